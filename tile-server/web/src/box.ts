@@ -1,0 +1,66 @@
+//! Pure geometry of longitude-latitude boxes: corners or typed text in, a box, its text and its outline out. Degrees throughout.
+import { wrapLon } from "./format";
+
+/** West, south, east, north. West greater than east means that the box crosses the date line. */
+export type Bounds = readonly [west: number, south: number, east: number, north: number];
+
+export interface LonLat {
+  readonly lon: number;
+  readonly lat: number;
+}
+
+/** The smaller of the two boxes between the corners: across the date line where that is the short way. */
+export function boxFromCorners(a: LonLat, b: LonLat): Bounds {
+  const [south, north] = [Math.min(a.lat, b.lat), Math.max(a.lat, b.lat)];
+  const eastward = (((b.lon - a.lon) % 360) + 360) % 360;
+  const [west, east] = eastward <= 180 ? [a.lon, b.lon] : [b.lon, a.lon];
+  return [tidy(wrapLon(west)), tidy(south), tidy(wrapLon(east)), tidy(north)];
+}
+
+/** Reads `W,S,E,N`; a string result is the reason why not. */
+export function parseBox(text: string): Bounds | string {
+  const parts = text.split(/[,;\s]+/).filter((part) => part !== "");
+  if (parts.length !== 4) return "Four numbers are needed: west, south, east, north.";
+  const numbers = parts.map(Number);
+  if (numbers.some((number) => !Number.isFinite(number))) return "West, south, east and north must be numbers in degrees.";
+  const [west, south, east, north] = numbers as [number, number, number, number];
+  if (south < -90 || north > 90) return "Latitudes run from -90 to 90.";
+  if (south >= north) return "South must lie below north.";
+  if (west < -180 || west > 360 || east < -180 || east > 360) return "Longitudes run from -180 to 180 (or 0 to 360).";
+  if (west === east) return "West and east are the same.";
+  return [west, south, east, north];
+}
+
+export function boxText(box: Bounds): string {
+  return box.join(",");
+}
+
+export function isWhole(box: Bounds): boolean {
+  return box[2] - box[0] >= 360;
+}
+
+export function contains(box: Bounds, point: LonLat): boolean {
+  const [west, south, east, north] = box;
+  if (point.lat < south || point.lat > north) return false;
+  if (isWhole(box)) return true;
+  const width = (((east - west) % 360) + 360) % 360;
+  return (((point.lon - west) % 360) + 360) % 360 <= width;
+}
+
+/** Closed outline with a point at least every `stepDeg`, so that edges follow parallels instead of cutting through the globe. */
+export function outline(box: Bounds, stepDeg = 2): LonLat[] {
+  const [west, south, , north] = box;
+  const width = isWhole(box) ? 360 : (((box[2] - west) % 360) + 360) % 360;
+  const across = Math.max(1, Math.ceil(width / stepDeg));
+  const up = Math.max(1, Math.ceil((north - south) / stepDeg));
+  const points: LonLat[] = [];
+  for (let i = 0; i <= across; i++) points.push({ lon: west + (width * i) / across, lat: south });
+  for (let i = 1; i <= up; i++) points.push({ lon: west + width, lat: south + ((north - south) * i) / up });
+  for (let i = 1; i <= across; i++) points.push({ lon: west + width - (width * i) / across, lat: north });
+  for (let i = 1; i <= up; i++) points.push({ lon: west, lat: north - ((north - south) * i) / up });
+  return points;
+}
+
+function tidy(degrees: number): number {
+  return Math.round(degrees * 100) / 100;
+}

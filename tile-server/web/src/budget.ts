@@ -1,0 +1,122 @@
+//! The budget panel: region, period and earth in; total, coverage, bars, a table and citable downloads out.
+import * as api from "./api";
+import type { Budget, BudgetQuery, Region } from "./api";
+import { BudgetForm } from "./budget-form";
+import type { Bounds } from "./box";
+import { barChart, type Chart } from "./chart";
+import { budgetCsv } from "./csv";
+import { el, icon, saveText } from "./dom";
+import { areaText, numberText, unitText } from "./format";
+import { DOWNLOAD } from "./icons";
+import { manifestLine } from "./manifest";
+import type { Store } from "./state";
+import type { Step } from "./time";
+
+const TG_PER_PG = 1000;
+
+export interface BudgetContext {
+  store: Store;
+  drawBox: (onChange: (box: Bounds) => void, onEnd: (box: Bounds | undefined) => void) => void;
+  markRegion: (box: Bounds | null) => void;
+  onError: (key: string, error: unknown) => void;
+}
+
+export class BudgetPanel {
+  readonly #context: BudgetContext;
+  readonly #form: BudgetForm;
+  readonly #result = el("div", { class: "budget-result", "aria-live": "polite" });
+  #asked: AbortController | undefined;
+  #chart: Chart | undefined;
+  /** What the result in sight answers, so that opening the panel again asks nothing twice. */
+  #answered = "";
+
+  constructor(body: HTMLElement, context: BudgetContext) {
+    this.#context = context;
+    this.#form = new BudgetForm({
+      onChange: () => void this.refresh(),
+      onRegion: (region) => context.store.set({ region }),
+      drawBox: context.drawBox,
+      markRegion: context.markRegion,
+    });
+    body.append(this.#form.element, this.#result);
+    context.store.on(["product", "region", "tab"], () => void this.refresh());
+  }
+
+  setRegions(regions: readonly Region[]): void {
+    this.#form.setRegions(regions, this.#context.store.state.region);
+  }
+
+  setSteps(steps: readonly Step[]): void {
+    this.#form.setSteps(steps);
+    this.#answered = "";
+    void this.refresh();
+  }
+
+  /** Asks only while the panel is open: a budget is work for the server. */
+  async refresh(): Promise<void> {
+    const { product, region, tab } = this.#context.store.state;
+    const isOpen = tab === "budget";
+    this.#context.markRegion(isOpen ? this.#form.boundsOf(region) : null);
+    this.#form.show(region);
+    const query = isOpen && product !== null ? this.#form.query(region) : undefined;
+    if (!query || product === null) return;
+    const key = api.budgetUrl(product, query);
+    if (key === this.#answered) return;
+    this.#answered = key;
+    this.#asked?.abort();
+    const asked = new AbortController();
+    this.#asked = asked;
+    this.#result.classList.add("waiting");
+    if (!this.#result.hasChildNodes()) this.#result.append(el("p", { class: "muted busy-line" }, "Adding up …"));
+    try {
+      const [rows, total] = await Promise.all([api.budget(product, query, asked.signal), api.budget(product, { ...query, step: "total" }, asked.signal)]);
+      if (!asked.signal.aborted) this.#draw(query, rows, total, key);
+    } catch (error) {
+      if (asked.signal.aborted) return;
+      this.#answered = "";
+      this.#chart?.destroy();
+      this.#chart = undefined;
+      this.#result.replaceChildren(el("p", { class: "problem" }, error instanceof Error ? error.message : String(error)));
+      if (error instanceof api.ApiError && error.kind === "unreachable") this.#context.onError("budget", error);
+    } finally {
+      if (this.#asked === asked) this.#result.classList.remove("waiting");
+    }
+  }
+
+  #draw(query: BudgetQuery, answer: Budget, total: Budget, jsonUrl: string): void {
+    this.#chart?.destroy();
+    const unit = unitText(answer.unit);
+    const plot = el("div", { class: "plot", id: "budget-plot", role: "img", "aria-label": `Budget of ${answer.rows.length} periods in ${unit}` });
+    this.#result.replaceChildren(
+      ...this.#headline(total, unit),
+      plot,
+      manifestLine(answer.manifest),
+      el("div", { class: "row actions" },
+        el("button", { type: "button", onclick: () => saveText(`${answer.product}-budget-${answer.region.replace(/[^\w.-]+/g, "_")}.csv`, "text/csv", budgetCsv(answer)) }, icon(DOWNLOAD), "CSV"),
+        el("a", { class: "button", href: jsonUrl, target: "_blank", rel: "noopener" }, "JSON")),
+      el("details", {}, el("summary", {}, "All periods"), table(answer, unit)),
+    );
+    const rows = answer.rows.map((row) => ({ startMs: Date.parse(row.start), endMs: Date.parse(row.end), value: row.budget }));
+    this.#chart = barChart(plot, rows, query.step === "year" ? `${unit} per year` : `${unit} per period`);
+  }
+
+  #headline(total: Budget, unit: string): HTMLElement[] {
+    const row = total.rows[0];
+    if (!row) return [el("p", { class: "problem" }, "The period holds no stored step.")];
+    const isCarbon = total.unit === "Tg C";
+    const petagrams = isCarbon ? el("span", { class: "muted" }, `= ${numberText(row.budget / TG_PER_PG, 3)} Pg C`) : null;
+    return [
+      el("p", { class: "reading" }, el("strong", { id: "budget-total", "data-value": String(row.budget) }, numberText(row.budget, 1)), el("span", { class: "unit" }, unit), petagrams),
+      el("p", { class: "muted" },
+        `${row.start.slice(0, 10)} to ${row.end.slice(0, 10)}; coverage ${numberText(row.coverage_percent, 1)} % of ${areaText(row.area_m2)}. `,
+        isCarbon ? "Negative: the sea takes carbon up." : null),
+    ];
+  }
+}
+
+function table(answer: Budget, unit: string): HTMLElement {
+  const head = el("tr", {}, ...["From", "To", unit, "Coverage"].map((title) => el("th", { scope: "col" }, title)));
+  const rows = answer.rows.map((row) =>
+    el("tr", {}, el("td", {}, row.start.slice(0, 10)), el("td", {}, row.end.slice(0, 10)), el("td", { class: "number" }, numberText(row.budget, 2)), el("td", { class: "number" }, `${numberText(row.coverage_percent, 1)} %`)));
+  return el("div", { class: "table-scroll" }, el("table", { id: "budget-table" }, el("thead", {}, head), el("tbody", {}, ...rows)));
+}

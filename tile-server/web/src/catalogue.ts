@@ -1,0 +1,50 @@
+//! The products as the page uses them: steps parsed, zoom limits fetched once, and the layer that a state describes.
+import * as api from "./api";
+import type { Product } from "./api";
+import type { Mode, State } from "./state";
+import type { LayerSpec } from "./tiles";
+import { clampToRange, parseSteps, toIso, type Step } from "./time";
+
+/** Where the server does not say how deep its tiles go; Cesium stretches the deepest ones beyond. */
+const DEFAULT_MAX_ZOOM = 6;
+
+export class Catalogue {
+  readonly products: readonly Product[];
+  readonly #steps = new Map<string, readonly Step[]>();
+  readonly #maxZoom = new Map<string, number>();
+
+  constructor(products: readonly Product[]) {
+    this.products = products;
+    for (const product of products) this.#steps.set(product.id, parseSteps(product.steps));
+  }
+
+  find(id: string | null): Product | undefined {
+    return this.products.find((product) => product.id === id);
+  }
+
+  stepsOf(id: string | null): readonly Step[] {
+    return (id !== null && this.#steps.get(id)) || [];
+  }
+
+  /** Asks for a layer's zoom limits unless they are known. */
+  async learn(product: string, mode: Mode): Promise<void> {
+    const key = `${product}/${mode}`;
+    if (this.#maxZoom.has(key)) return;
+    const info = await api.layerInfo(product, mode);
+    this.#maxZoom.set(key, Number.isInteger(info.maxzoom) ? info.maxzoom : DEFAULT_MAX_ZOOM);
+  }
+
+  /** The layer to draw at `timeMs`; undefined until product and time are known. */
+  layerAt(state: Readonly<State>, timeMs: number): LayerSpec | undefined {
+    const product = this.find(state.product);
+    if (!product || !Number.isFinite(timeMs)) return undefined;
+    const clampedMs = clampToRange(this.stepsOf(product.id), timeMs);
+    return {
+      product: product.id,
+      mode: state.mode,
+      timeIso: toIso(clampedMs),
+      bounds: product.bounds,
+      maxZoom: this.#maxZoom.get(`${product.id}/${state.mode}`) ?? DEFAULT_MAX_ZOOM,
+    };
+  }
+}

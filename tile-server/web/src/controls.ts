@@ -1,0 +1,92 @@
+//! The layer card: product, mode, opacity, legend and what is loading; changes go to the store only.
+import type { Product } from "./api";
+import { el, icon } from "./dom";
+import { chemistry } from "./format";
+import { PICTURE } from "./icons";
+import { legendView } from "./legend";
+import { MODES, type Mode, type Store } from "./state";
+import type { TileCounts } from "./tiles";
+
+const MODE_TITLES: Record<Mode, string> = { map: "Map", points: "Points", sprites: "Sprites", volume: "Volume" };
+const MODE_HINTS: Record<Mode, string> = {
+  map: "Thematic map",
+  points: "Particles as points",
+  sprites: "Particles as soft sprites",
+  volume: "Particle volume, half-angle sliced: with shadows",
+};
+
+export class Controls {
+  readonly #store: Store;
+  readonly #product = el("select", { id: "product", "aria-label": "Product" });
+  readonly #modes = el("div", { class: "segments", role: "radiogroup", "aria-label": "Mode" });
+  readonly #legend = el("div", { class: "legend-slot" });
+  readonly #source = el("p", { class: "source" });
+  readonly #progress = el("div", { class: "progress", id: "progress", role: "status" });
+
+  constructor(container: HTMLElement, store: Store, onRenderView: () => void) {
+    this.#store = store;
+    const opacity = el("input", { type: "range", id: "opacity", min: "0", max: "1", step: "0.05", value: String(store.state.opacity) });
+    opacity.addEventListener("input", () => store.set({ opacity: Number(opacity.value) }));
+    this.#product.addEventListener("change", () => store.set({ product: this.#product.value }));
+    container.append(
+      el("header", { class: "brand" }, el("img", { src: "./favicon.svg", alt: "", width: "26", height: "26" }), el("h1", {}, "Fluxglobe"), this.#progress),
+      el("label", { class: "field" }, el("span", { class: "visually-hidden" }, "Product"), this.#product),
+      this.#modes,
+      this.#legend,
+      el("label", { class: "field row opacity" }, el("span", {}, "Opacity"), opacity),
+      el("button", { type: "button", class: "wide", id: "render-view", onclick: onRenderView }, icon(PICTURE), "Render this view"),
+      this.#source,
+    );
+    store.on(["mode"], () => this.#markMode());
+  }
+
+  setProducts(products: readonly Product[]): void {
+    this.#product.replaceChildren(...products.map((product) => el("option", { value: product.id }, chemistry(product.title) + (product.synthetic ? " (synthetic)" : ""))));
+  }
+
+  setProduct(product: Product): void {
+    this.#product.value = product.id;
+    this.#legend.replaceChildren(legendView(product.legend));
+    this.#source.textContent = chemistry(product.source);
+    this.#source.title = product.source;
+    this.#modes.replaceChildren(...MODES.map((mode) => this.#modeButton(mode, product.modes.includes(mode))));
+    this.#markMode();
+  }
+
+  /** The line of what is on its way; empty when all is there. */
+  watch(counts: TileCounts): void {
+    counts.onChange(() => {
+      const isBusy = counts.pending > 0;
+      this.#progress.classList.toggle("busy", isBusy);
+      this.#progress.textContent = isBusy ? `${counts.pending} ${counts.pending === 1 ? "tile" : "tiles"} on the way` : "";
+    });
+  }
+
+  #modeButton(mode: Mode, isOffered: boolean): HTMLElement {
+    return el("button", {
+      type: "button", role: "radio", class: "segment", "data-mode": mode, title: MODE_HINTS[mode], disabled: !isOffered,
+      onclick: () => this.#store.set({ mode }),
+      onkeydown: (event) => this.#turn(event as KeyboardEvent),
+    }, MODE_TITLES[mode]);
+  }
+
+  /** Arrow keys move within the group, as radio buttons do. */
+  #turn(event: KeyboardEvent): void {
+    const by = event.key === "ArrowRight" || event.key === "ArrowDown" ? 1 : event.key === "ArrowLeft" || event.key === "ArrowUp" ? -1 : 0;
+    if (by === 0) return;
+    event.preventDefault();
+    const offered = [...this.#modes.querySelectorAll<HTMLButtonElement>("button:not(:disabled)")];
+    const at = offered.findIndex((button) => button.dataset["mode"] === this.#store.state.mode);
+    const next = offered[(at + by + offered.length) % offered.length];
+    next?.click();
+    next?.focus();
+  }
+
+  #markMode(): void {
+    for (const button of this.#modes.querySelectorAll<HTMLButtonElement>("button")) {
+      const isChosen = button.dataset["mode"] === this.#store.state.mode;
+      button.setAttribute("aria-checked", String(isChosen));
+      button.tabIndex = isChosen ? 0 : -1;
+    }
+  }
+}

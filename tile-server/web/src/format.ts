@@ -1,0 +1,77 @@
+//! Pure formatting: unit strings and numbers in, text with proper minus signs, superscripts and subscripts out.
+
+const SUPERSCRIPT: Record<string, string> = {
+  "-": "⁻", "+": "⁺", "0": "⁰", "1": "¹", "2": "²", "3": "³", "4": "⁴", "5": "⁵", "6": "⁶", "7": "⁷", "8": "⁸", "9": "⁹",
+};
+const THIN_SPACE = "\u2009";
+const NARROW_NO_BREAK_SPACE = "\u202f";
+const MINUS = "\u2212";
+
+/** `g C m-2 yr-1`, `m^-2` or `m**-2` become `g C m⁻² yr⁻¹`; text that is set already stays as it is. */
+export function unitText(unit: string): string {
+  const set = unit
+    .trim()
+    .replace(/([A-Za-zµμ%°])(?:\^|\*\*)?([-+]?\d+)(?=$|[\s/·.)])/g, (_match, symbol: string, power: string) => symbol + superscript(power))
+    .replace(/\bdegC\b|\bdegree_?[Cc]elsius\b/g, "°C")
+    .replace(/\s+/g, NARROW_NO_BREAK_SPACE);
+  return chemistry(set);
+}
+
+/** CO2, pCO2, fCO2 get their subscript; used for titles too. */
+export function chemistry(text: string): string {
+  return text.replace(/CO2/g, "CO₂").replace(/\bO2\b/g, "O₂");
+}
+
+function superscript(power: string): string {
+  return [...power].map((sign) => SUPERSCRIPT[sign] ?? sign).join("");
+}
+
+/** A number with `digits` decimals, thin spaces between thousands and a true minus sign; no-data is an en dash. */
+export function numberText(value: number | null | undefined, digits: number): string {
+  if (value === null || value === undefined || !Number.isFinite(value)) return "–";
+  const [whole = "0", fraction] = Math.abs(value).toFixed(digits).split(".");
+  const grouped = whole.replace(/\B(?=(\d{3})+$)/g, THIN_SPACE);
+  const text = fraction ? `${grouped}.${fraction}` : grouped;
+  // A rounded zero has no sign: "−0.0" would tell the reader something that the digits do not.
+  const isZero = !/[1-9]/.test(text);
+  return value < 0 && !isZero ? MINUS + text : text;
+}
+
+/** Decimals that show about `significant` figures of numbers as large as `magnitude`, 0 to 6. */
+export function digitsFor(magnitude: number, significant: number): number {
+  if (!Number.isFinite(magnitude) || magnitude === 0) return 2;
+  const leading = Math.floor(Math.log10(Math.abs(magnitude)));
+  return Math.min(6, Math.max(0, significant - 1 - leading));
+}
+
+/** A single value with about `significant` figures. */
+export function valueText(value: number | null | undefined, significant = 4): string {
+  return numberText(value, digitsFor(value ?? 0, significant));
+}
+
+/** `12.50° N`; zero has no hemisphere. */
+export function latText(latDeg: number, digits = 2): string {
+  return degreesText(latDeg, digits, latDeg >= 0 ? "N" : "S");
+}
+
+/** `45.00° W`; longitudes are brought to -180..180 first. */
+export function lonText(lonDeg: number, digits = 2): string {
+  const wrapped = wrapLon(lonDeg);
+  return degreesText(wrapped, digits, wrapped >= 0 ? "E" : "W");
+}
+
+function degreesText(degrees: number, digits: number, hemisphere: string): string {
+  const text = Math.abs(degrees).toFixed(digits);
+  return Number(text) === 0 ? `${text}°` : `${text}° ${hemisphere}`;
+}
+
+export function wrapLon(lonDeg: number): number {
+  const turned = (((lonDeg + 180) % 360) + 360) % 360;
+  return turned - 180;
+}
+
+/** Area in m² as millions of km², the size people know oceans by. */
+export function areaText(areaM2: number): string {
+  const millionKm2 = areaM2 / 1e12;
+  return `${numberText(millionKm2, digitsFor(millionKm2, 4))} million km²`;
+}

@@ -1,0 +1,160 @@
+//! The page's wiring: reads the address, asks for the catalogue, and joins store, globe, layers and cards.
+import "cesium/Build/Cesium/Widgets/CesiumWidget/CesiumWidget.css";
+import "./style.css";
+import * as api from "./api";
+import { BudgetPanel } from "./budget";
+import { contains } from "./box";
+import { CameraButtons } from "./camera";
+import { Catalogue } from "./catalogue";
+import { drawCheck } from "./check";
+import { Connection } from "./connection";
+import { Controls } from "./controls";
+import { byId } from "./dom";
+import { Globe } from "./globe";
+import { decodeHash, encodeHash } from "./hash";
+import { LayerStage } from "./layers";
+import { Marks } from "./marks";
+import { Notices } from "./notices";
+import { Panels } from "./panels";
+import { PlacePanel } from "./place";
+import { Playback } from "./playback";
+import { Pointer } from "./pointer";
+import { Presenter } from "./presenter";
+import { installProbe } from "./probe";
+import { globeOptions } from "./quality";
+import { INITIAL, Store } from "./state";
+import { TileCounts } from "./tiles";
+import { Timeline } from "./timeline";
+import { clampToRange } from "./time";
+import { ViewDialog } from "./view";
+
+/** Browsers refuse a page that rewrites its address too often. */
+const ADDRESS_PAUSE_MS = 300;
+
+const asked = decodeHash(location.hash);
+const store = new Store({ ...INITIAL, ...asked });
+const notices = new Notices();
+let catalogue = new Catalogue([]);
+
+const globe = new Globe(byId("globe"), byId("credits"), globeOptions());
+const counts = new TileCounts();
+const connection = new Connection(notices, () => store.set({ playing: false }), () => void begin());
+const stage = new LayerStage(globe.scene, counts, store.state.opacity, (status, url) => void connection.tileFailed(status, url));
+const presenter = new Presenter(stage);
+const marks = new Marks(globe.scene);
+const pointer = new Pointer(globe, (place) => store.set({ place, tab: "place" }));
+const steps = () => catalogue.stepsOf(store.state.product);
+const product = () => catalogue.find(store.state.product);
+const report = (key: string, error: unknown) => connection.report(key, error);
+
+const view = new ViewDialog(store, () => product()?.modes ?? [], () => product()?.synthetic ?? false);
+const controls = new Controls(byId("controls"), store, () => view.open());
+const timeline = new Timeline(byId("timeline"), store);
+const panels = new Panels(byId("panels"), store);
+const placePanel = new PlacePanel(panels.bodies.place, { store, steps, label: () => product()?.legend.label ?? "", onError: report });
+const budgetPanel = new BudgetPanel(panels.bodies.budget, {
+  store,
+  drawBox: (onChange, onEnd) => pointer.drawBox(onChange, onEnd),
+  markRegion: (box) => marks.region(box),
+  onError: report,
+});
+new CameraButtons(byId("camera"), globe);
+new Playback(store, presenter, steps, (timeMs) => catalogue.layerAt(store.state, timeMs));
+const probe = installProbe(store, counts, globe, () => stage.shownKey);
+
+controls.watch(counts);
+globe.view = store.state.camera;
+globe.scene.camera.percentageChanged = 0.01;
+globe.scene.camera.changed.addEventListener(() => store.set({ camera: globe.view }));
+globe.scene.camera.moveEnd.addEventListener(() => store.set({ camera: globe.view }));
+
+store.on(["opacity"], (state) => { stage.opacity = state.opacity; });
+store.on(["place"], (state) => marks.place(state.place));
+store.on(["product"], () => useProduct());
+store.on(["mode", "product"], (state) => {
+  if (state.product === null) return;
+  catalogue.learn(state.product, state.mode).then(showLayer, (error: unknown) => report("layer", error));
+});
+store.on(["timeMs"], showLayer);
+keepAddress();
+void begin();
+
+/** Loads what the page needs; again after a lost connection, when only what changed is drawn anew. */
+async function begin(): Promise<void> {
+  try {
+    catalogue = new Catalogue(await api.products());
+  } catch (error) {
+    report("products", error);
+    return;
+  }
+  notices.clear("products");
+  const first = catalogue.products[0];
+  if (!first) {
+    notices.show("products", "The server has no products yet. Ingest a file and load this page again.");
+    return;
+  }
+  controls.setProducts(catalogue.products);
+  const wanted = store.state.product;
+  if (wanted !== null && !catalogue.find(wanted)) notices.show("product", `The server has no product “${wanted}”; showing “${first.title}” instead.`);
+  presenter.reset();
+  const chosen = catalogue.find(wanted) ?? first;
+  if (store.state.product === chosen.id) useProduct();
+  else store.set({ product: chosen.id });
+  await catalogue.learn(chosen.id, store.state.mode).catch((error: unknown) => report("layer", error));
+  showLayer();
+  void presenter.idle().then(() => probe.setReady());
+  await loadAside();
+}
+
+/** Regions and the check table: the globe does not wait for them. */
+async function loadAside(): Promise<void> {
+  await Promise.all([
+    api.regions().then((regions) => budgetPanel.setRegions(regions)).catch((error: unknown) => report("regions", error)),
+    api.check().then((check) => {
+      panels.offer("check", check !== undefined);
+      if (check) drawCheck(panels.bodies.check, check);
+    }).catch((error: unknown) => report("check", error)),
+  ]);
+  marks.place(store.state.place);
+  await Promise.all([placePanel.refresh(), budgetPanel.refresh()]);
+}
+
+function useProduct(): void {
+  const chosen = product();
+  if (!chosen) return;
+  controls.setProduct(chosen);
+  byId("synthetic").hidden = !chosen.synthetic;
+  document.body.classList.toggle("is-synthetic", chosen.synthetic);
+  document.title = `${chosen.title}${chosen.synthetic ? " (synthetic)" : ""} – Fluxglobe`;
+  const known = steps();
+  timeline.setSteps(known);
+  budgetPanel.setSteps(known);
+  if (known.length === 0) notices.show("steps", `“${chosen.title}” has no periods yet.`);
+  else notices.clear("steps");
+  const mode = chosen.modes.includes(store.state.mode) ? store.state.mode : (chosen.modes[0] ?? "map");
+  const timeMs = Number.isFinite(store.state.timeMs) ? clampToRange(known, store.state.timeMs) : (known[0]?.midMs ?? Number.NaN);
+  store.set({ mode, timeMs });
+  if (!contains(chosen.bounds, store.state.camera) && asked.camera === undefined) globe.lookAt(chosen.bounds);
+}
+
+function showLayer(): void {
+  const spec = catalogue.layerAt(store.state, store.state.timeMs);
+  if (spec) presenter.want(spec);
+}
+
+function keepAddress(): void {
+  let timer: ReturnType<typeof setTimeout> | undefined;
+  store.on(["product", "mode", "timeMs", "camera", "opacity", "place", "tab", "region"], () => {
+    timer ??= setTimeout(() => {
+      timer = undefined;
+      history.replaceState(null, "", encodeHash(store.state));
+    }, ADDRESS_PAUSE_MS);
+  });
+  // A hash that is typed or pasted into an open page is meant as a whole new view.
+  window.addEventListener("hashchange", () => {
+    const change = decodeHash(location.hash);
+    if (change.product !== undefined && !catalogue.find(change.product)) delete change.product;
+    if (change.camera) globe.view = change.camera;
+    store.set(change);
+  });
+}

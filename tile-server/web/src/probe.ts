@@ -1,0 +1,37 @@
+//! `window.fluxglobe`: what a test or a curious reader may watch, never change.
+import type { Globe } from "./globe";
+import type { State, Store } from "./state";
+import type { TileCounts } from "./tiles";
+
+export interface Probe {
+  /** The catalogue is there and the first layer is drawn. */
+  readonly ready: boolean;
+  readonly tilesLoaded: number;
+  readonly tilesPending: number;
+  readonly tilesFailed: number;
+  /** `product/mode@instant` of the layer in sight. */
+  readonly shown: string | undefined;
+  readonly state: Readonly<State>;
+  /** Canvas point of a place in CSS pixels; undefined when it is on the far side. */
+  project(lon: number, lat: number): { x: number; y: number } | undefined;
+}
+
+declare global {
+  interface Window {
+    fluxglobe: Probe;
+  }
+}
+
+export function installProbe(store: Store, counts: TileCounts, globe: Globe, shown: () => string | undefined): { setReady: () => void } {
+  let isReady = false;
+  window.fluxglobe = {
+    get ready() { return isReady; },
+    get tilesLoaded() { return counts.loaded; },
+    get tilesPending() { return counts.pending; },
+    get tilesFailed() { return counts.failed; },
+    get shown() { return shown(); },
+    get state() { return store.state; },
+    project: (lon, lat) => globe.project({ lon, lat }),
+  };
+  return { setReady: () => { isReady = true; } };
+}

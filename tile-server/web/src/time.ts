@@ -1,0 +1,112 @@
+//! Pure time maths: product steps and instants in, positions on the time axis, quantised instants and readable labels out. All times are UTC.
+
+/** One stored period of a product. Instants in milliseconds since 1970-01-01T00:00:00Z; `endMs` is exclusive. */
+export interface Step {
+  readonly startMs: number;
+  readonly endMs: number;
+  readonly midMs: number;
+}
+
+/** Playback and dragging ask for instants on this raster only, so that a second pass finds its tiles cached. */
+export const PARTS_PER_STEP = 8;
+
+const DAY_MS = 86_400_000;
+const MONTHS = ["Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec"];
+
+export function parseSteps(raw: readonly { start: string; end: string; mid: string }[]): Step[] {
+  return raw
+    .map((step) => ({ startMs: Date.parse(step.start), endMs: Date.parse(step.end), midMs: Date.parse(step.mid) }))
+    .filter((step) => Number.isFinite(step.startMs) && Number.isFinite(step.midMs) && step.endMs > step.startMs)
+    .sort((a, b) => a.startMs - b.startMs);
+}
+
+/** First start and last end; undefined for a product without steps. */
+export function rangeOf(steps: readonly Step[]): { startMs: number; endMs: number } | undefined {
+  const first = steps[0];
+  const last = steps[steps.length - 1];
+  return first && last ? { startMs: first.startMs, endMs: last.endMs } : undefined;
+}
+
+export function clampToRange(steps: readonly Step[], timeMs: number): number {
+  const range = rangeOf(steps);
+  return range ? Math.min(Math.max(timeMs, range.startMs), range.endMs) : timeMs;
+}
+
+/**
+ * Place of an instant on the axis of steps: 2.25 is a quarter into the third step.
+ * An instant in a hole between two steps is at the start of the later one.
+ */
+export function positionOf(steps: readonly Step[], timeMs: number): number {
+  let low = 0;
+  let high = steps.length;
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if ((steps[middle] as Step).endMs <= timeMs) low = middle + 1;
+    else high = middle;
+  }
+  const step = steps[low];
+  if (!step) return steps.length;
+  return low + Math.max(0, timeMs - step.startMs) / (step.endMs - step.startMs);
+}
+
+/** Inverse of `positionOf`, clamped to the range. */
+export function instantAt(steps: readonly Step[], position: number): number {
+  const last = steps[steps.length - 1];
+  if (!last) return Number.NaN;
+  if (position >= steps.length) return last.endMs;
+  const index = Math.max(0, Math.floor(position));
+  const step = steps[index] as Step;
+  return step.startMs + Math.max(0, position - index) * (step.endMs - step.startMs);
+}
+
+/** Nearest instant on the raster of `PARTS_PER_STEP` parts of a step, to the whole second. */
+export function quantise(steps: readonly Step[], timeMs: number): number {
+  const position = Math.round(positionOf(steps, timeMs) * PARTS_PER_STEP) / PARTS_PER_STEP;
+  return wholeSecond(instantAt(steps, position));
+}
+
+/**
+ * The next playback instant: `strideParts` parts of a step on, on multiples of the stride, and from the end to the start.
+ * The last raster point (the end of the range) shows what the range's last middle shows, so the loop skips it.
+ */
+export function nextInstant(steps: readonly Step[], timeMs: number, strideParts: number): number {
+  const parts = Math.round(positionOf(steps, timeMs) * PARTS_PER_STEP);
+  const next = (Math.floor(parts / strideParts) + 1) * strideParts;
+  return wholeSecond(instantAt(steps, next >= steps.length * PARTS_PER_STEP ? 0 : next / PARTS_PER_STEP));
+}
+
+/**
+ * How many parts of a step playback advances at once, a power of two up to a whole step: a server that needs longer
+ * for a frame than the speed allows gets fewer frames to draw, and the pace stays nearer to what was asked.
+ */
+export function strideFor(loadMs: number, frameMs: number): number {
+  let stride = 1;
+  while (stride < PARTS_PER_STEP && loadMs > stride * frameMs * 1.5) stride *= 2;
+  return stride;
+}
+
+/** `2000-01-16T12:00:00Z`: seconds, no fraction, as the server writes them. */
+export function toIso(timeMs: number): string {
+  return `${new Date(timeMs).toISOString().slice(0, 19)}Z`;
+}
+
+export function formatInstant(timeMs: number): string {
+  const date = new Date(timeMs);
+  const time = date.toISOString().slice(11, 16);
+  return `${date.getUTCDate()} ${MONTHS[date.getUTCMonth()]} ${date.getUTCFullYear()}, ${time} UTC`;
+}
+
+/** Shortest label that tells one step of the product from the next: month, day, or day and hour. */
+export function stepLabel(step: Step): string {
+  const start = new Date(step.startMs);
+  const days = (step.endMs - step.startMs) / DAY_MS;
+  const month = MONTHS[start.getUTCMonth()];
+  if (days > 300) return `${start.getUTCFullYear()}`;
+  if (days >= 27) return `${month} ${start.getUTCFullYear()}`;
+  const day = `${start.getUTCDate()} ${month} ${start.getUTCFullYear()}`;
+  return days >= 1 ? day : `${day} ${start.toISOString().slice(11, 16)}`;
+}
+
+function wholeSecond(timeMs: number): number {
+  return Math.round(timeMs / 1000) * 1000;
+}
