@@ -1,0 +1,80 @@
+//! How a grid is cut into chunks: the rows of stored frames and the unit of every array kernel.
+
+use crate::grid::Grid;
+
+/// Chunk rows of a frame. 1-degree grids make 3 x 3 chunks, the 1/60-degree China Sea 41 x 15.
+pub const CHUNK_ROWS: u32 = 60;
+/// Chunk columns of a frame.
+pub const CHUNK_COLS: u32 = 120;
+
+/// A rectangle of cells of a grid, row 0 north.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Window {
+    /// First row.
+    pub row: u32,
+    /// First column.
+    pub col: u32,
+    /// Number of rows, at least 1.
+    pub rows: u32,
+    /// Number of columns, at least 1.
+    pub cols: u32,
+}
+
+impl Window {
+    /// Number of cells.
+    pub fn cell_count(self) -> usize {
+        self.rows as usize * self.cols as usize
+    }
+
+    /// Flat row-major indices into the grid, in the row-major order of the window.
+    pub fn cell_indices(self, grid: &Grid) -> impl Iterator<Item = usize> + use<> {
+        let grid_cols = grid.cols as usize;
+        (self.row..self.row + self.rows).flat_map(move |r| {
+            let start = r as usize * grid_cols + self.col as usize;
+            start..start + self.cols as usize
+        })
+    }
+}
+
+/// Windows that tile `grid` in blocks of `rows` x `cols`, north to south, then west to east; edge blocks are smaller.
+///
+/// # Panics
+/// Never for blocks of at least one cell; `rows` and `cols` are compile-time constants of their callers.
+pub fn windows(grid: &Grid, rows: u32, cols: u32) -> Vec<Window> {
+    (0..grid.rows.div_ceil(rows))
+        .flat_map(|i| (0..grid.cols.div_ceil(cols)).map(move |j| (i * rows, j * cols)))
+        .map(|(row, col)| Window {
+            row,
+            col,
+            rows: rows.min(grid.rows - row),
+            cols: cols.min(grid.cols - col),
+        })
+        .collect()
+}
+
+/// The chunks of a frame of `grid`; a chunk's number is its place in this list.
+pub fn frame_chunks(grid: &Grid) -> Vec<Window> {
+    windows(grid, CHUNK_ROWS, CHUNK_COLS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn chunks_cover_every_cell_once() {
+        let grid = Grid {
+            rows: 125,
+            cols: 250,
+            north_deg: 10.0,
+            west_deg: 100.0,
+            dlat_deg: 0.1,
+            dlon_deg: 0.1,
+        };
+        let mut seen = vec![0u8; grid.cell_count()];
+        for window in frame_chunks(&grid) {
+            window.cell_indices(&grid).for_each(|i| seen[i] += 1);
+        }
+        assert!(seen.iter().all(|&n| n == 1));
+    }
+}

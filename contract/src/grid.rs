@@ -1,0 +1,260 @@
+//! The one grid every stored product uses: regular latitude-longitude, row 0 north, columns eastwards.
+
+use serde::{Deserialize, Serialize};
+
+use crate::ContractError;
+use crate::earth::Earth;
+
+/// Most cells a stored grid may have: 2^28, a global 1/60-degree grid.
+pub const MAX_CELLS: u64 = 1 << 28;
+
+/// A place: longitude in [-180, 180), latitude in [-90, 90], degrees.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct LonLatDeg {
+    /// Longitude, degrees east.
+    pub lon: f64,
+    /// Latitude, degrees north.
+    pub lat: f64,
+}
+
+impl LonLatDeg {
+    /// A place with its longitude wrapped into [-180, 180).
+    ///
+    /// # Errors
+    /// Not finite, a latitude beyond the poles, or a longitude beyond two turns.
+    pub fn new(lon: f64, lat: f64) -> Result<Self, ContractError> {
+        if !lon.is_finite() || !lat.is_finite() || lat.abs() > 90.0 || lon.abs() > 720.0 {
+            let text = format!("{lon},{lat}");
+            return Err(ContractError::invalid(
+                "place",
+                &text,
+                "longitude, latitude in degrees, latitude -90 to 90",
+            ));
+        }
+        Ok(Self {
+            lon: wrap_lon_deg(lon),
+            lat,
+        })
+    }
+}
+
+/// Longitude wrapped into [-180, 180).
+pub fn wrap_lon_deg(lon: f64) -> f64 {
+    (lon + 180.0).rem_euclid(360.0) - 180.0
+}
+
+/// A regular latitude-longitude grid of cells. Values are row-major `[row, col]`, NaN where there is no data.
+///
+/// `north_deg` and `west_deg` are *edges* of the first row and column, never centres. Grids that cross the date
+/// line go on eastwards past 180.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Grid {
+    /// Number of rows, north to south.
+    pub rows: u32,
+    /// Number of columns, west to east.
+    pub cols: u32,
+    /// Northern edge of row 0, degrees.
+    pub north_deg: f64,
+    /// Western edge of column 0, degrees, in [-180, 180).
+    pub west_deg: f64,
+    /// Height of a cell, degrees, positive.
+    pub dlat_deg: f64,
+    /// Width of a cell, degrees, positive.
+    pub dlon_deg: f64,
+}
+
+/// Slack for edges computed from rounded coordinates, in cells.
+const EDGE_SLACK_CELLS: f64 = 1e-3;
+
+impl Grid {
+    /// Checks the invariants of a grid that came from outside.
+    ///
+    /// # Errors
+    /// Empty or too large (more than [`MAX_CELLS`]), not finite, past the poles, or wider than a full turn.
+    pub fn validate(&self) -> Result<(), ContractError> {
+        let bad = |reason: &str| Err(ContractError::invalid("grid", &format!("{self:?}"), reason));
+        let numbers = [self.north_deg, self.west_deg, self.dlat_deg, self.dlon_deg];
+        if self.rows == 0
+            || self.cols == 0
+            || u64::from(self.rows) * u64::from(self.cols) > MAX_CELLS
+        {
+            return bad("it has no cells or more than 268435456");
+        }
+        if numbers.iter().any(|v| !v.is_finite()) || self.dlat_deg <= 0.0 || self.dlon_deg <= 0.0 {
+            return bad("steps must be positive and finite");
+        }
+        let slack = EDGE_SLACK_CELLS * self.dlat_deg;
+        if self.north_deg > 90.0 + slack || self.south_deg() < -90.0 - slack {
+            return bad("it reaches past a pole");
+        }
+        if f64::from(self.cols) * self.dlon_deg > 360.0 + EDGE_SLACK_CELLS * self.dlon_deg {
+            return bad("it is wider than 360 degrees");
+        }
+        if !(-180.0..180.0).contains(&self.west_deg) {
+            return bad("its western edge must lie in [-180, 180)");
+        }
+        Ok(())
+    }
+
+    /// Number of cells.
+    pub fn cell_count(&self) -> usize {
+        self.rows as usize * self.cols as usize
+    }
+
+    /// Southern edge of the last row, degrees.
+    pub fn south_deg(&self) -> f64 {
+        self.north_deg - f64::from(self.rows) * self.dlat_deg
+    }
+
+    /// Eastern edge of the last column, degrees; past 180 where the grid crosses the date line.
+    pub fn east_deg(&self) -> f64 {
+        self.west_deg + f64::from(self.cols) * self.dlon_deg
+    }
+
+    /// Does the grid go all the way round?
+    pub fn is_periodic(&self) -> bool {
+        (f64::from(self.cols) * self.dlon_deg - 360.0).abs() < EDGE_SLACK_CELLS * self.dlon_deg
+    }
+
+    /// Northern edge of `row`, degrees, never past a pole.
+    pub fn row_north_deg(&self, row: u32) -> f64 {
+        (self.north_deg - f64::from(row) * self.dlat_deg).clamp(-90.0, 90.0)
+    }
+
+    /// Western edge of `col`, degrees, not wrapped.
+    pub fn col_west_deg(&self, col: u32) -> f64 {
+        self.west_deg + f64::from(col) * self.dlon_deg
+    }
+
+    /// Centre of a cell, longitude wrapped.
+    pub fn cell_center(&self, row: u32, col: u32) -> LonLatDeg {
+        LonLatDeg {
+            lon: wrap_lon_deg(self.col_west_deg(col) + 0.5 * self.dlon_deg),
+            lat: 0.5 * (self.row_north_deg(row) + self.row_north_deg(row + 1)),
+        }
+    }
+
+    /// The cell that holds a place: `(row, col)`; none outside the grid. Northern and western edges belong to a cell.
+    pub fn cell_at(&self, place: LonLatDeg) -> Option<(u32, u32)> {
+        let row = ((self.north_deg - place.lat) / self.dlat_deg).floor();
+        let row = if place.lat <= -90.0 {
+            row.min(f64::from(self.rows) - 1.0)
+        } else {
+            row
+        };
+        let east = (place.lon - self.west_deg).rem_euclid(360.0);
+        let col = (east / self.dlon_deg).floor();
+        let inside = row >= 0.0 && row < f64::from(self.rows) && col < f64::from(self.cols);
+        inside.then_some((row as u32, col as u32))
+    }
+
+    /// Area of one cell of `row`, m².
+    pub fn cell_area_m2(&self, row: u32, earth: Earth) -> f64 {
+        earth.cell_area_m2(
+            self.row_north_deg(row + 1),
+            self.row_north_deg(row),
+            self.dlon_deg,
+        )
+    }
+
+    /// Bounds as west, south, east, north in degrees.
+    pub fn bounds_deg(&self) -> [f64; 4] {
+        [
+            self.west_deg,
+            self.south_deg(),
+            self.east_deg(),
+            self.north_deg,
+        ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    pub(crate) const ONE_DEGREE: Grid = Grid {
+        rows: 180,
+        cols: 360,
+        north_deg: 90.0,
+        west_deg: -180.0,
+        dlat_deg: 1.0,
+        dlon_deg: 1.0,
+    };
+
+    #[test]
+    fn cell_areas_sum_to_the_earth() {
+        for earth in [Earth::Wgs84, Earth::Sphere] {
+            let sum: f64 = (0..180)
+                .map(|r| 360.0 * ONE_DEGREE.cell_area_m2(r, earth))
+                .sum();
+            assert!((sum / earth.cell_area_m2(-90.0, 90.0, 360.0) - 1.0).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn poles_and_date_line_have_a_cell() {
+        let at = |lon, lat| ONE_DEGREE.cell_at(LonLatDeg::new(lon, lat).unwrap());
+        assert_eq!(at(0.0, 90.0), Some((0, 180)));
+        assert_eq!(at(0.0, -90.0), Some((179, 180)));
+        assert_eq!(at(180.0, 0.5), Some((89, 0)));
+        assert_eq!(at(-180.0, 0.5), Some((89, 0)));
+        assert_eq!(at(179.999, 0.5), Some((89, 359)));
+    }
+
+    #[test]
+    fn a_grid_across_the_date_line_finds_both_sides() {
+        let grid = Grid {
+            rows: 10,
+            cols: 20,
+            north_deg: 5.0,
+            west_deg: 170.0,
+            dlat_deg: 1.0,
+            dlon_deg: 1.0,
+        };
+        assert_eq!(
+            grid.cell_at(LonLatDeg {
+                lon: -179.5,
+                lat: 4.5
+            }),
+            Some((0, 10))
+        );
+        assert_eq!(
+            grid.cell_at(LonLatDeg {
+                lon: 169.5,
+                lat: 4.5
+            }),
+            None
+        );
+    }
+
+    #[test]
+    fn hostile_grids_are_refused() {
+        let huge = Grid {
+            rows: u32::MAX,
+            cols: u32::MAX,
+            ..ONE_DEGREE
+        };
+        let past_pole = Grid {
+            north_deg: 90.5,
+            ..ONE_DEGREE
+        };
+        let not_a_number = Grid {
+            dlat_deg: f64::NAN,
+            ..ONE_DEGREE
+        };
+        assert!(
+            [huge, past_pole, not_a_number]
+                .iter()
+                .all(|g| g.validate().is_err())
+        );
+        assert!(ONE_DEGREE.validate().is_ok());
+    }
+
+    proptest! {
+        #[test]
+        fn a_cell_holds_its_centre(row in 0u32..180, col in 0u32..360) {
+            prop_assert_eq!(ONE_DEGREE.cell_at(ONE_DEGREE.cell_center(row, col)), Some((row, col)));
+        }
+    }
+}

@@ -1,0 +1,354 @@
+//! Render jobs: everything that shapes a picture, and the digest of it that names the picture.
+
+use serde::{Deserialize, Serialize};
+
+use crate::ContractError;
+use crate::colour::TransferFunction;
+use crate::digest::Digest;
+use crate::key::ObjectKey;
+use crate::manifest::ManifestId;
+use crate::tile::Tile;
+use crate::time::TimeMs;
+
+/// Raised whenever the renderer draws the same job differently, so that old pictures are not taken for new ones.
+pub const RENDERER_VERSION: u32 = 1;
+/// Largest width and height of a picture, pixels.
+pub const MAX_IMAGE_PX: u32 = 4096;
+/// Most slices of a half-angle volume.
+pub const MAX_SLICES: u32 = 256;
+/// Most particles a cell may carry.
+pub const MAX_PARTICLES_PER_CELL: u32 = 256;
+/// Farthest camera above the ground, m.
+pub const MAX_CAMERA_HEIGHT_M: f64 = 1e9;
+
+/// How a product is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Mode {
+    /// Thematic map: the interpolated grid in colours.
+    Map,
+    /// One dot a particle.
+    Points,
+    /// Soft round sprites without shadows.
+    Sprites,
+    /// Half-angle-sliced volume with shadows.
+    Volume,
+}
+
+impl Mode {
+    /// All four, in the order they are offered.
+    pub const ALL: [Self; 4] = [Self::Map, Self::Points, Self::Sprites, Self::Volume];
+
+    /// Name in URLs and on the command line.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Map => "map",
+            Self::Points => "points",
+            Self::Sprites => "sprites",
+            Self::Volume => "volume",
+        }
+    }
+}
+
+impl std::fmt::Display for Mode {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.as_str())
+    }
+}
+
+impl std::str::FromStr for Mode {
+    type Err = ContractError;
+
+    fn from_str(s: &str) -> Result<Self, Self::Err> {
+        let found = Self::ALL.into_iter().find(|mode| mode.as_str() == s);
+        found.ok_or_else(|| ContractError::invalid("mode", s, "map, points, sprites or volume"))
+    }
+}
+
+/// From where a picture is taken.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum View {
+    /// A map tile; `size_px` pixels a side, 256 or 512.
+    Tile {
+        /// Address.
+        tile: Tile,
+        /// Pixels a side.
+        size_px: u32,
+    },
+    /// The globe in perspective, the camera looking at the earth's centre, north up.
+    Globe {
+        /// Longitude below the camera, degrees.
+        lon_deg: f64,
+        /// Latitude below the camera, degrees.
+        lat_deg: f64,
+        /// Height of the camera above the ground, m.
+        height_m: f64,
+        /// Picture width, pixels.
+        width_px: u32,
+        /// Picture height, pixels.
+        height_px: u32,
+    },
+}
+
+/// Where the light comes from, in the frame of east, north and up at every place of a map; for globe views the same
+/// frame at the point below the camera.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Sun {
+    /// Clockwise from north, degrees.
+    pub azimuth_deg: f64,
+    /// Above the horizon, degrees, 5 to 90.
+    pub elevation_deg: f64,
+}
+
+/// What a picture looks like.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Style {
+    /// Value to colour.
+    pub transfer: TransferFunction,
+    /// Height of one kilogram of accumulated carbon per square metre, m: the height exaggeration.
+    pub height_m_per_kg_m2: f64,
+    /// Half-angle slices over the range of particles, 1 to [`MAX_SLICES`].
+    pub slices: u32,
+    /// Particles of every cell with data, 1 to [`MAX_PARTICLES_PER_CELL`].
+    pub particles_per_cell: u32,
+    /// Optical depth looking straight through a cell's column at the top of the transfer function.
+    pub optical_depth: f64,
+    /// Light.
+    pub sun: Sun,
+    /// Draw a plain globe behind the particles of a globe view.
+    pub globe_surface: bool,
+}
+
+/// Everything that shapes a picture. Two jobs with the same digest are the same picture, byte for byte.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RenderJob {
+    /// [`RENDERER_VERSION`].
+    pub renderer_version: u32,
+    /// The product drawn.
+    pub product: ManifestId,
+    /// Accumulated carbon that lifts and sinks the particles; without it they lie in a thin sheet.
+    pub accumulated: Option<ManifestId>,
+    /// Instant; between stored steps the grids are interpolated.
+    pub time: TimeMs,
+    /// Mode.
+    pub mode: Mode,
+    /// View.
+    pub view: View,
+    /// Style.
+    pub style: Style,
+}
+
+impl Style {
+    /// What a picture looks like unless told otherwise.
+    pub fn with_transfer(transfer: TransferFunction) -> Self {
+        Self {
+            transfer,
+            height_m_per_kg_m2: 8.0e6,
+            slices: 64,
+            particles_per_cell: 16,
+            optical_depth: 1.5,
+            sun: Sun {
+                azimuth_deg: 315.0,
+                elevation_deg: 40.0,
+            },
+            globe_surface: false,
+        }
+    }
+
+    fn validate(&self) -> Result<(), ContractError> {
+        let numbers = [
+            self.transfer.low,
+            self.transfer.high,
+            self.height_m_per_kg_m2,
+            self.optical_depth,
+            self.sun.azimuth_deg,
+        ];
+        let bad = |reason: &str| {
+            Err(ContractError::invalid(
+                "style",
+                &format!("{self:?}"),
+                reason,
+            ))
+        };
+        if numbers.iter().any(|v| !v.is_finite()) || self.transfer.low >= self.transfer.high {
+            return bad("numbers must be finite and the transfer function must rise");
+        }
+        if !(1..=MAX_SLICES).contains(&self.slices) {
+            return bad("slices are 1 to 256");
+        }
+        if !(1..=MAX_PARTICLES_PER_CELL).contains(&self.particles_per_cell) {
+            return bad("particles a cell are 1 to 256");
+        }
+        if !(5.0..=90.0).contains(&self.sun.elevation_deg) {
+            return bad("the sun stands 5 to 90 degrees above the horizon");
+        }
+        if !(0.0..=100.0).contains(&self.optical_depth)
+            || !(0.0..=1e9).contains(&self.height_m_per_kg_m2)
+        {
+            return bad("optical depth is 0 to 100, height 0 to 1e9 m per kg m-2");
+        }
+        Ok(())
+    }
+}
+
+impl View {
+    /// Width and height, pixels.
+    pub fn size_px(&self) -> [u32; 2] {
+        match *self {
+            Self::Tile { size_px, .. } => [size_px; 2],
+            Self::Globe {
+                width_px,
+                height_px,
+                ..
+            } => [width_px, height_px],
+        }
+    }
+
+    fn validate(&self) -> Result<(), ContractError> {
+        let bad = |reason: &str| Err(ContractError::invalid("view", &format!("{self:?}"), reason));
+        if self
+            .size_px()
+            .iter()
+            .any(|px| !(1..=MAX_IMAGE_PX).contains(px))
+        {
+            return bad("pictures are 1 to 4096 pixels wide and high");
+        }
+        match *self {
+            Self::Tile { tile, size_px } => {
+                if size_px != 256 && size_px != 512 {
+                    return bad("tiles are 256 or 512 pixels a side");
+                }
+                Tile::new(tile.z, tile.x, tile.y).map(|_inside| ())
+            }
+            Self::Globe {
+                lon_deg,
+                lat_deg,
+                height_m,
+                ..
+            } => {
+                crate::grid::LonLatDeg::new(lon_deg, lat_deg)?;
+                if !(1e3..=MAX_CAMERA_HEIGHT_M).contains(&height_m) {
+                    return bad("the camera stands 1 km to 1 million km above the ground");
+                }
+                Ok(())
+            }
+        }
+    }
+}
+
+impl RenderJob {
+    /// Checks every limit of a job that came from outside.
+    ///
+    /// # Errors
+    /// The first limit that is broken, with what would be valid.
+    pub fn validate(&self) -> Result<(), ContractError> {
+        if self.renderer_version != RENDERER_VERSION {
+            let text = self.renderer_version.to_string();
+            return Err(ContractError::invalid(
+                "renderer version",
+                &text,
+                format!("this one is {RENDERER_VERSION}"),
+            ));
+        }
+        self.style.validate()?;
+        self.view.validate()
+    }
+
+    /// The digest that names the picture.
+    pub fn digest(&self) -> Digest {
+        Digest::of_json(self)
+    }
+
+    /// Where the picture is kept.
+    pub fn key(&self) -> ObjectKey {
+        ObjectKey::tile(&self.digest())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::quantity::Quantity;
+
+    fn job() -> RenderJob {
+        RenderJob {
+            renderer_version: RENDERER_VERSION,
+            product: "p@1-00000000".parse().unwrap(),
+            accumulated: None,
+            time: "2000-01-01".parse().unwrap(),
+            mode: Mode::Volume,
+            view: View::Tile {
+                tile: Tile { z: 1, x: 0, y: 0 },
+                size_px: 256,
+            },
+            style: Style::with_transfer(TransferFunction::default_for(Quantity::CarbonFlux)),
+        }
+    }
+
+    #[test]
+    fn everything_that_shapes_a_picture_changes_its_name() {
+        let base = job();
+        base.validate().unwrap();
+        let mut names = vec![base.key()];
+        let mut changed = |change: fn(&mut RenderJob)| {
+            let mut job = job();
+            change(&mut job);
+            names.push(job.key());
+        };
+        changed(|j| j.product = "p@2-00000000".parse().unwrap());
+        changed(|j| j.accumulated = Some("q@1-00000000".parse().unwrap()));
+        changed(|j| j.time = "2000-01-02".parse().unwrap());
+        changed(|j| j.mode = Mode::Map);
+        changed(|j| {
+            j.view = View::Tile {
+                tile: Tile { z: 1, x: 1, y: 0 },
+                size_px: 256,
+            }
+        });
+        changed(|j| j.style.slices = 32);
+        changed(|j| j.style.sun.azimuth_deg = 0.0);
+        changed(|j| j.renderer_version += 1);
+        let count = names.len();
+        names.sort();
+        names.dedup();
+        assert_eq!(names.len(), count);
+    }
+
+    #[test]
+    fn jobs_beyond_a_limit_are_refused() {
+        let globe = |height_m, width_px| View::Globe {
+            lon_deg: 0.0,
+            lat_deg: 0.0,
+            height_m,
+            width_px,
+            height_px: 10,
+        };
+        let broken: [fn(&mut RenderJob); 5] = [
+            |j| j.style.slices = 1_000_000_000,
+            |j| j.style.slices = 0,
+            |j| j.style.transfer.high = f64::NAN,
+            |j| j.style.sun.elevation_deg = -1.0,
+            |j| {
+                j.view = View::Tile {
+                    tile: Tile { z: 1, x: 5, y: 0 },
+                    size_px: 256,
+                }
+            },
+        ];
+        for change in broken {
+            let mut job = job();
+            change(&mut job);
+            assert!(job.validate().is_err());
+        }
+        for view in [
+            globe(-100.0, 10),
+            globe(1e6, 0),
+            globe(1e6, 5000),
+            globe(f64::NAN, 10),
+        ] {
+            assert!(RenderJob { view, ..job() }.validate().is_err());
+        }
+    }
+}

@@ -1,0 +1,136 @@
+//! Keys of stored objects: one function for each kind, so that no two services spell a path in two ways.
+
+use std::fmt::{Display, Formatter};
+
+use serde::{Deserialize, Serialize};
+
+use crate::ContractError;
+use crate::digest::Digest;
+use crate::product::ProductId;
+
+/// The key of an object: `/`-separated parts of `A-Z a-z 0-9 . _ -`, none of them `.` or `..`.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct ObjectKey(String);
+
+impl ObjectKey {
+    /// An input file as it came.
+    pub fn raw(product: &ProductId, sha256: &Digest) -> Self {
+        Self(format!("raw/{product}/{sha256}"))
+    }
+
+    /// One time step as map-major chunks, named by its content.
+    pub fn frame(product: &ProductId, sha256: &Digest) -> Self {
+        Self(format!("frames/{product}/{sha256}.parquet"))
+    }
+
+    /// One segment of time as time-major chunks, named by its content.
+    pub fn series(product: &ProductId, sha256: &Digest) -> Self {
+        Self(format!("series/{product}/{sha256}.parquet"))
+    }
+
+    /// The cells that hold data in some step, one byte a cell, named by its content.
+    pub fn domain(product: &ProductId, sha256: &Digest) -> Self {
+        Self(format!("domain/{product}/{sha256}"))
+    }
+
+    /// A numbered manifest; numbers are zero-padded so that names sort as numbers do.
+    pub fn manifest(product: &ProductId, number: u64) -> Self {
+        Self(format!("manifests/{product}/{number:010}.json"))
+    }
+
+    /// Areas of a region's share of every cell, named by grid, region and earth.
+    pub fn weights(job: &Digest) -> Self {
+        Self(format!("weights/{job}.parquet"))
+    }
+
+    /// A drawn picture under the hash of its job.
+    pub fn tile(job: &Digest) -> Self {
+        let text = job.to_string();
+        Self(format!("tiles/{}/{text}.png", &text[..2]))
+    }
+
+    /// The key as text.
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+}
+
+impl std::str::FromStr for ObjectKey {
+    type Err = ContractError;
+
+    fn from_str(s: &str) -> Result<Self, Self::Err> {
+        let part_is_safe = |part: &str| {
+            !matches!(part, "" | "." | "..")
+                && part
+                    .bytes()
+                    .all(|b| b.is_ascii_alphanumeric() || matches!(b, b'.' | b'_' | b'-'))
+        };
+        if s.len() <= 512 && s.split('/').all(part_is_safe) {
+            Ok(Self(s.to_owned()))
+        } else {
+            Err(ContractError::invalid(
+                "object key",
+                s,
+                "parts of A-Z a-z 0-9 . _ - joined by /",
+            ))
+        }
+    }
+}
+
+impl TryFrom<String> for ObjectKey {
+    type Error = ContractError;
+
+    fn try_from(s: String) -> Result<Self, Self::Error> {
+        s.parse()
+    }
+}
+
+impl From<ObjectKey> for String {
+    fn from(key: ObjectKey) -> Self {
+        key.0
+    }
+}
+
+impl Display for ObjectKey {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_made_key_parses_as_itself() {
+        let (product, digest) = ("a-b".parse().unwrap(), Digest::of(b"x"));
+        for key in [
+            ObjectKey::raw(&product, &digest),
+            ObjectKey::frame(&product, &digest),
+            ObjectKey::series(&product, &digest),
+            ObjectKey::domain(&product, &digest),
+            ObjectKey::manifest(&product, 7),
+            ObjectKey::weights(&digest),
+            ObjectKey::tile(&digest),
+        ] {
+            assert_eq!(key.as_str().parse::<ObjectKey>().unwrap(), key);
+        }
+    }
+
+    #[test]
+    fn keys_that_leave_their_folder_are_refused() {
+        for s in [
+            "",
+            "/etc/passwd",
+            "a/../b",
+            "a//b",
+            "a/./b",
+            "a\\b",
+            "a/b\0",
+            "a b",
+        ] {
+            assert!(s.parse::<ObjectKey>().is_err(), "{s:?}");
+        }
+    }
+}

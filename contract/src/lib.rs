@@ -1,0 +1,23 @@
+//! What two Fluxglobe processes must agree on: names, grids, times, units, object keys, events, jobs and tile maths.
+//!
+//! A type enters if two processes exchange it as bytes; a function enters if both sides must get the same answer
+//! from it. Left out on purpose: input and output, async, GPU, SQL.
+#![warn(missing_docs, clippy::missing_errors_doc)]
+
+pub mod chunk;
+pub mod colour;
+pub mod digest;
+pub mod earth;
+pub mod error;
+pub mod event;
+pub mod grid;
+pub mod job;
+pub mod key;
+pub mod manifest;
+pub mod product;
+pub mod quantity;
+pub mod region;
+pub mod tile;
+pub mod time;
+
+pub use error::ContractError;

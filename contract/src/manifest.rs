@@ -1,0 +1,323 @@
+//! The numbered list of what a product consists of: the only thing that changes, and it changes whole.
+
+use std::fmt::{Display, Formatter};
+
+use serde::{Deserialize, Serialize};
+
+use crate::ContractError;
+use crate::digest::Digest;
+use crate::grid::Grid;
+use crate::key::ObjectKey;
+use crate::product::ProductId;
+use crate::quantity::Quantity;
+use crate::time::{Period, TimeMs};
+
+/// Version of the manifest's JSON.
+pub const MANIFEST_SCHEMA: u32 = 1;
+
+/// One version of one product. Readers see it whole or not at all.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Manifest {
+    /// [`MANIFEST_SCHEMA`].
+    pub schema: u32,
+    /// Product.
+    pub product: ProductId,
+    /// 1, 2, 3 ... in the order of commits.
+    pub number: u64,
+    /// Title for people.
+    pub title: String,
+    /// Quantity; values are stored in its unit.
+    pub quantity: Quantity,
+    /// Made up by a program rather than measured: shown on every page.
+    pub synthetic: bool,
+    /// Where the data come from, as a citation.
+    pub source: String,
+    /// The one grid of all steps.
+    pub grid: Grid,
+    /// Steps in the order of time, not overlapping.
+    pub steps: Vec<Step>,
+    /// Cells that hold data in some step: one byte a cell, 1 or 0, row-major.
+    pub domain: ObjectKey,
+    /// The same values time-major.
+    pub series: Vec<SeriesSegment>,
+    /// The manifest this one was derived from, if it was computed rather than ingested.
+    pub derived_from: Option<ManifestId>,
+}
+
+/// One time step of a product.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Step {
+    /// What the values are a mean over (or, for accumulated carbon, what `end` they have reached).
+    pub period: Period,
+    /// Map-major chunks.
+    pub frame: ObjectKey,
+    /// Digest of the input file; of the job for derived steps.
+    pub raw_sha256: Digest,
+    /// Name of the input file, for people.
+    pub origin: String,
+    /// Cells with data.
+    pub valid_cells: u64,
+}
+
+/// A run of consecutive steps, stored time-major.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SeriesSegment {
+    /// Index of its first step.
+    pub first_step: u32,
+    /// Number of steps.
+    pub steps: u32,
+    /// Time-major chunks.
+    pub series: ObjectKey,
+}
+
+impl Manifest {
+    /// The name that answers cite.
+    pub fn id(&self) -> ManifestId {
+        ManifestId {
+            product: self.product.clone(),
+            number: self.number,
+            short_sha256: Digest::of_json(self).short(),
+        }
+    }
+
+    /// First and last instant covered.
+    pub fn extent(&self) -> Option<Period> {
+        let (first, last) = (self.steps.first()?, self.steps.last()?);
+        Some(Period {
+            start: first.period.start,
+            end: last.period.end,
+        })
+    }
+
+    /// The two steps an instant lies between, and how far it has come from the first (0) to the second (1).
+    ///
+    /// A step's mean holds at the middle of its period; before the first middle and after the last the nearest
+    /// step holds. Accumulated carbon holds at the *end* of its period and grows from zero at the first start.
+    /// This is the weight of eq. 3.
+    pub fn bracket(&self, time: TimeMs) -> Option<Bracket> {
+        let accumulated = self.quantity == Quantity::AccumulatedCarbon;
+        let at = |step: &Step| {
+            if accumulated {
+                step.period.end
+            } else {
+                step.period.mid()
+            }
+        };
+        let after = self.steps.partition_point(|step| at(step) <= time);
+        let last = self.steps.len().checked_sub(1)?;
+        let share =
+            |t1: TimeMs, t2: TimeMs| (time.ms() - t1.ms()) as f64 / (t2.ms() - t1.ms()) as f64;
+        if after > last {
+            return Some(Bracket {
+                before: Some(last),
+                after: last,
+                weight: 0.0,
+            });
+        }
+        if after == 0 {
+            let Period { start, end } = self.steps[0].period;
+            let weight = if accumulated {
+                share(start, end).max(0.0)
+            } else {
+                0.0
+            };
+            return Some(Bracket {
+                before: (!accumulated).then_some(0),
+                after: 0,
+                weight,
+            });
+        }
+        let weight = share(at(&self.steps[after - 1]), at(&self.steps[after]));
+        Some(Bracket {
+            before: Some(after - 1),
+            after,
+            weight,
+        })
+    }
+}
+
+/// Two neighbouring steps and the weight of the second.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bracket {
+    /// Index of the step before; none where accumulation starts, that is zero in every cell of the domain.
+    pub before: Option<usize>,
+    /// Index of the step after; the same as `before` at the ends.
+    pub after: usize,
+    /// 0 at `before`, towards 1 at `after`.
+    pub weight: f64,
+}
+
+/// Name of one manifest: `product@number-digest`, with the first eight digits of its digest.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct ManifestId {
+    /// Product.
+    pub product: ProductId,
+    /// Number.
+    pub number: u64,
+    /// First eight digits of the digest of the manifest's canonical JSON.
+    short_sha256: String,
+}
+
+impl Display for ManifestId {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}@{}-{}", self.product, self.number, self.short_sha256)
+    }
+}
+
+impl std::str::FromStr for ManifestId {
+    type Err = ContractError;
+
+    fn from_str(s: &str) -> Result<Self, Self::Err> {
+        let bad = || {
+            ContractError::invalid(
+                "manifest",
+                s,
+                "product@number-digest, such as takahashi09-flux@12-0a1b2c3d",
+            )
+        };
+        let (product, rest) = s.split_once('@').ok_or_else(bad)?;
+        let (number, short) = rest.split_once('-').ok_or_else(bad)?;
+        if short.len() != 8
+            || !short
+                .bytes()
+                .all(|b| matches!(b, b'0'..=b'9' | b'a'..=b'f'))
+        {
+            return Err(bad());
+        }
+        Ok(Self {
+            product: product.parse()?,
+            number: number.parse().map_err(|_not_a_number| bad())?,
+            short_sha256: short.to_owned(),
+        })
+    }
+}
+
+impl TryFrom<String> for ManifestId {
+    type Error = ContractError;
+
+    fn try_from(s: String) -> Result<Self, Self::Error> {
+        s.parse()
+    }
+}
+
+impl From<ManifestId> for String {
+    fn from(id: ManifestId) -> Self {
+        id.to_string()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn manifest(quantity: Quantity) -> Manifest {
+        let product: ProductId = "p".parse().unwrap();
+        let digest = Digest::of(b"");
+        let step = |month| Step {
+            period: Period::month(2000, month).unwrap(),
+            frame: ObjectKey::frame(&product, &digest),
+            raw_sha256: digest,
+            origin: "f.nc".into(),
+            valid_cells: 1,
+        };
+        Manifest {
+            schema: MANIFEST_SCHEMA,
+            number: 3,
+            title: String::new(),
+            quantity,
+            synthetic: false,
+            source: String::new(),
+            grid: Grid {
+                rows: 1,
+                cols: 1,
+                north_deg: 1.0,
+                west_deg: 0.0,
+                dlat_deg: 1.0,
+                dlon_deg: 1.0,
+            },
+            steps: (1..=3).map(step).collect(),
+            domain: ObjectKey::domain(&product, &digest),
+            series: vec![],
+            derived_from: None,
+            product,
+        }
+    }
+
+    #[test]
+    fn a_mean_holds_at_the_middle_of_its_month() {
+        let m = manifest(Quantity::CarbonFlux);
+        let at = |s: &str| m.bracket(s.parse().unwrap()).unwrap();
+        assert_eq!(
+            at("2000-01-16T12:00:00Z"),
+            Bracket {
+                before: Some(0),
+                after: 1,
+                weight: 0.0
+            }
+        );
+        assert_eq!(
+            at("1999-01-01"),
+            Bracket {
+                before: Some(0),
+                after: 0,
+                weight: 0.0
+            }
+        );
+        assert_eq!(
+            at("2009-01-01"),
+            Bracket {
+                before: Some(2),
+                after: 2,
+                weight: 0.0
+            }
+        );
+        let half_way = at("2000-01-31T12:00:00Z"); // 15 of the 30 days between 16 Jan 12:00 and 15 Feb 12:00
+        assert!((half_way.weight - 0.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn accumulated_carbon_holds_at_the_end_of_its_month() {
+        let m = manifest(Quantity::AccumulatedCarbon);
+        let at = |s: &str| m.bracket(s.parse().unwrap()).unwrap();
+        assert_eq!(
+            at("2000-02-01"),
+            Bracket {
+                before: Some(0),
+                after: 1,
+                weight: 0.0
+            }
+        );
+        assert_eq!(
+            at("1999-01-01"),
+            Bracket {
+                before: None,
+                after: 0,
+                weight: 0.0
+            }
+        );
+        let in_the_first_month = at("2000-01-16T12:00:00Z");
+        assert_eq!(
+            in_the_first_month,
+            Bracket {
+                before: None,
+                after: 0,
+                weight: 0.5
+            }
+        );
+    }
+
+    #[test]
+    fn a_manifest_and_its_name_round_trip_as_json() {
+        let m = manifest(Quantity::CarbonFlux);
+        let json = serde_json::to_string(&m).unwrap();
+        assert_eq!(serde_json::from_str::<Manifest>(&json).unwrap(), m);
+        assert_eq!(m.id().to_string().parse::<ManifestId>().unwrap(), m.id());
+        let mut other = m.clone();
+        other.steps[0].valid_cells = 2;
+        assert_ne!(other.id(), m.id());
+    }
+}
