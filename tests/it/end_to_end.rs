@@ -1,0 +1,178 @@
+//! The main job on the real files: fetch, land, integrate, derive, draw, serve; the numbers against published ones.
+
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+use std::time::{Duration, Instant};
+
+use harness::program;
+use harness::real_data;
+use harness::server::Server;
+use serde_json::Value;
+
+/// Where other tests of this binary find a data folder in which the demo has run, if the real files are here.
+pub(crate) fn demo_data() -> Option<&'static Path> {
+    static DATA: OnceLock<Option<PathBuf>> = OnceLock::new();
+    DATA.get_or_init(|| {
+        let files = real_data::fluxengine()?;
+        let data = tempfile::tempdir().unwrap().keep();
+        let cache = files.parent().unwrap().to_str().unwrap().to_owned();
+        program::succeed(
+            &data,
+            &["demo", "--exit-after-check", "--offline", "--cache", &cache, "--listen", "127.0.0.1:0"],
+        )
+        .unwrap();
+        Some(data)
+    })
+    .as_deref()
+}
+
+fn budget(data: &Path, words: &[&str]) -> Value {
+    let start = ["budget", "--product", "takahashi09-flux", "--json"];
+    program::json(data, &[&start, words].concat()).unwrap()
+}
+
+/// The budget of each row, Tg C.
+fn rows(answer: &Value) -> Vec<f64> {
+    let rows = answer["rows"].as_array().unwrap();
+    rows.iter().map(|row| row["budget"].as_f64().unwrap()).collect()
+}
+
+fn total_pg(data: &Path, words: &[&str]) -> f64 {
+    let rows = rows(&budget(data, words));
+    assert_eq!(rows.len(), 1);
+    rows[0] / 1000.0
+}
+
+#[test]
+fn the_global_budget_is_the_published_one_on_both_earths() {
+    let Some(data) = demo_data() else { return };
+    // What the grid itself integrates to (docs/data-sources.md), within 0.2 %.
+    let ellipsoid = total_pg(data, &[]);
+    assert!((ellipsoid / -1.404 - 1.0).abs() < 0.002, "{ellipsoid}");
+    let sphere = total_pg(data, &["--earth", "sphere"]);
+    assert!((sphere / -1.398 - 1.0).abs() < 0.002, "{sphere}");
+    assert!(ellipsoid < sphere, "the two earths must differ");
+}
+
+#[test]
+fn the_bands_are_within_five_thousandths_of_a_petagram() {
+    let Some(data) = demo_data() else { return };
+    let bands = [("14n-50n", -0.694), ("14s-50s", -1.021), ("50s-62s", -0.066), ("equatorial-pacific", 0.466)];
+    for (region, expected) in bands {
+        let ours = total_pg(data, &["--region", region]);
+        assert!((ours - expected).abs() < 0.005, "{region}: {ours}, expected {expected}");
+    }
+}
+
+#[test]
+fn the_months_are_within_half_a_percent() {
+    const MONTHS_TG: [f64; 12] =
+        [-176.1, -155.7, -141.5, -128.6, -125.7, -101.7, -52.3, -31.0, -36.1, -99.5, -160.4, -195.8];
+    let Some(data) = demo_data() else { return };
+    let months = rows(&budget(data, &["--step", "month"]));
+    assert_eq!(months.len(), 12);
+    for (month, (ours, expected)) in months.iter().zip(MONTHS_TG).enumerate() {
+        assert!((ours / expected - 1.0).abs() < 0.005, "month {}: {ours}, expected {expected}", month + 1);
+    }
+}
+
+#[test]
+fn any_number_of_partitions_gives_the_same_bits() {
+    let Some(data) = demo_data() else { return };
+    let words = |partitions| ["--step", "month", "--region", "-60,-33.3,47.7,61.2", "--partitions", partitions];
+    let answers = ["1", "3", "16"].map(|partitions| budget(data, &words(partitions))["rows"].to_string());
+    assert!(answers[0].contains("budget"));
+    assert_eq!(answers[0], answers[1]);
+    assert_eq!(answers[0], answers[2]);
+}
+
+#[test]
+fn a_region_and_the_rest_of_the_globe_make_the_globe() {
+    let Some(data) = demo_data() else { return };
+    let across_the_date_line = total_pg(data, &["--region", "150,-90,-110,90"]);
+    let the_rest = total_pg(data, &["--region", "-110,-90,150,90"]);
+    let globe = total_pg(data, &[]);
+    assert!(((across_the_date_line + the_rest) / globe - 1.0).abs() < 1e-9);
+}
+
+#[test]
+fn a_geojson_file_is_a_region() {
+    let Some(data) = demo_data() else { return };
+    let file = data.join("box.geojson");
+    let corners = "[[-60,-20],[0,-20],[0,30],[-60,30],[-60,-20]]";
+    std::fs::write(&file, format!(r#"{{"type":"Polygon","coordinates":[{corners}]}}"#)).unwrap();
+    let polygon = total_pg(data, &["--region", file.to_str().unwrap()]);
+    let boxed = total_pg(data, &["--region", "-60,-20,0,30"]);
+    assert!((polygon / boxed - 1.0).abs() < 1e-9, "{polygon} {boxed}");
+}
+
+#[test]
+fn the_series_at_a_place_is_what_the_file_holds() {
+    let Some(data) = demo_data() else { return };
+    let place = ["--lon", "-150.5", "--lat", "0.5", "--json"];
+    let words = [&["stats", "point", "--product", "takahashi09-flux"], &place[..]].concat();
+    let answer = program::json(data, &words).unwrap();
+    let series = answer["series"].as_array().unwrap();
+    assert_eq!(series.len(), 12);
+    // The equatorial Pacific gives off carbon in every month.
+    assert!(series.iter().all(|step| step["value"].as_f64().unwrap() > 0.0), "{answer}");
+}
+
+#[test]
+fn a_second_start_is_up_in_five_seconds() {
+    let Some(data) = demo_data() else { return };
+    let start = Instant::now();
+    let server = Server::start(data, &["demo", "--offline"]).unwrap();
+    let took = start.elapsed();
+    assert_eq!(server.get("/").unwrap().status, 200);
+    assert!(took < Duration::from_secs(5), "{took:?}");
+}
+
+#[test]
+fn the_server_tells_what_was_computed() {
+    let Some(data) = demo_data() else { return };
+    let server = Server::start(data, &["serve"]).unwrap();
+    let products = server.get("/api/products").unwrap().json().unwrap();
+    let ids: Vec<_> = products["products"].as_array().unwrap().iter().map(|p| p["id"].as_str().unwrap()).collect();
+    for id in ["takahashi09-flux", "sst-2010", "chlorophyll-2010", "wind-2010"] {
+        assert!(ids.contains(&id), "{ids:?}");
+    }
+    let over_http = server.get("/api/products/takahashi09-flux/budget?step=month").unwrap().json().unwrap();
+    assert_eq!(over_http["rows"], budget(data, &["--step", "month"])["rows"]);
+    let check = server.get("/api/check").unwrap().json().unwrap();
+    assert!(check["rows"].as_array().unwrap().len() >= 17, "{check}");
+}
+
+#[test]
+fn tiles_are_drawn_once_and_are_the_same_from_the_command_line() {
+    let Some(data) = demo_data() else { return };
+    let server = Server::start(data, &["serve"]).unwrap();
+    for mode in ["map", "points", "sprites", "volume"] {
+        let path = format!("/tiles/takahashi09-flux/{mode}/2/0/1.png?time=2000-05-03T04:05:06Z");
+        let tile = server.get(&path).unwrap();
+        assert_eq!((tile.status, tile.content_type.as_str()), (200, "image/png"), "{mode}: {}", tile.text());
+        let picture = image::load_from_memory(&tile.body).unwrap().to_rgba8();
+        assert!(picture.pixels().any(|pixel| pixel[3] > 0), "{mode} is empty");
+        assert_eq!(server.get(&path).unwrap().body, tile.body);
+        let file = data.join(format!("{mode}.png"));
+        let words = ["render", "tile", "--layer", "takahashi09-flux", "--mode", mode, "--z", "2", "--x", "0", "--y", "1"];
+        let rest = ["--time", "2000-05-03T04:05:06Z", "-o", file.to_str().unwrap()];
+        program::succeed(data, &[&words[..], &rest].concat()).unwrap();
+        assert_eq!(std::fs::read(&file).unwrap(), tile.body, "{mode}");
+    }
+}
+
+#[test]
+fn without_a_network_the_demo_runs_on_synthetic_data_and_says_so() {
+    let data = tempfile::tempdir().unwrap();
+    let cache = tempfile::tempdir().unwrap();
+    let words =
+        ["demo", "--exit-after-check", "--offline", "--cache", cache.path().to_str().unwrap(), "--listen", "127.0.0.1:0"];
+    let output = program::run(data.path(), &words).unwrap();
+    let talk = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{talk}");
+    assert!(talk.contains("SYNTHETIC"), "{talk}");
+    let server = Server::start(data.path(), &["serve"]).unwrap();
+    let products = server.get("/api/products").unwrap().json().unwrap();
+    assert!(products["products"].as_array().unwrap().iter().all(|p| p["synthetic"] == true), "{products}");
+}

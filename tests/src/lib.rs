@@ -1,0 +1,5 @@
+//! The harness of the end-to-end tests: runs the built program as people do, and knows where the real files are.
+
+pub mod program;
+pub mod real_data;
+pub mod server;

@@ -1,0 +1,117 @@
+//! A started `fluxglobe serve`: waits until it answers, fetches, and stops it when dropped.
+
+use std::io::{BufRead as _, BufReader};
+use std::path::Path;
+use std::process::{Child, Stdio};
+use std::time::{Duration, Instant};
+
+use anyhow::{Context as _, Result, bail};
+
+use crate::program;
+
+/// Longest wait for a started server to answer.
+const START_LIMIT: Duration = Duration::from_secs(60);
+
+/// A running server.
+pub struct Server {
+    child: Child,
+    /// Address, such as `http://127.0.0.1:40123`.
+    pub url: String,
+}
+
+/// An answer: its status, header lookup and body.
+pub struct Answer {
+    /// HTTP status.
+    pub status: u16,
+    /// Content type.
+    pub content_type: String,
+    /// `ETag`, if any.
+    pub etag: Option<String>,
+    /// Body.
+    pub body: Vec<u8>,
+}
+
+impl Answer {
+    /// Body as text.
+    pub fn text(&self) -> String {
+        String::from_utf8_lossy(&self.body).into_owned()
+    }
+
+    /// Body as JSON.
+    pub fn json(&self) -> Result<serde_json::Value> {
+        serde_json::from_slice(&self.body).with_context(|| self.text())
+    }
+}
+
+impl Server {
+    /// Starts a server on a free port of this machine.
+    pub fn start(data: &Path, words: &[&str]) -> Result<Self> {
+        let mut child = program::command(data)
+            .args(words)
+            .args(["--listen", "127.0.0.1:0"])
+            .stderr(Stdio::piped())
+            .spawn()?;
+        let talk = child.stderr.take().context("standard error is piped")?;
+        let (sender, receiver) = std::sync::mpsc::sync_channel(1);
+        // Goes on reading after the address is found, so that the server never blocks on a full pipe.
+        std::thread::Builder::new().name("server-talk".to_owned()).spawn(move || {
+            for line in BufReader::new(talk).lines().map_while(Result::ok) {
+                let address = line.split_whitespace().find(|word| word.starts_with("http://127.0.0.1:"));
+                if let Some(address) = address {
+                    // Only the first address matters; later ones find the channel full or closed.
+                    drop(sender.try_send(address.trim_end_matches('/').to_owned()));
+                }
+            }
+        })?;
+        match receiver.recv_timeout(START_LIMIT) {
+            Ok(url) => {
+                let server = Self { child, url };
+                server.wait_until_ready()?;
+                Ok(server)
+            }
+            Err(_silent) => {
+                drop(child.kill());
+                bail!("fluxglobe {words:?} printed no address within {START_LIMIT:?}")
+            }
+        }
+    }
+
+    fn wait_until_ready(&self) -> Result<()> {
+        let start = Instant::now();
+        while start.elapsed() < START_LIMIT {
+            if self.get("/readyz").is_ok_and(|answer| answer.status == 200) {
+                return Ok(());
+            }
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        bail!("{} was not ready within {START_LIMIT:?}", self.url)
+    }
+
+    /// Fetches a path; every status is an answer.
+    pub fn get(&self, path: &str) -> Result<Answer> {
+        let agent: ureq::Agent = ureq::Agent::config_builder()
+            .http_status_as_error(false)
+            .timeout_global(Some(Duration::from_secs(120)))
+            .build()
+            .into();
+        let mut response = agent.get(format!("{}{path}", self.url)).call()?;
+        let header = |name: &str| {
+            let value = response.headers().get(name)?;
+            value.to_str().ok().map(ToOwned::to_owned)
+        };
+        let (content_type, etag) = (header("content-type").unwrap_or_default(), header("etag"));
+        Ok(Answer {
+            status: response.status().as_u16(),
+            content_type,
+            etag,
+            body: response.body_mut().with_config().limit(64 << 20).read_to_vec()?,
+        })
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        drop(self.child.kill());
+        drop(self.child.wait());
+    }
+}
