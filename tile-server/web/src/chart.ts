@@ -12,17 +12,23 @@ const IN = "#4aa8e0";
 const FONT = "11px system-ui, -apple-system, 'Segoe UI', Roboto, 'Liberation Sans', sans-serif";
 const HEIGHT_PX = 210;
 
+export interface TimeRange {
+  readonly startMs: number;
+  readonly endMs: number;
+}
+
 export interface Chart {
   /** Moves the cursor line; an instant outside of the plot is not drawn. */
   setNow(timeMs: number): void;
   destroy(): void;
 }
 
-/** `labelY` carries the unit. `onPick` gets the instant under a click. */
-export function seriesChart(container: HTMLElement, samples: readonly Sample[], labelY: string, nowMs: number, onPick: (timeMs: number) => void): Chart {
-  let now = nowMs;
+/** `labelY` is the unit. The time axis spans `range`, so that the cursor is in sight at every instant. `onPick` gets the instant under a click. */
+export function seriesChart(container: HTMLElement, samples: readonly Sample[], range: TimeRange, labelY: string, onPick: (timeMs: number) => void): Chart {
+  let now = Number.NaN;
   const options: Omit<uPlot.Options, "width" | "height"> = {
     ...dress(labelY),
+    scales: { x: { time: true, range: [range.startMs / 1000, range.endMs / 1000] }, y: { range: padded } },
     series: [{}, { stroke: LINE, width: 2, spanGaps: false, points: { show: true, size: 6, fill: LINE, stroke: "#0b1f2f", width: 1 } }],
     hooks: { drawAxes: [(plot) => zeroLine(plot)], draw: [(plot) => nowLine(plot, now)] },
   };
@@ -77,13 +83,12 @@ function dress(labelY: string): Omit<uPlot.Options, "width" | "height" | "series
   return {
     // The plot's dates are the product's, so they are read in UTC wherever the reader sits.
     tzDate: (seconds) => uPlot.tzDate(new Date(seconds * 1000), "Etc/UTC"),
-    scales: { x: { time: true }, y: { range: padded } },
     legend: { show: false },
     cursor: { y: false, drag: { x: false, y: false }, points: { size: 8 } },
-    padding: [8, 10, 0, 0],
+    padding: [8, 20, 0, 0],
     axes: [
-      { ...axis, grid: { show: false }, space: 52, values: monthNames },
-      { ...axis, label: labelY, labelSize: 18, size: 48, values: (_plot, splits) => splits.map((value) => String(Number(value.toPrecision(6))).replace("-", "−")) },
+      { ...axis, grid: { show: false }, space: 44, size: 40, values: monthNames },
+      { ...axis, label: labelY, labelSize: 20, labelGap: 2, size: 46, values: (_plot, splits) => splits.map((value) => String(Number(value.toPrecision(6))).replace("-", "−")) },
     ],
   };
 }
@@ -131,7 +136,7 @@ function horizontal(plot: uPlot, y: number): void {
 function nowLine(plot: uPlot, nowMs: number): void {
   const { min = 0, max = 0 } = plot.scales["x"] ?? {};
   const seconds = nowMs / 1000;
-  if (seconds < min || seconds > max) return;
+  if (!(seconds >= min && seconds <= max)) return;
   const x = plot.valToPos(seconds, "x", true);
   stroke(plot, NOW, [], (context) => {
     context.moveTo(x, plot.bbox.top);

@@ -9,12 +9,11 @@ const MINUS = "\u2212";
 
 /** `g C m-2 yr-1`, `m^-2` or `m**-2` become `g C m⁻² yr⁻¹`; text that is set already stays as it is. */
 export function unitText(unit: string): string {
-  const set = unit
-    .trim()
+  // Formulas first: the 2 of CO2 is an index, the 2 of m2 a power.
+  return chemistry(unit.trim())
     .replace(/([A-Za-zµμ%°])(?:\^|\*\*)?([-+]?\d+)(?=$|[\s/·.)])/g, (_match, symbol: string, power: string) => symbol + superscript(power))
     .replace(/\bdegC\b|\bdegree_?[Cc]elsius\b/g, "°C")
     .replace(/\s+/g, NARROW_NO_BREAK_SPACE);
-  return chemistry(set);
 }
 
 /** CO2, pCO2, fCO2 get their subscript; used for titles too. */

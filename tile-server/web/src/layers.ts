@@ -11,8 +11,11 @@ export interface Prepared {
   readonly tiles: LayerTiles;
 }
 
-/** Frames that must be drawn before Cesium has put a new layer's tiles into its queue. */
-const SETTLING_FRAMES = 3;
+/**
+ * Quiet frames in a row before a layer counts as loaded: Cesium's queue is empty for a moment before a new layer's tiles
+ * enter it, and again between a level of tiles and the finer one that replaces it.
+ */
+const QUIET_FRAMES = 5;
 /** While somebody keeps turning the globe new ground never stops loading; after this the layer is shown as it is. */
 const RESTLESS_LIMIT_MS = 4_000;
 
@@ -77,7 +80,7 @@ export class LayerStage {
   #settled(tiles: LayerTiles, signal: AbortSignal): Promise<boolean> {
     return new Promise((resolve) => {
       const startedMs = performance.now();
-      let frames = 0;
+      let quietFrames = 0;
       const end = (isLoaded: boolean): void => {
         unlisten();
         signal.removeEventListener("abort", giveUp);
@@ -85,10 +88,10 @@ export class LayerStage {
       };
       const giveUp = (): void => end(false);
       const unlisten = this.#scene.postRender.addEventListener(() => {
-        frames += 1;
         const isRestless = performance.now() - startedMs > RESTLESS_LIMIT_MS;
         const isQuiet = tiles.pending === 0 && (this.#scene.globe.tilesLoaded || isRestless);
-        if (frames > SETTLING_FRAMES && isQuiet) end(true);
+        quietFrames = isQuiet ? quietFrames + 1 : 0;
+        if (quietFrames >= QUIET_FRAMES) end(true);
         else this.#scene.requestRender();
       });
       if (signal.aborted) end(false);

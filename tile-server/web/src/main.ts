@@ -63,6 +63,7 @@ new Playback(store, presenter, steps, (timeMs) => catalogue.layerAt(store.state,
 const probe = installProbe(store, counts, globe, () => stage.shownKey);
 
 controls.watch(counts);
+globe.addBaseImagery().catch(() => notices.show("base", "The base map is missing from this server; data is drawn on plain water."));
 globe.view = store.state.camera;
 globe.scene.camera.percentageChanged = 0.01;
 globe.scene.camera.changed.addEventListener(() => store.set({ camera: globe.view }));

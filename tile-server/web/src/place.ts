@@ -9,7 +9,7 @@ import { DOWNLOAD } from "./icons";
 import { manifestLine } from "./manifest";
 import { hasData, valueAt, type Sample } from "./series";
 import type { Place, Store } from "./state";
-import { clampToRange, formatInstant, quantise, type Step } from "./time";
+import { clampToRange, formatInstant, parseSteps, quantise, rangeOf, type Step } from "./time";
 
 export interface PlaceContext {
   store: Store;
@@ -21,14 +21,17 @@ export interface PlaceContext {
 export class PlacePanel {
   readonly #context: PlaceContext;
   readonly #content = el("div", { class: "place-content", "aria-live": "polite" });
-  readonly #lat = el("input", { type: "number", id: "place-lat", min: "-90", max: "90", step: "any", placeholder: "Latitude", "aria-label": "Latitude in degrees north" });
-  readonly #lon = el("input", { type: "number", id: "place-lon", min: "-180", max: "360", step: "any", placeholder: "Longitude", "aria-label": "Longitude in degrees east" });
+  readonly #lat = el("input", { type: "number", id: "place-lat", min: "-90", max: "90", step: "any" });
+  readonly #lon = el("input", { type: "number", id: "place-lon", min: "-180", max: "360", step: "any" });
   #asked: AbortController | undefined;
   #shown: { samples: Sample[]; unit: string; chart: Chart | undefined; value: HTMLElement; when: HTMLElement } | undefined;
 
   constructor(body: HTMLElement, context: PlaceContext) {
     this.#context = context;
-    const form = el("form", { class: "row typed" }, this.#lat, this.#lon, el("button", { type: "submit" }, "Go"));
+    const form = el("form", { class: "row typed place-form" },
+      el("label", { class: "field" }, el("span", {}, "Latitude, ° N"), this.#lat),
+      el("label", { class: "field" }, el("span", {}, "Longitude, ° E"), this.#lon),
+      el("button", { type: "submit" }, "Go"));
     form.addEventListener("submit", (event) => {
       event.preventDefault();
       if (this.#lat.value !== "" && this.#lon.value !== "") context.store.set({ place: { lon: Number(this.#lon.value), lat: Number(this.#lat.value) } });
@@ -85,6 +88,7 @@ export class PlacePanel {
     const gaps = samples.filter((sample) => sample.value === null).length;
     this.#content.replaceChildren(
       this.#title(place),
+      el("p", { class: "muted" }, chemistry(this.#context.label())),
       el("p", { class: "reading" }, value, el("span", { class: "unit" }, unit), when),
       plot,
       el("p", { class: "muted" }, `${samples.length} periods${gaps > 0 ? `, ${gaps} without data` : ""}; linear in time between their middles.`),
@@ -94,7 +98,8 @@ export class PlacePanel {
         el("button", { type: "button", onclick: () => saveText(`${answer.product}-series.csv`, "text/csv", seriesCsv(answer)) }, icon(DOWNLOAD), "CSV"),
         el("a", { class: "button", href: api.pointUrl(answer.product, place.lon, place.lat), target: "_blank", rel: "noopener" }, "JSON")),
     );
-    const chart = seriesChart(plot, samples, `${chemistry(this.#context.label())}, ${unit}`, this.#context.store.state.timeMs, (timeMs) => {
+    const range = rangeOf(parseSteps(answer.series)) ?? { startMs: 0, endMs: 1 };
+    const chart = seriesChart(plot, samples, range, unit, (timeMs) => {
       const steps = this.#context.steps();
       this.#context.store.set({ timeMs: quantise(steps, clampToRange(steps, timeMs)) });
     });

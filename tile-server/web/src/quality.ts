@@ -2,7 +2,7 @@
 import type { GlobeOptions } from "./globe";
 
 const QUALITIES: Record<string, GlobeOptions> = {
-  low: { screenSpaceError: 6, resolutionScale: 0.75, hasSky: false },
+  low: { screenSpaceError: 4, resolutionScale: 0.75, hasSky: false },
   normal: { screenSpaceError: 2.5, resolutionScale: 1, hasSky: true },
   high: { screenSpaceError: 1.5, resolutionScale: Math.min(2, window.devicePixelRatio), hasSky: true },
 };

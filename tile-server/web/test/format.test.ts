@@ -1,0 +1,66 @@
+//! Units and numbers as text: the signs a reader of a journal expects.
+import { describe, expect, it } from "vitest";
+import { areaText, chemistry, digitsFor, latText, lonText, numberText, unitText, wrapLon } from "../src/format";
+
+const plain = (text: string): string => text.replace(/\u202f/g, " ").replace(/\u2009/g, "_");
+
+describe("units", () => {
+  it("get superscripts in every common spelling", () => {
+    for (const spelling of ["g C m-2 yr-1", "g C m^-2 yr^-1", "g C m**-2 yr**-1", "g C m⁻² yr⁻¹"]) {
+      expect(plain(unitText(spelling))).toBe("g C m⁻² yr⁻¹");
+    }
+    expect(plain(unitText("m2"))).toBe("m²");
+    expect(plain(unitText("mmol m-2 d-1"))).toBe("mmol m⁻² d⁻¹");
+  });
+
+  it("keep names that end in a digit", () => {
+    expect(plain(unitText("mol CO2 m-2 s-1"))).toBe("mol CO₂ m⁻² s⁻¹");
+    expect(plain(unitText("Tg C"))).toBe("Tg C");
+  });
+
+  it("write degrees Celsius", () => {
+    expect(unitText("degC")).toBe("°C");
+  });
+
+  it("set the subscript in words", () => {
+    expect(chemistry("pCO2 and CO2 flux")).toBe("pCO₂ and CO₂ flux");
+  });
+});
+
+describe("numbers", () => {
+  it("have true minus signs and thin spaces", () => {
+    expect(plain(numberText(-1404.36, 1))).toBe("−1_404.4");
+    expect(plain(numberText(1234567, 0))).toBe("1_234_567");
+    expect(plain(numberText(999, 0))).toBe("999");
+  });
+
+  it("give a rounded zero no sign", () => {
+    expect(numberText(-0.04, 1)).toBe("0.0");
+    expect(numberText(-0.06, 1)).toBe("−0.1");
+  });
+
+  it("show no data as a dash", () => {
+    for (const nothing of [null, undefined, Number.NaN]) expect(numberText(nothing, 2)).toBe("–");
+  });
+
+  it("choose decimals by size", () => {
+    expect([1404, 66, 4.8, 0.012].map((size) => digitsFor(size, 4))).toEqual([0, 2, 3, 5]);
+  });
+
+  it("write areas in million square kilometres", () => {
+    expect(areaText(334.1e12)).toBe("334.1 million km²");
+  });
+});
+
+describe("places", () => {
+  it("have hemispheres, except on the lines", () => {
+    expect(latText(-12.5)).toBe("12.50° S");
+    expect(latText(-0.001)).toBe("0.00°");
+    expect(lonText(210)).toBe("150.00° W");
+    expect(lonText(0)).toBe("0.00°");
+  });
+
+  it("wrap to -180..180", () => {
+    expect([-190, -180, 0, 179, 180, 540, 725].map(wrapLon)).toEqual([170, -180, 0, 179, -180, -180, 5]);
+  });
+});

@@ -1,0 +1,108 @@
+//! Time maths against hand values: months of unequal length, holes between steps, the raster and the loop of playback.
+import { describe, expect, it } from "vitest";
+import { clampToRange, formatInstant, instantAt, nextInstant, parseSteps, positionOf, quantise, rangeOf, stepLabel, strideFor, toIso, type Step } from "../src/time";
+
+const at = (iso: string): number => Date.parse(iso);
+const month = (start: string, end: string): { start: string; end: string; mid: string } => ({ start, end, mid: toIso((at(start) + at(end)) / 2) });
+const JAN = month("2000-01-01T00:00:00Z", "2000-02-01T00:00:00Z");
+const FEB = month("2000-02-01T00:00:00Z", "2000-03-01T00:00:00Z");
+const MAY = month("2000-05-01T00:00:00Z", "2000-06-01T00:00:00Z");
+const STEPS = parseSteps([JAN, FEB, MAY]);
+
+describe("steps", () => {
+  it("are sorted and broken ones are left out", () => {
+    const parsed = parseSteps([FEB, { start: "soon", end: "later", mid: "between" }, JAN]);
+    expect(parsed.map((step) => toIso(step.startMs))).toEqual([JAN.start, FEB.start]);
+  });
+
+  it("span from the first start to the last end", () => {
+    expect(rangeOf(STEPS)).toEqual({ startMs: at(JAN.start), endMs: at(MAY.end) });
+    expect(rangeOf([])).toBeUndefined();
+  });
+});
+
+describe("positions", () => {
+  it("count whole steps and parts of unequal months", () => {
+    expect(positionOf(STEPS, at("2000-01-01T00:00:00Z"))).toBe(0);
+    expect(positionOf(STEPS, at("2000-01-16T12:00:00Z"))).toBe(0.5);
+    expect(positionOf(STEPS, at("2000-02-15T12:00:00Z"))).toBe(1.5);
+    expect(positionOf(STEPS, at("2000-06-01T00:00:00Z"))).toBe(3);
+  });
+
+  it("put a hole between two steps at the start of the later one", () => {
+    expect(positionOf(STEPS, at("2000-04-10T00:00:00Z"))).toBe(2);
+  });
+
+  it("come back as the same instants", () => {
+    for (const iso of ["2000-01-09T06:00:00Z", "2000-02-29T23:59:59Z", "2000-05-31T00:00:00Z"]) {
+      expect(toIso(Math.round(instantAt(STEPS, positionOf(STEPS, at(iso)))))).toBe(iso);
+    }
+  });
+
+  it("are clamped to the range", () => {
+    expect(clampToRange(STEPS, at("1999-01-01T00:00:00Z"))).toBe(at(JAN.start));
+    expect(clampToRange(STEPS, at("2001-01-01T00:00:00Z"))).toBe(at(MAY.end));
+    expect(instantAt(STEPS, -4)).toBe(at(JAN.start));
+    expect(instantAt(STEPS, 99)).toBe(at(MAY.end));
+  });
+});
+
+describe("the raster", () => {
+  it("has eight instants in a step", () => {
+    // A sixteenth of January's 31 days is 1.9375 days: below it the start is nearer, above it the first eighth.
+    expect(toIso(quantise(STEPS, at("2000-01-02T20:00:00Z")))).toBe("2000-01-01T00:00:00Z");
+    expect(toIso(quantise(STEPS, at("2000-01-03T00:00:00Z")))).toBe("2000-01-04T21:00:00Z");
+  });
+
+  it("keeps an instant that lies on it", () => {
+    expect(quantise(STEPS, quantise(STEPS, at("2000-02-11T07:31:12Z")))).toBe(quantise(STEPS, at("2000-02-11T07:31:12Z")));
+  });
+});
+
+describe("playback", () => {
+  it("advances by parts of a step", () => {
+    expect(toIso(nextInstant(STEPS, at("2000-01-01T00:00:00Z"), 1))).toBe("2000-01-04T21:00:00Z");
+    expect(toIso(nextInstant(STEPS, at("2000-01-01T00:00:00Z"), 4))).toBe("2000-01-16T12:00:00Z");
+  });
+
+  it("lands on multiples of its stride, so that a slow pass finds the tiles of a slow pass", () => {
+    expect(toIso(nextInstant(STEPS, at("2000-01-04T21:00:00Z"), 4))).toBe("2000-01-16T12:00:00Z");
+  });
+
+  it("goes from the end to the start", () => {
+    expect(toIso(nextInstant(STEPS, at("2000-05-28T03:00:00Z"), 1))).toBe("2000-01-01T00:00:00Z");
+    expect(toIso(nextInstant(STEPS, at("2000-06-01T00:00:00Z"), 8))).toBe("2000-01-01T00:00:00Z");
+  });
+
+  it("visits every raster instant once a loop", () => {
+    const seen = new Set<number>();
+    let now = at(JAN.start);
+    for (let i = 0; i < STEPS.length * 8; i++) {
+      seen.add(now);
+      now = nextInstant(STEPS, now, 1);
+    }
+    expect(seen.size).toBe(24);
+    expect(now).toBe(at(JAN.start));
+  });
+
+  it("takes longer strides when a frame needs longer than it may, up to a whole step", () => {
+    expect(strideFor(100, 125)).toBe(1);
+    expect(strideFor(200, 125)).toBe(2);
+    expect(strideFor(1e6, 125)).toBe(8);
+  });
+});
+
+describe("texts", () => {
+  it("write instants in UTC", () => {
+    expect(formatInstant(at("2000-07-04T05:06:00Z"))).toBe("4 Jul 2000, 05:06 UTC");
+    expect(toIso(at("2000-07-04T05:06:07.900Z"))).toBe("2000-07-04T05:06:07Z");
+  });
+
+  it("label a step by its length", () => {
+    const step = (start: string, end: string): Step => parseSteps([month(start, end)])[0] as Step;
+    expect(stepLabel(step("2000-02-01T00:00:00Z", "2000-03-01T00:00:00Z"))).toBe("Feb 2000");
+    expect(stepLabel(step("2000-01-01T00:00:00Z", "2001-01-01T00:00:00Z"))).toBe("2000");
+    expect(stepLabel(step("2002-01-05T00:00:00Z", "2002-01-06T00:00:00Z"))).toBe("5 Jan 2002");
+    expect(stepLabel(step("2002-01-05T06:00:00Z", "2002-01-05T12:00:00Z"))).toBe("5 Jan 2002 06:00");
+  });
+});

@@ -1,0 +1,105 @@
+//! The shareable address, series values, cross-fades, ticks and files: pure parts of what the page shows.
+import { describe, expect, it } from "vitest";
+import { budgetCsv, seriesCsv } from "../src/csv";
+import { underOpacity } from "../src/fade";
+import { decodeHash, encodeHash } from "../src/hash";
+import { ticksOf } from "../src/legend";
+import { hasData, valueAt } from "../src/series";
+import { INITIAL, Store, type State } from "../src/state";
+
+describe("the address", () => {
+  const state: State = {
+    ...INITIAL,
+    product: "takahashi09 flux/é",
+    mode: "volume",
+    timeMs: Date.parse("2000-07-04T05:06:07Z"),
+    opacity: 0.35,
+    place: { lon: -150.25, lat: 3.5 },
+    tab: "budget",
+    region: "170,-10,-170,10",
+    camera: { lon: 12.5, lat: -40, heightKm: 5000, headingDeg: 20, pitchDeg: -60 },
+  };
+
+  it("carries a view there and back", () => {
+    expect({ ...INITIAL, ...decodeHash(encodeHash(state)) }).toEqual(state);
+  });
+
+  it("leaves out what is as it is at first", () => {
+    expect(encodeHash(INITIAL)).toBe("#mode=map&camera=-150,8,19000");
+  });
+
+  it("takes nothing from nonsense", () => {
+    expect(decodeHash("#mode=fog&time=soon&camera=1,2&opacity=7&place=0,95&tab=x&product=%E0%A4%A&=&&")).toEqual({});
+  });
+});
+
+describe("the store", () => {
+  it("tells only those who listen to what changed", () => {
+    const store = new Store(INITIAL);
+    const heard: string[] = [];
+    store.on(["mode"], () => heard.push("mode"));
+    store.on(["timeMs", "mode"], () => heard.push("either"));
+    store.set({ timeMs: 5 });
+    store.set({ timeMs: 5 });
+    expect(heard).toEqual(["either"]);
+    store.set({ mode: "volume" });
+    expect(heard).toEqual(["either", "mode", "either"]);
+  });
+});
+
+describe("a series", () => {
+  const samples = [{ midMs: 0, value: 10 }, { midMs: 100, value: 20 }, { midMs: 200, value: null }, { midMs: 300, value: 5 }];
+
+  it("is linear between middles and holds at the ends", () => {
+    expect(valueAt(samples, 25)).toBe(12.5);
+    expect(valueAt(samples, -50)).toBe(10);
+    expect(valueAt(samples, 900)).toBe(5);
+  });
+
+  it("has no value beside a gap, but has one on the middle before it", () => {
+    expect(valueAt(samples, 150)).toBeNull();
+    expect(valueAt(samples, 250)).toBeNull();
+    expect(valueAt(samples, 100)).toBe(20);
+    expect(valueAt(samples, 200)).toBeNull();
+  });
+
+  it("of gaps alone has no data", () => {
+    expect(hasData([{ midMs: 0, value: null }])).toBe(false);
+    expect(hasData(samples)).toBe(true);
+    expect(valueAt([], 0)).toBeNull();
+  });
+});
+
+describe("a cross-fade", () => {
+  it("never changes what the pair covers", () => {
+    for (const whole of [0.2, 0.9, 1]) {
+      for (let upper = 0; upper < whole; upper += 0.05) {
+        const under = underOpacity(whole, upper);
+        expect(upper + (1 - upper) * under).toBeCloseTo(whole, 12);
+      }
+      expect(underOpacity(whole, whole)).toBe(0);
+    }
+  });
+});
+
+describe("legend ticks", () => {
+  it("are round and inside", () => {
+    expect(ticksOf(-60, 60)).toEqual([-50, -25, 0, 25, 50]);
+    expect(ticksOf(0, 1)).toEqual([0, 0.2, 0.4, 0.6000000000000001, 0.8, 1]);
+    expect(ticksOf(5, 5)).toEqual([5]);
+  });
+});
+
+describe("files", () => {
+  const row = { start: "2000-01-01T00:00:00Z", end: "2000-02-01T00:00:00Z" };
+
+  it("of a budget say where the numbers come from", () => {
+    const text = budgetCsv({ product: "p", manifest: "m-1", region: "global", earth: "wgs84", unit: "Tg C", rows: [{ ...row, budget: -176.1, coverage_percent: 92.5, area_m2: 3e14 }] });
+    expect(text).toBe("# product: p\n# manifest: m-1\n# region: global\n# earth: wgs84\n# unit: Tg C\nstart,end,budget,coverage_percent,area_m2\n2000-01-01T00:00:00Z,2000-02-01T00:00:00Z,-176.1,92.5,300000000000000\n");
+  });
+
+  it("of a series leave gaps empty", () => {
+    const text = seriesCsv({ product: "p", manifest: "m-1", unit: "g C m-2 yr-1", lon: 0, lat: 0, cell: { row: 1, col: 2, lon: 0.5, lat: 0.5 }, series: [{ ...row, mid: "2000-01-16T12:00:00Z", value: null }] });
+    expect(text.trimEnd().endsWith(",2000-01-16T12:00:00Z,")).toBe(true);
+  });
+});
