@@ -1,0 +1,97 @@
+//! Series and budgets from the analyst, within limits; budgets are remembered, since their question names a version.
+
+use std::sync::Arc;
+
+use contract::digest::Digest;
+use quick_cache::sync::Cache;
+
+use crate::backend::{Analyse, BudgetRequest, BudgetRow, Check, RowCol};
+use crate::catalogue::Layer;
+use crate::error::ServerError;
+use crate::flights::Flights;
+use crate::gate::Gate;
+use crate::metrics::Metrics;
+
+/// Budgets remembered; one of 16 years by month takes 8 KiB.
+const BUDGETS: usize = 1000;
+
+/// The analyses of one server.
+pub struct Analyses {
+    analyst: Arc<dyn Analyse>,
+    gate: Gate,
+    metrics: Metrics,
+    budgets: Cache<Digest, Arc<[BudgetRow]>>,
+    flights: Flights<Arc<[BudgetRow]>>,
+}
+
+impl Analyses {
+    /// Nothing computed yet.
+    pub fn new(analyst: Arc<dyn Analyse>, gate: Gate, metrics: Metrics) -> Self {
+        Self {
+            analyst,
+            gate,
+            metrics,
+            budgets: Cache::new(BUDGETS),
+            flights: Flights::default(),
+        }
+    }
+
+    /// The values of a cell, one for each step, stored unit.
+    pub async fn point(
+        &self,
+        layer: &Layer,
+        cell: RowCol,
+    ) -> Result<Vec<Option<f64>>, ServerError> {
+        let _pass = self
+            .gate
+            .enter()
+            .await
+            .inspect_err(|_busy| self.metrics.refused.inc())?;
+        let values = self.analyst.point(&layer.manifest, cell).await?;
+        let steps = layer.manifest.steps.len();
+        if values.len() != steps {
+            return Err(ServerError::Defect {
+                what: format!("the analyst gave {} values for {steps} steps", values.len()),
+            });
+        }
+        Ok(values)
+    }
+
+    /// The budget rows of a request about `layer`.
+    pub async fn budget(
+        &self,
+        layer: &Layer,
+        request: BudgetRequest,
+    ) -> Result<Arc<[BudgetRow]>, ServerError> {
+        let key = Digest::of_json(&(
+            &layer.id,
+            &request.region,
+            request.period,
+            request.step,
+            request.earth,
+        ));
+        if let Some(rows) = self.budgets.get(&key) {
+            return Ok(rows);
+        }
+        let (analyst, gate, metrics) = (
+            Arc::clone(&self.analyst),
+            self.gate.clone(),
+            self.metrics.clone(),
+        );
+        let compute = || async move {
+            let _pass = gate
+                .enter()
+                .await
+                .inspect_err(|_busy| metrics.refused.inc())?;
+            Ok(analyst.budget(&request).await?.into())
+        };
+        let rows = self.flights.join(key, compute).await?;
+        self.budgets.insert(key, Arc::clone(&rows));
+        Ok(rows)
+    }
+
+    /// Our budgets beside published ones.
+    pub async fn check(&self) -> Result<Check, ServerError> {
+        self.analyst.check().await?.ok_or(ServerError::NoCheck)
+    }
+}

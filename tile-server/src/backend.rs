@@ -1,0 +1,189 @@
+//! What this server asks of others: pictures, point series and budgets, as two traits that the binary fills in.
+//!
+//! Left out on purpose: how a picture is drawn or a budget is summed. Both traits take and give values of `contract`
+//! and of this file only, so that the same server runs over a renderer in its process or one behind a network.
+
+use std::sync::Arc;
+
+use async_trait::async_trait;
+use bytes::Bytes;
+use contract::earth::Earth;
+use contract::job::RenderJob;
+use contract::manifest::Manifest;
+use contract::region::Region;
+use contract::time::Period;
+use serde::{Deserialize, Serialize};
+
+/// Draws pictures.
+#[async_trait]
+pub trait Draw: Send + Sync + 'static {
+    /// The picture of a valid job as the bytes of a PNG with alpha; a job without data is a transparent picture.
+    async fn draw(&self, job: &RenderJob) -> Result<Bytes, BackendError>;
+
+    /// Can pictures be drawn now? The text of the error is shown to operators.
+    async fn ready(&self) -> Result<(), BackendError>;
+}
+
+/// Computes series and budgets.
+#[async_trait]
+pub trait Analyse: Send + Sync + 'static {
+    /// The values of one cell, one for each step of the manifest in its order, stored unit; none where there is no data.
+    async fn point(
+        &self,
+        manifest: &Manifest,
+        cell: RowCol,
+    ) -> Result<Vec<Option<f64>>, BackendError>;
+
+    /// The carbon budget of a region, one row for each step of time.
+    async fn budget(&self, request: &BudgetRequest) -> Result<Vec<BudgetRow>, BackendError>;
+
+    /// Our budgets beside published ones; none where this deployment has nothing to compare with.
+    async fn check(&self) -> Result<Option<Check>, BackendError>;
+}
+
+/// A cell of a manifest's grid, inside it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
+pub struct RowCol {
+    /// Row, 0 is the northernmost.
+    pub row: u32,
+    /// Column, eastwards.
+    pub col: u32,
+}
+
+/// How a budget's period is cut into rows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum BudgetStep {
+    /// Calendar months.
+    Month,
+    /// Calendar years.
+    Year,
+    /// One row for all of it.
+    Total,
+}
+
+impl std::str::FromStr for BudgetStep {
+    type Err = contract::ContractError;
+
+    fn from_str(s: &str) -> Result<Self, Self::Err> {
+        match s {
+            "month" => Ok(Self::Month),
+            "year" => Ok(Self::Year),
+            "total" => Ok(Self::Total),
+            _ => Err(contract::ContractError::invalid(
+                "step",
+                s,
+                "month, year or total",
+            )),
+        }
+    }
+}
+
+/// A budget that is asked for.
+#[derive(Debug, Clone)]
+pub struct BudgetRequest {
+    /// A manifest of a carbon flux.
+    pub manifest: Arc<Manifest>,
+    /// Where.
+    pub region: Region,
+    /// When; overlaps the manifest's extent and does not reach past it.
+    pub period: Period,
+    /// Rows.
+    pub step: BudgetStep,
+    /// Figure of the earth for cell areas.
+    pub earth: Earth,
+}
+
+/// The budget of one period.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BudgetRow {
+    /// What it is summed over.
+    pub period: Period,
+    /// Carbon given off by the sea, Tg, positive out of the sea.
+    pub budget_tg: f64,
+    /// Share of the region's area with data, averaged over the period, percent.
+    pub coverage_percent: f64,
+    /// Area with data, averaged over the period, m².
+    pub area_m2: f64,
+}
+
+/// Our numbers beside published ones.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Check {
+    /// Comparisons in the order they are shown.
+    pub rows: Vec<CheckRow>,
+    /// Where the published numbers come from.
+    pub note: String,
+}
+
+/// One number of ours beside a published one.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CheckRow {
+    /// Region, for people.
+    pub what: String,
+    /// Period, for people.
+    pub period: String,
+    /// The published value.
+    pub published: f64,
+    /// Our value.
+    pub ours: f64,
+    /// Unit of both.
+    pub unit: String,
+    /// Ours against published; none where the published value is too small to divide by.
+    pub difference_percent: Option<f64>,
+}
+
+/// What a failure means for who asked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Class {
+    /// The question is wrong; the text says how.
+    BadRequest,
+    /// What is asked for does not exist; the text says what.
+    NotFound,
+    /// Too much to do now; the same question may succeed in a moment.
+    Busy,
+    /// A part that is needed does not answer; the same question may succeed later.
+    Unavailable,
+    /// Our fault; the text goes to the log, not to users.
+    Internal,
+}
+
+/// A failed picture or analysis.
+#[derive(Debug, Clone, thiserror::Error)]
+#[error("{text}")]
+pub struct BackendError {
+    /// What it means for who asked.
+    pub class: Class,
+    /// One line: for users, except for [`Class::Internal`], which only the log sees.
+    pub text: String,
+    /// What it came from.
+    pub source: Option<Arc<dyn std::error::Error + Send + Sync>>,
+}
+
+impl BackendError {
+    /// A failure without a deeper cause.
+    pub fn new(class: Class, text: impl Into<String>) -> Self {
+        Self {
+            class,
+            text: text.into(),
+            source: None,
+        }
+    }
+
+    /// The same with its cause, for the log.
+    #[must_use]
+    pub fn because(self, source: impl std::error::Error + Send + Sync + 'static) -> Self {
+        Self {
+            source: Some(Arc::new(source)),
+            ..self
+        }
+    }
+
+    /// May the same call succeed later?
+    pub fn is_retryable(&self) -> bool {
+        match self.class {
+            Class::Busy | Class::Unavailable => true,
+            Class::BadRequest | Class::NotFound | Class::Internal => false,
+        }
+    }
+}

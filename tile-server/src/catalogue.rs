@@ -1,0 +1,226 @@
+//! The products there are: reads the store's newest manifests, at most once in a while, and remembers them.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, PoisonError, RwLock};
+use std::time::{Duration, Instant};
+
+use contract::job::Mode;
+use contract::key::ObjectKey;
+use contract::manifest::{Manifest, ManifestId};
+use contract::product::ProductId;
+use contract::quantity::Quantity;
+use contract::time::Period;
+use storage::{StorageError, Store, manifests};
+
+use crate::error::ServerError;
+use crate::metrics::Metrics;
+
+/// Folder of all manifests; [`ObjectKey::manifest`] puts them there.
+const FOLDER: &str = "manifests";
+
+/// The newest version of one product.
+#[derive(Debug, Clone)]
+pub struct Layer {
+    /// Its name, which is costly to compute.
+    pub id: ManifestId,
+    /// Its manifest.
+    pub manifest: Arc<Manifest>,
+    /// What it covers; a manifest without steps is no layer.
+    pub extent: Period,
+    /// The accumulated carbon that was derived from exactly this version.
+    pub accumulated: Option<ManifestId>,
+}
+
+impl Layer {
+    /// Modes it can be drawn in. Accumulated carbon lifts the particles of another product; it has none of its own.
+    pub fn modes(&self) -> &'static [Mode] {
+        if self.manifest.quantity == Quantity::AccumulatedCarbon {
+            &[Mode::Map]
+        } else {
+            &Mode::ALL
+        }
+    }
+}
+
+/// What was known at one moment.
+#[derive(Debug, Default)]
+struct Snapshot {
+    read_at: Option<Instant>,
+    known: BTreeMap<ProductId, (ObjectKey, Arc<Manifest>, ManifestId)>,
+    layers: BTreeMap<ProductId, Arc<Layer>>,
+}
+
+/// The products of a store.
+#[derive(Debug)]
+pub struct Catalogue {
+    store: Store,
+    max_age: Duration,
+    metrics: Metrics,
+    snapshot: RwLock<Arc<Snapshot>>,
+    /// Held while the store is read, so that a crowd reads it once.
+    reading: tokio::sync::Mutex<()>,
+}
+
+impl Catalogue {
+    /// An empty catalogue that reads the store when it is first asked.
+    pub fn new(store: Store, max_age: Duration, metrics: Metrics) -> Self {
+        Self {
+            store,
+            max_age,
+            metrics,
+            snapshot: RwLock::default(),
+            reading: tokio::sync::Mutex::new(()),
+        }
+    }
+
+    /// The newest version of a product by its name in an address.
+    pub async fn layer(&self, product: &str) -> Result<Arc<Layer>, ServerError> {
+        let unknown = || ServerError::UnknownProduct {
+            name: product.chars().take(80).collect(),
+        };
+        let id: ProductId = product.parse().map_err(|_no_such_name| unknown())?;
+        let snapshot = self.snapshot().await?;
+        match snapshot.layers.get(&id) {
+            Some(layer) => Ok(Arc::clone(layer)),
+            None if snapshot.known.contains_key(&id) => Err(ServerError::EmptyProduct {
+                name: id.to_string(),
+            }),
+            None => Err(unknown()),
+        }
+    }
+
+    /// Every product with steps: carbon fluxes first, accumulated carbon last, then by name.
+    pub async fn layers(&self) -> Result<Vec<Arc<Layer>>, ServerError> {
+        let mut layers: Vec<_> = self.snapshot().await?.layers.values().cloned().collect();
+        layers.sort_by_key(|layer| match layer.manifest.quantity {
+            Quantity::CarbonFlux => 0,
+            Quantity::AccumulatedCarbon => 2,
+            _ => 1,
+        });
+        Ok(layers)
+    }
+
+    /// Reads the store now: the number of products, or why it cannot be read.
+    pub async fn probe(&self) -> Result<usize, StorageError> {
+        self.store.folders(FOLDER).await.map(|names| names.len())
+    }
+
+    fn current(&self) -> Arc<Snapshot> {
+        Arc::clone(&self.snapshot.read().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    fn fresh(&self) -> Option<Arc<Snapshot>> {
+        let snapshot = self.current();
+        let fresh = snapshot
+            .read_at
+            .is_some_and(|at| at.elapsed() < self.max_age);
+        fresh.then_some(snapshot)
+    }
+
+    /// What is known, read anew if it is too old. A store that does not answer leaves what was known before: objects
+    /// never change, so it is still true.
+    async fn snapshot(&self) -> Result<Arc<Snapshot>, ServerError> {
+        if let Some(snapshot) = self.fresh() {
+            return Ok(snapshot);
+        }
+        let _reading = self.reading.lock().await;
+        if let Some(snapshot) = self.fresh() {
+            return Ok(snapshot);
+        }
+        let before = self.current();
+        match self.read(&before).await {
+            Ok(snapshot) => {
+                let snapshot = Arc::new(snapshot);
+                self.metrics.products.set(snapshot.layers.len() as i64);
+                *self
+                    .snapshot
+                    .write()
+                    .unwrap_or_else(PoisonError::into_inner) = Arc::clone(&snapshot);
+                Ok(snapshot)
+            }
+            Err(error) => {
+                self.metrics.store_failures.inc();
+                if before.read_at.is_none() {
+                    return Err(error.into());
+                }
+                tracing::warn!(%error, "the list of products cannot be read; the one before is used");
+                Ok(before)
+            }
+        }
+    }
+
+    /// One listing of all manifests; only those that are new are read.
+    async fn read(&self, before: &Snapshot) -> Result<Snapshot, StorageError> {
+        let read_at = Some(Instant::now());
+        let mut newest: BTreeMap<ProductId, ObjectKey> = BTreeMap::new();
+        for key in self.store.list(FOLDER).await? {
+            // Keys come sorted and numbers are zero-padded: the last of a product is its newest.
+            if let Some(product) = key
+                .as_str()
+                .split('/')
+                .nth(1)
+                .and_then(|name| name.parse().ok())
+            {
+                newest.insert(product, key);
+            }
+        }
+        let mut known = BTreeMap::new();
+        for (product, key) in newest {
+            let entry = match before.known.get(&product) {
+                Some(entry) if entry.0 == key => Some(entry.clone()),
+                older => self.load(&product, key).await?.or_else(|| older.cloned()),
+            };
+            known.extend(entry.map(|entry| (product, entry)));
+        }
+        let layers = known.iter().filter_map(|(product, entry)| {
+            Some((product.clone(), Arc::new(layer(&known, entry)?)))
+        });
+        Ok(Snapshot {
+            read_at,
+            layers: layers.collect(),
+            known,
+        })
+    }
+
+    /// The newest manifest of a product; none if it is damaged, which must not hide the other products.
+    async fn load(
+        &self,
+        product: &ProductId,
+        key: ObjectKey,
+    ) -> Result<Option<Entry>, StorageError> {
+        match manifests::latest(&self.store, product).await {
+            Ok(manifest) => Ok(manifest.map(|manifest| {
+                let id = manifest.id();
+                (
+                    ObjectKey::manifest(product, manifest.number),
+                    Arc::new(manifest),
+                    id,
+                )
+            })),
+            Err(error) if error.is_retryable() => Err(error),
+            Err(error) => {
+                self.metrics.store_failures.inc();
+                tracing::error!(%error, product.id = %product, object.key = %key, "a manifest cannot be used");
+                Ok(None)
+            }
+        }
+    }
+}
+
+type Entry = (ObjectKey, Arc<Manifest>, ManifestId);
+
+fn layer(known: &BTreeMap<ProductId, Entry>, (_, manifest, id): &Entry) -> Option<Layer> {
+    let accumulated = manifest
+        .product
+        .accumulated()
+        .ok()
+        .and_then(|product| known.get(&product));
+    let accumulated =
+        accumulated.filter(|(_, derived, _)| derived.derived_from.as_ref() == Some(id));
+    Some(Layer {
+        id: id.clone(),
+        manifest: Arc::clone(manifest),
+        extent: manifest.extent()?,
+        accumulated: accumulated.map(|(_, _, id)| id.clone()),
+    })
+}

@@ -1,0 +1,101 @@
+//! Settings of the tile server: flags and environment variables in, plain values with limits out.
+
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::path::PathBuf;
+
+const LISTEN: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), 8080);
+const TILE_MEMORY_BYTES: u64 = 256 << 20;
+const DRAWS_AT_ONCE: u32 = 2;
+const DRAW_QUEUE: u32 = 256;
+const ANALYSES_AT_ONCE: u32 = 2;
+const ANALYSIS_QUEUE: u32 = 64;
+const REQUEST_LIMIT_S: u64 = 60;
+const DRAIN_LIMIT_S: u64 = 10;
+const CATALOGUE_AGE_MS: u64 = 1000;
+
+/// What the tile server can be told.
+#[derive(Debug, Clone, PartialEq, Eq, clap::Args)]
+pub struct Settings {
+    /// Address and port to listen on; only this machine can reach the default
+    #[arg(long, env = "FLUXGLOBE_LISTEN", default_value_t = LISTEN)]
+    pub listen: SocketAddr,
+    /// Folder with the built viewer; without it only tiles and data are served
+    #[arg(long, env = "FLUXGLOBE_VIEWER")]
+    pub viewer: Option<PathBuf>,
+    /// Memory for drawn pictures, bytes, 0 to 64 GiB
+    #[arg(long, env = "FLUXGLOBE_TILE_MEMORY_BYTES", default_value_t = TILE_MEMORY_BYTES, value_parser = clap::value_parser!(u64).range(0..=64 << 30))]
+    pub tile_memory_bytes: u64,
+    /// Pictures drawn at the same time, 1 to 1024
+    #[arg(long, env = "FLUXGLOBE_DRAWS_AT_ONCE", default_value_t = DRAWS_AT_ONCE, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub draws_at_once: u32,
+    /// Pictures that may wait to be drawn before clients are sent away, 0 to 65536
+    #[arg(long, env = "FLUXGLOBE_DRAW_QUEUE", default_value_t = DRAW_QUEUE, value_parser = clap::value_parser!(u32).range(0..=65_536))]
+    pub draw_queue: u32,
+    /// Series and budgets computed at the same time, 1 to 1024
+    #[arg(long, env = "FLUXGLOBE_ANALYSES_AT_ONCE", default_value_t = ANALYSES_AT_ONCE, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub analyses_at_once: u32,
+    /// Series and budgets that may wait before clients are sent away, 0 to 65536
+    #[arg(long, env = "FLUXGLOBE_ANALYSIS_QUEUE", default_value_t = ANALYSIS_QUEUE, value_parser = clap::value_parser!(u32).range(0..=65_536))]
+    pub analysis_queue: u32,
+    /// Longest time until an answer begins, seconds, 1 to 3600
+    #[arg(long, env = "FLUXGLOBE_REQUEST_LIMIT_S", default_value_t = REQUEST_LIMIT_S, value_parser = clap::value_parser!(u64).range(1..=3600))]
+    pub request_limit_s: u64,
+    /// Longest time that requests under way may take when the server is asked to stop, seconds, 0 to 3600
+    #[arg(long, env = "FLUXGLOBE_DRAIN_LIMIT_S", default_value_t = DRAIN_LIMIT_S, value_parser = clap::value_parser!(u64).range(0..=3600))]
+    pub drain_limit_s: u64,
+    /// Age at which the list of products is read again, milliseconds, 0 to 3600000
+    #[arg(long, env = "FLUXGLOBE_CATALOGUE_AGE_MS", default_value_t = CATALOGUE_AGE_MS, value_parser = clap::value_parser!(u64).range(0..=3_600_000))]
+    pub catalogue_age_ms: u64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            listen: LISTEN,
+            viewer: None,
+            tile_memory_bytes: TILE_MEMORY_BYTES,
+            draws_at_once: DRAWS_AT_ONCE,
+            draw_queue: DRAW_QUEUE,
+            analyses_at_once: ANALYSES_AT_ONCE,
+            analysis_queue: ANALYSIS_QUEUE,
+            request_limit_s: REQUEST_LIMIT_S,
+            drain_limit_s: DRAIN_LIMIT_S,
+            catalogue_age_ms: CATALOGUE_AGE_MS,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser as _;
+
+    #[derive(clap::Parser)]
+    struct Program {
+        #[command(flatten)]
+        settings: Settings,
+    }
+
+    #[test]
+    fn no_flags_are_the_defaults() {
+        assert_eq!(
+            Program::parse_from(["program"]).settings,
+            Settings::default()
+        );
+    }
+
+    #[test]
+    fn values_beyond_their_limits_are_refused() {
+        for flag in [
+            ["--draws-at-once", "0"],
+            ["--request-limit-s", "0"],
+            ["--listen", "8080"],
+            ["--draw-queue", "-1"],
+        ] {
+            assert!(
+                Program::try_parse_from(["program", flag[0], flag[1]]).is_err(),
+                "{flag:?}"
+            );
+        }
+    }
+}

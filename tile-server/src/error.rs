@@ -1,0 +1,212 @@
+//! The failures of this server, and the one place where a failure becomes a status and a text for users.
+
+use std::net::SocketAddr;
+use std::sync::Arc;
+
+use axum::Json;
+use axum::http::{HeaderValue, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use contract::ContractError;
+use serde_json::json;
+use storage::StorageError;
+
+use crate::backend::{BackendError, Class};
+
+/// How long a client is asked to wait when there is too much to do, seconds: a picture takes well under one.
+const RETRY_BUSY_S: u16 = 1;
+/// How long a client is asked to wait when a part does not answer, seconds.
+const RETRY_UNAVAILABLE_S: u16 = 5;
+
+/// Why a request has no answer.
+#[derive(Debug, Clone, thiserror::Error)]
+pub enum ServerError {
+    /// A part of the address is no value of its type.
+    #[error(transparent)]
+    Contract(#[from] ContractError),
+    /// The address cannot be taken apart.
+    #[error("the address is not valid: {reason}")]
+    Address { reason: String },
+    /// A parameter that must be there is not.
+    #[error("parameter {name:?} is missing: {wanted}")]
+    Missing {
+        name: &'static str,
+        wanted: &'static str,
+    },
+    /// A question about a place where the product has no cells.
+    #[error("{lon}, {lat} lies outside product {product}, which covers {covers}")]
+    OutsideGrid {
+        product: String,
+        lon: f64,
+        lat: f64,
+        covers: String,
+    },
+    /// A question about a time the product has no steps for.
+    #[error("product {product} has no data in that period: it covers {covers}")]
+    OutsidePeriod { product: String, covers: String },
+    /// A budget of something that is no flux.
+    #[error("product {product} is {quantity}: only a carbon flux has a budget")]
+    NotAFlux {
+        product: String,
+        quantity: &'static str,
+    },
+    /// No such product.
+    #[error("there is no product {name:?}; /api/products lists those there are")]
+    UnknownProduct { name: String },
+    /// The product has no steps yet.
+    #[error("product {name} has no steps yet")]
+    EmptyProduct { name: String },
+    /// No such way of drawing the product.
+    #[error("product {product} has no layer {mode:?}; it has {offered}")]
+    UnknownMode {
+        product: String,
+        mode: String,
+        offered: String,
+    },
+    /// Nothing at the address.
+    #[error("there is nothing at this address")]
+    UnknownAddress,
+    /// There is nothing published to compare with.
+    #[error("there is no comparison with published values here")]
+    NoCheck,
+    /// Only reading is possible.
+    #[error("this address can be read only: use GET or HEAD")]
+    ReadOnly,
+    /// The request carries more than an address.
+    #[error("requests carry at most {limit_bytes} bytes")]
+    BodyTooLarge { limit_bytes: u64 },
+    /// More work than the queue takes.
+    #[error("there is too much to do at the moment; please try again in a moment")]
+    Busy,
+    /// It took too long.
+    #[error("the answer took longer than {limit_s} s")]
+    TimedOut { limit_s: u64 },
+    /// A backend failed.
+    #[error(transparent)]
+    Backend(#[from] BackendError),
+    /// The store failed.
+    #[error(transparent)]
+    Storage(Arc<StorageError>),
+    /// A defect of this server or of a backend.
+    #[error("{what}")]
+    Defect { what: String },
+}
+
+impl From<StorageError> for ServerError {
+    fn from(error: StorageError) -> Self {
+        Self::Storage(Arc::new(error))
+    }
+}
+
+impl ServerError {
+    /// A part of the address that is no value of its type.
+    pub fn invalid(what: &'static str, text: &str, reason: impl Into<String>) -> Self {
+        Self::Contract(ContractError::invalid(what, text, reason))
+    }
+
+    /// What it means for who asked.
+    pub fn status(&self) -> StatusCode {
+        match self {
+            Self::Contract(_)
+            | Self::Address { .. }
+            | Self::Missing { .. }
+            | Self::OutsideGrid { .. }
+            | Self::OutsidePeriod { .. }
+            | Self::NotAFlux { .. } => StatusCode::BAD_REQUEST,
+            Self::UnknownProduct { .. }
+            | Self::EmptyProduct { .. }
+            | Self::UnknownMode { .. }
+            | Self::UnknownAddress
+            | Self::NoCheck => StatusCode::NOT_FOUND,
+            Self::ReadOnly => StatusCode::METHOD_NOT_ALLOWED,
+            Self::BodyTooLarge { .. } => StatusCode::PAYLOAD_TOO_LARGE,
+            Self::Busy => StatusCode::SERVICE_UNAVAILABLE,
+            Self::TimedOut { .. } => StatusCode::GATEWAY_TIMEOUT,
+            Self::Storage(error) if error.is_retryable() => StatusCode::SERVICE_UNAVAILABLE,
+            Self::Storage(_) | Self::Defect { .. } => StatusCode::INTERNAL_SERVER_ERROR,
+            Self::Backend(error) => match error.class {
+                Class::BadRequest => StatusCode::BAD_REQUEST,
+                Class::NotFound => StatusCode::NOT_FOUND,
+                Class::Busy | Class::Unavailable => StatusCode::SERVICE_UNAVAILABLE,
+                Class::Internal => StatusCode::INTERNAL_SERVER_ERROR,
+            },
+        }
+    }
+
+    /// May the same request succeed later?
+    pub fn is_retryable(&self) -> bool {
+        self.retry_after_s().is_some()
+    }
+
+    fn retry_after_s(&self) -> Option<u16> {
+        match self {
+            Self::Busy => Some(RETRY_BUSY_S),
+            Self::Backend(error) if error.class == Class::Busy => Some(RETRY_BUSY_S),
+            Self::TimedOut { .. } => Some(RETRY_UNAVAILABLE_S),
+            _ if self.status() == StatusCode::SERVICE_UNAVAILABLE => Some(RETRY_UNAVAILABLE_S),
+            _ => None,
+        }
+    }
+
+    /// The text for users: never that of a low-level error.
+    fn text(&self) -> String {
+        match self {
+            Self::Storage(error) if error.is_retryable() => {
+                "the store does not answer at the moment".to_owned()
+            }
+            _ if self.status() == StatusCode::INTERNAL_SERVER_ERROR => {
+                "something went wrong on our side; the server's log says more".to_owned()
+            }
+            _ => self.to_string(),
+        }
+    }
+}
+
+impl IntoResponse for ServerError {
+    fn into_response(self) -> Response {
+        let status = self.status();
+        if status.is_server_error() {
+            let cause = std::error::Error::source(&self).map(ToString::to_string);
+            tracing::warn!(status = status.as_u16(), error = %self, cause, "a request failed");
+        }
+        let mut response = (status, Json(json!({ "error": self.text() }))).into_response();
+        let headers = response.headers_mut();
+        headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
+        if let Some(seconds) = self.retry_after_s() {
+            headers.insert(header::RETRY_AFTER, seconds.into());
+        }
+        if status == StatusCode::METHOD_NOT_ALLOWED {
+            headers.insert(header::ALLOW, HeaderValue::from_static("GET, HEAD"));
+        }
+        response
+    }
+}
+
+/// Why the server does not start or stops.
+#[derive(Debug, thiserror::Error)]
+pub enum ServeError {
+    /// Somebody else listens there.
+    #[error("port {} is in use by another program; choose another with --listen", address.port())]
+    PortTaken { address: SocketAddr },
+    /// The address cannot be listened on.
+    #[error("cannot listen on {address}: {source}; choose another address with --listen")]
+    Listen {
+        address: SocketAddr,
+        source: std::io::Error,
+    },
+    /// A metric is registered twice: two servers share one registry.
+    #[error("cannot register metrics: {0}")]
+    Metrics(#[from] prometheus::Error),
+    /// The listening socket failed.
+    #[error("the server stopped: {0}")]
+    Stopped(#[source] std::io::Error),
+}
+
+impl ServeError {
+    /// May the same start succeed later?
+    pub fn is_retryable(&self) -> bool {
+        match self {
+            Self::PortTaken { .. } | Self::Stopped(_) => true,
+            Self::Listen { .. } | Self::Metrics(_) => false,
+        }
+    }
+}

@@ -1,0 +1,147 @@
+//! Single flight: whoever asks for what is being made already waits for that one answer.
+
+use std::collections::HashMap;
+use std::future::Future;
+use std::sync::{Mutex, PoisonError};
+
+use contract::digest::Digest;
+use futures::FutureExt as _;
+use futures::future::{BoxFuture, Shared, WeakShared};
+
+use crate::error::ServerError;
+
+type Flight<V> = BoxFuture<'static, Result<V, ServerError>>;
+
+/// Answers under way, by the digest of what was asked.
+///
+/// Only those who wait keep an answer under way alive: when the last one goes away, it is dropped.
+pub(crate) struct Flights<V: Clone + Send + Sync + 'static> {
+    under_way: Mutex<HashMap<Digest, WeakShared<Flight<V>>>>,
+}
+
+impl<V: Clone + Send + Sync + 'static> Default for Flights<V> {
+    fn default() -> Self {
+        Self {
+            under_way: Mutex::default(),
+        }
+    }
+}
+
+/// One who waits; leaving takes an answer nobody waits for off the list.
+struct Waiting<'a, V: Clone + Send + Sync + 'static> {
+    flights: &'a Flights<V>,
+    key: Digest,
+    flight: Option<Shared<Flight<V>>>,
+}
+
+impl<V: Clone + Send + Sync + 'static> Flights<V> {
+    /// Waits for the answer under way for `key`, or starts it. `start` is called only if there is none.
+    pub(crate) async fn join<F>(
+        &self,
+        key: Digest,
+        start: impl FnOnce() -> F,
+    ) -> Result<V, ServerError>
+    where
+        F: Future<Output = Result<V, ServerError>> + Send + 'static,
+    {
+        let flight = {
+            let mut under_way = self
+                .under_way
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner);
+            if let Some(flight) = under_way.get(&key).and_then(WeakShared::upgrade) {
+                flight
+            } else {
+                let flight = start().boxed().shared();
+                if let Some(weak) = flight.downgrade() {
+                    under_way.insert(key, weak);
+                }
+                flight
+            }
+        };
+        let waiting = Waiting {
+            flights: self,
+            key,
+            flight: Some(flight.clone()),
+        };
+        let answer = flight.await;
+        drop(waiting);
+        answer
+    }
+
+    #[cfg(test)]
+    fn len(&self) -> usize {
+        self.under_way.lock().unwrap().len()
+    }
+}
+
+impl<V: Clone + Send + Sync + 'static> Drop for Waiting<'_, V> {
+    fn drop(&mut self) {
+        drop(self.flight.take());
+        let mut under_way = self
+            .flights
+            .under_way
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        if under_way
+            .get(&self.key)
+            .is_some_and(|weak| weak.upgrade().is_none())
+        {
+            under_way.remove(&self.key);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicU32, Ordering};
+    use tokio::sync::Notify;
+
+    fn key() -> Digest {
+        Digest::of(b"k")
+    }
+
+    #[tokio::test]
+    async fn many_who_ask_at_once_get_one_answer() {
+        let flights = Flights::<u32>::default();
+        let (starts, go) = (AtomicU32::new(0), Arc::new(Notify::new()));
+        let ask = || {
+            flights.join(key(), || {
+                starts.fetch_add(1, Ordering::SeqCst);
+                let go = Arc::clone(&go);
+                async move {
+                    go.notified().await;
+                    Ok(7)
+                }
+            })
+        };
+        let mut first = Box::pin(ask());
+        let mut others: Vec<_> = (0..5).map(|_| Box::pin(ask())).collect();
+        assert!(first.as_mut().now_or_never().is_none());
+        assert!(
+            others
+                .iter_mut()
+                .all(|other| other.as_mut().now_or_never().is_none())
+        );
+        drop(first); // the one who started goes away: the others still get it
+        go.notify_one();
+        for answer in futures::future::join_all(others).await {
+            assert_eq!(answer.unwrap(), 7);
+        }
+        assert_eq!(starts.load(Ordering::SeqCst), 1);
+        assert_eq!(flights.len(), 0);
+    }
+
+    #[tokio::test]
+    async fn what_nobody_waits_for_is_dropped_and_started_anew() {
+        let flights = Flights::<u32>::default();
+        let mut lost = Box::pin(flights.join(key(), || std::future::pending()));
+        assert!(lost.as_mut().now_or_never().is_none());
+        drop(lost);
+        assert_eq!(flights.len(), 0);
+        assert_eq!(flights.join(key(), || async { Ok(1) }).await.unwrap(), 1);
+        assert_eq!(flights.join(key(), || async { Ok(2) }).await.unwrap(), 2);
+    }
+}

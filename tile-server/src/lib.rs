@@ -1,0 +1,42 @@
+//! The tile server: HTTP requests in; map tiles, globe views, series, budgets, the catalogue and the viewer out.
+//!
+//! | address | answer |
+//! |---|---|
+//! | `/tiles/{product}/{mode}/{z}/{x}/{y}.png?time=&size=` | Web Mercator tile, 256 or 512 pixels (`{y}@2x.png` is 512) |
+//! | `/tiles/{product}/{mode}.json?time=` | TileJSON 3.0.0 of the layer |
+//! | `/globe/{product}/{mode}.png?lon=&lat=&height_km=&time=&width=&height=&surface=` | view of the globe |
+//! | `/api/products` | every product, its steps, modes and legend |
+//! | `/api/products/{product}/point?lon=&lat=` | series of the cell at a place |
+//! | `/api/products/{product}/budget?region=&from=&to=&step=&earth=` | carbon budget |
+//! | `/api/regions` | regions with a name |
+//! | `/api/check` | our budgets beside published ones |
+//! | `/healthz`, `/readyz`, `/metrics` | the process lives; it can serve; Prometheus text |
+//! | `/` and below | the viewer's files |
+//!
+//! Times are ISO 8601 and any instant is valid; a missing one is the middle of the last step. `from` and `to` bound
+//! the half-open period `[from, to)`. Every refusal is JSON, `{"error": reason}`.
+//!
+//! Left out on purpose: drawing and computing, which come in through the traits of [`backend`].
+
+mod analyses;
+pub mod backend;
+mod catalogue;
+pub mod config;
+pub mod error;
+mod extract;
+mod flights;
+mod gate;
+pub mod metrics;
+mod middleware;
+mod pictures;
+mod request;
+mod router;
+mod routes;
+mod serve;
+mod state;
+
+pub use config::Settings;
+pub use error::{ServeError, ServerError};
+pub use router::router;
+pub use serve::{Server, serve};
+pub use state::AppState;

@@ -1,0 +1,95 @@
+//! Counts and times every request by its route.
+
+use std::time::Instant;
+
+use axum::body::Body;
+use axum::extract::{MatchedPath, Request, State};
+use axum::http::{Method, StatusCode};
+use axum::middleware::Next;
+use axum::response::Response;
+use futures::TryStreamExt as _;
+use prometheus::IntGauge;
+
+use crate::state::AppState;
+
+/// The route of what is no route: the viewer's files and unknown addresses.
+const FILES: &str = "viewer";
+
+/// One request under way; counted out even if the client goes away.
+struct UnderWay(IntGauge);
+
+impl UnderWay {
+    fn enter(gauge: &IntGauge) -> Self {
+        gauge.inc();
+        Self(gauge.clone())
+    }
+}
+
+impl Drop for UnderWay {
+    fn drop(&mut self) {
+        self.0.dec();
+    }
+}
+
+/// Counts the request when it comes, its answer when it begins and its bytes as they go.
+pub(crate) async fn count(State(state): State<AppState>, request: Request, next: Next) -> Response {
+    let metrics = &state.metrics;
+    let under_way = UnderWay::enter(&metrics.in_flight);
+    let started_at = Instant::now();
+    let route = request
+        .extensions()
+        .get::<MatchedPath>()
+        .map_or(FILES, MatchedPath::as_str)
+        .to_owned();
+    let (method, path) = (
+        method_label(request.method()),
+        request.uri().path().to_owned(),
+    );
+    let response = next.run(request).await;
+    let duration = started_at.elapsed();
+    let status = response.status();
+    metrics
+        .requests
+        .with_label_values(&[&route, method, status_label(status)])
+        .inc();
+    metrics
+        .request_duration_s
+        .with_label_values(&[&route])
+        .observe(duration.as_secs_f64());
+    tracing::debug!(
+        http.route = route,
+        http.path = path,
+        status = status.as_u16(),
+        duration_ms = duration.as_secs_f64() * 1e3,
+        "{method} {status}"
+    );
+    let sent_bytes = metrics.sent_bytes.with_label_values(&[&route]);
+    response.map(|body| {
+        let counted = body.into_data_stream().inspect_ok(move |piece| {
+            // Moved in here, it is under way until its last byte is.
+            let _under_way = &under_way;
+            sent_bytes.inc_by(piece.len() as u64);
+        });
+        Body::from_stream(counted)
+    })
+}
+
+/// Methods are free text to HTTP: only those with a meaning here become a label.
+fn method_label(method: &Method) -> &'static str {
+    match *method {
+        Method::GET => "GET",
+        Method::HEAD => "HEAD",
+        Method::OPTIONS => "OPTIONS",
+        _ => "other",
+    }
+}
+
+fn status_label(status: StatusCode) -> &'static str {
+    match status.as_u16() / 100 {
+        1 => "1xx",
+        2 => "2xx",
+        3 => "3xx",
+        4 => "4xx",
+        _ => "5xx",
+    }
+}

@@ -1,0 +1,181 @@
+//! Pictures by their job: from memory, from the object store, or drawn once for all who wait, within limits.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use bytes::Bytes;
+use contract::digest::Digest;
+use contract::job::RenderJob;
+use contract::key::ObjectKey;
+use quick_cache::Weighter;
+use quick_cache::sync::Cache;
+use storage::{StorageError, Store};
+
+use crate::backend::Draw;
+use crate::error::ServerError;
+use crate::flights::Flights;
+use crate::gate::Gate;
+use crate::metrics::{Metrics, Source};
+
+/// What every PNG begins with (ISO/IEC 15948, 5.2).
+const PNG_SIGNATURE: [u8; 8] = [0x89, b'P', b'N', b'G', 0x0d, 0x0a, 0x1a, 0x0a];
+/// Size of a picture the memory is laid out for, bytes: between an empty tile (0.3 KiB) and a busy one (100 KiB).
+const TYPICAL_BYTES: u64 = 20 << 10;
+/// Memory an entry takes besides its bytes: digest, handle and the cache's own tables.
+const ENTRY_BYTES: u64 = 128;
+
+#[derive(Debug, Clone)]
+struct ByBytes;
+
+impl Weighter<Digest, Bytes> for ByBytes {
+    fn weight(&self, _digest: &Digest, picture: &Bytes) -> u64 {
+        picture.len() as u64 + ENTRY_BYTES
+    }
+}
+
+/// The pictures of one server.
+pub struct Pictures {
+    flights: Flights<Bytes>,
+    maker: Arc<Maker>,
+}
+
+/// What making one picture needs; shared with the tasks that draw.
+struct Maker {
+    store: Store,
+    drawer: Arc<dyn Draw>,
+    gate: Gate,
+    memory: Cache<Digest, Bytes, ByBytes>,
+    metrics: Metrics,
+}
+
+impl Pictures {
+    /// No pictures yet. `memory_bytes` bounds those kept in memory.
+    pub fn new(
+        store: Store,
+        drawer: Arc<dyn Draw>,
+        gate: Gate,
+        memory_bytes: u64,
+        metrics: Metrics,
+    ) -> Self {
+        let memory = Cache::with_weighter(
+            (memory_bytes / TYPICAL_BYTES).max(16) as usize,
+            memory_bytes,
+            ByBytes,
+        );
+        Self {
+            flights: Flights::default(),
+            maker: Arc::new(Maker {
+                store,
+                drawer,
+                gate,
+                memory,
+                metrics,
+            }),
+        }
+    }
+
+    /// The picture of a job, as a PNG.
+    pub async fn get(&self, job: RenderJob) -> Result<Bytes, ServerError> {
+        let digest = job.digest();
+        if let Some(picture) = self.maker.memory.get(&digest) {
+            self.maker.metrics.hit(Source::Memory);
+            return Ok(picture);
+        }
+        let maker = Arc::clone(&self.maker);
+        self.flights.join(digest, || maker.make(digest, job)).await
+    }
+}
+
+impl Maker {
+    async fn make(self: Arc<Self>, digest: Digest, job: RenderJob) -> Result<Bytes, ServerError> {
+        // The flight before this one may have ended since the memory was asked.
+        if let Some(picture) = self.memory.get(&digest) {
+            self.metrics.hit(Source::Memory);
+            return Ok(picture);
+        }
+        let key = job.key();
+        if let Some(picture) = self.stored(&key).await {
+            self.metrics.hit(Source::Store);
+            self.remember(digest, picture.clone());
+            return Ok(picture);
+        }
+        self.metrics.cache_misses.inc();
+        let asked_at = Instant::now();
+        let pass = self
+            .gate
+            .enter()
+            .await
+            .inspect_err(|_busy| self.metrics.refused.inc())?;
+        self.metrics
+            .draw_wait_s
+            .observe(asked_at.elapsed().as_secs_f64());
+        // Drawing goes on if those who asked go away: the work is half done, and the next one finds it in the store.
+        let drawing = tokio::spawn(async move {
+            let picture = self.draw(&job).await?;
+            let picture = self.keep(&key, picture).await;
+            self.remember(digest, picture.clone());
+            drop(pass);
+            Ok(picture)
+        });
+        drawing.await.unwrap_or_else(|e| {
+            Err(ServerError::Defect {
+                what: format!("drawing ended early: {e}"),
+            })
+        })
+    }
+
+    async fn stored(&self, key: &ObjectKey) -> Option<Bytes> {
+        match self.store.get(key).await {
+            Ok(picture) => Some(picture),
+            Err(error) if error.is_not_found() => None,
+            Err(error) => {
+                self.metrics.store_failures.inc();
+                tracing::warn!(%error, object.key = %key, "a stored picture cannot be read; it is drawn again");
+                None
+            }
+        }
+    }
+
+    async fn draw(&self, job: &RenderJob) -> Result<Bytes, ServerError> {
+        let started_at = Instant::now();
+        let drawn = self.drawer.draw(job).await;
+        let mode = job.mode.as_str();
+        self.metrics
+            .draw_duration_s
+            .with_label_values(&[mode])
+            .observe(started_at.elapsed().as_secs_f64());
+        let drawn = drawn.map_err(ServerError::from).and_then(|picture| {
+            if picture.starts_with(&PNG_SIGNATURE) {
+                Ok(picture)
+            } else {
+                Err(ServerError::Defect {
+                    what: "the renderer's answer is no PNG".to_owned(),
+                })
+            }
+        });
+        let outcome = if drawn.is_ok() { "ok" } else { "failed" };
+        self.metrics.drawn.with_label_values(&[mode, outcome]).inc();
+        drawn
+    }
+
+    /// Stores a picture and gives it back. If another one is there under the same name, that one was already served,
+    /// so it is served again; a store that fails costs a second drawing one day, not this answer.
+    async fn keep(&self, key: &ObjectKey, picture: Bytes) -> Bytes {
+        let Err(error) = self.store.put_new(key, picture.clone()).await else {
+            return picture;
+        };
+        if matches!(error, StorageError::Conflict { .. }) {
+            self.metrics.conflicts.inc();
+            tracing::error!(object.key = %key, "the same job was drawn with other bytes; the stored ones are served");
+            return self.stored(key).await.unwrap_or(picture);
+        }
+        self.metrics.store_failures.inc();
+        tracing::warn!(%error, object.key = %key, "a picture cannot be stored");
+        picture
+    }
+
+    fn remember(&self, digest: Digest, picture: Bytes) {
+        self.memory.insert(digest, picture);
+        self.metrics.cache_bytes.set(self.memory.weight() as i64);
+    }
+}

@@ -1,0 +1,14 @@
+//! One file for each noun that can be asked for; the addresses are in `router`.
+
+pub(crate) mod budget;
+pub(crate) mod check;
+pub(crate) mod globe;
+pub(crate) mod health;
+pub(crate) mod metrics;
+pub(crate) mod picture;
+pub(crate) mod point;
+pub(crate) mod products;
+pub(crate) mod regions;
+pub(crate) mod tilejson;
+pub(crate) mod tiles;
+pub(crate) mod viewer;

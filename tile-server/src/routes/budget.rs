@@ -1,0 +1,150 @@
+//! `/api/products/{product}/budget`: the carbon a region gave off, by month, by year or in all.
+
+use std::sync::Arc;
+
+use axum::Json;
+use axum::extract::State;
+use axum::http::header;
+use axum::response::{IntoResponse as _, Response};
+use contract::earth::Earth;
+use contract::manifest::ManifestId;
+use contract::product::ProductId;
+use contract::quantity::Quantity;
+use contract::region::{NamedRegion, Region};
+use contract::time::{Period, TimeMs};
+use serde::{Deserialize, Serialize};
+
+use crate::backend::{BudgetRequest, BudgetRow};
+use crate::catalogue::Layer;
+use crate::error::ServerError;
+use crate::extract::{UrlPath, UrlQuery, time};
+use crate::state::AppState;
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct BudgetQuery {
+    region: Option<String>,
+    from: Option<String>,
+    to: Option<String>,
+    step: Option<String>,
+    earth: Option<String>,
+}
+
+#[derive(Debug, Serialize)]
+struct Budget<'a> {
+    product: &'a ProductId,
+    manifest: &'a ManifestId,
+    region: String,
+    earth: Earth,
+    unit: &'static str,
+    rows: Vec<Row>,
+}
+
+#[derive(Debug, Serialize)]
+struct Row {
+    start: TimeMs,
+    end: TimeMs,
+    budget: f64,
+    coverage_percent: f64,
+    area_m2: f64,
+}
+
+impl From<&BudgetRow> for Row {
+    fn from(row: &BudgetRow) -> Self {
+        let Period { start, end } = row.period;
+        let BudgetRow {
+            budget_tg,
+            coverage_percent,
+            area_m2,
+            ..
+        } = *row;
+        Self {
+            start,
+            end,
+            budget: budget_tg,
+            coverage_percent,
+            area_m2,
+        }
+    }
+}
+
+pub(crate) async fn get(
+    State(state): State<AppState>,
+    UrlPath(product): UrlPath<String>,
+    UrlQuery(query): UrlQuery<BudgetQuery>,
+) -> Result<Response, ServerError> {
+    let layer = state.catalogue.layer(&product).await?;
+    let manifest = &layer.manifest;
+    if manifest.quantity != Quantity::CarbonFlux {
+        let quantity = manifest.quantity.title();
+        return Err(ServerError::NotAFlux {
+            product: manifest.product.to_string(),
+            quantity,
+        });
+    }
+    let region = query.region.as_deref().unwrap_or("global");
+    let request = BudgetRequest {
+        manifest: Arc::clone(manifest),
+        region: region.parse()?,
+        period: period(
+            &layer,
+            time(query.from.as_deref())?,
+            time(query.to.as_deref())?,
+        )?,
+        step: query.step.as_deref().unwrap_or("month").parse()?,
+        earth: query
+            .earth
+            .as_deref()
+            .map_or(Ok(Earth::default()), str::parse)?,
+    };
+    let (region, earth) = (region_name(region, &request.region), request.earth);
+    let rows = state.analyses.budget(&layer, request).await?;
+    let rows = rows.iter().map(Row::from).collect();
+    let answer = Budget {
+        product: &manifest.product,
+        manifest: &layer.id,
+        region,
+        earth,
+        unit: "Tg C",
+        rows,
+    };
+    Ok(([(header::CACHE_CONTROL, "no-cache")], Json(answer)).into_response())
+}
+
+/// The part of `[from, to)` that the product covers; all it covers if nothing is said.
+fn period(layer: &Layer, from: Option<TimeMs>, to: Option<TimeMs>) -> Result<Period, ServerError> {
+    let extent = layer.extent;
+    let outside = || ServerError::OutsidePeriod {
+        product: layer.manifest.product.to_string(),
+        covers: format!("{} to {}", extent.start, extent.end),
+    };
+    // With one end left open the other may lie beyond all there is: that is an empty answer, not a backward period.
+    if (to.is_none() && from.is_some_and(|t| t >= extent.end))
+        || (from.is_none() && to.is_some_and(|t| t <= extent.start))
+    {
+        return Err(outside());
+    }
+    let asked = Period::new(from.unwrap_or(extent.start), to.unwrap_or(extent.end))?;
+    if !asked.overlaps(extent) {
+        return Err(outside());
+    }
+    Ok(Period {
+        start: asked.start.max(extent.start),
+        end: asked.end.min(extent.end),
+    })
+}
+
+/// A region as the answer names it: by its name, or as `west,south,east,north`.
+fn region_name(asked: &str, region: &Region) -> String {
+    match region {
+        Region::Box {
+            west,
+            south,
+            east,
+            north,
+        } if NamedRegion::find(asked).is_none() => {
+            format!("{west},{south},{east},{north}")
+        }
+        _ => asked.to_owned(),
+    }
+}

@@ -1,0 +1,12 @@
+//! `/api/check`: our budgets beside published ones, 404 where there is nothing to compare with.
+
+use axum::Json;
+use axum::extract::State;
+
+use crate::backend::Check;
+use crate::error::ServerError;
+use crate::state::AppState;
+
+pub(crate) async fn get(State(state): State<AppState>) -> Result<Json<Check>, ServerError> {
+    state.analyses.check().await.map(Json)
+}

@@ -1,0 +1,108 @@
+//! `/healthz` and `/readyz`: does the process live, and can it do its work now?
+
+use std::time::Duration;
+
+use axum::Json;
+use axum::extract::State;
+use axum::http::{StatusCode, header};
+use axum::response::{IntoResponse as _, Response};
+use serde::Serialize;
+use tokio::time::timeout;
+
+use crate::routes::viewer;
+use crate::state::AppState;
+
+/// A part that needs longer than this to say that it is there is as good as away.
+const PART_LIMIT: Duration = Duration::from_secs(2);
+
+#[derive(Debug, Serialize)]
+struct Readiness {
+    ready: bool,
+    checks: Vec<Part>,
+}
+
+#[derive(Debug, Serialize)]
+struct Part {
+    name: &'static str,
+    ok: bool,
+    /// Can the server not do without it?
+    required: bool,
+    detail: String,
+}
+
+/// The process answers. It asks nobody, so that a failing neighbour does not get this process restarted.
+pub(crate) async fn live() -> Response {
+    ([(header::CACHE_CONTROL, "no-store")], "ok\n").into_response()
+}
+
+/// Every part, asked now.
+pub(crate) async fn ready(State(state): State<AppState>) -> Response {
+    let (store, renderer) = tokio::join!(store(&state), renderer(&state));
+    let checks = vec![store, renderer, viewer_files(&state).await];
+    let ready = checks.iter().all(|part| part.ok || !part.required);
+    let status = if ready {
+        StatusCode::OK
+    } else {
+        StatusCode::SERVICE_UNAVAILABLE
+    };
+    (
+        status,
+        [(header::CACHE_CONTROL, "no-store")],
+        Json(Readiness { ready, checks }),
+    )
+        .into_response()
+}
+
+async fn store(state: &AppState) -> Part {
+    let (ok, detail) = match timeout(PART_LIMIT, state.catalogue.probe()).await {
+        Ok(Ok(1)) => (true, "1 product".to_owned()),
+        Ok(Ok(count)) => (true, format!("{count} products")),
+        Ok(Err(error)) => {
+            // The error names folders and servers: the log may know them, whoever asks here need not.
+            tracing::warn!(%error, "the store is not ready");
+            (false, "it cannot be read; the log says why".to_owned())
+        }
+        Err(_elapsed) => (
+            false,
+            format!("no answer within {} s", PART_LIMIT.as_secs()),
+        ),
+    };
+    Part {
+        name: "store",
+        ok,
+        required: true,
+        detail,
+    }
+}
+
+async fn renderer(state: &AppState) -> Part {
+    let (ok, detail) = match timeout(PART_LIMIT, state.drawer.ready()).await {
+        Ok(Ok(())) => (true, "it draws".to_owned()),
+        Ok(Err(error)) => (false, error.text),
+        Err(_elapsed) => (
+            false,
+            format!("no answer within {} s", PART_LIMIT.as_secs()),
+        ),
+    };
+    Part {
+        name: "renderer",
+        ok,
+        required: true,
+        detail,
+    }
+}
+
+async fn viewer_files(state: &AppState) -> Part {
+    let ok = viewer::is_built(&state.settings).await;
+    let detail = if ok {
+        "it is served at /"
+    } else {
+        "it has not been built; tiles and data are served"
+    };
+    Part {
+        name: "viewer",
+        ok,
+        required: false,
+        detail: detail.to_owned(),
+    }
+}

@@ -1,0 +1,102 @@
+//! `/api/products/{product}/point`: the series of the cell at a place, in the unit people read.
+
+use axum::Json;
+use axum::extract::State;
+use axum::http::header;
+use axum::response::{IntoResponse as _, Response};
+use contract::grid::LonLatDeg;
+use contract::manifest::ManifestId;
+use contract::product::ProductId;
+use serde::{Deserialize, Serialize};
+
+use crate::backend::RowCol;
+use crate::error::ServerError;
+use crate::extract::{UrlPath, UrlQuery, number};
+use crate::routes::products::{StepTimes, bounds_deg};
+use crate::state::AppState;
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct PointQuery {
+    lon: Option<String>,
+    lat: Option<String>,
+}
+
+#[derive(Debug, Serialize)]
+struct PointSeries<'a> {
+    product: &'a ProductId,
+    manifest: &'a ManifestId,
+    unit: &'static str,
+    lon: f64,
+    lat: f64,
+    cell: Cell,
+    series: Vec<PointValue>,
+}
+
+#[derive(Debug, Serialize)]
+struct Cell {
+    row: u32,
+    col: u32,
+    lon: f64,
+    lat: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct PointValue {
+    #[serde(flatten)]
+    times: StepTimes,
+    value: Option<f64>,
+}
+
+pub(crate) async fn get(
+    State(state): State<AppState>,
+    UrlPath(product): UrlPath<String>,
+    UrlQuery(query): UrlQuery<PointQuery>,
+) -> Result<Response, ServerError> {
+    let layer = state.catalogue.layer(&product).await?;
+    let manifest = &layer.manifest;
+    let coordinate = |name, text: &Option<String>, wanted| match text.as_deref() {
+        Some(text) => number(name, text, wanted),
+        None => Err(ServerError::Missing { name, wanted }),
+    };
+    let lon = coordinate("lon", &query.lon, "degrees east")?;
+    let lat = coordinate("lat", &query.lat, "degrees north, -90 to 90")?;
+    let place = LonLatDeg::new(lon, lat)?;
+    let Some((row, col)) = manifest.grid.cell_at(place) else {
+        let [west, south, east, north] = bounds_deg(&manifest.grid);
+        let covers = format!("longitudes {west} to {east} and latitudes {south} to {north}");
+        return Err(ServerError::OutsideGrid {
+            product: manifest.product.to_string(),
+            lon,
+            lat,
+            covers,
+        });
+    };
+    let values = state.analyses.point(&layer, RowCol { row, col }).await?;
+    let display = manifest.quantity.display();
+    let shown = |stored: f64| stored * display.factor + display.offset;
+    let series = manifest
+        .steps
+        .iter()
+        .zip(values)
+        .map(|(step, value)| PointValue {
+            times: step.period.into(),
+            value: value.map(shown).filter(|value| value.is_finite()),
+        });
+    let center = manifest.grid.cell_center(row, col);
+    let answer = PointSeries {
+        product: &manifest.product,
+        manifest: &layer.id,
+        unit: display.unit,
+        lon: place.lon,
+        lat: place.lat,
+        cell: Cell {
+            row,
+            col,
+            lon: center.lon,
+            lat: center.lat,
+        },
+        series: series.collect(),
+    };
+    Ok(([(header::CACHE_CONTROL, "no-cache")], Json(answer)).into_response())
+}

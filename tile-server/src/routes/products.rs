@@ -1,0 +1,161 @@
+//! `/api/products`: every product with its steps, modes and legend, as the viewer and people read them.
+
+use axum::Json;
+use axum::extract::State;
+use axum::http::{HeaderMap, StatusCode, header};
+use axum::response::{IntoResponse as _, Response};
+use contract::colour::TransferFunction;
+use contract::digest::Digest;
+use contract::grid::Grid;
+use contract::job::Mode;
+use contract::manifest::ManifestId;
+use contract::product::ProductId;
+use contract::quantity::Quantity;
+use contract::time::{Period, TimeMs};
+use serde::Serialize;
+
+use crate::catalogue::Layer;
+use crate::error::ServerError;
+use crate::routes::picture::has_tag;
+use crate::state::AppState;
+
+#[derive(Debug, Serialize)]
+struct Products<'a> {
+    products: Vec<Product<'a>>,
+}
+
+/// One product. `shown = stored * display_factor + display_offset`.
+#[derive(Debug, Serialize)]
+struct Product<'a> {
+    id: &'a ProductId,
+    title: &'a str,
+    quantity: Quantity,
+    unit: &'static str,
+    display_unit: &'static str,
+    display_factor: f64,
+    display_offset: f64,
+    synthetic: bool,
+    source: &'a str,
+    manifest: &'a ManifestId,
+    derived_from: Option<&'a ManifestId>,
+    bounds: [f64; 4],
+    steps: Vec<StepTimes>,
+    modes: &'static [Mode],
+    legend: Legend,
+}
+
+/// When a step holds.
+#[derive(Debug, Serialize)]
+pub(crate) struct StepTimes {
+    start: TimeMs,
+    end: TimeMs,
+    mid: TimeMs,
+}
+
+impl From<Period> for StepTimes {
+    fn from(period: Period) -> Self {
+        Self {
+            start: period.start,
+            end: period.end,
+            mid: period.mid(),
+        }
+    }
+}
+
+/// Colours, in the unit people read.
+#[derive(Debug, Serialize)]
+struct Legend {
+    low: f64,
+    high: f64,
+    unit: &'static str,
+    label: &'static str,
+    stops: Vec<(f64, String)>,
+}
+
+pub(crate) async fn list(
+    State(state): State<AppState>,
+    asked: HeaderMap,
+) -> Result<Response, ServerError> {
+    let layers = state.catalogue.layers().await?;
+    let names: Vec<_> = layers
+        .iter()
+        .map(|layer| (&layer.id, &layer.accumulated))
+        .collect();
+    // Weak: the same list may be sent compressed or not.
+    let tag = format!("W/\"{}\"", Digest::of_json(&names));
+    let headers = [
+        (header::ETAG, tag.clone()),
+        (header::CACHE_CONTROL, "no-cache".to_owned()),
+    ];
+    if has_tag(&asked, &tag) {
+        return Ok((StatusCode::NOT_MODIFIED, headers).into_response());
+    }
+    let products = layers.iter().map(|layer| product(layer)).collect();
+    Ok((headers, Json(Products { products })).into_response())
+}
+
+fn product(layer: &Layer) -> Product<'_> {
+    let manifest = &layer.manifest;
+    let display = manifest.quantity.display();
+    Product {
+        id: &manifest.product,
+        title: &manifest.title,
+        quantity: manifest.quantity,
+        unit: manifest.quantity.unit(),
+        display_unit: display.unit,
+        display_factor: display.factor,
+        display_offset: display.offset,
+        synthetic: manifest.synthetic,
+        source: &manifest.source,
+        manifest: &layer.id,
+        derived_from: manifest.derived_from.as_ref(),
+        bounds: bounds_deg(&manifest.grid),
+        steps: manifest
+            .steps
+            .iter()
+            .map(|step| step.period.into())
+            .collect(),
+        modes: layer.modes(),
+        legend: legend(manifest.quantity),
+    }
+}
+
+/// West, south, east, north of a grid, degrees, without the noise of its steps' sum; east may pass 180.
+pub(crate) fn bounds_deg(grid: &Grid) -> [f64; 4] {
+    const PER_DEG: f64 = 1e9;
+    let [west, south, east, north] = grid
+        .bounds_deg()
+        .map(|edge| (edge * PER_DEG).round() / PER_DEG);
+    [west, south.max(-90.0), east, north.min(90.0)]
+}
+
+fn legend(quantity: Quantity) -> Legend {
+    let display = quantity.display();
+    let transfer = TransferFunction::default_for(quantity);
+    // Legends are read by people: rounding takes away what the way to the stored unit and back adds.
+    let shown = |stored: f64| ((stored * display.factor + display.offset) * 1e9).round() / 1e9;
+    let stops = transfer.palette.stops();
+    let last = (stops.len() - 1) as f64;
+    let stop =
+        |(i, [r, g, b]): (usize, &[u8; 3])| (i as f64 / last, format!("#{r:02x}{g:02x}{b:02x}"));
+    Legend {
+        low: shown(transfer.low),
+        high: shown(transfer.high),
+        unit: display.unit,
+        label: quantity.title(),
+        stops: stops.iter().enumerate().map(stop).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_legend_is_in_the_unit_people_read() {
+        let legend = legend(Quantity::SeaSurfaceTemperature);
+        assert_eq!((legend.low, legend.high, legend.unit), (-2.0, 32.0, "°C"));
+        assert_eq!(legend.stops.first().unwrap(), &(0.0, "#081d42".to_owned()));
+        assert_eq!(legend.stops.last().unwrap().0, 1.0);
+    }
+}

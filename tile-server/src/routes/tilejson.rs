@@ -1,0 +1,228 @@
+//! `/tiles/{product}/{mode}.json`: what a map client needs to know of a layer, as TileJSON 3.0.0.
+
+use axum::Json;
+use axum::extract::State;
+use axum::http::{HeaderMap, header};
+use axum::response::{IntoResponse as _, Response};
+use contract::grid::Grid;
+use contract::manifest::ManifestId;
+use contract::tile::{MAX_LAT_DEG, MAX_ZOOM};
+use contract::time::TimeMs;
+use serde::{Deserialize, Serialize};
+
+use crate::error::ServerError;
+use crate::extract::{UrlPath, UrlQuery, time};
+use crate::request;
+use crate::routes::products::bounds_deg;
+use crate::state::AppState;
+
+/// Pixels a cell is wide at the deepest level that is offered: deeper levels would only magnify it.
+const CELL_PX: f64 = 64.0;
+/// Width of a tile, pixels.
+const TILE_PX: f64 = 256.0;
+
+#[derive(Debug, Deserialize)]
+pub(crate) struct TileJsonQuery {
+    time: Option<String>,
+}
+
+/// TileJSON 3.0.0, and beyond it the version and the instants of the layer.
+#[derive(Debug, Serialize)]
+struct TileJson<'a> {
+    tilejson: &'static str,
+    name: String,
+    description: &'a str,
+    attribution: String,
+    scheme: &'static str,
+    tiles: [String; 1],
+    minzoom: u8,
+    maxzoom: u8,
+    bounds: [f64; 4],
+    manifest: &'a ManifestId,
+    /// Middles of the steps; every instant between the first and the last is valid as well.
+    times: Vec<TimeMs>,
+}
+
+pub(crate) async fn get(
+    State(state): State<AppState>,
+    UrlPath((product, file)): UrlPath<(String, String)>,
+    UrlQuery(query): UrlQuery<TileJsonQuery>,
+    headers: HeaderMap,
+) -> Result<Response, ServerError> {
+    let name = file
+        .strip_suffix(".json")
+        .ok_or(ServerError::UnknownAddress)?;
+    let layer = state.catalogue.layer(&product).await?;
+    let mode = request::mode(&layer, name)?;
+    let at = time(query.time.as_deref())?.map_or_else(String::new, |time| format!("?time={time}"));
+    let manifest = &layer.manifest;
+    let answer = TileJson {
+        tilejson: "3.0.0",
+        name: format!("{}, {mode}", manifest.title),
+        description: manifest.quantity.title(),
+        attribution: attribution(manifest.synthetic, &manifest.source),
+        scheme: "xyz",
+        tiles: [format!(
+            "{}/tiles/{}/{mode}/{{z}}/{{x}}/{{y}}.png{at}",
+            origin(&headers),
+            manifest.product
+        )],
+        minzoom: 0,
+        maxzoom: max_zoom(&manifest.grid),
+        bounds: bounds(&manifest.grid),
+        manifest: &layer.id,
+        times: manifest
+            .steps
+            .iter()
+            .map(|step| step.period.mid())
+            .collect(),
+    };
+    Ok((
+        [(header::CACHE_CONTROL, "no-cache"), (header::VARY, "host")],
+        Json(answer),
+    )
+        .into_response())
+}
+
+/// The source as HTML, which is what clients take an attribution for.
+fn attribution(synthetic: bool, source: &str) -> String {
+    let source = source
+        .replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;");
+    match (synthetic, source.is_empty()) {
+        (true, true) => "SYNTHETIC data".to_owned(),
+        (true, false) => format!("SYNTHETIC data: {source}"),
+        (false, _) => source,
+    }
+}
+
+/// `http://host` as the client sees this server, or nothing, which makes addresses relative to this one's.
+///
+/// The header comes from outside and goes into an answer: only what can be a name or an address with a port is used.
+fn origin(headers: &HeaderMap) -> String {
+    let host = headers
+        .get(header::HOST)
+        .and_then(|host| host.to_str().ok())
+        .unwrap_or_default();
+    let plain = |b: u8| b.is_ascii_alphanumeric() || matches!(b, b'.' | b'-' | b':' | b'[' | b']');
+    let safe = host.len() <= 255
+        && host.bytes().all(plain)
+        && host.parse::<axum::http::uri::Authority>().is_ok();
+    // A proxy that speaks TLS says so; anything else it may say is of no use here.
+    let secure = headers
+        .get("x-forwarded-proto")
+        .is_some_and(|proto| proto == "https");
+    let scheme = if secure { "https" } else { "http" };
+    if safe {
+        format!("{scheme}://{host}")
+    } else {
+        String::new()
+    }
+}
+
+/// The deepest level offered: a cell is at least [`CELL_PX`] pixels wide there.
+fn max_zoom(grid: &Grid) -> u8 {
+    let zoom = (360.0 * CELL_PX / (TILE_PX * grid.dlon_deg.min(grid.dlat_deg)))
+        .log2()
+        .ceil();
+    zoom.clamp(0.0, f64::from(MAX_ZOOM)) as u8
+}
+
+/// West, south, east, north within the map's world; a grid across the date line is on both sides of it.
+fn bounds(grid: &Grid) -> [f64; 4] {
+    let [west, south, east, north] = bounds_deg(grid);
+    let (west, east) = if east > 180.0 {
+        (-180.0, 180.0)
+    } else {
+        (west, east)
+    };
+    [
+        west,
+        south.clamp(-MAX_LAT_DEG, MAX_LAT_DEG),
+        east,
+        north.clamp(-MAX_LAT_DEG, MAX_LAT_DEG),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GRID: Grid = Grid {
+        rows: 180,
+        cols: 360,
+        north_deg: 90.0,
+        west_deg: -180.0,
+        dlat_deg: 1.0,
+        dlon_deg: 1.0,
+    };
+
+    #[test]
+    fn finer_grids_are_offered_deeper() {
+        assert_eq!(max_zoom(&GRID), 7); // 2^7 * 256 px / 360 = 91 px a degree; one level up 45
+        assert_eq!(
+            max_zoom(&Grid {
+                dlat_deg: 1.0 / 60.0,
+                dlon_deg: 1.0 / 60.0,
+                ..GRID
+            }),
+            13
+        );
+        assert_eq!(
+            max_zoom(&Grid {
+                dlat_deg: 1e-9,
+                dlon_deg: 1e-9,
+                ..GRID
+            }),
+            MAX_ZOOM
+        );
+    }
+
+    #[test]
+    fn bounds_stay_on_the_map() {
+        assert_eq!(bounds(&GRID), [-180.0, -MAX_LAT_DEG, 180.0, MAX_LAT_DEG]);
+        let pacific = Grid {
+            rows: 10,
+            cols: 20,
+            north_deg: 5.0,
+            west_deg: 170.0,
+            ..GRID
+        };
+        assert_eq!(bounds(&pacific), [-180.0, -5.0, 180.0, 5.0]);
+    }
+
+    #[test]
+    fn only_a_plain_host_becomes_part_of_an_address() {
+        let of = |host: &str| {
+            let mut headers = HeaderMap::new();
+            headers.insert(header::HOST, host.parse().unwrap());
+            origin(&headers)
+        };
+        assert_eq!(of("localhost:8080"), "http://localhost:8080");
+        assert_eq!(of("[::1]:8080"), "http://[::1]:8080");
+        for hostile in [
+            "",
+            "a/b",
+            "a@b",
+            "a b",
+            "\"><script>",
+            "a?b",
+            "a#b",
+            "a:b:c",
+            "..//",
+            &"a".repeat(300),
+        ] {
+            assert_eq!(of(hostile), "", "{hostile:?}");
+        }
+    }
+
+    #[test]
+    fn synthetic_data_say_so_first() {
+        assert_eq!(attribution(true, "made up"), "SYNTHETIC data: made up");
+        assert_eq!(
+            attribution(false, "<b>T & al.</b>"),
+            "&lt;b&gt;T &amp; al.&lt;/b&gt;"
+        );
+    }
+}

@@ -1,0 +1,105 @@
+//! `/tiles/{product}/{mode}/{z}/{x}/{y}.png`: one map tile at any instant.
+
+use axum::extract::State;
+use axum::http::HeaderMap;
+use axum::response::Response;
+use contract::job::View;
+use contract::tile::Tile;
+use serde::Deserialize;
+
+use crate::error::ServerError;
+use crate::extract::{UrlPath, UrlQuery, time, whole_number};
+use crate::request;
+use crate::routes::picture;
+use crate::state::AppState;
+
+/// Pixels a side unless told otherwise.
+const SIZE_PX: u32 = 256;
+/// Pixels a side of a tile for screens with double resolution.
+const SIZE_2X_PX: u32 = 512;
+
+#[derive(Debug, Deserialize)]
+pub(crate) struct TileQuery {
+    time: Option<String>,
+    size: Option<String>,
+}
+
+pub(crate) async fn get(
+    State(state): State<AppState>,
+    UrlPath((product, mode, z, x, y)): UrlPath<(String, String, String, String, String)>,
+    UrlQuery(query): UrlQuery<TileQuery>,
+    headers: HeaderMap,
+) -> Result<Response, ServerError> {
+    let layer = state.catalogue.layer(&product).await?;
+    let mode = request::mode(&layer, &mode)?;
+    let (tile, named_size_px) = parse_tile(&z, &x, &y)?;
+    let size_px = match query.size.as_deref() {
+        Some(text) => parse_size(text)?,
+        None => named_size_px,
+    };
+    let time = time(query.time.as_deref())?;
+    let job = request::job(&layer, mode, View::Tile { tile, size_px }, time)?;
+    picture::respond(&state, &headers, job).await
+}
+
+fn parse_size(text: &str) -> Result<u32, ServerError> {
+    let valid = "256 or 512";
+    let size_px = whole_number("size", text, valid)?;
+    if [SIZE_PX, SIZE_2X_PX].contains(&size_px) {
+        Ok(size_px)
+    } else {
+        Err(ServerError::invalid("size", text, valid))
+    }
+}
+
+/// A tile of `z`, `x` and `y.png` or `y@2x.png`, and the size the name asks for.
+fn parse_tile(z: &str, x: &str, y: &str) -> Result<(Tile, u32), ServerError> {
+    let address = format!("{z}/{x}/{y}");
+    let Some(name) = y.strip_suffix(".png") else {
+        return Err(ServerError::invalid(
+            "tile",
+            &address,
+            "tiles are z/x/y.png",
+        ));
+    };
+    let (row, size_px) = name
+        .strip_suffix("@2x")
+        .map_or((name, SIZE_PX), |row| (row, SIZE_2X_PX));
+    let part = |text: &str| {
+        let valid = "zoom, column and row are whole numbers, as in 2/1/3.png";
+        whole_number("tile", text, valid)
+            .map_err(|_named_by_its_address| ServerError::invalid("tile", &address, valid))
+    };
+    let (z, x, y) = (part(z)?, part(x)?, part(row)?);
+    // A zoom no byte holds is too deep like any other that is.
+    Ok((Tile::new(z.try_into().unwrap_or(u8::MAX), x, y)?, size_px))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn addresses_parse_with_their_size() {
+        assert_eq!(
+            parse_tile("2", "1", "3.png").unwrap(),
+            (Tile { z: 2, x: 1, y: 3 }, 256)
+        );
+        assert_eq!(
+            parse_tile("2", "1", "3@2x.png").unwrap(),
+            (Tile { z: 2, x: 1, y: 3 }, 512)
+        );
+    }
+
+    #[test]
+    fn addresses_that_are_none_say_why() {
+        let reason = |z, x, y| parse_tile(z, x, y).unwrap_err().to_string();
+        assert!(reason("99", "0", "0.png").contains("zoom is 0 to 16"));
+        assert!(reason("256", "0", "0.png").contains("zoom is 0 to 16"));
+        assert!(reason("1", "2", "0.png").contains("0 to 1"));
+        assert!(reason("a", "0", "0.png").contains("whole numbers"));
+        assert!(reason("0", "-1", "0.png").contains("whole numbers"));
+        assert!(reason("0", "0", "0.jpg").contains("z/x/y.png"));
+        assert!(reason("0", "0", "@2x.png").contains("whole numbers"));
+    }
+}

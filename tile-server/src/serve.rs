@@ -1,0 +1,92 @@
+//! Listening: an address in, answers until told to stop, and an end that lets requests under way finish.
+
+use std::future::{Future, IntoFuture as _};
+use std::io::ErrorKind;
+use std::net::SocketAddr;
+use std::time::Duration;
+
+use axum::serve::ListenerExt as _;
+use tokio::net::TcpListener;
+use tokio::sync::watch;
+
+use crate::config::Settings;
+use crate::error::ServeError;
+use crate::router::router;
+use crate::state::AppState;
+
+/// A server that holds its address but does not answer yet.
+pub struct Server {
+    listener: TcpListener,
+    address: SocketAddr,
+    state: AppState,
+}
+
+/// Listens and answers until `shutdown` is there: [`Server::bind`] and [`Server::run`] in one.
+pub async fn serve(
+    settings: &Settings,
+    state: AppState,
+    shutdown: impl Future<Output = ()> + Send + 'static,
+) -> Result<(), ServeError> {
+    Server::bind(settings, state).await?.run(shutdown).await
+}
+
+impl Server {
+    /// Takes the address, so that its caller can say where to look before anything else is ready.
+    pub async fn bind(settings: &Settings, state: AppState) -> Result<Self, ServeError> {
+        let address = settings.listen;
+        let listener = TcpListener::bind(address)
+            .await
+            .map_err(|source| match source.kind() {
+                ErrorKind::AddrInUse => ServeError::PortTaken { address },
+                _ => ServeError::Listen { address, source },
+            })?;
+        let address = listener
+            .local_addr()
+            .map_err(|source| ServeError::Listen { address, source })?;
+        Ok(Self {
+            listener,
+            address,
+            state,
+        })
+    }
+
+    /// Where it listens; the port is the real one where port 0 was asked for.
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// Answers until `shutdown` is there, then takes no new connections and waits for requests under way, no longer
+    /// than the drain limit.
+    pub async fn run(
+        self,
+        shutdown: impl Future<Output = ()> + Send + 'static,
+    ) -> Result<(), ServeError> {
+        let limit = Duration::from_secs(self.state.settings.drain_limit_s);
+        let (stop, mut stopping) = watch::channel(false);
+        // Tiles are small answers to small requests: waiting to fill a packet only delays them.
+        let listener = self.listener.tap_io(|connection| {
+            if let Err(error) = connection.set_nodelay(true) {
+                tracing::debug!(%error, "a connection keeps its delay");
+            }
+        });
+        let until_told = async move {
+            shutdown.await;
+            stop.send_replace(true);
+        };
+        let serving = axum::serve(listener, router(self.state)).with_graceful_shutdown(until_told);
+        let drained = async move {
+            // An error means that serving ended by itself: then this branch has nothing to limit.
+            if stopping.wait_for(|stop| *stop).await.is_err() {
+                std::future::pending::<()>().await;
+            }
+            tokio::time::sleep(limit).await;
+        };
+        tokio::select! {
+            ended = serving.into_future() => ended.map_err(ServeError::Stopped),
+            () = drained => {
+                tracing::warn!(limit_s = limit.as_secs(), "requests under way were cut off");
+                Ok(())
+            }
+        }
+    }
+}
