@@ -47,18 +47,24 @@ export function contains(box: Bounds, point: LonLat): boolean {
   return (((point.lon - west) % 360) + 360) % 360 <= width;
 }
 
-/** Closed outline with a point at least every `stepDeg`, so that edges follow parallels instead of cutting through the globe. */
-export function outline(box: Bounds, stepDeg = 2): LonLat[] {
+/**
+ * Edges of a box as lines with a point at least every `stepDeg`, so that they follow parallels instead of cutting through the
+ * globe: one closed line, or the two parallels of a band around the whole globe, whose east and west sides are nowhere.
+ */
+export function outline(box: Bounds, stepDeg = 2): LonLat[][] {
   const [west, south, , north] = box;
   const width = isWhole(box) ? 360 : (((box[2] - west) % 360) + 360) % 360;
   const across = Math.max(1, Math.ceil(width / stepDeg));
   const up = Math.max(1, Math.ceil((north - south) / stepDeg));
-  const points: LonLat[] = [];
-  for (let i = 0; i <= across; i++) points.push({ lon: west + (width * i) / across, lat: south });
-  for (let i = 1; i <= up; i++) points.push({ lon: west + width, lat: south + ((north - south) * i) / up });
-  for (let i = 1; i <= across; i++) points.push({ lon: west + width - (width * i) / across, lat: north });
-  for (let i = 1; i <= up; i++) points.push({ lon: west, lat: north - ((north - south) * i) / up });
-  return points;
+  const parallel = (lat: number): LonLat[] => steps(across).map((part) => ({ lon: west + width * part, lat }));
+  const meridian = (lon: number): LonLat[] => steps(up).map((part) => ({ lon, lat: south + (north - south) * part }));
+  if (isWhole(box)) return [south, north].filter((lat) => Math.abs(lat) < 90).map(parallel);
+  return [[...parallel(south), ...meridian(west + width).slice(1), ...parallel(north).reverse().slice(1), ...meridian(west).reverse().slice(1)]];
+}
+
+/** 0 to 1 in `count` equal steps, both ends included. */
+function steps(count: number): number[] {
+  return [...Array(count + 1).keys()].map((i) => i / count);
 }
 
 function tidy(degrees: number): number {

@@ -8,6 +8,9 @@ import { clampToRange, parseSteps, toIso, type Step } from "./time";
 /** Where the server does not say how deep its tiles go; Cesium stretches the deepest ones beyond. */
 const DEFAULT_MAX_ZOOM = 6;
 
+/** The quantity budgets are made of. */
+const FLUX = "carbon_flux";
+
 export class Catalogue {
   readonly products: readonly Product[];
   readonly #steps = new Map<string, readonly Step[]>();
@@ -20,6 +23,12 @@ export class Catalogue {
 
   find(id: string | null): Product | undefined {
     return this.products.find((product) => product.id === id);
+  }
+
+  /** What a page without a wish shows: observed before synthetic, carbon fluxes before the rest, then what can be drawn in the most ways. */
+  get first(): Product | undefined {
+    return [...this.products].sort((a, b) =>
+      Number(a.synthetic) - Number(b.synthetic) || Number(b.quantity === FLUX) - Number(a.quantity === FLUX) || b.modes.length - a.modes.length)[0];
   }
 
   stepsOf(id: string | null): readonly Step[] {

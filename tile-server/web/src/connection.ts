@@ -8,12 +8,13 @@ const KEY = "connection";
 export class Connection {
   #isLost = false;
   readonly #notices: Notices;
-  readonly #onLost: () => void;
+  readonly #onTrouble: () => void;
   readonly #onBack: () => void;
 
-  constructor(notices: Notices, onLost: () => void, onBack: () => void) {
+  /** `onTrouble`: pictures fail to come, so that playing on would only repeat it. `onBack`: a lost server answers again. */
+  constructor(notices: Notices, onTrouble: () => void, onBack: () => void) {
     this.#notices = notices;
-    this.#onLost = onLost;
+    this.#onTrouble = onTrouble;
     this.#onBack = onBack;
   }
 
@@ -35,14 +36,17 @@ export class Connection {
       await getJson<unknown>(url);
     } catch (error) {
       // A picture that arrives the second time is no JSON; that is the one failure which means that all is well.
-      if (!(error instanceof SyntaxError)) this.report("tiles", error instanceof ApiError ? new Error(`Tiles are missing: ${error.message}`) : error);
+      if (error instanceof SyntaxError) return;
+      this.#onTrouble();
+      const isRefused = error instanceof ApiError && error.kind === "refused";
+      this.report("tiles", isRefused ? new Error(`Pictures are missing: ${error.message}`) : error);
     }
   }
 
   #lost(): void {
     if (this.#isLost) return;
     this.#isLost = true;
-    this.#onLost();
+    this.#onTrouble();
     this.#notices.show(KEY, "The server does not answer. What is drawn stays; the page asks again every few seconds.");
     const timer = setInterval(() => {
       void fetch(healthUrl(), { cache: "no-store" }).then((answer) => {

@@ -46,14 +46,14 @@ export class LayerStage {
     this.#scene.requestRender();
   }
 
-  /** Loads a layer invisibly; null when `signal` ended it first. */
+  /** Loads a layer invisibly; null when `signal` ended it first or none of its tiles came, so that the old picture stays. */
   async prepare(spec: LayerSpec, signal: AbortSignal): Promise<Prepared | null> {
     const tiles = new LayerTiles(spec, this.#counts, this.#onFailure);
     const layer = new ImageryLayer(tiles.provider, { alpha: 0 });
     this.#scene.imageryLayers.add(layer);
     const prepared = { spec, key: layerKey(spec), layer, tiles };
     const isLoaded = await this.#settled(tiles, signal);
-    if (isLoaded) return prepared;
+    if (isLoaded && !tiles.isLost) return prepared;
     this.#remove(prepared);
     return null;
   }

@@ -77,6 +77,8 @@ store.on(["mode", "product"], (state) => {
   catalogue.learn(state.product, state.mode).then(showLayer, (error: unknown) => report("layer", error));
 });
 store.on(["timeMs"], showLayer);
+// A new wish is a new chance: an old complaint about pictures would only confuse.
+store.on(["mode", "product", "timeMs"], () => notices.clear("tiles"));
 keepAddress();
 void begin();
 
@@ -89,7 +91,7 @@ async function begin(): Promise<void> {
     return;
   }
   notices.clear("products");
-  const first = catalogue.products[0];
+  const first = catalogue.first;
   if (!first) {
     notices.show("products", "The server has no products yet. Ingest a file and load this page again.");
     return;

@@ -35,7 +35,7 @@ export class Marks {
 
   region(bounds: Bounds | null): void {
     this.#lines.removeAll();
-    if (bounds) this.#line(outline(bounds));
+    for (const line of bounds ? outline(bounds) : []) this.#line(line);
     this.#scene.requestRender();
   }
 

@@ -45,6 +45,7 @@ export class LayerTiles {
   /** Requests of this layer that have not ended yet. */
   pending = 0;
   requested = 0;
+  failed = 0;
 
   constructor(
     readonly spec: LayerSpec,
@@ -70,6 +71,11 @@ export class LayerTiles {
     });
   }
 
+  /** Nothing of this layer came: there is no picture to show, only one to lose. */
+  get isLost(): boolean {
+    return this.requested > 0 && this.failed === this.requested;
+  }
+
   /** The provider's own method is kept and only watched: Cesium decides what to ask for and when. */
   #countRequests(provider: UrlTemplateImageryProvider, counts: TileCounts): void {
     const request = provider.requestImage.bind(provider);
@@ -81,6 +87,7 @@ export class LayerTiles {
       counts.add({ pending: 1 });
       const end = (outcome: { loaded?: number; failed?: number }): void => {
         this.pending -= 1;
+        this.failed += outcome.failed ?? 0;
         counts.add({ pending: -1, ...outcome });
       };
       promise.then(() => end({ loaded: 1 }), () => end({ failed: 1 }));

@@ -47,12 +47,22 @@ describe("inside", () => {
 
 describe("an outline", () => {
   it("is closed, dense and goes the short way over the date line", () => {
-    const line = outline([170, -10, -170, 10], 2);
+    const lines = outline([170, -10, -170, 10], 2);
+    expect(lines).toHaveLength(1);
+    const line = lines[0]!;
     expect(line[0]).toEqual(line[line.length - 1]);
     expect(Math.max(...line.map((point) => point.lon))).toBe(190);
     for (let i = 1; i < line.length; i++) {
       const [a, b] = [line[i - 1]!, line[i]!];
       expect(Math.abs(a.lon - b.lon) + Math.abs(a.lat - b.lat)).toBeLessThanOrEqual(2);
+      expect(a).not.toEqual(b);
     }
+  });
+
+  it("of a band around the globe is its two parallels, and of everything nothing", () => {
+    const lines = outline([-180, 14, 180, 50]);
+    expect(lines.map((line) => [...new Set(line.map((point) => point.lat))])).toEqual([[14], [50]]);
+    expect(outline([-180, -90, 180, 90])).toEqual([]);
+    expect(outline([-180, -90, 180, -62])).toHaveLength(1);
   });
 });
