@@ -18,6 +18,7 @@ use crate::backend::{BudgetRequest, BudgetRow};
 use crate::catalogue::Layer;
 use crate::error::ServerError;
 use crate::extract::{UrlPath, UrlQuery, time};
+use crate::routes::products::rounded;
 use crate::state::AppState;
 
 #[derive(Debug, Deserialize)]
@@ -136,15 +137,19 @@ fn period(layer: &Layer, from: Option<TimeMs>, to: Option<TimeMs>) -> Result<Per
 
 /// A region as the answer names it: by its name, or as `west,south,east,north`.
 fn region_name(asked: &str, region: &Region) -> String {
-    match region {
-        Region::Box {
-            west,
-            south,
-            east,
-            north,
-        } if NamedRegion::find(asked).is_none() => {
-            format!("{west},{south},{east},{north}")
-        }
-        _ => asked.to_owned(),
+    let &Region::Box {
+        west,
+        south,
+        east,
+        north,
+    } = region
+    else {
+        return asked.to_owned();
+    };
+    if NamedRegion::find(asked).is_some() {
+        return asked.to_owned();
     }
+    [west, south, east, north]
+        .map(|edge| rounded(edge).to_string())
+        .join(",")
 }

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::backend::RowCol;
 use crate::error::ServerError;
 use crate::extract::{UrlPath, UrlQuery, number};
-use crate::routes::products::{StepTimes, bounds_deg};
+use crate::routes::products::{StepTimes, bounds_deg, rounded};
 use crate::state::AppState;
 
 #[derive(Debug, Deserialize)]
@@ -88,13 +88,13 @@ pub(crate) async fn get(
         product: &manifest.product,
         manifest: &layer.id,
         unit: display.unit,
-        lon: place.lon,
-        lat: place.lat,
+        lon: rounded(place.lon),
+        lat: rounded(place.lat),
         cell: Cell {
             row,
             col,
-            lon: center.lon,
-            lat: center.lat,
+            lon: rounded(center.lon),
+            lat: rounded(center.lat),
         },
         series: series.collect(),
     };

@@ -122,18 +122,19 @@ fn product(layer: &Layer) -> Product<'_> {
 
 /// West, south, east, north of a grid, degrees, without the noise of its steps' sum; east may pass 180.
 pub(crate) fn bounds_deg(grid: &Grid) -> [f64; 4] {
-    const PER_DEG: f64 = 1e9;
-    let [west, south, east, north] = grid
-        .bounds_deg()
-        .map(|edge| (edge * PER_DEG).round() / PER_DEG);
+    let [west, south, east, north] = grid.bounds_deg().map(rounded);
     [west, south.max(-90.0), east, north.min(90.0)]
+}
+
+/// A number for people without the noise that arithmetic adds to it: nine decimals, 0.1 mm for degrees.
+pub(crate) fn rounded(number: f64) -> f64 {
+    (number * 1e9).round() / 1e9
 }
 
 fn legend(quantity: Quantity) -> Legend {
     let display = quantity.display();
     let transfer = TransferFunction::default_for(quantity);
-    // Legends are read by people: rounding takes away what the way to the stored unit and back adds.
-    let shown = |stored: f64| ((stored * display.factor + display.offset) * 1e9).round() / 1e9;
+    let shown = |stored: f64| rounded(stored * display.factor + display.offset);
     let stops = transfer.palette.stops();
     let last = (stops.len() - 1) as f64;
     let stop =

@@ -1,0 +1,140 @@
+//! `/api/products/{product}/budget`.
+
+use axum::http::StatusCode;
+use contract::earth::Earth;
+use contract::region::Region;
+use serde_json::json;
+use tile_server::backend::{BudgetRequest, BudgetStep, Class};
+
+use crate::app::TestApp;
+use crate::doubles::Mood;
+
+fn last(app: &TestApp) -> BudgetRequest {
+    app.analyst.budgets.lock().unwrap().last().unwrap().clone()
+}
+
+#[tokio::test]
+async fn an_answer_carries_everything_a_citation_needs() {
+    let app = TestApp::new().await;
+    let body = app.get("/api/products/flux/budget").await.json();
+    assert_eq!(
+        (&body["product"], &body["region"]),
+        (&json!("flux"), &json!("global"))
+    );
+    assert_eq!(
+        (&body["earth"], &body["unit"]),
+        (&json!("wgs84"), &json!("Tg C"))
+    );
+    assert!(body["manifest"].as_str().unwrap().starts_with("flux@1-"));
+    let row = json!({"start": "2000-01-01T00:00:00Z", "end": "2000-04-01T00:00:00Z", "budget": -176.1,
+        "coverage_percent": 92.5, "area_m2": 3.3e14});
+    assert_eq!(body["rows"], json!([row]));
+    let request = last(&app);
+    assert_eq!(
+        (request.region, request.step, request.earth),
+        (Region::Global, BudgetStep::Month, Earth::Wgs84)
+    );
+}
+
+#[tokio::test]
+async fn every_parameter_reaches_the_analyst() {
+    let app = TestApp::new().await;
+    let path = "/api/products/flux/budget?region=170,-10,-170,10&from=2000-02&to=2000-03&step=total&earth=sphere";
+    let body = app.get(path).await.json();
+    assert_eq!(body["region"], "170,-10,190,10");
+    let request = last(&app);
+    assert_eq!(
+        request.region,
+        Region::Box {
+            west: 170.0,
+            south: -10.0,
+            east: 190.0,
+            north: 10.0
+        }
+    );
+    assert_eq!(
+        request.period.to_string(),
+        "2000-02-01T00:00:00Z/2000-03-01T00:00:00Z"
+    );
+    assert_eq!(
+        (request.step, request.earth),
+        (BudgetStep::Total, Earth::Sphere)
+    );
+}
+
+#[tokio::test]
+async fn named_regions_are_named_in_the_answer() {
+    let app = TestApp::new().await;
+    let body = app
+        .get("/api/products/flux/budget?region=14n-50n")
+        .await
+        .json();
+    assert_eq!(body["region"], "14n-50n");
+}
+
+#[tokio::test]
+async fn a_longer_period_is_cut_to_what_there_is() {
+    let app = TestApp::new().await;
+    for query in ["from=0001&to=9999", "from=1999", "to=2001", ""] {
+        let answer = app.get(&format!("/api/products/flux/budget?{query}")).await;
+        assert_eq!(answer.status, StatusCode::OK, "{query}: {}", answer.text());
+        assert_eq!(
+            last(&app).period.to_string(),
+            "2000-01-01T00:00:00Z/2000-04-01T00:00:00Z",
+            "{query}"
+        );
+    }
+}
+
+#[tokio::test]
+async fn periods_without_data_or_the_wrong_way_round_are_refused() {
+    let app = TestApp::new().await;
+    for (query, reason) in [
+        ("from=2001&to=2002", "covers 2000-01-01"),
+        ("from=2001", "covers 2000-01-01"),
+        ("to=1999", "covers 2000-01-01"),
+        ("from=2000-03&to=2000-02", "end must come after the start"),
+    ] {
+        let answer = app.get(&format!("/api/products/flux/budget?{query}")).await;
+        assert_eq!(answer.status, StatusCode::BAD_REQUEST, "{query}");
+        assert!(
+            answer.reason().contains(reason),
+            "{query}: {}",
+            answer.reason()
+        );
+    }
+}
+
+#[tokio::test]
+async fn only_a_flux_has_a_budget() {
+    let app = TestApp::new().await;
+    for product in ["sst", "flux-accumulated"] {
+        let answer = app.get(&format!("/api/products/{product}/budget")).await;
+        assert_eq!(answer.status, StatusCode::BAD_REQUEST);
+        assert!(
+            answer.reason().contains("only a carbon flux has a budget"),
+            "{}",
+            answer.reason()
+        );
+    }
+}
+
+#[tokio::test]
+async fn a_failed_budget_is_not_remembered() {
+    let app = TestApp::new().await;
+    app.analyst.set(Mood::fails(
+        Class::Unavailable,
+        "the cluster does not answer",
+    ));
+    let answer = app.get("/api/products/flux/budget").await;
+    assert_eq!(
+        (answer.status, answer.header("retry-after")),
+        (StatusCode::SERVICE_UNAVAILABLE, "5")
+    );
+    assert_eq!(answer.reason(), "the cluster does not answer");
+    app.analyst.set(Mood::Well);
+    assert_eq!(
+        app.get("/api/products/flux/budget").await.status,
+        StatusCode::OK
+    );
+}

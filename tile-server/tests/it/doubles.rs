@@ -1,0 +1,153 @@
+//! Doubles for the two ports: they record what they are asked, and answer what a test tells them to.
+
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use async_trait::async_trait;
+use axum::body::Bytes;
+use contract::job::RenderJob;
+use contract::manifest::Manifest;
+use tile_server::backend::{
+    Analyse, BackendError, BudgetRequest, BudgetRow, Check, Class, Draw, RowCol,
+};
+use tokio::sync::Semaphore;
+
+/// How a double answers.
+#[derive(Debug, Clone, Default)]
+pub(crate) enum Mood {
+    #[default]
+    Well,
+    Fails(BackendError),
+    Panics,
+    AnswersNonsense,
+}
+
+impl Mood {
+    pub(crate) fn fails(class: Class, text: &str) -> Self {
+        Self::Fails(BackendError::new(class, text))
+    }
+
+    fn apply(&self) -> Result<(), BackendError> {
+        match self {
+            Self::Well | Self::AnswersNonsense => Ok(()),
+            Self::Fails(error) => Err(error.clone()),
+            Self::Panics => panic!("a planted panic"),
+        }
+    }
+}
+
+/// Draws nothing: its picture is a PNG signature and the digest of the job.
+pub(crate) struct Drawer {
+    pub(crate) jobs: Mutex<Vec<RenderJob>>,
+    pub(crate) mood: Mutex<Mood>,
+    /// While true, pictures wait for a permit of `turns` each.
+    pub(crate) is_slow: AtomicBool,
+    pub(crate) turns: Semaphore,
+}
+
+impl Default for Drawer {
+    fn default() -> Self {
+        let (jobs, mood) = (Mutex::default(), Mutex::default());
+        Self {
+            jobs,
+            mood,
+            is_slow: AtomicBool::new(false),
+            turns: Semaphore::new(0),
+        }
+    }
+}
+
+impl Drawer {
+    pub(crate) fn drawn_count(&self) -> usize {
+        self.jobs.lock().unwrap().len()
+    }
+
+    pub(crate) fn last_job(&self) -> RenderJob {
+        self.jobs.lock().unwrap().last().unwrap().clone()
+    }
+
+    pub(crate) fn set(&self, mood: Mood) {
+        *self.mood.lock().unwrap() = mood;
+    }
+
+    pub(crate) fn picture_of(job: &RenderJob) -> Bytes {
+        Bytes::from(
+            [
+                b"\x89PNG\r\n\x1a\n".as_slice(),
+                job.digest().to_string().as_bytes(),
+            ]
+            .concat(),
+        )
+    }
+}
+
+#[async_trait]
+impl Draw for Drawer {
+    async fn draw(&self, job: &RenderJob) -> Result<Bytes, BackendError> {
+        self.jobs.lock().unwrap().push(job.clone());
+        if self.is_slow.load(Ordering::SeqCst) {
+            self.turns.acquire().await.unwrap().forget();
+        }
+        let mood = self.mood.lock().unwrap().clone();
+        mood.apply()?;
+        Ok(if matches!(mood, Mood::AnswersNonsense) {
+            Bytes::from("no picture")
+        } else {
+            Self::picture_of(job)
+        })
+    }
+
+    async fn ready(&self) -> Result<(), BackendError> {
+        self.mood.lock().unwrap().clone().apply()
+    }
+}
+
+/// Computes nothing: a cell's value is `row + step / 100` in the stored unit, missing in column 0.
+#[derive(Default)]
+pub(crate) struct Analyst {
+    pub(crate) budgets: Mutex<Vec<BudgetRequest>>,
+    pub(crate) check: Mutex<Option<Check>>,
+    pub(crate) mood: Mutex<Mood>,
+}
+
+impl Analyst {
+    pub(crate) fn set(&self, mood: Mood) {
+        *self.mood.lock().unwrap() = mood;
+    }
+
+    fn mood(&self) -> Mood {
+        self.mood.lock().unwrap().clone()
+    }
+}
+
+#[async_trait]
+impl Analyse for Analyst {
+    async fn point(
+        &self,
+        manifest: &Manifest,
+        cell: RowCol,
+    ) -> Result<Vec<Option<f64>>, BackendError> {
+        self.mood().apply()?;
+        if matches!(self.mood(), Mood::AnswersNonsense) {
+            return Ok(vec![]);
+        }
+        let value = |step| (cell.col != 0).then_some(f64::from(cell.row) + f64::from(step) / 100.0);
+        Ok((0..manifest.steps.len() as u32).map(value).collect())
+    }
+
+    async fn budget(&self, request: &BudgetRequest) -> Result<Vec<BudgetRow>, BackendError> {
+        self.mood().apply()?;
+        self.budgets.lock().unwrap().push(request.clone());
+        Ok(vec![BudgetRow {
+            period: request.period,
+            budget_tg: -176.1,
+            coverage_percent: 92.5,
+            area_m2: 3.3e14,
+        }])
+    }
+
+    async fn check(&self) -> Result<Option<Check>, BackendError> {
+        self.mood().apply()?;
+        Ok(self.check.lock().unwrap().clone())
+    }
+}

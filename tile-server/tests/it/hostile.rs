@@ -1,0 +1,192 @@
+//! Requests that are wrong, from careless to malicious: each gets its status and a reason, none an error of ours.
+
+use axum::body::Body;
+use axum::http::{Request, StatusCode};
+
+use crate::app::TestApp;
+
+#[tokio::test]
+async fn bad_addresses_are_refused_with_the_reason() {
+    let app = TestApp::new().await;
+    let long = "a".repeat(5000);
+    let cases: &[(&str, &str)] = &[
+        ("/tiles/flux/map/99/0/0.png", "zoom is 0 to 16"),
+        ("/tiles/flux/map/256/0/0.png", "zoom is 0 to 16"),
+        ("/tiles/flux/map/1/2/0.png", "0 to 1"),
+        ("/tiles/flux/map/1/0/4294967295.png", "0 to 1"),
+        ("/tiles/flux/map/1/0/4294967296.png", "whole numbers"),
+        ("/tiles/flux/map/-1/0/0.png", "whole numbers"),
+        ("/tiles/flux/map/1/0x1/0.png", "whole numbers"),
+        ("/tiles/flux/map/1/1e0/0.png", "whole numbers"),
+        ("/tiles/flux/map/1/0/0", "z/x/y.png"),
+        ("/tiles/flux/map/1/0/0.jpg", "z/x/y.png"),
+        ("/tiles/flux/map/1/%00/0.png", "whole numbers"),
+        ("/tiles/flux/map/1/%ff/0.png", "not valid"),
+        ("/tiles/flux/map/0/0/0.png?time=banana", "ISO 8601"),
+        ("/tiles/flux/map/0/0/0.png?time=", "ISO 8601"),
+        ("/tiles/flux/map/0/0/0.png?time=2000-13-01", "ISO 8601"),
+        (
+            "/tiles/flux/map/0/0/0.png?time=99999-01-01T00:00:00Z",
+            "ISO 8601",
+        ),
+        ("/tiles/flux/map/0/0/0.png?time=%F0%9F%8C%8D", "ISO 8601"),
+        ("/tiles/flux/map/0/0/0.png?time=2000&time=2001", "duplicate"),
+        ("/tiles/flux/map/0/0/0.png?size=0", "256 or 512"),
+        ("/tiles/flux/map/0/0/0.png?size=1000000000", "256 or 512"),
+        ("/tiles/flux/map/0/0/0.png?size=-256", "256 or 512"),
+        ("/tiles/flux/map.json?time=banana", "ISO 8601"),
+        ("/globe/flux/map.png?lon=nan", "degrees east"),
+        ("/globe/flux/map.png?lat=91", "-90 to 90"),
+        ("/globe/flux/map.png?lon=1e300", "longitude"),
+        ("/globe/flux/map.png?width=1000000000", "1 to 4096"),
+        ("/globe/flux/map.png?width=1e9", "1 to 4096"),
+        ("/globe/flux/map.png?height=0", "1 to 4096"),
+        ("/globe/flux/map.png?height_km=-5", "1 km to 1 million km"),
+        ("/globe/flux/map.png?height_km=inf", "kilometres"),
+        ("/globe/flux/map.png?surface=maybe", "true or false"),
+        ("/api/products/flux/point?lon=nan&lat=0", "degrees east"),
+        ("/api/products/flux/point?lon=0", "\"lat\" is missing"),
+        (
+            "/api/products/flux/point?lon=0&lat=0&depth=3",
+            "unknown field",
+        ),
+        ("/api/products/flux/point?lon=0&lat=-90.1", "-90 to 90"),
+        ("/api/products/flux/budget?region=atlantis", "14n-50n"),
+        ("/api/products/flux/budget?region=", "west,south,east,north"),
+        (
+            "/api/products/flux/budget?region=1,2,3",
+            "west,south,east,north",
+        ),
+        (
+            "/api/products/flux/budget?region=0,10,10,0",
+            "rise from south to north",
+        ),
+        ("/api/products/flux/budget?region=nan,0,1,1", "degrees"),
+        ("/api/products/flux/budget?from=never", "ISO 8601"),
+        (
+            "/api/products/flux/budget?step=week",
+            "month, year or total",
+        ),
+        ("/api/products/flux/budget?earth=flat", "wgs84 or sphere"),
+        ("/api/products/flux/budget?form=2000", "unknown field"),
+    ];
+    for (path, reason) in cases {
+        let answer = app.get(path).await;
+        assert_eq!(
+            answer.status,
+            StatusCode::BAD_REQUEST,
+            "{path}: {}",
+            answer.text()
+        );
+        assert!(
+            answer.reason().contains(reason),
+            "{path}: {}",
+            answer.reason()
+        );
+        assert_eq!(answer.header("cache-control"), "no-store", "{path}");
+    }
+    for path in [
+        format!("/tiles/flux/map/0/0/0.png?time={long}"),
+        format!("/tiles/flux/map/1/0/{long}.png"),
+    ] {
+        let answer = app.get(&path).await;
+        assert_eq!(answer.status, StatusCode::BAD_REQUEST);
+        assert!(
+            answer.body.len() < 600,
+            "a long request does not make a long answer: {}",
+            answer.body.len()
+        );
+    }
+    assert_eq!(app.drawer.drawn_count(), 0);
+    assert_eq!(app.metric("fluxglobe_tiles_panics_total").await, 0.0);
+}
+
+#[tokio::test]
+async fn layers_and_addresses_that_do_not_exist_are_not_found() {
+    let app = TestApp::new().await;
+    let long = format!("/tiles/{}/map/0/0/0.png", "a".repeat(5000));
+    for (path, reason) in [
+        ("/tiles/atlantis/map/0/0/0.png", "no product \"atlantis\""),
+        ("/tiles/Flux/map/0/0/0.png", "no product \"Flux\""),
+        ("/tiles/%2e%2e/map/0/0/0.png", "no product \"..\""),
+        ("/tiles/..%2f..%2fetc/map/0/0/0.png", "no product"),
+        (
+            "/tiles/flux/hologram/0/0/0.png",
+            "map, points, sprites, volume",
+        ),
+        ("/tiles/flux-accumulated/volume/0/0/0.png", "it has map"),
+        ("/tiles/flux/hologram.json", "map, points, sprites, volume"),
+        ("/globe/flux/hologram.png", "map, points, sprites, volume"),
+        ("/globe/flux/map", "nothing at this address"),
+        ("/api/products/atlantis/point?lon=0&lat=0", "no product"),
+        ("/api/products/atlantis/budget", "no product"),
+        ("/api", "nothing at this address"),
+        ("/api/products/flux", "nothing at this address"),
+        ("/tiles/flux/map/0/0", "nothing at this address"),
+        ("/no/such/page", "nothing at this address"),
+        ("/..%2f..%2fetc/passwd", "nothing at this address"),
+        (&long, "no product"),
+    ] {
+        let answer = app.get(path).await;
+        assert_eq!(
+            answer.status,
+            StatusCode::NOT_FOUND,
+            "{path}: {}",
+            answer.text()
+        );
+        assert!(
+            answer.reason().contains(reason),
+            "{path}: {}",
+            answer.reason()
+        );
+        assert!(answer.body.len() < 400);
+    }
+}
+
+#[tokio::test]
+async fn nothing_can_be_written() {
+    let app = TestApp::new().await;
+    for path in [
+        "/tiles/flux/map/0/0/0.png",
+        "/api/products",
+        "/",
+        "/no/such/page",
+    ] {
+        for method in ["POST", "PUT", "DELETE", "PATCH", "TRACE"] {
+            let request = Request::builder()
+                .method(method)
+                .uri(path)
+                .body(Body::empty())
+                .unwrap();
+            let answer = app.send(request).await;
+            assert_eq!(
+                answer.status,
+                StatusCode::METHOD_NOT_ALLOWED,
+                "{method} {path}"
+            );
+            assert!(
+                answer.header("allow").contains("GET"),
+                "{method} {path}: {}",
+                answer.header("allow")
+            );
+            assert!(!answer.reason().is_empty());
+        }
+    }
+    assert_eq!(app.drawer.drawn_count(), 0);
+}
+
+#[tokio::test]
+async fn head_is_get_without_a_body() {
+    let app = TestApp::new().await;
+    let request = Request::builder()
+        .method("HEAD")
+        .uri("/tiles/flux/map/0/0/0.png")
+        .body(Body::empty())
+        .unwrap();
+    let answer = app.send(request).await;
+    assert_eq!(
+        (answer.status, answer.header("content-type")),
+        (StatusCode::OK, "image/png")
+    );
+    assert!(answer.body.is_empty());
+}

@@ -1,0 +1,135 @@
+//! What happens when there is too much to do, when something takes too long, and when something breaks.
+
+use std::sync::atomic::Ordering;
+
+use axum::body::Body;
+use axum::http::{Request, StatusCode};
+use futures::FutureExt as _;
+use tile_server::backend::Class;
+
+use crate::app::TestApp;
+use crate::doubles::Mood;
+
+const TILE: &str = "/tiles/flux/volume/1/0/0.png";
+
+#[tokio::test]
+async fn when_the_queue_is_full_clients_are_sent_away_with_a_time_to_come_back() {
+    let app =
+        TestApp::with(|settings| (settings.draws_at_once, settings.draw_queue) = (1, 1)).await;
+    app.drawer.is_slow.store(true, Ordering::SeqCst);
+    let mut drawn = Box::pin(app.get("/tiles/flux/map/2/0/0.png"));
+    let mut waits = Box::pin(app.get("/tiles/flux/map/2/1/0.png"));
+    while app.drawer.drawn_count() == 0 {
+        assert!(drawn.as_mut().now_or_never().is_none());
+        tokio::task::yield_now().await;
+    }
+    assert!(waits.as_mut().now_or_never().is_none());
+    let sent_away = app.get("/tiles/flux/map/2/2/0.png").await;
+    assert_eq!(
+        (sent_away.status, sent_away.header("retry-after")),
+        (StatusCode::SERVICE_UNAVAILABLE, "1")
+    );
+    assert!(sent_away.reason().contains("try again"));
+    app.drawer.turns.add_permits(2);
+    assert_eq!(
+        (drawn.await.status, waits.await.status),
+        (StatusCode::OK, StatusCode::OK)
+    );
+    assert_eq!(app.metric("fluxglobe_tiles_refused_total").await, 1.0);
+    app.drawer.is_slow.store(false, Ordering::SeqCst);
+    assert_eq!(
+        app.get("/tiles/flux/map/2/2/0.png").await.status,
+        StatusCode::OK
+    );
+}
+
+#[tokio::test]
+async fn an_answer_that_takes_too_long_ends_with_a_reason() {
+    let app = TestApp::with(|settings| settings.request_limit_s = 1).await;
+    app.drawer.is_slow.store(true, Ordering::SeqCst);
+    let answer = app.get(TILE).await;
+    assert_eq!(answer.status, StatusCode::GATEWAY_TIMEOUT);
+    assert!(answer.reason().contains("longer than 1 s"));
+    assert!(!answer.header("retry-after").is_empty());
+    assert_eq!(
+        app.metric("fluxglobe_tiles_requests_in_flight").await,
+        1.0,
+        "only the request for the metrics"
+    );
+}
+
+#[tokio::test]
+async fn classes_of_backend_failures_are_statuses() {
+    let app = TestApp::new().await;
+    for (class, status, is_told) in [
+        (Class::BadRequest, StatusCode::BAD_REQUEST, true),
+        (Class::NotFound, StatusCode::NOT_FOUND, true),
+        (Class::Busy, StatusCode::SERVICE_UNAVAILABLE, true),
+        (Class::Unavailable, StatusCode::SERVICE_UNAVAILABLE, true),
+        (Class::Internal, StatusCode::INTERNAL_SERVER_ERROR, false),
+    ] {
+        app.drawer.set(Mood::fails(class, "the planted text"));
+        let answer = app.get(TILE).await;
+        assert_eq!(answer.status, status, "{class:?}");
+        assert_eq!(
+            answer.text().contains("the planted text"),
+            is_told,
+            "{class:?}"
+        );
+        assert_eq!(
+            answer.header("retry-after").is_empty(),
+            status != StatusCode::SERVICE_UNAVAILABLE,
+            "{class:?}"
+        );
+    }
+    app.drawer.set(Mood::Well);
+    assert_eq!(
+        app.get(TILE).await.status,
+        StatusCode::OK,
+        "failures are not remembered"
+    );
+}
+
+#[tokio::test]
+async fn a_renderer_that_panics_or_answers_nonsense_is_an_internal_error_and_the_server_goes_on() {
+    let app = TestApp::new().await;
+    for mood in [Mood::Panics, Mood::AnswersNonsense] {
+        app.drawer.set(mood);
+        let answer = app.get(TILE).await;
+        assert_eq!(answer.status, StatusCode::INTERNAL_SERVER_ERROR);
+        assert!(answer.reason().contains("on our side"));
+    }
+    app.drawer.set(Mood::Well);
+    assert_eq!(app.get(TILE).await.status, StatusCode::OK);
+}
+
+#[tokio::test]
+async fn a_panic_in_a_handler_is_caught_and_counted() {
+    let app = TestApp::new().await;
+    app.analyst.set(Mood::Panics);
+    for path in ["/api/products/flux/point?lon=0&lat=0", "/api/check"] {
+        let answer = app.get(path).await;
+        assert_eq!(answer.status, StatusCode::INTERNAL_SERVER_ERROR, "{path}");
+        assert!(!answer.text().contains("planted"), "{}", answer.text());
+        assert!(!answer.header("x-content-type-options").is_empty());
+    }
+    assert_eq!(app.metric("fluxglobe_tiles_panics_total").await, 2.0);
+    app.analyst.set(Mood::Well);
+    assert_eq!(
+        app.get("/api/products/flux/point?lon=0&lat=0").await.status,
+        StatusCode::OK
+    );
+}
+
+#[tokio::test]
+async fn large_bodies_are_refused() {
+    let app = TestApp::new().await;
+    let request = Request::builder()
+        .uri(TILE)
+        .header("content-length", "1000000000")
+        .body(Body::empty())
+        .unwrap();
+    let answer = app.send(request).await;
+    assert_eq!(answer.status, StatusCode::PAYLOAD_TOO_LARGE);
+    assert_eq!(app.drawer.drawn_count(), 0);
+}

@@ -1,0 +1,91 @@
+//! `/metrics`.
+
+use crate::app::TestApp;
+
+#[tokio::test]
+async fn requests_are_counted_by_route_method_and_status_class() {
+    let app = TestApp::new().await;
+    for path in [
+        "/tiles/flux/map/0/0/0.png",
+        "/tiles/flux/map/1/0/0.png",
+        "/tiles/flux/map/1/9/9.png",
+        "/nothing",
+    ] {
+        app.get(path).await;
+    }
+    let route = "/tiles/{product}/{mode}/{z}/{x}/{y_png}";
+    let requests = async |route: &str, status: &str| {
+        let labels = format!(r#"method="GET",route="{route}",status="{status}""#);
+        app.metric(&format!("fluxglobe_tiles_requests_total{{{labels}}}"))
+            .await
+    };
+    assert_eq!(requests(route, "2xx").await, 2.0);
+    assert_eq!(requests(route, "4xx").await, 1.0);
+    assert_eq!(requests("viewer", "4xx").await, 1.0);
+    let timed = format!(r#"fluxglobe_tiles_request_duration_seconds_count{{route="{route}"}}"#);
+    assert_eq!(app.metric(&timed).await, 3.0);
+    assert_eq!(
+        app.metric(r#"fluxglobe_tiles_drawn_total{mode="map",outcome="ok"}"#)
+            .await,
+        2.0
+    );
+    assert_eq!(
+        app.metric(r#"fluxglobe_tiles_draw_duration_seconds_count{mode="map"}"#)
+            .await,
+        2.0
+    );
+    assert_eq!(app.metric("fluxglobe_tiles_products_count").await, 3.0);
+    let sent = format!(r#"fluxglobe_tiles_sent_bytes_total{{route="{route}"}}"#);
+    assert!(app.metric(&sent).await >= 2.0 * 72.0);
+}
+
+#[tokio::test]
+async fn the_text_is_what_prometheus_reads() {
+    let app = TestApp::new().await;
+    app.get("/tiles/flux/map/0/0/0.png").await;
+    let answer = app.get("/metrics").await;
+    assert!(
+        answer
+            .header("content-type")
+            .starts_with("text/plain; version=0.0.4")
+    );
+    let mut samples = 0;
+    for line in answer.text().lines().filter(|line| !line.starts_with('#')) {
+        let (name, value) = line.rsplit_once(' ').unwrap();
+        assert!(name.starts_with("fluxglobe_tiles_"), "{line}");
+        value
+            .parse::<f64>()
+            .unwrap_or_else(|e| panic!("{line}: {e}"));
+        samples += 1;
+    }
+    assert!(samples > 20);
+    assert!(
+        answer
+            .text()
+            .contains("# TYPE fluxglobe_tiles_requests_total counter")
+    );
+}
+
+#[tokio::test]
+async fn addresses_and_methods_never_become_labels() {
+    let app = TestApp::new().await;
+    for path in [
+        "/tiles/secret-name/map/0/0/0.png",
+        "/secret-name",
+        "/api/products/secret-name/budget",
+    ] {
+        app.get(path).await;
+        let request = axum::http::Request::builder()
+            .method("SECRET-NAME")
+            .uri(path);
+        app.send(request.body(axum::body::Body::empty()).unwrap())
+            .await;
+    }
+    assert!(
+        !app.get("/metrics")
+            .await
+            .text()
+            .to_lowercase()
+            .contains("secret-name")
+    );
+}

@@ -1,0 +1,75 @@
+//! `/api/products/{product}/point`.
+
+use axum::http::StatusCode;
+use serde_json::json;
+use tile_server::backend::Class;
+
+use crate::app::TestApp;
+use crate::doubles::Mood;
+
+#[tokio::test]
+async fn a_series_is_that_of_the_cell_in_the_unit_people_read() {
+    let app = TestApp::new().await;
+    let body = app
+        .get("/api/products/sst/point?lon=12.3&lat=-3.2")
+        .await
+        .json();
+    assert_eq!(
+        (&body["product"], &body["unit"]),
+        (&json!("sst"), &json!("°C"))
+    );
+    assert_eq!(
+        body["cell"],
+        json!({"row": 6, "col": 19, "lon": 15.0, "lat": -5.0})
+    );
+    assert_eq!((&body["lon"], &body["lat"]), (&json!(12.3), &json!(-3.2)));
+    let series = body["series"].as_array().unwrap();
+    assert_eq!(series.len(), 3);
+    let value = series[1]["value"].as_f64().unwrap();
+    assert!((value - (6.01 - 273.15)).abs() < 1e-9, "{value}");
+    assert_eq!(series[1]["start"], "2000-02-01T00:00:00Z");
+    assert_eq!(series[1]["mid"], "2000-02-15T12:00:00Z");
+    assert!(body["manifest"].as_str().unwrap().starts_with("sst@1-"));
+}
+
+#[tokio::test]
+async fn a_cell_without_data_has_nulls() {
+    let app = TestApp::new().await;
+    let body = app
+        .get("/api/products/sst/point?lon=180&lat=0")
+        .await
+        .json();
+    assert_eq!(body["cell"]["col"], 0);
+    assert!(
+        body["series"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .all(|step| step["value"].is_null())
+    );
+}
+
+#[tokio::test]
+async fn a_place_outside_the_grid_is_a_bad_request_that_says_what_is_inside() {
+    let app = TestApp::new().await;
+    let answer = app.get("/api/products/sst/point?lon=0&lat=75").await;
+    assert_eq!(answer.status, StatusCode::BAD_REQUEST);
+    assert!(
+        answer.reason().contains("latitudes -60 to 60"),
+        "{}",
+        answer.reason()
+    );
+}
+
+#[tokio::test]
+async fn an_analyst_that_answers_too_little_is_our_fault_and_tells_no_details() {
+    let app = TestApp::new().await;
+    app.analyst.set(Mood::AnswersNonsense);
+    let answer = app.get("/api/products/sst/point?lon=0&lat=0").await;
+    assert_eq!(answer.status, StatusCode::INTERNAL_SERVER_ERROR);
+    app.analyst
+        .set(Mood::fails(Class::Internal, "secret table at /srv/secret"));
+    let answer = app.get("/api/products/sst/point?lon=0&lat=0").await;
+    assert_eq!(answer.status, StatusCode::INTERNAL_SERVER_ERROR);
+    assert!(!answer.text().contains("secret"), "{}", answer.text());
+}

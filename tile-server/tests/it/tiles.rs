@@ -1,0 +1,137 @@
+//! `/tiles/{product}/{mode}/{z}/{x}/{y}.png`.
+
+use axum::http::StatusCode;
+use contract::job::{Mode, View};
+use contract::tile::Tile;
+
+use crate::app::TestApp;
+use crate::doubles::Drawer;
+
+#[tokio::test]
+async fn a_tile_is_the_picture_of_the_job_its_address_means() {
+    let app = TestApp::new().await;
+    let answer = app
+        .get("/tiles/flux/volume/3/2/1.png?time=2000-02-10T06:00:00Z&size=512")
+        .await;
+    assert_eq!(
+        (answer.status, answer.header("content-type")),
+        (StatusCode::OK, "image/png")
+    );
+    let job = app.drawer.last_job();
+    assert_eq!(answer.body, Drawer::picture_of(&job));
+    assert_eq!(
+        job.view,
+        View::Tile {
+            tile: Tile { z: 3, x: 2, y: 1 },
+            size_px: 512
+        }
+    );
+    assert_eq!(
+        (job.mode, job.time.to_string().as_str()),
+        (Mode::Volume, "2000-02-10T06:00:00Z")
+    );
+    assert_eq!(job.product.to_string().split('@').next(), Some("flux"));
+    assert!(
+        job.accumulated
+            .unwrap()
+            .to_string()
+            .starts_with("flux-accumulated@1-")
+    );
+    assert!(!job.style.globe_surface);
+}
+
+#[tokio::test]
+async fn every_mode_has_its_own_picture() {
+    let app = TestApp::new().await;
+    let mut pictures = vec![];
+    for mode in Mode::ALL {
+        pictures.push(app.get(&format!("/tiles/flux/{mode}/0/0/0.png")).await.body);
+    }
+    pictures.sort();
+    pictures.dedup();
+    assert_eq!(pictures.len(), 4);
+}
+
+#[tokio::test]
+async fn without_a_time_the_middle_of_the_last_step_is_drawn() {
+    let app = TestApp::new().await;
+    app.get("/tiles/flux/volume/0/0/0.png").await;
+    assert_eq!(
+        app.drawer.last_job().time.to_string(),
+        "2000-03-16T12:00:00Z"
+    );
+}
+
+#[tokio::test]
+async fn instants_beyond_the_product_share_the_picture_of_its_end() {
+    let app = TestApp::new().await;
+    for mode in ["volume", "map"] {
+        let of = async |time: &str| {
+            app.get(&format!("/tiles/flux/{mode}/0/0/0.png?time={time}"))
+                .await
+        };
+        let (early, earlier) = (of("1999-12-01").await, of("0001-01-01").await);
+        let (late, later) = (of("2000-05-01").await, of("9999-12-31").await);
+        assert_eq!(early.header("etag"), earlier.header("etag"));
+        assert_eq!(late.header("etag"), later.header("etag"));
+        assert_ne!(early.header("etag"), late.header("etag"));
+    }
+    assert_eq!(app.drawer.drawn_count(), 4);
+}
+
+#[tokio::test]
+async fn a_map_before_the_middle_of_its_first_step_is_that_step_but_particles_move() {
+    let app = TestApp::new().await;
+    let tag = async |mode: &str, day: u32| {
+        let path = format!("/tiles/flux/{mode}/0/0/0.png?time=2000-01-0{day}");
+        app.get(&path).await.header("etag").to_owned()
+    };
+    assert_eq!(tag("map", 2).await, tag("map", 3).await);
+    assert_ne!(tag("volume", 2).await, tag("volume", 3).await);
+}
+
+#[tokio::test]
+async fn double_resolution_can_be_asked_for_as_map_clients_do() {
+    let app = TestApp::new().await;
+    let named = app.get("/tiles/flux/map/1/1/0@2x.png").await;
+    let asked = app.get("/tiles/flux/map/1/1/0.png?size=512").await;
+    assert_eq!(
+        (named.status, named.header("etag")),
+        (StatusCode::OK, asked.header("etag"))
+    );
+}
+
+#[tokio::test]
+async fn accumulated_carbon_that_came_from_another_version_does_not_lift_particles() {
+    let app = TestApp::new().await;
+    app.land("flux", contract::quantity::Quantity::CarbonFlux, 2)
+        .await;
+    app.get("/tiles/flux/volume/0/0/0.png").await;
+    assert_eq!(app.drawer.last_job().accumulated, None);
+    assert_eq!(app.drawer.last_job().product.number, 2);
+}
+
+#[tokio::test]
+async fn pages_of_other_origins_may_show_tiles() {
+    let app = TestApp::new().await;
+    let answer = app
+        .get_with(
+            "/tiles/flux/map/0/0/0.png",
+            &[("origin", "http://map.example")],
+        )
+        .await;
+    assert_eq!(answer.header("access-control-allow-origin"), "*");
+}
+
+#[tokio::test]
+async fn offsets_of_times_survive_the_address() {
+    let app = TestApp::new().await;
+    for time in ["2000-02-10T06:00:00%2B02:00", "2000-02-10T06:00:00+02:00"] {
+        app.get(&format!("/tiles/flux/volume/0/0/0.png?time={time}"))
+            .await;
+        assert_eq!(
+            app.drawer.last_job().time.to_string(),
+            "2000-02-10T04:00:00Z"
+        );
+    }
+}
