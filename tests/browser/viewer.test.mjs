@@ -51,6 +51,7 @@ test("the viewer", async (t) => {
     // From here on errors are planted, so the clean list is no longer asked for.
     await t.test("opens a shared address as the same view, and marks synthetic data", () => sharedAddress(journey));
     await t.test("tells the server's reason when tiles are refused", () => refusedTiles(journey));
+    await t.test("says when the server is gone, and goes on when it is back", () => lostServer(journey));
   } finally {
     await browser.close();
   }
@@ -95,7 +96,7 @@ class Journey {
 }
 
 async function loads({ page, base }) {
-  const answer = await page.goto(new URL("?quality=low", base).href);
+  const answer = await page.goto(base.href);
   assert.equal(answer.status(), 200);
   await page.waitForFunction(() => window.fluxglobe?.ready === true, undefined, { timeout: LIMIT_MS });
   assert.ok(await page.locator("#globe canvas").isVisible());
@@ -257,7 +258,7 @@ async function sharedAddress(journey) {
   });
   assert.equal(await page.locator("#synthetic").isVisible(), false);
   await page.goto("about:blank");
-  await page.goto(new URL(`?quality=low#product=${id}&mode=map&time=${time}&camera=-120,-20,15000&place=-120.5,-20.5&tab=place`, base).href);
+  await page.goto(new URL(`#product=${id}&mode=map&time=${time}&camera=-120,-20,15000&place=-120.5,-20.5&tab=place`, base).href);
   await journey.until(() => window.fluxglobe?.ready === true);
   const state = await journey.state();
   assert.equal(state.timeMs, Date.parse(time));
@@ -275,6 +276,20 @@ async function refusedTiles(journey) {
   await page.locator("#time").press("PageUp");
   await page.locator(".notice", { hasText: reason }).waitFor();
   await journey.shot("refused");
+}
+
+async function lostServer(journey) {
+  const { page } = journey;
+  await page.unroute("**/tiles/**/*.png?*");
+  const before = await journey.shown();
+  await page.context().setOffline(true);
+  await page.locator("#time").press("PageUp");
+  await page.locator('.notice[data-key="connection"]').waitFor();
+  assert.equal(await journey.shown(), before, "the last picture must stay");
+  await journey.shot("gone");
+  await page.context().setOffline(false);
+  await page.locator('.notice[data-key="connection"]').waitFor({ state: "detached" });
+  await journey.until((iso) => window.fluxglobe.shown?.endsWith(iso), iso((await journey.state()).timeMs));
 }
 
 /** Canvas pixels that carry ink. */

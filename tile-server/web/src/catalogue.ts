@@ -50,6 +50,7 @@ export class Catalogue {
     const clampedMs = clampToRange(this.stepsOf(product.id), timeMs);
     return {
       product: product.id,
+      manifest: product.manifest,
       mode: state.mode,
       timeIso: toIso(clampedMs),
       bounds: product.bounds,

@@ -35,6 +35,7 @@ export class Globe {
       // The scene's own clock means nothing here: product time lives in the state, so time alone never redraws.
       maximumRenderTimeChange: Number.POSITIVE_INFINITY,
       scene3DOnly: true,
+      orderIndependentTranslucency: false,
       shouldAnimate: false,
       msaaSamples: options.hasSky ? 4 : 1,
       showRenderLoopErrors: false,

@@ -12,10 +12,11 @@ export interface Prepared {
 }
 
 /**
- * Quiet frames in a row before a layer counts as loaded: Cesium's queue is empty for a moment before a new layer's tiles
- * enter it, and again between a level of tiles and the finer one that replaces it.
+ * Quiet frames in a row before a layer counts as loaded: Cesium's queue is empty for a moment between a level of tiles and
+ * the finer one that replaces it, and for longer before a new layer's first tile enters it.
  */
-const QUIET_FRAMES = 5;
+const QUIET_FRAMES = 2;
+const QUIET_FRAMES_BEFORE_FIRST = 5;
 /** While somebody keeps turning the globe new ground never stops loading; after this the layer is shown as it is. */
 const RESTLESS_LIMIT_MS = 4_000;
 
@@ -38,6 +39,12 @@ export class LayerStage {
   /** What the eye sees, or is about to see. */
   get shownKey(): string | undefined {
     return (this.#fade?.to ?? this.#shown)?.key;
+  }
+
+  /** `key` is in sight, and no tile of it is missing. */
+  hasWhole(key: string): boolean {
+    const shown = this.#fade?.to ?? this.#shown;
+    return shown?.key === key && shown.tiles.failed === 0;
   }
 
   set opacity(opacity: number) {
@@ -91,7 +98,7 @@ export class LayerStage {
         const isRestless = performance.now() - startedMs > RESTLESS_LIMIT_MS;
         const isQuiet = tiles.pending === 0 && (this.#scene.globe.tilesLoaded || isRestless);
         quietFrames = isQuiet ? quietFrames + 1 : 0;
-        if (quietFrames >= QUIET_FRAMES) end(true);
+        if (quietFrames >= (tiles.requested > 0 ? QUIET_FRAMES : QUIET_FRAMES_BEFORE_FIRST)) end(true);
         else this.#scene.requestRender();
       });
       if (signal.aborted) end(false);

@@ -21,7 +21,7 @@ import { Playback } from "./playback";
 import { Pointer } from "./pointer";
 import { Presenter } from "./presenter";
 import { installProbe } from "./probe";
-import { globeOptions } from "./quality";
+import { chooseQuality } from "./quality";
 import { INITIAL, Store } from "./state";
 import { TileCounts } from "./tiles";
 import { Timeline } from "./timeline";
@@ -36,9 +36,13 @@ const store = new Store({ ...INITIAL, ...asked });
 const notices = new Notices();
 let catalogue = new Catalogue([]);
 
-const globe = new Globe(byId("globe"), byId("credits"), globeOptions());
+const globe = new Globe(byId("globe"), byId("credits"), chooseQuality());
 const counts = new TileCounts();
-const connection = new Connection(notices, () => store.set({ playing: false }), () => void begin());
+const connection = new Connection(notices, () => store.set({ playing: false }), () => {
+  // What loads may be waiting for tiles that already failed while the server was away.
+  presenter.abandon();
+  void begin();
+});
 const stage = new LayerStage(globe.scene, counts, store.state.opacity, (status, url) => void connection.tileFailed(status, url));
 const presenter = new Presenter(stage);
 const marks = new Marks(globe.scene);
@@ -71,7 +75,11 @@ globe.scene.camera.moveEnd.addEventListener(() => store.set({ camera: globe.view
 
 store.on(["opacity"], (state) => { stage.opacity = state.opacity; });
 store.on(["place"], (state) => marks.place(state.place));
-store.on(["product"], () => useProduct());
+store.on(["product"], () => {
+  // One product's picture must not stay under another one's legend, not even while the other loads.
+  presenter.reset();
+  useProduct();
+});
 store.on(["mode", "product"], (state) => {
   if (state.product === null) return;
   catalogue.learn(state.product, state.mode).then(showLayer, (error: unknown) => report("layer", error));
@@ -82,7 +90,7 @@ store.on(["mode", "product", "timeMs"], () => notices.clear("tiles"));
 keepAddress();
 void begin();
 
-/** Loads what the page needs; again after a lost connection, when only what changed is drawn anew. */
+/** Loads what the page needs; again when a lost server is back, where a whole picture in sight is kept. */
 async function begin(): Promise<void> {
   try {
     catalogue = new Catalogue(await api.products());
@@ -99,7 +107,6 @@ async function begin(): Promise<void> {
   controls.setProducts(catalogue.products);
   const wanted = store.state.product;
   if (wanted !== null && !catalogue.find(wanted)) notices.show("product", `The server has no product “${wanted}”; showing “${first.title}” instead.`);
-  presenter.reset();
   const chosen = catalogue.find(wanted) ?? first;
   if (store.state.product === chosen.id) useProduct();
   else store.set({ product: chosen.id });

@@ -43,7 +43,7 @@ export class Marks {
     this.#lines.add({
       positions: points.map((point) => Cartesian3.fromDegrees(point.lon, point.lat, LINE_HEIGHT_M)),
       width: 2.2,
-      material: Material.fromType("Color", { color: Color.fromCssColorString(REGION_COLOUR).withAlpha(0.95) }),
+      material: Material.fromType("Color", { color: Color.fromCssColorString(REGION_COLOUR) }),
     });
   }
 }

@@ -52,8 +52,8 @@ export class PlacePanel {
     }
     const asked = new AbortController();
     this.#asked = asked;
-    this.#lat.value = place.lat.toFixed(2);
-    this.#lon.value = place.lon.toFixed(2);
+    this.#lat.value = fieldText(place.lat);
+    this.#lon.value = fieldText(place.lon);
     this.#content.replaceChildren(this.#title(place), el("p", { class: "muted busy-line" }, "Reading the series …"));
     try {
       const answer = await api.point(product, place.lon, place.lat, asked.signal);
@@ -121,4 +121,9 @@ export class PlacePanel {
     this.#shown?.chart?.destroy();
     this.#shown = undefined;
   }
+}
+
+/** Adding zero turns a rounded -0 into 0. */
+function fieldText(degrees: number): string {
+  return (Number(degrees.toFixed(2)) + 0).toFixed(2);
 }

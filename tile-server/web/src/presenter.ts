@@ -26,7 +26,7 @@ export class Presenter {
     }
     this.#loading?.abort.abort();
     this.#next = undefined;
-    if (this.#stage.shownKey === layerKey(spec)) return;
+    if (this.#stage.hasWhole(layerKey(spec))) return;
     void this.#load(spec);
   }
 
@@ -55,13 +55,18 @@ export class Presenter {
     return new Promise((resolve) => this.#waiting.push(resolve));
   }
 
-  /** Forgets everything, for a product change or a server that came back. */
-  reset(): void {
+  /** Gives up what loads now, because the next wish shall start afresh even if it is the same. */
+  abandon(): void {
     this.#loading?.abort.abort();
     this.#loading = undefined;
     this.#next = undefined;
-    this.#stage.clear();
     this.#wake();
+  }
+
+  /** Forgets everything, for a change of product. */
+  reset(): void {
+    this.abandon();
+    this.#stage.clear();
   }
 
   async #load(spec: LayerSpec): Promise<void> {
@@ -79,7 +84,7 @@ export class Presenter {
     this.#loading = undefined;
     const next = this.#next;
     this.#next = undefined;
-    if (next && layerKey(next) !== this.#stage.shownKey) {
+    if (next && !this.#stage.hasWhole(layerKey(next))) {
       void this.#load(next);
       return;
     }

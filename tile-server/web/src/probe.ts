@@ -9,7 +9,7 @@ export interface Probe {
   readonly tilesLoaded: number;
   readonly tilesPending: number;
   readonly tilesFailed: number;
-  /** `product/mode@instant` of the layer in sight. */
+  /** `product:manifest/mode@instant` of the layer in sight. */
   readonly shown: string | undefined;
   readonly state: Readonly<State>;
   /** Canvas point of a place in CSS pixels; undefined when it is on the far side. */

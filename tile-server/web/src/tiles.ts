@@ -7,6 +7,8 @@ import type { Mode } from "./state";
 /** Everything that decides what a layer looks like; two equal keys are the same pictures. */
 export interface LayerSpec {
   readonly product: string;
+  /** The product's version: revised data is another picture at the same address. */
+  readonly manifest: string;
   readonly mode: Mode;
   readonly timeIso: string;
   readonly bounds: Bounds;
@@ -14,7 +16,7 @@ export interface LayerSpec {
 }
 
 export function layerKey(spec: LayerSpec): string {
-  return `${spec.product}/${spec.mode}@${spec.timeIso}`;
+  return `${spec.product}:${spec.manifest}/${spec.mode}@${spec.timeIso}`;
 }
 
 /** Totals over all layers since the page was loaded. */

@@ -38,6 +38,7 @@ export class Timeline {
     this.#slider.addEventListener("change", () => store.set({ timeMs: Math.round(this.#chosenMs() / 1000) * 1000 }));
     this.#slider.addEventListener("keydown", (event) => this.#key(event));
     new ResizeObserver(() => this.#drawTicks()).observe(this.#ticks);
+    new ResizeObserver(() => document.documentElement.style.setProperty("--timeline", `${container.offsetHeight}px`)).observe(container);
     store.on(["timeMs"], () => this.#drawTime());
     store.on(["playing"], () => this.#drawPlay());
     this.#drawPlay();
