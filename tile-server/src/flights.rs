@@ -137,7 +137,7 @@ mod tests {
     #[tokio::test]
     async fn what_nobody_waits_for_is_dropped_and_started_anew() {
         let flights = Flights::<u32>::default();
-        let mut lost = Box::pin(flights.join(key(), || std::future::pending()));
+        let mut lost = Box::pin(flights.join(key(), std::future::pending));
         assert!(lost.as_mut().now_or_never().is_none());
         drop(lost);
         assert_eq!(flights.len(), 0);

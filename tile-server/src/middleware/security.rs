@@ -5,7 +5,7 @@ use axum::http::{HeaderName, HeaderValue, header};
 use axum::middleware::Next;
 use axum::response::Response;
 
-/// The globe library makes workers and pictures from `blob:`, and compiles WebAssembly; its widgets set styles.
+/// The globe library makes workers and pictures from `blob:`, and compiles machine code for the browser; its widgets set styles.
 const POLICY: &str = "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; worker-src 'self' blob:; \
     img-src 'self' data: blob:; connect-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; object-src 'none'; \
     base-uri 'self'; form-action 'none'; frame-ancestors 'self'";

@@ -157,6 +157,6 @@ mod tests {
         let legend = legend(Quantity::SeaSurfaceTemperature);
         assert_eq!((legend.low, legend.high, legend.unit), (-2.0, 32.0, "°C"));
         assert_eq!(legend.stops.first().unwrap(), &(0.0, "#081d42".to_owned()));
-        assert_eq!(legend.stops.last().unwrap().0, 1.0);
+        assert!((legend.stops.last().unwrap().0 - 1.0).abs() < 1e-12);
     }
 }

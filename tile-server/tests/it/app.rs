@@ -209,12 +209,12 @@ impl TestApp {
         }
     }
 
-    /// The value of one line of `/metrics`, 0 if it is not there.
-    pub(crate) async fn metric(&self, line: &str) -> f64 {
+    /// The count in one line of `/metrics`, 0 if it is not there.
+    pub(crate) async fn metric(&self, line: &str) -> u64 {
         let text = self.get("/metrics").await.text();
         let value = text
             .lines()
             .find_map(|l| l.strip_prefix(line)?.strip_prefix(' '));
-        value.map_or(0.0, |value| value.parse().unwrap())
+        value.map_or(0, |value| value.parse().unwrap())
     }
 }

@@ -1,4 +1,8 @@
 //! The tile server as its clients see it: the real router in process, over a memory store with real frames.
+#![expect(
+    clippy::unwrap_used,
+    reason = "a test that cannot go on fails, in its helpers as in itself"
+)]
 
 mod app;
 mod budget;
