@@ -1,0 +1,170 @@
+//! One frame on the GPU: the stages in order. `frame_cpu.rs` lists the same stages in the same order.
+
+use bytemuck::Pod;
+use contract::job::Mode;
+
+use crate::error::RenderError;
+use crate::gpu::{Gpu, Recorder, Slot, Workspace};
+use crate::plan::{Part, Plan};
+use crate::stages::bin::{Bin, list_count};
+use crate::stages::compose::Compose;
+use crate::stages::eye::Eye;
+use crate::stages::interpolate::Interpolate;
+use crate::stages::layout::{Entry, Params};
+use crate::stages::light::Light;
+use crate::stages::map::Map;
+use crate::stages::particles::Particles;
+use crate::stages::project::Project;
+use crate::stages::{bin, compose, eye, interpolate, light, map, particles, project};
+
+/// Entries a list buffer starts with for each particle; a frame that needs more is drawn again with room for all.
+const FIRST_ENTRIES_PER_PARTICLE: u64 = 4;
+/// Entries it starts with at least.
+const FIRST_ENTRIES: u64 = 1 << 16;
+
+/// The frames of a scene on the device.
+#[derive(Clone)]
+pub struct SceneBuffers {
+    pub value: [wgpu::Buffer; 2],
+    pub accumulated: Option<[wgpu::Buffer; 2]>,
+    pub domain: wgpu::Buffer,
+}
+
+/// What the stages of one frame share while they are recorded.
+pub struct FrameContext<'a> {
+    pub gpu: &'a Gpu,
+    pub recorder: Recorder<'a>,
+    pub plan: &'a Plan,
+    pub params: Params,
+    pub params_buffer: wgpu::Buffer,
+    pub value_frames: [wgpu::Buffer; 2],
+    pub accumulated_frames: Option<[wgpu::Buffer; 2]>,
+    pub domain: wgpu::Buffer,
+    workspace: &'a mut Workspace,
+}
+
+impl<'a> FrameContext<'a> {
+    /// A frame of one part of the plan's picture in the buffers of `workspace`.
+    pub fn new(
+        gpu: &'a Gpu,
+        workspace: &'a mut Workspace,
+        plan: &'a Plan,
+        params: Params,
+        scene: SceneBuffers,
+    ) -> Result<Self, RenderError> {
+        let params_buffer = workspace.upload(gpu, Slot::Params, &[params])?;
+        let SceneBuffers { value, accumulated, domain } = scene;
+        Ok(Self {
+            gpu,
+            recorder: gpu.recorder(),
+            plan,
+            params,
+            params_buffer,
+            value_frames: value,
+            accumulated_frames: accumulated,
+            domain,
+            workspace,
+        })
+    }
+
+    /// The buffer of a slot with room for `bytes`.
+    pub fn room(&mut self, slot: Slot, bytes: u64) -> Result<wgpu::Buffer, RenderError> {
+        self.workspace.room(self.gpu, slot, bytes)
+    }
+
+    /// The buffer of a slot with this content.
+    pub fn upload<T: Pod>(&mut self, slot: Slot, content: &[T]) -> Result<wgpu::Buffer, RenderError> {
+        self.workspace.upload(self.gpu, slot, content)
+    }
+
+    /// Pixels of the part.
+    pub fn pixel_count(&self) -> u64 {
+        u64::from(self.params.width) * u64::from(self.params.height)
+    }
+}
+
+/// All compiled stages.
+pub struct Stages {
+    interpolate: Interpolate,
+    particles: Particles,
+    project: Project,
+    light: Light,
+    bin: Bin,
+    eye: Eye,
+    map: Map,
+    compose: Compose,
+}
+
+impl Stages {
+    /// Compiles every stage.
+    pub fn new(gpu: &Gpu) -> Self {
+        Self {
+            interpolate: Interpolate::new(gpu, interpolate::SOURCE),
+            particles: Particles::new(gpu, particles::SOURCE),
+            project: Project::new(gpu, project::SOURCE),
+            light: Light::new(gpu, light::SOURCE),
+            bin: Bin::new(gpu, bin::SOURCE),
+            eye: Eye::new(gpu, eye::SOURCE),
+            map: Map::new(gpu, map::SOURCE),
+            compose: Compose::new(gpu, compose::SOURCE),
+        }
+    }
+
+    fn record(&self, frame: &mut FrameContext<'_>) -> Result<(), RenderError> {
+        self.interpolate.record(frame)?;
+        if frame.plan.mode == Mode::Map {
+            self.map.record(frame)?;
+        } else {
+            self.particles.record(frame)?;
+            self.project.record(frame)?;
+            if frame.params.light_on == 1 {
+                self.light.record(frame)?;
+            }
+            self.bin.record(frame)?;
+            self.eye.record(frame)?;
+        }
+        self.compose.record(frame)
+    }
+
+    /// Draws one part; its pixels as RGBA8, red lowest.
+    pub fn draw(
+        &self,
+        gpu: &Gpu,
+        workspace: &mut Workspace,
+        plan: &Plan,
+        part: Part,
+        scene: &SceneBuffers,
+    ) -> Result<Vec<u8>, RenderError> {
+        let mut params = plan.params_of(part);
+        if params.particle_count == 0 && plan.mode != Mode::Map && params.surface == 0 {
+            return Ok(vec![0; part.size_px[0] as usize * part.size_px[1] as usize * 4]);
+        }
+        let entry_bytes = size_of::<Entry>() as u64;
+        let first = (u64::from(params.particle_count) * FIRST_ENTRIES_PER_PARTICLE).max(FIRST_ENTRIES);
+        let mut capacity = (workspace.room_bytes(Slot::Entries) / entry_bytes).max(first);
+        loop {
+            params.entry_capacity = capacity.min(gpu.most_buffer_bytes() / entry_bytes) as u32;
+            let mut frame = FrameContext::new(gpu, workspace, plan, params, scene.clone())?;
+            self.record(&mut frame)?;
+            let image = frame.room(Slot::Image, 4)?;
+            let image_bytes = frame.pixel_count() * 4;
+            if plan.mode == Mode::Map {
+                let [pixels] = frame.recorder.download_parts([(&image, 0, image_bytes)])?;
+                return Ok(pixels);
+            }
+            let counts = frame.room(Slot::Counts, 4)?;
+            let last_end = u64::from(list_count(&params) - 1) * 4;
+            let [pixels, total] = frame.recorder.download_parts([(&image, 0, image_bytes), (&counts, last_end, 4)])?;
+            let total: u32 = bytemuck::pod_read_unaligned(&total);
+            if total <= params.entry_capacity {
+                return Ok(pixels);
+            }
+            let bytes = u64::from(total) * entry_bytes;
+            if bytes > gpu.most_buffer_bytes() {
+                let limit = gpu.most_buffer_bytes();
+                return Err(RenderError::TooLarge { what: "list entries", bytes, limit });
+            }
+            capacity = u64::from(total) + u64::from(total / 4);
+        }
+    }
+}

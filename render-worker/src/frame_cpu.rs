@@ -1,0 +1,71 @@
+//! One frame on the CPU: the twins of the stages in the order of `frame.rs`.
+
+use contract::job::Mode;
+use glam::Vec4;
+
+use crate::error::RenderError;
+use crate::plan::{Part, Plan};
+use crate::scene::{Interval, Scene};
+use crate::stages::bin::list_count;
+use crate::stages::layout::{Entry, Params, Particle, Splat};
+use crate::stages::particles::cpu::Inputs;
+use crate::stages::{bin, compose, eye, interpolate, light, map, particles, project};
+
+/// Most bytes that the lists of one picture may take.
+const MOST_ENTRY_BYTES: u64 = 4 << 30;
+
+/// Draws one part; its pixels as RGBA8, red lowest.
+pub fn draw(plan: &Plan, part: Part, scene: &Scene) -> Result<Vec<u8>, RenderError> {
+    let params = plan.params_of(part);
+    let pixels = params.width as usize * params.height as usize;
+    let mut picture = vec![Vec4::ZERO; pixels];
+    let value = interpolated(&params, params.value_weight, &scene.value);
+    if plan.mode == Mode::Map {
+        map::cpu::map(&params, &value, &plan.palette, &plan.axes, &mut picture);
+    } else {
+        let accumulated = scene.accumulated.as_ref();
+        let accumulated = accumulated.map(|interval| interpolated(&params, params.accumulated_weight, interval));
+        let mut particles = vec![Particle::default(); params.particle_count as usize];
+        let inputs = Inputs {
+            active: &plan.active,
+            rows: &plan.rows,
+            value: &value,
+            accumulated: accumulated.as_deref().unwrap_or_default(),
+            palette: &plan.palette,
+        };
+        particles::cpu::generate(&params, &inputs, &mut particles);
+        let mut splats = vec![Splat::default(); particles.len()];
+        project::cpu::project(&params, &plan.rows, &plan.cols, &particles, &mut splats);
+        if params.light_on == 1 {
+            let mut buffer = vec![0u32; light::texel_count(&params)];
+            light::cpu::deposit(&params, &splats, &mut buffer);
+            light::cpu::prefix(&params, &mut buffer);
+            light::cpu::shade(&params, &buffer, &mut splats);
+        }
+        let (list_ends, entries) = binned(&params, &splats)?;
+        eye::cpu::eye(&params, &list_ends, &entries, &mut picture);
+    }
+    let mut image = vec![0u32; pixels];
+    compose::cpu::compose(&params, &picture, scene.domain.content(), &mut image);
+    Ok(image.into_iter().flat_map(u32::to_le_bytes).collect())
+}
+
+fn interpolated(params: &Params, weight: f32, interval: &Interval) -> Vec<f32> {
+    let (before, after) = (interval.before.cells.content(), interval.after.cells.content());
+    let mut between = vec![0.0; before.len()];
+    interpolate::cpu::interpolate(params, weight, before, after, &mut between);
+    between
+}
+
+fn binned(params: &Params, splats: &[Splat]) -> Result<(Vec<u32>, Vec<Entry>), RenderError> {
+    let mut counts = vec![0u32; list_count(params) as usize];
+    bin::cpu::count(params, splats, &mut counts);
+    let bytes = counts.iter().map(|&count| u64::from(count)).sum::<u64>() * size_of::<Entry>() as u64;
+    if bytes > MOST_ENTRY_BYTES {
+        return Err(RenderError::TooLarge { what: "list entries", bytes, limit: MOST_ENTRY_BYTES });
+    }
+    let total = bin::cpu::scan(&mut counts);
+    let mut entries = vec![Entry::default(); total as usize];
+    bin::cpu::scatter(params, splats, &mut counts, &mut entries);
+    Ok((counts, entries))
+}

@@ -1,0 +1,98 @@
+//! The graphics device behind plain verbs: make buffers and kernels, record dispatches, read results back.
+
+mod kernel;
+mod recorder;
+mod workspace;
+
+pub use kernel::Kernel;
+pub use recorder::Recorder;
+pub use workspace::{Slot, Workspace};
+
+use bytemuck::Pod;
+use wgpu::util::DeviceExt as _;
+
+use crate::error::RenderError;
+
+/// Largest buffer asked for, also on devices that would give more: bounds what one job can take.
+const MOST_BUFFER_BYTES: u64 = 1 << 30;
+
+/// A device with its queue. Shared by all threads.
+pub struct Gpu {
+    device: wgpu::Device,
+    queue: wgpu::Queue,
+    adapter_name: String,
+    most_buffer_bytes: u64,
+}
+
+impl Gpu {
+    /// Opens the most able Vulkan adapter, a software one if there is no other.
+    pub fn open() -> Result<Self, RenderError> {
+        pollster::block_on(Self::request())
+    }
+
+    async fn request() -> Result<Self, RenderError> {
+        let instance = wgpu::Instance::default();
+        let options = wgpu::RequestAdapterOptions {
+            power_preference: wgpu::PowerPreference::HighPerformance,
+            ..Default::default()
+        };
+        let adapter = instance.request_adapter(&options).await.map_err(RenderError::NoAdapter)?;
+        let adapter_name = adapter.get_info().name;
+        let limits = adapter.limits();
+        let most_buffer_bytes =
+            limits.max_buffer_size.min(limits.max_storage_buffer_binding_size).min(MOST_BUFFER_BYTES);
+        let descriptor = wgpu::DeviceDescriptor { required_limits: limits, ..Default::default() };
+        let (device, queue) = adapter
+            .request_device(&descriptor)
+            .await
+            .map_err(|source| RenderError::NoDevice { adapter: adapter_name.clone(), source })?;
+        Ok(Self { device, queue, adapter_name, most_buffer_bytes })
+    }
+
+    /// Name of the adapter.
+    pub fn adapter_name(&self) -> &str {
+        &self.adapter_name
+    }
+
+    /// Largest storage buffer of this device.
+    pub fn most_buffer_bytes(&self) -> u64 {
+        self.most_buffer_bytes
+    }
+
+    /// Compiles one entry point.
+    pub fn kernel(&self, label: &'static str, source: &str, entry: &str) -> Kernel {
+        Kernel::new(&self.device, label, source, entry)
+    }
+
+    /// A list of commands to fill.
+    pub fn recorder(&self) -> Recorder<'_> {
+        Recorder::new(self)
+    }
+
+    /// A small buffer of constants.
+    pub fn uniform<T: Pod>(&self, label: &str, content: &T) -> wgpu::Buffer {
+        self.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+            label: Some(label),
+            contents: bytemuck::bytes_of(content),
+            usage: wgpu::BufferUsages::UNIFORM,
+        })
+    }
+
+    /// A storage buffer with this content.
+    pub fn storage<T: Pod>(&self, label: &'static str, content: &[T]) -> Result<wgpu::Buffer, RenderError> {
+        let contents: &[u8] = bytemuck::cast_slice(content);
+        self.check_size(label, contents.len() as u64)?;
+        // An empty binding is not allowed; nobody reads the word.
+        let contents = if contents.is_empty() { &[0; 4] } else { contents };
+        Ok(self.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+            label: Some(label),
+            contents,
+            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
+        }))
+    }
+
+    fn check_size(&self, what: &'static str, bytes: u64) -> Result<(), RenderError> {
+        let limit = self.most_buffer_bytes;
+        if bytes > limit { Err(RenderError::TooLarge { what, bytes, limit }) } else { Ok(()) }
+    }
+}

@@ -1,0 +1,102 @@
+//! A list of commands for the device: dispatches and clears in order, then one download that runs them all.
+
+use std::sync::mpsc::sync_channel;
+
+use bytemuck::Pod;
+
+use super::{Gpu, Kernel};
+use crate::error::RenderError;
+
+/// Most workgroups in one dimension of a dispatch (the least any device allows).
+const MOST_GROUPS: u32 = 65_535;
+
+/// Commands that have not run yet.
+pub struct Recorder<'a> {
+    gpu: &'a Gpu,
+    encoder: wgpu::CommandEncoder,
+}
+
+impl<'a> Recorder<'a> {
+    pub(super) fn new(gpu: &'a Gpu) -> Self {
+        Self { gpu, encoder: gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default()) }
+    }
+
+    /// Runs `kernel` on `groups` workgroups with these buffers at their binding numbers.
+    pub fn dispatch(&mut self, kernel: &Kernel, buffers: &[(u32, &wgpu::Buffer)], groups: [u32; 2]) {
+        if groups.contains(&0) {
+            return;
+        }
+        let entries: Vec<_> = buffers
+            .iter()
+            .map(|(binding, buffer)| wgpu::BindGroupEntry { binding: *binding, resource: buffer.as_entire_binding() })
+            .collect();
+        let bindings = self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some(kernel.label),
+            layout: &kernel.layout,
+            entries: &entries,
+        });
+        let mut pass = self.encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+            label: Some(kernel.label),
+            timestamp_writes: None,
+        });
+        pass.set_pipeline(&kernel.pipeline);
+        pass.set_bind_group(0, &bindings, &[]);
+        pass.dispatch_workgroups(groups[0], groups[1], 1);
+    }
+
+    /// Runs `kernel` with one workgroup for every `size` of `count` items.
+    pub fn dispatch_list(&mut self, kernel: &Kernel, buffers: &[(u32, &wgpu::Buffer)], count: u32, size: u32) {
+        let groups = count.div_ceil(size);
+        let across = groups.min(MOST_GROUPS);
+        let down = if across == 0 { 0 } else { groups.div_ceil(across) };
+        self.dispatch(kernel, buffers, [across, down]);
+    }
+
+    /// Sets the first `bytes` of a buffer to zero.
+    pub fn clear(&mut self, buffer: &wgpu::Buffer, bytes: u64) {
+        self.encoder.clear_buffer(buffer, 0, Some(bytes));
+    }
+
+    /// Runs everything recorded and reads the first `len` items of a buffer.
+    pub fn download<T: Pod>(self, buffer: &wgpu::Buffer, len: usize) -> Result<Vec<T>, RenderError> {
+        let bytes = (len * size_of::<T>()) as u64;
+        let [content] = self.download_parts([(buffer, 0, bytes)])?;
+        Ok(bytemuck::pod_collect_to_vec(&content))
+    }
+
+    /// Runs everything recorded and reads parts of buffers: `(buffer, first byte, bytes)`.
+    pub fn download_parts<const N: usize>(
+        mut self,
+        parts: [(&wgpu::Buffer, u64, u64); N],
+    ) -> Result<[Vec<u8>; N], RenderError> {
+        let stopped = || RenderError::DeviceStopped { what: "drawing" };
+        let size = parts.iter().map(|part| part.2).sum();
+        let staging = self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("download"),
+            size,
+            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let mut at = 0;
+        for (buffer, first, bytes) in parts {
+            self.encoder.copy_buffer_to_buffer(buffer, first, &staging, at, bytes);
+            at += bytes;
+        }
+        let submission = self.gpu.queue.submit([self.encoder.finish()]);
+        let (done_tx, done_rx) = sync_channel(1);
+        staging.map_async(wgpu::MapMode::Read, .., move |result| {
+            // The receiver is gone only if this function has returned with an error.
+            drop(done_tx.send(result));
+        });
+        let wait = wgpu::PollType::Wait { submission_index: Some(submission), timeout: None };
+        self.gpu.device.poll(wait).map_err(|_stopped| stopped())?;
+        done_rx.recv().map_err(|_gone| stopped())?.map_err(|_unmapped| stopped())?;
+        let mapped = staging.get_mapped_range(..).map_err(|_unmapped| stopped())?;
+        let mut rest: &[u8] = &mapped;
+        Ok(parts.map(|(_, _, bytes)| {
+            let (content, after) = rest.split_at(bytes as usize);
+            rest = after;
+            content.to_vec()
+        }))
+    }
+}

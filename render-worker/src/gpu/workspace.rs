@@ -1,0 +1,92 @@
+//! Buffers that one frame at a time works in; they grow to the largest frame drawn and are used again.
+
+use bytemuck::Pod;
+
+use super::Gpu;
+use crate::error::RenderError;
+
+/// What a buffer holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Slot {
+    Params,
+    Rows,
+    Cols,
+    Active,
+    Palette,
+    Axes,
+    Value,
+    Accumulated,
+    Particles,
+    Splats,
+    Light,
+    Counts,
+    BlockSums,
+    Entries,
+    Picture,
+    Image,
+}
+
+impl Slot {
+    const COUNT: usize = Self::Image as usize + 1;
+
+    fn label(self) -> &'static str {
+        match self {
+            Self::Params => "params",
+            Self::Rows => "rows",
+            Self::Cols => "columns",
+            Self::Active => "active cells",
+            Self::Palette => "palette",
+            Self::Axes => "axes",
+            Self::Value => "interpolated values",
+            Self::Accumulated => "interpolated carbon",
+            Self::Particles => "particles",
+            Self::Splats => "splats",
+            Self::Light => "light slices",
+            Self::Counts => "list counts",
+            Self::BlockSums => "scan sums",
+            Self::Entries => "list entries",
+            Self::Picture => "picture",
+            Self::Image => "image",
+        }
+    }
+}
+
+/// The buffers of one frame in flight.
+#[derive(Default)]
+pub struct Workspace {
+    buffers: [Option<wgpu::Buffer>; Slot::COUNT],
+}
+
+impl Workspace {
+    /// The buffer of a slot with room for `bytes`; what it held is kept only if it was large enough.
+    pub fn room(&mut self, gpu: &Gpu, slot: Slot, bytes: u64) -> Result<wgpu::Buffer, RenderError> {
+        gpu.check_size(slot.label(), bytes)?;
+        let held = &mut self.buffers[slot as usize];
+        if let Some(buffer) = held.as_ref().filter(|buffer| buffer.size() >= bytes) {
+            return Ok(buffer.clone());
+        }
+        let kind = if slot == Slot::Params { wgpu::BufferUsages::UNIFORM } else { wgpu::BufferUsages::STORAGE };
+        let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(slot.label()),
+            // Powers of two: frames of slightly different size share a buffer.
+            size: bytes.max(256).next_power_of_two().min(gpu.most_buffer_bytes.max(256)),
+            usage: kind | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
+            mapped_at_creation: false,
+        });
+        *held = Some(buffer.clone());
+        Ok(buffer)
+    }
+
+    /// The buffer of a slot with this content at its start, before anything recorded later runs.
+    pub fn upload<T: Pod>(&mut self, gpu: &Gpu, slot: Slot, content: &[T]) -> Result<wgpu::Buffer, RenderError> {
+        let bytes: &[u8] = bytemuck::cast_slice(content);
+        let buffer = self.room(gpu, slot, bytes.len() as u64)?;
+        gpu.queue.write_buffer(&buffer, 0, bytes);
+        Ok(buffer)
+    }
+
+    /// Bytes a slot has room for.
+    pub fn room_bytes(&self, slot: Slot) -> u64 {
+        self.buffers[slot as usize].as_ref().map_or(0, wgpu::Buffer::size)
+    }
+}

@@ -1,0 +1,40 @@
+//! A finished picture and its PNG bytes.
+
+use bytes::Bytes;
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{ExtendedColorType, ImageEncoder as _};
+
+use crate::error::RenderError;
+
+/// A picture with straight alpha.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Image {
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    /// Red, green, blue, alpha; row by row from the top.
+    pub rgba8: Vec<u8>,
+}
+
+impl Image {
+    /// The picture as PNG; the same picture is always the same bytes.
+    pub fn encode_png(&self) -> Result<Bytes, RenderError> {
+        let mut png = Vec::with_capacity(self.rgba8.len() / 4 + 1024);
+        PngEncoder::new_with_quality(&mut png, CompressionType::Fast, FilterType::Adaptive)
+            .write_image(&self.rgba8, self.width, self.height, ExtendedColorType::Rgba8)
+            .map_err(|source| RenderError::Encode { width: self.width, height: self.height, source })?;
+        Ok(png.into())
+    }
+
+    /// Alpha of every pixel.
+    pub fn alpha(&self) -> impl Iterator<Item = u8> + '_ {
+        self.rgba8.chunks_exact(4).map(|pixel| pixel[3])
+    }
+
+    /// The pixel at a place.
+    pub fn pixel(&self, x: u32, y: u32) -> [u8; 4] {
+        let at = (y as usize * self.width as usize + x as usize) * 4;
+        [self.rgba8[at], self.rgba8[at + 1], self.rgba8[at + 2], self.rgba8[at + 3]]
+    }
+}

@@ -1,0 +1,191 @@
+//! Plans of globe views: a perspective camera above a place, looking at the earth's centre, north up.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use contract::earth::SPHERE_RADIUS_M;
+use contract::job::{Mode, RenderJob, View};
+use glam::DVec3;
+
+use super::look::{self, Look};
+use super::{Plan, area_m2, height_range_m};
+use crate::scene::Scene;
+use crate::stages::layout::{Active, Col, Params, Row, VIEW_GLOBE};
+
+/// Vertical opening of the camera (of the shorter side), degrees.
+const OPENING_DEG: f64 = 45.0;
+/// Light texels along a side at most: 64 slices of them are 27 MB.
+const MOST_LIGHT_TEXELS: f64 = 320.0;
+/// Parts of a light texel that positions are rounded to.
+const LIGHT_UNIT: i32 = 256;
+
+struct Camera {
+    place: DVec3,
+    east: DVec3,
+    north: DVec3,
+    up: DVec3,
+    focal_px: f64,
+    height: f64,
+}
+
+pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) {
+    let View::Globe { lon_deg, lat_deg, height_m, width_px, height_px } = job.view else { return };
+    let camera = camera(lon_deg, lat_deg, height_m, [width_px, height_px]);
+    let grid = &scene.grid;
+    let cell_rad = (grid.dlon_deg * grid.dlat_deg).sqrt().to_radians();
+    let cell_px = cell_rad * camera.focal_px / camera.height;
+    let params = &mut plan.params;
+    params.view = VIEW_GLOBE;
+    params.surface = u32::from(job.style.globe_surface);
+    params.edge_sharpness = cell_px.max(1.0) as f32;
+    params.per_earth_radius_m = (1.0 / SPHERE_RADIUS_M) as f32;
+    params.center_px_x = width_px as f32 / 2.0;
+    params.center_px_y = height_px as f32 / 2.0;
+    camera.write(params);
+    let sun = sun(job, &camera);
+    write(sun, [&mut params.sun_x, &mut params.sun_y, &mut params.sun_z]);
+    if job.mode == Mode::Map {
+        return;
+    }
+    let look = Look::of(job.mode);
+    let particles = look.particles_per_cell(cell_px, job.style.particles_per_cell);
+    params.particles_per_cell = particles;
+    plan.rows = rows(scene, &look, &camera, particles, job.style.optical_depth);
+    let heights = height_range_m(job, scene).map(|height_m| height_m / SPHERE_RADIUS_M);
+    let horizon = (1.0 / (1.0 + camera.height)).acos() + (1.0 / (1.0 + heights[1])).acos() + 2.0 * cell_rad;
+    let half = slice_planes(plan, job, camera.up, sun, heights, horizon);
+    light_frame(plan, &camera, sun, half, heights, horizon, cell_rad * look.radius_cells);
+    choose_cells(plan, scene, camera.up, horizon.min(PI));
+}
+
+/// East, north and up at a place, in the axes of eq. 4: x towards 90 E, y towards 0 E, z towards the north pole.
+pub(crate) fn axes_at(lon_deg: f64, lat_deg: f64) -> [DVec3; 3] {
+    let (sin_lon, cos_lon) = lon_deg.to_radians().sin_cos();
+    let (sin_lat, cos_lat) = lat_deg.to_radians().sin_cos();
+    let east = DVec3::new(cos_lon, -sin_lon, 0.0);
+    let north = DVec3::new(-sin_lat * sin_lon, -sin_lat * cos_lon, cos_lat);
+    let up = DVec3::new(cos_lat * sin_lon, cos_lat * cos_lon, sin_lat);
+    [east, north, up]
+}
+
+fn camera(lon_deg: f64, lat_deg: f64, height_m: f64, size_px: [u32; 2]) -> Camera {
+    let [east, north, up] = axes_at(lon_deg, lat_deg);
+    let height = height_m / SPHERE_RADIUS_M;
+    let side_px = f64::from(size_px[0].min(size_px[1]));
+    let focal_px = side_px / 2.0 / (OPENING_DEG / 2.0).to_radians().tan();
+    Camera { place: up * (1.0 + height), east, north, up, focal_px, height }
+}
+
+impl Camera {
+    fn write(&self, params: &mut Params) {
+        params.focal_px = self.focal_px as f32;
+        write(self.place, [&mut params.eye_x, &mut params.eye_y, &mut params.eye_z]);
+        write(self.east, [&mut params.right_x, &mut params.right_y, &mut params.right_z]);
+        write(self.north, [&mut params.up_x, &mut params.up_y, &mut params.up_z]);
+        write(-self.up, [&mut params.forward_x, &mut params.forward_y, &mut params.forward_z]);
+    }
+}
+
+fn write(vector: DVec3, fields: [&mut f32; 3]) {
+    for (field, value) in fields.into_iter().zip(vector.to_array()) {
+        *field = value as f32;
+    }
+}
+
+/// Towards the sun, which keeps its place in the frame of the camera.
+fn sun(job: &RenderJob, camera: &Camera) -> DVec3 {
+    let (sin_azimuth, cos_azimuth) = job.style.sun.azimuth_deg.to_radians().sin_cos();
+    let (sin_elevation, cos_elevation) = job.style.sun.elevation_deg.to_radians().sin_cos();
+    (camera.east * sin_azimuth + camera.north * cos_azimuth) * cos_elevation + camera.up * sin_elevation
+}
+
+fn rows(scene: &Scene, look: &Look, camera: &Camera, particles: u32, style_depth: f64) -> Vec<Row> {
+    let grid = &scene.grid;
+    (0..grid.rows)
+        .map(|row| {
+            let (north, south) = (grid.row_north_deg(row).to_radians(), grid.row_north_deg(row + 1).to_radians());
+            let lat = 0.5 * (north + south);
+            let area = (north.sin() - south.sin()) * grid.dlon_deg.to_radians();
+            let per_radian_px = camera.focal_px / camera.height;
+            let radius = look.radius_px(area.max(1e-12).sqrt() * per_radian_px) / per_radian_px;
+            Row {
+                sin_lat: lat.sin() as f32,
+                cos_lat: lat.cos() as f32,
+                lat_span_rad: (north - south) as f32,
+                radius: radius as f32,
+                area_m2: area_m2(scene, row),
+                depth_gain: look.depth_gain(area, radius, particles, style_depth) as f32,
+                ..Row::default()
+            }
+        })
+        .collect()
+}
+
+/// Slices across the half-way vector between light and view, over the visible cap; the vector comes back.
+fn slice_planes(plan: &mut Plan, job: &RenderJob, up: DVec3, sun: DVec3, heights: [f64; 2], horizon: f64) -> DVec3 {
+    let front_to_back = sun.dot(up) >= 0.0;
+    let sum = if front_to_back { sun + up } else { sun - up };
+    let half = sum / sum.length();
+    let tilt = half.dot(up).clamp(-1.0, 1.0).acos();
+    let reach = |cosine: f64| if cosine > 0.0 { [1.0 + heights[0], 1.0 + heights[1]] } else { [1.0 + heights[1], 1.0 + heights[0]] };
+    let near = (tilt - horizon).max(0.0).cos();
+    let far = (tilt + horizon).min(PI).cos();
+    let (top, bottom) = (reach(near)[1] * near + 1e-4, reach(far)[0] * far - 1e-4);
+    let params = &mut plan.params;
+    params.front_to_back = u32::from(front_to_back);
+    params.slice_top = top as f32;
+    params.slices_per_unit = (f64::from(job.style.slices) / (top - bottom)) as f32;
+    write(half, [&mut params.half_x, &mut params.half_y, &mut params.half_z]);
+    half
+}
+
+fn light_frame(
+    plan: &mut Plan,
+    camera: &Camera,
+    sun: DVec3,
+    half: DVec3,
+    heights: [f64; 2],
+    horizon: f64,
+    radius: f64,
+) {
+    let params = &mut plan.params;
+    if params.light_on == 0 {
+        return;
+    }
+    let across = if sun.cross(half).length() > 1e-6 { sun.cross(half) } else { camera.east };
+    let axis_u = across / across.length();
+    let axis_v = sun.cross(axis_u);
+    // Every point of the cap lies within a chord of the point below the camera.
+    let chord = if horizon >= FRAC_PI_2 { 1.0 + heights[1] } else { 2.0 * (horizon / 2.0).sin() * (1.0 + heights[1]) };
+    let reach = chord + heights[1].max(-heights[0]);
+    let texel = (look::TEXEL_PER_RADIUS * radius).max(2.0 * reach / MOST_LIGHT_TEXELS);
+    let texels = (2.0 * reach / texel).ceil() as u32 + 2;
+    params.light_unit = LIGHT_UNIT;
+    (params.light_width, params.light_height) = (texels, texels);
+    params.light_u0 = (camera.up.dot(axis_u) - reach) as f32;
+    params.light_v0 = (camera.up.dot(axis_v) - reach) as f32;
+    params.light_texels_per_unit = (1.0 / texel) as f32;
+    params.light_depth_gain = (PI / 3.0 / (texel * texel)) as f32;
+    write(axis_u, [&mut params.light_u_x, &mut params.light_u_y, &mut params.light_u_z]);
+    write(axis_v, [&mut params.light_v_x, &mut params.light_v_y, &mut params.light_v_z]);
+}
+
+/// All cells of the domain within `horizon` of the point below the camera.
+fn choose_cells(plan: &mut Plan, scene: &Scene, up: DVec3, horizon: f64) {
+    let grid = &scene.grid;
+    let nearest_cos = horizon.cos();
+    let lon = |col: u32| (grid.col_west_deg(col) + 0.5 * grid.dlon_deg).to_radians();
+    plan.cols = (0..grid.cols)
+        .map(|col| Col { sin_lon: lon(col).sin() as f32, cos_lon: lon(col).cos() as f32, ..Col::default() })
+        .collect();
+    let domain = scene.domain.content();
+    for (row, table) in (0u32..).zip(&plan.rows) {
+        let (sin_lat, cos_lat) = (f64::from(table.sin_lat), f64::from(table.cos_lat));
+        for (col, slot) in (0u32..).zip(&plan.cols) {
+            let cell = row * grid.cols + col;
+            let center = DVec3::new(cos_lat * f64::from(slot.sin_lon), cos_lat * f64::from(slot.cos_lon), sin_lat);
+            if domain[cell as usize] != 0 && center.dot(up) >= nearest_cos {
+                plan.active.push(Active { cell, slot: col });
+            }
+        }
+    }
+}

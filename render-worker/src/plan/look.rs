@@ -1,0 +1,94 @@
+//! The numbers behind the look of a picture that no job sets: sizes, numbers and thickness of particles.
+
+use contract::job::Mode;
+
+/// Thickness of the sheet that particles fill where they are not lifted or sunk, m.
+pub(super) const SHEET_M: f64 = 20_000.0;
+/// Farthest a particle is lifted or sunk, m: bounds how far beyond a tile particles must be looked for.
+pub(super) const HEIGHT_LIMIT_M: f64 = 1.2e6;
+/// Turns of a particle through its column for each kg m⁻²: at 60 g m⁻² a year it rises three times a year.
+pub(super) const TURNS_PER_KG_M2: f32 = 50.0;
+/// Share of the optical depth that a cell without flux keeps.
+pub(super) const FLOOR_DIVERGING: f32 = 0.12;
+/// The same for quantities without a sign.
+pub(super) const FLOOR_SEQUENTIAL: f32 = 0.45;
+/// Light that reaches everything.
+pub(super) const AMBIENT: f32 = 0.42;
+/// Opacity of a thematic map: the base map shines through a little.
+pub(super) const MAP_ALPHA: f32 = 0.9;
+/// Pixels north that a metre of height moves a particle, in pixels a metre: the slope of the view of map tiles.
+pub(super) const OBLIQUE: f64 = 0.35;
+/// Largest particle, pixels: keeps positions and reaches far inside 32-bit integers.
+pub(super) const MAX_RADIUS_PX: f32 = 100_000.0;
+/// Shadows of a lower sun would fall far beyond a tile.
+pub(super) const LOWEST_SUN_DEG: f64 = 20.0;
+/// Light texel over particle radius: depositing and looking up with hats of this width blurs as much as the
+/// particle's own kernel does (variance texel²/3 against radius²/8).
+pub(super) const TEXEL_PER_RADIUS: f64 = 0.612;
+
+/// How particles of one mode look.
+pub(super) struct Look {
+    /// Radius over the side of a cell.
+    pub radius_cells: f64,
+    /// Smallest radius.
+    pub min_radius_px: f32,
+    /// Largest radius.
+    pub max_radius_px: f64,
+    /// Radius of a particle without flux is smaller by this share.
+    pub size_spread: f32,
+    /// Pixels for each particle: fewer particles a cell are drawn where cells are small.
+    pub area_px_per_particle: f64,
+    /// Optical depth at the centre if it is the same at any size, over the style's optical depth.
+    pub center_depth: Option<f64>,
+}
+
+impl Look {
+    pub(super) fn of(mode: Mode) -> Self {
+        match mode {
+            Mode::Points => Self {
+                radius_cells: 0.06,
+                min_radius_px: 1.2,
+                max_radius_px: 3.5,
+                size_spread: 0.3,
+                area_px_per_particle: 7.0,
+                center_depth: Some(3.0),
+            },
+            Mode::Sprites => Self {
+                radius_cells: 0.24,
+                min_radius_px: 2.2,
+                max_radius_px: 28.0,
+                size_spread: 0.45,
+                area_px_per_particle: 12.0,
+                center_depth: Some(2.0),
+            },
+            Mode::Volume | Mode::Map => Self {
+                radius_cells: 1.15,
+                min_radius_px: 1.6,
+                max_radius_px: f64::INFINITY,
+                size_spread: 0.25,
+                area_px_per_particle: 1.6,
+                center_depth: None,
+            },
+        }
+    }
+
+    /// Particles drawn in a cell of this side, at most what the style allows; never fewer than one.
+    pub(super) fn particles_per_cell(&self, cell_px: f64, style: u32) -> u32 {
+        let wanted = (cell_px * cell_px / self.area_px_per_particle).ceil();
+        (wanted.min(f64::from(style)) as u32).max(1)
+    }
+
+    /// Radius of a full-size particle in a cell of this side, pixels.
+    pub(super) fn radius_px(&self, cell_px: f64) -> f64 {
+        (self.radius_cells * cell_px).clamp(f64::from(self.min_radius_px), self.max_radius_px.max(f64::from(self.min_radius_px)))
+    }
+
+    /// Optical depth at a particle's centre for a column of optical depth 1: what the column's depth over its area is
+    /// when spread over the kernel `(1 - q)²`, whose integral is a third of its disc.
+    pub(super) fn depth_gain(&self, cell_area: f64, radius: f64, particles: u32, style_depth: f64) -> f64 {
+        match self.center_depth {
+            Some(depth) => depth / style_depth.max(1e-6),
+            None => cell_area * 3.0 / (f64::from(particles) * std::f64::consts::PI * radius * radius),
+        }
+    }
+}

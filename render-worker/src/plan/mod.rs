@@ -1,0 +1,185 @@
+//! From a job and a scene to plain data for the stages: parameters, tables and the list of cells to draw.
+//!
+//! Everything that must not depend on which tile is drawn (slice planes, light texels, particle sizes and numbers)
+//! is computed here from the scene and the zoom level alone.
+
+mod globe;
+mod look;
+mod tile;
+
+use contract::earth::Earth;
+use contract::job::{Mode, RenderJob, View};
+
+use crate::error::RenderError;
+use crate::scene::Scene;
+use crate::stages::layout::{
+    Active, Axis, Col, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, Params, Particle, Row, SCREEN_TILE_PX, Splat,
+};
+use look::Look;
+
+/// Most particles of one picture.
+const MOST_PARTICLES: u64 = 1 << 24;
+/// Largest part of a picture drawn at once, pixels a side; a multiple of the screen tile.
+const PART_PX: u32 = 1024;
+
+/// Everything the stages need for one picture.
+#[derive(Debug, Clone)]
+pub struct Plan {
+    pub mode: Mode,
+    pub params: Params,
+    pub rows: Vec<Row>,
+    pub cols: Vec<Col>,
+    pub active: Vec<Active>,
+    pub axes: Vec<Axis>,
+    pub palette: Vec<u32>,
+    size_px: [u32; 2],
+}
+
+/// A rectangle of the picture that is drawn at once.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Part {
+    pub origin_px: [u32; 2],
+    pub size_px: [u32; 2],
+}
+
+impl Plan {
+    /// The plan of a valid job; `most_buffer_bytes` is what the device can hold in one buffer.
+    pub fn new(job: &RenderJob, scene: &Scene, most_buffer_bytes: u64) -> Result<Self, RenderError> {
+        job.validate()?;
+        scene.validate()?;
+        let size_px = job.view.size_px();
+        let mut plan = Self {
+            mode: job.mode,
+            params: common(job, scene),
+            rows: vec![],
+            cols: vec![],
+            active: vec![],
+            axes: vec![],
+            palette: palette(job),
+            size_px,
+        };
+        match job.view {
+            View::Tile { tile, size_px } => tile::plan(&mut plan, job, scene, tile, size_px),
+            View::Globe { .. } => globe::plan(&mut plan, job, scene),
+        }
+        plan.count_particles(most_buffer_bytes)?;
+        Ok(plan)
+    }
+
+    fn count_particles(&mut self, most_buffer_bytes: u64) -> Result<(), RenderError> {
+        let largest = size_of::<Particle>().max(size_of::<Splat>()) as u64;
+        let limit = MOST_PARTICLES.min(most_buffer_bytes / largest);
+        let count = self.active.len() as u64 * u64::from(self.params.particles_per_cell);
+        if count > limit {
+            return Err(RenderError::TooManyParticles { count, limit });
+        }
+        self.params.active_count = self.active.len() as u32;
+        self.params.particle_count = count as u32;
+        Ok(())
+    }
+
+    /// The picture cut into parts that are drawn at once, in reading order.
+    pub fn parts(&self) -> Vec<Part> {
+        let [width, height] = self.size_px;
+        let starts = |length: u32| (0..length).step_by(PART_PX as usize);
+        let part = |x: u32, y: u32| Part {
+            origin_px: [x, y],
+            size_px: [PART_PX.min(width - x), PART_PX.min(height - y)],
+        };
+        starts(height).flat_map(|y| starts(width).map(move |x| part(x, y))).collect()
+    }
+
+    /// Parameters for drawing one part.
+    pub fn params_of(&self, part: Part) -> Params {
+        let [width, height] = part.size_px;
+        Params {
+            origin_x_px: part.origin_px[0] as i32,
+            origin_y_px: part.origin_px[1] as i32,
+            width,
+            height,
+            tiles_x: width.div_ceil(SCREEN_TILE_PX),
+            tiles_y: height.div_ceil(SCREEN_TILE_PX),
+            ..self.params
+        }
+    }
+
+    /// Whole picture, pixels.
+    pub fn size_px(&self) -> [u32; 2] {
+        self.size_px
+    }
+}
+
+/// Parameters that do not depend on the view.
+fn common(job: &RenderJob, scene: &Scene) -> Params {
+    let (style, grid) = (&job.style, &scene.grid);
+    let transfer = &style.transfer;
+    let look = Look::of(job.mode);
+    let diverging = transfer.low < 0.0 && transfer.high > 0.0;
+    Params {
+        rows: grid.rows,
+        cols: grid.cols,
+        periodic: u32::from(grid.is_periodic()),
+        end_cell: grid.cell_count() as u32,
+        value_weight: scene.value.weight as f32,
+        accumulated_weight: scene.accumulated.as_ref().map_or(0.0, |interval| interval.weight as f32),
+        has_accumulated: u32::from(scene.accumulated.is_some()),
+        transfer_low: transfer.low as f32,
+        transfer_per_unit: (1.0 / (transfer.high - transfer.low)) as f32,
+        strength_per_unit: (1.0 / transfer.low.abs().max(transfer.high.abs())) as f32,
+        diverging: u32::from(diverging),
+        depth_floor: if diverging { look::FLOOR_DIVERGING } else { look::FLOOR_SEQUENTIAL },
+        height_m_per_kg_m2: style.height_m_per_kg_m2 as f32,
+        height_limit_m: look::HEIGHT_LIMIT_M as f32,
+        sheet_m: look::SHEET_M as f32,
+        turns_per_kg_m2: look::TURNS_PER_KG_M2,
+        optical_depth: style.optical_depth as f32,
+        kernel: match job.mode {
+            Mode::Points => KERNEL_DOT,
+            Mode::Sprites => KERNEL_BALL,
+            Mode::Volume | Mode::Map => KERNEL_CLOUD,
+        },
+        front_to_back: 1,
+        slices: style.slices,
+        size_spread: look.size_spread,
+        min_radius_px: look.min_radius_px,
+        max_radius_px: look::MAX_RADIUS_PX,
+        light_on: u32::from(job.mode == Mode::Volume),
+        ambient: look::AMBIENT,
+        map_alpha: look::MAP_ALPHA,
+        grid_west_rad: grid.west_deg.to_radians() as f32,
+        grid_north_rad: grid.north_deg.to_radians() as f32,
+        cols_per_rad: (1.0 / grid.dlon_deg.to_radians()) as f32,
+        rows_per_rad: (1.0 / grid.dlat_deg.to_radians()) as f32,
+        lon_span_rad: grid.dlon_deg.to_radians() as f32,
+        ..Params::default()
+    }
+}
+
+/// 256 colours of the transfer function, red lowest.
+fn palette(job: &RenderJob) -> Vec<u32> {
+    let transfer = &job.style.transfer;
+    let byte = |share: f64| (share * 255.0).round() as u32;
+    (0..256)
+        .map(|i| {
+            let value = transfer.low + (transfer.high - transfer.low) * f64::from(i) / 255.0;
+            let [r, g, b] = transfer.color(value);
+            byte(r) | byte(g) << 8 | byte(b) << 16
+        })
+        .collect()
+}
+
+/// Lowest and highest particle, m: from the frames, so that every tile of an instant has the same slice planes.
+fn height_range_m(job: &RenderJob, scene: &Scene) -> [f64; 2] {
+    let [low, high] = scene.accumulated.as_ref().map_or([0.0; 2], |interval| interval.range());
+    let scaled = |kg_m2: f32| {
+        (f64::from(kg_m2) * job.style.height_m_per_kg_m2).clamp(-look::HEIGHT_LIMIT_M, look::HEIGHT_LIMIT_M)
+    };
+    // Half the sheet, and a metre so that rounding cannot put a particle outside.
+    let sheet = 0.5 * look::SHEET_M + 1.0;
+    [scaled(low).min(0.0) - sheet, scaled(high).max(0.0) + sheet]
+}
+
+/// Area of the cells of every row, m².
+fn area_m2(scene: &Scene, row: u32) -> f32 {
+    scene.grid.cell_area_m2(row, Earth::Wgs84) as f32
+}

@@ -1,0 +1,53 @@
+//! Frames that stay on the device between pictures, least recently drawn first to go.
+
+use std::collections::BTreeMap;
+use std::sync::{Mutex, PoisonError};
+
+use bytemuck::Pod;
+
+use crate::error::RenderError;
+use crate::gpu::Gpu;
+use crate::scene::Cells;
+
+/// Bytes kept at most, apart from frames in flight.
+const MOST_BYTES: u64 = 512 << 20;
+
+/// Buffers by the id of their cells.
+#[derive(Default)]
+pub struct Resident {
+    held: Mutex<Held>,
+}
+
+#[derive(Default)]
+struct Held {
+    by_id: BTreeMap<u64, (wgpu::Buffer, u64)>,
+    uses: u64,
+}
+
+impl Resident {
+    /// The cells on the device, uploaded if they are not there.
+    pub fn buffer<T: Pod>(&self, gpu: &Gpu, cells: &Cells<T>) -> Result<wgpu::Buffer, RenderError> {
+        let mut held = self.held.lock().unwrap_or_else(PoisonError::into_inner);
+        held.uses += 1;
+        let use_count = held.uses;
+        if let Some((buffer, last_use)) = held.by_id.get_mut(&cells.id()) {
+            *last_use = use_count;
+            return Ok(buffer.clone());
+        }
+        let buffer = gpu.storage("frame", cells.content())?;
+        held.by_id.insert(cells.id(), (buffer.clone(), use_count));
+        held.evict();
+        Ok(buffer)
+    }
+}
+
+impl Held {
+    fn evict(&mut self) {
+        let mut bytes: u64 = self.by_id.values().map(|(buffer, _)| buffer.size()).sum();
+        while bytes > MOST_BYTES && self.by_id.len() > 1 {
+            let oldest = self.by_id.iter().min_by_key(|(_, (_, last_use))| *last_use).map(|(id, _)| *id);
+            let Some((buffer, _)) = oldest.and_then(|id| self.by_id.remove(&id)) else { return };
+            bytes -= buffer.size();
+        }
+    }
+}

@@ -1,0 +1,118 @@
+//! What there is to see at one instant: two adjacent frames of a product, of its accumulated carbon, and its domain.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use contract::grid::Grid;
+
+use crate::error::RenderError;
+use crate::stages::layout::{MISSING, is_missing};
+
+static NEXT_ID: AtomicU64 = AtomicU64::new(0);
+
+/// A column of numbers, one a cell (`[row, col]`), that devices may keep under its id.
+#[derive(Debug)]
+pub struct Cells<T> {
+    id: u64,
+    content: Vec<T>,
+}
+
+impl<T> Cells<T> {
+    fn new(content: Vec<T>) -> Self {
+        Self { id: NEXT_ID.fetch_add(1, Ordering::Relaxed), content }
+    }
+
+    /// Different for every set of cells made by this process.
+    pub fn id(&self) -> u64 {
+        self.id
+    }
+
+    /// The numbers.
+    pub fn content(&self) -> &[T] {
+        &self.content
+    }
+}
+
+/// One time step, gaps filled.
+#[derive(Debug)]
+pub struct Frame {
+    /// Values; [`MISSING`] where there is no data.
+    pub cells: Cells<f32>,
+    /// Smallest and largest value, 0 and 0 without data.
+    pub range: [f32; 2],
+}
+
+impl Frame {
+    /// A frame from values with NaN (or anything not finite) where there is no data.
+    pub fn new(mut values: Vec<f32>) -> Self {
+        let mut range: Option<[f32; 2]> = None;
+        for value in &mut values {
+            if !value.is_finite() || is_missing(*value) {
+                *value = MISSING;
+            } else {
+                let [low, high] = range.unwrap_or([*value; 2]);
+                range = Some([low.min(*value), high.max(*value)]);
+            }
+        }
+        Self { cells: Cells::new(values), range: range.unwrap_or_default() }
+    }
+
+    /// Bytes held.
+    pub fn size_bytes(&self) -> u64 {
+        size_of_val(self.cells.content.as_slice()) as u64
+    }
+}
+
+/// Two adjacent steps and the weight of the second (eq. 3).
+#[derive(Debug, Clone)]
+pub struct Interval {
+    /// The step before the instant.
+    pub before: Arc<Frame>,
+    /// The step after it.
+    pub after: Arc<Frame>,
+    /// 0 at `before`, 1 at `after`.
+    pub weight: f64,
+}
+
+impl Interval {
+    /// Smallest and largest value that any instant between the two steps can have.
+    pub fn range(&self) -> [f32; 2] {
+        let ([low1, high1], [low2, high2]) = (self.before.range, self.after.range);
+        [low1.min(low2), high1.max(high2)]
+    }
+}
+
+/// Everything a picture is drawn from, apart from its job.
+#[derive(Debug, Clone)]
+pub struct Scene {
+    /// The grid of all frames.
+    pub grid: Grid,
+    /// 1 for cells that hold data in some step, 0 for the others.
+    pub domain: Arc<Cells<u32>>,
+    /// The product drawn.
+    pub value: Interval,
+    /// Accumulated carbon, kg m⁻².
+    pub accumulated: Option<Interval>,
+}
+
+impl Scene {
+    /// A domain from one flag a cell.
+    pub fn domain_of(cells: impl IntoIterator<Item = bool>) -> Arc<Cells<u32>> {
+        Arc::new(Cells::new(cells.into_iter().map(u32::from).collect()))
+    }
+
+    /// Checks that all parts have one number a cell.
+    pub fn validate(&self) -> Result<(), RenderError> {
+        let frames = [Some(&self.value), self.accumulated.as_ref()];
+        let fits = frames
+            .into_iter()
+            .flatten()
+            .flat_map(|interval| [&interval.before, &interval.after])
+            .all(|frame| frame.cells.content.len() == self.grid.cell_count());
+        if fits && self.domain.content.len() == self.grid.cell_count() {
+            self.grid.validate()?;
+            return Ok(());
+        }
+        Err(RenderError::GridMismatch { product: "the product".into(), accumulated: "a frame or the domain".into() })
+    }
+}

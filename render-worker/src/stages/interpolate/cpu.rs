@@ -1,0 +1,22 @@
+//! CPU twin of `interpolate.wgsl`.
+
+use crate::stages::layout::{MISSING, Params, is_missing};
+
+/// Value between two adjacent frames, `weight` of the way from `v1` to `v2` (eq. 3); missing if either is, unless the
+/// instant is that of the first frame.
+pub fn interpolated(v1: f32, v2: f32, weight: f32) -> f32 {
+    if weight <= 0.0 {
+        return v1;
+    }
+    if is_missing(v1) || is_missing(v2) {
+        return MISSING;
+    }
+    v1 + (v2 - v1) * weight
+}
+
+/// Fills the cells of `between` that the picture needs.
+pub fn interpolate(params: &Params, weight: f32, before: &[f32], after: &[f32], between: &mut [f32]) {
+    for cell in params.first_cell as usize..params.end_cell as usize {
+        between[cell] = interpolated(before[cell], after[cell], weight);
+    }
+}

@@ -1,0 +1,238 @@
+//! The structs that Rust and WGSL share, declared once here and mirrored in `prelude.wgsl`; a test compares the two.
+
+/// Invocations of a workgroup in stages that run over a list.
+pub const GROUP: u32 = 128;
+/// Side of a screen tile, pixels; also the side of an eye workgroup.
+pub const SCREEN_TILE_PX: u32 = 8;
+/// Positions on the screen are whole multiples of this part of a pixel, so that no two tiles round them differently.
+pub const SUBPIXELS: i32 = 16;
+/// Optical depth 1 in the integers that light and eye sum up.
+pub const DEPTH_ONE: f32 = 4096.0;
+/// Counters that one workgroup of the scan sums up.
+pub const SCAN_BLOCK: u32 = GROUP * 8;
+/// What stands for "no data" in grids: NaN is not reliable in shaders.
+pub const MISSING: f32 = -1.0e30;
+
+/// [`Params::view`]: a map tile.
+pub const VIEW_TILE: u32 = 0;
+/// [`Params::view`]: the globe in perspective.
+pub const VIEW_GLOBE: u32 = 1;
+/// [`Params::kernel`]: hard dots.
+pub const KERNEL_DOT: u32 = 0;
+/// [`Params::kernel`]: shaded balls with a soft edge.
+pub const KERNEL_BALL: u32 = 1;
+/// [`Params::kernel`]: soft clouds, the projection of a round cloud of density `(1 - r²)^1.5`.
+pub const KERNEL_CLOUD: u32 = 2;
+
+shared_struct! {
+    /// Everything that all stages of one picture agree on.
+    pub struct Params {
+        pub rows: u32,
+        pub cols: u32,
+        pub periodic: u32,
+        pub first_cell: u32,
+        pub end_cell: u32,
+        pub value_weight: f32,
+        pub accumulated_weight: f32,
+        pub has_accumulated: u32,
+        pub transfer_low: f32,
+        pub transfer_per_unit: f32,
+        pub strength_per_unit: f32,
+        pub diverging: u32,
+        pub depth_floor: f32,
+        pub active_count: u32,
+        pub particles_per_cell: u32,
+        pub particle_count: u32,
+        pub height_m_per_kg_m2: f32,
+        pub height_limit_m: f32,
+        pub sheet_m: f32,
+        pub turns_per_kg_m2: f32,
+        pub optical_depth: f32,
+        pub view: u32,
+        pub kernel: u32,
+        pub front_to_back: u32,
+        pub width: u32,
+        pub height: u32,
+        pub tiles_x: u32,
+        pub tiles_y: u32,
+        pub slices: u32,
+        pub entry_capacity: u32,
+        pub min_radius_px: f32,
+        pub max_radius_px: f32,
+        pub size_spread: f32,
+        pub height_px_per_m: f32,
+        pub slice_top: f32,
+        pub slices_per_unit: f32,
+        pub light_on: u32,
+        pub light_width: u32,
+        pub light_height: u32,
+        pub light_unit: i32,
+        pub light_origin_x: i32,
+        pub light_origin_y: i32,
+        pub light_shift_x_per_m: f32,
+        pub light_shift_y_per_m: f32,
+        pub light_depth_gain: f32,
+        pub light_u0: f32,
+        pub light_v0: f32,
+        pub light_texels_per_unit: f32,
+        pub ambient: f32,
+        pub lon_span_rad: f32,
+        pub per_earth_radius_m: f32,
+        pub focal_px: f32,
+        pub eye_x: f32,
+        pub eye_y: f32,
+        pub eye_z: f32,
+        pub right_x: f32,
+        pub right_y: f32,
+        pub right_z: f32,
+        pub up_x: f32,
+        pub up_y: f32,
+        pub up_z: f32,
+        pub forward_x: f32,
+        pub forward_y: f32,
+        pub forward_z: f32,
+        pub half_x: f32,
+        pub half_y: f32,
+        pub half_z: f32,
+        pub sun_x: f32,
+        pub sun_y: f32,
+        pub sun_z: f32,
+        pub light_u_x: f32,
+        pub light_u_y: f32,
+        pub light_u_z: f32,
+        pub light_v_x: f32,
+        pub light_v_y: f32,
+        pub light_v_z: f32,
+        pub center_px_x: f32,
+        pub center_px_y: f32,
+        pub grid_west_rad: f32,
+        pub grid_north_rad: f32,
+        pub cols_per_rad: f32,
+        pub rows_per_rad: f32,
+        pub edge_sharpness: f32,
+        pub map_alpha: f32,
+        pub surface: u32,
+        /// Left and top of the part drawn, pixels (globe views are drawn in parts).
+        pub origin_x_px: i32,
+        pub origin_y_px: i32,
+        pub pad: u32,
+    }
+}
+
+shared_struct! {
+    /// One row of the grid as the view sees it.
+    pub struct Row {
+        /// Northern edge, subpixels south of the picture's top (tiles).
+        pub y_sub: i32,
+        /// Height, pixels (tiles).
+        pub y_span_px: f32,
+        /// Of the row's middle latitude (globe).
+        pub sin_lat: f32,
+        pub cos_lat: f32,
+        /// Height, radians.
+        pub lat_span_rad: f32,
+        /// Particle radius: pixels (tiles), earth radii (globe).
+        pub radius: f32,
+        /// Area of one cell, m².
+        pub area_m2: f32,
+        /// Optical depth at a particle's centre for a column of optical depth 1.
+        pub depth_gain: f32,
+    }
+}
+
+shared_struct! {
+    /// One column of the grid, or one of its copies beyond the date line, as the view sees it.
+    pub struct Col {
+        /// Western edge, subpixels east of the picture's left (tiles).
+        pub x_sub: i32,
+        /// Width, pixels (tiles).
+        pub x_span_px: f32,
+        /// Of the column's middle longitude (globe).
+        pub sin_lon: f32,
+        pub cos_lon: f32,
+    }
+}
+
+shared_struct! {
+    /// A cell to draw: which one, and through which copy of its column.
+    pub struct Active {
+        pub cell: u32,
+        pub slot: u32,
+    }
+}
+
+shared_struct! {
+    /// A particle in the frame of its cell.
+    pub struct Particle {
+        pub row: u32,
+        pub slot: u32,
+        /// Place in the cell, 0 west to 1 east.
+        pub east: f32,
+        /// Place in the cell, 0 north to 1 south.
+        pub south: f32,
+        /// Above the sea surface; negative below it.
+        pub height_m: f32,
+        /// Its share of the carbon the cell has given off, kg.
+        pub mass_kg: f32,
+        /// Optical depth that it gives its column, before sharing.
+        pub depth: f32,
+        /// Red, green, blue, strength; 8 bits each, red lowest.
+        pub color: u32,
+    }
+}
+
+shared_struct! {
+    /// A particle on the screen and in the light.
+    pub struct Splat {
+        /// Centre, subpixels east of the picture's left.
+        pub x_sub: i32,
+        /// Centre, subpixels south of the picture's top.
+        pub y_sub: i32,
+        pub radius_px: f32,
+        /// Optical depth at the centre; 0 draws nothing.
+        pub tau: f32,
+        /// Slice and place within it.
+        pub slice: f32,
+        /// Place in the light buffer, in parts of a texel (`Params::light_unit` of them).
+        pub light_u: i32,
+        pub light_v: i32,
+        /// Optical depth given to one light texel that takes all of it.
+        pub light_depth: f32,
+        /// Share of direct light the ground below would get, 0 on the night side.
+        pub day: f32,
+        /// Red, green, blue, strength; 8 bits each, red lowest.
+        pub color: u32,
+    }
+}
+
+shared_struct! {
+    /// A splat in the list of one screen tile and slice.
+    pub struct Entry {
+        pub x_sub: i32,
+        pub y_sub: i32,
+        pub inverse_radius_px: f32,
+        pub tau: f32,
+        /// Red, green, blue, slice; 8 bits each, red lowest.
+        pub color: u32,
+    }
+}
+
+shared_struct! {
+    /// Where a pixel's column or row falls between two cell centres (tiles).
+    pub struct Axis {
+        /// Cell west or north of the place; may lie outside the grid.
+        pub index: i32,
+        /// 0 at that cell's centre, 1 at the next one's.
+        pub fraction: f32,
+    }
+}
+
+/// Does a stored value stand for "no data"?
+pub fn is_missing(value: f32) -> bool {
+    value < 0.5 * MISSING
+}
+
+/// Nearest whole number, halves upwards, the same on every device.
+pub fn nearest(x: f32) -> i32 {
+    (x + 0.5).floor() as i32
+}

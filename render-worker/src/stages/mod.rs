@@ -1,0 +1,14 @@
+//! The stages of a frame, a folder each: `mod.rs` records the shader, `<stage>.wgsl` is the shader, `cpu.rs` its twin.
+
+pub mod layout;
+pub mod sphere;
+
+pub mod bin;
+pub mod compose;
+pub mod eye;
+pub mod fill;
+pub mod interpolate;
+pub mod light;
+pub mod map;
+pub mod particles;
+pub mod project;

@@ -1,0 +1,76 @@
+//! CPU twin of `particles.wgsl`.
+
+use crate::stages::layout::{Active, Params, Particle, Row, is_missing, nearest};
+
+/// What the stage reads.
+pub struct Inputs<'a> {
+    pub active: &'a [Active],
+    pub rows: &'a [Row],
+    pub value: &'a [f32],
+    pub accumulated: &'a [f32],
+    pub palette: &'a [u32],
+}
+
+/// Output permutation of a 32-bit linear congruential generator (PCG-RXS-M-XS, O'Neill 2014).
+pub fn hash(x: u32) -> u32 {
+    let state = x.wrapping_mul(747796405).wrapping_add(2891336453);
+    let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277803737);
+    (word >> 22) ^ word
+}
+
+/// 32 random bits as a number in [0, 1).
+pub fn unit(bits: u32) -> f32 {
+    (bits >> 8) as f32 * 5.9604645e-8
+}
+
+/// Thin at both ends of a column, so that particles appear and vanish unseen; mean 1.
+pub fn envelope(phase: f32) -> f32 {
+    (phase.min(1.0 - phase) * 4.0).clamp(0.0, 1.0) * (4.0 / 3.0)
+}
+
+fn strength_of(params: &Params, value: f32, position: f32) -> f32 {
+    if params.diverging == 0 { position } else { (value.abs() * params.strength_per_unit).clamp(0.0, 1.0) }
+}
+
+/// One particle for every active cell and `k` below `particles_per_cell`, cell by cell.
+pub fn generate(params: &Params, inputs: &Inputs<'_>, particles: &mut [Particle]) {
+    for (i, particle) in particles.iter_mut().enumerate() {
+        let cell = inputs.active[i / params.particles_per_cell as usize];
+        let k = i as u32 % params.particles_per_cell;
+        *particle = one(params, inputs, cell, k);
+    }
+}
+
+fn one(params: &Params, inputs: &Inputs<'_>, cell: Active, k: u32) -> Particle {
+    let row = cell.cell / params.cols;
+    let value = inputs.value[cell.cell as usize];
+    let cell_bits = hash(cell.cell);
+    let bits = hash(cell_bits ^ k.wrapping_mul(0x9e3779b9));
+    let east = cell_bits.wrapping_add(k.wrapping_mul(3242174889)).wrapping_add(bits >> 3);
+    let south = hash(cell_bits).wrapping_add(k.wrapping_mul(2447445414)).wrapping_add(hash(bits) >> 3);
+    let mut particle =
+        Particle { row, slot: cell.slot, east: unit(east), south: unit(south), ..Particle::default() };
+    if is_missing(value) {
+        return particle;
+    }
+    let mut carbon = 0.0;
+    if params.has_accumulated == 1 {
+        carbon = inputs.accumulated[cell.cell as usize];
+        if is_missing(carbon) {
+            carbon = 0.0;
+        }
+    }
+    let start = unit(hash(cell_bits ^ 0x85ebca6b).wrapping_add(k.wrapping_mul(2654435769)));
+    let turned = start + params.turns_per_kg_m2 * carbon.abs();
+    let phase = turned - turned.floor();
+    let column_m = (carbon * params.height_m_per_kg_m2).clamp(-params.height_limit_m, params.height_limit_m);
+    let position = ((value - params.transfer_low) * params.transfer_per_unit).clamp(0.0, 1.0);
+    let strength = strength_of(params, value, position);
+    particle.height_m = column_m * phase + params.sheet_m * (phase - 0.5);
+    particle.mass_kg = carbon * inputs.rows[row as usize].area_m2 / params.particles_per_cell as f32;
+    let opacity = params.depth_floor + (1.0 - params.depth_floor) * strength;
+    particle.depth = params.optical_depth * opacity * envelope(phase);
+    let color = inputs.palette[nearest(position * 255.0) as usize];
+    particle.color = color | ((nearest(strength * 255.0) as u32) << 24);
+    particle
+}

@@ -1,0 +1,66 @@
+// Particles of the active cells: place, height, mass, optical depth and colour, one invocation a particle.
+@group(0) @binding(1) var<storage, read> active_cells: array<Active>;
+@group(0) @binding(2) var<storage, read> rows: array<Row>;
+@group(0) @binding(3) var<storage, read> value_grid: array<f32>;
+@group(0) @binding(4) var<storage, read> accumulated_grid: array<f32>;
+@group(0) @binding(5) var<storage, read> palette: array<u32>;
+@group(0) @binding(6) var<storage, read_write> particles: array<Particle>;
+
+// Output permutation of a 32-bit linear congruential generator (PCG-RXS-M-XS, O'Neill 2014).
+fn hash(x: u32) -> u32 {
+    let state = x * 747796405u + 2891336453u;
+    let word = ((state >> ((state >> 28u) + 4u)) ^ state) * 277803737u;
+    return (word >> 22u) ^ word;
+}
+
+// 32 random bits as a number in [0, 1).
+fn unit(bits: u32) -> f32 {
+    return f32(bits >> 8u) * 5.9604645e-8;
+}
+
+// Thin at both ends of a column, so that particles appear and vanish unseen; mean 1.
+fn envelope(phase: f32) -> f32 {
+    return clamp(min(phase, 1.0 - phase) * 4.0, 0.0, 1.0) * (4.0 / 3.0);
+}
+
+fn strength_of(value: f32, position: f32) -> f32 {
+    if (params.diverging == 0u) { return position; }
+    return clamp(abs(value) * params.strength_per_unit, 0.0, 1.0);
+}
+
+@compute @workgroup_size(GROUP)
+fn generate(@builtin(global_invocation_id) global: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>) {
+    let i = list_index(global, workgroups);
+    if (i >= params.particle_count) { return; }
+    let cell = active_cells[i / params.particles_per_cell];
+    let k = i % params.particles_per_cell;
+    let row = cell.cell / params.cols;
+    let value = value_grid[cell.cell];
+    let cell_bits = hash(cell.cell);
+    let bits = hash(cell_bits ^ (k * 0x9e3779b9u));
+    var particle: Particle;
+    particle.row = row;
+    particle.slot = cell.slot;
+    particle.east = unit(cell_bits + k * 3242174889u + (bits >> 3u));
+    particle.south = unit(hash(cell_bits) + k * 2447445414u + (hash(bits) >> 3u));
+    if (is_missing(value)) {
+        particles[i] = particle;
+        return;
+    }
+    var carbon = 0.0;
+    if (params.has_accumulated == 1u) {
+        carbon = accumulated_grid[cell.cell];
+        if (is_missing(carbon)) { carbon = 0.0; }
+    }
+    let start = unit(hash(cell_bits ^ 0x85ebca6bu) + k * 2654435769u);
+    let phase = fract(start + params.turns_per_kg_m2 * abs(carbon));
+    let column_m = clamp(carbon * params.height_m_per_kg_m2, -params.height_limit_m, params.height_limit_m);
+    let position = clamp((value - params.transfer_low) * params.transfer_per_unit, 0.0, 1.0);
+    let strength = strength_of(value, position);
+    particle.height_m = column_m * phase + params.sheet_m * (phase - 0.5);
+    particle.mass_kg = carbon * rows[row].area_m2 / f32(params.particles_per_cell);
+    let opacity = params.depth_floor + (1.0 - params.depth_floor) * strength;
+    particle.depth = params.optical_depth * opacity * envelope(phase);
+    particle.color = palette[u32(nearest(position * 255.0))] | (u32(nearest(strength * 255.0)) << 24u);
+    particles[i] = particle;
+}
