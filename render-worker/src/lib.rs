@@ -20,9 +20,13 @@ pub mod plan;
 pub mod renderer;
 mod resident;
 pub mod scene;
+pub mod service;
+pub mod source;
 pub mod stages;
 
 pub use error::RenderError;
 pub use image::Image;
 pub use renderer::{Backend, Renderer};
 pub use scene::{Frame, Interval, Scene};
+pub use service::{Limits, RenderService};
+pub use source::Source;

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use contract::job::Mode;
-use render_worker::{Backend, Renderer};
+use render_worker::{Backend, Image, Renderer};
 
 use crate::scenes::{ONE_DEGREE, globe, job, ocean, tile};
 
@@ -26,6 +26,7 @@ fn the_gallery_is_drawn_where_asked_for() {
         ("near", globe(-120.0, 10.0, 2.5e6, 512)),
     ];
     for mode in Mode::ALL {
+        let mut sheet = Sheet::default();
         for (name, view) in views {
             let mut job = job(mode, view);
             job.style.globe_surface = true;
@@ -37,6 +38,44 @@ fn the_gallery_is_drawn_where_asked_for() {
             let all = start.elapsed();
             println!("{mode} {name}: {:.1} ms, with PNG {:.1} ms, {} bytes", drawn.as_secs_f64() * 1e3, all.as_secs_f64() * 1e3, png.len());
             std::fs::write(format!("{folder}/{mode}-{name}.png"), png).unwrap();
+            sheet.add(&image);
         }
+        sheet.write(&format!("{folder}/{mode}.png"));
     }
+}
+
+/// Pictures side by side over a dark ground.
+#[derive(Default)]
+struct Sheet {
+    pictures: Vec<Image>,
+}
+
+impl Sheet {
+    fn add(&mut self, image: &Image) {
+        self.pictures.push(image.clone());
+    }
+
+    fn write(&self, path: &str) {
+        let across = 4;
+        let side = 264;
+        let flat: Vec<_> = self.pictures.iter().flat_map(quarters).collect();
+        let (width, height) = (side * across, side * flat.len().div_ceil(across));
+        let mut sheet = vec![90u8; width * height * 4];
+        for (i, (image, at_x, at_y)) in flat.iter().enumerate() {
+            for y in 0..256u32 {
+                for x in 0..256u32 {
+                    let [r, g, b, a] = image.pixel(at_x + x, at_y + y);
+                    let to = ((i / across * side + y as usize) * width + i % across * side + x as usize) * 4;
+                    let over = |c: u8, ground: f32| (f32::from(c) * f32::from(a) / 255.0 + ground * (1.0 - f32::from(a) / 255.0)) as u8;
+                    sheet[to..to + 4].copy_from_slice(&[over(r, 14.0), over(g, 24.0), over(b, 40.0), 255]);
+                }
+            }
+        }
+        let sheet = Image { width: width as u32, height: height as u32, rgba8: sheet };
+        std::fs::write(path, sheet.encode_png().unwrap()).unwrap();
+    }
+}
+
+fn quarters(image: &Image) -> Vec<(&Image, u32, u32)> {
+    if image.width == 256 { vec![(image, 0, 0)] } else { vec![(image, 0, 0), (image, 256, 0), (image, 0, 256), (image, 256, 256)] }
 }
