@@ -1,0 +1,79 @@
+//! Fixed-point masses, areas and columns of carbon: integers whose sums do not depend on the order of adding.
+
+/// Decimals of a mass in kg: 1 µg, far below what any product resolves.
+pub const MASS_DECIMALS: u32 = 9;
+/// Decimals of an area in m².
+pub const AREA_DECIMALS: u32 = 6;
+/// Steps of a column of carbon in 1 kg m⁻²: 1e-15 kg m⁻², so that the whole ocean is off by less than 1 kg a step.
+pub const COLUMN_STEPS_PER_KG_M2: f64 = 1e15;
+
+/// Largest size of one cell's share, in steps: 2^100 leaves room for 2^27 of them in an `i128`.
+const LIMIT_STEPS: f64 = (1u128 << 100) as f64;
+/// Below this size a share goes through `i64`, which is much cheaper than `i128`.
+const SMALL_STEPS: f64 = (1u64 << 62) as f64;
+
+/// A value that no sum may take: not finite, or larger than anything physical.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error("a cell's share is {0}, beyond anything physical")]
+pub struct OutOfRange(pub f64);
+
+/// The nearest integer of a number of steps, halves away from zero.
+pub fn to_steps(steps: f64) -> Result<i128, OutOfRange> {
+    let rounded = steps.round();
+    if rounded.abs() < SMALL_STEPS {
+        Ok(i128::from(rounded as i64))
+    } else if rounded.abs() < LIMIT_STEPS {
+        Ok(rounded as i128)
+    } else {
+        Err(OutOfRange(steps)) // NaN comes here too: it is below nothing
+    }
+}
+
+/// `value * part / whole` to the nearest integer, halves away from zero; none if the product leaves an `i128`.
+pub fn share(value: i128, part: i64, whole: i64) -> Option<i128> {
+    if part == whole {
+        return Some(value);
+    }
+    let (product, whole) = (value.checked_mul(i128::from(part))?, i128::from(whole));
+    let half = if product < 0 { -(whole / 2) } else { whole / 2 };
+    Some((product + half) / whole)
+}
+
+/// An integer of `decimals` decimals as plain text, such as `-1404.000000001`.
+pub fn decimal_text(value: i128, decimals: u32) -> String {
+    let scale = 10u128.pow(decimals);
+    let (whole, rest) = (value.unsigned_abs() / scale, value.unsigned_abs() % scale);
+    let sign = if value < 0 { "-" } else { "" };
+    format!("{sign}{whole}.{rest:0width$}", width = decimals as usize)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_round_to_the_nearest_and_refuse_nonsense() {
+        assert_eq!(to_steps(2.5), Ok(3));
+        assert_eq!(to_steps(-2.5), Ok(-3));
+        assert_eq!(to_steps(1e25), Ok(10_000_000_000_000_000_905_969_664)); // the f64 next to 1e25
+        for bad in [f64::NAN, f64::INFINITY, 1e40] {
+            assert!(to_steps(bad).is_err());
+        }
+    }
+
+    #[test]
+    fn shares_round_to_the_nearest() {
+        assert_eq!(share(10, 1, 3), Some(3));
+        assert_eq!(share(20, 1, 3), Some(7));
+        assert_eq!(share(-20, 1, 3), Some(-7));
+        assert_eq!(share(i128::MAX, 5, 5), Some(i128::MAX));
+        assert_eq!(share(i128::MAX, 2, 3), None);
+    }
+
+    #[test]
+    fn text_keeps_sign_and_zeros() {
+        assert_eq!(decimal_text(-1_000_000_001, 9), "-1.000000001");
+        assert_eq!(decimal_text(-5, 2), "-0.05");
+        assert_eq!(decimal_text(0, 3), "0.000");
+    }
+}

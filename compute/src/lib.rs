@@ -1,0 +1,25 @@
+//! Statistics and carbon budgets over stored products, on Ballista and DataFusion.
+//!
+//! Questions are SQL over the stored frames and series, a row a chunk; the array work happens in the SQL functions of
+//! [`functions`], which call the pure kernels of [`budget`] and [`stats`]. Sums are integers, so that an answer has the
+//! same bits however many parts it was computed in.
+
+pub mod budget;
+pub mod catalog;
+pub mod check;
+pub mod derive;
+mod error;
+pub mod functions;
+pub mod point;
+pub mod published;
+pub mod region;
+mod scan;
+mod session;
+pub mod stats;
+
+pub use budget::{BudgetAnswer, BudgetQuery, BudgetRow, BudgetStep, budget};
+pub use check::{CheckRow, compare};
+pub use derive::{DeriveProgress, derive_accumulated};
+pub use error::{ComputeError, ErrorClass};
+pub use point::{PointAnswer, point_series};
+pub use session::Engine;

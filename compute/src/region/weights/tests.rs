@@ -1,0 +1,274 @@
+//! Weights against the region's own area, against boxes, against each other and against numbers from elsewhere.
+
+use contract::region::{NamedRegion, Polygon};
+use proptest::prelude::*;
+
+use super::*;
+use crate::region::area::region_area_m2;
+
+const ONE_DEGREE: Grid = Grid {
+    rows: 180,
+    cols: 360,
+    north_deg: 90.0,
+    west_deg: -180.0,
+    dlat_deg: 1.0,
+    dlon_deg: 1.0,
+};
+/// A grid whose lines are not representable numbers, across the date line.
+const PACIFIC: Grid = Grid {
+    rows: 150,
+    cols: 400,
+    north_deg: 20.05,
+    west_deg: 160.03,
+    dlat_deg: 0.3,
+    dlon_deg: 0.1,
+};
+
+fn polygon(outer: &[[f64; 2]], holes: Vec<Vec<[f64; 2]>>) -> Region {
+    Region::Polygons(vec![Polygon {
+        outer: outer.to_vec(),
+        holes,
+    }])
+}
+
+/// Weights as one field, `[row, col]`.
+fn field(grid: &Grid, region: &Region) -> Vec<f64> {
+    let windows = frame_chunks(grid);
+    let mut field = vec![0.0; grid.cell_count()];
+    for (chunk, areas) in compute(grid, region, Earth::Wgs84).unwrap() {
+        for (index, area) in windows[chunk as usize].cell_indices(grid).zip(areas) {
+            field[index] = area;
+        }
+    }
+    field
+}
+
+fn close(a: f64, b: f64, relative: f64) -> bool {
+    (a - b).abs() <= relative * a.abs().max(b.abs())
+}
+
+fn worst_difference_in_cells(grid: &Grid, a: &[f64], b: &[f64]) -> f64 {
+    let share = |(i, (x, y)): (usize, (&f64, &f64))| {
+        (x - y).abs() / grid.cell_area_m2((i / grid.cols as usize) as u32, Earth::Wgs84)
+    };
+    a.iter().zip(b).enumerate().map(share).fold(0.0, f64::max)
+}
+
+/// A polygon with a dent and a hole; areas of its share of some cells of the 1-degree grid in m².
+///
+/// Independent truth: shapely 2.2 clipped the polygon to each cell in longitude and latitude, cut the edges into pieces
+/// of 0.0005 degrees, pyproj 3.7 (PROJ's equal-area cylindrical projection on WGS84) mapped them, shapely took the area.
+const CELLS_M2: [(usize, usize, f64); 11] = [
+    (32, 179, 6_379_404_646.028_094),
+    (34, 177, 1_341_836_260.253_334),
+    (35, 181, 2_570_626_769.785_141),
+    (35, 183, 0.0),
+    (36, 184, 6_841_311_404.275_759),
+    (38, 182, 7_532_087_598.093_801),
+    (40, 176, 827_021_224.555_480_6),
+    (41, 183, 5_912_090_885.687_757),
+    (41, 185, 8_217_732_076.120_936),
+    (43, 180, 3_038_046_771.071_756),
+    (45, 184, 440_865_387.002_973_6),
+];
+/// Area of the polygon across the date line, found in the same way (about 180 E).
+const DATE_LINE_M2: f64 = 2_730_740_707_011.703;
+
+fn dented() -> Region {
+    let hole = vec![[1.1, 49.4], [3.6, 48.3], [2.9, 51.2]];
+    polygon(
+        &[
+            [-3.3, 48.2],
+            [6.7, 44.1],
+            [9.9, 57.3],
+            [2.2, 52.6],
+            [-1.4, 60.7],
+        ],
+        vec![hole],
+    )
+}
+
+#[test]
+fn cells_of_a_dented_polygon_have_the_areas_that_another_program_finds() {
+    let field = field(&ONE_DEGREE, &dented());
+    for (row, col, area_m2) in CELLS_M2 {
+        let ours = field[row * 360 + col];
+        assert!(
+            close(ours, area_m2, 1e-9),
+            "{row} {col}: {ours} against {area_m2}"
+        );
+    }
+    let sum: f64 = field.iter().sum();
+    assert!(close(sum, 804_720_548_391.53, 1e-9), "{sum}");
+}
+
+#[test]
+fn a_polygon_across_the_date_line_has_the_area_that_another_program_finds() {
+    let corners = [[171.5, -21.3], [188.2, -17.7], [183.1, 3.9], [176.4, -4.2]];
+    for grid in [ONE_DEGREE, PACIFIC] {
+        let sum: f64 = field(&grid, &polygon(&corners, vec![])).iter().sum();
+        assert!(close(sum, DATE_LINE_M2, 1e-9), "{sum}");
+    }
+    let jumping = corners.map(|[lon, lat]| [contract::grid::wrap_lon_deg(lon), lat]);
+    let same = field(&ONE_DEGREE, &polygon(&jumping, vec![]));
+    let difference = worst_difference_in_cells(
+        &ONE_DEGREE,
+        &same,
+        &field(&ONE_DEGREE, &polygon(&corners, vec![])),
+    );
+    assert!(difference < 1e-12, "{difference}");
+}
+
+#[test]
+fn a_box_is_cut_exactly_at_its_edges() {
+    let region: Region = "-0.25,10.5,1.5,11.25".parse().unwrap();
+    let field = field(&ONE_DEGREE, &region);
+    let cell = |row: usize, col: usize| field[row * 360 + col];
+    assert!(close(
+        cell(78, 179),
+        Earth::Wgs84.cell_area_m2(11.0, 11.25, 0.25),
+        1e-13
+    ));
+    assert!(close(
+        cell(79, 180),
+        Earth::Wgs84.cell_area_m2(10.5, 11.0, 1.0),
+        1e-13
+    ));
+    assert!(close(
+        cell(79, 181),
+        Earth::Wgs84.cell_area_m2(10.5, 11.0, 0.5),
+        1e-13
+    ));
+    assert_eq!(field.iter().filter(|&&area| area > 0.0).count(), 6);
+}
+
+#[test]
+fn the_globe_is_every_cell_whole() {
+    let field = field(&ONE_DEGREE, &Region::Global);
+    for row in 0..180u32 {
+        let whole = ONE_DEGREE.cell_area_m2(row, Earth::Wgs84);
+        assert!(
+            field[row as usize * 360..][..360]
+                .iter()
+                .all(|&area| area == whole)
+        );
+    }
+}
+
+#[test]
+fn a_polygon_round_the_south_pole_is_the_box_south_of_its_latitude() {
+    let ring: Vec<_> = (0..24)
+        .map(|i| [f64::from(i * 15) - 170.0, -62.5])
+        .collect();
+    let round = field(&ONE_DEGREE, &polygon(&ring, vec![]));
+    let boxed = field(&ONE_DEGREE, &"-180,-90,180,-62.5".parse().unwrap());
+    let difference = worst_difference_in_cells(&ONE_DEGREE, &round, &boxed);
+    assert!(difference < 1e-10, "{difference}");
+}
+
+#[test]
+fn rings_that_cross_are_refused() {
+    let bow_tie = polygon(&[[0.0, 0.0], [10.0, 7.0], [10.0, 0.0], [0.0, 9.0]], vec![]);
+    let square = Polygon {
+        outer: vec![[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]],
+        holes: vec![],
+    };
+    let twice = Region::Polygons(vec![square.clone(), square]);
+    for region in [bow_tie, twice] {
+        let error = compute(&ONE_DEGREE, &region, Earth::Wgs84)
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains("cross"), "{error}");
+    }
+}
+
+#[test]
+fn the_equatorial_pacific_lies_between_its_bounds_and_has_its_own_area() {
+    let region = NamedRegion::find("equatorial-pacific").unwrap().region();
+    let sum: f64 = field(&ONE_DEGREE, &region).iter().sum();
+    let own = region_area_m2(&region, Earth::Wgs84).unwrap();
+    assert!(close(sum, own, 1e-12), "{sum} {own}");
+    assert!((4e13..6e13).contains(&own), "{own}");
+}
+
+#[tokio::test]
+async fn stored_weights_are_computed_once() {
+    let store = Store::memory();
+    let region = dented();
+    let key = stored(&store, &ONE_DEGREE, &region, Earth::Wgs84)
+        .await
+        .unwrap()
+        .unwrap();
+    assert_eq!(
+        stored(&store, &ONE_DEGREE, &region, Earth::Wgs84)
+            .await
+            .unwrap(),
+        Some(key.clone())
+    );
+    let back = storage::weights::read(&store, &key).await.unwrap();
+    assert_eq!(back, compute(&ONE_DEGREE, &region, Earth::Wgs84).unwrap());
+    let sphere = stored(&store, &ONE_DEGREE, &region, Earth::Sphere)
+        .await
+        .unwrap();
+    assert_ne!(sphere, Some(key));
+    let outside = stored(&store, &PACIFIC, &region, Earth::Wgs84)
+        .await
+        .unwrap();
+    assert_eq!(outside, None);
+}
+
+/// A star-shaped ring round a centre: it never crosses itself.
+fn star() -> impl Strategy<Value = Vec<[f64; 2]>> {
+    let radii = proptest::collection::vec(2.0f64..25.0, 3..24);
+    (-180.0f64..180.0, -60.0f64..60.0, radii, 0.0f64..1.0).prop_map(|(lon, lat, radii, turn)| {
+        let count = radii.len() as f64;
+        let corner = |(i, radius): (usize, f64)| {
+            let angle = (i as f64 + turn) / count * std::f64::consts::TAU;
+            [lon + radius * angle.cos(), lat + radius * angle.sin()]
+        };
+        radii.into_iter().enumerate().map(corner).collect()
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
+
+    #[test]
+    fn weights_sum_to_the_regions_own_area(corners in star()) {
+        let region = polygon(&corners, vec![]);
+        let sum: f64 = field(&ONE_DEGREE, &region).iter().sum();
+        let own = region_area_m2(&region, Earth::Wgs84).unwrap();
+        prop_assert!(close(sum, own, 1e-10), "{} {}", sum, own);
+    }
+
+    #[test]
+    fn a_region_and_its_complement_make_the_globe(corners in star()) {
+        let lons = |f: fn(f64, f64) -> f64, start| corners.iter().map(|c| c[0]).fold(start, f);
+        let (west, east) = (lons(f64::min, f64::INFINITY), lons(f64::max, f64::NEG_INFINITY));
+        let world = [[west - 20.0, -90.0], [west + 340.0, -90.0], [west + 340.0, 90.0], [west - 20.0, 90.0]];
+        prop_assume!(east < west + 340.0);
+        // Corners every 90 degrees of longitude: longer edges would be joined the short way.
+        let world: Vec<_> = [0, 1, 2, 3, 4].map(|i| [world[0][0] + 90.0 * f64::from(i), -90.0]).into_iter()
+            .chain([4, 3, 2, 1, 0].map(|i| [world[0][0] + 90.0 * f64::from(i), 90.0]))
+            .collect();
+        let inside = field(&ONE_DEGREE, &polygon(&corners, vec![]));
+        let outside = field(&ONE_DEGREE, &polygon(&world, vec![corners.clone()]));
+        let both: Vec<f64> = inside.iter().zip(&outside).map(|(a, b)| a + b).collect();
+        let difference = worst_difference_in_cells(&ONE_DEGREE, &both, &field(&ONE_DEGREE, &Region::Global));
+        prop_assert!(difference < 1e-9, "{}", difference);
+    }
+
+    #[test]
+    fn a_polygon_that_is_a_box_has_the_weights_of_the_box(
+        west in -180.0f64..180.0, width in 0.5f64..170.0, south in -90.0f64..80.0, height in 0.5f64..60.0,
+    ) {
+        let (east, north) = (west + width, (south + height).min(90.0));
+        let corners = [[west, south], [east, south], [east, north], [west, north]];
+        for grid in [ONE_DEGREE, PACIFIC] {
+            let drawn = field(&grid, &polygon(&corners, vec![]));
+            let boxed = field(&grid, &Region::Box { west, south, east, north });
+            let difference = worst_difference_in_cells(&grid, &drawn, &boxed);
+            prop_assert!(difference < 1e-9, "{}", difference);
+        }
+    }
+}

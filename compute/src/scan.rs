@@ -1,0 +1,51 @@
+//! Stored objects as tables: frames, weights and series under the names that SQL uses.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use contract::key::ObjectKey;
+use datafusion::arrow::datatypes::SchemaRef;
+use datafusion::datasource::file_format::parquet::ParquetFormat;
+use datafusion::datasource::listing::{
+    ListingOptions, ListingTable, ListingTableConfig, ListingTableUrl,
+};
+use datafusion::execution::context::SessionContext;
+use storage::Store;
+use url::Url;
+
+use crate::ComputeError;
+
+/// Makes a table of some objects of one layout.
+pub(crate) fn register(
+    context: &SessionContext,
+    table: &str,
+    store: &Store,
+    keys: &[&ObjectKey],
+    schema: &SchemaRef,
+) -> Result<(), ComputeError> {
+    let engine = || ComputeError::engine("naming stored objects");
+    let urls = keys
+        .iter()
+        .map(|key| address(store, key))
+        .collect::<Result<Vec<_>, _>>()?;
+    let options = ListingOptions::new(Arc::new(ParquetFormat::default()));
+    let config = ListingTableConfig::new_with_multi_paths(urls)
+        .with_listing_options(options.with_file_extension(".parquet"))
+        .with_schema(Arc::clone(schema));
+    let listing = ListingTable::try_new(config).map_err(engine())?;
+    context
+        .register_table(table, Arc::new(listing))
+        .map_err(engine())?;
+    Ok(())
+}
+
+/// Address of an object; a folder's name may hold spaces and signs that mean something in a URL.
+fn address(store: &Store, key: &ObjectKey) -> Result<ListingTableUrl, ComputeError> {
+    let text = store.url_of(key);
+    let url = match text.strip_prefix("file://") {
+        Some(path) => Url::from_file_path(Path::new(path)).ok(),
+        None => Url::parse(&text).ok(),
+    };
+    let url = url.ok_or_else(|| ComputeError::inconsistent(&text, "it is no address"))?;
+    ListingTableUrl::try_new(url, None).map_err(ComputeError::engine("naming stored objects"))
+}

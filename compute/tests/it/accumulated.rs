@@ -1,0 +1,254 @@
+//! Accumulated carbon: its frames against hand sums and the printed budget, its manifest and its event.
+
+use std::sync::Mutex;
+
+use compute::derive::DeriveProgress;
+use compute::{Engine, derive_accumulated};
+use contract::earth::Earth;
+use contract::event::Body;
+use contract::grid::Grid;
+use contract::manifest::Manifest;
+use contract::quantity::Quantity;
+use contract::time::{Period, TimeMs};
+use storage::Store;
+use storage::log::{EmbeddedLog, EventLog as _};
+
+use crate::fixture::{
+    ONE_DEGREE, ask, folder_store, land, months, parts, product, total, wavy_year,
+};
+
+async fn derive(engine: &Engine, log: &EmbeddedLog, name: &str, start: Option<TimeMs>) -> Manifest {
+    derive_accumulated(engine, &product(name), start, log, &|_progress| ())
+        .await
+        .unwrap()
+}
+
+async fn frame(store: &Store, manifest: &Manifest, step: usize) -> Vec<f32> {
+    storage::frames::read(store, &manifest.steps[step].frame, &manifest.grid)
+        .await
+        .unwrap()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_last_frame_holds_the_printed_budget() {
+    let (_folder, store) = folder_store();
+    let id = product("wavy");
+    land(
+        &store,
+        &id,
+        Quantity::CarbonFlux,
+        ONE_DEGREE,
+        &wavy_year(&ONE_DEGREE),
+        12,
+    )
+    .await;
+    let engine = Engine::standalone(store.clone(), parts(2));
+    let log = EmbeddedLog::memory();
+    let seen = Mutex::new(vec![]);
+    let progress = |now: DeriveProgress| seen.lock().unwrap().push(now.done_steps);
+    let derived = derive_accumulated(&engine, &id, None, &log, &progress)
+        .await
+        .unwrap();
+    assert_eq!(*seen.lock().unwrap(), (1..=12).collect::<Vec<_>>());
+
+    let last = frame(&store, &derived, 11).await;
+    let mass_kg: f64 = last
+        .iter()
+        .enumerate()
+        .filter(|(_, value)| !value.is_nan())
+        .map(|(i, &value)| {
+            f64::from(value) * ONE_DEGREE.cell_area_m2((i / 360) as u32, Earth::Wgs84)
+        })
+        .sum();
+    let printed_tg = ask(&engine, &total(&id, "global")).await.rows[0].budget_tg;
+    assert!(
+        (mass_kg / 1e9 / printed_tg - 1.0).abs() < 1e-6,
+        "{mass_kg} {printed_tg}"
+    );
+
+    assert_eq!(derived.quantity, Quantity::AccumulatedCarbon);
+    assert_eq!(derived.product.as_str(), "wavy-accumulated");
+    assert_eq!(
+        derived
+            .steps
+            .iter()
+            .map(|step| step.period)
+            .collect::<Vec<_>>(),
+        months(2000)
+    );
+}
+
+/// A cell with data, one with a gap in February, one without any data.
+const TINY: Grid = Grid {
+    rows: 1,
+    cols: 3,
+    north_deg: 1.0,
+    west_deg: 0.0,
+    dlat_deg: 1.0,
+    dlon_deg: 1.0,
+};
+
+fn tiny_year() -> Vec<(Period, Vec<f32>)> {
+    let month = |(i, period): (usize, Period)| {
+        let flux = 1e-9 * (i as f32 - 1.5);
+        (
+            period,
+            vec![flux, if i == 1 { f32::NAN } else { flux }, f32::NAN],
+        )
+    };
+    months(2001)
+        .into_iter()
+        .take(4)
+        .enumerate()
+        .map(month)
+        .collect()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_gap_adds_nothing_and_land_stays_empty() {
+    let (_folder, store) = folder_store();
+    land(
+        &store,
+        &product("tiny"),
+        Quantity::CarbonFlux,
+        TINY,
+        &tiny_year(),
+        4,
+    )
+    .await;
+    let engine = Engine::standalone(store.clone(), parts(2));
+    let derived = derive(&engine, &EmbeddedLog::memory(), "tiny", None).await;
+    let days = [31.0, 28.0, 31.0, 30.0];
+    let (mut whole, mut gapped) = (0.0, 0.0);
+    for (i, days) in days.into_iter().enumerate() {
+        let grown = 1e-9 * (i as f64 - 1.5) * days * 86_400.0;
+        whole += grown;
+        gapped += if i == 1 { 0.0 } else { grown };
+        let values = frame(&store, &derived, i).await;
+        assert!(
+            (f64::from(values[0]) / whole - 1.0).abs() < 1e-6,
+            "{i} {values:?}"
+        );
+        assert!(
+            (f64::from(values[1]) / gapped - 1.0).abs() < 1e-6,
+            "{i} {values:?}"
+        );
+        assert!(values[2].is_nan());
+        assert_eq!(derived.steps[i].valid_cells, 2);
+    }
+    let series = compute::point_series(&Engine::local(store), &derived.product, place(0.5))
+        .await
+        .unwrap();
+    let last = series.series[3].value.unwrap();
+    assert!((last / (1000.0 * whole) - 1.0).abs() < 1e-6, "{last}");
+}
+
+fn place(lon: f64) -> contract::grid::LonLatDeg {
+    contract::grid::LonLatDeg::new(lon, 0.5).unwrap()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_start_inside_a_step_counts_the_rest_of_it() {
+    let (_folder, store) = folder_store();
+    land(
+        &store,
+        &product("tiny"),
+        Quantity::CarbonFlux,
+        TINY,
+        &tiny_year(),
+        4,
+    )
+    .await;
+    let engine = Engine::standalone(store.clone(), parts(2));
+    let start: TimeMs = "2001-02-11".parse().unwrap();
+    let derived = derive(&engine, &EmbeddedLog::memory(), "tiny", Some(start)).await;
+    assert_eq!(derived.steps.len(), 3);
+    assert_eq!(
+        derived.steps[0].period,
+        Period::new(start, "2001-03-01".parse().unwrap()).unwrap()
+    );
+    let values = frame(&store, &derived, 0).await;
+    let expected = -0.5e-9 * 18.0 * 86_400.0;
+    assert!(
+        (f64::from(values[0]) / expected - 1.0).abs() < 1e-6,
+        "{values:?}"
+    );
+    assert_eq!(values[1], 0.0, "a gap since the start is no growth yet");
+    let too_late = "2002-01-01".parse().ok();
+    let refused = derive_accumulated(
+        &engine,
+        &product("tiny"),
+        too_late,
+        &EmbeddedLog::memory(),
+        &|_progress| (),
+    )
+    .await;
+    assert!(refused.unwrap_err().to_string().contains("no step"));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn deriving_again_changes_nothing_until_the_source_does() {
+    let (_folder, store) = folder_store();
+    let source = land(
+        &store,
+        &product("tiny"),
+        Quantity::CarbonFlux,
+        TINY,
+        &tiny_year(),
+        4,
+    )
+    .await;
+    let engine = Engine::standalone(store.clone(), parts(2));
+    let log = EmbeddedLog::memory();
+    let first = derive(&engine, &log, "tiny", None).await;
+    let again = derive(&engine, &log, "tiny", None).await;
+    assert_eq!(first, again);
+    let told = log.read("product.derived", 0, 10).await.unwrap();
+    assert_eq!(told.len(), 1);
+    let body = Body::ProductDerived {
+        manifest: first.id(),
+        derived_from: source.id(),
+    };
+    assert_eq!(told[0].1.body, body);
+
+    let mut revised = tiny_year();
+    revised[0].1[0] = 5e-9;
+    land(
+        &store,
+        &product("tiny"),
+        Quantity::CarbonFlux,
+        TINY,
+        &revised,
+        4,
+    )
+    .await;
+    let third = derive(&engine, &log, "tiny", None).await;
+    assert_eq!(third.number, 2);
+    assert_ne!(third.steps[0].frame, first.steps[0].frame);
+    assert_eq!(log.read("product.derived", 0, 10).await.unwrap().len(), 2);
+
+    let later = derive(&engine, &log, "tiny", "2001-02-01".parse().ok()).await;
+    assert_eq!((later.number, later.steps.len()), (3, 3));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn frames_have_the_same_bytes_at_any_parallelism() {
+    let year = wavy_year(&ONE_DEGREE);
+    let mut keys = vec![];
+    for partitions in [1, 5] {
+        let (_folder, store) = folder_store();
+        land(
+            &store,
+            &product("wavy"),
+            Quantity::CarbonFlux,
+            ONE_DEGREE,
+            &year,
+            12,
+        )
+        .await;
+        let engine = Engine::standalone(store, parts(partitions));
+        let derived = derive(&engine, &EmbeddedLog::memory(), "wavy", None).await;
+        keys.push(derived.id());
+    }
+    assert_eq!(keys[0], keys[1]);
+}

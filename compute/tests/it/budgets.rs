@@ -1,0 +1,278 @@
+//! Budgets with known answers, and questions that have none.
+
+use compute::{BudgetStep, ComputeError, Engine, ErrorClass, budget};
+use contract::earth::Earth;
+use contract::grid::Grid;
+use contract::quantity::Quantity;
+use contract::time::Period;
+
+use crate::fixture::{ONE_DEGREE, ask, folder_store, land, months, parts, product, total};
+
+/// A flux that an f32 holds exactly: 2^-30 kg m⁻² s⁻¹.
+const FLUX: f32 = 1.0 / (1u32 << 30) as f32;
+
+fn even_year() -> Vec<(Period, Vec<f32>)> {
+    months(2000)
+        .into_iter()
+        .map(|period| (period, vec![FLUX; ONE_DEGREE.cell_count()]))
+        .collect()
+}
+
+fn kg(text: &str) -> f64 {
+    text.parse().unwrap()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_even_flux_integrates_to_area_times_time() {
+    let (_folder, store) = folder_store();
+    let id = product("even");
+    let manifest = land(
+        &store,
+        &id,
+        Quantity::CarbonFlux,
+        ONE_DEGREE,
+        &even_year(),
+        12,
+    )
+    .await;
+    let engine = Engine::standalone(store, parts(2));
+
+    let globe = ask(&engine, &total(&id, "global")).await;
+    let area_m2 = Earth::Wgs84.cell_area_m2(-90.0, 90.0, 360.0);
+    let expected_kg = f64::from(FLUX) * area_m2 * 366.0 * 86_400.0;
+    assert_eq!(globe.rows.len(), 1);
+    assert_eq!(globe.manifest, manifest.id());
+    assert!((kg(&globe.rows[0].budget_kg) / expected_kg - 1.0).abs() < 1e-12);
+    assert!((globe.rows[0].coverage_percent - 100.0).abs() < 1e-9);
+    assert!((globe.rows[0].area_m2 / area_m2 - 1.0).abs() < 1e-12);
+
+    // Half a cell, a third of a row, across the date line, and parts of two months.
+    let query = compute::BudgetQuery {
+        from: Some("2000-01-31".parse().unwrap()),
+        to: Some("2000-02-11".parse().unwrap()),
+        step: BudgetStep::Month,
+        ..total(&id, "179.5,0.25,-178.75,0.75")
+    };
+    let answer = ask(&engine, &query).await;
+    let area_m2 = Earth::Wgs84.cell_area_m2(0.25, 0.75, 1.75);
+    let days = [1.0, 10.0];
+    assert_eq!(answer.rows.len(), 2);
+    for (row, days) in answer.rows.iter().zip(days) {
+        let expected_kg = f64::from(FLUX) * area_m2 * days * 86_400.0;
+        assert!(
+            (kg(&row.budget_kg) / expected_kg - 1.0).abs() < 1e-11,
+            "{row:?} {expected_kg}"
+        );
+        assert!((row.region_area_m2 / area_m2 - 1.0).abs() < 1e-12);
+    }
+
+    let sphere = ask(
+        &engine,
+        &compute::BudgetQuery {
+            earth: Earth::Sphere,
+            ..total(&id, "global")
+        },
+    )
+    .await;
+    let ratio = sphere.rows[0].budget_tg / globe.rows[0].budget_tg;
+    let expected = Earth::Sphere.cell_area_m2(-90.0, 90.0, 360.0)
+        / Earth::Wgs84.cell_area_m2(-90.0, 90.0, 360.0);
+    assert!((ratio / expected - 1.0).abs() < 1e-12);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn months_and_years_and_the_total_are_the_same_mass() {
+    let (_folder, store) = folder_store();
+    let id = product("even");
+    land(
+        &store,
+        &id,
+        Quantity::CarbonFlux,
+        ONE_DEGREE,
+        &even_year(),
+        12,
+    )
+    .await;
+    let engine = Engine::standalone(store, parts(2));
+    let mut sums = vec![];
+    for (step, rows) in [
+        (BudgetStep::Month, 12),
+        (BudgetStep::Year, 1),
+        (BudgetStep::Total, 1),
+    ] {
+        let answer = ask(
+            &engine,
+            &compute::BudgetQuery {
+                step,
+                ..total(&id, "14n-50n")
+            },
+        )
+        .await;
+        assert_eq!(answer.rows.len(), rows);
+        assert!(
+            answer
+                .rows
+                .windows(2)
+                .all(|pair| pair[0].end == pair[1].start),
+            "rows are in the order of time"
+        );
+        sums.push(exact_sum(
+            answer.rows.iter().map(|row| row.budget_kg.as_str()),
+        ));
+    }
+    assert!(sums.iter().all(|&sum| sum == sums[0]), "{sums:?}");
+}
+
+/// Sum of decimal texts of nine decimals, without rounding.
+fn exact_sum<'a>(texts: impl Iterator<Item = &'a str>) -> i128 {
+    texts
+        .map(|text| text.replace('.', "").parse::<i128>().unwrap())
+        .sum()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_store_in_memory_serves_ballista_too() {
+    let store = storage::Store::memory();
+    let id = product("even");
+    land(
+        &store,
+        &id,
+        Quantity::CarbonFlux,
+        ONE_DEGREE,
+        &even_year()[..2],
+        2,
+    )
+    .await;
+    let answer = ask(&Engine::standalone(store, parts(2)), &total(&id, "global")).await;
+    assert!((answer.rows[0].coverage_percent - 100.0).abs() < 1e-9);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_store_in_a_folder_with_an_odd_name_is_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let odd = folder.path().join("a b%20c#d[1]é");
+    let store = storage::Store::open(odd.to_str().unwrap()).unwrap();
+    let id = product("even");
+    land(
+        &store,
+        &id,
+        Quantity::CarbonFlux,
+        ONE_DEGREE,
+        &even_year()[..1],
+        1,
+    )
+    .await;
+    let answer = ask(&Engine::standalone(store, parts(2)), &total(&id, "global")).await;
+    assert_eq!(answer.rows.len(), 1);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_region_larger_than_the_grid_is_covered_in_part() {
+    let grid = Grid {
+        rows: 10,
+        cols: 20,
+        north_deg: 10.0,
+        west_deg: 100.0,
+        dlat_deg: 1.0,
+        dlon_deg: 1.0,
+    };
+    let (_folder, store) = folder_store();
+    let id = product("small");
+    let mut values = vec![FLUX; grid.cell_count()];
+    values[..100].fill(f32::NAN); // the northern half
+    land(
+        &store,
+        &id,
+        Quantity::CarbonFlux,
+        grid,
+        &[(Period::month(2000, 1).unwrap(), values)],
+        1,
+    )
+    .await;
+    let engine = Engine::local(store);
+    let row = &ask(&engine, &total(&id, "90,0,130,10")).await.rows[0];
+    let held_m2 = Earth::Wgs84.cell_area_m2(0.0, 5.0, 20.0);
+    let asked_m2 = Earth::Wgs84.cell_area_m2(0.0, 10.0, 40.0);
+    assert!((row.area_m2 / held_m2 - 1.0).abs() < 1e-12);
+    assert!((row.region_area_m2 / asked_m2 - 1.0).abs() < 1e-12);
+    assert!((row.coverage_percent / (100.0 * held_m2 / asked_m2) - 1.0).abs() < 1e-12);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn questions_without_an_answer_are_refused_with_the_reason() {
+    let grid = Grid {
+        rows: 10,
+        cols: 20,
+        north_deg: 10.0,
+        west_deg: 100.0,
+        dlat_deg: 1.0,
+        dlon_deg: 1.0,
+    };
+    let (_folder, store) = folder_store();
+    let step = || {
+        vec![(
+            Period::month(2000, 1).unwrap(),
+            vec![FLUX; grid.cell_count()],
+        )]
+    };
+    land(
+        &store,
+        &product("flux"),
+        Quantity::CarbonFlux,
+        grid,
+        &step(),
+        1,
+    )
+    .await;
+    land(
+        &store,
+        &product("sst"),
+        Quantity::SeaSurfaceTemperature,
+        grid,
+        &step(),
+        1,
+    )
+    .await;
+    let engine = Engine::local(store);
+    let refusal = async |query: compute::BudgetQuery| -> ComputeError {
+        budget(&engine, &query).await.unwrap_err()
+    };
+
+    let unknown = refusal(total(&product("nothing"), "global")).await;
+    assert_eq!(unknown.class(), ErrorClass::NotFound);
+    assert!(unknown.to_string().contains("flux, sst"), "{unknown}");
+    let no_flux = refusal(total(&product("sst"), "global")).await;
+    assert!(
+        no_flux.to_string().contains("need a carbon flux"),
+        "{no_flux}"
+    );
+    let elsewhere = refusal(total(&product("flux"), "-60,0,-50,5")).await;
+    assert!(
+        elsewhere.to_string().contains("does not touch"),
+        "{elsewhere}"
+    );
+    let early = compute::BudgetQuery {
+        to: Some("1999".parse().unwrap()),
+        ..total(&product("flux"), "global")
+    };
+    let late = compute::BudgetQuery {
+        from: Some("2001".parse().unwrap()),
+        ..total(&product("flux"), "global")
+    };
+    for query in [early, late] {
+        let no_step = refusal(query).await;
+        assert!(
+            no_step
+                .to_string()
+                .contains("2000-01-01T00:00:00Z/2000-02-01T00:00:00Z"),
+            "{no_step}"
+        );
+        assert_eq!(no_step.class(), ErrorClass::BadRequest);
+    }
+    let backwards = compute::BudgetQuery {
+        from: Some("2001".parse().unwrap()),
+        to: Some("2000".parse().unwrap()),
+        ..total(&product("flux"), "global")
+    };
+    assert_eq!(refusal(backwards).await.class(), ErrorClass::BadRequest);
+}

@@ -1,0 +1,201 @@
+//! Products for the tests: synthetic fluxes whose budgets are known, and the real Takahashi (2009) grids.
+
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+
+use compute::{BudgetAnswer, BudgetQuery, BudgetStep, Engine, budget};
+use contract::digest::Digest;
+use contract::earth::Earth;
+use contract::grid::Grid;
+use contract::manifest::{MANIFEST_SCHEMA, Manifest, SeriesSegment, Step};
+use contract::product::ProductId;
+use contract::quantity::Quantity;
+use contract::time::Period;
+use storage::{Store, domain, frames, manifests, series};
+
+pub(crate) const ONE_DEGREE: Grid = Grid {
+    rows: 180,
+    cols: 360,
+    north_deg: 90.0,
+    west_deg: -180.0,
+    dlat_deg: 1.0,
+    dlon_deg: 1.0,
+};
+
+pub(crate) fn product(name: &str) -> ProductId {
+    name.parse().unwrap()
+}
+
+pub(crate) fn parts(partitions: usize) -> NonZeroUsize {
+    NonZeroUsize::new(partitions).unwrap()
+}
+
+/// A folder as store; the folder is gone with the returned guard.
+pub(crate) fn folder_store() -> (tempfile::TempDir, Store) {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path().to_str().unwrap()).unwrap();
+    (folder, store)
+}
+
+/// Months of a year.
+pub(crate) fn months(year: i32) -> Vec<Period> {
+    (1..=12)
+        .map(|month| Period::month(year, month).unwrap())
+        .collect()
+}
+
+/// Stores a product of some steps, its series in runs of `run` steps.
+pub(crate) async fn land(
+    store: &Store,
+    id: &ProductId,
+    quantity: Quantity,
+    grid: Grid,
+    steps: &[(Period, Vec<f32>)],
+    run: usize,
+) -> Manifest {
+    let mut cells = vec![false; grid.cell_count()];
+    let mut listed = vec![];
+    for (index, (period, values)) in steps.iter().enumerate() {
+        cells
+            .iter_mut()
+            .zip(values)
+            .for_each(|(cell, value)| *cell |= !value.is_nan());
+        listed.push(Step {
+            period: *period,
+            frame: frames::write(store, id, &grid, values, *period)
+                .await
+                .unwrap(),
+            raw_sha256: Digest::of(&index.to_le_bytes()),
+            origin: format!("step-{index}.nc"),
+            valid_cells: values.iter().filter(|value| !value.is_nan()).count() as u64,
+        });
+    }
+    let mut segments = vec![];
+    for (index, run_steps) in steps.chunks(run).enumerate() {
+        let views: Vec<&[f32]> = run_steps
+            .iter()
+            .map(|(_, values)| values.as_slice())
+            .collect();
+        segments.push(SeriesSegment {
+            first_step: (index * run) as u32,
+            steps: run_steps.len() as u32,
+            series: series::write(store, id, &grid, &views).await.unwrap(),
+        });
+    }
+    let latest = manifests::latest(store, id).await.unwrap();
+    let manifest = Manifest {
+        schema: MANIFEST_SCHEMA,
+        product: id.clone(),
+        number: latest.map_or(1, |latest| latest.number + 1),
+        title: format!("Test {id}"),
+        quantity,
+        synthetic: true,
+        source: "made by a test".to_owned(),
+        grid,
+        steps: listed,
+        domain: domain::write(store, id, &cells).await.unwrap(),
+        series: segments,
+        derived_from: None,
+    };
+    manifests::commit(store, &manifest).await.unwrap();
+    manifest
+}
+
+/// A year of fluxes with land, gaps and seasons, kg m⁻² s⁻¹; sums of floats over it depend on their order.
+pub(crate) fn wavy_year(grid: &Grid) -> Vec<(Period, Vec<f32>)> {
+    let value = |month: usize, index: usize| {
+        let place = grid.cell_center(
+            (index / grid.cols as usize) as u32,
+            (index % grid.cols as usize) as u32,
+        );
+        let land = (place.lon / 40.0).sin() * (place.lat / 25.0).cos() > 0.55;
+        let gap = (index * 7919 + month * 104_729).is_multiple_of(17);
+        let season =
+            (month as f64 / 12.0 * std::f64::consts::TAU).cos() * place.lat.to_radians().sin();
+        let flux = 1.3e-9 * (season + 0.4 * (place.lon / 17.0).sin() - 0.21);
+        if land || gap { f32::NAN } else { flux as f32 }
+    };
+    let month = |(month, period)| {
+        (
+            period,
+            (0..grid.cell_count())
+                .map(|index| value(month, index))
+                .collect(),
+        )
+    };
+    months(2000).into_iter().enumerate().map(month).collect()
+}
+
+/// The query for a region's whole period.
+pub(crate) fn total(id: &ProductId, region: &str) -> BudgetQuery {
+    BudgetQuery {
+        product: id.clone(),
+        region: region.parse().unwrap(),
+        region_name: region.to_owned(),
+        from: None,
+        to: None,
+        step: BudgetStep::Total,
+        earth: Earth::Wgs84,
+    }
+}
+
+pub(crate) async fn ask(engine: &Engine, query: &BudgetQuery) -> BudgetAnswer {
+    budget(engine, query).await.unwrap()
+}
+
+/// The twelve real grids, kg m⁻² s⁻¹; none where `FLUXGLOBE_FLUXENGINE` names no folder that holds them.
+///
+/// Read as the demonstration's profile reads them: labels are north-west corners, the reference year is 2000, the unit
+/// is g C m⁻² a month.
+pub(crate) fn takahashi_year() -> Option<Vec<(Period, Vec<f32>)>> {
+    let folder = takahashi_folder()?;
+    let mut files: Vec<PathBuf> = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .collect();
+    files.retain(|path| path.extension().is_some_and(|extension| extension == "nc"));
+    files.sort();
+    assert_eq!(files.len(), 12, "the folder holds one file a month");
+    Some(
+        files
+            .iter()
+            .zip(months(2000))
+            .map(|(file, period)| (period, read_flux(file, period)))
+            .collect(),
+    )
+}
+
+fn takahashi_folder() -> Option<PathBuf> {
+    let folder =
+        std::env::var_os("FLUXGLOBE_FLUXENGINE").map(|root| Path::new(&root).join("takahashi09"));
+    let folder = folder.filter(|folder| folder.is_dir());
+    if folder.is_none() {
+        eprintln!(
+            "SKIPPED: no real files; set FLUXGLOBE_FLUXENGINE to the folder that holds takahashi09"
+        );
+    }
+    folder
+}
+
+fn read_flux(file: &Path, period: Period) -> Vec<f32> {
+    const FILL: f32 = -999.0;
+    let mut reader = netcdf3::FileReader::open(file).unwrap();
+    let latitudes = reader.read_var_f32("latitude").unwrap();
+    assert_eq!(
+        (latitudes[0], latitudes[179]),
+        (90.0, -89.0),
+        "labels are north-west corners, row 0 north"
+    );
+    let grams_a_month = reader.read_var_f32("CO2flux").unwrap();
+    let kg_a_second = |value: f32| (f64::from(value) * 1e-3 / period.seconds()) as f32;
+    grams_a_month
+        .into_iter()
+        .map(|value| {
+            if value == FILL {
+                f32::NAN
+            } else {
+                kg_a_second(value)
+            }
+        })
+        .collect()
+}

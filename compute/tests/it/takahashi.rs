@@ -1,0 +1,89 @@
+//! The real Takahashi (2009) grids against the published budgets.
+
+use compute::{BudgetStep, Engine, compare, derive_accumulated};
+use contract::earth::Earth;
+use contract::quantity::Quantity;
+use storage::log::EmbeddedLog;
+
+use crate::fixture::{ONE_DEGREE, ask, folder_store, land, parts, product, takahashi_year, total};
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_real_grids_have_the_published_budgets() {
+    let Some(year) = takahashi_year() else { return };
+    let (_folder, store) = folder_store();
+    let id = product("takahashi09-flux");
+    land(&store, &id, Quantity::CarbonFlux, ONE_DEGREE, &year, 12).await;
+    let engine = Engine::standalone(store.clone(), parts(3));
+
+    let rows = compare(&engine, &id).await.unwrap();
+    for row in &rows {
+        eprintln!(
+            "{:40} {:15} {:?} {} {:.4} {:+.5} {}",
+            row.what, row.period, row.published, row.expected, row.ours, row.difference, row.unit
+        );
+    }
+    assert_eq!(rows.len(), 18);
+    let outside: Vec<_> = rows.iter().filter(|row| !row.within).collect();
+    assert!(outside.is_empty(), "{outside:#?}");
+
+    let globe = &ask(&engine, &total(&id, "global")).await.rows[0];
+    assert!(
+        (globe.area_m2 / 334.1e12 - 1.0).abs() < 1e-3,
+        "{}",
+        globe.area_m2
+    );
+
+    let derived = derive_accumulated(&engine, &id, None, &EmbeddedLog::memory(), &|_progress| ())
+        .await
+        .unwrap();
+    let last = storage::frames::read(&store, &derived.steps[11].frame, &ONE_DEGREE)
+        .await
+        .unwrap();
+    let mass_kg: f64 = last
+        .iter()
+        .enumerate()
+        .filter(|(_, value)| !value.is_nan())
+        .map(|(i, &value)| {
+            f64::from(value) * ONE_DEGREE.cell_area_m2((i / 360) as u32, Earth::Wgs84)
+        })
+        .sum();
+    assert!(
+        (mass_kg / 1e9 / globe.budget_tg - 1.0).abs() < 1e-6,
+        "{mass_kg} {}",
+        globe.budget_tg
+    );
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn read_as_centres_the_real_grids_would_fail_the_check() {
+    let Some(year) = takahashi_year() else { return };
+    let (_folder, store) = folder_store();
+    let id = product("takahashi09-flux");
+    // The planted fault: labels taken for centres shift every row by half a cell.
+    let shifted = contract::grid::Grid {
+        north_deg: 89.5,
+        rows: 179,
+        ..ONE_DEGREE
+    };
+    let cut: Vec<_> = year
+        .into_iter()
+        .map(|(period, values)| (period, values[..179 * 360].to_vec()))
+        .collect();
+    land(&store, &id, Quantity::CarbonFlux, shifted, &cut, 12).await;
+    let engine = Engine::standalone(store, parts(2));
+    let rows = compare(&engine, &id).await.unwrap();
+    assert!(rows.iter().any(|row| !row.within));
+    let band = ask(
+        &engine,
+        &compute::BudgetQuery {
+            step: BudgetStep::Year,
+            ..total(&id, "50s-62s")
+        },
+    )
+    .await;
+    assert!(
+        (band.rows[0].budget_tg + 66.0).abs() > 10.0,
+        "{}",
+        band.rows[0].budget_tg
+    );
+}
