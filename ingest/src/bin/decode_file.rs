@@ -1,0 +1,7 @@
+//! The sandboxed file reader as its own program: a path and limits in, description and values out.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    ingest::decoder::run_child(std::env::args_os().skip(1))
+}

@@ -1,0 +1,8 @@
+//! What the CF conventions say about a file: coordinates, time, packing and quantity.
+
+pub(crate) mod axis;
+pub(crate) mod calendar;
+pub(crate) mod coordinate;
+pub(crate) mod packing;
+pub(crate) mod period;
+pub(crate) mod quantity;

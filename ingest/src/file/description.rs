@@ -1,0 +1,179 @@
+//! What is in a data file, without its values: dimensions, variables and attributes; crosses the process border as JSON.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+/// Most variables that are looked at.
+pub const MAX_VARIABLES: usize = 4096;
+/// Most attributes of the file, or of one variable, that are looked at.
+pub const MAX_ATTRIBUTES: usize = 1024;
+/// Most numbers of one attribute that are kept.
+pub const MAX_ATTRIBUTE_NUMBERS: usize = 1024;
+/// Most bytes of one text attribute that are kept.
+pub const MAX_ATTRIBUTE_TEXT_BYTES: usize = 4096;
+/// Longest name of a variable, dimension or attribute, bytes.
+pub const MAX_NAME_BYTES: usize = 256;
+/// Most dimensions of a variable (the limit of HDF5).
+pub const MAX_RANK: usize = 32;
+
+/// What is in a data file.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Description {
+    /// Format for people, such as `NetCDF classic`.
+    pub format: String,
+    /// Attributes of the whole file.
+    pub attributes: Attributes,
+    /// Variables in the order of the file.
+    pub variables: Vec<Variable>,
+}
+
+/// One variable.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Variable {
+    /// Name.
+    pub name: String,
+    /// Dimensions, slowest first.
+    pub dimensions: Vec<Dimension>,
+    /// How values are stored.
+    pub kind: Kind,
+    /// Attributes.
+    pub attributes: Attributes,
+}
+
+/// One dimension of a variable.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Dimension {
+    /// Name; none in plain HDF5 files that name no dimensions.
+    pub name: Option<String>,
+    /// Length.
+    pub len: u64,
+}
+
+/// How the values of a variable are stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    /// Signed integers of this many bytes.
+    Integer(u8),
+    /// Unsigned integers of this many bytes.
+    Unsigned(u8),
+    /// Floating point of this many bytes.
+    Float(u8),
+    /// Text, compound or anything else that is no number.
+    Other,
+}
+
+/// Attributes by name.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Attributes(pub BTreeMap<String, AttributeValue>);
+
+/// The value of an attribute.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum AttributeValue {
+    /// Text.
+    Text(String),
+    /// One or more numbers; each as its bit pattern, since JSON holds neither NaN nor infinity.
+    Numbers(Vec<NumberBits>),
+}
+
+/// A float64 that survives JSON whatever it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct NumberBits(u64);
+
+impl From<f64> for NumberBits {
+    fn from(number: f64) -> Self {
+        Self(number.to_bits())
+    }
+}
+
+/// The part of one dimension to read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Part {
+    /// All of it.
+    All,
+    /// One index.
+    At(u64),
+}
+
+impl Attributes {
+    /// A text attribute, without white space and null characters around it.
+    pub fn text(&self, name: &str) -> Option<&str> {
+        match self.0.get(name)? {
+            AttributeValue::Text(text) => Some(text.trim_matches(|c: char| c.is_whitespace() || c == '\0')),
+            AttributeValue::Numbers(_) => None,
+        }
+    }
+
+    /// The numbers of an attribute.
+    pub fn numbers(&self, name: &str) -> Option<Vec<f64>> {
+        match self.0.get(name)? {
+            AttributeValue::Numbers(bits) => Some(bits.iter().map(|b| f64::from_bits(b.0)).collect()),
+            AttributeValue::Text(_) => None,
+        }
+    }
+
+    /// The first number of an attribute.
+    pub fn number(&self, name: &str) -> Option<f64> {
+        self.numbers(name)?.first().copied()
+    }
+}
+
+impl FromIterator<(String, AttributeValue)> for Attributes {
+    fn from_iter<I: IntoIterator<Item = (String, AttributeValue)>>(items: I) -> Self {
+        Self(items.into_iter().collect())
+    }
+}
+
+impl Description {
+    /// The variable of a name.
+    pub fn variable(&self, name: &str) -> Option<&Variable> {
+        self.variables.iter().find(|variable| variable.name == name)
+    }
+}
+
+impl Variable {
+    /// Number of values declared, however absurd.
+    pub fn cell_count(&self) -> u128 {
+        self.dimensions.iter().fold(1, |cells: u128, d| cells.saturating_mul(u128::from(d.len)))
+    }
+
+    /// Does it hold numbers?
+    pub fn is_numeric(&self) -> bool {
+        self.kind != Kind::Other
+    }
+
+    /// Is it a coordinate variable: one dimension of its own name (or, unnamed, one dimension at all)?
+    pub fn is_coordinate(&self) -> bool {
+        match self.dimensions.as_slice() {
+            [only] => only.name.as_deref().is_none_or(|name| name == self.name),
+            _ => false,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_that_json_cannot_hold_cross_the_border() {
+        let value = AttributeValue::Numbers(vec![f64::INFINITY.into(), (-0.0).into()]);
+        let json = serde_json::to_string(&value).unwrap();
+        assert_eq!(serde_json::from_str::<AttributeValue>(&json).unwrap(), value);
+    }
+
+    #[test]
+    fn a_product_of_absurd_dimensions_does_not_overflow() {
+        let absurd = Dimension { name: None, len: u64::MAX };
+        let variable = Variable {
+            name: "v".into(),
+            dimensions: vec![absurd; 32],
+            kind: Kind::Float(4),
+            attributes: Attributes::default(),
+        };
+        assert_eq!(variable.cell_count(), u128::MAX);
+    }
+}

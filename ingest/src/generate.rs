@@ -1,0 +1,141 @@
+//! The generator of the synthetic China Sea product: a scale and a seed in, an HDF5 file out, the same bytes each time.
+//!
+//! It has the shape of the product in the paper this project continues (1800 x 2460 cells of 1/60 degree, 12 months of
+//! 2009), with a coast, clouds and seasons that look right on a globe. It is made up: every file says `synthetic = 1`.
+
+mod coast;
+mod flux;
+mod noise;
+mod writer;
+
+use std::path::Path;
+
+use crate::error::IngestError;
+use noise::Noise;
+
+/// Cells at scale 1.
+const ROWS: u32 = 2460;
+const COLS: u32 = 1800;
+/// Edges, degrees.
+const NORTH_DEG: f64 = 41.0;
+const WEST_DEG: f64 = 100.0;
+const HEIGHT_DEG: f64 = 41.0;
+const WIDTH_DEG: f64 = 30.0;
+/// The year of the twelve months.
+const YEAR: i32 = 2009;
+/// What stands for no data in the file.
+const FILL: f32 = -9999.0;
+/// Share of the sea under cloud, averaged over the year.
+const CLOUD_SHARE: f64 = 0.2;
+
+/// The grid of a file.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Shape {
+    rows: u32,
+    cols: u32,
+}
+
+impl Shape {
+    fn scaled(scale: f64) -> Option<Self> {
+        let part = |n: u32| (f64::from(n) * scale).round() as u32;
+        let shape = Self { rows: part(ROWS), cols: part(COLS) };
+        (scale.is_finite() && scale <= 1.0 && shape.rows >= 8 && shape.cols >= 8).then_some(shape)
+    }
+
+    /// Latitude of the centre of a row, row 0 south as many files have it, degrees.
+    fn lat_deg(self, row: u32) -> f64 {
+        NORTH_DEG - HEIGHT_DEG + HEIGHT_DEG * (f64::from(row) + 0.5) / f64::from(self.rows)
+    }
+
+    /// Longitude of the centre of a column, degrees.
+    fn lon_deg(self, col: u32) -> f64 {
+        WEST_DEG + WIDTH_DEG * (f64::from(col) + 0.5) / f64::from(self.cols)
+    }
+
+    /// Centres of all cells in the order of the file: longitude, latitude.
+    fn centers(self) -> impl Iterator<Item = (f64, f64)> {
+        (0..self.rows).flat_map(move |row| (0..self.cols).map(move |col| (self.lon_deg(col), self.lat_deg(row))))
+    }
+}
+
+/// Writes the synthetic China Sea product. `scale` is 1 for 1800 x 2460 cells, 0.1 for 180 x 246; `progress` is told
+/// months done and months in all.
+pub fn generate_china_sea(path: &Path, scale: f64, seed: u64, progress: &dyn Fn(usize, usize)) -> Result<(), IngestError> {
+    let failed = |detail: String| IngestError::Generate { file: path.to_owned(), detail };
+    let shape = Shape::scaled(scale).ok_or_else(|| failed(format!("scale {scale} is not above 0.005 and at most 1")))?;
+    let noise = Noise::new(seed);
+    let is_sea: Vec<bool> = shape.centers().map(|(lon, lat)| !coast::is_land(lon, lat, &noise)).collect();
+    // A reader never sees half a file.
+    let part = path.with_extension("part");
+    let written = writer::write(&part, shape, seed, |month| {
+        progress(month, 12);
+        month_values(shape, &is_sea, month, &noise)
+    });
+    written.map_err(|e| failed(e.to_string()))?;
+    std::fs::rename(&part, path).map_err(|e| failed(e.to_string()))?;
+    progress(12, 12);
+    Ok(())
+}
+
+/// Flux of one month (0 to 11), mmol m⁻² d⁻¹, positive out of the sea, `[row, col]` from the south; land and cloud filled.
+fn month_values(shape: Shape, is_sea: &[bool], month: usize, noise: &Noise) -> Vec<f32> {
+    let cloud: Vec<f32> = shape.centers().map(|(lon, lat)| flux::cloudiness(lon, lat, month, noise)).collect();
+    let threshold = cloud_threshold(&cloud, is_sea, month);
+    let value = |(index, (lon, lat)): (usize, (f64, f64))| {
+        if is_sea[index] && cloud[index] < threshold { flux::flux_mmol_m2_d(lon, lat, month, noise) as f32 } else { FILL }
+    };
+    shape.centers().enumerate().map(value).collect()
+}
+
+/// The cloudiness that the wanted share of the sea is above; cloudier in winter and at the onset of the monsoon.
+fn cloud_threshold(cloud: &[f32], is_sea: &[bool], month: usize) -> f32 {
+    let season = (2.0 * std::f64::consts::PI * (month as f64 - 0.5) / 6.0).cos();
+    let share = CLOUD_SHARE * (1.0 + 0.3 * season);
+    let mut sea: Vec<f32> = cloud.iter().zip(is_sea).filter(|(_, sea)| **sea).map(|(c, _)| *c).collect();
+    if sea.is_empty() {
+        return f32::INFINITY;
+    }
+    let index = (((1.0 - share) * sea.len() as f64) as usize).min(sea.len() - 1);
+    *sea.select_nth_unstable_by(index, f32::total_cmp).1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn bytes(scale: f64, seed: u64) -> Vec<u8> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("china-sea.nc");
+        generate_china_sea(&path, scale, seed, &|_, _| {}).unwrap();
+        std::fs::read(path).unwrap()
+    }
+
+    #[test]
+    fn the_same_seed_gives_the_same_bytes_and_another_one_others() {
+        let first = bytes(0.02, 1);
+        std::thread::sleep(std::time::Duration::from_millis(1100)); // past a second, in case a time stamp were written
+        assert!(first == bytes(0.02, 1));
+        assert!(first != bytes(0.02, 2));
+    }
+
+    #[test]
+    fn clouds_cover_about_a_fifth_of_the_sea() {
+        let (shape, noise) = (Shape::scaled(0.05).unwrap(), Noise::new(1));
+        let is_sea: Vec<bool> = shape.centers().map(|(lon, lat)| !coast::is_land(lon, lat, &noise)).collect();
+        let sea = is_sea.iter().filter(|s| **s).count();
+        let covered: f64 = (0..12)
+            .map(|month| {
+                let values = month_values(shape, &is_sea, month, &noise);
+                1.0 - values.iter().filter(|v| **v != FILL).count() as f64 / sea as f64
+            })
+            .sum();
+        assert!((covered / 12.0 - CLOUD_SHARE).abs() < 0.02, "{}", covered / 12.0);
+    }
+
+    #[test]
+    fn absurd_scales_are_refused() {
+        for scale in [0.0, -1.0, 1.5, f64::NAN, 1e-9] {
+            assert!(Shape::scaled(scale).is_none(), "{scale}");
+        }
+    }
+}

@@ -1,0 +1,109 @@
+//! The synthetic product as an HDF5 file that the netCDF library opens: dimension scales, CF attributes, no time stamps.
+
+use std::path::Path;
+
+use hdf5::types::{FixedAscii, VarLenArray, VarLenUnicode};
+use hdf5::{Dataset, File, Location, ObjectReference as _, ObjectReference1, SliceOrIndex};
+use ndarray::ArrayView2;
+
+use super::{FILL, Shape, YEAR};
+
+/// Cells of a chunk: a map at scale 1 is 12 x 6 of them.
+const CHUNK_ROWS: usize = 205;
+const CHUNK_COLS: usize = 300;
+/// Level of deflate: higher ones gain little on noise.
+const DEFLATE_LEVEL: u8 = 4;
+
+type Name = FixedAscii<32>;
+
+/// Writes the file; `month` gives the values of a month, `[row, col]` from the south.
+pub(super) fn write(path: &Path, shape: Shape, seed: u64, month: impl Fn(usize) -> Vec<f32>) -> hdf5::Result<()> {
+    let file = File::create(path)?;
+    text(&file, "Conventions", "CF-1.8")?;
+    text(&file, "title", "SYNTHETIC China Sea air-sea CO2 flux 2009: made up by a program, no measurement")?;
+    text(&file, "source", "fluxglobe generate china-sea")?;
+    text(&file, "generator", &format!("fluxglobe china-sea, seed {seed}"))?;
+    file.new_attr::<i32>().create("synthetic")?.write_scalar(&1)?;
+
+    let days: Vec<f64> = (0..=12).map(first_day).collect();
+    let middles: Vec<f64> = days.windows(2).map(|d| 0.5 * (d[0] + d[1])).collect();
+    let time = scale(&file, "time", &middles)?;
+    text(&time, "standard_name", "time")?;
+    text(&time, "units", "days since 2009-01-01")?;
+    text(&time, "calendar", "standard")?;
+    text(&time, "axis", "T")?;
+    text(&time, "bounds", "time_bnds")?;
+    let lat = scale(&file, "lat", &(0..shape.rows).map(|r| shape.lat_deg(r)).collect::<Vec<_>>())?;
+    text(&lat, "standard_name", "latitude")?;
+    text(&lat, "units", "degrees_north")?;
+    let lon = scale(&file, "lon", &(0..shape.cols).map(|c| shape.lon_deg(c)).collect::<Vec<_>>())?;
+    text(&lon, "standard_name", "longitude")?;
+    text(&lon, "units", "degrees_east")?;
+    let side = scale(&file, "bnds", &[0.0, 1.0])?;
+
+    let pairs: Vec<f64> = days.windows(2).flatten().copied().collect();
+    let bounds = file.new_dataset::<f64>().obj_track_times(false).shape([12, 2]).create("time_bnds")?;
+    bounds.write_raw(&pairs)?;
+    attach(&file, &bounds, &[&time, &side])?;
+
+    let (rows, cols) = (shape.rows as usize, shape.cols as usize);
+    let flux = file
+        .new_dataset::<f32>()
+        .obj_track_times(false)
+        .chunk([1, rows.min(CHUNK_ROWS), cols.min(CHUNK_COLS)])
+        .shuffle()
+        .deflate(DEFLATE_LEVEL)
+        .fill_value(FILL)
+        .shape([12, rows, cols])
+        .create("co2_flux")?;
+    text(&flux, "standard_name", "surface_upward_mole_flux_of_carbon_dioxide")?;
+    text(&flux, "long_name", "SYNTHETIC air-sea CO2 flux, positive out of the sea")?;
+    text(&flux, "units", "mmol m-2 d-1")?;
+    text(&flux, "cell_methods", "time: mean")?;
+    flux.new_attr::<f32>().create("_FillValue")?.write_scalar(&FILL)?;
+    attach(&file, &flux, &[&time, &lat, &lon])?;
+    for index in 0..12 {
+        let values = month(index);
+        let map = ArrayView2::from_shape((rows, cols), &values)?;
+        let all = |count| SliceOrIndex::SliceCount { start: 0, step: 1, count, block: 1 };
+        let selection = hdf5::Hyperslab::from(vec![SliceOrIndex::Index(index), all(rows), all(cols)]);
+        flux.write_slice(map, selection)?;
+    }
+    file.close()
+}
+
+/// Days from the start of the year to the start of a month, 12 for the start of the next year.
+fn first_day(month: usize) -> f64 {
+    let start = |year, month| contract::time::TimeMs::from_ymd(year, month, 1).map(|t| t.ms() as f64 / 86_400_000.0);
+    let day = if month < 12 { start(YEAR, month as u32 + 1) } else { start(YEAR + 1, 1) };
+    let first = start(YEAR, 1);
+    day.and_then(|day| Ok(day - first?)).expect("months of 2009 exist")
+}
+
+fn text(owner: &Location, name: &str, value: &str) -> hdf5::Result<()> {
+    let value: VarLenUnicode = value.parse().map_err(|e| hdf5::Error::from(format!("{name}: {e}")))?;
+    owner.new_attr::<VarLenUnicode>().create(name)?.write_scalar(&value)
+}
+
+/// A coordinate variable, which is also the dimension's scale.
+fn scale(file: &File, name: &str, values: &[f64]) -> hdf5::Result<Dataset> {
+    let dataset = file.new_dataset::<f64>().obj_track_times(false).shape([values.len()]).create(name)?;
+    dataset.write_raw(values)?;
+    fixed(&dataset, "CLASS", "DIMENSION_SCALE")?;
+    fixed(&dataset, "NAME", name)?;
+    Ok(dataset)
+}
+
+fn fixed(owner: &Location, name: &str, value: &str) -> hdf5::Result<()> {
+    let value = Name::from_ascii(value).map_err(|e| hdf5::Error::from(format!("{name}: {e}")))?;
+    owner.new_attr::<Name>().create(name)?.write_scalar(&value)
+}
+
+/// Names the dimensions of a dataset by their scales.
+fn attach(file: &File, dataset: &Dataset, scales: &[&Dataset]) -> hdf5::Result<()> {
+    let lists: Vec<VarLenArray<ObjectReference1>> = scales
+        .iter()
+        .map(|scale| Ok(VarLenArray::from_slice(&[ObjectReference1::create(file, &scale.name())?])))
+        .collect::<hdf5::Result<_>>()?;
+    dataset.new_attr::<VarLenArray<ObjectReference1>>().shape([scales.len()]).create("DIMENSION_LIST")?.write_raw(&lists)
+}

@@ -1,0 +1,115 @@
+//! What became of a file, for people and programs.
+
+use std::fmt::{Display, Formatter};
+use std::path::PathBuf;
+
+use contract::event::{Body, RejectReason};
+use contract::manifest::ManifestId;
+use contract::time::Period;
+
+use crate::rejection::Rejection;
+
+/// What became of a file. Shown as one line.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Outcome {
+    /// It is in a product now.
+    Landed {
+        /// The file.
+        file: PathBuf,
+        /// Manifest that holds it.
+        manifest: ManifestId,
+        /// Periods it brought.
+        periods: Vec<Period>,
+        /// Did it replace values that were there?
+        revised: bool,
+    },
+    /// The same content was in the product before.
+    AlreadyLanded {
+        /// The file.
+        file: PathBuf,
+        /// Newest manifest that holds it.
+        manifest: ManifestId,
+        /// Its periods.
+        periods: Vec<Period>,
+    },
+    /// It was refused.
+    Rejected {
+        /// The file.
+        file: PathBuf,
+        /// Class of the reason.
+        reason: RejectReason,
+        /// What in the file is meant.
+        object: String,
+        /// What is wrong and what to do.
+        detail: String,
+    },
+}
+
+impl Outcome {
+    pub(crate) fn rejected(file: PathBuf, rejection: Rejection) -> Self {
+        let Rejection { reason, object, detail } = rejection;
+        Self::Rejected { file, reason, object, detail }
+    }
+
+    /// Was the file refused?
+    pub fn is_rejected(&self) -> bool {
+        matches!(self, Self::Rejected { .. })
+    }
+
+    /// Manifest that holds the file.
+    pub fn manifest(&self) -> Option<&ManifestId> {
+        match self {
+            Self::Landed { manifest, .. } | Self::AlreadyLanded { manifest, .. } => Some(manifest),
+            Self::Rejected { .. } => None,
+        }
+    }
+
+    /// The file.
+    pub fn file(&self) -> &std::path::Path {
+        match self {
+            Self::Landed { file, .. } | Self::AlreadyLanded { file, .. } | Self::Rejected { file, .. } => file,
+        }
+    }
+
+    /// The event that tells the others; a file that was there before is told again, in case its first event was lost.
+    pub(crate) fn event(&self, raw_sha256: Option<contract::digest::Digest>, attempt: u32) -> Body {
+        let path = self.file().display().to_string();
+        match (self, raw_sha256) {
+            (Self::Landed { manifest, periods, revised, .. }, Some(raw_sha256)) => Body::GranuleLanded {
+                path,
+                raw_sha256,
+                manifest: manifest.clone(),
+                periods: periods.clone(),
+                revised: *revised,
+            },
+            (Self::AlreadyLanded { manifest, periods, .. }, Some(raw_sha256)) => Body::GranuleLanded {
+                path,
+                raw_sha256,
+                manifest: manifest.clone(),
+                periods: periods.clone(),
+                revised: false,
+            },
+            (Self::Rejected { reason, object, detail, .. }, _) => {
+                Body::GranuleRejected { path, reason: *reason, detail: format!("{object}: {detail}"), attempt }
+            }
+            (Self::Landed { .. } | Self::AlreadyLanded { .. }, None) => unreachable!("a landed file has a digest"),
+        }
+    }
+}
+
+impl Display for Outcome {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        let span = |periods: &[Period]| match (periods.first(), periods.last()) {
+            (Some(first), Some(last)) => Period { start: first.start, end: last.end }.to_string(),
+            _ => "no period".to_owned(),
+        };
+        match self {
+            Self::Landed { file, manifest, periods, revised } => {
+                let how = if *revised { "revised" } else { "landed" };
+                write!(f, "{}: {how} in {manifest} for {}", file.display(), span(periods))
+            }
+            Self::AlreadyLanded { file, manifest, .. } => write!(f, "{}: was in {manifest} already", file.display()),
+            Self::Rejected { file, object, detail, .. } => write!(f, "{}: {object}: {detail}", file.display()),
+        }
+    }
+}

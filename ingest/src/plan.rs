@@ -1,0 +1,120 @@
+//! [`InspectedGranule`] in, [`PlannedGranule`] out: which variable, where its cells are, when its steps are, which unit.
+//!
+//! Nothing of the variable is read yet; only coordinates, which are small. A profile overrides what the file says.
+
+mod date;
+mod place;
+mod steps;
+mod target;
+
+use contract::event::RejectReason;
+use contract::product::ProductId;
+use contract::quantity::Quantity;
+use contract::time::Period;
+
+use crate::cf::axis::Mapping;
+use crate::cf::coordinate::{self, Axis, Role};
+use crate::cf::packing::Packing;
+use crate::decoder::session::Session;
+use crate::error::Stop;
+use crate::fetch::RawGranule;
+use crate::file::description::{Description, Part, Variable};
+use crate::inspect::InspectedGranule;
+use crate::profile::Profile;
+use crate::rejection::Rejection;
+use crate::settings::Limits;
+
+/// A file of which is known what will be read and what it will become.
+pub(crate) struct PlannedGranule {
+    pub(crate) raw: RawGranule,
+    pub(crate) session: Session,
+    pub(crate) target: Target,
+    pub(crate) variable: Variable,
+    pub(crate) axes: Vec<Axis>,
+    pub(crate) mapping: Mapping,
+    pub(crate) packing: Packing,
+    pub(crate) steps: Vec<PlannedStep>,
+}
+
+/// What a file becomes.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Target {
+    pub(crate) product: ProductId,
+    pub(crate) title: String,
+    pub(crate) source: String,
+    pub(crate) quantity: Quantity,
+    pub(crate) synthetic: bool,
+}
+
+/// One step of the file: where it is and how its values become stored ones, `stored = value * factor + offset`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct PlannedStep {
+    pub(crate) period: Period,
+    pub(crate) time_index: u64,
+    pub(crate) factor: f64,
+    pub(crate) offset: f64,
+}
+
+/// What the caller wants, beyond what the file says.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Wish<'a> {
+    pub(crate) profile: Option<&'a Profile>,
+    pub(crate) product: Option<&'a ProductId>,
+}
+
+/// A file on its way through planning.
+struct Planning<'a> {
+    session: Session,
+    file: &'a Description,
+    file_name: &'a str,
+    profile: Option<&'a Profile>,
+    limits: Limits,
+}
+
+pub(crate) async fn run(granule: InspectedGranule, wish: Wish<'_>, limits: Limits) -> Result<PlannedGranule, Stop> {
+    let InspectedGranule { raw, session, description } = granule;
+    let fits = |profile: &&Profile| profile.is_for(&raw.file_name, &description);
+    let profile = wish.profile.or_else(|| crate::profile::shipped().iter().find(fits));
+    let (variable, meaning) = target::choose(&description, profile)?;
+    let target = target::target(&description, variable, profile, meaning.quantity, wish.product)?;
+    let mut planning = Planning { session, file: &description, file_name: &raw.file_name, profile, limits };
+    let (axes, mapping) = place::mapping(&mut planning, variable).await?;
+    let periods = steps::periods(&mut planning, &axes).await?;
+    let steps = steps::convert(variable, profile, meaning, &periods)?;
+    let packing = target::packing(variable, profile)?;
+    let Planning { session, .. } = planning;
+    Ok(PlannedGranule { session, target, variable: variable.clone(), axes, mapping, packing, steps, raw })
+}
+
+impl Planning<'_> {
+    /// All values of a coordinate variable, unpacked; NaN for fill values.
+    async fn coordinate(&mut self, name: &str) -> Result<Vec<f64>, Stop> {
+        /// Longest coordinate axis.
+        const MAX_LABELS: u64 = 1 << 20;
+        let missing = || Rejection::new(RejectReason::Grid, name, "is not in the file; name another coordinate in the profile");
+        let variable = self.file.variable(name).ok_or_else(missing)?;
+        let count = match variable.dimensions.as_slice() {
+            [] => 1,
+            [only] => only.len,
+            more => {
+                let detail = format!("has {} dimensions where a coordinate has one: this is a swath; grid it first", more.len());
+                return Err(Rejection::new(RejectReason::Grid, name, detail).into());
+            }
+        };
+        if count > MAX_LABELS || !variable.is_numeric() {
+            let detail = format!("is no coordinate axis ({count} labels, at most {MAX_LABELS} numbers are read)");
+            return Err(Rejection::new(RejectReason::Grid, name, detail).into());
+        }
+        let parts = vec![Part::All; variable.dimensions.len()];
+        let packing = Packing::of(variable);
+        let stored = self.session.read(name, &parts, count).await?;
+        Ok(stored.into_iter().map(|v| packing.value(v)).collect())
+    }
+
+    /// The time axis, or a scalar time beside the axes.
+    fn time_variable(&self, axes: &[Axis]) -> Option<String> {
+        let on_axis = axes.iter().find(|a| a.role == Role::Time).and_then(|a| a.coordinate.clone());
+        let is_scalar_time = |v: &&Variable| v.cell_count() == 1 && v.is_numeric() && coordinate::role_of(v) == Role::Time;
+        on_axis.or_else(|| self.file.variables.iter().find(is_scalar_time).map(|v| v.name.clone()))
+    }
+}

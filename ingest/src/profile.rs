@@ -1,0 +1,191 @@
+//! Profiles: how a family of files that does not follow CF, or says what is not so, maps to a product.
+//!
+//! A profile is a TOML file (see `profiles/` for the shipped ones). Everything in it overrides what the file says.
+
+pub(crate) mod pattern;
+mod shipped;
+
+use std::path::Path;
+
+use contract::grid::Grid;
+use contract::product::ProductId;
+use contract::quantity::Quantity;
+use serde::Deserialize;
+
+use crate::cf::axis::Registration;
+use crate::cf::period::Covers;
+use crate::error::IngestError;
+use crate::file::description::{AttributeValue, Description};
+
+pub use shipped::shipped;
+
+/// Largest profile, bytes.
+const MAX_PROFILE_BYTES: u64 = 1 << 20;
+
+/// How a family of files maps to a product.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Profile {
+    /// Name, by which it is chosen.
+    pub name: String,
+    pub(crate) product: ProductId,
+    pub(crate) title: String,
+    /// Citation.
+    pub(crate) source: String,
+    pub(crate) quantity: Quantity,
+    #[serde(default)]
+    pub(crate) synthetic: bool,
+    /// Which files it is chosen for by itself; never, if absent.
+    #[serde(default, rename = "match")]
+    matches: Option<Match>,
+    pub(crate) variable: VariableRules,
+    #[serde(default)]
+    pub(crate) grid: GridRules,
+    #[serde(default)]
+    pub(crate) time: Option<TimeRules>,
+}
+
+/// Which files a profile is for: all that is stated must hold.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Match {
+    /// Pattern of the file name: `*` any text, `?` any character.
+    file_name: Option<String>,
+    /// Variables that must be there.
+    #[serde(default)]
+    variables: Vec<String>,
+    /// Variables that must not.
+    #[serde(default)]
+    absent: Vec<String>,
+    /// Attributes of the file and the text (or number) they must have.
+    #[serde(default)]
+    attributes: std::collections::BTreeMap<String, toml::Value>,
+}
+
+/// The variable to land, and what the file says wrong about it.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct VariableRules {
+    pub(crate) name: String,
+    pub(crate) unit: Option<String>,
+    /// Is a positive value into the sea in this file?
+    #[serde(default)]
+    pub(crate) positive_into_sea: bool,
+    pub(crate) fill_values: Option<Vec<f64>>,
+    /// Values outside are no data; in the file's unit, unpacked.
+    pub(crate) valid_range: Option<[f64; 2]>,
+    pub(crate) scale_factor: Option<f64>,
+    pub(crate) add_offset: Option<f64>,
+}
+
+/// Where the cells are.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct GridRules {
+    #[serde(default)]
+    pub(crate) registration: Registration,
+    /// Names of the coordinate variables.
+    pub(crate) latitude: Option<String>,
+    pub(crate) longitude: Option<String>,
+    /// The grid of a file that has no axes.
+    pub(crate) stated: Option<StatedGrid>,
+}
+
+/// A grid that is nowhere in the file.
+#[derive(Debug, Clone, Deserialize)]
+pub(crate) struct StatedGrid {
+    /// Edges and cells, row 0 north.
+    #[serde(flatten)]
+    pub(crate) grid: Grid,
+    /// Is the first row of the file the northernmost?
+    pub(crate) north_first: bool,
+    /// Names of the latitude and longitude dimensions, where the file names them; else the last two dimensions.
+    pub(crate) dimensions: Option<[String; 2]>,
+}
+
+/// Where the time comes from.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct TimeRules {
+    pub(crate) from: TimeSource,
+    pub(crate) covers: Covers,
+    /// The year that replaces the one of the file: the reference year of a climatology.
+    pub(crate) year: Option<i32>,
+}
+
+/// A source of time.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub(crate) enum TimeSource {
+    /// A variable, with the unit and calendar the file lacks or has wrong.
+    Variable { name: String, unit: Option<String>, calendar: Option<String> },
+    /// An attribute of the file, such as `time_coverage_start`.
+    Attribute(String),
+    /// The name of the file, with `{year}`, `{month}`, `{day}`, `{day_of_year}`, `*` and `?`.
+    FileName(String),
+    /// The n-th step is the n-th month of `year`.
+    MonthNumber,
+    /// One step whose stamp is this.
+    Fixed(contract::time::TimeMs),
+}
+
+impl Profile {
+    /// Reads a profile from TOML.
+    pub fn parse(name: &str, text: &str) -> Result<Self, IngestError> {
+        let bad = |detail: String| IngestError::Profile { name: name.to_owned(), detail };
+        let profile: Self = toml::from_str(text).map_err(|e| bad(e.to_string().replace('\n', " ")))?;
+        if let Some(unit) = &profile.variable.unit {
+            crate::unit::parse(unit).map_err(|e| bad(format!("unit {unit:?} {e}")))?;
+        }
+        if let Some(TimeRules { from: TimeSource::FileName(pattern), .. }) = &profile.time {
+            pattern::check(pattern).map_err(bad)?;
+        }
+        if let Some(stated) = &profile.grid.stated {
+            stated.grid.validate()?;
+        }
+        Ok(profile)
+    }
+
+    /// Reads a profile file.
+    pub fn load(path: &Path) -> Result<Self, IngestError> {
+        let name = path.display().to_string();
+        let bad = |e: std::io::Error| IngestError::Profile { name: name.clone(), detail: format!("cannot be read: {e}") };
+        if std::fs::metadata(path).map_err(bad)?.len() > MAX_PROFILE_BYTES {
+            return Err(IngestError::Profile { name, detail: format!("is larger than {MAX_PROFILE_BYTES} bytes") });
+        }
+        let text = std::fs::read_to_string(path).map_err(bad)?;
+        Self::parse(&name, &text)
+    }
+
+    /// A shipped profile by its name, or a profile file by its path.
+    pub fn find(name_or_path: &str) -> Result<Self, IngestError> {
+        if let Some(profile) = shipped().iter().find(|p| p.name == name_or_path) {
+            return Ok(profile.clone());
+        }
+        if Path::new(name_or_path).is_file() {
+            return Self::load(Path::new(name_or_path));
+        }
+        let names = shipped().iter().map(|p| p.name.as_str()).collect::<Vec<_>>().join(", ");
+        Err(IngestError::Profile { name: name_or_path.to_owned(), detail: format!("is no file and none of {names}") })
+    }
+
+    /// Is the profile for this file?
+    pub(crate) fn is_for(&self, file_name: &str, file: &Description) -> bool {
+        let Some(rules) = &self.matches else { return false };
+        if *rules == Match::default() {
+            return false;
+        }
+        let attribute_is = |(name, wanted): (&String, &toml::Value)| match (file.attributes.0.get(name), wanted) {
+            (Some(AttributeValue::Text(_)), toml::Value::String(wanted)) => {
+                file.attributes.text(name).is_some_and(|text| pattern::matches(wanted, text))
+            }
+            (Some(AttributeValue::Numbers(_)), toml::Value::Integer(wanted)) => file.attributes.number(name) == Some(*wanted as f64),
+            (Some(AttributeValue::Numbers(_)), toml::Value::Float(wanted)) => file.attributes.number(name) == Some(*wanted),
+            _ => false,
+        };
+        rules.file_name.as_ref().is_none_or(|p| pattern::matches(p, file_name))
+            && rules.variables.iter().all(|name| file.variable(name).is_some())
+            && rules.absent.iter().all(|name| file.variable(name).is_none())
+            && rules.attributes.iter().all(attribute_is)
+    }
+}

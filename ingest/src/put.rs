@@ -1,0 +1,44 @@
+//! [`EncodedGrid`] in, [`StoredGrid`] out: the frame is durable, under a name that only its content could have.
+
+use contract::digest::Digest;
+use contract::grid::Grid;
+use contract::key::ObjectKey;
+use contract::manifest::Step;
+use contract::product::ProductId;
+use storage::Store;
+
+use crate::encode::EncodedGrid;
+use crate::error::IngestError;
+use crate::fetch::RawGranule;
+use crate::plan::Target;
+
+/// A frame that is durable, as a step of a manifest to come.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct StoredGrid {
+    pub(crate) step: Step,
+}
+
+/// A file of which everything but the manifest is durable.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct StoredGranule {
+    pub(crate) target: Target,
+    pub(crate) grid: Grid,
+    pub(crate) raw_sha256: Digest,
+    /// In the order of time.
+    pub(crate) grids: Vec<StoredGrid>,
+}
+
+/// Stores the file as it came.
+pub(crate) async fn raw(store: &Store, product: &ProductId, raw: &RawGranule) -> Result<(), IngestError> {
+    let key = ObjectKey::raw(product, &raw.sha256);
+    store.put_new(&key, raw.bytes.clone()).await.map_err(IngestError::storage("store the file"))?;
+    Ok(())
+}
+
+/// Stores one frame.
+pub(crate) async fn run(store: &Store, encoded: EncodedGrid, raw: &RawGranule) -> Result<StoredGrid, IngestError> {
+    let EncodedGrid { period, key, frame, valid_cells } = encoded;
+    store.put_new(&key, frame).await.map_err(IngestError::storage("store a frame"))?;
+    let (raw_sha256, origin) = (raw.sha256, raw.file_name.clone());
+    Ok(StoredGrid { step: Step { period, frame: key, raw_sha256, origin, valid_cells } })
+}

@@ -1,0 +1,83 @@
+//! Settings of ingest: limits on what a file may ask for, and where the sandboxed reader is.
+
+use std::ffi::OsString;
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// The sandboxed reader: a program and what comes before its own arguments.
+#[derive(Debug, Clone)]
+pub struct DecoderCommand {
+    /// Program.
+    pub program: PathBuf,
+    /// Arguments before those of [`crate::decoder::run_child`], such as the hidden subcommand.
+    pub arguments: Vec<OsString>,
+}
+
+impl DecoderCommand {
+    /// This very program with its hidden subcommand `decode-file`.
+    ///
+    /// # Errors
+    /// The system does not say where this program is.
+    pub fn current() -> std::io::Result<Self> {
+        Ok(Self { program: std::env::current_exe()?, arguments: vec!["decode-file".into()] })
+    }
+}
+
+/// What one file may ask for. A file beyond a limit is refused with the limit named.
+#[derive(Debug, Clone, Copy)]
+pub struct Limits {
+    /// Largest input file, bytes.
+    pub file_bytes: u64,
+    /// Memory of the sandboxed reader, bytes of address space.
+    pub memory_bytes: u64,
+    /// Processor time of the sandboxed reader, seconds for one file.
+    pub cpu_s: u64,
+    /// Time for one file as the clock on the wall has it.
+    pub wall: Duration,
+    /// Most cells of one map of one variable; also bounds what is allocated for it.
+    pub plane_cells: u64,
+    /// Most cells that any variable may declare over all its dimensions.
+    pub variable_cells: u64,
+    /// Most time steps in one file.
+    pub steps: u64,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            file_bytes: 4 << 30,
+            memory_bytes: 3 << 30,
+            cpu_s: 600,
+            wall: Duration::from_secs(1800),
+            plane_cells: 1 << 26,
+            variable_cells: 1 << 34,
+            steps: 100_000,
+        }
+    }
+}
+
+/// Settings of ingest.
+#[derive(Debug, Clone)]
+pub struct Settings {
+    /// The sandboxed reader.
+    pub decoder: DecoderCommand,
+    /// Limits on one file.
+    pub limits: Limits,
+    /// Files that are read at the same time, 1 to 64.
+    pub parallel_files: usize,
+}
+
+impl Settings {
+    /// Default limits, two files at a time, and this very program as the reader.
+    ///
+    /// # Errors
+    /// The system does not say where this program is.
+    pub fn with_current_program() -> std::io::Result<Self> {
+        Ok(Self::with_decoder(DecoderCommand::current()?))
+    }
+
+    /// Default limits and two files at a time.
+    pub fn with_decoder(decoder: DecoderCommand) -> Self {
+        Self { decoder, limits: Limits::default(), parallel_files: 2 }
+    }
+}

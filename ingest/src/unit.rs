@@ -1,0 +1,134 @@
+//! Units as files spell them, and their conversion to the one unit a quantity is stored in.
+//!
+//! [`parse::parse`] reads the spelling; this file knows what the words mean and which quantity they fit. Two things are
+//! more than a factor: *of what* a mass or amount is (carbon or CO2), and months, whose length depends on the step.
+
+mod parse;
+mod symbol;
+
+use chrono::{Datelike as _, NaiveDate};
+use contract::quantity::{CARBON_KG_PER_MOL, Quantity};
+use contract::time::Period;
+
+pub use parse::parse;
+
+/// Mass of one mole of CO2, kg (IUPAC 2021: carbon 12.011, oxygen 15.999).
+const CO2_KG_PER_MOL: f64 = 0.044_009;
+/// Density by which a depth of rain becomes a mass, kg m⁻³: fresh water, as the convention has it.
+const WATER_KG_PER_M3: f64 = 1000.0;
+
+/// Powers of the base units.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Dimension {
+    /// Power of kilogram.
+    pub mass: i8,
+    /// Power of metre.
+    pub length: i8,
+    /// Power of second; months are counted apart.
+    pub time: i8,
+    /// Power of calendar month, whose length depends on the step.
+    pub month: i8,
+    /// Power of kelvin.
+    pub temperature: i8,
+    /// Power of mole.
+    pub amount: i8,
+}
+
+/// Of what a mass or amount is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Substance {
+    /// Carbon.
+    Carbon,
+    /// Carbon dioxide.
+    Co2,
+}
+
+/// A parsed unit: `base = value * factor + offset`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Unit {
+    /// Powers of the base units.
+    pub dimension: Dimension,
+    /// Multiplies a value; months are not in it.
+    pub factor: f64,
+    /// Added after the factor: degrees Celsius have one.
+    pub offset: f64,
+    /// Of what, if the unit says it.
+    pub substance: Option<Substance>,
+}
+
+/// A linear conversion to the stored unit of a quantity: `stored = value * factor + offset`, for one step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Conversion {
+    /// Multiplies a value, with `months` powers of the length of the step's month still to come.
+    factor: f64,
+    offset: f64,
+    months: i8,
+}
+
+impl Unit {
+    /// The conversion to the stored unit of a quantity, or what is wrong.
+    ///
+    /// `substance`: of what a mass is where the unit itself does not say (a profile or the standard name does). An
+    /// amount (mol) of CO2 holds the same amount of carbon.
+    pub fn to_quantity(self, quantity: Quantity, substance: Option<Substance>) -> Result<Conversion, String> {
+        let Ok(target) = parse(quantity.unit()) else { return Err(format!("no unit for {quantity:?}")) };
+        let months = self.dimension.month;
+        // A month is a time; its length comes with the step.
+        let own = Dimension { month: 0, time: self.dimension.time + months, ..self.dimension };
+        let extra = match quantity {
+            Quantity::CarbonFlux | Quantity::AccumulatedCarbon => carbon_factor(own, target.dimension, self.substance.or(substance))?,
+            Quantity::Precipitation if own == (Dimension { length: 1, time: -1, ..Dimension::default() }) => WATER_KG_PER_M3,
+            _ if own == target.dimension => 1.0,
+            _ => return Err(wrong_kind(quantity)),
+        };
+        Ok(Conversion { factor: self.factor * extra / target.factor, offset: self.offset, months })
+    }
+}
+
+fn wrong_kind(quantity: Quantity) -> String {
+    format!("is no unit of {}; give one such as {:?} in a profile", quantity.title().to_lowercase(), quantity.unit())
+}
+
+/// Factor from kg or mol of the substance to kg of carbon.
+fn carbon_factor(own: Dimension, target: Dimension, substance: Option<Substance>) -> Result<f64, String> {
+    let as_amount = Dimension { mass: 0, amount: 1, ..target };
+    match (own == target, own == as_amount, substance) {
+        (true, _, Some(Substance::Carbon)) => Ok(1.0),
+        (true, _, Some(Substance::Co2)) => Ok(CARBON_KG_PER_MOL / CO2_KG_PER_MOL),
+        (true, _, None) => {
+            Err("does not say whether it is mass of carbon or of CO2; give unit = \"... C ...\" or \"... CO2 ...\" in a profile".to_owned())
+        }
+        (_, true, _) => Ok(CARBON_KG_PER_MOL),
+        _ => Err("is no unit of a carbon flux; give one such as \"g C m-2 month-1\" or \"mol m-2 s-1\" in a profile".to_owned()),
+    }
+}
+
+impl Conversion {
+    /// Factor and offset for a step of this period, or what is wrong.
+    pub fn for_period(self, period: Period) -> Result<(f64, f64), String> {
+        let month_s = if self.months == 0 { 1.0 } else { month_seconds(period)? };
+        Ok((self.factor * month_s.powi(self.months.into()), self.offset))
+    }
+}
+
+/// Length of the month that a step covers or lies in, seconds; the mean length if it covers several whole months.
+fn month_seconds(period: Period) -> Result<f64, String> {
+    let advice = "a unit per month needs steps of whole months or within one month";
+    let instant = |t: contract::time::TimeMs| chrono::DateTime::from_timestamp_millis(t.ms()).ok_or(advice);
+    let (start, last) = (instant(period.start)?, instant(period.end)? - chrono::Duration::milliseconds(1));
+    let (first_month, last_month) = ((start.year(), start.month()), (last.year(), last.month()));
+    if first_month == last_month {
+        return Period::month(first_month.0, first_month.1).map(Period::seconds).map_err(|e| e.to_string());
+    }
+    let is_month_start = |t: chrono::DateTime<chrono::Utc>| {
+        NaiveDate::from_ymd_opt(t.year(), t.month(), 1).and_then(|d| d.and_hms_opt(0, 0, 0)) == Some(t.naive_utc())
+    };
+    if is_month_start(start) && is_month_start(instant(period.end)?) {
+        let count = (last_month.0 - first_month.0) * 12 + last_month.1 as i32 - first_month.1 as i32 + 1;
+        return Ok(period.seconds() / f64::from(count));
+    }
+    Err(advice.to_owned())
+}
+
+#[cfg(test)]
+mod tests;
