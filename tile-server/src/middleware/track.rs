@@ -1,14 +1,16 @@
 //! Counts and times every request by its route.
 
+use std::pin::Pin;
+use std::task::{Context, Poll};
 use std::time::Instant;
 
-use axum::body::Body;
+use axum::body::{Body, Bytes, HttpBody};
 use axum::extract::{MatchedPath, Request, State};
 use axum::http::{Method, StatusCode};
 use axum::middleware::Next;
 use axum::response::Response;
-use futures::TryStreamExt as _;
-use prometheus::IntGauge;
+use http_body::{Frame, SizeHint};
+use prometheus::{IntCounter, IntGauge};
 
 use crate::state::AppState;
 
@@ -65,13 +67,45 @@ pub(crate) async fn count(State(state): State<AppState>, request: Request, next:
     );
     let sent_bytes = metrics.sent_bytes.with_label_values(&[&route]);
     response.map(|body| {
-        let counted = body.into_data_stream().inspect_ok(move |piece| {
-            // Moved in here, it is under way until its last byte is.
-            let _under_way = &under_way;
-            sent_bytes.inc_by(piece.len() as u64);
-        });
-        Body::from_stream(counted)
+        Body::new(Sent {
+            body,
+            sent_bytes,
+            _under_way: under_way,
+        })
     })
+}
+
+/// A body that counts its bytes as they go; the request is under way until the last one is gone.
+struct Sent {
+    body: Body,
+    sent_bytes: IntCounter,
+    _under_way: UnderWay,
+}
+
+impl HttpBody for Sent {
+    type Data = Bytes;
+    type Error = axum::Error;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
+        let polled = Pin::new(&mut self.body).poll_frame(cx);
+        if let Poll::Ready(Some(Ok(frame))) = &polled {
+            self.sent_bytes
+                .inc_by(frame.data_ref().map_or(0, Bytes::len) as u64);
+        }
+        polled
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.body.is_end_stream()
+    }
+
+    /// Known lengths stay known, so that clients are told them.
+    fn size_hint(&self) -> SizeHint {
+        self.body.size_hint()
+    }
 }
 
 /// Methods are free text to HTTP: only those with a meaning here become a label.

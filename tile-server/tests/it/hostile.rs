@@ -191,4 +191,13 @@ async fn head_is_get_without_a_body() {
         (StatusCode::OK, "image/png")
     );
     assert!(answer.body.is_empty());
+    let whole = app.get("/tiles/flux/map/0/0/0.png").await;
+    assert_eq!(
+        answer.header("content-length"),
+        whole.body.len().to_string()
+    );
+    assert_eq!(
+        whole.header("content-length"),
+        answer.header("content-length")
+    );
 }
