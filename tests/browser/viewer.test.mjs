@@ -25,15 +25,21 @@ test("the viewer", async (t) => {
   const page = browser.context.pages()[0] ?? (await browser.context.newPage());
   page.setDefaultTimeout(LIMIT_MS);
   const journey = new Journey(page, watch, base);
-  const step = async (sentence, act) => {
-    const startedMs = Date.now();
-    await t.test(sentence, async () => {
-      await act(journey);
-      // Attributed to the step during which it happened; the last check of all looks at the whole list again.
-      assert.deepEqual(watch.problems, [], "the page must stay without error");
+  const step = (sentence, act, { isCleanPage = true } = {}) =>
+    t.test(sentence, async () => {
+      const startedMs = Date.now();
+      try {
+        assert.ok(journey.hasLoaded || act === loads, "the page never loaded, so there is nothing to look at");
+        await act(journey);
+        // Attributed to the step during which it happened; the last check of all looks at the whole list again.
+        if (isCleanPage) assert.deepEqual(watch.problems, [], "the page must stay without error");
+      } catch (error) {
+        await journey.shot(`failed-${sentence.replace(/\W+/g, "-")}`);
+        throw plain(error, watch);
+      } finally {
+        if (process.env.FLUXGLOBE_TIMES) console.error(`${((Date.now() - startedMs) / 1000).toFixed(1)} s  ${sentence}`);
+      }
     });
-    if (process.env.FLUXGLOBE_TIMES) console.error(`${((Date.now() - startedMs) / 1000).toFixed(1)} s  ${sentence}`);
-  };
 
   try {
     await step("loads and draws its first layer", loads);
@@ -49,15 +55,25 @@ test("the viewer", async (t) => {
     await step("shows the rendered view in a dialog", renderedView);
     await step("has nothing to complain about at the end", async () => {});
     // From here on errors are planted, so the clean list is no longer asked for.
-    await t.test("opens a shared address as the same view, and marks synthetic data", () => sharedAddress(journey));
-    await t.test("tells the server's reason when tiles are refused", () => refusedTiles(journey));
-    await t.test("says when the server is gone, and goes on when it is back", () => lostServer(journey));
+    const planted = { isCleanPage: false };
+    await step("opens a shared address as the same view, and marks synthetic data", sharedAddress, planted);
+    await step("tells the server's reason when tiles are refused", refusedTiles, planted);
+    await step("says when the server is gone, and goes on when it is back", lostServer, planted);
   } finally {
     await browser.close();
   }
 });
 
+/** An error without terminal colours, which break the reports of older test runners, and with what the page complained of. */
+function plain(error, watch) {
+  const text = (error.message ?? String(error)).replace(/\x1B\[[0-9;]*m/g, "");
+  const complaints = watch.problems.length > 0 && !text.includes("must stay without error") ? `\nThe page said:\n${watch.problems.join("\n")}` : "";
+  return new Error(text + complaints);
+}
+
 class Journey {
+  hasLoaded = false;
+
   constructor(page, watch, base) {
     Object.assign(this, { page, watch, base });
   }
@@ -95,11 +111,13 @@ class Journey {
   }
 }
 
-async function loads({ page, base }) {
+async function loads(journey) {
+  const { page, base } = journey;
   const answer = await page.goto(base.href);
   assert.equal(answer.status(), 200);
   await page.waitForFunction(() => window.fluxglobe?.ready === true, undefined, { timeout: LIMIT_MS });
   assert.ok(await page.locator("#globe canvas").isVisible());
+  journey.hasLoaded = true;
 }
 
 async function tilesArrive(journey) {

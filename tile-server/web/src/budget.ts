@@ -16,6 +16,8 @@ const TG_PER_PG = 1000;
 
 export interface BudgetContext {
   store: Store;
+  /** The product on show is a flux; of anything else there is no budget to ask for. */
+  isFlux: () => boolean;
   drawBox: (onChange: (box: Bounds) => void, onEnd: (box: Bounds | undefined) => void) => void;
   markRegion: (box: Bounds | null) => void;
   onError: (key: string, error: unknown) => void;
@@ -39,7 +41,8 @@ export class BudgetPanel {
       markRegion: context.markRegion,
     });
     body.append(this.#form.element, this.#result);
-    context.store.on(["product", "region", "tab"], () => void this.refresh());
+    // A new product comes with its steps, through `setSteps`.
+    context.store.on(["region", "tab"], () => void this.refresh());
   }
 
   setRegions(regions: readonly Region[]): void {
@@ -58,6 +61,10 @@ export class BudgetPanel {
     const isOpen = tab === "budget";
     this.#context.markRegion(isOpen ? this.#form.boundsOf(region) : null);
     this.#form.show(region);
+    if (isOpen && !this.#context.isFlux()) {
+      this.#say("Budgets are sums of a carbon flux; this product is none. Choose a flux to see one.");
+      return;
+    }
     const query = isOpen && product !== null ? this.#form.query(region) : undefined;
     if (!query || product === null) return;
     const key = api.budgetUrl(product, query);
@@ -73,14 +80,21 @@ export class BudgetPanel {
       if (!asked.signal.aborted) this.#draw(query, rows, total, key);
     } catch (error) {
       if (asked.signal.aborted) return;
-      this.#answered = "";
-      this.#chart?.destroy();
-      this.#chart = undefined;
-      this.#result.replaceChildren(el("p", { class: "problem" }, error instanceof Error ? error.message : String(error)));
+      this.#say(error instanceof Error ? error.message : String(error));
       if (error instanceof api.ApiError && error.kind === "unreachable") this.#context.onError("budget", error);
     } finally {
       if (this.#asked === asked) this.#result.classList.remove("waiting");
     }
+  }
+
+  /** A reason in place of a result. */
+  #say(problem: string): void {
+    this.#asked?.abort();
+    this.#answered = "";
+    this.#chart?.destroy();
+    this.#chart = undefined;
+    this.#result.classList.remove("waiting");
+    this.#result.replaceChildren(el("p", { class: "problem" }, problem));
   }
 
   #draw(query: BudgetQuery, answer: Budget, total: Budget, jsonUrl: string): void {

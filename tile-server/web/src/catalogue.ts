@@ -9,7 +9,7 @@ import { clampToRange, parseSteps, toIso, type Step } from "./time";
 const DEFAULT_MAX_ZOOM = 6;
 
 /** The quantity budgets are made of. */
-const FLUX = "carbon_flux";
+export const FLUX = "carbon_flux";
 
 export class Catalogue {
   readonly products: readonly Product[];

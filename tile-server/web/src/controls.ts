@@ -38,6 +38,7 @@ export class Controls {
       this.#source,
     );
     store.on(["mode"], () => this.#markMode());
+    store.on(["opacity"], (state) => { opacity.value = String(state.opacity); });
   }
 
   setProducts(products: readonly Product[]): void {

@@ -5,7 +5,7 @@ import * as api from "./api";
 import { BudgetPanel } from "./budget";
 import { contains } from "./box";
 import { CameraButtons } from "./camera";
-import { Catalogue } from "./catalogue";
+import { Catalogue, FLUX } from "./catalogue";
 import { drawCheck } from "./check";
 import { Connection } from "./connection";
 import { Controls } from "./controls";
@@ -36,7 +36,7 @@ const store = new Store({ ...INITIAL, ...asked });
 const notices = new Notices();
 let catalogue = new Catalogue([]);
 
-const globe = new Globe(byId("globe"), byId("credits"), chooseQuality());
+const globe = makeGlobe();
 const counts = new TileCounts();
 const connection = new Connection(notices, () => store.set({ playing: false }), () => {
   // What loads may be waiting for tiles that already failed while the server was away.
@@ -55,9 +55,10 @@ const view = new ViewDialog(store, () => product()?.modes ?? [], () => product()
 const controls = new Controls(byId("controls"), store, () => view.open());
 const timeline = new Timeline(byId("timeline"), store);
 const panels = new Panels(byId("panels"), store);
-const placePanel = new PlacePanel(panels.bodies.place, { store, steps, label: () => product()?.legend.label ?? "", onError: report });
+const placePanel = new PlacePanel(panels.bodies.place, { store, steps, label: () => product()?.legend.label ?? "", bounds: () => product()?.bounds, onError: report });
 const budgetPanel = new BudgetPanel(panels.bodies.budget, {
   store,
+  isFlux: () => product()?.quantity === FLUX,
   drawBox: (onChange, onEnd) => pointer.drawBox(onChange, onEnd),
   markRegion: (box) => marks.region(box),
   onError: report,
@@ -89,6 +90,19 @@ store.on(["timeMs"], showLayer);
 store.on(["mode", "product", "timeMs"], () => notices.clear("tiles"));
 keepAddress();
 void begin();
+
+function makeGlobe(): Globe {
+  try {
+    const made = new Globe(byId("globe"), byId("credits"), chooseQuality());
+    made.scene.renderError.addEventListener((_scene: unknown, error: unknown) => {
+      notices.show("render", `The globe cannot be drawn any more (${String(error)}). Load the page again.`);
+    });
+    return made;
+  } catch (error) {
+    notices.show("webgl", "This browser cannot draw the globe: it needs WebGL 2. Tables and tiles of the server work without it.");
+    throw error;
+  }
+}
 
 /** Loads what the page needs; again when a lost server is back, where a whole picture in sight is kept. */
 async function begin(): Promise<void> {
@@ -165,6 +179,6 @@ function keepAddress(): void {
     const change = decodeHash(location.hash);
     if (change.product !== undefined && !catalogue.find(change.product)) delete change.product;
     if (change.camera) globe.view = change.camera;
-    store.set(change);
+    store.set({ place: null, tab: null, region: INITIAL.region, opacity: INITIAL.opacity, ...change });
   });
 }

@@ -1,6 +1,7 @@
 //! The place panel: a chosen point in, its series as a plot with the value at the present instant out; a place can be typed as well.
 import * as api from "./api";
 import type { PointSeries } from "./api";
+import { contains, type Bounds } from "./box";
 import { seriesChart, type Chart } from "./chart";
 import { seriesCsv } from "./csv";
 import { el, icon, saveText } from "./dom";
@@ -15,6 +16,7 @@ export interface PlaceContext {
   store: Store;
   steps: () => readonly Step[];
   label: () => string;
+  bounds: () => Bounds | undefined;
   onError: (key: string, error: unknown) => void;
 }
 
@@ -54,6 +56,11 @@ export class PlacePanel {
     this.#asked = asked;
     this.#lat.value = fieldText(place.lat);
     this.#lon.value = fieldText(place.lon);
+    const bounds = this.#context.bounds();
+    if (bounds && !contains(bounds, place)) {
+      this.#content.replaceChildren(this.#title(place), el("p", { class: "no-data", id: "no-data" }, "There is no data here: the product does not reach this place."));
+      return;
+    }
     this.#content.replaceChildren(this.#title(place), el("p", { class: "muted busy-line" }, "Reading the series …"));
     try {
       const answer = await api.point(product, place.lon, place.lat, asked.signal);
@@ -79,7 +86,7 @@ export class PlacePanel {
     const unit = unitText(answer.unit);
     const cell = el("p", { class: "muted" }, `Grid cell centred on ${latText(answer.cell.lat)}, ${lonText(answer.cell.lon)} (row ${answer.cell.row}, column ${answer.cell.col})`);
     if (!hasData(samples)) {
-      this.#content.replaceChildren(this.#title(place), el("p", { class: "no-data", id: "no-data" }, "There is no data here: land, ice, or outside of what the product covers."), cell, manifestLine(answer.manifest));
+      this.#content.replaceChildren(this.#title(place), el("p", { class: "no-data", id: "no-data" }, "There is no data here: land, ice, or never observed."), cell, manifestLine(answer.manifest));
       return;
     }
     const value = el("strong", { id: "place-value" });
