@@ -6,6 +6,7 @@
 mod coast;
 mod flux;
 mod noise;
+mod text_type;
 mod writer;
 
 use std::path::Path;

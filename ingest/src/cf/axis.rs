@@ -84,7 +84,7 @@ impl Mapping {
         }
         if (f64::from(cols) * dlon - 360.0).abs() < TOLERANCE_CELLS * dlon {
             // The first column whose western edge is at or east of -180.
-            let skipped = ((360.0 - (west_deg + 180.0)) / dlon + SNAP_CELLS).floor() as u32 % cols;
+            let skipped = ((180.0 - west_deg) / dlon - SNAP_CELLS).ceil().max(0.0) as u32 % cols;
             file_cols.rotate_left(skipped as usize);
             west_deg = snapped_edge(wrap_lon_deg(west_deg + f64::from(skipped) * dlon), dlon);
         }

@@ -63,7 +63,7 @@ pub(super) fn flux_mmol_m2_d(lon: f64, lat: f64, month: usize, noise: &Noise) ->
     flux += (-4.5 * winter + 0.8 * summer) * (-stream * stream).exp();
     // Eddies live for weeks: from month to month half of each is left.
     let eddies = noise.fractal(lon / 1.6, lat / 1.6, month as f64 * 0.5, 5);
-    flux + (1.6 + 1.6 * winter * north) * eddies
+    flux + (3.0 + 2.0 * winter * north) * eddies
 }
 
 /// How cloudy a place is, without unit; only its order matters. Each month has clouds of its own.

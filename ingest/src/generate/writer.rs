@@ -6,6 +6,7 @@ use hdf5::types::{FixedAscii, VarLenArray, VarLenUnicode};
 use hdf5::{Dataset, File, Location, ObjectReference as _, ObjectReference1, SliceOrIndex};
 use ndarray::ArrayView2;
 
+use super::text_type::null_terminated;
 use super::{FILL, Shape, YEAR};
 
 /// Cells of a chunk: a map at scale 1 is 12 x 6 of them.
@@ -14,11 +15,10 @@ const CHUNK_COLS: usize = 300;
 /// Level of deflate: higher ones gain little on noise.
 const DEFLATE_LEVEL: u8 = 4;
 
-type Name = FixedAscii<32>;
-
 /// Writes the file; `month` gives the values of a month, `[row, col]` from the south.
 pub(super) fn write(path: &Path, shape: Shape, seed: u64, month: impl Fn(usize) -> Vec<f32>) -> hdf5::Result<()> {
-    let file = File::create(path)?;
+    // No object may carry the time of its making: the same seed gives the same bytes.
+    let file = File::with_options().with_fcpl(|create| create.obj_track_times(false)).create(path)?;
     text(&file, "Conventions", "CF-1.8")?;
     text(&file, "title", "SYNTHETIC China Sea air-sea CO2 flux 2009: made up by a program, no measurement")?;
     text(&file, "source", "fluxglobe generate china-sea")?;
@@ -94,9 +94,11 @@ fn scale(file: &File, name: &str, values: &[f64]) -> hdf5::Result<Dataset> {
     Ok(dataset)
 }
 
+/// A text as the dimension scales of HDF5 want it: of fixed length, with a null character at its end.
 fn fixed(owner: &Location, name: &str, value: &str) -> hdf5::Result<()> {
-    let value = Name::from_ascii(value).map_err(|e| hdf5::Error::from(format!("{name}: {e}")))?;
-    owner.new_attr::<Name>().create(name)?.write_scalar(&value)
+    let text = FixedAscii::<32>::from_ascii(value).map_err(|e| hdf5::Error::from(format!("{name}: {e}")))?;
+    let attribute = owner.new_attr_builder().empty_as(null_terminated(value.len() + 1)?).create(name)?;
+    attribute.as_writer().conversion(hdf5::Conversion::Soft).write_scalar(&text)
 }
 
 /// Names the dimensions of a dataset by their scales.

@@ -171,7 +171,7 @@ async fn other_grids_and_overlapping_periods_are_conflicts() {
     file.write_classic(&place.path("grid.nc"));
     assert_refused(&place, "grid.nc", RejectReason::Conflict, &["fgco2"]).await;
     let mut file = SmallFile::new();
-    (file.time, file.unit) = (vec![10.0, 11.0], "g C m-2 d-1");
+    (file.time, file.unit) = (vec![10.0, 11.0], "mg C m-2 d-1");
     file.write_classic(&place.path("days.nc"));
     assert_refused(&place, "days.nc", RejectReason::Conflict, &["overlaps"]).await;
     assert_eq!(place.newest("fgco2").await.number, 1);
