@@ -7,7 +7,7 @@ use contract::job::{Mode, RenderJob, View};
 use glam::DVec3;
 
 use super::look::{self, Look};
-use super::{Plan, area_m2, height_range_m};
+use super::{Plan, area_m2, entry_shift, height_range_m};
 use crate::scene::Scene;
 use crate::stages::layout::{Active, Col, Params, Row, VIEW_GLOBE};
 
@@ -17,6 +17,9 @@ const OPENING_DEG: f64 = 45.0;
 const MOST_LIGHT_TEXELS: f64 = 320.0;
 /// Parts of a light texel that positions are rounded to.
 const LIGHT_UNIT: i32 = 256;
+
+/// Largest particle on the screen over one on the ground below the camera.
+const NEAREST_OVER_FARTHEST: f64 = 4.0;
 
 struct Camera {
     place: DVec3,
@@ -49,11 +52,16 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) {
     let look = Look::of(job.mode);
     let particles = look.particles_per_cell(cell_px, job.style.particles_per_cell);
     params.particles_per_cell = particles;
+    let radius_px = look.radius_px(cell_px, particles);
+    // Particles lifted close to the camera are left out rather than fill the picture.
+    let widest_px = NEAREST_OVER_FARTHEST * radius_px + 16.0;
+    params.max_radius_px = widest_px as f32;
+    params.entry_shift = entry_shift(widest_px);
     plan.rows = rows(scene, &look, &camera, particles, job.style.optical_depth);
     let heights = height_range_m(job, scene).map(|height_m| height_m / SPHERE_RADIUS_M);
     let horizon = (1.0 / (1.0 + camera.height)).acos() + (1.0 / (1.0 + heights[1])).acos() + 2.0 * cell_rad;
     let half = slice_planes(plan, job, camera.up, sun, heights, horizon);
-    light_frame(plan, &camera, sun, half, heights, horizon, cell_rad * look.radius_cells);
+    light_frame(plan, &camera, sun, half, heights, horizon, radius_px / camera.focal_px * camera.height);
     choose_cells(plan, scene, camera.up, horizon.min(PI));
 }
 
@@ -106,7 +114,7 @@ fn rows(scene: &Scene, look: &Look, camera: &Camera, particles: u32, style_depth
             let lat = 0.5 * (north + south);
             let area = (north.sin() - south.sin()) * grid.dlon_deg.to_radians();
             let per_radian_px = camera.focal_px / camera.height;
-            let radius = look.radius_px(area.max(1e-12).sqrt() * per_radian_px) / per_radian_px;
+            let radius = look.radius_px(area.max(1e-12).sqrt() * per_radian_px, particles) / per_radian_px;
             Row {
                 sin_lat: lat.sin() as f32,
                 cos_lat: lat.cos() as f32,
@@ -164,7 +172,7 @@ fn light_frame(
     params.light_u0 = (camera.up.dot(axis_u) - reach) as f32;
     params.light_v0 = (camera.up.dot(axis_v) - reach) as f32;
     params.light_texels_per_unit = (1.0 / texel) as f32;
-    params.light_depth_gain = (PI / 3.0 / (texel * texel)) as f32;
+    params.light_depth_gain = (look::LIGHT_DEPTH * PI / 3.0 / (texel * texel)) as f32;
     write(axis_u, [&mut params.light_u_x, &mut params.light_u_y, &mut params.light_u_z]);
     write(axis_v, [&mut params.light_v_x, &mut params.light_v_y, &mut params.light_v_z]);
 }

@@ -9,11 +9,15 @@ pub(super) const HEIGHT_LIMIT_M: f64 = 1.2e6;
 /// Turns of a particle through its column for each kg m⁻²: at 60 g m⁻² a year it rises three times a year.
 pub(super) const TURNS_PER_KG_M2: f32 = 50.0;
 /// Share of the optical depth that a cell without flux keeps.
-pub(super) const FLOOR_DIVERGING: f32 = 0.12;
+pub(super) const FLOOR_DIVERGING: f32 = 0.18;
 /// The same for quantities without a sign.
 pub(super) const FLOOR_SEQUENTIAL: f32 = 0.45;
 /// Light that reaches everything.
-pub(super) const AMBIENT: f32 = 0.42;
+pub(super) const AMBIENT: f32 = 0.5;
+/// Direct light at full strength: above 1 together with the ambient, so that lit slopes stand out.
+pub(super) const DIRECT: f32 = 0.65;
+/// Share of the eye's optical depth that dims light; the rest is scattered forwards.
+pub(super) const LIGHT_DEPTH: f64 = 0.6;
 /// Opacity of a thematic map: the base map shines through a little.
 pub(super) const MAP_ALPHA: f32 = 0.9;
 /// Pixels north that a metre of height moves a particle, in pixels a metre: the slope of the view of map tiles.
@@ -26,9 +30,14 @@ pub(super) const LOWEST_SUN_DEG: f64 = 20.0;
 /// particle's own kernel does (variance texel²/3 against radius²/8).
 pub(super) const TEXEL_PER_RADIUS: f64 = 0.612;
 
+/// Clouds that overlap at a place: the fewer, the grainier; the more, the slower.
+const CLOUDS_OVER_A_POINT: f64 = 44.0;
+/// Radius of the largest clouds over the side of a cell: larger ones would blur what the grid resolves.
+const WIDEST_CELLS: f64 = 1.6;
+
 /// How particles of one mode look.
 pub(super) struct Look {
-    /// Radius over the side of a cell.
+    /// Radius over the side of a cell; for clouds the least.
     pub radius_cells: f64,
     /// Smallest radius.
     pub min_radius_px: f32,
@@ -36,6 +45,8 @@ pub(super) struct Look {
     pub max_radius_px: f64,
     /// Radius of a particle without flux is smaller by this share.
     pub size_spread: f32,
+    /// Random places spread over 2 to the minus this of a cell.
+    pub shake_shift: u32,
     /// Pixels for each particle: fewer particles a cell are drawn where cells are small.
     pub area_px_per_particle: f64,
     /// Optical depth at the centre if it is the same at any size, over the style's optical depth.
@@ -50,6 +61,7 @@ impl Look {
                 min_radius_px: 1.2,
                 max_radius_px: 3.5,
                 size_spread: 0.3,
+                shake_shift: 0,
                 area_px_per_particle: 7.0,
                 center_depth: Some(3.0),
             },
@@ -58,15 +70,17 @@ impl Look {
                 min_radius_px: 2.2,
                 max_radius_px: 28.0,
                 size_spread: 0.45,
+                shake_shift: 0,
                 area_px_per_particle: 12.0,
                 center_depth: Some(2.0),
             },
             Mode::Volume | Mode::Map => Self {
-                radius_cells: 1.15,
-                min_radius_px: 1.6,
+                radius_cells: 0.7,
+                min_radius_px: 1.8,
                 max_radius_px: f64::INFINITY,
-                size_spread: 0.25,
-                area_px_per_particle: 1.6,
+                size_spread: 0.2,
+                shake_shift: 3,
+                area_px_per_particle: 1.8,
                 center_depth: None,
             },
         }
@@ -78,9 +92,16 @@ impl Look {
         (wanted.min(f64::from(style)) as u32).max(1)
     }
 
-    /// Radius of a full-size particle in a cell of this side, pixels.
-    pub(super) fn radius_px(&self, cell_px: f64) -> f64 {
-        (self.radius_cells * cell_px).clamp(f64::from(self.min_radius_px), self.max_radius_px.max(f64::from(self.min_radius_px)))
+    /// Radius of a full-size particle in a cell of this side, pixels. Clouds are larger where fewer share a cell, so
+    /// that about as many overlap everywhere.
+    pub(super) fn radius_px(&self, cell_px: f64, particles: u32) -> f64 {
+        let least = f64::from(self.min_radius_px);
+        let cells = if self.center_depth.is_some() {
+            self.radius_cells
+        } else {
+            (CLOUDS_OVER_A_POINT / (std::f64::consts::PI * f64::from(particles))).sqrt().clamp(self.radius_cells, WIDEST_CELLS)
+        };
+        (cells * cell_px).clamp(least, self.max_radius_px.max(least))
     }
 
     /// Optical depth at a particle's centre for a column of optical depth 1: what the column's depth over its area is

@@ -13,7 +13,7 @@ use contract::job::{Mode, RenderJob, View};
 use crate::error::RenderError;
 use crate::scene::Scene;
 use crate::stages::layout::{
-    Active, Axis, Col, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, Params, Particle, Row, SCREEN_TILE_PX, Splat,
+    Active, Axis, Col, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, Params, Particle, Row, SCREEN_TILE_PX, SUBPIXELS, Splat,
 };
 use look::Look;
 
@@ -141,10 +141,12 @@ fn common(job: &RenderJob, scene: &Scene) -> Params {
         front_to_back: 1,
         slices: style.slices,
         size_spread: look.size_spread,
+        shake_shift: look.shake_shift,
         min_radius_px: look.min_radius_px,
         max_radius_px: look::MAX_RADIUS_PX,
         light_on: u32::from(job.mode == Mode::Volume),
         ambient: look::AMBIENT,
+        direct: look::DIRECT,
         map_alpha: look::MAP_ALPHA,
         grid_west_rad: grid.west_deg.to_radians() as f32,
         grid_north_rad: grid.north_deg.to_radians() as f32,
@@ -177,6 +179,12 @@ fn height_range_m(job: &RenderJob, scene: &Scene) -> [f64; 2] {
     // Half the sheet, and a metre so that rounding cannot put a particle outside.
     let sheet = 0.5 * look::SHEET_M + 1.0;
     [scaled(low).min(0.0) - sheet, scaled(high).max(0.0) + sheet]
+}
+
+/// Shift that makes positions up to `widest_px` beyond a screen tile fit 16 bits with their sign.
+fn entry_shift(widest_px: f64) -> u32 {
+    let farthest_sub = (widest_px + 2.0 * f64::from(SCREEN_TILE_PX)) * f64::from(SUBPIXELS);
+    (farthest_sub / f64::from(i16::MAX)).max(1.0).log2().ceil() as u32
 }
 
 /// Area of the cells of every row, m².

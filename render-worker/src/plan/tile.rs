@@ -9,7 +9,7 @@ use contract::job::{Mode, RenderJob};
 use contract::tile::{MAX_LAT_DEG, Tile, mercator_lat_deg, mercator_x, mercator_y};
 
 use super::look::{self, Look};
-use super::{Plan, area_m2, height_range_m};
+use super::{Plan, area_m2, entry_shift, height_range_m};
 use crate::scene::Scene;
 use crate::stages::layout::{Active, Axis, Col, Row, SUBPIXELS, VIEW_TILE};
 
@@ -52,7 +52,7 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene, tile: Tile, 
     plan.params.height_px_per_m = (look::OBLIQUE * level.px_per_m) as f32;
     plan.params.slice_top = heights_m[1] as f32;
     plan.params.slices_per_unit = (f64::from(job.style.slices) / (heights_m[1] - heights_m[0])) as f32;
-    let spans = light_and_reach(plan, job, &level, heights_m, look.radius_px(cell_px));
+    let spans = light_and_reach(plan, job, &level, heights_m, look.radius_px(cell_px, particles));
     choose_cells(plan, scene, &level, spans);
 }
 
@@ -65,7 +65,7 @@ fn rows(scene: &Scene, level: &Level, look: &Look, col_px: f64, particles: u32, 
         .map(|row| {
             let (north, south) = (edge_px(row), edge_px(row + 1));
             let area_px = (south - north).max(1e-6) * col_px;
-            let radius = look.radius_px(area_px.sqrt());
+            let radius = look.radius_px(area_px.sqrt(), particles);
             // Rows far from the tile do not fit; they are never chosen.
             let y_sub = (north * subpixels).round().clamp(-1e9, 1e9) as i32;
             Row {
@@ -87,6 +87,7 @@ fn light_and_reach(plan: &mut Plan, job: &RenderJob, level: &Level, heights_m: [
     let per_m = level.px_per_m * subpixels;
     let edge = level.size_px * subpixels;
     let margin = widest * subpixels;
+    plan.params.entry_shift = entry_shift(widest);
     let shift = |span: Span, per_m: f64| -> Span {
         let moves = heights_m.map(|h| h * per_m);
         [span[0] + moves[0].min(moves[1]) - 2.0, span[1] + moves[0].max(moves[1]) + 2.0]
@@ -118,7 +119,7 @@ fn light_and_reach(plan: &mut Plan, job: &RenderJob, level: &Level, heights_m: [
     [params.light_width, params.light_height] = texels;
     [params.light_shift_x_per_m, params.light_shift_y_per_m] = shadow_per_m.map(|shift| shift as f32);
     let texel_px = unit / subpixels;
-    params.light_depth_gain = (PI / 3.0 / (texel_px * texel_px) / elevation.sin()) as f32;
+    params.light_depth_gain = (look::LIGHT_DEPTH * PI / 3.0 / (texel_px * texel_px) / elevation.sin()) as f32;
     reach
 }
 

@@ -2,8 +2,10 @@
 
 /// Invocations of a workgroup in stages that run over a list.
 pub const GROUP: u32 = 128;
-/// Side of a screen tile, pixels; also the side of an eye workgroup.
+/// Side of a screen tile, pixels.
 pub const SCREEN_TILE_PX: u32 = 8;
+/// Subpixels of a screen tile, as a shift.
+pub const SCREEN_TILE_SHIFT: u32 = 7;
 /// Positions on the screen are whole multiples of this part of a pixel, so that no two tiles round them differently.
 pub const SUBPIXELS: i32 = 16;
 /// Optical depth 1 in the integers that light and eye sum up.
@@ -43,6 +45,8 @@ shared_struct! {
         pub active_count: u32,
         pub particles_per_cell: u32,
         pub particle_count: u32,
+        /// Random places spread over 2 to the minus this of a cell.
+        pub shake_shift: u32,
         pub height_m_per_kg_m2: f32,
         pub height_limit_m: f32,
         pub sheet_m: f32,
@@ -76,6 +80,7 @@ shared_struct! {
         pub light_v0: f32,
         pub light_texels_per_unit: f32,
         pub ambient: f32,
+        pub direct: f32,
         pub lon_span_rad: f32,
         pub per_earth_radius_m: f32,
         pub focal_px: f32,
@@ -115,7 +120,8 @@ shared_struct! {
         /// Left and top of the part drawn, pixels (globe views are drawn in parts).
         pub origin_x_px: i32,
         pub origin_y_px: i32,
-        pub pad: u32,
+        /// Bits that places in lists are coarser than subpixels, so that the largest particle fits 16 bits.
+        pub entry_shift: u32,
     }
 }
 
@@ -208,10 +214,11 @@ shared_struct! {
 shared_struct! {
     /// A splat in the list of one screen tile and slice.
     pub struct Entry {
-        pub x_sub: i32,
-        pub y_sub: i32,
-        pub inverse_radius_px: f32,
-        pub tau: f32,
+        /// Centre from the screen tile's corner, east in the low and south in the high 16 bits, both signed, in
+        /// subpixels shifted right by `Params::entry_shift`.
+        pub place: u32,
+        /// Radius in the same unit in the low 16 bits, optical depth at the centre times [`DEPTH_ONE`] in the high.
+        pub size: u32,
         /// Red, green, blue, slice; 8 bits each, red lowest.
         pub color: u32,
     }

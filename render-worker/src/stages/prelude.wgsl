@@ -2,19 +2,19 @@
 struct Params {
     rows: u32, cols: u32, periodic: u32, first_cell: u32, end_cell: u32, value_weight: f32, accumulated_weight: f32,
     has_accumulated: u32, transfer_low: f32, transfer_per_unit: f32, strength_per_unit: f32, diverging: u32,
-    depth_floor: f32, active_count: u32, particles_per_cell: u32, particle_count: u32, height_m_per_kg_m2: f32,
+    depth_floor: f32, active_count: u32, particles_per_cell: u32, particle_count: u32, shake_shift: u32, height_m_per_kg_m2: f32,
     height_limit_m: f32, sheet_m: f32, turns_per_kg_m2: f32, optical_depth: f32, view: u32, kernel: u32,
     front_to_back: u32, width: u32, height: u32, tiles_x: u32, tiles_y: u32, slices: u32, entry_capacity: u32,
     min_radius_px: f32, max_radius_px: f32, size_spread: f32, height_px_per_m: f32, slice_top: f32,
     slices_per_unit: f32, light_on: u32, light_width: u32, light_height: u32, light_unit: i32, light_origin_x: i32,
     light_origin_y: i32, light_shift_x_per_m: f32, light_shift_y_per_m: f32, light_depth_gain: f32, light_u0: f32,
-    light_v0: f32, light_texels_per_unit: f32, ambient: f32, lon_span_rad: f32, per_earth_radius_m: f32,
+    light_v0: f32, light_texels_per_unit: f32, ambient: f32, direct: f32, lon_span_rad: f32, per_earth_radius_m: f32,
     focal_px: f32, eye_x: f32, eye_y: f32, eye_z: f32, right_x: f32, right_y: f32, right_z: f32, up_x: f32,
     up_y: f32, up_z: f32, forward_x: f32, forward_y: f32, forward_z: f32, half_x: f32, half_y: f32, half_z: f32,
     sun_x: f32, sun_y: f32, sun_z: f32, light_u_x: f32, light_u_y: f32, light_u_z: f32, light_v_x: f32,
     light_v_y: f32, light_v_z: f32, center_px_x: f32, center_px_y: f32, grid_west_rad: f32, grid_north_rad: f32,
     cols_per_rad: f32, rows_per_rad: f32, edge_sharpness: f32, map_alpha: f32, surface: u32, origin_x_px: i32,
-    origin_y_px: i32, pad: u32,
+    origin_y_px: i32, entry_shift: u32,
 }
 struct Row {
     y_sub: i32, y_span_px: f32, sin_lat: f32, cos_lat: f32, lat_span_rad: f32, radius: f32, area_m2: f32,
@@ -34,7 +34,7 @@ struct Splat {
     day: f32, color: u32,
 }
 struct Entry {
-    x_sub: i32, y_sub: i32, inverse_radius_px: f32, tau: f32, color: u32,
+    place: u32, size: u32, color: u32,
 }
 struct Axis {
     index: i32, fraction: f32,
@@ -42,6 +42,7 @@ struct Axis {
 
 const GROUP = 128u;
 const SCREEN_TILE_PX = 8u;
+const SCREEN_TILE_SHIFT = 7u;
 const SUBPIXELS = 16;
 const DEPTH_ONE = 4096.0;
 const MISSING = -1.0e30;

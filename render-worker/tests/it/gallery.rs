@@ -11,7 +11,9 @@ use crate::scenes::{ONE_DEGREE, globe, job, ocean, tile};
 fn the_gallery_is_drawn_where_asked_for() {
     #[expect(clippy::disallowed_methods, reason = "a test's own switch")]
     let Ok(folder) = std::env::var("GALLERY") else { return };
-    let renderer = Renderer::new(Backend::Gpu).unwrap();
+    #[expect(clippy::disallowed_methods, reason = "a test's own switch")]
+    let backend = if std::env::var("GALLERY_CPU").is_ok() { Backend::Cpu } else { Backend::Gpu };
+    let renderer = Renderer::new(backend).unwrap();
     let scene = ocean(ONE_DEGREE);
     println!("{}", renderer.name());
     let views = [
@@ -31,12 +33,14 @@ fn the_gallery_is_drawn_where_asked_for() {
             let mut job = job(mode, view);
             job.style.globe_surface = true;
             renderer.render(&job, &scene).unwrap();
+            let busy = busy_ms();
             let start = Instant::now();
             let image = renderer.render(&job, &scene).unwrap();
             let drawn = start.elapsed();
+            let busy = busy_ms() - busy;
             let png = image.encode_png().unwrap();
             let all = start.elapsed();
-            println!("{mode} {name}: {:.1} ms, with PNG {:.1} ms, {} bytes", drawn.as_secs_f64() * 1e3, all.as_secs_f64() * 1e3, png.len());
+            println!("{mode} {name}: {busy} ms of processor, {:.1} ms, with PNG {:.1} ms, {} bytes", drawn.as_secs_f64() * 1e3, all.as_secs_f64() * 1e3, png.len());
             std::fs::write(format!("{folder}/{mode}-{name}.png"), png).unwrap();
             sheet.add(&image);
         }
@@ -78,4 +82,11 @@ impl Sheet {
 
 fn quarters(image: &Image) -> Vec<(&Image, u32, u32)> {
     if image.width == 256 { vec![(image, 0, 0)] } else { vec![(image, 0, 0), (image, 256, 0), (image, 0, 256), (image, 256, 256)] }
+}
+
+/// Processor time of this process: what a picture costs also while other programs run.
+fn busy_ms() -> i64 {
+    let stat = std::fs::read_to_string("/proc/self/stat").unwrap();
+    let ticks: Vec<i64> = stat.rsplit(')').next().unwrap().split_whitespace().filter_map(|field| field.parse().ok()).collect();
+    (ticks[10] + ticks[11]) * 10
 }

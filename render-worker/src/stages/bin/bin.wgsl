@@ -6,18 +6,22 @@
 @group(0) @binding(4) var<storage, read_write> entries: array<Entry>;
 
 const PER_INVOCATION = 8u;
-const TILE_SUB = 128; // SCREEN_TILE_PX * SUBPIXELS
-
+// Depth of one splat at one pixel: a colour sum of the eye grows by less than 2^24 at once and cannot wrap.
+const MOST_DEPTH = 15.0;
 // First and last screen tile that a splat touches, x and y; empty if it touches none. Whole numbers only: `count` and
 // `scatter` must agree to the last bit.
 struct Reach { low: vec2<i32>, high: vec2<i32> }
 
+fn radius_of(splat: Splat) -> i32 {
+    return max(nearest(splat.radius_px * f32(SUBPIXELS)) >> params.entry_shift, 1);
+}
+
 fn reach_of(splat: Splat) -> Reach {
     if (splat.tau <= 0.0) { return Reach(vec2(0), vec2(-1)); }
-    let radius = i32(ceil(splat.radius_px * f32(SUBPIXELS)));
+    let radius = radius_of(splat) << params.entry_shift;
     let place = vec2(splat.x_sub, splat.y_sub);
     let tiles = vec2(i32(params.tiles_x), i32(params.tiles_y));
-    return Reach(max((place - radius) >> vec2(7u), vec2(0)), min((place + radius) >> vec2(7u), tiles - 1));
+    return Reach(max((place - radius) >> vec2(SCREEN_TILE_SHIFT), vec2(0)), min((place + radius) >> vec2(SCREEN_TILE_SHIFT), tiles - 1));
 }
 
 fn list_of(x: i32, y: i32, splat: Splat) -> u32 {
@@ -105,11 +109,14 @@ fn scatter(@builtin(global_invocation_id) global: vec3<u32>, @builtin(num_workgr
     let splat = splats[i];
     let reach = reach_of(splat);
     let color = (splat.color & 0xffffffu) | (u32(splat.slice) << 24u);
-    let entry = Entry(splat.x_sub, splat.y_sub, 1.0 / splat.radius_px, splat.tau, color);
+    let depth = u32(min(splat.tau, MOST_DEPTH) * DEPTH_ONE + 0.5);
+    let size = u32(radius_of(splat)) | (depth << 16u);
     for (var y = reach.low.y; y <= reach.high.y; y++) {
         for (var x = reach.low.x; x <= reach.high.x; x++) {
             let at = atomicAdd(&counts[list_of(x, y, splat)], 1u);
-            if (at < params.entry_capacity) { entries[at] = entry; }
+            let corner = vec2(x, y) << vec2(SCREEN_TILE_SHIFT);
+            let place = vec2<u32>((vec2(splat.x_sub, splat.y_sub) - corner) >> vec2(params.entry_shift));
+            if (at < params.entry_capacity) { entries[at] = Entry((place.x & 0xffffu) | (place.y << 16u), size, color); }
         }
     }
 }

@@ -1,17 +1,22 @@
 //! CPU twin of `bin.wgsl`.
 
-use crate::stages::layout::{Entry, Params, SCREEN_TILE_PX, SUBPIXELS, Splat};
+use crate::stages::layout::{DEPTH_ONE, Entry, Params, SCREEN_TILE_SHIFT, SUBPIXELS, Splat, nearest};
+
+const MOST_DEPTH: f32 = 15.0;
+
+fn radius_of(params: &Params, splat: &Splat) -> i32 {
+    (nearest(splat.radius_px * SUBPIXELS as f32) >> params.entry_shift).max(1)
+}
 
 /// Screen tiles a splat touches, as half-open ranges of columns and rows.
 fn reach_of(params: &Params, splat: &Splat) -> [std::ops::Range<u32>; 2] {
     if splat.tau <= 0.0 {
         return [0..0, 0..0];
     }
-    let tile_sub = SCREEN_TILE_PX as i32 * SUBPIXELS;
-    let radius = (splat.radius_px * SUBPIXELS as f32).ceil() as i32;
+    let radius = radius_of(params, splat) << params.entry_shift;
     let axis = |place: i32, tiles: u32| {
-        let low = (place - radius).div_euclid(tile_sub).max(0) as u32;
-        let end = ((place + radius).div_euclid(tile_sub) + 1).clamp(0, tiles as i32) as u32;
+        let low = ((place - radius) >> SCREEN_TILE_SHIFT).max(0) as u32;
+        let end = (((place + radius) >> SCREEN_TILE_SHIFT) + 1).clamp(0, tiles as i32) as u32;
         low..end.max(low)
     };
     [axis(splat.x_sub, params.tiles_x), axis(splat.y_sub, params.tiles_y)]
@@ -44,15 +49,15 @@ pub fn scan(counts: &mut [u32]) -> u32 {
 /// Writes every entry and moves each list's start to its end.
 pub fn scatter(params: &Params, splats: &[Splat], counts: &mut [u32], entries: &mut [Entry]) {
     for splat in splats {
-        let entry = Entry {
-            x_sub: splat.x_sub,
-            y_sub: splat.y_sub,
-            inverse_radius_px: 1.0 / splat.radius_px,
-            tau: splat.tau,
-            color: (splat.color & 0x00ff_ffff) | ((splat.slice as u32) << 24),
-        };
+        let depth = (splat.tau.min(MOST_DEPTH) * DEPTH_ONE + 0.5) as u32;
+        let size = radius_of(params, splat) as u32 | (depth << 16);
+        let color = (splat.color & 0x00ff_ffff) | ((splat.slice as u32) << 24);
         for list in lists_of(params, splat) {
-            entries[counts[list] as usize] = entry;
+            let tile = list as u32 / params.slices;
+            let corner = [tile % params.tiles_x, tile / params.tiles_x].map(|t| (t << SCREEN_TILE_SHIFT) as i32);
+            let offset = |place: i32, corner: i32| ((place - corner) >> params.entry_shift) as u32;
+            let place = (offset(splat.x_sub, corner[0]) & 0xffff) | (offset(splat.y_sub, corner[1]) << 16);
+            entries[counts[list] as usize] = Entry { place, size, color };
             counts[list] += 1;
         }
     }

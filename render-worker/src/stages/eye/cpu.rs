@@ -1,15 +1,17 @@
-//! CPU twin of `eye.wgsl`.
+//! CPU twin of `eye.wgsl`. Every entry visits only the pixels it can reach: the order inside a slice cannot matter.
 
 use glam::{Vec2, Vec4};
 
 use crate::stages::layout::{DEPTH_ONE, Entry, KERNEL_BALL, KERNEL_CLOUD, Params, SCREEN_TILE_PX, SUBPIXELS};
 
 const MOST_SUM: u32 = 0x7fff_ffff;
-const MOST_DEPTH: f32 = 15.0;
+const TILE: usize = SCREEN_TILE_PX as usize;
 
-/// Share of a splat's depth at `offset` radii from its centre.
-pub fn weight_at(kernel: u32, offset: Vec2, radius_px: f32) -> f32 {
-    let q = offset.dot(offset);
+/// Sums of red, green, blue and optical depth of every pixel of a screen tile.
+type Sums = [[u32; 4]; TILE * TILE];
+
+/// Share of a splat's depth at a squared distance of `q` squared radii from its centre.
+pub fn weight_at(kernel: u32, q: f32, radius_px: f32) -> f32 {
     if kernel == KERNEL_CLOUD {
         let inside = (1.0 - q).max(0.0);
         return inside * inside;
@@ -20,22 +22,6 @@ pub fn weight_at(kernel: u32, offset: Vec2, radius_px: f32) -> f32 {
 fn ball_light(offset: Vec2) -> f32 {
     let toward = (1.0 - offset.dot(offset)).max(0.0).sqrt();
     0.55 + 0.45 * (-0.45 * offset.x - 0.55 * offset.y + 0.70 * toward).clamp(0.0, 1.0)
-}
-
-fn contribution(params: &Params, entry: &Entry, pixel_sub: [i32; 2]) -> [u32; 4] {
-    let [dx, dy] = [pixel_sub[0] - entry.x_sub, pixel_sub[1] - entry.y_sub];
-    let offset = Vec2::new(dx as f32, dy as f32) * (entry.inverse_radius_px / SUBPIXELS as f32);
-    if offset.dot(offset) >= 1.0 {
-        return [0; 4];
-    }
-    let depth = (entry.tau * weight_at(params.kernel, offset, 1.0 / entry.inverse_radius_px)).min(MOST_DEPTH);
-    let amount = (depth * DEPTH_ONE + 0.5) as u32;
-    let light = if params.kernel == KERNEL_BALL { ball_light(offset) } else { 1.0 };
-    let channel = |shift: u32| {
-        let plain = (entry.color >> shift) & 255;
-        amount * if params.kernel == KERNEL_BALL { (plain as f32 * light + 0.5) as u32 } else { plain }
-    };
-    [channel(0), channel(8), channel(16), amount]
 }
 
 /// Colour with alpha, premultiplied, once the slice with these sums is blended into it.
@@ -57,32 +43,56 @@ pub fn eye(params: &Params, list_ends: &[u32], entries: &[Entry], picture: &mut 
             let first_list = ((tile_y * params.tiles_x + tile_x) * params.slices) as usize;
             let first = if first_list == 0 { 0 } else { list_ends[first_list - 1] as usize };
             let end = list_ends[first_list + params.slices as usize - 1] as usize;
-            let list = &entries[first..end];
-            for y in tile_y * SCREEN_TILE_PX..((tile_y + 1) * SCREEN_TILE_PX).min(params.height) {
-                for x in tile_x * SCREEN_TILE_PX..((tile_x + 1) * SCREEN_TILE_PX).min(params.width) {
-                    picture[(y * params.width + x) as usize] = pixel(params, list, x, y);
+            let colors = screen_tile(params, &entries[first..end]);
+            let [left, top] = [tile_x, tile_y].map(|tile| tile * SCREEN_TILE_PX);
+            for y in top..(top + SCREEN_TILE_PX).min(params.height) {
+                for x in left..(left + SCREEN_TILE_PX).min(params.width) {
+                    picture[(y * params.width + x) as usize] = colors[(y - top) as usize * TILE + (x - left) as usize];
                 }
             }
         }
     }
 }
 
-fn pixel(params: &Params, list: &[Entry], x: u32, y: u32) -> Vec4 {
-    let front_to_back = params.front_to_back == 1;
-    let pixel_sub = [x, y].map(|p| p as i32 * SUBPIXELS + SUBPIXELS / 2);
-    let mut color = Vec4::ZERO;
-    let mut sums = [0u32; 4];
-    let mut slice = 0;
-    for entry in list {
-        if entry.color >> 24 != slice {
-            slice = entry.color >> 24;
-            color = blended(front_to_back, color, sums);
-            sums = [0; 4];
+fn screen_tile(params: &Params, list: &[Entry]) -> [Vec4; TILE * TILE] {
+    let mut colors = [Vec4::ZERO; TILE * TILE];
+    for slice in list.chunk_by(|a, b| a.color >> 24 == b.color >> 24) {
+        let mut sums = [[0u32; 4]; TILE * TILE];
+        for entry in slice {
+            add(params, entry, &mut sums);
         }
-        let own = contribution(params, entry, pixel_sub);
-        for (sum, own) in sums.iter_mut().zip(own) {
-            *sum = (*sum + own).min(MOST_SUM);
+        for (color, sums) in colors.iter_mut().zip(sums) {
+            *color = blended(params.front_to_back == 1, *color, sums);
         }
     }
-    blended(front_to_back, color, sums)
+    colors
+}
+
+fn add(params: &Params, entry: &Entry, sums: &mut Sums) {
+    let pixel_units = SUBPIXELS as f32 / (1u32 << params.entry_shift) as f32;
+    let radius = (entry.size & 0xffff) as f32;
+    let inverse_radius = 1.0 / radius;
+    let depth = (entry.size >> 16) as f32;
+    let rgb = [0, 8, 16].map(|shift| (entry.color >> shift) & 255);
+    let [east, south] = [(entry.place << 16) as i32 >> 16, entry.place as i32 >> 16].map(|place| place as f32);
+    // A pixel more on either side: what lies outside the radius adds nothing.
+    let reach = |place: f32| {
+        let low = ((place - radius) / pixel_units - 1.5).max(0.0) as usize;
+        let end = ((place + radius) / pixel_units + 1.5).clamp(0.0, TILE as f32) as usize;
+        low.min(end)..end
+    };
+    for y in reach(south) {
+        for x in reach(east) {
+            let center = Vec2::new(x as f32 + 0.5, y as f32 + 0.5) * pixel_units;
+            let offset = (center - Vec2::new(east, south)) * inverse_radius;
+            let q = offset.dot(offset);
+            let amount = (depth * weight_at(params.kernel, q, radius / pixel_units) + 0.5) as u32;
+            let sum = &mut sums[y * TILE + x];
+            for (channel, plain) in rgb.into_iter().enumerate() {
+                let lit = if params.kernel == KERNEL_BALL { (plain as f32 * ball_light(offset) + 0.5) as u32 } else { plain };
+                sum[channel] = (sum[channel] + lit * amount).min(MOST_SUM);
+            }
+            sum[3] = (sum[3] + amount).min(MOST_SUM);
+        }
+    }
 }

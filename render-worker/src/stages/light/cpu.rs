@@ -64,7 +64,7 @@ fn depth_above(params: &Params, light: &[u32], texel: [i32; 2], slice: u32, part
 }
 
 fn dimmed(color: u32, shade: f32) -> u32 {
-    let channel = |shift: u32| (nearest(((color >> shift) & 255) as f32 * shade) as u32) << shift;
+    let channel = |shift: u32| (nearest((((color >> shift) & 255) as f32 * shade).min(255.0)) as u32) << shift;
     channel(0) | channel(8) | channel(16) | (color & 0xff00_0000)
 }
 
@@ -82,6 +82,6 @@ pub fn shade(params: &Params, light: &[u32], splats: &mut [Splat]) {
         let north_row = mix(depth([x, y]), depth([x + 1, y]), east);
         let south_row = mix(depth([x, y + 1]), depth([x + 1, y + 1]), east);
         let transmittance = (-mix(north_row, south_row, south)).exp();
-        splat.color = dimmed(splat.color, params.ambient + (1.0 - params.ambient) * transmittance * splat.day);
+        splat.color = dimmed(splat.color, params.ambient + params.direct * transmittance * splat.day);
     }
 }

@@ -68,7 +68,7 @@ fn depth_above(texel: vec2<i32>, slice: u32, part: f32) -> f32 {
 }
 
 fn dimmed(color: u32, shade: f32) -> u32 {
-    let rgb = vec3(f32(color & 255u), f32((color >> 8u) & 255u), f32((color >> 16u) & 255u)) * shade;
+    let rgb = min(vec3(f32(color & 255u), f32((color >> 8u) & 255u), f32((color >> 16u) & 255u)) * shade, vec3(255.0));
     return u32(nearest(rgb.x)) | (u32(nearest(rgb.y)) << 8u) | (u32(nearest(rgb.z)) << 16u) | (color & 0xff000000u);
 }
 
@@ -84,5 +84,5 @@ fn shade(@builtin(global_invocation_id) global: vec3<u32>, @builtin(num_workgrou
     let north = mix(depth_above(texel.index, slice, part), depth_above(texel.index + vec2(1, 0), slice, part), texel.part.x);
     let south = mix(depth_above(texel.index + vec2(0, 1), slice, part), depth_above(texel.index + vec2(1, 1), slice, part), texel.part.x);
     let transmittance = exp(-mix(north, south, texel.part.y));
-    splats[i].color = dimmed(splat.color, params.ambient + (1.0 - params.ambient) * transmittance * splat.day);
+    splats[i].color = dimmed(splat.color, params.ambient + params.direct * transmittance * splat.day);
 }

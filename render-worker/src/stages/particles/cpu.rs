@@ -2,6 +2,9 @@
 
 use crate::stages::layout::{Active, Params, Particle, Row, is_missing, nearest};
 
+/// 0.5 in 32 bits.
+const HALF_TURN: u32 = 0x8000_0000;
+
 /// What the stage reads.
 pub struct Inputs<'a> {
     pub active: &'a [Active],
@@ -25,7 +28,7 @@ pub fn unit(bits: u32) -> f32 {
 
 /// Thin at both ends of a column, so that particles appear and vanish unseen; mean 1.
 pub fn envelope(phase: f32) -> f32 {
-    (phase.min(1.0 - phase) * 4.0).clamp(0.0, 1.0) * (4.0 / 3.0)
+    (phase.min(1.0 - phase) * 8.0).clamp(0.0, 1.0) * (8.0 / 7.0)
 }
 
 fn strength_of(params: &Params, value: f32, position: f32) -> f32 {
@@ -44,10 +47,12 @@ pub fn generate(params: &Params, inputs: &Inputs<'_>, particles: &mut [Particle]
 fn one(params: &Params, inputs: &Inputs<'_>, cell: Active, k: u32) -> Particle {
     let row = cell.cell / params.cols;
     let value = inputs.value[cell.cell as usize];
-    let cell_bits = hash(cell.cell);
-    let bits = hash(cell_bits ^ k.wrapping_mul(0x9e3779b9));
-    let east = cell_bits.wrapping_add(k.wrapping_mul(3242174889)).wrapping_add(bits >> 3);
-    let south = hash(cell_bits).wrapping_add(k.wrapping_mul(2447445414)).wrapping_add(hash(bits) >> 3);
+    let bits = hash(hash(cell.cell) ^ k.wrapping_mul(0x9e3779b9));
+    let shaken = |bits: u32| (bits >> params.shake_shift).wrapping_sub(HALF_TURN >> params.shake_shift);
+    let along = |step: u32, bits: u32| HALF_TURN.wrapping_add(k.wrapping_mul(step)).wrapping_add(shaken(bits));
+    let (east, south) = (along(3242174889, bits), along(2447445414, hash(bits)));
+    let across = (cell.cell % params.cols).wrapping_mul(1779033704);
+    let start = row.wrapping_add(k).wrapping_mul(2654435769).wrapping_add(across);
     let mut particle =
         Particle { row, slot: cell.slot, east: unit(east), south: unit(south), ..Particle::default() };
     if is_missing(value) {
@@ -60,8 +65,7 @@ fn one(params: &Params, inputs: &Inputs<'_>, cell: Active, k: u32) -> Particle {
             carbon = 0.0;
         }
     }
-    let start = unit(hash(cell_bits ^ 0x85ebca6b).wrapping_add(k.wrapping_mul(2654435769)));
-    let turned = start + params.turns_per_kg_m2 * carbon.abs();
+    let turned = unit(start.wrapping_add(hash(bits ^ 0x85ebca6b) >> 3)) + params.turns_per_kg_m2 * carbon.abs();
     let phase = turned - turned.floor();
     let column_m = (carbon * params.height_m_per_kg_m2).clamp(-params.height_limit_m, params.height_limit_m);
     let position = ((value - params.transfer_low) * params.transfer_per_unit).clamp(0.0, 1.0);

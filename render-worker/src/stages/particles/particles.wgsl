@@ -6,6 +6,8 @@
 @group(0) @binding(5) var<storage, read> palette: array<u32>;
 @group(0) @binding(6) var<storage, read_write> particles: array<Particle>;
 
+const HALF_TURN = 0x80000000u; // 0.5 in 32 bits
+
 // Output permutation of a 32-bit linear congruential generator (PCG-RXS-M-XS, O'Neill 2014).
 fn hash(x: u32) -> u32 {
     let state = x * 747796405u + 2891336453u;
@@ -18,9 +20,14 @@ fn unit(bits: u32) -> f32 {
     return f32(bits >> 8u) * 5.9604645e-8;
 }
 
+// Random bits spread evenly round 0 over the mode's share of a cell.
+fn shaken(bits: u32) -> u32 {
+    return (bits >> params.shake_shift) - (HALF_TURN >> params.shake_shift);
+}
+
 // Thin at both ends of a column, so that particles appear and vanish unseen; mean 1.
 fn envelope(phase: f32) -> f32 {
-    return clamp(min(phase, 1.0 - phase) * 4.0, 0.0, 1.0) * (4.0 / 3.0);
+    return clamp(min(phase, 1.0 - phase) * 8.0, 0.0, 1.0) * (8.0 / 7.0);
 }
 
 fn strength_of(value: f32, position: f32) -> f32 {
@@ -36,13 +43,16 @@ fn generate(@builtin(global_invocation_id) global: vec3<u32>, @builtin(num_workg
     let k = i % params.particles_per_cell;
     let row = cell.cell / params.cols;
     let value = value_grid[cell.cell];
-    let cell_bits = hash(cell.cell);
-    let bits = hash(cell_bits ^ (k * 0x9e3779b9u));
+    let bits = hash(hash(cell.cell) ^ (k * 0x9e3779b9u));
+    // An additive sequence (R2, Roberts 2018) round the cell's centre, shaken by random numbers: little for clouds,
+    // which then cover the sea evenly, wholly for dots, which must not stand in rows. Golden sections up the column.
+    let place = vec2(HALF_TURN) + k * vec2(3242174889u, 2447445414u);
+    let start = row * 2654435769u + (cell.cell % params.cols) * 1779033704u + k * 2654435769u;
     var particle: Particle;
     particle.row = row;
     particle.slot = cell.slot;
-    particle.east = unit(cell_bits + k * 3242174889u + (bits >> 3u));
-    particle.south = unit(hash(cell_bits) + k * 2447445414u + (hash(bits) >> 3u));
+    particle.east = unit(place.x + shaken(bits));
+    particle.south = unit(place.y + shaken(hash(bits)));
     if (is_missing(value)) {
         particles[i] = particle;
         return;
@@ -52,8 +62,7 @@ fn generate(@builtin(global_invocation_id) global: vec3<u32>, @builtin(num_workg
         carbon = accumulated_grid[cell.cell];
         if (is_missing(carbon)) { carbon = 0.0; }
     }
-    let start = unit(hash(cell_bits ^ 0x85ebca6bu) + k * 2654435769u);
-    let phase = fract(start + params.turns_per_kg_m2 * abs(carbon));
+    let phase = fract(unit(start + (hash(bits ^ 0x85ebca6bu) >> 3u)) + params.turns_per_kg_m2 * abs(carbon));
     let column_m = clamp(carbon * params.height_m_per_kg_m2, -params.height_limit_m, params.height_limit_m);
     let position = clamp((value - params.transfer_low) * params.transfer_per_unit, 0.0, 1.0);
     let strength = strength_of(value, position);
