@@ -50,6 +50,15 @@ struct Snapshot {
     layers: BTreeMap<ProductId, Arc<Layer>>,
 }
 
+/// What the store says of its products.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Probe {
+    /// Products in the store.
+    pub(crate) products: usize,
+    /// Products that were there before.
+    pub(crate) lost: usize,
+}
+
 /// The products of a store.
 #[derive(Debug)]
 pub struct Catalogue {
@@ -100,9 +109,17 @@ impl Catalogue {
         Ok(layers)
     }
 
-    /// Reads the store now: the number of products, or why it cannot be read.
-    pub async fn probe(&self) -> Result<usize, StorageError> {
-        self.store.folders(FOLDER).await.map(|names| names.len())
+    /// Asks the store now which products it has: how many, and how many of those known it has lost.
+    pub(crate) async fn probe(&self) -> Result<Probe, StorageError> {
+        let listed = self.store.folders(FOLDER).await?;
+        let known = &self.current().known;
+        let lost = known
+            .keys()
+            .filter(|product| !listed.iter().any(|name| name == product.as_str()));
+        Ok(Probe {
+            products: listed.len(),
+            lost: lost.count(),
+        })
     }
 
     fn current(&self) -> Arc<Snapshot> {
@@ -164,13 +181,14 @@ impl Catalogue {
                 newest.insert(product, key);
             }
         }
-        let mut known = BTreeMap::new();
+        // Manifests are never deleted: a product that is gone was lost with its disk, not withdrawn.
+        let mut known = before.known.clone();
         for (product, key) in newest {
-            let entry = match before.known.get(&product) {
-                Some(entry) if entry.0 == key => Some(entry.clone()),
-                older => self.load(&product, key).await?.or_else(|| older.cloned()),
-            };
-            known.extend(entry.map(|entry| (product, entry)));
+            if known.get(&product).is_none_or(|entry| entry.0 != key)
+                && let Some(entry) = self.load(&product, key).await?
+            {
+                known.insert(product, entry);
+            }
         }
         let layers = known.iter().filter_map(|(product, entry)| {
             Some((product.clone(), Arc::new(layer(&known, entry)?)))

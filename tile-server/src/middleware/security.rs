@@ -10,7 +10,7 @@ const POLICY: &str = "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; 
     img-src 'self' data: blob:; connect-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; object-src 'none'; \
     base-uri 'self'; form-action 'none'; frame-ancestors 'self'";
 
-const HEADERS: [(HeaderName, HeaderValue); 4] = [
+const HEADERS: [(HeaderName, HeaderValue); 5] = [
     (
         header::CONTENT_SECURITY_POLICY,
         HeaderValue::from_static(POLICY),
@@ -26,6 +26,11 @@ const HEADERS: [(HeaderName, HeaderValue); 4] = [
     (
         header::X_FRAME_OPTIONS,
         HeaderValue::from_static("SAMEORIGIN"),
+    ),
+    // Tiles may be used by pages that otherwise isolate themselves from other origins.
+    (
+        HeaderName::from_static("cross-origin-resource-policy"),
+        HeaderValue::from_static("cross-origin"),
     ),
 ];
 

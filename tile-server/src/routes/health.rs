@@ -9,6 +9,7 @@ use axum::response::{IntoResponse as _, Response};
 use serde::Serialize;
 use tokio::time::timeout;
 
+use crate::catalogue::Probe;
 use crate::routes::viewer;
 use crate::state::AppState;
 
@@ -55,8 +56,11 @@ pub(crate) async fn ready(State(state): State<AppState>) -> Response {
 
 async fn store(state: &AppState) -> Part {
     let (ok, detail) = match timeout(PART_LIMIT, state.catalogue.probe()).await {
-        Ok(Ok(1)) => (true, "1 product".to_owned()),
-        Ok(Ok(count)) => (true, format!("{count} products")),
+        Ok(Ok(Probe { products, lost: 0 })) => (true, format!("products: {products}")),
+        Ok(Ok(Probe { products, lost })) => (
+            false,
+            format!("products: {products}, and {lost} that were there are gone"),
+        ),
         Ok(Err(error)) => {
             // The error names folders and servers: the log may know them, whoever asks here need not.
             tracing::warn!(%error, "the store is not ready");

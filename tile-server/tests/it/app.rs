@@ -89,12 +89,15 @@ impl TestApp {
 
     /// A server over a store without products; it reads the list of products at every request.
     pub(crate) fn empty(change: impl FnOnce(&mut Settings)) -> Self {
+        Self::over(Store::memory(), change)
+    }
+
+    pub(crate) fn over(store: Store, change: impl FnOnce(&mut Settings)) -> Self {
         let mut settings = Settings {
             catalogue_age_ms: 0,
             ..Settings::default()
         };
         change(&mut settings);
-        let store = Store::memory();
         let (drawer, analyst) = (Arc::new(Drawer::default()), Arc::new(Analyst::default()));
         let state = AppState::new(
             &settings,

@@ -24,7 +24,7 @@ async fn a_server_with_all_its_parts_is_ready() {
     assert_eq!(answer.status, StatusCode::OK);
     let body = answer.json();
     assert_eq!(body["ready"], true);
-    assert_eq!(part(&body, "store")["detail"], "3 products");
+    assert_eq!(part(&body, "store")["detail"], "products: 3");
     assert_eq!(part(&body, "renderer")["ok"], true);
     let viewer = part(&body, "viewer");
     assert_eq!(

@@ -9,6 +9,7 @@ mod budget;
 mod caching;
 mod check;
 mod doubles;
+mod faults;
 mod globe;
 mod health;
 mod hostile;

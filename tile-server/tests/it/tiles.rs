@@ -1,6 +1,7 @@
 //! `/tiles/{product}/{mode}/{z}/{x}/{y}.png`.
 
-use axum::http::StatusCode;
+use axum::body::Body;
+use axum::http::{Request, StatusCode};
 use contract::job::{Mode, View};
 use contract::tile::Tile;
 
@@ -121,6 +122,24 @@ async fn pages_of_other_origins_may_show_tiles() {
         )
         .await;
     assert_eq!(answer.header("access-control-allow-origin"), "*");
+}
+
+#[tokio::test]
+async fn browsers_that_ask_first_are_let_in() {
+    let app = TestApp::new().await;
+    let request = Request::builder()
+        .method("OPTIONS")
+        .uri("/tiles/flux/map/0/0/0.png")
+        .header("origin", "http://map.example")
+        .header("access-control-request-method", "GET");
+    let answer = app.send(request.body(Body::empty()).unwrap()).await;
+    assert_eq!(answer.status, StatusCode::OK);
+    assert_eq!(answer.header("access-control-allow-origin"), "*");
+    assert!(
+        answer
+            .header("access-control-allow-methods")
+            .contains("GET")
+    );
 }
 
 #[tokio::test]
