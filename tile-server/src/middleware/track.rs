@@ -65,11 +65,11 @@ pub(crate) async fn count(State(state): State<AppState>, request: Request, next:
         duration_ms = duration.as_secs_f64() * 1e3,
         "{method} {status}"
     );
-    let sent_bytes = metrics.sent_bytes.with_label_values(&[&route]);
+    let bytes = metrics.sent_bytes.with_label_values(&[&route]);
     response.map(|body| {
         Body::new(Sent {
             body,
-            sent_bytes,
+            bytes,
             _under_way: under_way,
         })
     })
@@ -78,7 +78,7 @@ pub(crate) async fn count(State(state): State<AppState>, request: Request, next:
 /// A body that counts its bytes as they go; the request is under way until the last one is gone.
 struct Sent {
     body: Body,
-    sent_bytes: IntCounter,
+    bytes: IntCounter,
     _under_way: UnderWay,
 }
 
@@ -92,7 +92,7 @@ impl HttpBody for Sent {
     ) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
         let polled = Pin::new(&mut self.body).poll_frame(cx);
         if let Poll::Ready(Some(Ok(frame))) = &polled {
-            self.sent_bytes
+            self.bytes
                 .inc_by(frame.data_ref().map_or(0, Bytes::len) as u64);
         }
         polled
