@@ -7,8 +7,10 @@ const SETTLE_LIMIT_MS = 15_000;
 
 const PAGES = {
   "/clean": "<title>clean</title><link rel=icon href=data:,><p>nothing wrong here",
-  "/console": "<title>console</title><link rel=icon href=data:,><script>console.error('planted: the page complains')</script>",
-  "/throws": "<title>throws</title><link rel=icon href=data:,><script>setTimeout(() => { throw new Error('planted: thrown') })</script>",
+  "/console":
+    "<title>console</title><link rel=icon href=data:,><script>console.error('planted: the page complains')</script>",
+  "/throws":
+    "<title>throws</title><link rel=icon href=data:,><script>setTimeout(() => { throw new Error('planted: thrown') })</script>",
   "/missing": "<title>missing</title><link rel=icon href=data:,><img src=/no-such-picture.png>",
 };
 
@@ -27,7 +29,10 @@ export async function testHarness(t) {
     response.end();
   });
   const own = await serve((request, response) => {
-    const html = request.url === "/foreign" ? `<title>foreign</title><link rel=icon href=data:,><img src="${foreign.origin}/pixel.png">` : PAGES[request.url];
+    const html =
+      request.url === "/foreign"
+        ? `<title>foreign</title><link rel=icon href=data:,><img src="${foreign.origin}/pixel.png">`
+        : PAGES[request.url];
     response.writeHead(html ? 200 : 404, { "content-type": "text/html" });
     response.end(html ?? "");
   });
@@ -37,7 +42,10 @@ export async function testHarness(t) {
   const visit = async (path, expected) => {
     const before = watch.problems.length;
     await page.goto(own.origin + path);
-    await waitFor(() => expected === undefined || watch.problems.slice(before).some((line) => expected.test(line)), `${path} to be reported as ${expected}`);
+    await waitFor(
+      () => expected === undefined || watch.problems.slice(before).some((line) => expected.test(line)),
+      `${path} to be reported as ${expected}`,
+    );
     return watch.problems.slice(before);
   };
 

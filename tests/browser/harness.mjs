@@ -38,7 +38,12 @@ function browserPath() {
 
 export async function openBrowser(viewport = { width: 1280, height: 800 }) {
   const profile = mkdtempSync(join(tmpdir(), "fluxglobe-browser-"));
-  const context = await chromium.launchPersistentContext(profile, { executablePath: browserPath(), headless: true, viewport, args: FLAGS });
+  const context = await chromium.launchPersistentContext(profile, {
+    executablePath: browserPath(),
+    headless: true,
+    viewport,
+    args: FLAGS,
+  });
   return {
     context,
     async close() {
@@ -60,7 +65,8 @@ export class Watch {
     context.on("weberror", (error) => this.problems.push(`page error: ${error.error().message}`));
     context.on("request", (request) => {
       const { origin, protocol } = new URL(request.url());
-      if (protocol !== "data:" && protocol !== "blob:" && origin !== ownOrigin) this.problems.push(`request to another origin: ${request.url()}`);
+      if (protocol !== "data:" && protocol !== "blob:" && origin !== ownOrigin)
+        this.problems.push(`request to another origin: ${request.url()}`);
     });
     context.on("requestfailed", (request) => {
       // The page itself calls off requests whose answer nobody waits for any more; those are no failures.
@@ -75,7 +81,11 @@ export class Watch {
 
   /** Tiles answered since `from`, an index into `responses`. */
   tiles(mode, from = 0) {
-    return this.responses.slice(from).filter((response) => new URL(response.url()).pathname.includes(`/${mode}/`) && response.url().includes(".png?time="));
+    return this.responses
+      .slice(from)
+      .filter(
+        (response) => new URL(response.url()).pathname.includes(`/${mode}/`) && response.url().includes(".png?time="),
+      );
   }
 }
 

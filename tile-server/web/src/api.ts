@@ -112,7 +112,10 @@ export async function getJson<T>(url: string, signal?: AbortSignal): Promise<T> 
   const limit = AbortSignal.timeout(ANSWER_LIMIT_MS);
   let response: Response;
   try {
-    response = await fetch(url, { signal: signal ? anyOf(signal, limit) : limit, headers: { accept: "application/json" } });
+    response = await fetch(url, {
+      signal: signal ? anyOf(signal, limit) : limit,
+      headers: { accept: "application/json" },
+    });
   } catch (error) {
     if (signal?.aborted) throw error;
     const why = limit.aborted ? `no answer within ${ANSWER_LIMIT_MS / 1000} s` : "the connection failed";
@@ -145,7 +148,8 @@ function anyOf(a: AbortSignal, b: AbortSignal): AbortSignal {
 
 export const products = () => getJson<{ products: Product[] }>(address("api/products")).then((body) => body.products);
 export const regions = () => getJson<{ regions: Region[] }>(address("api/regions")).then((body) => body.regions);
-export const layerInfo = (product: string, mode: Mode) => getJson<LayerInfo>(address(`tiles/${encodeURIComponent(product)}/${mode}.json`));
+export const layerInfo = (product: string, mode: Mode) =>
+  getJson<LayerInfo>(address(`tiles/${encodeURIComponent(product)}/${mode}.json`));
 export const healthUrl = () => address("healthz");
 
 /** Undefined where the server has no published values to hold against. */

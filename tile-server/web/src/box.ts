@@ -22,7 +22,8 @@ export function parseBox(text: string): Bounds | string {
   const parts = text.split(/[,;\s]+/).filter((part) => part !== "");
   if (parts.length !== 4) return "Four numbers are needed: west, south, east, north.";
   const numbers = parts.map(Number);
-  if (numbers.some((number) => !Number.isFinite(number))) return "West, south, east and north must be numbers in degrees.";
+  if (numbers.some((number) => !Number.isFinite(number)))
+    return "West, south, east and north must be numbers in degrees.";
   const [west, south, east, north] = numbers as [number, number, number, number];
   if (south < -90 || north > 90) return "Latitudes run from -90 to 90.";
   if (south >= north) return "South must lie below north.";
@@ -59,7 +60,14 @@ export function outline(box: Bounds, stepDeg = 2): LonLat[][] {
   const parallel = (lat: number): LonLat[] => steps(across).map((part) => ({ lon: west + width * part, lat }));
   const meridian = (lon: number): LonLat[] => steps(up).map((part) => ({ lon, lat: south + (north - south) * part }));
   if (isWhole(box)) return [south, north].filter((lat) => Math.abs(lat) < 90).map(parallel);
-  return [[...parallel(south), ...meridian(west + width).slice(1), ...parallel(north).reverse().slice(1), ...meridian(west).reverse().slice(1)]];
+  return [
+    [
+      ...parallel(south),
+      ...meridian(west + width).slice(1),
+      ...parallel(north).reverse().slice(1),
+      ...meridian(west).reverse().slice(1),
+    ],
+  ];
 }
 
 /** 0 to 1 in `count` equal steps, both ends included. */

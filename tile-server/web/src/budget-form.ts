@@ -20,29 +20,55 @@ export class BudgetForm {
   readonly element: HTMLElement;
   readonly #context: BudgetFormContext;
   readonly #region = el("select", { id: "region", "aria-label": "Region" });
-  readonly #box = el("input", { type: "text", id: "box", placeholder: "W,S,E,N", "aria-label": "Box: west, south, east, north in degrees", autocomplete: "off", spellcheck: "false" });
+  readonly #box = el("input", {
+    type: "text",
+    id: "box",
+    placeholder: "W,S,E,N",
+    "aria-label": "Box: west, south, east, north in degrees",
+    autocomplete: "off",
+    spellcheck: "false",
+  });
   readonly #draw = el("button", { type: "button", "aria-pressed": "false" }, icon(PENCIL), "Draw");
-  readonly #boxRow = el("form", { class: "row typed box-row", hidden: true }, this.#box, el("button", { type: "submit" }, "Go"), this.#draw);
+  readonly #boxRow = el(
+    "form",
+    { class: "row typed box-row", hidden: true },
+    this.#box,
+    el("button", { type: "submit" }, "Go"),
+    this.#draw,
+  );
   readonly #problem = el("p", { class: "problem", role: "alert", hidden: true });
   readonly #from = el("select", { id: "from", "aria-label": "First period" });
   readonly #to = el("select", { id: "to", "aria-label": "Last period" });
-  readonly #step = choice("step", "Step", [["month", "Monthly"], ["year", "Yearly"]]);
-  readonly #earth = choice("earth", "Earth", [["wgs84", "WGS84"], ["sphere", "Sphere"]]);
+  readonly #step = choice("step", "Step", [
+    ["month", "Monthly"],
+    ["year", "Yearly"],
+  ]);
+  readonly #earth = choice("earth", "Earth", [
+    ["wgs84", "WGS84"],
+    ["sphere", "Sphere"],
+  ]);
   #regions: readonly Region[] = [];
   #steps: readonly Step[] = [];
 
   constructor(context: BudgetFormContext) {
     this.#context = context;
-    this.element = el("div", { class: "budget-form" },
+    this.element = el(
+      "div",
+      { class: "budget-form" },
       el("label", { class: "field" }, el("span", {}, "Region"), this.#region),
       this.#boxRow,
       this.#problem,
-      el("div", { class: "grid-2" },
+      el(
+        "div",
+        { class: "grid-2" },
         el("label", { class: "field" }, el("span", {}, "From"), this.#from),
         el("label", { class: "field" }, el("span", {}, "To"), this.#to),
         el("label", { class: "field" }, el("span", {}, "Step"), this.#step),
-        el("label", { class: "field" }, el("span", {}, "Earth"), this.#earth)));
-    for (const select of [this.#from, this.#to, this.#step, this.#earth]) select.addEventListener("change", () => context.onChange());
+        el("label", { class: "field" }, el("span", {}, "Earth"), this.#earth),
+      ),
+    );
+    for (const select of [this.#from, this.#to, this.#step, this.#earth])
+      select.addEventListener("change", () => context.onChange());
     this.#region.addEventListener("change", () => this.#regionChosen());
     this.#boxRow.addEventListener("submit", (event) => {
       event.preventDefault();
@@ -58,13 +84,15 @@ export class BudgetForm {
     this.#region.replaceChildren(
       el("option", { value: "global" }, regions.find((region) => region.name === "global")?.title ?? "All seas"),
       ...named.map((region) => el("option", { value: region.name }, region.title)),
-      el("option", { value: BOX }, "A box …"));
+      el("option", { value: BOX }, "A box …"),
+    );
     this.show(chosen);
   }
 
   setSteps(steps: readonly Step[]): void {
     this.#steps = steps;
-    for (const select of [this.#from, this.#to]) select.replaceChildren(...steps.map((step, index) => el("option", { value: String(index) }, stepLabel(step))));
+    for (const select of [this.#from, this.#to])
+      select.replaceChildren(...steps.map((step, index) => el("option", { value: String(index) }, stepLabel(step))));
     this.#to.value = String(steps.length - 1);
   }
 
@@ -95,7 +123,13 @@ export class BudgetForm {
       return undefined;
     }
     this.#say("");
-    return { region, from: toIso(from.startMs), to: toIso(to.endMs), step: this.#step.value as "month" | "year", earth: this.#earth.value as "wgs84" | "sphere" };
+    return {
+      region,
+      from: toIso(from.startMs),
+      to: toIso(to.endMs),
+      step: this.#step.value as "month" | "year",
+      earth: this.#earth.value as "wgs84" | "sphere",
+    };
   }
 
   #regionChosen(): void {
@@ -123,7 +157,8 @@ export class BudgetForm {
       (box) => {
         this.#draw.setAttribute("aria-pressed", "false");
         if (box) this.#context.onRegion(boxText(box));
-      });
+      },
+    );
   }
 
   #say(problem: string): void {

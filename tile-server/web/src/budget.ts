@@ -76,7 +76,10 @@ export class BudgetPanel {
     this.#result.classList.add("waiting");
     if (!this.#result.hasChildNodes()) this.#result.append(el("p", { class: "muted busy-line" }, "Adding up …"));
     try {
-      const [rows, total] = await Promise.all([api.budget(product, query, asked.signal), api.budget(product, { ...query, step: "total" }, asked.signal)]);
+      const [rows, total] = await Promise.all([
+        api.budget(product, query, asked.signal),
+        api.budget(product, { ...query, step: "total" }, asked.signal),
+      ]);
       if (!asked.signal.aborted) this.#draw(query, rows, total, key);
     } catch (error) {
       if (asked.signal.aborted) return;
@@ -100,17 +103,42 @@ export class BudgetPanel {
   #draw(query: BudgetQuery, answer: Budget, total: Budget, jsonUrl: string): void {
     this.#chart?.destroy();
     const unit = unitText(answer.unit);
-    const plot = el("div", { class: "plot", id: "budget-plot", role: "img", "aria-label": `Budget of ${answer.rows.length} periods in ${unit}` });
+    const plot = el("div", {
+      class: "plot",
+      id: "budget-plot",
+      role: "img",
+      "aria-label": `Budget of ${answer.rows.length} periods in ${unit}`,
+    });
     this.#result.replaceChildren(
       ...this.#headline(total, unit),
       plot,
       manifestLine(answer.manifest),
-      el("div", { class: "row actions" },
-        el("button", { type: "button", onclick: () => saveText(`${answer.product}-budget-${answer.region.replace(/[^\w.-]+/g, "_")}.csv`, "text/csv", budgetCsv(answer)) }, icon(DOWNLOAD), "CSV"),
-        el("a", { class: "button", href: jsonUrl, target: "_blank", rel: "noopener" }, "JSON")),
+      el(
+        "div",
+        { class: "row actions" },
+        el(
+          "button",
+          {
+            type: "button",
+            onclick: () =>
+              saveText(
+                `${answer.product}-budget-${answer.region.replace(/[^\w.-]+/g, "_")}.csv`,
+                "text/csv",
+                budgetCsv(answer),
+              ),
+          },
+          icon(DOWNLOAD),
+          "CSV",
+        ),
+        el("a", { class: "button", href: jsonUrl, target: "_blank", rel: "noopener" }, "JSON"),
+      ),
       el("details", {}, el("summary", {}, "All periods"), table(answer, unit)),
     );
-    const rows = answer.rows.map((row) => ({ startMs: Date.parse(row.start), endMs: Date.parse(row.end), value: row.budget }));
+    const rows = answer.rows.map((row) => ({
+      startMs: Date.parse(row.start),
+      endMs: Date.parse(row.end),
+      value: row.budget,
+    }));
     this.#chart = barChart(plot, rows, query.step === "year" ? `${unit} per year` : `${unit} per period`);
   }
 
@@ -118,12 +146,23 @@ export class BudgetPanel {
     const row = total.rows[0];
     if (!row) return [el("p", { class: "problem" }, "The period holds no stored step.")];
     const isCarbon = total.unit === "Tg C";
-    const petagrams = isCarbon ? el("span", { class: "muted" }, `= ${numberText(row.budget / TG_PER_PG, 3)} Pg C`) : null;
+    const petagrams = isCarbon
+      ? el("span", { class: "muted" }, `= ${numberText(row.budget / TG_PER_PG, 3)} Pg C`)
+      : null;
     return [
-      el("p", { class: "reading" }, el("strong", { id: "budget-total", "data-value": String(row.budget) }, numberText(row.budget, 1)), el("span", { class: "unit" }, unit), petagrams),
-      el("p", { class: "muted" },
+      el(
+        "p",
+        { class: "reading" },
+        el("strong", { id: "budget-total", "data-value": String(row.budget) }, numberText(row.budget, 1)),
+        el("span", { class: "unit" }, unit),
+        petagrams,
+      ),
+      el(
+        "p",
+        { class: "muted" },
         `${row.start.slice(0, 10)} to ${row.end.slice(0, 10)}; coverage ${numberText(row.coverage_percent, 1)} % of ${areaText(row.area_m2)}. `,
-        isCarbon ? "Negative: the sea takes carbon up." : null),
+        isCarbon ? "Negative: the sea takes carbon up." : null,
+      ),
     ];
   }
 }
@@ -131,6 +170,18 @@ export class BudgetPanel {
 function table(answer: Budget, unit: string): HTMLElement {
   const head = el("tr", {}, ...["From", "To", unit, "Coverage"].map((title) => el("th", { scope: "col" }, title)));
   const rows = answer.rows.map((row) =>
-    el("tr", {}, el("td", {}, row.start.slice(0, 10)), el("td", {}, row.end.slice(0, 10)), el("td", { class: "number" }, numberText(row.budget, 2)), el("td", { class: "number" }, `${numberText(row.coverage_percent, 1)} %`)));
-  return el("div", { class: "table-scroll" }, el("table", { id: "budget-table" }, el("thead", {}, head), el("tbody", {}, ...rows)));
+    el(
+      "tr",
+      {},
+      el("td", {}, row.start.slice(0, 10)),
+      el("td", {}, row.end.slice(0, 10)),
+      el("td", { class: "number" }, numberText(row.budget, 2)),
+      el("td", { class: "number" }, `${numberText(row.coverage_percent, 1)} %`),
+    ),
+  );
+  return el(
+    "div",
+    { class: "table-scroll" },
+    el("table", { id: "budget-table" }, el("thead", {}, head), el("tbody", {}, ...rows)),
+  );
 }

@@ -9,7 +9,8 @@ export class CameraButtons {
       button("Zoom in", PLUS, () => globe.zoom(1)),
       button("Zoom out", MINUS, () => globe.zoom(-1)),
       button("North up", NORTH, () => globe.northUp()),
-      button("Back to the start", HOUSE, () => globe.home()));
+      button("Back to the start", HOUSE, () => globe.home()),
+    );
   }
 }
 

@@ -27,8 +27,12 @@ export class Catalogue {
 
   /** What a page without a wish shows: observed before synthetic, carbon fluxes before the rest, then what can be drawn in the most ways. */
   get first(): Product | undefined {
-    return [...this.products].sort((a, b) =>
-      Number(a.synthetic) - Number(b.synthetic) || Number(b.quantity === FLUX) - Number(a.quantity === FLUX) || b.modes.length - a.modes.length)[0];
+    return [...this.products].sort(
+      (a, b) =>
+        Number(a.synthetic) - Number(b.synthetic) ||
+        Number(b.quantity === FLUX) - Number(a.quantity === FLUX) ||
+        b.modes.length - a.modes.length,
+    )[0];
   }
 
   stepsOf(id: string | null): readonly Step[] {

@@ -24,12 +24,26 @@ export interface Chart {
 }
 
 /** `labelY` is the unit. The time axis spans `range`, so that the cursor is in sight at every instant. `onPick` gets the instant under a click. */
-export function seriesChart(container: HTMLElement, samples: readonly Sample[], range: TimeRange, labelY: string, onPick: (timeMs: number) => void): Chart {
+export function seriesChart(
+  container: HTMLElement,
+  samples: readonly Sample[],
+  range: TimeRange,
+  labelY: string,
+  onPick: (timeMs: number) => void,
+): Chart {
   let now = Number.NaN;
   const options: Omit<uPlot.Options, "width" | "height"> = {
     ...dress(labelY),
     scales: { x: { time: true, range: [range.startMs / 1000, range.endMs / 1000] }, y: { range: padded } },
-    series: [{}, { stroke: LINE, width: 2, spanGaps: false, points: { show: true, size: 6, fill: LINE, stroke: "#0b1f2f", width: 1 } }],
+    series: [
+      {},
+      {
+        stroke: LINE,
+        width: 2,
+        spanGaps: false,
+        points: { show: true, size: 6, fill: LINE, stroke: "#0b1f2f", width: 1 },
+      },
+    ],
     hooks: { drawAxes: [(plot) => zeroLine(plot)], draw: [(plot) => nowLine(plot, now)] },
   };
   const data: uPlot.AlignedData = [samples.map((sample) => sample.midMs / 1000), samples.map((sample) => sample.value)];
@@ -45,10 +59,20 @@ export function seriesChart(container: HTMLElement, samples: readonly Sample[], 
 }
 
 /** One bar per row, warm for positive and cool for negative values. */
-export function barChart(container: HTMLElement, rows: readonly { startMs: number; endMs: number; value: number }[], labelY: string): Chart {
+export function barChart(
+  container: HTMLElement,
+  rows: readonly { startMs: number; endMs: number; value: number }[],
+  labelY: string,
+): Chart {
   const centres = rows.map((row) => (row.startMs + row.endMs) / 2000);
   const paths = uPlot.paths.bars?.({ size: [0.72, 60], radius: 0.12 });
-  const bars = (stroke: string): uPlot.Series => ({ stroke, fill: `${stroke}cc`, width: 1, points: { show: false }, ...(paths ? { paths } : {}) });
+  const bars = (stroke: string): uPlot.Series => ({
+    stroke,
+    fill: `${stroke}cc`,
+    width: 1,
+    points: { show: false },
+    ...(paths ? { paths } : {}),
+  });
   const first = rows[0];
   const last = rows[rows.length - 1];
   const options: Omit<uPlot.Options, "width" | "height"> = {
@@ -57,14 +81,30 @@ export function barChart(container: HTMLElement, rows: readonly { startMs: numbe
     hooks: { drawAxes: [(plot) => zeroLine(plot)] },
   };
   // Whole periods in sight: the outer bars are as wide as the others.
-  if (first && last) options.scales = { x: { time: true, range: [first.startMs / 1000, last.endMs / 1000] }, y: { range: paddedWithZero } };
-  const data: uPlot.AlignedData = [centres, rows.map((row) => (row.value >= 0 ? row.value : null)), rows.map((row) => (row.value < 0 ? row.value : null))];
+  if (first && last)
+    options.scales = {
+      x: { time: true, range: [first.startMs / 1000, last.endMs / 1000] },
+      y: { range: paddedWithZero },
+    };
+  const data: uPlot.AlignedData = [
+    centres,
+    rows.map((row) => (row.value >= 0 ? row.value : null)),
+    rows.map((row) => (row.value < 0 ? row.value : null)),
+  ];
   const { destroy } = mount(container, options, data);
   return { setNow: () => undefined, destroy };
 }
 
-function mount(container: HTMLElement, options: Omit<uPlot.Options, "width" | "height">, data: uPlot.AlignedData): { plot: uPlot; destroy: () => void } {
-  const plot = new uPlot({ ...options, width: Math.max(200, container.clientWidth), height: HEIGHT_PX }, data, container);
+function mount(
+  container: HTMLElement,
+  options: Omit<uPlot.Options, "width" | "height">,
+  data: uPlot.AlignedData,
+): { plot: uPlot; destroy: () => void } {
+  const plot = new uPlot(
+    { ...options, width: Math.max(200, container.clientWidth), height: HEIGHT_PX },
+    data,
+    container,
+  );
   const watcher = new ResizeObserver(() => {
     if (container.clientWidth > 0) plot.setSize({ width: container.clientWidth, height: HEIGHT_PX });
   });
@@ -79,7 +119,13 @@ function mount(container: HTMLElement, options: Omit<uPlot.Options, "width" | "h
 }
 
 function dress(labelY: string): Omit<uPlot.Options, "width" | "height" | "series"> {
-  const axis: uPlot.Axis = { stroke: INK, font: FONT, labelFont: FONT, grid: { stroke: GRID, width: 1 }, ticks: { stroke: GRID, width: 1, size: 4 } };
+  const axis: uPlot.Axis = {
+    stroke: INK,
+    font: FONT,
+    labelFont: FONT,
+    grid: { stroke: GRID, width: 1 },
+    ticks: { stroke: GRID, width: 1, size: 4 },
+  };
   return {
     // The plot's dates are the product's, so they are read in UTC wherever the reader sits.
     tzDate: (seconds) => uPlot.tzDate(new Date(seconds * 1000), "Etc/UTC"),
@@ -88,7 +134,14 @@ function dress(labelY: string): Omit<uPlot.Options, "width" | "height" | "series
     padding: [8, 20, 0, 0],
     axes: [
       { ...axis, grid: { show: false }, space: 44, size: 40, values: monthNames },
-      { ...axis, label: labelY, labelSize: 20, labelGap: 2, size: 46, values: (_plot, splits) => splits.map((value) => String(Number(value.toPrecision(6))).replace("-", "−")) },
+      {
+        ...axis,
+        label: labelY,
+        labelSize: 20,
+        labelGap: 2,
+        size: 46,
+        values: (_plot, splits) => splits.map((value) => String(Number(value.toPrecision(6))).replace("-", "−")),
+      },
     ],
   };
 }
@@ -100,7 +153,11 @@ function monthNames(_plot: uPlot, splits: number[], _axis: number, _space: numbe
   return splits.map((seconds) => {
     const date = new Date(seconds * 1000);
     const year = date.getUTCFullYear();
-    const name = new Intl.DateTimeFormat("en", { timeZone: "UTC", month: "short", ...(increment < 27 * DAY_S ? { day: "numeric" } : {}) }).format(date);
+    const name = new Intl.DateTimeFormat("en", {
+      timeZone: "UTC",
+      month: "short",
+      ...(increment < 27 * DAY_S ? { day: "numeric" } : {}),
+    }).format(date);
     if (increment >= 360 * DAY_S) return String(year);
     const text = year === shownYear ? name : `${name}\n${year}`;
     shownYear = year;

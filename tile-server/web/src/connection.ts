@@ -49,13 +49,16 @@ export class Connection {
     this.#onTrouble();
     this.#notices.show(KEY, "The server does not answer. What is drawn stays; the page asks again every few seconds.");
     const timer = setInterval(() => {
-      void fetch(healthUrl(), { cache: "no-store" }).then((answer) => {
-        if (!answer.ok || !this.#isLost) return;
-        clearInterval(timer);
-        this.#isLost = false;
-        this.#notices.clear(KEY);
-        this.#onBack();
-      }, () => undefined);
+      void fetch(healthUrl(), { cache: "no-store" }).then(
+        (answer) => {
+          if (!answer.ok || !this.#isLost) return;
+          clearInterval(timer);
+          this.#isLost = false;
+          this.#notices.clear(KEY);
+          this.#onBack();
+        },
+        () => undefined,
+      );
     }, RETRY_MS);
   }
 }

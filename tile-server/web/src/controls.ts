@@ -25,24 +25,48 @@ export class Controls {
 
   constructor(container: HTMLElement, store: Store, onRenderView: () => void) {
     this.#store = store;
-    const opacity = el("input", { type: "range", id: "opacity", min: "0", max: "1", step: "0.05", value: String(store.state.opacity) });
+    const opacity = el("input", {
+      type: "range",
+      id: "opacity",
+      min: "0",
+      max: "1",
+      step: "0.05",
+      value: String(store.state.opacity),
+    });
     opacity.addEventListener("input", () => store.set({ opacity: Number(opacity.value) }));
     this.#product.addEventListener("change", () => store.set({ product: this.#product.value }));
     container.append(
-      el("header", { class: "brand" }, el("img", { src: "./favicon.svg", alt: "", width: "26", height: "26" }), el("h1", {}, "Fluxglobe"), this.#progress),
+      el(
+        "header",
+        { class: "brand" },
+        el("img", { src: "./favicon.svg", alt: "", width: "26", height: "26" }),
+        el("h1", {}, "Fluxglobe"),
+        this.#progress,
+      ),
       el("label", { class: "field" }, el("span", { class: "visually-hidden" }, "Product"), this.#product),
       this.#modes,
       this.#legend,
       el("label", { class: "field row opacity" }, el("span", {}, "Opacity"), opacity),
-      el("button", { type: "button", class: "wide", id: "render-view", onclick: onRenderView }, icon(PICTURE), "Render this view"),
+      el(
+        "button",
+        { type: "button", class: "wide", id: "render-view", onclick: onRenderView },
+        icon(PICTURE),
+        "Render this view",
+      ),
       this.#source,
     );
     store.on(["mode"], () => this.#markMode());
-    store.on(["opacity"], (state) => { opacity.value = String(state.opacity); });
+    store.on(["opacity"], (state) => {
+      opacity.value = String(state.opacity);
+    });
   }
 
   setProducts(products: readonly Product[]): void {
-    this.#product.replaceChildren(...products.map((product) => el("option", { value: product.id }, chemistry(product.title) + (product.synthetic ? " (synthetic)" : ""))));
+    this.#product.replaceChildren(
+      ...products.map((product) =>
+        el("option", { value: product.id }, chemistry(product.title) + (product.synthetic ? " (synthetic)" : "")),
+      ),
+    );
   }
 
   setProduct(product: Product): void {
@@ -59,21 +83,37 @@ export class Controls {
     counts.onChange(() => {
       const isBusy = counts.pending > 0;
       this.#progress.classList.toggle("busy", isBusy);
-      this.#progress.textContent = isBusy ? `${counts.pending} ${counts.pending === 1 ? "tile" : "tiles"} on the way` : "";
+      this.#progress.textContent = isBusy
+        ? `${counts.pending} ${counts.pending === 1 ? "tile" : "tiles"} on the way`
+        : "";
     });
   }
 
   #modeButton(mode: Mode, isOffered: boolean): HTMLElement {
-    return el("button", {
-      type: "button", role: "radio", class: "segment", "data-mode": mode, title: MODE_HINTS[mode], disabled: !isOffered,
-      onclick: () => this.#store.set({ mode }),
-      onkeydown: (event) => this.#turn(event as KeyboardEvent),
-    }, MODE_TITLES[mode]);
+    return el(
+      "button",
+      {
+        type: "button",
+        role: "radio",
+        class: "segment",
+        "data-mode": mode,
+        title: MODE_HINTS[mode],
+        disabled: !isOffered,
+        onclick: () => this.#store.set({ mode }),
+        onkeydown: (event) => this.#turn(event as KeyboardEvent),
+      },
+      MODE_TITLES[mode],
+    );
   }
 
   /** Arrow keys move within the group, as radio buttons do. */
   #turn(event: KeyboardEvent): void {
-    const by = event.key === "ArrowRight" || event.key === "ArrowDown" ? 1 : event.key === "ArrowLeft" || event.key === "ArrowUp" ? -1 : 0;
+    const by =
+      event.key === "ArrowRight" || event.key === "ArrowDown"
+        ? 1
+        : event.key === "ArrowLeft" || event.key === "ArrowUp"
+          ? -1
+          : 0;
     if (by === 0) return;
     event.preventDefault();
     const offered = [...this.#modes.querySelectorAll<HTMLButtonElement>("button:not(:disabled)")];

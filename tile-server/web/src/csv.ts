@@ -3,7 +3,12 @@ import type { Budget, PointSeries } from "./api";
 
 export function seriesCsv(answer: PointSeries): string {
   return lines(
-    [`product: ${answer.product}`, `manifest: ${answer.manifest}`, `cell centre: lon ${answer.cell.lon}, lat ${answer.cell.lat}`, `unit: ${answer.unit}`],
+    [
+      `product: ${answer.product}`,
+      `manifest: ${answer.manifest}`,
+      `cell centre: lon ${answer.cell.lon}, lat ${answer.cell.lat}`,
+      `unit: ${answer.unit}`,
+    ],
     ["start", "end", "mid", "value"],
     answer.series.map((row) => [row.start, row.end, row.mid, row.value]),
   );
@@ -11,14 +16,28 @@ export function seriesCsv(answer: PointSeries): string {
 
 export function budgetCsv(answer: Budget): string {
   return lines(
-    [`product: ${answer.product}`, `manifest: ${answer.manifest}`, `region: ${answer.region}`, `earth: ${answer.earth}`, `unit: ${answer.unit}`],
+    [
+      `product: ${answer.product}`,
+      `manifest: ${answer.manifest}`,
+      `region: ${answer.region}`,
+      `earth: ${answer.earth}`,
+      `unit: ${answer.unit}`,
+    ],
     ["start", "end", "budget", "coverage_percent", "area_m2"],
     answer.rows.map((row) => [row.start, row.end, row.budget, row.coverage_percent, row.area_m2]),
   );
 }
 
 /** No data is an empty field. */
-function lines(comments: readonly string[], header: readonly string[], rows: readonly (readonly (string | number | null)[])[]): string {
-  const text = [...comments.map((comment) => `# ${comment}`), header.join(","), ...rows.map((row) => row.map((field) => field ?? "").join(","))];
+function lines(
+  comments: readonly string[],
+  header: readonly string[],
+  rows: readonly (readonly (string | number | null)[])[],
+): string {
+  const text = [
+    ...comments.map((comment) => `# ${comment}`),
+    header.join(","),
+    ...rows.map((row) => row.map((field) => field ?? "").join(",")),
+  ];
   return `${text.join("\n")}\n`;
 }

@@ -4,7 +4,11 @@ type Child = Node | string | null | undefined;
 type Attributes = Record<string, string | boolean | EventListener | undefined>;
 
 /** Attributes that start with `on` take a listener; `true` sets an empty attribute, `false` and undefined none. */
-export function el<K extends keyof HTMLElementTagNameMap>(tag: K, attributes: Attributes = {}, ...children: Child[]): HTMLElementTagNameMap[K] {
+export function el<K extends keyof HTMLElementTagNameMap>(
+  tag: K,
+  attributes: Attributes = {},
+  ...children: Child[]
+): HTMLElementTagNameMap[K] {
   const element = document.createElement(tag);
   for (const [name, value] of Object.entries(attributes)) {
     if (typeof value === "function") element.addEventListener(name.slice(2), value);

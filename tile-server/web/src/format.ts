@@ -1,7 +1,18 @@
 //! Pure formatting: unit strings and numbers in, text with proper minus signs, superscripts and subscripts out.
 
 const SUPERSCRIPT: Record<string, string> = {
-  "-": "⁻", "+": "⁺", "0": "⁰", "1": "¹", "2": "²", "3": "³", "4": "⁴", "5": "⁵", "6": "⁶", "7": "⁷", "8": "⁸", "9": "⁹",
+  "-": "⁻",
+  "+": "⁺",
+  "0": "⁰",
+  "1": "¹",
+  "2": "²",
+  "3": "³",
+  "4": "⁴",
+  "5": "⁵",
+  "6": "⁶",
+  "7": "⁷",
+  "8": "⁸",
+  "9": "⁹",
 };
 const THIN_SPACE = "\u2009";
 const NARROW_NO_BREAK_SPACE = "\u202f";
@@ -11,7 +22,10 @@ const MINUS = "\u2212";
 export function unitText(unit: string): string {
   // Formulas first: the 2 of CO2 is an index, the 2 of m2 a power.
   return chemistry(unit.trim())
-    .replace(/([A-Za-zµμ%°])(?:\^|\*\*)?([-+]?\d+)(?=$|[\s/·.)])/g, (_match, symbol: string, power: string) => symbol + superscript(power))
+    .replace(
+      /([A-Za-zµμ%°])(?:\^|\*\*)?([-+]?\d+)(?=$|[\s/·.)])/g,
+      (_match, symbol: string, power: string) => symbol + superscript(power),
+    )
     .replace(/\bdegC\b|\bdegree_?[Cc]elsius\b/g, "°C")
     .replace(/\s+/g, NARROW_NO_BREAK_SPACE);
 }

@@ -1,7 +1,18 @@
 //! The globe itself: Cesium with its own Natural Earth pictures and nothing from outside, drawn only when something changes.
 import {
-  Cartesian3, Cartographic, CesiumWidget, Color, Credit, EllipsoidTerrainProvider, ImageryLayer, Ion,
-  Math as CesiumMath, SceneTransforms, TileMapServiceImageryProvider, buildModuleUrl, type Scene,
+  Cartesian3,
+  Cartographic,
+  CesiumWidget,
+  Color,
+  Credit,
+  EllipsoidTerrainProvider,
+  ImageryLayer,
+  Ion,
+  Math as CesiumMath,
+  SceneTransforms,
+  TileMapServiceImageryProvider,
+  buildModuleUrl,
+  type Scene,
 } from "cesium";
 import type { Bounds } from "./box";
 import { HOME, type CameraView, type Place } from "./state";
@@ -157,7 +168,10 @@ export class Globe {
       const view = this.view;
       const turnDeg = Math.min(15, view.heightKm / 1200);
       const turns: Record<string, [number, number]> = {
-        ArrowLeft: [-turnDeg, 0], ArrowRight: [turnDeg, 0], ArrowUp: [0, turnDeg], ArrowDown: [0, -turnDeg],
+        ArrowLeft: [-turnDeg, 0],
+        ArrowRight: [turnDeg, 0],
+        ArrowUp: [0, turnDeg],
+        ArrowDown: [0, -turnDeg],
       };
       const turn = turns[event.key];
       if (turn) this.view = { ...view, lon: view.lon + turn[0], lat: Math.max(-89, Math.min(89, view.lat + turn[1])) };

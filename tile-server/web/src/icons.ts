@@ -13,7 +13,9 @@ export const CLOSE = "M6 6l12 12M18 6 6 18";
 export const DOWNLOAD = "M12 4.500v10.500M7.500 11l4.500 4.500 4.500-4.500M5 19.500h14";
 export const COPY = "M9 9h10v10.500H9zM15 9V4.500H5V15h4";
 export const PENCIL = "M4.500 4.500h15v15h-15zM4.500 4.500h.01M19.500 19.500h.01";
-export const PIN = "M12 20.500s-6-5.500-6-10.500a6 6 0 0 1 12 0c0 5-6 10.500-6 10.500zM12 12a2 2 0 1 0 0-4 2 2 0 0 0 0 4z";
+export const PIN =
+  "M12 20.500s-6-5.500-6-10.500a6 6 0 0 1 12 0c0 5-6 10.500-6 10.500zM12 12a2 2 0 1 0 0-4 2 2 0 0 0 0 4z";
 export const BARS = "M5 19.500v-6M10 19.500V8M15 19.500v-9M20 19.500V5";
 export const TICK = "M4.500 12.500l5 5 10-11";
-export const LINK = "M10 14a4 4 0 0 0 6 .5l3-3a4 4 0 0 0-5.700-5.700l-1 1M14 10a4 4 0 0 0-6-.5l-3 3a4 4 0 0 0 5.700 5.700l1-1";
+export const LINK =
+  "M10 14a4 4 0 0 0 6 .5l3-3a4 4 0 0 0-5.700-5.700l-1 1M14 10a4 4 0 0 0-6-.5l-3 3a4 4 0 0 0 5.700 5.700l1-1";

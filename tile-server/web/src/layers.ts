@@ -28,7 +28,12 @@ export class LayerStage {
   readonly #counts: TileCounts;
   readonly #onFailure: (status: number | undefined, url: string) => void;
 
-  constructor(scene: Scene, counts: TileCounts, opacity: number, onFailure: (status: number | undefined, url: string) => void) {
+  constructor(
+    scene: Scene,
+    counts: TileCounts,
+    opacity: number,
+    onFailure: (status: number | undefined, url: string) => void,
+  ) {
     this.#scene = scene;
     this.#counts = counts;
     this.#opacity = opacity;

@@ -11,7 +11,8 @@ export function ticksOf(low: number, high: number, most = MOST_TICKS): number[] 
   if (!(span > 0)) return [low];
   const rough = span / (most - 1);
   const power = 10 ** Math.floor(Math.log10(rough));
-  const step = [1, 2, 2.5, 5, 10].map((factor) => factor * power).find((candidate) => candidate >= rough * 0.999) ?? 10 * power;
+  const step =
+    [1, 2, 2.5, 5, 10].map((factor) => factor * power).find((candidate) => candidate >= rough * 0.999) ?? 10 * power;
   const ticks: number[] = [];
   for (let i = Math.ceil(low / step - 1e-9) + 0; i * step <= high + step * 1e-9; i++) ticks.push(i * step);
   return ticks;
@@ -35,8 +36,18 @@ export function legendView(legend: Legend): HTMLElement {
   const unit = unitText(legend.unit);
   return el(
     "figure",
-    { class: "legend", id: "legend", role: "group", "aria-label": `Colours from ${numberText(legend.low, digits)} to ${numberText(legend.high, digits)} ${unit}` },
-    el("figcaption", {}, el("span", { class: "legend-label" }, chemistry(legend.label)), el("span", { class: "legend-unit" }, unit)),
+    {
+      class: "legend",
+      id: "legend",
+      role: "group",
+      "aria-label": `Colours from ${numberText(legend.low, digits)} to ${numberText(legend.high, digits)} ${unit}`,
+    },
+    el(
+      "figcaption",
+      {},
+      el("span", { class: "legend-label" }, chemistry(legend.label)),
+      el("span", { class: "legend-unit" }, unit),
+    ),
     bar,
     axis,
   );
@@ -44,5 +55,7 @@ export function legendView(legend: Legend): HTMLElement {
 
 function fractionDigits(value: number, span: number): number {
   const most = digitsFor(span, 3);
-  return [...Array(most + 1).keys()].find((digits) => Math.abs(Number(value.toFixed(digits)) - value) < span * 1e-6) ?? most;
+  return (
+    [...Array(most + 1).keys()].find((digits) => Math.abs(Number(value.toFixed(digits)) - value) < span * 1e-6) ?? most
+  );
 }

@@ -1,6 +1,12 @@
 //! The page's wiring: reads the address, asks for the catalogue, and joins store, globe, layers and cards.
 import "cesium/Build/Cesium/Widgets/CesiumWidget/CesiumWidget.css";
-import "./style.css";
+import "./style/base.css";
+import "./style/fields.css";
+import "./style/layer.css";
+import "./style/analysis.css";
+import "./style/time.css";
+import "./style/messages.css";
+import "./style/phone.css";
 import * as api from "./api";
 import { BudgetPanel } from "./budget";
 import { contains } from "./box";
@@ -38,12 +44,21 @@ let catalogue = new Catalogue([]);
 
 const globe = makeGlobe();
 const counts = new TileCounts();
-const connection = new Connection(notices, () => store.set({ playing: false }), () => {
-  // What loads may be waiting for tiles that already failed while the server was away.
-  presenter.abandon();
-  void begin();
-});
-const stage = new LayerStage(globe.scene, counts, store.state.opacity, (status, url) => void connection.tileFailed(status, url));
+const connection = new Connection(
+  notices,
+  () => store.set({ playing: false }),
+  () => {
+    // What loads may be waiting for tiles that already failed while the server was away.
+    presenter.abandon();
+    void begin();
+  },
+);
+const stage = new LayerStage(
+  globe.scene,
+  counts,
+  store.state.opacity,
+  (status, url) => void connection.tileFailed(status, url),
+);
 const presenter = new Presenter(stage);
 const marks = new Marks(globe.scene);
 const pointer = new Pointer(globe, (place) => store.set({ place, tab: "place" }));
@@ -51,11 +66,21 @@ const steps = () => catalogue.stepsOf(store.state.product);
 const product = () => catalogue.find(store.state.product);
 const report = (key: string, error: unknown) => connection.report(key, error);
 
-const view = new ViewDialog(store, () => product()?.modes ?? [], () => product()?.synthetic ?? false);
+const view = new ViewDialog(
+  store,
+  () => product()?.modes ?? [],
+  () => product()?.synthetic ?? false,
+);
 const controls = new Controls(byId("controls"), store, () => view.open());
 const timeline = new Timeline(byId("timeline"), store);
 const panels = new Panels(byId("panels"), store);
-const placePanel = new PlacePanel(panels.bodies.place, { store, steps, label: () => product()?.legend.label ?? "", bounds: () => product()?.bounds, onError: report });
+const placePanel = new PlacePanel(panels.bodies.place, {
+  store,
+  steps,
+  label: () => product()?.legend.label ?? "",
+  bounds: () => product()?.bounds,
+  onError: report,
+});
 const budgetPanel = new BudgetPanel(panels.bodies.budget, {
   store,
   isFlux: () => product()?.quantity === FLUX,
@@ -68,13 +93,17 @@ new Playback(store, presenter, steps, (timeMs) => catalogue.layerAt(store.state,
 const probe = installProbe(store, counts, globe, () => stage.shownKey);
 
 controls.watch(counts);
-globe.addBaseImagery().catch(() => notices.show("base", "The base map is missing from this server; data is drawn on plain water."));
+globe
+  .addBaseImagery()
+  .catch(() => notices.show("base", "The base map is missing from this server; data is drawn on plain water."));
 globe.view = store.state.camera;
 globe.scene.camera.percentageChanged = 0.01;
 globe.scene.camera.changed.addEventListener(() => store.set({ camera: globe.view }));
 globe.scene.camera.moveEnd.addEventListener(() => store.set({ camera: globe.view }));
 
-store.on(["opacity"], (state) => { stage.opacity = state.opacity; });
+store.on(["opacity"], (state) => {
+  stage.opacity = state.opacity;
+});
 store.on(["place"], (state) => marks.place(state.place));
 store.on(["product"], () => {
   // One product's picture must not stay under another one's legend, not even while the other loads.
@@ -99,7 +128,10 @@ function makeGlobe(): Globe {
     });
     return made;
   } catch (error) {
-    notices.show("webgl", "This browser cannot draw the globe: it needs WebGL 2. Tables and tiles of the server work without it.");
+    notices.show(
+      "webgl",
+      "This browser cannot draw the globe: it needs WebGL 2. Tables and tiles of the server work without it.",
+    );
     throw error;
   }
 }
@@ -120,7 +152,8 @@ async function begin(): Promise<void> {
   }
   controls.setProducts(catalogue.products);
   const wanted = store.state.product;
-  if (wanted !== null && !catalogue.find(wanted)) notices.show("product", `The server has no product “${wanted}”; showing “${first.title}” instead.`);
+  if (wanted !== null && !catalogue.find(wanted))
+    notices.show("product", `The server has no product “${wanted}”; showing “${first.title}” instead.`);
   const chosen = catalogue.find(wanted) ?? first;
   if (store.state.product === chosen.id) useProduct();
   else store.set({ product: chosen.id });
@@ -133,11 +166,17 @@ async function begin(): Promise<void> {
 /** Regions and the check table: the globe does not wait for them. */
 async function loadAside(): Promise<void> {
   await Promise.all([
-    api.regions().then((regions) => budgetPanel.setRegions(regions)).catch((error: unknown) => report("regions", error)),
-    api.check().then((check) => {
-      panels.offer("check", check !== undefined);
-      if (check) drawCheck(panels.bodies.check, check);
-    }).catch((error: unknown) => report("check", error)),
+    api
+      .regions()
+      .then((regions) => budgetPanel.setRegions(regions))
+      .catch((error: unknown) => report("regions", error)),
+    api
+      .check()
+      .then((check) => {
+        panels.offer("check", check !== undefined);
+        if (check) drawCheck(panels.bodies.check, check);
+      })
+      .catch((error: unknown) => report("check", error)),
   ]);
   marks.place(store.state.place);
   await Promise.all([placePanel.refresh(), budgetPanel.refresh()]);
@@ -156,7 +195,9 @@ function useProduct(): void {
   if (known.length === 0) notices.show("steps", `“${chosen.title}” has no periods yet.`);
   else notices.clear("steps");
   const mode = chosen.modes.includes(store.state.mode) ? store.state.mode : (chosen.modes[0] ?? "map");
-  const timeMs = Number.isFinite(store.state.timeMs) ? clampToRange(known, store.state.timeMs) : (known[0]?.midMs ?? Number.NaN);
+  const timeMs = Number.isFinite(store.state.timeMs)
+    ? clampToRange(known, store.state.timeMs)
+    : (known[0]?.midMs ?? Number.NaN);
   store.set({ mode, timeMs });
   if (!contains(chosen.bounds, store.state.camera) && asked.camera === undefined) globe.lookAt(chosen.bounds);
 }

@@ -17,7 +17,11 @@ export class Notices {
       if (line && line.textContent !== text) line.textContent = text;
       return;
     }
-    const close = el("button", { type: "button", class: "quiet", "aria-label": "Close this message", onclick: () => this.clear(key) }, icon(CLOSE));
+    const close = el(
+      "button",
+      { type: "button", class: "quiet", "aria-label": "Close this message", onclick: () => this.clear(key) },
+      icon(CLOSE),
+    );
     const notice = el("div", { class: "notice", "data-key": key }, el("span", {}, text), close);
     this.#shown.set(key, notice);
     this.#box.append(notice);

@@ -3,7 +3,11 @@ import { el, icon } from "./dom";
 import { BARS, CLOSE, PIN, TICK } from "./icons";
 import type { Store, Tab } from "./state";
 
-const TITLES: Record<Tab, [title: string, icon: string]> = { place: ["Place", PIN], budget: ["Budget", BARS], check: ["Check", TICK] };
+const TITLES: Record<Tab, [title: string, icon: string]> = {
+  place: ["Place", PIN],
+  budget: ["Budget", BARS],
+  check: ["Check", TICK],
+};
 
 export class Panels {
   readonly bodies: Record<Tab, HTMLElement>;
@@ -19,13 +23,22 @@ export class Panels {
     this.bodies = { place: this.#body("place"), budget: this.#body("budget"), check: this.#body("check") };
     for (const tab of Object.keys(TITLES) as Tab[]) {
       const [title, path] = TITLES[tab];
-      const button = el("button", { type: "button", role: "tab", class: "tab", id: `tab-${tab}`, "aria-controls": `panel-${tab}` }, icon(path), title);
+      const button = el(
+        "button",
+        { type: "button", role: "tab", class: "tab", id: `tab-${tab}`, "aria-controls": `panel-${tab}` },
+        icon(path),
+        title,
+      );
       button.addEventListener("click", () => store.set({ tab: store.state.tab === tab ? null : tab }));
       button.addEventListener("keydown", (event) => this.#turn(event, tab));
       this.#tabs.set(tab, button);
       list.append(button);
     }
-    this.#close = el("button", { type: "button", class: "quiet", "aria-label": "Close the panel", onclick: () => store.set({ tab: null }) }, icon(CLOSE));
+    this.#close = el(
+      "button",
+      { type: "button", class: "quiet", "aria-label": "Close the panel", onclick: () => store.set({ tab: null }) },
+      icon(CLOSE),
+    );
     container.append(el("div", { class: "tab-row" }, list, this.#close), ...Object.values(this.bodies));
     store.on(["tab"], () => this.#draw());
     this.#draw();
@@ -39,7 +52,14 @@ export class Panels {
   }
 
   #body(tab: Tab): HTMLElement {
-    return el("div", { class: "panel-body", role: "tabpanel", id: `panel-${tab}`, "aria-labelledby": `tab-${tab}`, tabindex: "0", hidden: true });
+    return el("div", {
+      class: "panel-body",
+      role: "tabpanel",
+      id: `panel-${tab}`,
+      "aria-labelledby": `tab-${tab}`,
+      tabindex: "0",
+      hidden: true,
+    });
   }
 
   #turn(event: KeyboardEvent, from: Tab): void {

@@ -26,17 +26,23 @@ export class PlacePanel {
   readonly #lat = el("input", { type: "number", id: "place-lat", min: "-90", max: "90", step: "any" });
   readonly #lon = el("input", { type: "number", id: "place-lon", min: "-180", max: "360", step: "any" });
   #asked: AbortController | undefined;
-  #shown: { samples: Sample[]; unit: string; chart: Chart | undefined; value: HTMLElement; when: HTMLElement } | undefined;
+  #shown:
+    | { samples: Sample[]; unit: string; chart: Chart | undefined; value: HTMLElement; when: HTMLElement }
+    | undefined;
 
   constructor(body: HTMLElement, context: PlaceContext) {
     this.#context = context;
-    const form = el("form", { class: "row typed place-form" },
+    const form = el(
+      "form",
+      { class: "row typed place-form" },
       el("label", { class: "field" }, el("span", {}, "Latitude, ° N"), this.#lat),
       el("label", { class: "field" }, el("span", {}, "Longitude, ° E"), this.#lon),
-      el("button", { type: "submit" }, "Go"));
+      el("button", { type: "submit" }, "Go"),
+    );
     form.addEventListener("submit", (event) => {
       event.preventDefault();
-      if (this.#lat.value !== "" && this.#lon.value !== "") context.store.set({ place: { lon: Number(this.#lon.value), lat: Number(this.#lat.value) } });
+      if (this.#lat.value !== "" && this.#lon.value !== "")
+        context.store.set({ place: { lon: Number(this.#lon.value), lat: Number(this.#lat.value) } });
     });
     body.append(form, this.#content);
     context.store.on(["place", "product"], () => void this.refresh());
@@ -58,7 +64,10 @@ export class PlacePanel {
     this.#lon.value = fieldText(place.lon);
     const bounds = this.#context.bounds();
     if (bounds && !contains(bounds, place)) {
-      this.#content.replaceChildren(this.#title(place), el("p", { class: "no-data", id: "no-data" }, "There is no data here: the product does not reach this place."));
+      this.#content.replaceChildren(
+        this.#title(place),
+        el("p", { class: "no-data", id: "no-data" }, "There is no data here: the product does not reach this place."),
+      );
       return;
     }
     this.#content.replaceChildren(this.#title(place), el("p", { class: "muted busy-line" }, "Reading the series …"));
@@ -74,7 +83,9 @@ export class PlacePanel {
   }
 
   #hint(): void {
-    this.#content.replaceChildren(el("p", { class: "muted" }, "Click in the sea, or type a latitude and a longitude, to see the series there."));
+    this.#content.replaceChildren(
+      el("p", { class: "muted" }, "Click in the sea, or type a latitude and a longitude, to see the series there."),
+    );
   }
 
   #title(place: Place): HTMLElement {
@@ -84,26 +95,62 @@ export class PlacePanel {
   #draw(place: Place, answer: PointSeries): void {
     const samples = answer.series.map((row) => ({ midMs: Date.parse(row.mid), value: row.value }));
     const unit = unitText(answer.unit);
-    const cell = el("p", { class: "muted" }, `Grid cell centred on ${latText(answer.cell.lat)}, ${lonText(answer.cell.lon)} (row ${answer.cell.row}, column ${answer.cell.col})`);
+    const cell = el(
+      "p",
+      { class: "muted" },
+      `Grid cell centred on ${latText(answer.cell.lat)}, ${lonText(answer.cell.lon)} (row ${answer.cell.row}, column ${answer.cell.col})`,
+    );
     if (!hasData(samples)) {
-      this.#content.replaceChildren(this.#title(place), el("p", { class: "no-data", id: "no-data" }, "There is no data here: land, ice, or never observed."), cell, manifestLine(answer.manifest));
+      this.#content.replaceChildren(
+        this.#title(place),
+        el("p", { class: "no-data", id: "no-data" }, "There is no data here: land, ice, or never observed."),
+        cell,
+        manifestLine(answer.manifest),
+      );
       return;
     }
     const value = el("strong", { id: "place-value" });
     const when = el("span", { class: "muted" });
-    const plot = el("div", { class: "plot", id: "series-plot", role: "img", "data-points": String(samples.length), "aria-label": `Series of ${samples.length} values in ${unit}` });
+    const plot = el("div", {
+      class: "plot",
+      id: "series-plot",
+      role: "img",
+      "data-points": String(samples.length),
+      "aria-label": `Series of ${samples.length} values in ${unit}`,
+    });
     const gaps = samples.filter((sample) => sample.value === null).length;
     this.#content.replaceChildren(
       this.#title(place),
       el("p", { class: "muted" }, chemistry(this.#context.label())),
       el("p", { class: "reading" }, value, el("span", { class: "unit" }, unit), when),
       plot,
-      el("p", { class: "muted" }, `${samples.length} periods${gaps > 0 ? `, ${gaps} without data` : ""}; linear in time between their middles.`),
+      el(
+        "p",
+        { class: "muted" },
+        `${samples.length} periods${gaps > 0 ? `, ${gaps} without data` : ""}; linear in time between their middles.`,
+      ),
       cell,
       manifestLine(answer.manifest),
-      el("div", { class: "row actions" },
-        el("button", { type: "button", onclick: () => saveText(`${answer.product}-series.csv`, "text/csv", seriesCsv(answer)) }, icon(DOWNLOAD), "CSV"),
-        el("a", { class: "button", href: api.pointUrl(answer.product, place.lon, place.lat), target: "_blank", rel: "noopener" }, "JSON")),
+      el(
+        "div",
+        { class: "row actions" },
+        el(
+          "button",
+          { type: "button", onclick: () => saveText(`${answer.product}-series.csv`, "text/csv", seriesCsv(answer)) },
+          icon(DOWNLOAD),
+          "CSV",
+        ),
+        el(
+          "a",
+          {
+            class: "button",
+            href: api.pointUrl(answer.product, place.lon, place.lat),
+            target: "_blank",
+            rel: "noopener",
+          },
+          "JSON",
+        ),
+      ),
     );
     const range = rangeOf(parseSteps(answer.series)) ?? { startMs: 0, endMs: 1 };
     const chart = seriesChart(plot, samples, range, unit, (timeMs) => {

@@ -11,7 +11,12 @@ export class Playback {
   readonly #steps: () => readonly Step[];
   readonly #specAt: (timeMs: number) => LayerSpec | undefined;
 
-  constructor(store: Store, presenter: Presenter, steps: () => readonly Step[], specAt: (timeMs: number) => LayerSpec | undefined) {
+  constructor(
+    store: Store,
+    presenter: Presenter,
+    steps: () => readonly Step[],
+    specAt: (timeMs: number) => LayerSpec | undefined,
+  ) {
     this.#store = store;
     this.#presenter = presenter;
     this.#steps = steps;
@@ -47,7 +52,8 @@ export class Playback {
       await until(shownAtMs + stride * frameMs);
       if (!prepared) continue;
       // A hand on the slider or a new product made this picture obsolete while it loaded.
-      const isStale = run.isOver || this.#specAt(timeMs)?.product !== spec.product || this.#specAt(timeMs)?.mode !== spec.mode;
+      const isStale =
+        run.isOver || this.#specAt(timeMs)?.product !== spec.product || this.#specAt(timeMs)?.mode !== spec.mode;
       const wasMoved = quantise(this.#steps(), this.#store.state.timeMs) !== fromMs;
       if (isStale || wasMoved) {
         this.#presenter.discard(prepared);

@@ -24,8 +24,14 @@ export class Pointer {
     handler.setInputAction((event: ScreenSpaceEventHandler.PositionedEvent) => {
       if (this.#drawing) this.#drawing.start = globe.pick(event.position);
     }, ScreenSpaceEventType.LEFT_DOWN);
-    handler.setInputAction((event: ScreenSpaceEventHandler.MotionEvent) => this.#drag(event.endPosition), ScreenSpaceEventType.MOUSE_MOVE);
-    handler.setInputAction((event: ScreenSpaceEventHandler.PositionedEvent) => this.#release(event.position), ScreenSpaceEventType.LEFT_UP);
+    handler.setInputAction(
+      (event: ScreenSpaceEventHandler.MotionEvent) => this.#drag(event.endPosition),
+      ScreenSpaceEventType.MOUSE_MOVE,
+    );
+    handler.setInputAction(
+      (event: ScreenSpaceEventHandler.PositionedEvent) => this.#release(event.position),
+      ScreenSpaceEventType.LEFT_UP,
+    );
     window.addEventListener("keydown", (event) => {
       if (event.key === "Escape" && this.#drawing) this.#end(undefined);
     });

@@ -22,16 +22,37 @@ declare global {
   }
 }
 
-export function installProbe(store: Store, counts: TileCounts, globe: Globe, shown: () => string | undefined): { setReady: () => void } {
+export function installProbe(
+  store: Store,
+  counts: TileCounts,
+  globe: Globe,
+  shown: () => string | undefined,
+): { setReady: () => void } {
   let isReady = false;
   window.fluxglobe = {
-    get ready() { return isReady; },
-    get tilesLoaded() { return counts.loaded; },
-    get tilesPending() { return counts.pending; },
-    get tilesFailed() { return counts.failed; },
-    get shown() { return shown(); },
-    get state() { return store.state; },
+    get ready() {
+      return isReady;
+    },
+    get tilesLoaded() {
+      return counts.loaded;
+    },
+    get tilesPending() {
+      return counts.pending;
+    },
+    get tilesFailed() {
+      return counts.failed;
+    },
+    get shown() {
+      return shown();
+    },
+    get state() {
+      return store.state;
+    },
     project: (lon, lat) => globe.project({ lon, lat }),
   };
-  return { setReady: () => { isReady = true; } };
+  return {
+    setReady: () => {
+      isReady = true;
+    },
+  };
 }

@@ -1,5 +1,12 @@
 //! One product layer's tiles: an imagery provider per instant, and counts of what is on its way for the progress line and the tests.
-import { Rectangle, RequestErrorEvent, TileProviderError, UrlTemplateImageryProvider, WebMercatorTilingScheme } from "cesium";
+import {
+  Rectangle,
+  RequestErrorEvent,
+  RequestState,
+  TileProviderError,
+  UrlTemplateImageryProvider,
+  WebMercatorTilingScheme,
+} from "cesium";
 import { tileTemplate } from "./api";
 import { isWhole, type Bounds } from "./box";
 import type { Mode } from "./state";
@@ -68,7 +75,9 @@ export class LayerTiles {
     provider.errorEvent.addEventListener((error: TileProviderError) => {
       const cause: unknown = error.error;
       const url = `${tileTemplate(spec.product, spec.mode, spec.timeIso)}`
-        .replace("{z}", String(error.level)).replace("{x}", String(error.x)).replace("{y}", String(error.y));
+        .replace("{z}", String(error.level))
+        .replace("{x}", String(error.x))
+        .replace("{y}", String(error.y));
       onFailure(cause instanceof RequestErrorEvent ? cause.statusCode : undefined, url);
     });
   }
@@ -92,7 +101,15 @@ export class LayerTiles {
         this.failed += outcome.failed ?? 0;
         counts.add({ pending: -1, ...outcome });
       };
-      promise.then(() => end({ loaded: 1 }), () => end({ failed: 1 }));
+      promise.then(
+        () => end({ loaded: 1 }),
+        () => {
+          // Cesium calls requests off when nearer ground needs the line, and asks again later: that is no failure.
+          const isCalledOff = req?.state === RequestState.CANCELLED;
+          if (isCalledOff) this.requested -= 1;
+          end(isCalledOff ? {} : { failed: 1 });
+        },
+      );
       return promise;
     };
   }
@@ -104,5 +121,7 @@ function rectangleOf(bounds: Bounds): Rectangle {
   const high = Math.min(north, MERCATOR_LAT_DEG);
   const crossesDateLine = west < -180 || east > 180 || west > east;
   // A tile is the same whichever way it is reached; a rectangle across the date line is not worth the special cases.
-  return isWhole(bounds) || crossesDateLine ? Rectangle.fromDegrees(-180, low, 180, high) : Rectangle.fromDegrees(west, low, east, high);
+  return isWhole(bounds) || crossesDateLine
+    ? Rectangle.fromDegrees(-180, low, 180, high)
+    : Rectangle.fromDegrees(west, low, east, high);
 }

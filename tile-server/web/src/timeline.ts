@@ -2,7 +2,16 @@
 import { el, icon } from "./dom";
 import { BACK, FORWARD, PAUSE, PLAY } from "./icons";
 import type { Store } from "./state";
-import { clampToRange, formatInstant, instantAt, PARTS_PER_STEP, positionOf, quantise, stepLabel, type Step } from "./time";
+import {
+  clampToRange,
+  formatInstant,
+  instantAt,
+  PARTS_PER_STEP,
+  positionOf,
+  quantise,
+  stepLabel,
+  type Step,
+} from "./time";
 
 const SPEEDS = [0.25, 0.5, 1, 2, 4];
 /** Labels under the slider stay apart by at least this. */
@@ -11,7 +20,15 @@ const LABEL_WIDTH_PX = 64;
 export class Timeline {
   readonly #store: Store;
   #steps: readonly Step[] = [];
-  readonly #slider = el("input", { type: "range", id: "time", min: "0", max: "1", step: "any", value: "0", "aria-label": "Time" });
+  readonly #slider = el("input", {
+    type: "range",
+    id: "time",
+    min: "0",
+    max: "1",
+    step: "any",
+    value: "0",
+    "aria-label": "Time",
+  });
   readonly #readout = el("output", { class: "time-readout", id: "time-readout", for: "time" });
   readonly #play = el("button", { type: "button", class: "round play", id: "play" });
   readonly #ticks = el("div", { class: "ticks", "aria-hidden": "true" });
@@ -19,18 +36,44 @@ export class Timeline {
   constructor(container: HTMLElement, store: Store) {
     this.#store = store;
     const speed = el("select", { id: "speed", "aria-label": "Playback speed in steps per second" });
-    for (const pace of SPEEDS) speed.append(el("option", { value: String(pace), selected: pace === store.state.stepsPerSecond }, `${pace}×`));
+    for (const pace of SPEEDS)
+      speed.append(el("option", { value: String(pace), selected: pace === store.state.stepsPerSecond }, `${pace}×`));
     speed.addEventListener("change", () => store.set({ stepsPerSecond: Number(speed.value) }));
     container.append(
       el(
         "div",
         { class: "transport" },
-        el("button", { type: "button", class: "round", id: "step-back", "aria-label": "One step back", onclick: () => this.#jump(-1) }, icon(BACK)),
+        el(
+          "button",
+          {
+            type: "button",
+            class: "round",
+            id: "step-back",
+            "aria-label": "One step back",
+            onclick: () => this.#jump(-1),
+          },
+          icon(BACK),
+        ),
         this.#play,
-        el("button", { type: "button", class: "round", id: "step-forward", "aria-label": "One step forward", onclick: () => this.#jump(1) }, icon(FORWARD)),
+        el(
+          "button",
+          {
+            type: "button",
+            class: "round",
+            id: "step-forward",
+            "aria-label": "One step forward",
+            onclick: () => this.#jump(1),
+          },
+          icon(FORWARD),
+        ),
       ),
       el("div", { class: "track" }, this.#slider, this.#ticks),
-      el("div", { class: "time-side" }, this.#readout, el("label", { class: "speed" }, el("span", { class: "visually-hidden" }, "Speed"), speed)),
+      el(
+        "div",
+        { class: "time-side" },
+        this.#readout,
+        el("label", { class: "speed" }, el("span", { class: "visually-hidden" }, "Speed"), speed),
+      ),
     );
     this.#play.addEventListener("click", () => store.set({ playing: !store.state.playing }));
     // While the thumb moves, instants are taken on the cached raster; where it is let go, exactly what was chosen.
@@ -38,7 +81,9 @@ export class Timeline {
     this.#slider.addEventListener("change", () => store.set({ timeMs: Math.round(this.#chosenMs() / 1000) * 1000 }));
     this.#slider.addEventListener("keydown", (event) => this.#key(event));
     new ResizeObserver(() => this.#drawTicks()).observe(this.#ticks);
-    new ResizeObserver(() => document.documentElement.style.setProperty("--timeline", `${container.offsetHeight}px`)).observe(container);
+    new ResizeObserver(() =>
+      document.documentElement.style.setProperty("--timeline", `${container.offsetHeight}px`),
+    ).observe(container);
     store.on(["timeMs"], () => this.#drawTime());
     store.on(["playing"], () => this.#drawPlay());
     this.#drawPlay();
@@ -64,13 +109,22 @@ export class Timeline {
 
   #key(event: KeyboardEvent): void {
     const moves: Record<string, number> = {
-      ArrowLeft: -1 / PARTS_PER_STEP, ArrowDown: -1 / PARTS_PER_STEP, ArrowRight: 1 / PARTS_PER_STEP, ArrowUp: 1 / PARTS_PER_STEP,
-      PageDown: -1, PageUp: 1, Home: -Infinity, End: Infinity,
+      ArrowLeft: -1 / PARTS_PER_STEP,
+      ArrowDown: -1 / PARTS_PER_STEP,
+      ArrowRight: 1 / PARTS_PER_STEP,
+      ArrowUp: 1 / PARTS_PER_STEP,
+      PageDown: -1,
+      PageUp: 1,
+      Home: -Infinity,
+      End: Infinity,
     };
     const move = moves[event.key];
     if (move === undefined) return;
     event.preventDefault();
-    const position = Math.min(Math.max(positionOf(this.#steps, this.#store.state.timeMs) + move, 0), this.#steps.length);
+    const position = Math.min(
+      Math.max(positionOf(this.#steps, this.#store.state.timeMs) + move, 0),
+      this.#steps.length,
+    );
     this.#store.set({ timeMs: clampToRange(this.#steps, quantise(this.#steps, instantAt(this.#steps, position))) });
   }
 

@@ -25,13 +25,18 @@ export class ViewDialog {
     this.#store = store;
     this.#offered = offered;
     this.#isSynthetic = isSynthetic;
-    const close = el("button", { type: "button", class: "quiet", "aria-label": "Close", onclick: () => this.#dialog.close() }, icon(CLOSE));
+    const close = el(
+      "button",
+      { type: "button", class: "quiet", "aria-label": "Close", onclick: () => this.#dialog.close() },
+      icon(CLOSE),
+    );
     this.#mode.addEventListener("change", () => void this.#render());
     this.#dialog.addEventListener("close", () => this.#asked?.abort());
     this.#dialog.append(
       el("div", { class: "dialog-head" }, el("h2", { id: "view-title" }, "Rendered view"), this.#mode, close),
       this.#frame,
-      el("div", { class: "dialog-foot" }, this.#caption, this.#save));
+      el("div", { class: "dialog-foot" }, this.#caption, this.#save),
+    );
     byId("dialogs").append(this.#dialog);
   }
 
@@ -54,20 +59,31 @@ export class ViewDialog {
     this.#caption.textContent = `${formatInstant(timeMs)}, over ${latText(camera.lat, 1)}, ${lonText(camera.lon, 1)}, ${Math.round(camera.heightKm)} km up${this.#isSynthetic() ? " – synthetic data" : ""}`;
     this.#frame.replaceChildren(el("p", { class: "muted busy-line" }, "The server is drawing …"));
     const mode = this.#mode.value as Mode;
-    const url = api.globeUrl(product, mode, { lon: camera.lon, lat: camera.lat, heightKm: camera.heightKm, timeIso: toIso(timeMs), ...imageSize() });
+    const url = api.globeUrl(product, mode, {
+      lon: camera.lon,
+      lat: camera.lat,
+      heightKm: camera.heightKm,
+      timeIso: toIso(timeMs),
+      ...imageSize(),
+    });
     try {
       const blob = await imageBlob(url, asked.signal);
       if (asked.signal.aborted) return;
       this.#show(blob, `${product}-${mode}-${toIso(timeMs).replace(/:/g, "")}.png`);
     } catch (error) {
-      if (!asked.signal.aborted) this.#frame.replaceChildren(el("p", { class: "problem" }, error instanceof Error ? error.message : String(error)));
+      if (!asked.signal.aborted)
+        this.#frame.replaceChildren(
+          el("p", { class: "problem" }, error instanceof Error ? error.message : String(error)),
+        );
     }
   }
 
   #show(blob: Blob, name: string): void {
     if (this.#imageUrl) URL.revokeObjectURL(this.#imageUrl);
     this.#imageUrl = URL.createObjectURL(blob);
-    this.#frame.replaceChildren(el("img", { src: this.#imageUrl, id: "view-image", alt: "The ocean as the server renders it from here" }));
+    this.#frame.replaceChildren(
+      el("img", { src: this.#imageUrl, id: "view-image", alt: "The ocean as the server renders it from here" }),
+    );
     this.#save.href = this.#imageUrl;
     this.#save.download = name;
     this.#save.hidden = false;

@@ -1,9 +1,26 @@
 //! Time maths against hand values: months of unequal length, holes between steps, the raster and the loop of playback.
 import { describe, expect, it } from "vitest";
-import { clampToRange, formatInstant, instantAt, nextInstant, parseSteps, positionOf, quantise, rangeOf, stepLabel, strideFor, toIso, type Step } from "../src/time";
+import {
+  clampToRange,
+  formatInstant,
+  instantAt,
+  nextInstant,
+  parseSteps,
+  positionOf,
+  quantise,
+  rangeOf,
+  stepLabel,
+  strideFor,
+  toIso,
+  type Step,
+} from "../src/time";
 
 const at = (iso: string): number => Date.parse(iso);
-const month = (start: string, end: string): { start: string; end: string; mid: string } => ({ start, end, mid: toIso((at(start) + at(end)) / 2) });
+const month = (start: string, end: string): { start: string; end: string; mid: string } => ({
+  start,
+  end,
+  mid: toIso((at(start) + at(end)) / 2),
+});
 const JAN = month("2000-01-01T00:00:00Z", "2000-02-01T00:00:00Z");
 const FEB = month("2000-02-01T00:00:00Z", "2000-03-01T00:00:00Z");
 const MAY = month("2000-05-01T00:00:00Z", "2000-06-01T00:00:00Z");
@@ -55,7 +72,9 @@ describe("the raster", () => {
   });
 
   it("keeps an instant that lies on it", () => {
-    expect(quantise(STEPS, quantise(STEPS, at("2000-02-11T07:31:12Z")))).toBe(quantise(STEPS, at("2000-02-11T07:31:12Z")));
+    expect(quantise(STEPS, quantise(STEPS, at("2000-02-11T07:31:12Z")))).toBe(
+      quantise(STEPS, at("2000-02-11T07:31:12Z")),
+    );
   });
 });
 

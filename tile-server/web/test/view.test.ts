@@ -48,7 +48,12 @@ describe("the store", () => {
 });
 
 describe("a series", () => {
-  const samples = [{ midMs: 0, value: 10 }, { midMs: 100, value: 20 }, { midMs: 200, value: null }, { midMs: 300, value: 5 }];
+  const samples = [
+    { midMs: 0, value: 10 },
+    { midMs: 100, value: 20 },
+    { midMs: 200, value: null },
+    { midMs: 300, value: 5 },
+  ];
 
   it("is linear between middles and holds at the ends", () => {
     expect(valueAt(samples, 25)).toBe(12.5);
@@ -94,12 +99,29 @@ describe("files", () => {
   const row = { start: "2000-01-01T00:00:00Z", end: "2000-02-01T00:00:00Z" };
 
   it("of a budget say where the numbers come from", () => {
-    const text = budgetCsv({ product: "p", manifest: "m-1", region: "global", earth: "wgs84", unit: "Tg C", rows: [{ ...row, budget: -176.1, coverage_percent: 92.5, area_m2: 3e14 }] });
-    expect(text).toBe("# product: p\n# manifest: m-1\n# region: global\n# earth: wgs84\n# unit: Tg C\nstart,end,budget,coverage_percent,area_m2\n2000-01-01T00:00:00Z,2000-02-01T00:00:00Z,-176.1,92.5,300000000000000\n");
+    const text = budgetCsv({
+      product: "p",
+      manifest: "m-1",
+      region: "global",
+      earth: "wgs84",
+      unit: "Tg C",
+      rows: [{ ...row, budget: -176.1, coverage_percent: 92.5, area_m2: 3e14 }],
+    });
+    expect(text).toBe(
+      "# product: p\n# manifest: m-1\n# region: global\n# earth: wgs84\n# unit: Tg C\nstart,end,budget,coverage_percent,area_m2\n2000-01-01T00:00:00Z,2000-02-01T00:00:00Z,-176.1,92.5,300000000000000\n",
+    );
   });
 
   it("of a series leave gaps empty", () => {
-    const text = seriesCsv({ product: "p", manifest: "m-1", unit: "g C m-2 yr-1", lon: 0, lat: 0, cell: { row: 1, col: 2, lon: 0.5, lat: 0.5 }, series: [{ ...row, mid: "2000-01-16T12:00:00Z", value: null }] });
+    const text = seriesCsv({
+      product: "p",
+      manifest: "m-1",
+      unit: "g C m-2 yr-1",
+      lon: 0,
+      lat: 0,
+      cell: { row: 1, col: 2, lon: 0.5, lat: 0.5 },
+      series: [{ ...row, mid: "2000-01-16T12:00:00Z", value: null }],
+    });
     expect(text.trimEnd().endsWith(",2000-01-16T12:00:00Z,")).toBe(true);
   });
 });
