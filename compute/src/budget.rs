@@ -6,5 +6,5 @@ mod query;
 pub mod rows;
 pub mod running;
 
-pub use query::{BudgetAnswer, BudgetQuery, budget};
+pub use query::{BudgetAnswer, BudgetQuery, budget, budget_of};
 pub use rows::{BudgetRow, BudgetStep};

@@ -82,24 +82,11 @@ pub async fn point_series(
         });
     };
     let display = manifest.quantity.display();
-    let mut values = Vec::with_capacity(manifest.steps.len());
-    for segment in &manifest.series {
-        for value in segment_values(engine, &manifest, segment, row, col).await? {
-            let shown = f64::from(value) * display.factor + display.offset;
-            values.push((!value.is_nan()).then_some(shown));
-        }
-    }
-    if values.len() != manifest.steps.len() {
-        let reason = format!(
-            "{} values in its series for {} steps",
-            values.len(),
-            manifest.steps.len()
-        );
-        return Err(ComputeError::inconsistent(
-            manifest.id().to_string(),
-            reason,
-        ));
-    }
+    let shown = |value: f32| f64::from(value) * display.factor + display.offset;
+    let values = cell_values(engine, &manifest, row, col).await?;
+    let values = values
+        .into_iter()
+        .map(|value| (!value.is_nan()).then(|| shown(value)));
     let point = |(step, value): (&contract::manifest::Step, Option<f64>)| PointValue {
         start: step.period.start,
         end: step.period.end,
@@ -125,6 +112,31 @@ pub async fn point_series(
         },
         series: manifest.steps.iter().zip(values).map(point).collect(),
     })
+}
+
+/// Values of one cell of a version of a product, one for each of its steps, stored unit; NaN where there is no data.
+pub async fn cell_values(
+    engine: &Engine,
+    manifest: &Manifest,
+    row: u32,
+    col: u32,
+) -> Result<Vec<f32>, ComputeError> {
+    let mut values = Vec::with_capacity(manifest.steps.len());
+    for segment in &manifest.series {
+        values.extend(segment_values(engine, manifest, segment, row, col).await?);
+    }
+    if values.len() != manifest.steps.len() {
+        let reason = format!(
+            "{} values in its series for {} steps",
+            values.len(),
+            manifest.steps.len()
+        );
+        return Err(ComputeError::inconsistent(
+            manifest.id().to_string(),
+            reason,
+        ));
+    }
+    Ok(values)
 }
 
 /// Stored values of one cell in one segment of time.
