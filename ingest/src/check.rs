@@ -20,7 +20,11 @@ pub(crate) struct CheckedGrid {
 }
 
 /// Checks one step. A step without any value passes with no valid cells; whether that is too little is for the file.
-pub(crate) fn run(grid: DecodedGrid, quantity: Quantity, variable: &str) -> Result<CheckedGrid, Rejection> {
+pub(crate) fn run(
+    grid: DecodedGrid,
+    quantity: Quantity,
+    variable: &str,
+) -> Result<CheckedGrid, Rejection> {
     let DecodedGrid { period, mut values } = grid;
     let plausible = quantity.plausible();
     let (mut valid_cells, mut implausible_cells, mut example) = (0u64, 0u64, f32::NAN);
@@ -46,7 +50,11 @@ pub(crate) fn run(grid: DecodedGrid, quantity: Quantity, variable: &str) -> Resu
         );
         return Err(Rejection::new(RejectReason::Values, variable, detail));
     }
-    Ok(CheckedGrid { period, values, valid_cells })
+    Ok(CheckedGrid {
+        period,
+        values,
+        valid_cells,
+    })
 }
 
 /// The bounds of the plausible range are rounded to float32 as the values are: exactly 1.0 of ice is plausible.

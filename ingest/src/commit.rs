@@ -23,14 +23,25 @@ const MAX_TRIES: u32 = 16;
 /// What became of one file.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Committed {
-    Landed { manifest: ManifestId, periods: Vec<Period>, revised: bool },
-    AlreadyLanded { manifest: ManifestId, periods: Vec<Period> },
+    Landed {
+        manifest: ManifestId,
+        periods: Vec<Period>,
+        revised: bool,
+    },
+    AlreadyLanded {
+        manifest: ManifestId,
+        periods: Vec<Period>,
+    },
     Rejected(Rejection),
 }
 
 /// Publishes files of one product, in their order. Files for the same period become manifests one after the other, so
 /// that each revision can be cited.
-pub(crate) async fn run(store: &Store, product: &ProductId, granules: &[StoredGranule]) -> Result<Vec<Committed>, IngestError> {
+pub(crate) async fn run(
+    store: &Store,
+    product: &ProductId,
+    granules: &[StoredGranule],
+) -> Result<Vec<Committed>, IngestError> {
     let mut all = Vec::with_capacity(granules.len());
     let mut rest = granules;
     while !rest.is_empty() {
@@ -41,9 +52,15 @@ pub(crate) async fn run(store: &Store, product: &ProductId, granules: &[StoredGr
     Ok(all)
 }
 
-async fn publish(store: &Store, product: &ProductId, granules: &[StoredGranule]) -> Result<Vec<Committed>, IngestError> {
+async fn publish(
+    store: &Store,
+    product: &ProductId,
+    granules: &[StoredGranule],
+) -> Result<Vec<Committed>, IngestError> {
     for _ in 0..MAX_TRIES {
-        let newest = manifests::latest(store, product).await.map_err(IngestError::storage("read the newest manifest"))?;
+        let newest = manifests::latest(store, product)
+            .await
+            .map_err(IngestError::storage("read the newest manifest"))?;
         let merged = merge::merge(newest.as_ref(), granules);
         let manifest = match (&newest, merged.is_changed()) {
             (Some(newest), false) => newest.clone(),
@@ -53,20 +70,38 @@ async fn publish(store: &Store, product: &ProductId, granules: &[StoredGranule])
                 match manifests::commit(store, &manifest).await {
                     Ok(()) => manifest,
                     Err(StorageError::Conflict { .. }) => continue,
-                    Err(source) => return Err(IngestError::Storage { action: "publish a manifest", source }),
+                    Err(source) => {
+                        return Err(IngestError::Storage {
+                            action: "publish a manifest",
+                            source,
+                        });
+                    }
                 }
             }
         };
         return Ok(outcomes(&merged, granules, Some(&manifest.id())));
     }
-    Err(IngestError::Contended { product: product.to_string(), tries: MAX_TRIES })
+    Err(IngestError::Contended {
+        product: product.to_string(),
+        tries: MAX_TRIES,
+    })
 }
 
 /// The next manifest, with its series and domain durable.
-async fn build(store: &Store, product: &ProductId, newest: Option<&Manifest>, merged: &Merged, granules: &[StoredGranule]) -> Result<Manifest, IngestError> {
-    let last = merged.last_taken.and_then(|i| granules.get(i)).unwrap_or(&granules[0]);
+async fn build(
+    store: &Store,
+    product: &ProductId,
+    newest: Option<&Manifest>,
+    merged: &Merged,
+    granules: &[StoredGranule],
+) -> Result<Manifest, IngestError> {
+    let last = merged
+        .last_taken
+        .and_then(|i| granules.get(i))
+        .unwrap_or(&granules[0]);
     let grid = newest.map_or(last.grid, |m| m.grid);
-    let segments::Written { series, domain } = segments::write(store, product, &grid, newest, merged).await?;
+    let segments::Written { series, domain } =
+        segments::write(store, product, &grid, newest, merged).await?;
     Ok(Manifest {
         schema: MANIFEST_SCHEMA,
         product: product.clone(),
@@ -83,16 +118,27 @@ async fn build(store: &Store, product: &ProductId, newest: Option<&Manifest>, me
     })
 }
 
-fn outcomes(merged: &Merged, granules: &[StoredGranule], manifest: Option<&ManifestId>) -> Vec<Committed> {
+fn outcomes(
+    merged: &Merged,
+    granules: &[StoredGranule],
+    manifest: Option<&ManifestId>,
+) -> Vec<Committed> {
     let outcome = |(change, granule): (&Change, &StoredGranule)| {
         let periods = granule.grids.iter().map(|g| g.step.period).collect();
         match (change, manifest) {
-            (Change::Taken { revised }, Some(manifest)) => {
-                Committed::Landed { manifest: manifest.clone(), periods, revised: *revised }
-            }
-            (Change::Same, Some(manifest)) => Committed::AlreadyLanded { manifest: manifest.clone(), periods },
+            (Change::Taken { revised }, Some(manifest)) => Committed::Landed {
+                manifest: manifest.clone(),
+                periods,
+                revised: *revised,
+            },
+            (Change::Same, Some(manifest)) => Committed::AlreadyLanded {
+                manifest: manifest.clone(),
+                periods,
+            },
             (Change::Refused(rejection), _) => Committed::Rejected(rejection.clone()),
-            (Change::Taken { .. } | Change::Same, None) => unreachable!("a file that is taken or there has a manifest"),
+            (Change::Taken { .. } | Change::Same, None) => {
+                unreachable!("a file that is taken or there has a manifest")
+            }
         }
     };
     merged.changes.iter().zip(granules).map(outcome).collect()

@@ -16,17 +16,42 @@ pub(crate) struct DecodedGrid {
 }
 
 /// Reads and turns one step.
-pub(crate) async fn run(granule: &mut PlannedGranule, step: PlannedStep) -> Result<DecodedGrid, Stop> {
+pub(crate) async fn run(
+    granule: &mut PlannedGranule,
+    step: PlannedStep,
+) -> Result<DecodedGrid, Stop> {
     let part: Vec<Part> = granule.axes.iter().map(|axis| part(axis, step)).collect();
-    let expected = granule.axes.iter().filter(|a| is_plane(a)).map(|a| a.len).product();
-    let stored = granule.session.read(&granule.variable.name, &part, expected).await?;
-    let is_lat_first = granule.axes.iter().position(|a| a.role == Role::Latitude) < granule.axes.iter().position(|a| a.role == Role::Longitude);
-    let len_of = |role| granule.axes.iter().find(|a| a.role == role).map_or(0, |a| a.len as usize);
-    let strides = if is_lat_first { [len_of(Role::Longitude), 1] } else { [1, len_of(Role::Latitude)] };
+    let expected = granule
+        .axes
+        .iter()
+        .filter(|a| is_plane(a))
+        .map(|a| a.len)
+        .product();
+    let stored = granule
+        .session
+        .read(&granule.variable.name, &part, expected)
+        .await?;
+    let is_lat_first = granule.axes.iter().position(|a| a.role == Role::Latitude)
+        < granule.axes.iter().position(|a| a.role == Role::Longitude);
+    let len_of = |role| {
+        granule
+            .axes
+            .iter()
+            .find(|a| a.role == role)
+            .map_or(0, |a| a.len as usize)
+    };
+    let strides = if is_lat_first {
+        [len_of(Role::Longitude), 1]
+    } else {
+        [1, len_of(Role::Latitude)]
+    };
     let packing = &granule.packing;
     // One rounding to float32, at the end.
     let convert = |stored: f64| (packing.value(stored) * step.factor + step.offset) as f32;
-    Ok(DecodedGrid { period: step.period, values: turned(&granule.mapping, strides, &stored, convert) })
+    Ok(DecodedGrid {
+        period: step.period,
+        values: turned(&granule.mapping, strides, &stored, convert),
+    })
 }
 
 fn is_plane(axis: &Axis) -> bool {
@@ -45,11 +70,21 @@ fn part(axis: &Axis, step: PlannedStep) -> Part {
 ///
 /// - `strides`: distance in the file from one latitude, and from one longitude, to the next
 /// - result: `[row, col]` of `mapping.grid`
-fn turned(mapping: &Mapping, strides: [usize; 2], stored: &[f64], convert: impl Fn(f64) -> f32) -> Vec<f32> {
+fn turned(
+    mapping: &Mapping,
+    strides: [usize; 2],
+    stored: &[f64],
+    convert: impl Fn(f64) -> f32,
+) -> Vec<f32> {
     let mut values = Vec::with_capacity(mapping.grid.cell_count());
     for row in &mapping.file_rows {
         let start = *row as usize * strides[0];
-        values.extend(mapping.file_cols.iter().map(|col| convert(stored[start + *col as usize * strides[1]])));
+        values.extend(
+            mapping
+                .file_cols
+                .iter()
+                .map(|col| convert(stored[start + *col as usize * strides[1]])),
+        );
     }
     values
 }
@@ -64,7 +99,8 @@ mod tests {
         // 2 x 4 cells; the value is 10 * (index of latitude from the north) + (index of longitude from -180).
         let lat = [-45.0, 45.0];
         let lon = [45.0, 135.0, 225.0, 315.0];
-        let mapping = Mapping::from_labels(&lat, &lon, Registration::Center, ["lat", "lon"]).unwrap();
+        let mapping =
+            Mapping::from_labels(&lat, &lon, Registration::Center, ["lat", "lon"]).unwrap();
         let expected: Vec<f32> = vec![0.0, 1.0, 2.0, 3.0, 10.0, 11.0, 12.0, 13.0];
         let lat_first = [12.0, 13.0, 10.0, 11.0, 2.0, 3.0, 0.0, 1.0];
         assert_eq!(turned(&mapping, [4, 1], &lat_first, |v| v as f32), expected);

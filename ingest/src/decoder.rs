@@ -9,3 +9,6 @@ mod protocol;
 pub(crate) mod session;
 
 pub use child::run_child;
+
+/// Exit code of a reader for what is its parent's doing and not the file's.
+const EXIT_USAGE: u8 = 64;

@@ -19,9 +19,18 @@ pub(crate) struct EncodedGrid {
     pub(crate) valid_cells: u64,
 }
 
-pub(crate) fn run(checked: &CheckedGrid, product: &ProductId, grid: &Grid) -> Result<EncodedGrid, IngestError> {
+pub(crate) fn run(
+    checked: &CheckedGrid,
+    product: &ProductId,
+    grid: &Grid,
+) -> Result<EncodedGrid, IngestError> {
     let frame = storage::frames::encode(grid, &checked.values, checked.period)
         .map_err(IngestError::storage("encode a frame"))?;
     let key = ObjectKey::frame(product, &Digest::of(&frame));
-    Ok(EncodedGrid { period: checked.period, key, frame, valid_cells: checked.valid_cells })
+    Ok(EncodedGrid {
+        period: checked.period,
+        key,
+        frame,
+        valid_cells: checked.valid_cells,
+    })
 }

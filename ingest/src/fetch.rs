@@ -36,24 +36,52 @@ pub(crate) async fn run(path: &Path, limits: Limits) -> Result<RawGranule, Stop>
 }
 
 fn read(path: &Path, limits: Limits) -> Result<RawGranule, Stop> {
-    let unreadable = |e: std::io::Error| Rejection::new(RejectReason::Unreadable, "file", format!("cannot be read: {e}"));
+    let unreadable = |e: std::io::Error| {
+        Rejection::new(
+            RejectReason::Unreadable,
+            "file",
+            format!("cannot be read: {e}"),
+        )
+    };
     let metadata = std::fs::metadata(path).map_err(unreadable)?;
     if !metadata.is_file() {
-        return Err(Rejection::new(RejectReason::Unreadable, "file", "is no regular file; give a file").into());
+        return Err(Rejection::new(
+            RejectReason::Unreadable,
+            "file",
+            "is no regular file; give a file",
+        )
+        .into());
     }
     if metadata.len() > limits.file_bytes {
-        let detail = format!("has {} bytes, at most {} are read; give it in smaller pieces", metadata.len(), limits.file_bytes);
+        let detail = format!(
+            "has {} bytes, at most {} are read; give it in smaller pieces",
+            metadata.len(),
+            limits.file_bytes
+        );
         return Err(Rejection::new(RejectReason::TooLarge, "file", detail).into());
     }
     let stamp = stamp(path).map_err(unreadable)?;
     let bytes = Bytes::from(std::fs::read(path).map_err(unreadable)?);
-    let file_name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
-    Ok(RawGranule { path: path.to_owned(), file_name, sha256: Digest::of(&bytes), bytes, stamp })
+    let file_name = path
+        .file_name()
+        .unwrap_or(path.as_os_str())
+        .to_string_lossy()
+        .into_owned();
+    Ok(RawGranule {
+        path: path.to_owned(),
+        file_name,
+        sha256: Digest::of(&bytes),
+        bytes,
+        stamp,
+    })
 }
 
 fn stamp(path: &Path) -> std::io::Result<Stamp> {
     let metadata = std::fs::metadata(path)?;
-    Ok(Stamp { len: metadata.len(), modified: metadata.modified().ok() })
+    Ok(Stamp {
+        len: metadata.len(),
+        modified: metadata.modified().ok(),
+    })
 }
 
 impl RawGranule {
@@ -61,7 +89,9 @@ impl RawGranule {
     pub(crate) fn check_unchanged(&self) -> Result<(), IngestError> {
         match stamp(&self.path) {
             Ok(now) if now == self.stamp && now.len == self.bytes.len() as u64 => Ok(()),
-            _ => Err(IngestError::Changed { file: self.path.clone() }),
+            _ => Err(IngestError::Changed {
+                file: self.path.clone(),
+            }),
         }
     }
 }

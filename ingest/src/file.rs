@@ -4,7 +4,7 @@
 //! comes from the first bytes, never from the name. Left out on purpose: groups below the root, text variables,
 //! compound types, virtual and external storage.
 
-pub mod description;
+pub(crate) mod description;
 mod format;
 mod hdf5_attribute;
 mod hdf5_file;
@@ -29,7 +29,9 @@ impl DataFile {
     /// Opens a file and reads its header.
     pub(crate) fn open(path: &Path) -> Result<Self, Rejection> {
         match format::detect(path)? {
-            Format::NetCdf3(version) => netcdf3::NetCdf3File::open(path, version).map(Self::NetCdf3),
+            Format::NetCdf3(version) => {
+                netcdf3::NetCdf3File::open(path, version).map(Self::NetCdf3)
+            }
             Format::Hdf5 => hdf5_file::Hdf5File::open(path).map(Self::Hdf5),
         }
     }

@@ -39,7 +39,10 @@ struct Shape {
 impl Shape {
     fn scaled(scale: f64) -> Option<Self> {
         let part = |n: u32| (f64::from(n) * scale).round() as u32;
-        let shape = Self { rows: part(ROWS), cols: part(COLS) };
+        let shape = Self {
+            rows: part(ROWS),
+            cols: part(COLS),
+        };
         (scale.is_finite() && scale <= 1.0 && shape.rows >= 8 && shape.cols >= 8).then_some(shape)
     }
 
@@ -55,22 +58,36 @@ impl Shape {
 
     /// Centres of all cells in the order of the file: longitude, latitude.
     fn centers(self) -> impl Iterator<Item = (f64, f64)> {
-        (0..self.rows).flat_map(move |row| (0..self.cols).map(move |col| (self.lon_deg(col), self.lat_deg(row))))
+        (0..self.rows).flat_map(move |row| {
+            (0..self.cols).map(move |col| (self.lon_deg(col), self.lat_deg(row)))
+        })
     }
 }
 
 /// Writes the synthetic China Sea product. `scale` is 1 for 1800 x 2460 cells, 0.1 for 180 x 246; `progress` is told
 /// months done and months in all.
-pub fn generate_china_sea(path: &Path, scale: f64, seed: u64, progress: &dyn Fn(usize, usize)) -> Result<(), IngestError> {
-    let failed = |detail: String| IngestError::Generate { file: path.to_owned(), detail };
-    let shape = Shape::scaled(scale).ok_or_else(|| failed(format!("scale {scale} is not above 0.005 and at most 1")))?;
+pub fn generate_china_sea(
+    path: &Path,
+    scale: f64,
+    seed: u64,
+    progress: &dyn Fn(usize, usize),
+) -> Result<(), IngestError> {
+    let failed = |detail: String| IngestError::Generate {
+        file: path.to_owned(),
+        detail,
+    };
+    let shape = Shape::scaled(scale)
+        .ok_or_else(|| failed(format!("scale {scale} is not above 0.005 and at most 1")))?;
     let noise = Noise::new(seed);
-    let is_sea: Vec<bool> = shape.centers().map(|(lon, lat)| !coast::is_land(lon, lat, &noise)).collect();
+    let is_sea: Vec<bool> = shape
+        .centers()
+        .map(|(lon, lat)| !coast::is_land(lon, lat, noise))
+        .collect();
     // A reader never sees half a file.
     let part = path.with_extension("part");
     let written = writer::write(&part, shape, seed, |month| {
         progress(month, 12);
-        month_values(shape, &is_sea, month, &noise)
+        month_values(shape, &is_sea, month, noise)
     });
     written.map_err(|e| failed(e.to_string()))?;
     std::fs::rename(&part, path).map_err(|e| failed(e.to_string()))?;
@@ -79,11 +96,18 @@ pub fn generate_china_sea(path: &Path, scale: f64, seed: u64, progress: &dyn Fn(
 }
 
 /// Flux of one month (0 to 11), mmol m⁻² d⁻¹, positive out of the sea, `[row, col]` from the south; land and cloud filled.
-fn month_values(shape: Shape, is_sea: &[bool], month: usize, noise: &Noise) -> Vec<f32> {
-    let cloud: Vec<f32> = shape.centers().map(|(lon, lat)| flux::cloudiness(lon, lat, month, noise)).collect();
+fn month_values(shape: Shape, is_sea: &[bool], month: usize, noise: Noise) -> Vec<f32> {
+    let cloud: Vec<f32> = shape
+        .centers()
+        .map(|(lon, lat)| flux::cloudiness(lon, lat, month, noise))
+        .collect();
     let threshold = cloud_threshold(&cloud, is_sea, month);
     let value = |(index, (lon, lat)): (usize, (f64, f64))| {
-        if is_sea[index] && cloud[index] < threshold { flux::flux_mmol_m2_d(lon, lat, month, noise) as f32 } else { FILL }
+        if is_sea[index] && cloud[index] < threshold {
+            flux::flux_mmol_m2_d(lon, lat, month, noise) as f32
+        } else {
+            FILL
+        }
     };
     shape.centers().enumerate().map(value).collect()
 }
@@ -92,7 +116,12 @@ fn month_values(shape: Shape, is_sea: &[bool], month: usize, noise: &Noise) -> V
 fn cloud_threshold(cloud: &[f32], is_sea: &[bool], month: usize) -> f32 {
     let season = (2.0 * std::f64::consts::PI * (month as f64 - 0.5) / 6.0).cos();
     let share = CLOUD_SHARE * (1.0 + 0.3 * season);
-    let mut sea: Vec<f32> = cloud.iter().zip(is_sea).filter(|(_, sea)| **sea).map(|(c, _)| *c).collect();
+    let mut sea: Vec<f32> = cloud
+        .iter()
+        .zip(is_sea)
+        .filter(|(_, sea)| **sea)
+        .map(|(c, _)| *c)
+        .collect();
     if sea.is_empty() {
         return f32::INFINITY;
     }
@@ -122,15 +151,22 @@ mod tests {
     #[test]
     fn clouds_cover_about_a_fifth_of_the_sea() {
         let (shape, noise) = (Shape::scaled(0.05).unwrap(), Noise::new(1));
-        let is_sea: Vec<bool> = shape.centers().map(|(lon, lat)| !coast::is_land(lon, lat, &noise)).collect();
+        let is_sea: Vec<bool> = shape
+            .centers()
+            .map(|(lon, lat)| !coast::is_land(lon, lat, noise))
+            .collect();
         let sea = is_sea.iter().filter(|s| **s).count();
         let covered: f64 = (0..12)
             .map(|month| {
-                let values = month_values(shape, &is_sea, month, &noise);
+                let values = month_values(shape, &is_sea, month, noise);
                 1.0 - values.iter().filter(|v| **v != FILL).count() as f64 / sea as f64
             })
             .sum();
-        assert!((covered / 12.0 - CLOUD_SHARE).abs() < 0.02, "{}", covered / 12.0);
+        assert!(
+            (covered / 12.0 - CLOUD_SHARE).abs() < 0.02,
+            "{}",
+            covered / 12.0
+        );
     }
 
     #[test]

@@ -19,23 +19,40 @@ pub(crate) struct InspectedGranule {
 pub(crate) async fn run(raw: RawGranule, settings: &Settings) -> Result<InspectedGranule, Stop> {
     let (session, description) = Session::open(&raw.path, settings).await?;
     check_sizes(&description, settings.limits)?;
-    Ok(InspectedGranule { raw, session, description })
+    Ok(InspectedGranule {
+        raw,
+        session,
+        description,
+    })
 }
 
 /// Refuses a file that declares more than may be, before a byte of it is allocated.
 fn check_sizes(description: &Description, limits: Limits) -> Result<(), Rejection> {
     if description.variables.is_empty() {
-        return Err(Rejection::new(RejectReason::NoVariable, "file", "holds no variable; give a file with a gridded variable"));
+        return Err(Rejection::new(
+            RejectReason::NoVariable,
+            "file",
+            "holds no variable; give a file with a gridded variable",
+        ));
     }
     for variable in &description.variables {
         let cells = variable.cell_count();
         if cells > u128::from(limits.variable_cells) {
-            let shape = variable.dimensions.iter().map(|d| d.len.to_string()).collect::<Vec<_>>().join(" x ");
+            let shape = variable
+                .dimensions
+                .iter()
+                .map(|d| d.len.to_string())
+                .collect::<Vec<_>>()
+                .join(" x ");
             let detail = format!(
                 "declares {shape} = {cells} cells, at most {} are read; give it in smaller pieces",
                 limits.variable_cells
             );
-            return Err(Rejection::new(RejectReason::TooLarge, &variable.name, detail));
+            return Err(Rejection::new(
+                RejectReason::TooLarge,
+                &variable.name,
+                detail,
+            ));
         }
     }
     Ok(())

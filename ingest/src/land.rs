@@ -51,8 +51,15 @@ pub async fn land_files(
     batch: Batch<'_>,
     progress: &dyn Progress,
 ) -> Result<Vec<Outcome>, IngestError> {
-    let wish = Wish { profile: batch.profile, product: batch.product };
-    let order = |path: PathBuf| Order { trace: trace(&path), path, wish };
+    let wish = Wish {
+        profile: batch.profile,
+        product: batch.product,
+    };
+    let order = |path: PathBuf| Order {
+        trace: trace(&path),
+        path,
+        wish,
+    };
     let orders: Vec<Order<'_>> = batch.files.into_iter().map(order).collect();
     land_orders(store, log, settings, &orders, progress).await
 }
@@ -65,12 +72,19 @@ pub(crate) async fn land_orders(
     orders: &[Order<'_>],
     progress: &dyn Progress,
 ) -> Result<Vec<Outcome>, IngestError> {
-    let pipeline = Pipeline { store, settings, progress };
+    let pipeline = Pipeline {
+        store,
+        settings,
+        progress,
+    };
     let mut all = Vec::with_capacity(orders.len());
     for group in orders.chunks(COMMIT_FILES) {
-        for (order, (outcome, raw_sha256)) in group.iter().zip(land_group(&pipeline, group).await?) {
+        for (order, (outcome, raw_sha256)) in group.iter().zip(land_group(&pipeline, group).await?)
+        {
             let event = Event::new(order.trace.clone(), outcome.event(raw_sha256, 1));
-            log.append(&event).await.map_err(IngestError::storage("append an event"))?;
+            log.append(&event)
+                .await
+                .map_err(IngestError::storage("append an event"))?;
             progress.done(&outcome);
             all.push(outcome);
         }
@@ -80,7 +94,10 @@ pub(crate) async fn land_orders(
 
 type Told = (Outcome, Option<Digest>);
 
-async fn land_group(pipeline: &Pipeline<'_>, group: &[Order<'_>]) -> Result<Vec<Told>, IngestError> {
+async fn land_group(
+    pipeline: &Pipeline<'_>,
+    group: &[Order<'_>],
+) -> Result<Vec<Told>, IngestError> {
     let prepared: Vec<Prepared> = futures::stream::iter(group)
         .map(|order| pipeline.prepare(&order.path, order.wish))
         .buffered(pipeline.settings.parallel_files.clamp(1, 64))
@@ -91,19 +108,41 @@ async fn land_group(pipeline: &Pipeline<'_>, group: &[Order<'_>]) -> Result<Vec<
     for (index, prepared) in prepared.into_iter().enumerate() {
         let file = group[index].path.clone();
         match prepared {
-            Prepared::Stored(granule) => products.entry(granule.target.product.clone()).or_default().push((index, granule)),
-            Prepared::AlreadyLanded { raw_sha256, manifest, periods } => {
-                told[index] = Some((Outcome::AlreadyLanded { file, manifest, periods }, Some(raw_sha256)));
+            Prepared::Stored(granule) => products
+                .entry(granule.target.product.clone())
+                .or_default()
+                .push((index, granule)),
+            Prepared::AlreadyLanded {
+                raw_sha256,
+                manifest,
+                periods,
+            } => {
+                told[index] = Some((
+                    Outcome::AlreadyLanded {
+                        file,
+                        manifest,
+                        periods,
+                    },
+                    Some(raw_sha256),
+                ));
             }
-            Prepared::Rejected(rejection) => told[index] = Some((Outcome::rejected(file, rejection), None)),
+            Prepared::Rejected(rejection) => {
+                told[index] = Some((Outcome::rejected(file, rejection), None));
+            }
         }
     }
     for (product, stored) in products {
         let (indices, granules): (Vec<usize>, Vec<StoredGranule>) = stored.into_iter().unzip();
-        indices.iter().for_each(|i| pipeline.progress.stage(&group[*i].path, Stage::Commit, 0, 0));
+        for index in &indices {
+            let file = &group[*index].path;
+            pipeline.progress.stage(file, Stage::Commit, 0, 0);
+        }
         let committed = commit::run(pipeline.store, &product, &granules).await?;
         for ((index, granule), committed) in indices.into_iter().zip(&granules).zip(committed) {
-            told[index] = Some((outcome(group[index].path.clone(), committed), Some(granule.raw_sha256)));
+            told[index] = Some((
+                outcome(group[index].path.clone(), committed),
+                Some(granule.raw_sha256),
+            ));
         }
     }
     Ok(told.into_iter().flatten().collect())
@@ -111,13 +150,29 @@ async fn land_group(pipeline: &Pipeline<'_>, group: &[Order<'_>]) -> Result<Vec<
 
 fn outcome(file: PathBuf, committed: Committed) -> Outcome {
     match committed {
-        Committed::Landed { manifest, periods, revised } => Outcome::Landed { file, manifest, periods, revised },
-        Committed::AlreadyLanded { manifest, periods } => Outcome::AlreadyLanded { file, manifest, periods },
+        Committed::Landed {
+            manifest,
+            periods,
+            revised,
+        } => Outcome::Landed {
+            file,
+            manifest,
+            periods,
+            revised,
+        },
+        Committed::AlreadyLanded { manifest, periods } => Outcome::AlreadyLanded {
+            file,
+            manifest,
+            periods,
+        },
         Committed::Rejected(rejection) => Outcome::rejected(file, rejection),
     }
 }
 
 /// A trace for a file that no notice came for.
 pub(crate) fn trace(path: &std::path::Path) -> String {
-    format!("file-{}", Digest::of(path.as_os_str().as_encoded_bytes()).short())
+    format!(
+        "file-{}",
+        Digest::of(path.as_os_str().as_encoded_bytes()).short()
+    )
 }

@@ -47,8 +47,17 @@ pub enum Outcome {
 
 impl Outcome {
     pub(crate) fn rejected(file: PathBuf, rejection: Rejection) -> Self {
-        let Rejection { reason, object, detail } = rejection;
-        Self::Rejected { file, reason, object, detail }
+        let Rejection {
+            reason,
+            object,
+            detail,
+        } = rejection;
+        Self::Rejected {
+            file,
+            reason,
+            object,
+            detail,
+        }
     }
 
     /// Was the file refused?
@@ -67,7 +76,9 @@ impl Outcome {
     /// The file.
     pub fn file(&self) -> &std::path::Path {
         match self {
-            Self::Landed { file, .. } | Self::AlreadyLanded { file, .. } | Self::Rejected { file, .. } => file,
+            Self::Landed { file, .. }
+            | Self::AlreadyLanded { file, .. }
+            | Self::Rejected { file, .. } => file,
         }
     }
 
@@ -75,24 +86,50 @@ impl Outcome {
     pub(crate) fn event(&self, raw_sha256: Option<contract::digest::Digest>, attempt: u32) -> Body {
         let path = self.file().display().to_string();
         match (self, raw_sha256) {
-            (Self::Landed { manifest, periods, revised, .. }, Some(raw_sha256)) => Body::GranuleLanded {
+            (
+                Self::Landed {
+                    manifest,
+                    periods,
+                    revised,
+                    ..
+                },
+                Some(raw_sha256),
+            ) => Body::GranuleLanded {
                 path,
                 raw_sha256,
                 manifest: manifest.clone(),
                 periods: periods.clone(),
                 revised: *revised,
             },
-            (Self::AlreadyLanded { manifest, periods, .. }, Some(raw_sha256)) => Body::GranuleLanded {
+            (
+                Self::AlreadyLanded {
+                    manifest, periods, ..
+                },
+                Some(raw_sha256),
+            ) => Body::GranuleLanded {
                 path,
                 raw_sha256,
                 manifest: manifest.clone(),
                 periods: periods.clone(),
                 revised: false,
             },
-            (Self::Rejected { reason, object, detail, .. }, _) => {
-                Body::GranuleRejected { path, reason: *reason, detail: format!("{object}: {detail}"), attempt }
+            (
+                Self::Rejected {
+                    reason,
+                    object,
+                    detail,
+                    ..
+                },
+                _,
+            ) => Body::GranuleRejected {
+                path,
+                reason: *reason,
+                detail: format!("{object}: {detail}"),
+                attempt,
+            },
+            (Self::Landed { .. } | Self::AlreadyLanded { .. }, None) => {
+                unreachable!("a landed file has a digest")
             }
-            (Self::Landed { .. } | Self::AlreadyLanded { .. }, None) => unreachable!("a landed file has a digest"),
         }
     }
 }
@@ -100,16 +137,37 @@ impl Outcome {
 impl Display for Outcome {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
         let span = |periods: &[Period]| match (periods.first(), periods.last()) {
-            (Some(first), Some(last)) => Period { start: first.start, end: last.end }.to_string(),
+            (Some(first), Some(last)) => Period {
+                start: first.start,
+                end: last.end,
+            }
+            .to_string(),
             _ => "no period".to_owned(),
         };
         match self {
-            Self::Landed { file, manifest, periods, revised } => {
+            Self::Landed {
+                file,
+                manifest,
+                periods,
+                revised,
+            } => {
                 let how = if *revised { "revised" } else { "landed" };
-                write!(f, "{}: {how} in {manifest} for {}", file.display(), span(periods))
+                write!(
+                    f,
+                    "{}: {how} in {manifest} for {}",
+                    file.display(),
+                    span(periods)
+                )
             }
-            Self::AlreadyLanded { file, manifest, .. } => write!(f, "{}: was in {manifest} already", file.display()),
-            Self::Rejected { file, object, detail, .. } => write!(f, "{}: {object}: {detail}", file.display()),
+            Self::AlreadyLanded { file, manifest, .. } => {
+                write!(f, "{}: was in {manifest} already", file.display())
+            }
+            Self::Rejected {
+                file,
+                object,
+                detail,
+                ..
+            } => write!(f, "{}: {object}: {detail}", file.display()),
         }
     }
 }

@@ -26,7 +26,11 @@ pub(crate) enum Prepared {
     /// To commit.
     Stored(StoredGranule),
     /// Nothing: the product holds it.
-    AlreadyLanded { raw_sha256: Digest, manifest: ManifestId, periods: Vec<Period> },
+    AlreadyLanded {
+        raw_sha256: Digest,
+        manifest: ManifestId,
+        periods: Vec<Period>,
+    },
     /// Nothing: it is refused.
     Rejected(Rejection),
 }
@@ -40,17 +44,27 @@ pub(crate) struct Pipeline<'a> {
 
 impl Pipeline<'_> {
     /// Takes a file as far as to the manifest.
-    pub(crate) async fn prepare(&self, path: &Path, wish: Wish<'_>) -> Result<Prepared, IngestError> {
+    pub(crate) async fn prepare(
+        &self,
+        path: &Path,
+        wish: Wish<'_>,
+    ) -> Result<Prepared, IngestError> {
         for _ in 0..MAX_READS {
             match self.stages(path, wish).await {
                 Ok(prepared) => return Ok(prepared),
                 Err(Stop::Rejected(rejection)) => return Ok(Prepared::Rejected(rejection)),
-                Err(Stop::Failed(IngestError::Changed { file })) => tracing::info!(file = %file.display(), "changed while it was read"),
+                Err(Stop::Failed(IngestError::Changed { file })) => {
+                    tracing::info!(file = %file.display(), "changed while it was read");
+                }
                 Err(Stop::Failed(error)) => return Err(error),
             }
         }
         let detail = "kept changing while it was read; give it when it is complete";
-        Ok(Prepared::Rejected(Rejection::new(RejectReason::Unreadable, "file", detail)))
+        Ok(Prepared::Rejected(Rejection::new(
+            RejectReason::Unreadable,
+            "file",
+            detail,
+        )))
     }
 
     async fn stages(&self, path: &Path, wish: Wish<'_>) -> Result<Prepared, Stop> {
@@ -71,22 +85,49 @@ impl Pipeline<'_> {
         }
         planned.raw.check_unchanged()?;
         if grids.is_empty() {
-            let detail = "holds no value in any step; correct fill value or valid range in a profile";
-            return Err(Rejection::new(RejectReason::Values, &planned.variable.name, detail).into());
+            let detail =
+                "holds no value in any step; correct fill value or valid range in a profile";
+            return Err(
+                Rejection::new(RejectReason::Values, &planned.variable.name, detail).into(),
+            );
         }
         grids.sort_by_key(|grid| grid.step.period);
-        let PlannedGranule { raw: RawGranule { sha256: raw_sha256, .. }, target, mapping, .. } = planned;
-        Ok(Prepared::Stored(StoredGranule { target, grid: mapping.grid, raw_sha256, grids }))
+        let PlannedGranule {
+            raw: RawGranule {
+                sha256: raw_sha256, ..
+            },
+            target,
+            mapping,
+            ..
+        } = planned;
+        Ok(Prepared::Stored(StoredGranule {
+            target,
+            grid: mapping.grid,
+            raw_sha256,
+            grids,
+        }))
     }
 
     /// One time step: decode, check, encode, put. None if it holds no value at all.
-    async fn step(&self, path: &Path, planned: &mut PlannedGranule, index: usize) -> Result<Option<StoredGrid>, Stop> {
-        let tell = |stage| self.progress.stage(path, stage, index + 1, planned.steps.len());
+    async fn step(
+        &self,
+        path: &Path,
+        planned: &mut PlannedGranule,
+        index: usize,
+    ) -> Result<Option<StoredGrid>, Stop> {
+        let tell = |stage| {
+            self.progress
+                .stage(path, stage, index + 1, planned.steps.len());
+        };
         tell(Stage::Decode);
         let step = planned.steps[index];
         tell(Stage::Check);
         let decoded = decode::run(planned, step).await?;
-        let (quantity, product, grid) = (planned.target.quantity, planned.target.product.clone(), planned.mapping.grid);
+        let (quantity, product, grid) = (
+            planned.target.quantity,
+            planned.target.product.clone(),
+            planned.mapping.grid,
+        );
         let variable = planned.variable.name.clone();
         let encoded = tokio::task::spawn_blocking(move || {
             let checked = check::run(decoded, quantity, &variable)?;
@@ -96,27 +137,45 @@ impl Pipeline<'_> {
             Ok(Some(encode::run(&checked, &product, &grid)?))
         })
         .await??;
-        let Some(encoded) = encoded else { return Ok(None) };
-        self.progress.stage(path, Stage::Put, index + 1, planned.steps.len());
+        let Some(encoded) = encoded else {
+            return Ok(None);
+        };
+        self.progress
+            .stage(path, Stage::Put, index + 1, planned.steps.len());
         Ok(Some(put::run(self.store, encoded, &planned.raw).await?))
     }
 
     /// Is this very file in the product? With a profile of the caller's own it is decoded all the same, since the same
     /// bytes may mean other values by it.
-    async fn landed_before(&self, planned: &PlannedGranule, wish: Wish<'_>) -> Result<Option<Prepared>, IngestError> {
+    async fn landed_before(
+        &self,
+        planned: &PlannedGranule,
+        wish: Wish<'_>,
+    ) -> Result<Option<Prepared>, IngestError> {
         if wish.profile.is_some() {
             return Ok(None);
         }
         let newest = manifests::latest(self.store, &planned.target.product).await;
-        let Some(newest) = newest.map_err(IngestError::storage("read the newest manifest"))? else { return Ok(None) };
+        let Some(newest) = newest.map_err(IngestError::storage("read the newest manifest"))? else {
+            return Ok(None);
+        };
         let raw_sha256 = planned.raw.sha256;
         let periods: Vec<Period> = planned.steps.iter().map(|s| s.period).collect();
-        let is_there = !periods.is_empty() && periods.iter().all(|p| holds(&newest, *p, raw_sha256));
-        let is_same = newest.quantity == planned.target.quantity && newest.grid == planned.mapping.grid;
-        Ok((is_there && is_same).then(|| Prepared::AlreadyLanded { raw_sha256, manifest: newest.id(), periods }))
+        let is_there =
+            !periods.is_empty() && periods.iter().all(|p| holds(&newest, *p, raw_sha256));
+        let is_same =
+            newest.quantity == planned.target.quantity && newest.grid == planned.mapping.grid;
+        Ok((is_there && is_same).then(|| Prepared::AlreadyLanded {
+            raw_sha256,
+            manifest: newest.id(),
+            periods,
+        }))
     }
 }
 
 fn holds(manifest: &Manifest, period: Period, raw_sha256: Digest) -> bool {
-    manifest.steps.iter().any(|step| step.period == period && step.raw_sha256 == raw_sha256)
+    manifest
+        .steps
+        .iter()
+        .any(|step| step.period == period && step.raw_sha256 == raw_sha256)
 }

@@ -71,19 +71,50 @@ struct Planning<'a> {
     limits: Limits,
 }
 
-pub(crate) async fn run(granule: InspectedGranule, wish: Wish<'_>, limits: Limits) -> Result<PlannedGranule, Stop> {
-    let InspectedGranule { raw, session, description } = granule;
+pub(crate) async fn run(
+    granule: InspectedGranule,
+    wish: Wish<'_>,
+    limits: Limits,
+) -> Result<PlannedGranule, Stop> {
+    let InspectedGranule {
+        raw,
+        session,
+        description,
+    } = granule;
     let fits = |profile: &&Profile| profile.is_for(&raw.file_name, &description);
-    let profile = wish.profile.or_else(|| crate::profile::shipped().iter().find(fits));
+    let profile = wish
+        .profile
+        .or_else(|| crate::profile::shipped().iter().find(fits));
     let (variable, meaning) = target::choose(&description, profile)?;
-    let target = target::target(&description, variable, profile, meaning.quantity, wish.product)?;
-    let mut planning = Planning { session, file: &description, file_name: &raw.file_name, profile, limits };
+    let target = target::target(
+        &description,
+        variable,
+        profile,
+        meaning.quantity,
+        wish.product,
+    )?;
+    let mut planning = Planning {
+        session,
+        file: &description,
+        file_name: &raw.file_name,
+        profile,
+        limits,
+    };
     let (axes, mapping) = place::mapping(&mut planning, variable).await?;
     let periods = steps::periods(&mut planning, &axes).await?;
     let steps = steps::convert(variable, profile, meaning, &periods)?;
     let packing = target::packing(variable, profile)?;
     let Planning { session, .. } = planning;
-    Ok(PlannedGranule { session, target, variable: variable.clone(), axes, mapping, packing, steps, raw })
+    Ok(PlannedGranule {
+        session,
+        target,
+        variable: variable.clone(),
+        axes,
+        mapping,
+        packing,
+        steps,
+        raw,
+    })
 }
 
 impl Planning<'_> {
@@ -91,18 +122,29 @@ impl Planning<'_> {
     async fn coordinate(&mut self, name: &str) -> Result<Vec<f64>, Stop> {
         /// Longest coordinate axis.
         const MAX_LABELS: u64 = 1 << 20;
-        let missing = || Rejection::new(RejectReason::Grid, name, "is not in the file; name another coordinate in the profile");
+        let missing = || {
+            Rejection::new(
+                RejectReason::Grid,
+                name,
+                "is not in the file; name another coordinate in the profile",
+            )
+        };
         let variable = self.file.variable(name).ok_or_else(missing)?;
         let count = match variable.dimensions.as_slice() {
             [] => 1,
             [only] => only.len,
             more => {
-                let detail = format!("has {} dimensions where a coordinate has one: this is a swath; grid it first", more.len());
+                let detail = format!(
+                    "has {} dimensions where a coordinate has one: this is a swath; grid it first",
+                    more.len()
+                );
                 return Err(Rejection::new(RejectReason::Grid, name, detail).into());
             }
         };
         if count > MAX_LABELS || !variable.is_numeric() {
-            let detail = format!("is no coordinate axis ({count} labels, at most {MAX_LABELS} numbers are read)");
+            let detail = format!(
+                "is no coordinate axis ({count} labels, at most {MAX_LABELS} numbers are read)"
+            );
             return Err(Rejection::new(RejectReason::Grid, name, detail).into());
         }
         let parts = vec![Part::All; variable.dimensions.len()];
@@ -113,8 +155,19 @@ impl Planning<'_> {
 
     /// The time axis, or a scalar time beside the axes.
     fn time_variable(&self, axes: &[Axis]) -> Option<String> {
-        let on_axis = axes.iter().find(|a| a.role == Role::Time).and_then(|a| a.coordinate.clone());
-        let is_scalar_time = |v: &&Variable| v.cell_count() == 1 && v.is_numeric() && coordinate::role_of(v) == Role::Time;
-        on_axis.or_else(|| self.file.variables.iter().find(is_scalar_time).map(|v| v.name.clone()))
+        let on_axis = axes
+            .iter()
+            .find(|a| a.role == Role::Time)
+            .and_then(|a| a.coordinate.clone());
+        let is_scalar_time = |v: &&Variable| {
+            v.cell_count() == 1 && v.is_numeric() && coordinate::role_of(v) == Role::Time
+        };
+        on_axis.or_else(|| {
+            self.file
+                .variables
+                .iter()
+                .find(is_scalar_time)
+                .map(|v| v.name.clone())
+        })
     }
 }

@@ -118,7 +118,11 @@ pub(crate) struct TimeRules {
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub(crate) enum TimeSource {
     /// A variable, with the unit and calendar the file lacks or has wrong.
-    Variable { name: String, unit: Option<String>, calendar: Option<String> },
+    Variable {
+        name: String,
+        unit: Option<String>,
+        calendar: Option<String>,
+    },
     /// An attribute of the file, such as `time_coverage_start`.
     Attribute(String),
     /// The name of the file, with `{year}`, `{month}`, `{day}`, `{day_of_year}`, `*` and `?`.
@@ -132,12 +136,20 @@ pub(crate) enum TimeSource {
 impl Profile {
     /// Reads a profile from TOML.
     pub fn parse(name: &str, text: &str) -> Result<Self, IngestError> {
-        let bad = |detail: String| IngestError::Profile { name: name.to_owned(), detail };
-        let profile: Self = toml::from_str(text).map_err(|e| bad(e.to_string().replace('\n', " ")))?;
+        let bad = |detail: String| IngestError::Profile {
+            name: name.to_owned(),
+            detail,
+        };
+        let profile: Self =
+            toml::from_str(text).map_err(|e| bad(e.to_string().replace('\n', " ")))?;
         if let Some(unit) = &profile.variable.unit {
             crate::unit::parse(unit).map_err(|e| bad(format!("unit {unit:?} {e}")))?;
         }
-        if let Some(TimeRules { from: TimeSource::FileName(pattern), .. }) = &profile.time {
+        if let Some(TimeRules {
+            from: TimeSource::FileName(pattern),
+            ..
+        }) = &profile.time
+        {
             pattern::check(pattern).map_err(bad)?;
         }
         if let Some(stated) = &profile.grid.stated {
@@ -149,9 +161,15 @@ impl Profile {
     /// Reads a profile file.
     pub fn load(path: &Path) -> Result<Self, IngestError> {
         let name = path.display().to_string();
-        let bad = |e: std::io::Error| IngestError::Profile { name: name.clone(), detail: format!("cannot be read: {e}") };
+        let bad = |e: std::io::Error| IngestError::Profile {
+            name: name.clone(),
+            detail: format!("cannot be read: {e}"),
+        };
         if std::fs::metadata(path).map_err(bad)?.len() > MAX_PROFILE_BYTES {
-            return Err(IngestError::Profile { name, detail: format!("is larger than {MAX_PROFILE_BYTES} bytes") });
+            return Err(IngestError::Profile {
+                name,
+                detail: format!("is larger than {MAX_PROFILE_BYTES} bytes"),
+            });
         }
         let text = std::fs::read_to_string(path).map_err(bad)?;
         Self::parse(&name, &text)
@@ -165,27 +183,51 @@ impl Profile {
         if Path::new(name_or_path).is_file() {
             return Self::load(Path::new(name_or_path));
         }
-        let names = shipped().iter().map(|p| p.name.as_str()).collect::<Vec<_>>().join(", ");
-        Err(IngestError::Profile { name: name_or_path.to_owned(), detail: format!("is no file and none of {names}") })
+        let names = shipped()
+            .iter()
+            .map(|p| p.name.as_str())
+            .collect::<Vec<_>>()
+            .join(", ");
+        Err(IngestError::Profile {
+            name: name_or_path.to_owned(),
+            detail: format!("is no file and none of {names}"),
+        })
     }
 
     /// Is the profile for this file?
     pub(crate) fn is_for(&self, file_name: &str, file: &Description) -> bool {
-        let Some(rules) = &self.matches else { return false };
+        let Some(rules) = &self.matches else {
+            return false;
+        };
         if *rules == Match::default() {
             return false;
         }
-        let attribute_is = |(name, wanted): (&String, &toml::Value)| match (file.attributes.0.get(name), wanted) {
-            (Some(AttributeValue::Text(_)), toml::Value::String(wanted)) => {
-                file.attributes.text(name).is_some_and(|text| pattern::matches(wanted, text))
-            }
-            (Some(AttributeValue::Numbers(_)), toml::Value::Integer(wanted)) => file.attributes.number(name) == Some(*wanted as f64),
-            (Some(AttributeValue::Numbers(_)), toml::Value::Float(wanted)) => file.attributes.number(name) == Some(*wanted),
-            _ => false,
-        };
-        rules.file_name.as_ref().is_none_or(|p| pattern::matches(p, file_name))
-            && rules.variables.iter().all(|name| file.variable(name).is_some())
-            && rules.absent.iter().all(|name| file.variable(name).is_none())
+        let attribute_is =
+            |(name, wanted): (&String, &toml::Value)| match (file.attributes.0.get(name), wanted) {
+                (Some(AttributeValue::Text(_)), toml::Value::String(wanted)) => file
+                    .attributes
+                    .text(name)
+                    .is_some_and(|text| pattern::matches(wanted, text)),
+                (Some(AttributeValue::Numbers(_)), toml::Value::Integer(wanted)) => {
+                    file.attributes.number(name) == Some(*wanted as f64)
+                }
+                (Some(AttributeValue::Numbers(_)), toml::Value::Float(wanted)) => {
+                    file.attributes.number(name) == Some(*wanted)
+                }
+                _ => false,
+            };
+        rules
+            .file_name
+            .as_ref()
+            .is_none_or(|p| pattern::matches(p, file_name))
+            && rules
+                .variables
+                .iter()
+                .all(|name| file.variable(name).is_some())
+            && rules
+                .absent
+                .iter()
+                .all(|name| file.variable(name).is_none())
             && rules.attributes.iter().all(attribute_is)
     }
 }

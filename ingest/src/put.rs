@@ -29,16 +29,43 @@ pub(crate) struct StoredGranule {
 }
 
 /// Stores the file as it came.
-pub(crate) async fn raw(store: &Store, product: &ProductId, raw: &RawGranule) -> Result<(), IngestError> {
+pub(crate) async fn raw(
+    store: &Store,
+    product: &ProductId,
+    raw: &RawGranule,
+) -> Result<(), IngestError> {
     let key = ObjectKey::raw(product, &raw.sha256);
-    store.put_new(&key, raw.bytes.clone()).await.map_err(IngestError::storage("store the file"))?;
+    store
+        .put_new(&key, raw.bytes.clone())
+        .await
+        .map_err(IngestError::storage("store the file"))?;
     Ok(())
 }
 
 /// Stores one frame.
-pub(crate) async fn run(store: &Store, encoded: EncodedGrid, raw: &RawGranule) -> Result<StoredGrid, IngestError> {
-    let EncodedGrid { period, key, frame, valid_cells } = encoded;
-    store.put_new(&key, frame).await.map_err(IngestError::storage("store a frame"))?;
+pub(crate) async fn run(
+    store: &Store,
+    encoded: EncodedGrid,
+    raw: &RawGranule,
+) -> Result<StoredGrid, IngestError> {
+    let EncodedGrid {
+        period,
+        key,
+        frame,
+        valid_cells,
+    } = encoded;
+    store
+        .put_new(&key, frame)
+        .await
+        .map_err(IngestError::storage("store a frame"))?;
     let (raw_sha256, origin) = (raw.sha256, raw.file_name.clone());
-    Ok(StoredGrid { step: Step { period, frame: key, raw_sha256, origin, valid_cells } })
+    Ok(StoredGrid {
+        step: Step {
+            period,
+            frame: key,
+            raw_sha256,
+            origin,
+            valid_cells,
+        },
+    })
 }

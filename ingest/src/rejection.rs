@@ -22,7 +22,11 @@ pub struct Rejection {
 impl Rejection {
     /// A refusal; control characters are replaced and long texts are cut, since both may come from the file.
     pub fn new(reason: RejectReason, object: impl AsRef<str>, detail: impl AsRef<str>) -> Self {
-        Self { reason, object: one_line(object.as_ref()), detail: one_line(detail.as_ref()) }
+        Self {
+            reason,
+            object: one_line(object.as_ref()),
+            detail: one_line(detail.as_ref()),
+        }
     }
 
     /// The same refusal after it crossed a process border: its texts are cleaned once more.
@@ -38,7 +42,10 @@ impl Display for Rejection {
 }
 
 fn one_line(text: &str) -> String {
-    text.chars().take(MAX_TEXT_CHARS).map(|c| if c.is_control() { ' ' } else { c }).collect()
+    text.chars()
+        .take(MAX_TEXT_CHARS)
+        .map(|c| if c.is_control() { ' ' } else { c })
+        .collect()
 }
 
 #[cfg(test)]

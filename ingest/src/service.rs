@@ -49,11 +49,20 @@ struct Notice {
 impl IngestService {
     /// A service that has not started.
     pub fn new(store: Store, log: Arc<dyn EventLog>, settings: Settings) -> Self {
-        Self { store, log, settings }
+        Self {
+            store,
+            log,
+            settings,
+        }
     }
 
     /// Appends a notice for each file.
-    pub async fn notify(&self, files: &[PathBuf], profile: Option<&str>, product: Option<&ProductId>) -> Result<(), IngestError> {
+    pub async fn notify(
+        &self,
+        files: &[PathBuf],
+        profile: Option<&str>,
+        product: Option<&ProductId>,
+    ) -> Result<(), IngestError> {
         for file in files {
             let body = Body::GranuleNotice {
                 path: file.display().to_string(),
@@ -61,7 +70,10 @@ impl IngestService {
                 product: product.cloned(),
             };
             let event = Event::new(land::trace(file), body);
-            self.log.append(&event).await.map_err(IngestError::storage("append a notice"))?;
+            self.log
+                .append(&event)
+                .await
+                .map_err(IngestError::storage("append a notice"))?;
         }
         Ok(())
     }
@@ -79,7 +91,12 @@ impl IngestService {
     }
 
     /// Lands files as notices come, until `stop` is ready; a group that was begun is finished.
-    pub async fn run(&self, poll: Duration, progress: &dyn Progress, stop: impl Future<Output = ()>) -> Result<(), IngestError> {
+    pub async fn run(
+        &self,
+        poll: Duration,
+        progress: &dyn Progress,
+        stop: impl Future<Output = ()>,
+    ) -> Result<(), IngestError> {
         tokio::pin!(stop);
         loop {
             self.drain(progress).await?;
@@ -107,44 +124,98 @@ impl IngestService {
 
     async fn try_group(&self, progress: &dyn Progress) -> Result<Vec<Outcome>, IngestError> {
         let read = IngestError::storage("read notices");
-        let from = self.log.committed(TOPIC, GROUP).await.map_err(IngestError::storage("read the offset"))?;
+        let from = self
+            .log
+            .committed(TOPIC, GROUP)
+            .await
+            .map_err(IngestError::storage("read the offset"))?;
         let events = self.log.read(TOPIC, from, NOTICES).await.map_err(read)?;
-        let Some((last, _)) = events.last() else { return Ok(Vec::new()) };
+        let Some((last, _)) = events.last() else {
+            return Ok(Vec::new());
+        };
         let next = last + 1;
-        let notices: Vec<Notice> = events.into_iter().filter_map(|(_, event)| notice(event)).collect();
+        let notices: Vec<Notice> = events
+            .into_iter()
+            .filter_map(|(_, event)| notice(event))
+            .collect();
         let mut outcomes = Vec::with_capacity(notices.len());
         // Orders in a row whose profile is known land together.
         for run in notices.chunk_by(|a, b| a.profile.is_ok() && b.profile.is_ok()) {
             outcomes.extend(self.follow(run, progress).await?);
         }
-        self.log.commit(TOPIC, GROUP, next).await.map_err(IngestError::storage("commit the offset"))?;
+        self.log
+            .commit(TOPIC, GROUP, next)
+            .await
+            .map_err(IngestError::storage("commit the offset"))?;
         Ok(outcomes)
     }
 
-    async fn follow(&self, notices: &[Notice], progress: &dyn Progress) -> Result<Vec<Outcome>, IngestError> {
-        if let [Notice { path, profile: Err(rejection), trace, .. }] = notices {
+    async fn follow(
+        &self,
+        notices: &[Notice],
+        progress: &dyn Progress,
+    ) -> Result<Vec<Outcome>, IngestError> {
+        if let [
+            Notice {
+                path,
+                profile: Err(rejection),
+                trace,
+                ..
+            },
+        ] = notices
+        {
             let outcome = Outcome::rejected(path.clone(), rejection.clone());
             let event = Event::new(trace.clone(), outcome.event(None, 1));
-            self.log.append(&event).await.map_err(IngestError::storage("append an event"))?;
+            self.log
+                .append(&event)
+                .await
+                .map_err(IngestError::storage("append an event"))?;
             progress.done(&outcome);
             return Ok(vec![outcome]);
         }
         let orders: Vec<Order<'_>> = notices.iter().map(Notice::order).collect();
-        land::land_orders(&self.store, self.log.as_ref(), &self.settings, &orders, progress).await
+        land::land_orders(
+            &self.store,
+            self.log.as_ref(),
+            &self.settings,
+            &orders,
+            progress,
+        )
+        .await
     }
 }
 
 impl Notice {
     fn order(&self) -> Order<'_> {
         let profile = self.profile.as_ref().ok().and_then(Option::as_ref);
-        let wish = Wish { profile, product: self.product.as_ref() };
-        Order { path: self.path.clone(), wish, trace: self.trace.clone() }
+        let wish = Wish {
+            profile,
+            product: self.product.as_ref(),
+        };
+        Order {
+            path: self.path.clone(),
+            wish,
+            trace: self.trace.clone(),
+        }
     }
 }
 
 fn notice(event: Event) -> Option<Notice> {
-    let Body::GranuleNotice { path, profile, product } = event.body else { return None };
+    let Body::GranuleNotice {
+        path,
+        profile,
+        product,
+    } = event.body
+    else {
+        return None;
+    };
     let profile = profile.map(|name| Profile::find(&name)).transpose();
-    let refused = |e: IngestError| Rejection::new(RejectReason::NoVariable, "profile", e.to_string());
-    Some(Notice { path: PathBuf::from(path), profile: profile.map_err(refused), product, trace: event.trace })
+    let refused =
+        |e: IngestError| Rejection::new(RejectReason::NoVariable, "profile", e.to_string());
+    Some(Notice {
+        path: PathBuf::from(path),
+        profile: profile.map_err(refused),
+        product,
+        trace: event.trace,
+    })
 }

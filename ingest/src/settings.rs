@@ -19,7 +19,10 @@ impl DecoderCommand {
     /// # Errors
     /// The system does not say where this program is.
     pub fn current() -> std::io::Result<Self> {
-        Ok(Self { program: std::env::current_exe()?, arguments: vec!["decode-file".into()] })
+        Ok(Self {
+            program: std::env::current_exe()?,
+            arguments: vec!["decode-file".into()],
+        })
     }
 }
 
@@ -48,7 +51,7 @@ impl Default for Limits {
             file_bytes: 4 << 30,
             memory_bytes: 3 << 30,
             cpu_s: 600,
-            wall: Duration::from_secs(1800),
+            wall: Duration::from_mins(30),
             plane_cells: 1 << 26,
             variable_cells: 1 << 34,
             steps: 100_000,
@@ -78,6 +81,10 @@ impl Settings {
 
     /// Default limits and two files at a time.
     pub fn with_decoder(decoder: DecoderCommand) -> Self {
-        Self { decoder, limits: Limits::default(), parallel_files: 2 }
+        Self {
+            decoder,
+            limits: Limits::default(),
+            parallel_files: 2,
+        }
     }
 }

@@ -10,7 +10,7 @@ use chrono::{Datelike as _, NaiveDate};
 use contract::quantity::{CARBON_KG_PER_MOL, Quantity};
 use contract::time::Period;
 
-pub use parse::parse;
+pub(crate) use parse::parse;
 
 /// Mass of one mole of CO2, kg (IUPAC 2021: carbon 12.011, oxygen 15.999).
 const CO2_KG_PER_MOL: f64 = 0.044_009;
@@ -19,24 +19,24 @@ const WATER_KG_PER_M3: f64 = 1000.0;
 
 /// Powers of the base units.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Dimension {
+pub(crate) struct Dimension {
     /// Power of kilogram.
-    pub mass: i8,
+    pub(crate) mass: i8,
     /// Power of metre.
-    pub length: i8,
+    pub(crate) length: i8,
     /// Power of second; months are counted apart.
-    pub time: i8,
+    pub(crate) time: i8,
     /// Power of calendar month, whose length depends on the step.
-    pub month: i8,
+    pub(crate) month: i8,
     /// Power of kelvin.
-    pub temperature: i8,
+    pub(crate) temperature: i8,
     /// Power of mole.
-    pub amount: i8,
+    pub(crate) amount: i8,
 }
 
 /// Of what a mass or amount is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Substance {
+pub(crate) enum Substance {
     /// Carbon.
     Carbon,
     /// Carbon dioxide.
@@ -45,20 +45,20 @@ pub enum Substance {
 
 /// A parsed unit: `base = value * factor + offset`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Unit {
+pub(crate) struct Unit {
     /// Powers of the base units.
-    pub dimension: Dimension,
+    pub(crate) dimension: Dimension,
     /// Multiplies a value; months are not in it.
-    pub factor: f64,
+    pub(crate) factor: f64,
     /// Added after the factor: degrees Celsius have one.
-    pub offset: f64,
+    pub(crate) offset: f64,
     /// Of what, if the unit says it.
-    pub substance: Option<Substance>,
+    pub(crate) substance: Option<Substance>,
 }
 
 /// A linear conversion to the stored unit of a quantity: `stored = value * factor + offset`, for one step.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Conversion {
+pub(crate) struct Conversion {
     /// Multiplies a value, with `months` powers of the length of the step's month still to come.
     factor: f64,
     offset: f64,
@@ -70,28 +70,65 @@ impl Unit {
     ///
     /// `substance`: of what a mass is where the unit itself does not say (a profile or the standard name does). An
     /// amount (mol) of CO2 holds the same amount of carbon.
-    pub fn to_quantity(self, quantity: Quantity, substance: Option<Substance>) -> Result<Conversion, String> {
-        let Ok(target) = parse(quantity.unit()) else { return Err(format!("no unit for {quantity:?}")) };
+    pub(crate) fn to_quantity(
+        self,
+        quantity: Quantity,
+        substance: Option<Substance>,
+    ) -> Result<Conversion, String> {
+        let Ok(target) = parse(quantity.unit()) else {
+            return Err(format!("no unit for {quantity:?}"));
+        };
         let months = self.dimension.month;
         // A month is a time; its length comes with the step.
-        let own = Dimension { month: 0, time: self.dimension.time + months, ..self.dimension };
+        let own = Dimension {
+            month: 0,
+            time: self.dimension.time + months,
+            ..self.dimension
+        };
         let extra = match quantity {
-            Quantity::CarbonFlux | Quantity::AccumulatedCarbon => carbon_factor(own, target.dimension, self.substance.or(substance))?,
-            Quantity::Precipitation if own == (Dimension { length: 1, time: -1, ..Dimension::default() }) => WATER_KG_PER_M3,
+            Quantity::CarbonFlux | Quantity::AccumulatedCarbon => {
+                carbon_factor(own, target.dimension, self.substance.or(substance))?
+            }
+            Quantity::Precipitation
+                if own
+                    == (Dimension {
+                        length: 1,
+                        time: -1,
+                        ..Dimension::default()
+                    }) =>
+            {
+                WATER_KG_PER_M3
+            }
             _ if own == target.dimension => 1.0,
             _ => return Err(wrong_kind(quantity)),
         };
-        Ok(Conversion { factor: self.factor * extra / target.factor, offset: self.offset, months })
+        Ok(Conversion {
+            factor: self.factor * extra / target.factor,
+            offset: self.offset,
+            months,
+        })
     }
 }
 
 fn wrong_kind(quantity: Quantity) -> String {
-    format!("is no unit of {}; give one such as {:?} in a profile", quantity.title().to_lowercase(), quantity.unit())
+    format!(
+        "is no unit of {}; give one such as {:?} in a profile",
+        quantity.title().to_lowercase(),
+        quantity.unit()
+    )
 }
 
 /// Factor from kg or mol of the substance to kg of carbon.
-fn carbon_factor(own: Dimension, target: Dimension, substance: Option<Substance>) -> Result<f64, String> {
-    let as_amount = Dimension { mass: 0, amount: 1, ..target };
+fn carbon_factor(
+    own: Dimension,
+    target: Dimension,
+    substance: Option<Substance>,
+) -> Result<f64, String> {
+    let as_amount = Dimension {
+        mass: 0,
+        amount: 1,
+        ..target
+    };
     match (own == target, own == as_amount, substance) {
         (true, _, Some(Substance::Carbon)) => Ok(1.0),
         (true, _, Some(Substance::Co2)) => Ok(CARBON_KG_PER_MOL / CO2_KG_PER_MOL),
@@ -105,8 +142,12 @@ fn carbon_factor(own: Dimension, target: Dimension, substance: Option<Substance>
 
 impl Conversion {
     /// Factor and offset for a step of this period, or what is wrong.
-    pub fn for_period(self, period: Period) -> Result<(f64, f64), String> {
-        let month_s = if self.months == 0 { 1.0 } else { month_seconds(period)? };
+    pub(crate) fn for_period(self, period: Period) -> Result<(f64, f64), String> {
+        let month_s = if self.months == 0 {
+            1.0
+        } else {
+            month_seconds(period)?
+        };
         Ok((self.factor * month_s.powi(self.months.into()), self.offset))
     }
 }
@@ -114,17 +155,25 @@ impl Conversion {
 /// Length of the month that a step covers or lies in, seconds; the mean length if it covers several whole months.
 fn month_seconds(period: Period) -> Result<f64, String> {
     let advice = "a unit per month needs steps of whole months or within one month";
-    let instant = |t: contract::time::TimeMs| chrono::DateTime::from_timestamp_millis(t.ms()).ok_or(advice);
-    let (start, last) = (instant(period.start)?, instant(period.end)? - chrono::Duration::milliseconds(1));
+    let instant =
+        |t: contract::time::TimeMs| chrono::DateTime::from_timestamp_millis(t.ms()).ok_or(advice);
+    let (start, last) = (
+        instant(period.start)?,
+        instant(period.end)? - chrono::Duration::milliseconds(1),
+    );
     let (first_month, last_month) = ((start.year(), start.month()), (last.year(), last.month()));
     if first_month == last_month {
-        return Period::month(first_month.0, first_month.1).map(Period::seconds).map_err(|e| e.to_string());
+        return Period::month(first_month.0, first_month.1)
+            .map(Period::seconds)
+            .map_err(|e| e.to_string());
     }
     let is_month_start = |t: chrono::DateTime<chrono::Utc>| {
-        NaiveDate::from_ymd_opt(t.year(), t.month(), 1).and_then(|d| d.and_hms_opt(0, 0, 0)) == Some(t.naive_utc())
+        NaiveDate::from_ymd_opt(t.year(), t.month(), 1).and_then(|d| d.and_hms_opt(0, 0, 0))
+            == Some(t.naive_utc())
     };
     if is_month_start(start) && is_month_start(instant(period.end)?) {
-        let count = (last_month.0 - first_month.0) * 12 + last_month.1 as i32 - first_month.1 as i32 + 1;
+        let count =
+            (last_month.0 - first_month.0) * 12 + last_month.1 as i32 - first_month.1 as i32 + 1;
         return Ok(period.seconds() / f64::from(count));
     }
     Err(advice.to_owned())

@@ -51,14 +51,18 @@ impl Calendar {
             "proleptic_gregorian" => Ok(Self::ProlepticGregorian),
             "noleap" | "365_day" => Ok(Self::NoLeap),
             "360_day" => Ok(Self::Days360),
-            other => Err(format!("calendar {other:?} is not known; give the time in a profile")),
+            other => Err(format!(
+                "calendar {other:?} is not known; give the time in a profile"
+            )),
         }
     }
 
     /// Days since an origin of the calendar's own.
     fn day_number(self, year: i32, month: u32, day: u32) -> Option<i64> {
         match self {
-            Self::ProlepticGregorian => NaiveDate::from_ymd_opt(year, month, day).map(|d| d.num_days_from_ce().into()),
+            Self::ProlepticGregorian => {
+                NaiveDate::from_ymd_opt(year, month, day).map(|d| d.num_days_from_ce().into())
+            }
             Self::Standard if (year, month, day) >= (1582, 10, 15) => {
                 NaiveDate::from_ymd_opt(year, month, day).map(|d| d.num_days_from_ce().into())
             }
@@ -69,7 +73,8 @@ impl Calendar {
             }
             Self::Days360 => {
                 let valid = (1..=12).contains(&month) && (1..=30).contains(&day);
-                valid.then(|| i64::from(year) * 360 + i64::from(month - 1) * 30 + i64::from(day - 1))
+                valid
+                    .then(|| i64::from(year) * 360 + i64::from(month - 1) * 30 + i64::from(day - 1))
             }
         }
     }
@@ -89,11 +94,20 @@ impl Calendar {
                 (year, date.month(), date.day())
             }
             Self::Days360 => {
-                let (year, day) = (day_number.div_euclid(360), day_number.rem_euclid(360) as u32);
+                let (year, day) = (
+                    day_number.div_euclid(360),
+                    day_number.rem_euclid(360) as u32,
+                );
                 (i32::try_from(year).ok()?, day / 30 + 1, day % 30 + 1)
             }
         };
-        (1..=9998).contains(&year).then_some(CalendarDate { year, month, day, second, calendar: self })
+        (1..=9998).contains(&year).then_some(CalendarDate {
+            year,
+            month,
+            day,
+            second,
+            calendar: self,
+        })
     }
 }
 
@@ -101,7 +115,8 @@ impl Calendar {
 fn julian_day_number(year: i32, month: u32, day: u32) -> Option<i64> {
     let is_leap = year.rem_euclid(4) == 0;
     // Any leap or common Gregorian year tells which days exist.
-    let day_of_year = NaiveDate::from_ymd_opt(if is_leap { 2000 } else { 2001 }, month, day)?.ordinal();
+    let day_of_year =
+        NaiveDate::from_ymd_opt(if is_leap { 2000 } else { 2001 }, month, day)?.ordinal();
     let past = i64::from(year) - 1;
     // 1 January of year 1 (Julian) is 30 December of year 0 (Gregorian): two days earlier.
     Some(past * 365 + past.div_euclid(4) + i64::from(day_of_year) - 2)
@@ -110,7 +125,11 @@ fn julian_day_number(year: i32, month: u32, day: u32) -> Option<i64> {
 impl TimeUnit {
     /// Reads `STEP since DATE`.
     pub(crate) fn parse(text: &str, calendar: Calendar) -> Result<Self, String> {
-        let bad = || format!("time unit {text:?} is not of the form \"days since 1970-01-01\"; give the time in a profile");
+        let bad = || {
+            format!(
+                "time unit {text:?} is not of the form \"days since 1970-01-01\"; give the time in a profile"
+            )
+        };
         let lower = text.trim().to_ascii_lowercase();
         let (step, date) = lower.split_once(" since ").ok_or_else(bad)?;
         let step = match step.trim() {
@@ -130,8 +149,18 @@ impl TimeUnit {
 
     /// The date of a number of the axis, or what is wrong.
     pub(crate) fn date(self, number: f64) -> Result<CalendarDate, String> {
-        let bad = || format!("time {number} lies outside the years 1 to 9998 or is no number; give the time in a profile");
-        let CalendarDate { year, month, day, second, calendar } = self.reference;
+        let bad = || {
+            format!(
+                "time {number} lies outside the years 1 to 9998 or is no number; give the time in a profile"
+            )
+        };
+        let CalendarDate {
+            year,
+            month,
+            day,
+            second,
+            calendar,
+        } = self.reference;
         match self.step {
             Step::Seconds(step_s) => {
                 let total_s = number * step_s + second;
@@ -140,18 +169,23 @@ impl TimeUnit {
                     return Err(bad());
                 }
                 let start = calendar.day_number(year, month, day).ok_or_else(bad)?;
-                calendar.date(start + days as i64, total_s - days * DAY_S).ok_or_else(bad)
+                calendar
+                    .date(start + days as i64, total_s - days * DAY_S)
+                    .ok_or_else(bad)
             }
             // Calendar months and years, as people who write them mean it; UDUNITS would take 30.44 days.
             Step::Months(per_step) => {
                 if !(number.is_finite() && number.abs() < 120_000.0) {
                     return Err(bad());
                 }
-                let months = i64::from(year) * 12 + i64::from(month) - 1 + (number * f64::from(per_step)).floor() as i64;
+                let months = i64::from(year) * 12 + i64::from(month) - 1
+                    + (number * f64::from(per_step)).floor() as i64;
                 let year = i32::try_from(months.div_euclid(12)).map_err(|_far| bad())?;
                 let month = months.rem_euclid(12) as u32 + 1;
                 let number = calendar.day_number(year, month, 1).ok_or_else(bad)?;
-                calendar.date(number + i64::from(day.min(28)) - 1, second).ok_or_else(bad)
+                calendar
+                    .date(number + i64::from(day.min(28)) - 1, second)
+                    .ok_or_else(bad)
             }
         }
     }
@@ -161,20 +195,47 @@ impl TimeUnit {
 fn parse_reference(text: &str, calendar: Calendar) -> Option<CalendarDate> {
     let (date, clock) = text.split_once(['t', ' ']).unwrap_or((text, ""));
     let mut parts = date.splitn(3, '-').map(str::parse::<i32>);
-    let (year, month, day) = (parts.next()?.ok()?, parts.next()?.ok()?, parts.next()?.ok()?);
-    let clock = clock.trim().trim_end_matches("utc").trim_end_matches('z').trim();
+    let (year, month, day) = (
+        parts.next()?.ok()?,
+        parts.next()?.ok()?,
+        parts.next()?.ok()?,
+    );
+    let clock = clock
+        .trim()
+        .trim_end_matches("utc")
+        .trim_end_matches('z')
+        .trim();
     let (clock, offset_s) = split_offset(clock)?;
-    let mut fields = clock.split(':').map(|f| if f.is_empty() { Some(0.0) } else { f.parse::<f64>().ok() });
-    let mut field = || fields.next().unwrap_or(Some(0.0)).filter(|v| (0.0..=60.0).contains(v));
+    let mut fields = clock.split(':').map(|f| {
+        if f.is_empty() {
+            Some(0.0)
+        } else {
+            f.parse::<f64>().ok()
+        }
+    });
+    let mut field = || {
+        fields
+            .next()
+            .unwrap_or(Some(0.0))
+            .filter(|v| (0.0..=60.0).contains(v))
+    };
     let second = field()? * 3600.0 + field()? * 60.0 + field()? - offset_s;
     let (month, day) = (u32::try_from(month).ok()?, u32::try_from(day).ok()?);
     calendar.day_number(year, month, day)?;
-    Some(CalendarDate { year, month, day, second, calendar })
+    Some(CalendarDate {
+        year,
+        month,
+        day,
+        second,
+        calendar,
+    })
 }
 
 /// Splits `00:00:00 +2:30` into the clock and seconds east of UTC.
 fn split_offset(clock: &str) -> Option<(&str, f64)> {
-    let Some(at) = clock.find(['+', '-']) else { return Some((clock, 0.0)) };
+    let Some(at) = clock.find(['+', '-']) else {
+        return Some((clock, 0.0));
+    };
     let (clock, offset) = clock.split_at(at);
     let sign = if offset.starts_with('-') { -1.0 } else { 1.0 };
     let digits = &offset[1..];
@@ -193,34 +254,80 @@ mod tests {
 
     fn date(unit: &str, calendar: &str, number: f64) -> String {
         let calendar = Calendar::parse(Some(calendar)).unwrap();
-        let d = TimeUnit::parse(unit, calendar).unwrap().date(number).unwrap();
+        let d = TimeUnit::parse(unit, calendar)
+            .unwrap()
+            .date(number)
+            .unwrap();
         format!("{:04}-{:02}-{:02} {}", d.year, d.month, d.day, d.second)
     }
 
     /// Expected dates are those of Python's cftime 1.6 (`cftime.num2date`).
     #[test]
     fn dates_are_those_of_cftime() {
-        assert_eq!(date("seconds since 1970-01-01 00:00:00", "gregorian", 978_350_400.0), "2001-01-01 43200");
-        assert_eq!(date("days since 1900-1-1", "standard", 37_255.0), "2002-01-01 0");
-        assert_eq!(date("days since 1-1-1", "standard", 730_121.0), "2000-01-01 0");
-        assert_eq!(date("days since 1-1-1", "proleptic_gregorian", 730_119.0), "2000-01-01 0");
-        assert_eq!(date("days since 2000-01-01", "noleap", 59.0), "2000-03-01 0");
-        assert_eq!(date("days since 2000-01-01", "360_day", 59.5), "2000-02-30 43200");
-        assert_eq!(date("hours since 1999-12-31 12:00", "standard", 12.0), "2000-01-01 0");
-        assert_eq!(date("Days since 1970-01-01T00:00:00Z", "standard", 0.25), "1970-01-01 21600");
+        assert_eq!(
+            date(
+                "seconds since 1970-01-01 00:00:00",
+                "gregorian",
+                978_350_400.0
+            ),
+            "2001-01-01 43200"
+        );
+        assert_eq!(
+            date("days since 1900-1-1", "standard", 37_255.0),
+            "2002-01-01 0"
+        );
+        assert_eq!(
+            date("days since 1-1-1", "standard", 730_121.0),
+            "2000-01-01 0"
+        );
+        assert_eq!(
+            date("days since 1-1-1", "proleptic_gregorian", 730_119.0),
+            "2000-01-01 0"
+        );
+        assert_eq!(
+            date("days since 2000-01-01", "noleap", 59.0),
+            "2000-03-01 0"
+        );
+        assert_eq!(
+            date("days since 2000-01-01", "360_day", 59.5),
+            "2000-02-30 43200"
+        );
+        assert_eq!(
+            date("hours since 1999-12-31 12:00", "standard", 12.0),
+            "2000-01-01 0"
+        );
+        assert_eq!(
+            date("Days since 1970-01-01T00:00:00Z", "standard", 0.25),
+            "1970-01-01 21600"
+        );
     }
 
     #[test]
     fn a_reference_with_an_offset_is_turned_to_utc() {
-        assert_eq!(date("hours since 2000-01-01 00:00:00 +2:00", "standard", 2.0), "2000-01-01 0");
-        assert_eq!(date("hours since 2000-01-01 00:00:00 -0330", "standard", 0.0), "2000-01-01 12600");
+        assert_eq!(
+            date("hours since 2000-01-01 00:00:00 +2:00", "standard", 2.0),
+            "2000-01-01 0"
+        );
+        assert_eq!(
+            date("hours since 2000-01-01 00:00:00 -0330", "standard", 0.0),
+            "2000-01-01 12600"
+        );
     }
 
     #[test]
     fn months_since_are_calendar_months() {
-        assert_eq!(date("months since 2010-1-1 0:0:0", "standard", 2.0), "2010-03-01 0");
-        assert_eq!(date("months since 2010-11-1", "standard", 3.0), "2011-02-01 0");
-        assert_eq!(date("years since 1999-01-01", "standard", 1.0), "2000-01-01 0");
+        assert_eq!(
+            date("months since 2010-1-1 0:0:0", "standard", 2.0),
+            "2010-03-01 0"
+        );
+        assert_eq!(
+            date("months since 2010-11-1", "standard", 3.0),
+            "2011-02-01 0"
+        );
+        assert_eq!(
+            date("years since 1999-01-01", "standard", 1.0),
+            "2000-01-01 0"
+        );
     }
 
     #[test]
@@ -229,7 +336,14 @@ mod tests {
         for number in [1e9, f64::NAN, f64::INFINITY, -1e6, 1e300] {
             assert!(unit.date(number).is_err(), "{number}");
         }
-        for text in ["fortnights since 1970-01-01", "days", "days since", "days since 1970-13-01", "days since 1970-02-30", ""] {
+        for text in [
+            "fortnights since 1970-01-01",
+            "days",
+            "days since",
+            "days since 1970-13-01",
+            "days since 1970-02-30",
+            "",
+        ] {
             assert!(TimeUnit::parse(text, Calendar::Standard).is_err(), "{text}");
         }
         assert!(Calendar::parse(Some("lunar")).is_err());

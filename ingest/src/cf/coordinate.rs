@@ -23,13 +23,23 @@ pub(crate) struct Axis {
 }
 
 /// What a coordinate variable is. Units come first: real files carry other files' standard names by mistake, but no
-/// program works with degrees_north on a longitude.
+/// program works with `degrees_north` on a longitude.
 pub(crate) fn role_of(variable: &Variable) -> Role {
-    let text = |name: &str| variable.attributes.text(name).unwrap_or_default().to_ascii_lowercase();
+    let text = |name: &str| {
+        variable
+            .attributes
+            .text(name)
+            .unwrap_or_default()
+            .to_ascii_lowercase()
+    };
     let units = text("units");
     match units.as_str() {
-        "degrees_north" | "degree_north" | "degrees_n" | "degree_n" | "degreesn" | "degreen" => return Role::Latitude,
-        "degrees_east" | "degree_east" | "degrees_e" | "degree_e" | "degreese" | "degreee" => return Role::Longitude,
+        "degrees_north" | "degree_north" | "degrees_n" | "degree_n" | "degreesn" | "degreen" => {
+            return Role::Latitude;
+        }
+        "degrees_east" | "degree_east" | "degrees_e" | "degree_e" | "degreese" | "degreee" => {
+            return Role::Longitude;
+        }
         units if units.contains(" since ") => return Role::Time,
         _ => {}
     }
@@ -52,12 +62,18 @@ pub(crate) fn axes(file: &Description, variable: &Variable) -> Vec<Axis> {
     let mut axes: Vec<Axis> = Vec::new();
     for dimension in &variable.dimensions {
         let coordinate = match &dimension.name {
-            Some(name) => file.variable(name).filter(|c| c.is_coordinate() && c.is_numeric()),
+            Some(name) => file
+                .variable(name)
+                .filter(|c| c.is_coordinate() && c.is_numeric()),
             // A plain HDF5 file names no dimensions: a coordinate of that length which is the only one of its role left.
             None => unnamed_coordinate(file, dimension.len, &axes),
         };
         let role = coordinate.map_or(Role::Other, role_of);
-        axes.push(Axis { role, coordinate: coordinate.map(|c| c.name.clone()), len: dimension.len });
+        axes.push(Axis {
+            role,
+            coordinate: coordinate.map(|c| c.name.clone()),
+            len: dimension.len,
+        });
     }
     axes
 }
@@ -75,24 +91,33 @@ fn unnamed_coordinate<'a>(file: &'a Description, len: u64, taken: &[Axis]) -> Op
     // Of a square grid latitude comes first, as everywhere.
     let first = found.next()?;
     let second = found.next();
-    [Some(first), second].into_iter().flatten().min_by_key(|v| match role_of(v) {
-        Role::Time => 0,
-        Role::Latitude => 1,
-        Role::Longitude | Role::Other => 2,
-    })
+    [Some(first), second]
+        .into_iter()
+        .flatten()
+        .min_by_key(|v| match role_of(v) {
+            Role::Time => 0,
+            Role::Latitude => 1,
+            Role::Longitude | Role::Other => 2,
+        })
 }
 
 /// A refusal for a variable without a latitude and a longitude axis, which says why.
 pub(crate) fn no_grid(file: &Description, variable: &Variable) -> Rejection {
-    let is_plane = |v: &&Variable| v.dimensions.len() >= 2 && v.is_numeric() && v.name != variable.name;
-    let swath = file.variables.iter().filter(is_plane).find(|v| matches!(role_of(v), Role::Latitude | Role::Longitude));
+    let is_plane =
+        |v: &&Variable| v.dimensions.len() >= 2 && v.is_numeric() && v.name != variable.name;
+    let swath = file
+        .variables
+        .iter()
+        .filter(is_plane)
+        .find(|v| matches!(role_of(v), Role::Latitude | Role::Longitude));
     let detail = match swath {
         Some(coordinate) => format!(
             "is a swath: {:?} has {} dimensions, so every value has a place of its own; grid it to regular latitudes and longitudes first",
             coordinate.name,
             coordinate.dimensions.len()
         ),
-        None => "has no latitude and longitude axes; name them, or state the grid, in a profile".to_owned(),
+        None => "has no latitude and longitude axes; name them, or state the grid, in a profile"
+            .to_owned(),
     };
     Rejection::new(RejectReason::Grid, &variable.name, detail)
 }

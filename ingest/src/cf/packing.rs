@@ -25,12 +25,17 @@ impl Packing {
     /// The packing that the attributes of a variable state.
     pub(crate) fn of(variable: &Variable) -> Self {
         let attributes = &variable.attributes;
-        let mut fills: Vec<f64> =
-            ["_FillValue", "missing_value"].into_iter().filter_map(|name| attributes.numbers(name)).flatten().collect();
+        let mut fills: Vec<f64> = ["_FillValue", "missing_value"]
+            .into_iter()
+            .filter_map(|name| attributes.numbers(name))
+            .flatten()
+            .collect();
         if fills.is_empty() {
             fills.extend(default_fill(variable.kind));
         }
-        let is_unsigned = attributes.text("_Unsigned").is_some_and(|t| t.eq_ignore_ascii_case("true"));
+        let is_unsigned = attributes
+            .text("_Unsigned")
+            .is_some_and(|t| t.eq_ignore_ascii_case("true"));
         let unsigned_wrap = match variable.kind {
             Kind::Integer(bytes) if is_unsigned => Some(2f64.powi(8 * i32::from(bytes))),
             _ => None,
@@ -47,9 +52,13 @@ impl Packing {
     }
 
     /// The value of a stored number, in the file's unit; NaN for no data.
+    #[expect(clippy::float_cmp, reason = "a fill value is one exact number")]
     pub(crate) fn value(&self, stored: f64) -> f64 {
-        let is_fill = |fill: &f64| *fill == stored || self.is_float32 && f64::from(*fill as f32) == stored;
-        if self.fills.iter().any(is_fill) || !(self.valid_stored.0..=self.valid_stored.1).contains(&stored) {
+        let is_fill =
+            |fill: &f64| *fill == stored || self.is_float32 && f64::from(*fill as f32) == stored;
+        if self.fills.iter().any(is_fill)
+            || !(self.valid_stored.0..=self.valid_stored.1).contains(&stored)
+        {
             return f64::NAN;
         }
         let stored = match self.unsigned_wrap {
@@ -57,7 +66,11 @@ impl Packing {
             _ => stored,
         };
         let value = stored * self.scale + self.offset;
-        if (self.valid_values.0..=self.valid_values.1).contains(&value) { value } else { f64::NAN }
+        if (self.valid_values.0..=self.valid_values.1).contains(&value) {
+            value
+        } else {
+            f64::NAN
+        }
     }
 }
 
@@ -73,30 +86,55 @@ fn default_fill(kind: Kind) -> Option<f64> {
 /// `valid_range`, or `valid_min` and `valid_max`, of the stored numbers; never beyond the default fill values.
 fn valid_range(attributes: &Attributes) -> (f64, f64) {
     let range = attributes.numbers("valid_range").filter(|r| r.len() == 2);
-    let low = range.as_ref().map(|r| r[0]).or_else(|| attributes.number("valid_min"));
-    let high = range.as_ref().map(|r| r[1]).or_else(|| attributes.number("valid_max"));
+    let low = range
+        .as_ref()
+        .map(|r| r[0])
+        .or_else(|| attributes.number("valid_min"));
+    let high = range
+        .as_ref()
+        .map(|r| r[1])
+        .or_else(|| attributes.number("valid_max"));
     let usable = |v: &f64| !v.is_nan();
-    let low = low.filter(usable).unwrap_or(f64::NEG_INFINITY).max(-DEFAULT_FILL_FLOAT);
-    let high = high.filter(usable).unwrap_or(f64::INFINITY).min(DEFAULT_FILL_FLOAT);
+    let low = low
+        .filter(usable)
+        .unwrap_or(f64::NEG_INFINITY)
+        .max(-DEFAULT_FILL_FLOAT);
+    let high = high
+        .filter(usable)
+        .unwrap_or(f64::INFINITY)
+        .min(DEFAULT_FILL_FLOAT);
     (low, high)
 }
 
 #[cfg(test)]
+#[expect(clippy::float_cmp, reason = "these numbers are exact")]
 mod tests {
     use super::*;
     use crate::file::description::AttributeValue;
 
     fn variable(kind: Kind, numbers: &[(&str, &[f64])]) -> Variable {
         let attribute = |(name, values): &(&str, &[f64])| {
-            ((*name).to_owned(), AttributeValue::Numbers(values.iter().map(|v| (*v).into()).collect()))
+            (
+                (*name).to_owned(),
+                AttributeValue::Numbers(values.iter().map(|v| (*v).into()).collect()),
+            )
         };
-        Variable { name: "v".into(), dimensions: vec![], kind, attributes: numbers.iter().map(attribute).collect() }
+        Variable {
+            name: "v".into(),
+            dimensions: vec![],
+            kind,
+            attributes: numbers.iter().map(attribute).collect(),
+        }
     }
 
     #[test]
     fn packed_integers_unpack_and_their_range_is_that_of_the_stored_numbers() {
-        let attributes: [(&str, &[f64]); 4] =
-            [("scale_factor", &[0.01]), ("add_offset", &[273.15]), ("valid_range", &[-300.0, 4500.0]), ("_FillValue", &[-32_768.0])];
+        let attributes: [(&str, &[f64]); 4] = [
+            ("scale_factor", &[0.01]),
+            ("add_offset", &[273.15]),
+            ("valid_range", &[-300.0, 4500.0]),
+            ("_FillValue", &[-32_768.0]),
+        ];
         let packing = Packing::of(&variable(Kind::Integer(2), &attributes));
         assert!((packing.value(2000.0) - 293.15).abs() < 1e-12);
         assert!(packing.value(-32_768.0).is_nan());
@@ -105,11 +143,27 @@ mod tests {
 
     #[test]
     fn every_kind_of_missing_is_missing() {
-        let float = Packing::of(&variable(Kind::Float(4), &[("_FillValue", &[-999.9]), ("missing_value", &[-5.0])]));
-        for stored in [f64::NAN, f64::INFINITY, f64::from(-999.9f32), -999.9, -5.0, 9.969209968386869e36, 1e35, -1e35] {
+        let float = Packing::of(&variable(
+            Kind::Float(4),
+            &[("_FillValue", &[-999.9]), ("missing_value", &[-5.0])],
+        ));
+        for stored in [
+            f64::NAN,
+            f64::INFINITY,
+            f64::from(-999.9f32),
+            -999.9,
+            -5.0,
+            9.969209968386869e36,
+            1e35,
+            -1e35,
+        ] {
             assert!(float.value(stored).is_nan(), "{stored}");
         }
         assert_eq!(float.value(-999.0), -999.0);
-        assert!(Packing::of(&variable(Kind::Integer(2), &[])).value(-32_767.0).is_nan());
+        assert!(
+            Packing::of(&variable(Kind::Integer(2), &[]))
+                .value(-32_767.0)
+                .is_nan()
+        );
     }
 }

@@ -27,7 +27,11 @@ impl TryFrom<String> for Covers {
 
     /// `month`, `year`, `day`, `8 days`, `6 hours`.
     fn try_from(text: String) -> Result<Self, Self::Error> {
-        let bad = || format!("covers = {text:?} is not known; use month, year, day, or such as \"8 days\" or \"6 hours\"");
+        let bad = || {
+            format!(
+                "covers = {text:?} is not known; use month, year, day, or such as \"8 days\" or \"6 hours\""
+            )
+        };
         let (count, word) = match text.split_once([' ', '-']) {
             Some((count, word)) => (count.parse().map_err(|_no_number| bad())?, word),
             None => (1, text.as_str()),
@@ -46,7 +50,9 @@ impl Covers {
     /// The period of this length that a stamp names.
     pub(crate) fn period(self, stamp: CalendarDate) -> Result<Period, String> {
         let text = |e: contract::ContractError| e.to_string();
-        let after = |start: TimeMs, ms: i64| Period::new(start, TimeMs::new(start.ms() + ms).map_err(text)?).map_err(text);
+        let after = |start: TimeMs, ms: i64| {
+            Period::new(start, TimeMs::new(start.ms() + ms).map_err(text)?).map_err(text)
+        };
         match self {
             Self::Month => Period::month(stamp.year, stamp.month).map_err(text),
             Self::Year => Period::year(stamp.year).map_err(text),
@@ -57,29 +63,52 @@ impl Covers {
 }
 
 fn midnight(date: CalendarDate) -> Result<TimeMs, String> {
-    let missing = |_| format!("{}-{:02}-{:02} is no day of the real calendar; only monthly steps can be read from this one", date.year, date.month, date.day);
+    let missing = |_| {
+        format!(
+            "{}-{:02}-{:02} is no day of the real calendar; only monthly steps can be read from this one",
+            date.year, date.month, date.day
+        )
+    };
     TimeMs::from_ymd(date.year, date.month, date.day).map_err(missing)
 }
 
 /// The instant of a date, to the millisecond.
 pub(crate) fn instant(date: CalendarDate) -> Result<TimeMs, String> {
-    TimeMs::new(midnight(date)?.ms() + (date.second * 1000.0).round() as i64).map_err(|e| e.to_string())
+    TimeMs::new(midnight(date)?.ms() + (date.second * 1000.0).round() as i64)
+        .map_err(|e| e.to_string())
 }
 
 /// How long steps are, from the distance of their stamps; none if that does not tell.
 pub(crate) fn of_spacing(stamps: &[CalendarDate]) -> Option<Covers> {
-    let times: Vec<i64> = stamps.iter().map(|s| instant(*s).map(TimeMs::ms)).collect::<Result<_, _>>().ok()?;
+    let times: Vec<i64> = stamps
+        .iter()
+        .map(|s| instant(*s).map(TimeMs::ms))
+        .collect::<Result<_, _>>()
+        .ok()?;
     let (first, rest) = times.split_first()?;
-    let spacings: Vec<i64> = std::iter::once(first).chain(rest).zip(rest).map(|(a, b)| b - a).collect();
+    let spacings: Vec<i64> = std::iter::once(first)
+        .chain(rest)
+        .zip(rest)
+        .map(|(a, b)| b - a)
+        .collect();
     let (low, high) = (*spacings.iter().min()?, *spacings.iter().max()?);
-    let months: Vec<i64> = stamps.iter().map(|s| i64::from(s.year) * 12 + i64::from(s.month)).collect();
+    let months: Vec<i64> = stamps
+        .iter()
+        .map(|s| i64::from(s.year) * 12 + i64::from(s.month))
+        .collect();
     let each_in_the_next_month = months.windows(2).all(|pair| pair[1] == pair[0] + 1);
     match (low, high) {
         _ if each_in_the_next_month && low >= 27 * DAY_MS => Some(Covers::Month),
         (low, high) if low >= 364 * DAY_MS && high <= 367 * DAY_MS => Some(Covers::Year),
         (low, high) if low != high || low <= 0 => None,
-        (ms, _) if ms % DAY_MS == 0 => u32::try_from(ms / DAY_MS).ok().filter(|n| *n <= 366).map(Covers::Days),
-        (ms, _) if ms % 3_600_000 == 0 => u32::try_from(ms / 3_600_000).ok().filter(|n| *n <= 8784).map(Covers::Hours),
+        (ms, _) if ms % DAY_MS == 0 => u32::try_from(ms / DAY_MS)
+            .ok()
+            .filter(|n| *n <= 366)
+            .map(Covers::Days),
+        (ms, _) if ms % 3_600_000 == 0 => u32::try_from(ms / 3_600_000)
+            .ok()
+            .filter(|n| *n <= 8784)
+            .map(Covers::Hours),
         _ => None,
     }
 }
@@ -87,7 +116,9 @@ pub(crate) fn of_spacing(stamps: &[CalendarDate]) -> Option<Covers> {
 /// How long the one step of a file is, from the attributes that say so.
 pub(crate) fn of_attributes(attributes: &Attributes) -> Option<Covers> {
     let names = ["time_coverage_resolution", "time_coverage_duration"];
-    let text = names.into_iter().find_map(|name| attributes.text(name).filter(|t| t.starts_with('P')))?;
+    let text = names
+        .into_iter()
+        .find_map(|name| attributes.text(name).filter(|t| t.starts_with('P')))?;
     match text {
         "P1M" => Some(Covers::Month),
         "P1Y" => Some(Covers::Year),
@@ -104,16 +135,31 @@ mod tests {
     use crate::cf::calendar::Calendar;
 
     fn stamp(year: i32, month: u32, day: u32) -> CalendarDate {
-        CalendarDate { year, month, day, second: 0.0, calendar: Calendar::Standard }
+        CalendarDate {
+            year,
+            month,
+            day,
+            second: 0.0,
+            calendar: Calendar::Standard,
+        }
     }
 
     #[test]
     fn a_stamp_anywhere_in_a_month_names_the_month() {
         for day in [1, 15, 29] {
-            assert_eq!(Covers::Month.period(stamp(2000, 2, day)).unwrap(), Period::month(2000, 2).unwrap());
+            assert_eq!(
+                Covers::Month.period(stamp(2000, 2, day)).unwrap(),
+                Period::month(2000, 2).unwrap()
+            );
         }
-        let week = Covers::try_from("8 days".to_owned()).unwrap().period(stamp(2000, 2, 26)).unwrap();
-        assert_eq!(week.to_string(), "2000-02-26T00:00:00Z/2000-03-05T00:00:00Z");
+        let week = Covers::try_from("8 days".to_owned())
+            .unwrap()
+            .period(stamp(2000, 2, 26))
+            .unwrap();
+        assert_eq!(
+            week.to_string(),
+            "2000-02-26T00:00:00Z/2000-03-05T00:00:00Z"
+        );
     }
 
     #[test]
@@ -124,7 +170,10 @@ mod tests {
         assert_eq!(of_spacing(&days), Some(Covers::Days(1)));
         let years: Vec<_> = (1999..=2004).map(|y| stamp(y, 7, 1)).collect();
         assert_eq!(of_spacing(&years), Some(Covers::Year));
-        assert_eq!(of_spacing(&[stamp(2001, 1, 1), stamp(2001, 1, 4), stamp(2001, 1, 5)]), None);
+        assert_eq!(
+            of_spacing(&[stamp(2001, 1, 1), stamp(2001, 1, 4), stamp(2001, 1, 5)]),
+            None
+        );
         assert_eq!(of_spacing(&[stamp(2001, 1, 1)]), None);
     }
 

@@ -16,11 +16,27 @@ pub(crate) struct Named {
 
 /// What a standard name names, if it is a quantity that can be stored.
 pub(crate) fn of_standard_name(name: &str) -> Option<Named> {
-    let plain = |quantity| Some(Named { quantity, sign: 1.0, substance: None });
-    let flux = |sign, substance| Some(Named { quantity: Quantity::CarbonFlux, sign, substance });
+    let plain = |quantity| {
+        Some(Named {
+            quantity,
+            sign: 1.0,
+            substance: None,
+        })
+    };
+    let flux = |sign, substance| {
+        Some(Named {
+            quantity: Quantity::CarbonFlux,
+            sign,
+            substance,
+        })
+    };
     match name {
-        "surface_upward_mass_flux_of_carbon_dioxide_expressed_as_carbon" => flux(1.0, Some(Substance::Carbon)),
-        "surface_downward_mass_flux_of_carbon_dioxide_expressed_as_carbon" => flux(-1.0, Some(Substance::Carbon)),
+        "surface_upward_mass_flux_of_carbon_dioxide_expressed_as_carbon" => {
+            flux(1.0, Some(Substance::Carbon))
+        }
+        "surface_downward_mass_flux_of_carbon_dioxide_expressed_as_carbon" => {
+            flux(-1.0, Some(Substance::Carbon))
+        }
         "surface_upward_mass_flux_of_carbon_dioxide" => flux(1.0, Some(Substance::Co2)),
         "surface_downward_mass_flux_of_carbon_dioxide" => flux(-1.0, Some(Substance::Co2)),
         "surface_upward_mole_flux_of_carbon_dioxide" => flux(1.0, None),
@@ -36,11 +52,17 @@ pub(crate) fn of_standard_name(name: &str) -> Option<Named> {
         "surface_partial_pressure_of_carbon_dioxide_in_sea_water"
         | "partial_pressure_of_carbon_dioxide_in_sea_water"
         | "fugacity_of_carbon_dioxide_in_sea_water" => plain(Quantity::Pco2),
-        "sea_surface_salinity" | "sea_water_practical_salinity" | "sea_water_salinity" => plain(Quantity::Salinity),
-        "air_pressure_at_sea_level" | "air_pressure_at_mean_sea_level" => plain(Quantity::AirPressure),
+        "sea_surface_salinity" | "sea_water_practical_salinity" | "sea_water_salinity" => {
+            plain(Quantity::Salinity)
+        }
+        "air_pressure_at_sea_level" | "air_pressure_at_mean_sea_level" => {
+            plain(Quantity::AirPressure)
+        }
         "sea_ice_area_fraction" => plain(Quantity::IceFraction),
         "sea_surface_wave_significant_height" => plain(Quantity::WaveHeight),
-        "precipitation_flux" | "rainfall_flux" | "lwe_precipitation_rate" | "rainfall_rate" => plain(Quantity::Precipitation),
+        "precipitation_flux" | "rainfall_flux" | "lwe_precipitation_rate" | "rainfall_rate" => {
+            plain(Quantity::Precipitation)
+        }
         "eastward_sea_water_velocity"
         | "northward_sea_water_velocity"
         | "surface_eastward_sea_water_velocity"

@@ -26,7 +26,9 @@ pub(super) struct Merged {
 /// What became of one file.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Change {
-    Taken { revised: bool },
+    Taken {
+        revised: bool,
+    },
     /// All of it was there.
     Same,
     Refused(Rejection),
@@ -60,10 +62,12 @@ pub(super) fn merge(newest: Option<&Manifest>, granules: &[StoredGranule]) -> Me
         last_taken: None,
     };
     for (index, granule) in granules.iter().enumerate() {
-        let base = newest.map(|m| (m.grid, m.quantity, m.synthetic)).or_else(|| {
-            let first = granules.get(merged.last_taken?)?;
-            Some((first.grid, first.target.quantity, first.target.synthetic))
-        });
+        let base = newest
+            .map(|m| (m.grid, m.quantity, m.synthetic))
+            .or_else(|| {
+                let first = granules.get(merged.last_taken?)?;
+                Some((first.grid, first.target.quantity, first.target.synthetic))
+            });
         let change = match base.map_or(Ok(()), |base| check_fits(granule, base)) {
             Ok(()) => add(&mut merged.steps, granule),
             Err(rejection) => Change::Refused(rejection),
@@ -82,19 +86,39 @@ fn conflict(detail: String) -> Rejection {
 }
 
 /// Is the file of the grid and quantity of its product?
-fn check_fits(granule: &StoredGranule, (grid, quantity, synthetic): (Grid, contract::quantity::Quantity, bool)) -> Result<(), Rejection> {
+fn check_fits(
+    granule: &StoredGranule,
+    (grid, quantity, synthetic): (Grid, contract::quantity::Quantity, bool),
+) -> Result<(), Rejection> {
     let product = &granule.target.product;
     let advice = "land it in a product of its own";
     if !is_same_grid(&granule.grid, &grid) {
-        let shape = |g: &Grid| format!("{} x {} cells from {} N {} E", g.rows, g.cols, g.north_deg, g.west_deg);
-        return Err(conflict(format!("{product} has {}, the file {}; {advice}", shape(&grid), shape(&granule.grid))));
+        let shape = |g: &Grid| {
+            format!(
+                "{} x {} cells from {} N {} E",
+                g.rows, g.cols, g.north_deg, g.west_deg
+            )
+        };
+        return Err(conflict(format!(
+            "{product} has {}, the file {}; {advice}",
+            shape(&grid),
+            shape(&granule.grid)
+        )));
     }
     if granule.target.quantity != quantity {
-        return Err(conflict(format!("{product} holds {}, the file {}; {advice}", quantity.title(), granule.target.quantity.title())));
+        return Err(conflict(format!(
+            "{product} holds {}, the file {}; {advice}",
+            quantity.title(),
+            granule.target.quantity.title()
+        )));
     }
     if granule.target.synthetic != synthetic {
         let word = |synthetic| if synthetic { "synthetic" } else { "measured" };
-        return Err(conflict(format!("{product} is {}, the file {}; {advice}", word(synthetic), word(granule.target.synthetic))));
+        return Err(conflict(format!(
+            "{product} is {}, the file {}; {advice}",
+            word(synthetic),
+            word(granule.target.synthetic)
+        )));
     }
     Ok(())
 }
@@ -116,7 +140,10 @@ fn add(steps: &mut Vec<Step>, granule: &StoredGranule) -> Change {
     for new in granule.grids.iter().map(|g| &g.step) {
         // Steps do not overlap, so those that overlap the new one lie together.
         let first = next.partition_point(|s| s.period.end <= new.period.start);
-        let overlapping = next[first..].iter().take_while(|s| s.period.start < new.period.end).count();
+        let overlapping = next[first..]
+            .iter()
+            .take_while(|s| s.period.start < new.period.end)
+            .count();
         match overlapping {
             0 => {
                 next.insert(first, new.clone());

@@ -21,13 +21,19 @@ pub(super) struct Written {
 }
 
 /// Writes the series segments and the domain of merged steps.
-pub(super) async fn write(store: &Store, product: &ProductId, grid: &Grid, newest: Option<&Manifest>, merged: &Merged) -> Result<Written, IngestError> {
+pub(super) async fn write(
+    store: &Store,
+    product: &ProductId,
+    grid: &Grid,
+    newest: Option<&Manifest>,
+    merged: &Merged,
+) -> Result<Written, IngestError> {
     let steps = &merged.steps;
     let mut cells = match newest {
         // What was replaced may have held the only value of a cell: then the domain is built from nothing.
-        Some(newest) if !merged.is_revision => {
-            domain::read(store, &newest.domain).await.map_err(IngestError::storage("read the domain"))?
-        }
+        Some(newest) if !merged.is_revision => domain::read(store, &newest.domain)
+            .await
+            .map_err(IngestError::storage("read the domain"))?,
         _ => vec![false; grid.cell_count()],
     };
     let mut segments = Vec::new();
@@ -39,23 +45,40 @@ pub(super) async fn write(store: &Store, product: &ProductId, grid: &Grid, newes
             mark(&mut cells, &values);
             if kept.is_none() {
                 let series = write_series(store, product, grid, values).await?;
-                segments.push(SeriesSegment { first_step: first as u32, steps: count as u32, series });
+                segments.push(SeriesSegment {
+                    first_step: first as u32,
+                    steps: count as u32,
+                    series,
+                });
                 continue;
             }
         }
-        segments.extend(kept.map(|series| SeriesSegment { first_step: first as u32, steps: count as u32, series }));
+        segments.extend(kept.map(|series| SeriesSegment {
+            first_step: first as u32,
+            steps: count as u32,
+            series,
+        }));
     }
-    let domain = domain::write(store, product, &cells).await.map_err(IngestError::storage("store the domain"))?;
-    Ok(Written { series: segments, domain })
+    let domain = domain::write(store, product, &cells)
+        .await
+        .map_err(IngestError::storage("store the domain"))?;
+    Ok(Written {
+        series: segments,
+        domain,
+    })
 }
 
 /// First step and number of steps of each segment: a calendar year, or less where that is too much.
 fn runs(steps: &[Step], grid: &Grid) -> Vec<(usize, usize)> {
-    let most = MAX_SEGMENT_STEPS.min(MAX_SEGMENT_VALUES / grid.cell_count().max(1)).max(1);
+    let most = MAX_SEGMENT_STEPS
+        .min(MAX_SEGMENT_VALUES / grid.cell_count().max(1))
+        .max(1);
     let mut runs: Vec<(usize, usize)> = Vec::new();
     for (index, step) in steps.iter().enumerate() {
         match runs.last_mut() {
-            Some((first, count)) if *count < most && year(&steps[*first]) == year(step) => *count += 1,
+            Some((first, count)) if *count < most && year(&steps[*first]) == year(step) => {
+                *count += 1;
+            }
             _ => runs.push((index, 1)),
         }
     }
@@ -70,29 +93,54 @@ fn year(step: &Step) -> i32 {
 fn same_segment(manifest: &Manifest, steps: &[Step]) -> Option<ObjectKey> {
     let holds = |segment: &&SeriesSegment| {
         let first = segment.first_step as usize;
-        let own = manifest.steps.get(first..first + segment.steps as usize).unwrap_or_default();
+        let own = manifest
+            .steps
+            .get(first..first + segment.steps as usize)
+            .unwrap_or_default();
         own.len() == steps.len() && own.iter().zip(steps).all(|(a, b)| a.frame == b.frame)
     };
-    manifest.series.iter().find(holds).map(|segment| segment.series.clone())
+    manifest
+        .series
+        .iter()
+        .find(holds)
+        .map(|segment| segment.series.clone())
 }
 
-async fn read_all(store: &Store, grid: &Grid, steps: &[Step]) -> Result<Vec<Vec<f32>>, IngestError> {
+async fn read_all(
+    store: &Store,
+    grid: &Grid,
+    steps: &[Step],
+) -> Result<Vec<Vec<f32>>, IngestError> {
     let mut all = Vec::with_capacity(steps.len());
     for step in steps {
-        all.push(frames::read(store, &step.frame, grid).await.map_err(IngestError::storage("read a frame"))?);
+        all.push(
+            frames::read(store, &step.frame, grid)
+                .await
+                .map_err(IngestError::storage("read a frame"))?,
+        );
     }
     Ok(all)
 }
 
 fn mark(cells: &mut [bool], steps: &[Vec<f32>]) {
     for values in steps {
-        cells.iter_mut().zip(values).for_each(|(cell, value)| *cell |= !value.is_nan());
+        cells
+            .iter_mut()
+            .zip(values)
+            .for_each(|(cell, value)| *cell |= !value.is_nan());
     }
 }
 
-async fn write_series(store: &Store, product: &ProductId, grid: &Grid, values: Vec<Vec<f32>>) -> Result<ObjectKey, IngestError> {
+async fn write_series(
+    store: &Store,
+    product: &ProductId,
+    grid: &Grid,
+    values: Vec<Vec<f32>>,
+) -> Result<ObjectKey, IngestError> {
     let steps: Vec<&[f32]> = values.iter().map(Vec::as_slice).collect();
-    series::write(store, product, grid, &steps).await.map_err(IngestError::storage("store a series"))
+    series::write(store, product, grid, &steps)
+        .await
+        .map_err(IngestError::storage("store a series"))
 }
 
 #[cfg(test)]
@@ -114,11 +162,21 @@ mod tests {
 
     #[test]
     fn segments_are_calendar_years_and_smaller_for_large_grids() {
-        let grid = |rows, cols| Grid { rows, cols, north_deg: 90.0, west_deg: -180.0, dlat_deg: 0.001, dlon_deg: 0.001 };
+        let grid = |rows, cols| Grid {
+            rows,
+            cols,
+            north_deg: 90.0,
+            west_deg: -180.0,
+            dlat_deg: 0.001,
+            dlon_deg: 0.001,
+        };
         let two_years = steps((2000..=2001).flat_map(|y| (1..=12).map(move |m| (y, m))));
         assert_eq!(runs(&two_years, &grid(2, 4)), [(0, 12), (12, 12)]);
         assert_eq!(runs(&two_years[3..], &grid(2, 4)), [(0, 9), (9, 12)]);
-        assert_eq!(runs(&two_years[..5], &grid(1 << 13, 1 << 14)), [(0, 2), (2, 2), (4, 1)]);
+        assert_eq!(
+            runs(&two_years[..5], &grid(1 << 13, 1 << 14)),
+            [(0, 2), (2, 2), (4, 1)]
+        );
         assert_eq!(runs(&[], &grid(2, 4)), []);
     }
 }

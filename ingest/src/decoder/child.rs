@@ -1,20 +1,19 @@
 //! The reader process: limits itself first, then opens the file and answers until its standard input ends.
 
 use std::ffi::OsString;
-use std::io::{BufWriter, Write};
+use std::io::{BufWriter, Write as _};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use contract::event::RejectReason;
 use rlimit::Resource;
 
+use super::EXIT_USAGE;
 use super::protocol::{self, Answer, Opened, Request};
 use crate::file::DataFile;
 use crate::file::description::Part;
 use crate::rejection::Rejection;
 
-/// Exit code for a call with wrong arguments or a broken pipe: the parent's doing, not the file's.
-const EXIT_USAGE: u8 = 64;
 /// Open files a reader needs: the three streams, the file, and what the system opens meanwhile.
 const MAX_OPEN_FILES: u64 = 32;
 
@@ -23,16 +22,22 @@ pub fn run_child(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let arguments: Vec<OsString> = arguments.into_iter().collect();
     match serve(&arguments) {
         Some(Ok(())) => ExitCode::SUCCESS,
-        // A closed pipe: the parent has gone or has had enough.
-        Some(Err(_pipe)) => ExitCode::from(EXIT_USAGE),
-        None => ExitCode::from(EXIT_USAGE),
+        // Wrong arguments, limits that cannot be set, or a closed pipe: the parent has gone or has had enough.
+        Some(Err(_)) | None => ExitCode::from(EXIT_USAGE),
     }
 }
 
 fn serve(arguments: &[OsString]) -> Option<std::io::Result<()>> {
-    let [path, numbers @ ..] = arguments else { return None };
-    let numbers: Vec<u64> = numbers.iter().map(|n| n.to_str()?.parse().ok()).collect::<Option<_>>()?;
-    let [memory_bytes, cpu_s, plane_cells] = numbers[..] else { return None };
+    let [path, numbers @ ..] = arguments else {
+        return None;
+    };
+    let numbers: Vec<u64> = numbers
+        .iter()
+        .map(|n| n.to_str()?.parse().ok())
+        .collect::<Option<_>>()?;
+    let [memory_bytes, cpu_s, plane_cells] = numbers[..] else {
+        return None;
+    };
     Some(limit(memory_bytes, cpu_s).and_then(|()| converse(&PathBuf::from(path), plane_cells)))
 }
 
@@ -67,8 +72,15 @@ fn converse(path: &std::path::Path, plane_cells: u64) -> std::io::Result<()> {
     while let Some(request) = protocol::read::<Request>(&mut input)? {
         match answer(&mut file, &request, plane_cells) {
             Ok(values) => {
-                protocol::write(&mut out, &Answer::Values { count: values.len() as u64 })?;
-                values.iter().try_for_each(|value| out.write_all(&value.to_le_bytes()))?;
+                protocol::write(
+                    &mut out,
+                    &Answer::Values {
+                        count: values.len() as u64,
+                    },
+                )?;
+                values
+                    .iter()
+                    .try_for_each(|value| out.write_all(&value.to_le_bytes()))?;
             }
             Err(rejection) => protocol::write(&mut out, &Answer::Rejected(rejection))?,
         }
@@ -82,8 +94,14 @@ fn answer(file: &mut DataFile, request: &Request, plane_cells: u64) -> Result<Ve
     let name = &request.variable;
     let missing = || Rejection::new(RejectReason::NoVariable, name, "is not in the file");
     let variable = file.description().variable(name).ok_or_else(missing)?;
-    let whole = variable.dimensions.iter().zip(&request.part).filter(|(_, part)| **part == Part::All);
-    let cells = whole.fold(1u128, |n, (dimension, _)| n.saturating_mul(u128::from(dimension.len)));
+    let whole = variable
+        .dimensions
+        .iter()
+        .zip(&request.part)
+        .filter(|(_, part)| **part == Part::All);
+    let cells = whole.fold(1u128, |n, (dimension, _)| {
+        n.saturating_mul(u128::from(dimension.len))
+    });
     if cells > u128::from(plane_cells) {
         let detail = format!("{cells} values at once, at most {plane_cells} are read");
         return Err(Rejection::new(RejectReason::TooLarge, name, detail));

@@ -37,7 +37,9 @@ pub(super) enum Answer {
 /// Bytes of a message with its length in front.
 pub(super) fn encode<T: Serialize>(message: &T) -> std::io::Result<Vec<u8>> {
     let json = serde_json::to_vec(message)?;
-    let len = u32::try_from(json.len()).ok().filter(|len| *len <= MAX_MESSAGE_BYTES);
+    let len = u32::try_from(json.len())
+        .ok()
+        .filter(|len| *len <= MAX_MESSAGE_BYTES);
     let len = len.ok_or_else(|| Error::new(ErrorKind::InvalidData, "message too long"))?;
     Ok([len.to_le_bytes().as_slice(), &json].concat())
 }
@@ -46,7 +48,10 @@ pub(super) fn encode<T: Serialize>(message: &T) -> std::io::Result<Vec<u8>> {
 pub(super) fn message_bytes(prefix: [u8; 4]) -> std::io::Result<usize> {
     let len = u32::from_le_bytes(prefix);
     if len > MAX_MESSAGE_BYTES {
-        return Err(Error::new(ErrorKind::InvalidData, format!("a message of {len} bytes")));
+        return Err(Error::new(
+            ErrorKind::InvalidData,
+            format!("a message of {len} bytes"),
+        ));
     }
     Ok(len as usize)
 }
@@ -75,7 +80,10 @@ mod tests {
     #[test]
     fn a_message_round_trips_and_a_false_length_is_refused() {
         let bytes = encode(&Answer::Values { count: 3 }).unwrap();
-        assert!(matches!(read(&mut bytes.as_slice()).unwrap(), Some(Answer::Values { count: 3 })));
+        assert!(matches!(
+            read(&mut bytes.as_slice()).unwrap(),
+            Some(Answer::Values { count: 3 })
+        ));
         assert!(read::<Answer>(&mut u32::MAX.to_le_bytes().as_slice()).is_err());
         assert!(read::<Answer>(&mut [].as_slice()).unwrap().is_none());
     }

@@ -37,9 +37,15 @@ enum Silence {
 
 impl Session {
     /// Starts a reader and has it describe the file.
-    pub(crate) async fn open(path: &Path, settings: &Settings) -> Result<(Self, Description), Stop> {
+    pub(crate) async fn open(
+        path: &Path,
+        settings: &Settings,
+    ) -> Result<(Self, Description), Stop> {
         let limits = settings.limits;
-        let spawn = |source| IngestError::Spawn { program: settings.decoder.program.clone(), source };
+        let spawn = |source| IngestError::Spawn {
+            program: settings.decoder.program.clone(),
+            source,
+        };
         let mut child = Command::new(&settings.decoder.program)
             .args(&settings.decoder.arguments)
             .arg(path)
@@ -57,7 +63,13 @@ impl Session {
         let (Some(input), Some(output)) = (child.stdin.take(), child.stdout.take()) else {
             return Err(spawn(std::io::Error::other("no pipes to it")).into());
         };
-        let mut session = Self { child, input, output, limits, deadline: Instant::now() + limits.wall };
+        let mut session = Self {
+            child,
+            input,
+            output,
+            limits,
+            deadline: Instant::now() + limits.wall,
+        };
         match session.message::<Opened>().await? {
             Opened::Described(description) => Ok((session, description)),
             Opened::Rejected(rejection) => Err(rejection.cleaned().into()),
@@ -65,20 +77,33 @@ impl Session {
     }
 
     /// Values of a part of a variable, as many as `expected`.
-    pub(crate) async fn read(&mut self, variable: &str, part: &[Part], expected: u64) -> Result<Vec<f64>, Stop> {
+    pub(crate) async fn read(
+        &mut self,
+        variable: &str,
+        part: &[Part],
+        expected: u64,
+    ) -> Result<Vec<f64>, Stop> {
         if expected > self.limits.plane_cells {
-            let detail = format!("{expected} values at once, at most {} are read", self.limits.plane_cells);
+            let detail = format!(
+                "{expected} values at once, at most {} are read",
+                self.limits.plane_cells
+            );
             return Err(Rejection::new(RejectReason::TooLarge, variable, detail).into());
         }
-        let request = Request { variable: variable.to_owned(), part: part.to_vec() };
+        let request = Request {
+            variable: variable.to_owned(),
+            part: part.to_vec(),
+        };
         let bytes = protocol::encode(&request).map_err(|source| IngestError::Pipe { source })?;
         if self.input.write_all(&bytes).await.is_err() {
-            return Err(self.post_mortem(Silence::Ended).await.into());
+            return Err(self.post_mortem(Silence::Ended).await);
         }
         match self.message::<Answer>().await? {
             Answer::Values { count } if count == expected => self.values(count as usize).await,
             Answer::Values { count } => {
-                let detail = format!("the reader sent {count} values where {expected} belong; the file contradicts itself");
+                let detail = format!(
+                    "the reader sent {count} values where {expected} belong; the file contradicts itself"
+                );
                 Err(Rejection::new(RejectReason::Corrupt, variable, detail).into())
             }
             Answer::Rejected(rejection) => Err(rejection.cleaned().into()),
@@ -87,14 +112,23 @@ impl Session {
 
     async fn values(&mut self, count: usize) -> Result<Vec<f64>, Stop> {
         let bytes = self.bytes(count * 8).await?;
-        Ok(bytes.chunks_exact(8).map(|b| f64::from_le_bytes([b[0], b[1], b[2], b[3], b[4], b[5], b[6], b[7]])).collect())
+        Ok(bytes
+            .chunks_exact(8)
+            .map(|b| f64::from_le_bytes([b[0], b[1], b[2], b[3], b[4], b[5], b[6], b[7]]))
+            .collect())
     }
 
     async fn message<T: DeserializeOwned>(&mut self) -> Result<T, Stop> {
         let prefix = self.bytes(4).await?;
         let prefix = [prefix[0], prefix[1], prefix[2], prefix[3]];
         // A reader that a file has taken over may say anything: what cannot be is a damaged file.
-        let strange = |e: String| Rejection::new(RejectReason::Corrupt, "file", format!("made its reader talk nonsense ({e})"));
+        let strange = |e: String| {
+            Rejection::new(
+                RejectReason::Corrupt,
+                "file",
+                format!("made its reader talk nonsense ({e})"),
+            )
+        };
         let len = protocol::message_bytes(prefix).map_err(|e| strange(e.to_string()))?;
         let json = self.bytes(len).await?;
         Ok(serde_json::from_slice(&json).map_err(|e| strange(e.to_string()))?)
@@ -104,22 +138,36 @@ impl Session {
         let mut bytes = vec![0; count];
         match tokio::time::timeout_at(self.deadline, self.output.read_exact(&mut bytes)).await {
             Ok(Ok(_)) => Ok(bytes),
-            Ok(Err(_ended)) => Err(self.post_mortem(Silence::Ended).await.into()),
-            Err(_late) => Err(self.post_mortem(Silence::Late).await.into()),
+            Ok(Err(_ended)) => Err(self.post_mortem(Silence::Ended).await),
+            Err(_late) => Err(self.post_mortem(Silence::Late).await),
         }
     }
 
     /// Why a reader fell silent, as a refusal of its file.
     async fn post_mortem(&mut self, silence: Silence) -> Stop {
-        let Limits { memory_bytes, cpu_s, wall, .. } = self.limits;
-        let too_large = |detail: String| Stop::from(Rejection::new(RejectReason::TooLarge, "file", detail));
+        let Limits {
+            memory_bytes,
+            cpu_s,
+            wall,
+            ..
+        } = self.limits;
+        let too_large =
+            |detail: String| Stop::from(Rejection::new(RejectReason::TooLarge, "file", detail));
         if let Silence::Late = silence {
-            self.child.start_kill().unwrap_or_else(|e| tracing::debug!(error = %e, "reader is gone already"));
-            return too_large(format!("was not read within {} s; give it in smaller pieces", wall.as_secs()));
+            self.child
+                .start_kill()
+                .unwrap_or_else(|e| tracing::debug!(error = %e, "reader is gone already"));
+            return too_large(format!(
+                "was not read within {} s; give it in smaller pieces",
+                wall.as_secs()
+            ));
         }
         let mut last_words = Vec::new();
         if let Some(stderr) = self.child.stderr.take() {
-            let read = stderr.take(MAX_LAST_WORDS_BYTES).read_to_end(&mut last_words).await;
+            let read = stderr
+                .take(MAX_LAST_WORDS_BYTES)
+                .read_to_end(&mut last_words)
+                .await;
             read.map_or_else(|e| tracing::debug!(error = %e, "no last words"), |_| ());
         }
         let status = match self.child.wait().await {
@@ -129,16 +177,25 @@ impl Session {
         let last_words = String::from_utf8_lossy(&last_words);
         let signal = std::os::unix::process::ExitStatusExt::signal(&status);
         if last_words.contains("memory allocation") || last_words.contains("capacity overflow") {
-            return too_large(format!("needs more than {} MiB of memory to read; give it in smaller pieces", memory_bytes >> 20));
+            return too_large(format!(
+                "needs more than {} MiB of memory to read; give it in smaller pieces",
+                memory_bytes >> 20
+            ));
         }
-        match signal {
-            // SIGXCPU and, past the hard limit, SIGKILL.
-            Some(24 | 9) => too_large(format!("took more than {cpu_s} s of processor time to read; give it in smaller pieces")),
-            _ => {
-                let cause = signal.map_or_else(|| status.to_string(), |n| format!("signal {n}"));
-                let detail = format!("made its reader stop ({cause}); it is damaged, fetch it again");
-                Rejection::new(RejectReason::Corrupt, "file", detail).into()
-            }
+        // SIGXCPU and, past the hard limit, SIGKILL.
+        if let Some(24 | 9) = signal {
+            return too_large(format!(
+                "took more than {cpu_s} s of processor time to read; give it in smaller pieces"
+            ));
         }
+        if status.code() == Some(i32::from(super::EXIT_USAGE)) {
+            let source = std::io::Error::other(
+                "it cannot set its limits, or is another version of this program",
+            );
+            return IngestError::Pipe { source }.into();
+        }
+        let cause = signal.map_or_else(|| status.to_string(), |n| format!("signal {n}"));
+        let detail = format!("made its reader stop ({cause}); it is damaged, fetch it again");
+        Rejection::new(RejectReason::Corrupt, "file", detail).into()
     }
 }

@@ -5,55 +5,55 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 /// Most variables that are looked at.
-pub const MAX_VARIABLES: usize = 4096;
+pub(crate) const MAX_VARIABLES: usize = 4096;
 /// Most attributes of the file, or of one variable, that are looked at.
-pub const MAX_ATTRIBUTES: usize = 1024;
+pub(crate) const MAX_ATTRIBUTES: usize = 1024;
 /// Most numbers of one attribute that are kept.
-pub const MAX_ATTRIBUTE_NUMBERS: usize = 1024;
+pub(crate) const MAX_ATTRIBUTE_NUMBERS: usize = 1024;
 /// Most bytes of one text attribute that are kept.
-pub const MAX_ATTRIBUTE_TEXT_BYTES: usize = 4096;
+pub(crate) const MAX_ATTRIBUTE_TEXT_BYTES: usize = 4096;
 /// Longest name of a variable, dimension or attribute, bytes.
-pub const MAX_NAME_BYTES: usize = 256;
+pub(crate) const MAX_NAME_BYTES: usize = 256;
 /// Most dimensions of a variable (the limit of HDF5).
-pub const MAX_RANK: usize = 32;
+pub(crate) const MAX_RANK: usize = 32;
 
 /// What is in a data file.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct Description {
+pub(crate) struct Description {
     /// Format for people, such as `NetCDF classic`.
-    pub format: String,
+    pub(crate) format: String,
     /// Attributes of the whole file.
-    pub attributes: Attributes,
+    pub(crate) attributes: Attributes,
     /// Variables in the order of the file.
-    pub variables: Vec<Variable>,
+    pub(crate) variables: Vec<Variable>,
 }
 
 /// One variable.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Variable {
+pub(crate) struct Variable {
     /// Name.
-    pub name: String,
+    pub(crate) name: String,
     /// Dimensions, slowest first.
-    pub dimensions: Vec<Dimension>,
+    pub(crate) dimensions: Vec<Dimension>,
     /// How values are stored.
-    pub kind: Kind,
+    pub(crate) kind: Kind,
     /// Attributes.
-    pub attributes: Attributes,
+    pub(crate) attributes: Attributes,
 }
 
 /// One dimension of a variable.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Dimension {
+pub(crate) struct Dimension {
     /// Name; none in plain HDF5 files that name no dimensions.
-    pub name: Option<String>,
+    pub(crate) name: Option<String>,
     /// Length.
-    pub len: u64,
+    pub(crate) len: u64,
 }
 
 /// How the values of a variable are stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Kind {
+pub(crate) enum Kind {
     /// Signed integers of this many bytes.
     Integer(u8),
     /// Unsigned integers of this many bytes.
@@ -66,12 +66,12 @@ pub enum Kind {
 
 /// Attributes by name.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct Attributes(pub BTreeMap<String, AttributeValue>);
+pub(crate) struct Attributes(pub(crate) BTreeMap<String, AttributeValue>);
 
 /// The value of an attribute.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum AttributeValue {
+pub(crate) enum AttributeValue {
     /// Text.
     Text(String),
     /// One or more numbers; each as its bit pattern, since JSON holds neither NaN nor infinity.
@@ -80,7 +80,7 @@ pub enum AttributeValue {
 
 /// A float64 that survives JSON whatever it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct NumberBits(u64);
+pub(crate) struct NumberBits(u64);
 
 impl From<f64> for NumberBits {
     fn from(number: f64) -> Self {
@@ -91,7 +91,7 @@ impl From<f64> for NumberBits {
 /// The part of one dimension to read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Part {
+pub(crate) enum Part {
     /// All of it.
     All,
     /// One index.
@@ -100,23 +100,27 @@ pub enum Part {
 
 impl Attributes {
     /// A text attribute, without white space and null characters around it.
-    pub fn text(&self, name: &str) -> Option<&str> {
+    pub(crate) fn text(&self, name: &str) -> Option<&str> {
         match self.0.get(name)? {
-            AttributeValue::Text(text) => Some(text.trim_matches(|c: char| c.is_whitespace() || c == '\0')),
+            AttributeValue::Text(text) => {
+                Some(text.trim_matches(|c: char| c.is_whitespace() || c == '\0'))
+            }
             AttributeValue::Numbers(_) => None,
         }
     }
 
     /// The numbers of an attribute.
-    pub fn numbers(&self, name: &str) -> Option<Vec<f64>> {
+    pub(crate) fn numbers(&self, name: &str) -> Option<Vec<f64>> {
         match self.0.get(name)? {
-            AttributeValue::Numbers(bits) => Some(bits.iter().map(|b| f64::from_bits(b.0)).collect()),
+            AttributeValue::Numbers(bits) => {
+                Some(bits.iter().map(|b| f64::from_bits(b.0)).collect())
+            }
             AttributeValue::Text(_) => None,
         }
     }
 
     /// The first number of an attribute.
-    pub fn number(&self, name: &str) -> Option<f64> {
+    pub(crate) fn number(&self, name: &str) -> Option<f64> {
         self.numbers(name)?.first().copied()
     }
 }
@@ -129,24 +133,26 @@ impl FromIterator<(String, AttributeValue)> for Attributes {
 
 impl Description {
     /// The variable of a name.
-    pub fn variable(&self, name: &str) -> Option<&Variable> {
+    pub(crate) fn variable(&self, name: &str) -> Option<&Variable> {
         self.variables.iter().find(|variable| variable.name == name)
     }
 }
 
 impl Variable {
     /// Number of values declared, however absurd.
-    pub fn cell_count(&self) -> u128 {
-        self.dimensions.iter().fold(1, |cells: u128, d| cells.saturating_mul(u128::from(d.len)))
+    pub(crate) fn cell_count(&self) -> u128 {
+        self.dimensions
+            .iter()
+            .fold(1, |cells: u128, d| cells.saturating_mul(u128::from(d.len)))
     }
 
     /// Does it hold numbers?
-    pub fn is_numeric(&self) -> bool {
+    pub(crate) fn is_numeric(&self) -> bool {
         self.kind != Kind::Other
     }
 
     /// Is it a coordinate variable: one dimension of its own name (or, unnamed, one dimension at all)?
-    pub fn is_coordinate(&self) -> bool {
+    pub(crate) fn is_coordinate(&self) -> bool {
         match self.dimensions.as_slice() {
             [only] => only.name.as_deref().is_none_or(|name| name == self.name),
             _ => false,
@@ -162,12 +168,18 @@ mod tests {
     fn numbers_that_json_cannot_hold_cross_the_border() {
         let value = AttributeValue::Numbers(vec![f64::INFINITY.into(), (-0.0).into()]);
         let json = serde_json::to_string(&value).unwrap();
-        assert_eq!(serde_json::from_str::<AttributeValue>(&json).unwrap(), value);
+        assert_eq!(
+            serde_json::from_str::<AttributeValue>(&json).unwrap(),
+            value
+        );
     }
 
     #[test]
     fn a_product_of_absurd_dimensions_does_not_overflow() {
-        let absurd = Dimension { name: None, len: u64::MAX };
+        let absurd = Dimension {
+            name: None,
+            len: u64::MAX,
+        };
         let variable = Variable {
             name: "v".into(),
             dimensions: vec![absurd; 32],

@@ -23,10 +23,19 @@ pub(super) enum Format {
 
 /// Looks at the first bytes of a file.
 pub(super) fn detect(path: &Path) -> Result<Format, Rejection> {
-    let unreadable = |e: std::io::Error| Rejection::new(RejectReason::Unreadable, "file", format!("cannot be read: {e}"));
+    let unreadable = |e: std::io::Error| {
+        Rejection::new(
+            RejectReason::Unreadable,
+            "file",
+            format!("cannot be read: {e}"),
+        )
+    };
     let mut file = File::open(path).map_err(unreadable)?;
     let mut first = Vec::new();
-    (&mut file).take(8).read_to_end(&mut first).map_err(unreadable)?;
+    (&mut file)
+        .take(8)
+        .read_to_end(&mut first)
+        .map_err(unreadable)?;
     if let Some(version) = Version::of_magic(&first) {
         return Ok(Format::NetCdf3(version));
     }
@@ -45,7 +54,11 @@ pub(super) fn detect(path: &Path) -> Result<Format, Rejection> {
         }
         at_bytes *= 2;
     }
-    Err(Rejection::new(RejectReason::Unreadable, "file", explain(&first)))
+    Err(Rejection::new(
+        RejectReason::Unreadable,
+        "file",
+        explain(&first),
+    ))
 }
 
 /// What the first bytes look like instead, and what to do.
@@ -57,17 +70,28 @@ fn explain(first: &[u8]) -> String {
     let known: [(&[u8], &str); 5] = [
         (b"\x1f\x8b", "is compressed with gzip; unpack it first"),
         (b"PK\x03\x04", "is a zip archive; unpack it first"),
-        (b"\x0e\x03\x13\x01", "is HDF4, which is not read; convert it to NetCDF first"),
-        (b"GRIB", "is GRIB, which is not read; convert it to NetCDF first"),
+        (
+            b"\x0e\x03\x13\x01",
+            "is HDF4, which is not read; convert it to NetCDF first",
+        ),
+        (
+            b"GRIB",
+            "is GRIB, which is not read; convert it to NetCDF first",
+        ),
         (b"BZh", "is compressed with bzip2; unpack it first"),
     ];
     if let Some((_, text)) = known.iter().find(|(magic, _)| first.starts_with(magic)) {
         return (*text).to_owned();
     }
-    let is_text = first.iter().all(|b| b.is_ascii_graphic() || b.is_ascii_whitespace());
+    let is_text = first
+        .iter()
+        .all(|b| b.is_ascii_graphic() || b.is_ascii_whitespace());
     if is_text {
         let start = String::from_utf8_lossy(first);
-        return format!("is text (it starts with {:?}), whatever its name says; {advice}", start.trim());
+        return format!(
+            "is text (it starts with {:?}), whatever its name says; {advice}",
+            start.trim()
+        );
     }
     format!("has no known format; {advice}")
 }
@@ -85,8 +109,14 @@ mod tests {
 
     #[test]
     fn the_first_bytes_decide_and_not_the_name() {
-        assert_eq!(of(b"CDF\x01\0\0\0\0").unwrap(), Format::NetCdf3(Version::Classic));
-        assert_eq!(of(b"CDF\x02\0\0\0\0").unwrap(), Format::NetCdf3(Version::Offset64));
+        assert_eq!(
+            of(b"CDF\x01\0\0\0\0").unwrap(),
+            Format::NetCdf3(Version::Classic)
+        );
+        assert_eq!(
+            of(b"CDF\x02\0\0\0\0").unwrap(),
+            Format::NetCdf3(Version::Offset64)
+        );
         assert_eq!(of(&HDF5_MAGIC).unwrap(), Format::Hdf5);
         let mut behind_a_user_block = vec![b' '; 512];
         behind_a_user_block.extend(HDF5_MAGIC);
@@ -95,9 +125,19 @@ mod tests {
 
     #[test]
     fn what_it_is_instead_is_said() {
-        assert!(of(b"lat,lon,flux\n1,2,3\n").unwrap_err().detail.contains("is text"));
+        assert!(
+            of(b"lat,lon,flux\n1,2,3\n")
+                .unwrap_err()
+                .detail
+                .contains("is text")
+        );
         assert!(of(b"").unwrap_err().detail.contains("empty"));
         assert!(of(b"\x1f\x8b\x08").unwrap_err().detail.contains("gzip"));
-        assert!(of(&[0xff; 40]).unwrap_err().detail.contains("no known format"));
+        assert!(
+            of(&[0xff; 40])
+                .unwrap_err()
+                .detail
+                .contains("no known format")
+        );
     }
 }

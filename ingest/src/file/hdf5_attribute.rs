@@ -4,18 +4,30 @@ use hdf5::types::{FixedAscii, FixedUnicode, TypeDescriptor, VarLenAscii, VarLenU
 use hdf5::{Attribute, Location};
 
 use super::description::{
-    AttributeValue, Attributes, MAX_ATTRIBUTE_NUMBERS, MAX_ATTRIBUTE_TEXT_BYTES, MAX_ATTRIBUTES, MAX_NAME_BYTES,
+    AttributeValue, Attributes, MAX_ATTRIBUTE_NUMBERS, MAX_ATTRIBUTE_TEXT_BYTES, MAX_ATTRIBUTES,
+    MAX_NAME_BYTES,
 };
 
 /// Attributes of the netCDF library's own, which say nothing about the data.
-const INTERNAL: [&str; 6] =
-    ["REFERENCE_LIST", "DIMENSION_LIST", "_Netcdf4Dimid", "_Netcdf4Coordinates", "_NCProperties", "_nc3_strict"];
+const INTERNAL: [&str; 6] = [
+    "REFERENCE_LIST",
+    "DIMENSION_LIST",
+    "_Netcdf4Dimid",
+    "_Netcdf4Coordinates",
+    "_NCProperties",
+    "_nc3_strict",
+];
 
 /// All attributes that are numbers or text; one that cannot be read is left out, as if it were not there.
 pub(super) fn read_all(owner: &Location) -> Attributes {
     let names = owner.attr_names().unwrap_or_default();
-    let wanted = names.into_iter().filter(|n| n.len() <= MAX_NAME_BYTES && !INTERNAL.contains(&n.as_str()));
-    wanted.take(MAX_ATTRIBUTES).filter_map(|name| Some((name.clone(), read(&owner.attr(&name).ok()?)?))).collect()
+    let wanted = names
+        .into_iter()
+        .filter(|n| n.len() <= MAX_NAME_BYTES && !INTERNAL.contains(&n.as_str()));
+    wanted
+        .take(MAX_ATTRIBUTES)
+        .filter_map(|name| Some((name.clone(), read(&owner.attr(&name).ok()?)?)))
+        .collect()
 }
 
 fn read(attribute: &Attribute) -> Option<AttributeValue> {
@@ -26,24 +38,44 @@ fn read(attribute: &Attribute) -> Option<AttributeValue> {
     match attribute.dtype().ok()?.to_descriptor().ok()? {
         TypeDescriptor::Integer(_) | TypeDescriptor::Unsigned(_) | TypeDescriptor::Float(_) => {
             let numbers = attribute.read_raw::<f64>().ok()?;
-            Some(AttributeValue::Numbers(numbers.into_iter().map(Into::into).collect()))
+            Some(AttributeValue::Numbers(
+                numbers.into_iter().map(Into::into).collect(),
+            ))
         }
         TypeDescriptor::FixedAscii(_) => {
-            text(&attribute.read_raw::<FixedAscii<MAX_ATTRIBUTE_TEXT_BYTES>>().ok()?, |s| s.as_bytes())
+            let texts = attribute
+                .read_raw::<FixedAscii<MAX_ATTRIBUTE_TEXT_BYTES>>()
+                .ok()?;
+            Some(joined(&texts, |t| t.as_bytes()))
         }
         TypeDescriptor::FixedUnicode(_) => {
-            text(&attribute.read_raw::<FixedUnicode<MAX_ATTRIBUTE_TEXT_BYTES>>().ok()?, |s| s.as_bytes())
+            let texts = attribute
+                .read_raw::<FixedUnicode<MAX_ATTRIBUTE_TEXT_BYTES>>()
+                .ok()?;
+            Some(joined(&texts, |t| t.as_bytes()))
         }
-        TypeDescriptor::VarLenAscii => text(&attribute.read_raw::<VarLenAscii>().ok()?, |s| s.as_bytes()),
-        TypeDescriptor::VarLenUnicode => text(&attribute.read_raw::<VarLenUnicode>().ok()?, |s| s.as_bytes()),
+        TypeDescriptor::VarLenAscii => {
+            Some(joined(&attribute.read_raw::<VarLenAscii>().ok()?, |t| {
+                t.as_bytes()
+            }))
+        }
+        TypeDescriptor::VarLenUnicode => {
+            Some(joined(&attribute.read_raw::<VarLenUnicode>().ok()?, |t| {
+                t.as_bytes()
+            }))
+        }
         _ => None,
     }
 }
 
 /// Several texts are joined by spaces; bytes that are no UTF-8 are replaced.
-fn text<T>(texts: &[T], bytes: impl Fn(&T) -> &[u8]) -> Option<AttributeValue> {
-    let mut joined = texts.iter().map(|t| String::from_utf8_lossy(bytes(t)).into_owned()).collect::<Vec<_>>().join(" ");
-    let end = joined.floor_char_boundary(MAX_ATTRIBUTE_TEXT_BYTES);
-    joined.truncate(end);
-    Some(AttributeValue::Text(joined))
+fn joined<T>(texts: &[T], bytes: impl Fn(&T) -> &[u8]) -> AttributeValue {
+    let mut text = texts
+        .iter()
+        .map(|t| String::from_utf8_lossy(bytes(t)).into_owned())
+        .collect::<Vec<_>>()
+        .join(" ");
+    let end = text.floor_char_boundary(MAX_ATTRIBUTE_TEXT_BYTES);
+    text.truncate(end);
+    AttributeValue::Text(text)
 }

@@ -8,8 +8,8 @@
 
 use super::corrupt;
 use super::description::{
-    AttributeValue, Attributes, Kind, MAX_ATTRIBUTE_NUMBERS, MAX_ATTRIBUTE_TEXT_BYTES, MAX_ATTRIBUTES, MAX_NAME_BYTES,
-    MAX_RANK, MAX_VARIABLES,
+    AttributeValue, Attributes, Kind, MAX_ATTRIBUTE_NUMBERS, MAX_ATTRIBUTE_TEXT_BYTES,
+    MAX_ATTRIBUTES, MAX_NAME_BYTES, MAX_RANK, MAX_VARIABLES,
 };
 use crate::rejection::Rejection;
 
@@ -92,9 +92,8 @@ impl ExternalType {
 
     pub(super) fn size_bytes(self) -> u64 {
         match self {
-            Self::Char => 1,
+            Self::Char | Self::Number(Kind::Other) => 1,
             Self::Number(Kind::Integer(n) | Kind::Unsigned(n) | Kind::Float(n)) => u64::from(n),
-            Self::Number(Kind::Other) => 1,
         }
     }
 
@@ -112,8 +111,12 @@ impl ExternalType {
             (Self::Char | Self::Number(_), &[a]) => f64::from(a),
             (Self::Number(Kind::Integer(_)), &[a, b]) => f64::from(i16::from_be_bytes([a, b])),
             (_, &[a, b]) => f64::from(u16::from_be_bytes([a, b])),
-            (Self::Number(Kind::Integer(_)), &[a, b, c, d]) => f64::from(i32::from_be_bytes([a, b, c, d])),
-            (Self::Number(Kind::Unsigned(_)), &[a, b, c, d]) => f64::from(u32::from_be_bytes([a, b, c, d])),
+            (Self::Number(Kind::Integer(_)), &[a, b, c, d]) => {
+                f64::from(i32::from_be_bytes([a, b, c, d]))
+            }
+            (Self::Number(Kind::Unsigned(_)), &[a, b, c, d]) => {
+                f64::from(u32::from_be_bytes([a, b, c, d]))
+            }
             (_, &[a, b, c, d]) => f64::from(f32::from_be_bytes([a, b, c, d])),
             (_, bytes) => match (self, <[u8; 8]>::try_from(bytes)) {
                 (Self::Number(Kind::Integer(_)), Ok(bytes)) => i64::from_be_bytes(bytes) as f64,
@@ -127,14 +130,27 @@ impl ExternalType {
 
 /// Parses a header. `bytes` are the first bytes of the file, as many as may be header at all.
 pub(super) fn parse(bytes: &[u8], version: Version) -> Result<Header, Rejection> {
-    let mut cursor = Cursor { bytes, at: 4, version };
+    let mut cursor = Cursor {
+        bytes,
+        at: 4,
+        version,
+    };
     let record_count = cursor.count("the number of records")?;
-    let streaming = if version == Version::Data64 { u64::MAX } else { STREAMING_32 };
+    let streaming = if version == Version::Data64 {
+        u64::MAX
+    } else {
+        STREAMING_32
+    };
     let dimensions = cursor.dimensions()?;
     let attributes = cursor.attributes("file")?;
     let variables = cursor.variables(dimensions.len())?;
     let record_count = (record_count != streaming).then_some(record_count);
-    Ok(Header { record_count, dimensions, attributes, variables })
+    Ok(Header {
+        record_count,
+        dimensions,
+        attributes,
+        variables,
+    })
 }
 
 struct Cursor<'a> {
@@ -155,17 +171,25 @@ impl<'a> Cursor<'a> {
 
     fn u32(&mut self, what: &str) -> Result<u32, Rejection> {
         let bytes = self.take(4, what)?;
-        Ok(bytes.iter().fold(0, |value, byte| value << 8 | u32::from(*byte)))
+        Ok(bytes
+            .iter()
+            .fold(0, |value, byte| value << 8 | u32::from(*byte)))
     }
 
     fn u64(&mut self, what: &str) -> Result<u64, Rejection> {
         let bytes = self.take(8, what)?;
-        Ok(bytes.iter().fold(0, |value, byte| value << 8 | u64::from(*byte)))
+        Ok(bytes
+            .iter()
+            .fold(0, |value, byte| value << 8 | u64::from(*byte)))
     }
 
     /// A count or length: 32 bits, or 64 in CDF-5.
     fn count(&mut self, what: &str) -> Result<u64, Rejection> {
-        if self.version == Version::Data64 { self.u64(what) } else { self.u32(what).map(u64::from) }
+        if self.version == Version::Data64 {
+            self.u64(what)
+        } else {
+            self.u32(what).map(u64::from)
+        }
     }
 
     /// Bytes and their padding to a multiple of four.
@@ -178,7 +202,10 @@ impl<'a> Cursor<'a> {
     fn name(&mut self, what: &str) -> Result<String, Rejection> {
         let len = self.count(what)?;
         if len > MAX_NAME_BYTES as u64 {
-            return Err(corrupt(what, format!("its name is {len} bytes long, at most {MAX_NAME_BYTES} are read")));
+            return Err(corrupt(
+                what,
+                format!("its name is {len} bytes long, at most {MAX_NAME_BYTES} are read"),
+            ));
         }
         Ok(String::from_utf8_lossy(self.padded(len, what)?).into_owned())
     }
@@ -189,15 +216,23 @@ impl<'a> Cursor<'a> {
         match (found, count) {
             (0, 0) => Ok(0),
             (found, count) if found == tag && count <= limit => Ok(count),
-            (found, count) if found == tag => Err(corrupt(what, format!("{count} of them, at most {limit} are read"))),
-            (found, _) => Err(corrupt(what, format!("tag {found} where {tag} belongs; the file is damaged, fetch it again"))),
+            (found, count) if found == tag => Err(corrupt(
+                what,
+                format!("{count} of them, at most {limit} are read"),
+            )),
+            (found, _) => Err(corrupt(
+                what,
+                format!("tag {found} where {tag} belongs; the file is damaged, fetch it again"),
+            )),
         }
     }
 
     fn dimensions(&mut self) -> Result<Vec<(String, u64)>, Rejection> {
         let what = "list of dimensions";
         let count = self.list(TAG_DIMENSIONS, MAX_DIMENSIONS, what)?;
-        (0..count).map(|_| Ok((self.name(what)?, self.count(what)?))).collect()
+        (0..count)
+            .map(|_| Ok((self.name(what)?, self.count(what)?)))
+            .collect()
     }
 
     fn attributes(&mut self, owner: &str) -> Result<Attributes, Rejection> {
@@ -209,15 +244,20 @@ impl<'a> Cursor<'a> {
         let name = self.name(owner)?;
         let external = self.external(&name)?;
         let count = self.count(&name)?;
-        let size_bytes = count
-            .checked_mul(external.size_bytes())
-            .ok_or_else(|| corrupt(&name, format!("an attribute of {count} values; the file is damaged")))?;
+        let size_bytes = count.checked_mul(external.size_bytes()).ok_or_else(|| {
+            corrupt(
+                &name,
+                format!("an attribute of {count} values; the file is damaged"),
+            )
+        })?;
         let bytes = self.padded(size_bytes, &name)?;
         let value = if external == ExternalType::Char {
             let kept = &bytes[..bytes.len().min(MAX_ATTRIBUTE_TEXT_BYTES)];
             AttributeValue::Text(String::from_utf8_lossy(kept).into_owned())
         } else {
-            let numbers = bytes.chunks_exact(external.size_bytes() as usize).take(MAX_ATTRIBUTE_NUMBERS);
+            let numbers = bytes
+                .chunks_exact(external.size_bytes() as usize)
+                .take(MAX_ATTRIBUTE_NUMBERS);
             AttributeValue::Numbers(numbers.map(|b| external.number(b).into()).collect())
         };
         Ok((name, value))
@@ -225,8 +265,14 @@ impl<'a> Cursor<'a> {
 
     fn external(&mut self, what: &str) -> Result<ExternalType, Rejection> {
         let code = self.u32(what)?;
-        let known = ExternalType::of_code(code).filter(|_| self.version == Version::Data64 || code <= 6);
-        known.ok_or_else(|| corrupt(what, format!("type {code} does not exist; the file is damaged, fetch it again")))
+        let known =
+            ExternalType::of_code(code).filter(|_| self.version == Version::Data64 || code <= 6);
+        known.ok_or_else(|| {
+            corrupt(
+                what,
+                format!("type {code} does not exist; the file is damaged, fetch it again"),
+            )
+        })
     }
 
     fn variables(&mut self, dimension_count: usize) -> Result<Vec<HeaderVariable>, Rejection> {
@@ -238,18 +284,36 @@ impl<'a> Cursor<'a> {
         let name = self.name("list of variables")?;
         let rank = self.count(&name)?;
         if rank > MAX_RANK as u64 {
-            return Err(corrupt(&name, format!("{rank} dimensions, at most {MAX_RANK} are read")));
+            return Err(corrupt(
+                &name,
+                format!("{rank} dimensions, at most {MAX_RANK} are read"),
+            ));
         }
         let mut dimension_ids = Vec::new();
         for _ in 0..rank {
             let id = self.count(&name)?;
             let known = usize::try_from(id).ok().filter(|id| *id < dimension_count);
-            dimension_ids.push(known.ok_or_else(|| corrupt(&name, format!("dimension {id} does not exist; the file is damaged")))?);
+            dimension_ids.push(known.ok_or_else(|| {
+                corrupt(
+                    &name,
+                    format!("dimension {id} does not exist; the file is damaged"),
+                )
+            })?);
         }
         let attributes = self.attributes(&name)?;
         let external = self.external(&name)?;
         self.count(&name)?; // its size in bytes, which old writers get wrong: computed from the shape instead
-        let begin_bytes = if self.version == Version::Classic { self.u32(&name)?.into() } else { self.u64(&name)? };
-        Ok(HeaderVariable { name, dimension_ids, attributes, external, begin_bytes })
+        let begin_bytes = if self.version == Version::Classic {
+            self.u32(&name)?.into()
+        } else {
+            self.u64(&name)?
+        };
+        Ok(HeaderVariable {
+            name,
+            dimension_ids,
+            attributes,
+            external,
+            begin_bytes,
+        })
     }
 }

@@ -19,24 +19,85 @@ struct Patch {
 
 const PATCHES: [Patch; 9] = [
     // Changjiang: source in the mouth, strong sink in the summer plume.
-    Patch { lon: 121.9, lat: 31.2, radius_deg: 0.35, winter: 10.0, summer: 16.0 },
-    Patch { lon: 123.2, lat: 31.4, radius_deg: 1.4, winter: -1.0, summer: -12.0 },
+    Patch {
+        lon: 121.9,
+        lat: 31.2,
+        radius_deg: 0.35,
+        winter: 10.0,
+        summer: 16.0,
+    },
+    Patch {
+        lon: 123.2,
+        lat: 31.4,
+        radius_deg: 1.4,
+        winter: -1.0,
+        summer: -12.0,
+    },
     // Huanghe.
-    Patch { lon: 119.3, lat: 37.8, radius_deg: 0.7, winter: 2.0, summer: 4.0 },
+    Patch {
+        lon: 119.3,
+        lat: 37.8,
+        radius_deg: 0.7,
+        winter: 2.0,
+        summer: 4.0,
+    },
     // Zhujiang (Pearl River): mouth and plume.
-    Patch { lon: 113.7, lat: 22.2, radius_deg: 0.3, winter: 8.0, summer: 14.0 },
-    Patch { lon: 114.8, lat: 21.5, radius_deg: 1.1, winter: -1.0, summer: -6.0 },
+    Patch {
+        lon: 113.7,
+        lat: 22.2,
+        radius_deg: 0.3,
+        winter: 8.0,
+        summer: 14.0,
+    },
+    Patch {
+        lon: 114.8,
+        lat: 21.5,
+        radius_deg: 1.1,
+        winter: -1.0,
+        summer: -6.0,
+    },
     // Mekong plume.
-    Patch { lon: 107.2, lat: 9.4, radius_deg: 1.2, winter: -0.5, summer: -5.0 },
+    Patch {
+        lon: 107.2,
+        lat: 9.4,
+        radius_deg: 1.2,
+        winter: -0.5,
+        summer: -5.0,
+    },
     // Summer upwelling off Vietnam, winter upwelling off Luzon.
-    Patch { lon: 109.9, lat: 11.8, radius_deg: 1.3, winter: 0.0, summer: 5.0 },
-    Patch { lon: 119.8, lat: 18.7, radius_deg: 1.2, winter: 4.0, summer: 0.0 },
+    Patch {
+        lon: 109.9,
+        lat: 11.8,
+        radius_deg: 1.3,
+        winter: 0.0,
+        summer: 5.0,
+    },
+    Patch {
+        lon: 119.8,
+        lat: 18.7,
+        radius_deg: 1.2,
+        winter: 4.0,
+        summer: 0.0,
+    },
     // Chao Phraya in the Gulf of Thailand.
-    Patch { lon: 100.5, lat: 13.0, radius_deg: 0.6, winter: 3.0, summer: 6.0 },
+    Patch {
+        lon: 100.5,
+        lat: 13.0,
+        radius_deg: 0.6,
+        winter: 3.0,
+        summer: 6.0,
+    },
 ];
 
 /// The way of the Kuroshio: longitude and latitude, degrees.
-const KUROSHIO: [(f64, f64); 6] = [(122.3, 21.0), (122.4, 23.5), (123.6, 25.6), (126.2, 27.6), (128.3, 29.6), (130.2, 30.2)];
+const KUROSHIO: [(f64, f64); 6] = [
+    (122.3, 21.0),
+    (122.4, 23.5),
+    (123.6, 25.6),
+    (126.2, 27.6),
+    (128.3, 29.6),
+    (130.2, 30.2),
+];
 
 /// 1 in the middle of February, -1 in the middle of August; `month` is 0 to 11.
 fn winterness(month: usize) -> f64 {
@@ -44,7 +105,7 @@ fn winterness(month: usize) -> f64 {
 }
 
 /// Flux of CO2, mmol m⁻² d⁻¹, positive out of the sea.
-pub(super) fn flux_mmol_m2_d(lon: f64, lat: f64, month: usize, noise: &Noise) -> f64 {
+pub(super) fn flux_mmol_m2_d(lon: f64, lat: f64, month: usize, noise: Noise) -> f64 {
     let winter = 0.5 * (1.0 + winterness(month));
     let summer = 1.0 - winter;
     // 0 in the tropics, 1 north of the Changjiang.
@@ -67,10 +128,15 @@ pub(super) fn flux_mmol_m2_d(lon: f64, lat: f64, month: usize, noise: &Noise) ->
 }
 
 /// How cloudy a place is, without unit; only its order matters. Each month has clouds of its own.
-pub(super) fn cloudiness(lon: f64, lat: f64, month: usize, noise: &Noise) -> f32 {
+pub(super) fn cloudiness(lon: f64, lat: f64, month: usize, noise: Noise) -> f32 {
     // Cloud bands lie from west-south-west to east-north-east.
     let (along, across) = (0.94 * lon + 0.34 * lat, -0.34 * lon + 0.94 * lat);
-    noise.fractal(along / 5.0 + 100.0, across / 3.0 + 100.0, 1000.0 + 7.0 * month as f64, 5) as f32
+    noise.fractal(
+        along / 5.0 + 100.0,
+        across / 3.0 + 100.0,
+        1000.0 + 7.0 * month as f64,
+        5,
+    ) as f32
 }
 
 /// Distance from a broken line, degrees, without regard to the earth's curvature.
@@ -81,7 +147,9 @@ fn distance_deg(lon: f64, lat: f64, line: &[(f64, f64)]) -> f64 {
         let along = (((lon - ax) * dx + (lat - ay) * dy) / (dx * dx + dy * dy)).clamp(0.0, 1.0);
         (lon - ax - along * dx).hypot(lat - ay - along * dy)
     };
-    line.windows(2).map(to_segment).fold(f64::INFINITY, f64::min)
+    line.windows(2)
+        .map(to_segment)
+        .fold(f64::INFINITY, f64::min)
 }
 
 #[cfg(test)]
@@ -92,12 +160,22 @@ mod tests {
     fn the_north_takes_up_in_winter_and_the_south_gives_off_in_summer() {
         let noise = Noise::new(1);
         let mean = |lon: f64, lat: f64, month| {
-            let around = (0..100).map(|i| flux_mmol_m2_d(lon + f64::from(i % 10) * 0.2, lat + f64::from(i / 10) * 0.2, month, &noise));
+            let around = (0..100).map(|i| {
+                flux_mmol_m2_d(
+                    lon + f64::from(i % 10) * 0.2,
+                    lat + f64::from(i / 10) * 0.2,
+                    month,
+                    noise,
+                )
+            });
             around.sum::<f64>() / 100.0
         };
         assert!(mean(123.0, 34.0, 1) < -4.0, "Yellow Sea in February");
         assert!(mean(113.0, 14.0, 7) > 1.0, "South China Sea in August");
-        assert!(mean(122.8, 31.0, 7) < -2.0, "plume of the Changjiang in August");
+        assert!(
+            mean(122.8, 31.0, 7) < -2.0,
+            "plume of the Changjiang in August"
+        );
         assert!(mean(123.0, 34.0, 7) > mean(123.0, 34.0, 1));
     }
 }

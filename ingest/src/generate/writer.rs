@@ -15,37 +15,104 @@ const CHUNK_COLS: usize = 300;
 /// Level of deflate: higher ones gain little on noise.
 const DEFLATE_LEVEL: u8 = 4;
 
+/// The coordinate variables, which are also the dimensions.
+struct Axes {
+    time: Dataset,
+    lat: Dataset,
+    lon: Dataset,
+    side: Dataset,
+}
+
 /// Writes the file; `month` gives the values of a month, `[row, col]` from the south.
-pub(super) fn write(path: &Path, shape: Shape, seed: u64, month: impl Fn(usize) -> Vec<f32>) -> hdf5::Result<()> {
+pub(super) fn write(
+    path: &Path,
+    shape: Shape,
+    seed: u64,
+    month: impl Fn(usize) -> Vec<f32>,
+) -> hdf5::Result<()> {
     // No object may carry the time of its making: the same seed gives the same bytes.
-    let file = File::with_options().with_fcpl(|create| create.obj_track_times(false)).create(path)?;
-    text(&file, "Conventions", "CF-1.8")?;
-    text(&file, "title", "SYNTHETIC China Sea air-sea CO2 flux 2009: made up by a program, no measurement")?;
-    text(&file, "source", "fluxglobe generate china-sea")?;
-    text(&file, "generator", &format!("fluxglobe china-sea, seed {seed}"))?;
-    file.new_attr::<i32>().create("synthetic")?.write_scalar(&1)?;
+    let file = File::with_options()
+        .with_fcpl(|create| create.obj_track_times(false))
+        .create(path)?;
+    let generator = format!("fluxglobe china-sea, seed {seed}");
+    let title = "SYNTHETIC China Sea air-sea CO2 flux 2009: made up by a program, no measurement";
+    texts(
+        &file,
+        &[
+            ("Conventions", "CF-1.8"),
+            ("title", title),
+            ("source", "fluxglobe generate china-sea"),
+            ("generator", &generator),
+        ],
+    )?;
+    file.new_attr::<i32>()
+        .create("synthetic")?
+        .write_scalar(&1)?;
+    let axes = write_axes(&file, shape)?;
+    let flux = create_flux(&file, shape, &axes)?;
+    let (rows, cols) = (shape.rows as usize, shape.cols as usize);
+    let all = |count| SliceOrIndex::SliceCount {
+        start: 0,
+        step: 1,
+        count,
+        block: 1,
+    };
+    for index in 0..12 {
+        let values = month(index);
+        let map = ArrayView2::from_shape((rows, cols), &values)?;
+        let selection =
+            hdf5::Hyperslab::from(vec![SliceOrIndex::Index(index), all(rows), all(cols)]);
+        flux.write_slice(map, selection)?;
+    }
+    file.close()
+}
 
+fn write_axes(file: &File, shape: Shape) -> hdf5::Result<Axes> {
     let days: Vec<f64> = (0..=12).map(first_day).collect();
-    let middles: Vec<f64> = days.windows(2).map(|d| 0.5 * (d[0] + d[1])).collect();
-    let time = scale(&file, "time", &middles)?;
-    text(&time, "standard_name", "time")?;
-    text(&time, "units", "days since 2009-01-01")?;
-    text(&time, "calendar", "standard")?;
-    text(&time, "axis", "T")?;
-    text(&time, "bounds", "time_bnds")?;
-    let lat = scale(&file, "lat", &(0..shape.rows).map(|r| shape.lat_deg(r)).collect::<Vec<_>>())?;
-    text(&lat, "standard_name", "latitude")?;
-    text(&lat, "units", "degrees_north")?;
-    let lon = scale(&file, "lon", &(0..shape.cols).map(|c| shape.lon_deg(c)).collect::<Vec<_>>())?;
-    text(&lon, "standard_name", "longitude")?;
-    text(&lon, "units", "degrees_east")?;
-    let side = scale(&file, "bnds", &[0.0, 1.0])?;
-
+    let middles: Vec<f64> = days.windows(2).map(|d| f64::midpoint(d[0], d[1])).collect();
+    let lats: Vec<f64> = (0..shape.rows).map(|r| shape.lat_deg(r)).collect();
+    let lons: Vec<f64> = (0..shape.cols).map(|c| shape.lon_deg(c)).collect();
+    let time = scale(file, "time", &middles)?;
+    let units = ("units", "days since 2009-01-01");
+    texts(
+        &time,
+        &[
+            ("standard_name", "time"),
+            units,
+            ("calendar", "standard"),
+            ("axis", "T"),
+            ("bounds", "time_bnds"),
+        ],
+    )?;
+    let lat = scale(file, "lat", &lats)?;
+    texts(
+        &lat,
+        &[("standard_name", "latitude"), ("units", "degrees_north")],
+    )?;
+    let lon = scale(file, "lon", &lons)?;
+    texts(
+        &lon,
+        &[("standard_name", "longitude"), ("units", "degrees_east")],
+    )?;
+    let side = scale(file, "bnds", &[0.0, 1.0])?;
+    let axes = Axes {
+        time,
+        lat,
+        lon,
+        side,
+    };
     let pairs: Vec<f64> = days.windows(2).flatten().copied().collect();
-    let bounds = file.new_dataset::<f64>().obj_track_times(false).shape([12, 2]).create("time_bnds")?;
+    let bounds = file
+        .new_dataset::<f64>()
+        .obj_track_times(false)
+        .shape([12, 2])
+        .create("time_bnds")?;
     bounds.write_raw(&pairs)?;
-    attach(&file, &bounds, &[&time, &side])?;
+    attach(file, &bounds, &[&axes.time, &axes.side])?;
+    Ok(axes)
+}
 
+fn create_flux(file: &File, shape: Shape, axes: &Axes) -> hdf5::Result<Dataset> {
     let (rows, cols) = (shape.rows as usize, shape.cols as usize);
     let flux = file
         .new_dataset::<f32>()
@@ -56,38 +123,61 @@ pub(super) fn write(path: &Path, shape: Shape, seed: u64, month: impl Fn(usize) 
         .fill_value(FILL)
         .shape([12, rows, cols])
         .create("co2_flux")?;
-    text(&flux, "standard_name", "surface_upward_mole_flux_of_carbon_dioxide")?;
-    text(&flux, "long_name", "SYNTHETIC air-sea CO2 flux, positive out of the sea")?;
-    text(&flux, "units", "mmol m-2 d-1")?;
-    text(&flux, "cell_methods", "time: mean")?;
-    flux.new_attr::<f32>().create("_FillValue")?.write_scalar(&FILL)?;
-    attach(&file, &flux, &[&time, &lat, &lon])?;
-    for index in 0..12 {
-        let values = month(index);
-        let map = ArrayView2::from_shape((rows, cols), &values)?;
-        let all = |count| SliceOrIndex::SliceCount { start: 0, step: 1, count, block: 1 };
-        let selection = hdf5::Hyperslab::from(vec![SliceOrIndex::Index(index), all(rows), all(cols)]);
-        flux.write_slice(map, selection)?;
-    }
-    file.close()
+    let attributes = [
+        (
+            "standard_name",
+            "surface_upward_mole_flux_of_carbon_dioxide",
+        ),
+        (
+            "long_name",
+            "SYNTHETIC air-sea CO2 flux, positive out of the sea",
+        ),
+        ("units", "mmol m-2 d-1"),
+        ("cell_methods", "time: mean"),
+    ];
+    texts(&flux, &attributes)?;
+    flux.new_attr::<f32>()
+        .create("_FillValue")?
+        .write_scalar(&FILL)?;
+    attach(file, &flux, &[&axes.time, &axes.lat, &axes.lon])?;
+    Ok(flux)
 }
 
 /// Days from the start of the year to the start of a month, 12 for the start of the next year.
 fn first_day(month: usize) -> f64 {
-    let start = |year, month| contract::time::TimeMs::from_ymd(year, month, 1).map(|t| t.ms() as f64 / 86_400_000.0);
-    let day = if month < 12 { start(YEAR, month as u32 + 1) } else { start(YEAR + 1, 1) };
+    let start = |year, month| {
+        contract::time::TimeMs::from_ymd(year, month, 1).map(|t| t.ms() as f64 / 86_400_000.0)
+    };
+    let day = if month < 12 {
+        start(YEAR, month as u32 + 1)
+    } else {
+        start(YEAR + 1, 1)
+    };
     let first = start(YEAR, 1);
-    day.and_then(|day| Ok(day - first?)).expect("months of 2009 exist")
+    day.and_then(|day| Ok(day - first?))
+        .expect("months of 2009 exist")
 }
 
-fn text(owner: &Location, name: &str, value: &str) -> hdf5::Result<()> {
-    let value: VarLenUnicode = value.parse().map_err(|e| hdf5::Error::from(format!("{name}: {e}")))?;
-    owner.new_attr::<VarLenUnicode>().create(name)?.write_scalar(&value)
+fn texts(owner: &Location, attributes: &[(&str, &str)]) -> hdf5::Result<()> {
+    for (name, value) in attributes {
+        let value: VarLenUnicode = value
+            .parse()
+            .map_err(|e| hdf5::Error::from(format!("{name}: {e}")))?;
+        owner
+            .new_attr::<VarLenUnicode>()
+            .create(*name)?
+            .write_scalar(&value)?;
+    }
+    Ok(())
 }
 
 /// A coordinate variable, which is also the dimension's scale.
 fn scale(file: &File, name: &str, values: &[f64]) -> hdf5::Result<Dataset> {
-    let dataset = file.new_dataset::<f64>().obj_track_times(false).shape([values.len()]).create(name)?;
+    let dataset = file
+        .new_dataset::<f64>()
+        .obj_track_times(false)
+        .shape([values.len()])
+        .create(name)?;
     dataset.write_raw(values)?;
     fixed(&dataset, "CLASS", "DIMENSION_SCALE")?;
     fixed(&dataset, "NAME", name)?;
@@ -96,16 +186,32 @@ fn scale(file: &File, name: &str, values: &[f64]) -> hdf5::Result<Dataset> {
 
 /// A text as the dimension scales of HDF5 want it: of fixed length, with a null character at its end.
 fn fixed(owner: &Location, name: &str, value: &str) -> hdf5::Result<()> {
-    let text = FixedAscii::<32>::from_ascii(value).map_err(|e| hdf5::Error::from(format!("{name}: {e}")))?;
-    let attribute = owner.new_attr_builder().empty_as(null_terminated(value.len() + 1)?).create(name)?;
-    attribute.as_writer().conversion(hdf5::Conversion::Soft).write_scalar(&text)
+    let text = FixedAscii::<32>::from_ascii(value)
+        .map_err(|e| hdf5::Error::from(format!("{name}: {e}")))?;
+    let attribute = owner
+        .new_attr_builder()
+        .empty_as(null_terminated(value.len() + 1)?)
+        .create(name)?;
+    attribute
+        .as_writer()
+        .conversion(hdf5::Conversion::Soft)
+        .write_scalar(&text)
 }
 
 /// Names the dimensions of a dataset by their scales.
 fn attach(file: &File, dataset: &Dataset, scales: &[&Dataset]) -> hdf5::Result<()> {
     let lists: Vec<VarLenArray<ObjectReference1>> = scales
         .iter()
-        .map(|scale| Ok(VarLenArray::from_slice(&[ObjectReference1::create(file, &scale.name())?])))
+        .map(|scale| {
+            Ok(VarLenArray::from_slice(&[ObjectReference1::create(
+                file,
+                &scale.name(),
+            )?]))
+        })
         .collect::<hdf5::Result<_>>()?;
-    dataset.new_attr::<VarLenArray<ObjectReference1>>().shape([scales.len()]).create("DIMENSION_LIST")?.write_raw(&lists)
+    dataset
+        .new_attr::<VarLenArray<ObjectReference1>>()
+        .shape([scales.len()])
+        .create("DIMENSION_LIST")?
+        .write_raw(&lists)
 }

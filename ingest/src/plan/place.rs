@@ -15,7 +15,10 @@ fn refused(object: &str, detail: impl AsRef<str>) -> Rejection {
 }
 
 /// The axes of a variable and the place of every grid cell in it.
-pub(super) async fn mapping(planning: &mut Planning<'_>, variable: &Variable) -> Result<(Vec<Axis>, Mapping), Stop> {
+pub(super) async fn mapping(
+    planning: &mut Planning<'_>,
+    variable: &Variable,
+) -> Result<(Vec<Axis>, Mapping), Stop> {
     let rules = planning.profile.map(|p| p.grid.clone()).unwrap_or_default();
     let mut axes = coordinate::axes(planning.file, variable);
     name_axes(planning, variable, &rules, &mut axes)?;
@@ -24,9 +27,15 @@ pub(super) async fn mapping(planning: &mut Planning<'_>, variable: &Variable) ->
         return Err(coordinate::no_grid(planning.file, variable).into());
     };
     check_others(variable, &axes)?;
-    let (cells, most) = (u128::from(lat.len) * u128::from(lon.len), planning.limits.plane_cells);
+    let (cells, most) = (
+        u128::from(lat.len) * u128::from(lon.len),
+        planning.limits.plane_cells,
+    );
     if cells > u128::from(most) || cells == 0 {
-        let detail = format!("has {} x {} cells in one map, 1 to {most} are read; give it in smaller pieces", lat.len, lon.len);
+        let detail = format!(
+            "has {} x {} cells in one map, 1 to {most} are read; give it in smaller pieces",
+            lat.len, lon.len
+        );
         return Err(Rejection::new(RejectReason::TooLarge, &variable.name, detail).into());
     }
     let mapping = match &rules.stated {
@@ -37,23 +46,57 @@ pub(super) async fn mapping(planning: &mut Planning<'_>, variable: &Variable) ->
 }
 
 /// Gives the axes the roles that a profile states.
-fn name_axes(planning: &Planning<'_>, variable: &Variable, rules: &GridRules, axes: &mut [Axis]) -> Result<(), Rejection> {
-    for (name, role) in [(&rules.latitude, Role::Latitude), (&rules.longitude, Role::Longitude)] {
+fn name_axes(
+    planning: &Planning<'_>,
+    variable: &Variable,
+    rules: &GridRules,
+    axes: &mut [Axis],
+) -> Result<(), Rejection> {
+    for (name, role) in [
+        (&rules.latitude, Role::Latitude),
+        (&rules.longitude, Role::Longitude),
+    ] {
         let Some(name) = name else { continue };
-        let missing = || refused(name, "is no axis of the variable; name another one in the profile");
-        let dimension = planning.file.variable(name).and_then(|c| c.dimensions.first()).ok_or_else(missing)?;
+        let missing = || {
+            refused(
+                name,
+                "is no axis of the variable; name another one in the profile",
+            )
+        };
+        let dimension = planning
+            .file
+            .variable(name)
+            .and_then(|c| c.dimensions.first())
+            .ok_or_else(missing)?;
         let is_along = |(_, own): &(&mut Axis, &Dimension)| *own == dimension;
-        let (axis, _) = axes.iter_mut().zip(&variable.dimensions).find(is_along).ok_or_else(missing)?;
+        let (axis, _) = axes
+            .iter_mut()
+            .zip(&variable.dimensions)
+            .find(is_along)
+            .ok_or_else(missing)?;
         axis.role = role;
         axis.coordinate = Some(name.clone());
     }
-    let Some(stated) = &rules.stated else { return Ok(()) };
+    let Some(stated) = &rules.stated else {
+        return Ok(());
+    };
     let rank = axes.len();
     if rank < 2 {
-        return Err(refused(&variable.name, format!("has {rank} dimensions where a map has two")));
+        return Err(refused(
+            &variable.name,
+            format!("has {rank} dimensions where a map has two"),
+        ));
     }
-    let named = |name: &String| variable.dimensions.iter().position(|d| d.name.as_ref() == Some(name));
-    let places = stated.dimensions.as_ref().and_then(|[lat, lon]| Some([named(lat)?, named(lon)?]));
+    let named = |name: &String| {
+        variable
+            .dimensions
+            .iter()
+            .position(|d| d.name.as_ref() == Some(name))
+    };
+    let places = stated
+        .dimensions
+        .as_ref()
+        .and_then(|[lat, lon]| Some([named(lat)?, named(lon)?]));
     let [lat, lon] = places.unwrap_or([rank - 2, rank - 1]);
     axes[lat].role = Role::Latitude;
     axes[lon].role = Role::Longitude;
@@ -64,35 +107,69 @@ fn name_axes(planning: &Planning<'_>, variable: &Variable, rules: &GridRules, ax
 fn check_others(variable: &Variable, axes: &[Axis]) -> Result<(), Rejection> {
     for role in [Role::Latitude, Role::Longitude, Role::Time] {
         if axes.iter().filter(|a| a.role == role).count() > 1 {
-            return Err(refused(&variable.name, format!("has two {role:?} axes; name them in a profile")));
+            return Err(refused(
+                &variable.name,
+                format!("has two {role:?} axes; name them in a profile"),
+            ));
         }
     }
-    let deep = axes.iter().zip(&variable.dimensions).find(|(a, _)| a.role == Role::Other && a.len != 1);
+    let deep = axes
+        .iter()
+        .zip(&variable.dimensions)
+        .find(|(a, _)| a.role == Role::Other && a.len != 1);
     match deep {
         None => Ok(()),
         Some((axis, dimension)) => {
             let name = dimension.name.as_deref().unwrap_or("without a name");
-            let detail = format!("has {} levels along dimension {name:?}; give a file with one level", axis.len);
+            let detail = format!(
+                "has {} levels along dimension {name:?}; give a file with one level",
+                axis.len
+            );
             Err(refused(&variable.name, detail))
         }
     }
 }
 
-fn stated_mapping(variable: &Variable, stated: &StatedGrid, lat: &Axis, lon: &Axis) -> Result<Mapping, Rejection> {
+fn stated_mapping(
+    variable: &Variable,
+    stated: &StatedGrid,
+    lat: &Axis,
+    lon: &Axis,
+) -> Result<Mapping, Rejection> {
     let (rows, cols) = (u64::from(stated.grid.rows), u64::from(stated.grid.cols));
     if (lat.len, lon.len) != (rows, cols) {
-        let detail = format!("has {} x {} cells, its profile states {rows} x {cols}; give the profile that fits", lat.len, lon.len);
+        let detail = format!(
+            "has {} x {} cells, its profile states {rows} x {cols}; give the profile that fits",
+            lat.len, lon.len
+        );
         return Err(refused(&variable.name, detail));
     }
     Mapping::from_grid(stated.grid, stated.north_first)
 }
 
-async fn read_mapping(planning: &mut Planning<'_>, registration: Registration, lat: &Axis, lon: &Axis) -> Result<Mapping, Stop> {
+async fn read_mapping(
+    planning: &mut Planning<'_>,
+    registration: Registration,
+    lat: &Axis,
+    lon: &Axis,
+) -> Result<Mapping, Stop> {
     let name = |axis: &Axis| axis.coordinate.clone().unwrap_or_default();
     let names = [name(lat), name(lon)];
-    let (lat_deg, lon_deg) = (planning.coordinate(&names[0]).await?, planning.coordinate(&names[1]).await?);
+    let (lat_deg, lon_deg) = (
+        planning.coordinate(&names[0]).await?,
+        planning.coordinate(&names[1]).await?,
+    );
     if (lat_deg.len() as u64, lon_deg.len() as u64) != (lat.len, lon.len) {
-        return Err(refused(&names[0], "is not as long as the variable's dimension; the file is damaged").into());
+        return Err(refused(
+            &names[0],
+            "is not as long as the variable's dimension; the file is damaged",
+        )
+        .into());
     }
-    Ok(Mapping::from_labels(&lat_deg, &lon_deg, registration, [&names[0], &names[1]])?)
+    Ok(Mapping::from_labels(
+        &lat_deg,
+        &lon_deg,
+        registration,
+        [&names[0], &names[1]],
+    )?)
 }

@@ -17,27 +17,61 @@ use crate::unit::Substance;
 const MAX_TITLE_CHARS: usize = 200;
 
 /// The variable to land and what it means.
-pub(super) fn choose<'a>(file: &'a Description, profile: Option<&Profile>) -> Result<(&'a Variable, Named), Rejection> {
-    let Some(profile) = profile else { return choose_by_standard_name(file) };
+pub(super) fn choose<'a>(
+    file: &'a Description,
+    profile: Option<&Profile>,
+) -> Result<(&'a Variable, Named), Rejection> {
+    let Some(profile) = profile else {
+        return choose_by_standard_name(file);
+    };
     let name = &profile.variable.name;
     let missing = || {
-        let detail = format!("is not in the file, which holds {}; give the profile that fits", listed(file.variables.iter()));
+        let detail = format!(
+            "is not in the file, which holds {}; give the profile that fits",
+            listed(file.variables.iter())
+        );
         Rejection::new(RejectReason::NoVariable, name, detail)
     };
-    let variable = file.variable(name).filter(|v| v.is_numeric()).ok_or_else(missing)?;
-    let sign = if profile.variable.positive_into_sea { -1.0 } else { 1.0 };
+    let variable = file
+        .variable(name)
+        .filter(|v| v.is_numeric())
+        .ok_or_else(missing)?;
+    let sign = if profile.variable.positive_into_sea {
+        -1.0
+    } else {
+        1.0
+    };
     // The stored unit of a carbon flux is a mass of carbon, and a profile that states a mass means that.
     let stated = profile.variable.unit.as_ref().map(|_| Substance::Carbon);
-    let by_name = variable.attributes.text("standard_name").and_then(of_standard_name);
+    let by_name = variable
+        .attributes
+        .text("standard_name")
+        .and_then(of_standard_name);
     let substance = stated.or(by_name.and_then(|n| n.substance));
-    Ok((variable, Named { quantity: profile.quantity, sign, substance }))
+    Ok((
+        variable,
+        Named {
+            quantity: profile.quantity,
+            sign,
+            substance,
+        },
+    ))
 }
 
 fn choose_by_standard_name(file: &Description) -> Result<(&Variable, Named), Rejection> {
-    let is_data = |v: &&Variable| v.is_numeric() && coordinate::role_of(v) == Role::Other && v.dimensions.len() >= 2;
+    let is_data = |v: &&Variable| {
+        v.is_numeric() && coordinate::role_of(v) == Role::Other && v.dimensions.len() >= 2
+    };
     let data: Vec<&Variable> = file.variables.iter().filter(is_data).collect();
-    let named = |v: &&'_ Variable| v.attributes.text("standard_name").and_then(of_standard_name);
-    let found: Vec<_> = data.iter().filter_map(|v| named(v).map(|n| (*v, n))).collect();
+    let named = |v: &&'_ Variable| {
+        v.attributes
+            .text("standard_name")
+            .and_then(of_standard_name)
+    };
+    let found: Vec<_> = data
+        .iter()
+        .filter_map(|v| named(v).map(|n| (*v, n)))
+        .collect();
     let candidate = found.first().map(|(v, _)| *v).or(data.first().copied());
     // That a file is a swath matters before what its variables are called.
     if let Some(first) = candidate.filter(|first| is_swath(file, first)) {
@@ -46,7 +80,9 @@ fn choose_by_standard_name(file: &Description) -> Result<(&Variable, Named), Rej
     let refused = |detail: String| Err(Rejection::new(RejectReason::NoVariable, "file", detail));
     match found.as_slice() {
         [only] => Ok(*only),
-        [] if data.is_empty() => refused("holds no gridded variable; give a file with one".to_owned()),
+        [] if data.is_empty() => {
+            refused("holds no gridded variable; give a file with one".to_owned())
+        }
         [] => refused(format!(
             "has no variable whose standard_name is one that is stored (it holds {}); say in a profile which one to land",
             listed(data.into_iter())
@@ -60,9 +96,15 @@ fn choose_by_standard_name(file: &Description) -> Result<(&Variable, Named), Rej
 
 /// Has the variable no latitude axis, and the file a latitude or longitude of two dimensions?
 fn is_swath(file: &Description, variable: &Variable) -> bool {
-    let on_axes = coordinate::axes(file, variable).iter().any(|a| a.role == Role::Latitude);
+    let on_axes = coordinate::axes(file, variable)
+        .iter()
+        .any(|a| a.role == Role::Latitude);
     let is_plane = |v: &&Variable| v.dimensions.len() >= 2;
-    let mut planes = file.variables.iter().filter(is_plane).map(coordinate::role_of);
+    let mut planes = file
+        .variables
+        .iter()
+        .filter(is_plane)
+        .map(coordinate::role_of);
     !on_axes && planes.any(|role| matches!(role, Role::Latitude | Role::Longitude))
 }
 
@@ -81,7 +123,8 @@ pub(super) fn target(
     quantity: Quantity,
     product: Option<&ProductId>,
 ) -> Result<Target, Rejection> {
-    let marked = file.attributes.0.contains_key("synthetic") && file.attributes.number("synthetic") != Some(0.0);
+    let marked = file.attributes.0.contains_key("synthetic")
+        && file.attributes.number("synthetic") != Some(0.0);
     if let Some(profile) = profile {
         return Ok(Target {
             product: product.unwrap_or(&profile.product).clone(),
@@ -91,13 +134,34 @@ pub(super) fn target(
             synthetic: profile.synthetic || marked,
         });
     }
-    let cut = |text: &str| text.chars().take(MAX_TITLE_CHARS).map(|c| if c.is_control() { ' ' } else { c }).collect::<String>();
-    let text = |name: &str| file.attributes.text(name).filter(|t| !t.is_empty()).map(cut);
+    let cut = |text: &str| {
+        text.chars()
+            .take(MAX_TITLE_CHARS)
+            .map(|c| if c.is_control() { ' ' } else { c })
+            .collect::<String>()
+    };
+    let text = |name: &str| {
+        file.attributes
+            .text(name)
+            .filter(|t| !t.is_empty())
+            .map(cut)
+    };
     let title = text("title").or_else(|| variable.attributes.text("long_name").map(cut));
-    let source = ["references", "source", "institution"].into_iter().find_map(text);
-    let unnamed = || Rejection::new(RejectReason::NoVariable, &variable.name, "gives no name for a product; state one");
+    let source = ["references", "source", "institution"]
+        .into_iter()
+        .find_map(text);
+    let unnamed = || {
+        Rejection::new(
+            RejectReason::NoVariable,
+            &variable.name,
+            "gives no name for a product; state one",
+        )
+    };
     Ok(Target {
-        product: product.cloned().or_else(|| product_name(&variable.name)).ok_or_else(unnamed)?,
+        product: product
+            .cloned()
+            .or_else(|| product_name(&variable.name))
+            .ok_or_else(unnamed)?,
         title: title.unwrap_or_else(|| quantity.title().to_owned()),
         source: source.unwrap_or_else(|| "not stated in the file".to_owned()),
         quantity,
@@ -107,14 +171,22 @@ pub(super) fn target(
 
 /// A product name from a variable name: `CO2_flux` becomes `co2-flux`.
 fn product_name(variable: &str) -> Option<ProductId> {
-    let plain: String =
-        variable.to_ascii_lowercase().chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
-    let plain = plain.trim_start_matches(|c: char| !c.is_ascii_lowercase()).trim_end_matches('-');
+    let plain: String = variable
+        .to_ascii_lowercase()
+        .chars()
+        .map(|c| if c.is_ascii_alphanumeric() { c } else { '-' })
+        .collect();
+    let plain = plain
+        .trim_start_matches(|c: char| !c.is_ascii_lowercase())
+        .trim_end_matches('-');
     plain.chars().take(64).collect::<String>().parse().ok()
 }
 
 /// The packing of the file, with what the profile overrides.
-pub(super) fn packing(variable: &Variable, profile: Option<&Profile>) -> Result<Packing, Rejection> {
+pub(super) fn packing(
+    variable: &Variable,
+    profile: Option<&Profile>,
+) -> Result<Packing, Rejection> {
     let mut packing = Packing::of(variable);
     if let Some(rules) = profile.map(|p| &p.variable) {
         packing.fills.extend(rules.fill_values.iter().flatten());
@@ -126,7 +198,9 @@ pub(super) fn packing(variable: &Variable, profile: Option<&Profile>) -> Result<
     }
     if !packing.scale.is_finite() || packing.scale == 0.0 || !packing.offset.is_finite() {
         let (scale, offset) = (packing.scale, packing.offset);
-        let detail = format!("has scale_factor {scale} and add_offset {offset}, which cannot be; state them in a profile");
+        let detail = format!(
+            "has scale_factor {scale} and add_offset {offset}, which cannot be; state them in a profile"
+        );
         return Err(Rejection::new(RejectReason::Values, &variable.name, detail));
     }
     Ok(packing)

@@ -29,11 +29,18 @@ enum Field {
 }
 
 impl Field {
-    const ALL: [(&str, Self, usize); 4] =
-        [("{year}", Self::Year, 4), ("{month}", Self::Month, 2), ("{day}", Self::Day, 2), ("{day_of_year}", Self::DayOfYear, 3)];
+    const ALL: [(&str, Self, usize); 4] = [
+        ("{year}", Self::Year, 4),
+        ("{month}", Self::Month, 2),
+        ("{day}", Self::Day, 2),
+        ("{day_of_year}", Self::DayOfYear, 3),
+    ];
 
     fn digits(self) -> usize {
-        Self::ALL.iter().find(|(_, field, _)| *field == self).map_or(0, |(_, _, digits)| *digits)
+        Self::ALL
+            .iter()
+            .find(|(_, field, _)| *field == self)
+            .map_or(0, |(_, _, digits)| *digits)
     }
 }
 
@@ -44,7 +51,9 @@ pub(crate) fn check(pattern: &str) -> Result<(), String> {
     if has(Field::Year) && (has(Field::Month) || has(Field::DayOfYear)) {
         Ok(())
     } else {
-        Err(format!("file_name pattern {pattern:?} needs {{year}} and {{month}} or {{day_of_year}}"))
+        Err(format!(
+            "file_name pattern {pattern:?} needs {{year}} and {{month}} or {{day_of_year}}"
+        ))
     }
 }
 
@@ -65,10 +74,16 @@ fn pieces(pattern: &str) -> Result<Vec<Piece>, String> {
     let mut rest = pattern;
     let mut pieces = Vec::new();
     while let Some(first) = rest.bytes().next() {
-        let field = Field::ALL.iter().find(|(text, _, _)| rest.starts_with(text));
+        let field = Field::ALL
+            .iter()
+            .find(|(text, _, _)| rest.starts_with(text));
         let (piece, len) = match (first, field) {
             (_, Some((text, field, _))) => (Piece::Number(*field), text.len()),
-            (b'{', None) => return Err(format!("unknown field in pattern {pattern:?}; use {{year}}, {{month}}, {{day}}, {{day_of_year}}")),
+            (b'{', None) => {
+                return Err(format!(
+                    "unknown field in pattern {pattern:?}; use {{year}}, {{month}}, {{day}}, {{day_of_year}}"
+                ));
+            }
             (b'*', _) => (Piece::AnyText, 1),
             (b'?', _) => (Piece::AnyByte, 1),
             (byte, _) => (Piece::Literal(byte), 1),
@@ -120,7 +135,9 @@ fn find(pieces: &[Piece], name: &str) -> Option<Found> {
 fn number(bytes: &[u8], at: usize, field: Field, found: &mut Found) -> Option<usize> {
     let len = field.digits();
     let digits = bytes.get(at..at + len)?;
-    let value = digits.iter().try_fold(0, |n, b| b.is_ascii_digit().then(|| n * 10 + u32::from(b - b'0')))?;
+    let value = digits.iter().try_fold(0, |n, b| {
+        b.is_ascii_digit().then(|| n * 10 + u32::from(b - b'0'))
+    })?;
     let slot = match field {
         Field::Year => &mut found.year,
         Field::Month if !(1..=12).contains(&value) => return None,
@@ -140,9 +157,17 @@ mod tests {
 
     #[test]
     fn dates_are_found_in_names() {
-        let found = date("{year}{month}*_OCF-CO2-*.nc", "20100301_OCF-CO2-GLO-1M-KRG-CLIM.nc").unwrap();
+        let found = date(
+            "{year}{month}*_OCF-CO2-*.nc",
+            "20100301_OCF-CO2-GLO-1M-KRG-CLIM.nc",
+        )
+        .unwrap();
         assert_eq!((found.year, found.month), (Some(2010), Some(3)));
-        let found = date("*-{year}{month}-fv*.nc", "ESACCI-OC-1M_MONTHLY_1degree-201012-fv0.95.nc").unwrap();
+        let found = date(
+            "*-{year}{month}-fv*.nc",
+            "ESACCI-OC-1M_MONTHLY_1degree-201012-fv0.95.nc",
+        )
+        .unwrap();
         assert_eq!((found.year, found.month), (Some(2010), Some(12)));
         let found = date("M{year}{day_of_year}.*", "M2001032.1200.nc").unwrap();
         assert_eq!((found.year, found.day_of_year), (Some(2001), Some(32)));
@@ -151,7 +176,12 @@ mod tests {
 
     #[test]
     fn stars_and_marks_match_as_in_a_shell() {
-        assert!(matches("*.nc", "a.nc") && matches("a*b*c", "aXbXbXc") && matches("a?c", "abc") && matches("*", ""));
+        assert!(
+            matches("*.nc", "a.nc")
+                && matches("a*b*c", "aXbXbXc")
+                && matches("a?c", "abc")
+                && matches("*", "")
+        );
         assert!(!matches("*.nc", "a.ncx") && !matches("a?c", "ac") && !matches("", "a"));
     }
 

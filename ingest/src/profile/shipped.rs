@@ -6,24 +6,59 @@ use super::Profile;
 
 /// Name and text of each, in the order in which they are tried.
 const TEXTS: [(&str, &str); 14] = [
-    ("takahashi09-flux", include_str!("../../profiles/takahashi09-flux.toml")),
-    ("takahashi09-pco2", include_str!("../../profiles/takahashi09-pco2.toml")),
+    (
+        "takahashi09-flux",
+        include_str!("../../profiles/takahashi09-flux.toml"),
+    ),
+    (
+        "takahashi09-pco2",
+        include_str!("../../profiles/takahashi09-pco2.toml"),
+    ),
     ("sst-2010", include_str!("../../profiles/sst-2010.toml")),
-    ("chlorophyll-2010", include_str!("../../profiles/chlorophyll-2010.toml")),
+    (
+        "chlorophyll-2010",
+        include_str!("../../profiles/chlorophyll-2010.toml"),
+    ),
     ("wind-2010", include_str!("../../profiles/wind-2010.toml")),
-    ("socatv4-fco2-2010", include_str!("../../profiles/socatv4-fco2-2010.toml")),
+    (
+        "socatv4-fco2-2010",
+        include_str!("../../profiles/socatv4-fco2-2010.toml"),
+    ),
     ("ice-2010", include_str!("../../profiles/ice-2010.toml")),
-    ("air-pressure-2010", include_str!("../../profiles/air-pressure-2010.toml")),
-    ("wave-height-2010", include_str!("../../profiles/wave-height-2010.toml")),
-    ("rain-gpcp-2010", include_str!("../../profiles/rain-gpcp-2010.toml")),
-    ("china-sea-synthetic", include_str!("../../profiles/china-sea-synthetic.toml")),
-    ("globcurrent-east", include_str!("../../profiles/globcurrent-east.toml")),
-    ("globcurrent-north", include_str!("../../profiles/globcurrent-north.toml")),
-    ("takahashi09-salinity", include_str!("../../profiles/takahashi09-salinity.toml")),
+    (
+        "air-pressure-2010",
+        include_str!("../../profiles/air-pressure-2010.toml"),
+    ),
+    (
+        "wave-height-2010",
+        include_str!("../../profiles/wave-height-2010.toml"),
+    ),
+    (
+        "rain-gpcp-2010",
+        include_str!("../../profiles/rain-gpcp-2010.toml"),
+    ),
+    (
+        "china-sea-synthetic",
+        include_str!("../../profiles/china-sea-synthetic.toml"),
+    ),
+    (
+        "globcurrent-east",
+        include_str!("../../profiles/globcurrent-east.toml"),
+    ),
+    (
+        "globcurrent-north",
+        include_str!("../../profiles/globcurrent-north.toml"),
+    ),
+    (
+        "takahashi09-salinity",
+        include_str!("../../profiles/takahashi09-salinity.toml"),
+    ),
 ];
 
 static SHIPPED: LazyLock<Vec<Profile>> = LazyLock::new(|| {
-    let parse = |(name, text): &(&str, &str)| Profile::parse(name, text).expect("shipped profiles are parsed by a test");
+    let parse = |(name, text): &(&str, &str)| {
+        Profile::parse(name, text).expect("shipped profiles are parsed by a test")
+    };
     TEXTS.iter().map(parse).collect()
 });
 
@@ -51,6 +86,11 @@ mod tests {
         let error = Profile::parse("p", &text).unwrap_err().to_string();
         assert!(error.contains("registratoin"), "{error}");
         let text = TEXTS[0].1.replace("g C m-2 month-1", "g C m-2 fortnight-1");
-        assert!(Profile::parse("p", &text).unwrap_err().to_string().contains("fortnight"));
+        assert!(
+            Profile::parse("p", &text)
+                .unwrap_err()
+                .to_string()
+                .contains("fortnight")
+        );
     }
 }

@@ -13,9 +13,11 @@ const MAX_POWER: i8 = 9;
 const MAX_DEPTH: u32 = 4;
 
 /// Reads a spelling; the error says which word is not known.
-pub fn parse(text: &str) -> Result<Unit, String> {
+pub(crate) fn parse(text: &str) -> Result<Unit, String> {
     if text.len() > MAX_UNIT_BYTES {
-        return Err(format!("is longer than {MAX_UNIT_BYTES} bytes; give a unit in a profile"));
+        return Err(format!(
+            "is longer than {MAX_UNIT_BYTES} bytes; give a unit in a profile"
+        ));
     }
     let plain = plain_spelling(text);
     if let Some(unit) = look_up(plain.trim()) {
@@ -25,9 +27,16 @@ pub fn parse(text: &str) -> Result<Unit, String> {
         return Err("is empty; give a unit in a profile".to_owned());
     }
     let tokens = tokens(&plain)?;
-    let mut parser = Parser { tokens: &tokens, at: 0 };
+    let mut parser = Parser {
+        tokens: &tokens,
+        at: 0,
+    };
     let unit = parser.product(0)?;
-    if parser.at == tokens.len() { Ok(unit) } else { Err(unknown(&format!("{:?}", tokens[parser.at]))) }
+    if parser.at == tokens.len() {
+        Ok(unit)
+    } else {
+        Err(unknown(&format!("{:?}", tokens[parser.at])))
+    }
 }
 
 fn unknown(word: &str) -> String {
@@ -37,12 +46,26 @@ fn unknown(word: &str) -> String {
 /// One spelling for each of the things people write in several ways.
 fn plain_spelling(text: &str) -> String {
     let mut plain = text.trim_end_matches(['\0', '.']).replace("**", "^");
-    for (from, to) in [("µ", "u"), ("μ", "u"), ("⁻", "-"), ("⁰", "0"), ("¹", "1"), ("²", "2"), ("³", "3"), ("·", " "), ("−", "-")] {
+    for (from, to) in [
+        ("µ", "u"),
+        ("μ", "u"),
+        ("⁻", "-"),
+        ("⁰", "0"),
+        ("¹", "1"),
+        ("²", "2"),
+        ("³", "3"),
+        ("·", " "),
+        ("−", "-"),
+    ] {
         plain = plain.replace(from, to);
     }
     // An explanation behind the unit, as in "uatm (micro atmospheres)".
     match plain.find(" (") {
-        Some(at) if plain[at..].chars().any(char::is_alphabetic) && plain.ends_with(')') && !plain[..at].trim_end().ends_with('/') => {
+        Some(at)
+            if plain[at..].chars().any(char::is_alphabetic)
+                && plain.ends_with(')')
+                && !plain[..at].trim_end().ends_with('/') =>
+        {
             plain[..at].to_owned()
         }
         _ => plain,
@@ -73,12 +96,19 @@ fn tokens(text: &str) -> Result<Vec<Token>, String> {
             '(' => tokens.push(Token::Open),
             ')' => tokens.push(Token::Close),
             '^' | '-' | '+' | '0'..='9' => {
-                while at < chars.len() && (chars[at].is_ascii_digit() || at == start + 1 && matches!(chars[at], '-' | '+')) {
+                while at < chars.len()
+                    && (chars[at].is_ascii_digit()
+                        || at == start + 1 && matches!(chars[at], '-' | '+'))
+                {
                     at += 1;
                 }
                 let digits: String = chars[start..at].iter().filter(|c| **c != '^').collect();
-                let after_word = start > 0 && !matches!(chars[start - 1], ' ' | '*' | '.' | '/' | '(');
-                tokens.push(number_or_power(&digits, c == '^' || c == '-' || after_word)?);
+                let after_word =
+                    start > 0 && !matches!(chars[start - 1], ' ' | '*' | '.' | '/' | '(');
+                tokens.push(number_or_power(
+                    &digits,
+                    c == '^' || c == '-' || after_word,
+                )?);
             }
             _ if is_letter(c) => {
                 while at < chars.len() && is_letter(chars[at]) {
@@ -100,7 +130,11 @@ fn number_or_power(digits: &str, is_power: bool) -> Result<Token, String> {
     let bad = || unknown(&format!("{digits:?}"));
     if is_power {
         let power: i8 = digits.parse().map_err(|_no_number| bad())?;
-        return if power.abs() <= MAX_POWER { Ok(Token::Power(power)) } else { Err(bad()) };
+        return if power.abs() <= MAX_POWER {
+            Ok(Token::Power(power))
+        } else {
+            Err(bad())
+        };
     }
     Ok(Token::Number(digits.parse().map_err(|_no_number| bad())?))
 }
@@ -131,7 +165,12 @@ impl Parser<'_> {
         if depth > MAX_DEPTH {
             return Err("has brackets too deep".to_owned());
         }
-        let mut total = Unit { dimension: Dimension::default(), factor: 1.0, offset: 0.0, substance: None };
+        let mut total = Unit {
+            dimension: Dimension::default(),
+            factor: 1.0,
+            offset: 0.0,
+            substance: None,
+        };
         let mut divide = false;
         while let Some(token) = self.tokens.get(self.at) {
             self.at += 1;
@@ -142,7 +181,10 @@ impl Parser<'_> {
                     continue;
                 }
                 Token::Open => self.product(depth + 1)?,
-                Token::Number(number) => Unit { factor: *number, ..ONE },
+                Token::Number(number) => Unit {
+                    factor: *number,
+                    ..ONE
+                },
                 Token::Word(word) => match self.substance(word) {
                     Some(substance) => {
                         total.substance = Some(substance);
@@ -150,13 +192,19 @@ impl Parser<'_> {
                     }
                     None => look_up(word).ok_or_else(|| unknown(&format!("{word:?}")))?,
                 },
-                Token::Power(_) | Token::Close | Token::Divide => return Err("is not spelt as a unit; give one in a profile".to_owned()),
+                Token::Power(_) | Token::Close | Token::Divide => {
+                    return Err("is not spelt as a unit; give one in a profile".to_owned());
+                }
             };
             let power = self.power() * if divide { -1 } else { 1 };
             divide = false;
             total = times(total, part, power)?;
         }
-        if depth > 0 || divide { Err("ends too early; give a unit in a profile".to_owned()) } else { Ok(total) }
+        if depth > 0 || divide {
+            Err("ends too early; give a unit in a profile".to_owned())
+        } else {
+            Ok(total)
+        }
     }
 
     /// A word that says of what the mass or amount before it is.
@@ -183,7 +231,14 @@ impl Parser<'_> {
 }
 
 const ONE: Unit = Unit {
-    dimension: Dimension { mass: 0, length: 0, time: 0, month: 0, temperature: 0, amount: 0 },
+    dimension: Dimension {
+        mass: 0,
+        length: 0,
+        time: 0,
+        month: 0,
+        temperature: 0,
+        amount: 0,
+    },
     factor: 1.0,
     offset: 0.0,
     substance: None,
@@ -208,5 +263,10 @@ fn times(total: Unit, part: Unit, power: i8) -> Result<Unit, String> {
     if !factor.is_finite() || factor <= 0.0 {
         return Err("has a factor that is no positive number".to_owned());
     }
-    Ok(Unit { dimension, factor, offset: 0.0, substance: total.substance.or(part.substance) })
+    Ok(Unit {
+        dimension,
+        factor,
+        offset: 0.0,
+        substance: total.substance.or(part.substance),
+    })
 }

@@ -4,16 +4,35 @@ use contract::quantity::SECONDS_PER_YEAR;
 
 use super::{Dimension, Unit};
 
-const NONE: Dimension = Dimension { mass: 0, length: 0, time: 0, month: 0, temperature: 0, amount: 0 };
+const NONE: Dimension = Dimension {
+    mass: 0,
+    length: 0,
+    time: 0,
+    month: 0,
+    temperature: 0,
+    amount: 0,
+};
 const MASS: Dimension = Dimension { mass: 1, ..NONE };
 const LENGTH: Dimension = Dimension { length: 1, ..NONE };
 const VOLUME: Dimension = Dimension { length: 3, ..NONE };
-const SPEED: Dimension = Dimension { length: 1, time: -1, ..NONE };
+const SPEED: Dimension = Dimension {
+    length: 1,
+    time: -1,
+    ..NONE
+};
 const TIME: Dimension = Dimension { time: 1, ..NONE };
 const MONTH: Dimension = Dimension { month: 1, ..NONE };
-const TEMPERATURE: Dimension = Dimension { temperature: 1, ..NONE };
+const TEMPERATURE: Dimension = Dimension {
+    temperature: 1,
+    ..NONE
+};
 const AMOUNT: Dimension = Dimension { amount: 1, ..NONE };
-const PRESSURE: Dimension = Dimension { mass: 1, length: -1, time: -2, ..NONE };
+const PRESSURE: Dimension = Dimension {
+    mass: 1,
+    length: -1,
+    time: -2,
+    ..NONE
+};
 
 /// Zero of the Celsius scale, K.
 const CELSIUS_ZERO_K: f64 = 273.15;
@@ -36,25 +55,73 @@ type Entry = (&'static [&'static str], Dimension, f64, f64, Prefix);
 /// tropical year, 20 parts in a million shorter). "C" alone is carbon here, never coulomb.
 const ENTRIES: &[Entry] = &[
     (&["g"], MASS, 1e-3, 0.0, Prefix::Symbol),
-    (&["gram", "grams", "gm", "gramme", "grammes"], MASS, 1e-3, 0.0, Prefix::Name),
+    (
+        &["gram", "grams", "gm", "gramme", "grammes"],
+        MASS,
+        1e-3,
+        0.0,
+        Prefix::Name,
+    ),
     (&["t", "tonne", "tonnes"], MASS, 1e3, 0.0, Prefix::No),
     (&["m"], LENGTH, 1.0, 0.0, Prefix::Symbol),
-    (&["meter", "meters", "metre", "metres"], LENGTH, 1.0, 0.0, Prefix::Name),
+    (
+        &["meter", "meters", "metre", "metres"],
+        LENGTH,
+        1.0,
+        0.0,
+        Prefix::Name,
+    ),
     (&["l", "L"], VOLUME, 1e-3, 0.0, Prefix::Symbol),
-    (&["liter", "liters", "litre", "litres"], VOLUME, 1e-3, 0.0, Prefix::Name),
+    (
+        &["liter", "liters", "litre", "litres"],
+        VOLUME,
+        1e-3,
+        0.0,
+        Prefix::Name,
+    ),
     (&["s"], TIME, 1.0, 0.0, Prefix::Symbol),
     (&["sec", "second", "seconds"], TIME, 1.0, 0.0, Prefix::Name),
     (&["min", "minute", "minutes"], TIME, 60.0, 0.0, Prefix::No),
-    (&["h", "hr", "hrs", "hour", "hours"], TIME, 3600.0, 0.0, Prefix::No),
+    (
+        &["h", "hr", "hrs", "hour", "hours"],
+        TIME,
+        3600.0,
+        0.0,
+        Prefix::No,
+    ),
     (&["d", "day", "days"], TIME, 86_400.0, 0.0, Prefix::No),
     (&["mon", "month", "months"], MONTH, 1.0, 0.0, Prefix::No),
-    (&["a", "yr", "yrs", "year", "years"], TIME, SECONDS_PER_YEAR, 0.0, Prefix::No),
+    (
+        &["a", "yr", "yrs", "year", "years"],
+        TIME,
+        SECONDS_PER_YEAR,
+        0.0,
+        Prefix::No,
+    ),
     (&["K"], TEMPERATURE, 1.0, 0.0, Prefix::Symbol),
-    (&["kelvin", "kelvins", "degK", "degreeK", "degree_K", "deg_K"], TEMPERATURE, 1.0, 0.0, Prefix::No),
+    (
+        &["kelvin", "kelvins", "degK", "degreeK", "degree_K", "deg_K"],
+        TEMPERATURE,
+        1.0,
+        0.0,
+        Prefix::No,
+    ),
     (
         &[
-            "degC", "degreeC", "degree_C", "degrees_C", "degreesC", "deg_C", "celsius", "degree_celsius", "degrees_celsius",
-            "degree_centigrade", "°C", "^oC", "oC", "℃",
+            "degC",
+            "degreeC",
+            "degree_C",
+            "degrees_C",
+            "degreesC",
+            "deg_C",
+            "celsius",
+            "degree_celsius",
+            "degrees_celsius",
+            "degree_centigrade",
+            "°C",
+            "^oC",
+            "oC",
+            "℃",
         ],
         TEMPERATURE,
         1.0,
@@ -68,9 +135,34 @@ const ENTRIES: &[Entry] = &[
     (&["bar"], PRESSURE, 1e5, 0.0, Prefix::Symbol),
     (&["mb", "mbars"], PRESSURE, 100.0, 0.0, Prefix::No),
     (&["atm"], PRESSURE, 101_325.0, 0.0, Prefix::Symbol),
-    (&["atmosphere", "atmospheres"], PRESSURE, 101_325.0, 0.0, Prefix::Name),
-    (&["kn", "kt", "kts", "knot", "knots"], SPEED, KNOT_M_S, 0.0, Prefix::No),
-    (&["1", "unitless", "dimensionless", "fraction", "psu", "practical_salinity_unit"], NONE, 1.0, 0.0, Prefix::No),
+    (
+        &["atmosphere", "atmospheres"],
+        PRESSURE,
+        101_325.0,
+        0.0,
+        Prefix::Name,
+    ),
+    (
+        &["kn", "kt", "kts", "knot", "knots"],
+        SPEED,
+        KNOT_M_S,
+        0.0,
+        Prefix::No,
+    ),
+    (
+        &[
+            "1",
+            "unitless",
+            "dimensionless",
+            "fraction",
+            "psu",
+            "practical_salinity_unit",
+        ],
+        NONE,
+        1.0,
+        0.0,
+        Prefix::No,
+    ),
     (&["%", "percent"], NONE, 0.01, 0.0, Prefix::No),
     (&["ppm"], NONE, 1e-6, 0.0, Prefix::No),
 ];
@@ -116,7 +208,10 @@ pub(super) fn look_up(word: &str) -> Option<Unit> {
     let named = || {
         NAME_PREFIXES.iter().find_map(|(prefix, scale)| {
             let rest = lower.strip_prefix(prefix)?;
-            find(rest, |p| p == Prefix::Name || p == Prefix::Symbol && rest.len() > 1).map(|entry| (entry, *scale))
+            find(rest, |p| {
+                p == Prefix::Name || p == Prefix::Symbol && rest.len() > 1
+            })
+            .map(|entry| (entry, *scale))
         })
     };
     let ((_, dimension, factor, _, _), scale) = symbol.or_else(named)?;
@@ -125,9 +220,16 @@ pub(super) fn look_up(word: &str) -> Option<Unit> {
 
 fn find(word: &str, allowed: impl Fn(Prefix) -> bool) -> Option<&'static Entry> {
     let is = |known: &str| known == word || known.len() > 2 && known.eq_ignore_ascii_case(word);
-    ENTRIES.iter().find(|(words, _, _, _, prefix)| allowed(*prefix) && words.iter().any(|known| is(known)))
+    ENTRIES
+        .iter()
+        .find(|(words, _, _, _, prefix)| allowed(*prefix) && words.iter().any(|known| is(known)))
 }
 
 fn unit(dimension: Dimension, factor: f64, offset: f64) -> Unit {
-    Unit { dimension, factor, offset, substance: None }
+    Unit {
+        dimension,
+        factor,
+        offset,
+        substance: None,
+    }
 }

@@ -4,17 +4,32 @@ use super::*;
 
 /// Factor from the spelling to kg C m-2 s-1 for a step of one month.
 fn flux_factor(spelling: &str, year: i32, month: u32) -> f64 {
-    let conversion = parse(spelling).unwrap().to_quantity(Quantity::CarbonFlux, None).unwrap();
-    conversion.for_period(Period::month(year, month).unwrap()).unwrap().0
+    let conversion = parse(spelling)
+        .unwrap()
+        .to_quantity(Quantity::CarbonFlux, None)
+        .unwrap();
+    conversion
+        .for_period(Period::month(year, month).unwrap())
+        .unwrap()
+        .0
 }
 
 fn close(found: f64, expected: f64) {
-    assert!((found / expected - 1.0).abs() < 1e-12, "{found} is not {expected}");
+    assert!(
+        (found / expected - 1.0).abs() < 1e-12,
+        "{found} is not {expected}"
+    );
 }
 
 #[test]
 fn a_flux_per_month_knows_how_long_its_month_is() {
-    for spelling in ["g C m-2 month-1", "gC/m^2/month", "g C m^-2 mon^-1", "gC m⁻² month⁻¹", "g C/(m2 month)"] {
+    for spelling in [
+        "g C m-2 month-1",
+        "gC/m^2/month",
+        "g C m^-2 mon^-1",
+        "gC m⁻² month⁻¹",
+        "g C/(m2 month)",
+    ] {
         close(flux_factor(spelling, 2000, 2), 1e-3 / (29.0 * 86_400.0));
         close(flux_factor(spelling, 2001, 2), 1e-3 / (28.0 * 86_400.0));
         close(flux_factor(spelling, 2000, 1), 1e-3 / (31.0 * 86_400.0));
@@ -24,9 +39,18 @@ fn a_flux_per_month_knows_how_long_its_month_is() {
 #[test]
 fn moles_carry_the_mass_of_their_carbon() {
     close(flux_factor("mol m-2 s-1", 2000, 1), 0.012_011);
-    close(flux_factor("mmol m-2 d-1", 2000, 1), 0.012_011e-3 / 86_400.0);
-    close(flux_factor("mmol C/m2/day", 2000, 1), 0.012_011e-3 / 86_400.0);
-    close(flux_factor("mol CO2 m-2 yr-1", 2000, 1), 0.012_011 / (365.25 * 86_400.0));
+    close(
+        flux_factor("mmol m-2 d-1", 2000, 1),
+        0.012_011e-3 / 86_400.0,
+    );
+    close(
+        flux_factor("mmol C/m2/day", 2000, 1),
+        0.012_011e-3 / 86_400.0,
+    );
+    close(
+        flux_factor("mol CO2 m-2 yr-1", 2000, 1),
+        0.012_011 / (365.25 * 86_400.0),
+    );
     close(flux_factor("µmol m**-2 s**-1", 2000, 1), 0.012_011e-6);
 }
 
@@ -36,28 +60,64 @@ fn a_mass_must_say_of_what() {
     close(flux_factor("kg CO2 m-2 s-1", 2000, 1), 12.011 / 44.009);
     close(flux_factor("gCO2 m-2 s-1", 2000, 1), 1e-3 * 12.011 / 44.009);
     let unit = parse("kg m-2 s-1").unwrap();
-    assert!(unit.to_quantity(Quantity::CarbonFlux, None).unwrap_err().contains("carbon or of CO2"));
-    let told = unit.to_quantity(Quantity::CarbonFlux, Some(Substance::Carbon)).unwrap();
-    assert_eq!(told.for_period(Period::month(2000, 1).unwrap()).unwrap(), (1.0, 0.0));
+    assert!(
+        unit.to_quantity(Quantity::CarbonFlux, None)
+            .unwrap_err()
+            .contains("carbon or of CO2")
+    );
+    let told = unit
+        .to_quantity(Quantity::CarbonFlux, Some(Substance::Carbon))
+        .unwrap();
+    assert_eq!(
+        told.for_period(Period::month(2000, 1).unwrap()).unwrap(),
+        (1.0, 0.0)
+    );
 }
 
 #[test]
 fn other_quantities_convert_to_their_stored_unit() {
     let month = Period::month(2010, 1).unwrap();
     let convert = |spelling: &str, quantity, value: f64| {
-        let (factor, offset) = parse(spelling).unwrap().to_quantity(quantity, None).unwrap().for_period(month).unwrap();
+        let (factor, offset) = parse(spelling)
+            .unwrap()
+            .to_quantity(quantity, None)
+            .unwrap()
+            .for_period(month)
+            .unwrap();
         value * factor + offset
     };
-    for celsius in ["degC", "celsius", "degree_Celsius", "°C", "^oC", "degrees_C"] {
-        close(convert(celsius, Quantity::SeaSurfaceTemperature, 20.0), 293.15);
+    for celsius in [
+        "degC",
+        "celsius",
+        "degree_Celsius",
+        "°C",
+        "^oC",
+        "degrees_C",
+    ] {
+        close(
+            convert(celsius, Quantity::SeaSurfaceTemperature, 20.0),
+            293.15,
+        );
     }
     for kelvin in ["K", "kelvin", "Kelvin", "degK"] {
-        close(convert(kelvin, Quantity::SeaSurfaceTemperature, 293.15), 293.15);
+        close(
+            convert(kelvin, Quantity::SeaSurfaceTemperature, 293.15),
+            293.15,
+        );
     }
-    for micro in ["uatm", "µatm", "μatm", "microatm", "uatm (micro atmospheres)"] {
+    for micro in [
+        "uatm",
+        "µatm",
+        "μatm",
+        "microatm",
+        "uatm (micro atmospheres)",
+    ] {
         close(convert(micro, Quantity::Pco2, 1e6), 101_325.0);
     }
-    close(convert("mb (milli bar)", Quantity::AirPressure, 1013.25), 101_325.0);
+    close(
+        convert("mb (milli bar)", Quantity::AirPressure, 1013.25),
+        101_325.0,
+    );
     close(convert("hPa", Quantity::AirPressure, 1013.25), 101_325.0);
     close(convert("mbar", Quantity::AirPressure, 1013.25), 101_325.0);
     close(convert("mg m-3", Quantity::Chlorophyll, 1.0), 1e-6);
@@ -73,26 +133,66 @@ fn other_quantities_convert_to_their_stored_unit() {
 
 #[test]
 fn unknown_and_wrong_units_are_refused_by_name() {
-    for (spelling, word) in [("furlongs fortnight-1", "furlongs"), ("mol m-2 s-1 x", "\"x\""), ("", "empty"), ("m^99", "99")] {
+    for (spelling, word) in [
+        ("furlongs fortnight-1", "furlongs"),
+        ("mol m-2 s-1 x", "\"x\""),
+        ("", "empty"),
+        ("m^99", "99"),
+    ] {
         let error = parse(spelling).unwrap_err();
         assert!(error.contains(word), "{spelling}: {error}");
     }
-    for spelling in ["mol (m2", "m^", "/", "(((((((m)))))))", "m//s", "\u{1F600}", &"m ".repeat(200)] {
+    for spelling in [
+        "mol (m2",
+        "m^",
+        "/",
+        "(((((((m)))))))",
+        "m//s",
+        "\u{1F600}",
+        &"m ".repeat(200),
+    ] {
         assert!(parse(spelling).is_err(), "{spelling}");
     }
-    assert!(parse("K").unwrap().to_quantity(Quantity::CarbonFlux, None).is_err());
-    assert!(parse("m").unwrap().to_quantity(Quantity::SeaSurfaceTemperature, None).unwrap_err().contains("\"K\""));
+    assert!(
+        parse("K")
+            .unwrap()
+            .to_quantity(Quantity::CarbonFlux, None)
+            .is_err()
+    );
+    assert!(
+        parse("m")
+            .unwrap()
+            .to_quantity(Quantity::SeaSurfaceTemperature, None)
+            .unwrap_err()
+            .contains("\"K\"")
+    );
     assert!(parse("m9 m9 m9 m9 m9 m9 m9 m9 m9 m9 m9 m9 m9 m9 m9").is_err());
 }
 
 #[test]
 fn a_unit_per_month_is_refused_for_steps_across_months() {
-    let conversion = parse("g C m-2 month-1").unwrap().to_quantity(Quantity::CarbonFlux, None).unwrap();
+    let conversion = parse("g C m-2 month-1")
+        .unwrap()
+        .to_quantity(Quantity::CarbonFlux, None)
+        .unwrap();
     let period = |a: &str, b: &str| Period::new(a.parse().unwrap(), b.parse().unwrap()).unwrap();
-    assert!(conversion.for_period(period("2000-01-28", "2000-02-05")).is_err());
-    let quarter = conversion.for_period(period("2000-01-01", "2000-04-01")).unwrap().0;
+    assert!(
+        conversion
+            .for_period(period("2000-01-28", "2000-02-05"))
+            .is_err()
+    );
+    let quarter = conversion
+        .for_period(period("2000-01-01", "2000-04-01"))
+        .unwrap()
+        .0;
     close(quarter, 1e-3 / (91.0 * 86_400.0 / 3.0));
-    close(conversion.for_period(period("2000-02-03", "2000-02-04")).unwrap().0, 1e-3 / (29.0 * 86_400.0));
+    close(
+        conversion
+            .for_period(period("2000-02-03", "2000-02-04"))
+            .unwrap()
+            .0,
+        1e-3 / (29.0 * 86_400.0),
+    );
 }
 
 #[test]
@@ -100,6 +200,12 @@ fn every_stored_unit_parses_to_itself() {
     for quantity in Quantity::ALL {
         let unit = parse(quantity.unit()).unwrap();
         let conversion = unit.to_quantity(quantity, Some(Substance::Carbon)).unwrap();
-        assert_eq!(conversion.for_period(Period::month(2000, 1).unwrap()).unwrap(), (1.0, 0.0), "{quantity:?}");
+        assert_eq!(
+            conversion
+                .for_period(Period::month(2000, 1).unwrap())
+                .unwrap(),
+            (1.0, 0.0),
+            "{quantity:?}"
+        );
     }
 }

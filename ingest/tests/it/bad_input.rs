@@ -43,22 +43,50 @@ async fn a_truncated_hdf5_file_is_refused() {
 async fn text_named_nc_is_refused() {
     let place = Place::new();
     std::fs::write(place.path("table.nc"), "lat,lon,flux\n1,2,3\n").unwrap();
-    assert_refused(&place, "table.nc", RejectReason::Unreadable, &["is text", "NetCDF"]).await;
+    assert_refused(
+        &place,
+        "table.nc",
+        RejectReason::Unreadable,
+        &["is text", "NetCDF"],
+    )
+    .await;
     std::fs::write(place.path("empty.nc"), "").unwrap();
     assert_refused(&place, "empty.nc", RejectReason::Unreadable, &["empty"]).await;
-    assert_refused(&place, "absent.nc", RejectReason::Unreadable, &["No such file"]).await;
+    assert_refused(
+        &place,
+        "absent.nc",
+        RejectReason::Unreadable,
+        &["No such file"],
+    )
+    .await;
     std::fs::create_dir(place.path("folder.nc")).unwrap();
-    assert_refused(&place, "folder.nc", RejectReason::Unreadable, &["no regular file"]).await;
+    assert_refused(
+        &place,
+        "folder.nc",
+        RejectReason::Unreadable,
+        &["no regular file"],
+    )
+    .await;
 }
 
 #[tokio::test]
 async fn a_dataset_of_ten_to_the_fifteen_cells_is_refused_by_name() {
     let place = Place::new();
     let file = hdf5::File::create(place.path("huge.h5")).unwrap();
-    file.new_dataset::<f32>().chunk([1, 100, 100]).shape([100_000, 100_000, 100_000]).create("flux_of_everything").unwrap();
+    file.new_dataset::<f32>()
+        .chunk([1, 100, 100])
+        .shape([100_000, 100_000, 100_000])
+        .create("flux_of_everything")
+        .unwrap();
     file.close().unwrap();
     let start = std::time::Instant::now();
-    assert_refused(&place, "huge.h5", RejectReason::TooLarge, &["flux_of_everything", "1000000000000000"]).await;
+    assert_refused(
+        &place,
+        "huge.h5",
+        RejectReason::TooLarge,
+        &["flux_of_everything", "1000000000000000"],
+    )
+    .await;
     assert!(start.elapsed().as_secs() < 5);
 }
 
@@ -68,8 +96,13 @@ async fn a_map_or_a_chunk_too_large_for_memory_is_refused() {
     let mut limits = crate::fixture::settings();
     limits.limits.plane_cells = 16;
     SmallFile::new().write_classic(&place.path("a.nc"));
-    let batch = ingest::Batch { files: vec![place.path("a.nc")], ..Default::default() };
-    let outcomes = ingest::land_files(&place.store, &place.log, &limits, batch, &ingest::Quiet).await.unwrap();
+    let batch = ingest::Batch {
+        files: vec![place.path("a.nc")],
+        ..Default::default()
+    };
+    let outcomes = ingest::land_files(&place.store, &place.log, &limits, batch, &ingest::Quiet)
+        .await
+        .unwrap();
     let (reason, line) = refusal(&outcomes);
     assert_eq!(reason, RejectReason::TooLarge, "{line}");
     assert!(line.contains("4 x 8 cells"), "{line}");
@@ -81,8 +114,13 @@ async fn a_reader_without_memory_is_a_refusal_and_no_crash() {
     let mut limits = crate::fixture::settings();
     limits.limits.memory_bytes = 1 << 20; // less than the program itself
     SmallFile::new().write_hdf5(&place.path("a.h5"));
-    let batch = ingest::Batch { files: vec![place.path("a.h5")], ..Default::default() };
-    let outcomes = ingest::land_files(&place.store, &place.log, &limits, batch, &ingest::Quiet).await.unwrap();
+    let batch = ingest::Batch {
+        files: vec![place.path("a.h5")],
+        ..Default::default()
+    };
+    let outcomes = ingest::land_files(&place.store, &place.log, &limits, batch, &ingest::Quiet)
+        .await
+        .unwrap();
     assert!(outcomes[0].is_rejected(), "{}", outcomes[0]);
     eprintln!("{}", outcomes[0]);
 }
@@ -90,11 +128,26 @@ async fn a_reader_without_memory_is_a_refusal_and_no_crash() {
 #[tokio::test]
 async fn unknown_missing_and_wrong_units_are_refused() {
     let place = Place::new();
-    let with_unit = |unit: &'static str| SmallFile { unit, ..SmallFile::new() };
+    let with_unit = |unit: &'static str| SmallFile {
+        unit,
+        ..SmallFile::new()
+    };
     with_unit("furlongs fortnight-1").write_classic(&place.path("odd.nc"));
-    assert_refused(&place, "odd.nc", RejectReason::Unit, &["fgco2", "furlongs", "profile"]).await;
+    assert_refused(
+        &place,
+        "odd.nc",
+        RejectReason::Unit,
+        &["fgco2", "furlongs", "profile"],
+    )
+    .await;
     with_unit("K").write_classic(&place.path("kelvin.nc"));
-    assert_refused(&place, "kelvin.nc", RejectReason::Unit, &["fgco2", "\"K\"", "carbon flux"]).await;
+    assert_refused(
+        &place,
+        "kelvin.nc",
+        RejectReason::Unit,
+        &["fgco2", "\"K\"", "carbon flux"],
+    )
+    .await;
     with_unit("").write_classic(&place.path("none.nc"));
     assert_refused(&place, "none.nc", RejectReason::Unit, &["fgco2"]).await;
 }
@@ -105,11 +158,23 @@ async fn a_file_without_time_is_refused() {
     let mut file = SmallFile::new().first_month();
     file.time_unit = None;
     file.write_classic(&place.path("timeless.nc"));
-    assert_refused(&place, "timeless.nc", RejectReason::Time, &["no time axis", "profile"]).await;
+    assert_refused(
+        &place,
+        "timeless.nc",
+        RejectReason::Time,
+        &["no time axis", "profile"],
+    )
+    .await;
     let mut file = SmallFile::new().first_month();
     (file.time, file.time_unit) = (vec![1e9], Some("days since 1970-01-01"));
     file.write_hdf5(&place.path("placeholder.h5"));
-    assert_refused(&place, "placeholder.h5", RejectReason::Time, &["time", "1000000000"]).await;
+    assert_refused(
+        &place,
+        "placeholder.h5",
+        RejectReason::Time,
+        &["time", "1000000000"],
+    )
+    .await;
     let mut file = SmallFile::new();
     file.time = vec![3.0, 3.0];
     file.write_classic(&place.path("twice.nc"));
@@ -120,15 +185,27 @@ async fn a_file_without_time_is_refused() {
 async fn a_swath_is_refused_as_one() {
     let place = Place::new();
     let file = hdf5::File::create(place.path("swath.h5")).unwrap();
-    for (name, unit, standard_name) in
-        [("lat", "degrees_north", ""), ("lon", "degrees_east", ""), ("sst", "K", "sea_surface_temperature")]
-    {
-        let dataset = file.new_dataset::<f32>().shape([5, 6]).create(name).unwrap();
+    for (name, unit, standard_name) in [
+        ("lat", "degrees_north", ""),
+        ("lon", "degrees_east", ""),
+        ("sst", "K", "sea_surface_temperature"),
+    ] {
+        let dataset = file
+            .new_dataset::<f32>()
+            .shape([5, 6])
+            .create(name)
+            .unwrap();
         text(&dataset, "units", unit);
         text(&dataset, "standard_name", standard_name);
     }
     file.close().unwrap();
-    assert_refused(&place, "swath.h5", RejectReason::Grid, &["sst", "swath", "grid it"]).await;
+    assert_refused(
+        &place,
+        "swath.h5",
+        RejectReason::Grid,
+        &["sst", "swath", "grid it"],
+    )
+    .await;
 }
 
 #[tokio::test]
@@ -145,7 +222,13 @@ async fn odd_axes_are_refused() {
     let mut file = SmallFile::new();
     file.lat = vec![90.0, 45.0, 0.0, -45.0];
     file.write_classic(&place.path("corners.nc"));
-    assert_refused(&place, "corners.nc", RejectReason::Grid, &["past a pole", "registration"]).await;
+    assert_refused(
+        &place,
+        "corners.nc",
+        RejectReason::Grid,
+        &["past a pole", "registration"],
+    )
+    .await;
 }
 
 #[tokio::test]
@@ -154,7 +237,13 @@ async fn implausible_and_absent_values_are_refused() {
     let mut file = SmallFile::new();
     file.unit = "kg C m-2 s-1";
     file.write_classic(&place.path("scale.nc"));
-    assert_refused(&place, "scale.nc", RejectReason::Values, &["fgco2", "outside"]).await;
+    assert_refused(
+        &place,
+        "scale.nc",
+        RejectReason::Values,
+        &["fgco2", "outside"],
+    )
+    .await;
     let mut file = SmallFile::new();
     file.values.fill(FILL);
     file.write_hdf5(&place.path("blank.h5"));
@@ -183,11 +272,31 @@ async fn files_without_a_variable_to_land_say_what_they_hold() {
     let mut file = SmallFile::new();
     file.standard_name = "height_of_the_tide";
     file.write_classic(&place.path("tide.nc"));
-    assert_refused(&place, "tide.nc", RejectReason::NoVariable, &["fgco2", "profile"]).await;
-    std::fs::write(place.path("bare.nc"), b"CDF\x01\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0").unwrap();
-    assert_refused(&place, "bare.nc", RejectReason::NoVariable, &["no variable"]).await;
+    assert_refused(
+        &place,
+        "tide.nc",
+        RejectReason::NoVariable,
+        &["fgco2", "profile"],
+    )
+    .await;
+    std::fs::write(
+        place.path("bare.nc"),
+        b"CDF\x01\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0",
+    )
+    .unwrap();
+    assert_refused(
+        &place,
+        "bare.nc",
+        RejectReason::NoVariable,
+        &["no variable"],
+    )
+    .await;
     let profile = Profile::find("takahashi09-flux").unwrap();
-    let (reason, line) = refusal(&place.land_with(&[place.path("tide.nc")], Some(&profile)).await);
+    let (reason, line) = refusal(
+        &place
+            .land_with(&[place.path("tide.nc")], Some(&profile))
+            .await,
+    );
     assert_eq!(reason, RejectReason::NoVariable);
     assert!(line.contains("CO2flux") && line.contains("fgco2"), "{line}");
 }
@@ -197,13 +306,21 @@ async fn the_batch_goes_on_and_every_file_has_its_event() {
     let place = Place::new();
     SmallFile::new().write_classic(&place.path("good.nc"));
     std::fs::write(place.path("bad.nc"), "text").unwrap();
-    let outcomes = place.land(&[place.path("bad.nc"), place.path("good.nc"), place.path("bad.nc")]).await;
+    let outcomes = place
+        .land(&[
+            place.path("bad.nc"),
+            place.path("good.nc"),
+            place.path("bad.nc"),
+        ])
+        .await;
     let rejected: Vec<bool> = outcomes.iter().map(Outcome::is_rejected).collect();
     assert_eq!(rejected, [true, false, true]);
     let landed = place.log.read("granule.landed", 0, 10).await.unwrap();
     let refused = place.log.read("granule.rejected", 0, 10).await.unwrap();
     assert_eq!((landed.len(), refused.len()), (1, 2));
-    let Body::GranuleRejected { detail, reason, .. } = &refused[0].1.body else { panic!("{refused:?}") };
+    let Body::GranuleRejected { detail, reason, .. } = &refused[0].1.body else {
+        panic!("{refused:?}")
+    };
     assert_eq!(*reason, RejectReason::Unreadable);
     assert!(detail.contains("is text"), "{detail}");
 }

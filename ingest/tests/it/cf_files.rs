@@ -15,8 +15,16 @@ fn january_s() -> f32 {
 /// What the small file must be in the store, kg m-2 s-1: month 1 has 31 days, month 2 has 28.
 fn expected(month: usize) -> Vec<f32> {
     let month_s = [31.0, 28.0][month - 1] * 86_400.0f64;
-    let value = |row: usize, col: usize| if row + col == 0 { f32::NAN } else { ((100 * month + 10 * row + col) as f64 * 1e-3 / month_s) as f32 };
-    (0..4).flat_map(|r| (0..8).map(move |c| value(r, c))).collect()
+    let value = |row: usize, col: usize| {
+        if row + col == 0 {
+            f32::NAN
+        } else {
+            ((100 * month + 10 * row + col) as f64 * 1e-3 / month_s) as f32
+        }
+    };
+    (0..4)
+        .flat_map(|r| (0..8).map(move |c| value(r, c)))
+        .collect()
 }
 
 /// Equal bits, up to one unit in the last place: the file is float32, the factor float64.
@@ -32,7 +40,11 @@ fn assert_same(found: &[f32], expected: &[f32]) {
 #[test]
 fn the_comparison_sees_a_planted_fault() {
     let right = expected(1);
-    for change in [|v: &mut Vec<f32>| v[5] *= 1.001, |v: &mut Vec<f32>| v[5] = f32::NAN, |v: &mut Vec<f32>| v[0] = 0.0] {
+    for change in [
+        |v: &mut Vec<f32>| v[5] *= 1.001,
+        |v: &mut Vec<f32>| v[5] = f32::NAN,
+        |v: &mut Vec<f32>| v[0] = 0.0,
+    ] {
         let mut wrong = right.clone();
         change(&mut wrong);
         assert!(std::panic::catch_unwind(|| assert_same(&wrong, &right)).is_err());
@@ -41,15 +53,33 @@ fn the_comparison_sees_a_planted_fault() {
 
 async fn assert_lands(place: &Place, file: std::path::PathBuf) {
     let outcomes = place.land(&[file]).await;
-    let Outcome::Landed { periods, revised: false, .. } = &outcomes[0] else { panic!("{}", outcomes[0]) };
-    assert_eq!(periods, &[Period::month(2001, 1).unwrap(), Period::month(2001, 2).unwrap()]);
+    let Outcome::Landed {
+        periods,
+        revised: false,
+        ..
+    } = &outcomes[0]
+    else {
+        panic!("{}", outcomes[0])
+    };
+    assert_eq!(
+        periods,
+        &[
+            Period::month(2001, 1).unwrap(),
+            Period::month(2001, 2).unwrap()
+        ]
+    );
     let manifest = place.newest("fgco2").await;
-    assert_eq!((manifest.quantity, manifest.grid, manifest.synthetic), (Quantity::CarbonFlux, GRID, false));
+    assert_eq!(
+        (manifest.quantity, manifest.grid, manifest.synthetic),
+        (Quantity::CarbonFlux, GRID, false)
+    );
     for month in [1, 2] {
         assert_same(&place.values(&manifest, month - 1).await, &expected(month));
         assert_eq!(manifest.steps[month - 1].valid_cells, 31);
     }
-    let domain = storage::domain::read(&place.store, &manifest.domain).await.unwrap();
+    let domain = storage::domain::read(&place.store, &manifest.domain)
+        .await
+        .unwrap();
     assert!(!domain[0] && domain[1..].iter().all(|cell| *cell));
 }
 
@@ -75,13 +105,20 @@ async fn direction_and_longitude_range_of_the_file_do_not_matter() {
         let place = Place::new();
         let mut file = SmallFile::new();
         let plane = |values: &[f32]| -> Vec<f32> {
-            (0..4).flat_map(|r| (0..8).map(move |c| (3 - r, (c + 4) % 8))).map(|(r, c)| values[r * 8 + c]).collect()
+            (0..4)
+                .flat_map(|r| (0..8).map(move |c| (3 - r, (c + 4) % 8)))
+                .map(|(r, c)| values[r * 8 + c])
+                .collect()
         };
         file.lat.reverse();
         file.lon = (0..8).map(|i| 22.5 + 45.0 * f64::from(i)).collect();
         file.values = [plane(&file.values[..32]), plane(&file.values[32..])].concat();
         let path = place.path("turned");
-        if hdf5 { file.write_hdf5(&path) } else { file.write_classic(&path) }
+        if hdf5 {
+            file.write_hdf5(&path);
+        } else {
+            file.write_classic(&path);
+        }
         assert_lands(&place, path).await;
     }
 }
@@ -91,7 +128,10 @@ async fn the_sign_of_a_downward_flux_is_turned() {
     let place = Place::new();
     let mut file = SmallFile::new();
     file.standard_name = "surface_downward_mass_flux_of_carbon_dioxide_expressed_as_carbon";
-    file.values.iter_mut().filter(|v| **v != FILL).for_each(|v| *v = -*v);
+    file.values
+        .iter_mut()
+        .filter(|v| **v != FILL)
+        .for_each(|v| *v = -*v);
     file.write_classic(&place.path("down.nc"));
     assert_lands(&place, place.path("down.nc")).await;
 }
@@ -103,7 +143,12 @@ async fn the_same_file_again_adds_nothing() {
     place.land(&[place.path("a.nc")]).await;
     let before = place.newest("fgco2").await;
     let outcomes = place.land(&[place.path("a.nc"), place.path("a.nc")]).await;
-    assert!(outcomes.iter().all(|o| matches!(o, Outcome::AlreadyLanded { manifest, .. } if *manifest == before.id())), "{outcomes:?}");
+    assert!(
+        outcomes.iter().all(
+            |o| matches!(o, Outcome::AlreadyLanded { manifest, .. } if *manifest == before.id())
+        ),
+        "{outcomes:?}"
+    );
     assert_eq!(place.newest("fgco2").await, before);
 }
 
@@ -112,7 +157,11 @@ async fn the_same_file_twice_in_one_batch_lands_once() {
     let place = Place::new();
     SmallFile::new().write_classic(&place.path("a.nc"));
     let outcomes = place.land(&[place.path("a.nc"), place.path("a.nc")]).await;
-    assert!(matches!(outcomes[0], Outcome::Landed { .. }) && matches!(outcomes[1], Outcome::AlreadyLanded { .. }), "{outcomes:?}");
+    assert!(
+        matches!(outcomes[0], Outcome::Landed { .. })
+            && matches!(outcomes[1], Outcome::AlreadyLanded { .. }),
+        "{outcomes:?}"
+    );
     let manifest = place.newest("fgco2").await;
     assert_eq!((manifest.number, manifest.steps.len()), (1, 2));
 }
@@ -128,11 +177,23 @@ async fn a_revised_file_makes_a_new_manifest_and_the_old_one_stays() {
     file.values[9] = FILL;
     file.write_classic(&place.path("new.nc"));
     let outcomes = place.land(&[place.path("new.nc")]).await;
-    assert!(matches!(outcomes[0], Outcome::Landed { revised: true, .. }), "{}", outcomes[0]);
+    assert!(
+        matches!(outcomes[0], Outcome::Landed { revised: true, .. }),
+        "{}",
+        outcomes[0]
+    );
     let new = place.newest("fgco2").await;
     assert_eq!((new.number, new.steps.len()), (2, 2));
-    assert_eq!((new.steps[0].origin.as_str(), new.steps[1].origin.as_str()), ("new.nc", "old.nc"));
-    assert_eq!(storage::manifests::load(&place.store, &old.id()).await.unwrap(), old);
+    assert_eq!(
+        (new.steps[0].origin.as_str(), new.steps[1].origin.as_str()),
+        ("new.nc", "old.nc")
+    );
+    assert_eq!(
+        storage::manifests::load(&place.store, &old.id())
+            .await
+            .unwrap(),
+        old
+    );
     assert_same(&place.values(&old, 0).await, &expected(1));
     let revised = place.values(&new, 0).await;
     assert!((revised[1] - 7.0 * G_PER_KG / january_s()).abs() < 1e-12 && revised[9].is_nan());
@@ -148,20 +209,44 @@ async fn months_of_several_years_are_cut_into_segments_and_old_ones_are_kept() {
     let month = |unit: &'static str, value: f32| {
         let mut file = SmallFile::new().first_month();
         file.time_unit = Some(unit);
-        file.values.iter_mut().filter(|v| **v != FILL).for_each(|v| *v += value);
+        file.values
+            .iter_mut()
+            .filter(|v| **v != FILL)
+            .for_each(|v| *v += value);
         file
     };
-    let units = ["days since 2000-11-03", "days since 2000-12-31", "days since 2001-01-10", "days since 2001-03-05"];
+    let units = [
+        "days since 2000-11-03",
+        "days since 2000-12-31",
+        "days since 2001-01-10",
+        "days since 2001-03-05",
+    ];
     for (i, unit) in units.iter().enumerate() {
         month(unit, i as f32).write_classic(&place.path(&format!("{i}.nc")));
     }
     let paths: Vec<_> = (0..4).map(|i| place.path(&format!("{i}.nc"))).collect();
-    place.land(&[paths[2].clone(), paths[0].clone(), paths[1].clone()]).await;
+    place
+        .land(&[paths[2].clone(), paths[0].clone(), paths[1].clone()])
+        .await;
     let first = place.newest("fgco2").await;
-    assert_eq!(first.series.iter().map(|s| (s.first_step, s.steps)).collect::<Vec<_>>(), [(0, 2), (2, 1)]);
+    assert_eq!(
+        first
+            .series
+            .iter()
+            .map(|s| (s.first_step, s.steps))
+            .collect::<Vec<_>>(),
+        [(0, 2), (2, 1)]
+    );
     place.land(&[paths[3].clone()]).await;
     let second = place.newest("fgco2").await;
-    assert_eq!(second.series.iter().map(|s| (s.first_step, s.steps)).collect::<Vec<_>>(), [(0, 2), (2, 2)]);
+    assert_eq!(
+        second
+            .series
+            .iter()
+            .map(|s| (s.first_step, s.steps))
+            .collect::<Vec<_>>(),
+        [(0, 2), (2, 2)]
+    );
     assert_eq!(second.series[0].series, first.series[0].series);
     assert_ne!(second.series[1].series, first.series[1].series);
     assert_eq!(second.steps[3].period, Period::month(2001, 3).unwrap());

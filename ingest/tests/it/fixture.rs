@@ -12,72 +12,109 @@ use storage::log::EmbeddedLog;
 use tempfile::TempDir;
 
 /// A store, a log and a folder for files, gone when dropped.
-pub struct Place {
-    pub folder: TempDir,
-    pub store: Store,
-    pub log: EmbeddedLog,
+pub(crate) struct Place {
+    pub(crate) folder: TempDir,
+    pub(crate) store: Store,
+    pub(crate) log: EmbeddedLog,
 }
 
 impl Place {
-    pub fn new() -> Self {
-        Self { folder: tempfile::tempdir().unwrap(), store: Store::memory(), log: EmbeddedLog::memory() }
+    pub(crate) fn new() -> Self {
+        Self {
+            folder: tempfile::tempdir().unwrap(),
+            store: Store::memory(),
+            log: EmbeddedLog::memory(),
+        }
     }
 
-    pub fn path(&self, name: &str) -> PathBuf {
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
 
-    pub async fn land(&self, files: &[PathBuf]) -> Vec<Outcome> {
+    pub(crate) async fn land(&self, files: &[PathBuf]) -> Vec<Outcome> {
         self.land_with(files, None).await
     }
 
-    pub async fn land_with(&self, files: &[PathBuf], profile: Option<&Profile>) -> Vec<Outcome> {
-        let batch = Batch { files: files.to_vec(), profile, product: None };
-        ingest::land_files(&self.store, &self.log, &settings(), batch, &Quiet).await.unwrap()
+    pub(crate) async fn land_with(
+        &self,
+        files: &[PathBuf],
+        profile: Option<&Profile>,
+    ) -> Vec<Outcome> {
+        let batch = Batch {
+            files: files.to_vec(),
+            profile,
+            product: None,
+        };
+        ingest::land_files(&self.store, &self.log, &settings(), batch, &Quiet)
+            .await
+            .unwrap()
     }
 
-    pub async fn newest(&self, product: &str) -> Manifest {
+    pub(crate) async fn newest(&self, product: &str) -> Manifest {
         let product: ProductId = product.parse().unwrap();
-        storage::manifests::latest(&self.store, &product).await.unwrap().unwrap()
+        storage::manifests::latest(&self.store, &product)
+            .await
+            .unwrap()
+            .unwrap()
     }
 
     /// Values of a step, `[row, col]`.
-    pub async fn values(&self, manifest: &Manifest, step: usize) -> Vec<f32> {
-        storage::frames::read(&self.store, &manifest.steps[step].frame, &manifest.grid).await.unwrap()
+    pub(crate) async fn values(&self, manifest: &Manifest, step: usize) -> Vec<f32> {
+        storage::frames::read(&self.store, &manifest.steps[step].frame, &manifest.grid)
+            .await
+            .unwrap()
     }
 }
 
 /// The reader process of this crate's own binary, with limits for small files.
-pub fn settings() -> Settings {
+pub(crate) fn settings() -> Settings {
     let program = PathBuf::from(env!("CARGO_BIN_EXE_decode-file"));
-    let mut settings = Settings::with_decoder(DecoderCommand { program, arguments: vec![] });
+    let mut settings = Settings::with_decoder(DecoderCommand {
+        program,
+        arguments: vec![],
+    });
     settings.limits.memory_bytes = 1 << 30;
     settings.limits.cpu_s = 20;
-    settings.limits.wall = std::time::Duration::from_secs(60);
+    settings.limits.wall = std::time::Duration::from_mins(1);
     settings
 }
 
 /// A small CF file: 2 steps of a 4 x 8 grid of 45 degrees, carbon flux.
-pub struct SmallFile {
-    pub lat: Vec<f64>,
-    pub lon: Vec<f64>,
-    pub time: Vec<f64>,
-    pub time_unit: Option<&'static str>,
-    pub name: &'static str,
-    pub standard_name: &'static str,
-    pub unit: &'static str,
+pub(crate) struct SmallFile {
+    pub(crate) lat: Vec<f64>,
+    pub(crate) lon: Vec<f64>,
+    pub(crate) time: Vec<f64>,
+    pub(crate) time_unit: Option<&'static str>,
+    pub(crate) name: &'static str,
+    pub(crate) standard_name: &'static str,
+    pub(crate) unit: &'static str,
     /// `[time, lat, lon]`.
-    pub values: Vec<f32>,
+    pub(crate) values: Vec<f32>,
 }
 
-pub const FILL: f32 = -999.0;
-pub const GRID: Grid = Grid { rows: 4, cols: 8, north_deg: 90.0, west_deg: -180.0, dlat_deg: 45.0, dlon_deg: 45.0 };
+pub(crate) const FILL: f32 = -999.0;
+pub(crate) const GRID: Grid = Grid {
+    rows: 4,
+    cols: 8,
+    north_deg: 90.0,
+    west_deg: -180.0,
+    dlat_deg: 45.0,
+    dlon_deg: 45.0,
+};
 
 impl SmallFile {
     /// January and February 2001; the value is 100 * month + 10 * row + column, and the first cell has no data.
-    pub fn new() -> Self {
-        let value = |month: usize, row: usize, col: usize| if row + col == 0 { FILL } else { (100 * month + 10 * row + col) as f32 };
-        let values = (1..=2).flat_map(|m| (0..4).flat_map(move |r| (0..8).map(move |c| value(m, r, c)))).collect();
+    pub(crate) fn new() -> Self {
+        let value = |month: usize, row: usize, col: usize| {
+            if row + col == 0 {
+                FILL
+            } else {
+                (100 * month + 10 * row + col) as f32
+            }
+        };
+        let values = (1..=2)
+            .flat_map(|m| (0..4).flat_map(move |r| (0..8).map(move |c| value(m, r, c))))
+            .collect();
         Self {
             lat: vec![67.5, 22.5, -22.5, -67.5],
             lon: (0..8).map(|i| -157.5 + 45.0 * f64::from(i)).collect(),
@@ -91,7 +128,7 @@ impl SmallFile {
     }
 
     /// Only its first month.
-    pub fn first_month(mut self) -> Self {
+    pub(crate) fn first_month(mut self) -> Self {
         self.values.truncate(self.lat.len() * self.lon.len());
         self.time = vec![0.0];
         self.time_unit = Some("days since 2001-01-01");
@@ -99,28 +136,38 @@ impl SmallFile {
     }
 
     /// NetCDF classic, by the crate netcdf3.
-    pub fn write_classic(&self, path: &Path) {
+    pub(crate) fn write_classic(&self, path: &Path) {
         let mut set = netcdf3::DataSet::new();
         let stamped = self.time_unit.is_some();
-        set.add_global_attr_string("time_coverage_resolution", if stamped { "P1M" } else { "" }).unwrap();
+        set.add_global_attr_string("time_coverage_resolution", if stamped { "P1M" } else { "" })
+            .unwrap();
         if stamped {
             set.set_unlimited_dim("time", self.time.len()).unwrap();
         }
         set.add_fixed_dim("lat", self.lat.len()).unwrap();
         set.add_fixed_dim("lon", self.lon.len()).unwrap();
         set.add_var_f64("lat", &["lat"]).unwrap();
-        set.add_var_attr_string("lat", "units", "degrees_north").unwrap();
+        set.add_var_attr_string("lat", "units", "degrees_north")
+            .unwrap();
         set.add_var_f64("lon", &["lon"]).unwrap();
-        set.add_var_attr_string("lon", "units", "degrees_east").unwrap();
+        set.add_var_attr_string("lon", "units", "degrees_east")
+            .unwrap();
         if let Some(unit) = self.time_unit {
             set.add_var_f64("time", &["time"]).unwrap();
             set.add_var_attr_string("time", "units", unit).unwrap();
         }
-        let dimensions: &[&str] = if stamped { &["time", "lat", "lon"] } else { &["lat", "lon"] };
+        let dimensions: &[&str] = if stamped {
+            &["time", "lat", "lon"]
+        } else {
+            &["lat", "lon"]
+        };
         set.add_var_f32(self.name, dimensions).unwrap();
-        set.add_var_attr_string(self.name, "units", self.unit).unwrap();
-        set.add_var_attr_string(self.name, "standard_name", self.standard_name).unwrap();
-        set.add_var_attr_f32(self.name, "_FillValue", vec![FILL]).unwrap();
+        set.add_var_attr_string(self.name, "units", self.unit)
+            .unwrap();
+        set.add_var_attr_string(self.name, "standard_name", self.standard_name)
+            .unwrap();
+        set.add_var_attr_f32(self.name, "_FillValue", vec![FILL])
+            .unwrap();
         let mut writer = netcdf3::FileWriter::open(path).unwrap();
         writer.set_def(&set, netcdf3::Version::Classic, 0).unwrap();
         writer.write_var_f64("lat", &self.lat).unwrap();
@@ -133,10 +180,14 @@ impl SmallFile {
     }
 
     /// Plain HDF5 without dimension scales, by libhdf5.
-    pub fn write_hdf5(&self, path: &Path) {
+    pub(crate) fn write_hdf5(&self, path: &Path) {
         let file = hdf5::File::create(path).unwrap();
         let axis = |name: &str, values: &[f64], unit: &str| {
-            let dataset = file.new_dataset::<f64>().shape([values.len()]).create(name).unwrap();
+            let dataset = file
+                .new_dataset::<f64>()
+                .shape([values.len()])
+                .create(name)
+                .unwrap();
             dataset.write_raw(values).unwrap();
             text(&dataset, "units", unit);
         };
@@ -147,28 +198,58 @@ impl SmallFile {
             text(&file, "time_coverage_resolution", "P1M");
         }
         let (rows, cols) = (self.lat.len(), self.lon.len());
-        let shape: Vec<usize> = if self.time_unit.is_some() { vec![self.time.len(), rows, cols] } else { vec![rows, cols] };
+        let shape: Vec<usize> = if self.time_unit.is_some() {
+            vec![self.time.len(), rows, cols]
+        } else {
+            vec![rows, cols]
+        };
         let chunk: Vec<usize> = shape.iter().map(|n| (*n).clamp(1, 4)).collect();
-        let dataset = file.new_dataset::<f32>().chunk(chunk).shuffle().deflate(4).shape(shape).create(self.name).unwrap();
+        let dataset = file
+            .new_dataset::<f32>()
+            .chunk(chunk)
+            .shuffle()
+            .deflate(4)
+            .shape(shape)
+            .create(self.name)
+            .unwrap();
         dataset.write_raw(&self.values).unwrap();
         text(&dataset, "units", self.unit);
         text(&dataset, "standard_name", self.standard_name);
-        dataset.new_attr::<f32>().create("_FillValue").unwrap().write_scalar(&FILL).unwrap();
+        dataset
+            .new_attr::<f32>()
+            .create("_FillValue")
+            .unwrap()
+            .write_scalar(&FILL)
+            .unwrap();
     }
 }
 
 /// The maps of a series segment, read back with nothing but a Parquet reader: `[step][row, col]`.
-pub async fn series_maps(store: &Store, manifest: &Manifest, segment: usize) -> Vec<Vec<f32>> {
+pub(crate) async fn series_maps(
+    store: &Store,
+    manifest: &Manifest,
+    segment: usize,
+) -> Vec<Vec<f32>> {
     use arrow::array::{Float32Array, ListArray};
     let segment = &manifest.series[segment];
     let bytes = store.get(&segment.series).await.unwrap();
-    let reader = parquet::arrow::arrow_reader::ParquetRecordBatchReader::try_new(bytes, 1 << 20).unwrap();
+    let reader =
+        parquet::arrow::arrow_reader::ParquetRecordBatchReader::try_new(bytes, 1 << 20).unwrap();
     let steps = segment.steps as usize;
     let mut maps = vec![vec![f32::NAN; manifest.grid.cell_count()]; steps];
-    let mut blocks = contract::chunk::windows(&manifest.grid, storage::series::BLOCK_CELLS, storage::series::BLOCK_CELLS).into_iter();
+    let mut blocks = contract::chunk::windows(
+        &manifest.grid,
+        storage::series::BLOCK_CELLS,
+        storage::series::BLOCK_CELLS,
+    )
+    .into_iter();
     for batch in reader {
         let batch = batch.unwrap();
-        let lists = batch.column(1).as_any().downcast_ref::<ListArray>().unwrap();
+        let lists = batch
+            .column(1)
+            .as_any()
+            .downcast_ref::<ListArray>()
+            .unwrap();
         for row in 0..batch.num_rows() {
             let values = lists.value(row);
             let values = values.as_any().downcast_ref::<Float32Array>().unwrap();
@@ -182,13 +263,18 @@ pub async fn series_maps(store: &Store, manifest: &Manifest, segment: usize) -> 
 }
 
 /// Writes a text attribute.
-pub fn text(owner: &hdf5::Location, name: &str, value: &str) {
+pub(crate) fn text(owner: &hdf5::Location, name: &str, value: &str) {
     let value: VarLenUnicode = value.parse().unwrap();
-    owner.new_attr::<VarLenUnicode>().create(name).unwrap().write_scalar(&value).unwrap();
+    owner
+        .new_attr::<VarLenUnicode>()
+        .create(name)
+        .unwrap()
+        .write_scalar(&value)
+        .unwrap();
 }
 
 /// The one refusal of a batch of one, as reason and line.
-pub fn refusal(outcomes: &[Outcome]) -> (contract::event::RejectReason, String) {
+pub(crate) fn refusal(outcomes: &[Outcome]) -> (contract::event::RejectReason, String) {
     match outcomes {
         [outcome @ Outcome::Rejected { reason, .. }] => (*reason, outcome.to_string()),
         other => panic!("no refusal: {other:?}"),

@@ -12,7 +12,7 @@ use crate::fixture::{Place, SmallFile, settings};
 /// Files a process start is paid for: about 10 ms each.
 const WHOLE_WAY: usize = 150;
 
-/// A number that looks random: the mixing of SplitMix64.
+/// A number that looks random: the mixing of `SplitMix64`.
 fn mixed(counter: u64) -> u64 {
     let mut h = counter.wrapping_mul(0x9e37_79b9_7f4a_7c15);
     h = (h ^ (h >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -24,7 +24,14 @@ fn mixed(counter: u64) -> u64 {
 fn damaged(bytes: &[u8], counter: u64) -> Vec<u8> {
     let mut damaged = bytes.to_vec();
     let header = bytes.len().min(1024) as u64;
-    let at = |n: u64| (mixed(counter * 31 + n) % if n.is_multiple_of(3) { bytes.len() as u64 } else { header }) as usize;
+    let at = |n: u64| {
+        (mixed(counter * 31 + n)
+            % if n.is_multiple_of(3) {
+                bytes.len() as u64
+            } else {
+                header
+            }) as usize
+    };
     match counter % 4 {
         0 => damaged.truncate(at(0)),
         1 => (0..4).for_each(|n| damaged[at(n)] = mixed(counter + n) as u8),
@@ -45,22 +52,36 @@ fn damaged(bytes: &[u8], counter: u64) -> Vec<u8> {
 async fn survives(bytes: &[u8], name: &str) {
     let place = Place::new();
     let mut refused = 0;
-    let paths: Vec<_> = (0..WHOLE_WAY).map(|i| place.path(&format!("{i}-{name}"))).collect();
+    let paths: Vec<_> = (0..WHOLE_WAY)
+        .map(|i| place.path(&format!("{i}-{name}")))
+        .collect();
     for (i, path) in paths.iter().enumerate() {
         std::fs::write(path, damaged(bytes, i as u64)).unwrap();
     }
     let mut settings = settings();
     settings.limits.wall = std::time::Duration::from_secs(10);
-    let batch = Batch { files: paths, ..Batch::default() };
-    let outcomes = ingest::land_files(&place.store, &place.log, &settings, batch, &Quiet).await.unwrap();
+    let batch = Batch {
+        files: paths,
+        ..Batch::default()
+    };
+    let outcomes = ingest::land_files(&place.store, &place.log, &settings, batch, &Quiet)
+        .await
+        .unwrap();
     for outcome in &outcomes {
         let line = outcome.to_string();
         assert!(!line.contains('\n') && line.len() < 1000, "{line}");
         refused += usize::from(outcome.is_rejected());
     }
     assert_eq!(outcomes.len(), WHOLE_WAY);
-    assert!(refused > WHOLE_WAY / 4, "only {refused} of {WHOLE_WAY} were refused: the damage does not bite");
-    assert!(outcomes.iter().all(|o| !matches!(o, Outcome::Rejected { detail, .. } if detail.is_empty())));
+    assert!(
+        refused > WHOLE_WAY / 4,
+        "only {refused} of {WHOLE_WAY} were refused: the damage does not bite"
+    );
+    assert!(
+        outcomes
+            .iter()
+            .all(|o| !matches!(o, Outcome::Rejected { detail, .. } if detail.is_empty()))
+    );
 }
 
 #[tokio::test]
@@ -105,6 +126,8 @@ fn the_classic_reader_refuses_without_a_panic() {
 
 #[test]
 fn a_reader_called_wrongly_says_so() {
-    let output = std::process::Command::new(env!("CARGO_BIN_EXE_decode-file")).output().unwrap();
+    let output = std::process::Command::new(env!("CARGO_BIN_EXE_decode-file"))
+        .output()
+        .unwrap();
     assert_eq!(output.status.code(), Some(64));
 }

@@ -9,14 +9,32 @@ use super::*;
 use crate::plan::Target;
 use crate::put::StoredGrid;
 
-const GRID: Grid = Grid { rows: 2, cols: 4, north_deg: 90.0, west_deg: -180.0, dlat_deg: 90.0, dlon_deg: 90.0 };
+const GRID: Grid = Grid {
+    rows: 2,
+    cols: 4,
+    north_deg: 90.0,
+    west_deg: -180.0,
+    dlat_deg: 90.0,
+    dlon_deg: 90.0,
+};
 
 fn granule(content: &str, periods: &[Period]) -> StoredGranule {
     let product: contract::product::ProductId = "p".parse().unwrap();
     let raw_sha256 = Digest::of(content.as_bytes());
     let step = |period: &Period| {
-        let frame = ObjectKey::frame(&product, &Digest::of(format!("{content}{period}").as_bytes()));
-        StoredGrid { step: Step { period: *period, frame, raw_sha256, origin: "f.nc".into(), valid_cells: 1 } }
+        let frame = ObjectKey::frame(
+            &product,
+            &Digest::of(format!("{content}{period}").as_bytes()),
+        );
+        StoredGrid {
+            step: Step {
+                period: *period,
+                frame,
+                raw_sha256,
+                origin: "f.nc".into(),
+                valid_cells: 1,
+            },
+        }
     };
     StoredGranule {
         target: Target {
@@ -38,18 +56,31 @@ fn month(month: u32) -> Period {
 
 #[test]
 fn months_in_any_order_become_steps_in_the_order_of_time() {
-    let files: Vec<_> = [3, 1, 2].map(|m| granule(&format!("f{m}"), &[month(m)])).to_vec();
+    let files: Vec<_> = [3, 1, 2]
+        .map(|m| granule(&format!("f{m}"), &[month(m)]))
+        .to_vec();
     let merged = merge(None, &files);
     let periods: Vec<_> = merged.steps.iter().map(|s| s.period).collect();
     assert_eq!(periods, [month(1), month(2), month(3)]);
-    assert!(merged.changes.iter().all(|c| *c == Change::Taken { revised: false }));
+    assert!(
+        merged
+            .changes
+            .iter()
+            .all(|c| *c == Change::Taken { revised: false })
+    );
 }
 
 #[test]
 fn the_same_file_again_changes_nothing_and_another_content_revises() {
     let mut steps = merge(None, &[granule("a", &[month(1), month(2)])]).steps;
-    assert_eq!(add(&mut steps, &granule("a", &[month(1), month(2)])), Change::Same);
-    assert_eq!(add(&mut steps, &granule("b", &[month(2)])), Change::Taken { revised: true });
+    assert_eq!(
+        add(&mut steps, &granule("a", &[month(1), month(2)])),
+        Change::Same
+    );
+    assert_eq!(
+        add(&mut steps, &granule("b", &[month(2)])),
+        Change::Taken { revised: true }
+    );
     assert_eq!(steps.len(), 2);
     assert_eq!(steps[1].raw_sha256, Digest::of(b"b"));
 }
@@ -59,7 +90,9 @@ fn a_step_across_others_is_refused_and_leaves_them_whole() {
     let mut steps = merge(None, &[granule("a", &[month(1), month(2)])]).steps;
     let before = steps.clone();
     let year = Period::year(2000).unwrap();
-    let Change::Refused(rejection) = add(&mut steps, &granule("b", &[month(3), year])) else { panic!("taken") };
+    let Change::Refused(rejection) = add(&mut steps, &granule("b", &[month(3), year])) else {
+        panic!("taken")
+    };
     assert_eq!(rejection.reason, RejectReason::Conflict);
     assert_eq!(steps, before);
 }
@@ -72,16 +105,31 @@ fn another_grid_or_quantity_is_a_conflict() {
     other_quantity.target.quantity = Quantity::Pco2;
     let mut made_up = granule("d", &[month(4)]);
     made_up.target.synthetic = true;
-    let merged = merge(None, &[granule("a", &[month(1)]), other_grid, other_quantity, made_up]);
+    let merged = merge(
+        None,
+        &[
+            granule("a", &[month(1)]),
+            other_grid,
+            other_quantity,
+            made_up,
+        ],
+    );
     assert_eq!(merged.steps.len(), 1);
     for change in &merged.changes[1..] {
-        assert!(matches!(change, Change::Refused(r) if r.reason == RejectReason::Conflict), "{change:?}");
+        assert!(
+            matches!(change, Change::Refused(r) if r.reason == RejectReason::Conflict),
+            "{change:?}"
+        );
     }
 }
 
 #[test]
 fn a_group_ends_before_the_first_period_that_comes_again() {
-    let files = [granule("a", &[month(1)]), granule("b", &[month(2)]), granule("c", &[month(1)])];
+    let files = [
+        granule("a", &[month(1)]),
+        granule("b", &[month(2)]),
+        granule("c", &[month(1)]),
+    ];
     assert_eq!(disjoint_prefix(&files), 2);
     assert_eq!(disjoint_prefix(&files[..2]), 2);
 }
