@@ -44,6 +44,11 @@ impl ObjectKey {
         Self(format!("weights/{job}.parquet"))
     }
 
+    /// A comparison with published values, named by what was compared.
+    pub fn check(job: &Digest) -> Self {
+        Self(format!("checks/{job}.json"))
+    }
+
     /// A drawn picture under the hash of its job.
     pub fn tile(job: &Digest) -> Self {
         let text = job.to_string();
@@ -112,6 +117,7 @@ mod tests {
             ObjectKey::domain(&product, &digest),
             ObjectKey::manifest(&product, 7),
             ObjectKey::weights(&digest),
+            ObjectKey::check(&digest),
             ObjectKey::tile(&digest),
         ] {
             assert_eq!(key.as_str().parse::<ObjectKey>().unwrap(), key);

@@ -71,7 +71,7 @@ pub const NAMED_REGIONS: &[NamedRegion] = &[
     NamedRegion {
         name: "equatorial-pacific",
         title: "Equatorial Pacific, 14° S to 14° N",
-        bounds_deg: [130.0, -14.0, 285.0, 14.0],
+        bounds_deg: [125.5, -14.0, 284.5, 14.0],
         corners: EQUATORIAL_PACIFIC,
     },
     boxed(
@@ -81,7 +81,33 @@ pub const NAMED_REGIONS: &[NamedRegion] = &[
     ),
 ];
 
-const EQUATORIAL_PACIFIC: &[[f64; 2]] = &[];
+/// Coasts to coasts: east of the Philippines, Halmahera, New Guinea and Cape York (so without the Indonesian seas and
+/// the Arafura Sea), west of the Americas from El Salvador along the isthmus to Peru (so without the Caribbean). Corners
+/// lie on land wherever there is land.
+const EQUATORIAL_PACIFIC: &[[f64; 2]] = &[
+    [125.5, 14.0],  // east of Samar
+    [126.5, 7.5],   // Mindanao
+    [127.5, 4.0],   // Talaud Islands
+    [128.0, 1.0],   // Halmahera
+    [131.0, -0.8],  // Bird's Head, New Guinea
+    [134.0, -3.0],  // its neck
+    [138.0, -4.5],  // central range
+    [141.0, -6.0],  // central range
+    [143.5, -9.0],  // Torres Strait, north
+    [142.5, -11.0], // Cape York
+    [143.5, -14.0], // Cape York Peninsula, east coast
+    [284.5, -14.0], // Peru, south of Lima
+    [282.0, -8.0],  // Peru, Trujillo
+    [280.5, -5.0],  // Peru, Piura
+    [281.0, -1.0],  // Ecuador
+    [283.0, 4.0],   // Colombia
+    [283.0, 7.5],   // Darien
+    [280.5, 9.0],   // Panama Canal
+    [279.0, 9.2],   // Panama, west
+    [276.5, 10.5],  // Costa Rica
+    [275.0, 13.0],  // Nicaragua
+    [272.0, 14.0],  // Honduras
+];
 
 const fn boxed(name: &'static str, title: &'static str, bounds_deg: [f64; 4]) -> NamedRegion {
     NamedRegion {

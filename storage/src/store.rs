@@ -42,8 +42,7 @@ impl Store {
         std::fs::create_dir_all(folder).map_err(|e| bad(e.to_string()))?;
         let root = std::fs::canonicalize(folder).map_err(|e| bad(e.to_string()))?;
         let objects = LocalFileSystem::new_with_prefix(&root)
-            .map_err(|e| bad(e.to_string()))?
-            .with_fsync(true);
+            .map_err(|e| bad(e.to_string()))?;
         let text = root
             .to_str()
             .ok_or_else(|| bad("its path is not UTF-8".to_owned()))?;
