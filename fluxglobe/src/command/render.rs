@@ -1,0 +1,66 @@
+//! `fluxglobe render`: a product, an instant and a view in, a PNG file out.
+
+use anyhow::{Context as _, Result};
+use contract::colour::TransferFunction;
+use contract::job::{RENDERER_VERSION, RenderJob, Style, View};
+use contract::manifest::Manifest;
+use contract::tile::Tile;
+use storage::Store;
+
+use crate::cli::{Picture, Render, Settings};
+use crate::{embedded, progress};
+
+pub(crate) async fn run(settings: &Settings, options: Render) -> Result<()> {
+    let store = embedded::store(settings)?;
+    let (picture, view, surface) = match options {
+        Render::Tile(tile) => {
+            let address = Tile::new(tile.z, tile.x, tile.y)?;
+            (tile.picture, View::Tile { tile: address, size_px: tile.size }, false)
+        }
+        Render::Globe(globe) => {
+            let view = View::Globe {
+                lon_deg: globe.lon,
+                lat_deg: globe.lat,
+                height_m: globe.height * 1000.0,
+                width_px: globe.size.0,
+                height_px: globe.size.1,
+            };
+            (globe.picture, view, !globe.transparent)
+        }
+    };
+    let mut job = job(&store, settings, &picture, view).await?;
+    job.style.globe_surface = surface;
+    job.validate()?;
+    let bar = progress::bar("draw", 1);
+    let png = embedded::renderer(settings, store).await?.draw(&job).await?;
+    std::fs::write(&picture.output, &png).with_context(|| format!("cannot write {}", picture.output.display()))?;
+    progress::done(&bar, &format!("{} bytes", png.len()));
+    progress::result(&picture.output.display().to_string())
+}
+
+async fn job(store: &Store, settings: &Settings, picture: &Picture, view: View) -> Result<RenderJob> {
+    let manifest = embedded::manifest(store, &picture.layer, &settings.data).await?;
+    let last = manifest.steps.last().context("the product has no step")?;
+    let mut style = Style::with_transfer(TransferFunction::default_for(manifest.quantity));
+    style.slices = picture.slices.unwrap_or(style.slices);
+    style.particles_per_cell = picture.particles.unwrap_or(style.particles_per_cell);
+    Ok(RenderJob {
+        renderer_version: RENDERER_VERSION,
+        product: manifest.id(),
+        accumulated: accumulated(store, &manifest).await?,
+        time: picture.time.unwrap_or(last.period.mid()),
+        mode: picture.mode,
+        view,
+        style,
+    })
+}
+
+/// Accumulated carbon of just this version of a product, if it was derived.
+async fn accumulated(store: &Store, manifest: &Manifest) -> Result<Option<contract::manifest::ManifestId>> {
+    let Ok(product) = manifest.product.accumulated() else {
+        return Ok(None);
+    };
+    let latest = storage::manifests::latest(store, &product).await?;
+    let derived = latest.filter(|derived| derived.derived_from == Some(manifest.id()));
+    Ok(derived.map(|derived| derived.id()))
+}

@@ -1,0 +1,68 @@
+//! `fluxglobe serve`: a data folder in, tiles, views, statistics and the viewer over HTTP out.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use anyhow::{Context as _, Result};
+use compute::Engine;
+use storage::Store;
+use tile_server::backend::Check;
+use tile_server::metrics::Registry;
+use tile_server::{AppState, Server};
+
+use crate::cli::Settings;
+use crate::ports::{Analyst, Drawer};
+use crate::{embedded, progress};
+
+pub(crate) async fn run(settings: &Settings, options: tile_server::config::Settings) -> Result<()> {
+    let store = embedded::store(settings)?;
+    let check = crate::demo::check::stored(&store).await?;
+    let server = bind(settings, store, options, check).await?;
+    announce(&server);
+    until_asked_to_stop(server).await
+}
+
+/// A server that listens but does not answer yet.
+pub(crate) async fn bind(
+    settings: &Settings,
+    store: Store,
+    mut options: tile_server::config::Settings,
+    check: Option<Check>,
+) -> Result<Server> {
+    options.viewer = options.viewer.or_else(built_viewer);
+    let drawer = Drawer(Arc::new(embedded::renderer(settings, store.clone()).await?));
+    let analyst = Analyst {
+        local: Engine::local(store.clone()),
+        cluster: embedded::cluster(settings, store.clone()),
+        check,
+    };
+    let registry = Registry::new();
+    let state = AppState::new(&options, store, Arc::new(drawer), Arc::new(analyst), registry)?;
+    Ok(Server::bind(&options, state).await?)
+}
+
+/// Says where to look.
+pub(crate) fn announce(server: &Server) {
+    progress::say(&format!("{:>24} http://{}/", "open", server.address()));
+}
+
+/// Serves until Ctrl-C or a termination signal, then lets requests under way end.
+pub(crate) async fn until_asked_to_stop(server: Server) -> Result<()> {
+    use tokio::signal::unix::{SignalKind, signal};
+    let mut terminate = signal(SignalKind::terminate()).context("cannot listen for signals")?;
+    let stop = async move {
+        tokio::select! {
+            _interrupted = tokio::signal::ctrl_c() => {}
+            _terminated = terminate.recv() => {}
+        }
+        progress::say("stopping");
+    };
+    Ok(server.run(stop).await?)
+}
+
+/// The viewer beside the program, in a checkout it was built in, or installed.
+fn built_viewer() -> Option<PathBuf> {
+    let checkout = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tile-server/web/dist");
+    let installed = PathBuf::from("/usr/share/fluxglobe/viewer");
+    [checkout, installed].into_iter().find(|folder| folder.join("index.html").is_file())
+}

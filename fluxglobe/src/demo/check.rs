@@ -1,0 +1,77 @@
+//! Our budgets beside published ones: computed once for a version of the product, then kept.
+
+use anyhow::Result;
+use bytes::Bytes;
+use compute::check::CheckRow;
+use contract::digest::Digest;
+use contract::key::ObjectKey;
+use contract::manifest::Manifest;
+use serde::{Deserialize, Serialize};
+use storage::Store;
+use tile_server::backend::Check;
+
+use crate::cli::Settings;
+use crate::demo::source::SETS;
+use crate::{embedded, progress};
+
+/// Raised when the comparison itself changes, so that a kept one is not taken for it.
+const COMPARISON_VERSION: u32 = 1;
+
+/// A comparison and where the published values come from.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(crate) struct Comparison {
+    pub(crate) rows: Vec<CheckRow>,
+    pub(crate) note: String,
+}
+
+impl Comparison {
+    /// As the tile server tells it.
+    pub(crate) fn to_wire(&self) -> Check {
+        // Where the paper prints no value of its own (the months), the integral of its grid stands in.
+        let row = |row: &CheckRow| tile_server::backend::CheckRow {
+            what: row.what.clone(),
+            period: row.period.clone(),
+            published: row.published.unwrap_or(row.expected),
+            ours: row.ours,
+            unit: row.unit.clone(),
+            difference_percent: Some((row.ours / row.published.unwrap_or(row.expected) - 1.0) * 100.0)
+                .filter(|percent| percent.is_finite()),
+        };
+        Check { rows: self.rows.iter().map(row).collect(), note: self.note.clone() }
+    }
+}
+
+/// Compares a version of the flux with the published values, or takes the comparison that is kept.
+pub(crate) async fn compare(settings: &Settings, store: &Store, flux: &Manifest) -> Result<Comparison> {
+    let key = key(flux);
+    if let Some(kept) = read(store, &key).await? {
+        return Ok(kept);
+    }
+    let bar = progress::bar("budgets on Ballista", 1);
+    let engine = embedded::cluster(settings, store.clone());
+    let rows = compute::compare(&engine, &flux.product).await?;
+    progress::done(&bar, &format!("{} beside published ones", rows.len()));
+    let comparison = Comparison { rows, note: compute::published::CITATION.to_owned() };
+    store.put_new(&key, Bytes::from(serde_json::to_vec(&comparison)?)).await?;
+    Ok(comparison)
+}
+
+/// The comparison that is kept for the newest version of the demo's flux, if there is one.
+pub(crate) async fn stored(store: &Store) -> Result<Option<Check>> {
+    let Some(flux) = storage::manifests::latest(store, &SETS[0].product.parse()?).await? else {
+        return Ok(None);
+    };
+    Ok(read(store, &key(&flux)).await?.map(|comparison| comparison.to_wire()))
+}
+
+fn key(flux: &Manifest) -> ObjectKey {
+    ObjectKey::check(&Digest::of_json(&(COMPARISON_VERSION, flux.id())))
+}
+
+async fn read(store: &Store, key: &ObjectKey) -> Result<Option<Comparison>> {
+    match store.get(key).await {
+        Ok(content) => Ok(Some(serde_json::from_slice(&content)?)),
+        Err(error) if error.is_not_found() => Ok(None),
+        Err(error) => Err(error.into()),
+    }
+}

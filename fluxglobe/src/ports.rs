@@ -1,0 +1,98 @@
+//! The tile server's two ports, filled with the renderer and the engines of this process.
+
+use std::sync::Arc;
+
+use async_trait::async_trait;
+use bytes::Bytes;
+use compute::Engine;
+use compute::budget::{BudgetQuery, BudgetStep};
+use compute::{ComputeError, ErrorClass};
+use contract::job::RenderJob;
+use contract::manifest::Manifest;
+use contract::time::Period;
+use render_worker::{RenderError, RenderService};
+use tile_server::backend::{
+    Analyse, BackendError, BudgetRequest, BudgetRow, BudgetStep as WantedStep, Check, Class, Draw, RowCol,
+};
+
+/// Pictures from the renderer in this process.
+pub(crate) struct Drawer(pub(crate) Arc<RenderService>);
+
+/// Series from DataFusion, budgets from Ballista, both in this process.
+pub(crate) struct Analyst {
+    pub(crate) local: Engine,
+    pub(crate) cluster: Engine,
+    /// Our budgets beside published ones, if the demo compared them.
+    pub(crate) check: Option<Check>,
+}
+
+#[async_trait]
+impl Draw for Drawer {
+    async fn draw(&self, job: &RenderJob) -> Result<Bytes, BackendError> {
+        self.0.draw(job).await.map_err(render_failed)
+    }
+
+    async fn ready(&self) -> Result<(), BackendError> {
+        // The renderer is made before the server starts and tells of a lost device with the first picture.
+        Ok(())
+    }
+}
+
+#[async_trait]
+impl Analyse for Analyst {
+    async fn point(&self, manifest: &Manifest, cell: RowCol) -> Result<Vec<Option<f64>>, BackendError> {
+        let values = compute::point::cell_values(&self.local, manifest, cell.row, cell.col).await;
+        let values = values.map_err(compute_failed)?;
+        let known = |value: f32| (!value.is_nan()).then_some(f64::from(value));
+        Ok(values.into_iter().map(known).collect())
+    }
+
+    async fn budget(&self, request: &BudgetRequest) -> Result<Vec<BudgetRow>, BackendError> {
+        let query = BudgetQuery {
+            product: request.manifest.product.clone(),
+            region: request.region.clone(),
+            region_name: String::new(),
+            from: Some(request.period.start),
+            to: Some(request.period.end),
+            step: match request.step {
+                WantedStep::Month => BudgetStep::Month,
+                WantedStep::Year => BudgetStep::Year,
+                WantedStep::Total => BudgetStep::Total,
+            },
+            earth: request.earth,
+        };
+        let answer = compute::budget::budget_of(&self.cluster, &query, &request.manifest).await.map_err(compute_failed)?;
+        let row = |row: compute::budget::BudgetRow| BudgetRow {
+            period: Period { start: row.start, end: row.end },
+            budget_tg: row.budget_tg,
+            coverage_percent: row.coverage_percent,
+            area_m2: row.area_m2,
+        };
+        Ok(answer.rows.into_iter().map(row).collect())
+    }
+
+    async fn check(&self) -> Result<Option<Check>, BackendError> {
+        Ok(self.check.clone())
+    }
+}
+
+fn compute_failed(error: ComputeError) -> BackendError {
+    let class = match error.class() {
+        ErrorClass::NotFound => Class::NotFound,
+        ErrorClass::BadRequest => Class::BadRequest,
+        ErrorClass::Retryable => Class::Unavailable,
+        ErrorClass::Internal => Class::Internal,
+    };
+    BackendError::new(class, error.to_string()).because(error)
+}
+
+fn render_failed(error: RenderError) -> BackendError {
+    let class = if error.is_bad_request() {
+        Class::BadRequest
+    } else if error.is_retryable() {
+        Class::Unavailable
+    } else {
+        Class::Internal
+    };
+    BackendError::new(class, error.to_string()).because(error)
+}
