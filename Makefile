@@ -5,6 +5,8 @@ export CARGO_TARGET_DIR ?= $(HOME)/.cache/fluxglobe/target
 export FLUXGLOBE_TOOLS ?= $(HOME)/.cache/fluxglobe/tools
 export CMAKE ?= $(FLUXGLOBE_TOOLS)/bin/cmake
 export PIP ?= $(FLUXGLOBE_TOOLS)/bin/pip
+# Mesa's device chooser would look for a desktop session and complain on servers, which have none.
+export NODEVICE_SELECT := 1
 
 fluxglobe := $(CARGO_TARGET_DIR)/debug/fluxglobe
 viewer := tile-server/web/dist/index.html

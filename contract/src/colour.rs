@@ -81,7 +81,7 @@ impl TransferFunction {
     pub fn default_for(quantity: Quantity) -> Self {
         let display = quantity.display();
         let (palette, low, high) = match quantity {
-            Quantity::CarbonFlux => (Palette::Balance, -60.0, 60.0),
+            Quantity::CarbonFlux => (Palette::Balance, -40.0, 40.0),
             Quantity::AccumulatedCarbon => (Palette::Balance, -50.0, 50.0),
             Quantity::SeaSurfaceTemperature => (Palette::Thermal, -2.0, 32.0),
             Quantity::Chlorophyll => (Palette::Algae, 0.0, 2.0),

@@ -26,10 +26,22 @@ pub(crate) struct Cli {
 #[derive(Debug, Clone, Args)]
 pub(crate) struct Settings {
     /// Folder that holds everything: objects, manifests, the event log. Made if absent.
-    #[arg(long, env = "FLUXGLOBE_DATA", default_value = "fluxglobe-data", global = true, value_name = "FOLDER")]
+    #[arg(
+        long,
+        env = "FLUXGLOBE_DATA",
+        default_value = "fluxglobe-data",
+        global = true,
+        value_name = "FOLDER"
+    )]
     pub(crate) data: PathBuf,
     /// Log lines to show on standard error: error, warn, info, debug, trace, or a filter such as `ingest=debug`.
-    #[arg(long, env = "FLUXGLOBE_LOG", default_value = "warn", global = true, value_name = "FILTER")]
+    #[arg(
+        long,
+        env = "FLUXGLOBE_LOG",
+        default_value = "warn",
+        global = true,
+        value_name = "FILTER"
+    )]
     pub(crate) log: String,
     /// Draw with the processor alone instead of a Vulkan device.
     #[arg(long, env = "FLUXGLOBE_CPU", global = true)]
@@ -307,9 +319,26 @@ mod tests {
 
     #[test]
     fn places_and_boxes_may_be_negative() {
-        let words = ["fluxglobe", "stats", "point", "--product", "p", "--lon", "-150", "--lat", "-5.5"];
+        let words = [
+            "fluxglobe",
+            "stats",
+            "point",
+            "--product",
+            "p",
+            "--lon",
+            "-150",
+            "--lat",
+            "-5.5",
+        ];
         assert!(Cli::try_parse_from(words).is_ok());
-        let words = ["fluxglobe", "budget", "--product", "p", "--region", "-10,-20,30,40"];
+        let words = [
+            "fluxglobe",
+            "budget",
+            "--product",
+            "p",
+            "--region",
+            "-10,-20,30,40",
+        ];
         assert!(Cli::try_parse_from(words).is_ok());
     }
 }

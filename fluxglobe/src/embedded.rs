@@ -34,7 +34,11 @@ pub(crate) fn cluster(settings: &Settings, store: Store) -> Engine {
 
 /// The renderer on this machine's Vulkan device, or on its processor when asked to.
 pub(crate) async fn renderer(settings: &Settings, store: Store) -> Result<RenderService> {
-    let backend = if settings.cpu { Backend::Cpu } else { Backend::Gpu };
+    let backend = if settings.cpu {
+        Backend::Cpu
+    } else {
+        Backend::Gpu
+    };
     let make = move || RenderService::new(store, backend);
     Ok(tokio::task::spawn_blocking(make).await??)
 }
@@ -51,6 +55,9 @@ pub(crate) async fn manifest(store: &Store, product: &ProductId, data: &Path) ->
             "{} holds no product yet; land files with `fluxglobe ingest` or run `fluxglobe demo`",
             data.display()
         ),
-        false => bail!("there is no product {product}; there are {}", known.join(", ")),
+        false => bail!(
+            "there is no product {product}; there are {}",
+            known.join(", ")
+        ),
     }
 }

@@ -12,7 +12,8 @@ use contract::manifest::Manifest;
 use contract::time::Period;
 use render_worker::{RenderError, RenderService};
 use tile_server::backend::{
-    Analyse, BackendError, BudgetRequest, BudgetRow, BudgetStep as WantedStep, Check, Class, Draw, RowCol,
+    Analyse, BackendError, BudgetRequest, BudgetRow, BudgetStep as WantedStep, Check, Class, Draw,
+    RowCol,
 };
 
 /// Pictures from the renderer in this process.
@@ -40,7 +41,11 @@ impl Draw for Drawer {
 
 #[async_trait]
 impl Analyse for Analyst {
-    async fn point(&self, manifest: &Manifest, cell: RowCol) -> Result<Vec<Option<f64>>, BackendError> {
+    async fn point(
+        &self,
+        manifest: &Manifest,
+        cell: RowCol,
+    ) -> Result<Vec<Option<f64>>, BackendError> {
         let values = compute::point::cell_values(&self.local, manifest, cell.row, cell.col).await;
         let values = values.map_err(compute_failed)?;
         let known = |value: f32| (!value.is_nan()).then_some(f64::from(value));
@@ -61,9 +66,14 @@ impl Analyse for Analyst {
             },
             earth: request.earth,
         };
-        let answer = compute::budget::budget_of(&self.cluster, &query, &request.manifest).await.map_err(compute_failed)?;
+        let answer = compute::budget::budget_of(&self.cluster, &query, &request.manifest)
+            .await
+            .map_err(compute_failed)?;
         let row = |row: compute::budget::BudgetRow| BudgetRow {
-            period: Period { start: row.start, end: row.end },
+            period: Period {
+                start: row.start,
+                end: row.end,
+            },
             budget_tg: row.budget_tg,
             coverage_percent: row.coverage_percent,
             area_m2: row.area_m2,

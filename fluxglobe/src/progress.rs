@@ -8,9 +8,11 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 /// A bar over `steps` named steps; without a terminal it stays silent and `done` prints one line.
 pub(crate) fn bar(what: &'static str, steps: u64) -> ProgressBar {
-    let style = ProgressStyle::with_template("{prefix:>24} {bar:32.cyan/blue} {pos}/{len} {wide_msg} {elapsed}")
-        .expect("the template is constant")
-        .progress_chars("━╸─");
+    let style = ProgressStyle::with_template(
+        "{prefix:>24} {bar:32.cyan/blue} {pos}/{len} {wide_msg} {elapsed}",
+    )
+    .expect("the template is constant")
+    .progress_chars("━╸─");
     let bar = ProgressBar::new(steps).with_style(style).with_prefix(what);
     bar.enable_steady_tick(Duration::from_millis(200));
     bar
@@ -41,8 +43,13 @@ impl LandingBar {
 
 impl ingest::Progress for LandingBar {
     fn stage(&self, file: &Path, stage: ingest::Stage, _step: usize, _steps: usize) {
-        let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        self.0.set_message(format!("{} {name}", format!("{stage:?}").to_lowercase()));
+        let name = file
+            .file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned();
+        self.0
+            .set_message(format!("{} {name}", format!("{stage:?}").to_lowercase()));
     }
 
     fn done(&self, _outcome: &ingest::Outcome) {

@@ -17,7 +17,9 @@ fn flux_files(folder: &Path) -> Vec<PathBuf> {
 
 #[test]
 fn a_batch_goes_on_past_bad_files_and_its_exit_code_says_so() {
-    let Some(files) = real_data::fluxengine().map(|folder| flux_files(&folder)) else { return };
+    let Some(files) = real_data::fluxengine().map(|folder| flux_files(&folder)) else {
+        return;
+    };
     let data = tempfile::tempdir().unwrap();
     let make = |name: &str, content: &[u8]| {
         let path = data.path().join(name);
@@ -29,9 +31,17 @@ fn a_batch_goes_on_past_bad_files_and_its_exit_code_says_so() {
     let text = make("text.nc", b"this is no grid\n");
     let empty = make("empty.nc", b"");
     let good = files[0].to_str().unwrap();
-    let talk = program::fail(data.path(), &["ingest", &truncated, &text, good, &empty, "/nonexistent.nc"]).unwrap();
+    let talk = program::fail(
+        data.path(),
+        &["ingest", &truncated, &text, good, &empty, "/nonexistent.nc"],
+    )
+    .unwrap();
     for name in ["truncated.nc", "text.nc", "empty.nc", "nonexistent.nc"] {
-        assert_eq!(talk.lines().filter(|line| line.contains(name)).count(), 1, "{name}:\n{talk}");
+        assert_eq!(
+            talk.lines().filter(|line| line.contains(name)).count(),
+            1,
+            "{name}:\n{talk}"
+        );
     }
     let products = program::json(data.path(), &["products", "--json"]).unwrap();
     assert_eq!(products[0]["steps"], 1, "{products}");
@@ -39,23 +49,34 @@ fn a_batch_goes_on_past_bad_files_and_its_exit_code_says_so() {
 
 #[test]
 fn the_same_file_twice_lands_once() {
-    let Some(files) = real_data::fluxengine().map(|folder| flux_files(&folder)) else { return };
+    let Some(files) = real_data::fluxengine().map(|folder| flux_files(&folder)) else {
+        return;
+    };
     let data = tempfile::tempdir().unwrap();
     let good = files[3].to_str().unwrap();
     program::succeed(data.path(), &["ingest", good]).unwrap();
     let first = program::json(data.path(), &["products", "--json"]).unwrap();
     program::succeed(data.path(), &["ingest", good, good]).unwrap();
-    assert_eq!(program::json(data.path(), &["products", "--json"]).unwrap(), first);
+    assert_eq!(
+        program::json(data.path(), &["products", "--json"]).unwrap(),
+        first
+    );
 }
 
 #[test]
 fn a_swath_is_refused_with_its_reason() {
-    let Some(sets) = real_data::sets() else { return };
+    let Some(sets) = real_data::sets() else {
+        return;
+    };
     let data = tempfile::tempdir().unwrap();
-    let swath = sets.join("wind_ascat_l2/ascat_20150702_084200_metopa_45145_eps_o_250_2300_ovw.l2.nc");
+    let swath =
+        sets.join("wind_ascat_l2/ascat_20150702_084200_metopa_45145_eps_o_250_2300_ovw.l2.nc");
     let talk = program::fail(data.path(), &["ingest", swath.to_str().unwrap()]).unwrap();
     assert!(talk.contains("swath"), "{talk}");
-    assert_eq!(program::json(data.path(), &["products", "--json"]).unwrap(), serde_json::json!([]));
+    assert_eq!(
+        program::json(data.path(), &["products", "--json"]).unwrap(),
+        serde_json::json!([])
+    );
 }
 
 #[test]
@@ -63,14 +84,56 @@ fn commands_say_what_there_is() {
     let data = tempfile::tempdir().unwrap();
     let talk = program::fail(data.path(), &["budget", "--product", "takahashi09-flux"]).unwrap();
     assert!(talk.contains("no product"), "{talk}");
-    let talk = program::fail(data.path(), &["stats", "point", "--product", "Bad Name", "--lon", "0", "--lat", "0"]);
+    let talk = program::fail(
+        data.path(),
+        &[
+            "stats",
+            "point",
+            "--product",
+            "Bad Name",
+            "--lon",
+            "0",
+            "--lat",
+            "0",
+        ],
+    );
     assert!(talk.unwrap().contains("a-z"));
     let Some(data) = demo_data() else { return };
     for (words, expected) in [
-        (["budget", "--product", "takahashi09-flux", "--region", "atlantis"], "global"),
-        (["budget", "--product", "sst-2010", "--region", "global"], "flux"),
-        (["budget", "--product", "takahashi09-flux", "--from", "1999-13"], "ISO 8601"),
-        (["budget", "--product", "takahashi09-flux", "--region", "/nonexistent.geojson"], "nonexistent"),
+        (
+            [
+                "budget",
+                "--product",
+                "takahashi09-flux",
+                "--region",
+                "atlantis",
+            ],
+            "global",
+        ),
+        (
+            ["budget", "--product", "sst-2010", "--region", "global"],
+            "flux",
+        ),
+        (
+            [
+                "budget",
+                "--product",
+                "takahashi09-flux",
+                "--from",
+                "1999-13",
+            ],
+            "ISO 8601",
+        ),
+        (
+            [
+                "budget",
+                "--product",
+                "takahashi09-flux",
+                "--region",
+                "/nonexistent.geojson",
+            ],
+            "nonexistent",
+        ),
     ] {
         let talk = program::fail(data, &words).unwrap();
         assert!(talk.contains(expected), "{words:?}: {talk}");
@@ -93,8 +156,14 @@ fn bad_requests_get_their_status_and_a_reason() {
         ("/api/products/takahashi09-flux/budget?region=atlantis", 400),
         ("/api/products/takahashi09-flux/budget?from=never", 400),
         ("/api/products/sst-2010/budget", 400),
-        ("/globe/takahashi09-flux/volume.png?lon=0&lat=0&height_km=-5", 400),
-        ("/globe/takahashi09-flux/volume.png?lon=0&lat=0&width=1000000000", 400),
+        (
+            "/globe/takahashi09-flux/volume.png?lon=0&lat=0&height_km=-5",
+            400,
+        ),
+        (
+            "/globe/takahashi09-flux/volume.png?lon=0&lat=0&width=1000000000",
+            400,
+        ),
         ("/no/such/page", 404),
         ("/..%2f..%2fetc/passwd", 404),
     ];
@@ -107,5 +176,10 @@ fn bad_requests_get_their_status_and_a_reason() {
         }
     }
     let metrics = server.get("/metrics").unwrap().text();
-    assert!(!metrics.lines().any(|line| line.contains("panic") && line.ends_with(" 1")), "{metrics}");
+    assert!(
+        !metrics
+            .lines()
+            .any(|line| line.contains("panic") && line.ends_with(" 1")),
+        "{metrics}"
+    );
 }

@@ -13,8 +13,16 @@ fn the_page_shows_tiles_series_and_budgets_without_an_error() {
     let server = Server::start(data, &["serve"]).unwrap();
     let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/browser"));
     if !folder.join("node_modules").exists() {
-        let install = Command::new("npm").args(["ci", "--no-audit", "--no-fund"]).current_dir(folder).output().unwrap();
-        assert!(install.status.success(), "{}", String::from_utf8_lossy(&install.stderr));
+        let install = Command::new("npm")
+            .args(["ci", "--no-audit", "--no-fund"])
+            .current_dir(folder)
+            .output()
+            .unwrap();
+        assert!(
+            install.status.success(),
+            "{}",
+            String::from_utf8_lossy(&install.stderr)
+        );
     }
     let output = Command::new("node")
         .args(["--test", "viewer.test.mjs"])
@@ -24,6 +32,10 @@ fn the_page_shows_tiles_series_and_budgets_without_an_error() {
         .output()
         .unwrap();
     let text = String::from_utf8_lossy(&output.stdout);
-    assert!(output.status.success(), "{text}\n{}", String::from_utf8_lossy(&output.stderr));
+    assert!(
+        output.status.success(),
+        "{text}\n{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
     assert!(text.contains("pass"), "the runner ran nothing:\n{text}");
 }

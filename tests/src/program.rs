@@ -30,28 +30,42 @@ pub fn run(data: &Path, words: &[&str]) -> Result<Output> {
         "{} is not built; run `cargo build --workspace` first",
         program.display()
     );
-    command(data).args(words).output().context("cannot start fluxglobe")
+    command(data)
+        .args(words)
+        .output()
+        .context("cannot start fluxglobe")
 }
 
 /// Standard output of a run that must succeed.
 pub fn succeed(data: &Path, words: &[&str]) -> Result<String> {
     let output = run(data, words)?;
     let talk = String::from_utf8_lossy(&output.stderr);
-    ensure!(output.status.success(), "fluxglobe {words:?} failed ({}):\n{talk}", output.status);
+    ensure!(
+        output.status.success(),
+        "fluxglobe {words:?} failed ({}):\n{talk}",
+        output.status
+    );
     Ok(String::from_utf8(output.stdout)?)
 }
 
 /// JSON on the standard output of a run that must succeed.
 pub fn json(data: &Path, words: &[&str]) -> Result<serde_json::Value> {
     let text = succeed(data, words)?;
-    serde_json::from_str(&text).with_context(|| format!("fluxglobe {words:?} printed no JSON: {text}"))
+    serde_json::from_str(&text)
+        .with_context(|| format!("fluxglobe {words:?} printed no JSON: {text}"))
 }
 
 /// Standard error of a run that must fail, without a panic.
 pub fn fail(data: &Path, words: &[&str]) -> Result<String> {
     let output = run(data, words)?;
     let talk = String::from_utf8_lossy(&output.stderr).into_owned();
-    ensure!(!output.status.success(), "fluxglobe {words:?} should have failed:\n{talk}");
-    ensure!(!talk.contains("panicked"), "fluxglobe {words:?} panicked:\n{talk}");
+    ensure!(
+        !output.status.success(),
+        "fluxglobe {words:?} should have failed:\n{talk}"
+    );
+    ensure!(
+        !talk.contains("panicked"),
+        "fluxglobe {words:?} panicked:\n{talk}"
+    );
     Ok(talk)
 }

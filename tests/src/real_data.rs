@@ -17,7 +17,10 @@ pub fn sets() -> Option<PathBuf> {
 
 #[expect(clippy::print_stderr, reason = "a test that tests nothing must say so")]
 fn folder(variable: &str, default: Option<&str>) -> Option<PathBuf> {
-    #[expect(clippy::disallowed_methods, reason = "tests have no command line of their own")]
+    #[expect(
+        clippy::disallowed_methods,
+        reason = "tests have no command line of their own"
+    )]
     let given = std::env::var(variable).ok().filter(|text| !text.is_empty());
     let folder = PathBuf::from(given.as_deref().or(default).unwrap_or_default());
     if folder.is_dir() {

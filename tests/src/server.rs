@@ -54,15 +54,19 @@ impl Server {
         let talk = child.stderr.take().context("standard error is piped")?;
         let (sender, receiver) = std::sync::mpsc::sync_channel(1);
         // Goes on reading after the address is found, so that the server never blocks on a full pipe.
-        std::thread::Builder::new().name("server-talk".to_owned()).spawn(move || {
-            for line in BufReader::new(talk).lines().map_while(Result::ok) {
-                let address = line.split_whitespace().find(|word| word.starts_with("http://127.0.0.1:"));
-                if let Some(address) = address {
-                    // Only the first address matters; later ones find the channel full or closed.
-                    drop(sender.try_send(address.trim_end_matches('/').to_owned()));
+        std::thread::Builder::new()
+            .name("server-talk".to_owned())
+            .spawn(move || {
+                for line in BufReader::new(talk).lines().map_while(Result::ok) {
+                    let address = line
+                        .split_whitespace()
+                        .find(|word| word.starts_with("http://127.0.0.1:"));
+                    if let Some(address) = address {
+                        // Only the first address matters; later ones find the channel full or closed.
+                        drop(sender.try_send(address.trim_end_matches('/').to_owned()));
+                    }
                 }
-            }
-        })?;
+            })?;
         match receiver.recv_timeout(START_LIMIT) {
             Ok(url) => {
                 let server = Self { child, url };
@@ -104,7 +108,11 @@ impl Server {
             status: response.status().as_u16(),
             content_type,
             etag,
-            body: response.body_mut().with_config().limit(64 << 20).read_to_vec()?,
+            body: response
+                .body_mut()
+                .with_config()
+                .limit(64 << 20)
+                .read_to_vec()?,
         })
     }
 }

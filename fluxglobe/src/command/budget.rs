@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::Result;
-use comfy_table::presets::UTF8_HORIZONTAL_ONLY;
+use comfy_table::presets::NOTHING;
 use comfy_table::{CellAlignment, Table};
 use compute::budget::{BudgetAnswer, BudgetQuery, BudgetStep};
 use contract::region::Region;
@@ -44,7 +44,9 @@ pub(crate) async fn run(settings: &Settings, options: &Budget) -> Result<()> {
 
 /// A GeoJSON file, a named region or a box.
 fn region(text: &str) -> Result<Region> {
-    let extension = Path::new(text).extension().and_then(|extension| extension.to_str());
+    let extension = Path::new(text)
+        .extension()
+        .and_then(|extension| extension.to_str());
     match extension.map(str::to_ascii_lowercase).as_deref() {
         Some("geojson" | "json") => Ok(compute::region::geojson_file::read(Path::new(text))?),
         _ => Ok(text.parse()?),
@@ -53,7 +55,7 @@ fn region(text: &str) -> Result<Region> {
 
 fn table(answer: &BudgetAnswer) -> Table {
     let mut table = Table::new();
-    table.load_preset(UTF8_HORIZONTAL_ONLY);
+    table.load_preset(NOTHING);
     table.set_header(["from", "to", "Tg C", "% of area", "10⁶ km² with data"]);
     for column in 2..5 {
         if let Some(column) = table.column_mut(column) {

@@ -35,6 +35,9 @@ pub(crate) async fn accumulated(
         bar.set_position(progress.done_steps as u64);
     };
     let manifest = compute::derive_accumulated(&engine, product, start, log, &on_step).await?;
-    progress::done(&bar, &format!("{} frames of {}", manifest.steps.len(), manifest.product));
+    progress::done(
+        &bar,
+        &format!("{} frames of {}", manifest.steps.len(), manifest.product),
+    );
     Ok(manifest)
 }

@@ -6,8 +6,15 @@ use crate::cli::Generate;
 use crate::progress;
 
 pub(crate) fn run(options: Generate) -> Result<()> {
-    let Generate::ChinaSea { scale, seed, output } = options;
-    ensure!((0.01..=1.0).contains(&scale), "--scale {scale}: give 0.01 to 1");
+    let Generate::ChinaSea {
+        scale,
+        seed,
+        output,
+    } = options;
+    ensure!(
+        (0.01..=1.0).contains(&scale),
+        "--scale {scale}: give 0.01 to 1"
+    );
     china_sea(&output, scale, seed)?;
     progress::result(&output.display().to_string())
 }
@@ -15,7 +22,9 @@ pub(crate) fn run(options: Generate) -> Result<()> {
 /// Writes the synthetic China Sea with a progress bar.
 pub(crate) fn china_sea(output: &std::path::Path, scale: f64, seed: u64) -> Result<()> {
     let bar = progress::bar("generate China Sea", 12);
-    ingest::generate_china_sea(output, scale, seed, &|done, _all| bar.set_position(done as u64))?;
+    ingest::generate_china_sea(output, scale, seed, &|done, _all| {
+        bar.set_position(done as u64)
+    })?;
     progress::done(&bar, &format!("SYNTHETIC data in {}", output.display()));
     Ok(())
 }

@@ -17,12 +17,24 @@ pub(crate) async fn run(settings: &Settings, options: Ingest) -> Result<ExitCode
     let store = embedded::store(settings)?;
     let log: Arc<dyn EventLog> = embedded::log(settings)?;
     let service = IngestService::new(store, log, ingest::Settings::with_current_program()?);
-    let files: Vec<_> = options.files.iter().map(|file| std::path::absolute(file).unwrap_or_else(|_| file.clone())).collect();
-    service.notify(&files, options.profile.as_deref(), options.product.as_ref()).await?;
+    let files: Vec<_> = options
+        .files
+        .iter()
+        .map(|file| std::path::absolute(file).unwrap_or_else(|_| file.clone()))
+        .collect();
+    service
+        .notify(&files, options.profile.as_deref(), options.product.as_ref())
+        .await?;
     let bar = LandingBar::new(files.len());
     let outcomes = service.drain(&bar).await?;
-    let refused = outcomes.iter().filter(|outcome| outcome.is_rejected()).count();
-    bar.done(&format!("{} landed, {refused} refused", outcomes.len() - refused));
+    let refused = outcomes
+        .iter()
+        .filter(|outcome| outcome.is_rejected())
+        .count();
+    bar.done(&format!(
+        "{} landed, {refused} refused",
+        outcomes.len() - refused
+    ));
     for outcome in &outcomes {
         if options.json {
             progress::result(&serde_json::to_string(&Line::of(outcome))?)?;
@@ -32,7 +44,11 @@ pub(crate) async fn run(settings: &Settings, options: Ingest) -> Result<ExitCode
             progress::result(&outcome.to_string())?;
         }
     }
-    Ok(if refused == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    Ok(if refused == 0 {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
+    })
 }
 
 /// What became of a file, for machines.
@@ -51,9 +67,16 @@ impl Line {
             Outcome::Landed { revised: true, .. } => ("revised", None, None),
             Outcome::Landed { .. } => ("landed", None, None),
             Outcome::AlreadyLanded { .. } => ("already_landed", None, None),
-            Outcome::Rejected { reason, object, detail, .. } => {
-                ("rejected", Some(*reason), Some(format!("{object}: {detail}")))
-            }
+            Outcome::Rejected {
+                reason,
+                object,
+                detail,
+                ..
+            } => (
+                "rejected",
+                Some(*reason),
+                Some(format!("{object}: {detail}")),
+            ),
         };
         Self {
             file: outcome.file().display().to_string(),

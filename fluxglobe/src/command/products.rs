@@ -1,8 +1,8 @@
 //! `fluxglobe products`: manifests in, a table of what has landed out.
 
 use anyhow::Result;
-use comfy_table::presets::UTF8_HORIZONTAL_ONLY;
 use comfy_table::Table;
+use comfy_table::presets::NOTHING;
 use serde::Serialize;
 
 use crate::cli::{Products, Settings};
@@ -53,8 +53,10 @@ pub(crate) async fn run(settings: &Settings, options: &Products) -> Result<()> {
         return Ok(());
     }
     let mut table = Table::new();
-    table.load_preset(UTF8_HORIZONTAL_ONLY);
-    table.set_header(["product", "title", "cells", "steps", "from", "to", "manifest"]);
+    table.load_preset(NOTHING);
+    table.set_header([
+        "product", "title", "cells", "steps", "from", "to", "manifest",
+    ]);
     for row in rows {
         let day = |time: Option<String>| time.map_or(String::new(), |t| t[..10].to_owned());
         let synthetic = if row.synthetic { "SYNTHETIC " } else { "" };

@@ -15,7 +15,14 @@ pub(crate) async fn run(settings: &Settings, options: Render) -> Result<()> {
     let (picture, view, surface) = match options {
         Render::Tile(tile) => {
             let address = Tile::new(tile.z, tile.x, tile.y)?;
-            (tile.picture, View::Tile { tile: address, size_px: tile.size }, false)
+            (
+                tile.picture,
+                View::Tile {
+                    tile: address,
+                    size_px: tile.size,
+                },
+                false,
+            )
         }
         Render::Globe(globe) => {
             let view = View::Globe {
@@ -32,13 +39,22 @@ pub(crate) async fn run(settings: &Settings, options: Render) -> Result<()> {
     job.style.globe_surface = surface;
     job.validate()?;
     let bar = progress::bar("draw", 1);
-    let png = embedded::renderer(settings, store).await?.draw(&job).await?;
-    std::fs::write(&picture.output, &png).with_context(|| format!("cannot write {}", picture.output.display()))?;
+    let png = embedded::renderer(settings, store)
+        .await?
+        .draw(&job)
+        .await?;
+    std::fs::write(&picture.output, &png)
+        .with_context(|| format!("cannot write {}", picture.output.display()))?;
     progress::done(&bar, &format!("{} bytes", png.len()));
     progress::result(&picture.output.display().to_string())
 }
 
-async fn job(store: &Store, settings: &Settings, picture: &Picture, view: View) -> Result<RenderJob> {
+async fn job(
+    store: &Store,
+    settings: &Settings,
+    picture: &Picture,
+    view: View,
+) -> Result<RenderJob> {
     let manifest = embedded::manifest(store, &picture.layer, &settings.data).await?;
     let last = manifest.steps.last().context("the product has no step")?;
     let mut style = Style::with_transfer(TransferFunction::default_for(manifest.quantity));
@@ -56,7 +72,10 @@ async fn job(store: &Store, settings: &Settings, picture: &Picture, view: View) 
 }
 
 /// Accumulated carbon of just this version of a product, if it was derived.
-async fn accumulated(store: &Store, manifest: &Manifest) -> Result<Option<contract::manifest::ManifestId>> {
+async fn accumulated(
+    store: &Store,
+    manifest: &Manifest,
+) -> Result<Option<contract::manifest::ManifestId>> {
     let Ok(product) = manifest.product.accumulated() else {
         return Ok(None);
     };

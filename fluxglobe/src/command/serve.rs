@@ -37,7 +37,13 @@ pub(crate) async fn bind(
         check,
     };
     let registry = Registry::new();
-    let state = AppState::new(&options, store, Arc::new(drawer), Arc::new(analyst), registry)?;
+    let state = AppState::new(
+        &options,
+        store,
+        Arc::new(drawer),
+        Arc::new(analyst),
+        registry,
+    )?;
     Ok(Server::bind(&options, state).await?)
 }
 
@@ -64,5 +70,7 @@ pub(crate) async fn until_asked_to_stop(server: Server) -> Result<()> {
 fn built_viewer() -> Option<PathBuf> {
     let checkout = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tile-server/web/dist");
     let installed = PathBuf::from("/usr/share/fluxglobe/viewer");
-    [checkout, installed].into_iter().find(|folder| folder.join("index.html").is_file())
+    [checkout, installed]
+        .into_iter()
+        .find(|folder| folder.join("index.html").is_file())
 }

@@ -34,15 +34,24 @@ impl Comparison {
             published: row.published.unwrap_or(row.expected),
             ours: row.ours,
             unit: row.unit.clone(),
-            difference_percent: Some((row.ours / row.published.unwrap_or(row.expected) - 1.0) * 100.0)
-                .filter(|percent| percent.is_finite()),
+            difference_percent: Some(
+                (row.ours / row.published.unwrap_or(row.expected) - 1.0) * 100.0,
+            )
+            .filter(|percent| percent.is_finite()),
         };
-        Check { rows: self.rows.iter().map(row).collect(), note: self.note.clone() }
+        Check {
+            rows: self.rows.iter().map(row).collect(),
+            note: self.note.clone(),
+        }
     }
 }
 
 /// Compares a version of the flux with the published values, or takes the comparison that is kept.
-pub(crate) async fn compare(settings: &Settings, store: &Store, flux: &Manifest) -> Result<Comparison> {
+pub(crate) async fn compare(
+    settings: &Settings,
+    store: &Store,
+    flux: &Manifest,
+) -> Result<Comparison> {
     let key = key(flux);
     if let Some(kept) = read(store, &key).await? {
         return Ok(kept);
@@ -51,8 +60,13 @@ pub(crate) async fn compare(settings: &Settings, store: &Store, flux: &Manifest)
     let engine = embedded::cluster(settings, store.clone());
     let rows = compute::compare(&engine, &flux.product).await?;
     progress::done(&bar, &format!("{} beside published ones", rows.len()));
-    let comparison = Comparison { rows, note: compute::published::CITATION.to_owned() };
-    store.put_new(&key, Bytes::from(serde_json::to_vec(&comparison)?)).await?;
+    let comparison = Comparison {
+        rows,
+        note: compute::published::CITATION.to_owned(),
+    };
+    store
+        .put_new(&key, Bytes::from(serde_json::to_vec(&comparison)?))
+        .await?;
     Ok(comparison)
 }
 
@@ -61,7 +75,9 @@ pub(crate) async fn stored(store: &Store) -> Result<Option<Check>> {
     let Some(flux) = storage::manifests::latest(store, &SETS[0].product.parse()?).await? else {
         return Ok(None);
     };
-    Ok(read(store, &key(&flux)).await?.map(|comparison| comparison.to_wire()))
+    Ok(read(store, &key(&flux))
+        .await?
+        .map(|comparison| comparison.to_wire()))
 }
 
 fn key(flux: &Manifest) -> ObjectKey {

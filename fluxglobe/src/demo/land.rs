@@ -28,12 +28,23 @@ pub(crate) async fn has_landed(store: &Store, sets: &[Set]) -> Result<bool> {
 /// # Errors
 /// A file was refused: the demo's own files all fit.
 pub(crate) async fn land(store: &Store, log: &Arc<EmbeddedLog>, files: &[PathBuf]) -> Result<()> {
-    let service = IngestService::new(store.clone(), Arc::clone(log) as Arc<dyn EventLog>, Settings::with_current_program()?);
+    let service = IngestService::new(
+        store.clone(),
+        Arc::clone(log) as Arc<dyn EventLog>,
+        Settings::with_current_program()?,
+    );
     service.notify(files, None, None).await?;
     let bar = LandingBar::new(files.len());
     let outcomes = service.drain(&bar).await?;
-    let refused: Vec<_> = outcomes.iter().filter(|outcome| outcome.is_rejected()).collect();
-    bar.done(&format!("{} files in {} products", outcomes.len() - refused.len(), count_products(&outcomes)));
+    let refused: Vec<_> = outcomes
+        .iter()
+        .filter(|outcome| outcome.is_rejected())
+        .collect();
+    bar.done(&format!(
+        "{} files in {} products",
+        outcomes.len() - refused.len(),
+        count_products(&outcomes)
+    ));
     match refused.first() {
         Some(first) => bail!("{} files were refused, the first: {first}", refused.len()),
         None => Ok(()),
@@ -41,6 +52,9 @@ pub(crate) async fn land(store: &Store, log: &Arc<EmbeddedLog>, files: &[PathBuf
 }
 
 fn count_products(outcomes: &[Outcome]) -> usize {
-    let products: BTreeSet<_> = outcomes.iter().filter_map(|outcome| Some(&outcome.manifest()?.product)).collect();
+    let products: BTreeSet<_> = outcomes
+        .iter()
+        .filter_map(|outcome| Some(&outcome.manifest()?.product))
+        .collect();
     products.len()
 }

@@ -19,7 +19,10 @@ use crate::demo::source::{FILES_PER_SET, SETS, Set};
 use crate::{embedded, progress};
 
 /// What to land where nothing can be fetched. A quarter of the full size along each side is made in seconds.
-const SYNTHETIC: Set = Set { folder: "", product: "china-sea-synthetic" };
+const SYNTHETIC: Set = Set {
+    folder: "",
+    product: "china-sea-synthetic",
+};
 const SYNTHETIC_SCALE: f64 = 0.25;
 const SYNTHETIC_SEED: u64 = 1;
 
@@ -42,7 +45,9 @@ pub(crate) async fn run(settings: &Settings, options: Demo) -> Result<ExitCode> 
     let flux = embedded::manifest(&store, &inputs.flux, &settings.data).await?;
     match &check {
         Some(check) => progress::result(&table::against_published(check))?,
-        None => progress::result(&table::synthetic(&embedded::cluster(settings, store.clone()), &flux).await?)?,
+        None => progress::result(
+            &table::synthetic(&embedded::cluster(settings, store.clone()), &flux).await?,
+        )?,
     }
     let wire = check.as_ref().map(check::Comparison::to_wire);
     let server = serve::bind(settings, store.clone(), options.serve, wire).await?;
@@ -56,13 +61,20 @@ pub(crate) async fn run(settings: &Settings, options: Demo) -> Result<ExitCode> 
     for failure in &failures {
         progress::say(&format!("FAILED: {failure}"));
     }
-    Ok(if failures.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    Ok(if failures.is_empty() {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
+    })
 }
 
 /// What is to be landed: nothing if it is there, else the real files, else the synthetic product.
 async fn inputs(store: &Store, cache: &Path, options: &Demo) -> Result<Inputs> {
     if land::has_landed(store, &SETS).await? {
-        return Ok(Inputs { flux: SETS[0].product.parse()?, files: vec![] });
+        return Ok(Inputs {
+            flux: SETS[0].product.parse()?,
+            files: vec![],
+        });
     }
     match source::fetch(cache, options.pip.as_deref(), options.offline).await {
         Ok(folder) => {
@@ -70,11 +82,16 @@ async fn inputs(store: &Store, cache: &Path, options: &Demo) -> Result<Inputs> {
             for set in SETS {
                 files.extend(source::files(&folder, set)?);
             }
-            Ok(Inputs { flux: SETS[0].product.parse()?, files })
+            Ok(Inputs {
+                flux: SETS[0].product.parse()?,
+                files,
+            })
         }
         Err(error) => {
             progress::say(&format!("the real input files cannot be had: {error:#}"));
-            progress::say("going on with the generated China Sea product: SYNTHETIC data, no measurement");
+            progress::say(
+                "going on with the generated China Sea product: SYNTHETIC data, no measurement",
+            );
             synthetic_inputs(store, cache).await
         }
     }
@@ -83,7 +100,10 @@ async fn inputs(store: &Store, cache: &Path, options: &Demo) -> Result<Inputs> {
 async fn synthetic_inputs(store: &Store, cache: &Path) -> Result<Inputs> {
     let flux = SYNTHETIC.product.parse()?;
     if land::has_landed(store, &[SYNTHETIC]).await? {
-        return Ok(Inputs { flux, files: vec![] });
+        return Ok(Inputs {
+            flux,
+            files: vec![],
+        });
     }
     std::fs::create_dir_all(cache)?;
     let file = cache.join("china-sea-synthetic.h5");
@@ -92,11 +112,18 @@ async fn synthetic_inputs(store: &Store, cache: &Path) -> Result<Inputs> {
         generate::china_sea(&unfinished, SYNTHETIC_SCALE, SYNTHETIC_SEED)?;
         std::fs::rename(&unfinished, &file)?;
     }
-    Ok(Inputs { flux, files: vec![file] })
+    Ok(Inputs {
+        flux,
+        files: vec![file],
+    })
 }
 
 /// Lands, accumulates and compares; what is done already is not done again.
-async fn compute(settings: &Settings, store: &Store, inputs: &Inputs) -> Result<Option<check::Comparison>> {
+async fn compute(
+    settings: &Settings,
+    store: &Store,
+    inputs: &Inputs,
+) -> Result<Option<check::Comparison>> {
     let accumulated = inputs.flux.accumulated()?;
     let flux = storage::manifests::latest(store, &inputs.flux).await?;
     let derived = storage::manifests::latest(store, &accumulated).await?;

