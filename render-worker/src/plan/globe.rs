@@ -59,9 +59,10 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) {
     params.entry_shift = entry_shift(widest_px);
     plan.rows = rows(scene, &look, &camera, particles, job.style.optical_depth);
     let heights = height_range_m(job, scene).map(|height_m| height_m / SPHERE_RADIUS_M);
-    let horizon = (1.0 / (1.0 + camera.height)).acos() + (1.0 / (1.0 + heights[1])).acos() + 2.0 * cell_rad;
+    let radius = radius_px / camera.focal_px * camera.height;
+    let horizon = cap_rad(&camera, [width_px, height_px], job, heights, radius + cell_rad);
     let half = slice_planes(plan, job, camera.up, sun, heights, horizon);
-    light_frame(plan, &camera, sun, half, heights, horizon, radius_px / camera.focal_px * camera.height);
+    light_frame(plan, &camera, sun, half, heights, horizon, radius);
     choose_cells(plan, scene, camera.up, horizon.min(PI));
 }
 
@@ -114,7 +115,8 @@ fn rows(scene: &Scene, look: &Look, camera: &Camera, particles: u32, style_depth
             let lat = 0.5 * (north + south);
             let area = (north.sin() - south.sin()) * grid.dlon_deg.to_radians();
             let per_radian_px = camera.focal_px / camera.height;
-            let radius = look.radius_px(area.max(1e-12).sqrt() * per_radian_px, particles) / per_radian_px;
+            let side = Look::side(area / (north - south), north - south);
+            let radius = look.radius_px(side * per_radian_px, particles) / per_radian_px;
             Row {
                 sin_lat: lat.sin() as f32,
                 cos_lat: lat.cos() as f32,
@@ -126,6 +128,22 @@ fn rows(scene: &Scene, look: &Look, camera: &Camera, particles: u32, style_depth
             }
         })
         .collect()
+}
+
+/// Angle round the point below the camera within which particles can be seen or shadow what is seen.
+fn cap_rad(camera: &Camera, size_px: [u32; 2], job: &RenderJob, heights: [f64; 2], margin: f64) -> f64 {
+    let distance = 1.0 + camera.height;
+    let deepest = 1.0 + heights[0];
+    let horizon = (1.0 / distance).acos() + (1.0 / (1.0 + heights[1])).acos() + margin;
+    let corner_px = f64::from(size_px[0]).hypot(f64::from(size_px[1])) / 2.0;
+    let corner = (corner_px / camera.focal_px).atan();
+    let sine = distance * corner.sin() / deepest;
+    if sine >= 1.0 {
+        return horizon;
+    }
+    let elevation = job.style.sun.elevation_deg.max(look::LOWEST_SUN_DEG).to_radians();
+    let shadow = (heights[1] - heights[0]) / elevation.tan();
+    (sine.asin() - corner + 3.0 * margin + shadow).min(horizon)
 }
 
 /// Slices across the half-way vector between light and view, over the visible cap; the vector comes back.

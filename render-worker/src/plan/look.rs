@@ -79,7 +79,7 @@ impl Look {
                 min_radius_px: 1.8,
                 max_radius_px: f64::INFINITY,
                 size_spread: 0.2,
-                shake_shift: 3,
+                shake_shift: 2,
                 area_px_per_particle: 1.8,
                 center_depth: None,
             },
@@ -102,6 +102,12 @@ impl Look {
             (CLOUDS_OVER_A_POINT / (std::f64::consts::PI * f64::from(particles))).sqrt().clamp(self.radius_cells, WIDEST_CELLS)
         };
         (cells * cell_px).clamp(least, self.max_radius_px.max(least))
+    }
+
+    /// Side of a square that stands for a cell: at least most of its longer side, so that rows leave no gaps where
+    /// meridians run together.
+    pub(super) fn side(width: f64, height: f64) -> f64 {
+        (width * height).sqrt().max(0.8 * width.max(height))
     }
 
     /// Optical depth at a particle's centre for a column of optical depth 1: what the column's depth over its area is

@@ -64,8 +64,9 @@ fn rows(scene: &Scene, level: &Level, look: &Look, col_px: f64, particles: u32, 
     (0..scene.grid.rows)
         .map(|row| {
             let (north, south) = (edge_px(row), edge_px(row + 1));
-            let area_px = (south - north).max(1e-6) * col_px;
-            let radius = look.radius_px(area_px.sqrt(), particles);
+            let height = (south - north).max(1e-6);
+            let area_px = height * col_px;
+            let radius = look.radius_px(Look::side(col_px, height), particles);
             // Rows far from the tile do not fit; they are never chosen.
             let y_sub = (north * subpixels).round().clamp(-1e9, 1e9) as i32;
             Row {

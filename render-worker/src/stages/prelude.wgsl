@@ -40,17 +40,17 @@ struct Axis {
     index: i32, fraction: f32,
 }
 
-const GROUP = 128u;
-const SCREEN_TILE_PX = 8u;
-const SCREEN_TILE_SHIFT = 7u;
-const SUBPIXELS = 16;
-const DEPTH_ONE = 4096.0;
-const MISSING = -1.0e30;
-const VIEW_TILE = 0u;
-const VIEW_GLOBE = 1u;
-const KERNEL_DOT = 0u;
-const KERNEL_BALL = 1u;
-const KERNEL_CLOUD = 2u;
+const GROUP: u32 = 128u;
+const SCREEN_TILE_PX: u32 = 8u;
+const SCREEN_TILE_SHIFT: u32 = 7u;
+const SUBPIXELS: i32 = 16;
+const DEPTH_ONE: f32 = 4096.0;
+const MISSING: f32 = -1.0e30;
+const VIEW_TILE: u32 = 0u;
+const VIEW_GLOBE: u32 = 1u;
+const KERNEL_DOT: u32 = 0u;
+const KERNEL_BALL: u32 = 1u;
+const KERNEL_CLOUD: u32 = 2u;
 
 @group(0) @binding(0) var<uniform> params: Params;
 

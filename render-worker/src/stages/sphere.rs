@@ -1,5 +1,7 @@
 //! CPU twin of `sphere.wgsl`: where the sight line of a pixel meets the sea surface of the globe.
 
+use std::f32::consts::{FRAC_PI_2, PI};
+
 use glam::Vec3;
 
 use crate::stages::layout::Params;
@@ -34,9 +36,43 @@ pub fn ground_below(params: &Params, pixel: [u32; 2]) -> Ground {
     let normal = camera + sight * (nearest_at - (1.0 - miss_sq).sqrt());
     Ground {
         on_ground: true,
-        lon_rad: normal.x.atan2(normal.y),
-        lat_rad: normal.z.clamp(-1.0, 1.0).asin(),
+        lon_rad: angle_of(normal.x, normal.y),
+        lat_rad: angle_of(normal.z, normal.truncate().length()),
         normal,
         rim_px,
+    }
+}
+
+/// Angle of a vector against the x axis, -pi to pi.
+///
+/// Source: Abramowitz and Stegun (1964), Handbook of Mathematical Functions, eq. 4.4.49; good to 1e-7.
+pub fn angle_of(y: f32, x: f32) -> f32 {
+    let wide = x.abs().max(y.abs());
+    let t = x.abs().min(y.abs()) / wide.max(1.0e-30);
+    let q = t * t;
+    let high = q * (-0.0752896400 + q * (0.0429096138 + q * (-0.0161657367 + q * 0.0028662257)));
+    let mut angle = t * (1.0 + q * (-0.3333314528 + q * (0.1999355085 + q * (-0.1420889944 + q * (0.1065626393 + high)))));
+    if y.abs() > x.abs() {
+        angle = FRAC_PI_2 - angle;
+    }
+    if x < 0.0 {
+        angle = PI - angle;
+    }
+    if y < 0.0 { -angle } else { angle }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::angle_of;
+
+    #[test]
+    fn angles_agree_with_the_arc_tangent_all_round() {
+        for i in 0..10_000 {
+            let (y, x) = (f64::from(i) * std::f64::consts::TAU / 10_000.0).sin_cos();
+            let expected = y.atan2(x);
+            let found = f64::from(angle_of(y as f32, x as f32));
+            let turn = (found - expected).abs().min(std::f64::consts::TAU - (found - expected).abs());
+            assert!(turn < 3e-7, "{x} {y}: {found} against {expected}");
+        }
     }
 }

@@ -2,6 +2,20 @@
 // Shared by the stages that see the ground of the globe through a pixel.
 const TURN = 6.2831855;
 
+// Angle of a vector against the x axis, -pi to pi: Abramowitz and Stegun 4.4.49, good to 1e-7 on every device, unlike
+// the arc functions of some.
+fn angle_of(y: f32, x: f32) -> f32 {
+    let wide = max(abs(x), abs(y));
+    let t = min(abs(x), abs(y)) / max(wide, 1.0e-30);
+    let q = t * t;
+    let high = q * (-0.0752896400 + q * (0.0429096138 + q * (-0.0161657367 + q * 0.0028662257)));
+    var angle = t * (1.0 + q * (-0.3333314528 + q * (0.1999355085 + q * (-0.1420889944 + q * (0.1065626393 + high)))));
+    if (abs(y) > abs(x)) { angle = 0.25 * TURN - angle; }
+    if (x < 0.0) { angle = 0.5 * TURN - angle; }
+    if (y < 0.0) { return -angle; }
+    return angle;
+}
+
 struct Ground { on_ground: bool, lon: f32, lat: f32, normal: vec3<f32>, rim_px: f32 }
 
 // Where the sight line of a pixel's centre meets the sea surface; `rim_px` is how far inside the globe's outline it runs.
@@ -19,7 +33,7 @@ fn ground_below(pixel: vec2<u32>) -> Ground {
     ground.on_ground = miss_sq < 1.0 && nearest_at > 0.0;
     if (!ground.on_ground) { return ground; }
     ground.normal = camera + sight * (nearest_at - sqrt(1.0 - miss_sq));
-    ground.lat = asin(clamp(ground.normal.z, -1.0, 1.0));
-    ground.lon = atan2(ground.normal.x, ground.normal.y);
+    ground.lat = angle_of(ground.normal.z, length(ground.normal.xy));
+    ground.lon = angle_of(ground.normal.x, ground.normal.y);
     return ground;
 }

@@ -11,15 +11,15 @@ use contract::tile::Tile;
 use render_worker::scene::{Frame, Interval, Scene};
 
 /// The grid of the 1-degree climatology.
-pub const ONE_DEGREE: Grid =
+pub(crate) const ONE_DEGREE: Grid =
     Grid { rows: 180, cols: 360, north_deg: 90.0, west_deg: -180.0, dlat_deg: 1.0, dlon_deg: 1.0 };
 
 /// A coarser one for quick tests.
-pub const FIVE_DEGREES: Grid =
+pub(crate) const FIVE_DEGREES: Grid =
     Grid { rows: 36, cols: 72, north_deg: 90.0, west_deg: -180.0, dlat_deg: 5.0, dlon_deg: 5.0 };
 
 /// Flux of 1 g C m⁻² a year, kg m⁻² s⁻¹.
-pub const GRAM_A_YEAR: f64 = 1e-3 / (365.25 * 86_400.0);
+pub(crate) const GRAM_A_YEAR: f64 = 1e-3 / (365.25 * 86_400.0);
 
 fn is_land(lon: f64, lat: f64) -> bool {
     let blob = |x: f64, y: f64, rx: f64, ry: f64| {
@@ -47,7 +47,7 @@ fn frame(grid: &Grid, value: impl Fn(f64, f64) -> f64) -> Arc<Frame> {
 }
 
 /// Two months of flux with ten months of carbon accumulated.
-pub fn ocean(grid: Grid) -> Scene {
+pub(crate) fn ocean(grid: Grid) -> Scene {
     let year_s = 365.25 * 86_400.0;
     let value = Interval {
         before: frame(&grid, |lon, lat| flux(lon, lat, 0.0)),
@@ -64,7 +64,7 @@ pub fn ocean(grid: Grid) -> Scene {
 }
 
 /// A job in the default style of fluxes.
-pub fn job(mode: Mode, view: View) -> RenderJob {
+pub(crate) fn job(mode: Mode, view: View) -> RenderJob {
     RenderJob {
         renderer_version: RENDERER_VERSION,
         product: "made-up@1-00000000".parse().unwrap(),
@@ -76,10 +76,10 @@ pub fn job(mode: Mode, view: View) -> RenderJob {
     }
 }
 
-pub fn tile(z: u8, x: u32, y: u32, size_px: u32) -> View {
+pub(crate) fn tile(z: u8, x: u32, y: u32, size_px: u32) -> View {
     View::Tile { tile: Tile::new(z, x, y).unwrap(), size_px }
 }
 
-pub fn globe(lon_deg: f64, lat_deg: f64, height_m: f64, size_px: u32) -> View {
+pub(crate) fn globe(lon_deg: f64, lat_deg: f64, height_m: f64, size_px: u32) -> View {
     View::Globe { lon_deg, lat_deg, height_m, width_px: size_px, height_px: size_px }
 }

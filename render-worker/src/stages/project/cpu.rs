@@ -4,6 +4,9 @@ use glam::{Vec2, Vec3};
 
 use crate::stages::layout::{Col, Params, Particle, Row, SUBPIXELS, Splat, VIEW_TILE, nearest};
 
+/// Half a cell beyond which the series for small angles is not good enough.
+const WIDE_CELL_RAD: f32 = 0.2;
+
 /// One splat a particle.
 pub fn project(params: &Params, rows: &[Row], cols: &[Col], particles: &[Particle], splats: &mut [Splat]) {
     for (splat, particle) in splats.iter_mut().zip(particles) {
@@ -18,6 +21,10 @@ pub fn project(params: &Params, rows: &[Row], cols: &[Col], particles: &[Particl
 
 /// Sine and cosine of a small angle added to one with known sine and cosine.
 pub fn turned(sin_a: f32, cos_a: f32, delta: f32) -> Vec2 {
+    if delta.abs() > WIDE_CELL_RAD {
+        let (s, c) = delta.sin_cos();
+        return Vec2::new(sin_a * c + cos_a * s, cos_a * c - sin_a * s);
+    }
     let d2 = delta * delta;
     let s = delta * (1.0 - d2 / 6.0 * (1.0 - d2 / 20.0));
     let c = 1.0 - d2 / 2.0 * (1.0 - d2 / 12.0);
@@ -73,12 +80,14 @@ fn on_globe(params: &Params, row: &Row, col: &Col, particle: &Particle) -> Splat
     let scale = params.focal_px / ahead;
     let x = sight.dot(Vec3::new(params.right_x, params.right_y, params.right_z)) * scale + params.center_px_x;
     let y = params.center_px_y - sight.dot(Vec3::new(params.up_x, params.up_y, params.up_z)) * scale;
-    let radius = row.radius * size_of(params, particle.color);
-    if x.abs().max(y.abs()) > 1.0e5 || radius * scale > params.max_radius_px {
+    let oblique = (sight.length() / ahead).sqrt();
+    let full_px = row.radius * scale * oblique;
+    let radius_px = full_px * size_of(params, particle.color);
+    if x.abs().max(y.abs()) > 1.0e5 || radius_px > params.max_radius_px {
         return Splat::default();
     }
-    let radius_px = (radius * scale).max(params.min_radius_px);
-    let thinned = row.radius * scale / radius_px;
+    let radius_px = radius_px.max(params.min_radius_px);
+    let thinned = full_px / radius_px;
     let u = place.dot(Vec3::new(params.light_u_x, params.light_u_y, params.light_u_z)) - params.light_u0;
     let v = place.dot(Vec3::new(params.light_v_x, params.light_v_y, params.light_v_z)) - params.light_v0;
     let to_light = params.light_texels_per_unit * params.light_unit as f32;

@@ -4,9 +4,13 @@
 @group(0) @binding(3) var<storage, read> particles: array<Particle>;
 @group(0) @binding(4) var<storage, read_write> splats: array<Splat>;
 
+// Half a cell beyond which the series for small angles is not good enough.
+const WIDE_CELL_RAD = 0.2;
+
 // Sine and cosine of a small angle added to one with known sine and cosine: exact to 1e-7 below 0.2 rad, unlike
 // the sine of some devices.
 fn turned(sin_a: f32, cos_a: f32, delta: f32) -> vec2<f32> {
+    if (abs(delta) > WIDE_CELL_RAD) { return vec2(sin_a * cos(delta) + cos_a * sin(delta), cos_a * cos(delta) - sin_a * sin(delta)); }
     let d2 = delta * delta;
     let s = delta * (1.0 - d2 / 6.0 * (1.0 - d2 / 20.0));
     let c = 1.0 - d2 / 2.0 * (1.0 - d2 / 12.0);
@@ -63,12 +67,15 @@ fn on_globe(particle: Particle) -> Splat {
     let scale = params.focal_px / ahead;
     let x = dot(sight, vec3(params.right_x, params.right_y, params.right_z)) * scale + params.center_px_x;
     let y = params.center_px_y - dot(sight, vec3(params.up_x, params.up_y, params.up_z)) * scale;
-    let radius = row.radius * size_of(particle.color);
-    if (max(abs(x), abs(y)) > 1.0e5 || radius * scale > params.max_radius_px) { return splat; }
+    // A ball away from the middle of the picture is drawn as an ellipse, longer by 1 / cos; the disc has its area.
+    let oblique = sqrt(length(sight) / ahead);
+    let full_px = row.radius * scale * oblique;
+    let radius_px = full_px * size_of(particle.color);
+    if (max(abs(x), abs(y)) > 1.0e5 || radius_px > params.max_radius_px) { return splat; }
     splat.x_sub = nearest(x * f32(SUBPIXELS)) - params.origin_x_px * SUBPIXELS;
     splat.y_sub = nearest(y * f32(SUBPIXELS)) - params.origin_y_px * SUBPIXELS;
-    splat.radius_px = max(radius * scale, params.min_radius_px);
-    let thinned = row.radius * scale / splat.radius_px;
+    splat.radius_px = max(radius_px, params.min_radius_px);
+    let thinned = full_px / splat.radius_px;
     splat.tau = particle.depth * row.depth_gain * thinned * thinned;
     splat.light_depth = particle.depth * row.depth_gain * row.radius * row.radius * params.light_depth_gain;
     splat.slice = slice_of(dot(place, vec3(params.half_x, params.half_y, params.half_z)));
