@@ -160,7 +160,7 @@ export class BudgetPanel {
       el(
         "p",
         { class: "muted" },
-        `${row.start.slice(0, 10)} to ${row.end.slice(0, 10)}; coverage ${numberText(row.coverage_percent, 1)} % of ${areaText(row.area_m2)}. `,
+        `${row.start.slice(0, 10)} to ${row.end.slice(0, 10)}; coverage ${numberText(row.coverage_percent, 1)} % of the region: data on ${areaText(row.area_m2)}. `,
         isCarbon ? "Negative: the sea takes carbon up." : null,
       ),
     ];

@@ -71,6 +71,7 @@ export class Controls {
 
   setProduct(product: Product): void {
     this.#product.value = product.id;
+    this.#product.title = chemistry(product.title);
     this.#legend.replaceChildren(legendView(product.legend));
     this.#source.textContent = chemistry(product.source);
     this.#source.title = product.source;

@@ -9,6 +9,7 @@ import {
   ImageryLayer,
   Ion,
   Math as CesiumMath,
+  PerspectiveFrustum,
   SceneTransforms,
   TileMapServiceImageryProvider,
   buildModuleUrl,
@@ -22,6 +23,8 @@ const BASE_LOOK = { brightness: 0.62, saturation: 0.55, contrast: 1.08, gamma: 1
 const MIN_HEIGHT_M = 50_000;
 const MAX_HEIGHT_M = 60_000_000;
 const ZOOM_STEP = 0.35;
+/** Opening of the shorter side, the same as the server's camera has, so that a rendered view shows what the globe shows. */
+const OPENING_DEG = 45;
 
 export interface GlobeOptions {
   /** Larger is coarser and asks for fewer tiles; 2 is Cesium's own. */
@@ -56,6 +59,8 @@ export class Globe {
     this.widget.resolutionScale = options.resolutionScale;
     this.#dress(options);
     this.#keys();
+    new ResizeObserver(() => this.#lens(container)).observe(container);
+    this.#lens(container);
   }
 
   get scene(): Scene {
@@ -136,8 +141,8 @@ export class Globe {
     const [west, south, east, north] = bounds;
     const span = Math.max(north - south, (((east - west) % 360) + 360) % 360 || 360);
     const lon = west + ((((east - west) % 360) + 360) % 360) / 2;
-    // A box of 40 degrees fills the window from about 6000 km; nearer or further in proportion.
-    const heightKm = Math.min(HOME.heightKm, Math.max(800, span * 150));
+    // A box of 40 degrees fills the window from about 4800 km; nearer or further in proportion.
+    const heightKm = Math.min(HOME.heightKm, Math.max(800, span * 120));
     this.fly({ lon, lat: (south + north) / 2, heightKm, headingDeg: 0, pitchDeg: -90 }, 1.2);
   }
 
@@ -158,6 +163,16 @@ export class Globe {
     control.minimumZoomDistance = MIN_HEIGHT_M;
     control.maximumZoomDistance = MAX_HEIGHT_M;
     control.enableCollisionDetection = false;
+  }
+
+  /** Cesium's opening is that of the longer side. */
+  #lens(container: HTMLElement): void {
+    const [width, height] = [container.clientWidth, container.clientHeight];
+    const { frustum } = this.scene.camera;
+    if (width === 0 || height === 0 || !(frustum instanceof PerspectiveFrustum)) return;
+    const stretch = Math.max(width, height) / Math.min(width, height);
+    frustum.fov = 2 * Math.atan(Math.tan(CesiumMath.toRadians(OPENING_DEG / 2)) * stretch);
+    this.scene.requestRender();
   }
 
   /** The globe takes the focus and turns by arrow keys, so that it can be used without a pointer. */

@@ -31,7 +31,7 @@ import { chooseQuality } from "./quality";
 import { INITIAL, Store } from "./state";
 import { TileCounts } from "./tiles";
 import { Timeline } from "./timeline";
-import { clampToRange } from "./time";
+import { rangeOf } from "./time";
 import { ViewDialog } from "./view";
 
 /** Browsers refuse a page that rewrites its address too often. */
@@ -195,9 +195,10 @@ function useProduct(): void {
   if (known.length === 0) notices.show("steps", `“${chosen.title}” has no periods yet.`);
   else notices.clear("steps");
   const mode = chosen.modes.includes(store.state.mode) ? store.state.mode : (chosen.modes[0] ?? "map");
-  const timeMs = Number.isFinite(store.state.timeMs)
-    ? clampToRange(known, store.state.timeMs)
-    : (known[0]?.midMs ?? Number.NaN);
+  const range = rangeOf(known);
+  const isInRange = range !== undefined && store.state.timeMs >= range.startMs && store.state.timeMs <= range.endMs;
+  // Another product's years say nothing here: it begins with its own first picture.
+  const timeMs = isInRange ? store.state.timeMs : (known[0]?.midMs ?? Number.NaN);
   store.set({ mode, timeMs });
   if (!contains(chosen.bounds, store.state.camera) && asked.camera === undefined) globe.lookAt(chosen.bounds);
 }

@@ -37,7 +37,7 @@ export interface State {
 }
 
 /** The tropical Pacific, where the sea breathes out most, with both subtropical sinks in sight. */
-export const HOME: CameraView = { lon: -150, lat: 8, heightKm: 19000, headingDeg: 0, pitchDeg: -90 };
+export const HOME: CameraView = { lon: -150, lat: 8, heightKm: 15000, headingDeg: 0, pitchDeg: -90 };
 
 export const INITIAL: State = {
   product: null,

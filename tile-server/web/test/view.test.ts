@@ -25,7 +25,7 @@ describe("the address", () => {
   });
 
   it("leaves out what is as it is at first", () => {
-    expect(encodeHash(INITIAL)).toBe("#mode=map&camera=-150,8,19000");
+    expect(encodeHash(INITIAL)).toBe("#mode=map&camera=-150,8,15000");
   });
 
   it("takes nothing from nonsense", () => {
