@@ -28,7 +28,7 @@ pub enum ComputeError {
         quantity: Quantity,
     },
     /// The asked period holds no step.
-    #[error("{product} has no step in {asked}; it covers {}", extent(.covered))]
+    #[error("{product} has no step in {asked}; it covers {}", extent(*.covered))]
     NoStep {
         /// Product.
         product: ProductId,
@@ -164,7 +164,7 @@ fn list(known: &[ProductId]) -> String {
     }
 }
 
-fn extent(covered: &Option<Period>) -> String {
+fn extent(covered: Option<Period>) -> String {
     covered.map_or_else(|| "nothing".to_owned(), |period| period.to_string())
 }
 

@@ -15,6 +15,7 @@ pub mod published;
 pub mod region;
 mod scan;
 mod session;
+mod standalone;
 pub mod stats;
 
 pub use budget::{BudgetAnswer, BudgetQuery, BudgetRow, BudgetStep, budget};

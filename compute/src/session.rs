@@ -5,8 +5,9 @@
 use std::num::NonZeroUsize;
 use std::sync::Arc;
 
-use ballista::prelude::{SessionConfigExt as _, SessionContextExt as _};
+use ballista::extension::SessionConfigExt as _;
 use datafusion::catalog::MemoryCatalogProviderList;
+use datafusion::error::DataFusionError;
 use datafusion::execution::FunctionRegistry as _;
 use datafusion::execution::context::SessionContext;
 use datafusion::execution::runtime_env::{RuntimeEnv, RuntimeEnvBuilder};
@@ -16,8 +17,8 @@ use storage::Store;
 use tokio::sync::OnceCell;
 use url::Url;
 
-use crate::ComputeError;
-use crate::functions;
+use crate::standalone::{self, WorkFolder, WorkLease};
+use crate::{ComputeError, functions};
 
 /// A query engine over one store; clones share it. It starts with its first query.
 #[derive(Clone)]
@@ -30,7 +31,28 @@ struct Inner {
     kind: Kind,
     partitions: NonZeroUsize,
     /// The session that all queries share; made once.
-    session: OnceCell<SessionState>,
+    session: OnceCell<Session>,
+}
+
+struct Session {
+    state: SessionState,
+    /// Where Ballista's executor works; none without it.
+    work: Option<Arc<WorkFolder>>,
+}
+
+/// A context for one query: the shared session, tables of its own, and a claim on intermediate files.
+pub(crate) struct QueryContext {
+    context: SessionContext,
+    /// Dropped with the context: the files of a query outlive its last batch.
+    _lease: Option<WorkLease>,
+}
+
+impl std::ops::Deref for QueryContext {
+    type Target = SessionContext;
+
+    fn deref(&self) -> &SessionContext {
+        &self.context
+    }
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -78,9 +100,10 @@ impl Engine {
         self.session().await.map(|_session| ())
     }
 
-    /// A context for one query: the shared session, tables of its own.
-    pub(crate) async fn context(&self) -> Result<SessionContext, ComputeError> {
-        let shared = self.session().await?.clone();
+    /// A context for one query.
+    pub(crate) async fn context(&self) -> Result<QueryContext, ComputeError> {
+        let session = self.session().await?;
+        let shared = session.state.clone();
         let session_id = shared.session_id().to_owned();
         let config = shared
             .config()
@@ -91,10 +114,17 @@ impl Engine {
             .with_catalog_list(Arc::new(MemoryCatalogProviderList::new()))
             .with_config(config)
             .build();
-        Ok(SessionContext::new_with_state(state))
+        let lease = match &session.work {
+            Some(work) => Some(work.lease().await),
+            None => None,
+        };
+        Ok(QueryContext {
+            context: SessionContext::new_with_state(state),
+            _lease: lease,
+        })
     }
 
-    async fn session(&self) -> Result<&SessionState, ComputeError> {
+    async fn session(&self) -> Result<&Session, ComputeError> {
         self.inner
             .session
             .get_or_try_init(|| self.inner.start())
@@ -103,26 +133,26 @@ impl Engine {
 }
 
 impl Inner {
-    async fn start(&self) -> Result<SessionState, ComputeError> {
+    async fn start(&self) -> Result<Session, ComputeError> {
         let state = session_state(&self.store, self.kind, self.partitions)?;
         if self.kind == Kind::Local {
-            return Ok(state);
+            return Ok(Session { state, work: None });
         }
         tracing::info!(
             partitions = self.partitions,
             "starting Ballista in this process"
         );
-        let context = SessionContext::standalone_with_state(state)
+        let (mut state, work) = standalone::start(state, self.partitions.get())
             .await
-            .map_err(ComputeError::engine("starting Ballista"))?;
+            .map_err(|e| {
+                ComputeError::engine("starting Ballista")(DataFusionError::External(e.into()))
+            })?;
         // The upgrade to a Ballista session resets the functions to the built-in ones.
-        for function in functions::scalar_functions() {
-            context.register_udf(function.as_ref().clone());
-        }
-        for function in functions::aggregate_functions() {
-            context.register_udaf(function.as_ref().clone());
-        }
-        Ok(context.state())
+        register_functions(&mut state)?;
+        Ok(Session {
+            state,
+            work: Some(work),
+        })
     }
 }
 
@@ -152,19 +182,19 @@ fn session_state(
         )
         .with_runtime_env(runtime(store)?)
         .build();
-    for function in functions::scalar_functions() {
-        register(state.register_udf(function))?;
-    }
-    for function in functions::aggregate_functions() {
-        register(state.register_udaf(function))?;
-    }
+    register_functions(&mut state)?;
     Ok(state)
 }
 
-fn register<T>(result: datafusion::error::Result<T>) -> Result<(), ComputeError> {
-    result
-        .map(|_replaced| ())
-        .map_err(ComputeError::engine("registering functions"))
+fn register_functions(state: &mut SessionState) -> Result<(), ComputeError> {
+    let failed = || ComputeError::engine("registering functions");
+    for function in functions::scalar_functions() {
+        state.register_udf(function).map_err(failed())?;
+    }
+    for function in functions::aggregate_functions() {
+        state.register_udaf(function).map_err(failed())?;
+    }
+    Ok(())
 }
 
 /// What reads files: DataFusion knows local folders by itself, any other store is ours to name.
@@ -178,4 +208,67 @@ fn runtime(store: &Store) -> Result<Arc<RuntimeEnv>, ComputeError> {
         runtime.register_object_store(&url, store.object_store());
     }
     Ok(Arc::new(runtime))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Name of the operator at the top of a query's plan.
+    async fn top_of_plan(engine: &Engine) -> String {
+        let context = engine.context().await.unwrap();
+        let query = context
+            .sql("SELECT SUM(a) FROM (VALUES (1), (2)) t(a)")
+            .await
+            .unwrap();
+        query
+            .create_physical_plan()
+            .await
+            .unwrap()
+            .name()
+            .to_owned()
+    }
+
+    #[tokio::test(flavor = "multi_thread")]
+    async fn a_standalone_engine_hands_its_queries_to_ballista_and_a_local_one_does_not() {
+        let parts = NonZeroUsize::new(2).unwrap();
+        let standalone = Engine::standalone(Store::memory(), parts);
+        assert_eq!(top_of_plan(&standalone).await, "DistributedQueryExec");
+        assert_ne!(
+            top_of_plan(&Engine::local(Store::memory())).await,
+            "DistributedQueryExec"
+        );
+    }
+
+    #[tokio::test(flavor = "multi_thread")]
+    async fn intermediate_files_go_with_the_last_query_that_may_need_them() {
+        let engine = Engine::standalone(Store::memory(), NonZeroUsize::MIN);
+        let (first, second) = (
+            engine.context().await.unwrap(),
+            engine.context().await.unwrap(),
+        );
+        let query = first
+            .sql("SELECT SUM(a) FROM (VALUES (1), (2)) t(a)")
+            .await
+            .unwrap();
+        query.collect().await.unwrap();
+        let session = engine.session().await.unwrap();
+        let folder = session.work.as_ref().unwrap().path();
+        let files = || std::fs::read_dir(folder).unwrap().count();
+        assert!(
+            files() > 0,
+            "the query left nothing: this test tests nothing"
+        );
+        drop(first);
+        assert!(files() > 0, "files went while a query was running");
+        drop(second);
+        let emptied = async {
+            while files() > 0 {
+                tokio::task::yield_now().await;
+            }
+        };
+        tokio::time::timeout(std::time::Duration::from_secs(20), emptied)
+            .await
+            .unwrap();
+    }
 }

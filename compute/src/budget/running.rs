@@ -58,9 +58,9 @@ mod tests {
         let steps: Vec<[f32; 1]> = (0..50).map(|i| [(i as f32 - 20.3) * 1.3e-10]).collect();
         let run = |steps: &[[f32; 1]]| {
             let mut sums = [0];
-            steps
-                .iter()
-                .for_each(|step| add_step(&mut sums, step, 2_678_400.0).unwrap());
+            for step in steps {
+                add_step(&mut sums, step, 2_678_400.0).unwrap();
+            }
             sums
         };
         let mut halves = run(&steps[17..]);

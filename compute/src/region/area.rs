@@ -53,9 +53,6 @@ pub(super) fn integral_m2(earth: Earth, from: [f64; 2], to: [f64; 2], base: f64)
     if width_rad == 0.0 {
         return 0.0;
     }
-    if from[1] == to[1] {
-        return width_rad * (earth.zone_area_m2_per_rad(from[1].to_radians()) - base);
-    }
     let pieces = ((to[1] - from[1]).abs() / SPAN_DEG).ceil().max(1.0);
     let step_deg = (to[1] - from[1]) / pieces;
     let mut mean = 0.0;

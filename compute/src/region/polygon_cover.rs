@@ -103,7 +103,7 @@ impl<'a> Cover<'a> {
         let (south, north) = (from[1].min(to[1]), from[1].max(to[1]));
         let rows = self.lats_deg.len() - 1;
         // An edge along a parallel has no height: it brings nothing to cells east of it.
-        if south == north || north <= self.lats_deg[rows] || south >= self.lats_deg[0] {
+        if south >= north || north <= self.lats_deg[rows] || south >= self.lats_deg[0] {
             return;
         }
         // Rows are found by the grid's rule, then widened by one against rounding; empty cuts fall away.
@@ -216,13 +216,8 @@ fn checked(area_m2: f64, whole_m2: f64) -> Result<f64, ComputeError> {
 }
 
 fn lon_at(from: [f64; 2], to: [f64; 2], lat: f64) -> f64 {
-    if lat == from[1] {
-        from[0]
-    } else if lat == to[1] {
-        to[0]
-    } else {
-        from[0] + (to[0] - from[0]) * (lat - from[1]) / (to[1] - from[1])
-    }
+    let lon = from[0] + (to[0] - from[0]) * (lat - from[1]) / (to[1] - from[1]);
+    lon.clamp(from[0].min(to[0]), from[0].max(to[0]))
 }
 
 fn lat_at(from: [f64; 2], to: [f64; 2], lon: f64) -> f64 {

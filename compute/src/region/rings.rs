@@ -129,7 +129,7 @@ fn close_round_pole(corners: &mut Vec<[f64; 2]>, turns: f64) -> Result<(), Compu
     if turns == 0.0 {
         return Ok(());
     }
-    if turns.abs() != 1.0 {
+    if turns.abs() > 1.5 {
         return Err(bad("a ring goes round the earth more than once"));
     }
     let [lon, lat] = corners[0];

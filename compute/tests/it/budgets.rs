@@ -198,8 +198,8 @@ async fn a_region_larger_than_the_grid_is_covered_in_part() {
     assert!((row.coverage_percent / (100.0 * held_m2 / asked_m2) - 1.0).abs() < 1e-12);
 }
 
-#[tokio::test(flavor = "multi_thread")]
-async fn questions_without_an_answer_are_refused_with_the_reason() {
+/// A small grid with a product of fluxes and one of temperatures, January 2000.
+async fn small_products(store: &storage::Store) {
     let grid = Grid {
         rows: 10,
         cols: 20,
@@ -208,71 +208,53 @@ async fn questions_without_an_answer_are_refused_with_the_reason() {
         dlat_deg: 1.0,
         dlon_deg: 1.0,
     };
-    let (_folder, store) = folder_store();
-    let step = || {
-        vec![(
-            Period::month(2000, 1).unwrap(),
-            vec![FLUX; grid.cell_count()],
-        )]
-    };
-    land(
-        &store,
-        &product("flux"),
-        Quantity::CarbonFlux,
-        grid,
-        &step(),
-        1,
-    )
-    .await;
-    land(
-        &store,
-        &product("sst"),
-        Quantity::SeaSurfaceTemperature,
-        grid,
-        &step(),
-        1,
-    )
-    .await;
-    let engine = Engine::local(store);
-    let refusal = async |query: compute::BudgetQuery| -> ComputeError {
-        budget(&engine, &query).await.unwrap_err()
-    };
+    for (name, quantity) in [
+        ("flux", Quantity::CarbonFlux),
+        ("sst", Quantity::SeaSurfaceTemperature),
+    ] {
+        let values = vec![FLUX; grid.cell_count()];
+        let steps = [(Period::month(2000, 1).unwrap(), values)];
+        land(store, &product(name), quantity, grid, &steps, 1).await;
+    }
+}
 
-    let unknown = refusal(total(&product("nothing"), "global")).await;
+async fn refusal(engine: &Engine, query: compute::BudgetQuery) -> ComputeError {
+    budget(engine, &query).await.unwrap_err()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn questions_without_an_answer_are_refused_with_the_reason() {
+    let (_folder, store) = folder_store();
+    small_products(&store).await;
+    let engine = Engine::local(store);
+
+    let unknown = refusal(&engine, total(&product("nothing"), "global")).await;
     assert_eq!(unknown.class(), ErrorClass::NotFound);
     assert!(unknown.to_string().contains("flux, sst"), "{unknown}");
-    let no_flux = refusal(total(&product("sst"), "global")).await;
-    assert!(
-        no_flux.to_string().contains("need a carbon flux"),
-        "{no_flux}"
-    );
-    let elsewhere = refusal(total(&product("flux"), "-60,0,-50,5")).await;
-    assert!(
-        elsewhere.to_string().contains("does not touch"),
-        "{elsewhere}"
-    );
-    let early = compute::BudgetQuery {
-        to: Some("1999".parse().unwrap()),
+    let no_flux = refusal(&engine, total(&product("sst"), "global")).await;
+    let text = no_flux.to_string();
+    assert!(text.contains("need a carbon flux"), "{text}");
+    let elsewhere = refusal(&engine, total(&product("flux"), "-60,0,-50,5")).await;
+    let text = elsewhere.to_string();
+    assert!(text.contains("does not touch"), "{text}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn periods_without_a_step_are_refused_with_what_there_is() {
+    let (_folder, store) = folder_store();
+    small_products(&store).await;
+    let engine = Engine::local(store);
+    let between = |from: &str, to: &str| compute::BudgetQuery {
+        from: from.parse().ok(),
+        to: to.parse().ok(),
         ..total(&product("flux"), "global")
     };
-    let late = compute::BudgetQuery {
-        from: Some("2001".parse().unwrap()),
-        ..total(&product("flux"), "global")
-    };
-    for query in [early, late] {
-        let no_step = refusal(query).await;
-        assert!(
-            no_step
-                .to_string()
-                .contains("2000-01-01T00:00:00Z/2000-02-01T00:00:00Z"),
-            "{no_step}"
-        );
+    for query in [between("", "1999"), between("2001", "")] {
+        let no_step = refusal(&engine, query).await;
+        let covered = "2000-01-01T00:00:00Z/2000-02-01T00:00:00Z";
+        assert!(no_step.to_string().contains(covered), "{no_step}");
         assert_eq!(no_step.class(), ErrorClass::BadRequest);
     }
-    let backwards = compute::BudgetQuery {
-        from: Some("2001".parse().unwrap()),
-        to: Some("2000".parse().unwrap()),
-        ..total(&product("flux"), "global")
-    };
-    assert_eq!(refusal(backwards).await.class(), ErrorClass::BadRequest);
+    let backwards = refusal(&engine, between("2001", "2000")).await;
+    assert_eq!(backwards.class(), ErrorClass::BadRequest);
 }
