@@ -155,7 +155,8 @@ export const healthUrl = () => address("healthz");
 /** Undefined where the server has no published values to hold against. */
 export async function check(): Promise<Check | undefined> {
   try {
-    return await getJson<Check>(address("api/check"));
+    const answer = await getJson<Check>(address("api/check"));
+    return answer.rows.length > 0 ? answer : undefined;
   } catch (error) {
     if (error instanceof ApiError && error.status === 404) return undefined;
     throw error;

@@ -6,7 +6,7 @@ import type { Bounds } from "./box";
 import { barChart, type Chart } from "./chart";
 import { budgetCsv } from "./csv";
 import { el, icon, saveText } from "./dom";
-import { areaText, numberText, unitText } from "./format";
+import { areaText, digitsFor, numberText, unitText } from "./format";
 import { DOWNLOAD } from "./icons";
 import { manifestLine } from "./manifest";
 import type { Store } from "./state";
@@ -153,7 +153,11 @@ export class BudgetPanel {
       el(
         "p",
         { class: "reading" },
-        el("strong", { id: "budget-total", "data-value": String(row.budget) }, numberText(row.budget, 1)),
+        el(
+          "strong",
+          { id: "budget-total", "data-value": String(row.budget) },
+          numberText(row.budget, totalDigits(row.budget)),
+        ),
         el("span", { class: "unit" }, unit),
         petagrams,
       ),
@@ -165,6 +169,11 @@ export class BudgetPanel {
       ),
     ];
   }
+}
+
+/** Four figures and at least one decimal: -1404.3, 27.03, 0.1234. */
+function totalDigits(total: number): number {
+  return Math.max(1, digitsFor(total, 4));
 }
 
 function table(answer: Budget, unit: string): HTMLElement {

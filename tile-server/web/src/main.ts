@@ -165,13 +165,15 @@ async function begin(): Promise<void> {
 
 /** Regions and the check table: the globe does not wait for them. */
 async function loadAside(): Promise<void> {
+  // Nobody publishes budgets of made-up data.
+  const isAllSynthetic = catalogue.products.every((each) => each.synthetic);
+  const published = isAllSynthetic ? Promise.resolve(undefined) : api.check();
   await Promise.all([
     api
       .regions()
       .then((regions) => budgetPanel.setRegions(regions))
       .catch((error: unknown) => report("regions", error)),
-    api
-      .check()
+    published
       .then((check) => {
         panels.offer("check", check !== undefined);
         if (check) drawCheck(panels.bodies.check, check);
