@@ -7,7 +7,10 @@ use contract::key::ObjectKey;
 pub enum StorageError {
     /// The object store refused or lost a request.
     #[error("object {key:?}: {source}")]
-    Object { key: String, source: object_store::Error },
+    Object {
+        key: String,
+        source: object_store::Error,
+    },
     /// Something else is stored under a key that was to be created.
     #[error("{key} exists with other content; stored objects never change")]
     Conflict { key: ObjectKey },
@@ -19,7 +22,10 @@ pub enum StorageError {
     Location { location: String, reason: String },
     /// The event log cannot be read or written.
     #[error("event log {path}: {source}")]
-    Log { path: String, source: std::io::Error },
+    Log {
+        path: String,
+        source: std::io::Error,
+    },
 }
 
 impl StorageError {

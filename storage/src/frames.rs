@@ -53,9 +53,7 @@ pub fn encode(grid: &Grid, values: &[f32], period: Period) -> Result<Bytes, Stor
         lists.append(true);
     }
     let time = |t: contract::time::TimeMs| {
-        Arc::new(
-            TimestampMillisecondArray::from(vec![t.ms(); windows.len()]).with_timezone("UTC"),
-        )
+        Arc::new(TimestampMillisecondArray::from(vec![t.ms(); windows.len()]).with_timezone("UTC"))
     };
     let batch = RecordBatch::try_new(
         Arc::clone(&SCHEMA),
@@ -77,7 +75,11 @@ pub fn decode(object: &str, content: Bytes, grid: &Grid) -> Result<Vec<f32>, Sto
     let mut values = vec![f32::NAN; grid.cell_count()];
     let chunks = parquet_table::numbers(&batch, 0);
     if batch.num_rows() != windows.len() {
-        let reason = format!("{} chunks, its grid has {}", batch.num_rows(), windows.len());
+        let reason = format!(
+            "{} chunks, its grid has {}",
+            batch.num_rows(),
+            windows.len()
+        );
         return Err(StorageError::damaged(object, reason));
     }
     for row in 0..batch.num_rows() {

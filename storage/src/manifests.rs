@@ -14,10 +14,7 @@ pub async fn products(store: &Store) -> Result<Vec<ProductId>, StorageError> {
 }
 
 /// The newest manifest of a product, if it has one.
-pub async fn latest(
-    store: &Store,
-    product: &ProductId,
-) -> Result<Option<Manifest>, StorageError> {
+pub async fn latest(store: &Store, product: &ProductId) -> Result<Option<Manifest>, StorageError> {
     let keys = store.list(&format!("manifests/{product}")).await?;
     match keys.last() {
         Some(key) => read(store, key).await.map(Some),
@@ -43,15 +40,14 @@ pub async fn load(store: &Store, id: &ManifestId) -> Result<Manifest, StorageErr
 /// `Conflict` if another writer took the number: read the newest one again and build on it.
 pub async fn commit(store: &Store, manifest: &Manifest) -> Result<(), StorageError> {
     let key = ObjectKey::manifest(&manifest.product, manifest.number);
-    let json = serde_json::to_vec(manifest)
-        .map_err(|e| StorageError::damaged(key.as_str(), e))?;
+    let json = serde_json::to_vec(manifest).map_err(|e| StorageError::damaged(key.as_str(), e))?;
     store.put_new(&key, Bytes::from(json)).await.map(|_new| ())
 }
 
 async fn read(store: &Store, key: &ObjectKey) -> Result<Manifest, StorageError> {
     let content = store.get(key).await?;
-    let manifest: Manifest = serde_json::from_slice(&content)
-        .map_err(|e| StorageError::damaged(key.as_str(), e))?;
+    let manifest: Manifest =
+        serde_json::from_slice(&content).map_err(|e| StorageError::damaged(key.as_str(), e))?;
     manifest
         .grid
         .validate()

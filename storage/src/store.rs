@@ -35,14 +35,11 @@ impl Store {
         };
         let folder = location.strip_prefix("file:").unwrap_or(location);
         if folder.contains("://") {
-            return Err(bad(
-                "give a folder, file:FOLDER or memory:".to_owned(),
-            ));
+            return Err(bad("give a folder, file:FOLDER or memory:".to_owned()));
         }
         std::fs::create_dir_all(folder).map_err(|e| bad(e.to_string()))?;
         let root = std::fs::canonicalize(folder).map_err(|e| bad(e.to_string()))?;
-        let objects = LocalFileSystem::new_with_prefix(&root)
-            .map_err(|e| bad(e.to_string()))?;
+        let objects = LocalFileSystem::new_with_prefix(&root).map_err(|e| bad(e.to_string()))?;
         let text = root
             .to_str()
             .ok_or_else(|| bad("its path is not UTF-8".to_owned()))?;

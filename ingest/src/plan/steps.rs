@@ -14,6 +14,7 @@ use crate::profile::{Profile, TimeRules, TimeSource};
 use crate::rejection::Rejection;
 use crate::unit;
 
+const ONE_STAMP: &str = "has one stamp and no bounds, so nothing says what it covers; say in a profile (covers = \"month\", say)";
 const NO_TIME: &str = "has no time axis and no attribute that says its period; say in a profile where the time comes from";
 
 fn refused(object: &str, detail: impl AsRef<str>) -> Rejection {
@@ -112,7 +113,7 @@ async fn by_rules(
 /// Time as CF has it: bounds, then the distance of stamps, then attributes about the coverage.
 async fn by_file(planning: &mut Planning<'_>, axes: &[Axis]) -> Result<Vec<Period>, Stop> {
     let Some(name) = planning.time_variable(axes) else {
-        return Ok(vec![by_coverage(planning)?]);
+        return Ok(vec![by_coverage(planning, "file", NO_TIME)?]);
     };
     let stamps = stamps(planning, &name, None, None).await?;
     let bounds = planning
@@ -129,7 +130,9 @@ async fn by_file(planning: &mut Planning<'_>, axes: &[Axis]) -> Result<Vec<Perio
         period::of_spacing(&stamps).or_else(|| period::of_attributes(&planning.file.attributes));
     let covers = match covers {
         Some(covers) => covers,
-        None if stamps.len() == 1 => return Ok(vec![by_coverage(planning)?]),
+        None if stamps.len() == 1 => {
+            return Ok(vec![by_coverage(planning, &name, ONE_STAMP)?]);
+        }
         None => {
             return Err(refused(
                 &name,
@@ -145,7 +148,13 @@ async fn by_file(planning: &mut Planning<'_>, axes: &[Axis]) -> Result<Vec<Perio
 }
 
 /// The one period of a file from `time_coverage_start` and `time_coverage_end`.
-fn by_coverage(planning: &Planning<'_>) -> Result<Period, Rejection> {
+///
+/// Without them the refusal says `missing` of `object`.
+fn by_coverage(
+    planning: &Planning<'_>,
+    object: &str,
+    missing: &str,
+) -> Result<Period, Rejection> {
     let attributes = &planning.file.attributes;
     let at = |names: &[&str]| {
         names
@@ -153,14 +162,14 @@ fn by_coverage(planning: &Planning<'_>) -> Result<Period, Rejection> {
             .find_map(|name| attributes.text(name))
             .and_then(date::of_attribute)
     };
-    let start = at(&["time_coverage_start"]).ok_or_else(|| refused("file", NO_TIME))?;
+    let start = at(&["time_coverage_start"]).ok_or_else(|| refused(object, missing))?;
     if let Some(covers) = period::of_attributes(attributes) {
         return covers
             .period(start)
             .map_err(|e| refused("time_coverage_start", e));
     }
     let end =
-        at(&["time_coverage_end", "time_coverage_stop"]).ok_or_else(|| refused("file", NO_TIME))?;
+        at(&["time_coverage_end", "time_coverage_stop"]).ok_or_else(|| refused(object, missing))?;
     let both = period::instant(start).and_then(|s| Ok((s, period::instant(end)?)));
     let (start, end) = both.map_err(|e| refused("time_coverage_start", e))?;
     Period::new(start, end).map_err(|e| refused("time_coverage_end", e.to_string()))
