@@ -10,7 +10,7 @@ export NODEVICE_SELECT := 1
 
 fluxglobe := $(CARGO_TARGET_DIR)/debug/fluxglobe
 viewer := tile-server/web/dist/index.html
-viewer_sources := $(shell find tile-server/web/src tile-server/web/index.html tile-server/web/package-lock.json tile-server/web/vite.config.* 2>/dev/null)
+viewer_sources := $(shell git ls-files tile-server/web)
 
 .DEFAULT_GOAL := help
 .PHONY: help demo build viewer check test bless tools test-tools

@@ -1,7 +1,7 @@
 //! Ballista inside this process: a scheduler and one executor that speak over loopback.
 //!
-//! Ballista's own standalone mode leaves the intermediate files of every query behind; here they lie in a folder of
-//! ours and go when no query runs.
+//! Ballista's own standalone mode keeps the intermediate files of a query for minutes, and for ever when the process
+//! ends before; here they lie in a folder of ours and go when no query runs.
 
 use std::path::Path;
 use std::sync::Arc;

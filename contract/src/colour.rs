@@ -85,13 +85,12 @@ impl TransferFunction {
             Quantity::AccumulatedCarbon => (Palette::Balance, -50.0, 50.0),
             Quantity::SeaSurfaceTemperature => (Palette::Thermal, -2.0, 32.0),
             Quantity::Chlorophyll => (Palette::Algae, 0.0, 2.0),
-            Quantity::WindSpeed => (Palette::Speed, 0.0, 15.0),
+            Quantity::WindSpeed | Quantity::Precipitation => (Palette::Speed, 0.0, 15.0),
             Quantity::Pco2 => (Palette::Thermal, 280.0, 440.0),
             Quantity::Salinity => (Palette::Thermal, 30.0, 38.0),
             Quantity::AirPressure => (Palette::Thermal, 980.0, 1035.0),
             Quantity::IceFraction => (Palette::Speed, 0.0, 100.0),
             Quantity::WaveHeight => (Palette::Speed, 0.0, 6.0),
-            Quantity::Precipitation => (Palette::Speed, 0.0, 15.0),
             Quantity::Current => (Palette::Balance, -1.5, 1.5),
         };
         let stored = |shown: f64| (shown - display.offset) / display.factor;

@@ -40,7 +40,11 @@ impl LonLatDeg {
 
 /// Longitude wrapped into [-180, 180).
 pub fn wrap_lon_deg(lon: f64) -> f64 {
-    (lon + 180.0).rem_euclid(360.0) - 180.0
+    if (-180.0..180.0).contains(&lon) {
+        lon // as it is: adding and taking away 180 would round it
+    } else {
+        (lon + 180.0).rem_euclid(360.0) - 180.0
+    }
 }
 
 /// A regular latitude-longitude grid of cells. Values are row-major `[row, col]`, NaN where there is no data.

@@ -198,17 +198,15 @@ impl std::str::FromStr for Region {
             .take(5)
             .map(|part| part.trim().parse())
             .collect();
-        match numbers.as_deref() {
-            Ok(&[west, south, east, north]) => Self::new_box(west, south, east, north),
-            _ => {
-                let names: Vec<_> = NAMED_REGIONS.iter().map(|r| r.name).collect();
-                let reason = format!(
-                    "west,south,east,north in degrees, or one of {}",
-                    names.join(", ")
-                );
-                Err(ContractError::invalid("region", s, reason))
-            }
+        if let Ok(&[west, south, east, north]) = numbers.as_deref() {
+            return Self::new_box(west, south, east, north);
         }
+        let names: Vec<_> = NAMED_REGIONS.iter().map(|r| r.name).collect();
+        let reason = format!(
+            "west,south,east,north in degrees, or one of {}",
+            names.join(", ")
+        );
+        Err(ContractError::invalid("region", s, reason))
     }
 }
 

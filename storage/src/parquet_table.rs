@@ -1,6 +1,6 @@
 //! One record batch to Parquet bytes and back, with the same bytes for the same values.
 
-use arrow::array::{Array, ArrayRef, ListArray, PrimitiveArray, RecordBatch, UInt32Array};
+use arrow::array::{Array as _, ArrayRef, ListArray, PrimitiveArray, RecordBatch, UInt32Array};
 use arrow::compute::concat_batches;
 use arrow::datatypes::{ArrowPrimitiveType, SchemaRef};
 use bytes::Bytes;

@@ -147,7 +147,12 @@ impl Store {
         let mut names: Vec<String> = found
             .common_prefixes
             .iter()
-            .filter_map(|prefix| prefix.parts().last().map(|part| part.as_ref().to_owned()))
+            .filter_map(|prefix| {
+                prefix
+                    .parts()
+                    .next_back()
+                    .map(|part| part.as_ref().to_owned())
+            })
             .collect();
         names.sort();
         Ok(names)

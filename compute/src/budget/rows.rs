@@ -146,7 +146,8 @@ impl Total {
             end: period.end,
             budget_kg: decimal_text(self.mass_steps, MASS_DECIMALS),
             budget_tg: self.mass_steps as f64 / 10f64.powi(MASS_DECIMALS as i32) / KG_PER_TG,
-            coverage_percent: 100.0 * area_time_m2_ms / (region_area_m2 * row_ms),
+            // Cells and the whole region are rounded apart, so a full region could come out a hair above.
+            coverage_percent: (100.0 * area_time_m2_ms / (region_area_m2 * row_ms)).min(100.0),
             area_m2: area_time_m2_ms / self.covered_ms as f64,
             region_area_m2,
         }

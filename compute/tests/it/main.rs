@@ -11,4 +11,6 @@ mod parallel;
 #[cfg(test)]
 mod places;
 #[cfg(test)]
+mod regions;
+#[cfg(test)]
 mod takahashi;
