@@ -115,14 +115,12 @@ impl Pipeline<'_> {
         planned: &mut PlannedGranule,
         index: usize,
     ) -> Result<Option<StoredGrid>, Stop> {
-        let tell = |stage| {
-            self.progress
-                .stage(path, stage, index + 1, planned.steps.len());
-        };
+        let (number, count) = (index + 1, planned.steps.len());
+        let tell = |stage| self.progress.stage(path, stage, number, count);
         tell(Stage::Decode);
         let step = planned.steps[index];
-        tell(Stage::Check);
         let decoded = decode::run(planned, step).await?;
+        tell(Stage::Check);
         let (quantity, product, grid) = (
             planned.target.quantity,
             planned.target.product.clone(),
@@ -140,8 +138,7 @@ impl Pipeline<'_> {
         let Some(encoded) = encoded else {
             return Ok(None);
         };
-        self.progress
-            .stage(path, Stage::Put, index + 1, planned.steps.len());
+        tell(Stage::Put);
         Ok(Some(put::run(self.store, encoded, &planned.raw).await?))
     }
 

@@ -68,7 +68,13 @@ pub(crate) fn axes(file: &Description, variable: &Variable) -> Vec<Axis> {
             // A plain HDF5 file names no dimensions: a coordinate of that length which is the only one of its role left.
             None => unnamed_coordinate(file, dimension.len, &axes),
         };
-        let role = coordinate.map_or(Role::Other, role_of);
+        // A dimension may be called time and have no coordinate: then the time comes from elsewhere.
+        let is_time = dimension
+            .name
+            .as_deref()
+            .is_some_and(|name| name.eq_ignore_ascii_case("time"));
+        let bare = if is_time { Role::Time } else { Role::Other };
+        let role = coordinate.map_or(bare, role_of);
         axes.push(Axis {
             role,
             coordinate: coordinate.map(|c| c.name.clone()),

@@ -1,5 +1,6 @@
 //! Series segments and domain of the next manifest: only segments with a changed step are written again.
 
+use contract::digest::Digest;
 use contract::grid::Grid;
 use contract::key::ObjectKey;
 use contract::manifest::{Manifest, SeriesSegment, Step};
@@ -131,22 +132,30 @@ fn mark(cells: &mut [bool], steps: &[Vec<f32>]) {
     }
 }
 
+/// Turning maps into series takes seconds for a large grid: not on a task that others wait for.
 async fn write_series(
     store: &Store,
     product: &ProductId,
     grid: &Grid,
     values: Vec<Vec<f32>>,
 ) -> Result<ObjectKey, IngestError> {
-    let steps: Vec<&[f32]> = values.iter().map(Vec::as_slice).collect();
-    series::write(store, product, grid, &steps)
+    let grid = *grid;
+    let encode =
+        move || series::encode(&grid, &values.iter().map(Vec::as_slice).collect::<Vec<_>>());
+    let content = tokio::task::spawn_blocking(encode)
+        .await?
+        .map_err(IngestError::storage("encode a series"))?;
+    let key = ObjectKey::series(product, &Digest::of(&content));
+    store
+        .put_new(&key, content)
         .await
-        .map_err(IngestError::storage("store a series"))
+        .map_err(IngestError::storage("store a series"))?;
+    Ok(key)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use contract::digest::Digest;
     use contract::time::Period;
 
     fn steps(months: impl Iterator<Item = (i32, u32)>) -> Vec<Step> {

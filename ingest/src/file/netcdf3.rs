@@ -301,3 +301,6 @@ fn check_extent(
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests;

@@ -161,7 +161,7 @@ struct Cursor<'a> {
 
 impl<'a> Cursor<'a> {
     fn take(&mut self, count: u64, what: &str) -> Result<&'a [u8], Rejection> {
-        let left = &self.bytes[self.at..];
+        let left = self.bytes.get(self.at..).unwrap_or_default();
         let taken = usize::try_from(count).ok().and_then(|n| left.get(..n)).ok_or_else(|| {
             corrupt(what, format!("the header ends within it (byte {}); the file is truncated or damaged, fetch it again", self.at))
         })?;

@@ -7,7 +7,7 @@ use crate::cf::axis::{Mapping, Registration};
 use crate::cf::coordinate::{self, Axis, Role};
 use crate::error::Stop;
 use crate::file::description::{Dimension, Variable};
-use crate::profile::{GridRules, StatedGrid};
+use crate::profile::{GridRules, StatedGrid, TimeSource};
 use crate::rejection::Rejection;
 
 fn refused(object: &str, detail: impl AsRef<str>) -> Rejection {
@@ -22,6 +22,7 @@ pub(super) async fn mapping(
     let rules = planning.profile.map(|p| p.grid.clone()).unwrap_or_default();
     let mut axes = coordinate::axes(planning.file, variable);
     name_axes(planning, variable, &rules, &mut axes)?;
+    name_time(planning, variable, &mut axes);
     let find = |role: Role| axes.iter().find(|a| a.role == role).cloned();
     let (Some(lat), Some(lon)) = (find(Role::Latitude), find(Role::Longitude)) else {
         return Err(coordinate::no_grid(planning.file, variable).into());
@@ -36,7 +37,12 @@ pub(super) async fn mapping(
             "has {} x {} cells in one map, 1 to {most} are read; give it in smaller pieces",
             lat.len, lon.len
         );
-        return Err(Rejection::new(RejectReason::TooLarge, &variable.name, detail).into());
+        let reason = if cells == 0 {
+            RejectReason::Grid
+        } else {
+            RejectReason::TooLarge
+        };
+        return Err(Rejection::new(reason, &variable.name, detail).into());
     }
     let mapping = match &rules.stated {
         Some(stated) => stated_mapping(variable, stated, &lat, &lon)?,
@@ -101,6 +107,36 @@ fn name_axes(
     axes[lat].role = Role::Latitude;
     axes[lon].role = Role::Longitude;
     Ok(())
+}
+
+/// Finds the time axis that a profile speaks of: that of its time variable, or, where steps are counted, the only
+/// axis left that has steps.
+fn name_time(planning: &Planning<'_>, variable: &Variable, axes: &mut [Axis]) {
+    let Some(rules) = planning.profile.and_then(|p| p.time.as_ref()) else {
+        return;
+    };
+    let along = match &rules.from {
+        TimeSource::Variable { name, .. } => planning
+            .file
+            .variable(name)
+            .and_then(|v| v.dimensions.first()),
+        TimeSource::MonthNumber => {
+            let mut left = axes
+                .iter()
+                .zip(&variable.dimensions)
+                .filter(|(a, _)| a.role == Role::Other && a.len > 1);
+            let only = left.next().map(|(_, dimension)| dimension);
+            only.filter(|_| left.next().is_none())
+        }
+        TimeSource::Attribute(_) | TimeSource::FileName(_) | TimeSource::Fixed(_) => None,
+    };
+    let is_along =
+        |(axis, own): &(&mut Axis, &Dimension)| axis.role == Role::Other && Some(*own) == along;
+    if axes.iter().all(|a| a.role != Role::Time)
+        && let Some((axis, _)) = axes.iter_mut().zip(&variable.dimensions).find(is_along)
+    {
+        axis.role = Role::Time;
+    }
 }
 
 /// Refuses two axes of one role, and further axes of more than one level.

@@ -150,11 +150,7 @@ async fn by_file(planning: &mut Planning<'_>, axes: &[Axis]) -> Result<Vec<Perio
 /// The one period of a file from `time_coverage_start` and `time_coverage_end`.
 ///
 /// Without them the refusal says `missing` of `object`.
-fn by_coverage(
-    planning: &Planning<'_>,
-    object: &str,
-    missing: &str,
-) -> Result<Period, Rejection> {
+fn by_coverage(planning: &Planning<'_>, object: &str, missing: &str) -> Result<Period, Rejection> {
     let attributes = &planning.file.attributes;
     let at = |names: &[&str]| {
         names

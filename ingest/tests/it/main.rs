@@ -8,6 +8,7 @@ mod cf_files;
 mod faults;
 mod fixture;
 mod hostile;
+mod other_writers;
 mod real_files;
 mod service;
 mod synthetic;
