@@ -12,7 +12,10 @@ pub enum RenderError {
     NoAdapter(#[source] wgpu::RequestAdapterError),
     /// The adapter refused a device.
     #[error("adapter {adapter:?} gave no device")]
-    NoDevice { adapter: String, source: wgpu::RequestDeviceError },
+    NoDevice {
+        adapter: String,
+        source: wgpu::RequestDeviceError,
+    },
     /// The device stopped answering.
     #[error("the graphics device stopped while {what}")]
     DeviceStopped { what: &'static str },
@@ -20,23 +23,42 @@ pub enum RenderError {
     #[error("job refused")]
     Job(#[from] ContractError),
     /// More particles than one picture may have.
-    #[error("the picture needs {count} particles, at most {limit} are drawn; use fewer particles a cell or a smaller view")]
+    #[error(
+        "the picture needs {count} particles, at most {limit} are drawn; use fewer particles a cell or a smaller view"
+    )]
     TooManyParticles { count: u64, limit: u64 },
     /// A buffer larger than the device or the limit allows.
-    #[error("{what} need {bytes} bytes, the device holds at most {limit}; use a smaller picture or fewer slices")]
-    TooLarge { what: &'static str, bytes: u64, limit: u64 },
+    #[error(
+        "{what} need {bytes} bytes, the device holds at most {limit}; use a smaller picture or fewer slices"
+    )]
+    TooLarge {
+        what: &'static str,
+        bytes: u64,
+        limit: u64,
+    },
     /// Two products drawn together lie on different grids.
     #[error("{accumulated} does not lie on the grid of {product}")]
-    GridMismatch { product: String, accumulated: String },
+    GridMismatch {
+        product: String,
+        accumulated: String,
+    },
     /// A manifest without steps.
     #[error("{product} has no steps to draw")]
     NoSteps { product: String },
     /// Reading frames failed.
     #[error("cannot read {what} of {product}")]
-    Store { what: &'static str, product: String, source: storage::StorageError },
+    Store {
+        what: &'static str,
+        product: String,
+        source: storage::StorageError,
+    },
     /// The picture could not be written as PNG.
     #[error("cannot encode a picture of {width} x {height} pixels")]
-    Encode { width: u32, height: u32, source: image::ImageError },
+    Encode {
+        width: u32,
+        height: u32,
+        source: image::ImageError,
+    },
     /// The thread that drew was lost.
     #[error("the drawing thread ended early")]
     Thread(#[source] tokio::task::JoinError),
@@ -61,6 +83,12 @@ impl RenderError {
 
     /// Is the job, not the worker, to blame?
     pub fn is_bad_request(&self) -> bool {
-        matches!(self, Self::Job(_) | Self::TooManyParticles { .. } | Self::TooLarge { .. } | Self::GridMismatch { .. })
+        matches!(
+            self,
+            Self::Job(_)
+                | Self::TooManyParticles { .. }
+                | Self::TooLarge { .. }
+                | Self::GridMismatch { .. }
+        )
     }
 }

@@ -53,7 +53,11 @@ impl<'a> FrameContext<'a> {
         scene: SceneBuffers,
     ) -> Result<Self, RenderError> {
         let params_buffer = workspace.upload(gpu, Slot::Params, &[params])?;
-        let SceneBuffers { value, accumulated, domain } = scene;
+        let SceneBuffers {
+            value,
+            accumulated,
+            domain,
+        } = scene;
         Ok(Self {
             gpu,
             recorder: gpu.recorder(),
@@ -73,7 +77,11 @@ impl<'a> FrameContext<'a> {
     }
 
     /// The buffer of a slot with this content.
-    pub fn upload<T: Pod>(&mut self, slot: Slot, content: &[T]) -> Result<wgpu::Buffer, RenderError> {
+    pub fn upload<T: Pod>(
+        &mut self,
+        slot: Slot,
+        content: &[T],
+    ) -> Result<wgpu::Buffer, RenderError> {
         self.workspace.upload(self.gpu, slot, content)
     }
 
@@ -137,10 +145,14 @@ impl Stages {
     ) -> Result<Vec<u8>, RenderError> {
         let mut params = plan.params_of(part);
         if params.particle_count == 0 && plan.mode != Mode::Map && params.surface == 0 {
-            return Ok(vec![0; part.size_px[0] as usize * part.size_px[1] as usize * 4]);
+            return Ok(vec![
+                0;
+                part.size_px[0] as usize * part.size_px[1] as usize * 4
+            ]);
         }
         let entry_bytes = size_of::<Entry>() as u64;
-        let first = (u64::from(params.particle_count) * FIRST_ENTRIES_PER_PARTICLE).max(FIRST_ENTRIES);
+        let first =
+            (u64::from(params.particle_count) * FIRST_ENTRIES_PER_PARTICLE).max(FIRST_ENTRIES);
         let mut capacity = (workspace.room_bytes(Slot::Entries) / entry_bytes).max(first);
         loop {
             params.entry_capacity = capacity.min(gpu.most_buffer_bytes() / entry_bytes) as u32;
@@ -154,7 +166,9 @@ impl Stages {
             }
             let counts = frame.room(Slot::Counts, 4)?;
             let last_end = u64::from(list_count(&params) - 1) * 4;
-            let [pixels, total] = frame.recorder.download_parts([(&image, 0, image_bytes), (&counts, last_end, 4)])?;
+            let [pixels, total] = frame
+                .recorder
+                .download_parts([(&image, 0, image_bytes), (&counts, last_end, 4)])?;
             let total: u32 = bytemuck::pod_read_unaligned(&total);
             if total <= params.entry_capacity {
                 return Ok(pixels);
@@ -162,7 +176,11 @@ impl Stages {
             let bytes = u64::from(total) * entry_bytes;
             if bytes > gpu.most_buffer_bytes() {
                 let limit = gpu.most_buffer_bytes();
-                return Err(RenderError::TooLarge { what: "list entries", bytes, limit });
+                return Err(RenderError::TooLarge {
+                    what: "list entries",
+                    bytes,
+                    limit,
+                });
             }
             capacity = u64::from(total) + u64::from(total / 4);
         }

@@ -24,7 +24,8 @@ pub fn draw(plan: &Plan, part: Part, scene: &Scene) -> Result<Vec<u8>, RenderErr
         map::cpu::map(&params, &value, &plan.palette, &plan.axes, &mut picture);
     } else {
         let accumulated = scene.accumulated.as_ref();
-        let accumulated = accumulated.map(|interval| interpolated(&params, params.accumulated_weight, interval));
+        let accumulated =
+            accumulated.map(|interval| interpolated(&params, params.accumulated_weight, interval));
         let mut particles = vec![Particle::default(); params.particle_count as usize];
         let inputs = Inputs {
             active: &plan.active,
@@ -51,7 +52,10 @@ pub fn draw(plan: &Plan, part: Part, scene: &Scene) -> Result<Vec<u8>, RenderErr
 }
 
 fn interpolated(params: &Params, weight: f32, interval: &Interval) -> Vec<f32> {
-    let (before, after) = (interval.before.cells.content(), interval.after.cells.content());
+    let (before, after) = (
+        interval.before.cells.content(),
+        interval.after.cells.content(),
+    );
     let mut between = vec![0.0; before.len()];
     interpolate::cpu::interpolate(params, weight, before, after, &mut between);
     between
@@ -60,9 +64,14 @@ fn interpolated(params: &Params, weight: f32, interval: &Interval) -> Vec<f32> {
 fn binned(params: &Params, splats: &[Splat]) -> Result<(Vec<u32>, Vec<Entry>), RenderError> {
     let mut counts = vec![0u32; list_count(params) as usize];
     bin::cpu::count(params, splats, &mut counts);
-    let bytes = counts.iter().map(|&count| u64::from(count)).sum::<u64>() * size_of::<Entry>() as u64;
+    let bytes =
+        counts.iter().map(|&count| u64::from(count)).sum::<u64>() * size_of::<Entry>() as u64;
     if bytes > MOST_ENTRY_BYTES {
-        return Err(RenderError::TooLarge { what: "list entries", bytes, limit: MOST_ENTRY_BYTES });
+        return Err(RenderError::TooLarge {
+            what: "list entries",
+            bytes,
+            limit: MOST_ENTRY_BYTES,
+        });
     }
     let total = bin::cpu::scan(&mut counts);
     let mut entries = vec![Entry::default(); total as usize];

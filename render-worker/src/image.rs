@@ -22,8 +22,17 @@ impl Image {
     pub fn encode_png(&self) -> Result<Bytes, RenderError> {
         let mut png = Vec::with_capacity(self.rgba8.len() / 4 + 1024);
         PngEncoder::new_with_quality(&mut png, CompressionType::Fast, FilterType::Adaptive)
-            .write_image(&self.rgba8, self.width, self.height, ExtendedColorType::Rgba8)
-            .map_err(|source| RenderError::Encode { width: self.width, height: self.height, source })?;
+            .write_image(
+                &self.rgba8,
+                self.width,
+                self.height,
+                ExtendedColorType::Rgba8,
+            )
+            .map_err(|source| RenderError::Encode {
+                width: self.width,
+                height: self.height,
+                source,
+            })?;
         Ok(png.into())
     }
 
@@ -35,6 +44,11 @@ impl Image {
     /// The pixel at a place.
     pub fn pixel(&self, x: u32, y: u32) -> [u8; 4] {
         let at = (y as usize * self.width as usize + x as usize) * 4;
-        [self.rgba8[at], self.rgba8[at + 1], self.rgba8[at + 2], self.rgba8[at + 3]]
+        [
+            self.rgba8[at],
+            self.rgba8[at + 1],
+            self.rgba8[at + 2],
+            self.rgba8[at + 3],
+        ]
     }
 }

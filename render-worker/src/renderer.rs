@@ -51,15 +51,24 @@ impl Renderer {
 
     /// Name of the adapter, or of the CPU twins.
     pub fn name(&self) -> &str {
-        self.device.as_ref().map_or("CPU twins", |device| device.gpu.adapter_name())
+        self.device
+            .as_ref()
+            .map_or("CPU twins", |device| device.gpu.adapter_name())
     }
 
     /// Draws a job. Blocks until the picture is there.
     pub fn render(&self, job: &RenderJob, scene: &Scene) -> Result<Image, RenderError> {
-        let most_buffer_bytes = self.device.as_ref().map_or(u64::MAX, |device| device.gpu.most_buffer_bytes());
+        let most_buffer_bytes = self
+            .device
+            .as_ref()
+            .map_or(u64::MAX, |device| device.gpu.most_buffer_bytes());
         let plan = Plan::new(job, scene, most_buffer_bytes)?;
         let [width, height] = plan.size_px();
-        let mut image = Image { width, height, rgba8: vec![0; width as usize * height as usize * 4] };
+        let mut image = Image {
+            width,
+            height,
+            rgba8: vec![0; width as usize * height as usize * 4],
+        };
         let draw = |part: Part| match &self.device {
             None => frame_cpu::draw(&plan, part, scene),
             Some(device) => device.draw(&plan, part, scene),
@@ -71,7 +80,12 @@ impl Renderer {
     }
 
     /// Fills the gaps of one frame (`[row, col]`, [`MISSING`](crate::stages::layout::MISSING) where there is no data).
-    pub fn fill(&self, grid: &Grid, values: &[f32], domain: &[u32]) -> Result<Vec<f32>, RenderError> {
+    pub fn fill(
+        &self,
+        grid: &Grid,
+        values: &[f32],
+        domain: &[u32],
+    ) -> Result<Vec<f32>, RenderError> {
         match &self.device {
             Some(device) => device.fill.run(&device.gpu, grid, values, domain),
             None => {
@@ -88,7 +102,13 @@ impl Device {
         let stages = Stages::new(&gpu);
         let fill = Fill::new(&gpu, fill::SOURCE);
         tracing::info!(adapter = gpu.adapter_name(), "renderer is ready");
-        Ok(Self { gpu, stages, fill, idle: Mutex::default(), resident: Resident::default() })
+        Ok(Self {
+            gpu,
+            stages,
+            fill,
+            idle: Mutex::default(),
+            resident: Resident::default(),
+        })
     }
 
     fn draw(&self, plan: &Plan, part: Part, scene: &Scene) -> Result<Vec<u8>, RenderError> {
@@ -96,7 +116,9 @@ impl Device {
         // A poisoned pool is whole: workspaces are only pushed and popped.
         let idle = || self.idle.lock().unwrap_or_else(PoisonError::into_inner);
         let mut workspace = idle().pop().unwrap_or_default();
-        let drawn = self.stages.draw(&self.gpu, &mut workspace, plan, part, &buffers);
+        let drawn = self
+            .stages
+            .draw(&self.gpu, &mut workspace, plan, part, &buffers);
         idle().push(workspace);
         drawn
     }
@@ -104,7 +126,10 @@ impl Device {
     fn scene_buffers(&self, scene: &Scene) -> Result<SceneBuffers, RenderError> {
         let pair = |interval: &Interval| -> Result<[wgpu::Buffer; 2], RenderError> {
             let before = self.resident.buffer(&self.gpu, &interval.before.cells)?;
-            Ok([before, self.resident.buffer(&self.gpu, &interval.after.cells)?])
+            Ok([
+                before,
+                self.resident.buffer(&self.gpu, &interval.after.cells)?,
+            ])
         };
         Ok(SceneBuffers {
             value: pair(&scene.value)?,
@@ -117,7 +142,9 @@ impl Device {
 fn paste(image: &mut Image, part: Part, pixels: &[u8]) {
     let row_bytes = part.size_px[0] as usize * 4;
     for (y, row) in pixels.chunks_exact(row_bytes).enumerate() {
-        let at = ((part.origin_px[1] as usize + y) * image.width as usize + part.origin_px[0] as usize) * 4;
+        let at = ((part.origin_px[1] as usize + y) * image.width as usize
+            + part.origin_px[0] as usize)
+            * 4;
         image.rgba8[at..at + row_bytes].copy_from_slice(row);
     }
 }

@@ -45,8 +45,14 @@ impl Held {
     fn evict(&mut self) {
         let mut bytes: u64 = self.by_id.values().map(|(buffer, _)| buffer.size()).sum();
         while bytes > MOST_BYTES && self.by_id.len() > 1 {
-            let oldest = self.by_id.iter().min_by_key(|(_, (_, last_use))| *last_use).map(|(id, _)| *id);
-            let Some((buffer, _)) = oldest.and_then(|id| self.by_id.remove(&id)) else { return };
+            let oldest = self
+                .by_id
+                .iter()
+                .min_by_key(|(_, (_, last_use))| *last_use)
+                .map(|(id, _)| *id);
+            let Some((buffer, _)) = oldest.and_then(|id| self.by_id.remove(&id)) else {
+                return;
+            };
             bytes -= buffer.size();
         }
     }

@@ -19,7 +19,10 @@ pub struct Cells<T> {
 
 impl<T> Cells<T> {
     fn new(content: Vec<T>) -> Self {
-        Self { id: NEXT_ID.fetch_add(1, Ordering::Relaxed), content }
+        Self {
+            id: NEXT_ID.fetch_add(1, Ordering::Relaxed),
+            content,
+        }
     }
 
     /// Different for every set of cells made by this process.
@@ -54,7 +57,10 @@ impl Frame {
                 range = Some([low.min(*value), high.max(*value)]);
             }
         }
-        Self { cells: Cells::new(values), range: range.unwrap_or_default() }
+        Self {
+            cells: Cells::new(values),
+            range: range.unwrap_or_default(),
+        }
     }
 
     /// Bytes held.
@@ -113,6 +119,9 @@ impl Scene {
             self.grid.validate()?;
             return Ok(());
         }
-        Err(RenderError::GridMismatch { product: "the product".into(), accumulated: "a frame or the domain".into() })
+        Err(RenderError::GridMismatch {
+            product: "the product".into(),
+            accumulated: "a frame or the domain".into(),
+        })
     }
 }

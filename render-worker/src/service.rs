@@ -24,7 +24,10 @@ pub struct Limits {
 impl Default for Limits {
     /// Two pictures, so that one is encoded while the next is drawn; half a GiB of frames.
     fn default() -> Self {
-        Self { pictures: NonZeroUsize::MIN.saturating_add(1), frame_bytes: 512 << 20 }
+        Self {
+            pictures: NonZeroUsize::MIN.saturating_add(1),
+            frame_bytes: 512 << 20,
+        }
     }
 }
 
@@ -44,10 +47,22 @@ impl RenderService {
     }
 
     /// Opens the backend.
-    pub fn with_limits(store: Store, backend: Backend, limits: Limits) -> Result<Self, RenderError> {
+    pub fn with_limits(
+        store: Store,
+        backend: Backend,
+        limits: Limits,
+    ) -> Result<Self, RenderError> {
         let renderer = Arc::new(Renderer::new(backend)?);
-        let source = Arc::new(Source::new(store, Arc::clone(&renderer), limits.frame_bytes));
-        Ok(Self { renderer, source, permits: Arc::new(Semaphore::new(limits.pictures.get())) })
+        let source = Arc::new(Source::new(
+            store,
+            Arc::clone(&renderer),
+            limits.frame_bytes,
+        ));
+        Ok(Self {
+            renderer,
+            source,
+            permits: Arc::new(Semaphore::new(limits.pictures.get())),
+        })
     }
 
     /// Name of what draws.

@@ -38,7 +38,12 @@ struct Held {
 impl Source {
     /// A source that keeps frames up to `most_bytes`.
     pub fn new(store: Store, renderer: Arc<Renderer>, most_bytes: u64) -> Self {
-        Self { store, renderer, most_bytes, held: Mutex::default() }
+        Self {
+            store,
+            renderer,
+            most_bytes,
+            held: Mutex::default(),
+        }
     }
 
     /// The scene of a job's instant.
@@ -51,12 +56,20 @@ impl Source {
             let carbon = self.manifest(id).await?;
             if carbon.grid != product.grid {
                 let (product, accumulated) = (job.product.to_string(), id.to_string());
-                return Err(RenderError::GridMismatch { product, accumulated });
+                return Err(RenderError::GridMismatch {
+                    product,
+                    accumulated,
+                });
             }
             let domain = self.domain(&carbon).await?;
             accumulated = Some(self.interval(&carbon, &domain, job.time).await?);
         }
-        Ok(Scene { grid: product.grid, domain, value, accumulated })
+        Ok(Scene {
+            grid: product.grid,
+            domain,
+            value,
+            accumulated,
+        })
     }
 
     async fn interval(
@@ -65,14 +78,24 @@ impl Source {
         domain: &Arc<Cells<u32>>,
         time: TimeMs,
     ) -> Result<Interval, RenderError> {
-        let no_steps = || RenderError::NoSteps { product: manifest.product.to_string() };
-        let Bracket { before, after, weight } = manifest.bracket(time).ok_or_else(no_steps)?;
+        let no_steps = || RenderError::NoSteps {
+            product: manifest.product.to_string(),
+        };
+        let Bracket {
+            before,
+            after,
+            weight,
+        } = manifest.bracket(time).ok_or_else(no_steps)?;
         let after = self.frame(manifest, domain, after).await?;
         let before = match before {
             Some(step) => self.frame(manifest, domain, step).await?,
             None => self.nothing(manifest, domain),
         };
-        Ok(Interval { before, after, weight })
+        Ok(Interval {
+            before,
+            after,
+            weight,
+        })
     }
 
     /// Where accumulation starts: zero in every cell of the domain.
@@ -96,7 +119,8 @@ impl Source {
         let manifest = Arc::new(loaded.map_err(|e| failed("the manifest", id, e))?);
         let mut held = self.lock();
         let use_count = held.next_use();
-        held.manifests.insert(name, (Arc::clone(&manifest), use_count));
+        held.manifests
+            .insert(name, (Arc::clone(&manifest), use_count));
         drop_oldest(&mut held.manifests, MOST_MANIFESTS);
         Ok(manifest)
     }
@@ -110,7 +134,8 @@ impl Source {
         let domain = Scene::domain_of(flags);
         let mut held = self.lock();
         let use_count = held.next_use();
-        held.domains.insert(manifest.domain.clone(), (Arc::clone(&domain), use_count));
+        held.domains
+            .insert(manifest.domain.clone(), (Arc::clone(&domain), use_count));
         drop_oldest(&mut held.domains, MOST_MANIFESTS);
         Ok(domain)
     }
@@ -127,7 +152,11 @@ impl Source {
         }
         let read = storage::frames::read(&self.store, &key.0, &manifest.grid).await;
         let values = read.map_err(|e| failed("a frame", &manifest.product, e))?;
-        let (renderer, grid, domain) = (Arc::clone(&self.renderer), manifest.grid, Arc::clone(domain));
+        let (renderer, grid, domain) = (
+            Arc::clone(&self.renderer),
+            manifest.grid,
+            Arc::clone(domain),
+        );
         let filled = tokio::task::spawn_blocking(move || fill(&renderer, &grid, values, &domain));
         let frame = Arc::new(filled.await.map_err(RenderError::Thread)??);
         self.lock().keep(key, &frame, self.most_bytes);
@@ -140,23 +169,45 @@ impl Source {
     }
 }
 
-fn fill(renderer: &Renderer, grid: &Grid, values: Vec<f32>, domain: &Cells<u32>) -> Result<Frame, RenderError> {
+fn fill(
+    renderer: &Renderer,
+    grid: &Grid,
+    values: Vec<f32>,
+    domain: &Cells<u32>,
+) -> Result<Frame, RenderError> {
     let raw = Frame::new(values);
     let gaps = raw.cells.content().iter().zip(domain.content());
-    let has_gaps = gaps.into_iter().any(|(value, domain)| *domain != 0 && crate::stages::layout::is_missing(*value));
+    let has_gaps = gaps
+        .into_iter()
+        .any(|(value, domain)| *domain != 0 && crate::stages::layout::is_missing(*value));
     if !has_gaps || domain.content().len() != raw.cells.content().len() {
         return Ok(raw);
     }
-    Ok(Frame::new(renderer.fill(grid, raw.cells.content(), domain.content())?))
+    Ok(Frame::new(renderer.fill(
+        grid,
+        raw.cells.content(),
+        domain.content(),
+    )?))
 }
 
-fn failed(what: &'static str, product: &impl std::fmt::Display, source: StorageError) -> RenderError {
-    RenderError::Store { what, product: product.to_string(), source }
+fn failed(
+    what: &'static str,
+    product: &impl std::fmt::Display,
+    source: StorageError,
+) -> RenderError {
+    RenderError::Store {
+        what,
+        product: product.to_string(),
+        source,
+    }
 }
 
 fn drop_oldest<K: Ord + Clone, V>(held: &mut BTreeMap<K, (V, u64)>, most: usize) {
     while held.len() > most {
-        let oldest = held.iter().min_by_key(|(_, (_, last_use))| *last_use).map(|(key, _)| key.clone());
+        let oldest = held
+            .iter()
+            .min_by_key(|(_, (_, last_use))| *last_use)
+            .map(|(key, _)| key.clone());
         let Some(key) = oldest else { return };
         held.remove(&key);
     }
@@ -170,23 +221,36 @@ impl Held {
 
     fn manifest(&mut self, name: &str) -> Option<Arc<Manifest>> {
         let use_count = self.next_use();
-        self.manifests.get_mut(name).map(|held| touched(held, use_count))
+        self.manifests
+            .get_mut(name)
+            .map(|held| touched(held, use_count))
     }
 
     fn domain(&mut self, key: &ObjectKey) -> Option<Arc<Cells<u32>>> {
         let use_count = self.next_use();
-        self.domains.get_mut(key).map(|held| touched(held, use_count))
+        self.domains
+            .get_mut(key)
+            .map(|held| touched(held, use_count))
     }
 
     fn frame(&mut self, key: &(ObjectKey, ObjectKey)) -> Option<Arc<Frame>> {
         let use_count = self.next_use();
-        self.frames.get_mut(key).map(|held| touched(held, use_count))
+        self.frames
+            .get_mut(key)
+            .map(|held| touched(held, use_count))
     }
 
     fn keep(&mut self, key: (ObjectKey, ObjectKey), frame: &Arc<Frame>, most_bytes: u64) {
         let use_count = self.next_use();
         self.frames.insert(key, (Arc::clone(frame), use_count));
-        while self.frames.len() > 1 && self.frames.values().map(|(frame, _)| frame.size_bytes()).sum::<u64>() > most_bytes {
+        while self.frames.len() > 1
+            && self
+                .frames
+                .values()
+                .map(|(frame, _)| frame.size_bytes())
+                .sum::<u64>()
+                > most_bytes
+        {
             let fewer = self.frames.len() - 1;
             drop_oldest(&mut self.frames, fewer);
         }

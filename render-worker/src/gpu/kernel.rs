@@ -8,11 +8,24 @@ pub struct Kernel {
 }
 
 impl Kernel {
-    pub(super) fn new(device: &wgpu::Device, label: &'static str, source: &str, entry: &str) -> Self {
-        let descriptor = wgpu::ShaderModuleDescriptor { label: Some(label), source: wgpu::ShaderSource::Wgsl(source.into()) };
-        #[expect(unsafe_code, reason = "only here; every index is bounded in the shader and a test compares with checked modules")]
+    pub(super) fn new(
+        device: &wgpu::Device,
+        label: &'static str,
+        source: &str,
+        entry: &str,
+    ) -> Self {
+        let descriptor = wgpu::ShaderModuleDescriptor {
+            label: Some(label),
+            source: wgpu::ShaderSource::Wgsl(source.into()),
+        };
+        #[expect(
+            unsafe_code,
+            reason = "only here; every index is bounded in the shader and a test compares with checked modules"
+        )]
         // SAFETY: loops end (their bounds are counts made by earlier stages) and indices stay inside their buffers.
-        let module = unsafe { device.create_shader_module_trusted(descriptor, wgpu::ShaderRuntimeChecks::unchecked()) };
+        let module = unsafe {
+            device.create_shader_module_trusted(descriptor, wgpu::ShaderRuntimeChecks::unchecked())
+        };
         let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: Some(label),
             layout: None,
@@ -22,6 +35,10 @@ impl Kernel {
             cache: None,
         });
         let layout = pipeline.get_bind_group_layout(0);
-        Self { pipeline, layout, label }
+        Self {
+            pipeline,
+            layout,
+            label,
+        }
     }
 }

@@ -36,17 +36,33 @@ impl Gpu {
             power_preference: wgpu::PowerPreference::HighPerformance,
             ..Default::default()
         };
-        let adapter = instance.request_adapter(&options).await.map_err(RenderError::NoAdapter)?;
+        let adapter = instance
+            .request_adapter(&options)
+            .await
+            .map_err(RenderError::NoAdapter)?;
         let adapter_name = adapter.get_info().name;
         let limits = adapter.limits();
-        let most_buffer_bytes =
-            limits.max_buffer_size.min(limits.max_storage_buffer_binding_size).min(MOST_BUFFER_BYTES);
-        let descriptor = wgpu::DeviceDescriptor { required_limits: limits, ..Default::default() };
+        let most_buffer_bytes = limits
+            .max_buffer_size
+            .min(limits.max_storage_buffer_binding_size)
+            .min(MOST_BUFFER_BYTES);
+        let descriptor = wgpu::DeviceDescriptor {
+            required_limits: limits,
+            ..Default::default()
+        };
         let (device, queue) = adapter
             .request_device(&descriptor)
             .await
-            .map_err(|source| RenderError::NoDevice { adapter: adapter_name.clone(), source })?;
-        Ok(Self { device, queue, adapter_name, most_buffer_bytes })
+            .map_err(|source| RenderError::NoDevice {
+                adapter: adapter_name.clone(),
+                source,
+            })?;
+        Ok(Self {
+            device,
+            queue,
+            adapter_name,
+            most_buffer_bytes,
+        })
     }
 
     /// Name of the adapter.
@@ -71,28 +87,43 @@ impl Gpu {
 
     /// A small buffer of constants.
     pub fn uniform<T: Pod>(&self, label: &str, content: &T) -> wgpu::Buffer {
-        self.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-            label: Some(label),
-            contents: bytemuck::bytes_of(content),
-            usage: wgpu::BufferUsages::UNIFORM,
-        })
+        self.device
+            .create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label: Some(label),
+                contents: bytemuck::bytes_of(content),
+                usage: wgpu::BufferUsages::UNIFORM,
+            })
     }
 
     /// A storage buffer with this content.
-    pub fn storage<T: Pod>(&self, label: &'static str, content: &[T]) -> Result<wgpu::Buffer, RenderError> {
+    pub fn storage<T: Pod>(
+        &self,
+        label: &'static str,
+        content: &[T],
+    ) -> Result<wgpu::Buffer, RenderError> {
         let contents: &[u8] = bytemuck::cast_slice(content);
         self.check_size(label, contents.len() as u64)?;
         // An empty binding is not allowed; nobody reads the word.
-        let contents = if contents.is_empty() { &[0; 4] } else { contents };
-        Ok(self.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-            label: Some(label),
-            contents,
-            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
-        }))
+        let contents = if contents.is_empty() {
+            &[0; 4]
+        } else {
+            contents
+        };
+        Ok(self
+            .device
+            .create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label: Some(label),
+                contents,
+                usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
+            }))
     }
 
     fn check_size(&self, what: &'static str, bytes: u64) -> Result<(), RenderError> {
         let limit = self.most_buffer_bytes;
-        if bytes > limit { Err(RenderError::TooLarge { what, bytes, limit }) } else { Ok(()) }
+        if bytes > limit {
+            Err(RenderError::TooLarge { what, bytes, limit })
+        } else {
+            Ok(())
+        }
     }
 }

@@ -18,37 +18,65 @@ pub struct Recorder<'a> {
 
 impl<'a> Recorder<'a> {
     pub(super) fn new(gpu: &'a Gpu) -> Self {
-        Self { gpu, encoder: gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default()) }
+        Self {
+            gpu,
+            encoder: gpu
+                .device
+                .create_command_encoder(&wgpu::CommandEncoderDescriptor::default()),
+        }
     }
 
     /// Runs `kernel` on `groups` workgroups with these buffers at their binding numbers.
-    pub fn dispatch(&mut self, kernel: &Kernel, buffers: &[(u32, &wgpu::Buffer)], groups: [u32; 2]) {
+    pub fn dispatch(
+        &mut self,
+        kernel: &Kernel,
+        buffers: &[(u32, &wgpu::Buffer)],
+        groups: [u32; 2],
+    ) {
         if groups.contains(&0) {
             return;
         }
         let entries: Vec<_> = buffers
             .iter()
-            .map(|(binding, buffer)| wgpu::BindGroupEntry { binding: *binding, resource: buffer.as_entire_binding() })
+            .map(|(binding, buffer)| wgpu::BindGroupEntry {
+                binding: *binding,
+                resource: buffer.as_entire_binding(),
+            })
             .collect();
-        let bindings = self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some(kernel.label),
-            layout: &kernel.layout,
-            entries: &entries,
-        });
-        let mut pass = self.encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-            label: Some(kernel.label),
-            timestamp_writes: None,
-        });
+        let bindings = self
+            .gpu
+            .device
+            .create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some(kernel.label),
+                layout: &kernel.layout,
+                entries: &entries,
+            });
+        let mut pass = self
+            .encoder
+            .begin_compute_pass(&wgpu::ComputePassDescriptor {
+                label: Some(kernel.label),
+                timestamp_writes: None,
+            });
         pass.set_pipeline(&kernel.pipeline);
         pass.set_bind_group(0, &bindings, &[]);
         pass.dispatch_workgroups(groups[0], groups[1], 1);
     }
 
     /// Runs `kernel` with one workgroup for every `size` of `count` items.
-    pub fn dispatch_list(&mut self, kernel: &Kernel, buffers: &[(u32, &wgpu::Buffer)], count: u32, size: u32) {
+    pub fn dispatch_list(
+        &mut self,
+        kernel: &Kernel,
+        buffers: &[(u32, &wgpu::Buffer)],
+        count: u32,
+        size: u32,
+    ) {
         let groups = count.div_ceil(size);
         let across = groups.min(MOST_GROUPS);
-        let down = if across == 0 { 0 } else { groups.div_ceil(across) };
+        let down = if across == 0 {
+            0
+        } else {
+            groups.div_ceil(across)
+        };
         self.dispatch(kernel, buffers, [across, down]);
     }
 
@@ -58,7 +86,11 @@ impl<'a> Recorder<'a> {
     }
 
     /// Runs everything recorded and reads the first `len` items of a buffer.
-    pub fn download<T: Pod>(self, buffer: &wgpu::Buffer, len: usize) -> Result<Vec<T>, RenderError> {
+    pub fn download<T: Pod>(
+        self,
+        buffer: &wgpu::Buffer,
+        len: usize,
+    ) -> Result<Vec<T>, RenderError> {
         let bytes = (len * size_of::<T>()) as u64;
         let [content] = self.download_parts([(buffer, 0, bytes)])?;
         Ok(bytemuck::pod_collect_to_vec(&content))
@@ -79,7 +111,8 @@ impl<'a> Recorder<'a> {
         });
         let mut at = 0;
         for (buffer, first, bytes) in parts {
-            self.encoder.copy_buffer_to_buffer(buffer, first, &staging, at, bytes);
+            self.encoder
+                .copy_buffer_to_buffer(buffer, first, &staging, at, bytes);
             at += bytes;
         }
         let submission = self.gpu.queue.submit([self.encoder.finish()]);
@@ -88,10 +121,18 @@ impl<'a> Recorder<'a> {
             // The receiver is gone only if this function has returned with an error.
             drop(done_tx.send(result));
         });
-        let wait = wgpu::PollType::Wait { submission_index: Some(submission), timeout: None };
+        let wait = wgpu::PollType::Wait {
+            submission_index: Some(submission),
+            timeout: None,
+        };
         self.gpu.device.poll(wait).map_err(|_stopped| stopped())?;
-        done_rx.recv().map_err(|_gone| stopped())?.map_err(|_unmapped| stopped())?;
-        let mapped = staging.get_mapped_range(..).map_err(|_unmapped| stopped())?;
+        done_rx
+            .recv()
+            .map_err(|_gone| stopped())?
+            .map_err(|_unmapped| stopped())?;
+        let mapped = staging
+            .get_mapped_range(..)
+            .map_err(|_unmapped| stopped())?;
         let mut rest: &[u8] = &mapped;
         Ok(parts.map(|(_, _, bytes)| {
             let (content, after) = rest.split_at(bytes as usize);

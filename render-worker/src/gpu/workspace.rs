@@ -65,11 +65,18 @@ impl Workspace {
         if let Some(buffer) = held.as_ref().filter(|buffer| buffer.size() >= bytes) {
             return Ok(buffer.clone());
         }
-        let kind = if slot == Slot::Params { wgpu::BufferUsages::UNIFORM } else { wgpu::BufferUsages::STORAGE };
+        let kind = if slot == Slot::Params {
+            wgpu::BufferUsages::UNIFORM
+        } else {
+            wgpu::BufferUsages::STORAGE
+        };
         let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some(slot.label()),
             // Powers of two: frames of slightly different size share a buffer.
-            size: bytes.max(256).next_power_of_two().min(gpu.most_buffer_bytes.max(256)),
+            size: bytes
+                .max(256)
+                .next_power_of_two()
+                .min(gpu.most_buffer_bytes.max(256)),
             usage: kind | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
             mapped_at_creation: false,
         });
@@ -78,7 +85,12 @@ impl Workspace {
     }
 
     /// The buffer of a slot with this content at its start, before anything recorded later runs.
-    pub fn upload<T: Pod>(&mut self, gpu: &Gpu, slot: Slot, content: &[T]) -> Result<wgpu::Buffer, RenderError> {
+    pub fn upload<T: Pod>(
+        &mut self,
+        gpu: &Gpu,
+        slot: Slot,
+        content: &[T],
+    ) -> Result<wgpu::Buffer, RenderError> {
         let bytes: &[u8] = bytemuck::cast_slice(content);
         let buffer = self.room(gpu, slot, bytes.len() as u64)?;
         gpu.queue.write_buffer(&buffer, 0, bytes);
@@ -87,6 +99,8 @@ impl Workspace {
 
     /// Bytes a slot has room for.
     pub fn room_bytes(&self, slot: Slot) -> u64 {
-        self.buffers[slot as usize].as_ref().map_or(0, wgpu::Buffer::size)
+        self.buffers[slot as usize]
+            .as_ref()
+            .map_or(0, wgpu::Buffer::size)
     }
 }

@@ -31,7 +31,16 @@ struct Camera {
 }
 
 pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) {
-    let View::Globe { lon_deg, lat_deg, height_m, width_px, height_px } = job.view else { return };
+    let View::Globe {
+        lon_deg,
+        lat_deg,
+        height_m,
+        width_px,
+        height_px,
+    } = job.view
+    else {
+        return;
+    };
     let camera = camera(lon_deg, lat_deg, height_m, [width_px, height_px]);
     let grid = &scene.grid;
     let cell_rad = (grid.dlon_deg * grid.dlat_deg).sqrt().to_radians();
@@ -45,7 +54,10 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) {
     params.center_px_y = height_px as f32 / 2.0;
     camera.write(params);
     let sun = sun(job, &camera);
-    write(sun, [&mut params.sun_x, &mut params.sun_y, &mut params.sun_z]);
+    write(
+        sun,
+        [&mut params.sun_x, &mut params.sun_y, &mut params.sun_z],
+    );
     if job.mode == Mode::Map {
         return;
     }
@@ -60,10 +72,19 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) {
     plan.rows = rows(scene, &look, &camera, particles, job.style.optical_depth);
     let heights = height_range_m(job, scene).map(|height_m| height_m / SPHERE_RADIUS_M);
     let radius = radius_px / camera.focal_px * camera.height;
-    let horizon = cap_rad(&camera, [width_px, height_px], job, heights, radius + cell_rad);
+    // From a cell's middle to its corner.
+    let half_cell = (grid.dlon_deg.hypot(grid.dlat_deg) / 2.0).to_radians();
+    let horizon = cap_rad(
+        &camera,
+        [width_px, height_px],
+        job,
+        heights,
+        radius + half_cell,
+    )
+    .min(PI);
     let half = slice_planes(plan, job, camera.up, sun, heights, horizon);
     light_frame(plan, &camera, sun, half, heights, horizon, radius);
-    choose_cells(plan, scene, camera.up, horizon.min(PI));
+    choose_cells(plan, scene, camera.up, horizon);
 }
 
 /// East, north and up at a place, in the axes of eq. 4: x towards 90 E, y towards 0 E, z towards the north pole.
@@ -81,16 +102,43 @@ fn camera(lon_deg: f64, lat_deg: f64, height_m: f64, size_px: [u32; 2]) -> Camer
     let height = height_m / SPHERE_RADIUS_M;
     let side_px = f64::from(size_px[0].min(size_px[1]));
     let focal_px = side_px / 2.0 / (OPENING_DEG / 2.0).to_radians().tan();
-    Camera { place: up * (1.0 + height), east, north, up, focal_px, height }
+    Camera {
+        place: up * (1.0 + height),
+        east,
+        north,
+        up,
+        focal_px,
+        height,
+    }
 }
 
 impl Camera {
     fn write(&self, params: &mut Params) {
         params.focal_px = self.focal_px as f32;
-        write(self.place, [&mut params.eye_x, &mut params.eye_y, &mut params.eye_z]);
-        write(self.east, [&mut params.right_x, &mut params.right_y, &mut params.right_z]);
-        write(self.north, [&mut params.up_x, &mut params.up_y, &mut params.up_z]);
-        write(-self.up, [&mut params.forward_x, &mut params.forward_y, &mut params.forward_z]);
+        write(
+            self.place,
+            [&mut params.eye_x, &mut params.eye_y, &mut params.eye_z],
+        );
+        write(
+            self.east,
+            [
+                &mut params.right_x,
+                &mut params.right_y,
+                &mut params.right_z,
+            ],
+        );
+        write(
+            self.north,
+            [&mut params.up_x, &mut params.up_y, &mut params.up_z],
+        );
+        write(
+            -self.up,
+            [
+                &mut params.forward_x,
+                &mut params.forward_y,
+                &mut params.forward_z,
+            ],
+        );
     }
 }
 
@@ -104,14 +152,18 @@ fn write(vector: DVec3, fields: [&mut f32; 3]) {
 fn sun(job: &RenderJob, camera: &Camera) -> DVec3 {
     let (sin_azimuth, cos_azimuth) = job.style.sun.azimuth_deg.to_radians().sin_cos();
     let (sin_elevation, cos_elevation) = job.style.sun.elevation_deg.to_radians().sin_cos();
-    (camera.east * sin_azimuth + camera.north * cos_azimuth) * cos_elevation + camera.up * sin_elevation
+    (camera.east * sin_azimuth + camera.north * cos_azimuth) * cos_elevation
+        + camera.up * sin_elevation
 }
 
 fn rows(scene: &Scene, look: &Look, camera: &Camera, particles: u32, style_depth: f64) -> Vec<Row> {
     let grid = &scene.grid;
     (0..grid.rows)
         .map(|row| {
-            let (north, south) = (grid.row_north_deg(row).to_radians(), grid.row_north_deg(row + 1).to_radians());
+            let (north, south) = (
+                grid.row_north_deg(row).to_radians(),
+                grid.row_north_deg(row + 1).to_radians(),
+            );
             let lat = 0.5 * (north + south);
             let area = (north.sin() - south.sin()) * grid.dlon_deg.to_radians();
             let per_radian_px = camera.focal_px / camera.height;
@@ -131,7 +183,13 @@ fn rows(scene: &Scene, look: &Look, camera: &Camera, particles: u32, style_depth
 }
 
 /// Angle round the point below the camera within which particles can be seen or shadow what is seen.
-fn cap_rad(camera: &Camera, size_px: [u32; 2], job: &RenderJob, heights: [f64; 2], margin: f64) -> f64 {
+fn cap_rad(
+    camera: &Camera,
+    size_px: [u32; 2],
+    job: &RenderJob,
+    heights: [f64; 2],
+    margin: f64,
+) -> f64 {
     let distance = 1.0 + camera.height;
     let deepest = 1.0 + heights[0];
     let horizon = (1.0 / distance).acos() + (1.0 / (1.0 + heights[1])).acos() + margin;
@@ -141,18 +199,36 @@ fn cap_rad(camera: &Camera, size_px: [u32; 2], job: &RenderJob, heights: [f64; 2
     if sine >= 1.0 {
         return horizon;
     }
-    let elevation = job.style.sun.elevation_deg.max(look::LOWEST_SUN_DEG).to_radians();
+    let elevation = job
+        .style
+        .sun
+        .elevation_deg
+        .max(look::LOWEST_SUN_DEG)
+        .to_radians();
     let shadow = (heights[1] - heights[0]) / elevation.tan();
     (sine.asin() - corner + 3.0 * margin + shadow).min(horizon)
 }
 
 /// Slices across the half-way vector between light and view, over the visible cap; the vector comes back.
-fn slice_planes(plan: &mut Plan, job: &RenderJob, up: DVec3, sun: DVec3, heights: [f64; 2], horizon: f64) -> DVec3 {
+fn slice_planes(
+    plan: &mut Plan,
+    job: &RenderJob,
+    up: DVec3,
+    sun: DVec3,
+    heights: [f64; 2],
+    horizon: f64,
+) -> DVec3 {
     let front_to_back = sun.dot(up) >= 0.0;
     let sum = if front_to_back { sun + up } else { sun - up };
     let half = sum / sum.length();
     let tilt = half.dot(up).clamp(-1.0, 1.0).acos();
-    let reach = |cosine: f64| if cosine > 0.0 { [1.0 + heights[0], 1.0 + heights[1]] } else { [1.0 + heights[1], 1.0 + heights[0]] };
+    let reach = |cosine: f64| {
+        if cosine > 0.0 {
+            [1.0 + heights[0], 1.0 + heights[1]]
+        } else {
+            [1.0 + heights[1], 1.0 + heights[0]]
+        }
+    };
     let near = (tilt - horizon).max(0.0).cos();
     let far = (tilt + horizon).min(PI).cos();
     let (top, bottom) = (reach(near)[1] * near + 1e-4, reach(far)[0] * far - 1e-4);
@@ -160,7 +236,10 @@ fn slice_planes(plan: &mut Plan, job: &RenderJob, up: DVec3, sun: DVec3, heights
     params.front_to_back = u32::from(front_to_back);
     params.slice_top = top as f32;
     params.slices_per_unit = (f64::from(job.style.slices) / (top - bottom)) as f32;
-    write(half, [&mut params.half_x, &mut params.half_y, &mut params.half_z]);
+    write(
+        half,
+        [&mut params.half_x, &mut params.half_y, &mut params.half_z],
+    );
     half
 }
 
@@ -177,11 +256,19 @@ fn light_frame(
     if params.light_on == 0 {
         return;
     }
-    let across = if sun.cross(half).length() > 1e-6 { sun.cross(half) } else { camera.east };
+    let across = if sun.cross(half).length() > 1e-6 {
+        sun.cross(half)
+    } else {
+        camera.east
+    };
     let axis_u = across / across.length();
     let axis_v = sun.cross(axis_u);
     // Every point of the cap lies within a chord of the point below the camera.
-    let chord = if horizon >= FRAC_PI_2 { 1.0 + heights[1] } else { 2.0 * (horizon / 2.0).sin() * (1.0 + heights[1]) };
+    let chord = if horizon >= FRAC_PI_2 {
+        1.0 + heights[1]
+    } else {
+        2.0 * (horizon / 2.0).sin() * (1.0 + heights[1])
+    };
     let reach = chord + heights[1].max(-heights[0]);
     let texel = (look::TEXEL_PER_RADIUS * radius).max(2.0 * reach / MOST_LIGHT_TEXELS);
     let texels = (2.0 * reach / texel).ceil() as u32 + 2;
@@ -191,8 +278,22 @@ fn light_frame(
     params.light_v0 = (camera.up.dot(axis_v) - reach) as f32;
     params.light_texels_per_unit = (1.0 / texel) as f32;
     params.light_depth_gain = (look::LIGHT_DEPTH * PI / 3.0 / (texel * texel)) as f32;
-    write(axis_u, [&mut params.light_u_x, &mut params.light_u_y, &mut params.light_u_z]);
-    write(axis_v, [&mut params.light_v_x, &mut params.light_v_y, &mut params.light_v_z]);
+    write(
+        axis_u,
+        [
+            &mut params.light_u_x,
+            &mut params.light_u_y,
+            &mut params.light_u_z,
+        ],
+    );
+    write(
+        axis_v,
+        [
+            &mut params.light_v_x,
+            &mut params.light_v_y,
+            &mut params.light_v_z,
+        ],
+    );
 }
 
 /// All cells of the domain within `horizon` of the point below the camera.
@@ -201,14 +302,22 @@ fn choose_cells(plan: &mut Plan, scene: &Scene, up: DVec3, horizon: f64) {
     let nearest_cos = horizon.cos();
     let lon = |col: u32| (grid.col_west_deg(col) + 0.5 * grid.dlon_deg).to_radians();
     plan.cols = (0..grid.cols)
-        .map(|col| Col { sin_lon: lon(col).sin() as f32, cos_lon: lon(col).cos() as f32, ..Col::default() })
+        .map(|col| Col {
+            sin_lon: lon(col).sin() as f32,
+            cos_lon: lon(col).cos() as f32,
+            ..Col::default()
+        })
         .collect();
     let domain = scene.domain.content();
     for (row, table) in (0u32..).zip(&plan.rows) {
         let (sin_lat, cos_lat) = (f64::from(table.sin_lat), f64::from(table.cos_lat));
         for (col, slot) in (0u32..).zip(&plan.cols) {
             let cell = row * grid.cols + col;
-            let center = DVec3::new(cos_lat * f64::from(slot.sin_lon), cos_lat * f64::from(slot.cos_lon), sin_lat);
+            let center = DVec3::new(
+                cos_lat * f64::from(slot.sin_lon),
+                cos_lat * f64::from(slot.cos_lon),
+                sin_lat,
+            );
             if domain[cell as usize] != 0 && center.dot(up) >= nearest_cos {
                 plan.active.push(Active { cell, slot: col });
             }

@@ -31,7 +31,7 @@ pub(super) const LOWEST_SUN_DEG: f64 = 20.0;
 pub(super) const TEXEL_PER_RADIUS: f64 = 0.612;
 
 /// Clouds that overlap at a place: the fewer, the grainier; the more, the slower.
-const CLOUDS_OVER_A_POINT: f64 = 44.0;
+const CLOUDS_OVER_A_POINT: f64 = 50.0;
 /// Radius of the largest clouds over the side of a cell: larger ones would blur what the grid resolves.
 const WIDEST_CELLS: f64 = 1.6;
 
@@ -78,8 +78,8 @@ impl Look {
                 radius_cells: 0.7,
                 min_radius_px: 1.8,
                 max_radius_px: f64::INFINITY,
-                size_spread: 0.2,
-                shake_shift: 2,
+                size_spread: 0.1,
+                shake_shift: 3,
                 area_px_per_particle: 1.8,
                 center_depth: None,
             },
@@ -99,7 +99,9 @@ impl Look {
         let cells = if self.center_depth.is_some() {
             self.radius_cells
         } else {
-            (CLOUDS_OVER_A_POINT / (std::f64::consts::PI * f64::from(particles))).sqrt().clamp(self.radius_cells, WIDEST_CELLS)
+            (CLOUDS_OVER_A_POINT / (std::f64::consts::PI * f64::from(particles)))
+                .sqrt()
+                .clamp(self.radius_cells, WIDEST_CELLS)
         };
         (cells * cell_px).clamp(least, self.max_radius_px.max(least))
     }
@@ -112,10 +114,18 @@ impl Look {
 
     /// Optical depth at a particle's centre for a column of optical depth 1: what the column's depth over its area is
     /// when spread over the kernel `(1 - q)²`, whose integral is a third of its disc.
-    pub(super) fn depth_gain(&self, cell_area: f64, radius: f64, particles: u32, style_depth: f64) -> f64 {
+    pub(super) fn depth_gain(
+        &self,
+        cell_area: f64,
+        radius: f64,
+        particles: u32,
+        style_depth: f64,
+    ) -> f64 {
         match self.center_depth {
             Some(depth) => depth / style_depth.max(1e-6),
-            None => cell_area * 3.0 / (f64::from(particles) * std::f64::consts::PI * radius * radius),
+            None => {
+                cell_area * 3.0 / (f64::from(particles) * std::f64::consts::PI * radius * radius)
+            }
         }
     }
 }

@@ -13,7 +13,8 @@ use contract::job::{Mode, RenderJob, View};
 use crate::error::RenderError;
 use crate::scene::Scene;
 use crate::stages::layout::{
-    Active, Axis, Col, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, Params, Particle, Row, SCREEN_TILE_PX, SUBPIXELS, Splat,
+    Active, Axis, Col, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, Params, Particle, Row,
+    SCREEN_TILE_PX, SUBPIXELS, Splat,
 };
 use look::Look;
 
@@ -44,7 +45,11 @@ pub struct Part {
 
 impl Plan {
     /// The plan of a valid job; `most_buffer_bytes` is what the device can hold in one buffer.
-    pub fn new(job: &RenderJob, scene: &Scene, most_buffer_bytes: u64) -> Result<Self, RenderError> {
+    pub fn new(
+        job: &RenderJob,
+        scene: &Scene,
+        most_buffer_bytes: u64,
+    ) -> Result<Self, RenderError> {
         job.validate()?;
         scene.validate()?;
         let size_px = job.view.size_px();
@@ -86,7 +91,9 @@ impl Plan {
             origin_px: [x, y],
             size_px: [PART_PX.min(width - x), PART_PX.min(height - y)],
         };
-        starts(height).flat_map(|y| starts(width).map(move |x| part(x, y))).collect()
+        starts(height)
+            .flat_map(|y| starts(width).map(move |x| part(x, y)))
+            .collect()
     }
 
     /// Parameters for drawing one part.
@@ -121,13 +128,20 @@ fn common(job: &RenderJob, scene: &Scene) -> Params {
         periodic: u32::from(grid.is_periodic()),
         end_cell: grid.cell_count() as u32,
         value_weight: scene.value.weight as f32,
-        accumulated_weight: scene.accumulated.as_ref().map_or(0.0, |interval| interval.weight as f32),
+        accumulated_weight: scene
+            .accumulated
+            .as_ref()
+            .map_or(0.0, |interval| interval.weight as f32),
         has_accumulated: u32::from(scene.accumulated.is_some()),
         transfer_low: transfer.low as f32,
         transfer_per_unit: (1.0 / (transfer.high - transfer.low)) as f32,
         strength_per_unit: (1.0 / transfer.low.abs().max(transfer.high.abs())) as f32,
         diverging: u32::from(diverging),
-        depth_floor: if diverging { look::FLOOR_DIVERGING } else { look::FLOOR_SEQUENTIAL },
+        depth_floor: if diverging {
+            look::FLOOR_DIVERGING
+        } else {
+            look::FLOOR_SEQUENTIAL
+        },
         height_m_per_kg_m2: style.height_m_per_kg_m2 as f32,
         height_limit_m: look::HEIGHT_LIMIT_M as f32,
         sheet_m: look::SHEET_M as f32,
@@ -172,9 +186,13 @@ fn palette(job: &RenderJob) -> Vec<u32> {
 
 /// Lowest and highest particle, m: from the frames, so that every tile of an instant has the same slice planes.
 fn height_range_m(job: &RenderJob, scene: &Scene) -> [f64; 2] {
-    let [low, high] = scene.accumulated.as_ref().map_or([0.0; 2], |interval| interval.range());
+    let [low, high] = scene
+        .accumulated
+        .as_ref()
+        .map_or([0.0; 2], |interval| interval.range());
     let scaled = |kg_m2: f32| {
-        (f64::from(kg_m2) * job.style.height_m_per_kg_m2).clamp(-look::HEIGHT_LIMIT_M, look::HEIGHT_LIMIT_M)
+        (f64::from(kg_m2) * job.style.height_m_per_kg_m2)
+            .clamp(-look::HEIGHT_LIMIT_M, look::HEIGHT_LIMIT_M)
     };
     // Half the sheet, and a metre so that rounding cannot put a particle outside.
     let sheet = 0.5 * look::SHEET_M + 1.0;

@@ -32,7 +32,10 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene, tile: Tile, 
     let world_px = f64::from(size_px) * f64::from(1u32 << tile.z);
     let level = Level {
         world_px,
-        origin_px: [f64::from(tile.x) * f64::from(size_px), f64::from(tile.y) * f64::from(size_px)],
+        origin_px: [
+            f64::from(tile.x) * f64::from(size_px),
+            f64::from(tile.y) * f64::from(size_px),
+        ],
         size_px: f64::from(size_px),
         px_per_m: world_px / (TAU * WGS84_EQUATORIAL_RADIUS_M),
     };
@@ -47,19 +50,46 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene, tile: Tile, 
     let cell_px = (grid.dlon_deg * grid.dlat_deg).sqrt() / 360.0 * world_px;
     let particles = look.particles_per_cell(cell_px, job.style.particles_per_cell);
     plan.params.particles_per_cell = particles;
-    plan.rows = rows(scene, &level, &look, col_px, particles, job.style.optical_depth);
+    plan.rows = rows(
+        scene,
+        &level,
+        &look,
+        col_px,
+        particles,
+        job.style.optical_depth,
+    );
     let heights_m = height_range_m(job, scene);
     plan.params.height_px_per_m = (look::OBLIQUE * level.px_per_m) as f32;
     plan.params.slice_top = heights_m[1] as f32;
-    plan.params.slices_per_unit = (f64::from(job.style.slices) / (heights_m[1] - heights_m[0])) as f32;
-    let spans = light_and_reach(plan, job, &level, heights_m, look.radius_px(cell_px, particles));
+    plan.params.slices_per_unit =
+        (f64::from(job.style.slices) / (heights_m[1] - heights_m[0])) as f32;
+    let spans = light_and_reach(
+        plan,
+        job,
+        &level,
+        heights_m,
+        look.radius_px(cell_px, particles),
+    );
     choose_cells(plan, scene, &level, spans);
 }
 
-fn rows(scene: &Scene, level: &Level, look: &Look, col_px: f64, particles: u32, style_depth: f64) -> Vec<Row> {
+fn rows(
+    scene: &Scene,
+    level: &Level,
+    look: &Look,
+    col_px: f64,
+    particles: u32,
+    style_depth: f64,
+) -> Vec<Row> {
     let subpixels = f64::from(SUBPIXELS);
     let edge_px = |row: u32| {
-        mercator_y(scene.grid.row_north_deg(row).clamp(-MAX_LAT_DEG, MAX_LAT_DEG)) * level.world_px - level.origin_px[1]
+        mercator_y(
+            scene
+                .grid
+                .row_north_deg(row)
+                .clamp(-MAX_LAT_DEG, MAX_LAT_DEG),
+        ) * level.world_px
+            - level.origin_px[1]
     };
     (0..scene.grid.rows)
         .map(|row| {
@@ -82,25 +112,50 @@ fn rows(scene: &Scene, level: &Level, look: &Look, col_px: f64, particles: u32, 
 }
 
 /// Sets the light's parameters; where cells must be looked for comes back: x and y.
-fn light_and_reach(plan: &mut Plan, job: &RenderJob, level: &Level, heights_m: [f64; 2], radius_px: f64) -> [Span; 2] {
+fn light_and_reach(
+    plan: &mut Plan,
+    job: &RenderJob,
+    level: &Level,
+    heights_m: [f64; 2],
+    radius_px: f64,
+) -> [Span; 2] {
     let subpixels = f64::from(SUBPIXELS);
-    let widest = plan.rows.iter().map(|row| f64::from(row.radius)).fold(0.0, f64::max) + 1.0;
+    let widest = plan
+        .rows
+        .iter()
+        .map(|row| f64::from(row.radius))
+        .fold(0.0, f64::max)
+        + 1.0;
     let per_m = level.px_per_m * subpixels;
     let edge = level.size_px * subpixels;
     let margin = widest * subpixels;
     plan.params.entry_shift = entry_shift(widest);
     let shift = |span: Span, per_m: f64| -> Span {
         let moves = heights_m.map(|h| h * per_m);
-        [span[0] + moves[0].min(moves[1]) - 2.0, span[1] + moves[0].max(moves[1]) + 2.0]
+        [
+            span[0] + moves[0].min(moves[1]) - 2.0,
+            span[1] + moves[0].max(moves[1]) + 2.0,
+        ]
     };
     // On the ground below what is seen: height moves particles north, that is to smaller y.
-    let seen = [[-margin, edge + margin], shift([-margin, edge + margin], look::OBLIQUE * per_m)];
+    let seen = [
+        [-margin, edge + margin],
+        shift([-margin, edge + margin], look::OBLIQUE * per_m),
+    ];
     if plan.params.light_on == 0 {
         return seen;
     }
-    let elevation = job.style.sun.elevation_deg.max(look::LOWEST_SUN_DEG).to_radians();
+    let elevation = job
+        .style
+        .sun
+        .elevation_deg
+        .max(look::LOWEST_SUN_DEG)
+        .to_radians();
     let azimuth = job.style.sun.azimuth_deg.to_radians();
-    let shadow_per_m = [-azimuth.sin() / elevation.tan() * per_m, azimuth.cos() / elevation.tan() * per_m];
+    let shadow_per_m = [
+        -azimuth.sin() / elevation.tan() * per_m,
+        azimuth.cos() / elevation.tan() * per_m,
+    ];
     let texel_px = (look::TEXEL_PER_RADIUS * radius_px).max(LEAST_TEXEL_PX);
     let unit = (texel_px * subpixels).round();
     let mut origin = [0; 2];
@@ -118,9 +173,11 @@ fn light_and_reach(plan: &mut Plan, job: &RenderJob, level: &Level, heights_m: [
     params.light_unit = unit as i32;
     [params.light_origin_x, params.light_origin_y] = origin;
     [params.light_width, params.light_height] = texels;
-    [params.light_shift_x_per_m, params.light_shift_y_per_m] = shadow_per_m.map(|shift| shift as f32);
+    [params.light_shift_x_per_m, params.light_shift_y_per_m] =
+        shadow_per_m.map(|shift| shift as f32);
     let texel_px = unit / subpixels;
-    params.light_depth_gain = (look::LIGHT_DEPTH * PI / 3.0 / (texel_px * texel_px) / elevation.sin()) as f32;
+    params.light_depth_gain =
+        (look::LIGHT_DEPTH * PI / 3.0 / (texel_px * texel_px) / elevation.sin()) as f32;
     reach
 }
 
@@ -133,10 +190,15 @@ fn choose_cells(plan: &mut Plan, scene: &Scene, level: &Level, spans: [Span; 2])
     let first_turn = -(level.size_px / level.world_px).ceil() as i32 - 1;
     for turn in first_turn..=-first_turn {
         for col in 0..grid.cols {
-            let west = (mercator_x(grid.col_west_deg(col)) + f64::from(turn)) * level.world_px - level.origin_px[0];
+            let west = (mercator_x(grid.col_west_deg(col)) + f64::from(turn)) * level.world_px
+                - level.origin_px[0];
             if (west + width_px) * subpixels >= spans[0][0] && west * subpixels <= spans[0][1] {
                 let x_sub = (west * subpixels).round() as i32;
-                plan.cols.push(Col { x_sub, x_span_px: width_px as f32, ..Col::default() });
+                plan.cols.push(Col {
+                    x_sub,
+                    x_span_px: width_px as f32,
+                    ..Col::default()
+                });
                 slots.push(col);
             }
         }
@@ -146,12 +208,17 @@ fn choose_cells(plan: &mut Plan, scene: &Scene, level: &Level, spans: [Span; 2])
         let height = f64::from(row.y_span_px) * subpixels;
         height > 0.0 && north + height >= spans[1][0] && north <= spans[1][1]
     };
-    let chosen: Vec<u32> = (0..grid.rows).filter(|&row| near(&plan.rows[row as usize])).collect();
+    let chosen: Vec<u32> = (0..grid.rows)
+        .filter(|&row| near(&plan.rows[row as usize]))
+        .collect();
     for &row in &chosen {
         for (slot, col) in slots.iter().enumerate() {
             let cell = row * grid.cols + col;
             if scene.domain.content()[cell as usize] != 0 {
-                plan.active.push(Active { cell, slot: slot as u32 });
+                plan.active.push(Active {
+                    cell,
+                    slot: slot as u32,
+                });
             }
         }
     }
@@ -168,15 +235,27 @@ fn interpolate_rows(plan: &mut Plan, rows: Range<u32>) {
 fn map_axes(plan: &mut Plan, scene: &Scene, level: &Level) {
     let grid = &scene.grid;
     plan.params.edge_sharpness = (grid.dlon_deg / 360.0 * level.world_px).max(1.0) as f32;
-    let axis = |place: f64| Axis { index: place.floor() as i32, fraction: (place - place.floor()) as f32 };
+    let axis = |place: f64| Axis {
+        index: place.floor() as i32,
+        fraction: (place - place.floor()) as f32,
+    };
     let pixels = 0..level.size_px as u32;
     let share = |pixel: u32, origin_px: f64| (origin_px + f64::from(pixel) + 0.5) / level.world_px;
     let col = |pixel: u32| {
         let lon = share(pixel, level.origin_px[0]) * 360.0 - 180.0;
         axis((lon - grid.west_deg).rem_euclid(360.0) / grid.dlon_deg - 0.5)
     };
-    let row = |pixel: u32| axis((grid.north_deg - mercator_lat_deg(share(pixel, level.origin_px[1]))) / grid.dlat_deg - 0.5);
-    plan.axes = pixels.clone().map(col).chain(pixels.clone().map(row)).collect();
+    let row = |pixel: u32| {
+        axis(
+            (grid.north_deg - mercator_lat_deg(share(pixel, level.origin_px[1]))) / grid.dlat_deg
+                - 0.5,
+        )
+    };
+    plan.axes = pixels
+        .clone()
+        .map(col)
+        .chain(pixels.clone().map(row))
+        .collect();
     let first = row(0).index.clamp(0, grid.rows as i32) as u32;
     let last = (row(pixels.end - 1).index + 2).clamp(0, grid.rows as i32) as u32;
     interpolate_rows(plan, first..last.max(first));

@@ -19,8 +19,10 @@ pub struct Ground {
 
 /// What the centre of a pixel of a globe view shows.
 pub fn ground_below(params: &Params, pixel: [u32; 2]) -> Ground {
-    let x = ((pixel[0] as i32 + params.origin_x_px) as f32 + 0.5 - params.center_px_x) / params.focal_px;
-    let y = (params.center_px_y - (pixel[1] as i32 + params.origin_y_px) as f32 - 0.5) / params.focal_px;
+    let x = ((pixel[0] as i32 + params.origin_x_px) as f32 + 0.5 - params.center_px_x)
+        / params.focal_px;
+    let y = (params.center_px_y - (pixel[1] as i32 + params.origin_y_px) as f32 - 0.5)
+        / params.focal_px;
     let camera = Vec3::new(params.eye_x, params.eye_y, params.eye_z);
     let toward = Vec3::new(params.forward_x, params.forward_y, params.forward_z)
         + Vec3::new(params.right_x, params.right_y, params.right_z) * x
@@ -31,7 +33,10 @@ pub fn ground_below(params: &Params, pixel: [u32; 2]) -> Ground {
     let miss_sq = foot.dot(foot);
     let rim_px = (1.0 - miss_sq.sqrt()) * params.focal_px / nearest_at.max(1.0e-6);
     if miss_sq >= 1.0 || nearest_at <= 0.0 {
-        return Ground { rim_px, ..Ground::default() };
+        return Ground {
+            rim_px,
+            ..Ground::default()
+        };
     }
     let normal = camera + sight * (nearest_at - (1.0 - miss_sq).sqrt());
     Ground {
@@ -51,7 +56,10 @@ pub fn angle_of(y: f32, x: f32) -> f32 {
     let t = x.abs().min(y.abs()) / wide.max(1.0e-30);
     let q = t * t;
     let high = q * (-0.0752896400 + q * (0.0429096138 + q * (-0.0161657367 + q * 0.0028662257)));
-    let mut angle = t * (1.0 + q * (-0.3333314528 + q * (0.1999355085 + q * (-0.1420889944 + q * (0.1065626393 + high)))));
+    let mut angle = t
+        * (1.0
+            + q * (-0.3333314528
+                + q * (0.1999355085 + q * (-0.1420889944 + q * (0.1065626393 + high)))));
     if y.abs() > x.abs() {
         angle = FRAC_PI_2 - angle;
     }
@@ -71,7 +79,9 @@ mod tests {
             let (y, x) = (f64::from(i) * std::f64::consts::TAU / 10_000.0).sin_cos();
             let expected = y.atan2(x);
             let found = f64::from(angle_of(y as f32, x as f32));
-            let turn = (found - expected).abs().min(std::f64::consts::TAU - (found - expected).abs());
+            let turn = (found - expected)
+                .abs()
+                .min(std::f64::consts::TAU - (found - expected).abs());
             assert!(turn < 3e-7, "{x} {y}: {found} against {expected}");
         }
     }

@@ -26,12 +26,18 @@ pub(crate) fn distance(a: &Image, b: &Image) -> (u8, usize) {
         (0..4).map(channel).max().unwrap_or(0) as u8
     };
     let apart: Vec<u8> = pixels.map(worst).collect();
-    (apart.iter().copied().max().unwrap_or(0), apart.iter().filter(|&&d| d > 1).count())
+    (
+        apart.iter().copied().max().unwrap_or(0),
+        apart.iter().filter(|&&d| d > 1).count(),
+    )
 }
 
 /// Fails if two pictures are alike.
 pub(crate) fn assert_images_differ(a: &Image, b: &Image) {
     let (most, pixels) = distance(a, b);
     let all = a.rgba8.len() / 4;
-    assert!(most > 16 && pixels > all / 20, "pictures that should differ: at most by {most}, in {pixels} of {all} pixels");
+    assert!(
+        most > 16 && pixels > all / 20,
+        "pictures that should differ: at most by {most}, in {pixels} of {all} pixels"
+    );
 }

@@ -17,7 +17,8 @@ fn is_switched_off(test: &str) -> bool {
 /// The device, shared by the tests of this run; none if it is switched off.
 pub(crate) fn gpu(test: &str) -> Option<&'static Gpu> {
     static GPU: OnceLock<Gpu> = OnceLock::new();
-    (!is_switched_off(test)).then(|| GPU.get_or_init(|| Gpu::open().expect("a Vulkan adapter, or NO_GPU=1")))
+    (!is_switched_off(test))
+        .then(|| GPU.get_or_init(|| Gpu::open().expect("a Vulkan adapter, or NO_GPU=1")))
 }
 
 /// A renderer on the device, shared likewise.

@@ -10,11 +10,17 @@ use crate::scenes::{ONE_DEGREE, globe, job, ocean, tile};
 #[test]
 fn the_gallery_is_drawn_where_asked_for() {
     #[expect(clippy::disallowed_methods, reason = "a test's own switch")]
-    let Ok(folder) = std::env::var("GALLERY") else { return };
+    let Ok(folder) = std::env::var("GALLERY") else {
+        return;
+    };
     #[expect(clippy::disallowed_methods, reason = "a test's own switch")]
-    let backend = if std::env::var("GALLERY_CPU").is_ok() { Backend::Cpu } else { Backend::Gpu };
+    let backend = if std::env::var("GALLERY_CPU").is_ok() {
+        Backend::Cpu
+    } else {
+        Backend::Gpu
+    };
     let renderer = Renderer::new(backend).unwrap();
-    let scene = ocean(ONE_DEGREE);
+    let scene = stored().unwrap_or_else(|| ocean(ONE_DEGREE));
     println!("{}", renderer.name());
     let views = [
         ("z0", tile(0, 0, 0, 256)),
@@ -40,7 +46,12 @@ fn the_gallery_is_drawn_where_asked_for() {
             let busy = busy_ms() - busy;
             let png = image.encode_png().unwrap();
             let all = start.elapsed();
-            println!("{mode} {name}: {busy} ms of processor, {:.1} ms, with PNG {:.1} ms, {} bytes", drawn.as_secs_f64() * 1e3, all.as_secs_f64() * 1e3, png.len());
+            println!(
+                "{mode} {name}: {busy} ms of processor, {:.1} ms, with PNG {:.1} ms, {} bytes",
+                drawn.as_secs_f64() * 1e3,
+                all.as_secs_f64() * 1e3,
+                png.len()
+            );
             std::fs::write(format!("{folder}/{mode}-{name}.png"), png).unwrap();
             sheet.add(&image);
         }
@@ -69,24 +80,85 @@ impl Sheet {
             for y in 0..256u32 {
                 for x in 0..256u32 {
                     let [r, g, b, a] = image.pixel(at_x + x, at_y + y);
-                    let to = ((i / across * side + y as usize) * width + i % across * side + x as usize) * 4;
-                    let over = |c: u8, ground: f32| (f32::from(c) * f32::from(a) / 255.0 + ground * (1.0 - f32::from(a) / 255.0)) as u8;
-                    sheet[to..to + 4].copy_from_slice(&[over(r, 14.0), over(g, 24.0), over(b, 40.0), 255]);
+                    let to =
+                        ((i / across * side + y as usize) * width + i % across * side + x as usize)
+                            * 4;
+                    let over = |c: u8, ground: f32| {
+                        (f32::from(c) * f32::from(a) / 255.0
+                            + ground * (1.0 - f32::from(a) / 255.0)) as u8
+                    };
+                    sheet[to..to + 4].copy_from_slice(&[
+                        over(r, 14.0),
+                        over(g, 24.0),
+                        over(b, 40.0),
+                        255,
+                    ]);
                 }
             }
         }
-        let sheet = Image { width: width as u32, height: height as u32, rgba8: sheet };
+        let sheet = Image {
+            width: width as u32,
+            height: height as u32,
+            rgba8: sheet,
+        };
         std::fs::write(path, sheet.encode_png().unwrap()).unwrap();
     }
 }
 
 fn quarters(image: &Image) -> Vec<(&Image, u32, u32)> {
-    if image.width == 256 { vec![(image, 0, 0)] } else { vec![(image, 0, 0), (image, 256, 0), (image, 0, 256), (image, 256, 256)] }
+    if image.width == 256 {
+        vec![(image, 0, 0)]
+    } else {
+        vec![
+            (image, 0, 0),
+            (image, 256, 0),
+            (image, 0, 256),
+            (image, 256, 256),
+        ]
+    }
 }
 
 /// Processor time of this process: what a picture costs also while other programs run.
 fn busy_ms() -> i64 {
     let stat = std::fs::read_to_string("/proc/self/stat").unwrap();
-    let ticks: Vec<i64> = stat.rsplit(')').next().unwrap().split_whitespace().filter_map(|field| field.parse().ok()).collect();
+    let ticks: Vec<i64> = stat
+        .rsplit(')')
+        .next()
+        .unwrap()
+        .split_whitespace()
+        .filter_map(|field| field.parse().ok())
+        .collect();
     (ticks[10] + ticks[11]) * 10
+}
+
+/// The scene of a climatology in a store, if `GALLERY_STORE` names the folder.
+fn stored() -> Option<render_worker::Scene> {
+    #[expect(clippy::disallowed_methods, reason = "a test's own switch")]
+    let store = storage::Store::open(
+        &std::env::var("GALLERY_STORE")
+            .ok()
+            .filter(|folder| !folder.is_empty())?,
+    )
+    .unwrap();
+    let renderer = std::sync::Arc::new(Renderer::new(Backend::Cpu).unwrap());
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .build()
+        .unwrap();
+    runtime.block_on(async {
+        let newest = async |product: &str| {
+            storage::manifests::latest(&store, &product.parse().unwrap())
+                .await
+                .unwrap()
+        };
+        let mut job = job(Mode::Volume, tile(0, 0, 0, 256));
+        job.product = newest("takahashi09-flux").await?.id();
+        job.accumulated = Some(newest("takahashi09-flux-accumulated").await?.id());
+        job.time = "2000-10-20".parse().unwrap();
+        Some(
+            render_worker::Source::new(store.clone(), renderer, 1 << 30)
+                .scene(&job)
+                .await
+                .unwrap(),
+        )
+    })
 }

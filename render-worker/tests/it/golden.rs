@@ -25,8 +25,14 @@ fn is_set(variable: &str) -> bool {
 }
 
 fn decode(bytes: &[u8]) -> Image {
-    let image = image::load_from_memory_with_format(bytes, image::ImageFormat::Png).unwrap().into_rgba8();
-    Image { width: image.width(), height: image.height(), rgba8: image.into_raw() }
+    let image = image::load_from_memory_with_format(bytes, image::ImageFormat::Png)
+        .unwrap()
+        .into_rgba8();
+    Image {
+        width: image.width(),
+        height: image.height(),
+        rgba8: image.into_raw(),
+    }
 }
 
 /// The middle of a tile, so that files stay small; all of a globe.
@@ -35,7 +41,11 @@ fn cropped(image: &Image) -> Image {
         return image.clone();
     }
     let pixels = (64..192).flat_map(|y| (64..192).flat_map(move |x| image.pixel(x, y)));
-    Image { width: 128, height: 128, rgba8: pixels.collect() }
+    Image {
+        width: 128,
+        height: 128,
+        rgba8: pixels.collect(),
+    }
 }
 
 fn matches_golden(name: &str, mode: Mode, view: View) {
@@ -50,12 +60,21 @@ fn matches_golden(name: &str, mode: Mode, view: View) {
             std::fs::write(&path, drawn.encode_png().unwrap()).unwrap();
             println!("wrote {}", path.display());
         }
-        let bytes = std::fs::read(&path).unwrap_or_else(|e| panic!("{}: {e}; BLESS=1 draws it", path.display()));
-        assert!(bytes.len() as u64 <= MOST_BYTES, "{} is too large", path.display());
+        let bytes = std::fs::read(&path)
+            .unwrap_or_else(|e| panic!("{}: {e}; BLESS=1 draws it", path.display()));
+        assert!(
+            bytes.len() as u64 <= MOST_BYTES,
+            "{} is too large",
+            path.display()
+        );
         let (most, pixels) = distance(&drawn, &decode(&bytes));
         let all = (drawn.width * drawn.height) as usize;
         // On this machine the twins draw their own pictures to the byte, but for the maths library of another system.
-        let (most_diff, most_pixels) = if is_twin { (1, 0) } else { (MAX_DIFF, all * DIFF_PIXELS_PER_MILLE / 1000) };
+        let (most_diff, most_pixels) = if is_twin {
+            (1, 0)
+        } else {
+            (MAX_DIFF, all * DIFF_PIXELS_PER_MILLE / 1000)
+        };
         assert!(
             most <= most_diff && pixels <= most_pixels,
             "{name} by {}: at most {most} apart, {pixels} of {all} pixels by more than one",
@@ -91,12 +110,23 @@ fn map_globes_match_their_golden_picture() {
 
 #[test]
 fn volume_globes_match_their_golden_picture() {
-    matches_golden("volume_globe", Mode::Volume, globe(-120.0, 10.0, 1.5e7, 160));
+    matches_golden(
+        "volume_globe",
+        Mode::Volume,
+        globe(-120.0, 10.0, 1.5e7, 160),
+    );
 }
 
 #[test]
 fn a_golden_picture_of_something_else_is_seen() {
-    let drawn = |mode| renderers("golden")[0].render(&job(mode, tile(2, 0, 1, 256)), &ocean(FIVE_DEGREES)).unwrap();
-    let (most, pixels) = distance(&cropped(&drawn(Mode::Volume)), &cropped(&drawn(Mode::Sprites)));
+    let drawn = |mode| {
+        renderers("golden")[0]
+            .render(&job(mode, tile(2, 0, 1, 256)), &ocean(FIVE_DEGREES))
+            .unwrap()
+    };
+    let (most, pixels) = distance(
+        &cropped(&drawn(Mode::Volume)),
+        &cropped(&drawn(Mode::Sprites)),
+    );
     assert!(most > MAX_DIFF && pixels > 128 * 128 * DIFF_PIXELS_PER_MILLE / 1000);
 }

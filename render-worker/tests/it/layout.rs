@@ -2,8 +2,9 @@
 
 use render_worker::stages::fill::{self, FillParams};
 use render_worker::stages::layout::{
-    Active, Axis, Col, DEPTH_ONE, Entry, GROUP, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, MISSING, Params, Particle, Row,
-    SCREEN_TILE_PX, SCREEN_TILE_SHIFT, SUBPIXELS, Splat, VIEW_GLOBE, VIEW_TILE,
+    Active, Axis, Col, DEPTH_ONE, Entry, GROUP, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, MISSING,
+    Params, Particle, Row, SCREEN_TILE_PX, SCREEN_TILE_SHIFT, SUBPIXELS, Splat, VIEW_GLOBE,
+    VIEW_TILE,
 };
 use render_worker::stages::{bin, compose, eye, interpolate, light, map, particles, project};
 
@@ -16,8 +17,18 @@ fn module(source: &str) -> naga::Module {
 /// What differs between a Rust struct and its mirror, if anything does.
 fn difference(source: &str, name: &str, fields: Fields, size: usize) -> Option<String> {
     let module = module(source);
-    let found = module.types.iter().find(|(_, ty)| ty.name.as_deref() == Some(name));
-    let Some((_, naga::Type { inner: naga::TypeInner::Struct { members, span }, .. })) = found else {
+    let found = module
+        .types
+        .iter()
+        .find(|(_, ty)| ty.name.as_deref() == Some(name));
+    let Some((
+        _,
+        naga::Type {
+            inner: naga::TypeInner::Struct { members, span },
+            ..
+        },
+    )) = found
+    else {
         return Some(format!("no struct {name}"));
     };
     let scalar = |kind: &str| match kind {
@@ -30,12 +41,21 @@ fn difference(source: &str, name: &str, fields: Fields, size: usize) -> Option<S
             && member.offset as usize == *offset
             && module.types[member.ty].inner == naga::TypeInner::Scalar(scalar(kind))
     };
-    let wrong = members.iter().zip(fields).find(|(member, field)| !same(member, field));
+    let wrong = members
+        .iter()
+        .zip(fields)
+        .find(|(member, field)| !same(member, field));
     if let Some((member, field)) = wrong {
         return Some(format!("{name}: {member:?} against {field:?}"));
     }
     let complete = members.len() == fields.len() && *span as usize == size;
-    (!complete).then(|| format!("{name}: {} fields, {span} bytes against {}, {size}", members.len(), fields.len()))
+    (!complete).then(|| {
+        format!(
+            "{name}: {} fields, {span} bytes against {}, {size}",
+            members.len(),
+            fields.len()
+        )
+    })
 }
 
 const SHARED: [(&str, Fields, usize); 8] = [
@@ -54,15 +74,30 @@ fn structs_have_the_same_fields_in_rust_and_wgsl() {
     for (name, fields, size) in SHARED {
         assert_eq!(difference(eye::SOURCE, name, fields, size), None);
     }
-    assert_eq!(difference(fill::SOURCE, "FillParams", FillParams::FIELDS, size_of::<FillParams>()), None);
+    assert_eq!(
+        difference(
+            fill::SOURCE,
+            "FillParams",
+            FillParams::FIELDS,
+            size_of::<FillParams>()
+        ),
+        None
+    );
 }
 
 #[test]
 fn a_swapped_or_missing_field_is_seen() {
-    for (right, wrong) in [("rows: u32, cols: u32", "cols: u32, rows: u32"), ("rows: u32, ", ""), ("rows: u32", "rows: f32")] {
+    for (right, wrong) in [
+        ("rows: u32, cols: u32", "cols: u32, rows: u32"),
+        ("rows: u32, ", ""),
+        ("rows: u32", "rows: f32"),
+    ] {
         let source = eye::SOURCE.replacen(right, wrong, 1);
         assert_ne!(source, eye::SOURCE);
-        assert!(difference(&source, "Params", Params::FIELDS, size_of::<Params>()).is_some(), "{wrong}");
+        assert!(
+            difference(&source, "Params", Params::FIELDS, size_of::<Params>()).is_some(),
+            "{wrong}"
+        );
     }
 }
 
@@ -70,7 +105,11 @@ fn a_swapped_or_missing_field_is_seen() {
 fn constants_have_the_same_value_in_rust_and_wgsl() {
     let wgsl = |name: &str| {
         let module = module(eye::SOURCE);
-        let (_, constant) = module.constants.iter().find(|(_, c)| c.name.as_deref() == Some(name)).unwrap();
+        let (_, constant) = module
+            .constants
+            .iter()
+            .find(|(_, c)| c.name.as_deref() == Some(name))
+            .unwrap();
         match module.global_expressions[constant.init] {
             naga::Expression::Literal(naga::Literal::U32(v)) => f64::from(v),
             naga::Expression::Literal(naga::Literal::I32(v)) => f64::from(v),
@@ -93,7 +132,11 @@ fn constants_have_the_same_value_in_rust_and_wgsl() {
         ("KERNEL_BALL", f64::from(KERNEL_BALL)),
         ("KERNEL_CLOUD", f64::from(KERNEL_CLOUD)),
     ] {
-        assert!((wgsl(name) - value).abs() <= value.abs() * 1e-7, "{name}: {} against {value}", wgsl(name));
+        assert!(
+            (wgsl(name) - value).abs() <= value.abs() * 1e-7,
+            "{name}: {} against {value}",
+            wgsl(name)
+        );
     }
     assert_eq!(SCREEN_TILE_PX as i32 * SUBPIXELS, 1 << SCREEN_TILE_SHIFT);
 }
@@ -101,12 +144,21 @@ fn constants_have_the_same_value_in_rust_and_wgsl() {
 #[test]
 fn every_shader_is_valid_without_extensions() {
     let sources = [
-        interpolate::SOURCE, fill::SOURCE, particles::SOURCE, project::SOURCE, light::SOURCE, bin::SOURCE, eye::SOURCE,
-        map::SOURCE, compose::SOURCE,
+        interpolate::SOURCE,
+        fill::SOURCE,
+        particles::SOURCE,
+        project::SOURCE,
+        light::SOURCE,
+        bin::SOURCE,
+        eye::SOURCE,
+        map::SOURCE,
+        compose::SOURCE,
     ];
     for source in sources {
-        let mut validator =
-            naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::empty());
+        let mut validator = naga::valid::Validator::new(
+            naga::valid::ValidationFlags::all(),
+            naga::valid::Capabilities::empty(),
+        );
         let module = module(source);
         validator.validate(&module).unwrap();
         assert!(!module.entry_points.is_empty());

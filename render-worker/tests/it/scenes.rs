@@ -11,12 +11,24 @@ use contract::tile::Tile;
 use render_worker::scene::{Frame, Interval, Scene};
 
 /// The grid of the 1-degree climatology.
-pub(crate) const ONE_DEGREE: Grid =
-    Grid { rows: 180, cols: 360, north_deg: 90.0, west_deg: -180.0, dlat_deg: 1.0, dlon_deg: 1.0 };
+pub(crate) const ONE_DEGREE: Grid = Grid {
+    rows: 180,
+    cols: 360,
+    north_deg: 90.0,
+    west_deg: -180.0,
+    dlat_deg: 1.0,
+    dlon_deg: 1.0,
+};
 
 /// A coarser one for quick tests.
-pub(crate) const FIVE_DEGREES: Grid =
-    Grid { rows: 36, cols: 72, north_deg: 90.0, west_deg: -180.0, dlat_deg: 5.0, dlon_deg: 5.0 };
+pub(crate) const FIVE_DEGREES: Grid = Grid {
+    rows: 36,
+    cols: 72,
+    north_deg: 90.0,
+    west_deg: -180.0,
+    dlat_deg: 5.0,
+    dlon_deg: 5.0,
+};
 
 /// Flux of 1 g C m⁻² a year, kg m⁻² s⁻¹.
 pub(crate) const GRAM_A_YEAR: f64 = 1e-3 / (365.25 * 86_400.0);
@@ -26,22 +38,34 @@ fn is_land(lon: f64, lat: f64) -> bool {
         let dx = (lon - x + 540.0).rem_euclid(360.0) - 180.0;
         (dx / rx).powi(2) + ((lat - y) / ry).powi(2) < 1.0
     };
-    blob(20.0, 5.0, 22.0, 32.0) || blob(90.0, 50.0, 65.0, 24.0) || blob(-60.0, -15.0, 18.0, 35.0)
-        || blob(-100.0, 50.0, 32.0, 22.0) || blob(134.0, -25.0, 18.0, 12.0) || lat < -72.0 || lat > 80.0
+    blob(20.0, 5.0, 22.0, 32.0)
+        || blob(90.0, 50.0, 65.0, 24.0)
+        || blob(-60.0, -15.0, 18.0, 35.0)
+        || blob(-100.0, 50.0, 32.0, 22.0)
+        || blob(134.0, -25.0, 18.0, 12.0)
+        || lat < -72.0
+        || lat > 80.0
 }
 
 /// Sources near the equator, sinks in middle latitudes, waves on top.
 fn flux(lon: f64, lat: f64, phase: f64) -> f64 {
     let (x, y) = (lon.to_radians(), lat.to_radians());
-    let belts = 45.0 * (-(lat / 14.0).powi(2)).exp() - 40.0 * (-((lat.abs() - 42.0) / 14.0).powi(2)).exp();
-    (belts * (1.0 + 0.4 * (3.0 * x + phase).sin()) + 10.0 * (5.0 * x).cos() * (4.0 * y + phase).sin()) * GRAM_A_YEAR
+    let belts =
+        45.0 * (-(lat / 14.0).powi(2)).exp() - 40.0 * (-((lat.abs() - 42.0) / 14.0).powi(2)).exp();
+    (belts * (1.0 + 0.4 * (3.0 * x + phase).sin())
+        + 10.0 * (5.0 * x).cos() * (4.0 * y + phase).sin())
+        * GRAM_A_YEAR
 }
 
 fn frame(grid: &Grid, value: impl Fn(f64, f64) -> f64) -> Arc<Frame> {
     let cells = (0..grid.rows).flat_map(|row| (0..grid.cols).map(move |col| (row, col)));
     let values = cells.map(|(row, col)| {
         let place = grid.cell_center(row, col);
-        if is_land(place.lon, place.lat) { f32::NAN } else { value(place.lon, place.lat) as f32 }
+        if is_land(place.lon, place.lat) {
+            f32::NAN
+        } else {
+            value(place.lon, place.lat) as f32
+        }
     });
     Arc::new(Frame::new(values.collect()))
 }
@@ -60,7 +84,12 @@ pub(crate) fn ocean(grid: Grid) -> Scene {
         weight: 0.6,
     };
     let domain = Scene::domain_of(value.before.cells.content().iter().map(|v| *v > -1.0));
-    Scene { grid, domain, value, accumulated: Some(accumulated) }
+    Scene {
+        grid,
+        domain,
+        value,
+        accumulated: Some(accumulated),
+    }
 }
 
 /// A job in the default style of fluxes.
@@ -77,9 +106,18 @@ pub(crate) fn job(mode: Mode, view: View) -> RenderJob {
 }
 
 pub(crate) fn tile(z: u8, x: u32, y: u32, size_px: u32) -> View {
-    View::Tile { tile: Tile::new(z, x, y).unwrap(), size_px }
+    View::Tile {
+        tile: Tile::new(z, x, y).unwrap(),
+        size_px,
+    }
 }
 
 pub(crate) fn globe(lon_deg: f64, lat_deg: f64, height_m: f64, size_px: u32) -> View {
-    View::Globe { lon_deg, lat_deg, height_m, width_px: size_px, height_px: size_px }
+    View::Globe {
+        lon_deg,
+        lat_deg,
+        height_m,
+        width_px: size_px,
+        height_px: size_px,
+    }
 }

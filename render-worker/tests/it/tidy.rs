@@ -11,7 +11,11 @@ fn every_stage_has_a_shader_and_a_twin() {
         let path = entry.unwrap().path();
         if path.is_dir() {
             let name = path.file_name().unwrap().to_str().unwrap();
-            for file in ["mod.rs".to_owned(), "cpu.rs".to_owned(), format!("{name}.wgsl")] {
+            for file in [
+                "mod.rs".to_owned(),
+                "cpu.rs".to_owned(),
+                format!("{name}.wgsl"),
+            ] {
                 assert!(path.join(&file).is_file(), "{name} has no {file}");
             }
             stages += 1;
@@ -22,7 +26,10 @@ fn every_stage_has_a_shader_and_a_twin() {
 
 /// Stages in the order in which a text first calls each.
 fn order<'a>(text: &str, stages: &[&'a str], call: impl Fn(&str) -> String) -> Vec<&'a str> {
-    let mut found: Vec<_> = stages.iter().map(|stage| (text.find(&call(stage)).unwrap_or(usize::MAX), *stage)).collect();
+    let mut found: Vec<_> = stages
+        .iter()
+        .map(|stage| (text.find(&call(stage)).unwrap_or(usize::MAX), *stage))
+        .collect();
     found.retain(|(at, _)| *at != usize::MAX);
     found.sort_unstable();
     found.into_iter().map(|(_, stage)| stage).collect()
@@ -30,14 +37,27 @@ fn order<'a>(text: &str, stages: &[&'a str], call: impl Fn(&str) -> String) -> V
 
 #[test]
 fn both_frames_list_the_same_stages_in_the_same_order() {
-    let stages = ["interpolate", "map", "particles", "project", "light", "bin", "eye", "compose"];
+    let stages = [
+        "interpolate",
+        "map",
+        "particles",
+        "project",
+        "light",
+        "bin",
+        "eye",
+        "compose",
+    ];
     let read = |file: &str| std::fs::read_to_string(Path::new(SOURCES).join(file)).unwrap();
-    let gpu = order(&read("frame.rs"), &stages, |stage| format!("self.{stage}.record("));
+    let gpu = order(&read("frame.rs"), &stages, |stage| {
+        format!("self.{stage}.record(")
+    });
     let cpu = read("frame_cpu.rs");
     let (_, draw) = cpu.split_once("pub fn draw(").unwrap();
     let (draw, _) = draw.split_once("\n}\n").unwrap();
     // Two stages are called through a function that also makes their buffers.
-    let draw = draw.replacen("interpolated(", "interpolate::cpu::(", 1).replacen("binned(", "bin::cpu::(", 1);
+    let draw = draw
+        .replacen("interpolated(", "interpolate::cpu::(", 1)
+        .replacen("binned(", "bin::cpu::(", 1);
     let cpu = order(&draw, &stages, |stage| format!("{stage}::cpu::"));
     assert_eq!(gpu, stages);
     assert_eq!(cpu, stages);

@@ -1,6 +1,8 @@
 //! CPU twin of `bin.wgsl`.
 
-use crate::stages::layout::{DEPTH_ONE, Entry, Params, SCREEN_TILE_SHIFT, SUBPIXELS, Splat, nearest};
+use crate::stages::layout::{
+    DEPTH_ONE, Entry, Params, SCREEN_TILE_SHIFT, SUBPIXELS, Splat, nearest,
+};
 
 const MOST_DEPTH: f32 = 15.0;
 
@@ -19,13 +21,19 @@ fn reach_of(params: &Params, splat: &Splat) -> [std::ops::Range<u32>; 2] {
         let end = (((place + radius) >> SCREEN_TILE_SHIFT) + 1).clamp(0, tiles as i32) as u32;
         low..end.max(low)
     };
-    [axis(splat.x_sub, params.tiles_x), axis(splat.y_sub, params.tiles_y)]
+    [
+        axis(splat.x_sub, params.tiles_x),
+        axis(splat.y_sub, params.tiles_y),
+    ]
 }
 
 fn lists_of(params: &Params, splat: &Splat) -> impl Iterator<Item = usize> + use<> {
     let [xs, ys] = reach_of(params, splat);
     let (tiles_x, slices, slice) = (params.tiles_x, params.slices, splat.slice as u32);
-    ys.flat_map(move |y| xs.clone().map(move |x| ((y * tiles_x + x) * slices + slice) as usize))
+    ys.flat_map(move |y| {
+        xs.clone()
+            .map(move |x| ((y * tiles_x + x) * slices + slice) as usize)
+    })
 }
 
 /// Adds the number of splats in every list of (screen tile, slice).
@@ -54,9 +62,11 @@ pub fn scatter(params: &Params, splats: &[Splat], counts: &mut [u32], entries: &
         let color = (splat.color & 0x00ff_ffff) | ((splat.slice as u32) << 24);
         for list in lists_of(params, splat) {
             let tile = list as u32 / params.slices;
-            let corner = [tile % params.tiles_x, tile / params.tiles_x].map(|t| (t << SCREEN_TILE_SHIFT) as i32);
+            let corner = [tile % params.tiles_x, tile / params.tiles_x]
+                .map(|t| (t << SCREEN_TILE_SHIFT) as i32);
             let offset = |place: i32, corner: i32| ((place - corner) >> params.entry_shift) as u32;
-            let place = (offset(splat.x_sub, corner[0]) & 0xffff) | (offset(splat.y_sub, corner[1]) << 16);
+            let place =
+                (offset(splat.x_sub, corner[0]) & 0xffff) | (offset(splat.y_sub, corner[1]) << 16);
             entries[counts[list] as usize] = Entry { place, size, color };
             counts[list] += 1;
         }

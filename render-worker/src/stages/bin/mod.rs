@@ -44,11 +44,19 @@ impl Bin {
         let splats = frame.room(Slot::Splats, 4)?;
         let counts = frame.room(Slot::Counts, u64::from(lists) * 4)?;
         let sums = frame.room(Slot::BlockSums, u64::from(lists.div_ceil(SCAN_BLOCK)) * 4)?;
-        let entries = frame.room(Slot::Entries, u64::from(frame.params.entry_capacity) * size_of::<Entry>() as u64)?;
+        let entries = frame.room(
+            Slot::Entries,
+            u64::from(frame.params.entry_capacity) * size_of::<Entry>() as u64,
+        )?;
         let params = &frame.params_buffer;
         let recorder = &mut frame.recorder;
         recorder.clear(&counts, u64::from(lists) * 4);
-        recorder.dispatch_list(&self.count, &[(0, params), (1, &splats), (2, &counts)], particles, GROUP);
+        recorder.dispatch_list(
+            &self.count,
+            &[(0, params), (1, &splats), (2, &counts)],
+            particles,
+            GROUP,
+        );
         let scan = [(0, params), (2, &counts), (3, &sums)];
         recorder.dispatch_list(&self.scan_blocks, &scan, lists, SCAN_BLOCK);
         recorder.dispatch(&self.scan_sums, &[(0, params), (3, &sums)], [1, 1]);

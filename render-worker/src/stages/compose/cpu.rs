@@ -25,8 +25,14 @@ fn surface_below(params: &Params, domain: &[u32], pixel: [u32; 2]) -> Vec4 {
     if !ground.on_ground {
         return (AIR * 0.5).extend(1.0) * cover;
     }
-    let color = if is_land(params, domain, ground.lon_rad, ground.lat_rad) { LAND } else { SEA };
-    let sun = ground.normal.dot(Vec3::new(params.sun_x, params.sun_y, params.sun_z));
+    let color = if is_land(params, domain, ground.lon_rad, ground.lat_rad) {
+        LAND
+    } else {
+        SEA
+    };
+    let sun = ground
+        .normal
+        .dot(Vec3::new(params.sun_x, params.sun_y, params.sun_z));
     let toward = Vec3::new(params.eye_x, params.eye_y, params.eye_z) - ground.normal;
     let facing = ground.normal.dot(toward / toward.length()).clamp(0.0, 1.0);
     let haze = (1.0 - facing) * (1.0 - facing) * (1.0 - facing);

@@ -7,8 +7,11 @@ use crate::frame::FrameContext;
 use crate::gpu::{Gpu, Kernel, Slot};
 
 /// The shader.
-pub const SOURCE: &str =
-    concat!(include_str!("../prelude.wgsl"), include_str!("../sphere.wgsl"), include_str!("compose.wgsl"));
+pub const SOURCE: &str = concat!(
+    include_str!("../prelude.wgsl"),
+    include_str!("../sphere.wgsl"),
+    include_str!("compose.wgsl")
+);
 
 /// The compiled stage.
 pub struct Compose {
@@ -18,15 +21,26 @@ pub struct Compose {
 impl Compose {
     /// Compiles `source`, [`SOURCE`] but for tests.
     pub fn new(gpu: &Gpu, source: &str) -> Self {
-        Self { compose: gpu.kernel("compose", source, "compose") }
+        Self {
+            compose: gpu.kernel("compose", source, "compose"),
+        }
     }
 
     /// Fills the slot of the image.
     pub fn record(&self, frame: &mut FrameContext<'_>) -> Result<(), RenderError> {
         let picture = frame.room(Slot::Picture, 16)?;
         let image = frame.room(Slot::Image, frame.pixel_count() * 4)?;
-        let buffers = [(0, &frame.params_buffer), (1, &picture), (2, &frame.domain), (3, &image)];
-        frame.recorder.dispatch(&self.compose, &buffers, [frame.params.tiles_x, frame.params.tiles_y]);
+        let buffers = [
+            (0, &frame.params_buffer),
+            (1, &picture),
+            (2, &frame.domain),
+            (3, &image),
+        ];
+        frame.recorder.dispatch(
+            &self.compose,
+            &buffers,
+            [frame.params.tiles_x, frame.params.tiles_y],
+        );
         Ok(())
     }
 }

@@ -2,7 +2,9 @@
 
 use glam::{Vec2, Vec4};
 
-use crate::stages::layout::{DEPTH_ONE, Entry, KERNEL_BALL, KERNEL_CLOUD, Params, SCREEN_TILE_PX, SUBPIXELS};
+use crate::stages::layout::{
+    DEPTH_ONE, Entry, KERNEL_BALL, KERNEL_CLOUD, Params, SCREEN_TILE_PX, SUBPIXELS,
+};
 
 const MOST_SUM: u32 = 0x7fff_ffff;
 const TILE: usize = SCREEN_TILE_PX as usize;
@@ -31,9 +33,18 @@ pub fn blended(front_to_back: bool, picture: Vec4, sums: [u32; 4]) -> Vec4 {
     }
     let depth = sums[3] as f32;
     let alpha = 1.0 - (-depth / DEPTH_ONE).exp();
-    let rgb = Vec4::new(sums[0] as f32, sums[1] as f32, sums[2] as f32, depth * 255.0) / (depth * 255.0);
+    let rgb = Vec4::new(
+        sums[0] as f32,
+        sums[1] as f32,
+        sums[2] as f32,
+        depth * 255.0,
+    ) / (depth * 255.0);
     let slice = rgb * alpha;
-    if front_to_back { picture + slice * (1.0 - picture.w) } else { picture * (1.0 - alpha) + slice }
+    if front_to_back {
+        picture + slice * (1.0 - picture.w)
+    } else {
+        picture * (1.0 - alpha) + slice
+    }
 }
 
 /// Every pixel from the lists that end where `list_ends` says.
@@ -41,13 +52,18 @@ pub fn eye(params: &Params, list_ends: &[u32], entries: &[Entry], picture: &mut 
     for tile_y in 0..params.tiles_y {
         for tile_x in 0..params.tiles_x {
             let first_list = ((tile_y * params.tiles_x + tile_x) * params.slices) as usize;
-            let first = if first_list == 0 { 0 } else { list_ends[first_list - 1] as usize };
+            let first = if first_list == 0 {
+                0
+            } else {
+                list_ends[first_list - 1] as usize
+            };
             let end = list_ends[first_list + params.slices as usize - 1] as usize;
             let colors = screen_tile(params, &entries[first..end]);
             let [left, top] = [tile_x, tile_y].map(|tile| tile * SCREEN_TILE_PX);
             for y in top..(top + SCREEN_TILE_PX).min(params.height) {
                 for x in left..(left + SCREEN_TILE_PX).min(params.width) {
-                    picture[(y * params.width + x) as usize] = colors[(y - top) as usize * TILE + (x - left) as usize];
+                    picture[(y * params.width + x) as usize] =
+                        colors[(y - top) as usize * TILE + (x - left) as usize];
                 }
             }
         }
@@ -74,7 +90,8 @@ fn add(params: &Params, entry: &Entry, sums: &mut Sums) {
     let inverse_radius = 1.0 / radius;
     let depth = (entry.size >> 16) as f32;
     let rgb = [0, 8, 16].map(|shift| (entry.color >> shift) & 255);
-    let [east, south] = [(entry.place << 16) as i32 >> 16, entry.place as i32 >> 16].map(|place| place as f32);
+    let [east, south] =
+        [(entry.place << 16) as i32 >> 16, entry.place as i32 >> 16].map(|place| place as f32);
     // A pixel more on either side: what lies outside the radius adds nothing.
     let reach = |place: f32| {
         let low = ((place - radius) / pixel_units - 1.5).max(0.0) as usize;
@@ -89,7 +106,11 @@ fn add(params: &Params, entry: &Entry, sums: &mut Sums) {
             let amount = (depth * weight_at(params.kernel, q, radius / pixel_units) + 0.5) as u32;
             let sum = &mut sums[y * TILE + x];
             for (channel, plain) in rgb.into_iter().enumerate() {
-                let lit = if params.kernel == KERNEL_BALL { (plain as f32 * ball_light(offset) + 0.5) as u32 } else { plain };
+                let lit = if params.kernel == KERNEL_BALL {
+                    (plain as f32 * ball_light(offset) + 0.5) as u32
+                } else {
+                    plain
+                };
                 sum[channel] = (sum[channel] + lit * amount).min(MOST_SUM);
             }
             sum[3] = (sum[3] + amount).min(MOST_SUM);

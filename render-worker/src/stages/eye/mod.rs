@@ -17,7 +17,9 @@ pub struct Eye {
 impl Eye {
     /// Compiles `source`, [`SOURCE`] but for tests.
     pub fn new(gpu: &Gpu, source: &str) -> Self {
-        Self { eye: gpu.kernel("eye", source, "eye") }
+        Self {
+            eye: gpu.kernel("eye", source, "eye"),
+        }
     }
 
     /// Fills the slot of the picture.
@@ -25,8 +27,17 @@ impl Eye {
         let counts = frame.room(Slot::Counts, 4)?;
         let entries = frame.room(Slot::Entries, 4)?;
         let picture = frame.room(Slot::Picture, frame.pixel_count() * 16)?;
-        let buffers = [(0, &frame.params_buffer), (1, &counts), (2, &entries), (3, &picture)];
-        frame.recorder.dispatch(&self.eye, &buffers, [frame.params.tiles_x, frame.params.tiles_y]);
+        let buffers = [
+            (0, &frame.params_buffer),
+            (1, &counts),
+            (2, &entries),
+            (3, &picture),
+        ];
+        frame.recorder.dispatch(
+            &self.eye,
+            &buffers,
+            [frame.params.tiles_x, frame.params.tiles_y],
+        );
         Ok(())
     }
 }

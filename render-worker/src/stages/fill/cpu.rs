@@ -10,11 +10,23 @@ use crate::stages::layout::is_missing;
 pub fn fill(params: &FillParams, values: &[f32], domain: &[u32], cosines: &[f32]) -> Vec<f32> {
     let cols = params.cols as usize;
     let gap = |at: usize| is_missing(values[at]) && domain[at] != 0;
-    let cell = |at: usize| if gap(at) { from_neighbours(params, values, cosines, at / cols, at % cols) } else { values[at] };
+    let cell = |at: usize| {
+        if gap(at) {
+            from_neighbours(params, values, cosines, at / cols, at % cols)
+        } else {
+            values[at]
+        }
+    };
     (0..values.len()).map(cell).collect()
 }
 
-fn from_neighbours(params: &FillParams, values: &[f32], cosines: &[f32], row: usize, col: usize) -> f32 {
+fn from_neighbours(
+    params: &FillParams,
+    values: &[f32],
+    cosines: &[f32],
+    row: usize,
+    col: usize,
+) -> f32 {
     let (rows, cols) = (params.rows as i32, params.cols as i32);
     let width = cosines[row] * params.lon_per_lat;
     let (mut weights, mut sum) = (0.0, 0.0);
@@ -25,7 +37,11 @@ fn from_neighbours(params: &FillParams, values: &[f32], cosines: &[f32], row: us
         }
         for dx in -params.reach_x..=params.reach_x {
             let x = col as i32 + dx;
-            let x = if params.periodic == 1 { x.rem_euclid(cols) } else { x };
+            let x = if params.periodic == 1 {
+                x.rem_euclid(cols)
+            } else {
+                x
+            };
             if x < 0 || x >= cols {
                 continue;
             }
@@ -38,5 +54,9 @@ fn from_neighbours(params: &FillParams, values: &[f32], cosines: &[f32], row: us
             }
         }
     }
-    if weights > 0.0 { sum / weights } else { values[row * params.cols as usize + col] }
+    if weights > 0.0 {
+        sum / weights
+    } else {
+        values[row * params.cols as usize + col]
+    }
 }

@@ -34,7 +34,11 @@ shared_struct! {
 impl FillParams {
     /// Parameters and the cosine of every row's middle latitude.
     pub fn for_grid(grid: &Grid) -> (Self, Vec<f32>) {
-        let widest = if grid.is_periodic() { (grid.cols as i32 - 1) / 2 } else { REACH };
+        let widest = if grid.is_periodic() {
+            (grid.cols as i32 - 1) / 2
+        } else {
+            REACH
+        };
         let params = Self {
             rows: grid.rows,
             cols: grid.cols,
@@ -43,7 +47,8 @@ impl FillParams {
             lon_per_lat: (grid.dlon_deg / grid.dlat_deg) as f32,
             ..Self::default()
         };
-        let cosines = (0..grid.rows).map(|row| grid.cell_center(row, 0).lat.to_radians().cos().max(1e-3) as f32);
+        let cosines = (0..grid.rows)
+            .map(|row| grid.cell_center(row, 0).lat.to_radians().cos().max(1e-3) as f32);
         (params, cosines.collect())
     }
 }
@@ -56,11 +61,19 @@ pub struct Fill {
 impl Fill {
     /// Compiles `source`, [`SOURCE`] but for tests.
     pub fn new(gpu: &Gpu, source: &str) -> Self {
-        Self { kernel: gpu.kernel("fill", source, "fill") }
+        Self {
+            kernel: gpu.kernel("fill", source, "fill"),
+        }
     }
 
     /// Fills one frame on the GPU; see [`cpu::fill`].
-    pub fn run(&self, gpu: &Gpu, grid: &Grid, values: &[f32], domain: &[u32]) -> Result<Vec<f32>, RenderError> {
+    pub fn run(
+        &self,
+        gpu: &Gpu,
+        grid: &Grid,
+        values: &[f32],
+        domain: &[u32],
+    ) -> Result<Vec<f32>, RenderError> {
         let (params, cosines) = FillParams::for_grid(grid);
         let params = gpu.uniform("fill params", &params);
         let values_in = gpu.storage("fill values", values)?;
@@ -69,7 +82,17 @@ impl Fill {
         let filled = gpu.storage("fill filled", values)?;
         let mut recorder = gpu.recorder();
         let groups = [grid.cols.div_ceil(BLOCK), grid.rows.div_ceil(BLOCK)];
-        recorder.dispatch(&self.kernel, &[(0, &params), (1, &values_in), (2, &domain), (3, &cosines), (4, &filled)], groups);
+        recorder.dispatch(
+            &self.kernel,
+            &[
+                (0, &params),
+                (1, &values_in),
+                (2, &domain),
+                (3, &cosines),
+                (4, &filled),
+            ],
+            groups,
+        );
         recorder.download(&filled, values.len())
     }
 }

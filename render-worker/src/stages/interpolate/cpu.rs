@@ -15,7 +15,13 @@ pub fn interpolated(v1: f32, v2: f32, weight: f32) -> f32 {
 }
 
 /// Fills the cells of `between` that the picture needs.
-pub fn interpolate(params: &Params, weight: f32, before: &[f32], after: &[f32], between: &mut [f32]) {
+pub fn interpolate(
+    params: &Params,
+    weight: f32,
+    before: &[f32],
+    after: &[f32],
+    between: &mut [f32],
+) {
     for cell in params.first_cell as usize..params.end_cell as usize {
         between[cell] = interpolated(before[cell], after[cell], weight);
     }

@@ -8,7 +8,10 @@ use crate::gpu::{Gpu, Kernel, Slot};
 use crate::stages::layout::GROUP;
 
 /// The shader.
-pub const SOURCE: &str = concat!(include_str!("../prelude.wgsl"), include_str!("interpolate.wgsl"));
+pub const SOURCE: &str = concat!(
+    include_str!("../prelude.wgsl"),
+    include_str!("interpolate.wgsl")
+);
 
 /// The compiled stage.
 pub struct Interpolate {
@@ -27,18 +30,39 @@ impl Interpolate {
 
     /// Fills the slots of values and accumulated carbon.
     pub fn record(&self, frame: &mut FrameContext<'_>) -> Result<(), RenderError> {
-        let cells = frame.params.end_cell.saturating_sub(frame.params.first_cell);
+        let cells = frame
+            .params
+            .end_cell
+            .saturating_sub(frame.params.first_cell);
         let bytes = u64::from(frame.params.rows) * u64::from(frame.params.cols) * 4;
         let value = frame.room(Slot::Value, bytes)?;
         let [before, after] = frame.value_frames.clone();
-        let buffers = [(0, &frame.params_buffer), (1, &before), (2, &after), (3, &value)];
-        frame.recorder.dispatch_list(&self.value, &buffers, cells, GROUP);
+        let buffers = [
+            (0, &frame.params_buffer),
+            (1, &before),
+            (2, &after),
+            (3, &value),
+        ];
+        frame
+            .recorder
+            .dispatch_list(&self.value, &buffers, cells, GROUP);
         // The next stage binds the slot also where nothing is accumulated.
-        let accumulated_bytes = if frame.accumulated_frames.is_some() { bytes } else { 4 };
+        let accumulated_bytes = if frame.accumulated_frames.is_some() {
+            bytes
+        } else {
+            4
+        };
         let accumulated = frame.room(Slot::Accumulated, accumulated_bytes)?;
         if let Some([before, after]) = frame.accumulated_frames.clone() {
-            let buffers = [(0, &frame.params_buffer), (1, &before), (2, &after), (3, &accumulated)];
-            frame.recorder.dispatch_list(&self.accumulated, &buffers, cells, GROUP);
+            let buffers = [
+                (0, &frame.params_buffer),
+                (1, &before),
+                (2, &after),
+                (3, &accumulated),
+            ];
+            frame
+                .recorder
+                .dispatch_list(&self.accumulated, &buffers, cells, GROUP);
         }
         Ok(())
     }

@@ -41,9 +41,18 @@ impl Light {
         frame.recorder.clear(&light, bytes);
         let all = [(0, &frame.params_buffer), (1, &splats), (2, &light)];
         let columns = frame.params.light_width * frame.params.light_height;
-        frame.recorder.dispatch_list(&self.deposit, &all, count, GROUP);
-        frame.recorder.dispatch_list(&self.prefix, &[(0, &frame.params_buffer), (2, &light)], columns, GROUP);
-        frame.recorder.dispatch_list(&self.shade, &all, count, GROUP);
+        frame
+            .recorder
+            .dispatch_list(&self.deposit, &all, count, GROUP);
+        frame.recorder.dispatch_list(
+            &self.prefix,
+            &[(0, &frame.params_buffer), (2, &light)],
+            columns,
+            GROUP,
+        );
+        frame
+            .recorder
+            .dispatch_list(&self.shade, &all, count, GROUP);
         Ok(())
     }
 }

@@ -8,8 +8,11 @@ use crate::gpu::{Gpu, Kernel, Slot};
 use crate::stages::layout::Axis;
 
 /// The shader.
-pub const SOURCE: &str =
-    concat!(include_str!("../prelude.wgsl"), include_str!("../sphere.wgsl"), include_str!("map.wgsl"));
+pub const SOURCE: &str = concat!(
+    include_str!("../prelude.wgsl"),
+    include_str!("../sphere.wgsl"),
+    include_str!("map.wgsl")
+);
 
 /// The compiled stage.
 pub struct Map {
@@ -19,7 +22,9 @@ pub struct Map {
 impl Map {
     /// Compiles `source`, [`SOURCE`] but for tests.
     pub fn new(gpu: &Gpu, source: &str) -> Self {
-        Self { map: gpu.kernel("map", source, "map") }
+        Self {
+            map: gpu.kernel("map", source, "map"),
+        }
     }
 
     /// Fills the slot of the picture.
@@ -27,13 +32,26 @@ impl Map {
         let plan = frame.plan;
         let value = frame.room(Slot::Value, 4)?;
         let palette = frame.upload(Slot::Palette, &plan.palette)?;
-        let axes = frame.room(Slot::Axes, (plan.axes.len().max(1) * size_of::<Axis>()) as u64)?;
+        let axes = frame.room(
+            Slot::Axes,
+            (plan.axes.len().max(1) * size_of::<Axis>()) as u64,
+        )?;
         if !plan.axes.is_empty() {
             frame.upload(Slot::Axes, &plan.axes)?;
         }
         let picture = frame.room(Slot::Picture, frame.pixel_count() * 16)?;
-        let buffers = [(0, &frame.params_buffer), (1, &value), (2, &palette), (3, &axes), (4, &picture)];
-        frame.recorder.dispatch(&self.map, &buffers, [frame.params.tiles_x, frame.params.tiles_y]);
+        let buffers = [
+            (0, &frame.params_buffer),
+            (1, &value),
+            (2, &palette),
+            (3, &axes),
+            (4, &picture),
+        ];
+        frame.recorder.dispatch(
+            &self.map,
+            &buffers,
+            [frame.params.tiles_x, frame.params.tiles_y],
+        );
         Ok(())
     }
 }

@@ -28,11 +28,15 @@ pub fn unit(bits: u32) -> f32 {
 
 /// Thin at both ends of a column, so that particles appear and vanish unseen; mean 1.
 pub fn envelope(phase: f32) -> f32 {
-    (phase.min(1.0 - phase) * 8.0).clamp(0.0, 1.0) * (8.0 / 7.0)
+    (phase.min(1.0 - phase) * 12.0).clamp(0.0, 1.0) * (12.0 / 11.0)
 }
 
 fn strength_of(params: &Params, value: f32, position: f32) -> f32 {
-    if params.diverging == 0 { position } else { (value.abs() * params.strength_per_unit).clamp(0.0, 1.0) }
+    if params.diverging == 0 {
+        position
+    } else {
+        (value.abs() * params.strength_per_unit).clamp(0.0, 1.0)
+    }
 }
 
 /// One particle for every active cell and `k` below `particles_per_cell`, cell by cell.
@@ -48,13 +52,26 @@ fn one(params: &Params, inputs: &Inputs<'_>, cell: Active, k: u32) -> Particle {
     let row = cell.cell / params.cols;
     let value = inputs.value[cell.cell as usize];
     let bits = hash(hash(cell.cell) ^ k.wrapping_mul(0x9e3779b9));
-    let shaken = |bits: u32| (bits >> params.shake_shift).wrapping_sub(HALF_TURN >> params.shake_shift);
-    let along = |step: u32, bits: u32| HALF_TURN.wrapping_add(k.wrapping_mul(step)).wrapping_add(shaken(bits));
+    let shaken =
+        |bits: u32| (bits >> params.shake_shift).wrapping_sub(HALF_TURN >> params.shake_shift);
+    let along = |step: u32, bits: u32| {
+        HALF_TURN
+            .wrapping_add(k.wrapping_mul(step))
+            .wrapping_add(shaken(bits))
+    };
     let (east, south) = (along(3242174889, bits), along(2447445414, hash(bits)));
     let across = (cell.cell % params.cols).wrapping_mul(1779033704);
-    let start = row.wrapping_add(k).wrapping_mul(2654435769).wrapping_add(across);
-    let mut particle =
-        Particle { row, slot: cell.slot, east: unit(east), south: unit(south), ..Particle::default() };
+    let start = row
+        .wrapping_add(k)
+        .wrapping_mul(2654435769)
+        .wrapping_add(across);
+    let mut particle = Particle {
+        row,
+        slot: cell.slot,
+        east: unit(east),
+        south: unit(south),
+        ..Particle::default()
+    };
     if is_missing(value) {
         return particle;
     }
@@ -65,14 +82,17 @@ fn one(params: &Params, inputs: &Inputs<'_>, cell: Active, k: u32) -> Particle {
             carbon = 0.0;
         }
     }
-    let turned = unit(start.wrapping_add(hash(bits ^ 0x85ebca6b) >> 3)) + params.turns_per_kg_m2 * carbon.abs();
+    let turned = unit(start.wrapping_add(hash(bits ^ 0x85ebca6b) >> 3))
+        + params.turns_per_kg_m2 * carbon.abs();
     let phase = turned - turned.floor();
-    let column_m = (carbon * params.height_m_per_kg_m2).clamp(-params.height_limit_m, params.height_limit_m);
+    let column_m =
+        (carbon * params.height_m_per_kg_m2).clamp(-params.height_limit_m, params.height_limit_m);
     let position = ((value - params.transfer_low) * params.transfer_per_unit).clamp(0.0, 1.0);
     let strength = strength_of(params, value, position);
     particle.height_m = column_m * phase + params.sheet_m * (phase - 0.5);
-    particle.mass_kg = carbon * inputs.rows[row as usize].area_m2 / params.particles_per_cell as f32;
-    let opacity = params.depth_floor + (1.0 - params.depth_floor) * strength;
+    particle.mass_kg =
+        carbon * inputs.rows[row as usize].area_m2 / params.particles_per_cell as f32;
+    let opacity = params.depth_floor + (1.0 - params.depth_floor) * strength.sqrt();
     particle.depth = params.optical_depth * opacity * envelope(phase);
     let color = inputs.palette[nearest(position * 255.0) as usize];
     particle.color = color | ((nearest(strength * 255.0) as u32) << 24);

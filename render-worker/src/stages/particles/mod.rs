@@ -11,7 +11,10 @@ use crate::gpu::{Gpu, Kernel, Slot};
 use crate::stages::layout::{GROUP, Particle};
 
 /// The shader.
-pub const SOURCE: &str = concat!(include_str!("../prelude.wgsl"), include_str!("particles.wgsl"));
+pub const SOURCE: &str = concat!(
+    include_str!("../prelude.wgsl"),
+    include_str!("particles.wgsl")
+);
 
 /// The compiled stage.
 pub struct Particles {
@@ -21,7 +24,9 @@ pub struct Particles {
 impl Particles {
     /// Compiles `source`, [`SOURCE`] but for tests.
     pub fn new(gpu: &Gpu, source: &str) -> Self {
-        Self { generate: gpu.kernel("particles", source, "generate") }
+        Self {
+            generate: gpu.kernel("particles", source, "generate"),
+        }
     }
 
     /// Fills the slot of particles.
@@ -33,7 +38,10 @@ impl Particles {
         let palette = frame.upload(Slot::Palette, &plan.palette)?;
         let value = frame.room(Slot::Value, 4)?;
         let accumulated = frame.room(Slot::Accumulated, 4)?;
-        let particles = frame.room(Slot::Particles, u64::from(count) * size_of::<Particle>() as u64)?;
+        let particles = frame.room(
+            Slot::Particles,
+            u64::from(count) * size_of::<Particle>() as u64,
+        )?;
         let buffers = [
             (0, &frame.params_buffer),
             (1, &active),
@@ -43,7 +51,9 @@ impl Particles {
             (5, &palette),
             (6, &particles),
         ];
-        frame.recorder.dispatch_list(&self.generate, &buffers, count, GROUP);
+        frame
+            .recorder
+            .dispatch_list(&self.generate, &buffers, count, GROUP);
         Ok(())
     }
 }

@@ -27,7 +27,7 @@ fn shaken(bits: u32) -> u32 {
 
 // Thin at both ends of a column, so that particles appear and vanish unseen; mean 1.
 fn envelope(phase: f32) -> f32 {
-    return clamp(min(phase, 1.0 - phase) * 8.0, 0.0, 1.0) * (8.0 / 7.0);
+    return clamp(min(phase, 1.0 - phase) * 12.0, 0.0, 1.0) * (12.0 / 11.0);
 }
 
 fn strength_of(value: f32, position: f32) -> f32 {
@@ -68,7 +68,7 @@ fn generate(@builtin(global_invocation_id) global: vec3<u32>, @builtin(num_workg
     let strength = strength_of(value, position);
     particle.height_m = column_m * phase + params.sheet_m * (phase - 0.5);
     particle.mass_kg = carbon * rows[row].area_m2 / f32(params.particles_per_cell);
-    let opacity = params.depth_floor + (1.0 - params.depth_floor) * strength;
+    let opacity = params.depth_floor + (1.0 - params.depth_floor) * sqrt(strength);
     particle.depth = params.optical_depth * opacity * envelope(phase);
     particle.color = palette[u32(nearest(position * 255.0))] | (u32(nearest(strength * 255.0)) << 24u);
     particles[i] = particle;

@@ -8,7 +8,13 @@ use crate::stages::layout::{Col, Params, Particle, Row, SUBPIXELS, Splat, VIEW_T
 const WIDE_CELL_RAD: f32 = 0.2;
 
 /// One splat a particle.
-pub fn project(params: &Params, rows: &[Row], cols: &[Col], particles: &[Particle], splats: &mut [Splat]) {
+pub fn project(
+    params: &Params,
+    rows: &[Row],
+    cols: &[Col],
+    particles: &[Particle],
+    splats: &mut [Splat],
+) {
     for (splat, particle) in splats.iter_mut().zip(particles) {
         let (row, col) = (&rows[particle.row as usize], &cols[particle.slot as usize]);
         *splat = if params.view == VIEW_TILE {
@@ -32,7 +38,8 @@ pub fn turned(sin_a: f32, cos_a: f32, delta: f32) -> Vec2 {
 }
 
 fn slice_of(params: &Params, coordinate: f32) -> f32 {
-    ((params.slice_top - coordinate) * params.slices_per_unit).clamp(0.0, params.slices as f32 - 0.001)
+    ((params.slice_top - coordinate) * params.slices_per_unit)
+        .clamp(0.0, params.slices as f32 - 0.001)
 }
 
 fn size_of(params: &Params, color: u32) -> f32 {
@@ -53,8 +60,12 @@ fn on_tile(params: &Params, row: &Row, col: &Col, particle: &Particle) -> Splat 
         radius_px,
         tau,
         slice: slice_of(params, particle.height_m),
-        light_u: x_sub + nearest(particle.height_m * params.light_shift_x_per_m) + params.light_origin_x,
-        light_v: ground_y + nearest(particle.height_m * params.light_shift_y_per_m) + params.light_origin_y,
+        light_u: x_sub
+            + nearest(particle.height_m * params.light_shift_x_per_m)
+            + params.light_origin_x,
+        light_v: ground_y
+            + nearest(particle.height_m * params.light_shift_y_per_m)
+            + params.light_origin_y,
         light_depth: tau * radius_px * radius_px * params.light_depth_gain,
         day: 1.0,
         color: particle.color,
@@ -62,24 +73,39 @@ fn on_tile(params: &Params, row: &Row, col: &Col, particle: &Particle) -> Splat 
 }
 
 fn on_globe(params: &Params, row: &Row, col: &Col, particle: &Particle) -> Splat {
-    let lat = turned(row.sin_lat, row.cos_lat, (0.5 - particle.south) * row.lat_span_rad);
-    let lon = turned(col.sin_lon, col.cos_lon, (particle.east - 0.5) * params.lon_span_rad);
+    let lat = turned(
+        row.sin_lat,
+        row.cos_lat,
+        (0.5 - particle.south) * row.lat_span_rad,
+    );
+    let lon = turned(
+        col.sin_lon,
+        col.cos_lon,
+        (particle.east - 0.5) * params.lon_span_rad,
+    );
     let normal = Vec3::new(lat.y * lon.x, lat.y * lon.y, lat.x);
     let distance = 1.0 + particle.height_m * params.per_earth_radius_m;
     let place = normal * distance;
     let camera = Vec3::new(params.eye_x, params.eye_y, params.eye_z);
     let sight = place - camera;
-    let ahead = sight.dot(Vec3::new(params.forward_x, params.forward_y, params.forward_z));
+    let ahead = sight.dot(Vec3::new(
+        params.forward_x,
+        params.forward_y,
+        params.forward_z,
+    ));
     let beyond = normal.dot(camera);
     let horizon = distance.min(1.0);
     let camera_sq = camera.dot(camera);
-    let grazing = (camera_sq - horizon * horizon).max(0.0).sqrt() * (distance * distance - horizon * horizon).max(0.0).sqrt();
+    let grazing = (camera_sq - horizon * horizon).max(0.0).sqrt()
+        * (distance * distance - horizon * horizon).max(0.0).sqrt();
     if ahead < 0.01 * (camera_sq - 1.0) || beyond * distance < horizon * horizon - grazing {
         return Splat::default();
     }
     let scale = params.focal_px / ahead;
-    let x = sight.dot(Vec3::new(params.right_x, params.right_y, params.right_z)) * scale + params.center_px_x;
-    let y = params.center_px_y - sight.dot(Vec3::new(params.up_x, params.up_y, params.up_z)) * scale;
+    let x = sight.dot(Vec3::new(params.right_x, params.right_y, params.right_z)) * scale
+        + params.center_px_x;
+    let y =
+        params.center_px_y - sight.dot(Vec3::new(params.up_x, params.up_y, params.up_z)) * scale;
     let oblique = (sight.length() / ahead).sqrt();
     let full_px = row.radius * scale * oblique;
     let radius_px = full_px * size_of(params, particle.color);
@@ -88,19 +114,38 @@ fn on_globe(params: &Params, row: &Row, col: &Col, particle: &Particle) -> Splat
     }
     let radius_px = radius_px.max(params.min_radius_px);
     let thinned = full_px / radius_px;
-    let u = place.dot(Vec3::new(params.light_u_x, params.light_u_y, params.light_u_z)) - params.light_u0;
-    let v = place.dot(Vec3::new(params.light_v_x, params.light_v_y, params.light_v_z)) - params.light_v0;
+    let u = place.dot(Vec3::new(
+        params.light_u_x,
+        params.light_u_y,
+        params.light_u_z,
+    )) - params.light_u0;
+    let v = place.dot(Vec3::new(
+        params.light_v_x,
+        params.light_v_y,
+        params.light_v_z,
+    )) - params.light_v0;
     let to_light = params.light_texels_per_unit * params.light_unit as f32;
     Splat {
         x_sub: nearest(x * SUBPIXELS as f32) - params.origin_x_px * SUBPIXELS,
         y_sub: nearest(y * SUBPIXELS as f32) - params.origin_y_px * SUBPIXELS,
         radius_px,
         tau: particle.depth * row.depth_gain * thinned * thinned,
-        slice: slice_of(params, place.dot(Vec3::new(params.half_x, params.half_y, params.half_z))),
+        slice: slice_of(
+            params,
+            place.dot(Vec3::new(params.half_x, params.half_y, params.half_z)),
+        ),
         light_u: nearest(u * to_light),
         light_v: nearest(v * to_light),
-        light_depth: particle.depth * row.depth_gain * row.radius * row.radius * params.light_depth_gain,
-        day: smoothstep(-0.15, 0.35, normal.dot(Vec3::new(params.sun_x, params.sun_y, params.sun_z))),
+        light_depth: particle.depth
+            * row.depth_gain
+            * row.radius
+            * row.radius
+            * params.light_depth_gain,
+        day: smoothstep(
+            -0.15,
+            0.35,
+            normal.dot(Vec3::new(params.sun_x, params.sun_y, params.sun_z)),
+        ),
         color: particle.color,
     }
 }

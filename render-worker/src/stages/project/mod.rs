@@ -11,7 +11,10 @@ use crate::gpu::{Gpu, Kernel, Slot};
 use crate::stages::layout::{GROUP, Splat};
 
 /// The shader.
-pub const SOURCE: &str = concat!(include_str!("../prelude.wgsl"), include_str!("project.wgsl"));
+pub const SOURCE: &str = concat!(
+    include_str!("../prelude.wgsl"),
+    include_str!("project.wgsl")
+);
 
 /// The compiled stage.
 pub struct Project {
@@ -21,7 +24,9 @@ pub struct Project {
 impl Project {
     /// Compiles `source`, [`SOURCE`] but for tests.
     pub fn new(gpu: &Gpu, source: &str) -> Self {
-        Self { project: gpu.kernel("project", source, "project") }
+        Self {
+            project: gpu.kernel("project", source, "project"),
+        }
     }
 
     /// Fills the slot of splats.
@@ -32,8 +37,16 @@ impl Project {
         let cols = frame.upload(Slot::Cols, &plan.cols)?;
         let particles = frame.room(Slot::Particles, 4)?;
         let splats = frame.room(Slot::Splats, u64::from(count) * size_of::<Splat>() as u64)?;
-        let buffers = [(0, &frame.params_buffer), (1, &rows), (2, &cols), (3, &particles), (4, &splats)];
-        frame.recorder.dispatch_list(&self.project, &buffers, count, GROUP);
+        let buffers = [
+            (0, &frame.params_buffer),
+            (1, &rows),
+            (2, &cols),
+            (3, &particles),
+            (4, &splats),
+        ];
+        frame
+            .recorder
+            .dispatch_list(&self.project, &buffers, count, GROUP);
         Ok(())
     }
 }
