@@ -10,5 +10,6 @@ mod fixture;
 mod hostile;
 mod other_writers;
 mod real_files;
+mod sandbox;
 mod service;
 mod synthetic;

@@ -30,8 +30,8 @@ async fn assert_holds_the_map(place: &Place, periods: [Period; 2]) {
         (grid.rows, grid.cols, grid.north_deg, grid.west_deg),
         (6, 12, 90.0, -180.0)
     );
-    for month in 0..2 {
-        assert_eq!(manifest.steps[month].period, periods[month]);
+    for (month, period) in periods.into_iter().enumerate() {
+        assert_eq!(manifest.steps[month].period, period);
         let values = place.values(&manifest, month).await;
         for row in 0..6 {
             for col in 0..12 {

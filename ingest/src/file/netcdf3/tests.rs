@@ -8,7 +8,7 @@ use super::*;
 fn by_hand() -> Vec<u8> {
     let mut bytes = b"CDF\x01".to_vec();
     let put = |bytes: &mut Vec<u8>, words: &[u32]| {
-        words.iter().for_each(|w| bytes.extend(w.to_be_bytes()))
+        bytes.extend(words.iter().flat_map(|w| w.to_be_bytes()));
     };
     let name = |bytes: &mut Vec<u8>, text: &str| {
         bytes.extend((text.len() as u32).to_be_bytes());
@@ -37,9 +37,8 @@ fn by_hand() -> Vec<u8> {
     bytes.extend(2.5f64.to_be_bytes());
     let v = bytes.len() as u32;
     // The only record variable: records of 6 bytes, without padding.
-    [1i16, 2, 3, -4, -5, -6]
-        .iter()
-        .for_each(|n| bytes.extend(n.to_be_bytes()));
+    let stored = [1i16, 2, 3, -4, -5, -6];
+    bytes.extend(stored.iter().flat_map(|n| n.to_be_bytes()));
     bytes[begin_of_v..begin_of_v + 4].copy_from_slice(&v.to_be_bytes());
     bytes[begin_of_s..begin_of_s + 4].copy_from_slice(&s.to_be_bytes());
     bytes
