@@ -50,14 +50,14 @@ pub(crate) async fn manifest(store: &Store, product: &ProductId, data: &Path) ->
     }
     let known = storage::manifests::products(store).await?;
     let known: Vec<String> = known.iter().map(ToString::to_string).collect();
-    match known.is_empty() {
-        true => bail!(
+    if known.is_empty() {
+        bail!(
             "{} holds no product yet; land files with `fluxglobe ingest` or run `fluxglobe demo`",
             data.display()
-        ),
-        false => bail!(
-            "there is no product {product}; there are {}",
-            known.join(", ")
-        ),
+        );
     }
+    bail!(
+        "there is no product {product}; there are {}",
+        known.join(", ")
+    )
 }

@@ -1,5 +1,7 @@
 //! All end-to-end tests as one binary: the built program, run as people run it.
 
+#![expect(clippy::unwrap_used, reason = "a test ends where it cannot go on")]
+
 mod bad_input;
 mod browser;
 mod dependencies;

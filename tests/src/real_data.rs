@@ -26,6 +26,9 @@ fn folder(variable: &str, default: Option<&str>) -> Option<PathBuf> {
     if folder.is_dir() {
         return Some(folder);
     }
-    eprintln!("SKIPPED: no real files; set {variable} to their folder (looked in {folder:?})");
+    eprintln!(
+        "SKIPPED: no real files; set {variable} to their folder (looked in \"{}\")",
+        folder.display()
+    );
     None
 }

@@ -10,7 +10,7 @@ use anyhow::{Context as _, Result, bail};
 use crate::program;
 
 /// Longest wait for a started server to answer.
-const START_LIMIT: Duration = Duration::from_secs(60);
+const START_LIMIT: Duration = Duration::from_mins(1);
 
 /// A running server.
 pub struct Server {
@@ -95,7 +95,7 @@ impl Server {
     pub fn get(&self, path: &str) -> Result<Answer> {
         let agent: ureq::Agent = ureq::Agent::config_builder()
             .http_status_as_error(false)
-            .timeout_global(Some(Duration::from_secs(120)))
+            .timeout_global(Some(Duration::from_mins(2)))
             .build()
             .into();
         let mut response = agent.get(format!("{}{path}", self.url)).call()?;

@@ -23,7 +23,7 @@ pub(crate) fn run(options: Generate) -> Result<()> {
 pub(crate) fn china_sea(output: &std::path::Path, scale: f64, seed: u64) -> Result<()> {
     let bar = progress::bar("generate China Sea", 12);
     ingest::generate_china_sea(output, scale, seed, &|done, _all| {
-        bar.set_position(done as u64)
+        bar.set_position(done as u64);
     })?;
     progress::done(&bar, &format!("SYNTHETIC data in {}", output.display()));
     Ok(())

@@ -207,8 +207,9 @@ fn target(name: &str) -> Option<PathBuf> {
         let file = inside.strip_prefix(set.folder)?.strip_prefix('/')?;
         Some((set, file))
     })?;
-    let is_plain =
-        file.ends_with(".nc") && !file.contains(['/', '\\', '\0']) && !file.starts_with('.');
+    let is_plain = file.strip_suffix(".nc").is_some()
+        && !file.contains(['/', '\\', '\0'])
+        && !file.starts_with('.');
     is_plain.then(|| Path::new(set.folder).join(file))
 }
 

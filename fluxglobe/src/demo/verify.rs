@@ -100,7 +100,7 @@ fn paths(flux: &Manifest) -> Vec<String> {
 /// A page must answer; a picture must also show something.
 fn fetch(base: &str, path: &str) -> Result<()> {
     let agent: ureq::Agent = ureq::Agent::config_builder()
-        .timeout_global(Some(Duration::from_secs(120)))
+        .timeout_global(Some(Duration::from_mins(2)))
         .build()
         .into();
     let body = agent
