@@ -9,12 +9,12 @@ pub enum RenderError {
     #[error(
         "no Vulkan adapter found; install the package mesa-vulkan-drivers for a software one, or draw with the CPU backend"
     )]
-    NoAdapter(#[source] wgpu::RequestAdapterError),
+    NoAdapter(#[source] Box<wgpu::RequestAdapterError>),
     /// The adapter refused a device.
     #[error("adapter {adapter:?} gave no device")]
     NoDevice {
         adapter: String,
-        source: wgpu::RequestDeviceError,
+        source: Box<wgpu::RequestDeviceError>,
     },
     /// The device stopped answering.
     #[error("the graphics device stopped while {what}")]
@@ -50,7 +50,7 @@ pub enum RenderError {
     Store {
         what: &'static str,
         product: String,
-        source: storage::StorageError,
+        source: Box<storage::StorageError>,
     },
     /// The picture could not be written as PNG.
     #[error("cannot encode a picture of {width} x {height} pixels")]

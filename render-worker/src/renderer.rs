@@ -86,13 +86,11 @@ impl Renderer {
         values: &[f32],
         domain: &[u32],
     ) -> Result<Vec<f32>, RenderError> {
-        match &self.device {
-            Some(device) => device.fill.run(&device.gpu, grid, values, domain),
-            None => {
-                let (params, cosines) = FillParams::for_grid(grid);
-                Ok(fill::cpu::fill(&params, values, domain, &cosines))
-            }
+        if let Some(device) = &self.device {
+            return device.fill.run(&device.gpu, grid, values, domain);
         }
+        let (params, cosines) = FillParams::for_grid(grid);
+        Ok(fill::cpu::fill(&params, values, domain, &cosines))
     }
 }
 

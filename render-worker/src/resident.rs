@@ -14,7 +14,7 @@ const MOST_BYTES: u64 = 512 << 20;
 
 /// Buffers by the id of their cells.
 #[derive(Default)]
-pub struct Resident {
+pub(crate) struct Resident {
     held: Mutex<Held>,
 }
 
@@ -26,7 +26,11 @@ struct Held {
 
 impl Resident {
     /// The cells on the device, uploaded if they are not there.
-    pub fn buffer<T: Pod>(&self, gpu: &Gpu, cells: &Cells<T>) -> Result<wgpu::Buffer, RenderError> {
+    pub(crate) fn buffer<T: Pod>(
+        &self,
+        gpu: &Gpu,
+        cells: &Cells<T>,
+    ) -> Result<wgpu::Buffer, RenderError> {
         let mut held = self.held.lock().unwrap_or_else(PoisonError::into_inner);
         held.uses += 1;
         let use_count = held.uses;

@@ -198,7 +198,7 @@ fn failed(
     RenderError::Store {
         what,
         product: product.to_string(),
-        source,
+        source: Box::new(source),
     }
 }
 

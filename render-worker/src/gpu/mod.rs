@@ -39,7 +39,7 @@ impl Gpu {
         let adapter = instance
             .request_adapter(&options)
             .await
-            .map_err(RenderError::NoAdapter)?;
+            .map_err(|e| RenderError::NoAdapter(Box::new(e)))?;
         let adapter_name = adapter.get_info().name;
         let limits = adapter.limits();
         let most_buffer_bytes = limits
@@ -55,7 +55,7 @@ impl Gpu {
             .await
             .map_err(|source| RenderError::NoDevice {
                 adapter: adapter_name.clone(),
-                source,
+                source: Box::new(source),
             })?;
         Ok(Self {
             device,

@@ -6,13 +6,12 @@ use contract::earth::SPHERE_RADIUS_M;
 use contract::job::{Mode, RenderJob, View};
 use glam::DVec3;
 
+use super::camera::{Camera, write};
 use super::look::{self, Look};
 use super::{Plan, area_m2, entry_shift, height_range_m};
 use crate::scene::Scene;
-use crate::stages::layout::{Active, Col, Params, Row, VIEW_GLOBE};
+use crate::stages::layout::{Active, Col, Row, VIEW_GLOBE};
 
-/// Vertical opening of the camera (of the shorter side), degrees.
-const OPENING_DEG: f64 = 45.0;
 /// Light texels along a side at most: 64 slices of them are 27 MB.
 const MOST_LIGHT_TEXELS: f64 = 320.0;
 /// Parts of a light texel that positions are rounded to.
@@ -21,13 +20,14 @@ const LIGHT_UNIT: i32 = 256;
 /// Largest particle on the screen over one on the ground below the camera.
 const NEAREST_OVER_FARTHEST: f64 = 4.0;
 
-struct Camera {
-    place: DVec3,
-    east: DVec3,
-    north: DVec3,
-    up: DVec3,
-    focal_px: f64,
-    height: f64,
+/// The part of the shell that is drawn; lengths in earth radii.
+struct Cap {
+    /// Lowest and highest particle, from the sea surface.
+    heights: [f64; 2],
+    /// Round the point below the camera, radians.
+    angle: f64,
+    /// Of a full-size particle.
+    radius: f64,
 }
 
 pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) {
@@ -41,7 +41,7 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) {
     else {
         return;
     };
-    let camera = camera(lon_deg, lat_deg, height_m, [width_px, height_px]);
+    let camera = Camera::above(lon_deg, lat_deg, height_m, [width_px, height_px]);
     let grid = &scene.grid;
     let cell_rad = (grid.dlon_deg * grid.dlat_deg).sqrt().to_radians();
     let cell_px = cell_rad * camera.focal_px / camera.height;
@@ -53,7 +53,7 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) {
     params.center_px_x = width_px as f32 / 2.0;
     params.center_px_y = height_px as f32 / 2.0;
     camera.write(params);
-    let sun = sun(job, &camera);
+    let sun = camera.sun(job);
     write(
         sun,
         [&mut params.sun_x, &mut params.sun_y, &mut params.sun_z],
@@ -74,86 +74,15 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) {
     let radius = radius_px / camera.focal_px * camera.height;
     // From a cell's middle to its corner.
     let half_cell = (grid.dlon_deg.hypot(grid.dlat_deg) / 2.0).to_radians();
-    let horizon = cap_rad(
-        &camera,
-        [width_px, height_px],
-        job,
+    let angle = camera.cap_rad([width_px, height_px], job, heights, radius + half_cell);
+    let cap = Cap {
         heights,
-        radius + half_cell,
-    )
-    .min(PI);
-    let half = slice_planes(plan, job, camera.up, sun, heights, horizon);
-    light_frame(plan, &camera, sun, half, heights, horizon, radius);
-    choose_cells(plan, scene, camera.up, horizon);
-}
-
-/// East, north and up at a place, in the axes of eq. 4: x towards 90 E, y towards 0 E, z towards the north pole.
-pub(crate) fn axes_at(lon_deg: f64, lat_deg: f64) -> [DVec3; 3] {
-    let (sin_lon, cos_lon) = lon_deg.to_radians().sin_cos();
-    let (sin_lat, cos_lat) = lat_deg.to_radians().sin_cos();
-    let east = DVec3::new(cos_lon, -sin_lon, 0.0);
-    let north = DVec3::new(-sin_lat * sin_lon, -sin_lat * cos_lon, cos_lat);
-    let up = DVec3::new(cos_lat * sin_lon, cos_lat * cos_lon, sin_lat);
-    [east, north, up]
-}
-
-fn camera(lon_deg: f64, lat_deg: f64, height_m: f64, size_px: [u32; 2]) -> Camera {
-    let [east, north, up] = axes_at(lon_deg, lat_deg);
-    let height = height_m / SPHERE_RADIUS_M;
-    let side_px = f64::from(size_px[0].min(size_px[1]));
-    let focal_px = side_px / 2.0 / (OPENING_DEG / 2.0).to_radians().tan();
-    Camera {
-        place: up * (1.0 + height),
-        east,
-        north,
-        up,
-        focal_px,
-        height,
-    }
-}
-
-impl Camera {
-    fn write(&self, params: &mut Params) {
-        params.focal_px = self.focal_px as f32;
-        write(
-            self.place,
-            [&mut params.eye_x, &mut params.eye_y, &mut params.eye_z],
-        );
-        write(
-            self.east,
-            [
-                &mut params.right_x,
-                &mut params.right_y,
-                &mut params.right_z,
-            ],
-        );
-        write(
-            self.north,
-            [&mut params.up_x, &mut params.up_y, &mut params.up_z],
-        );
-        write(
-            -self.up,
-            [
-                &mut params.forward_x,
-                &mut params.forward_y,
-                &mut params.forward_z,
-            ],
-        );
-    }
-}
-
-fn write(vector: DVec3, fields: [&mut f32; 3]) {
-    for (field, value) in fields.into_iter().zip(vector.to_array()) {
-        *field = value as f32;
-    }
-}
-
-/// Towards the sun, which keeps its place in the frame of the camera.
-fn sun(job: &RenderJob, camera: &Camera) -> DVec3 {
-    let (sin_azimuth, cos_azimuth) = job.style.sun.azimuth_deg.to_radians().sin_cos();
-    let (sin_elevation, cos_elevation) = job.style.sun.elevation_deg.to_radians().sin_cos();
-    (camera.east * sin_azimuth + camera.north * cos_azimuth) * cos_elevation
-        + camera.up * sin_elevation
+        angle: angle.min(PI),
+        radius,
+    };
+    let half = slice_planes(plan, job, camera.up, sun, &cap);
+    light_frame(plan, &camera, sun, half, &cap);
+    choose_cells(plan, scene, camera.up, cap.angle);
 }
 
 fn rows(scene: &Scene, look: &Look, camera: &Camera, particles: u32, style_depth: f64) -> Vec<Row> {
@@ -182,42 +111,9 @@ fn rows(scene: &Scene, look: &Look, camera: &Camera, particles: u32, style_depth
         .collect()
 }
 
-/// Angle round the point below the camera within which particles can be seen or shadow what is seen.
-fn cap_rad(
-    camera: &Camera,
-    size_px: [u32; 2],
-    job: &RenderJob,
-    heights: [f64; 2],
-    margin: f64,
-) -> f64 {
-    let distance = 1.0 + camera.height;
-    let deepest = 1.0 + heights[0];
-    let horizon = (1.0 / distance).acos() + (1.0 / (1.0 + heights[1])).acos() + margin;
-    let corner_px = f64::from(size_px[0]).hypot(f64::from(size_px[1])) / 2.0;
-    let corner = (corner_px / camera.focal_px).atan();
-    let sine = distance * corner.sin() / deepest;
-    if sine >= 1.0 {
-        return horizon;
-    }
-    let elevation = job
-        .style
-        .sun
-        .elevation_deg
-        .max(look::LOWEST_SUN_DEG)
-        .to_radians();
-    let shadow = (heights[1] - heights[0]) / elevation.tan();
-    (sine.asin() - corner + 3.0 * margin + shadow).min(horizon)
-}
-
 /// Slices across the half-way vector between light and view, over the visible cap; the vector comes back.
-fn slice_planes(
-    plan: &mut Plan,
-    job: &RenderJob,
-    up: DVec3,
-    sun: DVec3,
-    heights: [f64; 2],
-    horizon: f64,
-) -> DVec3 {
+fn slice_planes(plan: &mut Plan, job: &RenderJob, up: DVec3, sun: DVec3, cap: &Cap) -> DVec3 {
+    let Cap { heights, angle, .. } = *cap;
     let front_to_back = sun.dot(up) >= 0.0;
     let sum = if front_to_back { sun + up } else { sun - up };
     let half = sum / sum.length();
@@ -229,8 +125,8 @@ fn slice_planes(
             [1.0 + heights[1], 1.0 + heights[0]]
         }
     };
-    let near = (tilt - horizon).max(0.0).cos();
-    let far = (tilt + horizon).min(PI).cos();
+    let near = (tilt - angle).max(0.0).cos();
+    let far = (tilt + angle).min(PI).cos();
     let (top, bottom) = (reach(near)[1] * near + 1e-4, reach(far)[0] * far - 1e-4);
     let params = &mut plan.params;
     params.front_to_back = u32::from(front_to_back);
@@ -243,15 +139,12 @@ fn slice_planes(
     half
 }
 
-fn light_frame(
-    plan: &mut Plan,
-    camera: &Camera,
-    sun: DVec3,
-    half: DVec3,
-    heights: [f64; 2],
-    horizon: f64,
-    radius: f64,
-) {
+fn light_frame(plan: &mut Plan, camera: &Camera, sun: DVec3, half: DVec3, cap: &Cap) {
+    let Cap {
+        heights,
+        angle,
+        radius,
+    } = *cap;
     let params = &mut plan.params;
     if params.light_on == 0 {
         return;
@@ -264,10 +157,10 @@ fn light_frame(
     let axis_u = across / across.length();
     let axis_v = sun.cross(axis_u);
     // Every point of the cap lies within a chord of the point below the camera.
-    let chord = if horizon >= FRAC_PI_2 {
+    let chord = if angle >= FRAC_PI_2 {
         1.0 + heights[1]
     } else {
-        2.0 * (horizon / 2.0).sin() * (1.0 + heights[1])
+        2.0 * (angle / 2.0).sin() * (1.0 + heights[1])
     };
     let reach = chord + heights[1].max(-heights[0]);
     let texel = (look::TEXEL_PER_RADIUS * radius).max(2.0 * reach / MOST_LIGHT_TEXELS);

@@ -3,6 +3,7 @@
 //! Everything that must not depend on which tile is drawn (slice planes, light texels, particle sizes and numbers)
 //! is computed here from the scene and the zoom level alone.
 
+mod camera;
 mod globe;
 mod look;
 mod tile;
@@ -11,7 +12,7 @@ use contract::earth::Earth;
 use contract::job::{Mode, RenderJob, View};
 
 use crate::error::RenderError;
-use crate::scene::Scene;
+use crate::scene::{Interval, Scene};
 use crate::stages::layout::{
     Active, Axis, Col, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, Params, Particle, Row,
     SCREEN_TILE_PX, SUBPIXELS, Splat,
@@ -186,10 +187,7 @@ fn palette(job: &RenderJob) -> Vec<u32> {
 
 /// Lowest and highest particle, m: from the frames, so that every tile of an instant has the same slice planes.
 fn height_range_m(job: &RenderJob, scene: &Scene) -> [f64; 2] {
-    let [low, high] = scene
-        .accumulated
-        .as_ref()
-        .map_or([0.0; 2], |interval| interval.range());
+    let [low, high] = scene.accumulated.as_ref().map_or([0.0; 2], Interval::range);
     let scaled = |kg_m2: f32| {
         (f64::from(kg_m2) * job.style.height_m_per_kg_m2)
             .clamp(-look::HEIGHT_LIMIT_M, look::HEIGHT_LIMIT_M)

@@ -51,6 +51,10 @@ pub fn ground_below(params: &Params, pixel: [u32; 2]) -> Ground {
 /// Angle of a vector against the x axis, -pi to pi.
 ///
 /// Source: Abramowitz and Stegun (1964), Handbook of Mathematical Functions, eq. 4.4.49; good to 1e-7.
+#[expect(
+    clippy::excessive_precision,
+    reason = "coefficients as printed in the source"
+)]
 pub fn angle_of(y: f32, x: f32) -> f32 {
     let wide = x.abs().max(y.abs());
     let t = x.abs().min(y.abs()) / wide.max(1.0e-30);

@@ -1,4 +1,9 @@
 //! Tests of the renderer as a whole and of its stages, one binary.
+#![expect(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "all of this binary is tests; clippy allows these in test functions only"
+)]
 
 mod compare;
 mod device;

@@ -188,7 +188,7 @@ impl March<'_> {
             let place = eye + sight * along;
             let (density, tint) = self.clouds.at(place);
             if density > 0.0 {
-                let t = ((place.normalize().dot(self.sun) + 0.15) / 0.5).clamp(0.0, 1.0);
+                let t = ((place.normalize_or_zero().dot(self.sun) + 0.15) / 0.5).clamp(0.0, 1.0);
                 let day = t * t * (3.0 - 2.0 * t);
                 let alpha = 1.0 - (-density * self.step).exp();
                 let shade = AMBIENT + DIRECT * self.light(place) * day;
@@ -237,7 +237,7 @@ fn reference(job: &RenderJob, scene: &Scene) -> Vec<[f64; 4]> {
         for x in 0..width_px {
             let right = (f64::from(x) + 0.5 - f64::from(width_px) / 2.0) / focal_px;
             let above = (f64::from(height_px) / 2.0 - f64::from(y) - 0.5) / focal_px;
-            picture.push(march.ray(eye, (east * right + north * above - up).normalize()));
+            picture.push(march.ray(eye, (east * right + north * above - up).normalize_or_zero()));
         }
     }
     picture

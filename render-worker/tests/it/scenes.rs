@@ -43,8 +43,7 @@ fn is_land(lon: f64, lat: f64) -> bool {
         || blob(-60.0, -15.0, 18.0, 35.0)
         || blob(-100.0, 50.0, 32.0, 22.0)
         || blob(134.0, -25.0, 18.0, 12.0)
-        || lat < -72.0
-        || lat > 80.0
+        || !(-72.0..=80.0).contains(&lat)
 }
 
 /// Sources near the equator, sinks in middle latitudes, waves on top.

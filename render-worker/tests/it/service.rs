@@ -79,9 +79,7 @@ async fn two_months() -> Stored {
     let carbon = scene.accumulated.unwrap();
     let mut after = values(&scene.value.after);
     // A cloud over the second month: gaps to fill.
-    for cell in 20 * 72..20 * 72 + 6 {
-        after[cell] = f32::NAN;
-    }
+    after[20 * 72..20 * 72 + 6].fill(f32::NAN);
     let flux = stored(
         &store,
         "flux",

@@ -79,7 +79,7 @@ impl Twins {
         } else {
             particles::cpu::generate(&params, &inputs, &mut particles);
             project::cpu::project(&params, &plan.rows, &plan.cols, &particles, &mut splats);
-            shaded = splats.clone();
+            shaded.clone_from(&splats);
             if params.light_on == 1 {
                 light = vec![0; texel_count(&params)];
                 light::cpu::deposit(&params, &splats, &mut light);
@@ -165,7 +165,7 @@ fn prove(test: &str, source: &str, right: &str, wrong: &str, distance: impl Fn(&
 }
 
 fn channels(colors: &[Vec4]) -> Vec<f32> {
-    colors.iter().flat_map(|color| color.to_array()).collect()
+    colors.iter().flat_map(Vec4::to_array).collect()
 }
 
 fn bytes(words: impl IntoIterator<Item = u32>) -> Vec<f32> {
@@ -213,7 +213,7 @@ fn interpolate_matches_its_twin() {
 fn fill_matches_its_twin() {
     let grid = FIVE_DEGREES;
     let value = |i: usize| {
-        if i % 5 == 0 || (700..1400).contains(&i) {
+        if i.is_multiple_of(5) || (700..1400).contains(&i) {
             MISSING
         } else {
             (i as f32 * 0.37).sin()
@@ -314,7 +314,7 @@ fn project_matches_its_twin_on_tiles_and_on_the_globe() {
         prove("project", project::SOURCE, right, wrong, |gpu, source| {
             let stage = Project::new(gpu, source);
             let particles = |f: &mut FrameContext<'_>| {
-                drop(f.upload(Slot::Particles, &twins.particles).unwrap())
+                drop(f.upload(Slot::Particles, &twins.particles).unwrap());
             };
             let drawn: Vec<Splat> = twins.run(
                 gpu,

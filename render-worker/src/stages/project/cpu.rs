@@ -72,6 +72,19 @@ fn on_tile(params: &Params, row: &Row, col: &Col, particle: &Particle) -> Splat 
     }
 }
 
+fn vector(x: f32, y: f32, z: f32) -> Vec3 {
+    Vec3::new(x, y, z)
+}
+
+/// Is a place beyond the horizon of the sea surface, or of its own sphere when below it?
+fn is_hidden(normal: Vec3, distance: f32, camera: Vec3) -> bool {
+    let horizon = distance.min(1.0);
+    let camera_sq = camera.dot(camera);
+    let grazing = (camera_sq - horizon * horizon).max(0.0).sqrt()
+        * (distance * distance - horizon * horizon).max(0.0).sqrt();
+    normal.dot(camera) * distance < horizon * horizon - grazing
+}
+
 fn on_globe(params: &Params, row: &Row, col: &Col, particle: &Particle) -> Splat {
     let lat = turned(
         row.sin_lat,
@@ -86,26 +99,16 @@ fn on_globe(params: &Params, row: &Row, col: &Col, particle: &Particle) -> Splat
     let normal = Vec3::new(lat.y * lon.x, lat.y * lon.y, lat.x);
     let distance = 1.0 + particle.height_m * params.per_earth_radius_m;
     let place = normal * distance;
-    let camera = Vec3::new(params.eye_x, params.eye_y, params.eye_z);
+    let camera = vector(params.eye_x, params.eye_y, params.eye_z);
     let sight = place - camera;
-    let ahead = sight.dot(Vec3::new(
-        params.forward_x,
-        params.forward_y,
-        params.forward_z,
-    ));
-    let beyond = normal.dot(camera);
-    let horizon = distance.min(1.0);
-    let camera_sq = camera.dot(camera);
-    let grazing = (camera_sq - horizon * horizon).max(0.0).sqrt()
-        * (distance * distance - horizon * horizon).max(0.0).sqrt();
-    if ahead < 0.01 * (camera_sq - 1.0) || beyond * distance < horizon * horizon - grazing {
+    let ahead = sight.dot(vector(params.forward_x, params.forward_y, params.forward_z));
+    if ahead < 0.01 * (camera.dot(camera) - 1.0) || is_hidden(normal, distance, camera) {
         return Splat::default();
     }
     let scale = params.focal_px / ahead;
-    let x = sight.dot(Vec3::new(params.right_x, params.right_y, params.right_z)) * scale
+    let x = sight.dot(vector(params.right_x, params.right_y, params.right_z)) * scale
         + params.center_px_x;
-    let y =
-        params.center_px_y - sight.dot(Vec3::new(params.up_x, params.up_y, params.up_z)) * scale;
+    let y = params.center_px_y - sight.dot(vector(params.up_x, params.up_y, params.up_z)) * scale;
     let oblique = (sight.length() / ahead).sqrt();
     let full_px = row.radius * scale * oblique;
     let radius_px = full_px * size_of(params, particle.color);
@@ -114,16 +117,10 @@ fn on_globe(params: &Params, row: &Row, col: &Col, particle: &Particle) -> Splat
     }
     let radius_px = radius_px.max(params.min_radius_px);
     let thinned = full_px / radius_px;
-    let u = place.dot(Vec3::new(
-        params.light_u_x,
-        params.light_u_y,
-        params.light_u_z,
-    )) - params.light_u0;
-    let v = place.dot(Vec3::new(
-        params.light_v_x,
-        params.light_v_y,
-        params.light_v_z,
-    )) - params.light_v0;
+    let u =
+        place.dot(vector(params.light_u_x, params.light_u_y, params.light_u_z)) - params.light_u0;
+    let v =
+        place.dot(vector(params.light_v_x, params.light_v_y, params.light_v_z)) - params.light_v0;
     let to_light = params.light_texels_per_unit * params.light_unit as f32;
     Splat {
         x_sub: nearest(x * SUBPIXELS as f32) - params.origin_x_px * SUBPIXELS,
@@ -132,7 +129,7 @@ fn on_globe(params: &Params, row: &Row, col: &Col, particle: &Particle) -> Splat
         tau: particle.depth * row.depth_gain * thinned * thinned,
         slice: slice_of(
             params,
-            place.dot(Vec3::new(params.half_x, params.half_y, params.half_z)),
+            place.dot(vector(params.half_x, params.half_y, params.half_z)),
         ),
         light_u: nearest(u * to_light),
         light_v: nearest(v * to_light),
@@ -144,7 +141,7 @@ fn on_globe(params: &Params, row: &Row, col: &Col, particle: &Particle) -> Splat
         day: smoothstep(
             -0.15,
             0.35,
-            normal.dot(Vec3::new(params.sun_x, params.sun_y, params.sun_z)),
+            normal.dot(vector(params.sun_x, params.sun_y, params.sun_z)),
         ),
         color: particle.color,
     }

@@ -1,0 +1,120 @@
+//! The camera of a globe view: where it stands, what it sees of the globe, and where its sun stands.
+
+use contract::earth::SPHERE_RADIUS_M;
+use contract::job::RenderJob;
+use glam::DVec3;
+
+use super::look;
+use crate::stages::layout::Params;
+
+/// Vertical opening of the camera (of the shorter side), degrees.
+const OPENING_DEG: f64 = 45.0;
+
+/// A camera above a place; lengths in earth radii.
+pub(super) struct Camera {
+    pub place: DVec3,
+    pub east: DVec3,
+    pub north: DVec3,
+    pub up: DVec3,
+    pub focal_px: f64,
+    pub height: f64,
+}
+
+/// East, north and up at a place, in the axes of eq. 4: x towards 90 E, y towards 0 E, z towards the north pole.
+fn axes_at(lon_deg: f64, lat_deg: f64) -> [DVec3; 3] {
+    let (sin_lon, cos_lon) = lon_deg.to_radians().sin_cos();
+    let (sin_lat, cos_lat) = lat_deg.to_radians().sin_cos();
+    let east = DVec3::new(cos_lon, -sin_lon, 0.0);
+    let north = DVec3::new(-sin_lat * sin_lon, -sin_lat * cos_lon, cos_lat);
+    let up = DVec3::new(cos_lat * sin_lon, cos_lat * cos_lon, sin_lat);
+    [east, north, up]
+}
+
+impl Camera {
+    /// Above a place, looking down, north up; `size_px` is the picture's width and height.
+    pub(super) fn above(lon_deg: f64, lat_deg: f64, height_m: f64, size_px: [u32; 2]) -> Self {
+        let [east, north, up] = axes_at(lon_deg, lat_deg);
+        let height = height_m / SPHERE_RADIUS_M;
+        let side_px = f64::from(size_px[0].min(size_px[1]));
+        let focal_px = side_px / 2.0 / (OPENING_DEG / 2.0).to_radians().tan();
+        Self {
+            place: up * (1.0 + height),
+            east,
+            north,
+            up,
+            focal_px,
+            height,
+        }
+    }
+
+    /// Sets what the stages need of it.
+    pub(super) fn write(&self, params: &mut Params) {
+        params.focal_px = self.focal_px as f32;
+        write(
+            self.place,
+            [&mut params.eye_x, &mut params.eye_y, &mut params.eye_z],
+        );
+        write(
+            self.east,
+            [
+                &mut params.right_x,
+                &mut params.right_y,
+                &mut params.right_z,
+            ],
+        );
+        write(
+            self.north,
+            [&mut params.up_x, &mut params.up_y, &mut params.up_z],
+        );
+        write(
+            -self.up,
+            [
+                &mut params.forward_x,
+                &mut params.forward_y,
+                &mut params.forward_z,
+            ],
+        );
+    }
+
+    /// Towards the sun, which keeps its place in the frame of the self.
+    pub(super) fn sun(&self, job: &RenderJob) -> DVec3 {
+        let (sin_azimuth, cos_azimuth) = job.style.sun.azimuth_deg.to_radians().sin_cos();
+        let (sin_elevation, cos_elevation) = job.style.sun.elevation_deg.to_radians().sin_cos();
+        (self.east * sin_azimuth + self.north * cos_azimuth) * cos_elevation
+            + self.up * sin_elevation
+    }
+
+    /// Angle round the point below the camera within which particles can be seen or shadow what is seen.
+    pub(super) fn cap_rad(
+        &self,
+        size_px: [u32; 2],
+        job: &RenderJob,
+        heights: [f64; 2],
+        margin: f64,
+    ) -> f64 {
+        let distance = 1.0 + self.height;
+        let deepest = 1.0 + heights[0];
+        let horizon = (1.0 / distance).acos() + (1.0 / (1.0 + heights[1])).acos() + margin;
+        let corner_px = f64::from(size_px[0]).hypot(f64::from(size_px[1])) / 2.0;
+        let corner = (corner_px / self.focal_px).atan();
+        let sine = distance * corner.sin() / deepest;
+        if sine >= 1.0 {
+            return horizon;
+        }
+        let elevation = job
+            .style
+            .sun
+            .elevation_deg
+            .max(look::LOWEST_SUN_DEG)
+            .to_radians();
+        let shadow = (heights[1] - heights[0]) / elevation.tan();
+        (sine.asin() - corner + 3.0 * margin + shadow).min(horizon)
+    }
+}
+
+/// Sets three parameters from a vector.
+pub(super) fn write(vector: DVec3, fields: [&mut f32; 3]) {
+    for (field, value) in fields.into_iter().zip(vector.to_array()) {
+        *field = value as f32;
+    }
+}
