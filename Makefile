@@ -27,7 +27,8 @@ build: tools viewer ## Build the program and the viewer
 viewer: $(viewer)
 
 $(viewer): $(viewer_sources) | tools
-	cd tile-server/web && npm ci --no-audit --no-fund && npm run build
+	# Not `npm ci`: it insists on other platforms' optional packages, which a partial mirror lacks. The lock file holds.
+	cd tile-server/web && npm install --no-save --no-audit --no-fund && npm run build
 
 tools:
 	@deploy/install-tools.sh run

@@ -14,7 +14,7 @@ fn the_page_shows_tiles_series_and_budgets_without_an_error() {
     let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/browser"));
     if !folder.join("node_modules").exists() {
         let install = Command::new("npm")
-            .args(["ci", "--no-audit", "--no-fund"])
+            .args(["install", "--no-save", "--no-audit", "--no-fund"])
             .current_dir(folder)
             .output()
             .unwrap();
