@@ -17,6 +17,7 @@ pub mod frame_cpu;
 pub mod gpu;
 pub mod image;
 pub mod plan;
+pub mod pyramid;
 pub mod renderer;
 mod resident;
 pub mod scene;

@@ -11,6 +11,7 @@ use crate::frame_cpu;
 use crate::gpu::{Gpu, Workspace};
 use crate::image::Image;
 use crate::plan::{Part, Plan};
+use crate::pyramid;
 use crate::resident::Resident;
 use crate::scene::{Interval, Scene};
 use crate::stages::fill::{self, Fill, FillParams};
@@ -44,9 +45,16 @@ impl Renderer {
     pub fn new(backend: Backend) -> Result<Self, RenderError> {
         let device = match backend {
             Backend::Cpu => None,
-            Backend::Gpu => Some(Device::open()?),
+            Backend::Gpu => Some(Device::new(Gpu::open()?)),
         };
         Ok(Self { device })
+    }
+
+    /// Opens the device with shaders that check every index and loop; slow, for tests.
+    pub fn checked() -> Result<Self, RenderError> {
+        Ok(Self {
+            device: Some(Device::new(Gpu::open_checked()?)),
+        })
     }
 
     /// Name of the adapter, or of the CPU twins.
@@ -62,6 +70,10 @@ impl Renderer {
             .device
             .as_ref()
             .map_or(u64::MAX, |device| device.gpu.most_buffer_bytes());
+        job.validate()?;
+        scene.validate()?;
+        let coarser = pyramid::suited(job, scene);
+        let scene = coarser.as_ref().unwrap_or(scene);
         let plan = Plan::new(job, scene, most_buffer_bytes)?;
         let [width, height] = plan.size_px();
         let mut image = Image {
@@ -86,7 +98,8 @@ impl Renderer {
         values: &[f32],
         domain: &[u32],
     ) -> Result<Vec<f32>, RenderError> {
-        if let Some(device) = &self.device {
+        let fits = |device: &&Device| size_of_val(values) as u64 <= device.gpu.most_buffer_bytes();
+        if let Some(device) = self.device.as_ref().filter(fits) {
             return device.fill.run(&device.gpu, grid, values, domain);
         }
         let (params, cosines) = FillParams::for_grid(grid);
@@ -95,18 +108,17 @@ impl Renderer {
 }
 
 impl Device {
-    fn open() -> Result<Self, RenderError> {
-        let gpu = Gpu::open()?;
+    fn new(gpu: Gpu) -> Self {
         let stages = Stages::new(&gpu);
         let fill = Fill::new(&gpu, fill::SOURCE);
         tracing::info!(adapter = gpu.adapter_name(), "renderer is ready");
-        Ok(Self {
+        Self {
             gpu,
             stages,
             fill,
             idle: Mutex::default(),
             resident: Resident::default(),
-        })
+        }
     }
 
     fn draw(&self, plan: &Plan, part: Part, scene: &Scene) -> Result<Vec<u8>, RenderError> {

@@ -1,7 +1,7 @@
 //! What there is to see at one instant: two adjacent frames of a product, of its accumulated carbon, and its domain.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, OnceLock};
 
 use contract::grid::Grid;
 
@@ -15,6 +15,8 @@ static NEXT_ID: AtomicU64 = AtomicU64::new(0);
 pub struct Cells<T> {
     id: u64,
     content: Vec<T>,
+    /// The same in blocks of four.
+    coarser: OnceLock<Arc<Cells<T>>>,
 }
 
 impl<T> Cells<T> {
@@ -22,12 +24,19 @@ impl<T> Cells<T> {
         Self {
             id: NEXT_ID.fetch_add(1, Ordering::Relaxed),
             content,
+            coarser: OnceLock::new(),
         }
     }
 
     /// Different for every set of cells made by this process.
     pub fn id(&self) -> u64 {
         self.id
+    }
+
+    /// The same in blocks of four, made by `make` the first time.
+    pub(crate) fn coarser(cells: &Arc<Self>, make: impl FnOnce(&[T]) -> Vec<T>) -> Arc<Self> {
+        let coarser = || Arc::new(Self::new(make(&cells.content)));
+        Arc::clone(cells.coarser.get_or_init(coarser))
     }
 
     /// The numbers.
@@ -43,6 +52,10 @@ pub struct Frame {
     pub cells: Cells<f32>,
     /// Smallest and largest value, 0 and 0 without data.
     pub range: [f32; 2],
+    /// Means over blocks of four.
+    coarser_mean: OnceLock<Arc<Frame>>,
+    /// What keeps the mass of blocks of four.
+    coarser_mass: OnceLock<Arc<Frame>>,
 }
 
 impl Frame {
@@ -60,10 +73,22 @@ impl Frame {
         Self {
             cells: Cells::new(values),
             range: range.unwrap_or_default(),
+            coarser_mean: OnceLock::new(),
+            coarser_mass: OnceLock::new(),
         }
     }
 
-    /// Bytes held.
+    pub(crate) fn coarser_mean(&self, make: impl FnOnce(&[f32]) -> Vec<f32>) -> Arc<Self> {
+        let coarser = || Arc::new(Self::new(make(&self.cells.content)));
+        Arc::clone(self.coarser_mean.get_or_init(coarser))
+    }
+
+    pub(crate) fn coarser_mass(&self, make: impl FnOnce(&[f32]) -> Vec<f32>) -> Arc<Self> {
+        let coarser = || Arc::new(Self::new(make(&self.cells.content)));
+        Arc::clone(self.coarser_mass.get_or_init(coarser))
+    }
+
+    /// Bytes held, coarser versions left out: they add a third at most.
     pub fn size_bytes(&self) -> u64 {
         size_of_val(self.cells.content.as_slice()) as u64
     }

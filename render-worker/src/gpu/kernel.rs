@@ -1,5 +1,7 @@
 //! One compiled entry point and the layout of its bindings.
 
+use super::Checks;
+
 /// A compute pipeline.
 pub struct Kernel {
     pub(super) pipeline: wgpu::ComputePipeline,
@@ -10,6 +12,7 @@ pub struct Kernel {
 impl Kernel {
     pub(super) fn new(
         device: &wgpu::Device,
+        checks: Checks,
         label: &'static str,
         source: &str,
         entry: &str,
@@ -18,13 +21,9 @@ impl Kernel {
             label: Some(label),
             source: wgpu::ShaderSource::Wgsl(source.into()),
         };
-        #[expect(
-            unsafe_code,
-            reason = "only here; every index is bounded in the shader and a test compares with checked modules"
-        )]
-        // SAFETY: loops end (their bounds are counts made by earlier stages) and indices stay inside their buffers.
-        let module = unsafe {
-            device.create_shader_module_trusted(descriptor, wgpu::ShaderRuntimeChecks::unchecked())
+        let module = match checks {
+            Checks::Full => device.create_shader_module(descriptor),
+            Checks::Trusted => trusted(device, descriptor),
         };
         let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: Some(label),
@@ -40,5 +39,20 @@ impl Kernel {
             layout,
             label,
         }
+    }
+}
+
+#[expect(
+    unsafe_code,
+    reason = "run-time checks cost several times the work of the eye; a test compares both ways"
+)]
+fn trusted(
+    device: &wgpu::Device,
+    descriptor: wgpu::ShaderModuleDescriptor<'_>,
+) -> wgpu::ShaderModule {
+    // SAFETY: every loop ends, its bound is a parameter or a count made by an earlier stage; every index is below the
+    // length that its buffer was given for this frame, or tested against it (light texels, list entries).
+    unsafe {
+        device.create_shader_module_trusted(descriptor, wgpu::ShaderRuntimeChecks::unchecked())
     }
 }

@@ -22,15 +22,30 @@ pub struct Gpu {
     queue: wgpu::Queue,
     adapter_name: String,
     most_buffer_bytes: u64,
+    checks: Checks,
+}
+
+/// What shaders check while they run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Checks {
+    /// Nothing: indices and loops are bounded by the stages themselves.
+    Trusted,
+    /// Every index and every loop, many times slower: for tests.
+    Full,
 }
 
 impl Gpu {
     /// Opens the most able Vulkan adapter, a software one if there is no other.
     pub fn open() -> Result<Self, RenderError> {
-        pollster::block_on(Self::request())
+        pollster::block_on(Self::request(Checks::Trusted))
     }
 
-    async fn request() -> Result<Self, RenderError> {
+    /// The same with shaders that check themselves.
+    pub fn open_checked() -> Result<Self, RenderError> {
+        pollster::block_on(Self::request(Checks::Full))
+    }
+
+    async fn request(checks: Checks) -> Result<Self, RenderError> {
         let instance = wgpu::Instance::default();
         let options = wgpu::RequestAdapterOptions {
             power_preference: wgpu::PowerPreference::HighPerformance,
@@ -62,6 +77,7 @@ impl Gpu {
             queue,
             adapter_name,
             most_buffer_bytes,
+            checks,
         })
     }
 
@@ -77,7 +93,7 @@ impl Gpu {
 
     /// Compiles one entry point.
     pub fn kernel(&self, label: &'static str, source: &str, entry: &str) -> Kernel {
-        Kernel::new(&self.device, label, source, entry)
+        Kernel::new(&self.device, self.checks, label, source, entry)
     }
 
     /// A list of commands to fill.

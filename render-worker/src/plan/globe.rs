@@ -8,7 +8,7 @@ use glam::DVec3;
 
 use super::camera::{Camera, write};
 use super::look::{self, Look};
-use super::{Plan, area_m2, entry_shift, height_range_m};
+use super::{Plan, area_m2, cell_px, entry_shift, height_range_m};
 use crate::scene::Scene;
 use crate::stages::layout::{Active, Col, Row, VIEW_GLOBE};
 
@@ -43,8 +43,7 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) {
     };
     let camera = Camera::above(lon_deg, lat_deg, height_m, [width_px, height_px]);
     let grid = &scene.grid;
-    let cell_rad = (grid.dlon_deg * grid.dlat_deg).sqrt().to_radians();
-    let cell_px = cell_rad * camera.focal_px / camera.height;
+    let cell_px = cell_px(&job.view, grid);
     let params = &mut plan.params;
     params.view = VIEW_GLOBE;
     params.surface = u32::from(job.style.globe_surface);

@@ -9,6 +9,7 @@ mod look;
 mod tile;
 
 use contract::earth::Earth;
+use contract::grid::Grid;
 use contract::job::{Mode, RenderJob, View};
 
 use crate::error::RenderError;
@@ -114,6 +115,23 @@ impl Plan {
     /// Whole picture, pixels.
     pub fn size_px(&self) -> [u32; 2] {
         self.size_px
+    }
+}
+
+/// Side of a grid's cells in a view, pixels: at the equator of a tile's level, below the camera of a globe view.
+pub fn cell_px(view: &View, grid: &Grid) -> f64 {
+    let cell_deg = (grid.dlon_deg * grid.dlat_deg).sqrt();
+    match *view {
+        View::Tile { tile, size_px } => tile::world_px(tile, size_px) * cell_deg / 360.0,
+        View::Globe {
+            lon_deg,
+            lat_deg,
+            height_m,
+            ..
+        } => {
+            let camera = camera::Camera::above(lon_deg, lat_deg, height_m, view.size_px());
+            cell_deg.to_radians() * camera.focal_px / camera.height
+        }
     }
 }
 

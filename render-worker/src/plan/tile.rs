@@ -9,7 +9,7 @@ use contract::job::{Mode, RenderJob};
 use contract::tile::{MAX_LAT_DEG, Tile, mercator_lat_deg, mercator_x, mercator_y};
 
 use super::look::{self, Look};
-use super::{Plan, area_m2, entry_shift, height_range_m};
+use super::{Plan, area_m2, cell_px, entry_shift, height_range_m};
 use crate::scene::Scene;
 use crate::stages::layout::{Active, Axis, Col, Row, SUBPIXELS, VIEW_TILE};
 
@@ -28,8 +28,13 @@ struct Level {
     px_per_m: f64,
 }
 
+/// Pixels round the world at a tile's level: the same for a tile and its children of half the size.
+pub(super) fn world_px(tile: Tile, size_px: u32) -> f64 {
+    f64::from(size_px) * f64::from(1u32 << tile.z)
+}
+
 pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene, tile: Tile, size_px: u32) {
-    let world_px = f64::from(size_px) * f64::from(1u32 << tile.z);
+    let world_px = world_px(tile, size_px);
     let level = Level {
         world_px,
         origin_px: [
@@ -47,7 +52,7 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene, tile: Tile, 
     let grid = &scene.grid;
     let look = Look::of(job.mode);
     let col_px = grid.dlon_deg / 360.0 * world_px;
-    let cell_px = (grid.dlon_deg * grid.dlat_deg).sqrt() / 360.0 * world_px;
+    let cell_px = cell_px(&job.view, grid);
     let particles = look.particles_per_cell(cell_px, job.style.particles_per_cell);
     plan.params.particles_per_cell = particles;
     plan.rows = rows(

@@ -4,7 +4,7 @@ use contract::job::Mode;
 use render_worker::{Image, Renderer, Scene};
 
 use crate::compare::{assert_images_differ, distance};
-use crate::device::renderers;
+use crate::device::{gpu_renderer, renderers};
 use crate::scenes::{FIVE_DEGREES, ONE_DEGREE, globe, job, ocean, tile};
 
 /// The four 256 tiles below a tile as one picture.
@@ -169,6 +169,22 @@ fn two_camera_angles_two_instants_and_four_modes_differ() {
             for b in &pictures[i + 1..] {
                 assert_images_differ(a, b);
             }
+        }
+    }
+}
+
+#[test]
+fn trusted_shaders_draw_the_bytes_that_checked_ones_draw() {
+    let Some(trusted) = gpu_renderer("trusted shaders") else {
+        return;
+    };
+    let checked = Renderer::checked().unwrap();
+    let scene = ocean(FIVE_DEGREES);
+    for mode in Mode::ALL {
+        for view in [tile(2, 0, 1, 256), globe(-120.0, 10.0, 1.5e7, 128)] {
+            let job = job(mode, view);
+            let images = [trusted, &checked].map(|r| r.render(&job, &scene).unwrap());
+            assert!(images[0] == images[1], "{mode} {view:?}");
         }
     }
 }

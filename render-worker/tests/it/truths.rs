@@ -5,6 +5,7 @@ use std::sync::Arc;
 use contract::job::{Mode, RenderJob};
 use glam::Vec4;
 use render_worker::plan::Plan;
+use render_worker::pyramid::coarser;
 use render_worker::scene::{Frame, Interval, Scene};
 use render_worker::stages::fill::{self, FillParams};
 use render_worker::stages::interpolate::cpu::interpolated;
@@ -380,6 +381,70 @@ fn a_sea_of_full_flux_has_the_optical_depth_of_the_style() {
             assert!(
                 (mean / 0.8 - 1.0).abs() < 0.05,
                 "{} z{z}: {mean}",
+                renderer.name()
+            );
+        }
+    }
+}
+
+#[test]
+fn coarser_scenes_keep_the_mass_of_the_carbon_and_the_mean_of_the_flux() {
+    let scene = ocean(ONE_DEGREE);
+    let coarse = coarser(&coarser(&scene).unwrap()).unwrap();
+    assert_eq!((coarse.grid.rows, coarse.grid.cols), (45, 90));
+    let mass_kg = |scene: &Scene| -> f64 {
+        let area = |cell: usize| {
+            let row = cell as u32 / scene.grid.cols;
+            scene.grid.cell_area_m2(row, contract::earth::Earth::Wgs84)
+        };
+        let carbon = scene
+            .accumulated
+            .as_ref()
+            .unwrap()
+            .before
+            .cells
+            .content()
+            .iter()
+            .enumerate();
+        let with_data = carbon.filter(|(_, kg)| !is_missing(**kg));
+        with_data
+            .map(|(cell, kg)| f64::from(*kg) * area(cell))
+            .sum()
+    };
+    assert!((mass_kg(&coarse) / mass_kg(&scene) - 1.0).abs() < 1e-5);
+    // Open sea: 30 S to 26 S, 150 W to 146 W.
+    let block = coarse.value.before.cells.content()[30 * 90 + 7];
+    let cells = (120..124).flat_map(|row| (28..32).map(move |col| row * 360 + col));
+    let mean = cells
+        .map(|cell| scene.value.before.cells.content()[cell])
+        .sum::<f32>()
+        / 16.0;
+    assert!((block / mean - 1.0).abs() < 1e-5, "{block} against {mean}");
+    // 45 rows from pole to pole cannot be halved.
+    assert!(coarser(&coarse).is_none());
+}
+
+#[test]
+fn a_grid_much_finer_than_the_screen_is_drawn_from_a_coarser_version_without_seams() {
+    let grid = contract::grid::Grid {
+        rows: 1230,
+        cols: 900,
+        north_deg: 41.0,
+        west_deg: 100.0,
+        dlat_deg: 1.0 / 30.0,
+        dlon_deg: 1.0 / 30.0,
+    };
+    let scene = ocean(grid);
+    for renderer in renderers("coarse") {
+        for mode in Mode::ALL {
+            let image = renderer
+                .render(&job(mode, tile(0, 0, 0, 256)), &scene)
+                .unwrap();
+            let drawn = image.alpha().filter(|alpha| *alpha > 40).count();
+            // 30 by 41 degrees are 21 by 34 pixels of the whole world.
+            assert!(
+                (200..1100).contains(&drawn),
+                "{} {mode}: {drawn} pixels",
                 renderer.name()
             );
         }
