@@ -1,6 +1,6 @@
 //! The tile server's two ports, filled with the renderer and the engines of this process.
 
-use std::sync::Arc;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use async_trait::async_trait;
 use bytes::Bytes;
@@ -17,7 +17,24 @@ use tile_server::backend::{
 };
 
 /// Pictures from the renderer in this process.
-pub(crate) struct Drawer(pub(crate) Arc<RenderService>);
+pub(crate) struct Drawer {
+    service: RenderService,
+    /// Why the last picture failed, if its device or thread was lost; cleared by the next one that succeeds.
+    trouble: Mutex<Option<String>>,
+}
+
+impl Drawer {
+    pub(crate) fn new(service: RenderService) -> Self {
+        Self {
+            service,
+            trouble: Mutex::default(),
+        }
+    }
+
+    fn trouble(&self) -> MutexGuard<'_, Option<String>> {
+        self.trouble.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
 
 /// Series from DataFusion, budgets from Ballista, both in this process.
 pub(crate) struct Analyst {
@@ -30,12 +47,17 @@ pub(crate) struct Analyst {
 #[async_trait]
 impl Draw for Drawer {
     async fn draw(&self, job: &RenderJob) -> Result<Bytes, BackendError> {
-        self.0.draw(job).await.map_err(render_failed)
+        let picture = self.service.draw(job).await;
+        let trouble = picture.as_ref().err().filter(|error| error.is_retryable());
+        *self.trouble() = trouble.map(ToString::to_string);
+        picture.map_err(render_failed)
     }
 
     async fn ready(&self) -> Result<(), BackendError> {
-        // The renderer is made before the server starts and tells of a lost device with the first picture.
-        Ok(())
+        match self.trouble().clone() {
+            Some(text) => Err(BackendError::new(Class::Unavailable, text)),
+            None => Ok(()),
+        }
     }
 }
 

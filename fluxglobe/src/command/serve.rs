@@ -30,7 +30,7 @@ pub(crate) async fn bind(
     check: Option<Check>,
 ) -> Result<Server> {
     options.viewer = options.viewer.or_else(built_viewer);
-    let drawer = Drawer(Arc::new(embedded::renderer(settings, store.clone()).await?));
+    let drawer = Drawer::new(embedded::renderer(settings, store.clone()).await?);
     let analyst = Analyst {
         local: Engine::local(store.clone()),
         cluster: embedded::cluster(settings, store.clone()),

@@ -1,16 +1,21 @@
 //! The event log of embedded mode: a file of JSON lines a topic, a small file a group of readers.
 
 use std::collections::BTreeMap;
-use std::fs::{File, OpenOptions};
+use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
 
 use async_trait::async_trait;
 use contract::event::Event;
 
 use super::EventLog;
 use crate::StorageError;
+
+/// How long a lock held by another process is waited for.
+const LOCK_PATIENCE: Duration = Duration::from_secs(1);
+const LOCK_PAUSE: Duration = Duration::from_millis(20);
 
 /// A log in a folder, or in memory when it has none. One process at a time.
 pub struct EmbeddedLog {
@@ -41,10 +46,7 @@ impl EmbeddedLog {
         std::fs::create_dir_all(folder).map_err(|e| failed(folder, e))?;
         let lock_path = folder.join("lock");
         let lock = File::create(&lock_path).map_err(|e| failed(&lock_path, e))?;
-        lock.try_lock().map_err(|e| {
-            let text = format!("another fluxglobe process uses this data folder ({e}); stop it or give another --data");
-            failed(&lock_path, std::io::Error::other(text))
-        })?;
+        take_lock(&lock).map_err(|e| failed(&lock_path, e))?;
         let mut state = State {
             _lock: Some(lock),
             ..State::default()
@@ -134,6 +136,25 @@ impl EventLog for EmbeddedLog {
         }
         state.offsets.insert(name, next);
         Ok(())
+    }
+}
+
+/// Takes the lock. A process that was just killed can hold it for some milliseconds more, so it is tried for a while.
+fn take_lock(lock: &File) -> std::io::Result<()> {
+    let start = Instant::now();
+    loop {
+        match lock.try_lock() {
+            Ok(()) => return Ok(()),
+            Err(TryLockError::Error(error)) => return Err(error),
+            Err(TryLockError::WouldBlock) if start.elapsed() < LOCK_PATIENCE => {
+                std::thread::sleep(LOCK_PAUSE);
+            }
+            Err(TryLockError::WouldBlock) => {
+                return Err(std::io::Error::other(
+                    "another fluxglobe process writes to this data folder; wait for it, stop it or give another --data",
+                ));
+            }
+        }
     }
 }
 
