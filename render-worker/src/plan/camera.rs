@@ -1,5 +1,7 @@
 //! The camera of a globe view: where it stands, what it sees of the globe, and where its sun stands.
 
+use std::f64::consts::PI;
+
 use contract::earth::SPHERE_RADIUS_M;
 use contract::job::RenderJob;
 use glam::DVec3;
@@ -84,14 +86,14 @@ impl Camera {
             + self.up * sin_elevation
     }
 
-    /// Angle round the point below the camera within which particles can be seen or shadow what is seen.
+    /// Angles round the point below the camera within which particles can be seen, and can shadow what is seen.
     pub(super) fn cap_rad(
         &self,
         size_px: [u32; 2],
         job: &RenderJob,
         heights: [f64; 2],
         margin: f64,
-    ) -> f64 {
+    ) -> [f64; 2] {
         let distance = 1.0 + self.height;
         let deepest = 1.0 + heights[0];
         let horizon = (1.0 / distance).acos() + (1.0 / (1.0 + heights[1])).acos() + margin;
@@ -99,7 +101,7 @@ impl Camera {
         let corner = (corner_px / self.focal_px).atan();
         let sine = distance * corner.sin() / deepest;
         if sine >= 1.0 {
-            return horizon;
+            return [horizon.min(PI); 2];
         }
         let elevation = job
             .style
@@ -108,7 +110,8 @@ impl Camera {
             .max(look::LOWEST_SUN_DEG)
             .to_radians();
         let shadow = (heights[1] - heights[0]) / elevation.tan();
-        (sine.asin() - corner + 3.0 * margin + shadow).min(horizon)
+        let seen = sine.asin() - corner + margin;
+        [seen, seen + 2.0 * margin + shadow].map(|angle| angle.min(horizon).min(PI))
     }
 }
 

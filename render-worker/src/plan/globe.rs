@@ -73,15 +73,16 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) {
     let radius = radius_px / camera.focal_px * camera.height;
     // From a cell's middle to its corner.
     let half_cell = (grid.dlon_deg.hypot(grid.dlat_deg) / 2.0).to_radians();
-    let angle = camera.cap_rad([width_px, height_px], job, heights, radius + half_cell);
-    let cap = Cap {
+    let [seen, drawn] = camera.cap_rad([width_px, height_px], job, heights, radius + half_cell);
+    let cap = |angle| Cap {
         heights,
-        angle: angle.min(PI),
+        angle,
         radius,
     };
-    let half = slice_planes(plan, job, camera.up, sun, &cap);
-    light_frame(plan, &camera, sun, half, &cap);
-    choose_cells(plan, scene, camera.up, cap.angle);
+    // What lies beyond the seen cap falls into the first or last slice, from where it shadows as it should.
+    let half = slice_planes(plan, job, camera.up, sun, &cap(seen));
+    light_frame(plan, &camera, sun, half, &cap(drawn));
+    choose_cells(plan, scene, camera.up, drawn);
 }
 
 fn rows(scene: &Scene, look: &Look, camera: &Camera, particles: u32, style_depth: f64) -> Vec<Row> {

@@ -241,7 +241,7 @@ fn a_uniform_slab_dims_light_as_exp_of_minus_its_depth() {
     };
     let cells = (0..6).flat_map(|y| (0..6).map(move |x| (x, y)));
     let mut splats: Vec<Splat> = cells
-        .flat_map(|(x, y)| (0..slices).map(move |slice| splat(x, y, slice as f32 + 0.25)))
+        .flat_map(|(x, y)| (0..slices).map(move |slice| splat(x, y, slice as f32 + 0.5)))
         .collect();
     let mut buffer = vec![0; light::texel_count(&params)];
     light::cpu::deposit(&params, &splats, &mut buffer);

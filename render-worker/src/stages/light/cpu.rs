@@ -27,26 +27,40 @@ fn address(params: &Params, texel: [i32; 2], slice: u32) -> Option<usize> {
     inside.then(|| (layer + y as usize) * params.light_width as usize + x as usize)
 }
 
-/// Adds every splat's depth to the four nearest texels of its slice.
+/// Adds every splat's depth to the four nearest texels of the two slices whose middles it lies between.
 pub fn deposit(params: &Params, splats: &[Splat], light: &mut [u32]) {
     for splat in splats.iter().filter(|splat| splat.tau > 0.0) {
-        let Texel {
-            index: [x, y],
-            part,
-        } = texel_of(params, splat);
-        let east = splat.light_depth * part[0];
-        let west = splat.light_depth - east;
-        let shares = [
-            ([x, y], west * (1.0 - part[1])),
-            ([x + 1, y], east * (1.0 - part[1])),
-            ([x, y + 1], west * part[1]),
-            ([x + 1, y + 1], east * part[1]),
-        ];
-        for (texel, depth) in shares {
-            if let Some(at) = address(params, texel, splat.slice as u32) {
-                light[at] =
-                    light[at].wrapping_add((depth.min(MOST_GIVEN) * DEPTH_ONE + 0.5) as u32);
-            }
+        let texel = texel_of(params, splat);
+        let middle = (splat.slice - 0.5).floor();
+        let behind = splat.light_depth * (splat.slice - 0.5 - middle);
+        give_slice(
+            params,
+            &texel,
+            middle as i32,
+            splat.light_depth - behind,
+            light,
+        );
+        give_slice(params, &texel, middle as i32 + 1, behind, light);
+    }
+}
+
+fn give_slice(params: &Params, texel: &Texel, slice: i32, depth: f32, light: &mut [u32]) {
+    let at = slice.clamp(0, params.slices as i32 - 1) as u32;
+    let Texel {
+        index: [x, y],
+        part,
+    } = *texel;
+    let east = depth * part[0];
+    let west = depth - east;
+    let shares = [
+        ([x, y], west * (1.0 - part[1])),
+        ([x + 1, y], east * (1.0 - part[1])),
+        ([x, y + 1], west * part[1]),
+        ([x + 1, y + 1], east * part[1]),
+    ];
+    for (texel, depth) in shares {
+        if let Some(at) = address(params, texel, at) {
+            light[at] = light[at].wrapping_add((depth.min(MOST_GIVEN) * DEPTH_ONE + 0.5) as u32);
         }
     }
 }
@@ -66,13 +80,18 @@ pub fn prefix(params: &Params, light: &mut [u32]) {
     }
 }
 
-fn depth_above(params: &Params, light: &[u32], texel: [i32; 2], slice: u32, part: f32) -> f32 {
-    let Some(at) = address(params, texel, slice) else {
-        return 0.0;
+fn depth_above(params: &Params, light: &[u32], texel: [i32; 2], middle: i32, part: f32) -> f32 {
+    let depth_at = |plane: i32| {
+        let plane = plane.clamp(0, params.slices as i32) as u32;
+        address(params, texel, plane).map_or(0.0, |at| light[at] as f32)
     };
-    let layer = params.light_width as usize * params.light_height as usize;
-    let (before, behind) = (light[at] as f32, light[at + layer] as f32);
-    (before + (behind - before) * part) / DEPTH_ONE
+    let between = depth_at(middle + 1);
+    let outer = mix(
+        depth_at(middle) + between,
+        between + depth_at(middle + 2),
+        part,
+    );
+    0.5 * outer / DEPTH_ONE
 }
 
 fn dimmed(color: u32, shade: f32) -> u32 {
@@ -93,9 +112,9 @@ pub fn shade(params: &Params, light: &[u32], splats: &mut [Splat]) {
             index: [x, y],
             part: [east, south],
         } = texel_of(params, splat);
-        let slice = splat.slice as u32;
-        let part = splat.slice - slice as f32;
-        let depth = |texel| depth_above(params, light, texel, slice, part);
+        let middle = (splat.slice - 0.5).floor();
+        let part = splat.slice - 0.5 - middle;
+        let depth = |texel| depth_above(params, light, texel, middle as i32, part);
         let north_row = mix(depth([x, y]), depth([x + 1, y]), east);
         let south_row = mix(depth([x, y + 1]), depth([x + 1, y + 1]), east);
         let transmittance = (-mix(north_row, south_row, south)).exp();

@@ -29,6 +29,18 @@ fn give(texel: vec2<i32>, slice: u32, depth: f32) {
     if (inside(texel)) { atomicAdd(&light[address(texel, slice)], u32(min(depth, MOST_GIVEN) * DEPTH_ONE + 0.5)); }
 }
 
+fn give_slice(texel: Texel, slice: i32, depth: f32) {
+    let at = u32(clamp(slice, 0, i32(params.slices) - 1));
+    let east = depth * texel.part.x;
+    let west = depth - east;
+    give(texel.index, at, west * (1.0 - texel.part.y));
+    give(texel.index + vec2(1, 0), at, east * (1.0 - texel.part.y));
+    give(texel.index + vec2(0, 1), at, west * texel.part.y);
+    give(texel.index + vec2(1, 1), at, east * texel.part.y);
+}
+
+// Every splat gives to the two slices whose middles it lies between: given to its own slice alone, a thin sheet that
+// runs through the slices at a slant would be striped.
 @compute @workgroup_size(GROUP)
 fn deposit(@builtin(global_invocation_id) global: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>) {
     let i = list_index(global, workgroups);
@@ -36,13 +48,10 @@ fn deposit(@builtin(global_invocation_id) global: vec3<u32>, @builtin(num_workgr
     let splat = splats[i];
     if (splat.tau <= 0.0) { return; }
     let texel = texel_of(splat);
-    let slice = u32(splat.slice);
-    let east = splat.light_depth * texel.part.x;
-    let west = splat.light_depth - east;
-    give(texel.index, slice, west * (1.0 - texel.part.y));
-    give(texel.index + vec2(1, 0), slice, east * (1.0 - texel.part.y));
-    give(texel.index + vec2(0, 1), slice, west * texel.part.y);
-    give(texel.index + vec2(1, 1), slice, east * texel.part.y);
+    let middle = floor(splat.slice - 0.5);
+    let behind = splat.light_depth * (splat.slice - 0.5 - middle);
+    give_slice(texel, i32(middle), splat.light_depth - behind);
+    give_slice(texel, i32(middle) + 1, behind);
 }
 
 @compute @workgroup_size(GROUP)
@@ -59,12 +68,18 @@ fn prefix(@builtin(global_invocation_id) global: vec3<u32>, @builtin(num_workgro
     }
 }
 
-// Depth above a place within a slice: between the planes before and behind it, so that slices leave no bands.
-fn depth_above(texel: vec2<i32>, slice: u32, part: f32) -> f32 {
+// Depth above a slice plane; nothing above the first, everything above the last.
+fn depth_at(texel: vec2<i32>, plane: i32) -> f32 {
+    return f32(atomicLoad(&light[address(texel, u32(clamp(plane, 0, i32(params.slices))))]));
+}
+
+// Depth above a place: the mean of half a slice before and half a slice behind it, each between two planes. Together
+// with the deposit this gives a thin sheet half its own depth wherever it lies, so that slices leave no bands.
+fn depth_above(texel: vec2<i32>, middle: i32, part: f32) -> f32 {
     if (!inside(texel)) { return 0.0; }
-    let before = f32(atomicLoad(&light[address(texel, slice)]));
-    let behind = f32(atomicLoad(&light[address(texel, slice + 1u)]));
-    return (before + (behind - before) * part) / DEPTH_ONE;
+    let between = depth_at(texel, middle + 1);
+    let outer = mix(depth_at(texel, middle) + between, between + depth_at(texel, middle + 2), part);
+    return 0.5 * outer / DEPTH_ONE;
 }
 
 fn dimmed(color: u32, shade: f32) -> u32 {
@@ -79,10 +94,10 @@ fn shade(@builtin(global_invocation_id) global: vec3<u32>, @builtin(num_workgrou
     let splat = splats[i];
     if (splat.tau <= 0.0) { return; }
     let texel = texel_of(splat);
-    let slice = u32(splat.slice);
-    let part = splat.slice - f32(slice);
-    let north = mix(depth_above(texel.index, slice, part), depth_above(texel.index + vec2(1, 0), slice, part), texel.part.x);
-    let south = mix(depth_above(texel.index + vec2(0, 1), slice, part), depth_above(texel.index + vec2(1, 1), slice, part), texel.part.x);
+    let middle = i32(floor(splat.slice - 0.5));
+    let part = splat.slice - 0.5 - f32(middle);
+    let north = mix(depth_above(texel.index, middle, part), depth_above(texel.index + vec2(1, 0), middle, part), texel.part.x);
+    let south = mix(depth_above(texel.index + vec2(0, 1), middle, part), depth_above(texel.index + vec2(1, 1), middle, part), texel.part.x);
     let transmittance = exp(-mix(north, south, texel.part.y));
     splats[i].color = dimmed(splat.color, params.ambient + params.direct * transmittance * splat.day);
 }
