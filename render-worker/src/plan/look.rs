@@ -9,7 +9,7 @@ pub(super) const HEIGHT_LIMIT_M: f64 = 1.2e6;
 /// Turns of a particle through its column for each kg m⁻²: at 60 g m⁻² a year it rises three times a year.
 pub(super) const TURNS_PER_KG_M2: f32 = 50.0;
 /// Share of the optical depth that a cell without flux keeps.
-pub(super) const FLOOR_DIVERGING: f32 = 0.18;
+pub(super) const FLOOR_DIVERGING: f32 = 0.3;
 /// The same for quantities without a sign.
 pub(super) const FLOOR_SEQUENTIAL: f32 = 0.45;
 /// Light that reaches everything.

