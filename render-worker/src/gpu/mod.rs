@@ -23,6 +23,7 @@ pub struct Gpu {
     adapter_name: String,
     most_buffer_bytes: u64,
     checks: Checks,
+    is_software: bool,
 }
 
 /// What shaders check while they run.
@@ -56,6 +57,7 @@ impl Gpu {
             .await
             .map_err(|e| RenderError::NoAdapter(Box::new(e)))?;
         let adapter_name = adapter.get_info().name;
+        let is_software = adapter.get_info().device_type == wgpu::DeviceType::Cpu;
         let limits = adapter.limits();
         let most_buffer_bytes = limits
             .max_buffer_size
@@ -78,12 +80,18 @@ impl Gpu {
             adapter_name,
             most_buffer_bytes,
             checks,
+            is_software,
         })
     }
 
     /// Name of the adapter.
     pub fn adapter_name(&self) -> &str {
         &self.adapter_name
+    }
+
+    /// Is the adapter a program on the processor, such as lavapipe?
+    pub fn is_software(&self) -> bool {
+        self.is_software
     }
 
     /// Largest storage buffer of this device.

@@ -22,6 +22,9 @@ pub(super) const LIGHT_DEPTH: f64 = 0.6;
 pub(super) const MAP_ALPHA: f32 = 0.9;
 /// Pixels north that a metre of height moves a particle, in pixels a metre: the slope of the view of map tiles.
 pub(super) const OBLIQUE: f64 = 0.35;
+/// Farthest a particle of a map tile is lifted or sunk, pixels: in deep zoom levels all heights are scaled down alike,
+/// so that particles stay near their cells and shadows fall on the next tile at most.
+pub(super) const MOST_LIFT_PX: f64 = 120.0;
 /// Largest particle, pixels: keeps positions and reaches far inside 32-bit integers.
 pub(super) const MAX_RADIUS_PX: f32 = 100_000.0;
 /// Shadows of a lower sun would fall far beyond a tile.

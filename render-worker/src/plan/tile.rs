@@ -64,6 +64,12 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene, tile: Tile, 
         job.style.optical_depth,
     );
     let heights_m = height_range_m(job, scene);
+    let highest_px = heights_m[1].max(-heights_m[0]) * level.px_per_m;
+    let flattened = (look::MOST_LIFT_PX / highest_px).min(1.0);
+    let heights_m = heights_m.map(|height_m| height_m * flattened);
+    plan.params.height_m_per_kg_m2 *= flattened as f32;
+    plan.params.height_limit_m *= flattened as f32;
+    plan.params.sheet_m *= flattened as f32;
     plan.params.height_px_per_m = (look::OBLIQUE * level.px_per_m) as f32;
     plan.params.slice_top = heights_m[1] as f32;
     plan.params.slices_per_unit =
