@@ -128,7 +128,13 @@ mod tests {
     };
 
     fn values() -> Vec<f32> {
-        let value = |i: usize| if i % 7 == 0 { f32::NAN } else { i as f32 };
+        let value = |i: usize| {
+            if i.is_multiple_of(7) {
+                f32::NAN
+            } else {
+                i as f32
+            }
+        };
         (0..GRID.cell_count()).map(value).collect()
     }
 

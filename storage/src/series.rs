@@ -81,6 +81,7 @@ pub async fn write(
 }
 
 #[cfg(test)]
+#[expect(clippy::float_cmp, reason = "these values are exact")]
 mod tests {
     use super::*;
     use arrow::datatypes::Float32Type;

@@ -19,7 +19,7 @@ async fn a_product_tells_what_a_viewer_needs() {
     );
     assert!((flux["display_factor"].as_f64().unwrap() - 1000.0 * 365.25 * 86_400.0).abs() < 1.0);
     assert_eq!(flux["synthetic"], false);
-    assert_eq!(flux["bounds"], json!([-180.0, -40.0, 180.0, 40.0]));
+    assert_eq!(flux["bounds"], json!([-180.0, -60.0, 180.0, 60.0]));
     assert_eq!(flux["modes"], json!(["map", "points", "sprites", "volume"]));
     let january = json!({"start": "2000-01-01T00:00:00Z", "end": "2000-02-01T00:00:00Z", "mid": "2000-01-16T12:00:00Z"});
     assert_eq!(flux["steps"][0], january);
@@ -27,7 +27,7 @@ async fn a_product_tells_what_a_viewer_needs() {
     let legend = &flux["legend"];
     assert_eq!(
         (&legend["low"], &legend["high"]),
-        (&json!(-40.0), &json!(60.0))
+        (&json!(-40.0), &json!(40.0))
     );
     assert_eq!(legend["stops"][0], json!([0.0, "#11387f"]));
     assert_eq!(legend["stops"][8][0], json!(1.0));
