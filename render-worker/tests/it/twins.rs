@@ -202,8 +202,19 @@ fn interpolate_matches_its_twin() {
                     slot,
                     expected.len(),
                 );
-                // One rounding of a product and one of a sum.
-                worst(&drawn[cells.clone()], &expected[cells.clone()], 1e-14, 1e-5)
+                // A device may round a product and its sum at once, the twin rounds twice: an error of the largest
+                // operand's last bits, which is all there is where two frames cancel.
+                let expected = &expected[cells.clone()];
+                let largest = expected
+                    .iter()
+                    .filter(|v| **v > MISSING)
+                    .fold(0.0f32, |most, v| most.max(v.abs()));
+                worst(
+                    &drawn[cells.clone()],
+                    expected,
+                    4.0 * f32::EPSILON * largest,
+                    1e-5,
+                )
             },
         );
     }
