@@ -3,13 +3,12 @@
 mod steps;
 
 use contract::digest::Digest;
-use contract::event::{Body, Event};
+use contract::event::Body;
 use contract::manifest::{MANIFEST_SCHEMA, Manifest, ManifestId, SeriesSegment, Step};
 use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::time::{Period, TimeMs};
 use serde::Serialize;
-use storage::log::EventLog;
 use storage::{StorageError, domain, frames, manifests, series};
 
 use crate::{ComputeError, Engine, catalog};
@@ -19,8 +18,6 @@ use steps::accumulate_segment;
 const SEGMENT_VALUES: usize = 64 << 20;
 /// How often the commit is tried again when another writer takes the number.
 const COMMIT_ATTEMPTS: u32 = 5;
-/// Events read at once when looking whether one was told already.
-const EVENTS_PER_READ: usize = 256;
 
 /// How far a derivation has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,12 +49,11 @@ struct StepJob<'a> {
 ///
 /// A step's values hold at its end. A gap in time leaves a cell as it was; a cell without data in any step holds none.
 /// If the newest version was derived from the same version of the source and the same start, it is returned as it is.
-/// The event follows the manifest, and is told once however often this is called.
+/// [`derived`] is the event to tell of it, after the manifest.
 pub async fn derive_accumulated(
     engine: &Engine,
     product: &ProductId,
     start: Option<TimeMs>,
-    log: &dyn EventLog,
     progress: &(dyn Fn(DeriveProgress) + Send + Sync),
 ) -> Result<Manifest, ComputeError> {
     let source = catalog::product(engine.store(), product).await?;
@@ -88,8 +84,15 @@ pub async fn derive_accumulated(
             .await?
         }
     };
-    tell_once(log, &manifest, &source.id()).await?;
     Ok(manifest)
+}
+
+/// What is told of a derived manifest; nothing if it was not derived.
+pub fn derived(manifest: &Manifest) -> Option<Body> {
+    Some(Body::ProductDerived {
+        manifest: manifest.id(),
+        derived_from: manifest.derived_from.clone()?,
+    })
 }
 
 /// The steps that end after the start, the first cut at it.
@@ -216,30 +219,4 @@ async fn commit(
             Err(e) => return Err(e.into()),
         }
     }
-}
-
-/// Tells that a manifest was derived, unless the log holds it: a crash between commit and event must not lose it.
-async fn tell_once(
-    log: &dyn EventLog,
-    manifest: &Manifest,
-    source: &ManifestId,
-) -> Result<(), ComputeError> {
-    let body = Body::ProductDerived {
-        manifest: manifest.id(),
-        derived_from: source.clone(),
-    };
-    let mut from = 0;
-    loop {
-        let events = log.read(body.topic(), from, EVENTS_PER_READ).await?;
-        if events.iter().any(|(_, event)| event.body == body) {
-            return Ok(());
-        }
-        match events.last() {
-            Some((offset, _)) => from = offset + 1,
-            None => break,
-        }
-    }
-    log.append(&Event::new(manifest.id().to_string(), body))
-        .await?;
-    Ok(())
 }

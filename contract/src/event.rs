@@ -7,13 +7,19 @@ use crate::digest::Digest;
 use crate::job::RenderJob;
 use crate::key::ObjectKey;
 use crate::manifest::ManifestId;
+use crate::observation::Observation;
 use crate::product::ProductId;
-use crate::time::Period;
+use crate::time::{Period, TimeMs};
+use crate::topic::{Origin, Topic};
 
 /// Version of the events' JSON.
 pub const EVENT_SCHEMA: u32 = 1;
 /// Longest event, bytes.
 pub const MAX_EVENT_BYTES: usize = 1 << 20;
+/// Longest trace, bytes.
+pub const MAX_TRACE_BYTES: usize = 128;
+/// Most observations of one event.
+pub const MAX_OBSERVATIONS: usize = 1000;
 
 /// An event with its schema version.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -23,6 +29,9 @@ pub struct Event {
     pub schema: u32,
     /// The same text on everything that follows from one notice.
     pub trace: String,
+    /// When the notice was given that all of this follows from: how fresh a tile is counts from here.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noticed: Option<TimeMs>,
     /// What happened.
     pub body: Body,
 }
@@ -34,12 +43,21 @@ pub enum Body {
     /// A file is there to be ingested.
     #[serde(rename = "granule.notice")]
     GranuleNotice {
-        /// Path of the file.
+        /// Path or URL of the file.
         path: String,
         /// Name of the profile to read it with; found by itself if absent.
         profile: Option<String>,
         /// The product to land it in; named by the profile if absent.
         product: Option<ProductId>,
+        /// What the file's digest must be, if the sender knows.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        sha256: Option<Digest>,
+        /// What the file's size must be, bytes, if the sender knows.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        size_bytes: Option<u64>,
+        /// 1 for the first try, more for a notice that was refused and sent again.
+        #[serde(default = "first", skip_serializing_if = "is_first")]
+        attempt: u32,
     },
     /// A file is in a product.
     #[serde(rename = "granule.landed")]
@@ -66,6 +84,15 @@ pub enum Body {
         detail: String,
         /// 1 for the first try.
         attempt: u32,
+        /// Where the refused message lies.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        origin: Option<Origin>,
+    },
+    /// Measurements of buoys, ships, stations and profiles.
+    #[serde(rename = "observation")]
+    Observations {
+        /// At most [`MAX_OBSERVATIONS`].
+        observations: Vec<Observation>,
     },
     /// A product was computed from another.
     #[serde(rename = "product.derived")]
@@ -88,7 +115,19 @@ pub enum Body {
         key: ObjectKey,
         /// Time it took, milliseconds.
         duration_ms: u64,
+        /// Why there is no picture; the job will not be tried again.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        failure: Option<String>,
     },
+}
+
+fn first() -> u32 {
+    1
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it so")]
+fn is_first(attempt: &u32) -> bool {
+    *attempt == first()
 }
 
 /// Why a file was refused, as a class.
@@ -113,18 +152,45 @@ pub enum RejectReason {
     Values,
     /// It does not fit the product that is there (other grid, other quantity, overlapping period).
     Conflict,
+    /// Its digest or size is not the one that its notice gave.
+    Checksum,
+    /// Its path or address is not one that may be read.
+    Location,
+    /// It could not be had, however often it was tried.
+    Unavailable,
+    /// The message itself cannot be understood: no JSON, an unknown schema, a field out of its limits.
+    Message,
 }
 
 impl Body {
     /// Topic that events of this kind go to.
-    pub fn topic(&self) -> &'static str {
+    pub fn topic(&self) -> Topic {
         match self {
-            Self::GranuleNotice { .. } => "granule.notice",
-            Self::GranuleLanded { .. } => "granule.landed",
-            Self::GranuleRejected { .. } => "granule.rejected",
-            Self::ProductDerived { .. } => "product.derived",
-            Self::RenderJob { .. } => "render.job",
-            Self::RenderDone { .. } => "render.done",
+            Self::GranuleNotice { .. } => Topic::GranuleNotice,
+            Self::GranuleLanded { .. } => Topic::GranuleLanded,
+            Self::GranuleRejected { .. } => Topic::GranuleRejected,
+            Self::Observations { .. } => Topic::Observation,
+            Self::ProductDerived { .. } => Topic::ProductDerived,
+            Self::RenderJob { .. } => Topic::RenderJob,
+            Self::RenderDone { .. } => Topic::RenderDone,
+        }
+    }
+
+    /// What events share that must be read in their order: the product, else what the event speaks of.
+    pub fn order_key(&self) -> String {
+        match self {
+            Self::GranuleNotice { path, product, .. } => {
+                product.as_ref().map_or(path, |p| p.as_str()).to_owned()
+            }
+            Self::GranuleLanded { manifest, .. } | Self::ProductDerived { manifest, .. } => {
+                manifest.product.to_string()
+            }
+            Self::GranuleRejected { path, .. } => path.clone(),
+            Self::Observations { observations } => observations
+                .first()
+                .map_or_else(String::new, |o| o.platform.clone()),
+            Self::RenderJob { job } => job.digest().to_string(),
+            Self::RenderDone { key, .. } => key.to_string(),
         }
     }
 }
@@ -135,6 +201,18 @@ impl Event {
         Self {
             schema: EVENT_SCHEMA,
             trace: trace.into(),
+            noticed: None,
+            body,
+        }
+    }
+
+    /// An event that follows from this one: same trace, same notice.
+    #[must_use]
+    pub fn followed_by(&self, body: Body) -> Self {
+        Self {
+            schema: EVENT_SCHEMA,
+            trace: self.trace.clone(),
+            noticed: self.noticed,
             body,
         }
     }
@@ -167,7 +245,23 @@ impl Event {
                 version.schema
             )));
         }
-        serde_json::from_str(text).map_err(|e| bad(e.to_string()))
+        let event: Self = serde_json::from_str(text).map_err(|e| bad(e.to_string()))?;
+        if event.trace.len() > MAX_TRACE_BYTES || event.trace.chars().any(char::is_control) {
+            return Err(bad(format!(
+                "a trace is at most {MAX_TRACE_BYTES} printable bytes"
+            )));
+        }
+        match &event.body {
+            Body::Observations { observations } if observations.len() > MAX_OBSERVATIONS => Err(
+                bad(format!("it has more than {MAX_OBSERVATIONS} observations")),
+            ),
+            Body::Observations { observations } => {
+                observations.iter().try_for_each(Observation::validate)?;
+                Ok(event)
+            }
+            Body::RenderJob { job } => job.validate().map(|()| event),
+            _ => Ok(event),
+        }
     }
 }
 
@@ -181,7 +275,7 @@ mod tests {
     #[test]
     fn old_bytes_still_parse() {
         let event = Event::from_json(NOTICE_V1).unwrap();
-        assert_eq!(event.body.topic(), "granule.notice");
+        assert_eq!(event.body.topic(), Topic::GranuleNotice);
         assert_eq!(event.to_json(), NOTICE_V1);
     }
 
@@ -190,6 +284,31 @@ mod tests {
         let error =
             Event::from_json(&NOTICE_V1.replace("\"schema\":1", "\"schema\":2")).unwrap_err();
         assert!(error.to_string().contains("schema 2 is unknown"), "{error}");
+    }
+
+    #[test]
+    fn what_follows_keeps_trace_and_notice() {
+        let mut notice = Event::from_json(NOTICE_V1).unwrap();
+        notice.noticed = Some("2020-01-01".parse().unwrap());
+        let body = Body::ProductDerived {
+            manifest: "p@1-00000000".parse().unwrap(),
+            derived_from: "q@1-00000000".parse().unwrap(),
+        };
+        let derived = notice.followed_by(body);
+        assert_eq!(
+            (derived.trace.as_str(), derived.noticed),
+            ("t", notice.noticed)
+        );
+        assert_eq!(Event::from_json(&derived.to_json()).unwrap(), derived);
+    }
+
+    #[test]
+    fn a_job_beyond_its_limits_does_not_enter_as_an_event() {
+        let text = r#"{"schema":1,"trace":"\u0007","body":{"kind":"granule.notice","path":"a","profile":null,"product":null}}"#;
+        assert!(
+            Event::from_json(text).is_err(),
+            "control characters in a trace"
+        );
     }
 
     #[test]

@@ -44,6 +44,11 @@ impl ObjectKey {
         Self(format!("weights/{job}.parquet"))
     }
 
+    /// Observations of one dataset and month as GeoParquet, named by its content.
+    pub fn observations(dataset: &ProductId, sha256: &Digest) -> Self {
+        Self(format!("observations/{dataset}/{sha256}.parquet"))
+    }
+
     /// A comparison with published values, named by what was compared.
     pub fn check(job: &Digest) -> Self {
         Self(format!("checks/{job}.json"))
@@ -117,6 +122,7 @@ mod tests {
             ObjectKey::domain(&product, &digest),
             ObjectKey::manifest(&product, 7),
             ObjectKey::weights(&digest),
+            ObjectKey::observations(&product, &digest),
             ObjectKey::check(&digest),
             ObjectKey::tile(&digest),
         ] {

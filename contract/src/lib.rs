@@ -14,10 +14,12 @@ pub mod grid;
 pub mod job;
 pub mod key;
 pub mod manifest;
+pub mod observation;
 pub mod product;
 pub mod quantity;
 pub mod region;
 pub mod tile;
 pub mod time;
+pub mod topic;
 
 pub use error::ContractError;

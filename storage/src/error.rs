@@ -20,12 +20,16 @@ pub enum StorageError {
     /// The place to store in cannot be used.
     #[error("cannot store in {location:?}: {reason}")]
     Location { location: String, reason: String },
-    /// The event log cannot be read or written.
-    #[error("event log {path}: {source}")]
+    /// The event log cannot be read or written now.
+    #[error("event log {log}: {source}")]
     Log {
-        path: String,
-        source: std::io::Error,
+        /// A folder or a list of brokers.
+        log: String,
+        source: Box<dyn std::error::Error + Send + Sync>,
     },
+    /// The event log is not set up as it must be; trying again does not help.
+    #[error("event log {log} cannot be used: {reason}")]
+    LogSetup { log: String, reason: String },
 }
 
 impl StorageError {
@@ -42,7 +46,10 @@ impl StorageError {
                     | object_store::Error::Unauthenticated { .. }
             ),
             Self::Log { .. } => true,
-            Self::Conflict { .. } | Self::Damaged { .. } | Self::Location { .. } => false,
+            Self::Conflict { .. }
+            | Self::Damaged { .. }
+            | Self::Location { .. }
+            | Self::LogSetup { .. } => false,
         }
     }
 
@@ -55,6 +62,17 @@ impl StorageError {
                 ..
             }
         )
+    }
+
+    /// A failure of an event log that may pass.
+    pub fn log(
+        log: impl Into<String>,
+        source: impl Into<Box<dyn std::error::Error + Send + Sync>>,
+    ) -> Self {
+        Self::Log {
+            log: log.into(),
+            source: source.into(),
+        }
     }
 
     pub(crate) fn damaged(object: impl Into<String>, reason: impl std::fmt::Display) -> Self {

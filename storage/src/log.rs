@@ -1,31 +1,141 @@
-//! The event log: events in, numbered events out, and how far each group of readers has come.
+//! The event log: messages by topic, groups of readers that share them, and how far each group has come.
+//!
+//! A reader finishes a message together with what follows from it: the events that follow are appended and the offset
+//! moves in one step, or neither happens. So a notice has its events once, however often its reader is killed.
 
 mod embedded;
+mod journal;
+mod low_water;
+
+use std::time::Duration;
 
 use async_trait::async_trait;
+use bytes::Bytes;
+use contract::ContractError;
 use contract::event::Event;
+use contract::topic::{Origin, Topic};
 
 use crate::StorageError;
 
 pub use embedded::EmbeddedLog;
+pub use low_water::{LowWater, Ready};
 
-/// An append-only log of events by topic. An event is durable when `append` returns.
+/// A message as it lies in the log: anybody may have written it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Message {
+    /// Where.
+    pub origin: Origin,
+    /// What, as it came.
+    pub content: Bytes,
+}
+
+impl Message {
+    /// The event in it.
+    ///
+    /// # Errors
+    /// Not UTF-8, or no event of this version.
+    pub fn event(&self) -> Result<Event, ContractError> {
+        let text = std::str::from_utf8(&self.content).map_err(|e| {
+            ContractError::invalid("message", &self.origin.to_string(), e.to_string())
+        })?;
+        Event::from_json(text)
+    }
+}
+
+/// A message that is dealt with.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Finished {
+    /// The message.
+    pub origin: Origin,
+    /// What follows from it.
+    pub follows: Vec<Event>,
+}
+
+/// Where to begin without a group.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Start {
+    /// The oldest message that is kept.
+    Oldest,
+    /// What is appended from now on.
+    Now,
+}
+
+/// A log of messages by topic.
 #[async_trait]
 pub trait EventLog: Send + Sync {
-    /// Appends an event to its topic; its offset, counted from 0.
-    async fn append(&self, event: &Event) -> Result<u64, StorageError>;
+    /// Appends events, all or none; they are durable when this returns.
+    async fn append(&self, events: &[Event]) -> Result<(), StorageError>;
 
-    /// At most `max` events from an offset on, with their offsets.
-    async fn read(
+    /// Appends a message as it is, for notices of other systems and for sending a refused message again.
+    async fn append_message(
         &self,
-        topic: &str,
-        from: u64,
-        max: usize,
-    ) -> Result<Vec<(u64, Event)>, StorageError>;
+        topic: Topic,
+        key: &str,
+        content: Bytes,
+    ) -> Result<(), StorageError>;
 
-    /// The offset a group of readers goes on from.
-    async fn committed(&self, topic: &str, group: &str) -> Result<u64, StorageError>;
+    /// Joins a group that shares the messages of a topic; a new group begins with the oldest.
+    async fn join(&self, topic: Topic, group: &str) -> Result<Box<dyn Reader>, StorageError>;
 
-    /// Stores the offset a group goes on from; it never goes back.
-    async fn commit(&self, topic: &str, group: &str, next: u64) -> Result<(), StorageError>;
+    /// Follows all messages of a topic alone, without leaving a trace of it.
+    async fn follow(&self, topic: Topic, start: Start) -> Result<Box<dyn Follower>, StorageError>;
+
+    /// One message, none if it is not there (any more).
+    async fn message(&self, origin: Origin) -> Result<Option<Message>, StorageError>;
+
+    /// How many messages of a topic a group has still before it.
+    async fn lag(&self, topic: Topic, group: &str) -> Result<u64, StorageError>;
+
+    /// Can messages be appended and read now?
+    async fn ready(&self) -> Result<(), StorageError>;
+}
+
+/// One member of a group. After an error, whatever was not finished is delivered again, perhaps to another member.
+#[async_trait]
+pub trait Reader: Send {
+    /// At most `max` messages, in order within a partition; none after `wait` without any.
+    async fn next(&mut self, max: usize, wait: Duration) -> Result<Vec<Message>, StorageError>;
+
+    /// Finishes messages, in any order. The offset of a partition moves past a message once all before it are finished
+    /// too; what follows from a message is appended in the same step.
+    async fn finish(&mut self, done: Vec<Finished>) -> Result<(), StorageError>;
+
+    /// Hands back what was not finished at once, so that nobody waits for this member.
+    async fn leave(self: Box<Self>) -> Result<(), StorageError>;
+}
+
+/// Somebody who only looks.
+#[async_trait]
+pub trait Follower: Send {
+    /// At most `max` messages; none after `wait` without any.
+    async fn next(&mut self, max: usize, wait: Duration) -> Result<Vec<Message>, StorageError>;
+}
+
+/// Most messages that [`contents`] reads at once.
+const MESSAGES_AT_ONCE: usize = 256;
+/// A follower from the oldest message that brings nothing for so long is at the end.
+const END_WAIT: Duration = Duration::from_millis(500);
+
+/// All messages of a topic that are there now.
+pub async fn contents(log: &dyn EventLog, topic: Topic) -> Result<Vec<Message>, StorageError> {
+    let mut follower = log.follow(topic, Start::Oldest).await?;
+    let mut all = vec![];
+    loop {
+        let some = follower.next(MESSAGES_AT_ONCE, END_WAIT).await?;
+        if some.is_empty() {
+            return Ok(all);
+        }
+        all.extend(some);
+    }
+}
+
+/// Appends an event unless the log holds one with the same body: for those who are no readers, and who may have been
+/// killed between what they did and telling of it.
+pub async fn tell_once(log: &dyn EventLog, event: &Event) -> Result<(), StorageError> {
+    let told = contents(log, event.body.topic()).await?;
+    let is_told = |message: &Message| message.event().is_ok_and(|told| told.body == event.body);
+    if told.iter().any(is_told) {
+        return Ok(());
+    }
+    log.append(std::slice::from_ref(event)).await
 }

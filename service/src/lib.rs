@@ -1,0 +1,19 @@
+//! What every service has: request metrics, health and metrics over HTTP, log lines, an orderly end.
+//!
+//! Left out on purpose: what a service does. Nothing here knows of grids, pictures or topics.
+
+pub mod admin;
+mod error;
+mod logging;
+mod readiness;
+mod red;
+mod stop;
+
+pub use error::ServiceError;
+pub use logging::{LogFormat, start_logging};
+pub use readiness::{Part, Readiness, Report};
+pub use red::{Outcome, Red, Running};
+pub use stop::{Stop, when_asked_to_stop};
+
+/// Registry that a service's metrics go to.
+pub use prometheus::Registry;
