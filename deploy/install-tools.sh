@@ -18,6 +18,8 @@ packages_run=(
     'python3-venv /usr/lib/python3.*/ensurepip/__init__.py'
     'nodejs /usr/bin/node'
     'npm /usr/bin/npm'
+    'libssl-dev /usr/include/openssl/ssl.h'
+    'protobuf-compiler /usr/bin/protoc'
     'libvulkan1 /usr/lib/*/libvulkan.so.1'
     'mesa-vulkan-drivers /usr/share/vulkan/icd.d/lvp_icd.*.json'
 )

@@ -5,12 +5,14 @@
 pub mod admin;
 mod error;
 mod logging;
+mod patience;
 mod readiness;
 mod red;
 mod stop;
 
 pub use error::ServiceError;
 pub use logging::{LogFormat, start_logging};
+pub use patience::{pauses, until_there};
 pub use readiness::{Part, Readiness, Report};
 pub use red::{Outcome, Red, Running};
 pub use stop::{Stop, when_asked_to_stop};
