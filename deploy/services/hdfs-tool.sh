@@ -1,0 +1,18 @@
+#!/usr/bin/env bash
+# Hadoop's own command-line client for files, from the jars that services.sh installs.
+#   deploy/services/hdfs-tool.sh -mkdir -p /fluxglobe
+#   deploy/services/hdfs-tool.sh -put grid.nc /fluxglobe/grid.nc
+#   deploy/services/hdfs-tool.sh -ls -R /
+set -euo pipefail
+here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+
+jars=${FLUXGLOBE_SERVICES:-$HOME/.cache/fluxglobe/services}/hdfs/lib
+[ -d "$jars" ] || {
+    echo 'hdfs-tool: not installed; run: deploy/services/services.sh install hdfs' >&2
+    exit 1
+}
+java=${JAVA_HOME:+$JAVA_HOME/bin/}java
+exec "$java" -Xmx256m -XX:+UseSerialGC -XX:TieredStopAtLevel=1 -Dfluxglobe.log=WARN \
+    "-Dlog4j.configuration=file:$here/hdfs/log4j.properties" \
+    "-Dfluxglobe.hdfs=${FLUXGLOBE_HDFS:-hdfs://127.0.0.1:${FLUXGLOBE_HDFS_PORT:-18020}}" \
+    -cp "$here/hdfs:$jars/*" org.apache.hadoop.fs.FsShell "$@"
