@@ -18,6 +18,11 @@ impl Digest {
         Self(Sha256::digest(bytes).into())
     }
 
+    /// The digest that a hasher ended with, for content that is read in pieces.
+    pub fn from_bytes(sha256: [u8; 32]) -> Self {
+        Self(sha256)
+    }
+
     /// Digest of a value's canonical JSON: fields in declaration order, no white space.
     ///
     /// # Panics

@@ -1,5 +1,8 @@
 //! The command line: words in, one plain `Command` out. Every value is parsed here, once, into its final type.
 
+mod services;
+mod show;
+
 use std::num::NonZeroU16;
 use std::path::PathBuf;
 
@@ -8,6 +11,12 @@ use contract::earth::Earth;
 use contract::job::Mode;
 use contract::product::ProductId;
 use contract::time::TimeMs;
+
+pub(crate) use services::{
+    Bench, BenchStream, Executor, Ingestd, Notice, Rejected, RenderWorker, Scheduler, TileServer,
+    Topics,
+};
+pub(crate) use show::settings as shown_settings;
 
 /// See and count the ocean's carbon.
 ///
@@ -43,6 +52,21 @@ pub(crate) struct Settings {
         value_name = "FILTER"
     )]
     pub(crate) log: String,
+    /// What log lines look like.
+    #[arg(
+        long,
+        env = "FLUXGLOBE_LOG_FORMAT",
+        value_enum,
+        default_value = "text",
+        global = true
+    )]
+    pub(crate) log_format: service::LogFormat,
+    /// Object store in place of the one in --data: s3://BUCKET/PREFIX, gs://, az://, hdfs://HOST:PORT/PATH, file:FOLDER.
+    #[arg(long, env = "FLUXGLOBE_STORE", global = true, value_name = "URL")]
+    pub(crate) store: Option<String>,
+    /// Ballista scheduler to compute on, http://HOST:PORT; in this process without it. Answers are the same bits.
+    #[arg(long, env = "FLUXGLOBE_CLUSTER", global = true, value_name = "URL")]
+    pub(crate) cluster: Option<String>,
     /// Draw with the processor alone instead of a Vulkan device.
     #[arg(long, env = "FLUXGLOBE_CPU", global = true)]
     pub(crate) cpu: bool,
@@ -73,6 +97,27 @@ pub(crate) enum Command {
     Render(Render),
     /// Serve tiles, views, statistics and the viewer.
     Serve(tile_server::config::Settings),
+    /// Service: land what notices speak of, and observations.
+    Ingestd(Ingestd),
+    /// Service: plan queries for the executors, derive products from what landed.
+    Scheduler(Scheduler),
+    /// Service: compute what the scheduler gives it.
+    Executor(Executor),
+    /// Service: draw pictures on this machine's Vulkan device.
+    RenderWorker(RenderWorker),
+    /// Service: serve tiles, views, statistics and the viewer over the cluster.
+    TileServer(TileServer),
+    /// Tell the ingest service of files.
+    Notice(Notice),
+    /// The event log's topics on Kafka.
+    #[command(subcommand)]
+    Topics(Topics),
+    /// Refused files and messages.
+    #[command(subcommand)]
+    Rejected(Rejected),
+    /// Measure.
+    #[command(subcommand)]
+    Bench(Bench),
     /// Make synthetic data, labelled so.
     #[command(subcommand)]
     Generate(Generate),

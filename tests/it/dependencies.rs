@@ -8,23 +8,29 @@ use serde_json::Value;
 /// Workspace crates that each crate may depend on directly.
 const MAY_USE: &[(&str, &[&str])] = &[
     ("contract", &[]),
+    ("service", &[]),
     ("storage", &["contract"]),
-    ("ingest", &["contract", "storage"]),
-    ("compute", &["contract", "storage"]),
-    ("render-worker", &["contract", "storage"]),
-    ("tile-server", &["contract", "storage"]),
+    ("kafka-log", &["contract", "storage", "service"]),
+    ("observations", &["contract", "storage", "service"]),
+    ("ingest", &["contract", "storage", "service"]),
+    ("compute", &["contract", "storage", "service"]),
+    ("render-worker", &["contract", "storage", "service"]),
+    ("tile-server", &["contract", "storage", "service"]),
     (
         "fluxglobe",
         &[
             "contract",
             "storage",
+            "service",
+            "kafka-log",
+            "observations",
             "ingest",
             "compute",
             "render-worker",
             "tile-server",
         ],
     ),
-    ("tests", &["contract"]),
+    ("tests", &["contract", "storage", "kafka-log"]),
 ];
 
 /// Packages that must not be reachable from a crate.
@@ -35,14 +41,15 @@ const MUST_NOT_REACH: &[(&str, &[&str])] = &[
     ),
     (
         "tile-server",
-        &["wgpu", "datafusion", "ballista", "hdf5-metno"],
+        &["wgpu", "datafusion", "ballista", "hdf5-metno", "rdkafka"],
     ),
     (
         "render-worker",
-        &["datafusion", "ballista", "hdf5-metno", "axum"],
+        &["datafusion", "ballista", "hdf5-metno", "rdkafka"],
     ),
-    ("ingest", &["datafusion", "ballista", "wgpu", "axum"]),
-    ("compute", &["wgpu", "hdf5-metno"]),
+    ("ingest", &["datafusion", "ballista", "wgpu", "rdkafka"]),
+    ("compute", &["wgpu", "hdf5-metno", "rdkafka"]),
+    ("observations", &["datafusion", "wgpu", "rdkafka"]),
 ];
 
 /// Packages of which there may be one version only: two would not understand each other's values.

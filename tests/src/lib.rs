@@ -1,5 +1,9 @@
 //! The harness of the end-to-end tests: runs the built program as people do, and knows where the real files are.
 
+pub mod cluster;
+pub mod http;
+pub mod node;
 pub mod program;
 pub mod real_data;
 pub mod server;
+pub mod servers;

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result, bail};
 
+use crate::http::{self, Answer};
 use crate::program;
 
 /// Longest wait for a started server to answer.
@@ -17,30 +18,6 @@ pub struct Server {
     child: Child,
     /// Address, such as `http://127.0.0.1:40123`.
     pub url: String,
-}
-
-/// An answer: its status, header lookup and body.
-pub struct Answer {
-    /// HTTP status.
-    pub status: u16,
-    /// Content type.
-    pub content_type: String,
-    /// `ETag`, if any.
-    pub etag: Option<String>,
-    /// Body.
-    pub body: Vec<u8>,
-}
-
-impl Answer {
-    /// Body as text.
-    pub fn text(&self) -> String {
-        String::from_utf8_lossy(&self.body).into_owned()
-    }
-
-    /// Body as JSON.
-    pub fn json(&self) -> Result<serde_json::Value> {
-        serde_json::from_slice(&self.body).with_context(|| self.text())
-    }
 }
 
 impl Server {
@@ -93,27 +70,7 @@ impl Server {
 
     /// Fetches a path; every status is an answer.
     pub fn get(&self, path: &str) -> Result<Answer> {
-        let agent: ureq::Agent = ureq::Agent::config_builder()
-            .http_status_as_error(false)
-            .timeout_global(Some(Duration::from_mins(2)))
-            .build()
-            .into();
-        let mut response = agent.get(format!("{}{path}", self.url)).call()?;
-        let header = |name: &str| {
-            let value = response.headers().get(name)?;
-            value.to_str().ok().map(ToOwned::to_owned)
-        };
-        let (content_type, etag) = (header("content-type").unwrap_or_default(), header("etag"));
-        Ok(Answer {
-            status: response.status().as_u16(),
-            content_type,
-            etag,
-            body: response
-                .body_mut()
-                .with_config()
-                .limit(64 << 20)
-                .read_to_vec()?,
-        })
+        http::get(&format!("{}{path}", self.url))
     }
 }
 

@@ -9,11 +9,11 @@ use compute::budget::{BudgetAnswer, BudgetQuery, BudgetStep};
 use contract::region::Region;
 
 use crate::cli::{Budget, Settings, Step};
-use crate::{embedded, progress};
+use crate::{deployment, progress};
 
 pub(crate) async fn run(settings: &Settings, options: &Budget) -> Result<()> {
-    let store = embedded::store(settings)?;
-    embedded::manifest(&store, &options.product, &settings.data).await?;
+    let store = deployment::store(settings)?;
+    deployment::manifest(&store, &options.product, &settings.data).await?;
     let query = BudgetQuery {
         product: options.product.clone(),
         region: region(&options.region)?,
@@ -28,7 +28,7 @@ pub(crate) async fn run(settings: &Settings, options: &Budget) -> Result<()> {
         earth: options.earth,
     };
     let bar = progress::bar("budget on Ballista", 1);
-    let answer = compute::budget::budget(&embedded::cluster(settings, store), &query).await?;
+    let answer = compute::budget::budget(&deployment::cluster(settings, store), &query).await?;
     bar.finish_and_clear();
     if options.json {
         return progress::result(&serde_json::to_string_pretty(&answer)?);

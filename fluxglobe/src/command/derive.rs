@@ -9,13 +9,13 @@ use storage::Store;
 use storage::log::EventLog;
 
 use crate::cli::{Derive, Settings};
-use crate::{embedded, progress};
+use crate::{deployment, progress};
 
 pub(crate) async fn run(settings: &Settings, options: Derive) -> Result<()> {
     let Derive::Accumulated { product, start } = options;
-    let store = embedded::store(settings)?;
-    embedded::manifest(&store, &product, &settings.data).await?;
-    let log = embedded::log(settings)?;
+    let store = deployment::store(settings)?;
+    deployment::manifest(&store, &product, &settings.data).await?;
+    let log = deployment::log(settings)?;
     let manifest = accumulated(settings, store, &*log, &product, start).await?;
     progress::result(&manifest.id().to_string())
 }
@@ -29,7 +29,7 @@ pub(crate) async fn accumulated(
     start: Option<TimeMs>,
 ) -> Result<Manifest> {
     let bar = progress::bar("accumulate on Ballista", 0);
-    let engine = embedded::cluster(settings, store);
+    let engine = deployment::cluster(settings, store);
     let on_step = |progress: DeriveProgress| {
         bar.set_length(progress.all_steps as u64);
         bar.set_position(progress.done_steps as u64);

@@ -11,11 +11,11 @@ use storage::log::EventLog;
 
 use crate::cli::{Ingest, Settings};
 use crate::progress::LandingBar;
-use crate::{embedded, progress};
+use crate::{deployment, progress};
 
 pub(crate) async fn run(settings: &Settings, options: Ingest) -> Result<ExitCode> {
-    let store = embedded::store(settings)?;
-    let log: Arc<dyn EventLog> = embedded::log(settings)?;
+    let store = deployment::store(settings)?;
+    let log: Arc<dyn EventLog> = deployment::log(settings)?;
     let service = IngestService::new(store, log, ingest::Settings::with_current_program()?);
     let files: Vec<_> = options
         .files

@@ -6,7 +6,7 @@ use comfy_table::presets::NOTHING;
 use serde::Serialize;
 
 use crate::cli::{Products, Settings};
-use crate::{embedded, progress};
+use crate::{deployment, progress};
 
 #[derive(Serialize)]
 struct Row {
@@ -24,7 +24,7 @@ struct Row {
 }
 
 pub(crate) async fn run(settings: &Settings, options: &Products) -> Result<()> {
-    let store = embedded::store(settings)?;
+    let store = deployment::store(settings)?;
     let mut rows = vec![];
     for product in storage::manifests::products(&store).await? {
         let Some(manifest) = storage::manifests::latest(&store, &product).await? else {

@@ -8,10 +8,10 @@ use contract::tile::Tile;
 use storage::Store;
 
 use crate::cli::{Picture, Render, Settings};
-use crate::{embedded, progress};
+use crate::{deployment, progress};
 
 pub(crate) async fn run(settings: &Settings, options: Render) -> Result<()> {
-    let store = embedded::store(settings)?;
+    let store = deployment::store(settings)?;
     let (picture, view, surface) = match options {
         Render::Tile(tile) => {
             let address = Tile::new(tile.z, tile.x, tile.y)?;
@@ -39,7 +39,7 @@ pub(crate) async fn run(settings: &Settings, options: Render) -> Result<()> {
     job.style.globe_surface = surface;
     job.validate()?;
     let bar = progress::bar("draw", 1);
-    let png = embedded::renderer(settings, store)
+    let png = deployment::renderer(settings, store)
         .await?
         .draw(&job)
         .await?;
@@ -55,7 +55,7 @@ async fn job(
     picture: &Picture,
     view: View,
 ) -> Result<RenderJob> {
-    let manifest = embedded::manifest(store, &picture.layer, &settings.data).await?;
+    let manifest = deployment::manifest(store, &picture.layer, &settings.data).await?;
     let last = manifest.steps.last().context("the product has no step")?;
     let mut style = Style::with_transfer(TransferFunction::default_for(manifest.quantity));
     style.slices = picture.slices.unwrap_or(style.slices);

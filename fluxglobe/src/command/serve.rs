@@ -12,10 +12,10 @@ use tile_server::{AppState, Server};
 
 use crate::cli::Settings;
 use crate::ports::{Analyst, Drawer};
-use crate::{embedded, progress};
+use crate::{deployment, progress};
 
 pub(crate) async fn run(settings: &Settings, options: tile_server::config::Settings) -> Result<()> {
-    let store = embedded::store(settings)?;
+    let store = deployment::store(settings)?;
     let check = crate::demo::check::stored(&store).await?;
     let server = bind(settings, store, options, check).await?;
     announce(&server);
@@ -30,10 +30,10 @@ pub(crate) async fn bind(
     check: Option<Check>,
 ) -> Result<Server> {
     options.viewer = options.viewer.or_else(built_viewer);
-    let drawer = Drawer::new(embedded::renderer(settings, store.clone()).await?);
+    let drawer = Drawer::new(deployment::renderer(settings, store.clone()).await?);
     let analyst = Analyst {
         local: Engine::local(store.clone()),
-        cluster: embedded::cluster(settings, store.clone()),
+        cluster: deployment::cluster(settings, store.clone()),
         check,
     };
     let registry = Registry::new();

@@ -8,15 +8,15 @@ use compute::point::PointAnswer;
 use contract::grid::LonLatDeg;
 
 use crate::cli::{Settings, StatsPoint};
-use crate::{embedded, progress};
+use crate::{deployment, progress};
 
 /// Width of the longest bar, characters.
 const BAR_CHARS: f64 = 30.0;
 
 pub(crate) async fn point(settings: &Settings, options: &StatsPoint) -> Result<()> {
     let place = LonLatDeg::new(options.lon, options.lat)?;
-    let store = embedded::store(settings)?;
-    embedded::manifest(&store, &options.product, &settings.data).await?;
+    let store = deployment::store(settings)?;
+    deployment::manifest(&store, &options.product, &settings.data).await?;
     let answer =
         compute::point::point_series(&Engine::local(store), &options.product, place).await?;
     if options.json {

@@ -12,7 +12,7 @@ use tile_server::backend::Check;
 
 use crate::cli::Settings;
 use crate::demo::source::SETS;
-use crate::{embedded, progress};
+use crate::{deployment, progress};
 
 /// Raised when the comparison itself changes, so that a kept one is not taken for it.
 const COMPARISON_VERSION: u32 = 1;
@@ -57,7 +57,7 @@ pub(crate) async fn compare(
         return Ok(kept);
     }
     let bar = progress::bar("budgets on Ballista", 1);
-    let engine = embedded::cluster(settings, store.clone());
+    let engine = deployment::cluster(settings, store.clone());
     let rows = compute::compare(&engine, &flux.product).await?;
     progress::done(&bar, &format!("{} beside published ones", rows.len()));
     let comparison = Comparison {

@@ -16,7 +16,7 @@ use storage::Store;
 use crate::cli::{Demo, Settings};
 use crate::command::{derive, generate, serve};
 use crate::demo::source::{FILES_PER_SET, SETS, Set};
-use crate::{embedded, progress};
+use crate::{deployment, progress};
 
 /// What to land where nothing can be fetched. A quarter of the full size along each side is made in seconds.
 const SYNTHETIC: Set = Set {
@@ -39,14 +39,14 @@ pub(crate) async fn run(settings: &Settings, options: Demo) -> Result<ExitCode> 
         progress::result(&folder.display().to_string())?;
         return Ok(ExitCode::SUCCESS);
     }
-    let store = embedded::store(settings)?;
+    let store = deployment::store(settings)?;
     let inputs = inputs(&store, &cache, &options).await?;
     let check = compute(settings, &store, &inputs).await?;
-    let flux = embedded::manifest(&store, &inputs.flux, &settings.data).await?;
+    let flux = deployment::manifest(&store, &inputs.flux, &settings.data).await?;
     match &check {
         Some(check) => progress::result(&table::against_published(check))?,
         None => progress::result(
-            &table::synthetic(&embedded::cluster(settings, store.clone()), &flux).await?,
+            &table::synthetic(&deployment::cluster(settings, store.clone()), &flux).await?,
         )?,
     }
     let wire = check.as_ref().map(check::Comparison::to_wire);
@@ -133,13 +133,13 @@ async fn compute(
     };
     if !inputs.files.is_empty() || !is_derived {
         // The log is held no longer than it is written, so that `fluxglobe ingest` works beside a running demo.
-        let log = embedded::log(settings)?;
+        let log = deployment::log(settings)?;
         if !inputs.files.is_empty() {
             land::land(store, &log, &inputs.files).await?;
         }
         derive::accumulated(settings, store.clone(), &*log, &inputs.flux, None).await?;
     }
-    let flux = embedded::manifest(store, &inputs.flux, &settings.data).await?;
+    let flux = deployment::manifest(store, &inputs.flux, &settings.data).await?;
     if flux.product.as_str() != SETS[0].product {
         return Ok(None);
     }

@@ -12,7 +12,7 @@ use tile_server::Server;
 
 use crate::cli::Settings;
 use crate::demo::check::Comparison;
-use crate::{embedded, progress};
+use crate::{deployment, progress};
 
 /// Largest relative difference between the accumulated frames' sum and the printed budget.
 const MASS_TOLERANCE: f64 = 1e-6;
@@ -124,7 +124,7 @@ fn fetch(base: &str, path: &str) -> Result<()> {
 /// The accumulated frames must hold the mass that the budget says left the sea.
 async fn mass(settings: &Settings, store: &Store, flux: &Manifest) -> Result<Option<String>> {
     let accumulated =
-        embedded::manifest(store, &flux.product.accumulated()?, &settings.data).await?;
+        deployment::manifest(store, &flux.product.accumulated()?, &settings.data).await?;
     let last = accumulated
         .steps
         .last()
@@ -153,7 +153,7 @@ async fn mass(settings: &Settings, store: &Store, flux: &Manifest) -> Result<Opt
         earth: Earth::Wgs84,
     };
     let answer =
-        compute::budget::budget_of(&embedded::cluster(settings, store.clone()), &query, flux)
+        compute::budget::budget_of(&deployment::cluster(settings, store.clone()), &query, flux)
             .await?;
     let budget_tg: f64 = answer.rows.iter().map(|row| row.budget_tg).sum();
     let difference = (in_frames_tg / budget_tg - 1.0).abs();

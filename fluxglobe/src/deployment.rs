@@ -1,4 +1,4 @@
-//! Embedded mode: one process, a local folder as object store, an event log in it, Ballista in process.
+//! What commands and services work on: one process with a data folder, or the servers that settings name.
 
 use std::num::NonZeroUsize;
 use std::path::Path;
@@ -8,28 +8,46 @@ use anyhow::{Context as _, Result, bail};
 use compute::Engine;
 use contract::manifest::Manifest;
 use contract::product::ProductId;
+use kafka_log::KafkaLog;
 use render_worker::{Backend, RenderService};
 use storage::Store;
-use storage::log::EmbeddedLog;
+use storage::log::{EmbeddedLog, EventLog};
 
 use crate::cli::Settings;
 
-/// Opens the object store in the data folder.
+/// Opens the object store that settings name, else the one in the data folder.
 pub(crate) fn store(settings: &Settings) -> Result<Store> {
+    if let Some(url) = &settings.store {
+        return Ok(Store::open(url)?);
+    }
     let folder = settings.data.join("objects");
     let text = folder.to_str().context("--data is not UTF-8")?;
     Ok(Store::open(text)?)
 }
 
 /// Opens the event log in the data folder; one process at a time writes it.
-pub(crate) fn log(settings: &Settings) -> Result<Arc<EmbeddedLog>> {
-    Ok(Arc::new(EmbeddedLog::open(&settings.data.join("events"))?))
+pub(crate) fn embedded_log(settings: &Settings) -> Result<EmbeddedLog> {
+    Ok(EmbeddedLog::open(&settings.data.join("events"))?)
 }
 
-/// Ballista in this process; it starts with its first query.
-pub(crate) fn cluster(settings: &Settings, store: Store) -> Engine {
+/// Opens the event log that settings name, else the one in the data folder.
+pub(crate) async fn log(
+    settings: &Settings,
+    kafka: &kafka_log::Settings,
+) -> Result<Arc<dyn EventLog>> {
+    if kafka.is_set() {
+        return Ok(Arc::new(KafkaLog::connect(kafka).await?));
+    }
+    Ok(Arc::new(embedded_log(settings)?))
+}
+
+/// The Ballista cluster that settings name, else Ballista in this process; it starts with its first query.
+pub(crate) fn engine(settings: &Settings, store: Store) -> Result<Engine> {
     let partitions = NonZeroUsize::from(settings.partitions);
-    Engine::standalone(store, partitions)
+    Ok(match &settings.cluster {
+        Some(scheduler) => Engine::cluster(store, scheduler.clone(), partitions),
+        None => Engine::standalone(store, partitions),
+    })
 }
 
 /// The renderer on this machine's Vulkan device, or on its processor when asked to.

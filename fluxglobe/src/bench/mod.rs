@@ -1,0 +1,3 @@
+//! `fluxglobe bench`: figures measured, never asserted.
+
+pub(crate) mod stream;

@@ -1,0 +1,174 @@
+//! Words of the services: each is what its crate can be told, and what every service is told.
+
+use std::net::SocketAddr;
+use std::num::NonZeroU16;
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+use contract::digest::Digest;
+use contract::product::ProductId;
+use contract::topic::Origin;
+
+/// What every service is told besides its own settings.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct Common {
+    /// Print the settings it would run with, and where each comes from, and exit.
+    #[arg(long)]
+    pub(crate) print_settings: bool,
+}
+
+/// `fluxglobe ingestd`.
+#[derive(Debug, Args)]
+pub(crate) struct Ingestd {
+    #[command(flatten)]
+    pub(crate) common: Common,
+    /// Address of /healthz, /readyz and /metrics.
+    #[arg(long, env = "FLUXGLOBE_ADMIN", default_value = "127.0.0.1:9101")]
+    pub(crate) admin: SocketAddr,
+    #[command(flatten)]
+    pub(crate) kafka: kafka_log::Settings,
+    #[command(flatten)]
+    pub(crate) observations: observations::Settings,
+    #[command(flatten)]
+    pub(crate) ingest: ingest::ServiceSettings,
+}
+
+/// `fluxglobe scheduler`.
+#[derive(Debug, Args)]
+pub(crate) struct Scheduler {
+    #[command(flatten)]
+    pub(crate) common: Common,
+    /// Address of /healthz, /readyz and /metrics.
+    #[arg(long, env = "FLUXGLOBE_ADMIN", default_value = "127.0.0.1:9102")]
+    pub(crate) admin: SocketAddr,
+    #[command(flatten)]
+    pub(crate) kafka: kafka_log::Settings,
+    #[command(flatten)]
+    pub(crate) scheduler: compute::service::SchedulerSettings,
+}
+
+/// `fluxglobe executor`.
+#[derive(Debug, Args)]
+pub(crate) struct Executor {
+    #[command(flatten)]
+    pub(crate) common: Common,
+    /// Address of /healthz, /readyz and /metrics.
+    #[arg(long, env = "FLUXGLOBE_ADMIN", default_value = "127.0.0.1:9103")]
+    pub(crate) admin: SocketAddr,
+    #[command(flatten)]
+    pub(crate) executor: compute::service::ExecutorSettings,
+}
+
+/// `fluxglobe render-worker`.
+#[derive(Debug, Args)]
+pub(crate) struct RenderWorker {
+    #[command(flatten)]
+    pub(crate) common: Common,
+    /// Address of /healthz, /readyz and /metrics.
+    #[arg(long, env = "FLUXGLOBE_ADMIN", default_value = "127.0.0.1:9104")]
+    pub(crate) admin: SocketAddr,
+    #[command(flatten)]
+    pub(crate) kafka: kafka_log::Settings,
+    #[command(flatten)]
+    pub(crate) render: render_worker::server::Settings,
+}
+
+/// `fluxglobe tile-server`.
+#[derive(Debug, Args)]
+pub(crate) struct TileServer {
+    #[command(flatten)]
+    pub(crate) common: Common,
+    #[command(flatten)]
+    pub(crate) kafka: kafka_log::Settings,
+    #[command(flatten)]
+    pub(crate) observations: observations::Settings,
+    #[command(flatten)]
+    pub(crate) fleet: render_worker::fleet::Settings,
+    #[command(flatten)]
+    pub(crate) serve: tile_server::config::Settings,
+}
+
+/// `fluxglobe notice`.
+#[derive(Debug, Args)]
+pub(crate) struct Notice {
+    /// Files, or addresses that the ingest service may fetch from.
+    #[arg(required = true, value_name = "FILE|URL")]
+    pub(crate) files: Vec<String>,
+    /// Name of a shipped profile, if the file must be read with it.
+    #[arg(long)]
+    pub(crate) profile: Option<String>,
+    /// Product to land in, if not the profile's.
+    #[arg(long)]
+    pub(crate) product: Option<ProductId>,
+    /// SHA-256 that a fetched file must have; local files are digested here.
+    #[arg(long)]
+    pub(crate) sha256: Option<Digest>,
+    /// Print the notices, a line each, instead of sending them: for a Kafka client of your own.
+    #[arg(long)]
+    pub(crate) print: bool,
+    #[command(flatten)]
+    pub(crate) kafka: kafka_log::Settings,
+}
+
+/// `fluxglobe topics`.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Topics {
+    /// Make the topics that are missing; those that are there are left as they are.
+    Create {
+        /// Partitions of each topic: how many readers of a group can work at once.
+        #[arg(long, default_value = "4")]
+        partitions: NonZeroU16,
+        /// Copies of each partition, no more than there are brokers.
+        #[arg(long, default_value = "1")]
+        replication: NonZeroU16,
+        #[command(flatten)]
+        kafka: kafka_log::Settings,
+    },
+}
+
+/// `fluxglobe rejected`.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Rejected {
+    /// List refused files and messages: reason, origin, attempt and what to do.
+    List {
+        /// JSON instead of a table.
+        #[arg(long)]
+        json: bool,
+        #[command(flatten)]
+        kafka: kafka_log::Settings,
+    },
+    /// Send refused messages again, with the next attempt's number.
+    Replay {
+        /// Origins as `list` shows them, TOPIC/PARTITION/OFFSET; all of them if none is given.
+        #[arg(value_name = "ORIGIN")]
+        origins: Vec<Origin>,
+        #[command(flatten)]
+        kafka: kafka_log::Settings,
+    },
+}
+
+/// `fluxglobe bench`.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Bench {
+    /// How fresh a running cluster is: from a notice to a volume tile, and the share of each stage.
+    Stream(BenchStream),
+}
+
+/// `fluxglobe bench stream`.
+#[derive(Debug, Args)]
+pub(crate) struct BenchStream {
+    /// Notices to measure; one more goes before them to warm up.
+    #[arg(long, default_value = "20")]
+    pub(crate) notices: NonZeroU16,
+    /// Folder to write the granules in, one that the ingest service may read.
+    #[arg(long, value_name = "FOLDER")]
+    pub(crate) inbox: PathBuf,
+    /// Address of the tile server.
+    #[arg(long, default_value = "http://127.0.0.1:8080")]
+    pub(crate) tiles: String,
+    /// JSON instead of a table.
+    #[arg(long)]
+    pub(crate) json: bool,
+    #[command(flatten)]
+    pub(crate) kafka: kafka_log::Settings,
+}
