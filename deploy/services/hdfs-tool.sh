@@ -5,13 +5,18 @@
 #   deploy/services/hdfs-tool.sh -ls -R /
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+# shellcheck source=java.sh
+source "$here/java.sh"
 
 jars=${FLUXGLOBE_SERVICES:-$HOME/.cache/fluxglobe/services}/hdfs/lib
 [ -d "$jars" ] || {
     echo 'hdfs-tool: not installed; run: deploy/services/services.sh install hdfs' >&2
     exit 1
 }
-java=${JAVA_HOME:+$JAVA_HOME/bin/}java
+java=$(find_java) || {
+    echo 'no Java 17' >&2
+    exit 1
+}
 exec "$java" -Xmx256m -XX:+UseSerialGC -XX:TieredStopAtLevel=1 -Dfluxglobe.log=WARN \
     "-Dlog4j.configuration=file:$here/hdfs/log4j.properties" \
     "-Dfluxglobe.hdfs=${FLUXGLOBE_HDFS:-hdfs://127.0.0.1:${FLUXGLOBE_HDFS_PORT:-18020}}" \

@@ -5,6 +5,8 @@
 #   deploy/services/kafka-tool.sh console-consumer --topic granule.landed --from-beginning
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+# shellcheck source=java.sh
+source "$here/java.sh"
 
 tool=${1:-}
 case $tool in
@@ -36,6 +38,9 @@ server=(--bootstrap-server "${FLUXGLOBE_KAFKA:-127.0.0.1:${FLUXGLOBE_KAFKA_PORT:
 for argument in "$@"; do
     if [ "$argument" = --bootstrap-server ]; then server=(); fi
 done
-java=${JAVA_HOME:+$JAVA_HOME/bin/}java
+java=$(find_java) || {
+    echo 'no Java 17' >&2
+    exit 1
+}
 exec "$java" -Xmx256m -XX:+UseSerialGC -XX:TieredStopAtLevel=1 -Dfluxglobe.log=WARN \
     "-Dlog4j2.configurationFile=$here/kafka/log4j2.xml" -cp "$jars/*" "$class" "${server[@]}" "$@"

@@ -2,6 +2,8 @@
 # One Apache Kafka broker in KRaft mode on 127.0.0.1, its jars from Maven Central.
 #   deploy/services/kafka.sh install | start | stop | status | env
 # FLUXGLOBE_KAFKA_PORT (19092): clients; FLUXGLOBE_KAFKA_CONTROLLER_PORT (the next one): the broker's own use.
+# FLUXGLOBE_KAFKA_SASL_PORT (none): clients that show a user and a password over TLS. Certificate and password are made at the
+# first start with it and lie in the files `certificate.pem` and `password` of the run folder; the user is fluxglobe.
 # shellcheck source=process.sh
 source "$(dirname "${BASH_SOURCE[0]}")/process.sh"
 # shellcheck source=java.sh
@@ -11,9 +13,12 @@ port=${FLUXGLOBE_KAFKA_PORT:-19092}
 check_port FLUXGLOBE_KAFKA_PORT "$port"
 controller_port=${FLUXGLOBE_KAFKA_CONTROLLER_PORT:-$((port + 1))}
 check_port FLUXGLOBE_KAFKA_CONTROLLER_PORT "$controller_port"
+sasl_port=${FLUXGLOBE_KAFKA_SASL_PORT:-}
+if [ -n "$sasl_port" ]; then check_port FLUXGLOBE_KAFKA_SASL_PORT "$sasl_port"; fi
 heap=${FLUXGLOBE_KAFKA_HEAP:-320m}
 
 install_service() {
+    need_package openssl /usr/bin/openssl
     fetch_jars "$here/kafka/pom.xml"
     say "installed in $service"
 }
@@ -26,15 +31,50 @@ java_run() {
         -Dfluxglobe.log=INFO "-Dlog4j2.configurationFile=$here/kafka/log4j2.xml" -cp "$service/lib/*" "${java_arguments[@]}"
 }
 
+# A certificate that is its own authority and a password, each made once.
+make_secrets() {
+    if ! [ -s "$run/password" ]; then
+        (umask 077 && head -c 24 /dev/urandom | base64 | tr '+/' '-_' >"$run/password")
+    fi
+    if ! [ -s "$run/certificate.pem" ]; then
+        (
+            umask 077
+            openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:P-256 -nodes -days 3650 -subj /CN=localhost \
+                -addext subjectAltName=DNS:localhost,IP:127.0.0.1 -keyout "$run/key.pem" -out "$run/certificate.new" 2>>"$log"
+            cat "$run/key.pem" "$run/certificate.new" >"$run/keystore.pem"
+            chmod 644 "$run/certificate.new"
+            mv "$run/certificate.new" "$run/certificate.pem"
+            rm "$run/key.pem"
+        ) || fail "could not make its certificate; its log: $log"
+    fi
+}
+
+secure_settings() {
+    cat <<END
+ssl.keystore.type=PEM
+ssl.keystore.location=$run/keystore.pem
+sasl.enabled.mechanisms=PLAIN,SCRAM-SHA-512
+listener.name.sasl_ssl.plain.sasl.jaas.config=org.apache.kafka.common.security.plain.PlainLoginModule required user_fluxglobe="$(cat "$run/password")";
+listener.name.sasl_ssl.scram-sha-512.sasl.jaas.config=org.apache.kafka.common.security.scram.ScramLoginModule required;
+END
+}
+
 # One broker: every internal topic has one copy and few partitions, a new group starts without waiting for more members.
 write_settings() {
-    cat >"$run/server.properties" <<END
+    local secure_listener=''
+    rm -f "$run/server.properties"
+    if [ -n "$sasl_port" ]; then
+        make_secrets
+        secure_listener=,SASL_SSL://127.0.0.1:$sasl_port
+        (umask 077 && secure_settings >"$run/server.properties")
+    fi
+    cat >>"$run/server.properties" <<END
 process.roles=broker,controller
 node.id=1
 controller.quorum.voters=1@127.0.0.1:$controller_port
 controller.listener.names=CONTROLLER
-listeners=PLAINTEXT://127.0.0.1:$port,CONTROLLER://127.0.0.1:$controller_port
-advertised.listeners=PLAINTEXT://127.0.0.1:$port
+listeners=PLAINTEXT://127.0.0.1:$port,CONTROLLER://127.0.0.1:$controller_port$secure_listener
+advertised.listeners=PLAINTEXT://127.0.0.1:$port$secure_listener
 log.dirs=$run/data
 auto.create.topics.enable=false
 num.partitions=4
@@ -82,9 +122,29 @@ broker_answers() {
     [ "${answer:8}" = 0000000100000001 ]
 }
 
-start_service() { start_once launch_broker broker_answers "$port" "$controller_port"; }
+# The user of the SCRAM mechanism is kept by the broker itself; Kafka's own tool adds it, out of a file, since a command line
+# is there for everybody to read.
+add_scram_user() {
+    (umask 077 && printf 'SCRAM-SHA-512=[password=%s]\n' "$(cat "$run/password")" >"$run/user.properties")
+    FLUXGLOBE_KAFKA=127.0.0.1:$port "$here/kafka-tool.sh" configs --alter --entity-type users --entity-name fluxglobe \
+        --add-config-file "$run/user.properties" >>"$log" 2>&1 || fail "could not add its user; its log: $log"
+    mv "$run/user.properties" "$run/scram_user"
+}
+
+start_service() {
+    # shellcheck disable=SC2086 # the last one may be absent
+    start_once launch_broker broker_answers "$port" "$controller_port" $sasl_port
+    if [ -n "$sasl_port" ] && ! [ -e "$run/scram_user" ]; then add_scram_user; fi
+}
 stop_service() { stop_with TERM; }
 status_service() { status_line "127.0.0.1:$port"; }
-env_service() { printf 'export FLUXGLOBE_KAFKA=127.0.0.1:%s\n' "$port"; }
+env_service() {
+    printf 'export FLUXGLOBE_KAFKA=127.0.0.1:%s\n' "$port"
+    if [ -n "$sasl_port" ]; then
+        printf 'export FLUXGLOBE_KAFKA_SASL=127.0.0.1:%s\n' "$sasl_port"
+        printf 'export FLUXGLOBE_KAFKA_SASL_PASSWORD_FILE=%q\n' "$run/password"
+        printf 'export FLUXGLOBE_KAFKA_SASL_CERTIFICATE=%q\n' "$run/certificate.pem"
+    fi
+}
 
 main "$@"

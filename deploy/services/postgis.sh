@@ -66,9 +66,22 @@ make_cluster() {
     : >"$run/made"
 }
 
+# After kill -9 the lock file names a process that may linger as a zombie, for which the server would wait for ever. It is
+# stale once no process works in the data folder any more: then, and only then, it goes.
+clear_stale_lock() {
+    local until=$((SECONDS + stop_limit_s)) folder
+    folder=$(readlink -f "$run/data")
+    while [ -n "$(find /proc -maxdepth 2 -path '/proc/[0-9]*/cwd' -lname "$folder" -print -quit 2>/dev/null)" ]; do
+        ((SECONDS < until)) || fail "processes of a killed server still work in $folder"
+        sleep 0.1
+    done
+    rm -f "$run/data/postmaster.pid"
+}
+
 # Loopback only, no Unix socket; small buffers, since several servers share one machine.
 launch_server() {
     if ! [ -e "$run/made" ]; then make_cluster; fi
+    clear_stale_lock
     as_owner launch env -u PGDATA LC_ALL=C.UTF-8 "$programs/postgres" -D "$data" -p "$port" -c listen_addresses=127.0.0.1 \
         -c unix_socket_directories= -c shared_buffers=64MB -c max_connections=100 -c password_encryption=scram-sha-256 \
         -c jit=off -c log_line_prefix='%m [%p] '

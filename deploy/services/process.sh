@@ -73,37 +73,47 @@ launch() {
     )
 }
 
-# wait_until_ready CHECK...: returns when the check succeeds; ends with the tail of the log when the server died or is late.
-wait_until_ready() {
+# answers_in_time CHECK...: 0 when the check succeeds, 1 when the server ended meanwhile, 2 when it took too long.
+answers_in_time() {
     local since=$EPOCHREALTIME until=$((SECONDS + start_limit_s))
     until "$@" >/dev/null 2>&1; do
-        if ! running_pid >/dev/null; then
-            tail -n 30 "$log" >&2
-            fail "ended while starting; its log: $log"
-        fi
-        if ((SECONDS >= until)); then
-            tail -n 30 "$log" >&2
-            fail "does not answer after $start_limit_s s; its log: $log"
-        fi
+        running_pid >/dev/null || return 1
+        ((SECONDS < until)) || return 2
         sleep 0.2
     done
     say "ready after $(awk -v a="$since" -v b="$EPOCHREALTIME" 'BEGIN { printf "%.1f", b - a }') s"
 }
 
-# start_once PREPARE_AND_LAUNCH CHECK PORT...: nothing to do when it runs, otherwise start it on free ports.
+# wait_until_ready CHECK...: ends with the tail of the log when the server died or is late.
+wait_until_ready() {
+    local outcome=0
+    answers_in_time "$@" || outcome=$?
+    if [ $outcome = 0 ]; then return; fi
+    tail -n 30 "$log" >&2
+    if [ $outcome = 1 ]; then fail "ended while starting; its log: $log"; fi
+    fail "does not answer after $start_limit_s s; its log: $log"
+}
+
+# A killed server may need a moment to let go of its port.
+need_free_port() {
+    local until=$((SECONDS + 5))
+    while answers_tcp "$1"; do
+        ((SECONDS < until)) || fail "port $1 is taken by another program; choose another one (see README.md)"
+        sleep 0.2
+    done
+}
+
+# start_once LAUNCHER CHECK PORT...: nothing to do when it runs and answers, otherwise starts it on free ports.
 start_once() {
     local launcher=$1 check=$2 wanted_port
     shift 2
     need_installed
     mkdir -p "$run/data"
-    if running_pid >/dev/null; then
-        wait_until_ready "$check"
-        return
-    fi
+    # One that was just killed may still look alive, hence the second look after waiting for its answer.
+    if running_pid >/dev/null && answers_in_time "$check"; then return; fi
+    if running_pid >/dev/null; then fail "runs, but does not answer within $start_limit_s s; its log: $log"; fi
     rm -f "$pid_file"
-    for wanted_port in "$@"; do
-        ! answers_tcp "$wanted_port" || fail "port $wanted_port is taken by another program; choose another one (see README.md)"
-    done
+    for wanted_port in "$@"; do need_free_port "$wanted_port"; done
     "$launcher"
     wait_until_ready "$check"
 }
