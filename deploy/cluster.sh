@@ -33,7 +33,7 @@ say() { printf 'cluster: %s\n' "$*" >&2; }
 settings() {
     deploy/services/services.sh env "${servers[@]}"
     echo "export FLUXGLOBE_CLUSTER=http://127.0.0.1:18150"
-    echo "export FLUXGLOBE_RENDER_WORKERS=http://127.0.0.1:18161,http://127.0.0.1:18162"
+    echo "export FLUXGLOBE_RENDER_WORKERS=127.0.0.1:18161,127.0.0.1:18162"
     echo "export FLUXGLOBE_ALLOW_FOLDER=$(samples_folder)"
     echo "export FLUXGLOBE_SPOOL=$runs/cluster/spool"
 }

@@ -130,6 +130,21 @@ pub(crate) enum Command {
     },
 }
 
+impl Command {
+    /// Is a service asked for its settings instead of its work?
+    pub(crate) fn prints_settings(&self) -> bool {
+        let common = match self {
+            Self::Ingestd(options) => &options.common,
+            Self::Scheduler(options) => &options.common,
+            Self::Executor(options) => &options.common,
+            Self::RenderWorker(options) => &options.common,
+            Self::TileServer(options) => &options.common,
+            _ => return false,
+        };
+        common.print_settings
+    }
+}
+
 /// `fluxglobe demo`.
 #[derive(Debug, Args)]
 pub(crate) struct Demo {
@@ -250,6 +265,8 @@ pub(crate) enum Derive {
         /// Where accumulation starts; the product's first instant if absent.
         #[arg(long)]
         start: Option<TimeMs>,
+        #[command(flatten)]
+        kafka: kafka_log::KafkaSettings,
     },
 }
 

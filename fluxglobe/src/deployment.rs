@@ -8,7 +8,7 @@ use anyhow::{Context as _, Result, bail};
 use compute::Engine;
 use contract::manifest::Manifest;
 use contract::product::ProductId;
-use kafka_log::KafkaLog;
+use kafka_log::{KafkaLog, KafkaSettings};
 use render_worker::{Backend, RenderService};
 use storage::Store;
 use storage::log::{EmbeddedLog, EventLog};
@@ -30,15 +30,27 @@ pub(crate) fn embedded_log(settings: &Settings) -> Result<EmbeddedLog> {
     Ok(EmbeddedLog::open(&settings.data.join("events"))?)
 }
 
-/// Opens the event log that settings name, else the one in the data folder.
+/// Opens the event log that settings name, else the one in the data folder; none over a shared store without Kafka,
+/// whose readers would look for events elsewhere.
 pub(crate) async fn log(
     settings: &Settings,
-    kafka: &kafka_log::Settings,
+    kafka: &KafkaSettings,
+) -> Result<Option<Arc<dyn EventLog>>> {
+    Ok(match (&kafka.kafka, &settings.store) {
+        (Some(_), _) => Some(Arc::new(KafkaLog::connect(kafka).await?)),
+        (None, Some(_)) => None,
+        (None, None) => Some(Arc::new(embedded_log(settings)?)),
+    })
+}
+
+/// The same for commands that are of no use without it.
+pub(crate) async fn needed_log(
+    settings: &Settings,
+    kafka: &KafkaSettings,
 ) -> Result<Arc<dyn EventLog>> {
-    if kafka.is_set() {
-        return Ok(Arc::new(KafkaLog::connect(kafka).await?));
-    }
-    Ok(Arc::new(embedded_log(settings)?))
+    log(settings, kafka)
+        .await?
+        .context("give Kafka's brokers: --kafka or FLUXGLOBE_KAFKA, HOST:PORT[,HOST:PORT...]")
 }
 
 /// The Ballista cluster that settings name, else Ballista in this process; it starts with its first query.

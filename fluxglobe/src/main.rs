@@ -1,47 +1,49 @@
 //! `fluxglobe`: the one program; reads the command line, runs the command, says what failed.
 
+mod bench;
 mod cli;
 mod command;
 mod demo;
-mod embedded;
+mod deployment;
 mod ports;
 mod progress;
+mod protocol;
+mod services;
+mod viewer;
 
 use std::process::ExitCode;
 
-use clap::Parser as _;
-use tracing_subscriber::EnvFilter;
+use clap::{CommandFactory as _, FromArgMatches as _};
 
-use crate::cli::{Cli, Command};
+use crate::cli::{Cli, Command, Settings};
 
 fn main() -> ExitCode {
-    let Cli { settings, command } = Cli::parse();
+    let mut program = Cli::command();
+    let matches = program.clone().get_matches();
+    let cli = match Cli::from_arg_matches(&matches) {
+        Ok(cli) => cli,
+        Err(error) => error.exit(),
+    };
+    let Cli { settings, command } = cli;
     // The decoder of hostile files runs before anything else is started: no threads, no log, no open files.
     if let Command::DecodeFile { args } = &command {
         return ingest::decoder::run_child(args.clone());
     }
-    let filter = match EnvFilter::try_new(&settings.log) {
-        Ok(filter) => filter,
-        Err(error) => return failed(&anyhow::anyhow!("--log {:?}: {error}", settings.log)),
-    };
-    tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_writer(std::io::stderr)
-        .init();
-    let runtime = match tokio::runtime::Builder::new_multi_thread()
-        .enable_all()
-        .build()
-    {
-        Ok(runtime) => runtime,
-        Err(error) => return failed(&anyhow::anyhow!("cannot start threads: {error}")),
-    };
-    let outcome = runtime.block_on(command::run(&settings, command));
+    if command.prints_settings() {
+        program.build();
+        let shown = progress::result(&cli::shown_settings(&program, &matches));
+        return shown.map_or_else(|error| failed(&error), |()| ExitCode::SUCCESS);
+    }
+    run(&settings, command).unwrap_or_else(|error| failed(&error))
+}
+
+fn run(settings: &Settings, command: Command) -> anyhow::Result<ExitCode> {
+    service::start_logging(&settings.log, settings.log_format)?;
+    let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build()?;
+    let outcome = runtime.block_on(command::run(settings, command));
     // Ballista's executor keeps threads of its own; nobody waits for them.
     runtime.shutdown_background();
-    match outcome {
-        Ok(code) => code,
-        Err(error) => failed(&error),
-    }
+    outcome
 }
 
 #[expect(clippy::print_stderr, reason = "the last word of a failed command")]

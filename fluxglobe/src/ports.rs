@@ -1,5 +1,7 @@
 //! The tile server's two ports, filled with the renderer and the engines of this process.
 
+mod observer;
+
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use async_trait::async_trait;
@@ -10,11 +12,14 @@ use compute::{ComputeError, ErrorClass};
 use contract::job::RenderJob;
 use contract::manifest::Manifest;
 use contract::time::Period;
+use render_worker::fleet::{Fleet, FleetError};
 use render_worker::{RenderError, RenderService};
 use tile_server::backend::{
     Analyse, BackendError, BudgetRequest, BudgetRow, BudgetStep as WantedStep, Check, Class, Draw,
     RowCol,
 };
+
+pub(crate) use observer::Observer;
 
 /// Pictures from the renderer in this process.
 pub(crate) struct Drawer {
@@ -105,6 +110,41 @@ impl Analyse for Analyst {
 
     async fn check(&self) -> Result<Option<Check>, BackendError> {
         Ok(self.check.clone())
+    }
+}
+
+/// Pictures from render workers elsewhere.
+pub(crate) struct FleetDrawer(pub(crate) Fleet);
+
+#[async_trait]
+impl Draw for FleetDrawer {
+    async fn draw(&self, job: &RenderJob) -> Result<Bytes, BackendError> {
+        let trace = job.digest().short();
+        let picture = self.0.draw(job, &trace).await;
+        picture.map(|picture| picture.png).map_err(fleet_failed)
+    }
+
+    async fn ready(&self) -> Result<(), BackendError> {
+        self.0
+            .ready()
+            .await
+            .map(|_workers| ())
+            .map_err(fleet_failed)
+    }
+}
+
+fn fleet_failed(error: FleetError) -> BackendError {
+    let class = match &error {
+        FleetError::BadRequest(_) => Class::BadRequest,
+        FleetError::NotFound(_) => Class::NotFound,
+        FleetError::Busy { .. } => Class::Busy,
+        FleetError::Unavailable(_) | FleetError::Late { .. } => Class::Unavailable,
+        FleetError::Setup(_) | FleetError::Failed(_) => Class::Internal,
+    };
+    let failed = BackendError::new(class, error.to_string());
+    match error.retry_after() {
+        Some(pause) => failed.after(pause),
+        None => failed,
     }
 }
 

@@ -3,6 +3,7 @@
 //! Left out on purpose: what a service does. Nothing here knows of grids, pictures or topics.
 
 pub mod admin;
+mod board;
 mod error;
 mod logging;
 mod patience;
@@ -10,6 +11,7 @@ mod readiness;
 mod red;
 mod stop;
 
+pub use board::Board;
 pub use error::ServiceError;
 pub use logging::{LogFormat, start_logging};
 pub use patience::{pauses, until_there};

@@ -210,7 +210,7 @@ fn plan(shape: Shape) -> (Vec<Planned>, String, Vec<String>) {
             &["render-worker", "--render-listen", &listen],
             true,
         );
-        renderers.push(format!("http://{listen}"));
+        renderers.push(listen);
     }
     for i in 1..=shape.ingestds {
         add(format!("ingestd-{i}"), &["ingestd"], true);

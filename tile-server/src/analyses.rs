@@ -91,7 +91,7 @@ impl Analyses {
     }
 
     /// Our budgets beside published ones.
-    pub async fn check(&self) -> Result<Check, ServerError> {
-        self.analyst.check().await?.ok_or(ServerError::NoCheck)
+    pub async fn check(&self) -> Result<Option<Check>, ServerError> {
+        Ok(self.analyst.check().await?)
     }
 }

@@ -4,14 +4,17 @@
 //! and of this file only, so that the same server runs over a renderer in its process or one behind a network.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use async_trait::async_trait;
 use bytes::Bytes;
 use contract::earth::Earth;
 use contract::job::RenderJob;
 use contract::manifest::Manifest;
+use contract::observation::{Observation, PlatformKind, Quality};
+use contract::product::ProductId;
 use contract::region::Region;
-use contract::time::Period;
+use contract::time::{Period, TimeMs};
 use serde::{Deserialize, Serialize};
 
 /// Draws pictures.
@@ -39,6 +42,108 @@ pub trait Analyse: Send + Sync + 'static {
 
     /// Our budgets beside published ones; none where this deployment has nothing to compare with.
     async fn check(&self) -> Result<Option<Check>, BackendError>;
+}
+
+/// Finds observations of buoys, ships, stations and profiles.
+#[async_trait]
+pub trait Observe: Send + Sync + 'static {
+    /// Platforms with observations that a question is about, by dataset and name.
+    async fn platforms(&self, question: &ObservationQuestion) -> Result<Vec<Platform>, BackendError>;
+
+    /// Where a platform was, in the order of time.
+    async fn track(&self, question: &TrackQuestion) -> Result<Vec<TrackPoint>, BackendError>;
+
+    /// Observations in the order of time, and where to go on if there are more.
+    async fn observations(
+        &self,
+        question: &ObservationQuestion,
+    ) -> Result<ObservationPage, BackendError>;
+
+    /// Can they be found now?
+    async fn ready(&self) -> Result<(), BackendError>;
+}
+
+/// Which observations are asked for; an empty list does not restrict.
+#[derive(Debug, Clone)]
+pub struct ObservationQuestion {
+    /// Where.
+    pub region: Region,
+    /// First instant.
+    pub from: Option<TimeMs>,
+    /// First instant after them.
+    pub to: Option<TimeMs>,
+    /// Data sets.
+    pub datasets: Vec<ProductId>,
+    /// Names of platforms.
+    pub platforms: Vec<String>,
+    /// Kinds of platforms.
+    pub kinds: Vec<PlatformKind>,
+    /// What was measured.
+    pub properties: Vec<String>,
+    /// The least trusted ones that are still wanted.
+    pub worst: Quality,
+    /// Most observations of one answer.
+    pub limit: u32,
+    /// Where the answer before ended.
+    pub after: Option<String>,
+}
+
+/// Whose track is asked for.
+#[derive(Debug, Clone)]
+pub struct TrackQuestion {
+    /// Data set.
+    pub dataset: ProductId,
+    /// Name of the platform.
+    pub platform: String,
+    /// First instant.
+    pub from: Option<TimeMs>,
+    /// First instant after it.
+    pub to: Option<TimeMs>,
+    /// Most places of the answer.
+    pub limit: u32,
+}
+
+/// A platform and what there is of it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Platform {
+    /// Data set.
+    pub dataset: ProductId,
+    /// Name in it.
+    pub name: String,
+    /// What it is.
+    pub kind: PlatformKind,
+    /// First observation.
+    pub first: TimeMs,
+    /// Last observation.
+    pub last: TimeMs,
+    /// Last longitude, degrees east.
+    pub lon_deg: f64,
+    /// Last latitude, degrees north.
+    pub lat_deg: f64,
+    /// What was measured.
+    pub properties: Vec<String>,
+    /// Observations.
+    pub count: u64,
+}
+
+/// A place on a track.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct TrackPoint {
+    /// When.
+    pub time: TimeMs,
+    /// Longitude, degrees east.
+    pub lon_deg: f64,
+    /// Latitude, degrees north.
+    pub lat_deg: f64,
+}
+
+/// Some observations.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ObservationPage {
+    /// In the order of time.
+    pub observations: Vec<Observation>,
+    /// What to ask with for those after them.
+    pub next: Option<String>,
 }
 
 /// A cell of a manifest's grid, inside it.
@@ -158,6 +263,8 @@ pub struct BackendError {
     pub text: String,
     /// What it came from.
     pub source: Option<Arc<dyn std::error::Error + Send + Sync>>,
+    /// When the same call may succeed, if that is known.
+    pub retry_after: Option<Duration>,
 }
 
 impl BackendError {
@@ -167,6 +274,16 @@ impl BackendError {
             class,
             text: text.into(),
             source: None,
+            retry_after: None,
+        }
+    }
+
+    /// The same with the time after which to ask again.
+    #[must_use]
+    pub fn after(self, pause: Duration) -> Self {
+        Self {
+            retry_after: Some(pause),
+            ..self
         }
     }
 

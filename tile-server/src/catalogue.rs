@@ -122,6 +122,17 @@ impl Catalogue {
         })
     }
 
+    /// What is known may have changed: the next question reads the store.
+    pub(crate) fn outdated(&self) {
+        let mut snapshot = self.snapshot.write().unwrap_or_else(PoisonError::into_inner);
+        let known = Snapshot {
+            read_at: None,
+            known: snapshot.known.clone(),
+            layers: snapshot.layers.clone(),
+        };
+        *snapshot = Arc::new(known);
+    }
+
     fn current(&self) -> Arc<Snapshot> {
         Arc::clone(&self.snapshot.read().unwrap_or_else(PoisonError::into_inner))
     }
@@ -157,7 +168,7 @@ impl Catalogue {
             }
             Err(error) => {
                 self.metrics.store_failures.inc();
-                if before.read_at.is_none() {
+                if before.read_at.is_none() && before.known.is_empty() {
                     return Err(error.into());
                 }
                 tracing::warn!(%error, "the list of products cannot be read; the one before is used");

@@ -65,9 +65,12 @@ pub enum ServerError {
     /// Nothing at the address.
     #[error("there is nothing at this address")]
     UnknownAddress,
-    /// There is nothing published to compare with.
-    #[error("there is no comparison with published values here")]
-    NoCheck,
+    /// This server has no observations.
+    #[error("there are no observations here")]
+    NoObservations,
+    /// More viewers wait for news than are served.
+    #[error("too many viewers wait for news; please try again later")]
+    TooManyListeners,
     /// Only reading is possible.
     #[error("this address can be read only: use GET or HEAD")]
     ReadOnly,
@@ -116,10 +119,10 @@ impl ServerError {
             | Self::EmptyProduct { .. }
             | Self::UnknownMode { .. }
             | Self::UnknownAddress
-            | Self::NoCheck => StatusCode::NOT_FOUND,
+            | Self::NoObservations => StatusCode::NOT_FOUND,
             Self::ReadOnly => StatusCode::METHOD_NOT_ALLOWED,
             Self::BodyTooLarge { .. } => StatusCode::PAYLOAD_TOO_LARGE,
-            Self::Busy => StatusCode::SERVICE_UNAVAILABLE,
+            Self::Busy | Self::TooManyListeners => StatusCode::SERVICE_UNAVAILABLE,
             Self::TimedOut { .. } => StatusCode::GATEWAY_TIMEOUT,
             Self::Storage(error) if error.is_retryable() => StatusCode::SERVICE_UNAVAILABLE,
             Self::Storage(_) | Self::Defect { .. } => StatusCode::INTERNAL_SERVER_ERROR,
@@ -140,6 +143,10 @@ impl ServerError {
     fn retry_after_s(&self) -> Option<u16> {
         match self {
             Self::Busy => Some(RETRY_BUSY_S),
+            Self::Backend(BackendError {
+                retry_after: Some(pause),
+                ..
+            }) => Some(pause.as_secs_f64().ceil().clamp(1.0, 3600.0) as u16),
             Self::Backend(error) if error.class == Class::Busy => Some(RETRY_BUSY_S),
             Self::TimedOut { .. } => Some(RETRY_UNAVAILABLE_S),
             _ if self.status() == StatusCode::SERVICE_UNAVAILABLE => Some(RETRY_UNAVAILABLE_S),

@@ -9,7 +9,10 @@
 //! | `/api/products/{product}/point?lon=&lat=` | series of the cell at a place |
 //! | `/api/products/{product}/budget?region=&from=&to=&step=&earth=` | carbon budget |
 //! | `/api/regions` | regions with a name |
-//! | `/api/check` | our budgets beside published ones |
+//! | `/api/check` | our budgets beside published ones, `null` where there is nothing to compare with |
+//! | `/api/events` | news of new versions as server-sent events |
+//! | `/api/observations/platforms?bbox=&from=&to=&property=&kind=` | buoys, ships, stations and profiles as GeoJSON |
+//! | `/api/observations/{dataset}/{platform}?property=&from=&to=&after=` | what one of them measured |
 //! | `/healthz`, `/readyz`, `/metrics` | the process lives; it can serve; Prometheus text |
 //! | `/` and below | the viewer's files |
 //!
@@ -26,6 +29,7 @@ pub mod error;
 mod extract;
 mod flights;
 mod gate;
+pub mod live;
 pub mod metrics;
 mod middleware;
 mod pictures;

@@ -77,7 +77,7 @@ pub struct Metrics {
 impl Metrics {
     /// Makes the metrics and registers them.
     pub fn register(registry: &Registry) -> Result<Self, prometheus::Error> {
-        let name = |what: &str| format!("fluxglobe_tiles_{what}");
+        let name = |what: &str| format!("fluxglobe_tile_server_{what}");
         let counter =
             |what: &str, help: &str| registered(registry, IntCounter::new(name(what), help)?);
         let gauge = |what: &str, help: &str| registered(registry, IntGauge::new(name(what), help)?);
@@ -91,12 +91,12 @@ impl Metrics {
             HistogramOpts::new(name(what), help).buckets(bounds.to_vec())
         };
         let requests_s = timed(
-            "request_duration_seconds",
+            "request_seconds",
             "Time until an answer begins.",
             &REQUEST_BOUNDS_S,
         );
         let draws_s = timed(
-            "draw_duration_seconds",
+            "draw_seconds",
             "Time to draw a picture.",
             &DRAW_BOUNDS_S,
         );
@@ -109,10 +109,10 @@ impl Metrics {
             requests: counters(
                 "requests_total",
                 "Answers by route.",
-                &["route", "method", "status"],
+                &["operation", "method", "outcome"],
             )?,
-            request_duration_s: registered(registry, HistogramVec::new(requests_s, &["route"])?)?,
-            in_flight: gauge("requests_in_flight", "Requests under way.")?,
+            request_duration_s: registered(registry, HistogramVec::new(requests_s, &["operation"])?)?,
+            in_flight: gauge("in_flight", "Requests under way.")?,
             sent_bytes: counters("sent_bytes_total", "Bytes of bodies sent.", &["route"])?,
             cache_hits: counters(
                 "cache_hits_total",

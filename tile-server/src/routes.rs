@@ -2,10 +2,13 @@
 
 pub(crate) mod budget;
 pub(crate) mod check;
+pub(crate) mod events;
 pub(crate) mod globe;
 pub(crate) mod health;
 pub(crate) mod metrics;
+pub(crate) mod observations;
 pub(crate) mod picture;
+pub(crate) mod platforms;
 pub(crate) mod point;
 pub(crate) mod products;
 pub(crate) mod regions;

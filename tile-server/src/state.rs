@@ -1,17 +1,19 @@
 //! What every request can reach, made once at the start.
 
 use std::ops::Deref;
-use std::sync::Arc;
-use std::time::Duration;
+use std::sync::{Arc, OnceLock};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use storage::Store;
+use storage::log::EventLog;
 
 use crate::analyses::Analyses;
-use crate::backend::{Analyse, Draw};
+use crate::backend::{Analyse, Draw, Observe};
 use crate::catalogue::Catalogue;
 use crate::config::Settings;
 use crate::error::ServeError;
 use crate::gate::Gate;
+use crate::live::{Freshness, HotTiles, LiveService, News};
 use crate::metrics::{Metrics, Registry};
 use crate::pictures::Pictures;
 
@@ -29,6 +31,16 @@ pub struct Parts {
     pub analyses: Analyses,
     /// Asked directly only whether it is ready.
     pub drawer: Arc<dyn Draw>,
+    /// Finds observations, where there are any.
+    pub observer: OnceLock<Arc<dyn Observe>>,
+    /// The event log, once this server follows it.
+    pub log: OnceLock<Arc<dyn EventLog>>,
+    /// Tiles that are asked for often.
+    pub hot: HotTiles,
+    /// What viewers are told.
+    pub news: News,
+    /// How long it takes from a notice to a picture.
+    pub freshness: Freshness,
     /// Counters of this server.
     pub metrics: Metrics,
     /// Everything that `/metrics` shows.
@@ -62,11 +74,36 @@ impl AppState {
             ),
             analyses: Analyses::new(analyst, analyses, metrics.clone()),
             drawer,
+            observer: OnceLock::new(),
+            log: OnceLock::new(),
+            hot: HotTiles::default(),
+            news: News::new(start_ms()),
+            freshness: Freshness::register(&registry)?,
             metrics,
             registry,
             settings: settings.clone(),
         })))
     }
+
+    /// The same with somebody who finds observations.
+    #[must_use]
+    pub fn with_observations(self, observer: Arc<dyn Observe>) -> Self {
+        // Set once, when the parts are put together; a second one would change nothing.
+        self.observer.get_or_init(|| observer);
+        self
+    }
+
+    /// What keeps this server up with the event log.
+    pub fn live(&self, log: Arc<dyn EventLog>) -> LiveService {
+        self.log.get_or_init(|| Arc::clone(&log));
+        LiveService::new(self.clone(), log)
+    }
+}
+
+/// The time of this start, milliseconds since 1970.
+fn start_ms() -> u64 {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH);
+    since.map_or(0, |since| since.as_millis() as u64)
 }
 
 impl Deref for AppState {

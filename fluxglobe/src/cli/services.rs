@@ -26,9 +26,9 @@ pub(crate) struct Ingestd {
     #[arg(long, env = "FLUXGLOBE_ADMIN", default_value = "127.0.0.1:9101")]
     pub(crate) admin: SocketAddr,
     #[command(flatten)]
-    pub(crate) kafka: kafka_log::Settings,
+    pub(crate) kafka: kafka_log::KafkaSettings,
     #[command(flatten)]
-    pub(crate) observations: observations::Settings,
+    pub(crate) observations: observations::ObservationSettings,
     #[command(flatten)]
     pub(crate) ingest: ingest::ServiceSettings,
 }
@@ -42,7 +42,7 @@ pub(crate) struct Scheduler {
     #[arg(long, env = "FLUXGLOBE_ADMIN", default_value = "127.0.0.1:9102")]
     pub(crate) admin: SocketAddr,
     #[command(flatten)]
-    pub(crate) kafka: kafka_log::Settings,
+    pub(crate) kafka: kafka_log::KafkaSettings,
     #[command(flatten)]
     pub(crate) scheduler: compute::service::SchedulerSettings,
 }
@@ -68,7 +68,7 @@ pub(crate) struct RenderWorker {
     #[arg(long, env = "FLUXGLOBE_ADMIN", default_value = "127.0.0.1:9104")]
     pub(crate) admin: SocketAddr,
     #[command(flatten)]
-    pub(crate) kafka: kafka_log::Settings,
+    pub(crate) kafka: kafka_log::KafkaSettings,
     #[command(flatten)]
     pub(crate) render: render_worker::server::Settings,
 }
@@ -79,11 +79,11 @@ pub(crate) struct TileServer {
     #[command(flatten)]
     pub(crate) common: Common,
     #[command(flatten)]
-    pub(crate) kafka: kafka_log::Settings,
+    pub(crate) kafka: kafka_log::KafkaSettings,
     #[command(flatten)]
-    pub(crate) observations: observations::Settings,
+    pub(crate) observations: observations::ObservationSettings,
     #[command(flatten)]
-    pub(crate) fleet: render_worker::fleet::Settings,
+    pub(crate) fleet: render_worker::fleet::FleetSettings,
     #[command(flatten)]
     pub(crate) serve: tile_server::config::Settings,
 }
@@ -107,7 +107,7 @@ pub(crate) struct Notice {
     #[arg(long)]
     pub(crate) print: bool,
     #[command(flatten)]
-    pub(crate) kafka: kafka_log::Settings,
+    pub(crate) kafka: kafka_log::KafkaSettings,
 }
 
 /// `fluxglobe topics`.
@@ -115,14 +115,11 @@ pub(crate) struct Notice {
 pub(crate) enum Topics {
     /// Make the topics that are missing; those that are there are left as they are.
     Create {
-        /// Partitions of each topic: how many readers of a group can work at once.
-        #[arg(long, default_value = "4")]
-        partitions: NonZeroU16,
         /// Copies of each partition, no more than there are brokers.
         #[arg(long, default_value = "1")]
         replication: NonZeroU16,
         #[command(flatten)]
-        kafka: kafka_log::Settings,
+        kafka: kafka_log::KafkaSettings,
     },
 }
 
@@ -135,7 +132,7 @@ pub(crate) enum Rejected {
         #[arg(long)]
         json: bool,
         #[command(flatten)]
-        kafka: kafka_log::Settings,
+        kafka: kafka_log::KafkaSettings,
     },
     /// Send refused messages again, with the next attempt's number.
     Replay {
@@ -143,7 +140,7 @@ pub(crate) enum Rejected {
         #[arg(value_name = "ORIGIN")]
         origins: Vec<Origin>,
         #[command(flatten)]
-        kafka: kafka_log::Settings,
+        kafka: kafka_log::KafkaSettings,
     },
 }
 
@@ -170,5 +167,5 @@ pub(crate) struct BenchStream {
     #[arg(long)]
     pub(crate) json: bool,
     #[command(flatten)]
-    pub(crate) kafka: kafka_log::Settings,
+    pub(crate) kafka: kafka_log::KafkaSettings,
 }

@@ -28,7 +28,7 @@ pub(crate) async fn run(settings: &Settings, options: &Budget) -> Result<()> {
         earth: options.earth,
     };
     let bar = progress::bar("budget on Ballista", 1);
-    let answer = compute::budget::budget(&deployment::cluster(settings, store), &query).await?;
+    let answer = compute::budget::budget(&deployment::engine(settings, store)?, &query).await?;
     bar.finish_and_clear();
     if options.json {
         return progress::result(&serde_json::to_string_pretty(&answer)?);

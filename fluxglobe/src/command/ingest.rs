@@ -15,7 +15,7 @@ use crate::{deployment, progress};
 
 pub(crate) async fn run(settings: &Settings, options: Ingest) -> Result<ExitCode> {
     let store = deployment::store(settings)?;
-    let log: Arc<dyn EventLog> = deployment::log(settings)?;
+    let log: Arc<dyn EventLog> = Arc::new(deployment::embedded_log(settings)?);
     let service = IngestService::new(store, log, ingest::Settings::with_current_program()?);
     let files: Vec<_> = options
         .files

@@ -4,17 +4,20 @@ mod budget;
 pub(crate) mod derive;
 pub(crate) mod generate;
 mod ingest;
+pub(crate) mod notice;
 mod products;
+mod rejected;
 mod render;
 pub(crate) mod serve;
 mod stats;
+mod topics;
 
 use std::process::ExitCode;
 
 use anyhow::Result;
 
-use crate::cli::{Command, Settings, Stats};
-use crate::demo;
+use crate::cli::{Bench, Command, Settings, Stats};
+use crate::{bench, demo, deployment, services};
 
 /// Runs a command; the exit code says whether every part of it succeeded.
 pub(crate) async fn run(settings: &Settings, command: Command) -> Result<ExitCode> {
@@ -27,6 +30,22 @@ pub(crate) async fn run(settings: &Settings, command: Command) -> Result<ExitCod
         Command::Derive(options) => derive::run(settings, options).await?,
         Command::Render(options) => render::run(settings, options).await?,
         Command::Serve(options) => serve::run(settings, options).await?,
+        Command::Ingestd(options) => services::ingestd::run(settings, options).await?,
+        Command::Scheduler(options) => services::scheduler::run(settings, options).await?,
+        Command::Executor(options) => services::executor::run(settings, options).await?,
+        Command::RenderWorker(options) => services::render_worker::run(settings, options).await?,
+        Command::TileServer(options) => services::tile_server::run(settings, options).await?,
+        Command::Notice(options) if options.print => notice::print(&options)?,
+        Command::Notice(options) => {
+            let log = deployment::needed_log(settings, &options.kafka).await?;
+            notice::send(log.as_ref(), &options).await?;
+        }
+        Command::Topics(command) => topics::run(command).await?,
+        Command::Rejected(command) => rejected::run(settings, command).await?,
+        Command::Bench(Bench::Stream(options)) => {
+            let log = deployment::needed_log(settings, &options.kafka).await?;
+            bench::stream::run(log.as_ref(), &options).await?;
+        }
         Command::Generate(options) => generate::run(options)?,
         Command::DecodeFile { .. } => unreachable!("main runs the decoder before anything else"),
     }

@@ -20,6 +20,7 @@ struct Row {
     from: Option<String>,
     to: Option<String>,
     manifest: String,
+    derived_from: Option<String>,
     source: String,
 }
 
@@ -41,6 +42,7 @@ pub(crate) async fn run(settings: &Settings, options: &Products) -> Result<()> {
             steps: manifest.steps.len(),
             from: extent.map(|period| period.start.to_string()),
             to: extent.map(|period| period.end.to_string()),
+            derived_from: manifest.derived_from.map(|id| id.to_string()),
             title: manifest.title,
             source: manifest.source,
         });

@@ -1,6 +1,5 @@
 //! `fluxglobe serve`: a data folder in, tiles, views, statistics and the viewer over HTTP out.
 
-use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::{Context as _, Result};
@@ -12,7 +11,7 @@ use tile_server::{AppState, Server};
 
 use crate::cli::Settings;
 use crate::ports::{Analyst, Drawer};
-use crate::{deployment, progress};
+use crate::{deployment, progress, viewer};
 
 pub(crate) async fn run(settings: &Settings, options: tile_server::config::Settings) -> Result<()> {
     let store = deployment::store(settings)?;
@@ -29,11 +28,11 @@ pub(crate) async fn bind(
     mut options: tile_server::config::Settings,
     check: Option<Check>,
 ) -> Result<Server> {
-    options.viewer = options.viewer.or_else(built_viewer);
+    options.viewer = options.viewer.or_else(viewer::built);
     let drawer = Drawer::new(deployment::renderer(settings, store.clone()).await?);
     let analyst = Analyst {
         local: Engine::local(store.clone()),
-        cluster: deployment::cluster(settings, store.clone()),
+        cluster: deployment::engine(settings, store.clone())?,
         check,
     };
     let registry = Registry::new();
@@ -64,13 +63,4 @@ pub(crate) async fn until_asked_to_stop(server: Server) -> Result<()> {
         progress::say("stopping");
     };
     Ok(server.run(stop).await?)
-}
-
-/// The viewer beside the program, in a checkout it was built in, or installed.
-fn built_viewer() -> Option<PathBuf> {
-    let checkout = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tile-server/web/dist");
-    let installed = PathBuf::from("/usr/share/fluxglobe/viewer");
-    [checkout, installed]
-        .into_iter()
-        .find(|folder| folder.join("index.html").is_file())
 }

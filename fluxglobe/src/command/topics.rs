@@ -1,19 +1,15 @@
-//! `fluxglobe topics`: makes the topics of the event log on Kafka, or lists them.
+//! `fluxglobe topics`: makes the topics of the event log on Kafka.
 
 use anyhow::Result;
-use kafka_log::KafkaLog;
 
 use crate::cli::Topics;
 use crate::progress;
 
 pub(crate) async fn run(command: Topics) -> Result<()> {
-    match command {
-        Topics::Create { kafka, partitions, replication } => {
-            let made = KafkaLog::create_topics(&kafka, partitions.get(), replication.get()).await?;
-            for topic in made {
-                progress::result(&topic.to_string())?;
-            }
-        }
+    let Topics::Create { replication, kafka } = command;
+    for topic in kafka_log::create_topics(&kafka, replication.get()).await? {
+        let how = if topic.is_new { "made" } else { "was there" };
+        progress::result(&format!("{} {how}", topic.name))?;
     }
     Ok(())
 }

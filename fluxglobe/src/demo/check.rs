@@ -57,7 +57,7 @@ pub(crate) async fn compare(
         return Ok(kept);
     }
     let bar = progress::bar("budgets on Ballista", 1);
-    let engine = deployment::cluster(settings, store.clone());
+    let engine = deployment::engine(settings, store.clone())?;
     let rows = compute::compare(&engine, &flux.product).await?;
     progress::done(&bar, &format!("{} beside published ones", rows.len()));
     let comparison = Comparison {

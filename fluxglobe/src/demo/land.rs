@@ -27,10 +27,10 @@ pub(crate) async fn has_landed(store: &Store, sets: &[Set]) -> Result<bool> {
 ///
 /// # Errors
 /// A file was refused: the demo's own files all fit.
-pub(crate) async fn land(store: &Store, log: &Arc<EmbeddedLog>, files: &[PathBuf]) -> Result<()> {
+pub(crate) async fn land(store: &Store, log: &EmbeddedLog, files: &[PathBuf]) -> Result<()> {
     let service = IngestService::new(
         store.clone(),
-        Arc::clone(log) as Arc<dyn EventLog>,
+        Arc::new(log.clone()) as Arc<dyn EventLog>,
         Settings::with_current_program()?,
     );
     service.notify(files, None, None).await?;

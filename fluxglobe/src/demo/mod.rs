@@ -46,7 +46,7 @@ pub(crate) async fn run(settings: &Settings, options: Demo) -> Result<ExitCode> 
     match &check {
         Some(check) => progress::result(&table::against_published(check))?,
         None => progress::result(
-            &table::synthetic(&deployment::cluster(settings, store.clone()), &flux).await?,
+            &table::synthetic(&deployment::engine(settings, store.clone())?, &flux).await?,
         )?,
     }
     let wire = check.as_ref().map(check::Comparison::to_wire);
@@ -133,11 +133,11 @@ async fn compute(
     };
     if !inputs.files.is_empty() || !is_derived {
         // The log is held no longer than it is written, so that `fluxglobe ingest` works beside a running demo.
-        let log = deployment::log(settings)?;
+        let log = deployment::embedded_log(settings)?;
         if !inputs.files.is_empty() {
             land::land(store, &log, &inputs.files).await?;
         }
-        derive::accumulated(settings, store.clone(), &*log, &inputs.flux, None).await?;
+        derive::accumulated(settings, store.clone(), Some(&log), &inputs.flux, None).await?;
     }
     let flux = deployment::manifest(store, &inputs.flux, &settings.data).await?;
     if flux.product.as_str() != SETS[0].product {

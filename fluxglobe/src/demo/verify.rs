@@ -153,7 +153,7 @@ async fn mass(settings: &Settings, store: &Store, flux: &Manifest) -> Result<Opt
         earth: Earth::Wgs84,
     };
     let answer =
-        compute::budget::budget_of(&deployment::cluster(settings, store.clone()), &query, flux)
+        compute::budget::budget_of(&deployment::engine(settings, store.clone())?, &query, flux)
             .await?;
     let budget_tg: f64 = answer.rows.iter().map(|row| row.budget_tg).sum();
     let difference = (in_frames_tg / budget_tg - 1.0).abs();

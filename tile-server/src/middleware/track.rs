@@ -52,7 +52,7 @@ pub(crate) async fn count(State(state): State<AppState>, request: Request, next:
     let status = response.status();
     metrics
         .requests
-        .with_label_values(&[&route, method, status_label(status)])
+        .with_label_values(&[&route, method, outcome_label(status)])
         .inc();
     metrics
         .request_duration_s
@@ -118,12 +118,12 @@ fn method_label(method: &Method) -> &'static str {
     }
 }
 
-fn status_label(status: StatusCode) -> &'static str {
-    match status.as_u16() / 100 {
-        1 => "1xx",
-        2 => "2xx",
-        3 => "3xx",
-        4 => "4xx",
-        _ => "5xx",
+/// The words that all services count by.
+fn outcome_label(status: StatusCode) -> &'static str {
+    match status {
+        StatusCode::SERVICE_UNAVAILABLE => "busy",
+        _ if status.is_server_error() => "failed",
+        _ if status.is_client_error() => "refused",
+        _ => "ok",
     }
 }

@@ -1,4 +1,4 @@
-//! `/api/check`: our budgets beside published ones, 404 where there is nothing to compare with.
+//! `/api/check`: our budgets beside published ones, `null` where there is nothing to compare with.
 
 use axum::Json;
 use axum::extract::State;
@@ -7,6 +7,6 @@ use crate::backend::Check;
 use crate::error::ServerError;
 use crate::state::AppState;
 
-pub(crate) async fn get(State(state): State<AppState>) -> Result<Json<Check>, ServerError> {
+pub(crate) async fn get(State(state): State<AppState>) -> Result<Json<Option<Check>>, ServerError> {
     state.analyses.check().await.map(Json)
 }

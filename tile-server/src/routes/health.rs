@@ -38,8 +38,15 @@ pub(crate) async fn live() -> Response {
 
 /// Every part, asked now.
 pub(crate) async fn ready(State(state): State<AppState>) -> Response {
-    let (store, renderer) = tokio::join!(store(&state), renderer(&state));
-    let checks = vec![store, renderer, viewer_files(&state).await];
+    let (store, renderer, log, observations) = tokio::join!(
+        store(&state),
+        renderer(&state),
+        log(&state),
+        observations(&state)
+    );
+    let mut checks = vec![store, renderer, viewer_files(&state).await];
+    checks.extend(log);
+    checks.extend(observations);
     let ready = checks.iter().all(|part| part.ok || !part.required);
     let status = if ready {
         StatusCode::OK
@@ -94,6 +101,46 @@ async fn renderer(state: &AppState) -> Part {
         required: true,
         detail,
     }
+}
+
+/// Without the event log tiles are still served, only later than they could be: it is not required.
+async fn log(state: &AppState) -> Option<Part> {
+    let log = state.log.get()?;
+    let (ok, detail) = match timeout(PART_LIMIT, log.ready()).await {
+        Ok(Ok(())) => (true, "it answers".to_owned()),
+        Ok(Err(error)) => {
+            tracing::warn!(%error, "the event log is not ready");
+            (false, "it does not answer; the log says why".to_owned())
+        }
+        Err(_elapsed) => (
+            false,
+            format!("no answer within {} s", PART_LIMIT.as_secs()),
+        ),
+    };
+    Some(Part {
+        name: "event log",
+        ok,
+        required: false,
+        detail,
+    })
+}
+
+async fn observations(state: &AppState) -> Option<Part> {
+    let observer = state.observer.get()?;
+    let (ok, detail) = match timeout(PART_LIMIT, observer.ready()).await {
+        Ok(Ok(())) => (true, "they are found".to_owned()),
+        Ok(Err(error)) => (false, error.text),
+        Err(_elapsed) => (
+            false,
+            format!("no answer within {} s", PART_LIMIT.as_secs()),
+        ),
+    };
+    Some(Part {
+        name: "observations",
+        ok,
+        required: false,
+        detail,
+    })
 }
 
 async fn viewer_files(state: &AppState) -> Part {

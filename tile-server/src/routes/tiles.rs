@@ -3,7 +3,7 @@
 use axum::extract::State;
 use axum::http::HeaderMap;
 use axum::response::Response;
-use contract::job::View;
+use contract::job::{Mode, View};
 use contract::tile::Tile;
 use serde::Deserialize;
 
@@ -39,7 +39,12 @@ pub(crate) async fn get(
     };
     let time = time(query.time.as_deref())?;
     let job = request::job(&layer, mode, View::Tile { tile, size_px }, time)?;
-    picture::respond(&state, &headers, job).await
+    state.hot.asked(&layer.manifest.product, mode, &job.view, job.time);
+    let response = picture::respond(&state, &headers, job).await?;
+    if mode == Mode::Volume {
+        state.freshness.served(&layer.id);
+    }
+    Ok(response)
 }
 
 fn parse_size(text: &str) -> Result<u32, ServerError> {

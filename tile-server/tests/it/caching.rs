@@ -19,11 +19,11 @@ async fn the_same_tile_is_drawn_once() {
     assert_eq!(first.body, second.body);
     assert_eq!(app.drawer.drawn_count(), 1);
     assert_eq!(
-        app.metric(r#"fluxglobe_tiles_cache_hits_total{source="memory"}"#)
+        app.metric(r#"fluxglobe_tile_server_cache_hits_total{source="memory"}"#)
             .await,
         1
     );
-    assert_eq!(app.metric("fluxglobe_tiles_cache_misses_total").await, 1);
+    assert_eq!(app.metric("fluxglobe_tile_server_cache_misses_total").await, 1);
 }
 
 #[tokio::test]
@@ -64,7 +64,7 @@ async fn a_picture_outlives_the_memory_of_its_process() {
     assert_eq!(first.body, second.body);
     assert_eq!(app.drawer.drawn_count(), 1);
     assert_eq!(
-        app.metric(r#"fluxglobe_tiles_cache_hits_total{source="store"}"#)
+        app.metric(r#"fluxglobe_tile_server_cache_hits_total{source="store"}"#)
             .await,
         1
     );
@@ -78,7 +78,7 @@ async fn the_memory_for_pictures_is_bounded() {
     for x in 0..256 {
         app.get(&format!("/tiles/flux/map/8/{x}/0.png")).await;
     }
-    let bytes = app.metric("fluxglobe_tiles_cache_bytes").await;
+    let bytes = app.metric("fluxglobe_tile_server_cache_bytes").await;
     assert!(bytes > 0 && bytes <= 10_000, "{bytes}");
 }
 
@@ -186,7 +186,7 @@ async fn a_renderer_that_contradicts_the_store_is_counted_and_the_stored_picture
     let (answer, ()) = tokio::join!(app.get(TILE), elsewhere);
     assert_eq!(answer.status, StatusCode::OK);
     assert!(answer.body.ends_with(b"!"));
-    assert_eq!(app.metric("fluxglobe_tiles_conflicts_total").await, 1);
+    assert_eq!(app.metric("fluxglobe_tile_server_conflicts_total").await, 1);
 }
 
 #[tokio::test]

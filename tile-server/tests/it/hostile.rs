@@ -100,7 +100,7 @@ async fn bad_addresses_are_refused_with_the_reason() {
         );
     }
     assert_eq!(app.drawer.drawn_count(), 0);
-    assert_eq!(app.metric("fluxglobe_tiles_panics_total").await, 0);
+    assert_eq!(app.metric("fluxglobe_tile_server_panics_total").await, 0);
 }
 
 #[tokio::test]

@@ -35,7 +35,7 @@ async fn when_the_queue_is_full_clients_are_sent_away_with_a_time_to_come_back()
         (drawn.await.status, waits.await.status),
         (StatusCode::OK, StatusCode::OK)
     );
-    assert_eq!(app.metric("fluxglobe_tiles_refused_total").await, 1);
+    assert_eq!(app.metric("fluxglobe_tile_server_refused_total").await, 1);
     app.drawer.is_slow.store(false, Ordering::SeqCst);
     assert_eq!(
         app.get("/tiles/flux/map/2/2/0.png").await.status,
@@ -52,7 +52,7 @@ async fn an_answer_that_takes_too_long_ends_with_a_reason() {
     assert!(answer.reason().contains("longer than 1 s"));
     assert!(!answer.header("retry-after").is_empty());
     assert_eq!(
-        app.metric("fluxglobe_tiles_requests_in_flight").await,
+        app.metric("fluxglobe_tile_server_in_flight").await,
         1,
         "only the request for the metrics"
     );
@@ -113,7 +113,7 @@ async fn a_panic_in_a_handler_is_caught_and_counted() {
         assert!(!answer.text().contains("planted"), "{}", answer.text());
         assert!(!answer.header("x-content-type-options").is_empty());
     }
-    assert_eq!(app.metric("fluxglobe_tiles_panics_total").await, 2);
+    assert_eq!(app.metric("fluxglobe_tile_server_panics_total").await, 2);
     app.analyst.set(Mood::Well);
     assert_eq!(
         app.get("/api/products/flux/point?lon=0&lat=0").await.status,

@@ -15,27 +15,27 @@ async fn requests_are_counted_by_route_method_and_status_class() {
     }
     let route = "/tiles/{product}/{mode}/{z}/{x}/{y_png}";
     let requests = async |route: &str, status: &str| {
-        let labels = format!(r#"method="GET",route="{route}",status="{status}""#);
-        app.metric(&format!("fluxglobe_tiles_requests_total{{{labels}}}"))
+        let labels = format!(r#"method="GET",operation="{route}",outcome="{status}""#);
+        app.metric(&format!("fluxglobe_tile_server_requests_total{{{labels}}}"))
             .await
     };
-    assert_eq!(requests(route, "2xx").await, 2);
-    assert_eq!(requests(route, "4xx").await, 1);
-    assert_eq!(requests("viewer", "4xx").await, 1);
-    let timed = format!(r#"fluxglobe_tiles_request_duration_seconds_count{{route="{route}"}}"#);
+    assert_eq!(requests(route, "ok").await, 2);
+    assert_eq!(requests(route, "refused").await, 1);
+    assert_eq!(requests("viewer", "refused").await, 1);
+    let timed = format!(r#"fluxglobe_tile_server_request_seconds_count{{operation="{route}"}}"#);
     assert_eq!(app.metric(&timed).await, 3);
     assert_eq!(
-        app.metric(r#"fluxglobe_tiles_drawn_total{mode="map",outcome="ok"}"#)
+        app.metric(r#"fluxglobe_tile_server_drawn_total{mode="map",outcome="ok"}"#)
             .await,
         2
     );
     assert_eq!(
-        app.metric(r#"fluxglobe_tiles_draw_duration_seconds_count{mode="map"}"#)
+        app.metric(r#"fluxglobe_tile_server_draw_seconds_count{mode="map"}"#)
             .await,
         2
     );
-    assert_eq!(app.metric("fluxglobe_tiles_products_count").await, 3);
-    let sent = format!(r#"fluxglobe_tiles_sent_bytes_total{{route="{route}"}}"#);
+    assert_eq!(app.metric("fluxglobe_tile_server_products_count").await, 3);
+    let sent = format!(r#"fluxglobe_tile_server_sent_bytes_total{{route="{route}"}}"#);
     assert!(app.metric(&sent).await >= 2 * 72);
 }
 
@@ -52,7 +52,7 @@ async fn the_text_is_what_prometheus_reads() {
     let mut samples = 0;
     for line in answer.text().lines().filter(|line| !line.starts_with('#')) {
         let (name, value) = line.rsplit_once(' ').unwrap();
-        assert!(name.starts_with("fluxglobe_tiles_"), "{line}");
+        assert!(name.starts_with("fluxglobe_tile_server_"), "{line}");
         value
             .parse::<f64>()
             .unwrap_or_else(|e| panic!("{line}: {e}"));
@@ -62,7 +62,7 @@ async fn the_text_is_what_prometheus_reads() {
     assert!(
         answer
             .text()
-            .contains("# TYPE fluxglobe_tiles_requests_total counter")
+            .contains("# TYPE fluxglobe_tile_server_requests_total counter")
     );
 }
 

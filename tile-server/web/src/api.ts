@@ -154,13 +154,8 @@ export const healthUrl = () => address("healthz");
 
 /** Undefined where the server has no published values to hold against. */
 export async function check(): Promise<Check | undefined> {
-  try {
-    const answer = await getJson<Check>(address("api/check"));
-    return answer.rows.length > 0 ? answer : undefined;
-  } catch (error) {
-    if (error instanceof ApiError && error.status === 404) return undefined;
-    throw error;
-  }
+  const answer = await getJson<Check | null>(address("api/check"));
+  return answer !== null && answer.rows.length > 0 ? answer : undefined;
 }
 
 export function point(product: string, lon: number, lat: number, signal: AbortSignal): Promise<PointSeries> {

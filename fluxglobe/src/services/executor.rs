@@ -1,0 +1,32 @@
+//! `fluxglobe executor`: tasks from the scheduler in, their results out.
+
+use anyhow::{Context as _, Result};
+use compute::service::Executor;
+
+use crate::cli;
+use crate::cli::Settings;
+use crate::services::Footing;
+
+pub(crate) async fn run(settings: &Settings, options: cli::Executor) -> Result<()> {
+    let scheduler = settings.cluster.clone().context(
+        "give the scheduler's address: --cluster or FLUXGLOBE_CLUSTER, http://HOST:PORT",
+    )?;
+    let footing = Footing::take(
+        settings,
+        "executor",
+        Some(options.admin),
+        &["store", "scheduler"],
+    )
+    .await?;
+    let Some(store) = footing.store().await? else {
+        return footing.leave().await;
+    };
+    let executor = Executor::start(&options.executor, &scheduler, store, &footing.registry).await?;
+    let readiness = executor.readiness();
+    footing.board.set("scheduler", move || {
+        let readiness = readiness.clone();
+        async move { crate::services::worst(readiness.as_ref()).await }
+    });
+    executor.run(footing.stop.clone()).await?;
+    footing.leave().await
+}

@@ -1,0 +1,40 @@
+//! `fluxglobe render-worker`: pictures on demand over gRPC, and those of `render.job`.
+
+use anyhow::Result;
+use render_worker::Backend;
+use render_worker::batch::BatchService;
+use render_worker::server::{Server, open_desk};
+
+use crate::cli::{RenderWorker, Settings};
+use crate::services::Footing;
+
+pub(crate) async fn run(settings: &Settings, options: RenderWorker) -> Result<()> {
+    let parts = ["store", "renderer", "event log"];
+    let footing = Footing::take(settings, "render-worker", Some(options.admin), &parts).await?;
+    let Some(store) = footing.store().await? else {
+        return footing.leave().await;
+    };
+    let backend = if settings.cpu {
+        Backend::Cpu
+    } else {
+        Backend::Gpu
+    };
+    let (render, registry) = (options.render.clone(), footing.registry.clone());
+    let desk = tokio::task::spawn_blocking(move || open_desk(&render, store, backend, &registry))
+        .await??;
+    let asked = desk.clone();
+    footing.board.set("renderer", move || {
+        let asked = asked.clone();
+        async move { asked.ready().await.map(|()| asked.name().to_owned()) }
+    });
+    let server = Server::bind(desk.clone(), &options.render)?;
+    tracing::info!(address = %server.address(), "render worker");
+    let serving = tokio::spawn(server.run(footing.stop.clone()));
+    if let Some(log) = footing.log(&options.kafka).await? {
+        BatchService::new(desk, log, options.render.drain())
+            .run(footing.stop.clone())
+            .await;
+    }
+    serving.await??;
+    footing.leave().await
+}

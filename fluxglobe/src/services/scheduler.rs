@@ -1,0 +1,36 @@
+//! `fluxglobe scheduler`: Ballista's scheduler, and the deriver that keeps derived products up with what lands.
+
+use std::num::NonZeroUsize;
+
+use anyhow::Result;
+use compute::Engine;
+use compute::service::{Deriver, Scheduler};
+
+use crate::cli;
+use crate::cli::Settings;
+use crate::services::Footing;
+
+pub(crate) async fn run(settings: &Settings, options: cli::Scheduler) -> Result<()> {
+    let parts = ["store", "event log", "scheduler"];
+    let footing = Footing::take(settings, "scheduler", Some(options.admin), &parts).await?;
+    let Some(store) = footing.store().await? else {
+        return footing.leave().await;
+    };
+    let scheduler = Scheduler::start(&options.scheduler, store.clone(), &footing.registry).await?;
+    let (readiness, address) = (scheduler.readiness(), scheduler.address());
+    footing.board.set("scheduler", move || {
+        let readiness = readiness.clone();
+        async move { crate::services::worst(readiness.as_ref()).await }
+    });
+    // Executors and clients are served while the log is waited for.
+    let serving = tokio::spawn(scheduler.run(footing.stop.clone()));
+    if let Some(log) = footing.log(&options.kafka).await? {
+        let partitions = NonZeroUsize::from(settings.partitions);
+        let engine = Engine::cluster(store, format!("http://{address}"), partitions);
+        Deriver::new(engine, log, &footing.registry)?
+            .run(footing.stop.clone())
+            .await;
+    }
+    serving.await??;
+    footing.leave().await
+}

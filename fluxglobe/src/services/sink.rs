@@ -1,0 +1,26 @@
+//! Where ingest hands observations that it found in files.
+
+use std::sync::Arc;
+
+use async_trait::async_trait;
+use contract::observation::Observation;
+use ingest::observation::{ObservationSink, SinkError, Stored};
+use observations::ObservationStore;
+
+/// An observation store as ingest's sink.
+pub(crate) struct Sink(pub(crate) Arc<dyn ObservationStore>);
+
+#[async_trait]
+impl ObservationSink for Sink {
+    async fn put(&self, observations: Vec<Observation>) -> Result<Stored, SinkError> {
+        let counts = self.0.upsert(&observations).await.map_err(|error| {
+            let is_retryable = error.is_retryable();
+            SinkError::new(error, is_retryable)
+        })?;
+        Ok(Stored {
+            new: counts.new,
+            replaced: counts.replaced,
+            same: counts.same,
+        })
+    }
+}

@@ -1,0 +1,19 @@
+//! The stream to the end: what lands is shown, hot tiles that it touches are drawn before anybody asks, viewers are told.
+//!
+//! ```text
+//! granule.landed, product.derived -> catalogue anew -> touched times -> render.job of hot tiles there
+//!                                                \-> news to viewers (server-sent events)
+//! render.done, or the first volume tile that is asked for -> how fresh it was
+//! ```
+
+mod freshness;
+mod hot;
+mod news;
+mod service;
+mod touched;
+
+pub use freshness::Freshness;
+pub use hot::{HotTile, HotTiles};
+pub use news::{Item, Listener, News};
+pub use service::LiveService;
+pub use touched::touched;

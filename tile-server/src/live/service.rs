@@ -1,0 +1,222 @@
+//! Follows the event log for one server.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::time::Duration;
+
+use contract::event::{Body, Event};
+use contract::manifest::{Manifest, ManifestId};
+use contract::product::ProductId;
+use contract::quantity::Quantity;
+use contract::time::Period;
+use contract::topic::Topic;
+use service::Stop;
+use storage::StorageError;
+use storage::log::{EventLog, Follower, Message, Start};
+use tokio::sync::mpsc;
+
+use crate::live::touched;
+use crate::request;
+use crate::state::AppState;
+
+/// Hot tiles drawn anew for one version.
+const MOST_JOBS: usize = 64;
+/// Messages taken at a time, and how long one waits for the first.
+const MESSAGES: usize = 64;
+const WAIT: Duration = Duration::from_millis(250);
+
+/// Keeps one server up with what lands.
+pub struct LiveService {
+    state: AppState,
+    log: Arc<dyn EventLog>,
+    /// Versions seen, to tell what a newer one touches.
+    seen: BTreeMap<ProductId, Arc<Manifest>>,
+}
+
+impl LiveService {
+    pub(crate) fn new(state: AppState, log: Arc<dyn EventLog>) -> Self {
+        Self {
+            state,
+            log,
+            seen: BTreeMap::new(),
+        }
+    }
+
+    /// Follows until asked to stop. A log that goes away is waited for; what was appended meanwhile is not told, but a
+    /// catalogue that is too old reads itself anew in any case.
+    pub async fn run(mut self, stop: Stop) {
+        let mut pauses = service::pauses();
+        while !stop.is_said() {
+            let ended = tokio::select! {
+                () = stop.said() => return,
+                ended = self.follow() => ended,
+            };
+            if let Err(error) = ended {
+                tracing::warn!(%error, "the event log cannot be followed; trying again");
+            }
+            tokio::select! {
+                () = stop.said() => return,
+                () = tokio::time::sleep(pauses.next().unwrap_or(WAIT)) => {}
+            }
+        }
+    }
+
+    async fn follow(&mut self) -> Result<(), StorageError> {
+        let topics = [Topic::GranuleLanded, Topic::ProductDerived, Topic::RenderDone];
+        let (sender, mut heard) = mpsc::channel(MESSAGES);
+        let mut pumps = vec![];
+        for topic in topics {
+            pumps.push(pump(self.log.follow(topic, Start::Now).await?, sender.clone()));
+        }
+        drop(sender);
+        self.remember_all().await;
+        let hearing = async {
+            while let Some(message) = heard.recv().await {
+                match message.event() {
+                    Ok(event) => self.hear(&event).await?,
+                    Err(error) => {
+                        tracing::warn!(origin = %message.origin, %error, "a message is passed over");
+                    }
+                }
+            }
+            Ok(())
+        };
+        tokio::try_join!(futures::future::try_join_all(pumps), hearing).map(|_ended| ())
+    }
+
+    async fn hear(&mut self, event: &Event) -> Result<(), StorageError> {
+        match &event.body {
+            Body::GranuleLanded { manifest, .. } => {
+                self.new_version(event, manifest).await.map(|_touched| ())
+            }
+            Body::ProductDerived {
+                manifest,
+                derived_from,
+            } => {
+                // The particles of the source are lifted by what was derived: its pictures are new too, at least where
+                // what was derived is, which reaches from the first changed step of the source to the end.
+                let touched = self.new_version(event, manifest).await?;
+                self.redraw(event, derived_from, &touched).await
+            }
+            Body::RenderDone {
+                key, failure: None, ..
+            } => {
+                self.state.freshness.drawn(key);
+                Ok(())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// What there is before anything new comes.
+    async fn remember_all(&mut self) {
+        match self.state.catalogue.layers().await {
+            Ok(layers) => {
+                for layer in layers {
+                    self.seen
+                        .insert(layer.manifest.product.clone(), Arc::clone(&layer.manifest));
+                }
+            }
+            Err(error) => {
+                tracing::warn!(%error, "products are not known yet; all that comes is new")
+            }
+        }
+    }
+
+    async fn new_version(
+        &mut self,
+        event: &Event,
+        manifest: &ManifestId,
+    ) -> Result<(), StorageError> {
+        self.state.catalogue.outdated();
+        let layer = match self.state.catalogue.layer(manifest.product.as_str()).await {
+            Ok(layer) => layer,
+            Err(error) => {
+                tracing::warn!(trace = event.trace, %manifest, %error, "a version cannot be shown");
+                return Ok(vec![]);
+            }
+        };
+        let before = self
+            .seen
+            .insert(manifest.product.clone(), Arc::clone(&layer.manifest));
+        let touched = touched(before.as_deref(), &layer.manifest);
+        tracing::info!(trace = event.trace, %manifest, periods = touched.len(), "a new version is shown");
+        self.state.news.tell(layer.id.clone(), touched.clone());
+        // Pictures of a flux wait for what lifts their particles.
+        let waits = layer.manifest.quantity == Quantity::CarbonFlux;
+        if !waits {
+            if let Some(noticed) = event.noticed {
+                self.state.freshness.expect_version(&layer.id, noticed);
+            }
+            self.order(event, &layer, &touched).await?;
+        }
+        Ok(touched)
+    }
+
+    /// Draws anew what the derivation from `source` touches.
+    async fn redraw(
+        &self,
+        event: &Event,
+        source: &ManifestId,
+        touched: &[Period],
+    ) -> Result<(), StorageError> {
+        let Ok(layer) = self.state.catalogue.layer(source.product.as_str()).await else {
+            return Ok(());
+        };
+        if let Some(noticed) = event.noticed {
+            self.state.freshness.expect_version(&layer.id, noticed);
+        }
+        self.order(event, &layer, touched).await
+    }
+
+    async fn order(
+        &self,
+        event: &Event,
+        layer: &crate::catalogue::Layer,
+        touched: &[Period],
+    ) -> Result<(), StorageError> {
+        let is_touched = |time| {
+            touched
+                .iter()
+                .any(|period| period.start <= time && time <= period.end)
+        };
+        let hot = self
+            .state
+            .hot
+            .of(&layer.manifest.product, MOST_JOBS, is_touched);
+        let jobs: Vec<_> = hot
+            .iter()
+            .filter_map(|tile| request::job(layer, tile.mode, tile.view, Some(tile.time)).ok())
+            .collect();
+        if jobs.is_empty() {
+            return Ok(());
+        }
+        if let Some(noticed) = event.noticed {
+            for job in &jobs {
+                self.state.freshness.expect_picture(job.key(), noticed);
+            }
+        }
+        let events: Vec<Event> = jobs
+            .into_iter()
+            .map(|job| event.followed_by(Body::RenderJob { job }))
+            .collect();
+        self.log.append(&events).await
+    }
+}
+
+/// Hands on what a follower brings, for as long as somebody takes it.
+async fn pump(
+    mut follower: Box<dyn Follower>,
+    sender: mpsc::Sender<Message>,
+) -> Result<(), StorageError> {
+    loop {
+        for message in follower.next(MESSAGES, WAIT).await? {
+            if sender.send(message).await.is_err() {
+                return Ok(());
+            }
+        }
+        if sender.is_closed() {
+            return Ok(());
+        }
+    }
+}

@@ -1,0 +1,173 @@
+//! `/api/observations/platforms`: buoys, ships, stations and profiles as GeoJSON: points, and the tracks of ships.
+
+use axum::Json;
+use axum::extract::State;
+use axum::http::header;
+use axum::response::{IntoResponse as _, Response};
+use contract::observation::{PlatformKind, Quality};
+use contract::region::Region;
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+use crate::backend::{ObservationQuestion, Observe, Platform, TrackPoint, TrackQuestion};
+use crate::error::ServerError;
+use crate::extract::{UrlQuery, time};
+use crate::state::AppState;
+
+/// Places of one track; more are thinned out by the observation store.
+const TRACK_POINTS: u32 = 2000;
+/// Tracks of one answer: each is a question of its own.
+const MOST_TRACKS: usize = 50;
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct PlatformQuery {
+    bbox: Option<String>,
+    from: Option<String>,
+    to: Option<String>,
+    property: Option<String>,
+    kind: Option<String>,
+    dataset: Option<String>,
+}
+
+pub(crate) async fn get(
+    State(state): State<AppState>,
+    UrlQuery(query): UrlQuery<PlatformQuery>,
+) -> Result<Response, ServerError> {
+    let observer = state.observer.get().ok_or(ServerError::NoObservations)?;
+    let question = query.question()?;
+    let mut features = vec![];
+    for (number, platform) in observer.platforms(&question).await?.iter().enumerate() {
+        let track = if platform.kind == PlatformKind::Ship && number < MOST_TRACKS {
+            track(observer.as_ref(), platform, &question).await?
+        } else {
+            vec![]
+        };
+        features.push(feature(platform, &track));
+    }
+    let answer = json!({ "type": "FeatureCollection", "features": features });
+    Ok(([(header::CACHE_CONTROL, "no-cache")], Json(answer)).into_response())
+}
+
+impl PlatformQuery {
+    fn question(&self) -> Result<ObservationQuestion, ServerError> {
+        let region: Region = self.bbox.as_deref().unwrap_or("global").parse()?;
+        let kinds = self.kind.as_deref().map(str::parse).transpose()?;
+        let dataset = self.dataset.as_deref().map(str::parse).transpose()?;
+        Ok(ObservationQuestion {
+            region,
+            from: time(self.from.as_deref())?,
+            to: time(self.to.as_deref())?,
+            datasets: dataset.into_iter().collect(),
+            platforms: vec![],
+            kinds: kinds.into_iter().collect(),
+            properties: self.property.clone().into_iter().collect(),
+            worst: Quality::Questionable,
+            limit: 1,
+            after: None,
+        })
+    }
+}
+
+async fn track(
+    observer: &dyn Observe,
+    platform: &Platform,
+    question: &ObservationQuestion,
+) -> Result<Vec<TrackPoint>, ServerError> {
+    let question = TrackQuestion {
+        dataset: platform.dataset.clone(),
+        platform: platform.name.clone(),
+        from: question.from,
+        to: question.to,
+        limit: TRACK_POINTS,
+    };
+    Ok(observer.track(&question).await?)
+}
+
+fn feature(platform: &Platform, track: &[TrackPoint]) -> Value {
+    let geometry = if track.len() > 1 {
+        json!({ "type": "MultiLineString", "coordinates": lines(track) })
+    } else {
+        json!({ "type": "Point", "coordinates": [platform.lon_deg, platform.lat_deg] })
+    };
+    json!({
+        "type": "Feature",
+        "id": format!("{}/{}", platform.dataset, platform.name),
+        "geometry": geometry,
+        "properties": {
+            "dataset": platform.dataset,
+            "platform": platform.name,
+            "kind": platform.kind,
+            "first": platform.first,
+            "last": platform.last,
+            "lon": platform.lon_deg,
+            "lat": platform.lat_deg,
+            "properties": platform.properties,
+            "count": platform.count,
+        },
+    })
+}
+
+/// A track as lines that stay on one side of the date line, each ending where it crosses (RFC 7946, 3.1.9).
+fn lines(track: &[TrackPoint]) -> Vec<Vec<[f64; 2]>> {
+    let mut all = vec![vec![]];
+    let mut before: Option<TrackPoint> = None;
+    for point in track {
+        if let Some(last) = before
+            && (point.lon_deg - last.lon_deg).abs() > 180.0
+        {
+            let edge = if last.lon_deg > 0.0 { 180.0 } else { -180.0 };
+            let beyond = point.lon_deg + 2.0 * edge;
+            let span = beyond - last.lon_deg;
+            let share = if span == 0.0 {
+                0.0
+            } else {
+                (edge - last.lon_deg) / span
+            };
+            let lat = last.lat_deg + share * (point.lat_deg - last.lat_deg);
+            push(&mut all, [edge, lat]);
+            all.push(vec![[-edge, lat]]);
+        }
+        push(&mut all, [point.lon_deg, point.lat_deg]);
+        before = Some(*point);
+    }
+    all.retain(|line| line.len() > 1);
+    all
+}
+
+fn push(lines: &mut [Vec<[f64; 2]>], place: [f64; 2]) {
+    if let Some(line) = lines.last_mut() {
+        line.push(place);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(lon_deg: f64, lat_deg: f64) -> TrackPoint {
+        TrackPoint {
+            time: "2000".parse().unwrap(),
+            lon_deg,
+            lat_deg,
+        }
+    }
+
+    #[test]
+    fn a_track_over_the_date_line_is_cut_there_both_ways() {
+        let eastwards = lines(&[
+            at(170.0, 0.0),
+            at(178.0, 0.0),
+            at(-178.0, 4.0),
+            at(-170.0, 4.0),
+        ]);
+        let west = vec![[170.0, 0.0], [178.0, 0.0], [180.0, 2.0]];
+        let east = vec![[-180.0, 2.0], [-178.0, 4.0], [-170.0, 4.0]];
+        assert_eq!(eastwards, [west, east]);
+        let westwards = lines(&[at(-179.0, 1.0), at(179.0, 1.0)]);
+        assert_eq!(
+            westwards,
+            [[[-179.0, 1.0], [-180.0, 1.0]], [[180.0, 1.0], [179.0, 1.0]]]
+        );
+    }
+}
