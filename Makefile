@@ -13,7 +13,7 @@ viewer := tile-server/web/dist/index.html
 viewer_sources := $(shell git ls-files tile-server/web)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo build viewer check test bless tools test-tools
+.PHONY: help demo build viewer check test faults bless services services-down cluster cluster-down tools test-tools
 
 help: ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 14
@@ -23,6 +23,20 @@ demo: build ## Ingest real data, compute budgets, serve the globe on http://loca
 
 build: tools viewer ## Build the program and the viewer
 	cargo build --locked -p fluxglobe
+
+services: ## Install and start Kafka, PostGIS, S3, HDFS and Prometheus, each in its own folder and on its own port
+	deploy/services/services.sh install
+	deploy/services/services.sh start
+	@echo 'settings that reach them: eval "$$(deploy/services/services.sh env)"'
+
+services-down: ## Stop them; data stay
+	deploy/services/services.sh stop
+
+cluster: build ## Start the servers and every service as a process, with sample data flowing
+	FLUXGLOBE_PROGRAM=$(fluxglobe) deploy/cluster.sh up
+
+cluster-down: ## Stop the services and the servers; data stay
+	deploy/cluster.sh down
 
 viewer: $(viewer)
 
@@ -45,8 +59,15 @@ test: test-tools $(viewer) ## Everything that CI runs
 	$(FLUXGLOBE_TOOLS)/bin/typos
 	cd tile-server/web && npm run check && npm test
 	cargo build --locked --workspace --all-targets
-	FLUXGLOBE_FLUXENGINE=$$($(fluxglobe) demo --fetch-only) cargo test --locked --workspace
+	deploy/services/services.sh install
+	FLUXGLOBE_FLUXENGINE=$$($(fluxglobe) demo --fetch-only) deploy/with-services.sh cargo test --locked --workspace
 	cargo clippy --locked --workspace --all-targets -- -D warnings
+	deploy/check.sh
+
+faults: test-tools $(viewer) ## kill -9 of every kind of process, 60 times, while granules land and tiles are drawn
+	cargo build --locked --workspace --all-targets
+	deploy/services/services.sh install
+	FLUXGLOBE_KILLS=60 cargo test --locked -p tests --test cluster killed -- --nocapture
 
 bless: test-tools ## Draw the golden images anew and list what changed
 	BLESS=1 cargo test --locked -p render-worker

@@ -32,6 +32,7 @@ say() { printf 'cluster: %s\n' "$*" >&2; }
 # What every service is told.
 settings() {
     deploy/services/services.sh env "${servers[@]}"
+    echo "export FLUXGLOBE_STORE=s3://fluxglobe/cluster"
     echo "export FLUXGLOBE_CLUSTER=http://127.0.0.1:18150"
     echo "export FLUXGLOBE_RENDER_WORKERS=127.0.0.1:18161,127.0.0.1:18162"
     echo "export FLUXGLOBE_ALLOW_FOLDER=$(samples_folder)"

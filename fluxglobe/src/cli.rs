@@ -2,6 +2,7 @@
 
 mod services;
 mod show;
+mod upkeep;
 
 use std::num::NonZeroU16;
 use std::path::PathBuf;
@@ -17,6 +18,7 @@ pub(crate) use services::{
     Topics,
 };
 pub(crate) use show::settings as shown_settings;
+pub(crate) use upkeep::{Gc, Recompute, RecomputeWhat};
 
 /// See and count the ocean's carbon.
 ///
@@ -115,6 +117,10 @@ pub(crate) enum Command {
     /// Refused files and messages.
     #[command(subcommand)]
     Rejected(Rejected),
+    /// Make anew what was derived from a product, where it is stale or missing.
+    Recompute(Recompute),
+    /// Remove objects that no kept version needs.
+    Gc(Gc),
     /// Measure.
     #[command(subcommand)]
     Bench(Bench),

@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a test ends where it cannot go on")]
 
 mod equality;
+mod faults;
 mod granules;
 
 use std::sync::{Mutex, MutexGuard, PoisonError};

@@ -57,6 +57,7 @@ impl Cluster {
         let (planned, scheduler, renderers) = plan(shape);
         let mut settings = servers.settings().to_vec();
         let mut set = |name: &str, value: String| settings.push((name.to_owned(), value));
+        set("FLUXGLOBE_STORE", "s3://fluxglobe/cluster".to_owned());
         set("FLUXGLOBE_CLUSTER", format!("http://{scheduler}"));
         set("FLUXGLOBE_RENDER_WORKERS", renderers.join(","));
         set("FLUXGLOBE_ALLOW_FOLDER", inbox.display().to_string());

@@ -1,6 +1,7 @@
 //! The harness of the end-to-end tests: runs the built program as people do, and knows where the real files are.
 
 pub mod cluster;
+pub mod granule;
 pub mod http;
 pub mod node;
 pub mod program;

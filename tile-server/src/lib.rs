@@ -39,8 +39,10 @@ mod routes;
 mod serve;
 mod state;
 
+pub use catalogue::Layer;
 pub use config::Settings;
 pub use error::{ServeError, ServerError};
+pub use request::job as picture_job;
 pub use router::router;
 pub use serve::{Server, serve};
 pub use state::AppState;

@@ -24,7 +24,7 @@ pub(crate) fn mode(layer: &Layer, text: &str) -> Result<Mode, ServerError> {
 }
 
 /// The job of a picture. Without a time it shows the middle of the last step.
-pub(crate) fn job(
+pub fn job(
     layer: &Layer,
     mode: Mode,
     view: View,

@@ -2,10 +2,12 @@
 
 mod budget;
 pub(crate) mod derive;
+mod gc;
 pub(crate) mod generate;
 mod ingest;
 pub(crate) mod notice;
 mod products;
+mod recompute;
 mod rejected;
 mod render;
 pub(crate) mod serve;
@@ -42,6 +44,8 @@ pub(crate) async fn run(settings: &Settings, command: Command) -> Result<ExitCod
         }
         Command::Topics(command) => topics::run(command).await?,
         Command::Rejected(command) => rejected::run(settings, command).await?,
+        Command::Recompute(options) => recompute::run(settings, options).await?,
+        Command::Gc(options) => gc::run(settings, &options).await?,
         Command::Bench(Bench::Stream(options)) => {
             let log = deployment::needed_log(settings, &options.kafka).await?;
             bench::stream::run(log.as_ref(), &options).await?;

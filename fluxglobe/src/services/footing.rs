@@ -64,6 +64,11 @@ impl Footing {
         })
     }
 
+    /// Where the object store is.
+    pub(crate) fn store_url(&self) -> &str {
+        &self.store_url
+    }
+
     /// The object store, once it is there and proven to hold what it is given. None if asked to stop before.
     pub(crate) async fn store(&self) -> Result<Option<Store>> {
         let open = || async {

@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use anyhow::Result;
 use compute::Engine;
+use kafka_log::KafkaSettings;
 use render_worker::fleet::Fleet;
+use storage::Store;
 use tile_server::{AppState, Server};
 
 use crate::cli::{Settings, TileServer};
@@ -14,7 +16,8 @@ use crate::{deployment, viewer};
 
 pub(crate) async fn run(settings: &Settings, options: TileServer) -> Result<()> {
     let footing = Footing::take(settings, "tile-server", None, &[]).await?;
-    let Some(store) = footing.store().await? else { return footing.leave().await };
+    // Opening asks nobody: /healthz is answered while the store is waited for, and /readyz says so.
+    let store = Store::open(footing.store_url())?;
     let fleet = Fleet::start(&options.fleet, store.clone(), &footing.registry)?;
     let measured = observations::open(&options.observations, &store)?;
     let analyst = Analyst {
@@ -35,10 +38,21 @@ pub(crate) async fn run(settings: &Settings, options: TileServer) -> Result<()> 
     let server = Server::bind(&serve, state.clone()).await?;
     tracing::info!(address = %server.address(), "tile server");
     let serving = tokio::spawn(server.run(footing.stop.said()));
-    // Tiles are served while the log is waited for.
-    if let Some(log) = footing.log(&options.kafka).await? {
-        state.live(log).run(footing.stop.clone()).await;
+    let live = live(&footing, &options.kafka, state).await;
+    if live.is_err() {
+        footing.stop.now();
     }
     serving.await??;
-    footing.leave().await
+    footing.leave().await?;
+    live
+}
+
+/// Follows the event log once store and log are there and of this version.
+async fn live(footing: &Footing, kafka: &KafkaSettings, state: AppState) -> Result<()> {
+    if footing.store().await?.is_some()
+        && let Some(log) = footing.log(kafka).await?
+    {
+        state.live(log).run(footing.stop.clone()).await;
+    }
+    Ok(())
 }

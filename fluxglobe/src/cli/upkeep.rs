@@ -1,0 +1,93 @@
+//! Words of what maintainers do: recompute, remove, survey.
+
+use std::num::NonZeroU16;
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use compute::recompute::What;
+use contract::product::ProductId;
+use contract::time::TimeMs;
+
+/// What is recomputed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum RecomputeWhat {
+    /// Sums that means over named regions are made of.
+    Statistics,
+    /// Sums that budgets of named regions are made of.
+    Budget,
+    /// Accumulated frames and their series.
+    Frames,
+    /// Volume tiles.
+    Tiles,
+}
+
+impl RecomputeWhat {
+    /// The same for the compute cluster, which draws nothing.
+    pub(crate) fn computed(self) -> Option<What> {
+        match self {
+            Self::Statistics => Some(What::Statistics),
+            Self::Budget => Some(What::Budget),
+            Self::Frames => Some(What::Frames),
+            Self::Tiles => None,
+        }
+    }
+}
+
+/// `fluxglobe recompute`.
+#[derive(Debug, Args)]
+pub(crate) struct Recompute {
+    /// Product that others are derived from.
+    #[arg(long)]
+    pub(crate) product: ProductId,
+    /// First instant; the product's first if absent.
+    #[arg(long)]
+    pub(crate) from: Option<TimeMs>,
+    /// First instant after the period; the product's end if absent.
+    #[arg(long)]
+    pub(crate) to: Option<TimeMs>,
+    /// What, separated by commas. Killed at any point, the same command goes on where it was; readers see the old
+    /// version until a new one is whole.
+    #[arg(
+        long,
+        value_enum,
+        value_delimiter = ',',
+        default_value = "statistics,budget,frames,tiles"
+    )]
+    pub(crate) what: Vec<RecomputeWhat>,
+    /// Deepest zoom level of tiles, 0 to 6.
+    #[arg(long, default_value = "2", value_parser = clap::value_parser!(u8).range(0..=6))]
+    pub(crate) zoom: u8,
+    /// Also what is there and right by its name: made again and compared.
+    #[arg(long)]
+    pub(crate) force: bool,
+    /// Show the plan and do nothing.
+    #[arg(long)]
+    pub(crate) dry_run: bool,
+    /// The plan as JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+    #[command(flatten)]
+    pub(crate) kafka: kafka_log::KafkaSettings,
+}
+
+/// `fluxglobe gc`.
+#[derive(Debug, Args)]
+pub(crate) struct Gc {
+    /// Newest versions of each product that stay readable.
+    #[arg(long, default_value = "10")]
+    pub(crate) keep_versions: NonZeroU16,
+    /// Whatever was written in the last days stays.
+    #[arg(long, default_value = "30", value_name = "DAYS")]
+    pub(crate) keep_days: u16,
+    /// List and remove nothing.
+    #[arg(long)]
+    pub(crate) dry_run: bool,
+}
+
+/// `fluxglobe survey`.
+#[derive(Debug, Args)]
+pub(crate) struct Survey {
+    /// Folders of files; each is a set.
+    #[arg(required = true, value_name = "FOLDER")]
+    pub(crate) folders: Vec<PathBuf>,
+}

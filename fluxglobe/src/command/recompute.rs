@@ -1,0 +1,119 @@
+//! `fluxglobe recompute`: what of a product's derived things is stale or missing in a period; shown, then made, once.
+
+mod tiles;
+
+use anyhow::Result;
+use comfy_table::Table;
+use comfy_table::presets::NOTHING;
+use compute::recompute::{Plan, Reason, Request, What};
+use contract::event::Event;
+use serde::Serialize;
+
+use crate::cli::{Recompute, RecomputeWhat, Settings};
+use crate::{deployment, progress};
+
+/// What would be made, for machines.
+#[derive(Serialize)]
+struct Shown<'a> {
+    #[serde(flatten)]
+    plan: &'a Plan,
+    tiles_missing: usize,
+    tiles_there: usize,
+}
+
+pub(crate) async fn run(settings: &Settings, options: Recompute) -> Result<()> {
+    let store = deployment::store(settings)?;
+    deployment::manifest(&store, &options.product, &settings.data).await?;
+    let request = Request {
+        product: options.product.clone(),
+        from: options.from,
+        to: options.to,
+        what: options
+            .what
+            .iter()
+            .filter_map(|what| what.computed())
+            .collect(),
+        is_forced: options.force,
+    };
+    let plan = compute::recompute::plan(&store, &request).await?;
+    let with_tiles = options.what.contains(&RecomputeWhat::Tiles);
+    let wanted = if with_tiles {
+        tiles::plan(&store, &options).await?
+    } else {
+        tiles::Tiles::default()
+    };
+    show(&plan, &wanted, options.json)?;
+    if options.dry_run {
+        progress::say("nothing was done: --dry-run");
+        return Ok(());
+    }
+    let log = deployment::log(settings, &options.kafka).await?;
+    if !plan.items.is_empty() {
+        let bar = progress::bar("recompute", plan.items.len() as u64);
+        let engine = deployment::engine(settings, store.clone())?;
+        let outcome =
+            compute::recompute::run(&engine, &plan, &|done| bar.set_position(done as u64)).await?;
+        if let (Some(log), Some(manifest)) = (log.as_deref(), &outcome.derived)
+            && let Some(body) = compute::derive::derived(manifest)
+        {
+            storage::log::tell_once(log, &Event::new(manifest.id().to_string(), body)).await?;
+        }
+        progress::done(&bar, &format!("{} made", plan.items.len()));
+        if let Some(manifest) = outcome.derived {
+            progress::result(&manifest.id().to_string())?;
+        }
+    }
+    if with_tiles {
+        // Planned anew: what was derived just now gives pictures other names.
+        let wanted = tiles::plan(&store, &options).await?;
+        let kafka = options.kafka.kafka.is_some();
+        tiles::draw(settings, store, log.as_deref().filter(|_| kafka), &wanted).await?;
+    }
+    Ok(())
+}
+
+fn show(plan: &Plan, tiles: &tiles::Tiles, json: bool) -> Result<()> {
+    if json {
+        let shown = Shown {
+            plan,
+            tiles_missing: tiles.missing.len(),
+            tiles_there: tiles.there,
+        };
+        return progress::result(&serde_json::to_string_pretty(&shown)?);
+    }
+    let mut table = Table::new();
+    table.load_preset(NOTHING);
+    table.set_header(["what", "missing", "stale", "forced"]);
+    for (name, what) in [
+        ("frames", What::Frames),
+        ("statistics", What::Statistics),
+        ("budget", What::Budget),
+    ] {
+        let count = |reason| {
+            let of = plan
+                .items
+                .iter()
+                .filter(|item| item.what == what && item.reason == reason);
+            of.count().to_string()
+        };
+        table.add_row([
+            name.to_owned(),
+            count(Reason::Missing),
+            count(Reason::Stale),
+            count(Reason::Forced),
+        ]);
+    }
+    table.add_row([
+        "tiles".to_owned(),
+        tiles.missing.len().to_string(),
+        "0".to_owned(),
+        "0".to_owned(),
+    ]);
+    progress::result(&table.to_string())?;
+    progress::say(&format!(
+        "for {}; {} are right as they are",
+        plan.manifest,
+        plan.fresh_count + tiles.there
+    ));
+    Ok(())
+}
