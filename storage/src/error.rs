@@ -36,15 +36,7 @@ impl StorageError {
     /// May the same call succeed later?
     pub fn is_retryable(&self) -> bool {
         match self {
-            Self::Object { source, .. } => !matches!(
-                source,
-                object_store::Error::NotFound { .. }
-                    | object_store::Error::InvalidPath { .. }
-                    | object_store::Error::NotSupported { .. }
-                    | object_store::Error::NotImplemented { .. }
-                    | object_store::Error::PermissionDenied { .. }
-                    | object_store::Error::Unauthenticated { .. }
-            ),
+            Self::Object { source, .. } => may_pass(source),
             Self::Log { .. } => true,
             Self::Conflict { .. }
             | Self::Damaged { .. }
@@ -80,5 +72,96 @@ impl StorageError {
             object: object.into(),
             reason: reason.to_string(),
         }
+    }
+}
+
+/// May the same request to an object store succeed later?
+///
+/// Clients put whatever they do not tell apart into one kind, `Generic`: there the cause decides. A full disk may be
+/// emptied and a server may come back; a request that a server finds wrong (400 to 499), or a folder that may not be
+/// written, stays as it is.
+pub(crate) fn may_pass(error: &object_store::Error) -> bool {
+    use object_store::Error;
+    match error {
+        Error::NotFound { .. }
+        | Error::InvalidPath { .. }
+        | Error::NotSupported { .. }
+        | Error::NotImplemented { .. }
+        | Error::PermissionDenied { .. }
+        | Error::Unauthenticated { .. }
+        | Error::UnknownConfigurationKey { .. } => false,
+        Error::Generic { source, .. } => !is_final(source.as_ref()),
+        // Two writers at once, or a kind that this version does not know.
+        _ => true,
+    }
+}
+
+fn is_final(cause: &(dyn std::error::Error + 'static)) -> bool {
+    use std::io::ErrorKind;
+    // Requests that were too slow, too many, or in each other's way.
+    const PASSING: [&str; 3] = ["408", "409", "429"];
+    let text = cause.to_string();
+    if let Some((_, status)) = text.split_once("status code: ")
+        && status.starts_with('4')
+    {
+        return !PASSING.iter().any(|passing| status.starts_with(passing));
+    }
+    std::iter::successors(Some(cause), |cause| cause.source())
+        .filter_map(|cause| cause.downcast_ref::<std::io::Error>())
+        .any(|io| {
+            matches!(
+                io.kind(),
+                ErrorKind::PermissionDenied
+                    | ErrorKind::ReadOnlyFilesystem
+                    | ErrorKind::NotADirectory
+            )
+        })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::{Error as IoError, ErrorKind};
+
+    fn generic(source: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> object_store::Error {
+        object_store::Error::Generic {
+            store: "test",
+            source: source.into(),
+        }
+    }
+
+    #[test]
+    fn a_full_disk_may_pass_and_a_locked_folder_may_not() {
+        assert!(may_pass(&generic(IoError::from(ErrorKind::StorageFull))));
+        assert!(may_pass(&generic(IoError::from(
+            ErrorKind::ConnectionRefused
+        ))));
+        assert!(!may_pass(&generic(IoError::from(
+            ErrorKind::PermissionDenied
+        ))));
+        assert!(!may_pass(&generic(IoError::from(
+            ErrorKind::ReadOnlyFilesystem
+        ))));
+    }
+
+    #[test]
+    fn a_servers_trouble_may_pass_and_a_wrong_request_may_not() {
+        let answer =
+            |status: &str| generic(format!("Server returned non-2xx status code: {status}: x"));
+        for status in [
+            "500 Internal Server Error",
+            "503 Slow Down",
+            "429 Too Many Requests",
+        ] {
+            assert!(may_pass(&answer(status)), "{status}");
+        }
+        for status in [
+            "400 Bad Request",
+            "405 Method Not Allowed",
+            "411 Length Required",
+        ] {
+            assert!(!may_pass(&answer(status)), "{status}");
+        }
+        assert!(may_pass(&generic("no answer within 60 s")));
     }
 }

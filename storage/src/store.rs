@@ -1,161 +1,195 @@
 //! The object store: keys in, bytes out; objects are created once and never change.
+//!
+//! One handle for a folder, memory, and the buckets and file systems of other machines. What differs between them is
+//! how an object is created once (`create`), who tries again after a failure that may pass (the clouds' clients
+//! themselves, [`patient`] for HDFS), and nothing else.
 
+mod check;
+mod clouds;
+mod create;
+#[cfg(test)]
+mod faulty;
+mod folder;
+mod hdfs;
+mod leftovers;
+mod location;
+mod patient;
+mod read;
+mod settings;
+
+use std::fmt::{Debug, Formatter};
+use std::path::{Path as FilePath, PathBuf};
 use std::sync::Arc;
 
-use bytes::Bytes;
 use contract::key::ObjectKey;
-use futures::TryStreamExt as _;
+use object_store::ObjectStore;
 use object_store::local::LocalFileSystem;
 use object_store::memory::InMemory;
 use object_store::path::Path;
-use object_store::{ObjectStore, ObjectStoreExt as _, PutMode, PutOptions, PutPayload};
+use object_store::prefix::PrefixStore;
+use url::Url;
 
+use self::location::Location;
 use crate::StorageError;
 
-/// Largest object that is read whole: a frame of the largest grid is 1 GiB uncompressed.
+pub use self::settings::{Patience, Settings};
+
+/// Largest object: a frame of the largest grid is 1 GiB uncompressed.
 const MAX_OBJECT_BYTES: u64 = 2 << 30;
+/// Large objects are read and sent in parts of this size.
+const PART_BYTES: u64 = 16 << 20;
+/// Parts under way at a time.
+const PARTS_AT_ONCE: usize = 4;
 
 /// A handle on one object store; clones share it.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Store {
+    /// The objects by their keys.
     objects: Arc<dyn ObjectStore>,
-    /// What SQL scans prefix keys with, ending in `/`.
+    /// The same objects by bucket and path, as SQL scans name them.
+    root: Arc<dyn ObjectStore>,
+    root_url: Url,
+    /// Where keys begin, ending in `/`.
     url: String,
+    place: Place,
+    patience: Patience,
+}
+
+/// What kind of store it is, where that matters.
+#[derive(Clone)]
+enum Place {
+    Memory,
+    /// The folder, with all links resolved.
+    Folder(PathBuf),
+    Cloud,
+    Hdfs,
 }
 
 impl Store {
-    /// Opens `memory:` or a folder, which is made if absent.
+    /// Opens `memory:`, a folder (also as `file:FOLDER`; made if absent), `s3://BUCKET/PREFIX`, `gs://BUCKET/PREFIX`,
+    /// `az://CONTAINER/PREFIX` or `hdfs://HOST:PORT/PREFIX`. Credentials and endpoints come from the variables of the
+    /// environment that each of them is known by.
+    ///
+    /// Nothing is sent: whether the store answers is for [`Store::check_writable`] to find out.
+    ///
+    /// # Errors
+    /// `Location`, with what to give or set.
     pub fn open(location: &str) -> Result<Self, StorageError> {
-        if location == "memory:" {
-            return Ok(Self::memory());
-        }
+        Self::open_with(location, &Settings::from_environment())
+    }
+
+    /// Opens a store with settings other than this process' environment.
+    pub fn open_with(location: &str, settings: &Settings) -> Result<Self, StorageError> {
         let bad = |reason: String| StorageError::Location {
-            location: location.to_owned(),
+            location: location::shown(location),
             reason,
         };
-        let folder = location.strip_prefix("file:").unwrap_or(location);
-        if folder.contains("://") {
-            return Err(bad("give a folder, file:FOLDER or memory:".to_owned()));
+        let patience = settings.patience;
+        match location::parse(location).map_err(bad)? {
+            Location::Memory => Ok(Self::memory()),
+            Location::Folder(folder) => Self::folder(&folder).map_err(bad),
+            Location::Bucket {
+                cloud,
+                name,
+                prefix,
+            } => {
+                let root = clouds::open(cloud, &name, settings).map_err(bad)?;
+                let root_url = format!("{}://{name}/", cloud.scheme());
+                Self::remote(root, &root_url, &prefix, Place::Cloud, patience).map_err(bad)
+            }
+            Location::Hdfs { node, prefix } => {
+                let root = hdfs::open(&node, settings).map_err(bad)?;
+                let root_url = format!("hdfs://{node}/");
+                Self::remote(root, &root_url, &prefix, Place::Hdfs, patience).map_err(bad)
+            }
         }
-        std::fs::create_dir_all(folder).map_err(|e| bad(e.to_string()))?;
-        let root = std::fs::canonicalize(folder).map_err(|e| bad(e.to_string()))?;
-        let objects = LocalFileSystem::new_with_prefix(&root).map_err(|e| bad(e.to_string()))?;
-        let text = root
-            .to_str()
-            .ok_or_else(|| bad("its path is not UTF-8".to_owned()))?;
-        Ok(Self {
-            objects: Arc::new(objects),
-            url: format!("file://{}/", text.trim_end_matches('/')),
-        })
     }
 
     /// A store that is gone with the process.
     pub fn memory() -> Self {
+        let root: Arc<dyn ObjectStore> = Arc::new(InMemory::new());
         Self {
-            objects: Arc::new(InMemory::new()),
+            objects: Arc::clone(&root),
+            root,
+            root_url: Url::parse("memory:///").expect("this text is a URL"),
             url: "memory:///".to_owned(),
+            place: Place::Memory,
+            patience: Patience::default(),
         }
     }
 
-    /// What SQL scans prefix keys with, ending in `/`.
+    fn folder(folder: &FilePath) -> Result<Self, String> {
+        std::fs::create_dir_all(folder).map_err(|e| e.to_string())?;
+        let root = std::fs::canonicalize(folder).map_err(|e| e.to_string())?;
+        let text = root.to_str().ok_or("its path is not UTF-8")?;
+        let objects = LocalFileSystem::new_with_prefix(&root)
+            .map_err(|e| e.to_string())?
+            // A folder is there as long as an object is in it, as in every other store.
+            .with_automatic_cleanup(true);
+        Ok(Self {
+            objects: Arc::new(objects),
+            root: Arc::new(LocalFileSystem::new()),
+            root_url: Url::parse("file:///").expect("this text is a URL"),
+            url: format!("file://{}/", text.trim_end_matches('/')),
+            place: Place::Folder(root),
+            patience: Patience::default(),
+        })
+    }
+
+    fn remote(
+        root: Arc<dyn ObjectStore>,
+        root_url: &str,
+        prefix: &Path,
+        place: Place,
+        patience: Patience,
+    ) -> Result<Self, String> {
+        let slash = if prefix.as_ref().is_empty() { "" } else { "/" };
+        Ok(Self {
+            objects: Arc::new(PrefixStore::new(Arc::clone(&root), prefix.clone())),
+            root,
+            root_url: Url::parse(root_url).map_err(|e| e.to_string())?,
+            url: format!("{root_url}{prefix}{slash}"),
+            place,
+            patience,
+        })
+    }
+
+    /// Where keys begin, ending in `/`. [`Store::open`] of it is this store again, but for `memory:`.
     pub fn url(&self) -> &str {
         &self.url
     }
 
-    /// Address of one object for SQL scans.
+    /// Where an object is, for people and for `Store::open`'s kind of text; a folder's name is not escaped.
     pub fn url_of(&self, key: &ObjectKey) -> String {
         format!("{}{key}", self.url)
     }
 
-    /// The store itself, for libraries that read by themselves.
+    /// What SQL scans register, once for all objects: a URL of a scheme and a host, and the store that answers for
+    /// every path below it. [`Store::sql_url`] names an object in it.
+    pub fn sql_root(&self) -> (Url, Arc<dyn ObjectStore>) {
+        (self.root_url.clone(), Arc::clone(&self.root))
+    }
+
+    /// Address of one object for SQL scans, escaped as a URL must be.
+    pub fn sql_url(&self, key: &ObjectKey) -> Url {
+        match &self.place {
+            Place::Folder(root) => Url::from_file_path(root.join(key.as_str()))
+                .expect("the folder's path is absolute and UTF-8"),
+            Place::Memory | Place::Cloud | Place::Hdfs => Url::parse(&self.url_of(key))
+                .expect("prefix and key hold only signs that a URL may hold"),
+        }
+    }
+
+    /// The store by its keys, for libraries that read by themselves.
     pub fn object_store(&self) -> Arc<dyn ObjectStore> {
         Arc::clone(&self.objects)
     }
+}
 
-    /// The whole content of an object.
-    pub async fn get(&self, key: &ObjectKey) -> Result<Bytes, StorageError> {
-        let found = self
-            .objects
-            .get(&path(key))
-            .await
-            .map_err(|e| failed(key, e))?;
-        if found.meta.size > MAX_OBJECT_BYTES {
-            return Err(StorageError::damaged(
-                key.as_str(),
-                "it is larger than 2 GiB",
-            ));
-        }
-        found.bytes().await.map_err(|e| failed(key, e))
-    }
-
-    /// Is there such an object?
-    pub async fn exists(&self, key: &ObjectKey) -> Result<bool, StorageError> {
-        match self.objects.head(&path(key)).await {
-            Ok(_) => Ok(true),
-            Err(object_store::Error::NotFound { .. }) => Ok(false),
-            Err(e) => Err(failed(key, e)),
-        }
-    }
-
-    /// Creates an object: true if written now, false if the same content was there.
-    ///
-    /// A store can answer "already exists" to its own half-answered request, so on doubt the object is read back
-    /// and compared.
-    pub async fn put_new(&self, key: &ObjectKey, content: Bytes) -> Result<bool, StorageError> {
-        let options = PutOptions {
-            mode: PutMode::Create,
-            ..PutOptions::default()
-        };
-        let payload = PutPayload::from_bytes(content.clone());
-        match self.objects.put_opts(&path(key), payload, options).await {
-            Ok(_) => Ok(true),
-            Err(object_store::Error::AlreadyExists { .. }) => {
-                if self.get(key).await? == content {
-                    Ok(false)
-                } else {
-                    Err(StorageError::Conflict { key: key.clone() })
-                }
-            }
-            Err(e) => Err(failed(key, e)),
-        }
-    }
-
-    /// Keys under a folder, sorted.
-    pub async fn list(&self, folder: &str) -> Result<Vec<ObjectKey>, StorageError> {
-        let found: Vec<_> = self
-            .objects
-            .list(Some(&Path::from(folder)))
-            .try_collect()
-            .await
-            .map_err(|e| failed(folder, e))?;
-        // Names that are no keys of ours (a temporary file of the store, say) are not ours to report.
-        let mut keys: Vec<ObjectKey> = found
-            .iter()
-            .filter_map(|meta| meta.location.as_ref().parse().ok())
-            .collect();
-        keys.sort();
-        Ok(keys)
-    }
-
-    /// Names of the folders directly under a folder, sorted.
-    pub async fn folders(&self, folder: &str) -> Result<Vec<String>, StorageError> {
-        let found = self
-            .objects
-            .list_with_delimiter(Some(&Path::from(folder)))
-            .await
-            .map_err(|e| failed(folder, e))?;
-        let mut names: Vec<String> = found
-            .common_prefixes
-            .iter()
-            .filter_map(|prefix| {
-                prefix
-                    .parts()
-                    .next_back()
-                    .map(|part| part.as_ref().to_owned())
-            })
-            .collect();
-        names.sort();
-        Ok(names)
+/// Shows where it is and no more: clients hold credentials.
+impl Debug for Store {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        f.debug_tuple("Store").field(&self.url).finish()
     }
 }
 
@@ -171,49 +205,4 @@ fn failed(key: impl std::fmt::Display, source: object_store::Error) -> StorageEr
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn stores() -> (tempfile::TempDir, Vec<Store>) {
-        let folder = tempfile::tempdir().unwrap();
-        let local = Store::open(folder.path().to_str().unwrap()).unwrap();
-        (folder, vec![local, Store::memory()])
-    }
-
-    #[tokio::test]
-    async fn an_object_is_created_once_and_never_changes() {
-        let (_folder, stores) = stores();
-        let key: ObjectKey = "a/b.txt".parse().unwrap();
-        for store in stores {
-            assert!(!store.exists(&key).await.unwrap());
-            assert!(store.put_new(&key, Bytes::from("one")).await.unwrap());
-            assert!(!store.put_new(&key, Bytes::from("one")).await.unwrap());
-            let other = store.put_new(&key, Bytes::from("two")).await;
-            assert!(matches!(other, Err(StorageError::Conflict { .. })));
-            assert_eq!(store.get(&key).await.unwrap(), "one");
-        }
-    }
-
-    #[tokio::test]
-    async fn listings_are_sorted_and_name_folders() {
-        let (_folder, stores) = stores();
-        for store in stores {
-            for name in ["m/q/2", "m/p/1", "m/q/1"] {
-                let key = name.parse().unwrap();
-                store.put_new(&key, Bytes::from("x")).await.unwrap();
-            }
-            let keys: Vec<_> = store.list("m").await.unwrap();
-            let names: Vec<_> = keys.iter().map(ObjectKey::as_str).collect();
-            assert_eq!(names, ["m/p/1", "m/q/1", "m/q/2"]);
-            assert_eq!(store.folders("m").await.unwrap(), ["p", "q"]);
-            assert!(store.folders("nothing").await.unwrap().is_empty());
-        }
-    }
-
-    #[tokio::test]
-    async fn a_missing_object_is_told_from_a_broken_store() {
-        let missing = Store::memory().get(&"a/b".parse().unwrap()).await;
-        let error = missing.unwrap_err();
-        assert!(error.is_not_found() && !error.is_retryable());
-    }
-}
+mod tests;

@@ -1,0 +1,287 @@
+//! Buckets of clouds: opened with each cloud's usual variables, refused with advice when one is missing.
+
+use std::sync::Arc;
+
+use object_store::aws::{AmazonS3Builder, AmazonS3ConfigKey};
+use object_store::azure::{AzureConfigKey, MicrosoftAzureBuilder};
+use object_store::gcp::{GoogleCloudStorageBuilder, GoogleConfigKey};
+use object_store::{BackoffConfig, ClientConfigKey, ObjectStore, RetryConfig};
+
+use super::location::Cloud;
+use super::settings::{Patience, Settings};
+
+/// Opens a bucket; nothing is sent yet.
+///
+/// # Errors
+/// What to set, in words that hold no value of a variable.
+pub(super) fn open(
+    cloud: Cloud,
+    bucket: &str,
+    settings: &Settings,
+) -> Result<Arc<dyn ObjectStore>, String> {
+    match cloud {
+        Cloud::S3 => s3(bucket, settings),
+        Cloud::Google => google(bucket, settings),
+        Cloud::Azure => azure(bucket, settings),
+    }
+}
+
+fn s3(bucket: &str, settings: &Settings) -> Result<Arc<dyn ObjectStore>, String> {
+    use AmazonS3ConfigKey as Key;
+    let mut builder = AmazonS3Builder::new();
+    for (key, value) in settings.options::<Key>("AWS_") {
+        builder = builder.with_config(key, value);
+    }
+    let is_set = |key| builder.get_config_value(&key).is_some();
+    let has_keys = is_set(Key::AccessKeyId) && is_set(Key::SecretAccessKey);
+    let has_identity = is_set(Key::WebIdentityTokenFile) && is_set(Key::RoleArn);
+    let has_container = is_set(Key::ContainerCredentialsRelativeUri)
+        || is_set(Key::ContainerCredentialsFullUri) && is_set(Key::ContainerAuthorizationTokenFile);
+    let is_unsigned = settings.is_on("AWS_SKIP_SIGNATURE");
+    // Without any of these the library would ask an instance's metadata service, an address that must be meant.
+    if !(has_keys || has_identity || has_container || is_unsigned || is_set(Key::MetadataEndpoint))
+    {
+        return Err(
+            "no credentials: set AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, or \
+             AWS_WEB_IDENTITY_TOKEN_FILE and AWS_ROLE_ARN; for the role of the machine itself set \
+             AWS_METADATA_ENDPOINT=http://169.254.169.254"
+                .to_owned(),
+        );
+    }
+    let endpoint = [Key::S3Endpoint, Key::Endpoint]
+        .iter()
+        .find_map(|key| builder.get_config_value(key));
+    let plain = plain_http(
+        endpoint.as_deref(),
+        settings,
+        "AWS_ENDPOINT_URL",
+        "AWS_ALLOW_HTTP",
+    )?;
+    for (key, value) in client_options(settings.patience, plain) {
+        builder = builder.with_config(Key::Client(key), value);
+    }
+    let store = builder
+        .with_bucket_name(bucket)
+        // Objects are created once: a store that cannot promise that is found out by `check_writable`.
+        .with_config(Key::ConditionalPut, "etag")
+        .with_retry(retries(settings.patience))
+        .build();
+    Ok(Arc::new(store.map_err(|e| e.to_string())?))
+}
+
+fn google(bucket: &str, settings: &Settings) -> Result<Arc<dyn ObjectStore>, String> {
+    use GoogleConfigKey as Key;
+    let mut builder = GoogleCloudStorageBuilder::new();
+    for (key, value) in settings.options::<Key>("GOOGLE_") {
+        builder = builder.with_config(key, value);
+    }
+    let is_set = |key| builder.get_config_value(&key).is_some();
+    let has_account = is_set(Key::ServiceAccount)
+        || is_set(Key::ServiceAccountKey)
+        || is_set(Key::ApplicationCredentials);
+    let is_unsigned = settings.is_on("GOOGLE_SKIP_SIGNATURE");
+    if !(has_account || is_unsigned || settings.has_any(&["GCE_METADATA_HOST"])) {
+        return Err(
+            "no credentials: set GOOGLE_APPLICATION_CREDENTIALS to the file of a service \
+             account; for the account of the machine itself set \
+             GCE_METADATA_HOST=metadata.google.internal"
+                .to_owned(),
+        );
+    }
+    let endpoint = builder.get_config_value(&Key::BaseUrl);
+    let plain = plain_http(
+        endpoint.as_deref(),
+        settings,
+        "GOOGLE_BASE_URL",
+        "GOOGLE_ALLOW_HTTP",
+    )?;
+    for (key, value) in client_options(settings.patience, plain) {
+        builder = builder.with_config(Key::Client(key), value);
+    }
+    let store = builder
+        .with_bucket_name(bucket)
+        .with_retry(retries(settings.patience))
+        .build();
+    Ok(Arc::new(store.map_err(|e| e.to_string())?))
+}
+
+fn azure(container: &str, settings: &Settings) -> Result<Arc<dyn ObjectStore>, String> {
+    use AzureConfigKey as Key;
+    let mut builder = MicrosoftAzureBuilder::new();
+    for prefix in ["AZURE_", "IDENTITY_ENDPOINT"] {
+        for (key, value) in settings.options::<Key>(prefix) {
+            builder = builder.with_config(key, value);
+        }
+    }
+    let is_set = |key| builder.get_config_value(&key).is_some();
+    let is_emulator = settings.is_on("AZURE_STORAGE_USE_EMULATOR");
+    if !is_emulator && !is_set(Key::AccountName) {
+        return Err("no account: set AZURE_STORAGE_ACCOUNT_NAME".to_owned());
+    }
+    let has_key = is_set(Key::AccessKey) || is_set(Key::SasKey) || is_set(Key::Token);
+    let has_client = is_set(Key::ClientId)
+        && is_set(Key::AuthorityId)
+        && (is_set(Key::ClientSecret) || is_set(Key::FederatedTokenFile));
+    let is_unsigned = settings.is_on("AZURE_SKIP_SIGNATURE");
+    if !(is_emulator || has_key || has_client || is_unsigned || is_set(Key::MsiEndpoint)) {
+        return Err("no credentials: set AZURE_STORAGE_ACCOUNT_KEY or AZURE_STORAGE_SAS_KEY, or \
+             AZURE_CLIENT_ID, AZURE_TENANT_ID and AZURE_CLIENT_SECRET; for the identity of the machine \
+             itself set AZURE_MSI_ENDPOINT"
+            .to_owned());
+    }
+    let endpoint = builder.get_config_value(&Key::Endpoint);
+    let plain = plain_http(
+        endpoint.as_deref(),
+        settings,
+        "AZURE_STORAGE_ENDPOINT",
+        "AZURE_ALLOW_HTTP",
+    )?;
+    for (key, value) in client_options(settings.patience, plain) {
+        builder = builder.with_config(Key::Client(key), value);
+    }
+    let store = builder
+        .with_container_name(container)
+        .with_retry(retries(settings.patience))
+        .build();
+    Ok(Arc::new(store.map_err(|e| e.to_string())?))
+}
+
+/// May requests go out without encryption? Only to an endpoint that says `http://`, and only if that is allowed.
+fn plain_http(
+    endpoint: Option<&str>,
+    settings: &Settings,
+    endpoint_name: &str,
+    allowed_name: &str,
+) -> Result<bool, String> {
+    let is_plain = match endpoint.map(url::Url::parse) {
+        None => false,
+        Some(Err(e)) => return Err(format!("{endpoint_name} is no URL: {e}")),
+        Some(Ok(url)) => match url.scheme() {
+            "https" => false,
+            "http" => true,
+            _ => {
+                return Err(format!(
+                    "{endpoint_name} must begin with https:// or http://"
+                ));
+            }
+        },
+    };
+    if is_plain && !settings.is_on(allowed_name) {
+        return Err(format!(
+            "{endpoint_name} is not encrypted: write https://, or set {allowed_name}=true"
+        ));
+    }
+    Ok(is_plain)
+}
+
+/// Time limits and encryption, as every cloud's builder takes them.
+fn client_options(patience: Patience, is_plain: bool) -> [(ClientConfigKey, String); 3] {
+    let seconds = |limit: std::time::Duration| format!("{} ms", limit.as_millis());
+    [
+        (ClientConfigKey::AllowHttp, is_plain.to_string()),
+        (ClientConfigKey::ConnectTimeout, seconds(patience.connect)),
+        (ClientConfigKey::Timeout, seconds(patience.request)),
+    ]
+}
+
+fn retries(patience: Patience) -> RetryConfig {
+    RetryConfig {
+        backoff: BackoffConfig {
+            init_backoff: Patience::FIRST_PAUSE,
+            max_backoff: Patience::LONGEST_PAUSE,
+            base: 2.0,
+        },
+        // Time is the limit: pauses only grow, so that this many are never reached.
+        max_retries: 10_000,
+        retry_timeout: patience.retries,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SECRET: &str = "c2VjcmV0LXZhbHVl";
+
+    fn settings(variables: &[(&str, &str)]) -> Settings {
+        let owned = |&(name, value): &(&str, &str)| (name.to_owned(), value.to_owned());
+        Settings::from_variables(variables.iter().map(owned))
+    }
+
+    fn refusal(cloud: Cloud, variables: &[(&str, &str)]) -> String {
+        let reason = open(cloud, "bucket", &settings(variables)).unwrap_err();
+        assert!(!reason.contains(SECRET), "{reason}");
+        reason
+    }
+
+    #[test]
+    fn a_missing_secret_is_named_for_every_cloud() {
+        let half = [("AWS_ACCESS_KEY_ID", "me")];
+        assert!(refusal(Cloud::S3, &half).contains("AWS_SECRET_ACCESS_KEY"));
+        assert!(refusal(Cloud::S3, &[]).contains("AWS_ACCESS_KEY_ID"));
+        assert!(refusal(Cloud::Google, &[]).contains("GOOGLE_APPLICATION_CREDENTIALS"));
+        assert!(refusal(Cloud::Azure, &[]).contains("AZURE_STORAGE_ACCOUNT_NAME"));
+        let account = [("AZURE_STORAGE_ACCOUNT_NAME", "me")];
+        assert!(refusal(Cloud::Azure, &account).contains("AZURE_STORAGE_ACCOUNT_KEY"));
+    }
+
+    #[test]
+    fn a_secret_that_cannot_be_read_is_not_repeated() {
+        let key = [
+            ("AZURE_STORAGE_ACCOUNT_NAME", "me"),
+            ("AZURE_STORAGE_ACCOUNT_KEY", "c2VjcmV0LXZhbHVl!"),
+        ];
+        refusal(Cloud::Azure, &key);
+        let json = [("GOOGLE_SERVICE_ACCOUNT_KEY", SECRET)];
+        refusal(Cloud::Google, &json);
+        let file = [("GOOGLE_SERVICE_ACCOUNT", "no/such/file")];
+        assert!(refusal(Cloud::Google, &file).contains("no/such/file"));
+    }
+
+    #[test]
+    fn a_plain_endpoint_is_used_only_if_it_is_meant() {
+        let keys = [
+            ("AWS_ACCESS_KEY_ID", "me"),
+            ("AWS_SECRET_ACCESS_KEY", SECRET),
+        ];
+        let with = |more: &[(&str, &str)]| settings(&[&keys[..], more].concat());
+        let endpoint = ("AWS_ENDPOINT_URL", "http://127.0.0.1:1");
+        let reason = open(Cloud::S3, "b", &with(&[endpoint])).unwrap_err();
+        assert!(reason.contains("AWS_ALLOW_HTTP"), "{reason}");
+        open(
+            Cloud::S3,
+            "b",
+            &with(&[endpoint, ("AWS_ALLOW_HTTP", "true")]),
+        )
+        .unwrap();
+        let odd = with(&[("AWS_ENDPOINT_URL_S3", "ftp://h")]);
+        assert!(open(Cloud::S3, "b", &odd).unwrap_err().contains("https://"));
+        // Allowing it changes nothing for an encrypted endpoint.
+        let encrypted = with(&[
+            ("AWS_ENDPOINT_URL", "https://h"),
+            ("AWS_ALLOW_HTTP", "true"),
+        ]);
+        assert_eq!(
+            plain_http(Some("https://h"), &encrypted, "E", "AWS_ALLOW_HTTP"),
+            Ok(false)
+        );
+    }
+
+    #[test]
+    fn whole_settings_open_each_cloud() {
+        let s3 = [
+            ("AWS_ACCESS_KEY_ID", "me"),
+            ("AWS_SECRET_ACCESS_KEY", SECRET),
+        ];
+        open(Cloud::S3, "bucket", &settings(&s3)).unwrap();
+        let machine = [("GCE_METADATA_HOST", "metadata.google.internal")];
+        open(Cloud::Google, "bucket", &settings(&machine)).unwrap();
+        let azure = [
+            ("AZURE_STORAGE_ACCOUNT_NAME", "me"),
+            ("AZURE_STORAGE_ACCOUNT_KEY", SECRET),
+        ];
+        open(Cloud::Azure, "bucket", &settings(&azure)).unwrap();
+        let emulator = [("AZURE_STORAGE_USE_EMULATOR", "true")];
+        open(Cloud::Azure, "bucket", &settings(&emulator)).unwrap();
+    }
+}

@@ -1,0 +1,182 @@
+//! Creating an object once: conditionally, and read back whenever the answer leaves a doubt.
+
+use std::time::Instant;
+
+use backon::{BackoffBuilder as _, ExponentialBuilder};
+use bytes::Bytes;
+use contract::digest::Digest;
+use contract::key::ObjectKey;
+use futures::{StreamExt as _, TryStreamExt as _, stream};
+use object_store::{Error, ObjectStoreExt as _, PutMode, PutOptions, PutPayload};
+
+use super::settings::Patience;
+use super::{
+    MAX_OBJECT_BYTES, PART_BYTES, PARTS_AT_ONCE, Place, Store, failed, folder, hdfs, path,
+};
+use crate::StorageError;
+
+/// Above this size an object that is named by its content is sent to a cloud in parts.
+const WHOLE_BYTES: usize = 64 << 20;
+
+impl Store {
+    /// Creates an object: true if the store said that it was written now, false if the same content is there.
+    ///
+    /// A store can answer "already exists" to its own half-answered request, and an answer can be lost after the
+    /// object was written; so on any doubt the object is read back and compared, and if it is not there the request is
+    /// sent again for as long as the store's patience lasts. A doubt that ends well is told as false.
+    ///
+    /// Objects above 64 MiB go to a cloud in parts if their key names the digest of their bytes: the end of such an
+    /// upload replaces what is there, which are equal bytes then. Any other object is one conditional request.
+    ///
+    /// # Errors
+    /// `Conflict` if other content is there. A retryable error after at most twice the patience.
+    pub async fn put_new(&self, key: &ObjectKey, content: Bytes) -> Result<bool, StorageError> {
+        if content.len() as u64 > MAX_OBJECT_BYTES {
+            return Err(StorageError::damaged(
+                key.as_str(),
+                "it is larger than 2 GiB",
+            ));
+        }
+        if hdfs::is_half_written(last_part(key)) {
+            let reason = "names like .NAME.tmp.1 are those of half-written objects";
+            return Err(StorageError::damaged(key.as_str(), reason));
+        }
+        let begun = Instant::now();
+        let mut pauses = ExponentialBuilder::default()
+            .with_min_delay(Patience::FIRST_PAUSE)
+            .with_max_delay(Patience::LONGEST_PAUSE)
+            .with_jitter()
+            .without_max_times()
+            .build();
+        loop {
+            let error = match self.create(key, &content).await {
+                Ok(()) => return Ok(true),
+                Err(error) => error,
+            };
+            if self.is_refusal(&error) {
+                return Err(self.refused(key, error));
+            }
+            match self.holds(key, &content).await? {
+                Some(true) => return Ok(false),
+                Some(false) => return Err(StorageError::Conflict { key: key.clone() }),
+                None if begun.elapsed() > self.patience.retries => {
+                    return Err(failed(key, error));
+                }
+                None => {
+                    tracing::info!(%key, %error, "not there after a doubtful answer: sent again")
+                }
+            }
+            tokio::time::sleep(pauses.next().unwrap_or(Patience::LONGEST_PAUSE)).await;
+        }
+    }
+
+    async fn create(&self, key: &ObjectKey, content: &Bytes) -> Result<(), Error> {
+        match &self.place {
+            Place::Folder(root) => folder::create(root.clone(), key.clone(), content.clone()).await,
+            Place::Cloud if content.len() > WHOLE_BYTES && is_named_by_content(key, content) => {
+                self.send_parts(key, content).await
+            }
+            Place::Cloud | Place::Hdfs | Place::Memory => {
+                let options = PutOptions::from(PutMode::Create);
+                let payload = PutPayload::from_bytes(content.clone());
+                let sent = self.objects.put_opts(&path(key), payload, options).await;
+                sent.map(|_put| ())
+            }
+        }
+    }
+
+    /// Sends an object in parts; nothing is seen of it before its end.
+    async fn send_parts(&self, key: &ObjectKey, content: &Bytes) -> Result<(), Error> {
+        let path = path(key);
+        match self.objects.head(&path).await {
+            Ok(_there) => {
+                return Err(Error::AlreadyExists {
+                    path: key.to_string(),
+                    source: "it was there before the upload".into(),
+                });
+            }
+            Err(Error::NotFound { .. }) => {}
+            Err(e) => return Err(e),
+        }
+        let mut upload = self.objects.put_multipart(&path).await?;
+        let ends = (0..content.len()).step_by(PART_BYTES as usize);
+        let parts: Vec<_> = ends
+            .map(|at| content.slice(at..content.len().min(at + PART_BYTES as usize)))
+            .map(|part| upload.put_part(PutPayload::from_bytes(part)))
+            .collect();
+        let sent = stream::iter(parts)
+            .buffer_unordered(PARTS_AT_ONCE)
+            .try_collect::<Vec<()>>()
+            .await;
+        let ended = match sent {
+            Ok(_parts) => upload.complete().await.map(|_put| ()),
+            Err(e) => Err(e),
+        };
+        if ended.is_err()
+            && let Err(error) = upload.abort().await
+        {
+            tracing::warn!(%key, %error, "parts of an upload stay until the bucket's lifecycle rule takes them");
+        }
+        ended
+    }
+
+    /// Is the object there, and with this content? It is compared as it comes, not held a second time.
+    pub(super) async fn holds(
+        &self,
+        key: &ObjectKey,
+        content: &Bytes,
+    ) -> Result<Option<bool>, StorageError> {
+        let found = match self.objects.get(&path(key)).await {
+            Ok(found) => found,
+            Err(Error::NotFound { .. }) => return Ok(None),
+            Err(e) => return Err(failed(key, e)),
+        };
+        if found.meta.size != content.len() as u64 {
+            return Ok(Some(false));
+        }
+        let mut pieces = found.into_stream();
+        let mut at = 0;
+        while let Some(piece) = pieces.next().await {
+            let piece = piece.map_err(|e| failed(key, e))?;
+            let end = at + piece.len();
+            if content.get(at..end) != Some(&piece[..]) {
+                return Ok(Some(false));
+            }
+            at = end;
+        }
+        Ok(Some(at == content.len()))
+    }
+
+    fn refused(&self, key: &ObjectKey, error: Error) -> StorageError {
+        match error {
+            Error::NotFound { .. } => StorageError::Location {
+                location: self.url.clone(),
+                reason: "there is no such bucket or container: make it first".to_owned(),
+            },
+            other => failed(key, other),
+        }
+    }
+
+    /// Is this an answer that leaves no doubt: nothing was written, and nothing will be?
+    fn is_refusal(&self, error: &Error) -> bool {
+        match error {
+            // A lost rename on HDFS looks like this; a cloud says so of a missing bucket.
+            Error::NotFound { .. } => !matches!(self.place, Place::Hdfs),
+            Error::AlreadyExists { .. } | Error::Precondition { .. } => false,
+            other => !crate::error::may_pass(other),
+        }
+    }
+}
+
+fn last_part(key: &ObjectKey) -> &str {
+    key.as_str().rsplit('/').next().unwrap_or_default()
+}
+
+/// Does the last part of the key begin with the digest of these bytes?
+fn is_named_by_content(key: &ObjectKey, content: &[u8]) -> bool {
+    let stem = last_part(key).split('.').next().unwrap_or_default();
+    stem == Digest::of(content).to_string()
+}
+
+#[cfg(test)]
+mod tests;

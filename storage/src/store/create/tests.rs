@@ -1,0 +1,106 @@
+//! Creating once, against stores that lose answers, tell untruths and fail.
+
+use super::*;
+use crate::store::faulty::{Fault, Faulty, absent, broken, denied, exists};
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+fn store(faulty: &Arc<Faulty>) -> Store {
+    Store {
+        objects: Arc::clone(faulty) as _,
+        place: Place::Cloud,
+        patience: Patience {
+            retries: Duration::from_millis(600),
+            ..Patience::default()
+        },
+        ..Store::memory()
+    }
+}
+
+fn key() -> ObjectKey {
+    "manifests/p/0000000001.json".parse().unwrap()
+}
+
+#[tokio::test]
+async fn a_lost_answer_is_read_back_and_not_written_twice() {
+    let faulty = Faulty::new([Fault::LoseAnswer]);
+    let store = store(&faulty);
+    assert!(!store.put_new(&key(), Bytes::from("one")).await.unwrap());
+    assert_eq!(store.get(&key()).await.unwrap(), "one");
+    assert_eq!(faulty.put_count(), 1);
+}
+
+#[tokio::test]
+async fn exists_without_an_object_is_sent_again() {
+    let faulty = Faulty::new([Fault::Fail(exists), Fault::Fail(broken)]);
+    let store = store(&faulty);
+    assert!(store.put_new(&key(), Bytes::from("one")).await.unwrap());
+    assert_eq!(faulty.put_count(), 3);
+}
+
+#[tokio::test]
+async fn another_writers_object_is_a_conflict_however_the_answer_came() {
+    for fault in [Fault::Fail(broken), Fault::Fail(exists)] {
+        let faulty = Faulty::new([fault]);
+        faulty
+            .inner
+            .put(&path(&key()), "theirs".into())
+            .await
+            .unwrap();
+        // Of the same length: the content is compared, not the size.
+        let ours = store(&faulty).put_new(&key(), Bytes::from("ours!!")).await;
+        assert!(
+            matches!(ours, Err(StorageError::Conflict { .. })),
+            "{ours:?}"
+        );
+    }
+}
+
+#[tokio::test]
+async fn a_store_that_stays_broken_ends_in_a_retryable_error() {
+    let faulty = Faulty::always(Fault::Fail(broken));
+    let begun = Instant::now();
+    let error = store(&faulty).put_new(&key(), Bytes::from("x")).await;
+    assert!(error.unwrap_err().is_retryable());
+    assert!(faulty.put_count() > 1 && begun.elapsed() < Duration::from_secs(5));
+}
+
+#[tokio::test]
+async fn a_refusal_is_told_at_once() {
+    let faulty = Faulty::always(Fault::Fail(denied));
+    let error = store(&faulty)
+        .put_new(&key(), Bytes::from("x"))
+        .await
+        .unwrap_err();
+    assert!(!error.is_retryable());
+    assert_eq!(faulty.put_count(), 1);
+    let faulty = Faulty::always(Fault::Fail(absent));
+    let error = store(&faulty)
+        .put_new(&key(), Bytes::from("x"))
+        .await
+        .unwrap_err();
+    assert!(matches!(error, StorageError::Location { .. }), "{error}");
+}
+
+#[tokio::test]
+async fn only_what_is_named_by_its_content_is_sent_in_parts() {
+    let faulty = Faulty::new([]);
+    let store = store(&faulty);
+    let large = Bytes::from(vec![1; WHOLE_BYTES + 1]);
+    let named = ObjectKey::frame(&"p".parse().unwrap(), &Digest::of(&large));
+    assert!(store.put_new(&named, large.clone()).await.unwrap());
+    assert!(!store.put_new(&named, large.clone()).await.unwrap());
+    assert_eq!(faulty.multipart_count.load(Ordering::Relaxed), 1);
+    assert_eq!(faulty.put_count(), 0);
+    assert!(store.put_new(&key(), large.clone()).await.unwrap());
+    assert_eq!(faulty.put_count(), 1);
+    assert!(store.get(&named).await.unwrap() == large);
+}
+
+#[tokio::test]
+async fn names_of_half_written_objects_are_not_taken() {
+    let key = "a/.b.tmp.1".parse().unwrap();
+    let made = Store::memory().put_new(&key, Bytes::from("x")).await;
+    assert!(matches!(made, Err(StorageError::Damaged { .. })));
+}

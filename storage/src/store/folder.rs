@@ -1,0 +1,158 @@
+//! Objects in a folder of this machine, durable when they are told of: file and folders are flushed to the disk.
+
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, ErrorKind, Write as _};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use bytes::Bytes;
+use contract::key::ObjectKey;
+
+/// How often a folder may vanish under a writer: a removal takes emptied folders along.
+const ATTEMPTS: usize = 16;
+
+/// Tells this process' half-written files apart.
+static NEXT: AtomicU64 = AtomicU64::new(0);
+
+/// Creates an object: `AlreadyExists` if there is one, and whole or not at all otherwise.
+///
+/// The content reaches the disk under another name first, so that after a power cut no half object bears the key.
+pub(super) async fn create(
+    root: PathBuf,
+    key: ObjectKey,
+    content: Bytes,
+) -> Result<(), object_store::Error> {
+    let path = root.join(key.as_str());
+    let written = tokio::task::spawn_blocking(move || {
+        let written = write(&path, &content);
+        if matches!(&written, Ok(()))
+            || matches!(&written, Err(e) if e.kind() == ErrorKind::AlreadyExists)
+        {
+            // Another writer may have made the name and not yet flushed it.
+            flush_folders(&root, &path)?;
+        }
+        written
+    });
+    match written.await {
+        Ok(Ok(())) => Ok(()),
+        Ok(Err(e)) => Err(failed(&key, e)),
+        Err(e) => Err(e.into()),
+    }
+}
+
+fn write(path: &Path, content: &[u8]) -> io::Result<()> {
+    let (mut file, staging) = stage(path)?;
+    let written = file
+        .write_all(content)
+        .and_then(|()| file.sync_all())
+        .and_then(|()| fs::hard_link(&staging, path));
+    let removed = fs::remove_file(&staging);
+    written?;
+    // The object stands; a second name that stays behind is listed by nobody.
+    if let Err(error) = removed {
+        tracing::warn!(%error, file = %staging.display(), "a temporary file stays behind");
+    }
+    Ok(())
+}
+
+/// A new file beside the object, named as listings pass over (`NAME#DIGITS`).
+fn stage(path: &Path) -> io::Result<(File, PathBuf)> {
+    let folder = path.parent().ok_or(ErrorKind::InvalidInput)?;
+    let mut last = io::Error::from(ErrorKind::NotFound);
+    for _ in 0..ATTEMPTS {
+        let number = NEXT.fetch_add(1, Ordering::Relaxed);
+        let mut name = path.as_os_str().to_owned();
+        name.push(format!("#{}{number:06}", std::process::id()));
+        let staging = PathBuf::from(name);
+        match OpenOptions::new()
+            .write(true)
+            .create_new(true)
+            .open(&staging)
+        {
+            Ok(file) => return Ok((file, staging)),
+            Err(e) if e.kind() == ErrorKind::NotFound => fs::create_dir_all(folder)?,
+            // Left by a killed process that had the same id.
+            Err(e) if e.kind() == ErrorKind::AlreadyExists => last = e,
+            Err(e) => return Err(e),
+        }
+    }
+    // "Already exists" would say that the object does.
+    Err(io::Error::other(format!(
+        "no temporary file could be made: {last}"
+    )))
+}
+
+/// Is this the name of a file that [`stage`] made?
+pub(super) fn is_half_written(name: &str) -> bool {
+    name.rsplit_once('#')
+        .is_some_and(|(_, digits)| !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit()))
+}
+
+/// Flushes the folders of an object, up to the root of the store.
+fn flush_folders(root: &Path, path: &Path) -> io::Result<()> {
+    let inside = |folder: &&Path| folder.starts_with(root);
+    for folder in path.ancestors().skip(1).take_while(inside) {
+        File::open(folder)?.sync_all()?;
+    }
+    Ok(())
+}
+
+fn failed(key: &ObjectKey, source: io::Error) -> object_store::Error {
+    let path = key.to_string();
+    match source.kind() {
+        ErrorKind::AlreadyExists => object_store::Error::AlreadyExists {
+            path,
+            source: source.into(),
+        },
+        ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => {
+            object_store::Error::PermissionDenied {
+                path,
+                source: source.into(),
+            }
+        }
+        _ => object_store::Error::Generic {
+            store: "folder",
+            source: source.into(),
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[tokio::test]
+    async fn a_file_of_a_killed_writer_is_neither_an_object_nor_in_the_way() {
+        let folder = tempfile::tempdir().unwrap();
+        let key: ObjectKey = "a/b".parse().unwrap();
+        fs::create_dir(folder.path().join("a")).unwrap();
+        for number in 0..3 {
+            let name = format!("a/b#{}{number:06}", std::process::id());
+            fs::write(folder.path().join(name), "half").unwrap();
+        }
+        let root = folder.path().to_owned();
+        create(root.clone(), key.clone(), Bytes::from("whole"))
+            .await
+            .unwrap();
+        assert_eq!(fs::read(folder.path().join("a/b")).unwrap(), b"whole");
+        let again = create(root, key, Bytes::from("other")).await;
+        assert!(matches!(
+            again,
+            Err(object_store::Error::AlreadyExists { .. })
+        ));
+        let left = fs::read_dir(folder.path().join("a")).unwrap().count();
+        assert_eq!(left, 4, "the object and the three files that were there");
+    }
+
+    #[tokio::test]
+    async fn a_file_in_the_place_of_a_folder_is_an_error() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("a"), "file").unwrap();
+        let key: ObjectKey = "a/b".parse().unwrap();
+        let made = create(folder.path().to_owned(), key, Bytes::from("x")).await;
+        assert!(
+            matches!(made, Err(object_store::Error::Generic { .. })),
+            "{made:?}"
+        );
+    }
+}

@@ -1,0 +1,93 @@
+//! Patience against a store that fails, loses answers and falls silent.
+
+use super::*;
+use crate::store::faulty::{Fault, Faulty, broken, denied};
+use bytes::Bytes;
+use object_store::ObjectStoreExt as _;
+
+const SHORT: Patience = Patience {
+    connect: Duration::from_millis(100),
+    request: Duration::from_millis(200),
+    retries: Duration::from_millis(1500),
+};
+
+fn patient(inner: &Arc<Faulty>) -> Arc<Patient> {
+    Patient::new(Arc::clone(inner) as Arc<dyn ObjectStore>, SHORT, |e| e)
+}
+
+fn here() -> Path {
+    Path::from("a/b")
+}
+
+#[tokio::test]
+async fn a_failure_that_passes_is_waited_for() {
+    let inner = Faulty::new([Fault::Fail(broken), Fault::Hang, Fault::Fail(broken)]);
+    patient(&inner).put(&here(), "x".into()).await.unwrap();
+    assert_eq!(inner.put_count(), 4);
+}
+
+#[tokio::test]
+async fn a_store_that_never_answers_is_given_up_in_bounded_time() {
+    let inner = Faulty::always(Fault::Hang);
+    let begun = Instant::now();
+    let error = patient(&inner).put(&here(), "x".into()).await.unwrap_err();
+    assert!(
+        error.to_string().contains("no answer within 0.2 s"),
+        "{error}"
+    );
+    assert!(may_pass(&error));
+    // Retries, the pause that began just before their end, and one more try.
+    assert!(
+        begun.elapsed() < SHORT.retries * 3 + SHORT.request,
+        "{:?}",
+        begun.elapsed()
+    );
+    assert!(inner.put_count() > 2);
+}
+
+#[tokio::test]
+async fn what_will_not_change_is_not_tried_again() {
+    let inner = Faulty::always(Fault::Fail(denied));
+    let error = patient(&inner).put(&here(), "x".into()).await.unwrap_err();
+    assert!(matches!(error, Error::PermissionDenied { .. }));
+    assert_eq!(inner.put_count(), 1);
+}
+
+#[tokio::test]
+async fn reads_wait_too_whole_or_in_part() {
+    let inner = Faulty::new([]);
+    inner.inner.put(&here(), "hello".into()).await.unwrap();
+    let store = patient(&inner);
+    let expect = async |answer: &'static str, range: Option<std::ops::Range<u64>>| {
+        inner
+            .gets
+            .lock()
+            .unwrap()
+            .extend([Fault::Fail(broken), Fault::Hang]);
+        let options = GetOptions::new().with_range(range);
+        let found = store.get_opts(&here(), options).await.unwrap();
+        assert_eq!(found.bytes().await.unwrap(), answer);
+        assert!(
+            inner.gets.lock().unwrap().is_empty(),
+            "the faults did not fire"
+        );
+    };
+    expect("hello", None).await;
+    expect("ell", Some(1..4)).await;
+    let listed: Vec<_> = store.list(None).try_collect().await.unwrap();
+    assert_eq!(listed.len(), 1);
+    store.delete(&here()).await.unwrap();
+    assert!(matches!(
+        store.get(&here()).await,
+        Err(Error::NotFound { .. })
+    ));
+}
+
+#[tokio::test]
+async fn long_answers_come_piece_by_piece() {
+    let inner = Faulty::new([]);
+    let long = Bytes::from(vec![7; WHOLE_BYTES as usize + 1]);
+    inner.inner.put(&here(), long.clone().into()).await.unwrap();
+    let found = patient(&inner).get(&here()).await.unwrap();
+    assert!(found.bytes().await.unwrap() == long);
+}

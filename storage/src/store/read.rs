@@ -1,0 +1,146 @@
+//! Reading, listing and removing objects.
+
+use bytes::{Bytes, BytesMut};
+use contract::key::ObjectKey;
+use futures::{StreamExt as _, TryStreamExt as _, stream};
+use object_store::path::Path;
+use object_store::{Error, GetResultPayload, ObjectStoreExt as _};
+
+use super::{MAX_OBJECT_BYTES, PART_BYTES, PARTS_AT_ONCE, Place, Store, failed, hdfs, path};
+use crate::StorageError;
+
+impl Store {
+    /// The whole content of an object. Large ones come in parts, several at a time.
+    ///
+    /// # Errors
+    /// `is_not_found` if there is no such object.
+    pub async fn get(&self, key: &ObjectKey) -> Result<Bytes, StorageError> {
+        let path = path(key);
+        let found = self.objects.get(&path).await.map_err(|e| failed(key, e))?;
+        let size_bytes = found.meta.size;
+        if size_bytes > MAX_OBJECT_BYTES {
+            return Err(StorageError::damaged(
+                key.as_str(),
+                "it is larger than 2 GiB",
+            ));
+        }
+        let is_file = matches!(found.payload, GetResultPayload::File(..));
+        if is_file || size_bytes <= PART_BYTES {
+            return found.bytes().await.map_err(|e| failed(key, e));
+        }
+        drop(found);
+        let starts = (0..size_bytes).step_by(PART_BYTES as usize);
+        let ranges = starts.map(|start| start..size_bytes.min(start + PART_BYTES));
+        let mut parts = stream::iter(ranges)
+            .map(|range| self.objects.get_range(&path, range))
+            .buffered(PARTS_AT_ONCE);
+        let mut content = BytesMut::with_capacity(size_bytes as usize);
+        while let Some(part) = parts.try_next().await.map_err(|e| failed(key, e))? {
+            content.extend_from_slice(&part);
+        }
+        if content.len() as u64 != size_bytes {
+            let reason = format!("{} of {size_bytes} bytes came", content.len());
+            return Err(StorageError::damaged(key.as_str(), reason));
+        }
+        Ok(content.freeze())
+    }
+
+    /// A part of an object, `range_bytes` from its beginning.
+    ///
+    /// # Errors
+    /// `Damaged` if the object is shorter.
+    pub async fn get_range(
+        &self,
+        key: &ObjectKey,
+        range_bytes: std::ops::Range<u64>,
+    ) -> Result<Bytes, StorageError> {
+        let length_bytes = range_bytes.end.saturating_sub(range_bytes.start);
+        if length_bytes == 0 {
+            return Ok(Bytes::new());
+        }
+        let size_bytes = self.size_bytes(key).await?;
+        if range_bytes.end > size_bytes {
+            let reason = format!("bytes {range_bytes:?} of {size_bytes} were asked for");
+            return Err(StorageError::damaged(key.as_str(), reason));
+        }
+        let part = self.objects.get_range(&path(key), range_bytes).await;
+        part.map_err(|e| failed(key, e))
+    }
+
+    /// The size of an object in bytes.
+    pub async fn size_bytes(&self, key: &ObjectKey) -> Result<u64, StorageError> {
+        let meta = self.objects.head(&path(key)).await;
+        Ok(meta.map_err(|e| failed(key, e))?.size)
+    }
+
+    /// Is there such an object?
+    pub async fn exists(&self, key: &ObjectKey) -> Result<bool, StorageError> {
+        match self.objects.head(&path(key)).await {
+            Ok(_) => Ok(true),
+            Err(Error::NotFound { .. }) => Ok(false),
+            Err(e) => Err(failed(key, e)),
+        }
+    }
+
+    /// Keys under a folder, sorted. `""` is the whole store.
+    pub async fn list(&self, folder: &str) -> Result<Vec<ObjectKey>, StorageError> {
+        let mut found = self.objects.list(Some(&Path::from(folder)));
+        let mut keys: Vec<ObjectKey> = vec![];
+        while let Some(meta) = found.try_next().await.map_err(|e| failed(folder, e))? {
+            // Names that are no keys of ours (a half-written file, say) are not ours to report.
+            let name = meta.location.filename().unwrap_or_default();
+            if !hdfs::is_half_written(name) {
+                keys.extend(meta.location.as_ref().parse::<ObjectKey>().ok());
+            }
+        }
+        keys.sort();
+        Ok(keys)
+    }
+
+    /// Names of the folders directly under a folder, sorted.
+    pub async fn folders(&self, folder: &str) -> Result<Vec<String>, StorageError> {
+        let found = self
+            .objects
+            .list_with_delimiter(Some(&Path::from(folder)))
+            .await
+            .map_err(|e| failed(folder, e))?;
+        let mut names: Vec<String> = found
+            .common_prefixes
+            .iter()
+            .filter_map(|prefix| {
+                prefix
+                    .parts()
+                    .next_back()
+                    .map(|part| part.as_ref().to_owned())
+            })
+            .collect();
+        names.sort();
+        Ok(names)
+    }
+
+    /// Removes an object that nothing names any more; it is no error if it is gone already.
+    ///
+    /// Only clean-up may do this: readers trust that what a manifest names is there.
+    pub async fn remove(&self, key: &ObjectKey) -> Result<(), StorageError> {
+        match self.objects.delete(&path(key)).await {
+            Ok(()) | Err(Error::NotFound { .. }) => {}
+            Err(e) => return Err(failed(key, e)),
+        }
+        if matches!(self.place, Place::Hdfs) {
+            self.remove_empty_folders(key).await;
+        }
+        Ok(())
+    }
+
+    /// Folders of an object that hold nothing any more. The file system refuses to remove the others, so that what it
+    /// answers tells where to stop.
+    async fn remove_empty_folders(&self, key: &ObjectKey) {
+        let mut folder = key.as_str();
+        while let Some((parent, _)) = folder.rsplit_once('/') {
+            folder = parent;
+            let Ok(()) = self.objects.delete(&Path::from(folder)).await else {
+                return;
+            };
+        }
+    }
+}

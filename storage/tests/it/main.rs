@@ -1,0 +1,12 @@
+//! What every object store must do, seen on folders, memory, a real S3 server and a real Hadoop file system.
+//!
+//! The S3 server and the file system are those that `deploy/services/services.sh` starts and names in the environment.
+//! Google's and Azure's clients are not run here, there is no server of theirs to be had: their settings and error
+//! texts are tested beside the code.
+
+mod conformance;
+mod fault_proxy;
+mod faults;
+mod killed;
+mod stores;
+mod suite;
