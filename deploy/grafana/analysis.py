@@ -4,81 +4,114 @@ from grafana_foundation_sdk.builders.dashboard import Dashboard
 
 from panels import AMBER, GREEN, RED, dashboard, lines, number, quantiles
 
+# What the tile server is asked for besides pictures and by programs.
+ASKED = 'service="tile-server", operation=~"/api/products/.*"'
 RATE = "service:fluxglobe_requests:rate5m"
 TILES = "fluxglobe_tile_server"
 
 
 def board() -> Dashboard:
     """The dashboard."""
+    failing = f'sum({RATE}{{{ASKED}, outcome=~"failed|busy"}})'
+    board = dashboard(
+        "fluxglobe-analysis", "Fluxglobe analysis", "Budgets, series and derivations on the compute cluster."
+    )
+    numbers = [
+        number(
+            "Executors",
+            "Executors that the scheduler knows. Worry at 0.",
+            "max(fluxglobe_scheduler_executors)",
+            "none",
+            (None, RED),
+            (1, GREEN),
+            width=6,
+        ),
+        number("Products", "Products that viewers can choose.", f"max({TILES}_products_count)", "none", width=6),
+        number(
+            "Tasks waiting",
+            "Tasks that no executor has taken yet. Worry when it lasts: start more executors.",
+            "sum(fluxglobe_scheduler_waiting_tasks)",
+            "none",
+            width=6,
+        ),
+        number(
+            "Questions failing",
+            "Share of budgets and series, asked over HTTP, that get no answer.",
+            f"{failing} / sum({RATE}{{{ASKED}}})",
+            "percentunit",
+            (None, GREEN),
+            (0.01, AMBER),
+            (0.05, RED),
+            width=6,
+        ),
+    ]
+    for panel in numbers:
+        board = board.with_panel(panel)
     return (
-        dashboard("fluxglobe-analysis", "Fluxglobe analysis", "Budgets, series and derivations on the compute cluster.")
-        .with_panel(
-            number(
-                "Executors",
-                "Executors that answer.",
-                'sum(up{job="fluxglobe", service="executor"})',
-                "none",
-                (None, RED),
-                (1, GREEN),
-                width=6,
-            )
-        )
-        .with_panel(
-            number("Products", "Products that viewers can choose.", f"max({TILES}_products_count)", "none", width=6)
-        )
-        .with_panel(
-            number(
-                "Jobs under way", "Ballista jobs that run now.", "sum(fluxglobe_scheduler_in_flight)", "none", width=6
-            )
-        )
-        .with_panel(
-            number(
-                "Analyses failing",
-                "Share of budgets and series that fail.",
-                f'sum({RATE}{{service="tile-server", operation!~"tile.*", outcome=~"failed|retryable"}}) / sum({RATE}{{service="tile-server", operation!~"tile.*"}})',
-                "percentunit",
-                (None, GREEN),
-                (0.01, AMBER),
-                (0.05, RED),
-                width=6,
-            )
-        )
-        .with_panel(
+        board.with_panel(
             lines(
-                "Scheduler",
-                "Jobs and calls by kind and outcome.",
+                "Queries",
+                "Queries on the cluster that ended, by how. `dropped` was cancelled.",
                 "ops",
-                (
-                    "sum by (operation, outcome) (rate(fluxglobe_scheduler_requests_total[$__rate_interval]))",
-                    "{{operation}} {{outcome}}",
-                ),
+                ("sum by (outcome) (rate(fluxglobe_scheduler_requests_total[$__rate_interval]))", "{{outcome}}"),
+                stacked=True,
             )
         )
         .with_panel(
             lines(
-                "Executors",
-                "Tasks by outcome. `retryable` is a store or an executor that came and went.",
+                "Query duration",
+                "From submission to end.",
+                "s",
+                *quantiles("fluxglobe_scheduler_request_seconds", "query"),
+            )
+        )
+        .with_panel(
+            lines(
+                "Derivations",
+                "Products redone because of what landed, by how that ended.",
                 "ops",
-                (
-                    "sum by (operation, outcome) (rate(fluxglobe_executor_requests_total[$__rate_interval]))",
-                    "{{operation}} {{outcome}}",
-                ),
+                ("sum by (outcome) (rate(fluxglobe_deriver_requests_total[$__rate_interval]))", "{{outcome}}"),
+                stacked=True,
             )
         )
         .with_panel(
             lines(
-                "Job duration",
-                "Median and 95th percentile.",
+                "Derivation duration",
+                "From a landed granule to the derived product.",
                 "s",
-                *quantiles("fluxglobe_scheduler_request_seconds", "{{operation}}", by="operation"),
+                *quantiles("fluxglobe_deriver_request_seconds", "derivation"),
             )
         )
         .with_panel(
             lines(
-                "Task duration",
-                "Median and 95th percentile.",
+                "Tasks",
+                "Tasks that ended, by executor. One that stands still among others is stuck.",
+                "ops",
+                ("rate(fluxglobe_executor_tasks_total[$__rate_interval])", "{{instance}}"),
+            )
+        )
+        .with_panel(
+            lines(
+                "Intermediate results",
+                "Bytes in each executor's work folder.",
+                "bytes",
+                ("fluxglobe_executor_work_bytes", "{{instance}}"),
+            )
+        )
+        .with_panel(
+            lines(
+                "Questions",
+                "Budgets and series asked over HTTP, by route.",
+                "ops",
+                (f"sum by (operation) ({RATE}{{{ASKED}}})", "{{operation}}"),
+            )
+        )
+        .with_panel(
+            lines(
+                "Duration of questions",
+                "95 % are answered sooner, by route.",
                 "s",
-                *quantiles("fluxglobe_executor_request_seconds", "{{operation}}", by="operation"),
+                (f"service:fluxglobe_request_seconds:p95_5m{{{ASKED}}}", "{{operation}}"),
             )
         )
     )

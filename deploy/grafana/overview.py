@@ -40,9 +40,9 @@ def board() -> Dashboard:
             (120, RED),
         ),
         number(
-            "Messages waiting",
-            "Messages that ingest has not finished. Worry when it grows.",
-            "sum(fluxglobe_ingestd_lag_messages)",
+            "Notices waiting",
+            "Notices that ingest has not finished. Worry when it grows.",
+            "max(fluxglobe_ingestd_lag_messages)",
             "none",
             (None, GREEN),
             (100, AMBER),
@@ -50,8 +50,8 @@ def board() -> Dashboard:
         ),
         number(
             "Refused in 24 h",
-            "Messages and files refused within a day; `fluxglobe rejected list` says why.",
-            'sum(increase(fluxglobe_ingestd_requests_total{outcome="refused"}[24h])) or vector(0)',
+            "Notices refused within a day; `fluxglobe rejected list` says why.",
+            "sum(increase(fluxglobe_ingestd_rejected_total[24h])) or vector(0)",
             "none",
             (None, GREEN),
             (1, AMBER),
@@ -81,25 +81,28 @@ def board() -> Dashboard:
         .with_panel(
             lines(
                 "Notice to tile",
-                "Time from a granule's notice until a tile that shows it was served. Worry above two minutes.",
+                "Time from a granule's notice until a tile that shows it was there: asked for by a viewer, or ordered ahead. Worry above two minutes.",
                 "s",
-                *quantiles(FRESH, "tile", window="15m"),
+                *quantiles(FRESH, "{{path}}", by="path", window="15m"),
             )
         )
         .with_panel(
             lines(
-                "Messages waiting",
-                "By topic and partition. One partition that grows alone has a slow or a stuck message.",
+                "Notices waiting",
+                "Notices that no ingest process has finished. Worry when the number only grows.",
                 "none",
-                ("sum by (topic, partition) (fluxglobe_ingestd_lag_messages)", "{{topic}}/{{partition}}"),
+                ("max(fluxglobe_ingestd_lag_messages)", "waiting"),
             )
         )
         .with_panel(
             lines(
-                "Granules",
-                "What ingest did with what it was told of. `refused` ends in granule.rejected.",
+                "Notices",
+                "What became of them. `refused` ends in granule.rejected, `retryable` is tried again.",
                 "ops",
-                ("sum by (outcome) (rate(fluxglobe_ingestd_requests_total[$__rate_interval]))", "{{outcome}}"),
+                (
+                    'sum by (outcome) (rate(fluxglobe_ingestd_requests_total{operation="notice"}[$__rate_interval]))',
+                    "{{outcome}}",
+                ),
                 stacked=True,
             )
         )

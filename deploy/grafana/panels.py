@@ -56,7 +56,7 @@ def dashboard(uid: str, title: str, description: str) -> Dashboard:
 
 def service_variable() -> CustomVariable:
     """The service a panel speaks of, as metrics spell it."""
-    names = ["ingestd", "scheduler", "executor", "render_worker", "tile_server"]
+    names = ["ingestd", "scheduler", "deriver", "render_worker", "render_fleet", "tile_server"]
     return CustomVariable("service").label("Service").values(",".join(names)).hide(VariableHide.DONT_HIDE)
 
 

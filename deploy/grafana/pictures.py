@@ -26,7 +26,7 @@ def board() -> Dashboard:
             number(
                 "Drawing, 95 %",
                 "The aims are 15 ms on a large GPU and 150 ms in software.",
-                p95(f"{TILES}_draw_duration_seconds", "15m"),
+                p95(f"{TILES}_draw_seconds", "15m"),
                 "s",
                 width=6,
             )
@@ -34,8 +34,8 @@ def board() -> Dashboard:
         .with_panel(
             number(
                 "Pictures waiting",
-                "At all render workers.",
-                "sum(fluxglobe_render_worker_queue_length)",
+                "Pictures that viewers wait for, at all render workers.",
+                'sum(fluxglobe_render_worker_queue_length{class="on_demand"})',
                 "none",
                 (None, GREEN),
                 (32, AMBER),
@@ -81,7 +81,7 @@ def board() -> Dashboard:
                 "Drawing by mode",
                 "Median and 95th percentile as the tile server sees it, waiting left out.",
                 "s",
-                *quantiles(f"{TILES}_draw_duration_seconds", "{{mode}}", by="mode"),
+                *quantiles(f"{TILES}_draw_seconds", "{{mode}}", by="mode"),
             )
         )
         .with_panel(
@@ -97,8 +97,33 @@ def board() -> Dashboard:
                 "Queue by worker",
                 "One long queue among short ones: a product that many ask for lives on that worker.",
                 "none",
-                ("fluxglobe_render_worker_queue_length", "{{instance}}"),
+                ("sum by (instance, class) (fluxglobe_render_worker_queue_length)", "{{instance}} {{class}}"),
             )
         )
-        .with_panel(spread("Spread of drawing", "Time to draw a picture.", f"{TILES}_draw_duration_seconds"))
+        .with_panel(
+            lines(
+                "Tries",
+                "Pictures asked of single workers, by how that ended. More than one try a picture: workers are slow or away.",
+                "ops",
+                ("sum by (outcome) (rate(fluxglobe_render_fleet_tries_total[$__rate_interval]))", "{{outcome}}"),
+                stacked=True,
+            )
+        )
+        .with_panel(
+            lines(
+                "Render workers",
+                "As the tile servers see them.",
+                "none",
+                ("max by (health) (fluxglobe_render_fleet_workers)", "{{health}}"),
+            )
+        )
+        .with_panel(
+            lines(
+                "Frames kept",
+                "Bytes of frames by where they are; a full memory means frames are read again and again.",
+                "bytes",
+                ("sum by (instance, place) (fluxglobe_render_worker_resident_bytes)", "{{instance}} {{place}}"),
+            )
+        )
+        .with_panel(spread("Spread of drawing", "Time to draw a picture.", f"{TILES}_draw_seconds"))
     )

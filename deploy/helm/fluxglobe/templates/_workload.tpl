@@ -7,13 +7,24 @@ A service account, a deployment and a disruption budget for one service. Takes a
   health     name of the port with /healthz, /readyz and /metrics
   needs      list of store, kafka, postgis, cluster, renderWorkers
   single     true where there must never be two
-  listen     port of --listen, if it has one
+  own        dict of settings that only this service has; a %s in a value becomes drainSeconds
 */}}
 {{- define "fluxglobe.workload" -}}
 {{- $name := printf "%s-%s" (include "fluxglobe.fullname" .root) .service -}}
 {{- $gpu := .settings.gpu | default (dict "enabled" false) -}}
 {{- $autoscaling := .settings.autoscaling | default (dict "enabled" false) -}}
-{{- $kafkaSecret := and (has "kafka" .needs) (include "fluxglobe.kafkaHasUser" .root) -}}
+{{- $secrets := dict -}}
+{{- if has "postgis" .needs }}
+{{- with .root.Values.postgis }}
+{{- $_ := set $secrets "postgis" (dict "name" .secretName "password" true "caKey" .caKey) }}
+{{- end }}
+{{- end }}
+{{- if has "kafka" .needs }}
+{{- $hasUser := eq "yes" (include "fluxglobe.kafkaHasUser" .root) }}
+{{- with .root.Values.kafka }}
+{{- if or $hasUser .caKey }}{{ $_ := set $secrets "kafka" (dict "name" .secretName "password" $hasUser "caKey" .caKey) }}{{ end }}
+{{- end }}
+{{- end }}
 apiVersion: v1
 kind: ServiceAccount
 metadata:
@@ -90,9 +101,9 @@ spec:
             {{- end }}
           env:
             - {name: FLUXGLOBE_LOG, value: {{ .root.Values.log | quote }}}
-            - {name: FLUXGLOBE_DRAIN_LIMIT_S, value: {{ .settings.drainSeconds | quote }}}
-            {{- if .listen }}
-            - {name: FLUXGLOBE_LISTEN, value: "0.0.0.0:{{ .listen }}"}
+            - {name: FLUXGLOBE_LOG_FORMAT, value: json}
+            {{- range $key, $value := .own }}
+            - {name: {{ $key }}, value: {{ $value | replace "%s" (toString $.settings.drainSeconds) | quote }}}
             {{- end }}
             {{- range .ports }}{{ if eq .name "admin" }}
             - {name: FLUXGLOBE_ADMIN, value: "0.0.0.0:{{ .port }}"}
@@ -135,21 +146,26 @@ spec:
             capabilities: {drop: [ALL]}
           volumeMounts:
             - {name: tmp, mountPath: /tmp}
-            {{- if has "postgis" .needs }}
-            - {name: postgis, mountPath: /run/secrets/postgis, readOnly: true}
-            {{- end }}
-            {{- if $kafkaSecret }}
-            - {name: kafka, mountPath: /run/secrets/kafka, readOnly: true}
+            # Files that are worked on; what is there when the pod goes is not missed.
+            - {name: data, mountPath: /data}
+            {{- range $secret, $_ := $secrets }}
+            - {name: {{ $secret }}, mountPath: /run/secrets/{{ $secret }}, readOnly: true}
             {{- end }}
       volumes:
         - {name: tmp, emptyDir: {}}
-        {{- if has "postgis" .needs }}
-        - name: postgis
-          secret: {secretName: {{ .root.Values.postgis.secretName }}, items: [{key: password, path: password}], defaultMode: 0440}
-        {{- end }}
-        {{- if $kafkaSecret }}
-        - name: kafka
-          secret: {secretName: {{ .root.Values.kafka.secretName }}, items: [{key: password, path: password}], defaultMode: 0440}
+        - {name: data, emptyDir: {}}
+        {{- range $secret, $what := $secrets }}
+        - name: {{ $secret }}
+          secret:
+            secretName: {{ $what.name }}
+            defaultMode: 0440
+            items:
+              {{- if $what.password }}
+              - {key: password, path: password}
+              {{- end }}
+              {{- with $what.caKey }}
+              - {key: {{ . }}, path: ca.crt}
+              {{- end }}
         {{- end }}
 ---
 apiVersion: policy/v1

@@ -1,0 +1,152 @@
+#!/usr/bin/env bash
+# Checks everything in deploy/, each kind of file with its own tool, and sees each check fail on a planted fault.
+#   deploy/check.sh            everything
+#   deploy/check.sh NAME...    shell, image, compose, prometheus, grafana, chart, unit
+# The tools are installed by check/install.sh and, for promtool, services/prometheus.sh.
+set -euo pipefail
+
+cd "$(dirname "${BASH_SOURCE[0]}")"
+tools=${FLUXGLOBE_TOOLS:-$HOME/.cache/fluxglobe/tools}
+promtool=${FLUXGLOBE_SERVICES:-$HOME/.cache/fluxglobe/services}/prometheus/bin/promtool
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+
+ran=0
+# checked NAME COMMAND...: runs a check quietly and shows what it said if it fails.
+checked() {
+    local name=$1
+    shift
+    if ! "$@" >"$work/said" 2>&1; then
+        cat "$work/said" >&2
+        printf 'deploy: FAILED: %s\n' "$name" >&2
+        exit 1
+    fi
+    ran=$((ran + 1))
+    printf 'deploy: ok: %s\n' "$name"
+}
+
+# refused NAME TEXT COMMAND...: the check must fail on a planted fault, and say TEXT about it.
+refused() {
+    local name=$1 text=$2
+    shift 2
+    if "$@" >"$work/said" 2>&1 || ! grep --quiet --fixed-strings -- "$text" "$work/said"; then
+        cat "$work/said" >&2
+        printf 'deploy: FAILED: no complaint about "%s" from: %s\n' "$text" "$name" >&2
+        exit 1
+    fi
+    ran=$((ran + 1))
+    printf 'deploy: ok: %s sees a planted fault\n' "$name"
+}
+
+check_shell() {
+    if ! [ -x "$tools/bin/shellcheck" ]; then
+        printf 'deploy: shell: shellcheck has no wheel for this machine, left out\n'
+        return
+    fi
+    local scripts
+    mapfile -t scripts < <(git ls-files '*.sh' | sed 's|^|./|')
+    checked "shellcheck of ${#scripts[@]} scripts" "$tools/bin/shellcheck" --external-sources --source-path=SCRIPTDIR "${scripts[@]}"
+    printf '#!/bin/bash\nrm -r $1\n' >"$work/fault.sh"
+    refused shellcheck SC2086 "$tools/bin/shellcheck" "$work/fault.sh"
+}
+
+check_image() {
+    checked 'hadolint of the Dockerfile' "$tools/bin/hadolint" Dockerfile
+    sed 's/^FROM debian:.*/FROM debian/' Dockerfile >"$work/Dockerfile"
+    refused hadolint DL3006 "$tools/bin/hadolint" "$work/Dockerfile"
+}
+
+compose() { "$tools/bin/docker-compose" --project-directory . --file "$1" --profile '*' config "${@:2}"; }
+
+compose_rules() { compose "$1" --format json | "$tools/bin/python" check/compose.py; }
+
+check_compose() {
+    export FLUXGLOBE_SECRETS=$work/secrets
+    checked 'secrets are made' ./make-secrets.sh
+    checked 'docker compose config' compose compose.yaml --quiet
+    checked 'ports, privileges, limits and health checks of the compose file' compose_rules compose.yaml
+    sed 's/restart: unless-stopped/restrat: unless-stopped/' compose.yaml >"$work/compose.yaml"
+    refused 'docker compose config' restrat compose "$work/compose.yaml" --quiet
+    sed 's/"127\.0\.0\.1:/"/' compose.yaml >"$work/compose.yaml"
+    refused 'the compose file rules' 'to more than this machine' compose_rules "$work/compose.yaml"
+}
+
+check_prometheus() {
+    checked 'promtool check config' "$promtool" check config prometheus/compose.yml prometheus/embedded.yml
+    checked 'promtool check rules' "$promtool" check rules prometheus/rules.yml
+    checked 'promtool test rules' "$promtool" test rules prometheus/rules.test.yml
+    cp prometheus/rules.test.yml "$work/"
+    sed 's/> 0\.05/> 0.5/' prometheus/rules.yml >"$work/rules.yml"
+    refused 'promtool test rules' FluxglobeErrors "$promtool" test rules "$work/rules.test.yml"
+}
+
+check_grafana() {
+    checked 'dashboards are written' "$tools/bin/python" -B grafana/make.py "$work/dashboards"
+    checked 'dashboards are what grafana/make.py writes' diff --recursive "$work/dashboards" grafana/dashboards
+    "$tools/bin/python" check/queries.py grafana/dashboards/*.json >"$work/queries.yml"
+    checked "promtool of the dashboards' queries" "$promtool" check rules "$work/queries.yml"
+    sed 's/histogram_quantile(/histogram_quantil(/' "$work/queries.yml" >"$work/fault.yml"
+    refused "promtool of the dashboards' queries" histogram_quantil "$promtool" check rules "$work/fault.yml"
+}
+
+# helm COMMAND...: without its remarks on our symbolic links, which name files outside the chart on purpose.
+helm() {
+    local status=0
+    "$tools/bin/helm" "$@" 2> >(grep --invert-match 'found symbolic link' >&2) || status=$?
+    return "$status"
+}
+
+schemas_of() {
+    "$tools/bin/kubeconform" -strict -summary \
+        -schema-location "$tools/schemas/$1/{{.ResourceKind}}{{.KindSuffix}}.json" \
+        -schema-location "$tools/schemas/custom/{{.ResourceKind}}{{.KindSuffix}}.json" "${@:2}"
+}
+
+check_chart() {
+    local values name version
+    for values in helm/fluxglobe/values.yaml helm/fluxglobe/ci/*.yaml; do
+        name=$(basename "$values" .yaml)
+        for version in 1.30 1.37; do
+            checked "helm lint, $name values, Kubernetes $version" \
+                helm lint --strict --quiet --kube-version "$version.0" --values "$values" helm/fluxglobe
+            helm template test helm/fluxglobe --namespace ocean --kube-version "$version.0" --values "$values" \
+                >"$work/$name-$version.yaml"
+            checked "kubeconform, $name values, Kubernetes $version" schemas_of "$version" "$work/$name-$version.yaml"
+        done
+    done
+    refused 'the values schema' kafka.security helm lint --kube-version 1.37.0 --set kafka.security=none helm/fluxglobe
+    refused 'the values schema' postgis.url \
+        helm lint --kube-version 1.37.0 --set postgis.url=postgres://me:secret@host/database helm/fluxglobe
+    sed 's/formula: queries/formulae: queries/' "$work/everything-1.37.yaml" >"$work/fault.yaml"
+    refused kubeconform formulae schemas_of 1.37 "$work/fault.yaml"
+    sed 's/runAsNonRoot: true/runAsNonRoot: "yes"/' "$work/everything-1.37.yaml" >"$work/fault.yaml"
+    refused kubeconform runAsNonRoot schemas_of 1.37 "$work/fault.yaml"
+}
+
+check_unit() {
+    if ! command -v systemd-analyze >/dev/null; then
+        printf 'deploy: unit: systemd-analyze is not on this machine, left out\n'
+        return
+    fi
+    local unit
+    # It wants the program to be there.
+    for unit in fluxglobe.service fluxglobe@.service; do
+        sed 's|^ExecStart=[^ ]*|ExecStart=/bin/true|' "$unit" >"$work/${unit/@/@tile-server}"
+        checked "systemd-analyze verify $unit" systemd-analyze verify "$work/${unit/@/@tile-server}"
+    done
+    sed 's|^NoNewPrivileges|NoNewPriviliges|' "$work/fluxglobe.service" >"$work/fault.service"
+    refused 'systemd-analyze verify' NoNewPriviliges unit_without_remarks "$work/fault.service"
+}
+
+# systemd-analyze only remarks on unknown names.
+unit_without_remarks() {
+    systemd-analyze verify "$1" >"$work/remarks" 2>&1
+    cat "$work/remarks"
+    ! [ -s "$work/remarks" ]
+}
+
+check/install.sh
+if ! [ -x "$promtool" ]; then services/prometheus.sh install; fi
+if [ $# = 0 ]; then set -- shell image compose prometheus grafana chart unit; fi
+for name in "$@"; do "check_$name"; done
+printf '%d passed, 0 failed\n' "$ran"
