@@ -7,6 +7,9 @@
 mod merge;
 mod segments;
 
+use std::time::Duration;
+
+use backon::{BackoffBuilder as _, ExponentialBuilder};
 use contract::manifest::{MANIFEST_SCHEMA, Manifest, ManifestId};
 use contract::product::ProductId;
 use contract::time::Period;
@@ -17,8 +20,11 @@ use crate::put::StoredGranule;
 use crate::rejection::Rejection;
 use merge::{Change, Merged};
 
-/// Lost races for the next number before giving up.
-const MAX_TRIES: u32 = 16;
+/// Lost races for the next number before the caller is told; it may go on.
+const MAX_TRIES: u32 = 200;
+/// Pause after a lost race, with jitter: it doubles up to the longest, so that many writers of one product get apart.
+const FIRST_PAUSE: Duration = Duration::from_millis(5);
+const LONGEST_PAUSE: Duration = Duration::from_millis(640);
 
 /// What became of one file.
 #[derive(Debug, Clone, PartialEq)]
@@ -57,7 +63,13 @@ async fn publish(
     product: &ProductId,
     granules: &[StoredGranule],
 ) -> Result<Vec<Committed>, IngestError> {
-    for _ in 0..MAX_TRIES {
+    let pauses = ExponentialBuilder::default()
+        .with_min_delay(FIRST_PAUSE)
+        .with_max_delay(LONGEST_PAUSE)
+        .with_max_times(MAX_TRIES as usize)
+        .with_jitter()
+        .build();
+    for pause in pauses {
         let newest = manifests::latest(store, product)
             .await
             .map_err(IngestError::storage("read the newest manifest"))?;
@@ -69,7 +81,10 @@ async fn publish(
                 let manifest = build(store, product, newest.as_ref(), &merged, granules).await?;
                 match manifests::commit(store, &manifest).await {
                     Ok(()) => manifest,
-                    Err(StorageError::Conflict { .. }) => continue,
+                    Err(StorageError::Conflict { .. }) => {
+                        tokio::time::sleep(pause).await;
+                        continue;
+                    }
                     Err(source) => {
                         return Err(IngestError::Storage {
                             action: "publish a manifest",

@@ -63,6 +63,47 @@ pub enum IngestError {
     /// A background task ended early.
     #[error("a background task ended early: {0}")]
     Task(#[from] tokio::task::JoinError),
+    /// Observations could not be stored.
+    #[error("cannot store observations: {source}")]
+    Observations {
+        /// Why it failed.
+        #[source]
+        source: crate::observation::SinkError,
+    },
+    /// A setting cannot be used.
+    #[error("--{setting}: {detail}")]
+    Setting {
+        /// Its flag.
+        setting: &'static str,
+        /// What is wrong and what to do.
+        detail: String,
+    },
+    /// A file cannot be kept while it is worked on: the disk is full, say.
+    #[error("cannot write to the spool {folder:?}: {source}")]
+    Spool {
+        /// Folder.
+        folder: PathBuf,
+        /// Why it failed.
+        #[source]
+        source: std::io::Error,
+    },
+    /// A digest cannot be taken.
+    #[error("cannot take a digest: {source}")]
+    Digest {
+        /// Why it failed.
+        #[source]
+        source: openssl::error::ErrorStack,
+    },
+    /// Nothing can be fetched over HTTP.
+    #[error("cannot set up HTTP: {source}")]
+    Client {
+        /// Why it failed.
+        #[source]
+        source: reqwest::Error,
+    },
+    /// The sandboxed reader was killed, and not for what its file asked of it.
+    #[error("the file reader was killed")]
+    Killed,
     /// A synthetic file could not be written.
     #[error("cannot write {file:?}: {detail}")]
     Generate {
@@ -80,17 +121,45 @@ impl IngestError {
 
     /// Is the same call worth another try?
     pub fn is_retryable(&self) -> bool {
+        matches!(self.cause(), Cause::Passing)
+    }
+
+    /// Where the cause lies.
+    pub(crate) fn cause(&self) -> Cause {
         match self {
-            Self::Storage { source, .. } => source.is_retryable(),
-            Self::Changed { .. } | Self::Contended { .. } => true,
-            Self::Spawn { .. }
+            Self::Storage { source, .. } if source.is_retryable() => Cause::Passing,
+            Self::Storage { source, .. } => match source {
+                StorageError::Conflict { .. } | StorageError::Damaged { .. } => Cause::Stored,
+                _ if source.is_not_found() => Cause::Stored,
+                _ => Cause::Place,
+            },
+            Self::Observations { source } if source.is_retryable => Cause::Passing,
+            Self::Changed { .. } | Self::Contended { .. } | Self::Spool { .. } | Self::Killed => {
+                Cause::Passing
+            }
+            Self::Observations { .. }
+            | Self::Spawn { .. }
             | Self::Pipe { .. }
-            | Self::Profile { .. }
-            | Self::Contract(_)
-            | Self::Task(_)
-            | Self::Generate { .. } => false,
+            | Self::Setting { .. }
+            | Self::Client { .. }
+            | Self::Digest { .. }
+            | Self::Generate { .. } => Cause::Place,
+            Self::Profile { .. } | Self::Contract(_) | Self::Task(_) => Cause::Granule,
         }
     }
+}
+
+/// Where the cause of a failure lies: what a service does next depends on it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Cause {
+    /// It may be gone at the next try.
+    Passing,
+    /// The place that this program runs in: somebody must mend it, and no file is to blame.
+    Place,
+    /// What is stored of the product.
+    Stored,
+    /// This file makes the program fail.
+    Granule,
 }
 
 /// How a stage can end early: the file is bad, or the program failed.

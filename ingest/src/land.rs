@@ -10,27 +10,21 @@ use futures::{StreamExt as _, TryStreamExt as _};
 use storage::Store;
 use storage::log::EventLog;
 
-use crate::commit::{self, Committed};
+use crate::answer::{self, Answer, Asked, Ready};
 use crate::error::IngestError;
+use crate::fetch::{Expected, Location};
+use crate::gates::Gates;
+use crate::metrics::Metrics;
+use crate::notice::{Notice, Order, notice_body};
 use crate::outcome::Outcome;
 use crate::pipeline::{Pipeline, Prepared};
-use crate::plan::Wish;
 use crate::profile::Profile;
 use crate::progress::{Progress, Stage};
 use crate::put::StoredGranule;
 use crate::settings::Settings;
 
 /// Files that are published together: bounds what a crash makes be done again.
-const COMMIT_FILES: usize = 64;
-
-/// A file to land, and what its sender wants.
-#[derive(Debug, Clone)]
-pub(crate) struct Order<'a> {
-    pub(crate) path: PathBuf,
-    pub(crate) wish: Wish<'a>,
-    /// The same text on everything that follows from one notice.
-    pub(crate) trace: String,
-}
+pub(crate) const COMMIT_FILES: usize = 64;
 
 /// Files to land together.
 #[derive(Debug, Clone, Default)]
@@ -51,122 +45,116 @@ pub async fn land_files(
     batch: Batch<'_>,
     progress: &dyn Progress,
 ) -> Result<Vec<Outcome>, IngestError> {
-    let wish = Wish {
-        profile: batch.profile,
-        product: batch.product,
-    };
-    let order = |path: PathBuf| Order {
-        trace: trace(&path),
-        path,
-        wish,
-    };
-    let orders: Vec<Order<'_>> = batch.files.into_iter().map(order).collect();
-    land_orders(store, log, settings, &orders, progress).await
-}
-
-/// Lands files; an event of each is durable when this returns.
-pub(crate) async fn land_orders(
-    store: &Store,
-    log: &dyn EventLog,
-    settings: &Settings,
-    orders: &[Order<'_>],
-    progress: &dyn Progress,
-) -> Result<Vec<Outcome>, IngestError> {
+    let asked = asked_for(&batch);
+    let (gates, metrics) = (Gates::new(settings), Metrics::unseen());
     let pipeline = Pipeline {
         store,
         settings,
+        gates: &gates,
+        observations: None,
+        metrics: &metrics,
         progress,
     };
-    let mut all = Vec::with_capacity(orders.len());
-    for group in orders.chunks(COMMIT_FILES) {
-        for (order, (outcome, raw_sha256)) in group.iter().zip(land_group(&pipeline, group).await?)
-        {
-            let event = Event::new(order.trace.clone(), outcome.event(raw_sha256, 1));
-            log.append(&event)
-                .await
-                .map_err(IngestError::storage("append an event"))?;
-            progress.done(&outcome);
-            all.push(outcome);
+    let mut all = Vec::with_capacity(asked.len());
+    for group in asked.chunks(COMMIT_FILES) {
+        let answers = land_group(&pipeline, group).await?;
+        let events: Vec<Event> = answers.iter().filter_map(|a| a.event.clone()).collect();
+        log.append(&events)
+            .await
+            .map_err(IngestError::storage("append events"))?;
+        for answer in answers {
+            progress.done(&answer.outcome);
+            all.push(answer.outcome);
         }
     }
     Ok(all)
 }
 
-type Told = (Outcome, Option<Digest>);
+/// What would have been asked, had there been notices.
+pub(crate) fn asked_for(batch: &Batch<'_>) -> Vec<Asked> {
+    batch.files.iter().map(|path| asked(path, batch)).collect()
+}
 
-async fn land_group(
+fn asked(path: &std::path::Path, batch: &Batch<'_>) -> Asked {
+    let shown = path.display().to_string();
+    let body = notice_body(&shown, None, None, 1);
+    let notice = Notice {
+        order_key: body.order_key(),
+        order: Ok(Order {
+            location: Location::File(path.to_owned()),
+            expected: Expected::default(),
+            profile: batch.profile.cloned(),
+            product: batch.product.cloned(),
+        }),
+        shown,
+        attempt: 1,
+        cause: Event::new(trace(path), body),
+    };
+    Asked {
+        notice,
+        origin: None,
+    }
+}
+
+/// Lands a group: its files of one product become durable together, in their order.
+pub(crate) async fn land_group(
     pipeline: &Pipeline<'_>,
-    group: &[Order<'_>],
-) -> Result<Vec<Told>, IngestError> {
-    let prepared: Vec<Prepared> = futures::stream::iter(group)
-        .map(|order| pipeline.prepare(&order.path, order.wish))
+    group: &[Asked],
+) -> Result<Vec<Answer>, IngestError> {
+    let ready: Vec<Ready> = futures::stream::iter(group)
+        .map(|asked| prepare(pipeline, asked))
         .buffered(pipeline.settings.parallel_files.clamp(1, 64))
         .try_collect()
         .await?;
-    let mut told: Vec<Option<Told>> = vec![None; group.len()];
+    let mut answers: Vec<Option<Answer>> = vec![None; group.len()];
     let mut products: BTreeMap<ProductId, Vec<(usize, StoredGranule)>> = BTreeMap::new();
-    for (index, prepared) in prepared.into_iter().enumerate() {
-        let file = group[index].path.clone();
-        match prepared {
-            Prepared::Stored(granule) => products
+    for (index, ready) in ready.into_iter().enumerate() {
+        match ready {
+            Ready::ToCommit(granule) => products
                 .entry(granule.target.product.clone())
                 .or_default()
                 .push((index, granule)),
-            Prepared::AlreadyLanded {
-                raw_sha256,
-                manifest,
-                periods,
-            } => {
-                told[index] = Some((
-                    Outcome::AlreadyLanded {
-                        file,
-                        manifest,
-                        periods,
-                    },
-                    Some(raw_sha256),
-                ));
-            }
-            Prepared::Rejected(rejection) => {
-                told[index] = Some((Outcome::rejected(file, rejection), None));
-            }
+            Ready::Answered(answer) => answers[index] = Some(answer),
         }
     }
-    for (product, stored) in products {
-        let (indices, granules): (Vec<usize>, Vec<StoredGranule>) = stored.into_iter().unzip();
-        for index in &indices {
-            let file = &group[*index].path;
-            pipeline.progress.stage(file, Stage::Commit, 0, 0);
-        }
-        let committed = commit::run(pipeline.store, &product, &granules).await?;
-        for ((index, granule), committed) in indices.into_iter().zip(&granules).zip(committed) {
-            told[index] = Some((
-                outcome(group[index].path.clone(), committed),
-                Some(granule.raw_sha256),
-            ));
+    for stored in products.values() {
+        let batch: Vec<_> = stored
+            .iter()
+            .map(|(index, granule)| (&group[*index], granule))
+            .collect();
+        let committed = commit(pipeline, &batch).await?;
+        for ((index, _), answer) in stored.iter().zip(committed) {
+            answers[*index] = Some(answer);
         }
     }
-    Ok(told.into_iter().flatten().collect())
+    Ok(answers.into_iter().flatten().collect())
 }
 
-fn outcome(file: PathBuf, committed: Committed) -> Outcome {
-    match committed {
-        Committed::Landed {
-            manifest,
-            periods,
-            revised,
-        } => Outcome::Landed {
-            file,
-            manifest,
-            periods,
-            revised,
-        },
-        Committed::AlreadyLanded { manifest, periods } => Outcome::AlreadyLanded {
-            file,
-            manifest,
-            periods,
-        },
-        Committed::Rejected(rejection) => Outcome::rejected(file, rejection),
+/// Takes the file of a notice as far as to the manifest.
+pub(crate) async fn prepare(pipeline: &Pipeline<'_>, asked: &Asked) -> Result<Ready, IngestError> {
+    let prepared = match &asked.notice.order {
+        Ok(order) => pipeline.prepare(&asked.file(), order).await?,
+        Err(rejection) => Prepared::Rejected(rejection.clone()),
+    };
+    asked.settle(pipeline.store, prepared).await
+}
+
+/// Publishes files of one product.
+pub(crate) async fn commit(
+    pipeline: &Pipeline<'_>,
+    batch: &[(&Asked, &StoredGranule)],
+) -> Result<Vec<Answer>, IngestError> {
+    for (asked, _) in batch {
+        pipeline.progress.stage(&asked.file(), Stage::Commit, 0, 0);
     }
+    let running = pipeline.metrics.start("commit");
+    let committed = answer::commit(pipeline.store, batch).await;
+    running.done(match &committed {
+        Ok(_) => service::Outcome::Ok,
+        Err(error) if error.is_retryable() => service::Outcome::Retryable,
+        Err(_) => service::Outcome::Failed,
+    });
+    committed
 }
 
 /// A trace for a file that no notice came for.

@@ -1,12 +1,13 @@
 //! Notice of a file in, landed product out: fetch, inspect, plan, decode, check, encode, put, commit.
 //!
 //! ```text
-//! path -> RawGranule -> InspectedGranule -> PlannedGranule -> DecodedGrid -> CheckedGrid -> EncodedGrid -> StoredGrid -> manifest
-//!        fetch        inspect             plan              decode         check          encode         put           commit
+//! notice -> RawGranule -> InspectedGranule -> PlannedGranule -> DecodedGrid -> CheckedGrid -> EncodedGrid -> StoredGrid -> manifest
+//!          fetch        inspect             plan              decode         check          encode         put           commit
 //! ```
 //! Files are parsed in a process of their own ([`decoder`]); all else here sees only checked descriptions and numbers.
-//! Left out on purpose: swaths and irregular grids (refused), observations, downloads.
+//! Left out on purpose: swaths and irregular grids (refused).
 
+mod answer;
 mod cf;
 mod check;
 mod commit;
@@ -16,9 +17,15 @@ mod encode;
 pub mod error;
 mod fetch;
 mod file;
+mod gates;
 mod generate;
+mod ingestd;
 mod inspect;
 mod land;
+mod landing_note;
+mod metrics;
+mod notice;
+pub mod observation;
 mod outcome;
 mod pipeline;
 mod plan;
@@ -26,16 +33,19 @@ mod profile;
 mod progress;
 mod put;
 mod rejection;
-mod service;
 mod settings;
+mod survey;
 mod unit;
 
 pub use error::IngestError;
+pub use fetch::{AllowedHost, Patience, Sources};
 pub use generate::generate_china_sea;
+pub use ingestd::{IngestService, ServiceSettings};
 pub use land::{Batch, land_files};
+pub use metrics::Metrics;
 pub use outcome::Outcome;
-pub use profile::{Profile, shipped};
+pub use profile::{Profile, Profiles, shipped};
 pub use progress::{Progress, Quiet, Stage};
 pub use rejection::Rejection;
-pub use service::IngestService;
 pub use settings::{DecoderCommand, Limits, Settings};
+pub use survey::{Row, data_files, markdown, survey};

@@ -6,7 +6,9 @@ use std::path::PathBuf;
 use contract::event::{Body, RejectReason};
 use contract::manifest::ManifestId;
 use contract::time::Period;
+use contract::topic::Origin;
 
+use crate::observation::Stored;
 use crate::rejection::Rejection;
 
 /// What became of a file. Shown as one line.
@@ -31,6 +33,13 @@ pub enum Outcome {
         manifest: ManifestId,
         /// Its periods.
         periods: Vec<Period>,
+    },
+    /// It holds observations, which are stored now.
+    Observed {
+        /// The file.
+        file: PathBuf,
+        /// What became of them.
+        stored: Stored,
     },
     /// It was refused.
     Rejected {
@@ -69,7 +78,7 @@ impl Outcome {
     pub fn manifest(&self) -> Option<&ManifestId> {
         match self {
             Self::Landed { manifest, .. } | Self::AlreadyLanded { manifest, .. } => Some(manifest),
-            Self::Rejected { .. } => None,
+            Self::Observed { .. } | Self::Rejected { .. } => None,
         }
     }
 
@@ -78,14 +87,20 @@ impl Outcome {
         match self {
             Self::Landed { file, .. }
             | Self::AlreadyLanded { file, .. }
+            | Self::Observed { file, .. }
             | Self::Rejected { file, .. } => file,
         }
     }
 
-    /// The event that tells the others; a file that was there before is told again, in case its first event was lost.
-    pub(crate) fn event(&self, raw_sha256: Option<contract::digest::Digest>, attempt: u32) -> Body {
+    /// The event that tells the others, if there is one; `origin` is where the refused message lies.
+    pub(crate) fn event(
+        &self,
+        raw_sha256: Option<contract::digest::Digest>,
+        attempt: u32,
+        origin: Option<Origin>,
+    ) -> Option<Body> {
         let path = self.file().display().to_string();
-        match (self, raw_sha256) {
+        Some(match (self, raw_sha256) {
             (
                 Self::Landed {
                     manifest,
@@ -126,11 +141,13 @@ impl Outcome {
                 reason: *reason,
                 detail: format!("{object}: {detail}"),
                 attempt,
+                origin,
             },
+            (Self::Observed { .. }, _) => return None,
             (Self::Landed { .. } | Self::AlreadyLanded { .. }, None) => {
                 unreachable!("a landed file has a digest")
             }
-        }
+        })
     }
 }
 
@@ -162,6 +179,14 @@ impl Display for Outcome {
             Self::AlreadyLanded { file, manifest, .. } => {
                 write!(f, "{}: was in {manifest} already", file.display())
             }
+            Self::Observed { file, stored } => write!(
+                f,
+                "{}: {} observations are new, {} replaced, {} were there",
+                file.display(),
+                stored.new,
+                stored.replaced,
+                stored.same
+            ),
             Self::Rejected {
                 file,
                 object,

@@ -1,5 +1,7 @@
 //! The whole way of one file, stage by stage, up to the manifest: its objects are durable when this returns.
 
+mod observing;
+
 use std::path::Path;
 
 use contract::digest::Digest;
@@ -10,15 +12,21 @@ use storage::{Store, manifests};
 
 use crate::error::{IngestError, Stop};
 use crate::fetch::RawGranule;
+use crate::gates::Gates;
+use crate::metrics::{Metrics, ended};
+use crate::notice::Order;
+use crate::observation::{ObservationSink, Stored};
 use crate::plan::{PlannedGranule, Wish};
 use crate::progress::{Progress, Stage};
 use crate::put::{StoredGranule, StoredGrid};
 use crate::rejection::Rejection;
 use crate::settings::Settings;
-use crate::{check, decode, encode, fetch, inspect, plan, put};
+use crate::{check, decode, encode, fetch, inspect, observation, plan, put};
 
 /// Times a file that changes under our hands is read again.
 const MAX_READS: u32 = 3;
+/// Bytes of the beginning of a file from which a text is recognised.
+const TEXT_HEAD_BYTES: usize = 256 << 10;
 
 /// What is left to do for a file.
 #[derive(Debug)]
@@ -31,14 +39,21 @@ pub(crate) enum Prepared {
         manifest: ManifestId,
         periods: Vec<Period>,
     },
+    /// Nothing: it held observations, which are stored.
+    Observed(Stored),
     /// Nothing: it is refused.
     Rejected(Rejection),
 }
 
 /// What every file's way needs.
+#[derive(Clone, Copy)]
 pub(crate) struct Pipeline<'a> {
     pub(crate) store: &'a Store,
     pub(crate) settings: &'a Settings,
+    pub(crate) gates: &'a Gates,
+    /// Where observations go; files of them are refused if there is none.
+    pub(crate) observations: Option<&'a dyn ObservationSink>,
+    pub(crate) metrics: &'a Metrics,
     pub(crate) progress: &'a dyn Progress,
 }
 
@@ -46,35 +61,69 @@ impl Pipeline<'_> {
     /// Takes a file as far as to the manifest.
     pub(crate) async fn prepare(
         &self,
-        path: &Path,
-        wish: Wish<'_>,
+        shown: &Path,
+        order: &Order,
     ) -> Result<Prepared, IngestError> {
+        let mut was_killed = false;
         for _ in 0..MAX_READS {
-            match self.stages(path, wish).await {
+            match self.stages(shown, order).await {
                 Ok(prepared) => return Ok(prepared),
                 Err(Stop::Rejected(rejection)) => return Ok(Prepared::Rejected(rejection)),
-                Err(Stop::Failed(IngestError::Changed { file })) => {
-                    tracing::info!(file = %file.display(), "changed while it was read");
+                Err(Stop::Failed(IngestError::Changed { .. })) => {
+                    tracing::info!(file = %shown.display(), "changed while it was read");
+                }
+                Err(Stop::Failed(IngestError::Killed)) => {
+                    tracing::warn!(file = %shown.display(), "its reader was killed");
+                    was_killed = true;
                 }
                 Err(Stop::Failed(error)) => return Err(error),
             }
         }
-        let detail = "kept changing while it was read; give it when it is complete";
-        Ok(Prepared::Rejected(Rejection::new(
-            RejectReason::Unreadable,
-            "file",
-            detail,
-        )))
+        let (reason, detail) = if was_killed {
+            let detail = "had its reader killed again and again, as happens where memory is short; give it in smaller pieces";
+            (RejectReason::TooLarge, detail)
+        } else {
+            let detail = "kept changing while it was read; give it when it is complete";
+            (RejectReason::Unreadable, detail)
+        };
+        Ok(Prepared::Rejected(Rejection::new(reason, "file", detail)))
     }
 
-    async fn stages(&self, path: &Path, wish: Wish<'_>) -> Result<Prepared, Stop> {
-        let limits = self.settings.limits;
-        self.progress.stage(path, Stage::Fetch, 0, 0);
-        let raw = fetch::run(path, limits).await?;
+    async fn stages(&self, shown: &Path, order: &Order) -> Result<Prepared, Stop> {
+        let Self {
+            settings, metrics, ..
+        } = self;
+        self.progress.stage(shown, Stage::Fetch, 0, 0);
+        let fetched = fetch::run(&order.location, &order.expected, settings);
+        let raw = metrics.timed("fetch", fetched).await?;
+        metrics.fetched(raw.size_bytes);
+        let _pass = self.gates.enter(raw.size_bytes).await;
+        let read = self.read(shown, raw.clone(), order.wish()).await;
+        match read {
+            // Whatever is wrong with a file that changed meanwhile may be right the next time.
+            Err(Stop::Rejected(rejection)) => {
+                raw.check_unchanged()?;
+                Err(rejection.into())
+            }
+            other => other,
+        }
+    }
+
+    async fn read(&self, path: &Path, raw: RawGranule, wish: Wish<'_>) -> Result<Prepared, Stop> {
+        let metrics = self.metrics;
+        if let Some(format) = observation::recognise_text(&raw.head(TEXT_HEAD_BYTES).await?) {
+            return self.observe_text(format, raw, wish).await;
+        }
         self.progress.stage(path, Stage::Inspect, 0, 0);
-        let inspected = inspect::run(raw, self.settings).await?;
+        let inspected = metrics
+            .timed("inspect", inspect::run(raw, self.settings))
+            .await?;
+        if wish.profile.is_none() && observation::recognise(&inspected.description).is_some() {
+            return self.observe(inspected, wish).await;
+        }
         self.progress.stage(path, Stage::Plan, 0, 0);
-        let mut planned = plan::run(inspected, wish, limits).await?;
+        let planned = plan::run(inspected, wish, self.settings);
+        let mut planned = metrics.timed("plan", planned).await?;
         if let Some(landed) = self.landed_before(&planned, wish).await? {
             return Ok(landed);
         }
@@ -119,7 +168,10 @@ impl Pipeline<'_> {
         let tell = |stage| self.progress.stage(path, stage, number, count);
         tell(Stage::Decode);
         let step = planned.steps[index];
-        let decoded = decode::run(planned, step).await?;
+        let decoded = self
+            .metrics
+            .timed("decode", decode::run(planned, step))
+            .await?;
         tell(Stage::Check);
         let (quantity, product, grid) = (
             planned.target.quantity,
@@ -127,19 +179,27 @@ impl Pipeline<'_> {
             planned.mapping.grid,
         );
         let variable = planned.variable.name.clone();
+        let metrics = self.metrics.clone();
         let encoded = tokio::task::spawn_blocking(move || {
-            let checked = check::run(decoded, quantity, &variable)?;
+            let running = metrics.start("check");
+            let checked = check::run(decoded, quantity, &variable).map_err(Stop::from);
+            running.done(ended(&checked));
+            let checked = checked?;
             if checked.valid_cells == 0 {
                 return Ok::<_, Stop>(None);
             }
-            Ok(Some(encode::run(&checked, &product, &grid)?))
+            let running = metrics.start("encode");
+            let encoded = encode::run(&checked, &product, &grid).map_err(Stop::from);
+            running.done(ended(&encoded));
+            encoded.map(Some)
         })
         .await??;
         let Some(encoded) = encoded else {
             return Ok(None);
         };
         tell(Stage::Put);
-        Ok(Some(put::run(self.store, encoded, &planned.raw).await?))
+        let put = async { Ok(put::run(self.store, encoded, &planned.raw).await?) };
+        self.metrics.timed("put", put).await.map(Some)
     }
 
     /// Is this very file in the product? With a profile of the caller's own it is decoded all the same, since the same

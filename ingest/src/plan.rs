@@ -22,7 +22,7 @@ use crate::file::description::{Description, Part, Variable};
 use crate::inspect::InspectedGranule;
 use crate::profile::Profile;
 use crate::rejection::Rejection;
-use crate::settings::Limits;
+use crate::settings::{Limits, Settings};
 
 /// A file of which is known what will be read and what it will become.
 pub(crate) struct PlannedGranule {
@@ -44,6 +44,8 @@ pub(crate) struct Target {
     pub(crate) source: String,
     pub(crate) quantity: Quantity,
     pub(crate) synthetic: bool,
+    /// Name of the profile it was read with; none for a file that follows CF.
+    pub(crate) profile: Option<String>,
 }
 
 /// One step of the file: where it is and how its values become stored ones, `stored = value * factor + offset`.
@@ -74,17 +76,16 @@ struct Planning<'a> {
 pub(crate) async fn run(
     granule: InspectedGranule,
     wish: Wish<'_>,
-    limits: Limits,
+    settings: &Settings,
 ) -> Result<PlannedGranule, Stop> {
+    let limits = settings.limits;
     let InspectedGranule {
         raw,
         session,
         description,
     } = granule;
     let fits = |profile: &&Profile| profile.is_for(&raw.file_name, &description);
-    let profile = wish
-        .profile
-        .or_else(|| crate::profile::shipped().iter().find(fits));
+    let profile = wish.profile.or_else(|| settings.profiles.iter().find(fits));
     let (variable, meaning) = target::choose(&description, profile)?;
     let target = target::target(
         &description,

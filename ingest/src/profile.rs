@@ -2,6 +2,7 @@
 //!
 //! A profile is a TOML file (see `profiles/` for the shipped ones). Everything in it overrides what the file says.
 
+mod catalogue;
 pub(crate) mod pattern;
 mod shipped;
 
@@ -17,6 +18,7 @@ use crate::cf::period::Covers;
 use crate::error::IngestError;
 use crate::file::description::{AttributeValue, Description};
 
+pub use catalogue::Profiles;
 pub use shipped::shipped;
 
 /// Largest profile, bytes.
@@ -60,6 +62,9 @@ struct Match {
     /// Attributes of the file and the text (or number) they must have.
     #[serde(default)]
     attributes: std::collections::BTreeMap<String, toml::Value>,
+    /// Collections, as notices of other systems name them, whose files are of this family whatever else is stated.
+    #[serde(default)]
+    collections: Vec<String>,
 }
 
 /// The variable to land, and what the file says wrong about it.
@@ -194,12 +199,22 @@ impl Profile {
         })
     }
 
+    /// Is the profile for the files of a collection?
+    fn is_for_collection(&self, collection: &str) -> bool {
+        let rules = self.matches.as_ref();
+        rules.is_some_and(|rules| rules.collections.iter().any(|name| name == collection))
+    }
+
     /// Is the profile for this file?
     pub(crate) fn is_for(&self, file_name: &str, file: &Description) -> bool {
         let Some(rules) = &self.matches else {
             return false;
         };
-        if *rules == Match::default() {
+        let by_content = Match {
+            collections: vec![],
+            ..rules.clone()
+        };
+        if by_content == Match::default() {
             return false;
         }
         let attribute_is =

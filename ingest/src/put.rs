@@ -36,7 +36,7 @@ pub(crate) async fn raw(
 ) -> Result<(), IngestError> {
     let key = ObjectKey::raw(product, &raw.sha256);
     store
-        .put_new(&key, raw.bytes.clone())
+        .put_new(&key, raw.content().await?)
         .await
         .map_err(IngestError::storage("store the file"))?;
     Ok(())

@@ -1,8 +1,11 @@
-//! Settings of ingest: limits on what a file may ask for, and where the sandboxed reader is.
+//! Settings of ingest: limits on what a file may ask for, what may be read, and where the sandboxed reader is.
 
 use std::ffi::OsString;
 use std::path::PathBuf;
 use std::time::Duration;
+
+use crate::fetch::Sources;
+use crate::profile::Profiles;
 
 /// The sandboxed reader: a program and what comes before its own arguments.
 #[derive(Debug, Clone)]
@@ -29,7 +32,7 @@ impl DecoderCommand {
 /// What one file may ask for. A file beyond a limit is refused with the limit named.
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
-    /// Largest input file, bytes.
+    /// Largest input file, bytes; the object store takes 2 GiB in one object.
     pub file_bytes: u64,
     /// Memory of the sandboxed reader, bytes of address space.
     pub memory_bytes: u64,
@@ -48,7 +51,7 @@ pub struct Limits {
 impl Default for Limits {
     fn default() -> Self {
         Self {
-            file_bytes: 4 << 30,
+            file_bytes: 2 << 30,
             memory_bytes: 3 << 30,
             cpu_s: 600,
             wall: Duration::from_mins(30),
@@ -68,10 +71,16 @@ pub struct Settings {
     pub limits: Limits,
     /// Files that are read at the same time, 1 to 64.
     pub parallel_files: usize,
+    /// Bytes of files that are read at the same time; a larger file goes alone.
+    pub parallel_bytes: u64,
+    /// What may be read.
+    pub sources: Sources,
+    /// How files are to be read.
+    pub profiles: Profiles,
 }
 
 impl Settings {
-    /// Default limits, two files at a time, and this very program as the reader.
+    /// Default limits, two files at a time, and this very program as the reader, for files that the user names.
     ///
     /// # Errors
     /// The system does not say where this program is.
@@ -79,12 +88,15 @@ impl Settings {
         Ok(Self::with_decoder(DecoderCommand::current()?))
     }
 
-    /// Default limits and two files at a time.
+    /// Default limits and two files at a time, for files that the user names.
     pub fn with_decoder(decoder: DecoderCommand) -> Self {
         Self {
             decoder,
             limits: Limits::default(),
             parallel_files: 2,
+            parallel_bytes: 1 << 30,
+            sources: Sources::command_line(),
+            profiles: Profiles::shipped(),
         }
     }
 }

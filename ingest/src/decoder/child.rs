@@ -53,7 +53,9 @@ fn limit(memory_bytes: u64, cpu_s: u64) -> std::io::Result<()> {
     limits.into_iter().try_for_each(|(resource, wanted)| {
         let (_, hard) = resource.get()?;
         let allowed = wanted.min(hard);
-        resource.set(allowed, allowed)
+        // The last second of processor time is for the signal that tells this limit from a kill by somebody else.
+        let grace = if resource == Resource::CPU { 1 } else { 0 };
+        resource.set(allowed, allowed.saturating_add(grace).min(hard))
     })
 }
 

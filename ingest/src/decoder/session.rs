@@ -182,8 +182,12 @@ impl Session {
                 memory_bytes >> 20
             ));
         }
-        // SIGXCPU and, past the hard limit, SIGKILL.
-        if let Some(24 | 9) = signal {
+        // SIGKILL: the system had no memory left, or somebody stopped it.
+        if signal == Some(9) {
+            return IngestError::Killed.into();
+        }
+        // SIGXCPU.
+        if signal == Some(24) {
             return too_large(format!(
                 "took more than {cpu_s} s of processor time to read; give it in smaller pieces"
             ));

@@ -132,6 +132,7 @@ pub(super) fn target(
             source: profile.source.clone(),
             quantity,
             synthetic: profile.synthetic || marked,
+            profile: Some(profile.name.clone()),
         });
     }
     let cut = |text: &str| {
@@ -166,6 +167,7 @@ pub(super) fn target(
         source: source.unwrap_or_else(|| "not stated in the file".to_owned()),
         quantity,
         synthetic: marked,
+        profile: None,
     })
 }
 

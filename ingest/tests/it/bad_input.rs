@@ -1,10 +1,10 @@
 //! Bad files: each gets one line with file, object and what to do, and the others of the batch land.
 
 use contract::event::{Body, RejectReason};
+use contract::topic::Topic;
 use ingest::{Outcome, Profile};
-use storage::log::EventLog as _;
 
-use crate::fixture::{FILL, Place, SmallFile, refusal, text};
+use crate::fixture::{FILL, Place, SmallFile, events, refusal, text};
 
 /// Lands one file and checks reason, words in the line, and that it is one line with the file's name.
 async fn assert_refused(place: &Place, name: &str, reason: RejectReason, words: &[&str]) {
@@ -315,10 +315,10 @@ async fn the_batch_goes_on_and_every_file_has_its_event() {
         .await;
     let rejected: Vec<bool> = outcomes.iter().map(Outcome::is_rejected).collect();
     assert_eq!(rejected, [true, false, true]);
-    let landed = place.log.read("granule.landed", 0, 10).await.unwrap();
-    let refused = place.log.read("granule.rejected", 0, 10).await.unwrap();
+    let landed = events(&place.log, Topic::GranuleLanded).await;
+    let refused = events(&place.log, Topic::GranuleRejected).await;
     assert_eq!((landed.len(), refused.len()), (1, 2));
-    let Body::GranuleRejected { detail, reason, .. } = &refused[0].1.body else {
+    let Body::GranuleRejected { detail, reason, .. } = &refused[0].body else {
         panic!("{refused:?}")
     };
     assert_eq!(*reason, RejectReason::Unreadable);

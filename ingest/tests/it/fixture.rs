@@ -2,13 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
+use contract::event::Event;
 use contract::grid::Grid;
 use contract::manifest::Manifest;
 use contract::product::ProductId;
+use contract::topic::Topic;
 use hdf5::types::VarLenUnicode;
 use ingest::{Batch, DecoderCommand, Outcome, Profile, Quiet, Settings};
 use storage::Store;
-use storage::log::EmbeddedLog;
+use storage::log::{EmbeddedLog, EventLog, Start};
 use tempfile::TempDir;
 
 /// A store, a log and a folder for files, gone when dropped.
@@ -64,6 +66,19 @@ impl Place {
             .await
             .unwrap()
     }
+}
+
+/// All events of a topic, in their order.
+pub(crate) async fn events(log: &dyn EventLog, topic: Topic) -> Vec<Event> {
+    let mut follower = log.follow(topic, Start::Oldest).await.unwrap();
+    let messages = follower
+        .next(10_000, std::time::Duration::ZERO)
+        .await
+        .unwrap();
+    messages
+        .iter()
+        .map(|message| message.event().unwrap())
+        .collect()
 }
 
 /// The reader process of this crate's own binary, with limits for small files.

@@ -54,7 +54,7 @@ async fn a_reader_that_hangs_is_killed() {
 
 #[tokio::test]
 async fn a_reader_out_of_processor_time_says_too_large() {
-    let (reason, line) = refused_by("ulimit -t 1; while :; do :; done").await;
+    let (reason, line) = refused_by("ulimit -S -t 1; while :; do :; done").await;
     assert_eq!(reason, RejectReason::TooLarge);
     assert!(line.contains("processor time"), "{line}");
 }
@@ -69,6 +69,21 @@ async fn a_reader_that_floods_or_lies_is_not_believed() {
         let (reason, line) = refused_by(script).await;
         assert_eq!(reason, RejectReason::Corrupt, "{script}: {line}");
     }
+}
+
+/// A reader that somebody else kills is started again; if it dies again and again the file is refused and not the others.
+#[tokio::test]
+async fn a_reader_that_is_killed_is_started_again() {
+    let place = Place::new();
+    SmallFile::new().write_classic(&place.path("a.nc"));
+    let counter = place.path("starts");
+    let script = format!("echo x >> {}; kill -KILL $$", counter.display());
+    let outcomes = land(&place, &scripted(&script), "a.nc").await.unwrap();
+    let (reason, line) = refusal(&outcomes);
+    assert_eq!(reason, RejectReason::TooLarge);
+    assert!(line.contains("killed again and again"), "{line}");
+    let starts = std::fs::read_to_string(counter).unwrap();
+    assert_eq!(starts.lines().count(), 3);
 }
 
 /// The reader has no environment but the switch that keeps the HDF5 library from loading plugins.

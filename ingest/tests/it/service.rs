@@ -1,13 +1,15 @@
-//! The service follows notices: events after objects, offset after events.
+//! The service follows notices: events after objects, each once, offsets with their events.
 
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
-use contract::event::{Body, RejectReason};
-use ingest::{IngestService, Outcome, Quiet};
+use contract::event::{Body, Event, RejectReason};
+use contract::topic::Topic;
+use ingest::{IngestService, Outcome, Progress, Quiet, Stage};
 use storage::Store;
 use storage::log::{EmbeddedLog, EventLog};
 
-use crate::fixture::{Place, SmallFile, settings};
+use crate::fixture::{Place, SmallFile, events, settings};
 
 fn service(store: &Store, log: &Arc<EmbeddedLog>) -> IngestService {
     IngestService::new(
@@ -15,6 +17,26 @@ fn service(store: &Store, log: &Arc<EmbeddedLog>) -> IngestService {
         Arc::clone(log) as Arc<dyn EventLog>,
         settings(),
     )
+}
+
+/// Runs the service until a topic holds so many events, and then a moment more: what would come too often comes too.
+pub(crate) async fn run_until(
+    service: &IngestService,
+    log: &dyn EventLog,
+    topic: Topic,
+    count: usize,
+) -> Vec<Event> {
+    let stop = async {
+        let start = Instant::now();
+        while events(log, topic).await.len() < count {
+            let late = start.elapsed() > Duration::from_secs(30);
+            assert!(!late, "{:?}", events(log, topic).await);
+            tokio::time::sleep(Duration::from_millis(20)).await;
+        }
+        tokio::time::sleep(Duration::from_millis(100)).await;
+    };
+    service.run(&Quiet, stop).await.unwrap();
+    events(log, topic).await
 }
 
 #[tokio::test]
@@ -35,12 +57,14 @@ async fn notices_are_followed_once_and_in_order() {
             .collect::<Vec<_>>(),
         [false, true]
     );
-    assert_eq!(log.committed("granule.notice", "ingest").await.unwrap(), 2);
+    assert_eq!(log.lag(Topic::GranuleNotice, "ingest").await.unwrap(), 0);
     assert!(service.drain(&Quiet).await.unwrap().is_empty());
-    let landed = log.read("granule.landed", 0, 10).await.unwrap();
-    let notices = log.read("granule.notice", 0, 10).await.unwrap();
+    let landed = events(log.as_ref(), Topic::GranuleLanded).await;
+    let notices = events(log.as_ref(), Topic::GranuleNotice).await;
     assert_eq!(landed.len(), 1);
-    assert_eq!(landed[0].1.trace, notices[0].1.trace);
+    assert_eq!(landed[0].trace, notices[0].trace);
+    assert!(landed[0].noticed.is_some() && landed[0].noticed == notices[0].noticed);
+    assert_ne!(notices[0].trace, notices[1].trace);
 }
 
 #[tokio::test]
@@ -71,12 +95,86 @@ async fn a_notice_names_profile_and_product() {
         "{}",
         outcomes[2]
     );
-    let refused = log.read("granule.rejected", 0, 10).await.unwrap();
-    assert!(matches!(refused[0].1.body, Body::GranuleRejected { .. }));
+    let refused = events(log.as_ref(), Topic::GranuleRejected).await;
+    let Body::GranuleRejected {
+        origin, attempt, ..
+    } = &refused[0].body
+    else {
+        panic!("{refused:?}")
+    };
+    assert_eq!(origin.unwrap().to_string(), "granule.notice/0/1");
+    assert_eq!(*attempt, 1);
 }
 
 #[tokio::test]
-async fn the_service_stops_when_told() {
+async fn a_duplicate_is_finished_in_silence() {
+    let (place, log) = (Place::new(), Arc::new(EmbeddedLog::memory()));
+    SmallFile::new().write_classic(&place.path("a.nc"));
+    let service = service(&place.store, &log);
+    for _ in 0..3 {
+        service
+            .notify(&[place.path("a.nc")], None, None)
+            .await
+            .unwrap();
+        service.drain(&Quiet).await.unwrap();
+    }
+    assert_eq!(events(log.as_ref(), Topic::GranuleLanded).await.len(), 1);
+    assert_eq!(log.lag(Topic::GranuleNotice, "ingest").await.unwrap(), 0);
+    assert_eq!(place.newest("fgco2").await.number, 1);
+}
+
+#[tokio::test]
+async fn poison_is_refused_with_its_place_and_blocks_nothing() {
+    let (place, log) = (Place::new(), Arc::new(EmbeddedLog::memory()));
+    SmallFile::new().write_classic(&place.path("a.nc"));
+    let service = service(&place.store, &log);
+    let poison = [
+        "no JSON",
+        r#"{"schema":99,"trace":"t","body":{}}"#,
+        r#"{"version":"9.0","collection":"c","identifier":"i"}"#,
+        "",
+    ];
+    for text in poison {
+        let content = bytes::Bytes::from_static(text.as_bytes());
+        log.append_message(Topic::GranuleNotice, "k", content)
+            .await
+            .unwrap();
+    }
+    service
+        .notify(&[place.path("a.nc")], None, None)
+        .await
+        .unwrap();
+    let landed = run_until(&service, log.as_ref(), Topic::GranuleLanded, 1).await;
+    assert_eq!(landed.len(), 1);
+    let refused = events(log.as_ref(), Topic::GranuleRejected).await;
+    assert_eq!(refused.len(), poison.len());
+    for (offset, event) in (0..).zip(&refused) {
+        let Body::GranuleRejected { reason, origin, .. } = &event.body else {
+            panic!("{event:?}")
+        };
+        assert_eq!(*reason, RejectReason::Message);
+        assert_eq!(
+            origin.unwrap().offset,
+            offset,
+            "which message, in their order"
+        );
+    }
+}
+
+/// Tells when a stage is reached, and how many files are between fetch and commit.
+struct Seen(tokio::sync::watch::Sender<bool>);
+
+impl Progress for Seen {
+    fn stage(&self, _file: &std::path::Path, stage: Stage, _step: usize, _steps: usize) {
+        if stage == Stage::Inspect {
+            self.0.send_replace(true);
+        }
+    }
+    fn done(&self, _outcome: &Outcome) {}
+}
+
+#[tokio::test]
+async fn work_that_was_begun_is_finished_before_the_service_stops() {
     let (place, log) = (Place::new(), Arc::new(EmbeddedLog::memory()));
     SmallFile::new().write_classic(&place.path("a.nc"));
     let service = service(&place.store, &log);
@@ -84,13 +182,139 @@ async fn the_service_stops_when_told() {
         .notify(&[place.path("a.nc")], None, None)
         .await
         .unwrap();
-    service
-        .run(
-            std::time::Duration::from_millis(10),
-            &Quiet,
-            std::future::ready(()),
-        )
+    let (sender, mut seen) = tokio::sync::watch::channel(false);
+    let stop = async move {
+        seen.wait_for(|seen| *seen).await.unwrap();
+    };
+    service.run(&Seen(sender), stop).await.unwrap();
+    assert_eq!(events(log.as_ref(), Topic::GranuleLanded).await.len(), 1);
+    assert_eq!(log.lag(Topic::GranuleNotice, "ingest").await.unwrap(), 0);
+}
+
+#[tokio::test]
+async fn work_that_takes_too_long_comes_again() {
+    let (place, log) = (Place::new(), Arc::new(EmbeddedLog::memory()));
+    SmallFile::new().write_classic(&place.path("a.nc"));
+    let mut slow = settings();
+    slow.decoder.program = "/bin/sleep".into();
+    slow.decoder.arguments = vec![];
+    // The reader's arguments are a path and numbers, so that it fails at once; a shell that sleeps does not.
+    slow.decoder.program = "/bin/sh".into();
+    slow.decoder.arguments = vec!["-c".into(), "sleep 60".into()];
+    let stuck = IngestService::new(
+        place.store.clone(),
+        Arc::clone(&log) as Arc<dyn EventLog>,
+        slow,
+    )
+    .with_bounds(4, Duration::from_millis(200));
+    stuck
+        .notify(&[place.path("a.nc")], None, None)
         .await
         .unwrap();
-    assert_eq!(place.newest("fgco2").await.steps.len(), 2);
+    let start = Instant::now();
+    let stop = tokio::time::sleep(Duration::from_millis(300));
+    stuck.run(&Quiet, stop).await.unwrap();
+    assert!(start.elapsed() < Duration::from_secs(5));
+    assert_eq!(log.lag(Topic::GranuleNotice, "ingest").await.unwrap(), 1);
+    let landed = run_until(
+        &service(&place.store, &log),
+        log.as_ref(),
+        Topic::GranuleLanded,
+        1,
+    )
+    .await;
+    assert_eq!(landed.len(), 1);
+}
+
+/// The offset waits for a slow file, and nobody else does.
+#[tokio::test]
+async fn others_land_while_one_file_is_slow_and_the_offset_waits_for_it() {
+    let (place, log) = (Place::new(), Arc::new(EmbeddedLog::memory()));
+    SmallFile::new().write_classic(&place.path("slow.nc"));
+    SmallFile::new()
+        .first_month()
+        .write_hdf5(&place.path("b.h5"));
+    let reader = env!("CARGO_BIN_EXE_decode-file");
+    let gate = place.path("gate");
+    let script = format!(
+        "case \"$0\" in *slow*) while ! [ -e {} ]; do sleep 0.02; done;; esac; exec {reader} \"$@\"",
+        gate.display()
+    );
+    let mut settings = settings();
+    settings.decoder.program = "/bin/sh".into();
+    // `$0` is the first word after the script, and again the first of the reader's arguments.
+    settings.decoder.arguments = vec![
+        "-c".into(),
+        script.replace("\"$@\"", "\"$0\" \"$@\"").into(),
+    ];
+    let service = IngestService::new(
+        place.store.clone(),
+        Arc::clone(&log) as Arc<dyn EventLog>,
+        settings,
+    );
+    let (slow, quick) = ("slow".parse().unwrap(), "quick".parse().unwrap());
+    service
+        .notify(&[place.path("slow.nc")], None, Some(&slow))
+        .await
+        .unwrap();
+    service
+        .notify(&[place.path("b.h5")], None, Some(&quick))
+        .await
+        .unwrap();
+    let stop = async {
+        let start = Instant::now();
+        let is_there = async || {
+            let newest = storage::manifests::latest(&place.store, &quick)
+                .await
+                .unwrap();
+            newest.is_some()
+        };
+        while !is_there().await {
+            assert!(start.elapsed() < Duration::from_secs(30));
+            tokio::time::sleep(Duration::from_millis(20)).await;
+        }
+        tokio::time::sleep(Duration::from_millis(100)).await;
+        assert_eq!(log.lag(Topic::GranuleNotice, "ingest").await.unwrap(), 2);
+        assert!(events(log.as_ref(), Topic::GranuleLanded).await.is_empty());
+        std::fs::write(&gate, "").unwrap();
+    };
+    service.run(&Quiet, stop).await.unwrap();
+    let landed = events(log.as_ref(), Topic::GranuleLanded).await;
+    let products: Vec<String> = landed.iter().map(|e| e.body.order_key()).collect();
+    assert_eq!(products, ["slow", "quick"], "in the order of their notices");
+    assert_eq!(log.lag(Topic::GranuleNotice, "ingest").await.unwrap(), 0);
+}
+
+/// Two months of a product, sent twice in an order that a race could turn round.
+#[tokio::test]
+async fn revisions_of_one_product_land_in_the_order_of_their_notices() {
+    let (place, log) = (Place::new(), Arc::new(EmbeddedLog::memory()));
+    let product = "p".parse().unwrap();
+    let service = service(&place.store, &log);
+    for revision in 0..4u8 {
+        let mut file = SmallFile::new();
+        file.values[5] = f32::from(revision);
+        let path = place.path(&format!("{revision}.nc"));
+        // The first is the largest to read, the last the smallest.
+        if revision % 2 == 0 {
+            file.write_hdf5(&path);
+        } else {
+            file.write_classic(&path);
+        }
+        service.notify(&[path], None, Some(&product)).await.unwrap();
+    }
+    let landed = run_until(&service, log.as_ref(), Topic::GranuleLanded, 4).await;
+    assert_eq!(landed.len(), 4);
+    let manifest = place.newest("p").await;
+    assert_eq!(manifest.number, 4, "each revision can be cited");
+    assert_eq!(manifest.steps[0].origin, "3.nc");
+}
+
+#[tokio::test]
+async fn readiness_names_each_part() {
+    let (place, log) = (Place::new(), Arc::new(EmbeddedLog::memory()));
+    let report = service(&place.store, &log).ready().await;
+    assert!(report.ready, "{report:?}");
+    let names: Vec<_> = report.checks.iter().map(|part| part.name).collect();
+    assert_eq!(names, ["object store", "event log", "spool", "work"]);
 }

@@ -43,6 +43,7 @@ fn granule(content: &str, periods: &[Period]) -> StoredGranule {
             source: "s".into(),
             quantity: Quantity::CarbonFlux,
             synthetic: false,
+            profile: None,
         },
         grid: GRID,
         raw_sha256,

@@ -1,0 +1,121 @@
+//! How often and how long a source is asked again before its file is given up.
+
+use std::time::{Duration, Instant};
+
+use backon::{BackoffBuilder as _, ExponentialBackoff, ExponentialBuilder};
+use contract::event::RejectReason;
+
+use super::location::Location;
+use crate::error::{IngestError, Stop};
+use crate::rejection::Rejection;
+
+/// How often and how long a source is asked again.
+#[derive(Debug, Clone, Copy)]
+pub struct Patience {
+    /// Tries of a source that answers that the file is not there, or not for us: an announced file can come late.
+    pub tries: u32,
+    /// How long a source that cannot be reached, or says that it is out of order, is asked again.
+    pub away: Duration,
+    /// Pause before the second try; it doubles from try to try, with jitter.
+    pub first_pause: Duration,
+    /// Longest pause.
+    pub longest_pause: Duration,
+    /// Time limit of one try.
+    pub one_try: Duration,
+}
+
+impl Default for Patience {
+    fn default() -> Self {
+        Self {
+            tries: 5,
+            away: Duration::from_mins(5),
+            first_pause: Duration::from_millis(500),
+            longest_pause: Duration::from_secs(15),
+            one_try: Duration::from_mins(30),
+        }
+    }
+}
+
+/// How a try to have a file can end without it.
+#[derive(Debug)]
+pub(super) enum Miss {
+    /// The source says that it is not there, or not for us.
+    Absent(String),
+    /// The source does not answer, or says that it is out of order.
+    Away(String),
+    /// Trying again does not help.
+    Stop(Stop),
+}
+
+impl<E: Into<Stop>> From<E> for Miss {
+    fn from(error: E) -> Self {
+        Self::Stop(error.into())
+    }
+}
+
+/// Tries one file.
+pub(super) struct Tries {
+    patience: Patience,
+    pauses: ExponentialBackoff,
+    begun: Instant,
+    absent: u32,
+}
+
+impl Tries {
+    pub(super) fn new(patience: Patience) -> Self {
+        Self {
+            patience,
+            pauses: ExponentialBuilder::default()
+                .with_min_delay(patience.first_pause)
+                .with_max_delay(patience.longest_pause)
+                .without_max_times()
+                .with_jitter()
+                .build(),
+            begun: Instant::now(),
+            absent: 0,
+        }
+    }
+
+    /// Waits for the next try, or gives the file up.
+    pub(super) async fn after(&mut self, miss: Miss, location: &Location) -> Result<(), Stop> {
+        let (why, is_over) = match miss {
+            Miss::Stop(stop) => return Err(stop),
+            Miss::Absent(why) => {
+                self.absent += 1;
+                (why, self.absent >= self.patience.tries)
+            }
+            Miss::Away(why) => (why, self.begun.elapsed() >= self.patience.away),
+        };
+        if is_over {
+            let seconds = self.begun.elapsed().as_secs();
+            let detail =
+                format!("could not be had in {seconds} s: {why}; send it again when it is there");
+            return Err(Rejection::new(RejectReason::Unavailable, "file", detail).into());
+        }
+        tracing::info!(%location, why, "not had yet; trying again");
+        let pause = self.pauses.next().unwrap_or(self.patience.longest_pause);
+        tokio::time::sleep(pause).await;
+        Ok(())
+    }
+}
+
+/// A try under its time limit.
+pub(super) async fn limited<T>(
+    limit: Duration,
+    work: impl Future<Output = Result<T, Miss>>,
+) -> Result<T, Miss> {
+    match tokio::time::timeout(limit, work).await {
+        Ok(done) => done,
+        Err(_elapsed) => Err(Miss::Away(format!(
+            "not all of it came in {} s",
+            limit.as_secs()
+        ))),
+    }
+}
+
+/// A task that ended early is a fault of the program.
+impl Miss {
+    pub(super) fn task(error: tokio::task::JoinError) -> Self {
+        Self::Stop(Stop::Failed(IngestError::Task(error)))
+    }
+}

@@ -1,0 +1,362 @@
+//! The service at work, from joining the readers of notices to leaving them: takes notices, works on a bounded number of
+//! them at the same time, publishes what is ready, and finishes each with what follows from it.
+
+use std::collections::BTreeMap;
+use std::future::Future;
+use std::pin::{Pin, pin};
+use std::sync::Arc;
+use std::time::Duration;
+
+use contract::product::ProductId;
+use contract::topic::Origin;
+use futures::FutureExt as _;
+use futures::future::Shared;
+use futures::stream::{FuturesUnordered, StreamExt as _};
+use storage::log::{Finished, Message, Reader};
+use tokio::time::Instant;
+use tracing::Instrument as _;
+
+use super::bench::{Bench, Number};
+use super::health::Health;
+use super::insist::insist;
+use super::{GROUP, IngestService, TOPIC, now};
+use crate::answer::{Answer, Asked, Ready, blame};
+use crate::error::IngestError;
+use crate::land;
+use crate::metrics;
+use crate::notice::Notice;
+use crate::outcome::Outcome;
+use crate::pipeline::Pipeline;
+use crate::progress::Progress;
+use crate::put::StoredGranule;
+
+/// How long notices are waited for while nothing is under way: bounds how late a stop is heard.
+const IDLE_WAIT: Duration = Duration::from_millis(250);
+/// And while something is: bounds how late what is done is finished.
+const BUSY_WAIT: Duration = Duration::from_millis(20);
+
+type Work<'a> = FuturesUnordered<Pin<Box<dyn Future<Output = Done> + Send + 'a>>>;
+
+/// A piece of work that ended.
+enum Done {
+    Prepared(Number, Ready),
+    Published(ProductId, Vec<(Number, Answer)>),
+}
+
+/// A file that is under way.
+struct Job {
+    asked: Arc<Asked>,
+    /// Number of its message.
+    message: Number,
+}
+
+/// A message some of whose files are under way.
+struct Open {
+    origin: Origin,
+    /// In the order of its files.
+    answers: Vec<(Number, Option<Answer>)>,
+    running: service::Running,
+}
+
+struct Shift<'a> {
+    service: &'a IngestService,
+    pipeline: Pipeline<'a>,
+    bench: Bench<StoredGranule>,
+    jobs: BTreeMap<Number, Job>,
+    open: BTreeMap<Number, Open>,
+    next: Number,
+    work: Work<'a>,
+    done: Vec<Done>,
+    /// Messages of which everything is answered.
+    finished: Vec<Open>,
+}
+
+/// Works until `stop`, or until the event log fails; what is not finished then comes again.
+pub(super) async fn run(
+    service: &IngestService,
+    progress: &dyn Progress,
+    stop: Shared<impl Future<Output = ()> + Send>,
+) -> Result<(), IngestError> {
+    let mut reader = service
+        .log
+        .join(TOPIC, GROUP)
+        .await
+        .map_err(IngestError::storage("join the readers of notices"))?;
+    let mut shift = Shift {
+        service,
+        pipeline: service.pipeline(progress),
+        bench: Bench::default(),
+        jobs: BTreeMap::new(),
+        open: BTreeMap::new(),
+        next: 0,
+        work: FuturesUnordered::new(),
+        done: Vec::new(),
+        finished: Vec::new(),
+    };
+    let mut last_call = None;
+    loop {
+        shift.settle();
+        shift.publish();
+        shift.finish(reader.as_mut()).await?;
+        if last_call.is_none() && stop.clone().now_or_never().is_some() {
+            tracing::info!(under_way = shift.open.len(), "finishing what is under way");
+            last_call = Some(Instant::now() + service.drain);
+        }
+        if let Some(last_call) = last_call {
+            let is_late = Instant::now() >= last_call;
+            if shift.open.is_empty() && shift.done.is_empty() || is_late {
+                if is_late {
+                    tracing::warn!(under_way = shift.open.len(), "out of time; it comes again");
+                }
+                return reader
+                    .leave()
+                    .await
+                    .map_err(IngestError::storage("leave the readers of notices"));
+            }
+        }
+        if last_call.is_none() && shift.room() > 0 {
+            shift.take(reader.as_mut()).await?;
+        } else {
+            shift.wait(&stop, last_call).await;
+        }
+    }
+}
+
+impl<'a> Shift<'a> {
+    fn room(&self) -> usize {
+        self.service
+            .parallel_notices
+            .saturating_sub(self.open.len())
+    }
+
+    /// Takes further messages, as many as there is room for.
+    async fn take(&mut self, reader: &mut dyn Reader) -> Result<(), IngestError> {
+        let room = self.room();
+        let wait = if self.work.is_empty() {
+            IDLE_WAIT
+        } else {
+            BUSY_WAIT
+        };
+        let read = reader.next(room, wait);
+        let messages = alongside(&mut self.work, &mut self.done, read).await;
+        for message in messages.map_err(IngestError::storage("read notices"))? {
+            self.begin(&message);
+        }
+        Ok(())
+    }
+
+    fn begin(&mut self, message: &Message) {
+        let number = self.count();
+        let mut answers = Vec::new();
+        for notice in Notice::of(message, &self.service.settings, now()) {
+            let job = self.count();
+            answers.push((job, None));
+            self.bench.add(job, notice.order_key.clone());
+            let asked = Arc::new(Asked {
+                notice,
+                origin: Some(message.origin),
+            });
+            let span = tracing::info_span!("notice", trace = asked.notice.cause.trace, origin = %message.origin);
+            let work = prepare(self.pipeline, &self.service.health, job, Arc::clone(&asked));
+            self.work.push(Box::pin(work.instrument(span)));
+            self.jobs.insert(
+                job,
+                Job {
+                    asked,
+                    message: number,
+                },
+            );
+        }
+        let open = Open {
+            origin: message.origin,
+            answers,
+            running: self.service.metrics.start("notice"),
+        };
+        self.open.insert(number, open);
+    }
+
+    fn count(&mut self) -> Number {
+        self.next += 1;
+        self.next
+    }
+
+    /// Waits for a piece of work.
+    async fn wait(
+        &mut self,
+        stop: &Shared<impl Future<Output = ()> + Send>,
+        last_call: Option<Instant>,
+    ) {
+        let until = last_call.unwrap_or_else(|| Instant::now() + IDLE_WAIT);
+        tokio::select! {
+            Some(done) = self.work.next() => self.done.push(done),
+            () = stop.clone(), if last_call.is_none() => {}
+            () = tokio::time::sleep_until(until) => {}
+        }
+    }
+
+    /// Notes what ended.
+    fn settle(&mut self) {
+        for done in std::mem::take(&mut self.done) {
+            match done {
+                Done::Prepared(number, Ready::ToCommit(granule)) => {
+                    let product = granule.target.product.clone();
+                    self.bench.ready(number, product, granule);
+                }
+                Done::Prepared(number, Ready::Answered(answer)) => self.answered(number, answer),
+                Done::Published(product, answers) => {
+                    self.bench.free(&product);
+                    for (number, answer) in answers {
+                        self.answered(number, answer);
+                    }
+                }
+            }
+        }
+    }
+
+    fn answered(&mut self, number: Number, answer: Answer) {
+        self.bench.remove(number);
+        let Some(job) = self.jobs.remove(&number) else {
+            return;
+        };
+        let Some(open) = self.open.get_mut(&job.message) else {
+            return;
+        };
+        for (own, place) in &mut open.answers {
+            if *own == number {
+                *place = Some(answer.clone());
+            }
+        }
+        if open.answers.iter().all(|(_, answer)| answer.is_some()) {
+            self.finished.extend(self.open.remove(&job.message));
+        }
+    }
+
+    /// Begins to publish what may be.
+    fn publish(&mut self) {
+        for (product, files) in self.bench.take() {
+            let batch = files.into_iter().filter_map(|(number, granule)| {
+                let asked = Arc::clone(&self.jobs.get(&number)?.asked);
+                Some((number, asked, granule))
+            });
+            let work = publish(
+                self.pipeline,
+                &self.service.health,
+                product,
+                batch.collect(),
+            );
+            self.work.push(Box::pin(work));
+        }
+    }
+
+    /// Finishes what is answered.
+    async fn finish(&mut self, reader: &mut dyn Reader) -> Result<(), IngestError> {
+        if self.finished.is_empty() {
+            return Ok(());
+        }
+        let finished = std::mem::take(&mut self.finished);
+        let events = |open: &Open| {
+            open.answers
+                .iter()
+                .filter_map(|(_, answer)| answer.as_ref()?.event.clone())
+                .collect()
+        };
+        let messages = finished.iter().map(|open| Finished {
+            origin: open.origin,
+            follows: events(open),
+        });
+        let told = reader.finish(messages.collect());
+        alongside(&mut self.work, &mut self.done, told)
+            .await
+            .map_err(IngestError::storage("finish notices"))?;
+        for open in finished {
+            tell(open, self.pipeline);
+        }
+        Ok(())
+    }
+}
+
+/// Polls the work that is under way while something else is waited for, which is never cancelled.
+async fn alongside<T>(
+    work: &mut Work<'_>,
+    done: &mut Vec<Done>,
+    main: impl Future<Output = T>,
+) -> T {
+    let mut main = pin!(main);
+    loop {
+        tokio::select! {
+            biased;
+            result = &mut main => return result,
+            Some(one) = work.next() => done.push(one),
+        }
+    }
+}
+
+async fn prepare(
+    pipeline: Pipeline<'_>,
+    health: &Health,
+    number: Number,
+    asked: Arc<Asked>,
+) -> Done {
+    let ready = insist(health, "prepare", || land::prepare(&pipeline, &asked)).await;
+    let ready = ready.unwrap_or_else(|error| Ready::Answered(asked.refused(blame(&error))));
+    Done::Prepared(number, ready)
+}
+
+/// Publishes files of one product together; if that fails because of one of them, one by one.
+async fn publish(
+    pipeline: Pipeline<'_>,
+    health: &Health,
+    product: ProductId,
+    batch: Vec<(Number, Arc<Asked>, StoredGranule)>,
+) -> Done {
+    let pairs: Vec<_> = batch
+        .iter()
+        .map(|(_, asked, granule)| (asked.as_ref(), granule))
+        .collect();
+    let together = insist(health, "publish", || land::commit(&pipeline, &pairs)).await;
+    let answers = match together {
+        Ok(answers) => answers,
+        Err(error) if pairs.len() == 1 => vec![pairs[0].0.refused(blame(&error))],
+        Err(_) => {
+            let mut answers = Vec::with_capacity(pairs.len());
+            for pair in &pairs {
+                let own = std::slice::from_ref(pair);
+                let alone = insist(health, "publish", || land::commit(&pipeline, own)).await;
+                answers.extend(alone.unwrap_or_else(|error| vec![pair.0.refused(blame(&error))]));
+            }
+            answers
+        }
+    };
+    let numbers = batch.iter().map(|(number, _, _)| *number);
+    Done::Published(product, numbers.zip(answers).collect())
+}
+
+/// Counts and logs a message whose events are told.
+fn tell(open: Open, pipeline: Pipeline<'_>) {
+    let mut ended = service::Outcome::Ok;
+    for answer in open.answers.into_iter().filter_map(|(_, answer)| answer) {
+        let Answer { outcome, event } = answer;
+        let trace = event
+            .as_ref()
+            .map(|event| event.trace.as_str())
+            .unwrap_or_default();
+        let noticed = event.as_ref().and_then(|event| event.noticed);
+        match &outcome {
+            Outcome::Rejected { reason, .. } => {
+                ended = service::Outcome::Refused;
+                pipeline.metrics.rejected(*reason);
+                let reason = metrics::class(*reason);
+                tracing::warn!(trace, origin = %open.origin, reason, "refused {outcome}");
+            }
+            Outcome::Landed { .. } => {
+                pipeline.metrics.landed(noticed, now());
+                tracing::info!(trace, origin = %open.origin, "{outcome}");
+            }
+            Outcome::AlreadyLanded { .. } | Outcome::Observed { .. } => {
+                tracing::info!(trace, origin = %open.origin, told = event.is_some(), "{outcome}");
+            }
+        }
+        pipeline.progress.done(&outcome);
+    }
+    open.running.done(ended);
+}

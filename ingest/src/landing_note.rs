@@ -1,0 +1,53 @@
+//! Which notice landed a file, noted before the file is published.
+//!
+//! A notice is answered with an event at the moment that its offset moves. A process can die between publishing a file
+//! and that moment; the notice then comes again and finds its file published. Was it published by this notice, whose
+//! event is still due, or by another one, which has told of it or will? The note tells: a notice that finds its own note
+//! tells of the file; one that does not is a duplicate, and is finished in silence.
+//!
+//! Two notices of one file that are worked on at the same time may both have noted it; then the one that found the file
+//! published by the other is silent, unless its process dies just then. Nothing is ever left untold.
+
+use bytes::Bytes;
+use contract::digest::Digest;
+use contract::key::ObjectKey;
+use contract::product::ProductId;
+use contract::topic::Origin;
+use storage::Store;
+
+use crate::error::IngestError;
+
+fn key(product: &ProductId, raw_sha256: Digest, origin: Origin) -> Result<ObjectKey, IngestError> {
+    let Origin {
+        partition, offset, ..
+    } = origin;
+    Ok(format!("landings/{product}/{raw_sha256}-{partition}-{offset}").parse()?)
+}
+
+/// Notes that a notice is about to publish a file; true if that was noted before.
+pub(crate) async fn note(
+    store: &Store,
+    product: &ProductId,
+    raw_sha256: Digest,
+    origin: Origin,
+) -> Result<bool, IngestError> {
+    let content = Bytes::from(origin.to_string());
+    let is_new = store
+        .put_new(&key(product, raw_sha256, origin)?, content)
+        .await
+        .map_err(IngestError::storage("note a landing"))?;
+    Ok(!is_new)
+}
+
+/// Has this notice begun to publish the file before?
+pub(crate) async fn is_noted(
+    store: &Store,
+    product: &ProductId,
+    raw_sha256: Digest,
+    origin: Origin,
+) -> Result<bool, IngestError> {
+    store
+        .exists(&key(product, raw_sha256, origin)?)
+        .await
+        .map_err(IngestError::storage("look up a landing"))
+}

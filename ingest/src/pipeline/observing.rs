@@ -1,0 +1,75 @@
+//! The way of a file of observations: read, and handed to their store.
+
+use contract::event::RejectReason;
+use contract::observation::Observation;
+
+use super::{Pipeline, Prepared};
+use crate::error::{IngestError, Stop};
+use crate::fetch::RawGranule;
+use crate::inspect::InspectedGranule;
+use crate::observation::{self, TextFormat};
+use crate::plan::Wish;
+use crate::rejection::Rejection;
+
+impl Pipeline<'_> {
+    /// Observations of a text file.
+    pub(super) async fn observe_text(
+        &self,
+        format: TextFormat,
+        raw: RawGranule,
+        wish: Wish<'_>,
+    ) -> Result<Prepared, Stop> {
+        if raw.size_bytes > observation::MAX_TEXT_BYTES {
+            let detail = format!(
+                "has {} bytes of text, at most {} are read; give it in smaller pieces",
+                raw.size_bytes,
+                observation::MAX_TEXT_BYTES
+            );
+            return Err(Rejection::new(RejectReason::TooLarge, "file", detail).into());
+        }
+        let (content, product) = (raw.content().await?, wish.product.cloned());
+        let read = move || {
+            let source = observation::Source {
+                file_name: &raw.file_name,
+                dataset: product.as_ref(),
+            };
+            observation::read_text(format, &content, source)
+        };
+        let rows = async { Ok(tokio::task::spawn_blocking(read).await??) };
+        let rows = self.metrics.timed("decode", rows).await?;
+        self.store_observations(rows).await
+    }
+
+    /// Observations of a NetCDF file.
+    pub(super) async fn observe(
+        &self,
+        inspected: InspectedGranule,
+        wish: Wish<'_>,
+    ) -> Result<Prepared, Stop> {
+        let InspectedGranule {
+            raw,
+            mut session,
+            description,
+        } = inspected;
+        let source = observation::Source {
+            file_name: &raw.file_name,
+            dataset: wish.product,
+        };
+        let read = observation::read(&mut session, &description, source);
+        let rows = self.metrics.timed("decode", read).await?;
+        raw.check_unchanged()?;
+        self.store_observations(rows).await
+    }
+
+    async fn store_observations(&self, rows: Vec<Observation>) -> Result<Prepared, Stop> {
+        let Some(sink) = self.observations else {
+            let detail = "holds observations, and there is no place for them here";
+            return Err(Rejection::new(RejectReason::NoVariable, "file", detail).into());
+        };
+        let put = async {
+            let stored = sink.put(rows).await;
+            Ok(stored.map_err(|source| IngestError::Observations { source })?)
+        };
+        self.metrics.timed("put", put).await.map(Prepared::Observed)
+    }
+}

@@ -1,0 +1,224 @@
+//! Files in, a table out: which of them land, as what, and why the others do not. Nothing is kept.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use async_trait::async_trait;
+use contract::observation::Observation;
+use storage::Store;
+
+use crate::answer::{Asked, Ready};
+use crate::error::IngestError;
+use crate::gates::Gates;
+use crate::land::{self, Batch};
+use crate::metrics::{Metrics, class};
+use crate::observation::{ObservationSink, SinkError, Stored};
+use crate::outcome::Outcome;
+use crate::pipeline::Pipeline;
+use crate::progress::Quiet;
+use crate::settings::Settings;
+
+/// Endings of files that may hold data; documentation beside them is passed over.
+const DATA_ENDINGS: [&str; 10] = [
+    "nc", "nc4", "cdf", "h5", "hdf", "hdf5", "csv", "tsv", "tab", "dat",
+];
+/// Folders below a folder that are looked into.
+const MAX_DEPTH: usize = 16;
+
+/// What became of a file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// The folder that it lies in.
+    pub set: String,
+    /// Its name.
+    pub file: String,
+    /// The profile that it was read with; none if it follows CF, holds observations, or was refused before that was known.
+    pub profile: Option<String>,
+    /// What became of it.
+    pub outcome: Outcome,
+}
+
+/// Data files of a folder and the folders below it, sorted; a file is itself.
+///
+/// # Errors
+/// A folder cannot be read.
+pub fn data_files(path: &Path) -> std::io::Result<Vec<PathBuf>> {
+    let mut found = Vec::new();
+    gather(path, MAX_DEPTH, &mut found)?;
+    found.sort();
+    Ok(found)
+}
+
+fn gather(path: &Path, depth: usize, found: &mut Vec<PathBuf>) -> std::io::Result<()> {
+    if !path.is_dir() {
+        found.push(path.to_owned());
+        return Ok(());
+    }
+    for entry in std::fs::read_dir(path)? {
+        let entry = entry?;
+        let (path, kind) = (entry.path(), entry.file_type()?);
+        let ending = path
+            .extension()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .to_lowercase();
+        if kind.is_dir() && depth > 0 {
+            gather(&path, depth - 1, found)?;
+        } else if kind.is_file() && DATA_ENDINGS.contains(&ending.as_str()) {
+            found.push(path);
+        }
+    }
+    Ok(())
+}
+
+/// Lands each file in a store that is thrown away, one store for the files of a folder, and tells what became of it.
+pub async fn survey(files: &[PathBuf], settings: &Settings) -> Result<Vec<Row>, IngestError> {
+    let mut sets: BTreeMap<&Path, Vec<PathBuf>> = BTreeMap::new();
+    for file in files {
+        let folder = file.parent().unwrap_or(Path::new(""));
+        sets.entry(folder).or_default().push(file.clone());
+    }
+    let mut rows = Vec::with_capacity(files.len());
+    for files in sets.into_values() {
+        rows.extend(survey_set(files, settings).await?);
+    }
+    Ok(rows)
+}
+
+async fn survey_set(files: Vec<PathBuf>, settings: &Settings) -> Result<Vec<Row>, IngestError> {
+    let (store, gates, metrics) = (Store::memory(), Gates::new(settings), Metrics::unseen());
+    let pipeline = Pipeline {
+        store: &store,
+        settings,
+        gates: &gates,
+        observations: Some(&Passing),
+        metrics: &metrics,
+        progress: &Quiet,
+    };
+    let mut rows = Vec::with_capacity(files.len());
+    for asked in land::asked_for(&Batch {
+        files,
+        ..Batch::default()
+    }) {
+        rows.push(survey_file(&pipeline, &asked).await?);
+    }
+    Ok(rows)
+}
+
+async fn survey_file(pipeline: &Pipeline<'_>, asked: &Asked) -> Result<Row, IngestError> {
+    let (profile, outcome) = match land::prepare(pipeline, asked).await? {
+        Ready::Answered(answer) => (None, answer.outcome),
+        Ready::ToCommit(granule) => {
+            let answers = land::commit(pipeline, &[(asked, &granule)]).await?;
+            let profile = granule.target.profile;
+            let outcome = answers.into_iter().next().map(|answer| answer.outcome);
+            (profile, outcome.expect("one file has one answer"))
+        }
+    };
+    let path = asked.file();
+    let name =
+        |path: Option<&std::ffi::OsStr>| path.unwrap_or_default().to_string_lossy().into_owned();
+    Ok(Row {
+        set: name(path.parent().and_then(Path::file_name)),
+        file: name(path.file_name()),
+        profile,
+        outcome,
+    })
+}
+
+/// Keeps no observations.
+struct Passing;
+
+#[async_trait]
+impl ObservationSink for Passing {
+    async fn put(&self, observations: Vec<Observation>) -> Result<Stored, SinkError> {
+        let new = observations.len() as u64;
+        Ok(Stored {
+            new,
+            ..Stored::default()
+        })
+    }
+}
+
+/// The rows as a Markdown table: files of one set that fared alike are one line.
+pub fn markdown(rows: &[Row]) -> String {
+    let mut lines: Vec<(String, String, usize)> = Vec::new();
+    for row in rows {
+        let (how, result) = cells(row);
+        let known = lines
+            .iter_mut()
+            .find(|(set, told, _)| *set == row.set && *told == format!("{how} | {result}"));
+        match known {
+            Some((_, _, files)) => *files += 1,
+            None => lines.push((row.set.clone(), format!("{how} | {result}"), 1)),
+        }
+    }
+    let mut text = "| set | files | read by | result |\n|---|---|---|---|\n".to_owned();
+    for (set, told, files) in lines {
+        writeln!(text, "| `{}` | {files} | {told} |", plain(&set))
+            .expect("a string takes everything");
+    }
+    text
+}
+
+/// How a file was read, and what became of it.
+fn cells(row: &Row) -> (String, String) {
+    let by = row
+        .profile
+        .as_ref()
+        .map_or_else(|| "CF".to_owned(), |name| format!("`{name}`"));
+    match &row.outcome {
+        Outcome::Landed { manifest, .. } | Outcome::AlreadyLanded { manifest, .. } => {
+            (by, format!("lands in `{}`", manifest.product))
+        }
+        Outcome::Observed { .. } => (
+            "observations".to_owned(),
+            "stored as observations".to_owned(),
+        ),
+        Outcome::Rejected {
+            reason,
+            object,
+            detail,
+            ..
+        } => {
+            let why = plain(&format!("{object}: {detail}"));
+            (
+                "-".to_owned(),
+                format!("refused ({}): {why}", class(*reason)),
+            )
+        }
+    }
+}
+
+/// Text that cannot end a cell of a table.
+fn plain(text: &str) -> String {
+    text.replace('|', "\\|")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rejection::Rejection;
+    use contract::event::RejectReason;
+
+    #[test]
+    fn files_that_fared_alike_are_one_line() {
+        let refused = |file: &str| {
+            let rejection = Rejection::new(RejectReason::Grid, "lon", "is a swath | grid it first");
+            Row {
+                set: "swaths".to_owned(),
+                file: file.to_owned(),
+                profile: None,
+                outcome: Outcome::rejected(file.into(), rejection),
+            }
+        };
+        let text = markdown(&[refused("a.nc"), refused("b.nc")]);
+        let lines: Vec<_> = text.lines().collect();
+        assert_eq!(lines.len(), 3, "{text}");
+        assert_eq!(
+            lines[2],
+            "| `swaths` | 2 | - | refused (grid): lon: is a swath \\| grid it first |"
+        );
+    }
+}
