@@ -17,7 +17,7 @@ java=$(find_java) || {
     echo 'no Java 17' >&2
     exit 1
 }
-exec "$java" -Xmx256m -XX:+UseSerialGC -XX:TieredStopAtLevel=1 -Dfluxglobe.log=WARN \
+exec "$java" -Xmx256m "${small_java[@]}" -Dfluxglobe.log=WARN \
     "-Dlog4j.configuration=file:$here/hdfs/log4j.properties" \
     "-Dfluxglobe.hdfs=${FLUXGLOBE_HDFS:-hdfs://127.0.0.1:${FLUXGLOBE_HDFS_PORT:-18020}}" \
     -cp "$here/hdfs:$jars/*" org.apache.hadoop.fs.FsShell "$@"

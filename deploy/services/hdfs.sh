@@ -27,7 +27,7 @@ launch_cluster() {
         say 'formatting its data folder'
         format=(-format)
     fi
-    launch "$java" "-Xmx$heap" -XX:+UseSerialGC -XX:+ExitOnOutOfMemoryError -Djava.awt.headless=true \
+    launch "$java" "-Xmx$heap" "${small_java[@]}" \
         -Djava.net.preferIPv4Stack=true -Dfluxglobe.log=INFO "-Dlog4j.configuration=file:$here/hdfs/log4j.properties" \
         -cp "$service/lib/*" org.apache.hadoop.test.MiniDFSClusterManager "${format[@]}" \
         -datanodes 1 -nnport "$port" -httpport "$http_port" \

@@ -42,5 +42,5 @@ java=$(find_java) || {
     echo 'no Java 17' >&2
     exit 1
 }
-exec "$java" -Xmx256m -XX:+UseSerialGC -XX:TieredStopAtLevel=1 -Dfluxglobe.log=WARN \
+exec "$java" -Xmx256m "${small_java[@]}" -Dfluxglobe.log=WARN \
     "-Dlog4j2.configurationFile=$here/kafka/log4j2.xml" -cp "$jars/*" "$class" "${server[@]}" "$@"

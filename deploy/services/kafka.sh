@@ -26,9 +26,8 @@ install_service() {
 java_run() {
     local java
     java=$(find_java) || fail 'no Java 17'
-    # The serial collector: the smallest one, and the others want cores that tests need.
-    "$@" "$java" "-Xmx$heap" -XX:+UseSerialGC -XX:+ExitOnOutOfMemoryError -Djava.awt.headless=true \
-        -Dfluxglobe.log=INFO "-Dlog4j2.configurationFile=$here/kafka/log4j2.xml" -cp "$service/lib/*" "${java_arguments[@]}"
+    "$@" "$java" "-Xmx$heap" "${small_java[@]}" -Dfluxglobe.log=INFO \
+        "-Dlog4j2.configurationFile=$here/kafka/log4j2.xml" -cp "$service/lib/*" "${java_arguments[@]}"
 }
 
 # A certificate that is its own authority and a password, each made once.
@@ -59,7 +58,8 @@ listener.name.sasl_ssl.scram-sha-512.sasl.jaas.config=org.apache.kafka.common.se
 END
 }
 
-# One broker: every internal topic has one copy and few partitions, a new group starts without waiting for more members.
+# One broker: every internal topic has one copy and few partitions, a new group starts without waiting for more members. A
+# broker started after kill -9 may not come back before the session of the killed one is over, hence the short one.
 write_settings() {
     local secure_listener=''
     rm -f "$run/server.properties"
@@ -73,6 +73,7 @@ process.roles=broker,controller
 node.id=1
 controller.quorum.voters=1@127.0.0.1:$controller_port
 controller.listener.names=CONTROLLER
+listener.security.protocol.map=CONTROLLER:PLAINTEXT,PLAINTEXT:PLAINTEXT,SASL_SSL:SASL_SSL
 listeners=PLAINTEXT://127.0.0.1:$port,CONTROLLER://127.0.0.1:$controller_port$secure_listener
 advertised.listeners=PLAINTEXT://127.0.0.1:$port$secure_listener
 log.dirs=$run/data
@@ -89,6 +90,8 @@ share.coordinator.state.topic.num.partitions=1
 share.coordinator.state.topic.replication.factor=1
 share.coordinator.state.topic.min.isr=1
 group.initial.rebalance.delay.ms=0
+broker.session.timeout.ms=4000
+broker.heartbeat.interval.ms=500
 log.cleaner.dedupe.buffer.size=16777216
 END
 }
@@ -125,10 +128,15 @@ broker_answers() {
 # The user of the SCRAM mechanism is kept by the broker itself; Kafka's own tool adds it, out of a file, since a command line
 # is there for everybody to read.
 add_scram_user() {
-    (umask 077 && printf 'SCRAM-SHA-512=[password=%s]\n' "$(cat "$run/password")" >"$run/user.properties")
+    local password
+    password=$(cat "$run/password")
+    (umask 077 && printf 'SCRAM-SHA-512=password=%s\n' "$password" >"$run/user.properties")
+    # A tool that fails shows what it was given.
     FLUXGLOBE_KAFKA=127.0.0.1:$port "$here/kafka-tool.sh" configs --alter --entity-type users --entity-name fluxglobe \
-        --add-config-file "$run/user.properties" >>"$log" 2>&1 || fail "could not add its user; its log: $log"
-    mv "$run/user.properties" "$run/scram_user"
+        --add-config-file "$run/user.properties" 2>&1 | sed "s/$password/(password)/g" >>"$log" ||
+        fail "could not add its user; its log: $log"
+    rm "$run/user.properties"
+    : >"$run/scram_user"
 }
 
 start_service() {
