@@ -25,7 +25,7 @@ def main() -> None:
     groups = []
     for file in map(Path, sys.argv[1:]):
         rules = [
-            {"record": f"panel:query:{index}", "expr": query}
+            {"record": f"panel:{file.stem}:query{index}", "expr": query}
             for index, query in enumerate(queries(json.loads(file.read_text())))
         ]
         if not rules:

@@ -1,4 +1,4 @@
-"""Writes the dashboards as Grafana reads them: `python make.py FOLDER`. Every panel says what it tells and when to worry."""
+"""Writes the dashboards for Grafana: `python make.py FOLDER`. Each panel says what it tells and when to worry."""
 
 import sys
 from pathlib import Path

@@ -81,7 +81,7 @@ def board() -> Dashboard:
         .with_panel(
             lines(
                 "Notice to tile",
-                "Time from a granule's notice until a tile that shows it was there: asked for by a viewer, or ordered ahead. Worry above two minutes.",
+                "From a notice to a tile that shows what it brought, asked for or ordered ahead. Worry above two minutes.",
                 "s",
                 *quantiles(FRESH, "{{path}}", by="path", window="15m"),
             )

@@ -127,9 +127,7 @@ def lines(
 
 
 def spread(title: str, what: str, histogram: str, *, width: int = 12) -> HeatmapPanel:
-    """How a histogram's observations are spread, over time. `histogram`: its name, with labels if need be."""
-    name, _, labels = histogram.partition("{")
-    selector = f"{name}_bucket" + ("{" + labels if labels else "")
+    """How a histogram's observations are spread, over time. `histogram`: its name."""
     return (
         HeatmapPanel()
         .title(title)
@@ -137,7 +135,9 @@ def spread(title: str, what: str, histogram: str, *, width: int = 12) -> Heatmap
         .datasource(SOURCE)
         .calculate(False)
         .with_target(
-            query(f"sum by (le) (increase({selector}[$__rate_interval]))", "{{le}}").format(PromQueryFormat.HEATMAP)
+            query(f"sum by (le) (increase({histogram}_bucket[$__rate_interval]))", "{{le}}").format(
+                PromQueryFormat.HEATMAP
+            )
         )
         .span(width)
         .height(8)
@@ -146,11 +146,9 @@ def spread(title: str, what: str, histogram: str, *, width: int = 12) -> Heatmap
 
 def quantiles(histogram: str, legend: str, *, by: str = "", window: str = "$__rate_interval") -> list[tuple[str, str]]:
     """Median and 95th percentile of a histogram, apart by a label."""
-    name, _, labels = histogram.partition("{")
-    selector = f"{name}_bucket" + ("{" + labels if labels else "")
     groups = f"{by}, le" if by else "le"
     return [
-        (f"histogram_quantile({q}, sum by ({groups}) (rate({selector}[{window}])))", f"{legend} {label}")
+        (f"histogram_quantile({q}, sum by ({groups}) (rate({histogram}_bucket[{window}])))", f"{legend} {label}")
         for q, label in ((0.5, "median"), (0.95, "95 %"))
     ]
 
