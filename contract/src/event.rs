@@ -180,7 +180,7 @@ impl Body {
     pub fn order_key(&self) -> String {
         match self {
             Self::GranuleNotice { path, product, .. } => {
-                product.as_ref().map_or(path, |p| p.as_str()).to_owned()
+                product.as_ref().map_or(path.as_str(), |p| p.as_str()).to_owned()
             }
             Self::GranuleLanded { manifest, .. } | Self::ProductDerived { manifest, .. } => {
                 manifest.product.to_string()

@@ -1,5 +1,6 @@
 //! The command line: words in, one plain `Command` out. Every value is parsed here, once, into its final type.
 
+mod observations;
 mod services;
 mod show;
 mod upkeep;
@@ -13,6 +14,7 @@ use contract::job::Mode;
 use contract::product::ProductId;
 use contract::time::TimeMs;
 
+pub(crate) use observations::{MatchTime, Matchup, Observations, ObservationsAsked};
 pub(crate) use services::{
     Bench, BenchStream, Executor, Ingestd, Notice, Rejected, RenderWorker, Scheduler, TileServer,
     Topics,
@@ -117,6 +119,9 @@ pub(crate) enum Command {
     /// Refused files and messages.
     #[command(subcommand)]
     Rejected(Rejected),
+    /// Observations of buoys, ships, stations and profiles.
+    #[command(subcommand)]
+    Observations(Observations),
     /// Make anew what was derived from a product, where it is stale or missing.
     Recompute(Recompute),
     /// Remove objects that no kept version needs.

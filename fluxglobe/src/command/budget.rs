@@ -43,7 +43,7 @@ pub(crate) async fn run(settings: &Settings, options: &Budget) -> Result<()> {
 }
 
 /// A GeoJSON file, a named region or a box.
-fn region(text: &str) -> Result<Region> {
+pub(crate) fn region(text: &str) -> Result<Region> {
     let extension = Path::new(text)
         .extension()
         .and_then(|extension| extension.to_str());

@@ -6,6 +6,7 @@ mod gc;
 pub(crate) mod generate;
 mod ingest;
 pub(crate) mod notice;
+mod observations;
 mod products;
 mod recompute;
 mod rejected;
@@ -44,6 +45,7 @@ pub(crate) async fn run(settings: &Settings, command: Command) -> Result<ExitCod
         }
         Command::Topics(command) => topics::run(command).await?,
         Command::Rejected(command) => rejected::run(settings, command).await?,
+        Command::Observations(command) => observations::run(settings, command).await?,
         Command::Recompute(options) => recompute::run(settings, options).await?,
         Command::Gc(options) => gc::run(settings, &options).await?,
         Command::Bench(Bench::Stream(options)) => {
