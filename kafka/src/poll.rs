@@ -1,0 +1,97 @@
+//! The task that fetches for a reader: it goes on whatever the reader does, so that the group knows the member is alive.
+
+use std::sync::Arc;
+
+use bytes::Bytes;
+use contract::event::MAX_EVENT_BYTES;
+use contract::topic::{Origin, Topic};
+use futures::StreamExt as _;
+use rdkafka::Message as _;
+use rdkafka::consumer::{Consumer as _, StreamConsumer};
+use rdkafka::error::{KafkaError, KafkaResult};
+use rdkafka::message::BorrowedMessage;
+use storage::log::Message;
+use tokio::sync::oneshot;
+use tokio::task::JoinHandle;
+
+use crate::inbox::{Inbox, Member};
+use crate::off_thread::OffThread;
+
+/// A running task; it ends when this is dropped.
+pub(crate) struct Polling {
+    stop: Option<oneshot::Sender<()>>,
+    task: JoinHandle<()>,
+}
+
+impl Polling {
+    pub(crate) fn start(consumer: OffThread<StreamConsumer<Member>>, inbox: Arc<Inbox>) -> Self {
+        let (stop, stopped) = oneshot::channel();
+        let task = tokio::spawn(async move {
+            if let Err(error) = poll(&consumer, &inbox, stopped).await {
+                inbox.fail(error);
+            }
+        });
+        Self {
+            stop: Some(stop),
+            task,
+        }
+    }
+
+    /// Ends it and waits until it holds nothing any more.
+    pub(crate) async fn end(mut self) {
+        self.stop.take();
+        if let Err(error) = self.task.await {
+            tracing::warn!(%error, "the task that fetches ended badly");
+        }
+    }
+}
+
+async fn poll(
+    consumer: &StreamConsumer<Member>,
+    inbox: &Inbox,
+    mut stopped: oneshot::Receiver<()>,
+) -> KafkaResult<()> {
+    let mut received = consumer.stream();
+    let mut is_paused = false;
+    loop {
+        tokio::select! {
+            biased;
+            _ended = &mut stopped => return Ok(()),
+            () = inbox.room.notified(), if is_paused => {
+                if inbox.has_room() {
+                    consumer.resume(&consumer.assignment()?)?;
+                    is_paused = false;
+                }
+            }
+            next = received.next() => match next.expect("a stream of messages has no end") {
+                Ok(message) => {
+                    // Partitions given while paused are not paused yet: their first message pauses them.
+                    if inbox.put(of_topic(inbox.topic(), &message)) {
+                        consumer.pause(&consumer.assignment()?)?;
+                        is_paused = true;
+                    }
+                }
+                Err(error @ KafkaError::MessageConsumptionFatal(_)) => return Err(error),
+                // The client mends these by itself, or cannot; the reader asks when it gets nothing.
+                Err(error) => tracing::debug!(%error, topic = %inbox.topic(), "fetching is disturbed"),
+            },
+        }
+        // Messages that are there already must not keep others from running.
+        tokio::task::consume_budget().await;
+    }
+}
+
+/// A message with its place. One that is too long for an event is cut: it is refused as such, and not held whole.
+pub(crate) fn of_topic(topic: Topic, message: &BorrowedMessage<'_>) -> Message {
+    let content = message.payload().unwrap_or_default();
+    let kept = &content[..content.len().min(MAX_EVENT_BYTES + 1)];
+    Message {
+        origin: Origin {
+            topic,
+            partition: u32::try_from(message.partition())
+                .expect("fetched partitions are numbered from 0"),
+            offset: u64::try_from(message.offset()).expect("fetched messages are numbered from 0"),
+        },
+        content: Bytes::copy_from_slice(kept),
+    }
+}

@@ -1,0 +1,171 @@
+//! Asking brokers what is there: topics, their partitions, and where partitions begin and end.
+
+use std::time::{Duration, Instant};
+
+use contract::topic::Topic;
+use futures::StreamExt as _;
+use rdkafka::ClientContext;
+use rdkafka::client::Client;
+use rdkafka::consumer::{Consumer as _, StreamConsumer};
+use rdkafka::error::RDKafkaErrorCode;
+use rdkafka::metadata::MetadataTopic;
+use tokio::task::JoinHandle;
+
+use crate::KafkaFailure;
+use crate::blocking::blocking;
+use crate::cluster::Cluster;
+use crate::context::Context;
+use crate::off_thread::OffThread;
+
+/// How long brokers may take to answer whether they are there.
+pub(crate) const READY_LIMIT: Duration = Duration::from_secs(2);
+/// How long they may take for everything else that is asked.
+pub(crate) const ASK_LIMIT: Duration = Duration::from_secs(10);
+
+/// How a topic is there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Found {
+    Missing,
+    /// With so many partitions, each with a leader.
+    Partitions(u32),
+    /// Some partition has no leader now.
+    Leaderless,
+}
+
+/// A client that only asks. Consumers never make topics by asking for them, as producers may.
+pub(crate) struct Probe {
+    client: OffThread<StreamConsumer<Context>>,
+    context: Context,
+    cluster: Cluster,
+    /// Takes the client's own messages off its queue, which would grow for ever.
+    drain: JoinHandle<()>,
+}
+
+impl Probe {
+    pub(crate) fn open(cluster: &Cluster) -> Result<Self, KafkaFailure> {
+        let context = Context::default();
+        let client: StreamConsumer<Context> = cluster
+            .asking()
+            .create_with_context(context.clone())
+            .map_err(|e| context.failure("opening a client", e))?;
+        let client = OffThread::new(client);
+        let drained = client.clone();
+        let drain = tokio::spawn(async move {
+            // Nothing is assigned to it: what comes are troubles, which the context has noted.
+            drained
+                .stream()
+                .for_each(|_trouble| std::future::ready(()))
+                .await;
+        });
+        Ok(Self {
+            client,
+            context,
+            cluster: cluster.clone(),
+            drain,
+        })
+    }
+
+    /// How topics are there.
+    pub(crate) async fn topics(
+        &self,
+        topics: &'static [Topic],
+        limit: Duration,
+    ) -> Result<Vec<(Topic, Found)>, KafkaFailure> {
+        let (client, context, cluster) = (
+            self.client.clone(),
+            self.context.clone(),
+            self.cluster.clone(),
+        );
+        blocking("looking for topics", move || {
+            let until = Instant::now() + limit;
+            let found = |&topic: &Topic| {
+                let left = until.saturating_duration_since(Instant::now());
+                find(client.client(), &context, &cluster.topic(topic), left)
+                    .map(|found| (topic, found))
+            };
+            topics.iter().map(found).collect()
+        })
+        .await
+    }
+
+    /// Where the messages of each partition begin and end; the end of what can be read, open transactions left out.
+    pub(crate) async fn bounds(&self, topic: Topic) -> Result<Vec<(u64, u64)>, KafkaFailure> {
+        let (client, context) = (self.client.clone(), self.context.clone());
+        let name = self.cluster.topic(topic);
+        let partitions = self.cluster.partitions();
+        blocking("looking for the ends of a topic", move || {
+            let until = Instant::now() + ASK_LIMIT;
+            let bounds = |partition| bounds(client.client(), &context, &name, partition, until);
+            (0..partitions).map(bounds).collect()
+        })
+        .await
+    }
+}
+
+impl Drop for Probe {
+    fn drop(&mut self) {
+        self.drain.abort();
+    }
+}
+
+/// Where one partition begins and ends.
+pub(crate) fn bounds<C: ClientContext>(
+    client: &Client<C>,
+    context: &Context,
+    topic: &str,
+    partition: u32,
+    until: Instant,
+) -> Result<(u64, u64), KafkaFailure> {
+    let left = until.saturating_duration_since(Instant::now());
+    let (low, high) = client
+        .fetch_watermarks(topic, partition as i32, left)
+        .map_err(|e| context.failure("looking for the ends of a topic", e))?;
+    Ok((low.max(0) as u64, high.max(0) as u64))
+}
+
+fn find<C: ClientContext>(
+    client: &Client<C>,
+    context: &Context,
+    topic: &str,
+    limit: Duration,
+) -> Result<Found, KafkaFailure> {
+    const STEP: &str = "looking for topics";
+    let answer = client
+        .fetch_metadata(Some(topic), limit)
+        .map_err(|e| context.failure(STEP, e))?;
+    context.well();
+    let Some(about) = answer.topics().iter().find(|about| about.name() == topic) else {
+        return Ok(Found::Missing);
+    };
+    about_topic(about)
+        .map_err(|code| context.failure(STEP, rdkafka::error::KafkaError::MetadataFetch(code)))
+}
+
+fn about_topic(about: &MetadataTopic) -> Result<Found, RDKafkaErrorCode> {
+    match about.error().map(RDKafkaErrorCode::from) {
+        None => {}
+        Some(RDKafkaErrorCode::UnknownTopicOrPartition) => return Ok(Found::Missing),
+        Some(RDKafkaErrorCode::LeaderNotAvailable) => return Ok(Found::Leaderless),
+        Some(code) => return Err(code),
+    }
+    let partitions = about.partitions();
+    let is_led = partitions.iter().all(|partition| partition.leader() >= 0);
+    Ok(if is_led {
+        Found::Partitions(partitions.len() as u32)
+    } else {
+        Found::Leaderless
+    })
+}
+
+/// Do brokers answer? Then the client is taken to be well again.
+pub(crate) fn are_brokers_there<C: ClientContext>(
+    client: &Client<C>,
+    context: &Context,
+    topic: &str,
+) -> Result<(), KafkaFailure> {
+    client
+        .fetch_metadata(Some(topic), READY_LIMIT)
+        .map_err(|e| context.failure("looking for brokers", e))?;
+    context.well();
+    Ok(())
+}

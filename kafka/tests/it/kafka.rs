@@ -1,0 +1,180 @@
+//! The suite on Kafka, and what Kafka alone must do.
+
+use std::time::Duration;
+
+use bytes::Bytes;
+use contract::event::MAX_EVENT_BYTES;
+use rdkafka::ClientConfig;
+use rdkafka::producer::{FutureProducer, FutureRecord, Producer as _};
+use storage::log::{EventLog, Start, contents};
+use tokio::time::Instant;
+
+use crate::events::{
+    FROM, MOMENT, assert_one_each, finished, finished_with_one, notice, notice_of, notices, paths,
+    read, work_off,
+};
+use crate::own_topics::{OwnTopics, end, open};
+use crate::suite::run_suite;
+
+run_suite!(open, end);
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn events_appended_together_are_all_there_or_none() {
+    let own = open().await;
+    let mut events = notices("a", 30);
+    events.push(notice(&"x".repeat(MAX_EVENT_BYTES)));
+    let refused = own.log.append(&events).await.unwrap_err();
+    assert!(!refused.is_retryable(), "{refused}");
+    assert!(contents(&own.log, FROM).await.unwrap().is_empty());
+    events.pop();
+    own.log.append(&events).await.unwrap();
+    own.log.append(&[]).await.unwrap();
+    assert_eq!(contents(&own.log, FROM).await.unwrap().len(), 30);
+    end(own).await;
+}
+
+fn foreign_producer(own: &OwnTopics, transactional_id: &str) -> FutureProducer {
+    let servers = own.settings.kafka.as_deref().unwrap();
+    let mut config = ClientConfig::new();
+    config.set("bootstrap.servers", servers);
+    config.set("transactional.id", transactional_id);
+    config.create().unwrap()
+}
+
+fn topic(own: &OwnTopics) -> String {
+    format!("{}{FROM}", own.settings.kafka_topic_prefix)
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn bytes_that_are_no_text_are_delivered_as_they_are() {
+    let own = open().await;
+    let bytes = Bytes::from_static(b"\xff\xfe\x00");
+    own.log
+        .append_message(FROM, "k", bytes.clone())
+        .await
+        .unwrap();
+    let mut reader = own.log.join(FROM, "g").await.unwrap();
+    let messages = read(&mut *reader, 1).await;
+    assert_eq!(messages[0].content, bytes);
+    assert!(messages[0].event().is_err());
+    end(own).await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn what_was_never_committed_is_not_seen_and_counts_nowhere() {
+    const LIMIT: Duration = Duration::from_secs(10);
+    let own = open().await;
+    let topic = topic(&own);
+    let id = format!("{}foreign", own.settings.kafka_topic_prefix);
+    let producer = foreign_producer(&own, &id);
+    let send = async |content: &str| {
+        let record = FutureRecord::to(&topic).key("k").payload(content);
+        producer.send(record, LIMIT).await.unwrap()
+    };
+    producer.init_transactions(LIMIT).unwrap();
+    producer.begin_transaction().unwrap();
+    let place = send(&notice("never").to_json()).await;
+    producer.abort_transaction(LIMIT).unwrap();
+    own.log.append(&[notice("seen")]).await.unwrap();
+
+    assert_eq!(paths(&contents(&own.log, FROM).await.unwrap()), ["seen"]);
+    assert_eq!(own.log.lag(FROM, "g").await.unwrap(), 1);
+    let origin = contract::topic::Origin {
+        topic: FROM,
+        partition: place.partition as u32,
+        offset: place.offset as u64,
+    };
+    let found = own.log.message(origin).await.unwrap();
+    assert_eq!(found, None, "{found:?}");
+    // One that is still open holds back only what comes after it, and a new follower sees it once it is committed.
+    producer.begin_transaction().unwrap();
+    send(&notice("late").to_json()).await;
+    let mut follower = own.log.follow(FROM, Start::Now).await.unwrap();
+    assert!(follower.next(10, MOMENT).await.unwrap().is_empty());
+    producer.commit_transaction(LIMIT).unwrap();
+    assert_eq!(paths(&follower.next(10, LIMIT).await.unwrap()), ["late"]);
+    end(own).await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn three_members_that_come_and_go_finish_each_message_once() {
+    let own = open().await;
+    own.log.append(&notices("a", 600)).await.unwrap();
+    let restless = async |lives: usize| {
+        for _ in 0..lives {
+            let mut reader = own.log.join(FROM, "g").await.unwrap();
+            for _ in 0..5 {
+                let messages = reader.next(8, MOMENT).await.unwrap();
+                // Half of what is held is never finished.
+                let half = messages.iter().step_by(2).map(finished_with_one).collect();
+                if reader.finish(half).await.is_err() {
+                    break;
+                }
+            }
+        }
+    };
+    tokio::join!(restless(4), restless(4), restless(4));
+    work_off(&own.log, "g").await;
+    assert_one_each(&own.log, 600).await;
+    end(own).await;
+}
+
+/// More than the reader keeps: fetching pauses, the member stays in its group, and nothing is lost or out of order.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_slow_reader_stops_the_fetching_and_gets_everything_in_order() {
+    const COUNT: usize = 3000;
+    let own = open().await;
+    let events: Vec<_> = (0..COUNT)
+        .map(|n| notice_of(&n.to_string(), Some("p")))
+        .collect();
+    for some in events.chunks(500) {
+        own.log.append(some).await.unwrap();
+    }
+    let mut reader = own.log.join(FROM, "g").await.unwrap();
+    let mut seen = paths(&read(&mut *reader, 1).await);
+    // Longer than the group waits for a member that does not say that it is alive.
+    tokio::time::sleep(Duration::from_secs(8)).await;
+    while seen.len() < COUNT {
+        let messages = read(&mut *reader, (COUNT - seen.len()).min(100)).await;
+        seen.extend(paths(&messages));
+        reader
+            .finish(messages.iter().map(finished).collect())
+            .await
+            .unwrap();
+    }
+    let expected: Vec<String> = (0..COUNT).map(|n| n.to_string()).collect();
+    assert_eq!(seen, expected);
+    end(own).await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_member_that_leaves_is_replaced_at_once_and_not_by_a_timeout() {
+    let own = open().await;
+    own.log.append(&notices("a", 10)).await.unwrap();
+    let mut first = own.log.join(FROM, "g").await.unwrap();
+    read(&mut *first, 10).await;
+    let start = Instant::now();
+    first.leave().await.unwrap();
+    let mut second = own.log.join(FROM, "g").await.unwrap();
+    read(&mut *second, 10).await;
+    let took = start.elapsed();
+    assert!(took < Duration::from_secs(5), "{took:?}");
+    end(own).await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_call_that_was_given_up_is_the_end_of_its_reader() {
+    let own = open().await;
+    own.log.append(&notices("a", 4)).await.unwrap();
+    let mut reader = own.log.join(FROM, "g").await.unwrap();
+    let messages = read(&mut *reader, 4).await;
+    let done = messages.iter().map(finished_with_one).collect();
+    let given_up = tokio::time::timeout(Duration::from_millis(1), reader.finish(done)).await;
+    assert!(given_up.is_err(), "it was done within a millisecond");
+    let refused = reader.next(1, MOMENT).await.unwrap_err();
+    assert!(refused.is_retryable(), "{refused}");
+    drop(reader);
+    work_off(&own.log, "g").await;
+    assert_one_each(&own.log, 4).await;
+    end(own).await;
+}

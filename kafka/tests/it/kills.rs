@@ -1,0 +1,135 @@
+//! Readers killed at any moment: what follows from each message is there once.
+
+use std::io::{BufRead as _, BufReader};
+use std::process::{Command, Stdio};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+use kafka_log::KafkaLog;
+use storage::log::EventLog as _;
+
+use crate::events::{FROM, MOMENT, assert_one_each, finished_by, lag, notices, work_off};
+use crate::own_topics::{end, open, own_settings, servers};
+
+/// Says to this program, started again, that it is a reader to be killed: `PREFIX,GROUP`.
+const READER: &str = "FLUXGLOBE_TEST_READER";
+const SEED: &str = "FLUXGLOBE_TEST_SEED";
+/// What a reader prints when it begins to work.
+const AT_WORK: &str = "at work";
+const MESSAGES: usize = 1500;
+const KILLS: u32 = 24;
+/// Groups that are read at the same time: each waits some seconds until a killed member is missed.
+const GROUPS: u32 = 6;
+/// A reader is killed at most so long after it began to work, milliseconds.
+const LONGEST_LIFE_MS: u64 = 400;
+
+/// Numbers that look random and follow from a seed (xorshift).
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, end: u64) -> u64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        self.0 % end
+    }
+}
+
+fn variable(name: &str) -> Option<String> {
+    std::env::var_os(name)?.into_string().ok()
+}
+
+fn seed() -> u64 {
+    let clock = || {
+        SystemTime::now()
+            .duration_since(UNIX_EPOCH)
+            .unwrap()
+            .as_millis() as u64
+    };
+    variable(SEED).map_or_else(clock, |seed| seed.parse().unwrap())
+}
+
+fn group_name(number: u32) -> String {
+    format!("g{number}")
+}
+
+#[test]
+fn what_follows_is_there_once_however_often_a_reader_is_killed() {
+    let mut runtime = tokio::runtime::Builder::new_multi_thread();
+    let runtime = runtime.worker_threads(2).enable_all().build().unwrap();
+    if let Some(reader) = variable(READER) {
+        runtime.block_on(be_a_reader(&reader));
+        return;
+    }
+    let seed = seed();
+    println!("{SEED}={seed}");
+    let own = runtime.block_on(open());
+    runtime
+        .block_on(own.log.append(&notices("a", MESSAGES)))
+        .unwrap();
+    let killed = AtomicU32::new(0);
+    std::thread::scope(|scope| {
+        for number in 0..GROUPS {
+            let (killed, prefix) = (&killed, &own.settings.kafka_topic_prefix);
+            scope.spawn(move || {
+                let mut random = Random(seed.wrapping_add(u64::from(number)).max(1));
+                while killed.fetch_add(1, Ordering::Relaxed) < KILLS {
+                    live_and_die(prefix, &group_name(number), random.below(LONGEST_LIFE_MS));
+                }
+            });
+        }
+    });
+    runtime.block_on(async {
+        for group in (0..GROUPS).map(group_name) {
+            let left = lag(&own.log, &group).await;
+            println!(
+                "{group}: at most {left} of {MESSAGES} left after {KILLS} kills of {GROUPS} groups"
+            );
+            assert!(left > 0, "done before it was killed: make more messages");
+            work_off(&own.log, &group).await;
+        }
+        assert_one_each(&own.log, MESSAGES * GROUPS as usize).await;
+        end(own).await;
+    });
+}
+
+/// Starts a reader in a process of its own, waits until it works, and kills it.
+fn live_and_die(prefix: &str, group: &str, life_ms: u64) {
+    let mut reader = Command::new(std::env::current_exe().unwrap())
+        .args(["--exact", "--nocapture"])
+        .arg("kills::what_follows_is_there_once_however_often_a_reader_is_killed")
+        .env(READER, format!("{prefix},{group}"))
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let lines = BufReader::new(reader.stdout.take().unwrap()).lines();
+    let is_at_work = lines
+        .map_while(Result::ok)
+        .any(|line| line.contains(AT_WORK));
+    assert!(is_at_work, "the reader ended before it was killed");
+    std::thread::sleep(Duration::from_millis(life_ms));
+    // SIGKILL: it says good-bye to nobody.
+    reader.kill().unwrap();
+    reader.wait().unwrap();
+}
+
+/// Reads and finishes out of order until it is killed.
+async fn be_a_reader(prefix_and_group: &str) {
+    let (prefix, group) = prefix_and_group.split_once(',').unwrap();
+    let mut settings = own_settings(&servers());
+    settings.kafka_topic_prefix = prefix.to_owned();
+    settings.kafka_instance = Some(format!("reader-{group}"));
+    let log = KafkaLog::connect(&settings).await.unwrap();
+    let mut reader = log.join(FROM, group).await.unwrap();
+    loop {
+        let messages = reader.next(8, MOMENT).await.unwrap();
+        if !messages.is_empty() {
+            println!("{AT_WORK}");
+        }
+        let (even, odd): (Vec<_>, Vec<_>) = messages.iter().partition(|m| m.origin.offset % 2 == 0);
+        for part in [odd, even] {
+            let done = part.into_iter().map(|m| finished_by(group, m)).collect();
+            reader.finish(done).await.unwrap();
+        }
+    }
+}

@@ -1,0 +1,14 @@
+//! The event log as its users see it: one suite for the embedded log and for Kafka, then what only Kafka can do wrong.
+
+mod broker;
+mod embedded;
+mod events;
+mod faults;
+mod kafka;
+mod kills;
+mod own_topics;
+mod rejected;
+mod security;
+mod setup;
+mod speed;
+mod suite;
