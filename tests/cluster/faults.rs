@@ -17,7 +17,7 @@ use serde_json::Value;
 
 use crate::alone;
 
-const PRODUCT: &str = "killed-flux";
+pub(crate) const PRODUCT: &str = "killed-flux";
 const ACCUMULATED: &str = "killed-flux-accumulated";
 const LIMIT: Duration = Duration::from_mins(4);
 /// Granules noticed before each kill.
@@ -45,7 +45,7 @@ impl Dice {
     clippy::disallowed_methods,
     reason = "tests have no command line of their own"
 )]
-fn number(variable: &str, default: u64) -> u64 {
+pub(crate) fn number(variable: &str, default: u64) -> u64 {
     std::env::var(variable)
         .ok()
         .and_then(|text| text.parse().ok())
@@ -56,7 +56,7 @@ fn number(variable: &str, default: u64) -> u64 {
     clippy::print_stderr,
     reason = "seeds and times are what the test is for"
 )]
-fn say(line: &str) {
+pub(crate) fn say(line: &str) {
     eprintln!("{line}");
 }
 
@@ -235,14 +235,14 @@ fn killed_processes_lose_nothing_and_double_nothing() {
     }
 }
 
-fn notice(cluster: &Cluster, files: &[PathBuf]) {
+pub(crate) fn notice(cluster: &Cluster, files: &[PathBuf]) {
     let mut words = vec!["notice", "--product", PRODUCT];
     words.extend(files.iter().map(|file| file.to_str().unwrap()));
     cluster.succeed(&words).unwrap();
 }
 
 /// Waits until everything has landed and what is derived is of the newest version.
-fn until_whole(cluster: &Cluster, months: usize) {
+pub(crate) fn until_whole(cluster: &Cluster, months: usize) {
     let look = |cluster: &Cluster| {
         let products: Value = serde_json::from_str(&cluster.succeed(&["products", "--json"])?)?;
         let find = |name: &str| {
@@ -272,7 +272,7 @@ fn until_whole(cluster: &Cluster, months: usize) {
 }
 
 /// One `granule.landed` for each granule, and no `product.derived` twice.
-fn each_event_once(cluster: &Cluster, files: &[PathBuf]) {
+pub(crate) fn each_event_once(cluster: &Cluster, files: &[PathBuf]) {
     let mut landed: BTreeMap<String, usize> = BTreeMap::new();
     for event in events(cluster, Topic::GranuleLanded) {
         if let Body::GranuleLanded { path, .. } = event.body {

@@ -5,6 +5,7 @@
 mod equality;
 mod faults;
 mod granules;
+mod outages;
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 

@@ -11,6 +11,7 @@ use tempfile::TempDir;
 use crate::http::{self, Answer};
 use crate::node::Node;
 use crate::program;
+use crate::proxy::Proxy;
 use crate::servers::{Servers, free_port};
 
 /// How many of each service.
@@ -40,6 +41,8 @@ pub struct Cluster {
     pub nodes: BTreeMap<String, Node>,
     /// Address of the tile server.
     pub tiles: String,
+    /// What stands before S3.
+    pub s3: Proxy,
     /// Kafka, PostGIS and S3.
     pub servers: Servers,
     settings: Vec<(String, String)>,
@@ -56,8 +59,11 @@ impl Cluster {
         let folder = tempfile::tempdir()?;
         let (planned, scheduler, renderers) = plan(shape);
         let mut settings = servers.settings().to_vec();
+        let s3 = before_s3(&servers)?;
+        settings.retain(|(name, _)| name != "AWS_ENDPOINT_URL");
         let mut set = |name: &str, value: String| settings.push((name.to_owned(), value));
         set("FLUXGLOBE_STORE", "s3://fluxglobe/cluster".to_owned());
+        set("AWS_ENDPOINT_URL", format!("http://{}", s3.address));
         set("FLUXGLOBE_CLUSTER", format!("http://{scheduler}"));
         set("FLUXGLOBE_RENDER_WORKERS", renderers.join(","));
         set("FLUXGLOBE_ALLOW_FOLDER", inbox.display().to_string());
@@ -70,6 +76,7 @@ impl Cluster {
         let mut cluster = Self {
             nodes: BTreeMap::new(),
             tiles: String::new(),
+            s3,
             servers,
             settings,
             folder,
@@ -178,6 +185,16 @@ impl Cluster {
             self.talk()
         )
     }
+}
+
+fn before_s3(servers: &Servers) -> Result<Proxy> {
+    let endpoint = servers.setting("AWS_ENDPOINT_URL")?;
+    let address = endpoint.trim_start_matches("http://").trim_end_matches('/');
+    Proxy::start(
+        address
+            .parse()
+            .with_context(|| format!("{endpoint} is no address"))?,
+    )
 }
 
 fn plan(shape: Shape) -> (Vec<Planned>, String, Vec<String>) {

@@ -5,6 +5,7 @@ pub mod granule;
 pub mod http;
 pub mod node;
 pub mod program;
+pub mod proxy;
 pub mod real_data;
 pub mod server;
 pub mod servers;
