@@ -113,7 +113,7 @@ impl Appender {
         transactions
             .run(records, None)
             .await
-            .map_err(|broken| broken.failure)?;
+            .map_err(|broken| *broken.failure)?;
         *open = Some(transactions);
         Ok(())
     }

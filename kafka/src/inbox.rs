@@ -257,14 +257,14 @@ mod tests {
     fn fetching_pauses_when_messages_or_bytes_are_many_and_goes_on_when_half_are_out() {
         let inbox = Inbox::new(Topic::GranuleNotice);
         inbox.give(0);
-        let full = (0..).find(|&n| inbox.put(message(0, n, 1))).unwrap();
+        let full = (0..9999).find(|&n| inbox.put(message(0, n, 1))).unwrap();
         assert_eq!(full as usize + 1, MAX_WAITING);
         assert!(!inbox.has_room());
         let out = inbox.hand_out(MAX_WAITING / 2).unwrap();
         assert!(inbox.has_room());
         assert_eq!(out.len(), MAX_WAITING / 2);
         let big = MAX_WAITING_BYTES / 4;
-        let count = (0..)
+        let count = (0..9999)
             .find(|&n| inbox.put(message(0, 5000 + n, big)))
             .unwrap();
         assert_eq!(count, 3);

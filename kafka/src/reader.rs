@@ -144,7 +144,7 @@ impl KafkaReader {
                     tracing::debug!(topic = %self.topic, "partitions were shared out anew; finishing again");
                     tokio::time::sleep(AGAIN_PAUSE).await;
                 }
-                Err(broken) => return Err(broken.failure),
+                Err(broken) => return Err(*broken.failure),
             }
         }
     }

@@ -26,7 +26,7 @@ impl Slots {
     /// Takes the lowest number that is free in a group.
     pub(crate) fn take(&self, group: &str) -> Slot {
         let mut taken = self.taken();
-        let number = (0..)
+        let number = (0..u32::MAX)
             .find(|&number| !taken.contains(&(group.to_owned(), number)))
             .expect("fewer readers than numbers");
         taken.insert((group.to_owned(), number));

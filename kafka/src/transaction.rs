@@ -42,7 +42,7 @@ pub(crate) struct Offsets {
 /// A transaction that did not come about.
 #[derive(Debug)]
 pub(crate) struct Broken {
-    pub(crate) failure: KafkaFailure,
+    pub(crate) failure: Box<KafkaFailure>,
     /// Is it certain that nothing of it will ever be seen?
     pub(crate) is_undone: bool,
 }
@@ -90,7 +90,7 @@ impl Transactions {
         });
         ran.await.unwrap_or_else(|failure| {
             Err(Broken {
-                failure,
+                failure: Box::new(failure),
                 is_undone: false,
             })
         })
@@ -105,7 +105,7 @@ impl Transactions {
         let until = Instant::now() + LIMIT;
         if let Err(error) = self.producer.begin_transaction() {
             return Err(Broken {
-                failure: self.context.failure("beginning a transaction", error),
+                failure: Box::new(self.context.failure("beginning a transaction", error)),
                 is_undone: true,
             });
         }
@@ -126,7 +126,7 @@ impl Transactions {
                 tracing::debug!(%error, "how a transaction ended is known to Kafka only");
             }
             Broken {
-                failure,
+                failure: Box::new(failure),
                 is_undone: aborted.is_ok(),
             }
         })

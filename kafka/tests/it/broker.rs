@@ -38,7 +38,7 @@ impl Broker {
             .set("bootstrap.servers", self.servers())
             .create()
             .unwrap();
-        let until = Instant::now() + Duration::from_secs(60);
+        let until = Instant::now() + Duration::from_mins(1);
         while client
             .fetch_metadata(None, Duration::from_secs(2))
             .map_or(0, |found| found.topics().len())

@@ -1,5 +1,7 @@
 //! The suite on the embedded log, in a folder as it is used.
 
+use std::future::{Ready, ready};
+
 use storage::log::EmbeddedLog;
 
 use crate::suite::run_suite;
@@ -10,17 +12,18 @@ struct InFolder {
     folder: tempfile::TempDir,
 }
 
-async fn open() -> InFolder {
+fn open() -> Ready<InFolder> {
     let folder = tempfile::tempdir().unwrap();
-    InFolder {
+    ready(InFolder {
         log: EmbeddedLog::open(folder.path()).unwrap(),
         folder,
-    }
+    })
 }
 
-async fn end(own: InFolder) {
+fn end(own: InFolder) -> Ready<()> {
     drop(own.log);
     own.folder.close().unwrap();
+    ready(())
 }
 
 run_suite!(open, end);

@@ -12,7 +12,7 @@ use tokio::time::Instant;
 pub(crate) const FROM: Topic = Topic::GranuleNotice;
 pub(crate) const TO: Topic = Topic::GranuleRejected;
 /// A test waits so long for what must come: a group may have to notice a killed member first.
-pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
+pub(crate) const PATIENCE: Duration = Duration::from_mins(1);
 pub(crate) const MOMENT: Duration = Duration::from_millis(200);
 
 pub(crate) fn notice(path: &str) -> Event {

@@ -2,7 +2,10 @@
 
 use std::time::Duration;
 
-use storage::log::EventLog as _;
+use contract::topic::Origin;
+use kafka_log::KafkaLog;
+use storage::StorageError;
+use storage::log::{EventLog as _, Reader, Start, contents};
 use tokio::time::Instant;
 
 use crate::broker::Broker;
@@ -13,6 +16,8 @@ use crate::own_topics::open_on;
 
 /// No call may take longer, whatever Kafka does.
 const LONGEST_CALL: Duration = Duration::from_secs(20);
+/// How long appends fail for.
+const DOWN: Duration = Duration::from_secs(30);
 /// What this process may grow by while appends fail, bytes: the client's queues, and the noise of an allocator.
 const GROWTH_BYTES: u64 = 64 << 20;
 
@@ -37,52 +42,78 @@ async fn while_no_broker_answers_calls_fail_in_time_and_afterwards_work_goes_on(
     log.ready().await.unwrap();
 
     broker.kill();
-    let start = Instant::now();
-    let mut errors = vec![];
-    let mut call = |what: &str, began: Instant, error: Option<storage::StorageError>| {
-        let error = error.unwrap_or_else(|| panic!("{what} succeeded without a broker"));
-        assert!(error.is_retryable(), "{what}: {error}");
-        assert!(
-            began.elapsed() < LONGEST_CALL,
-            "{what}: {:?}",
-            began.elapsed()
-        );
-        errors.push(format!(
-            "{what} {:.1} s: {error}",
-            began.elapsed().as_secs_f64()
-        ));
+    fail_in_time(log, reader, held[0].origin).await;
+    append_without_end(log).await;
+    broker.start_again();
+
+    let back = Instant::now();
+    let say = |what: &str| {
+        println!(
+            "{what} {:.1} s after the broker",
+            back.elapsed().as_secs_f64()
+        )
     };
+    while let Err(error) = log.ready().await {
+        assert!(back.elapsed() < LONGEST_CALL, "{error}");
+        tokio::time::sleep(MOMENT).await;
+    }
+    say("ready");
+    log.append(&[notice("after")]).await.unwrap();
+    say("appended");
+    work_off(log, "g").await;
+    say("worked off");
+    // Whatever came through of what was given up was seen or not; what was acknowledged is there.
+    let count = contents(log, FROM).await.unwrap().len();
+    assert!(count >= 21, "{count}");
+    assert_one_each(log, count).await;
+}
+
+async fn fail_in_time(log: &KafkaLog, mut reader: Box<dyn Reader>, origin: Origin) {
+    fn check(what: &str, began: Instant, error: Option<StorageError>) {
+        let took = began.elapsed();
+        let error = error.unwrap_or_else(|| panic!("{what} succeeded without a broker"));
+        println!("{what}: {:.1} s: {error}", took.as_secs_f64());
+        assert!(error.is_retryable() && took < LONGEST_CALL, "{what}");
+    }
     let began = Instant::now();
-    call("ready", began, log.ready().await.err());
+    check("ready", began, log.ready().await.err());
     assert!(began.elapsed() < Duration::from_secs(3));
     let began = Instant::now();
-    call("next", began, reader.next(5, MOMENT).await.err());
+    check("next", began, reader.next(5, MOMENT).await.err());
     drop(reader);
     let began = Instant::now();
-    call("join", began, log.join(FROM, "g").await.err());
+    check("join", began, log.join(FROM, "g").await.err());
     let began = Instant::now();
-    call(
+    check(
         "append all",
         began,
         log.append(&notices("no", 3)).await.err(),
     );
     let began = Instant::now();
-    call("lag", began, log.lag(FROM, "g").await.err());
+    check(
+        "append one",
+        began,
+        log.append(&notices("no", 1)).await.err(),
+    );
     let began = Instant::now();
-    call("message", began, log.message(held[0].origin).await.err());
+    check("lag", began, log.lag(FROM, "g").await.err());
     let began = Instant::now();
-    let follow = log.follow(FROM, storage::log::Start::Oldest).await;
-    call("follow", began, follow.err());
+    check("message", began, log.message(origin).await.err());
+    let began = Instant::now();
+    let follower = log.follow(FROM, Start::Oldest).await;
+    check("follow", began, follower.err());
+}
 
-    // Callers that do not give up: as fast as they can, each with an event of 100 kB.
+/// Callers that do not give up: as fast as they can, each with an event of 100 kB.
+async fn append_without_end(log: &KafkaLog) {
     let before_bytes = resident_bytes();
     let big = notice(&"x".repeat(100_000));
-    let until = Instant::now() + Duration::from_secs(30);
+    let until = Instant::now() + DOWN;
     let hammer = async || {
         let mut count = 0;
         while Instant::now() < until {
-            let one = std::slice::from_ref(&big);
-            let given_up = tokio::time::timeout(Duration::from_millis(20), log.append(one)).await;
+            let append = log.append(std::slice::from_ref(&big));
+            let given_up = tokio::time::timeout(Duration::from_millis(20), append).await;
             assert!(!matches!(given_up, Ok(Ok(()))));
             count += 1;
             tokio::task::yield_now().await;
@@ -92,40 +123,10 @@ async fn while_no_broker_answers_calls_fail_in_time_and_afterwards_work_goes_on(
     let (a, b, c, d) = tokio::join!(hammer(), hammer(), hammer(), hammer());
     let grown_bytes = resident_bytes().saturating_sub(before_bytes);
     println!(
-        "down for {:.0} s; {} appends given up; grown by {} KiB",
-        start.elapsed().as_secs_f64(),
+        "{} appends given up in {} s without a broker: grown by {} KiB",
         a + b + c + d,
+        DOWN.as_secs(),
         grown_bytes >> 10
     );
-    println!("{}", errors.join("\n"));
     assert!(grown_bytes < GROWTH_BYTES, "{grown_bytes}");
-
-    broker.start_again();
-    let back = Instant::now();
-    while let Err(error) = log.ready().await {
-        assert!(back.elapsed() < Duration::from_secs(20), "{error}");
-        tokio::time::sleep(MOMENT).await;
-    }
-    println!(
-        "ready {:.1} s after the broker",
-        back.elapsed().as_secs_f64()
-    );
-    log.append(&[notice("after")]).await.unwrap();
-    println!(
-        "appended {:.1} s after the broker",
-        back.elapsed().as_secs_f64()
-    );
-    finish_all(log).await;
-    println!(
-        "worked off {:.1} s after the broker",
-        back.elapsed().as_secs_f64()
-    );
-}
-
-/// Whatever came through of what was given up was seen or not; what was acknowledged is there once each.
-async fn finish_all(log: &kafka_log::KafkaLog) {
-    work_off(log, "g").await;
-    let count = storage::log::contents(log, FROM).await.unwrap().len();
-    assert!(count >= 21, "{count}");
-    assert_one_each(log, count).await;
 }

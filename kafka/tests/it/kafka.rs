@@ -6,7 +6,7 @@ use bytes::Bytes;
 use contract::event::MAX_EVENT_BYTES;
 use rdkafka::ClientConfig;
 use rdkafka::producer::{FutureProducer, FutureRecord, Producer as _};
-use storage::log::{EventLog, Start, contents};
+use storage::log::{EventLog as _, Start, contents};
 use tokio::time::Instant;
 
 use crate::events::{

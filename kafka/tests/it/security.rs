@@ -174,7 +174,7 @@ fn free_ports() -> [u16; 4] {
 
 /// Makes topics, tells an event and reads it.
 async fn use_it(settings: &KafkaSettings) {
-    let until = Instant::now() + Duration::from_secs(60);
+    let until = Instant::now() + Duration::from_mins(1);
     while let Err(error) = create_topics(settings, 1).await {
         assert!(error.is_retryable() && Instant::now() < until, "{error}");
     }
