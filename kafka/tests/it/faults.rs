@@ -51,7 +51,7 @@ async fn while_no_broker_answers_calls_fail_in_time_and_afterwards_work_goes_on(
         println!(
             "{what} {:.1} s after the broker",
             back.elapsed().as_secs_f64()
-        )
+        );
     };
     while let Err(error) = log.ready().await {
         assert!(back.elapsed() < LONGEST_CALL, "{error}");

@@ -116,6 +116,12 @@ impl GuardedBroker {
 
 impl Drop for GuardedBroker {
     fn drop(&mut self) {
+        if std::thread::panicking() {
+            println!(
+                "{}",
+                std::fs::read_to_string(self.file("log")).unwrap_or_default()
+            );
+        }
         self.process.kill().unwrap();
         self.process.wait().unwrap();
     }
@@ -132,7 +138,10 @@ fn java(folder: &Path) -> Command {
         .append(true)
         .open(folder.join("log"));
     let mut java = Command::new("java");
-    java.args(["-Xmx256m", "-XX:+UseSerialGC", "-cp"])
+    let lines = Path::new(env!("CARGO_MANIFEST_DIR")).join("../deploy/services/kafka/log4j2.xml");
+    java.args(["-Xmx256m", "-XX:+UseSerialGC", "-Dfluxglobe.log=WARN"])
+        .arg(format!("-Dlog4j2.configurationFile={}", lines.display()))
+        .arg("-cp")
         .arg(jars)
         .stdout(Stdio::null())
         .stderr(log.unwrap());
