@@ -19,6 +19,7 @@ packages_run=(
     'nodejs /usr/bin/node'
     'npm /usr/bin/npm'
     'libssl-dev /usr/include/openssl/ssl.h'
+    'libcurl4-openssl-dev /usr/include/*/curl/curl.h'
     'protobuf-compiler /usr/bin/protoc'
     'libvulkan1 /usr/lib/*/libvulkan.so.1'
     'mesa-vulkan-drivers /usr/share/vulkan/icd.d/lvp_icd.*.json'

@@ -57,7 +57,7 @@ pub(crate) async fn needed_log(
 pub(crate) fn engine(settings: &Settings, store: Store) -> Result<Engine> {
     let partitions = NonZeroUsize::from(settings.partitions);
     Ok(match &settings.cluster {
-        Some(scheduler) => Engine::cluster(store, scheduler.clone(), partitions),
+        Some(scheduler) => Engine::cluster(store, scheduler.parse()?, partitions),
         None => Engine::standalone(store, partitions),
     })
 }

@@ -1,6 +1,6 @@
 //! `fluxglobe executor`: tasks from the scheduler in, their results out.
 
-use anyhow::{Context as _, Result};
+use anyhow::Result;
 use compute::service::Executor;
 
 use crate::cli;
@@ -8,9 +8,10 @@ use crate::cli::Settings;
 use crate::services::Footing;
 
 pub(crate) async fn run(settings: &Settings, options: cli::Executor) -> Result<()> {
-    let scheduler = settings.cluster.clone().context(
-        "give the scheduler's address: --cluster or FLUXGLOBE_CLUSTER, http://HOST:PORT",
-    )?;
+    let mut executor = options.executor;
+    if let Some(scheduler) = &settings.cluster {
+        executor.scheduler = scheduler.parse()?;
+    }
     let footing = Footing::take(
         settings,
         "executor",
@@ -21,7 +22,7 @@ pub(crate) async fn run(settings: &Settings, options: cli::Executor) -> Result<(
     let Some(store) = footing.store().await? else {
         return footing.leave().await;
     };
-    let executor = Executor::start(&options.executor, &scheduler, store, &footing.registry).await?;
+    let executor = Executor::start(&executor, store, &footing.registry).await?;
     let readiness = executor.readiness();
     footing.board.set("scheduler", move || {
         let readiness = readiness.clone();

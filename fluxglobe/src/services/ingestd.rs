@@ -1,10 +1,12 @@
 //! `fluxglobe ingestd`: notices and observations from Kafka in; products, observations and their events out.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use anyhow::Result;
-use ingest::{DecoderCommand, IngestService};
+use ingest::{DecoderCommand, IngestService, Metrics, Quiet};
 use observations::ObservationService;
+use service::Red;
 
 use crate::cli::{Ingestd, Settings};
 use crate::services::Footing;
@@ -32,13 +34,17 @@ pub(crate) async fn run(settings: &Settings, options: Ingestd) -> Result<()> {
                 .map(|()| "they can be stored".to_owned())
         }
     });
+    let drain = Duration::from_secs(options.ingest.drain_s);
     let granules = IngestService::new(store, Arc::clone(&log), ingest)
-        .with_metrics(&footing.registry)?
-        .with_observations(Arc::new(Sink(Arc::clone(&measured))));
-    let observed = ObservationService::new(log, measured);
-    tokio::join!(
-        granules.run(footing.stop.clone()),
+        .with_metrics(Metrics::register(&footing.registry)?)
+        .with_observations(Arc::new(Sink(Arc::clone(&measured))))
+        .with_bounds(usize::from(options.ingest.parallel_notices), drain);
+    let red = Red::register(&footing.registry, "observations")?;
+    let observed = ObservationService::new(log, measured, red);
+    let (landed, ()) = tokio::join!(
+        granules.run(&Quiet, footing.stop.said()),
         observed.run(footing.stop.said())
     );
+    landed?;
     footing.leave().await
 }

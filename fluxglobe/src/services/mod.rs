@@ -20,6 +20,8 @@ async fn worst(readiness: &dyn Readiness) -> Result<String, String> {
     let parts = readiness.parts().await;
     match parts.iter().find(|part| part.required && !part.ok) {
         Some(part) => Err(format!("{}: {}", part.name, part.detail)),
-        None => Ok(parts.last().map_or_else(String::new, |part| part.detail.clone())),
+        None => Ok(parts
+            .last()
+            .map_or_else(String::new, |part| part.detail.clone())),
     }
 }

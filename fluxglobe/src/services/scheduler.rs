@@ -26,10 +26,10 @@ pub(crate) async fn run(settings: &Settings, options: cli::Scheduler) -> Result<
     let serving = tokio::spawn(scheduler.run(footing.stop.clone()));
     if let Some(log) = footing.log(&options.kafka).await? {
         let partitions = NonZeroUsize::from(settings.partitions);
-        let engine = Engine::cluster(store, format!("http://{address}"), partitions);
+        let engine = Engine::cluster(store, format!("http://{address}").parse()?, partitions);
         Deriver::new(engine, log, &footing.registry)?
             .run(footing.stop.clone())
-            .await;
+            .await?;
     }
     serving.await??;
     footing.leave().await

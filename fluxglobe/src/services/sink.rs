@@ -15,7 +15,10 @@ impl ObservationSink for Sink {
     async fn put(&self, observations: Vec<Observation>) -> Result<Stored, SinkError> {
         let counts = self.0.upsert(&observations).await.map_err(|error| {
             let is_retryable = error.is_retryable();
-            SinkError::new(error, is_retryable)
+            SinkError {
+                source: Box::new(error),
+                is_retryable,
+            }
         })?;
         Ok(Stored {
             new: counts.new,
