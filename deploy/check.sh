@@ -46,7 +46,7 @@ check_shell() {
     local scripts
     mapfile -t scripts < <(git ls-files '*.sh' | sed 's|^|./|')
     checked "shellcheck of ${#scripts[@]} scripts" "$tools/bin/shellcheck" --external-sources --source-path=SCRIPTDIR "${scripts[@]}"
-    printf '#!/bin/bash\nrm -r $1\n' >"$work/fault.sh"
+    printf '%s\n' '#!/bin/bash' "rm -r \$1" >"$work/fault.sh"
     refused shellcheck SC2086 "$tools/bin/shellcheck" "$work/fault.sh"
 }
 
@@ -92,7 +92,8 @@ check_grafana() {
 # helm COMMAND...: without its remarks on our symbolic links, which name files outside the chart on purpose.
 helm() {
     local status=0
-    "$tools/bin/helm" "$@" 2> >(grep --invert-match 'found symbolic link' >&2) || status=$?
+    "$tools/bin/helm" "$@" 2>"$work/remarks" || status=$?
+    grep --invert-match 'found symbolic link' "$work/remarks" >&2 || true
     return "$status"
 }
 
@@ -103,23 +104,23 @@ schemas_of() {
 }
 
 check_chart() {
-    local values name version
-    for values in helm/fluxglobe/values.yaml helm/fluxglobe/ci/*.yaml; do
-        name=$(basename "$values" .yaml)
-        for version in 1.30 1.37; do
-            checked "helm lint, $name values, Kubernetes $version" \
+    local version values made
+    for version in 1.30 1.37; do
+        made=()
+        for values in helm/fluxglobe/values.yaml helm/fluxglobe/ci/*.yaml; do
+            made+=("$work/$version-$(basename "$values")")
+            checked "helm lint, $(basename "$values"), Kubernetes $version" \
                 helm lint --strict --quiet --kube-version "$version.0" --values "$values" helm/fluxglobe
-            helm template test helm/fluxglobe --namespace ocean --kube-version "$version.0" --values "$values" \
-                >"$work/$name-$version.yaml"
-            checked "kubeconform, $name values, Kubernetes $version" schemas_of "$version" "$work/$name-$version.yaml"
+            helm template test helm/fluxglobe --namespace ocean --kube-version "$version.0" --values "$values" >"${made[-1]}"
         done
+        checked "kubeconform of what they make, Kubernetes $version" schemas_of "$version" "${made[@]}"
     done
-    refused 'the values schema' kafka.security helm lint --kube-version 1.37.0 --set kafka.security=none helm/fluxglobe
-    refused 'the values schema' postgis.url \
+    refused 'the values schema' /kafka/security helm lint --kube-version 1.37.0 --set kafka.security=none helm/fluxglobe
+    refused 'the values schema' /postgis/url \
         helm lint --kube-version 1.37.0 --set postgis.url=postgres://me:secret@host/database helm/fluxglobe
-    sed 's/formula: queries/formulae: queries/' "$work/everything-1.37.yaml" >"$work/fault.yaml"
+    sed 's/formula: queries/formulae: queries/' "$work/1.37-everything.yaml" >"$work/fault.yaml"
     refused kubeconform formulae schemas_of 1.37 "$work/fault.yaml"
-    sed 's/runAsNonRoot: true/runAsNonRoot: "yes"/' "$work/everything-1.37.yaml" >"$work/fault.yaml"
+    sed 's/runAsNonRoot: true/runAsNonRoot: "yes"/' "$work/1.37-everything.yaml" >"$work/fault.yaml"
     refused kubeconform runAsNonRoot schemas_of 1.37 "$work/fault.yaml"
 }
 

@@ -1,8 +1,9 @@
 {{/* Names and labels that every object shares. */}}
 
+{{/* Short enough for a pod of the longest-named service to stay below the 64 bytes that a Kafka instance may have. */}}
 {{- define "fluxglobe.fullname" -}}
-{{- if contains .Chart.Name .Release.Name }}{{ .Release.Name | trunc 40 | trimSuffix "-" }}
-{{- else }}{{ printf "%s-%s" .Release.Name .Chart.Name | trunc 40 | trimSuffix "-" }}{{ end }}
+{{- if contains .Chart.Name .Release.Name }}{{ .Release.Name | trunc 30 | trimSuffix "-" }}
+{{- else }}{{ printf "%s-%s" .Release.Name .Chart.Name | trunc 30 | trimSuffix "-" }}{{ end }}
 {{- end }}
 
 {{/* What selects the pods of one service: dict "root" $ "service" NAME. It never changes between versions. */}}
