@@ -1,6 +1,7 @@
 //! What can go wrong between a render job and its picture.
 
 use contract::ContractError;
+use contract::key::ObjectKey;
 
 /// A job that could not be drawn.
 #[derive(Debug, thiserror::Error)]
@@ -19,6 +20,9 @@ pub enum RenderError {
     /// The device stopped answering.
     #[error("the graphics device stopped while {what}")]
     DeviceStopped { what: &'static str },
+    /// The device has no memory left.
+    #[error("the graphics device was out of memory while {what}")]
+    OutOfMemory { what: &'static str },
     /// The job breaks a limit of the contract.
     #[error("job refused")]
     Job(#[from] ContractError),
@@ -52,6 +56,13 @@ pub enum RenderError {
         product: String,
         source: Box<storage::StorageError>,
     },
+    /// The picture could not be read from the store or put there.
+    #[error("cannot {what} picture {key}")]
+    Picture {
+        what: &'static str,
+        key: ObjectKey,
+        source: Box<storage::StorageError>,
+    },
     /// The picture could not be written as PNG.
     #[error("cannot encode a picture of {width} x {height} pixels")]
     Encode {
@@ -62,14 +73,20 @@ pub enum RenderError {
     /// The thread that drew was lost.
     #[error("the drawing thread ended early")]
     Thread(#[source] tokio::task::JoinError),
+    /// Whoever wanted the picture has gone.
+    #[error("nobody waits for the picture any more")]
+    NotWanted,
 }
 
 impl RenderError {
     /// May the same job succeed later?
     pub fn is_retryable(&self) -> bool {
         match self {
-            Self::DeviceStopped { .. } | Self::Thread(_) => true,
-            Self::Store { source, .. } => source.is_retryable(),
+            Self::DeviceStopped { .. }
+            | Self::OutOfMemory { .. }
+            | Self::Thread(_)
+            | Self::NotWanted => true,
+            Self::Store { source, .. } | Self::Picture { source, .. } => source.is_retryable(),
             Self::NoAdapter(_)
             | Self::NoDevice { .. }
             | Self::Job(_)
@@ -90,5 +107,54 @@ impl RenderError {
                 | Self::TooLarge { .. }
                 | Self::GridMismatch { .. }
         )
+    }
+
+    /// Does the job name something that is not stored?
+    pub fn is_not_found(&self) -> bool {
+        matches!(self, Self::Store { source, .. } if source.is_not_found())
+    }
+
+    /// Is the device to blame, so that a fresh one may draw the job?
+    pub fn is_device_fault(&self) -> bool {
+        match self {
+            Self::DeviceStopped { .. } | Self::OutOfMemory { .. } => true,
+            // Drivers and the library over them give up by a panic where they have no error to return.
+            Self::Thread(lost) => lost.is_panic(),
+            _ => false,
+        }
+    }
+
+    /// Would every worker fail at this job, now and later? What a job that was tried on a fresh device fails with is
+    /// its own; a store or a machine that cannot be used is not.
+    pub fn is_final(&self) -> bool {
+        match self {
+            Self::DeviceStopped { .. }
+            | Self::OutOfMemory { .. }
+            | Self::Thread(_)
+            | Self::Job(_)
+            | Self::TooManyParticles { .. }
+            | Self::TooLarge { .. }
+            | Self::GridMismatch { .. }
+            | Self::NoSteps { .. }
+            | Self::Encode { .. } => true,
+            Self::Store { source, .. } => {
+                source.is_not_found() || matches!(**source, storage::StorageError::Damaged { .. })
+            }
+            Self::NoAdapter(_) | Self::NoDevice { .. } | Self::Picture { .. } | Self::NotWanted => {
+                false
+            }
+        }
+    }
+
+    /// The error and what it came from, in one line.
+    pub fn in_full(&self) -> String {
+        let mut text = self.to_string();
+        let mut cause = std::error::Error::source(self);
+        while let Some(error) = cause {
+            text.push_str(": ");
+            text.push_str(&error.to_string());
+            cause = error.source();
+        }
+        text
     }
 }

@@ -6,11 +6,13 @@
 //! ```
 //! Nothing is rasterised: data-centre GPUs are wired for compute. Sums whose order is not fixed are sums of integers,
 //! and everything that a tile shares with its neighbours is absolute, so pictures have no seams and equal jobs give
-//! equal bytes. Left out on purpose: where frames come from (`source` knows) and who asks (`service` knows).
+//! equal bytes. `source` knows where frames come from. Who asks is the business of the feature `service`: a `desk` that
+//! draws every job once, a gRPC `server` and a `batch` reader before it, and a `fleet` of such servers for who asks.
 
 #[macro_use]
 mod shared_struct;
 
+mod device;
 pub mod error;
 pub mod frame;
 pub mod frame_cpu;
@@ -18,6 +20,7 @@ pub mod gpu;
 pub mod image;
 pub mod plan;
 pub mod pyramid;
+mod recent;
 pub mod renderer;
 mod resident;
 pub mod scene;
@@ -25,9 +28,22 @@ pub mod service;
 pub mod source;
 pub mod stages;
 
+#[cfg(feature = "service")]
+pub mod batch;
+#[cfg(feature = "service")]
+pub mod desk;
+#[cfg(feature = "service")]
+pub mod fleet;
+#[cfg(feature = "service")]
+mod gauges;
+#[cfg(feature = "service")]
+pub mod server;
+#[cfg(feature = "service")]
+pub mod wire;
+
+pub use crate::service::{Limits, RenderService};
 pub use error::RenderError;
 pub use image::Image;
 pub use renderer::{Backend, Renderer};
 pub use scene::{Frame, Interval, Scene};
-pub use service::{Limits, RenderService};
 pub use source::Source;

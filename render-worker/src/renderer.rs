@@ -1,20 +1,19 @@
 //! Jobs and scenes in, pictures out, on the GPU or with the CPU twins; one renderer serves many threads.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use contract::grid::Grid;
 use contract::job::RenderJob;
 
+use crate::device::Device;
 use crate::error::RenderError;
-use crate::frame::{SceneBuffers, Stages};
 use crate::frame_cpu;
-use crate::gpu::{Gpu, Workspace};
+use crate::gpu::Gpu;
 use crate::image::Image;
 use crate::plan::{Part, Plan};
 use crate::pyramid;
-use crate::resident::Resident;
-use crate::scene::{Interval, Scene};
-use crate::stages::fill::{self, Fill, FillParams};
+use crate::scene::Scene;
+use crate::stages::fill::{self, FillParams};
 
 /// What draws.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -27,49 +26,107 @@ pub enum Backend {
 
 /// Draws pictures.
 pub struct Renderer {
-    device: Option<Device>,
+    name: String,
+    /// None for the CPU twins.
+    device: Option<DeviceSlot>,
 }
 
-struct Device {
-    gpu: Gpu,
-    stages: Stages,
-    fill: Fill,
-    /// Buffers of frames that are not in flight; as many as ever were in flight at once.
-    idle: Mutex<Vec<Workspace>>,
-    /// Frames of products that were drawn lately.
-    resident: Resident,
+/// The device in use; another takes its place after a fault, while pictures under way keep the old one.
+struct DeviceSlot {
+    open: fn() -> Result<Gpu, RenderError>,
+    current: Mutex<Arc<Device>>,
+    /// Held while a fresh device is opened, so that only one is.
+    opening: Mutex<()>,
 }
 
 impl Renderer {
     /// Opens the device and compiles the stages.
     pub fn new(backend: Backend) -> Result<Self, RenderError> {
-        let device = match backend {
-            Backend::Cpu => None,
-            Backend::Gpu => Some(Device::new(Gpu::open()?)),
-        };
-        Ok(Self { device })
+        match backend {
+            Backend::Cpu => Ok(Self {
+                name: "CPU twins".to_owned(),
+                device: None,
+            }),
+            Backend::Gpu => Self::on(Gpu::open),
+        }
     }
 
     /// Opens the device with shaders that check every index and loop; slow, for tests.
     pub fn checked() -> Result<Self, RenderError> {
+        Self::on(Gpu::open_checked)
+    }
+
+    fn on(open: fn() -> Result<Gpu, RenderError>) -> Result<Self, RenderError> {
+        let device = Device::new(open()?, 0)?;
         Ok(Self {
-            device: Some(Device::new(Gpu::open_checked()?)),
+            name: device.gpu().adapter_name().to_owned(),
+            device: Some(DeviceSlot {
+                open,
+                current: Mutex::new(Arc::new(device)),
+                opening: Mutex::default(),
+            }),
         })
     }
 
     /// Name of the adapter, or of the CPU twins.
     pub fn name(&self) -> &str {
-        self.device
-            .as_ref()
-            .map_or("CPU twins", |device| device.gpu.adapter_name())
+        &self.name
+    }
+
+    /// The device to draw on now.
+    fn device(&self) -> Option<Arc<Device>> {
+        self.device.as_ref().map(|slot| Arc::clone(&slot.lock()))
+    }
+
+    /// How many devices were given up so far.
+    pub fn device_number(&self) -> u64 {
+        self.device().map_or(0, |device| device.number)
+    }
+
+    /// Bytes of frames that stay on the device between pictures.
+    pub fn resident_bytes(&self) -> u64 {
+        self.device().map_or(0, |device| device.resident_bytes())
+    }
+
+    /// Opens a fresh device in place of the one of this number; does nothing if that one is gone already. Blocks while
+    /// the shaders compile.
+    pub fn renew(&self, failed_number: u64) -> Result<(), RenderError> {
+        let Some(slot) = &self.device else {
+            return Ok(());
+        };
+        let _one_at_a_time = slot.opening.lock().unwrap_or_else(PoisonError::into_inner);
+        if slot.lock().number == failed_number {
+            let adapter = self.name.as_str();
+            tracing::warn!(adapter, "the graphics device failed, opening it again");
+            let fresh = Device::new((slot.open)()?, failed_number + 1)?;
+            *slot.lock() = Arc::new(fresh);
+        }
+        Ok(())
+    }
+
+    /// Loses the device as a driver would, for tests of what happens then.
+    pub fn lose_device(&self) {
+        if let Some(device) = self.device() {
+            device.gpu().lose();
+        }
     }
 
     /// Draws a job. Blocks until the picture is there.
     pub fn render(&self, job: &RenderJob, scene: &Scene) -> Result<Image, RenderError> {
-        let most_buffer_bytes = self
-            .device
+        self.render_while(job, scene, &|| true)
+    }
+
+    /// Draws a job for as long as it is wanted; asks between the parts of the picture.
+    pub fn render_while(
+        &self,
+        job: &RenderJob,
+        scene: &Scene,
+        is_wanted: &dyn Fn() -> bool,
+    ) -> Result<Image, RenderError> {
+        let device = self.device();
+        let most_buffer_bytes = device
             .as_ref()
-            .map_or(u64::MAX, |device| device.gpu.most_buffer_bytes());
+            .map_or(u64::MAX, |device| device.gpu().most_buffer_bytes());
         job.validate()?;
         scene.validate()?;
         let coarser = pyramid::suited(job, scene);
@@ -81,11 +138,14 @@ impl Renderer {
             height,
             rgba8: vec![0; width as usize * height as usize * 4],
         };
-        let draw = |part: Part| match &self.device {
+        let draw = |part: Part| match &device {
             None => frame_cpu::draw(&plan, part, scene),
             Some(device) => device.draw(&plan, part, scene),
         };
         for part in plan.parts() {
+            if !is_wanted() {
+                return Err(RenderError::NotWanted);
+            }
             paste(&mut image, part, &draw(part)?);
         }
         Ok(image)
@@ -98,58 +158,20 @@ impl Renderer {
         values: &[f32],
         domain: &[u32],
     ) -> Result<Vec<f32>, RenderError> {
-        // A software adapter would visit every cell where the twin visits the gaps alone.
-        let pays = |device: &&Device| {
-            let bytes = size_of_val(values) as u64;
-            !device.gpu.is_software() && bytes <= device.gpu.most_buffer_bytes()
-        };
-        if let Some(device) = self.device.as_ref().filter(pays) {
-            return device.fill.run(&device.gpu, grid, values, domain);
-        }
-        let (params, cosines) = FillParams::for_grid(grid);
-        Ok(fill::cpu::fill(&params, values, domain, &cosines))
+        let on_device = self
+            .device()
+            .and_then(|device| device.fill(grid, values, domain));
+        on_device.unwrap_or_else(|| {
+            let (params, cosines) = FillParams::for_grid(grid);
+            Ok(fill::cpu::fill(&params, values, domain, &cosines))
+        })
     }
 }
 
-impl Device {
-    fn new(gpu: Gpu) -> Self {
-        let stages = Stages::new(&gpu);
-        let fill = Fill::new(&gpu, fill::SOURCE);
-        tracing::info!(adapter = gpu.adapter_name(), "renderer is ready");
-        Self {
-            gpu,
-            stages,
-            fill,
-            idle: Mutex::default(),
-            resident: Resident::default(),
-        }
-    }
-
-    fn draw(&self, plan: &Plan, part: Part, scene: &Scene) -> Result<Vec<u8>, RenderError> {
-        let buffers = self.scene_buffers(scene)?;
-        // A poisoned pool is whole: workspaces are only pushed and popped.
-        let idle = || self.idle.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut workspace = idle().pop().unwrap_or_default();
-        let drawn = self
-            .stages
-            .draw(&self.gpu, &mut workspace, plan, part, &buffers);
-        idle().push(workspace);
-        drawn
-    }
-
-    fn scene_buffers(&self, scene: &Scene) -> Result<SceneBuffers, RenderError> {
-        let pair = |interval: &Interval| -> Result<[wgpu::Buffer; 2], RenderError> {
-            let before = self.resident.buffer(&self.gpu, &interval.before.cells)?;
-            Ok([
-                before,
-                self.resident.buffer(&self.gpu, &interval.after.cells)?,
-            ])
-        };
-        Ok(SceneBuffers {
-            value: pair(&scene.value)?,
-            accumulated: scene.accumulated.as_ref().map(pair).transpose()?,
-            domain: self.resident.buffer(&self.gpu, &scene.domain)?,
-        })
+impl DeviceSlot {
+    fn lock(&self) -> std::sync::MutexGuard<'_, Arc<Device>> {
+        // The slot is changed by one assignment, so a poisoned lock still guards a whole device.
+        self.current.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

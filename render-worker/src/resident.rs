@@ -25,6 +25,12 @@ struct Held {
 }
 
 impl Resident {
+    /// Bytes held.
+    pub(crate) fn bytes(&self) -> u64 {
+        let held = self.held.lock().unwrap_or_else(PoisonError::into_inner);
+        held.bytes()
+    }
+
     /// The cells on the device, uploaded if they are not there.
     pub(crate) fn buffer<T: Pod>(
         &self,
@@ -46,8 +52,12 @@ impl Resident {
 }
 
 impl Held {
+    fn bytes(&self) -> u64 {
+        self.by_id.values().map(|(buffer, _)| buffer.size()).sum()
+    }
+
     fn evict(&mut self) {
-        let mut bytes: u64 = self.by_id.values().map(|(buffer, _)| buffer.size()).sum();
+        let mut bytes = self.bytes();
         while bytes > MOST_BYTES && self.by_id.len() > 1 {
             let oldest = self
                 .by_id

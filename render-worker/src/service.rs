@@ -9,8 +9,10 @@ use storage::Store;
 use tokio::sync::Semaphore;
 
 use crate::error::RenderError;
+use crate::image::Image;
 use crate::renderer::{Backend, Renderer};
-use crate::source::Source;
+use crate::scene::Scene;
+use crate::source::{Kept, Source};
 
 /// Limits of a service.
 #[derive(Debug, Clone, Copy)]
@@ -30,6 +32,9 @@ impl Default for Limits {
         }
     }
 }
+
+/// Asked between the parts of a picture: does anybody still want it?
+pub type IsWanted = Arc<dyn Fn() -> bool + Send + Sync>;
 
 /// Draws jobs from a store. Cheap to clone, shared by all tasks.
 #[derive(Clone)]
@@ -70,19 +75,80 @@ impl RenderService {
         self.renderer.name()
     }
 
-    /// Draws a job; the PNG of equal jobs is equal.
+    /// What draws.
+    pub fn renderer(&self) -> &Renderer {
+        &self.renderer
+    }
+
+    /// Frames in memory.
+    pub fn kept(&self) -> Kept {
+        self.source.kept()
+    }
+
+    /// Draws a job; the PNG of equal jobs is equal. A job that the device fails at is drawn on a fresh one, once.
     pub async fn draw(&self, job: &RenderJob) -> Result<Bytes, RenderError> {
         job.validate()?;
-        let permit = Arc::clone(&self.permits).acquire_owned().await;
-        let scene = self.source.scene(job).await?;
+        // It is never closed, but a closed semaphore would only mean that nothing is counted.
+        let permit = Arc::new(Arc::clone(&self.permits).acquire_owned().await);
+        let attempt = || async {
+            let scene = self.scene(job).await?;
+            let wanted: IsWanted = Arc::new(|| true);
+            let image = self
+                .picture(job, scene, wanted, Arc::clone(&permit))
+                .await?;
+            self.encode(image).await
+        };
+        self.on_a_sound_device(attempt).await
+    }
+
+    /// Loads what a job is drawn from.
+    pub async fn scene(&self, job: &RenderJob) -> Result<Scene, RenderError> {
+        self.source.scene(job).await
+    }
+
+    /// Draws a loaded scene; `held` is let go when the drawing thread has ended, also if nobody waits for it.
+    pub async fn picture(
+        &self,
+        job: &RenderJob,
+        scene: Scene,
+        is_wanted: IsWanted,
+        held: impl Send + 'static,
+    ) -> Result<Image, RenderError> {
         let (renderer, job) = (Arc::clone(&self.renderer), job.clone());
         let drawing = tokio::task::spawn_blocking(move || {
-            let png = renderer.render(&job, &scene)?.encode_png();
-            // Held until the picture is there, also if nobody waits for it any more. It is never closed, but a
-            // closed semaphore would only mean that nothing is counted.
-            drop(permit);
-            png
+            let image = renderer.render_while(&job, &scene, &*is_wanted);
+            drop(held);
+            image
         });
         drawing.await.map_err(RenderError::Thread)?
+    }
+
+    /// Writes a picture as PNG.
+    pub async fn encode(&self, image: Image) -> Result<Bytes, RenderError> {
+        let encoding = tokio::task::spawn_blocking(move || image.encode_png());
+        encoding.await.map_err(RenderError::Thread)?
+    }
+
+    /// Tries, and if the device failed tries once more on a fresh one.
+    pub async fn on_a_sound_device<T, F>(&self, attempt: impl Fn() -> F) -> Result<T, RenderError>
+    where
+        F: Future<Output = Result<T, RenderError>>,
+    {
+        let number = self.renderer.device_number();
+        match attempt().await {
+            Err(error) if error.is_device_fault() => {
+                tracing::warn!(error = error.in_full(), "drawing again on a fresh device");
+                self.renew(number).await?;
+                attempt().await
+            }
+            done => done,
+        }
+    }
+
+    /// Opens a fresh device in place of the one of this number; see [`Renderer::renew`].
+    pub async fn renew(&self, failed_number: u64) -> Result<(), RenderError> {
+        let renderer = Arc::clone(&self.renderer);
+        let renewing = tokio::task::spawn_blocking(move || renderer.renew(failed_number));
+        renewing.await.map_err(RenderError::Thread)?
     }
 }

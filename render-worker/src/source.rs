@@ -1,6 +1,7 @@
 //! Where scenes come from: the frames that a job's manifests name, gaps filled once, kept while there is room.
 
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use contract::grid::Grid;
@@ -11,11 +12,12 @@ use contract::time::TimeMs;
 use storage::{StorageError, Store};
 
 use crate::error::RenderError;
+use crate::recent::Recent;
 use crate::renderer::Renderer;
 use crate::scene::{Cells, Frame, Interval, Scene};
 
 /// Manifests kept; each is a few kilobytes a step.
-const MOST_MANIFESTS: usize = 64;
+const MOST_MANIFESTS: u64 = 64;
 
 /// Loads scenes from a store.
 pub struct Source {
@@ -24,15 +26,29 @@ pub struct Source {
     renderer: Arc<Renderer>,
     most_bytes: u64,
     held: Mutex<Held>,
+    frame_hits: AtomicU64,
+    frame_misses: AtomicU64,
+}
+
+/// What a source keeps, and how often that helped.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Kept {
+    /// Products of which frames are kept.
+    pub products: BTreeSet<String>,
+    /// Bytes of frames.
+    pub frame_bytes: u64,
+    /// Frames that were there when they were wanted.
+    pub frame_hits: u64,
+    /// Frames that had to be read.
+    pub frame_misses: u64,
 }
 
 #[derive(Default)]
 struct Held {
-    manifests: BTreeMap<String, (Arc<Manifest>, u64)>,
-    domains: BTreeMap<ObjectKey, (Arc<Cells<u32>>, u64)>,
+    manifests: Recent<String, Arc<Manifest>>,
+    domains: Recent<ObjectKey, Arc<Cells<u32>>>,
     /// By the key of the frame and of the domain that its gaps were filled for.
-    frames: BTreeMap<(ObjectKey, ObjectKey), (Arc<Frame>, u64)>,
-    uses: u64,
+    frames: Recent<(ObjectKey, ObjectKey), Arc<Frame>>,
 }
 
 impl Source {
@@ -43,6 +59,23 @@ impl Source {
             renderer,
             most_bytes,
             held: Mutex::default(),
+            frame_hits: AtomicU64::new(0),
+            frame_misses: AtomicU64::new(0),
+        }
+    }
+
+    /// What is kept now.
+    pub fn kept(&self) -> Kept {
+        let held = self.lock();
+        // A frame's key is `frames/PRODUCT/DIGEST`, or the domain's where accumulation starts.
+        let product = |(frame, _): &(ObjectKey, ObjectKey)| {
+            frame.as_str().split('/').nth(1).map(str::to_owned)
+        };
+        Kept {
+            products: held.frames.keys().filter_map(product).collect(),
+            frame_bytes: held.frames.sum(|frame| frame.size_bytes()),
+            frame_hits: self.frame_hits.load(Ordering::Relaxed),
+            frame_misses: self.frame_misses.load(Ordering::Relaxed),
         }
     }
 
@@ -101,42 +134,38 @@ impl Source {
     /// Where accumulation starts: zero in every cell of the domain.
     fn nothing(&self, manifest: &Manifest, domain: &Cells<u32>) -> Arc<Frame> {
         let key = (manifest.domain.clone(), manifest.domain.clone());
-        if let Some(frame) = self.lock().frame(&key) {
+        if let Some(frame) = self.lock().frames.get(&key) {
             return frame;
         }
         let zero = |cell: &u32| if *cell == 0 { f32::NAN } else { 0.0 };
         let frame = Arc::new(Frame::new(domain.content().iter().map(zero).collect()));
-        self.lock().keep(key, &frame, self.most_bytes);
+        self.keep_frame(key, &frame);
         frame
     }
 
     async fn manifest(&self, id: &ManifestId) -> Result<Arc<Manifest>, RenderError> {
         let name = id.to_string();
-        if let Some(manifest) = self.lock().manifest(&name) {
+        if let Some(manifest) = self.lock().manifests.get(&name) {
             return Ok(manifest);
         }
         let loaded = storage::manifests::load(&self.store, id).await;
         let manifest = Arc::new(loaded.map_err(|e| failed("the manifest", id, e))?);
-        let mut held = self.lock();
-        let use_count = held.next_use();
-        held.manifests
-            .insert(name, (Arc::clone(&manifest), use_count));
-        drop_oldest(&mut held.manifests, MOST_MANIFESTS);
+        let kept = Arc::clone(&manifest);
+        self.lock()
+            .manifests
+            .keep(name, kept, MOST_MANIFESTS, |_| 1);
         Ok(manifest)
     }
 
     async fn domain(&self, manifest: &Manifest) -> Result<Arc<Cells<u32>>, RenderError> {
-        if let Some(domain) = self.lock().domain(&manifest.domain) {
+        if let Some(domain) = self.lock().domains.get(&manifest.domain) {
             return Ok(domain);
         }
         let read = storage::domain::read(&self.store, &manifest.domain).await;
         let flags = read.map_err(|e| failed("the domain", &manifest.product, e))?;
         let domain = Scene::domain_of(flags);
-        let mut held = self.lock();
-        let use_count = held.next_use();
-        held.domains
-            .insert(manifest.domain.clone(), (Arc::clone(&domain), use_count));
-        drop_oldest(&mut held.domains, MOST_MANIFESTS);
+        let (key, kept) = (manifest.domain.clone(), Arc::clone(&domain));
+        self.lock().domains.keep(key, kept, MOST_MANIFESTS, |_| 1);
         Ok(domain)
     }
 
@@ -147,9 +176,12 @@ impl Source {
         step: usize,
     ) -> Result<Arc<Frame>, RenderError> {
         let key = (manifest.steps[step].frame.clone(), manifest.domain.clone());
-        if let Some(frame) = self.lock().frame(&key) {
+        let held = self.lock().frames.get(&key);
+        if let Some(frame) = held {
+            self.frame_hits.fetch_add(1, Ordering::Relaxed);
             return Ok(frame);
         }
+        self.frame_misses.fetch_add(1, Ordering::Relaxed);
         let read = storage::frames::read(&self.store, &key.0, &manifest.grid).await;
         let values = read.map_err(|e| failed("a frame", &manifest.product, e))?;
         let (renderer, grid, domain) = (
@@ -159,8 +191,15 @@ impl Source {
         );
         let filled = tokio::task::spawn_blocking(move || fill(&renderer, &grid, values, &domain));
         let frame = Arc::new(filled.await.map_err(RenderError::Thread)??);
-        self.lock().keep(key, &frame, self.most_bytes);
+        self.keep_frame(key, &frame);
         Ok(frame)
+    }
+
+    fn keep_frame(&self, key: (ObjectKey, ObjectKey), frame: &Arc<Frame>) {
+        let kept = Arc::clone(frame);
+        self.lock()
+            .frames
+            .keep(key, kept, self.most_bytes, |frame| frame.size_bytes());
     }
 
     fn lock(&self) -> std::sync::MutexGuard<'_, Held> {
@@ -200,64 +239,4 @@ fn failed(
         product: product.to_string(),
         source: Box::new(source),
     }
-}
-
-fn drop_oldest<K: Ord + Clone, V>(held: &mut BTreeMap<K, (V, u64)>, most: usize) {
-    while held.len() > most {
-        let oldest = held
-            .iter()
-            .min_by_key(|(_, (_, last_use))| *last_use)
-            .map(|(key, _)| key.clone());
-        let Some(key) = oldest else { return };
-        held.remove(&key);
-    }
-}
-
-impl Held {
-    fn next_use(&mut self) -> u64 {
-        self.uses += 1;
-        self.uses
-    }
-
-    fn manifest(&mut self, name: &str) -> Option<Arc<Manifest>> {
-        let use_count = self.next_use();
-        self.manifests
-            .get_mut(name)
-            .map(|held| touched(held, use_count))
-    }
-
-    fn domain(&mut self, key: &ObjectKey) -> Option<Arc<Cells<u32>>> {
-        let use_count = self.next_use();
-        self.domains
-            .get_mut(key)
-            .map(|held| touched(held, use_count))
-    }
-
-    fn frame(&mut self, key: &(ObjectKey, ObjectKey)) -> Option<Arc<Frame>> {
-        let use_count = self.next_use();
-        self.frames
-            .get_mut(key)
-            .map(|held| touched(held, use_count))
-    }
-
-    fn keep(&mut self, key: (ObjectKey, ObjectKey), frame: &Arc<Frame>, most_bytes: u64) {
-        let use_count = self.next_use();
-        self.frames.insert(key, (Arc::clone(frame), use_count));
-        while self.frames.len() > 1
-            && self
-                .frames
-                .values()
-                .map(|(frame, _)| frame.size_bytes())
-                .sum::<u64>()
-                > most_bytes
-        {
-            let fewer = self.frames.len() - 1;
-            drop_oldest(&mut self.frames, fewer);
-        }
-    }
-}
-
-fn touched<T>(held: &mut (Arc<T>, u64), use_count: u64) -> Arc<T> {
-    held.1 = use_count;
-    Arc::clone(&held.0)
 }

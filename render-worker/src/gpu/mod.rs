@@ -1,5 +1,6 @@
 //! The graphics device behind plain verbs: make buffers and kernels, record dispatches, read results back.
 
+mod fault;
 mod kernel;
 mod recorder;
 mod workspace;
@@ -12,6 +13,7 @@ use bytemuck::Pod;
 use wgpu::util::DeviceExt as _;
 
 use crate::error::RenderError;
+use fault::FaultNote;
 
 /// Largest buffer asked for, also on devices that would give more: bounds what one job can take.
 const MOST_BUFFER_BYTES: u64 = 1 << 30;
@@ -24,6 +26,7 @@ pub struct Gpu {
     most_buffer_bytes: u64,
     checks: Checks,
     is_software: bool,
+    fault: FaultNote,
 }
 
 /// What shaders check while they run.
@@ -74,6 +77,8 @@ impl Gpu {
                 adapter: adapter_name.clone(),
                 source: Box::new(source),
             })?;
+        let fault = FaultNote::default();
+        fault.listen(&device);
         Ok(Self {
             device,
             queue,
@@ -81,6 +86,7 @@ impl Gpu {
             most_buffer_bytes,
             checks,
             is_software,
+            fault,
         })
     }
 
@@ -97,6 +103,16 @@ impl Gpu {
     /// Largest storage buffer of this device.
     pub fn most_buffer_bytes(&self) -> u64 {
         self.most_buffer_bytes
+    }
+
+    /// An error if the device had a fault at any time; `what` was being done.
+    pub fn check_fault(&self, what: &'static str) -> Result<(), RenderError> {
+        self.fault.check(what)
+    }
+
+    /// Loses the device as a driver would, for tests of what happens then.
+    pub fn lose(&self) {
+        self.device.destroy();
     }
 
     /// Compiles one entry point.

@@ -116,6 +116,8 @@ impl<'a> Recorder<'a> {
             at += bytes;
         }
         let submission = self.gpu.queue.submit([self.encoder.finish()]);
+        // A refused submission never ends: it must not be waited for.
+        self.gpu.check_fault("drawing")?;
         let (done_tx, done_rx) = sync_channel(1);
         staging.map_async(wgpu::MapMode::Read, .., move |result| {
             // The receiver is gone only if this function has returned with an error.
@@ -130,6 +132,7 @@ impl<'a> Recorder<'a> {
             .recv()
             .map_err(|_gone| stopped())?
             .map_err(|_unmapped| stopped())?;
+        self.gpu.check_fault("drawing")?;
         let mapped = staging
             .get_mapped_range(..)
             .map_err(|_unmapped| stopped())?;

@@ -5,16 +5,28 @@
     reason = "all of this binary is tests; clippy allows these in test functions only"
 )]
 
+#[cfg(feature = "service")]
+mod batch;
 mod compare;
 mod device;
+#[cfg(feature = "service")]
+mod fleet;
 mod gallery;
 mod golden;
 mod layout;
 mod limits;
+mod lost_device;
+#[cfg(feature = "service")]
+mod process;
 mod reference;
 mod scenes;
 mod seams;
+#[cfg(feature = "service")]
+mod server;
 mod service;
+mod stored;
 mod tidy;
 mod truths;
 mod twins;
+#[cfg(feature = "service")]
+mod worker;

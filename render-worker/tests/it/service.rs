@@ -1,107 +1,13 @@
 //! The service over a store in memory: manifests and frames in, PNG out.
 
-use contract::digest::Digest;
 use contract::grid::Grid;
 use contract::job::{Mode, RenderJob};
-use contract::manifest::{MANIFEST_SCHEMA, Manifest, Step};
 use contract::quantity::Quantity;
-use contract::time::Period;
 use render_worker::{Backend, RenderError, RenderService};
 use storage::Store;
 
-use crate::scenes::{FIVE_DEGREES, job, ocean, tile};
-
-/// Stores a product of these monthly values.
-async fn stored(
-    store: &Store,
-    name: &str,
-    quantity: Quantity,
-    grid: Grid,
-    months: &[Vec<f32>],
-) -> Manifest {
-    let product = name.parse().unwrap();
-    let mut steps = vec![];
-    let mut domain = vec![false; grid.cell_count()];
-    for (month, values) in (1..).zip(months) {
-        let period = Period::month(2000, month).unwrap();
-        let frame = storage::frames::write(store, &product, &grid, values, period)
-            .await
-            .unwrap();
-        for (cell, value) in domain.iter_mut().zip(values) {
-            *cell |= value.is_finite();
-        }
-        steps.push(Step {
-            period,
-            frame,
-            raw_sha256: Digest::of(b""),
-            origin: "made up".into(),
-            valid_cells: 1,
-        });
-    }
-    let domain = storage::domain::write(store, &product, &domain)
-        .await
-        .unwrap();
-    let manifest = Manifest {
-        schema: MANIFEST_SCHEMA,
-        product,
-        number: 1,
-        title: name.into(),
-        quantity,
-        synthetic: true,
-        source: String::new(),
-        grid,
-        steps,
-        domain,
-        series: vec![],
-        derived_from: None,
-    };
-    storage::manifests::commit(store, &manifest).await.unwrap();
-    manifest
-}
-
-fn values(frame: &render_worker::Frame) -> Vec<f32> {
-    frame
-        .cells
-        .content()
-        .iter()
-        .map(|value| if *value < -1e29 { f32::NAN } else { *value })
-        .collect()
-}
-
-struct Stored {
-    store: Store,
-    job: RenderJob,
-}
-
-async fn two_months() -> Stored {
-    let store = Store::memory();
-    let scene = ocean(FIVE_DEGREES);
-    let carbon = scene.accumulated.unwrap();
-    let mut after = values(&scene.value.after);
-    // A cloud over the second month: gaps to fill.
-    after[20 * 72..20 * 72 + 6].fill(f32::NAN);
-    let flux = stored(
-        &store,
-        "flux",
-        Quantity::CarbonFlux,
-        FIVE_DEGREES,
-        &[values(&scene.value.before), after],
-    )
-    .await;
-    let carbon = [values(&carbon.before), values(&carbon.after)];
-    let carbon = stored(
-        &store,
-        "flux-accumulated",
-        Quantity::AccumulatedCarbon,
-        FIVE_DEGREES,
-        &carbon,
-    )
-    .await;
-    let mut job = job(Mode::Map, tile(1, 0, 1, 256));
-    (job.product, job.accumulated) = (flux.id(), Some(carbon.id()));
-    job.time = "2000-01-30".parse().unwrap();
-    Stored { store, job }
-}
+use crate::scenes::FIVE_DEGREES;
+use crate::stored::{product, two_months_in};
 
 fn alpha(png: &[u8]) -> Vec<u8> {
     image::load_from_memory(png)
@@ -114,7 +20,8 @@ fn alpha(png: &[u8]) -> Vec<u8> {
 
 #[tokio::test]
 async fn a_stored_product_is_drawn_at_any_instant_in_every_mode() {
-    let Stored { store, job } = two_months().await;
+    let store = Store::memory();
+    let job = two_months_in(&store).await;
     let service = RenderService::new(store, Backend::Cpu).unwrap();
     for mode in Mode::ALL {
         let mut pictures = vec![];
@@ -145,7 +52,8 @@ async fn a_stored_product_is_drawn_at_any_instant_in_every_mode() {
 
 #[tokio::test]
 async fn gaps_of_the_domain_are_filled_before_anything_is_drawn() {
-    let Stored { store, job } = two_months().await;
+    let store = Store::memory();
+    let job = two_months_in(&store).await;
     let service = RenderService::new(store, Backend::Cpu).unwrap();
     // Row 20 (10 S to 15 S), columns 0 to 5: seen on the tile south of the equator at the date line.
     let late = RenderJob {
@@ -159,13 +67,14 @@ async fn gaps_of_the_domain_are_filled_before_anything_is_drawn() {
 
 #[tokio::test]
 async fn jobs_that_name_what_is_not_there_are_refused() {
-    let Stored { store, job } = two_months().await;
+    let store = Store::memory();
+    let job = two_months_in(&store).await;
     let other = Grid {
         rows: 1,
         cols: 2,
         ..FIVE_DEGREES
     };
-    let small = stored(
+    let small = product(
         &store,
         "small-accumulated",
         Quantity::AccumulatedCarbon,
@@ -198,7 +107,8 @@ async fn jobs_that_name_what_is_not_there_are_refused() {
 
 #[tokio::test]
 async fn many_tasks_draw_at_the_same_time_and_agree() {
-    let Stored { store, job } = two_months().await;
+    let store = Store::memory();
+    let job = two_months_in(&store).await;
     let service = RenderService::new(store, Backend::Cpu).unwrap();
     let job = RenderJob {
         mode: Mode::Volume,

@@ -1,0 +1,206 @@
+//! One job at the desk: looked for in the store, else drawn in turn, then kept.
+
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+use ::service::Outcome as Ended;
+use bytes::Bytes;
+use contract::job::RenderJob;
+use contract::key::ObjectKey;
+use storage::StorageError;
+
+use super::flight::{Flight, Outcome};
+use super::queue::{Class, Full, Permit};
+use super::{DeskError, Drawn, Inner, Origin};
+use crate::error::RenderError;
+
+/// Shortest and longest hint when to ask a full worker again.
+const RETRY_HINT: [Duration; 2] = [Duration::from_millis(100), Duration::from_secs(30)];
+
+impl Inner {
+    /// One job from the store or from the device.
+    pub(super) async fn fly(&self, job: &RenderJob, flight: &Arc<Flight>, class: Class) -> Outcome {
+        if let Some(drawn) = flight.while_wanted(self.stored(job)).await? {
+            return Ok(drawn);
+        }
+        let permit = Arc::new(self.turn(flight, class).await?);
+        let begun = Instant::now();
+        let drawn = self.drawn(job, flight, &permit).await;
+        self.note(&drawn);
+        let png = drawn?;
+        self.learn(begun.elapsed());
+        // Another may draw while this one is stored.
+        drop(permit);
+        let count = |origin: &str| self.pictures.with_label_values(&[origin]).inc();
+        match self.keep(job, png.clone()).await {
+            Ok(None) => {
+                count("drawn");
+                let origin = Origin::Drawn;
+                Ok(Drawn {
+                    png,
+                    origin,
+                    kept: true,
+                })
+            }
+            Ok(Some(theirs)) => {
+                count("conflict");
+                let origin = Origin::Stored;
+                Ok(Drawn {
+                    png: theirs,
+                    origin,
+                    kept: true,
+                })
+            }
+            Err(error) => {
+                count("not_kept");
+                tracing::warn!(
+                    error = error.in_full(),
+                    "a picture is given out but not kept"
+                );
+                let origin = Origin::Drawn;
+                Ok(Drawn {
+                    png,
+                    origin,
+                    kept: false,
+                })
+            }
+        }
+    }
+
+    /// The picture, if it was drawn before. A store that cannot be asked is one more reason to draw.
+    async fn stored(&self, job: &RenderJob) -> Result<Option<Drawn>, RenderError> {
+        match self.store.get(&job.key()).await {
+            Ok(png) => {
+                self.pictures.with_label_values(&["stored"]).inc();
+                let origin = Origin::Stored;
+                Ok(Some(Drawn {
+                    png,
+                    origin,
+                    kept: true,
+                }))
+            }
+            Err(error) if error.is_not_found() => Ok(None),
+            Err(error) => {
+                tracing::warn!(%error, "the store cannot be asked for a picture");
+                Ok(None)
+            }
+        }
+    }
+
+    /// Waits for a permit as long as somebody wants the picture.
+    async fn turn(&self, flight: &Flight, class: Class) -> Result<Permit, DeskError> {
+        let in_turn = async {
+            if class == Class::OnDemand {
+                return self.queue.permit(class).await;
+            }
+            tokio::select! {
+                permit = self.queue.permit(class) => permit,
+                // Whoever joined waits as if he had opened the flight.
+                () = flight.turns_urgent() => {
+                    Ok(self.queue.permit_of_known(Class::OnDemand).await)
+                }
+            }
+        };
+        let permit = flight.while_wanted(async { Ok(in_turn.await) }).await?;
+        permit.map_err(|Full { waiting }| DeskError::Full {
+            waiting,
+            retry_after: self.retry_after(waiting),
+        })
+    }
+
+    async fn drawn(
+        &self,
+        job: &RenderJob,
+        flight: &Arc<Flight>,
+        permit: &Arc<Permit>,
+    ) -> Result<Bytes, RenderError> {
+        let attempt = || async {
+            let loading = flight.while_wanted(self.service.scene(job));
+            let scene = self.measured("load", loading).await?;
+            let held = Arc::clone(permit);
+            let drawing = self.service.picture(job, scene, flight.is_wanted(), held);
+            let image = self.measured("draw", drawing).await?;
+            self.measured("encode", self.service.encode(image)).await
+        };
+        self.service.on_a_sound_device(attempt).await
+    }
+
+    async fn measured<T>(
+        &self,
+        operation: &'static str,
+        work: impl Future<Output = Result<T, RenderError>>,
+    ) -> Result<T, RenderError> {
+        let running = self.red.start(operation);
+        let done = work.await;
+        running.done(done.as_ref().map_or_else(ended, |_there| Ended::Ok));
+        done
+    }
+
+    /// Stores a picture. None: it is there now. Some: another one was there, and a key has one content for ever.
+    pub(super) async fn keep(
+        &self,
+        job: &RenderJob,
+        png: Bytes,
+    ) -> Result<Option<Bytes>, RenderError> {
+        let key = job.key();
+        match self.store.put_new(&key, png).await {
+            Ok(_new) => Ok(None),
+            Err(StorageError::Conflict { .. }) => {
+                let adapter = self.service.name();
+                tracing::error!(%key, adapter, "another adapter drew this job differently");
+                let theirs = self.store.get(&key).await;
+                Ok(Some(theirs.map_err(|e| picture_failed("read", &key, e))?))
+            }
+            Err(source) => Err(picture_failed("store", &key, source)),
+        }
+    }
+
+    fn note(&self, drawn: &Result<Bytes, RenderError>) {
+        let away = &self.is_without_device;
+        match drawn {
+            Ok(_png) => away.store(false, Ordering::Release),
+            Err(RenderError::NoAdapter(_) | RenderError::NoDevice { .. }) => {
+                away.store(true, Ordering::Release);
+            }
+            Err(_other) => {}
+        }
+    }
+
+    fn learn(&self, took: Duration) {
+        let mean = self.mean_us.load(Ordering::Relaxed);
+        // An eighth of the news: one slow picture does not send everybody away.
+        let next = mean - mean / 8 + took.as_micros() as u64 / 8;
+        self.mean_us.store(next, Ordering::Relaxed);
+    }
+
+    /// When the queue should have moved on by itself.
+    fn retry_after(&self, waiting: usize) -> Duration {
+        let mean = Duration::from_micros(self.mean_us.load(Ordering::Relaxed));
+        let turns = waiting / self.limits.draws_at_once.get() + 1;
+        let [shortest, longest] = RETRY_HINT;
+        mean.saturating_mul(turns as u32).clamp(shortest, longest)
+    }
+}
+
+/// How an operation ended that brought no picture.
+fn ended(error: &RenderError) -> Ended {
+    match error {
+        RenderError::NotWanted => Ended::Dropped,
+        error if error.is_bad_request() || error.is_not_found() => Ended::Refused,
+        error if error.is_retryable() => Ended::Retryable,
+        _ => Ended::Failed,
+    }
+}
+
+pub(super) fn picture_failed(
+    what: &'static str,
+    key: &ObjectKey,
+    source: StorageError,
+) -> RenderError {
+    RenderError::Picture {
+        what,
+        key: key.clone(),
+        source: Box::new(source),
+    }
+}

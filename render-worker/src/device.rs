@@ -1,0 +1,99 @@
+//! A device with its compiled stages, the buffers that frames are drawn in and the frames that stay on it.
+
+use std::sync::{Mutex, PoisonError};
+
+use contract::grid::Grid;
+
+use crate::error::RenderError;
+use crate::frame::{SceneBuffers, Stages};
+use crate::gpu::{Gpu, Workspace};
+use crate::plan::{Part, Plan};
+use crate::resident::Resident;
+use crate::scene::{Interval, Scene};
+use crate::stages::fill::{self, Fill};
+
+/// Everything that lives and dies with one device.
+pub(crate) struct Device {
+    gpu: Gpu,
+    stages: Stages,
+    fill: Fill,
+    /// Buffers of frames that are not in flight; as many as ever were in flight at once.
+    idle: Mutex<Vec<Workspace>>,
+    /// Frames of products that were drawn lately.
+    resident: Resident,
+    /// How many devices this process had before.
+    pub(crate) number: u64,
+}
+
+impl Device {
+    /// Compiles the stages.
+    pub(crate) fn new(gpu: Gpu, number: u64) -> Result<Self, RenderError> {
+        let stages = Stages::new(&gpu);
+        let fill = Fill::new(&gpu, fill::SOURCE);
+        gpu.check_fault("compiling shaders")?;
+        tracing::info!(adapter = gpu.adapter_name(), number, "renderer is ready");
+        Ok(Self {
+            gpu,
+            stages,
+            fill,
+            idle: Mutex::default(),
+            resident: Resident::default(),
+            number,
+        })
+    }
+
+    pub(crate) fn gpu(&self) -> &Gpu {
+        &self.gpu
+    }
+
+    /// Bytes of frames that stay on the device.
+    pub(crate) fn resident_bytes(&self) -> u64 {
+        self.resident.bytes()
+    }
+
+    /// Draws one part of a picture.
+    pub(crate) fn draw(
+        &self,
+        plan: &Plan,
+        part: Part,
+        scene: &Scene,
+    ) -> Result<Vec<u8>, RenderError> {
+        let buffers = self.scene_buffers(scene)?;
+        // A poisoned pool is whole: workspaces are only pushed and popped.
+        let idle = || self.idle.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut workspace = idle().pop().unwrap_or_default();
+        let drawn = self
+            .stages
+            .draw(&self.gpu, &mut workspace, plan, part, &buffers);
+        idle().push(workspace);
+        drawn
+    }
+
+    /// Fills the gaps of one frame, if the device does that faster than the twin.
+    pub(crate) fn fill(
+        &self,
+        grid: &Grid,
+        values: &[f32],
+        domain: &[u32],
+    ) -> Option<Result<Vec<f32>, RenderError>> {
+        // A software adapter would visit every cell where the twin visits the gaps alone.
+        let bytes = size_of_val(values) as u64;
+        let pays = !self.gpu.is_software() && bytes <= self.gpu.most_buffer_bytes();
+        pays.then(|| self.fill.run(&self.gpu, grid, values, domain))
+    }
+
+    fn scene_buffers(&self, scene: &Scene) -> Result<SceneBuffers, RenderError> {
+        let pair = |interval: &Interval| -> Result<[wgpu::Buffer; 2], RenderError> {
+            let before = self.resident.buffer(&self.gpu, &interval.before.cells)?;
+            Ok([
+                before,
+                self.resident.buffer(&self.gpu, &interval.after.cells)?,
+            ])
+        };
+        Ok(SceneBuffers {
+            value: pair(&scene.value)?,
+            accumulated: scene.accumulated.as_ref().map(pair).transpose()?,
+            domain: self.resident.buffer(&self.gpu, &scene.domain)?,
+        })
+    }
+}

@@ -1,0 +1,100 @@
+//! What a desk holds, read when somebody asks for the metrics.
+
+use prometheus::core::{Collector, Desc};
+use prometheus::proto::MetricFamily;
+use prometheus::{IntCounter, IntCounterVec, IntGauge, IntGaugeVec, Opts};
+
+use crate::desk::{Desk, METRICS};
+
+/// Gauges of one desk.
+pub(crate) struct Gauges {
+    desk: Desk,
+    queue_length: IntGaugeVec,
+    drawing: IntGauge,
+    resident_bytes: IntGaugeVec,
+    frame_reads: IntCounterVec,
+    device_restarts: IntCounter,
+}
+
+impl Gauges {
+    pub(crate) fn of(desk: &Desk) -> Result<Self, prometheus::Error> {
+        let named = |what: &str, help: &str| Opts::new(format!("fluxglobe_{METRICS}_{what}"), help);
+        Ok(Self {
+            desk: desk.clone(),
+            queue_length: IntGaugeVec::new(
+                named(
+                    "queue_length",
+                    "Jobs that are not begun, by who wants them.",
+                ),
+                &["class"],
+            )?,
+            drawing: IntGauge::with_opts(named("drawing", "Jobs that hold a permit to draw."))?,
+            resident_bytes: IntGaugeVec::new(
+                named("resident_bytes", "Bytes of frames kept, by where."),
+                &["place"],
+            )?,
+            frame_reads: IntCounterVec::new(
+                named(
+                    "frame_reads_total",
+                    "Frames wanted, by whether they were there.",
+                ),
+                &["outcome"],
+            )?,
+            device_restarts: IntCounter::with_opts(named(
+                "device_restarts_total",
+                "Graphics devices that were given up and opened again.",
+            ))?,
+        })
+    }
+}
+
+impl Collector for Gauges {
+    fn desc(&self) -> Vec<&Desc> {
+        [
+            self.queue_length.desc(),
+            self.drawing.desc(),
+            self.resident_bytes.desc(),
+            self.frame_reads.desc(),
+            self.device_restarts.desc(),
+        ]
+        .concat()
+    }
+
+    fn collect(&self) -> Vec<MetricFamily> {
+        let condition = self.desk.condition();
+        let service = self.desk.service();
+        let kept = service.kept();
+        let waiting = |class: &str, count: usize| {
+            let gauge = self.queue_length.with_label_values(&[class]);
+            gauge.set(count as i64);
+        };
+        waiting("on_demand", condition.waiting_on_demand);
+        waiting("batch", condition.waiting_batch);
+        self.drawing.set(condition.in_flight as i64);
+        let bytes = |place: &str, bytes: u64| {
+            let gauge = self.resident_bytes.with_label_values(&[place]);
+            gauge.set(bytes as i64);
+        };
+        bytes("memory", kept.frame_bytes);
+        bytes("device", service.renderer().resident_bytes());
+        let reads = |outcome: &str, total: u64| {
+            raise(&self.frame_reads.with_label_values(&[outcome]), total);
+        };
+        reads("hit", kept.frame_hits);
+        reads("miss", kept.frame_misses);
+        raise(&self.device_restarts, service.renderer().device_number());
+        [
+            self.queue_length.collect(),
+            self.drawing.collect(),
+            self.resident_bytes.collect(),
+            self.frame_reads.collect(),
+            self.device_restarts.collect(),
+        ]
+        .concat()
+    }
+}
+
+/// Brings a counter up to a total that is counted elsewhere.
+fn raise(counter: &IntCounter, total: u64) {
+    counter.inc_by(total.saturating_sub(counter.get()));
+}

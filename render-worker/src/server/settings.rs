@@ -1,0 +1,64 @@
+//! Settings of a render worker.
+
+use std::net::SocketAddr;
+use std::num::NonZeroUsize;
+use std::time::Duration;
+
+use clap::value_parser;
+
+use crate::desk::DeskLimits;
+use crate::service::Limits;
+
+/// How a render worker listens and how much it takes on. A flag and a variable have the same name.
+#[derive(Debug, Clone, clap::Args)]
+pub struct Settings {
+    /// Address at which pictures are drawn for others (gRPC, no encryption: keep it inside the cluster).
+    #[arg(
+        long,
+        env = "FLUXGLOBE_RENDER_LISTEN",
+        default_value = "127.0.0.1:50061",
+        value_name = "ADDRESS"
+    )]
+    pub render_listen: SocketAddr,
+    /// Pictures drawn at the same time, 1 to 64; two keep a device busy while one of them is encoded.
+    #[arg(long, env = "FLUXGLOBE_DRAWS_AT_ONCE", default_value_t = 2,
+          value_parser = value_parser!(u8).range(1..=64), value_name = "COUNT")]
+    pub draws_at_once: u8,
+    /// Jobs that may wait to be drawn on demand, 0 to 4096; more are sent away with a hint when to ask again.
+    #[arg(long, env = "FLUXGLOBE_DRAW_QUEUE", default_value_t = 64,
+          value_parser = value_parser!(u16).range(0..=4096), value_name = "COUNT")]
+    pub draw_queue: u16,
+    /// Memory for frames of products drawn lately, MiB, 16 to 1048576.
+    #[arg(long, env = "FLUXGLOBE_FRAME_MEMORY_MIB", default_value_t = 512,
+          value_parser = value_parser!(u32).range(16..=1_048_576), value_name = "MIB")]
+    pub frame_memory_mib: u32,
+    /// How long jobs under way may take to end when the worker is asked to stop, seconds, 0 to 600.
+    #[arg(long, env = "FLUXGLOBE_RENDER_DRAIN_S", default_value_t = 25,
+          value_parser = value_parser!(u16).range(0..=600), value_name = "SECONDS")]
+    pub render_drain_s: u16,
+}
+
+impl Settings {
+    pub(crate) fn service_limits(&self) -> Limits {
+        Limits {
+            pictures: self.at_once(),
+            frame_bytes: u64::from(self.frame_memory_mib) << 20,
+        }
+    }
+
+    pub(crate) fn desk_limits(&self) -> DeskLimits {
+        DeskLimits {
+            draws_at_once: self.at_once(),
+            draw_queue: usize::from(self.draw_queue),
+        }
+    }
+
+    /// How long the end may take.
+    pub fn drain(&self) -> Duration {
+        Duration::from_secs(u64::from(self.render_drain_s))
+    }
+
+    fn at_once(&self) -> NonZeroUsize {
+        NonZeroUsize::new(usize::from(self.draws_at_once)).unwrap_or(NonZeroUsize::MIN)
+    }
+}

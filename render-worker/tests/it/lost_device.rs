@@ -1,0 +1,80 @@
+//! A graphics device that is lost, or that loses itself at every job: the worker goes on.
+
+use contract::job::Mode;
+use contract::job::RenderJob;
+use render_worker::{Backend, RenderError, RenderService};
+use storage::Store;
+
+use crate::stored::two_months_in;
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_job_is_drawn_on_a_fresh_device_when_its_own_is_lost() {
+    if crate::device::gpu("a lost device").is_none() {
+        return;
+    }
+    let store = Store::memory();
+    let job = two_months_in(&store).await;
+    let service = RenderService::new(store, Backend::Gpu).unwrap();
+    for (lost, mode) in (0..).zip([Mode::Volume, Mode::Map, Mode::Sprites]) {
+        let job = RenderJob {
+            mode,
+            ..job.clone()
+        };
+        let before = service.draw(&job).await.unwrap();
+        assert_eq!(service.renderer().device_number(), lost);
+        service.renderer().lose_device();
+        assert_eq!(service.draw(&job).await.unwrap(), before, "{mode}");
+        assert_eq!(
+            service.renderer().device_number(),
+            lost + 1,
+            "the fault fired"
+        );
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_job_that_loses_every_device_fails_and_the_next_one_is_drawn() {
+    if crate::device::gpu("a job that loses devices").is_none() {
+        return;
+    }
+    let store = Store::memory();
+    let job = two_months_in(&store).await;
+    let service = RenderService::new(store, Backend::Gpu).unwrap();
+    let poison = || async {
+        let scene = service.scene(&job).await?;
+        service.renderer().lose_device();
+        let wanted: render_worker::service::IsWanted = std::sync::Arc::new(|| true);
+        service.picture(&job, scene, wanted, ()).await
+    };
+    let failed = service.on_a_sound_device(poison).await.unwrap_err();
+    assert!(failed.is_device_fault() && failed.is_final(), "{failed}");
+    assert!(!matches!(failed, RenderError::NoAdapter(_)));
+    assert_eq!(
+        service.renderer().device_number(),
+        1,
+        "tried on a second device"
+    );
+    service.draw(&job).await.unwrap();
+    assert_eq!(service.renderer().device_number(), 2);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn many_that_draw_on_a_device_that_is_lost_share_one_fresh_one() {
+    if crate::device::gpu("many on a lost device").is_none() {
+        return;
+    }
+    let store = Store::memory();
+    let job = two_months_in(&store).await;
+    let service = RenderService::new(store, Backend::Gpu).unwrap();
+    let before = service.draw(&job).await.unwrap();
+    service.renderer().lose_device();
+    let draw = || {
+        let (service, job) = (service.clone(), job.clone());
+        tokio::spawn(async move { service.draw(&job).await.unwrap() })
+    };
+    let tasks: Vec<_> = (0..6).map(|_| draw()).collect();
+    for task in tasks {
+        assert_eq!(task.await.unwrap(), before);
+    }
+    assert_eq!(service.renderer().device_number(), 1);
+}
