@@ -27,8 +27,11 @@ launch_cluster() {
         say 'formatting its data folder'
         format=(-format)
     fi
+    # Hadoop insists on an address for the machine's own name, which not every container has; it needs no other names.
+    printf '127.0.0.1 localhost %s\n' "$HOSTNAME" >"$run/hosts"
     launch "$java" "-Xmx$heap" "${small_java[@]}" \
-        -Djava.net.preferIPv4Stack=true -Dfluxglobe.log=INFO "-Dlog4j.configuration=file:$here/hdfs/log4j.properties" \
+        -Djava.net.preferIPv4Stack=true "-Djdk.net.hosts.file=$run/hosts" -Dfluxglobe.log=INFO \
+        "-Dlog4j.configuration=file:$here/hdfs/log4j.properties" \
         -cp "$service/lib/*" org.apache.hadoop.test.MiniDFSClusterManager "${format[@]}" \
         -datanodes 1 -nnport "$port" -httpport "$http_port" \
         -D "hdfs.minidfs.basedir=$run/data" -D dfs.replication=1 -D dfs.webhdfs.enabled=true \

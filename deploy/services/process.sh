@@ -16,7 +16,7 @@ log=$run/log
 # Every server inherits its data folder opened as this descriptor.
 data_fd=8
 # How long a server may take until it answers, and until it has stopped by itself.
-start_limit_s=${FLUXGLOBE_START_LIMIT_S:-90}
+start_limit_s=${FLUXGLOBE_START_LIMIT_S:-180}
 stop_limit_s=${FLUXGLOBE_STOP_LIMIT_S:-30}
 # An older log is set aside once, at a start, when it is larger than this.
 log_limit_bytes=$((16 << 20))

@@ -8,7 +8,7 @@ source "$(dirname "${BASH_SOURCE[0]}")/process.sh"
 # shellcheck source=debian.sh
 source "$here/debian.sh"
 
-# The first versions check and create in two steps: of 32 writers that create the same key, several would win.
+# Older versions check and create in two steps: of 32 writers that create the same key, several would win.
 server=github.com/versity/versitygw/cmd/versitygw@v1.8.0
 region=us-east-1
 port=${FLUXGLOBE_S3_PORT:-19000}
