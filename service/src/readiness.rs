@@ -79,7 +79,7 @@ impl Report {
 mod tests {
     use super::*;
 
-    #[tokio::test(start_paused = true)]
+    #[tokio::test]
     async fn a_part_that_does_not_answer_is_away() {
         let silent = std::future::pending::<Result<String, String>>();
         let part = Part::required("store", silent).await;
