@@ -75,7 +75,7 @@ impl Patient {
             async move { self.bounded(limit, answer).await }
         };
         once.retry(pauses)
-            .when(|error| may_pass(error) && begun.elapsed() < self.patience.retries)
+            .when(|error| is_worth_a_try(error) && begun.elapsed() < self.patience.retries)
             .notify(|error, pause| {
                 tracing::info!(%error, pause_ms = pause.as_millis() as u64, "trying the store again");
             })
@@ -117,6 +117,15 @@ impl Patient {
             attributes,
         })
     }
+}
+
+/// An object that is there already may be the one of the try before: that is for the caller to find out, at once.
+fn is_worth_a_try(error: &Error) -> bool {
+    let is_answer = matches!(
+        error,
+        Error::AlreadyExists { .. } | Error::Precondition { .. } | Error::NotModified { .. }
+    );
+    may_pass(error) && !is_answer
 }
 
 fn silent(limit: Duration) -> Error {

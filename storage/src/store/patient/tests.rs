@@ -1,7 +1,7 @@
 //! Patience against a store that fails, loses answers and falls silent.
 
 use super::*;
-use crate::store::faulty::{Fault, Faulty, broken, denied};
+use crate::store::faulty::{Fault, Faulty, broken, denied, exists};
 use bytes::Bytes;
 use object_store::ObjectStoreExt as _;
 
@@ -47,10 +47,12 @@ async fn a_store_that_never_answers_is_given_up_in_bounded_time() {
 
 #[tokio::test]
 async fn what_will_not_change_is_not_tried_again() {
-    let inner = Faulty::always(Fault::Fail(denied));
-    let error = patient(&inner).put(&here(), "x".into()).await.unwrap_err();
-    assert!(matches!(error, Error::PermissionDenied { .. }));
-    assert_eq!(inner.put_count(), 1);
+    for refuse in [denied as fn() -> Error, exists] {
+        let inner = Faulty::always(Fault::Fail(refuse));
+        let error = patient(&inner).put(&here(), "x".into()).await.unwrap_err();
+        assert_eq!(error.to_string(), refuse().to_string());
+        assert_eq!(inner.put_count(), 1);
+    }
 }
 
 #[tokio::test]
