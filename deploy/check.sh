@@ -75,6 +75,10 @@ check_prometheus() {
     checked 'promtool check config' "$promtool" check config prometheus/compose.yml prometheus/embedded.yml
     checked 'promtool check rules' "$promtool" check rules prometheus/rules.yml
     checked 'promtool test rules' "$promtool" test rules prometheus/rules.test.yml
+    checked 'metrics that rules and dashboards ask for' \
+        "$tools/bin/python" -B check/metrics.py .. prometheus/rules.yml grafana/dashboards/*.json ../docs/operations.md
+    sed 's/(fluxglobe_scheduler_executors)/(fluxglobe_scheduler_workers)/' prometheus/rules.yml >"$work/rules.yml"
+    refused 'the look for metrics' fluxglobe_scheduler_workers "$tools/bin/python" -B check/metrics.py .. "$work/rules.yml"
     cp prometheus/rules.test.yml "$work/"
     sed 's/> 0\.05/> 0.5/' prometheus/rules.yml >"$work/rules.yml"
     refused 'promtool test rules' FluxglobeErrors "$promtool" test rules "$work/rules.test.yml"

@@ -1,7 +1,6 @@
 """Budgets, series and derivations on the compute cluster."""
 
 from grafana_foundation_sdk.builders.dashboard import Dashboard
-
 from panels import AMBER, GREEN, RED, dashboard, lines, number, quantiles
 
 # What the tile server is asked for besides pictures and by programs.
@@ -70,7 +69,10 @@ def board() -> Dashboard:
                 "Derivations",
                 "Products redone because of what landed, by how that ended.",
                 "ops",
-                ("sum by (outcome) (rate(fluxglobe_deriver_requests_total[$__rate_interval]))", "{{outcome}}"),
+                (
+                    "sum by (operation, outcome) (rate(fluxglobe_deriver_requests_total[$__rate_interval]))",
+                    "{{operation}} {{outcome}}",
+                ),
                 stacked=True,
             )
         )
@@ -79,15 +81,32 @@ def board() -> Dashboard:
                 "Derivation duration",
                 "From a landed granule to the derived product.",
                 "s",
-                *quantiles("fluxglobe_deriver_request_seconds", "derivation"),
+                *quantiles("fluxglobe_deriver_request_seconds", "{{operation}}", by="operation"),
             )
         )
         .with_panel(
             lines(
                 "Tasks",
-                "Tasks that ended, by executor. One that stands still among others is stuck.",
+                "Tasks that ended, by how. `retryable` is a store or another executor that was away.",
                 "ops",
-                ("rate(fluxglobe_executor_tasks_total[$__rate_interval])", "{{instance}}"),
+                ("sum by (outcome) (rate(fluxglobe_executor_requests_total[$__rate_interval]))", "{{outcome}}"),
+                stacked=True,
+            )
+        )
+        .with_panel(
+            lines(
+                "Task duration",
+                "At all executors.",
+                "s",
+                *quantiles("fluxglobe_executor_request_seconds", "task"),
+            )
+        )
+        .with_panel(
+            lines(
+                "Tasks by executor",
+                "Tasks that ended. One that stands still among others is stuck.",
+                "ops",
+                ("sum by (instance) (rate(fluxglobe_executor_requests_total[$__rate_interval]))", "{{instance}}"),
             )
         )
         .with_panel(

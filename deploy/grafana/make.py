@@ -3,12 +3,11 @@
 import sys
 from pathlib import Path
 
-from grafana_foundation_sdk.cog.encoder import JSONEncoder
-
 import analysis
 import overview
 import pictures
 import service
+from grafana_foundation_sdk.cog.encoder import JSONEncoder
 
 
 def main() -> None:

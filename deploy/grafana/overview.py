@@ -1,7 +1,6 @@
 """The first dashboard to look at: is all well, and if not, where?"""
 
 from grafana_foundation_sdk.builders.dashboard import Dashboard
-
 from panels import AMBER, GREEN, RED, dashboard, lines, number, p95, quantiles, row
 
 UP = 'up{job="fluxglobe"}'

@@ -56,7 +56,16 @@ def dashboard(uid: str, title: str, description: str) -> Dashboard:
 
 def service_variable() -> CustomVariable:
     """The service a panel speaks of, as metrics spell it."""
-    names = ["ingestd", "scheduler", "deriver", "render_worker", "render_fleet", "tile_server"]
+    names = [
+        "ingestd",
+        "observations",
+        "scheduler",
+        "deriver",
+        "executor",
+        "render_worker",
+        "render_fleet",
+        "tile_server",
+    ]
     return CustomVariable("service").label("Service").values(",".join(names)).hide(VariableHide.DONT_HIDE)
 
 

@@ -1,7 +1,6 @@
 """Tiles and views: where they come from, what drawing takes, who is sent away."""
 
 from grafana_foundation_sdk.builders.dashboard import Dashboard
-
 from panels import AMBER, GREEN, RED, dashboard, lines, number, p95, quantiles, spread
 
 TILES = "fluxglobe_tile_server"

@@ -1,7 +1,6 @@
 """One service: rate, errors and duration of each of its operations."""
 
 from grafana_foundation_sdk.builders.dashboard import Dashboard
-
 from panels import FULL, dashboard, lines, quantiles, service_variable, spread
 
 
