@@ -1,9 +1,10 @@
 //! Hadoop file systems: a whole object appears under its name at once, by a rename that replaces nothing.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use hdfs_native_object_store::HdfsObjectStoreBuilder;
 use object_store::{Error, ObjectStore};
+use tokio::runtime::{Handle, Runtime};
 
 use super::patient::Patient;
 use super::settings::Settings;
@@ -16,16 +17,37 @@ use super::settings::Settings;
 /// # Errors
 /// What to set, in words.
 pub(super) fn open(node: &str, settings: &Settings) -> Result<Arc<dyn ObjectStore>, String> {
-    let store = HdfsObjectStoreBuilder::new()
-        .with_url(format!("hdfs://{node}"))
-        .build()
-        .map_err(|e| {
-            format!(
-                "{e}; give hdfs://HOST:PORT/PREFIX, or set HADOOP_CONF_DIR to the folder whose \
-                 hdfs-site.xml knows the name service"
-            )
-        })?;
-    Ok(Patient::new(Arc::new(store), settings.patience, classify))
+    let url = format!("hdfs://{node}");
+    let runtime = runtime().map_err(|e| format!("no threads for it: {e}"))?;
+    let connect = move || {
+        let client = HdfsObjectStoreBuilder::new()
+            .with_url(&url)
+            .with_io_runtime(runtime.clone())
+            .build()?;
+        Ok(Arc::new(client) as Arc<dyn ObjectStore>)
+    };
+    let store = Patient::new(Box::new(connect), settings.patience, classify).map_err(|e| {
+        format!(
+            "{e}; give hdfs://HOST:PORT/PREFIX, or set HADOOP_CONF_DIR to the folder whose \
+             hdfs-site.xml knows the name service"
+        )
+    })?;
+    Ok(Arc::new(store))
+}
+
+/// Threads of connections to name and data nodes. They are the process' own, for a client outlives the runtime that it
+/// was opened in.
+fn runtime() -> std::io::Result<Handle> {
+    static RUNTIME: OnceLock<Runtime> = OnceLock::new();
+    if let Some(runtime) = RUNTIME.get() {
+        return Ok(runtime.handle().clone());
+    }
+    let made = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(2)
+        .thread_name("hdfs")
+        .enable_all()
+        .build()?;
+    Ok(RUNTIME.get_or_init(|| made).handle().clone())
 }
 
 /// The client tells what will not change only in the text of the name node's answer.

@@ -2,7 +2,7 @@
 
 use std::fmt::{Debug, Display, Formatter};
 use std::future::Future;
-use std::sync::Arc;
+use std::sync::{Arc, PoisonError, RwLock};
 use std::time::{Duration, Instant};
 
 use async_trait::async_trait;
@@ -23,44 +23,72 @@ use crate::error::may_pass;
 const WHOLE_BYTES: u64 = 64 << 20;
 
 /// A store whose every call is bounded in time. Only for stores whose `put` creates whole objects or none, so that a
-/// put can be tried again.
+/// put can be tried again. Clones share it.
+#[derive(Clone)]
 pub(super) struct Patient {
-    inner: Arc<dyn ObjectStore>,
+    shared: Arc<Shared>,
+}
+
+struct Shared {
+    /// What calls are made with; another after a silence, for a connection may be dead without saying so.
+    client: RwLock<Client>,
+    connect: Connect,
     patience: Patience,
     /// Gives an error of the client the kind that it has, where the client does not.
     classify: fn(Error) -> Error,
 }
 
+type Client = Arc<dyn ObjectStore>;
+
+/// Makes a client with connections of its own.
+pub(super) type Connect = Box<dyn Fn() -> Result<Client> + Send + Sync>;
+
 impl Patient {
     pub(super) fn new(
-        inner: Arc<dyn ObjectStore>,
+        connect: Connect,
         patience: Patience,
         classify: fn(Error) -> Error,
-    ) -> Arc<Self> {
-        Arc::new(Self {
-            inner,
-            patience,
-            classify,
+    ) -> Result<Self> {
+        Ok(Self {
+            shared: Arc::new(Shared {
+                client: RwLock::new(connect()?),
+                connect,
+                patience,
+                classify,
+            }),
         })
     }
 
-    fn share(&self) -> Self {
-        Self {
-            inner: Arc::clone(&self.inner),
-            patience: self.patience,
-            classify: self.classify,
+    fn client(&self) -> Client {
+        let client = self.shared.client.read();
+        Arc::clone(&client.unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// Turns away from a client that was silent, unless another call has done so.
+    fn leave(&self, silent: &Client) {
+        let client = self.shared.client.write();
+        let mut client = client.unwrap_or_else(PoisonError::into_inner);
+        if Arc::ptr_eq(&client, silent) {
+            match (self.shared.connect)() {
+                Ok(other) => *client = other,
+                Err(error) => tracing::warn!(%error, "no new client; the silent one is asked on"),
+            }
         }
     }
 
     /// Calls until it succeeds, fails for good, or was tried for long enough.
-    async fn tried<T, F>(&self, call: impl FnMut() -> F) -> Result<T>
+    async fn tried<T, F>(&self, call: impl FnMut(Client) -> F) -> Result<T>
     where
         F: Future<Output = Result<T>>,
     {
-        self.tried_within(self.patience.request, call).await
+        self.tried_within(self.shared.patience.request, call).await
     }
 
-    async fn tried_within<T, F>(&self, limit: Duration, mut call: impl FnMut() -> F) -> Result<T>
+    async fn tried_within<T, F>(
+        &self,
+        limit: Duration,
+        mut call: impl FnMut(Client) -> F,
+    ) -> Result<T>
     where
         F: Future<Output = Result<T>>,
     {
@@ -71,11 +99,12 @@ impl Patient {
             .with_jitter()
             .without_max_times();
         let once = || {
-            let answer = call();
-            async move { self.bounded(limit, answer).await }
+            let client = self.client();
+            let answer = call(Arc::clone(&client));
+            async move { self.bounded(limit, &client, answer).await }
         };
         once.retry(pauses)
-            .when(|error| is_worth_a_try(error) && begun.elapsed() < self.patience.retries)
+            .when(|error| is_worth_a_try(error) && begun.elapsed() < self.shared.patience.retries)
             .notify(|error, pause| {
                 tracing::info!(%error, pause_ms = pause.as_millis() as u64, "trying the store again");
             })
@@ -85,38 +114,40 @@ impl Patient {
     async fn bounded<T>(
         &self,
         limit: Duration,
+        client: &Client,
         answer: impl Future<Output = Result<T>>,
     ) -> Result<T> {
-        match tokio::time::timeout(limit, answer).await {
-            Ok(answer) => answer.map_err(self.classify),
-            Err(_elapsed) => Err(silent(limit)),
+        if let Ok(answer) = tokio::time::timeout(limit, answer).await {
+            return answer.map_err(self.shared.classify);
         }
+        self.leave(client);
+        Err(silent(limit))
     }
+}
 
-    /// Reads short answers whole, so that a failure in the middle is a failure of this try.
-    async fn read(&self, location: &Path, options: GetOptions) -> Result<GetResult> {
-        let found = self.inner.get_opts(location, options).await?;
-        let length_bytes = found.range.end - found.range.start;
-        if length_bytes > WHOLE_BYTES {
-            return Ok(found);
-        }
-        let (meta, range, attributes) = (
-            found.meta.clone(),
-            found.range.clone(),
-            found.attributes.clone(),
-        );
-        let content = found.bytes().await?;
-        if content.len() as u64 != length_bytes {
-            let reason = format!("{} of {length_bytes} bytes came", content.len());
-            return Err(generic(reason));
-        }
-        Ok(GetResult {
-            payload: GetResultPayload::Stream(stream::once(async { Ok(content) }).boxed()),
-            meta,
-            range,
-            attributes,
-        })
+/// Reads short answers whole, so that a failure in the middle is a failure of this try.
+async fn read(client: Client, location: &Path, options: GetOptions) -> Result<GetResult> {
+    let found = client.get_opts(location, options).await?;
+    let length_bytes = found.range.end - found.range.start;
+    if length_bytes > WHOLE_BYTES {
+        return Ok(found);
     }
+    let (meta, range, attributes) = (
+        found.meta.clone(),
+        found.range.clone(),
+        found.attributes.clone(),
+    );
+    let content = found.bytes().await?;
+    if content.len() as u64 != length_bytes {
+        let reason = format!("{} of {length_bytes} bytes came", content.len());
+        return Err(generic(reason));
+    }
+    Ok(GetResult {
+        payload: GetResultPayload::Stream(stream::once(async { Ok(content) }).boxed()),
+        meta,
+        range,
+        attributes,
+    })
 }
 
 /// An object that is there already may be the one of the try before: that is for the caller to find out, at once.
@@ -147,7 +178,7 @@ impl Debug for Patient {
 
 impl Display for Patient {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
-        Display::fmt(&self.inner, f)
+        Display::fmt(&self.client(), f)
     }
 }
 
@@ -160,10 +191,10 @@ impl ObjectStore for Patient {
         options: PutOptions,
     ) -> Result<PutResult> {
         let shares = 1 + payload.content_length() as u64 / WHOLE_BYTES;
-        let limit = self.patience.request * u32::try_from(shares).unwrap_or(u32::MAX);
-        self.tried_within(limit, || {
-            self.inner
-                .put_opts(location, payload.clone(), options.clone())
+        let limit = self.shared.patience.request * u32::try_from(shares).unwrap_or(u32::MAX);
+        self.tried_within(limit, |client| {
+            let (payload, options) = (payload.clone(), options.clone());
+            async move { client.put_opts(location, payload, options).await }
         })
         .await
     }
@@ -173,21 +204,26 @@ impl ObjectStore for Patient {
         location: &Path,
         options: PutMultipartOptions,
     ) -> Result<Box<dyn MultipartUpload>> {
-        self.tried(|| self.inner.put_multipart_opts(location, options.clone()))
-            .await
+        self.tried(|client| {
+            let options = options.clone();
+            async move { client.put_multipart_opts(location, options).await }
+        })
+        .await
     }
 
     async fn get_opts(&self, location: &Path, options: GetOptions) -> Result<GetResult> {
-        let mut found = self.tried(|| self.read(location, options.clone())).await?;
+        let mut found = self
+            .tried(|client| read(client, location, options.clone()))
+            .await?;
         if found.range.end - found.range.start > WHOLE_BYTES
             && let GetResultPayload::Stream(pieces) = found.payload
         {
-            let me = self.share();
-            let bounded = stream::try_unfold((me, pieces), |(me, mut pieces)| async move {
-                let limit = me.patience.request;
-                let piece = me.bounded(limit, pieces.try_next()).await?;
-                Ok(piece.map(|piece| (piece, (me, pieces))))
-            });
+            let bounded =
+                stream::try_unfold((self.clone(), pieces), |(me, mut pieces)| async move {
+                    let (limit, client) = (me.shared.patience.request, me.client());
+                    let piece = me.bounded(limit, &client, pieces.try_next()).await?;
+                    Ok(piece.map(|piece| (piece, (me, pieces))))
+                });
             found.payload = GetResultPayload::Stream(bounded.boxed());
         }
         Ok(found)
@@ -197,19 +233,12 @@ impl ObjectStore for Patient {
         &self,
         locations: BoxStream<'static, Result<Path>>,
     ) -> BoxStream<'static, Result<Path>> {
-        let me = self.share();
+        let me = self.clone();
         locations
             .and_then(move |location| {
-                let me = me.share();
+                let me = me.clone();
                 async move {
-                    me.tried(|| async {
-                        let only = location.clone();
-                        let mut gone = me
-                            .inner
-                            .delete_stream(stream::once(async { Ok(only) }).boxed());
-                        gone.try_next().await
-                    })
-                    .await?;
+                    me.tried(|client| delete(client, location.clone())).await?;
                     Ok(location)
                 }
             })
@@ -217,10 +246,10 @@ impl ObjectStore for Patient {
     }
 
     fn list(&self, prefix: Option<&Path>) -> BoxStream<'static, Result<ObjectMeta>> {
-        let (me, prefix) = (self.share(), prefix.cloned());
+        let (me, prefix) = (self.clone(), prefix.cloned());
         stream::once(async move {
             let found: Vec<ObjectMeta> = me
-                .tried(|| me.inner.list(prefix.as_ref()).try_collect())
+                .tried(|client| client.list(prefix.as_ref()).try_collect())
                 .await?;
             Ok::<_, Error>(stream::iter(found.into_iter().map(Ok)))
         })
@@ -229,18 +258,30 @@ impl ObjectStore for Patient {
     }
 
     async fn list_with_delimiter(&self, prefix: Option<&Path>) -> Result<ListResult> {
-        self.tried(|| self.inner.list_with_delimiter(prefix)).await
+        self.tried(|client| async move { client.list_with_delimiter(prefix).await })
+            .await
     }
 
+    /// Not tried again: a copy that was half done is no copy.
     async fn copy_opts(&self, from: &Path, to: &Path, options: CopyOptions) -> Result<()> {
-        let copied = self.inner.copy_opts(from, to, options);
-        self.bounded(self.patience.request, copied).await
+        let client = self.client();
+        let copied = client.copy_opts(from, to, options);
+        self.bounded(self.shared.patience.request, &client, copied)
+            .await
     }
 
+    /// Not tried again: after a lost answer nothing would be left to rename.
     async fn rename_opts(&self, from: &Path, to: &Path, options: RenameOptions) -> Result<()> {
-        let renamed = self.inner.rename_opts(from, to, options);
-        self.bounded(self.patience.request, renamed).await
+        let client = self.client();
+        let renamed = client.rename_opts(from, to, options);
+        self.bounded(self.shared.patience.request, &client, renamed)
+            .await
     }
+}
+
+async fn delete(client: Client, location: Path) -> Result<Option<Path>> {
+    let mut gone = client.delete_stream(stream::once(async { Ok(location) }).boxed());
+    gone.try_next().await
 }
 
 #[cfg(test)]

@@ -5,8 +5,10 @@
 //! texts are tested beside the code.
 
 mod conformance;
+mod cut_proxy;
 mod fault_proxy;
 mod faults;
 mod killed;
+mod name_node;
 mod stores;
 mod suite;

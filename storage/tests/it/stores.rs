@@ -1,7 +1,7 @@
 //! The stores that the suite runs on, each empty and for one test alone.
 
 use std::sync::atomic::{AtomicU32, Ordering};
-use std::time::{SystemTime, UNIX_EPOCH};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use futures::{StreamExt as _, TryStreamExt as _, stream};
 use storage::Store;
@@ -22,6 +22,7 @@ impl Opened {
             .try_collect::<Vec<()>>()
             .await
             .unwrap();
+        self.store.remove_leftovers(Duration::ZERO).await.unwrap();
     }
 }
 

@@ -4,6 +4,7 @@ use super::*;
 use crate::store::faulty::{Fault, Faulty, broken, denied, exists};
 use bytes::Bytes;
 use object_store::ObjectStoreExt as _;
+use std::sync::Mutex;
 
 const SHORT: Patience = Patience {
     connect: Duration::from_millis(100),
@@ -11,8 +12,10 @@ const SHORT: Patience = Patience {
     retries: Duration::from_millis(1500),
 };
 
-fn patient(inner: &Arc<Faulty>) -> Arc<Patient> {
-    Patient::new(Arc::clone(inner) as Arc<dyn ObjectStore>, SHORT, |e| e)
+fn patient(inner: &Arc<Faulty>) -> Patient {
+    let inner = Arc::clone(inner);
+    let connect = Box::new(move || Ok(Arc::clone(&inner) as Client));
+    Patient::new(connect, SHORT, |e| e).unwrap()
 }
 
 fn here() -> Path {
@@ -92,4 +95,14 @@ async fn long_answers_come_piece_by_piece() {
     inner.inner.put(&here(), long.clone().into()).await.unwrap();
     let found = patient(&inner).get(&here()).await.unwrap();
     assert!(found.bytes().await.unwrap() == long);
+}
+
+#[tokio::test]
+async fn a_silent_client_is_left_for_a_new_one() {
+    let clients = Mutex::new(vec![Faulty::new([]), Faulty::always(Fault::Hang)]);
+    let last = Arc::clone(&clients.lock().unwrap()[0]);
+    let connect = Box::new(move || Ok(clients.lock().unwrap().pop().unwrap() as Client));
+    let store = Patient::new(connect, SHORT, |e| e).unwrap();
+    store.put(&here(), "x".into()).await.unwrap();
+    assert_eq!(last.put_count(), 1);
 }
