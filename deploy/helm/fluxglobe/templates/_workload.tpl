@@ -13,18 +13,7 @@ A service account, a deployment and a disruption budget for one service. Takes a
 {{- $name := printf "%s-%s" (include "fluxglobe.fullname" .root) .service -}}
 {{- $gpu := .settings.gpu | default (dict "enabled" false) -}}
 {{- $autoscaling := .settings.autoscaling | default (dict "enabled" false) -}}
-{{- $secrets := dict -}}
-{{- if has "postgis" .needs }}
-{{- with .root.Values.postgis }}
-{{- $_ := set $secrets "postgis" (dict "name" .secretName "password" true "caKey" .caKey) }}
-{{- end }}
-{{- end }}
-{{- if has "kafka" .needs }}
-{{- $hasUser := eq "yes" (include "fluxglobe.kafkaHasUser" .root) }}
-{{- with .root.Values.kafka }}
-{{- if or $hasUser .caKey }}{{ $_ := set $secrets "kafka" (dict "name" .secretName "password" $hasUser "caKey" .caKey) }}{{ end }}
-{{- end }}
-{{- end }}
+{{- $secrets := include "fluxglobe.secrets" . | fromJson -}}
 apiVersion: v1
 kind: ServiceAccount
 metadata:
@@ -84,12 +73,7 @@ spec:
           labelSelector:
             matchLabels: {{- include "fluxglobe.selector" . | nindent 14 }}
       {{- end }}
-      securityContext:
-        runAsNonRoot: true
-        runAsUser: 10001
-        runAsGroup: 10001
-        fsGroup: 10001
-        seccompProfile: {type: RuntimeDefault}
+      securityContext: {{- include "fluxglobe.podSecurity" . | nindent 8 }}
       containers:
         - name: {{ .service }}
           image: {{ include "fluxglobe.image" .root | quote }}
@@ -140,33 +124,16 @@ spec:
             {{- $_ := set $resources "limits" (set ($resources.limits | default dict) $gpu.resource $gpu.count) }}
             {{- end }}
             {{- toYaml $resources | nindent 12 }}
-          securityContext:
-            allowPrivilegeEscalation: false
-            readOnlyRootFilesystem: true
-            capabilities: {drop: [ALL]}
+          securityContext: {{- include "fluxglobe.containerSecurity" . | nindent 12 }}
           volumeMounts:
             - {name: tmp, mountPath: /tmp}
             # Files that are worked on; what is there when the pod goes is not missed.
             - {name: data, mountPath: /data}
-            {{- range $secret, $_ := $secrets }}
-            - {name: {{ $secret }}, mountPath: /run/secrets/{{ $secret }}, readOnly: true}
-            {{- end }}
+            {{- include "fluxglobe.secretMounts" $secrets | nindent 12 }}
       volumes:
         - {name: tmp, emptyDir: {}}
         - {name: data, emptyDir: {}}
-        {{- range $secret, $what := $secrets }}
-        - name: {{ $secret }}
-          secret:
-            secretName: {{ $what.name }}
-            defaultMode: 0440
-            items:
-              {{- if $what.password }}
-              - {key: password, path: password}
-              {{- end }}
-              {{- with $what.caKey }}
-              - {key: {{ . }}, path: ca.crt}
-              {{- end }}
-        {{- end }}
+        {{- include "fluxglobe.secretVolumes" $secrets | nindent 8 }}
 ---
 apiVersion: policy/v1
 kind: PodDisruptionBudget
