@@ -1,6 +1,6 @@
 # shellcheck shell=bash
 # Starts, watches and ends one server process: in goes its run folder and command, out comes a pid file, a log file and
-# a server that answers. Sourced by the file of every service, which sets `name`, `service`, `run` and `log`.
+# a server that answers. Sourced by the file of every service, after which it is named.
 set -euo pipefail
 
 # The folder of these files, for those that source this one.
