@@ -139,8 +139,8 @@ check_unit() {
         sed 's|^ExecStart=[^ ]*|ExecStart=/bin/true|' "$unit" >"$work/${unit/@/@tile-server}"
         checked "systemd-analyze verify $unit" systemd-analyze verify "$work/${unit/@/@tile-server}"
     done
-    sed 's|^NoNewPrivileges|NoNewPriviliges|' "$work/fluxglobe.service" >"$work/fault.service"
-    refused 'systemd-analyze verify' NoNewPriviliges unit_without_remarks "$work/fault.service"
+    sed 's|^NoNewPrivileges|NoNewRights|' "$work/fluxglobe.service" >"$work/fault.service"
+    refused 'systemd-analyze verify' NoNewRights unit_without_remarks "$work/fault.service"
 }
 
 # systemd-analyze only remarks on unknown names.
