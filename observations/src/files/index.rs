@@ -1,0 +1,147 @@
+//! The numbered index of a dataset: which file holds which month. The newest number is what readers see.
+
+use bytes::Bytes;
+use contract::key::ObjectKey;
+use contract::product::ProductId;
+use contract::time::TimeMs;
+use serde::{Deserialize, Serialize};
+use storage::{StorageError, Store};
+
+use super::Rows;
+use crate::error::ObservationError;
+
+/// Version of the index's JSON.
+const SCHEMA: u32 = 1;
+/// Folder of the indexes.
+const FOLDER: &str = "observation-indexes";
+
+/// One version of one dataset.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Index {
+    schema: u32,
+    dataset: ProductId,
+    /// 1, 2, 3 ... in the order of commits.
+    number: u64,
+    /// In the order of time.
+    pub(super) months: Vec<Month>,
+}
+
+/// One month of a dataset.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Month {
+    year: i32,
+    /// 1 to 12.
+    month: u32,
+    /// GeoParquet.
+    pub(super) file: ObjectKey,
+    rows: u64,
+    /// Time of its first row.
+    pub(super) first: TimeMs,
+    /// Time of its last row.
+    pub(super) last: TimeMs,
+    /// West, south, east, north of its places.
+    pub(super) bounds_deg: [f64; 4],
+}
+
+impl Index {
+    /// The first index of a dataset, still without a month.
+    pub(super) fn first(dataset: ProductId) -> Self {
+        Self {
+            schema: SCHEMA,
+            dataset,
+            number: 1,
+            months: vec![],
+        }
+    }
+
+    /// The one after this.
+    pub(super) fn next(self) -> Self {
+        Self {
+            number: self.number + 1,
+            ..self
+        }
+    }
+}
+
+impl Month {
+    /// A month whose file holds these rows.
+    ///
+    /// # Panics
+    /// If there are no rows.
+    pub(super) fn new(year: i32, month: u32, file: ObjectKey, rows: &Rows) -> Self {
+        let first = rows
+            .keys()
+            .next()
+            .expect("a month is written with its first row");
+        let last = rows
+            .keys()
+            .next_back()
+            .expect("a month is written with its first row");
+        let start = [
+            f64::INFINITY,
+            f64::INFINITY,
+            f64::NEG_INFINITY,
+            f64::NEG_INFINITY,
+        ];
+        let bounds_deg = rows.values().fold(start, |[w, s, e, n], o| {
+            let (lon, lat) = (o.lon_deg, o.lat_deg);
+            [w.min(lon), s.min(lat), e.max(lon), n.max(lat)]
+        });
+        Self {
+            year,
+            month,
+            file,
+            rows: rows.len() as u64,
+            first: first.time,
+            last: last.time,
+            bounds_deg,
+        }
+    }
+
+    pub(super) fn year_month(&self) -> (i32, u32) {
+        (self.year, self.month)
+    }
+}
+
+/// Datasets that have an index, sorted by name.
+pub(super) async fn datasets(store: &Store) -> Result<Vec<ProductId>, ObservationError> {
+    let names = store.folders(FOLDER).await?;
+    Ok(names.iter().filter_map(|name| name.parse().ok()).collect())
+}
+
+/// The newest index of a dataset, if it has one.
+pub(super) async fn latest(
+    store: &Store,
+    dataset: &ProductId,
+) -> Result<Option<Index>, ObservationError> {
+    let keys = store.list(&format!("{FOLDER}/{dataset}")).await?;
+    let Some(key) = keys.last() else {
+        return Ok(None);
+    };
+    let damaged = |reason: String| ObservationError::damaged(key.as_str(), reason);
+    let content = store.get(key).await?;
+    let index: Index = serde_json::from_slice(&content).map_err(|e| damaged(e.to_string()))?;
+    if index.schema != SCHEMA {
+        return Err(damaged(format!(
+            "schema {} is unknown, this program reads {SCHEMA}",
+            index.schema
+        )));
+    }
+    Ok(Some(index))
+}
+
+/// Publishes an index whose files are all durable; false if another writer took its number.
+///
+/// An equal index of another writer is a lost race too: what this writer brought was there before it.
+pub(super) async fn commit(store: &Store, index: &Index) -> Result<bool, ObservationError> {
+    let name = format!("{FOLDER}/{}/{:010}.json", index.dataset, index.number);
+    let key: ObjectKey = name.parse()?;
+    let json = serde_json::to_vec(index).map_err(|e| ObservationError::damaged(&name, e))?;
+    match store.put_new(&key, Bytes::from(json)).await {
+        Ok(is_new) => Ok(is_new),
+        Err(StorageError::Conflict { .. }) => Ok(false),
+        Err(e) => Err(e.into()),
+    }
+}

@@ -1,0 +1,30 @@
+//! Observations of buoys, ships, stations and profiles: kept and queried in PostGIS or in GeoParquet files.
+//!
+//! ```text
+//! observation events, observation files -> upsert -> [PostGIS | GeoParquet] -> query, platforms, track
+//! ```
+//! One trait, [`ObservationStore`], and one suite of tests for both homes: the same calls give the same answers, byte for
+//! byte as JSON. Left out on purpose: reading files (ingest) and comparing with grids (compute).
+
+mod area;
+mod batch;
+mod error;
+mod files;
+mod filter;
+mod key;
+mod platform;
+mod postgis;
+mod service;
+mod settings;
+mod store;
+mod track;
+
+pub use error::{ErrorClass, ObservationError};
+pub use files::FileStore;
+pub use filter::{Filter, MAX_LIMIT, Page, PageToken};
+pub use platform::Platform;
+pub use postgis::PostgisStore;
+pub use service::ObservationService;
+pub use settings::{DatabaseSettings, ObservationSettings};
+pub use store::{Counts, ObservationStore, open};
+pub use track::{TrackPoint, TrackQuery};

@@ -1,0 +1,88 @@
+//! Observations in PostGIS: a table with a natural key, asked in the order of that key.
+
+mod pool;
+mod question;
+mod row;
+mod upsert;
+
+use async_trait::async_trait;
+use contract::observation::Observation;
+use tokio_postgres::types::ToSql;
+
+use crate::batch;
+use crate::error::ObservationError;
+use crate::filter::{Filter, Page};
+use crate::platform::Platform;
+use crate::settings::DatabaseSettings;
+use crate::store::{Counts, ObservationStore};
+use crate::track::{TrackPoint, TrackQuery};
+use pool::Connections;
+use question::Question;
+
+/// Observations in a PostGIS database; clones share its connections.
+#[derive(Clone)]
+pub struct PostgisStore {
+    connections: Connections,
+}
+
+impl PostgisStore {
+    /// A store that connects, and brings the tables to this version, with its first call.
+    pub fn new(settings: &DatabaseSettings) -> Result<Self, ObservationError> {
+        Ok(Self {
+            connections: Connections::new(settings)?,
+        })
+    }
+
+    async fn rows(
+        &self,
+        action: &'static str,
+        question: &Question<'_>,
+    ) -> Result<Vec<tokio_postgres::Row>, ObservationError> {
+        let parameters: Vec<&(dyn ToSql + Sync)> = question.parameters();
+        let client = self.connections.client().await?;
+        let asked = client.query(question.sql(), &parameters);
+        let answer = self.connections.within(asked).await;
+        self.connections.settle(action, client, answer)
+    }
+}
+
+#[async_trait]
+impl ObservationStore for PostgisStore {
+    async fn upsert(&self, observations: &[Observation]) -> Result<Counts, ObservationError> {
+        let batch = batch::prepare(observations)?;
+        let mut counts = Counts::default();
+        for part in batch.chunks(upsert::ROWS) {
+            counts += upsert::run(&self.connections, part).await?;
+        }
+        Ok(counts)
+    }
+
+    async fn query(&self, filter: &Filter) -> Result<Page, ObservationError> {
+        let checked = filter.checked()?;
+        let question = question::observations(&checked);
+        let rows = self.rows("reading observations", &question).await?;
+        let observations = rows
+            .iter()
+            .map(row::observation)
+            .collect::<Result<_, _>>()?;
+        Ok(Page::cut(observations, filter.limit))
+    }
+
+    async fn platforms(&self, filter: &Filter) -> Result<Vec<Platform>, ObservationError> {
+        let checked = filter.checked()?;
+        let question = question::platforms(&checked);
+        let rows = self.rows("reading platforms", &question).await?;
+        rows.iter().map(row::platform).collect()
+    }
+
+    async fn track(&self, query: &TrackQuery) -> Result<Vec<TrackPoint>, ObservationError> {
+        query.validate()?;
+        let question = question::track(query);
+        let rows = self.rows("reading a track", &question).await?;
+        rows.iter().map(row::track_point).collect()
+    }
+
+    async fn ready(&self) -> Result<(), ObservationError> {
+        self.connections.ready().await
+    }
+}

@@ -1,0 +1,70 @@
+//! The one trait of both homes of observations, and which home a setting means.
+
+use std::sync::Arc;
+
+use async_trait::async_trait;
+use contract::observation::Observation;
+use serde::{Deserialize, Serialize};
+use storage::Store;
+
+use crate::error::ObservationError;
+use crate::files::FileStore;
+use crate::filter::{Filter, Page};
+use crate::platform::Platform;
+use crate::postgis::PostgisStore;
+use crate::settings::ObservationSettings;
+use crate::track::{TrackPoint, TrackQuery};
+
+/// What became of the observations of one call; of several of one name only the last is counted.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Counts {
+    /// Names that were not there before.
+    pub new: u64,
+    /// Names that said something else before.
+    pub replaced: u64,
+    /// Names that said the same before; nothing was written for them.
+    pub same: u64,
+}
+
+impl std::ops::AddAssign for Counts {
+    fn add_assign(&mut self, other: Self) {
+        self.new += other.new;
+        self.replaced += other.replaced;
+        self.same += other.same;
+    }
+}
+
+/// Where observations are kept.
+#[async_trait]
+pub trait ObservationStore: Send + Sync {
+    /// Stores observations; one of a name that is there replaces it. Durable when this returns. After an error some may
+    /// be stored and some not: the same call again makes it whole.
+    ///
+    /// # Errors
+    /// An observation that breaks a limit (then none is stored), or a store that does not answer.
+    async fn upsert(&self, observations: &[Observation]) -> Result<Counts, ObservationError>;
+
+    /// Observations by time, dataset, platform, property and depth, a page at a time.
+    async fn query(&self, filter: &Filter) -> Result<Page, ObservationError>;
+
+    /// The platforms of the observations that a filter wants, by dataset and name, at most its limit; `after` is not
+    /// looked at.
+    async fn platforms(&self, filter: &Filter) -> Result<Vec<Platform>, ObservationError>;
+
+    /// The way of a platform in the order of time, one place for each time.
+    async fn track(&self, query: &TrackQuery) -> Result<Vec<TrackPoint>, ObservationError>;
+
+    /// Can observations be stored and asked for now? Answers within two seconds.
+    async fn ready(&self) -> Result<(), ObservationError>;
+}
+
+/// The home that the settings name: a database, or files in the object store. Nothing is connected to yet.
+pub fn open(
+    settings: &ObservationSettings,
+    store: &Store,
+) -> Result<Arc<dyn ObservationStore>, ObservationError> {
+    match settings.database()? {
+        Some(database) => Ok(Arc::new(PostgisStore::new(&database)?)),
+        None => Ok(Arc::new(FileStore::new(store.clone()))),
+    }
+}
