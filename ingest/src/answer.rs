@@ -62,7 +62,10 @@ impl Asked {
         prepared: Prepared,
     ) -> Result<Ready, IngestError> {
         Ok(match prepared {
-            Prepared::Stored(granule) => Ready::ToCommit(granule),
+            Prepared::Stored(granule) => Ready::ToCommit(StoredGranule {
+                asked_by: self.origin,
+                ..granule
+            }),
             Prepared::Rejected(rejection) => Ready::Answered(self.refused(rejection)),
             Prepared::Observed(stored) => {
                 let file = self.file();
@@ -100,26 +103,17 @@ pub(crate) async fn commit(
         return Ok(vec![]);
     };
     let product = &first.target.product;
-    let mut noted_before = Vec::with_capacity(batch.len());
-    for (asked, granule) in batch {
-        noted_before.push(match asked.origin {
-            Some(origin) => landing_note::note(store, product, granule.raw_sha256, origin).await?,
-            None => true,
-        });
-    }
     let granules: Vec<StoredGranule> = batch
         .iter()
         .map(|(_, granule)| (*granule).clone())
         .collect();
     let committed = commit::run(store, product, &granules).await?;
-    let told = committed.into_iter().zip(batch).zip(noted_before);
-    let answer =
-        |((committed, (asked, granule)), noted_before): ((_, &(&Asked, &StoredGranule)), bool)| {
-            let is_due = noted_before || !matches!(committed, Committed::AlreadyLanded { .. });
-            let raw_sha256 = Some(granule.raw_sha256);
-            asked.answer(outcome(asked.file(), committed), raw_sha256, is_due)
-        };
-    Ok(told.map(answer).collect())
+    let answer = |(committed, (asked, granule)): (Committed, &(&Asked, &StoredGranule))| {
+        let is_due = !matches!(committed, Committed::AlreadyLanded { is_due: false, .. });
+        let raw_sha256 = Some(granule.raw_sha256);
+        asked.answer(outcome(asked.file(), committed), raw_sha256, is_due)
+    };
+    Ok(committed.into_iter().zip(batch).map(answer).collect())
 }
 
 fn outcome(file: PathBuf, committed: Committed) -> Outcome {
@@ -134,7 +128,9 @@ fn outcome(file: PathBuf, committed: Committed) -> Outcome {
             periods,
             revised,
         },
-        Committed::AlreadyLanded { manifest, periods } => Outcome::AlreadyLanded {
+        Committed::AlreadyLanded {
+            manifest, periods, ..
+        } => Outcome::AlreadyLanded {
             file,
             manifest,
             periods,

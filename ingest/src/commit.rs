@@ -16,6 +16,7 @@ use contract::time::Period;
 use storage::{StorageError, Store, manifests};
 
 use crate::error::IngestError;
+use crate::landing_note;
 use crate::put::StoredGranule;
 use crate::rejection::Rejection;
 use merge::{Change, Merged};
@@ -37,6 +38,8 @@ pub(crate) enum Committed {
     AlreadyLanded {
         manifest: ManifestId,
         periods: Vec<Period>,
+        /// Is it this file's notice that has to tell?
+        is_due: bool,
     },
     Rejected(Rejection),
 }
@@ -69,6 +72,7 @@ async fn publish(
         .with_max_times(MAX_TRIES as usize)
         .with_jitter()
         .build();
+    let mut notes = Notes::of(store, product, granules);
     for pause in pauses {
         let newest = manifests::latest(store, product)
             .await
@@ -76,8 +80,9 @@ async fn publish(
         let merged = merge::merge(newest.as_ref(), granules);
         let manifest = match (&newest, merged.is_changed()) {
             (Some(newest), false) => newest.clone(),
-            (None, false) => return Ok(outcomes(&merged, granules, None)),
+            (None, false) => return outcomes(&merged, &notes, None).await,
             (newest, true) => {
+                notes.note(&merged).await?;
                 let manifest = build(store, product, newest.as_ref(), &merged, granules).await?;
                 match manifests::commit(store, &manifest).await {
                     Ok(()) => manifest,
@@ -94,7 +99,7 @@ async fn publish(
                 }
             }
         };
-        return Ok(outcomes(&merged, granules, Some(&manifest.id())));
+        return outcomes(&merged, &notes, Some(&manifest.id())).await;
     }
     Err(IngestError::Contended {
         product: product.to_string(),
@@ -133,14 +138,63 @@ async fn build(
     })
 }
 
-fn outcomes(
+/// What is noted of the files of a commit: whether it was noted before, once that is known.
+struct Notes<'a> {
+    store: &'a Store,
+    product: &'a ProductId,
+    granules: &'a [StoredGranule],
+    before: Vec<Option<bool>>,
+}
+
+impl<'a> Notes<'a> {
+    fn of(store: &'a Store, product: &'a ProductId, granules: &'a [StoredGranule]) -> Self {
+        Self {
+            store,
+            product,
+            granules,
+            before: vec![None; granules.len()],
+        }
+    }
+
+    /// Notes the files that are about to be published.
+    async fn note(&mut self, merged: &Merged) -> Result<(), IngestError> {
+        for (index, change) in merged.changes.iter().enumerate() {
+            let granule = &self.granules[index];
+            if let (Change::Taken { .. }, None, Some(origin)) =
+                (change, self.before[index], granule.asked_by)
+            {
+                let noted =
+                    landing_note::note(self.store, self.product, granule.raw_sha256, origin);
+                self.before[index] = Some(noted.await?);
+            }
+        }
+        Ok(())
+    }
+
+    /// Is it the notice of a file that was there that has to tell of it?
+    async fn is_due(&self, index: usize) -> Result<bool, IngestError> {
+        let granule = &self.granules[index];
+        match (self.before[index], granule.asked_by) {
+            // Noted just now, but somebody else was faster, and tells.
+            (Some(before), _) => Ok(before),
+            (None, Some(origin)) => {
+                landing_note::is_noted(self.store, self.product, granule.raw_sha256, origin).await
+            }
+            (None, None) => Ok(true),
+        }
+    }
+}
+
+async fn outcomes(
     merged: &Merged,
-    granules: &[StoredGranule],
+    notes: &Notes<'_>,
     manifest: Option<&ManifestId>,
-) -> Vec<Committed> {
-    let outcome = |(change, granule): (&Change, &StoredGranule)| {
-        let periods = granule.grids.iter().map(|g| g.step.period).collect();
-        match (change, manifest) {
+) -> Result<Vec<Committed>, IngestError> {
+    let mut all = Vec::with_capacity(merged.changes.len());
+    for (index, change) in merged.changes.iter().enumerate() {
+        let grids = &notes.granules[index].grids;
+        let periods = grids.iter().map(|g| g.step.period).collect();
+        all.push(match (change, manifest) {
             (Change::Taken { revised }, Some(manifest)) => Committed::Landed {
                 manifest: manifest.clone(),
                 periods,
@@ -149,12 +203,13 @@ fn outcomes(
             (Change::Same, Some(manifest)) => Committed::AlreadyLanded {
                 manifest: manifest.clone(),
                 periods,
+                is_due: notes.is_due(index).await?,
             },
             (Change::Refused(rejection), _) => Committed::Rejected(rejection.clone()),
             (Change::Taken { .. } | Change::Same, None) => {
                 unreachable!("a file that is taken or there has a manifest")
             }
-        }
-    };
-    merged.changes.iter().zip(granules).map(outcome).collect()
+        });
+    }
+    Ok(all)
 }

@@ -10,6 +10,7 @@ mod health;
 mod insist;
 mod settings;
 mod shift;
+mod work;
 
 use std::future::Future;
 use std::path::PathBuf;

@@ -5,8 +5,8 @@
 //! event is still due, or by another one, which has told of it or will? The note tells: a notice that finds its own note
 //! tells of the file; one that does not is a duplicate, and is finished in silence.
 //!
-//! Two notices of one file that are worked on at the same time may both have noted it; then the one that found the file
-//! published by the other is silent, unless its process dies just then. Nothing is ever left untold.
+//! Two processes that publish one file of two notices at the same moment have both noted it; the one that was slower is
+//! silent, unless it dies just then: then both tell. Nothing is ever left untold.
 
 use bytes::Bytes;
 use contract::digest::Digest;

@@ -154,6 +154,7 @@ impl Pipeline<'_> {
             grid: mapping.grid,
             raw_sha256,
             grids,
+            asked_by: None,
         }))
     }
 

@@ -152,10 +152,11 @@ impl Profile {
         }
         if let Some(TimeRules {
             from: TimeSource::FileName(pattern),
+            year,
             ..
         }) = &profile.time
         {
-            pattern::check(pattern).map_err(bad)?;
+            pattern::check(pattern, year.is_some()).map_err(bad)?;
         }
         if let Some(stated) = &profile.grid.stated {
             stated.grid.validate()?;

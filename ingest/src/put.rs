@@ -5,6 +5,7 @@ use contract::grid::Grid;
 use contract::key::ObjectKey;
 use contract::manifest::Step;
 use contract::product::ProductId;
+use contract::topic::Origin;
 use storage::Store;
 
 use crate::encode::EncodedGrid;
@@ -26,6 +27,8 @@ pub(crate) struct StoredGranule {
     pub(crate) raw_sha256: Digest,
     /// In the order of time.
     pub(crate) grids: Vec<StoredGrid>,
+    /// The notice that it came with; none for files that no notice came for.
+    pub(crate) asked_by: Option<Origin>,
 }
 
 /// Stores the file as it came.

@@ -79,14 +79,50 @@ pub async fn survey(files: &[PathBuf], settings: &Settings) -> Result<Vec<Row>, 
         let folder = file.parent().unwrap_or(Path::new(""));
         sets.entry(folder).or_default().push(file.clone());
     }
+    let folders: Vec<&Path> = sets.keys().copied().collect();
     let mut rows = Vec::with_capacity(files.len());
-    for files in sets.into_values() {
-        rows.extend(survey_set(files, settings).await?);
+    for (folder, files) in sets {
+        let set = set_name(folder, &folders);
+        for (asked, profile, outcome) in survey_set(files, settings).await? {
+            let file = asked
+                .file()
+                .file_name()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into_owned();
+            rows.push(Row {
+                set: set.clone(),
+                file,
+                profile,
+                outcome,
+            });
+        }
     }
     Ok(rows)
 }
 
-async fn survey_set(files: Vec<PathBuf>, settings: &Settings) -> Result<Vec<Row>, IngestError> {
+/// The last parts of a folder's path that tell it from the others; a year alone is no name.
+fn set_name(folder: &Path, folders: &[&Path]) -> String {
+    let parts: Vec<_> = folder.components().collect();
+    let name = |parts: &[std::path::Component<'_>]| parts.iter().collect::<PathBuf>();
+    for first in (0..parts.len()).rev() {
+        let own = name(&parts[first..]);
+        let is_shared = folders.iter().filter(|other| other.ends_with(&own)).count() > 1;
+        let text = own.display().to_string();
+        if !is_shared && !text.bytes().all(|b| b.is_ascii_digit()) {
+            return text;
+        }
+    }
+    folder.display().to_string()
+}
+
+/// A file, the profile that it was read with, and what became of it.
+type Surveyed = (Asked, Option<String>, Outcome);
+
+async fn survey_set(
+    files: Vec<PathBuf>,
+    settings: &Settings,
+) -> Result<Vec<Surveyed>, IngestError> {
     let (store, gates, metrics) = (Store::memory(), Gates::new(settings), Metrics::unseen());
     let pipeline = Pipeline {
         store: &store,
@@ -101,29 +137,24 @@ async fn survey_set(files: Vec<PathBuf>, settings: &Settings) -> Result<Vec<Row>
         files,
         ..Batch::default()
     }) {
-        rows.push(survey_file(&pipeline, &asked).await?);
+        let (profile, outcome) = survey_file(&pipeline, &asked).await?;
+        rows.push((asked, profile, outcome));
     }
     Ok(rows)
 }
 
-async fn survey_file(pipeline: &Pipeline<'_>, asked: &Asked) -> Result<Row, IngestError> {
-    let (profile, outcome) = match land::prepare(pipeline, asked).await? {
+async fn survey_file(
+    pipeline: &Pipeline<'_>,
+    asked: &Asked,
+) -> Result<(Option<String>, Outcome), IngestError> {
+    Ok(match land::prepare(pipeline, asked).await? {
         Ready::Answered(answer) => (None, answer.outcome),
         Ready::ToCommit(granule) => {
             let answers = land::commit(pipeline, &[(asked, &granule)]).await?;
-            let profile = granule.target.profile;
             let outcome = answers.into_iter().next().map(|answer| answer.outcome);
-            (profile, outcome.expect("one file has one answer"))
+            let outcome = outcome.expect("one file has one answer");
+            (granule.target.profile, outcome)
         }
-    };
-    let path = asked.file();
-    let name =
-        |path: Option<&std::ffi::OsStr>| path.unwrap_or_default().to_string_lossy().into_owned();
-    Ok(Row {
-        set: name(path.parent().and_then(Path::file_name)),
-        file: name(path.file_name()),
-        profile,
-        outcome,
     })
 }
 
@@ -201,6 +232,13 @@ mod tests {
     use super::*;
     use crate::rejection::Rejection;
     use contract::event::RejectReason;
+
+    #[test]
+    fn sets_are_told_apart_by_the_last_parts_of_their_paths() {
+        let folders = ["/a/SST/2010", "/a/wind/2010", "/a/ice/2011", "/a/x"].map(Path::new);
+        let names = folders.map(|folder| set_name(folder, &folders));
+        assert_eq!(names, ["SST/2010", "wind/2010", "ice/2011", "x"]);
+    }
 
     #[test]
     fn files_that_fared_alike_are_one_line() {

@@ -3,26 +3,22 @@
 
 use std::collections::BTreeMap;
 use std::future::Future;
-use std::pin::{Pin, pin};
 use std::sync::Arc;
 use std::time::Duration;
 
-use contract::product::ProductId;
 use contract::topic::Origin;
 use futures::FutureExt as _;
 use futures::future::Shared;
-use futures::stream::{FuturesUnordered, StreamExt as _};
+use futures::stream::StreamExt as _;
 use storage::log::{Finished, Message, Reader};
 use tokio::time::Instant;
 use tracing::Instrument as _;
 
 use super::bench::{Bench, Number};
-use super::health::Health;
-use super::insist::insist;
+use super::work::{self, Done, Work, alongside};
 use super::{GROUP, IngestService, TOPIC, now};
-use crate::answer::{Answer, Asked, Ready, blame};
+use crate::answer::{Answer, Asked, Ready};
 use crate::error::IngestError;
-use crate::land;
 use crate::metrics;
 use crate::notice::Notice;
 use crate::outcome::Outcome;
@@ -35,14 +31,6 @@ const IDLE_WAIT: Duration = Duration::from_millis(250);
 /// And while something is: bounds how late what is done is finished.
 const BUSY_WAIT: Duration = Duration::from_millis(20);
 
-type Work<'a> = FuturesUnordered<Pin<Box<dyn Future<Output = Done> + Send + 'a>>>;
-
-/// A piece of work that ended.
-enum Done {
-    Prepared(Number, Ready),
-    Published(ProductId, Vec<(Number, Answer)>),
-}
-
 /// A file that is under way.
 struct Job {
     asked: Arc<Asked>,
@@ -53,6 +41,7 @@ struct Job {
 /// A message some of whose files are under way.
 struct Open {
     origin: Origin,
+    trace: String,
     /// In the order of its files.
     answers: Vec<(Number, Option<Answer>)>,
     running: service::Running,
@@ -89,7 +78,7 @@ pub(super) async fn run(
         jobs: BTreeMap::new(),
         open: BTreeMap::new(),
         next: 0,
-        work: FuturesUnordered::new(),
+        work: Work::new(),
         done: Vec::new(),
         finished: Vec::new(),
     };
@@ -148,7 +137,9 @@ impl<'a> Shift<'a> {
     fn begin(&mut self, message: &Message) {
         let number = self.count();
         let mut answers = Vec::new();
+        let mut trace = String::new();
         for notice in Notice::of(message, &self.service.settings, now()) {
+            trace.clone_from(&notice.cause.trace);
             let job = self.count();
             answers.push((job, None));
             self.bench.add(job, notice.order_key.clone());
@@ -157,7 +148,7 @@ impl<'a> Shift<'a> {
                 origin: Some(message.origin),
             });
             let span = tracing::info_span!("notice", trace = asked.notice.cause.trace, origin = %message.origin);
-            let work = prepare(self.pipeline, &self.service.health, job, Arc::clone(&asked));
+            let work = work::prepare(self.pipeline, &self.service.health, job, Arc::clone(&asked));
             self.work.push(Box::pin(work.instrument(span)));
             self.jobs.insert(
                 job,
@@ -169,6 +160,7 @@ impl<'a> Shift<'a> {
         }
         let open = Open {
             origin: message.origin,
+            trace,
             answers,
             running: self.service.metrics.start("notice"),
         };
@@ -238,7 +230,7 @@ impl<'a> Shift<'a> {
                 let asked = Arc::clone(&self.jobs.get(&number)?.asked);
                 Some((number, asked, granule))
             });
-            let work = publish(
+            let work = work::publish(
                 self.pipeline,
                 &self.service.health,
                 product,
@@ -275,71 +267,14 @@ impl<'a> Shift<'a> {
     }
 }
 
-/// Polls the work that is under way while something else is waited for, which is never cancelled.
-async fn alongside<T>(
-    work: &mut Work<'_>,
-    done: &mut Vec<Done>,
-    main: impl Future<Output = T>,
-) -> T {
-    let mut main = pin!(main);
-    loop {
-        tokio::select! {
-            biased;
-            result = &mut main => return result,
-            Some(one) = work.next() => done.push(one),
-        }
-    }
-}
-
-async fn prepare(
-    pipeline: Pipeline<'_>,
-    health: &Health,
-    number: Number,
-    asked: Arc<Asked>,
-) -> Done {
-    let ready = insist(health, "prepare", || land::prepare(&pipeline, &asked)).await;
-    let ready = ready.unwrap_or_else(|error| Ready::Answered(asked.refused(blame(&error))));
-    Done::Prepared(number, ready)
-}
-
-/// Publishes files of one product together; if that fails because of one of them, one by one.
-async fn publish(
-    pipeline: Pipeline<'_>,
-    health: &Health,
-    product: ProductId,
-    batch: Vec<(Number, Arc<Asked>, StoredGranule)>,
-) -> Done {
-    let pairs: Vec<_> = batch
-        .iter()
-        .map(|(_, asked, granule)| (asked.as_ref(), granule))
-        .collect();
-    let together = insist(health, "publish", || land::commit(&pipeline, &pairs)).await;
-    let answers = match together {
-        Ok(answers) => answers,
-        Err(error) if pairs.len() == 1 => vec![pairs[0].0.refused(blame(&error))],
-        Err(_) => {
-            let mut answers = Vec::with_capacity(pairs.len());
-            for pair in &pairs {
-                let own = std::slice::from_ref(pair);
-                let alone = insist(health, "publish", || land::commit(&pipeline, own)).await;
-                answers.extend(alone.unwrap_or_else(|error| vec![pair.0.refused(blame(&error))]));
-            }
-            answers
-        }
-    };
-    let numbers = batch.iter().map(|(number, _, _)| *number);
-    Done::Published(product, numbers.zip(answers).collect())
-}
-
 /// Counts and logs a message whose events are told.
 fn tell(open: Open, pipeline: Pipeline<'_>) {
     let mut ended = service::Outcome::Ok;
-    for answer in open.answers.into_iter().filter_map(|(_, answer)| answer) {
-        let Answer { outcome, event } = answer;
-        let trace = event
-            .as_ref()
-            .map(|event| event.trace.as_str())
-            .unwrap_or_default();
+    for (_, answer) in open.answers {
+        let Some(Answer { outcome, event }) = answer else {
+            continue;
+        };
+        let trace = open.trace.as_str();
         let noticed = event.as_ref().and_then(|event| event.noticed);
         match &outcome {
             Outcome::Rejected { reason, .. } => {

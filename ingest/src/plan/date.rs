@@ -59,8 +59,12 @@ pub(super) fn of_attribute(text: &str) -> Option<CalendarDate> {
         .map(of_instant)
 }
 
-/// The date in a file name that fits a pattern.
-pub(super) fn of_file_name(pattern: &str, file_name: &str) -> Result<CalendarDate, Rejection> {
+/// The date in a file name that fits a pattern; `year` where the name has none.
+pub(super) fn of_file_name(
+    pattern: &str,
+    file_name: &str,
+    year: Option<i32>,
+) -> Result<CalendarDate, Rejection> {
     let bad = || {
         let detail = format!(
             "does not fit the profile's pattern {pattern:?}; rename it or give the profile that fits"
@@ -68,7 +72,8 @@ pub(super) fn of_file_name(pattern: &str, file_name: &str) -> Result<CalendarDat
         Rejection::new(RejectReason::Time, "file name", detail)
     };
     let found = pattern::date(pattern, file_name).ok_or_else(bad)?;
-    let year = found.year.ok_or_else(bad)? as i32;
+    let named = found.year.map(|year| year as i32);
+    let year = named.or(year).ok_or_else(bad)?;
     if let Some(day_of_year) = found.day_of_year {
         let first = TimeMs::from_ymd(year, 1, 1).map_err(|_no_year| bad())?;
         let time = TimeMs::new(first.ms() + i64::from(day_of_year - 1) * DAY_MS);
@@ -108,10 +113,12 @@ mod tests {
 
     #[test]
     fn a_file_name_gives_month_or_day_of_year() {
-        let found = of_file_name("M{year}{day_of_year}*", "M2001060.nc").unwrap();
+        let found = of_file_name("M{year}{day_of_year}*", "M2001060.nc", None).unwrap();
         assert_eq!((found.year, found.month, found.day), (2001, 3, 1));
+        let found = of_file_name("s{month}.nc", "s07.nc", Some(2011)).unwrap();
+        assert_eq!((found.year, found.month), (2011, 7));
         assert!(
-            of_file_name("{year}{month}*", "nothing.nc")
+            of_file_name("{year}{month}*", "nothing.nc", None)
                 .unwrap_err()
                 .detail
                 .contains("pattern")

@@ -86,7 +86,9 @@ async fn by_rules(
                     .ok_or_else(|| refused(name, format!("says {text:?}, which is no date")))?,
             ]
         }
-        TimeSource::FileName(pattern) => vec![date::of_file_name(pattern, planning.file_name)?],
+        TimeSource::FileName(pattern) => {
+            vec![date::of_file_name(pattern, planning.file_name, rules.year)?]
+        }
         TimeSource::MonthNumber => {
             let year = rules
                 .year

@@ -44,15 +44,15 @@ impl Field {
     }
 }
 
-/// Is a pattern of a date well formed: known fields, a year?
-pub(crate) fn check(pattern: &str) -> Result<(), String> {
+/// Is a pattern of a date well formed: known fields, a year unless it is known already?
+pub(crate) fn check(pattern: &str, knows_year: bool) -> Result<(), String> {
     let pieces = pieces(pattern)?;
     let has = |field| pieces.contains(&Piece::Number(field));
-    if has(Field::Year) && (has(Field::Month) || has(Field::DayOfYear)) {
+    if (knows_year || has(Field::Year)) && (has(Field::Month) || has(Field::DayOfYear)) {
         Ok(())
     } else {
         Err(format!(
-            "file_name pattern {pattern:?} needs {{year}} and {{month}} or {{day_of_year}}"
+            "file_name pattern {pattern:?} needs {{year}} (or a year beside it) and {{month}} or {{day_of_year}}"
         ))
     }
 }
@@ -196,7 +196,8 @@ mod tests {
     #[test]
     fn patterns_without_a_date_are_refused() {
         for pattern in ["*.nc", "{year}.nc", "{month}.nc", "{yaer}{month}"] {
-            assert!(check(pattern).is_err(), "{pattern}");
+            assert!(check(pattern, false).is_err(), "{pattern}");
         }
+        assert!(check("s{month}.nc", true).is_ok() && check("*.nc", true).is_err());
     }
 }

@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 use super::Profile;
 
 /// Name and text of each, in the order in which they are tried.
-const TEXTS: [(&str, &str); 14] = [
+const TEXTS: [(&str, &str); 19] = [
     (
         "takahashi09-flux",
         include_str!("../../profiles/takahashi09-flux.toml"),
@@ -36,6 +36,26 @@ const TEXTS: [(&str, &str); 14] = [
     (
         "rain-gpcp-2010",
         include_str!("../../profiles/rain-gpcp-2010.toml"),
+    ),
+    (
+        "woa18-salinity",
+        include_str!("../../profiles/woa18-salinity.toml"),
+    ),
+    (
+        "reynolds-sst",
+        include_str!("../../profiles/reynolds-sst.toml"),
+    ),
+    (
+        "ccmp-wind",
+        include_str!("../../profiles/ccmp-wind.toml"),
+    ),
+    (
+        "ostia-sst-climatology",
+        include_str!("../../profiles/ostia-sst-climatology.toml"),
+    ),
+    (
+        "air-pressure-oceanflux",
+        include_str!("../../profiles/air-pressure-oceanflux.toml"),
     ),
     (
         "china-sea-synthetic",

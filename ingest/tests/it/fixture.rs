@@ -277,6 +277,19 @@ pub(crate) async fn series_maps(
     maps
 }
 
+/// Opens an HDF5 file for writing that was closed just now. The library's lock on it can outlive the closing for a moment:
+/// a reader process that another test was starting meanwhile has it too until it runs its own program.
+pub(crate) fn open_again(path: &Path) -> hdf5::File {
+    let start = std::time::Instant::now();
+    loop {
+        match hdf5::File::open_rw(path) {
+            Ok(file) => return file,
+            Err(error) => assert!(start.elapsed().as_secs() < 10, "{error}"),
+        }
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+}
+
 /// Writes a text attribute.
 pub(crate) fn text(owner: &hdf5::Location, name: &str, value: &str) {
     let value: VarLenUnicode = value.parse().unwrap();

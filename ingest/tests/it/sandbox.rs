@@ -6,7 +6,7 @@ use contract::event::RejectReason;
 use hdf5::Extent;
 use ingest::{Batch, DecoderCommand, IngestError, Outcome, Quiet, Settings};
 
-use crate::fixture::{FILL, Place, SmallFile, refusal, settings, text};
+use crate::fixture::{FILL, Place, SmallFile, open_again, refusal, settings, text};
 
 /// Settings whose reader is a shell script; the file and the limits come as its arguments.
 fn scripted(script: &str) -> Settings {
@@ -116,7 +116,7 @@ async fn values_in_other_files_are_not_read() {
     file.name = "elsewhere";
     file.write_hdf5(&place.path("b.h5"));
     std::fs::write(place.path("secret"), [0x40u8; 128]).unwrap();
-    let open = hdf5::File::open_rw(place.path("b.h5")).unwrap();
+    let open = open_again(&place.path("b.h5"));
     let secret = place.path("secret");
     let dataset = open
         .new_dataset::<f32>()
@@ -161,7 +161,7 @@ async fn a_huge_chunk_is_refused_before_it_is_read() {
     let mut file = SmallFile::new();
     file.name = "small";
     file.write_hdf5(&place.path("chunk.h5"));
-    let open = hdf5::File::open_rw(place.path("chunk.h5")).unwrap();
+    let open = open_again(&place.path("chunk.h5"));
     let dataset = open
         .new_dataset::<f32>()
         .chunk([1, 30_000, 30_000])

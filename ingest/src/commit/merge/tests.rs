@@ -47,6 +47,7 @@ fn granule(content: &str, periods: &[Period]) -> StoredGranule {
         },
         grid: GRID,
         raw_sha256,
+        asked_by: None,
         grids: periods.iter().map(step).collect(),
     }
 }
