@@ -47,7 +47,7 @@ impl BatchService {
                 return;
             };
             tracing::warn!(%error, "render jobs cannot be read; trying again");
-            if begun.elapsed() > Duration::from_secs(60) {
+            if begun.elapsed() > Duration::from_mins(1) {
                 pauses = ::service::pauses();
             }
             let pause = pauses.next().unwrap_or(IDLE_WAIT);

@@ -22,7 +22,7 @@ pub const MOST_REPLY_BYTES: usize = 80 << 20;
 /// Metadata of a refusal: when to ask again, milliseconds.
 const RETRY_AFTER: &str = "retry-after-ms";
 /// A hint that is longer than this is a mistake or a trick.
-const LONGEST_HINT: Duration = Duration::from_secs(60);
+const LONGEST_HINT: Duration = Duration::from_mins(1);
 
 /// What two processes must have in common to exchange pictures.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -16,7 +16,7 @@ use tokio::task::JoinHandle;
 use tonic::transport::Channel;
 
 /// Anything that takes longer than this has failed.
-pub(crate) const LIMIT: Duration = Duration::from_secs(120);
+pub(crate) const LIMIT: Duration = Duration::from_mins(2);
 
 /// A running worker.
 pub(crate) struct Worker {
@@ -103,7 +103,9 @@ pub(crate) async fn until(what: &str, is_so: impl Fn() -> bool) {
 pub(crate) fn metric(registry: &Registry, name: &str, labels: &[(&str, &str)]) -> u64 {
     let families = registry.gather();
     let family = families.iter().find(|family| family.name() == name);
-    let series = family.map(|family| family.get_metric()).unwrap_or_default();
+    let series = family
+        .map(prometheus::proto::MetricFamily::get_metric)
+        .unwrap_or_default();
     let fits = |m: &&prometheus::proto::Metric| {
         let has = |(name, value): &(&str, &str)| {
             let labels = m.get_label();
