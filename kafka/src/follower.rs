@@ -43,7 +43,8 @@ impl KafkaFollower {
         start: Start,
     ) -> Result<Self, KafkaFailure> {
         const STEP: &str = "following a topic";
-        // Asked for now and not when fetching begins: what is appended after this call is seen.
+        // Asked for now and not when fetching begins: what is appended after this call is seen. So is what is in an open
+        // transaction; one that was committed a moment ago may still count as open.
         let bounds = probe.bounds(topic).await?;
         let name = cluster.topic(topic);
         let context = Context::default();

@@ -22,6 +22,9 @@ pub(crate) const READY_LIMIT: Duration = Duration::from_secs(2);
 /// How long they may take for everything else that is asked.
 pub(crate) const ASK_LIMIT: Duration = Duration::from_secs(10);
 
+/// Pause before a partition is asked for again.
+const AGAIN_PAUSE: Duration = Duration::from_millis(50);
+
 /// How a topic is there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Found {
@@ -116,11 +119,20 @@ pub(crate) fn bounds<C: ClientContext>(
     partition: u32,
     until: Instant,
 ) -> Result<(u64, u64), KafkaFailure> {
-    let left = until.saturating_duration_since(Instant::now());
-    let (low, high) = client
-        .fetch_watermarks(topic, partition as i32, left)
-        .map_err(|e| context.failure("looking for the ends of a topic", e))?;
-    Ok((low.max(0) as u64, high.max(0) as u64))
+    loop {
+        let left = until.saturating_duration_since(Instant::now());
+        match client.fetch_watermarks(topic, partition as i32, left) {
+            Ok((low, high)) => return Ok((low.max(0) as u64, high.max(0) as u64)),
+            Err(error) => {
+                let failure = context.failure("looking for the ends of a topic", error);
+                // A broker that was just made leader of a partition may not know it yet.
+                if left <= AGAIN_PAUSE || !failure.is_retryable() {
+                    return Err(failure);
+                }
+                std::thread::sleep(AGAIN_PAUSE);
+            }
+        }
+    }
 }
 
 fn find<C: ClientContext>(

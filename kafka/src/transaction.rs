@@ -22,6 +22,9 @@ const ABORT_LIMIT: Duration = Duration::from_secs(5);
 const FIRST_LIMIT: Duration = Duration::from_secs(10);
 /// Pause before a record is tried again that found the local queue full.
 const FULL_PAUSE: Duration = Duration::from_millis(10);
+/// How often, and after which pause, it is looked whether all reports are counted off.
+const COUNTED_OFF_TRIES: u32 = 20;
+const COUNTED_OFF_PAUSE: Duration = Duration::from_millis(1);
 /// Pause before a step is tried again that may succeed now.
 const AGAIN_PAUSE: Duration = Duration::from_millis(20);
 
@@ -160,6 +163,13 @@ impl Transactions {
                 Ok(Err((error, _record))) => return Err(self.context.failure(STEP, error)),
                 Err(_cancelled) => return Err(self.context.failure(STEP, KafkaError::Canceled)),
             }
+        }
+        // The last report is told a moment before it is counted off, and a commit that still counts it waits long.
+        for _ in 0..COUNTED_OFF_TRIES {
+            if self.producer.in_flight_count() == 0 {
+                break;
+            }
+            tokio::time::sleep(COUNTED_OFF_PAUSE).await;
         }
         Ok(())
     }

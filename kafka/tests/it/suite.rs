@@ -199,6 +199,8 @@ pub(crate) async fn a_follower_from_now_sees_what_comes_and_one_from_the_oldest_
     log: &dyn EventLog,
 ) {
     log.append(&notices("old", 3)).await.unwrap();
+    // What is durable may take a moment until it is seen.
+    assert_eq!(contents(log, FROM).await.unwrap().len(), 3);
     let mut now = log.follow(FROM, Start::Now).await.unwrap();
     let mut oldest = log.follow(FROM, Start::Oldest).await.unwrap();
     log.append(&notices("new", 3)).await.unwrap();
