@@ -63,7 +63,7 @@ impl Store {
                     return Err(failed(key, error));
                 }
                 None => {
-                    tracing::info!(%key, %error, "not there after a doubtful answer: sent again")
+                    tracing::info!(%key, %error, "not there after a doubtful answer: sent again");
                 }
             }
             tokio::time::sleep(pauses.next().unwrap_or(Patience::LONGEST_PAUSE)).await;

@@ -84,7 +84,7 @@ mod tests {
         store.put_new(&key, Bytes::from("x")).await.unwrap();
         let half = folder.path().join("a/c#123000001");
         std::fs::write(&half, "half").unwrap();
-        let hour = Duration::from_secs(3600);
+        let hour = Duration::from_hours(1);
         assert_eq!(store.remove_leftovers(hour).await.unwrap(), 0);
         assert!(half.exists());
         assert_eq!(store.remove_leftovers(Duration::ZERO).await.unwrap(), 1);

@@ -21,6 +21,15 @@ impl Patience {
     pub(super) const FIRST_PAUSE: Duration = Duration::from_millis(100);
     /// Longest pause: how late an answering store is noticed.
     pub(super) const LONGEST_PAUSE: Duration = Duration::from_secs(5);
+
+    /// For those whom somebody waits for: a store that is away is told of within seconds.
+    pub fn interactive() -> Self {
+        Self {
+            connect: Duration::from_secs(1),
+            request: Duration::from_secs(10),
+            retries: Duration::from_secs(2),
+        }
+    }
 }
 
 impl Default for Patience {
@@ -28,7 +37,7 @@ impl Default for Patience {
     fn default() -> Self {
         Self {
             connect: Duration::from_secs(5),
-            request: Duration::from_secs(60),
+            request: Duration::from_mins(1),
             retries: Duration::from_secs(90),
         }
     }

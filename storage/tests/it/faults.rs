@@ -75,7 +75,7 @@ async fn a_conflict_that_wrote_nothing_is_sent_again() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_server_that_fails_for_a_while_is_waited_for() {
-    let (proxy, store) = behind_proxy(Duration::from_secs(60)).await;
+    let (proxy, store) = behind_proxy(Duration::from_mins(1)).await;
     proxy.next("PUT", Fault::Status(500), 5);
     assert!(store.put_new(&key(), Bytes::from("one")).await.unwrap());
     proxy.next("GET", Fault::Status(503), 4);
@@ -123,7 +123,7 @@ async fn a_body_that_breaks_off_is_read_on() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn an_upload_in_parts_survives_faults_at_each_of_its_requests() {
-    let (proxy, store) = behind_proxy(Duration::from_secs(60)).await;
+    let (proxy, store) = behind_proxy(Duration::from_mins(1)).await;
     let content = noise(65 << 20, 5);
     let key = ObjectKey::raw(&"p".parse().unwrap(), &Digest::of(&content));
     proxy.next("POST", Fault::Status(500), 1);

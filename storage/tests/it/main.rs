@@ -3,6 +3,8 @@
 //! The S3 server and the file system are those that `deploy/services/services.sh` starts and names in the environment.
 //! Google's and Azure's clients are not run here, there is no server of theirs to be had: their settings and error
 //! texts are tested beside the code.
+#![expect(clippy::unwrap_used, reason = "a test ends where it cannot go on")]
+#![expect(clippy::print_stdout, reason = "a test of faults says how many fired")]
 
 mod conformance;
 mod cut_proxy;

@@ -23,7 +23,7 @@ async fn behind_proxy() -> (CutProxy, Store) {
     settings.patience = Patience {
         connect: Duration::from_secs(1),
         request: REQUEST,
-        retries: Duration::from_secs(60),
+        retries: Duration::from_mins(1),
     };
     let through = format!("hdfs://{}/{prefix}", proxy.address());
     (proxy, Store::open_with(&through, &settings).unwrap())
