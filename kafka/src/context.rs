@@ -88,11 +88,26 @@ impl ClientContext for Context {
             return;
         }
         tracing::debug!(target: "kafka", %error, "{reason}");
+        let code = if is_certificate_refused(reason) {
+            Some(RDKafkaErrorCode::SSL)
+        } else {
+            error.rdkafka_error_code()
+        };
         *self.trouble() = Some(Trouble {
-            code: error.rdkafka_error_code(),
+            code,
             text: reason.chars().take(MAX_NOTED_CHARS).collect(),
         });
     }
+}
+
+/// In TLS 1.3 a broker that does not want this client's certificate says so after the handshake: the client takes that for
+/// a lost connection, only its words tell the difference.
+fn is_certificate_refused(reason: &str) -> bool {
+    reason.contains("SSL routines")
+        && reason.contains("alert")
+        && ["certificate", "unknown ca"]
+            .iter()
+            .any(|what| reason.contains(what))
 }
 
 fn is_end(error: &KafkaError) -> bool {
@@ -104,6 +119,17 @@ impl ConsumerContext for Context {}
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_refused_certificate_is_no_lost_connection() {
+        let context = Context::default();
+        let lost = || KafkaError::Global(RDKafkaErrorCode::BrokerTransportFailure);
+        context.error(lost(), "Receive failed: connection reset, certificate");
+        assert!(context.failure("looking", lost()).is_retryable());
+        let text = "Receive failed: error:0A00045C:SSL routines::tlsv13 alert certificate required";
+        context.error(lost(), text);
+        assert!(!context.failure("looking", lost()).is_retryable());
+    }
 
     #[test]
     fn a_refused_login_is_named_instead_of_the_lost_connection() {

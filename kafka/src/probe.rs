@@ -22,7 +22,9 @@ pub(crate) const READY_LIMIT: Duration = Duration::from_secs(2);
 /// How long they may take for everything else that is asked.
 pub(crate) const ASK_LIMIT: Duration = Duration::from_secs(10);
 
-/// Pause before a partition is asked for again.
+/// Longest that a question is waited for before troubles are looked at.
+const TURN: Duration = Duration::from_secs(1);
+/// Pause before something is asked for again.
 const AGAIN_PAUSE: Duration = Duration::from_millis(50);
 
 /// How a topic is there.
@@ -142,9 +144,21 @@ fn find<C: ClientContext>(
     limit: Duration,
 ) -> Result<Found, KafkaFailure> {
     const STEP: &str = "looking for topics";
-    let answer = client
-        .fetch_metadata(Some(topic), limit)
-        .map_err(|e| context.failure(STEP, e))?;
+    let until = Instant::now() + limit;
+    let answer = loop {
+        // Asked in short turns: a refused login shows while the client still hopes for a connection.
+        let left = until.saturating_duration_since(Instant::now());
+        match client.fetch_metadata(Some(topic), left.min(TURN)) {
+            Ok(answer) => break answer,
+            Err(error) => {
+                let failure = context.failure(STEP, error);
+                if left <= TURN || !failure.is_retryable() {
+                    return Err(failure);
+                }
+                std::thread::sleep(AGAIN_PAUSE);
+            }
+        }
+    };
     context.well();
     let Some(about) = answer.topics().iter().find(|about| about.name() == topic) else {
         return Ok(Found::Missing);

@@ -4,7 +4,7 @@ use std::io::{BufRead as _, BufReader};
 use std::os::unix::process::ExitStatusExt as _;
 use std::process::{Command, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use kafka_log::KafkaLog;
 use storage::log::EventLog as _;
@@ -75,9 +75,12 @@ fn what_follows_is_there_once_however_often_a_reader_is_killed() {
             let (killed, prefix) = (&killed, &own.settings.kafka_topic_prefix);
             scope.spawn(move || {
                 let mut random = Random(seed.wrapping_add(u64::from(number)).max(1));
+                let mut waits = vec![];
                 while killed.fetch_add(1, Ordering::Relaxed) < KILLS {
-                    live_and_die(prefix, &group_name(number), random.below(LONGEST_LIFE_MS));
+                    let life_ms = random.below(LONGEST_LIFE_MS);
+                    waits.push(live_and_die(prefix, &group_name(number), life_ms));
                 }
+                println!("group {number}: readers at work after {waits:.1?}");
             });
         }
     });
@@ -95,8 +98,10 @@ fn what_follows_is_there_once_however_often_a_reader_is_killed() {
     });
 }
 
-/// Starts a reader in a process of its own, waits until it works, and kills it.
-fn live_and_die(prefix: &str, group: &str, life_ms: u64) {
+/// Starts a reader in a process of its own, waits until it works, and kills it. Says how long it was until it worked: its
+/// predecessor's death must be noticed first.
+fn live_and_die(prefix: &str, group: &str, life_ms: u64) -> Duration {
+    let start = Instant::now();
     let mut reader = Command::new(std::env::current_exe().unwrap())
         .args(["--exact", "--nocapture"])
         .arg("kills::what_follows_is_there_once_however_often_a_reader_is_killed")
@@ -110,12 +115,14 @@ fn live_and_die(prefix: &str, group: &str, life_ms: u64) {
         .map_while(Result::ok)
         .any(|line| line.contains(AT_WORK));
     assert!(is_at_work, "the reader ended before it was killed");
+    let until_at_work = start.elapsed();
     std::thread::sleep(Duration::from_millis(life_ms));
     // SIGKILL: it says good-bye to nobody. One that ended by itself before proves nothing.
     reader.kill().unwrap();
     let status = reader.wait().unwrap();
     assert_eq!(status.signal(), Some(SIGKILL));
     drop(lines);
+    until_at_work
 }
 
 /// Reads and finishes out of order until it is killed.

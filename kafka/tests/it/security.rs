@@ -200,7 +200,7 @@ async fn assert_refused(settings: &KafkaSettings, text: &str) {
     let error = error.to_string();
     assert!(error.to_lowercase().contains(text), "{error}");
     assert!(!error.contains(PASSWORD), "{error}");
-    assert!(start.elapsed() < Duration::from_secs(15));
+    assert!(start.elapsed() < Duration::from_secs(5));
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
