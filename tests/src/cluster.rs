@@ -71,6 +71,7 @@ impl Cluster {
             "FLUXGLOBE_SPOOL",
             folder.path().join("spool").display().to_string(),
         );
+        set("FLUXGLOBE_EXECUTOR_WORK", folder.path().join("work").display().to_string());
         set("FLUXGLOBE_LOG", "info".to_owned());
         set("NODEVICE_SELECT", "1".to_owned());
         let mut cluster = Self {
