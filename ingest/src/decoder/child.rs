@@ -54,7 +54,7 @@ fn limit(memory_bytes: u64, cpu_s: u64) -> std::io::Result<()> {
         let (_, hard) = resource.get()?;
         let allowed = wanted.min(hard);
         // The last second of processor time is for the signal that tells this limit from a kill by somebody else.
-        let grace = if resource == Resource::CPU { 1 } else { 0 };
+        let grace = u64::from(resource == Resource::CPU);
         resource.set(allowed, allowed.saturating_add(grace).min(hard))
     })
 }

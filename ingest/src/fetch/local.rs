@@ -22,8 +22,8 @@ const READ_BYTES: usize = 1 << 20;
 /// Reads any file, as its owner on the command line may.
 pub(super) fn any(path: &Path, expected: &Expected, limits: Limits) -> Result<RawGranule, Stop> {
     // Asked before it is opened: opening a pipe waits for a writer.
-    check_regular(path).map_err(unreadable)??;
-    let file = File::open(path).map_err(unreadable)?;
+    check_regular(path).map_err(|e| unreadable(&e))??;
+    let file = File::open(path).map_err(|e| unreadable(&e))?;
     taken(file, path.to_owned(), file_name(path), expected, limits)
 }
 
@@ -47,21 +47,21 @@ pub(super) fn inside(
     let real = match std::fs::canonicalize(path) {
         Ok(real) if is_inside(&real) => real,
         // Whether a file outside is there or not is nobody's business.
-        Err(e) if is_plain && is_inside(path) => return Err(missed(e)),
+        Err(e) if is_plain && is_inside(path) => return Err(missed(&e)),
         Ok(_) | Err(_) => return Err(outside().into()),
     };
-    check_regular(&real).map_err(missed)??;
-    let file = File::open(&real).map_err(missed)?;
+    check_regular(&real).map_err(|e| missed(&e))??;
+    let file = File::open(&real).map_err(|e| missed(&e))?;
     let handle = format!("/proc/{}/fd/{}", std::process::id(), file.as_raw_fd());
     let handle = PathBuf::from(handle);
-    let opened = std::fs::canonicalize(&handle).map_err(missed)?;
+    let opened = std::fs::canonicalize(&handle).map_err(|e| missed(&e))?;
     if !is_inside(&opened) {
         return Err(outside().into());
     }
     Ok(taken(file, handle, file_name(path), expected, limits)?)
 }
 
-fn missed(error: io::Error) -> Miss {
+fn missed(error: &io::Error) -> Miss {
     match error.kind() {
         io::ErrorKind::NotFound | io::ErrorKind::PermissionDenied => {
             Miss::Absent(format!("it cannot be read: {error}"))
@@ -70,7 +70,7 @@ fn missed(error: io::Error) -> Miss {
     }
 }
 
-fn unreadable(e: io::Error) -> Rejection {
+fn unreadable(e: &io::Error) -> Rejection {
     Rejection::new(
         RejectReason::Unreadable,
         "file",
@@ -97,7 +97,7 @@ fn taken(
     expected: &Expected,
     limits: Limits,
 ) -> Result<RawGranule, Stop> {
-    let metadata = file.metadata().map_err(unreadable)?;
+    let metadata = file.metadata().map_err(|e| unreadable(&e))?;
     if metadata.len() > limits.file_bytes {
         return Err(too_large(metadata.len(), limits.file_bytes).into());
     }
@@ -108,7 +108,7 @@ fn taken(
     let mut check = Check::of(expected)?;
     let mut buffer = vec![0; READ_BYTES];
     loop {
-        let count = file.read(&mut buffer).map_err(unreadable)?;
+        let count = file.read(&mut buffer).map_err(|e| unreadable(&e))?;
         if count == 0 {
             break;
         }

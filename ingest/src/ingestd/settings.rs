@@ -32,7 +32,7 @@ pub struct ServiceSettings {
         value_name = "HOST[:PORT]"
     )]
     pub allow_host: Vec<AllowedHost>,
-    /// Prefix of an object store that notices may name files below, such as s3://BUCKET/FOLDER; several with commas. Keys
+    /// Prefix of an object store that notices may name files below, such as `s3://BUCKET/FOLDER`; several with commas. Keys
     /// of the store come from its usual variables.
     #[arg(
         long,

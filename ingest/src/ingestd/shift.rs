@@ -17,7 +17,7 @@ use tracing::Instrument as _;
 use super::bench::{Bench, Number};
 use super::work::{self, Done, Work, alongside};
 use super::{GROUP, IngestService, TOPIC, now};
-use crate::answer::{Answer, Asked, Ready};
+use crate::answer::{Answer, Asked};
 use crate::error::IngestError;
 use crate::metrics;
 use crate::notice::Notice;
@@ -111,7 +111,7 @@ pub(super) async fn run(
     }
 }
 
-impl<'a> Shift<'a> {
+impl Shift<'_> {
     fn room(&self) -> usize {
         self.service
             .parallel_notices
@@ -190,22 +190,22 @@ impl<'a> Shift<'a> {
     fn settle(&mut self) {
         for done in std::mem::take(&mut self.done) {
             match done {
-                Done::Prepared(number, Ready::ToCommit(granule)) => {
+                Done::ToPublish(number, granule) => {
                     let product = granule.target.product.clone();
-                    self.bench.ready(number, product, granule);
+                    self.bench.ready(number, product, *granule);
                 }
-                Done::Prepared(number, Ready::Answered(answer)) => self.answered(number, answer),
+                Done::Answered(number, answer) => self.answered(number, &answer),
                 Done::Published(product, answers) => {
                     self.bench.free(&product);
                     for (number, answer) in answers {
-                        self.answered(number, answer);
+                        self.answered(number, &answer);
                     }
                 }
             }
         }
     }
 
-    fn answered(&mut self, number: Number, answer: Answer) {
+    fn answered(&mut self, number: Number, answer: &Answer) {
         self.bench.remove(number);
         let Some(job) = self.jobs.remove(&number) else {
             return;

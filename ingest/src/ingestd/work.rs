@@ -20,7 +20,9 @@ pub(super) type Work<'a> = FuturesUnordered<Pin<Box<dyn Future<Output = Done> + 
 
 /// A piece of work that ended.
 pub(super) enum Done {
-    Prepared(Number, Ready),
+    /// A file can be published.
+    ToPublish(Number, Box<StoredGranule>),
+    Answered(Number, Box<Answer>),
     Published(ProductId, Vec<(Number, Answer)>),
 }
 
@@ -48,8 +50,11 @@ pub(super) async fn prepare(
     asked: Arc<Asked>,
 ) -> Done {
     let ready = insist(health, "prepare", || land::prepare(&pipeline, &asked)).await;
-    let ready = ready.unwrap_or_else(|error| Ready::Answered(asked.refused(blame(&error))));
-    Done::Prepared(number, ready)
+    match ready {
+        Ok(Ready::ToCommit(granule)) => Done::ToPublish(number, Box::new(granule)),
+        Ok(Ready::Answered(answer)) => Done::Answered(number, Box::new(answer)),
+        Err(error) => Done::Answered(number, Box::new(asked.refused(blame(&error)))),
+    }
 }
 
 /// Publishes files of one product together; if that fails because of one of them, one by one.

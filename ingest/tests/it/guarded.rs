@@ -11,6 +11,7 @@ use contract::topic::Topic;
 use ingest::{
     DecoderCommand, IngestError, IngestService, Outcome, Quiet, ServiceSettings, Settings,
 };
+use storage::Store;
 use storage::log::{EmbeddedLog, EventLog};
 
 use crate::fixture::{Place, SmallFile, events};
@@ -241,6 +242,44 @@ async fn a_notice_cannot_have_a_file_read_as_a_profile() {
         "{line}"
     );
     assert!(!line.contains("hunter2"));
+}
+
+/// With a real S3 server, where there is one: below the allowed prefix, beside it, and absent.
+#[tokio::test]
+async fn files_of_an_allowed_store_land_and_others_are_refused() {
+    let Some(bucket) = std::env::var_os("FLUXGLOBE_S3_BUCKET") else {
+        eprintln!("SKIPPED: no S3 server; set FLUXGLOBE_S3_BUCKET and the variables AWS_*");
+        return;
+    };
+    let place = Place::new();
+    SmallFile::new().write_hdf5(&place.path("a.h5"));
+    let content = bytes::Bytes::from(std::fs::read(place.path("a.h5")).unwrap());
+    let root = format!(
+        "s3://{}/ingest-test-{}",
+        bucket.display(),
+        std::process::id()
+    );
+    let store = Store::open(&root).unwrap();
+    let keys = ["in/a.h5", "in-side/a.h5"].map(|key| key.parse().unwrap());
+    for key in &keys {
+        store.put_new(key, content.clone()).await.unwrap();
+    }
+    let settings = guarded(&place, &["--allow-store", &format!("{root}/in")]).unwrap();
+    let sha256 = Some(Digest::of(&content));
+    let event = notice(
+        &format!("{root}/in/a.h5"),
+        sha256,
+        Some(content.len() as u64),
+    );
+    let outcome = outcome_of(&place, &settings, event).await;
+    let beside = refused(&place, &settings, &format!("{root}/in-side/a.h5")).await;
+    let absent = refused(&place, &settings, &format!("{root}/in/b.h5")).await;
+    for key in &keys {
+        store.remove(key).await.unwrap();
+    }
+    assert!(matches!(outcome, Outcome::Landed { .. }), "{outcome}");
+    assert_eq!(beside.0, RejectReason::Location, "{}", beside.1);
+    assert_eq!(absent.0, RejectReason::Unavailable, "{}", absent.1);
 }
 
 #[test]

@@ -15,5 +15,6 @@ mod sandbox;
 mod service;
 mod survey;
 mod synthetic;
+mod tutorial_files;
 mod web;
 mod web_server;

@@ -34,7 +34,7 @@ fn folder(variable: &str, default: Option<PathBuf>, inside: &str) -> Option<Path
     folder
 }
 
-fn fluxengine(inside: &str) -> Option<PathBuf> {
+pub(crate) fn fluxengine(inside: &str) -> Option<PathBuf> {
     folder("FLUXGLOBE_FLUXENGINE", None, inside)
 }
 
@@ -43,7 +43,7 @@ fn test_data(inside: &str) -> Option<PathBuf> {
     folder("FLUXGLOBE_TEST_DATA", Some(beside), inside)
 }
 
-fn files(folder: &Path, part: &str) -> Vec<PathBuf> {
+pub(crate) fn files(folder: &Path, part: &str) -> Vec<PathBuf> {
     let is_wanted = |path: &PathBuf| {
         path.extension().is_some_and(|e| e == "nc") && path.to_string_lossy().contains(part)
     };
@@ -56,7 +56,7 @@ fn files(folder: &Path, part: &str) -> Vec<PathBuf> {
     files
 }
 
-fn near(found: f64, expected: f64) {
+pub(crate) fn near(found: f64, expected: f64) {
     assert!(
         (found / expected - 1.0).abs() < 1e-6,
         "{found:e} is not {expected:e}"
@@ -337,100 +337,6 @@ async fn daily_currents_land_as_a_region() {
         .sum();
     near(sum / 2552.0, -1.344_207_754e-2);
     near(f64::from(values[80]), -3.567_620_367e-2);
-}
-
-/// One file of a family: product, a part of its name, and its only step as period, cells with data, mean and the cell in the
-/// middle row, a quarter of the columns from the west.
-type OneFile = (&'static str, &'static str, (i32, u32), u64, f64, f64);
-
-/// Rows of these files run from south to north; temperatures in degrees Celsius have 273.15 added.
-#[tokio::test]
-async fn families_of_the_tutorials_land_with_the_month_of_their_names() {
-    let tutorials = "../../tutorials";
-    let woa = format!("{tutorials}/01_introduction/data/WOA_salinity");
-    let reynolds =
-        format!("{tutorials}/02_using_insitu_data/reynolds_avhrr_only_monthly_calculated_tmh/2013");
-    let n2o = format!("{tutorials}/04_N2O_fluxes/data");
-    let all: [(&str, OneFile); 5] = [
-        (
-            &woa,
-            (
-                "woa18-salinity",
-                "_s07_",
-                (2011, 7),
-                41_088,
-                3.386_726_829e1,
-                34.468_795_9,
-            ),
-        ),
-        (
-            &reynolds,
-            (
-                "reynolds-sst",
-                "20130701",
-                (2013, 7),
-                45_152,
-                2.870_349_965e2,
-                294.431_572_3,
-            ),
-        ),
-        (
-            &n2o,
-            (
-                "ccmp-wind",
-                "ccmp",
-                (2014, 10),
-                56_160,
-                3.945_135_435,
-                5.687_315_94,
-            ),
-        ),
-        (
-            &n2o,
-            (
-                "air-pressure-oceanflux",
-                "OCF-PRE",
-                (2014, 10),
-                64_800,
-                1.009_305_732e5,
-                101_270.464_36,
-            ),
-        ),
-        (
-            "SST_gradients",
-            (
-                "ostia-sst-climatology",
-                "07-UKMO",
-                (2008, 7),
-                691_687,
-                2.871_335_778e2,
-                296.279_998_78,
-            ),
-        ),
-    ];
-    for (inside, (product, part, (year, month), valid_cells, mean, cell)) in all {
-        let Some(folder) = fluxengine(inside) else {
-            continue;
-        };
-        let place = Place::new();
-        let outcomes = place.land(&files(&folder, part)).await;
-        assert!(
-            matches!(outcomes.as_slice(), [Outcome::Landed { .. }]),
-            "{outcomes:?}"
-        );
-        let manifest = place.newest(product).await;
-        let step = &manifest.steps[0];
-        assert_eq!(step.period, Period::month(year, month).unwrap());
-        assert_eq!(step.valid_cells, valid_cells, "{product}");
-        let values = place.values(&manifest, 0).await;
-        let valid = values.iter().filter(|v| !v.is_nan());
-        near(
-            valid.map(|v| f64::from(*v)).sum::<f64>() / valid_cells as f64,
-            mean,
-        );
-        let (rows, cols) = (manifest.grid.rows as usize, manifest.grid.cols as usize);
-        near(f64::from(values[rows / 2 * cols + cols / 4]), cell);
-    }
 }
 
 #[tokio::test]

@@ -27,7 +27,7 @@ async fn allowed(place: &Place, answers: Box<crate::web_server::Answers>) -> (We
     (server, settings)
 }
 
-fn redirect(to: String) -> Answer {
+fn redirect(to: &str) -> Answer {
     Answer::Whole("302 Found", vec![format!("location: {to}")], vec![])
 }
 
@@ -139,7 +139,7 @@ async fn a_redirect_to_an_inner_address_is_refused() {
     ];
     for target in targets {
         let to = target.clone();
-        let (server, settings) = allowed(&place, Box::new(move |_| redirect(to.clone()))).await;
+        let (server, settings) = allowed(&place, Box::new(move |_| redirect(&to))).await;
         let (reason, line) = refused(&place, &settings, &server.url("/a.nc")).await;
         assert_eq!(reason, RejectReason::Location, "{target}: {line}");
         assert_eq!(server.asked(), ["/a.nc"], "the fault fired");
@@ -153,7 +153,7 @@ async fn redirects_are_followed_five_times() {
     let content = small_file(&place);
     let answers = move |path: &str| match path.trim_start_matches('/').parse::<u32>() {
         Ok(0) | Err(_) => Answer::Whole("200 OK", vec![], content.clone()),
-        Ok(left) => redirect(format!("/{}", left - 1)),
+        Ok(left) => redirect(&format!("/{}", left - 1)),
     };
     let (server, settings) = allowed(&place, Box::new(answers)).await;
     let outcome = outcome_of(&place, &settings, notice(&server.url("/5"), None, None)).await;

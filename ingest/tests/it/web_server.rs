@@ -1,5 +1,6 @@
 //! A small HTTP server: a path in, an answer out, as the test wants it.
 
+use std::fmt::Write as _;
 use std::net::SocketAddr;
 use std::sync::{Arc, Mutex};
 
@@ -71,10 +72,10 @@ fn bytes_of(answer: Answer) -> Vec<u8> {
         .iter()
         .any(|line| line.starts_with("transfer-encoding"));
     if !is_sized {
-        text += &format!("content-length: {}\r\n", body.len());
+        write!(text, "content-length: {}\r\n", body.len()).unwrap();
     }
     for line in headers {
-        text += &format!("{line}\r\n");
+        write!(text, "{line}\r\n").unwrap();
     }
     let mut bytes = (text + "\r\n").into_bytes();
     bytes.extend_from_slice(&body[..shown]);
