@@ -2,9 +2,13 @@
 
 pub mod chunk;
 pub mod fixed;
+pub mod named;
 mod query;
 pub mod rows;
 pub mod running;
+pub mod sums;
 
+pub(crate) use query::steps_inside;
 pub use query::{BudgetAnswer, BudgetQuery, budget, budget_of};
 pub use rows::{BudgetRow, BudgetStep};
+pub use sums::Measure;

@@ -1,21 +1,23 @@
 //! Accumulated carbon: a product of fluxes in, a product of the carbon given off since a chosen start out.
 
+mod derivation;
+pub(crate) mod exact;
+mod prior;
+mod source;
 mod steps;
 
 use contract::digest::Digest;
 use contract::event::Body;
-use contract::manifest::{MANIFEST_SCHEMA, Manifest, ManifestId, SeriesSegment, Step};
+use contract::manifest::Manifest;
 use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::time::{Period, TimeMs};
-use serde::Serialize;
-use storage::{StorageError, domain, frames, manifests, series};
+use storage::{StorageError, Store, manifests};
 
 use crate::{ComputeError, Engine, catalog};
-use steps::accumulate_segment;
+use derivation::Derivation;
+use source::{SourceStep, steps_since};
 
-/// Values of one query and one series segment: 256 MiB of f32, whatever the grid.
-const SEGMENT_VALUES: usize = 64 << 20;
 /// How often the commit is tried again when another writer takes the number.
 const COMMIT_ATTEMPTS: u32 = 5;
 
@@ -28,63 +30,115 @@ pub struct DeriveProgress {
     pub all_steps: usize,
 }
 
-/// A step of the source and the part of it after the start.
-#[derive(Debug, Clone, Copy)]
-struct SourceStep<'a> {
-    step: &'a Step,
-    /// From the start on; the whole period except perhaps in the first step.
-    period: Period,
-}
-
-/// What a derived step depends on.
-#[derive(Serialize)]
-struct StepJob<'a> {
-    kind: &'static str,
-    source: &'a ManifestId,
-    start: TimeMs,
-    period: Period,
-}
+/// Who is told of it.
+pub type Progress<'a> = dyn Fn(DeriveProgress) + Send + Sync + 'a;
 
 /// Derives the product of a flux product's accumulated carbon, kg m⁻², from `start` (the product's own if absent) on.
 ///
 /// A step's values hold at its end. A gap in time leaves a cell as it was; a cell without data in any step holds none.
-/// If the newest version was derived from the same version of the source and the same start, it is returned as it is.
+/// If the newest version was derived from the same version of the source and the same start, it is returned as it is;
+/// else only the steps from the first changed one on are computed.
 /// [`derived`] is the event to tell of it, after the manifest.
 pub async fn derive_accumulated(
     engine: &Engine,
     product: &ProductId,
     start: Option<TimeMs>,
-    progress: &(dyn Fn(DeriveProgress) + Send + Sync),
+    progress: &Progress<'_>,
 ) -> Result<Manifest, ComputeError> {
-    let source = catalog::product(engine.store(), product).await?;
-    if source.quantity != Quantity::CarbonFlux {
-        return Err(ComputeError::NotAFlux {
+    let source = flux(engine.store(), product).await?;
+    let steps = steps_since(&source, start)?;
+    let latest = manifests::latest(engine.store(), &product.accumulated()?).await?;
+    if let Some(latest) = latest
+        .as_ref()
+        .filter(|latest| is_up_to_date(latest, &source, &steps))
+    {
+        progress(of_all(steps.len(), &steps));
+        return Ok(latest.clone());
+    }
+    derive(engine, &source, &steps, latest.as_ref(), progress).await
+}
+
+/// The same with every step that ends after `from` computed anew, whatever is stored. If what comes out is what is
+/// stored, no new version is made of it.
+pub async fn derive_anew(
+    engine: &Engine,
+    product: &ProductId,
+    start: Option<TimeMs>,
+    from: TimeMs,
+    progress: &Progress<'_>,
+) -> Result<Manifest, ComputeError> {
+    let source = flux(engine.store(), product).await?;
+    let steps = steps_since(&source, start)?;
+    let latest = manifests::latest(engine.store(), &product.accumulated()?).await?;
+    let trusted = latest.map(|mut latest| {
+        latest.steps.retain(|step| step.period.end <= from);
+        latest
+    });
+    derive(engine, &source, &steps, trusted.as_ref(), progress).await
+}
+
+async fn derive(
+    engine: &Engine,
+    source: &Manifest,
+    steps: &[SourceStep<'_>],
+    prior: Option<&Manifest>,
+    progress: &Progress<'_>,
+) -> Result<Manifest, ComputeError> {
+    let target = source.product.accumulated()?;
+    let derivation = Derivation::begin(engine, source, &target, steps, prior).await?;
+    commit(engine, source, derivation.finish(progress).await?).await
+}
+
+/// The newest version of a product that is a flux of carbon.
+async fn flux(store: &Store, product: &ProductId) -> Result<Manifest, ComputeError> {
+    let source = catalog::product(store, product).await?;
+    if source.quantity == Quantity::CarbonFlux {
+        Ok(source)
+    } else {
+        Err(ComputeError::NotAFlux {
             product: product.clone(),
             quantity: source.quantity,
-        });
+        })
     }
-    let steps = steps_since(&source, start)?;
-    let target = product.accumulated()?;
-    let latest = manifests::latest(engine.store(), &target).await?;
-    let manifest = match latest.filter(|latest| is_up_to_date(latest, &source, &steps)) {
-        Some(latest) => {
-            progress(DeriveProgress {
-                done_steps: steps.len(),
-                all_steps: steps.len(),
-            });
-            latest
-        }
-        None => {
-            commit(
-                engine,
-                &source,
-                &steps,
-                derive(engine, &source, &target, &steps, progress).await?,
-            )
-            .await?
-        }
+}
+
+/// The start that somebody chose for a product's accumulated carbon; none if it begins with its source, or is not there.
+///
+/// A chosen start is one that is not where the source began when it was derived from it.
+pub async fn chosen_start(
+    store: &Store,
+    product: &ProductId,
+) -> Result<Option<TimeMs>, ComputeError> {
+    let Some(latest) = manifests::latest(store, &product.accumulated()?).await? else {
+        return Ok(None);
     };
-    Ok(manifest)
+    let (Some(first), Some(source)) = (latest.steps.first(), &latest.derived_from) else {
+        return Ok(None);
+    };
+    let source = match manifests::load(store, source).await {
+        Ok(source) => source,
+        // That version is gone: nobody can tell any more.
+        Err(e) if e.is_not_found() => return Ok(None),
+        Err(e) => return Err(e.into()),
+    };
+    let start = first.period.start;
+    let is_own = source
+        .steps
+        .first()
+        .is_some_and(|step| step.period.start == start);
+    Ok((!is_own).then_some(start))
+}
+
+/// Every step of a product's accumulated carbon and the hash of what it would be made of now.
+pub(crate) fn made_of(
+    source: &Manifest,
+    start: Option<TimeMs>,
+) -> Result<Vec<(Period, Digest)>, ComputeError> {
+    let steps = steps_since(source, start)?;
+    Ok(steps
+        .iter()
+        .map(|step| (step.period, step.made_of))
+        .collect())
 }
 
 /// What is told of a derived manifest; nothing if it was not derived.
@@ -95,118 +149,32 @@ pub fn derived(manifest: &Manifest) -> Option<Body> {
     })
 }
 
-/// The steps that end after the start, the first cut at it.
-fn steps_since(
-    source: &Manifest,
-    start: Option<TimeMs>,
-) -> Result<Vec<SourceStep<'_>>, ComputeError> {
-    let mut steps = vec![];
-    for step in &source.steps {
-        let from = start.map_or(step.period.start, |start| start.max(step.period.start));
-        if from < step.period.end {
-            steps.push(SourceStep {
-                step,
-                period: Period::new(from, step.period.end)?,
-            });
-        }
-    }
-    if steps.is_empty() {
-        let asked = start.map_or_else(
-            || "any period".to_owned(),
-            |start| format!("the time from {start} on"),
-        );
-        return Err(ComputeError::NoStep {
-            product: source.product.clone(),
-            asked,
-            covered: source.extent(),
-        });
-    }
-    Ok(steps)
-}
-
+/// Is the newest version derived from this very version of the source, from the same steps?
 fn is_up_to_date(latest: &Manifest, source: &Manifest, steps: &[SourceStep<'_>]) -> bool {
-    let periods = latest.steps.iter().map(|step| step.period);
+    let made_of = latest.steps.iter().map(|step| step.raw_sha256);
     latest.derived_from.as_ref() == Some(&source.id())
-        && periods.eq(steps.iter().map(|step| step.period))
+        && made_of.eq(steps.iter().map(|step| step.made_of))
 }
 
-/// Computes and stores everything but the manifest, which is returned with number 0.
-async fn derive(
-    engine: &Engine,
-    source: &Manifest,
-    target: &ProductId,
-    steps: &[SourceStep<'_>],
-    progress: &(dyn Fn(DeriveProgress) + Send + Sync),
-) -> Result<Manifest, ComputeError> {
-    let store = engine.store();
-    let cells = domain::read(store, &source.domain).await?;
-    if cells.len() != source.grid.cell_count() {
-        return Err(ComputeError::inconsistent(
-            source.domain.to_string(),
-            "it does not fill its product's grid",
-        ));
+fn of_all(done_steps: usize, steps: &[SourceStep<'_>]) -> DeriveProgress {
+    DeriveProgress {
+        done_steps,
+        all_steps: steps.len(),
     }
-    let per_segment = (SEGMENT_VALUES / source.grid.cell_count()).max(1);
-    let (mut sums, mut done) = (vec![0; source.grid.cell_count()], vec![]);
-    let mut segments = vec![];
-    for run in steps.chunks(per_segment) {
-        let columns = accumulate_segment(engine, &source.grid, run, &cells, &mut sums).await?;
-        let views: Vec<&[f32]> = columns.iter().map(Vec::as_slice).collect();
-        let key = series::write(store, target, &source.grid, &views).await?;
-        segments.push(SeriesSegment {
-            first_step: done.len() as u32,
-            steps: run.len() as u32,
-            series: key,
-        });
-        for (step, values) in run.iter().zip(&columns) {
-            let frame = frames::write(store, target, &source.grid, values, step.period).await?;
-            let job = StepJob {
-                kind: "accumulated",
-                source: &source.id(),
-                start: steps[0].period.start,
-                period: step.period,
-            };
-            done.push(Step {
-                period: step.period,
-                frame,
-                raw_sha256: Digest::of_json(&job),
-                origin: format!("accumulated from {}, {}", source.id(), step.step.origin),
-                valid_cells: values.iter().filter(|value| !value.is_nan()).count() as u64,
-            });
-            progress(DeriveProgress {
-                done_steps: done.len(),
-                all_steps: steps.len(),
-            });
-        }
-    }
-    Ok(Manifest {
-        schema: MANIFEST_SCHEMA,
-        product: target.clone(),
-        number: 0,
-        title: format!("{}, accumulated", source.title),
-        quantity: Quantity::AccumulatedCarbon,
-        synthetic: source.synthetic,
-        source: source.source.clone(),
-        grid: source.grid,
-        steps: done,
-        domain: domain::write(store, target, &cells).await?,
-        series: segments,
-        derived_from: Some(source.id()),
-    })
 }
 
-/// Publishes the manifest under the next free number, unless another writer published the same derivation meanwhile.
+/// Publishes the manifest under the next free number, unless another writer published the same derivation meanwhile, or
+/// one of a newer version of the source.
 async fn commit(
     engine: &Engine,
     source: &Manifest,
-    steps: &[SourceStep<'_>],
     derived: Manifest,
 ) -> Result<Manifest, ComputeError> {
     let mut attempt = 1;
     loop {
         let latest = manifests::latest(engine.store(), &derived.product).await?;
         let number = latest.as_ref().map_or(1, |latest| latest.number + 1);
-        if let Some(latest) = latest.filter(|latest| is_up_to_date(latest, source, steps)) {
+        if let Some(latest) = latest.filter(|latest| is_no_older(latest, source, &derived)) {
             return Ok(latest);
         }
         let manifest = Manifest {
@@ -219,4 +187,15 @@ async fn commit(
             Err(e) => return Err(e.into()),
         }
     }
+}
+
+/// Is it what was derived, or something derived from a newer version of the source?
+fn is_no_older(latest: &Manifest, source: &Manifest, derived: &Manifest) -> bool {
+    let derived_from = latest.derived_from.as_ref();
+    let is_newer = derived_from.is_some_and(|id| id.number > source.number);
+    let same = Manifest {
+        number: latest.number,
+        ..derived.clone()
+    };
+    is_newer || *latest == same
 }

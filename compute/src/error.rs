@@ -1,5 +1,6 @@
 //! What can go wrong in a computation, and whose turn it is then: the asker's, the operator's or nobody's.
 
+use ballista_core::error::BallistaError;
 use contract::ContractError;
 use contract::grid::LonLatDeg;
 use contract::product::ProductId;
@@ -7,6 +8,8 @@ use contract::quantity::Quantity;
 use contract::time::Period;
 use datafusion::error::DataFusionError;
 use storage::StorageError;
+
+use crate::failure::{self, Failure};
 
 /// A computation that gave no answer.
 #[derive(Debug, thiserror::Error)]
@@ -83,6 +86,41 @@ pub enum ComputeError {
         /// Its own words.
         source: Box<DataFusionError>,
     },
+    /// The cluster, or this process as a part of it, failed.
+    #[error("cluster, {what}: {source}")]
+    Cluster {
+        /// What was being done.
+        what: &'static str,
+        /// Ballista's words.
+        source: Box<BallistaError>,
+    },
+    /// The cluster took a query and did not answer it.
+    #[error(
+        "the cluster gave no answer within {limit_s} s; are there executors, and have they room?"
+    )]
+    Overdue {
+        /// How long it was waited for, s.
+        limit_s: u64,
+    },
+    /// A scheduler's address that cannot be one.
+    #[error("scheduler address {url:?}: {reason}; give host:port, such as scheduler:50050")]
+    SchedulerUrl {
+        /// As it was given.
+        url: String,
+        /// What is wrong.
+        reason: String,
+    },
+    /// A file, a folder or an address of this machine cannot be used.
+    #[error("{what}: {source}")]
+    Machine {
+        /// What was wanted.
+        what: String,
+        /// The system's words.
+        source: std::io::Error,
+    },
+    /// A service's metrics cannot be registered.
+    #[error(transparent)]
+    Metrics(#[from] prometheus::Error),
     /// Stored things contradict each other.
     #[error("{what} does not fit: {reason}")]
     Inconsistent {
@@ -117,10 +155,15 @@ impl ComputeError {
             | Self::PlaceOutside { .. }
             | Self::Region { .. }
             | Self::RegionFile { .. }
+            | Self::SchedulerUrl { .. }
             | Self::Contract(_) => ErrorClass::BadRequest,
-            Self::Storage(e) if e.is_retryable() => ErrorClass::Retryable,
-            Self::Engine { source, .. } if engine_may_recover(source) => ErrorClass::Retryable,
-            Self::Storage(_) | Self::Engine { .. } | Self::Inconsistent { .. } => {
+            Self::Storage(e) => retryable_if(e.is_retryable()),
+            Self::Engine { source, .. } => retryable_if(failure::of(source) == Failure::Passing),
+            Self::Cluster { source, .. } => {
+                retryable_if(failure::of_ballista(source) == Failure::Passing)
+            }
+            Self::Overdue { .. } => ErrorClass::Retryable,
+            Self::Machine { .. } | Self::Metrics(_) | Self::Inconsistent { .. } => {
                 ErrorClass::Internal
             }
         }
@@ -138,6 +181,18 @@ impl ComputeError {
         }
     }
 
+    pub(crate) fn cluster(what: &'static str) -> impl FnOnce(BallistaError) -> Self {
+        move |source| Self::Cluster {
+            what,
+            source: Box::new(source),
+        }
+    }
+
+    pub(crate) fn machine(what: impl Into<String>) -> impl FnOnce(std::io::Error) -> Self {
+        let what = what.into();
+        move |source| Self::Machine { what, source }
+    }
+
     pub(crate) fn inconsistent(what: impl Into<String>, reason: impl std::fmt::Display) -> Self {
         Self::Inconsistent {
             what: what.into(),
@@ -146,13 +201,12 @@ impl ComputeError {
     }
 }
 
-fn engine_may_recover(error: &DataFusionError) -> bool {
-    matches!(
-        error.find_root(),
-        DataFusionError::ObjectStore(_)
-            | DataFusionError::IoError(_)
-            | DataFusionError::ResourcesExhausted(_)
-    )
+fn retryable_if(may_pass: bool) -> ErrorClass {
+    if may_pass {
+        ErrorClass::Retryable
+    } else {
+        ErrorClass::Internal
+    }
 }
 
 fn list(known: &[ProductId]) -> String {

@@ -1,13 +1,16 @@
 //! The series of a product at one place.
 
+use contract::digest::Digest;
 use contract::grid::LonLatDeg;
+use contract::key::ObjectKey;
 use contract::manifest::{Manifest, ManifestId, SeriesSegment};
 use contract::product::ProductId;
 use contract::time::TimeMs;
-use datafusion::arrow::array::AsArray as _;
+use datafusion::arrow::array::{AsArray as _, RecordBatch};
 use datafusion::arrow::datatypes::Float32Type;
 use serde::{Deserialize, Serialize};
 
+use crate::session::QueryContext;
 use crate::{ComputeError, Engine, catalog, scan};
 
 /// The cell that a place lies in.
@@ -148,26 +151,14 @@ async fn segment_values(
     col: u32,
 ) -> Result<Vec<f32>, ComputeError> {
     let (block, cell) = storage::series::block_of(&manifest.grid, row, col);
-    let context = engine.context().await?;
-    scan::register(
-        &context,
-        "series",
-        engine.store(),
-        &[&segment.series],
-        &storage::series::SCHEMA,
-    )?;
-    let failed = || ComputeError::engine("reading a series");
     let sql = SERIES_AT
         .replace("$cell", &cell.to_string())
         .replace("$steps", &segment.steps.to_string())
         .replace("$block", &block.to_string());
-    let batches = context
-        .sql(&sql)
-        .await
-        .map_err(failed())?
-        .collect()
-        .await
-        .map_err(failed())?;
+    let job = Digest::of_json(&("series", &segment.series, &sql));
+    let batches = engine
+        .answer(job, |context| ask(engine, context, &segment.series, &sql))
+        .await?;
     let rows: Vec<_> = batches
         .iter()
         .filter(|batch| batch.num_rows() > 0)
@@ -185,4 +176,17 @@ async fn segment_values(
             format!("no single block {block}"),
         )),
     }
+}
+
+async fn ask(
+    engine: &Engine,
+    context: QueryContext,
+    series: &ObjectKey,
+    sql: &str,
+) -> Result<Vec<RecordBatch>, ComputeError> {
+    let (store, schema) = (engine.store(), &storage::series::SCHEMA);
+    scan::register(&context, "series", store, &[series], schema)?;
+    let failed = || ComputeError::engine("reading a series");
+    let query = context.sql(sql).await.map_err(failed())?;
+    query.collect().await.map_err(failed())
 }

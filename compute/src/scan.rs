@@ -1,6 +1,5 @@
 //! Stored objects as tables: frames, weights and series under the names that SQL uses.
 
-use std::path::Path;
 use std::sync::Arc;
 
 use contract::key::ObjectKey;
@@ -11,7 +10,6 @@ use datafusion::datasource::listing::{
 };
 use datafusion::execution::context::SessionContext;
 use storage::Store;
-use url::Url;
 
 use crate::ComputeError;
 
@@ -39,13 +37,7 @@ pub(crate) fn register(
     Ok(())
 }
 
-/// Address of an object; a folder's name may hold spaces and signs that mean something in a URL.
 fn address(store: &Store, key: &ObjectKey) -> Result<ListingTableUrl, ComputeError> {
-    let text = store.url_of(key);
-    let url = match text.strip_prefix("file://") {
-        Some(path) => Url::from_file_path(Path::new(path)).ok(),
-        None => Url::parse(&text).ok(),
-    };
-    let url = url.ok_or_else(|| ComputeError::inconsistent(&text, "it is no address"))?;
-    ListingTableUrl::try_new(url, None).map_err(ComputeError::engine("naming stored objects"))
+    ListingTableUrl::try_new(store.sql_url(key), None)
+        .map_err(ComputeError::engine("naming stored objects"))
 }

@@ -1,24 +1,27 @@
-//! Query engines: Ballista in this process for budgets and derived products, plain DataFusion for one place's series.
-//!
-//! One session state serves client, scheduler and executor, so that all three know the same functions and stores.
+//! Query engines: Ballista in this process or as a cluster for budgets and derived products, plain DataFusion for one
+//! place's series.
 
+use std::future::Future;
 use std::num::NonZeroUsize;
 use std::sync::Arc;
+use std::time::Duration;
 
 use ballista::extension::SessionConfigExt as _;
+use contract::digest::Digest;
 use datafusion::catalog::MemoryCatalogProviderList;
 use datafusion::error::DataFusionError;
-use datafusion::execution::FunctionRegistry as _;
 use datafusion::execution::context::SessionContext;
-use datafusion::execution::runtime_env::{RuntimeEnv, RuntimeEnvBuilder};
 use datafusion::execution::session_state::{SessionState, SessionStateBuilder};
-use datafusion::prelude::SessionConfig;
 use storage::Store;
 use tokio::sync::OnceCell;
-use url::Url;
+use tokio::time::Instant;
 
+use crate::cluster::{self, Cluster, SchedulerUrl};
 use crate::standalone::{self, WorkFolder, WorkLease};
-use crate::{ComputeError, functions};
+use crate::{ComputeError, Objects, state};
+
+/// A query that a cluster does not answer within this is given up: no executor has been there, or none has room for it.
+const QUERY_LIMIT: Duration = Duration::from_hours(1);
 
 /// A query engine over one store; clones share it. It starts with its first query.
 #[derive(Clone)]
@@ -55,12 +58,13 @@ impl std::ops::Deref for QueryContext {
     }
 }
 
-#[derive(Clone, Copy, PartialEq, Eq)]
 enum Kind {
     /// Ballista's scheduler and executor inside this process, spoken to over loopback.
     Standalone,
     /// DataFusion alone: no scheduler between the question and the answer.
     Local,
+    /// Ballista's scheduler and executors as processes of their own.
+    Cluster(Cluster),
 }
 
 impl Engine {
@@ -72,6 +76,32 @@ impl Engine {
     /// DataFusion in this process, for questions that touch few rows.
     pub fn local(store: Store) -> Self {
         Self::new(store, Kind::Local, NonZeroUsize::MIN)
+    }
+
+    /// A Ballista cluster, its queries cut into `partitions` parts. Its executors must read the same store by the same
+    /// address.
+    ///
+    /// A query whose scheduler or executors are lost is asked again, for at most [`cluster::PATIENCE`]: queries only read
+    /// objects that never change, so that asking twice does no harm.
+    pub fn cluster(store: Store, scheduler: SchedulerUrl, partitions: NonZeroUsize) -> Self {
+        let cluster = Cluster {
+            scheduler,
+            patience: cluster::PATIENCE,
+        };
+        Self::new(store, Kind::Cluster(cluster), partitions)
+    }
+
+    /// The same engine, waiting so long for a cluster that is away; other engines have nobody to wait for.
+    #[must_use]
+    pub fn with_patience(&self, patience: Duration) -> Self {
+        let Kind::Cluster(cluster) = &self.inner.kind else {
+            return self.clone();
+        };
+        let kind = Kind::Cluster(Cluster {
+            patience,
+            ..cluster.clone()
+        });
+        Self::new(self.inner.store.clone(), kind, self.inner.partitions)
     }
 
     fn new(store: Store, kind: Kind, partitions: NonZeroUsize) -> Self {
@@ -92,7 +122,7 @@ impl Engine {
 
     /// Does every query pass through Ballista's scheduler?
     pub fn is_distributed(&self) -> bool {
-        self.inner.kind == Kind::Standalone
+        !matches!(self.inner.kind, Kind::Local)
     }
 
     /// Starts the engine if it has not started; queries do so by themselves.
@@ -100,8 +130,51 @@ impl Engine {
         self.session().await.map(|_session| ())
     }
 
-    /// A context for one query.
-    pub(crate) async fn context(&self) -> Result<QueryContext, ComputeError> {
+    /// Can a query be asked now? Of a cluster its scheduler is asked, within two seconds.
+    pub async fn ready(&self) -> Result<(), ComputeError> {
+        match &self.inner.kind {
+            Kind::Cluster(cluster) => cluster.scheduler.answers().await,
+            Kind::Standalone | Kind::Local => Ok(()),
+        }
+    }
+
+    /// Works on a question; `job` is the hash of all that its answer depends on.
+    ///
+    /// On a cluster, `ask` is called again when it failed for a reason that passes, as long as there is patience.
+    pub(crate) async fn answer<T, F, Fut>(&self, job: Digest, ask: F) -> Result<T, ComputeError>
+    where
+        F: Fn(QueryContext) -> Fut,
+        Fut: Future<Output = Result<T, ComputeError>>,
+    {
+        let name = job.to_string();
+        let Kind::Cluster(cluster) = &self.inner.kind else {
+            return ask(self.context(&name).await?).await;
+        };
+        let begun = Instant::now();
+        let mut pauses = ::service::pauses();
+        loop {
+            let asked = ask(self.context(&name).await?);
+            let error = match tokio::time::timeout(QUERY_LIMIT, asked).await {
+                Ok(Err(error)) if error.is_retryable() => error,
+                Ok(ended) => return ended,
+                Err(_elapsed) => {
+                    return Err(ComputeError::Overdue {
+                        limit_s: QUERY_LIMIT.as_secs(),
+                    });
+                }
+            };
+            match pauses.next() {
+                Some(pause) if begun.elapsed() + pause < cluster.patience => {
+                    tracing::warn!(job = name, %error, "the cluster lost a query; asking again");
+                    tokio::time::sleep(pause).await;
+                }
+                _ => return Err(error),
+            }
+        }
+    }
+
+    /// A context for one query, which a scheduler shows under this name.
+    async fn context(&self, job: &str) -> Result<QueryContext, ComputeError> {
         let session = self.session().await?;
         let shared = session.state.clone();
         let session_id = shared.session_id().to_owned();
@@ -109,6 +182,11 @@ impl Engine {
             .config()
             .clone()
             .with_create_default_catalog_and_schema(true);
+        let config = if self.is_distributed() {
+            config.with_ballista_job_name(job)
+        } else {
+            config
+        };
         let state = SessionStateBuilder::new_from_existing(shared)
             .with_session_id(session_id)
             .with_catalog_list(Arc::new(MemoryCatalogProviderList::new()))
@@ -134,80 +212,38 @@ impl Engine {
 
 impl Inner {
     async fn start(&self) -> Result<Session, ComputeError> {
-        let state = session_state(&self.store, self.kind, self.partitions)?;
-        if self.kind == Kind::Local {
-            return Ok(Session { state, work: None });
+        let failed = || ComputeError::engine("starting the query engine");
+        let runtime = Objects::of(&self.store).runtime().map_err(failed())?;
+        match &self.kind {
+            Kind::Local => Ok(Session {
+                state: state::session_state(state::local_config(), runtime).map_err(failed())?,
+                work: None,
+            }),
+            Kind::Cluster(cluster) => Ok(Session {
+                state: cluster
+                    .session(runtime, self.partitions)
+                    .map_err(failed())?,
+                work: None,
+            }),
+            Kind::Standalone => {
+                tracing::info!(
+                    partitions = self.partitions,
+                    "starting Ballista in this process"
+                );
+                let config = state::ballista_config(self.partitions);
+                let state = state::session_state(config, runtime).map_err(failed())?;
+                let (mut state, work) = standalone::start(state, self.partitions.get())
+                    .await
+                    .map_err(|e| failed()(DataFusionError::External(e.into())))?;
+                // The upgrade to a Ballista session resets the functions to the built-in ones.
+                state::register_functions(&mut state).map_err(failed())?;
+                Ok(Session {
+                    state,
+                    work: Some(work),
+                })
+            }
         }
-        tracing::info!(
-            partitions = self.partitions,
-            "starting Ballista in this process"
-        );
-        let (mut state, work) = standalone::start(state, self.partitions.get())
-            .await
-            .map_err(|e| {
-                ComputeError::engine("starting Ballista")(DataFusionError::External(e.into()))
-            })?;
-        // The upgrade to a Ballista session resets the functions to the built-in ones.
-        register_functions(&mut state)?;
-        Ok(Session {
-            state,
-            work: Some(work),
-        })
     }
-}
-
-/// The one session state of client, scheduler and executor.
-fn session_state(
-    store: &Store,
-    kind: Kind,
-    partitions: NonZeroUsize,
-) -> Result<SessionState, ComputeError> {
-    let config = match kind {
-        Kind::Local => SessionConfig::new()
-            // One block of a series file is wanted: decode nothing of the others.
-            .set_bool("datafusion.execution.parquet.pushdown_filters", true),
-        Kind::Standalone => SessionConfig::new_with_ballista()
-            .with_ballista_standalone_parallelism(partitions.get())
-            // Adaptive planning is on by default in Ballista 55 and incomplete.
-            .with_ballista_adaptive_query_planner(false)
-            // The default packs all partitions of a stage into one task.
-            .set_usize("ballista.scheduler.max_partitions_per_task", 1),
-    };
-    let mut state = SessionStateBuilder::new()
-        .with_default_features()
-        .with_config(
-            config
-                .with_target_partitions(partitions.get())
-                .with_information_schema(false),
-        )
-        .with_runtime_env(runtime(store)?)
-        .build();
-    register_functions(&mut state)?;
-    Ok(state)
-}
-
-fn register_functions(state: &mut SessionState) -> Result<(), ComputeError> {
-    let failed = || ComputeError::engine("registering functions");
-    for function in functions::scalar_functions() {
-        state.register_udf(function).map_err(failed())?;
-    }
-    for function in functions::aggregate_functions() {
-        state.register_udaf(function).map_err(failed())?;
-    }
-    Ok(())
-}
-
-/// What reads files: DataFusion knows local folders by itself, any other store is ours to name.
-fn runtime(store: &Store) -> Result<Arc<RuntimeEnv>, ComputeError> {
-    let runtime = RuntimeEnvBuilder::new()
-        .build()
-        .map_err(ComputeError::engine("making a runtime"))?;
-    if !store.url().starts_with("file:") {
-        let url =
-            Url::parse(store.url()).map_err(|e| ComputeError::inconsistent(store.url(), e))?;
-        runtime.register_object_store(&url, store.object_store());
-    }
-    Ok(Arc::new(runtime))
 }
 
 #[cfg(test)]
@@ -216,7 +252,7 @@ mod tests {
 
     /// Name of the operator at the top of a query's plan.
     async fn top_of_plan(engine: &Engine) -> String {
-        let context = engine.context().await.unwrap();
+        let context = engine.context("test").await.unwrap();
         let query = context
             .sql("SELECT SUM(a) FROM (VALUES (1), (2)) t(a)")
             .await
@@ -230,10 +266,13 @@ mod tests {
     }
 
     #[tokio::test(flavor = "multi_thread")]
-    async fn a_standalone_engine_hands_its_queries_to_ballista_and_a_local_one_does_not() {
+    async fn all_engines_but_the_local_one_hand_their_queries_to_ballista() {
         let parts = NonZeroUsize::new(2).unwrap();
         let standalone = Engine::standalone(Store::memory(), parts);
         assert_eq!(top_of_plan(&standalone).await, "DistributedQueryExec");
+        let nowhere = "http://127.0.0.1:1".parse().unwrap();
+        let cluster = Engine::cluster(Store::memory(), nowhere, parts);
+        assert_eq!(top_of_plan(&cluster).await, "DistributedQueryExec");
         assert_ne!(
             top_of_plan(&Engine::local(Store::memory())).await,
             "DistributedQueryExec"
@@ -241,11 +280,31 @@ mod tests {
     }
 
     #[tokio::test(flavor = "multi_thread")]
+    async fn a_cluster_that_stays_away_is_told_of_when_patience_ends() {
+        let nowhere = "http://127.0.0.1:1".parse().unwrap();
+        let engine = Engine::cluster(Store::memory(), nowhere, NonZeroUsize::MIN)
+            .with_patience(Duration::from_millis(500));
+        assert!(engine.ready().await.is_err());
+        let tries = std::sync::atomic::AtomicU32::new(0);
+        let ask = |context: QueryContext| {
+            tries.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+            async move {
+                let failed = || ComputeError::engine("testing");
+                let query = context.sql("SELECT 1").await.map_err(failed())?;
+                query.collect().await.map_err(failed())
+            }
+        };
+        let error = engine.answer(Digest::of(b"test"), ask).await.unwrap_err();
+        assert!(error.is_retryable(), "{error}");
+        assert!(tries.into_inner() > 1, "asked once only");
+    }
+
+    #[tokio::test(flavor = "multi_thread")]
     async fn intermediate_files_go_with_the_last_query_that_may_need_them() {
         let engine = Engine::standalone(Store::memory(), NonZeroUsize::MIN);
         let (first, second) = (
-            engine.context().await.unwrap(),
-            engine.context().await.unwrap(),
+            engine.context("first").await.unwrap(),
+            engine.context("second").await.unwrap(),
         );
         let query = first
             .sql("SELECT SUM(a) FROM (VALUES (1), (2)) t(a)")
@@ -267,7 +326,7 @@ mod tests {
                 tokio::task::yield_now().await;
             }
         };
-        tokio::time::timeout(std::time::Duration::from_secs(20), emptied)
+        tokio::time::timeout(Duration::from_secs(20), emptied)
             .await
             .unwrap();
     }

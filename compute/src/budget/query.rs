@@ -1,21 +1,17 @@
-//! A budget as a query: frames joined with a region's weights on the engine, exact sums a step, calendar rows.
-
-use std::collections::BTreeMap;
+//! A budget: a region's weights, exact sums of every step, calendar rows.
 
 use contract::earth::Earth;
-use contract::key::ObjectKey;
-use contract::manifest::{Manifest, ManifestId};
+use contract::manifest::{Manifest, ManifestId, Step};
 use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::region::Region;
 use contract::time::{Period, TimeMs};
-use datafusion::arrow::array::{AsArray as _, RecordBatch};
-use datafusion::arrow::datatypes::{Decimal128Type, TimestampMillisecondType};
 use serde::{Deserialize, Serialize};
 
-use super::rows::{BudgetRow, BudgetStep, StepSum, row_periods, rows};
+use super::rows::{BudgetRow, BudgetStep, row_periods, rows};
+use super::sums::{self, Measure};
 use crate::region::{area, weights};
-use crate::{ComputeError, Engine, catalog, scan};
+use crate::{ComputeError, Engine, catalog};
 
 /// What a budget is asked for.
 #[derive(Debug, Clone, PartialEq)]
@@ -59,15 +55,6 @@ pub struct BudgetAnswer {
     pub rows: Vec<BudgetRow>,
 }
 
-/// One row a step: the seconds are those of the whole step; parts of steps are shared out afterwards, exactly.
-const STEP_SUMS: &str = "
-    SELECT period_start,
-           period_end,
-           SUM(cell_mass(\"values\", area_m2, (CAST(period_end AS BIGINT) - CAST(period_start AS BIGINT)) / 1000.0)) AS mass,
-           SUM(valid_area(\"values\", area_m2)) AS area
-    FROM frames JOIN weights ON frames.chunk = weights.chunk
-    GROUP BY period_start, period_end";
-
 /// Computes a budget.
 pub async fn budget(engine: &Engine, query: &BudgetQuery) -> Result<BudgetAnswer, ComputeError> {
     let manifest = catalog::product(engine.store(), &query.product).await?;
@@ -86,7 +73,7 @@ pub async fn budget_of(
             quantity: manifest.quantity,
         });
     }
-    let (window, keys) = steps_inside(manifest, query.from, query.to)?;
+    let (window, steps) = steps_inside(manifest, query.from, query.to)?;
     let region_area_m2 = area::region_area_m2(&query.region, query.earth)?;
     let weights =
         weights::stored(engine.store(), &manifest.grid, &query.region, query.earth).await?;
@@ -94,7 +81,7 @@ pub async fn budget_of(
         let (product, bounds) = (manifest.product.clone(), catalog::bounds_text(manifest));
         return Err(ComputeError::RegionOutside { product, bounds });
     };
-    let sums = step_sums(engine, &keys, &weights).await?;
+    let sums = sums::of_steps(engine, manifest, &steps, &weights, Measure::Mass).await?;
     let rows = rows(&row_periods(window, query.step)?, &sums, region_area_m2).ok_or_else(|| {
         ComputeError::inconsistent(manifest.id().to_string(), "its sums exceed 128 bits")
     })?;
@@ -111,12 +98,12 @@ pub async fn budget_of(
     })
 }
 
-/// The asked period and the frames of the steps that reach into it.
-fn steps_inside(
+/// The asked period and the steps that reach into it.
+pub(crate) fn steps_inside(
     manifest: &Manifest,
     from: Option<TimeMs>,
     to: Option<TimeMs>,
-) -> Result<(Period, Vec<&ObjectKey>), ComputeError> {
+) -> Result<(Period, Vec<&Step>), ComputeError> {
     let covered = manifest.extent();
     let none = |asked: String| ComputeError::NoStep {
         product: manifest.product.clone(),
@@ -137,79 +124,10 @@ fn steps_inside(
         .steps
         .iter()
         .filter(|step| step.period.overlaps(window));
-    let keys: Vec<_> = inside.map(|step| &step.frame).collect();
-    if keys.is_empty() {
+    let steps: Vec<_> = inside.collect();
+    if steps.is_empty() {
         Err(none(window.to_string()))
     } else {
-        Ok((window, keys))
+        Ok((window, steps))
     }
-}
-
-/// Exact sums of every step, in the order of time.
-async fn step_sums(
-    engine: &Engine,
-    frames: &[&ObjectKey],
-    weights: &ObjectKey,
-) -> Result<Vec<StepSum>, ComputeError> {
-    let context = engine.context().await?;
-    scan::register(
-        &context,
-        "frames",
-        engine.store(),
-        frames,
-        &storage::frames::SCHEMA,
-    )?;
-    scan::register(
-        &context,
-        "weights",
-        engine.store(),
-        &[weights],
-        &storage::weights::SCHEMA,
-    )?;
-    let failed = || ComputeError::engine("summing a budget");
-    let batches = context
-        .sql(STEP_SUMS)
-        .await
-        .map_err(failed())?
-        .collect()
-        .await
-        .map_err(failed())?;
-    let mut sums = BTreeMap::new();
-    for batch in &batches {
-        for sum in sums_of(batch)? {
-            sums.insert(sum.period.start, sum);
-        }
-    }
-    if sums.len() != frames.len() {
-        let reason = format!(
-            "the engine answered for {} steps of {}",
-            sums.len(),
-            frames.len()
-        );
-        return Err(ComputeError::inconsistent("budget", reason));
-    }
-    Ok(sums.into_values().collect())
-}
-
-fn sums_of(batch: &RecordBatch) -> Result<Vec<StepSum>, ComputeError> {
-    let time = |column: usize| {
-        batch
-            .column(column)
-            .as_primitive::<TimestampMillisecondType>()
-    };
-    let decimal = |column: usize| batch.column(column).as_primitive::<Decimal128Type>();
-    let (starts, ends, masses, areas) = (time(0), time(1), decimal(2), decimal(3));
-    (0..batch.num_rows())
-        .map(|row| {
-            let period = Period::new(
-                TimeMs::new(starts.value(row))?,
-                TimeMs::new(ends.value(row))?,
-            )?;
-            Ok(StepSum {
-                period,
-                mass_steps: masses.value(row),
-                area_steps: areas.value(row),
-            })
-        })
-        .collect()
 }

@@ -3,13 +3,17 @@
 use std::collections::BTreeMap;
 
 use contract::chunk::{Window, frame_chunks};
+use contract::digest::Digest;
 use contract::grid::Grid;
 use datafusion::arrow::array::{AsArray as _, RecordBatch};
 use datafusion::arrow::datatypes::{Int64Type, TimestampMillisecondType, UInt32Type};
+use datafusion::error::DataFusionError;
+use datafusion::execution::SendableRecordBatchStream;
 use futures::TryStreamExt as _;
 
-use super::SourceStep;
+use super::source::SourceStep;
 use crate::budget::running::{add_sums, column_kg_m2};
+use crate::session::QueryContext;
 use crate::{ComputeError, Engine, scan};
 
 /// One row a chunk and step. Seconds are counted from the start of accumulation on.
@@ -26,35 +30,110 @@ const RUNNING_SUMS: &str = "
         FROM frames
     )";
 
-/// Accumulated columns after every step of a run, kg m⁻², `[row, col]`, NaN outside the domain.
+/// One row a chunk: the same sums after the last step only.
+const FINAL_SUMS: &str = "
+    SELECT chunk, column_sum(\"values\", seconds) AS sums
+    FROM (
+        SELECT chunk, \"values\",
+               (CAST(period_end AS BIGINT) - GREATEST(CAST(period_start AS BIGINT), CAST($start AS BIGINT))) / 1000.0
+                   AS seconds
+        FROM frames
+    )
+    GROUP BY chunk";
+
+/// Accumulated columns after every step of a run, kg m⁻², `[row, col]`, NaN outside the domain, and the exact sums
+/// after its last step.
 ///
-/// `sums` holds the exact sums of the steps before (`[row, col]`, kg m⁻² in steps of 10⁻¹⁵) and then those of this run
-/// too.
+/// `before` holds the exact sums of the steps before (`[row, col]`, kg m⁻² in steps of 10⁻¹⁵).
 pub(super) async fn accumulate_segment(
     engine: &Engine,
     grid: &Grid,
     run: &[SourceStep<'_>],
     domain: &[bool],
-    sums: &mut [i64],
-) -> Result<Vec<Vec<f32>>, ComputeError> {
+    before: &[i64],
+) -> Result<(Vec<Vec<f32>>, Vec<i64>), ComputeError> {
+    let job = job("running sums", run);
+    let columns = |context: QueryContext| async move {
+        let mut batches = query(engine, &context, RUNNING_SUMS, run).await?;
+        let mut segment = Segment::new(grid, run, domain, before);
+        while let Some(batch) = batches.try_next().await.map_err(failed())? {
+            segment.take(&batch)?;
+        }
+        segment.finish()
+    };
+    engine.answer(job, columns).await
+}
+
+/// The exact sums after the last step of a run, `[row, col]`, kg m⁻² in steps of 10⁻¹⁵.
+pub(super) async fn sums_after(
+    engine: &Engine,
+    grid: &Grid,
+    run: &[SourceStep<'_>],
+) -> Result<Vec<i64>, ComputeError> {
+    let job = job("final sums", run);
+    let sums = |context: QueryContext| async move {
+        let mut batches = query(engine, &context, FINAL_SUMS, run).await?;
+        let windows = frame_chunks(grid);
+        let (mut sums, mut taken) = (vec![0; grid.cell_count()], 0);
+        while let Some(batch) = batches.try_next().await.map_err(failed())? {
+            let chunks = batch.column(0).as_primitive::<UInt32Type>();
+            let lists = batch.column(1).as_list::<i32>();
+            for row in 0..batch.num_rows() {
+                let list = lists.value(row);
+                let chunk_sums = list.as_primitive::<Int64Type>().values();
+                let window = window_of(&windows, chunks.value(row), chunk_sums.len())?;
+                for (index, &sum) in window.cell_indices(grid).zip(chunk_sums) {
+                    sums[index] = sum;
+                }
+                taken += 1;
+            }
+        }
+        all_chunks(taken, windows.len()).map(|()| sums)
+    };
+    engine.answer(job, sums).await
+}
+
+fn failed() -> impl FnOnce(DataFusionError) -> ComputeError {
+    ComputeError::engine("accumulating carbon")
+}
+
+/// Named by what the last step is made of, and by where the run begins.
+fn job(what: &str, run: &[SourceStep<'_>]) -> Digest {
+    let made_of = |step: Option<&SourceStep<'_>>| step.map(|step| step.made_of);
+    Digest::of_json(&(what, made_of(run.first()), made_of(run.last())))
+}
+
+async fn query(
+    engine: &Engine,
+    context: &QueryContext,
+    sql: &str,
+    run: &[SourceStep<'_>],
+) -> Result<SendableRecordBatchStream, ComputeError> {
     let frames: Vec<_> = run.iter().map(|step| &step.step.frame).collect();
-    let context = engine.context().await?;
-    scan::register(
-        &context,
-        "frames",
-        engine.store(),
-        &frames,
-        &storage::frames::SCHEMA,
-    )?;
-    let failed = || ComputeError::engine("accumulating carbon");
-    let sql = RUNNING_SUMS.replace("$start", &run[0].period.start.ms().to_string());
+    let (store, schema) = (engine.store(), &storage::frames::SCHEMA);
+    scan::register(context, "frames", store, &frames, schema)?;
+    let sql = sql.replace("$start", &run[0].period.start.ms().to_string());
     let query = context.sql(&sql).await.map_err(failed())?;
-    let mut batches = query.execute_stream().await.map_err(failed())?;
-    let mut segment = Segment::new(grid, run, domain, sums);
-    while let Some(batch) = batches.try_next().await.map_err(failed())? {
-        segment.take(&batch)?;
+    query.execute_stream().await.map_err(failed())
+}
+
+/// The window of an answered chunk, if it was asked for.
+fn window_of(windows: &[Window], chunk: u32, cell_count: usize) -> Result<Window, ComputeError> {
+    let window = windows
+        .get(chunk as usize)
+        .filter(|window| window.cell_count() == cell_count);
+    let not_asked = || format!("chunk {chunk} was not asked for");
+    window
+        .copied()
+        .ok_or_else(|| ComputeError::inconsistent("accumulated carbon", not_asked()))
+}
+
+fn all_chunks(taken: usize, expected: usize) -> Result<(), ComputeError> {
+    if taken == expected {
+        return Ok(());
     }
-    segment.finish(sums)
+    let reason = format!("the engine answered for {taken} chunks of {expected}");
+    Err(ComputeError::inconsistent("accumulated carbon", reason))
 }
 
 /// Columns as they come in, chunk by chunk in any order.
@@ -65,7 +144,7 @@ struct Segment<'a> {
     /// Index of a step by the start of its source's period, ms.
     index_of: BTreeMap<i64, usize>,
     /// Exact sums before this run.
-    before: Vec<i64>,
+    before: &'a [i64],
     /// Exact sums after it.
     after: Vec<i64>,
     columns: Vec<Vec<f32>>,
@@ -73,7 +152,7 @@ struct Segment<'a> {
 }
 
 impl<'a> Segment<'a> {
-    fn new(grid: &'a Grid, run: &[SourceStep<'_>], domain: &'a [bool], sums: &[i64]) -> Self {
+    fn new(grid: &'a Grid, run: &[SourceStep<'_>], domain: &'a [bool], before: &'a [i64]) -> Self {
         let starts = run.iter().enumerate();
         Self {
             grid,
@@ -82,8 +161,8 @@ impl<'a> Segment<'a> {
             index_of: starts
                 .map(|(index, step)| (step.step.period.start.ms(), index))
                 .collect(),
-            before: sums.to_vec(),
-            after: sums.to_vec(),
+            before,
+            after: before.to_vec(),
             columns: vec![vec![f32::NAN; grid.cell_count()]; run.len()],
             rows_taken: 0,
         }
@@ -105,15 +184,10 @@ impl<'a> Segment<'a> {
     }
 
     fn take_chunk(&mut self, chunk: u32, start_ms: i64, sums: &[i64]) -> Result<(), ComputeError> {
-        let window = self
-            .windows
-            .get(chunk as usize)
-            .filter(|window| window.cell_count() == sums.len());
-        let (Some(window), Some(&step)) = (window, self.index_of.get(&start_ms)) else {
-            return Err(ComputeError::inconsistent(
-                "accumulated carbon",
-                format!("chunk {chunk} was not asked for"),
-            ));
+        let window = window_of(&self.windows, chunk, sums.len())?;
+        let Some(&step) = self.index_of.get(&start_ms) else {
+            let reason = format!("a step from {start_ms} ms on was not asked for");
+            return Err(ComputeError::inconsistent("accumulated carbon", reason));
         };
         let indices: Vec<usize> = window.cell_indices(self.grid).collect();
         let mut totals: Vec<i64> = indices.iter().map(|&index| self.before[index]).collect();
@@ -132,16 +206,8 @@ impl<'a> Segment<'a> {
         Ok(())
     }
 
-    fn finish(self, sums: &mut [i64]) -> Result<Vec<Vec<f32>>, ComputeError> {
-        let expected = self.windows.len() * self.columns.len();
-        if self.rows_taken != expected {
-            let reason = format!(
-                "the engine answered for {} chunks of {expected}",
-                self.rows_taken
-            );
-            return Err(ComputeError::inconsistent("accumulated carbon", reason));
-        }
-        sums.copy_from_slice(&self.after);
-        Ok(self.columns)
+    fn finish(self) -> Result<(Vec<Vec<f32>>, Vec<i64>), ComputeError> {
+        all_chunks(self.rows_taken, self.windows.len() * self.columns.len())?;
+        Ok((self.columns, self.after))
     }
 }

@@ -72,6 +72,16 @@ pub fn compute(
     Ok(chunks)
 }
 
+/// Where weights are stored, whether they are there or not.
+pub fn key(grid: &Grid, region: &Region, earth: Earth) -> ObjectKey {
+    ObjectKey::weights(&Digest::of_json(&Job {
+        method: METHOD,
+        grid,
+        region,
+        earth,
+    }))
+}
+
 /// The key of stored weights, which are computed if nobody did before; none if the region lies outside the grid.
 pub async fn stored(
     store: &Store,
@@ -79,12 +89,7 @@ pub async fn stored(
     region: &Region,
     earth: Earth,
 ) -> Result<Option<ObjectKey>, ComputeError> {
-    let key = ObjectKey::weights(&Digest::of_json(&Job {
-        method: METHOD,
-        grid,
-        region,
-        earth,
-    }));
+    let key = key(grid, region, earth);
     if store.exists(&key).await? {
         return Ok(Some(key));
     }

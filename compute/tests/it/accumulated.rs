@@ -2,7 +2,7 @@
 
 use std::sync::Mutex;
 
-use compute::derive::DeriveProgress;
+use compute::derive::{DeriveProgress, derived};
 use compute::{Engine, derive_accumulated};
 use contract::earth::Earth;
 use contract::event::Body;
@@ -11,14 +11,13 @@ use contract::manifest::Manifest;
 use contract::quantity::Quantity;
 use contract::time::{Period, TimeMs};
 use storage::Store;
-use storage::log::{EmbeddedLog, EventLog as _};
 
 use crate::fixture::{
     ONE_DEGREE, ask, folder_store, land, months, parts, product, total, wavy_year,
 };
 
-async fn derive(engine: &Engine, log: &EmbeddedLog, name: &str, start: Option<TimeMs>) -> Manifest {
-    derive_accumulated(engine, &product(name), start, log, &|_progress| ())
+async fn derive(engine: &Engine, name: &str, start: Option<TimeMs>) -> Manifest {
+    derive_accumulated(engine, &product(name), start, &|_progress| ())
         .await
         .unwrap()
 }
@@ -43,10 +42,9 @@ async fn the_last_frame_holds_the_printed_budget() {
     )
     .await;
     let engine = Engine::standalone(store.clone(), parts(2));
-    let log = EmbeddedLog::memory();
     let seen = Mutex::new(vec![]);
     let progress = |now: DeriveProgress| seen.lock().unwrap().push(now.done_steps);
-    let derived = derive_accumulated(&engine, &id, None, &log, &progress)
+    let derived = derive_accumulated(&engine, &id, None, &progress)
         .await
         .unwrap();
     assert_eq!(*seen.lock().unwrap(), (1..=12).collect::<Vec<_>>());
@@ -117,7 +115,7 @@ async fn a_gap_adds_nothing_and_land_stays_empty() {
     )
     .await;
     let engine = Engine::standalone(store.clone(), parts(2));
-    let derived = derive(&engine, &EmbeddedLog::memory(), "tiny", None).await;
+    let derived = derive(&engine, "tiny", None).await;
     let days = [31.0, 28.0, 31.0, 30.0];
     let (mut whole, mut gapped) = (0.0, 0.0);
     for (i, days) in days.into_iter().enumerate() {
@@ -161,7 +159,7 @@ async fn a_start_inside_a_step_counts_the_rest_of_it() {
     .await;
     let engine = Engine::standalone(store.clone(), parts(2));
     let start: TimeMs = "2001-02-11".parse().unwrap();
-    let derived = derive(&engine, &EmbeddedLog::memory(), "tiny", Some(start)).await;
+    let derived = derive(&engine, "tiny", Some(start)).await;
     assert_eq!(derived.steps.len(), 3);
     assert_eq!(
         derived.steps[0].period,
@@ -178,14 +176,7 @@ async fn a_start_inside_a_step_counts_the_rest_of_it() {
         "a gap since the start is no growth yet"
     );
     let too_late = "2002-01-01".parse().ok();
-    let refused = derive_accumulated(
-        &engine,
-        &product("tiny"),
-        too_late,
-        &EmbeddedLog::memory(),
-        &|_progress| (),
-    )
-    .await;
+    let refused = derive_accumulated(&engine, &product("tiny"), too_late, &|_progress| ()).await;
     assert!(refused.unwrap_err().to_string().contains("no step"));
 }
 
@@ -202,17 +193,15 @@ async fn deriving_again_changes_nothing_until_the_source_does() {
     )
     .await;
     let engine = Engine::standalone(store.clone(), parts(2));
-    let log = EmbeddedLog::memory();
-    let first = derive(&engine, &log, "tiny", None).await;
-    let again = derive(&engine, &log, "tiny", None).await;
+    let first = derive(&engine, "tiny", None).await;
+    let again = derive(&engine, "tiny", None).await;
     assert_eq!(first, again);
-    let told = log.read("product.derived", 0, 10).await.unwrap();
-    assert_eq!(told.len(), 1);
     let body = Body::ProductDerived {
         manifest: first.id(),
         derived_from: source.id(),
     };
-    assert_eq!(told[0].1.body, body);
+    assert_eq!(derived(&first), Some(body));
+    assert_eq!(derived(&source), None);
 
     let mut revised = tiny_year();
     revised[0].1[0] = 5e-9;
@@ -225,12 +214,11 @@ async fn deriving_again_changes_nothing_until_the_source_does() {
         4,
     )
     .await;
-    let third = derive(&engine, &log, "tiny", None).await;
+    let third = derive(&engine, "tiny", None).await;
     assert_eq!(third.number, 2);
     assert_ne!(third.steps[0].frame, first.steps[0].frame);
-    assert_eq!(log.read("product.derived", 0, 10).await.unwrap().len(), 2);
 
-    let later = derive(&engine, &log, "tiny", "2001-02-01".parse().ok()).await;
+    let later = derive(&engine, "tiny", "2001-02-01".parse().ok()).await;
     assert_eq!((later.number, later.steps.len()), (3, 3));
 }
 
@@ -250,7 +238,7 @@ async fn frames_have_the_same_bytes_at_any_parallelism() {
         )
         .await;
         let engine = Engine::standalone(store, parts(partitions));
-        let derived = derive(&engine, &EmbeddedLog::memory(), "wavy", None).await;
+        let derived = derive(&engine, "wavy", None).await;
         keys.push(derived.id());
     }
     assert_eq!(keys[0], keys[1]);

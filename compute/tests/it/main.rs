@@ -1,16 +1,28 @@
-//! Computations as a whole: products written through the storage crate, answers through Ballista in this process.
+//! Computations as a whole: products written through the storage crate, answers through Ballista in this process and in others.
 
 #[cfg(test)]
 mod accumulated;
 #[cfg(test)]
 mod budgets;
 #[cfg(test)]
+mod cluster;
+#[cfg(test)]
 mod fixture;
+#[cfg(test)]
+mod incremental;
+#[cfg(test)]
+mod node;
 #[cfg(test)]
 mod parallel;
 #[cfg(test)]
 mod places;
 #[cfg(test)]
+mod recomputed;
+#[cfg(test)]
 mod regions;
 #[cfg(test)]
 mod takahashi;
+#[cfg(test)]
+mod told;
+#[cfg(test)]
+mod troubled;

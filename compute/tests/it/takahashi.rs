@@ -3,7 +3,6 @@
 use compute::{BudgetStep, Engine, compare, derive_accumulated};
 use contract::earth::Earth;
 use contract::quantity::Quantity;
-use storage::log::EmbeddedLog;
 
 use crate::fixture::{ONE_DEGREE, ask, folder_store, land, parts, product, takahashi_year, total};
 
@@ -33,7 +32,7 @@ async fn the_real_grids_have_the_published_budgets() {
         globe.area_m2
     );
 
-    let derived = derive_accumulated(&engine, &id, None, &EmbeddedLog::memory(), &|_progress| ())
+    let derived = derive_accumulated(&engine, &id, None, &|_progress| ())
         .await
         .unwrap();
     let last = storage::frames::read(&store, &derived.steps[11].frame, &ONE_DEGREE)

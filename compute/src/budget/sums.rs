@@ -1,0 +1,349 @@
+//! Exact sums of a region's share of every step: asked of the engine, or read where they were stored for this version.
+
+use std::collections::BTreeMap;
+
+use contract::digest::Digest;
+use contract::key::ObjectKey;
+use contract::manifest::{Manifest, ManifestId, Step};
+use contract::time::{Period, TimeMs};
+use datafusion::arrow::array::{AsArray as _, RecordBatch};
+use datafusion::arrow::datatypes::{Decimal128Type, TimestampMillisecondType};
+use serde::{Deserialize, Serialize};
+use storage::{StorageError, Store};
+
+use super::rows::StepSum;
+use crate::session::QueryContext;
+use crate::{ComputeError, Engine, scan};
+
+/// Version of stored sums: it changes when their bits or their layout do.
+const SCHEMA: u32 = 1;
+/// How many versions back sums are looked for that can be taken over.
+const VERSIONS_BACK: u64 = 8;
+
+/// What is summed over cells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Measure {
+    /// Flux x area x time: a mass, kg.
+    Mass,
+    /// Value x area: what a mean is made of.
+    Mean,
+}
+
+/// One row a step: the seconds are those of the whole step; parts of steps are shared out afterwards, exactly.
+const STEP_SUMS: &str = "
+    SELECT period_start,
+           period_end,
+           SUM(cell_mass(\"values\", area_m2, $seconds)) AS mass,
+           SUM(valid_area(\"values\", area_m2)) AS area
+    FROM frames JOIN weights ON frames.chunk = weights.chunk
+    GROUP BY period_start, period_end";
+
+impl Measure {
+    fn sql(self) -> String {
+        let seconds = match self {
+            Self::Mass => "(CAST(period_end AS BIGINT) - CAST(period_start AS BIGINT)) / 1000.0",
+            Self::Mean => "CAST(1.0 AS DOUBLE)",
+        };
+        STEP_SUMS.replace("$seconds", seconds)
+    }
+}
+
+/// The sums of one version of a product over one region.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Table {
+    schema: u32,
+    manifest: ManifestId,
+    weights: ObjectKey,
+    measure: Measure,
+    rows: Vec<Row>,
+}
+
+/// Integers are text: JSON's numbers do not hold 128 bits.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Row {
+    frame: ObjectKey,
+    start: TimeMs,
+    end: TimeMs,
+    mass_steps: String,
+    area_steps: String,
+}
+
+impl Row {
+    fn sum(&self) -> Option<StepSum> {
+        Some(StepSum {
+            period: Period::new(self.start, self.end).ok()?,
+            mass_steps: self.mass_steps.parse().ok()?,
+            area_steps: self.area_steps.parse().ok()?,
+        })
+    }
+}
+
+/// What storing a version's sums came to.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StoredSums {
+    /// Where they are.
+    pub key: ObjectKey,
+    /// Steps that had to be summed.
+    pub computed_count: usize,
+    /// Steps whose sums were taken over from an earlier version.
+    pub kept_count: usize,
+}
+
+/// Hash of all that a version's sums over a region's weights are made of.
+pub(crate) fn input(manifest: &ManifestId, weights: &ObjectKey, measure: Measure) -> Digest {
+    Digest::of_json(&(SCHEMA, manifest, weights, measure))
+}
+
+/// The key of a version's sums over a region's weights.
+pub fn key(manifest: &ManifestId, weights: &ObjectKey, measure: Measure) -> ObjectKey {
+    let digest = input(manifest, weights, measure);
+    format!("{FOLDER}/{}/{digest}.json", manifest.product)
+        .parse()
+        .expect("a folder, a product and a digest make a key")
+}
+
+/// Folder of all stored sums.
+pub(crate) const FOLDER: &str = "sums";
+
+/// Exact sums of some steps of a version, in the order of time.
+pub(crate) async fn of_steps(
+    engine: &Engine,
+    manifest: &Manifest,
+    steps: &[&Step],
+    weights: &ObjectKey,
+    measure: Measure,
+) -> Result<Vec<StepSum>, ComputeError> {
+    let key = key(&manifest.id(), weights, measure);
+    let stored = stored_rows(engine.store(), &key).await?;
+    let known: Option<Vec<StepSum>> = steps
+        .iter()
+        .map(|step| stored.get(&step.frame)?.sum())
+        .collect();
+    match known {
+        Some(sums) => Ok(sums),
+        None => asked(engine, steps, weights, measure).await,
+    }
+}
+
+/// Stores the sums of all steps of a version, unless they are there. Those of frames that an earlier version had too
+/// are taken over from it.
+pub async fn store(
+    engine: &Engine,
+    manifest: &Manifest,
+    weights: &ObjectKey,
+    measure: Measure,
+) -> Result<StoredSums, ComputeError> {
+    let store = engine.store();
+    let key = key(&manifest.id(), weights, measure);
+    if store.exists(&key).await? {
+        return Ok(StoredSums {
+            key,
+            computed_count: 0,
+            kept_count: manifest.steps.len(),
+        });
+    }
+    let mut known = earlier_rows(store, manifest, weights, measure).await?;
+    let unknown: Vec<&Step> = manifest
+        .steps
+        .iter()
+        .filter(|step| known.get(&step.frame).and_then(Row::sum).is_none())
+        .collect();
+    let computed_count = unknown.len();
+    if computed_count > 0 {
+        let sums = asked(engine, &unknown, weights, measure).await?;
+        known.extend(unknown.iter().zip(sums).map(|(step, sum)| {
+            let row = row_of(&step.frame, &sum);
+            (step.frame.clone(), row)
+        }));
+    }
+    let rows = manifest
+        .steps
+        .iter()
+        .filter_map(|step| known.get(&step.frame).cloned());
+    put(store, manifest, weights, measure, rows.collect()).await?;
+    Ok(StoredSums {
+        key,
+        computed_count,
+        kept_count: manifest.steps.len() - computed_count,
+    })
+}
+
+/// Computes all sums of a version anew and compares them with the stored ones, which are stored if they are not there.
+///
+/// # Errors
+/// `Storage` with a conflict if they differ.
+pub(crate) async fn verify(
+    engine: &Engine,
+    manifest: &Manifest,
+    weights: &ObjectKey,
+    measure: Measure,
+) -> Result<(), ComputeError> {
+    let steps: Vec<&Step> = manifest.steps.iter().collect();
+    let sums = asked(engine, &steps, weights, measure).await?;
+    let rows = steps
+        .iter()
+        .zip(&sums)
+        .map(|(step, sum)| row_of(&step.frame, sum));
+    put(engine.store(), manifest, weights, measure, rows.collect()).await
+}
+
+async fn put(
+    store: &Store,
+    manifest: &Manifest,
+    weights: &ObjectKey,
+    measure: Measure,
+    rows: Vec<Row>,
+) -> Result<(), ComputeError> {
+    let id = manifest.id();
+    let key = key(&id, weights, measure);
+    let table = Table {
+        schema: SCHEMA,
+        manifest: id,
+        weights: weights.clone(),
+        measure,
+        rows,
+    };
+    let json =
+        serde_json::to_vec(&table).map_err(|e| ComputeError::inconsistent(key.as_str(), e))?;
+    store.put_new(&key, json.into()).await?;
+    Ok(())
+}
+
+fn row_of(frame: &ObjectKey, sum: &StepSum) -> Row {
+    Row {
+        frame: frame.clone(),
+        start: sum.period.start,
+        end: sum.period.end,
+        mass_steps: sum.mass_steps.to_string(),
+        area_steps: sum.area_steps.to_string(),
+    }
+}
+
+/// Stored rows by frame; none where there is no table that can be read: sums can always be computed again.
+async fn stored_rows(
+    store: &Store,
+    key: &ObjectKey,
+) -> Result<BTreeMap<ObjectKey, Row>, StorageError> {
+    let content = match store.get(key).await {
+        Ok(content) => content,
+        Err(e) if e.is_not_found() => return Ok(BTreeMap::new()),
+        Err(e) => return Err(e),
+    };
+    match serde_json::from_slice::<Table>(&content) {
+        Ok(table) if table.schema == SCHEMA => {
+            let rows = table.rows.into_iter();
+            Ok(rows.map(|row| (row.frame.clone(), row)).collect())
+        }
+        Ok(_) => Ok(BTreeMap::new()),
+        Err(error) => {
+            tracing::warn!(%key, %error, "stored sums cannot be read; they are computed again");
+            Ok(BTreeMap::new())
+        }
+    }
+}
+
+/// Rows of the newest earlier version that has any.
+async fn earlier_rows(
+    store: &Store,
+    manifest: &Manifest,
+    weights: &ObjectKey,
+    measure: Measure,
+) -> Result<BTreeMap<ObjectKey, Row>, ComputeError> {
+    let oldest = manifest.number.saturating_sub(VERSIONS_BACK).max(1);
+    for number in (oldest..manifest.number).rev() {
+        let at = ObjectKey::manifest(&manifest.product, number);
+        let content = match store.get(&at).await {
+            Ok(content) => content,
+            Err(e) if e.is_not_found() => break,
+            Err(e) => return Err(e.into()),
+        };
+        let Ok(earlier) = serde_json::from_slice::<Manifest>(&content) else {
+            break;
+        };
+        // Other cells, other weights.
+        if earlier.grid != manifest.grid {
+            break;
+        }
+        let rows = stored_rows(store, &key(&earlier.id(), weights, measure)).await?;
+        if !rows.is_empty() {
+            return Ok(rows);
+        }
+    }
+    Ok(BTreeMap::new())
+}
+
+/// Exact sums of steps in their order, from the engine.
+async fn asked(
+    engine: &Engine,
+    steps: &[&Step],
+    weights: &ObjectKey,
+    measure: Measure,
+) -> Result<Vec<StepSum>, ComputeError> {
+    let frames: Vec<&ObjectKey> = steps.iter().map(|step| &step.frame).collect();
+    let job = Digest::of_json(&("sums", measure, &frames, weights));
+    let ask = |context| ask(engine, context, &frames, weights, measure);
+    let mut sums = BTreeMap::new();
+    for batch in &engine.answer(job, ask).await? {
+        for sum in sums_of(batch)? {
+            sums.insert(sum.period.start, sum);
+        }
+    }
+    let found: Option<Vec<StepSum>> = steps
+        .iter()
+        .map(|step| sums.remove(&step.period.start))
+        .collect();
+    found.filter(|_| sums.is_empty()).ok_or_else(|| {
+        let reason = format!(
+            "the engine did not answer for each of {} steps",
+            steps.len()
+        );
+        ComputeError::inconsistent("sums", reason)
+    })
+}
+
+async fn ask(
+    engine: &Engine,
+    context: QueryContext,
+    frames: &[&ObjectKey],
+    weights: &ObjectKey,
+    measure: Measure,
+) -> Result<Vec<RecordBatch>, ComputeError> {
+    let store = engine.store();
+    scan::register(&context, "frames", store, frames, &storage::frames::SCHEMA)?;
+    scan::register(
+        &context,
+        "weights",
+        store,
+        &[weights],
+        &storage::weights::SCHEMA,
+    )?;
+    let failed = || ComputeError::engine("summing over a region");
+    let query = context.sql(&measure.sql()).await.map_err(failed())?;
+    query.collect().await.map_err(failed())
+}
+
+fn sums_of(batch: &RecordBatch) -> Result<Vec<StepSum>, ComputeError> {
+    let time = |column: usize| {
+        batch
+            .column(column)
+            .as_primitive::<TimestampMillisecondType>()
+    };
+    let decimal = |column: usize| batch.column(column).as_primitive::<Decimal128Type>();
+    let (starts, ends, masses, areas) = (time(0), time(1), decimal(2), decimal(3));
+    (0..batch.num_rows())
+        .map(|row| {
+            let period = Period::new(
+                TimeMs::new(starts.value(row))?,
+                TimeMs::new(ends.value(row))?,
+            )?;
+            Ok(StepSum {
+                period,
+                mass_steps: masses.value(row),
+                area_steps: areas.value(row),
+            })
+        })
+        .collect()
+}

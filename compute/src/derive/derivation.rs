@@ -1,0 +1,180 @@
+//! One derivation: kept steps and new ones in the order of time, exact sums from one run of steps to the next.
+
+use contract::manifest::{MANIFEST_SCHEMA, Manifest, SeriesSegment, Step};
+use contract::product::ProductId;
+use contract::quantity::Quantity;
+use storage::{Store, domain, frames, series};
+
+use super::prior::Prior;
+use super::source::SourceStep;
+use super::steps::{accumulate_segment, sums_after};
+use super::{Progress, exact, of_all};
+use crate::{ComputeError, Engine};
+use contract::key::ObjectKey;
+
+/// Values of one query and one series segment: 256 MiB of f32, whatever the grid.
+const SEGMENT_VALUES: usize = 64 << 20;
+
+/// A derivation under way. Its result is the same, bit for bit, whatever could be kept.
+pub(super) struct Derivation<'a> {
+    engine: &'a Engine,
+    source: &'a Manifest,
+    target: &'a ProductId,
+    steps: &'a [SourceStep<'a>],
+    domain: ObjectKey,
+    /// `[row, col]`.
+    cells: Vec<bool>,
+    prior: Prior<'a>,
+    /// Exact sums after the steps so far, from the first one on that is not kept.
+    sums: Vec<i64>,
+    done: Vec<Step>,
+    segments: Vec<SeriesSegment>,
+}
+
+impl<'a> Derivation<'a> {
+    /// Finds out what of the newest manifest can be kept, and the exact sums at its end.
+    pub(super) async fn begin(
+        engine: &'a Engine,
+        source: &'a Manifest,
+        target: &'a ProductId,
+        steps: &'a [SourceStep<'a>],
+        latest: Option<&'a Manifest>,
+    ) -> Result<Self, ComputeError> {
+        let (store, grid) = (engine.store(), &source.grid);
+        let cells = domain::read(store, &source.domain).await?;
+        if cells.len() != grid.cell_count() {
+            return Err(ComputeError::inconsistent(
+                source.domain.to_string(),
+                "it does not fill its product's grid",
+            ));
+        }
+        let domain = domain::write(store, target, &cells).await?;
+        let prior = Prior::of(store, latest, grid, steps, &domain).await?;
+        let kept = &steps[..prior.step_count];
+        let sums = match kept.last() {
+            // With everything kept nobody asks for the sums.
+            Some(last) if kept.len() < steps.len() => {
+                match exact::kept(store, last.made_of, grid.cell_count()).await? {
+                    Some(sums) => sums,
+                    None => sums_after(engine, grid, kept).await?,
+                }
+            }
+            _ => vec![0; grid.cell_count()],
+        };
+        tracing::debug!(product = %target, kept = kept.len(), steps = steps.len(), "accumulating");
+        Ok(Self {
+            engine,
+            source,
+            target,
+            steps,
+            domain,
+            cells,
+            prior,
+            sums,
+            done: vec![],
+            segments: vec![],
+        })
+    }
+
+    /// Computes and stores everything but the manifest, which is returned with number 0.
+    pub(super) async fn finish(
+        mut self,
+        progress: &Progress<'_>,
+    ) -> Result<Manifest, ComputeError> {
+        let per_segment = (SEGMENT_VALUES / self.source.grid.cell_count()).max(1);
+        for run in self.steps.chunks(per_segment) {
+            self.run(run, progress).await?;
+        }
+        if let Some(last) = self
+            .steps
+            .last()
+            .filter(|_| self.prior.step_count < self.steps.len())
+        {
+            exact::keep(self.store(), last.made_of, &self.sums).await?;
+        }
+        Ok(Manifest {
+            schema: MANIFEST_SCHEMA,
+            product: self.target.clone(),
+            number: 0,
+            title: format!("{}, accumulated", self.source.title),
+            quantity: Quantity::AccumulatedCarbon,
+            synthetic: self.source.synthetic,
+            source: self.source.source.clone(),
+            grid: self.source.grid,
+            steps: self.done,
+            domain: self.domain,
+            series: self.segments,
+            derived_from: Some(self.source.id()),
+        })
+    }
+
+    fn store(&self) -> &'a Store {
+        self.engine.store()
+    }
+
+    /// One run of steps, a segment of the series.
+    async fn run(
+        &mut self,
+        run: &[SourceStep<'_>],
+        progress: &Progress<'_>,
+    ) -> Result<(), ComputeError> {
+        let first = self.done.len();
+        if let Some(segment) = self.prior.segment(first, run.len()) {
+            self.segments.push(segment.clone());
+            let kept = (first..first + run.len()).filter_map(|index| self.prior.step(index));
+            self.done.extend(kept.cloned());
+            progress(of_all(self.done.len(), self.steps));
+            return Ok(());
+        }
+        let columns = self.columns(first, run).await?;
+        let views: Vec<&[f32]> = columns.iter().map(Vec::as_slice).collect();
+        let grid = &self.source.grid;
+        self.segments.push(SeriesSegment {
+            first_step: first as u32,
+            steps: run.len() as u32,
+            series: series::write(self.store(), self.target, grid, &views).await?,
+        });
+        for (index, (step, values)) in run.iter().zip(&columns).enumerate() {
+            let step = match self.prior.step(first + index) {
+                Some(kept) => kept.clone(),
+                None => self.stored(step, values).await?,
+            };
+            self.done.push(step);
+            progress(of_all(self.done.len(), self.steps));
+        }
+        Ok(())
+    }
+
+    /// Values of every step of a run, `[row, col]` each: read where they are kept, else accumulated.
+    async fn columns(
+        &mut self,
+        first: usize,
+        run: &[SourceStep<'_>],
+    ) -> Result<Vec<Vec<f32>>, ComputeError> {
+        let kept_count = self.prior.step_count.saturating_sub(first).min(run.len());
+        let mut columns = vec![];
+        for index in first..first + kept_count {
+            columns.push(self.prior.column(self.store(), index, &self.cells).await?);
+        }
+        let rest = &run[kept_count..];
+        if !rest.is_empty() {
+            let grid = &self.source.grid;
+            let (new, after) =
+                accumulate_segment(self.engine, grid, rest, &self.cells, &self.sums).await?;
+            columns.extend(new);
+            self.sums = after;
+        }
+        Ok(columns)
+    }
+
+    async fn stored(&self, step: &SourceStep<'_>, values: &[f32]) -> Result<Step, ComputeError> {
+        let (store, grid) = (self.store(), &self.source.grid);
+        Ok(Step {
+            period: step.period,
+            frame: frames::write(store, self.target, grid, values, step.period).await?,
+            raw_sha256: step.made_of,
+            origin: format!("accumulated up to {}", step.step.origin),
+            valid_cells: values.iter().filter(|value| !value.is_nan()).count() as u64,
+        })
+    }
+}

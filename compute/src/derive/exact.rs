@@ -1,0 +1,112 @@
+//! The exact sums that accumulation has come to after a step, kept so that the next step needs no earlier one.
+//!
+//! They can be computed again at any time, so that whatever is wrong with a stored one counts as not there.
+
+use std::sync::Arc;
+
+use contract::digest::Digest;
+use contract::key::ObjectKey;
+use datafusion::arrow::array::{AsArray as _, Int64Array, RecordBatch};
+use datafusion::arrow::datatypes::{DataType, Field, Int64Type, Schema};
+use datafusion::parquet::arrow::ArrowWriter;
+use datafusion::parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use datafusion::parquet::basic::{Compression, ZstdLevel};
+use datafusion::parquet::errors::ParquetError;
+use datafusion::parquet::file::properties::WriterProperties;
+use storage::{StorageError, Store};
+
+use crate::ComputeError;
+
+/// The key of the sums after a step, named by what that step is made of.
+pub(crate) fn key(made_of: Digest) -> ObjectKey {
+    format!("{FOLDER}/{made_of}.parquet")
+        .parse()
+        .expect("a folder and a digest make a key")
+}
+
+/// Folder of all of them.
+pub(crate) const FOLDER: &str = "accumulating";
+
+/// Stores the sums after a step: `[row, col]`, kg m⁻² in steps of 10⁻¹⁵.
+pub(super) async fn keep(store: &Store, made_of: Digest, sums: &[i64]) -> Result<(), ComputeError> {
+    let key = key(made_of);
+    let content = encode(sums).map_err(|e| ComputeError::inconsistent(key.as_str(), e))?;
+    match store.put_new(&key, content.into()).await {
+        // Another version of the encoder wrote the same sums.
+        Ok(_) | Err(StorageError::Conflict { .. }) => Ok(()),
+        Err(e) => Err(e.into()),
+    }
+}
+
+/// The stored sums after a step, if they are there and whole.
+pub(super) async fn kept(
+    store: &Store,
+    made_of: Digest,
+    cell_count: usize,
+) -> Result<Option<Vec<i64>>, ComputeError> {
+    let key = key(made_of);
+    let content = match store.get(&key).await {
+        Ok(content) => content,
+        Err(e) if e.is_not_found() => return Ok(None),
+        Err(e) => return Err(e.into()),
+    };
+    match decode(content) {
+        Ok(sums) if sums.len() == cell_count => Ok(Some(sums)),
+        Ok(_) => Ok(None),
+        Err(error) => {
+            tracing::warn!(%key, %error, "stored sums cannot be read; they are computed again");
+            Ok(None)
+        }
+    }
+}
+
+fn encode(sums: &[i64]) -> Result<Vec<u8>, ParquetError> {
+    let schema = Arc::new(Schema::new(vec![Field::new("sum", DataType::Int64, false)]));
+    let column = Arc::new(Int64Array::from_iter_values(sums.iter().copied()));
+    let batch = RecordBatch::try_new(Arc::clone(&schema), vec![column])?;
+    let properties = WriterProperties::builder()
+        .set_compression(Compression::ZSTD(ZstdLevel::default()))
+        .set_created_by("fluxglobe".to_owned())
+        .set_dictionary_enabled(false)
+        .build();
+    let mut out = vec![];
+    let mut writer = ArrowWriter::try_new(&mut out, schema, Some(properties))?;
+    writer.write(&batch)?;
+    writer.close()?;
+    Ok(out)
+}
+
+fn decode(content: bytes::Bytes) -> Result<Vec<i64>, ParquetError> {
+    let reader = ParquetRecordBatchReaderBuilder::try_new(content)?.build()?;
+    let mut sums = vec![];
+    for batch in reader {
+        let batch = batch?;
+        let column = batch
+            .columns()
+            .first()
+            .and_then(|column| column.as_primitive_opt::<Int64Type>());
+        let column = column.ok_or_else(|| ParquetError::General("no column of sums".to_owned()))?;
+        sums.extend_from_slice(column.values());
+    }
+    Ok(sums)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[tokio::test]
+    async fn sums_round_trip_and_damaged_ones_are_as_if_not_there() {
+        let store = Store::memory();
+        let sums = [0, i64::MIN, 9_000_000_000_000_000_000, -1];
+        let made_of = Digest::of(b"a");
+        keep(&store, made_of, &sums).await.unwrap();
+        keep(&store, made_of, &sums).await.unwrap();
+        assert_eq!(kept(&store, made_of, 4).await.unwrap().unwrap(), sums);
+        assert!(kept(&store, made_of, 5).await.unwrap().is_none());
+        let other = Digest::of(b"b");
+        assert!(kept(&store, other, 4).await.unwrap().is_none());
+        store.put_new(&key(other), "PAR1".into()).await.unwrap();
+        assert!(kept(&store, other, 4).await.unwrap().is_none());
+    }
+}

@@ -1,0 +1,93 @@
+//! What an earlier derivation left that is still right: its first steps, up to the first one whose source changed.
+
+use contract::grid::Grid;
+use contract::key::ObjectKey;
+use contract::manifest::{Manifest, SeriesSegment, Step};
+use storage::{Store, domain, frames};
+
+use super::source::SourceStep;
+use crate::ComputeError;
+
+/// The reusable part of the newest manifest.
+pub(super) struct Prior<'a> {
+    manifest: Option<&'a Manifest>,
+    /// How many of its first steps are made of what they would be made of now.
+    pub(super) step_count: usize,
+    /// Its domain where that is another one now; `[row, col]`.
+    other_domain: Option<Vec<bool>>,
+}
+
+impl<'a> Prior<'a> {
+    /// What of the newest manifest can be kept.
+    pub(super) async fn of(
+        store: &Store,
+        latest: Option<&'a Manifest>,
+        grid: &Grid,
+        steps: &[SourceStep<'_>],
+        domain_now: &ObjectKey,
+    ) -> Result<Self, ComputeError> {
+        let nothing = Self {
+            manifest: None,
+            step_count: 0,
+            other_domain: None,
+        };
+        let Some(latest) = latest.filter(|latest| latest.grid == *grid) else {
+            return Ok(nothing);
+        };
+        let equal = |(old, new): &(&Step, &SourceStep<'_>)| {
+            old.raw_sha256 == new.made_of && old.period == new.period
+        };
+        let step_count = latest.steps.iter().zip(steps).take_while(equal).count();
+        let other_domain = if latest.domain == *domain_now {
+            None
+        } else {
+            Some(domain::read(store, &latest.domain).await?)
+        };
+        Ok(Self {
+            manifest: Some(latest),
+            step_count,
+            other_domain,
+        })
+    }
+
+    /// A kept step, if its very bytes are right too.
+    pub(super) fn step(&self, index: usize) -> Option<&'a Step> {
+        let manifest = self.manifest.filter(|_| self.other_domain.is_none())?;
+        (index < self.step_count).then(|| &manifest.steps[index])
+    }
+
+    /// The stored series of a run of steps, if it holds these and all of them are kept.
+    pub(super) fn segment(&self, first: usize, count: usize) -> Option<&'a SeriesSegment> {
+        let manifest = self.manifest.filter(|_| self.other_domain.is_none())?;
+        let holds = |segment: &&SeriesSegment| {
+            (segment.first_step as usize, segment.steps as usize) == (first, count)
+        };
+        (first + count <= self.step_count)
+            .then(|| manifest.series.iter().find(holds))
+            .flatten()
+    }
+
+    /// Values of a kept step as they are over the domain of now, `[row, col]`.
+    ///
+    /// No kept step has data in a cell that only one of the two domains has: if the old one lacks it, no old step had
+    /// data there; if the new one lacks it, no step has now. So such a cell has accumulated exactly nothing, or is empty.
+    pub(super) async fn column(
+        &self,
+        store: &Store,
+        index: usize,
+        domain_now: &[bool],
+    ) -> Result<Vec<f32>, ComputeError> {
+        let manifest = self.manifest.expect("kept steps have a manifest");
+        let mut values = frames::read(store, &manifest.steps[index].frame, &manifest.grid).await?;
+        if let Some(before) = &self.other_domain {
+            for ((value, &now), &before) in values.iter_mut().zip(domain_now).zip(before) {
+                if !now {
+                    *value = f32::NAN;
+                } else if !before {
+                    *value = 0.0;
+                }
+            }
+        }
+        Ok(values)
+    }
+}

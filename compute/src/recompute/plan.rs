@@ -1,0 +1,149 @@
+//! The plan: what of a product's derived things is missing or stale, from listings and manifests alone.
+
+use std::collections::BTreeSet;
+
+use contract::key::ObjectKey;
+use contract::manifest::Manifest;
+use contract::quantity::Quantity;
+use contract::time::Period;
+use storage::{Store, manifests};
+
+use super::{Item, Plan, Reason, Request, What};
+use crate::budget::named::{self, Touching};
+use crate::budget::{Measure, steps_inside, sums};
+use crate::derive::{chosen_start, made_of};
+use crate::{ComputeError, catalog};
+
+/// What a request comes to. Nothing is written.
+pub async fn plan(store: &Store, request: &Request) -> Result<Plan, ComputeError> {
+    let manifest = catalog::product(store, &request.product).await?;
+    let (window, _steps) = steps_inside(&manifest, request.from, request.to)?;
+    let mut plan = Plan {
+        manifest: manifest.id(),
+        items: vec![],
+        fresh_count: 0,
+        start: None,
+        anew_from: None,
+        is_forced: request.is_forced,
+    };
+    let kinds: BTreeSet<What> = request.what.iter().copied().collect();
+    for what in kinds {
+        match what {
+            What::Frames => frames(store, &manifest, window, request.is_forced, &mut plan).await?,
+            What::Statistics => tables(store, &manifest, what, &mut plan).await?,
+            What::Budget if manifest.quantity == Quantity::CarbonFlux => {
+                tables(store, &manifest, what, &mut plan).await?;
+            }
+            What::Budget => {
+                return Err(ComputeError::NotAFlux {
+                    product: manifest.product,
+                    quantity: manifest.quantity,
+                });
+            }
+        }
+    }
+    Ok(plan)
+}
+
+/// Accumulated frames of the period and, as they follow from these, all after it.
+async fn frames(
+    store: &Store,
+    source: &Manifest,
+    window: Period,
+    is_forced: bool,
+    plan: &mut Plan,
+) -> Result<(), ComputeError> {
+    if source.quantity != Quantity::CarbonFlux {
+        return Err(ComputeError::NotAFlux {
+            product: source.product.clone(),
+            quantity: source.quantity,
+        });
+    }
+    plan.start = chosen_start(store, &source.product).await?;
+    let target = source.product.accumulated()?;
+    let latest = manifests::latest(store, &target).await?;
+    let there: BTreeSet<ObjectKey> = store
+        .list(&format!("frames/{target}"))
+        .await?
+        .into_iter()
+        .collect();
+    let mut is_broken = false;
+    for (index, (period, input)) in made_of(source, plan.start)?.into_iter().enumerate() {
+        let stored = latest.as_ref().and_then(|latest| latest.steps.get(index));
+        let reason = match stored {
+            None => Some(Reason::Missing),
+            Some(step) if step.raw_sha256 != input => Some(Reason::Stale),
+            Some(step) if !there.contains(&step.frame) => Some(Reason::Missing),
+            Some(_) if is_broken => Some(Reason::Stale),
+            Some(_) if is_forced && period.overlaps(window) => Some(Reason::Forced),
+            Some(_) => None,
+        };
+        match reason {
+            // What is whole before the asked period is left alone; what comes after a hole is not.
+            Some(reason) if is_broken || period.end > window.start => {
+                is_broken |= reason != Reason::Forced;
+                if stored.is_some() && reason != Reason::Stale {
+                    plan.anew_from.get_or_insert(period.start);
+                }
+                plan.items.push(Item {
+                    what: What::Frames,
+                    product: target.clone(),
+                    region: None,
+                    period,
+                    reason,
+                    input,
+                    measure: None,
+                });
+            }
+            _ => plan.fresh_count += 1,
+        }
+    }
+    Ok(())
+}
+
+/// Stored sums of the named regions that touch the grid.
+async fn tables(
+    store: &Store,
+    manifest: &Manifest,
+    what: What,
+    plan: &mut Plan,
+) -> Result<(), ComputeError> {
+    let measure = if what == What::Budget {
+        Measure::Mass
+    } else {
+        Measure::Mean
+    };
+    let Some(period) = manifest.extent() else {
+        return Ok(());
+    };
+    let there: BTreeSet<ObjectKey> = store
+        .list(&format!("{}/{}", sums::FOLDER, manifest.product))
+        .await?
+        .into_iter()
+        .collect();
+    for Touching { name, weights } in named::touching(store, &manifest.grid).await? {
+        let reason = if !there.contains(&sums::key(&manifest.id(), &weights, measure)) {
+            // A new version has no sums of its own yet, the first one never had any.
+            if manifest.number > 1 && !there.is_empty() {
+                Reason::Stale
+            } else {
+                Reason::Missing
+            }
+        } else if plan.is_forced {
+            Reason::Forced
+        } else {
+            plan.fresh_count += 1;
+            continue;
+        };
+        plan.items.push(Item {
+            what,
+            product: manifest.product.clone(),
+            region: Some(name.to_owned()),
+            period,
+            reason,
+            input: sums::input(&manifest.id(), &weights, measure),
+            measure: Some(measure),
+        });
+    }
+    Ok(())
+}

@@ -1,0 +1,354 @@
+//! Ballista's executor as a service: it fetches tasks from the scheduler, works on them, and serves their results.
+//!
+//! It is started before or after its scheduler and outlives it. Each of its lives has an identity of its own under the
+//! executor's name: one that came back under the identity of a killed one would be taken for it, and the tasks that were
+//! lost would be waited for for ever.
+
+use std::net::SocketAddr;
+use std::num::NonZeroUsize;
+use std::sync::Arc;
+use std::time::Duration;
+
+use ::service::{Part, Readiness, Red, Stop};
+use arrow_flight::flight_service_server::FlightServiceServer;
+use async_trait::async_trait;
+use ballista_core::error::BallistaError;
+use ballista_core::ids::new_instance_id;
+use ballista_core::registry::BallistaFunctionRegistry;
+use ballista_core::serde::BallistaCodec;
+use ballista_core::serde::protobuf::ExecutorRegistration;
+use ballista_core::serde::protobuf::scheduler_grpc_client::SchedulerGrpcClient;
+use ballista_core::serde::scheduler::{
+    ExecutorOperatingSystemSpecification, ExecutorSpecification,
+};
+use ballista_core::utils::{GrpcServerConfig, create_grpc_server};
+use ballista_core::{BALLISTA_PROTOCOL_VERSION, ConfigProducer, RuntimeProducer};
+use ballista_executor::execution_engine::DefaultExecutionEngine;
+use ballista_executor::execution_loop::poll_loop;
+use ballista_executor::executor::Executor as TaskRunner;
+use ballista_executor::flight_service::BallistaFlightService;
+use ballista_executor::health::ExecutorHealth;
+use ballista_executor::metrics::LoggingMetricsCollector;
+use datafusion::execution::memory_pool::FairSpillPool;
+use datafusion::execution::runtime_env::RuntimeEnvBuilder;
+use prometheus::{IntGauge, Registry};
+use storage::Store;
+use tokio::net::TcpListener;
+use tokio::sync::Semaphore;
+use tokio::task::JoinHandle;
+use tokio::time::Instant;
+use tokio_stream::wrappers::TcpListenerStream;
+use tonic::transport::Channel;
+
+use super::courier::Courier;
+use super::executor_metrics::CountedEngine;
+use super::executor_settings::ExecutorSettings;
+use super::heartbeat;
+use super::scheduler::store_part;
+use super::work::WorkFolder;
+use crate::{ComputeError, Objects, state};
+
+/// How often the work folder is looked at.
+const TIDY_INTERVAL: Duration = Duration::from_secs(10);
+/// Intermediate results that nobody wrote to for so long belong to queries that nobody remembers.
+const FORGOTTEN: Duration = Duration::from_hours(2);
+/// A scheduler that was not seen for so long is away.
+const AWAY: Duration = Duration::from_secs(5);
+/// How long the last report may take on the way.
+const LAST_REPORT: Duration = Duration::from_secs(7);
+
+/// An executor that holds its address and its work folder but does not work yet.
+pub struct Executor {
+    settings: ExecutorSettings,
+    listener: TcpListener,
+    address: SocketAddr,
+    registration: ExecutorRegistration,
+    work: Arc<WorkFolder>,
+    /// Executors whose folders were found without their process.
+    gone: Vec<String>,
+    objects: Objects,
+    store: Store,
+    channel: Channel,
+    courier: Courier,
+    red: Red,
+    work_bytes: IntGauge,
+}
+
+impl Executor {
+    /// Takes the address and makes the work folder. The scheduler need not be there.
+    pub async fn start(
+        settings: &ExecutorSettings,
+        store: Store,
+        registry: &Registry,
+    ) -> Result<Self, ComputeError> {
+        let objects = Objects::of(&store);
+        Self::start_over(settings, store, objects, registry).await
+    }
+
+    /// The same, reading objects from somewhere else.
+    pub async fn start_over(
+        settings: &ExecutorSettings,
+        store: Store,
+        objects: Objects,
+        registry: &Registry,
+    ) -> Result<Self, ComputeError> {
+        let listen = settings.executor_listen;
+        let listener = TcpListener::bind(listen).await.map_err(ComputeError::machine(
+            format!("cannot listen on {listen}; is another executor there? Give another --executor-listen"),
+        ))?;
+        let address = listener
+            .local_addr()
+            .map_err(ComputeError::machine("address of the executor"))?;
+        let id = format!("{}-{}", settings.executor_name, new_instance_id());
+        let (work, gone) = WorkFolder::make(&settings.executor_work, &id)?;
+        let work_bytes = IntGauge::new(
+            "fluxglobe_executor_work_bytes",
+            "Intermediate results in the work folder.",
+        )?;
+        registry.register(Box::new(work_bytes.clone()))?;
+        let channel = settings.scheduler.endpoint()?.connect_lazy();
+        tracing::info!(%address, executor = id, tasks = settings.tasks(), "executor");
+        Ok(Self {
+            registration: registration(settings, &id, address),
+            courier: Courier::new(channel.clone(), &id),
+            red: Red::register(registry, "executor")?,
+            settings: settings.clone(),
+            listener,
+            address,
+            work: Arc::new(work),
+            gone,
+            objects,
+            store,
+            channel,
+            work_bytes,
+        })
+    }
+
+    /// Where intermediate results are fetched from; the port is the real one where port 0 was asked for.
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// Its identity in this life.
+    pub fn id(&self) -> &str {
+        &self.registration.id
+    }
+
+    /// Whether it can do its work.
+    pub fn readiness(&self) -> Arc<dyn Readiness> {
+        Arc::new(ExecutorReadiness {
+            courier: self.courier.clone(),
+            store: self.store.clone(),
+        })
+    }
+
+    /// Works until asked to stop; then takes no more tasks, ends those it has, within the limit of the settings, and
+    /// takes its leave of the scheduler, which gives what is left to others.
+    pub async fn run(self, stop: Stop) -> Result<(), ComputeError> {
+        let hands = Arc::new(Semaphore::new(self.settings.tasks()));
+        let mut working = Background(tokio::spawn(poll_loop(
+            SchedulerGrpcClient::new(self.courier.clone())
+                .max_decoding_message_size(state::MESSAGE_BYTES)
+                .max_encoding_message_size(state::MESSAGE_BYTES),
+            Arc::new(self.runner()?),
+            codec(),
+            None,
+            Some(Arc::clone(&hands)),
+            ExecutorHealth::new(),
+        )));
+        let mut serving = Background(tokio::spawn(serve(self.listener, Arc::clone(&self.work))));
+        let heart = heartbeat::run(
+            self.channel,
+            self.registration.clone(),
+            self.courier.clone(),
+        );
+        let _heart = Background(tokio::spawn(heart));
+        let janitor = Janitor {
+            work: Arc::clone(&self.work),
+            work_bytes: self.work_bytes,
+            limit_bytes: self.settings.executor_work_bytes,
+            hands: Arc::clone(&hands),
+        };
+        let _janitor = Background(tokio::spawn(janitor.run()));
+        let _obituaries = Background(tokio::spawn(tell_gone(self.courier.clone(), self.gone)));
+        tokio::select! {
+            () = stop.said() => {}
+            ended = &mut serving.0 => return ended_early(ended),
+            ended = &mut working.0 => return ended_early(ended),
+        }
+        let limit = Duration::from_secs(self.settings.executor_drain_s);
+        drain(&hands, self.settings.tasks(), &self.courier, limit).await;
+        let id = &self.registration.id;
+        if let Err(error) = self.courier.tell_gone(id, "it was asked to stop").await {
+            tracing::warn!(%error, "left without a word; the scheduler notices by itself");
+        }
+        Ok(())
+    }
+
+    fn runner(&self) -> Result<TaskRunner, ComputeError> {
+        let failed = || ComputeError::engine("starting the executor");
+        let base = self.objects.runtime().map_err(failed())?;
+        let state = state::session_state(state::ballista_config(NonZeroUsize::MIN), base)
+            .map_err(failed())?;
+        let tasks = self.settings.tasks();
+        let task_bytes = (self.settings.executor_memory_bytes / tasks as u64) as usize;
+        let (objects, spills) = (self.objects.clone(), self.work.path().to_owned());
+        let runtime: RuntimeProducer = Arc::new(move |_config| {
+            let runtime = RuntimeEnvBuilder::new()
+                .with_memory_pool(Arc::new(FairSpillPool::new(task_bytes)))
+                .with_temp_file_path(spills.clone())
+                .build_arc()?;
+            objects.register(&runtime);
+            Ok(runtime)
+        });
+        let config: ConfigProducer = Arc::new(|| state::ballista_config(NonZeroUsize::MIN));
+        let folder = self.work.path().display().to_string();
+        let engine = DefaultExecutionEngine::new();
+        Ok(TaskRunner::new(
+            self.registration.clone(),
+            &folder,
+            runtime,
+            config,
+            Arc::new(BallistaFunctionRegistry::from(&state)),
+            Arc::new(LoggingMetricsCollector::default()),
+            tasks,
+            Arc::new(CountedEngine::new(engine, self.red.clone())),
+        ))
+    }
+}
+
+/// Work in the background that ends with its owner.
+struct Background<T>(JoinHandle<T>);
+
+impl<T> Drop for Background<T> {
+    fn drop(&mut self) {
+        self.0.abort();
+    }
+}
+
+fn codec() -> BallistaCodec {
+    BallistaCodec::default()
+}
+
+/// Serves intermediate results to other executors and to clients.
+async fn serve(listener: TcpListener, work: Arc<WorkFolder>) -> Result<(), BallistaError> {
+    let folder = work.path().display().to_string();
+    let flight = FlightServiceServer::new(BallistaFlightService::new(folder))
+        .max_decoding_message_size(state::MESSAGE_BYTES)
+        .max_encoding_message_size(state::MESSAGE_BYTES);
+    create_grpc_server(&GrpcServerConfig::default())
+        .add_service(flight)
+        .serve_with_incoming(TcpListenerStream::new(listener))
+        .await
+        .map_err(BallistaError::from)
+}
+
+fn ended_early(
+    ended: Result<Result<(), BallistaError>, tokio::task::JoinError>,
+) -> Result<(), ComputeError> {
+    ended
+        .unwrap_or_else(|e| Err(BallistaError::TokioError(e)))
+        .map_err(ComputeError::cluster("working as executor"))
+}
+
+/// Takes no more tasks and waits for those under way, and then for the report on the last of them.
+async fn drain(hands: &Semaphore, tasks: usize, courier: &Courier, limit: Duration) {
+    let all_free = hands.acquire_many(tasks as u32);
+    let Ok(Ok(_held)) = tokio::time::timeout(limit, all_free).await else {
+        tracing::warn!("stopping while tasks run; the scheduler gives them to others");
+        return;
+    };
+    // The request under way may have been sent before the last task ended; the one after it holds the report.
+    let (reported, begun) = (courier.answer_count() + 2, Instant::now());
+    while courier.answer_count() < reported && begun.elapsed() < LAST_REPORT.min(limit) {
+        tokio::time::sleep(Duration::from_millis(50)).await;
+    }
+}
+
+/// Tells the scheduler of executors that died here and left their folders, so that it need not wait for them.
+async fn tell_gone(courier: Courier, gone: Vec<String>) {
+    for id in gone {
+        let mut pauses = ::service::pauses();
+        while let Err(error) = courier.tell_gone(&id, "its process is gone").await {
+            tracing::debug!(executor = id, %error, "the scheduler cannot be told yet");
+            tokio::time::sleep(pauses.next().unwrap_or(AWAY)).await;
+        }
+        tracing::info!(executor = id, "told the scheduler that an executor is gone");
+    }
+}
+
+/// Removes forgotten intermediate results, and takes no new task while there are too many others.
+struct Janitor {
+    work: Arc<WorkFolder>,
+    work_bytes: IntGauge,
+    limit_bytes: u64,
+    hands: Arc<Semaphore>,
+}
+
+impl Janitor {
+    async fn run(self) {
+        let mut held = vec![];
+        loop {
+            let work = Arc::clone(&self.work);
+            let tidied = tokio::task::spawn_blocking(move || work.tidy(FORGOTTEN)).await;
+            let bytes = tidied.unwrap_or(0);
+            self.work_bytes.set(bytes as i64);
+            if bytes <= self.limit_bytes {
+                held.clear();
+            } else {
+                let limit_bytes = self.limit_bytes;
+                tracing::warn!(
+                    bytes,
+                    limit_bytes,
+                    "too many intermediate results: no new task"
+                );
+                // Hands that are busy now are taken the next time.
+                while let Ok(hand) = Arc::clone(&self.hands).try_acquire_owned() {
+                    held.push(hand);
+                }
+            }
+            tokio::time::sleep(TIDY_INTERVAL).await;
+        }
+    }
+}
+
+/// What the executor tells the scheduler about itself.
+fn registration(
+    settings: &ExecutorSettings,
+    id: &str,
+    address: SocketAddr,
+) -> ExecutorRegistration {
+    let specification = ExecutorSpecification::default().with_vcores(settings.tasks() as u32);
+    ExecutorRegistration {
+        id: id.to_owned(),
+        host: settings.executor_host.clone(),
+        port: u32::from(address.port()),
+        // Tasks are pulled: nobody calls the executor on this port.
+        grpc_port: 0,
+        specification: Some(specification.into()),
+        os_info: Some(ExecutorOperatingSystemSpecification::default().into()),
+        ballista_protocol_version: BALLISTA_PROTOCOL_VERSION,
+    }
+}
+
+struct ExecutorReadiness {
+    courier: Courier,
+    store: Store,
+}
+
+#[async_trait]
+impl Readiness for ExecutorReadiness {
+    async fn parts(&self) -> Vec<Part> {
+        let seen = async {
+            match self.courier.silence() {
+                Some(silence) if silence < AWAY => Ok("it answers".to_owned()),
+                Some(silence) => Err(format!("not seen for {} s", silence.as_secs())),
+                None => Err("never seen yet".to_owned()),
+            }
+        };
+        vec![
+            Part::required("scheduler", seen).await,
+            store_part(&self.store).await,
+        ]
+    }
+}

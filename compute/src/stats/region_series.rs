@@ -1,0 +1,132 @@
+//! The series of a product over a region: its mean over the cells that hold data, by area, for every step.
+
+use contract::earth::Earth;
+use contract::manifest::{Manifest, ManifestId};
+use contract::product::ProductId;
+use contract::region::Region;
+use contract::time::TimeMs;
+use serde::{Deserialize, Serialize};
+
+use crate::budget::fixed::{AREA_DECIMALS, MASS_DECIMALS};
+use crate::budget::rows::StepSum;
+use crate::budget::steps_inside;
+use crate::budget::sums::{self, Measure};
+use crate::region::{area, weights};
+use crate::{ComputeError, Engine, catalog};
+
+/// What a series over a region is asked for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RegionSeriesQuery {
+    /// Product.
+    pub product: ProductId,
+    /// Region.
+    pub region: Region,
+    /// What the answer calls the region.
+    pub region_name: String,
+    /// First instant; the product's first if absent.
+    pub from: Option<TimeMs>,
+    /// First instant after the asked period; the product's end if absent.
+    pub to: Option<TimeMs>,
+    /// Figure of the earth.
+    pub earth: Earth,
+}
+
+/// One step of a series.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct RegionValue {
+    /// First instant that it covers.
+    pub start: TimeMs,
+    /// First instant after it.
+    pub end: TimeMs,
+    /// Mean by area over the cells with data, in the answer's unit; none where no cell has any.
+    pub mean: Option<f64>,
+    /// Area that holds data, m².
+    pub area_m2: f64,
+    /// Share of the region's area that holds data, percent. Land counts as without data.
+    pub coverage_percent: f64,
+}
+
+/// A series with all that is needed to cite it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RegionSeries {
+    /// Product.
+    pub product: ProductId,
+    /// The version of the product that was read.
+    pub manifest: ManifestId,
+    /// Title of the product.
+    pub title: String,
+    /// Citation of the product.
+    pub source: String,
+    /// Made up by a program rather than measured.
+    pub synthetic: bool,
+    /// Name of the quantity.
+    pub quantity: String,
+    /// Unit of the values.
+    pub unit: String,
+    /// Name of the region.
+    pub region: String,
+    /// Area of the region, land included, m².
+    pub region_area_m2: f64,
+    /// Figure of the earth.
+    pub earth: Earth,
+    /// Values in the order of time.
+    pub series: Vec<RegionValue>,
+}
+
+/// The series of a product over a region.
+pub async fn region_series(
+    engine: &Engine,
+    query: &RegionSeriesQuery,
+) -> Result<RegionSeries, ComputeError> {
+    let manifest = catalog::product(engine.store(), &query.product).await?;
+    region_series_of(engine, query, &manifest).await
+}
+
+/// The same of one version of a product.
+pub async fn region_series_of(
+    engine: &Engine,
+    query: &RegionSeriesQuery,
+    manifest: &Manifest,
+) -> Result<RegionSeries, ComputeError> {
+    let (_window, steps) = steps_inside(manifest, query.from, query.to)?;
+    let region_area_m2 = area::region_area_m2(&query.region, query.earth)?;
+    let weights =
+        weights::stored(engine.store(), &manifest.grid, &query.region, query.earth).await?;
+    let Some(weights) = weights else {
+        let (product, bounds) = (manifest.product.clone(), catalog::bounds_text(manifest));
+        return Err(ComputeError::RegionOutside { product, bounds });
+    };
+    let sums = sums::of_steps(engine, manifest, &steps, &weights, Measure::Mean).await?;
+    let display = manifest.quantity.display();
+    let value = |sum: &StepSum| {
+        let (mean, area_m2) = mean_and_area(sum);
+        RegionValue {
+            start: sum.period.start,
+            end: sum.period.end,
+            mean: mean.map(|mean| mean * display.factor + display.offset),
+            area_m2,
+            // Cells and the whole region are rounded apart, so a full region could come out a hair above.
+            coverage_percent: (100.0 * area_m2 / region_area_m2).min(100.0),
+        }
+    };
+    Ok(RegionSeries {
+        product: manifest.product.clone(),
+        manifest: manifest.id(),
+        title: manifest.title.clone(),
+        source: manifest.source.clone(),
+        synthetic: manifest.synthetic,
+        quantity: manifest.quantity.title().to_owned(),
+        unit: display.unit.to_owned(),
+        region: query.region_name.clone(),
+        region_area_m2,
+        earth: query.earth,
+        series: sums.iter().map(value).collect(),
+    })
+}
+
+/// Mean in the stored unit over the cells with data, none without any, and their area, m².
+fn mean_and_area(sum: &StepSum) -> (Option<f64>, f64) {
+    let area_m2 = sum.area_steps as f64 / 10f64.powi(AREA_DECIMALS as i32);
+    let integral = sum.mass_steps as f64 / 10f64.powi(MASS_DECIMALS as i32);
+    ((sum.area_steps > 0).then(|| integral / area_m2), area_m2)
+}

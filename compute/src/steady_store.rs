@@ -1,0 +1,276 @@
+//! An object store whose reads are tried again when they fail for a passing reason.
+//!
+//! Ballista gives a job up at the first error of an object store, but runs a task again, perhaps elsewhere, after an I/O
+//! error. So what still fails after the tries here is handed on as one.
+
+use std::fmt::{Display, Formatter};
+use std::future::Future;
+use std::ops::Range;
+use std::sync::Arc;
+use std::time::Duration;
+
+use tokio::time::Instant;
+
+use async_trait::async_trait;
+use bytes::Bytes;
+use datafusion::error::DataFusionError;
+use futures::StreamExt as _;
+use futures::stream::{self, BoxStream};
+use object_store::path::Path;
+use object_store::{
+    CopyOptions, Error, GetOptions, GetRange, GetResult, GetResultPayload, ListResult,
+    MultipartUpload, ObjectMeta, ObjectStore, PutMultipartOptions, PutOptions, PutPayload,
+    PutResult, Result,
+};
+
+/// How long one read is tried here; stores behind a network have tried for long before.
+const PATIENCE: Duration = Duration::from_secs(5);
+/// The largest part of an object that is fetched as one: more is handed on as it comes.
+const WHOLE_BYTES: u64 = 64 << 20;
+
+/// The decorator. Writes pass through: nothing is written on the way of a query.
+#[derive(Debug)]
+pub(crate) struct SteadyStore {
+    inner: Arc<dyn ObjectStore>,
+    /// How long one read is tried.
+    patience: Duration,
+}
+
+impl SteadyStore {
+    pub(crate) fn new(inner: Arc<dyn ObjectStore>) -> Self {
+        let patience = PATIENCE;
+        Self { inner, patience }
+    }
+
+    /// Tries until it succeeds, fails for good, or patience is at its end.
+    async fn steadily<T, F, Fut>(&self, what: &Path, attempt: F) -> Result<T>
+    where
+        F: Fn() -> Fut,
+        Fut: Future<Output = Result<T>>,
+    {
+        let begun = Instant::now();
+        let mut pauses = ::service::pauses();
+        loop {
+            let error = match attempt().await {
+                Err(error) if may_pass(&error) => error,
+                ended => return ended,
+            };
+            match pauses.next() {
+                Some(pause) if begun.elapsed() + pause < self.patience => {
+                    tracing::debug!(object = %what, %error, "reading again");
+                    tokio::time::sleep(pause).await;
+                }
+                _ => return Err(as_io(error)),
+            }
+        }
+    }
+}
+
+impl Display for SteadyStore {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        write!(f, "steady {}", self.inner)
+    }
+}
+
+/// May the same read succeed later?
+fn may_pass(error: &Error) -> bool {
+    matches!(error, Error::Generic { .. } | Error::JoinError { .. })
+}
+
+/// The same failure, so that whoever looks for its root finds an I/O error.
+fn as_io(error: Error) -> Error {
+    let root = DataFusionError::IoError(std::io::Error::other(error));
+    Error::Generic {
+        store: "object store",
+        source: Box::new(root),
+    }
+}
+
+#[async_trait]
+impl ObjectStore for SteadyStore {
+    async fn put_opts(
+        &self,
+        location: &Path,
+        payload: PutPayload,
+        options: PutOptions,
+    ) -> Result<PutResult> {
+        self.inner.put_opts(location, payload, options).await
+    }
+
+    async fn put_multipart_opts(
+        &self,
+        location: &Path,
+        options: PutMultipartOptions,
+    ) -> Result<Box<dyn MultipartUpload>> {
+        self.inner.put_multipart_opts(location, options).await
+    }
+
+    async fn get_opts(&self, location: &Path, options: GetOptions) -> Result<GetResult> {
+        let is_small = match &options.range {
+            Some(GetRange::Bounded(range)) => range.end.saturating_sub(range.start) <= WHOLE_BYTES,
+            Some(GetRange::Suffix(bytes)) => *bytes <= WHOLE_BYTES,
+            _ => false,
+        };
+        self.steadily(location, || async {
+            let found = self.inner.get_opts(location, options.clone()).await?;
+            if is_small && !options.head {
+                whole(found).await
+            } else {
+                Ok(found)
+            }
+        })
+        .await
+    }
+
+    async fn get_ranges(&self, location: &Path, ranges: &[Range<u64>]) -> Result<Vec<Bytes>> {
+        self.steadily(location, || self.inner.get_ranges(location, ranges))
+            .await
+    }
+
+    fn delete_stream(
+        &self,
+        locations: BoxStream<'static, Result<Path>>,
+    ) -> BoxStream<'static, Result<Path>> {
+        self.inner.delete_stream(locations)
+    }
+
+    fn list(&self, prefix: Option<&Path>) -> BoxStream<'static, Result<ObjectMeta>> {
+        self.inner.list(prefix)
+    }
+
+    async fn list_with_delimiter(&self, prefix: Option<&Path>) -> Result<ListResult> {
+        let what = prefix.cloned().unwrap_or_default();
+        self.steadily(&what, || self.inner.list_with_delimiter(prefix))
+            .await
+    }
+
+    async fn copy_opts(&self, from: &Path, to: &Path, options: CopyOptions) -> Result<()> {
+        self.inner.copy_opts(from, to, options).await
+    }
+}
+
+/// An answer with its content fetched, so that a connection lost half way is noticed while it can be tried again.
+async fn whole(found: GetResult) -> Result<GetResult> {
+    let (meta, range, attributes) = (
+        found.meta.clone(),
+        found.range.clone(),
+        found.attributes.clone(),
+    );
+    let content = found.bytes().await?;
+    let payload = stream::once(std::future::ready(Ok(content))).boxed();
+    Ok(GetResult {
+        payload: GetResultPayload::Stream(payload),
+        meta,
+        range,
+        attributes,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use object_store::ObjectStoreExt as _;
+    use object_store::memory::InMemory;
+    use std::sync::atomic::{AtomicU32, Ordering};
+
+    /// Fails the first reads.
+    #[derive(Debug)]
+    struct Failing {
+        inner: InMemory,
+        left: AtomicU32,
+    }
+
+    impl Display for Failing {
+        fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+            f.write_str("failing")
+        }
+    }
+
+    #[async_trait]
+    impl ObjectStore for Failing {
+        async fn put_opts(&self, at: &Path, what: PutPayload, o: PutOptions) -> Result<PutResult> {
+            self.inner.put_opts(at, what, o).await
+        }
+        async fn put_multipart_opts(
+            &self,
+            at: &Path,
+            o: PutMultipartOptions,
+        ) -> Result<Box<dyn MultipartUpload>> {
+            self.inner.put_multipart_opts(at, o).await
+        }
+        async fn get_opts(&self, at: &Path, o: GetOptions) -> Result<GetResult> {
+            let left = self
+                .left
+                .fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| {
+                    left.checked_sub(1)
+                });
+            if left.is_ok() {
+                return Err(Error::Generic {
+                    store: "failing",
+                    source: "500 Internal Server Error".into(),
+                });
+            }
+            self.inner.get_opts(at, o).await
+        }
+        fn delete_stream(
+            &self,
+            at: BoxStream<'static, Result<Path>>,
+        ) -> BoxStream<'static, Result<Path>> {
+            self.inner.delete_stream(at)
+        }
+        fn list(&self, prefix: Option<&Path>) -> BoxStream<'static, Result<ObjectMeta>> {
+            self.inner.list(prefix)
+        }
+        async fn list_with_delimiter(&self, prefix: Option<&Path>) -> Result<ListResult> {
+            self.inner.list_with_delimiter(prefix).await
+        }
+        async fn copy_opts(&self, from: &Path, to: &Path, o: CopyOptions) -> Result<()> {
+            self.inner.copy_opts(from, to, o).await
+        }
+    }
+
+    async fn failing(times: u32) -> (Arc<Failing>, SteadyStore) {
+        let inner = InMemory::new();
+        inner.put(&Path::from("a"), "content".into()).await.unwrap();
+        let failing = Arc::new(Failing {
+            inner,
+            left: AtomicU32::new(times),
+        });
+        let mut steady = SteadyStore::new(Arc::clone(&failing) as Arc<dyn ObjectStore>);
+        steady.patience = Duration::from_secs(2);
+        (failing, steady)
+    }
+
+    #[tokio::test]
+    async fn a_read_that_fails_for_a_while_is_tried_until_it_succeeds() {
+        let (failing, steady) = failing(3).await;
+        let part = steady.get_range(&Path::from("a"), 0..3).await.unwrap();
+        assert_eq!(part, "con");
+        assert_eq!(
+            failing.left.load(Ordering::Relaxed),
+            0,
+            "the fault never fired"
+        );
+    }
+
+    #[tokio::test]
+    async fn what_fails_for_long_is_an_io_error_at_its_root() {
+        let (_failing, steady) = failing(u32::MAX).await;
+        let begun = Instant::now();
+        let error = steady.head(&Path::from("a")).await.unwrap_err();
+        assert!(begun.elapsed() <= 2 * steady.patience);
+        assert!(error.to_string().contains("500"), "{error}");
+        let error = DataFusionError::from(error);
+        assert!(
+            matches!(error.find_root(), DataFusionError::IoError(_)),
+            "{error:?}"
+        );
+    }
+
+    #[tokio::test]
+    async fn an_object_that_is_not_there_is_not_waited_for() {
+        let (_failing, steady) = failing(0).await;
+        let missing = steady.head(&Path::from("b")).await.unwrap_err();
+        assert!(matches!(missing, Error::NotFound { .. }));
+    }
+}

@@ -1,0 +1,181 @@
+//! A cluster of real processes: the same bits as one process, whatever is killed on the way.
+
+use std::time::{Duration, Instant};
+
+use compute::{BudgetAnswer, BudgetQuery, BudgetStep, Engine, budget, derive_accumulated};
+use contract::quantity::Quantity;
+use contract::region::{Polygon, Region};
+use storage::Store;
+
+use crate::fixture::{ONE_DEGREE, ask, folder_store, land, parts, product, total, wavy_year};
+use crate::node::Cluster;
+
+/// Parts that queries are cut into, whatever the number of executors.
+const PARTS: usize = 8;
+
+async fn wavy_store() -> (tempfile::TempDir, Store) {
+    let (folder, store) = folder_store();
+    let (id, year) = (product("wavy"), wavy_year(&ONE_DEGREE));
+    land(&store, &id, Quantity::CarbonFlux, ONE_DEGREE, &year, 12).await;
+    (folder, store)
+}
+
+fn engine(store: &Store, cluster: &Cluster) -> Engine {
+    let url = cluster.address.to_string().parse().unwrap();
+    Engine::cluster(store.clone(), url, parts(PARTS))
+}
+
+fn monthly(region: &str) -> BudgetQuery {
+    BudgetQuery {
+        step: BudgetStep::Month,
+        ..total(&product("wavy"), region)
+    }
+}
+
+/// A coast of 60,000 corners: far more than one message between client and scheduler may hold, were it sent in one.
+fn rugged() -> BudgetQuery {
+    let corner = |i: u32| {
+        let angle = f64::from(i) / 60_000.0 * std::f64::consts::TAU;
+        let radius_deg = 30.0 + 3.0 * (f64::from(i) * 0.7).sin();
+        [
+            -140.0 + radius_deg * angle.cos(),
+            5.0 + radius_deg * angle.sin(),
+        ]
+    };
+    BudgetQuery {
+        region: Region::Polygons(vec![Polygon {
+            outer: (0..60_000).map(corner).collect(),
+            holes: vec![],
+        }]),
+        region_name: "rugged".to_owned(),
+        ..monthly("global")
+    }
+}
+
+fn questions() -> Vec<BudgetQuery> {
+    let regions = ["global", "equatorial-pacific", "170.5,-33.3,-120.1,12.7"];
+    let mut all: Vec<_> = regions.into_iter().map(monthly).collect();
+    all.push(rugged());
+    all
+}
+
+async fn answers(engine: &Engine) -> Vec<BudgetAnswer> {
+    let mut answers = vec![];
+    for question in questions() {
+        answers.push(ask(engine, &question).await);
+    }
+    answers
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn one_two_and_eight_executors_give_the_bits_of_one_process() {
+    let (folder, store) = wavy_store().await;
+    let alone = answers(&Engine::standalone(store.clone(), parts(2))).await;
+    assert_eq!(alone[3].rows.len(), 12);
+    let mut cluster = Cluster::start(folder.path());
+    let mut derived = vec![];
+    for executor_count in [1, 2, 8] {
+        cluster.add(executor_count - cluster.executors.len(), 0, 0);
+        let engine = engine(&store, &cluster);
+        engine.ready().await.unwrap();
+        let begun = Instant::now();
+        assert_eq!(answers(&engine).await, alone, "{executor_count} executors");
+        eprintln!(
+            "{executor_count} executors: four budgets in {:?}",
+            begun.elapsed()
+        );
+
+        // Into a store of its own, so that nothing is there already; executors read any folder of this machine.
+        let (_own, own_store) = wavy_store().await;
+        let engine = self::engine(&own_store, &cluster);
+        let manifest = derive_accumulated(&engine, &product("wavy"), None, &|_| ()).await;
+        derived.push(manifest.unwrap());
+    }
+    let alone = Engine::standalone(store, parts(2));
+    let manifest = derive_accumulated(&alone, &product("wavy"), None, &|_| ()).await;
+    let manifest = manifest.unwrap();
+    assert!(derived.iter().all(|other| *other == manifest));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_executor_killed_in_the_middle_is_noticed_within_five_seconds_and_changes_nothing() {
+    let (folder, store) = wavy_store().await;
+    let expected = ask(&Engine::local(store.clone()), &monthly("global")).await;
+    let mut cluster = Cluster::start(folder.path());
+    cluster.add(3, 300, 0);
+    let engine = engine(&store, &cluster);
+    let asking = tokio::spawn(async move { budget(&engine, &monthly("global")).await });
+    cluster.busy(0);
+    assert!(!asking.is_finished(), "the query was over before the kill");
+    let heard = cluster.scheduler.line_count();
+    cluster.executors[0].kill();
+    let killed = Instant::now();
+    let (noticed, _, _) = cluster.scheduler.heard("EXECUTORS 2", heard);
+    let notice = noticed - killed;
+    assert_eq!(asking.await.unwrap().unwrap(), expected);
+    eprintln!(
+        "executor lost: noticed after {notice:?}, answered {:?} after the kill",
+        killed.elapsed()
+    );
+    assert!(notice < Duration::from_secs(5), "{notice:?}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_scheduler_killed_in_the_middle_is_asked_again_when_it_is_back() {
+    let (folder, store) = wavy_store().await;
+    let expected = ask(&Engine::local(store.clone()), &monthly("global")).await;
+    let mut cluster = Cluster::start(folder.path());
+    cluster.add(2, 200, 0);
+    let engine = engine(&store, &cluster);
+    let asking = tokio::spawn(async move { budget(&engine, &monthly("global")).await });
+    cluster.busy(0);
+    assert!(!asking.is_finished(), "the query was over before the kill");
+    cluster.scheduler.kill();
+    let killed = Instant::now();
+    cluster.restart_scheduler();
+    assert_eq!(asking.await.unwrap().unwrap(), expected);
+    cluster.scheduler.heard("EXECUTORS 2", 0);
+    eprintln!(
+        "scheduler lost: answered {:?} after the kill",
+        killed.elapsed()
+    );
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn executors_and_scheduler_may_be_started_in_any_order_and_leave_in_peace() {
+    let (folder, store) = wavy_store().await;
+    let expected = ask(&Engine::local(store.clone()), &monthly("global")).await;
+    let mut cluster = Cluster::start(folder.path());
+    let engine = engine(&store, &cluster);
+    // A question before there is anybody to answer it, and executors before there is a scheduler.
+    cluster.scheduler.kill();
+    let early = engine.clone();
+    let asking = tokio::spawn(async move { budget(&early, &monthly("global")).await });
+    tokio::time::sleep(Duration::from_millis(300)).await;
+    cluster.restart_scheduler();
+    cluster.add(2, 0, 0);
+    assert_eq!(asking.await.unwrap().unwrap(), expected);
+    let heard = cluster.scheduler.line_count();
+    let begun = Instant::now();
+    cluster.executors[0].stop();
+    cluster.scheduler.heard("EXECUTORS 1", heard);
+    eprintln!("an executor left after {:?}", begun.elapsed());
+    assert_eq!(ask(&engine, &monthly("global")).await, expected);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_store_that_fails_for_a_while_changes_nothing() {
+    let (folder, store) = wavy_store().await;
+    let expected = ask(&Engine::local(store.clone()), &monthly("global")).await;
+    let mut cluster = Cluster::start(folder.path());
+    // Longer than one executor tries by itself: the scheduler has the task run again.
+    cluster.add(2, 0, 8_000);
+    let engine = engine(&store, &cluster);
+    let begun = Instant::now();
+    assert_eq!(ask(&engine, &monthly("global")).await, expected);
+    eprintln!("store away for 8 s: answered after {:?}", begun.elapsed());
+    let failed = cluster.executors.iter().any(|node| {
+        node.line_count() > 2 // its address, its identity, and failures
+    });
+    assert!(failed, "the store never failed");
+}

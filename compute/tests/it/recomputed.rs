@@ -1,0 +1,236 @@
+//! Recomputation and clean-up: plans that say what is stale, runs that mend it, old versions that go in the end.
+
+use std::time::Duration;
+
+use compute::gc::{self, Keep};
+use compute::recompute::{Reason, Request, What, plan, run};
+use compute::stats::{RegionSeriesQuery, region_series};
+use compute::{Engine, derive_accumulated};
+use contract::earth::Earth;
+use contract::grid::Grid;
+use contract::manifest::Manifest;
+use contract::quantity::Quantity;
+use contract::time::{Period, TimeMs};
+use storage::{Store, manifests};
+
+use crate::fixture::{ask, folder_store, land, product, total, wavy_year};
+
+const TEN_DEGREES: Grid = Grid {
+    rows: 18,
+    cols: 36,
+    north_deg: 90.0,
+    west_deg: -180.0,
+    dlat_deg: 10.0,
+    dlon_deg: 10.0,
+};
+
+async fn put(store: &Store, steps: &[(Period, Vec<f32>)]) -> Manifest {
+    let id = product("wavy");
+    land(store, &id, Quantity::CarbonFlux, TEN_DEGREES, steps, 12).await
+}
+
+fn request(what: &[What]) -> Request {
+    Request {
+        product: product("wavy"),
+        from: None,
+        to: None,
+        what: what.to_vec(),
+        is_forced: false,
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_plan_names_what_is_missing_and_stale_and_a_run_leaves_nothing_of_it() {
+    let mut year = wavy_year(&TEN_DEGREES);
+    let (_folder, store) = folder_store();
+    put(&store, &year).await;
+    let engine = Engine::local(store.clone());
+    let all = request(&[What::Budget, What::Frames, What::Statistics]);
+    let first = plan(&store, &all).await.unwrap();
+    let count = |kind: What| first.items.iter().filter(|item| item.what == kind).count();
+    assert_eq!(count(What::Frames), 12);
+    assert!(count(What::Budget) >= 8 && count(What::Budget) == count(What::Statistics));
+    assert!(
+        first
+            .items
+            .iter()
+            .all(|item| item.reason == Reason::Missing)
+    );
+    let outcome = run(&engine, &first, &|_done| ()).await.unwrap();
+    assert_eq!(outcome.derived.unwrap().number, 1);
+    let second = plan(&store, &all).await.unwrap();
+    assert_eq!(
+        (second.items.len(), second.fresh_count),
+        (0, first.items.len())
+    );
+
+    year[10].1[300] = 4e-9;
+    put(&store, &year).await;
+    let third = plan(&store, &all).await.unwrap();
+    let frames: Vec<_> = third
+        .items
+        .iter()
+        .filter(|item| item.what == What::Frames)
+        .collect();
+    assert_eq!(frames.len(), 2, "November and what follows from it");
+    assert!(third.items.iter().all(|item| item.reason == Reason::Stale));
+    run(&engine, &third, &|_done| ()).await.unwrap();
+    assert!(plan(&store, &all).await.unwrap().items.is_empty());
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_lost_frame_is_planned_and_made_again_without_a_new_version() {
+    let year = wavy_year(&TEN_DEGREES);
+    let (folder, store) = folder_store();
+    put(&store, &year).await;
+    let engine = Engine::local(store.clone());
+    let derived = derive_accumulated(&engine, &product("wavy"), None, &|_| ()).await;
+    let derived = derived.unwrap();
+    std::fs::remove_file(folder.path().join(derived.steps[8].frame.as_str())).unwrap();
+    let frames = request(&[What::Frames]);
+    let mend = plan(&store, &frames).await.unwrap();
+    assert_eq!(mend.items.len(), 4);
+    assert_eq!(mend.items[0].reason, Reason::Missing);
+    let outcome = run(&engine, &mend, &|_done| ()).await.unwrap();
+    assert_eq!(outcome.derived.unwrap(), derived);
+    assert!(store.exists(&derived.steps[8].frame).await.unwrap());
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn forced_recomputation_compares_with_what_is_stored() {
+    let year = wavy_year(&TEN_DEGREES);
+    let (folder, store) = folder_store();
+    put(&store, &year).await;
+    let engine = Engine::local(store.clone());
+    let budgets = request(&[What::Budget]);
+    run(&engine, &plan(&store, &budgets).await.unwrap(), &|_| ())
+        .await
+        .unwrap();
+    let forced = Request {
+        is_forced: true,
+        ..budgets
+    };
+    let again = plan(&store, &forced).await.unwrap();
+    assert!(again.items.iter().all(|item| item.reason == Reason::Forced));
+    run(&engine, &again, &|_| ()).await.unwrap();
+    // The planted fault: one digit of one stored sum.
+    let tables = folder.path().join("sums/wavy");
+    let table = std::fs::read_dir(tables)
+        .unwrap()
+        .next()
+        .unwrap()
+        .unwrap()
+        .path();
+    let text = std::fs::read_to_string(&table).unwrap();
+    let spoilt = text.replacen("\"mass_steps\":\"", "\"mass_steps\":\"7", 1);
+    let spoilt = spoilt.replacen(":\"7-", ":\"-7", 1);
+    assert_ne!(spoilt, text);
+    std::fs::write(&table, spoilt).unwrap();
+    assert!(run(&engine, &again, &|_| ()).await.is_err());
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn stored_sums_answer_with_the_same_bits_and_without_the_engine() {
+    let year = wavy_year(&TEN_DEGREES);
+    let (folder, store) = folder_store();
+    let manifest = put(&store, &year).await;
+    let engine = Engine::local(store.clone());
+    let question = total(&product("wavy"), "14n-50n");
+    let computed = ask(&engine, &question).await;
+    let budgets = plan(&store, &request(&[What::Budget])).await.unwrap();
+    run(&engine, &budgets, &|_| ()).await.unwrap();
+    // Without frames no engine could answer.
+    for step in &manifest.steps {
+        std::fs::remove_file(folder.path().join(step.frame.as_str())).unwrap();
+    }
+    assert_eq!(ask(&engine, &question).await, computed);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_mean_over_a_region_is_the_mean_by_area() {
+    let (_folder, store) = folder_store();
+    let mut values = vec![f32::NAN; TEN_DEGREES.cell_count()];
+    let (north, equator) = (2 * 36, 8 * 36); // cells 60 to 70 and 0 to 10 degrees north
+    values[north] = 280.0;
+    values[equator] = 300.0;
+    let january = Period::month(2000, 1).unwrap();
+    let id = product("sst");
+    let sst = Quantity::SeaSurfaceTemperature;
+    land(&store, &id, sst, TEN_DEGREES, &[(january, values)], 1).await;
+    let query = RegionSeriesQuery {
+        product: id,
+        region: "-180,0,-170,90".parse().unwrap(),
+        region_name: "strip".to_owned(),
+        from: None,
+        to: None,
+        earth: Earth::Sphere,
+    };
+    let answer = region_series(&Engine::local(store), &query).await.unwrap();
+    let strip = |south: f64, north: f64| north.to_radians().sin() - south.to_radians().sin();
+    let (a, b) = (strip(60.0, 70.0), strip(0.0, 10.0));
+    let display = sst.display();
+    let expected = (280.0 * a + 300.0 * b) / (a + b) * display.factor + display.offset;
+    let mean = answer.series[0].mean.unwrap();
+    assert!((mean / expected - 1.0).abs() < 1e-9, "{mean} {expected}");
+    let covered = 100.0 * (a + b) / strip(0.0, 90.0);
+    assert!((answer.series[0].coverage_percent / covered - 1.0).abs() < 1e-9);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn clean_up_takes_what_no_kept_version_names_and_nothing_young() {
+    let mut year = wavy_year(&TEN_DEGREES);
+    let (_folder, store) = folder_store();
+    let engine = Engine::local(store.clone());
+    let mut versions = vec![];
+    for round in 0..3 {
+        year[4].1[300] = 1e-9 * round as f32;
+        put(&store, &year).await;
+        let derived = derive_accumulated(&engine, &product("wavy"), None, &|_| ()).await;
+        versions.push(derived.unwrap());
+    }
+    let stranger = "notes/by-hand.txt".parse().unwrap();
+    store.put_new(&stranger, "x".into()).await.unwrap();
+    let keep = Keep {
+        versions: 1,
+        age: Duration::from_secs(86_400),
+    };
+    let now = now();
+    assert!(
+        gc::plan(&store, keep, now)
+            .await
+            .unwrap()
+            .garbage
+            .is_empty()
+    );
+    let in_two_days = TimeMs::new(now.ms() + 2 * 86_400_000).unwrap();
+    let removal = gc::plan(&store, keep, in_two_days).await.unwrap();
+    assert!(removal.size_bytes() > 0);
+    let removed = gc::run(&store, &removal, keep, &|_done| ()).await.unwrap();
+    assert_eq!(removed, removal.garbage.len());
+
+    let target = product("wavy-accumulated");
+    assert_eq!(
+        manifests::latest(&store, &target).await.unwrap().unwrap(),
+        versions[2]
+    );
+    for step in &versions[2].steps {
+        assert!(store.exists(&step.frame).await.unwrap());
+    }
+    assert!(!store.exists(&versions[0].steps[4].frame).await.unwrap());
+    assert!(manifests::load(&store, &versions[0].id()).await.is_err());
+    assert!(store.exists(&stranger).await.unwrap());
+    let nothing = gc::plan(&store, keep, in_two_days).await.unwrap();
+    assert!(nothing.garbage.is_empty());
+    // What is left is enough to go on from.
+    year[11].1[300] = 5e-9;
+    put(&store, &year).await;
+    let next = derive_accumulated(&engine, &product("wavy"), None, &|_| ()).await;
+    assert_eq!(next.unwrap().number, 4);
+}
+
+fn now() -> TimeMs {
+    let since = std::time::SystemTime::now()
+        .duration_since(std::time::UNIX_EPOCH)
+        .unwrap();
+    TimeMs::new(since.as_millis() as i64).unwrap()
+}
