@@ -45,7 +45,7 @@ check_shell() {
     fi
     local scripts
     mapfile -t scripts < <(git ls-files '*.sh' | sed 's|^|./|')
-    checked "shellcheck of ${#scripts[@]} scripts" "$tools/bin/shellcheck" --external-sources --source-path=SCRIPTDIR "${scripts[@]}"
+    checked "shellcheck of ${#scripts[@]} scripts" "$tools/bin/shellcheck" --external-sources --source-path=SCRIPTDIR --source-path=.. "${scripts[@]}"
     printf '%s\n' '#!/bin/bash' "rm -r \$1" >"$work/fault.sh"
     refused shellcheck SC2086 "$tools/bin/shellcheck" "$work/fault.sh"
 }
