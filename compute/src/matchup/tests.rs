@@ -1,0 +1,158 @@
+//! A small product in memory against observations whose partners are known by hand.
+
+use contract::digest::Digest;
+use contract::grid::Grid;
+use contract::key::ObjectKey;
+use contract::manifest::{MANIFEST_SCHEMA, Step};
+use contract::observation::{PlatformKind, Quality};
+use contract::quantity::Quantity;
+use contract::time::Period;
+
+use super::*;
+use crate::ErrorClass;
+
+/// Four cells of 90 x 90 degrees north of the equator.
+const GRID: Grid = Grid {
+    rows: 1,
+    cols: 4,
+    north_deg: 90.0,
+    west_deg: -180.0,
+    dlat_deg: 90.0,
+    dlon_deg: 90.0,
+};
+
+/// January and February 2010, K; the last cell has no data in February.
+async fn product(store: &Store) -> Manifest {
+    let product: ProductId = "sst".parse().unwrap();
+    let months = [
+        (1, [280.0, 281.0, 282.0, 283.0]),
+        (2, [290.0, 291.0, 292.0, f32::NAN]),
+    ];
+    let mut steps = vec![];
+    for (month, values) in months {
+        let period = Period::month(2010, month).unwrap();
+        let frame = frames::write(store, &product, &GRID, &values, period);
+        steps.push(Step {
+            period,
+            frame: frame.await.unwrap(),
+            raw_sha256: Digest::of(b""),
+            origin: "f.nc".into(),
+            valid_cells: 4,
+        });
+    }
+    Manifest {
+        schema: MANIFEST_SCHEMA,
+        number: 1,
+        title: "Sea".into(),
+        quantity: Quantity::SeaSurfaceTemperature,
+        synthetic: false,
+        source: String::new(),
+        grid: GRID,
+        steps,
+        domain: ObjectKey::domain(&product, &Digest::of(b"")),
+        series: vec![],
+        derived_from: None,
+        product,
+    }
+}
+
+fn observation(time: &str, lon_deg: f64, lat_deg: f64, value: f64) -> Observation {
+    Observation {
+        dataset: "ships".parse().unwrap(),
+        platform: "s".to_owned(),
+        kind: PlatformKind::Ship,
+        time: time.parse().unwrap(),
+        lon_deg,
+        lat_deg,
+        depth_m: 0.0,
+        property: "sea_surface_temperature".to_owned(),
+        value,
+        unit: "K".to_owned(),
+        quality: Quality::Good,
+    }
+}
+
+fn near(found: Option<f64>, expected: f64) {
+    assert!((found.unwrap() - expected).abs() < 1e-9, "{found:?}");
+}
+
+#[tokio::test]
+async fn each_observation_meets_its_cell_and_month_and_the_rest_is_counted() {
+    let store = Store::memory();
+    let manifest = product(&store).await;
+    let observations = [
+        observation("2010-01-10", -100.0, 45.0, 279.0),
+        observation("2010-02-10", 10.0, 45.0, 295.0),
+        observation("2010-02-10", 100.0, 45.0, 280.0),
+        observation("2010-01-10", 100.0, 45.0, 283.0),
+        observation("2010-01-10", 10.0, -45.0, 280.0),
+        observation("2011-01-10", 10.0, 45.0, 280.0),
+    ];
+    let found = matchup(&store, &manifest, &observations, TimeMatch::Nearest)
+        .await
+        .unwrap();
+    let pairs: Vec<_> = found
+        .rows
+        .iter()
+        .map(|row| {
+            (
+                (row.observed + 273.15).round(),
+                (row.gridded + 273.15).round(),
+            )
+        })
+        .collect();
+    assert_eq!(pairs, [(279.0, 280.0), (295.0, 292.0), (283.0, 283.0)]);
+    let left_out = LeftOut {
+        other_time: 1,
+        outside: 1,
+        no_data: 1,
+    };
+    assert_eq!((found.left_out, found.unit.as_str()), (left_out, "°C"));
+    // Differences 1, -3 and 0.
+    near(found.statistics.bias, -2.0 / 3.0);
+    near(found.statistics.rmse, (10.0f64 / 3.0).sqrt());
+}
+
+#[tokio::test]
+async fn between_two_months_the_value_is_between_theirs() {
+    let store = Store::memory();
+    let manifest = product(&store).await;
+    // Half way between 16 January 12:00 and 15 February 0:00.
+    let middle = [observation("2010-01-31T06:00:00Z", -100.0, 45.0, 285.0)];
+    let found = matchup(&store, &manifest, &middle, TimeMatch::Linear)
+        .await
+        .unwrap();
+    near(found.statistics.bias, 0.0);
+    let gap = [observation("2010-01-31T06:00:00Z", 100.0, 45.0, 285.0)];
+    let found = matchup(&store, &manifest, &gap, TimeMatch::Linear)
+        .await
+        .unwrap();
+    assert_eq!(
+        (found.rows.len(), found.left_out.no_data),
+        (0, 1),
+        "half of it is missing"
+    );
+}
+
+#[tokio::test]
+async fn apples_are_not_compared_with_pears() {
+    let store = Store::memory();
+    let manifest = product(&store).await;
+    let good = observation("2010-01-10", 10.0, 45.0, 280.0);
+    let wind = Observation {
+        property: "wind_speed".to_owned(),
+        unit: "m s-1".to_owned(),
+        ..good.clone()
+    };
+    for observations in [vec![], vec![wind.clone()], vec![good.clone(), wind]] {
+        let error = matchup(&store, &manifest, &observations, TimeMatch::Nearest)
+            .await
+            .unwrap_err();
+        assert_eq!(error.class(), ErrorClass::BadRequest, "{error}");
+    }
+    assert!(
+        matchup(&store, &manifest, &[good], TimeMatch::Nearest)
+            .await
+            .is_ok()
+    );
+}

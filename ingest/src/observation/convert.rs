@@ -1,0 +1,236 @@
+//! A unit as a file spells it to the unit that a property is stored in.
+
+use super::property::{self, COMMON_UNITS, DEGREE, Property};
+use crate::unit::{self, Unit};
+
+/// How stored numbers become values: `value = number * factor + offset`, none if it cannot be true.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Conversion {
+    /// Name of the property.
+    pub(super) property: String,
+    /// Unit of values.
+    pub(super) unit: String,
+    factor: f64,
+    offset: f64,
+    known: Option<&'static Property>,
+}
+
+impl Conversion {
+    /// The conversion of a property from a file's unit, or what is wrong with the unit.
+    pub(super) fn new(name: &str, spelling: &str) -> Result<Self, String> {
+        let known = property::known(name);
+        let (unit, factor, offset) = match known {
+            Some(property) => to_known(property, spelling)?,
+            None => to_common(spelling),
+        };
+        Ok(Self {
+            property: name.to_owned(),
+            unit,
+            factor,
+            offset,
+            known,
+        })
+    }
+
+    /// The value of a number of the file.
+    pub(super) fn value(&self, number: f64) -> Option<f64> {
+        let value = number * self.factor + self.offset;
+        let is_true = self
+            .known
+            .is_none_or(|known| known.plausible.contains(&value));
+        (value.is_finite() && is_true).then_some(value)
+    }
+}
+
+/// Unit, factor and offset for a property that is known.
+fn to_known(property: &Property, spelling: &str) -> Result<(String, f64, f64), String> {
+    let stored = property.unit.to_owned();
+    if property.unit == DEGREE {
+        return if is_degree(spelling) {
+            Ok((stored, 1.0, 0.0))
+        } else {
+            Err(format!(
+                "has unit {spelling:?}, directions and places are given in degrees"
+            ))
+        };
+    }
+    // Practical salinity is a plain number that files give a great many units.
+    if property.name.ends_with("salinity") {
+        return if is_salinity(spelling) {
+            Ok((stored, 1.0, 0.0))
+        } else {
+            Err(format!(
+                "has unit {spelling:?}, practical salinity is a plain number"
+            ))
+        };
+    }
+    let own = parse(spelling, property.unit == "K")
+        .map_err(|e| format!("has unit {spelling:?}, which {e}"))?;
+    let target = unit::parse(property.unit).map_err(|e| format!("has a stored unit that {e}"))?;
+    match linear(own, target) {
+        Some((factor, offset)) => Ok((stored, factor, offset)),
+        None => Err(format!(
+            "has unit {spelling:?}, which is no unit of {}; it is stored in {}",
+            property.name, property.unit
+        )),
+    }
+}
+
+/// Unit, factor and offset for anything else: a common unit of the same kind, or the file's own.
+fn to_common(spelling: &str) -> (String, f64, f64) {
+    let own = parse(spelling, spelling.starts_with("deg"));
+    let common = own.ok().and_then(|own| {
+        COMMON_UNITS.into_iter().find_map(|name| {
+            let (factor, offset) = linear(own, unit::parse(name).ok()?)?;
+            Some((name.to_owned(), factor, offset))
+        })
+    });
+    common.unwrap_or_else(|| {
+        let plain = spelling.chars().filter(|c| !c.is_control());
+        let mut kept: String = plain.collect();
+        kept.truncate(kept.floor_char_boundary(32));
+        if kept.is_empty() {
+            kept.push('1');
+        }
+        (kept, 1.0, 0.0)
+    })
+}
+
+/// `value = number * factor + offset` from one unit to another of the same kind.
+fn linear(own: Unit, target: Unit) -> Option<(f64, f64)> {
+    (own.dimension == target.dimension && own.dimension.month == 0).then(|| {
+        (
+            own.factor / target.factor,
+            (own.offset - target.offset) / target.factor,
+        )
+    })
+}
+
+/// Where a temperature is meant, `C` is a degree Celsius; elsewhere it is carbon.
+fn parse(spelling: &str, is_temperature: bool) -> Result<Unit, String> {
+    let squeezed = spelling.to_ascii_lowercase().replace([' ', '.', '_'], "");
+    match squeezed.as_str() {
+        "c" | "degc" | "degreec" | "degreesc" | "degreescelsius" | "degcelsius"
+            if is_temperature =>
+        {
+            unit::parse("degC")
+        }
+        "nmi" | "nauticalmile" | "nauticalmiles" => Ok(Unit {
+            factor: 1852.0,
+            ..unit::parse("m")?
+        }),
+        "ft" | "foot" | "feet" => Ok(Unit {
+            factor: 0.3048,
+            ..unit::parse("m")?
+        }),
+        _ => unit::parse(spelling),
+    }
+}
+
+fn is_degree(spelling: &str) -> bool {
+    let lower = spelling.to_ascii_lowercase();
+    let word = lower.trim_start_matches("decimal").trim();
+    word.starts_with("deg") && !word.contains('c') && !word.ends_with('k') || word == "°"
+}
+
+fn is_salinity(spelling: &str) -> bool {
+    let lower = spelling.trim().to_ascii_lowercase();
+    matches!(
+        lower.as_str(),
+        "" | "1"
+            | "psu"
+            | "pss"
+            | "pss-78"
+            | "pss78"
+            | "1e-3"
+            | "0.001"
+            | "1.e-3"
+            | "g kg-1"
+            | "g/kg"
+            | "ppt"
+            | "‰"
+            | "dimensionless"
+            | "unitless"
+            | "1e-03"
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn value(property: &str, unit: &str, number: f64) -> Option<f64> {
+        Conversion::new(property, unit).unwrap().value(number)
+    }
+
+    #[test]
+    fn units_of_real_files_become_the_stored_one() {
+        let near = |found: Option<f64>, expected: f64| (found.unwrap() - expected).abs() < 1e-9;
+        assert!(near(value("sea_surface_temperature", "C", 20.0), 293.15));
+        assert!(near(
+            value("sea_surface_temperature", "deg.C", 20.0),
+            293.15
+        ));
+        assert!(near(
+            value("sea_water_temperature", "Degree_C", -1.0),
+            272.15
+        ));
+        assert!(near(
+            value("eastward_sea_water_velocity", "cm s-1", 50.0),
+            0.5
+        ));
+        assert!(near(
+            value("air_pressure_at_mean_sea_level", "hPa", 1013.25),
+            101_325.0
+        ));
+        assert!(near(
+            value("fugacity_of_carbon_dioxide_in_sea_water", "uatm", 1e3),
+            101.325
+        ));
+        assert!(near(
+            value("mole_fraction_of_carbon_dioxide_in_air", "umol/mol", 400.0),
+            4e-4
+        ));
+        assert!(near(value("relative_humidity", "%", 80.0), 0.8));
+        assert!(near(
+            value("sea_water_practical_salinity", "PSU", 35.0),
+            35.0
+        ));
+        assert!(near(value("visibility_in_air", "nmi", 2.0), 3704.0));
+        assert!(near(value("wind_from_direction", "degrees", 276.0), 276.0));
+    }
+
+    #[test]
+    fn what_cannot_be_true_is_no_value() {
+        for number in [-999.0, 1e35, f64::NAN, 99.9, f64::INFINITY] {
+            assert_eq!(value("sea_surface_temperature", "degree_C", number), None);
+        }
+    }
+
+    #[test]
+    fn unknown_properties_keep_a_unit_of_their_kind() {
+        let conversion = Conversion::new("temperature_equi", "degrees C").unwrap();
+        assert_eq!(conversion.unit, "K");
+        assert!((conversion.value(-1.16).unwrap() - 271.99).abs() < 1e-9);
+        let other = Conversion::new("ph", "total scale").unwrap();
+        assert_eq!(
+            (other.unit.as_str(), other.value(8.1)),
+            ("total scale", Some(8.1))
+        );
+        let hostile = Conversion::new("x", &"\u{1b}é".repeat(100)).unwrap();
+        assert!(hostile.unit.len() <= 32 && !hostile.unit.chars().any(char::is_control));
+    }
+
+    #[test]
+    fn a_unit_of_another_kind_is_refused() {
+        for (name, unit) in [
+            ("sea_surface_temperature", "m"),
+            ("wind_speed", "furlongs"),
+            ("wind_from_direction", "m s-1"),
+            ("sea_water_practical_salinity", "kg m-3"),
+            ("wind_to_direction", "degrees C"),
+        ] {
+            assert!(Conversion::new(name, unit).is_err(), "{name} in {unit}");
+        }
+    }
+}

@@ -1,0 +1,231 @@
+//! Coordinates of samples: for each cell of a measured variable, where, when, how deep and of which platform it is.
+
+use contract::event::RejectReason;
+
+use super::epic;
+use super::sampling::Sampling;
+use crate::cf::coordinate::{Role, role_of};
+use crate::cf::packing::Packing;
+use crate::decoder::session::Session;
+use crate::error::Stop;
+use crate::file::description::{Description, Part, Variable};
+use crate::rejection::Rejection;
+
+/// Most values of one coordinate variable.
+pub(super) const MAX_VALUES: u64 = 1 << 24;
+
+/// What a coordinate says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Says {
+    Time,
+    Latitude,
+    Longitude,
+    Depth,
+}
+
+/// Values of a coordinate and how to find that of a cell.
+#[derive(Debug, Clone)]
+pub(super) struct Coordinate {
+    pub(super) name: String,
+    pub(super) values: Vec<f64>,
+    /// For each of its dimensions: which index of the cell goes there, and how far one step is.
+    steps: Vec<(Index, usize)>,
+}
+
+/// Where the index of a dimension comes from.
+#[derive(Debug, Clone, Copy)]
+enum Index {
+    /// The cell's own index at this place.
+    Own(usize),
+    /// The instance that the sample at this place belongs to.
+    Instance(usize),
+    /// The dimension has one element.
+    Only,
+}
+
+impl Coordinate {
+    fn position(&self, cell: &[usize], sampling: &Sampling) -> usize {
+        let step = |(index, stride): &(Index, usize)| {
+            let at = match index {
+                Index::Own(place) => cell[*place],
+                Index::Instance(place) => sampling.instance_of(cell[*place]),
+                Index::Only => 0,
+            };
+            at * stride
+        };
+        self.steps.iter().map(step).sum()
+    }
+
+    /// The value that belongs to a cell; NaN if there is none.
+    pub(super) fn at(&self, cell: &[usize], sampling: &Sampling) -> f64 {
+        let position = self.position(cell, sampling);
+        self.values.get(position).copied().unwrap_or(f64::NAN)
+    }
+}
+
+/// What a variable says of samples, if it is a coordinate.
+pub(super) fn says(variable: &Variable) -> Option<Says> {
+    match role_of(variable) {
+        Role::Latitude => return Some(Says::Latitude),
+        Role::Longitude => return Some(Says::Longitude),
+        Role::Time => return Some(Says::Time),
+        Role::Other => {}
+    }
+    let text = |name: &str| {
+        variable
+            .attributes
+            .text(name)
+            .unwrap_or_default()
+            .to_ascii_lowercase()
+    };
+    let name = variable.name.to_ascii_lowercase();
+    let is_depth = text("axis") == "z"
+        || matches!(
+            text("standard_name").as_str(),
+            "depth" | "height" | "altitude"
+        )
+        || matches!(text("positive").as_str(), "up" | "down")
+        || matches!(
+            name.as_str(),
+            "depth" | "depth_m" | "z" | "height" | "altitude"
+        )
+        || variable.is_coordinate() && epic::code_of(variable) == Some(epic::DEPTH);
+    is_depth.then_some(Says::Depth)
+}
+
+/// How a cell of `measured` finds its value in `variable`; none if it cannot.
+fn steps(
+    variable: &Variable,
+    measured: &Variable,
+    sampling: &Sampling,
+) -> Option<Vec<(Index, usize)>> {
+    let mut stride = 1usize;
+    let mut steps = vec![];
+    for dimension in variable.dimensions.iter().rev() {
+        let own = measured
+            .dimensions
+            .iter()
+            .position(|d| d.name.is_some() && d.name == dimension.name && d.len == dimension.len);
+        let through = || {
+            let is_instance = dimension.name.as_deref() == sampling.instance_dimension();
+            let sample = measured.dimensions.iter().position(|d| {
+                d.name.is_some() && d.name.as_deref() == sampling.sample_dimension()
+            })?;
+            is_instance.then_some(Index::Instance(sample))
+        };
+        let index = own.map(Index::Own).or_else(through);
+        let index = index.or((dimension.len == 1).then_some(Index::Only))?;
+        steps.push((index, stride));
+        stride = stride.checked_mul(usize::try_from(dimension.len).ok()?)?;
+    }
+    Some(steps)
+}
+
+/// The coordinate of a kind that fits a measured variable best: one that it names, then one that is a dimension of it,
+/// then any other.
+pub(super) async fn find(
+    session: &mut Session,
+    file: &Description,
+    measured: &Variable,
+    sampling: &Sampling,
+    what: Says,
+) -> Result<Option<Coordinate>, Stop> {
+    let named: Vec<&str> = measured
+        .attributes
+        .text("coordinates")
+        .map_or_else(Vec::new, |text| text.split_whitespace().collect());
+    let rank = |variable: &Variable| {
+        let is_named = named.contains(&variable.name.as_str());
+        let is_own = measured
+            .dimensions
+            .iter()
+            .any(|d| d.name.as_deref() == Some(variable.name.as_str()));
+        // The more dimensions, the more exactly it says where a sample is.
+        (!is_named, !is_own, usize::MAX - variable.dimensions.len())
+    };
+    let fits = |v: &&Variable| {
+        v.name != measured.name
+            && v.is_numeric()
+            && says(v) == Some(what)
+            && !epic::is_measured_place(v)
+    };
+    let mut best = file.variables.iter().filter(fits).collect::<Vec<_>>();
+    best.sort_by_key(|v| rank(v));
+    let found = best
+        .into_iter()
+        .find_map(|v| steps(v, measured, sampling).map(|steps| (v, steps)));
+    let Some((variable, steps)) = found else {
+        return Ok(None);
+    };
+    Ok(Some(Coordinate {
+        name: variable.name.clone(),
+        values: read(session, variable).await?,
+        steps,
+    }))
+}
+
+/// The coordinate of a variable of the same shape (or less) as a measured one: its flags, say.
+pub(super) async fn beside(
+    session: &mut Session,
+    variable: &Variable,
+    measured: &Variable,
+    sampling: &Sampling,
+) -> Result<Option<Coordinate>, Stop> {
+    let Some(steps) = steps(variable, measured, sampling) else {
+        return Ok(None);
+    };
+    Ok(Some(Coordinate {
+        name: variable.name.clone(),
+        values: read(session, variable).await?,
+        steps,
+    }))
+}
+
+/// All values of a variable, unpacked, NaN where there is none, in the order of its dimensions.
+pub(super) async fn read(session: &mut Session, variable: &Variable) -> Result<Vec<f64>, Stop> {
+    let stored = read_stored(session, variable).await?;
+    let packing = Packing::of(variable);
+    Ok(stored.into_iter().map(|v| packing.value(v)).collect())
+}
+
+/// All stored numbers of a variable. A reader gives two whole dimensions at a time; the slower ones are walked through.
+pub(super) async fn read_stored(
+    session: &mut Session,
+    variable: &Variable,
+) -> Result<Vec<f64>, Stop> {
+    let cells = variable.cell_count();
+    if cells > u128::from(MAX_VALUES) {
+        let detail =
+            format!("has {cells} values, at most {MAX_VALUES} are read; give it in smaller pieces");
+        return Err(Rejection::new(RejectReason::TooLarge, &variable.name, detail).into());
+    }
+    let lens: Vec<u64> = variable.dimensions.iter().map(|d| d.len).collect();
+    if lens.contains(&0) {
+        return Ok(vec![]);
+    }
+    // Dimensions of one element cost nothing to fix.
+    let long: Vec<usize> = (0..lens.len()).filter(|i| lens[*i] > 1).collect();
+    let whole = &long[long.len().saturating_sub(2)..];
+    let outer = &long[..long.len() - whole.len()];
+    let fixed = lens.len() > whole.len() + outer.len();
+    let mut part: Vec<Part> = vec![Part::At(0); lens.len()];
+    for place in whole {
+        part[*place] = Part::All;
+    }
+    // HDF5 gives one or two whole dimensions: a variable of single elements is asked for with one of them.
+    if whole.is_empty() && fixed {
+        part[0] = Part::All;
+    }
+    let run: u64 = whole.iter().map(|i| lens[*i]).product();
+    let runs: u64 = outer.iter().map(|i| lens[*i]).product();
+    let mut values = Vec::with_capacity(usize::try_from(run * runs).unwrap_or_default());
+    for at in 0..runs {
+        let mut rest = at;
+        for place in outer.iter().rev() {
+            part[*place] = Part::At(rest % lens[*place]);
+            rest /= lens[*place];
+        }
+        values.extend(session.read(&variable.name, &part, run).await?);
+    }
+    Ok(values)
+}

@@ -1,0 +1,192 @@
+//! NetCDF files of observations: which variables were measured, and each of their samples with place, time and flag.
+
+use contract::event::RejectReason;
+use contract::observation::{Observation, PlatformKind, Quality};
+use contract::product::ProductId;
+use contract::time::TimeMs;
+
+use super::coordinate::{self, Coordinate};
+use super::epic;
+use super::gather::Gathered;
+use super::measured::{self, Measured};
+use super::quality::{Verdict, worse};
+use super::recognise::{Feature, recognise};
+use super::sampling::Sampling;
+use super::{Source, name};
+use crate::cf::period;
+use crate::decoder::session::Session;
+use crate::error::Stop;
+use crate::file::description::Description;
+use crate::rejection::Rejection;
+
+/// What all samples of a file share.
+struct Shared {
+    dataset: ProductId,
+    kind: PlatformKind,
+    sampling: Sampling,
+}
+
+/// Reads a file that [`recognise`] knows.
+pub(super) async fn read(
+    session: &mut Session,
+    file: &Description,
+    source: Source<'_>,
+) -> Result<Vec<Observation>, Stop> {
+    let Some(feature) = recognise(file).filter(|feature| *feature != Feature::Unplaced) else {
+        let detail = "has series of platforms, but nothing in the file says where the platforms are; \
+                      give it with latitude, longitude and units (CF discrete sampling geometry)";
+        return Err(Rejection::new(RejectReason::NoVariable, "file", detail).into());
+    };
+    let shared = Shared {
+        dataset: dataset(file, source),
+        kind: kind(file, feature),
+        sampling: Sampling::of(session, file, source).await?,
+    };
+    let mut gathered = Gathered::default();
+    let mut passed_over = vec![];
+    for variable in file
+        .variables
+        .iter()
+        .filter(|v| measured::is_candidate(file, v))
+    {
+        match measured::prepare(session, file, variable, &shared.sampling).await? {
+            Ok(measured) => take(session, &measured, &shared, &mut gathered).await?,
+            Err(rejection) => passed_over.push(rejection),
+        }
+    }
+    let none = || {
+        let detail = "holds no measured variable with a place, a time and a unit";
+        Rejection::new(RejectReason::NoVariable, "file", detail)
+    };
+    for rejection in &passed_over {
+        tracing::info!(%rejection, file = source.file_name, "a variable is passed over");
+    }
+    let why = passed_over.into_iter().next().unwrap_or_else(none);
+    Ok(gathered.finish(why)?)
+}
+
+fn dataset(file: &Description, source: Source<'_>) -> ProductId {
+    let text = |name: &str| file.attributes.text(name).unwrap_or_default();
+    let is_array = text("Data_Source").contains("Global Tropical Moored Buoy Array");
+    if is_array {
+        // Positions of every day lie near, not at, the place that the other files state for all days.
+        let is_of_places = file.variables.iter().any(epic::is_measured_place);
+        return name::dataset(
+            source,
+            if is_of_places {
+                "gtmba-positions"
+            } else {
+                "gtmba"
+            },
+        );
+    }
+    name::dataset(source, name::stem(source.file_name))
+}
+
+fn kind(file: &Description, feature: Feature) -> PlatformKind {
+    match feature {
+        Feature::Trajectory => PlatformKind::Ship,
+        Feature::Profile | Feature::TrajectoryProfile => PlatformKind::Profile,
+        Feature::Point | Feature::TimeSeries | Feature::TimeSeriesProfile | Feature::Unplaced => {
+            let said = ["platform_type", "platform", "title"]
+                .into_iter()
+                .filter_map(|name| file.attributes.text(name))
+                .any(|text| {
+                    let text = text.to_ascii_lowercase();
+                    ["tower", "pier", "land station", "lighthouse"]
+                        .iter()
+                        .any(|w| text.contains(w))
+                });
+            if said {
+                PlatformKind::Station
+            } else {
+                PlatformKind::Buoy
+            }
+        }
+    }
+}
+
+/// Takes every sample of a variable that has a value, a place and a time.
+async fn take(
+    session: &mut Session,
+    measured: &Measured<'_>,
+    shared: &Shared,
+    gathered: &mut Gathered,
+) -> Result<(), Stop> {
+    let values = coordinate::read(session, measured.variable).await?;
+    let lens: Vec<usize> = measured
+        .variable
+        .dimensions
+        .iter()
+        .map(|d| d.len as usize)
+        .collect();
+    let mut cell = vec![0; lens.len()];
+    for (at, number) in values.into_iter().enumerate() {
+        let mut rest = at;
+        for (index, len) in cell.iter_mut().zip(&lens).rev() {
+            *index = rest % len;
+            rest /= len;
+        }
+        if let Some(observation) = sample(measured, shared, &cell, number)? {
+            gathered.take(observation)?;
+        }
+    }
+    Ok(())
+}
+
+/// The observation of one cell; none where there is no value, place or time.
+fn sample(
+    measured: &Measured<'_>,
+    shared: &Shared,
+    cell: &[usize],
+    number: f64,
+) -> Result<Option<Observation>, Rejection> {
+    let Some(value) = measured.conversion.value(number) else {
+        return Ok(None);
+    };
+    let at = |coordinate: &Coordinate| coordinate.at(cell, &shared.sampling);
+    let (time, lat_deg, lon_deg) = (
+        at(&measured.time),
+        at(&measured.latitude),
+        at(&measured.longitude),
+    );
+    if time.is_nan() || lat_deg.is_nan() || lon_deg.is_nan() {
+        return Ok(None);
+    }
+    let depth_m = match &measured.depth {
+        Some((coordinate, to)) => at(coordinate) * to.factor,
+        None => 0.0,
+    };
+    let verdicts = measured
+        .flags
+        .iter()
+        .map(|(flag, scheme)| scheme.verdict(at(flag)));
+    let verdict: Option<Verdict> = verdicts.reduce(worse);
+    let Some(quality) = verdict.unwrap_or(Some(Quality::NotEvaluated)) else {
+        return Ok(None);
+    };
+    let conversion = &measured.conversion;
+    let is_longitude = conversion.property == "longitude";
+    Ok(Some(Observation {
+        dataset: shared.dataset.clone(),
+        platform: shared.sampling.name(measured.variable, cell),
+        kind: shared.kind,
+        time: instant(measured, time)?,
+        lon_deg,
+        lat_deg,
+        depth_m: if depth_m.is_nan() { 0.0 } else { depth_m },
+        property: conversion.property.clone(),
+        value: if is_longitude {
+            contract::grid::wrap_lon_deg(value)
+        } else {
+            value
+        },
+        unit: conversion.unit.clone(),
+        quality,
+    }))
+}
+
+fn instant(measured: &Measured<'_>, number: f64) -> Result<TimeMs, Rejection> {
+    let date = measured.time_unit.date(number).and_then(period::instant);
+    date.map_err(|e| Rejection::new(RejectReason::Time, &measured.time.name, e))
+}

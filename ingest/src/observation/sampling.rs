@@ -1,0 +1,287 @@
+//! How the samples of a file belong to its platforms (CF conventions, chapter 9.3): ragged one behind the other, ragged by
+//! index, in rows, or all of one platform; and what the platforms are called.
+
+use contract::event::RejectReason;
+
+use super::coordinate::{MAX_VALUES, read, read_stored};
+use super::hdf5_text::TEXT_BYTES;
+use super::{Source, name};
+use crate::decoder::session::Session;
+use crate::error::Stop;
+use crate::file::description::{Description, Kind, Part, Variable};
+use crate::rejection::Rejection;
+
+/// Most platforms of one file.
+const MAX_INSTANCES: u64 = 100_000;
+/// Most letters of one name.
+const MAX_LETTERS: u64 = 256;
+/// The format whose letters are numbers.
+const CLASSIC: &str = "NetCDF classic";
+
+/// Which samples belong to which platform.
+#[derive(Debug, Default)]
+pub(super) struct Sampling {
+    /// Dimension that runs over platforms, if there is one.
+    instance: Option<String>,
+    /// Ragged files: the dimension that runs over samples, and the platform of each.
+    ragged: Option<(String, Vec<u32>)>,
+    /// Names of the platforms, in their order.
+    names: Vec<String>,
+}
+
+impl Sampling {
+    pub(super) fn instance_dimension(&self) -> Option<&str> {
+        self.instance.as_deref()
+    }
+
+    pub(super) fn sample_dimension(&self) -> Option<&str> {
+        self.ragged
+            .as_ref()
+            .map(|(dimension, _)| dimension.as_str())
+    }
+
+    /// The platform of a sample of a ragged file.
+    pub(super) fn instance_of(&self, sample: usize) -> usize {
+        let of = |(_, instances): &(String, Vec<u32>)| instances.get(sample).copied();
+        self.ragged.as_ref().and_then(of).unwrap_or(0) as usize
+    }
+
+    /// Name of the platform of a cell of a measured variable.
+    pub(super) fn name(&self, measured: &Variable, cell: &[usize]) -> String {
+        let place = |wanted: Option<&str>| {
+            let is_it = |name: Option<&str>| name.is_some() && name == wanted;
+            measured
+                .dimensions
+                .iter()
+                .position(|d| is_it(d.name.as_deref()))
+        };
+        let own = place(self.instance_dimension()).map(|at| cell[at]);
+        let through = || place(self.sample_dimension()).map(|at| self.instance_of(cell[at]));
+        let index = own.or_else(through).unwrap_or(0);
+        self.names
+            .get(index)
+            .cloned()
+            .unwrap_or_else(|| (index + 1).to_string())
+    }
+
+    /// Reads what a file says of its platforms.
+    pub(super) async fn of(
+        session: &mut Session,
+        file: &Description,
+        source: Source<'_>,
+    ) -> Result<Self, Stop> {
+        let mut sampling = Self::default();
+        let counts = attributed(file, "sample_dimension");
+        let indices = attributed(file, "instance_dimension");
+        if let Some((variable, samples)) = counts {
+            sampling.instance = dimension(variable);
+            let counts = read(session, variable).await?;
+            let instances = contiguous(&variable.name, &counts, length(file, &samples))?;
+            sampling.ragged = Some((samples, instances));
+        } else if let Some((variable, instance)) = indices {
+            sampling.instance = Some(instance);
+            if let Some(samples) = dimension(variable) {
+                let indices = read(session, variable).await?;
+                sampling.ragged = Some((samples, indexed(&variable.name, &indices)?));
+            }
+        }
+        let id = identifier(file);
+        sampling.names = match id {
+            Some(id) => names(session, file, id).await?,
+            None => lone_name(file, source),
+        };
+        if let (Some(id), None) = (id, &sampling.instance) {
+            // Rows: the first dimension of the names is that of the platforms. A lone name has only its letters.
+            let rows = id.dimensions.first().map_or(1, |d| d.len);
+            let is_rows =
+                sampling.names.len() as u64 == rows && rows > 1 || id.dimensions.len() == 2;
+            sampling.instance = if is_rows { dimension(id) } else { None };
+        }
+        Ok(sampling)
+    }
+}
+
+/// The variable with an attribute that names a dimension, and that dimension.
+fn attributed<'a>(file: &'a Description, attribute: &str) -> Option<(&'a Variable, String)> {
+    let of = |v: &'a Variable| Some((v, v.attributes.text(attribute)?.to_owned()));
+    file.variables.iter().find_map(of)
+}
+
+fn dimension(variable: &Variable) -> Option<String> {
+    variable.dimensions.first()?.name.clone()
+}
+
+/// Length of a dimension, as some variable has it.
+fn length(file: &Description, dimension: &str) -> Option<u64> {
+    let all = file.variables.iter().flat_map(|v| &v.dimensions);
+    let mut of_name = all.filter(|d| d.name.as_deref() == Some(dimension));
+    of_name.next().map(|d| d.len)
+}
+
+fn corrupt(object: &str, detail: impl AsRef<str>) -> Rejection {
+    Rejection::new(RejectReason::Corrupt, object, detail)
+}
+
+/// The platform of each sample from the number of samples of each platform.
+fn contiguous(name: &str, counts: &[f64], samples: Option<u64>) -> Result<Vec<u32>, Rejection> {
+    let samples =
+        samples.ok_or_else(|| corrupt(name, "names a sample dimension that no variable has"))?;
+    if samples > MAX_VALUES {
+        let detail = format!("speaks of {samples} samples, at most {MAX_VALUES} are read");
+        return Err(Rejection::new(RejectReason::TooLarge, name, detail));
+    }
+    let mut instances = vec![];
+    for (instance, count) in counts.iter().enumerate() {
+        // A platform without a count has no samples.
+        let count = if count.is_nan() { 0.0 } else { *count };
+        let left = samples - instances.len() as u64;
+        if count < 0.0 || count.fract() != 0.0 || count > left as f64 {
+            let detail =
+                format!("gives {count} samples to a platform where {left} are left of {samples}");
+            return Err(corrupt(name, detail));
+        }
+        instances.resize(instances.len() + count as usize, instance as u32);
+    }
+    if (instances.len() as u64) < samples {
+        let detail = format!(
+            "gives {} of {samples} samples to platforms",
+            instances.len()
+        );
+        return Err(corrupt(name, detail));
+    }
+    Ok(instances)
+}
+
+/// The platform of each sample from its index.
+fn indexed(name: &str, indices: &[f64]) -> Result<Vec<u32>, Rejection> {
+    let index = |index: &f64| {
+        let is_index = (0.0..MAX_INSTANCES as f64).contains(index) && index.fract() == 0.0;
+        is_index.then_some(*index as u32).ok_or_else(|| {
+            corrupt(
+                name,
+                format!("says {index}, which is no index of a platform"),
+            )
+        })
+    };
+    indices.iter().map(index).collect()
+}
+
+/// The variable that names platforms: of a station's or ship's casts it is the station or ship that is the platform.
+fn identifier(file: &Description) -> Option<&Variable> {
+    ["timeseries_id", "trajectory_id", "profile_id"]
+        .into_iter()
+        .find_map(|role| {
+            file.variables
+                .iter()
+                .find(|v| v.attributes.text("cf_role") == Some(role))
+        })
+}
+
+/// Names of platforms: numbers, letters by platform, or texts.
+async fn names(
+    session: &mut Session,
+    file: &Description,
+    id: &Variable,
+) -> Result<Vec<String>, Stop> {
+    let (rows, letters) = match id.dimensions.as_slice() {
+        [] => (1, 1),
+        [one] => (one.len, 1),
+        [rows, letters] => (rows.len, letters.len),
+        _ => return Err(corrupt(&id.name, "has too many dimensions for names").into()),
+    };
+    if rows > MAX_INSTANCES || letters > MAX_LETTERS {
+        let detail = format!("names {rows} platforms, at most {MAX_INSTANCES} are read");
+        return Err(Rejection::new(RejectReason::TooLarge, &id.name, detail).into());
+    }
+    let texts: Vec<String> = if id.kind != Kind::Other {
+        let numbers = read_stored(session, id).await?;
+        numbers.iter().map(ToString::to_string).collect()
+    } else if file.format == CLASSIC {
+        // A letter is a number; one dimension is that of the letters of a lone name.
+        let numbers = read_stored(session, id).await?;
+        let in_row = if id.dimensions.len() < 2 {
+            rows
+        } else {
+            letters
+        };
+        numbers
+            .chunks(usize::try_from(in_row.max(1)).unwrap_or(1))
+            .map(text)
+            .collect()
+    } else {
+        let part = vec![Part::All; id.dimensions.len()];
+        let count = rows * letters * TEXT_BYTES as u64;
+        let numbers = session.read(&id.name, &part, count).await?;
+        let texts: Vec<String> = numbers.chunks(TEXT_BYTES).map(text).collect();
+        let is_lone = id.dimensions.len() < 2 && texts.iter().all(|text| text.len() <= 1);
+        let in_row = if is_lone { rows } else { letters };
+        texts
+            .chunks(usize::try_from(in_row.max(1)).unwrap_or(1))
+            .map(<[String]>::concat)
+            .collect()
+    };
+    let named = |(index, text): (usize, String)| {
+        name::platform(&text).unwrap_or_else(|| (index + 1).to_string())
+    };
+    Ok(texts.into_iter().enumerate().map(named).collect())
+}
+
+/// A text from its bytes and the zeros behind them.
+fn text(numbers: &[f64]) -> String {
+    let bytes: Vec<u8> = numbers
+        .iter()
+        .map(|b| *b as u8)
+        .take_while(|b| *b != 0)
+        .collect();
+    String::from_utf8_lossy(&bytes).into_owned()
+}
+
+/// The name of the one platform of a file without names.
+fn lone_name(file: &Description, source: Source<'_>) -> Vec<String> {
+    let stated = [
+        "platform_code",
+        "site_code",
+        "wmo_platform_code",
+        "platform_name",
+        "platform",
+        "id",
+    ];
+    let name = stated
+        .into_iter()
+        .filter_map(|attribute| file.attributes.text(attribute))
+        .find_map(name::platform)
+        .or_else(|| name::platform(name::stem(source.file_name)));
+    name.into_iter().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counts_and_indices_give_every_sample_its_platform() {
+        assert_eq!(
+            contiguous("n", &[2.0, 0.0, 1.0], Some(3)).unwrap(),
+            [0, 0, 2]
+        );
+        assert_eq!(indexed("n", &[1.0, 0.0, 1.0]).unwrap(), [1, 0, 1]);
+    }
+
+    #[test]
+    fn counts_that_do_not_fit_are_refused() {
+        for (counts, samples) in [
+            (vec![2.0, 2.0], Some(3)),
+            (vec![2.0], Some(3)),
+            (vec![-1.0, 4.0], Some(3)),
+            (vec![1e300], Some(3)),
+            (vec![1.5, 1.5], Some(3)),
+            (vec![3.0], None),
+        ] {
+            let refused = contiguous("n", &counts, samples).unwrap_err();
+            assert_eq!(refused.reason, RejectReason::Corrupt, "{counts:?}");
+        }
+        for index in [-1.0, 0.5, f64::NAN, 1e9] {
+            assert!(indexed("n", &[index]).is_err(), "{index}");
+        }
+    }
+}

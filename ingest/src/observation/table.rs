@@ -1,0 +1,286 @@
+//! Tab-separated tables of underway and station measurements, as SOCAT and PANGAEA give them: rows in, observations out.
+//!
+//! Comments before the line of column names are passed over. Flags are WOCE's and speak of the carbon dioxide value
+//! only; all else counts as not evaluated. A platform whose rows all lie at one place is a station, any other a ship.
+
+use std::collections::BTreeMap;
+
+use contract::event::RejectReason;
+use contract::observation::{Observation, PlatformKind, Quality};
+use csv::{ByteRecord, ReaderBuilder};
+
+use super::gather::Gathered;
+use super::quality::Scheme;
+use super::table_columns::Columns;
+use super::{MAX_TEXT_BYTES, Source, name, table_time};
+use crate::rejection::Rejection;
+
+/// Lines that may come before the column names.
+const MAX_COMMENT_LINES: usize = 10_000;
+/// A table of which more than one row in this many has no place or time is damaged.
+const READABLE_IN: u64 = 10;
+/// Numbers at and below stand for no value (-999, -9999); so do those at and above the other.
+const MISSING_BELOW: f64 = -900.0;
+const MISSING_ABOVE: f64 = 1e30;
+/// A platform that moves less than this is a station, degrees.
+const STATION_DEG: f64 = 0.01;
+
+/// Does the head of a file hold a line of column names?
+pub(super) fn has_columns(head: &[u8]) -> bool {
+    columns(head).is_some()
+}
+
+/// Grid cells by latitude and longitude under plain numbers: `"","Grid_lat","Grid_long","1","2"`.
+pub(super) fn is_undated_grid(line: &str) -> bool {
+    let fields: Vec<String> = line
+        .split(',')
+        .map(|field| field.trim().trim_matches('"').to_lowercase())
+        .collect();
+    let has = |word: &str| fields.iter().any(|field| field.contains(word));
+    let numbers = fields
+        .iter()
+        .filter(|field| field.parse::<u32>().is_ok())
+        .count();
+    has("lat") && has("lon") && numbers >= 2 && numbers + 3 >= fields.len()
+}
+
+/// Why such a table is refused.
+pub(super) fn undated() -> Rejection {
+    let detail = "has columns 1, 2, 3 ... of grid cells: nothing in the file says when, what or in which unit; \
+                  give it as NetCDF with time and units";
+    Rejection::new(RejectReason::Time, "columns", detail)
+}
+
+/// The columns, and where their line ends.
+fn columns(content: &[u8]) -> Option<(Columns, usize)> {
+    let mut start = 0;
+    for line in content
+        .split_inclusive(|b| *b == b'\n')
+        .take(MAX_COMMENT_LINES)
+    {
+        start += line.len();
+        let found = std::str::from_utf8(line).ok().and_then(Columns::of);
+        if let Some(columns) = found {
+            return Some((columns, start));
+        }
+    }
+    None
+}
+
+/// Reads a table.
+pub(super) fn read(content: &[u8], source: Source<'_>) -> Result<Vec<Observation>, Rejection> {
+    if content.len() as u64 > MAX_TEXT_BYTES {
+        let detail = format!("has more than {MAX_TEXT_BYTES} bytes of text");
+        return Err(Rejection::new(RejectReason::TooLarge, "file", detail));
+    }
+    let none = || {
+        Rejection::new(
+            RejectReason::NoVariable,
+            "columns",
+            "has no column of place and time",
+        )
+    };
+    let (columns, start) = columns(content).ok_or_else(none)?;
+    if columns.measured.is_empty() {
+        let detail = "has no measured column that is known, such as SST, sal or fCO2rec";
+        return Err(Rejection::new(RejectReason::NoVariable, "columns", detail));
+    }
+    let is_socat = columns.measured.iter().any(|m| m.is_flagged);
+    let stem = name::stem(source.file_name);
+    let dataset = name::dataset(source, if is_socat { "socat" } else { stem });
+    let mut rows = ReaderBuilder::new()
+        .delimiter(b'\t')
+        .quoting(false)
+        .flexible(true)
+        .has_headers(false)
+        .from_reader(&content[start..]);
+    let mut gathered = Gathered::default();
+    let mut spans = BTreeMap::<String, Span>::new();
+    let (mut good, mut bad) = (0u64, 0u64);
+    let mut record = ByteRecord::new();
+    let broken = |e: csv::Error| Rejection::new(RejectReason::Corrupt, "file", e.to_string());
+    while rows.read_byte_record(&mut record).map_err(broken)? {
+        let Some(row) = Row::of(&columns, &record) else {
+            bad += 1;
+            continue;
+        };
+        good += 1;
+        let platform = row.text(columns.platform).and_then(name::platform);
+        let platform = platform
+            .or_else(|| name::platform(stem))
+            .unwrap_or_else(|| "1".to_owned());
+        spans.entry(platform.clone()).or_default().widen(row.place);
+        for (property, value, unit, depth_m, quality) in row.values(&columns) {
+            gathered.take(Observation {
+                dataset: dataset.clone(),
+                platform: platform.clone(),
+                kind: PlatformKind::Ship,
+                time: row.time,
+                lon_deg: row.place[0],
+                lat_deg: row.place[1],
+                depth_m,
+                property: property.to_owned(),
+                value,
+                unit: unit.to_owned(),
+                quality,
+            })?;
+        }
+    }
+    if bad * READABLE_IN > good + bad {
+        let detail = format!(
+            "{bad} of {} rows have no place or time; it is damaged",
+            good + bad
+        );
+        return Err(Rejection::new(RejectReason::Corrupt, "file", detail));
+    }
+    let mut found = gathered.finish(Rejection::new(
+        RejectReason::Values,
+        "file",
+        "holds no measured value",
+    ))?;
+    for observation in &mut found {
+        if spans
+            .get(&observation.platform)
+            .is_some_and(Span::is_one_place)
+        {
+            observation.kind = PlatformKind::Station;
+        }
+    }
+    Ok(found)
+}
+
+/// Where a platform was.
+#[derive(Default)]
+struct Span {
+    /// West, south, east, north; none before the first row.
+    bounds: Option<[f64; 4]>,
+    rows: u64,
+}
+
+impl Span {
+    fn widen(&mut self, [lon, lat]: [f64; 2]) {
+        let [w, s, e, n] = self.bounds.unwrap_or([lon, lat, lon, lat]);
+        self.bounds = Some([w.min(lon), s.min(lat), e.max(lon), n.max(lat)]);
+        self.rows += 1;
+    }
+
+    fn is_one_place(&self) -> bool {
+        let within = |[w, s, e, n]: [f64; 4]| e - w < STATION_DEG && n - s < STATION_DEG;
+        self.rows > 1 && self.bounds.is_some_and(within)
+    }
+}
+
+/// A row with a place and a time.
+struct Row<'a> {
+    record: &'a ByteRecord,
+    time: contract::time::TimeMs,
+    place: [f64; 2],
+}
+
+impl<'a> Row<'a> {
+    fn of(columns: &Columns, record: &'a ByteRecord) -> Option<Self> {
+        let field = |at: usize| std::str::from_utf8(record.get(at)?).ok().map(str::trim);
+        let number = |at: Option<usize>| field(at?)?.parse::<f64>().ok();
+        let (lon, lat) = (number(columns.longitude)?, number(columns.latitude)?);
+        let is_place = (-180.0..=360.0).contains(&lon) && (-90.0..=90.0).contains(&lat);
+        let time = table_time::of_row(columns, field)?;
+        is_place.then_some(Self {
+            record,
+            time,
+            place: [lon, lat],
+        })
+    }
+
+    fn text(&self, at: Option<usize>) -> Option<&str> {
+        std::str::from_utf8(self.record.get(at?)?).ok()
+    }
+
+    fn number(&self, at: usize) -> Option<f64> {
+        let number: f64 = self.text(Some(at))?.trim().parse().ok()?;
+        (number > MISSING_BELOW && number < MISSING_ABOVE).then_some(number)
+    }
+
+    /// Property, value, unit, depth and quality of what was measured.
+    fn values(
+        &self,
+        columns: &'a Columns,
+    ) -> impl Iterator<Item = (&'a str, f64, &'a str, f64, Quality)> {
+        let depth_m = columns.depth.and_then(|at| self.number(at)).unwrap_or(0.0);
+        let flag = columns.flag.and_then(|at| self.number(at));
+        columns.measured.iter().filter_map(move |measured| {
+            let value = measured.conversion.value(self.number(measured.at)?)?;
+            let quality = match flag {
+                Some(flag) if measured.is_flagged => Scheme::Woce.verdict(flag)?,
+                _ => Quality::NotEvaluated,
+            };
+            let height_m = measured.height_m.unwrap_or(depth_m);
+            let conversion = &measured.conversion;
+            Some((
+                conversion.property.as_str(),
+                value,
+                conversion.unit.as_str(),
+                height_m,
+                quality,
+            ))
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SOURCE: Source<'static> = Source {
+        file_name: "cruise.tsv",
+        dataset: None,
+    };
+    const TABLE: &str = "/* comment */\nExpocode\tyr\tmon\tday\thh\tmm\tss\tlongitude [dec.deg.E]\tlatitude [dec.deg.N]\tsample_depth [m]\tsal\tSST [deg.C]\tWOA_SSS\tfCO2rec [uatm]\tfCO2rec_flag\n\
+        33HQ\t2015\t7\t14\t7\t14\t40\t181.5\t70.9\t5\t31.5\t-1.0\t30\t271.4\t2\n\
+        33HQ\t2015\t7\t14\t7\t44\t40\t181.7\t70.8\t5\tNaN\t-999\t30\t300.0\t4\n";
+
+    #[test]
+    fn rows_become_observations_with_their_flags() {
+        let found = read(TABLE.as_bytes(), SOURCE).unwrap();
+        let of = |property: &str| -> Vec<_> {
+            let those = found.iter().filter(|o| o.property == property);
+            those.map(|o| (o.value, o.quality)).collect()
+        };
+        assert_eq!(of("sea_surface_salinity"), [(31.5, Quality::NotEvaluated)]);
+        assert_eq!(of("sea_surface_temperature").len(), 1);
+        let qualities: Vec<_> = of("fugacity_of_carbon_dioxide_in_sea_water")
+            .iter()
+            .map(|v| v.1)
+            .collect();
+        assert_eq!(qualities, [Quality::Good, Quality::Bad]);
+        let first = &found[0];
+        assert!((first.lon_deg + 178.5).abs() < 1e-9, "past the date line");
+        assert_eq!(
+            (first.dataset.as_str(), first.platform.as_str()),
+            ("socat", "33HQ")
+        );
+        assert_eq!((first.kind, first.depth_m), (PlatformKind::Ship, 5.0));
+    }
+
+    #[test]
+    fn what_stays_at_one_place_is_a_station() {
+        let fixed = TABLE.replace("181.7\t70.8", "181.5\t70.9");
+        let found = read(fixed.as_bytes(), SOURCE).unwrap();
+        assert!(found.iter().all(|o| o.kind == PlatformKind::Station));
+    }
+
+    #[test]
+    fn damaged_and_empty_tables_are_refused_with_their_reasons() {
+        let reason = |text: &str| read(text.as_bytes(), SOURCE).unwrap_err().reason;
+        assert_eq!(
+            reason(&TABLE.replace("2015", "soon")),
+            RejectReason::Corrupt
+        );
+        assert_eq!(
+            reason("yr\tmon\tday\tlat\tlon\n2000\t1\t1\t0\t0\n"),
+            RejectReason::NoVariable
+        );
+        let header: String = TABLE.split_inclusive('\n').take(2).collect();
+        assert_eq!(reason(&header), RejectReason::Values);
+        assert_eq!(undated().reason, RejectReason::Time);
+    }
+}
