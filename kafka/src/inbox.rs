@@ -41,6 +41,12 @@ struct State {
     failure: Option<KafkaError>,
 }
 
+impl State {
+    fn is_full(&self) -> bool {
+        self.waiting.len() >= MAX_WAITING || self.waiting_bytes >= MAX_WAITING_BYTES
+    }
+}
+
 /// A partition of this member.
 #[derive(Debug)]
 struct Owned {
@@ -106,11 +112,15 @@ impl Inbox {
         }
         state.waiting_bytes += message.content.len();
         state.waiting.push_back(message);
-        let is_full =
-            state.waiting.len() >= MAX_WAITING || state.waiting_bytes >= MAX_WAITING_BYTES;
+        let is_full = state.is_full();
         drop(state);
         self.news.notify_one();
         is_full
+    }
+
+    /// Is there no room for another message?
+    pub(crate) fn is_full(&self) -> bool {
+        self.state().is_full()
     }
 
     /// May fetching go on? Half empty, so that it does not stop and go with every message.

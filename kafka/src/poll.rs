@@ -1,6 +1,7 @@
 //! The task that fetches for a reader: it goes on whatever the reader does, so that the group knows the member is alive.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use bytes::Bytes;
 use contract::event::MAX_EVENT_BYTES;
@@ -16,6 +17,9 @@ use tokio::task::JoinHandle;
 
 use crate::inbox::{Inbox, Member};
 use crate::off_thread::OffThread;
+
+/// A reader that takes nothing out for so long pauses the fetching. Shares and troubles wait for it.
+const PAUSE_AFTER: Duration = Duration::from_millis(500);
 
 /// A running task; it ends when this is dropped.
 pub(crate) struct Polling {
@@ -66,9 +70,16 @@ async fn poll(
             next = received.next() => match next.expect("a stream of messages has no end") {
                 Ok(message) => {
                     // Partitions given while paused are not paused yet: their first message pauses them.
-                    if inbox.put(of_topic(inbox.topic(), &message)) {
-                        consumer.pause(&consumer.assignment()?)?;
-                        is_paused = true;
+                    let is_full = inbox.put(of_topic(inbox.topic(), &message));
+                    if is_full {
+                        let has_room = tokio::select! {
+                            _ended = &mut stopped => return Ok(()),
+                            has_room = gets_room_soon(inbox) => has_room,
+                        };
+                        if !has_room {
+                            consumer.pause(&consumer.assignment()?)?;
+                            is_paused = true;
+                        }
                     }
                 }
                 Err(error @ KafkaError::MessageConsumptionFatal(_)) => return Err(error),
@@ -79,6 +90,17 @@ async fn poll(
         // Messages that are there already must not keep others from running.
         tokio::task::consume_budget().await;
     }
+}
+
+/// Does the reader take something out before it pays to pause? After a pause the client needs up to a second to fetch again,
+/// so that a quick reader would wait for it time and again.
+async fn gets_room_soon(inbox: &Inbox) -> bool {
+    let room = async {
+        while inbox.is_full() {
+            inbox.room.notified().await;
+        }
+    };
+    tokio::time::timeout(PAUSE_AFTER, room).await.is_ok()
 }
 
 /// A message with its place. One that is too long for an event is cut: it is refused as such, and not held whole.
