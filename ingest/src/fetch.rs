@@ -7,6 +7,7 @@ mod address;
 mod checksum;
 mod guard;
 mod http;
+mod keep;
 mod local;
 mod location;
 mod object;

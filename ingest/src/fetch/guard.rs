@@ -1,27 +1,28 @@
 //! What may be read: anything by its path on the command line; for the service what its settings name, and nothing else.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::Instant;
 
-use bytes::Bytes;
 use contract::event::RejectReason;
-use futures::{Stream, StreamExt as _};
-use tokio::io::{AsyncWriteExt as _, BufWriter};
+use futures::StreamExt as _;
+use tokio::sync::Semaphore;
 
-use super::checksum::{Check, Expected, wrong_size};
+use super::checksum::Expected;
 use super::http::{self, AllowedHost, Web};
+use super::keep::Keep;
 use super::local;
 use super::location::Location;
 use super::object::{self, AllowedStore};
 use super::patience::{Miss, Patience, Tries, limited};
-use super::raw::{Held, RawGranule, Stamp};
-use super::spool::{self, Spool};
+use super::raw::RawGranule;
+use super::spool::{Spool, Spooled};
 use crate::error::{IngestError, Stop};
 use crate::rejection::Rejection;
 use crate::settings::Limits;
 
-/// Bytes gathered before they are written.
-const WRITE_BYTES: usize = 1 << 20;
+/// Files that are fetched at the same time; those that wait for their source to come back are not counted.
+const PARALLEL_FETCHES: usize = 8;
 
 /// What may be read. Clones share connections and spool.
 #[derive(Debug, Clone, Default)]
@@ -36,6 +37,7 @@ struct Guarded {
     stores: Vec<AllowedStore>,
     spool: Spool,
     patience: Patience,
+    slots: Semaphore,
 }
 
 /// What a service may read, as its settings say it.
@@ -74,6 +76,7 @@ impl Sources {
             web: Web::new(allowed.hosts)?,
             spool: Spool::open(&allowed.spool, allowed.spool_bytes)?,
             patience: allowed.patience,
+            slots: Semaphore::new(PARALLEL_FETCHES),
         }))))
     }
 
@@ -119,115 +122,73 @@ impl Guarded {
     ) -> Result<RawGranule, Stop> {
         let mut tries = Tries::new(self.patience);
         loop {
-            match self.try_once(location, expected, limits).await {
+            let slot = self.slots.acquire().await;
+            let spooled = match location {
+                Location::File(_) => None,
+                Location::Web(_) | Location::Object(_) => {
+                    let most = self.most(limits);
+                    let room = expected.size_bytes.unwrap_or(most).min(most);
+                    Some(self.spool.file(room).await?)
+                }
+            };
+            let begun = Instant::now();
+            let tried = self.try_once(location, spooled, expected, limits).await;
+            match tried {
                 Ok(raw) => return Ok(raw),
-                Err(miss) => tries.after(miss, location).await?,
+                Err(miss) => {
+                    drop(slot);
+                    tries.after(miss, begun.elapsed(), location).await?;
+                }
             }
         }
+    }
+
+    /// Largest file that is fetched.
+    fn most(&self, limits: Limits) -> u64 {
+        limits.file_bytes.min(self.spool.bytes())
     }
 
     async fn try_once(
         self: &Arc<Self>,
         location: &Location,
+        spooled: Option<Spooled>,
         expected: &Expected,
         limits: Limits,
     ) -> Result<RawGranule, Miss> {
-        let name = location.file_name();
-        match location {
-            Location::File(path) => {
-                let (own, path, expected) = (Arc::clone(self), path.clone(), expected.clone());
-                let read = move || local::inside(&own.folders, &path, &expected, limits);
-                tokio::task::spawn_blocking(read)
-                    .await
-                    .map_err(Miss::task)?
-            }
-            Location::Web(url) => {
-                let fetched = async {
+        let keep = |chunks, length| Keep {
+            file_name: location.file_name(),
+            chunks,
+            length,
+            most: self.most(limits),
+        };
+        let fetched = async {
+            match (location, spooled) {
+                (Location::Web(url), Some(spooled)) => {
                     let response = self.web.get(url).await?;
                     let length = response.content_length();
-                    let chunks = response
-                        .bytes_stream()
-                        .map(|chunk| chunk.map_err(http::away));
-                    self.keep(name, chunks, length, expected, limits).await
-                };
-                limited(self.patience.one_try, fetched).await
-            }
-            Location::Object(url) => {
-                let fetched = async {
+                    let chunks = response.bytes_stream();
+                    let chunks = chunks.map(|chunk| chunk.map_err(http::away)).boxed();
+                    keep(chunks, length).run(spooled, expected).await
+                }
+                (Location::Object(url), Some(spooled)) => {
                     let found = object::get(&self.stores, url).await?;
                     let length = Some(found.meta.size);
-                    let chunks = found.into_stream().map(|chunk| chunk.map_err(object::miss));
-                    self.keep(name, chunks, length, expected, limits).await
-                };
-                limited(self.patience.one_try, fetched).await
+                    let chunks = found.into_stream();
+                    let chunks = chunks.map(|chunk| chunk.map_err(object::miss)).boxed();
+                    keep(chunks, length).run(spooled, expected).await
+                }
+                (Location::File(path), _) => {
+                    let (own, path, expected) = (Arc::clone(self), path.clone(), expected.clone());
+                    let read = move || local::inside(&own.folders, &path, &expected, limits);
+                    tokio::task::spawn_blocking(read)
+                        .await
+                        .map_err(Miss::task)?
+                }
+                (Location::Web(_) | Location::Object(_), None) => {
+                    unreachable!("there is a place for what comes over the network")
+                }
             }
-        }
-    }
-
-    /// Writes what comes to the spool, no more than is allowed, and compares it with what was announced.
-    async fn keep(
-        &self,
-        file_name: String,
-        chunks: impl Stream<Item = Result<Bytes, Miss>> + Send,
-        length: Option<u64>,
-        expected: &Expected,
-        limits: Limits,
-    ) -> Result<RawGranule, Miss> {
-        let most = limits.file_bytes.min(self.spool.bytes());
-        if let Some(length) = length {
-            if length > most {
-                return Err(local::too_large(length, most).into());
-            }
-            if let Some(refused) = wrong_size(expected, length) {
-                return Err(refused.into());
-            }
-        }
-        let room = length.or(expected.size_bytes).unwrap_or(most).min(most);
-        let mut spooled = self.spool.file(room).await?;
-        let unwritten = |folder: &Path| {
-            let folder = folder.to_owned();
-            move |source| Miss::from(spool::failed(&folder, source))
         };
-        let writer = spooled
-            .file()
-            .try_clone()
-            .map_err(unwritten(spooled.path()))?;
-        let writer = tokio::fs::File::from_std(writer);
-        let mut writer = BufWriter::with_capacity(WRITE_BYTES, writer);
-        let mut check = Check::of(expected)?;
-        let mut chunks = std::pin::pin!(chunks);
-        while let Some(chunk) = chunks.next().await {
-            let chunk = chunk?;
-            check.update(&chunk)?;
-            if check.size_bytes() > room {
-                return Err(beyond(check.size_bytes(), room, most, expected).into());
-            }
-            writer
-                .write_all(&chunk)
-                .await
-                .map_err(unwritten(spooled.path()))?;
-        }
-        writer.flush().await.map_err(unwritten(spooled.path()))?;
-        let size_bytes = check.size_bytes();
-        if length.is_some_and(|length| length != size_bytes) {
-            return Err(Miss::Away(format!("only {size_bytes} bytes of it came")));
-        }
-        let sha256 = check.finish(expected)??;
-        spooled.shrink_to(size_bytes);
-        let metadata = spooled
-            .file()
-            .metadata()
-            .map_err(unwritten(spooled.path()))?;
-        let (path, stamp) = (spooled.path().to_owned(), Stamp::of(&metadata));
-        let held = Held::Spooled(Arc::new(spooled));
-        Ok(RawGranule::new(path, file_name, sha256, stamp, held))
-    }
-}
-
-/// The refusal of a file that is longer than there was room for: longer than announced, or than allowed.
-fn beyond(bytes: u64, room: u64, most: u64, expected: &Expected) -> Rejection {
-    match wrong_size(expected, bytes) {
-        Some(refused) if room < most => refused,
-        _ => local::too_large(bytes, most),
+        limited(self.patience.one_try, fetched).await
     }
 }

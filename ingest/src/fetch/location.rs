@@ -1,6 +1,6 @@
 //! Where a file is, as a notice says it: a path or a URL; shown without what is secret in it.
 
-use std::fmt::{Display, Formatter};
+use std::fmt::{Display, Formatter, Write as _};
 use std::path::{Path, PathBuf};
 
 use contract::event::RejectReason;
@@ -95,7 +95,13 @@ pub(super) fn shown(url: &Url) -> String {
 impl Display for Location {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::File(path) => write!(f, "{}", path.display()),
+            // A path may hold anything but a zero: a line break would make a line of a log of its own.
+            Self::File(path) => {
+                let clean = |c: char| if c.is_control() { '?' } else { c };
+                path.to_string_lossy()
+                    .chars()
+                    .try_for_each(|c| f.write_char(clean(c)))
+            }
             Self::Web(url) | Self::Object(url) => f.write_str(&shown(url)),
         }
     }
@@ -142,5 +148,7 @@ mod tests {
         let location = Location::parse(text).unwrap();
         assert_eq!(location.to_string(), "https://h:8443/a/b%2B1=2.nc");
         assert_eq!(location.file_name(), "b+1=2.nc");
+        let location = Location::parse("/a/b\nrefused \u{1b}[2J").unwrap();
+        assert_eq!(location.to_string(), "/a/b?refused ?[2J");
     }
 }

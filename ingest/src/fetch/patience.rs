@@ -1,6 +1,6 @@
 //! How often and how long a source is asked again before its file is given up.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use backon::{BackoffBuilder as _, ExponentialBackoff, ExponentialBuilder};
 use contract::event::RejectReason;
@@ -57,7 +57,8 @@ impl<E: Into<Stop>> From<E> for Miss {
 pub(super) struct Tries {
     patience: Patience,
     pauses: ExponentialBackoff,
-    begun: Instant,
+    /// Spent on tries and pauses; waiting for room of our own is not the source's fault.
+    spent: Duration,
     absent: u32,
 }
 
@@ -71,29 +72,36 @@ impl Tries {
                 .without_max_times()
                 .with_jitter()
                 .build(),
-            begun: Instant::now(),
+            spent: Duration::ZERO,
             absent: 0,
         }
     }
 
-    /// Waits for the next try, or gives the file up.
-    pub(super) async fn after(&mut self, miss: Miss, location: &Location) -> Result<(), Stop> {
+    /// Waits for the next try after one that took so long, or gives the file up.
+    pub(super) async fn after(
+        &mut self,
+        miss: Miss,
+        took: Duration,
+        location: &Location,
+    ) -> Result<(), Stop> {
+        self.spent += took;
         let (why, is_over) = match miss {
             Miss::Stop(stop) => return Err(stop),
             Miss::Absent(why) => {
                 self.absent += 1;
                 (why, self.absent >= self.patience.tries)
             }
-            Miss::Away(why) => (why, self.begun.elapsed() >= self.patience.away),
+            Miss::Away(why) => (why, self.spent >= self.patience.away),
         };
         if is_over {
-            let seconds = self.begun.elapsed().as_secs();
+            let seconds = self.spent.as_secs();
             let detail =
                 format!("could not be had in {seconds} s: {why}; send it again when it is there");
             return Err(Rejection::new(RejectReason::Unavailable, "file", detail).into());
         }
         tracing::info!(%location, why, "not had yet; trying again");
         let pause = self.pauses.next().unwrap_or(self.patience.longest_pause);
+        self.spent += pause;
         tokio::time::sleep(pause).await;
         Ok(())
     }

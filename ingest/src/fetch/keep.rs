@@ -1,0 +1,86 @@
+//! What comes over the network in, a file in the spool out: no more than is allowed, and what was announced.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use bytes::Bytes;
+use futures::StreamExt as _;
+use futures::stream::BoxStream;
+use tokio::io::{AsyncWriteExt as _, BufWriter};
+
+use super::checksum::{Check, Expected, wrong_size};
+use super::local;
+use super::patience::Miss;
+use super::raw::{Held, RawGranule, Stamp};
+use super::spool::{self, Spooled};
+use crate::rejection::Rejection;
+
+/// Bytes gathered before they are written.
+const WRITE_BYTES: usize = 1 << 20;
+
+/// What comes.
+pub(super) struct Keep<'a> {
+    pub(super) file_name: String,
+    pub(super) chunks: BoxStream<'a, Result<Bytes, Miss>>,
+    /// What the source says that it sends, bytes.
+    pub(super) length: Option<u64>,
+    /// What is allowed, bytes.
+    pub(super) most: u64,
+}
+
+impl Keep<'_> {
+    /// Writes it to its place, which has room for the announced size, or for all that is allowed.
+    pub(super) async fn run(
+        mut self,
+        mut spooled: Spooled,
+        expected: &Expected,
+    ) -> Result<RawGranule, Miss> {
+        if let Some(length) = self.length {
+            self.check_length(length, expected)?;
+            spooled.shrink_to(length);
+        }
+        let room = self.length.or(expected.size_bytes).unwrap_or(self.most);
+        let folder = spooled.path().to_owned();
+        let unwritten = |source| unwritten(&folder, source);
+        let writer = tokio::fs::File::from_std(spooled.file().try_clone().map_err(unwritten)?);
+        let mut writer = BufWriter::with_capacity(WRITE_BYTES, writer);
+        let mut check = Check::of(expected)?;
+        while let Some(chunk) = self.chunks.next().await {
+            let chunk = chunk?;
+            check.update(&chunk)?;
+            if check.size_bytes() > room.min(self.most) {
+                return Err(self.beyond(check.size_bytes(), expected).into());
+            }
+            writer.write_all(&chunk).await.map_err(unwritten)?;
+        }
+        writer.flush().await.map_err(unwritten)?;
+        let size_bytes = check.size_bytes();
+        if self.length.is_some_and(|length| length != size_bytes) {
+            return Err(Miss::Away(format!("only {size_bytes} bytes of it came")));
+        }
+        let sha256 = check.finish(expected)??;
+        spooled.shrink_to(size_bytes);
+        let stamp = Stamp::of(&spooled.file().metadata().map_err(unwritten)?);
+        let held = Held::Spooled(Arc::new(spooled));
+        Ok(RawGranule::new(folder, self.file_name, sha256, stamp, held))
+    }
+
+    fn check_length(&self, length: u64, expected: &Expected) -> Result<(), Rejection> {
+        if length > self.most {
+            return Err(local::too_large(length, self.most));
+        }
+        wrong_size(expected, length).map_or(Ok(()), Err)
+    }
+
+    /// The refusal of a file that is longer than announced, or than allowed.
+    fn beyond(&self, bytes: u64, expected: &Expected) -> Rejection {
+        match wrong_size(expected, bytes) {
+            Some(refused) if bytes <= self.most => refused,
+            _ => local::too_large(bytes, self.most),
+        }
+    }
+}
+
+fn unwritten(file: &Path, source: std::io::Error) -> Miss {
+    Miss::from(spool::failed(file, source))
+}
