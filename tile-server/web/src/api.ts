@@ -174,10 +174,18 @@ export function budgetUrl(product: string, query: BudgetQuery): string {
   return address(`api/products/${encodeURIComponent(product)}/budget`, { ...query });
 }
 
+/** Which data is drawn. It is a part of a tile's address, so that no cache on the way answers with older pictures. */
+export interface Version {
+  readonly manifest: string;
+  /** Rises when the same version looks different: what lifts its particles comes later than it. */
+  readonly revision: number;
+}
+
 /** `{z}`, `{x}` and `{y}` are left for the imagery provider to fill. */
-export function tileTemplate(product: string, mode: Mode, timeIso: string): string {
+export function tileTemplate(product: string, mode: Mode, timeIso: string, version: Version): string {
   const folder = address(`tiles/${encodeURIComponent(product)}/${mode}/`);
-  return `${folder}{z}/{x}/{y}.png?time=${encodeURIComponent(timeIso)}`;
+  const query = `time=${encodeURIComponent(timeIso)}&manifest=${encodeURIComponent(version.manifest)}`;
+  return `${folder}{z}/{x}/{y}.png?${query}${version.revision > 0 ? `&revision=${version.revision}` : ""}`;
 }
 
 export interface GlobeView {

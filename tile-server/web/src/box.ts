@@ -78,3 +78,20 @@ function steps(count: number): number[] {
 function tidy(degrees: number): number {
   return Math.round(degrees * 100) / 100;
 }
+
+/** A line in degrees with places between its own ones, at most `stepDeg` apart in longitude and latitude. */
+export function denseLine(line: readonly [number, number][], stepDeg: number): [number, number][] {
+  const dense: [number, number][] = [];
+  for (const [index, [lon, lat]] of line.entries()) {
+    const before = line[index - 1];
+    if (before) {
+      const parts = Math.ceil(Math.max(Math.abs(lon - before[0]), Math.abs(lat - before[1])) / stepDeg);
+      for (let part = 1; part < parts; part++) {
+        const share = part / parts;
+        dense.push([before[0] + share * (lon - before[0]), before[1] + share * (lat - before[1])]);
+      }
+    }
+    dense.push([lon, lat]);
+  }
+  return dense;
+}

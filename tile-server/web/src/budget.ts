@@ -55,6 +55,12 @@ export class BudgetPanel {
     void this.refresh();
   }
 
+  /** There is a newer version: asks again what is shown. */
+  async renew(): Promise<void> {
+    this.#answered = "";
+    await this.refresh();
+  }
+
   /** Asks only while the panel is open: a budget is work for the server. */
   async refresh(): Promise<void> {
     const { product, region, tab } = this.#context.store.state;

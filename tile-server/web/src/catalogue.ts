@@ -14,10 +14,13 @@ export const FLUX = "carbon_flux";
 export class Catalogue {
   readonly products: readonly Product[];
   readonly #steps = new Map<string, readonly Step[]>();
-  readonly #maxZoom = new Map<string, number>();
+  readonly #maxZoom: Map<string, number>;
+  readonly #revisions: Map<string, number>;
 
-  constructor(products: readonly Product[]) {
+  constructor(products: readonly Product[], before?: Catalogue) {
     this.products = products;
+    this.#maxZoom = new Map(before ? before.#maxZoom : []);
+    this.#revisions = new Map(before ? before.#revisions : []);
     for (const product of products) this.#steps.set(product.id, parseSteps(product.steps));
   }
 
@@ -47,6 +50,11 @@ export class Catalogue {
     this.#maxZoom.set(key, Number.isInteger(info.maxzoom) ? info.maxzoom : DEFAULT_MAX_ZOOM);
   }
 
+  /** The same version looks different now: its pictures are asked for again. */
+  revise(product: string): void {
+    this.#revisions.set(product, (this.#revisions.get(product) ?? 0) + 1);
+  }
+
   /** The layer to draw at `timeMs`; undefined until product and time are known. */
   layerAt(state: Readonly<State>, timeMs: number): LayerSpec | undefined {
     const product = this.find(state.product);
@@ -55,6 +63,7 @@ export class Catalogue {
     return {
       product: product.id,
       manifest: product.manifest,
+      revision: this.#revisions.get(product.id) ?? 0,
       mode: state.mode,
       timeIso: toIso(clampedMs),
       bounds: product.bounds,

@@ -95,7 +95,7 @@ export function barChart(
   return { setNow: () => undefined, destroy };
 }
 
-function mount(
+export function mount(
   container: HTMLElement,
   options: Omit<uPlot.Options, "width" | "height">,
   data: uPlot.AlignedData,
@@ -118,7 +118,7 @@ function mount(
   };
 }
 
-function dress(labelY: string): Omit<uPlot.Options, "width" | "height" | "series"> {
+export function dress(labelY: string): Omit<uPlot.Options, "width" | "height" | "series"> {
   const axis: uPlot.Axis = {
     stroke: INK,
     font: FONT,
@@ -165,7 +165,7 @@ function monthNames(_plot: uPlot, splits: number[], _axis: number, _space: numbe
   });
 }
 
-function padded(_plot: uPlot, low: number | null, high: number | null): uPlot.Range.MinMax {
+export function padded(_plot: uPlot, low: number | null, high: number | null): uPlot.Range.MinMax {
   if (low === null || high === null) return [0, 1];
   const pad = (high - low) * 0.08 || Math.abs(high) * 0.1 || 1;
   return [low - pad, high + pad];

@@ -16,6 +16,8 @@ const MODE_HINTS: Record<Mode, string> = {
 };
 
 export class Controls {
+  /** Room for the toggle of observations. */
+  readonly observations = el("div");
   readonly #store: Store;
   readonly #product = el("select", { id: "product", "aria-label": "Product" });
   readonly #modes = el("div", { class: "segments", role: "radiogroup", "aria-label": "Mode" });
@@ -46,6 +48,7 @@ export class Controls {
       el("label", { class: "field" }, el("span", { class: "visually-hidden" }, "Product"), this.#product),
       this.#modes,
       this.#legend,
+      this.observations,
       el("label", { class: "field row opacity" }, el("span", {}, "Opacity"), opacity),
       el(
         "button",

@@ -11,8 +11,9 @@ export function encodeHash(state: Readonly<State>): string {
   parts.push(`camera=${cameraText(state.camera)}`);
   if (state.opacity !== 0.9) parts.push(`opacity=${round(state.opacity, 2)}`);
   if (state.place) parts.push(`place=${round(state.place.lon, 3)},${round(state.place.lat, 3)}`);
-  if (state.tab) parts.push(`tab=${state.tab}`);
+  if (state.tab && TABS.includes(state.tab)) parts.push(`tab=${state.tab}`);
   if (state.region !== "global") parts.push(`region=${encodeURIComponent(state.region)}`);
+  if (state.observations) parts.push("observations=on");
   return `#${parts.join("&")}`;
 }
 
@@ -36,6 +37,7 @@ function read(key: string, value: string, found: Partial<State>): void {
   else if (key === "opacity" && value !== "" && Number(value) >= 0 && Number(value) <= 1) found.opacity = Number(value);
   else if (key === "place") assign(found, "place", placeOf(value));
   else if (key === "tab" && TABS.includes(value as Tab)) found.tab = value as Tab;
+  else if (key === "observations" && value === "on") found.observations = true;
   else if (key === "region" && value !== "") found.region = value;
 }
 

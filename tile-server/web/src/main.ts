@@ -21,6 +21,7 @@ import { decodeHash, encodeHash } from "./hash";
 import { LayerStage } from "./layers";
 import { Marks } from "./marks";
 import { Notices } from "./notices";
+import { ObservationLayer } from "./observation-layer";
 import { Panels } from "./panels";
 import { PlacePanel } from "./place";
 import { Playback } from "./playback";
@@ -32,6 +33,7 @@ import { INITIAL, Store } from "./state";
 import { TileCounts } from "./tiles";
 import { Timeline } from "./timeline";
 import { rangeOf } from "./time";
+import { touches, Updates, type News } from "./updates";
 import { ViewDialog } from "./view";
 
 /** Browsers refuse a page that rewrites its address too often. */
@@ -61,7 +63,11 @@ const stage = new LayerStage(
 );
 const presenter = new Presenter(stage);
 const marks = new Marks(globe.scene);
-const pointer = new Pointer(globe, (place) => store.set({ place, tab: "place" }));
+const pointer = new Pointer(
+  globe,
+  (place) => store.set({ place, tab: "place" }),
+  (position) => measured.choose(position),
+);
 const steps = () => catalogue.stepsOf(store.state.product);
 const product = () => catalogue.find(store.state.product);
 const report = (key: string, error: unknown) => connection.report(key, error);
@@ -74,6 +80,7 @@ const view = new ViewDialog(
 const controls = new Controls(byId("controls"), store, () => view.open());
 const timeline = new Timeline(byId("timeline"), store);
 const panels = new Panels(byId("panels"), store);
+const measured = new ObservationLayer(controls.observations, globe, store, panels, report);
 const placePanel = new PlacePanel(panels.bodies.place, {
   store,
   steps,
@@ -90,7 +97,7 @@ const budgetPanel = new BudgetPanel(panels.bodies.budget, {
 });
 new CameraButtons(byId("camera"), globe);
 new Playback(store, presenter, steps, (timeMs) => catalogue.layerAt(store.state, timeMs));
-const probe = installProbe(store, counts, globe, () => stage.shownKey);
+const probe = installProbe(store, counts, globe, () => stage.shownKey, () => measured.platforms);
 
 controls.watch(counts);
 globe
@@ -109,6 +116,7 @@ store.on(["product"], () => {
   // One product's picture must not stay under another one's legend, not even while the other loads.
   presenter.reset();
   useProduct();
+  bringIntoSight();
 });
 store.on(["mode", "product"], (state) => {
   if (state.product === null) return;
@@ -119,6 +127,7 @@ store.on(["timeMs"], showLayer);
 store.on(["mode", "product", "timeMs"], () => notices.clear("tiles"));
 keepAddress();
 void begin();
+new Updates((news) => void renew(news));
 
 function makeGlobe(): Globe {
   try {
@@ -139,7 +148,7 @@ function makeGlobe(): Globe {
 /** Loads what the page needs; again when a lost server is back, where a whole picture in sight is kept. */
 async function begin(): Promise<void> {
   try {
-    catalogue = new Catalogue(await api.products());
+    catalogue = new Catalogue(await api.products(), catalogue);
   } catch (error) {
     report("products", error);
     return;
@@ -155,8 +164,10 @@ async function begin(): Promise<void> {
   if (wanted !== null && !catalogue.find(wanted))
     notices.show("product", `The server has no product “${wanted}”; showing “${first.title}” instead.`);
   const chosen = catalogue.find(wanted) ?? first;
-  if (store.state.product === chosen.id) useProduct();
-  else store.set({ product: chosen.id });
+  if (store.state.product === chosen.id) {
+    useProduct();
+    bringIntoSight();
+  } else store.set({ product: chosen.id });
   await catalogue.learn(chosen.id, store.state.mode).catch((error: unknown) => report("layer", error));
   showLayer();
   void presenter.idle().then(() => probe.setReady());
@@ -184,6 +195,36 @@ async function loadAside(): Promise<void> {
   await Promise.all([placePanel.refresh(), budgetPanel.refresh()]);
 }
 
+/** Shows what is new in the page that is open: what did not change stays as it is. */
+async function renew(all: News[]): Promise<void> {
+  const before = product();
+  for (const news of all) {
+    // Told again of a version that is known: what lifts its particles is there now.
+    if (catalogue.find(news.product)?.manifest === news.manifest) catalogue.revise(news.product);
+  }
+  try {
+    catalogue = new Catalogue(await api.products(), catalogue);
+  } catch (error) {
+    report("products", error);
+    return;
+  }
+  const titles = new Set(all.map((news) => catalogue.find(news.product)?.title ?? news.product));
+  notices.tell("news", `New data: ${[...titles].join(", ")}`);
+  controls.setProducts(catalogue.products);
+  const now = product();
+  if (!now) return;
+  if (!before) {
+    await begin();
+    return;
+  }
+  controls.setProduct(now);
+  const shown = all.filter((news) => news.product === now.id);
+  if (shown.length === 0) return;
+  if (JSON.stringify(before.steps) !== JSON.stringify(now.steps)) useProduct();
+  if (shown.some((news) => touches(news, store.state.timeMs))) showLayer();
+  await Promise.all([placePanel.refresh(), budgetPanel.renew()]);
+}
+
 function useProduct(): void {
   const chosen = product();
   if (!chosen) return;
@@ -202,7 +243,12 @@ function useProduct(): void {
   // Another product's years say nothing here: it begins with its own first picture.
   const timeMs = isInRange ? store.state.timeMs : (known[0]?.midMs ?? Number.NaN);
   store.set({ mode, timeMs });
-  if (!contains(chosen.bounds, store.state.camera) && asked.camera === undefined) globe.lookAt(chosen.bounds);
+}
+
+/** Only for a product that was chosen: new data of the one in sight must not turn the globe. */
+function bringIntoSight(): void {
+  const bounds = product()?.bounds;
+  if (bounds && !contains(bounds, store.state.camera) && asked.camera === undefined) globe.lookAt(bounds);
 }
 
 function showLayer(): void {

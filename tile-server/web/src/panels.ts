@@ -1,12 +1,13 @@
 //! The analysis card: tabs for place, budget and check, one open at a time, closable so that the globe has the room.
 import { el, icon } from "./dom";
-import { BARS, CLOSE, PIN, TICK } from "./icons";
+import { BARS, CLOSE, PIN, TICK, WAVE } from "./icons";
 import type { Store, Tab } from "./state";
 
 const TITLES: Record<Tab, [title: string, icon: string]> = {
   place: ["Place", PIN],
   budget: ["Budget", BARS],
   check: ["Check", TICK],
+  platform: ["Observed", WAVE],
 };
 
 export class Panels {
@@ -20,7 +21,12 @@ export class Panels {
     this.#container = container;
     this.#store = store;
     const list = el("div", { class: "tabs", role: "tablist", "aria-label": "Analysis" });
-    this.bodies = { place: this.#body("place"), budget: this.#body("budget"), check: this.#body("check") };
+    this.bodies = {
+      place: this.#body("place"),
+      budget: this.#body("budget"),
+      check: this.#body("check"),
+      platform: this.#body("platform"),
+    };
     for (const tab of Object.keys(TITLES) as Tab[]) {
       const [title, path] = TITLES[tab];
       const button = el(

@@ -14,12 +14,18 @@ export class Pointer {
   #drawing: Drawing | undefined;
   readonly #globe: Globe;
 
-  constructor(globe: Globe, onPlace: (place: Place) => void) {
+  /** `onThing` says whether something on the globe was hit; only the globe itself is a place. */
+  constructor(
+    globe: Globe,
+    onPlace: (place: Place) => void,
+    onThing: (position: { x: number; y: number }) => boolean,
+  ) {
     this.#globe = globe;
     const handler = new ScreenSpaceEventHandler(globe.canvas);
     handler.setInputAction((event: ScreenSpaceEventHandler.PositionedEvent) => {
+      if (this.#drawing || onThing(event.position)) return;
       const place = globe.pick(event.position);
-      if (place && !this.#drawing) onPlace(place);
+      if (place) onPlace(place);
     }, ScreenSpaceEventType.LEFT_CLICK);
     handler.setInputAction((event: ScreenSpaceEventHandler.PositionedEvent) => {
       if (this.#drawing) this.#drawing.start = globe.pick(event.position);

@@ -1,5 +1,6 @@
 //! `window.fluxglobe`: what a test or a curious reader may watch, never change.
 import type { Globe } from "./globe";
+import type { Platform } from "./observations";
 import type { State, Store } from "./state";
 import type { TileCounts } from "./tiles";
 
@@ -11,6 +12,8 @@ export interface Probe {
   readonly tilesFailed: number;
   /** `product:manifest/mode@instant` of the layer in sight. */
   readonly shown: string | undefined;
+  /** Names of the platforms on the globe, `dataset/platform`, with their place. */
+  readonly platforms: readonly { id: string; lon: number; lat: number }[];
   readonly state: Readonly<State>;
   /** Canvas point of a place in CSS pixels; undefined when it is on the far side. */
   project(lon: number, lat: number): { x: number; y: number } | undefined;
@@ -27,6 +30,7 @@ export function installProbe(
   counts: TileCounts,
   globe: Globe,
   shown: () => string | undefined,
+  platforms: () => readonly Platform[],
 ): { setReady: () => void } {
   let isReady = false;
   window.fluxglobe = {
@@ -44,6 +48,9 @@ export function installProbe(
     },
     get shown() {
       return shown();
+    },
+    get platforms() {
+      return platforms().map(({ id, properties: { lon, lat } }) => ({ id, lon, lat }));
     },
     get state() {
       return store.state;

@@ -3,7 +3,8 @@
 export type Mode = "map" | "points" | "sprites" | "volume";
 export const MODES: readonly Mode[] = ["map", "points", "sprites", "volume"];
 
-export type Tab = "place" | "budget" | "check";
+export type Tab = "place" | "budget" | "check" | "platform";
+/** Those that a shared address can open; which platform was chosen is no part of it. */
 export const TABS: readonly Tab[] = ["place", "budget", "check"];
 
 export interface CameraView {
@@ -33,6 +34,8 @@ export interface State {
   tab: Tab | null;
   /** Region of the budget: `global`, a name, or `W,S,E,N`. */
   region: string;
+  /** Buoys, ships, stations and casts are shown. */
+  observations: boolean;
   camera: CameraView;
 }
 
@@ -49,6 +52,7 @@ export const INITIAL: State = {
   place: null,
   tab: null,
   region: "global",
+  observations: false,
   camera: HOME,
 };
 

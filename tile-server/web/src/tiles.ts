@@ -7,15 +7,13 @@ import {
   UrlTemplateImageryProvider,
   WebMercatorTilingScheme,
 } from "cesium";
-import { tileTemplate } from "./api";
+import { tileTemplate, type Version } from "./api";
 import { isWhole, type Bounds } from "./box";
 import type { Mode } from "./state";
 
 /** Everything that decides what a layer looks like; two equal keys are the same pictures. */
-export interface LayerSpec {
+export interface LayerSpec extends Version {
   readonly product: string;
-  /** The product's version: revised data is another picture at the same address. */
-  readonly manifest: string;
   readonly mode: Mode;
   readonly timeIso: string;
   readonly bounds: Bounds;
@@ -23,7 +21,8 @@ export interface LayerSpec {
 }
 
 export function layerKey(spec: LayerSpec): string {
-  return `${spec.product}:${spec.manifest}/${spec.mode}@${spec.timeIso}`;
+  const revision = spec.revision > 0 ? `+${spec.revision}` : "";
+  return `${spec.product}:${spec.manifest}${revision}/${spec.mode}@${spec.timeIso}`;
 }
 
 /** Totals over all layers since the page was loaded. */
@@ -61,8 +60,9 @@ export class LayerTiles {
     counts: TileCounts,
     onFailure: (status: number | undefined, url: string) => void,
   ) {
+    const template = tileTemplate(spec.product, spec.mode, spec.timeIso, spec);
     const provider = new UrlTemplateImageryProvider({
-      url: tileTemplate(spec.product, spec.mode, spec.timeIso),
+      url: template,
       tilingScheme: new WebMercatorTilingScheme(),
       tileWidth: TILE_PX,
       tileHeight: TILE_PX,
@@ -74,7 +74,7 @@ export class LayerTiles {
     this.#countRequests(provider, counts);
     provider.errorEvent.addEventListener((error: TileProviderError) => {
       const cause: unknown = error.error;
-      const url = `${tileTemplate(spec.product, spec.mode, spec.timeIso)}`
+      const url = template
         .replace("{z}", String(error.level))
         .replace("{x}", String(error.x))
         .replace("{y}", String(error.y));
