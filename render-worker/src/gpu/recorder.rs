@@ -1,6 +1,7 @@
 //! A list of commands for the device: dispatches and clears in order, then one download that runs them all.
 
 use std::sync::mpsc::sync_channel;
+use std::time::Duration;
 
 use bytemuck::Pod;
 
@@ -9,6 +10,9 @@ use crate::error::RenderError;
 
 /// Most workgroups in one dimension of a dispatch (the least any device allows).
 const MOST_GROUPS: u32 = 65_535;
+
+/// A device that has not drawn a part by then hangs; a software adapter needs seconds for the largest.
+const HUNG: Duration = Duration::from_mins(5);
 
 /// Commands that have not run yet.
 pub struct Recorder<'a> {
@@ -125,7 +129,7 @@ impl<'a> Recorder<'a> {
         });
         let wait = wgpu::PollType::Wait {
             submission_index: Some(submission),
-            timeout: None,
+            timeout: Some(HUNG),
         };
         self.gpu.device.poll(wait).map_err(|_stopped| stopped())?;
         done_rx
