@@ -9,6 +9,7 @@ mod ports;
 mod progress;
 mod protocol;
 mod services;
+mod sink;
 mod viewer;
 
 use std::process::ExitCode;
@@ -39,7 +40,9 @@ fn main() -> ExitCode {
 
 fn run(settings: &Settings, command: Command) -> anyhow::Result<ExitCode> {
     service::start_logging(&settings.log, settings.log_format)?;
-    let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build()?;
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .enable_all()
+        .build()?;
     let outcome = runtime.block_on(command::run(settings, command));
     // Ballista's executor keeps threads of its own; nobody waits for them.
     runtime.shutdown_background();

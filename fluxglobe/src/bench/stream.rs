@@ -43,7 +43,7 @@ struct Summary {
 }
 
 /// One stage.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Clone, Serialize)]
 struct Stage {
     stage: &'static str,
     p50_s: f64,
@@ -71,7 +71,11 @@ pub(crate) async fn run(log: &dyn EventLog, options: &BenchStream) -> Result<()>
         until_tile(&options.tiles, &manifest).await?;
         let tile_s = begun.elapsed().as_secs_f64();
         if number > 0 {
-            all.push(Times { landed_s, derived_s, tile_s });
+            all.push(Times {
+                landed_s,
+                derived_s,
+                tile_s,
+            });
             bar.inc(1);
         }
         tokio::fs::remove_file(&file).await?;
@@ -88,8 +92,10 @@ pub(crate) async fn run(log: &dyn EventLog, options: &BenchStream) -> Result<()>
 async fn granule(options: &BenchStream, seed: u64) -> Result<PathBuf> {
     let file = options.inbox.join(format!("bench-stream-{seed:06}.h5"));
     let target = file.clone();
-    tokio::task::spawn_blocking(move || ingest::generate_china_sea(&target, SCALE, seed + 1, &|_done, _all| ()))
-        .await??;
+    tokio::task::spawn_blocking(move || {
+        ingest::generate_china_sea(&target, SCALE, seed + 1, &|_done, _all| ())
+    })
+    .await??;
     Ok(file)
 }
 
@@ -110,7 +116,9 @@ async fn send(log: &dyn EventLog, file: &std::path::Path, product: &ProductId) -
 
 async fn until_landed(follower: &mut dyn Follower, notice: &Event) -> Result<ManifestId> {
     wait(follower, "granule.landed", |event| match &event.body {
-        Body::GranuleLanded { manifest, .. } if event.trace == notice.trace => Some(manifest.clone()),
+        Body::GranuleLanded { manifest, .. } if event.trace == notice.trace => {
+            Some(manifest.clone())
+        }
         _ => None,
     })
     .await
@@ -124,7 +132,11 @@ async fn until_derived(follower: &mut dyn Follower, source: &ManifestId) -> Resu
     .await
 }
 
-async fn wait<T>(follower: &mut dyn Follower, what: &str, wanted: impl Fn(&Event) -> Option<T>) -> Result<T> {
+async fn wait<T>(
+    follower: &mut dyn Follower,
+    what: &str,
+    wanted: impl Fn(&Event) -> Option<T>,
+) -> Result<T> {
     let begun = Instant::now();
     while begun.elapsed() < STAGE_LIMIT {
         for message in follower.next(MESSAGES, POLL).await? {
@@ -142,11 +154,20 @@ async fn until_tile(tiles: &str, manifest: &ManifestId) -> Result<()> {
     let client = reqwest::Client::new();
     let address = format!("{tiles}/api/products");
     while begun.elapsed() < STAGE_LIMIT {
-        let products: serde_json::Value = client.get(&address).send().await?.json().await?;
+        let answer = client.get(&address).send().await?.bytes().await?;
+        let products: serde_json::Value = serde_json::from_slice(&answer)?;
         if products.to_string().contains(&manifest.to_string()) {
             // China Sea: tile 3/6/3 holds it.
-            let tile = format!("{tiles}/tiles/{}/volume/3/6/3.png?time=2009-07-15", manifest.product);
-            let answer = client.get(&tile).send().await?.error_for_status().context("the tile was refused")?;
+            let tile = format!(
+                "{tiles}/tiles/{}/volume/3/6/3.png?time=2009-07-15",
+                manifest.product
+            );
+            let answer = client
+                .get(&tile)
+                .send()
+                .await?
+                .error_for_status()
+                .context("the tile was refused")?;
             answer.bytes().await?;
             return Ok(());
         }
@@ -212,14 +233,25 @@ mod tests {
     #[test]
     fn quantiles_are_values_that_were_measured() {
         let values: Vec<f64> = (1..=20).map(f64::from).collect();
-        assert_eq!((quantile(&values, 0.5), quantile(&values, 0.95)), (10.0, 19.0));
+        assert_eq!(
+            (quantile(&values, 0.5), quantile(&values, 0.95)),
+            (10.0, 19.0)
+        );
         assert_eq!(quantile(&[7.0], 0.95), 7.0);
     }
 
     #[test]
     fn shares_of_the_stages_add_up_to_the_whole() {
-        let times = [Times { landed_s: 1.0, derived_s: 3.0, tile_s: 4.0 }];
-        let shares: Vec<f64> = summarise(&times).stages.iter().map(|s| s.share_percent).collect();
+        let times = [Times {
+            landed_s: 1.0,
+            derived_s: 3.0,
+            tile_s: 4.0,
+        }];
+        let shares: Vec<f64> = summarise(&times)
+            .stages
+            .iter()
+            .map(|s| s.share_percent)
+            .collect();
         assert_eq!(shares, [25.0, 50.0, 25.0, 100.0]);
     }
 }

@@ -6,17 +6,24 @@ use std::sync::Arc;
 use anyhow::Result;
 use contract::event::RejectReason;
 use ingest::{IngestService, Outcome};
+use observations::FileStore;
 use serde::Serialize;
 use storage::log::EventLog;
 
 use crate::cli::{Ingest, Settings};
 use crate::progress::LandingBar;
+use crate::sink::Sink;
 use crate::{deployment, progress};
 
 pub(crate) async fn run(settings: &Settings, options: Ingest) -> Result<ExitCode> {
     let store = deployment::store(settings)?;
     let log: Arc<dyn EventLog> = Arc::new(deployment::embedded_log(settings)?);
-    let service = IngestService::new(store, log, ingest::Settings::with_current_program()?);
+    let service = IngestService::new(
+        store.clone(),
+        log,
+        ingest::Settings::with_current_program()?,
+    )
+    .with_observations(Arc::new(Sink(Arc::new(FileStore::new(store)))));
     let files: Vec<_> = options
         .files
         .iter()
@@ -67,6 +74,7 @@ impl Line {
             Outcome::Landed { revised: true, .. } => ("revised", None, None),
             Outcome::Landed { .. } => ("landed", None, None),
             Outcome::AlreadyLanded { .. } => ("already_landed", None, None),
+            Outcome::Observed { .. } => ("observed", None, None),
             Outcome::Rejected {
                 reason,
                 object,

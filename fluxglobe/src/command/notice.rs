@@ -43,7 +43,8 @@ fn notice(file: &str, options: &Notice) -> Result<Event> {
         (file.to_owned(), options.sha256, None)
     } else {
         let path = std::path::absolute(file.trim_start_matches("file://"))?;
-        let (sha256, size_bytes) = digest(&path).with_context(|| format!("cannot read {}", path.display()))?;
+        let (sha256, size_bytes) =
+            digest(&path).with_context(|| format!("cannot read {}", path.display()))?;
         (path.display().to_string(), Some(sha256), Some(size_bytes))
     };
     let body = Body::GranuleNotice {
@@ -61,7 +62,9 @@ fn notice(file: &str, options: &Notice) -> Result<Event> {
 
 /// The clock on the wall.
 pub(crate) fn now() -> Result<TimeMs> {
-    let since = SystemTime::now().duration_since(UNIX_EPOCH).context("the clock stands before 1970")?;
+    let since = SystemTime::now()
+        .duration_since(UNIX_EPOCH)
+        .context("the clock stands before 1970")?;
     Ok(TimeMs::new(since.as_millis() as i64)?)
 }
 

@@ -4,13 +4,14 @@ use std::sync::Arc;
 
 use anyhow::{Context as _, Result};
 use compute::Engine;
+use observations::FileStore;
 use storage::Store;
 use tile_server::backend::Check;
 use tile_server::metrics::Registry;
 use tile_server::{AppState, Server};
 
 use crate::cli::Settings;
-use crate::ports::{Analyst, Drawer};
+use crate::ports::{Analyst, Drawer, Observer};
 use crate::{deployment, progress, viewer};
 
 pub(crate) async fn run(settings: &Settings, options: tile_server::config::Settings) -> Result<()> {
@@ -38,11 +39,12 @@ pub(crate) async fn bind(
     let registry = Registry::new();
     let state = AppState::new(
         &options,
-        store,
+        store.clone(),
         Arc::new(drawer),
         Arc::new(analyst),
         registry,
-    )?;
+    )?
+    .with_observations(Arc::new(Observer(Arc::new(FileStore::new(store)))));
     Ok(Server::bind(&options, state).await?)
 }
 

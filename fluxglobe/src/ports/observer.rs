@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use async_trait::async_trait;
+use contract::ContractError;
 use observations::{ErrorClass, Filter, ObservationError, ObservationStore, TrackQuery};
 use tile_server::backend::{
     BackendError, Class, ObservationPage, ObservationQuestion, Observe, Platform, TrackPoint,
@@ -78,7 +79,7 @@ fn filter(question: &ObservationQuestion) -> Result<Filter, BackendError> {
         kinds: question.kinds.clone(),
         worst: question.worst,
         limit: question.limit,
-        after: after.map_err(|error: ObservationError| {
+        after: after.map_err(|error: ContractError| {
             BackendError::new(Class::BadRequest, error.to_string())
         })?,
     })

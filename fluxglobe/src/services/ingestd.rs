@@ -10,7 +10,7 @@ use service::Red;
 
 use crate::cli::{Ingestd, Settings};
 use crate::services::Footing;
-use crate::services::sink::Sink;
+use crate::sink::Sink;
 
 pub(crate) async fn run(settings: &Settings, options: Ingestd) -> Result<()> {
     // What can be refused without asking anybody is refused before anything is waited for.

@@ -8,7 +8,6 @@ mod footing;
 pub(crate) mod ingestd;
 pub(crate) mod render_worker;
 pub(crate) mod scheduler;
-mod sink;
 pub(crate) mod tile_server;
 
 pub(crate) use footing::Footing;

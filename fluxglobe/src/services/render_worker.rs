@@ -25,7 +25,7 @@ pub(crate) async fn run(settings: &Settings, options: RenderWorker) -> Result<()
     let asked = desk.clone();
     footing.board.set("renderer", move || {
         let asked = asked.clone();
-        async move { asked.ready().await.map(|()| asked.name().to_owned()) }
+        async move { asked.ready().await }
     });
     let server = Server::bind(desk.clone(), &options.render)?;
     tracing::info!(address = %server.address(), "render worker");

@@ -1,0 +1,78 @@
+//! Words of `fluxglobe observations`.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand, ValueEnum};
+use contract::observation::PlatformKind;
+use contract::product::ProductId;
+use contract::time::TimeMs;
+
+/// `fluxglobe observations`. Files of observations are landed with `fluxglobe ingest`, as grids are.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Observations {
+    /// Buoys, ships, stations and profiles that there are observations of.
+    List(ObservationsAsked),
+    /// The observations themselves, in the order of time.
+    Query(ObservationsAsked),
+    /// Hold observations against a product: nearest cell, bias, RMSE, scatter plot.
+    Matchup(Matchup),
+}
+
+/// Which observations.
+#[derive(Debug, Args)]
+pub(crate) struct ObservationsAsked {
+    /// `global`, a named region, a box WEST,SOUTH,EAST,NORTH, or a GeoJSON file.
+    #[arg(long, default_value = "global", allow_hyphen_values = true)]
+    pub(crate) region: String,
+    /// First instant.
+    #[arg(long)]
+    pub(crate) from: Option<TimeMs>,
+    /// First instant after them.
+    #[arg(long)]
+    pub(crate) to: Option<TimeMs>,
+    /// What was measured, a CF standard name such as `sea_surface_temperature`.
+    #[arg(long)]
+    pub(crate) property: Option<String>,
+    /// Data set.
+    #[arg(long)]
+    pub(crate) dataset: Option<ProductId>,
+    /// Name of the platform.
+    #[arg(long)]
+    pub(crate) platform: Option<String>,
+    /// buoy, ship, station or profile.
+    #[arg(long)]
+    pub(crate) kind: Option<PlatformKind>,
+    /// Most observations, 1 to 1,000,000.
+    #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub(crate) limit: u32,
+    /// JSON instead of a table, a line each.
+    #[arg(long)]
+    pub(crate) json: bool,
+    #[command(flatten)]
+    pub(crate) store: observations::ObservationSettings,
+}
+
+/// How a step of the product is chosen for an observation's time.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(crate) enum MatchTime {
+    /// The step that the time lies in or is nearest to.
+    Nearest,
+    /// Interpolated between the two steps around it.
+    Linear,
+}
+
+/// `fluxglobe observations matchup`.
+#[derive(Debug, Args)]
+pub(crate) struct Matchup {
+    /// The product to hold them against.
+    #[arg(long)]
+    pub(crate) product: ProductId,
+    /// How time is matched.
+    #[arg(long, value_enum, default_value = "nearest")]
+    pub(crate) time: MatchTime,
+    /// File for a scatter plot.
+    #[arg(long, value_name = "FILE.svg")]
+    pub(crate) plot: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) asked: ObservationsAsked,
+}

@@ -1,0 +1,153 @@
+//! `fluxglobe observations`: which platforms there are, what they measured, and how a product compares with it.
+
+use anyhow::{Context as _, Result, bail};
+use comfy_table::Table;
+use comfy_table::presets::NOTHING;
+use compute::matchup::{self, TimeMatch};
+use contract::observation::{Observation, Quality};
+use observations::{Filter, ObservationStore};
+
+use crate::cli::{MatchTime, Matchup, Observations, ObservationsAsked, Settings};
+use crate::command::budget;
+use crate::{deployment, progress};
+
+pub(crate) async fn run(settings: &Settings, command: Observations) -> Result<()> {
+    match command {
+        Observations::List(asked) => list(settings, &asked).await,
+        Observations::Query(asked) => query(settings, &asked).await,
+        Observations::Matchup(options) => matchup(settings, &options).await,
+    }
+}
+
+fn filter(asked: &ObservationsAsked) -> Result<Filter> {
+    let region = budget::region(&asked.region)?;
+    Ok(Filter {
+        region,
+        from: asked.from,
+        to: asked.to,
+        properties: asked.property.clone().into_iter().collect(),
+        datasets: asked.dataset.clone().into_iter().collect(),
+        platforms: asked.platform.clone().into_iter().collect(),
+        kinds: asked.kind.into_iter().collect(),
+        worst: Quality::Bad,
+        limit: asked.limit.min(observations::MAX_LIMIT),
+        after: None,
+    })
+}
+
+async fn list(settings: &Settings, asked: &ObservationsAsked) -> Result<()> {
+    let store = observations::open(&asked.store, &deployment::store(settings)?)?;
+    let platforms = store.platforms(&filter(asked)?).await?;
+    if asked.json {
+        for platform in &platforms {
+            progress::result(&serde_json::to_string(platform)?)?;
+        }
+        return Ok(());
+    }
+    if platforms.is_empty() {
+        progress::say("no observations; land files of them with `fluxglobe ingest`");
+        return Ok(());
+    }
+    let mut table = Table::new();
+    table.load_preset(NOTHING);
+    table.set_header([
+        "dataset",
+        "platform",
+        "kind",
+        "from",
+        "to",
+        "last place",
+        "values",
+        "properties",
+    ]);
+    for p in platforms {
+        table.add_row([
+            p.dataset.to_string(),
+            p.name,
+            p.kind.to_string(),
+            progress::day(p.first),
+            progress::day(p.last),
+            format!("{:.3}, {:.3}", p.lon_deg, p.lat_deg),
+            p.count.to_string(),
+            p.properties.join(" "),
+        ]);
+    }
+    progress::result(&table.to_string())
+}
+
+async fn query(settings: &Settings, asked: &ObservationsAsked) -> Result<()> {
+    let store = observations::open(&asked.store, &deployment::store(settings)?)?;
+    let rows = all(store.as_ref(), asked).await?;
+    if asked.json {
+        for row in &rows {
+            progress::result(&serde_json::to_string(row)?)?;
+        }
+        return Ok(());
+    }
+    let mut table = Table::new();
+    table.load_preset(NOTHING);
+    table.set_header([
+        "time", "dataset", "platform", "place", "depth m", "property", "value", "unit", "flag",
+    ]);
+    for o in rows {
+        table.add_row([
+            o.time.to_string(),
+            o.dataset.to_string(),
+            o.platform,
+            format!("{:.3}, {:.3}", o.lon_deg, o.lat_deg),
+            format!("{}", o.depth_m),
+            o.property,
+            format!("{}", o.value),
+            o.unit,
+            o.quality.flag().to_string(),
+        ]);
+    }
+    progress::result(&table.to_string())
+}
+
+/// Up to the limit, page by page.
+async fn all(store: &dyn ObservationStore, asked: &ObservationsAsked) -> Result<Vec<Observation>> {
+    let (mut filter, mut rows) = (filter(asked)?, vec![]);
+    loop {
+        filter.limit = (asked.limit - rows.len() as u32).min(observations::MAX_LIMIT);
+        let page = store.query(&filter).await?;
+        rows.extend(page.observations);
+        if page.next.is_none() || rows.len() >= asked.limit as usize {
+            return Ok(rows);
+        }
+        filter.after = page.next;
+    }
+}
+
+async fn matchup(settings: &Settings, options: &Matchup) -> Result<()> {
+    if options.asked.property.is_none() {
+        bail!("say what is held against the product: --property, such as sea_surface_temperature");
+    }
+    let store = deployment::store(settings)?;
+    let manifest = deployment::manifest(&store, &options.product, &settings.data).await?;
+    let found = observations::open(&options.asked.store, &store)?;
+    let rows = all(found.as_ref(), &options.asked).await?;
+    let time = match options.time {
+        MatchTime::Nearest => TimeMatch::Nearest,
+        MatchTime::Linear => TimeMatch::Linear,
+    };
+    let matched = matchup::matchup(&store, &manifest, &rows, time).await?;
+    if let Some(file) = &options.plot {
+        let svg = matchup::scatter_svg(&matched)?;
+        std::fs::write(file, svg).with_context(|| format!("cannot write {}", file.display()))?;
+        progress::say(&format!("plot in {}", file.display()));
+    }
+    if options.asked.json {
+        return progress::result(&serde_json::to_string_pretty(&matched)?);
+    }
+    progress::result(&format!("{:#?}", matched.statistics))?;
+    progress::say(&format!(
+        "{} of {} observations in {}; left out: {:?}; against {}",
+        matched.rows.len(),
+        rows.len(),
+        matched.unit,
+        matched.left_out,
+        manifest.id()
+    ));
+    Ok(())
+}
