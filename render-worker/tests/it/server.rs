@@ -172,13 +172,18 @@ async fn a_picture_that_all_have_given_up_is_not_drawn_to_its_end() {
         (*width_px, *height_px) = (4096, 4096);
     }
     let (one, other) = (ask(&fleet, &large), ask(&fleet, &large));
-    let waiting = ask(&fleet, &quick(&job, 1));
     let calls = [("operation", "call")];
     let begun = [("operation", "draw")];
     let in_flight = "fluxglobe_render_worker_in_flight";
     worker
-        .until("it is drawn and the others wait", |w| {
-            w.metric(in_flight, &calls) == 3 && w.metric(in_flight, &begun) == 1
+        .until("it is drawn for both", |w| {
+            w.metric(in_flight, &calls) == 2 && w.metric(in_flight, &begun) == 1
+        })
+        .await;
+    let waiting = ask(&fleet, &quick(&job, 1));
+    worker
+        .until("another waits", |w| {
+            w.desk.condition().waiting_on_demand == 1
         })
         .await;
     one.abort();
@@ -239,12 +244,13 @@ async fn a_stopping_worker_sends_others_away_and_finishes_what_it_took() {
     let job = two_months_in(&store).await;
     let worker = Worker::start(&store, 1, 4);
     let fleet = Arc::new(fleet(&store, &[&worker.name]).await);
-    let (drawing, waiting) = (ask(&fleet, &slow(&job, 1)), ask(&fleet, &quick(&job, 1)));
+    let drawing = ask(&fleet, &slow(&job, 1));
     worker
-        .until("one is drawn, one waits", |w| {
-            let condition = w.desk.condition();
-            condition.in_flight == 1 && condition.waiting_on_demand == 1
-        })
+        .until("one is drawn", |w| w.desk.condition().in_flight == 1)
+        .await;
+    let waiting = ask(&fleet, &quick(&job, 1));
+    worker
+        .until("one waits", |w| w.desk.condition().waiting_on_demand == 1)
         .await;
     worker.stop.now();
     worker
