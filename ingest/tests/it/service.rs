@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use contract::event::{Body, Event, RejectReason};
 use contract::topic::Topic;
-use ingest::{IngestService, Outcome, Progress, Quiet, Stage};
+use ingest::{IngestService, Outcome, Progress, Quiet, Settings, Stage};
 use storage::Store;
 use storage::log::{EmbeddedLog, EventLog};
 
@@ -196,9 +196,6 @@ async fn work_that_takes_too_long_comes_again() {
     let (place, log) = (Place::new(), Arc::new(EmbeddedLog::memory()));
     SmallFile::new().write_classic(&place.path("a.nc"));
     let mut slow = settings();
-    slow.decoder.program = "/bin/sleep".into();
-    slow.decoder.arguments = vec![];
-    // The reader's arguments are a path and numbers, so that it fails at once; a shell that sleeps does not.
     slow.decoder.program = "/bin/sh".into();
     slow.decoder.arguments = vec!["-c".into(), "sleep 60".into()];
     let stuck = IngestService::new(
@@ -226,6 +223,18 @@ async fn work_that_takes_too_long_comes_again() {
     assert_eq!(landed.len(), 1);
 }
 
+/// Settings whose reader waits with files of some names until a gate is there.
+fn slow_reader(names: &str, gate: &std::path::Path) -> Settings {
+    let reader = env!("CARGO_BIN_EXE_decode-file");
+    let wait = format!("while ! [ -e {} ]; do sleep 0.02; done", gate.display());
+    // `$0` is the first word after the script: the first of the reader's arguments, its file.
+    let script = format!("case \"$0\" in {names}) {wait};; esac; exec {reader} \"$0\" \"$@\"");
+    let mut settings = settings();
+    settings.decoder.program = "/bin/sh".into();
+    settings.decoder.arguments = vec!["-c".into(), script.into()];
+    settings
+}
+
 /// The offset waits for a slow file, and nobody else does.
 #[tokio::test]
 async fn others_land_while_one_file_is_slow_and_the_offset_waits_for_it() {
@@ -234,19 +243,8 @@ async fn others_land_while_one_file_is_slow_and_the_offset_waits_for_it() {
     SmallFile::new()
         .first_month()
         .write_hdf5(&place.path("b.h5"));
-    let reader = env!("CARGO_BIN_EXE_decode-file");
     let gate = place.path("gate");
-    let script = format!(
-        "case \"$0\" in *slow*) while ! [ -e {} ]; do sleep 0.02; done;; esac; exec {reader} \"$@\"",
-        gate.display()
-    );
-    let mut settings = settings();
-    settings.decoder.program = "/bin/sh".into();
-    // `$0` is the first word after the script, and again the first of the reader's arguments.
-    settings.decoder.arguments = vec![
-        "-c".into(),
-        script.replace("\"$@\"", "\"$0\" \"$@\"").into(),
-    ];
+    let settings = slow_reader("*slow*", &gate);
     let service = IngestService::new(
         place.store.clone(),
         Arc::clone(&log) as Arc<dyn EventLog>,
@@ -285,17 +283,21 @@ async fn others_land_while_one_file_is_slow_and_the_offset_waits_for_it() {
     assert_eq!(log.lag(Topic::GranuleNotice, "ingest").await.unwrap(), 0);
 }
 
-/// Two months of a product, sent twice in an order that a race could turn round.
+/// The first of four is slow to read: the others wait for it.
 #[tokio::test]
 async fn revisions_of_one_product_land_in_the_order_of_their_notices() {
     let (place, log) = (Place::new(), Arc::new(EmbeddedLog::memory()));
     let product = "p".parse().unwrap();
-    let service = service(&place.store, &log);
+    let gate = place.path("gate");
+    let service = IngestService::new(
+        place.store.clone(),
+        Arc::clone(&log) as Arc<dyn EventLog>,
+        slow_reader("*0.nc", &gate),
+    );
     for revision in 0..4u8 {
         let mut file = SmallFile::new();
         file.values[5] = f32::from(revision);
         let path = place.path(&format!("{revision}.nc"));
-        // The first is the largest to read, the last the smallest.
         if revision % 2 == 0 {
             file.write_hdf5(&path);
         } else {
@@ -303,7 +305,18 @@ async fn revisions_of_one_product_land_in_the_order_of_their_notices() {
         }
         service.notify(&[path], None, Some(&product)).await.unwrap();
     }
-    let landed = run_until(&service, log.as_ref(), Topic::GranuleLanded, 4).await;
+    let open = async {
+        tokio::time::sleep(Duration::from_millis(500)).await;
+        assert!(
+            storage::manifests::products(&place.store)
+                .await
+                .unwrap()
+                .is_empty()
+        );
+        std::fs::write(&gate, "").unwrap();
+    };
+    let run = run_until(&service, log.as_ref(), Topic::GranuleLanded, 4);
+    let (landed, ()) = tokio::join!(run, open);
     assert_eq!(landed.len(), 4);
     let manifest = place.newest("p").await;
     assert_eq!(manifest.number, 4, "each revision can be cited");
