@@ -12,5 +12,6 @@ mod fault_proxy;
 mod faults;
 mod killed;
 mod name_node;
+mod restarts;
 mod stores;
 mod suite;
