@@ -48,7 +48,10 @@ pub trait Analyse: Send + Sync + 'static {
 #[async_trait]
 pub trait Observe: Send + Sync + 'static {
     /// Platforms with observations that a question is about, by dataset and name.
-    async fn platforms(&self, question: &ObservationQuestion) -> Result<Vec<Platform>, BackendError>;
+    async fn platforms(
+        &self,
+        question: &ObservationQuestion,
+    ) -> Result<Vec<Platform>, BackendError>;
 
     /// Where a platform was, in the order of time.
     async fn track(&self, question: &TrackQuestion) -> Result<Vec<TrackPoint>, BackendError>;

@@ -14,6 +14,7 @@ use storage::{StorageError, Store, manifests};
 
 use crate::error::ServerError;
 use crate::metrics::Metrics;
+use crate::versions::Versions;
 
 /// Folder of all manifests; [`ObjectKey::manifest`] puts them there.
 const FOLDER: &str = "manifests";
@@ -66,6 +67,7 @@ pub struct Catalogue {
     max_age: Duration,
     metrics: Metrics,
     snapshot: RwLock<Arc<Snapshot>>,
+    versions: Versions,
     /// Held while the store is read, so that a crowd reads it once.
     reading: tokio::sync::Mutex<()>,
 }
@@ -74,6 +76,7 @@ impl Catalogue {
     /// An empty catalogue that reads the store when it is first asked.
     pub fn new(store: Store, max_age: Duration, metrics: Metrics) -> Self {
         Self {
+            versions: Versions::new(store.clone()),
             store,
             max_age,
             metrics,
@@ -96,6 +99,35 @@ impl Catalogue {
             }),
             None => Err(unknown()),
         }
+    }
+
+    /// The version of a product that `manifest` names; the newest one if it names none.
+    pub async fn version(
+        &self,
+        product: &str,
+        manifest: Option<&str>,
+    ) -> Result<Arc<Layer>, ServerError> {
+        let newest = self.layer(product).await?;
+        let Some(name) = manifest else {
+            return Ok(newest);
+        };
+        let id: ManifestId = name.parse()?;
+        if id == newest.id {
+            return Ok(newest);
+        }
+        if id.product != newest.manifest.product {
+            return Err(ServerError::UnknownVersion {
+                manifest: id.to_string(),
+            });
+        }
+        self.versions.layer(&id).await
+    }
+
+    /// Is there no newer version known?
+    pub(crate) fn is_newest(&self, layer: &Layer) -> bool {
+        let newest = self.current();
+        let newest = newest.layers.get(&layer.manifest.product);
+        newest.is_some_and(|newest| newest.id == layer.id)
     }
 
     /// Every product with steps: carbon fluxes first, accumulated carbon last, then by name.
@@ -124,7 +156,10 @@ impl Catalogue {
 
     /// What is known may have changed: the next question reads the store.
     pub(crate) fn outdated(&self) {
-        let mut snapshot = self.snapshot.write().unwrap_or_else(PoisonError::into_inner);
+        let mut snapshot = self
+            .snapshot
+            .write()
+            .unwrap_or_else(PoisonError::into_inner);
         let known = Snapshot {
             read_at: None,
             known: snapshot.known.clone(),

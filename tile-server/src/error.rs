@@ -55,6 +55,11 @@ pub enum ServerError {
     /// The product has no steps yet.
     #[error("product {name} has no steps yet")]
     EmptyProduct { name: String },
+    /// No such version of a product.
+    #[error(
+        "there is no version {manifest:?}, or it is kept no more; /api/products names the newest ones"
+    )]
+    UnknownVersion { manifest: String },
     /// No such way of drawing the product.
     #[error("product {product} has no layer {mode:?}; it has {offered}")]
     UnknownMode {
@@ -71,6 +76,9 @@ pub enum ServerError {
     /// More viewers wait for news than are served.
     #[error("too many viewers wait for news; please try again later")]
     TooManyListeners,
+    /// This server ends.
+    #[error("this server is stopping; please ask again in a moment")]
+    Stopping,
     /// Only reading is possible.
     #[error("this address can be read only: use GET or HEAD")]
     ReadOnly,
@@ -117,12 +125,13 @@ impl ServerError {
             | Self::NotAFlux { .. } => StatusCode::BAD_REQUEST,
             Self::UnknownProduct { .. }
             | Self::EmptyProduct { .. }
+            | Self::UnknownVersion { .. }
             | Self::UnknownMode { .. }
             | Self::UnknownAddress
             | Self::NoObservations => StatusCode::NOT_FOUND,
             Self::ReadOnly => StatusCode::METHOD_NOT_ALLOWED,
             Self::BodyTooLarge { .. } => StatusCode::PAYLOAD_TOO_LARGE,
-            Self::Busy | Self::TooManyListeners => StatusCode::SERVICE_UNAVAILABLE,
+            Self::Busy | Self::TooManyListeners | Self::Stopping => StatusCode::SERVICE_UNAVAILABLE,
             Self::TimedOut { .. } => StatusCode::GATEWAY_TIMEOUT,
             Self::Storage(error) if error.is_retryable() => StatusCode::SERVICE_UNAVAILABLE,
             Self::Storage(_) | Self::Defect { .. } => StatusCode::INTERNAL_SERVER_ERROR,

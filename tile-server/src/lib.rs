@@ -2,12 +2,12 @@
 //!
 //! | address | answer |
 //! |---|---|
-//! | `/tiles/{product}/{mode}/{z}/{x}/{y}.png?time=&size=` | Web Mercator tile, 256 or 512 pixels (`{y}@2x.png` is 512) |
+//! | `/tiles/{product}/{mode}/{z}/{x}/{y}.png?time=&size=&manifest=` | Web Mercator tile, 256 or 512 pixels (`{y}@2x.png` is 512) |
 //! | `/tiles/{product}/{mode}.json?time=` | TileJSON 3.0.0 of the layer |
 //! | `/globe/{product}/{mode}.png?lon=&lat=&height_km=&time=&width=&height=&surface=` | view of the globe |
 //! | `/api/products` | every product, its steps, modes and legend |
-//! | `/api/products/{product}/point?lon=&lat=` | series of the cell at a place |
-//! | `/api/products/{product}/budget?region=&from=&to=&step=&earth=` | carbon budget |
+//! | `/api/products/{product}/point?lon=&lat=&manifest=` | series of the cell at a place |
+//! | `/api/products/{product}/budget?region=&from=&to=&step=&earth=&manifest=` | carbon budget |
 //! | `/api/regions` | regions with a name |
 //! | `/api/check` | our budgets beside published ones, `null` where there is nothing to compare with |
 //! | `/api/events` | news of new versions as server-sent events |
@@ -17,7 +17,7 @@
 //! | `/` and below | the viewer's files |
 //!
 //! Times are ISO 8601 and any instant is valid; a missing one is the middle of the last step. `from` and `to` bound
-//! the half-open period `[from, to)`. Every refusal is JSON, `{"error": reason}`.
+//! the half-open period `[from, to)`. `manifest` names a version, as answers do; without it the newest one answers. Every refusal is JSON, `{"error": reason}`.
 //!
 //! Left out on purpose: drawing and computing, which come in through the traits of [`backend`].
 
@@ -38,6 +38,7 @@ mod router;
 mod routes;
 mod serve;
 mod state;
+mod versions;
 
 pub use catalogue::Layer;
 pub use config::Settings;

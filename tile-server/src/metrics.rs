@@ -95,11 +95,7 @@ impl Metrics {
             "Time until an answer begins.",
             &REQUEST_BOUNDS_S,
         );
-        let draws_s = timed(
-            "draw_seconds",
-            "Time to draw a picture.",
-            &DRAW_BOUNDS_S,
-        );
+        let draws_s = timed("draw_seconds", "Time to draw a picture.", &DRAW_BOUNDS_S);
         let waits_s = timed(
             "draw_wait_seconds",
             "Time a picture waited for its turn.",
@@ -111,7 +107,10 @@ impl Metrics {
                 "Answers by route.",
                 &["operation", "method", "outcome"],
             )?,
-            request_duration_s: registered(registry, HistogramVec::new(requests_s, &["operation"])?)?,
+            request_duration_s: registered(
+                registry,
+                HistogramVec::new(requests_s, &["operation"])?,
+            )?,
             in_flight: gauge("in_flight", "Requests under way.")?,
             sent_bytes: counters("sent_bytes_total", "Bytes of bodies sent.", &["route"])?,
             cache_hits: counters(

@@ -12,8 +12,8 @@ use tower_http::cors::{Any, CorsLayer};
 use crate::error::ServerError;
 use crate::middleware::{limits, panics::CountPanics, security, track};
 use crate::routes::{
-    budget, check, events, globe, health, metrics, observations, platforms, point, products, regions,
-    tilejson, tiles, viewer,
+    budget, check, events, globe, health, metrics, observations, platforms, point, products,
+    regions, tilejson, tiles, viewer,
 };
 use crate::state::AppState;
 
@@ -44,7 +44,10 @@ pub fn router(state: AppState) -> Router {
         .route("/api/check", get(check::get))
         .route("/api/events", get(events::get))
         .route("/api/observations/platforms", get(platforms::get))
-        .route("/api/observations/{dataset}/{platform}", get(observations::get))
+        .route(
+            "/api/observations/{dataset}/{platform}",
+            get(observations::get),
+        )
         .route("/healthz", get(health::live))
         .route("/readyz", get(health::ready))
         .route("/metrics", get(metrics::get))

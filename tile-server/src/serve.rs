@@ -69,8 +69,10 @@ impl Server {
                 tracing::debug!(%error, "a connection keeps its delay");
             }
         });
+        let ending = self.state.clone();
         let until_told = async move {
             shutdown.await;
+            ending.news.close();
             stop.send_replace(true);
         };
         let serving = axum::serve(listener, router(self.state)).with_graceful_shutdown(until_told);

@@ -34,10 +34,16 @@ pub struct Item {
 /// The news of one server.
 #[derive(Debug)]
 pub struct News {
-    kept: Mutex<VecDeque<Arc<Item>>>,
-    sender: broadcast::Sender<Arc<Item>>,
+    told: Mutex<Told>,
     /// Numbers begin with the time of the start, so that a number of an earlier run is never taken for one of this.
     first_id: u64,
+}
+
+#[derive(Debug)]
+struct Told {
+    kept: VecDeque<Arc<Item>>,
+    /// None once nobody is told any more.
+    sender: Option<broadcast::Sender<Arc<Item>>>,
 }
 
 /// One who listens.
@@ -51,54 +57,58 @@ impl News {
     /// No news yet; numbers begin after `first_id`.
     pub fn new(first_id: u64) -> Self {
         Self {
-            kept: Mutex::default(),
-            sender: broadcast::Sender::new(BEHIND),
+            told: Mutex::new(Told {
+                kept: VecDeque::new(),
+                sender: Some(broadcast::Sender::new(BEHIND)),
+            }),
             first_id,
         }
     }
 
     /// Tells all listeners.
     pub fn tell(&self, manifest: ManifestId, touched: Vec<Period>) {
-        let mut kept = self.lock();
-        let id = kept.back().map_or(self.first_id, |last| last.id) + 1;
+        let mut told = self.lock();
+        let id = told.kept.back().map_or(self.first_id, |last| last.id) + 1;
         let item = Arc::new(Item {
             id,
             product: manifest.product.to_string(),
             manifest,
             touched,
         });
-        kept.push_back(Arc::clone(&item));
-        if kept.len() > KEPT {
-            kept.pop_front();
+        told.kept.push_back(Arc::clone(&item));
+        if told.kept.len() > KEPT {
+            told.kept.pop_front();
         }
         // Sent under the lock, so that whoever subscribes sees an item either kept or sent, never both.
         // Nobody listening is no failure.
-        drop(self.sender.send(item));
+        drop(told.sender.as_ref().map(|sender| sender.send(item)));
     }
 
     /// Listens from now on, after what is kept since item `last`.
     pub fn listen(&self, last: Option<u64>) -> Result<Listener, ServerError> {
-        let kept = self.lock();
-        if self.sender.receiver_count() >= MOST_LISTENERS {
+        let told = self.lock();
+        let sender = told.sender.as_ref().ok_or(ServerError::Stopping)?;
+        if sender.receiver_count() >= MOST_LISTENERS {
             return Err(ServerError::TooManyListeners);
         }
-        let missed = kept
+        let missed = told
+            .kept
             .iter()
             .filter(|item| last.is_some_and(|last| item.id > last));
         Ok(Listener {
             missed: missed.cloned().collect(),
-            receiver: self.sender.subscribe(),
+            receiver: sender.subscribe(),
         })
     }
 
-    /// Listeners now.
-    pub fn listeners(&self) -> usize {
-        self.sender.receiver_count()
+    /// Ends all listening, so that connections which would stay for ever do not keep a server from ending.
+    pub fn close(&self) {
+        self.lock().sender = None;
     }
 
-    fn lock(&self) -> MutexGuard<'_, VecDeque<Arc<Item>>> {
+    fn lock(&self) -> MutexGuard<'_, Told> {
         // One push and one pop: a poisoned lock guards a whole queue.
-        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
+        self.told.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -132,6 +142,31 @@ mod tests {
             told.push(listener.next().await.unwrap().id);
         }
         assert_eq!(told, [102, 103]);
+    }
+
+    #[tokio::test]
+    async fn the_end_is_told_to_all_and_nobody_comes_after_it() {
+        let news = News::new(0);
+        let mut listener = news.listen(None).unwrap();
+        news.tell(manifest(1), vec![]);
+        news.close();
+        assert_eq!(listener.next().await.unwrap().id, 1);
+        assert!(listener.next().await.is_none());
+        assert!(news.listen(None).unwrap_err().is_retryable());
+    }
+
+    #[test]
+    fn more_listeners_than_are_served_are_asked_to_come_later() {
+        let news = News::new(0);
+        let all: Vec<_> = (0..MOST_LISTENERS)
+            .map(|_| news.listen(None).unwrap())
+            .collect();
+        assert!(matches!(
+            news.listen(None),
+            Err(ServerError::TooManyListeners)
+        ));
+        drop(all);
+        assert!(news.listen(None).is_ok());
     }
 
     #[tokio::test]

@@ -15,6 +15,7 @@ use storage::StorageError;
 use storage::log::{EventLog, Follower, Message, Start};
 use tokio::sync::mpsc;
 
+use crate::catalogue::Layer;
 use crate::live::touched;
 use crate::request;
 use crate::state::AppState;
@@ -30,8 +31,10 @@ pub struct LiveService {
     state: AppState,
     log: Arc<dyn EventLog>,
     /// Versions seen, to tell what a newer one touches.
-    seen: BTreeMap<ProductId, Arc<Manifest>>,
+    seen: BTreeMap<ProductId, Seen>,
 }
+
+type Seen = (ManifestId, Arc<Manifest>);
 
 impl LiveService {
     pub(crate) fn new(state: AppState, log: Arc<dyn EventLog>) -> Self {
@@ -42,8 +45,8 @@ impl LiveService {
         }
     }
 
-    /// Follows until asked to stop. A log that goes away is waited for; what was appended meanwhile is not told, but a
-    /// catalogue that is too old reads itself anew in any case.
+    /// Follows until asked to stop. A log that goes away is waited for; of what was appended meanwhile viewers are told,
+    /// but no tiles are ordered.
     pub async fn run(mut self, stop: Stop) {
         let mut pauses = service::pauses();
         while !stop.is_said() {
@@ -62,14 +65,24 @@ impl LiveService {
     }
 
     async fn follow(&mut self) -> Result<(), StorageError> {
-        let topics = [Topic::GranuleLanded, Topic::ProductDerived, Topic::RenderDone];
+        if self.seen.is_empty() {
+            self.remember_all().await;
+        }
+        let topics = [
+            Topic::GranuleLanded,
+            Topic::ProductDerived,
+            Topic::RenderDone,
+        ];
         let (sender, mut heard) = mpsc::channel(MESSAGES);
         let mut pumps = vec![];
         for topic in topics {
-            pumps.push(pump(self.log.follow(topic, Start::Now).await?, sender.clone()));
+            pumps.push(pump(
+                self.log.follow(topic, Start::Now).await?,
+                sender.clone(),
+            ));
         }
         drop(sender);
-        self.remember_all().await;
+        self.catch_up().await;
         let hearing = async {
             while let Some(message) = heard.recv().await {
                 match message.event() {
@@ -113,21 +126,46 @@ impl LiveService {
         match self.state.catalogue.layers().await {
             Ok(layers) => {
                 for layer in layers {
-                    self.seen
-                        .insert(layer.manifest.product.clone(), Arc::clone(&layer.manifest));
+                    self.see(&layer);
                 }
             }
             Err(error) => {
-                tracing::warn!(%error, "products are not known yet; all that comes is new")
+                tracing::warn!(%error, "products are not known yet; all that comes is new");
             }
         }
+    }
+
+    /// Tells of what landed while nobody followed.
+    async fn catch_up(&mut self) {
+        self.state.catalogue.outdated();
+        let Ok(layers) = self.state.catalogue.layers().await else {
+            return;
+        };
+        for layer in layers {
+            if let Some(touched) = self.see(&layer) {
+                self.state.news.tell(layer.id.clone(), touched);
+            }
+        }
+    }
+
+    /// The times that a version touches; none if it was seen before.
+    fn see(&mut self, layer: &Layer) -> Option<Vec<Period>> {
+        let now = (layer.id.clone(), Arc::clone(&layer.manifest));
+        let before = self.seen.insert(layer.manifest.product.clone(), now);
+        if before.as_ref().is_some_and(|(id, _)| *id == layer.id) {
+            return None;
+        }
+        Some(touched(
+            before.as_ref().map(|(_, old)| &**old),
+            &layer.manifest,
+        ))
     }
 
     async fn new_version(
         &mut self,
         event: &Event,
         manifest: &ManifestId,
-    ) -> Result<(), StorageError> {
+    ) -> Result<Vec<Period>, StorageError> {
         self.state.catalogue.outdated();
         let layer = match self.state.catalogue.layer(manifest.product.as_str()).await {
             Ok(layer) => layer,
@@ -136,10 +174,9 @@ impl LiveService {
                 return Ok(vec![]);
             }
         };
-        let before = self
-            .seen
-            .insert(manifest.product.clone(), Arc::clone(&layer.manifest));
-        let touched = touched(before.as_deref(), &layer.manifest);
+        let Some(touched) = self.see(&layer) else {
+            return Ok(vec![]);
+        };
         tracing::info!(trace = event.trace, %manifest, periods = touched.len(), "a new version is shown");
         self.state.news.tell(layer.id.clone(), touched.clone());
         // Pictures of a flux wait for what lifts their particles.
@@ -166,13 +203,14 @@ impl LiveService {
         if let Some(noticed) = event.noticed {
             self.state.freshness.expect_version(&layer.id, noticed);
         }
+        self.state.news.tell(layer.id.clone(), touched.to_vec());
         self.order(event, &layer, touched).await
     }
 
     async fn order(
         &self,
         event: &Event,
-        layer: &crate::catalogue::Layer,
+        layer: &Layer,
         touched: &[Period],
     ) -> Result<(), StorageError> {
         let is_touched = |time| {

@@ -29,6 +29,7 @@ pub(crate) struct BudgetQuery {
     to: Option<String>,
     step: Option<String>,
     earth: Option<String>,
+    manifest: Option<String>,
 }
 
 #[derive(Debug, Serialize)]
@@ -74,7 +75,8 @@ pub(crate) async fn get(
     UrlPath(product): UrlPath<String>,
     UrlQuery(query): UrlQuery<BudgetQuery>,
 ) -> Result<Response, ServerError> {
-    let layer = state.catalogue.layer(&product).await?;
+    let named = query.manifest.as_deref();
+    let layer = state.catalogue.version(&product, named).await?;
     let manifest = &layer.manifest;
     if manifest.quantity != Quantity::CarbonFlux {
         let quantity = manifest.quantity.title();

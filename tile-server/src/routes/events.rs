@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use axum::extract::State;
-use axum::http::{HeaderMap, header};
+use axum::http::{HeaderMap, HeaderName, header};
 use axum::response::sse::{Event, KeepAlive, Sse};
 use axum::response::{IntoResponse as _, Response};
 use futures::Stream;
@@ -43,5 +43,10 @@ fn event(item: &Arc<Item>) -> Event {
 
 fn respond(stream: impl Stream<Item = Result<Event, Infallible>> + Send + 'static) -> Response {
     let sse = Sse::new(stream).keep_alive(KeepAlive::new().interval(HEARTBEAT).text("still here"));
-    ([(header::CACHE_CONTROL, "no-store")], sse).into_response()
+    let headers = [
+        (header::CACHE_CONTROL, "no-store"),
+        // A proxy that collects an answer before it hands it on would keep the news to itself.
+        (HeaderName::from_static("x-accel-buffering"), "no"),
+    ];
+    (headers, sse).into_response()
 }

@@ -20,6 +20,7 @@ use crate::state::AppState;
 pub(crate) struct PointQuery {
     lon: Option<String>,
     lat: Option<String>,
+    manifest: Option<String>,
 }
 
 #[derive(Debug, Serialize)]
@@ -53,7 +54,8 @@ pub(crate) async fn get(
     UrlPath(product): UrlPath<String>,
     UrlQuery(query): UrlQuery<PointQuery>,
 ) -> Result<Response, ServerError> {
-    let layer = state.catalogue.layer(&product).await?;
+    let named = query.manifest.as_deref();
+    let layer = state.catalogue.version(&product, named).await?;
     let manifest = &layer.manifest;
     let coordinate = |name, text: &Option<String>, wanted| match text.as_deref() {
         Some(text) => number(name, text, wanted),

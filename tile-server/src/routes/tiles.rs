@@ -22,6 +22,7 @@ const SIZE_2X_PX: u32 = 512;
 pub(crate) struct TileQuery {
     time: Option<String>,
     size: Option<String>,
+    manifest: Option<String>,
 }
 
 pub(crate) async fn get(
@@ -30,7 +31,8 @@ pub(crate) async fn get(
     UrlQuery(query): UrlQuery<TileQuery>,
     headers: HeaderMap,
 ) -> Result<Response, ServerError> {
-    let layer = state.catalogue.layer(&product).await?;
+    let manifest = query.manifest.as_deref();
+    let layer = state.catalogue.version(&product, manifest).await?;
     let mode = request::mode(&layer, &mode)?;
     let (tile, named_size_px) = parse_tile(&z, &x, &y)?;
     let size_px = match query.size.as_deref() {
@@ -39,7 +41,11 @@ pub(crate) async fn get(
     };
     let time = time(query.time.as_deref())?;
     let job = request::job(&layer, mode, View::Tile { tile, size_px }, time)?;
-    state.hot.asked(&layer.manifest.product, mode, &job.view, job.time);
+    // Who looks at an old version is no reason to draw a new one.
+    if state.catalogue.is_newest(&layer) {
+        let product = &layer.manifest.product;
+        state.hot.asked(product, mode, &job.view, job.time);
+    }
     let response = picture::respond(&state, &headers, job).await?;
     if mode == Mode::Volume {
         state.freshness.served(&layer.id);

@@ -17,7 +17,7 @@ use tile_server::metrics::Registry;
 use tile_server::{AppState, Settings, router};
 use tower::ServiceExt as _;
 
-use crate::doubles::{Analyst, Drawer};
+use crate::doubles::{Analyst, Drawer, Observer};
 
 /// 10-degree cells between 60 N and 60 S.
 pub(crate) const GRID: Grid = Grid {
@@ -35,6 +35,8 @@ pub(crate) struct TestApp {
     pub(crate) store: Store,
     pub(crate) drawer: Arc<Drawer>,
     pub(crate) analyst: Arc<Analyst>,
+    pub(crate) observer: Arc<Observer>,
+    pub(crate) state: AppState,
     pub(crate) router: Router,
 }
 
@@ -111,12 +113,37 @@ impl TestApp {
             store,
             drawer,
             analyst,
-            router: router(state),
+            observer: Arc::default(),
+            router: router(state.clone()),
+            state,
+        }
+    }
+
+    /// The same server with observations.
+    pub(crate) fn observing(self) -> Self {
+        let state = self.state.with_observations(self.observer.clone());
+        Self {
+            router: router(state.clone()),
+            state,
+            ..self
         }
     }
 
     pub(crate) async fn land(&self, product: &str, quantity: Quantity, number: u64) -> ManifestId {
         self.land_derived(product, quantity, number, None).await
+    }
+
+    /// Lands a version whose values differ from those of version 1 in the last month only.
+    pub(crate) async fn land_last_month(
+        &self,
+        product: &str,
+        quantity: Quantity,
+        number: u64,
+        derived_from: Option<ManifestId>,
+    ) -> ManifestId {
+        let scale = |month| if month == MONTHS { number } else { 1 };
+        self.land_scaled(product, quantity, number, derived_from, scale)
+            .await
     }
 
     /// Lands a version of a product the way ingest does; its values depend on its number.
@@ -127,14 +154,27 @@ impl TestApp {
         number: u64,
         derived_from: Option<ManifestId>,
     ) -> ManifestId {
+        self.land_scaled(product, quantity, number, derived_from, |_month| number)
+            .await
+    }
+
+    async fn land_scaled(
+        &self,
+        product: &str,
+        quantity: Quantity,
+        number: u64,
+        derived_from: Option<ManifestId>,
+        scale: impl Fn(u32) -> u64,
+    ) -> ManifestId {
         let product: ProductId = product.parse().unwrap();
         let value = |month: u32| {
+            let scale = scale(month) as f32;
             let land = |cell: usize| cell.is_multiple_of(7);
             let of = move |cell: usize| {
                 if land(cell) {
                     f32::NAN
                 } else {
-                    (month as f32) * 1e-9 * number as f32
+                    (month as f32) * 1e-9 * scale
                 }
             };
             (0..GRID.cell_count()).map(of).collect::<Vec<f32>>()

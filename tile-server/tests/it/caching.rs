@@ -23,7 +23,10 @@ async fn the_same_tile_is_drawn_once() {
             .await,
         1
     );
-    assert_eq!(app.metric("fluxglobe_tile_server_cache_misses_total").await, 1);
+    assert_eq!(
+        app.metric("fluxglobe_tile_server_cache_misses_total").await,
+        1
+    );
 }
 
 #[tokio::test]

@@ -1,14 +1,20 @@
-//! Doubles for the two ports: they record what they are asked, and answer what a test tells them to.
+//! Doubles for the ports: they record what they are asked, and answer what a test tells them to.
 
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use async_trait::async_trait;
 use axum::body::Bytes;
+use contract::event::Event;
 use contract::job::RenderJob;
 use contract::manifest::Manifest;
+use contract::observation::Observation;
+use contract::topic::{Origin, Topic};
+use storage::StorageError;
+use storage::log::{EmbeddedLog, EventLog, Follower, Message, Reader, Start};
 use tile_server::backend::{
-    Analyse, BackendError, BudgetRequest, BudgetRow, Check, Class, Draw, RowCol,
+    Analyse, BackendError, BudgetRequest, BudgetRow, Check, Class, Draw, ObservationPage,
+    ObservationQuestion, Observe, Platform, RowCol, TrackPoint, TrackQuestion,
 };
 use tokio::sync::Semaphore;
 
@@ -149,5 +155,133 @@ impl Analyse for Analyst {
     async fn check(&self) -> Result<Option<Check>, BackendError> {
         self.mood().apply()?;
         Ok(self.check.lock().unwrap().clone())
+    }
+}
+
+/// Has observed what a test says.
+#[derive(Default)]
+pub(crate) struct Observer {
+    pub(crate) platforms: Mutex<Vec<Platform>>,
+    pub(crate) track: Mutex<Vec<TrackPoint>>,
+    pub(crate) observations: Mutex<Vec<Observation>>,
+    pub(crate) questions: Mutex<Vec<ObservationQuestion>>,
+    pub(crate) mood: Mutex<Mood>,
+}
+
+impl Observer {
+    pub(crate) fn set(&self, mood: Mood) {
+        *self.mood.lock().unwrap() = mood;
+    }
+
+    pub(crate) fn last_question(&self) -> ObservationQuestion {
+        self.questions.lock().unwrap().last().unwrap().clone()
+    }
+
+    fn asked(&self, question: &ObservationQuestion) -> Result<(), BackendError> {
+        self.questions.lock().unwrap().push(question.clone());
+        self.mood.lock().unwrap().clone().apply()
+    }
+}
+
+#[async_trait]
+impl Observe for Observer {
+    async fn platforms(
+        &self,
+        question: &ObservationQuestion,
+    ) -> Result<Vec<Platform>, BackendError> {
+        self.asked(question)?;
+        Ok(self.platforms.lock().unwrap().clone())
+    }
+
+    async fn track(&self, _question: &TrackQuestion) -> Result<Vec<TrackPoint>, BackendError> {
+        Ok(self.track.lock().unwrap().clone())
+    }
+
+    /// Pages begin where `after`, a number, says.
+    async fn observations(
+        &self,
+        question: &ObservationQuestion,
+    ) -> Result<ObservationPage, BackendError> {
+        self.asked(question)?;
+        let all = self.observations.lock().unwrap().clone();
+        let start = question
+            .after
+            .as_ref()
+            .map_or(0, |after| after.parse().unwrap());
+        let end = all.len().min(start + question.limit as usize);
+        Ok(ObservationPage {
+            observations: all[start..end].to_vec(),
+            next: (end < all.len()).then(|| end.to_string()),
+        })
+    }
+
+    async fn ready(&self) -> Result<(), BackendError> {
+        self.mood.lock().unwrap().clone().apply()
+    }
+}
+
+/// A log in memory that counts who follows it, and fails when told to.
+pub(crate) struct Log {
+    pub(crate) log: EmbeddedLog,
+    pub(crate) followed: AtomicUsize,
+    pub(crate) is_away: AtomicBool,
+}
+
+impl Default for Log {
+    fn default() -> Self {
+        Self {
+            log: EmbeddedLog::memory(),
+            followed: AtomicUsize::new(0),
+            is_away: AtomicBool::new(false),
+        }
+    }
+}
+
+impl Log {
+    fn answers(&self) -> Result<(), StorageError> {
+        if self.is_away.load(Ordering::SeqCst) {
+            return Err(StorageError::log("secret-broker:9092", "it is away"));
+        }
+        Ok(())
+    }
+}
+
+#[async_trait]
+impl EventLog for Log {
+    async fn append(&self, events: &[Event]) -> Result<(), StorageError> {
+        self.log.append(events).await
+    }
+
+    async fn append_message(
+        &self,
+        topic: Topic,
+        key: &str,
+        content: Bytes,
+    ) -> Result<(), StorageError> {
+        self.log.append_message(topic, key, content).await
+    }
+
+    async fn join(&self, topic: Topic, group: &str) -> Result<Box<dyn Reader>, StorageError> {
+        self.log.join(topic, group).await
+    }
+
+    async fn follow(&self, topic: Topic, start: Start) -> Result<Box<dyn Follower>, StorageError> {
+        self.answers()?;
+        let follower = self.log.follow(topic, start).await?;
+        self.followed.fetch_add(1, Ordering::SeqCst);
+        Ok(follower)
+    }
+
+    async fn message(&self, origin: Origin) -> Result<Option<Message>, StorageError> {
+        self.log.message(origin).await
+    }
+
+    async fn lag(&self, topic: Topic, group: &str) -> Result<u64, StorageError> {
+        self.log.lag(topic, group).await
+    }
+
+    async fn ready(&self) -> Result<(), StorageError> {
+        self.answers()?;
+        self.log.ready().await
     }
 }

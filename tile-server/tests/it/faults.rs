@@ -46,7 +46,9 @@ async fn what_was_known_is_served_on_but_the_server_is_not_ready() {
         "not drawn before"
     );
     assert!(
-        app.metric("fluxglobe_tile_server_store_failures_total").await > 0,
+        app.metric("fluxglobe_tile_server_store_failures_total")
+            .await
+            > 0,
         "the fault took place"
     );
     let ready = app.get("/readyz").await;
@@ -99,7 +101,9 @@ async fn a_stored_picture_that_cannot_be_read_is_drawn_again() {
     );
     assert_eq!(app.drawer.drawn_count(), 1);
     assert!(
-        app.metric("fluxglobe_tile_server_store_failures_total").await >= 1,
+        app.metric("fluxglobe_tile_server_store_failures_total")
+            .await
+            >= 1,
         "the fault took place"
     );
 }

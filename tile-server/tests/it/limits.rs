@@ -1,11 +1,12 @@
 //! What happens when there is too much to do, when something takes too long, and when something breaks.
 
 use std::sync::atomic::Ordering;
+use std::time::Duration;
 
 use axum::body::Body;
 use axum::http::{Request, StatusCode};
 use futures::FutureExt as _;
-use tile_server::backend::Class;
+use tile_server::backend::{BackendError, Class};
 
 use crate::app::TestApp;
 use crate::doubles::Mood;
@@ -101,6 +102,25 @@ async fn a_renderer_that_panics_or_answers_nonsense_is_an_internal_error_and_the
     }
     app.drawer.set(Mood::Well);
     assert_eq!(app.get(TILE).await.status, StatusCode::OK);
+}
+
+#[tokio::test]
+async fn a_backend_that_knows_when_to_come_back_is_passed_on() {
+    let app = TestApp::new().await;
+    for (class, pause_ms, seconds) in [
+        (Class::Busy, 2500, "3"),
+        (Class::Unavailable, 40_000, "40"),
+        (Class::Busy, 0, "1"),
+        (Class::Busy, 1 << 40, "3600"),
+    ] {
+        let pause = Duration::from_millis(pause_ms);
+        let error = BackendError::new(class, "the workers are full").after(pause);
+        app.drawer.set(Mood::Fails(error));
+        let answer = app.get(TILE).await;
+        assert_eq!(answer.status, StatusCode::SERVICE_UNAVAILABLE);
+        assert_eq!(answer.header("retry-after"), seconds);
+        assert_eq!(answer.reason(), "the workers are full");
+    }
 }
 
 #[tokio::test]

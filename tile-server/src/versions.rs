@@ -1,0 +1,98 @@
+//! Versions of products by their name, so that what was cited once can be shown again.
+
+use std::sync::Arc;
+
+use contract::manifest::{Manifest, ManifestId};
+use contract::quantity::Quantity;
+use quick_cache::sync::Cache;
+use storage::{StorageError, Store, manifests};
+
+use crate::catalogue::Layer;
+use crate::error::ServerError;
+
+/// Versions remembered: each is the list of its steps, some ten KiB.
+const REMEMBERED: usize = 256;
+/// Derivations looked through for the one of a version, newest first.
+const DERIVATIONS: usize = 64;
+
+/// The versions of all products.
+#[derive(Debug)]
+pub(crate) struct Versions {
+    store: Store,
+    known: Cache<String, Arc<Layer>>,
+}
+
+impl Versions {
+    /// None read yet.
+    pub(crate) fn new(store: Store) -> Self {
+        Self {
+            store,
+            known: Cache::new(REMEMBERED),
+        }
+    }
+
+    /// A version as it was published.
+    ///
+    /// # Errors
+    /// Not found if it was never there, or is there no more.
+    pub(crate) async fn layer(&self, id: &ManifestId) -> Result<Arc<Layer>, ServerError> {
+        let name = id.to_string();
+        if let Some(layer) = self.known.get(&name) {
+            return Ok(layer);
+        }
+        let manifest = match manifests::load(&self.store, id).await {
+            Ok(manifest) => manifest,
+            // Also one whose number is there with other contents: the name is that of nothing.
+            Err(error) if error.is_not_found() || matches!(error, StorageError::Damaged { .. }) => {
+                tracing::debug!(%error, manifest = name, "a version is not there");
+                return Err(ServerError::UnknownVersion { manifest: name });
+            }
+            Err(error) => return Err(error.into()),
+        };
+        let extent = manifest.extent().ok_or_else(|| ServerError::EmptyProduct {
+            name: manifest.product.to_string(),
+        })?;
+        let accumulated = self.derivation(&manifest, id).await?;
+        // A derivation may still be on its way.
+        let is_settled = accumulated.is_some() || manifest.quantity != Quantity::CarbonFlux;
+        let layer = Arc::new(Layer {
+            id: id.clone(),
+            manifest: Arc::new(manifest),
+            extent,
+            accumulated,
+        });
+        if is_settled {
+            self.known.insert(name, Arc::clone(&layer));
+        }
+        Ok(layer)
+    }
+
+    /// The accumulated carbon that was derived from exactly this version.
+    async fn derivation(
+        &self,
+        manifest: &Manifest,
+        id: &ManifestId,
+    ) -> Result<Option<ManifestId>, StorageError> {
+        if manifest.quantity != Quantity::CarbonFlux {
+            return Ok(None);
+        }
+        let Ok(product) = manifest.product.accumulated() else {
+            return Ok(None);
+        };
+        let keys = self.store.list(&format!("manifests/{product}")).await?;
+        for key in keys.iter().rev().take(DERIVATIONS) {
+            let content = match self.store.get(key).await {
+                Ok(content) => content,
+                Err(error) if error.is_not_found() => continue,
+                Err(error) => return Err(error),
+            };
+            let Ok(derived) = serde_json::from_slice::<Manifest>(&content) else {
+                continue;
+            };
+            if derived.derived_from.as_ref() == Some(id) {
+                return Ok(Some(derived.id()));
+            }
+        }
+        Ok(None)
+    }
+}

@@ -1,0 +1,283 @@
+//! What a server does when something lands: it shows it, orders the hot tiles that it touches, and tells viewers.
+
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+use contract::digest::Digest;
+use contract::event::{Body, Event};
+use contract::job::RenderJob;
+use contract::manifest::ManifestId;
+use contract::quantity::Quantity;
+use contract::time::TimeMs;
+use contract::topic::Topic;
+use service::Stop;
+use storage::log::{EventLog as _, contents};
+use tokio::task::JoinHandle;
+
+use crate::app::TestApp;
+use crate::doubles::Log;
+use crate::events::Viewer;
+
+/// Longer than anything here takes, also on a busy machine.
+const LIMIT: Duration = Duration::from_secs(20);
+/// Topics that a server follows.
+const TOPICS: usize = 3;
+
+struct Live {
+    app: TestApp,
+    log: Arc<Log>,
+    stop: Stop,
+    running: JoinHandle<()>,
+}
+
+impl Live {
+    /// A server that by itself would not look for new versions within the time of a test.
+    async fn new() -> Self {
+        let live = Self::over(Arc::new(Log::default())).await;
+        live.follows().await;
+        live
+    }
+
+    async fn over(log: Arc<Log>) -> Self {
+        let app = TestApp::with(|settings| settings.catalogue_age_ms = 3_600_000).await;
+        let stop = Stop::new();
+        let running = tokio::spawn(app.state.live(log.clone()).run(stop.clone()));
+        Self {
+            app,
+            log,
+            stop,
+            running,
+        }
+    }
+
+    async fn follows(&self) {
+        self.until(async || self.log.followed.load(Ordering::SeqCst) == TOPICS)
+            .await;
+    }
+
+    async fn until(&self, is_so: impl AsyncFn() -> bool) {
+        let started = Instant::now();
+        while !is_so().await {
+            assert!(started.elapsed() < LIMIT, "it did not come to that");
+            tokio::time::sleep(Duration::from_millis(10)).await;
+        }
+    }
+
+    async fn say(&self, body: Body) {
+        let mut event = Event::new("trace-1", body);
+        event.noticed = Some(noticed());
+        self.log.append(&[event]).await.unwrap();
+    }
+
+    async fn landed(&self, manifest: &ManifestId) {
+        self.say(Body::GranuleLanded {
+            path: "a.nc".to_owned(),
+            raw_sha256: Digest::of(b"a"),
+            manifest: manifest.clone(),
+            periods: vec![],
+            revised: true,
+        })
+        .await;
+    }
+
+    async fn orders(&self) -> Vec<(Event, RenderJob)> {
+        let messages = contents(self.log.as_ref(), Topic::RenderJob).await.unwrap();
+        let order = |event: Event| match event.body.clone() {
+            Body::RenderJob { job } => (event, job),
+            other => panic!("{other:?}"),
+        };
+        messages
+            .iter()
+            .map(|message| order(message.event().unwrap()))
+            .collect()
+    }
+
+    async fn fresh(&self, path: &str) -> u64 {
+        let name = "fluxglobe_tile_server_notice_to_tile_seconds_count";
+        self.app
+            .metric(&format!(r#"{name}{{path="{path}"}}"#))
+            .await
+    }
+}
+
+fn noticed() -> TimeMs {
+    "2020-01-01".parse().unwrap()
+}
+
+#[tokio::test]
+async fn a_landed_version_is_shown_at_once_and_viewers_are_told() {
+    let live = Live::new().await;
+    let mut viewer = Viewer::new(&live.app, None).await;
+    let new = live
+        .app
+        .land_last_month("sst", Quantity::SeaSurfaceTemperature, 2, None)
+        .await;
+    let address = "/api/products/sst/point?lon=15&lat=-5";
+    let old = live.app.get(address).await.json()["manifest"].clone();
+    assert_ne!(old, new.to_string(), "nobody has said anything yet");
+    live.landed(&new).await;
+    let told = viewer.next().await.unwrap();
+    assert_eq!(told.data["manifest"], new.to_string());
+    assert_eq!(told.data["touched"][0]["start"], "2000-02-01T00:00:00Z");
+    assert_eq!(told.data["touched"].as_array().unwrap().len(), 1);
+    let shown = live.app.get(address).await.json()["manifest"].clone();
+    assert_eq!(shown, new.to_string());
+    live.stop.now();
+    live.running.await.unwrap();
+}
+
+#[tokio::test]
+async fn exactly_the_hot_tiles_that_it_touches_are_ordered() {
+    let live = Live::new().await;
+    for path in [
+        "sst/volume/0/0/0.png?time=2000-03-20",
+        "sst/volume/1/1/0.png?time=2000-03-20&size=512",
+        "sst/map/1/0/0.png?time=2000-02-20",
+        "sst/volume/0/0/0.png?time=2000-01-10",
+        "flux/volume/0/0/0.png?time=2000-03-20",
+    ] {
+        live.app.get(&format!("/tiles/{path}")).await;
+    }
+    let new = live
+        .app
+        .land_last_month("sst", Quantity::SeaSurfaceTemperature, 2, None)
+        .await;
+    live.landed(&new).await;
+    live.until(async || !live.orders().await.is_empty()).await;
+    let orders = live.orders().await;
+    let mut asked: Vec<String> = orders
+        .iter()
+        .map(|(_, job)| format!("{} {}", job.mode, job.time))
+        .collect();
+    asked.sort();
+    assert_eq!(
+        asked,
+        [
+            "map 2000-02-20T00:00:00Z",
+            "volume 2000-03-20T00:00:00Z",
+            "volume 2000-03-20T00:00:00Z"
+        ]
+    );
+    for (event, job) in &orders {
+        assert_eq!(job.product, new);
+        assert_eq!(event.trace, "trace-1");
+        assert_eq!(event.noticed, Some(noticed()));
+    }
+    // What a viewer asks for afterwards is exactly what was ordered.
+    live.app
+        .get("/tiles/sst/volume/0/0/0.png?time=2000-03-20")
+        .await;
+    let drawn = live.app.drawer.last_job();
+    assert!(orders.iter().any(|(_, job)| *job == drawn));
+}
+
+#[tokio::test]
+async fn pictures_of_a_flux_wait_for_what_lifts_their_particles() {
+    let live = Live::new().await;
+    let mut viewer = Viewer::new(&live.app, None).await;
+    live.app
+        .get("/tiles/flux/volume/0/0/0.png?time=2000-03-20")
+        .await;
+    let flux = live
+        .app
+        .land_last_month("flux", Quantity::CarbonFlux, 2, None)
+        .await;
+    live.landed(&flux).await;
+    assert_eq!(viewer.next().await.unwrap().data["product"], "flux");
+    assert!(live.orders().await.is_empty());
+    let (product, quantity) = ("flux-accumulated", Quantity::AccumulatedCarbon);
+    let lift = live
+        .app
+        .land_last_month(product, quantity, 2, Some(flux.clone()))
+        .await;
+    live.say(Body::ProductDerived {
+        manifest: lift.clone(),
+        derived_from: flux.clone(),
+    })
+    .await;
+    assert_eq!(viewer.next().await.unwrap().data["product"], product);
+    let again = viewer.next().await.unwrap();
+    assert_eq!(
+        again.data["manifest"],
+        flux.to_string(),
+        "it looks different now"
+    );
+    live.until(async || !live.orders().await.is_empty()).await;
+    let orders = live.orders().await;
+    assert_eq!(orders.len(), 1);
+    assert_eq!(orders[0].1.product, flux);
+    assert_eq!(orders[0].1.accumulated, Some(lift));
+}
+
+#[tokio::test]
+async fn the_time_from_notice_to_tile_is_measured_once_each_way() {
+    let live = Live::new().await;
+    let tile = "/tiles/sst/volume/0/0/0.png?time=2000-03-20";
+    live.app.get(tile).await;
+    assert_eq!(live.fresh("asked").await, 0, "it follows from no notice");
+    let mut viewer = Viewer::new(&live.app, None).await;
+    let new = live
+        .app
+        .land_last_month("sst", Quantity::SeaSurfaceTemperature, 2, None)
+        .await;
+    live.landed(&new).await;
+    viewer.next().await.unwrap();
+    live.until(async || !live.orders().await.is_empty()).await;
+    live.app.get("/tiles/sst/map/0/0/0.png").await;
+    assert_eq!(live.fresh("asked").await, 0, "a map is no volume tile");
+    for _ in 0..2 {
+        live.app.get(tile).await;
+    }
+    assert_eq!(live.fresh("asked").await, 1);
+    let key = live.orders().await[0].1.key();
+    for failure in [Some("no".to_owned()), None, None] {
+        live.say(Body::RenderDone {
+            key: key.clone(),
+            duration_ms: 1,
+            failure,
+        })
+        .await;
+    }
+    live.until(async || live.fresh("hot").await > 0).await;
+    assert_eq!(live.fresh("hot").await, 1);
+}
+
+#[tokio::test]
+async fn messages_that_are_no_events_change_nothing() {
+    let live = Live::new().await;
+    let mut viewer = Viewer::new(&live.app, None).await;
+    live.log
+        .append_message(Topic::GranuleLanded, "k", "no event".into())
+        .await
+        .unwrap();
+    live.landed(&"nothing@7-00000000".parse().unwrap()).await;
+    let new = live
+        .app
+        .land("sst", Quantity::SeaSurfaceTemperature, 2)
+        .await;
+    live.landed(&new).await;
+    live.landed(&new).await;
+    let told = viewer.next().await.unwrap();
+    assert_eq!(told.data["manifest"], new.to_string(), "told first");
+    assert!(!live.running.is_finished());
+}
+
+#[tokio::test]
+async fn a_log_that_is_away_is_waited_for_and_what_landed_meanwhile_is_told() {
+    let log = Arc::new(Log::default());
+    log.is_away.store(true, Ordering::SeqCst);
+    let live = Live::over(log).await;
+    let mut viewer = Viewer::new(&live.app, None).await;
+    // The server has looked at what there is before it finds the log away.
+    tokio::time::sleep(Duration::from_millis(300)).await;
+    let new = live
+        .app
+        .land_last_month("sst", Quantity::SeaSurfaceTemperature, 2, None)
+        .await;
+    live.log.is_away.store(false, Ordering::SeqCst);
+    live.follows().await;
+    let told = viewer.next().await.unwrap();
+    assert_eq!(told.data["manifest"], new.to_string());
+    assert_eq!(told.data["touched"][0]["start"], "2000-02-01T00:00:00Z");
+}

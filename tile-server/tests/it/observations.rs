@@ -1,0 +1,179 @@
+//! `/api/observations/platforms` and `/api/observations/{dataset}/{platform}`.
+
+use axum::http::StatusCode;
+use contract::observation::{Observation, PlatformKind, Quality};
+use contract::region::Region;
+use serde_json::json;
+use tile_server::backend::{Class, Platform, TrackPoint};
+
+use crate::app::TestApp;
+use crate::doubles::Mood;
+
+fn platform(name: &str, kind: PlatformKind) -> Platform {
+    Platform {
+        dataset: "buoys".parse().unwrap(),
+        name: name.to_owned(),
+        kind,
+        first: "2020-01-01".parse().unwrap(),
+        last: "2020-02-01".parse().unwrap(),
+        lon_deg: -155.0,
+        lat_deg: 0.5,
+        properties: vec!["sea_surface_temperature".to_owned()],
+        count: 3,
+    }
+}
+
+fn observation(hour: u32, quality: Quality) -> Observation {
+    Observation {
+        dataset: "buoys".parse().unwrap(),
+        platform: "51001".to_owned(),
+        kind: PlatformKind::Buoy,
+        time: format!("2020-01-01T{hour:02}:00:00Z").parse().unwrap(),
+        lon_deg: -155.0,
+        lat_deg: 0.5,
+        depth_m: 1.5,
+        property: "sea_surface_temperature".to_owned(),
+        value: 25.0 + f64::from(hour),
+        unit: "degC".to_owned(),
+        quality,
+    }
+}
+
+async fn with_buoy() -> TestApp {
+    let app = TestApp::new().await.observing();
+    let series = (0..5).map(|hour| observation(hour, Quality::Good));
+    *app.observer.observations.lock().unwrap() = series.collect();
+    app
+}
+
+#[tokio::test]
+async fn platforms_are_points_and_ships_are_tracks() {
+    let app = TestApp::new().await.observing();
+    let at = |lon_deg: f64| TrackPoint {
+        time: "2020-01-01".parse().unwrap(),
+        lon_deg,
+        lat_deg: 10.0,
+    };
+    *app.observer.platforms.lock().unwrap() = vec![
+        platform("51001", PlatformKind::Buoy),
+        platform("MLCE", PlatformKind::Ship),
+    ];
+    *app.observer.track.lock().unwrap() = vec![at(178.0), at(-178.0), at(-177.0)];
+    let answer = app.get("/api/observations/platforms").await;
+    assert_eq!(answer.status, StatusCode::OK);
+    let body = answer.json();
+    assert_eq!(body["type"], "FeatureCollection");
+    let buoy = &body["features"][0];
+    assert_eq!(buoy["id"], "buoys/51001");
+    assert_eq!(
+        buoy["geometry"],
+        json!({"type": "Point", "coordinates": [-155.0, 0.5]})
+    );
+    assert_eq!(buoy["properties"]["kind"], "buoy");
+    assert_eq!(buoy["properties"]["count"], 3);
+    let track = [
+        [[178.0, 10.0], [180.0, 10.0]].to_vec(),
+        [[-180.0, 10.0], [-178.0, 10.0], [-177.0, 10.0]].to_vec(),
+    ];
+    assert_eq!(
+        body["features"][1]["geometry"],
+        json!({"type": "MultiLineString", "coordinates": track}),
+        "cut at the date line"
+    );
+}
+
+#[tokio::test]
+async fn the_question_is_what_the_address_says() {
+    let app = TestApp::new().await.observing();
+    app.get("/api/observations/platforms?bbox=170,-10,-170,10&from=2020-01-01&to=2021-01-01&property=wind_speed&kind=ship")
+        .await;
+    let asked = app.observer.last_question();
+    assert_eq!(asked.region, "170,-10,-170,10".parse::<Region>().unwrap());
+    assert_eq!(asked.from, Some("2020-01-01".parse().unwrap()));
+    assert_eq!(asked.to, Some("2021-01-01".parse().unwrap()));
+    assert_eq!(asked.properties, ["wind_speed"]);
+    assert_eq!(asked.kinds, [PlatformKind::Ship]);
+}
+
+#[tokio::test]
+async fn a_series_tells_unit_and_quality_a_page_at_a_time() {
+    let app = with_buoy().await;
+    app.observer.observations.lock().unwrap()[1].quality = Quality::Bad;
+    let path = "/api/observations/buoys/51001?limit=2&property=sea_surface_temperature";
+    let first = app.get(path).await.json();
+    assert_eq!(first["dataset"], "buoys");
+    assert_eq!(first["platform"], "51001");
+    assert_eq!(
+        first["series"][1],
+        json!({"time": "2020-01-01T01:00:00Z", "lon": -155.0, "lat": 0.5, "depth_m": 1.5,
+            "property": "sea_surface_temperature", "value": 26.0, "unit": "degC", "quality": "bad"})
+    );
+    let mut next = first["next"].clone();
+    let mut count = 2;
+    while let Some(after) = next.as_str() {
+        let page = app.get(&format!("{path}&after={after}")).await.json();
+        count += page["series"].as_array().unwrap().len();
+        next = page["next"].clone();
+    }
+    assert_eq!(count, 5);
+    let asked = app.observer.last_question();
+    assert_eq!(asked.platforms, ["51001"]);
+    assert_eq!(
+        asked.worst,
+        Quality::Bad,
+        "the reader judges, not the server"
+    );
+}
+
+#[tokio::test]
+async fn names_of_platforms_may_hold_anything() {
+    let app = with_buoy().await;
+    app.get("/api/observations/buoys/A%20B%2F..%2F%C3%A9%3Cb%3E")
+        .await;
+    assert_eq!(app.observer.last_question().platforms, ["A B/../é<b>"]);
+}
+
+#[tokio::test]
+async fn bad_questions_say_what_is_wrong_and_reach_nobody() {
+    let app = with_buoy().await;
+    for path in [
+        "platforms?bbox=1,2,3",
+        "platforms?bbox=0,-91,1,1",
+        "platforms?from=yesterday",
+        "platforms?kind=whale",
+        "platforms?dataset=../secret",
+        "platforms?colour=red",
+        "buoys/51001?limit=0",
+        "buoys/51001?limit=10001",
+        "buoys/51001?limit=-1",
+        "buoys/51001?to=x",
+        "Not%20a%20name!/51001",
+    ] {
+        let answer = app.get(&format!("/api/observations/{path}")).await;
+        assert_eq!(answer.status, StatusCode::BAD_REQUEST, "{path}");
+        assert!(!answer.reason().is_empty());
+    }
+    assert!(app.observer.questions.lock().unwrap().is_empty());
+}
+
+#[tokio::test]
+async fn a_server_without_observations_says_so() {
+    let app = TestApp::new().await;
+    for path in ["platforms", "buoys/51001"] {
+        let answer = app.get(&format!("/api/observations/{path}")).await;
+        assert_eq!(answer.status, StatusCode::NOT_FOUND);
+        assert!(answer.reason().contains("no observations"));
+    }
+}
+
+#[tokio::test]
+async fn a_database_that_is_away_is_worth_another_try() {
+    let app = with_buoy().await;
+    app.observer
+        .set(Mood::fails(Class::Unavailable, "the database is away"));
+    for path in ["platforms", "buoys/51001"] {
+        let answer = app.get(&format!("/api/observations/{path}")).await;
+        assert_eq!(answer.status, StatusCode::SERVICE_UNAVAILABLE);
+        assert_eq!(answer.header("retry-after"), "5");
+    }
+}

@@ -1,0 +1,80 @@
+//! `manifest=`: versions that were cited stay readable.
+
+use axum::http::StatusCode;
+use contract::quantity::Quantity;
+
+use crate::app::TestApp;
+
+#[tokio::test]
+async fn a_named_version_is_drawn_with_what_was_derived_from_it() {
+    let app = TestApp::new().await;
+    app.get("/tiles/flux/volume/0/0/0.png").await;
+    let old = app.drawer.last_job();
+    let flux = app.land("flux", Quantity::CarbonFlux, 2).await;
+    app.land_derived(
+        "flux-accumulated",
+        Quantity::AccumulatedCarbon,
+        2,
+        Some(flux),
+    )
+    .await;
+    app.get("/tiles/flux/volume/0/0/0.png").await;
+    let new = app.drawer.last_job();
+    assert_ne!(new.product, old.product);
+    assert_ne!(new.accumulated, old.accumulated);
+    // At another address, so that it is drawn and not remembered.
+    let named = format!("/tiles/flux/volume/1/0/0.png?manifest={}", old.product);
+    for _ in 0..2 {
+        assert_eq!(app.get(&named).await.status, StatusCode::OK);
+        let job = app.drawer.last_job();
+        assert_eq!(job.product, old.product);
+        assert_eq!(job.accumulated, old.accumulated);
+        assert!(job.accumulated.is_some());
+    }
+}
+
+#[tokio::test]
+async fn series_and_budgets_tell_the_version_that_was_asked_for() {
+    let app = TestApp::new().await;
+    let old = app.get("/api/products/flux/budget").await.json()["manifest"].clone();
+    let new = app.land("flux", Quantity::CarbonFlux, 2).await;
+    for path in ["budget?", "point?lon=15&lat=-5&"] {
+        let path = format!("/api/products/flux/{path}");
+        assert_eq!(app.get(&path).await.json()["manifest"], new.to_string());
+        let named = format!("{path}manifest={}", old.as_str().unwrap());
+        assert_eq!(app.get(&named).await.json()["manifest"], old);
+    }
+    let budgets = app.analyst.budgets.lock().unwrap();
+    let computed: Vec<u64> = budgets.iter().map(|asked| asked.manifest.number).collect();
+    assert_eq!(computed, [1, 2], "the old one was remembered");
+}
+
+#[tokio::test]
+async fn a_version_that_is_not_there_is_not_found_and_nonsense_is_refused() {
+    let app = TestApp::new().await;
+    let sst = app
+        .get("/api/products/sst/point?lon=15&lat=-5")
+        .await
+        .json()["manifest"]
+        .clone();
+    let sst = sst.as_str().unwrap();
+    for address in [
+        "/tiles/flux/map/0/0/0.png?",
+        "/api/products/flux/point?lon=15&lat=-5&",
+        "/api/products/flux/budget?",
+    ] {
+        for (manifest, status) in [
+            ("flux@9-00000000", StatusCode::NOT_FOUND),
+            ("flux@1-00000000", StatusCode::NOT_FOUND),
+            (sst, StatusCode::NOT_FOUND),
+            ("newest", StatusCode::BAD_REQUEST),
+            ("../flux@1-00000000", StatusCode::BAD_REQUEST),
+            ("", StatusCode::BAD_REQUEST),
+        ] {
+            let answer = app.get(&format!("{address}manifest={manifest}")).await;
+            assert_eq!(answer.status, status, "{address} {manifest}");
+            assert!(!answer.reason().is_empty());
+        }
+    }
+    assert_eq!(app.drawer.drawn_count(), 0);
+}
