@@ -1,5 +1,6 @@
 //! The suite on Kafka, and what Kafka alone must do.
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use bytes::Bytes;
@@ -13,7 +14,7 @@ use crate::events::{
     FROM, MOMENT, assert_one_each, finished, finished_with_one, notice, notice_of, notices, paths,
     read, work_off,
 };
-use crate::own_topics::{OwnTopics, end, open};
+use crate::own_topics::{OwnTopics, end, open, open_with, own_settings, servers};
 use crate::suite::run_suite;
 
 run_suite!(open, end);
@@ -116,6 +117,51 @@ async fn three_members_that_come_and_go_finish_each_message_once() {
     tokio::join!(restless(4), restless(4), restless(4));
     work_off(&own.log, "g").await;
     assert_one_each(&own.log, 600).await;
+    end(own).await;
+}
+
+/// Partitions change hands while offsets are on their way: what is refused then must be finished by its new owner only.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn members_at_work_while_others_come_and_go_finish_each_message_once() {
+    const COUNT: usize = 6000;
+    let mut settings = own_settings(&servers());
+    settings.kafka_partitions = 6;
+    let own = open_with(settings).await;
+    own.log.append(&notices("a", COUNT)).await.unwrap();
+    let is_over = AtomicBool::new(false);
+    let steady = async || {
+        let mut reader = own.log.join(FROM, "g").await.unwrap();
+        let mut finishes = 0;
+        while !is_over.load(Ordering::Relaxed) {
+            let messages = reader.next(1, MOMENT).await.unwrap();
+            let done = messages.iter().map(finished_with_one).collect();
+            reader.finish(done).await.unwrap();
+            finishes += usize::from(!messages.is_empty());
+        }
+        reader.leave().await.unwrap();
+        finishes
+    };
+    let restless = async || {
+        for _ in 0..6 {
+            let mut reader = own.log.join(FROM, "g").await.unwrap();
+            // Until it is given something, or for a while.
+            for _ in 0..10 {
+                if !reader.next(1, MOMENT).await.unwrap().is_empty() {
+                    break;
+                }
+            }
+            reader.leave().await.unwrap();
+        }
+        is_over.store(true, Ordering::Relaxed);
+    };
+    let (first, second, ()) = tokio::join!(steady(), steady(), restless());
+    println!("{} finishes while members came and went", first + second);
+    assert!(
+        own.log.lag(FROM, "g").await.unwrap() > 0,
+        "there was work all the time"
+    );
+    work_off(&own.log, "g").await;
+    assert_one_each(&own.log, COUNT).await;
     end(own).await;
 }
 

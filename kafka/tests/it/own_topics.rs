@@ -41,7 +41,10 @@ pub(crate) async fn open() -> OwnTopics {
 }
 
 pub(crate) async fn open_on(servers: &str) -> OwnTopics {
-    let settings = own_settings(servers);
+    open_with(own_settings(servers)).await
+}
+
+pub(crate) async fn open_with(settings: KafkaSettings) -> OwnTopics {
     create_topics(&settings, 1).await.unwrap();
     let log = KafkaLog::connect(&settings).await.unwrap();
     OwnTopics { settings, log }
