@@ -4,6 +4,7 @@
 //! All of them hold their state in memory: whatever one of them loses when it is killed is asked or computed again, and
 //! what is stored is named by its content, so that doing it twice changes nothing.
 
+mod background;
 mod courier;
 pub mod deriver;
 pub mod executor;
@@ -12,6 +13,7 @@ mod executor_settings;
 mod heartbeat;
 pub mod scheduler;
 mod scheduler_metrics;
+mod scheduler_watch;
 mod work;
 
 pub use deriver::Deriver;

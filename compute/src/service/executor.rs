@@ -35,11 +35,11 @@ use prometheus::{IntGauge, Registry};
 use storage::Store;
 use tokio::net::TcpListener;
 use tokio::sync::Semaphore;
-use tokio::task::JoinHandle;
 use tokio::time::Instant;
 use tokio_stream::wrappers::TcpListenerStream;
 use tonic::transport::Channel;
 
+use super::background::Background;
 use super::courier::Courier;
 use super::executor_metrics::CountedEngine;
 use super::executor_settings::ExecutorSettings;
@@ -54,8 +54,10 @@ const TIDY_INTERVAL: Duration = Duration::from_secs(10);
 const FORGOTTEN: Duration = Duration::from_hours(2);
 /// A scheduler that was not seen for so long is away.
 const AWAY: Duration = Duration::from_secs(5);
-/// How long the last report may take on the way.
+/// How long the report on the last task may take: an executor without a free hand makes a request every five seconds.
 const LAST_REPORT: Duration = Duration::from_secs(7);
+/// The same of an executor that has nothing to do.
+const IDLE_REPORT: Duration = Duration::from_millis(500);
 
 /// An executor that holds its address and its work folder but does not work yet.
 pub struct Executor {
@@ -217,15 +219,6 @@ impl Executor {
     }
 }
 
-/// Work in the background that ends with its owner.
-struct Background<T>(JoinHandle<T>);
-
-impl<T> Drop for Background<T> {
-    fn drop(&mut self) {
-        self.0.abort();
-    }
-}
-
 fn codec() -> BallistaCodec {
     BallistaCodec::default()
 }
@@ -253,15 +246,27 @@ fn ended_early(
 
 /// Takes no more tasks and waits for those under way, and then for the report on the last of them.
 async fn drain(hands: &Semaphore, tasks: usize, courier: &Courier, limit: Duration) {
-    let all_free = hands.acquire_many(tasks as u32);
-    let Ok(Ok(_held)) = tokio::time::timeout(limit, all_free).await else {
+    let is_idle = || hands.available_permits() == tasks;
+    let was_idle = is_idle();
+    if was_idle {
+        // A task that ended just now is reported with the next request, which an idle executor makes at once.
+        reported(courier, IDLE_REPORT).await;
+    }
+    let is_still_idle = was_idle && is_idle();
+    let Ok(Ok(_held)) = tokio::time::timeout(limit, hands.acquire_many(tasks as u32)).await else {
         tracing::warn!("stopping while tasks run; the scheduler gives them to others");
         return;
     };
-    // The request under way may have been sent before the last task ended; the one after it holds the report.
-    let (reported, begun) = (courier.answer_count() + 2, Instant::now());
-    while courier.answer_count() < reported && begun.elapsed() < LAST_REPORT.min(limit) {
-        tokio::time::sleep(Duration::from_millis(50)).await;
+    if !is_still_idle {
+        reported(courier, LAST_REPORT.min(limit)).await;
+    }
+}
+
+/// Waits for two requests to be answered: the one under way may have been made before the last task ended.
+async fn reported(courier: &Courier, limit: Duration) {
+    let (enough, begun) = (courier.answer_count() + 2, Instant::now());
+    while courier.answer_count() < enough && begun.elapsed() < limit {
+        tokio::time::sleep(Duration::from_millis(20)).await;
     }
 }
 

@@ -15,14 +15,15 @@ use ballista_scheduler::cluster::BallistaCluster;
 use ballista_scheduler::config::{SchedulerConfig, TaskDistributionPolicy};
 use ballista_scheduler::scheduler_process::start_grpc_service_with_listener;
 use ballista_scheduler::scheduler_server::SchedulerServer;
-use futures::StreamExt as _;
 use futures::future::BoxFuture;
-use prometheus::{IntCounter, IntGauge, Registry};
+use prometheus::{IntGauge, Registry};
 use storage::Store;
 use tokio::net::TcpListener;
 use tokio::time::Instant;
 
+use super::background::Background;
 use super::scheduler_metrics::QueryMetrics;
+use super::scheduler_watch::Seen;
 use crate::{ComputeError, Objects, state};
 
 /// How often executors are looked at for signs of life.
@@ -68,6 +69,8 @@ pub struct Scheduler {
     query_count: Box<dyn Fn() -> usize + Send + Sync>,
     executors: IntGauge,
     store: Store,
+    _watch: Background<()>,
+    _count: Background<()>,
 }
 
 impl Scheduler {
@@ -91,16 +94,7 @@ impl Scheduler {
         let cluster = BallistaCluster::new_from_config(&config)
             .await
             .map_err(failed())?;
-        let executors = IntGauge::new(
-            "fluxglobe_scheduler_executors",
-            "Executors that give signs of life.",
-        )?;
-        registry.register(Box::new(executors.clone()))?;
-        let lost = IntCounter::new(
-            "fluxglobe_scheduler_executors_lost_total",
-            "Executors that were lost or left.",
-        )?;
-        registry.register(Box::new(lost.clone()))?;
+        let seen = Seen::register(registry)?;
         let metrics = Arc::new(QueryMetrics::register(registry)?);
         let mut server = SchedulerServer::new(
             address.to_string(),
@@ -110,24 +104,14 @@ impl Scheduler {
             metrics,
         );
         server.init().await.map_err(failed())?;
-        let (watched, shown) = (server.clone(), executors.clone());
-        let mut changes = server.cluster_state_events().await.map_err(failed())?;
-        tokio::spawn(async move {
-            while let Some(change) = changes.next().await {
-                let alive = watched.state.executor_manager.get_executors_state().await;
-                shown.set(alive.map_or(0, |executors| executors.len() as i64));
-                if let ballista_scheduler::cluster::ClusterStateEvent::RemovedExecutor {
-                    executor_id,
-                } = change
-                {
-                    lost.inc();
-                    tracing::warn!(
-                        executor = executor_id,
-                        "an executor is lost; its tasks are given to others"
-                    );
-                }
-            }
-        });
+        let changes = server.cluster_state_events().await.map_err(failed())?;
+        let watch = seen
+            .clone()
+            .watch(changes, server.state.executor_manager.clone());
+        let state = Arc::clone(&server.state);
+        let count = seen
+            .clone()
+            .count(move || state.task_manager.get_running_job_cache());
         let counted = server.clone();
         tracing::info!(%address, "scheduler");
         Ok(Self {
@@ -137,8 +121,10 @@ impl Scheduler {
             query_count: Box::new(move || {
                 counted.pending_job_number() + counted.running_job_number()
             }),
-            executors,
+            executors: seen.executors,
             store,
+            _watch: Background(tokio::spawn(watch)),
+            _count: Background(tokio::spawn(count)),
         })
     }
 

@@ -6,25 +6,18 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use ::service::{Outcome, Red, Running};
 use ballista_core::JobId;
 use ballista_scheduler::metrics::SchedulerMetricsCollector;
-use prometheus::{IntGauge, Registry};
+use prometheus::Registry;
 
 /// Queries under way and their metrics.
 pub(super) struct QueryMetrics {
     red: Red,
-    waiting_tasks: IntGauge,
     running: Mutex<BTreeMap<String, Running>>,
 }
 
 impl QueryMetrics {
     pub(super) fn register(registry: &Registry) -> Result<Self, prometheus::Error> {
-        let waiting_tasks = IntGauge::new(
-            "fluxglobe_scheduler_waiting_tasks",
-            "Tasks that no executor has taken yet.",
-        )?;
-        registry.register(Box::new(waiting_tasks.clone()))?;
         Ok(Self {
             red: Red::register(registry, "scheduler")?,
-            waiting_tasks,
             running: Mutex::default(),
         })
     }
@@ -60,9 +53,8 @@ impl SchedulerMetricsCollector for QueryMetrics {
         self.ended(job_id, Outcome::Dropped);
     }
 
-    fn set_pending_tasks_queue_size(&self, value: u64) {
-        self.waiting_tasks.set(value as i64);
-    }
+    /// Nobody calls it in Ballista 55: waiting tasks are counted by the scheduler service itself.
+    fn set_pending_tasks_queue_size(&self, _value: u64) {}
 
     fn gather_metrics(&self) -> ballista_core::error::Result<Option<(Vec<u8>, String)>> {
         // They are shown with all others of this process.
