@@ -80,7 +80,7 @@ pub struct Server {
 }
 
 impl Server {
-    /// Takes the address of the settings.
+    /// Takes the address of the settings. Needs a runtime.
     pub fn bind(desk: Desk, settings: &Settings) -> Result<Self, ServerError> {
         let address = settings.render_listen;
         let listen = |source| ServerError::Listen { address, source };
