@@ -8,7 +8,7 @@
 # address, 127.0.0.1:8080 unless told otherwise. FLUXGLOBE_SAMPLES: folder of sample files; `none` sends nothing.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
-# shellcheck source=services/process.sh
+# shellcheck source=deploy/services/process.sh
 source deploy/services/process.sh
 program=${FLUXGLOBE_PROGRAM:-${CARGO_TARGET_DIR:-$HOME/.cache/fluxglobe/target}/debug/fluxglobe}
 runs=${FLUXGLOBE_RUN:-$HOME/.cache/fluxglobe/run}
@@ -65,7 +65,7 @@ start_node() {
     if [ "$name_of" = tile-server ]; then
         launch "$program" "$@" --listen "$address"
     else
-        launch "$program" "$@" --admin "$address"
+        FLUXGLOBE_EXECUTOR_WORK=$run/work launch "$program" "$@" --admin "$address"
     fi
 }
 

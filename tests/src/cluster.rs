@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+use std::process::{Output, Stdio};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result, bail, ensure};
@@ -117,7 +117,7 @@ impl Cluster {
 
     /// Runs a command against the cluster, whatever its exit code.
     pub fn run(&self, words: &[&str]) -> Result<Output> {
-        Command::new(program::path())
+        program::unset()
             .args(words)
             .envs(self.settings.iter().map(|(name, value)| (name, value)))
             .env("FLUXGLOBE_LOG", "warn")

@@ -49,9 +49,8 @@ impl Node {
     /// Starts it again (or the first time); what it says is appended to its log.
     pub fn restart(&mut self) -> Result<()> {
         let log = File::options().create(true).append(true).open(&self.log)?;
-        let child = Command::new(program::path())
+        let child = program::unset()
             .args(&self.words)
-            .env_remove("FLUXGLOBE_DATA")
             .envs(self.settings.iter().map(|(name, value)| (name, value)))
             .stdin(Stdio::null())
             .stdout(log.try_clone()?)

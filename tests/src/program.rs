@@ -17,8 +17,20 @@ pub fn path() -> PathBuf {
 
 /// A command on a data folder; nothing of the caller's settings leaks into it.
 pub fn command(data: &Path) -> Command {
+    let mut command = unset();
+    command.arg("--data").arg(data);
+    command
+}
+
+/// The program without any setting: servers that this test run was given are not meant for it.
+pub fn unset() -> Command {
     let mut command = Command::new(path());
-    command.env_remove("FLUXGLOBE_LOG").arg("--data").arg(data);
+    for (name, _value) in std::env::vars_os() {
+        let is_setting = |text: &str| text.starts_with("FLUXGLOBE_") || text.starts_with("AWS_");
+        if name.to_str().is_some_and(is_setting) {
+            command.env_remove(name);
+        }
+    }
     command
 }
 
