@@ -1,8 +1,8 @@
 //! A proxy that carries bytes of any protocol, and whose connections break or freeze as told.
 
 use std::net::SocketAddr;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex};
 
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::net::tcp::{OwnedReadHalf, OwnedWriteHalf};
@@ -22,7 +22,7 @@ struct Shared {
     upstream: String,
     mood: watch::Sender<Mood>,
     /// Counts up: connections of an older age are frozen, open for ever and silent.
-    age: Mutex<watch::Sender<u32>>,
+    age: watch::Sender<u32>,
     cut: AtomicUsize,
 }
 
@@ -41,7 +41,7 @@ impl CutProxy {
         let shared = Arc::new(Shared {
             upstream: upstream.to_owned(),
             mood: watch::Sender::new(Mood::Fine),
-            age: Mutex::new(watch::Sender::new(0)),
+            age: watch::Sender::new(0),
             cut: AtomicUsize::new(0),
         });
         let serving = Arc::clone(&shared);
@@ -68,7 +68,7 @@ impl CutProxy {
 
     /// Connections that are open now stay open and never carry anything again.
     pub(crate) fn freeze_open_ones(&self) {
-        self.shared.age.lock().unwrap().send_modify(|age| *age += 1);
+        self.shared.age.send_modify(|age| *age += 1);
     }
 
     /// How many connections were cut.
@@ -84,7 +84,7 @@ impl Drop for CutProxy {
 }
 
 async fn carry(client: TcpStream, shared: &Shared) -> std::io::Result<()> {
-    let mut age = shared.age.lock().unwrap().subscribe();
+    let mut age = shared.age.subscribe();
     age.mark_unchanged();
     let server = TcpStream::connect(&shared.upstream).await?;
     let (from_client, to_client) = client.into_split();
