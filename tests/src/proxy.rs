@@ -1,9 +1,10 @@
 //! A proxy before a server: hands bytes through, or answers every request with 500, as told.
 
+use std::collections::BTreeMap;
 use std::io::{Read as _, Write as _};
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, MutexGuard};
 
 use anyhow::Result;
 
@@ -16,7 +17,7 @@ pub struct Proxy {
     pub address: SocketAddr,
     is_failing: Arc<AtomicBool>,
     refused: Arc<AtomicU64>,
-    open: Arc<Mutex<Vec<TcpStream>>>,
+    open: Arc<Mutex<BTreeMap<u64, TcpStream>>>,
 }
 
 impl Proxy {
@@ -35,14 +36,20 @@ impl Proxy {
             Arc::clone(&proxy.open),
         );
         std::thread::spawn(move || {
-            for client in listener.incoming().map_while(Result::ok) {
+            // An accept that failed (a client gone at once) is no reason to serve nobody any more.
+            for (number, client) in (0..).zip(listener.incoming().filter_map(Result::ok)) {
                 if is_failing.load(Ordering::SeqCst) {
                     refused.fetch_add(1, Ordering::SeqCst);
                     std::thread::spawn(move || refuse(client));
                 } else if let Ok(server) = TcpStream::connect(target) {
-                    remember(&open, &client);
-                    remember(&open, &server);
-                    join(client, server);
+                    let open = Arc::clone(&open);
+                    if let Ok(client) = client.try_clone() {
+                        lock(&open).insert(number, client);
+                    }
+                    std::thread::spawn(move || {
+                        join(client, server);
+                        lock(&open).remove(&number);
+                    });
                 }
             }
         });
@@ -71,12 +78,8 @@ impl Proxy {
     }
 }
 
-fn remember(open: &Mutex<Vec<TcpStream>>, stream: &TcpStream) {
-    if let Ok(stream) = stream.try_clone() {
-        open.lock()
-            .expect("nobody panics while holding it")
-            .push(stream);
-    }
+fn lock(open: &Mutex<BTreeMap<u64, TcpStream>>) -> MutexGuard<'_, BTreeMap<u64, TcpStream>> {
+    open.lock().expect("nobody panics while holding it")
 }
 
 /// Reads what comes until the head is there, answers, and closes.
@@ -93,17 +96,20 @@ fn refuse(mut client: TcpStream) {
     drop(client.shutdown(Shutdown::Write));
 }
 
+/// Hands bytes through both ways until either side closes.
 fn join(client: TcpStream, server: TcpStream) {
-    let pump = |mut from: TcpStream, mut to: TcpStream| {
-        std::thread::spawn(move || {
-            // Either side closing ends both.
-            drop(std::io::copy(&mut from, &mut to));
-            drop(to.shutdown(Shutdown::Both));
-            drop(from.shutdown(Shutdown::Both));
-        });
+    let (Ok(client_too), Ok(server_too)) = (client.try_clone(), server.try_clone()) else {
+        return;
     };
-    if let (Ok(client_too), Ok(server_too)) = (client.try_clone(), server.try_clone()) {
-        pump(client, server_too);
-        pump(server, client_too);
-    }
+    let back = std::thread::spawn(move || pump(server, client_too));
+    pump(client, server_too);
+    // A pump that panicked has closed its streams too.
+    drop(back.join());
+}
+
+fn pump(mut from: TcpStream, mut to: TcpStream) {
+    // Either side closing ends both.
+    drop(std::io::copy(&mut from, &mut to));
+    drop(to.shutdown(Shutdown::Both));
+    drop(from.shutdown(Shutdown::Both));
 }
