@@ -23,7 +23,7 @@ use tower::ServiceExt;
 use crate::state::MESSAGE_BYTES;
 
 /// How long one request is carried: longer than a scheduler may take to be started again.
-const CARRY_LIMIT: Duration = Duration::from_secs(60);
+const CARRY_LIMIT: Duration = Duration::from_mins(1);
 /// One try.
 const TRY_LIMIT: Duration = Duration::from_secs(10);
 /// A rest after a request that could not be carried at all.

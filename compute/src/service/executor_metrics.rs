@@ -33,7 +33,6 @@ impl CountedEngine {
 }
 
 impl ExecutionEngine for CountedEngine {
-    #[expect(clippy::too_many_arguments, reason = "Ballista's trait has them")]
     fn create_query_stage_exec(
         &self,
         job_id: JobId,

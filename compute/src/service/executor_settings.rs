@@ -37,7 +37,7 @@ pub struct ExecutorSettings {
           value_parser = clap::value_parser!(u64).range(1 << 20..))]
     pub executor_work_bytes: u64,
     /// Bytes of memory for sorting and joining, shared by the tasks; what does not fit goes to the work folder.
-    #[arg(long, env = "FLUXGLOBE_EXECUTOR_MEMORY_BYTES", default_value_t = 1 << 30,
+    #[arg(long, env = "FLUXGLOBE_EXECUTOR_MEMORY_BYTES", default_value_t = 4 << 30,
           value_parser = clap::value_parser!(u64).range(64 << 20..))]
     pub executor_memory_bytes: u64,
     /// Seconds that running tasks are waited for when the executor is asked to stop, 0 to 3,600.

@@ -88,7 +88,7 @@ impl Scheduler {
             .local_addr()
             .map_err(ComputeError::machine("address of the scheduler"))?;
         let objects = Objects::of(&store);
-        let config = Arc::new(config(settings, address, objects)?);
+        let config = Arc::new(config(settings, address, &objects)?);
         let failed = || ComputeError::cluster("starting the scheduler");
         config.validate().map_err(failed())?;
         let cluster = BallistaCluster::new_from_config(&config)
@@ -166,7 +166,7 @@ impl Scheduler {
 fn config(
     settings: &SchedulerSettings,
     address: SocketAddr,
-    objects: Objects,
+    objects: &Objects,
 ) -> Result<SchedulerConfig, ComputeError> {
     let runtime = objects
         .runtime()

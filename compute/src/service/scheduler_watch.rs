@@ -6,7 +6,6 @@ use std::time::Duration;
 
 use ballista_core::JobId;
 use ballista_scheduler::cluster::{ClusterStateEvent, ClusterStateEventStream};
-use ballista_scheduler::state::execution_graph::ExecutionGraph as _;
 use ballista_scheduler::state::executor_manager::ExecutorManager;
 use ballista_scheduler::state::task_manager::JobInfoCache;
 use futures::StreamExt as _;

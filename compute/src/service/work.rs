@@ -151,7 +151,7 @@ mod tests {
         let (work, _gone) = WorkFolder::make(root.path(), "a").unwrap();
         fs::create_dir(work.path().join("job")).unwrap();
         fs::write(work.path().join("job/part"), vec![0; 5000]).unwrap();
-        assert!(work.tidy(Duration::from_secs(3600)) >= 5000);
+        assert!(work.tidy(Duration::from_hours(1)) >= 5000);
         assert!(work.path().join("job/part").exists());
         std::thread::sleep(Duration::from_millis(20));
         assert_eq!(work.tidy(Duration::from_millis(1)), 0);

@@ -19,7 +19,7 @@ use crate::troubled::Troubled;
 /// Where a child finds its order.
 const ORDER: &str = "FLUXGLOBE_TEST_NODE";
 /// How long anything may take that a test waits for.
-pub(crate) const LIMIT: Duration = Duration::from_secs(120);
+pub(crate) const LIMIT: Duration = Duration::from_mins(2);
 
 /// What a child is to be.
 #[derive(Debug, Clone, Serialize, Deserialize)]

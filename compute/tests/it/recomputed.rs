@@ -192,7 +192,7 @@ async fn clean_up_takes_what_no_kept_version_names_and_nothing_young() {
     store.put_new(&stranger, "x".into()).await.unwrap();
     let keep = Keep {
         versions: 1,
-        age: Duration::from_secs(86_400),
+        age: Duration::from_hours(24),
     };
     let now = now();
     assert!(

@@ -53,7 +53,7 @@ async fn derive_until_idle(store: &Store, log: &Arc<dyn EventLog>) {
             tokio::time::sleep(Duration::from_millis(20)).await;
         }
     };
-    tokio::time::timeout(Duration::from_secs(60), idle)
+    tokio::time::timeout(Duration::from_mins(1), idle)
         .await
         .unwrap();
     stop.now();
