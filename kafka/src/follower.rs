@@ -18,12 +18,16 @@ use crate::cluster::Cluster;
 use crate::context::Context;
 use crate::off_thread::OffThread;
 use crate::poll::of_topic;
-use crate::probe::{Probe, are_brokers_there};
+use crate::probe::{Probe, are_brokers_there, ends};
 
 /// The name that clients go by which are no members of any group; nothing is kept under it.
 pub(crate) const LOOKERS: &str = "lookers";
 /// How long messages may take that are known to be there.
 const CATCH_UP_LIMIT: Duration = Duration::from_secs(15);
+
+/// How long transactions may stay open: their own limit, and how seldom Kafka looks for those beyond it.
+const SETTLE_LIMIT: Duration = Duration::from_secs(25);
+const SETTLE_PAUSE: Duration = Duration::from_millis(20);
 
 /// Reads on where it was after a failure that passes.
 pub(crate) struct KafkaFollower {
@@ -45,7 +49,10 @@ impl KafkaFollower {
         const STEP: &str = "following a topic";
         // Asked for now and not when fetching begins: what is appended after this call is seen. So is what is in an open
         // transaction; one that was committed a moment ago may still count as open.
-        let bounds = probe.bounds(topic).await?;
+        let bounds = match start {
+            Start::Now => probe.bounds(topic).await?,
+            Start::Oldest => settled_bounds(cluster, probe, topic).await?,
+        };
         let name = cluster.topic(topic);
         let context = Context::default();
         let failed = |error: KafkaError| context.failure(STEP, error);
@@ -135,6 +142,27 @@ impl KafkaFollower {
             are_brokers_there(consumer.client(), &context, &topic)
         })
         .await
+    }
+}
+
+/// Where partitions begin and end, once every transaction that is open now has ended: whoever wants all that is there must
+/// not miss what was committed a moment ago, or lies behind what a killed process left open.
+async fn settled_bounds(
+    cluster: &Cluster,
+    probe: &Probe,
+    topic: Topic,
+) -> Result<Vec<(u64, u64)>, KafkaFailure> {
+    let ends = ends(cluster, topic).await?;
+    let until = Instant::now() + SETTLE_LIMIT;
+    loop {
+        let bounds = probe.bounds(topic).await?;
+        if bounds.iter().zip(&ends).all(|((_, seen), end)| seen >= end) {
+            return Ok(bounds);
+        }
+        if Instant::now() >= until {
+            return Err(Context::default().slow("waiting for open transactions", SETTLE_LIMIT));
+        }
+        tokio::time::sleep(SETTLE_PAUSE).await;
     }
 }
 

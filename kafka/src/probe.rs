@@ -6,7 +6,7 @@ use contract::topic::Topic;
 use futures::StreamExt as _;
 use rdkafka::ClientContext;
 use rdkafka::client::Client;
-use rdkafka::consumer::{Consumer as _, StreamConsumer};
+use rdkafka::consumer::{BaseConsumer, Consumer as _, StreamConsumer};
 use rdkafka::error::RDKafkaErrorCode;
 use rdkafka::metadata::MetadataTopic;
 use tokio::task::JoinHandle;
@@ -105,6 +105,26 @@ impl Probe {
         })
         .await
     }
+}
+
+/// Where each partition ends, open transactions and all.
+pub(crate) async fn ends(cluster: &Cluster, topic: Topic) -> Result<Vec<u64>, KafkaFailure> {
+    const STEP: &str = "looking for the ends of a topic";
+    let mut config = cluster.asking();
+    config.set("isolation.level", "read_uncommitted");
+    let (name, partitions) = (cluster.topic(topic), cluster.partitions());
+    blocking(STEP, move || {
+        let context = Context::default();
+        let client: BaseConsumer<Context> = config
+            .create_with_context(context.clone())
+            .map_err(|e| context.failure(STEP, e))?;
+        let until = Instant::now() + ASK_LIMIT;
+        let end = |partition| bounds(client.client(), &context, &name, partition, until);
+        (0..partitions)
+            .map(|partition| Ok(end(partition)?.1))
+            .collect()
+    })
+    .await
 }
 
 impl Drop for Probe {

@@ -94,6 +94,17 @@ async fn what_was_never_committed_is_not_seen_and_counts_nowhere() {
     assert!(follower.next(10, MOMENT).await.unwrap().is_empty());
     producer.commit_transaction(LIMIT).unwrap();
     assert_eq!(paths(&follower.next(10, LIMIT).await.unwrap()), ["late"]);
+    // Whoever wants all waits for those that are open, so that nothing behind them is missed.
+    producer.begin_transaction().unwrap();
+    send(&notice("last").to_json()).await;
+    let committed = async {
+        tokio::time::sleep(MOMENT).await;
+        tokio::task::spawn_blocking(move || producer.commit_transaction(LIMIT).unwrap())
+            .await
+            .unwrap();
+    };
+    let (all, ()) = tokio::join!(contents(&own.log, FROM), committed);
+    assert_eq!(all.unwrap().len(), 3);
     end(own).await;
 }
 
