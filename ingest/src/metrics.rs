@@ -2,7 +2,7 @@
 
 use contract::event::RejectReason;
 use contract::time::TimeMs;
-use prometheus::{Histogram, HistogramOpts, IntCounter, IntCounterVec, IntGauge, Opts, Registry};
+use prometheus::{Gauge, Histogram, HistogramOpts, IntCounter, IntCounterVec, Opts, Registry};
 use service::{Outcome, Red, Running};
 
 use crate::error::Stop;
@@ -19,7 +19,8 @@ pub struct Metrics {
     notice_to_landed: Histogram,
     rejected: IntCounterVec,
     bytes: IntCounter,
-    lag: IntGauge,
+    /// NaN until it is known: no lag is not the same as none looked up.
+    lag: Gauge,
 }
 
 impl Metrics {
@@ -55,11 +56,12 @@ impl Metrics {
                 "fluxglobe_ingestd_fetched_bytes_total",
                 "Bytes of files that were fetched.",
             )?,
-            lag: IntGauge::new(
+            lag: Gauge::new(
                 "fluxglobe_ingestd_lag_messages",
                 "Notices that no ingest service has finished.",
             )?,
         };
+        new.lag.set(f64::NAN);
         registry.register(Box::new(new.notice_to_landed.clone()))?;
         registry.register(Box::new(new.rejected.clone()))?;
         registry.register(Box::new(new.bytes.clone()))?;
@@ -100,7 +102,7 @@ impl Metrics {
     }
 
     pub(crate) fn lag(&self, messages: u64) {
-        self.lag.set(i64::try_from(messages).unwrap_or(i64::MAX));
+        self.lag.set(messages as f64);
     }
 }
 
