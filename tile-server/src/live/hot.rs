@@ -118,10 +118,10 @@ fn forget_half(tiles: &mut HashMap<(ProductId, Mode, Place), Asked>) {
     let mut last: Vec<Instant> = tiles.values().map(|asked| asked.last).collect();
     last.sort_unstable();
     let middle = last[last.len() / 2];
-    tiles.retain(|_, asked| asked.last > middle);
-    for asked in tiles.values_mut() {
+    tiles.retain(|_, asked| {
         asked.times = asked.times.div_ceil(2);
-    }
+        asked.last > middle
+    });
 }
 
 #[cfg(test)]

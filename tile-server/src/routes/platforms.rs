@@ -14,6 +14,8 @@ use crate::error::ServerError;
 use crate::extract::{UrlQuery, time};
 use crate::state::AppState;
 
+/// Platforms of one answer: as many points as a globe still shows apart.
+const MOST_PLATFORMS: u32 = 10_000;
 /// Places of one track; more are thinned out by the observation store.
 const TRACK_POINTS: u32 = 2000;
 /// Tracks of one answer: each is a question of its own.
@@ -37,8 +39,10 @@ pub(crate) async fn get(
     let observer = state.observer.get().ok_or(ServerError::NoObservations)?;
     let question = query.question()?;
     let mut features = vec![];
-    for (number, platform) in observer.platforms(&question).await?.iter().enumerate() {
-        let track = if platform.kind == PlatformKind::Ship && number < MOST_TRACKS {
+    let mut tracks = 0;
+    for platform in &observer.platforms(&question).await? {
+        let track = if platform.kind == PlatformKind::Ship && tracks < MOST_TRACKS {
+            tracks += 1;
             track(observer.as_ref(), platform, &question).await?
         } else {
             vec![]
@@ -63,7 +67,7 @@ impl PlatformQuery {
             kinds: kinds.into_iter().collect(),
             properties: self.property.clone().into_iter().collect(),
             worst: Quality::Questionable,
-            limit: 1,
+            limit: MOST_PLATFORMS,
             after: None,
         })
     }

@@ -222,7 +222,7 @@ impl Observe for Observer {
 
 /// A log in memory that counts who follows it, and fails when told to.
 pub(crate) struct Log {
-    pub(crate) log: EmbeddedLog,
+    pub(crate) inner: EmbeddedLog,
     pub(crate) followed: AtomicUsize,
     pub(crate) is_away: AtomicBool,
 }
@@ -230,7 +230,7 @@ pub(crate) struct Log {
 impl Default for Log {
     fn default() -> Self {
         Self {
-            log: EmbeddedLog::memory(),
+            inner: EmbeddedLog::memory(),
             followed: AtomicUsize::new(0),
             is_away: AtomicBool::new(false),
         }
@@ -249,7 +249,7 @@ impl Log {
 #[async_trait]
 impl EventLog for Log {
     async fn append(&self, events: &[Event]) -> Result<(), StorageError> {
-        self.log.append(events).await
+        self.inner.append(events).await
     }
 
     async fn append_message(
@@ -258,30 +258,30 @@ impl EventLog for Log {
         key: &str,
         content: Bytes,
     ) -> Result<(), StorageError> {
-        self.log.append_message(topic, key, content).await
+        self.inner.append_message(topic, key, content).await
     }
 
     async fn join(&self, topic: Topic, group: &str) -> Result<Box<dyn Reader>, StorageError> {
-        self.log.join(topic, group).await
+        self.inner.join(topic, group).await
     }
 
     async fn follow(&self, topic: Topic, start: Start) -> Result<Box<dyn Follower>, StorageError> {
         self.answers()?;
-        let follower = self.log.follow(topic, start).await?;
+        let follower = self.inner.follow(topic, start).await?;
         self.followed.fetch_add(1, Ordering::SeqCst);
         Ok(follower)
     }
 
     async fn message(&self, origin: Origin) -> Result<Option<Message>, StorageError> {
-        self.log.message(origin).await
+        self.inner.message(origin).await
     }
 
     async fn lag(&self, topic: Topic, group: &str) -> Result<u64, StorageError> {
-        self.log.lag(topic, group).await
+        self.inner.lag(topic, group).await
     }
 
     async fn ready(&self) -> Result<(), StorageError> {
         self.answers()?;
-        self.log.ready().await
+        self.inner.ready().await
     }
 }

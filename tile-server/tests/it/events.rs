@@ -54,7 +54,8 @@ impl Viewer {
                 .expect("nothing was told")?;
             self.text += std::str::from_utf8(&frame.unwrap()).unwrap();
         }
-        let (event, rest) = self.text.split_once("\n\n").unwrap();
+        let text = std::mem::take(&mut self.text);
+        let (event, rest) = text.split_once("\n\n").unwrap();
         let field = |name: &str| {
             let line = event.lines().find_map(|line| line.strip_prefix(name));
             line.unwrap_or_else(|| panic!("no {name} in {event}"))
@@ -64,7 +65,7 @@ impl Viewer {
             id: field("id: ").parse().unwrap(),
             data: serde_json::from_str(field("data: ")).unwrap(),
         };
-        self.text = rest.to_owned();
+        self.text = String::from(rest);
         Some(told)
     }
 }

@@ -83,6 +83,28 @@ async fn platforms_are_points_and_ships_are_tracks() {
 }
 
 #[tokio::test]
+async fn many_buoys_take_no_ship_its_track_but_there_is_a_limit() {
+    let app = TestApp::new().await.observing();
+    let at = |lon_deg: f64| TrackPoint {
+        time: "2020-01-01".parse().unwrap(),
+        lon_deg,
+        lat_deg: 10.0,
+    };
+    *app.observer.track.lock().unwrap() = vec![at(1.0), at(2.0)];
+    let of = |kind| move |number| platform(&format!("{number}"), kind);
+    let buoys = (0..80).map(of(PlatformKind::Buoy));
+    let ships = (80..200).map(of(PlatformKind::Ship));
+    *app.observer.platforms.lock().unwrap() = buoys.chain(ships).collect();
+    let body = app.get("/api/observations/platforms").await.json();
+    let features = body["features"].as_array().unwrap();
+    let is_track = |number: usize| features[number]["geometry"]["type"] == "MultiLineString";
+    assert_eq!(features.len(), 200);
+    let tracks = (0..200).filter(|number| is_track(*number)).count();
+    assert_eq!(tracks, 50);
+    assert!(is_track(80) && is_track(129) && !is_track(130));
+}
+
+#[tokio::test]
 async fn the_question_is_what_the_address_says() {
     let app = TestApp::new().await.observing();
     app.get("/api/observations/platforms?bbox=170,-10,-170,10&from=2020-01-01&to=2021-01-01&property=wind_speed&kind=ship")
@@ -93,6 +115,7 @@ async fn the_question_is_what_the_address_says() {
     assert_eq!(asked.to, Some("2021-01-01".parse().unwrap()));
     assert_eq!(asked.properties, ["wind_speed"]);
     assert_eq!(asked.kinds, [PlatformKind::Ship]);
+    assert!(asked.limit >= 10_000, "the limit is one of platforms too");
 }
 
 #[tokio::test]
