@@ -60,12 +60,7 @@ impl Proxy {
     pub fn fail(&self, failing: bool) {
         self.is_failing.store(failing, Ordering::SeqCst);
         if failing {
-            for stream in self
-                .open
-                .lock()
-                .expect("nobody panics while holding it")
-                .drain(..)
-            {
+            for stream in std::mem::take(&mut *lock(&self.open)).values() {
                 // A connection that is gone already needs no closing.
                 drop(stream.shutdown(Shutdown::Both));
             }
