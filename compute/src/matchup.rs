@@ -152,7 +152,7 @@ pub async fn matchup(
         property,
         unit: display.unit.to_owned(),
         time_match,
-        statistics: Statistics::of(values),
+        statistics: Statistics::of(&values),
         left_out: out,
         rows,
     })

@@ -14,7 +14,6 @@ mod convert;
 mod coordinate;
 mod epic;
 mod gather;
-pub(crate) mod hdf5_text;
 mod measured;
 mod name;
 mod ndbc;

@@ -42,7 +42,9 @@ fn plain(observation: &Observation) -> Observation {
 #[expect(clippy::float_cmp, reason = "the same numbers, not near ones")]
 pub(crate) fn says_the_same(a: &Observation, b: &Observation) -> bool {
     (a.kind, a.quality, &a.unit) == (b.kind, b.quality, &b.unit)
-        && (a.lon_deg, a.lat_deg, a.value) == (b.lon_deg, b.lat_deg, b.value)
+        && a.lon_deg == b.lon_deg
+        && a.lat_deg == b.lat_deg
+        && a.value == b.value
 }
 
 #[cfg(test)]

@@ -20,7 +20,7 @@ const SILENCE: Duration = Duration::from_secs(10);
 /// Where observations are kept.
 #[derive(Debug, Clone, clap::Args)]
 pub struct ObservationSettings {
-    /// PostGIS database for observations, such as postgres://fluxglobe@db:5432/fluxglobe?sslmode=verify-full. sslmode is
+    /// PostGIS database for observations, such as `postgres://fluxglobe@db:5432/fluxglobe?sslmode=verify-full`. sslmode is
     /// disable, require (encrypted, the server is not checked) or verify-full; verify-full if not said, but prefer for
     /// this machine. No password in it. Without this setting observations are GeoParquet files in the object store.
     #[arg(long, env = "FLUXGLOBE_POSTGIS", value_name = "URL")]
@@ -165,9 +165,8 @@ fn parse(url: &str) -> Result<(tokio_postgres::Config, Protection), ObservationE
     let protection = match mode {
         Some("disable") => Protection::Disable,
         Some("require") => Protection::Require,
-        Some("verify-full") => Protection::VerifyFull,
         None if config.get_hosts().iter().all(is_this_machine) => Protection::Prefer,
-        None => Protection::VerifyFull,
+        Some("verify-full") | None => Protection::VerifyFull,
         Some(_) => return Err(bad("sslmode is disable, require or verify-full")),
     };
     Ok((config, protection))

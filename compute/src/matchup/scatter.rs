@@ -127,7 +127,7 @@ mod tests {
             property: "sea_surface_temperature".to_owned(),
             unit: "°C".to_owned(),
             time_match: TimeMatch::Nearest,
-            statistics: Statistics::of(rows.iter().map(|r| (r.observed, r.gridded))),
+            statistics: Statistics::of(&rows.iter().map(|r| (r.observed, r.gridded))),
             left_out: LeftOut::default(),
             rows,
         }

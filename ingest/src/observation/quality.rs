@@ -47,7 +47,7 @@ impl Scheme {
         };
         match (self, code) {
             // Its default means that the calibration after the recovery is not known.
-            (Self::TropicalArray, 1) | (Self::Woce, 2) | (Self::Primary, 1) => Some(Quality::Good),
+            (Self::TropicalArray | Self::Primary, 1) | (Self::Woce, 2) => Some(Quality::Good),
             (Self::TropicalArray, 3 | 4 | 8 | 9) | (Self::Woce | Self::Primary, 3) => {
                 Some(Quality::Questionable)
             }
@@ -102,10 +102,10 @@ fn meaning(word: &str) -> Verdict {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use Quality::{Bad, Good, NotEvaluated, Questionable};
 
     #[test]
     fn codes_mean_what_their_scheme_says() {
-        use Quality::{Bad, Good, NotEvaluated, Questionable};
         let verdicts =
             |scheme: Scheme| [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 9.0].map(|f| scheme.verdict(f));
         assert_eq!(
@@ -146,7 +146,6 @@ mod tests {
             "PASS",
         ];
         let found = words.map(meaning);
-        use Quality::{Bad, Good, NotEvaluated, Questionable};
         assert_eq!(
             found,
             [

@@ -4,11 +4,10 @@
 use contract::event::RejectReason;
 
 use super::coordinate::{MAX_VALUES, read, read_stored};
-use super::hdf5_text::TEXT_BYTES;
 use super::{Source, name};
 use crate::decoder::session::Session;
 use crate::error::Stop;
-use crate::file::description::{Description, Kind, Part, Variable};
+use crate::file::description::{Description, Kind, Variable};
 use crate::rejection::Rejection;
 
 /// Most platforms of one file.
@@ -209,16 +208,9 @@ async fn names(
             .map(text)
             .collect()
     } else {
-        let part = vec![Part::All; id.dimensions.len()];
-        let count = rows * letters * TEXT_BYTES as u64;
-        let numbers = session.read(&id.name, &part, count).await?;
-        let texts: Vec<String> = numbers.chunks(TEXT_BYTES).map(text).collect();
-        let is_lone = id.dimensions.len() < 2 && texts.iter().all(|text| text.len() <= 1);
-        let in_row = if is_lone { rows } else { letters };
-        texts
-            .chunks(usize::try_from(in_row.max(1)).unwrap_or(1))
-            .map(<[String]>::concat)
-            .collect()
+        let detail = "names platforms by text, which is read from NetCDF classic only; name them by numbers, or \
+                      convert the file (nccopy -k classic)";
+        return Err(Rejection::new(RejectReason::Unreadable, &id.name, detail).into());
     };
     let named = |(index, text): (usize, String)| {
         name::platform(&text).unwrap_or_else(|| (index + 1).to_string())

@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 
 use contract::event::RejectReason;
 use contract::observation::{Observation, PlatformKind, Quality};
+use contract::product::ProductId;
 use csv::{ByteRecord, ReaderBuilder};
 
 use super::gather::Gathered;
@@ -87,32 +88,56 @@ pub(super) fn read(content: &[u8], source: Source<'_>) -> Result<Vec<Observation
     }
     let is_socat = columns.measured.iter().any(|m| m.is_flagged);
     let stem = name::stem(source.file_name);
-    let dataset = name::dataset(source, if is_socat { "socat" } else { stem });
+    let mut reading = Reading {
+        dataset: name::dataset(source, if is_socat { "socat" } else { stem }),
+        lone_platform: name::platform(stem).unwrap_or_else(|| "1".to_owned()),
+        gathered: Gathered::default(),
+        spans: BTreeMap::new(),
+    };
     let mut rows = ReaderBuilder::new()
         .delimiter(b'\t')
         .quoting(false)
         .flexible(true)
         .has_headers(false)
         .from_reader(&content[start..]);
-    let mut gathered = Gathered::default();
-    let mut spans = BTreeMap::<String, Span>::new();
     let (mut good, mut bad) = (0u64, 0u64);
     let mut record = ByteRecord::new();
     let broken = |e: csv::Error| Rejection::new(RejectReason::Corrupt, "file", e.to_string());
     while rows.read_byte_record(&mut record).map_err(broken)? {
-        let Some(row) = Row::of(&columns, &record) else {
-            bad += 1;
-            continue;
-        };
-        good += 1;
+        match Row::of(&columns, &record) {
+            Some(row) => {
+                good += 1;
+                reading.take(&columns, &row)?;
+            }
+            None => bad += 1,
+        }
+    }
+    if bad * READABLE_IN > good + bad {
+        let all = good + bad;
+        let detail = format!("{bad} of {all} rows have no place or time; it is damaged");
+        return Err(Rejection::new(RejectReason::Corrupt, "file", detail));
+    }
+    reading.finish()
+}
+
+/// What was read of a table so far.
+struct Reading {
+    dataset: ProductId,
+    /// Name of the platform where no column says it.
+    lone_platform: String,
+    gathered: Gathered,
+    spans: BTreeMap<String, Span>,
+}
+
+impl Reading {
+    fn take(&mut self, columns: &Columns, row: &Row<'_>) -> Result<(), Rejection> {
         let platform = row.text(columns.platform).and_then(name::platform);
-        let platform = platform
-            .or_else(|| name::platform(stem))
-            .unwrap_or_else(|| "1".to_owned());
-        spans.entry(platform.clone()).or_default().widen(row.place);
-        for (property, value, unit, depth_m, quality) in row.values(&columns) {
-            gathered.take(Observation {
-                dataset: dataset.clone(),
+        let platform = platform.unwrap_or_else(|| self.lone_platform.clone());
+        let span = self.spans.entry(platform.clone()).or_default();
+        span.widen(row.place);
+        for (property, value, unit, depth_m, quality) in row.values(columns) {
+            self.gathered.take(Observation {
+                dataset: self.dataset.clone(),
                 platform: platform.clone(),
                 kind: PlatformKind::Ship,
                 time: row.time,
@@ -125,28 +150,21 @@ pub(super) fn read(content: &[u8], source: Source<'_>) -> Result<Vec<Observation
                 quality,
             })?;
         }
+        Ok(())
     }
-    if bad * READABLE_IN > good + bad {
-        let detail = format!(
-            "{bad} of {} rows have no place or time; it is damaged",
-            good + bad
-        );
-        return Err(Rejection::new(RejectReason::Corrupt, "file", detail));
-    }
-    let mut found = gathered.finish(Rejection::new(
-        RejectReason::Values,
-        "file",
-        "holds no measured value",
-    ))?;
-    for observation in &mut found {
-        if spans
-            .get(&observation.platform)
-            .is_some_and(Span::is_one_place)
-        {
-            observation.kind = PlatformKind::Station;
+
+    /// The observations, now that it is known who moved.
+    fn finish(self) -> Result<Vec<Observation>, Rejection> {
+        let none = Rejection::new(RejectReason::Values, "file", "holds no measured value");
+        let mut found = self.gathered.finish(none)?;
+        for observation in &mut found {
+            let span = self.spans.get(&observation.platform);
+            if span.is_some_and(Span::is_one_place) {
+                observation.kind = PlatformKind::Station;
+            }
         }
+        Ok(found)
     }
-    Ok(found)
 }
 
 /// Where a platform was.

@@ -404,6 +404,24 @@ async fn grids_and_other_texts_are_no_observations() {
     );
 }
 
+/// Two files of NetCDF-4, written by Python netCDF4 1.7: names as numbers and names as text.
+#[tokio::test]
+async fn netcdf_4_is_read_and_names_of_text_in_it_are_refused_with_advice() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/observations/files");
+    let found = observations(&folder.join("numbered.nc")).await;
+    let row = |name: &str, hour, lon, value| (name.to_owned(), hour, lon, value);
+    let expected = [
+        row("44005", 1, 100, 11),
+        row("44005", 2, 100, 12),
+        row("44006", 4, -160, 21),
+        row("44006", 5, -160, 22),
+    ];
+    assert_eq!(seen(&found), expected);
+    let rejection = refusal(&folder.join("named.nc")).await;
+    assert_eq!(rejection.reason, RejectReason::Unreadable, "{rejection}");
+    assert!(rejection.detail.contains("nccopy"), "{rejection}");
+}
+
 /// Every byte of a good file changed, and every length of it: a refusal or observations, never a crash or a hang.
 #[tokio::test(flavor = "multi_thread")]
 async fn mutated_texts_end_in_observations_or_a_refusal() {

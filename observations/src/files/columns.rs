@@ -3,7 +3,7 @@
 use std::sync::{Arc, LazyLock};
 
 use arrow::array::{
-    Array as _, ArrayRef, AsArray as _, Float64Array, RecordBatch, StringArray,
+    Array as _, ArrayRef, AsArray, Float64Array, RecordBatch, StringArray,
     TimestampMillisecondArray, UInt8Array,
 };
 use arrow::datatypes::{
@@ -23,7 +23,7 @@ pub(super) const TIME: &str = "time";
 /// Bytes of a point in well-known binary: byte order, type, longitude, latitude.
 const POINT_BYTES: usize = 1 + 4 + 8 + 8;
 
-/// Longitude and latitude, as GeoArrow; the coordinate system is that of GeoParquet's default, OGC:CRS84.
+/// Longitude and latitude, as `GeoArrow`; the coordinate system is that of GeoParquet's default, OGC:CRS84.
 static POINT: LazyLock<PointType> =
     LazyLock::new(|| PointType::new(Dimension::XY, Arc::new(Metadata::default())));
 
@@ -48,7 +48,7 @@ pub(super) static SCHEMA: LazyLock<SchemaRef> = LazyLock::new(|| {
 
 /// Rows as columns.
 pub(super) fn batch<'a>(
-    rows: impl Iterator<Item = &'a Observation> + Clone,
+    rows: &(impl Iterator<Item = &'a Observation> + Clone),
 ) -> Result<RecordBatch, GeoArrowError> {
     let texts = |text: fn(&Observation) -> &str| -> ArrayRef {
         Arc::new(StringArray::from_iter_values(rows.clone().map(text)))
@@ -90,9 +90,9 @@ pub(super) fn rows(
             .filter(|column| column.null_count() == 0)
             .ok_or_else(|| damaged(&format!("no column {name} of {kind}")))
     };
-    let text = |name: &str| column(name, &DataType::Utf8).map(|c| c.as_string::<i32>());
+    let text = |name: &str| column(name, &DataType::Utf8).map(AsArray::as_string::<i32>);
     let number =
-        |name: &str| column(name, &DataType::Float64).map(|c| c.as_primitive::<Float64Type>());
+        |name: &str| column(name, &DataType::Float64).map(AsArray::as_primitive::<Float64Type>);
     let time = DataType::Timestamp(TimeUnit::Millisecond, Some("UTC".into()));
     let times = column(TIME, &time)?.as_primitive::<TimestampMillisecondType>();
     let (datasets, platforms) = (text("dataset")?, text("platform")?);

@@ -32,8 +32,8 @@ pub(super) struct Index {
 #[serde(deny_unknown_fields)]
 pub(super) struct Month {
     year: i32,
-    /// 1 to 12.
-    month: u32,
+    /// Number of the month in its year, 1 to 12.
+    in_year: u32,
     /// GeoParquet.
     pub(super) file: ObjectKey,
     rows: u64,
@@ -70,7 +70,7 @@ impl Month {
     ///
     /// # Panics
     /// If there are no rows.
-    pub(super) fn new(year: i32, month: u32, file: ObjectKey, rows: &Rows) -> Self {
+    pub(super) fn new(year: i32, in_year: u32, file: ObjectKey, rows: &Rows) -> Self {
         let first = rows
             .keys()
             .next()
@@ -91,7 +91,7 @@ impl Month {
         });
         Self {
             year,
-            month,
+            in_year,
             file,
             rows: rows.len() as u64,
             first: first.time,
@@ -101,7 +101,7 @@ impl Month {
     }
 
     pub(super) fn year_month(&self) -> (i32, u32) {
-        (self.year, self.month)
+        (self.year, self.in_year)
     }
 }
 

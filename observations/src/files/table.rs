@@ -27,7 +27,7 @@ pub(super) fn encode<'a>(
     rows: impl Iterator<Item = &'a Observation> + Clone,
 ) -> Result<Bytes, ObservationError> {
     let failed = |e: &dyn std::fmt::Display| ObservationError::damaged(WRITING, e);
-    let batch = columns::batch(rows).map_err(|e| failed(&e))?;
+    let batch = columns::batch(&rows).map_err(|e| failed(&e))?;
     let options = GeoParquetWriterOptionsBuilder::default()
         .set_primary_column("geometry".to_owned())
         .set_generate_covering(true)

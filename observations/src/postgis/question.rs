@@ -1,5 +1,6 @@
 //! Questions as SQL with numbered parameters: nothing that was asked stands in the text.
 
+use contract::product::ProductId;
 use tokio_postgres::types::ToSql;
 
 use super::upsert::system_time;
@@ -148,7 +149,7 @@ fn conditions<'a>(question: &mut Question<'a>, checked: &CheckedFilter<'a>) -> V
         ),
         (
             "dataset",
-            filter.datasets.iter().map(|d| d.as_str()).collect(),
+            filter.datasets.iter().map(ProductId::as_str).collect(),
         ),
         (
             "platform",
@@ -173,7 +174,7 @@ fn conditions<'a>(question: &mut Question<'a>, checked: &CheckedFilter<'a>) -> V
 }
 
 /// The index finds what meets a box, in single precision; the comparisons after it are exact.
-fn place<'a>(question: &mut Question<'a>, area: &Area) -> Option<String> {
+fn place(question: &mut Question<'_>, area: &Area) -> Option<String> {
     if *area == Area::Everywhere {
         return None;
     }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
 use std::time::{Duration, Instant};
 
-use observations::{ErrorClass, Filter, ObservationSettings, ObservationStore, PostgisStore};
+use observations::{ErrorClass, Filter, ObservationSettings, ObservationStore as _, PostgisStore};
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::net::{TcpListener, TcpStream};
 

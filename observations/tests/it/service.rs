@@ -63,7 +63,7 @@ async fn until_read(log: &Arc<dyn EventLog>) {
             tokio::time::sleep(Duration::from_millis(20)).await;
         }
     };
-    tokio::time::timeout(Duration::from_secs(60), all)
+    tokio::time::timeout(Duration::from_mins(1), all)
         .await
         .expect("messages are left over");
 }

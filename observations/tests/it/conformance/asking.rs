@@ -163,11 +163,14 @@ pub(crate) async fn edges_of_a_polygon_belong_to_it_and_those_of_its_hole_too(ho
     assert_eq!(found, expected);
 }
 
+/// Is an observation wanted?
+type Wanted = fn(&Observation) -> bool;
+
 pub(crate) async fn a_filter_finds_what_it_names_and_nothing_else(home: &Home) {
     let store = home.store();
     let rows = many(2000);
     store.upsert(&rows).await.unwrap();
-    let filters: [(Filter, fn(&Observation) -> bool); 7] = [
+    let filters: [(Filter, Wanted); 7] = [
         (
             Filter {
                 datasets: vec!["ships".parse().unwrap(), "absent".parse().unwrap()],

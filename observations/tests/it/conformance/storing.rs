@@ -39,7 +39,7 @@ pub(crate) async fn a_new_value_replaces_the_old_one(home: &Home) {
     assert_eq!(values(store, Filter::default()).await, [2.0, 281.0, 3.0]);
     let changes: [fn(&mut Observation); 5] = [
         |o| o.quality = Quality::Bad,
-        |o| o.unit = "degC".to_owned(),
+        |o| "degC".clone_into(&mut o.unit),
         |o| o.kind = PlatformKind::Ship,
         |o| o.lon_deg = 1.0,
         |o| o.lat_deg = f64::from_bits(o.lat_deg.to_bits() + 1),
@@ -177,7 +177,7 @@ pub(crate) async fn a_hundred_thousand_rows_are_stored_and_found(home: &Home) {
     assert_eq!(store.upsert(&rows).await.unwrap(), counts(100_000, 0, 0));
     let stored = start.elapsed();
     assert_eq!(store.upsert(&rows).await.unwrap(), counts(0, 0, 100_000));
-    let again = start.elapsed() - stored;
+    let again = start.elapsed().saturating_sub(stored);
     let asked = std::time::Instant::now();
     let filter = Filter {
         region: "-30,-10,30,10".parse().unwrap(),
