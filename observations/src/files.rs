@@ -122,7 +122,7 @@ impl FileStore {
         (year, month): (i32, u32),
         rows: &Rows,
     ) -> Result<Month, ObservationError> {
-        let content = table::encode(rows.values())?;
+        let content = table::encode(&rows.values())?;
         let file = ObjectKey::observations(dataset, &Digest::of(&content));
         self.store.put_new(&file, content).await?;
         Ok(Month::new(year, month, file, rows))

@@ -24,10 +24,10 @@ const WRITING: &str = "a file of observations to write";
 
 /// Bytes of rows that are in the order of their keys.
 pub(super) fn encode<'a>(
-    rows: impl Iterator<Item = &'a Observation> + Clone,
+    rows: &(impl Iterator<Item = &'a Observation> + Clone),
 ) -> Result<Bytes, ObservationError> {
     let failed = |e: &dyn std::fmt::Display| ObservationError::damaged(WRITING, e);
-    let batch = columns::batch(&rows).map_err(|e| failed(&e))?;
+    let batch = columns::batch(rows).map_err(|e| failed(&e))?;
     let options = GeoParquetWriterOptionsBuilder::default()
         .set_primary_column("geometry".to_owned())
         .set_generate_covering(true)
@@ -124,10 +124,10 @@ mod tests {
     #[test]
     fn rows_round_trip_with_every_bit() {
         let rows = rows(20_000);
-        let bytes = encode(rows.iter()).unwrap();
+        let bytes = encode(&rows.iter()).unwrap();
         assert_eq!(
             bytes,
-            encode(rows.iter()).unwrap(),
+            encode(&rows.iter()).unwrap(),
             "other bytes for equal rows"
         );
         let back = decode("f", bytes, None, None, |_| true).unwrap();
@@ -138,7 +138,7 @@ mod tests {
     fn only_groups_within_the_time_are_decoded() {
         let rows = rows(20_000);
         let (from, to) = (rows[9000].time, rows[9001].time);
-        let bytes = encode(rows.iter()).unwrap();
+        let bytes = encode(&rows.iter()).unwrap();
         let seen = std::cell::Cell::new(0);
         let wants = |o: &Observation| {
             seen.set(seen.get() + 1);
@@ -152,7 +152,7 @@ mod tests {
     /// What GeoParquet 1.1 asks of a file, read by the metadata reader of its library and by hand.
     #[test]
     fn the_file_is_geoparquet() {
-        let bytes = encode(rows(100).iter()).unwrap();
+        let bytes = encode(&rows(100).iter()).unwrap();
         let reader = SerializedFileReader::new(bytes).unwrap();
         let metadata = reader.metadata().file_metadata();
         let geo = GeoParquetMetadata::from_parquet_meta(metadata)
@@ -187,7 +187,7 @@ mod tests {
 
     #[test]
     fn bytes_that_are_no_file_of_observations_are_damaged() {
-        let bytes = encode(rows(100).iter()).unwrap();
+        let bytes = encode(&rows(100).iter()).unwrap();
         for part in [
             Bytes::new(),
             Bytes::from("text"),
