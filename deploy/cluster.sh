@@ -62,6 +62,8 @@ start_node() {
     select_node "$name_of"
     if running_pid >/dev/null; then return; fi
     ! answers_tcp "${address##*:}" || fail "port ${address##*:} is taken by another program"
+    # A name of its own that it keeps: a transaction that a kill left open is ended when it is back.
+    export FLUXGLOBE_KAFKA_INSTANCE=$name_of
     if [ "$name_of" = tile-server ]; then
         launch "$program" "$@" --listen "$address"
     else

@@ -179,9 +179,10 @@ impl Body {
     /// What events share that must be read in their order: the product, else what the event speaks of.
     pub fn order_key(&self) -> String {
         match self {
-            Self::GranuleNotice { path, product, .. } => {
-                product.as_ref().map_or(path.as_str(), |p| p.as_str()).to_owned()
-            }
+            Self::GranuleNotice { path, product, .. } => product
+                .as_ref()
+                .map_or(path.as_str(), |p| p.as_str())
+                .to_owned(),
             Self::GranuleLanded { manifest, .. } | Self::ProductDerived { manifest, .. } => {
                 manifest.product.to_string()
             }

@@ -71,7 +71,10 @@ impl Cluster {
             "FLUXGLOBE_SPOOL",
             folder.path().join("spool").display().to_string(),
         );
-        set("FLUXGLOBE_EXECUTOR_WORK", folder.path().join("work").display().to_string());
+        set(
+            "FLUXGLOBE_EXECUTOR_WORK",
+            folder.path().join("work").display().to_string(),
+        );
         set("FLUXGLOBE_LOG", "info".to_owned());
         set("NODEVICE_SELECT", "1".to_owned());
         let mut cluster = Self {
@@ -85,13 +88,9 @@ impl Cluster {
         cluster.succeed(&["topics", "create"])?;
         for (name, words, address) in planned {
             let words: Vec<&str> = words.iter().map(String::as_str).collect();
-            let node = Node::start(
-                cluster.folder.path(),
-                &name,
-                &words,
-                &address,
-                &cluster.settings,
-            )?;
+            let mut settings = cluster.settings.clone();
+            settings.push(("FLUXGLOBE_KAFKA_INSTANCE".to_owned(), name.clone()));
+            let node = Node::start(cluster.folder.path(), &name, &words, &address, &settings)?;
             if name == "tile-server" {
                 cluster.tiles = format!("http://{address}");
             }

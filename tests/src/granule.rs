@@ -13,7 +13,10 @@ const FILL: f32 = -999.0;
 const FIRST_YEAR: usize = 2000;
 
 /// Writes the granule of one month, counted from January 2000; another `edition` has other values.
-#[expect(clippy::unwrap_used, reason = "the file is this function's own: it cannot be wrong")]
+#[expect(
+    clippy::unwrap_used,
+    reason = "the file is this function's own: it cannot be wrong"
+)]
 pub fn write(folder: &Path, month: usize, edition: usize) -> Result<PathBuf> {
     let (year, month_of_year) = (FIRST_YEAR + month / 12, month % 12 + 1);
     let file = folder.join(format!("flux-{year}-{month_of_year:02}-{edition}.nc"));
@@ -29,7 +32,8 @@ pub fn write(folder: &Path, month: usize, edition: usize) -> Result<PathBuf> {
         }
     }
     let mut set = netcdf3::DataSet::new();
-    set.add_global_attr_string("time_coverage_resolution", "P1M").unwrap();
+    set.add_global_attr_string("time_coverage_resolution", "P1M")
+        .unwrap();
     set.set_unlimited_dim("time", 1).unwrap();
     set.add_fixed_dim("lat", ROWS).unwrap();
     set.add_fixed_dim("lon", COLS).unwrap();
@@ -41,13 +45,16 @@ pub fn write(folder: &Path, month: usize, edition: usize) -> Result<PathBuf> {
     let since = format!("days since {year}-{month_of_year:02}-01");
     set.add_var_attr_string("time", "units", &since).unwrap();
     set.add_var_f32("fgco2", &["time", "lat", "lon"]).unwrap();
-    set.add_var_attr_string("fgco2", "units", "mol m-2 s-1").unwrap();
+    set.add_var_attr_string("fgco2", "units", "mol m-2 s-1")
+        .unwrap();
     set.add_var_attr_string(
         "fgco2",
         "standard_name",
         "surface_upward_mole_flux_of_carbon_dioxide",
-    ).unwrap();
-    set.add_var_attr_f32("fgco2", "_FillValue", vec![FILL]).unwrap();
+    )
+    .unwrap();
+    set.add_var_attr_f32("fgco2", "_FillValue", vec![FILL])
+        .unwrap();
     let mut writer = netcdf3::FileWriter::open(&file).unwrap();
     writer.set_def(&set, netcdf3::Version::Classic, 0).unwrap();
     writer.write_var_f64("lat", &lat).unwrap();

@@ -45,10 +45,7 @@ const TEXTS: [(&str, &str); 19] = [
         "reynolds-sst",
         include_str!("../../profiles/reynolds-sst.toml"),
     ),
-    (
-        "ccmp-wind",
-        include_str!("../../profiles/ccmp-wind.toml"),
-    ),
+    ("ccmp-wind", include_str!("../../profiles/ccmp-wind.toml")),
     (
         "ostia-sst-climatology",
         include_str!("../../profiles/ostia-sst-climatology.toml"),
