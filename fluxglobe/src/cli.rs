@@ -20,7 +20,7 @@ pub(crate) use services::{
     Topics,
 };
 pub(crate) use show::settings as shown_settings;
-pub(crate) use upkeep::{Gc, Recompute, RecomputeWhat};
+pub(crate) use upkeep::{Gc, Recompute, RecomputeWhat, Survey};
 
 /// See and count the ocean's carbon.
 ///
@@ -65,10 +65,10 @@ pub(crate) struct Settings {
         global = true
     )]
     pub(crate) log_format: service::LogFormat,
-    /// Object store in place of the one in --data: s3://BUCKET/PREFIX, gs://, az://, hdfs://HOST:PORT/PATH, file:FOLDER.
+    /// Object store in place of the one in --data: `s3://BUCKET/PREFIX`, `gs://`, `az://`, `hdfs://HOST:PORT/PATH`, `file:FOLDER`.
     #[arg(long, env = "FLUXGLOBE_STORE", global = true, value_name = "URL")]
     pub(crate) store: Option<String>,
-    /// Ballista scheduler to compute on, http://HOST:PORT; in this process without it. Answers are the same bits.
+    /// Ballista scheduler to compute on, `http://HOST:PORT`; in this process without it. Answers are the same bits.
     #[arg(long, env = "FLUXGLOBE_CLUSTER", global = true, value_name = "URL")]
     pub(crate) cluster: Option<String>,
     /// Draw with the processor alone instead of a Vulkan device.
@@ -126,6 +126,8 @@ pub(crate) enum Command {
     Recompute(Recompute),
     /// Remove objects that no kept version needs.
     Gc(Gc),
+    /// Show what would become of files: landed with which profile, or refused and why. Nothing is stored.
+    Survey(Survey),
     /// Measure.
     #[command(subcommand)]
     Bench(Bench),

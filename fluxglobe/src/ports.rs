@@ -121,7 +121,9 @@ impl Draw for FleetDrawer {
     async fn draw(&self, job: &RenderJob) -> Result<Bytes, BackendError> {
         let trace = job.digest().short();
         let picture = self.0.draw(job, &trace).await;
-        picture.map(|picture| picture.png).map_err(fleet_failed)
+        picture
+            .map(|picture| picture.png)
+            .map_err(|error| fleet_failed(&error))
     }
 
     async fn ready(&self) -> Result<(), BackendError> {
@@ -129,12 +131,12 @@ impl Draw for FleetDrawer {
             .ready()
             .await
             .map(|_workers| ())
-            .map_err(fleet_failed)
+            .map_err(|error| fleet_failed(&error))
     }
 }
 
-fn fleet_failed(error: FleetError) -> BackendError {
-    let class = match &error {
+fn fleet_failed(error: &FleetError) -> BackendError {
+    let class = match error {
         FleetError::BadRequest(_) => Class::BadRequest,
         FleetError::NotFound(_) => Class::NotFound,
         FleetError::Busy { .. } => Class::Busy,

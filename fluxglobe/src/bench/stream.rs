@@ -29,6 +29,7 @@ const PRODUCT: &str = "bench-stream";
 
 /// Times of one notice, from its sending, seconds.
 #[derive(Debug, Clone, Copy, Serialize)]
+#[expect(clippy::struct_field_names, reason = "units last in names")]
 struct Times {
     landed_s: f64,
     derived_s: f64,
@@ -45,7 +46,7 @@ struct Summary {
 /// One stage.
 #[derive(Debug, Clone, Serialize)]
 struct Stage {
-    stage: &'static str,
+    name: &'static str,
     p50_s: f64,
     p95_s: f64,
     /// Of the mean time from notice to tile, percent.
@@ -176,19 +177,22 @@ async fn until_tile(tiles: &str, manifest: &ManifestId) -> Result<()> {
     bail!("the tile server did not show {manifest} within {STAGE_LIMIT:?}")
 }
 
+/// A stage and how long it took.
+type Part = (&'static str, fn(&Times) -> f64);
+
 fn summarise(all: &[Times]) -> Summary {
-    let stages: [(&'static str, fn(&Times) -> f64); 4] = [
+    let stages: [Part; 4] = [
         ("notice to landed", |t| t.landed_s),
         ("landed to derived", |t| t.derived_s - t.landed_s),
         ("derived to tile", |t| t.tile_s - t.derived_s),
         ("notice to tile", |t| t.tile_s),
     ];
     let whole: f64 = all.iter().map(|t| t.tile_s).sum();
-    let stage = |(stage, of): (&'static str, fn(&Times) -> f64)| {
+    let stage = |(name, of): Part| {
         let mut values: Vec<f64> = all.iter().map(of).collect();
         values.sort_by(f64::total_cmp);
         Stage {
-            stage,
+            name,
             p50_s: quantile(&values, 0.5),
             p95_s: quantile(&values, 0.95),
             share_percent: 100.0 * values.iter().sum::<f64>() / whole,
@@ -217,7 +221,7 @@ fn table(summary: &Summary) -> Table {
     }
     for stage in &summary.stages {
         table.add_row([
-            stage.stage.to_owned(),
+            stage.name.to_owned(),
             format!("{:.3}", stage.p50_s),
             format!("{:.3}", stage.p95_s),
             format!("{:.0} %", stage.share_percent),
@@ -237,7 +241,7 @@ mod tests {
             (quantile(&values, 0.5), quantile(&values, 0.95)),
             (10.0, 19.0)
         );
-        assert_eq!(quantile(&[7.0], 0.95), 7.0);
+        assert_eq!(quantile(&[7.0], 0.95).to_bits(), 7.0_f64.to_bits());
     }
 
     #[test]

@@ -44,7 +44,7 @@ pub(crate) struct Scheduler {
     #[command(flatten)]
     pub(crate) kafka: kafka_log::KafkaSettings,
     #[command(flatten)]
-    pub(crate) scheduler: compute::service::SchedulerSettings,
+    pub(crate) ballista: compute::service::SchedulerSettings,
 }
 
 /// `fluxglobe executor`.
@@ -56,7 +56,7 @@ pub(crate) struct Executor {
     #[arg(long, env = "FLUXGLOBE_ADMIN", default_value = "127.0.0.1:9103")]
     pub(crate) admin: SocketAddr,
     #[command(flatten)]
-    pub(crate) executor: compute::service::ExecutorSettings,
+    pub(crate) ballista: compute::service::ExecutorSettings,
 }
 
 /// `fluxglobe render-worker`.

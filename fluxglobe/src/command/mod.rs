@@ -13,6 +13,7 @@ mod rejected;
 mod render;
 pub(crate) mod serve;
 mod stats;
+mod survey;
 mod topics;
 
 use std::process::ExitCode;
@@ -47,6 +48,7 @@ pub(crate) async fn run(settings: &Settings, command: Command) -> Result<ExitCod
         Command::Rejected(command) => rejected::run(settings, command).await?,
         Command::Observations(command) => observations::run(settings, command).await?,
         Command::Recompute(options) => recompute::run(settings, options).await?,
+        Command::Survey(options) => survey::run(&options).await?,
         Command::Gc(options) => gc::run(settings, &options).await?,
         Command::Bench(Bench::Stream(options)) => {
             let log = deployment::needed_log(settings, &options.kafka).await?;

@@ -8,7 +8,7 @@ use crate::cli::Settings;
 use crate::services::Footing;
 
 pub(crate) async fn run(settings: &Settings, options: cli::Executor) -> Result<()> {
-    let mut executor = options.executor;
+    let mut executor = options.ballista;
     if let Some(scheduler) = &settings.cluster {
         executor.scheduler = scheduler.parse()?;
     }

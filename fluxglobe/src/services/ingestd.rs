@@ -15,7 +15,7 @@ use crate::sink::Sink;
 pub(crate) async fn run(settings: &Settings, options: Ingestd) -> Result<()> {
     // What can be refused without asking anybody is refused before anything is waited for.
     let ingest = options.ingest.resolve(DecoderCommand::current()?)?;
-    let parts = ["store", "event log", "observations"];
+    let parts = ["store", "event log", "observations", "ingest"];
     let footing = Footing::take(settings, "ingestd", Some(options.admin), &parts).await?;
     let Some(store) = footing.store().await? else {
         return footing.leave().await;
@@ -39,6 +39,11 @@ pub(crate) async fn run(settings: &Settings, options: Ingestd) -> Result<()> {
         .with_metrics(Metrics::register(&footing.registry)?)
         .with_observations(Arc::new(Sink(Arc::clone(&measured))))
         .with_bounds(usize::from(options.ingest.parallel_notices), drain);
+    let asked = granules.clone();
+    footing.board.set("ingest", move || {
+        let asked = asked.clone();
+        async move { crate::services::worst(&asked).await }
+    });
     let red = Red::register(&footing.registry, "observations")?;
     let observed = ObservationService::new(log, measured, red);
     let (landed, ()) = tokio::join!(

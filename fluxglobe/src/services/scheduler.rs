@@ -16,7 +16,7 @@ pub(crate) async fn run(settings: &Settings, options: cli::Scheduler) -> Result<
     let Some(store) = footing.store().await? else {
         return footing.leave().await;
     };
-    let scheduler = Scheduler::start(&options.scheduler, store.clone(), &footing.registry).await?;
+    let scheduler = Scheduler::start(&options.ballista, store.clone(), &footing.registry).await?;
     let (readiness, address) = (scheduler.readiness(), scheduler.address());
     footing.board.set("scheduler", move || {
         let readiness = readiness.clone();

@@ -94,15 +94,14 @@ pub(super) async fn draw(
     tiles: &Tiles,
 ) -> Result<()> {
     let bar = progress::bar("draw tiles", tiles.missing.len() as u64);
-    match log {
-        Some(log) => on_workers(log, &tiles.missing, &|| bar.inc(1)).await?,
-        None => {
-            let renderer = deployment::renderer(settings, store.clone()).await?;
-            for job in &tiles.missing {
-                let png = renderer.draw(job).await?;
-                store.put_new(&job.key(), png).await?;
-                bar.inc(1);
-            }
+    if let Some(log) = log {
+        on_workers(log, &tiles.missing, &|| bar.inc(1)).await?;
+    } else {
+        let renderer = deployment::renderer(settings, store.clone()).await?;
+        for job in &tiles.missing {
+            let png = renderer.draw(job).await?;
+            store.put_new(&job.key(), png).await?;
+            bar.inc(1);
         }
     }
     progress::done(&bar, &format!("{} drawn", tiles.missing.len()));
