@@ -15,6 +15,8 @@ export async function observationsOfPlatform(journey) {
   assert.equal(answer.status, 200);
   const { features } = await answer.json();
   await page.locator("#observations").check();
+  // The answer changes the line; the list of none is as long before the answer as after it.
+  await page.locator("#observations-status").filter({ hasNotText: /^$|asking/ }).waitFor();
   await journey.until((count) => window.fluxglobe.platforms.length === count, features.length);
   if (features.length === 0) {
     assert.match(await page.locator("#observations-status").innerText(), /none/);
