@@ -131,7 +131,10 @@ impl Renderer {
         scene.validate()?;
         let coarser = pyramid::suited(job, scene);
         let scene = coarser.as_ref().unwrap_or(scene);
-        let plan = Plan::new(job, scene, most_buffer_bytes)?;
+        let plan = match &device {
+            Some(_) => Plan::for_device(job, scene, most_buffer_bytes)?,
+            None => Plan::new(job, scene, most_buffer_bytes)?,
+        };
         let [width, height] = plan.size_px();
         let mut image = Image {
             width,

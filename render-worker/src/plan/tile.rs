@@ -11,7 +11,7 @@ use contract::tile::{MAX_LAT_DEG, Tile, mercator_lat_deg, mercator_x, mercator_y
 use super::look::{self, Look};
 use super::{Plan, area_m2, cell_px, entry_shift, height_range_m};
 use crate::scene::Scene;
-use crate::stages::layout::{Active, Axis, Col, Row, SUBPIXELS, VIEW_TILE};
+use crate::stages::layout::{Axis, Col, Row, SUBPIXELS, VIEW_TILE};
 
 /// Smallest light texel, pixels: finer than the screen is of no use.
 const LEAST_TEXEL_PX: f64 = 1.5;
@@ -192,12 +192,11 @@ fn light_and_reach(
     reach
 }
 
-/// Fills the tables of columns and the list of cells whose ground lies within `spans` (x, y), date line included.
+/// Fills the table of columns and sets the rows whose ground lies within `spans` (x, y), date line included.
 fn choose_cells(plan: &mut Plan, scene: &Scene, level: &Level, spans: [Span; 2]) {
     let grid = &scene.grid;
     let subpixels = f64::from(SUBPIXELS);
     let width_px = grid.dlon_deg / 360.0 * level.world_px;
-    let mut slots = vec![];
     let first_turn = -(level.size_px / level.world_px).ceil() as i32 - 1;
     for turn in first_turn..=-first_turn {
         for col in 0..grid.cols {
@@ -208,9 +207,9 @@ fn choose_cells(plan: &mut Plan, scene: &Scene, level: &Level, spans: [Span; 2])
                 plan.cols.push(Col {
                     x_sub,
                     x_span_px: width_px as f32,
+                    index: col,
                     ..Col::default()
                 });
-                slots.push(col);
             }
         }
     }
@@ -222,19 +221,9 @@ fn choose_cells(plan: &mut Plan, scene: &Scene, level: &Level, spans: [Span; 2])
     let chosen: Vec<u32> = (0..grid.rows)
         .filter(|&row| near(&plan.rows[row as usize]))
         .collect();
-    for &row in &chosen {
-        for (slot, col) in slots.iter().enumerate() {
-            let cell = row * grid.cols + col;
-            if scene.domain.content()[cell as usize] != 0 {
-                plan.active.push(Active {
-                    cell,
-                    slot: slot as u32,
-                });
-            }
-        }
-    }
-    let rows = chosen.first().copied().unwrap_or(0)..chosen.last().map_or(0, |row| row + 1);
-    interpolate_rows(plan, rows);
+    plan.params.first_row = chosen.first().copied().unwrap_or(0);
+    plan.params.row_count = chosen.last().map_or(0, |row| row + 1) - plan.params.first_row;
+    plan.params.slot_count = plan.cols.len() as u32;
 }
 
 fn interpolate_rows(plan: &mut Plan, rows: Range<u32>) {

@@ -2,7 +2,8 @@
 struct Params {
     rows: u32, cols: u32, periodic: u32, first_cell: u32, end_cell: u32, value_weight: f32, accumulated_weight: f32,
     has_accumulated: u32, transfer_low: f32, transfer_per_unit: f32, strength_per_unit: f32, diverging: u32,
-    depth_floor: f32, active_count: u32, particles_per_cell: u32, particle_count: u32, shake_shift: u32, height_m_per_kg_m2: f32,
+    depth_floor: f32, first_row: u32, row_count: u32, slot_count: u32, cap_least: f32, particles_per_cell: u32,
+    cells_per_side: u32, particles_each: u32, splat_count: u32, shake_shift: u32, height_m_per_kg_m2: f32,
     height_limit_m: f32, sheet_m: f32, turns_per_kg_m2: f32, optical_depth: f32, view: u32, kernel: u32,
     front_to_back: u32, width: u32, height: u32, tiles_x: u32, tiles_y: u32, slices: u32, entry_capacity: u32,
     min_radius_px: f32, max_radius_px: f32, size_spread: f32, height_px_per_m: f32, slice_top: f32,
@@ -21,10 +22,7 @@ struct Row {
     depth_gain: f32,
 }
 struct Col {
-    x_sub: i32, x_span_px: f32, sin_lon: f32, cos_lon: f32,
-}
-struct Active {
-    cell: u32, slot: u32,
+    x_sub: i32, x_span_px: f32, sin_lon: f32, cos_lon: f32, index: u32,
 }
 struct Particle {
     row: u32, slot: u32, east: f32, south: f32, height_m: f32, mass_kg: f32, depth: f32, color: u32,
@@ -41,8 +39,9 @@ struct Axis {
 }
 
 const GROUP: u32 = 128u;
-const SCREEN_TILE_PX: u32 = 8u;
-const SCREEN_TILE_SHIFT: u32 = 7u;
+const SQUARE: u32 = 16u;
+const SCREEN_TILE_PX: u32 = 16u;
+const SCREEN_TILE_SHIFT: u32 = 8u;
 const SUBPIXELS: i32 = 16;
 const DEPTH_ONE: f32 = 4096.0;
 const MISSING: f32 = -1.0e30;

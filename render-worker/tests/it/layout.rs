@@ -1,12 +1,13 @@
 //! The structs and constants of Rust and WGSL, compared through naga.
 
+use render_worker::passes::{place, splat};
 use render_worker::stages::fill::{self, FillParams};
 use render_worker::stages::layout::{
-    Active, Axis, Col, DEPTH_ONE, Entry, GROUP, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, MISSING,
-    Params, Particle, Row, SCREEN_TILE_PX, SCREEN_TILE_SHIFT, SUBPIXELS, Splat, VIEW_GLOBE,
+    Axis, Col, DEPTH_ONE, Entry, GROUP, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, MISSING, Params,
+    Particle, Row, SCREEN_TILE_PX, SCREEN_TILE_SHIFT, SQUARE, SUBPIXELS, Splat, VIEW_GLOBE,
     VIEW_TILE,
 };
-use render_worker::stages::{bin, compose, eye, interpolate, light, map, particles, project};
+use render_worker::stages::{bin, compose, eye, interpolate, light, map};
 
 type Fields = &'static [(&'static str, usize, &'static str)];
 
@@ -58,11 +59,10 @@ fn difference(source: &str, name: &str, fields: Fields, size: usize) -> Option<S
     })
 }
 
-const SHARED: [(&str, Fields, usize); 8] = [
+const SHARED: [(&str, Fields, usize); 7] = [
     ("Params", Params::FIELDS, size_of::<Params>()),
     ("Row", Row::FIELDS, size_of::<Row>()),
     ("Col", Col::FIELDS, size_of::<Col>()),
-    ("Active", Active::FIELDS, size_of::<Active>()),
     ("Particle", Particle::FIELDS, size_of::<Particle>()),
     ("Splat", Splat::FIELDS, size_of::<Splat>()),
     ("Entry", Entry::FIELDS, size_of::<Entry>()),
@@ -121,6 +121,7 @@ fn constants_have_the_same_value_in_rust_and_wgsl() {
     };
     for (name, value) in [
         ("GROUP", f64::from(GROUP)),
+        ("SQUARE", f64::from(SQUARE)),
         ("SCREEN_TILE_PX", f64::from(SCREEN_TILE_PX)),
         ("SCREEN_TILE_SHIFT", f64::from(SCREEN_TILE_SHIFT)),
         ("SUBPIXELS", f64::from(SUBPIXELS)),
@@ -146,10 +147,10 @@ fn every_shader_is_valid_without_extensions() {
     let sources = [
         interpolate::SOURCE,
         fill::SOURCE,
-        particles::SOURCE,
-        project::SOURCE,
+        splat::SOURCE,
         light::SOURCE,
         bin::SOURCE,
+        place::SOURCE,
         eye::SOURCE,
         map::SOURCE,
         compose::SOURCE,

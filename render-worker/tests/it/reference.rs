@@ -74,7 +74,8 @@ impl Clouds {
             lerp_at(&scene.value),
             lerp_at(scene.accumulated.as_ref().unwrap()),
         );
-        let mut particles = vec![Particle::default(); plan.params.particle_count as usize];
+        let count = plan.active.len() * plan.params.particles_per_cell as usize;
+        let mut particles = vec![Particle::default(); count];
         let inputs = Inputs {
             active: &plan.active,
             rows: &plan.rows,

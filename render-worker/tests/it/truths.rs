@@ -10,8 +10,8 @@ use render_worker::scene::{Frame, Interval, Scene};
 use render_worker::stages::fill::{self, FillParams};
 use render_worker::stages::interpolate::cpu::interpolated;
 use render_worker::stages::layout::{
-    Active, Col, DEPTH_ONE, Entry, MISSING, Params, Particle, Row, SUBPIXELS, Splat, VIEW_GLOBE,
-    is_missing,
+    Active, Col, DEPTH_ONE, Entry, MISSING, Params, Particle, Row, SCREEN_TILE_PX, SUBPIXELS,
+    Splat, VIEW_GLOBE, is_missing,
 };
 use render_worker::stages::particles::cpu::{Inputs, envelope, generate};
 use render_worker::stages::{bin, eye, light, project};
@@ -267,7 +267,10 @@ fn a_uniform_slab_dims_light_as_exp_of_minus_its_depth() {
 
 /// Binned and seen by the eye.
 fn seen(params: &mut Params, splats: &[Splat]) -> Vec<Vec4> {
-    (params.tiles_x, params.tiles_y) = (params.width.div_ceil(8), params.height.div_ceil(8));
+    (params.tiles_x, params.tiles_y) = (
+        params.width.div_ceil(SCREEN_TILE_PX),
+        params.height.div_ceil(SCREEN_TILE_PX),
+    );
     let mut ends = vec![0; bin::list_count(params) as usize];
     bin::cpu::count(params, splats, &mut ends);
     let mut entries = vec![Entry::default(); bin::cpu::scan(&mut ends) as usize];

@@ -1,14 +1,18 @@
-// The eye's side of half-angle slicing: one workgroup a screen tile, two pixels an invocation. Inside a slice optical
-// depth and colour are summed as integers, in any order; slices are blended in order, towards or away from the eye.
+// The eye's side of half-angle slicing: one workgroup a screen tile. Inside a slice the entries of its list add optical
+// depth and colour to the pixels that they reach, as integers and so in any order; slices are blended in order, towards
+// or away from the eye. Entries are spread over the invocations while they are added, pixels while they are blended.
 @group(0) @binding(1) var<storage, read> list_ends: array<u32>;
 @group(0) @binding(2) var<storage, read> entries: array<Entry>;
 @group(0) @binding(3) var<storage, read_write> picture: array<vec4<f32>>;
 
-const BATCH = 32u; // SCREEN_TILE_PX * HALF_TILE_PX
-const HALF_TILE_PX = 4u;
-const MOST_SUM = vec4<u32>(0x7fffffffu);
+const PIXELS = 256u; // SCREEN_TILE_PX squared
+// Entries added between two looks at the sums, two invocations each: their sums, below 2^24 each, and what was clamped to
+// MOST_SUM before stay below 2^32.
+const BATCH = 128u;
+const MOST_SUM = 0x7fffffffu;
 
-var<workgroup> batch: array<Entry, BATCH>;
+// Red, green, blue and depth of every pixel.
+var<workgroup> sums: array<atomic<u32>, 1024>;
 
 // Share of a splat's depth at a squared distance of `q` squared radii from its centre.
 fn weight_at(q: f32, radius_px: f32) -> f32 {
@@ -25,15 +29,39 @@ fn ball_light(offset: vec2<f32>) -> f32 {
     return 0.55 + 0.45 * clamp(-0.45 * offset.x - 0.55 * offset.y + 0.70 * toward, 0.0, 1.0);
 }
 
-struct Round { inverse_radius: f32, radius_px: f32, depth: f32, rgb: vec3<u32> }
-
-fn contribution(own: Round, offset: vec2<f32>) -> vec4<u32> {
-    let q = dot(offset, offset);
-    let amount = u32(own.depth * weight_at(q, own.radius_px) + 0.5);
-    if (params.kernel == KERNEL_BALL) {
-        return vec4(vec3<u32>(vec3<f32>(own.rgb) * ball_light(offset) + 0.5) * amount, amount);
+// Adds an entry to every second row of pixels.
+fn add(entry: Entry, half: i32) {
+    let pixel_units = f32(SUBPIXELS) / f32(1u << params.entry_shift);
+    let radius = f32(entry.size & 0xffffu);
+    let depth = f32(entry.size >> 16u);
+    let rgb = vec3(entry.color & 255u, (entry.color >> 8u) & 255u, (entry.color >> 16u) & 255u);
+    let place = vec2(f32(i32(entry.place << 16u) >> 16u), f32(i32(entry.place) >> 16u));
+    // Pixels with their centre within the radius.
+    let low = max(vec2<i32>(ceil((place - radius) / pixel_units - 0.5)), vec2(0));
+    let high = min(vec2<i32>(floor((place + radius) / pixel_units - 0.5)), vec2(i32(SCREEN_TILE_PX) - 1));
+    let inverse_radius = 1.0 / radius;
+    let radius_px = radius / pixel_units;
+    for (var y = low.y + ((low.y ^ half) & 1); y <= high.y; y += 2) {
+        for (var x = low.x; x <= high.x; x++) {
+            let offset = ((vec2(f32(x), f32(y)) + 0.5) * pixel_units - place) * inverse_radius;
+            let amount = u32(depth * weight_at(dot(offset, offset), radius_px) + 0.5);
+            if (amount == 0u) { continue; }
+            var own = rgb;
+            if (params.kernel == KERNEL_BALL) { own = vec3<u32>(vec3<f32>(rgb) * ball_light(offset) + 0.5); }
+            let pixel = u32(y) * SCREEN_TILE_PX + u32(x);
+            atomicAdd(&sums[pixel], own.x * amount);
+            atomicAdd(&sums[PIXELS + pixel], own.y * amount);
+            atomicAdd(&sums[2u * PIXELS + pixel], own.z * amount);
+            atomicAdd(&sums[3u * PIXELS + pixel], amount);
+        }
     }
-    return vec4(own.rgb * amount, amount);
+}
+
+// What was added to a pixel since it was last looked at.
+fn taken(channel: u32, pixel: u32) -> u32 {
+    let sum = atomicLoad(&sums[channel * PIXELS + pixel]);
+    if (sum > 0u) { atomicStore(&sums[channel * PIXELS + pixel], 0u); }
+    return sum;
 }
 
 // Colour with alpha, premultiplied, once the slice with these sums is blended into it.
@@ -45,51 +73,29 @@ fn blended(picture: vec4<f32>, sums: vec4<u32>) -> vec4<f32> {
     return picture * (1.0 - alpha) + slice;
 }
 
-fn put(pixel: vec2<u32>, color: vec4<f32>) {
-    if (pixel.x < params.width && pixel.y < params.height) { picture[pixel.y * params.width + pixel.x] = color; }
-}
-
-@compute @workgroup_size(SCREEN_TILE_PX, HALF_TILE_PX)
-fn eye(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>,
+@compute @workgroup_size(SCREEN_TILE_PX, SCREEN_TILE_PX)
+fn eye(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(global_invocation_id) pixel: vec3<u32>,
     @builtin(local_invocation_index) invocation: u32) {
+    for (var channel = 0u; channel < 4u; channel++) { atomicStore(&sums[channel * PIXELS + invocation], 0u); }
+    workgroupBarrier();
     let first_list = (workgroup.y * params.tiles_x + workgroup.x) * params.slices;
-    var first = 0u;
-    if (first_list > 0u) { first = min(list_ends[first_list - 1u], params.entry_capacity); }
-    let end = min(list_ends[first_list + params.slices - 1u], params.entry_capacity);
-    // Centre of the upper pixel in the unit of entries.
-    let unit = 1.0 / f32(1u << params.entry_shift);
-    let center = (vec2<f32>(local.xy) + 0.5) * f32(SUBPIXELS) * unit;
-    let step = f32(HALF_TILE_PX) * f32(SUBPIXELS) * unit;
-    var upper = vec4(0.0);
-    var lower = vec4(0.0);
-    var upper_sums = vec4(0u);
-    var lower_sums = vec4(0u);
-    var slice = 0u;
-    for (var base = first; base < end; base += BATCH) {
-        workgroupBarrier();
-        if (base + invocation < end) { batch[invocation] = entries[base + invocation]; }
-        workgroupBarrier();
-        let length = min(BATCH, end - base);
-        for (var j = 0u; j < length; j++) {
-            let entry = batch[j];
-            if (entry.color >> 24u != slice) {
-                slice = entry.color >> 24u;
-                upper = blended(upper, upper_sums);
-                lower = blended(lower, lower_sums);
-                upper_sums = vec4(0u);
-                lower_sums = vec4(0u);
-            }
-            let radius = f32(entry.size & 0xffffu);
-            let rgb = vec3(entry.color & 255u, (entry.color >> 8u) & 255u, (entry.color >> 16u) & 255u);
-            let own = Round(1.0 / radius, radius / (unit * f32(SUBPIXELS)), f32(entry.size >> 16u), rgb);
-            let place = vec2(f32(i32(entry.place << 16u) >> 16u), f32(i32(entry.place) >> 16u));
-            let offset = (center - place) * own.inverse_radius;
-            upper_sums = min(upper_sums + contribution(own, offset), MOST_SUM);
-            let below = vec2(offset.x, offset.y + step * own.inverse_radius);
-            lower_sums = min(lower_sums + contribution(own, below), MOST_SUM);
+    var begin = 0u;
+    if (first_list > 0u) { begin = min(list_ends[first_list - 1u], params.entry_capacity); }
+    var color = vec4(0.0);
+    for (var slice = 0u; slice < params.slices; slice++) {
+        let end = min(list_ends[first_list + slice], params.entry_capacity);
+        if (end <= begin) { continue; }
+        var own = vec4(0u);
+        for (; begin < end; begin += BATCH) {
+            let at = begin + (invocation >> 1u);
+            if (at < end) { add(entries[at], i32(invocation & 1u)); }
+            workgroupBarrier();
+            let more = vec4(taken(0u, invocation), taken(1u, invocation), taken(2u, invocation), taken(3u, invocation));
+            own = min(own + more, vec4(MOST_SUM));
+            workgroupBarrier();
         }
+        begin = end;
+        color = blended(color, own);
     }
-    let pixel = workgroup.xy * SCREEN_TILE_PX + local.xy;
-    put(pixel, blended(upper, upper_sums));
-    put(pixel + vec2(0u, HALF_TILE_PX), blended(lower, lower_sums));
+    if (pixel.x < params.width && pixel.y < params.height) { picture[pixel.y * params.width + pixel.x] = color; }
 }

@@ -1,4 +1,4 @@
-//! CPU twin of `light.wgsl`.
+//! CPU twin of `deposit.wgsl`, `light.wgsl` and `shade.wgsl`.
 
 use crate::stages::layout::{DEPTH_ONE, Params, Splat, nearest};
 
