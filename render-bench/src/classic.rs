@@ -121,7 +121,7 @@ impl<'a> Classic<'a> {
             steps.clone(),
         )?;
         self.splats.record(&mut frame)?;
-        let stored = frame.room(Slot::Splats, 4)?;
+        let (seen, lit) = (frame.room(Slot::Seen, 4)?, frame.room(Slot::Lit, 4)?);
         let uniform = frame.params_buffer.clone();
         let encoder = frame.recorder.encoder();
         encoder.clear_buffer(&self.slice_counts, 0, None);
@@ -139,7 +139,8 @@ impl<'a> Classic<'a> {
                     binding,
                     resource: match binding {
                         0 => uniform.as_entire_binding(),
-                        1 => stored.as_entire_binding(),
+                        1 => seen.as_entire_binding(),
+                        7 => lit.as_entire_binding(),
                         3 => wgpu::BindingResource::TextureView(&light_view),
                         4 => self.slice_counts.as_entire_binding(),
                         5 => self.draws.as_entire_binding(),
@@ -157,9 +158,9 @@ impl<'a> Classic<'a> {
         let across = groups.min(65_535);
         let lists = [across, groups.div_ceil(across.max(1))];
         let sort: [(&wgpu::ComputePipeline, &[u32], [u32; 2]); 3] = [
-            (&self.pipelines.count, &[0, 1, 4], lists),
+            (&self.pipelines.count, &[0, 1, 4, 7], lists),
             (&self.pipelines.start, &[0, 4, 5], [1, 1]),
-            (&self.pipelines.order, &[0, 1, 4, 6], lists),
+            (&self.pipelines.order, &[0, 1, 4, 6, 7], lists),
         ];
         for (pipeline, bindings, [x, y]) in sort {
             let group = bind(&pipeline.get_bind_group_layout(0), bindings);
@@ -168,8 +169,14 @@ impl<'a> Classic<'a> {
             pass.set_bind_group(0, &group, &[]);
             pass.dispatch_workgroups(x, y, 1);
         }
-        let eye_group = bind(&self.pipelines.eye.get_bind_group_layout(0), &[0, 1, 2, 3]);
-        let light_group = bind(&self.pipelines.light.get_bind_group_layout(0), &[0, 1, 2]);
+        let eye_group = bind(
+            &self.pipelines.eye.get_bind_group_layout(0),
+            &[0, 1, 2, 3, 7],
+        );
+        let light_group = bind(
+            &self.pipelines.light.get_bind_group_layout(0),
+            &[0, 1, 2, 7],
+        );
         for slice in 0..params.slices {
             let sides = [
                 (&eye_view, &self.pipelines.eye, &eye_group),

@@ -1,5 +1,6 @@
 // Classic half-angle slicing by rasterising quads: what the compute renderer is held against. The prelude goes before.
-@group(0) @binding(1) var<storage, read> splats: array<vec4<u32>>;
+@group(0) @binding(1) var<storage, read> seen: array<vec4<u32>>;
+@group(0) @binding(7) var<storage, read> lit: array<vec4<u32>>;
 @group(0) @binding(2) var<storage, read> order: array<u32>;
 @group(0) @binding(3) var light: texture_2d<f32>;
 
@@ -20,15 +21,15 @@ fn clip(px: vec2<f32>, size: vec2<f32>) -> vec4<f32> {
 @vertex
 fn eye_corner(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance: u32) -> Corner {
     let at = order[instance];
-    let near = splats[at];
-    let lit = splats[params.splat_count + at];
+    let near = seen[at];
+    let far = lit[at];
     let radius = f32((near.z & 0xffffu) << params.entry_shift) / f32(SUBPIXELS);
     let center = vec2(f32(bitcast<i32>(near.x)), f32(bitcast<i32>(near.y))) / f32(SUBPIXELS);
     var shade = 1.0;
     if (params.light_on == 1u) {
-        let texel = vec2(bitcast<i32>(lit.x), bitcast<i32>(lit.y)) / params.light_unit;
+        let texel = vec2(bitcast<i32>(far.x), bitcast<i32>(far.y)) / params.light_unit;
         let depth = textureLoad(light, clamp(texel, vec2(0), vec2(i32(params.light_width), i32(params.light_height)) - 1), 0).x;
-        shade = params.ambient + params.direct * exp(-depth) * bitcast<f32>(lit.w);
+        shade = params.ambient + params.direct * exp(-depth) * bitcast<f32>(far.w);
     }
     let rgb = vec3(f32(near.w & 255u), f32((near.w >> 8u) & 255u), f32((near.w >> 16u) & 255u)) / 255.0;
     var corner: Corner;
@@ -52,9 +53,9 @@ fn eye_pixel(corner: Corner) -> @location(0) vec4<f32> {
 @vertex
 fn light_corner(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance: u32) -> Corner {
     let at = order[instance];
-    let near = splats[at];
-    let lit = splats[params.splat_count + at];
-    let center = vec2(f32(bitcast<i32>(lit.x)), f32(bitcast<i32>(lit.y))) / f32(params.light_unit);
+    let near = seen[at];
+    let far = lit[at];
+    let center = vec2(f32(bitcast<i32>(far.x)), f32(bitcast<i32>(far.y))) / f32(params.light_unit);
     var corner: Corner;
     corner.offset = corner_of(vertex);
     // As wide as a particle is in light texels; the same depth over the same area as the compute renderer gives.
@@ -77,7 +78,7 @@ fn light_pixel(corner: Corner) -> @location(0) vec4<f32> {
 @group(0) @binding(6) var<storage, read_write> order_out: array<u32>;
 
 fn slice_at(at: u32) -> u32 {
-    return u32(bitcast<f32>(splats[params.splat_count + at].z));
+    return u32(bitcast<f32>(lit[at].z));
 }
 
 const MOST_SLICES = 256u;
@@ -94,7 +95,7 @@ fn count_slices(@builtin(global_invocation_id) global: vec3<u32>, @builtin(num_w
     clear_own(invocation);
     let at = list_index(global, workgroups);
     if (at < params.splat_count) {
-        if (splats[at].z != 0u) { atomicAdd(&own[slice_at(at)], 1u); }
+        if (seen[at].z != 0u) { atomicAdd(&own[slice_at(at)], 1u); }
     }
     workgroupBarrier();
     for (var slice = invocation; slice < MOST_SLICES; slice += GROUP) {
@@ -124,7 +125,7 @@ fn order_slices(@builtin(global_invocation_id) global: vec3<u32>, @builtin(num_w
     clear_own(invocation);
     let at = list_index(global, workgroups);
     var is_drawn = false;
-    if (at < params.splat_count) { is_drawn = splats[at].z != 0u; }
+    if (at < params.splat_count) { is_drawn = seen[at].z != 0u; }
     if (is_drawn) { atomicAdd(&own[slice_at(at)], 1u); }
     workgroupBarrier();
     for (var slice = invocation; slice < MOST_SLICES; slice += GROUP) {

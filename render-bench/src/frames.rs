@@ -47,7 +47,7 @@ pub fn measure(
 ) -> Result<Measured> {
     let mut playback = Playback::new(gpu, stages, job, scene)?;
     let steps = Playback::upload(gpu, scene)?;
-    let ends = Stamps::new(gpu, Some("compose"));
+    let ends = Stamps::new(gpu, Some("eye"));
     let mut series = |count: usize, stamps: Option<&Stamps>| -> Result<f64> {
         let mut waiting = VecDeque::new();
         let start = Instant::now();

@@ -12,7 +12,7 @@ use contract::quantity::Quantity;
 use render_worker::{Frame, Interval, Scene};
 
 /// Share of the region that is sea in these scenes.
-const SEA_SHARE: f64 = 0.62;
+const SEA_SHARE: f64 = 0.605;
 const NORTH_DEG: f64 = 41.0;
 const WEST_DEG: f64 = 100.0;
 const WIDTH_DEG: f64 = 30.0;

@@ -132,6 +132,7 @@ impl Stages {
         if frame.plan.mode == Mode::Map {
             self.interpolate.record(frame)?;
             self.map.record(frame)?;
+            self.compose.record(frame)
         } else {
             self.splats.record(frame)?;
             if frame.params.light_on == 1 {
@@ -139,9 +140,8 @@ impl Stages {
             }
             self.bin.record(frame)?;
             self.place.record(frame)?;
-            self.eye.record(frame)?;
+            self.eye.record(frame)
         }
-        self.compose.record(frame)
     }
 
     /// Everything that draws one part with room for `capacity` list entries, recorded but not run.

@@ -1,8 +1,8 @@
 // Sums of a workgroup by key, in a small open hash table: neighbours share texels and lists, and one addition to
 // memory for all of them is cheaper than one for each. A key that finds no room after a few probes has no slot.
-const TABLE = 2048u;
-const TABLE_SHIFT = 21u; // 32 - log2(TABLE)
-const PROBES = 6u;
+const TABLE = 256u;
+const TABLE_SHIFT = 24u; // 32 - log2(TABLE)
+const PROBES = 12u;
 const NO_SLOT = 0xffffffffu;
 
 // Key plus one; 0 where the slot is free.

@@ -16,7 +16,7 @@ use contract::job::{Mode, RenderJob, View};
 use glam::Vec3;
 
 use crate::error::RenderError;
-use crate::passes::splat::{STORED_BYTES, workgroups};
+use crate::passes::splat::{HALF_BYTES, workgroups};
 use crate::scene::{Interval, Scene};
 use crate::stages::layout::{
     Active, Axis, Col, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, Params, Row, SCREEN_TILE_PX, SQUARE,
@@ -28,14 +28,11 @@ use look::Look;
 static NEXT_ID: AtomicU64 = AtomicU64::new(1);
 
 /// Most particles of one picture, those of cells without data included.
-const MOST_PARTICLES: u64 = 1 << 26;
+const MOST_PARTICLES: u64 = 1 << 27;
 /// Largest part of a picture drawn at once, pixels a side; a multiple of the screen tile.
 const PART_PX: u32 = 2048;
 /// Particles that one invocation makes, unless cells hold fewer: neighbours share sums, more of them share better.
 const PARTICLES_EACH: u32 = 4;
-/// Cells along both sides from which on an invocation visits several of them where a cell holds one particle: fewer
-/// would leave parts of a device idle.
-const MANY_CELLS: u64 = 1 << 18;
 
 /// Everything the stages need for one picture.
 #[derive(Debug, Clone)]
@@ -102,14 +99,10 @@ impl Plan {
 
     fn count_particles(&mut self, most_buffer_bytes: u64) -> Result<(), RenderError> {
         let params = &mut self.params;
-        let cells = u64::from(params.row_count) * u64::from(params.slot_count);
         params.particles_each = params.particles_per_cell.clamp(1, PARTICLES_EACH);
-        let is_wide = cells >= MANY_CELLS && params.particles_each * 4 <= PARTICLES_EACH;
-        params.cells_per_side = if is_wide { 2 } else { 1 };
-        let own = params.cells_per_side * params.cells_per_side * params.particles_each;
         let groups: u64 = workgroups(params).into_iter().map(u64::from).product();
-        let count = groups * u64::from(SQUARE * SQUARE * own);
-        let limit = MOST_PARTICLES.min(most_buffer_bytes / STORED_BYTES);
+        let count = groups * u64::from(SQUARE * SQUARE * params.particles_each);
+        let limit = MOST_PARTICLES.min(most_buffer_bytes / HALF_BYTES);
         if count > limit {
             return Err(RenderError::TooManyParticles { count, limit });
         }

@@ -51,8 +51,7 @@ shared_struct! {
         /// Least cosine of a cell's angle to the place below the camera, times the camera's distance (globe).
         pub cap_least: f32,
         pub particles_per_cell: u32,
-        /// Cells along a side that one invocation visits, and particles of each that it makes.
-        pub cells_per_side: u32,
+        /// Particles of its cell that one invocation makes.
         pub particles_each: u32,
         /// Places for splats, those of cells without data included.
         pub splat_count: u32,

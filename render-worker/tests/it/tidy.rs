@@ -57,16 +57,16 @@ fn both_frames_list_the_same_stages_in_the_same_order() {
         .replacen("binned(", "bin::cpu::(", 1);
     let cpu = order(&draw, &stages, |stage| format!("{stage}::cpu::"));
     assert_eq!(cpu, stages);
-    // On the device two passes stand for the stages that see one particle at a time.
+    // On the device two passes stand for the stages that see one particle at a time, and the eye composes.
     let passes = [
         "interpolate",
         "map",
+        "compose",
         "splats",
         "light",
         "bin",
         "place",
         "eye",
-        "compose",
     ];
     let gpu = order(&read("frame.rs"), &passes, |stage| {
         format!("self.{stage}.record(")

@@ -32,17 +32,19 @@ impl Place {
 
     /// Fills the slot of entries and moves each list's start to its end.
     pub fn record(&self, frame: &mut FrameContext<'_>) -> Result<(), RenderError> {
-        let splats = frame.room(Slot::Splats, 4)?;
+        let seen = frame.room(Slot::Seen, 4)?;
+        let lit = frame.room(Slot::Lit, 4)?;
         let light = frame.room(Slot::Light, 4)?;
         let counts = frame.room(Slot::Counts, 4)?;
         let entry_bytes = u64::from(frame.params.entry_capacity) * size_of::<Entry>() as u64;
         let entries = frame.room(Slot::Entries, entry_bytes)?;
         let buffers = [
             (0, &frame.params_buffer),
-            (1, &splats),
+            (1, &seen),
             (2, &light),
             (3, &counts),
             (4, &entries),
+            (5, &lit),
         ];
         let groups = workgroups(&frame.params);
         frame.recorder.dispatch_deep(&self.place, &buffers, groups);

@@ -1,6 +1,7 @@
 // Stored splats into the lists of (screen tile, slice), dimmed by what lies between them and the sun: the second half of
 // a counting sort. The order within a list is that of arrival; the eye sums inside a slice, so it cannot matter.
-@group(0) @binding(1) var<storage, read> splats: array<vec4<u32>>;
+@group(0) @binding(1) var<storage, read> seen: array<vec4<u32>>;
+@group(0) @binding(5) var<storage, read> lit: array<vec4<u32>>;
 @group(0) @binding(2) var<storage, read> light: array<u32>;
 @group(0) @binding(3) var<storage, read_write> counts: array<atomic<u32>>;
 @group(0) @binding(4) var<storage, read_write> entries: array<Entry>;
@@ -13,9 +14,9 @@ fn next_place(list: u32) -> u32 {
 }
 
 fn count_own(at: u32) {
-    let near = splats[at];
+    let near = seen[at];
     if (near.z == 0u) { return; }
-    let slice = u32(bitcast<f32>(splats[params.splat_count + at].z));
+    let slice = u32(bitcast<f32>(lit[at].z));
     let reach = reach_of(vec2(bitcast<i32>(near.x), bitcast<i32>(near.y)), near.z);
     for (var y = reach.low.y; y <= reach.high.y; y++) {
         for (var x = reach.low.x; x <= reach.high.x; x++) {
@@ -26,16 +27,16 @@ fn count_own(at: u32) {
 }
 
 fn place_own(at: u32) {
-    let near = splats[at];
+    let near = seen[at];
     if (near.z == 0u) { return; }
-    let lit = splats[params.splat_count + at];
-    let slice = bitcast<f32>(lit.z);
+    let far = lit[at];
+    let slice = bitcast<f32>(far.z);
     let place = vec2(bitcast<i32>(near.x), bitcast<i32>(near.y));
     let reach = reach_of(place, near.z);
     if (any(reach.low > reach.high)) { return; }
     var color = near.w;
     if (params.light_on == 1u) {
-        color = shaded(color, vec2(bitcast<i32>(lit.x), bitcast<i32>(lit.y)), slice, bitcast<f32>(lit.w));
+        color = shaded(color, vec2(bitcast<i32>(far.x), bitcast<i32>(far.y)), slice, bitcast<f32>(far.w));
     }
     color = (color & 0xffffffu) | (u32(slice) << 24u);
     for (var y = reach.low.y; y <= reach.high.y; y++) {
@@ -56,13 +57,12 @@ fn place(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) w
     clear_table(invocation);
     workgroupBarrier();
     let first = first_splat(workgroup, workgroups) + invocation;
-    let own = params.cells_per_side * params.cells_per_side * params.particles_each;
-    for (var j = 0u; j < own; j++) { count_own(first + j * SQUARE * SQUARE); }
+    for (var j = 0u; j < params.particles_each; j++) { count_own(first + j * SQUARE * SQUARE); }
     workgroupBarrier();
     for (var slot = invocation; slot < TABLE; slot += SQUARE * SQUARE) {
         let tag = atomicLoad(&tags[slot]);
         if (tag != 0u) { atomicStore(&sums[slot], atomicAdd(&counts[tag - 1u], atomicLoad(&sums[slot]))); }
     }
     workgroupBarrier();
-    for (var j = 0u; j < own; j++) { place_own(first + j * SQUARE * SQUARE); }
+    for (var j = 0u; j < params.particles_each; j++) { place_own(first + j * SQUARE * SQUARE); }
 }

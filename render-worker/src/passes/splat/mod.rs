@@ -26,8 +26,8 @@ pub const SOURCE: &str = concat!(
     include_str!("splat.wgsl"),
 );
 
-/// Bytes of a stored splat.
-pub const STORED_BYTES: u64 = 32;
+/// Bytes of each half of a stored splat: what the eye sees, and where it lies in the light.
+pub const HALF_BYTES: u64 = 16;
 
 /// The compiled stage.
 pub struct Splats {
@@ -36,10 +36,9 @@ pub struct Splats {
 
 /// Workgroups over the cells of a picture: across, down, and through the particles of a cell.
 pub fn workgroups(params: &Params) -> [u32; 3] {
-    let side = SQUARE * params.cells_per_side;
     [
-        params.slot_count.div_ceil(side),
-        params.row_count.div_ceil(side),
+        params.slot_count.div_ceil(SQUARE),
+        params.row_count.div_ceil(SQUARE),
         params.particles_per_cell.div_ceil(params.particles_each),
     ]
 }
@@ -47,28 +46,25 @@ pub fn workgroups(params: &Params) -> [u32; 3] {
 /// Where a particle's splat is stored: `down` rows below the first one drawn, in column `slot` of the table.
 pub fn stored_at(params: &Params, down: u32, slot: u32, particle: u32) -> usize {
     let [across, along, _] = workgroups(params);
-    let side = params.cells_per_side;
-    let (block_x, block_y) = (slot / (SQUARE * side), down / (SQUARE * side));
-    let group = ((particle / params.particles_each) * along + block_y) * across + block_x;
-    let (part_x, part_y) = (slot / SQUARE % side, down / SQUARE % side);
-    let own = (part_y * side + part_x) * params.particles_each + particle % params.particles_each;
+    let each = params.particles_each;
+    let group = ((particle / each) * along + down / SQUARE) * across + slot / SQUARE;
     let invocation = down % SQUARE * SQUARE + slot % SQUARE;
-    ((group * side * side * params.particles_each + own) * SQUARE * SQUARE + invocation) as usize
+    ((group * each + particle % each) * SQUARE * SQUARE + invocation) as usize
 }
 
 /// A splat as a device stores it: the words of both halves, as `splat.wgsl` writes them.
-pub fn unpacked(near: [u32; 4], lit: [u32; 4], entry_shift: u32) -> Splat {
+pub fn unpacked(seen: [u32; 4], lit: [u32; 4], entry_shift: u32) -> Splat {
     Splat {
-        x_sub: near[0] as i32,
-        y_sub: near[1] as i32,
-        radius_px: ((near[2] & 0xffff) << entry_shift) as f32 / SUBPIXELS as f32,
-        tau: (near[2] >> 16) as f32 / DEPTH_ONE,
+        x_sub: seen[0] as i32,
+        y_sub: seen[1] as i32,
+        radius_px: ((seen[2] & 0xffff) << entry_shift) as f32 / SUBPIXELS as f32,
+        tau: (seen[2] >> 16) as f32 / DEPTH_ONE,
         slice: f32::from_bits(lit[2]),
         light_u: lit[0] as i32,
         light_v: lit[1] as i32,
         light_depth: 0.0,
         day: f32::from_bits(lit[3]),
-        color: near[3],
+        color: seen[3],
     }
 }
 
@@ -86,10 +82,9 @@ impl Splats {
         let rows = frame.upload_of_plan(Slot::Rows, &plan.rows)?;
         let cols = frame.upload_of_plan(Slot::Cols, &plan.cols)?;
         let palette = frame.upload_of_plan(Slot::Palette, &plan.palette)?;
-        let splats = frame.room(
-            Slot::Splats,
-            u64::from(frame.params.splat_count) * STORED_BYTES,
-        )?;
+        let half_bytes = u64::from(frame.params.splat_count) * HALF_BYTES;
+        let seen = frame.room(Slot::Seen, half_bytes)?;
+        let lit = frame.room(Slot::Lit, half_bytes)?;
         let light_bytes = if frame.params.light_on == 1 {
             texel_count(&frame.params) as u64 * 4
         } else {
@@ -115,9 +110,10 @@ impl Splats {
             (5, after),
             (6, carbon_before),
             (7, carbon_after),
-            (8, &splats),
+            (8, &seen),
             (9, &light),
             (10, &counts),
+            (11, &lit),
         ];
         let groups = workgroups(&frame.params);
         frame.recorder.dispatch_deep(&self.splat, &buffers, groups);

@@ -1,6 +1,6 @@
 // From cells to stored splats in one pass: interpolate, generate, project; give depth to the light and count the lists.
-// One invocation makes a few particles of a few cells; a workgroup covers a square of cells, whose particles are near
-// one another in the picture and in the light.
+// One invocation makes a few particles of a cell; a workgroup covers a square of cells, whose particles are near one
+// another in the picture and in the light.
 @group(0) @binding(1) var<storage, read> rows: array<Row>;
 @group(0) @binding(2) var<storage, read> cols: array<Col>;
 @group(0) @binding(3) var<storage, read> palette: array<u32>;
@@ -8,8 +8,10 @@
 @group(0) @binding(5) var<storage, read> value_after: array<f32>;
 @group(0) @binding(6) var<storage, read> carbon_before: array<f32>;
 @group(0) @binding(7) var<storage, read> carbon_after: array<f32>;
-// Place on the screen, size and colour of every splat; then place in the light, slice and day of every splat.
-@group(0) @binding(8) var<storage, read_write> splats: array<vec4<u32>>;
+// Place on the screen, size and colour of every splat.
+@group(0) @binding(8) var<storage, read_write> seen: array<vec4<u32>>;
+// Place in the light, slice and day of every splat.
+@group(0) @binding(11) var<storage, read_write> lit: array<vec4<u32>>;
 @group(0) @binding(9) var<storage, read_write> light: array<atomic<u32>>;
 @group(0) @binding(10) var<storage, read_write> counts: array<atomic<u32>>;
 
@@ -52,11 +54,11 @@ fn carbon_of(cell: u32) -> f32 {
 
 fn store(at: u32, splat: Splat) {
     let size = size_word(splat);
-    splats[at] = vec4(bitcast<u32>(splat.x_sub), bitcast<u32>(splat.y_sub), size, splat.color);
+    seen[at] = vec4(bitcast<u32>(splat.x_sub), bitcast<u32>(splat.y_sub), size, splat.color);
     if (splat.tau <= 0.0) { return; }
     if (params.light_on == 1u) { deposit(splat); }
     if (size == 0u) { return; }
-    splats[params.splat_count + at] = vec4(bitcast<u32>(splat.light_u), bitcast<u32>(splat.light_v),
+    lit[at] = vec4(bitcast<u32>(splat.light_u), bitcast<u32>(splat.light_v),
         bitcast<u32>(splat.slice), bitcast<u32>(splat.day));
     let reach = reach_of(vec2(splat.x_sub, splat.y_sub), size);
     for (var y = reach.low.y; y <= reach.high.y; y++) {
@@ -69,30 +71,27 @@ fn splat(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) w
     @builtin(local_invocation_id) local: vec3<u32>, @builtin(local_invocation_index) invocation: u32) {
     clear_table(invocation);
     workgroupBarrier();
-    let side = params.cells_per_side;
-    var at = first_splat(workgroup, workgroups) + invocation;
-    for (var part = 0u; part < side * side; part++) {
-        let down = (workgroup.y * side + part / side) * SQUARE + local.y;
-        let slot = (workgroup.x * side + part % side) * SQUARE + local.x;
-        var value = MISSING;
-        var carbon = 0.0;
-        let row = params.first_row + down;
-        if (down < params.row_count && slot < params.slot_count) {
-            let cell = row * params.cols + cols[slot].index;
-            value = interpolated(value_before[cell], value_after[cell], params.value_weight);
-            if (!is_missing(value)) {
-                carbon = carbon_of(cell);
-                if (!is_in_cap(row, slot)) { value = MISSING; }
-            }
+    let down = workgroup.y * SQUARE + local.y;
+    let slot = workgroup.x * SQUARE + local.x;
+    let row = params.first_row + down;
+    var value = MISSING;
+    var carbon = 0.0;
+    if (down < params.row_count && slot < params.slot_count) {
+        let cell = row * params.cols + cols[slot].index;
+        value = interpolated(value_before[cell], value_after[cell], params.value_weight);
+        if (!is_missing(value)) {
+            carbon = carbon_of(cell);
+            if (!is_in_cap(row, slot)) { value = MISSING; }
         }
-        for (var j = 0u; j < params.particles_each; j++) {
-            let k = workgroup.z * params.particles_each + j;
-            if (is_missing(value) || k >= params.particles_per_cell) {
-                splats[at] = vec4(0u);
-            } else {
-                store(at, splat_of(particle_of(row, slot, k, value, carbon)));
-            }
-            at += SQUARE * SQUARE;
+    }
+    let first = first_splat(workgroup, workgroups) + invocation;
+    for (var j = 0u; j < params.particles_each; j++) {
+        let k = workgroup.z * params.particles_each + j;
+        let at = first + j * SQUARE * SQUARE;
+        if (is_missing(value) || k >= params.particles_per_cell) {
+            seen[at] = vec4(0u);
+        } else {
+            store(at, splat_of(particle_of(row, slot, k, value, carbon)));
         }
     }
     workgroupBarrier();

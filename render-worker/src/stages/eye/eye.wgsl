@@ -3,16 +3,21 @@
 // or away from the eye. Entries are spread over the invocations while they are added, pixels while they are blended.
 @group(0) @binding(1) var<storage, read> list_ends: array<u32>;
 @group(0) @binding(2) var<storage, read> entries: array<Entry>;
-@group(0) @binding(3) var<storage, read_write> picture: array<vec4<f32>>;
+@group(0) @binding(3) var<storage, read> domain: array<u32>;
+@group(0) @binding(4) var<storage, read_write> image: array<u32>;
 
-const PIXELS = 256u; // SCREEN_TILE_PX squared
-// Entries added between two looks at the sums, two invocations each: their sums, below 2^24 each, and what was clamped to
-// MOST_SUM before stay below 2^32.
-const BATCH = 128u;
+const PIXELS = 256u; // SCREEN_TILE_PX squared, and invocations
+// Entries of a slice whose sums, below 2^24 each, stay below 2^32.
+const SAFE = 256u;
 const MOST_SUM = 0x7fffffffu;
+// Slices whose lists are looked up at once.
+const LOOKED_UP = 64u;
 
+// Shared memory is what limits how many workgroups run at once: no more than this.
 // Red, green, blue and depth of every pixel.
 var<workgroup> sums: array<atomic<u32>, 1024>;
+// Where the list before these slices ends, and theirs.
+var<workgroup> ends: array<u32, 65>;
 
 // Share of a splat's depth at a squared distance of `q` squared radii from its centre.
 fn weight_at(q: f32, radius_px: f32) -> f32 {
@@ -32,22 +37,22 @@ fn ball_light(offset: vec2<f32>) -> f32 {
 // Adds an entry to every second row of pixels.
 fn add(entry: Entry, half: i32) {
     let pixel_units = f32(SUBPIXELS) / f32(1u << params.entry_shift);
-    let radius = f32(entry.size & 0xffffu);
+    let radius_px = f32(entry.size & 0xffffu) / pixel_units;
+    let place = vec2(f32(i32(entry.place << 16u) >> 16u), f32(i32(entry.place) >> 16u)) / pixel_units;
     let depth = f32(entry.size >> 16u);
     let rgb = vec3(entry.color & 255u, (entry.color >> 8u) & 255u, (entry.color >> 16u) & 255u);
-    let place = vec2(f32(i32(entry.place << 16u) >> 16u), f32(i32(entry.place) >> 16u));
     // Pixels with their centre within the radius.
-    let low = max(vec2<i32>(ceil((place - radius) / pixel_units - 0.5)), vec2(0));
-    let high = min(vec2<i32>(floor((place + radius) / pixel_units - 0.5)), vec2(i32(SCREEN_TILE_PX) - 1));
-    let inverse_radius = 1.0 / radius;
-    let radius_px = radius / pixel_units;
+    let low = max(vec2<i32>(ceil(place - radius_px - 0.5)), vec2(0));
+    let high = min(vec2<i32>(floor(place + radius_px - 0.5)), vec2(i32(SCREEN_TILE_PX) - 1));
+    let inverse_radius = 1.0 / radius_px;
     for (var y = low.y + ((low.y ^ half) & 1); y <= high.y; y += 2) {
+        let south = (f32(y) + 0.5 - place.y) * inverse_radius;
         for (var x = low.x; x <= high.x; x++) {
-            let offset = ((vec2(f32(x), f32(y)) + 0.5) * pixel_units - place) * inverse_radius;
-            let amount = u32(depth * weight_at(dot(offset, offset), radius_px) + 0.5);
+            let east = (f32(x) + 0.5 - place.x) * inverse_radius;
+            let amount = u32(depth * weight_at(east * east + south * south, radius_px) + 0.5);
             if (amount == 0u) { continue; }
             var own = rgb;
-            if (params.kernel == KERNEL_BALL) { own = vec3<u32>(vec3<f32>(rgb) * ball_light(offset) + 0.5); }
+            if (params.kernel == KERNEL_BALL) { own = vec3<u32>(vec3<f32>(rgb) * ball_light(vec2(east, south)) + 0.5); }
             let pixel = u32(y) * SCREEN_TILE_PX + u32(x);
             atomicAdd(&sums[pixel], own.x * amount);
             atomicAdd(&sums[PIXELS + pixel], own.y * amount);
@@ -57,11 +62,15 @@ fn add(entry: Entry, half: i32) {
     }
 }
 
-// What was added to a pixel since it was last looked at.
-fn taken(channel: u32, pixel: u32) -> u32 {
-    let sum = atomicLoad(&sums[channel * PIXELS + pixel]);
-    if (sum > 0u) { atomicStore(&sums[channel * PIXELS + pixel], 0u); }
+fn taken_one(at: u32) -> u32 {
+    let sum = atomicLoad(&sums[at]);
+    if (sum > 0u) { atomicStore(&sums[at], 0u); }
     return sum;
+}
+
+// What was added to a pixel since it was last looked at.
+fn taken(at: u32) -> vec4<u32> {
+    return vec4(taken_one(at), taken_one(PIXELS + at), taken_one(2u * PIXELS + at), taken_one(3u * PIXELS + at));
 }
 
 // Colour with alpha, premultiplied, once the slice with these sums is blended into it.
@@ -77,25 +86,36 @@ fn blended(picture: vec4<f32>, sums: vec4<u32>) -> vec4<f32> {
 fn eye(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(global_invocation_id) pixel: vec3<u32>,
     @builtin(local_invocation_index) invocation: u32) {
     for (var channel = 0u; channel < 4u; channel++) { atomicStore(&sums[channel * PIXELS + invocation], 0u); }
-    workgroupBarrier();
     let first_list = (workgroup.y * params.tiles_x + workgroup.x) * params.slices;
-    var begin = 0u;
-    if (first_list > 0u) { begin = min(list_ends[first_list - 1u], params.entry_capacity); }
     var color = vec4(0.0);
-    for (var slice = 0u; slice < params.slices; slice++) {
-        let end = min(list_ends[first_list + slice], params.entry_capacity);
-        if (end <= begin) { continue; }
-        var own = vec4(0u);
-        for (; begin < end; begin += BATCH) {
-            let at = begin + (invocation >> 1u);
-            if (at < end) { add(entries[at], i32(invocation & 1u)); }
-            workgroupBarrier();
-            let more = vec4(taken(0u, invocation), taken(1u, invocation), taken(2u, invocation), taken(3u, invocation));
-            own = min(own + more, vec4(MOST_SUM));
-            workgroupBarrier();
+    for (var first = 0u; first < params.slices; first += LOOKED_UP) {
+        let looked_up = min(params.slices - first, LOOKED_UP);
+        if (invocation <= looked_up) {
+            // Ends of lists, from the one before on.
+            let list = first_list + first + invocation;
+            ends[invocation] = 0u;
+            if (list > 0u) { ends[invocation] = min(list_ends[list - 1u], params.entry_capacity); }
         }
-        begin = end;
-        color = blended(color, own);
+        workgroupBarrier();
+        // Nothing to look for where nothing is listed.
+        let listed = select(looked_up, 0u, ends[0] == ends[looked_up]);
+        for (var slice = 0u; slice < listed; slice++) {
+            let begin = ends[slice];
+            let end = ends[slice + 1u];
+            if (end <= begin) { continue; }
+            var own = vec4(0u);
+            for (var base = begin; base < end; base += SAFE) {
+                // Two invocations an entry.
+                for (var at = base + (invocation >> 1u); at < min(base + SAFE, end); at += PIXELS / 2u) {
+                    add(entries[at], i32(invocation & 1u));
+                }
+                workgroupBarrier();
+                own += min(taken(invocation), vec4(MOST_SUM) - own);
+                workgroupBarrier();
+            }
+            color = blended(color, own);
+        }
+        workgroupBarrier();
     }
-    if (pixel.x < params.width && pixel.y < params.height) { picture[pixel.y * params.width + pixel.x] = color; }
+    if (pixel.x < params.width && pixel.y < params.height) { image[pixel.y * params.width + pixel.x] = composed(pixel.xy, color); }
 }

@@ -1,25 +1,50 @@
-// A sum along the slices turns the depth given to each slice into the depth above its plane, one invocation a texel.
+// A sum along the slices turns the depth given to each slice into the depth above its plane. A column of texels is cut
+// into segments, one invocation each, whose sums are added up in shared memory.
 @group(0) @binding(1) var<storage, read_write> light: array<u32>;
 
 const DARK = 0x7fffffffu;
+const COLUMNS = 32u; // of a workgroup
+const SEGMENTS = 8u;
+const STEP = 8u; // loads that do not wait for one another
 
-@compute @workgroup_size(GROUP)
-fn prefix(@builtin(global_invocation_id) global: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>) {
-    let column = list_index(global, workgroups);
+var<workgroup> segment_sums: array<u32, 256>;
+
+// Sum that stops at DARK; both terms are at most that.
+fn deeper(a: u32, b: u32) -> u32 {
+    return min(a + b, DARK);
+}
+
+@compute @workgroup_size(COLUMNS, SEGMENTS)
+fn prefix(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_id) local: vec3<u32>) {
     let layer = params.light_width * params.light_height;
-    if (column >= layer) { return; }
-    var above = 0u;
-    var at = column;
-    // Eight at a time: loads that do not wait for one another.
-    for (var base = 0u; base <= params.slices; base += 8u) {
+    let column = (workgroup.y * workgroups.x + workgroup.x) * COLUMNS + local.x;
+    // One layer more than slices: it receives the whole.
+    let length = (params.slices + SEGMENTS) / SEGMENTS;
+    let begin = min(local.y * length, params.slices + 1u);
+    let end = select(begin, min(begin + length, params.slices + 1u), column < layer);
+    var sum = 0u;
+    for (var base = begin; base < end; base += STEP) {
         var own: array<u32, 8>;
-        for (var j = 0u; j < 8u; j++) {
-            if (base + j <= params.slices) { own[j] = light[at + j * layer]; }
+        for (var j = 0u; j < STEP; j++) {
+            own[j] = 0u;
+            if (base + j < end) { own[j] = light[(base + j) * layer + column]; }
         }
-        for (var j = 0u; j < 8u; j++) {
-            if (base + j <= params.slices) { light[at + j * layer] = above; }
-            above = min(above + min(own[j], DARK), DARK);
+        for (var j = 0u; j < STEP; j++) { sum = deeper(sum, min(own[j], DARK)); }
+    }
+    segment_sums[local.y * COLUMNS + local.x] = sum;
+    workgroupBarrier();
+    var above = 0u;
+    for (var before = 0u; before < local.y; before++) { above = deeper(above, segment_sums[before * COLUMNS + local.x]); }
+    for (var base = begin; base < end; base += STEP) {
+        var own: array<u32, 8>;
+        for (var j = 0u; j < STEP; j++) {
+            own[j] = 0u;
+            if (base + j < end) { own[j] = light[(base + j) * layer + column]; }
         }
-        at += 8u * layer;
+        for (var j = 0u; j < STEP; j++) {
+            if (base + j < end) { light[(base + j) * layer + column] = above; }
+            above = deeper(above, min(own[j], DARK));
+        }
     }
 }

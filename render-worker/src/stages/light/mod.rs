@@ -8,7 +8,10 @@ pub mod cpu;
 use crate::error::RenderError;
 use crate::frame::FrameContext;
 use crate::gpu::{Gpu, Kernel, Slot};
-use crate::stages::layout::{GROUP, Params};
+use crate::stages::layout::Params;
+
+/// Columns of texels that one workgroup sums up.
+const COLUMNS: u32 = 32;
 
 /// The functions that give depth to the light; [`splat`](crate::passes::splat) runs them.
 pub const DEPOSIT_FUNCTIONS: &str =
@@ -44,7 +47,7 @@ impl Light {
         let buffers = [(0, &frame.params_buffer), (1, &light)];
         frame
             .recorder
-            .dispatch_list(&self.prefix, &buffers, columns, GROUP);
+            .dispatch_list(&self.prefix, &buffers, columns, COLUMNS);
         Ok(())
     }
 }
