@@ -19,6 +19,7 @@ pub mod frame_cpu;
 pub mod gpu;
 pub mod image;
 pub mod plan;
+pub mod proof;
 pub mod pyramid;
 mod recent;
 pub mod renderer;
