@@ -5,6 +5,7 @@
 
 pub mod difference;
 pub mod flip;
+pub mod ocean;
 pub mod quality;
 pub mod reference;
 

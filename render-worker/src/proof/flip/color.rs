@@ -76,7 +76,11 @@ impl Opponents {
     pub(super) fn lightness(&self) -> Plane {
         Plane {
             width: self.0[0].width,
-            values: self.0[0].values.iter().map(|y| (y + 16.0) / 116.0).collect(),
+            values: self.0[0]
+                .values
+                .iter()
+                .map(|y| (y + 16.0) / 116.0)
+                .collect(),
         }
     }
 

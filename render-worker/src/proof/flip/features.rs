@@ -34,7 +34,9 @@ impl Features {
         let smooth: Vec<f64> = smooth.into_iter().map(|weight| weight / sum).collect();
         // First and second derivative of the bell.
         let slope = balanced(weights(radius, |x| -x * bell(x)));
-        let bend = balanced(weights(radius, |x| (x * x / (sigma * sigma) - 1.0) * bell(x)));
+        let bend = balanced(weights(radius, |x| {
+            (x * x / (sigma * sigma) - 1.0) * bell(x)
+        }));
         let strength = |kernel: &[f64]| -> Vec<f64> {
             let across = lightness.weighed(kernel, &smooth).values;
             let down = lightness.weighed(&smooth, kernel).values;
@@ -51,6 +53,12 @@ impl Features {
 fn balanced(weights: Vec<f64>) -> Vec<f64> {
     let sum = |sign: f64| -> f64 { weights.iter().map(|weight| (weight * sign).max(0.0)).sum() };
     let (above, below) = (sum(1.0), sum(-1.0));
-    let scale = |weight: f64| if weight > 0.0 { weight / above } else { weight / below };
+    let scale = |weight: f64| {
+        if weight > 0.0 {
+            weight / above
+        } else {
+            weight / below
+        }
+    };
     weights.into_iter().map(scale).collect()
 }

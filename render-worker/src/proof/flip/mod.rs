@@ -11,7 +11,6 @@ use glam::DVec3;
 
 use color::Opponents;
 
-
 /// Pixels in a degree of the eye's view: 0.7 m before a screen of 3840 pixels on 0.7 m.
 pub const PIXELS_PER_DEGREE: f64 = 3840.0 / 0.7 * 0.7 * std::f64::consts::PI / 180.0;
 
@@ -117,13 +116,39 @@ mod tests {
     #[test]
     fn values_agree_with_the_program_of_the_authors() {
         let flat = |_, _| [90, 120, 200];
-        let dot = move |x, y| if (x, y) == (40, 30) { [255; 3] } else { flat(x, y) };
+        let dot = move |x, y| {
+            if (x, y) == (40, 30) {
+                [255; 3]
+            } else {
+                flat(x, y)
+            }
+        };
         let cases = [
-            (screen(pattern), screen(noisy), [0.30705556, 0.49581453, 0.43833898]),
-            (screen(flat), screen(dot), [0.00111858, 0.42225480, 0.42225480]),
-            (screen(|_, _| [0; 3]), screen(|_, _| [255; 3]), [0.96732521, 0.96738833, 0.96738833]),
-            (screen(edge(48)), screen(edge(49)), [0.02391273, 0.33468086, 0.02894138]),
-            (screen(edge(48)), screen(edge(52)), [0.06335804, 0.71011233, 0.03942814]),
+            (
+                screen(pattern),
+                screen(noisy),
+                [0.30705556, 0.49581453, 0.43833898],
+            ),
+            (
+                screen(flat),
+                screen(dot),
+                [0.00111858, 0.42225480, 0.42225480],
+            ),
+            (
+                screen(|_, _| [0; 3]),
+                screen(|_, _| [255; 3]),
+                [0.96732521, 0.96738833, 0.96738833],
+            ),
+            (
+                screen(edge(48)),
+                screen(edge(49)),
+                [0.02391273, 0.33468086, 0.02894138],
+            ),
+            (
+                screen(edge(48)),
+                screen(edge(52)),
+                [0.06335804, 0.71011233, 0.03942814],
+            ),
         ];
         for (i, (a, b, expected)) in cases.into_iter().enumerate() {
             let (mean, most, one) = measured(&a, &b);

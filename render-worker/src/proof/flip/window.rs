@@ -22,7 +22,11 @@ impl Plane {
         };
         Self {
             width: self.width,
-            values: self.values.chunks_exact(self.width).flat_map(row_of).collect(),
+            values: self
+                .values
+                .chunks_exact(self.width)
+                .flat_map(row_of)
+                .collect(),
         }
     }
 
@@ -43,7 +47,10 @@ impl Plane {
 fn window(at: usize, last: usize, weights: &[f64], value: impl Fn(usize) -> f64) -> f64 {
     let radius = weights.len() / 2;
     let places = (0..weights.len()).map(|i| (at + i).saturating_sub(radius).min(last));
-    places.zip(weights).map(|(at, weight)| value(at) * weight).sum()
+    places
+        .zip(weights)
+        .map(|(at, weight)| value(at) * weight)
+        .sum()
 }
 
 /// A number for every whole distance up to `radius` either side.

@@ -105,7 +105,11 @@ fn cloud(
     // Places of one cell are spread evenly by two irrational steps and then shaken.
     let place = |step: u32, bits: u32| {
         let shaken = (bits >> params.shake_shift).wrapping_sub(0x8000_0000 >> params.shake_shift);
-        share(0x8000_0000u32.wrapping_add(k.wrapping_mul(step)).wrapping_add(shaken))
+        share(
+            0x8000_0000u32
+                .wrapping_add(k.wrapping_mul(step))
+                .wrapping_add(shaken),
+        )
     };
     let east = place(3_242_174_889, bits);
     let south = place(2_447_445_414, scrambled(bits));
@@ -148,4 +152,42 @@ fn cloud(
         color: DVec3::from_array(transfer.color(value)),
         is_seen: !space.is_hidden(center),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_depth_of_a_piece_is_the_integral_of_the_density() {
+        let cloud = Cloud {
+            center: DVec3::ZERO,
+            radius: 2.5,
+            depth: 0.7,
+            color: DVec3::ONE,
+            is_seen: true,
+        };
+        let density = |along: f64, miss_sq: f64| {
+            let q = (along * along + miss_sq) / (cloud.radius * cloud.radius);
+            8.0 * cloud.depth / (3.0 * PI * cloud.radius) * (1.0 - q).max(0.0).powf(1.5)
+        };
+        for (from, to, miss) in [
+            (-9.0, 9.0, 0.0),
+            (-1.0, 0.5, 1.2),
+            (0.3, 8.0, 2.4),
+            (1.0, 2.0, 2.6),
+        ] {
+            let miss_sq = miss * miss;
+            let steps = 200_000;
+            let step = (to - from) / f64::from(steps);
+            let summed: f64 = (0..steps)
+                .map(|i| density(from + (f64::from(i) + 0.5) * step, miss_sq) * step)
+                .sum();
+            let exact = cloud.depth_between(from, to, miss_sq);
+            assert!((exact - summed).abs() < 1e-8, "{exact} against {summed}");
+        }
+        // Right through, the closed form of the projection.
+        let seen = 0.7 * (1.0 - 1.2 * 1.2 / 6.25f64).powi(2);
+        assert!((cloud.depth_between(-9.0, 9.0, 1.44) - seen).abs() < 1e-12);
+    }
 }

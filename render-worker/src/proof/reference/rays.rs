@@ -100,8 +100,12 @@ impl<'a> Rays<'a> {
         let threads = thread::available_parallelism().map_or(1, usize::from);
         let rows_each = (height as usize).div_ceil(threads).max(1);
         // Neighbouring rows cost alike, so every thread takes each so many rows.
-        let mut rows: Vec<_> = (0..height).zip(picture.chunks_exact_mut(width as usize)).collect();
-        let mut shares: Vec<Vec<_>> = (0..threads).map(|_| Vec::with_capacity(rows_each)).collect();
+        let mut rows: Vec<_> = (0..height)
+            .zip(picture.chunks_exact_mut(width as usize))
+            .collect();
+        let mut shares: Vec<Vec<_>> = (0..threads)
+            .map(|_| Vec::with_capacity(rows_each))
+            .collect();
         for (i, row) in rows.drain(..).enumerate() {
             shares[i % threads].push(row);
         }
@@ -179,5 +183,76 @@ impl<'a> Rays<'a> {
             through *= passing;
         }
         [color.x, color.y, color.z, 1.0 - through]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use contract::job::{RenderJob, View};
+
+    use super::*;
+
+    /// Two thousand kilometres above 0 N 0 E, the sun straight above as well.
+    fn space() -> Space {
+        let mut job: RenderJob = crate::proof::ocean::job(View::Globe {
+            lon_deg: 0.0,
+            lat_deg: 0.0,
+            height_m: 2.0e6,
+            width_px: 9,
+            height_px: 9,
+        });
+        job.style.sun.elevation_deg = 90.0;
+        Space::of(&job)
+    }
+
+    fn cloud(space: &Space, height_m: f64, depth: f64, color: DVec3) -> Cloud {
+        Cloud {
+            center: space.place(0.0, 0.0, 0.0, height_m),
+            radius: 0.01,
+            depth,
+            color,
+            is_seen: true,
+        }
+    }
+
+    fn middle(space: &Space, clouds: &[Cloud], steps_per_radius: u32) -> [f64; 4] {
+        let sky = Sky::new(clouds, space);
+        let shade = Shade {
+            ambient: 0.5,
+            direct: 0.25,
+        };
+        Rays::new(&sky, shade, [9, 9], Fineness { steps_per_radius }).pixel(4, 4)
+    }
+
+    #[test]
+    fn one_cloud_lit_from_the_eye_has_the_colour_of_its_closed_form() {
+        let space = space();
+        let depth = 1.3;
+        let white = cloud(&space, 0.0, depth, DVec3::ONE);
+        let [r, g, b, alpha] = middle(&space, &[white], 64);
+        assert!((alpha - (1.0 - f64::exp(-depth))).abs() < 1e-9);
+        // Sum of exp(-t) (0.5 + 0.25 exp(-0.6 t)) over depths t from 0 to 1.3.
+        let expected = 0.5 * (1.0 - f64::exp(-depth)) + 0.25 * (1.0 - f64::exp(-1.6 * depth)) / 1.6;
+        for channel in [r, g, b] {
+            assert!(
+                (channel - expected).abs() < 1e-5,
+                "{channel} against {expected}"
+            );
+        }
+    }
+
+    #[test]
+    fn what_is_nearer_hides_and_shadows_what_is_farther() {
+        let space = space();
+        let (red, blue) = (DVec3::X, DVec3::Z);
+        let high = cloud(&space, 300_000.0, 2.0, red);
+        let low = cloud(&space, 0.0, 2.0, blue);
+        let [r, _, b, alpha] = middle(&space, &[low, high], 32);
+        assert!((alpha - (1.0 - f64::exp(-4.0))).abs() < 1e-9);
+        let own =
+            |over: f64| 0.5 * (1.0 - f64::exp(-2.0)) + over * 0.25 * (1.0 - f64::exp(-3.2)) / 1.6;
+        assert!((r - own(1.0)).abs() < 1e-4, "{r}");
+        let behind = f64::exp(-2.0) * own(f64::exp(-1.2));
+        assert!((b - behind).abs() < 1e-4, "{b} against {behind}");
     }
 }

@@ -95,11 +95,7 @@ impl Space {
                 // A pixel up the beam of light goes this far across the ground; south is down the screen, and height
                 // moves what is seen north.
                 let across = elevation.tan().recip();
-                let beam = DVec3::new(
-                    azimuth.sin() * across,
-                    -azimuth.cos() * across - SLOPE,
-                    1.0,
-                );
+                let beam = DVec3::new(azimuth.sin() * across, -azimuth.cos() * across - SLOPE, 1.0);
                 Self {
                     eye: Eye::Map {
                         world_px: size_px * f64::from(1u32 << tile.z),
