@@ -91,7 +91,7 @@ fn a_little_later_the_volume_looks_a_little_different() {
         let changes = halving(&format!("time, {name}"), 0.02, |share| {
             renderer.render(&job, &later(&scene, share)).unwrap()
         });
-        assert_eq!(roughness(&changes, 24.0), None, "{}", name);
+        assert_eq!(roughness(&changes, 24.0), None, "{name}");
     }
 }
 
@@ -106,11 +106,11 @@ fn from_a_little_farther_the_volume_looks_a_little_different() {
     let east = halving("view, east", 0.3, |lon| {
         renderer.render(&seen(lon, 0.0), &scene).unwrap()
     });
-    assert_eq!(roughness(&east, 40.0), None, "{}", "east");
+    assert_eq!(roughness(&east, 40.0), None, "east");
     let up = halving("view, up", 6.0e4, |height| {
         renderer.render(&seen(0.0, height), &scene).unwrap()
     });
-    assert_eq!(roughness(&up, 40.0), None, "{}", "up");
+    assert_eq!(roughness(&up, 40.0), None, "up");
 }
 
 #[test]
