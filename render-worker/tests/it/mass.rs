@@ -33,7 +33,8 @@ fn drawn(view: contract::job::View, scene: &Scene) -> Drawn {
     let plan = Plan::new(&job(Mode::Volume, view), scene, u64::MAX).unwrap();
     let params = plan.params_of(plan.parts()[0]);
     let (value, carbon) = (at(&scene.value), at(scene.accumulated.as_ref().unwrap()));
-    let mut particles = vec![Particle::default(); params.particle_count as usize];
+    let count = plan.active.len() * params.particles_per_cell as usize;
+    let mut particles = vec![Particle::default(); count];
     let inputs = particles::cpu::Inputs {
         active: &plan.active,
         rows: &plan.rows,
