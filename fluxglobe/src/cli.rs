@@ -1,6 +1,7 @@
 //! The command line: words in, one plain `Command` out. Every value is parsed here, once, into its final type.
 
 mod observations;
+mod pictures;
 mod services;
 mod show;
 mod upkeep;
@@ -15,6 +16,7 @@ use contract::product::ProductId;
 use contract::time::TimeMs;
 
 pub(crate) use observations::{MatchTime, Matchup, Observations, ObservationsAsked};
+pub(crate) use pictures::{BenchCompare, BenchQuality, RenderAnimation};
 pub(crate) use services::{
     Bench, BenchStream, Executor, Ingestd, Notice, Rejected, RenderWorker, Scheduler, TileServer,
     Topics,
@@ -290,6 +292,8 @@ pub(crate) enum Render {
     Tile(RenderTile),
     /// A view of the globe.
     Globe(RenderGlobe),
+    /// Views of the globe at instants that follow each other: a film, or a folder of pictures.
+    Animation(RenderAnimation),
 }
 
 /// What every picture needs.

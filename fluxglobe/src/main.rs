@@ -1,5 +1,6 @@
 //! `fluxglobe`: the one program; reads the command line, runs the command, says what failed.
 
+mod animation;
 mod bench;
 mod cli;
 mod command;

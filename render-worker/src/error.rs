@@ -70,6 +70,9 @@ pub enum RenderError {
         height: u32,
         source: image::ImageError,
     },
+    /// Only volumes without a globe behind them are drawn another way.
+    #[error("the reference draws volumes without a globe behind them only")]
+    NoReference,
     /// The thread that drew was lost.
     #[error("the drawing thread ended early")]
     Thread(#[source] tokio::task::JoinError),
@@ -94,7 +97,8 @@ impl RenderError {
             | Self::TooLarge { .. }
             | Self::GridMismatch { .. }
             | Self::NoSteps { .. }
-            | Self::Encode { .. } => false,
+            | Self::Encode { .. }
+            | Self::NoReference => false,
         }
     }
 
@@ -136,7 +140,8 @@ impl RenderError {
             | Self::TooLarge { .. }
             | Self::GridMismatch { .. }
             | Self::NoSteps { .. }
-            | Self::Encode { .. } => true,
+            | Self::Encode { .. }
+            | Self::NoReference => true,
             Self::Store { source, .. } => {
                 source.is_not_found() || matches!(**source, storage::StorageError::Damaged { .. })
             }

@@ -1,3 +1,5 @@
 //! `fluxglobe bench`: figures measured, never asserted.
 
+pub(crate) mod compare;
+pub(crate) mod quality;
 pub(crate) mod stream;

@@ -9,6 +9,8 @@ use contract::digest::Digest;
 use contract::product::ProductId;
 use contract::topic::Origin;
 
+use super::{BenchCompare, BenchQuality};
+
 /// What every service is told besides its own settings.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct Common {
@@ -149,6 +151,10 @@ pub(crate) enum Rejected {
 pub(crate) enum Bench {
     /// How fresh a running cluster is: from a notice to a volume tile, and the share of each stage.
     Stream(BenchStream),
+    /// How far volumes are from a reference in double precision, against the number of slices.
+    Quality(BenchQuality),
+    /// How far two pictures are apart: decibels, levels, bytes, FLIP.
+    Compare(BenchCompare),
 }
 
 /// `fluxglobe bench stream`.

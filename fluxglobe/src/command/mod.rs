@@ -10,7 +10,7 @@ mod observations;
 mod products;
 mod recompute;
 mod rejected;
-mod render;
+pub(crate) mod render;
 pub(crate) mod serve;
 mod stats;
 mod survey;
@@ -54,6 +54,8 @@ pub(crate) async fn run(settings: &Settings, command: Command) -> Result<ExitCod
             let log = deployment::needed_log(settings, &options.kafka).await?;
             bench::stream::run(log.as_ref(), &options).await?;
         }
+        Command::Bench(Bench::Quality(options)) => bench::quality::run(settings, options).await?,
+        Command::Bench(Bench::Compare(options)) => bench::compare::run(&options)?,
         Command::Generate(options) => generate::run(options)?,
         Command::DecodeFile { .. } => unreachable!("main runs the decoder before anything else"),
     }

@@ -7,8 +7,8 @@ use contract::manifest::Manifest;
 use contract::tile::Tile;
 use storage::Store;
 
-use crate::cli::{Picture, Render, Settings};
-use crate::{deployment, progress};
+use crate::cli::{Picture, Render, RenderGlobe, Settings};
+use crate::{animation, deployment, progress};
 
 pub(crate) async fn run(settings: &Settings, options: Render) -> Result<()> {
     let store = deployment::store(settings)?;
@@ -25,15 +25,10 @@ pub(crate) async fn run(settings: &Settings, options: Render) -> Result<()> {
             )
         }
         Render::Globe(globe) => {
-            let view = View::Globe {
-                lon_deg: globe.lon,
-                lat_deg: globe.lat,
-                height_m: globe.height * 1000.0,
-                width_px: globe.size.0,
-                height_px: globe.size.1,
-            };
+            let view = view_of(&globe);
             (globe.picture, view, !globe.transparent)
         }
+        Render::Animation(animation) => return animation::run(settings, store, animation).await,
     };
     let mut job = job(&store, settings, &picture, view).await?;
     job.style.globe_surface = surface;
@@ -49,7 +44,19 @@ pub(crate) async fn run(settings: &Settings, options: Render) -> Result<()> {
     progress::result(&picture.output.display().to_string())
 }
 
-async fn job(
+/// The view that the options of a globe's picture ask for.
+pub(crate) fn view_of(globe: &RenderGlobe) -> View {
+    View::Globe {
+        lon_deg: globe.lon,
+        lat_deg: globe.lat,
+        height_m: globe.height * 1000.0,
+        width_px: globe.size.0,
+        height_px: globe.size.1,
+    }
+}
+
+/// The job that the options of a picture ask for, over the newest version of its product.
+pub(crate) async fn job(
     store: &Store,
     settings: &Settings,
     picture: &Picture,
@@ -72,7 +79,7 @@ async fn job(
 }
 
 /// Accumulated carbon of just this version of a product, if it was derived.
-async fn accumulated(
+pub(crate) async fn accumulated(
     store: &Store,
     manifest: &Manifest,
 ) -> Result<Option<contract::manifest::ManifestId>> {

@@ -16,6 +16,7 @@ mod golden;
 mod layout;
 mod limits;
 mod lost_device;
+mod mass;
 #[cfg(feature = "service")]
 mod process;
 mod reference;
@@ -24,6 +25,7 @@ mod seams;
 #[cfg(feature = "service")]
 mod server;
 mod service;
+mod smooth;
 mod stored;
 mod tidy;
 mod truths;

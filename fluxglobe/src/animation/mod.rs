@@ -1,0 +1,142 @@
+//! `fluxglobe render animation`: a product, a span of time and a camera in, a film or a folder of pictures out.
+//!
+//! Every picture is a job like any other, so it is the same bytes wherever it is drawn and however often.
+
+mod encoder;
+mod film;
+mod folder;
+mod shots;
+mod strip;
+
+use std::sync::Arc;
+
+use anyhow::{Context as _, Result, bail};
+use bytes::Bytes;
+use contract::job::RenderJob;
+use contract::manifest::Manifest;
+use contract::time::TimeMs;
+use futures::stream::{self, StreamExt as _, TryStreamExt as _};
+use prometheus::Registry;
+use render_worker::fleet::{Fleet, FleetSettings};
+use storage::Store;
+use tile_server::backend::Draw;
+
+use crate::cli::{RenderAnimation, Settings};
+use crate::command::render;
+use crate::ports::{Drawer, FleetDrawer};
+use crate::{deployment, progress};
+use film::Film;
+use shots::Shots;
+
+/// Longest wait for one picture of a busy fleet, milliseconds.
+const DEADLINE_MS: u32 = 120_000;
+/// A worker that takes longer than this has the next one asked too, milliseconds.
+const HEDGE_MS: u32 = 20_000;
+
+pub(crate) async fn run(settings: &Settings, store: Store, options: RenderAnimation) -> Result<()> {
+    if options.globe.picture.time.is_some() {
+        bail!("an animation has no one --time: give --from and --to");
+    }
+    let shots = Arc::new(shots(settings, &store, &options).await?);
+    let mut film = Film::open(&options, &shots).await?;
+    let missing = film.missing(&shots)?;
+    let drawer = drawer(settings, store, &options).await?;
+    let bar = progress::bar("draw", shots.count().into());
+    bar.inc(u64::from(shots.count()) - missing.len() as u64);
+    let drawn = stream::iter(missing)
+        .map(|number| {
+            let (drawer, shots) = (Arc::clone(&drawer), Arc::clone(&shots));
+            async move {
+                let job = shots.job(number)?;
+                let png = drawer.draw(&job).await;
+                let png = png.with_context(|| format!("picture {number}, {}", job.time))?;
+                anyhow::Ok((number, png))
+            }
+        })
+        // In order, whoever is done first.
+        .buffered(usize::from(options.at_once));
+    let drawn: Result<()> = drawn
+        .try_fold(&mut film, |film, (number, png): (u32, Bytes)| {
+            let bar = &bar;
+            async move {
+                film.add(number, png).await?;
+                bar.inc(1);
+                Ok(film)
+            }
+        })
+        .await
+        .map(|_film| ());
+    if let Err(error) = drawn {
+        film.abandon().await;
+        return Err(error);
+    }
+    let bytes = film.finish().await?;
+    let outcome = format!("{} pictures, {bytes} bytes", shots.count());
+    progress::done(&bar, &outcome);
+    progress::result(&options.globe.picture.output.display().to_string())
+}
+
+async fn shots(settings: &Settings, store: &Store, options: &RenderAnimation) -> Result<Shots> {
+    let globe = &options.globe;
+    let view = render::view_of(globe);
+    let mut first = render::job(store, settings, &globe.picture, view).await?;
+    first.style.globe_surface = !globe.transparent;
+    let manifest = storage::manifests::load(store, &first.product).await?;
+    let (from, to) = span(&manifest, options.from, options.to)?;
+    let shots = Shots {
+        first: RenderJob {
+            time: from,
+            ..first
+        },
+        to,
+        fps: options.fps,
+        count: Shots::count_of(options.seconds, options.fps)?,
+        turn_deg: options.turn,
+    };
+    shots.validate()?;
+    Ok(shots)
+}
+
+/// The span of an animation, which must lie within a product's in part.
+fn span(manifest: &Manifest, from: Option<TimeMs>, to: Option<TimeMs>) -> Result<(TimeMs, TimeMs)> {
+    let [Some(first), Some(last)] = [manifest.steps.first(), manifest.steps.last()] else {
+        bail!("{} has no step", manifest.product);
+    };
+    let covered = (first.period.start, last.period.end);
+    let (from, to) = (from.unwrap_or(covered.0), to.unwrap_or(covered.1));
+    if from >= to {
+        bail!("an animation goes forward in time: {from} is not before {to}");
+    }
+    if to <= covered.0 || from >= covered.1 {
+        bail!(
+            "{} covers {} to {}, nothing of {from} to {to}",
+            manifest.product,
+            covered.0,
+            covered.1
+        );
+    }
+    Ok((from, to))
+}
+
+/// What draws: render workers if any are given, else the renderer in this process.
+async fn drawer(
+    settings: &Settings,
+    store: Store,
+    options: &RenderAnimation,
+) -> Result<Arc<dyn Draw>> {
+    if options.render_workers.is_empty() {
+        let service = deployment::renderer(settings, store).await?;
+        return Ok(Arc::new(Drawer::new(service)));
+    }
+    let fleet = FleetSettings {
+        render_workers: options.render_workers.clone(),
+        render_deadline_ms: DEADLINE_MS,
+        render_hedge_ms: HEDGE_MS,
+        render_in_flight: options.at_once,
+    };
+    let fleet = Fleet::start(&fleet, store, &Registry::new())?;
+    Ok(Arc::new(FleetDrawer(fleet)))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,80 @@
+//! The pictures of an animation: which job is the one of each number.
+
+use anyhow::{Result, bail};
+use contract::job::{RenderJob, View};
+use contract::time::TimeMs;
+use serde::{Deserialize, Serialize};
+
+/// Most pictures: ten minutes at 60 a second.
+const MOST_SHOTS: u32 = 36_000;
+/// Most pixels of all pictures: those of ten minutes of 4K at 60 a second.
+const MOST_PIXELS: u64 = 36_000 * 3840 * 2160;
+
+/// An animation as numbered jobs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Shots {
+    /// The job of picture 0.
+    pub(super) first: RenderJob,
+    /// First instant after the animation.
+    pub(super) to: TimeMs,
+    pub(super) fps: u16,
+    pub(super) count: u32,
+    /// Degrees that the camera moves east in all.
+    pub(super) turn_deg: f64,
+}
+
+impl Shots {
+    /// Pictures of so many seconds.
+    pub(super) fn count_of(seconds: f64, fps: u16) -> Result<u32> {
+        let count = (seconds * f64::from(fps)).round();
+        if !(1.0..=f64::from(MOST_SHOTS)).contains(&count) {
+            bail!(
+                "{seconds} s at {fps} pictures a second are {count} pictures; an animation has 1 to {MOST_SHOTS}"
+            );
+        }
+        Ok(count as u32)
+    }
+
+    pub(super) fn count(&self) -> u32 {
+        self.count
+    }
+
+    /// Checks the size of the whole and the first and last job.
+    pub(super) fn validate(&self) -> Result<()> {
+        if !self.turn_deg.is_finite() || self.turn_deg.abs() > 36_000.0 {
+            bail!(
+                "the camera moves at most 36000 degrees, not {}",
+                self.turn_deg
+            );
+        }
+        self.first.validate()?;
+        let [width, height] = self.first.view.size_px().map(u64::from);
+        let pixels = width * height * u64::from(self.count);
+        if pixels > MOST_PIXELS {
+            bail!(
+                "{} pictures of {width} x {height} are {pixels} pixels, at most {MOST_PIXELS} are drawn; make them fewer or smaller",
+                self.count
+            );
+        }
+        self.job(self.count - 1)?;
+        Ok(())
+    }
+
+    /// The job of a picture. Instants are whole milliseconds, so that the same animation is always the same jobs.
+    pub(super) fn job(&self, number: u32) -> Result<RenderJob> {
+        let (from_ms, to_ms) = (i128::from(self.first.time.ms()), i128::from(self.to.ms()));
+        let ms = from_ms + (to_ms - from_ms) * i128::from(number) / i128::from(self.count);
+        let mut job = self.first.clone();
+        job.time = TimeMs::new(i64::try_from(ms)?)?;
+        if let View::Globe { lon_deg, .. } = &mut job.view {
+            let turned = *lon_deg + self.turn_deg * f64::from(number) / f64::from(self.count);
+            // A camera that does not move keeps its longitude to the bit.
+            if self.turn_deg != 0.0 {
+                *lon_deg = (turned + 180.0).rem_euclid(360.0) - 180.0;
+            }
+        }
+        job.validate()?;
+        Ok(job)
+    }
+}

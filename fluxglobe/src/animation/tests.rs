@@ -1,0 +1,205 @@
+//! Animations without a store: instants, folders that go on, strips that hold what was drawn, encoders that fail.
+
+use std::path::Path;
+
+use contract::colour::TransferFunction;
+use contract::job::{Mode, RENDERER_VERSION, RenderJob, Style, View};
+use contract::quantity::Quantity;
+use render_worker::Image;
+
+use super::encoder::{Container, Encoder};
+use super::folder::Folder;
+use super::shots::Shots;
+use super::strip::Strip;
+
+fn shots(count: u32) -> Shots {
+    let view = View::Globe {
+        lon_deg: 170.0,
+        lat_deg: 0.0,
+        height_m: 1e7,
+        width_px: 6,
+        height_px: 4,
+    };
+    Shots {
+        first: RenderJob {
+            renderer_version: RENDERER_VERSION,
+            product: "made-up@1-00000000".parse().unwrap(),
+            accumulated: None,
+            time: "2000-01-01".parse().unwrap(),
+            mode: Mode::Volume,
+            view,
+            style: Style::with_transfer(TransferFunction::default_for(Quantity::CarbonFlux)),
+        },
+        to: "2001-01-01".parse().unwrap(),
+        fps: 25,
+        count,
+        turn_deg: 40.0,
+    }
+}
+
+/// A picture of its own for every number.
+fn picture(number: u32) -> Image {
+    Image {
+        width: 6,
+        height: 4,
+        rgba8: (0..6 * 4 * 4)
+            .map(|i| (i * 7 + number * 31) as u8)
+            .collect(),
+    }
+}
+
+#[test]
+fn instants_divide_the_span_and_a_whole_turn_closes_to_a_ring() {
+    let shots = shots(366);
+    let job = |number| shots.job(number).unwrap();
+    assert_eq!(job(0).time.to_string(), "2000-01-01T00:00:00Z");
+    // 2000 has 366 days: a picture a day, and the last one is not the first of the next year.
+    assert_eq!(job(31).time.to_string(), "2000-02-01T00:00:00Z");
+    assert_eq!(job(365).time.to_string(), "2000-12-31T00:00:00Z");
+    let lon = |number: u32| match job(number).view {
+        View::Globe { lon_deg, .. } => lon_deg,
+        View::Tile { .. } => panic!("a globe view"),
+    };
+    assert!((lon(0) - 170.0).abs() < 1e-9);
+    // Past the date line: 170 + 40 * 183 / 366.
+    assert!((lon(183) - -170.0).abs() < 1e-9, "{}", lon(183));
+    assert_ne!(job(1).digest(), job(2).digest());
+}
+
+#[test]
+fn too_many_pictures_and_too_many_pixels_are_refused() {
+    assert_eq!(Shots::count_of(2.0, 25).unwrap(), 50);
+    for (seconds, fps) in [
+        (0.0, 25),
+        (f64::NAN, 25),
+        (-1.0, 25),
+        (1e9, 25),
+        (601.0, 60),
+    ] {
+        assert!(Shots::count_of(seconds, fps).is_err(), "{seconds} {fps}");
+    }
+    let mut many = shots(36_000);
+    many.validate().unwrap();
+    if let View::Globe {
+        width_px,
+        height_px,
+        ..
+    } = &mut many.first.view
+    {
+        (*width_px, *height_px) = (4096, 4096);
+    }
+    let refused = many.validate().unwrap_err().to_string();
+    assert!(refused.contains("fewer or smaller"), "{refused}");
+    let mut spinning = shots(2);
+    spinning.turn_deg = f64::INFINITY;
+    assert!(spinning.validate().is_err());
+}
+
+#[test]
+fn a_folder_goes_on_where_it_was_left_and_takes_no_other_animation() {
+    let place = tempfile::tempdir().unwrap();
+    let path = place.path().join("film");
+    let folder = Folder::open(&path, &shots(4)).unwrap();
+    assert_eq!(folder.missing().unwrap(), [0, 1, 2, 3]);
+    folder.add(0, b"first").unwrap();
+    folder.add(2, b"third").unwrap();
+    // What was being written when the power went is no picture.
+    std::fs::write(path.join(".picture-00001.png.part"), b"hal").unwrap();
+    let again = Folder::open(&path, &shots(4)).unwrap();
+    assert_eq!(again.missing().unwrap(), [1, 3]);
+    let refused = Folder::open(&path, &shots(5)).err().unwrap().to_string();
+    assert!(refused.contains("another animation"), "{refused}");
+}
+
+#[test]
+fn an_animated_png_holds_every_picture_to_the_byte() {
+    let place = tempfile::tempdir().unwrap();
+    let path = place.path().join("film.png");
+    let write = || {
+        let mut strip = Strip::open(&path, &shots(3)).unwrap();
+        for number in 0..3 {
+            strip.add(&picture(number).encode_png().unwrap()).unwrap();
+        }
+        strip.finish().unwrap();
+        std::fs::read(&path).unwrap()
+    };
+    let bytes = write();
+    assert_eq!(bytes, write(), "the same animation is the same bytes");
+    let mut reader = png::Decoder::new(std::io::Cursor::new(&bytes))
+        .read_info()
+        .unwrap();
+    let control = reader.info().animation_control.unwrap();
+    assert_eq!((control.num_frames, control.num_plays), (3, 0));
+    for number in 0..3 {
+        let mut pixels = vec![0; 6 * 4 * 4];
+        reader.next_frame(&mut pixels).unwrap();
+        assert_eq!(pixels, picture(number).rgba8, "picture {number}");
+        let frame = reader.info().frame_control.unwrap();
+        assert_eq!((frame.delay_num, frame.delay_den), (1, 25));
+    }
+    assert_eq!(std::fs::read_dir(place.path()).unwrap().count(), 1);
+}
+
+#[test]
+fn a_picture_of_another_size_does_not_get_into_a_strip() {
+    let place = tempfile::tempdir().unwrap();
+    let path = place.path().join("film.png");
+    let mut strip = Strip::open(&path, &shots(2)).unwrap();
+    let mut other = picture(0);
+    (other.width, other.height) = (4, 6);
+    assert!(strip.add(&other.encode_png().unwrap()).is_err());
+    assert!(strip.add(b"no picture").is_err());
+    strip.abandon();
+    assert_eq!(std::fs::read_dir(place.path()).unwrap().count(), 0);
+}
+
+#[tokio::test]
+async fn an_encoder_that_is_not_there_is_asked_for_by_name() {
+    let place = tempfile::tempdir().unwrap();
+    let output = place.path().join("film.mp4");
+    let missing = Path::new("no-such-encoder");
+    let error = Encoder::start(missing, Container::Mp4, &output, &shots(2)).await;
+    let text = error.err().unwrap().to_string();
+    assert!(
+        text.contains("install ffmpeg") && text.contains("FILE.png"),
+        "{text}"
+    );
+}
+
+#[tokio::test]
+async fn what_an_encoder_complains_of_is_said_and_no_file_is_left() {
+    let place = tempfile::tempdir().unwrap();
+    let program = place.path().join("encoder");
+    std::fs::write(
+        &program,
+        "#!/bin/sh\ncat > /dev/null\necho broken pipe organ >&2\nexit 3\n",
+    )
+    .unwrap();
+    make_executable(&program);
+    let output = place.path().join("film.webm");
+    let mut encoder = Encoder::start(&program, Container::Webm, &output, &shots(2))
+        .await
+        .unwrap();
+    encoder
+        .add(&picture(0).encode_png().unwrap())
+        .await
+        .unwrap();
+    let text = encoder.finish().await.unwrap_err().to_string();
+    assert!(
+        text.contains("broken pipe organ") && text.contains('3'),
+        "{text}"
+    );
+    assert!(!output.exists());
+}
+
+fn make_executable(path: &Path) {
+    use std::os::unix::fs::PermissionsExt as _;
+    std::fs::set_permissions(path, std::fs::Permissions::from_mode(0o755)).unwrap();
+}
+
+#[test]
+fn kinds_of_films_are_told_by_their_names() {
+    assert_eq!(Container::named("mp4"), Some(Container::Mp4));
+    assert_eq!(Container::named("webp"), Some(Container::Webp));
+    assert_eq!(Container::named("exe"), None);
+}

@@ -1,0 +1,105 @@
+//! Words for animations and for measures of pictures.
+
+use std::path::PathBuf;
+
+use clap::{Args, value_parser};
+use contract::product::ProductId;
+use contract::time::TimeMs;
+use render_worker::fleet::WorkerAddress;
+
+use super::RenderGlobe;
+
+/// `fluxglobe render animation`.
+#[derive(Debug, Args)]
+#[command(
+    mut_arg("time", |arg| arg.hide(true)),
+    mut_arg("output", |arg| arg
+        .value_name("FILE|FOLDER")
+        .help("File to write, its kind by its name: .mp4, .webm, .webp and .gif need ffmpeg, .png is an animated PNG; \
+               else a folder of PNG files, which goes on where it was left")),
+)]
+pub(crate) struct RenderAnimation {
+    #[command(flatten)]
+    pub(crate) globe: RenderGlobe,
+    /// First instant; the product's first if absent.
+    #[arg(long)]
+    pub(crate) from: Option<TimeMs>,
+    /// First instant after the animation, so that a year closes to a ring; the product's end if absent.
+    #[arg(long)]
+    pub(crate) to: Option<TimeMs>,
+    /// Pictures a second, 1 to 120.
+    #[arg(long, default_value_t = 25, value_parser = value_parser!(u16).range(1..=120))]
+    pub(crate) fps: u16,
+    /// Length, seconds; at most 36000 pictures in all.
+    #[arg(long, default_value_t = 12.0)]
+    pub(crate) seconds: f64,
+    /// Degrees that the camera moves east in all.
+    #[arg(
+        long,
+        default_value_t = 0.0,
+        allow_negative_numbers = true,
+        value_name = "DEGREES"
+    )]
+    pub(crate) turn: f64,
+    /// Render workers to draw on, HOST:PORT[,HOST:PORT...]; this process if none is given.
+    #[arg(
+        long,
+        env = "FLUXGLOBE_RENDER_WORKERS",
+        value_delimiter = ',',
+        value_name = "ADDRESSES"
+    )]
+    pub(crate) render_workers: Vec<WorkerAddress>,
+    /// Pictures under way at the same time, 1 to 64.
+    #[arg(long, default_value_t = 4, value_parser = value_parser!(u16).range(1..=64))]
+    pub(crate) at_once: u16,
+    /// The encoder of films; found by itself if absent.
+    #[arg(
+        long,
+        env = "FLUXGLOBE_FFMPEG",
+        default_value = "ffmpeg",
+        value_name = "PROGRAM"
+    )]
+    pub(crate) ffmpeg: PathBuf,
+}
+
+/// `fluxglobe bench quality`.
+#[derive(Debug, Args)]
+pub(crate) struct BenchQuality {
+    /// Product to measure besides the generated scenes, if it has landed; all its steps' middle is the instant.
+    #[arg(long, default_value = "takahashi09-flux")]
+    pub(crate) product: ProductId,
+    /// Numbers of slices, each 1 to 256.
+    #[arg(
+        long,
+        value_delimiter = ',',
+        default_value = "16,32,64,128,256",
+        value_parser = value_parser!(u32).range(1..=256)
+    )]
+    pub(crate) slices: Vec<u32>,
+    /// Width and height of the globe views, pixels, 16 to 512.
+    #[arg(long, default_value_t = 160, value_parser = value_parser!(u32).range(16..=512))]
+    pub(crate) size: u32,
+    /// Plot to write.
+    #[arg(long, value_name = "FILE.svg")]
+    pub(crate) plot: Option<PathBuf>,
+    /// JSON instead of a table.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// `fluxglobe bench compare`.
+#[derive(Debug, Args)]
+pub(crate) struct BenchCompare {
+    /// A picture.
+    #[arg(value_name = "A.png")]
+    pub(crate) a: PathBuf,
+    /// Another of the same size.
+    #[arg(value_name = "B.png")]
+    pub(crate) b: PathBuf,
+    /// Fail if fewer pixels than this lie within one level, percent.
+    #[arg(long, value_name = "PERCENT")]
+    pub(crate) least_within: Option<f64>,
+    /// JSON instead of lines.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
