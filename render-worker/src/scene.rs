@@ -108,7 +108,11 @@ impl Frame {
 
     /// Bytes held, coarser versions left out: they add a third at most.
     pub fn size_bytes(&self) -> u64 {
-        let cells = self.cells.content.len() + self.errors.as_ref().map_or(0, |errors| errors.content.len());
+        let cells = self.cells.content.len()
+            + self
+                .errors
+                .as_ref()
+                .map_or(0, |errors| errors.content.len());
         (cells * size_of::<f32>()) as u64
     }
 }

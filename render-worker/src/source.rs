@@ -222,7 +222,9 @@ fn fill(
     if !has_gaps || domain.len() != values.len() {
         return Ok(Frame::new(values));
     }
-    renderer.fill(Form::Window, grid, &values, domain).map(Frame::filled)
+    renderer
+        .fill(Form::Window, grid, &values, domain)
+        .map(Frame::filled)
 }
 
 fn failed(

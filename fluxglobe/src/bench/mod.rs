@@ -1,3 +1,4 @@
 //! `fluxglobe bench`: figures measured, never asserted.
 
+pub(crate) mod fill;
 pub(crate) mod stream;

@@ -75,10 +75,18 @@ fn structs_have_the_same_fields_in_rust_and_wgsl() {
     for (name, fields, size) in SHARED {
         assert_eq!(difference(eye::SOURCE, name, fields, size), None);
     }
-    let fills = [fill::STENCIL_SOURCE, window::SOURCE, exact::SOURCE, pairs::SOURCE];
+    let fills = [
+        fill::STENCIL_SOURCE,
+        window::SOURCE,
+        exact::SOURCE,
+        pairs::SOURCE,
+    ];
     for source in fills {
         let size = size_of::<FillLevel>();
-        assert_eq!(difference(source, "FillLevel", FillLevel::FIELDS, size), None);
+        assert_eq!(
+            difference(source, "FillLevel", FillLevel::FIELDS, size),
+            None
+        );
     }
 }
 
@@ -139,7 +147,10 @@ fn constants_have_the_same_value_in_rust_and_wgsl() {
     let width = constant(fill::STENCIL_SOURCE, "WIDTH");
     let segment = constant(fill::STENCIL_SOURCE, "SEGMENT");
     assert_eq!(segment, width + 2.0 * f64::from(MOST_REACH_COLS));
-    assert_eq!(constant(pairs::SOURCE, "MOST_COLS"), f64::from(pairs::MOST_COLS));
+    assert_eq!(
+        constant(pairs::SOURCE, "MOST_COLS"),
+        f64::from(pairs::MOST_COLS)
+    );
     assert_eq!(SCREEN_TILE_PX as i32 * SUBPIXELS, 1 << SCREEN_TILE_SHIFT);
 }
 

@@ -72,7 +72,9 @@ impl Case {
             let short = 0.3 * ((x + 2.0 * y) / 37.0).sin() + 0.1 * ((3.0 * x - y) / 11.0).cos();
             (long + short) as f32
         };
-        (0..self.rows).flat_map(|row| (0..self.cols).map(move |col| value(row, col))).collect()
+        (0..self.rows)
+            .flat_map(|row| (0..self.cols).map(move |col| value(row, col)))
+            .collect()
     }
 }
 
@@ -116,12 +118,15 @@ pub fn bench_fill(
         once = submitted(gpu, &prepared, pieces, 1)?;
     }
     once = submitted(gpu, &prepared, pieces, 1)?;
-    let repeats = (LEAST_SUBMISSION.as_secs_f64() / once.as_secs_f64()).clamp(1.0, f64::from(MOST_REPEATS)) as u32;
+    let repeats = (LEAST_SUBMISSION.as_secs_f64() / once.as_secs_f64())
+        .clamp(1.0, f64::from(MOST_REPEATS)) as u32;
     let scale = f64::from(all) / f64::from(pieces) / f64::from(repeats);
     timing.measured_share = f64::from(pieces) / f64::from(all);
     timing.seconds.clear();
     while timing.seconds.is_empty() || (timing.seconds.len() < runs && started.elapsed() < limit) {
-        timing.seconds.push(submitted(gpu, &prepared, pieces, repeats)?.as_secs_f64() * scale);
+        timing
+            .seconds
+            .push(submitted(gpu, &prepared, pieces, repeats)?.as_secs_f64() * scale);
     }
     timing.seconds.sort_by(f64::total_cmp);
     if pieces == all {
@@ -129,13 +134,21 @@ pub fn bench_fill(
         let answers = recorder.download(prepared.answers(), 2 * values.len())?;
         let filled = task.filled(&values, &answers);
         let score = Score::of(&truth, &filled.values, &filled.errors, &hidden);
-        timing.rmse_of_hidden = score.rmse().zip(score.spread()).map(|(rmse, spread)| rmse / spread);
+        timing.rmse_of_hidden = score
+            .rmse()
+            .zip(score.spread())
+            .map(|(rmse, spread)| rmse / spread);
         timing.from_all_pairs = Some(from_all_pairs(&grid, &values, &filled.values, &hidden));
     }
     Ok(timing)
 }
 
-fn submitted(gpu: &Gpu, prepared: &Prepared<'_>, pieces: u32, repeats: u32) -> Result<Duration, RenderError> {
+fn submitted(
+    gpu: &Gpu,
+    prepared: &Prepared<'_>,
+    pieces: u32,
+    repeats: u32,
+) -> Result<Duration, RenderError> {
     let mut recorder = gpu.recorder();
     for _ in 0..repeats {
         prepared.record(&mut recorder, pieces);
@@ -147,11 +160,23 @@ fn submitted(gpu: &Gpu, prepared: &Prepared<'_>, pieces: u32, repeats: u32) -> R
 }
 
 fn from_all_pairs(grid: &Grid, values: &[f32], filled: &[f32], hidden: &[usize]) -> f64 {
-    let some: Vec<usize> = hidden.iter().copied().step_by(hidden.len().div_ceil(CHECKED).max(1)).collect();
-    let held = values.iter().filter(|value| super::scaled::holds(**value)).map(|value| f64::from(*value));
-    let (low, high) = held.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
+    let some: Vec<usize> = hidden
+        .iter()
+        .copied()
+        .step_by(hidden.len().div_ceil(CHECKED).max(1))
+        .collect();
+    let held = values
+        .iter()
+        .filter(|value| super::scaled::holds(**value))
+        .map(|value| f64::from(*value));
+    let (low, high) = held.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+        (low.min(value), high.max(value))
+    });
     let answers = reference::answers_at(grid, values, &some);
-    let apart = some.iter().zip(answers).map(|(cell, answer)| (f64::from(filled[*cell]) - answer).abs());
+    let apart = some
+        .iter()
+        .zip(answers)
+        .map(|(cell, answer)| (f64::from(filled[*cell]) - answer).abs());
     apart.fold(0.0, f64::max) / (high - low)
 }
 
@@ -161,9 +186,20 @@ pub fn cases(largest: [u32; 2], share: f64) -> Vec<Case> {
     let case = |part: u32, side_cells: u32| Case {
         rows: rows.div_ceil(part).max(1),
         cols: cols.div_ceil(part).max(1),
-        missing: HoldOut { share, side_cells, seed: 1 },
+        missing: HoldOut {
+            share,
+            side_cells,
+            seed: 1,
+        },
     };
-    vec![case(16, 1), case(16, 32), case(4, 1), case(4, 32), case(1, 1), case(1, 32)]
+    vec![
+        case(16, 1),
+        case(16, 32),
+        case(4, 1),
+        case(4, 32),
+        case(1, 1),
+        case(1, 32),
+    ]
 }
 
 #[cfg(test)]
@@ -174,7 +210,14 @@ mod tests {
     fn cases_grow_up_to_the_largest() {
         let cases = cases([2460, 1800], 0.2);
         let cells = |case: &Case| u64::from(case.rows) * u64::from(case.cols);
-        assert!(cases.windows(2).all(|pair| cells(&pair[0]) <= cells(&pair[1])));
-        assert_eq!(cases.last().map(|case| (case.rows, case.cols)), Some((2460, 1800)));
+        assert!(
+            cases
+                .windows(2)
+                .all(|pair| cells(&pair[0]) <= cells(&pair[1]))
+        );
+        assert_eq!(
+            cases.last().map(|case| (case.rows, case.cols)),
+            Some((2460, 1800))
+        );
     }
 }

@@ -22,29 +22,50 @@ pub fn quotient(a: f32, b: f32) -> f32 {
 pub fn split(values: &[f32]) -> Vec<f32> {
     let held = |value: &f32| !crate::stages::layout::is_missing(*value);
     let plane = |of: &dyn Fn(f32) -> f32| -> Vec<f32> {
-        values.iter().map(|value| if held(value) { of(*value) } else { 0.0 }).collect()
+        values
+            .iter()
+            .map(|value| if held(value) { of(*value) } else { 0.0 })
+            .collect()
     };
-    [plane(&|_| 1.0), plane(&|value| value), plane(&|value| value * value)].concat()
+    [
+        plane(&|_| 1.0),
+        plane(&|value| value),
+        plane(&|value| value * value),
+    ]
+    .concat()
 }
 
 /// The weighted sums of the three planes of `source` around each wanted cell; zero in the others.
-pub fn stencil(level: &FillLevel, table: &Table, source: &[f32], wanted: Option<&[u32]>) -> Vec<f32> {
+pub fn stencil(
+    level: &FillLevel,
+    table: &Table,
+    source: &[f32],
+    wanted: Option<&[u32]>,
+) -> Vec<f32> {
     let cells = level.rows as usize * level.cols as usize;
-    let rims: Vec<Rimmed> = source.chunks_exact(cells).map(|plane| Rimmed::new(level, plane)).collect();
+    let rims: Vec<Rimmed> = source
+        .chunks_exact(cells)
+        .map(|plane| Rimmed::new(level, plane))
+        .collect();
     let mut sums = vec![0.0f32; 3 * cells];
     let threads = thread::available_parallelism().map_or(1, NonZeroUsize::get);
     let band_rows = (level.rows as usize).div_ceil(threads).max(1);
     let band = band_rows * level.cols as usize;
     let (counts, rest) = sums.split_at_mut(cells);
     let (values, squares) = rest.split_at_mut(cells);
-    let bands = counts.chunks_mut(band).zip(values.chunks_mut(band)).zip(squares.chunks_mut(band));
+    let bands = counts
+        .chunks_mut(band)
+        .zip(values.chunks_mut(band))
+        .zip(squares.chunks_mut(band));
     thread::scope(|scope| {
         for (number, ((counts, values), squares)) in bands.enumerate() {
             let rims = &rims;
             scope.spawn(move || {
                 let planes = [counts, values, squares];
                 for (rim, sums) in rims.iter().zip(planes) {
-                    for (row, sums) in (number * band_rows..).zip(sums.chunks_exact_mut(level.cols as usize)) {
+                    for (row, sums) in
+                        (number * band_rows..).zip(sums.chunks_exact_mut(level.cols as usize))
+                    {
                         let first = row * level.cols as usize;
                         let wanted = wanted.map(|wanted| &wanted[first..first + sums.len()]);
                         row_sums(level, table, rim, row, wanted, sums);
@@ -56,7 +77,14 @@ pub fn stencil(level: &FillLevel, table: &Table, source: &[f32], wanted: Option<
     sums
 }
 
-fn row_sums(level: &FillLevel, table: &Table, source: &Rimmed, row: usize, wanted: Option<&[u32]>, sums: &mut [f32]) {
+fn row_sums(
+    level: &FillLevel,
+    table: &Table,
+    source: &Rimmed,
+    row: usize,
+    wanted: Option<&[u32]>,
+    sums: &mut [f32],
+) {
     let width = 2 * table.reach_rows as usize + 1;
     for (start, end) in runs(wanted, sums.len()) {
         for step in 0..width {
@@ -72,14 +100,21 @@ fn row_sums(level: &FillLevel, table: &Table, source: &Rimmed, row: usize, wante
                 *sum += weights[0] * near;
             }
             for (dx, weight) in weights.iter().enumerate().skip(1) {
-                let (west, east) = (source.run(y, start, -(dx as isize)), source.run(y, start, dx as isize));
+                let (west, east) = (
+                    source.run(y, start, -(dx as isize)),
+                    source.run(y, start, dx as isize),
+                );
                 for ((sum, west), east) in sums.iter_mut().zip(west).zip(east) {
                     *sum += weight * (west + east);
                 }
             }
         }
         if let Some(wanted) = wanted {
-            for (sum, _) in sums[start..end].iter_mut().zip(&wanted[start..end]).filter(|(_, wanted)| **wanted == 0) {
+            for (sum, _) in sums[start..end]
+                .iter_mut()
+                .zip(&wanted[start..end])
+                .filter(|(_, wanted)| **wanted == 0)
+            {
                 *sum = 0.0;
             }
         }
@@ -92,7 +127,11 @@ fn runs(wanted: Option<&[u32]>, cols: usize) -> Vec<(usize, usize)> {
         return vec![(0, cols)];
     };
     let mut runs: Vec<(usize, usize)> = vec![];
-    for (col, _) in wanted.iter().enumerate().filter(|(_, wanted)| **wanted != 0) {
+    for (col, _) in wanted
+        .iter()
+        .enumerate()
+        .filter(|(_, wanted)| **wanted != 0)
+    {
         match runs.last_mut() {
             Some((_, end)) if col < *end + JOINED_COLS => *end = col + 1,
             _ => runs.push((col, col + 1)),
@@ -123,7 +162,11 @@ impl Rimmed {
                 content.resize(content.len() + rim, 0.0);
             }
         }
-        Self { content, cols: cols + 2 * rim, rim }
+        Self {
+            content,
+            cols: cols + 2 * rim,
+            rim,
+        }
     }
 
     /// The cells of a row from a column on, seen from `shift` columns further.
@@ -139,9 +182,18 @@ mod tests {
 
     #[test]
     fn quotients_are_right_to_the_last_bits() {
-        for (a, b) in [(1.0f32, 3.0f32), (2.5, 1e-6), (-7.0, 12345.0), (1e-3, 0.7), (0.0, 2.0)] {
+        for (a, b) in [
+            (1.0f32, 3.0f32),
+            (2.5, 1e-6),
+            (-7.0, 12345.0),
+            (1e-3, 0.7),
+            (0.0, 2.0),
+        ] {
             let exact = f64::from(a) / f64::from(b);
-            assert!((f64::from(quotient(a, b)) - exact).abs() <= 3e-7 * exact.abs(), "{a} / {b}");
+            assert!(
+                (f64::from(quotient(a, b)) - exact).abs() <= 3e-7 * exact.abs(),
+                "{a} / {b}"
+            );
         }
     }
 

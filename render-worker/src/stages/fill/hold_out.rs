@@ -23,7 +23,11 @@ impl HoldOut {
         let side = self.side_cells.max(1);
         let mut kept = values.to_vec();
         let mut hidden = vec![];
-        for (cell, value) in kept.iter_mut().enumerate().filter(|(_, value)| holds(**value)) {
+        for (cell, value) in kept
+            .iter_mut()
+            .enumerate()
+            .filter(|(_, value)| holds(**value))
+        {
             let (row, col) = (cell as u32 / cols, cell as u32 % cols);
             let block = hash(hash(hash(self.seed) ^ (row / side)) ^ (col / side));
             if block < threshold {
@@ -117,22 +121,41 @@ mod tests {
 
     #[test]
     fn a_share_of_the_data_is_hidden_the_same_every_time_and_never_land() {
-        let values: Vec<f32> = (0..10_000).map(|i| if i % 4 == 0 { f32::NAN } else { i as f32 }).collect();
-        let single = HoldOut { share: 0.2, side_cells: 1, seed: 1 };
+        let values: Vec<f32> = (0..10_000)
+            .map(|i| if i % 4 == 0 { f32::NAN } else { i as f32 })
+            .collect();
+        let single = HoldOut {
+            share: 0.2,
+            side_cells: 1,
+            seed: 1,
+        };
         let (kept, hidden) = single.hide(&values, 100);
         assert!((1300..1700).contains(&hidden.len()), "{}", hidden.len());
-        assert!(hidden.iter().all(|cell| cell % 4 != 0 && kept[*cell] == MISSING));
+        assert!(
+            hidden
+                .iter()
+                .all(|cell| cell % 4 != 0 && kept[*cell] == MISSING)
+        );
         assert_eq!(single.hide(&values, 100).1, hidden);
         assert_ne!(HoldOut { seed: 2, ..single }.hide(&values, 100).1, hidden);
         // Blocks are hidden whole.
-        let (_, blocks) = HoldOut { side_cells: 10, ..single }.hide(&[1.0; 10_000], 100);
+        let (_, blocks) = HoldOut {
+            side_cells: 10,
+            ..single
+        }
+        .hide(&[1.0; 10_000], 100);
         assert!(!blocks.is_empty() && blocks.len() % 100 == 0);
     }
 
     #[test]
     fn a_score_tells_bias_from_scatter() {
         let truth = [1.0, 2.0, 3.0, 4.0];
-        let score = Score::of(&truth, &[1.5, 2.5, 3.5, MISSING], &[0.2, 0.5, 0.5, MISSING], &[0, 1, 2, 3]);
+        let score = Score::of(
+            &truth,
+            &[1.5, 2.5, 3.5, MISSING],
+            &[0.2, 0.5, 0.5, MISSING],
+            &[0, 1, 2, 3],
+        );
         assert_eq!(score.cells, 3, "what could not be filled is not counted");
         assert!((score.rmse().unwrap() - 0.5).abs() < 1e-12);
         assert!((score.bias().unwrap() - 0.5).abs() < 1e-12);

@@ -45,7 +45,9 @@ impl Ladder {
             };
             Rung { level, table }
         };
-        Self { rungs: levels.into_iter().enumerate().map(rung).collect() }
+        Self {
+            rungs: levels.into_iter().enumerate().map(rung).collect(),
+        }
     }
 
     /// Marks the levels of which only wanted cells are computed.

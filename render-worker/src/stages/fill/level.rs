@@ -66,7 +66,11 @@ pub enum Extent {
 impl Table {
     /// The table of `weight`, a function of the squared chord; none if it would reach too far.
     pub fn new(places: &Places<'_>, extent: Extent, weight: &dyn Fn(f64) -> f64) -> Option<Self> {
-        let all_cols = if places.periodic { places.cols / 2 } else { places.cols.saturating_sub(1) };
+        let all_cols = if places.periodic {
+            places.cols / 2
+        } else {
+            places.cols.saturating_sub(1)
+        };
         let (mut reach_rows, most_cols) = match extent {
             Extent::All => (places.rows.len() as u32 - 1, all_cols),
             Extent::Chord { radius, .. } => {
@@ -84,7 +88,11 @@ impl Table {
             Extent::Chord { radius, .. } => radius * radius,
         };
         let half_sine_sq: Vec<f64> = (0..=most_cols)
-            .map(|dx| places.sphere.half_sine_sq_cols(f64::from(dx) * places.stride))
+            .map(|dx| {
+                places
+                    .sphere
+                    .half_sine_sq_cols(f64::from(dx) * places.stride)
+            })
             .collect();
         let mut lines = vec![];
         for (row, &at) in places.rows.iter().enumerate() {
@@ -107,7 +115,14 @@ impl Table {
             }
         }
         let clipped = |line: &Vec<f64>| line.len() as u32 > most_cols && most_cols < all_cols;
-        if matches!(extent, Extent::Chord { may_clip: false, .. }) && lines.iter().any(clipped) {
+        if matches!(
+            extent,
+            Extent::Chord {
+                may_clip: false,
+                ..
+            }
+        ) && lines.iter().any(clipped)
+        {
             return None;
         }
         Some(Self::of_lines(places, reach_rows, lines))
@@ -117,19 +132,31 @@ impl Table {
         let spans: Vec<u32> = lines.iter().map(|line| line.len() as u32).collect();
         let reach_cols = spans.iter().max().map_or(0, |most| most.saturating_sub(1));
         let mut weights = vec![0.0; spans.len() * (reach_cols as usize + 1)];
-        for (line, place) in lines.iter().zip(weights.chunks_exact_mut(reach_cols as usize + 1)) {
+        for (line, place) in lines
+            .iter()
+            .zip(weights.chunks_exact_mut(reach_cols as usize + 1))
+        {
             for (dx, (weight, place)) in line.iter().zip(place).enumerate() {
                 // Half a turn away, east and west are the same cell.
                 let twice = places.periodic && dx > 0 && 2 * dx == places.cols as usize;
                 *place = if twice { 0.5 * weight } else { *weight } as f32;
             }
         }
-        Self { reach_rows, reach_cols, weights, spans }
+        Self {
+            reach_rows,
+            reach_cols,
+            weights,
+            spans,
+        }
     }
 }
 
 fn rows_within(places: &Places<'_>, radius: f64) -> u32 {
-    let spacing = places.rows.windows(2).map(|pair| pair[1] - pair[0]).fold(f64::INFINITY, f64::min);
+    let spacing = places
+        .rows
+        .windows(2)
+        .map(|pair| pair[1] - pair[0])
+        .fold(f64::INFINITY, f64::min);
     if !spacing.is_finite() {
         return 0;
     }

@@ -95,12 +95,20 @@ impl Task {
         if gaps.iter().all(|gap| *gap == 0) {
             return None;
         }
-        Some(Self { scaled: Scaled::of(values)?, gaps })
+        Some(Self {
+            scaled: Scaled::of(values)?,
+            gaps,
+        })
     }
 
     fn pairs(&self) -> u64 {
         let gaps = self.gaps.iter().filter(|gap| **gap != 0).count() as u64;
-        gaps * self.scaled.values.iter().filter(|value| holds(**value)).count() as u64
+        gaps * self
+            .scaled
+            .values
+            .iter()
+            .filter(|value| holds(**value))
+            .count() as u64
     }
 
     fn filled(&self, values: &[f32], answers: &[f32]) -> Filled {
@@ -134,13 +142,22 @@ fn ladder_of(form: Form, grid: &Grid) -> Result<Ladder, RenderError> {
 }
 
 fn check_pairs(pairs: u64, limit: u64) -> Result<(), RenderError> {
-    if pairs > limit { Err(RenderError::TooManyPairs { pairs, limit }) } else { Ok(()) }
+    if pairs > limit {
+        Err(RenderError::TooManyPairs { pairs, limit })
+    } else {
+        Ok(())
+    }
 }
 
 /// Fills one frame with the twins; the same bits as on a device.
 ///
 /// `values`, `domain`: `[row, col]`, one number a cell; values NaN or [`MISSING`] where there is no data.
-pub fn on_cpu(form: Form, grid: &Grid, values: &[f32], domain: &[u32]) -> Result<Filled, RenderError> {
+pub fn on_cpu(
+    form: Form,
+    grid: &Grid,
+    values: &[f32],
+    domain: &[u32],
+) -> Result<Filled, RenderError> {
     let Some(task) = Task::of(values, domain) else {
         return Ok(unfilled(values));
     };
@@ -222,27 +239,50 @@ impl Fill {
         Ok(task.filled(values, &answers))
     }
 
-    fn prepared(&self, gpu: &Gpu, form: Form, grid: &Grid, task: &Task) -> Result<Prepared<'_>, RenderError> {
+    fn prepared(
+        &self,
+        gpu: &Gpu,
+        form: Form,
+        grid: &Grid,
+        task: &Task,
+    ) -> Result<Prepared<'_>, RenderError> {
         let (values, gaps) = (&task.scaled.values, &task.gaps);
         match form {
             Form::Window => {
                 let ladder = self.window_tables(gpu, grid)?;
-                Ok(Prepared::Window(&self.window, Rooms::new(gpu, &ladder, values, gaps)?))
+                Ok(Prepared::Window(
+                    &self.window,
+                    Rooms::new(gpu, &ladder, values, gaps)?,
+                ))
             }
             Form::Exact => {
                 let ladder = DeviceLadder::new(gpu, grid, &ladder_of(form, grid)?)?;
                 let exact = self.exact.get_or_init(|| Exact::new(gpu, &self.sources));
-                Ok(Prepared::Exact(exact, Rooms::new(gpu, &ladder, values, gaps)?))
+                Ok(Prepared::Exact(
+                    exact,
+                    Rooms::new(gpu, &ladder, values, gaps)?,
+                ))
             }
             Form::Pairs | Form::NaivePairs => {
                 let is_naive = form == Form::NaivePairs;
                 check_pairs(task.pairs(), MOST_PAIRS)?;
                 if !is_naive && grid.cols > pairs::MOST_COLS {
-                    let (bytes, limit) = (4 * u64::from(grid.cols), 4 * u64::from(pairs::MOST_COLS));
-                    return Err(RenderError::TooLarge { what: "weights of a row", bytes, limit });
+                    let (bytes, limit) =
+                        (4 * u64::from(grid.cols), 4 * u64::from(pairs::MOST_COLS));
+                    return Err(RenderError::TooLarge {
+                        what: "weights of a row",
+                        bytes,
+                        limit,
+                    });
                 }
-                let pairs = self.pairs.get_or_init(|| Pairs::new(gpu, &self.sources.pairs));
-                Ok(Prepared::Pairs(pairs, PairRooms::new(gpu, grid, values, gaps)?, is_naive))
+                let pairs = self
+                    .pairs
+                    .get_or_init(|| Pairs::new(gpu, &self.sources.pairs));
+                Ok(Prepared::Pairs(
+                    pairs,
+                    PairRooms::new(gpu, grid, values, gaps)?,
+                    is_naive,
+                ))
             }
         }
     }

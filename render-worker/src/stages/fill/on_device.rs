@@ -66,7 +66,12 @@ pub struct LevelRoom {
 
 impl Rooms {
     /// Rooms for scaled values and their gaps.
-    pub fn new(gpu: &Gpu, ladder: &DeviceLadder, values: &[f32], gaps: &[u32]) -> Result<Self, RenderError> {
+    pub fn new(
+        gpu: &Gpu,
+        ladder: &DeviceLadder,
+        values: &[f32],
+        gaps: &[u32],
+    ) -> Result<Self, RenderError> {
         let room = |(index, rung): (usize, &DeviceRung)| -> Result<LevelRoom, RenderError> {
             let cells = u64::from(rung.level.rows) * u64::from(rung.level.cols);
             // Levels that are summed over whole have no marks and no answers of their own.
@@ -89,7 +94,12 @@ impl Rooms {
         };
         Ok(Self {
             values: gpu.storage("fill values", values)?,
-            levels: ladder.rungs.iter().enumerate().map(room).collect::<Result<_, _>>()?,
+            levels: ladder
+                .rungs
+                .iter()
+                .enumerate()
+                .map(room)
+                .collect::<Result<_, _>>()?,
         })
     }
 }
@@ -110,6 +120,10 @@ impl LevelRoom {
             (4, &self.wanted),
             (5, &self.sums),
         ];
-        recorder.dispatch(stencil, &buffers, [self.level.cols.div_ceil(WIDTH), self.level.rows]);
+        recorder.dispatch(
+            stencil,
+            &buffers,
+            [self.level.cols.div_ceil(WIDTH), self.level.rows],
+        );
     }
 }

@@ -11,7 +11,9 @@ use super::sphere::Sphere;
 /// `values`: `[row, col]`, any unit, missing where there is none; the cells themselves must be missing.
 pub fn answers_at(grid: &Grid, values: &[f32], cells: &[usize]) -> Vec<f64> {
     let sphere = Sphere::of(grid);
-    let by_cols: Vec<f64> = (0..grid.cols).map(|col| sphere.half_sine_sq_cols(f64::from(col))).collect();
+    let by_cols: Vec<f64> = (0..grid.cols)
+        .map(|col| sphere.half_sine_sq_cols(f64::from(col)))
+        .collect();
     let cols = grid.cols as usize;
     let answer = |cell: &usize| {
         let (row, col) = (cell / cols, cell % cols);

@@ -14,7 +14,12 @@ pub struct Scaled {
 impl Scaled {
     /// Scales values (NaN, infinite or [`MISSING`] where there is no data); none if there is no data at all.
     pub fn of(values: &[f32]) -> Option<Self> {
-        let held = || values.iter().filter(|value| holds(**value)).map(|value| f64::from(*value));
+        let held = || {
+            values
+                .iter()
+                .filter(|value| holds(**value))
+                .map(|value| f64::from(*value))
+        };
         let (mut low, mut high, mut sum, mut count) = (f64::INFINITY, f64::NEG_INFINITY, 0.0, 0.0);
         for value in held() {
             (low, high) = (low.min(value), high.max(value));
@@ -27,11 +32,23 @@ impl Scaled {
         let center = sum / count;
         let widest = (high - center).max(center - low);
         // The next power of two: dividing by it is exact.
-        let unit = if widest > 0.0 { 2f64.powi(widest.log2().ceil() as i32) } else { 1.0 };
-        let scale = |value: &f32| {
-            if holds(*value) { ((f64::from(*value) - center) / unit) as f32 } else { MISSING }
+        let unit = if widest > 0.0 {
+            2f64.powi(widest.log2().ceil() as i32)
+        } else {
+            1.0
         };
-        Some(Self { values: values.iter().map(scale).collect(), center, unit })
+        let scale = |value: &f32| {
+            if holds(*value) {
+                ((f64::from(*value) - center) / unit) as f32
+            } else {
+                MISSING
+            }
+        };
+        Some(Self {
+            values: values.iter().map(scale).collect(),
+            center,
+            unit,
+        })
     }
 
     /// The value of a scaled one.
@@ -69,6 +86,9 @@ mod tests {
         assert!(Scaled::of(&[f32::NAN, MISSING]).is_none());
         assert_eq!(Scaled::of(&[4.0, 4.0]).unwrap().value(0.0), 4.0);
         let tiny = Scaled::of(&[1e-38, 3e-38]).unwrap();
-        assert!(tiny.values.iter().all(|v| v.abs() >= 0.5), "no denormal numbers");
+        assert!(
+            tiny.values.iter().all(|v| v.abs() >= 0.5),
+            "no denormal numbers"
+        );
     }
 }

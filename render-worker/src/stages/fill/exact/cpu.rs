@@ -10,7 +10,14 @@ use crate::stages::fill::ladder::Ladder;
 use crate::stages::fill::level::FillLevel;
 
 /// Weights of the six nodes around the middle between two: Lagrange, exact for polynomials of degree 5.
-const SHARES: [f32; 6] = [3.0 / 256.0, -25.0 / 256.0, 150.0 / 256.0, 150.0 / 256.0, -25.0 / 256.0, 3.0 / 256.0];
+const SHARES: [f32; 6] = [
+    3.0 / 256.0,
+    -25.0 / 256.0,
+    150.0 / 256.0,
+    150.0 / 256.0,
+    -25.0 / 256.0,
+    3.0 / 256.0,
+];
 
 /// The mean and the mean square of every gap, one plane after the other, scaled as `values` are; zero in other cells.
 ///
@@ -36,7 +43,11 @@ pub fn answers(ladder: &Ladder, values: &[f32], gaps: &[u32]) -> Vec<f32> {
 
 fn finer(place: usize, tap: usize, pad: u32) -> i32 {
     let own = 2 * (place as i32 - pad as i32);
-    if tap == 6 { own } else { own + 2 * (2 - tap as i32) + 1 }
+    if tap == 6 {
+        own
+    } else {
+        own + 2 * (2 - tap as i32) + 1
+    }
 }
 
 fn gathered(level: &FillLevel, fine: &[f32]) -> Vec<f32> {
@@ -46,8 +57,16 @@ fn gathered(level: &FillLevel, fine: &[f32]) -> Vec<f32> {
     for plane in 0..3 {
         let fine = &fine[plane * (rows * cols) as usize..(plane + 1) * (rows * cols) as usize];
         let at = |row: i32, col: i32| {
-            let x = if level.periodic == 1 { col.rem_euclid(cols) } else { col };
-            if row < 0 || row >= rows || x < 0 || x >= cols { 0.0 } else { fine[(row * cols + x) as usize] }
+            let x = if level.periodic == 1 {
+                col.rem_euclid(cols)
+            } else {
+                col
+            };
+            if row < 0 || row >= rows || x < 0 || x >= cols {
+                0.0
+            } else {
+                fine[(row * cols + x) as usize]
+            }
         };
         for row in 0..coarser_rows {
             for col in 0..coarser_cols {
@@ -72,10 +91,15 @@ fn raise(level: &FillLevel, coarse: &[f32], wanted: Option<&[u32]>, sums: &mut [
     let (rows, cols) = (level.rows as usize, level.cols as usize);
     let (coarser_rows, coarser_cols) = (level.coarser_rows as usize, level.coarser_cols as usize);
     let coarse_col = |col: usize, k: usize| {
-        if level.periodic == 1 { (col / 2 + k + 3 * coarser_cols - 2) % coarser_cols } else { col / 2 + k }
+        if level.periodic == 1 {
+            (col / 2 + k + 3 * coarser_cols - 2) % coarser_cols
+        } else {
+            col / 2 + k
+        }
     };
     for plane in 0..3 {
-        let coarse = &coarse[plane * coarser_rows * coarser_cols..(plane + 1) * coarser_rows * coarser_cols];
+        let coarse =
+            &coarse[plane * coarser_rows * coarser_cols..(plane + 1) * coarser_rows * coarser_cols];
         let across = |row: usize, col: usize| {
             let at = |k: usize| coarse[row * coarser_cols + coarse_col(col, k)];
             if col % 2 == 0 {

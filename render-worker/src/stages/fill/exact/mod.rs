@@ -46,7 +46,11 @@ pub fn ladder(grid: &Grid) -> Option<Ladder> {
     let mut first_row = 0.0;
     loop {
         let stride = f64::from(1u32 << levels.len());
-        let near = if levels.is_empty() { None } else { Some(0.5 * REACH * cell_rad * stride) };
+        let near = if levels.is_empty() {
+            None
+        } else {
+            Some(0.5 * REACH * cell_rad * stride)
+        };
         let far = REACH * cell_rad * stride;
         let is_coarsest = rows.max(cols) <= COARSEST || (periodic && cols % 2 == 1);
         if is_coarsest && rows.max(cols) > MOST_COARSEST {
@@ -60,25 +64,41 @@ pub fn ladder(grid: &Grid) -> Option<Ladder> {
                 None => 1.0 / chord_sq,
                 Some(near) => smoothed(chord_sq, near),
             };
-            let left = if is_coarsest { 0.0 } else { smoothed(chord_sq, far) };
+            let left = if is_coarsest {
+                0.0
+            } else {
+                smoothed(chord_sq, far)
+            };
             let is_self = near.is_none() && chord_sq == 0.0;
             unit_sq * if is_self { 0.0 } else { whole - left }
         };
         let places = Places {
             sphere: &sphere,
-            rows: &(0..rows).map(|row| (f64::from(row) - first_row) * stride).collect::<Vec<_>>(),
+            rows: &(0..rows)
+                .map(|row| (f64::from(row) - first_row) * stride)
+                .collect::<Vec<_>>(),
             cols,
             stride,
             periodic,
         };
-        let extent =
-            if is_coarsest { Extent::All } else { Extent::Chord { radius: far, may_clip: false } };
+        let extent = if is_coarsest {
+            Extent::All
+        } else {
+            Extent::Chord {
+                radius: far,
+                may_clip: false,
+            }
+        };
         levels.push(([rows, cols], Table::new(&places, extent, &weight)?));
         if is_coarsest {
             return Some(Ladder::new(grid, levels, pad_cols, 0.0).masked(|index| index == 0));
         }
         rows = coarser_count(rows);
-        cols = if periodic { cols / 2 } else { coarser_count(cols) };
+        cols = if periodic {
+            cols / 2
+        } else {
+            coarser_count(cols)
+        };
         first_row = f64::from(PAD) + 0.5 * first_row;
     }
 }
@@ -90,7 +110,9 @@ fn coarser_count(count: u32) -> u32 {
 
 /// Width of the grid's widest cells, radians of arc.
 fn widest_rad(grid: &Grid, sphere: &Sphere) -> f64 {
-    (0..grid.rows).map(|row| sphere.width_rad(f64::from(row))).fold(0.0, f64::max)
+    (0..grid.rows)
+        .map(|row| sphere.width_rad(f64::from(row)))
+        .fold(0.0, f64::max)
 }
 
 /// 1/d² beyond `radius`; within it the Taylor polynomial of 1/d² in d² about the radius, smooth down to 0.
@@ -100,7 +122,10 @@ fn smoothed(chord_sq: f64, radius: f64) -> f64 {
         return 1.0 / chord_sq;
     }
     let inside = 1.0 - chord_sq / radius_sq;
-    (0..=SMOOTH_ORDER).map(|order| inside.powi(order)).sum::<f64>() / radius_sq
+    (0..=SMOOTH_ORDER)
+        .map(|order| inside.powi(order))
+        .sum::<f64>()
+        / radius_sq
 }
 
 /// The compiled stage.
@@ -149,8 +174,12 @@ impl Exact {
             ];
             recorder.dispatch(&self.raise, &buffers, blocks(fine.size()));
         }
-        let buffers =
-            [(0, &finest.params), (4, &finest.wanted), (6, &finest.sums), (7, &finest.answers)];
+        let buffers = [
+            (0, &finest.params),
+            (4, &finest.wanted),
+            (6, &finest.sums),
+            (7, &finest.answers),
+        ];
         recorder.dispatch(&self.finish, &buffers, blocks(finest.size()));
     }
 }
@@ -176,7 +205,11 @@ mod tests {
     fn the_smoothed_weight_meets_the_weight_without_an_edge() {
         let (inside, outside) = (smoothed(0.999999, 1.0), smoothed(1.000001, 1.0));
         assert!((inside - outside - 2e-6).abs() < 1e-9);
-        assert_eq!(smoothed(0.0, 2.0), 1.0, "four terms of 1 over the radius squared");
+        assert_eq!(
+            smoothed(0.0, 2.0),
+            1.0,
+            "four terms of 1 over the radius squared"
+        );
     }
 
     #[test]
@@ -190,6 +223,13 @@ mod tests {
             dlon_deg: 0.25,
         };
         assert!(ladder(&fine).is_none());
-        assert!(ladder(&Grid { rows: 800, north_deg: 80.0, ..fine }).is_some());
+        assert!(
+            ladder(&Grid {
+                rows: 800,
+                north_deg: 80.0,
+                ..fine
+            })
+            .is_some()
+        );
     }
 }

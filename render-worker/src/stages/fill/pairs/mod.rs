@@ -32,7 +32,10 @@ pub fn tables(grid: &Grid) -> Vec<f32> {
     let rows = (0..grid.rows).map(|row| 4.0 * sphere.half_sine_sq_rows(f64::from(row)) / unit_sq);
     let cols = (0..grid.cols).map(|col| 4.0 * sphere.half_sine_sq_cols(f64::from(col)) / unit_sq);
     let cosines = (0..grid.rows).map(|row| sphere.lat_rad(f64::from(row)).cos());
-    rows.chain(cols).chain(cosines).map(|number| number as f32).collect()
+    rows.chain(cols)
+        .chain(cosines)
+        .map(|number| number as f32)
+        .collect()
 }
 
 /// Gaps and data in lists, row by row.
@@ -52,19 +55,35 @@ impl Lists {
         let cols = grid.cols as usize;
         let (mut work, mut targets) = (vec![], vec![]);
         let (mut row_starts, mut source_cols, mut source_values) = (vec![0], vec![], vec![]);
-        for (row, (values, gaps)) in values.chunks_exact(cols).zip(gaps.chunks_exact(cols)).enumerate() {
-            let of_row: Vec<u32> = (0..grid.cols).filter(|col| gaps[*col as usize] != 0).collect();
+        for (row, (values, gaps)) in values
+            .chunks_exact(cols)
+            .zip(gaps.chunks_exact(cols))
+            .enumerate()
+        {
+            let of_row: Vec<u32> = (0..grid.cols)
+                .filter(|col| gaps[*col as usize] != 0)
+                .collect();
             for chunk in of_row.chunks(TILE) {
                 work.push([row as u32, targets.len() as u32, chunk.len() as u32, 0]);
                 targets.extend_from_slice(chunk);
             }
-            for (col, value) in values.iter().enumerate().filter(|(_, value)| !is_missing(**value)) {
+            for (col, value) in values
+                .iter()
+                .enumerate()
+                .filter(|(_, value)| !is_missing(**value))
+            {
                 source_cols.push(col as u32);
                 source_values.push(*value);
             }
             row_starts.push(source_cols.len() as u32);
         }
-        Self { work, targets, row_starts, source_cols, source_values }
+        Self {
+            work,
+            targets,
+            row_starts,
+            source_cols,
+            source_values,
+        }
     }
 }
 
@@ -89,7 +108,11 @@ pub struct PairRooms {
 impl PairRooms {
     /// Rooms for scaled values and their gaps.
     pub fn new(gpu: &Gpu, grid: &Grid, values: &[f32], gaps: &[u32]) -> Result<Self, RenderError> {
-        let level = FillLevel { rows: grid.rows, cols: grid.cols, ..FillLevel::default() };
+        let level = FillLevel {
+            rows: grid.rows,
+            cols: grid.cols,
+            ..FillLevel::default()
+        };
         let lists = Lists::new(grid, values, gaps);
         Ok(Self {
             rows: grid.rows,
@@ -110,7 +133,11 @@ impl PairRooms {
 
     /// How many pieces the work falls into: workgroups of the tiled form, rows of workgroups of the naive one.
     pub fn pieces(&self, is_naive: bool) -> u32 {
-        if is_naive { self.rows.div_ceil(BLOCK) } else { self.work_count }
+        if is_naive {
+            self.rows.div_ceil(BLOCK)
+        } else {
+            self.work_count
+        }
     }
 }
 
@@ -130,7 +157,13 @@ impl Pairs {
     }
 
     /// Fills the answers of the first `pieces` pieces of the work.
-    pub fn record(&self, recorder: &mut Recorder<'_>, rooms: &PairRooms, is_naive: bool, pieces: u32) {
+    pub fn record(
+        &self,
+        recorder: &mut Recorder<'_>,
+        rooms: &PairRooms,
+        is_naive: bool,
+        pieces: u32,
+    ) {
         if is_naive {
             let buffers = [
                 (0, &rooms.params),

@@ -22,7 +22,12 @@ pub fn answers(ladder: &Ladder, values: &[f32], gaps: &[u32]) -> Vec<f32> {
     }
     let mut answers = vec![];
     for (index, rung) in ladder.rungs.iter().enumerate().rev() {
-        let sums = stencil(&rung.level, &rung.table, &planes[index], Some(&wanted[index]));
+        let sums = stencil(
+            &rung.level,
+            &rung.table,
+            &planes[index],
+            Some(&wanted[index]),
+        );
         answers = settled(&rung.level, &sums, &answers, &wanted[index]);
     }
     answers
@@ -35,7 +40,11 @@ fn joined(level: &FillLevel, fine: &[f32]) -> Vec<f32> {
     for plane in 0..3 {
         let fine = &fine[plane * rows * cols..(plane + 1) * rows * cols];
         let at = |row: usize, col: usize| {
-            if row < rows && col < cols { fine[row * cols + col] } else { 0.0 }
+            if row < rows && col < cols {
+                fine[row * cols + col]
+            } else {
+                0.0
+            }
         };
         for row in 0..coarser_rows {
             for col in 0..coarser_cols {

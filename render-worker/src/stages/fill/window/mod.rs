@@ -39,21 +39,36 @@ pub fn ladder(grid: &Grid) -> Ladder {
         let stride = f64::from(1u32 << levels.len());
         let places = Places {
             sphere: &sphere,
-            rows: &(0..rows).map(|row| middle(row, stride, grid.rows)).collect::<Vec<_>>(),
+            rows: &(0..rows)
+                .map(|row| middle(row, stride, grid.rows))
+                .collect::<Vec<_>>(),
             cols,
             stride,
             periodic: grid.is_periodic(),
         };
         let unit_sq = (cell_rad * stride).powi(2);
         let weight = |chord_sq: f64| {
-            if chord_sq == 0.0 { OWN_WEIGHT } else { unit_sq / chord_sq }
+            if chord_sq == 0.0 {
+                OWN_WEIGHT
+            } else {
+                unit_sq / chord_sq
+            }
         };
         let is_coarsest = rows.max(cols) <= COARSEST;
         let radius = REACH * cell_rad * stride * (1.0 + 1e-9);
-        let extent =
-            if is_coarsest { Extent::All } else { Extent::Chord { radius, may_clip: true } };
+        let extent = if is_coarsest {
+            Extent::All
+        } else {
+            Extent::Chord {
+                radius,
+                may_clip: true,
+            }
+        };
         let table = Table::new(&places, extent, &weight);
-        levels.push(([rows, cols], table.expect("the coarsest level is small, others may be clipped")));
+        levels.push((
+            [rows, cols],
+            table.expect("the coarsest level is small, others may be clipped"),
+        ));
         if is_coarsest {
             return Ladder::new(grid, levels, 0, (1.0 / (REACH * REACH)) as f32).masked(|_| true);
         }
@@ -107,7 +122,10 @@ impl Window {
         for (index, level) in rooms.levels.iter().enumerate().rev() {
             level.record_stencil(recorder, &self.stencil);
             // The coarsest level has no other answer to lean on and reads none.
-            let coarser = rooms.levels.get(index + 1).map_or(&rooms.values, |level| &level.answers);
+            let coarser = rooms
+                .levels
+                .get(index + 1)
+                .map_or(&rooms.values, |level| &level.answers);
             let buffers = [
                 (0, &level.params),
                 (1, &level.sums),
