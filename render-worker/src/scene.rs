@@ -54,6 +54,8 @@ pub struct Frame {
     /// Estimated error (1σ) of every value in its unit: 0 where it was measured, above where a gap was filled; none if
     /// there was no gap. [`MISSING`] where there is no data.
     pub errors: Option<Cells<f32>>,
+    /// The largest of them, 0 without any: what a style scales its doubt by.
+    pub largest_error: f32,
     /// Smallest and largest value, 0 and 0 without data.
     pub range: [f32; 2],
     /// Means over blocks of four.
@@ -77,6 +79,7 @@ impl Frame {
         Self {
             cells: Cells::new(values),
             errors: None,
+            largest_error: 0.0,
             range: range.unwrap_or_default(),
             coarser_mean: OnceLock::new(),
             coarser_mass: OnceLock::new(),
@@ -85,18 +88,24 @@ impl Frame {
 
     /// A frame of filled values and their estimated errors.
     pub fn filled(filled: Filled) -> Self {
-        let mut frame = Self::new(filled.values);
-        frame.errors = Some(Cells::new(filled.errors));
-        frame
+        Self::new(filled.values).with_errors(filled.errors)
+    }
+
+    fn with_errors(mut self, errors: Vec<f32>) -> Self {
+        let errors = Self::new(errors);
+        self.largest_error = errors.range[1];
+        self.errors = Some(errors.cells);
+        self
     }
 
     /// Blocks of four; an error becomes the mean of the four, as if they were wrong together.
     pub(crate) fn coarser_mean(&self, make: impl Fn(&[f32]) -> Vec<f32>) -> Arc<Self> {
         let coarser = || {
-            let mut coarser = Self::new(make(&self.cells.content));
-            let errors = self.errors.as_ref().map(|errors| make(&errors.content));
-            coarser.errors = errors.map(|errors| Cells::new(Self::new(errors).cells.content));
-            Arc::new(coarser)
+            let coarser = Self::new(make(&self.cells.content));
+            Arc::new(match &self.errors {
+                Some(errors) => coarser.with_errors(make(&errors.content)),
+                None => coarser,
+            })
         };
         Arc::clone(self.coarser_mean.get_or_init(coarser))
     }

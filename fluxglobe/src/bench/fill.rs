@@ -29,6 +29,8 @@ struct Row {
     from_all_pairs: Option<f64>,
     /// Root mean square error of hidden values over their standard deviation.
     rmse_over_spread: Option<f64>,
+    /// Equal on two devices where all bits of the filled values are.
+    digest: Option<String>,
     adapter: String,
 }
 
@@ -69,7 +71,7 @@ pub(crate) fn run(options: &BenchFill) -> Result<()> {
     Ok(())
 }
 
-const HEADER: &str = "form         rows   cols  missing  gap  runs   median ms      p99 ms  measured  from all pairs  RMSE/spread";
+const HEADER: &str = "form         rows   cols  missing  gap  runs   median ms      p99 ms  measured  from all pairs  RMSE/spread    digest";
 
 impl Row {
     fn new(timing: &Timing, adapter: &str) -> Self {
@@ -86,6 +88,7 @@ impl Row {
             measured_share: timing.measured_share,
             from_all_pairs: timing.from_all_pairs,
             rmse_over_spread: timing.rmse_of_hidden,
+            digest: timing.values_digest.map(|digest| digest.short()),
             adapter: adapter.to_owned(),
         }
     }
@@ -102,7 +105,7 @@ fn print(options: &BenchFill, row: &Row) -> Result<()> {
         .rmse_over_spread
         .map_or_else(|| "-".to_owned(), |rmse| format!("{rmse:.4}"));
     progress::result(&format!(
-        "{:<11} {:>5} {:>6} {:>8} {:>4} {:>5} {:>11.3} {:>11.3} {:>8.2}% {:>15} {:>12}",
+        "{:<11} {:>5} {:>6} {:>8} {:>4} {:>5} {:>11.3} {:>11.3} {:>8.2}% {:>15} {:>12}  {}",
         row.form,
         row.rows,
         row.cols,
@@ -114,5 +117,6 @@ fn print(options: &BenchFill, row: &Row) -> Result<()> {
         100.0 * row.measured_share,
         apart,
         rmse,
+        row.digest.as_deref().unwrap_or("-"),
     ))
 }

@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use contract::digest::Digest;
 use contract::grid::Grid;
 
 use super::hold_out::{HoldOut, Score};
@@ -39,6 +40,8 @@ pub struct Timing {
     /// Largest difference from all pairs in float64 among some gaps, as a share of the values' range; none if only a
     /// part was filled.
     pub from_all_pairs: Option<f64>,
+    /// The filled values, so that two devices can be compared: equal bits, equal digests. None if only a part was filled.
+    pub values_digest: Option<Digest>,
     /// Against the values that were hidden, in units of their standard deviation.
     pub rmse_of_hidden: Option<f64>,
 }
@@ -99,6 +102,7 @@ pub fn bench_fill(
         seconds: vec![0.0],
         measured_share: 1.0,
         from_all_pairs: None,
+        values_digest: None,
         rmse_of_hidden: None,
     };
     let Some(task) = Task::of(&values, &domain) else {
@@ -138,6 +142,7 @@ pub fn bench_fill(
             .rmse()
             .zip(score.spread())
             .map(|(rmse, spread)| rmse / spread);
+        timing.values_digest = Some(Digest::of(bytemuck::cast_slice(&filled.values)));
         timing.from_all_pairs = Some(from_all_pairs(&grid, &values, &filled.values, &hidden));
     }
     Ok(timing)

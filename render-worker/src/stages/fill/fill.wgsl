@@ -8,7 +8,7 @@ struct FillLevel {
 const MISSING = -1.0e30;
 const COARSER_PAD = 2u;
 const WIDTH = 128u;
-const SEGMENT = 384u; // WIDTH + 2 * MOST_REACH_COLS
+const SEGMENT = 512u; // WIDTH + 2 * MOST_REACH_COLS
 
 @group(0) @binding(0) var<uniform> level: FillLevel;
 

@@ -3,7 +3,7 @@
 use super::sphere::Sphere;
 
 /// Most columns that a table reaches to either side; a shader's shared memory is made for it.
-pub const MOST_REACH_COLS: u32 = 128;
+pub const MOST_REACH_COLS: u32 = 192;
 /// Most rows that a table reaches.
 const MOST_REACH_ROWS: u32 = 512;
 

@@ -6,6 +6,7 @@
 //! [`pairs`] gives it slowly. Every product of two numbers is rounded before it is added, on every device, so that a
 //! form has the same bits on all of them and on the processor. Land is what holds no data in any step: it stays empty.
 
+mod band;
 pub mod bench;
 pub mod cpu;
 pub mod exact;
@@ -27,6 +28,7 @@ use contract::grid::Grid;
 use crate::error::RenderError;
 use crate::gpu::Gpu;
 use crate::stages::layout::MISSING;
+use band::Band;
 use exact::Exact;
 use ladder::Ladder;
 use on_device::{DeviceLadder, Rooms};
@@ -39,6 +41,8 @@ pub const STENCIL_SOURCE: &str = concat!(include_str!("fill.wgsl"), include_str!
 
 /// Most pairs of cells that are met one by one: minutes of a large GPU.
 const MOST_PAIRS: u64 = 1 << 42;
+/// The same for the twins.
+const MOST_PAIRS_ON_CPU: u64 = 1 << 36;
 /// Most rows: workgroups in one dimension of a dispatch.
 const MOST_ROWS: u32 = 65_535;
 
@@ -133,12 +137,8 @@ fn unfilled(values: &[f32]) -> Filled {
     }
 }
 
-fn ladder_of(form: Form, grid: &Grid) -> Result<Ladder, RenderError> {
-    if form == Form::Exact {
-        exact::ladder(grid).ok_or(RenderError::NoExactFill)
-    } else {
-        Ok(window::ladder(grid))
-    }
+fn exact_ladder(grid: &Grid) -> Result<Ladder, RenderError> {
+    exact::ladder(grid).ok_or(RenderError::NoExactFill)
 }
 
 fn check_pairs(pairs: u64, limit: u64) -> Result<(), RenderError> {
@@ -158,19 +158,21 @@ pub fn on_cpu(
     values: &[f32],
     domain: &[u32],
 ) -> Result<Filled, RenderError> {
-    let Some(task) = Task::of(values, domain) else {
-        return Ok(unfilled(values));
-    };
-    let scaled = &task.scaled.values;
-    let answers = match form {
-        Form::Window => window::cpu::answers(&window::ladder(grid), scaled, &task.gaps),
-        Form::Exact => exact::cpu::answers(&ladder_of(form, grid)?, scaled, &task.gaps),
-        Form::Pairs | Form::NaivePairs => {
-            check_pairs(task.pairs(), MOST_PAIRS >> 6)?;
-            pairs::cpu::answers(grid, &pairs::tables(grid), scaled, &task.gaps)
-        }
-    };
-    Ok(task.filled(values, &answers))
+    Band::of(grid, values, domain).filled(values, domain, |grid, values, domain| {
+        let Some(task) = Task::of(values, domain) else {
+            return Ok(unfilled(values));
+        };
+        let scaled = &task.scaled.values;
+        let answers = match form {
+            Form::Window => window::cpu::answers(&window::ladder(grid), scaled, &task.gaps),
+            Form::Exact => exact::cpu::answers(&exact_ladder(grid)?, scaled, &task.gaps),
+            Form::Pairs | Form::NaivePairs => {
+                check_pairs(task.pairs(), MOST_PAIRS_ON_CPU)?;
+                pairs::cpu::answers(grid, &pairs::tables(grid), scaled, &task.gaps)
+            }
+        };
+        Ok(task.filled(values, &answers))
+    })
 }
 
 /// The shaders of all forms; the true ones but for tests.
@@ -228,15 +230,16 @@ impl Fill {
         values: &[f32],
         domain: &[u32],
     ) -> Result<Filled, RenderError> {
-        let Some(task) = Task::of(values, domain) else {
-            return Ok(unfilled(values));
-        };
-        let prepared = self.prepared(gpu, form, grid, &task)?;
-        let mut recorder = gpu.recorder();
-        let pieces = prepared.pieces();
-        prepared.record(&mut recorder, pieces);
-        let answers = recorder.download(prepared.answers(), 2 * values.len())?;
-        Ok(task.filled(values, &answers))
+        Band::of(grid, values, domain).filled(values, domain, |grid, values, domain| {
+            let Some(task) = Task::of(values, domain) else {
+                return Ok(unfilled(values));
+            };
+            let prepared = self.prepared(gpu, form, grid, &task)?;
+            let mut recorder = gpu.recorder();
+            prepared.record(&mut recorder, prepared.pieces());
+            let answers = recorder.download(prepared.answers(), 2 * values.len())?;
+            Ok(task.filled(values, &answers))
+        })
     }
 
     fn prepared(
@@ -256,7 +259,7 @@ impl Fill {
                 ))
             }
             Form::Exact => {
-                let ladder = DeviceLadder::new(gpu, grid, &ladder_of(form, grid)?)?;
+                let ladder = DeviceLadder::new(gpu, grid, &exact_ladder(grid)?)?;
                 let exact = self.exact.get_or_init(|| Exact::new(gpu, &self.sources));
                 Ok(Prepared::Exact(
                     exact,

@@ -26,7 +26,7 @@ const SMOOTH_ORDER: i32 = 3;
 /// A level of at most so many rows and columns is summed over whole.
 const COARSEST: u32 = 32;
 /// So many are allowed where a grid that goes all the way round cannot be halved.
-const MOST_COARSEST: u32 = 128;
+const MOST_COARSEST: u32 = 192;
 /// Rows (and columns, unless the grid goes all the way round) of a coarser level before the first one of the finer.
 const PAD: u32 = 2;
 /// Side of a workgroup, cells.

@@ -112,10 +112,10 @@ impl Window {
             let (fine, coarse) = (&pair[0], &pair[1]);
             let buffers = [
                 (0, &fine.params),
-                (1, &fine.planes),
-                (2, &fine.wanted),
-                (3, &coarse.planes),
-                (4, &coarse.wanted),
+                (3, &fine.planes),
+                (4, &fine.wanted),
+                (5, &coarse.planes),
+                (6, &coarse.wanted),
             ];
             recorder.dispatch(&self.join, &buffers, blocks(coarse.size()));
         }
@@ -128,10 +128,10 @@ impl Window {
                 .map_or(&rooms.values, |level| &level.answers);
             let buffers = [
                 (0, &level.params),
-                (1, &level.sums),
-                (2, coarser),
-                (3, &level.wanted),
-                (4, &level.answers),
+                (7, &level.sums),
+                (8, coarser),
+                (9, &level.wanted),
+                (10, &level.answers),
             ];
             recorder.dispatch(&self.settle, &buffers, blocks(level.size()));
         }
