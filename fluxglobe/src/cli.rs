@@ -1,5 +1,6 @@
 //! The command line: words in, one plain `Command` out. Every value is parsed here, once, into its final type.
 
+mod fill;
 mod observations;
 mod pictures;
 mod services;
@@ -15,6 +16,7 @@ use contract::job::Mode;
 use contract::product::ProductId;
 use contract::time::TimeMs;
 
+pub(crate) use fill::{BenchFill, FillError, ProductsOf};
 pub(crate) use observations::{MatchTime, Matchup, Observations, ObservationsAsked};
 pub(crate) use pictures::{BenchCompare, BenchQuality, RenderAnimation};
 pub(crate) use services::{
@@ -203,6 +205,9 @@ pub(crate) struct Ingest {
 /// `fluxglobe products`.
 #[derive(Debug, Args)]
 pub(crate) struct Products {
+    /// More about one product.
+    #[command(subcommand)]
+    pub(crate) of: Option<ProductsOf>,
     /// JSON instead of a table.
     #[arg(long)]
     pub(crate) json: bool,

@@ -40,6 +40,16 @@ pub enum RenderError {
         bytes: u64,
         limit: u64,
     },
+    /// Gaps times cells with data, where every pair is met.
+    #[error(
+        "{pairs} pairs of a gap and a cell with data, at most {limit} are met one by one; use the form window or exact"
+    )]
+    TooManyPairs { pairs: u64, limit: u64 },
+    /// Multilevel summation over a pole.
+    #[error(
+        "the grid comes too near a pole, or cannot be halved often enough, for the exact form; use the form window or pairs"
+    )]
+    NoExactFill,
     /// Two products drawn together lie on different grids.
     #[error("{accumulated} does not lie on the grid of {product}")]
     GridMismatch {
@@ -95,6 +105,8 @@ impl RenderError {
             | Self::Job(_)
             | Self::TooManyParticles { .. }
             | Self::TooLarge { .. }
+            | Self::TooManyPairs { .. }
+            | Self::NoExactFill
             | Self::GridMismatch { .. }
             | Self::NoSteps { .. }
             | Self::Encode { .. }
@@ -109,6 +121,8 @@ impl RenderError {
             Self::Job(_)
                 | Self::TooManyParticles { .. }
                 | Self::TooLarge { .. }
+                | Self::TooManyPairs { .. }
+                | Self::NoExactFill
                 | Self::GridMismatch { .. }
         )
     }
@@ -138,6 +152,8 @@ impl RenderError {
             | Self::Job(_)
             | Self::TooManyParticles { .. }
             | Self::TooLarge { .. }
+            | Self::TooManyPairs { .. }
+            | Self::NoExactFill
             | Self::GridMismatch { .. }
             | Self::NoSteps { .. }
             | Self::Encode { .. }

@@ -15,6 +15,8 @@ use crate::error::RenderError;
 use crate::recent::Recent;
 use crate::renderer::Renderer;
 use crate::scene::{Cells, Frame, Interval, Scene};
+use crate::stages::fill::Form;
+use crate::stages::fill::scaled::holds;
 
 /// Manifests kept; each is a few kilobytes a step.
 const MOST_MANIFESTS: u64 = 64;
@@ -214,19 +216,15 @@ fn fill(
     values: Vec<f32>,
     domain: &Cells<u32>,
 ) -> Result<Frame, RenderError> {
-    let raw = Frame::new(values);
-    let gaps = raw.cells.content().iter().zip(domain.content());
-    let has_gaps = gaps
-        .into_iter()
-        .any(|(value, domain)| *domain != 0 && crate::stages::layout::is_missing(*value));
-    if !has_gaps || domain.content().len() != raw.cells.content().len() {
-        return Ok(raw);
+    let domain = domain.content();
+    let mut gaps = values.iter().zip(domain);
+    let has_gaps = gaps.any(|(value, domain)| *domain != 0 && !holds(*value));
+    if !has_gaps || domain.len() != values.len() {
+        return Ok(Frame::new(values));
     }
-    Ok(Frame::new(renderer.fill(
-        grid,
-        raw.cells.content(),
-        domain.content(),
-    )?))
+    renderer
+        .fill(Form::Window, grid, &values, domain)
+        .map(Frame::filled)
 }
 
 fn failed(

@@ -155,6 +155,8 @@ pub(crate) enum Bench {
     Quality(BenchQuality),
     /// How far two pictures are apart: decibels, levels, bytes, FLIP.
     Compare(BenchCompare),
+    /// Gap filling on this machine's Vulkan device: every form, small grids first.
+    Fill(super::BenchFill),
 }
 
 /// `fluxglobe bench stream`.

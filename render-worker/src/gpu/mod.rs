@@ -183,6 +183,17 @@ impl Gpu {
             }))
     }
 
+    /// A storage buffer of so many bytes, zero at first.
+    pub fn room(&self, label: &'static str, bytes: u64) -> Result<wgpu::Buffer, RenderError> {
+        self.check_size(label, bytes)?;
+        Ok(self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(label),
+            size: bytes.max(4),
+            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
+            mapped_at_creation: false,
+        }))
+    }
+
     fn check_size(&self, what: &'static str, bytes: u64) -> Result<(), RenderError> {
         let limit = self.most_buffer_bytes;
         if bytes > limit {

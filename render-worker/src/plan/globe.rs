@@ -171,6 +171,16 @@ fn light_frame(plan: &mut Plan, camera: &Camera, sun: DVec3, half: DVec3, cap: &
     params.light_v0 = (camera.up.dot(axis_v) - reach) as f32;
     params.light_texels_per_unit = (1.0 / texel) as f32;
     params.light_depth_gain = (look::LIGHT_DEPTH * PI / 3.0 / (texel * texel)) as f32;
+    // The eye's own place in the light's axes and slices: what is as far from a place as a part of its distance lies
+    // that part of the way there.
+    let eye = camera.place;
+    let to_light = f64::from(LIGHT_UNIT) / texel;
+    let per_px = 1.0 / camera.focal_px;
+    params.toward_u = ((eye.dot(axis_u) - f64::from(params.light_u0)) * to_light * per_px) as f32;
+    params.toward_v = ((eye.dot(axis_v) - f64::from(params.light_v0)) * to_light * per_px) as f32;
+    let above_top = f64::from(params.slice_top) - eye.dot(half);
+    params.toward_slice = (above_top * f64::from(params.slices_per_unit) * per_px) as f32;
+    params.toward_pull = per_px as f32;
     write(
         axis_u,
         [

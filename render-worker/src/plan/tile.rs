@@ -11,6 +11,7 @@ use contract::tile::{MAX_LAT_DEG, Tile, mercator_lat_deg, mercator_x, mercator_y
 use super::look::{self, Look};
 use super::{Plan, area_m2, cell_px, entry_shift, height_range_m};
 use crate::scene::Scene;
+use crate::stages::light::FARTHEST_LOOK;
 use crate::stages::layout::{Axis, Col, Row, SUBPIXELS, VIEW_TILE};
 
 /// Smallest light texel, pixels: finer than the screen is of no use.
@@ -167,6 +168,10 @@ fn light_and_reach(
         -azimuth.sin() / elevation.tan() * per_m,
         azimuth.cos() / elevation.tan() * per_m,
     ];
+    // The eye looks straight down once height is drawn as a way north: a pixel towards it is a pixel of height, above
+    // ground that lies as much farther south.
+    let toward_eye =
+        [shadow_per_m[0], shadow_per_m[1] + look::OBLIQUE * per_m].map(|shift| shift / level.px_per_m);
     let texel_px = (look::TEXEL_PER_RADIUS * radius_px).max(LEAST_TEXEL_PX);
     let unit = (texel_px * subpixels).round();
     let mut origin = [0; 2];
@@ -174,6 +179,9 @@ fn light_and_reach(
     let mut reach = [[0.0; 2]; 2];
     for axis in 0..2 {
         let lit = shift(seen[axis], shadow_per_m[axis]);
+        // Clouds look their light up so far from their centres.
+        let looked = FARTHEST_LOOK * widest * toward_eye[axis].abs();
+        let lit = [lit[0] - looked, lit[1] + looked];
         let absolute = level.origin_px[axis] * subpixels;
         let base = ((absolute + lit[0]) / unit).floor() - 1.0;
         origin[axis] = (absolute - base * unit) as i32;
@@ -186,6 +194,9 @@ fn light_and_reach(
     [params.light_width, params.light_height] = texels;
     [params.light_shift_x_per_m, params.light_shift_y_per_m] =
         shadow_per_m.map(|shift| shift as f32);
+    params.toward_u = toward_eye[0] as f32;
+    params.toward_v = toward_eye[1] as f32;
+    params.toward_slice = (-f64::from(params.slices_per_unit) / level.px_per_m) as f32;
     let texel_px = unit / subpixels;
     params.light_depth_gain =
         (look::LIGHT_DEPTH * PI / 3.0 / (texel_px * texel_px) / elevation.sin()) as f32;

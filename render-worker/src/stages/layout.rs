@@ -86,6 +86,12 @@ shared_struct! {
         pub light_shift_x_per_m: f32,
         pub light_shift_y_per_m: f32,
         pub light_depth_gain: f32,
+        /// From a place in the light towards the eye, for each pixel of radius: this, less `toward_pull` times the place
+        /// (in parts of texels and in slices).
+        pub toward_u: f32,
+        pub toward_v: f32,
+        pub toward_slice: f32,
+        pub toward_pull: f32,
         pub light_u0: f32,
         pub light_v0: f32,
         pub light_texels_per_unit: f32,

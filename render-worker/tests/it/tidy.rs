@@ -5,9 +5,15 @@ use std::path::Path;
 const SOURCES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/src");
 
 #[test]
-fn every_stage_has_a_shader_and_a_twin() {
+fn every_stage_and_every_form_of_filling_has_a_shader_and_a_twin() {
+    assert_eq!(check("stages"), 9);
+    assert_eq!(check("stages/fill"), 3);
+}
+
+/// The number of folders within a folder, each with its three files.
+fn check(folder: &str) -> usize {
     let mut stages = 0;
-    for entry in std::fs::read_dir(Path::new(SOURCES).join("stages")).unwrap() {
+    for entry in std::fs::read_dir(Path::new(SOURCES).join(folder)).unwrap() {
         let path = entry.unwrap().path();
         if path.is_dir() {
             let name = path.file_name().unwrap().to_str().unwrap();
@@ -21,7 +27,7 @@ fn every_stage_has_a_shader_and_a_twin() {
             stages += 1;
         }
     }
-    assert_eq!(stages, 9);
+    stages
 }
 
 /// Stages in the order in which a text first calls each.

@@ -36,7 +36,8 @@ fn place_own(at: u32) {
     if (any(reach.low > reach.high)) { return; }
     var color = near.w;
     if (params.light_on == 1u) {
-        color = shaded(color, vec2(bitcast<i32>(far.x), bitcast<i32>(far.y)), slice, bitcast<f32>(far.w));
+        let radius_px = f32((near.z & 0xffffu) << params.entry_shift) / f32(SUBPIXELS);
+        color = shaded(color, vec2(bitcast<i32>(far.x), bitcast<i32>(far.y)), slice, bitcast<f32>(far.w), radius_px);
     }
     color = (color & 0xffffffu) | (u32(slice) << 24u);
     for (var y = reach.low.y; y <= reach.high.y; y++) {

@@ -13,6 +13,9 @@ use crate::stages::layout::Params;
 /// Columns of texels that one workgroup sums up.
 const COLUMNS: u32 = 32;
 
+/// Radii from its centre at which a cloud looks its light up, at most.
+pub const FARTHEST_LOOK: f64 = 0.6;
+
 /// The functions that give depth to the light; [`splat`](crate::passes::splat) runs them.
 pub const DEPOSIT_FUNCTIONS: &str =
     concat!(include_str!("texel.wgsl"), include_str!("deposit.wgsl"));

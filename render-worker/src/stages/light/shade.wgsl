@@ -19,12 +19,30 @@ fn dimmed(color: u32, shade: f32) -> u32 {
     return u32(nearest(rgb.x)) | (u32(nearest(rgb.y)) << 8u) | (u32(nearest(rgb.z)) << 16u) | (color & 0xff000000u);
 }
 
-fn shaded(color: u32, place: vec2<i32>, slice: f32, day: f32) -> u32 {
+// Optical depth between a place and the sun.
+fn depth_before(place: vec2<i32>, slice: f32) -> f32 {
     let texel = texel_of(place);
     let middle = i32(floor(slice - 0.5));
     let part = slice - 0.5 - f32(middle);
     let north = mix(depth_above(texel.index, middle, part), depth_above(texel.index + vec2(1, 0), middle, part), texel.part.x);
     let south = mix(depth_above(texel.index + vec2(0, 1), middle, part), depth_above(texel.index + vec2(1, 1), middle, part), texel.part.x);
-    let transmittance = exp(-mix(north, south, texel.part.y));
-    return dimmed(color, params.ambient + params.direct * transmittance * day);
+    return mix(north, south, texel.part.y);
+}
+
+// Share of light at a place `t` radii towards the eye times the share of what is seen there, and the latter.
+fn look(place: vec2<i32>, slice: f32, step: f32, share: f32) -> vec2<f32> {
+    let toward = vec2(params.toward_u, params.toward_v) - params.toward_pull * vec2<f32>(place);
+    let there = place + vec2(nearest(step * toward.x), nearest(step * toward.y));
+    let slice_there = slice + step * (params.toward_slice - params.toward_pull * slice);
+    // Where little light reaches, the eye sees little past what lies in front.
+    let half = exp(-0.5 * depth_before(there, clamp(slice_there, 0.0, f32(params.slices) - 0.001)));
+    return share * half * vec2(half * half, 1.0);
+}
+
+// A splat's colour in its light. The light is looked up at three places, by the share of the cloud there: one look at the
+// centre would draw clouds too dark, because the eye sees their near sides.
+fn shaded(color: u32, place: vec2<i32>, slice: f32, day: f32, radius_px: f32) -> u32 {
+    let sum = look(place, slice, -0.6 * radius_px, 0.3277) + look(place, slice, 0.0, 1.0) + look(place, slice, 0.6 * radius_px, 0.3277);
+    let lit = sum.x / max(sum.y, 1.0e-30);
+    return dimmed(color, params.ambient + params.direct * lit * day);
 }
