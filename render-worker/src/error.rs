@@ -46,9 +46,6 @@ pub enum RenderError {
         product: String,
         accumulated: String,
     },
-    /// A manifest without steps.
-    #[error("{product} has no steps to draw")]
-    NoSteps { product: String },
     /// Reading frames failed.
     #[error("cannot read {what} of {product}")]
     Store {
@@ -93,7 +90,6 @@ impl RenderError {
             | Self::TooManyParticles { .. }
             | Self::TooLarge { .. }
             | Self::GridMismatch { .. }
-            | Self::NoSteps { .. }
             | Self::Encode { .. } => false,
         }
     }
@@ -135,7 +131,6 @@ impl RenderError {
             | Self::TooManyParticles { .. }
             | Self::TooLarge { .. }
             | Self::GridMismatch { .. }
-            | Self::NoSteps { .. }
             | Self::Encode { .. } => true,
             Self::Store { source, .. } => {
                 source.is_not_found() || matches!(**source, storage::StorageError::Damaged { .. })

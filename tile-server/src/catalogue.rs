@@ -9,7 +9,7 @@ use contract::key::ObjectKey;
 use contract::manifest::{Manifest, ManifestId};
 use contract::product::ProductId;
 use contract::quantity::Quantity;
-use contract::time::Period;
+use contract::time::{Period, TimeMs};
 use storage::{StorageError, Store, manifests};
 
 use crate::error::ServerError;
@@ -28,8 +28,36 @@ pub struct Layer {
     pub manifest: Arc<Manifest>,
     /// What it covers; a manifest without steps is no layer.
     pub extent: Period,
-    /// The accumulated carbon that was derived from exactly this version.
-    pub accumulated: Option<ManifestId>,
+    /// The accumulated carbon that lifts its particles.
+    pub accumulated: Option<Accumulated>,
+}
+
+/// Accumulated carbon of one version of a product.
+#[derive(Debug, Clone)]
+pub struct Accumulated {
+    /// Its name, which is costly to compute.
+    pub id: ManifestId,
+    /// Its manifest.
+    pub manifest: Arc<Manifest>,
+    /// The last instant at which it holds for that version: none if it was derived from exactly that one.
+    pub until: Option<TimeMs>,
+}
+
+impl Accumulated {
+    /// What was derived from a version, for that version.
+    pub fn new(id: ManifestId, manifest: Arc<Manifest>) -> Self {
+        let until = None;
+        Self {
+            id,
+            manifest,
+            until,
+        }
+    }
+
+    /// Does it hold at an instant?
+    pub(crate) fn holds_at(&self, time: TimeMs) -> bool {
+        self.until.is_none_or(|until| time <= until)
+    }
 }
 
 impl Layer {
@@ -236,13 +264,52 @@ impl Catalogue {
                 known.insert(product, entry);
             }
         }
-        let layers = known.iter().filter_map(|(product, entry)| {
-            Some((product.clone(), Arc::new(layer(&known, entry)?)))
-        });
+        let mut layers = BTreeMap::new();
+        for (product, (_, manifest, id)) in &known {
+            let Some(extent) = manifest.extent() else {
+                continue;
+            };
+            let layer = Layer {
+                id: id.clone(),
+                manifest: Arc::clone(manifest),
+                extent,
+                accumulated: self.accumulated(&known, manifest, id).await,
+            };
+            layers.insert(product.clone(), Arc::new(layer));
+        }
         Ok(Snapshot {
             read_at,
-            layers: layers.collect(),
+            layers,
             known,
+        })
+    }
+
+    /// The newest accumulated carbon of a version. While the derivation from a new version is on its way, the one
+    /// before still holds as far as nothing changed that it was summed from.
+    async fn accumulated(
+        &self,
+        known: &BTreeMap<ProductId, Entry>,
+        manifest: &Manifest,
+        id: &ManifestId,
+    ) -> Option<Accumulated> {
+        let product = manifest.product.accumulated().ok()?;
+        let (_, derived, derived_id) = known.get(&product)?;
+        let source = derived.derived_from.as_ref()?;
+        let accumulated = Accumulated::new(derived_id.clone(), Arc::clone(derived));
+        if source == id {
+            return Some(accumulated);
+        }
+        let before = match self.versions.manifest(source).await {
+            Ok(before) => before,
+            Err(error) => {
+                tracing::debug!(%error, manifest = %source, "the version before cannot be compared");
+                return None;
+            }
+        };
+        let until = Some(equal_until(&before, manifest)?);
+        Some(Accumulated {
+            until,
+            ..accumulated
         })
     }
 
@@ -273,18 +340,13 @@ impl Catalogue {
 
 type Entry = (ObjectKey, Arc<Manifest>, ManifestId);
 
-fn layer(known: &BTreeMap<ProductId, Entry>, (_, manifest, id): &Entry) -> Option<Layer> {
-    let accumulated = manifest
-        .product
-        .accumulated()
-        .ok()
-        .and_then(|product| known.get(&product));
-    let accumulated =
-        accumulated.filter(|(_, derived, _)| derived.derived_from.as_ref() == Some(id));
-    Some(Layer {
-        id: id.clone(),
-        manifest: Arc::clone(manifest),
-        extent: manifest.extent()?,
-        accumulated: accumulated.map(|(_, _, id)| id.clone()),
-    })
+/// The end of the steps at the start of both versions that are equal in both; none if what was summed up from one says
+/// nothing of the other.
+fn equal_until(before: &Manifest, now: &Manifest) -> Option<TimeMs> {
+    if before.product != now.product || before.grid != now.grid || before.domain != now.domain {
+        return None;
+    }
+    let pairs = before.steps.iter().zip(&now.steps);
+    let equal = pairs.take_while(|(old, new)| old.period == new.period && old.frame == new.frame);
+    equal.last().map(|(_, new)| new.period.end)
 }

@@ -40,7 +40,7 @@ mod serve;
 mod state;
 mod versions;
 
-pub use catalogue::Layer;
+pub use catalogue::{Accumulated, Layer};
 pub use config::Settings;
 pub use error::{ServeError, ServerError};
 pub use request::job as picture_job;

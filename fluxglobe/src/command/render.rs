@@ -2,7 +2,7 @@
 
 use anyhow::{Context as _, Result};
 use contract::colour::TransferFunction;
-use contract::job::{RENDERER_VERSION, RenderJob, Style, View};
+use contract::job::{RenderJob, Style, View};
 use contract::manifest::Manifest;
 use contract::tile::Tile;
 use storage::Store;
@@ -60,26 +60,17 @@ async fn job(
     let mut style = Style::with_transfer(TransferFunction::default_for(manifest.quantity));
     style.slices = picture.slices.unwrap_or(style.slices);
     style.particles_per_cell = picture.particles.unwrap_or(style.particles_per_cell);
-    Ok(RenderJob {
-        renderer_version: RENDERER_VERSION,
-        product: manifest.id(),
-        accumulated: accumulated(store, &manifest).await?,
-        time: picture.time.unwrap_or(last.period.mid()),
-        mode: picture.mode,
-        view,
-        style,
-    })
+    let time = picture.time.unwrap_or(last.period.mid());
+    let lift = accumulated(store, &manifest).await?;
+    let job = RenderJob::of(&manifest, lift.as_ref(), time, picture.mode, view, style)?;
+    Ok(job)
 }
 
 /// Accumulated carbon of just this version of a product, if it was derived.
-async fn accumulated(
-    store: &Store,
-    manifest: &Manifest,
-) -> Result<Option<contract::manifest::ManifestId>> {
+async fn accumulated(store: &Store, manifest: &Manifest) -> Result<Option<Manifest>> {
     let Ok(product) = manifest.product.accumulated() else {
         return Ok(None);
     };
     let latest = storage::manifests::latest(store, &product).await?;
-    let derived = latest.filter(|derived| derived.derived_from == Some(manifest.id()));
-    Ok(derived.map(|derived| derived.id()))
+    Ok(latest.filter(|derived| derived.derived_from == Some(manifest.id())))
 }

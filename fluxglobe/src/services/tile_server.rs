@@ -18,7 +18,7 @@ pub(crate) async fn run(settings: &Settings, options: TileServer) -> Result<()> 
     let footing = Footing::take(settings, "tile-server", None, &[]).await?;
     // Opening asks nobody: /healthz is answered while the store is waited for, and /readyz says so.
     let store = Store::open(footing.store_url())?;
-    let fleet = Fleet::start(&options.fleet, store.clone(), &footing.registry)?;
+    let fleet = Fleet::start(&options.fleet, &footing.registry)?;
     let measured = observations::open(&options.observations, &store)?;
     let analyst = Analyst {
         local: Engine::local(store.clone()),

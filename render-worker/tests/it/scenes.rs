@@ -6,6 +6,7 @@ use std::sync::Arc;
 use contract::colour::TransferFunction;
 use contract::grid::Grid;
 use contract::job::{Mode, RENDERER_VERSION, RenderJob, Style, View};
+use contract::moment::Moment;
 use contract::quantity::Quantity;
 use contract::tile::Tile;
 use render_worker::scene::{Frame, Interval, Scene};
@@ -91,13 +92,21 @@ pub(crate) fn ocean(grid: Grid) -> Scene {
     }
 }
 
-/// A job in the default style of fluxes.
+fn moment(product: &str) -> Moment {
+    Moment {
+        domain: format!("domain/{product}/0").parse().unwrap(),
+        before: Some(format!("frames/{product}/0").parse().unwrap()),
+        after: None,
+    }
+}
+
+/// A job in the default style of fluxes, for scenes that are there already.
 pub(crate) fn job(mode: Mode, view: View) -> RenderJob {
     RenderJob {
         renderer_version: RENDERER_VERSION,
-        product: "made-up@1-00000000".parse().unwrap(),
-        accumulated: Some("made-up-accumulated@1-00000000".parse().unwrap()),
-        time: "2000-11-01".parse().unwrap(),
+        grid: FIVE_DEGREES,
+        value: moment("made-up"),
+        accumulated: Some(moment("made-up-accumulated")),
         mode,
         view,
         style: Style::with_transfer(TransferFunction::default_for(Quantity::CarbonFlux)),

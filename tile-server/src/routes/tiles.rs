@@ -43,8 +43,8 @@ pub(crate) async fn get(
     let job = request::job(&layer, mode, View::Tile { tile, size_px }, time)?;
     // Who looks at an old version is no reason to draw a new one.
     if state.catalogue.is_newest(&layer) {
-        let product = &layer.manifest.product;
-        state.hot.asked(product, mode, &job.view, job.time);
+        let (product, shown) = (&layer.manifest.product, request::shown_time(&layer, time));
+        state.hot.asked(product, mode, &job.view, shown);
     }
     let response = picture::respond(&state, &headers, job).await?;
     if mode == Mode::Volume {

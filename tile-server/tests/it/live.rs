@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use contract::digest::Digest;
 use contract::event::{Body, Event};
-use contract::job::RenderJob;
+use contract::job::{Mode, RenderJob};
 use contract::manifest::ManifestId;
 use contract::quantity::Quantity;
 use contract::time::TimeMs;
@@ -146,21 +146,22 @@ async fn exactly_the_hot_tiles_that_it_touches_are_ordered() {
     live.landed(&new).await;
     live.until(async || !live.orders().await.is_empty()).await;
     let orders = live.orders().await;
-    let mut asked: Vec<String> = orders
-        .iter()
-        .map(|(_, job)| format!("{} {}", job.mode, job.time))
-        .collect();
-    asked.sort();
+    let mut asked: Vec<_> = orders.iter().map(|(_, job)| (job.mode, &job.value)).collect();
+    asked.sort_by_key(|(mode, _)| *mode);
+    let (march, february) = (
+        live.app.moment("sst", "2000-03-20").await,
+        live.app.moment("sst", "2000-02-20").await,
+    );
     assert_eq!(
         asked,
         [
-            "map 2000-02-20T00:00:00Z",
-            "volume 2000-03-20T00:00:00Z",
-            "volume 2000-03-20T00:00:00Z"
-        ]
+            (Mode::Map, &february),
+            (Mode::Volume, &march),
+            (Mode::Volume, &march)
+        ],
+        "and of the new version"
     );
-    for (event, job) in &orders {
-        assert_eq!(job.product, new);
+    for (event, _) in &orders {
         assert_eq!(event.trace, "trace-1");
         assert_eq!(event.noticed, Some(noticed()));
     }
@@ -192,7 +193,7 @@ async fn pictures_of_a_flux_wait_for_what_lifts_their_particles() {
         .land_last_month(product, quantity, 2, Some(flux.clone()))
         .await;
     live.say(Body::ProductDerived {
-        manifest: lift.clone(),
+        manifest: lift,
         derived_from: flux.clone(),
     })
     .await;
@@ -206,8 +207,10 @@ async fn pictures_of_a_flux_wait_for_what_lifts_their_particles() {
     live.until(async || !live.orders().await.is_empty()).await;
     let orders = live.orders().await;
     assert_eq!(orders.len(), 1);
-    assert_eq!(orders[0].1.product, flux);
-    assert_eq!(orders[0].1.accumulated, Some(lift));
+    let time = "2000-03-20";
+    assert_eq!(orders[0].1.value, live.app.moment("flux", time).await);
+    let lifting = live.app.moment(product, time).await;
+    assert_eq!(orders[0].1.accumulated, Some(lifting));
 }
 
 #[tokio::test]
