@@ -79,6 +79,13 @@ struct Snapshot {
     layers: BTreeMap<ProductId, Arc<Layer>>,
 }
 
+/// A store that could not be read.
+#[derive(Debug)]
+struct Failure {
+    at: Instant,
+    error: Arc<StorageError>,
+}
+
 /// What the store says of its products.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Probe {
@@ -96,8 +103,8 @@ pub struct Catalogue {
     metrics: Metrics,
     snapshot: RwLock<Arc<Snapshot>>,
     versions: Versions,
-    /// Held while the store is read, so that a crowd reads it once.
-    reading: tokio::sync::Mutex<()>,
+    /// Held while the store is read, so that a crowd reads it once; when and how that failed the last time.
+    reading: tokio::sync::Mutex<Option<Failure>>,
 }
 
 impl Catalogue {
@@ -109,7 +116,7 @@ impl Catalogue {
             max_age,
             metrics,
             snapshot: RwLock::default(),
-            reading: tokio::sync::Mutex::new(()),
+            reading: tokio::sync::Mutex::default(),
         }
     }
 
@@ -214,30 +221,46 @@ impl Catalogue {
         if let Some(snapshot) = self.fresh() {
             return Ok(snapshot);
         }
-        let _reading = self.reading.lock().await;
+        let asked_at = Instant::now();
+        let mut failure = self.reading.lock().await;
         if let Some(snapshot) = self.fresh() {
             return Ok(snapshot);
         }
         let before = self.current();
+        // Whoever waited while it failed does not wait for it to fail again.
+        if let Some(failure) = failure.as_ref().filter(|failure| failure.at >= asked_at) {
+            return known_before(before, &failure.error);
+        }
         match self.read(&before).await {
             Ok(snapshot) => {
                 let snapshot = Arc::new(snapshot);
                 self.metrics.products.set(snapshot.layers.len() as i64);
-                *self
-                    .snapshot
-                    .write()
-                    .unwrap_or_else(PoisonError::into_inner) = Arc::clone(&snapshot);
+                self.replace(Arc::clone(&snapshot));
+                *failure = None;
                 Ok(snapshot)
             }
             Err(error) => {
                 self.metrics.store_failures.inc();
-                if before.read_at.is_none() && before.known.is_empty() {
-                    return Err(error.into());
-                }
                 tracing::warn!(%error, "the list of products cannot be read; the one before is used");
-                Ok(before)
+                let (at, error) = (Instant::now(), Arc::new(error));
+                let answer = known_before(Arc::clone(&before), &error);
+                if answer.is_ok() {
+                    // As old as if it had been read now: the store is asked again when that is too old.
+                    self.replace(Arc::new(Snapshot {
+                        read_at: Some(at),
+                        known: before.known.clone(),
+                        layers: before.layers.clone(),
+                    }));
+                }
+                *failure = Some(Failure { at, error });
+                answer
             }
         }
+    }
+
+    fn replace(&self, snapshot: Arc<Snapshot>) {
+        let held = self.snapshot.write();
+        *held.unwrap_or_else(PoisonError::into_inner) = snapshot;
     }
 
     /// One listing of all manifests; only those that are new are read.
@@ -336,6 +359,17 @@ impl Catalogue {
             }
         }
     }
+}
+
+/// What is known although the store does not answer, if anything is.
+fn known_before(
+    before: Arc<Snapshot>,
+    error: &Arc<StorageError>,
+) -> Result<Arc<Snapshot>, ServerError> {
+    if before.read_at.is_none() && before.known.is_empty() {
+        return Err(ServerError::Storage(Arc::clone(error)));
+    }
+    Ok(before)
 }
 
 type Entry = (ObjectKey, Arc<Manifest>, ManifestId);

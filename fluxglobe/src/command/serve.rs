@@ -15,7 +15,7 @@ use crate::ports::{Analyst, Drawer, Observer};
 use crate::{deployment, progress, viewer};
 
 pub(crate) async fn run(settings: &Settings, options: tile_server::config::Settings) -> Result<()> {
-    let store = deployment::store(settings)?;
+    let store = deployment::interactive_store(settings)?;
     let check = crate::demo::check::stored(&store).await?;
     let server = bind(settings, store, options, check).await?;
     announce(&server);

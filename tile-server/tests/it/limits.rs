@@ -53,10 +53,14 @@ async fn an_answer_that_takes_too_long_ends_with_a_reason() {
     assert!(answer.reason().contains("longer than 1 s"));
     assert!(!answer.header("retry-after").is_empty());
     assert_eq!(
-        app.metric("fluxglobe_tile_server_in_flight").await,
+        app.metric(r#"fluxglobe_tile_server_in_flight{operation="/metrics"}"#)
+            .await,
         1,
-        "only the request for the metrics"
+        "the request for the metrics"
     );
+    let tiles = r#"fluxglobe_tile_server_in_flight{operation="/tiles/{product}/{mode}/{z}/{x}/{y_png}"}"#;
+    let text = app.get("/metrics").await.text();
+    assert!(text.contains(&format!("{tiles} 0\n")), "no other: {text}");
 }
 
 #[tokio::test]

@@ -182,3 +182,31 @@ async fn offsets_of_times_survive_the_address() {
         assert_eq!(app.drawer.last_job().value, meant);
     }
 }
+
+#[tokio::test]
+async fn a_picture_says_which_instant_it_shows_and_what_there_is_if_that_is_another() {
+    let app = TestApp::new().await;
+    let of = async |time: &str| {
+        let tile = app.get(&format!("/tiles/flux/map/0/0/0.png{time}")).await;
+        let globe = app.get(&format!("/globe/flux/map.png{time}")).await;
+        let said = |answer: &crate::app::Answer| {
+            ["fluxglobe-time", "fluxglobe-time-covered"].map(|name| answer.header(name).to_owned())
+        };
+        assert_eq!(said(&tile), said(&globe));
+        let tag = tile.header("etag");
+        let asked = format!("/tiles/flux/map/0/0/0.png{time}");
+        let again = app.get_with(&asked, &[("if-none-match", tag)]).await;
+        assert_eq!(again.status, StatusCode::NOT_MODIFIED);
+        assert_eq!(said(&again), said(&tile));
+        said(&tile)
+    };
+    let covered = "2000-01-01T00:00:00Z/2000-04-01T00:00:00Z";
+    assert_eq!(of("").await, ["2000-03-16T12:00:00Z", ""]);
+    assert_eq!(of("?time=2000-02-03").await, ["2000-02-03T00:00:00Z", ""]);
+    assert_eq!(of("?time=1900").await, ["2000-01-01T00:00:00Z", covered]);
+    assert_eq!(of("?time=2026-11-21").await, ["2000-04-01T00:00:00Z", covered]);
+    let origin = [("origin", "http://map.example")];
+    let answer = app.get_with("/tiles/flux/map/0/0/0.png", &origin).await;
+    let exposed = answer.header("access-control-expose-headers");
+    assert!(exposed.contains("fluxglobe-time-covered"), "{exposed}");
+}

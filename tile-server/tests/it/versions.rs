@@ -69,6 +69,8 @@ async fn a_version_that_is_not_there_is_not_found_and_nonsense_is_refused() {
     let sst = sst.as_str().unwrap();
     for address in [
         "/tiles/flux/map/0/0/0.png?",
+        "/tiles/flux/map.json?",
+        "/globe/flux/map.png?",
         "/api/products/flux/point?lon=15&lat=-5&",
         "/api/products/flux/budget?",
     ] {
@@ -86,4 +88,27 @@ async fn a_version_that_is_not_there_is_not_found_and_nonsense_is_refused() {
         }
     }
     assert_eq!(app.drawer.drawn_count(), 0);
+}
+
+#[tokio::test]
+async fn a_globe_and_a_tilejson_show_the_version_that_was_asked_for() {
+    let app = TestApp::new().await;
+    let cited = version(&app, "flux").await;
+    let path = "/globe/flux/map.png?time=2000-02-20";
+    let old = app.get(path).await.header("etag").to_owned();
+    app.land("flux", Quantity::CarbonFlux, 2).await;
+    assert_ne!(app.get(path).await.header("etag"), old);
+    let named = app.get(&format!("{path}&manifest={cited}")).await;
+    assert_eq!(named.header("etag"), old);
+    let of = async |query: &str| app.get(&format!("/tiles/flux/map.json{query}")).await.json();
+    assert_ne!(of("").await["manifest"], cited);
+    let json = of(&format!("?time=2000-02&manifest={cited}")).await;
+    assert_eq!(json["manifest"], cited);
+    let tiles = json["tiles"][0].as_str().unwrap();
+    let expected = format!("{{y}}.png?time=2000-02-01T00:00:00Z&manifest={cited}");
+    assert!(tiles.ends_with(&expected), "{tiles}");
+    let tile = tiles.replace("{z}/{x}/{y}", "0/0/0");
+    app.get(&tile).await;
+    let same = format!("/tiles/flux/map/0/0/0.png?time=2000-02-01&manifest={cited}");
+    assert_eq!(app.get(&tile).await.header("etag"), app.get(&same).await.header("etag"));
 }
