@@ -45,7 +45,10 @@ pub(crate) async fn bind(
         registry,
     )?
     .with_observations(Arc::new(Observer(Arc::new(FileStore::new(store)))));
-    Ok(Server::bind(&options, state).await?)
+    let server = Server::bind(&options, state.clone()).await?;
+    // The event log belongs to whoever lands: `fluxglobe ingest` beside this server. Ends with the server.
+    tokio::spawn(state.watch().run());
+    Ok(server)
 }
 
 /// Says where to look.

@@ -137,13 +137,23 @@ impl LiveService {
 
     /// Tells of what landed while nobody followed.
     async fn catch_up(&mut self) {
-        self.state.catalogue.outdated();
+        self.renew().await;
         let Ok(layers) = self.state.catalogue.layers().await else {
             return;
         };
         for layer in layers {
             if let Some(touched) = self.see(&layer) {
                 self.state.news.tell(layer.id.clone(), touched);
+            }
+        }
+    }
+
+    /// Reads the list of products anew. A store that is away is waited for: what landed is told of later, not never.
+    async fn renew(&self) {
+        for pause in service::pauses() {
+            match self.state.catalogue.renew().await {
+                Err(error) if error.is_retryable() => tokio::time::sleep(pause).await,
+                Ok(()) | Err(_) => return,
             }
         }
     }
@@ -166,7 +176,7 @@ impl LiveService {
         event: &Event,
         manifest: &ManifestId,
     ) -> Result<Vec<Period>, StorageError> {
-        self.state.catalogue.outdated();
+        self.renew().await;
         let layer = match self.state.catalogue.layer(manifest.product.as_str()).await {
             Ok(layer) => layer,
             Err(error) => {

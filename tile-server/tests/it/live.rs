@@ -284,3 +284,31 @@ async fn a_log_that_is_away_is_waited_for_and_what_landed_meanwhile_is_told() {
     assert_eq!(told.data["manifest"], new.to_string());
     assert_eq!(told.data["touched"][0]["start"], "2000-02-01T00:00:00Z");
 }
+
+#[tokio::test]
+async fn without_a_log_what_another_process_lands_is_told_all_the_same() {
+    let app = TestApp::new().await;
+    let watch = app.state.watch().every(Duration::from_millis(20));
+    let watching = tokio::spawn(watch.run());
+    let mut viewer = Viewer::new(&app, None).await;
+    // What is there already is no news, however often it is looked at.
+    tokio::time::sleep(Duration::from_millis(200)).await;
+    let (quantity, carbon) = (Quantity::CarbonFlux, Quantity::AccumulatedCarbon);
+    let flux = app.land_last_month("flux", quantity, 2, None).await;
+    let told = viewer.next().await.unwrap();
+    assert_eq!(told.data["manifest"], flux.to_string());
+    assert_eq!(told.data["touched"][0]["start"], "2000-02-01T00:00:00Z");
+    let lift = app
+        .land_last_month("flux-accumulated", carbon, 2, Some(flux.clone()))
+        .await;
+    let mut names = vec![];
+    for _ in 0..2 {
+        let told = viewer.next().await.unwrap();
+        names.push(told.data["manifest"].as_str().unwrap().to_owned());
+        assert_eq!(told.data["touched"][0]["start"], "2000-02-01T00:00:00Z");
+    }
+    names.sort();
+    assert_eq!(names, [lift.to_string(), flux.to_string()], "it is lifted by something else now");
+    app.state.news.close();
+    watching.await.unwrap();
+}

@@ -32,6 +32,20 @@ export function clampToRange(steps: readonly Step[], timeMs: number): number {
   return range ? Math.min(Math.max(timeMs, range.startMs), range.endMs) : timeMs;
 }
 
+/** Is there nothing of this instant? */
+export function isOutside(steps: readonly Step[], timeMs: number): boolean {
+  return clampToRange(steps, timeMs) !== timeMs;
+}
+
+/** What a reader is told who asked for an instant that there is nothing of; what is shown is `clampToRange`'s. */
+export function outsideText(title: string, steps: readonly Step[], timeMs: number): string {
+  const range = rangeOf(steps);
+  if (!range) return "";
+  const [from, to] = [range.startMs, range.endMs].map(formatInstant);
+  const shown = formatInstant(clampToRange(steps, timeMs));
+  return `“${title}” has nothing of ${formatInstant(timeMs)}: it covers ${from} to ${to}. Shown is ${shown}.`;
+}
+
 /**
  * Place of an instant on the axis of steps: 2.25 is a quarter into the third step.
  * An instant in a hole between two steps is at the start of the later one.

@@ -4,7 +4,9 @@ import {
   clampToRange,
   formatInstant,
   instantAt,
+  isOutside,
   nextInstant,
+  outsideText,
   parseSteps,
   positionOf,
   quantise,
@@ -123,5 +125,25 @@ describe("texts", () => {
     expect(stepLabel(step("2000-01-01T00:00:00Z", "2001-01-01T00:00:00Z"))).toBe("2000");
     expect(stepLabel(step("2002-01-05T00:00:00Z", "2002-01-06T00:00:00Z"))).toBe("5 Jan 2002");
     expect(stepLabel(step("2002-01-05T06:00:00Z", "2002-01-05T12:00:00Z"))).toBe("5 Jan 2002 06:00");
+  });
+});
+
+describe("an instant that there is nothing of", () => {
+  it("is told with what there is and what is shown", () => {
+    const text = outsideText("Flux", STEPS, at("1850-03-01T00:00:00Z"));
+    expect(text).toBe(
+      "“Flux” has nothing of 1 Mar 1850, 00:00 UTC: it covers 1 Jan 2000, 00:00 UTC to 1 Jun 2000, 00:00 UTC. " +
+        "Shown is 1 Jan 2000, 00:00 UTC.",
+    );
+    expect(outsideText("Flux", STEPS, at("2026-11-21T00:00:00Z"))).toMatch(/Shown is 1 Jun 2000, 00:00 UTC\.$/);
+  });
+
+  it("lies beyond both ends and in no hole", () => {
+    expect(["1999-12-31T23:59:59Z", "2000-06-01T00:00:01Z"].map((time) => isOutside(STEPS, at(time)))).toEqual([true, true]);
+    expect([JAN.start, "2000-04-01T00:00:00Z", MAY.end].map((time) => isOutside(STEPS, at(time)))).toEqual([
+      false,
+      false,
+      false,
+    ]);
   });
 });
