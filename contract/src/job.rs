@@ -394,7 +394,13 @@ mod tests {
 
     #[test]
     fn a_job_that_is_read_back_has_the_name_it_was_written_with() {
-        for odd in [0.1 + 0.2, 1.0 / 3.0, 123.456_789_012_345_67, 5e-324_f64.sqrt(), 360.0 / 8640.0] {
+        for odd in [
+            0.1 + 0.2,
+            1.0 / 3.0,
+            123.456_789_012_345_67,
+            5e-324_f64.sqrt(),
+            360.0 / 8640.0,
+        ] {
             let mut job = job();
             job.grid.dlon_deg = odd;
             job.grid.west_deg = -odd;
@@ -430,8 +436,7 @@ mod tests {
                 j.accumulated = Some(Moment {
                     after: after("frames/p/b", 2.0),
                     ..moment()
-                }
-                );
+                });
             },
             |j| j.style.slices = 1_000_000_000,
             |j| j.style.slices = 0,

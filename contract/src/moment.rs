@@ -171,7 +171,10 @@ mod tests {
         let moving = at(&carbon, "2000-01-16T12:00:00Z");
         assert_eq!(moving.before, None);
         let after = moving.after.unwrap();
-        assert_eq!((after.frame, after.weight.to_bits()), (frame("a"), 0.5_f64.to_bits()));
+        assert_eq!(
+            (after.frame, after.weight.to_bits()),
+            (frame("a"), 0.5_f64.to_bits())
+        );
         let end = at(&carbon, "2000-02-01");
         assert_eq!((end.before, end.after), (Some(frame("a")), None));
     }

@@ -20,7 +20,11 @@ pub(crate) fn leave_alone() {
     if let Ok(program) = std::env::current_exe() {
         let mut words = std::env::args_os();
         let mut again = std::process::Command::new(program);
-        again.arg0(words.next().unwrap_or_else(|| OsStr::new("fluxglobe").to_owned()));
+        again.arg0(
+            words
+                .next()
+                .unwrap_or_else(|| OsStr::new("fluxglobe").to_owned()),
+        );
         // Comes back only if it failed.
         drop(again.args(words).env(SWITCH, "1").exec());
     }
@@ -38,7 +42,10 @@ mod tests {
     fn a_desktop_and_a_choice_that_was_made_are_left_as_they_are() {
         let with = |names: &'static [&str]| is_wanted(|name| names.contains(&name));
         assert!(with(&[]));
-        assert!(!with(&["NODEVICE_SELECT"]), "it would start itself for ever");
+        assert!(
+            !with(&["NODEVICE_SELECT"]),
+            "it would start itself for ever"
+        );
         assert!(!with(&["DISPLAY"]));
         assert!(!with(&["WAYLAND_DISPLAY"]));
     }

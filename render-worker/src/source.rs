@@ -131,11 +131,7 @@ impl Source {
         frame
     }
 
-    async fn domain(
-        &self,
-        grid: &Grid,
-        moment: &Moment,
-    ) -> Result<Arc<Cells<u32>>, RenderError> {
+    async fn domain(&self, grid: &Grid, moment: &Moment) -> Result<Arc<Cells<u32>>, RenderError> {
         let held = self.lock().domains.get(&moment.domain);
         let domain = if let Some(domain) = held {
             domain

@@ -142,7 +142,10 @@ async fn a_landing_leaves_pictures_that_it_does_not_touch_their_name_and_their_b
         assert_eq!(old.key(), new.key(), "{time}");
     }
     // After the middle of what was the last month the new one shows.
-    let (old, new) = (at(&flux, &carbon, "2000-02-25"), at(&longer, &carbon, "2000-02-25"));
+    let (old, new) = (
+        at(&flux, &carbon, "2000-02-25"),
+        at(&longer, &carbon, "2000-02-25"),
+    );
     assert_ne!(old.key(), new.key());
     let (old, new) = (service.draw(&old).await, service.draw(&new).await);
     assert_ne!(old.unwrap(), new.unwrap());

@@ -176,7 +176,8 @@ mod tests {
         }
 
         fn wrote(&mut self, second: u64) {
-            self.progress.wrote(self.start + Duration::from_secs(second));
+            self.progress
+                .wrote(self.start + Duration::from_secs(second));
         }
 
         fn due(&self) -> (u64, End) {
@@ -243,7 +244,10 @@ mod tests {
         let now = Instant::now();
         for size in 1..=HTTP2.len() {
             let mut progress = Progress::new(now);
-            let ends: Vec<_> = HTTP2.chunks(size).map(|part| progress.read(part, now)).collect();
+            let ends: Vec<_> = HTTP2
+                .chunks(size)
+                .map(|part| progress.read(part, now))
+                .collect();
             let (last, before) = ends.split_last().unwrap();
             assert_eq!(*last, Some(End::Http2), "{size}");
             assert!(before.iter().all(Option::is_none), "{size}");

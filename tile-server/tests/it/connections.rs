@@ -32,7 +32,9 @@ impl Running {
             change(settings);
         })
         .await;
-        let server = Server::bind(&app.state.settings, app.state.clone()).await.unwrap();
+        let server = Server::bind(&app.state.settings, app.state.clone())
+            .await
+            .unwrap();
         let address = server.address();
         let task = tokio::spawn(async {
             server.run(std::future::pending()).await.unwrap();
@@ -50,7 +52,9 @@ impl Running {
     }
 
     async fn open(&self) -> u64 {
-        self.app.metric("fluxglobe_tile_server_connections_count").await
+        self.app
+            .metric("fluxglobe_tile_server_connections_count")
+            .await
     }
 }
 
@@ -91,20 +95,38 @@ async fn a_head_that_comes_a_byte_at_a_time_ends_the_connection() {
     let endless = format!("GET / HTTP/1.1\r\nx: {}", "y".repeat(400));
     let pause = Duration::from_millis(50);
     // The first request of a connection, one after an answer, one after empty lines, and one behind another.
-    for before in ["", REQUEST, "\r\n\r\n\r\n", "GET /healthz HTTP/1.1\r\nHost: a\r\n\r\nG"] {
+    for before in [
+        "",
+        REQUEST,
+        "\r\n\r\n\r\n",
+        "GET /healthz HTTP/1.1\r\nHost: a\r\n\r\nG",
+    ] {
         let mut slow = server.connect().await;
         slow.write_all(before.as_bytes()).await.unwrap();
         if before.starts_with("GET") {
-            assert!(answer(&mut slow).await.starts_with("HTTP/1.1 200"), "{before:?}");
+            assert!(
+                answer(&mut slow).await.starts_with("HTTP/1.1 200"),
+                "{before:?}"
+            );
         }
         let took = trickle(&mut slow, &endless, pause).await;
-        assert!(took < Duration::from_secs(10), "{before:?}: {took:?} of 20 s");
+        assert!(
+            took < Duration::from_secs(10),
+            "{before:?}: {took:?} of 20 s"
+        );
     }
-    assert_eq!(server.ended("slow").await, 4, "the limit, and nothing else, ended them");
+    assert_eq!(
+        server.ended("slow").await,
+        4,
+        "the limit, and nothing else, ended them"
+    );
     // Whoever is quick enough is answered, also in pieces.
     let mut quick = server.connect().await;
     let took = trickle(&mut quick, REQUEST, Duration::from_millis(5)).await;
-    assert!(answer(&mut quick).await.starts_with("HTTP/1.1 200"), "{took:?}");
+    assert!(
+        answer(&mut quick).await.starts_with("HTTP/1.1 200"),
+        "{took:?}"
+    );
 }
 
 #[tokio::test]
@@ -121,7 +143,10 @@ async fn a_connection_on_which_nothing_moves_is_ended_and_a_slow_answer_is_not()
     tokio::time::sleep(Duration::from_secs(3)).await;
     drawer.turns.add_permits(1);
     let drawn = answer(&mut waiting).await;
-    assert!(drawn.starts_with("HTTP/1.1 200"), "3 s are more than the head may take: {drawn}");
+    assert!(
+        drawn.starts_with("HTTP/1.1 200"),
+        "3 s are more than the head may take: {drawn}"
+    );
     assert_eq!(server.ended("slow").await, 0);
     // Nine seconds: five more than a request may take.
     assert_eq!(answer(&mut silent).await, "", "hung up");
@@ -146,8 +171,14 @@ async fn those_beyond_the_limit_are_told_to_come_again_and_find_room_when_others
         assert!(told.starts_with("HTTP/1.1 503"), "{told}");
         assert!(told.contains("\r\nretry-after: 1\r\n"), "{told}");
         let (_, body) = told.split_once("\r\n\r\n").unwrap();
-        assert!(told.contains(&format!("content-length: {}\r\n", body.len())), "{told}");
-        assert!(serde_json::from_str::<serde_json::Value>(body).is_ok(), "{body}");
+        assert!(
+            told.contains(&format!("content-length: {}\r\n", body.len())),
+            "{told}"
+        );
+        assert!(
+            serde_json::from_str::<serde_json::Value>(body).is_ok(),
+            "{body}"
+        );
         assert_eq!(server.ended("full").await, number);
     }
     drop(inside.pop());

@@ -61,7 +61,8 @@ async fn an_answer_that_takes_too_long_ends_with_a_reason() {
         1,
         "the request for the metrics"
     );
-    let tiles = r#"fluxglobe_tile_server_in_flight{operation="/tiles/{product}/{mode}/{z}/{x}/{y_png}"}"#;
+    let tiles =
+        r#"fluxglobe_tile_server_in_flight{operation="/tiles/{product}/{mode}/{z}/{x}/{y_png}"}"#;
     let text = app.get("/metrics").await.text();
     assert!(text.contains(&format!("{tiles} 0\n")), "no other: {text}");
 }

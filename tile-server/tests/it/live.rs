@@ -146,7 +146,10 @@ async fn exactly_the_hot_tiles_that_it_touches_are_ordered() {
     live.landed(&new).await;
     live.until(async || !live.orders().await.is_empty()).await;
     let orders = live.orders().await;
-    let mut asked: Vec<_> = orders.iter().map(|(_, job)| (job.mode, &job.value)).collect();
+    let mut asked: Vec<_> = orders
+        .iter()
+        .map(|(_, job)| (job.mode, &job.value))
+        .collect();
     asked.sort_by_key(|(mode, _)| *mode);
     let (march, february) = (
         live.app.moment("sst", "2000-03-20").await,
@@ -308,7 +311,11 @@ async fn without_a_log_what_another_process_lands_is_told_all_the_same() {
         assert_eq!(told.data["touched"][0]["start"], "2000-02-01T00:00:00Z");
     }
     names.sort();
-    assert_eq!(names, [lift.to_string(), flux.to_string()], "it is lifted by something else now");
+    assert_eq!(
+        names,
+        [lift.to_string(), flux.to_string()],
+        "it is lifted by something else now"
+    );
     app.state.news.close();
     watching.await.unwrap();
 }

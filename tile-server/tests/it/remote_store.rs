@@ -50,7 +50,9 @@ async fn object(
         headers
     };
     match method {
-        Method::PUT if objects.contains_key(&key) => StatusCode::PRECONDITION_FAILED.into_response(),
+        Method::PUT if objects.contains_key(&key) => {
+            StatusCode::PRECONDITION_FAILED.into_response()
+        }
         Method::PUT => {
             let headers = dated(content.len());
             objects.insert(key, content);
@@ -117,7 +119,9 @@ async fn a_store_that_goes_silent_is_told_of_within_seconds_and_what_is_known_is
     app.drawer.is_slow.store(true, Ordering::SeqCst);
     let begun = Instant::now();
     let known = (0..10).map(|_| app.get(tile));
-    let paths: Vec<String> = (0..3).map(|x| format!("/tiles/flux/map/2/{x}/0.png")).collect();
+    let paths: Vec<String> = (0..3)
+        .map(|x| format!("/tiles/flux/map/2/{x}/0.png"))
+        .collect();
     let unknown = paths.iter().map(|path| app.get(path));
     let (known, unknown) = tokio::join!(
         futures::future::join_all(known),
@@ -126,7 +130,10 @@ async fn a_store_that_goes_silent_is_told_of_within_seconds_and_what_is_known_is
     let took = begun.elapsed();
     assert!(took < Duration::from_secs(40), "{took:?}");
     println!("a crowd was answered within {took:?}");
-    assert!(bucket.unanswered.load(Ordering::SeqCst) > 0, "the fault took place");
+    assert!(
+        bucket.unanswered.load(Ordering::SeqCst) > 0,
+        "the fault took place"
+    );
     for answer in known {
         assert_eq!((answer.status, &answer.body), (StatusCode::OK, &first.body));
     }
@@ -153,5 +160,9 @@ async fn a_crowd_that_comes_while_nothing_is_known_waits_for_one_failure_only() 
     }
     let took = begun.elapsed();
     assert!(took < Duration::from_secs(30), "{took:?}");
-    assert_eq!(bucket.unanswered.load(Ordering::SeqCst), 1, "asked once for all");
+    assert_eq!(
+        bucket.unanswered.load(Ordering::SeqCst),
+        1,
+        "asked once for all"
+    );
 }

@@ -98,8 +98,7 @@ async fn double_resolution_can_be_asked_for_as_map_clients_do() {
 #[tokio::test]
 async fn accumulated_carbon_that_came_from_another_version_does_not_lift_particles() {
     let app = TestApp::new().await;
-    app.land("flux", Quantity::CarbonFlux, 2)
-        .await;
+    app.land("flux", Quantity::CarbonFlux, 2).await;
     app.get("/tiles/flux/volume/0/0/0.png").await;
     assert_eq!(app.drawer.last_job().accumulated, None);
     let new = app.moment("flux", "2000-03-16T12:00:00Z").await;
@@ -139,7 +138,11 @@ async fn a_landing_leaves_tiles_that_it_does_not_touch_as_they_are() {
     let after = tags().await;
     assert_eq!(is_same(&before, &after), [untouched, untouched].concat());
     assert_eq!(waiting[..4], after[..4], "maps are not lifted");
-    assert_eq!(app.drawer.drawn_count() - drawn, 4 + 1, "only what differs was drawn");
+    assert_eq!(
+        app.drawer.drawn_count() - drawn,
+        4 + 1,
+        "only what differs was drawn"
+    );
 }
 
 #[tokio::test]
@@ -204,7 +207,10 @@ async fn a_picture_says_which_instant_it_shows_and_what_there_is_if_that_is_anot
     assert_eq!(of("").await, ["2000-03-16T12:00:00Z", ""]);
     assert_eq!(of("?time=2000-02-03").await, ["2000-02-03T00:00:00Z", ""]);
     assert_eq!(of("?time=1900").await, ["2000-01-01T00:00:00Z", covered]);
-    assert_eq!(of("?time=2026-11-21").await, ["2000-04-01T00:00:00Z", covered]);
+    assert_eq!(
+        of("?time=2026-11-21").await,
+        ["2000-04-01T00:00:00Z", covered]
+    );
     let origin = [("origin", "http://map.example")];
     let answer = app.get_with("/tiles/flux/map/0/0/0.png", &origin).await;
     let exposed = answer.header("access-control-expose-headers");

@@ -100,7 +100,11 @@ async fn a_globe_and_a_tilejson_show_the_version_that_was_asked_for() {
     assert_ne!(app.get(path).await.header("etag"), old);
     let named = app.get(&format!("{path}&manifest={cited}")).await;
     assert_eq!(named.header("etag"), old);
-    let of = async |query: &str| app.get(&format!("/tiles/flux/map.json{query}")).await.json();
+    let of = async |query: &str| {
+        app.get(&format!("/tiles/flux/map.json{query}"))
+            .await
+            .json()
+    };
     assert_ne!(of("").await["manifest"], cited);
     let json = of(&format!("?time=2000-02&manifest={cited}")).await;
     assert_eq!(json["manifest"], cited);
@@ -110,5 +114,8 @@ async fn a_globe_and_a_tilejson_show_the_version_that_was_asked_for() {
     let tile = tiles.replace("{z}/{x}/{y}", "0/0/0");
     app.get(&tile).await;
     let same = format!("/tiles/flux/map/0/0/0.png?time=2000-02-01&manifest={cited}");
-    assert_eq!(app.get(&tile).await.header("etag"), app.get(&same).await.header("etag"));
+    assert_eq!(
+        app.get(&tile).await.header("etag"),
+        app.get(&same).await.header("etag")
+    );
 }
