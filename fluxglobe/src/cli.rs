@@ -405,6 +405,17 @@ mod tests {
     }
 
     #[test]
+    fn what_every_command_takes_stands_apart_from_its_own() {
+        let mut program = Cli::command();
+        program.build();
+        let command = program.find_subcommand_mut("products").unwrap();
+        let help = command.render_help().to_string();
+        let (own, shared) = help.split_once("Options of every command:").unwrap();
+        assert!(own.contains("--json") && !own.contains("--data"), "{help}");
+        assert!(shared.contains("--data") && !shared.contains("--json"));
+    }
+
+    #[test]
     fn places_and_boxes_may_be_negative() {
         let words = [
             "fluxglobe",

@@ -5,6 +5,7 @@ use contract::colour::TransferFunction;
 use contract::job::{RenderJob, Style, View};
 use contract::manifest::Manifest;
 use contract::tile::Tile;
+use contract::time::Period;
 use storage::Store;
 
 use crate::cli::{Picture, Render, Settings};
@@ -61,6 +62,15 @@ async fn job(
     style.slices = picture.slices.unwrap_or(style.slices);
     style.particles_per_cell = picture.particles.unwrap_or(style.particles_per_cell);
     let time = picture.time.unwrap_or(last.period.mid());
+    if let Some(Period { start, end }) = manifest.extent()
+        && (time < start || time > end)
+    {
+        let shown = time.clamp(start, end);
+        progress::say(&format!(
+            "{} covers {start} to {end} and has nothing of {time}; shown is {shown}",
+            manifest.product
+        ));
+    }
     let lift = accumulated(store, &manifest).await?;
     let job = RenderJob::of(&manifest, lift.as_ref(), time, picture.mode, view, style)?;
     Ok(job)

@@ -212,8 +212,7 @@ async function renew(all: News[]): Promise<void> {
     report("products", error);
     return;
   }
-  const titles = new Set(all.map((news) => catalogue.find(news.product)?.title ?? news.product));
-  notices.tell("news", `New data: ${[...titles].join(", ")}`);
+  notices.tell("news", `New data: ${catalogue.titlesOf(all.map((news) => news.product)).join(", ")}`);
   controls.setProducts(catalogue.products);
   const now = product();
   if (!now) return;

@@ -11,6 +11,7 @@ export interface Step {
 export const PARTS_PER_STEP = 8;
 
 const DAY_MS = 86_400_000;
+const DAY_S = DAY_MS / 1000;
 const MONTHS = ["Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec"];
 
 export function parseSteps(raw: readonly { start: string; end: string; mid: string }[]): Step[] {
@@ -119,6 +120,31 @@ export function stepLabel(step: Step): string {
   if (days >= 27) return `${month} ${start.getUTCFullYear()}`;
   const day = `${start.getUTCDate()} ${month} ${start.getUTCFullYear()}`;
   return days >= 1 ? day : `${day} ${start.toISOString().slice(11, 16)}`;
+}
+
+/** Months by name and, where a year begins or at the first label, the year below; within days hours with the day below. */
+export function timeNames(
+  _plot: unknown,
+  splits: readonly number[],
+  _axis: number,
+  _space: number,
+  increment: number,
+): string[] {
+  let shownBelow = "";
+  return splits.map((seconds) => {
+    const date = new Date(seconds * 1000);
+    const named = (parts: Intl.DateTimeFormatOptions): string =>
+      new Intl.DateTimeFormat("en-GB", { timeZone: "UTC", ...parts }).format(date);
+    const year = String(date.getUTCFullYear());
+    if (increment >= 360 * DAY_S) return year;
+    const isWithinDays = increment < DAY_S;
+    const day = named({ month: "short", ...(increment < 27 * DAY_S ? { day: "numeric" } : {}) });
+    const below = isWithinDays ? `${day} ${year}` : year;
+    const name = isWithinDays ? date.toISOString().slice(11, 16) : day;
+    const text = below === shownBelow ? name : `${name}\n${below}`;
+    shownBelow = below;
+    return text;
+  });
 }
 
 function wholeSecond(timeMs: number): number {

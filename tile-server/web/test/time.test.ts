@@ -13,6 +13,7 @@ import {
   rangeOf,
   stepLabel,
   strideFor,
+  timeNames,
   toIso,
   type Step,
 } from "../src/time";
@@ -144,6 +145,27 @@ describe("an instant that there is nothing of", () => {
       false,
       false,
       false,
+    ]);
+  });
+});
+
+describe("labels of a time axis", () => {
+  const HOUR_S = 3600;
+  const labels = (increment: number, ...times: string[]): string[] =>
+    timeNames(undefined, times.map((time) => at(time) / 1000), 0, 0, increment);
+
+  it("name years, months, days and hours, with what they lie in where that begins", () => {
+    expect(labels(366 * 24 * HOUR_S, JAN.start)).toEqual(["2000"]);
+    expect(labels(30 * 24 * HOUR_S, "1999-12-01T00:00:00Z", JAN.start, FEB.start)).toEqual([
+      "Dec\n1999",
+      "Jan\n2000",
+      "Feb",
+    ]);
+    expect(labels(24 * HOUR_S, JAN.start, "2000-01-02T00:00:00Z")).toEqual(["1 Jan\n2000", "2 Jan"]);
+    expect(labels(6 * HOUR_S, "2000-01-01T12:00:00Z", "2000-01-01T18:00:00Z", "2000-01-02T00:00:00Z")).toEqual([
+      "12:00\n1 Jan 2000",
+      "18:00",
+      "00:00\n2 Jan 2000",
     ]);
   });
 });
