@@ -223,7 +223,9 @@ impl LiveService {
         layer: &Layer,
         touched: &[Period],
     ) -> Result<(), StorageError> {
+        // Whoever asks for no instant sees the newest step, which may be one that has just landed.
         let is_touched = |time| {
+            let time = request::shown_time(layer, time);
             touched
                 .iter()
                 .any(|period| period.start <= time && time <= period.end)
@@ -234,7 +236,7 @@ impl LiveService {
             .of(&layer.manifest.product, MOST_JOBS, is_touched);
         let jobs: Vec<_> = hot
             .iter()
-            .filter_map(|tile| request::job(layer, tile.mode, tile.view, Some(tile.time)).ok())
+            .filter_map(|tile| request::job(layer, tile.mode, tile.view, tile.time).ok())
             .collect();
         if jobs.is_empty() {
             return Ok(());

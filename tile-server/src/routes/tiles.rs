@@ -45,7 +45,8 @@ pub(crate) async fn get(
     // Who looks at an old version is no reason to draw a new one.
     if state.catalogue.is_newest(&layer) {
         let product = &layer.manifest.product;
-        state.hot.asked(product, mode, &job.view, shown.time);
+        let at = time.map(|_asked| shown.time);
+        state.hot.asked(product, mode, &job.view, at);
     }
     let response = picture::respond(&state, &headers, job, shown).await?;
     if mode == Mode::Volume {

@@ -136,6 +136,7 @@ async fn exactly_the_hot_tiles_that_it_touches_are_ordered() {
         "sst/map/1/0/0.png?time=2000-02-20",
         "sst/volume/0/0/0.png?time=2000-01-10",
         "flux/volume/0/0/0.png?time=2000-03-20",
+        "sst/points/0/0/0.png",
     ] {
         live.app.get(&format!("/tiles/{path}")).await;
     }
@@ -151,14 +152,16 @@ async fn exactly_the_hot_tiles_that_it_touches_are_ordered() {
         .map(|(_, job)| (job.mode, &job.value))
         .collect();
     asked.sort_by_key(|(mode, _)| *mode);
-    let (march, february) = (
+    let (march, february, newest) = (
         live.app.moment("sst", "2000-03-20").await,
         live.app.moment("sst", "2000-02-20").await,
+        live.app.moment("sst", "2000-03-16T12:00:00Z").await,
     );
     assert_eq!(
         asked,
         [
             (Mode::Map, &february),
+            (Mode::Points, &newest),
             (Mode::Volume, &march),
             (Mode::Volume, &march)
         ],
