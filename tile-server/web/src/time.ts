@@ -133,12 +133,11 @@ export function timeNames(
   let shownBelow = "";
   return splits.map((seconds) => {
     const date = new Date(seconds * 1000);
-    const named = (parts: Intl.DateTimeFormatOptions): string =>
-      new Intl.DateTimeFormat("en-GB", { timeZone: "UTC", ...parts }).format(date);
     const year = String(date.getUTCFullYear());
     if (increment >= 360 * DAY_S) return year;
     const isWithinDays = increment < DAY_S;
-    const day = named({ month: "short", ...(increment < 27 * DAY_S ? { day: "numeric" } : {}) });
+    const month = MONTHS[date.getUTCMonth()] ?? "";
+    const day = increment < 27 * DAY_S ? `${date.getUTCDate()} ${month}` : month;
     const below = isWithinDays ? `${day} ${year}` : year;
     const name = isWithinDays ? date.toISOString().slice(11, 16) : day;
     const text = below === shownBelow ? name : `${name}\n${below}`;
