@@ -4,10 +4,11 @@
 use std::sync::Arc;
 use std::thread;
 
-use anyhow::{Context as _, Result};
+use anyhow::Result;
 use contract::colour::TransferFunction;
 use contract::grid::Grid;
 use contract::job::{Mode, RENDERER_VERSION, RenderJob, Style, View};
+use contract::moment::Moment;
 use contract::quantity::Quantity;
 use render_worker::{Frame, Interval, Scene};
 
@@ -99,34 +100,7 @@ pub fn scene(grid: &Grid) -> Scene {
         grid: *grid,
         domain,
         value,
-        accumulated: Some(accumulated),
-    }
-}
-
-/// Cells of sea.
-pub fn particles(scene: &Scene) -> u64 {
-    scene
-        .domain
-        .content()
-        .iter()
-        .map(|&is_sea| u64::from(is_sea))
-        .sum()
-}
-
-/// The volume seen from above the region, in slices.
-pub fn job(size_px: [u32; 2], slices: u32) -> Result<RenderJob> {
-    let mut style = Style::with_transfer(TransferFunction::default_for(Quantity::CarbonFlux));
-    style.slices = slices;
-    style.particles_per_cell = 1;
-    Ok(RenderJob {
-        renderer_version: RENDERER_VERSION,
-        product: "made-up@1-00000000".parse().context("a manifest's name")?,
-        accumulated: Some(
-            "made-up-carbon@1-00000000"
-                .parse()
-                .context("a manifest's name")?,
-        ),
-        time: "2009-11-01".parse().context("an instant")?,
+        accumulated: Some(moment("made-up-carbon")?),
         mode: Mode::Volume,
         view: View::Globe {
             lon_deg: WEST_DEG + 0.5 * WIDTH_DEG,

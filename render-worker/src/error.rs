@@ -56,9 +56,6 @@ pub enum RenderError {
         product: String,
         accumulated: String,
     },
-    /// A manifest without steps.
-    #[error("{product} has no steps to draw")]
-    NoSteps { product: String },
     /// Reading frames failed.
     #[error("cannot read {what} of {product}")]
     Store {
@@ -108,7 +105,6 @@ impl RenderError {
             | Self::TooManyPairs { .. }
             | Self::NoExactFill
             | Self::GridMismatch { .. }
-            | Self::NoSteps { .. }
             | Self::Encode { .. }
             | Self::NoReference => false,
         }
@@ -155,7 +151,6 @@ impl RenderError {
             | Self::TooManyPairs { .. }
             | Self::NoExactFill
             | Self::GridMismatch { .. }
-            | Self::NoSteps { .. }
             | Self::Encode { .. }
             | Self::NoReference => true,
             Self::Store { source, .. } => {

@@ -66,7 +66,7 @@ pub(crate) struct Recompute {
     /// The plan as JSON.
     #[arg(long)]
     pub(crate) json: bool,
-    #[command(flatten)]
+    #[command(flatten, next_help_heading = "Kafka")]
     pub(crate) kafka: kafka_log::KafkaSettings,
 }
 
