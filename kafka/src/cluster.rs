@@ -39,7 +39,7 @@ impl Cluster {
         let servers = settings
             .kafka
             .clone()
-            .ok_or(KafkaFailure::Settings("--kafka is needed: HOST:PORT,..."))?;
+            .ok_or(KafkaFailure::Settings("--kafka (FLUXGLOBE_KAFKA) is needed: HOST:PORT[,HOST:PORT...]"))?;
         let instance = settings
             .kafka_instance
             .clone()

@@ -9,6 +9,8 @@ use crate::cli::{RenderWorker, Settings};
 use crate::services::Footing;
 
 pub(crate) async fn run(settings: &Settings, options: RenderWorker) -> Result<()> {
+    // Settings and secrets are looked at before anything is waited for.
+    options.kafka.check()?;
     let parts = ["store", "renderer", "event log"];
     let footing = Footing::take(settings, "render-worker", Some(options.admin), &parts).await?;
     let Some(store) = footing.store().await? else {
