@@ -7,6 +7,7 @@ mod faults;
 mod granules;
 mod outages;
 mod refusals;
+mod restarts;
 mod watched;
 
 use std::sync::{PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};

@@ -77,18 +77,23 @@ impl Ground {
         let folder = tempfile::tempdir().unwrap();
         let path = |name: &str| folder.path().join(name).display().to_string();
         std::fs::create_dir(folder.path().join("inbox")).unwrap();
+        let scheduler = format!("127.0.0.1:{}", free_port());
         let brokers = servers.setting("FLUXGLOBE_KAFKA").unwrap();
         let mut kafka = KafkaSettings::plain(brokers);
         kafka.kafka_topic_prefix = format!("ground-{}.", NEXT.fetch_add(1, Ordering::Relaxed));
         kafka.kafka_partitions = 1;
         let settings = [
             ("FLUXGLOBE_KAFKA", brokers.to_owned()),
-            ("FLUXGLOBE_KAFKA_TOPIC_PREFIX", kafka.kafka_topic_prefix.clone()),
+            (
+                "FLUXGLOBE_KAFKA_TOPIC_PREFIX",
+                kafka.kafka_topic_prefix.clone(),
+            ),
             ("FLUXGLOBE_KAFKA_PARTITIONS", "1".to_owned()),
             ("FLUXGLOBE_STORE", format!("file:{}", path("store"))),
             ("FLUXGLOBE_ALLOW_FOLDER", path("inbox")),
             ("FLUXGLOBE_SPOOL", path("spool")),
             ("FLUXGLOBE_EXECUTOR_WORK", path("work")),
+            ("FLUXGLOBE_CLUSTER", format!("http://{scheduler}")),
             ("FLUXGLOBE_FETCH_TRIES", "2".to_owned()),
             ("FLUXGLOBE_FETCH_PATIENCE_S", "1".to_owned()),
             ("FLUXGLOBE_CPU", "true".to_owned()),
@@ -164,7 +169,9 @@ impl Ground {
 
     fn rejected(&self) -> Vec<Value> {
         let text = self.succeed(&["rejected", "list", "--json"]);
-        text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+        text.lines()
+            .map(|line| serde_json::from_str(line).unwrap())
+            .collect()
     }
 
     /// Objects of the store, by key.
@@ -184,14 +191,15 @@ impl Ground {
         self.succeed(&["notice", "--product", PRODUCT, good.to_str().unwrap()]);
         let mut ingestd = self.start("ingestd");
         until("good granule behind bad ones", &mut ingestd, || {
-            self.count(Topic::GranuleLanded) == 1
-                && self.count(Topic::GranuleRejected) >= bad.len()
+            self.count(Topic::GranuleLanded) == 1 && self.count(Topic::GranuleRejected) >= bad.len()
         });
         let rejected = self.rejected();
         assert_eq!(rejected.len(), bad.len(), "{rejected:#?}");
         for (i, bad) in bad.iter().enumerate() {
             let origin = format!("granule.notice/0/{i}");
-            let about = rejected.iter().find(|about| about["origin"] == origin.as_str());
+            let about = rejected
+                .iter()
+                .find(|about| about["origin"] == origin.as_str());
             let about = about.unwrap_or_else(|| panic!("no {origin} in {rejected:#?}"));
             assert_eq!(about["reason"], bad.reason, "{about}");
             assert_eq!(about["attempt"], 1, "{about}");
@@ -215,8 +223,19 @@ impl Ground {
 fn start(folder: &Path, service: &str, settings: &[(String, String)]) -> Node {
     let address = || format!("127.0.0.1:{}", free_port());
     let (admin, port) = (address(), address());
+    // Executors and commands find the scheduler where they are told that it is.
+    let told = settings
+        .iter()
+        .find(|(name, _)| name == "FLUXGLOBE_CLUSTER");
+    let scheduler = told.map_or(&*port, |(_, url)| url.trim_start_matches("http://"));
     let words: &[&str] = match service {
-        "scheduler" => &["scheduler", "--scheduler-listen", &port, "--admin", &admin],
+        "scheduler" => &[
+            "scheduler",
+            "--scheduler-listen",
+            scheduler,
+            "--admin",
+            &admin,
+        ],
         "executor" => &["executor", "--executor-listen", &port, "--admin", &admin],
         "render-worker" => &["render-worker", "--render-listen", &port, "--admin", &admin],
         "tile-server" => &["tile-server", "--listen", &admin],

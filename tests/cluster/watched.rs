@@ -32,7 +32,10 @@ impl Prometheus {
             format!("{service}={address}")
         };
         let told = vec![
-            ("FLUXGLOBE_PROMETHEUS_TARGETS", PROCESSES.map(target).join(",")),
+            (
+                "FLUXGLOBE_PROMETHEUS_TARGETS",
+                PROCESSES.map(target).join(","),
+            ),
             ("FLUXGLOBE_PROMETHEUS_INTERVAL_S", "1".to_owned()),
         ];
         let server = Servers::start_told(&["prometheus"], told).unwrap();
@@ -72,11 +75,15 @@ impl Prometheus {
     fn broken(&self) -> Result<Vec<String>> {
         let found = self.ask("rules")?;
         let groups = found["groups"].as_array().context("no list")?.iter();
-        let rules = groups.filter_map(|group| group["rules"].as_array()).flatten();
+        let rules = groups
+            .filter_map(|group| group["rules"].as_array())
+            .flatten();
         let rules: Vec<&Value> = rules.collect();
         assert!(rules.len() > 20, "our rules are not there: {found}");
         let broken = rules.iter().filter(|rule| rule["health"] == "err");
-        Ok(broken.map(|rule| format!("{}: {}", rule["name"], rule["lastError"])).collect())
+        Ok(broken
+            .map(|rule| format!("{}: {}", rule["name"], rule["lastError"]))
+            .collect())
     }
 }
 
@@ -97,12 +104,18 @@ fn every_service_is_scraped_under_its_name_and_told_of_when_it_is_gone() {
         let is_so = prometheus.up()? == services && prometheus.gone()?.is_empty();
         Ok(is_so.then_some(()))
     };
-    cluster.wait_for("five services that answer", LIMIT, all_there).unwrap();
+    cluster
+        .wait_for("five services that answer", LIMIT, all_there)
+        .unwrap();
     assert_eq!(prometheus.broken().unwrap(), Vec::<String>::new());
 
     cluster.node("executor-1").unwrap().kill().unwrap();
     let told = |_: &Cluster| Ok((prometheus.gone()? == ["executor"]).then_some(()));
-    cluster.wait_for("word of the executor", LIMIT, told).unwrap();
+    cluster
+        .wait_for("word of the executor", LIMIT, told)
+        .unwrap();
     cluster.node("executor-1").unwrap().restart().unwrap();
-    cluster.wait_for("five services again", LIMIT, all_there).unwrap();
+    cluster
+        .wait_for("five services again", LIMIT, all_there)
+        .unwrap();
 }

@@ -42,10 +42,7 @@ impl Servers {
     }
 
     /// The same, told more than their ports: variables that the scripts of `deploy/services` know.
-    pub fn start_told(
-        names: &[&'static str],
-        told: Vec<(&'static str, String)>,
-    ) -> Result<Self> {
+    pub fn start_told(names: &[&'static str], told: Vec<(&'static str, String)>) -> Result<Self> {
         let port = || free_port().to_string();
         let ports = [
             "FLUXGLOBE_KAFKA_PORT",

@@ -17,7 +17,9 @@ pub struct Web {
 impl Web {
     /// Answers with an empty body.
     pub fn empty() -> Result<Self> {
-        Self::answering("HTTP/1.1 200 OK\r\nContent-Length: 0\r\nConnection: close\r\n\r\n".to_owned())
+        Self::answering(
+            "HTTP/1.1 200 OK\r\nContent-Length: 0\r\nConnection: close\r\n\r\n".to_owned(),
+        )
     }
 
     /// Sends everybody elsewhere.

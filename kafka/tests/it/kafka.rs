@@ -128,11 +128,17 @@ async fn a_transaction_left_open_for_good_holds_readers_up_for_little_more_than_
     let record = FutureRecord::to(&topic).key("p").payload(&never);
     producer.send(record, MOMENT * 50).await.unwrap();
     let begun = Instant::now();
-    own.log.append(&[notice_of("seen", Some("p"))]).await.unwrap();
+    own.log
+        .append(&[notice_of("seen", Some("p"))])
+        .await
+        .unwrap();
     let mut reader = own.log.join(FROM, "g").await.unwrap();
     assert_eq!(paths(&read(&mut *reader, 1).await), ["seen"]);
     let took = begun.elapsed();
-    println!("read {:.1} s after the transaction was left open", took.as_secs_f64());
+    println!(
+        "read {:.1} s after the transaction was left open",
+        took.as_secs_f64()
+    );
     assert!(took > LIMIT / 2, "nothing was held up: {took:?}");
     assert!(took < LIMIT + LOOKED_FOR, "{took:?}");
     end(own).await;

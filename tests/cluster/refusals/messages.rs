@@ -47,7 +47,8 @@ fn gibberish(of: &Event) -> [Vec<u8>; 5] {
     let text = of.to_json();
     [
         text.replace("\"schema\":1", "\"schema\":99").into_bytes(),
-        text.replace("\"trace\"", "\"extra\":1,\"trace\"").into_bytes(),
+        text.replace("\"trace\"", "\"extra\":1,\"trace\"")
+            .into_bytes(),
         text[..text.len() / 2].as_bytes().to_vec(),
         b"no JSON at all".to_vec(),
         b"\xff\xfe\x00".to_vec(),
@@ -106,11 +107,17 @@ fn gibberish_blocks_no_partition_of_observations_render_jobs_and_landed_granules
     ground.succeed(&["notice", "--product", PRODUCT, file.to_str().unwrap()]);
     ground.set("FLUXGLOBE_PARTITIONS", "1");
     let mut nodes = topics.map(|(_, _, service)| ground.start(service));
+    let _executor = ground.start("executor");
     for ((topic, group, _), node) in topics.into_iter().zip(&mut nodes) {
-        until(&format!("end of {topic}"), node, || ground.lag(topic, group) == 0);
+        until(&format!("end of {topic}"), node, || {
+            ground.lag(topic, group) == 0
+        });
     }
     // The granule that landed behind the gibberish was read too: a reader that stopped would have left it.
-    assert_eq!(ground.count(Topic::GranuleLanded), gibberish(&good).len() + 1);
+    assert_eq!(
+        ground.count(Topic::GranuleLanded),
+        gibberish(&good).len() + 1
+    );
     let stored = ground.succeed(&["observations", "query", "--dataset", "buoys", "--json"]);
     assert_eq!(stored.lines().count(), 1, "{stored}");
     let rejected = ground.rejected();

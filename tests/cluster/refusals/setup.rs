@@ -105,7 +105,11 @@ fn a_missing_secret_is_named_before_anything_is_waited_for() {
     let cases: [(&[&str], &[(&str, &str)], &str); 4] = [
         (&OVER_KAFKA, &login, "--kafka-password-file"),
         (&OVER_KAFKA, &login[..2], "--kafka-password-file"),
-        (&["ingestd", "tile-server"], &database, "--postgis-password-file"),
+        (
+            &["ingestd", "tile-server"],
+            &database,
+            "--postgis-password-file",
+        ),
         (&SERVICES, &keys, "AWS_SECRET_ACCESS_KEY"),
     ];
     for (services, more, says) in cases {
@@ -126,7 +130,10 @@ fn a_store_that_cannot_be_written_or_not_with_these_keys_ends_every_service() {
     let mut servers = Servers::start(&["s3"]).unwrap();
     let buckets = servers.folder().join("s3/data");
     let settings = |servers: &Servers, more: &[(&str, &str)]| {
-        let s3 = servers.settings().iter().map(|(n, v)| (n.as_str(), v.as_str()));
+        let s3 = servers
+            .settings()
+            .iter()
+            .map(|(n, v)| (n.as_str(), v.as_str()));
         let given: Vec<_> = s3
             .filter(|(name, _)| !more.iter().any(|(other, _)| other == name))
             .chain(more.iter().copied())

@@ -44,7 +44,10 @@ fn a_redirect_to_the_inner_network_is_refused_and_not_followed() {
     // The hosts that redirect are allowed: what they lead to is not.
     let allowed = [&to_inner, &to_metadata, &to_file].map(|web| web.address.to_string());
     ground.refuse(&[("FLUXGLOBE_ALLOW_HOST", &allowed.join(","))], &bad);
-    assert!(to_inner.came() > 0 && to_metadata.came() > 0, "nobody was redirected");
+    assert!(
+        to_inner.came() > 0 && to_metadata.came() > 0,
+        "nobody was redirected"
+    );
     assert_eq!(inner.came(), 0, "the redirect was followed");
 }
 

@@ -15,11 +15,26 @@ fn stranger(folder: &Path) -> String {
     let file = folder.join("stranger.pem").display().to_string();
     let key = folder.join("stranger.key").display().to_string();
     let words = [
-        "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", "/CN=stranger", "-keyout",
-        &key, "-out", &file,
+        "req",
+        "-x509",
+        "-newkey",
+        "rsa:2048",
+        "-nodes",
+        "-days",
+        "2",
+        "-subj",
+        "/CN=stranger",
+        "-keyout",
+        &key,
+        "-out",
+        &file,
     ];
     let made = Command::new("openssl").args(words).output().unwrap();
-    assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+    assert!(
+        made.status.success(),
+        "{}",
+        String::from_utf8_lossy(&made.stderr)
+    );
     file
 }
 
@@ -41,7 +56,11 @@ impl Told {
             .output()
             .unwrap();
         let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
-        (output.status.success(), text(output.stdout), text(output.stderr))
+        (
+            output.status.success(),
+            text(output.stdout),
+            text(output.stderr),
+        )
     }
 
     fn succeed(&self, words: &[&str]) -> String {
@@ -58,17 +77,39 @@ fn told(servers: &Servers, folder: &Path) -> Told {
         ("FLUXGLOBE_KAFKA", given("FLUXGLOBE_KAFKA_SASL")),
         ("FLUXGLOBE_KAFKA_SECURITY", "sasl_ssl".to_owned()),
         ("FLUXGLOBE_KAFKA_USER", "fluxglobe".to_owned()),
-        ("FLUXGLOBE_KAFKA_PASSWORD_FILE", given("FLUXGLOBE_KAFKA_SASL_PASSWORD_FILE")),
-        ("FLUXGLOBE_KAFKA_CA_FILE", given("FLUXGLOBE_KAFKA_SASL_CERTIFICATE")),
+        (
+            "FLUXGLOBE_KAFKA_PASSWORD_FILE",
+            given("FLUXGLOBE_KAFKA_SASL_PASSWORD_FILE"),
+        ),
+        (
+            "FLUXGLOBE_KAFKA_CA_FILE",
+            given("FLUXGLOBE_KAFKA_SASL_CERTIFICATE"),
+        ),
         ("FLUXGLOBE_POSTGIS", given("FLUXGLOBE_POSTGIS")),
-        ("FLUXGLOBE_POSTGIS_PASSWORD_FILE", given("FLUXGLOBE_POSTGIS_PASSWORD_FILE")),
-        ("FLUXGLOBE_POSTGIS_CA_FILE", given("FLUXGLOBE_POSTGIS_CA_FILE")),
-        ("FLUXGLOBE_STORE", format!("file:{}", folder.join("store").display())),
+        (
+            "FLUXGLOBE_POSTGIS_PASSWORD_FILE",
+            given("FLUXGLOBE_POSTGIS_PASSWORD_FILE"),
+        ),
+        (
+            "FLUXGLOBE_POSTGIS_CA_FILE",
+            given("FLUXGLOBE_POSTGIS_CA_FILE"),
+        ),
+        (
+            "FLUXGLOBE_STORE",
+            format!("file:{}", folder.join("store").display()),
+        ),
         ("FLUXGLOBE_ALLOW_FOLDER", inbox),
-        ("FLUXGLOBE_SPOOL", folder.join("spool").display().to_string()),
+        (
+            "FLUXGLOBE_SPOOL",
+            folder.join("spool").display().to_string(),
+        ),
         ("FLUXGLOBE_LOG", "warn".to_owned()),
     ];
-    Told(settings.map(|(name, value)| (name.to_owned(), value)).to_vec())
+    Told(
+        settings
+            .map(|(name, value)| (name.to_owned(), value))
+            .to_vec(),
+    )
 }
 
 #[test]
@@ -93,7 +134,9 @@ fn granules_and_observations_go_over_tls_and_a_wrong_certificate_is_refused() {
     let mut ingestd = start(folder.path(), "ingestd", &told.0);
     ingestd.wait_until_ready().unwrap();
     until("observations over TLS", &mut ingestd, || {
-        !told.succeed(&["observations", "query", "--json"]).is_empty()
+        !told
+            .succeed(&["observations", "query", "--json"])
+            .is_empty()
             && told.succeed(&["products", "--json"]).contains(PRODUCT)
     });
     let scram = told.with("FLUXGLOBE_KAFKA_SASL_MECHANISM", "PLAIN");
@@ -103,7 +146,10 @@ fn granules_and_observations_go_over_tls_and_a_wrong_certificate_is_refused() {
     let wrong = told.with("FLUXGLOBE_KAFKA_CA_FILE", &other);
     for service in ["scheduler", "ingestd"] {
         let talk = refused_start(folder.path(), service, &wrong.0);
-        assert!(talk.contains("certificate verify failed"), "{service}: {talk}");
+        assert!(
+            talk.contains("certificate verify failed"),
+            "{service}: {talk}"
+        );
     }
     let wrong = told.with("FLUXGLOBE_POSTGIS_CA_FILE", &other);
     let (is_fine, _, talk) = wrong.run(&["observations", "query"]);
@@ -113,7 +159,10 @@ fn granules_and_observations_go_over_tls_and_a_wrong_certificate_is_refused() {
     let parts = until_told(&waiting);
     assert!(!waiting.talk().is_empty(), "{parts}");
     let (is_fine, _, talk) = told
-        .with("FLUXGLOBE_POSTGIS", &plain(servers.setting("FLUXGLOBE_POSTGIS").unwrap()))
+        .with(
+            "FLUXGLOBE_POSTGIS",
+            &plain(servers.setting("FLUXGLOBE_POSTGIS").unwrap()),
+        )
         .run(&["observations", "query"]);
     assert!(!is_fine && talk.contains("no encryption"), "{talk}");
 }
@@ -128,10 +177,14 @@ fn until_told(node: &harness::node::Node) -> Value {
     let begun = std::time::Instant::now();
     loop {
         assert!(begun.elapsed() < super::LIMIT, "{}", node.talk());
-        let Ok(answer) = node.get("/readyz") else { continue };
+        let Ok(answer) = node.get("/readyz") else {
+            continue;
+        };
         let parts = answer.json().unwrap();
         let part = parts["checks"].as_array().unwrap().iter();
-        let part = part.filter(|part| part["name"] == "observations").any(|part| part["ok"] == false);
+        let part = part
+            .filter(|part| part["name"] == "observations")
+            .any(|part| part["ok"] == false);
         if answer.status == 503 && part && node.talk().contains("certificate is not trusted") {
             return parts;
         }
