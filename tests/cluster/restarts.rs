@@ -81,6 +81,12 @@ fn one_trace_leads_from_the_notice_to_the_tile() {
     let cluster = Cluster::start(ONE_OF_EACH, inbox.path()).unwrap();
     notice(&cluster, &[file(0), file(1)]);
     until_whole(&cluster, 2);
+    // Granules that are derived together share a version, which is told under the trace of the first: these are over.
+    let over =
+        |cluster: &Cluster| Ok((events(cluster, Topic::ProductDerived).len() == 2).then_some(()));
+    cluster
+        .wait_for("end of the first two", LIMIT, over)
+        .unwrap();
     // Somebody looks at it: what touches this tile is drawn anew unasked.
     let hot = format!("/tiles/{PRODUCT}/volume/0/0/0.png?time=2000-01-20");
     assert_eq!(cluster.get(&hot).unwrap().status, 200);

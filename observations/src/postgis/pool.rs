@@ -1,6 +1,5 @@
 //! Connections to the database: bounded, with limits on every wait; the tables are made or brought up to date once.
 
-use std::error::Error;
 use std::future::Future;
 use std::sync::Arc;
 use std::time::Duration;
@@ -211,7 +210,7 @@ fn is_refused(error: &tokio_postgres::Error) -> bool {
 /// be sent.
 fn is_distrusted(error: &tokio_postgres::Error) -> bool {
     const VERIFY_FAILED: &str = "certificate verify failed";
-    let first: &(dyn Error + 'static) = error;
+    let first: &(dyn std::error::Error + 'static) = error;
     std::iter::successors(Some(first), |cause| cause.source())
         .filter_map(|cause| cause.downcast_ref::<openssl::ssl::Error>()?.ssl_error())
         .flat_map(|stack| stack.errors())

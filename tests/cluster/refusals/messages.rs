@@ -31,7 +31,7 @@ fn a_file_that_is_not_the_promised_one_is_refused() {
         bad(
             promised(path, Some(Digest::of(b"something else")), None),
             "checksum",
-            "sha256",
+            "SHA-256 digest",
         ),
         bad(
             promised(path, None, Some(content.len() as u64)),
@@ -60,7 +60,7 @@ fn an_unknown_schema_version_and_gibberish_are_refused() {
     let ground = Ground::new();
     let file = ground.good();
     let of = notice(file.to_str().unwrap());
-    let says = ["schema 99 is unknown", "extra", "EOF", "expected", "UTF-8"];
+    let says = ["schema 99 is unknown", "extra", "EOF", "expected", "utf-8"];
     let bad: Vec<Bad> = gibberish(&of)
         .into_iter()
         .zip(says)
