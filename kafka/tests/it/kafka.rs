@@ -119,6 +119,8 @@ async fn a_transaction_left_open_for_good_holds_readers_up_for_little_more_than_
     let mut config = ClientConfig::new();
     config.set("bootstrap.servers", own.settings.kafka.as_deref().unwrap());
     config.set("transactional.id", id);
+    // The partition that our own keys go to.
+    config.set("partitioner", "murmur2_random");
     config.set("transaction.timeout.ms", LIMIT.as_millis().to_string());
     let producer: FutureProducer = config.create().unwrap();
     producer.init_transactions(MOMENT * 50).unwrap();
