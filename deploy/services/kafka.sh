@@ -99,7 +99,8 @@ launch_broker() {
     local java_arguments
     if ! [ -e "$run/data/meta.properties" ]; then
         local cluster_id
-        cluster_id=$(head -c 16 /dev/urandom | base64 | tr '+/' '-_' | tr -d '=')
+        # Letters and digits alone: one that began with a dash would be taken for an option.
+        cluster_id=$(head -c 16 /dev/urandom | base64 | tr '+/' 'AB' | tr -d '=')
         java_arguments=(kafka.tools.StorageTool format --cluster-id "$cluster_id" --config "$run/server.properties")
         java_run env >>"$log" 2>&1 || {
             tail -n 30 "$log" >&2

@@ -118,7 +118,7 @@ fn one_trace_leads_from_the_notice_to_the_tile() {
             .unwrap();
     }
     for name in ["ingestd-1", "scheduler", "tile-server"] {
-        let talk = cluster.nodes[name].talk();
-        assert!(talk.contains(TRACE), "{name} says nothing of it: {talk}");
+        let said = cluster.nodes[name].said();
+        assert!(said.contains(TRACE), "{name} says nothing of it: {said}");
     }
 }

@@ -1,14 +1,16 @@
 //! Prometheus scrapes the services under their names, our rules run on what it finds, and a service that is gone is told of.
 
+use std::path::Path;
 use std::time::Duration;
 
 use anyhow::{Context as _, Result};
 use harness::cluster::{Cluster, Shape};
-use harness::http;
 use harness::servers::Servers;
+use harness::{granule, http};
 use serde_json::Value;
 
 use crate::alone;
+use crate::faults::{PRODUCT, notice, until_whole};
 
 const LIMIT: Duration = Duration::from_mins(1);
 /// The service of each process.
@@ -18,6 +20,17 @@ const PROCESSES: [(&str, &str); 5] = [
     ("render-1", "render-worker"),
     ("ingestd-1", "ingestd"),
     ("tile-server", "tile-server"),
+];
+
+/// What counts under a name of its own: those services, and parts of their processes.
+const COUNTING: [&str; 7] = [
+    "ingestd",
+    "scheduler",
+    "deriver",
+    "executor",
+    "render_worker",
+    "render_fleet",
+    "tile_server",
 ];
 
 struct Prometheus {
@@ -71,6 +84,16 @@ impl Prometheus {
             .collect())
     }
 
+    /// Names of all metrics of ours.
+    fn names(&self) -> Result<Vec<String>> {
+        let found = self.ask("label/__name__/values")?;
+        let names = found.as_array().context("no list")?.iter();
+        let ours = names
+            .filter_map(Value::as_str)
+            .filter(|name| name.starts_with("fluxglobe_"));
+        Ok(ours.map(ToOwned::to_owned).collect())
+    }
+
     /// Rules that could not be worked out.
     fn broken(&self) -> Result<Vec<String>> {
         let found = self.ask("rules")?;
@@ -108,6 +131,7 @@ fn every_service_is_scraped_under_its_name_and_told_of_when_it_is_gone() {
         .wait_for("five services that answer", LIMIT, all_there)
         .unwrap();
     assert_eq!(prometheus.broken().unwrap(), Vec::<String>::new());
+    counts_are_there(&cluster, &prometheus, inbox.path());
 
     cluster.node("executor-1").unwrap().kill().unwrap();
     let told = |_: &Cluster| Ok((prometheus.gone()? == ["executor"]).then_some(()));
@@ -118,4 +142,38 @@ fn every_service_is_scraped_under_its_name_and_told_of_when_it_is_gone() {
     cluster
         .wait_for("five services again", LIMIT, all_there)
         .unwrap();
+}
+
+/// Once there was work, every service tells rate, errors and duration of it, and all metrics have one scheme of names.
+fn counts_are_there(cluster: &Cluster, prometheus: &Prometheus, inbox: &Path) {
+    let file = granule::write(inbox, 0, 0).unwrap();
+    notice(cluster, &[file]);
+    until_whole(cluster, 1);
+    let tile = format!("/tiles/{PRODUCT}/volume/0/0/0.png?time=2000-01-20");
+    assert_eq!(cluster.get(&tile).unwrap().status, 200);
+    let wanted = COUNTING.iter().flat_map(|service| {
+        ["requests_total", "request_seconds_count", "in_flight"]
+            .map(|what| format!("fluxglobe_{service}_{what}"))
+    });
+    let wanted: Vec<String> = wanted.collect();
+    let counted = |_: &Cluster| {
+        let names = prometheus.names()?;
+        let missing: Vec<&String> = wanted.iter().filter(|name| !names.contains(name)).collect();
+        anyhow::ensure!(missing.is_empty(), "nobody counts {missing:?}");
+        Ok(Some(()))
+    };
+    cluster
+        .wait_for("count of every service", LIMIT, counted)
+        .unwrap();
+    let schemes = COUNTING
+        .iter()
+        .copied()
+        .chain(["observations", "build_info"]);
+    let schemes: Vec<String> = schemes.map(|part| format!("fluxglobe_{part}")).collect();
+    for name in prometheus.names().unwrap() {
+        assert!(
+            schemes.iter().any(|scheme| name.starts_with(scheme)),
+            "{name}"
+        );
+    }
 }
