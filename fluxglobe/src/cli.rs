@@ -31,7 +31,7 @@ pub(crate) use upkeep::{Gc, Recompute, RecomputeWhat, Survey};
 /// Results go to standard output (`--json` for machines), talk and progress bars to standard error; the exit code is
 /// 0 only on success. Start with `fluxglobe demo`.
 #[derive(Debug, Parser)]
-#[command(version, propagate_version = true, max_term_width = 110)]
+#[command(version = crate::protocol::version(), propagate_version = true, max_term_width = 110)]
 pub(crate) struct Cli {
     #[command(flatten, next_help_heading = "Options of every command")]
     pub(crate) settings: Settings,

@@ -320,3 +320,17 @@ fn without_a_network_the_demo_runs_on_synthetic_data_and_says_so() {
         "{products}"
     );
 }
+
+#[test]
+fn the_program_tells_its_version_and_those_of_what_it_exchanges() {
+    let data = tempfile::tempdir().unwrap();
+    let text = program::succeed(data.path(), &["--version"]).unwrap();
+    let expected = format!("fluxglobe {} (events ", env!("CARGO_PKG_VERSION"));
+    assert!(text.starts_with(&expected), "{text}");
+    for what in ["events", "manifests", "renderer"] {
+        let number = text.split_once(what).unwrap().1.trim_start();
+        assert!(number.starts_with(|c: char| c.is_ascii_digit()), "{text}");
+    }
+    let service = program::succeed(data.path(), &["ingestd", "--version"]).unwrap();
+    assert!(service.contains("(events "), "{service}");
+}

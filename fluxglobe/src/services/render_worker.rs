@@ -10,6 +10,8 @@ use crate::deployment;
 use crate::services::Footing;
 
 pub(crate) async fn run(settings: &Settings, options: RenderWorker) -> Result<()> {
+    // Settings and secrets are looked at before anything is waited for.
+    options.kafka.check()?;
     let parts = ["store", "renderer", "event log"];
     let footing = Footing::take(settings, "render-worker", Some(options.admin), &parts).await?;
     if footing.store().await?.is_none() {
