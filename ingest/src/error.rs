@@ -104,6 +104,14 @@ pub enum IngestError {
     /// The sandboxed reader was killed, and not for what its file asked of it.
     #[error("the file reader was killed")]
     Killed,
+    /// Files that landed before cannot be read anew; what readers see is unchanged.
+    #[error("{product} stays as it is: {detail}")]
+    Reread {
+        /// Product.
+        product: String,
+        /// What is in the way and what to do.
+        detail: String,
+    },
     /// A synthetic file could not be written.
     #[error("cannot write {file:?}: {detail}")]
     Generate {
@@ -144,7 +152,9 @@ impl IngestError {
             | Self::Client { .. }
             | Self::Digest { .. }
             | Self::Generate { .. } => Cause::Place,
-            Self::Profile { .. } | Self::Contract(_) | Self::Task(_) => Cause::Granule,
+            Self::Profile { .. } | Self::Reread { .. } | Self::Contract(_) | Self::Task(_) => {
+                Cause::Granule
+            }
         }
     }
 }

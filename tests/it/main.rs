@@ -7,3 +7,4 @@ mod browser;
 mod dependencies;
 mod end_to_end;
 mod harness_self;
+mod reread;
