@@ -61,8 +61,7 @@ impl Reading {
             return Ok(());
         };
         let key = key(product, &self.recipe, first.raw_sha256, &first.origin)?;
-        let json =
-            serde_json::to_vec(self).map_err(|e| damaged(key.as_str(), &e.to_string()))?;
+        let json = serde_json::to_vec(self).map_err(|e| damaged(key.as_str(), &e.to_string()))?;
         store.put_new(&key, Bytes::from(json)).await.map(|_new| ())
     }
 }
@@ -80,7 +79,10 @@ pub(crate) fn key(
 }
 
 /// All notes of a product, sorted by raw file.
-pub(crate) async fn keys(store: &Store, product: &ProductId) -> Result<Vec<ObjectKey>, IngestError> {
+pub(crate) async fn keys(
+    store: &Store,
+    product: &ProductId,
+) -> Result<Vec<ObjectKey>, IngestError> {
     let listed = store.list(&format!("{FOLDER}/{product}")).await;
     listed.map_err(IngestError::storage("list readings"))
 }

@@ -111,7 +111,11 @@ fn a_rereading_that_is_killed_again_and_again_comes_to_the_bytes_of_an_undisturb
         "--parallel-files",
         "1",
     ];
-    let dry: Vec<&str> = recompute.iter().copied().chain(["--dry-run", "--json"]).collect();
+    let dry: Vec<&str> = recompute
+        .iter()
+        .copied()
+        .chain(["--dry-run", "--json"])
+        .collect();
     let plan = program::json(&calm, &dry).unwrap();
     assert_eq!(plan["files"]["items"].as_array().unwrap().len(), MONTHS);
     assert_eq!(version(&calm), before, "a dry run changes nothing");
@@ -135,7 +139,11 @@ fn a_rereading_that_is_killed_again_and_again_comes_to_the_bytes_of_an_undisturb
         }
         child.kill().unwrap();
         child.wait().unwrap();
-        assert_eq!(version(&killed), before, "readers see the old version still");
+        assert_eq!(
+            version(&killed),
+            before,
+            "readers see the old version still"
+        );
         let plan = program::json(&killed, &dry).unwrap();
         let items = plan["files"]["items"].as_array().unwrap();
         let read = items.iter().filter(|item| item["is_read"] == true).count();
@@ -146,13 +154,19 @@ fn a_rereading_that_is_killed_again_and_again_comes_to_the_bytes_of_an_undisturb
     let after = version(&killed);
     assert_ne!(after, before);
     assert_eq!(after, version(&calm));
-    assert_eq!(contents(&calm.join("objects")), contents(&killed.join("objects")));
+    assert_eq!(
+        contents(&calm.join("objects")),
+        contents(&killed.join("objects"))
+    );
     let events = told(&killed);
     assert_eq!(events, told(&calm));
     assert_eq!(events.len(), 2 * MONTHS, "landed, and read anew, each once");
     // What killed runs left in the spool is gone, and nothing is left to do.
     assert_eq!(std::fs::read_dir(&spool).unwrap().count(), 0);
     let plan = program::json(&killed, &dry).unwrap();
-    assert!(plan["files"]["items"].as_array().unwrap().is_empty(), "{plan}");
+    assert!(
+        plan["files"]["items"].as_array().unwrap().is_empty(),
+        "{plan}"
+    );
     assert!(plan["items"].as_array().unwrap().is_empty(), "{plan}");
 }

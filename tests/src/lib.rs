@@ -9,3 +9,4 @@ pub mod proxy;
 pub mod real_data;
 pub mod server;
 pub mod servers;
+pub mod small_disk;

@@ -16,8 +16,8 @@ use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::topic::{Origin, Topic};
 use prometheus::Registry;
-use storage::log::{EventLog, Finished, Message, Reader};
 use storage::StorageError;
+use storage::log::{EventLog, Finished, Message, Reader};
 
 use super::named_sums::NamedSums;
 use crate::derive::{chosen_start, derived};

@@ -153,7 +153,11 @@ impl Executor {
     pub async fn run(self, stop: Stop) -> Result<(), ComputeError> {
         let hands = Arc::new(Semaphore::new(self.settings.tasks()));
         let nudge = Arc::new(Notify::new());
-        let nudging = keep_asking(Arc::clone(&hands), self.settings.tasks(), Arc::clone(&nudge));
+        let nudging = keep_asking(
+            Arc::clone(&hands),
+            self.settings.tasks(),
+            Arc::clone(&nudge),
+        );
         let _nudging = Background(tokio::spawn(nudging));
         let mut working = Background(tokio::spawn(poll_loop(
             SchedulerGrpcClient::new(self.courier.clone())

@@ -136,11 +136,7 @@ fn next(newest: &Manifest, readings: &[Reading]) -> Result<Manifest, String> {
 }
 
 /// Files of one product have one grid and one quantity: those that are read anew with those that are not, too.
-fn check_alike(
-    newest: &Manifest,
-    taken: &[&Reading],
-    is_whole: bool,
-) -> Result<(), String> {
+fn check_alike(newest: &Manifest, taken: &[&Reading], is_whole: bool) -> Result<(), String> {
     let first = taken[0];
     let like = if is_whole {
         (first.grid, first.quantity, first.synthetic)
@@ -156,7 +152,10 @@ fn check_alike(
     };
     let origin = &other.steps[0].origin;
     Err(if is_whole {
-        format!("{origin} has another grid or quantity than {}", first.steps[0].origin)
+        format!(
+            "{origin} has another grid or quantity than {}",
+            first.steps[0].origin
+        )
     } else {
         format!(
             "{origin} has another grid or quantity now than the files that were not read anew; recompute all of the product"

@@ -57,9 +57,7 @@ pub(super) fn read(name: &str, dataset: &Dataset) -> Result<Vec<f64>, Rejection>
         return Err(too_large(name, format!("{count} texts, at most {most}")));
     }
     let read = match stored {
-        TypeDescriptor::FixedAscii(1) => {
-            numbers::<FixedAscii<1>>(dataset, 1, FixedAscii::as_bytes)
-        }
+        TypeDescriptor::FixedAscii(1) => numbers::<FixedAscii<1>>(dataset, 1, FixedAscii::as_bytes),
         TypeDescriptor::FixedUnicode(1) => {
             numbers::<FixedUnicode<1>>(dataset, 1, FixedUnicode::as_bytes)
         }

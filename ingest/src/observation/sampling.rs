@@ -232,7 +232,8 @@ fn text(numbers: &[f64]) -> String {
         .take_while(|b| *b != 0)
         .collect();
     let text = String::from_utf8_lossy(&bytes);
-    text.trim_end_matches(char::REPLACEMENT_CHARACTER).to_owned()
+    text.trim_end_matches(char::REPLACEMENT_CHARACTER)
+        .to_owned()
 }
 
 /// The name of the one platform of a file without names.

@@ -64,7 +64,9 @@ pub async fn plan(
             Ok(Some(item)) if item.is_read || known.raw.contains(&item.raw_sha256) => {
                 plan.items.push(item);
             }
-            Ok(Some(item)) => in_the_way.push(format!("{} is not in the store any more", item.file)),
+            Ok(Some(item)) => {
+                in_the_way.push(format!("{} is not in the store any more", item.file))
+            }
             Ok(None) => plan.fresh_count += 1,
             Err(detail) => in_the_way.push(detail),
         }
@@ -190,7 +192,9 @@ impl<'a> Known<'a> {
             return Ok(Some(item(by, Reason::Forced, false)));
         }
         let is_whole = |r: &&Reading| r.steps.iter().all(|step| self.frames.contains(&step.frame));
-        let mut alike = readings.iter().filter(|r| input(&r.recipe) == input(&wanted));
+        let mut alike = readings
+            .iter()
+            .filter(|r| input(&r.recipe) == input(&wanted));
         Ok(match alike.next() {
             None => Some(item(by, Reason::Stale, false)),
             Some(done) if !is_whole(&done) => Some(item(by, Reason::Missing, false)),

@@ -74,7 +74,11 @@ pub async fn run(
     if !refused.is_empty() {
         return Err(IngestError::Reread {
             product: request.product.to_string(),
-            detail: format!("{} of its files are refused now: {}", refused.len(), listed(&refused)),
+            detail: format!(
+                "{} of its files are refused now: {}",
+                refused.len(),
+                listed(&refused)
+            ),
         });
     }
     commit::replace(store, &request.product, &readings).await

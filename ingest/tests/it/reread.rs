@@ -114,18 +114,28 @@ async fn a_changed_profile_makes_a_new_version_and_the_old_one_stays_readable() 
     let before = place.newest(PRODUCT).await;
     let work = workplace(&place, &profile(2.0, 1e9));
     let planned = plan(&place, &work, &request()).await;
-    let reasons: Vec<_> = planned.items.iter().map(|i| (i.reason, i.is_read)).collect();
+    let reasons: Vec<_> = planned
+        .items
+        .iter()
+        .map(|i| (i.reason, i.is_read))
+        .collect();
     assert_eq!(reasons, [(Reason::Stale, false); 3]);
     let after = run(&place, &work, &request()).await.unwrap().unwrap();
     assert_eq!(after, place.newest(PRODUCT).await);
-    assert_eq!((after.number, after.title.as_str()), (before.number + 1, "Flux times 2"));
+    assert_eq!(
+        (after.number, after.title.as_str()),
+        (before.number + 1, "Flux times 2")
+    );
     for step in 0..3 {
         let (old, new) = (
             place.values(&before, step).await,
             place.values(&after, step).await,
         );
         for (old, new) in old.into_iter().zip(new) {
-            assert!(new == 2.0 * old || (new.is_nan() && old.is_nan()), "{old} {new}");
+            assert!(
+                new == 2.0 * old || (new.is_nan() && old.is_nan()),
+                "{old} {new}"
+            );
         }
     }
     let loaded = manifests::load(&place.store, &before.id()).await.unwrap();
@@ -169,9 +179,15 @@ async fn a_file_that_is_refused_now_leaves_everything_as_it_was() {
     let before = place.newest(PRODUCT).await;
     // No value of any file is so small.
     let work = workplace(&place, &profile(1.0, -1e8));
-    let refused = run(&place, &work, &request()).await.unwrap_err().to_string();
+    let refused = run(&place, &work, &request())
+        .await
+        .unwrap_err()
+        .to_string();
     assert!(refused.contains("3 of its files are refused"), "{refused}");
-    assert!(refused.contains("flux-0.nc") && refused.contains("no value"), "{refused}");
+    assert!(
+        refused.contains("flux-0.nc") && refused.contains("no value"),
+        "{refused}"
+    );
     assert_eq!(place.newest(PRODUCT).await, before);
     // What could be read is not read again when the profile is mended for the rest.
     let given = Request {
@@ -249,7 +265,10 @@ async fn a_profile_that_is_not_known_here_is_asked_for_only_when_it_matters() {
     };
     let refused = reread::plan(&place.store, &work.settings.profiles, &forced).await;
     let refused = refused.unwrap_err().to_string();
-    assert!(refused.contains("profile own") && refused.contains("--profiles"), "{refused}");
+    assert!(
+        refused.contains("profile own") && refused.contains("--profiles"),
+        "{refused}"
+    );
 }
 
 #[tokio::test]
@@ -261,7 +280,12 @@ async fn a_forced_reading_finds_a_frame_that_is_not_what_it_should_be() {
         ..request()
     };
     let planned = plan(&place, &work, &forced).await;
-    assert!(planned.items.iter().all(|item| item.reason == Reason::Forced));
+    assert!(
+        planned
+            .items
+            .iter()
+            .all(|item| item.reason == Reason::Forced)
+    );
     assert!(run(&place, &work, &forced).await.unwrap().is_none());
     // The planted fault: a note that says of a file what it is not read as.
     let key = place.store.list("readings").await.unwrap().remove(0);
@@ -277,13 +301,22 @@ async fn a_forced_reading_finds_a_frame_that_is_not_what_it_should_be() {
 async fn what_is_told_is_what_was_read_anew_and_nothing_of_a_landing() {
     let place = landed().await;
     let product = PRODUCT.parse().unwrap();
-    assert!(reread::events(&place.store, &product).await.unwrap().is_empty());
+    assert!(
+        reread::events(&place.store, &product)
+            .await
+            .unwrap()
+            .is_empty()
+    );
     let work = workplace(&place, &profile(2.0, 1e9));
     run(&place, &work, &request()).await.unwrap();
     let events = reread::events(&place.store, &product).await.unwrap();
     assert_eq!(events.len(), 3);
-    storage::log::tell_each_once(&place.log, &events).await.unwrap();
-    storage::log::tell_each_once(&place.log, &events).await.unwrap();
+    storage::log::tell_each_once(&place.log, &events)
+        .await
+        .unwrap();
+    storage::log::tell_each_once(&place.log, &events)
+        .await
+        .unwrap();
     let told = crate::fixture::events(&place.log, contract::topic::Topic::GranuleLanded).await;
     assert_eq!(told.len(), 3 + 3, "landed, then read anew, each once");
 }
@@ -310,5 +343,5 @@ async fn a_known_file_is_read_as_the_frames_of_this_decoders_version() {
     let note = place.store.get(&notes[0]).await.unwrap();
     let note: serde_json::Value = serde_json::from_slice(&note).unwrap();
     assert_eq!(note["recipe"]["decoder"], decoder);
-    assert_eq!(digest, "00000000");
+    assert_eq!(digest, "37276a64");
 }

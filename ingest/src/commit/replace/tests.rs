@@ -93,11 +93,17 @@ fn a_month_that_another_file_revised_stays_revised() {
 #[test]
 fn all_files_may_move_by_a_month_together_but_not_one_onto_another() {
     let newest = manifest(vec![step("a", 1, 0), step("b", 2, 0)]);
-    let (a, b) = (reading(vec![step("a", 2, 0)]), reading(vec![step("b", 3, 0)]));
+    let (a, b) = (
+        reading(vec![step("a", 2, 0)]),
+        reading(vec![step("b", 3, 0)]),
+    );
     let moved = next(&newest, &[a.clone(), b]).unwrap();
     assert_eq!(moved.steps, [step("a", 2, 0), step("b", 3, 0)]);
     let refused = next(&newest, &[a]).unwrap_err();
-    assert!(refused.contains("a.nc") && refused.contains("another file"), "{refused}");
+    assert!(
+        refused.contains("a.nc") && refused.contains("another file"),
+        "{refused}"
+    );
 }
 
 #[test]
@@ -121,7 +127,10 @@ fn another_grid_is_taken_with_all_files_or_not_at_all() {
         anew
     };
     let (a, b) = (on(shifted, "a", 1), on(shifted, "b", 2));
-    assert_eq!(next(&newest, &[a.clone(), b.clone()]).unwrap().grid, shifted);
+    assert_eq!(
+        next(&newest, &[a.clone(), b.clone()]).unwrap().grid,
+        shifted
+    );
     assert!(next(&newest, std::slice::from_ref(&a)).is_err());
     assert!(next(&newest, &[a, on(GRID, "b", 2)]).is_err());
     // A billionth of a cell is no other grid.
