@@ -4,6 +4,7 @@
 
 mod equality;
 mod faults;
+mod full_disk;
 mod granules;
 mod outages;
 mod refusals;

@@ -10,3 +10,4 @@ pub mod real_data;
 pub mod server;
 pub mod servers;
 pub mod web;
+pub mod small_disk;
