@@ -100,6 +100,37 @@ pub fn scene(grid: &Grid) -> Scene {
         grid: *grid,
         domain,
         value,
+        accumulated: Some(accumulated),
+    }
+}
+
+/// Cells of sea.
+pub fn particles(scene: &Scene) -> u64 {
+    scene
+        .domain
+        .content()
+        .iter()
+        .map(|&is_sea| u64::from(is_sea))
+        .sum()
+}
+
+fn moment(product: &str) -> Result<Moment> {
+    Ok(Moment {
+        domain: format!("domain/{product}/0").parse()?,
+        before: Some(format!("frames/{product}/0").parse()?),
+        after: None,
+    })
+}
+
+/// The volume seen from above the region, in slices. What it is drawn from is given beside it.
+pub fn job(size_px: [u32; 2], slices: u32) -> Result<RenderJob> {
+    let mut style = Style::with_transfer(TransferFunction::default_for(Quantity::CarbonFlux));
+    style.slices = slices;
+    style.particles_per_cell = 1;
+    Ok(RenderJob {
+        renderer_version: RENDERER_VERSION,
+        grid: grid(1_000),
+        value: moment("made-up")?,
         accumulated: Some(moment("made-up-carbon")?),
         mode: Mode::Volume,
         view: View::Globe {

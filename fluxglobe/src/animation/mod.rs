@@ -136,7 +136,7 @@ async fn drawer(
         render_hedge_ms: HEDGE_MS,
         render_in_flight: options.at_once,
     };
-    let fleet = Fleet::start(&fleet, store, &Registry::new())?;
+    let fleet = Fleet::start(&fleet, &Registry::new())?;
     Ok(Arc::new(FleetDrawer(fleet)))
 }
 

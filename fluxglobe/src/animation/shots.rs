@@ -88,7 +88,14 @@ impl Shots {
             }
         }
         let (accumulated, time) = (self.accumulated.as_ref(), self.time(number)?);
-        let job = RenderJob::of(&self.product, accumulated, time, self.mode, view, self.style)?;
+        let job = RenderJob::of(
+            &self.product,
+            accumulated,
+            time,
+            self.mode,
+            view,
+            self.style,
+        )?;
         Ok(job)
     }
 }

@@ -11,8 +11,8 @@ use contract::tile::{MAX_LAT_DEG, Tile, mercator_lat_deg, mercator_x, mercator_y
 use super::look::{self, Look};
 use super::{Plan, area_m2, cell_px, entry_shift, height_range_m};
 use crate::scene::Scene;
-use crate::stages::light::FARTHEST_LOOK;
 use crate::stages::layout::{Axis, Col, Row, SUBPIXELS, VIEW_TILE};
+use crate::stages::light::FARTHEST_LOOK;
 
 /// Smallest light texel, pixels: finer than the screen is of no use.
 const LEAST_TEXEL_PX: f64 = 1.5;
@@ -170,8 +170,8 @@ fn light_and_reach(
     ];
     // The eye looks straight down once height is drawn as a way north: a pixel towards it is a pixel of height, above
     // ground that lies as much farther south.
-    let toward_eye =
-        [shadow_per_m[0], shadow_per_m[1] + look::OBLIQUE * per_m].map(|shift| shift / level.px_per_m);
+    let toward_eye = [shadow_per_m[0], shadow_per_m[1] + look::OBLIQUE * per_m]
+        .map(|shift| shift / level.px_per_m);
     let texel_px = (look::TEXEL_PER_RADIUS * radius_px).max(LEAST_TEXEL_PX);
     let unit = (texel_px * subpixels).round();
     let mut origin = [0; 2];

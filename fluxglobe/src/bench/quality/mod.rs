@@ -155,7 +155,14 @@ async fn landed(
     for (name, view) in views {
         let style = Style::with_transfer(TransferFunction::default_for(manifest.quantity));
         let time = last.period.mid();
-        let job = RenderJob::of(manifest, accumulated.as_ref(), time, Mode::Volume, view, style)?;
+        let job = RenderJob::of(
+            manifest,
+            accumulated.as_ref(),
+            time,
+            Mode::Volume,
+            view,
+            style,
+        )?;
         subjects.push(Subject {
             name: format!("{}, {name}", manifest.product),
             scene: service.scene(&job).await?,
