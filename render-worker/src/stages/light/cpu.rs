@@ -68,7 +68,7 @@ fn give_slice(params: &Params, texel: &Texel, slice: i32, depth: f32, light: &mu
     }
 }
 
-/// Turns the depth of each slice into the depth above its upper plane; one more layer holds the whole.
+/// Turns the depth of each slice into twice the depth above its middle; one more layer holds twice the whole.
 pub fn prefix(params: &Params, light: &mut [u32]) {
     let layer = params.light_width as usize * params.light_height as usize;
     let mut above = vec![0u32; layer];
@@ -77,24 +77,21 @@ pub fn prefix(params: &Params, light: &mut [u32]) {
         .take(params.slices as usize + 1)
     {
         for (own, above) in slice.iter_mut().zip(&mut above) {
-            let depth = std::mem::replace(own, *above);
-            *above = (*above + depth.min(DARK)).min(DARK);
+            let below = (*above + (*own).min(DARK)).min(DARK);
+            *own = *above + below;
+            *above = below;
         }
     }
 }
 
 fn depth_above(params: &Params, light: &[u32], texel: [i32; 2], middle: i32, part: f32) -> f32 {
-    let depth_at = |plane: i32| {
-        let plane = plane.clamp(0, params.slices as i32) as u32;
-        address(params, texel, plane).map_or(0.0, |at| light[at] as f32)
+    let depth_at = |slice: i32| {
+        let at = u32::try_from(slice)
+            .ok()
+            .and_then(|slice| address(params, texel, slice));
+        at.map_or(0.0, |at| light[at] as f32)
     };
-    let between = depth_at(middle + 1);
-    let outer = mix(
-        depth_at(middle) + between,
-        between + depth_at(middle + 2),
-        part,
-    );
-    0.5 * outer / DEPTH_ONE
+    0.5 * mix(depth_at(middle), depth_at(middle + 1), part) / DEPTH_ONE
 }
 
 fn dimmed(color: u32, shade: f32) -> u32 {

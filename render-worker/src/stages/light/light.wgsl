@@ -1,5 +1,5 @@
-// A sum along the slices turns the depth given to each slice into the depth above its plane. A column of texels is cut
-// into segments, one invocation each, whose sums are added up in shared memory.
+// A sum along the slices turns the depth given to each slice into twice the depth above its middle: that above its upper
+// plane and that above its lower one; the layer behind the last holds twice the whole. A column of texels is cut into segments, one invocation each, whose sums are added up in shared memory.
 @group(0) @binding(1) var<storage, read_write> light: array<u32>;
 
 const DARK = 0x7fffffffu;
@@ -43,8 +43,9 @@ fn prefix(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) 
             if (base + j < end) { own[j] = light[(base + j) * layer + column]; }
         }
         for (var j = 0u; j < STEP; j++) {
-            if (base + j < end) { light[(base + j) * layer + column] = above; }
-            above = deeper(above, min(own[j], DARK));
+            let below = deeper(above, min(own[j], DARK));
+            if (base + j < end) { light[(base + j) * layer + column] = above + below; }
+            above = below;
         }
     }
 }

@@ -1,17 +1,12 @@
-// What lies between a splat and the sun dims it. Reads `light`, the depth above the slice planes.
+// What lies between a splat and the sun dims it. Reads `light`, twice the depth above the middle of each slice.
 
-// Depth above a slice plane; nothing above the first, everything above the last.
-fn depth_at(texel: vec2<i32>, plane: i32) -> f32 {
-    return f32(light[address(texel, u32(clamp(plane, 0, i32(params.slices))))]);
-}
-
-// Depth above a place: the mean of half a slice before and half a slice behind it, each between two planes. Together
-// with the deposit this gives a thin sheet half its own depth wherever it lies, so that slices leave no bands.
+// Depth above a place between the middles of two slices. Together with the deposit this gives a thin sheet half its own
+// depth wherever it lies, so that slices leave no bands.
 fn depth_above(texel: vec2<i32>, middle: i32, part: f32) -> f32 {
     if (!inside(texel)) { return 0.0; }
-    let between = depth_at(texel, middle + 1);
-    let outer = mix(depth_at(texel, middle) + between, between + depth_at(texel, middle + 2), part);
-    return 0.5 * outer / DEPTH_ONE;
+    var before = 0.0;
+    if (middle >= 0) { before = f32(light[address(texel, u32(middle))]); }
+    return 0.5 * mix(before, f32(light[address(texel, u32(middle + 1))]), part) / DEPTH_ONE;
 }
 
 fn dimmed(color: u32, shade: f32) -> u32 {
