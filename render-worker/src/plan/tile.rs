@@ -12,7 +12,7 @@ use super::look::{self, Look};
 use super::{Plan, area_m2, cell_px, entry_shift, height_range_m};
 use crate::scene::Scene;
 use crate::stages::layout::{Axis, Col, Row, SUBPIXELS, VIEW_TILE};
-use crate::stages::light::FARTHEST_LOOK;
+use crate::stages::light::LOOK;
 
 /// Smallest light texel, pixels: finer than the screen is of no use.
 const LEAST_TEXEL_PX: f64 = 1.5;
@@ -180,7 +180,7 @@ fn light_and_reach(
     for axis in 0..2 {
         let lit = shift(seen[axis], shadow_per_m[axis]);
         // Clouds look their light up so far from their centres.
-        let looked = FARTHEST_LOOK * widest * toward_eye[axis].abs();
+        let looked = f64::from(LOOK) * widest * toward_eye[axis].abs();
         let lit = [lit[0] - looked, lit[1] + looked];
         let absolute = level.origin_px[axis] * subpixels;
         let base = ((absolute + lit[0]) / unit).floor() - 1.0;

@@ -1,13 +1,14 @@
 //! CPU twin of `deposit.wgsl`, `light.wgsl` and `shade.wgsl`.
 
+use super::LOOK;
 use crate::stages::layout::{DEPTH_ONE, Params, Splat, nearest};
 
 const MOST_GIVEN: f32 = 16.0;
 const DARK: u32 = 0x7fff_ffff;
 
-/// Places in a cloud where its light is looked up, radii towards the eye, and the share of the cloud there: one look at
-/// the centre would draw clouds too dark, because the eye sees their near sides.
-const LOOKUPS: [(f32, f32); 3] = [(-0.6, 0.3277), (0.0, 1.0), (0.6, 0.3277)];
+/// Places in a cloud where its light is looked up, radii towards the eye: one look at the centre would draw clouds too
+/// dark, because the eye sees their near sides.
+const LOOKUPS: [f32; 2] = [-LOOK, LOOK];
 
 struct Texel {
     index: [i32; 2],
@@ -123,7 +124,7 @@ fn depth_before(params: &Params, light: &[u32], place: [i32; 2], slice: f32) -> 
 fn lit(params: &Params, light: &[u32], splat: &Splat) -> f32 {
     let (u, v) = (splat.light_u as f32, splat.light_v as f32);
     let (mut sum, mut weights) = (0.0, 0.0);
-    for (t, weight) in LOOKUPS {
+    for t in LOOKUPS {
         let step = t * splat.radius_px;
         let place = [
             splat.light_u + nearest(step * (params.toward_u - params.toward_pull * u)),
@@ -133,8 +134,8 @@ fn lit(params: &Params, light: &[u32], splat: &Splat) -> f32 {
         let slice = (splat.slice + step * toward).clamp(0.0, params.slices as f32 - 0.001);
         // Where little light reaches, the eye sees little past what lies in front.
         let half = (-0.5 * depth_before(params, light, place, slice)).exp();
-        sum += weight * half * half * half;
-        weights += weight * half;
+        sum += half * half * half;
+        weights += half;
     }
     sum / weights.max(1e-30)
 }

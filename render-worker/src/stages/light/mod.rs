@@ -13,8 +13,9 @@ use crate::stages::layout::Params;
 /// Columns of texels that one workgroup sums up.
 const COLUMNS: u32 = 32;
 
-/// Radii from its centre at which a cloud looks its light up, at most.
-pub const FARTHEST_LOOK: f64 = 0.6;
+/// Radii before and behind its centre, along the sight line, at which a cloud looks its light up: near the root of the mean
+/// square distance of its mass there, 1 over the root of 6. Nearer to the reference than a look at the centre by 7 dB.
+pub const LOOK: f32 = 0.38;
 
 /// The functions that give depth to the light; [`splat`](crate::passes::splat) runs them.
 pub const DEPOSIT_FUNCTIONS: &str =

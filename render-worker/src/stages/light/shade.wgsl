@@ -24,20 +24,23 @@ fn depth_before(place: vec2<i32>, slice: f32) -> f32 {
     return mix(north, south, texel.part.y);
 }
 
-// Share of light at a place `t` radii towards the eye times the share of what is seen there, and the latter.
-fn look(place: vec2<i32>, slice: f32, step: f32, share: f32) -> vec2<f32> {
+// How far from a cloud's centre its light is looked up, radii.
+const LOOK = 0.38;
+
+// Share of light at a place a step towards the eye times the share of what is seen there, and the latter.
+fn look(place: vec2<i32>, slice: f32, step: f32) -> vec2<f32> {
     let toward = vec2(params.toward_u, params.toward_v) - params.toward_pull * vec2<f32>(place);
     let there = place + vec2(nearest(step * toward.x), nearest(step * toward.y));
     let slice_there = slice + step * (params.toward_slice - params.toward_pull * slice);
     // Where little light reaches, the eye sees little past what lies in front.
     let half = exp(-0.5 * depth_before(there, clamp(slice_there, 0.0, f32(params.slices) - 0.001)));
-    return share * half * vec2(half * half, 1.0);
+    return half * vec2(half * half, 1.0);
 }
 
-// A splat's colour in its light. The light is looked up at three places, by the share of the cloud there: one look at the
-// centre would draw clouds too dark, because the eye sees their near sides.
+// A splat's colour in its light, looked up before and behind the centre: one look at the centre would draw clouds too
+// dark, because the eye sees their near sides.
 fn shaded(color: u32, place: vec2<i32>, slice: f32, day: f32, radius_px: f32) -> u32 {
-    let sum = look(place, slice, -0.6 * radius_px, 0.3277) + look(place, slice, 0.0, 1.0) + look(place, slice, 0.6 * radius_px, 0.3277);
+    let sum = look(place, slice, -LOOK * radius_px) + look(place, slice, LOOK * radius_px);
     let lit = sum.x / max(sum.y, 1.0e-30);
     return dimmed(color, params.ambient + params.direct * lit * day);
 }
