@@ -186,15 +186,20 @@ fn an_ingest_service_whose_spool_is_full_waits_and_lands_everything_when_there_i
     ));
     let (status, text) = ready(&mut cluster);
     assert_eq!(status, 200, "{text}");
+    assert_eq!(landed_paths(&cluster), addresses, "each once");
+    assert_eq!(events(&cluster, Topic::GranuleRejected), vec![]);
+}
+
+/// What every event of a file that landed names, sorted.
+fn landed_paths(cluster: &Cluster) -> Vec<String> {
     let mut landed = vec![];
-    for event in events(&cluster, Topic::GranuleLanded) {
+    for event in events(cluster, Topic::GranuleLanded) {
         if let Body::GranuleLanded { path, .. } = event.body {
             landed.push(path);
         }
     }
     landed.sort();
-    assert_eq!(landed, addresses, "each once");
-    assert_eq!(events(&cluster, Topic::GranuleRejected), vec![]);
+    landed
 }
 
 /// Puts granules where only the network leads to, and so through the spool; their addresses, sorted.
