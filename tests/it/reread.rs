@@ -75,78 +75,73 @@ fn told(data: &Path) -> Vec<String> {
     bodies
 }
 
-#[test]
-fn a_rereading_that_is_killed_again_and_again_comes_to_the_bytes_of_an_undisturbed_one() {
-    let folder = tempfile::tempdir().unwrap();
+/// Lands the months in one data folder by the profile in `folder`, and copies that to another.
+fn land_twice(folder: &Path, calm: &Path, killed: &Path) {
     let files: Vec<PathBuf> = (0..MONTHS)
-        .map(|month| granule::write(folder.path(), month, 0).unwrap())
+        .map(|month| granule::write(folder, month, 0).unwrap())
         .collect();
-    let profile = write_profile(folder.path(), 1.0);
+    let profile = write_profile(folder, 1.0);
     let mut words = vec!["ingest", "--profile", profile.to_str().unwrap()];
     words.extend(files.iter().map(|file| file.to_str().unwrap()));
-    let (calm, killed) = (folder.path().join("calm"), folder.path().join("killed"));
-    program::succeed(&calm, &words).unwrap();
-    assert_eq!(noted(&calm), MONTHS);
-    for (below, content) in contents(&calm) {
+    program::succeed(calm, &words).unwrap();
+    assert_eq!(noted(calm), MONTHS);
+    for (below, content) in contents(calm) {
         let path = killed.join(below);
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
         std::fs::write(path, content).unwrap();
     }
-    let before = version(&calm);
+}
 
-    let profiles = folder.path().join("profiles");
+/// Starts the program and kills it as soon as so many readings are noted.
+fn kill_when_noted(data: &Path, words: &[&str], readings: usize) {
+    let mut child = program::command(data)
+        .args(words)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let start = Instant::now();
+    while noted(data) < readings {
+        assert!(start.elapsed() < LIMIT, "nothing was read");
+        let has_ended = child.try_wait().unwrap().is_some();
+        assert!(!has_ended, "it ended before it was killed");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+}
+
+/// What a dry run says: the plan of the files, and of what is computed.
+fn plan(data: &Path, words: &[&str]) -> (Vec<serde_json::Value>, Vec<serde_json::Value>) {
+    let plan = program::json(data, &[words, &["--dry-run", "--json"]].concat()).unwrap();
+    let items = |plan: &serde_json::Value| plan["items"].as_array().unwrap().clone();
+    (items(&plan["files"]), items(&plan))
+}
+
+#[test]
+fn a_rereading_that_is_killed_again_and_again_comes_to_the_bytes_of_an_undisturbed_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let below = |name: &str| folder.path().join(name);
+    let (calm, killed) = (below("calm"), below("killed"));
+    land_twice(folder.path(), &calm, &killed);
+    let before = version(&calm);
+    let (profiles, spool) = (below("profiles"), below("spool"));
     std::fs::create_dir(&profiles).unwrap();
     write_profile(&profiles, 2.0);
-    let spool = folder.path().join("spool");
-    let recompute = [
-        "recompute",
-        "--product",
-        PRODUCT,
-        "--what",
-        "frames",
-        "--profiles",
-        profiles.to_str().unwrap(),
-        "--spool",
-        spool.to_str().unwrap(),
-        "--parallel-files",
-        "1",
-    ];
-    let dry: Vec<&str> = recompute
-        .iter()
-        .copied()
-        .chain(["--dry-run", "--json"])
-        .collect();
-    let plan = program::json(&calm, &dry).unwrap();
-    assert_eq!(plan["files"]["items"].as_array().unwrap().len(), MONTHS);
+    let what = "recompute --what frames --parallel-files 1 --product";
+    let mut recompute: Vec<&str> = what.split(' ').chain([PRODUCT]).collect();
+    recompute.extend(["--profiles", profiles.to_str().unwrap()]);
+    recompute.extend(["--spool", spool.to_str().unwrap()]);
+    let (files, _computed) = plan(&calm, &recompute);
+    assert_eq!(files.len(), MONTHS);
     assert_eq!(version(&calm), before, "a dry run changes nothing");
     program::succeed(&calm, &recompute).unwrap();
 
     for kill_after in [1, 3, 6] {
-        let mut child = program::command(&killed)
-            .args(recompute)
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap();
-        let start = Instant::now();
-        while noted(&killed) < MONTHS + kill_after {
-            assert!(start.elapsed() < LIMIT, "nothing was read");
-            assert!(
-                child.try_wait().unwrap().is_none(),
-                "it ended before it was killed"
-            );
-            std::thread::sleep(Duration::from_millis(1));
-        }
-        child.kill().unwrap();
-        child.wait().unwrap();
-        assert_eq!(
-            version(&killed),
-            before,
-            "readers see the old version still"
-        );
-        let plan = program::json(&killed, &dry).unwrap();
-        let items = plan["files"]["items"].as_array().unwrap();
-        let read = items.iter().filter(|item| item["is_read"] == true).count();
+        kill_when_noted(&killed, &recompute, MONTHS + kill_after);
+        assert_eq!(version(&killed), before, "readers see the old one still");
+        let (files, _computed) = plan(&killed, &recompute);
+        let read = files.iter().filter(|item| item["is_read"] == true).count();
         assert!((kill_after..MONTHS).contains(&read), "{read} are read");
     }
     program::succeed(&killed, &recompute).unwrap();
@@ -163,10 +158,5 @@ fn a_rereading_that_is_killed_again_and_again_comes_to_the_bytes_of_an_undisturb
     assert_eq!(events.len(), 2 * MONTHS, "landed, and read anew, each once");
     // What killed runs left in the spool is gone, and nothing is left to do.
     assert_eq!(std::fs::read_dir(&spool).unwrap().count(), 0);
-    let plan = program::json(&killed, &dry).unwrap();
-    assert!(
-        plan["files"]["items"].as_array().unwrap().is_empty(),
-        "{plan}"
-    );
-    assert!(plan["items"].as_array().unwrap().is_empty(), "{plan}");
+    assert_eq!(plan(&killed, &recompute), (vec![], vec![]));
 }

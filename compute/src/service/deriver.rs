@@ -65,9 +65,10 @@ impl Deriver {
 
     /// Reads until asked to stop. What fails for a reason that passes is tried again for ever.
     pub async fn run(&self, stop: Stop) -> Result<(), ComputeError> {
+        // On the heap: both are large, and whoever waits for this would carry them along.
         tokio::select! {
-            ended = self.follow_log(&stop) => ended,
-            never = self.sums.run() => match never {},
+            ended = Box::pin(self.follow_log(&stop)) => ended,
+            never = Box::pin(self.sums.run()) => match never {},
         }
     }
 

@@ -54,7 +54,7 @@ pub(super) fn read(name: &str, dataset: &Dataset) -> Result<Vec<f64>, Rejection>
         if is_letters { MAX_LETTERS } else { MAX_TEXTS },
     );
     if count > most {
-        return Err(too_large(name, format!("{count} texts, at most {most}")));
+        return Err(too_large(name, &format!("{count} texts, at most {most}")));
     }
     let read = match stored {
         TypeDescriptor::FixedAscii(1) => numbers::<FixedAscii<1>>(dataset, 1, FixedAscii::as_bytes),
@@ -80,7 +80,7 @@ pub(super) fn read(name: &str, dataset: &Dataset) -> Result<Vec<f64>, Rejection>
     read.map_err(damaged)
 }
 
-fn too_large(name: &str, what: String) -> Rejection {
+fn too_large(name: &str, what: &str) -> Rejection {
     let detail = format!("{what} are read; give it in smaller pieces");
     Rejection::new(RejectReason::TooLarge, name, detail)
 }
@@ -104,7 +104,7 @@ fn check_length(name: &str, dataset: &Dataset) -> Result<(), Rejection> {
         Ok(bytes) if bytes <= MAX_FREE_BYTES => Ok(()),
         Ok(bytes) => {
             let what = format!("{bytes} bytes of text, at most {MAX_FREE_BYTES}");
-            Err(too_large(name, what))
+            Err(too_large(name, &what))
         }
         Err(e) => Err(corrupt(name, format!("{e}; the file is damaged"))),
     }

@@ -65,7 +65,7 @@ pub async fn plan(
                 plan.items.push(item);
             }
             Ok(Some(item)) => {
-                in_the_way.push(format!("{} is not in the store any more", item.file))
+                in_the_way.push(format!("{} is not in the store any more", item.file));
             }
             Ok(None) => plan.fresh_count += 1,
             Err(detail) => in_the_way.push(detail),
