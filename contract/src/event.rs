@@ -106,7 +106,7 @@ pub enum Body {
     #[serde(rename = "render.job")]
     RenderJob {
         /// The job.
-        job: RenderJob,
+        job: Box<RenderJob>,
     },
     /// A picture is there.
     #[serde(rename = "render.done")]

@@ -3,11 +3,12 @@
 //! JSON numbers are not enough where a digest must come out the same on both sides: readers may be wrong in the last
 //! bit. For `#[serde(with = "crate::exact")]`; [`grid`] does the same for a whole grid.
 
-use serde::{Deserialize, Deserializer, Serializer};
+use serde::{Deserialize as _, Deserializer, Serializer};
 
 /// Longest text read: far more than any shortest decimal form needs.
 const MAX_BYTES: usize = 400;
 
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it so")]
 pub(crate) fn serialize<S: Serializer>(number: &f64, to: S) -> Result<S::Ok, S::Error> {
     // The shortest text that reads as this number.
     to.collect_str(number)

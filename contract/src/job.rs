@@ -328,13 +328,13 @@ mod tests {
         Moment {
             domain: "domain/p/d".parse().unwrap(),
             before: Some("frames/p/a".parse().unwrap()),
-            after: after("frames/p/b", 0.25),
+            after: Some(after("frames/p/b", 0.25)),
         }
     }
 
-    fn after(frame: &str, weight: f64) -> Option<After> {
+    fn after(frame: &str, weight: f64) -> After {
         let frame = frame.parse().unwrap();
-        Some(After { frame, weight })
+        After { frame, weight }
     }
 
     fn job() -> RenderJob {
@@ -373,8 +373,8 @@ mod tests {
         changed(|j| j.value.domain = "domain/p/e".parse().unwrap());
         changed(|j| j.value.before = None);
         changed(|j| j.value.after = None);
-        changed(|j| j.value.after = after("frames/p/c", 0.25));
-        changed(|j| j.value.after = after("frames/p/b", 0.5));
+        changed(|j| j.value.after = Some(after("frames/p/c", 0.25)));
+        changed(|j| j.value.after = Some(after("frames/p/b", 0.5)));
         changed(|j| j.accumulated = Some(moment()));
         changed(|j| j.mode = Mode::Map);
         changed(|j| {
@@ -404,7 +404,7 @@ mod tests {
             let mut job = job();
             job.grid.dlon_deg = odd;
             job.grid.west_deg = -odd;
-            job.value.after = after("frames/p/b", odd.fract());
+            job.value.after = Some(after("frames/p/b", odd.fract()));
             job.style.transfer.low = -odd * 1e-9;
             job.style.sun.azimuth_deg = odd;
             job.view = View::Globe {
@@ -434,7 +434,7 @@ mod tests {
             |j| j.value.before = Some("raw/p/a".parse().unwrap()),
             |j| {
                 j.accumulated = Some(Moment {
-                    after: after("frames/p/b", 2.0),
+                    after: Some(after("frames/p/b", 2.0)),
                     ..moment()
                 });
             },

@@ -15,7 +15,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use axum::serve::Listener;
-use prometheus::{IntCounterVec, IntGauge};
+use prometheus::{IntCounterVec, IntGauge, Opts, Registry};
 use tokio::io::AsyncReadExt as _;
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
@@ -43,11 +43,31 @@ pub(crate) struct Limits {
     pub(crate) idle: Duration,
 }
 
-/// What connections count.
+/// How many connections there are and were ended.
 #[derive(Debug, Clone)]
 pub(crate) struct Counts {
-    pub(crate) open: IntGauge,
-    pub(crate) ended: IntCounterVec,
+    open: IntGauge,
+    /// By the limit that they broke.
+    ended: IntCounterVec,
+}
+
+impl Counts {
+    pub(crate) fn register(registry: &Registry) -> Result<Self, prometheus::Error> {
+        let open = IntGauge::new(
+            "fluxglobe_tile_server_connections_count",
+            "Connections that are open.",
+        )?;
+        let ended = IntCounterVec::new(
+            Opts::new(
+                "fluxglobe_tile_server_connections_ended_total",
+                "Connections ended by this server, by the limit that they broke.",
+            ),
+            &["why"],
+        )?;
+        registry.register(Box::new(open.clone()))?;
+        registry.register(Box::new(ended.clone()))?;
+        Ok(Self { open, ended })
+    }
 }
 
 /// A socket that lets in as many as there is room for.
@@ -93,10 +113,7 @@ impl Door {
                 head: Duration::from_secs(settings.head_limit_s),
                 idle: Duration::from_secs(idle_s),
             },
-            counts: Counts {
-                open: metrics.connections.clone(),
-                ended: metrics.connections_ended.clone(),
-            },
+            counts: metrics.connections.clone(),
         }
     }
 

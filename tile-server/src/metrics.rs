@@ -9,6 +9,8 @@ use prometheus::{
 
 pub use prometheus::Registry;
 
+use crate::connections::Counts;
+
 /// Bounds of request times, seconds: a cached tile is under a millisecond, a budget some seconds.
 const REQUEST_BOUNDS_S: [f64; 12] = [
     0.0005, 0.001, 0.0025, 0.005, 0.015, 0.05, 0.15, 0.5, 1.5, 5.0, 15.0, 60.0,
@@ -72,10 +74,8 @@ pub struct Metrics {
     pub panics: IntCounter,
     /// Products known.
     pub products: IntGauge,
-    /// Connections that are open.
-    pub connections: IntGauge,
-    /// Connections that were ended by this server, by the limit that they broke.
-    pub connections_ended: IntCounterVec,
+    /// Connections.
+    pub(crate) connections: Counts,
 }
 
 impl Metrics {
@@ -147,12 +147,7 @@ impl Metrics {
             )?,
             panics: counter("panics_total", "Panics that were caught.")?,
             products: gauge("products_count", "Products known.")?,
-            connections: gauge("connections_count", "Connections that are open.")?,
-            connections_ended: counters(
-                "connections_ended_total",
-                "Connections ended by this server, by the limit that they broke.",
-                &["why"],
-            )?,
+            connections: Counts::register(registry)?,
         })
     }
 

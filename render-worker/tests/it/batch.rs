@@ -18,7 +18,12 @@ use crate::stored::{quick, slow, two_months_in};
 use crate::worker::{LIMIT, Worker};
 
 fn wanted(job: &RenderJob, trace: &str) -> Event {
-    Event::new(trace, Body::RenderJob { job: job.clone() })
+    Event::new(
+        trace,
+        Body::RenderJob {
+            job: job.clone().into(),
+        },
+    )
 }
 
 async fn events(log: &EmbeddedLog, topic: Topic) -> Vec<Event> {

@@ -86,8 +86,8 @@ impl Reader {
         }
         Ok(Snapshot {
             read_at,
-            layers,
             known,
+            layers,
         })
     }
 

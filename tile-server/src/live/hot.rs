@@ -139,18 +139,19 @@ mod tests {
         }
     }
 
-    fn time(text: &str) -> Option<TimeMs> {
-        Some(text.parse().unwrap())
+    fn time(text: &str) -> TimeMs {
+        text.parse().unwrap()
     }
 
     #[test]
     fn the_hottest_touched_tiles_come_first() {
         let hot = HotTiles::default();
         for (x, times) in [(1, 3), (2, 5), (3, 1)] {
-            (0..times).for_each(|_| hot.asked(&product(), Mode::Volume, &view(x), time("2000-05")));
+            (0..times)
+                .for_each(|_| hot.asked(&product(), Mode::Volume, &view(x), Some(time("2000-05"))));
         }
-        hot.asked(&product(), Mode::Volume, &view(9), time("2000-09"));
-        let found = hot.of(&product(), 2, |t| t < time("2000-06"));
+        hot.asked(&product(), Mode::Volume, &view(9), Some(time("2000-09")));
+        let found = hot.of(&product(), 2, |t| t < Some(time("2000-06")));
         assert_eq!(found.iter().map(|t| t.asked).collect::<Vec<_>>(), [5, 3]);
         assert_eq!(found[0].view, view(2));
         assert!(hot.of(&"other".parse().unwrap(), 9, |_| true).is_empty());
@@ -160,7 +161,7 @@ mod tests {
     fn memory_is_bounded() {
         let hot = HotTiles::default();
         for x in 0..20_000 {
-            hot.asked(&product(), Mode::Map, &view(x), time("2000"));
+            hot.asked(&product(), Mode::Map, &view(x), Some(time("2000")));
         }
         assert!(hot.lock().len() <= MOST_TILES);
     }

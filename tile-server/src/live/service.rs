@@ -248,7 +248,7 @@ impl LiveService {
         }
         let events: Vec<Event> = jobs
             .into_iter()
-            .map(|job| event.followed_by(Body::RenderJob { job }))
+            .map(|job| event.followed_by(Body::RenderJob { job: job.into() }))
             .collect();
         self.log.append(&events).await
     }

@@ -84,7 +84,7 @@ impl Live {
     async fn orders(&self) -> Vec<(Event, RenderJob)> {
         let messages = contents(self.log.as_ref(), Topic::RenderJob).await.unwrap();
         let order = |event: Event| match event.body.clone() {
-            Body::RenderJob { job } => (event, job),
+            Body::RenderJob { job } => (event, *job),
             other => panic!("{other:?}"),
         };
         messages

@@ -117,8 +117,14 @@ async fn on_workers(
     let mut open: BTreeSet<ObjectKey> = jobs.iter().map(RenderJob::key).collect();
     for some in jobs.chunks(AT_ONCE) {
         let trace = uuid::Uuid::new_v4().to_string();
-        let event =
-            |job: &RenderJob| Event::new(trace.clone(), Body::RenderJob { job: job.clone() });
+        let event = |job: &RenderJob| {
+            Event::new(
+                trace.clone(),
+                Body::RenderJob {
+                    job: job.clone().into(),
+                },
+            )
+        };
         log.append(&some.iter().map(event).collect::<Vec<_>>())
             .await?;
     }
