@@ -61,6 +61,8 @@ fn start(folder: &Path, service: &str, settings: &[(String, String)]) -> Node {
 }
 
 fn refused_start(folder: &Path, service: &str, settings: &[(String, String)]) -> String {
+    // What an earlier start said is no answer to this one.
+    drop(std::fs::remove_file(folder.join(format!("{service}.log"))));
     let mut node = start(folder, service, settings);
     let code = node.wait_until_ended().unwrap();
     let talk = node.talk();
