@@ -14,6 +14,8 @@ source deploy/services/process.sh
 program=${FLUXGLOBE_PROGRAM:-${CARGO_TARGET_DIR:-$HOME/.cache/fluxglobe/target}/debug/fluxglobe}
 runs=${FLUXGLOBE_RUN:-$HOME/.cache/fluxglobe/run}
 listen=${FLUXGLOBE_LISTEN:-127.0.0.1:8080}
+# Files of your own that notices may name.
+inbox=$runs/cluster/inbox
 servers=(kafka postgis s3)
 watcher=prometheus
 
@@ -47,7 +49,7 @@ settings() {
     echo "export FLUXGLOBE_STORE=s3://fluxglobe/cluster"
     echo "export FLUXGLOBE_CLUSTER=http://127.0.0.1:18150"
     echo "export FLUXGLOBE_RENDER_WORKERS=127.0.0.1:18161,127.0.0.1:18162"
-    echo "export FLUXGLOBE_ALLOW_FOLDER=$(samples_folder)"
+    echo "export FLUXGLOBE_ALLOW_FOLDER=$(samples_folder),$inbox"
     echo "export FLUXGLOBE_SPOOL=$runs/cluster/spool"
 }
 
@@ -87,7 +89,7 @@ up() {
     [ -x "$program" ] || fail "$program is not built; run: make build"
     deploy/services/services.sh install "${servers[@]}" "$watcher"
     FLUXGLOBE_PROMETHEUS_TARGETS=$(targets) deploy/services/services.sh start "${servers[@]}" "$watcher"
-    mkdir -p "$runs/cluster/spool"
+    mkdir -p "$runs/cluster/spool" "$inbox"
     if [ "${FLUXGLOBE_SAMPLES:-}" != none ]; then "$program" demo --fetch-only >/dev/null; fi
     local text
     text=$(settings)
@@ -109,6 +111,7 @@ up() {
     select_node cluster
     say "open http://$listen/"
     say "alerts: http://127.0.0.1:${FLUXGLOBE_PROMETHEUS_PORT:-19090}/alerts"
+    say "files of your own: put them into $inbox and send notices of them"
     say "settings for commands of your own: eval \"\$(deploy/cluster.sh env)\""
     say "logs: $runs/cluster/*/log; stop with: make cluster-down"
 }

@@ -122,7 +122,25 @@ fn config(topic: Topic, replication: u16) -> Vec<(&'static str, String)> {
 /// Are all topics there, with the right partition counts? A key's partition follows from the count, so one that changed
 /// would break the order of a product's events: the count must be the settings' exactly.
 pub(crate) async fn check(cluster: &Cluster, probe: &Probe) -> Result<(), KafkaFailure> {
+    let until = Instant::now() + ASK_LIMIT;
+    while let Some(leaderless) = find_leaderless(cluster, probe).await? {
+        if Instant::now() >= until {
+            return Err(KafkaFailure::Client {
+                step: "looking for topics",
+                source: KafkaError::MetadataFetch(RDKafkaErrorCode::LeaderNotAvailable),
+                noted: Some(leaderless),
+            });
+        }
+        // A broker that was lost for a moment leads again soon: no reason for a command to fail.
+        tokio::time::sleep(LOOK_PAUSE).await;
+    }
+    Ok(())
+}
+
+/// A topic of which a partition has no leader now, if there is one; an error if one is missing or made otherwise.
+async fn find_leaderless(cluster: &Cluster, probe: &Probe) -> Result<Option<String>, KafkaFailure> {
     let wanted = cluster.partitions();
+    let mut leaderless = None;
     for (topic, found) in probe.topics(&Topic::ALL, ASK_LIMIT).await? {
         let name = cluster.topic(topic);
         match found {
@@ -138,14 +156,8 @@ pub(crate) async fn check(cluster: &Cluster, probe: &Probe) -> Result<(), KafkaF
                     "topic {name} is missing, {wanted} partitions are wanted; run `fluxglobe topics create`"
                 )));
             }
-            Found::Leaderless => {
-                return Err(KafkaFailure::Client {
-                    step: "looking for topics",
-                    source: KafkaError::MetadataFetch(RDKafkaErrorCode::LeaderNotAvailable),
-                    noted: Some(name),
-                });
-            }
+            Found::Leaderless => leaderless = Some(name),
         }
     }
-    Ok(())
+    Ok(leaderless)
 }

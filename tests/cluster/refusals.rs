@@ -10,6 +10,7 @@ mod tls;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
+use contract::digest::Digest;
 use contract::event::{Body, Event};
 use harness::node::Node;
 use harness::servers::free_port;
@@ -61,6 +62,8 @@ fn start(folder: &Path, service: &str, settings: &[(String, String)]) -> Node {
 }
 
 fn refused_start(folder: &Path, service: &str, settings: &[(String, String)]) -> String {
+    // What an earlier start said is no answer to this one.
+    drop(std::fs::remove_file(folder.join(format!("{service}.log"))));
     let mut node = start(folder, service, settings);
     let code = node.wait_until_ended().unwrap();
     let talk = node.talk();
@@ -96,14 +99,19 @@ fn files_below(folder: &Path) -> Vec<String> {
     found
 }
 
-/// The bytes of a notice of a path.
+/// A notice of a path.
 fn notice(path: &str) -> Event {
+    promised(path, None, None)
+}
+
+/// A notice of a path, with what its sender says of the file.
+fn promised(path: &str, sha256: Option<Digest>, size_bytes: Option<u64>) -> Event {
     let body = Body::GranuleNotice {
         path: path.to_owned(),
         profile: None,
         product: None,
-        sha256: None,
-        size_bytes: None,
+        sha256,
+        size_bytes,
         attempt: 1,
     };
     Event::new("bad", body)

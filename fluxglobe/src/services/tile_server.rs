@@ -16,6 +16,7 @@ use crate::{deployment, viewer};
 pub(crate) async fn run(settings: &Settings, options: TileServer) -> Result<()> {
     // Settings and secrets are looked at before anything is waited for.
     options.kafka.check()?;
+    options.observations.database()?;
     let footing = Footing::take(settings, "tile-server", None, &[]).await?;
     // Opening asks nobody: /healthz is answered while the store is waited for, and /readyz says so.
     let store = deployment::open_interactive(footing.store_url())?;

@@ -213,6 +213,6 @@ fn is_distrusted(error: &tokio_postgres::Error) -> bool {
     let first: &(dyn std::error::Error + 'static) = error;
     std::iter::successors(Some(first), |cause| cause.source())
         .filter_map(|cause| cause.downcast_ref::<openssl::ssl::Error>()?.ssl_error())
-        .flat_map(|stack| stack.errors())
+        .flat_map(openssl::error::ErrorStack::errors)
         .any(|failed| failed.reason() == Some(VERIFY_FAILED))
 }

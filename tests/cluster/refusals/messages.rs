@@ -1,23 +1,10 @@
 //! Messages that nobody understands, or that say what is not so.
 
 use contract::digest::Digest;
-use contract::event::{Body, Event};
+use contract::event::Event;
 use contract::topic::Topic;
 
-use super::{Bad, Ground, PRODUCT, bad, notice, until};
-
-/// The notice of the file at `path`, with what its sender says of it.
-fn promised(path: &str, sha256: Option<Digest>, size_bytes: Option<u64>) -> String {
-    let body = Body::GranuleNotice {
-        path: path.to_owned(),
-        profile: None,
-        product: None,
-        sha256,
-        size_bytes,
-        attempt: 1,
-    };
-    Event::new("bad", body).to_json()
-}
+use super::{Bad, Ground, PRODUCT, bad, notice, promised, until};
 
 #[test]
 fn a_file_that_is_not_the_promised_one_is_refused() {
@@ -29,12 +16,12 @@ fn a_file_that_is_not_the_promised_one_is_refused() {
     let path = file.to_str().unwrap();
     let bad = [
         bad(
-            promised(path, Some(Digest::of(b"something else")), None),
+            promised(path, Some(Digest::of(b"something else")), None).to_json(),
             "checksum",
             "SHA-256 digest",
         ),
         bad(
-            promised(path, None, Some(content.len() as u64)),
+            promised(path, None, Some(content.len() as u64)).to_json(),
             "checksum",
             "bytes",
         ),
@@ -49,7 +36,7 @@ fn gibberish(of: &Event) -> [Vec<u8>; 5] {
         text.replace("\"schema\":1", "\"schema\":99").into_bytes(),
         text.replace("\"trace\"", "\"extra\":1,\"trace\"")
             .into_bytes(),
-        text[..text.len() / 2].as_bytes().to_vec(),
+        text.as_bytes()[..text.len() / 2].to_vec(),
         b"no JSON at all".to_vec(),
         b"\xff\xfe\x00".to_vec(),
     ]
