@@ -149,7 +149,7 @@ pub(crate) enum Rejected {
 pub(crate) enum Bench {
     /// How fresh a running cluster is: from a notice to a volume tile, and the share of each stage.
     Stream(BenchStream),
-    /// Gap filling on this machine's Vulkan device: every form, small grids first.
+    /// Gap filling on this machine's Vulkan device, or with --cpu on the processor: every form, small grids first.
     Fill(super::BenchFill),
 }
 

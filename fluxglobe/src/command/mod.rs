@@ -58,7 +58,7 @@ pub(crate) async fn run(settings: &Settings, command: Command) -> Result<ExitCod
             let log = deployment::needed_log(settings, &options.kafka).await?;
             bench::stream::run(log.as_ref(), &options).await?;
         }
-        Command::Bench(Bench::Fill(options)) => bench::fill::run(&options)?,
+        Command::Bench(Bench::Fill(options)) => bench::fill::run(settings, &options)?,
         Command::Generate(options) => generate::run(options)?,
         Command::DecodeFile { .. } => unreachable!("main runs the decoder before anything else"),
     }
