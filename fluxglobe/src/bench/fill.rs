@@ -1,15 +1,15 @@
-//! `fluxglobe bench fill`: how long gap filling takes on this machine's device, every form, small grids first.
+//! `fluxglobe bench fill`: how long gap filling takes on this machine's device (or with --cpu the twins), every form,
+//! small grids first.
 
 use std::time::Duration;
 
 use anyhow::Result;
-use render_worker::RenderError;
 use render_worker::gpu::Gpu;
 use render_worker::stages::fill::bench::{self, Timing};
 use render_worker::stages::fill::{Fill, Sources};
 use serde::Serialize;
 
-use crate::cli::BenchFill;
+use crate::cli::{BenchFill, Settings};
 use crate::progress;
 
 /// One line.
@@ -34,35 +34,35 @@ struct Row {
     adapter: String,
 }
 
-pub(crate) fn run(options: &BenchFill) -> Result<()> {
-    let gpu = Gpu::open()?;
-    let fill = Fill::new(&gpu, Sources::default());
+pub(crate) fn run(settings: &Settings, options: &BenchFill) -> Result<()> {
+    let gpu = if settings.cpu {
+        None
+    } else {
+        Some(Gpu::open()?)
+    };
+    let on_gpu = gpu
+        .as_ref()
+        .map(|gpu| (gpu, Fill::new(gpu, Sources::default())));
+    let adapter = gpu.as_ref().map_or("CPU twins", Gpu::adapter_name);
     let limit = Duration::from_secs(options.limit_s);
+    let runs = options.runs.get() as usize;
     progress::say(&format!(
-        "gap filling on {}; device time of a whole frame, without upload and read-back",
-        gpu.adapter_name()
+        "gap filling on {adapter}; a whole frame, without upload and read-back"
     ));
     if !options.json {
         progress::result(HEADER)?;
     }
     for case in bench::cases([options.size[0], options.size[1]], options.share) {
-        for form in &options.forms {
-            match bench::bench_fill(
-                &gpu,
-                &fill,
-                case,
-                form.form(),
-                options.runs.get() as usize,
-                limit,
-            ) {
-                Ok(timing) => print(options, &Row::new(&timing, gpu.adapter_name()))?,
-                Err(error @ (RenderError::TooManyPairs { .. } | RenderError::TooLarge { .. })) => {
-                    progress::say(&format!(
-                        "{} of {} x {}: {error}",
-                        form.form().name(),
-                        case.rows,
-                        case.cols
-                    ));
+        for form in options.forms.iter().map(|form| form.form()) {
+            let timing = match &on_gpu {
+                Some((gpu, fill)) => bench::bench_fill(gpu, fill, case, form, runs, limit),
+                None => bench::bench_twin(case, form, runs, limit),
+            };
+            match timing {
+                Ok(timing) => print(options, &Row::new(&timing, adapter))?,
+                Err(error) if error.is_bad_request() => {
+                    let (rows, cols) = (case.rows, case.cols);
+                    progress::say(&format!("{} of {rows} x {cols}: {error}", form.name()));
                 }
                 Err(error) => return Err(error.into()),
             }

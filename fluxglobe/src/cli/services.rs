@@ -155,7 +155,7 @@ pub(crate) enum Bench {
     Quality(BenchQuality),
     /// How far two pictures are apart: decibels, levels, bytes, FLIP.
     Compare(BenchCompare),
-    /// Gap filling on this machine's Vulkan device: every form, small grids first.
+    /// Gap filling on this machine's Vulkan device, or with --cpu on the processor: every form, small grids first.
     Fill(super::BenchFill),
 }
 

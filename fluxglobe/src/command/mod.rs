@@ -60,7 +60,7 @@ pub(crate) async fn run(settings: &Settings, command: Command) -> Result<ExitCod
         }
         Command::Bench(Bench::Quality(options)) => bench::quality::run(settings, options).await?,
         Command::Bench(Bench::Compare(options)) => bench::compare::run(&options)?,
-        Command::Bench(Bench::Fill(options)) => bench::fill::run(&options)?,
+        Command::Bench(Bench::Fill(options)) => bench::fill::run(settings, &options)?,
         Command::Generate(options) => generate::run(options)?,
         Command::DecodeFile { .. } => unreachable!("main runs the decoder before anything else"),
     }

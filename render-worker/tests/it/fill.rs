@@ -1,6 +1,7 @@
 //! Gap filling: every form against all pairs in float64, the device against the twins bit for bit, and what must hold
 //! of filled frames.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use contract::grid::Grid;
@@ -143,88 +144,34 @@ fn a_wrong_shader_of_any_form_is_seen() {
         return;
     };
     let (values, domain) = frame(&SEA);
-    let wrong = |source: &str, right: &str, wrong: &str| {
-        let faulty = source.replacen(right, wrong, 1);
-        assert_ne!(faulty, source, "the fault was planted");
-        faulty.into()
-    };
-    let sources = Sources::default;
+    type Shader = fn(&mut Sources) -> &mut Cow<'static, str>;
+    let (window, exact): (Shader, Shader) = (|all| &mut all.window, |all| &mut all.exact);
+    let (pairs, stencil): (Shader, Shader) = (|all| &mut all.pairs, |all| &mut all.stencil);
     let faults = [
-        (
-            Form::Window,
-            Sources {
-                window: wrong(&sources().window, "0.1875, sides", "0.1874, sides"),
-                ..sources()
-            },
-        ),
-        (
-            Form::Window,
-            Sources {
-                window: wrong(&sources().window, "dy <= 2", "dy <= 1"),
-                ..sources()
-            },
-        ),
-        (
-            Form::Window,
-            Sources {
-                stencil: wrong(&sources().stencil, "center + dx", "center - dx"),
-                ..sources()
-            },
-        ),
+        (Form::Window, window, "0.1875, sides", "0.1874, sides"),
+        (Form::Window, window, "dy <= 2", "dy <= 1"),
+        (Form::Window, stencil, "center + dx", "center - dx"),
         (
             Form::Exact,
-            Sources {
-                stencil: wrong(
-                    &sources().stencil,
-                    "dx = 1u; dx < span",
-                    "dx = 2u; dx < span",
-                ),
-                ..sources()
-            },
+            stencil,
+            "dx = 1u; dx < span",
+            "dx = 2u; dx < span",
         ),
-        (
-            Form::Exact,
-            Sources {
-                exact: wrong(&sources().exact, "0.5859375", "0.5859374"),
-                ..sources()
-            },
-        ),
-        (
-            Form::Exact,
-            Sources {
-                exact: wrong(&sources().exact, "at.y % 2u == 0u", "at.y % 2u == 1u"),
-                ..sources()
-            },
-        ),
-        (
-            Form::Pairs,
-            Sources {
-                pairs: wrong(
-                    &sources().pairs,
-                    "first + lane < end",
-                    "first + lane < end - 1u",
-                ),
-                ..sources()
-            },
-        ),
-        (
-            Form::NaivePairs,
-            Sources {
-                pairs: wrong(&sources().pairs, "total += line;", "total = line;"),
-                ..sources()
-            },
-        ),
+        (Form::Exact, exact, "0.5859375", "0.5859374"),
+        (Form::Exact, exact, "at.y % 2u == 0u", "at.y % 2u == 1u"),
+        (Form::Pairs, pairs, "lane < end", "lane < end - 1u"),
+        (Form::NaivePairs, pairs, "total += line;", "total = line;"),
     ];
-    for (number, (form, sources)) in faults.into_iter().enumerate() {
-        let drawn = Fill::new(gpu, sources)
-            .run(gpu, form, &SEA, &values, &domain)
-            .unwrap();
+    for (form, shader, right, wrong) in faults {
+        let mut sources = Sources::default();
+        let shader = shader(&mut sources);
+        let faulty = shader.replacen(right, wrong, 1);
+        assert_ne!(faulty, **shader, "the fault was planted");
+        *shader = faulty.into();
+        let fill = Fill::new(gpu, sources);
+        let drawn = fill.run(gpu, form, &SEA, &values, &domain).unwrap();
         let twin = fill::on_cpu(form, &SEA, &values, &domain).unwrap();
-        assert!(
-            drawn != twin,
-            "fault {number} in {} stays unseen",
-            form.name()
-        );
+        assert!(drawn != twin, "{wrong} in {} stays unseen", form.name());
     }
 }
 

@@ -6,7 +6,8 @@ use contract::digest::Digest;
 use contract::grid::Grid;
 
 use super::hold_out::{HoldOut, Score};
-use super::{Fill, Form, Prepared, Task, reference};
+use super::scaled::holds;
+use super::{Fill, Filled, Form, Prepared, Task, reference};
 use crate::error::RenderError;
 use crate::gpu::Gpu;
 
@@ -81,6 +82,95 @@ impl Case {
     }
 }
 
+/// A case's frame, and what was hidden of it.
+struct Made {
+    grid: Grid,
+    truth: Vec<f32>,
+    values: Vec<f32>,
+    hidden: Vec<usize>,
+    domain: Vec<u32>,
+}
+
+impl Made {
+    fn of(case: &Case) -> Self {
+        let truth = case.truth();
+        let (values, hidden) = case.missing.hide(&truth, case.cols);
+        let domain = vec![1; values.len()];
+        Self {
+            grid: case.grid(),
+            truth,
+            values,
+            hidden,
+            domain,
+        }
+    }
+
+    fn timing(&self, case: Case, form: Form) -> Timing {
+        Timing {
+            form,
+            case,
+            gaps: self.hidden.len(),
+            seconds: vec![0.0],
+            measured_share: 1.0,
+            from_all_pairs: None,
+            values_digest: None,
+            rmse_of_hidden: None,
+        }
+    }
+
+    fn check(&self, filled: &Filled, timing: &mut Timing) {
+        let score = Score::of(&self.truth, &filled.values, &filled.errors, &self.hidden);
+        timing.rmse_of_hidden = score
+            .rmse()
+            .zip(score.spread())
+            .map(|(rmse, spread)| rmse / spread);
+        timing.values_digest = Some(Digest::of(bytemuck::cast_slice(&filled.values)));
+        timing.from_all_pairs = Some(self.distance_to_all_pairs(&filled.values));
+    }
+
+    fn distance_to_all_pairs(&self, filled: &[f32]) -> f64 {
+        let step = self.hidden.len().div_ceil(CHECKED).max(1);
+        let some: Vec<usize> = self.hidden.iter().copied().step_by(step).collect();
+        let held = self
+            .values
+            .iter()
+            .filter(|value| holds(**value))
+            .map(|value| f64::from(*value));
+        let (low, high) = held.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+            (low.min(value), high.max(value))
+        });
+        let answers = reference::answers_at(&self.grid, &self.values, &some);
+        let apart = some
+            .iter()
+            .zip(answers)
+            .map(|(cell, answer)| (f64::from(filled[*cell]) - answer).abs());
+        apart.fold(0.0, f64::max) / (high - low)
+    }
+}
+
+/// Fills one case with the twin of one form `runs` times, or fewer if that takes longer than `limit`.
+pub fn bench_twin(
+    case: Case,
+    form: Form,
+    runs: usize,
+    limit: Duration,
+) -> Result<Timing, RenderError> {
+    let made = Made::of(&case);
+    let mut timing = made.timing(case, form);
+    timing.seconds.clear();
+    let started = Instant::now();
+    while timing.seconds.is_empty() || (timing.seconds.len() < runs && started.elapsed() < limit) {
+        let run = Instant::now();
+        let filled = super::on_cpu(form, &made.grid, &made.values, &made.domain)?;
+        timing.seconds.push(run.elapsed().as_secs_f64());
+        if timing.values_digest.is_none() {
+            made.check(&filled, &mut timing);
+        }
+    }
+    timing.seconds.sort_by(f64::total_cmp);
+    Ok(timing)
+}
+
 /// Fills one case with one form `runs` times, or fewer if that takes longer than `limit`. Forms that meet every pair
 /// fill only as many gaps as the limit allows.
 pub fn bench_fill(
@@ -92,23 +182,12 @@ pub fn bench_fill(
     limit: Duration,
 ) -> Result<Timing, RenderError> {
     let started = Instant::now();
-    let (grid, truth) = (case.grid(), case.truth());
-    let (values, hidden) = case.missing.hide(&truth, case.cols);
-    let domain = vec![1; values.len()];
-    let mut timing = Timing {
-        form,
-        case,
-        gaps: hidden.len(),
-        seconds: vec![0.0],
-        measured_share: 1.0,
-        from_all_pairs: None,
-        values_digest: None,
-        rmse_of_hidden: None,
-    };
-    let Some(task) = Task::of(&values, &domain) else {
+    let made = Made::of(&case);
+    let mut timing = made.timing(case, form);
+    let Some(task) = Task::of(&made.values, &made.domain) else {
         return Ok(timing);
     };
-    let prepared = fill.prepared(gpu, form, &grid, &task)?;
+    let prepared = fill.prepared(gpu, form, &made.grid, &task)?;
     let all = prepared.pieces();
     let mut pieces = all.min(1);
     // The first run also clears buffers and warms the device up; more pieces until the time is well used.
@@ -134,16 +213,10 @@ pub fn bench_fill(
     }
     timing.seconds.sort_by(f64::total_cmp);
     if pieces == all {
-        let recorder = gpu.recorder();
-        let answers = recorder.download(prepared.answers(), 2 * values.len())?;
-        let filled = task.filled(&values, &answers);
-        let score = Score::of(&truth, &filled.values, &filled.errors, &hidden);
-        timing.rmse_of_hidden = score
-            .rmse()
-            .zip(score.spread())
-            .map(|(rmse, spread)| rmse / spread);
-        timing.values_digest = Some(Digest::of(bytemuck::cast_slice(&filled.values)));
-        timing.from_all_pairs = Some(from_all_pairs(&grid, &values, &filled.values, &hidden));
+        let answers = gpu
+            .recorder()
+            .download(prepared.answers(), 2 * made.values.len())?;
+        made.check(&task.filled(&made.values, &answers), &mut timing);
     }
     Ok(timing)
 }
@@ -162,27 +235,6 @@ fn submitted(
     // A few bytes come back, so that the end of the work is known.
     let _: Vec<f32> = recorder.download(prepared.answers(), 1)?;
     Ok(started.elapsed())
-}
-
-fn from_all_pairs(grid: &Grid, values: &[f32], filled: &[f32], hidden: &[usize]) -> f64 {
-    let some: Vec<usize> = hidden
-        .iter()
-        .copied()
-        .step_by(hidden.len().div_ceil(CHECKED).max(1))
-        .collect();
-    let held = values
-        .iter()
-        .filter(|value| super::scaled::holds(**value))
-        .map(|value| f64::from(*value));
-    let (low, high) = held.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
-        (low.min(value), high.max(value))
-    });
-    let answers = reference::answers_at(grid, values, &some);
-    let apart = some
-        .iter()
-        .zip(answers)
-        .map(|(cell, answer)| (f64::from(filled[*cell]) - answer).abs());
-    apart.fold(0.0, f64::max) / (high - low)
 }
 
 /// The cases of the table: up to `largest` rows and columns, small ones first, a share of the cells missing in blocks.

@@ -125,10 +125,10 @@ impl Table {
         {
             return None;
         }
-        Some(Self::of_lines(places, reach_rows, lines))
+        Some(Self::of_lines(places, reach_rows, &lines))
     }
 
-    fn of_lines(places: &Places<'_>, reach_rows: u32, lines: Vec<Vec<f64>>) -> Self {
+    fn of_lines(places: &Places<'_>, reach_rows: u32, lines: &[Vec<f64>]) -> Self {
         let spans: Vec<u32> = lines.iter().map(|line| line.len() as u32).collect();
         let reach_cols = spans.iter().max().map_or(0, |most| most.saturating_sub(1));
         let mut weights = vec![0.0; spans.len() * (reach_cols as usize + 1)];

@@ -283,7 +283,7 @@ impl Fill {
                     .get_or_init(|| Pairs::new(gpu, &self.sources.pairs));
                 Ok(Prepared::Pairs(
                     pairs,
-                    PairRooms::new(gpu, grid, values, gaps)?,
+                    Box::new(PairRooms::new(gpu, grid, values, gaps)?),
                     is_naive,
                 ))
             }
@@ -305,7 +305,7 @@ impl Fill {
 enum Prepared<'a> {
     Window(&'a Window, Rooms),
     Exact(&'a Exact, Rooms),
-    Pairs(&'a Pairs, PairRooms, bool),
+    Pairs(&'a Pairs, Box<PairRooms>, bool),
 }
 
 impl Prepared<'_> {

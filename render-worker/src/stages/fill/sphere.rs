@@ -5,6 +5,7 @@ use contract::grid::Grid;
 /// A grid's cell centres on the unit sphere. Rows and columns are fractional and may lie outside the grid, so that
 /// coarser levels have a place too.
 #[derive(Debug, Clone, Copy)]
+#[expect(clippy::struct_field_names, reason = "units last in names")]
 pub struct Sphere {
     north_rad: f64,
     row_rad: f64,

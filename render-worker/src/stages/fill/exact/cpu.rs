@@ -102,7 +102,7 @@ fn raise(level: &FillLevel, coarse: &[f32], wanted: Option<&[u32]>, sums: &mut [
             &coarse[plane * coarser_rows * coarser_cols..(plane + 1) * coarser_rows * coarser_cols];
         let across = |row: usize, col: usize| {
             let at = |k: usize| coarse[row * coarser_cols + coarse_col(col, k)];
-            if col % 2 == 0 {
+            if col.is_multiple_of(2) {
                 return at(2);
             }
             let mut line = 0.0;
@@ -118,7 +118,7 @@ fn raise(level: &FillLevel, coarse: &[f32], wanted: Option<&[u32]>, sums: &mut [
                     continue;
                 }
                 let mut total = 0.0;
-                if row % 2 == 0 {
+                if row.is_multiple_of(2) {
                     total = across(row / 2 + PAD as usize, col);
                 } else {
                     for k in 0..6 {

@@ -19,8 +19,9 @@ use crate::gpu::{Gpu, Kernel, Recorder};
 
 /// Where a level's part of the weight ends, cells of the level below.
 pub const REACH: f64 = 12.0;
-/// Largest difference from all pairs, as a share of the values' range.
-pub const TOLERANCE: f32 = 3e-5;
+/// Largest difference from all pairs, as a share of the values' range; most are below a twentieth of it, the largest
+/// lie far from all data.
+pub const TOLERANCE: f32 = 1e-4;
 /// Order of the polynomial that smooths the weight near 0.
 const SMOOTH_ORDER: i32 = 3;
 /// A level of at most so many rows and columns is summed over whole.

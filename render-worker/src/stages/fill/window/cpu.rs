@@ -1,8 +1,4 @@
 //! CPU twin of `window.wgsl`: the same bits.
-#![expect(
-    clippy::needless_range_loop,
-    reason = "same loops and indices as the shader, to be read side by side"
-)]
 
 use crate::stages::fill::cpu::{quotient, split, stencil};
 use crate::stages::fill::ladder::Ladder;
