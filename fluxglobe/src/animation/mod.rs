@@ -39,7 +39,7 @@ pub(crate) async fn run(settings: &Settings, store: Store, options: RenderAnimat
     }
     let shots = Arc::new(shots(settings, &store, &options).await?);
     let drawer = drawer(settings, store, &options).await?;
-    let mut film = Film::open(&options, &shots).await?;
+    let mut film = Film::open(&options, &shots)?;
     let missing = film.missing(&shots)?;
     let bar = progress::bar("draw", shots.count().into());
     bar.inc(u64::from(shots.count()) - missing.len() as u64);
