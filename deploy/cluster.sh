@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
-# Every service of Fluxglobe as a process of its own on this machine, over real Kafka, PostGIS and S3.
+# Every service of Fluxglobe as a process of its own on this machine, over real Kafka, PostGIS and S3, watched by Prometheus.
 #   deploy/cluster.sh up       start the servers, then all services; send notices of sample files; say where to look
 #   deploy/cluster.sh down     stop the services, then the servers; data stay
 #   deploy/cluster.sh status   exit code 0 only when every service is ready
 #   deploy/cluster.sh env      the settings that reach the cluster, as `export` lines
+#   deploy/cluster.sh targets  what Prometheus scrapes: SERVICE=HOST:PORT, with commas
 # FLUXGLOBE_PROGRAM: the built program. FLUXGLOBE_RUN: folder of logs and data. FLUXGLOBE_LISTEN: the tile server's
 # address, 127.0.0.1:8080 unless told otherwise. FLUXGLOBE_SAMPLES: folder of sample files; `none` sends nothing.
 set -euo pipefail
@@ -14,6 +15,7 @@ program=${FLUXGLOBE_PROGRAM:-${CARGO_TARGET_DIR:-$HOME/.cache/fluxglobe/target}/
 runs=${FLUXGLOBE_RUN:-$HOME/.cache/fluxglobe/run}
 listen=${FLUXGLOBE_LISTEN:-127.0.0.1:8080}
 servers=(kafka postgis s3)
+watcher=prometheus
 
 # Service, its health address, and what it is told besides the common settings.
 nodes=(
@@ -28,6 +30,16 @@ nodes=(
 )
 
 say() { printf 'cluster: %s\n' "$*" >&2; }
+
+# Health and metrics of every process, under the name of its service.
+targets() {
+    local entry list=''
+    for entry in "${nodes[@]}"; do
+        read -r _name address service _words <<<"$entry"
+        list+=${list:+,}$service=$address
+    done
+    printf '%s\n' "$list"
+}
 
 # What every service is told.
 settings() {
@@ -73,8 +85,8 @@ start_node() {
 
 up() {
     [ -x "$program" ] || fail "$program is not built; run: make build"
-    deploy/services/services.sh install "${servers[@]}"
-    deploy/services/services.sh start "${servers[@]}"
+    deploy/services/services.sh install "${servers[@]}" "$watcher"
+    FLUXGLOBE_PROMETHEUS_TARGETS=$(targets) deploy/services/services.sh start "${servers[@]}" "$watcher"
     mkdir -p "$runs/cluster/spool"
     if [ "${FLUXGLOBE_SAMPLES:-}" != none ]; then "$program" demo --fetch-only >/dev/null; fi
     local text
@@ -96,6 +108,7 @@ up() {
     fi
     select_node cluster
     say "open http://$listen/"
+    say "alerts: http://127.0.0.1:${FLUXGLOBE_PROMETHEUS_PORT:-19090}/alerts"
     say "settings for commands of your own: eval \"\$(deploy/cluster.sh env)\""
     say "logs: $runs/cluster/*/log; stop with: make cluster-down"
 }
@@ -107,7 +120,7 @@ down() {
         select_node "$name_of"
         stop_with TERM
     done
-    deploy/services/services.sh stop "${servers[@]}"
+    deploy/services/services.sh stop "${servers[@]}" "$watcher"
 }
 
 status() {
@@ -129,8 +142,9 @@ up) up ;;
 down) down ;;
 status) status ;;
 env) settings ;;
+targets) targets ;;
 *)
-    sed -n '2,8s/^# \?//p' "${BASH_SOURCE[0]}" >&2
+    sed -n '2,9s/^# \?//p' "${BASH_SOURCE[0]}" >&2
     exit 2
     ;;
 esac

@@ -11,6 +11,7 @@ pub mod executor;
 mod executor_metrics;
 mod executor_settings;
 mod heartbeat;
+mod named_sums;
 pub mod scheduler;
 mod scheduler_metrics;
 mod scheduler_watch;

@@ -71,8 +71,10 @@ pub struct TransferFunction {
     /// Colours.
     pub palette: Palette,
     /// Stored value of the first colour.
+    #[serde(with = "crate::exact")]
     pub low: f64,
     /// Stored value of the last colour, above `low`.
+    #[serde(with = "crate::exact")]
     pub high: f64,
 }
 

@@ -5,13 +5,15 @@ use serde::{Deserialize, Serialize};
 use crate::ContractError;
 use crate::colour::TransferFunction;
 use crate::digest::Digest;
+use crate::grid::Grid;
 use crate::key::ObjectKey;
-use crate::manifest::ManifestId;
+use crate::manifest::Manifest;
+use crate::moment::Moment;
 use crate::tile::Tile;
 use crate::time::TimeMs;
 
 /// Raised whenever the renderer draws the same job differently, so that old pictures are not taken for new ones.
-pub const RENDERER_VERSION: u32 = 1;
+pub const RENDERER_VERSION: u32 = 2;
 /// Largest width and height of a picture, pixels.
 pub const MAX_IMAGE_PX: u32 = 4096;
 /// Most slices of a half-angle volume.
@@ -79,10 +81,13 @@ pub enum View {
     /// The globe in perspective, the camera looking at the earth's centre, north up.
     Globe {
         /// Longitude below the camera, degrees.
+        #[serde(with = "crate::exact")]
         lon_deg: f64,
         /// Latitude below the camera, degrees.
+        #[serde(with = "crate::exact")]
         lat_deg: f64,
         /// Height of the camera above the ground, m.
+        #[serde(with = "crate::exact")]
         height_m: f64,
         /// Picture width, pixels.
         width_px: u32,
@@ -96,8 +101,10 @@ pub enum View {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Sun {
     /// Clockwise from north, degrees.
+    #[serde(with = "crate::exact")]
     pub azimuth_deg: f64,
     /// Above the horizon, degrees, 5 to 90.
+    #[serde(with = "crate::exact")]
     pub elevation_deg: f64,
 }
 
@@ -107,12 +114,14 @@ pub struct Style {
     /// Value to colour.
     pub transfer: TransferFunction,
     /// Height of one kilogram of accumulated carbon per square metre, m: the height exaggeration.
+    #[serde(with = "crate::exact")]
     pub height_m_per_kg_m2: f64,
     /// Half-angle slices over the range of particles, 1 to [`MAX_SLICES`].
     pub slices: u32,
     /// Particles of every cell with data, 1 to [`MAX_PARTICLES_PER_CELL`].
     pub particles_per_cell: u32,
     /// Optical depth looking straight through a cell's column at the top of the transfer function.
+    #[serde(with = "crate::exact")]
     pub optical_depth: f64,
     /// Light.
     pub sun: Sun,
@@ -120,18 +129,21 @@ pub struct Style {
     pub globe_surface: bool,
 }
 
-/// Everything that shapes a picture. Two jobs with the same digest are the same picture, byte for byte.
+/// Everything that shapes a picture and nothing else. Two jobs with the same digest are the same picture, byte for
+/// byte; versions and instants that come to the same frames come to the same job.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RenderJob {
     /// [`RENDERER_VERSION`].
     pub renderer_version: u32,
+    /// The grid of all frames.
+    #[serde(with = "crate::exact::grid")]
+    pub grid: Grid,
     /// The product drawn.
-    pub product: ManifestId,
+    pub value: Moment,
     /// Accumulated carbon that lifts and sinks the particles; without it they lie in a thin sheet.
-    pub accumulated: Option<ManifestId>,
-    /// Instant; between stored steps the grids are interpolated.
-    pub time: TimeMs,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub accumulated: Option<Moment>,
     /// Mode.
     pub mode: Mode,
     /// View.
@@ -239,6 +251,42 @@ impl View {
 }
 
 impl RenderJob {
+    /// The job that draws a version of a product at an instant, lifted by a version of its accumulated carbon. A map has
+    /// no particles to lift.
+    ///
+    /// # Errors
+    /// A product without steps, two that do not lie on one grid, or a limit that is broken.
+    pub fn of(
+        product: &Manifest,
+        accumulated: Option<&Manifest>,
+        time: TimeMs,
+        mode: Mode,
+        view: View,
+        style: Style,
+    ) -> Result<Self, ContractError> {
+        let moment = |manifest: &Manifest| {
+            let name = || manifest.product.to_string();
+            let empty = || ContractError::invalid("product", &name(), "it has no steps");
+            if manifest.grid != product.grid {
+                let reason = format!("it does not lie on the grid of {}", product.product);
+                return Err(ContractError::invalid("product", &name(), reason));
+            }
+            manifest.moment(time).ok_or_else(empty)
+        };
+        let accumulated = accumulated.filter(|_| mode != Mode::Map);
+        let job = Self {
+            renderer_version: RENDERER_VERSION,
+            grid: product.grid,
+            value: moment(product)?,
+            accumulated: accumulated.map(moment).transpose()?,
+            mode,
+            view,
+            style,
+        };
+        job.validate()?;
+        Ok(job)
+    }
+
     /// Checks every limit of a job that came from outside.
     ///
     /// # Errors
@@ -252,6 +300,9 @@ impl RenderJob {
                 format!("this one is {RENDERER_VERSION}"),
             ));
         }
+        self.grid.validate()?;
+        self.value.validate()?;
+        self.accumulated.as_ref().map_or(Ok(()), Moment::validate)?;
         self.style.validate()?;
         self.view.validate()
     }
@@ -270,14 +321,35 @@ impl RenderJob {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::moment::After;
     use crate::quantity::Quantity;
+
+    fn moment() -> Moment {
+        Moment {
+            domain: "domain/p/d".parse().unwrap(),
+            before: Some("frames/p/a".parse().unwrap()),
+            after: after("frames/p/b", 0.25),
+        }
+    }
+
+    fn after(frame: &str, weight: f64) -> Option<After> {
+        let frame = frame.parse().unwrap();
+        Some(After { frame, weight })
+    }
 
     fn job() -> RenderJob {
         RenderJob {
             renderer_version: RENDERER_VERSION,
-            product: "p@1-00000000".parse().unwrap(),
+            grid: Grid {
+                rows: 2,
+                cols: 4,
+                north_deg: 90.0,
+                west_deg: -180.0,
+                dlat_deg: 90.0,
+                dlon_deg: 90.0,
+            },
+            value: moment(),
             accumulated: None,
-            time: "2000-01-01".parse().unwrap(),
             mode: Mode::Volume,
             view: View::Tile {
                 tile: Tile { z: 1, x: 0, y: 0 },
@@ -297,9 +369,13 @@ mod tests {
             change(&mut job);
             names.push(job.key());
         };
-        changed(|j| j.product = "p@2-00000000".parse().unwrap());
-        changed(|j| j.accumulated = Some("q@1-00000000".parse().unwrap()));
-        changed(|j| j.time = "2000-01-02".parse().unwrap());
+        changed(|j| j.grid.rows = 1);
+        changed(|j| j.value.domain = "domain/p/e".parse().unwrap());
+        changed(|j| j.value.before = None);
+        changed(|j| j.value.after = None);
+        changed(|j| j.value.after = after("frames/p/c", 0.25));
+        changed(|j| j.value.after = after("frames/p/b", 0.5));
+        changed(|j| j.accumulated = Some(moment()));
         changed(|j| j.mode = Mode::Map);
         changed(|j| {
             j.view = View::Tile {
@@ -317,6 +393,34 @@ mod tests {
     }
 
     #[test]
+    fn a_job_that_is_read_back_has_the_name_it_was_written_with() {
+        for odd in [
+            0.1 + 0.2,
+            1.0 / 3.0,
+            123.456_789_012_345_67,
+            5e-324_f64.sqrt(),
+            360.0 / 8640.0,
+        ] {
+            let mut job = job();
+            job.grid.dlon_deg = odd;
+            job.grid.west_deg = -odd;
+            job.value.after = after("frames/p/b", odd.fract());
+            job.style.transfer.low = -odd * 1e-9;
+            job.style.sun.azimuth_deg = odd;
+            job.view = View::Globe {
+                lon_deg: odd,
+                lat_deg: -odd,
+                height_m: odd * 1e6,
+                width_px: 10,
+                height_px: 10,
+            };
+            let back: RenderJob =
+                serde_json::from_str(&serde_json::to_string(&job).unwrap()).unwrap();
+            assert_eq!((back.digest(), &back), (job.digest(), &job), "{odd}");
+        }
+    }
+
+    #[test]
     fn jobs_beyond_a_limit_are_refused() {
         let globe = |height_m, width_px| View::Globe {
             lon_deg: 0.0,
@@ -325,7 +429,15 @@ mod tests {
             width_px,
             height_px: 10,
         };
-        let broken: [fn(&mut RenderJob); 5] = [
+        let broken: [fn(&mut RenderJob); 8] = [
+            |j| j.grid.rows = u32::MAX,
+            |j| j.value.before = Some("raw/p/a".parse().unwrap()),
+            |j| {
+                j.accumulated = Some(Moment {
+                    after: after("frames/p/b", 2.0),
+                    ..moment()
+                });
+            },
             |j| j.style.slices = 1_000_000_000,
             |j| j.style.slices = 0,
             |j| j.style.transfer.high = f64::NAN,

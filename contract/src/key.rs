@@ -60,6 +60,12 @@ impl ObjectKey {
         Self(format!("tiles/{}/{text}.png", &text[..2]))
     }
 
+    /// Is it the key of an object in a top-level folder?
+    pub fn is_in(&self, folder: &str) -> bool {
+        let rest = self.0.strip_prefix(folder);
+        rest.is_some_and(|rest| rest.starts_with('/'))
+    }
+
     /// The key as text.
     pub fn as_str(&self) -> &str {
         &self.0

@@ -4,6 +4,7 @@ from grafana_foundation_sdk.builders.dashboard import Dashboard
 from panels import AMBER, GREEN, RED, dashboard, lines, number, p95, quantiles, spread
 
 TILES = "fluxglobe_tile_server"
+WORKER = "fluxglobe_render_worker"
 
 
 def board() -> Dashboard:
@@ -46,7 +47,8 @@ def board() -> Dashboard:
             number(
                 "Pictures that differ",
                 "Two renderers drew different bytes for one job within a day. Worry above 0.",
-                f"sum(increase({TILES}_conflicts_total[24h]))",
+                f"sum(increase({TILES}_conflicts_total[24h]))"
+                f' + (sum(increase({WORKER}_pictures_total{{origin="conflict"}}[24h])) or vector(0))',
                 "none",
                 (None, GREEN),
                 (1, RED),

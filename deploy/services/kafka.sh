@@ -8,6 +8,8 @@
 source "$(dirname "${BASH_SOURCE[0]}")/process.sh"
 # shellcheck source=java.sh
 source "$here/java.sh"
+# shellcheck source=certificate.sh
+source "$here/certificate.sh"
 
 port=${FLUXGLOBE_KAFKA_PORT:-19092}
 check_port FLUXGLOBE_KAFKA_PORT "$port"
@@ -36,15 +38,10 @@ make_secrets() {
         (umask 077 && head -c 24 /dev/urandom | base64 | tr '+/' '-_' >"$run/password")
     fi
     if ! [ -s "$run/certificate.pem" ]; then
-        (
-            umask 077
-            openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:P-256 -nodes -days 3650 -subj /CN=localhost \
-                -addext subjectAltName=DNS:localhost,IP:127.0.0.1 -keyout "$run/key.pem" -out "$run/certificate.new" 2>>"$log"
-            cat "$run/key.pem" "$run/certificate.new" >"$run/keystore.pem"
-            chmod 644 "$run/certificate.new"
-            mv "$run/certificate.new" "$run/certificate.pem"
-            rm "$run/key.pem"
-        ) || fail "could not make its certificate; its log: $log"
+        make_certificate "$run/key.pem" "$run/certificate.new"
+        (umask 077 && cat "$run/key.pem" "$run/certificate.new" >"$run/keystore.pem")
+        rm "$run/key.pem"
+        mv "$run/certificate.new" "$run/certificate.pem"
     fi
 }
 
@@ -86,6 +83,7 @@ offsets.topic.replication.factor=1
 transaction.state.log.num.partitions=4
 transaction.state.log.replication.factor=1
 transaction.state.log.min.isr=1
+transaction.abort.timed.out.transaction.cleanup.interval.ms=1000
 share.coordinator.state.topic.num.partitions=1
 share.coordinator.state.topic.replication.factor=1
 share.coordinator.state.topic.min.isr=1
@@ -101,7 +99,8 @@ launch_broker() {
     local java_arguments
     if ! [ -e "$run/data/meta.properties" ]; then
         local cluster_id
-        cluster_id=$(head -c 16 /dev/urandom | base64 | tr '+/' '-_' | tr -d '=')
+        # Letters and digits alone: one that began with a dash would be taken for an option.
+        cluster_id=$(head -c 16 /dev/urandom | base64 | tr '+/' 'AB' | tr -d '=')
         java_arguments=(kafka.tools.StorageTool format --cluster-id "$cluster_id" --config "$run/server.properties")
         java_run env >>"$log" 2>&1 || {
             tail -n 30 "$log" >&2

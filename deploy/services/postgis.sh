@@ -2,16 +2,21 @@
 # One PostgreSQL 15 server with PostGIS on 127.0.0.1, its programs from Debian, its database in our own folder.
 #   deploy/services/postgis.sh install | start | stop | status | env
 # FLUXGLOBE_POSTGIS_PORT (15432). User and database are both called fluxglobe; the password is made at the first start and
-# lies in the file `password` of the run folder.
+# lies in the file `password` of the run folder. FLUXGLOBE_POSTGIS_TLS=true: clients over TLS and no others; the certificate
+# is made at the first start with it and lies in the file `certificate.pem`.
 # shellcheck source=process.sh
 source "$(dirname "${BASH_SOURCE[0]}")/process.sh"
 # shellcheck source=debian.sh
 source "$here/debian.sh"
+# shellcheck source=certificate.sh
+source "$here/certificate.sh"
 
 port=${FLUXGLOBE_POSTGIS_PORT:-15432}
 check_port FLUXGLOBE_POSTGIS_PORT "$port"
 programs=/usr/lib/postgresql/15/bin
 password_file=$run/password
+tls=${FLUXGLOBE_POSTGIS_TLS:-false}
+[[ $tls = true || $tls = false ]] || fail "FLUXGLOBE_POSTGIS_TLS is true or false, not: $tls"
 
 install_service() {
     # Debian makes and starts a cluster on port 5432 when the server is installed; not on behalf of ours.
@@ -22,6 +27,7 @@ install_service() {
         need_package postgresql-15 "$programs/postgres"
         as_root rm -f "$no_cluster"
     fi
+    need_package openssl /usr/bin/openssl
     need_package postgresql-15-postgis-3 '/usr/share/postgresql/15/extension/postgis.control'
     "$programs/postgres" --version >"$service/installed"
     say "installed: $(cat "$service/installed")"
@@ -78,13 +84,26 @@ clear_stale_lock() {
     rm -f "$run/data/postmaster.pid"
 }
 
+# The server reads key and certificate under these names, and turns away whoever speaks no TLS.
+secure() {
+    if ! [ -s "$run/certificate.pem" ]; then
+        make_certificate "$run/data/server.key" "$run/data/server.crt"
+        if [ "$(id -u)" = 0 ]; then chown postgres "$run/data/server.key" "$run/data/server.crt"; fi
+        sed 's/^host /hostssl /' "$run/data/pg_hba.conf" >"$run/pg_hba.new"
+        cat "$run/pg_hba.new" >"$run/data/pg_hba.conf"
+        rm "$run/pg_hba.new"
+        cp "$run/data/server.crt" "$run/certificate.pem"
+    fi
+}
+
 # Loopback only, no Unix socket; small buffers, since several servers share one machine.
 launch_server() {
     if ! [ -e "$run/made" ]; then make_cluster; fi
+    if [ "$tls" = true ]; then secure; fi
     clear_stale_lock
     as_owner launch env -u PGDATA LC_ALL=C.UTF-8 "$programs/postgres" -D "$data" -p "$port" -c listen_addresses=127.0.0.1 \
         -c unix_socket_directories= -c shared_buffers=64MB -c max_connections=100 -c password_encryption=scram-sha-256 \
-        -c jit=off -c log_line_prefix='%m [%p] '
+        -c jit=off -c "ssl=$tls" -c log_line_prefix='%m [%p] '
 }
 
 query() {
@@ -106,7 +125,12 @@ start_service() {
 stop_service() { stop_with INT; }
 status_service() { status_line "127.0.0.1:$port"; }
 env_service() {
-    printf 'export FLUXGLOBE_POSTGIS=postgres://fluxglobe@127.0.0.1:%s/fluxglobe\n' "$port"
+    local mode=''
+    if [ "$tls" = true ]; then
+        mode='?sslmode=verify-full'
+        printf 'export FLUXGLOBE_POSTGIS_CA_FILE=%q\n' "$run/certificate.pem"
+    fi
+    printf "export FLUXGLOBE_POSTGIS='%s'\n" "postgres://fluxglobe@127.0.0.1:$port/fluxglobe$mode"
     printf 'export FLUXGLOBE_POSTGIS_PASSWORD_FILE=%q\n' "$password_file"
 }
 

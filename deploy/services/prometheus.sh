@@ -2,8 +2,8 @@
 # One Prometheus server on 127.0.0.1, its program taken out of Debian's package, so that no system service comes with it.
 #   deploy/services/prometheus.sh install | start | stop | status | env
 # FLUXGLOBE_PROMETHEUS_PORT (19090)
-# FLUXGLOBE_PROMETHEUS_TARGETS: comma-separated host:port to scrape (the ports that Fluxglobe's services have by default)
-# FLUXGLOBE_PROMETHEUS_RULES: a rule file, or a pattern of several (none)
+# FLUXGLOBE_PROMETHEUS_TARGETS: comma-separated SERVICE=HOST:PORT to scrape (the processes of deploy/cluster.sh)
+# FLUXGLOBE_PROMETHEUS_RULES: a rule file, or a pattern of several (deploy/prometheus/rules.yml)
 # FLUXGLOBE_PROMETHEUS_INTERVAL_S: seconds between two scrapes (5)
 # shellcheck source=process.sh
 source "$(dirname "${BASH_SOURCE[0]}")/process.sh"
@@ -12,8 +12,8 @@ source "$here/debian.sh"
 
 port=${FLUXGLOBE_PROMETHEUS_PORT:-19090}
 check_port FLUXGLOBE_PROMETHEUS_PORT "$port"
-targets=${FLUXGLOBE_PROMETHEUS_TARGETS-127.0.0.1:8080,127.0.0.1:9101,127.0.0.1:9102,127.0.0.1:9103,127.0.0.1:9104}
-rules=${FLUXGLOBE_PROMETHEUS_RULES:-}
+targets=${FLUXGLOBE_PROMETHEUS_TARGETS-}
+rules=${FLUXGLOBE_PROMETHEUS_RULES-$here/../prometheus/rules.yml}
 interval_s=${FLUXGLOBE_PROMETHEUS_INTERVAL_S:-5}
 
 install_service() {
@@ -28,13 +28,15 @@ install_service() {
     say "installed: $(cat "$service/installed")"
 }
 
+# The rules know every target by its job and the label of its service.
 write_settings() {
     local target list=''
     [[ $interval_s =~ ^[1-9][0-9]{0,3}$ ]] || fail "FLUXGLOBE_PROMETHEUS_INTERVAL_S is no number of seconds: $interval_s"
-    IFS=, read -ra wanted <<<"$targets"
+    IFS=, read -ra wanted <<<"${targets:-$("$here/../cluster.sh" targets)}"
     for target in "${wanted[@]}"; do
-        [[ $target =~ ^[][A-Za-z0-9.:_-]+:[0-9]{1,5}$ ]] || fail "FLUXGLOBE_PROMETHEUS_TARGETS names no host:port: $target"
-        list+=${list:+, }\"$target\"
+        [[ $target =~ ^([a-z][a-z-]*)=([][A-Za-z0-9.:_-]+:[0-9]{1,5})$ ]] ||
+            fail "FLUXGLOBE_PROMETHEUS_TARGETS names no SERVICE=HOST:PORT: $target"
+        list+="      - {targets: [\"${BASH_REMATCH[2]}\"], labels: {service: ${BASH_REMATCH[1]}}}"$'\n'
     done
     [[ $rules != *[\"\\]* ]] || fail 'FLUXGLOBE_PROMETHEUS_RULES holds a quotation mark or a backslash'
     {
@@ -42,7 +44,7 @@ write_settings() {
         printf 'global:\n  scrape_interval: %ss\n  scrape_timeout: %ss\n  evaluation_interval: %ss\n' \
             "$interval_s" "$interval_s" "$interval_s"
         if [ -n "$rules" ]; then printf 'rule_files: ["%s"]\n' "$(readlink -m "$(dirname "$rules")")/$(basename "$rules")"; fi
-        printf 'scrape_configs:\n  - job_name: fluxglobe\n    static_configs:\n      - targets: [%s]\n' "$list"
+        printf 'scrape_configs:\n  - job_name: fluxglobe\n    static_configs:\n%s' "$list"
     } >"$run/prometheus.yml"
 }
 

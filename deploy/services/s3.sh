@@ -2,7 +2,7 @@
 # One S3 server (versitygw over a folder) on 127.0.0.1, built by `go install` at a pinned version.
 #   deploy/services/s3.sh install | start | stop | status | env
 # FLUXGLOBE_S3_PORT (19000); FLUXGLOBE_S3_BUCKET (fluxglobe) is made at the start. The key pair is made at the first start and
-# lies in the file `credentials` of the run folder.
+# lies in the file `credentials` of the run folder. FLUXGLOBE_S3_READ_ONLY=true: whatever is written is refused, for tests.
 # shellcheck source=process.sh
 source "$(dirname "${BASH_SOURCE[0]}")/process.sh"
 # shellcheck source=debian.sh
@@ -11,6 +11,8 @@ source "$here/debian.sh"
 # Older versions check and create in two steps: of 32 writers that create the same key, several would win.
 server=github.com/versity/versitygw/cmd/versitygw@v1.8.0
 region=us-east-1
+read_only=${FLUXGLOBE_S3_READ_ONLY:-false}
+[[ $read_only = true || $read_only = false ]] || fail "FLUXGLOBE_S3_READ_ONLY is true or false, not: $read_only"
 port=${FLUXGLOBE_S3_PORT:-19000}
 check_port FLUXGLOBE_S3_PORT "$port"
 bucket=${FLUXGLOBE_S3_BUCKET:-fluxglobe}
@@ -70,7 +72,7 @@ launch_server() {
     # In the environment, since a command line is there for everybody to read.
     ROOT_ACCESS_KEY_ID=$(sed -n 1p "$run/credentials") ROOT_SECRET_ACCESS_KEY=$(sed -n 2p "$run/credentials") \
         launch "$service/bin/versitygw" --port "127.0.0.1:$port" --region "$region" --health /-/health --quiet \
-        posix "$run/data"
+        "--readonly=$read_only" posix "$run/data"
 }
 
 # Prints the status of making the bucket; the secret goes through standard input. The hash is the one of an empty body, which
@@ -87,6 +89,7 @@ server_answers() { curl --silent --fail --max-time 3 "http://127.0.0.1:$port/-/h
 start_service() {
     local status
     start_once launch_server server_answers "$port"
+    if [ "$read_only" = true ]; then return; fi
     status=$(make_bucket)
     case $status in
     200 | 409) ;; # made now, or there already

@@ -1,5 +1,6 @@
 //! The command line: words in, one plain `Command` out. Every value is parsed here, once, into its final type.
 
+mod fill;
 mod observations;
 mod pictures;
 mod services;
@@ -15,6 +16,7 @@ use contract::job::Mode;
 use contract::product::ProductId;
 use contract::time::TimeMs;
 
+pub(crate) use fill::{BenchFill, FillError, ProductsOf};
 pub(crate) use observations::{MatchTime, Matchup, Observations, ObservationsAsked};
 pub(crate) use pictures::{BenchCompare, BenchQuality, RenderAnimation};
 pub(crate) use services::{
@@ -29,9 +31,9 @@ pub(crate) use upkeep::{Gc, Recompute, RecomputeWhat, Survey};
 /// Results go to standard output (`--json` for machines), talk and progress bars to standard error; the exit code is
 /// 0 only on success. Start with `fluxglobe demo`.
 #[derive(Debug, Parser)]
-#[command(version, propagate_version = true, max_term_width = 110)]
+#[command(version = crate::protocol::version(), propagate_version = true, max_term_width = 110)]
 pub(crate) struct Cli {
-    #[command(flatten)]
+    #[command(flatten, next_help_heading = "Options of every command")]
     pub(crate) settings: Settings,
     #[command(subcommand)]
     pub(crate) command: Command,
@@ -146,6 +148,18 @@ pub(crate) enum Command {
 }
 
 impl Command {
+    /// May it use a graphics device of this machine?
+    pub(crate) fn may_draw(&self) -> bool {
+        matches!(
+            self,
+            Self::Demo(_)
+                | Self::Render(_)
+                | Self::Serve(_)
+                | Self::RenderWorker(_)
+                | Self::Recompute(_)
+        )
+    }
+
     /// Is a service asked for its settings instead of its work?
     pub(crate) fn prints_settings(&self) -> bool {
         let common = match self {
@@ -163,7 +177,7 @@ impl Command {
 /// `fluxglobe demo`.
 #[derive(Debug, Args)]
 pub(crate) struct Demo {
-    #[command(flatten)]
+    #[command(flatten, next_help_heading = "Server")]
     pub(crate) serve: tile_server::config::Settings,
     /// Do everything, check the results and the served tiles, and exit: 0 if all is well.
     #[arg(long)]
@@ -203,6 +217,9 @@ pub(crate) struct Ingest {
 /// `fluxglobe products`.
 #[derive(Debug, Args)]
 pub(crate) struct Products {
+    /// More about one product.
+    #[command(subcommand)]
+    pub(crate) of: Option<ProductsOf>,
     /// JSON instead of a table.
     #[arg(long)]
     pub(crate) json: bool,
@@ -280,7 +297,7 @@ pub(crate) enum Derive {
         /// Where accumulation starts; the product's first instant if absent.
         #[arg(long)]
         start: Option<TimeMs>,
-        #[command(flatten)]
+        #[command(flatten, next_help_heading = "Kafka")]
         kafka: kafka_log::KafkaSettings,
     },
 }
@@ -394,6 +411,17 @@ mod tests {
     #[test]
     fn the_command_line_is_consistent() {
         Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn what_every_command_takes_stands_apart_from_its_own() {
+        let mut program = Cli::command();
+        program.build();
+        let command = program.find_subcommand_mut("products").unwrap();
+        let help = command.render_help().to_string();
+        let (own, shared) = help.split_once("Options of every command:").unwrap();
+        assert!(own.contains("--json") && !own.contains("--data"), "{help}");
+        assert!(shared.contains("--data") && !shared.contains("--json"));
     }
 
     #[test]

@@ -25,6 +25,21 @@ pub(crate) fn store(settings: &Settings) -> Result<Store> {
     Ok(Store::open(text)?)
 }
 
+/// The same for those whom people wait for: that it is away is told of within seconds.
+pub(crate) fn interactive_store(settings: &Settings) -> Result<Store> {
+    match &settings.store {
+        Some(url) => Ok(open_interactive(url)?),
+        None => store(settings),
+    }
+}
+
+/// Opens a store for those whom people wait for.
+pub(crate) fn open_interactive(url: &str) -> Result<Store, storage::StorageError> {
+    let mut settings = storage::store::Settings::from_environment();
+    settings.patience = storage::store::Patience::interactive();
+    Store::open_with(url, &settings)
+}
+
 /// Opens the event log in the data folder; one process at a time writes it.
 pub(crate) fn embedded_log(settings: &Settings) -> Result<EmbeddedLog> {
     Ok(EmbeddedLog::open(&settings.data.join("events"))?)

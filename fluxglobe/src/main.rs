@@ -6,6 +6,7 @@ mod cli;
 mod command;
 mod demo;
 mod deployment;
+mod desktop;
 mod ports;
 mod progress;
 mod protocol;
@@ -35,6 +36,9 @@ fn main() -> ExitCode {
         program.build();
         let shown = progress::result(&cli::shown_settings(&program, &matches));
         return shown.map_or_else(|error| failed(&error), |()| ExitCode::SUCCESS);
+    }
+    if command.may_draw() && !settings.cpu {
+        desktop::leave_alone();
     }
     run(&settings, command).unwrap_or_else(|error| failed(&error))
 }

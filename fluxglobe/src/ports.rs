@@ -163,6 +163,8 @@ fn compute_failed(error: ComputeError) -> BackendError {
 fn render_failed(error: RenderError) -> BackendError {
     let class = if error.is_bad_request() {
         Class::BadRequest
+    } else if error.is_not_found() {
+        Class::NotFound
     } else if error.is_retryable() {
         Class::Unavailable
     } else {

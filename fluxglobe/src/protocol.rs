@@ -1,5 +1,7 @@
 //! What all processes over one store must agree on: a service of another version is told before it does any work.
 
+use std::sync::LazyLock;
+
 use bytes::Bytes;
 use contract::event::EVENT_SCHEMA;
 use contract::job::RENDERER_VERSION;
@@ -24,6 +26,21 @@ const OURS: Protocol = Protocol {
     manifest_schema: MANIFEST_SCHEMA,
     renderer_version: RENDERER_VERSION,
 };
+
+/// Version of this program.
+pub(crate) const PROGRAM: &str = env!("CARGO_PKG_VERSION");
+
+/// The program's version and those of what its processes exchange: two programs whose last three are the same may run
+/// side by side.
+pub(crate) fn version() -> &'static str {
+    static TEXT: LazyLock<String> = LazyLock::new(|| {
+        format!(
+            "{PROGRAM} (events {}, manifests {}, renderer {})",
+            OURS.event_schema, OURS.manifest_schema, OURS.renderer_version
+        )
+    });
+    &TEXT
+}
 
 /// The store cannot be used, or is used by another version.
 #[derive(Debug, thiserror::Error)]

@@ -5,6 +5,7 @@
 //! nothing names; the same files make the same objects again and land once.
 
 mod merge;
+mod replace;
 mod segments;
 
 use std::time::Duration;
@@ -20,6 +21,8 @@ use crate::landing_note;
 use crate::put::StoredGranule;
 use crate::rejection::Rejection;
 use merge::{Change, Merged};
+
+pub(crate) use replace::replace;
 
 /// Lost races for the next number before the caller is told; it may go on.
 const MAX_TRIES: u32 = 200;
@@ -66,14 +69,8 @@ async fn publish(
     product: &ProductId,
     granules: &[StoredGranule],
 ) -> Result<Vec<Committed>, IngestError> {
-    let pauses = ExponentialBuilder::default()
-        .with_min_delay(FIRST_PAUSE)
-        .with_max_delay(LONGEST_PAUSE)
-        .with_max_times(MAX_TRIES as usize)
-        .with_jitter()
-        .build();
     let mut notes = Notes::of(store, product, granules);
-    for pause in pauses {
+    for pause in pauses().build() {
         let newest = manifests::latest(store, product)
             .await
             .map_err(IngestError::storage("read the newest manifest"))?;
@@ -105,6 +102,15 @@ async fn publish(
         product: product.to_string(),
         tries: MAX_TRIES,
     })
+}
+
+/// Pauses between lost races.
+fn pauses() -> ExponentialBuilder {
+    ExponentialBuilder::default()
+        .with_min_delay(FIRST_PAUSE)
+        .with_max_delay(LONGEST_PAUSE)
+        .with_max_times(MAX_TRIES as usize)
+        .with_jitter()
 }
 
 /// The next manifest, with its series and domain durable.

@@ -104,6 +104,14 @@ pub enum IngestError {
     /// The sandboxed reader was killed, and not for what its file asked of it.
     #[error("the file reader was killed")]
     Killed,
+    /// Files that landed before cannot be read anew; what readers see is unchanged.
+    #[error("{product} stays as it is: {detail}")]
+    Reread {
+        /// Product.
+        product: String,
+        /// What is in the way and what to do.
+        detail: String,
+    },
     /// A synthetic file could not be written.
     #[error("cannot write {file:?}: {detail}")]
     Generate {
@@ -122,6 +130,15 @@ impl IngestError {
     /// Is the same call worth another try?
     pub fn is_retryable(&self) -> bool {
         matches!(self.cause(), Cause::Passing)
+    }
+
+    /// Is there no room on a disk (or none left of somebody's share of it)?
+    pub fn is_disk_full(&self) -> bool {
+        use std::io::{Error as IoError, ErrorKind};
+        let first: &(dyn std::error::Error + 'static) = self;
+        std::iter::successors(Some(first), |error| error.source())
+            .filter_map(|error| error.downcast_ref::<IoError>())
+            .any(|io| matches!(io.kind(), ErrorKind::StorageFull | ErrorKind::QuotaExceeded))
     }
 
     /// Where the cause lies.
@@ -144,7 +161,9 @@ impl IngestError {
             | Self::Client { .. }
             | Self::Digest { .. }
             | Self::Generate { .. } => Cause::Place,
-            Self::Profile { .. } | Self::Contract(_) | Self::Task(_) => Cause::Granule,
+            Self::Profile { .. } | Self::Reread { .. } | Self::Contract(_) | Self::Task(_) => {
+                Cause::Granule
+            }
         }
     }
 }
@@ -178,5 +197,35 @@ impl From<Rejection> for Stop {
 impl<E: Into<IngestError>> From<E> for Stop {
     fn from(error: E) -> Self {
         Self::Failed(error.into())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::{Error as IoError, ErrorKind};
+
+    #[test]
+    fn a_full_disk_is_known_behind_every_door() {
+        let full = || IoError::from(ErrorKind::StorageFull);
+        let spool = |source| IngestError::Spool {
+            folder: PathBuf::from("spool"),
+            source,
+        };
+        assert!(spool(full()).is_disk_full());
+        assert!(!spool(IoError::from(ErrorKind::PermissionDenied)).is_disk_full());
+        let log = IngestError::storage("finish notices")(StorageError::log("events", full()));
+        assert!(log.is_disk_full() && log.is_retryable(), "{log}");
+        let object = object_store::Error::Generic {
+            store: "folder",
+            source: full().into(),
+        };
+        let key = "frames/p/x".to_owned();
+        let store = StorageError::Object {
+            key,
+            source: object,
+        };
+        let store = IngestError::storage("store a frame")(store);
+        assert!(store.is_disk_full() && store.is_retryable(), "{store}");
     }
 }

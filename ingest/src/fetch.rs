@@ -14,6 +14,7 @@ mod object;
 mod patience;
 mod raw;
 mod spool;
+mod stored;
 
 pub(crate) use checksum::{Expected, Method};
 pub(crate) use guard::Allowed;
@@ -22,6 +23,7 @@ pub use http::AllowedHost;
 pub(crate) use location::Location;
 pub use patience::Patience;
 pub(crate) use raw::RawGranule;
+pub(crate) use stored::RawFiles;
 
 use crate::error::Stop;
 use crate::settings::Settings;

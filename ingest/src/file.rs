@@ -1,13 +1,14 @@
 //! Data files as the sandboxed reader sees them: what is in a file (no values), then values of one variable.
 //!
 //! Two formats: NetCDF classic (read by [`netcdf3`]) and HDF5, which NetCDF-4 is a use of ([`hdf5_file`]). The format
-//! comes from the first bytes, never from the name. Left out on purpose: groups below the root, text variables,
-//! compound types, virtual and external storage.
+//! comes from the first bytes, never from the name. Text is read for names only, cut to a length. Left out on purpose:
+//! groups below the root, compound types, virtual and external storage.
 
 pub(crate) mod description;
 mod format;
 mod hdf5_attribute;
 mod hdf5_file;
+mod hdf5_text;
 mod netcdf3;
 mod netcdf3_header;
 

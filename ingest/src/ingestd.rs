@@ -47,6 +47,8 @@ const GROUP: &str = "ingest";
 /// Tries of a command whose failure may pass, and the pause before the second; it doubles from try to try.
 const MAX_TRIES: u32 = 5;
 const FIRST_PAUSE: Duration = Duration::from_millis(100);
+/// Between two looks at a disk that is full.
+const FULL_PAUSE: Duration = Duration::from_secs(2);
 /// A command has read all notices when none comes for so long.
 const END_WAIT: Duration = Duration::from_millis(10);
 /// A session that lasted so long was no failed start: the next one is begun soon.
@@ -154,6 +156,11 @@ impl IngestService {
         let mut pause = FIRST_PAUSE;
         for attempt in 1.. {
             match self.try_group(progress).await {
+                // Whoever frees the disk need not come back here to start again what was under way.
+                Err(error) if error.is_disk_full() => {
+                    tracing::warn!(%error, "the disk is full; ingest waits until there is room");
+                    tokio::time::sleep(FULL_PAUSE).await;
+                }
                 Err(error) if error.is_retryable() && attempt < MAX_TRIES => {
                     tracing::warn!(%error, attempt, "ingest will try again");
                     tokio::time::sleep(pause).await;

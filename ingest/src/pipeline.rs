@@ -8,7 +8,7 @@ use contract::digest::Digest;
 use contract::event::RejectReason;
 use contract::manifest::{Manifest, ManifestId};
 use contract::time::Period;
-use storage::{Store, manifests};
+use storage::{StorageError, Store, manifests};
 
 use crate::error::{IngestError, Stop};
 use crate::fetch::RawGranule;
@@ -19,6 +19,7 @@ use crate::observation::{ObservationSink, Stored};
 use crate::plan::{PlannedGranule, Wish};
 use crate::progress::{Progress, Stage};
 use crate::put::{StoredGranule, StoredGrid};
+use crate::reading::Reading;
 use crate::rejection::Rejection;
 use crate::settings::Settings;
 use crate::{check, decode, encode, fetch, inspect, observation, plan, put};
@@ -123,11 +124,47 @@ impl Pipeline<'_> {
         }
         self.progress.stage(path, Stage::Plan, 0, 0);
         let planned = plan::run(inspected, wish, self.settings);
-        let mut planned = metrics.timed("plan", planned).await?;
+        let planned = metrics.timed("plan", planned).await?;
         if let Some(landed) = self.landed_before(&planned, wish).await? {
             return Ok(landed);
         }
         put::raw(self.store, &planned.target.product, &planned.raw).await?;
+        let (granule, reading) = self.grids(path, planned).await?;
+        match reading.put(self.store, &granule.target.product).await {
+            // A program that reads otherwise under the same version noted it: the file lands all the same.
+            Err(error @ StorageError::Conflict { .. }) => {
+                tracing::warn!(%error, file = %path.display(), "was read as something else before");
+            }
+            noted => noted.map_err(IngestError::storage("note a reading"))?,
+        }
+        Ok(Prepared::Stored(granule))
+    }
+
+    /// Reads a file that landed before as it would be read now: its frames become durable, and are noted.
+    pub(crate) async fn reread(
+        &self,
+        shown: &Path,
+        raw: RawGranule,
+        wish: Wish<'_>,
+    ) -> Result<Reading, Stop> {
+        let _pass = self.gates.enter(raw.size_bytes).await;
+        self.progress.stage(shown, Stage::Inspect, 0, 0);
+        let inspected = inspect::run(raw, self.settings).await?;
+        let planned = plan::run(inspected, wish, self.settings).await?;
+        let (granule, reading) = self.grids(shown, planned).await?;
+        reading
+            .put(self.store, &granule.target.product)
+            .await
+            .map_err(IngestError::storage("note a reading"))?;
+        Ok(reading)
+    }
+
+    /// All steps of a file that hold a value, and what is noted of them.
+    async fn grids(
+        &self,
+        path: &Path,
+        mut planned: PlannedGranule,
+    ) -> Result<(StoredGranule, Reading), Stop> {
         let mut grids = Vec::new();
         for index in 0..planned.steps.len() {
             grids.extend(self.step(path, &mut planned, index).await?);
@@ -141,21 +178,25 @@ impl Pipeline<'_> {
             );
         }
         grids.sort_by_key(|grid| grid.step.period);
+        let steps = grids.iter().map(|grid| grid.step.clone()).collect();
         let PlannedGranule {
             raw: RawGranule {
                 sha256: raw_sha256, ..
             },
             target,
             mapping,
+            recipe,
             ..
         } = planned;
-        Ok(Prepared::Stored(StoredGranule {
+        let reading = Reading::new(recipe, &target, mapping.grid, steps);
+        let granule = StoredGranule {
             target,
             grid: mapping.grid,
             raw_sha256,
             grids,
             asked_by: None,
-        }))
+        };
+        Ok((granule, reading))
     }
 
     /// One time step: decode, check, encode, put. None if it holds no value at all.

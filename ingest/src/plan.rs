@@ -21,6 +21,7 @@ use crate::fetch::RawGranule;
 use crate::file::description::{Description, Part, Variable};
 use crate::inspect::InspectedGranule;
 use crate::profile::Profile;
+use crate::recipe::Recipe;
 use crate::rejection::Rejection;
 use crate::settings::{Limits, Settings};
 
@@ -34,6 +35,7 @@ pub(crate) struct PlannedGranule {
     pub(crate) mapping: Mapping,
     pub(crate) packing: Packing,
     pub(crate) steps: Vec<PlannedStep>,
+    pub(crate) recipe: Recipe,
 }
 
 /// What a file becomes.
@@ -114,6 +116,7 @@ pub(crate) async fn run(
         mapping,
         packing,
         steps,
+        recipe: Recipe::of(profile),
         raw,
     })
 }

@@ -8,6 +8,7 @@ mod shipped;
 
 use std::path::Path;
 
+use contract::digest::Digest;
 use contract::grid::Grid;
 use contract::product::ProductId;
 use contract::quantity::Quantity;
@@ -45,6 +46,9 @@ pub struct Profile {
     pub(crate) grid: GridRules,
     #[serde(default)]
     pub(crate) time: Option<TimeRules>,
+    /// Hash of all of it but the name and which files it is chosen for.
+    #[serde(skip)]
+    rules: Option<Digest>,
 }
 
 /// Which files a profile is for: all that is stated must hold.
@@ -145,8 +149,13 @@ impl Profile {
             name: name.to_owned(),
             detail,
         };
-        let profile: Self =
-            toml::from_str(text).map_err(|e| bad(e.to_string().replace('\n', " ")))?;
+        let not_toml = |e: toml::de::Error| bad(e.to_string().replace('\n', " "));
+        let mut profile: Self = toml::from_str(text).map_err(not_toml)?;
+        let mut rules: toml::Table = toml::from_str(text).map_err(not_toml)?;
+        for beside in ["name", "match"] {
+            rules.remove(beside);
+        }
+        profile.rules = Some(Digest::of_json(&rules));
         if let Some(unit) = &profile.variable.unit {
             crate::unit::parse(unit).map_err(|e| bad(format!("unit {unit:?} {e}")))?;
         }
@@ -204,6 +213,11 @@ impl Profile {
     fn is_for_collection(&self, collection: &str) -> bool {
         let rules = self.matches.as_ref();
         rules.is_some_and(|rules| rules.collections.iter().any(|name| name == collection))
+    }
+
+    /// Hash of what it says of the files that are read by it: comments, order and layout do not matter.
+    pub(crate) fn rules(&self) -> Digest {
+        self.rules.expect("a profile is parsed from its text")
     }
 
     /// Is the profile for this file?

@@ -36,10 +36,9 @@ pub(crate) struct Cluster {
 impl Cluster {
     /// Reads the secrets and checks that the settings go together; asks no broker.
     pub(crate) fn open(settings: &KafkaSettings) -> Result<Self, KafkaFailure> {
-        let servers = settings
-            .kafka
-            .clone()
-            .ok_or(KafkaFailure::Settings("--kafka is needed: HOST:PORT,..."))?;
+        let servers = settings.kafka.clone().ok_or(KafkaFailure::Settings(
+            "--kafka (FLUXGLOBE_KAFKA) is needed: HOST:PORT[,HOST:PORT...]",
+        ))?;
         let instance = settings
             .kafka_instance
             .clone()

@@ -10,7 +10,7 @@ use crate::gpu::{Gpu, Workspace};
 use crate::plan::{Part, Plan};
 use crate::resident::Resident;
 use crate::scene::{Interval, Scene};
-use crate::stages::fill::{self, Fill};
+use crate::stages::fill::{self, Fill, Filled, Form};
 
 /// Everything that lives and dies with one device.
 pub(crate) struct Device {
@@ -29,7 +29,7 @@ impl Device {
     /// Compiles the stages.
     pub(crate) fn new(gpu: Gpu, number: u64) -> Result<Self, RenderError> {
         let stages = Stages::new(&gpu);
-        let fill = Fill::new(&gpu, fill::SOURCE);
+        let fill = Fill::new(&gpu, fill::Sources::default());
         gpu.check_fault("compiling shaders")?;
         tracing::info!(adapter = gpu.adapter_name(), number, "renderer is ready");
         Ok(Self {
@@ -72,14 +72,14 @@ impl Device {
     /// Fills the gaps of one frame, if the device does that faster than the twin.
     pub(crate) fn fill(
         &self,
+        form: Form,
         grid: &Grid,
         values: &[f32],
         domain: &[u32],
-    ) -> Option<Result<Vec<f32>, RenderError>> {
-        // A software adapter would visit every cell where the twin visits the gaps alone.
-        let bytes = size_of_val(values) as u64;
-        let pays = !self.gpu.is_software() && bytes <= self.gpu.most_buffer_bytes();
-        pays.then(|| self.fill.run(&self.gpu, grid, values, domain))
+    ) -> Option<Result<Filled, RenderError>> {
+        // A software adapter is slower than the twin, which uses the same processor without a detour.
+        let pays = !self.gpu.is_software() && Fill::fits(&self.gpu, grid);
+        pays.then(|| self.fill.run(&self.gpu, form, grid, values, domain))
     }
 
     fn scene_buffers(&self, scene: &Scene) -> Result<SceneBuffers, RenderError> {

@@ -40,15 +40,22 @@ pub enum RenderError {
         bytes: u64,
         limit: u64,
     },
+    /// Gaps times cells with data, where every pair is met.
+    #[error(
+        "{pairs} pairs of a gap and a cell with data, at most {limit} are met one by one; use the form window or exact"
+    )]
+    TooManyPairs { pairs: u64, limit: u64 },
+    /// Multilevel summation over a pole.
+    #[error(
+        "the grid comes too near a pole, or cannot be halved often enough, for the exact form; use the form window or pairs"
+    )]
+    NoExactFill,
     /// Two products drawn together lie on different grids.
     #[error("{accumulated} does not lie on the grid of {product}")]
     GridMismatch {
         product: String,
         accumulated: String,
     },
-    /// A manifest without steps.
-    #[error("{product} has no steps to draw")]
-    NoSteps { product: String },
     /// Reading frames failed.
     #[error("cannot read {what} of {product}")]
     Store {
@@ -95,8 +102,9 @@ impl RenderError {
             | Self::Job(_)
             | Self::TooManyParticles { .. }
             | Self::TooLarge { .. }
+            | Self::TooManyPairs { .. }
+            | Self::NoExactFill
             | Self::GridMismatch { .. }
-            | Self::NoSteps { .. }
             | Self::Encode { .. }
             | Self::NoReference => false,
         }
@@ -109,6 +117,8 @@ impl RenderError {
             Self::Job(_)
                 | Self::TooManyParticles { .. }
                 | Self::TooLarge { .. }
+                | Self::TooManyPairs { .. }
+                | Self::NoExactFill
                 | Self::GridMismatch { .. }
         )
     }
@@ -138,8 +148,9 @@ impl RenderError {
             | Self::Job(_)
             | Self::TooManyParticles { .. }
             | Self::TooLarge { .. }
+            | Self::TooManyPairs { .. }
+            | Self::NoExactFill
             | Self::GridMismatch { .. }
-            | Self::NoSteps { .. }
             | Self::Encode { .. }
             | Self::NoReference => true,
             Self::Store { source, .. } => {

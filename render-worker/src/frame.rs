@@ -4,7 +4,9 @@ use bytemuck::Pod;
 use contract::job::Mode;
 
 use crate::error::RenderError;
-use crate::gpu::{Gpu, Recorder, Slot, Workspace};
+use crate::gpu::{Gpu, Recorder, Slot, Stamps, Workspace};
+use crate::passes::place::{self, Place};
+use crate::passes::splat::{self, Splats};
 use crate::plan::{Part, Plan};
 use crate::stages::bin::{Bin, list_count};
 use crate::stages::compose::Compose;
@@ -13,12 +15,10 @@ use crate::stages::interpolate::Interpolate;
 use crate::stages::layout::{Entry, Params};
 use crate::stages::light::Light;
 use crate::stages::map::Map;
-use crate::stages::particles::Particles;
-use crate::stages::project::Project;
-use crate::stages::{bin, compose, eye, interpolate, light, map, particles, project};
+use crate::stages::{bin, compose, eye, interpolate, light, map};
 
 /// Entries a list buffer starts with for each particle; a frame that needs more is drawn again with room for all.
-const FIRST_ENTRIES_PER_PARTICLE: u64 = 4;
+const FIRST_ENTRIES_PER_PARTICLE: u64 = 2;
 /// Entries it starts with at least.
 const FIRST_ENTRIES: u64 = 1 << 16;
 
@@ -85,6 +85,16 @@ impl<'a> FrameContext<'a> {
         self.workspace.upload(self.gpu, slot, content)
     }
 
+    /// The buffer of a slot with this content of the plan; sent once for all frames of a plan in one workspace.
+    pub fn upload_of_plan<T: Pod>(
+        &mut self,
+        slot: Slot,
+        content: &[T],
+    ) -> Result<wgpu::Buffer, RenderError> {
+        let plan = self.plan.id;
+        self.workspace.upload_once(self.gpu, slot, plan, content)
+    }
+
     /// Pixels of the part.
     pub fn pixel_count(&self) -> u64 {
         u64::from(self.params.width) * u64::from(self.params.height)
@@ -94,10 +104,10 @@ impl<'a> FrameContext<'a> {
 /// All compiled stages.
 pub struct Stages {
     interpolate: Interpolate,
-    particles: Particles,
-    project: Project,
+    splats: Splats,
     light: Light,
     bin: Bin,
+    place: Place,
     eye: Eye,
     map: Map,
     compose: Compose,
@@ -108,10 +118,10 @@ impl Stages {
     pub fn new(gpu: &Gpu) -> Self {
         Self {
             interpolate: Interpolate::new(gpu, interpolate::SOURCE),
-            particles: Particles::new(gpu, particles::SOURCE),
-            project: Project::new(gpu, project::SOURCE),
+            splats: Splats::new(gpu, splat::SOURCE),
             light: Light::new(gpu, light::SOURCE),
             bin: Bin::new(gpu, bin::SOURCE),
+            place: Place::new(gpu, place::SOURCE),
             eye: Eye::new(gpu, eye::SOURCE),
             map: Map::new(gpu, map::SOURCE),
             compose: Compose::new(gpu, compose::SOURCE),
@@ -119,19 +129,44 @@ impl Stages {
     }
 
     fn record(&self, frame: &mut FrameContext<'_>) -> Result<(), RenderError> {
-        self.interpolate.record(frame)?;
         if frame.plan.mode == Mode::Map {
+            self.interpolate.record(frame)?;
             self.map.record(frame)?;
+            self.compose.record(frame)
         } else {
-            self.particles.record(frame)?;
-            self.project.record(frame)?;
+            self.splats.record(frame)?;
             if frame.params.light_on == 1 {
                 self.light.record(frame)?;
             }
             self.bin.record(frame)?;
-            self.eye.record(frame)?;
+            self.place.record(frame)?;
+            self.eye.record(frame)
         }
-        self.compose.record(frame)
+    }
+
+    /// Everything that draws one part with room for `capacity` list entries, recorded but not run.
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "what a frame is made of, passed on once"
+    )]
+    pub fn recorded<'a>(
+        &self,
+        gpu: &'a Gpu,
+        workspace: &'a mut Workspace,
+        plan: &'a Plan,
+        part: Part,
+        scene: &SceneBuffers,
+        capacity: u32,
+        stamps: Option<&'a Stamps>,
+    ) -> Result<FrameContext<'a>, RenderError> {
+        let mut params = plan.params_of(part);
+        params.entry_capacity = capacity;
+        let mut frame = FrameContext::new(gpu, workspace, plan, params, scene.clone())?;
+        if let Some(stamps) = stamps {
+            frame.recorder.stamp(stamps);
+        }
+        self.record(&mut frame)?;
+        Ok(frame)
     }
 
     /// Draws one part; its pixels as RGBA8, red lowest.
@@ -143,21 +178,19 @@ impl Stages {
         part: Part,
         scene: &SceneBuffers,
     ) -> Result<Vec<u8>, RenderError> {
-        let mut params = plan.params_of(part);
-        if params.particle_count == 0 && plan.mode != Mode::Map && params.surface == 0 {
+        let params = plan.params_of(part);
+        if params.splat_count == 0 && plan.mode != Mode::Map && params.surface == 0 {
             return Ok(vec![
                 0;
                 part.size_px[0] as usize * part.size_px[1] as usize * 4
             ]);
         }
         let entry_bytes = size_of::<Entry>() as u64;
-        let first =
-            (u64::from(params.particle_count) * FIRST_ENTRIES_PER_PARTICLE).max(FIRST_ENTRIES);
+        let first = (u64::from(params.splat_count) * FIRST_ENTRIES_PER_PARTICLE).max(FIRST_ENTRIES);
         let mut capacity = (workspace.room_bytes(Slot::Entries) / entry_bytes).max(first);
         loop {
-            params.entry_capacity = capacity.min(gpu.most_buffer_bytes() / entry_bytes) as u32;
-            let mut frame = FrameContext::new(gpu, workspace, plan, params, scene.clone())?;
-            self.record(&mut frame)?;
+            let room = capacity.min(gpu.most_buffer_bytes() / entry_bytes) as u32;
+            let mut frame = self.recorded(gpu, workspace, plan, part, scene, room, None)?;
             let image = frame.room(Slot::Image, 4)?;
             let image_bytes = frame.pixel_count() * 4;
             if plan.mode == Mode::Map {
@@ -170,7 +203,7 @@ impl Stages {
                 .recorder
                 .download_parts([(&image, 0, image_bytes), (&counts, last_end, 4)])?;
             let total: u32 = bytemuck::pod_read_unaligned(&total);
-            if total <= params.entry_capacity {
+            if total <= room {
                 return Ok(pixels);
             }
             let bytes = u64::from(total) * entry_bytes;

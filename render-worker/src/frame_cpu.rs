@@ -11,6 +11,8 @@ use crate::stages::layout::{Entry, Params, Particle, Splat};
 use crate::stages::particles::cpu::Inputs;
 use crate::stages::{bin, compose, eye, interpolate, light, map, particles, project};
 
+/// Most particles of one picture.
+const MOST_PARTICLES: usize = 1 << 24;
 /// Most bytes that the lists of one picture may take.
 const MOST_ENTRY_BYTES: u64 = 4 << 30;
 
@@ -26,7 +28,14 @@ pub fn draw(plan: &Plan, part: Part, scene: &Scene) -> Result<Vec<u8>, RenderErr
         let accumulated = scene.accumulated.as_ref();
         let accumulated =
             accumulated.map(|interval| interpolated(&params, params.accumulated_weight, interval));
-        let mut particles = vec![Particle::default(); params.particle_count as usize];
+        let count = plan.active.len() * params.particles_per_cell as usize;
+        if count > MOST_PARTICLES {
+            return Err(RenderError::TooManyParticles {
+                count: count as u64,
+                limit: MOST_PARTICLES as u64,
+            });
+        }
+        let mut particles = vec![Particle::default(); count];
         let inputs = Inputs {
             active: &plan.active,
             rows: &plan.rows,

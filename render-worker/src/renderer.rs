@@ -13,7 +13,7 @@ use crate::image::Image;
 use crate::plan::{Part, Plan};
 use crate::pyramid;
 use crate::scene::Scene;
-use crate::stages::fill::{self, FillParams};
+use crate::stages::fill::{self, Filled, Form};
 
 /// What draws.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -131,7 +131,10 @@ impl Renderer {
         scene.validate()?;
         let coarser = pyramid::suited(job, scene);
         let scene = coarser.as_ref().unwrap_or(scene);
-        let plan = Plan::new(job, scene, most_buffer_bytes)?;
+        let plan = match &device {
+            Some(_) => Plan::for_device(job, scene, most_buffer_bytes)?,
+            None => Plan::new(job, scene, most_buffer_bytes)?,
+        };
         let [width, height] = plan.size_px();
         let mut image = Image {
             width,
@@ -151,20 +154,18 @@ impl Renderer {
         Ok(image)
     }
 
-    /// Fills the gaps of one frame (`[row, col]`, [`MISSING`](crate::stages::layout::MISSING) where there is no data).
+    /// Fills the gaps of one frame (`[row, col]`, [`MISSING`](crate::stages::layout::MISSING) or NaN where there is no
+    /// data); the same bits on every device. Blocks until it is done.
     pub fn fill(
         &self,
+        form: Form,
         grid: &Grid,
         values: &[f32],
         domain: &[u32],
-    ) -> Result<Vec<f32>, RenderError> {
-        let on_device = self
-            .device()
-            .and_then(|device| device.fill(grid, values, domain));
-        on_device.unwrap_or_else(|| {
-            let (params, cosines) = FillParams::for_grid(grid);
-            Ok(fill::cpu::fill(&params, values, domain, &cosines))
-        })
+    ) -> Result<Filled, RenderError> {
+        let device = self.device();
+        let on_device = device.and_then(|device| device.fill(form, grid, values, domain));
+        on_device.unwrap_or_else(|| fill::on_cpu(form, grid, values, domain))
     }
 }
 

@@ -6,6 +6,7 @@ use std::sync::{Arc, OnceLock};
 use contract::grid::Grid;
 
 use crate::error::RenderError;
+use crate::stages::fill::Filled;
 use crate::stages::layout::{MISSING, is_missing};
 
 static NEXT_ID: AtomicU64 = AtomicU64::new(0);
@@ -50,6 +51,11 @@ impl<T> Cells<T> {
 pub struct Frame {
     /// Values; [`MISSING`] where there is no data.
     pub cells: Cells<f32>,
+    /// Estimated error (1σ) of every value in its unit: 0 where it was measured, above where a gap was filled; none if
+    /// there was no gap. [`MISSING`] where there is no data.
+    pub errors: Option<Cells<f32>>,
+    /// The largest of them, 0 without any: what a style scales its doubt by.
+    pub largest_error: f32,
     /// Smallest and largest value, 0 and 0 without data.
     pub range: [f32; 2],
     /// Means over blocks of four.
@@ -72,14 +78,35 @@ impl Frame {
         }
         Self {
             cells: Cells::new(values),
+            errors: None,
+            largest_error: 0.0,
             range: range.unwrap_or_default(),
             coarser_mean: OnceLock::new(),
             coarser_mass: OnceLock::new(),
         }
     }
 
-    pub(crate) fn coarser_mean(&self, make: impl FnOnce(&[f32]) -> Vec<f32>) -> Arc<Self> {
-        let coarser = || Arc::new(Self::new(make(&self.cells.content)));
+    /// A frame of filled values and their estimated errors.
+    pub fn filled(filled: Filled) -> Self {
+        Self::new(filled.values).with_errors(filled.errors)
+    }
+
+    fn with_errors(mut self, errors: Vec<f32>) -> Self {
+        let errors = Self::new(errors);
+        self.largest_error = errors.range[1];
+        self.errors = Some(errors.cells);
+        self
+    }
+
+    /// Blocks of four; an error becomes the mean of the four, as if they were wrong together.
+    pub(crate) fn coarser_mean(&self, make: impl Fn(&[f32]) -> Vec<f32>) -> Arc<Self> {
+        let coarser = || {
+            let coarser = Self::new(make(&self.cells.content));
+            Arc::new(match &self.errors {
+                Some(errors) => coarser.with_errors(make(&errors.content)),
+                None => coarser,
+            })
+        };
         Arc::clone(self.coarser_mean.get_or_init(coarser))
     }
 
@@ -90,7 +117,12 @@ impl Frame {
 
     /// Bytes held, coarser versions left out: they add a third at most.
     pub fn size_bytes(&self) -> u64 {
-        size_of_val(self.cells.content.as_slice()) as u64
+        let cells = self.cells.content.len()
+            + self
+                .errors
+                .as_ref()
+                .map_or(0, |errors| errors.content.len());
+        (cells * size_of::<f32>()) as u64
     }
 }
 

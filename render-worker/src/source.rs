@@ -1,4 +1,4 @@
-//! Where scenes come from: the frames that a job's manifests name, gaps filled once, kept while there is room.
+//! Where scenes come from: the frames that a job names, gaps filled once, kept while there is room.
 
 use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -7,17 +7,18 @@ use std::sync::{Arc, Mutex, PoisonError};
 use contract::grid::Grid;
 use contract::job::RenderJob;
 use contract::key::ObjectKey;
-use contract::manifest::{Bracket, Manifest, ManifestId};
-use contract::time::TimeMs;
+use contract::moment::Moment;
 use storage::{StorageError, Store};
 
 use crate::error::RenderError;
 use crate::recent::Recent;
 use crate::renderer::Renderer;
 use crate::scene::{Cells, Frame, Interval, Scene};
+use crate::stages::fill::Form;
+use crate::stages::fill::scaled::holds;
 
-/// Manifests kept; each is a few kilobytes a step.
-const MOST_MANIFESTS: u64 = 64;
+/// Domains kept; each has four bytes a cell.
+const MOST_DOMAINS: u64 = 64;
 
 /// Loads scenes from a store.
 pub struct Source {
@@ -45,7 +46,6 @@ pub struct Kept {
 
 #[derive(Default)]
 struct Held {
-    manifests: Recent<String, Arc<Manifest>>,
     domains: Recent<ObjectKey, Arc<Cells<u32>>>,
     /// By the key of the frame and of the domain that its gaps were filled for.
     frames: Recent<(ObjectKey, ObjectKey), Arc<Frame>>,
@@ -79,61 +79,51 @@ impl Source {
         }
     }
 
-    /// The scene of a job's instant.
+    /// The scene of a job.
     pub async fn scene(&self, job: &RenderJob) -> Result<Scene, RenderError> {
-        let product = self.manifest(&job.product).await?;
-        let domain = self.domain(&product).await?;
-        let value = self.interval(&product, &domain, job.time).await?;
-        let mut accumulated = None;
-        if let Some(id) = &job.accumulated {
-            let carbon = self.manifest(id).await?;
-            if carbon.grid != product.grid {
-                let (product, accumulated) = (job.product.to_string(), id.to_string());
-                return Err(RenderError::GridMismatch {
-                    product,
-                    accumulated,
-                });
-            }
-            let domain = self.domain(&carbon).await?;
-            accumulated = Some(self.interval(&carbon, &domain, job.time).await?);
-        }
+        let grid = &job.grid;
+        let (domain, value) = self.interval(grid, &job.value).await?;
+        let accumulated = match &job.accumulated {
+            Some(carbon) => Some(self.interval(grid, carbon).await?.1),
+            None => None,
+        };
         Ok(Scene {
-            grid: product.grid,
+            grid: *grid,
             domain,
             value,
             accumulated,
         })
     }
 
+    /// The domain of a moment and the frames around it.
     async fn interval(
         &self,
-        manifest: &Manifest,
-        domain: &Arc<Cells<u32>>,
-        time: TimeMs,
-    ) -> Result<Interval, RenderError> {
-        let no_steps = || RenderError::NoSteps {
-            product: manifest.product.to_string(),
+        grid: &Grid,
+        moment: &Moment,
+    ) -> Result<(Arc<Cells<u32>>, Interval), RenderError> {
+        let domain = self.domain(grid, moment).await?;
+        let before = match &moment.before {
+            Some(frame) => self.frame(grid, moment, &domain, frame).await?,
+            None => self.nothing(moment, &domain),
         };
-        let Bracket {
+        let (after, weight) = match &moment.after {
+            Some(after) => (
+                self.frame(grid, moment, &domain, &after.frame).await?,
+                after.weight,
+            ),
+            None => (Arc::clone(&before), 0.0),
+        };
+        let interval = Interval {
             before,
             after,
             weight,
-        } = manifest.bracket(time).ok_or_else(no_steps)?;
-        let after = self.frame(manifest, domain, after).await?;
-        let before = match before {
-            Some(step) => self.frame(manifest, domain, step).await?,
-            None => self.nothing(manifest, domain),
         };
-        Ok(Interval {
-            before,
-            after,
-            weight,
-        })
+        Ok((domain, interval))
     }
 
     /// Where accumulation starts: zero in every cell of the domain.
-    fn nothing(&self, manifest: &Manifest, domain: &Cells<u32>) -> Arc<Frame> {
-        let key = (manifest.domain.clone(), manifest.domain.clone());
+    fn nothing(&self, moment: &Moment, domain: &Cells<u32>) -> Arc<Frame> {
+        let key = (moment.domain.clone(), moment.domain.clone());
         if let Some(frame) = self.lock().frames.get(&key) {
             return frame;
         }
@@ -143,52 +133,47 @@ impl Source {
         frame
     }
 
-    async fn manifest(&self, id: &ManifestId) -> Result<Arc<Manifest>, RenderError> {
-        let name = id.to_string();
-        if let Some(manifest) = self.lock().manifests.get(&name) {
-            return Ok(manifest);
-        }
-        let loaded = storage::manifests::load(&self.store, id).await;
-        let manifest = Arc::new(loaded.map_err(|e| failed("the manifest", id, e))?);
-        let kept = Arc::clone(&manifest);
-        self.lock()
-            .manifests
-            .keep(name, kept, MOST_MANIFESTS, |_| 1);
-        Ok(manifest)
-    }
-
-    async fn domain(&self, manifest: &Manifest) -> Result<Arc<Cells<u32>>, RenderError> {
-        if let Some(domain) = self.lock().domains.get(&manifest.domain) {
+    async fn domain(&self, grid: &Grid, moment: &Moment) -> Result<Arc<Cells<u32>>, RenderError> {
+        let held = self.lock().domains.get(&moment.domain);
+        let domain = if let Some(domain) = held {
+            domain
+        } else {
+            let read = storage::domain::read(&self.store, &moment.domain).await;
+            let flags = read.map_err(|e| failed("the domain", moment, e))?;
+            let domain = Scene::domain_of(flags);
+            let kept = Arc::clone(&domain);
+            self.lock()
+                .domains
+                .keep(moment.domain.clone(), kept, MOST_DOMAINS, |_| 1);
+            domain
+        };
+        // Before anything as large as the grid claims to be is laid out.
+        if domain.content().len() == grid.cell_count() {
             return Ok(domain);
         }
-        let read = storage::domain::read(&self.store, &manifest.domain).await;
-        let flags = read.map_err(|e| failed("the domain", &manifest.product, e))?;
-        let domain = Scene::domain_of(flags);
-        let (key, kept) = (manifest.domain.clone(), Arc::clone(&domain));
-        self.lock().domains.keep(key, kept, MOST_MANIFESTS, |_| 1);
-        Ok(domain)
+        Err(RenderError::GridMismatch {
+            product: "the job".to_owned(),
+            accumulated: moment.domain.to_string(),
+        })
     }
 
     async fn frame(
         &self,
-        manifest: &Manifest,
+        grid: &Grid,
+        moment: &Moment,
         domain: &Arc<Cells<u32>>,
-        step: usize,
+        frame: &ObjectKey,
     ) -> Result<Arc<Frame>, RenderError> {
-        let key = (manifest.steps[step].frame.clone(), manifest.domain.clone());
+        let key = (frame.clone(), moment.domain.clone());
         let held = self.lock().frames.get(&key);
         if let Some(frame) = held {
             self.frame_hits.fetch_add(1, Ordering::Relaxed);
             return Ok(frame);
         }
         self.frame_misses.fetch_add(1, Ordering::Relaxed);
-        let read = storage::frames::read(&self.store, &key.0, &manifest.grid).await;
-        let values = read.map_err(|e| failed("a frame", &manifest.product, e))?;
-        let (renderer, grid, domain) = (
-            Arc::clone(&self.renderer),
-            manifest.grid,
-            Arc::clone(domain),
-        );
+        let read = storage::frames::read(&self.store, frame, grid).await;
+        let values = read.map_err(|e| failed("a frame", moment, e))?;
+        let (renderer, grid, domain) = (Arc::clone(&self.renderer), *grid, Arc::clone(domain));
         let filled = tokio::task::spawn_blocking(move || fill(&renderer, &grid, values, &domain));
         let frame = Arc::new(filled.await.map_err(RenderError::Thread)??);
         self.keep_frame(key, &frame);
@@ -214,29 +199,21 @@ fn fill(
     values: Vec<f32>,
     domain: &Cells<u32>,
 ) -> Result<Frame, RenderError> {
-    let raw = Frame::new(values);
-    let gaps = raw.cells.content().iter().zip(domain.content());
-    let has_gaps = gaps
-        .into_iter()
-        .any(|(value, domain)| *domain != 0 && crate::stages::layout::is_missing(*value));
-    if !has_gaps || domain.content().len() != raw.cells.content().len() {
-        return Ok(raw);
+    let domain = domain.content();
+    let mut gaps = values.iter().zip(domain);
+    let has_gaps = gaps.any(|(value, domain)| *domain != 0 && !holds(*value));
+    if !has_gaps || domain.len() != values.len() {
+        return Ok(Frame::new(values));
     }
-    Ok(Frame::new(renderer.fill(
-        grid,
-        raw.cells.content(),
-        domain.content(),
-    )?))
+    renderer
+        .fill(Form::Window, grid, &values, domain)
+        .map(Frame::filled)
 }
 
-fn failed(
-    what: &'static str,
-    product: &impl std::fmt::Display,
-    source: StorageError,
-) -> RenderError {
+fn failed(what: &'static str, moment: &Moment, source: StorageError) -> RenderError {
     RenderError::Store {
         what,
-        product: product.to_string(),
+        product: moment.product().to_owned(),
         source: Box::new(source),
     }
 }

@@ -72,7 +72,6 @@ pub fn encode(grid: &Grid, values: &[f32], period: Period) -> Result<Bytes, Stor
 pub fn decode(object: &str, content: Bytes, grid: &Grid) -> Result<Vec<f32>, StorageError> {
     let batch = parquet_table::decode(object, content, &SCHEMA)?;
     let windows = frame_chunks(grid);
-    let mut values = vec![f32::NAN; grid.cell_count()];
     let chunks = parquet_table::numbers(&batch, 0);
     if batch.num_rows() != windows.len() {
         let reason = format!(
@@ -82,6 +81,7 @@ pub fn decode(object: &str, content: Bytes, grid: &Grid) -> Result<Vec<f32>, Sto
         );
         return Err(StorageError::damaged(object, reason));
     }
+    let mut values = vec![f32::NAN; grid.cell_count()];
     for row in 0..batch.num_rows() {
         let chunk = parquet_table::row_values::<Float32Type>(&batch, 3, row);
         let window = windows

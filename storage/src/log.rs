@@ -132,10 +132,20 @@ pub async fn contents(log: &dyn EventLog, topic: Topic) -> Result<Vec<Message>, 
 /// Appends an event unless the log holds one with the same body: for those who are no readers, and who may have been
 /// killed between what they did and telling of it.
 pub async fn tell_once(log: &dyn EventLog, event: &Event) -> Result<(), StorageError> {
-    let told = contents(log, event.body.topic()).await?;
-    let is_told = |message: &Message| message.event().is_ok_and(|told| told.body == event.body);
-    if told.iter().any(is_told) {
+    tell_each_once(log, std::slice::from_ref(event)).await
+}
+
+/// The same for several events of one topic, which is read once.
+pub async fn tell_each_once(log: &dyn EventLog, events: &[Event]) -> Result<(), StorageError> {
+    let Some(first) = events.first() else {
+        return Ok(());
+    };
+    let messages = contents(log, first.body.topic()).await?;
+    let told: Vec<Event> = messages.iter().filter_map(|m| m.event().ok()).collect();
+    let is_untold = |event: &&Event| !told.iter().any(|told| told.body == event.body);
+    let untold: Vec<Event> = events.iter().filter(is_untold).cloned().collect();
+    if untold.is_empty() {
         return Ok(());
     }
-    log.append(std::slice::from_ref(event)).await
+    log.append(&untold).await
 }

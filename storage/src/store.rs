@@ -32,6 +32,7 @@ use url::Url;
 use self::location::Location;
 use crate::StorageError;
 
+pub use self::leftovers::Leftover;
 pub use self::settings::{Patience, Settings};
 
 /// Largest object: a frame of the largest grid is 1 GiB uncompressed.

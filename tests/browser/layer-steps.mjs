@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { visiblePixels } from "./harness.mjs";
 import { LIMIT_MS } from "./journey.mjs";
-import { iso, letters } from "./reading.mjs";
+import { eventually, iso, letters } from "./reading.mjs";
 
 export async function loads(journey) {
   const { page, base } = journey;
@@ -15,6 +15,7 @@ export async function loads(journey) {
 
 export async function tilesArrive(journey) {
   const { mode } = await journey.state();
+  await journey.until(() => window.fluxglobe.tilesLoaded > 0 && window.fluxglobe.tilesPending === 0);
   const counts = await journey.page.evaluate(() => ({
     loaded: window.fluxglobe.tilesLoaded,
     failed: window.fluxglobe.tilesFailed,
@@ -36,11 +37,13 @@ async function assertTilesVisible(journey, tiles) {
 
 export async function legendHasUnit(journey) {
   const { legend } = await journey.product();
-  const text = await journey.page.locator("#legend .legend-unit").innerText();
-  // Typography differs (superscripts, thin spaces), letters and figures do not.
-  assert.equal(letters(text), letters(legend.unit));
   assert.notEqual(letters(legend.unit), "");
-  assert.ok((await journey.page.locator("#legend .legend-tick").count()) >= 2);
+  await eventually(async () => {
+    const text = await journey.page.locator("#legend .legend-unit").innerText();
+    // Typography differs (superscripts, thin spaces), letters and figures do not.
+    assert.equal(letters(text), letters(legend.unit));
+    assert.ok((await journey.page.locator("#legend .legend-tick").count()) >= 2);
+  });
 }
 
 export async function sliderMoves(journey) {
@@ -71,7 +74,7 @@ export async function sliderMoves(journey) {
   );
   assert.ok(!times.has(iso(before.state.timeMs)));
   await page.locator("#time").press("Home");
-  assert.equal((await journey.state()).timeMs, start, "Home goes to the start");
+  await eventually(async () => assert.equal((await journey.state()).timeMs, start, "Home goes to the start"));
 }
 
 export async function plays(journey) {
@@ -86,8 +89,8 @@ export async function plays(journey) {
   }
   assert.equal(shown.size, 2, "two further instants must have been shown");
   await page.locator("#play").click();
+  await journey.until(() => window.fluxglobe.state.playing === false);
   const after = await journey.state();
-  assert.equal(after.playing, false);
   assert.ok(after.timeMs > before.timeMs, "time must have gone on");
 }
 
@@ -106,9 +109,12 @@ export async function renderedView(journey) {
   await page.locator("#view-image").waitFor();
   const source = await page.locator("#view-image").getAttribute("src");
   assert.ok((await visiblePixels(page, source)) > 1000, "the image must show the globe");
-  assert.ok(
-    journey.watch.responses.some(
-      (response) => /\/globe\/.*\/volume\.png/.test(response.url()) && response.status() === 200,
+  await eventually(() =>
+    assert.ok(
+      journey.watch.responses.some(
+        (response) => /\/globe\/.*\/volume\.png/.test(response.url()) && response.status() === 200,
+      ),
+      "the server must have drawn it",
     ),
   );
   await journey.shot("view");

@@ -1,7 +1,11 @@
 //! Reading what the page shows: numbers and units from typeset text, ink from plots.
+import assert from "node:assert/strict";
+import { LIMIT_MS } from "./journey.mjs";
+
+const PAUSE_MS = 50;
 
 /** Canvas pixels that carry ink. */
-export function inkOf(page, selector) {
+function inkOf(page, selector) {
   return page
     .locator(selector)
     .first()
@@ -11,6 +15,27 @@ export function inkOf(page, selector) {
       for (let i = 3; i < data.length; i += 4) if (data[i] > 0) count += 1;
       return count;
     });
+}
+
+/** A canvas is there before it is drawn on: waits until it carries more ink than axes alone. */
+export function hasInk(page, selector) {
+  return eventually(async () => {
+    const ink = await inkOf(page, selector);
+    assert.ok(ink > 500, `${selector} must have been drawn, it has ${ink} pixels of ink`);
+  });
+}
+
+/** What the page shows follows what was done to it, but not at once: holds when `check` passes, fails as it failed last. */
+export async function eventually(check) {
+  const limit = Date.now() + LIMIT_MS;
+  for (;;) {
+    try {
+      return await check();
+    } catch (error) {
+      if (Date.now() > limit) throw error;
+    }
+    await new Promise((resolve) => setTimeout(resolve, PAUSE_MS));
+  }
 }
 
 export function iso(timeMs) {

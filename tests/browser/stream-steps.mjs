@@ -2,10 +2,13 @@
 import assert from "node:assert/strict";
 import { execSync } from "node:child_process";
 import { LIMIT_MS } from "./journey.mjs";
-import { inkOf, letters } from "./reading.mjs";
+import { eventually, hasInk, letters } from "./reading.mjs";
 
 /** A command that makes new data of the product on show land on the server; without it only the page's half is tried. */
 const LAND = process.env.FLUXGLOBE_LAND;
+
+/** Landing also computes what follows from it. */
+const LANDING_MS = 5 * LIMIT_MS;
 
 /** Returns why it looked at less than it could. */
 export async function observationsOfPlatform(journey) {
@@ -19,7 +22,7 @@ export async function observationsOfPlatform(journey) {
   await page.locator("#observations-status").filter({ hasNotText: /^$|asking/ }).waitFor();
   await journey.until((count) => window.fluxglobe.platforms.length === count, features.length);
   if (features.length === 0) {
-    assert.match(await page.locator("#observations-status").innerText(), /none/);
+    await page.locator("#observations-status").filter({ hasText: /none/ }).waitFor();
     await page.locator("#observations").uncheck();
     return "the server has observations of no platform";
   }
@@ -27,6 +30,7 @@ export async function observationsOfPlatform(journey) {
   if (chosen === undefined) return "no platform is on the near side of the globe";
   await page.locator("#globe canvas").first().click({ position: chosen.at });
   await page.locator("#platform-plot canvas").waitFor();
+  await page.locator("#platform-name").filter({ hasText: /\S/ }).waitFor();
   const name = await page.locator("#platform-name").innerText();
   const hit = features.find((feature) => feature.properties.platform === name);
   assert.ok(hit, `${name} must be one of the server's platforms`);
@@ -34,20 +38,22 @@ export async function observationsOfPlatform(journey) {
   const path = `api/observations/${encodeURIComponent(dataset)}/${encodeURIComponent(platform)}`;
   const { series } = await journey.api(path);
   const plot = page.locator("#platform-plot");
-  assert.ok(Number(await plot.getAttribute("data-points")) > 0);
-  const unit = await plot.getAttribute("data-unit");
-  assert.ok(
-    series.some((one) => one.unit === unit),
-    `${unit} must be a unit of the server's`,
-  );
-  const quality = await page.locator("#platform-quality").innerText();
-  assert.match(quality, /good|not evaluated|questionable|bad/);
-  assert.ok(letters(quality).includes(letters(unit).slice(0, 1)), `${quality} must name the unit ${unit}`);
-  assert.ok((await inkOf(page, "#platform-plot canvas")) > 500, "the plot must have been drawn");
+  await eventually(async () => {
+    assert.ok(Number(await plot.getAttribute("data-points")) > 0);
+    const unit = await plot.getAttribute("data-unit");
+    assert.ok(
+      series.some((one) => one.unit === unit),
+      `${unit} must be a unit of the server's`,
+    );
+    const quality = await page.locator("#platform-quality").innerText();
+    assert.match(quality, /good|not evaluated|questionable|bad/);
+    assert.ok(letters(quality).includes(letters(unit).slice(0, 1)), `${quality} must name the unit ${unit}`);
+  });
+  await hasInk(page, "#platform-plot canvas");
   await journey.shot("observed");
   await page.locator("#observations").uncheck();
   await journey.until(() => window.fluxglobe.platforms.length === 0);
-  assert.ok(await page.locator("#tab-platform").isHidden());
+  await page.locator("#tab-platform").waitFor({ state: "hidden" });
 }
 
 /** A platform whose place is on the canvas and not under a card. */
@@ -69,7 +75,7 @@ export async function newDataLands(journey) {
   const { page } = journey;
   const before = await journey.product();
   await page.evaluate(() => (window.stillTheSamePage = true));
-  execSync(LAND, { stdio: "inherit", timeout: LIMIT_MS });
+  execSync(LAND, { stdio: "inherit", timeout: LANDING_MS });
   await page.locator('.notice[data-key="news"]', { hasText: "New data" }).waitFor({ timeout: LIMIT_MS });
   await journey.until((manifest) => !window.fluxglobe.shown?.includes(`:${manifest}`), before.manifest);
   assert.ok(await page.evaluate(() => window.stillTheSamePage), "the page must not have been loaded again");

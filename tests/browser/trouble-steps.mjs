@@ -22,9 +22,25 @@ export async function sharedAddress(journey) {
   assert.equal(state.timeMs, Date.parse(time));
   assert.ok(Math.abs(state.camera.lon + 120) < 0.1 && Math.abs(state.camera.heightKm - 15000) < 10);
   await page.locator("#series-plot canvas").waitFor();
-  assert.match(await page.locator("#synthetic").innerText(), /synthetic/i);
-  assert.ok(await page.locator("#synthetic").isVisible());
+  await page.locator("#synthetic").filter({ hasText: /synthetic/i }).waitFor({ state: "visible" });
   await journey.shot("synthetic");
+}
+
+/** An address that asks for an instant that there is nothing of. */
+export async function timeOutside(journey) {
+  const { page, base } = journey;
+  const { id, steps } = await journey.product();
+  const last = steps[steps.length - 1].end;
+  await page.goto("about:blank");
+  await page.goto(new URL(`#product=${id}&mode=map&time=2150-07-01`, base).href);
+  await journey.until(() => window.fluxglobe?.ready === true);
+  const notice = page.locator('.notice[data-key="outside"]', { hasText: "1 Jul 2150" });
+  await notice.waitFor();
+  await journey.until((iso) => window.fluxglobe.shown?.endsWith(iso), last);
+  await journey.shot("outside");
+  // A new wish is a new chance.
+  await page.locator("#time").press("Home");
+  await notice.waitFor({ state: "detached" });
 }
 
 export async function refusedTiles(journey) {

@@ -7,9 +7,11 @@ import { openBrowser, Watch } from "./harness.mjs";
 import { Journey, LIMIT_MS } from "./journey.mjs";
 import { legendHasUnit, loads, plays, renderedView, sliderMoves, tilesArrive, volumeMode } from "./layer-steps.mjs";
 import { newDataIsShown, newDataLands, observationsOfPlatform } from "./stream-steps.mjs";
-import { lostServer, refusedTiles, sharedAddress } from "./trouble-steps.mjs";
+import { lostServer, refusedTiles, sharedAddress, timeOutside } from "./trouble-steps.mjs";
 
 const URL_ASKED = process.env.FLUXGLOBE_URL;
+/** Set where the server has all that the page can show: then a step that found nothing to look at has failed. */
+const LOOKS_AT_ALL = process.env.FLUXGLOBE_LOOK_AT_ALL === "1";
 
 test("the harness sees what it is there to see", testHarness);
 
@@ -27,6 +29,7 @@ test("the viewer", async (t) => {
       try {
         assert.ok(journey.hasLoaded || act === loads, "the page never loaded, so there is nothing to look at");
         const skipped = await act(journey);
+        assert.ok(!skipped || !LOOKS_AT_ALL, `nothing was looked at: ${skipped}`);
         if (skipped) test.diagnostic(`not looked at: ${skipped}`);
         // Attributed to the step during which it happened; the last check of all looks at the whole list again.
         if (isCleanPage) assert.deepEqual(watch.problems, [], "the page must stay without error");
@@ -53,6 +56,7 @@ test("the viewer", async (t) => {
     await step("fetches volume tiles in volume mode", volumeMode);
     await step("shows the rendered view in a dialog", renderedView);
     await step("shows data that lands while it is open", newDataLands);
+    await step("says so when its address asks for a time that there is nothing of", timeOutside);
     await step("has nothing to complain about at the end", async () => {});
     // From here on errors are planted, so the clean list is no longer asked for.
     const planted = { isCleanPage: false };

@@ -14,6 +14,7 @@ use harness::cluster::{Cluster, Shape};
 use harness::{granule, http, program};
 use kafka_log::{KafkaLog, KafkaSettings};
 use serde_json::Value;
+use storage::log::EventLog as _;
 
 use crate::alone;
 
@@ -315,4 +316,16 @@ pub(crate) fn events(cluster: &Cluster, topic: Topic) -> Vec<Event> {
             .map(|message| message.event().unwrap())
             .collect()
     })
+}
+
+/// Appends an event as any client may.
+pub(crate) fn append(cluster: &Cluster, event: Event) {
+    let runtime = tokio::runtime::Runtime::new().unwrap();
+    runtime.block_on(async {
+        let servers = cluster.servers.setting("FLUXGLOBE_KAFKA").unwrap();
+        let log = KafkaLog::connect(&KafkaSettings::plain(servers))
+            .await
+            .unwrap();
+        log.append(&[event]).await.unwrap();
+    });
 }

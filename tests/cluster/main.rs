@@ -4,15 +4,25 @@
 
 mod equality;
 mod faults;
+mod full_disk;
 mod granules;
 mod outages;
+mod refusals;
+mod restarts;
+mod watched;
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 
 /// Two clusters at once would starve each other on a small machine, and times would mean nothing.
-static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
+static ROOM: RwLock<()> = RwLock::new(());
 
-fn alone() -> MutexGuard<'static, ()> {
+/// For a test with a whole cluster.
+fn alone() -> RwLockWriteGuard<'static, ()> {
     // A test that failed says so itself; the others still run.
-    ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner)
+    ROOM.write().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// For tests of one or two services, which may run beside each other.
+fn together() -> RwLockReadGuard<'static, ()> {
+    ROOM.read().unwrap_or_else(PoisonError::into_inner)
 }

@@ -9,11 +9,9 @@ use contract::event::{Body, Event};
 use contract::observation::{Observation, PlatformKind, Quality};
 use harness::cluster::{Cluster, Shape};
 use harness::granule;
-use kafka_log::{KafkaLog, KafkaSettings};
-use storage::log::EventLog as _;
 
 use crate::alone;
-use crate::faults::{PRODUCT, each_event_once, notice, number, say, until_whole};
+use crate::faults::{PRODUCT, append, each_event_once, notice, number, say, until_whole};
 
 /// Resident memory that no service exceeds while it waits, bytes.
 const MEMORY_BYTES: u64 = 1 << 30;
@@ -149,15 +147,4 @@ fn observation(number: usize) -> Observation {
         unit: "K".to_owned(),
         quality: Quality::Good,
     }
-}
-
-fn append(cluster: &Cluster, event: Event) {
-    let runtime = tokio::runtime::Runtime::new().unwrap();
-    runtime.block_on(async {
-        let servers = cluster.servers.setting("FLUXGLOBE_KAFKA").unwrap();
-        let log = KafkaLog::connect(&KafkaSettings::plain(servers))
-            .await
-            .unwrap();
-        log.append(&[event]).await.unwrap();
-    });
 }

@@ -183,3 +183,34 @@ fn bad_requests_get_their_status_and_a_reason() {
         "{metrics}"
     );
 }
+
+#[test]
+fn settings_are_printed_without_secrets_and_with_where_they_come_from() {
+    let data = tempfile::tempdir().unwrap();
+    let secret = data.path().join("password");
+    std::fs::write(&secret, "hush").unwrap();
+    for service in [
+        "ingestd",
+        "scheduler",
+        "executor",
+        "render-worker",
+        "tile-server",
+    ] {
+        let output = program::command(data.path())
+            .args([service, "--print-settings"])
+            .env("AWS_SECRET_ACCESS_KEY", "hush")
+            .env("FLUXGLOBE_STORE", "s3://me:hush@bucket/prefix")
+            .env("FLUXGLOBE_KAFKA_PASSWORD_FILE", &secret)
+            .env("FLUXGLOBE_POSTGIS", "postgres://me:hush@host/db")
+            .output()
+            .unwrap();
+        let text = String::from_utf8_lossy(&output.stdout);
+        assert!(output.status.success(), "{service}: {text}");
+        assert!(
+            text.contains("FLUXGLOBE_STORE=s3://me:***@bucket/prefix  # environment"),
+            "{service}: {text}"
+        );
+        assert!(text.contains("# default"), "{service}: {text}");
+        assert!(!text.contains("hush"), "{service}: {text}");
+    }
+}

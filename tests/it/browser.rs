@@ -1,17 +1,86 @@
-//! The viewer in a real headless browser, over a server with the real data.
+//! The viewer in a real headless browser, over a server with the real data, observations, and data that land meanwhile.
 
-use std::path::Path;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use harness::server::Server;
+use harness::{program, real_data};
 
 use crate::end_to_end::demo_data;
 
+const BROWSER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/browser");
+const PROFILE: &str = concat!(
+    env!("CARGO_MANIFEST_DIR"),
+    "/../ingest/profiles/takahashi09-flux.toml"
+);
+
+/// What the demo left, for this test to change.
+fn own_copy(from: &Path) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let copied = Command::new("cp")
+        .arg("-r")
+        .arg(from.join("."))
+        .arg(folder.path())
+        .status()
+        .unwrap();
+    assert!(copied.success());
+    folder
+}
+
+/// A day of a station and of a ship, as a table of their measurements.
+fn observations(folder: &Path) -> PathBuf {
+    let mut table = "Expocode\tyr\tmon\tday\thh\tmm\tss\tlongitude [dec.deg.E]\tlatitude [dec.deg.N]\tSST [deg.C]\n".to_owned();
+    for hour in 0..24 {
+        let sst = 26.0 + f64::from(hour % 12) / 10.0;
+        let at = format!("2000\t1\t15\t{hour}\t0\t0");
+        writeln!(table, "STATION\t{at}\t-160.0\t10.0\t{sst}").unwrap();
+        let lon = -140.0 + f64::from(hour) / 5.0;
+        writeln!(table, "SHIP\t{at}\t{lon}\t-15.0\t{sst}").unwrap();
+    }
+    let file = folder.join("observed.tsv");
+    std::fs::write(&file, table).unwrap();
+    file
+}
+
+/// The line by which a person lands a correction in the product on show, beside the running server: February's file as
+/// January's, and what follows from it.
+fn land_a_correction(data: &Path, file: &Path) -> String {
+    let shipped = std::fs::read_to_string(PROFILE).unwrap();
+    let corrected = shipped
+        .replace("name = \"takahashi09-flux\"", "name = \"correction\"")
+        .replace(
+            "from = { variable = { name = \"time\" } }",
+            "from = { fixed = \"2000-01\" }",
+        )
+        .replace("year = 2000\n", "");
+    assert!(corrected.contains("fixed = ") && corrected.contains("name = \"correction\""));
+    let profile = data.join("correction.toml");
+    std::fs::write(&profile, corrected).unwrap();
+    let fluxglobe = format!(
+        "env -i PATH=\"$PATH\" HOME=\"$HOME\" '{}' --data '{}'",
+        program::path().display(),
+        data.display()
+    );
+    format!(
+        "{fluxglobe} ingest --profile '{}' '{}' && {fluxglobe} derive accumulated --product takahashi09-flux",
+        profile.display(),
+        file.display()
+    )
+}
+
 #[test]
-fn the_page_shows_tiles_series_and_budgets_without_an_error() {
-    let Some(data) = demo_data() else { return };
+fn the_page_shows_tiles_series_budgets_observations_and_news_without_an_error() {
+    let Some(demo) = demo_data() else { return };
+    let folder = own_copy(demo);
+    let data = folder.path();
+    let observed = observations(data);
+    program::succeed(data, &["ingest", observed.to_str().unwrap()]).unwrap();
+    let february = real_data::fluxengine()
+        .unwrap()
+        .join("takahashi09/M2001032.1200.a7.all_products.BIN.01feb011200.v1.20132321228.data.nc");
     let server = Server::start(data, &["serve"]).unwrap();
-    let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/browser"));
+    let folder = Path::new(BROWSER);
     if !folder.join("node_modules").exists() {
         let install = Command::new("npm")
             .args(["install", "--no-save", "--no-audit", "--no-fund"])
@@ -28,7 +97,10 @@ fn the_page_shows_tiles_series_and_budgets_without_an_error() {
         .args(["--test", "viewer.test.mjs"])
         .current_dir(folder)
         .env("FLUXGLOBE_URL", &server.url)
-        .env("FLUXGLOBE_SCREENSHOTS", data.join("screenshots"))
+        .env("FLUXGLOBE_LAND", land_a_correction(data, &february))
+        // Nothing may be passed over here: all that the page can show is there.
+        .env("FLUXGLOBE_LOOK_AT_ALL", "1")
+        .env("FLUXGLOBE_SCREENSHOTS", demo.join("screenshots"))
         .output()
         .unwrap();
     let text = String::from_utf8_lossy(&output.stdout);
@@ -38,4 +110,5 @@ fn the_page_shows_tiles_series_and_budgets_without_an_error() {
         String::from_utf8_lossy(&output.stderr)
     );
     assert!(text.contains("pass"), "the runner ran nothing:\n{text}");
+    assert!(!text.contains("not looked at"), "{text}");
 }

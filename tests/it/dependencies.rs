@@ -156,7 +156,7 @@ impl Graph {
         let found = self
             .packages
             .iter()
-            .find(|(_, package)| package.0 == name && package.1 == "0.0.0");
+            .find(|(_, package)| package.0 == name && package.1 == env!("CARGO_PKG_VERSION"));
         found
             .unwrap_or_else(|| panic!("{name} is no crate of this workspace"))
             .0

@@ -65,6 +65,42 @@ fn the_global_budget_is_the_published_one_on_both_earths() {
 }
 
 #[test]
+fn the_error_of_filled_gaps_is_told_by_hiding_data() {
+    let Some(data) = demo_data() else { return };
+    let words = [
+        "products",
+        "fill-error",
+        "--product",
+        "takahashi09-flux",
+        "--steps",
+        "2",
+    ];
+    let picture = data.join("fill-error.png");
+    let more = [
+        "--gap-cells",
+        "1,4",
+        "--json",
+        "--picture",
+        picture.to_str().unwrap(),
+    ];
+    let report = program::json(data, &[&words[..], &more].concat()).unwrap();
+    assert_eq!(report["steps"].as_array().unwrap().len(), 4);
+    let number = |row: &Value, name: &str| row[name].as_f64().unwrap();
+    for row in report["all"].as_array().unwrap() {
+        assert!(number(row, "hidden_cells") > 5000.0);
+        assert!(number(row, "rmse") < 0.4 * number(row, "spread"), "{row}");
+        assert!(
+            number(row, "bias").abs() < 0.2 * number(row, "rmse"),
+            "{row}"
+        );
+        assert!(number(row, "within_two_sigma") > 0.95, "{row}");
+    }
+    assert!(std::fs::read(&picture).unwrap().starts_with(b"\x89PNG"));
+    let all_hidden = program::fail(data, &[&words[..], &["--share", "1"]].concat()).unwrap();
+    assert!(all_hidden.contains("below 1"), "{all_hidden}");
+}
+
+#[test]
 fn the_bands_are_within_five_thousandths_of_a_petagram() {
     let Some(data) = demo_data() else { return };
     let bands = [
@@ -283,4 +319,18 @@ fn without_a_network_the_demo_runs_on_synthetic_data_and_says_so() {
             .all(|p| p["synthetic"] == true),
         "{products}"
     );
+}
+
+#[test]
+fn the_program_tells_its_version_and_those_of_what_it_exchanges() {
+    let data = tempfile::tempdir().unwrap();
+    let text = program::succeed(data.path(), &["--version"]).unwrap();
+    let expected = format!("fluxglobe {} (events ", env!("CARGO_PKG_VERSION"));
+    assert!(text.starts_with(&expected), "{text}");
+    for what in ["events", "manifests", "renderer"] {
+        let number = text.split_once(what).unwrap().1.trim_start();
+        assert!(number.starts_with(|c: char| c.is_ascii_digit()), "{text}");
+    }
+    let service = program::succeed(data.path(), &["ingestd", "--version"]).unwrap();
+    assert!(service.contains("(events "), "{service}");
 }

@@ -8,3 +8,4 @@ mod browser;
 mod dependencies;
 mod end_to_end;
 mod harness_self;
+mod reread;

@@ -67,6 +67,7 @@ impl Cluster {
         set("FLUXGLOBE_CLUSTER", format!("http://{scheduler}"));
         set("FLUXGLOBE_RENDER_WORKERS", renderers.join(","));
         set("FLUXGLOBE_ALLOW_FOLDER", inbox.display().to_string());
+        set("FLUXGLOBE_ALLOW_STORE", "s3://fluxglobe/inbox".to_owned());
         set(
             "FLUXGLOBE_SPOOL",
             folder.path().join("spool").display().to_string(),
@@ -105,6 +106,15 @@ impl Cluster {
     /// Settings that every process of the cluster has.
     pub fn settings(&self) -> &[(String, String)] {
         &self.settings
+    }
+
+    /// One of them.
+    pub fn setting(&self, name: &str) -> Result<&str> {
+        let mut all = self.settings.iter();
+        let found = all.find(|(known, _)| known == name);
+        found
+            .map(|(_, value)| value.as_str())
+            .with_context(|| format!("{name} is not set"))
     }
 
     /// A service.

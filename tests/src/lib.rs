@@ -9,3 +9,5 @@ pub mod proxy;
 pub mod real_data;
 pub mod server;
 pub mod servers;
+pub mod web;
+pub mod small_disk;

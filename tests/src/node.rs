@@ -97,6 +97,21 @@ impl Node {
             .is_none_or(|child| !matches!(child.try_wait(), Ok(None)))
     }
 
+    /// Waits until it ends by itself; its exit code, none if a signal ended it.
+    pub fn wait_until_ended(&mut self) -> Result<Option<i32>> {
+        let start = Instant::now();
+        let mut child = self.child.take().context("it does not run")?;
+        while start.elapsed() < READY_LIMIT {
+            if let Some(status) = child.try_wait()? {
+                return Ok(status.code());
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        child.kill()?;
+        child.wait()?;
+        bail!("{} went on:\n{}", self.name, self.talk())
+    }
+
     /// Waits until it says that it is ready; how long that took.
     pub fn wait_until_ready(&mut self) -> Result<Duration> {
         let start = Instant::now();
@@ -135,9 +150,14 @@ impl Node {
         Ok(text.lines().filter_map(value).sum())
     }
 
+    /// All that it said since it was first started.
+    pub fn said(&self) -> String {
+        std::fs::read_to_string(&self.log).unwrap_or_default()
+    }
+
     /// The end of what it said.
     pub fn talk(&self) -> String {
-        let text = std::fs::read_to_string(&self.log).unwrap_or_default();
+        let text = self.said();
         let lines: Vec<&str> = text.lines().collect();
         lines[lines.len().saturating_sub(40)..].join("\n")
     }

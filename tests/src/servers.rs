@@ -12,7 +12,7 @@ use tempfile::TempDir;
 pub struct Servers {
     names: Vec<&'static str>,
     folder: TempDir,
-    ports: Vec<(&'static str, String)>,
+    told: Vec<(&'static str, String)>,
     settings: Vec<(String, String)>,
 }
 
@@ -36,8 +36,13 @@ pub fn free_port() -> u16 {
 }
 
 impl Servers {
-    /// Starts some of `kafka`, `postgis`, `s3` and `hdfs`.
+    /// Starts some of `kafka`, `postgis`, `s3`, `hdfs` and `prometheus`.
     pub fn start(names: &[&'static str]) -> Result<Self> {
+        Self::start_told(names, vec![])
+    }
+
+    /// The same, told more than their ports: variables that the scripts of `deploy/services` know.
+    pub fn start_told(names: &[&'static str], told: Vec<(&'static str, String)>) -> Result<Self> {
         let port = || free_port().to_string();
         let ports = [
             "FLUXGLOBE_KAFKA_PORT",
@@ -46,13 +51,15 @@ impl Servers {
             "FLUXGLOBE_S3_PORT",
             "FLUXGLOBE_HDFS_PORT",
             "FLUXGLOBE_HDFS_HTTP_PORT",
+            "FLUXGLOBE_PROMETHEUS_PORT",
         ];
         let mut servers = Self {
             names: names.to_vec(),
             folder: tempfile::tempdir()?,
-            ports: ports.map(|name| (name, port())).to_vec(),
+            told: ports.map(|name| (name, port())).to_vec(),
             settings: vec![],
         };
+        servers.told.extend(told);
         servers.script("start", names)?;
         let text = servers.script("env", names)?;
         servers.settings = text.lines().filter_map(setting).collect();
@@ -75,6 +82,11 @@ impl Servers {
     /// Folder of the servers' files.
     pub fn folder(&self) -> &std::path::Path {
         self.folder.path()
+    }
+
+    /// Tells the scripts one thing more, from the next start on.
+    pub fn tell(&mut self, name: &'static str, value: &str) {
+        self.told.push((name, value.to_owned()));
     }
 
     /// Stops one in an orderly way; its data stay.
@@ -102,7 +114,7 @@ impl Servers {
         let output = Command::new(&script)
             .arg(verb)
             .args(names)
-            .envs(self.ports.iter().map(|(name, port)| (*name, port.as_str())))
+            .envs(self.told.iter().map(|(name, value)| (*name, value)))
             .env("FLUXGLOBE_RUN", self.folder.path())
             .stdin(Stdio::null())
             .output()

@@ -1,55 +1,27 @@
 //! The products there are: reads the store's newest manifests, at most once in a while, and remembers them.
 
-use std::collections::BTreeMap;
-use std::sync::{Arc, PoisonError, RwLock};
+mod layer;
+mod snapshot;
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use contract::job::Mode;
-use contract::key::ObjectKey;
-use contract::manifest::{Manifest, ManifestId};
+use contract::manifest::ManifestId;
 use contract::product::ProductId;
 use contract::quantity::Quantity;
-use contract::time::Period;
-use storage::{StorageError, Store, manifests};
+use futures::FutureExt as _;
+use futures::future::{BoxFuture, Shared};
+use storage::{StorageError, Store};
 
 use crate::error::ServerError;
 use crate::metrics::Metrics;
 use crate::versions::Versions;
+use snapshot::{FOLDER, Reader, Snapshot};
 
-/// Folder of all manifests; [`ObjectKey::manifest`] puts them there.
-const FOLDER: &str = "manifests";
+pub use layer::{Accumulated, Layer};
 
-/// The newest version of one product.
-#[derive(Debug, Clone)]
-pub struct Layer {
-    /// Its name, which is costly to compute.
-    pub id: ManifestId,
-    /// Its manifest.
-    pub manifest: Arc<Manifest>,
-    /// What it covers; a manifest without steps is no layer.
-    pub extent: Period,
-    /// The accumulated carbon that was derived from exactly this version.
-    pub accumulated: Option<ManifestId>,
-}
-
-impl Layer {
-    /// Modes it can be drawn in. Accumulated carbon lifts the particles of another product; it has none of its own.
-    pub fn modes(&self) -> &'static [Mode] {
-        if self.manifest.quantity == Quantity::AccumulatedCarbon {
-            &[Mode::Map]
-        } else {
-            &Mode::ALL
-        }
-    }
-}
-
-/// What was known at one moment.
-#[derive(Debug, Default)]
-struct Snapshot {
-    read_at: Option<Instant>,
-    known: BTreeMap<ProductId, (ObjectKey, Arc<Manifest>, ManifestId)>,
-    layers: BTreeMap<ProductId, Arc<Layer>>,
-}
+/// How long a store is waited for by those who can be served from what was known before.
+const PATIENCE: Duration = Duration::from_secs(2);
 
 /// What the store says of its products.
 #[derive(Debug, Clone, Copy)]
@@ -61,27 +33,39 @@ pub(crate) struct Probe {
 }
 
 /// The products of a store.
-#[derive(Debug)]
 pub struct Catalogue {
-    store: Store,
+    reader: Arc<Reader>,
     max_age: Duration,
-    metrics: Metrics,
-    snapshot: RwLock<Arc<Snapshot>>,
-    versions: Versions,
-    /// Held while the store is read, so that a crowd reads it once.
-    reading: tokio::sync::Mutex<()>,
+    state: Arc<Mutex<State>>,
+}
+
+#[derive(Default)]
+struct State {
+    snapshot: Arc<Snapshot>,
+    /// Raised when what is known may have changed: who began to read before that has read the past.
+    epoch: u64,
+    reading: Option<Reading>,
+}
+
+/// The store is being read, once for all who wait.
+#[derive(Clone)]
+struct Reading {
+    begun: Instant,
+    answer: Shared<BoxFuture<'static, Result<Arc<Snapshot>, ServerError>>>,
 }
 
 impl Catalogue {
     /// An empty catalogue that reads the store when it is first asked.
     pub fn new(store: Store, max_age: Duration, metrics: Metrics) -> Self {
+        let versions = Versions::new(store.clone());
         Self {
-            versions: Versions::new(store.clone()),
-            store,
+            reader: Arc::new(Reader {
+                store,
+                metrics,
+                versions,
+            }),
             max_age,
-            metrics,
-            snapshot: RwLock::default(),
-            reading: tokio::sync::Mutex::new(()),
+            state: Arc::default(),
         }
     }
 
@@ -120,12 +104,12 @@ impl Catalogue {
                 manifest: id.to_string(),
             });
         }
-        self.versions.layer(&id).await
+        self.reader.versions.layer(&id).await
     }
 
     /// Is there no newer version known?
     pub(crate) fn is_newest(&self, layer: &Layer) -> bool {
-        let newest = self.current();
+        let newest = self.state().snapshot.clone();
         let newest = newest.layers.get(&layer.manifest.product);
         newest.is_some_and(|newest| newest.id == layer.id)
     }
@@ -143,9 +127,10 @@ impl Catalogue {
 
     /// Asks the store now which products it has: how many, and how many of those known it has lost.
     pub(crate) async fn probe(&self) -> Result<Probe, StorageError> {
-        let listed = self.store.folders(FOLDER).await?;
-        let known = &self.current().known;
-        let lost = known
+        let listed = self.reader.store.folders(FOLDER).await?;
+        let before = Arc::clone(&self.state().snapshot);
+        let lost = before
+            .known
             .keys()
             .filter(|product| !listed.iter().any(|name| name == product.as_str()));
         Ok(Probe {
@@ -154,137 +139,104 @@ impl Catalogue {
         })
     }
 
-    /// What is known may have changed: the next question reads the store.
-    pub(crate) fn outdated(&self) {
-        let mut snapshot = self
-            .snapshot
-            .write()
-            .unwrap_or_else(PoisonError::into_inner);
-        let known = Snapshot {
-            read_at: None,
-            known: snapshot.known.clone(),
-            layers: snapshot.layers.clone(),
+    /// Reads the store, for what is known may have changed.
+    ///
+    /// # Errors
+    /// The store does not answer; those who ask for products are still served from what was known before.
+    pub(crate) async fn renew(&self) -> Result<(), ServerError> {
+        let reading = {
+            let mut state = self.state();
+            Self::outdate(&mut state);
+            self.read(&mut state)
         };
-        *snapshot = Arc::new(known);
+        reading.answer.await.map(|_snapshot| ())
     }
 
-    fn current(&self) -> Arc<Snapshot> {
-        Arc::clone(&self.snapshot.read().unwrap_or_else(PoisonError::into_inner))
+    fn outdate(state: &mut State) {
+        state.epoch += 1;
+        state.reading = None;
+        let mut known = Snapshot::clone(&state.snapshot);
+        known.read_at = None;
+        state.snapshot = Arc::new(known);
     }
 
-    fn fresh(&self) -> Option<Arc<Snapshot>> {
-        let snapshot = self.current();
-        let fresh = snapshot
-            .read_at
-            .is_some_and(|at| at.elapsed() < self.max_age);
-        fresh.then_some(snapshot)
+    fn state(&self) -> MutexGuard<'_, State> {
+        locked(&self.state)
     }
 
     /// What is known, read anew if it is too old. A store that does not answer leaves what was known before: objects
     /// never change, so it is still true.
     async fn snapshot(&self) -> Result<Arc<Snapshot>, ServerError> {
-        if let Some(snapshot) = self.fresh() {
-            return Ok(snapshot);
-        }
-        let _reading = self.reading.lock().await;
-        if let Some(snapshot) = self.fresh() {
-            return Ok(snapshot);
-        }
-        let before = self.current();
-        match self.read(&before).await {
-            Ok(snapshot) => {
-                let snapshot = Arc::new(snapshot);
-                self.metrics.products.set(snapshot.layers.len() as i64);
-                *self
-                    .snapshot
-                    .write()
-                    .unwrap_or_else(PoisonError::into_inner) = Arc::clone(&snapshot);
-                Ok(snapshot)
+        let (before, reading) = {
+            let mut state = self.state();
+            let before = Arc::clone(&state.snapshot);
+            if before.is_younger_than(self.max_age) {
+                return Ok(before);
             }
-            Err(error) => {
-                self.metrics.store_failures.inc();
-                if before.read_at.is_none() && before.known.is_empty() {
-                    return Err(error.into());
-                }
-                tracing::warn!(%error, "the list of products cannot be read; the one before is used");
-                Ok(before)
-            }
+            let under_way = state.reading.clone();
+            let reading = under_way.unwrap_or_else(|| self.read(&mut state));
+            (before, reading)
+        };
+        if before.is_first() {
+            return reading.answer.await;
         }
-    }
-
-    /// One listing of all manifests; only those that are new are read.
-    async fn read(&self, before: &Snapshot) -> Result<Snapshot, StorageError> {
-        let read_at = Some(Instant::now());
-        let mut newest: BTreeMap<ProductId, ObjectKey> = BTreeMap::new();
-        for key in self.store.list(FOLDER).await? {
-            // Keys come sorted and numbers are zero-padded: the last of a product is its newest.
-            if let Some(product) = key
-                .as_str()
-                .split('/')
-                .nth(1)
-                .and_then(|name| name.parse().ok())
-            {
-                newest.insert(product, key);
-            }
-        }
-        // Manifests are never deleted: a product that is gone was lost with its disk, not withdrawn.
-        let mut known = before.known.clone();
-        for (product, key) in newest {
-            if known.get(&product).is_none_or(|entry| entry.0 != key)
-                && let Some(entry) = self.load(&product, key).await?
-            {
-                known.insert(product, entry);
-            }
-        }
-        let layers = known.iter().filter_map(|(product, entry)| {
-            Some((product.clone(), Arc::new(layer(&known, entry)?)))
-        });
-        Ok(Snapshot {
-            read_at,
-            layers: layers.collect(),
-            known,
+        let patience = PATIENCE.saturating_sub(reading.begun.elapsed());
+        let read = tokio::time::timeout(patience, reading.answer).await;
+        Ok(match read {
+            Ok(Ok(snapshot)) => snapshot,
+            Ok(Err(_)) | Err(_) => before,
         })
     }
 
-    /// The newest manifest of a product; none if it is damaged, which must not hide the other products.
-    async fn load(
-        &self,
-        product: &ProductId,
-        key: ObjectKey,
-    ) -> Result<Option<Entry>, StorageError> {
-        match manifests::latest(&self.store, product).await {
-            Ok(manifest) => Ok(manifest.map(|manifest| {
-                let id = manifest.id();
-                (
-                    ObjectKey::manifest(product, manifest.number),
-                    Arc::new(manifest),
-                    id,
-                )
-            })),
-            Err(error) if error.is_retryable() => Err(error),
-            Err(error) => {
-                self.metrics.store_failures.inc();
-                tracing::error!(%error, product.id = %product, object.key = %key, "a manifest cannot be used");
-                Ok(None)
+    /// Begins to read the store; what comes of it is kept however long it takes.
+    fn read(&self, state: &mut State) -> Reading {
+        let (before, epoch) = (Arc::clone(&state.snapshot), state.epoch);
+        let (reader, held) = (Arc::clone(&self.reader), Arc::clone(&self.state));
+        let task = tokio::spawn(async move {
+            let read = reader.read(&before).await;
+            let mut state = locked(&held);
+            let is_of_now = state.epoch == epoch;
+            if is_of_now {
+                state.reading = None;
             }
-        }
+            match read {
+                Ok(snapshot) => {
+                    let snapshot = Arc::new(snapshot);
+                    if is_of_now {
+                        reader.metrics.products.set(snapshot.layers.len() as i64);
+                        state.snapshot = Arc::clone(&snapshot);
+                    }
+                    Ok(snapshot)
+                }
+                Err(error) => {
+                    reader.metrics.store_failures.inc();
+                    tracing::warn!(%error, "the list of products cannot be read; the one before is used");
+                    if is_of_now && !before.is_first() {
+                        // As if it had been read now: the store is asked again when that is too old.
+                        let read_at = Some(Instant::now());
+                        let before = Snapshot::clone(&before);
+                        state.snapshot = Arc::new(Snapshot { read_at, ..before });
+                    }
+                    Err(ServerError::from(error))
+                }
+            }
+        });
+        let lost = |e| {
+            Err(ServerError::Defect {
+                what: format!("reading the list of products ended early: {e}"),
+            })
+        };
+        let answer = task.map(move |ended| ended.unwrap_or_else(lost));
+        let reading = Reading {
+            begun: Instant::now(),
+            answer: answer.boxed().shared(),
+        };
+        state.reading = Some(reading.clone());
+        reading
     }
 }
 
-type Entry = (ObjectKey, Arc<Manifest>, ManifestId);
-
-fn layer(known: &BTreeMap<ProductId, Entry>, (_, manifest, id): &Entry) -> Option<Layer> {
-    let accumulated = manifest
-        .product
-        .accumulated()
-        .ok()
-        .and_then(|product| known.get(&product));
-    let accumulated =
-        accumulated.filter(|(_, derived, _)| derived.derived_from.as_ref() == Some(id));
-    Some(Layer {
-        id: id.clone(),
-        manifest: Arc::clone(manifest),
-        extent: manifest.extent()?,
-        accumulated: accumulated.map(|(_, _, id)| id.clone()),
-    })
+fn locked(state: &Mutex<State>) -> MutexGuard<'_, State> {
+    // Changed by single assignments, so a poisoned lock still guards a whole state.
+    state.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -12,6 +12,9 @@ const ANALYSIS_QUEUE: u32 = 64;
 const REQUEST_LIMIT_S: u64 = 60;
 const DRAIN_LIMIT_S: u64 = 10;
 const CATALOGUE_AGE_MS: u64 = 1000;
+const CONNECTIONS: u32 = 4096;
+const HEAD_LIMIT_S: u64 = 10;
+const IDLE_LIMIT_S: u64 = 75;
 
 /// What the tile server can be told.
 #[derive(Debug, Clone, PartialEq, Eq, clap::Args)]
@@ -46,6 +49,15 @@ pub struct Settings {
     /// Age at which the list of products is read again, milliseconds, 0 to 3600000
     #[arg(long, env = "FLUXGLOBE_CATALOGUE_AGE_MS", default_value_t = CATALOGUE_AGE_MS, value_parser = clap::value_parser!(u64).range(0..=3_600_000))]
     pub catalogue_age_ms: u64,
+    /// Connections open at the same time, 1 to 65536; each takes a file handle, and those beyond are told to come again
+    #[arg(long, env = "FLUXGLOBE_CONNECTIONS", default_value_t = CONNECTIONS, value_parser = clap::value_parser!(u32).range(1..=65_536))]
+    pub connections: u32,
+    /// Longest time that a client may take to send a request's head, seconds, 1 to 300
+    #[arg(long, env = "FLUXGLOBE_HEAD_LIMIT_S", default_value_t = HEAD_LIMIT_S, value_parser = clap::value_parser!(u64).range(1..=300))]
+    pub head_limit_s: u64,
+    /// Time after which a connection that nothing moves on is ended, seconds, 1 to 3600; never before --request-limit-s
+    #[arg(long, env = "FLUXGLOBE_IDLE_LIMIT_S", default_value_t = IDLE_LIMIT_S, value_parser = clap::value_parser!(u64).range(1..=3600))]
+    pub idle_limit_s: u64,
 }
 
 impl Default for Settings {
@@ -61,6 +73,9 @@ impl Default for Settings {
             request_limit_s: REQUEST_LIMIT_S,
             drain_limit_s: DRAIN_LIMIT_S,
             catalogue_age_ms: CATALOGUE_AGE_MS,
+            connections: CONNECTIONS,
+            head_limit_s: HEAD_LIMIT_S,
+            idle_limit_s: IDLE_LIMIT_S,
         }
     }
 }
@@ -91,6 +106,8 @@ mod tests {
             ["--request-limit-s", "0"],
             ["--listen", "8080"],
             ["--draw-queue", "-1"],
+            ["--connections", "0"],
+            ["--head-limit-s", "301"],
         ] {
             assert!(
                 Program::try_parse_from(["program", flag[0], flag[1]]).is_err(),

@@ -94,6 +94,9 @@ pub enum ServerError {
     /// A backend failed.
     #[error(transparent)]
     Backend(#[from] BackendError),
+    /// The store does not answer, and what is in memory is not enough.
+    #[error("the store does not answer, and without it no picture was drawn within {limit_s} s")]
+    StoreAway { limit_s: u64 },
     /// The store failed.
     #[error(transparent)]
     Storage(Arc<StorageError>),
@@ -131,7 +134,9 @@ impl ServerError {
             | Self::NoObservations => StatusCode::NOT_FOUND,
             Self::ReadOnly => StatusCode::METHOD_NOT_ALLOWED,
             Self::BodyTooLarge { .. } => StatusCode::PAYLOAD_TOO_LARGE,
-            Self::Busy | Self::TooManyListeners | Self::Stopping => StatusCode::SERVICE_UNAVAILABLE,
+            Self::Busy | Self::TooManyListeners | Self::Stopping | Self::StoreAway { .. } => {
+                StatusCode::SERVICE_UNAVAILABLE
+            }
             Self::TimedOut { .. } => StatusCode::GATEWAY_TIMEOUT,
             Self::Storage(error) if error.is_retryable() => StatusCode::SERVICE_UNAVAILABLE,
             Self::Storage(_) | Self::Defect { .. } => StatusCode::INTERNAL_SERVER_ERROR,

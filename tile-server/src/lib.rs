@@ -3,8 +3,8 @@
 //! | address | answer |
 //! |---|---|
 //! | `/tiles/{product}/{mode}/{z}/{x}/{y}.png?time=&size=&manifest=` | Web Mercator tile, 256 or 512 pixels (`{y}@2x.png` is 512) |
-//! | `/tiles/{product}/{mode}.json?time=` | TileJSON 3.0.0 of the layer |
-//! | `/globe/{product}/{mode}.png?lon=&lat=&height_km=&time=&width=&height=&surface=` | view of the globe |
+//! | `/tiles/{product}/{mode}.json?time=&manifest=` | TileJSON 3.0.0 of the layer |
+//! | `/globe/{product}/{mode}.png?lon=&lat=&height_km=&time=&width=&height=&surface=&manifest=` | view of the globe |
 //! | `/api/products` | every product, its steps, modes and legend |
 //! | `/api/products/{product}/point?lon=&lat=&manifest=` | series of the cell at a place |
 //! | `/api/products/{product}/budget?region=&from=&to=&step=&earth=&manifest=` | carbon budget |
@@ -17,7 +17,8 @@
 //! | `/` and below | the viewer's files |
 //!
 //! Times are ISO 8601 and any instant is valid; a missing one is the middle of the last step. `from` and `to` bound
-//! the half-open period `[from, to)`. `manifest` names a version, as answers do; without it the newest one answers. Every refusal is JSON, `{"error": reason}`.
+//! the half-open period `[from, to)`. `manifest` names a version, as answers do; without it the newest one answers. An instant outside what a
+//! product covers shows the nearest one inside; pictures say so in `fluxglobe-time` and `fluxglobe-time-covered`. Every refusal is JSON, `{"error": reason}`.
 //!
 //! Left out on purpose: drawing and computing, which come in through the traits of [`backend`].
 
@@ -25,6 +26,7 @@ mod analyses;
 pub mod backend;
 mod catalogue;
 pub mod config;
+mod connections;
 pub mod error;
 mod extract;
 mod flights;
@@ -40,7 +42,7 @@ mod serve;
 mod state;
 mod versions;
 
-pub use catalogue::Layer;
+pub use catalogue::{Accumulated, Layer};
 pub use config::Settings;
 pub use error::{ServeError, ServerError};
 pub use request::job as picture_job;

@@ -3,6 +3,7 @@
 //! ```text
 //! granule.landed, product.derived -> catalogue anew -> touched times -> render.job of hot tiles there
 //!                                                \-> news to viewers (server-sent events)
+//! a look at the list of products now and then, where there is no log -> news to viewers
 //! render.done, or the first volume tile that is asked for -> how fresh it was
 //! ```
 
@@ -11,9 +12,11 @@ mod hot;
 mod news;
 mod service;
 mod touched;
+mod watch;
 
 pub use freshness::Freshness;
 pub use hot::{HotTile, HotTiles};
 pub use news::{Item, Listener, News};
 pub use service::LiveService;
 pub use touched::touched;
+pub use watch::Watch;

@@ -3,7 +3,7 @@
 //! Names are `fluxglobe_<service>_<what>_<unit>`; labels have few values each: routes are patterns, never addresses.
 
 use prometheus::{
-    Histogram, HistogramOpts, HistogramVec, IntCounter, IntCounterVec, IntGauge, Opts,
+    Histogram, HistogramOpts, HistogramVec, IntCounter, IntCounterVec, IntGauge, IntGaugeVec, Opts,
     core::Collector,
 };
 
@@ -46,8 +46,8 @@ pub struct Metrics {
     pub requests: IntCounterVec,
     /// Time until an answer begins, by route.
     pub request_duration_s: HistogramVec,
-    /// Requests under way.
-    pub in_flight: IntGauge,
+    /// Requests under way, by route.
+    pub in_flight: IntGaugeVec,
     /// Bytes of bodies sent, after compression, by route.
     pub sent_bytes: IntCounterVec,
     /// Pictures that needed no drawing, by where they came from.
@@ -72,6 +72,10 @@ pub struct Metrics {
     pub panics: IntCounter,
     /// Products known.
     pub products: IntGauge,
+    /// Connections that are open.
+    pub connections: IntGauge,
+    /// Connections that were ended by this server, by the limit that they broke.
+    pub connections_ended: IntCounterVec,
 }
 
 impl Metrics {
@@ -85,6 +89,12 @@ impl Metrics {
             registered(
                 registry,
                 IntCounterVec::new(Opts::new(name(what), help), labels)?,
+            )
+        };
+        let gauges = |what: &str, help: &str, labels: &[&str]| {
+            registered(
+                registry,
+                IntGaugeVec::new(Opts::new(name(what), help), labels)?,
             )
         };
         let timed = |what: &str, help: &str, bounds: &[f64]| {
@@ -111,7 +121,7 @@ impl Metrics {
                 registry,
                 HistogramVec::new(requests_s, &["operation"])?,
             )?,
-            in_flight: gauge("in_flight", "Requests under way.")?,
+            in_flight: gauges("in_flight", "Requests under way.", &["operation"])?,
             sent_bytes: counters("sent_bytes_total", "Bytes of bodies sent.", &["route"])?,
             cache_hits: counters(
                 "cache_hits_total",
@@ -137,6 +147,12 @@ impl Metrics {
             )?,
             panics: counter("panics_total", "Panics that were caught.")?,
             products: gauge("products_count", "Products known.")?,
+            connections: gauge("connections_count", "Connections that are open.")?,
+            connections_ended: counters(
+                "connections_ended_total",
+                "Connections ended by this server, by the limit that they broke.",
+                &["why"],
+            )?,
         })
     }
 

@@ -1,7 +1,7 @@
 //! Pictures by their job: from memory, from the object store, or drawn once for all who wait, within limits.
 
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use contract::digest::Digest;
@@ -19,6 +19,11 @@ use crate::metrics::{Metrics, Source};
 
 /// What every PNG begins with (ISO/IEC 15948, 5.2).
 const PNG_SIGNATURE: [u8; 8] = [0x89, b'P', b'N', b'G', 0x0d, 0x0a, 0x1a, 0x0a];
+/// How long a stored picture is waited for before it is drawn again.
+const STORE_LIMIT: Duration = Duration::from_secs(3);
+/// How long drawing may take while the store does not answer. Whoever has the frames in memory draws as ever; whoever
+/// has not would wait for the store in turn.
+const AWAY_LIMIT: Duration = Duration::from_secs(8);
 /// Size of a picture the memory is laid out for, bytes: between an empty tile (0.3 KiB) and a busy one (100 KiB).
 const TYPICAL_BYTES: u64 = 20 << 10;
 /// Memory an entry takes besides its bytes: digest, handle and the cache's own tables.
@@ -38,6 +43,9 @@ pub struct Pictures {
     flights: Flights<Bytes>,
     maker: Arc<Maker>,
 }
+
+/// The store does not answer.
+struct StoreAway;
 
 /// What making one picture needs; shared with the tasks that draw.
 struct Maker {
@@ -94,11 +102,13 @@ impl Maker {
             return Ok(picture);
         }
         let key = job.key();
-        if let Some(picture) = self.stored(&key).await {
+        let stored = self.stored(&key).await;
+        if let Ok(Some(picture)) = stored {
             self.metrics.hit(Source::Store);
             self.remember(digest, picture.clone());
             return Ok(picture);
         }
+        let limit = stored.err().map(|StoreAway| AWAY_LIMIT);
         self.metrics.cache_misses.inc();
         let asked_at = Instant::now();
         let pass = self
@@ -111,8 +121,12 @@ impl Maker {
             .observe(asked_at.elapsed().as_secs_f64());
         // Drawing goes on if those who asked go away: the work is half done, and the next one finds it in the store.
         let drawing = tokio::spawn(async move {
-            let picture = self.draw(&job).await?;
-            let picture = self.keep(&key, picture).await;
+            let picture = self.draw_within(limit, &job).await?;
+            let picture = match limit {
+                None => self.keep(&key, picture).await,
+                // It could not be asked for a moment ago; the one who asks next stores it.
+                Some(_) => picture,
+            };
             self.remember(digest, picture.clone());
             drop(pass);
             Ok(picture)
@@ -124,16 +138,33 @@ impl Maker {
         })
     }
 
-    async fn stored(&self, key: &ObjectKey) -> Option<Bytes> {
-        match self.store.get(key).await {
-            Ok(picture) => Some(picture),
-            Err(error) if error.is_not_found() => None,
-            Err(error) => {
-                self.metrics.store_failures.inc();
-                tracing::warn!(%error, object.key = %key, "a stored picture cannot be read; it is drawn again");
-                None
-            }
-        }
+    async fn stored(&self, key: &ObjectKey) -> Result<Option<Bytes>, StoreAway> {
+        let looked = tokio::time::timeout(STORE_LIMIT, self.store.get(key)).await;
+        let error = match looked {
+            Ok(Ok(picture)) => return Ok(Some(picture)),
+            Ok(Err(error)) if error.is_not_found() => return Ok(None),
+            Ok(Err(error)) => error.to_string(),
+            Err(_elapsed) => format!("no answer within {} s", STORE_LIMIT.as_secs()),
+        };
+        self.metrics.store_failures.inc();
+        tracing::warn!(error, object.key = %key, "a stored picture cannot be read; it is drawn again");
+        Err(StoreAway)
+    }
+
+    async fn draw_within(
+        &self,
+        limit: Option<Duration>,
+        job: &RenderJob,
+    ) -> Result<Bytes, ServerError> {
+        let Some(limit) = limit else {
+            return self.draw(job).await;
+        };
+        let drawn = tokio::time::timeout(limit, self.draw(job)).await;
+        drawn.unwrap_or_else(|_elapsed| {
+            Err(ServerError::StoreAway {
+                limit_s: limit.as_secs(),
+            })
+        })
     }
 
     async fn draw(&self, job: &RenderJob) -> Result<Bytes, ServerError> {
@@ -167,7 +198,7 @@ impl Maker {
         if matches!(error, StorageError::Conflict { .. }) {
             self.metrics.conflicts.inc();
             tracing::error!(object.key = %key, "the same job was drawn with other bytes; the stored ones are served");
-            return self.stored(key).await.unwrap_or(picture);
+            return self.stored(key).await.ok().flatten().unwrap_or(picture);
         }
         self.metrics.store_failures.inc();
         tracing::warn!(%error, object.key = %key, "a picture cannot be stored");

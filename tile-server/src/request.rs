@@ -1,8 +1,7 @@
 //! From an address to a render job: a layer, a mode, an instant and a view in, everything that shapes the picture out.
 
 use contract::colour::TransferFunction;
-use contract::job::{Mode, RENDERER_VERSION, RenderJob, Style, View};
-use contract::quantity::Quantity;
+use contract::job::{Mode, RenderJob, Style, View};
 use contract::time::TimeMs;
 
 use crate::catalogue::Layer;
@@ -23,6 +22,15 @@ pub(crate) fn mode(layer: &Layer, text: &str) -> Result<Mode, ServerError> {
     })
 }
 
+/// The instant that is shown: the one asked for, or the nearest that the product covers; the middle of its last step
+/// unless one is asked for.
+pub(crate) fn shown_time(layer: &Layer, time: Option<TimeMs>) -> TimeMs {
+    let last = layer.manifest.steps.last();
+    let middle = last.map_or(layer.extent.end, |last| last.period.mid());
+    time.unwrap_or(middle)
+        .clamp(layer.extent.start, layer.extent.end)
+}
+
 /// The job of a picture. Without a time it shows the middle of the last step.
 pub fn job(
     layer: &Layer,
@@ -31,35 +39,10 @@ pub fn job(
     time: Option<TimeMs>,
 ) -> Result<RenderJob, ServerError> {
     let manifest = &layer.manifest;
-    let job = RenderJob {
-        renderer_version: RENDERER_VERSION,
-        product: layer.id.clone(),
-        // A map has no particles to lift: without the accumulated carbon its name survives a new derivation.
-        accumulated: layer.accumulated.clone().filter(|_| mode != Mode::Map),
-        time: shown_time(layer, mode, time),
-        mode,
-        view,
-        style: Style::with_transfer(TransferFunction::default_for(manifest.quantity)),
-    };
-    job.validate()?;
-    Ok(job)
-}
-
-/// The instant that is drawn: inside what the product covers, so that equal pictures have one name.
-///
-/// A map before the middle of the first step, or after that of the last, shows that step unchanged; particles move
-/// until the end of the last step.
-fn shown_time(layer: &Layer, mode: Mode, time: Option<TimeMs>) -> TimeMs {
-    let steps = &layer.manifest.steps;
-    let (Some(first), Some(last)) = (steps.first(), steps.last()) else {
-        return layer.extent.end;
-    };
-    let of_means = layer.manifest.quantity != Quantity::AccumulatedCarbon;
-    let (earliest, latest) = if mode == Mode::Map && of_means {
-        (first.period.mid(), last.period.mid())
-    } else {
-        (layer.extent.start, layer.extent.end)
-    };
-    time.unwrap_or_else(|| last.period.mid())
-        .clamp(earliest, latest)
+    let time = shown_time(layer, time);
+    let accumulated = layer.accumulated.as_ref();
+    let accumulated = accumulated.filter(|lift| lift.holds_at(time));
+    let style = Style::with_transfer(TransferFunction::default_for(manifest.quantity));
+    let lift = accumulated.map(|lift| &*lift.manifest);
+    Ok(RenderJob::of(manifest, lift, time, mode, view, style)?)
 }

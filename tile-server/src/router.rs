@@ -11,6 +11,7 @@ use tower_http::cors::{Any, CorsLayer};
 
 use crate::error::ServerError;
 use crate::middleware::{limits, panics::CountPanics, security, track};
+use crate::routes::picture::{COVERED, SHOWN_TIME};
 use crate::routes::{
     budget, check, events, globe, health, metrics, observations, platforms, point, products,
     regions, tilejson, tiles, viewer,
@@ -22,7 +23,8 @@ pub fn router(state: AppState) -> Router {
     // Map clients on other pages may read everything here: nothing is private and nobody logs in.
     let other_origins = CorsLayer::new()
         .allow_origin(Any)
-        .allow_methods([Method::GET, Method::HEAD]);
+        .allow_methods([Method::GET, Method::HEAD])
+        .expose_headers([SHOWN_TIME, COVERED]);
     let layers = ServiceBuilder::new()
         .layer(from_fn_with_state(state.clone(), track::count))
         .layer(from_fn(security::headers))

@@ -5,11 +5,11 @@ use std::io::ErrorKind;
 use std::net::SocketAddr;
 use std::time::Duration;
 
-use axum::serve::ListenerExt as _;
 use tokio::net::TcpListener;
 use tokio::sync::watch;
 
 use crate::config::Settings;
+use crate::connections::Door;
 use crate::error::ServeError;
 use crate::router::router;
 use crate::state::AppState;
@@ -63,19 +63,14 @@ impl Server {
     ) -> Result<(), ServeError> {
         let limit = Duration::from_secs(self.state.settings.drain_limit_s);
         let (stop, mut stopping) = watch::channel(false);
-        // Tiles are small answers to small requests: waiting to fill a packet only delays them.
-        let listener = self.listener.tap_io(|connection| {
-            if let Err(error) = connection.set_nodelay(true) {
-                tracing::debug!(%error, "a connection keeps its delay");
-            }
-        });
+        let door = Door::new(self.listener, &self.state.settings, &self.state.metrics);
         let ending = self.state.clone();
         let until_told = async move {
             shutdown.await;
             ending.news.close();
             stop.send_replace(true);
         };
-        let serving = axum::serve(listener, router(self.state)).with_graceful_shutdown(until_told);
+        let serving = axum::serve(door, router(self.state)).with_graceful_shutdown(until_told);
         let drained = async move {
             // An error means that serving ended by itself: then this branch has nothing to limit.
             if stopping.wait_for(|stop| *stop).await.is_err() {

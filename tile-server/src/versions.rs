@@ -7,7 +7,7 @@ use contract::quantity::Quantity;
 use quick_cache::sync::Cache;
 use storage::{StorageError, Store, manifests};
 
-use crate::catalogue::Layer;
+use crate::catalogue::{Accumulated, Layer};
 use crate::error::ServerError;
 
 /// Versions remembered: each is the list of its steps, some ten KiB.
@@ -20,6 +20,7 @@ const DERIVATIONS: usize = 64;
 pub(crate) struct Versions {
     store: Store,
     known: Cache<String, Arc<Layer>>,
+    manifests: Cache<String, Arc<Manifest>>,
 }
 
 impl Versions {
@@ -28,6 +29,7 @@ impl Versions {
         Self {
             store,
             known: Cache::new(REMEMBERED),
+            manifests: Cache::new(REMEMBERED),
         }
     }
 
@@ -40,15 +42,7 @@ impl Versions {
         if let Some(layer) = self.known.get(&name) {
             return Ok(layer);
         }
-        let manifest = match manifests::load(&self.store, id).await {
-            Ok(manifest) => manifest,
-            // Also one whose number is there with other contents: the name is that of nothing.
-            Err(error) if error.is_not_found() || matches!(error, StorageError::Damaged { .. }) => {
-                tracing::debug!(%error, manifest = name, "a version is not there");
-                return Err(ServerError::UnknownVersion { manifest: name });
-            }
-            Err(error) => return Err(error.into()),
-        };
+        let manifest = self.manifest(id).await?;
         let extent = manifest.extent().ok_or_else(|| ServerError::EmptyProduct {
             name: manifest.product.to_string(),
         })?;
@@ -57,7 +51,7 @@ impl Versions {
         let is_settled = accumulated.is_some() || manifest.quantity != Quantity::CarbonFlux;
         let layer = Arc::new(Layer {
             id: id.clone(),
-            manifest: Arc::new(manifest),
+            manifest,
             extent,
             accumulated,
         });
@@ -67,12 +61,36 @@ impl Versions {
         Ok(layer)
     }
 
+    /// The manifest of a version.
+    ///
+    /// # Errors
+    /// Not found if it was never there, or is there no more.
+    pub(crate) async fn manifest(&self, id: &ManifestId) -> Result<Arc<Manifest>, ServerError> {
+        let name = id.to_string();
+        if let Some(manifest) = self.manifests.get(&name) {
+            return Ok(manifest);
+        }
+        match manifests::load(&self.store, id).await {
+            Ok(manifest) => {
+                let manifest = Arc::new(manifest);
+                self.manifests.insert(name, Arc::clone(&manifest));
+                Ok(manifest)
+            }
+            // Also one whose number is there with other contents: the name is that of nothing.
+            Err(error) if error.is_not_found() || matches!(error, StorageError::Damaged { .. }) => {
+                tracing::debug!(%error, manifest = name, "a version is not there");
+                Err(ServerError::UnknownVersion { manifest: name })
+            }
+            Err(error) => Err(error.into()),
+        }
+    }
+
     /// The accumulated carbon that was derived from exactly this version.
     async fn derivation(
         &self,
         manifest: &Manifest,
         id: &ManifestId,
-    ) -> Result<Option<ManifestId>, StorageError> {
+    ) -> Result<Option<Accumulated>, StorageError> {
         if manifest.quantity != Quantity::CarbonFlux {
             return Ok(None);
         }
@@ -90,7 +108,7 @@ impl Versions {
                 continue;
             };
             if derived.derived_from.as_ref() == Some(id) {
-                return Ok(Some(derived.id()));
+                return Ok(Some(Accumulated::new(derived.id(), Arc::new(derived))));
             }
         }
         Ok(None)

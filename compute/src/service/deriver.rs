@@ -16,10 +16,10 @@ use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::topic::{Origin, Topic};
 use prometheus::Registry;
+use storage::StorageError;
 use storage::log::{EventLog, Finished, Message, Reader};
-use storage::{StorageError, manifests};
 
-use crate::budget::{Measure, named};
+use super::named_sums::NamedSums;
 use crate::derive::{chosen_start, derived};
 use crate::{ComputeError, Engine, ErrorClass, catalog, derive_accumulated};
 
@@ -36,6 +36,7 @@ pub struct Deriver {
     engine: Engine,
     log: Arc<dyn EventLog>,
     red: Red,
+    sums: NamedSums,
 }
 
 /// How reading ended.
@@ -53,16 +54,29 @@ impl Deriver {
         registry: &Registry,
     ) -> Result<Self, ComputeError> {
         let red = Red::register(registry, "deriver")?;
-        Ok(Self { engine, log, red })
+        let sums = NamedSums::new(engine.clone(), red.clone());
+        Ok(Self {
+            engine,
+            log,
+            red,
+            sums,
+        })
     }
 
     /// Reads until asked to stop. What fails for a reason that passes is tried again for ever.
     pub async fn run(&self, stop: Stop) -> Result<(), ComputeError> {
+        tokio::select! {
+            ended = self.follow_log(&stop) => ended,
+            never = self.sums.run() => match never {},
+        }
+    }
+
+    async fn follow_log(&self, stop: &Stop) -> Result<(), ComputeError> {
         loop {
             let join = || self.log.join(Topic::GranuleLanded, GROUP);
-            let joined = until_there("event log", &stop, StorageError::is_retryable, join).await?;
+            let joined = until_there("event log", stop, StorageError::is_retryable, join).await?;
             let Some(reader) = joined else { return Ok(()) };
-            match self.read(reader, &stop).await {
+            match self.read(reader, stop).await {
                 Ended::Stopped => return Ok(()),
                 Ended::Lost(error) if error.is_retryable() => {
                     tracing::warn!(%error, "event log lost; joining again");
@@ -97,9 +111,8 @@ impl Deriver {
             if let Err(error) = reader.finish(done).await {
                 return Ended::Lost(error);
             }
-            tokio::select! {
-                () = stop.said() => return leave(reader).await,
-                () = self.store_sums(touched) => {}
+            for source in touched {
+                self.sums.add(source);
             }
         }
     }
@@ -139,6 +152,7 @@ impl Deriver {
         stop: &Stop,
     ) -> Option<Option<Manifest>> {
         let running = self.red.start("derive");
+        let _sums_wait = self.sums.hold().await;
         let attempt = || self.derived_now(product);
         let derived = until_there("derivation", stop, ComputeError::is_retryable, attempt).await;
         for (_, event) in events {
@@ -169,29 +183,6 @@ impl Deriver {
                 Some(None)
             }
         }
-    }
-
-    /// Stores the sums of the named regions for versions that were derived from, so that budgets of them are read and
-    /// not computed. Only what changed since the version before is summed. Nobody depends on it: what fails is left.
-    async fn store_sums(&self, sources: BTreeSet<ManifestId>) {
-        for source in sources {
-            let running = self.red.start("sums");
-            match self.store_sums_of(&source).await {
-                Ok(()) => running.done(Outcome::Ok),
-                Err(error) => {
-                    tracing::warn!(manifest = %source, %error, "sums of named regions are left to be computed");
-                    running.done(Outcome::Failed);
-                }
-            }
-        }
-    }
-
-    async fn store_sums_of(&self, source: &ManifestId) -> Result<(), ComputeError> {
-        let manifest = manifests::load(self.engine.store(), source).await?;
-        for region in named::touching(self.engine.store(), &manifest.grid).await? {
-            named::store_sums(&self.engine, &manifest, region.name, Measure::Mass).await?;
-        }
-        Ok(())
     }
 
     async fn derived_now(&self, product: &ProductId) -> Result<Option<Manifest>, ComputeError> {

@@ -34,7 +34,7 @@ use datafusion::execution::runtime_env::RuntimeEnvBuilder;
 use prometheus::{IntGauge, Registry};
 use storage::Store;
 use tokio::net::TcpListener;
-use tokio::sync::Semaphore;
+use tokio::sync::{Notify, Semaphore};
 use tokio::time::Instant;
 use tokio_stream::wrappers::TcpListenerStream;
 use tonic::transport::Channel;
@@ -52,6 +52,10 @@ use crate::{ComputeError, Objects, state};
 const TIDY_INTERVAL: Duration = Duration::from_secs(10);
 /// Intermediate results that nobody wrote to for so long belong to queries that nobody remembers.
 const FORGOTTEN: Duration = Duration::from_hours(2);
+/// How often an executor without a task asks for one.
+const IDLE_ASK: Duration = Duration::from_millis(50);
+/// And one that works on some: it reports those that ended with its questions.
+const BUSY_ASK: Duration = Duration::from_millis(10);
 /// A scheduler that was not seen for so long is away.
 const AWAY: Duration = Duration::from_secs(5);
 /// How long the report on the last task may take: an executor without a free hand makes a request every five seconds.
@@ -148,13 +152,20 @@ impl Executor {
     /// takes its leave of the scheduler, which gives what is left to others.
     pub async fn run(self, stop: Stop) -> Result<(), ComputeError> {
         let hands = Arc::new(Semaphore::new(self.settings.tasks()));
+        let nudge = Arc::new(Notify::new());
+        let nudging = keep_asking(
+            Arc::clone(&hands),
+            self.settings.tasks(),
+            Arc::clone(&nudge),
+        );
+        let _nudging = Background(tokio::spawn(nudging));
         let mut working = Background(tokio::spawn(poll_loop(
             SchedulerGrpcClient::new(self.courier.clone())
                 .max_decoding_message_size(state::MESSAGE_BYTES)
                 .max_encoding_message_size(state::MESSAGE_BYTES),
             Arc::new(self.runner()?),
             codec(),
-            None,
+            Some(Arc::clone(&nudge)),
             Some(Arc::clone(&hands)),
             ExecutorHealth::new(),
         )));
@@ -242,6 +253,16 @@ fn ended_early(
     ended
         .unwrap_or_else(|e| Err(BallistaError::TokioError(e)))
         .map_err(ComputeError::cluster("working as executor"))
+}
+
+/// Has the scheduler asked for work again and again: more often while tasks run, since a task's end is reported with the
+/// next question, and the next stage of a query begins no earlier.
+async fn keep_asking(hands: Arc<Semaphore>, tasks: usize, nudge: Arc<Notify>) {
+    loop {
+        let is_idle = hands.available_permits() == tasks;
+        tokio::time::sleep(if is_idle { IDLE_ASK } else { BUSY_ASK }).await;
+        nudge.notify_one();
+    }
 }
 
 /// Takes no more tasks and waits for those under way, and then for the report on the last of them.

@@ -5,6 +5,8 @@ mod accumulated;
 #[cfg(test)]
 mod budgets;
 #[cfg(test)]
+mod cleaned;
+#[cfg(test)]
 mod cluster;
 #[cfg(test)]
 mod fixture;

@@ -12,7 +12,6 @@ use std::sync::Arc;
 
 use anyhow::{Context as _, Result, bail};
 use bytes::Bytes;
-use contract::job::RenderJob;
 use contract::manifest::Manifest;
 use contract::time::TimeMs;
 use futures::stream::{self, StreamExt as _, TryStreamExt as _};
@@ -49,7 +48,8 @@ pub(crate) async fn run(settings: &Settings, store: Store, options: RenderAnimat
             async move {
                 let job = shots.job(number)?;
                 let png = drawer.draw(&job).await;
-                let png = png.with_context(|| format!("picture {number}, {}", job.time))?;
+                let time = shots.time(number)?;
+                let png = png.with_context(|| format!("picture {number}, {time}"))?;
                 anyhow::Ok((number, png))
             }
         })
@@ -79,16 +79,18 @@ pub(crate) async fn run(settings: &Settings, store: Store, options: RenderAnimat
 async fn shots(settings: &Settings, store: &Store, options: &RenderAnimation) -> Result<Shots> {
     let globe = &options.globe;
     let view = render::view_of(globe);
-    let mut first = render::job(store, settings, &globe.picture, view).await?;
-    first.style.globe_surface = !globe.transparent;
-    let manifest = storage::manifests::load(store, &first.product).await?;
-    let (from, to) = span(&manifest, options.from, options.to)?;
+    let product = render::product(store, settings, &globe.picture).await?;
+    let (from, to) = span(&product, options.from, options.to)?;
+    let mut style = render::style(&product, &globe.picture);
+    style.globe_surface = !globe.transparent;
     let shots = Shots {
-        first: RenderJob {
-            time: from,
-            ..first
-        },
+        accumulated: render::accumulated(store, &product).await?,
+        product,
+        from,
         to,
+        mode: globe.picture.mode,
+        view,
+        style,
         fps: options.fps,
         count: Shots::count_of(options.seconds, options.fps)?,
         turn_deg: options.turn,

@@ -1,7 +1,8 @@
 //! The pictures of an animation: which job is the one of each number.
 
 use anyhow::{Result, bail};
-use contract::job::{RenderJob, View};
+use contract::job::{Mode, RenderJob, Style, View};
+use contract::manifest::Manifest;
 use contract::time::TimeMs;
 use serde::{Deserialize, Serialize};
 
@@ -14,10 +15,18 @@ const MOST_PIXELS: u64 = 36_000 * 3840 * 2160;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Shots {
-    /// The job of picture 0.
-    pub(super) first: RenderJob,
+    /// The version of the product that is drawn.
+    pub(super) product: Manifest,
+    /// Its accumulated carbon.
+    pub(super) accumulated: Option<Manifest>,
+    /// Instant of picture 0.
+    pub(super) from: TimeMs,
     /// First instant after the animation.
     pub(super) to: TimeMs,
+    pub(super) mode: Mode,
+    /// View of picture 0.
+    pub(super) view: View,
+    pub(super) style: Style,
     pub(super) fps: u16,
     pub(super) count: u32,
     /// Degrees that the camera moves east in all.
@@ -48,8 +57,8 @@ impl Shots {
                 self.turn_deg
             );
         }
-        self.first.validate()?;
-        let [width, height] = self.first.view.size_px().map(u64::from);
+        self.job(0)?;
+        let [width, height] = self.view.size_px().map(u64::from);
         let pixels = width * height * u64::from(self.count);
         if pixels > MOST_PIXELS {
             bail!(
@@ -61,20 +70,25 @@ impl Shots {
         Ok(())
     }
 
-    /// The job of a picture. Instants are whole milliseconds, so that the same animation is always the same jobs.
-    pub(super) fn job(&self, number: u32) -> Result<RenderJob> {
-        let (from_ms, to_ms) = (i128::from(self.first.time.ms()), i128::from(self.to.ms()));
+    /// The instant of a picture: whole milliseconds, so that the same animation is always the same jobs.
+    pub(super) fn time(&self, number: u32) -> Result<TimeMs> {
+        let (from_ms, to_ms) = (i128::from(self.from.ms()), i128::from(self.to.ms()));
         let ms = from_ms + (to_ms - from_ms) * i128::from(number) / i128::from(self.count);
-        let mut job = self.first.clone();
-        job.time = TimeMs::new(i64::try_from(ms)?)?;
-        if let View::Globe { lon_deg, .. } = &mut job.view {
+        Ok(TimeMs::new(i64::try_from(ms)?)?)
+    }
+
+    /// The job of a picture.
+    pub(super) fn job(&self, number: u32) -> Result<RenderJob> {
+        let mut view = self.view;
+        if let View::Globe { lon_deg, .. } = &mut view {
             let turned = *lon_deg + self.turn_deg * f64::from(number) / f64::from(self.count);
             // A camera that does not move keeps its longitude to the bit.
             if self.turn_deg != 0.0 {
                 *lon_deg = (turned + 180.0).rem_euclid(360.0) - 180.0;
             }
         }
-        job.validate()?;
+        let (accumulated, time) = (self.accumulated.as_ref(), self.time(number)?);
+        let job = RenderJob::of(&self.product, accumulated, time, self.mode, view, self.style)?;
         Ok(job)
     }
 }

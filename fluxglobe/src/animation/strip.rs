@@ -22,7 +22,7 @@ impl Strip {
         let begun = super::encoder::begun(path)?;
         let file =
             File::create(&begun).with_context(|| format!("cannot write {}", begun.display()))?;
-        let size_px = shots.first.view.size_px();
+        let size_px = shots.view.size_px();
         let mut encoder = Encoder::new(BufWriter::new(file), size_px[0], size_px[1]);
         encoder.set_color(ColorType::Rgba);
         encoder.set_depth(BitDepth::Eight);

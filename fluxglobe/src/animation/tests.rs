@@ -3,14 +3,53 @@
 use std::path::Path;
 
 use contract::colour::TransferFunction;
-use contract::job::{Mode, RENDERER_VERSION, RenderJob, Style, View};
+use contract::digest::Digest;
+use contract::grid::Grid;
+use contract::job::{Mode, Style, View};
+use contract::key::ObjectKey;
+use contract::manifest::{MANIFEST_SCHEMA, Manifest, Step};
+use contract::product::ProductId;
 use contract::quantity::Quantity;
+use contract::time::Period;
 use render_worker::Image;
 
 use super::encoder::{Container, Encoder};
 use super::folder::Folder;
 use super::shots::Shots;
 use super::strip::Strip;
+
+/// The twelve months of 2000 on a grid of one cell.
+fn product() -> Manifest {
+    let product: ProductId = "made-up".parse().unwrap();
+    let step = |month| Step {
+        period: Period::month(2000, month).unwrap(),
+        frame: ObjectKey::frame(&product, &Digest::of(&[month as u8])),
+        raw_sha256: Digest::of(b"file"),
+        origin: "file.nc".into(),
+        valid_cells: 1,
+    };
+    Manifest {
+        schema: MANIFEST_SCHEMA,
+        number: 1,
+        title: String::new(),
+        quantity: Quantity::CarbonFlux,
+        synthetic: true,
+        source: String::new(),
+        grid: Grid {
+            rows: 1,
+            cols: 1,
+            north_deg: 1.0,
+            west_deg: 0.0,
+            dlat_deg: 1.0,
+            dlon_deg: 1.0,
+        },
+        steps: (1..=12).map(step).collect(),
+        domain: ObjectKey::domain(&product, &Digest::of(b"domain")),
+        series: vec![],
+        derived_from: None,
+        product,
+    }
+}
 
 fn shots(count: u32) -> Shots {
     let view = View::Globe {
@@ -21,15 +60,12 @@ fn shots(count: u32) -> Shots {
         height_px: 4,
     };
     Shots {
-        first: RenderJob {
-            renderer_version: RENDERER_VERSION,
-            product: "made-up@1-00000000".parse().unwrap(),
-            accumulated: None,
-            time: "2000-01-01".parse().unwrap(),
-            mode: Mode::Volume,
-            view,
-            style: Style::with_transfer(TransferFunction::default_for(Quantity::CarbonFlux)),
-        },
+        product: product(),
+        accumulated: None,
+        from: "2000-01-01".parse().unwrap(),
+        mode: Mode::Volume,
+        view,
+        style: Style::with_transfer(TransferFunction::default_for(Quantity::CarbonFlux)),
         to: "2001-01-01".parse().unwrap(),
         fps: 25,
         count,
@@ -52,10 +88,11 @@ fn picture(number: u32) -> Image {
 fn instants_divide_the_span_and_a_whole_turn_closes_to_a_ring() {
     let shots = shots(366);
     let job = |number| shots.job(number).unwrap();
-    assert_eq!(job(0).time.to_string(), "2000-01-01T00:00:00Z");
+    let time = |number| shots.time(number).unwrap().to_string();
+    assert_eq!(time(0), "2000-01-01T00:00:00Z");
     // 2000 has 366 days: a picture a day, and the last one is not the first of the next year.
-    assert_eq!(job(31).time.to_string(), "2000-02-01T00:00:00Z");
-    assert_eq!(job(365).time.to_string(), "2000-12-31T00:00:00Z");
+    assert_eq!(time(31), "2000-02-01T00:00:00Z");
+    assert_eq!(time(365), "2000-12-31T00:00:00Z");
     let lon = |number: u32| match job(number).view {
         View::Globe { lon_deg, .. } => lon_deg,
         View::Tile { .. } => panic!("a globe view"),
@@ -84,7 +121,7 @@ fn too_many_pictures_and_too_many_pixels_are_refused() {
         width_px,
         height_px,
         ..
-    } = &mut many.first.view
+    } = &mut many.view
     {
         (*width_px, *height_px) = (4096, 4096);
     }

@@ -48,7 +48,7 @@ pub(crate) struct ObservationsAsked {
     /// JSON instead of a table, a line each.
     #[arg(long)]
     pub(crate) json: bool,
-    #[command(flatten)]
+    #[command(flatten, next_help_heading = "PostGIS")]
     pub(crate) store: observations::ObservationSettings,
 }
 

@@ -27,9 +27,9 @@ pub(crate) struct Ingestd {
     /// Address of /healthz, /readyz and /metrics.
     #[arg(long, env = "FLUXGLOBE_ADMIN", default_value = "127.0.0.1:9101")]
     pub(crate) admin: SocketAddr,
-    #[command(flatten)]
+    #[command(flatten, next_help_heading = "Kafka")]
     pub(crate) kafka: kafka_log::KafkaSettings,
-    #[command(flatten)]
+    #[command(flatten, next_help_heading = "PostGIS")]
     pub(crate) observations: observations::ObservationSettings,
     #[command(flatten)]
     pub(crate) ingest: ingest::ServiceSettings,
@@ -43,7 +43,7 @@ pub(crate) struct Scheduler {
     /// Address of /healthz, /readyz and /metrics.
     #[arg(long, env = "FLUXGLOBE_ADMIN", default_value = "127.0.0.1:9102")]
     pub(crate) admin: SocketAddr,
-    #[command(flatten)]
+    #[command(flatten, next_help_heading = "Kafka")]
     pub(crate) kafka: kafka_log::KafkaSettings,
     #[command(flatten)]
     pub(crate) ballista: compute::service::SchedulerSettings,
@@ -69,7 +69,7 @@ pub(crate) struct RenderWorker {
     /// Address of /healthz, /readyz and /metrics.
     #[arg(long, env = "FLUXGLOBE_ADMIN", default_value = "127.0.0.1:9104")]
     pub(crate) admin: SocketAddr,
-    #[command(flatten)]
+    #[command(flatten, next_help_heading = "Kafka")]
     pub(crate) kafka: kafka_log::KafkaSettings,
     #[command(flatten)]
     pub(crate) render: render_worker::server::Settings,
@@ -80,13 +80,13 @@ pub(crate) struct RenderWorker {
 pub(crate) struct TileServer {
     #[command(flatten)]
     pub(crate) common: Common,
-    #[command(flatten)]
+    #[command(flatten, next_help_heading = "Kafka")]
     pub(crate) kafka: kafka_log::KafkaSettings,
-    #[command(flatten)]
+    #[command(flatten, next_help_heading = "PostGIS")]
     pub(crate) observations: observations::ObservationSettings,
-    #[command(flatten)]
+    #[command(flatten, next_help_heading = "Render workers")]
     pub(crate) fleet: render_worker::fleet::FleetSettings,
-    #[command(flatten)]
+    #[command(flatten, next_help_heading = "Server")]
     pub(crate) serve: tile_server::config::Settings,
 }
 
@@ -108,7 +108,7 @@ pub(crate) struct Notice {
     /// Print the notices, a line each, instead of sending them: for a Kafka client of your own.
     #[arg(long)]
     pub(crate) print: bool,
-    #[command(flatten)]
+    #[command(flatten, next_help_heading = "Kafka")]
     pub(crate) kafka: kafka_log::KafkaSettings,
 }
 
@@ -120,7 +120,7 @@ pub(crate) enum Topics {
         /// Copies of each partition, no more than there are brokers.
         #[arg(long, default_value = "1")]
         replication: NonZeroU16,
-        #[command(flatten)]
+        #[command(flatten, next_help_heading = "Kafka")]
         kafka: kafka_log::KafkaSettings,
     },
 }
@@ -133,7 +133,7 @@ pub(crate) enum Rejected {
         /// JSON instead of a table.
         #[arg(long)]
         json: bool,
-        #[command(flatten)]
+        #[command(flatten, next_help_heading = "Kafka")]
         kafka: kafka_log::KafkaSettings,
     },
     /// Send refused messages again, with the next attempt's number.
@@ -141,7 +141,7 @@ pub(crate) enum Rejected {
         /// Origins as `list` shows them, TOPIC/PARTITION/OFFSET; all of them if none is given.
         #[arg(value_name = "ORIGIN")]
         origins: Vec<Origin>,
-        #[command(flatten)]
+        #[command(flatten, next_help_heading = "Kafka")]
         kafka: kafka_log::KafkaSettings,
     },
 }
@@ -155,6 +155,8 @@ pub(crate) enum Bench {
     Quality(BenchQuality),
     /// How far two pictures are apart: decibels, levels, bytes, FLIP.
     Compare(BenchCompare),
+    /// Gap filling on this machine's Vulkan device: every form, small grids first.
+    Fill(super::BenchFill),
 }
 
 /// `fluxglobe bench stream`.
@@ -172,6 +174,6 @@ pub(crate) struct BenchStream {
     /// JSON instead of a table.
     #[arg(long)]
     pub(crate) json: bool,
-    #[command(flatten)]
+    #[command(flatten, next_help_heading = "Kafka")]
     pub(crate) kafka: kafka_log::KafkaSettings,
 }

@@ -15,7 +15,8 @@ pub(crate) enum RecomputeWhat {
     Statistics,
     /// Sums that budgets of named regions are made of.
     Budget,
-    /// Accumulated frames and their series.
+    /// Frames and series of the files themselves, read anew from the store where decoder or profile have changed since;
+    /// and the accumulated ones that follow from them.
     Frames,
     /// Volume tiles.
     Tiles,
@@ -54,6 +55,25 @@ pub(crate) struct Recompute {
         default_value = "statistics,budget,frames,tiles"
     )]
     pub(crate) what: Vec<RecomputeWhat>,
+    /// Name of a profile or a profile file (TOML) to read the files by, if not the one of the name that they were read by
+    /// before.
+    #[arg(long, value_name = "NAME|FILE")]
+    pub(crate) profile: Option<String>,
+    /// Folder of profiles of your own (*.toml), beside those of the program.
+    #[arg(long, env = "FLUXGLOBE_PROFILES", value_name = "FOLDER")]
+    pub(crate) profiles: Option<PathBuf>,
+    /// Folder for files while they are read anew; made if absent, emptied of what a killed process left.
+    #[arg(
+        long,
+        env = "FLUXGLOBE_SPOOL",
+        default_value = "/var/tmp/fluxglobe-spool",
+        value_name = "FOLDER"
+    )]
+    pub(crate) spool: PathBuf,
+    /// Files that are read anew at the same time, 1 to 64.
+    #[arg(long, env = "FLUXGLOBE_PARALLEL_FILES", default_value_t = 2,
+          value_parser = clap::value_parser!(u16).range(1..=64))]
+    pub(crate) parallel_files: u16,
     /// Deepest zoom level of tiles, 0 to 6.
     #[arg(long, default_value = "2", value_parser = clap::value_parser!(u8).range(0..=6))]
     pub(crate) zoom: u8,
@@ -66,7 +86,7 @@ pub(crate) struct Recompute {
     /// The plan as JSON.
     #[arg(long)]
     pub(crate) json: bool,
-    #[command(flatten)]
+    #[command(flatten, next_help_heading = "Kafka")]
     pub(crate) kafka: kafka_log::KafkaSettings,
 }
 

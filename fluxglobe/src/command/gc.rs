@@ -1,4 +1,5 @@
-//! `fluxglobe gc`: objects that no kept version needs; listed, and removed unless only asked about.
+//! `fluxglobe gc`: objects that no kept version needs and files of killed writers; listed, and removed unless only asked
+//! about.
 
 use std::time::Duration;
 
@@ -16,21 +17,24 @@ pub(crate) async fn run(settings: &Settings, options: &Gc) -> Result<()> {
         age: Duration::from_hours(24) * u32::from(options.keep_days),
     };
     let plan = gc::plan(&store, keep, notice::now()?).await?;
-    let size_bytes: u64 = plan.garbage.iter().map(|garbage| garbage.size_bytes).sum();
     for garbage in &plan.garbage {
         progress::result(&format!("{} {}", garbage.key, garbage.size_bytes))?;
     }
+    for leftover in &plan.leftovers {
+        progress::result(&format!("{} {}", leftover.path, leftover.size_bytes))?;
+    }
     let summary = format!(
-        "{} objects, {:.1} MB; {} stay",
+        "{} objects, {} half-written files, {:.1} MB; {} stay",
         plan.garbage.len(),
-        size_bytes as f64 / 1e6,
+        plan.leftovers.len(),
+        plan.size_bytes() as f64 / 1e6,
         plan.kept_count
     );
     if options.dry_run {
         progress::say(&format!("would remove {summary}"));
         return Ok(());
     }
-    let bar = progress::bar("remove", plan.garbage.len() as u64);
+    let bar = progress::bar("remove", plan.count() as u64);
     gc::run(&store, &plan, keep, &|done| bar.set_position(done as u64)).await?;
     progress::done(&bar, &summary);
     Ok(())

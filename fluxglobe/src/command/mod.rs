@@ -2,6 +2,7 @@
 
 mod budget;
 pub(crate) mod derive;
+mod fill_error;
 mod gc;
 pub(crate) mod generate;
 mod ingest;
@@ -20,7 +21,7 @@ use std::process::ExitCode;
 
 use anyhow::Result;
 
-use crate::cli::{Bench, Command, Settings, Stats};
+use crate::cli::{Bench, Command, ProductsOf, Settings, Stats};
 use crate::{bench, demo, deployment, services};
 
 /// Runs a command; the exit code says whether every part of it succeeded.
@@ -28,7 +29,10 @@ pub(crate) async fn run(settings: &Settings, command: Command) -> Result<ExitCod
     match command {
         Command::Demo(options) => return demo::run(settings, options).await,
         Command::Ingest(options) => return ingest::run(settings, options).await,
-        Command::Products(options) => products::run(settings, &options).await?,
+        Command::Products(options) => match &options.of {
+            Some(ProductsOf::FillError(options)) => fill_error::run(settings, options).await?,
+            None => products::run(settings, &options).await?,
+        },
         Command::Stats(Stats::Point(options)) => stats::point(settings, &options).await?,
         Command::Budget(options) => budget::run(settings, &options).await?,
         Command::Derive(options) => derive::run(settings, options).await?,
@@ -56,6 +60,7 @@ pub(crate) async fn run(settings: &Settings, command: Command) -> Result<ExitCod
         }
         Command::Bench(Bench::Quality(options)) => bench::quality::run(settings, options).await?,
         Command::Bench(Bench::Compare(options)) => bench::compare::run(&options)?,
+        Command::Bench(Bench::Fill(options)) => bench::fill::run(&options)?,
         Command::Generate(options) => generate::run(options)?,
         Command::DecodeFile { .. } => unreachable!("main runs the decoder before anything else"),
     }

@@ -1,5 +1,8 @@
-//! `fluxglobe recompute`: what of a product's derived things is stale or missing in a period; shown, then made, once.
+//! `fluxglobe recompute`: what of a product is stale or missing in a period; shown, then made, once.
+//!
+//! In the order in which one follows from the other: files read anew, what is computed from their frames, tiles.
 
+mod files;
 mod tiles;
 
 use anyhow::Result;
@@ -7,7 +10,9 @@ use comfy_table::Table;
 use comfy_table::presets::NOTHING;
 use compute::recompute::{Plan, Reason, Request, What};
 use contract::event::Event;
+use contract::quantity::Quantity;
 use serde::Serialize;
+use storage::Store;
 
 use crate::cli::{Recompute, RecomputeWhat, Settings};
 use crate::{deployment, progress};
@@ -17,6 +22,7 @@ use crate::{deployment, progress};
 struct Shown<'a> {
     #[serde(flatten)]
     plan: &'a Plan,
+    files: Option<&'a ingest::reread::Plan>,
     tiles_missing: usize,
     tiles_there: usize,
 }
@@ -24,30 +30,31 @@ struct Shown<'a> {
 pub(crate) async fn run(settings: &Settings, options: Recompute) -> Result<()> {
     let store = deployment::store(settings)?;
     deployment::manifest(&store, &options.product, &settings.data).await?;
-    let request = Request {
-        product: options.product.clone(),
-        from: options.from,
-        to: options.to,
-        what: options
-            .what
-            .iter()
-            .filter_map(|what| what.computed())
-            .collect(),
-        is_forced: options.force,
+    let with_frames = options.what.contains(&RecomputeWhat::Frames);
+    let files = if with_frames {
+        Some(files::Files::plan(&store, &options).await?)
+    } else {
+        None
     };
-    let plan = compute::recompute::plan(&store, &request).await?;
+    let plan = plan(settings, &store, &options).await?;
     let with_tiles = options.what.contains(&RecomputeWhat::Tiles);
     let wanted = if with_tiles {
         tiles::plan(&store, &options).await?
     } else {
         tiles::Tiles::default()
     };
-    show(&plan, &wanted, options.json)?;
+    let files_plan = files.as_ref().map(|files| &files.plan);
+    show(&plan, files_plan, &wanted, options.json)?;
     if options.dry_run {
         progress::say("nothing was done: --dry-run");
         return Ok(());
     }
     let log = deployment::log(settings, &options.kafka).await?;
+    if let Some(files) = &files {
+        files.read(&store, log.as_deref()).await?;
+    }
+    // Planned anew: what was read just now makes stale what follows from it.
+    let plan = self::plan(settings, &store, &options).await?;
     if !plan.items.is_empty() {
         let bar = progress::bar("recompute", plan.items.len() as u64);
         let engine = deployment::engine(settings, store.clone())?;
@@ -72,10 +79,33 @@ pub(crate) async fn run(settings: &Settings, options: Recompute) -> Result<()> {
     Ok(())
 }
 
-fn show(plan: &Plan, tiles: &tiles::Tiles, json: bool) -> Result<()> {
+/// What is to be computed. Only carbon fluxes accumulate; frames of other quantities are those of their files alone.
+async fn plan(settings: &Settings, store: &Store, options: &Recompute) -> Result<Plan> {
+    let manifest = deployment::manifest(store, &options.product, &settings.data).await?;
+    let is_flux = manifest.quantity == Quantity::CarbonFlux;
+    let computed = options.what.iter().filter_map(|what| what.computed());
+    let request = Request {
+        product: options.product.clone(),
+        from: options.from,
+        to: options.to,
+        what: computed
+            .filter(|what| is_flux || *what != What::Frames)
+            .collect(),
+        is_forced: options.force,
+    };
+    Ok(compute::recompute::plan(store, &request).await?)
+}
+
+fn show(
+    plan: &Plan,
+    files: Option<&ingest::reread::Plan>,
+    tiles: &tiles::Tiles,
+    json: bool,
+) -> Result<()> {
     if json {
         let shown = Shown {
             plan,
+            files,
             tiles_missing: tiles.missing.len(),
             tiles_there: tiles.there,
         };
@@ -84,6 +114,9 @@ fn show(plan: &Plan, tiles: &tiles::Tiles, json: bool) -> Result<()> {
     let mut table = Table::new();
     table.load_preset(NOTHING);
     table.set_header(["what", "missing", "stale", "forced"]);
+    if let Some(files) = files {
+        table.add_row(files::row(files));
+    }
     for (name, what) in [
         ("frames", What::Frames),
         ("statistics", What::Statistics),
@@ -113,7 +146,15 @@ fn show(plan: &Plan, tiles: &tiles::Tiles, json: bool) -> Result<()> {
     progress::say(&format!(
         "for {}; {} are right as they are",
         plan.manifest,
-        plan.fresh_count + tiles.there
+        plan.fresh_count + tiles.there + files.map_or(0, |files| files.fresh_count)
     ));
+    if let Some(files) = files.filter(|files| !files.items.is_empty()) {
+        progress::say(&format!(
+            "{} files are read anew ({} of them have been, and wait for the others); what follows from their frames is \
+             planned after that",
+            files.items.len(),
+            files.items.len() - files.unread_count()
+        ));
+    }
     Ok(())
 }

@@ -2,9 +2,10 @@
 
 use anyhow::{Context as _, Result};
 use contract::colour::TransferFunction;
-use contract::job::{RENDERER_VERSION, RenderJob, Style, View};
+use contract::job::{RenderJob, Style, View};
 use contract::manifest::Manifest;
 use contract::tile::Tile;
+use contract::time::Period;
 use storage::Store;
 
 use crate::cli::{Picture, Render, RenderGlobe, Settings};
@@ -62,31 +63,46 @@ pub(crate) async fn job(
     picture: &Picture,
     view: View,
 ) -> Result<RenderJob> {
-    let manifest = deployment::manifest(store, &picture.layer, &settings.data).await?;
+    let manifest = product(store, settings, picture).await?;
     let last = manifest.steps.last().context("the product has no step")?;
-    let mut style = Style::with_transfer(TransferFunction::default_for(manifest.quantity));
+    let style = style(&manifest, picture);
+    let time = picture.time.unwrap_or(last.period.mid());
+    if let Some(Period { start, end }) = manifest.extent()
+        && (time < start || time > end)
+    {
+        let shown = time.clamp(start, end);
+        progress::say(&format!(
+            "{} covers {start} to {end} and has nothing of {time}; shown is {shown}",
+            manifest.product
+        ));
+    }
+    let lift = accumulated(store, &manifest).await?;
+    let job = RenderJob::of(&manifest, lift.as_ref(), time, picture.mode, view, style)?;
+    Ok(job)
+}
+
+/// The newest version of a picture's product.
+pub(crate) async fn product(
+    store: &Store,
+    settings: &Settings,
+    picture: &Picture,
+) -> Result<Manifest> {
+    deployment::manifest(store, &picture.layer, &settings.data).await
+}
+
+/// The style that the options of a picture ask for.
+pub(crate) fn style(product: &Manifest, picture: &Picture) -> Style {
+    let mut style = Style::with_transfer(TransferFunction::default_for(product.quantity));
     style.slices = picture.slices.unwrap_or(style.slices);
     style.particles_per_cell = picture.particles.unwrap_or(style.particles_per_cell);
-    Ok(RenderJob {
-        renderer_version: RENDERER_VERSION,
-        product: manifest.id(),
-        accumulated: accumulated(store, &manifest).await?,
-        time: picture.time.unwrap_or(last.period.mid()),
-        mode: picture.mode,
-        view,
-        style,
-    })
+    style
 }
 
 /// Accumulated carbon of just this version of a product, if it was derived.
-pub(crate) async fn accumulated(
-    store: &Store,
-    manifest: &Manifest,
-) -> Result<Option<contract::manifest::ManifestId>> {
+pub(crate) async fn accumulated(store: &Store, manifest: &Manifest) -> Result<Option<Manifest>> {
     let Ok(product) = manifest.product.accumulated() else {
         return Ok(None);
     };
     let latest = storage::manifests::latest(store, &product).await?;
-    let derived = latest.filter(|derived| derived.derived_from == Some(manifest.id()));
-    Ok(derived.map(|derived| derived.id()))
+    Ok(latest.filter(|derived| derived.derived_from == Some(manifest.id())))
 }

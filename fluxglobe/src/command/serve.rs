@@ -15,7 +15,7 @@ use crate::ports::{Analyst, Drawer, Observer};
 use crate::{deployment, progress, viewer};
 
 pub(crate) async fn run(settings: &Settings, options: tile_server::config::Settings) -> Result<()> {
-    let store = deployment::store(settings)?;
+    let store = deployment::interactive_store(settings)?;
     let check = crate::demo::check::stored(&store).await?;
     let server = bind(settings, store, options, check).await?;
     announce(&server);
@@ -45,7 +45,10 @@ pub(crate) async fn bind(
         registry,
     )?
     .with_observations(Arc::new(Observer(Arc::new(FileStore::new(store)))));
-    Ok(Server::bind(&options, state).await?)
+    let server = Server::bind(&options, state.clone()).await?;
+    // The event log belongs to whoever lands: `fluxglobe ingest` beside this server. Ends with the server.
+    tokio::spawn(state.watch().run());
+    Ok(server)
 }
 
 /// Says where to look.

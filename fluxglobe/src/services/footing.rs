@@ -13,9 +13,6 @@ use storage::{StorageError, Store};
 use crate::cli::Settings;
 use crate::protocol;
 
-/// Version of this program.
-const VERSION: &str = env!("CARGO_PKG_VERSION");
-
 /// A service that lives and is not yet ready.
 pub(crate) struct Footing {
     pub(crate) registry: Registry,
@@ -37,7 +34,7 @@ impl Footing {
         parts: &[&'static str],
     ) -> Result<Self> {
         let stop = service::when_asked_to_stop()?;
-        let registry = service::admin::registry(service, VERSION)?;
+        let registry = service::admin::registry(service, protocol::PROGRAM)?;
         let board = Board::waiting_for(parts);
         let store_url = match &settings.store {
             Some(url) => url.clone(),
@@ -102,9 +99,6 @@ impl Footing {
 
     /// The event log on Kafka, once it is there with all its topics.
     pub(crate) async fn log(&self, kafka: &KafkaSettings) -> Result<Option<Arc<dyn EventLog>>> {
-        if kafka.kafka.is_none() {
-            bail!("give Kafka's brokers: --kafka or FLUXGLOBE_KAFKA, HOST:PORT[,HOST:PORT...]");
-        }
         let connect = || KafkaLog::connect(kafka);
         let there = until_there("event log", &self.stop, StorageError::is_retryable, connect).await;
         let Some(log) = there.context("the event log cannot be used")? else {

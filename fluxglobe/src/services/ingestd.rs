@@ -15,6 +15,8 @@ use crate::sink::Sink;
 pub(crate) async fn run(settings: &Settings, options: Ingestd) -> Result<()> {
     // What can be refused without asking anybody is refused before anything is waited for.
     let ingest = options.ingest.resolve(DecoderCommand::current()?)?;
+    options.kafka.check()?;
+    options.observations.database()?;
     let parts = ["store", "event log", "observations", "ingest"];
     let footing = Footing::take(settings, "ingestd", Some(options.admin), &parts).await?;
     let Some(store) = footing.store().await? else {

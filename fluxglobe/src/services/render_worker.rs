@@ -6,14 +6,19 @@ use render_worker::batch::BatchService;
 use render_worker::server::{Server, open_desk};
 
 use crate::cli::{RenderWorker, Settings};
+use crate::deployment;
 use crate::services::Footing;
 
 pub(crate) async fn run(settings: &Settings, options: RenderWorker) -> Result<()> {
+    // Settings and secrets are looked at before anything is waited for.
+    options.kafka.check()?;
     let parts = ["store", "renderer", "event log"];
     let footing = Footing::take(settings, "render-worker", Some(options.admin), &parts).await?;
-    let Some(store) = footing.store().await? else {
+    if footing.store().await?.is_none() {
         return footing.leave().await;
-    };
+    }
+    // Whoever asks for a picture is told within seconds that the store is away; the batch tries again by itself.
+    let store = deployment::open_interactive(footing.store_url())?;
     let backend = if settings.cpu {
         Backend::Cpu
     } else {

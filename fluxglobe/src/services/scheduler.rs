@@ -11,6 +11,8 @@ use crate::cli::Settings;
 use crate::services::Footing;
 
 pub(crate) async fn run(settings: &Settings, options: cli::Scheduler) -> Result<()> {
+    // Settings and secrets are looked at before anything is waited for.
+    options.kafka.check()?;
     let parts = ["store", "event log", "scheduler"];
     let footing = Footing::take(settings, "scheduler", Some(options.admin), &parts).await?;
     let Some(store) = footing.store().await? else {

@@ -6,7 +6,6 @@ use anyhow::Result;
 use compute::Engine;
 use kafka_log::KafkaSettings;
 use render_worker::fleet::Fleet;
-use storage::Store;
 use tile_server::{AppState, Server};
 
 use crate::cli::{Settings, TileServer};
@@ -15,10 +14,12 @@ use crate::services::Footing;
 use crate::{deployment, viewer};
 
 pub(crate) async fn run(settings: &Settings, options: TileServer) -> Result<()> {
+    // Settings and secrets are looked at before anything is waited for.
+    options.kafka.check()?;
     let footing = Footing::take(settings, "tile-server", None, &[]).await?;
     // Opening asks nobody: /healthz is answered while the store is waited for, and /readyz says so.
-    let store = Store::open(footing.store_url())?;
-    let fleet = Fleet::start(&options.fleet, store.clone(), &footing.registry)?;
+    let store = deployment::open_interactive(footing.store_url())?;
+    let fleet = Fleet::start(&options.fleet, &footing.registry)?;
     let measured = observations::open(&options.observations, &store)?;
     let analyst = Analyst {
         local: Engine::local(store.clone()),

@@ -79,7 +79,7 @@ fn default_fill(kind: Kind) -> Option<f64> {
     match kind {
         Kind::Integer(2) => Some(-32_767.0),
         Kind::Integer(4) => Some(-2_147_483_647.0),
-        Kind::Integer(_) | Kind::Unsigned(_) | Kind::Float(_) | Kind::Other => None,
+        Kind::Integer(_) | Kind::Unsigned(_) | Kind::Float(_) | Kind::Text(_) | Kind::Other => None,
     }
 }
 

@@ -101,9 +101,10 @@ fn answer(file: &mut DataFile, request: &Request, plane_cells: u64) -> Result<Ve
         .iter()
         .zip(&request.part)
         .filter(|(_, part)| **part == Part::All);
-    let cells = whole.fold(1u128, |n, (dimension, _)| {
-        n.saturating_mul(u128::from(dimension.len))
-    });
+    let cells = whole.fold(
+        u128::from(variable.numbers_a_value()),
+        |n, (dimension, _)| n.saturating_mul(u128::from(dimension.len)),
+    );
     if cells > u128::from(plane_cells) {
         let detail = format!("{cells} values at once, at most {plane_cells} are read");
         return Err(Rejection::new(RejectReason::TooLarge, name, detail));

@@ -14,6 +14,8 @@ pub(crate) const MAX_ATTRIBUTE_NUMBERS: usize = 1024;
 pub(crate) const MAX_ATTRIBUTE_TEXT_BYTES: usize = 4096;
 /// Longest name of a variable, dimension or attribute, bytes.
 pub(crate) const MAX_NAME_BYTES: usize = 256;
+/// Bytes of a text that are read: the longest name of a platform.
+pub(crate) const TEXT_BYTES: u8 = 64;
 /// Most dimensions of a variable (the limit of HDF5).
 pub(crate) const MAX_RANK: usize = 32;
 
@@ -60,7 +62,9 @@ pub(crate) enum Kind {
     Unsigned(u8),
     /// Floating point of this many bytes.
     Float(u8),
-    /// Text, compound or anything else that is no number.
+    /// Text; each value is read as this many numbers: its bytes and zeros behind them. One: letters.
+    Text(u8),
+    /// Compound or anything else that is neither number nor text.
     Other,
 }
 
@@ -148,7 +152,18 @@ impl Variable {
 
     /// Does it hold numbers?
     pub(crate) fn is_numeric(&self) -> bool {
-        self.kind != Kind::Other
+        matches!(
+            self.kind,
+            Kind::Integer(_) | Kind::Unsigned(_) | Kind::Float(_)
+        )
+    }
+
+    /// How many numbers one of its values is read as.
+    pub(crate) fn numbers_a_value(&self) -> u64 {
+        match self.kind {
+            Kind::Text(bytes) => u64::from(bytes),
+            Kind::Integer(_) | Kind::Unsigned(_) | Kind::Float(_) | Kind::Other => 1,
+        }
     }
 
     /// Is it a coordinate variable: one dimension of its own name (or, unnamed, one dimension at all)?

@@ -18,7 +18,7 @@ use super::corrupt;
 use super::description::{
     Attributes, Description, Dimension, Kind, MAX_NAME_BYTES, MAX_VARIABLES, Part, Variable,
 };
-use super::hdf5_attribute;
+use super::{hdf5_attribute, hdf5_text};
 use crate::rejection::Rejection;
 
 /// Decompressed chunks kept while a variable is read map by map, so that a chunk over many maps is unpacked once.
@@ -76,6 +76,14 @@ impl Hdf5File {
                 name,
                 format!("{} parts for {} dimensions", part.len(), shape.len()),
             ));
+        }
+        let kind = self.description.variable(name).map(|v| v.kind);
+        if let Some(Kind::Text(_)) = kind {
+            return if part.iter().all(|p| *p == Part::All) {
+                hdf5_text::read(name, &dataset)
+            } else {
+                Err(corrupt(name, "is text, which is read whole"))
+            };
         }
         if shape.is_empty() {
             return dataset
@@ -194,7 +202,8 @@ fn describe_dataset(
         Ok(TypeDescriptor::Integer(size)) => Kind::Integer(size as u8),
         Ok(TypeDescriptor::Unsigned(size)) => Kind::Unsigned(size as u8),
         Ok(TypeDescriptor::Float(size)) => Kind::Float(size as u8),
-        _ => Kind::Other,
+        Ok(other) => hdf5_text::kind(&other).unwrap_or(Kind::Other),
+        Err(_unknown) => Kind::Other,
     };
     let names = dimension_names(file, name, dataset, &attributes, shape.len());
     let dimensions = names

@@ -92,14 +92,14 @@ impl ExternalType {
 
     pub(super) fn size_bytes(self) -> u64 {
         match self {
-            Self::Char | Self::Number(Kind::Other) => 1,
+            Self::Char | Self::Number(Kind::Text(_) | Kind::Other) => 1,
             Self::Number(Kind::Integer(n) | Kind::Unsigned(n) | Kind::Float(n)) => u64::from(n),
         }
     }
 
     pub(super) fn kind(self) -> Kind {
         match self {
-            Self::Char => Kind::Other,
+            Self::Char => Kind::Text(1),
             Self::Number(kind) => kind,
         }
     }

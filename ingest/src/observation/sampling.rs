@@ -7,15 +7,13 @@ use super::coordinate::{MAX_VALUES, read, read_stored};
 use super::{Source, name};
 use crate::decoder::session::Session;
 use crate::error::Stop;
-use crate::file::description::{Description, Kind, Variable};
+use crate::file::description::{Description, Dimension, Kind, Part, Variable};
 use crate::rejection::Rejection;
 
 /// Most platforms of one file.
 const MAX_INSTANCES: u64 = 100_000;
 /// Most letters of one name.
 const MAX_LETTERS: u64 = 256;
-/// The format whose letters are numbers.
-const CLASSIC: &str = "NetCDF classic";
 
 /// Which samples belong to which platform.
 #[derive(Debug, Default)]
@@ -184,33 +182,35 @@ async fn names(
 ) -> Result<Vec<String>, Stop> {
     let (rows, letters) = match id.dimensions.as_slice() {
         [] => (1, 1),
+        // One dimension is that of the letters of a lone name, unless something measured has it too.
+        [one] if id.kind == Kind::Text(1) && !is_of_platforms(file, one) => (1, one.len),
         [one] => (one.len, 1),
-        [rows, letters] => (rows.len, letters.len),
+        [rows, letters] if id.kind == Kind::Text(1) => (rows.len, letters.len),
         _ => return Err(corrupt(&id.name, "has too many dimensions for names").into()),
     };
     if rows > MAX_INSTANCES || letters > MAX_LETTERS {
-        let detail = format!("names {rows} platforms, at most {MAX_INSTANCES} are read");
+        let detail = format!(
+            "names {rows} platforms with {letters} letters, at most {MAX_INSTANCES} with {MAX_LETTERS} are read"
+        );
         return Err(Rejection::new(RejectReason::TooLarge, &id.name, detail).into());
     }
-    let texts: Vec<String> = if id.kind != Kind::Other {
-        let numbers = read_stored(session, id).await?;
-        numbers.iter().map(ToString::to_string).collect()
-    } else if file.format == CLASSIC {
-        // A letter is a number; one dimension is that of the letters of a lone name.
-        let numbers = read_stored(session, id).await?;
-        let in_row = if id.dimensions.len() < 2 {
-            rows
-        } else {
-            letters
-        };
-        numbers
-            .chunks(usize::try_from(in_row.max(1)).unwrap_or(1))
-            .map(text)
-            .collect()
-    } else {
-        let detail = "names platforms by text, which is read from NetCDF classic only; name them by numbers, or \
-                      convert the file (nccopy -k classic)";
-        return Err(Rejection::new(RejectReason::Unreadable, &id.name, detail).into());
+    let texts: Vec<String> = match id.kind {
+        Kind::Integer(_) | Kind::Unsigned(_) | Kind::Float(_) => {
+            let numbers = read_stored(session, id).await?;
+            numbers.iter().map(ToString::to_string).collect()
+        }
+        // Without a platform or a letter there is nothing to read.
+        Kind::Text(_) if rows * letters == 0 => vec![],
+        Kind::Text(bytes) => {
+            let in_name = letters * u64::from(bytes);
+            let parts = vec![Part::All; id.dimensions.len()];
+            let numbers = session.read(&id.name, &parts, rows * in_name).await?;
+            numbers.chunks(in_name as usize).map(text).collect()
+        }
+        Kind::Other => {
+            let detail = "names platforms by neither numbers nor text; name them by one of these";
+            return Err(Rejection::new(RejectReason::Unreadable, &id.name, detail).into());
+        }
     };
     let named = |(index, text): (usize, String)| {
         name::platform(&text).unwrap_or_else(|| (index + 1).to_string())
@@ -218,14 +218,22 @@ async fn names(
     Ok(texts.into_iter().enumerate().map(named).collect())
 }
 
-/// A text from its bytes and the zeros behind them.
+/// Is a dimension one that numbers are given for?
+fn is_of_platforms(file: &Description, dimension: &Dimension) -> bool {
+    let mut numeric = file.variables.iter().filter(|v| v.is_numeric());
+    dimension.name.is_some() && numeric.any(|v| v.dimensions.contains(dimension))
+}
+
+/// A text from its bytes and the zeros behind them; a letter that was cut in two is left out.
 fn text(numbers: &[f64]) -> String {
     let bytes: Vec<u8> = numbers
         .iter()
         .map(|b| *b as u8)
         .take_while(|b| *b != 0)
         .collect();
-    String::from_utf8_lossy(&bytes).into_owned()
+    let text = String::from_utf8_lossy(&bytes);
+    text.trim_end_matches(char::REPLACEMENT_CHARACTER)
+        .to_owned()
 }
 
 /// The name of the one platform of a file without names.

@@ -164,7 +164,7 @@ pub(super) fn target(
             .or_else(|| product_name(&variable.name))
             .ok_or_else(unnamed)?,
         title: title.unwrap_or_else(|| quantity.title().to_owned()),
-        source: source.unwrap_or_else(|| "not stated in the file".to_owned()),
+        source: source.unwrap_or_else(|| "source not stated in the file".to_owned()),
         quantity,
         synthetic: marked,
         profile: None,

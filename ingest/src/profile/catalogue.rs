@@ -49,7 +49,10 @@ impl Profiles {
     }
 
     /// The profile of a name.
-    pub(crate) fn named(&self, name: &str) -> Result<Profile, IngestError> {
+    ///
+    /// # Errors
+    /// There is none; the names that there are.
+    pub fn named(&self, name: &str) -> Result<Profile, IngestError> {
         let found = self.iter().find(|profile| profile.name == name);
         found.cloned().ok_or_else(|| {
             let names: Vec<_> = self.iter().map(|p| p.name.as_str()).collect();

@@ -11,6 +11,7 @@ mod guarded;
 mod hostile;
 mod other_writers;
 mod real_files;
+mod reread;
 mod sandbox;
 mod service;
 mod survey;

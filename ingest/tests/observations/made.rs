@@ -128,7 +128,7 @@ const SST: &[(&str, &str)] = &[
 ];
 
 /// Platform, hour, longitude and value in degrees Celsius of each observation, sorted.
-fn seen(observations: &[Observation]) -> Vec<(String, i64, i64, i64)> {
+pub(crate) fn seen(observations: &[Observation]) -> Vec<(String, i64, i64, i64)> {
     let start: contract::time::TimeMs = "2000-01-01".parse().unwrap();
     let mut seen: Vec<_> = observations
         .iter()
@@ -402,24 +402,6 @@ async fn grids_and_other_texts_are_no_observations() {
         refusal(&folder.path().join("absent")).await.reason,
         RejectReason::Unreadable
     );
-}
-
-/// Two files of NetCDF-4, written by Python netCDF4 1.7: names as numbers and names as text.
-#[tokio::test]
-async fn netcdf_4_is_read_and_names_of_text_in_it_are_refused_with_advice() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/observations/files");
-    let found = observations(&folder.join("numbered.nc")).await;
-    let row = |name: &str, hour, lon, value| (name.to_owned(), hour, lon, value);
-    let expected = [
-        row("44005", 1, 100, 11),
-        row("44005", 2, 100, 12),
-        row("44006", 4, -160, 21),
-        row("44006", 5, -160, 22),
-    ];
-    assert_eq!(seen(&found), expected);
-    let rejection = refusal(&folder.join("named.nc")).await;
-    assert_eq!(rejection.reason, RejectReason::Unreadable, "{rejection}");
-    assert!(rejection.detail.contains("nccopy"), "{rejection}");
 }
 
 /// Every byte of a good file changed, and every length of it: a refusal or observations, never a crash or a hang.

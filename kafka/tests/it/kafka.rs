@@ -108,6 +108,44 @@ async fn what_was_never_committed_is_not_seen_and_counts_nowhere() {
     end(own).await;
 }
 
+/// A process that is killed within a transaction and never comes back holds up what follows until Kafka ends it for it. The
+/// broker of `deploy/services` looks for such every second, where Kafka's default is every ten.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_transaction_left_open_for_good_holds_readers_up_for_little_more_than_its_limit() {
+    const LIMIT: Duration = Duration::from_secs(2);
+    const LOOKED_FOR: Duration = Duration::from_secs(4);
+    let own = open().await;
+    let id = format!("{}killed", own.settings.kafka_topic_prefix);
+    let mut config = ClientConfig::new();
+    config.set("bootstrap.servers", own.settings.kafka.as_deref().unwrap());
+    config.set("transactional.id", id);
+    // The partition that our own keys go to.
+    config.set("partitioner", "murmur2_random");
+    config.set("transaction.timeout.ms", LIMIT.as_millis().to_string());
+    let producer: FutureProducer = config.create().unwrap();
+    producer.init_transactions(MOMENT * 50).unwrap();
+    producer.begin_transaction().unwrap();
+    let topic = topic(&own);
+    let never = notice("never").to_json();
+    let record = FutureRecord::to(&topic).key("p").payload(&never);
+    producer.send(record, MOMENT * 50).await.unwrap();
+    let begun = Instant::now();
+    own.log
+        .append(&[notice_of("seen", Some("p"))])
+        .await
+        .unwrap();
+    let mut reader = own.log.join(FROM, "g").await.unwrap();
+    assert_eq!(paths(&read(&mut *reader, 1).await), ["seen"]);
+    let took = begun.elapsed();
+    println!(
+        "read {:.1} s after the transaction was left open",
+        took.as_secs_f64()
+    );
+    assert!(took > LIMIT / 2, "nothing was held up: {took:?}");
+    assert!(took < LIMIT + LOOKED_FOR, "{took:?}");
+    end(own).await;
+}
+
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn three_members_that_come_and_go_finish_each_message_once() {
     let own = open().await;

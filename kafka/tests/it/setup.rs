@@ -96,6 +96,8 @@ async fn settings_that_cannot_work_are_refused_before_any_broker_is_asked() {
         refused.to_string().contains("--kafka-password-file"),
         "{refused}"
     );
+    let unasked = settings.check().unwrap_err();
+    assert_eq!(unasked.to_string(), refused.to_string());
 
     let mut settings = own_settings("192.0.2.1:9092");
     settings.kafka_security = Security::Ssl;
@@ -112,7 +114,7 @@ async fn settings_that_cannot_work_are_refused_before_any_broker_is_asked() {
         refusal(&settings)
             .await
             .to_string()
-            .contains("--kafka is needed")
+            .contains("--kafka (FLUXGLOBE_KAFKA) is needed")
     );
     assert!(start.elapsed() < Duration::from_secs(5));
 }

@@ -269,15 +269,24 @@ pub(crate) async fn the_longest_event_passes_and_a_longer_one_does_not(log: &dyn
     let too_long = Bytes::from(vec![b' '; MAX_EVENT_BYTES + 1]);
     let refused = log.append_message(FROM, "k", too_long).await.unwrap_err();
     assert!(!refused.is_retryable(), "{refused}");
+    let longer = notice(&"x".repeat(MAX_EVENT_BYTES - empty + 1));
+    // All or none: what stands before it is not appended either.
+    let refused = log.append(&[notice("before"), longer.clone()]).await;
+    let refused = refused.unwrap_err();
+    assert!(!refused.is_retryable(), "{refused}");
+    assert_eq!(contents(log, FROM).await.unwrap().len(), 1);
     let mut reader = log.join(FROM, "g").await.unwrap();
     let messages = read(&mut *reader, 1).await;
     assert_eq!(messages[0].event().unwrap(), longest);
-    // What follows may be as long.
-    let done = Finished {
+    // What follows may be as long, and no longer.
+    let done = |follows| Finished {
         origin: messages[0].origin,
-        follows: vec![longest.clone(), longest.clone()],
+        follows,
     };
-    reader.finish(vec![done]).await.unwrap();
+    let refused = reader.finish(vec![done(vec![longer])]).await.unwrap_err();
+    assert!(!refused.is_retryable(), "{refused}");
+    let follows = vec![longest.clone(), longest.clone()];
+    reader.finish(vec![done(follows)]).await.unwrap();
     assert_eq!(contents(log, FROM).await.unwrap().len(), 3);
 }
 

@@ -137,6 +137,10 @@ impl Connections {
                 "the database refuses the connection: {}",
                 words(&e)
             )),
+            PoolError::Backend(e) if is_distrusted(&e) => ObservationError::setup(format!(
+                "the database's certificate is not trusted ({}); give those it goes back to with --postgis-ca-file",
+                words(&e)
+            )),
             PoolError::Backend(e) => connection(words(&e)),
             other => connection(other.to_string()),
         })
@@ -200,4 +204,15 @@ fn is_refused(error: &tokio_postgres::Error) -> bool {
         SqlState::INSUFFICIENT_PRIVILEGE,
     ];
     error.code().is_some_and(|code| refusals.contains(code))
+}
+
+/// A certificate that goes back to none of ours, or is another host's: waiting does not help, and neither may the password
+/// be sent.
+fn is_distrusted(error: &tokio_postgres::Error) -> bool {
+    const VERIFY_FAILED: &str = "certificate verify failed";
+    let first: &(dyn std::error::Error + 'static) = error;
+    std::iter::successors(Some(first), |cause| cause.source())
+        .filter_map(|cause| cause.downcast_ref::<openssl::ssl::Error>()?.ssl_error())
+        .flat_map(|stack| stack.errors())
+        .any(|failed| failed.reason() == Some(VERIFY_FAILED))
 }

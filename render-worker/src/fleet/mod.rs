@@ -18,14 +18,12 @@ use bytes::Bytes;
 use contract::job::RenderJob;
 use futures::stream::{FuturesUnordered, StreamExt as _};
 use prometheus::{IntCounterVec, IntGaugeVec, Opts, Registry};
-use storage::Store;
 use tokio::time::Instant;
 
 use crate::desk::Origin;
 use crate::wire::Version;
 use crate::wire::proto::{DrawReply, DrawRequest, Origin as OriginCode};
 use member::Member;
-use place::Places;
 use refusals::Refusals;
 
 pub use address::{AddressError, HostPort, WorkerAddress};
@@ -46,7 +44,6 @@ pub struct Fleet {
 struct Inner {
     settings: FleetSettings,
     version: Version,
-    places: Places,
     /// By name, so that the order is the same everywhere.
     members: Mutex<BTreeMap<String, Arc<Member>>>,
     red: Red,
@@ -67,19 +64,14 @@ pub struct Picture {
 
 impl Fleet {
     /// A fleet with the workers of the settings, watched from now on. Needs a runtime.
-    pub fn start(
-        settings: &FleetSettings,
-        store: Store,
-        registry: &Registry,
-    ) -> Result<Self, FleetError> {
-        Self::start_as(Version::own(), settings, store, registry)
+    pub fn start(settings: &FleetSettings, registry: &Registry) -> Result<Self, FleetError> {
+        Self::start_as(Version::own(), settings, registry)
     }
 
     /// The same as if it were another version, for tests of how versions meet.
     pub fn start_as(
         version: Version,
         settings: &FleetSettings,
-        store: Store,
         registry: &Registry,
     ) -> Result<Self, FleetError> {
         let setup = |e: prometheus::Error| FleetError::Setup(e.to_string());
@@ -106,7 +98,6 @@ impl Fleet {
         let inner = Arc::new(Inner {
             settings: settings.clone(),
             version,
-            places: Places::new(store),
             members: Mutex::default(),
             red: Red::register(registry, "render_fleet").map_err(setup)?,
             tries,
@@ -158,15 +149,13 @@ impl Inner {
         let limit = self.settings.deadline();
         let deadline = Instant::now() + limit;
         let late = || FleetError::Late { deadline: limit };
-        let placed = tokio::time::timeout_at(deadline, self.places.of(job)).await;
-        let place = placed.map_err(|_elapsed| late())??;
         let request = DrawRequest {
             version: Some(self.version.clone().into()),
             job_json: serde_json::to_string(job)
                 .map_err(|e| FleetError::BadRequest(e.to_string()))?,
             trace: trace.to_owned(),
         };
-        let asking = self.ask(&place, &request, deadline);
+        let asking = self.ask(place::of(job), &request, deadline);
         let asked = tokio::time::timeout_at(deadline, asking).await;
         match asked {
             // The connection's own clock may run out a moment before this one.

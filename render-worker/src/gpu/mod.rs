@@ -3,10 +3,12 @@
 mod fault;
 mod kernel;
 mod recorder;
+mod stamps;
 mod workspace;
 
 pub use kernel::Kernel;
 pub use recorder::Recorder;
+pub use stamps::{Stamped, Stamps};
 pub use workspace::{Slot, Workspace};
 
 use bytemuck::Pod;
@@ -16,7 +18,11 @@ use crate::error::RenderError;
 use fault::FaultNote;
 
 /// Largest buffer asked for, also on devices that would give more: bounds what one job can take.
-const MOST_BUFFER_BYTES: u64 = 1 << 30;
+const MOST_BUFFER_BYTES: u64 = (2 << 30) - 4;
+
+/// Features that are used where a device has them; pictures are the same without.
+const WELCOME: wgpu::Features =
+    wgpu::Features::TIMESTAMP_QUERY.union(wgpu::Features::INDIRECT_FIRST_INSTANCE);
 
 /// A device with its queue. Shared by all threads.
 pub struct Gpu {
@@ -68,6 +74,8 @@ impl Gpu {
             .min(MOST_BUFFER_BYTES);
         let descriptor = wgpu::DeviceDescriptor {
             required_limits: limits,
+            // For measuring, and for the classic renderer that is measured beside.
+            required_features: adapter.features() & WELCOME,
             ..Default::default()
         };
         let (device, queue) = adapter
@@ -88,6 +96,23 @@ impl Gpu {
             is_software,
             fault,
         })
+    }
+
+    /// The device itself, for what has no verb here.
+    pub fn device(&self) -> &wgpu::Device {
+        &self.device
+    }
+
+    /// Its queue.
+    pub fn queue(&self) -> &wgpu::Queue {
+        &self.queue
+    }
+
+    /// Waits until everything submitted has run.
+    pub fn wait(&self) -> Result<(), RenderError> {
+        let waited = self.device.poll(wgpu::PollType::wait_indefinitely());
+        waited.map_err(|_stopped| RenderError::DeviceStopped { what: "drawing" })?;
+        self.check_fault("drawing")
     }
 
     /// Name of the adapter.
@@ -156,6 +181,17 @@ impl Gpu {
                 contents,
                 usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
             }))
+    }
+
+    /// A storage buffer of so many bytes, zero at first.
+    pub fn room(&self, label: &'static str, bytes: u64) -> Result<wgpu::Buffer, RenderError> {
+        self.check_size(label, bytes)?;
+        Ok(self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(label),
+            size: bytes.max(4),
+            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
+            mapped_at_creation: false,
+        }))
     }
 
     fn check_size(&self, what: &'static str, bytes: u64) -> Result<(), RenderError> {

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use bytemuck::Pod;
 
-use super::{Gpu, Kernel};
+use super::{Gpu, Kernel, Stamps};
 use crate::error::RenderError;
 
 /// Most workgroups in one dimension of a dispatch (the least any device allows).
@@ -17,7 +17,8 @@ const HUNG: Duration = Duration::from_mins(5);
 /// Commands that have not run yet.
 pub struct Recorder<'a> {
     gpu: &'a Gpu,
-    encoder: wgpu::CommandEncoder,
+    pub(super) encoder: wgpu::CommandEncoder,
+    stamps: Option<&'a Stamps>,
 }
 
 impl<'a> Recorder<'a> {
@@ -27,7 +28,23 @@ impl<'a> Recorder<'a> {
             encoder: gpu
                 .device
                 .create_command_encoder(&wgpu::CommandEncoderDescriptor::default()),
+            stamps: None,
         }
+    }
+
+    /// Passes recorded from here on tell when they begin and end.
+    pub fn stamp(&mut self, stamps: &'a Stamps) {
+        self.stamps = Some(stamps);
+    }
+
+    /// The list itself, for what has no verb here.
+    pub fn encoder(&mut self) -> &mut wgpu::CommandEncoder {
+        &mut self.encoder
+    }
+
+    /// Runs everything recorded, without waiting for it.
+    pub fn submit(self) -> wgpu::SubmissionIndex {
+        self.gpu.queue.submit([self.encoder.finish()])
     }
 
     /// Runs `kernel` on `groups` workgroups with these buffers at their binding numbers.
@@ -36,6 +53,16 @@ impl<'a> Recorder<'a> {
         kernel: &Kernel,
         buffers: &[(u32, &wgpu::Buffer)],
         groups: [u32; 2],
+    ) {
+        self.dispatch_deep(kernel, buffers, [groups[0], groups[1], 1]);
+    }
+
+    /// The same in three dimensions.
+    pub fn dispatch_deep(
+        &mut self,
+        kernel: &Kernel,
+        buffers: &[(u32, &wgpu::Buffer)],
+        groups: [u32; 3],
     ) {
         if groups.contains(&0) {
             return;
@@ -59,11 +86,18 @@ impl<'a> Recorder<'a> {
             .encoder
             .begin_compute_pass(&wgpu::ComputePassDescriptor {
                 label: Some(kernel.label),
-                timestamp_writes: None,
+                timestamp_writes: self.stamps.and_then(|stamps| {
+                    let (query_set, first) = stamps.of_pass(kernel.label)?;
+                    Some(wgpu::ComputePassTimestampWrites {
+                        query_set,
+                        beginning_of_pass_write_index: Some(first),
+                        end_of_pass_write_index: Some(first + 1),
+                    })
+                }),
             });
         pass.set_pipeline(&kernel.pipeline);
         pass.set_bind_group(0, &bindings, &[]);
-        pass.dispatch_workgroups(groups[0], groups[1], 1);
+        pass.dispatch_workgroups(groups[0], groups[1], groups[2]);
     }
 
     /// Runs `kernel` with one workgroup for every `size` of `count` items.

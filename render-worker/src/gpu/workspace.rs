@@ -4,6 +4,7 @@ use bytemuck::Pod;
 
 use super::Gpu;
 use crate::error::RenderError;
+use crate::stages::layout::Entry;
 
 /// What a buffer holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -11,13 +12,11 @@ pub enum Slot {
     Params,
     Rows,
     Cols,
-    Active,
     Palette,
     Axes,
     Value,
-    Accumulated,
-    Particles,
-    Splats,
+    Seen,
+    Lit,
     Light,
     Counts,
     BlockSums,
@@ -34,13 +33,11 @@ impl Slot {
             Self::Params => "params",
             Self::Rows => "rows",
             Self::Cols => "columns",
-            Self::Active => "active cells",
             Self::Palette => "palette",
             Self::Axes => "axes",
             Self::Value => "interpolated values",
-            Self::Accumulated => "interpolated carbon",
-            Self::Particles => "particles",
-            Self::Splats => "splats",
+            Self::Seen => "splats on the screen",
+            Self::Lit => "splats in the light",
             Self::Light => "light slices",
             Self::Counts => "list counts",
             Self::BlockSums => "scan sums",
@@ -55,6 +52,8 @@ impl Slot {
 #[derive(Default)]
 pub struct Workspace {
     buffers: [Option<wgpu::Buffer>; Slot::COUNT],
+    /// Whose content a slot holds, by [`Workspace::upload_once`].
+    owners: [u64; Slot::COUNT],
 }
 
 impl Workspace {
@@ -92,9 +91,33 @@ impl Workspace {
         content: &[T],
     ) -> Result<wgpu::Buffer, RenderError> {
         let bytes: &[u8] = bytemuck::cast_slice(content);
+        self.owners[slot as usize] = 0;
         let buffer = self.room(gpu, slot, bytes.len() as u64)?;
         gpu.queue.write_buffer(&buffer, 0, bytes);
         Ok(buffer)
+    }
+
+    /// The same, but for content that the slot still holds from `owner`, a number above 0 that stands for this content.
+    pub fn upload_once<T: Pod>(
+        &mut self,
+        gpu: &Gpu,
+        slot: Slot,
+        owner: u64,
+        content: &[T],
+    ) -> Result<wgpu::Buffer, RenderError> {
+        if self.owners[slot as usize] == owner
+            && let Some(buffer) = &self.buffers[slot as usize]
+        {
+            return Ok(buffer.clone());
+        }
+        let buffer = self.upload(gpu, slot, content)?;
+        self.owners[slot as usize] = owner;
+        Ok(buffer)
+    }
+
+    /// List entries there is room for.
+    pub fn entry_room(&self) -> u32 {
+        (self.room_bytes(Slot::Entries) / size_of::<Entry>() as u64) as u32
     }
 
     /// Bytes a slot has room for.

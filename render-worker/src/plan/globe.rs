@@ -10,7 +10,7 @@ use super::camera::{Camera, write};
 use super::look::{self, Look};
 use super::{Plan, area_m2, cell_px, entry_shift, height_range_m};
 use crate::scene::Scene;
-use crate::stages::layout::{Active, Col, Row, VIEW_GLOBE};
+use crate::stages::layout::{Col, Row, VIEW_GLOBE};
 
 /// Light texels along a side at most: 64 slices of them are 27 MB.
 const MOST_LIGHT_TEXELS: f64 = 320.0;
@@ -82,7 +82,7 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) {
     // What lies beyond the seen cap falls into the first or last slice, from where it shadows as it should.
     let half = slice_planes(plan, job, camera.up, sun, &cap(seen));
     light_frame(plan, &camera, sun, half, &cap(drawn));
-    choose_cells(plan, scene, camera.up, drawn);
+    choose_cells(plan, scene, &camera, drawn);
 }
 
 fn rows(scene: &Scene, look: &Look, camera: &Camera, particles: u32, style_depth: f64) -> Vec<Row> {
@@ -171,6 +171,16 @@ fn light_frame(plan: &mut Plan, camera: &Camera, sun: DVec3, half: DVec3, cap: &
     params.light_v0 = (camera.up.dot(axis_v) - reach) as f32;
     params.light_texels_per_unit = (1.0 / texel) as f32;
     params.light_depth_gain = (look::LIGHT_DEPTH * PI / 3.0 / (texel * texel)) as f32;
+    // The eye's own place in the light's axes and slices: what is as far from a place as a part of its distance lies
+    // that part of the way there.
+    let eye = camera.place;
+    let to_light = f64::from(LIGHT_UNIT) / texel;
+    let per_px = 1.0 / camera.focal_px;
+    params.toward_u = ((eye.dot(axis_u) - f64::from(params.light_u0)) * to_light * per_px) as f32;
+    params.toward_v = ((eye.dot(axis_v) - f64::from(params.light_v0)) * to_light * per_px) as f32;
+    let above_top = f64::from(params.slice_top) - eye.dot(half);
+    params.toward_slice = (above_top * f64::from(params.slices_per_unit) * per_px) as f32;
+    params.toward_pull = per_px as f32;
     write(
         axis_u,
         [
@@ -189,31 +199,28 @@ fn light_frame(plan: &mut Plan, camera: &Camera, sun: DVec3, half: DVec3, cap: &
     );
 }
 
-/// All cells of the domain within `horizon` of the point below the camera.
-fn choose_cells(plan: &mut Plan, scene: &Scene, up: DVec3, horizon: f64) {
+/// Fills the table of columns and sets the rows and the cap within `horizon` of the point below the camera.
+fn choose_cells(plan: &mut Plan, scene: &Scene, camera: &Camera, horizon: f64) {
     let grid = &scene.grid;
-    let nearest_cos = horizon.cos();
     let lon = |col: u32| (grid.col_west_deg(col) + 0.5 * grid.dlon_deg).to_radians();
     plan.cols = (0..grid.cols)
         .map(|col| Col {
             sin_lon: lon(col).sin() as f32,
             cos_lon: lon(col).cos() as f32,
+            index: col,
             ..Col::default()
         })
         .collect();
-    let domain = scene.domain.content();
-    for (row, table) in (0u32..).zip(&plan.rows) {
-        let (sin_lat, cos_lat) = (f64::from(table.sin_lat), f64::from(table.cos_lat));
-        for (col, slot) in (0u32..).zip(&plan.cols) {
-            let cell = row * grid.cols + col;
-            let center = DVec3::new(
-                cos_lat * f64::from(slot.sin_lon),
-                cos_lat * f64::from(slot.cos_lon),
-                sin_lat,
-            );
-            if domain[cell as usize] != 0 && center.dot(up) >= nearest_cos {
-                plan.active.push(Active { cell, slot: col });
-            }
-        }
-    }
+    plan.params.cap_least = (horizon.cos() * camera.place.length()) as f32;
+    plan.params.slot_count = grid.cols;
+    // Rows with a middle in the cap, one more on either side: the cap itself is tested cell by cell.
+    let below = camera.up.z.clamp(-1.0, 1.0).asin();
+    let is_near = |row: u32| {
+        let lat = f64::from(plan.rows[row as usize].sin_lat).asin();
+        (lat - below).abs() <= horizon + grid.dlat_deg.to_radians()
+    };
+    let first = (0..grid.rows).find(|&row| is_near(row));
+    let last = (0..grid.rows).rfind(|&row| is_near(row));
+    plan.params.first_row = first.unwrap_or(0);
+    plan.params.row_count = last.map_or(0, |row| row + 1) - plan.params.first_row;
 }

@@ -8,30 +8,42 @@ mod globe;
 mod look;
 mod tile;
 
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use contract::earth::Earth;
 use contract::grid::Grid;
 use contract::job::{Mode, RenderJob, View};
+use glam::Vec3;
 
 use crate::error::RenderError;
+use crate::passes::splat::{HALF_BYTES, workgroups};
 use crate::scene::{Interval, Scene};
 use crate::stages::layout::{
-    Active, Axis, Col, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, Params, Particle, Row,
-    SCREEN_TILE_PX, SUBPIXELS, Splat,
+    Active, Axis, Col, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, Params, Row, SCREEN_TILE_PX, SQUARE,
+    SUBPIXELS, VIEW_TILE,
 };
 use look::Look;
 
-/// Most particles of one picture.
-const MOST_PARTICLES: u64 = 1 << 24;
+/// 0 stands for no plan.
+static NEXT_ID: AtomicU64 = AtomicU64::new(1);
+
+/// Most particles of one picture, those of cells without data included.
+const MOST_PARTICLES: u64 = 1 << 27;
 /// Largest part of a picture drawn at once, pixels a side; a multiple of the screen tile.
-const PART_PX: u32 = 1024;
+const PART_PX: u32 = 2048;
+/// Particles that one invocation makes, unless cells hold fewer: neighbours share sums, more of them share better.
+const PARTICLES_EACH: u32 = 4;
 
 /// Everything the stages need for one picture.
 #[derive(Debug, Clone)]
 pub struct Plan {
+    /// Different for every plan made by this process; what is copied is the same.
+    pub id: u64,
     pub mode: Mode,
     pub params: Params,
     pub rows: Vec<Row>,
     pub cols: Vec<Col>,
+    /// The cells to draw, listed for the twins; devices find them by themselves.
     pub active: Vec<Active>,
     pub axes: Vec<Axis>,
     pub palette: Vec<u32>,
@@ -46,8 +58,19 @@ pub struct Part {
 }
 
 impl Plan {
-    /// The plan of a valid job; `most_buffer_bytes` is what the device can hold in one buffer.
+    /// The plan of a valid job with the list of its cells; `most_buffer_bytes` is the largest buffer to be filled.
     pub fn new(
+        job: &RenderJob,
+        scene: &Scene,
+        most_buffer_bytes: u64,
+    ) -> Result<Self, RenderError> {
+        let mut plan = Self::for_device(job, scene, most_buffer_bytes)?;
+        plan.list_cells(scene);
+        Ok(plan)
+    }
+
+    /// The same without the list; quick, whatever the size of the grid.
+    pub fn for_device(
         job: &RenderJob,
         scene: &Scene,
         most_buffer_bytes: u64,
@@ -56,6 +79,7 @@ impl Plan {
         scene.validate()?;
         let size_px = job.view.size_px();
         let mut plan = Self {
+            id: NEXT_ID.fetch_add(1, Ordering::Relaxed),
             mode: job.mode,
             params: common(job, scene),
             rows: vec![],
@@ -74,15 +98,31 @@ impl Plan {
     }
 
     fn count_particles(&mut self, most_buffer_bytes: u64) -> Result<(), RenderError> {
-        let largest = size_of::<Particle>().max(size_of::<Splat>()) as u64;
-        let limit = MOST_PARTICLES.min(most_buffer_bytes / largest);
-        let count = self.active.len() as u64 * u64::from(self.params.particles_per_cell);
+        let params = &mut self.params;
+        params.particles_each = params.particles_per_cell.clamp(1, PARTICLES_EACH);
+        let groups: u64 = workgroups(params).into_iter().map(u64::from).product();
+        let count = groups * u64::from(SQUARE * SQUARE * params.particles_each);
+        let limit = MOST_PARTICLES.min(most_buffer_bytes / HALF_BYTES);
         if count > limit {
             return Err(RenderError::TooManyParticles { count, limit });
         }
-        self.params.active_count = self.active.len() as u32;
-        self.params.particle_count = count as u32;
+        params.splat_count = count as u32;
         Ok(())
+    }
+
+    /// Lists the cells of the domain that a device would visit, by the rule of `splat.wgsl`.
+    fn list_cells(&mut self, scene: &Scene) {
+        let params = &self.params;
+        let domain = scene.domain.content();
+        let rows = params.first_row..params.first_row + params.row_count;
+        for row in rows {
+            for (slot, col) in (0..).zip(&self.cols) {
+                let cell = row * params.cols + col.index;
+                if domain[cell as usize] != 0 && is_in_cap(params, &self.rows[row as usize], col) {
+                    self.active.push(Active { cell, slot });
+                }
+            }
+        }
     }
 
     /// The picture cut into parts that are drawn at once, in reading order.
@@ -96,6 +136,14 @@ impl Plan {
         starts(height)
             .flat_map(|y| starts(width).map(move |x| part(x, y)))
             .collect()
+    }
+
+    /// The whole picture as one part.
+    pub fn whole(&self) -> Part {
+        Part {
+            origin_px: [0, 0],
+            size_px: self.size_px,
+        }
     }
 
     /// Parameters for drawing one part.
@@ -219,6 +267,17 @@ fn height_range_m(job: &RenderJob, scene: &Scene) -> [f64; 2] {
 fn entry_shift(widest_px: f64) -> u32 {
     let farthest_sub = (widest_px + 2.0 * f64::from(SCREEN_TILE_PX)) * f64::from(SUBPIXELS);
     (farthest_sub / f64::from(i16::MAX)).max(1.0).log2().ceil() as u32
+}
+
+/// Is a cell near enough to the place below the camera to be seen, or to shadow what is seen?
+fn is_in_cap(params: &Params, row: &Row, col: &Col) -> bool {
+    let center = Vec3::new(
+        row.cos_lat * col.sin_lon,
+        row.cos_lat * col.cos_lon,
+        row.sin_lat,
+    );
+    params.view == VIEW_TILE
+        || center.dot(Vec3::new(params.eye_x, params.eye_y, params.eye_z)) >= params.cap_least
 }
 
 /// Area of the cells of every row, m².

@@ -11,7 +11,8 @@ use contract::tile::{MAX_LAT_DEG, Tile, mercator_lat_deg, mercator_x, mercator_y
 use super::look::{self, Look};
 use super::{Plan, area_m2, cell_px, entry_shift, height_range_m};
 use crate::scene::Scene;
-use crate::stages::layout::{Active, Axis, Col, Row, SUBPIXELS, VIEW_TILE};
+use crate::stages::light::FARTHEST_LOOK;
+use crate::stages::layout::{Axis, Col, Row, SUBPIXELS, VIEW_TILE};
 
 /// Smallest light texel, pixels: finer than the screen is of no use.
 const LEAST_TEXEL_PX: f64 = 1.5;
@@ -167,6 +168,10 @@ fn light_and_reach(
         -azimuth.sin() / elevation.tan() * per_m,
         azimuth.cos() / elevation.tan() * per_m,
     ];
+    // The eye looks straight down once height is drawn as a way north: a pixel towards it is a pixel of height, above
+    // ground that lies as much farther south.
+    let toward_eye =
+        [shadow_per_m[0], shadow_per_m[1] + look::OBLIQUE * per_m].map(|shift| shift / level.px_per_m);
     let texel_px = (look::TEXEL_PER_RADIUS * radius_px).max(LEAST_TEXEL_PX);
     let unit = (texel_px * subpixels).round();
     let mut origin = [0; 2];
@@ -174,6 +179,9 @@ fn light_and_reach(
     let mut reach = [[0.0; 2]; 2];
     for axis in 0..2 {
         let lit = shift(seen[axis], shadow_per_m[axis]);
+        // Clouds look their light up so far from their centres.
+        let looked = FARTHEST_LOOK * widest * toward_eye[axis].abs();
+        let lit = [lit[0] - looked, lit[1] + looked];
         let absolute = level.origin_px[axis] * subpixels;
         let base = ((absolute + lit[0]) / unit).floor() - 1.0;
         origin[axis] = (absolute - base * unit) as i32;
@@ -186,18 +194,20 @@ fn light_and_reach(
     [params.light_width, params.light_height] = texels;
     [params.light_shift_x_per_m, params.light_shift_y_per_m] =
         shadow_per_m.map(|shift| shift as f32);
+    params.toward_u = toward_eye[0] as f32;
+    params.toward_v = toward_eye[1] as f32;
+    params.toward_slice = (-f64::from(params.slices_per_unit) / level.px_per_m) as f32;
     let texel_px = unit / subpixels;
     params.light_depth_gain =
         (look::LIGHT_DEPTH * PI / 3.0 / (texel_px * texel_px) / elevation.sin()) as f32;
     reach
 }
 
-/// Fills the tables of columns and the list of cells whose ground lies within `spans` (x, y), date line included.
+/// Fills the table of columns and sets the rows whose ground lies within `spans` (x, y), date line included.
 fn choose_cells(plan: &mut Plan, scene: &Scene, level: &Level, spans: [Span; 2]) {
     let grid = &scene.grid;
     let subpixels = f64::from(SUBPIXELS);
     let width_px = grid.dlon_deg / 360.0 * level.world_px;
-    let mut slots = vec![];
     let first_turn = -(level.size_px / level.world_px).ceil() as i32 - 1;
     for turn in first_turn..=-first_turn {
         for col in 0..grid.cols {
@@ -208,9 +218,9 @@ fn choose_cells(plan: &mut Plan, scene: &Scene, level: &Level, spans: [Span; 2])
                 plan.cols.push(Col {
                     x_sub,
                     x_span_px: width_px as f32,
+                    index: col,
                     ..Col::default()
                 });
-                slots.push(col);
             }
         }
     }
@@ -222,19 +232,9 @@ fn choose_cells(plan: &mut Plan, scene: &Scene, level: &Level, spans: [Span; 2])
     let chosen: Vec<u32> = (0..grid.rows)
         .filter(|&row| near(&plan.rows[row as usize]))
         .collect();
-    for &row in &chosen {
-        for (slot, col) in slots.iter().enumerate() {
-            let cell = row * grid.cols + col;
-            if scene.domain.content()[cell as usize] != 0 {
-                plan.active.push(Active {
-                    cell,
-                    slot: slot as u32,
-                });
-            }
-        }
-    }
-    let rows = chosen.first().copied().unwrap_or(0)..chosen.last().map_or(0, |row| row + 1);
-    interpolate_rows(plan, rows);
+    plan.params.first_row = chosen.first().copied().unwrap_or(0);
+    plan.params.row_count = chosen.last().map_or(0, |row| row + 1) - plan.params.first_row;
+    plan.params.slot_count = plan.cols.len() as u32;
 }
 
 fn interpolate_rows(plan: &mut Plan, rows: Range<u32>) {

@@ -6,8 +6,8 @@ use std::sync::Arc;
 use contract::colour::TransferFunction;
 use contract::grid::Grid;
 use contract::job::{Mode, RENDERER_VERSION, RenderJob, Style, View};
+use contract::moment::Moment;
 use contract::quantity::Quantity;
-use contract::time::TimeMs;
 
 use crate::scene::{Frame, Interval, Scene};
 
@@ -87,12 +87,17 @@ pub fn scene(grid: Grid) -> Scene {
 /// # Panics
 /// Never: its fixed words are valid.
 pub fn job(view: View) -> RenderJob {
-    let id = |text: &str| text.parse().expect("the name is constant");
+    let key = |text: &str| text.parse().expect("the name is constant");
+    let moment = |domain: &str, frame: &str| Moment {
+        domain: key(domain),
+        before: Some(key(frame)),
+        after: None,
+    };
     RenderJob {
         renderer_version: RENDERER_VERSION,
-        product: id("made-up@1-00000000"),
-        accumulated: Some(id("made-up-accumulated@1-00000000")),
-        time: TimeMs::from_ymd(2000, 11, 1).expect("the day is constant"),
+        grid: ONE_DEGREE,
+        value: moment("domain/made-up/0", "frames/made-up/0"),
+        accumulated: Some(moment("domain/made-up-carbon/0", "frames/made-up-carbon/0")),
         mode: Mode::Volume,
         view,
         style: Style::with_transfer(TransferFunction::default_for(Quantity::CarbonFlux)),

@@ -2,10 +2,12 @@
 
 /// Invocations of a workgroup in stages that run over a list.
 pub const GROUP: u32 = 128;
+/// Side of a square of invocations in stages that run over cells or over the pixels of a screen tile.
+pub const SQUARE: u32 = 16;
 /// Side of a screen tile, pixels.
-pub const SCREEN_TILE_PX: u32 = 8;
+pub const SCREEN_TILE_PX: u32 = 16;
 /// Subpixels of a screen tile, as a shift.
-pub const SCREEN_TILE_SHIFT: u32 = 7;
+pub const SCREEN_TILE_SHIFT: u32 = 8;
 /// Positions on the screen are whole multiples of this part of a pixel, so that no two tiles round them differently.
 pub const SUBPIXELS: i32 = 16;
 /// Optical depth 1 in the integers that light and eye sum up.
@@ -42,9 +44,17 @@ shared_struct! {
         pub strength_per_unit: f32,
         pub diverging: u32,
         pub depth_floor: f32,
-        pub active_count: u32,
+        /// Rows of the grid from `first_row` on, and columns of the table, whose cells may be drawn.
+        pub first_row: u32,
+        pub row_count: u32,
+        pub slot_count: u32,
+        /// Least cosine of a cell's angle to the place below the camera, times the camera's distance (globe).
+        pub cap_least: f32,
         pub particles_per_cell: u32,
-        pub particle_count: u32,
+        /// Particles of its cell that one invocation makes.
+        pub particles_each: u32,
+        /// Places for splats, those of cells without data included.
+        pub splat_count: u32,
         /// Random places spread over 2 to the minus this of a cell.
         pub shake_shift: u32,
         pub height_m_per_kg_m2: f32,
@@ -76,6 +86,12 @@ shared_struct! {
         pub light_shift_x_per_m: f32,
         pub light_shift_y_per_m: f32,
         pub light_depth_gain: f32,
+        /// From a place in the light towards the eye, for each pixel of radius: this, less `toward_pull` times the place
+        /// (in parts of texels and in slices).
+        pub toward_u: f32,
+        pub toward_v: f32,
+        pub toward_slice: f32,
+        pub toward_pull: f32,
         pub light_u0: f32,
         pub light_v0: f32,
         pub light_texels_per_unit: f32,
@@ -156,15 +172,16 @@ shared_struct! {
         /// Of the column's middle longitude (globe).
         pub sin_lon: f32,
         pub cos_lon: f32,
+        /// Which column of the grid.
+        pub index: u32,
     }
 }
 
-shared_struct! {
-    /// A cell to draw: which one, and through which copy of its column.
-    pub struct Active {
-        pub cell: u32,
-        pub slot: u32,
-    }
+/// A cell to draw: which one, and through which copy of its column.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Active {
+    pub cell: u32,
+    pub slot: u32,
 }
 
 shared_struct! {
@@ -188,7 +205,7 @@ shared_struct! {
 }
 
 shared_struct! {
-    /// A particle on the screen and in the light.
+    /// A particle on the screen and in the light. Devices store it packed, see `passes/splat`.
     pub struct Splat {
         /// Centre, subpixels east of the picture's left.
         pub x_sub: i32,

@@ -1,4 +1,6 @@
 //! The stages of a frame, a folder each: `mod.rs` records the shader, `<stage>.wgsl` is the shader, `cpu.rs` its twin.
+//!
+//! Stages that see one particle at a time are functions; [`passes`](crate::passes) run them.
 
 pub mod layout;
 pub mod sphere;

@@ -2,12 +2,14 @@
 struct Params {
     rows: u32, cols: u32, periodic: u32, first_cell: u32, end_cell: u32, value_weight: f32, accumulated_weight: f32,
     has_accumulated: u32, transfer_low: f32, transfer_per_unit: f32, strength_per_unit: f32, diverging: u32,
-    depth_floor: f32, active_count: u32, particles_per_cell: u32, particle_count: u32, shake_shift: u32, height_m_per_kg_m2: f32,
+    depth_floor: f32, first_row: u32, row_count: u32, slot_count: u32, cap_least: f32, particles_per_cell: u32,
+    particles_each: u32, splat_count: u32, shake_shift: u32, height_m_per_kg_m2: f32,
     height_limit_m: f32, sheet_m: f32, turns_per_kg_m2: f32, optical_depth: f32, view: u32, kernel: u32,
     front_to_back: u32, width: u32, height: u32, tiles_x: u32, tiles_y: u32, slices: u32, entry_capacity: u32,
     min_radius_px: f32, max_radius_px: f32, size_spread: f32, height_px_per_m: f32, slice_top: f32,
     slices_per_unit: f32, light_on: u32, light_width: u32, light_height: u32, light_unit: i32, light_origin_x: i32,
-    light_origin_y: i32, light_shift_x_per_m: f32, light_shift_y_per_m: f32, light_depth_gain: f32, light_u0: f32,
+    light_origin_y: i32, light_shift_x_per_m: f32, light_shift_y_per_m: f32, light_depth_gain: f32, toward_u: f32, toward_v: f32,
+    toward_slice: f32, toward_pull: f32, light_u0: f32,
     light_v0: f32, light_texels_per_unit: f32, ambient: f32, direct: f32, lon_span_rad: f32, per_earth_radius_m: f32,
     focal_px: f32, eye_x: f32, eye_y: f32, eye_z: f32, right_x: f32, right_y: f32, right_z: f32, up_x: f32,
     up_y: f32, up_z: f32, forward_x: f32, forward_y: f32, forward_z: f32, half_x: f32, half_y: f32, half_z: f32,
@@ -21,10 +23,7 @@ struct Row {
     depth_gain: f32,
 }
 struct Col {
-    x_sub: i32, x_span_px: f32, sin_lon: f32, cos_lon: f32,
-}
-struct Active {
-    cell: u32, slot: u32,
+    x_sub: i32, x_span_px: f32, sin_lon: f32, cos_lon: f32, index: u32,
 }
 struct Particle {
     row: u32, slot: u32, east: f32, south: f32, height_m: f32, mass_kg: f32, depth: f32, color: u32,
@@ -41,8 +40,9 @@ struct Axis {
 }
 
 const GROUP: u32 = 128u;
-const SCREEN_TILE_PX: u32 = 8u;
-const SCREEN_TILE_SHIFT: u32 = 7u;
+const SQUARE: u32 = 16u;
+const SCREEN_TILE_PX: u32 = 16u;
+const SCREEN_TILE_SHIFT: u32 = 8u;
 const SUBPIXELS: i32 = 16;
 const DEPTH_ONE: f32 = 4096.0;
 const MISSING: f32 = -1.0e30;

@@ -68,7 +68,7 @@ async fn every_job_is_stored_and_told_of_once_and_failures_say_why() {
     let mut noticed = wanted(&quick(&job, 1), "one");
     noticed.noticed = Some("2020-01-01".parse().unwrap());
     let mut unknown = quick(&job, 3);
-    unknown.product = "nothing@3-00000000".parse().unwrap();
+    unknown.value.domain = "domain/nothing/0".parse().unwrap();
     let other = Event::new(
         "other",
         Body::GranuleNotice {

@@ -12,7 +12,7 @@ use render_worker::wire::proto::renderer_client::RendererClient;
 use storage::Store;
 
 use crate::process::WorkerProcess;
-use crate::stored::{quick, slow, two_months_in};
+use crate::stored::{at, quick, slow, two_months, two_months_in};
 use crate::worker::{
     LIMIT, Worker, ask, drawn_here, fleet, fleet_settings, fleet_with, metric, until,
 };
@@ -27,38 +27,28 @@ async fn shared_store() -> (tempfile::TempDir, Store, RenderJob) {
     (folder, store, job)
 }
 
-/// Pictures that one of the workers is asked for first: a job between frames that make it so.
-fn place_of(job: &RenderJob, manifest: &contract::manifest::Manifest) -> String {
-    let bracket = manifest.bracket(job.time).unwrap();
-    let frame = |step: usize| manifest.steps[step].frame.as_str();
-    let before = bracket.before.map_or("start", frame);
-    format!("{} {before} {}", manifest.product, frame(bracket.after))
-}
-
-async fn first_asked<'a>(store: &Store, job: &RenderJob, names: &[&'a str]) -> &'a str {
-    let manifest = storage::manifests::load(store, &job.product).await.unwrap();
-    names[ranked(&place_of(job, &manifest), names)[0]]
+/// The worker that is asked for a picture first: the one of the frame that it begins with.
+fn first_asked<'a>(job: &RenderJob, names: &[&'a str]) -> &'a str {
+    let frame = job.value.before.as_ref().unwrap();
+    names[ranked(frame.as_str(), names)[0]]
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn pictures_between_the_same_frames_are_drawn_on_one_worker() {
     let store = Store::memory();
-    let job = two_months_in(&store).await;
+    let (flux, carbon) = two_months(&store).await;
     let workers: Vec<Worker> = (0..3).map(|_| Worker::start(&store, 1, 64)).collect();
     let names: Vec<&str> = workers.iter().map(|w| w.name.as_str()).collect();
-    let fleet = fleet(&store, &names).await;
+    let fleet = fleet(&names).await;
     let mut by_interval: BTreeMap<&str, BTreeSet<String>> = BTreeMap::new();
     for (interval, times) in [
         ("first month", ["2000-01-02", "2000-01-03"]),
-        ("between", ["2000-01-20", "2000-02-10"]),
+        ("between", ["2000-01-16T12:00:00Z", "2000-02-10"]),
         ("last month", ["2000-02-25", "2000-02-26"]),
     ] {
         for (number, time) in (0..).zip(times) {
-            let job = RenderJob {
-                time: time.parse().unwrap(),
-                ..quick(&job, number)
-            };
-            let first = first_asked(&store, &job, &names).await;
+            let job = quick(&at(&flux, &carbon, time), number);
+            let first = first_asked(&job, &names);
             let picture = fleet.draw(&job, "t").await.unwrap();
             assert_eq!(picture.worker, first, "{interval}");
             by_interval
@@ -82,9 +72,9 @@ async fn a_worker_killed_in_the_middle_of_a_tile_has_it_drawn_elsewhere_with_equ
     let names: Vec<String> = processes.iter().map(|p| p.name.clone()).collect();
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
     let registry = Registry::new();
-    let fleet = Arc::new(fleet_with(&store, &fleet_settings(&names), &registry).await);
+    let fleet = Arc::new(fleet_with(&fleet_settings(&names), &registry).await);
     let job = slow(&job, 1);
-    let first = first_asked(&store, &job, &names).await.to_owned();
+    let first = first_asked(&job, &names).to_owned();
     let call = ask(&fleet, &job);
     let mut client = RendererClient::connect(format!("http://{first}"))
         .await
@@ -129,7 +119,7 @@ async fn a_worker_killed_in_the_middle_of_a_tile_has_it_drawn_elsewhere_with_equ
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_frozen_worker_is_not_waited_for() {
-    let (folder, store, job) = shared_store().await;
+    let (folder, _store, job) = shared_store().await;
     let processes: Vec<_> = (0..2)
         .map(|_| WorkerProcess::start(folder.path()))
         .collect();
@@ -137,9 +127,9 @@ async fn a_frozen_worker_is_not_waited_for() {
     let registry = Registry::new();
     let mut settings = fleet_settings(&names);
     settings.render_hedge_ms = 300;
-    let fleet = fleet_with(&store, &settings, &registry).await;
+    let fleet = fleet_with(&settings, &registry).await;
     let job = quick(&job, 1);
-    let first = first_asked(&store, &job, &names).await;
+    let first = first_asked(&job, &names);
     processes.iter().find(|p| p.name == first).unwrap().freeze();
     let picture = fleet.draw(&job, "t").await.unwrap();
     assert_ne!(picture.worker, first);
@@ -161,8 +151,8 @@ async fn a_full_worker_is_passed_over() {
     let workers: Vec<Worker> = (0..2).map(|_| Worker::start(&store, 1, 0)).collect();
     let names: Vec<&str> = workers.iter().map(|w| w.name.as_str()).collect();
     let registry = Registry::new();
-    let fleet = Arc::new(fleet_with(&store, &fleet_settings(&names), &registry).await);
-    let first = first_asked(&store, &job, &names).await;
+    let fleet = Arc::new(fleet_with(&fleet_settings(&names), &registry).await);
+    let first = first_asked(&job, &names);
     let full = workers.iter().find(|w| w.name == first).unwrap();
     let drawing = ask(&fleet, &slow(&job, 1));
     full.until("it is full", |w| w.desk.condition().in_flight == 1)
@@ -183,7 +173,7 @@ async fn workers_may_come_later_than_those_who_ask() {
     worker_settings.render_listen = port.local_addr().unwrap();
     drop(port);
     let name = worker_settings.render_listen.to_string();
-    let fleet = fleet(&store, &[&name]).await;
+    let fleet = fleet(&[&name]).await;
     assert!(matches!(
         fleet.ready().await,
         Err(FleetError::Unavailable(_))
@@ -205,7 +195,7 @@ async fn a_name_brings_the_workers_at_its_addresses() {
     let worker = Worker::start(&store, 1, 8);
     let (_, port) = worker.name.rsplit_once(':').unwrap();
     let named = format!("dns:localhost:{port}");
-    let fleet = fleet(&store, &[&named]).await;
+    let fleet = fleet(&[&named]).await;
     until("one address answers", || {
         fleet.health().values().any(|health| *health == Health::Up)
     })
@@ -216,11 +206,11 @@ async fn a_name_brings_the_workers_at_its_addresses() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn no_answer_within_the_time_is_an_error_within_the_time() {
-    let (folder, store, job) = shared_store().await;
+    let (folder, _store, job) = shared_store().await;
     let process = WorkerProcess::start(folder.path());
     let mut settings = fleet_settings(&[&process.name]);
     settings.render_deadline_ms = 400;
-    let fleet = fleet_with(&store, &settings, &Registry::new()).await;
+    let fleet = fleet_with(&settings, &Registry::new()).await;
     process.freeze();
     let begun = Instant::now();
     let late = fleet.draw(&quick(&job, 1), "t").await.unwrap_err();
@@ -236,14 +226,14 @@ async fn a_job_that_no_worker_would_draw_is_asked_of_none() {
     let job = two_months_in(&store).await;
     let worker = Worker::start(&store, 1, 8);
     let registry = Registry::new();
-    let fleet = fleet_with(&store, &fleet_settings(&[&worker.name]), &registry).await;
+    let fleet = fleet_with(&fleet_settings(&[&worker.name]), &registry).await;
     let mut beyond = job.clone();
     beyond.style.slices = 0;
     let refused = fleet.draw(&beyond, "t").await.unwrap_err();
     assert!(matches!(refused, FleetError::BadRequest(_)), "{refused}");
     let mut unknown = job;
-    unknown.product = "nothing@3-00000000".parse().unwrap();
+    unknown.value.domain = "domain/nothing/0".parse().unwrap();
+    assert_eq!(metric(&registry, TRIES, &[]), 0);
     let refused = fleet.draw(&unknown, "t").await.unwrap_err();
     assert!(matches!(refused, FleetError::NotFound(_)), "{refused}");
-    assert_eq!(metric(&registry, TRIES, &[]), 0);
 }

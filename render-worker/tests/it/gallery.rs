@@ -150,10 +150,9 @@ fn stored() -> Option<render_worker::Scene> {
                 .await
                 .unwrap()
         };
-        let mut job = job(Mode::Volume, tile(0, 0, 0, 256));
-        job.product = newest("takahashi09-flux").await?.id();
-        job.accumulated = Some(newest("takahashi09-flux-accumulated").await?.id());
-        job.time = "2000-10-20".parse().unwrap();
+        let flux = newest("takahashi09-flux").await?;
+        let carbon = newest("takahashi09-flux-accumulated").await?;
+        let job = crate::stored::at(&flux, &carbon, "2000-10-20");
         Some(
             render_worker::Source::new(store.clone(), renderer, 1 << 30)
                 .scene(&job)

@@ -1,12 +1,14 @@
 //! The structs and constants of Rust and WGSL, compared through naga.
 
-use render_worker::stages::fill::{self, FillParams};
+use render_worker::passes::{place, splat};
+use render_worker::stages::fill::level::{FillLevel, MOST_REACH_COLS};
+use render_worker::stages::fill::{self, exact, pairs, window};
 use render_worker::stages::layout::{
-    Active, Axis, Col, DEPTH_ONE, Entry, GROUP, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, MISSING,
-    Params, Particle, Row, SCREEN_TILE_PX, SCREEN_TILE_SHIFT, SUBPIXELS, Splat, VIEW_GLOBE,
+    Axis, Col, DEPTH_ONE, Entry, GROUP, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, MISSING, Params,
+    Particle, Row, SCREEN_TILE_PX, SCREEN_TILE_SHIFT, SQUARE, SUBPIXELS, Splat, VIEW_GLOBE,
     VIEW_TILE,
 };
-use render_worker::stages::{bin, compose, eye, interpolate, light, map, particles, project};
+use render_worker::stages::{bin, compose, eye, interpolate, light, map};
 
 type Fields = &'static [(&'static str, usize, &'static str)];
 
@@ -58,11 +60,10 @@ fn difference(source: &str, name: &str, fields: Fields, size: usize) -> Option<S
     })
 }
 
-const SHARED: [(&str, Fields, usize); 8] = [
+const SHARED: [(&str, Fields, usize); 7] = [
     ("Params", Params::FIELDS, size_of::<Params>()),
     ("Row", Row::FIELDS, size_of::<Row>()),
     ("Col", Col::FIELDS, size_of::<Col>()),
-    ("Active", Active::FIELDS, size_of::<Active>()),
     ("Particle", Particle::FIELDS, size_of::<Particle>()),
     ("Splat", Splat::FIELDS, size_of::<Splat>()),
     ("Entry", Entry::FIELDS, size_of::<Entry>()),
@@ -74,15 +75,19 @@ fn structs_have_the_same_fields_in_rust_and_wgsl() {
     for (name, fields, size) in SHARED {
         assert_eq!(difference(eye::SOURCE, name, fields, size), None);
     }
-    assert_eq!(
-        difference(
-            fill::SOURCE,
-            "FillParams",
-            FillParams::FIELDS,
-            size_of::<FillParams>()
-        ),
-        None
-    );
+    let fills = [
+        fill::STENCIL_SOURCE,
+        window::SOURCE,
+        exact::SOURCE,
+        pairs::SOURCE,
+    ];
+    for source in fills {
+        let size = size_of::<FillLevel>();
+        assert_eq!(
+            difference(source, "FillLevel", FillLevel::FIELDS, size),
+            None
+        );
+    }
 }
 
 #[test]
@@ -92,8 +97,9 @@ fn a_swapped_or_missing_field_is_seen() {
         ("rows: u32, ", ""),
         ("rows: u32", "rows: f32"),
     ] {
-        let source = eye::SOURCE.replacen(right, wrong, 1);
-        assert_ne!(source, eye::SOURCE);
+        // A shader that does not read the field.
+        let source = light::SOURCE.replacen(right, wrong, 1);
+        assert_ne!(source, light::SOURCE);
         assert!(
             difference(&source, "Params", Params::FIELDS, size_of::<Params>()).is_some(),
             "{wrong}"
@@ -103,8 +109,8 @@ fn a_swapped_or_missing_field_is_seen() {
 
 #[test]
 fn constants_have_the_same_value_in_rust_and_wgsl() {
-    let wgsl = |name: &str| {
-        let module = module(eye::SOURCE);
+    let constant = |source: &str, name: &str| {
+        let module = module(source);
         let (_, constant) = module
             .constants
             .iter()
@@ -119,8 +125,10 @@ fn constants_have_the_same_value_in_rust_and_wgsl() {
             ref other => panic!("{name} is {other:?}"),
         }
     };
+    let wgsl = |name: &str| constant(eye::SOURCE, name);
     for (name, value) in [
         ("GROUP", f64::from(GROUP)),
+        ("SQUARE", f64::from(SQUARE)),
         ("SCREEN_TILE_PX", f64::from(SCREEN_TILE_PX)),
         ("SCREEN_TILE_SHIFT", f64::from(SCREEN_TILE_SHIFT)),
         ("SUBPIXELS", f64::from(SUBPIXELS)),
@@ -138,6 +146,13 @@ fn constants_have_the_same_value_in_rust_and_wgsl() {
             wgsl(name)
         );
     }
+    let width = constant(fill::STENCIL_SOURCE, "WIDTH");
+    let segment = constant(fill::STENCIL_SOURCE, "SEGMENT");
+    assert_eq!(segment, width + 2.0 * f64::from(MOST_REACH_COLS));
+    assert_eq!(
+        constant(pairs::SOURCE, "MOST_COLS"),
+        f64::from(pairs::MOST_COLS)
+    );
     assert_eq!(SCREEN_TILE_PX as i32 * SUBPIXELS, 1 << SCREEN_TILE_SHIFT);
 }
 
@@ -145,11 +160,14 @@ fn constants_have_the_same_value_in_rust_and_wgsl() {
 fn every_shader_is_valid_without_extensions() {
     let sources = [
         interpolate::SOURCE,
-        fill::SOURCE,
-        particles::SOURCE,
-        project::SOURCE,
+        splat::SOURCE,
+        fill::STENCIL_SOURCE,
+        window::SOURCE,
+        exact::SOURCE,
+        pairs::SOURCE,
         light::SOURCE,
         bin::SOURCE,
+        place::SOURCE,
         eye::SOURCE,
         map::SOURCE,
         compose::SOURCE,

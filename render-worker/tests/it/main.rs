@@ -9,6 +9,7 @@
 mod batch;
 mod compare;
 mod device;
+mod fill;
 #[cfg(feature = "service")]
 mod fleet;
 mod gallery;

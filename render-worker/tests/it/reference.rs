@@ -37,7 +37,7 @@ fn the_volume_is_near_the_reference_and_the_number_sees_what_it_should_see() {
     println!(
         "PSNR against the float64 reference: {full:.2} dB at 64 slices, {few:.2} dB at 2, {other_light:.2} dB lit from the other side, {sprites:.2} dB for unlit sprites, {thin:.2} dB a fifth thinner"
     );
-    assert!(full >= 38.5, "{full} dB at 64 slices");
+    assert!(full >= 44.0, "{full} dB at 64 slices");
     for (worse, what) in [
         (few, "2 slices"),
         (other_light, "light from the other side"),
@@ -56,7 +56,7 @@ fn more_slices_come_nearer_to_the_reference_on_a_globe_and_on_a_tile() {
     let scene = ocean(ONE_DEGREE);
     let renderer = twins();
     let views = [
-        ("globe", globe(-150.0, 0.0, 4.0e6, 64), 37.0),
+        ("globe", globe(-150.0, 0.0, 4.0e6, 64), 44.0),
         ("tile", tile(3, 1, 3, 256), 46.0),
     ];
     for (name, view, least_db) in views {
@@ -67,12 +67,11 @@ fn more_slices_come_nearer_to_the_reference_on_a_globe_and_on_a_tile() {
         }
         let [eight, usual, many] = [0, 1, 2].map(|i| rows[i].difference);
         assert!(usual.psnr_db.unwrap() >= least_db, "{name}: {usual:?}");
+        // Few slices are far off; from 64 on what is left is that a cloud has one colour, however many there are.
+        let [few_db, usual_db, many_db] = [eight, usual, many].map(|d| d.psnr_db.unwrap());
+        assert!(few_db < usual_db - 3.0 && many_db > usual_db - 1.0, "{name}");
         assert!(
-            eight.psnr_db < usual.psnr_db && usual.psnr_db < many.psnr_db,
-            "{name}"
-        );
-        assert!(
-            eight.mean_flip > usual.mean_flip && usual.mean_flip > many.mean_flip,
+            eight.mean_flip > 1.5 * usual.mean_flip && many.mean_flip < 1.2 * usual.mean_flip,
             "{name}"
         );
     }

@@ -36,7 +36,7 @@ async fn a_picture_is_the_same_bytes_by_grpc_as_in_process() {
         let own = Store::memory();
         assert_eq!(two_months_in(&own).await, job);
         let worker = Worker::start_with(&own, &settings(2, 8), backend, Version::own());
-        let fleet = fleet(&own, &[&worker.name]).await;
+        let fleet = fleet(&[&worker.name]).await;
         let local = render_worker::RenderService::new(store.clone(), backend).unwrap();
         for mode in Mode::ALL {
             let job = RenderJob {
@@ -59,7 +59,7 @@ async fn thirty_two_equal_calls_are_one_drawing() {
     let store = Store::memory();
     let job = two_months_in(&store).await;
     let worker = Worker::start(&store, 1, 1);
-    let fleet = Arc::new(fleet(&store, &[&worker.name]).await);
+    let fleet = Arc::new(fleet(&[&worker.name]).await);
     // The only place to draw at is taken, so that all calls meet before anything is drawn.
     let first = ask(&fleet, &slow(&job, 1));
     worker
@@ -98,7 +98,7 @@ async fn a_full_worker_says_when_to_ask_again_and_draws_what_it_took() {
     let store = Store::memory();
     let job = two_months_in(&store).await;
     let worker = Worker::start(&store, 1, 1);
-    let fleet = Arc::new(fleet(&store, &[&worker.name]).await);
+    let fleet = Arc::new(fleet(&[&worker.name]).await);
     let drawing = ask(&fleet, &slow(&job, 1));
     worker
         .until("one is drawn", |w| w.desk.condition().in_flight == 1)
@@ -122,7 +122,7 @@ async fn a_job_whose_time_is_up_is_never_begun() {
     let store = Store::memory();
     let job = two_months_in(&store).await;
     let worker = Worker::start(&store, 1, 4);
-    let fleet = Arc::new(fleet(&store, &[&worker.name]).await);
+    let fleet = Arc::new(fleet(&[&worker.name]).await);
     let drawing = ask(&fleet, &slow(&job, 1));
     worker
         .until("one is drawn", |w| w.desk.condition().in_flight == 1)
@@ -157,7 +157,7 @@ async fn a_picture_that_all_have_given_up_is_not_drawn_to_its_end() {
     let store = Store::memory();
     let job = two_months_in(&store).await;
     let worker = Worker::start(&store, 1, 4);
-    let fleet = Arc::new(fleet(&store, &[&worker.name]).await);
+    let fleet = Arc::new(fleet(&[&worker.name]).await);
     // Sixteen parts, between which it is asked whether anybody waits.
     let mut large = RenderJob {
         mode: Mode::Map,
@@ -224,7 +224,7 @@ async fn versions_that_differ_are_told_on_both_sides_before_anything_is_drawn() 
     let refused = worker.client().await.draw(request(&job)).await.unwrap_err();
     assert_eq!(refused.code(), Code::FailedPrecondition);
     assert!(refused.message().contains("0.0.0-older"), "{refused}");
-    let fleet = fleet(&store, &[&worker.name]).await;
+    let fleet = fleet(&[&worker.name]).await;
     let not_ready = fleet.ready().await.unwrap_err().to_string();
     assert!(not_ready.contains("0.0.0-older"), "{not_ready}");
     let refused = fleet.draw(&job, "t").await.unwrap_err();
@@ -243,7 +243,7 @@ async fn a_stopping_worker_sends_others_away_and_finishes_what_it_took() {
     let store = Store::memory();
     let job = two_months_in(&store).await;
     let worker = Worker::start(&store, 1, 4);
-    let fleet = Arc::new(fleet(&store, &[&worker.name]).await);
+    let fleet = Arc::new(fleet(&[&worker.name]).await);
     let drawing = ask(&fleet, &slow(&job, 1));
     worker
         .until("one is drawn", |w| w.desk.condition().in_flight == 1)
@@ -278,7 +278,7 @@ async fn what_is_no_job_is_refused_with_a_reason_and_without_work() {
     let mut beyond = job.clone();
     beyond.style.slices = 100_000;
     let mut unknown = job.clone();
-    unknown.product = "nothing@3-00000000".parse().unwrap();
+    unknown.value.domain = "domain/nothing/0".parse().unwrap();
     let long = "x".repeat(200_000);
     let cases = [
         (
@@ -290,7 +290,7 @@ async fn what_is_no_job_is_refused_with_a_reason_and_without_work() {
             "cannot be read",
         ),
         (request(&beyond), Code::InvalidArgument, "slices"),
-        (request(&unknown), Code::NotFound, "nothing@3"),
+        (request(&unknown), Code::NotFound, "nothing"),
         (
             DrawRequest {
                 trace: "a\nb".into(),
@@ -377,7 +377,7 @@ async fn a_caller_asks_one_worker_for_no_more_than_it_may() {
     let worker = Worker::start(&store, 1, 64);
     let mut settings = fleet_settings(&[&worker.name]);
     settings.render_in_flight = 1;
-    let fleet = Arc::new(fleet_with(&store, &settings, &prometheus::Registry::new()).await);
+    let fleet = Arc::new(fleet_with(&settings, &prometheus::Registry::new()).await);
     let drawing = ask(&fleet, &slow(&job, 1));
     worker
         .until("one is drawn", |w| w.desk.condition().in_flight == 1)

@@ -7,7 +7,7 @@ use render_worker::{Backend, RenderError, RenderService};
 use storage::Store;
 
 use crate::scenes::FIVE_DEGREES;
-use crate::stored::{product, two_months_in};
+use crate::stored::{at, product, two_months, two_months_in};
 
 fn alpha(png: &[u8]) -> Vec<u8> {
     image::load_from_memory(png)
@@ -21,7 +21,7 @@ fn alpha(png: &[u8]) -> Vec<u8> {
 #[tokio::test]
 async fn a_stored_product_is_drawn_at_any_instant_in_every_mode() {
     let store = Store::memory();
-    let job = two_months_in(&store).await;
+    let (flux, carbon) = two_months(&store).await;
     let service = RenderService::new(store, Backend::Cpu).unwrap();
     for mode in Mode::ALL {
         let mut pictures = vec![];
@@ -34,8 +34,7 @@ async fn a_stored_product_is_drawn_at_any_instant_in_every_mode() {
         ] {
             let job = RenderJob {
                 mode,
-                time: time.parse().unwrap(),
-                ..job.clone()
+                ..at(&flux, &carbon, time)
             };
             let png = service.draw(&job).await.unwrap();
             assert!(
@@ -53,13 +52,10 @@ async fn a_stored_product_is_drawn_at_any_instant_in_every_mode() {
 #[tokio::test]
 async fn gaps_of_the_domain_are_filled_before_anything_is_drawn() {
     let store = Store::memory();
-    let job = two_months_in(&store).await;
+    let (flux, carbon) = two_months(&store).await;
     let service = RenderService::new(store, Backend::Cpu).unwrap();
     // Row 20 (10 S to 15 S), columns 0 to 5: seen on the tile south of the equator at the date line.
-    let late = RenderJob {
-        time: "2000-03-01".parse().unwrap(),
-        ..job
-    };
+    let late = at(&flux, &carbon, "2000-03-01");
     let alpha = alpha(&service.draw(&late).await.unwrap());
     let (x, y) = (10, 18);
     assert!(alpha[y * 256 + x] > 200, "a map where the cloud was");
@@ -68,7 +64,8 @@ async fn gaps_of_the_domain_are_filled_before_anything_is_drawn() {
 #[tokio::test]
 async fn jobs_that_name_what_is_not_there_are_refused() {
     let store = Store::memory();
-    let job = two_months_in(&store).await;
+    let (flux, carbon) = two_months(&store).await;
+    let job = at(&flux, &carbon, "2000-01-30");
     let other = Grid {
         rows: 1,
         cols: 2,
@@ -83,23 +80,24 @@ async fn jobs_that_name_what_is_not_there_are_refused() {
     )
     .await;
     let service = RenderService::new(store, Backend::Cpu).unwrap();
-    let unknown = RenderJob {
-        product: "nothing@3-00000000".parse().unwrap(),
-        ..job.clone()
-    };
+    let mut unknown = job.clone();
+    unknown.value.domain = "domain/nothing/0".parse().unwrap();
     let refused = service.draw(&unknown).await.unwrap_err();
-    assert!(
-        matches!(refused, RenderError::Store { .. }) && refused.to_string().contains("nothing"),
-        "{refused}"
-    );
-    let mismatched = RenderJob {
-        accumulated: Some(small.id()),
-        ..job.clone()
-    };
-    assert!(matches!(
-        service.draw(&mismatched).await,
-        Err(RenderError::GridMismatch { .. })
-    ));
+    assert!(refused.is_not_found(), "{refused}");
+    // Nothing that a job says of its grid makes anybody lay out more than is stored.
+    let mut mismatched = job.clone();
+    mismatched.accumulated = small.moment("2000-01-30".parse().unwrap());
+    let mut wider = job.clone();
+    (wider.grid.rows, wider.grid.dlat_deg) = (1 << 20, 1e-4);
+    for wrong in [mismatched, wider] {
+        assert!(matches!(
+            service.draw(&wrong).await,
+            Err(RenderError::GridMismatch { .. })
+        ));
+    }
+    let (time, view, style) = ("2000-01-30".parse().unwrap(), job.view, job.style);
+    let quarrel = RenderJob::of(&flux, Some(&small), time, Mode::Volume, view, style).unwrap_err();
+    assert!(quarrel.to_string().contains("grid of flux"), "{quarrel}");
     let mut refused = job;
     refused.style.slices = 0;
     assert!(service.draw(&refused).await.unwrap_err().is_bad_request());
@@ -124,4 +122,31 @@ async fn many_tasks_draw_at_the_same_time_and_agree() {
         pictures.push(task.await.unwrap());
     }
     assert!(pictures.windows(2).all(|pair| pair[0] == pair[1]));
+}
+
+#[tokio::test]
+async fn a_landing_leaves_pictures_that_it_does_not_touch_their_name_and_their_bytes() {
+    let store = Store::memory();
+    let (flux, carbon) = two_months(&store).await;
+    let mut longer = flux.clone();
+    longer.number += 1;
+    longer.steps.push(contract::manifest::Step {
+        period: contract::time::Period::month(2000, 3).unwrap(),
+        ..flux.steps[0].clone()
+    });
+    assert_ne!(longer.id(), flux.id());
+    let service = RenderService::new(store, Backend::Cpu).unwrap();
+    let middle = "2000-02-15T12:00:00Z";
+    for time in ["2000-01-30", middle] {
+        let (old, new) = (at(&flux, &carbon, time), at(&longer, &carbon, time));
+        assert_eq!(old.key(), new.key(), "{time}");
+    }
+    // After the middle of what was the last month the new one shows.
+    let (old, new) = (
+        at(&flux, &carbon, "2000-02-25"),
+        at(&longer, &carbon, "2000-02-25"),
+    );
+    assert_ne!(old.key(), new.key());
+    let (old, new) = (service.draw(&old).await, service.draw(&new).await);
+    assert_ne!(old.unwrap(), new.unwrap());
 }

@@ -68,8 +68,23 @@ fn values(frame: &render_worker::Frame) -> Vec<f32> {
         .collect()
 }
 
-/// Two months of a flux with what they accumulate; a job that draws a tile of them.
+/// Two months of a flux with what they accumulate; a job that draws a tile of them on the 30th of January.
 pub(crate) async fn two_months_in(store: &Store) -> RenderJob {
+    let (flux, carbon) = two_months(store).await;
+    at(&flux, &carbon, "2000-01-30")
+}
+
+/// A job that draws a map tile of a flux at a time; other modes of it lift particles by accumulated carbon.
+pub(crate) fn at(flux: &Manifest, carbon: &Manifest, time: &str) -> RenderJob {
+    let (view, style) = (tile(1, 0, 1, 256), job(Mode::Map, tile(0, 0, 0, 256)).style);
+    let time = time.parse().unwrap();
+    let job = RenderJob::of(flux, Some(carbon), time, Mode::Volume, view, style).unwrap();
+    let mode = Mode::Map;
+    RenderJob { mode, ..job }
+}
+
+/// Two months of a flux and what they accumulate.
+pub(crate) async fn two_months(store: &Store) -> (Manifest, Manifest) {
     let scene = ocean(FIVE_DEGREES);
     let carbon = scene.accumulated.unwrap();
     let mut after = values(&scene.value.after);
@@ -92,10 +107,7 @@ pub(crate) async fn two_months_in(store: &Store) -> RenderJob {
         &carbon,
     )
     .await;
-    let mut job = job(Mode::Map, tile(1, 0, 1, 256));
-    (job.product, job.accumulated) = (flux.id(), Some(carbon.id()));
-    job.time = "2000-01-30".parse().unwrap();
-    job
+    (flux, carbon)
 }
 
 /// The same product as a small map, quickly drawn; another picture for every `number`.

@@ -5,9 +5,15 @@ use std::path::Path;
 const SOURCES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/src");
 
 #[test]
-fn every_stage_has_a_shader_and_a_twin() {
+fn every_stage_and_every_form_of_filling_has_a_shader_and_a_twin() {
+    assert_eq!(check("stages"), 9);
+    assert_eq!(check("stages/fill"), 3);
+}
+
+/// The number of folders within a folder, each with its three files.
+fn check(folder: &str) -> usize {
     let mut stages = 0;
-    for entry in std::fs::read_dir(Path::new(SOURCES).join("stages")).unwrap() {
+    for entry in std::fs::read_dir(Path::new(SOURCES).join(folder)).unwrap() {
         let path = entry.unwrap().path();
         if path.is_dir() {
             let name = path.file_name().unwrap().to_str().unwrap();
@@ -21,7 +27,7 @@ fn every_stage_has_a_shader_and_a_twin() {
             stages += 1;
         }
     }
-    assert_eq!(stages, 9);
+    stages
 }
 
 /// Stages in the order in which a text first calls each.
@@ -37,6 +43,7 @@ fn order<'a>(text: &str, stages: &[&'a str], call: impl Fn(&str) -> String) -> V
 
 #[test]
 fn both_frames_list_the_same_stages_in_the_same_order() {
+    let read = |file: &str| std::fs::read_to_string(Path::new(SOURCES).join(file)).unwrap();
     let stages = [
         "interpolate",
         "map",
@@ -47,10 +54,6 @@ fn both_frames_list_the_same_stages_in_the_same_order() {
         "eye",
         "compose",
     ];
-    let read = |file: &str| std::fs::read_to_string(Path::new(SOURCES).join(file)).unwrap();
-    let gpu = order(&read("frame.rs"), &stages, |stage| {
-        format!("self.{stage}.record(")
-    });
     let cpu = read("frame_cpu.rs");
     let (_, draw) = cpu.split_once("pub fn draw(").unwrap();
     let (draw, _) = draw.split_once("\n}\n").unwrap();
@@ -59,6 +62,20 @@ fn both_frames_list_the_same_stages_in_the_same_order() {
         .replacen("interpolated(", "interpolate::cpu::(", 1)
         .replacen("binned(", "bin::cpu::(", 1);
     let cpu = order(&draw, &stages, |stage| format!("{stage}::cpu::"));
-    assert_eq!(gpu, stages);
     assert_eq!(cpu, stages);
+    // On the device two passes stand for the stages that see one particle at a time, and the eye composes.
+    let passes = [
+        "interpolate",
+        "map",
+        "compose",
+        "splats",
+        "light",
+        "bin",
+        "place",
+        "eye",
+    ];
+    let gpu = order(&read("frame.rs"), &passes, |stage| {
+        format!("self.{stage}.record(")
+    });
+    assert_eq!(gpu, passes);
 }

@@ -7,11 +7,10 @@ use glam::Vec4;
 use render_worker::plan::Plan;
 use render_worker::pyramid::coarser;
 use render_worker::scene::{Frame, Interval, Scene};
-use render_worker::stages::fill::{self, FillParams};
 use render_worker::stages::interpolate::cpu::interpolated;
 use render_worker::stages::layout::{
-    Active, Col, DEPTH_ONE, Entry, MISSING, Params, Particle, Row, SUBPIXELS, Splat, VIEW_GLOBE,
-    is_missing,
+    Active, Col, DEPTH_ONE, Entry, MISSING, Params, Particle, Row, SCREEN_TILE_PX, SUBPIXELS,
+    Splat, VIEW_GLOBE, is_missing,
 };
 use render_worker::stages::particles::cpu::{Inputs, envelope, generate};
 use render_worker::stages::{bin, eye, light, project};
@@ -24,27 +23,6 @@ fn a_quarter_of_the_way_from_two_to_six_is_three() {
     assert!((interpolated(2.0, 6.0, 0.25) - 3.0).abs() < 1e-6);
     assert!((interpolated(2.0, MISSING, 0.0) - 2.0).abs() < 1e-6);
     assert!(is_missing(interpolated(2.0, MISSING, 0.25)));
-}
-
-#[test]
-fn a_gap_is_filled_with_the_mean_weighted_by_inverse_squared_distance() {
-    // One row: 1, gap, land, 4. The gap lies 1 from the 1 and 2 from the 4: (1/1 * 1 + 1/4 * 4) / (1/1 + 1/4) = 1.6.
-    let params = FillParams {
-        rows: 1,
-        cols: 4,
-        reach_x: 8,
-        lon_per_lat: 1.0,
-        ..FillParams::default()
-    };
-    let filled = fill::cpu::fill(
-        &params,
-        &[1.0, MISSING, MISSING, 4.0],
-        &[1, 1, 0, 1],
-        &[1.0],
-    );
-    assert!((filled[1] - 1.6).abs() < 1e-6, "{}", filled[1]);
-    assert!(is_missing(filled[2]), "land stays land");
-    assert_eq!((filled[0], filled[3]), (1.0, 4.0));
 }
 
 #[test]
@@ -267,7 +245,10 @@ fn a_uniform_slab_dims_light_as_exp_of_minus_its_depth() {
 
 /// Binned and seen by the eye.
 fn seen(params: &mut Params, splats: &[Splat]) -> Vec<Vec4> {
-    (params.tiles_x, params.tiles_y) = (params.width.div_ceil(8), params.height.div_ceil(8));
+    (params.tiles_x, params.tiles_y) = (
+        params.width.div_ceil(SCREEN_TILE_PX),
+        params.height.div_ceil(SCREEN_TILE_PX),
+    );
     let mut ends = vec![0; bin::list_count(params) as usize];
     bin::cpu::count(params, splats, &mut ends);
     let mut entries = vec![Entry::default(); bin::cpu::scan(&mut ends) as usize];

@@ -131,16 +131,12 @@ pub(crate) fn fleet_settings(workers: &[&str]) -> FleetSettings {
 }
 
 /// A fleet of these workers, each of which has been asked how it is.
-pub(crate) async fn fleet(store: &Store, workers: &[&str]) -> Fleet {
-    fleet_with(store, &fleet_settings(workers), &Registry::new()).await
+pub(crate) async fn fleet(workers: &[&str]) -> Fleet {
+    fleet_with(&fleet_settings(workers), &Registry::new()).await
 }
 
-pub(crate) async fn fleet_with(
-    store: &Store,
-    settings: &FleetSettings,
-    registry: &Registry,
-) -> Fleet {
-    let fleet = Fleet::start(settings, store.clone(), registry).unwrap();
+pub(crate) async fn fleet_with(settings: &FleetSettings, registry: &Registry) -> Fleet {
+    let fleet = Fleet::start(settings, registry).unwrap();
     let unknown = render_worker::fleet::Health::Unknown;
     until("every worker was asked", || {
         let health = fleet.health();

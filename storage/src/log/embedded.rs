@@ -149,7 +149,7 @@ impl State {
 impl EventLog for EmbeddedLog {
     async fn append(&self, events: &[Event]) -> Result<(), StorageError> {
         self.shared.write(Entry {
-            messages: lines(events),
+            messages: lines(events)?,
             ..Entry::default()
         })
     }
@@ -160,13 +160,7 @@ impl EventLog for EmbeddedLog {
         _key: &str,
         content: Bytes,
     ) -> Result<(), StorageError> {
-        if content.len() > MAX_EVENT_BYTES {
-            let reason = format!("it is longer than {MAX_EVENT_BYTES} bytes");
-            return Err(StorageError::damaged(
-                format!("message for {topic}"),
-                reason,
-            ));
-        }
+        check_length(topic, content.len())?;
         let text = String::from_utf8(content.to_vec())
             .map_err(|e| StorageError::damaged(format!("message for {topic}"), e))?;
         self.shared.write(Entry {
@@ -258,6 +252,10 @@ impl Reader for EmbeddedReader {
     }
 
     async fn finish(&mut self, done: Vec<Finished>) -> Result<(), StorageError> {
+        // Before anything is noted: what is too long would hold up whatever is finished after it.
+        for event in done.iter().flat_map(|finished| &finished.follows) {
+            check_length(event.body.topic(), event.to_json().len())?;
+        }
         for finished in done {
             self.water.finish(finished);
         }
@@ -271,7 +269,7 @@ impl Reader for EmbeddedReader {
             .map(|next| (self.group.clone(), *next))
             .collect();
         let written = self.shared.write(Entry {
-            messages: lines(&ready.events),
+            messages: lines(&ready.events)?,
             offsets,
         });
         if written.is_err() {
@@ -314,11 +312,24 @@ impl Follower for EmbeddedFollower {
     }
 }
 
-fn lines(events: &[Event]) -> Vec<(Topic, String)> {
-    events
-        .iter()
-        .map(|event| (event.body.topic(), event.to_json()))
-        .collect()
+fn lines(events: &[Event]) -> Result<Vec<(Topic, String)>, StorageError> {
+    let line = |event: &Event| {
+        let (topic, text) = (event.body.topic(), event.to_json());
+        check_length(topic, text.len()).map(|()| (topic, text))
+    };
+    events.iter().map(line).collect()
+}
+
+/// Every log refuses what is longer, so that an event that passes one passes all.
+fn check_length(topic: Topic, bytes: usize) -> Result<(), StorageError> {
+    if bytes <= MAX_EVENT_BYTES {
+        return Ok(());
+    }
+    let reason = format!("it is longer than {MAX_EVENT_BYTES} bytes");
+    Err(StorageError::damaged(
+        format!("message for {topic}"),
+        reason,
+    ))
 }
 
 fn origin(topic: Topic, offset: u64) -> Origin {

@@ -14,12 +14,12 @@ const MOST_TILES: usize = 4096;
 /// A tile that was not asked for during this is not hot, however often it was before.
 const MEMORY: Duration = Duration::from_hours(1);
 
-/// A tile at an instant.
+/// A tile at an instant, or at whatever is the newest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 struct Place {
     tile: (u8, u32, u32),
     size_px: u32,
-    time: TimeMs,
+    time: Option<TimeMs>,
 }
 
 /// A tile that was asked for.
@@ -29,8 +29,8 @@ pub struct HotTile {
     pub mode: Mode,
     /// View.
     pub view: View,
-    /// Instant.
-    pub time: TimeMs,
+    /// Instant; none where none was asked for, which means the newest step there is.
+    pub time: Option<TimeMs>,
     /// How often.
     pub asked: u64,
 }
@@ -49,7 +49,7 @@ pub struct HotTiles {
 
 impl HotTiles {
     /// Remembers that a tile was asked for.
-    pub fn asked(&self, product: &ProductId, mode: Mode, view: &View, time: TimeMs) {
+    pub fn asked(&self, product: &ProductId, mode: Mode, view: &View, time: Option<TimeMs>) {
         let View::Tile { tile, size_px } = *view else {
             return;
         };
@@ -78,7 +78,7 @@ impl HotTiles {
         &self,
         product: &ProductId,
         most: usize,
-        is_touched: impl Fn(TimeMs) -> bool,
+        is_touched: impl Fn(Option<TimeMs>) -> bool,
     ) -> Vec<HotTile> {
         let tiles = self.lock();
         let mut found: Vec<_> = tiles
@@ -139,8 +139,8 @@ mod tests {
         }
     }
 
-    fn time(text: &str) -> TimeMs {
-        text.parse().unwrap()
+    fn time(text: &str) -> Option<TimeMs> {
+        Some(text.parse().unwrap())
     }
 
     #[test]

@@ -106,6 +106,11 @@ impl News {
         self.lock().sender = None;
     }
 
+    /// Is nobody told any more?
+    pub(crate) fn is_closed(&self) -> bool {
+        self.lock().sender.is_none()
+    }
+
     fn lock(&self) -> MutexGuard<'_, Told> {
         // One push and one pop: a poisoned lock guards a whole queue.
         self.told.lock().unwrap_or_else(PoisonError::into_inner)

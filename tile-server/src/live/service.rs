@@ -137,13 +137,23 @@ impl LiveService {
 
     /// Tells of what landed while nobody followed.
     async fn catch_up(&mut self) {
-        self.state.catalogue.outdated();
+        self.renew().await;
         let Ok(layers) = self.state.catalogue.layers().await else {
             return;
         };
         for layer in layers {
             if let Some(touched) = self.see(&layer) {
                 self.state.news.tell(layer.id.clone(), touched);
+            }
+        }
+    }
+
+    /// Reads the list of products anew. A store that is away is waited for: what landed is told of later, not never.
+    async fn renew(&self) {
+        for pause in service::pauses() {
+            match self.state.catalogue.renew().await {
+                Err(error) if error.is_retryable() => tokio::time::sleep(pause).await,
+                Ok(()) | Err(_) => return,
             }
         }
     }
@@ -166,7 +176,7 @@ impl LiveService {
         event: &Event,
         manifest: &ManifestId,
     ) -> Result<Vec<Period>, StorageError> {
-        self.state.catalogue.outdated();
+        self.renew().await;
         let layer = match self.state.catalogue.layer(manifest.product.as_str()).await {
             Ok(layer) => layer,
             Err(error) => {
@@ -213,7 +223,9 @@ impl LiveService {
         layer: &Layer,
         touched: &[Period],
     ) -> Result<(), StorageError> {
+        // Whoever asks for no instant sees the newest step, which may be one that has just landed.
         let is_touched = |time| {
+            let time = request::shown_time(layer, time);
             touched
                 .iter()
                 .any(|period| period.start <= time && time <= period.end)
@@ -224,7 +236,7 @@ impl LiveService {
             .of(&layer.manifest.product, MOST_JOBS, is_touched);
         let jobs: Vec<_> = hot
             .iter()
-            .filter_map(|tile| request::job(layer, tile.mode, tile.view, Some(tile.time)).ok())
+            .filter_map(|tile| request::job(layer, tile.mode, tile.view, tile.time).ok())
             .collect();
         if jobs.is_empty() {
             return Ok(());

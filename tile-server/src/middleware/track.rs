@@ -36,13 +36,13 @@ impl Drop for UnderWay {
 /// Counts the request when it comes, its answer when it begins and its bytes as they go.
 pub(crate) async fn count(State(state): State<AppState>, request: Request, next: Next) -> Response {
     let metrics = &state.metrics;
-    let under_way = UnderWay::enter(&metrics.in_flight);
     let started_at = Instant::now();
     let route = request
         .extensions()
         .get::<MatchedPath>()
         .map_or(FILES, MatchedPath::as_str)
         .to_owned();
+    let under_way = UnderWay::enter(&metrics.in_flight.with_label_values(&[&route]));
     let (method, path) = (
         method_label(request.method()),
         request.uri().path().to_owned(),

@@ -9,7 +9,7 @@ use serde::Deserialize;
 use crate::error::ServerError;
 use crate::extract::{UrlPath, UrlQuery, number, time, whole_number};
 use crate::request;
-use crate::routes::picture;
+use crate::routes::picture::{self, Shown};
 use crate::state::AppState;
 
 /// Height that shows the whole disc with a margin, km.
@@ -26,6 +26,7 @@ pub(crate) struct GlobeQuery {
     width: Option<String>,
     height: Option<String>,
     surface: Option<String>,
+    manifest: Option<String>,
 }
 
 pub(crate) async fn get(
@@ -37,16 +38,18 @@ pub(crate) async fn get(
     let name = file
         .strip_suffix(".png")
         .ok_or(ServerError::UnknownAddress)?;
-    let layer = state.catalogue.layer(&product).await?;
+    let manifest = query.manifest.as_deref();
+    let layer = state.catalogue.version(&product, manifest).await?;
     let mode = request::mode(&layer, name)?;
     let view = query.view()?;
-    let mut job = request::job(&layer, mode, view, time(query.time.as_deref())?)?;
+    let time = time(query.time.as_deref())?;
+    let mut job = request::job(&layer, mode, view, time)?;
     job.style.globe_surface = match query.surface.as_deref() {
         None | Some("true") => true,
         Some("false") => false,
         Some(text) => return Err(ServerError::invalid("surface", text, "true or false")),
     };
-    picture::respond(&state, &headers, job).await
+    picture::respond(&state, &headers, job, Shown::of(&layer, time)).await
 }
 
 impl GlobeQuery {

@@ -1,15 +1,54 @@
-//! A render job as an answer: the PNG, or "your copy is still right", with the headers caches go by.
+//! A render job as an answer: the PNG, or "your copy is still right", with the headers caches go by and those that say
+//! what instant is shown.
 
-use axum::http::{HeaderMap, StatusCode, header};
+use axum::http::{HeaderMap, HeaderName, StatusCode, header};
 use axum::response::{IntoResponse as _, Response};
 use contract::job::RenderJob;
+use contract::time::{Period, TimeMs};
 
+use crate::catalogue::Layer;
 use crate::error::ServerError;
 use crate::metrics::Source;
+use crate::request;
 use crate::state::AppState;
 
 /// An address means "the newest version", so a copy may be used unasked only as long as nobody minds a late change.
 const CACHE_CONTROL: &str = "public, max-age=60";
+
+/// The instant that a picture shows.
+pub(crate) const SHOWN_TIME: HeaderName = HeaderName::from_static("fluxglobe-time");
+/// What the product covers; only where another instant was asked for than is shown.
+pub(crate) const COVERED: HeaderName = HeaderName::from_static("fluxglobe-time-covered");
+
+/// Which instant a picture shows of those that were asked for.
+pub(crate) struct Shown {
+    /// The instant.
+    pub(crate) time: TimeMs,
+    /// What there is, if the instant asked for lies outside.
+    covered: Option<Period>,
+}
+
+impl Shown {
+    pub(crate) fn of(layer: &Layer, asked: Option<TimeMs>) -> Self {
+        let time = request::shown_time(layer, asked);
+        Self {
+            time,
+            covered: asked
+                .is_some_and(|asked| asked != time)
+                .then_some(layer.extent),
+        }
+    }
+
+    fn headers(&self) -> HeaderMap {
+        let value = |text: String| text.parse().expect("times are printable");
+        let mut headers = HeaderMap::new();
+        headers.insert(SHOWN_TIME, value(self.time.to_string()));
+        if let Some(Period { start, end }) = self.covered {
+            headers.insert(COVERED, value(format!("{start}/{end}")));
+        }
+        headers
+    }
+}
 
 /// The picture of a job. The entity tag is the job's digest: the same job is the same picture, byte for byte, so a
 /// client that has it is answered without drawing or reading anything.
@@ -17,6 +56,7 @@ pub(crate) async fn respond(
     state: &AppState,
     asked: &HeaderMap,
     job: RenderJob,
+    shown: Shown,
 ) -> Result<Response, ServerError> {
     let tag = format!("\"{}\"", job.digest());
     let headers = [
@@ -25,10 +65,11 @@ pub(crate) async fn respond(
     ];
     if has_tag(asked, &tag) {
         state.metrics.hit(Source::Client);
-        return Ok((StatusCode::NOT_MODIFIED, headers).into_response());
+        return Ok((StatusCode::NOT_MODIFIED, headers, shown.headers()).into_response());
     }
     let picture = state.pictures.get(job).await?;
-    Ok((headers, [(header::CONTENT_TYPE, "image/png")], picture).into_response())
+    let content = [(header::CONTENT_TYPE, "image/png")];
+    Ok((headers, shown.headers(), content, picture).into_response())
 }
 
 /// Does `If-None-Match` name the tag? Weak comparison, as RFC 9110, 13.1.2 asks for.

@@ -79,7 +79,7 @@ pub(crate) async fn list(
     let layers = state.catalogue.layers().await?;
     let names: Vec<_> = layers
         .iter()
-        .map(|layer| (&layer.id, &layer.accumulated))
+        .map(|layer| (&layer.id, layer.accumulated.as_ref().map(|lift| &lift.id)))
         .collect();
     // Weak: the same list may be sent compressed or not.
     let tag = format!("W/\"{}\"", Digest::of_json(&names));

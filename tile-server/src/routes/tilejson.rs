@@ -10,6 +10,7 @@ use contract::tile::{MAX_LAT_DEG, MAX_ZOOM};
 use contract::time::TimeMs;
 use serde::{Deserialize, Serialize};
 
+use crate::catalogue::Layer;
 use crate::error::ServerError;
 use crate::extract::{UrlPath, UrlQuery, time};
 use crate::request;
@@ -24,6 +25,23 @@ const TILE_PX: f64 = 256.0;
 #[derive(Debug, Deserialize)]
 pub(crate) struct TileJsonQuery {
     time: Option<String>,
+    manifest: Option<String>,
+}
+
+impl TileJsonQuery {
+    /// The same query as tiles take it, in its canonical form.
+    fn of_tiles(&self, layer: &Layer) -> Result<String, ServerError> {
+        let time = time(self.time.as_deref())?.map(|time| format!("time={time}"));
+        // Named as it was found, not as it was written.
+        let manifest = self.manifest.as_ref();
+        let manifest = manifest.map(|_named| format!("manifest={}", layer.id));
+        let parts: Vec<String> = time.into_iter().chain(manifest).collect();
+        Ok(if parts.is_empty() {
+            String::new()
+        } else {
+            format!("?{}", parts.join("&"))
+        })
+    }
 }
 
 /// TileJSON 3.0.0, and beyond it the version and the instants of the layer.
@@ -52,9 +70,10 @@ pub(crate) async fn get(
     let name = file
         .strip_suffix(".json")
         .ok_or(ServerError::UnknownAddress)?;
-    let layer = state.catalogue.layer(&product).await?;
+    let named = query.manifest.as_deref();
+    let layer = state.catalogue.version(&product, named).await?;
     let mode = request::mode(&layer, name)?;
-    let at = time(query.time.as_deref())?.map_or_else(String::new, |time| format!("?time={time}"));
+    let at = query.of_tiles(&layer)?;
     let manifest = &layer.manifest;
     let answer = TileJson {
         tilejson: "3.0.0",

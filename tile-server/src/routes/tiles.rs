@@ -10,7 +10,7 @@ use serde::Deserialize;
 use crate::error::ServerError;
 use crate::extract::{UrlPath, UrlQuery, time, whole_number};
 use crate::request;
-use crate::routes::picture;
+use crate::routes::picture::{self, Shown};
 use crate::state::AppState;
 
 /// Pixels a side unless told otherwise.
@@ -41,12 +41,14 @@ pub(crate) async fn get(
     };
     let time = time(query.time.as_deref())?;
     let job = request::job(&layer, mode, View::Tile { tile, size_px }, time)?;
+    let shown = Shown::of(&layer, time);
     // Who looks at an old version is no reason to draw a new one.
     if state.catalogue.is_newest(&layer) {
         let product = &layer.manifest.product;
-        state.hot.asked(product, mode, &job.view, job.time);
+        let at = time.map(|_asked| shown.time);
+        state.hot.asked(product, mode, &job.view, at);
     }
-    let response = picture::respond(&state, &headers, job).await?;
+    let response = picture::respond(&state, &headers, job, shown).await?;
     if mode == Mode::Volume {
         state.freshness.served(&layer.id);
     }

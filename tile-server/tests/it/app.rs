@@ -8,6 +8,7 @@ use axum::http::{HeaderMap, Request, StatusCode};
 use contract::digest::Digest;
 use contract::grid::Grid;
 use contract::manifest::{MANIFEST_SCHEMA, Manifest, ManifestId, SeriesSegment, Step};
+use contract::moment::Moment;
 use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::time::Period;
@@ -217,6 +218,13 @@ impl TestApp {
         };
         manifests::commit(&self.store, &manifest).await.unwrap();
         manifest.id()
+    }
+
+    /// What the newest version of a product is made of at an instant.
+    pub(crate) async fn moment(&self, product: &str, time: &str) -> Moment {
+        let newest = manifests::latest(&self.store, &product.parse().unwrap()).await;
+        let moment = newest.unwrap().unwrap().moment(time.parse().unwrap());
+        moment.unwrap()
     }
 
     pub(crate) async fn get(&self, path: &str) -> Answer {

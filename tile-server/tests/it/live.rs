@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use contract::digest::Digest;
 use contract::event::{Body, Event};
-use contract::job::RenderJob;
+use contract::job::{Mode, RenderJob};
 use contract::manifest::ManifestId;
 use contract::quantity::Quantity;
 use contract::time::TimeMs;
@@ -136,6 +136,7 @@ async fn exactly_the_hot_tiles_that_it_touches_are_ordered() {
         "sst/map/1/0/0.png?time=2000-02-20",
         "sst/volume/0/0/0.png?time=2000-01-10",
         "flux/volume/0/0/0.png?time=2000-03-20",
+        "sst/points/0/0/0.png",
     ] {
         live.app.get(&format!("/tiles/{path}")).await;
     }
@@ -146,21 +147,27 @@ async fn exactly_the_hot_tiles_that_it_touches_are_ordered() {
     live.landed(&new).await;
     live.until(async || !live.orders().await.is_empty()).await;
     let orders = live.orders().await;
-    let mut asked: Vec<String> = orders
+    let mut asked: Vec<_> = orders
         .iter()
-        .map(|(_, job)| format!("{} {}", job.mode, job.time))
+        .map(|(_, job)| (job.mode, &job.value))
         .collect();
-    asked.sort();
+    asked.sort_by_key(|(mode, _)| *mode);
+    let (march, february, newest) = (
+        live.app.moment("sst", "2000-03-20").await,
+        live.app.moment("sst", "2000-02-20").await,
+        live.app.moment("sst", "2000-03-16T12:00:00Z").await,
+    );
     assert_eq!(
         asked,
         [
-            "map 2000-02-20T00:00:00Z",
-            "volume 2000-03-20T00:00:00Z",
-            "volume 2000-03-20T00:00:00Z"
-        ]
+            (Mode::Map, &february),
+            (Mode::Points, &newest),
+            (Mode::Volume, &march),
+            (Mode::Volume, &march)
+        ],
+        "and of the new version"
     );
-    for (event, job) in &orders {
-        assert_eq!(job.product, new);
+    for (event, _) in &orders {
         assert_eq!(event.trace, "trace-1");
         assert_eq!(event.noticed, Some(noticed()));
     }
@@ -192,7 +199,7 @@ async fn pictures_of_a_flux_wait_for_what_lifts_their_particles() {
         .land_last_month(product, quantity, 2, Some(flux.clone()))
         .await;
     live.say(Body::ProductDerived {
-        manifest: lift.clone(),
+        manifest: lift,
         derived_from: flux.clone(),
     })
     .await;
@@ -206,8 +213,10 @@ async fn pictures_of_a_flux_wait_for_what_lifts_their_particles() {
     live.until(async || !live.orders().await.is_empty()).await;
     let orders = live.orders().await;
     assert_eq!(orders.len(), 1);
-    assert_eq!(orders[0].1.product, flux);
-    assert_eq!(orders[0].1.accumulated, Some(lift));
+    let time = "2000-03-20";
+    assert_eq!(orders[0].1.value, live.app.moment("flux", time).await);
+    let lifting = live.app.moment(product, time).await;
+    assert_eq!(orders[0].1.accumulated, Some(lifting));
 }
 
 #[tokio::test]
@@ -280,4 +289,36 @@ async fn a_log_that_is_away_is_waited_for_and_what_landed_meanwhile_is_told() {
     let told = viewer.next().await.unwrap();
     assert_eq!(told.data["manifest"], new.to_string());
     assert_eq!(told.data["touched"][0]["start"], "2000-02-01T00:00:00Z");
+}
+
+#[tokio::test]
+async fn without_a_log_what_another_process_lands_is_told_all_the_same() {
+    let app = TestApp::new().await;
+    let watch = app.state.watch().every(Duration::from_millis(20));
+    let watching = tokio::spawn(watch.run());
+    let mut viewer = Viewer::new(&app, None).await;
+    // What is there already is no news, however often it is looked at.
+    tokio::time::sleep(Duration::from_millis(200)).await;
+    let (quantity, carbon) = (Quantity::CarbonFlux, Quantity::AccumulatedCarbon);
+    let flux = app.land_last_month("flux", quantity, 2, None).await;
+    let told = viewer.next().await.unwrap();
+    assert_eq!(told.data["manifest"], flux.to_string());
+    assert_eq!(told.data["touched"][0]["start"], "2000-02-01T00:00:00Z");
+    let lift = app
+        .land_last_month("flux-accumulated", carbon, 2, Some(flux.clone()))
+        .await;
+    let mut names = vec![];
+    for _ in 0..2 {
+        let told = viewer.next().await.unwrap();
+        names.push(told.data["manifest"].as_str().unwrap().to_owned());
+        assert_eq!(told.data["touched"][0]["start"], "2000-02-01T00:00:00Z");
+    }
+    names.sort();
+    assert_eq!(
+        names,
+        [lift.to_string(), flux.to_string()],
+        "it is lifted by something else now"
+    );
+    app.state.news.close();
+    watching.await.unwrap();
 }

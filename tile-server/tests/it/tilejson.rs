@@ -43,10 +43,8 @@ async fn its_tiles_are_there() {
         .replace("{x}", "0")
         .replace("{y}", "0");
     assert_eq!(app.get(&tile).await.status, StatusCode::OK);
-    assert_eq!(
-        app.drawer.last_job().time.to_string(),
-        "2000-02-01T00:00:00Z"
-    );
+    let meant = app.moment("flux", "2000-02-01T00:00:00Z").await;
+    assert_eq!(app.drawer.last_job().value, meant);
 }
 
 #[tokio::test]

@@ -3,6 +3,7 @@
 use axum::body::Body;
 use axum::http::{Request, StatusCode};
 use contract::job::{Mode, View};
+use contract::quantity::Quantity;
 use contract::tile::Tile;
 
 use crate::app::TestApp;
@@ -27,17 +28,11 @@ async fn a_tile_is_the_picture_of_the_job_its_address_means() {
             size_px: 512
         }
     );
-    assert_eq!(
-        (job.mode, job.time.to_string().as_str()),
-        (Mode::Volume, "2000-02-10T06:00:00Z")
-    );
-    assert_eq!(job.product.to_string().split('@').next(), Some("flux"));
-    assert!(
-        job.accumulated
-            .unwrap()
-            .to_string()
-            .starts_with("flux-accumulated@1-")
-    );
+    assert_eq!(job.mode, Mode::Volume);
+    let time = "2000-02-10T06:00:00Z";
+    assert_eq!(job.value, app.moment("flux", time).await);
+    let lift = app.moment("flux-accumulated", time).await;
+    assert_eq!(job.accumulated, Some(lift));
     assert!(!job.style.globe_surface);
 }
 
@@ -57,10 +52,8 @@ async fn every_mode_has_its_own_picture() {
 async fn without_a_time_the_middle_of_the_last_step_is_drawn() {
     let app = TestApp::new().await;
     app.get("/tiles/flux/volume/0/0/0.png").await;
-    assert_eq!(
-        app.drawer.last_job().time.to_string(),
-        "2000-03-16T12:00:00Z"
-    );
+    let middle = app.moment("flux", "2000-03-16T12:00:00Z").await;
+    assert_eq!(app.drawer.last_job().value, middle);
 }
 
 #[tokio::test]
@@ -105,11 +98,51 @@ async fn double_resolution_can_be_asked_for_as_map_clients_do() {
 #[tokio::test]
 async fn accumulated_carbon_that_came_from_another_version_does_not_lift_particles() {
     let app = TestApp::new().await;
-    app.land("flux", contract::quantity::Quantity::CarbonFlux, 2)
-        .await;
+    app.land("flux", Quantity::CarbonFlux, 2).await;
     app.get("/tiles/flux/volume/0/0/0.png").await;
     assert_eq!(app.drawer.last_job().accumulated, None);
-    assert_eq!(app.drawer.last_job().product.number, 2);
+    let new = app.moment("flux", "2000-03-16T12:00:00Z").await;
+    assert_eq!(app.drawer.last_job().value, new);
+}
+
+#[tokio::test]
+async fn a_landing_leaves_tiles_that_it_does_not_touch_as_they_are() {
+    let app = TestApp::new().await;
+    let tag = async |mode: &str, time: &str| {
+        let path = format!("/tiles/flux/{mode}/0/0/0.png?time={time}");
+        app.get(&path).await.header("etag").to_owned()
+    };
+    let tags = async || {
+        let mut tags = vec![];
+        for mode in ["map", "volume"] {
+            for time in ["2000-01-10", "2000-02-10", "2000-02-20", "2000-03-20"] {
+                tags.push(tag(mode, time).await);
+            }
+        }
+        tags
+    };
+    let is_same = |old: &[String], new: &[String]| -> Vec<bool> {
+        old.iter().zip(new).map(|(old, new)| old == new).collect()
+    };
+    let before = tags().await;
+    let drawn = app.drawer.drawn_count();
+    let flux = Quantity::CarbonFlux;
+    let version = app.land_last_month("flux", flux, 2, None).await;
+    // Only the last month differs; it shows from the middle of the one before it.
+    let untouched = [true, true, false, false];
+    let waiting = tags().await;
+    assert_eq!(is_same(&before, &waiting), [untouched, untouched].concat());
+    let carbon = Quantity::AccumulatedCarbon;
+    app.land_last_month("flux-accumulated", carbon, 2, Some(version))
+        .await;
+    let after = tags().await;
+    assert_eq!(is_same(&before, &after), [untouched, untouched].concat());
+    assert_eq!(waiting[..4], after[..4], "maps are not lifted");
+    assert_eq!(
+        app.drawer.drawn_count() - drawn,
+        4 + 1,
+        "only what differs was drawn"
+    );
 }
 
 #[tokio::test]
@@ -148,9 +181,38 @@ async fn offsets_of_times_survive_the_address() {
     for time in ["2000-02-10T06:00:00%2B02:00", "2000-02-10T06:00:00+02:00"] {
         app.get(&format!("/tiles/flux/volume/0/0/0.png?time={time}"))
             .await;
-        assert_eq!(
-            app.drawer.last_job().time.to_string(),
-            "2000-02-10T04:00:00Z"
-        );
+        let meant = app.moment("flux", "2000-02-10T04:00:00Z").await;
+        assert_eq!(app.drawer.last_job().value, meant);
     }
+}
+
+#[tokio::test]
+async fn a_picture_says_which_instant_it_shows_and_what_there_is_if_that_is_another() {
+    let app = TestApp::new().await;
+    let of = async |time: &str| {
+        let tile = app.get(&format!("/tiles/flux/map/0/0/0.png{time}")).await;
+        let globe = app.get(&format!("/globe/flux/map.png{time}")).await;
+        let said = |answer: &crate::app::Answer| {
+            ["fluxglobe-time", "fluxglobe-time-covered"].map(|name| answer.header(name).to_owned())
+        };
+        assert_eq!(said(&tile), said(&globe));
+        let tag = tile.header("etag");
+        let asked = format!("/tiles/flux/map/0/0/0.png{time}");
+        let again = app.get_with(&asked, &[("if-none-match", tag)]).await;
+        assert_eq!(again.status, StatusCode::NOT_MODIFIED);
+        assert_eq!(said(&again), said(&tile));
+        said(&tile)
+    };
+    let covered = "2000-01-01T00:00:00Z/2000-04-01T00:00:00Z";
+    assert_eq!(of("").await, ["2000-03-16T12:00:00Z", ""]);
+    assert_eq!(of("?time=2000-02-03").await, ["2000-02-03T00:00:00Z", ""]);
+    assert_eq!(of("?time=1900").await, ["2000-01-01T00:00:00Z", covered]);
+    assert_eq!(
+        of("?time=2026-11-21").await,
+        ["2000-04-01T00:00:00Z", covered]
+    );
+    let origin = [("origin", "http://map.example")];
+    let answer = app.get_with("/tiles/flux/map/0/0/0.png", &origin).await;
+    let exposed = answer.header("access-control-expose-headers");
+    assert!(exposed.contains("fluxglobe-time-covered"), "{exposed}");
 }

@@ -5,11 +5,20 @@ use contract::quantity::Quantity;
 
 use crate::app::TestApp;
 
+/// The name of the newest version of a product.
+async fn version(app: &TestApp, product: &str) -> String {
+    let products = app.get("/api/products").await.json();
+    let all = products["products"].as_array().unwrap();
+    let found = all.iter().find(|one| one["id"] == product).unwrap();
+    found["manifest"].as_str().unwrap().to_owned()
+}
+
 #[tokio::test]
 async fn a_named_version_is_drawn_with_what_was_derived_from_it() {
     let app = TestApp::new().await;
     app.get("/tiles/flux/volume/0/0/0.png").await;
     let old = app.drawer.last_job();
+    let cited = version(&app, "flux").await;
     let flux = app.land("flux", Quantity::CarbonFlux, 2).await;
     app.land_derived(
         "flux-accumulated",
@@ -20,14 +29,14 @@ async fn a_named_version_is_drawn_with_what_was_derived_from_it() {
     .await;
     app.get("/tiles/flux/volume/0/0/0.png").await;
     let new = app.drawer.last_job();
-    assert_ne!(new.product, old.product);
+    assert_ne!(new.value, old.value);
     assert_ne!(new.accumulated, old.accumulated);
     // At another address, so that it is drawn and not remembered.
-    let named = format!("/tiles/flux/volume/1/0/0.png?manifest={}", old.product);
+    let named = format!("/tiles/flux/volume/1/0/0.png?manifest={cited}");
     for _ in 0..2 {
         assert_eq!(app.get(&named).await.status, StatusCode::OK);
         let job = app.drawer.last_job();
-        assert_eq!(job.product, old.product);
+        assert_eq!(job.value, old.value);
         assert_eq!(job.accumulated, old.accumulated);
         assert!(job.accumulated.is_some());
     }
@@ -60,6 +69,8 @@ async fn a_version_that_is_not_there_is_not_found_and_nonsense_is_refused() {
     let sst = sst.as_str().unwrap();
     for address in [
         "/tiles/flux/map/0/0/0.png?",
+        "/tiles/flux/map.json?",
+        "/globe/flux/map.png?",
         "/api/products/flux/point?lon=15&lat=-5&",
         "/api/products/flux/budget?",
     ] {
@@ -77,4 +88,34 @@ async fn a_version_that_is_not_there_is_not_found_and_nonsense_is_refused() {
         }
     }
     assert_eq!(app.drawer.drawn_count(), 0);
+}
+
+#[tokio::test]
+async fn a_globe_and_a_tilejson_show_the_version_that_was_asked_for() {
+    let app = TestApp::new().await;
+    let cited = version(&app, "flux").await;
+    let path = "/globe/flux/map.png?time=2000-02-20";
+    let old = app.get(path).await.header("etag").to_owned();
+    app.land("flux", Quantity::CarbonFlux, 2).await;
+    assert_ne!(app.get(path).await.header("etag"), old);
+    let named = app.get(&format!("{path}&manifest={cited}")).await;
+    assert_eq!(named.header("etag"), old);
+    let of = async |query: &str| {
+        app.get(&format!("/tiles/flux/map.json{query}"))
+            .await
+            .json()
+    };
+    assert_ne!(of("").await["manifest"], cited);
+    let json = of(&format!("?time=2000-02&manifest={cited}")).await;
+    assert_eq!(json["manifest"], cited);
+    let tiles = json["tiles"][0].as_str().unwrap();
+    let expected = format!("{{y}}.png?time=2000-02-01T00:00:00Z&manifest={cited}");
+    assert!(tiles.ends_with(&expected), "{tiles}");
+    let tile = tiles.replace("{z}/{x}/{y}", "0/0/0");
+    app.get(&tile).await;
+    let same = format!("/tiles/flux/map/0/0/0.png?time=2000-02-01&manifest={cited}");
+    assert_eq!(
+        app.get(&tile).await.header("etag"),
+        app.get(&same).await.header("etag")
+    );
 }

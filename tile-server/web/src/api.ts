@@ -20,6 +20,8 @@ export interface Product {
   synthetic: boolean;
   source: string;
   manifest: string;
+  /** The version it was computed from. */
+  derived_from: string | null;
   bounds: [number, number, number, number];
   steps: { start: string; end: string; mid: string }[];
   modes: Mode[];

@@ -1,6 +1,7 @@
 //! The products as the page uses them: steps parsed, zoom limits fetched once, and the layer that a state describes.
 import * as api from "./api";
 import type { Product } from "./api";
+import { titleText } from "./format";
 import type { Mode, State } from "./state";
 import type { LayerSpec } from "./tiles";
 import { clampToRange, parseSteps, toIso, type Step } from "./time";
@@ -36,6 +37,17 @@ export class Catalogue {
         Number(b.quantity === FLUX) - Number(a.quantity === FLUX) ||
         b.modes.length - a.modes.length,
     )[0];
+  }
+
+  /** Titles of products, each once; what was derived from another one of them goes without saying. */
+  titlesOf(ids: readonly string[]): string[] {
+    const goesWithoutSaying = (product: Product | undefined): boolean =>
+      ids.some((id) => product?.derived_from?.startsWith(`${id}@`));
+    const told = [...new Set(ids)].filter((id) => !goesWithoutSaying(this.find(id)));
+    return told.map((id) => {
+      const product = this.find(id);
+      return product ? titleText(product) : id;
+    });
   }
 
   stepsOf(id: string | null): readonly Step[] {

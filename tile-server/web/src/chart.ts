@@ -2,6 +2,7 @@
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 import type { Sample } from "./series";
+import { timeNames } from "./time";
 
 const INK = "#9fb6c6";
 const GRID = "rgba(140, 180, 205, 0.14)";
@@ -133,7 +134,7 @@ export function dress(labelY: string): Omit<uPlot.Options, "width" | "height" | 
     cursor: { y: false, drag: { x: false, y: false }, points: { size: 8 } },
     padding: [8, 20, 0, 0],
     axes: [
-      { ...axis, grid: { show: false }, space: 44, size: 40, values: monthNames },
+      { ...axis, grid: { show: false }, space: 44, size: 40, values: timeNames },
       {
         ...axis,
         label: labelY,
@@ -144,25 +145,6 @@ export function dress(labelY: string): Omit<uPlot.Options, "width" | "height" | 
       },
     ],
   };
-}
-
-/** Months by name and, where a year begins or at the first label, the year below. */
-function monthNames(_plot: uPlot, splits: number[], _axis: number, _space: number, increment: number): string[] {
-  const DAY_S = 86_400;
-  let shownYear = Number.NaN;
-  return splits.map((seconds) => {
-    const date = new Date(seconds * 1000);
-    const year = date.getUTCFullYear();
-    const name = new Intl.DateTimeFormat("en", {
-      timeZone: "UTC",
-      month: "short",
-      ...(increment < 27 * DAY_S ? { day: "numeric" } : {}),
-    }).format(date);
-    if (increment >= 360 * DAY_S) return String(year);
-    const text = year === shownYear ? name : `${name}\n${year}`;
-    shownYear = year;
-    return text;
-  });
 }
 
 export function padded(_plot: uPlot, low: number | null, high: number | null): uPlot.Range.MinMax {

@@ -1,7 +1,7 @@
 //! The layer card: product, mode, opacity, legend and what is loading; changes go to the store only.
 import type { Product } from "./api";
 import { el, icon } from "./dom";
-import { chemistry } from "./format";
+import { chemistry, titleText } from "./format";
 import { PICTURE } from "./icons";
 import { legendView } from "./legend";
 import { MODES, type Mode, type Store } from "./state";
@@ -67,7 +67,7 @@ export class Controls {
   setProducts(products: readonly Product[]): void {
     this.#product.replaceChildren(
       ...products.map((product) =>
-        el("option", { value: product.id }, chemistry(product.title) + (product.synthetic ? " (synthetic)" : "")),
+        el("option", { value: product.id }, titleText(product)),
       ),
     );
   }

@@ -88,3 +88,9 @@ export function areaText(areaM2: number): string {
   const millionKm2 = areaM2 / 1e12;
   return `${numberText(millionKm2, digitsFor(millionKm2, 4))} million km²`;
 }
+
+/** A product's title that says so where the data are made up, once. */
+export function titleText(product: { title: string; synthetic: boolean }): string {
+  const says = /synthetic/i.test(product.title);
+  return chemistry(product.title) + (product.synthetic && !says ? " (synthetic)" : "");
+}

@@ -16,6 +16,7 @@ import { drawCheck } from "./check";
 import { Connection } from "./connection";
 import { Controls } from "./controls";
 import { byId } from "./dom";
+import { titleText } from "./format";
 import { Globe } from "./globe";
 import { decodeHash, encodeHash } from "./hash";
 import { LayerStage } from "./layers";
@@ -32,7 +33,7 @@ import { chooseQuality } from "./quality";
 import { INITIAL, Store } from "./state";
 import { TileCounts } from "./tiles";
 import { Timeline } from "./timeline";
-import { rangeOf } from "./time";
+import { clampToRange, isOutside, outsideText } from "./time";
 import { touches, Updates, type News } from "./updates";
 import { ViewDialog } from "./view";
 
@@ -40,6 +41,8 @@ import { ViewDialog } from "./view";
 const ADDRESS_PAUSE_MS = 300;
 
 const asked = decodeHash(location.hash);
+/** The instant that an address asks for, until it was held against what there is. */
+let askedMs = asked.timeMs;
 const store = new Store({ ...INITIAL, ...asked });
 const notices = new Notices();
 let catalogue = new Catalogue([]);
@@ -125,6 +128,7 @@ store.on(["mode", "product"], (state) => {
 store.on(["timeMs"], showLayer);
 // A new wish is a new chance: an old complaint about pictures would only confuse.
 store.on(["mode", "product", "timeMs"], () => notices.clear("tiles"));
+store.on(["product", "timeMs"], () => notices.clear("outside"));
 keepAddress();
 void begin();
 new Updates((news) => void renew(news));
@@ -208,8 +212,7 @@ async function renew(all: News[]): Promise<void> {
     report("products", error);
     return;
   }
-  const titles = new Set(all.map((news) => catalogue.find(news.product)?.title ?? news.product));
-  notices.tell("news", `New data: ${[...titles].join(", ")}`);
+  notices.tell("news", `New data: ${catalogue.titlesOf(all.map((news) => news.product)).join(", ")}`);
   controls.setProducts(catalogue.products);
   const now = product();
   if (!now) return;
@@ -231,18 +234,24 @@ function useProduct(): void {
   controls.setProduct(chosen);
   byId("synthetic").hidden = !chosen.synthetic;
   document.body.classList.toggle("is-synthetic", chosen.synthetic);
-  document.title = `${chosen.title}${chosen.synthetic ? " (synthetic)" : ""} – Fluxglobe`;
+  document.title = `${titleText(chosen)} – Fluxglobe`;
   const known = steps();
   timeline.setSteps(known);
   budgetPanel.setSteps(known);
   if (known.length === 0) notices.show("steps", `“${chosen.title}” has no periods yet.`);
   else notices.clear("steps");
   const mode = chosen.modes.includes(store.state.mode) ? store.state.mode : (chosen.modes[0] ?? "map");
-  const range = rangeOf(known);
-  const isInRange = range !== undefined && store.state.timeMs >= range.startMs && store.state.timeMs <= range.endMs;
-  // Another product's years say nothing here: it begins with its own first picture.
-  const timeMs = isInRange ? store.state.timeMs : (known[0]?.midMs ?? Number.NaN);
+  const wantedMs = askedMs ?? Number.NaN;
+  askedMs = undefined;
+  const isAsked = Number.isFinite(wantedMs);
+  // Another product's years say nothing here: unless its address names an instant, it begins with its own first picture.
+  const timeMs = isAsked
+    ? clampToRange(known, wantedMs)
+    : isOutside(known, store.state.timeMs) || !Number.isFinite(store.state.timeMs)
+      ? (known[0]?.midMs ?? Number.NaN)
+      : store.state.timeMs;
   store.set({ mode, timeMs });
+  if (isAsked && isOutside(known, wantedMs)) notices.show("outside", outsideText(titleText(chosen), known, wantedMs));
 }
 
 /** Only for a product that was chosen: new data of the one in sight must not turn the globe. */
@@ -269,6 +278,9 @@ function keepAddress(): void {
     const change = decodeHash(location.hash);
     if (change.product !== undefined && !catalogue.find(change.product)) delete change.product;
     if (change.camera) globe.view = change.camera;
+    askedMs = change.timeMs;
     store.set({ place: null, tab: null, region: INITIAL.region, opacity: INITIAL.opacity, ...change });
+    // A change of product has looked at the instant already.
+    if (askedMs !== undefined) useProduct();
   });
 }

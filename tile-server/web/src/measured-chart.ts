@@ -23,7 +23,7 @@ export function measuredChart(container: HTMLElement, group: Group, unit: string
     ],
   };
   if (!isOverTime && below && left) {
-    const { values: _monthNames, ...plain } = below;
+    const { values: _timeNames, ...plain } = below;
     options.axes = [{ ...plain, label: "depth, m", labelSize: 18, size: 34 }, left];
   }
   const value = (wanted: boolean) =>

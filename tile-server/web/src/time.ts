@@ -11,6 +11,7 @@ export interface Step {
 export const PARTS_PER_STEP = 8;
 
 const DAY_MS = 86_400_000;
+const DAY_S = DAY_MS / 1000;
 const MONTHS = ["Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec"];
 
 export function parseSteps(raw: readonly { start: string; end: string; mid: string }[]): Step[] {
@@ -30,6 +31,20 @@ export function rangeOf(steps: readonly Step[]): { startMs: number; endMs: numbe
 export function clampToRange(steps: readonly Step[], timeMs: number): number {
   const range = rangeOf(steps);
   return range ? Math.min(Math.max(timeMs, range.startMs), range.endMs) : timeMs;
+}
+
+/** Is there nothing of this instant? */
+export function isOutside(steps: readonly Step[], timeMs: number): boolean {
+  return clampToRange(steps, timeMs) !== timeMs;
+}
+
+/** What a reader is told who asked for an instant that there is nothing of; what is shown is `clampToRange`'s. */
+export function outsideText(title: string, steps: readonly Step[], timeMs: number): string {
+  const range = rangeOf(steps);
+  if (!range) return "";
+  const [from, to] = [range.startMs, range.endMs].map(formatInstant);
+  const shown = formatInstant(clampToRange(steps, timeMs));
+  return `“${title}” has nothing of ${formatInstant(timeMs)}: it covers ${from} to ${to}. Shown is ${shown}.`;
 }
 
 /**
@@ -105,6 +120,30 @@ export function stepLabel(step: Step): string {
   if (days >= 27) return `${month} ${start.getUTCFullYear()}`;
   const day = `${start.getUTCDate()} ${month} ${start.getUTCFullYear()}`;
   return days >= 1 ? day : `${day} ${start.toISOString().slice(11, 16)}`;
+}
+
+/** Months by name and, where a year begins or at the first label, the year below; within days hours with the day below. */
+export function timeNames(
+  _plot: unknown,
+  splits: readonly number[],
+  _axis: number,
+  _space: number,
+  increment: number,
+): string[] {
+  let shownBelow = "";
+  return splits.map((seconds) => {
+    const date = new Date(seconds * 1000);
+    const year = String(date.getUTCFullYear());
+    if (increment >= 360 * DAY_S) return year;
+    const isWithinDays = increment < DAY_S;
+    const month = MONTHS[date.getUTCMonth()] ?? "";
+    const day = increment < 27 * DAY_S ? `${date.getUTCDate()} ${month}` : month;
+    const below = isWithinDays ? `${day} ${year}` : year;
+    const name = isWithinDays ? date.toISOString().slice(11, 16) : day;
+    const text = below === shownBelow ? name : `${name}\n${below}`;
+    shownBelow = below;
+    return text;
+  });
 }
 
 function wholeSecond(timeMs: number): number {

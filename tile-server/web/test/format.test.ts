@@ -1,6 +1,6 @@
 //! Units and numbers as text: the signs a reader of a journal expects.
 import { describe, expect, it } from "vitest";
-import { areaText, chemistry, digitsFor, latText, lonText, numberText, unitText, wrapLon } from "../src/format";
+import { areaText, chemistry, digitsFor, latText, lonText, numberText, titleText, unitText, wrapLon } from "../src/format";
 
 const plain = (text: string): string => text.replace(/\u202f/g, " ").replace(/\u2009/g, "_");
 
@@ -62,5 +62,13 @@ describe("places", () => {
 
   it("wrap to -180..180", () => {
     expect([-190, -180, 0, 179, 180, 540, 725].map(wrapLon)).toEqual([170, -180, 0, 179, -180, -180, 5]);
+  });
+});
+
+describe("titles", () => {
+  it("say once that data are made up", () => {
+    expect(titleText({ title: "CO2 flux", synthetic: false })).toBe("CO₂ flux");
+    expect(titleText({ title: "CO2 flux", synthetic: true })).toBe("CO₂ flux (synthetic)");
+    expect(titleText({ title: "SYNTHETIC China Sea", synthetic: true })).toBe("SYNTHETIC China Sea");
   });
 });

@@ -4,13 +4,16 @@ import {
   clampToRange,
   formatInstant,
   instantAt,
+  isOutside,
   nextInstant,
+  outsideText,
   parseSteps,
   positionOf,
   quantise,
   rangeOf,
   stepLabel,
   strideFor,
+  timeNames,
   toIso,
   type Step,
 } from "../src/time";
@@ -123,5 +126,46 @@ describe("texts", () => {
     expect(stepLabel(step("2000-01-01T00:00:00Z", "2001-01-01T00:00:00Z"))).toBe("2000");
     expect(stepLabel(step("2002-01-05T00:00:00Z", "2002-01-06T00:00:00Z"))).toBe("5 Jan 2002");
     expect(stepLabel(step("2002-01-05T06:00:00Z", "2002-01-05T12:00:00Z"))).toBe("5 Jan 2002 06:00");
+  });
+});
+
+describe("an instant that there is nothing of", () => {
+  it("is told with what there is and what is shown", () => {
+    const text = outsideText("Flux", STEPS, at("1850-03-01T00:00:00Z"));
+    expect(text).toBe(
+      "“Flux” has nothing of 1 Mar 1850, 00:00 UTC: it covers 1 Jan 2000, 00:00 UTC to 1 Jun 2000, 00:00 UTC. " +
+        "Shown is 1 Jan 2000, 00:00 UTC.",
+    );
+    expect(outsideText("Flux", STEPS, at("2026-11-21T00:00:00Z"))).toMatch(/Shown is 1 Jun 2000, 00:00 UTC\.$/);
+  });
+
+  it("lies beyond both ends and in no hole", () => {
+    expect(["1999-12-31T23:59:59Z", "2000-06-01T00:00:01Z"].map((time) => isOutside(STEPS, at(time)))).toEqual([true, true]);
+    expect([JAN.start, "2000-04-01T00:00:00Z", MAY.end].map((time) => isOutside(STEPS, at(time)))).toEqual([
+      false,
+      false,
+      false,
+    ]);
+  });
+});
+
+describe("labels of a time axis", () => {
+  const HOUR_S = 3600;
+  const labels = (increment: number, ...times: string[]): string[] =>
+    timeNames(undefined, times.map((time) => at(time) / 1000), 0, 0, increment);
+
+  it("name years, months, days and hours, with what they lie in where that begins", () => {
+    expect(labels(366 * 24 * HOUR_S, JAN.start)).toEqual(["2000"]);
+    expect(labels(30 * 24 * HOUR_S, "1999-12-01T00:00:00Z", JAN.start, FEB.start)).toEqual([
+      "Dec\n1999",
+      "Jan\n2000",
+      "Feb",
+    ]);
+    expect(labels(24 * HOUR_S, JAN.start, "2000-01-02T00:00:00Z")).toEqual(["1 Jan\n2000", "2 Jan"]);
+    expect(labels(6 * HOUR_S, "2000-01-01T12:00:00Z", "2000-01-01T18:00:00Z", "2000-01-02T00:00:00Z")).toEqual([
+      "12:00\n1 Jan 2000",
+      "18:00",
+      "00:00\n2 Jan 2000",
+    ]);
   });
 });

@@ -7,7 +7,7 @@ use anyhow::{Context as _, Result};
 use comfy_table::presets::NOTHING;
 use comfy_table::{CellAlignment, Table};
 use contract::colour::TransferFunction;
-use contract::job::{Mode, RENDERER_VERSION, RenderJob, Style, View};
+use contract::job::{Mode, RenderJob, Style, View};
 use contract::manifest::Manifest;
 use contract::tile::Tile;
 use render_worker::proof::{QualityRow, against_slices, ocean};
@@ -153,15 +153,9 @@ async fn landed(
     ];
     let mut subjects = vec![];
     for (name, view) in views {
-        let job = RenderJob {
-            renderer_version: RENDERER_VERSION,
-            product: manifest.id(),
-            accumulated: accumulated.clone(),
-            time: last.period.mid(),
-            mode: Mode::Volume,
-            view,
-            style: Style::with_transfer(TransferFunction::default_for(manifest.quantity)),
-        };
+        let style = Style::with_transfer(TransferFunction::default_for(manifest.quantity));
+        let time = last.period.mid();
+        let job = RenderJob::of(manifest, accumulated.as_ref(), time, Mode::Volume, view, style)?;
         subjects.push(Subject {
             name: format!("{}, {name}", manifest.product),
             scene: service.scene(&job).await?,

@@ -11,7 +11,7 @@ use contract::tile::Tile;
 use contract::topic::Topic;
 use storage::log::{EventLog, Start};
 use storage::{Store, manifests};
-use tile_server::{Layer, picture_job};
+use tile_server::{Accumulated, Layer, picture_job};
 
 use crate::cli::{Recompute, Settings};
 use crate::{deployment, progress};
@@ -47,7 +47,7 @@ pub(super) async fn plan(store: &Store, options: &Recompute) -> Result<Tiles> {
     let layer = Layer {
         id,
         extent,
-        accumulated: accumulated.map(|derived| derived.id()),
+        accumulated: accumulated.map(|derived| Accumulated::new(derived.id(), derived.into())),
         manifest: manifest.into(),
     };
     let stored: BTreeSet<ObjectKey> = store.list("tiles").await?.into_iter().collect();

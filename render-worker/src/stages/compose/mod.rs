@@ -6,10 +6,17 @@ use crate::error::RenderError;
 use crate::frame::FrameContext;
 use crate::gpu::{Gpu, Kernel, Slot};
 
+/// The function that the eye runs for its own pixels.
+pub const FUNCTIONS: &str = concat!(
+    include_str!("../sphere.wgsl"),
+    include_str!("over_globe.wgsl")
+);
+
 /// The shader.
 pub const SOURCE: &str = concat!(
     include_str!("../prelude.wgsl"),
     include_str!("../sphere.wgsl"),
+    include_str!("over_globe.wgsl"),
     include_str!("compose.wgsl")
 );
 

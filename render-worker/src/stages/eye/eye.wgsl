@@ -1,14 +1,23 @@
-// The eye's side of half-angle slicing: one workgroup a screen tile, two pixels an invocation. Inside a slice optical
-// depth and colour are summed as integers, in any order; slices are blended in order, towards or away from the eye.
+// The eye's side of half-angle slicing: one workgroup a screen tile. Inside a slice the entries of its list add optical
+// depth and colour to the pixels that they reach, as integers and so in any order; slices are blended in order, towards
+// or away from the eye. Entries are spread over the invocations while they are added, pixels while they are blended.
 @group(0) @binding(1) var<storage, read> list_ends: array<u32>;
 @group(0) @binding(2) var<storage, read> entries: array<Entry>;
-@group(0) @binding(3) var<storage, read_write> picture: array<vec4<f32>>;
+@group(0) @binding(3) var<storage, read> domain: array<u32>;
+@group(0) @binding(4) var<storage, read_write> image: array<u32>;
 
-const BATCH = 32u; // SCREEN_TILE_PX * HALF_TILE_PX
-const HALF_TILE_PX = 4u;
-const MOST_SUM = vec4<u32>(0x7fffffffu);
+const PIXELS = 256u; // SCREEN_TILE_PX squared, and invocations
+// Entries of a slice whose sums, below 2^24 each, stay below 2^32.
+const SAFE = 256u;
+const MOST_SUM = 0x7fffffffu;
+// Slices whose lists are looked up at once.
+const LOOKED_UP = 64u;
 
-var<workgroup> batch: array<Entry, BATCH>;
+// Shared memory is what limits how many workgroups run at once: no more than this.
+// Red, green, blue and depth of every pixel.
+var<workgroup> sums: array<atomic<u32>, 1024>;
+// Where the list before these slices ends, and theirs.
+var<workgroup> ends: array<u32, 65>;
 
 // Share of a splat's depth at a squared distance of `q` squared radii from its centre.
 fn weight_at(q: f32, radius_px: f32) -> f32 {
@@ -25,15 +34,43 @@ fn ball_light(offset: vec2<f32>) -> f32 {
     return 0.55 + 0.45 * clamp(-0.45 * offset.x - 0.55 * offset.y + 0.70 * toward, 0.0, 1.0);
 }
 
-struct Round { inverse_radius: f32, radius_px: f32, depth: f32, rgb: vec3<u32> }
-
-fn contribution(own: Round, offset: vec2<f32>) -> vec4<u32> {
-    let q = dot(offset, offset);
-    let amount = u32(own.depth * weight_at(q, own.radius_px) + 0.5);
-    if (params.kernel == KERNEL_BALL) {
-        return vec4(vec3<u32>(vec3<f32>(own.rgb) * ball_light(offset) + 0.5) * amount, amount);
+// Adds an entry to every second row of pixels.
+fn add(entry: Entry, half: i32) {
+    let pixel_units = f32(SUBPIXELS) / f32(1u << params.entry_shift);
+    let radius_px = f32(entry.size & 0xffffu) / pixel_units;
+    let place = vec2(f32(i32(entry.place << 16u) >> 16u), f32(i32(entry.place) >> 16u)) / pixel_units;
+    let depth = f32(entry.size >> 16u);
+    let rgb = vec3(entry.color & 255u, (entry.color >> 8u) & 255u, (entry.color >> 16u) & 255u);
+    // Pixels with their centre within the radius.
+    let low = max(vec2<i32>(ceil(place - radius_px - 0.5)), vec2(0));
+    let high = min(vec2<i32>(floor(place + radius_px - 0.5)), vec2(i32(SCREEN_TILE_PX) - 1));
+    let inverse_radius = 1.0 / radius_px;
+    for (var y = low.y + ((low.y ^ half) & 1); y <= high.y; y += 2) {
+        let south = (f32(y) + 0.5 - place.y) * inverse_radius;
+        for (var x = low.x; x <= high.x; x++) {
+            let east = (f32(x) + 0.5 - place.x) * inverse_radius;
+            let amount = u32(depth * weight_at(east * east + south * south, radius_px) + 0.5);
+            if (amount == 0u) { continue; }
+            var own = rgb;
+            if (params.kernel == KERNEL_BALL) { own = vec3<u32>(vec3<f32>(rgb) * ball_light(vec2(east, south)) + 0.5); }
+            let pixel = u32(y) * SCREEN_TILE_PX + u32(x);
+            atomicAdd(&sums[pixel], own.x * amount);
+            atomicAdd(&sums[PIXELS + pixel], own.y * amount);
+            atomicAdd(&sums[2u * PIXELS + pixel], own.z * amount);
+            atomicAdd(&sums[3u * PIXELS + pixel], amount);
+        }
     }
-    return vec4(own.rgb * amount, amount);
+}
+
+fn taken_one(at: u32) -> u32 {
+    let sum = atomicLoad(&sums[at]);
+    if (sum > 0u) { atomicStore(&sums[at], 0u); }
+    return sum;
+}
+
+// What was added to a pixel since it was last looked at.
+fn taken(at: u32) -> vec4<u32> {
+    return vec4(taken_one(at), taken_one(PIXELS + at), taken_one(2u * PIXELS + at), taken_one(3u * PIXELS + at));
 }
 
 // Colour with alpha, premultiplied, once the slice with these sums is blended into it.
@@ -45,51 +82,40 @@ fn blended(picture: vec4<f32>, sums: vec4<u32>) -> vec4<f32> {
     return picture * (1.0 - alpha) + slice;
 }
 
-fn put(pixel: vec2<u32>, color: vec4<f32>) {
-    if (pixel.x < params.width && pixel.y < params.height) { picture[pixel.y * params.width + pixel.x] = color; }
-}
-
-@compute @workgroup_size(SCREEN_TILE_PX, HALF_TILE_PX)
-fn eye(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>,
+@compute @workgroup_size(SCREEN_TILE_PX, SCREEN_TILE_PX)
+fn eye(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(global_invocation_id) pixel: vec3<u32>,
     @builtin(local_invocation_index) invocation: u32) {
+    for (var channel = 0u; channel < 4u; channel++) { atomicStore(&sums[channel * PIXELS + invocation], 0u); }
     let first_list = (workgroup.y * params.tiles_x + workgroup.x) * params.slices;
-    var first = 0u;
-    if (first_list > 0u) { first = min(list_ends[first_list - 1u], params.entry_capacity); }
-    let end = min(list_ends[first_list + params.slices - 1u], params.entry_capacity);
-    // Centre of the upper pixel in the unit of entries.
-    let unit = 1.0 / f32(1u << params.entry_shift);
-    let center = (vec2<f32>(local.xy) + 0.5) * f32(SUBPIXELS) * unit;
-    let step = f32(HALF_TILE_PX) * f32(SUBPIXELS) * unit;
-    var upper = vec4(0.0);
-    var lower = vec4(0.0);
-    var upper_sums = vec4(0u);
-    var lower_sums = vec4(0u);
-    var slice = 0u;
-    for (var base = first; base < end; base += BATCH) {
-        workgroupBarrier();
-        if (base + invocation < end) { batch[invocation] = entries[base + invocation]; }
-        workgroupBarrier();
-        let length = min(BATCH, end - base);
-        for (var j = 0u; j < length; j++) {
-            let entry = batch[j];
-            if (entry.color >> 24u != slice) {
-                slice = entry.color >> 24u;
-                upper = blended(upper, upper_sums);
-                lower = blended(lower, lower_sums);
-                upper_sums = vec4(0u);
-                lower_sums = vec4(0u);
-            }
-            let radius = f32(entry.size & 0xffffu);
-            let rgb = vec3(entry.color & 255u, (entry.color >> 8u) & 255u, (entry.color >> 16u) & 255u);
-            let own = Round(1.0 / radius, radius / (unit * f32(SUBPIXELS)), f32(entry.size >> 16u), rgb);
-            let place = vec2(f32(i32(entry.place << 16u) >> 16u), f32(i32(entry.place) >> 16u));
-            let offset = (center - place) * own.inverse_radius;
-            upper_sums = min(upper_sums + contribution(own, offset), MOST_SUM);
-            let below = vec2(offset.x, offset.y + step * own.inverse_radius);
-            lower_sums = min(lower_sums + contribution(own, below), MOST_SUM);
+    var color = vec4(0.0);
+    for (var first = 0u; first < params.slices; first += LOOKED_UP) {
+        let looked_up = min(params.slices - first, LOOKED_UP);
+        if (invocation <= looked_up) {
+            // Ends of lists, from the one before on.
+            let list = first_list + first + invocation;
+            ends[invocation] = 0u;
+            if (list > 0u) { ends[invocation] = min(list_ends[list - 1u], params.entry_capacity); }
         }
+        workgroupBarrier();
+        // Nothing to look for where nothing is listed.
+        let listed = select(looked_up, 0u, ends[0] == ends[looked_up]);
+        for (var slice = 0u; slice < listed; slice++) {
+            let begin = ends[slice];
+            let end = ends[slice + 1u];
+            if (end <= begin) { continue; }
+            var own = vec4(0u);
+            for (var base = begin; base < end; base += SAFE) {
+                // Two invocations an entry.
+                for (var at = base + (invocation >> 1u); at < min(base + SAFE, end); at += PIXELS / 2u) {
+                    add(entries[at], i32(invocation & 1u));
+                }
+                workgroupBarrier();
+                own += min(taken(invocation), vec4(MOST_SUM) - own);
+                workgroupBarrier();
+            }
+            color = blended(color, own);
+        }
+        workgroupBarrier();
     }
-    let pixel = workgroup.xy * SCREEN_TILE_PX + local.xy;
-    put(pixel, blended(upper, upper_sums));
-    put(pixel + vec2(0u, HALF_TILE_PX), blended(lower, lower_sums));
+    if (pixel.x < params.width && pixel.y < params.height) { image[pixel.y * params.width + pixel.x] = composed(pixel.xy, color); }
 }

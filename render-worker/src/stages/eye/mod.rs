@@ -1,4 +1,4 @@
-//! The eye: lists of entries in, the blended colour of every pixel out. See `eye.wgsl`.
+//! The eye: lists of entries in, every pixel out, blended and composed. See `eye.wgsl`.
 
 pub mod cpu;
 
@@ -7,34 +7,44 @@ use crate::frame::FrameContext;
 use crate::gpu::{Gpu, Kernel, Slot};
 
 /// The shader.
-pub const SOURCE: &str = concat!(include_str!("../prelude.wgsl"), include_str!("eye.wgsl"));
+pub const SOURCE: &str = concat!(
+    include_str!("../prelude.wgsl"),
+    include_str!("../sphere.wgsl"),
+    include_str!("../compose/over_globe.wgsl"),
+    include_str!("eye.wgsl")
+);
 
-/// The compiled stage.
+/// The compiled stage: one shader for each kind of particle, which is tested for every pixel of every entry otherwise.
 pub struct Eye {
-    eye: Kernel,
+    of_kernel: [Kernel; 3],
 }
 
 impl Eye {
     /// Compiles `source`, [`SOURCE`] but for tests.
     pub fn new(gpu: &Gpu, source: &str) -> Self {
+        let compiled = |kernel| {
+            let source = source.replace("params.kernel", kernel);
+            gpu.kernel("eye", &source, "eye")
+        };
         Self {
-            eye: gpu.kernel("eye", source, "eye"),
+            of_kernel: ["KERNEL_DOT", "KERNEL_BALL", "KERNEL_CLOUD"].map(compiled),
         }
     }
 
-    /// Fills the slot of the picture.
+    /// Fills the slot of the image.
     pub fn record(&self, frame: &mut FrameContext<'_>) -> Result<(), RenderError> {
         let counts = frame.room(Slot::Counts, 4)?;
         let entries = frame.room(Slot::Entries, 4)?;
-        let picture = frame.room(Slot::Picture, frame.pixel_count() * 16)?;
+        let image = frame.room(Slot::Image, frame.pixel_count() * 4)?;
         let buffers = [
             (0, &frame.params_buffer),
             (1, &counts),
             (2, &entries),
-            (3, &picture),
+            (3, &frame.domain),
+            (4, &image),
         ];
         frame.recorder.dispatch(
-            &self.eye,
+            &self.of_kernel[frame.params.kernel as usize],
             &buffers,
             [frame.params.tiles_x, frame.params.tiles_y],
         );

@@ -1,60 +1,36 @@
-// Missing cells of the domain from the cells with data around them: inverse distance weighting (power 2) within a
-// window, every workgroup loading its block and the window's rim into shared memory once.
-@group(0) @binding(0) var<uniform> params: FillParams;
-@group(0) @binding(1) var<storage, read> values: array<f32>;
-@group(0) @binding(2) var<storage, read> domain: array<u32>;
-@group(0) @binding(3) var<storage, read> cosines: array<f32>;
-@group(0) @binding(4) var<storage, read_write> filled: array<f32>;
-
-struct FillParams { rows: u32, cols: u32, periodic: u32, reach_x: i32, lon_per_lat: f32, pad_a: u32, pad_b: u32, pad_c: u32, }
-
-const MISSING = -1.0e30;
-const BLOCK = 16;
-const REACH = 8;
-const SIDE = 32; // BLOCK + 2 * REACH
-
-var<workgroup> near: array<f32, 1024>; // SIDE * SIDE
-
-fn load(row: i32, col: i32) -> f32 {
-    var x = col;
-    let cols = i32(params.cols);
-    if (params.periodic == 1u) { x = (x % cols + cols) % cols; }
-    if (row < 0 || row >= i32(params.rows) || x < 0 || x >= cols) { return MISSING; }
-    return values[u32(row) * params.cols + u32(x)];
+// Shared by the forms of gap filling: the struct of one level, arithmetic that rounds alike on every device, and the
+// weighted sum over the cells around each cell.
+struct FillLevel {
+    rows: u32, cols: u32, periodic: u32, reach_rows: u32, reach_cols: u32, coarser_rows: u32, coarser_cols: u32,
+    coarser_pad_cols: u32, is_masked: u32, has_coarser: u32, lean: f32, zero: u32,
 }
 
-@compute @workgroup_size(BLOCK, BLOCK)
-fn fill(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>,
-    @builtin(local_invocation_index) invocation: u32) {
-    let origin = vec2<i32>(workgroup.xy) * BLOCK - REACH;
-    for (var i = i32(invocation); i < SIDE * SIDE; i += BLOCK * BLOCK) {
-        near[i] = load(origin.y + i / SIDE, origin.x + i % SIDE);
-    }
-    workgroupBarrier();
-    let center = vec2<i32>(local.xy) + REACH;
-    let col = u32(origin.x + center.x);
-    let row = u32(origin.y + center.y);
-    if (row >= params.rows || col >= params.cols) { return; }
-    let at = row * params.cols + col;
-    let own = near[center.y * SIDE + center.x];
-    if (own >= 0.5 * MISSING || domain[at] == 0u) {
-        filled[at] = own;
-        return;
-    }
-    let width = cosines[row] * params.lon_per_lat;
-    var weights = 0.0;
-    var sum = 0.0;
-    for (var dy = -REACH; dy <= REACH; dy++) {
-        for (var dx = -params.reach_x; dx <= params.reach_x; dx++) {
-            let value = near[(center.y + dy) * SIDE + center.x + dx];
-            if (value >= 0.5 * MISSING) {
-                let east = f32(dx) * width;
-                let south = f32(dy);
-                let weight = 1.0 / (east * east + south * south);
-                weights += weight;
-                sum += weight * value;
-            }
-        }
-    }
-    if (weights > 0.0) { filled[at] = sum / weights; } else { filled[at] = own; }
+const MISSING = -1.0e30;
+const COARSER_PAD = 2u;
+const WIDTH = 128u;
+const SEGMENT = 512u; // WIDTH + 2 * MOST_REACH_COLS
+
+@group(0) @binding(0) var<uniform> level: FillLevel;
+
+fn is_missing(value: f32) -> bool {
+    return value < 0.5 * MISSING;
+}
+
+// A product that no compiler joins with the sum it goes into: a joined one rounds once, not twice, and then devices
+// differ. Nobody can know before the run that `zero` is 0.
+fn product(a: f32, b: f32) -> f32 {
+    return bitcast<f32>(bitcast<u32>(a * b) ^ level.zero);
+}
+
+fn products(a: f32, b: vec3<f32>) -> vec3<f32> {
+    return bitcast<vec3<f32>>(bitcast<vec3<u32>>(a * b) ^ vec3<u32>(level.zero));
+}
+
+// `a / b` for positive `b` by Newton's iteration: devices may divide with an error that is up to them.
+fn quotient(a: f32, b: f32) -> f32 {
+    var inverse = bitcast<f32>(0x7ef311c7u - bitcast<u32>(b));
+    inverse *= 2.0 - product(b, inverse);
+    inverse *= 2.0 - product(b, inverse);
+    inverse *= 2.0 - product(b, inverse);
+    return product(a, inverse);
 }

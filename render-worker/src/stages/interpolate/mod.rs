@@ -7,28 +7,30 @@ use crate::frame::FrameContext;
 use crate::gpu::{Gpu, Kernel, Slot};
 use crate::stages::layout::GROUP;
 
+/// The function that other stages run where they need one cell.
+pub const FUNCTIONS: &str = include_str!("between.wgsl");
+
 /// The shader.
 pub const SOURCE: &str = concat!(
     include_str!("../prelude.wgsl"),
+    include_str!("between.wgsl"),
     include_str!("interpolate.wgsl")
 );
 
 /// The compiled stage.
 pub struct Interpolate {
-    value: Kernel,
-    accumulated: Kernel,
+    interpolate: Kernel,
 }
 
 impl Interpolate {
     /// Compiles `source`, [`SOURCE`] but for tests.
     pub fn new(gpu: &Gpu, source: &str) -> Self {
         Self {
-            value: gpu.kernel("interpolate", source, "interpolate_value"),
-            accumulated: gpu.kernel("interpolate", source, "interpolate_accumulated"),
+            interpolate: gpu.kernel("interpolate", source, "interpolate"),
         }
     }
 
-    /// Fills the slots of values and accumulated carbon.
+    /// Fills the slot of values.
     pub fn record(&self, frame: &mut FrameContext<'_>) -> Result<(), RenderError> {
         let cells = frame
             .params
@@ -45,25 +47,7 @@ impl Interpolate {
         ];
         frame
             .recorder
-            .dispatch_list(&self.value, &buffers, cells, GROUP);
-        // The next stage binds the slot also where nothing is accumulated.
-        let accumulated_bytes = if frame.accumulated_frames.is_some() {
-            bytes
-        } else {
-            4
-        };
-        let accumulated = frame.room(Slot::Accumulated, accumulated_bytes)?;
-        if let Some([before, after]) = frame.accumulated_frames.clone() {
-            let buffers = [
-                (0, &frame.params_buffer),
-                (1, &before),
-                (2, &after),
-                (3, &accumulated),
-            ];
-            frame
-                .recorder
-                .dispatch_list(&self.accumulated, &buffers, cells, GROUP);
-        }
+            .dispatch_list(&self.interpolate, &buffers, cells, GROUP);
         Ok(())
     }
 }

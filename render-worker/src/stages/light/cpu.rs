@@ -1,17 +1,20 @@
-//! CPU twin of `light.wgsl`.
+//! CPU twin of `deposit.wgsl`, `light.wgsl` and `shade.wgsl`.
 
 use crate::stages::layout::{DEPTH_ONE, Params, Splat, nearest};
 
 const MOST_GIVEN: f32 = 16.0;
 const DARK: u32 = 0x7fff_ffff;
 
+/// Places in a cloud where its light is looked up, radii towards the eye, and the share of the cloud there: one look at
+/// the centre would draw clouds too dark, because the eye sees their near sides.
+const LOOKUPS: [(f32, f32); 3] = [(-0.6, 0.3277), (0.0, 1.0), (0.6, 0.3277)];
+
 struct Texel {
     index: [i32; 2],
     part: [f32; 2],
 }
 
-fn texel_of(params: &Params, splat: &Splat) -> Texel {
-    let place = [splat.light_u, splat.light_v];
+fn texel_of(params: &Params, place: [i32; 2]) -> Texel {
     let index = place.map(|p| p.div_euclid(params.light_unit));
     let part = [0, 1].map(|axis| {
         (place[axis] - index[axis] * params.light_unit) as f32 / params.light_unit as f32
@@ -30,7 +33,7 @@ fn address(params: &Params, texel: [i32; 2], slice: u32) -> Option<usize> {
 /// Adds every splat's depth to the four nearest texels of the two slices whose middles it lies between.
 pub fn deposit(params: &Params, splats: &[Splat], light: &mut [u32]) {
     for splat in splats.iter().filter(|splat| splat.tau > 0.0) {
-        let texel = texel_of(params, splat);
+        let texel = texel_of(params, [splat.light_u, splat.light_v]);
         let middle = (splat.slice - 0.5).floor();
         let behind = splat.light_depth * (splat.slice - 0.5 - middle);
         give_slice(
@@ -105,22 +108,44 @@ fn mix(a: f32, b: f32, t: f32) -> f32 {
     a * (1.0 - t) + b * t
 }
 
+/// Optical depth between a place and the sun.
+fn depth_before(params: &Params, light: &[u32], place: [i32; 2], slice: f32) -> f32 {
+    let Texel {
+        index: [x, y],
+        part: [east, south],
+    } = texel_of(params, place);
+    let middle = (slice - 0.5).floor();
+    let part = slice - 0.5 - middle;
+    let depth = |texel| depth_above(params, light, texel, middle as i32, part);
+    let north_row = mix(depth([x, y]), depth([x + 1, y]), east);
+    let south_row = mix(depth([x, y + 1]), depth([x + 1, y + 1]), east);
+    mix(north_row, south_row, south)
+}
+
+/// Share of the direct light that what the eye sees of a splat gets.
+fn lit(params: &Params, light: &[u32], splat: &Splat) -> f32 {
+    let (u, v) = (splat.light_u as f32, splat.light_v as f32);
+    let (mut sum, mut weights) = (0.0, 0.0);
+    for (t, weight) in LOOKUPS {
+        let step = t * splat.radius_px;
+        let place = [
+            splat.light_u + nearest(step * (params.toward_u - params.toward_pull * u)),
+            splat.light_v + nearest(step * (params.toward_v - params.toward_pull * v)),
+        ];
+        let toward = params.toward_slice - params.toward_pull * splat.slice;
+        let slice = (splat.slice + step * toward).clamp(0.0, params.slices as f32 - 0.001);
+        // Where little light reaches, the eye sees little past what lies in front.
+        let half = (-0.5 * depth_before(params, light, place, slice)).exp();
+        sum += weight * half * half * half;
+        weights += weight * half;
+    }
+    sum / weights.max(1e-30)
+}
+
 /// Dims every splat's colour by what lies between it and the sun.
 pub fn shade(params: &Params, light: &[u32], splats: &mut [Splat]) {
     for splat in splats.iter_mut().filter(|splat| splat.tau > 0.0) {
-        let Texel {
-            index: [x, y],
-            part: [east, south],
-        } = texel_of(params, splat);
-        let middle = (splat.slice - 0.5).floor();
-        let part = splat.slice - 0.5 - middle;
-        let depth = |texel| depth_above(params, light, texel, middle as i32, part);
-        let north_row = mix(depth([x, y]), depth([x + 1, y]), east);
-        let south_row = mix(depth([x, y + 1]), depth([x + 1, y + 1]), east);
-        let transmittance = (-mix(north_row, south_row, south)).exp();
-        splat.color = dimmed(
-            splat.color,
-            params.ambient + params.direct * transmittance * splat.day,
-        );
+        let direct = params.direct * lit(params, light, splat) * splat.day;
+        splat.color = dimmed(splat.color, params.ambient + direct);
     }
 }

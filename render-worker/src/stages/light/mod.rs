@@ -1,20 +1,33 @@
-//! Light: splats in, the same splats dimmed by what lies between them and the sun out. See `light.wgsl`.
+//! The light's side of half-angle slicing: splats give their optical depth to a slice-layered buffer, a sum along the
+//! slices turns it into the depth above each slice plane, and every splat is dimmed by what lies between it and the sun.
+//!
+//! Depth is given in the pass that makes the splats and read in the pass that places them; here is the sum.
 
 pub mod cpu;
 
 use crate::error::RenderError;
 use crate::frame::FrameContext;
 use crate::gpu::{Gpu, Kernel, Slot};
-use crate::stages::layout::{GROUP, Params};
+use crate::stages::layout::Params;
+
+/// Columns of texels that one workgroup sums up.
+const COLUMNS: u32 = 32;
+
+/// Radii from its centre at which a cloud looks its light up, at most.
+pub const FARTHEST_LOOK: f64 = 0.6;
+
+/// The functions that give depth to the light; [`splat`](crate::passes::splat) runs them.
+pub const DEPOSIT_FUNCTIONS: &str =
+    concat!(include_str!("texel.wgsl"), include_str!("deposit.wgsl"));
+/// The functions that dim a splat; [`place`](crate::passes::place) runs them.
+pub const SHADE_FUNCTIONS: &str = concat!(include_str!("texel.wgsl"), include_str!("shade.wgsl"));
 
 /// The shader.
 pub const SOURCE: &str = concat!(include_str!("../prelude.wgsl"), include_str!("light.wgsl"));
 
 /// The compiled stage.
 pub struct Light {
-    deposit: Kernel,
     prefix: Kernel,
-    shade: Kernel,
 }
 
 /// Numbers in the light buffer: one layer for every slice and one for the whole.
@@ -26,33 +39,18 @@ impl Light {
     /// Compiles `source`, [`SOURCE`] but for tests.
     pub fn new(gpu: &Gpu, source: &str) -> Self {
         Self {
-            deposit: gpu.kernel("light", source, "deposit"),
             prefix: gpu.kernel("light", source, "prefix"),
-            shade: gpu.kernel("light", source, "shade"),
         }
     }
 
-    /// Dims the colours of the splats.
+    /// Turns the depth of each slice into the depth above it.
     pub fn record(&self, frame: &mut FrameContext<'_>) -> Result<(), RenderError> {
-        let count = frame.params.particle_count;
-        let bytes = texel_count(&frame.params) as u64 * 4;
-        let splats = frame.room(Slot::Splats, 4)?;
-        let light = frame.room(Slot::Light, bytes)?;
-        frame.recorder.clear(&light, bytes);
-        let all = [(0, &frame.params_buffer), (1, &splats), (2, &light)];
+        let light = frame.room(Slot::Light, 4)?;
         let columns = frame.params.light_width * frame.params.light_height;
+        let buffers = [(0, &frame.params_buffer), (1, &light)];
         frame
             .recorder
-            .dispatch_list(&self.deposit, &all, count, GROUP);
-        frame.recorder.dispatch_list(
-            &self.prefix,
-            &[(0, &frame.params_buffer), (2, &light)],
-            columns,
-            GROUP,
-        );
-        frame
-            .recorder
-            .dispatch_list(&self.shade, &all, count, GROUP);
+            .dispatch_list(&self.prefix, &buffers, columns, COLUMNS);
         Ok(())
     }
 }

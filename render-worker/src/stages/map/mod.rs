@@ -31,7 +31,7 @@ impl Map {
     pub fn record(&self, frame: &mut FrameContext<'_>) -> Result<(), RenderError> {
         let plan = frame.plan;
         let value = frame.room(Slot::Value, 4)?;
-        let palette = frame.upload(Slot::Palette, &plan.palette)?;
+        let palette = frame.upload_of_plan(Slot::Palette, &plan.palette)?;
         let axes = frame.room(
             Slot::Axes,
             (plan.axes.len().max(1) * size_of::<Axis>()) as u64,

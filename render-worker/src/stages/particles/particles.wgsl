@@ -1,11 +1,4 @@
-// Particles of the active cells: place, height, mass, optical depth and colour, one invocation a particle.
-@group(0) @binding(1) var<storage, read> active_cells: array<Active>;
-@group(0) @binding(2) var<storage, read> rows: array<Row>;
-@group(0) @binding(3) var<storage, read> value_grid: array<f32>;
-@group(0) @binding(4) var<storage, read> accumulated_grid: array<f32>;
-@group(0) @binding(5) var<storage, read> palette: array<u32>;
-@group(0) @binding(6) var<storage, read_write> particles: array<Particle>;
-
+// A particle of a cell: place, height, mass, optical depth and colour. Reads `rows` and `palette`.
 const HALF_TURN = 0x80000000u; // 0.5 in 32 bits
 
 // Output permutation of a 32-bit linear congruential generator (PCG-RXS-M-XS, O'Neill 2014).
@@ -35,33 +28,20 @@ fn strength_of(value: f32, position: f32) -> f32 {
     return clamp(abs(value) * params.strength_per_unit, 0.0, 1.0);
 }
 
-@compute @workgroup_size(GROUP)
-fn generate(@builtin(global_invocation_id) global: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>) {
-    let i = list_index(global, workgroups);
-    if (i >= params.particle_count) { return; }
-    let cell = active_cells[i / params.particles_per_cell];
-    let k = i % params.particles_per_cell;
-    let row = cell.cell / params.cols;
-    let value = value_grid[cell.cell];
-    let bits = hash(hash(cell.cell) ^ (k * 0x9e3779b9u));
+// Particle `k` of a cell with data; `slot` is its column in the table, `carbon` what it has accumulated, kg m-2.
+fn particle_of(row: u32, slot: u32, k: u32, value: f32, carbon: f32) -> Particle {
+    let col = cols[slot].index;
+    let cell = row * params.cols + col;
+    let bits = hash(hash(cell) ^ (k * 0x9e3779b9u));
     // An additive sequence (R2, Roberts 2018) round the cell's centre, shaken by random numbers: little for clouds,
     // which then cover the sea evenly, wholly for dots, which must not stand in rows. Golden sections up the column.
     let place = vec2(HALF_TURN) + k * vec2(3242174889u, 2447445414u);
-    let start = row * 2654435769u + (cell.cell % params.cols) * 1779033704u + k * 2654435769u;
+    let start = row * 2654435769u + col * 1779033704u + k * 2654435769u;
     var particle: Particle;
     particle.row = row;
-    particle.slot = cell.slot;
+    particle.slot = slot;
     particle.east = unit(place.x + shaken(bits));
     particle.south = unit(place.y + shaken(hash(bits)));
-    if (is_missing(value)) {
-        particles[i] = particle;
-        return;
-    }
-    var carbon = 0.0;
-    if (params.has_accumulated == 1u) {
-        carbon = accumulated_grid[cell.cell];
-        if (is_missing(carbon)) { carbon = 0.0; }
-    }
     let phase = fract(unit(start + (hash(bits ^ 0x85ebca6bu) >> 3u)) + params.turns_per_kg_m2 * abs(carbon));
     let column_m = clamp(carbon * params.height_m_per_kg_m2, -params.height_limit_m, params.height_limit_m);
     let position = clamp((value - params.transfer_low) * params.transfer_per_unit, 0.0, 1.0);
@@ -71,5 +51,5 @@ fn generate(@builtin(global_invocation_id) global: vec3<u32>, @builtin(num_workg
     let opacity = params.depth_floor + (1.0 - params.depth_floor) * sqrt(strength);
     particle.depth = params.optical_depth * opacity * envelope(phase);
     particle.color = palette[u32(nearest(position * 255.0))] | (u32(nearest(strength * 255.0)) << 24u);
-    particles[i] = particle;
+    return particle;
 }

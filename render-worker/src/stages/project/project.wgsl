@@ -1,9 +1,5 @@
-// Particles to the screen and to the light: map projection for tiles, eq. 4 and a perspective camera for the globe.
-@group(0) @binding(1) var<storage, read> rows: array<Row>;
-@group(0) @binding(2) var<storage, read> cols: array<Col>;
-@group(0) @binding(3) var<storage, read> particles: array<Particle>;
-@group(0) @binding(4) var<storage, read_write> splats: array<Splat>;
-
+// A particle on the screen and in the light: map projection for tiles, eq. 4 and a perspective camera for the globe.
+// Reads `rows` and `cols`.
 // Half a cell beyond which the series for small angles is not good enough.
 const WIDE_CELL_RAD = 0.2;
 
@@ -88,13 +84,7 @@ fn on_globe(particle: Particle) -> Splat {
     return splat;
 }
 
-@compute @workgroup_size(GROUP)
-fn project(@builtin(global_invocation_id) global: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>) {
-    let i = list_index(global, workgroups);
-    if (i >= params.particle_count) { return; }
-    if (params.view == VIEW_TILE) {
-        splats[i] = on_tile(particles[i]);
-    } else {
-        splats[i] = on_globe(particles[i]);
-    }
+fn splat_of(particle: Particle) -> Splat {
+    if (params.view == VIEW_TILE) { return on_tile(particle); }
+    return on_globe(particle);
 }

@@ -1,0 +1,203 @@
+//! A product at one instant: the stored frames that its values come from, and nothing else of the product.
+
+use serde::{Deserialize, Serialize};
+
+use crate::ContractError;
+use crate::key::ObjectKey;
+use crate::manifest::{Bracket, Manifest};
+use crate::time::TimeMs;
+
+/// What a product's values at an instant are made of. All of it is named by content, so versions of a product that
+/// agree about an instant have equal moments there, whatever they differ in elsewhere.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Moment {
+    /// Cells that hold data in some step: gaps in them are filled.
+    pub domain: ObjectKey,
+    /// Frame at the instant or before it; none where accumulation starts, that is zero in every cell of the domain.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub before: Option<ObjectKey>,
+    /// Frame after the instant; none where the one before holds alone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub after: Option<After>,
+}
+
+/// A frame that the values move towards.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct After {
+    /// The frame.
+    pub frame: ObjectKey,
+    /// Its weight (eq. 3), above 0 and below 1.
+    #[serde(with = "crate::exact")]
+    pub weight: f64,
+}
+
+impl Manifest {
+    /// What the values at an instant are made of; none without steps.
+    pub fn moment(&self, time: TimeMs) -> Option<Moment> {
+        let Bracket {
+            before,
+            after,
+            weight,
+        } = self.bracket(time)?;
+        let frame = |step: usize| self.steps[step].frame.clone();
+        Some(Moment {
+            domain: self.domain.clone(),
+            before: before.map(frame),
+            // A frame without weight shows nowhere: it may come and go without a trace.
+            after: (weight > 0.0).then(|| After {
+                frame: frame(after),
+                weight,
+            }),
+        })
+    }
+}
+
+impl Moment {
+    /// Checks a moment that came from outside.
+    ///
+    /// # Errors
+    /// Objects of other kinds than frames and a domain, or a weight that is none.
+    pub fn validate(&self) -> Result<(), ContractError> {
+        let bad = |key: &ObjectKey, reason: &str| {
+            Err(ContractError::invalid("moment", key.as_str(), reason))
+        };
+        if !self.domain.is_in("domain") {
+            return bad(&self.domain, "a domain is wanted");
+        }
+        let after = self.after.as_ref();
+        let frames = self.before.iter().chain(after.map(|after| &after.frame));
+        for frame in frames {
+            if !frame.is_in("frames") {
+                return bad(frame, "a frame is wanted");
+            }
+        }
+        match after {
+            Some(After { frame, weight }) if !(*weight > 0.0 && *weight < 1.0) => {
+                bad(frame, "weights lie between 0 and 1")
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Name of the product, for people: the folder of its domain.
+    pub fn product(&self) -> &str {
+        self.domain.as_str().split('/').nth(1).unwrap_or_default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::digest::Digest;
+    use crate::grid::Grid;
+    use crate::manifest::{MANIFEST_SCHEMA, Step};
+    use crate::product::ProductId;
+    use crate::quantity::Quantity;
+    use crate::time::Period;
+
+    fn frame(content: &str) -> ObjectKey {
+        ObjectKey::frame(&"p".parse().unwrap(), &Digest::of(content.as_bytes()))
+    }
+
+    /// Months from January 2000 on, with a frame each.
+    fn manifest(quantity: Quantity, frames: &[&str]) -> Manifest {
+        let product: ProductId = "p".parse().unwrap();
+        let step = |(month, content): (u32, &&str)| Step {
+            period: Period::month(2000, month).unwrap(),
+            frame: frame(content),
+            raw_sha256: Digest::of(b""),
+            origin: String::new(),
+            valid_cells: 1,
+        };
+        Manifest {
+            schema: MANIFEST_SCHEMA,
+            number: frames.len() as u64,
+            title: String::new(),
+            quantity,
+            synthetic: false,
+            source: String::new(),
+            grid: Grid {
+                rows: 1,
+                cols: 1,
+                north_deg: 1.0,
+                west_deg: 0.0,
+                dlat_deg: 1.0,
+                dlon_deg: 1.0,
+            },
+            steps: (1..).zip(frames).map(step).collect(),
+            domain: ObjectKey::domain(&product, &Digest::of(b"d")),
+            series: vec![],
+            derived_from: None,
+            product,
+        }
+    }
+
+    fn at(manifest: &Manifest, time: &str) -> Moment {
+        manifest.moment(time.parse().unwrap()).unwrap()
+    }
+
+    #[test]
+    fn a_landing_changes_the_moments_that_it_touches_and_no_others() {
+        let flux = |frames: &[&str]| manifest(Quantity::CarbonFlux, frames);
+        let (old, new) = (flux(&["a", "b"]), flux(&["a", "b", "c"]));
+        assert_ne!(old.id(), new.id());
+        for time in ["1999-01-01", "2000-01-20", "2000-02-10"] {
+            assert_eq!(at(&old, time), at(&new, time), "{time}");
+        }
+        // The middle of what was the last step: the frame after it has no weight yet.
+        let middle = Period::month(2000, 2).unwrap().mid();
+        assert_eq!(old.moment(middle), new.moment(middle));
+        assert_ne!(at(&old, "2000-02-20"), at(&new, "2000-02-20"));
+        let revised = flux(&["a", "B"]);
+        assert_eq!(at(&old, "2000-01-10"), at(&revised, "2000-01-10"));
+        assert_ne!(at(&old, "2000-01-20"), at(&revised, "2000-01-20"));
+    }
+
+    #[test]
+    fn a_wider_domain_changes_every_moment() {
+        let old = manifest(Quantity::CarbonFlux, &["a"]);
+        let mut wider = old.clone();
+        wider.domain = ObjectKey::domain(&old.product, &Digest::of(b"wider"));
+        assert_ne!(at(&old, "2000-01-10"), at(&wider, "2000-01-10"));
+    }
+
+    #[test]
+    fn accumulation_starts_from_nothing_and_moves_to_the_end_of_its_step() {
+        let carbon = manifest(Quantity::AccumulatedCarbon, &["a", "b"]);
+        let start = at(&carbon, "2000-01-01");
+        assert_eq!((&start.before, &start.after), (&None, &None));
+        let moving = at(&carbon, "2000-01-16T12:00:00Z");
+        assert_eq!(moving.before, None);
+        let after = moving.after.unwrap();
+        assert_eq!(
+            (after.frame, after.weight.to_bits()),
+            (frame("a"), 0.5_f64.to_bits())
+        );
+        let end = at(&carbon, "2000-02-01");
+        assert_eq!((end.before, end.after), (Some(frame("a")), None));
+    }
+
+    #[test]
+    fn moments_of_other_objects_are_refused() {
+        let good = at(&manifest(Quantity::CarbonFlux, &["a", "b"]), "2000-01-20");
+        good.validate().unwrap();
+        let after = |frame: &str, weight| {
+            let frame = frame.parse().unwrap();
+            Some(After { frame, weight })
+        };
+        let is_refused = |change: &dyn Fn(&mut Moment)| {
+            let mut moment = good.clone();
+            change(&mut moment);
+            moment.validate().is_err()
+        };
+        assert!(is_refused(&|m| m.domain = frame("a")));
+        assert!(is_refused(&|m| m.before = Some("raw/p/x".parse().unwrap())));
+        assert!(is_refused(&|m| m.before = Some("frames".parse().unwrap())));
+        assert!(is_refused(&|m| m.after = after("tiles/x", 0.5)));
+        for weight in [0.0, 1.0, -0.5, f64::NAN] {
+            assert!(is_refused(&|m| m.after = after("frames/p/x", weight)));
+        }
+    }
+}

@@ -1,0 +1,122 @@
+//! `fluxglobe bench fill`: how long gap filling takes on this machine's device, every form, small grids first.
+
+use std::time::Duration;
+
+use anyhow::Result;
+use render_worker::RenderError;
+use render_worker::gpu::Gpu;
+use render_worker::stages::fill::bench::{self, Timing};
+use render_worker::stages::fill::{Fill, Sources};
+use serde::Serialize;
+
+use crate::cli::BenchFill;
+use crate::progress;
+
+/// One line.
+#[derive(Serialize)]
+struct Row {
+    form: &'static str,
+    rows: u32,
+    cols: u32,
+    missing: usize,
+    gap_cells: u32,
+    runs: usize,
+    median_ms: f64,
+    p99_ms: f64,
+    /// Below 1 where only a part of the gaps was filled and the times are scaled up.
+    measured_share: f64,
+    /// Largest difference from all pairs in float64, share of the range.
+    from_all_pairs: Option<f64>,
+    /// Root mean square error of hidden values over their standard deviation.
+    rmse_over_spread: Option<f64>,
+    /// Equal on two devices where all bits of the filled values are.
+    digest: Option<String>,
+    adapter: String,
+}
+
+pub(crate) fn run(options: &BenchFill) -> Result<()> {
+    let gpu = Gpu::open()?;
+    let fill = Fill::new(&gpu, Sources::default());
+    let limit = Duration::from_secs(options.limit_s);
+    progress::say(&format!(
+        "gap filling on {}; device time of a whole frame, without upload and read-back",
+        gpu.adapter_name()
+    ));
+    if !options.json {
+        progress::result(HEADER)?;
+    }
+    for case in bench::cases([options.size[0], options.size[1]], options.share) {
+        for form in &options.forms {
+            match bench::bench_fill(
+                &gpu,
+                &fill,
+                case,
+                form.form(),
+                options.runs.get() as usize,
+                limit,
+            ) {
+                Ok(timing) => print(options, &Row::new(&timing, gpu.adapter_name()))?,
+                Err(error @ (RenderError::TooManyPairs { .. } | RenderError::TooLarge { .. })) => {
+                    progress::say(&format!(
+                        "{} of {} x {}: {error}",
+                        form.form().name(),
+                        case.rows,
+                        case.cols
+                    ));
+                }
+                Err(error) => return Err(error.into()),
+            }
+        }
+    }
+    Ok(())
+}
+
+const HEADER: &str = "form         rows   cols  missing  gap  runs   median ms      p99 ms  measured  from all pairs  RMSE/spread    digest";
+
+impl Row {
+    fn new(timing: &Timing, adapter: &str) -> Self {
+        let runs = timing.seconds.len();
+        Self {
+            form: timing.form.name(),
+            rows: timing.case.rows,
+            cols: timing.case.cols,
+            missing: timing.gaps,
+            gap_cells: timing.case.missing.side_cells,
+            runs,
+            median_ms: timing.median_s() * 1e3,
+            p99_ms: timing.seconds[(runs * 99 / 100).min(runs - 1)] * 1e3,
+            measured_share: timing.measured_share,
+            from_all_pairs: timing.from_all_pairs,
+            rmse_over_spread: timing.rmse_of_hidden,
+            digest: timing.values_digest.map(|digest| digest.short()),
+            adapter: adapter.to_owned(),
+        }
+    }
+}
+
+fn print(options: &BenchFill, row: &Row) -> Result<()> {
+    if options.json {
+        return progress::result(&serde_json::to_string(row)?);
+    }
+    let apart = row
+        .from_all_pairs
+        .map_or_else(|| "-".to_owned(), |apart| format!("{apart:.1e}"));
+    let rmse = row
+        .rmse_over_spread
+        .map_or_else(|| "-".to_owned(), |rmse| format!("{rmse:.4}"));
+    progress::result(&format!(
+        "{:<11} {:>5} {:>6} {:>8} {:>4} {:>5} {:>11.3} {:>11.3} {:>8.2}% {:>15} {:>12}  {}",
+        row.form,
+        row.rows,
+        row.cols,
+        row.missing,
+        row.gap_cells,
+        row.runs,
+        row.median_ms,
+        row.p99_ms,
+        100.0 * row.measured_share,
+        apart,
+        rmse,
+        row.digest.as_deref().unwrap_or("-"),
+    ))
+}

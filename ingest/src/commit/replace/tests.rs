@@ -1,0 +1,143 @@
+//! Replacing by hand-made steps: other values, other months, other grids, files that others revised.
+
+use contract::grid::Grid;
+use contract::key::ObjectKey;
+use contract::manifest::MANIFEST_SCHEMA;
+use contract::quantity::Quantity;
+
+use super::*;
+use crate::plan::Target;
+use crate::recipe::Recipe;
+
+const GRID: Grid = Grid {
+    rows: 2,
+    cols: 4,
+    north_deg: 90.0,
+    west_deg: -180.0,
+    dlat_deg: 90.0,
+    dlon_deg: 90.0,
+};
+
+fn product() -> ProductId {
+    "p".parse().unwrap()
+}
+
+/// A step of a file in some edition of its values.
+fn step(file: &str, month: u32, edition: u32) -> Step {
+    let frame = Digest::of(format!("{file} {month} {edition}").as_bytes());
+    Step {
+        period: Period::month(2000, month).unwrap(),
+        frame: ObjectKey::frame(&product(), &frame),
+        raw_sha256: Digest::of(file.as_bytes()),
+        origin: format!("{file}.nc"),
+        valid_cells: 1,
+    }
+}
+
+fn reading(steps: Vec<Step>) -> Reading {
+    let target = Target {
+        product: product(),
+        title: "t".into(),
+        source: "s".into(),
+        quantity: Quantity::CarbonFlux,
+        synthetic: false,
+        profile: None,
+    };
+    Reading::new(Recipe::of(None), &target, GRID, steps)
+}
+
+fn manifest(steps: Vec<Step>) -> Manifest {
+    Manifest {
+        schema: MANIFEST_SCHEMA,
+        product: product(),
+        number: 7,
+        title: "t".into(),
+        quantity: Quantity::CarbonFlux,
+        synthetic: false,
+        source: "s".into(),
+        grid: GRID,
+        steps,
+        domain: ObjectKey::domain(&product(), &Digest::of(b"")),
+        series: vec![],
+        derived_from: None,
+    }
+}
+
+#[test]
+fn a_file_that_is_read_as_before_changes_nothing() {
+    let newest = manifest(vec![step("a", 1, 0), step("b", 2, 0)]);
+    let same = reading(vec![step("a", 1, 0)]);
+    assert_eq!(next(&newest, &[same]).unwrap(), newest);
+    assert_eq!(next(&newest, &[]).unwrap(), newest);
+}
+
+#[test]
+fn other_values_take_the_place_of_the_old_ones_and_other_files_stay() {
+    let newest = manifest(vec![step("a", 1, 0), step("b", 2, 0), step("a", 3, 0)]);
+    let anew = reading(vec![step("a", 1, 1), step("a", 3, 1)]);
+    let expected = [step("a", 1, 1), step("b", 2, 0), step("a", 3, 1)];
+    assert_eq!(next(&newest, &[anew]).unwrap().steps, expected);
+}
+
+#[test]
+fn a_month_that_another_file_revised_stays_revised() {
+    let newest = manifest(vec![step("b", 1, 0), step("a", 2, 0)]);
+    let anew = reading(vec![step("a", 1, 1), step("a", 2, 1)]);
+    let expected = [step("b", 1, 0), step("a", 2, 1)];
+    assert_eq!(next(&newest, &[anew]).unwrap().steps, expected);
+    // Nothing of it is left in the product: it is passed over.
+    let gone = reading(vec![step("c", 2, 1)]);
+    assert_eq!(next(&newest, &[gone]).unwrap(), newest);
+}
+
+#[test]
+fn all_files_may_move_by_a_month_together_but_not_one_onto_another() {
+    let newest = manifest(vec![step("a", 1, 0), step("b", 2, 0)]);
+    let (a, b) = (
+        reading(vec![step("a", 2, 0)]),
+        reading(vec![step("b", 3, 0)]),
+    );
+    let moved = next(&newest, &[a.clone(), b]).unwrap();
+    assert_eq!(moved.steps, [step("a", 2, 0), step("b", 3, 0)]);
+    let refused = next(&newest, &[a]).unwrap_err();
+    assert!(
+        refused.contains("a.nc") && refused.contains("another file"),
+        "{refused}"
+    );
+}
+
+#[test]
+fn a_step_that_held_no_value_before_is_added_and_one_that_holds_none_now_goes() {
+    let newest = manifest(vec![step("a", 1, 0), step("a", 2, 0)]);
+    let anew = reading(vec![step("a", 2, 0), step("a", 3, 0)]);
+    let steps = next(&newest, &[anew]).unwrap().steps;
+    assert_eq!(steps, [step("a", 2, 0), step("a", 3, 0)]);
+}
+
+#[test]
+fn another_grid_is_taken_with_all_files_or_not_at_all() {
+    let newest = manifest(vec![step("a", 1, 0), step("b", 2, 0)]);
+    let shifted = Grid {
+        west_deg: -135.0,
+        ..GRID
+    };
+    let on = |grid, file, month| {
+        let mut anew = reading(vec![step(file, month, 1)]);
+        anew.grid = grid;
+        anew
+    };
+    let (a, b) = (on(shifted, "a", 1), on(shifted, "b", 2));
+    assert_eq!(
+        next(&newest, &[a.clone(), b.clone()]).unwrap().grid,
+        shifted
+    );
+    assert!(next(&newest, std::slice::from_ref(&a)).is_err());
+    assert!(next(&newest, &[a, on(GRID, "b", 2)]).is_err());
+    // A billionth of a cell is no other grid.
+    let near = Grid {
+        west_deg: -180.0 + 1e-7,
+        ..GRID
+    };
+    let both = [on(near, "a", 1), on(near, "b", 2)];
+    assert_eq!(next(&newest, &both).unwrap().grid, GRID);
+}

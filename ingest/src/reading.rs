@@ -1,0 +1,114 @@
+//! What a file was read as, noted in the store under the hash of all that it follows from: file, name, profile, decoder.
+//!
+//! It tells whether a step is what the file would be read as now, and what of a re-reading that was killed is done. It
+//! lies in `readings/{product}/{raw}-{input}` and goes with its raw file.
+
+use bytes::Bytes;
+use contract::digest::Digest;
+use contract::grid::Grid;
+use contract::key::ObjectKey;
+use contract::manifest::Step;
+use contract::product::ProductId;
+use contract::quantity::Quantity;
+use serde::{Deserialize, Serialize};
+use storage::{StorageError, Store};
+
+use crate::error::IngestError;
+use crate::plan::Target;
+use crate::recipe::Recipe;
+
+/// Version of the note's JSON.
+const SCHEMA: u32 = 1;
+/// Folder of the notes.
+const FOLDER: &str = "readings";
+
+/// What one file was read as; its frames are durable.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Reading {
+    schema: u32,
+    pub(crate) recipe: Recipe,
+    pub(crate) title: String,
+    pub(crate) source: String,
+    pub(crate) quantity: Quantity,
+    pub(crate) synthetic: bool,
+    pub(crate) grid: Grid,
+    /// In the order of time, at least one.
+    pub(crate) steps: Vec<Step>,
+}
+
+impl Reading {
+    /// What a file was read as.
+    pub(crate) fn new(recipe: Recipe, target: &Target, grid: Grid, steps: Vec<Step>) -> Self {
+        Self {
+            schema: SCHEMA,
+            recipe,
+            title: target.title.clone(),
+            source: target.source.clone(),
+            quantity: target.quantity,
+            synthetic: target.synthetic,
+            grid,
+            steps,
+        }
+    }
+
+    /// Notes it. An equal note may be there.
+    ///
+    /// # Errors
+    /// `Conflict` if the same file was read in the same way as something else.
+    pub(crate) async fn put(&self, store: &Store, product: &ProductId) -> Result<(), StorageError> {
+        let Some(first) = self.steps.first() else {
+            return Ok(());
+        };
+        let key = key(product, &self.recipe, first.raw_sha256, &first.origin)?;
+        let json = serde_json::to_vec(self).map_err(|e| damaged(key.as_str(), &e.to_string()))?;
+        store.put_new(&key, Bytes::from(json)).await.map(|_new| ())
+    }
+}
+
+/// Where the reading of a file by a recipe lies.
+pub(crate) fn key(
+    product: &ProductId,
+    recipe: &Recipe,
+    raw_sha256: Digest,
+    file_name: &str,
+) -> Result<ObjectKey, StorageError> {
+    let input = recipe.input(raw_sha256, file_name);
+    let text = format!("{FOLDER}/{product}/{raw_sha256}-{input}");
+    text.parse().map_err(|_no_key| damaged(&text, "is no key"))
+}
+
+/// All notes of a product, sorted by raw file.
+pub(crate) async fn keys(
+    store: &Store,
+    product: &ProductId,
+) -> Result<Vec<ObjectKey>, IngestError> {
+    let listed = store.list(&format!("{FOLDER}/{product}")).await;
+    listed.map_err(IngestError::storage("list readings"))
+}
+
+/// The raw file that a note is of.
+pub(crate) fn raw_of(key: &ObjectKey) -> Option<Digest> {
+    let name = key.as_str().rsplit('/').next()?;
+    name.split_once('-')?.0.parse().ok()
+}
+
+/// One note; none if it is gone or was written by a program that notes other things.
+pub(crate) async fn get(store: &Store, key: &ObjectKey) -> Result<Option<Reading>, IngestError> {
+    let content = match store.get(key).await {
+        Ok(content) => content,
+        Err(e) if e.is_not_found() => return Ok(None),
+        Err(e) => return Err(IngestError::storage("read a reading")(e)),
+    };
+    let reading = serde_json::from_slice::<Reading>(&content);
+    Ok(reading
+        .ok()
+        .filter(|r| r.schema == SCHEMA && !r.steps.is_empty()))
+}
+
+fn damaged(object: &str, reason: &str) -> StorageError {
+    StorageError::Damaged {
+        object: object.to_owned(),
+        reason: reason.to_owned(),
+    }
+}

@@ -1,0 +1,66 @@
+//! What is told of files that were read anew, from the two newest versions alone, so that it can be told after any kill.
+
+use std::collections::BTreeMap;
+
+use contract::event::{Body, Event};
+use contract::key::ObjectKey;
+use contract::manifest::{Manifest, Step};
+use contract::product::ProductId;
+use storage::{StorageError, Store, manifests};
+
+use crate::error::IngestError;
+
+/// One event for each file that the newest version has other values of than the one before, although both hold it.
+///
+/// They are the same each time, for [`storage::log::tell_once`]: a run may be killed between publishing and telling.
+pub async fn events(store: &Store, product: &ProductId) -> Result<Vec<Event>, IngestError> {
+    let read = IngestError::storage("read the newest manifest");
+    let Some(now) = manifests::latest(store, product).await.map_err(read)? else {
+        return Ok(vec![]);
+    };
+    let key = ObjectKey::manifest(product, now.number.saturating_sub(1));
+    let before = match store.get(&key).await {
+        Ok(content) => serde_json::from_slice::<Manifest>(&content).map_err(|e| {
+            let (object, reason) = (key.to_string(), e.to_string());
+            IngestError::storage("read a manifest")(StorageError::Damaged { object, reason })
+        })?,
+        Err(e) if e.is_not_found() => return Ok(vec![]),
+        Err(e) => return Err(IngestError::storage("read a manifest")(e)),
+    };
+    Ok(told(&before, &now))
+}
+
+fn told(before: &Manifest, now: &Manifest) -> Vec<Event> {
+    fn by_file(manifest: &Manifest) -> BTreeMap<(&str, contract::digest::Digest), Vec<&Step>> {
+        let mut files: BTreeMap<_, Vec<&Step>> = BTreeMap::new();
+        for step in &manifest.steps {
+            let file = (step.origin.as_str(), step.raw_sha256);
+            files.entry(file).or_default().push(step);
+        }
+        files
+    }
+    let old = by_file(before);
+    // A version that brought a file is one of a landing, which told of itself.
+    if now.derived_from.is_some() || by_file(now).keys().any(|file| !old.contains_key(file)) {
+        return vec![];
+    }
+    let mut events = vec![];
+    for (file, steps) in by_file(now) {
+        if old.get(&file) == Some(&steps) {
+            continue;
+        }
+        let (origin, raw_sha256) = file;
+        let trace = format!("reread-{}", raw_sha256.short());
+        events.push(Event::new(
+            trace,
+            Body::GranuleLanded {
+                path: origin.to_owned(),
+                raw_sha256,
+                manifest: now.id(),
+                periods: steps.iter().map(|step| step.period).collect(),
+                revised: true,
+            },
+        ));
+    }
+    events
+}

@@ -1,0 +1,137 @@
+// Classic half-angle slicing by rasterising quads: what the compute renderer is held against. The prelude goes before.
+@group(0) @binding(1) var<storage, read> seen: array<vec4<u32>>;
+@group(0) @binding(7) var<storage, read> lit: array<vec4<u32>>;
+@group(0) @binding(2) var<storage, read> order: array<u32>;
+@group(0) @binding(3) var light: texture_2d<f32>;
+
+struct Corner {
+    @builtin(position) position: vec4<f32>,
+    @location(0) offset: vec2<f32>,
+    @location(1) @interpolate(flat) color: vec4<f32>,
+}
+
+fn corner_of(vertex: u32) -> vec2<f32> {
+    return vec2(f32(vertex & 1u), f32(vertex >> 1u)) * 2.0 - 1.0;
+}
+
+fn clip(px: vec2<f32>, size: vec2<f32>) -> vec4<f32> {
+    return vec4(px.x / size.x * 2.0 - 1.0, 1.0 - px.y / size.y * 2.0, 0.0, 1.0);
+}
+
+@vertex
+fn eye_corner(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance: u32) -> Corner {
+    let at = order[instance];
+    let near = seen[at];
+    let far = lit[at];
+    let radius = f32((near.z & 0xffffu) << params.entry_shift) / f32(SUBPIXELS);
+    let center = vec2(f32(bitcast<i32>(near.x)), f32(bitcast<i32>(near.y))) / f32(SUBPIXELS);
+    var shade = 1.0;
+    if (params.light_on == 1u) {
+        let texel = vec2(bitcast<i32>(far.x), bitcast<i32>(far.y)) / params.light_unit;
+        let depth = textureLoad(light, clamp(texel, vec2(0), vec2(i32(params.light_width), i32(params.light_height)) - 1), 0).x;
+        shade = params.ambient + params.direct * exp(-depth) * bitcast<f32>(far.w);
+    }
+    let rgb = vec3(f32(near.w & 255u), f32((near.w >> 8u) & 255u), f32((near.w >> 16u) & 255u)) / 255.0;
+    var corner: Corner;
+    corner.offset = corner_of(vertex);
+    corner.position = clip(center + corner.offset * radius, vec2(f32(params.width), f32(params.height)));
+    corner.color = vec4(min(rgb * shade, vec3(1.0)), f32(near.z >> 16u) / DEPTH_ONE);
+    return corner;
+}
+
+fn weight(offset: vec2<f32>) -> f32 {
+    let inside = max(1.0 - dot(offset, offset), 0.0);
+    return inside * inside;
+}
+
+@fragment
+fn eye_pixel(corner: Corner) -> @location(0) vec4<f32> {
+    let alpha = 1.0 - exp(-corner.color.w * weight(corner.offset));
+    return vec4(corner.color.xyz * alpha, alpha);
+}
+
+@vertex
+fn light_corner(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance: u32) -> Corner {
+    let at = order[instance];
+    let near = seen[at];
+    let far = lit[at];
+    let center = vec2(f32(bitcast<i32>(far.x)), f32(bitcast<i32>(far.y))) / f32(params.light_unit);
+    var corner: Corner;
+    corner.offset = corner_of(vertex);
+    // As wide as a particle is in light texels; the same depth over the same area as the compute renderer gives.
+    let radius = LIGHT_RADIUS_TEXELS;
+    corner.position = clip(center + corner.offset * radius, vec2(f32(params.light_width), f32(params.light_height)));
+    let radius_px = f32((near.z & 0xffffu) << params.entry_shift) / f32(SUBPIXELS);
+    let mass = f32(near.z >> 16u) / DEPTH_ONE * radius_px * radius_px * LIGHT_GAIN;
+    corner.color = vec4(mass * 3.0 / (3.14159265 * radius * radius));
+    return corner;
+}
+
+@fragment
+fn light_pixel(corner: Corner) -> @location(0) vec4<f32> {
+    return vec4(corner.color.x * weight(corner.offset));
+}
+
+// Sorting by slice, once a frame: count, prefix, scatter.
+@group(0) @binding(4) var<storage, read_write> slice_counts: array<atomic<u32>>;
+@group(0) @binding(5) var<storage, read_write> draws: array<u32>;
+@group(0) @binding(6) var<storage, read_write> order_out: array<u32>;
+
+fn slice_at(at: u32) -> u32 {
+    return u32(bitcast<f32>(lit[at].z));
+}
+
+const MOST_SLICES = 256u;
+var<workgroup> own: array<atomic<u32>, MOST_SLICES>;
+
+fn clear_own(invocation: u32) {
+    for (var slice = invocation; slice < MOST_SLICES; slice += GROUP) { atomicStore(&own[slice], 0u); }
+    workgroupBarrier();
+}
+
+@compute @workgroup_size(GROUP)
+fn count_slices(@builtin(global_invocation_id) global: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) invocation: u32) {
+    clear_own(invocation);
+    let at = list_index(global, workgroups);
+    if (at < params.splat_count) {
+        if (seen[at].z != 0u) { atomicAdd(&own[slice_at(at)], 1u); }
+    }
+    workgroupBarrier();
+    for (var slice = invocation; slice < MOST_SLICES; slice += GROUP) {
+        let count = atomicLoad(&own[slice]);
+        if (count > 0u) { atomicAdd(&slice_counts[slice], count); }
+    }
+}
+
+// One instanced draw of four corners for every slice.
+@compute @workgroup_size(1)
+fn start_slices() {
+    var first = 0u;
+    for (var slice = 0u; slice < params.slices; slice++) {
+        let count = atomicLoad(&slice_counts[slice]);
+        draws[4u * slice] = 4u;
+        draws[4u * slice + 1u] = count;
+        draws[4u * slice + 2u] = 0u;
+        draws[4u * slice + 3u] = first;
+        atomicStore(&slice_counts[slice], first);
+        first += count;
+    }
+}
+
+@compute @workgroup_size(GROUP)
+fn order_slices(@builtin(global_invocation_id) global: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) invocation: u32) {
+    clear_own(invocation);
+    let at = list_index(global, workgroups);
+    var is_drawn = false;
+    if (at < params.splat_count) { is_drawn = seen[at].z != 0u; }
+    if (is_drawn) { atomicAdd(&own[slice_at(at)], 1u); }
+    workgroupBarrier();
+    for (var slice = invocation; slice < MOST_SLICES; slice += GROUP) {
+        let count = atomicLoad(&own[slice]);
+        if (count > 0u) { atomicStore(&own[slice], atomicAdd(&slice_counts[slice], count)); }
+    }
+    workgroupBarrier();
+    if (is_drawn) { order_out[atomicAdd(&own[slice_at(at)], 1u)] = at; }
+}

@@ -1,0 +1,130 @@
+//! Made-up scenes of any size: the seas off eastern Asia, 0 to 41 N and 100 to 130 E, on as many cells as are wanted,
+//! with one particle a cell of sea.
+
+use std::sync::Arc;
+use std::thread;
+
+use anyhow::Result;
+use contract::colour::TransferFunction;
+use contract::grid::Grid;
+use contract::job::{Mode, RENDERER_VERSION, RenderJob, Style, View};
+use contract::moment::Moment;
+use contract::quantity::Quantity;
+use render_worker::{Frame, Interval, Scene};
+
+/// Share of the region that is sea in these scenes.
+const SEA_SHARE: f64 = 0.605;
+const NORTH_DEG: f64 = 41.0;
+const WEST_DEG: f64 = 100.0;
+const WIDTH_DEG: f64 = 30.0;
+/// Kilograms of carbon per square metre and second in a gram a year.
+const GRAM_A_YEAR: f64 = 1e-3 / (365.25 * 86_400.0);
+const YEAR_S: f64 = 365.25 * 86_400.0;
+/// The camera sees the whole region in a picture that is wider than high.
+const CAMERA_HEIGHT_M: f64 = 5.3e6;
+
+/// A grid of the region with at least so many cells of sea, square in degrees.
+pub fn grid(particles: u64) -> Grid {
+    let cells = particles as f64 / SEA_SHARE * 1.02;
+    let cols = (cells * WIDTH_DEG / NORTH_DEG).sqrt().ceil();
+    let rows = (cells / cols).ceil();
+    Grid {
+        rows: rows as u32,
+        cols: cols as u32,
+        north_deg: NORTH_DEG,
+        west_deg: WEST_DEG,
+        dlat_deg: NORTH_DEG / rows,
+        dlon_deg: WIDTH_DEG / cols,
+    }
+}
+
+/// Land in the north-west, as on the coast of a continent, and two islands.
+fn is_land(lon: f64, lat: f64) -> bool {
+    let coast =
+        105.5 + 6.0 * ((lat - 5.0) / 36.0) + 3.0 * (lat * 0.35).sin() + 0.7 * (lat * 2.9).sin();
+    let island = |x: f64, y: f64, rx: f64, ry: f64| {
+        ((lon - x) / rx).powi(2) + ((lat - y) / ry).powi(2) < 1.0
+    };
+    lon < coast + 1.5 || island(114.0, 2.0, 5.0, 4.0) || island(121.5, 14.0, 2.0, 5.5)
+}
+
+fn frame(grid: &Grid, value: impl Fn(f64, f64) -> f64 + Sync) -> Arc<Frame> {
+    let mut values = vec![f32::NAN; grid.cell_count()];
+    let cores = thread::available_parallelism().map_or(1, usize::from);
+    let rows_each = (grid.rows as usize).div_ceil(cores);
+    let cols = grid.cols as usize;
+    thread::scope(|scope| {
+        for (part, rows) in values.chunks_mut(rows_each * cols).enumerate() {
+            let value = &value;
+            scope.spawn(move || {
+                for (down, row) in rows.chunks_mut(cols).enumerate() {
+                    let lat =
+                        grid.north_deg - grid.dlat_deg * ((part * rows_each + down) as f64 + 0.5);
+                    for (col, cell) in row.iter_mut().enumerate() {
+                        let lon = grid.west_deg + grid.dlon_deg * (col as f64 + 0.5);
+                        if !is_land(lon, lat) {
+                            *cell = value(lon, lat) as f32;
+                        }
+                    }
+                }
+            });
+        }
+    });
+    Arc::new(Frame::new(values))
+}
+
+/// Sinks in the north, sources near the equator, eddies of two degrees on top; `phase` is the season, radians.
+fn flux(lon: f64, lat: f64, phase: f64) -> f64 {
+    let belt = 35.0 - 2.4 * lat + 22.0 * (phase + lat * 0.05).cos();
+    let eddies = 14.0 * (lon * 3.1 + phase).sin() * (lat * 2.7 - 0.4 * phase).cos();
+    (belt + eddies) * GRAM_A_YEAR
+}
+
+/// Two adjacent months and what has accumulated until each.
+pub fn scene(grid: &Grid) -> Scene {
+    let month = std::f64::consts::TAU / 12.0;
+    let value = Interval {
+        before: frame(grid, |lon, lat| flux(lon, lat, 0.0)),
+        after: frame(grid, |lon, lat| flux(lon, lat, month)),
+        weight: 0.3,
+    };
+    let carbon =
+        |share: f64| move |lon: f64, lat: f64| flux(lon, lat, 0.5 * month) * share * YEAR_S;
+    let accumulated = Interval {
+        before: frame(grid, carbon(0.8)),
+        after: frame(grid, carbon(0.88)),
+        weight: 0.6,
+    };
+    let domain = Scene::domain_of(value.before.cells.content().iter().map(|v| *v > -1.0));
+    Scene {
+        grid: *grid,
+        domain,
+        value,
+        accumulated: Some(moment("made-up-carbon")?),
+        mode: Mode::Volume,
+        view: View::Globe {
+            lon_deg: WEST_DEG + 0.5 * WIDTH_DEG,
+            lat_deg: 0.5 * NORTH_DEG,
+            height_m: CAMERA_HEIGHT_M,
+            width_px: size_px[0],
+            height_px: size_px[1],
+        },
+        style,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_scene_has_at_least_the_particles_that_were_asked_for_and_few_more() {
+        for wanted in [20_000, 100_000] {
+            let made = particles(&scene(&grid(wanted)));
+            assert!(
+                made >= wanted && made < wanted * 5 / 4,
+                "{made} for {wanted}"
+            );
+        }
+    }
+}

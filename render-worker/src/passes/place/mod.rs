@@ -1,0 +1,53 @@
+//! The second pass over particles: stored splats, light and starts of lists in, lists of shaded entries out.
+
+use crate::error::RenderError;
+use crate::frame::FrameContext;
+use crate::gpu::{Gpu, Kernel, Slot};
+use crate::passes::splat::workgroups;
+use crate::stages::layout::Entry;
+
+/// The shader.
+pub const SOURCE: &str = concat!(
+    include_str!("../../stages/prelude.wgsl"),
+    include_str!("../../stages/light/texel.wgsl"),
+    include_str!("../../stages/light/shade.wgsl"),
+    include_str!("../../stages/bin/reach.wgsl"),
+    include_str!("../tally.wgsl"),
+    include_str!("../order.wgsl"),
+    include_str!("place.wgsl"),
+);
+
+/// The compiled stage.
+pub struct Place {
+    place: Kernel,
+}
+
+impl Place {
+    /// Compiles `source`, [`SOURCE`] but for tests.
+    pub fn new(gpu: &Gpu, source: &str) -> Self {
+        Self {
+            place: gpu.kernel("place", source, "place"),
+        }
+    }
+
+    /// Fills the slot of entries and moves each list's start to its end.
+    pub fn record(&self, frame: &mut FrameContext<'_>) -> Result<(), RenderError> {
+        let seen = frame.room(Slot::Seen, 4)?;
+        let lit = frame.room(Slot::Lit, 4)?;
+        let light = frame.room(Slot::Light, 4)?;
+        let counts = frame.room(Slot::Counts, 4)?;
+        let entry_bytes = u64::from(frame.params.entry_capacity) * size_of::<Entry>() as u64;
+        let entries = frame.room(Slot::Entries, entry_bytes)?;
+        let buffers = [
+            (0, &frame.params_buffer),
+            (1, &seen),
+            (2, &light),
+            (3, &counts),
+            (4, &entries),
+            (5, &lit),
+        ];
+        let groups = workgroups(&frame.params);
+        frame.recorder.dispatch_deep(&self.place, &buffers, groups);
+        Ok(())
+    }
+}

@@ -1,0 +1,122 @@
+//! The first pass over particles: cells of four frames in; stored splats, the depth given to the light and the lengths of
+//! the lists out. See `splat.wgsl`.
+//!
+//! It runs the functions of [`interpolate`](crate::stages::interpolate), [`particles`](crate::stages::particles),
+//! [`project`](crate::stages::project), [`light`](crate::stages::light) and [`bin`](crate::stages::bin), each with its own twin: between them
+//! nothing is worth storing.
+
+use crate::error::RenderError;
+use crate::frame::FrameContext;
+use crate::gpu::{Gpu, Kernel, Slot};
+use crate::stages::bin::list_count;
+use crate::stages::layout::{DEPTH_ONE, Params, SQUARE, SUBPIXELS, Splat};
+use crate::stages::light::texel_count;
+
+/// The shader.
+pub const SOURCE: &str = concat!(
+    include_str!("../../stages/prelude.wgsl"),
+    include_str!("../../stages/interpolate/between.wgsl"),
+    include_str!("../../stages/particles/particles.wgsl"),
+    include_str!("../../stages/project/project.wgsl"),
+    include_str!("../../stages/light/texel.wgsl"),
+    include_str!("../../stages/light/deposit.wgsl"),
+    include_str!("../../stages/bin/reach.wgsl"),
+    include_str!("../tally.wgsl"),
+    include_str!("../order.wgsl"),
+    include_str!("splat.wgsl"),
+);
+
+/// Bytes of each half of a stored splat: what the eye sees, and where it lies in the light.
+pub const HALF_BYTES: u64 = 16;
+
+/// The compiled stage.
+pub struct Splats {
+    splat: Kernel,
+}
+
+/// Workgroups over the cells of a picture: across, down, and through the particles of a cell.
+pub fn workgroups(params: &Params) -> [u32; 3] {
+    [
+        params.slot_count.div_ceil(SQUARE),
+        params.row_count.div_ceil(SQUARE),
+        params.particles_per_cell.div_ceil(params.particles_each),
+    ]
+}
+
+/// Where a particle's splat is stored: `down` rows below the first one drawn, in column `slot` of the table.
+pub fn stored_at(params: &Params, down: u32, slot: u32, particle: u32) -> usize {
+    let [across, along, _] = workgroups(params);
+    let each = params.particles_each;
+    let group = ((particle / each) * along + down / SQUARE) * across + slot / SQUARE;
+    let invocation = down % SQUARE * SQUARE + slot % SQUARE;
+    ((group * each + particle % each) * SQUARE * SQUARE + invocation) as usize
+}
+
+/// A splat as a device stores it: the words of both halves, as `splat.wgsl` writes them.
+pub fn unpacked(seen: [u32; 4], lit: [u32; 4], entry_shift: u32) -> Splat {
+    Splat {
+        x_sub: seen[0] as i32,
+        y_sub: seen[1] as i32,
+        radius_px: ((seen[2] & 0xffff) << entry_shift) as f32 / SUBPIXELS as f32,
+        tau: (seen[2] >> 16) as f32 / DEPTH_ONE,
+        slice: f32::from_bits(lit[2]),
+        light_u: lit[0] as i32,
+        light_v: lit[1] as i32,
+        light_depth: 0.0,
+        day: f32::from_bits(lit[3]),
+        color: seen[3],
+    }
+}
+
+impl Splats {
+    /// Compiles `source`, [`SOURCE`] but for tests.
+    pub fn new(gpu: &Gpu, source: &str) -> Self {
+        Self {
+            splat: gpu.kernel("splat", source, "splat"),
+        }
+    }
+
+    /// Fills the slots of splats, of light and of list lengths.
+    pub fn record(&self, frame: &mut FrameContext<'_>) -> Result<(), RenderError> {
+        let plan = frame.plan;
+        let rows = frame.upload_of_plan(Slot::Rows, &plan.rows)?;
+        let cols = frame.upload_of_plan(Slot::Cols, &plan.cols)?;
+        let palette = frame.upload_of_plan(Slot::Palette, &plan.palette)?;
+        let half_bytes = u64::from(frame.params.splat_count) * HALF_BYTES;
+        let seen = frame.room(Slot::Seen, half_bytes)?;
+        let lit = frame.room(Slot::Lit, half_bytes)?;
+        let light_bytes = if frame.params.light_on == 1 {
+            texel_count(&frame.params) as u64 * 4
+        } else {
+            4
+        };
+        let light = frame.room(Slot::Light, light_bytes)?;
+        let count_bytes = u64::from(list_count(&frame.params)) * 4;
+        let counts = frame.room(Slot::Counts, count_bytes)?;
+        frame.recorder.clear(&light, light_bytes);
+        frame.recorder.clear(&counts, count_bytes);
+        let [before, after] = &frame.value_frames;
+        // Bound but never read where nothing is accumulated.
+        let [carbon_before, carbon_after] = frame
+            .accumulated_frames
+            .as_ref()
+            .unwrap_or(&frame.value_frames);
+        let buffers = [
+            (0, &frame.params_buffer),
+            (1, &rows),
+            (2, &cols),
+            (3, &palette),
+            (4, before),
+            (5, after),
+            (6, carbon_before),
+            (7, carbon_after),
+            (8, &seen),
+            (9, &light),
+            (10, &counts),
+            (11, &lit),
+        ];
+        let groups = workgroups(&frame.params);
+        frame.recorder.dispatch_deep(&self.splat, &buffers, groups);
+        Ok(())
+    }
+}

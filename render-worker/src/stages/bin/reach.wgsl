@@ -1,0 +1,27 @@
+// Which lists of (screen tile, slice) a splat belongs to. Whole numbers only, made once from the splat and stored, so
+// that those who count and those who place entries cannot disagree.
+
+// Depth of one splat at one pixel: a colour sum of the eye grows by less than 2^24 at once and cannot wrap.
+const MOST_DEPTH = 15.0;
+
+// First and last screen tile that a splat touches, x and y; empty if it touches none.
+struct Reach { low: vec2<i32>, high: vec2<i32> }
+
+// Radius in the low and depth in the high 16 bits, as in an entry; 0 draws nothing.
+fn size_word(splat: Splat) -> u32 {
+    let radius = max(nearest(splat.radius_px * f32(SUBPIXELS)) >> params.entry_shift, 1);
+    let depth = u32(min(splat.tau, MOST_DEPTH) * DEPTH_ONE + 0.5);
+    if (splat.tau <= 0.0 || depth == 0u) { return 0u; }
+    return u32(radius) | (depth << 16u);
+}
+
+fn reach_of(place: vec2<i32>, size: u32) -> Reach {
+    if (size == 0u) { return Reach(vec2(0), vec2(-1)); }
+    let radius = i32(size & 0xffffu) << params.entry_shift;
+    let tiles = vec2(i32(params.tiles_x), i32(params.tiles_y));
+    return Reach(max((place - radius) >> vec2(SCREEN_TILE_SHIFT), vec2(0)), min((place + radius) >> vec2(SCREEN_TILE_SHIFT), tiles - 1));
+}
+
+fn list_of(x: i32, y: i32, slice: u32) -> u32 {
+    return (u32(y) * params.tiles_x + u32(x)) * params.slices + slice;
+}

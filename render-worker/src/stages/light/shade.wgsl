@@ -1,0 +1,48 @@
+// What lies between a splat and the sun dims it. Reads `light`, the depth above the slice planes.
+
+// Depth above a slice plane; nothing above the first, everything above the last.
+fn depth_at(texel: vec2<i32>, plane: i32) -> f32 {
+    return f32(light[address(texel, u32(clamp(plane, 0, i32(params.slices))))]);
+}
+
+// Depth above a place: the mean of half a slice before and half a slice behind it, each between two planes. Together
+// with the deposit this gives a thin sheet half its own depth wherever it lies, so that slices leave no bands.
+fn depth_above(texel: vec2<i32>, middle: i32, part: f32) -> f32 {
+    if (!inside(texel)) { return 0.0; }
+    let between = depth_at(texel, middle + 1);
+    let outer = mix(depth_at(texel, middle) + between, between + depth_at(texel, middle + 2), part);
+    return 0.5 * outer / DEPTH_ONE;
+}
+
+fn dimmed(color: u32, shade: f32) -> u32 {
+    let rgb = min(vec3(f32(color & 255u), f32((color >> 8u) & 255u), f32((color >> 16u) & 255u)) * shade, vec3(255.0));
+    return u32(nearest(rgb.x)) | (u32(nearest(rgb.y)) << 8u) | (u32(nearest(rgb.z)) << 16u) | (color & 0xff000000u);
+}
+
+// Optical depth between a place and the sun.
+fn depth_before(place: vec2<i32>, slice: f32) -> f32 {
+    let texel = texel_of(place);
+    let middle = i32(floor(slice - 0.5));
+    let part = slice - 0.5 - f32(middle);
+    let north = mix(depth_above(texel.index, middle, part), depth_above(texel.index + vec2(1, 0), middle, part), texel.part.x);
+    let south = mix(depth_above(texel.index + vec2(0, 1), middle, part), depth_above(texel.index + vec2(1, 1), middle, part), texel.part.x);
+    return mix(north, south, texel.part.y);
+}
+
+// Share of light at a place `t` radii towards the eye times the share of what is seen there, and the latter.
+fn look(place: vec2<i32>, slice: f32, step: f32, share: f32) -> vec2<f32> {
+    let toward = vec2(params.toward_u, params.toward_v) - params.toward_pull * vec2<f32>(place);
+    let there = place + vec2(nearest(step * toward.x), nearest(step * toward.y));
+    let slice_there = slice + step * (params.toward_slice - params.toward_pull * slice);
+    // Where little light reaches, the eye sees little past what lies in front.
+    let half = exp(-0.5 * depth_before(there, clamp(slice_there, 0.0, f32(params.slices) - 0.001)));
+    return share * half * vec2(half * half, 1.0);
+}
+
+// A splat's colour in its light. The light is looked up at three places, by the share of the cloud there: one look at the
+// centre would draw clouds too dark, because the eye sees their near sides.
+fn shaded(color: u32, place: vec2<i32>, slice: f32, day: f32, radius_px: f32) -> u32 {
+    let sum = look(place, slice, -0.6 * radius_px, 0.3277) + look(place, slice, 0.0, 1.0) + look(place, slice, 0.6 * radius_px, 0.3277);
+    let lit = sum.x / max(sum.y, 1.0e-30);
+    return dimmed(color, params.ambient + params.direct * lit * day);
+}

@@ -1,0 +1,71 @@
+//! One version of a product as it is shown, with the accumulated carbon that lifts its particles.
+
+use std::sync::Arc;
+
+use contract::job::Mode;
+use contract::manifest::{Manifest, ManifestId};
+use contract::quantity::Quantity;
+use contract::time::{Period, TimeMs};
+
+/// One version of a product.
+#[derive(Debug, Clone)]
+pub struct Layer {
+    /// Its name, which is costly to compute.
+    pub id: ManifestId,
+    /// Its manifest.
+    pub manifest: Arc<Manifest>,
+    /// What it covers; a manifest without steps is no layer.
+    pub extent: Period,
+    /// The accumulated carbon that lifts its particles.
+    pub accumulated: Option<Accumulated>,
+}
+
+/// Accumulated carbon of one version of a product.
+#[derive(Debug, Clone)]
+pub struct Accumulated {
+    /// Its name, which is costly to compute.
+    pub id: ManifestId,
+    /// Its manifest.
+    pub manifest: Arc<Manifest>,
+    /// The last instant at which it holds for that version: none if it was derived from exactly that one.
+    pub until: Option<TimeMs>,
+}
+
+impl Accumulated {
+    /// What was derived from a version, for that version.
+    pub fn new(id: ManifestId, manifest: Arc<Manifest>) -> Self {
+        let until = None;
+        Self {
+            id,
+            manifest,
+            until,
+        }
+    }
+
+    /// Does it hold at an instant?
+    pub(crate) fn holds_at(&self, time: TimeMs) -> bool {
+        self.until.is_none_or(|until| time <= until)
+    }
+}
+
+impl Layer {
+    /// Modes it can be drawn in. Accumulated carbon lifts the particles of another product; it has none of its own.
+    pub fn modes(&self) -> &'static [Mode] {
+        if self.manifest.quantity == Quantity::AccumulatedCarbon {
+            &[Mode::Map]
+        } else {
+            &Mode::ALL
+        }
+    }
+}
+
+/// The end of the steps at the start of both versions that are equal in both; none if what was summed up from one says
+/// nothing of the other.
+pub(super) fn equal_until(before: &Manifest, now: &Manifest) -> Option<TimeMs> {
+    if before.product != now.product || before.grid != now.grid || before.domain != now.domain {
+        return None;
+    }
+    let pairs = before.steps.iter().zip(&now.steps);
+    let equal = pairs.take_while(|(old, new)| old.period == new.period && old.frame == new.frame);
+    equal.last().map(|(_, new)| new.period.end)
+}

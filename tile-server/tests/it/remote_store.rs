@@ -1,0 +1,168 @@
+//! A store behind a network that goes silent: what is in memory is served, the rest is refused within seconds.
+
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+use axum::Router;
+use axum::body::Bytes;
+use axum::extract::{Path, Query, State};
+use axum::http::{HeaderMap, Method, StatusCode, header};
+use axum::response::{IntoResponse as _, Response};
+use axum::routing::any;
+use contract::quantity::Quantity;
+use storage::Store;
+use storage::store::{Patience, Settings};
+
+use crate::app::TestApp;
+
+/// As much of S3 as this server uses: objects are put, read and listed.
+#[derive(Default)]
+struct Bucket {
+    objects: Mutex<BTreeMap<String, Bytes>>,
+    /// Requests are taken and never answered.
+    is_silent: AtomicBool,
+    unanswered: AtomicUsize,
+}
+
+async fn object(
+    State(bucket): State<Arc<Bucket>>,
+    path: Option<Path<String>>,
+    Query(query): Query<BTreeMap<String, String>>,
+    method: Method,
+    content: Bytes,
+) -> Response {
+    if bucket.is_silent.load(Ordering::SeqCst) {
+        bucket.unanswered.fetch_add(1, Ordering::SeqCst);
+        std::future::pending::<()>().await;
+    }
+    let key = path.map(|Path(key)| key).unwrap_or_default();
+    if key.is_empty() {
+        return listing(&bucket, query.get("prefix").map_or("", String::as_str));
+    }
+    let mut objects = bucket.objects.lock().unwrap();
+    let dated = |length: usize| {
+        let mut headers = HeaderMap::new();
+        let date = "Sat, 01 Jan 2000 00:00:00 GMT";
+        headers.insert(header::LAST_MODIFIED, date.parse().unwrap());
+        headers.insert(header::ETAG, format!("\"{length}\"").parse().unwrap());
+        headers
+    };
+    match method {
+        Method::PUT if objects.contains_key(&key) => {
+            StatusCode::PRECONDITION_FAILED.into_response()
+        }
+        Method::PUT => {
+            let headers = dated(content.len());
+            objects.insert(key, content);
+            headers.into_response()
+        }
+        _ => match objects.get(&key).cloned() {
+            Some(content) => (dated(content.len()), content).into_response(),
+            None => StatusCode::NOT_FOUND.into_response(),
+        },
+    }
+}
+
+fn listing(bucket: &Bucket, prefix: &str) -> Response {
+    let entry = |(key, content): (&String, &Bytes)| {
+        format!(
+            "<Contents><Key>{key}</Key><Size>{}</Size><LastModified>2000-01-01T00:00:00.000Z</LastModified><ETag>\"1\"</ETag></Contents>",
+            content.len()
+        )
+    };
+    let objects = bucket.objects.lock().unwrap();
+    let found: String = objects
+        .iter()
+        .filter(|(key, _)| key.starts_with(prefix))
+        .map(entry)
+        .collect();
+    format!("<ListBucketResult><IsTruncated>false</IsTruncated>{found}</ListBucketResult>")
+        .into_response()
+}
+
+async fn remote() -> (Arc<Bucket>, Store) {
+    let bucket = Arc::new(Bucket::default());
+    let router = Router::new()
+        .route("/bucket", any(object))
+        .route("/bucket/{*key}", any(object))
+        .with_state(Arc::clone(&bucket));
+    let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
+    let endpoint = format!("http://{}", listener.local_addr().unwrap());
+    tokio::spawn(async { axum::serve(listener, router).await.unwrap() });
+    let variables = [
+        ("AWS_ENDPOINT", endpoint.as_str()),
+        ("AWS_ACCESS_KEY_ID", "a"),
+        ("AWS_SECRET_ACCESS_KEY", "a"),
+        ("AWS_REGION", "us-east-1"),
+        ("AWS_ALLOW_HTTP", "true"),
+    ];
+    let owned = variables.map(|(name, value)| (name.to_owned(), value.to_owned()));
+    let mut settings = Settings::from_variables(owned);
+    settings.patience = Patience::interactive();
+    let store = Store::open_with("s3://bucket", &settings).unwrap();
+    (bucket, store)
+}
+
+#[tokio::test]
+async fn a_store_that_goes_silent_is_told_of_within_seconds_and_what_is_known_is_served() {
+    let (bucket, store) = remote().await;
+    let app = TestApp::over(store, |settings| settings.catalogue_age_ms = 1000);
+    app.land("flux", Quantity::CarbonFlux, 1).await;
+    let tile = "/tiles/flux/map/0/0/0.png";
+    let first = app.get(tile).await;
+    assert_eq!(first.status, StatusCode::OK, "{}", first.text());
+    bucket.is_silent.store(true, Ordering::SeqCst);
+    tokio::time::sleep(Duration::from_millis(1100)).await;
+    // A crowd, of which some ask for what is in memory and others for what must be drawn without the store.
+    app.drawer.is_slow.store(true, Ordering::SeqCst);
+    let begun = Instant::now();
+    let known = (0..10).map(|_| app.get(tile));
+    let paths: Vec<String> = (0..3)
+        .map(|x| format!("/tiles/flux/map/2/{x}/0.png"))
+        .collect();
+    let unknown = paths.iter().map(|path| app.get(path));
+    let (known, unknown) = tokio::join!(
+        futures::future::join_all(known),
+        futures::future::join_all(unknown)
+    );
+    let took = begun.elapsed();
+    assert!(took < Duration::from_secs(40), "{took:?}");
+    println!("a crowd was answered within {took:?}");
+    assert!(
+        bucket.unanswered.load(Ordering::SeqCst) > 0,
+        "the fault took place"
+    );
+    for answer in known {
+        assert_eq!((answer.status, &answer.body), (StatusCode::OK, &first.body));
+    }
+    for answer in unknown {
+        assert_eq!(answer.status, StatusCode::SERVICE_UNAVAILABLE);
+        assert!(!answer.header("retry-after").is_empty());
+        assert!(answer.reason().contains("store"), "{}", answer.reason());
+    }
+    bucket.is_silent.store(false, Ordering::SeqCst);
+    app.drawer.is_slow.store(false, Ordering::SeqCst);
+    assert_eq!(app.get(&paths[0]).await.status, StatusCode::OK);
+}
+
+#[tokio::test]
+async fn a_crowd_that_comes_while_nothing_is_known_waits_for_one_failure_only() {
+    let (bucket, store) = remote().await;
+    bucket.is_silent.store(true, Ordering::SeqCst);
+    let app = TestApp::over(store, |_settings| {});
+    let begun = Instant::now();
+    let crowd = (0..20).map(|_| app.get("/tiles/flux/map/0/0/0.png"));
+    for answer in futures::future::join_all(crowd).await {
+        assert_eq!(answer.status, StatusCode::SERVICE_UNAVAILABLE);
+        assert!(!answer.header("retry-after").is_empty());
+    }
+    let took = begun.elapsed();
+    assert!(took < Duration::from_secs(30), "{took:?}");
+    assert_eq!(
+        bucket.unanswered.load(Ordering::SeqCst),
+        1,
+        "asked once for all"
+    );
+}

@@ -1,0 +1,35 @@
+//! Titles of what is new, each once.
+import { describe, expect, it } from "vitest";
+import type { Product } from "../src/api";
+import { Catalogue } from "../src/catalogue";
+
+function product(id: string, title: string, derived_from: string | null = null): Product {
+  return {
+    id,
+    title,
+    quantity: "carbon_flux",
+    unit: "",
+    display_unit: "",
+    synthetic: false,
+    source: "",
+    manifest: `${id}@1-00000000`,
+    derived_from,
+    bounds: [-180, -90, 180, 90],
+    steps: [],
+    modes: ["map"],
+    legend: { low: 0, high: 1, unit: "", label: "", stops: [] },
+  };
+}
+
+describe("titles of news", () => {
+  const catalogue = new Catalogue([
+    product("flux", "CO2 flux"),
+    product("flux-accumulated", "CO2 flux, accumulated", "flux@1-00000000"),
+  ]);
+
+  it("are told once and typeset, and what follows from one of them is not", () => {
+    expect(catalogue.titlesOf(["flux", "flux-accumulated", "flux"])).toEqual(["CO₂ flux"]);
+    expect(catalogue.titlesOf(["flux-accumulated"])).toEqual(["CO₂ flux, accumulated"]);
+    expect(catalogue.titlesOf(["a-stranger"])).toEqual(["a-stranger"]);
+  });
+});
