@@ -69,7 +69,10 @@ fn more_slices_come_nearer_to_the_reference_on_a_globe_and_on_a_tile() {
         assert!(usual.psnr_db.unwrap() >= least_db, "{name}: {usual:?}");
         // Few slices are far off; from 64 on what is left is that a cloud has one colour, however many there are.
         let [few_db, usual_db, many_db] = [eight, usual, many].map(|d| d.psnr_db.unwrap());
-        assert!(few_db < usual_db - 3.0 && many_db > usual_db - 2.0, "{name}");
+        assert!(
+            few_db < usual_db - 3.0 && many_db > usual_db - 2.0,
+            "{name}"
+        );
         assert!(
             eight.mean_flip > 1.5 * usual.mean_flip && many.mean_flip < 1.2 * usual.mean_flip,
             "{name}"
