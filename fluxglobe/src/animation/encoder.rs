@@ -99,7 +99,7 @@ pub(super) struct Encoder {
 }
 
 impl Encoder {
-    pub(super) async fn start(
+    pub(super) fn start(
         program: &Path,
         container: Container,
         output: &Path,

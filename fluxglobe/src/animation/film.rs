@@ -23,13 +23,13 @@ pub(super) enum Film {
 
 impl Film {
     /// Opens the output of the options.
-    pub(super) async fn open(options: &RenderAnimation, shots: &Shots) -> Result<Self> {
+    pub(super) fn open(options: &RenderAnimation, shots: &Shots) -> Result<Self> {
         let output = &options.globe.picture.output;
         match extension(output).as_deref() {
             Some("png" | "apng") => Ok(Self::Strip(Box::new(Strip::open(output, shots)?))),
             Some(name) => match Container::named(name) {
                 Some(container) => {
-                    let encoder = Encoder::start(&options.ffmpeg, container, output, shots).await?;
+                    let encoder = Encoder::start(&options.ffmpeg, container, output, shots)?;
                     Ok(Self::Encoder(Box::new(encoder)))
                 }
                 None => Ok(Self::Folder(Folder::open(output, shots)?)),

@@ -37,9 +37,9 @@ pub(crate) async fn run(settings: &Settings, store: Store, options: RenderAnimat
         bail!("an animation has no one --time: give --from and --to");
     }
     let shots = Arc::new(shots(settings, &store, &options).await?);
-    let mut film = Film::open(&options, &shots).await?;
-    let missing = film.missing(&shots)?;
     let drawer = drawer(settings, store, &options).await?;
+    let mut film = Film::open(&options, &shots)?;
+    let missing = film.missing(&shots)?;
     let bar = progress::bar("draw", shots.count().into());
     bar.inc(u64::from(shots.count()) - missing.len() as u64);
     let drawn = stream::iter(missing)

@@ -190,12 +190,12 @@ fn a_picture_of_another_size_does_not_get_into_a_strip() {
     assert_eq!(std::fs::read_dir(place.path()).unwrap().count(), 0);
 }
 
-#[tokio::test]
-async fn an_encoder_that_is_not_there_is_asked_for_by_name() {
+#[test]
+fn an_encoder_that_is_not_there_is_asked_for_by_name() {
     let place = tempfile::tempdir().unwrap();
     let output = place.path().join("film.mp4");
     let missing = Path::new("no-such-encoder");
-    let error = Encoder::start(missing, Container::Mp4, &output, &shots(2)).await;
+    let error = Encoder::start(missing, Container::Mp4, &output, &shots(2));
     let text = error.err().unwrap().to_string();
     assert!(
         text.contains("install ffmpeg") && text.contains("FILE.png"),
@@ -214,9 +214,7 @@ async fn what_an_encoder_complains_of_is_said_and_no_file_is_left() {
     .unwrap();
     make_executable(&program);
     let output = place.path().join("film.webm");
-    let mut encoder = Encoder::start(&program, Container::Webm, &output, &shots(2))
-        .await
-        .unwrap();
+    let mut encoder = Encoder::start(&program, Container::Webm, &output, &shots(2)).unwrap();
     encoder
         .add(&picture(0).encode_png().unwrap())
         .await

@@ -33,6 +33,11 @@ pub(super) const LOWEST_SUN_DEG: f64 = 20.0;
 /// particle's own kernel does (variance texel²/3 against radius²/8).
 pub(super) const TEXEL_PER_RADIUS: f64 = 0.612;
 
+/// How much more of what is lit is seen than of what is dark: power of the light, nearest to the reference.
+pub(super) const LOOK_POWER_GLOBE: f32 = 0.5;
+/// The same where the eye looks straight down on a map.
+pub(super) const LOOK_POWER_TILE: f32 = 0.1;
+
 /// Clouds that overlap at a place: the fewer, the grainier; the more, the slower.
 const CLOUDS_OVER_A_POINT: f64 = 50.0;
 /// Radius of the largest clouds over the side of a cell: larger ones would blur what the grid resolves.

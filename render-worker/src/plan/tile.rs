@@ -194,6 +194,7 @@ fn light_and_reach(
     [params.light_width, params.light_height] = texels;
     [params.light_shift_x_per_m, params.light_shift_y_per_m] =
         shadow_per_m.map(|shift| shift as f32);
+    params.look_power = look::LOOK_POWER_TILE;
     params.toward_u = toward_eye[0] as f32;
     params.toward_v = toward_eye[1] as f32;
     params.toward_slice = (-f64::from(params.slices_per_unit) / level.px_per_m) as f32;

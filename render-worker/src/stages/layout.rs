@@ -92,6 +92,8 @@ shared_struct! {
         pub toward_v: f32,
         pub toward_slice: f32,
         pub toward_pull: f32,
+        /// Power of the light at a place by which what is seen of it counts.
+        pub look_power: f32,
         pub light_u0: f32,
         pub light_v0: f32,
         pub light_texels_per_unit: f32,

@@ -9,7 +9,7 @@ struct Params {
     min_radius_px: f32, max_radius_px: f32, size_spread: f32, height_px_per_m: f32, slice_top: f32,
     slices_per_unit: f32, light_on: u32, light_width: u32, light_height: u32, light_unit: i32, light_origin_x: i32,
     light_origin_y: i32, light_shift_x_per_m: f32, light_shift_y_per_m: f32, light_depth_gain: f32, toward_u: f32, toward_v: f32,
-    toward_slice: f32, toward_pull: f32, light_u0: f32,
+    toward_slice: f32, toward_pull: f32, look_power: f32, light_u0: f32,
     light_v0: f32, light_texels_per_unit: f32, ambient: f32, direct: f32, lon_span_rad: f32, per_earth_radius_m: f32,
     focal_px: f32, eye_x: f32, eye_y: f32, eye_z: f32, right_x: f32, right_y: f32, right_z: f32, up_x: f32,
     up_y: f32, up_z: f32, forward_x: f32, forward_y: f32, forward_z: f32, half_x: f32, half_y: f32, half_z: f32,

@@ -478,7 +478,7 @@ fn the_lists_hold_every_stored_splat_once_and_in_its_light() {
             |gpu, source| distance(gpu, source, place::SOURCE),
         );
         for (right, wrong) in [
-            ("exp(-0.5 *", "exp(0.5 *"),
+            ("vec2(exp(-depth), 1.0)", "vec2(exp(depth), 1.0)"),
             (
                 "atomicAdd(&counts[tag - 1u], atomicLoad",
                 "atomicAdd(&counts[tag - 1u], 1u + atomicLoad",

@@ -48,7 +48,7 @@ fn linear(srgb: f64) -> f64 {
     }
 }
 
-/// A picture in lightness, red-green and blue-yellow (YCxCz), one plane each.
+/// A picture in lightness, red-green and blue-yellow (`YCxCz`), one plane each.
 pub(super) struct Opponents([Plane; 3]);
 
 impl Opponents {
@@ -138,7 +138,7 @@ fn lab(xyz: DVec3) -> DVec3 {
     )
 }
 
-/// Distance of two colours: of lightness plus of the colour plane (HyAB), which stays right for large ones.
+/// Distance of two colours: of lightness plus of the colour plane (`HyAB`), which stays right for large ones.
 ///
 /// Source: Abasi, Tehran, Fairchild (2020), Distance metrics for very large color differences.
 pub(super) fn distance(a: DVec3, b: DVec3) -> f64 {

@@ -133,9 +133,10 @@ fn lit(params: &Params, light: &[u32], splat: &Splat) -> f32 {
         let toward = params.toward_slice - params.toward_pull * splat.slice;
         let slice = (splat.slice + step * toward).clamp(0.0, params.slices as f32 - 0.001);
         // Where little light reaches, the eye sees little past what lies in front.
-        let half = (-0.5 * depth_before(params, light, place, slice)).exp();
-        sum += half * half * half;
-        weights += half;
+        let depth = depth_before(params, light, place, slice);
+        let seen = (-params.look_power * depth).exp();
+        sum += seen * (-depth).exp();
+        weights += seen;
     }
     sum / weights.max(1e-30)
 }

@@ -33,8 +33,8 @@ fn look(place: vec2<i32>, slice: f32, step: f32) -> vec2<f32> {
     let there = place + vec2(nearest(step * toward.x), nearest(step * toward.y));
     let slice_there = slice + step * (params.toward_slice - params.toward_pull * slice);
     // Where little light reaches, the eye sees little past what lies in front.
-    let half = exp(-0.5 * depth_before(there, clamp(slice_there, 0.0, f32(params.slices) - 0.001)));
-    return half * vec2(half * half, 1.0);
+    let depth = depth_before(there, clamp(slice_there, 0.0, f32(params.slices) - 0.001));
+    return exp(-params.look_power * depth) * vec2(exp(-depth), 1.0);
 }
 
 // A splat's colour in its light, looked up before and behind the centre: one look at the centre would draw clouds too
