@@ -2,6 +2,7 @@
 //! of any size. Nothing here is linked into services.
 
 pub mod classic;
+pub mod command;
 pub mod compare;
 pub mod encode;
 pub mod frames;

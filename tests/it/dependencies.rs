@@ -15,6 +15,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("ingest", &["contract", "storage", "service"]),
     ("compute", &["contract", "storage", "service"]),
     ("render-worker", &["contract", "storage", "service"]),
+    ("render-bench", &["contract", "render-worker"]),
     ("tile-server", &["contract", "storage", "service"]),
     (
         "fluxglobe",
@@ -27,6 +28,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "ingest",
             "compute",
             "render-worker",
+            "render-bench",
             "tile-server",
         ],
     ),
@@ -45,6 +47,10 @@ const MUST_NOT_REACH: &[(&str, &[&str])] = &[
     ),
     (
         "render-worker",
+        &["datafusion", "ballista", "hdf5-metno", "rdkafka"],
+    ),
+    (
+        "render-bench",
         &["datafusion", "ballista", "hdf5-metno", "rdkafka"],
     ),
     ("ingest", &["datafusion", "ballista", "wgpu", "rdkafka"]),

@@ -151,6 +151,8 @@ pub(crate) enum Rejected {
 pub(crate) enum Bench {
     /// How fresh a running cluster is: from a notice to a volume tile, and the share of each stage.
     Stream(BenchStream),
+    /// How fast the renderer is on this machine, beside the classic raster renderer and the processor.
+    Render(render_bench::command::RenderBench),
     /// How far volumes are from a reference in double precision, against the number of slices.
     Quality(BenchQuality),
     /// How far two pictures are apart: decibels, levels, bytes, FLIP.

@@ -1,0 +1,391 @@
+//! The command: options in, one table out. Pictures are compared before speed is.
+
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context as _, Result};
+use clap::Args;
+use contract::job::RenderJob;
+use contract::tile::Tile;
+use render_worker::frame::Stages;
+use render_worker::gpu::Gpu;
+use render_worker::playback::Playback;
+use render_worker::stages::fill::{Fill, Form, Sources, bench};
+use render_worker::{Backend, Image, Renderer, Scene};
+use serde::Serialize;
+
+use crate::classic::{self, Classic};
+use crate::stats::Times;
+use crate::{compare, encode, frames, scenery, tiles, twins};
+
+/// Longest time for one form on one grid.
+const MOST_FILLING: Duration = Duration::from_secs(4);
+
+/// Measure the renderer on this machine.
+#[derive(Args)]
+pub struct RenderBench {
+    /// Particles of each scene, in millions.
+    #[arg(long, value_delimiter = ',', default_value = "0.1,1,4.43")]
+    millions: Vec<f64>,
+    /// Pictures, WIDTHxHEIGHT.
+    #[arg(long, value_delimiter = ',', default_value = "1920x1080")]
+    sizes: Vec<String>,
+    /// Half-angle slices.
+    #[arg(long, value_delimiter = ',', default_value = "64")]
+    slices: Vec<u32>,
+    /// Frames of each series.
+    #[arg(long, default_value_t = 200)]
+    frames: usize,
+    /// Frames of the classic renderer; 0 leaves it out.
+    #[arg(long, default_value_t = 10)]
+    classic: usize,
+    /// Runs of the CPU twins; 0 leaves them out.
+    #[arg(long, default_value_t = 5)]
+    twins: usize,
+    /// Frames read back and encoded; 0 leaves them out.
+    #[arg(long, default_value_t = 0)]
+    encode: usize,
+    /// Volume tiles; 0 leaves them out.
+    #[arg(long, default_value_t = 0)]
+    tiles: usize,
+    /// Largest grid whose gaps are filled, ROWSxCOLUMNS: every form, small grids first; nothing else is timed.
+    #[arg(long)]
+    fill: Option<String>,
+    /// Folder for the pictures.
+    #[arg(long)]
+    pictures: Option<PathBuf>,
+    /// Folder for the same few pictures on every machine, to be compared with those of another adapter; nothing is timed.
+    #[arg(long)]
+    samples: Option<PathBuf>,
+    /// Compare two folders of sample pictures; nothing is timed.
+    #[arg(long, num_args = 2, value_names = ["A", "B"])]
+    compare: Option<Vec<PathBuf>>,
+    /// One JSON line a scene instead of the table.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct Row {
+    adapter: String,
+    particles: u64,
+    width: u32,
+    height: u32,
+    slices: u32,
+    measured: frames::Measured,
+    classic: Option<Against>,
+    twins: Option<(Times, usize)>,
+    encoded: Option<encode::Encoded>,
+}
+
+#[derive(Serialize)]
+struct Against {
+    frame_ms: f64,
+    times_faster: f64,
+    difference: Option<compare::Difference>,
+}
+
+/// Measures what the options ask for, and prints it.
+///
+/// # Errors
+/// No device, a size that is none, a scene that is too large, a file that cannot be written.
+pub fn run(args: &RenderBench) -> Result<()> {
+    if let Some(folders) = &args.compare {
+        return compare_folders(&folders[0], &folders[1]);
+    }
+    if let Some(folder) = &args.samples {
+        return samples(folder);
+    }
+    let gpu = Gpu::open()?;
+    if let Some(size) = &args.fill {
+        return fills(&gpu, size);
+    }
+    let start = Instant::now();
+    let stages = Stages::new(&gpu);
+    talk(&format!(
+        "{}; shaders compiled in {:.2} s",
+        gpu.adapter_name(),
+        start.elapsed().as_secs_f64()
+    ));
+    for millions in &args.millions {
+        let start = Instant::now();
+        let grid = scenery::grid((millions * 1e6) as u64);
+        let scene = scenery::scene(&grid);
+        let particles = scenery::particles(&scene);
+        talk(&format!(
+            "{particles} particles on {} x {} cells, made in {:.1} s",
+            grid.rows,
+            grid.cols,
+            start.elapsed().as_secs_f64()
+        ));
+        for size in &args.sizes {
+            let (width, height) = size.split_once('x').context("a size is WIDTHxHEIGHT")?;
+            let size_px = [width.parse()?, height.parse()?];
+            for &slices in &args.slices {
+                let job = scenery::job(size_px, slices)?;
+                let row = row(args, &gpu, &stages, &job, &scene)?;
+                report(args, &row);
+            }
+        }
+        if args.tiles > 0 {
+            let renderer = Renderer::new(Backend::Gpu)?;
+            let job = scenery::job([256, 256], 64)?;
+            for z in [3, 4, 5, 6] {
+                // Round 115 E, 20 N.
+                let tile = Tile::new(
+                    z,
+                    (0.819 * f64::from(1 << z)) as u32,
+                    (0.443 * f64::from(1 << z)) as u32,
+                )?;
+                let times = tiles::measure(&renderer, &job, &scene, &[tile], args.tiles)?;
+                say(&format!(
+                    "  volume tile {tile:?} with PNG: median {:.2} ms, p99 {:.2} ms",
+                    times.median_ms, times.p99_ms
+                ));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn row(
+    args: &RenderBench,
+    gpu: &Gpu,
+    stages: &Stages,
+    job: &RenderJob,
+    scene: &Scene,
+) -> Result<Row> {
+    let [width, height] = job.view.size_px();
+    let measured = frames::measure(gpu, stages, job, scene, args.frames)?;
+    let name = format!(
+        "{}-{width}x{height}-{}",
+        scenery::particles(scene),
+        job.style.slices
+    );
+    let classic = (args.classic > 0)
+        .then(|| against(args, gpu, stages, job, scene, &measured, &name))
+        .transpose()?;
+    let twins = (args.twins > 0)
+        .then(|| twins::measure(job, scene, args.twins))
+        .transpose()?;
+    let encoded = (args.encode > 0)
+        .then(|| encode::measure(gpu, stages, job, scene, args.encode))
+        .transpose()?;
+    Ok(Row {
+        adapter: gpu.adapter_name().to_owned(),
+        particles: scenery::particles(scene),
+        width,
+        height,
+        slices: job.style.slices,
+        measured,
+        classic,
+        twins,
+        encoded,
+    })
+}
+
+/// The classic renderer on the same frame: first the pictures, then the times.
+fn against(
+    args: &RenderBench,
+    gpu: &Gpu,
+    stages: &Stages,
+    job: &RenderJob,
+    scene: &Scene,
+    measured: &frames::Measured,
+    name: &str,
+) -> Result<Against> {
+    let steps = classic::steps(gpu, scene)?;
+    let mut playback = Playback::new(gpu, stages, job, scene)?;
+    let mut classic = Classic::new(gpu, job, scene)?;
+    let weights = frames::weights(7);
+    playback.seek(weights.0, weights.1);
+    let [width, height] = job.view.size_px();
+    let ours = Image {
+        width,
+        height,
+        rgba8: playback.image(&steps)?,
+    };
+    classic.draw(&steps, weights)?;
+    let theirs = classic.image()?;
+    if let Some(folder) = &args.pictures {
+        std::fs::create_dir_all(folder)?;
+        std::fs::write(folder.join(format!("{name}.png")), ours.encode_png()?)?;
+        std::fs::write(
+            folder.join(format!("{name}-classic.png")),
+            theirs.encode_png()?,
+        )?;
+    }
+    let start = Instant::now();
+    for frame in 0..args.classic {
+        classic.draw(&steps, frames::weights(frame))?;
+    }
+    gpu.wait()?;
+    let frame_ms = start.elapsed().as_secs_f64() / args.classic as f64 * 1e3;
+    Ok(Against {
+        frame_ms,
+        times_faster: frame_ms / measured.frame.median_ms.max(1e-9),
+        difference: compare::difference(&ours, &theirs),
+    })
+}
+
+fn report(args: &RenderBench, row: &Row) {
+    if args.json {
+        say(&format!(
+            "{}",
+            serde_json::to_string(row).unwrap_or_default()
+        ));
+        return;
+    }
+    let m = &row.measured;
+    say(&format!(
+        "{:>9} particles {}x{} {:>3} slices: frame median {:.3} ms, p99 {:.3} ms, wall {:.3} ms; {} entries",
+        row.particles,
+        row.width,
+        row.height,
+        row.slices,
+        m.frame.median_ms,
+        m.frame.p99_ms,
+        m.frame_wall_ms,
+        m.entries
+    ));
+    let stages: Vec<_> = m
+        .stages
+        .iter()
+        .map(|(name, t)| format!("{name} {:.3}", t.median_ms))
+        .collect();
+    say(&format!("  {}", stages.join(", ")));
+    if let Some(c) = &row.classic {
+        say(&format!(
+            "  classic {:.2} ms, {:.1} times; {:?}",
+            c.frame_ms, c.times_faster, c.difference
+        ));
+    }
+    if let Some((times, cores)) = &row.twins {
+        let splat = m
+            .stages
+            .iter()
+            .find(|(name, _)| name == "splat")
+            .map_or(0.0, |(_, t)| t.median_ms);
+        say(&format!(
+            "  interpolation and particles on {cores} cores {:.1} ms, {:.0} times the pass that also lights and counts",
+            times.median_ms,
+            times.median_ms / splat.max(1e-9)
+        ));
+    }
+    if let Some(e) = &row.encoded {
+        say(&format!(
+            "  read back and encoded on {} cores: {:.1} frames/s, PNG {} bytes",
+            e.cores, e.frames_per_s, e.png_bytes
+        ));
+    }
+}
+
+/// Fills the gaps of made-up frames, a fifth of them missing, with every form.
+fn fills(gpu: &Gpu, size: &str) -> Result<()> {
+    let (rows, cols) = size.split_once('x').context("a size is ROWSxCOLUMNS")?;
+    let fill = Fill::new(gpu, Sources::default());
+    for case in bench::cases([rows.parse()?, cols.parse()?], 0.2) {
+        for form in Form::ALL {
+            let timing = match bench::bench_fill(gpu, &fill, case, form, 50, MOST_FILLING) {
+                Ok(timing) => timing,
+                Err(error) => {
+                    say(&format!(
+                        "{} of {} x {}: {error}",
+                        form.name(),
+                        case.rows,
+                        case.cols
+                    ));
+                    continue;
+                }
+            };
+            say(&format!(
+                "{:<11} {:>4} x {:<4} gaps of {:>2}: median {:>10.3} ms, {:>6.2} % measured; from all pairs {:?}, RMSE over spread {:?}, digest {}",
+                form.name(),
+                case.rows,
+                case.cols,
+                case.missing.side_cells,
+                timing.median_s() * 1e3,
+                100.0 * timing.measured_share,
+                timing.from_all_pairs,
+                timing.rmse_of_hidden,
+                timing
+                    .values_digest
+                    .map_or_else(|| "-".to_owned(), |digest| digest.short())
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Draws the same pictures on every machine.
+fn samples(folder: &PathBuf) -> Result<()> {
+    std::fs::create_dir_all(folder)?;
+    let renderer = Renderer::new(Backend::Gpu)?;
+    let scene = scenery::scene(&scenery::grid(200_000));
+    let mut globe = scenery::job([640, 480], 64)?;
+    globe.style.particles_per_cell = 4;
+    let mut jobs = vec![("globe", globe)];
+    for (name, z, x, y) in [
+        ("tile-4", 4, 13, 7),
+        ("tile-5", 5, 26, 14),
+        ("tile-7", 7, 104, 56),
+    ] {
+        let mut job = scenery::job([256, 256], 64)?;
+        job.style.particles_per_cell = 16;
+        job.view = contract::job::View::Tile {
+            tile: Tile::new(z, x, y)?,
+            size_px: 256,
+        };
+        jobs.push((name, job));
+    }
+    for (name, job) in jobs {
+        let image = renderer.render(&job, &scene)?;
+        std::fs::write(folder.join(format!("{name}.png")), image.encode_png()?)?;
+    }
+    say(&format!(
+        "{}: pictures in {}",
+        renderer.name(),
+        folder.display()
+    ));
+    Ok(())
+}
+
+fn compare_folders(a: &PathBuf, b: &PathBuf) -> Result<()> {
+    let mut names: Vec<_> = std::fs::read_dir(a)?
+        .map(|entry| entry.map(|e| e.file_name()))
+        .collect::<Result<_, _>>()?;
+    names.sort();
+    for name in names {
+        let read = |folder: &PathBuf| -> Result<Image> {
+            let path = folder.join(&name);
+            let picture = image::open(&path)
+                .with_context(|| path.display().to_string())?
+                .into_rgba8();
+            Ok(Image {
+                width: picture.width(),
+                height: picture.height(),
+                rgba8: picture.into_raw(),
+            })
+        };
+        let d = compare::difference(&read(a)?, &read(b)?).context("the sizes differ")?;
+        say(&format!(
+            "{}: PSNR {:.1} dB, {:.3} % of pixels within one level, at most {} levels, {} bytes differ",
+            name.display(),
+            d.psnr_db,
+            d.within_one_level * 100.0,
+            d.most_levels,
+            d.bytes
+        ));
+    }
+    Ok(())
+}
+
+#[expect(clippy::print_stdout, reason = "results of a command")]
+fn say(line: &str) {
+    println!("{line}");
+}
+
+#[expect(clippy::print_stderr, reason = "talk of a command")]
+fn talk(line: &str) {
+    eprintln!("{line}");
+}
