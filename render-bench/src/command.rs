@@ -22,7 +22,7 @@ use crate::{compare, encode, frames, scenery, tiles, twins};
 const MOST_FILLING: Duration = Duration::from_secs(4);
 
 /// Measure the renderer on this machine.
-#[derive(Args)]
+#[derive(Debug, Args)]
 pub struct RenderBench {
     /// Particles of each scene, in millions.
     #[arg(long, value_delimiter = ',', default_value = "0.1,1,4.43")]
