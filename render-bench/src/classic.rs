@@ -107,6 +107,10 @@ impl<'a> Classic<'a> {
     }
 
     /// Draws an instant; the picture stays on the device. Does not wait.
+    #[expect(
+        clippy::too_many_lines,
+        reason = "one list of passes, read from top to bottom"
+    )]
     pub fn draw(&mut self, steps: &Steps, weights: (f32, f32)) -> Result<()> {
         (
             self.plan.params.value_weight,
@@ -281,6 +285,7 @@ fn half(bits: u16) -> f32 {
 }
 
 impl Pipelines {
+    #[expect(clippy::too_many_lines, reason = "descriptors of five pipelines")]
     fn new(device: &wgpu::Device, params: &Params) -> Self {
         // Light depth of a splat from its depth on the screen, at the scale of what lies below the camera.
         let height =

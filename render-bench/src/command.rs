@@ -27,7 +27,7 @@ pub struct RenderBench {
     /// Particles of each scene, in millions.
     #[arg(long, value_delimiter = ',', default_value = "0.1,1,4.43")]
     millions: Vec<f64>,
-    /// Pictures, WIDTHxHEIGHT.
+    /// Pictures, `WIDTHxHEIGHT`.
     #[arg(long, value_delimiter = ',', default_value = "1920x1080")]
     sizes: Vec<String>,
     /// Half-angle slices.
@@ -48,7 +48,7 @@ pub struct RenderBench {
     /// Volume tiles; 0 leaves them out.
     #[arg(long, default_value_t = 0)]
     tiles: usize,
-    /// Largest grid whose gaps are filled, ROWSxCOLUMNS: every form, small grids first; nothing else is timed.
+    /// Largest grid whose gaps are filled, `ROWSxCOLUMNS`: every form, small grids first; nothing else is timed.
     #[arg(long)]
     fill: Option<String>,
     /// Folder for the pictures.
@@ -157,13 +157,8 @@ fn row(
 ) -> Result<Row> {
     let [width, height] = job.view.size_px();
     let measured = frames::measure(gpu, stages, job, scene, args.frames)?;
-    let name = format!(
-        "{}-{width}x{height}-{}",
-        scenery::particles(scene),
-        job.style.slices
-    );
     let classic = (args.classic > 0)
-        .then(|| against(args, gpu, stages, job, scene, &measured, &name))
+        .then(|| against(args, gpu, stages, job, scene, &measured))
         .transpose()?;
     let twins = (args.twins > 0)
         .then(|| twins::measure(job, scene, args.twins))
@@ -192,14 +187,18 @@ fn against(
     job: &RenderJob,
     scene: &Scene,
     measured: &frames::Measured,
-    name: &str,
 ) -> Result<Against> {
+    let [width, height] = job.view.size_px();
+    let name = format!(
+        "{}-{width}x{height}-{}",
+        scenery::particles(scene),
+        job.style.slices
+    );
     let steps = classic::steps(gpu, scene)?;
     let mut playback = Playback::new(gpu, stages, job, scene)?;
     let mut classic = Classic::new(gpu, job, scene)?;
     let weights = frames::weights(7);
     playback.seek(weights.0, weights.1);
-    let [width, height] = job.view.size_px();
     let ours = Image {
         width,
         height,
@@ -230,10 +229,7 @@ fn against(
 
 fn report(args: &RenderBench, row: &Row) {
     if args.json {
-        say(&format!(
-            "{}",
-            serde_json::to_string(row).unwrap_or_default()
-        ));
+        say(&serde_json::to_string(row).unwrap_or_default());
         return;
     }
     let m = &row.measured;

@@ -140,11 +140,11 @@ fn every_form_has_the_same_bits_on_the_device_and_on_the_processor() {
 
 #[test]
 fn a_wrong_shader_of_any_form_is_seen() {
+    type Shader = fn(&mut Sources) -> &mut Cow<'static, str>;
     let Some(gpu) = gpu("fill faults") else {
         return;
     };
     let (values, domain) = frame(&SEA);
-    type Shader = fn(&mut Sources) -> &mut Cow<'static, str>;
     let (window, exact): (Shader, Shader) = (|all| &mut all.window, |all| &mut all.exact);
     let (pairs, stencil): (Shader, Shader) = (|all| &mut all.pairs, |all| &mut all.stencil);
     let faults = [

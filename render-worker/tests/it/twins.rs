@@ -131,7 +131,7 @@ impl Twins {
         len: usize,
     ) -> Vec<T> {
         let output = (output, (len * size_of::<T>()) as u64);
-        let [bytes] = self.run_with(gpu, self.params, fill, record, [output]);
+        let [bytes] = self.run_with(gpu, &self.params, fill, record, [output]);
         bytemuck::pod_collect_to_vec(&bytes)
     }
 
@@ -139,7 +139,7 @@ impl Twins {
     fn run_with<const N: usize>(
         &self,
         gpu: &Gpu,
-        params: Params,
+        params: &Params,
         fill: impl FnOnce(&mut FrameContext<'_>),
         record: impl FnOnce(&mut FrameContext<'_>),
         outputs: [(Slot, u64); N],
@@ -157,7 +157,7 @@ impl Twins {
             accumulated: self.scene.accumulated.as_ref().map(pair),
             domain: gpu.storage("domain", self.scene.domain.content()).unwrap(),
         };
-        let mut frame = FrameContext::new(gpu, &mut workspace, &self.plan, params, scene).unwrap();
+        let mut frame = FrameContext::new(gpu, &mut workspace, &self.plan, *params, scene).unwrap();
         fill(&mut frame);
         record(&mut frame);
         let buffers = outputs.map(|(slot, bytes)| (frame.room(slot, 4).unwrap(), bytes));
@@ -238,7 +238,7 @@ fn interpolate_matches_its_twin() {
             let stage = Interpolate::new(gpu, source);
             let [drawn] = twins.run_with(
                 gpu,
-                params,
+                &params,
                 |_| (),
                 |f| stage.record(f).unwrap(),
                 [(Slot::Value, twins.value.len() as u64 * 4)],
@@ -288,7 +288,7 @@ fn splats_match_their_twins_on_tiles_and_on_the_globe() {
             let outputs = twins.stored();
             let [seen, lit] = twins.run_with(
                 gpu,
-                twins.params,
+                &twins.params,
                 |_| (),
                 |f| stage.record(f).unwrap(),
                 outputs,
@@ -338,7 +338,7 @@ fn light_is_given_and_lists_are_counted_as_the_twins_do() {
                 let [first, second] = twins.stored();
                 let [seen, lit, light, counts] = twins.run_with(
                     gpu,
-                    twins.params,
+                    &twins.params,
                     |_| (),
                     |f| stage.record(f).unwrap(),
                     [
@@ -434,7 +434,7 @@ fn the_lists_hold_every_stored_splat_once_and_in_its_light() {
             let [first, second] = twins.stored();
             let [seen, lit, above, ends, entries] = twins.run_with(
                 gpu,
-                params,
+                &params,
                 |_| (),
                 |f| {
                     splats.record(f).unwrap();

@@ -18,9 +18,12 @@ pub const SOURCE: &str = concat!(include_str!("../prelude.wgsl"), include_str!("
 
 /// The compiled stage.
 pub struct Bin {
-    scan_blocks: Kernel,
-    scan_sums: Kernel,
-    scan_add: Kernel,
+    /// Scans each block of lists and sums it up.
+    blocks: Kernel,
+    /// Scans the sums.
+    sums: Kernel,
+    /// Adds them to the blocks.
+    add: Kernel,
 }
 
 /// Lists of a picture: screen tiles times slices.
@@ -33,9 +36,9 @@ impl Bin {
     pub fn new(gpu: &Gpu, source: &str) -> Self {
         let kernel = |entry| gpu.kernel(entry, source, entry);
         Self {
-            scan_blocks: kernel("scan_blocks"),
-            scan_sums: kernel("scan_sums"),
-            scan_add: kernel("scan_add"),
+            blocks: kernel("scan_blocks"),
+            sums: kernel("scan_sums"),
+            add: kernel("scan_add"),
         }
     }
 
@@ -47,9 +50,9 @@ impl Bin {
         let params = &frame.params_buffer;
         let recorder = &mut frame.recorder;
         let scan = [(0, params), (1, &counts), (2, &sums)];
-        recorder.dispatch_list(&self.scan_blocks, &scan, lists, SCAN_BLOCK);
-        recorder.dispatch(&self.scan_sums, &[(0, params), (2, &sums)], [1, 1]);
-        recorder.dispatch_list(&self.scan_add, &scan, lists, SCAN_BLOCK);
+        recorder.dispatch_list(&self.blocks, &scan, lists, SCAN_BLOCK);
+        recorder.dispatch(&self.sums, &[(0, params), (2, &sums)], [1, 1]);
+        recorder.dispatch_list(&self.add, &scan, lists, SCAN_BLOCK);
         Ok(())
     }
 }

@@ -143,7 +143,7 @@ mod tests {
             side_cells: 10,
             ..single
         }
-        .hide(&[1.0; 10_000], 100);
+        .hide(&vec![1.0; 10_000], 100);
         assert!(!blocks.is_empty() && blocks.len() % 100 == 0);
     }
 
