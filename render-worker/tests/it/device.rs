@@ -21,6 +21,13 @@ pub(crate) fn gpu(test: &str) -> Option<&'static Gpu> {
         .then(|| GPU.get_or_init(|| Gpu::open().expect("a Vulkan adapter, or NO_GPU=1")))
 }
 
+/// A device whose shaders check every index, for planted faults: they must not leave their buffers.
+pub(crate) fn checked_gpu(test: &str) -> Option<&'static Gpu> {
+    static GPU: OnceLock<Gpu> = OnceLock::new();
+    let open = || Gpu::open_checked().expect("a Vulkan adapter, or NO_GPU=1");
+    (!is_switched_off(test)).then(|| GPU.get_or_init(open))
+}
+
 /// A renderer on the device, shared likewise.
 pub(crate) fn gpu_renderer(test: &str) -> Option<&'static Renderer> {
     static RENDERER: OnceLock<Renderer> = OnceLock::new();

@@ -12,7 +12,7 @@ use render_worker::stages::fill::{self, Fill, Filled, Form, Sources, exact, refe
 use render_worker::stages::layout::{MISSING, is_missing};
 use render_worker::{Backend, Renderer, Source, pyramid};
 
-use crate::device::gpu;
+use crate::device::{checked_gpu, gpu};
 use crate::scenes::{FIVE_DEGREES, ONE_DEGREE};
 use crate::stored::two_months_in;
 
@@ -141,7 +141,7 @@ fn every_form_has_the_same_bits_on_the_device_and_on_the_processor() {
 #[test]
 fn a_wrong_shader_of_any_form_is_seen() {
     type Shader = fn(&mut Sources) -> &mut Cow<'static, str>;
-    let Some(gpu) = gpu("fill faults") else {
+    let Some(gpu) = checked_gpu("fill faults") else {
         return;
     };
     let (values, domain) = frame(&SEA);
