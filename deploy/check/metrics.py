@@ -49,7 +49,9 @@ def main() -> None:
     known = {text.rsplit("}_", 1)[-1] for text in strings(sys.argv[1])} | strings(sys.argv[1])
     wanted = set()
     for file in map(Path, sys.argv[2:]):
-        wanted |= {SUFFIX.sub("", name) for name in NAME.findall(file.read_text().replace(ANY_SERVICE, "ingestd"))}
+        names = NAME.findall(file.read_text().replace(ANY_SERVICE, "ingestd"))
+        # A gauge may be called a count too.
+        wanted |= {name if name in known else SUFFIX.sub("", name) for name in names}
     missing = sorted(name for name in wanted if not is_counted(name, known))
     for name in missing:
         print(f"no service counts {name}")
