@@ -79,7 +79,8 @@ impl<'a> Playback<'a> {
         self.plan.params.accumulated_weight = accumulated_weight;
     }
 
-    /// Draws an instant; the picture stays on the device. Does not wait.
+    /// Draws an instant; the picture stays on the device. Does not wait, and so does not learn whether its lists outgrew
+    /// their room: particles that find none are left out. [`Playback::image`] makes room and draws them all.
     pub fn draw(
         &mut self,
         steps: &Steps,

@@ -1,5 +1,5 @@
 //! The light's side of half-angle slicing: splats give their optical depth to a slice-layered buffer, a sum along the
-//! slices turns it into the depth above each slice plane, and every splat is dimmed by what lies between it and the sun.
+//! slices turns it into twice the depth above each slice's middle, and every splat is dimmed by what lies between it and the sun.
 //!
 //! Depth is given in the pass that makes the splats and read in the pass that places them; here is the sum.
 
@@ -44,7 +44,7 @@ impl Light {
         }
     }
 
-    /// Turns the depth of each slice into the depth above it.
+    /// Turns the depth of each slice into twice the depth above its middle.
     pub fn record(&self, frame: &mut FrameContext<'_>) -> Result<(), RenderError> {
         let light = frame.room(Slot::Light, 4)?;
         let columns = frame.params.light_width * frame.params.light_height;
