@@ -5,7 +5,7 @@ use anyhow::{Context as _, Result, ensure};
 use contract::job::RenderJob;
 use render_worker::frame::FrameContext;
 use render_worker::gpu::{Gpu, Slot, Workspace};
-use render_worker::passes::splat::{self, Splats};
+use render_worker::passes::splat::Splats;
 use render_worker::plan::Plan;
 use render_worker::playback::{Playback, Steps};
 use render_worker::stages::layout::{GROUP, Params};
@@ -43,7 +43,7 @@ struct Pipelines {
 impl<'a> Classic<'a> {
     /// The renderer for a job's view; the light must be on the eye's side of the volume.
     pub fn new(gpu: &'a Gpu, job: &RenderJob, scene: &Scene) -> Result<Self> {
-        let plan = Plan::for_device(job, scene, gpu.most_buffer_bytes())?;
+        let plan = Plan::holding(job, scene, gpu.most_buffer_bytes(), u64::MAX)?;
         let params = plan.params_of(plan.whole());
         ensure!(
             params.front_to_back == 1 && params.light_on == 1,
@@ -82,7 +82,7 @@ impl<'a> Classic<'a> {
         };
         Ok(Self {
             gpu,
-            splats: Splats::new(gpu, splat::SOURCE),
+            splats: Splats::new(gpu),
             workspace: Workspace::default(),
             pipelines: Pipelines::new(gpu.device(), &params),
             eye: target("eye", params.width, params.height),

@@ -102,6 +102,7 @@ pub fn run(args: &RenderBench) -> Result<()> {
     }
     let start = Instant::now();
     let stages = Stages::new(&gpu);
+    gpu.keep_pipelines();
     talk(&format!(
         "{}; shaders compiled in {:.2} s",
         gpu.adapter_name(),
@@ -234,7 +235,7 @@ fn report(args: &RenderBench, row: &Row) {
     }
     let m = &row.measured;
     say(&format!(
-        "{:>9} particles {}x{} {:>3} slices: frame median {:.3} ms, p99 {:.3} ms, wall {:.3} ms; {} entries",
+        "{:>9} particles {}x{} {:>3} slices: frame median {:.3} ms, p99 {:.3} ms, wall {:.3} ms; {} entries, {:.1} times the mean in the fullest tile",
         row.particles,
         row.width,
         row.height,
@@ -242,7 +243,8 @@ fn report(args: &RenderBench, row: &Row) {
         m.frame.median_ms,
         m.frame.p99_ms,
         m.frame_wall_ms,
-        m.entries
+        m.entries,
+        m.fullest_over_mean
     ));
     let stages: Vec<_> = m
         .stages

@@ -9,6 +9,7 @@ use render_worker::Scene;
 use render_worker::frame::Stages;
 use render_worker::gpu::{Gpu, Slot, Stamps};
 use render_worker::playback::Playback;
+use render_worker::stages::bin::list_count;
 use serde::Serialize;
 
 use crate::stats::Times;
@@ -29,6 +30,8 @@ pub struct Measured {
     pub stages: Vec<(String, Times)>,
     /// List entries of the last frame.
     pub entries: u32,
+    /// Those of its fullest screen tile over those of a tile that has any.
+    pub fullest_over_mean: f64,
 }
 
 /// Weights that move on with every frame, so that no two frames are alike.
@@ -75,18 +78,31 @@ pub fn measure(
         .unwrap_or_default();
     let periods = ended.windows(2).map(|pair| pair[1].end_s - pair[0].end_s);
     let stage_times = staged(gpu, &mut playback, &steps, frames.min(60))?;
-    let lists =
-        render_worker::stages::bin::list_count(&playback.plan().params_of(playback.plan().whole()));
+    let params = playback.plan().params_of(playback.plan().whole());
     let counts = playback.workspace().room(gpu, Slot::Counts, 4)?;
-    let [last] = gpu
+    let ends: Vec<u32> = gpu
         .recorder()
-        .download_parts([(&counts, u64::from(lists - 1) * 4, 4)])?;
+        .download(&counts, list_count(&params) as usize)?;
     Ok(Measured {
         frame: Times::of(periods.collect()),
         frame_wall_ms: wall_s / frames as f64 * 1e3,
         stages: stage_times,
-        entries: bytemuck::pod_read_unaligned(&last),
+        entries: ends.last().copied().unwrap_or_default(),
+        fullest_over_mean: fullest_over_mean(&ends, params.slices as usize),
     })
+}
+
+/// Where the lists of a picture end, those of a tile one after the other.
+fn fullest_over_mean(ends: &[u32], slices: usize) -> f64 {
+    let tile_ends = ends.iter().skip(slices - 1).step_by(slices);
+    let mut begin = 0;
+    let lengths: Vec<u32> = tile_ends
+        .map(|end| end - std::mem::replace(&mut begin, *end))
+        .filter(|length| *length > 0)
+        .collect();
+    let fullest = lengths.iter().max().copied().unwrap_or_default();
+    let mean = f64::from(begin) / lengths.len().max(1) as f64;
+    f64::from(fullest) / mean.max(1.0)
 }
 
 fn staged(

@@ -1,5 +1,6 @@
 //! A device with its compiled stages, the buffers that frames are drawn in and the frames that stay on it.
 
+use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 
 use contract::grid::Grid;
@@ -9,7 +10,7 @@ use crate::frame::{SceneBuffers, Stages};
 use crate::gpu::{Gpu, Workspace};
 use crate::plan::{Part, Plan};
 use crate::resident::Resident;
-use crate::scene::{Interval, Scene};
+use crate::scene::{Frame, Interval, Scene};
 use crate::stages::fill::{self, Fill, Filled, Form};
 
 /// Everything that lives and dies with one device.
@@ -31,6 +32,7 @@ impl Device {
         let stages = Stages::new(&gpu);
         let fill = Fill::new(&gpu, fill::Sources::default());
         gpu.check_fault("compiling shaders")?;
+        gpu.keep_pipelines();
         tracing::info!(adapter = gpu.adapter_name(), number, "renderer is ready");
         Ok(Self {
             gpu,
@@ -58,7 +60,7 @@ impl Device {
         part: Part,
         scene: &Scene,
     ) -> Result<Vec<u8>, RenderError> {
-        let buffers = self.scene_buffers(scene)?;
+        let buffers = self.scene_buffers(scene, &plan.held_cells())?;
         // A poisoned pool is whole: workspaces are only pushed and popped.
         let idle = || self.idle.lock().unwrap_or_else(PoisonError::into_inner);
         let mut workspace = idle().pop().unwrap_or_default();
@@ -82,18 +84,21 @@ impl Device {
         pays.then(|| self.fill.run(&self.gpu, form, grid, values, domain))
     }
 
-    fn scene_buffers(&self, scene: &Scene) -> Result<SceneBuffers, RenderError> {
+    fn scene_buffers(
+        &self,
+        scene: &Scene,
+        held: &Range<usize>,
+    ) -> Result<SceneBuffers, RenderError> {
+        let frame = |frame: &Frame| self.resident.buffer(&self.gpu, &frame.cells, held.clone());
         let pair = |interval: &Interval| -> Result<[wgpu::Buffer; 2], RenderError> {
-            let before = self.resident.buffer(&self.gpu, &interval.before.cells)?;
-            Ok([
-                before,
-                self.resident.buffer(&self.gpu, &interval.after.cells)?,
-            ])
+            Ok([frame(&interval.before)?, frame(&interval.after)?])
         };
         Ok(SceneBuffers {
             value: pair(&scene.value)?,
             accumulated: scene.accumulated.as_ref().map(pair).transpose()?,
-            domain: self.resident.buffer(&self.gpu, &scene.domain)?,
+            domain: self
+                .resident
+                .buffer(&self.gpu, &scene.domain, held.clone())?,
         })
     }
 }

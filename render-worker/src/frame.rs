@@ -5,8 +5,8 @@ use contract::job::Mode;
 
 use crate::error::RenderError;
 use crate::gpu::{Gpu, Recorder, Slot, Stamps, Workspace};
-use crate::passes::place::{self, Place};
-use crate::passes::splat::{self, Splats};
+use crate::passes::place::Place;
+use crate::passes::splat::Splats;
 use crate::plan::{Part, Plan};
 use crate::stages::bin::{Bin, list_count};
 use crate::stages::compose::Compose;
@@ -15,7 +15,7 @@ use crate::stages::interpolate::Interpolate;
 use crate::stages::layout::{Entry, Params};
 use crate::stages::light::Light;
 use crate::stages::map::Map;
-use crate::stages::{bin, compose, eye, interpolate, light, map};
+use crate::stages::{bin, compose, interpolate, map};
 
 /// Entries a list buffer starts with for each particle; a frame that needs more is drawn again with room for all.
 const FIRST_ENTRIES_PER_PARTICLE: u64 = 2;
@@ -118,11 +118,11 @@ impl Stages {
     pub fn new(gpu: &Gpu) -> Self {
         Self {
             interpolate: Interpolate::new(gpu, interpolate::SOURCE),
-            splats: Splats::new(gpu, splat::SOURCE),
-            light: Light::new(gpu, light::SOURCE),
+            splats: Splats::new(gpu),
+            light: Light::new(gpu),
             bin: Bin::new(gpu, bin::SOURCE),
-            place: Place::new(gpu, place::SOURCE),
-            eye: Eye::new(gpu, eye::SOURCE),
+            place: Place::new(gpu),
+            eye: Eye::new(gpu),
             map: Map::new(gpu, map::SOURCE),
             compose: Compose::new(gpu, compose::SOURCE),
         }

@@ -31,7 +31,8 @@ impl<'a> Playback<'a> {
         job: &RenderJob,
         scene: &Scene,
     ) -> Result<Self, RenderError> {
-        let plan = Plan::for_device(job, scene, gpu.most_buffer_bytes())?;
+        // Frames are held whole: what is played is looked at for long.
+        let plan = Plan::holding(job, scene, gpu.most_buffer_bytes(), u64::MAX)?;
         let part = plan.whole();
         let mut playback = Self {
             gpu,

@@ -1,6 +1,7 @@
 //! Frames that stay on the device between pictures, least recently drawn first to go.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 
 use bytemuck::Pod;
@@ -12,7 +13,7 @@ use crate::scene::Cells;
 /// Bytes kept at most, apart from frames in flight.
 const MOST_BYTES: u64 = 512 << 20;
 
-/// Buffers by the id of their cells.
+/// Buffers by the id of their cells and the first of them held.
 #[derive(Default)]
 pub(crate) struct Resident {
     held: Mutex<Held>,
@@ -20,7 +21,7 @@ pub(crate) struct Resident {
 
 #[derive(Default)]
 struct Held {
-    by_id: BTreeMap<u64, (wgpu::Buffer, u64)>,
+    by_id: BTreeMap<(u64, usize, usize), (wgpu::Buffer, u64)>,
     uses: u64,
 }
 
@@ -31,21 +32,23 @@ impl Resident {
         held.bytes()
     }
 
-    /// The cells on the device, uploaded if they are not there.
+    /// A part of the cells on the device, uploaded if it is not there.
     pub(crate) fn buffer<T: Pod>(
         &self,
         gpu: &Gpu,
         cells: &Cells<T>,
+        part: Range<usize>,
     ) -> Result<wgpu::Buffer, RenderError> {
         let mut held = self.held.lock().unwrap_or_else(PoisonError::into_inner);
         held.uses += 1;
         let use_count = held.uses;
-        if let Some((buffer, last_use)) = held.by_id.get_mut(&cells.id()) {
+        let id = (cells.id(), part.start, part.end);
+        if let Some((buffer, last_use)) = held.by_id.get_mut(&id) {
             *last_use = use_count;
             return Ok(buffer.clone());
         }
-        let buffer = gpu.storage("frame", cells.content())?;
-        held.by_id.insert(cells.id(), (buffer.clone(), use_count));
+        let buffer = gpu.storage("frame", &cells.content()[part])?;
+        held.by_id.insert(id, (buffer.clone(), use_count));
         held.evict();
         Ok(buffer)
     }

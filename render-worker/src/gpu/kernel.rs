@@ -1,6 +1,7 @@
 //! One compiled entry point and the layout of its bindings.
 
-use super::Checks;
+use super::pipelines::Pipelines;
+use super::{Checks, Gpu};
 
 /// A compute pipeline.
 pub struct Kernel {
@@ -10,18 +11,13 @@ pub struct Kernel {
 }
 
 impl Kernel {
-    pub(super) fn new(
-        device: &wgpu::Device,
-        checks: Checks,
-        label: &'static str,
-        source: &str,
-        entry: &str,
-    ) -> Self {
+    pub(super) fn new(gpu: &Gpu, label: &'static str, source: &str, entry: &str) -> Self {
+        let device = &gpu.device;
         let descriptor = wgpu::ShaderModuleDescriptor {
             label: Some(label),
             source: wgpu::ShaderSource::Wgsl(source.into()),
         };
-        let module = match checks {
+        let module = match gpu.checks {
             Checks::Full => device.create_shader_module(descriptor),
             Checks::Trusted => trusted(device, descriptor),
         };
@@ -35,7 +31,7 @@ impl Kernel {
                 zero_initialize_workgroup_memory: false,
                 ..Default::default()
             },
-            cache: None,
+            cache: gpu.pipelines.as_ref().map(Pipelines::cache),
         });
         let layout = pipeline.get_bind_group_layout(0);
         Self {

@@ -2,6 +2,7 @@
 
 mod fault;
 mod kernel;
+mod pipelines;
 mod recorder;
 mod stamps;
 mod workspace;
@@ -16,13 +17,15 @@ use wgpu::util::DeviceExt as _;
 
 use crate::error::RenderError;
 use fault::FaultNote;
+use pipelines::Pipelines;
 
 /// Largest buffer asked for, also on devices that would give more: bounds what one job can take.
 const MOST_BUFFER_BYTES: u64 = (2 << 30) - 4;
 
 /// Features that are used where a device has them; pictures are the same without.
-const WELCOME: wgpu::Features =
-    wgpu::Features::TIMESTAMP_QUERY.union(wgpu::Features::INDIRECT_FIRST_INSTANCE);
+const WELCOME: wgpu::Features = wgpu::Features::TIMESTAMP_QUERY
+    .union(wgpu::Features::INDIRECT_FIRST_INSTANCE)
+    .union(wgpu::Features::PIPELINE_CACHE);
 
 /// A device with its queue. Shared by all threads.
 pub struct Gpu {
@@ -33,6 +36,7 @@ pub struct Gpu {
     checks: Checks,
     is_software: bool,
     fault: FaultNote,
+    pipelines: Option<Pipelines>,
 }
 
 /// What shaders check while they run.
@@ -65,8 +69,9 @@ impl Gpu {
             .request_adapter(&options)
             .await
             .map_err(|e| RenderError::NoAdapter(Box::new(e)))?;
-        let adapter_name = adapter.get_info().name;
-        let is_software = adapter.get_info().device_type == wgpu::DeviceType::Cpu;
+        let info = adapter.get_info();
+        let adapter_name = info.name.clone();
+        let is_software = info.device_type == wgpu::DeviceType::Cpu;
         let limits = adapter.limits();
         let most_buffer_bytes = limits
             .max_buffer_size
@@ -87,6 +92,8 @@ impl Gpu {
             })?;
         let fault = FaultNote::default();
         fault.listen(&device);
+        let pipelines =
+            pipelines::folder().and_then(|folder| Pipelines::open(&device, &info, &folder));
         Ok(Self {
             device,
             queue,
@@ -95,6 +102,7 @@ impl Gpu {
             checks,
             is_software,
             fault,
+            pipelines,
         })
     }
 
@@ -142,7 +150,14 @@ impl Gpu {
 
     /// Compiles one entry point.
     pub fn kernel(&self, label: &'static str, source: &str, entry: &str) -> Kernel {
-        Kernel::new(&self.device, self.checks, label, source, entry)
+        Kernel::new(self, label, source, entry)
+    }
+
+    /// Keeps what has been compiled for the next process.
+    pub fn keep_pipelines(&self) {
+        if let Some(pipelines) = &self.pipelines {
+            pipelines.keep();
+        }
     }
 
     /// A list of commands to fill.

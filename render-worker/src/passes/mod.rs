@@ -5,3 +5,19 @@
 
 pub mod place;
 pub mod splat;
+
+use crate::gpu::Gpu;
+
+/// The source of a pass in which nobody shares sums with neighbours, which pays on GPUs alone.
+pub fn unshared(source: &str) -> String {
+    source.replace("const PROBES = 12u;", "const PROBES = 0u;")
+}
+
+/// The source of a pass as it suits the device.
+fn suited(gpu: &Gpu, source: &str) -> String {
+    if gpu.is_software() {
+        unshared(source)
+    } else {
+        source.to_owned()
+    }
+}

@@ -3,6 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use contract::earth::SPHERE_RADIUS_M;
+use contract::grid::Grid;
 use contract::job::{Mode, RenderJob, View};
 use glam::DVec3;
 
@@ -58,6 +59,9 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) {
         [&mut params.sun_x, &mut params.sun_y, &mut params.sun_z],
     );
     if job.mode == Mode::Map {
+        let margin = 2.0 * grid.dlat_deg.to_radians();
+        let [seen, _] = camera.cap_rad([width_px, height_px], job, [0.0; 2], margin);
+        interpolate_rows(plan, grid, &camera, seen);
         return;
     }
     let look = Look::of(job.mode);
@@ -83,6 +87,18 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) {
     let half = slice_planes(plan, job, camera.up, sun, &cap(seen));
     light_frame(plan, &camera, sun, half, &cap(drawn));
     choose_cells(plan, scene, &camera, drawn);
+}
+
+/// Rows within an angle of the point below the camera.
+fn interpolate_rows(plan: &mut Plan, grid: &Grid, camera: &Camera, angle: f64) {
+    let below_deg = camera.up.z.clamp(-1.0, 1.0).asin().to_degrees();
+    let row = |lat_deg: f64| {
+        ((grid.north_deg - lat_deg) / grid.dlat_deg).clamp(0.0, f64::from(grid.rows))
+    };
+    let first = row(below_deg + angle.to_degrees()).floor() as u32;
+    let end = row(below_deg - angle.to_degrees()).ceil() as u32;
+    plan.params.first_cell = first * grid.cols;
+    plan.params.end_cell = end.max(first) * grid.cols;
 }
 
 fn rows(scene: &Scene, look: &Look, camera: &Camera, particles: u32, style_depth: f64) -> Vec<Row> {

@@ -8,6 +8,7 @@ mod globe;
 mod look;
 mod tile;
 
+use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use contract::earth::Earth;
@@ -31,6 +32,11 @@ static NEXT_ID: AtomicU64 = AtomicU64::new(1);
 const MOST_PARTICLES: u64 = 1 << 27;
 /// Largest part of a picture drawn at once, pixels a side; a multiple of the screen tile.
 const PART_PX: u32 = 2048;
+/// Frames of more bytes are not held whole but in bands of the rows that a picture shows: four frames and a domain of
+/// this size leave room for the rest on a device of 2 GiB.
+const MOST_HELD_BYTES: u64 = 256 << 20;
+/// Bands begin and end at multiples of so many rows, so that neighbouring pictures share them.
+const BAND_ROWS: u32 = 256;
 /// Particles that one invocation makes, unless cells hold fewer: neighbours share sums, more of them share better.
 const PARTICLES_EACH: u32 = 4;
 
@@ -64,7 +70,8 @@ impl Plan {
         scene: &Scene,
         most_buffer_bytes: u64,
     ) -> Result<Self, RenderError> {
-        let mut plan = Self::for_device(job, scene, most_buffer_bytes)?;
+        // The twins read frames where they are, whole.
+        let mut plan = Self::holding(job, scene, most_buffer_bytes, u64::MAX)?;
         plan.list_cells(scene);
         Ok(plan)
     }
@@ -74,6 +81,16 @@ impl Plan {
         job: &RenderJob,
         scene: &Scene,
         most_buffer_bytes: u64,
+    ) -> Result<Self, RenderError> {
+        Self::holding(job, scene, most_buffer_bytes, MOST_HELD_BYTES)
+    }
+
+    /// The same with frames of more than `most_held_bytes` held in bands of rows.
+    pub fn holding(
+        job: &RenderJob,
+        scene: &Scene,
+        most_buffer_bytes: u64,
+        most_held_bytes: u64,
     ) -> Result<Self, RenderError> {
         job.validate()?;
         scene.validate()?;
@@ -94,7 +111,46 @@ impl Plan {
             View::Globe { .. } => globe::plan(&mut plan, job, scene),
         }
         plan.count_particles(most_buffer_bytes)?;
+        plan.choose_band(most_buffer_bytes, most_held_bytes)?;
         Ok(plan)
+    }
+
+    /// Cells of a frame that are on the device while this is drawn, whole rows of them.
+    pub fn held_cells(&self) -> Range<usize> {
+        self.params.held_first_cell as usize..self.params.held_end_cell as usize
+    }
+
+    fn choose_band(
+        &mut self,
+        most_buffer_bytes: u64,
+        most_held_bytes: u64,
+    ) -> Result<(), RenderError> {
+        const CELL_BYTES: u64 = size_of::<f32>() as u64;
+        let params = &mut self.params;
+        let (rows, cols) = (params.rows, params.cols);
+        let shown = if self.mode == Mode::Map {
+            params.first_cell / cols..params.end_cell.div_ceil(cols)
+        } else {
+            params.first_row..params.first_row + params.row_count
+        };
+        let row_bytes = u64::from(cols) * CELL_BYTES;
+        let band = if u64::from(rows) * row_bytes <= most_held_bytes {
+            0..rows
+        } else {
+            let first = shown.start / BAND_ROWS * BAND_ROWS;
+            first..shown.end.next_multiple_of(BAND_ROWS).min(rows)
+        };
+        let bytes = u64::from(band.end - band.start) * row_bytes;
+        if bytes > most_buffer_bytes {
+            return Err(RenderError::TooLarge {
+                what: "rows of a frame that the picture shows",
+                bytes,
+                limit: most_buffer_bytes,
+            });
+        }
+        params.held_first_cell = band.start * cols;
+        params.held_end_cell = band.end * cols;
+        Ok(())
     }
 
     fn count_particles(&mut self, most_buffer_bytes: u64) -> Result<(), RenderError> {

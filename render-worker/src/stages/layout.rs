@@ -36,6 +36,9 @@ shared_struct! {
         pub periodic: u32,
         pub first_cell: u32,
         pub end_cell: u32,
+        /// Cells that the buffers of frames hold, the first and the end: all unless a frame is too large to be held whole.
+        pub held_first_cell: u32,
+        pub held_end_cell: u32,
         pub value_weight: f32,
         pub accumulated_weight: f32,
         pub has_accumulated: u32,

@@ -1,6 +1,6 @@
 // Shared by all stages: the structs of layout.rs, constants, hashing and small maths.
 struct Params {
-    rows: u32, cols: u32, periodic: u32, first_cell: u32, end_cell: u32, value_weight: f32, accumulated_weight: f32,
+    rows: u32, cols: u32, periodic: u32, first_cell: u32, end_cell: u32, held_first_cell: u32, held_end_cell: u32, value_weight: f32, accumulated_weight: f32,
     has_accumulated: u32, transfer_low: f32, transfer_per_unit: f32, strength_per_unit: f32, diverging: u32,
     depth_floor: f32, first_row: u32, row_count: u32, slot_count: u32, cap_least: f32, particles_per_cell: u32,
     particles_each: u32, splat_count: u32, shake_shift: u32, height_m_per_kg_m2: f32,

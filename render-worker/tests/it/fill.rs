@@ -154,8 +154,8 @@ fn a_wrong_shader_of_any_form_is_seen() {
         (
             Form::Exact,
             stencil,
+            "dx = 0u; dx < span",
             "dx = 1u; dx < span",
-            "dx = 2u; dx < span",
         ),
         (Form::Exact, exact, "0.5859375", "0.5859374"),
         (Form::Exact, exact, "at.y % 2u == 0u", "at.y % 2u == 1u"),

@@ -23,8 +23,13 @@ pub struct Place {
 }
 
 impl Place {
+    /// Compiles the shader as it suits the device.
+    pub fn new(gpu: &Gpu) -> Self {
+        Self::of(gpu, &super::suited(gpu, SOURCE))
+    }
+
     /// Compiles `source`, [`SOURCE`] but for tests.
-    pub fn new(gpu: &Gpu, source: &str) -> Self {
+    pub fn of(gpu: &Gpu, source: &str) -> Self {
         Self {
             place: gpu.kernel("place", source, "place"),
         }

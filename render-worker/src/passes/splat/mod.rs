@@ -69,8 +69,13 @@ pub fn unpacked(seen: [u32; 4], lit: [u32; 4], entry_shift: u32) -> Splat {
 }
 
 impl Splats {
+    /// Compiles the shader as it suits the device.
+    pub fn new(gpu: &Gpu) -> Self {
+        Self::of(gpu, &super::suited(gpu, SOURCE))
+    }
+
     /// Compiles `source`, [`SOURCE`] but for tests.
-    pub fn new(gpu: &Gpu, source: &str) -> Self {
+    pub fn of(gpu: &Gpu, source: &str) -> Self {
         Self {
             splat: gpu.kernel("splat", source, "splat"),
         }

@@ -44,7 +44,7 @@ fn is_in_cap(row: u32, slot: u32) -> bool {
     return dot(center, vec3(params.eye_x, params.eye_y, params.eye_z)) >= params.cap_least;
 }
 
-// Carbon of a cell; what is missing has accumulated nothing.
+// Carbon of a cell, counted from the first held; what is missing has accumulated nothing.
 fn carbon_of(cell: u32) -> f32 {
     if (params.has_accumulated == 0u) { return 0.0; }
     let carbon = interpolated(carbon_before[cell], carbon_after[cell], params.accumulated_weight);
@@ -77,7 +77,7 @@ fn splat(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) w
     var value = MISSING;
     var carbon = 0.0;
     if (down < params.row_count && slot < params.slot_count) {
-        let cell = row * params.cols + cols[slot].index;
+        let cell = row * params.cols + cols[slot].index - params.held_first_cell;
         value = interpolated(value_before[cell], value_after[cell], params.value_weight);
         if (!is_missing(value)) {
             carbon = carbon_of(cell);

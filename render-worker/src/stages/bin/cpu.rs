@@ -1,7 +1,7 @@
 //! CPU twin of `reach.wgsl`, `bin.wgsl` and of the placing in `place.wgsl`.
 
 use crate::stages::layout::{
-    DEPTH_ONE, Entry, Params, SCREEN_TILE_SHIFT, SUBPIXELS, Splat, nearest,
+    DEPTH_ONE, Entry, KERNEL_CLOUD, Params, SCREEN_TILE_SHIFT, SUBPIXELS, Splat, nearest,
 };
 
 const MOST_DEPTH: f32 = 15.0;
@@ -10,14 +10,20 @@ fn radius_of(params: &Params, splat: &Splat) -> i32 {
     (nearest(splat.radius_px * SUBPIXELS as f32) >> params.entry_shift).max(1)
 }
 
-/// Optical depth at the centre in whole parts; a splat of none is in no list.
-fn depth_of(splat: &Splat) -> u32 {
-    (splat.tau.min(MOST_DEPTH) * DEPTH_ONE + 0.5) as u32
+/// Optical depth at the centre in whole parts; a splat of none is in no list. A cloud whose radius was rounded keeps its mass.
+fn depth_of(params: &Params, splat: &Splat) -> u32 {
+    let mut tau = splat.tau;
+    if params.kernel == KERNEL_CLOUD {
+        let rounded_px = (radius_of(params, splat) << params.entry_shift) as f32 / SUBPIXELS as f32;
+        let wider = splat.radius_px / rounded_px;
+        tau *= wider * wider;
+    }
+    (tau.min(MOST_DEPTH) * DEPTH_ONE + 0.5) as u32
 }
 
 /// Screen tiles a splat touches, as half-open ranges of columns and rows.
 fn reach_of(params: &Params, splat: &Splat) -> [std::ops::Range<u32>; 2] {
-    if splat.tau <= 0.0 || depth_of(splat) == 0 {
+    if splat.tau <= 0.0 || depth_of(params, splat) == 0 {
         return [0..0, 0..0];
     }
     let radius = radius_of(params, splat) << params.entry_shift;
@@ -62,7 +68,7 @@ pub fn scan(counts: &mut [u32]) -> u32 {
 /// Writes every entry and moves each list's start to its end.
 pub fn scatter(params: &Params, splats: &[Splat], counts: &mut [u32], entries: &mut [Entry]) {
     for splat in splats {
-        let size = radius_of(params, splat) as u32 | (depth_of(splat) << 16);
+        let size = radius_of(params, splat) as u32 | (depth_of(params, splat) << 16);
         let color = (splat.color & 0x00ff_ffff) | ((splat.slice as u32) << 24);
         for list in lists_of(params, splat) {
             let tile = list as u32 / params.slices;

@@ -10,7 +10,13 @@ struct Reach { low: vec2<i32>, high: vec2<i32> }
 // Radius in the low and depth in the high 16 bits, as in an entry; 0 draws nothing.
 fn size_word(splat: Splat) -> u32 {
     let radius = max(nearest(splat.radius_px * f32(SUBPIXELS)) >> params.entry_shift, 1);
-    let depth = u32(min(splat.tau, MOST_DEPTH) * DEPTH_ONE + 0.5);
+    var tau = splat.tau;
+    if (params.kernel == KERNEL_CLOUD) {
+        // A cloud whose radius was rounded keeps its mass.
+        let wider = splat.radius_px / (f32(radius << params.entry_shift) / f32(SUBPIXELS));
+        tau *= wider * wider;
+    }
+    let depth = u32(min(tau, MOST_DEPTH) * DEPTH_ONE + 0.5);
     if (splat.tau <= 0.0 || depth == 0u) { return 0u; }
     return u32(radius) | (depth << 16u);
 }

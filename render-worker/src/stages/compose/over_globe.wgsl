@@ -9,7 +9,9 @@ fn is_land(lon: f32, lat: f32) -> bool {
     let col = i32(floor((east - floor(east / TURN) * TURN) * params.cols_per_rad));
     let row = i32(floor((params.grid_north_rad - lat) * params.rows_per_rad));
     if (row < 0 || row >= i32(params.rows) || col >= i32(params.cols)) { return false; }
-    return domain[u32(row) * params.cols + u32(col)] == 0u;
+    let cell = u32(row) * params.cols + u32(col);
+    if (cell < params.held_first_cell || cell >= params.held_end_cell) { return false; }
+    return domain[cell - params.held_first_cell] == 0u;
 }
 
 fn surface_below(pixel: vec2<u32>) -> vec4<f32> {

@@ -11,8 +11,14 @@ pub const SOURCE: &str = concat!(
     include_str!("../prelude.wgsl"),
     include_str!("../sphere.wgsl"),
     include_str!("../compose/over_globe.wgsl"),
-    include_str!("eye.wgsl")
+    include_str!("eye.wgsl"),
+    include_str!("alone.wgsl")
 );
+
+/// The entry point that shares the work of a screen tile; for GPUs.
+pub const SHARED: &str = "eye";
+/// The one whose pixels work alone; for adapters that are programs.
+pub const ALONE: &str = "alone";
 
 /// The compiled stage: one shader for each kind of particle, which is tested for every pixel of every entry otherwise.
 pub struct Eye {
@@ -20,11 +26,17 @@ pub struct Eye {
 }
 
 impl Eye {
-    /// Compiles `source`, [`SOURCE`] but for tests.
-    pub fn new(gpu: &Gpu, source: &str) -> Self {
+    /// Compiles the entry point that suits the device.
+    pub fn new(gpu: &Gpu) -> Self {
+        let entry = if gpu.is_software() { ALONE } else { SHARED };
+        Self::of(gpu, SOURCE, entry)
+    }
+
+    /// Compiles an entry point of `source`, [`SOURCE`] but for tests.
+    pub fn of(gpu: &Gpu, source: &str, entry: &str) -> Self {
         let compiled = |kernel| {
             let source = source.replace("params.kernel", kernel);
-            gpu.kernel("eye", &source, "eye")
+            gpu.kernel("eye", &source, entry)
         };
         Self {
             of_kernel: ["KERNEL_DOT", "KERNEL_BALL", "KERNEL_CLOUD"].map(compiled),

@@ -9,6 +9,8 @@ use crate::gpu::{Gpu, Kernel, Recorder};
 
 /// Columns that a workgroup of the stencil takes.
 const WIDTH: u32 = 128;
+/// Rows that it takes.
+const ROWS: u32 = 4;
 
 /// The tables of a grid's levels; they depend on the grid alone and are kept between frames.
 pub struct DeviceLadder {
@@ -123,7 +125,10 @@ impl LevelRoom {
         recorder.dispatch(
             stencil,
             &buffers,
-            [self.level.cols.div_ceil(WIDTH), self.level.rows],
+            [
+                self.level.cols.div_ceil(WIDTH),
+                self.level.rows.div_ceil(ROWS),
+            ],
         );
     }
 }

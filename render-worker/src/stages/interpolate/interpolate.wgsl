@@ -7,5 +7,6 @@
 fn interpolate(@builtin(global_invocation_id) global: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>) {
     let cell = params.first_cell + list_index(global, workgroups);
     if (cell >= params.end_cell) { return; }
-    between[cell] = interpolated(before[cell], after[cell], params.value_weight);
+    let held = cell - params.held_first_cell;
+    between[held] = interpolated(before[held], after[held], params.value_weight);
 }

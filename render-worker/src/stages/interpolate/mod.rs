@@ -36,7 +36,8 @@ impl Interpolate {
             .params
             .end_cell
             .saturating_sub(frame.params.first_cell);
-        let bytes = u64::from(frame.params.rows) * u64::from(frame.params.cols) * 4;
+        let held = frame.params.held_end_cell - frame.params.held_first_cell;
+        let bytes = u64::from(held) * 4;
         let value = frame.room(Slot::Value, bytes)?;
         let [before, after] = frame.value_frames.clone();
         let buffers = [

@@ -49,3 +49,18 @@ fn prefix(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) 
         }
     }
 }
+
+// The same without segments and without waiting: see the eye's `alone`.
+@compute @workgroup_size(GROUP)
+fn straight(@builtin(global_invocation_id) global: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>) {
+    let layer = params.light_width * params.light_height;
+    let column = list_index(global, workgroups);
+    if (column >= layer) { return; }
+    var above = 0u;
+    for (var slice = 0u; slice <= params.slices; slice++) {
+        let at = slice * layer + column;
+        let below = deeper(above, min(light[at], DARK));
+        light[at] = above + below;
+        above = below;
+    }
+}

@@ -10,7 +10,9 @@ fn cell_value(row: i32, col: i32) -> vec2<f32> {
     let cols = i32(params.cols);
     if (params.periodic == 1u) { x = (x % cols + cols) % cols; }
     if (x < 0 || x >= cols || row < 0 || row >= i32(params.rows)) { return vec2(0.0); }
-    let value = value_grid[u32(row) * params.cols + u32(x)];
+    let cell = u32(row) * params.cols + u32(x);
+    if (cell < params.held_first_cell || cell >= params.held_end_cell) { return vec2(0.0); }
+    let value = value_grid[cell - params.held_first_cell];
     if (is_missing(value)) { return vec2(0.0); }
     return vec2(value, 1.0);
 }
