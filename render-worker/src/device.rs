@@ -58,7 +58,7 @@ impl Device {
         part: Part,
         scene: &Scene,
     ) -> Result<Vec<u8>, RenderError> {
-        let buffers = self.scene_buffers(scene)?;
+        let buffers = self.scene_buffers(scene, plan.params.doubt == 1)?;
         // A poisoned pool is whole: workspaces are only pushed and popped.
         let idle = || self.idle.lock().unwrap_or_else(PoisonError::into_inner);
         let mut workspace = idle().pop().unwrap_or_default();
@@ -82,7 +82,7 @@ impl Device {
         pays.then(|| self.fill.run(&self.gpu, form, grid, values, domain))
     }
 
-    fn scene_buffers(&self, scene: &Scene) -> Result<SceneBuffers, RenderError> {
+    fn scene_buffers(&self, scene: &Scene, has_doubt: bool) -> Result<SceneBuffers, RenderError> {
         let pair = |interval: &Interval| -> Result<[wgpu::Buffer; 2], RenderError> {
             let before = self.resident.buffer(&self.gpu, &interval.before.cells)?;
             Ok([
@@ -90,10 +90,18 @@ impl Device {
                 self.resident.buffer(&self.gpu, &interval.after.cells)?,
             ])
         };
+        let doubts = || -> Result<[wgpu::Buffer; 2], RenderError> {
+            let before = self.resident.buffer(&self.gpu, scene.value.before.doubts())?;
+            Ok([
+                before,
+                self.resident.buffer(&self.gpu, scene.value.after.doubts())?,
+            ])
+        };
         Ok(SceneBuffers {
             value: pair(&scene.value)?,
             accumulated: scene.accumulated.as_ref().map(pair).transpose()?,
             domain: self.resident.buffer(&self.gpu, &scene.domain)?,
+            doubts: has_doubt.then(doubts).transpose()?,
         })
     }
 }

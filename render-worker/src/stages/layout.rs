@@ -140,6 +140,12 @@ shared_struct! {
         pub origin_y_px: i32,
         /// Bits that places in lists are coarser than subpixels, so that the largest particle fits 16 bits.
         pub entry_shift: u32,
+        /// The palette is followed by 256 words of opacity (low 16 bits) and size (next 8).
+        pub shape_table: u32,
+        /// Cells whose gap was filled are drawn differently.
+        pub doubt: u32,
+        /// Where the picture lies on the hatching of its level, below [`HATCH_PX`](super::doubt::HATCH_PX).
+        pub hatch_phase_px: u32,
     }
 }
 
