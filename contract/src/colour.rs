@@ -92,7 +92,11 @@ impl TransferFunction {
             return [0.0; 3];
         }
         let Some((below, above, share)) = self.colors.around(self.within(value)) else {
-            let place = if self.reversed { 1.0 - position } else { position };
+            let place = if self.reversed {
+                1.0 - position
+            } else {
+                position
+            };
             return self.palette.color_at(place);
         };
         std::array::from_fn(|c| {
@@ -183,7 +187,10 @@ mod tests {
         assert_eq!(tf.color(2.0), [0.5; 3]);
         assert_eq!(tf.color(-9.0), [0.25; 3], "as at the range's end");
         assert_eq!(tf.color(f64::NAN), [0.0; 3]);
-        assert_eq!([1.0, 2.0, 9.0].map(|v| tf.opacity(v)), [Some(0.0), Some(0.5), Some(1.0)]);
+        assert_eq!(
+            [1.0, 2.0, 9.0].map(|v| tf.opacity(v)),
+            [Some(0.0), Some(0.5), Some(1.0)]
+        );
         assert_eq!(tf.size(2.0), None);
     }
 
@@ -200,7 +207,10 @@ mod tests {
         let json = serde_json::to_string(&full).unwrap();
         let end = r#""high":"1","reversed":true,"size":[["0","0.5"]]}"#;
         assert!(json.ends_with(end), "{json}");
-        assert_eq!(serde_json::from_str::<TransferFunction>(&json).unwrap(), full);
+        assert_eq!(
+            serde_json::from_str::<TransferFunction>(&json).unwrap(),
+            full
+        );
     }
 
     #[test]
@@ -221,6 +231,11 @@ mod tests {
             colors: "0:#000000,4:#ffffff".parse().unwrap(),
             ..with(0.0, 1.0)
         };
-        assert!(both.validate().unwrap_err().to_string().contains("other way round"));
+        assert!(
+            both.validate()
+                .unwrap_err()
+                .to_string()
+                .contains("other way round")
+        );
     }
 }

@@ -91,10 +91,13 @@ impl Device {
             ])
         };
         let doubts = || -> Result<[wgpu::Buffer; 2], RenderError> {
-            let before = self.resident.buffer(&self.gpu, scene.value.before.doubts())?;
+            let before = self
+                .resident
+                .buffer(&self.gpu, scene.value.before.doubts())?;
             Ok([
                 before,
-                self.resident.buffer(&self.gpu, scene.value.after.doubts())?,
+                self.resident
+                    .buffer(&self.gpu, scene.value.after.doubts())?,
             ])
         };
         Ok(SceneBuffers {

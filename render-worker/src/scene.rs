@@ -145,10 +145,7 @@ impl Frame {
                 .errors
                 .as_ref()
                 .map_or(0, |errors| errors.content.len())
-            + self
-                .doubts
-                .get()
-                .map_or(0, |doubts| doubts.content.len());
+            + self.doubts.get().map_or(0, |doubts| doubts.content.len());
         (cells * size_of::<f32>()) as u64
     }
 }
@@ -167,7 +164,9 @@ pub struct Interval {
 impl Interval {
     /// Was any gap filled in either step?
     pub fn has_doubt(&self) -> bool {
-        [&self.before, &self.after].iter().any(|frame| frame.largest_error > 0.0)
+        [&self.before, &self.after]
+            .iter()
+            .any(|frame| frame.largest_error > 0.0)
     }
 
     /// Smallest and largest value that any instant between the two steps can have.

@@ -104,12 +104,18 @@ impl Legend {
             unit: display.unit,
             label: quantity.title(),
             stops: colors(transfer),
-            opacity: places(transfer, &transfer.opacity, |share| share.get(), |value| {
-                transfer.opacity(value)
-            }),
-            size: places(transfer, &transfer.size, |share| share.get(), |value| {
-                transfer.size(value)
-            }),
+            opacity: places(
+                transfer,
+                &transfer.opacity,
+                |share| share.get(),
+                |value| transfer.opacity(value),
+            ),
+            size: places(
+                transfer,
+                &transfer.size,
+                |share| share.get(),
+                |value| transfer.size(value),
+            ),
             ticks: ticks::of(low, high),
             transfer: *transfer,
         }
@@ -141,7 +147,11 @@ impl Legend {
 
     /// Width and height of its drawing, pixels.
     fn size_px(&self) -> [u32; 2] {
-        let dots = if self.size.is_empty() { 0 } else { DOTS_HEIGHT_PX };
+        let dots = if self.size.is_empty() {
+            0
+        } else {
+            DOTS_HEIGHT_PX
+        };
         [WIDTH_PX, HEIGHT_PX + dots]
     }
 
@@ -199,9 +209,12 @@ fn bytes(color: [f64; 3]) -> [u8; 3] {
 fn colors(transfer: &TransferFunction) -> Vec<(f64, String)> {
     let at = |value: f64| Rgb(bytes(transfer.color(value))).to_string();
     if !transfer.colors.is_empty() {
-        return places(transfer, &transfer.colors, |color: Rgb| color.to_string(), |value| {
-            Some(at(value))
-        });
+        return places(
+            transfer,
+            &transfer.colors,
+            |color: Rgb| color.to_string(),
+            |value| Some(at(value)),
+        );
     }
     let mut stops: Vec<_> = transfer.palette.stops().to_vec();
     if transfer.reversed {
@@ -260,8 +273,16 @@ mod tests {
     fn every_quantity_has_round_ends_and_ticks_between_them() {
         for quantity in Quantity::ALL {
             let legend = usual(quantity);
-            assert!((legend.low * 10.0).fract().abs() < 1e-9, "{quantity:?} {}", legend.low);
-            assert!((legend.high * 10.0).fract().abs() < 1e-9, "{quantity:?} {}", legend.high);
+            assert!(
+                (legend.low * 10.0).fract().abs() < 1e-9,
+                "{quantity:?} {}",
+                legend.low
+            );
+            assert!(
+                (legend.high * 10.0).fract().abs() < 1e-9,
+                "{quantity:?} {}",
+                legend.high
+            );
             assert!((2..=7).contains(&legend.ticks.len()), "{quantity:?}");
             let inside = |tick: &f64| (legend.low - 1e-9..=legend.high + 1e-9).contains(tick);
             assert!(legend.ticks.iter().all(inside), "{quantity:?}");
@@ -277,8 +298,17 @@ mod tests {
             ..TransferOptions::default()
         };
         let legend = legend(Quantity::WindSpeed, options);
-        let expected = [(0.0, "#404040"), (0.5, "#808080"), (0.5, "#ff0000"), (1.0, "#ff8080")];
-        let found: Vec<_> = legend.stops.iter().map(|(at, c)| (*at, c.as_str())).collect();
+        let expected = [
+            (0.0, "#404040"),
+            (0.5, "#808080"),
+            (0.5, "#ff0000"),
+            (1.0, "#ff8080"),
+        ];
+        let found: Vec<_> = legend
+            .stops
+            .iter()
+            .map(|(at, c)| (*at, c.as_str()))
+            .collect();
         assert_eq!(found, expected);
         assert_eq!(legend.opacity, [(0.0, 0.5), (0.25, 1.0), (1.0, 1.0)]);
         assert!(legend.size.is_empty() && legend.dots().is_empty());
@@ -305,6 +335,9 @@ mod tests {
         let text = String::from_utf8(usual(Quantity::WindSpeed).encoded(Form::Json).unwrap());
         let text = text.unwrap();
         assert!(!text.contains("opacity") && !text.contains("size") && !text.contains("transfer"));
-        assert!(text.contains("\"ticks\":[0.0,") && text.contains("m s⁻¹"), "{text}");
+        assert!(
+            text.contains("\"ticks\":[0.0,") && text.contains("m s⁻¹"),
+            "{text}"
+        );
     }
 }

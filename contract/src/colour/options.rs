@@ -163,7 +163,9 @@ mod tests {
 
     #[test]
     fn ranges_must_rise() {
-        for text in ["", "5", "5:", "5:5", "5:4", "a:b", "nan:1", "0:inf", "0:1:2"] {
+        for text in [
+            "", "5", "5:", "5:5", "5:4", "a:b", "nan:1", "0:inf", "0:1:2",
+        ] {
             let refused = text.parse::<ShownRange>().unwrap_err().to_string();
             assert!(refused.contains("LOW:HIGH"), "{text}: {refused}");
         }

@@ -135,12 +135,21 @@ impl<T: AtStop> Stops<T> {
         }
         for pair in stops.windows(2) {
             if pair[1].0 < pair[0].0 {
-                return bad(&pair[1], format!("values rise from stop to stop; {} lies before it", pair[0].0));
+                return bad(
+                    &pair[1],
+                    format!(
+                        "values rise from stop to stop; {} lies before it",
+                        pair[0].0
+                    ),
+                );
             }
         }
         for three in stops.windows(3) {
             if three[2].0 <= three[0].0 {
-                return bad(&three[2], "two stops at one value make a jump, a third means nothing".to_owned());
+                return bad(
+                    &three[2],
+                    "two stops at one value make a jump, a third means nothing".to_owned(),
+                );
             }
         }
         if (1..T::LEAST).contains(&stops.len()) {
@@ -254,7 +263,8 @@ impl<T: AtStop> FromStr for Stops<T> {
     type Err = ContractError;
 
     fn from_str(s: &str) -> Result<Self, Self::Err> {
-        let bad = |text: &str| ContractError::invalid(T::LIST, text, format!("written {}", T::FORM));
+        let bad =
+            |text: &str| ContractError::invalid(T::LIST, text, format!("written {}", T::FORM));
         let mut list = Self::default();
         for text in s.split(',') {
             let Some(room) = list.stops.get_mut(list.count) else {
@@ -323,7 +333,13 @@ mod tests {
     #[test]
     fn stops_hold_beyond_their_ends_and_run_straight_between_them() {
         let stops = shares("-10:0.25, 10:0.75").unwrap();
-        for (value, expected) in [(-99.0, 0.25), (-10.0, 0.25), (0.0, 0.5), (10.0, 0.75), (99.0, 0.75)] {
+        for (value, expected) in [
+            (-99.0, 0.25),
+            (-10.0, 0.25),
+            (0.0, 0.5),
+            (10.0, 0.75),
+            (99.0, 0.75),
+        ] {
             assert_eq!(at(&stops, value), expected, "{value}");
         }
         assert!(Stops::<Share>::default().around(0.0).is_none());
@@ -332,15 +348,23 @@ mod tests {
     #[test]
     fn two_stops_at_one_value_are_a_jump() {
         let stops = shares("0:0,5:0,5:1,9:1").unwrap();
-        assert_eq!([4.999, 5.0, 7.0].map(|value| at(&stops, value)), [0.0, 1.0, 1.0]);
+        assert_eq!(
+            [4.999, 5.0, 7.0].map(|value| at(&stops, value)),
+            [0.0, 1.0, 1.0]
+        );
     }
 
     #[test]
     fn lists_that_mean_nothing_are_refused_with_what_is_valid() {
         let refused = |text: &str| shares(text).unwrap_err().to_string();
-        for text in ["", "5", "a:1", "1:b", "1:2", "1:-0.1", "nan:1", "inf:1", "1e21:1", "1:nan", "0:1,"] {
+        for text in [
+            "", "5", "a:1", "1:b", "1:2", "1:-0.1", "nan:1", "inf:1", "1e21:1", "1:nan", "0:1,",
+        ] {
             let reason = refused(text);
-            assert!(reason.contains("VALUE:SHARE") || reason.contains("from 0 to 1"), "{text}: {reason}");
+            assert!(
+                reason.contains("VALUE:SHARE") || reason.contains("from 0 to 1"),
+                "{text}: {reason}"
+            );
         }
         assert!(refused("1:0,0:1").contains("rise"));
         assert!(refused("1:0,1:1,1:0").contains("third"));
@@ -348,7 +372,12 @@ mod tests {
         assert!(refused(&many).contains("at most 16"));
         let colors = |text: &str| text.parse::<Stops<Rgb>>().unwrap_err().to_string();
         assert!(colors("0:#ffffff").contains("at least 2"));
-        for text in ["0:red,1:#000000", "0:#fff,1:#000000", "0:#gggggg,1:#000000", "0:#ffffff1,1:#000000"] {
+        for text in [
+            "0:red,1:#000000",
+            "0:#fff,1:#000000",
+            "0:#gggggg,1:#000000",
+            "0:#ffffff1,1:#000000",
+        ] {
             assert!(colors(text).contains("#rrggbb"), "{text}");
         }
     }

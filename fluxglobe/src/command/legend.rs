@@ -9,7 +9,10 @@ use crate::{deployment, progress};
 
 pub(crate) async fn run(settings: &Settings, store: &Store, options: &RenderLegend) -> Result<()> {
     let path = options.output.display();
-    let ending = options.output.extension().and_then(|ending| ending.to_str());
+    let ending = options
+        .output
+        .extension()
+        .and_then(|ending| ending.to_str());
     let form = ending.and_then(|ending| Form::named(&ending.to_ascii_lowercase()));
     let form = form.with_context(|| format!("{path}: a legend is a .png, .svg or .json file"))?;
     let manifest = deployment::manifest(store, &options.layer, &settings.data).await?;

@@ -240,12 +240,11 @@ fn common(job: &RenderJob, scene: &Scene) -> Params {
 fn palette(job: &RenderJob) -> Vec<u32> {
     let transfer = &job.style.transfer;
     let byte = |share: f64| (share * 255.0).round() as u32;
-    let colors = (0..256)
-        .map(|i| {
-            let value = transfer.low + (transfer.high - transfer.low) * f64::from(i) / 255.0;
-            let [r, g, b] = transfer.color(value);
-            byte(r) | byte(g) << 8 | byte(b) << 16
-        });
+    let colors = (0..256).map(|i| {
+        let value = transfer.low + (transfer.high - transfer.low) * f64::from(i) / 255.0;
+        let [r, g, b] = transfer.color(value);
+        byte(r) | byte(g) << 8 | byte(b) << 16
+    });
     colors.chain(shape::table(job.mode, transfer)).collect()
 }
 

@@ -88,7 +88,10 @@ mod tests {
 
     fn entry(mode: Mode, transfer: &TransferFunction, at: usize) -> (f64, f64) {
         let word = table(mode, transfer)[at];
-        (f64::from(word & 0xffff) / 65535.0, f64::from(word >> 16) / 255.0)
+        (
+            f64::from(word & 0xffff) / 65535.0,
+            f64::from(word >> 16) / 255.0,
+        )
     }
 
     #[test]
@@ -99,7 +102,10 @@ mod tests {
     #[test]
     fn what_was_not_given_stays_as_usual() {
         let near = |(a, b): (f64, f64), (c, d): (f64, f64)| {
-            assert!((a - c).abs() < 2e-5 && (b - d).abs() < 3e-3, "{a} {b}, {c} {d}");
+            assert!(
+                (a - c).abs() < 2e-5 && (b - d).abs() < 3e-3,
+                "{a} {b}, {c} {d}"
+            );
         };
         let opacity = with("-1:0.25,1:0.75", "");
         near(entry(Mode::Volume, &opacity, 0), (0.25, 1.0));
@@ -107,7 +113,10 @@ mod tests {
         let size = with("", "-1:0.5,1:0.75");
         near(entry(Mode::Volume, &size, 0), (1.0, 0.5));
         let middle = 0.3 + 0.7 * (1.0f64 / 255.0).sqrt();
-        near(entry(Mode::Volume, &size, 128), (middle, 0.625 + 0.125 / 255.0));
+        near(
+            entry(Mode::Volume, &size, 128),
+            (middle, 0.625 + 0.125 / 255.0),
+        );
         near(entry(Mode::Map, &size, 128), (1.0, 0.625 + 0.125 / 255.0));
         let look = Look::of(Mode::Volume);
         assert!((size_spread(&size, &look) - 1.0).abs() < f32::EPSILON);

@@ -31,7 +31,12 @@ fn stops_and_doubt_leave_no_seams() {
             for [z, x, y] in [[2, 0, 1], [3, 7, 5]] {
                 let large = styled(mode, tile(z as u8, x, y, 512), full);
                 let large = renderer.render(&large, &scene).unwrap();
-                let small = children_of(renderer, &scene, &|view| styled(mode, view, full), [z, x, y]);
+                let small = children_of(
+                    renderer,
+                    &scene,
+                    &|view| styled(mode, view, full),
+                    [z, x, y],
+                );
                 assert!(large == small, "{} {mode} {z}/{x}/{y}", renderer.name());
                 assert!(large.alpha().any(|alpha| alpha > 50));
             }
@@ -110,13 +115,21 @@ fn what_users_make_transparent_is_not_there_and_what_they_make_small_covers_less
             let all = mean_alpha(&drawn(renderer, mode, "0:1", "0:1"));
             let half = mean_alpha(&drawn(renderer, mode, "0:0.5", "0:1"));
             let sources = mean_alpha(&drawn(renderer, mode, "0:0,0:1", "0:1"));
-            assert!(half < 0.95 * all && half > 0.3 * all, "{mode}: {half} of {all}");
-            assert!(sources > 0.05 * all && sources < 0.9 * all, "{mode}: {sources} of {all}");
+            assert!(
+                half < 0.95 * all && half > 0.3 * all,
+                "{mode}: {half} of {all}"
+            );
+            assert!(
+                sources > 0.05 * all && sources < 0.9 * all,
+                "{mode}: {sources} of {all}"
+            );
         }
         for mode in [Mode::Points, Mode::Sprites] {
             let view = tile(4, 3, 7, 256);
             let of = |size: &str| {
-                let job = styled(mode, view, |style| style.transfer.size = size.parse().unwrap());
+                let job = styled(mode, view, |style| {
+                    style.transfer.size = size.parse().unwrap()
+                });
                 mean_alpha(&renderer.render(&job, &scene).unwrap())
             };
             let (large, small) = (of("0:1"), of("0:0.4"));
@@ -142,15 +155,20 @@ fn doubt_is_seen_where_gaps_were_filled_and_nowhere_else() {
         // On a map every pixel tells: tile 2/0/1 covers 180 W to 90 W, 0 to 66.5 N, in 2.8 pixels a degree.
         let view = tile(2, 0, 1, 256);
         let sure = renderer.render(&job(Mode::Map, view), &scene).unwrap();
-        let unsure = renderer.render(&styled(Mode::Map, view, doubt), &scene).unwrap();
-        let doubts = [&scene.value.before, &scene.value.after].map(|frame| frame.doubts().content());
+        let unsure = renderer
+            .render(&styled(Mode::Map, view, doubt), &scene)
+            .unwrap();
+        let doubts =
+            [&scene.value.before, &scene.value.after].map(|frame| frame.doubts().content());
         let (mut changed, mut checked) = (0, 0);
         for x in 0..256 {
             // The last row of pixels lies at the equator, between rows 89 and 90.
             let lon = (f64::from(x) + 0.5) / 256.0 * 90.0;
             let cols = [(lon - 0.5).max(0.0) as usize, (lon + 0.5) as usize];
             let cells = cols.iter().flat_map(|col| [89 * 360 + col, 90 * 360 + col]);
-            let is_measured = cells.into_iter().all(|cell| doubts.iter().all(|d| d[cell] <= 0.0));
+            let is_measured = cells
+                .into_iter()
+                .all(|cell| doubts.iter().all(|d| d[cell] <= 0.0));
             let is_same = sure.pixel(x, 255) == unsure.pixel(x, 255);
             if is_measured {
                 assert!(is_same, "{} column {x}", renderer.name());
@@ -158,6 +176,9 @@ fn doubt_is_seen_where_gaps_were_filled_and_nowhere_else() {
             }
             changed += usize::from(!is_same);
         }
-        assert!(checked > 40 && changed > 30, "{checked} measured, {changed} changed");
+        assert!(
+            checked > 40 && changed > 30,
+            "{checked} measured, {changed} changed"
+        );
     }
 }

@@ -613,7 +613,13 @@ fn far_apart(a: &[f32], b: &[f32], tolerance: f32) -> f32 {
 #[test]
 fn map_matches_its_twin_on_tiles_and_on_the_globe() {
     let views = [tile(2, 0, 1, 256), globe(-120.0, 10.0, 1.5e7, 160)];
-    let plain = views.map(|view| (Twins::of(Mode::Map, view), "mix(north, south", "mix(south, north"));
+    let plain = views.map(|view| {
+        (
+            Twins::of(Mode::Map, view),
+            "mix(north, south",
+            "mix(south, north",
+        )
+    });
     let [on_tile, on_globe] = views.map(|view| Twins::doubted(Mode::Map, view));
     let doubted = [
         (on_tile, "* doubt * line_at(pixel)", "* doubt"),
@@ -625,26 +631,20 @@ fn map_matches_its_twin_on_tiles_and_on_the_globe() {
     ];
     for (twins, right, wrong) in plain.into_iter().chain(doubted) {
         let expected = channels(&twins.picture);
-        prove(
-            "map",
-            map::SOURCE,
-            right,
-            wrong,
-            |gpu, source| {
-                let stage = Map::new(gpu, source);
-                let value =
-                    |f: &mut FrameContext<'_>| drop(f.upload(Slot::Value, &twins.value).unwrap());
-                let drawn: Vec<Vec4> = twins.run(
-                    gpu,
-                    value,
-                    |f| stage.record(f).unwrap(),
-                    Slot::Picture,
-                    expected.len() / 4,
-                );
-                // A colour may be the next of the palette's 256.
-                far_apart(&channels(&drawn), &expected, 0.02)
-            },
-        );
+        prove("map", map::SOURCE, right, wrong, |gpu, source| {
+            let stage = Map::new(gpu, source);
+            let value =
+                |f: &mut FrameContext<'_>| drop(f.upload(Slot::Value, &twins.value).unwrap());
+            let drawn: Vec<Vec4> = twins.run(
+                gpu,
+                value,
+                |f| stage.record(f).unwrap(),
+                Slot::Picture,
+                expected.len() / 4,
+            );
+            // A colour may be the next of the palette's 256.
+            far_apart(&channels(&drawn), &expected, 0.02)
+        });
     }
 }
 

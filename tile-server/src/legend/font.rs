@@ -48,7 +48,8 @@ mod tests {
 
     #[test]
     fn every_letter_of_titles_units_and_numbers_is_there() {
-        let titles = Quantity::ALL.map(|quantity| quantity.title().to_owned() + quantity.display().unit);
+        let titles =
+            Quantity::ALL.map(|quantity| quantity.title().to_owned() + quantity.display().unit);
         let letters = titles.concat().replace('-', "−") + "0123456789−.e";
         for letter in letters.chars().filter(|letter| *letter != ' ') {
             let columns = known(letter).unwrap_or_else(|| panic!("no letter {letter:?}"));

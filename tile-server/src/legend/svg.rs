@@ -39,9 +39,15 @@ fn write(legend: &Legend, to: &mut String) -> std::fmt::Result {
         to.push_str(&checks.replace("{2}", &(2 * CHECK_PX).to_string()));
         to.push_str("<linearGradient id=\"shares\">");
         for (place, share) in &legend.opacity {
-            write!(to, "<stop offset=\"{place:.6}\" stop-color=\"#fff\" stop-opacity=\"{share:.4}\"/>")?;
+            write!(
+                to,
+                "<stop offset=\"{place:.6}\" stop-color=\"#fff\" stop-opacity=\"{share:.4}\"/>"
+            )?;
         }
-        write!(to, "</linearGradient><mask id=\"seen\"><rect {bar} fill=\"url(#shares)\"/></mask>")?;
+        write!(
+            to,
+            "</linearGradient><mask id=\"seen\"><rect {bar} fill=\"url(#shares)\"/></mask>"
+        )?;
     }
     write!(
         to,
@@ -53,7 +59,10 @@ fn write(legend: &Legend, to: &mut String) -> std::fmt::Result {
     )?;
     if is_transparent {
         write!(to, "<rect {bar} fill=\"url(#checks)\"/>")?;
-        write!(to, "<rect {bar} fill=\"url(#colors)\" mask=\"url(#seen)\"/>")?;
+        write!(
+            to,
+            "<rect {bar} fill=\"url(#colors)\" mask=\"url(#seen)\"/>"
+        )?;
     } else {
         write!(to, "<rect {bar} fill=\"url(#colors)\"/>")?;
     }
@@ -67,7 +76,11 @@ fn write(legend: &Legend, to: &mut String) -> std::fmt::Result {
     }
     for (place, radius) in legend.dots() {
         let x = Legend::x_px(place);
-        write!(to, "<circle cx=\"{x:.2}\" cy=\"{}\" r=\"{radius:.2}\" fill=\"#555\"/>", HEIGHT_PX + 6)?;
+        write!(
+            to,
+            "<circle cx=\"{x:.2}\" cy=\"{}\" r=\"{radius:.2}\" fill=\"#555\"/>",
+            HEIGHT_PX + 6
+        )?;
     }
     to.push_str("</svg>\n");
     Ok(())
@@ -87,7 +100,10 @@ mod tests {
     fn every_quantity_is_drawn_with_its_title_unit_and_ticks() {
         for quantity in Quantity::ALL {
             let svg = svg(quantity, &TransferOptions::default());
-            assert!(svg.contains(&format!(">{}</text>", quantity.title())), "{svg}");
+            assert!(
+                svg.contains(&format!(">{}</text>", quantity.title())),
+                "{svg}"
+            );
             assert!(svg.contains(&format!(">{}</text>", quantity.display().unit)));
             assert!(svg.matches("text-anchor=\"middle\"").count() >= 2);
             assert!(!svg.contains("mask") && !svg.contains("circle"));

@@ -36,7 +36,9 @@ pub(super) fn of(low: f64, high: f64) -> Vec<f64> {
 
 /// The values with as many decimals as any of them needs, a minus sign for a minus sign.
 pub(super) fn texts(ticks: &[f64]) -> Vec<String> {
-    let largest = ticks.iter().fold(0.0, |most: f64, tick| most.max(tick.abs()));
+    let largest = ticks
+        .iter()
+        .fold(0.0, |most: f64, tick| most.max(tick.abs()));
     let needed = |tick: &f64| {
         let is_enough = |digits: &usize| {
             let digits = *digits;
@@ -53,7 +55,10 @@ pub(super) fn texts(ticks: &[f64]) -> Vec<String> {
         None if *tick == 0.0 => "0".to_owned(),
         None => short(*tick),
     };
-    ticks.iter().map(|tick| text(tick).replace('-', "−")).collect()
+    ticks
+        .iter()
+        .map(|tick| text(tick).replace('-', "−"))
+        .collect()
 }
 
 /// Six figures and an exponent.
@@ -87,9 +92,17 @@ mod tests {
 
     #[test]
     fn ranges_at_the_limits_of_numbers_have_a_tick_all_the_same() {
-        for (low, high) in [(1.0, 1.0 + f64::EPSILON), (0.0, 1e-300), (-1e300, 1e300), (5.0, 5.0)] {
+        for (low, high) in [
+            (1.0, 1.0 + f64::EPSILON),
+            (0.0, 1e-300),
+            (-1e300, 1e300),
+            (5.0, 5.0),
+        ] {
             let ticks = of(low, high);
-            assert!(!ticks.is_empty() && ticks.len() < 12, "{low} to {high}: {ticks:?}");
+            assert!(
+                !ticks.is_empty() && ticks.len() < 12,
+                "{low} to {high}: {ticks:?}"
+            );
             assert_eq!(texts(&ticks).len(), ticks.len());
         }
     }

@@ -65,10 +65,7 @@ const BAD_ADDRESSES: &[(&str, &str)] = &[
     ),
     ("/tiles/flux/map/0/0/0.png?reverse=maybe", "true or false"),
     ("/tiles/flux/map/0/0/0.png?doubt=2", "true or false"),
-    (
-        "/tiles/flux/map/0/0/0.png?doubt=1&doubt=1",
-        "duplicate",
-    ),
+    ("/tiles/flux/map/0/0/0.png?doubt=1&doubt=1", "duplicate"),
     ("/globe/flux/map.png?palette=jet", "balance, curl"),
     ("/api/products/flux/legend.png?palette=jet", "balance, curl"),
     ("/globe/flux/map.png?lon=nan", "degrees east"),

@@ -8,7 +8,8 @@ use serde_json::json;
 
 use crate::app::TestApp;
 
-const LOOK: &str = "palette=ice&range=10:30&opacity=10:0.2,30:1&particle_size=10:0.5&reverse=true&doubt=1";
+const LOOK: &str =
+    "palette=ice&range=10:30&opacity=10:0.2,30:1&particle_size=10:0.5&reverse=true&doubt=1";
 
 #[tokio::test]
 async fn a_look_is_a_part_of_the_job_in_stored_units() {
@@ -41,15 +42,23 @@ async fn a_look_is_a_part_of_the_job_in_stored_units() {
 async fn one_look_written_in_two_ways_is_one_picture() {
     let app = TestApp::new().await;
     let tag = async |query: &str| {
-        let answer = app.get(&format!("/tiles/flux/volume/0/0/0.png?{query}")).await;
+        let answer = app
+            .get(&format!("/tiles/flux/volume/0/0/0.png?{query}"))
+            .await;
         assert_eq!(answer.status, StatusCode::OK, "{query}: {}", answer.text());
         answer.header("etag").to_owned()
     };
     let stops = tag("stops=-40:%2311387f,40:%23760e24").await;
     assert_eq!(stops, tag("stops=-4.0e1:11387F,%2040:760E24").await);
-    assert_eq!(stops, tag("stops=-40:11387f,40:760e24&range=-40:40&doubt=0").await);
+    assert_eq!(
+        stops,
+        tag("stops=-40:11387f,40:760e24&range=-40:40&doubt=0").await
+    );
     let usual = tag("").await;
-    assert_eq!(usual, tag("reverse=false&palette=balance&range=-40:40").await);
+    assert_eq!(
+        usual,
+        tag("reverse=false&palette=balance&range=-40:40").await
+    );
     assert_ne!(usual, stops);
     assert_eq!(app.drawer.drawn_count(), 2);
 }
@@ -81,7 +90,10 @@ async fn tilejson_names_tiles_and_legend_of_the_look_asked_for() {
         "<img src=\"http://h:1/api/products/flux/legend.svg?stops=-40:11387f,40:760e24&amp;doubt=true\" alt=\"Air-sea CO₂ flux\">"
     );
     let plain = app.get("/tiles/flux/map.json").await.json();
-    assert!(!plain["tiles"][0].as_str().unwrap().contains('?'), "{plain}");
+    assert!(
+        !plain["tiles"][0].as_str().unwrap().contains('?'),
+        "{plain}"
+    );
     let refused = app.get("/tiles/flux/map.json?palette=jet").await;
     assert_eq!(refused.status, StatusCode::BAD_REQUEST);
 }
@@ -90,7 +102,9 @@ async fn tilejson_names_tiles_and_legend_of_the_look_asked_for() {
 async fn a_legend_comes_in_three_forms() {
     let app = TestApp::new().await;
     let of = async |form: &str| {
-        let answer = app.get(&format!("/api/products/sst/legend.{form}?{LOOK}")).await;
+        let answer = app
+            .get(&format!("/api/products/sst/legend.{form}?{LOOK}"))
+            .await;
         assert_eq!(answer.status, StatusCode::OK, "{}", answer.text());
         answer
     };
@@ -98,7 +112,10 @@ async fn a_legend_comes_in_three_forms() {
     assert_eq!(legend.header("content-type"), "application/json");
     let body = legend.json();
     assert_eq!((&body["low"], &body["high"]), (&json!(10.0), &json!(30.0)));
-    assert_eq!((&body["unit"], &body["label"]), (&json!("°C"), &json!("Sea-surface temperature")));
+    assert_eq!(
+        (&body["unit"], &body["label"]),
+        (&json!("°C"), &json!("Sea-surface temperature"))
+    );
     assert_eq!(body["ticks"], json!([10.0, 15.0, 20.0, 25.0, 30.0]));
     assert_eq!(body["stops"][0], json!([0.0, "#eafcfd"]), "reversed");
     assert_eq!(body["opacity"], json!([[0.0, 0.2], [1.0, 1.0]]));
@@ -109,7 +126,9 @@ async fn a_legend_comes_in_three_forms() {
     assert_eq!(png.header("content-type"), "image/png");
     assert!(png.body.starts_with(b"\x89PNG\r\n\x1a\n"));
     let tag = [("if-none-match", png.header("etag"))];
-    let again = app.get_with(&format!("/api/products/sst/legend.png?{LOOK}"), &tag).await;
+    let again = app
+        .get_with(&format!("/api/products/sst/legend.png?{LOOK}"), &tag)
+        .await;
     assert_eq!(again.status, StatusCode::NOT_MODIFIED);
     let other = app.get_with("/api/products/sst/legend.png", &tag).await;
     assert_eq!(other.status, StatusCode::OK);
@@ -122,9 +141,18 @@ async fn the_list_of_products_has_the_usual_legends() {
     let listed = app.get("/api/products").await.json();
     let alone = app.get("/api/products/flux/legend.json").await.json();
     assert_eq!(listed["products"][0]["legend"], alone);
-    for nothing in ["legend", "legend.", "legend.gif", "other.json", "legend.json.png"] {
+    for nothing in [
+        "legend",
+        "legend.",
+        "legend.gif",
+        "other.json",
+        "legend.json.png",
+    ] {
         let answer = app.get(&format!("/api/products/flux/{nothing}")).await;
         assert_eq!(answer.status, StatusCode::NOT_FOUND, "{nothing}");
     }
-    assert_eq!(app.get("/api/products/atlantis/legend.png").await.status, StatusCode::NOT_FOUND);
+    assert_eq!(
+        app.get("/api/products/atlantis/legend.png").await.status,
+        StatusCode::NOT_FOUND
+    );
 }
