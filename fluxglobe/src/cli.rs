@@ -338,10 +338,10 @@ pub(crate) struct Picture {
     /// File to write.
     #[arg(short, long, value_name = "FILE.png")]
     pub(crate) output: PathBuf,
-    #[command(flatten, next_help_heading = "Look")]
+    #[command(flatten)]
     pub(crate) look: Look,
     /// Draw cells whose gap was filled differently, by their estimated error: hatched on maps, paler as particles.
-    #[arg(long, help_heading = "Look")]
+    #[arg(long, help_heading = look::HEADING)]
     pub(crate) doubt: bool,
 }
 

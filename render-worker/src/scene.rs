@@ -67,7 +67,7 @@ pub struct Frame {
 }
 
 /// Doubt of a filled cell with next to no estimated error: it is seen that it was not measured.
-const LEAST_DOUBT: f32 = 0.35;
+const LEAST_DOUBT: f32 = 0.4;
 
 impl Frame {
     /// A frame from values with NaN (or anything not finite) where there is no data.
@@ -108,7 +108,8 @@ impl Frame {
     pub fn doubts(&self) -> &Cells<f32> {
         let doubt = |error: &f32| {
             if *error > 0.0 {
-                LEAST_DOUBT + (1.0 - LEAST_DOUBT) * (error / self.largest_error)
+                // The root, because a few cells are far worse than most.
+                LEAST_DOUBT + (1.0 - LEAST_DOUBT) * (error / self.largest_error).sqrt()
             } else {
                 0.0
             }

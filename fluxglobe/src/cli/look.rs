@@ -6,26 +6,29 @@ use clap::Args;
 use contract::colour::{Palette, Rgb, Share, ShownRange, Stops, TransferOptions};
 use contract::product::ProductId;
 
+/// Where help lists them: apart from what says which picture.
+pub(super) const HEADING: &str = "Look";
+
 /// What changes colours, opacity and size from the usual.
 #[derive(Debug, Args)]
 pub(crate) struct Look {
     /// balance, curl, delta, thermal, haline, ice, algae, speed, dense or gray.
-    #[arg(long)]
+    #[arg(long, help_heading = HEADING)]
     pub(crate) palette: Option<Palette>,
     /// Values of the first and the last colour, in the legend's unit, such as -40:40.
-    #[arg(long, value_name = "LOW:HIGH", allow_hyphen_values = true)]
+    #[arg(long, value_name = "LOW:HIGH", allow_hyphen_values = true, help_heading = HEADING)]
     pub(crate) range: Option<ShownRange>,
     /// Colours in place of a palette's, 2 to 16 stops such as '-40:#11387f,0:#f0f0ee,40:#760e24'; two at one value jump.
-    #[arg(long, value_name = "VALUE:#rrggbb,...", allow_hyphen_values = true)]
+    #[arg(long, value_name = "VALUE:#rrggbb,...", allow_hyphen_values = true, help_heading = HEADING)]
     pub(crate) stops: Option<Stops<Rgb>>,
     /// Share of the usual opacity by value, up to 16 stops such as '-40:1,0:0.1,40:1'.
-    #[arg(long, value_name = "VALUE:SHARE,...", allow_hyphen_values = true)]
+    #[arg(long, value_name = "VALUE:SHARE,...", allow_hyphen_values = true, help_heading = HEADING)]
     pub(crate) opacity: Option<Stops<Share>>,
     /// Share of a particle's full size by value, up to 16 stops such as '0:0.3,40:1'.
-    #[arg(long, value_name = "VALUE:SHARE,...", allow_hyphen_values = true)]
+    #[arg(long, value_name = "VALUE:SHARE,...", allow_hyphen_values = true, help_heading = HEADING)]
     pub(crate) particle_size: Option<Stops<Share>>,
     /// The palette's last colour first.
-    #[arg(long)]
+    #[arg(long, help_heading = HEADING)]
     pub(crate) reverse: bool,
 }
 
@@ -55,7 +58,7 @@ pub(crate) struct RenderLegend {
     /// File to write, its kind by its name: .png, .svg or .json.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: PathBuf,
-    #[command(flatten, next_help_heading = "Look")]
+    #[command(flatten)]
     pub(crate) look: Look,
 }
 

@@ -11,7 +11,6 @@ use contract::tile::{MAX_LAT_DEG, Tile, mercator_lat_deg, mercator_x, mercator_y
 use super::look::{self, Look};
 use super::{Plan, area_m2, cell_px, entry_shift, height_range_m};
 use crate::scene::Scene;
-use crate::stages::doubt::HATCH_PX;
 use crate::stages::layout::{Axis, Col, Row, SUBPIXELS, VIEW_TILE};
 use crate::stages::light::LOOK;
 
@@ -47,7 +46,6 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene, tile: Tile, 
         px_per_m: world_px / (TAU * WGS84_EQUATORIAL_RADIUS_M),
     };
     plan.params.view = VIEW_TILE;
-    plan.params.hatch_phase_px = hatch_phase_px(&level);
     if job.mode == Mode::Map {
         map_axes(plan, scene, &level);
         return;
@@ -204,12 +202,6 @@ fn light_and_reach(
     params.light_depth_gain =
         (look::LIGHT_DEPTH * PI / 3.0 / (texel_px * texel_px) / elevation.sin()) as f32;
     reach
-}
-
-/// Where the tile's corner lies between two lines of the hatching of its level.
-fn hatch_phase_px(level: &Level) -> u32 {
-    let [east, south] = level.origin_px;
-    ((east + south) as u64 % u64::from(HATCH_PX)) as u32
 }
 
 /// Fills the table of columns and sets the rows whose ground lies within `spans` (x, y), date line included.

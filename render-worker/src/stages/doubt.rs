@@ -9,7 +9,7 @@ use crate::stages::layout::{Params, Particle, nearest};
 pub const FUNCTIONS: &str = include_str!("doubt.wgsl");
 
 /// Pixels from one line of a hatching to the next along a row or a column: a divisor of the side of every tile.
-pub const HATCH_PX: u32 = 8;
+const HATCH_PX: u32 = 8;
 
 const PALENESS: f32 = 0.65;
 const DEPTH_LEFT: f32 = 0.3;
@@ -46,7 +46,7 @@ pub fn doubted(particle: Particle, doubt: f32) -> Particle {
 
 fn line_at(params: &Params, pixel: [u32; 2]) -> f32 {
     let origin = (params.origin_x_px + params.origin_y_px) as u32;
-    let along = pixel[0] + pixel[1] + origin + params.hatch_phase_px;
+    let along = pixel[0] + pixel[1] + origin;
     (1.0 - 0.5 * ((along % HATCH_PX) as f32 - 2.0).abs()).max(0.0)
 }
 
@@ -78,6 +78,7 @@ mod tests {
 
     #[test]
     fn lines_of_the_hatching_come_back_after_its_width_and_are_as_strong_as_the_doubt() {
+        assert!(256 % HATCH_PX == 0, "lines go on in the next tile");
         let params = Params::default();
         let gray = |doubt: f32, x: u32| hatched(&params, Vec3::splat(0.6), doubt, [x, 3]).x;
         for x in 0..40 {

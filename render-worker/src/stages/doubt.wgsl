@@ -5,7 +5,8 @@
 const PALENESS = 0.65;
 const DEPTH_LEFT = 0.3;
 const PALE = 200.0;
-// Pixels from one line of a hatching to the next along a row or a column: a divisor of the side of every tile.
+// Pixels from one line of a hatching to the next along a row or a column: a divisor of the side of every tile, so that
+// its pixels are as good as those of its level.
 const HATCH_PX = 8u;
 // Share of the ink in the colour of a line at full doubt.
 const HATCH_INK = 0.75;
@@ -31,10 +32,9 @@ fn doubted(particle: Particle, doubt: f32) -> Particle {
     return faded;
 }
 
-// Share of a pixel that a line of the hatching covers: diagonals on the absolute pixels of a level, so that they go on
-// in the next tile.
+// Share of a pixel that a line of the hatching covers: diagonals that go on in the next tile and part.
 fn line_at(pixel: vec2<u32>) -> f32 {
-    let along = pixel.x + pixel.y + u32(params.origin_x_px + params.origin_y_px) + params.hatch_phase_px;
+    let along = pixel.x + pixel.y + u32(params.origin_x_px + params.origin_y_px);
     return max(1.0 - 0.5 * abs(f32(along % HATCH_PX) - 2.0), 0.0);
 }
 

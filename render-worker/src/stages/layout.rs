@@ -144,8 +144,6 @@ shared_struct! {
         pub shape_table: u32,
         /// Cells whose gap was filled are drawn differently.
         pub doubt: u32,
-        /// Where the picture lies on the hatching of its level, below [`HATCH_PX`](super::doubt::HATCH_PX).
-        pub hatch_phase_px: u32,
     }
 }
 

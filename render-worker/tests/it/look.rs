@@ -139,6 +139,29 @@ fn what_users_make_transparent_is_not_there_and_what_they_make_small_covers_less
 }
 
 #[test]
+fn doubt_rises_with_the_estimated_error_and_is_none_where_a_cell_was_measured() {
+    let frame = clouded(FIVE_DEGREES).value.before;
+    let (errors, doubts) = (
+        frame.errors.as_ref().unwrap().content(),
+        frame.doubts().content(),
+    );
+    let mut cells: Vec<_> = errors.iter().zip(doubts).collect();
+    assert!(
+        cells
+            .iter()
+            .all(|(error, doubt)| (**error > 0.0) == (**doubt > 0.3))
+    );
+    cells.retain(|(error, _)| **error > 0.0);
+    cells.sort_by(|a, b| a.0.total_cmp(b.0));
+    assert!(cells.len() > 200 && cells.is_sorted_by(|a, b| a.1 <= b.1));
+    let most = cells.last().unwrap();
+    assert!((most.1 - 1.0).abs() < 1e-6 && most.1 - cells[0].1 > 0.3);
+    // Without a gap nobody doubts anything.
+    let whole = ocean(FIVE_DEGREES).value.before;
+    assert!(whole.doubts().content().iter().all(|doubt| *doubt == 0.0));
+}
+
+#[test]
 fn doubt_is_seen_where_gaps_were_filled_and_nowhere_else() {
     let (scene, whole) = (clouded(ONE_DEGREE), ocean(ONE_DEGREE));
     let doubt = |style: &mut Style| style.doubt = true;
