@@ -1,71 +1,23 @@
-//! Transfer functions: a linear map from a value to a colour (eq. 2 of the method), shared by legends and pictures.
+//! Transfer functions: from a value to colour, opacity and size (eq. 2 of the method), shared by legends and pictures.
+
+mod options;
+mod palette;
+mod stops;
 
 use serde::{Deserialize, Serialize};
 
+use crate::ContractError;
 use crate::quantity::Quantity;
 
-/// A named list of equally spaced colours, sRGB.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Palette {
-    /// Diverging blue - pale - red; safe for colour-blind readers. Sinks blue, sources red.
-    Balance,
-    /// Sequential dark blue to pale yellow for temperature.
-    Thermal,
-    /// Sequential pale to dark green for chlorophyll.
-    Algae,
-    /// Sequential pale to dark for speeds and amounts.
-    Speed,
-}
+pub use options::{ShownRange, TransferOptions};
+pub use palette::Palette;
+pub use stops::{AtStop, MAX_STOPS, MAX_VALUE, Rgb, Share, Stop, Stops};
 
-impl Palette {
-    /// Colours at equal distances from 0 to 1, sRGB bytes, lightness varying evenly.
-    pub fn stops(self) -> &'static [[u8; 3]] {
-        match self {
-            Self::Balance => &[
-                [17, 56, 127],
-                [30, 102, 190],
-                [92, 159, 219],
-                [170, 207, 236],
-                [240, 240, 238],
-                [244, 191, 163],
-                [226, 122, 92],
-                [188, 50, 52],
-                [118, 14, 36],
-            ],
-            Self::Thermal => &[
-                [8, 29, 66],
-                [32, 50, 130],
-                [92, 60, 148],
-                [148, 74, 140],
-                [204, 92, 116],
-                [240, 130, 84],
-                [250, 182, 72],
-                [240, 240, 100],
-            ],
-            Self::Algae => &[
-                [226, 246, 220],
-                [172, 218, 160],
-                [112, 190, 112],
-                [46, 158, 82],
-                [10, 120, 74],
-                [18, 82, 56],
-                [16, 44, 32],
-            ],
-            Self::Speed => &[
-                [255, 252, 210],
-                [220, 220, 140],
-                [160, 190, 80],
-                [84, 158, 60],
-                [22, 122, 66],
-                [18, 82, 60],
-                [20, 40, 36],
-            ],
-        }
-    }
-}
+/// Least distance from the first to the last value: its inverse is far from the limits of the numbers that pictures are
+/// computed with.
+const MIN_SPAN: f64 = 1e-30;
 
-/// A linear transfer function over a range of stored values.
+/// What a value looks like, over a range of stored values: linear in a palette unless there are stops.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TransferFunction {
     /// Colours.
@@ -76,9 +28,34 @@ pub struct TransferFunction {
     /// Stored value of the last colour, above `low`.
     #[serde(with = "crate::exact")]
     pub high: f64,
+    /// The palette's last colour first.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub reversed: bool,
+    /// Colours in place of the palette's, by stored value.
+    #[serde(default, skip_serializing_if = "Stops::is_empty")]
+    pub colors: Stops<Rgb>,
+    /// Share of the style's optical depth, and of a map's opacity, in place of the usual one, by stored value.
+    #[serde(default, skip_serializing_if = "Stops::is_empty")]
+    pub opacity: Stops<Share>,
+    /// Radius of a particle over that of a full-size one in place of the usual one, by stored value.
+    #[serde(default, skip_serializing_if = "Stops::is_empty")]
+    pub size: Stops<Share>,
 }
 
 impl TransferFunction {
+    /// A palette over a range of stored values.
+    pub fn linear(palette: Palette, low: f64, high: f64) -> Self {
+        Self {
+            palette,
+            low,
+            high,
+            reversed: false,
+            colors: Stops::default(),
+            opacity: Stops::default(),
+            size: Stops::default(),
+        }
+    }
+
     /// What a quantity is drawn with unless told otherwise.
     pub fn default_for(quantity: Quantity) -> Self {
         let display = quantity.display();
@@ -95,12 +72,7 @@ impl TransferFunction {
             Quantity::WaveHeight => (Palette::Speed, 0.0, 6.0),
             Quantity::Current => (Palette::Balance, -1.5, 1.5),
         };
-        let stored = |shown: f64| (shown - display.offset) / display.factor;
-        Self {
-            palette,
-            low: stored(low),
-            high: stored(high),
-        }
+        Self::linear(palette, display.stored(low), display.stored(high))
     }
 
     /// Place of a stored value between `low` (0) and `high` (1), clamped; NaN stays NaN.
@@ -108,18 +80,67 @@ impl TransferFunction {
         ((value - self.low) / (self.high - self.low)).clamp(0.0, 1.0)
     }
 
+    /// The nearest value of the range, which is not taken to rise.
+    fn within(&self, value: f64) -> f64 {
+        value.max(self.low).min(self.high)
+    }
+
     /// Colour of a stored value, sRGB 0 to 1, linear between stops; black for NaN.
     pub fn color(&self, value: f64) -> [f64; 3] {
-        let stops = self.palette.stops();
-        let x = self.position(value) * (stops.len() - 1) as f64;
-        if x.is_nan() {
+        let position = self.position(value);
+        if position.is_nan() {
             return [0.0; 3];
         }
-        let i = (x as usize).min(stops.len() - 2);
-        let t = x - i as f64;
+        let Some((below, above, share)) = self.colors.around(self.within(value)) else {
+            let place = if self.reversed {
+                1.0 - position
+            } else {
+                position
+            };
+            return self.palette.color_at(place);
+        };
         std::array::from_fn(|c| {
-            (f64::from(stops[i][c]) * (1.0 - t) + f64::from(stops[i + 1][c]) * t) / 255.0
+            (f64::from(below.0[c]) * (1.0 - share) + f64::from(above.0[c]) * share) / 255.0
         })
+    }
+
+    /// Share of the optical depth at a stored value; none without stops of opacity.
+    pub fn opacity(&self, value: f64) -> Option<f64> {
+        self.share(&self.opacity, value)
+    }
+
+    /// Size of a particle over the full one at a stored value; none without stops of size.
+    pub fn size(&self, value: f64) -> Option<f64> {
+        self.share(&self.size, value)
+    }
+
+    fn share(&self, stops: &Stops<Share>, value: f64) -> Option<f64> {
+        let (below, above, share) = stops.around(self.within(value))?;
+        Some(below.get() * (1.0 - share) + above.get() * share)
+    }
+
+    /// Checks every limit of one that came from outside.
+    ///
+    /// # Errors
+    /// The first limit that is broken, with what would be valid.
+    pub fn validate(&self) -> Result<(), ContractError> {
+        let bad = |reason: &str| {
+            let text = format!("{} to {}", self.low, self.high);
+            Err(ContractError::invalid("range of colours", &text, reason))
+        };
+        let is_usable = |value: f64| (-MAX_VALUE..=MAX_VALUE).contains(&value);
+        if !is_usable(self.low) || !is_usable(self.high) || self.low >= self.high {
+            return bad("numbers must be finite and the range must rise");
+        }
+        if self.high - self.low < MIN_SPAN {
+            return bad("the two values are too close to each other");
+        }
+        if self.reversed && !self.colors.is_empty() {
+            return bad("a palette is turned round, colour stops are written the other way round");
+        }
+        self.colors.validate()?;
+        self.opacity.validate()?;
+        self.size.validate()
     }
 }
 
@@ -140,6 +161,81 @@ mod tests {
         for quantity in Quantity::ALL {
             let tf = TransferFunction::default_for(quantity);
             assert!(tf.low < tf.high, "{quantity:?}");
+            tf.validate().unwrap();
         }
+    }
+
+    #[test]
+    fn a_reversed_palette_has_its_last_colour_first() {
+        let plain = TransferFunction::linear(Palette::Ice, 0.0, 1.0);
+        let reversed = TransferFunction {
+            reversed: true,
+            ..plain
+        };
+        assert_eq!(plain.color(0.0), reversed.color(1.0));
+        assert_eq!(plain.color(0.25), reversed.color(0.75));
+        assert_ne!(plain.color(0.25), reversed.color(0.25));
+    }
+
+    #[test]
+    fn stops_take_the_place_of_the_palette() {
+        let tf = TransferFunction {
+            colors: "0:#000000,4:#ffffff".parse().unwrap(),
+            opacity: "1:0,3:1".parse().unwrap(),
+            ..TransferFunction::linear(Palette::Ice, 1.0, 4.0)
+        };
+        assert_eq!(tf.color(2.0), [0.5; 3]);
+        assert_eq!(tf.color(-9.0), [0.25; 3], "as at the range's end");
+        assert_eq!(tf.color(f64::NAN), [0.0; 3]);
+        assert_eq!(
+            [1.0, 2.0, 9.0].map(|v| tf.opacity(v)),
+            [Some(0.0), Some(0.5), Some(1.0)]
+        );
+        assert_eq!(tf.size(2.0), None);
+    }
+
+    #[test]
+    fn what_is_not_used_takes_no_room_in_a_job() {
+        let tf = TransferFunction::linear(Palette::Ice, 0.5, 1.0);
+        let json = serde_json::to_string(&tf).unwrap();
+        assert_eq!(json, r#"{"palette":"ice","low":"0.5","high":"1"}"#);
+        let full = TransferFunction {
+            reversed: true,
+            size: "0:0.5".parse().unwrap(),
+            ..tf
+        };
+        let json = serde_json::to_string(&full).unwrap();
+        let end = r#""high":"1","reversed":true,"size":[["0","0.5"]]}"#;
+        assert!(json.ends_with(end), "{json}");
+        assert_eq!(
+            serde_json::from_str::<TransferFunction>(&json).unwrap(),
+            full
+        );
+    }
+
+    #[test]
+    fn ranges_that_pictures_cannot_be_computed_with_are_refused() {
+        let with = |low, high| TransferFunction::linear(Palette::Ice, low, high);
+        for (low, high) in [
+            (1.0, 1.0),
+            (2.0, 1.0),
+            (f64::NAN, 1.0),
+            (0.0, f64::INFINITY),
+            (-1e300, 1e300),
+            (0.0, 1e-40),
+        ] {
+            assert!(with(low, high).validate().is_err(), "{low} to {high}");
+        }
+        let both = TransferFunction {
+            reversed: true,
+            colors: "0:#000000,4:#ffffff".parse().unwrap(),
+            ..with(0.0, 1.0)
+        };
+        assert!(
+            both.validate()
+                .unwrap_err()
+                .to_string()
+                .contains("other way round")
+        );
     }
 }

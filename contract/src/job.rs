@@ -127,6 +127,9 @@ pub struct Style {
     pub sun: Sun,
     /// Draw a plain globe behind the particles of a globe view.
     pub globe_surface: bool,
+    /// Draw cells whose gap was filled differently, by their estimated error: hatched on maps, paler as particles.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub doubt: bool,
 }
 
 /// Everything that shapes a picture and nothing else. Two jobs with the same digest are the same picture, byte for
@@ -166,13 +169,13 @@ impl Style {
                 elevation_deg: 40.0,
             },
             globe_surface: false,
+            doubt: false,
         }
     }
 
     fn validate(&self) -> Result<(), ContractError> {
+        self.transfer.validate()?;
         let numbers = [
-            self.transfer.low,
-            self.transfer.high,
             self.height_m_per_kg_m2,
             self.optical_depth,
             self.sun.azimuth_deg,
@@ -184,8 +187,8 @@ impl Style {
                 reason,
             ))
         };
-        if numbers.iter().any(|v| !v.is_finite()) || self.transfer.low >= self.transfer.high {
-            return bad("numbers must be finite and the transfer function must rise");
+        if numbers.iter().any(|v| !v.is_finite()) {
+            return bad("numbers must be finite");
         }
         if !(1..=MAX_SLICES).contains(&self.slices) {
             return bad("slices are 1 to 256");
@@ -321,6 +324,7 @@ impl RenderJob {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::colour::{Palette, Share, Stops};
     use crate::moment::After;
     use crate::quantity::Quantity;
 
@@ -359,6 +363,19 @@ mod tests {
         }
     }
 
+    /// As they may come from outside: what is read is checked later.
+    fn shares_beyond_one() -> Stops<Share> {
+        serde_json::from_str(r#"[["0","1.5"]]"#).unwrap()
+    }
+
+    #[test]
+    fn a_job_in_the_usual_style_names_nothing_that_it_does_not_use() {
+        let json = serde_json::to_string(&job()).unwrap();
+        for unused in ["reversed", "colors", "opacity", "\"size\"", "doubt"] {
+            assert!(!json.contains(unused), "{unused}: {json}");
+        }
+    }
+
     #[test]
     fn everything_that_shapes_a_picture_changes_its_name() {
         let base = job();
@@ -385,6 +402,14 @@ mod tests {
         });
         changed(|j| j.style.slices = 32);
         changed(|j| j.style.sun.azimuth_deg = 0.0);
+        changed(|j| j.style.doubt = true);
+        changed(|j| j.style.transfer.palette = Palette::Ice);
+        changed(|j| j.style.transfer.reversed = true);
+        changed(|j| j.style.transfer.high *= 2.0);
+        changed(|j| j.style.transfer.colors = "0:#000000,1:#ffffff".parse().unwrap());
+        changed(|j| j.style.transfer.opacity = "0:0.5".parse().unwrap());
+        changed(|j| j.style.transfer.opacity = "0:0.25".parse().unwrap());
+        changed(|j| j.style.transfer.size = "0:0.5".parse().unwrap());
         changed(|j| j.renderer_version += 1);
         let count = names.len();
         names.sort();
@@ -429,7 +454,7 @@ mod tests {
             width_px,
             height_px: 10,
         };
-        let broken: [fn(&mut RenderJob); 8] = [
+        let broken: [fn(&mut RenderJob); 10] = [
             |j| j.grid.rows = u32::MAX,
             |j| j.value.before = Some("raw/p/a".parse().unwrap()),
             |j| {
@@ -441,6 +466,8 @@ mod tests {
             |j| j.style.slices = 1_000_000_000,
             |j| j.style.slices = 0,
             |j| j.style.transfer.high = f64::NAN,
+            |j| j.style.transfer.low = -1e300,
+            |j| j.style.transfer.size = shares_beyond_one(),
             |j| j.style.sun.elevation_deg = -1.0,
             |j| {
                 j.view = View::Tile {

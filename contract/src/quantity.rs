@@ -48,6 +48,18 @@ pub struct Display {
     pub offset: f64,
 }
 
+impl Display {
+    /// The stored value of one that is shown.
+    pub fn stored(&self, shown: f64) -> f64 {
+        (shown - self.offset) / self.factor
+    }
+
+    /// What is shown of a stored value.
+    pub fn shown(&self, stored: f64) -> f64 {
+        stored * self.factor + self.offset
+    }
+}
+
 impl Quantity {
     /// Every quantity.
     pub const ALL: [Self; 12] = [

@@ -1,6 +1,7 @@
 //! The command line: words in, one plain `Command` out. Every value is parsed here, once, into its final type.
 
 mod fill;
+mod look;
 mod observations;
 mod pictures;
 mod services;
@@ -17,6 +18,7 @@ use contract::product::ProductId;
 use contract::time::TimeMs;
 
 pub(crate) use fill::{BenchFill, FillError, ProductsOf};
+pub(crate) use look::{Look, RenderLegend};
 pub(crate) use observations::{MatchTime, Matchup, Observations, ObservationsAsked};
 pub(crate) use pictures::{BenchCompare, BenchQuality, RenderAnimation};
 pub(crate) use services::{
@@ -311,6 +313,8 @@ pub(crate) enum Render {
     Globe(RenderGlobe),
     /// Views of the globe at instants that follow each other: a film, or a folder of pictures.
     Animation(RenderAnimation),
+    /// What the colours of a layer mean.
+    Legend(RenderLegend),
 }
 
 /// What every picture needs.
@@ -334,6 +338,11 @@ pub(crate) struct Picture {
     /// File to write.
     #[arg(short, long, value_name = "FILE.png")]
     pub(crate) output: PathBuf,
+    #[command(flatten)]
+    pub(crate) look: Look,
+    /// Draw cells whose gap was filled differently, by their estimated error: hatched on maps, paler as particles.
+    #[arg(long, help_heading = look::HEADING)]
+    pub(crate) doubt: bool,
 }
 
 /// `fluxglobe render tile`.

@@ -53,6 +53,7 @@ fn one(plan: &Plan, scene: &Scene, run: usize, cores: usize) {
                     value,
                     accumulated: carbon,
                     palette: &plan.palette,
+                    doubt: &[],
                 };
                 generate(&plan.params, &inputs, &mut particles);
                 project::cpu::project(&plan.params, &plan.rows, &plan.cols, &particles, splats);

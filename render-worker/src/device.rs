@@ -60,7 +60,8 @@ impl Device {
         part: Part,
         scene: &Scene,
     ) -> Result<Vec<u8>, RenderError> {
-        let buffers = self.scene_buffers(scene, &plan.held_cells())?;
+        let buffers =
+            self.scene_buffers(scene, &plan.held_cells(), plan.params.doubt == 1)?;
         // A poisoned pool is whole: workspaces are only pushed and popped.
         let idle = || self.idle.lock().unwrap_or_else(PoisonError::into_inner);
         let mut workspace = idle().pop().unwrap_or_default();
@@ -88,10 +89,15 @@ impl Device {
         &self,
         scene: &Scene,
         held: &Range<usize>,
+        has_doubt: bool,
     ) -> Result<SceneBuffers, RenderError> {
         let frame = |frame: &Frame| self.resident.buffer(&self.gpu, &frame.cells, held.clone());
         let pair = |interval: &Interval| -> Result<[wgpu::Buffer; 2], RenderError> {
             Ok([frame(&interval.before)?, frame(&interval.after)?])
+        };
+        let doubt = |frame: &Frame| self.resident.buffer(&self.gpu, frame.doubts(), held.clone());
+        let doubts = || -> Result<[wgpu::Buffer; 2], RenderError> {
+            Ok([doubt(&scene.value.before)?, doubt(&scene.value.after)?])
         };
         Ok(SceneBuffers {
             value: pair(&scene.value)?,
@@ -99,6 +105,7 @@ impl Device {
             domain: self
                 .resident
                 .buffer(&self.gpu, &scene.domain, held.clone())?,
+            doubts: has_doubt.then(doubts).transpose()?,
         })
     }
 }

@@ -28,6 +28,8 @@ pub struct SceneBuffers {
     pub value: [wgpu::Buffer; 2],
     pub accumulated: Option<[wgpu::Buffer; 2]>,
     pub domain: wgpu::Buffer,
+    /// Doubts of both frames of values; none where they are not drawn.
+    pub doubts: Option<[wgpu::Buffer; 2]>,
 }
 
 /// What the stages of one frame share while they are recorded.
@@ -40,6 +42,7 @@ pub struct FrameContext<'a> {
     pub value_frames: [wgpu::Buffer; 2],
     pub accumulated_frames: Option<[wgpu::Buffer; 2]>,
     pub domain: wgpu::Buffer,
+    pub doubts: Option<[wgpu::Buffer; 2]>,
     workspace: &'a mut Workspace,
 }
 
@@ -49,14 +52,17 @@ impl<'a> FrameContext<'a> {
         gpu: &'a Gpu,
         workspace: &'a mut Workspace,
         plan: &'a Plan,
-        params: Params,
+        mut params: Params,
         scene: SceneBuffers,
     ) -> Result<Self, RenderError> {
+        // Steps without a filled gap have no doubts to read.
+        params.doubt &= u32::from(scene.doubts.is_some());
         let params_buffer = workspace.upload(gpu, Slot::Params, &[params])?;
         let SceneBuffers {
             value,
             accumulated,
             domain,
+            doubts,
         } = scene;
         Ok(Self {
             gpu,
@@ -67,6 +73,7 @@ impl<'a> FrameContext<'a> {
             value_frames: value,
             accumulated_frames: accumulated,
             domain,
+            doubts,
             workspace,
         })
     }

@@ -9,7 +9,7 @@ use crate::scene::{Interval, Scene};
 use crate::stages::bin::list_count;
 use crate::stages::layout::{Entry, Params, Particle, Splat};
 use crate::stages::particles::cpu::Inputs;
-use crate::stages::{bin, compose, eye, interpolate, light, map, particles, project};
+use crate::stages::{bin, compose, doubt, eye, interpolate, light, map, particles, project};
 
 /// Most particles of one picture.
 const MOST_PARTICLES: usize = 1 << 24;
@@ -22,8 +22,15 @@ pub fn draw(plan: &Plan, part: Part, scene: &Scene) -> Result<Vec<u8>, RenderErr
     let pixels = params.width as usize * params.height as usize;
     let mut picture = vec![Vec4::ZERO; pixels];
     let value = interpolated(&params, params.value_weight, &scene.value);
+    let doubt = doubt::between(&params, &scene.value);
     if plan.mode == Mode::Map {
-        map::cpu::map(&params, &value, &plan.palette, &plan.axes, &mut picture);
+        let inputs = map::cpu::Inputs {
+            value: &value,
+            palette: &plan.palette,
+            axes: &plan.axes,
+            doubt: &doubt,
+        };
+        map::cpu::map(&params, &inputs, &mut picture);
     } else {
         let accumulated = scene.accumulated.as_ref();
         let accumulated =
@@ -42,6 +49,7 @@ pub fn draw(plan: &Plan, part: Part, scene: &Scene) -> Result<Vec<u8>, RenderErr
             value: &value,
             accumulated: accumulated.as_deref().unwrap_or_default(),
             palette: &plan.palette,
+            doubt: &doubt,
         };
         particles::cpu::generate(&params, &inputs, &mut particles);
         let mut splats = vec![Splat::default(); particles.len()];

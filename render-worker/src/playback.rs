@@ -57,10 +57,17 @@ impl<'a> Playback<'a> {
                 gpu.storage("frame", interval.after.cells.content())?,
             ])
         };
+        let doubts = || -> Result<[wgpu::Buffer; 2], RenderError> {
+            Ok([
+                gpu.storage("doubts", scene.value.before.doubts().content())?,
+                gpu.storage("doubts", scene.value.after.doubts().content())?,
+            ])
+        };
         Ok(SceneBuffers {
             value: pair(&scene.value)?,
             accumulated: scene.accumulated.as_ref().map(pair).transpose()?,
             domain: gpu.storage("domain", scene.domain.content())?,
+            doubts: scene.value.has_doubt().then(doubts).transpose()?,
         })
     }
 

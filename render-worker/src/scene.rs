@@ -62,7 +62,12 @@ pub struct Frame {
     coarser_mean: OnceLock<Arc<Frame>>,
     /// What keeps the mass of blocks of four.
     coarser_mass: OnceLock<Arc<Frame>>,
+    /// Made when doubt is first drawn.
+    doubts: OnceLock<Cells<f32>>,
 }
+
+/// Doubt of a filled cell with next to no estimated error: it is seen that it was not measured.
+const LEAST_DOUBT: f32 = 0.4;
 
 impl Frame {
     /// A frame from values with NaN (or anything not finite) where there is no data.
@@ -83,6 +88,7 @@ impl Frame {
             range: range.unwrap_or_default(),
             coarser_mean: OnceLock::new(),
             coarser_mass: OnceLock::new(),
+            doubts: OnceLock::new(),
         }
     }
 
@@ -96,6 +102,24 @@ impl Frame {
         self.largest_error = errors.range[1];
         self.errors = Some(errors.cells);
         self
+    }
+
+    /// How much each cell is to be doubted: 0 where it was measured, else rising with its estimated error to 1.
+    pub fn doubts(&self) -> &Cells<f32> {
+        let doubt = |error: &f32| {
+            if *error > 0.0 {
+                // The root, because a few cells are far worse than most.
+                LEAST_DOUBT + (1.0 - LEAST_DOUBT) * (error / self.largest_error).sqrt()
+            } else {
+                0.0
+            }
+        };
+        self.doubts.get_or_init(|| {
+            Cells::new(match &self.errors {
+                Some(errors) => errors.content.iter().map(doubt).collect(),
+                None => vec![0.0; self.cells.content.len()],
+            })
+        })
     }
 
     /// Blocks of four; an error becomes the mean of the four, as if they were wrong together.
@@ -121,7 +145,8 @@ impl Frame {
             + self
                 .errors
                 .as_ref()
-                .map_or(0, |errors| errors.content.len());
+                .map_or(0, |errors| errors.content.len())
+            + self.doubts.get().map_or(0, |doubts| doubts.content.len());
         (cells * size_of::<f32>()) as u64
     }
 }
@@ -138,6 +163,13 @@ pub struct Interval {
 }
 
 impl Interval {
+    /// Was any gap filled in either step?
+    pub fn has_doubt(&self) -> bool {
+        [&self.before, &self.after]
+            .iter()
+            .any(|frame| frame.largest_error > 0.0)
+    }
+
     /// Smallest and largest value that any instant between the two steps can have.
     pub fn range(&self) -> [f32; 2] {
         let ([low1, high1], [low2, high2]) = (self.before.range, self.after.range);

@@ -7,8 +7,8 @@ use serde::de::DeserializeOwned;
 
 use crate::error::ServerError;
 
-/// Longest query that is taken apart, bytes: the longest real one names a region, two times and four words.
-const MAX_QUERY_BYTES: usize = 2048;
+/// Longest query that is taken apart, bytes: the longest real one has three lists of 16 stops, every sign escaped.
+const MAX_QUERY_BYTES: usize = 4096;
 
 /// The parts of the path.
 #[derive(Debug)]

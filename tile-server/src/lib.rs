@@ -6,6 +6,7 @@
 //! | `/tiles/{product}/{mode}.json?time=&manifest=` | TileJSON 3.0.0 of the layer |
 //! | `/globe/{product}/{mode}.png?lon=&lat=&height_km=&time=&width=&height=&surface=&manifest=` | view of the globe |
 //! | `/api/products` | every product, its steps, modes and legend |
+//! | `/api/products/{product}/legend.json`, `.svg`, `.png` | what the colours mean |
 //! | `/api/products/{product}/point?lon=&lat=&manifest=` | series of the cell at a place |
 //! | `/api/products/{product}/budget?region=&from=&to=&step=&earth=&manifest=` | carbon budget |
 //! | `/api/regions` | regions with a name |
@@ -20,6 +21,9 @@
 //! the half-open period `[from, to)`. `manifest` names a version, as answers do; without it the newest one answers. An instant outside what a
 //! product covers shows the nearest one inside; pictures say so in `fluxglobe-time` and `fluxglobe-time-covered`. Every refusal is JSON, `{"error": reason}`.
 //!
+//! Tiles, views, TileJSON and legends take how a picture is to look, in the unit people read: `palette`, `range` (`LOW:HIGH`), `stops`
+//! (`VALUE:rrggbb,...`), `opacity` and `particle_size` (`VALUE:SHARE,...`), `reverse`, and `doubt`, which draws filled cells differently.
+//!
 //! Left out on purpose: drawing and computing, which come in through the traits of [`backend`].
 
 mod analyses;
@@ -31,7 +35,9 @@ pub mod error;
 mod extract;
 mod flights;
 mod gate;
+pub mod legend;
 pub mod live;
+mod look;
 pub mod metrics;
 mod middleware;
 mod pictures;

@@ -1,11 +1,11 @@
 //! From an address to a render job: a layer, a mode, an instant and a view in, everything that shapes the picture out.
 
-use contract::colour::TransferFunction;
 use contract::job::{Mode, RenderJob, Style, View};
 use contract::time::TimeMs;
 
 use crate::catalogue::Layer;
 use crate::error::ServerError;
+use crate::look::Look;
 
 /// The mode of an address, if the layer is drawn in it.
 pub(crate) fn mode(layer: &Layer, text: &str) -> Result<Mode, ServerError> {
@@ -31,18 +31,29 @@ pub(crate) fn shown_time(layer: &Layer, time: Option<TimeMs>) -> TimeMs {
         .clamp(layer.extent.start, layer.extent.end)
 }
 
-/// The job of a picture. Without a time it shows the middle of the last step.
+/// The job of a picture in the usual style. Without a time it shows the middle of the last step.
 pub fn job(
     layer: &Layer,
     mode: Mode,
     view: View,
     time: Option<TimeMs>,
 ) -> Result<RenderJob, ServerError> {
+    let style = Look::default().style(layer.manifest.quantity)?;
+    job_in_style(layer, mode, view, time, style)
+}
+
+/// The same in a style.
+pub(crate) fn job_in_style(
+    layer: &Layer,
+    mode: Mode,
+    view: View,
+    time: Option<TimeMs>,
+    style: Style,
+) -> Result<RenderJob, ServerError> {
     let manifest = &layer.manifest;
     let time = shown_time(layer, time);
     let accumulated = layer.accumulated.as_ref();
     let accumulated = accumulated.filter(|lift| lift.holds_at(time));
-    let style = Style::with_transfer(TransferFunction::default_for(manifest.quantity));
     let lift = accumulated.map(|lift| &*lift.manifest);
     Ok(RenderJob::of(manifest, lift, time, mode, view, style)?)
 }

@@ -5,6 +5,7 @@ pub(crate) mod check;
 pub(crate) mod events;
 pub(crate) mod globe;
 pub(crate) mod health;
+pub(crate) mod legend;
 pub(crate) mod metrics;
 pub(crate) mod observations;
 pub(crate) mod picture;

@@ -81,7 +81,7 @@ async fn shots(settings: &Settings, store: &Store, options: &RenderAnimation) ->
     let view = render::view_of(globe);
     let product = render::product(store, settings, &globe.picture).await?;
     let (from, to) = span(&product, options.from, options.to)?;
-    let mut style = render::style(&product, &globe.picture);
+    let mut style = render::style(&product, &globe.picture)?;
     style.globe_surface = !globe.transparent;
     let shots = Shots {
         accumulated: render::accumulated(store, &product).await?,

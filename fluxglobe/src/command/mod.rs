@@ -6,6 +6,7 @@ mod fill_error;
 mod gc;
 pub(crate) mod generate;
 mod ingest;
+mod legend;
 pub(crate) mod notice;
 mod observations;
 mod products;

@@ -1,7 +1,6 @@
 //! `fluxglobe render`: a product, an instant and a view in, a PNG file out.
 
 use anyhow::{Context as _, Result};
-use contract::colour::TransferFunction;
 use contract::job::{RenderJob, Style, View};
 use contract::manifest::Manifest;
 use contract::tile::Tile;
@@ -9,6 +8,7 @@ use contract::time::Period;
 use storage::Store;
 
 use crate::cli::{Picture, Render, RenderGlobe, Settings};
+use crate::command::legend;
 use crate::{animation, deployment, progress};
 
 pub(crate) async fn run(settings: &Settings, options: Render) -> Result<()> {
@@ -30,6 +30,7 @@ pub(crate) async fn run(settings: &Settings, options: Render) -> Result<()> {
             (globe.picture, view, !globe.transparent)
         }
         Render::Animation(animation) => return animation::run(settings, store, animation).await,
+        Render::Legend(options) => return legend::run(settings, &store, &options).await,
     };
     let mut job = job(&store, settings, &picture, view).await?;
     job.style.globe_surface = surface;
@@ -65,7 +66,7 @@ pub(crate) async fn job(
 ) -> Result<RenderJob> {
     let manifest = product(store, settings, picture).await?;
     let last = manifest.steps.last().context("the product has no step")?;
-    let style = style(&manifest, picture);
+    let style = style(&manifest, picture)?;
     let time = picture.time.unwrap_or(last.period.mid());
     if let Some(Period { start, end }) = manifest.extent()
         && (time < start || time > end)
@@ -91,11 +92,13 @@ pub(crate) async fn product(
 }
 
 /// The style that the options of a picture ask for.
-pub(crate) fn style(product: &Manifest, picture: &Picture) -> Style {
-    let mut style = Style::with_transfer(TransferFunction::default_for(product.quantity));
+pub(crate) fn style(product: &Manifest, picture: &Picture) -> Result<Style> {
+    let transfer = picture.look.options().over(product.quantity)?;
+    let mut style = Style::with_transfer(transfer);
     style.slices = picture.slices.unwrap_or(style.slices);
     style.particles_per_cell = picture.particles.unwrap_or(style.particles_per_cell);
-    style
+    style.doubt = picture.doubt;
+    Ok(style)
 }
 
 /// Accumulated carbon of just this version of a product, if it was derived.

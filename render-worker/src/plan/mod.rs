@@ -6,6 +6,7 @@
 mod camera;
 mod globe;
 mod look;
+mod shape;
 mod tile;
 
 use std::ops::Range;
@@ -244,7 +245,6 @@ fn common(job: &RenderJob, scene: &Scene) -> Params {
     let (style, grid) = (&job.style, &scene.grid);
     let transfer = &style.transfer;
     let look = Look::of(job.mode);
-    let diverging = transfer.low < 0.0 && transfer.high > 0.0;
     Params {
         rows: grid.rows,
         cols: grid.cols,
@@ -259,12 +259,8 @@ fn common(job: &RenderJob, scene: &Scene) -> Params {
         transfer_low: transfer.low as f32,
         transfer_per_unit: (1.0 / (transfer.high - transfer.low)) as f32,
         strength_per_unit: (1.0 / transfer.low.abs().max(transfer.high.abs())) as f32,
-        diverging: u32::from(diverging),
-        depth_floor: if diverging {
-            look::FLOOR_DIVERGING
-        } else {
-            look::FLOOR_SEQUENTIAL
-        },
+        diverging: u32::from(shape::is_diverging(transfer)),
+        depth_floor: shape::depth_floor(transfer),
         height_m_per_kg_m2: style.height_m_per_kg_m2 as f32,
         height_limit_m: look::HEIGHT_LIMIT_M as f32,
         sheet_m: look::SHEET_M as f32,
@@ -277,11 +273,13 @@ fn common(job: &RenderJob, scene: &Scene) -> Params {
         },
         front_to_back: 1,
         slices: style.slices,
-        size_spread: look.size_spread,
+        size_spread: shape::size_spread(transfer, &look),
         shake_shift: look.shake_shift,
         min_radius_px: look.min_radius_px,
         max_radius_px: look::MAX_RADIUS_PX,
         light_on: u32::from(job.mode == Mode::Volume),
+        shape_table: u32::from(shape::is_given(transfer)),
+        doubt: u32::from(style.doubt && scene.value.has_doubt()),
         ambient: look::AMBIENT,
         direct: look::DIRECT,
         map_alpha: look::MAP_ALPHA,
@@ -294,17 +292,16 @@ fn common(job: &RenderJob, scene: &Scene) -> Params {
     }
 }
 
-/// 256 colours of the transfer function, red lowest.
+/// 256 colours of the transfer function, red lowest; behind them its opacity and size where users gave any.
 fn palette(job: &RenderJob) -> Vec<u32> {
     let transfer = &job.style.transfer;
     let byte = |share: f64| (share * 255.0).round() as u32;
-    (0..256)
-        .map(|i| {
-            let value = transfer.low + (transfer.high - transfer.low) * f64::from(i) / 255.0;
-            let [r, g, b] = transfer.color(value);
-            byte(r) | byte(g) << 8 | byte(b) << 16
-        })
-        .collect()
+    let colors = (0..256).map(|i| {
+        let value = transfer.low + (transfer.high - transfer.low) * f64::from(i) / 255.0;
+        let [r, g, b] = transfer.color(value);
+        byte(r) | byte(g) << 8 | byte(b) << 16
+    });
+    colors.chain(shape::table(job.mode, transfer)).collect()
 }
 
 /// Lowest and highest particle, m: from the frames, so that every tile of an instant has the same slice planes.

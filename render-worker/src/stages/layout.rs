@@ -143,6 +143,10 @@ shared_struct! {
         pub origin_y_px: i32,
         /// Bits that places in lists are coarser than subpixels, so that the largest particle fits 16 bits.
         pub entry_shift: u32,
+        /// The palette is followed by 256 words of opacity (low 16 bits) and size (next 8).
+        pub shape_table: u32,
+        /// Cells whose gap was filled are drawn differently.
+        pub doubt: u32,
     }
 }
 

@@ -2,6 +2,7 @@
 //!
 //! Stages that see one particle at a time are functions; [`passes`](crate::passes) run them.
 
+pub mod doubt;
 pub mod layout;
 pub mod sphere;
 

@@ -16,7 +16,7 @@ struct Params {
     sun_x: f32, sun_y: f32, sun_z: f32, light_u_x: f32, light_u_y: f32, light_u_z: f32, light_v_x: f32,
     light_v_y: f32, light_v_z: f32, center_px_x: f32, center_px_y: f32, grid_west_rad: f32, grid_north_rad: f32,
     cols_per_rad: f32, rows_per_rad: f32, edge_sharpness: f32, map_alpha: f32, surface: u32, origin_x_px: i32,
-    origin_y_px: i32, entry_shift: u32,
+    origin_y_px: i32, entry_shift: u32, shape_table: u32, doubt: u32,
 }
 struct Row {
     y_sub: i32, y_span_px: f32, sin_lat: f32, cos_lat: f32, lat_span_rad: f32, radius: f32, area_m2: f32,

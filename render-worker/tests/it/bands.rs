@@ -31,6 +31,7 @@ fn held(gpu: &Gpu, scene: &Scene, cells: Range<usize>) -> SceneBuffers {
     SceneBuffers {
         value: pair(&scene.value),
         accumulated: scene.accumulated.as_ref().map(pair),
+        doubts: None,
         domain: gpu
             .storage("domain", &scene.domain.content()[cells.clone()])
             .unwrap(),

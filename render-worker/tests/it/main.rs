@@ -17,6 +17,7 @@ mod gallery;
 mod golden;
 mod layout;
 mod limits;
+mod look;
 mod lost_device;
 mod mass;
 #[cfg(feature = "service")]

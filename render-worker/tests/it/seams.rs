@@ -1,6 +1,6 @@
 //! Pictures without seams: a 512 tile is its four 256 children to the byte, and equal jobs give equal bytes.
 
-use contract::job::Mode;
+use contract::job::{Mode, RenderJob, View};
 use render_worker::{Image, Renderer, Scene};
 
 use crate::compare::{assert_images_differ, distance};
@@ -8,7 +8,17 @@ use crate::device::{gpu_renderer, renderers};
 use crate::scenes::{FIVE_DEGREES, ONE_DEGREE, globe, job, ocean, tile};
 
 /// The four 256 tiles below a tile as one picture.
-fn children(renderer: &Renderer, scene: &Scene, mode: Mode, [z, x, y]: [u32; 3]) -> Image {
+fn children(renderer: &Renderer, scene: &Scene, mode: Mode, tile: [u32; 3]) -> Image {
+    children_of(renderer, scene, &|view| job(mode, view), tile)
+}
+
+/// The same for any job.
+pub(crate) fn children_of(
+    renderer: &Renderer,
+    scene: &Scene,
+    job: &dyn Fn(View) -> RenderJob,
+    [z, x, y]: [u32; 3],
+) -> Image {
     let mut whole = Image {
         width: 512,
         height: 512,
@@ -16,7 +26,7 @@ fn children(renderer: &Renderer, scene: &Scene, mode: Mode, [z, x, y]: [u32; 3])
     };
     for (east, south) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
         let view = tile(z as u8 + 1, 2 * x + east, 2 * y + south, 256);
-        let child = renderer.render(&job(mode, view), scene).unwrap();
+        let child = renderer.render(&job(view), scene).unwrap();
         for (row, pixels) in (0..).zip(child.rgba8.chunks_exact(256 * 4)) {
             let at = ((south as usize * 256 + row) * 512 + east as usize * 256) * 4;
             whole.rgba8[at..at + 1024].copy_from_slice(pixels);

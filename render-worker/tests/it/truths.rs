@@ -104,6 +104,7 @@ fn all_particles(scene: &Scene, job: &RenderJob, carbon: &[f32]) -> (Plan, Vec<P
         value: &value,
         accumulated: carbon,
         palette: &plan.palette,
+        doubt: &[],
     };
     generate(&plan.params, &inputs, &mut particles);
     (plan, particles)

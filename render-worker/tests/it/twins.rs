@@ -3,7 +3,7 @@
 use std::sync::OnceLock;
 
 use bytemuck::Pod;
-use contract::job::{Mode, RenderJob, View};
+use contract::job::{Mode, RenderJob, Style, View};
 use glam::Vec4;
 use render_worker::Scene;
 use render_worker::frame::{FrameContext, SceneBuffers};
@@ -22,11 +22,11 @@ use render_worker::stages::layout::{Active, Entry, MISSING, Params, Particle, Sp
 use render_worker::stages::light::{self, Light, texel_count};
 use render_worker::stages::map::{self, Map};
 use render_worker::stages::particles::cpu::Inputs;
-use render_worker::stages::{particles, project};
+use render_worker::stages::{doubt, particles, project};
 
 use crate::compare::worst;
 use crate::device::{checked_gpu, gpu};
-use crate::scenes::{FIVE_DEGREES, globe, job, ocean, tile};
+use crate::scenes::{FIVE_DEGREES, clouded, globe, job, ocean, tile};
 
 /// What every stage makes of one job, by the twins.
 struct Twins {
@@ -48,10 +48,29 @@ impl Twins {
         Self::of_job(job(mode, view))
     }
 
+    /// Of an ocean under clouds, in stops of opacity and size and with doubt.
+    fn doubted(mode: Mode, view: View) -> Self {
+        Self::styled(mode, view, |style| {
+            style.transfer.opacity = "-1e-9:0.9,0:0.1,1e-9:0.7".parse().unwrap();
+            style.transfer.size = "-1e-9:0.4,0:1,1e-9:0.6".parse().unwrap();
+            style.doubt = true;
+        })
+    }
+
+    fn styled(mode: Mode, view: View, change: impl FnOnce(&mut Style)) -> Self {
+        let mut job = job(mode, view);
+        change(&mut job.style);
+        Self::of_job(job)
+    }
+
     fn of_job(mut job: RenderJob) -> Self {
         let mode = job.mode;
-        let scene = ocean(FIVE_DEGREES);
         job.style.globe_surface = true;
+        let scene = if job.style.doubt {
+            clouded(FIVE_DEGREES)
+        } else {
+            ocean(FIVE_DEGREES)
+        };
         let plan = Plan::new(&job, &scene, u64::MAX).unwrap();
         let mut params = plan.params_of(plan.parts()[0]);
         let carbon = scene.accumulated.as_ref().unwrap();
@@ -68,6 +87,7 @@ impl Twins {
             between(&scene.value, params.value_weight),
             between(carbon, params.accumulated_weight),
         );
+        let doubt = doubt::between(&params, &scene.value);
         let mut particles =
             vec![Particle::default(); plan.active.len() * params.particles_per_cell as usize];
         let inputs = Inputs {
@@ -76,13 +96,20 @@ impl Twins {
             value: &value,
             accumulated: &accumulated,
             palette: &plan.palette,
+            doubt: &doubt,
         };
         let mut picture = vec![Vec4::ZERO; (params.width * params.height) as usize];
         let (mut splats, mut deposited, mut light) =
             (vec![Splat::default(); particles.len()], vec![], vec![]);
         let (mut list_ends, mut entries) = (vec![], vec![]);
         if mode == Mode::Map {
-            map::cpu::map(&params, &value, &plan.palette, &plan.axes, &mut picture);
+            let inputs = map::cpu::Inputs {
+                value: &value,
+                palette: &plan.palette,
+                axes: &plan.axes,
+                doubt: &doubt,
+            };
+            map::cpu::map(&params, &inputs, &mut picture);
         } else {
             particles::cpu::generate(&params, &inputs, &mut particles);
             project::cpu::project(&params, &plan.rows, &plan.cols, &particles, &mut splats);
@@ -116,6 +143,11 @@ impl Twins {
             picture,
             image,
         }
+    }
+
+    fn doubted_tile() -> &'static Self {
+        static TWINS: OnceLock<Twins> = OnceLock::new();
+        TWINS.get_or_init(|| Self::doubted(Mode::Volume, tile(2, 0, 1, 256)))
     }
 
     fn tile() -> &'static Self {
@@ -163,6 +195,10 @@ impl Twins {
             value: pair(&self.scene.value),
             accumulated: self.scene.accumulated.as_ref().map(pair),
             domain: gpu.storage("domain", self.scene.domain.content()).unwrap(),
+            doubts: Some(
+                [&self.scene.value.before, &self.scene.value.after]
+                    .map(|frame| buffer(frame.doubts().content())),
+            ),
         };
         let mut frame = FrameContext::new(gpu, &mut workspace, &self.plan, *params, scene).unwrap();
         fill(&mut frame);
@@ -292,6 +328,14 @@ fn splats_match_their_twins_on_tiles_and_on_the_globe() {
             "1.0 + particle.height_m",
             "1.0 - particle.height_m",
         ),
+        (Twins::doubted_tile(), "shape >> 16u", "shape >> 17u"),
+        (Twins::doubted_tile(), "shape & 0xffffu", "shape & 0x7fffu"),
+        (
+            Twins::doubted_tile(),
+            "doubt_after[cell] - before",
+            "doubt_after[cell]",
+        ),
+        (Twins::doubted_tile(), "PALENESS * doubt", "doubt"),
     ];
     for (twins, right, wrong) in faults {
         let expected = splat_numbers(&twins.splats, &twins.splats);
@@ -321,6 +365,7 @@ fn every_function_of_a_particle_is_in_the_pass_that_is_tested() {
     for functions in [
         interpolate::FUNCTIONS,
         particles::FUNCTIONS,
+        doubt::FUNCTIONS,
         project::FUNCTIONS,
         light::DEPOSIT_FUNCTIONS,
         bin::FUNCTIONS,
@@ -639,29 +684,39 @@ fn far_apart(a: &[f32], b: &[f32], tolerance: f32) -> f32 {
 
 #[test]
 fn map_matches_its_twin_on_tiles_and_on_the_globe() {
-    for view in [tile(2, 0, 1, 256), globe(-120.0, 10.0, 1.5e7, 160)] {
-        let twins = Twins::of(Mode::Map, view);
-        let expected = channels(&twins.picture);
-        prove(
-            "map",
-            map::SOURCE,
+    let views = [tile(2, 0, 1, 256), globe(-120.0, 10.0, 1.5e7, 160)];
+    let plain = views.map(|view| {
+        (
+            Twins::of(Mode::Map, view),
             "mix(north, south",
             "mix(south, north",
-            |gpu, source| {
-                let stage = Map::new(gpu, source);
-                let value =
-                    |f: &mut FrameContext<'_>| drop(f.upload(Slot::Value, &twins.value).unwrap());
-                let drawn: Vec<Vec4> = twins.run(
-                    gpu,
-                    value,
-                    |f| stage.record(f).unwrap(),
-                    Slot::Picture,
-                    expected.len() / 4,
-                );
-                // A colour may be the next of the palette's 256.
-                far_apart(&channels(&drawn), &expected, 0.02)
-            },
-        );
+        )
+    });
+    let [on_tile, on_globe] = views.map(|view| Twins::doubted(Mode::Map, view));
+    let doubted = [
+        (on_tile, "* doubt * line_at(pixel)", "* doubt"),
+        (
+            on_globe,
+            "palette[256u + at] & 0xffffu",
+            "palette[256u + at] & 0x7fffu",
+        ),
+    ];
+    for (twins, right, wrong) in plain.into_iter().chain(doubted) {
+        let expected = channels(&twins.picture);
+        prove("map", map::SOURCE, right, wrong, |gpu, source| {
+            let stage = Map::new(gpu, source);
+            let value =
+                |f: &mut FrameContext<'_>| drop(f.upload(Slot::Value, &twins.value).unwrap());
+            let drawn: Vec<Vec4> = twins.run(
+                gpu,
+                value,
+                |f| stage.record(f).unwrap(),
+                Slot::Picture,
+                expected.len() / 4,
+            );
+            // A colour may be the next of the palette's 256.
+            far_apart(&channels(&drawn), &expected, 0.02)
+        });
     }
 }
 

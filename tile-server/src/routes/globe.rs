@@ -8,6 +8,7 @@ use serde::Deserialize;
 
 use crate::error::ServerError;
 use crate::extract::{UrlPath, UrlQuery, number, time, whole_number};
+use crate::look::LookQuery;
 use crate::request;
 use crate::routes::picture::{self, Shown};
 use crate::state::AppState;
@@ -27,6 +28,8 @@ pub(crate) struct GlobeQuery {
     height: Option<String>,
     surface: Option<String>,
     manifest: Option<String>,
+    #[serde(flatten)]
+    look: LookQuery,
 }
 
 pub(crate) async fn get(
@@ -43,12 +46,13 @@ pub(crate) async fn get(
     let mode = request::mode(&layer, name)?;
     let view = query.view()?;
     let time = time(query.time.as_deref())?;
-    let mut job = request::job(&layer, mode, view, time)?;
-    job.style.globe_surface = match query.surface.as_deref() {
+    let mut style = query.look.parse()?.style(layer.manifest.quantity)?;
+    style.globe_surface = match query.surface.as_deref() {
         None | Some("true") => true,
         Some("false") => false,
         Some(text) => return Err(ServerError::invalid("surface", text, "true or false")),
     };
+    let job = request::job_in_style(&layer, mode, view, time, style)?;
     picture::respond(&state, &headers, job, Shown::of(&layer, time)).await
 }
 

@@ -13,7 +13,7 @@ use crate::request;
 use crate::state::AppState;
 
 /// An address means "the newest version", so a copy may be used unasked only as long as nobody minds a late change.
-const CACHE_CONTROL: &str = "public, max-age=60";
+pub(crate) const CACHE_CONTROL: &str = "public, max-age=60";
 
 /// The instant that a picture shows.
 pub(crate) const SHOWN_TIME: HeaderName = HeaderName::from_static("fluxglobe-time");

@@ -16,6 +16,7 @@ use serde::Serialize;
 
 use crate::catalogue::Layer;
 use crate::error::ServerError;
+use crate::legend::Legend;
 use crate::routes::picture::has_tag;
 use crate::state::AppState;
 
@@ -62,16 +63,6 @@ impl From<Period> for StepTimes {
     }
 }
 
-/// Colours, in the unit people read.
-#[derive(Debug, Serialize)]
-struct Legend {
-    low: f64,
-    high: f64,
-    unit: &'static str,
-    label: &'static str,
-    stops: Vec<(f64, String)>,
-}
-
 pub(crate) async fn list(
     State(state): State<AppState>,
     asked: HeaderMap,
@@ -116,7 +107,10 @@ fn product(layer: &Layer) -> Product<'_> {
             .map(|step| step.period.into())
             .collect(),
         modes: layer.modes(),
-        legend: legend(manifest.quantity),
+        legend: Legend::of(
+            manifest.quantity,
+            &TransferFunction::default_for(manifest.quantity),
+        ),
     }
 }
 
@@ -129,34 +123,4 @@ pub(crate) fn bounds_deg(grid: &Grid) -> [f64; 4] {
 /// A number for people without the noise that arithmetic adds to it: nine decimals, 0.1 mm for degrees.
 pub(crate) fn rounded(number: f64) -> f64 {
     (number * 1e9).round() / 1e9
-}
-
-fn legend(quantity: Quantity) -> Legend {
-    let display = quantity.display();
-    let transfer = TransferFunction::default_for(quantity);
-    let shown = |stored: f64| rounded(stored * display.factor + display.offset);
-    let stops = transfer.palette.stops();
-    let last = (stops.len() - 1) as f64;
-    let stop =
-        |(i, [r, g, b]): (usize, &[u8; 3])| (i as f64 / last, format!("#{r:02x}{g:02x}{b:02x}"));
-    Legend {
-        low: shown(transfer.low),
-        high: shown(transfer.high),
-        unit: display.unit,
-        label: quantity.title(),
-        stops: stops.iter().enumerate().map(stop).collect(),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_legend_is_in_the_unit_people_read() {
-        let legend = legend(Quantity::SeaSurfaceTemperature);
-        assert_eq!((legend.low, legend.high, legend.unit), (-2.0, 32.0, "°C"));
-        assert_eq!(legend.stops.first().unwrap(), &(0.0, "#081d42".to_owned()));
-        assert!((legend.stops.last().unwrap().0 - 1.0).abs() < 1e-12);
-    }
 }

@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use crate::catalogue::Layer;
 use crate::error::ServerError;
 use crate::extract::{UrlPath, UrlQuery, time};
+use crate::look::LookQuery;
 use crate::request;
 use crate::routes::products::bounds_deg;
 use crate::state::AppState;
@@ -26,6 +27,8 @@ const TILE_PX: f64 = 256.0;
 pub(crate) struct TileJsonQuery {
     time: Option<String>,
     manifest: Option<String>,
+    #[serde(flatten)]
+    look: LookQuery,
 }
 
 impl TileJsonQuery {
@@ -35,12 +38,27 @@ impl TileJsonQuery {
         // Named as it was found, not as it was written.
         let manifest = self.manifest.as_ref();
         let manifest = manifest.map(|_named| format!("manifest={}", layer.id));
-        let parts: Vec<String> = time.into_iter().chain(manifest).collect();
-        Ok(if parts.is_empty() {
-            String::new()
-        } else {
-            format!("?{}", parts.join("&"))
-        })
+        let look = self.look.parse()?;
+        // What cannot be drawn is refused here, not by every tile.
+        look.style(layer.manifest.quantity)?;
+        let parts = time.into_iter().chain(manifest).chain(look.parameters());
+        Ok(query_of(&parts.collect::<Vec<_>>()))
+    }
+
+    /// The drawing of the colours as HTML, which is one of the two things clients take a legend for.
+    fn legend(&self, origin: &str, layer: &Layer) -> Result<String, ServerError> {
+        let query = query_of(&self.look.parse()?.parameters()).replace('&', "&amp;");
+        let (product, title) = (&layer.manifest.product, layer.manifest.quantity.title());
+        let address = format!("{origin}/api/products/{product}/legend.svg{query}");
+        Ok(format!("<img src=\"{address}\" alt=\"{title}\">"))
+    }
+}
+
+fn query_of(parts: &[String]) -> String {
+    if parts.is_empty() {
+        String::new()
+    } else {
+        format!("?{}", parts.join("&"))
     }
 }
 
@@ -56,6 +74,7 @@ struct TileJson<'a> {
     minzoom: u8,
     maxzoom: u8,
     bounds: [f64; 4],
+    legend: String,
     manifest: &'a ManifestId,
     /// Middles of the steps; every instant between the first and the last is valid as well.
     times: Vec<TimeMs>,
@@ -75,6 +94,7 @@ pub(crate) async fn get(
     let mode = request::mode(&layer, name)?;
     let at = query.of_tiles(&layer)?;
     let manifest = &layer.manifest;
+    let origin = origin(&headers);
     let answer = TileJson {
         tilejson: "3.0.0",
         name: format!("{}, {mode}", manifest.title),
@@ -82,13 +102,13 @@ pub(crate) async fn get(
         attribution: attribution(manifest.synthetic, &manifest.source),
         scheme: "xyz",
         tiles: [format!(
-            "{}/tiles/{}/{mode}/{{z}}/{{x}}/{{y}}.png{at}",
-            origin(&headers),
+            "{origin}/tiles/{}/{mode}/{{z}}/{{x}}/{{y}}.png{at}",
             manifest.product
         )],
         minzoom: 0,
         maxzoom: max_zoom(&manifest.grid),
         bounds: bounds(&manifest.grid),
+        legend: query.legend(&origin, &layer)?,
         manifest: &layer.id,
         times: manifest
             .steps

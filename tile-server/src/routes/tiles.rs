@@ -9,6 +9,7 @@ use serde::Deserialize;
 
 use crate::error::ServerError;
 use crate::extract::{UrlPath, UrlQuery, time, whole_number};
+use crate::look::LookQuery;
 use crate::request;
 use crate::routes::picture::{self, Shown};
 use crate::state::AppState;
@@ -23,6 +24,8 @@ pub(crate) struct TileQuery {
     time: Option<String>,
     size: Option<String>,
     manifest: Option<String>,
+    #[serde(flatten)]
+    look: LookQuery,
 }
 
 pub(crate) async fn get(
@@ -40,10 +43,13 @@ pub(crate) async fn get(
         None => named_size_px,
     };
     let time = time(query.time.as_deref())?;
-    let job = request::job(&layer, mode, View::Tile { tile, size_px }, time)?;
+    let look = query.look.parse()?;
+    let style = look.style(layer.manifest.quantity)?;
+    let view = View::Tile { tile, size_px };
+    let job = request::job_in_style(&layer, mode, view, time, style)?;
     let shown = Shown::of(&layer, time);
-    // Who looks at an old version is no reason to draw a new one.
-    if state.catalogue.is_newest(&layer) {
+    // Who looks at an old version, or in colours of their own, is no reason to draw a new one.
+    if look.is_usual() && state.catalogue.is_newest(&layer) {
         let product = &layer.manifest.product;
         let at = time.map(|_asked| shown.time);
         state.hot.asked(product, mode, &job.view, at);

@@ -17,6 +17,7 @@ mod health;
 mod hostile;
 mod limits;
 mod live;
+mod look;
 mod metrics;
 mod observations;
 mod point;

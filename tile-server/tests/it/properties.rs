@@ -13,7 +13,7 @@ fn part() -> impl Strategy<Value = String> {
     prop_oneof![
         4 => prop::sample::select(vec![
             "tiles", "globe", "api", "products", "flux", "sst", "map", "volume", "map.json", "map.png", "point", "budget",
-            "0", "1", "0.png", "0@2x.png", "regions", "check", "..", "%2e%2e", "%00", "%ff", "assets", "",
+            "legend.json", "legend.svg", "legend.png", "0", "1", "0.png", "0@2x.png", "regions", "check", "..", "%2e%2e", "%00", "%ff", "assets", "",
         ]).prop_map(str::to_owned),
         1 => "[0-9]{1,12}(\\.png)?",
         1 => "[-a-zA-Z0-9_.~%@:+]{0,20}",
@@ -34,12 +34,19 @@ fn query() -> impl Strategy<Value = String> {
         "to",
         "step",
         "earth",
+        "palette",
+        "range",
+        "stops",
+        "opacity",
+        "particle_size",
+        "doubt",
         "x",
     ]);
     let value = prop_oneof![
         "-?[0-9]{1,6}(\\.[0-9]{1,3})?(e[0-9]{1,3})?",
         "[0-9]{4}-[0-9]{2}-[0-9]{2}(T[0-9]{2}:[0-9]{2}:[0-9]{2}Z)?",
         "-?[0-9]{1,3}(,-?[0-9]{1,3}){0,4}",
+        "-?[0-9]{1,3}(e-?[0-9]{1,3})?:[0-9a-f.]{1,6}(,-?[0-9]{1,3}:[0-9a-f.]{1,6}){0,3}",
         prop::sample::select(vec![
             "nan", "inf", "global", "month", "total", "sphere", "%00", "%", "%zz", ""
         ])

@@ -9,6 +9,8 @@ export interface Legend {
   label: string;
   /** Position 0..1 between low and high, and a colour. */
   stops: [number, string][];
+  /** Round values to mark; an older server does not say. */
+  ticks?: number[];
 }
 
 export interface Product {

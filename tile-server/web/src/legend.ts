@@ -23,7 +23,7 @@ export function gradientOf(legend: Legend): string {
 }
 
 export function legendView(legend: Legend): HTMLElement {
-  const ticks = ticksOf(legend.low, legend.high);
+  const ticks = legend.ticks ?? ticksOf(legend.low, legend.high);
   const digits = Math.max(...ticks.map((tick) => fractionDigits(tick, legend.high - legend.low)));
   const bar = el("div", { class: "legend-bar", "aria-hidden": "true" });
   bar.style.background = gradientOf(legend);

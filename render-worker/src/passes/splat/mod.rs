@@ -17,6 +17,7 @@ pub const SOURCE: &str = concat!(
     include_str!("../../stages/prelude.wgsl"),
     include_str!("../../stages/interpolate/between.wgsl"),
     include_str!("../../stages/particles/particles.wgsl"),
+    include_str!("../../stages/doubt.wgsl"),
     include_str!("../../stages/project/project.wgsl"),
     include_str!("../../stages/light/texel.wgsl"),
     include_str!("../../stages/light/deposit.wgsl"),
@@ -106,6 +107,8 @@ impl Splats {
             .accumulated_frames
             .as_ref()
             .unwrap_or(&frame.value_frames);
+        // Bound but never read where doubt is not drawn.
+        let [doubt_before, doubt_after] = frame.doubts.as_ref().unwrap_or(&frame.value_frames);
         let buffers = [
             (0, &frame.params_buffer),
             (1, &rows),
@@ -119,6 +122,8 @@ impl Splats {
             (9, &light),
             (10, &counts),
             (11, &lit),
+            (12, doubt_before),
+            (13, doubt_after),
         ];
         let groups = workgroups(&frame.params);
         frame.recorder.dispatch_deep(&self.splat, &buffers, groups);

@@ -14,6 +14,9 @@
 @group(0) @binding(11) var<storage, read_write> lit: array<vec4<u32>>;
 @group(0) @binding(9) var<storage, read_write> light: array<atomic<u32>>;
 @group(0) @binding(10) var<storage, read_write> counts: array<atomic<u32>>;
+// Bound but never read where doubt is not drawn.
+@group(0) @binding(12) var<storage, read> doubt_before: array<f32>;
+@group(0) @binding(13) var<storage, read> doubt_after: array<f32>;
 
 // Keys of lists; those of light texels are below.
 const LIST_KEY = 0x80000000u;
@@ -76,11 +79,13 @@ fn splat(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) w
     let row = params.first_row + down;
     var value = MISSING;
     var carbon = 0.0;
+    var doubt = 0.0;
     if (down < params.row_count && slot < params.slot_count) {
         let cell = row * params.cols + cols[slot].index - params.held_first_cell;
         value = interpolated(value_before[cell], value_after[cell], params.value_weight);
         if (!is_missing(value)) {
             carbon = carbon_of(cell);
+            doubt = doubt_of(cell);
             if (!is_in_cap(row, slot)) { value = MISSING; }
         }
     }
@@ -91,7 +96,9 @@ fn splat(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) w
         if (is_missing(value) || k >= params.particles_per_cell) {
             seen[at] = vec4(0u);
         } else {
-            store(at, splat_of(particle_of(row, slot, k, value, carbon)));
+            var particle = particle_of(row, slot, k, value, carbon);
+            if (doubt > 0.0) { particle = doubted(particle, doubt); }
+            store(at, splat_of(particle));
         }
     }
     workgroupBarrier();

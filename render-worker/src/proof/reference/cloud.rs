@@ -13,6 +13,9 @@ use crate::plan::Plan;
 use crate::scene::{Interval, Scene};
 use crate::stages::layout::{Active, SUBPIXELS};
 
+/// A smaller one of the 256 sizes is none.
+const LEAST_SIZE: f64 = 1.0 / 255.0;
+
 /// A cloud of density `8 / (3 pi radius) depth (1 - r²)^1.5`, r in radii: seen from anywhere its depth is
 /// `depth (1 - r²)²`.
 #[derive(Debug, Clone, Copy)]
@@ -134,8 +137,14 @@ fn cloud(
     let thin = (phase.min(1.0 - phase) * 12.0).min(1.0) * 12.0 / 11.0;
     let table = &plan.rows[row as usize];
     let full_radius = f64::from(table.radius);
-    let radius = full_radius * (1.0 - f64::from(params.size_spread) * (1.0 - strength));
-    let column_depth = job.style.optical_depth * (floor + (1.0 - floor) * strength.sqrt()) * thin;
+    let size = transfer
+        .size(value)
+        .unwrap_or_else(|| 1.0 - f64::from(params.size_spread) * (1.0 - strength));
+    let radius = full_radius * size.max(LEAST_SIZE);
+    let opacity = transfer
+        .opacity(value)
+        .unwrap_or_else(|| floor + (1.0 - floor) * strength.sqrt());
+    let column_depth = job.style.optical_depth * opacity * thin;
     let depth = column_depth * f64::from(table.depth_gain) * (full_radius / radius).powi(2);
     if depth <= 0.0 {
         return None;

@@ -73,7 +73,7 @@ pub fn reference(
     scene: &Scene,
     fineness: Fineness,
 ) -> Result<Picture, RenderError> {
-    if job.mode != Mode::Volume || job.style.globe_surface {
+    if job.mode != Mode::Volume || job.style.globe_surface || job.style.doubt {
         return Err(RenderError::NoReference);
     }
     let coarser = pyramid::suited(job, scene);

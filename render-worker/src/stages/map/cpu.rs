@@ -2,32 +2,38 @@
 
 use std::f32::consts::TAU;
 
-use glam::{Vec2, Vec4};
+use glam::{Vec2, Vec3, Vec4};
 
+use crate::stages::doubt::hatched;
 use crate::stages::layout::{Axis, Params, VIEW_TILE, is_missing, nearest};
 use crate::stages::sphere::ground_below;
 
-/// Every pixel of a thematic map; `axes` holds the columns, then the rows of a tile.
-pub fn map(params: &Params, value: &[f32], palette: &[u32], axes: &[Axis], picture: &mut [Vec4]) {
+/// What the stage reads.
+pub struct Inputs<'a> {
+    pub value: &'a [f32],
+    pub palette: &'a [u32],
+    /// Columns, then rows of a tile.
+    pub axes: &'a [Axis],
+    /// Doubt of every cell; empty where it is not drawn.
+    pub doubt: &'a [f32],
+}
+
+/// Every pixel of a thematic map.
+pub fn map(params: &Params, inputs: &Inputs<'_>, picture: &mut [Vec4]) {
     for y in 0..params.height {
         for x in 0..params.width {
             let at = (y * params.width + x) as usize;
             picture[at] = if params.view == VIEW_TILE {
-                color_at(
-                    params,
-                    value,
-                    palette,
-                    axes[x as usize],
-                    axes[(params.width + y) as usize],
-                )
+                let (col, row) = (x as usize, (params.width + y) as usize);
+                color_at(params, inputs, [inputs.axes[col], inputs.axes[row]], [x, y])
             } else {
-                on_globe(params, value, palette, [x, y])
+                on_globe(params, inputs, [x, y])
             };
         }
     }
 }
 
-fn on_globe(params: &Params, value: &[f32], palette: &[u32], pixel: [u32; 2]) -> Vec4 {
+fn on_globe(params: &Params, inputs: &Inputs<'_>, pixel: [u32; 2]) -> Vec4 {
     let hit = ground_below(params, pixel);
     if !hit.on_ground {
         return Vec4::ZERO;
@@ -35,7 +41,7 @@ fn on_globe(params: &Params, value: &[f32], palette: &[u32], pixel: [u32; 2]) ->
     let east = hit.lon_rad - params.grid_west_rad;
     let x = (east - (east / TAU).floor() * TAU) * params.cols_per_rad - 0.5;
     let y = (params.grid_north_rad - hit.lat_rad) * params.rows_per_rad - 0.5;
-    color_at(params, value, palette, axis_at(x), axis_at(y))
+    color_at(params, inputs, [axis_at(x), axis_at(y)], pixel)
 }
 
 fn axis_at(place: f32) -> Axis {
@@ -45,7 +51,7 @@ fn axis_at(place: f32) -> Axis {
     }
 }
 
-fn cell_value(params: &Params, value: &[f32], row: i32, col: i32) -> Vec2 {
+fn cell_at(params: &Params, row: i32, col: i32) -> Option<usize> {
     let (rows, cols) = (params.rows as i32, params.cols as i32);
     let col = if params.periodic == 1 {
         col.rem_euclid(cols)
@@ -53,22 +59,39 @@ fn cell_value(params: &Params, value: &[f32], row: i32, col: i32) -> Vec2 {
         col
     };
     if col < 0 || col >= cols || row < 0 || row >= rows {
-        return Vec2::ZERO;
+        return None;
     }
-    let value = value[row as usize * cols as usize + col as usize];
-    if is_missing(value) {
-        Vec2::ZERO
-    } else {
-        Vec2::new(value, 1.0)
+    Some(row as usize * cols as usize + col as usize)
+}
+
+fn cell_value(params: &Params, value: &[f32], row: i32, col: i32) -> Vec2 {
+    let value = cell_at(params, row, col).map(|cell| value[cell]);
+    match value.filter(|value| !is_missing(*value)) {
+        Some(value) => Vec2::new(value, 1.0),
+        None => Vec2::ZERO,
     }
+}
+
+fn cell_doubt(params: &Params, doubt: &[f32], row: i32, col: i32) -> f32 {
+    cell_at(params, row, col).map_or(0.0, |cell| doubt[cell])
+}
+
+fn doubt_at(params: &Params, doubt: &[f32], [x, y]: [Axis; 2]) -> f32 {
+    let mix = |a: f32, b: f32, t: f32| a * (1.0 - t) + b * t;
+    let along = |row| {
+        let [west, east] = [x.index, x.index + 1].map(|col| cell_doubt(params, doubt, row, col));
+        mix(west, east, x.fraction)
+    };
+    mix(along(y.index), along(y.index + 1), y.fraction)
 }
 
 fn mix(a: Vec2, b: Vec2, t: f32) -> Vec2 {
     a * (1.0 - t) + b * t
 }
 
-fn color_at(params: &Params, value: &[f32], palette: &[u32], x: Axis, y: Axis) -> Vec4 {
-    let cell = |row, col| cell_value(params, value, row, col);
+fn color_at(params: &Params, inputs: &Inputs<'_>, [x, y]: [Axis; 2], pixel: [u32; 2]) -> Vec4 {
+    let palette = inputs.palette;
+    let cell = |row, col| cell_value(params, inputs.value, row, col);
     let north = mix(
         cell(y.index, x.index),
         cell(y.index, x.index + 1),
@@ -80,13 +103,23 @@ fn color_at(params: &Params, value: &[f32], palette: &[u32], x: Axis, y: Axis) -
         x.fraction,
     );
     let value = mix(north, south, y.fraction);
-    let alpha = params.map_alpha * ((value.y - 0.5) * params.edge_sharpness + 0.5).clamp(0.0, 1.0);
+    let mut alpha =
+        params.map_alpha * ((value.y - 0.5) * params.edge_sharpness + 0.5).clamp(0.0, 1.0);
     if alpha <= 0.0 {
         return Vec4::ZERO;
     }
     let position =
         ((value.x / value.y - params.transfer_low) * params.transfer_per_unit).clamp(0.0, 1.0);
-    let color = palette[nearest(position * 255.0) as usize];
+    let at = nearest(position * 255.0) as usize;
+    if params.shape_table == 1 {
+        alpha *= (palette[256 + at] & 0xffff) as f32 / 65535.0;
+    }
+    let color = palette[at];
     let channel = |shift: u32| ((color >> shift) & 255) as f32 / 255.0;
-    Vec4::new(channel(0), channel(8), channel(16), 1.0) * alpha
+    let mut rgb = Vec3::new(channel(0), channel(8), channel(16));
+    if params.doubt == 1 {
+        let doubt = doubt_at(params, inputs.doubt, [x, y]);
+        rgb = hatched(params, rgb, doubt, pixel);
+    }
+    rgb.extend(1.0) * alpha
 }

@@ -3,30 +3,57 @@
 @group(0) @binding(2) var<storage, read> palette: array<u32>;
 @group(0) @binding(3) var<storage, read> axes: array<Axis>;
 @group(0) @binding(4) var<storage, read_write> picture: array<vec4<f32>>;
+// Bound but never read where doubt is not drawn.
+@group(0) @binding(5) var<storage, read> doubt_before: array<f32>;
+@group(0) @binding(6) var<storage, read> doubt_after: array<f32>;
 
-// Value and 1, or zeros where there is no data.
-fn cell_value(row: i32, col: i32) -> vec2<f32> {
+// Cells that are not there.
+const NO_CELL = 0xffffffffu;
+
+fn cell_at(row: i32, col: i32) -> u32 {
     var x = col;
     let cols = i32(params.cols);
     if (params.periodic == 1u) { x = (x % cols + cols) % cols; }
-    if (x < 0 || x >= cols || row < 0 || row >= i32(params.rows)) { return vec2(0.0); }
+    if (x < 0 || x >= cols || row < 0 || row >= i32(params.rows)) { return NO_CELL; }
     let cell = u32(row) * params.cols + u32(x);
-    if (cell < params.held_first_cell || cell >= params.held_end_cell) { return vec2(0.0); }
-    let value = value_grid[cell - params.held_first_cell];
+    if (cell < params.held_first_cell || cell >= params.held_end_cell) { return NO_CELL; }
+    return cell - params.held_first_cell;
+}
+
+// Value and 1, or zeros where there is no data.
+fn cell_value(row: i32, col: i32) -> vec2<f32> {
+    let cell = cell_at(row, col);
+    if (cell == NO_CELL) { return vec2(0.0); }
+    let value = value_grid[cell];
     if (is_missing(value)) { return vec2(0.0); }
     return vec2(value, 1.0);
 }
 
-fn color_at(x: Axis, y: Axis) -> vec4<f32> {
+fn cell_doubt(row: i32, col: i32) -> f32 {
+    let cell = cell_at(row, col);
+    if (cell == NO_CELL) { return 0.0; }
+    return doubt_of(cell);
+}
+
+fn doubt_at(x: Axis, y: Axis) -> f32 {
+    let north = mix(cell_doubt(y.index, x.index), cell_doubt(y.index, x.index + 1), x.fraction);
+    let south = mix(cell_doubt(y.index + 1, x.index), cell_doubt(y.index + 1, x.index + 1), x.fraction);
+    return mix(north, south, y.fraction);
+}
+
+fn color_at(x: Axis, y: Axis, pixel: vec2<u32>) -> vec4<f32> {
     let north = mix(cell_value(y.index, x.index), cell_value(y.index, x.index + 1), x.fraction);
     let south = mix(cell_value(y.index + 1, x.index), cell_value(y.index + 1, x.index + 1), x.fraction);
     let value = mix(north, south, y.fraction);
     // Half the weight on data: the edge of the data runs between cell centres, one pixel soft.
-    let alpha = params.map_alpha * clamp((value.y - 0.5) * params.edge_sharpness + 0.5, 0.0, 1.0);
+    var alpha = params.map_alpha * clamp((value.y - 0.5) * params.edge_sharpness + 0.5, 0.0, 1.0);
     if (alpha <= 0.0) { return vec4(0.0); }
     let position = clamp((value.x / value.y - params.transfer_low) * params.transfer_per_unit, 0.0, 1.0);
-    let color = palette[u32(nearest(position * 255.0))];
-    let rgb = vec3(f32(color & 255u), f32((color >> 8u) & 255u), f32((color >> 16u) & 255u)) / 255.0;
+    let at = u32(nearest(position * 255.0));
+    if (params.shape_table == 1u) { alpha *= f32(palette[256u + at] & 0xffffu) / 65535.0; }
+    let color = palette[at];
+    var rgb = vec3(f32(color & 255u), f32((color >> 8u) & 255u), f32((color >> 16u) & 255u)) / 255.0;
+    if (params.doubt == 1u) { rgb = hatched(rgb, doubt_at(x, y), pixel); }
     return vec4(rgb, 1.0) * alpha;
 }
 
@@ -40,7 +67,7 @@ fn map(@builtin(global_invocation_id) pixel: vec3<u32>) {
     if (pixel.x >= params.width || pixel.y >= params.height) { return; }
     let at = pixel.y * params.width + pixel.x;
     if (params.view == VIEW_TILE) {
-        picture[at] = color_at(axes[pixel.x], axes[params.width + pixel.y]);
+        picture[at] = color_at(axes[pixel.x], axes[params.width + pixel.y], pixel.xy);
         return;
     }
     let hit = ground_below(pixel.xy);
@@ -51,5 +78,5 @@ fn map(@builtin(global_invocation_id) pixel: vec3<u32>) {
     let east = hit.lon - params.grid_west_rad;
     let x = (east - floor(east / TURN) * TURN) * params.cols_per_rad - 0.5;
     let y = (params.grid_north_rad - hit.lat) * params.rows_per_rad - 0.5;
-    picture[at] = color_at(axis_at(x), axis_at(y));
+    picture[at] = color_at(axis_at(x), axis_at(y), pixel.xy);
 }

@@ -1,5 +1,6 @@
 //! CPU twin of `particles.wgsl`.
 
+use crate::stages::doubt::doubted;
 use crate::stages::layout::{Active, Params, Particle, Row, is_missing, nearest};
 
 /// 0.5 in 32 bits.
@@ -12,6 +13,8 @@ pub struct Inputs<'a> {
     pub value: &'a [f32],
     pub accumulated: &'a [f32],
     pub palette: &'a [u32],
+    /// Doubt of every cell; empty where it is not drawn.
+    pub doubt: &'a [f32],
 }
 
 /// Output permutation of a 32-bit linear congruential generator (PCG-RXS-M-XS, O'Neill 2014).
@@ -92,9 +95,18 @@ fn one(params: &Params, inputs: &Inputs<'_>, cell: Active, k: u32) -> Particle {
     particle.height_m = column_m * phase + params.sheet_m * (phase - 0.5);
     particle.mass_kg =
         carbon * inputs.rows[row as usize].area_m2 / params.particles_per_cell as f32;
-    let opacity = params.depth_floor + (1.0 - params.depth_floor) * strength.sqrt();
+    let at = nearest(position * 255.0) as usize;
+    let mut opacity = params.depth_floor + (1.0 - params.depth_floor) * strength.sqrt();
+    let mut size = nearest(strength * 255.0) as u32;
+    if params.shape_table == 1 {
+        let shape = inputs.palette[256 + at];
+        opacity = (shape & 0xffff) as f32 / 65535.0;
+        size = shape >> 16;
+    }
     particle.depth = params.optical_depth * opacity * envelope(phase);
-    let color = inputs.palette[nearest(position * 255.0) as usize];
-    particle.color = color | ((nearest(strength * 255.0) as u32) << 24);
-    particle
+    particle.color = inputs.palette[at] | (size << 24);
+    match inputs.doubt.get(cell.cell as usize) {
+        Some(&doubt) if doubt > 0.0 => doubted(particle, doubt),
+        Some(_) | None => particle,
+    }
 }

@@ -1,4 +1,5 @@
-// A particle of a cell: place, height, mass, optical depth and colour. Reads `rows` and `palette`.
+// A particle of a cell: place, height, mass, optical depth and colour. Reads `rows` and `palette`, whose second half holds
+// opacity and size where users gave any.
 const HALF_TURN = 0x80000000u; // 0.5 in 32 bits
 
 // Output permutation of a 32-bit linear congruential generator (PCG-RXS-M-XS, O'Neill 2014).
@@ -48,8 +49,15 @@ fn particle_of(row: u32, slot: u32, k: u32, value: f32, carbon: f32) -> Particle
     let strength = strength_of(value, position);
     particle.height_m = column_m * phase + params.sheet_m * (phase - 0.5);
     particle.mass_kg = carbon * rows[row].area_m2 / f32(params.particles_per_cell);
-    let opacity = params.depth_floor + (1.0 - params.depth_floor) * sqrt(strength);
+    let at = u32(nearest(position * 255.0));
+    var opacity = params.depth_floor + (1.0 - params.depth_floor) * sqrt(strength);
+    var size = u32(nearest(strength * 255.0));
+    if (params.shape_table == 1u) {
+        let shape = palette[256u + at];
+        opacity = f32(shape & 0xffffu) / 65535.0;
+        size = shape >> 16u;
+    }
     particle.depth = params.optical_depth * opacity * envelope(phase);
-    particle.color = palette[u32(nearest(position * 255.0))] | (u32(nearest(strength * 255.0)) << 24u);
+    particle.color = palette[at] | (size << 24u);
     return particle;
 }

@@ -1,0 +1,124 @@
+//! A legend as SVG: text stays text, and the drawing has any size.
+
+use std::fmt::Write as _;
+
+use super::{BAR_HEIGHT_PX, BAR_TOP_PX, CHECK_PX, HEIGHT_PX, Legend, MARGIN_PX};
+
+/// What is drawn under transparent colours.
+const CHECKS: &str = "<pattern id=\"checks\" width=\"{2}\" height=\"{2}\" patternUnits=\"userSpaceOnUse\">\
+<rect width=\"{2}\" height=\"{2}\" fill=\"#fff\"/><path d=\"M0 0h{1}v{1}h-{1}zM{1} {1}h{1}v{1}h-{1}z\" fill=\"#ccc\"/></pattern>";
+
+/// The drawing.
+pub(super) fn drawn(legend: &Legend) -> String {
+    let mut text = String::new();
+    write(legend, &mut text).expect("a string takes any text");
+    text
+}
+
+fn write(legend: &Legend, to: &mut String) -> std::fmt::Result {
+    let [width, height] = legend.size_px();
+    write!(
+        to,
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \
+         font-family=\"sans-serif\" font-size=\"14\" fill=\"#222\">\
+         <title>{}</title><defs><linearGradient id=\"colors\">",
+        legend.title()
+    )?;
+    for (place, color) in &legend.stops {
+        write!(to, "<stop offset=\"{place:.6}\" stop-color=\"{color}\"/>")?;
+    }
+    to.push_str("</linearGradient>");
+    let bar = format!(
+        "x=\"{MARGIN_PX}\" y=\"{BAR_TOP_PX}\" width=\"{}\" height=\"{BAR_HEIGHT_PX}\"",
+        width - 2 * MARGIN_PX
+    );
+    let is_transparent = !legend.opacity.is_empty();
+    if is_transparent {
+        let checks = CHECKS.replace("{1}", &CHECK_PX.to_string());
+        to.push_str(&checks.replace("{2}", &(2 * CHECK_PX).to_string()));
+        to.push_str("<linearGradient id=\"shares\">");
+        for (place, share) in &legend.opacity {
+            write!(
+                to,
+                "<stop offset=\"{place:.6}\" stop-color=\"#fff\" stop-opacity=\"{share:.4}\"/>"
+            )?;
+        }
+        write!(
+            to,
+            "</linearGradient><mask id=\"seen\"><rect {bar} fill=\"url(#shares)\"/></mask>"
+        )?;
+    }
+    write!(
+        to,
+        "</defs><rect width=\"{width}\" height=\"{height}\" fill=\"#fff\"/>\
+         <text x=\"{MARGIN_PX}\" y=\"21\">{}</text><text x=\"{}\" y=\"21\" text-anchor=\"end\">{}</text>",
+        legend.label,
+        width - MARGIN_PX,
+        legend.unit
+    )?;
+    if is_transparent {
+        write!(to, "<rect {bar} fill=\"url(#checks)\"/>")?;
+        write!(
+            to,
+            "<rect {bar} fill=\"url(#colors)\" mask=\"url(#seen)\"/>"
+        )?;
+    } else {
+        write!(to, "<rect {bar} fill=\"url(#colors)\"/>")?;
+    }
+    let foot = BAR_TOP_PX + BAR_HEIGHT_PX;
+    for (x, text) in legend.marks() {
+        write!(
+            to,
+            "<path d=\"M{x:.2} {foot}v6\" stroke=\"#222\"/><text x=\"{x:.2}\" y=\"{}\" text-anchor=\"middle\" font-size=\"13\">{text}</text>",
+            foot + 21
+        )?;
+    }
+    for (place, radius) in legend.dots() {
+        let x = Legend::x_px(place);
+        write!(
+            to,
+            "<circle cx=\"{x:.2}\" cy=\"{}\" r=\"{radius:.2}\" fill=\"#555\"/>",
+            HEIGHT_PX + 6
+        )?;
+    }
+    to.push_str("</svg>\n");
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contract::colour::TransferOptions;
+    use contract::quantity::Quantity;
+
+    fn svg(quantity: Quantity, options: &TransferOptions) -> String {
+        drawn(&Legend::of(quantity, &options.over(quantity).unwrap()))
+    }
+
+    #[test]
+    fn every_quantity_is_drawn_with_its_title_unit_and_ticks() {
+        for quantity in Quantity::ALL {
+            let svg = svg(quantity, &TransferOptions::default());
+            assert!(
+                svg.contains(&format!(">{}</text>", quantity.title())),
+                "{svg}"
+            );
+            assert!(svg.contains(&format!(">{}</text>", quantity.display().unit)));
+            assert!(svg.matches("text-anchor=\"middle\"").count() >= 2);
+            assert!(!svg.contains("mask") && !svg.contains("circle"));
+            assert!(!svg.contains('&'), "nothing needs escaping: {svg}");
+        }
+    }
+
+    #[test]
+    fn opacity_and_sizes_are_drawn_where_users_gave_any() {
+        let options = TransferOptions {
+            opacity: "0:0,15:1".parse().unwrap(),
+            size: "0:0.2,15:1".parse().unwrap(),
+            ..TransferOptions::default()
+        };
+        let svg = svg(Quantity::WindSpeed, &options);
+        assert!(svg.contains("stop-opacity=\"0.0000\"") && svg.contains("url(#checks)"));
+        assert_eq!(svg.matches("<circle").count(), 17);
+    }
+}

@@ -1,0 +1,133 @@
+//! How a picture is to look: parameters of an address in, checked options and the style of a job out.
+
+use contract::colour::TransferOptions;
+use contract::job::Style;
+use contract::quantity::Quantity;
+use serde::Deserialize;
+
+use crate::error::ServerError;
+
+/// Parameters that every picture and its legend take; see [`Look`].
+#[derive(Debug, Clone, Default, Deserialize)]
+pub(crate) struct LookQuery {
+    palette: Option<String>,
+    range: Option<String>,
+    stops: Option<String>,
+    opacity: Option<String>,
+    particle_size: Option<String>,
+    reverse: Option<String>,
+    doubt: Option<String>,
+}
+
+/// What was asked of the look; all of it the usual where nothing was.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(crate) struct Look {
+    options: TransferOptions,
+    doubt: bool,
+}
+
+impl LookQuery {
+    /// The texts as values.
+    pub(crate) fn parse(&self) -> Result<Look, ServerError> {
+        Ok(Look {
+            options: TransferOptions {
+                palette: parsed(self.palette.as_ref())?,
+                range: parsed(self.range.as_ref())?,
+                colors: parsed(self.stops.as_ref())?.unwrap_or_default(),
+                opacity: parsed(self.opacity.as_ref())?.unwrap_or_default(),
+                size: parsed(self.particle_size.as_ref())?.unwrap_or_default(),
+                reversed: flag("reverse", self.reverse.as_deref())?,
+            },
+            doubt: flag("doubt", self.doubt.as_deref())?,
+        })
+    }
+}
+
+fn parsed<T: std::str::FromStr>(text: Option<&String>) -> Result<Option<T>, ServerError>
+where
+    ServerError: From<T::Err>,
+{
+    Ok(text.map(|text| text.parse()).transpose()?)
+}
+
+fn flag(what: &'static str, text: Option<&str>) -> Result<bool, ServerError> {
+    match text {
+        None | Some("false" | "0") => Ok(false),
+        Some("true" | "1") => Ok(true),
+        Some(text) => Err(ServerError::invalid(what, text, "true or false")),
+    }
+}
+
+impl Look {
+    /// Is everything as usual?
+    pub(crate) fn is_usual(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// The style of a quantity that looks so.
+    pub(crate) fn style(&self, quantity: Quantity) -> Result<Style, ServerError> {
+        let mut style = Style::with_transfer(self.options.over(quantity)?);
+        style.doubt = self.doubt;
+        Ok(style)
+    }
+
+    /// Parameters that ask for the same look, in their canonical form: nothing in them needs escaping.
+    pub(crate) fn parameters(&self) -> Vec<String> {
+        let options = &self.options;
+        let range = options.range.map(|range| format!("range={range}"));
+        let palette = options.palette.map(|palette| format!("palette={palette}"));
+        let stops = |name: &str, list: String| (!list.is_empty()).then(|| format!("{name}={list}"));
+        let flag = |name: &str, is_set: bool| is_set.then(|| format!("{name}=true"));
+        [
+            palette,
+            range,
+            stops("stops", options.colors.to_string()),
+            stops("opacity", options.opacity.to_string()),
+            stops("particle_size", options.size.to_string()),
+            flag("reverse", options.reversed),
+            flag("doubt", self.doubt),
+        ]
+        .into_iter()
+        .flatten()
+        .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parameters_ask_for_the_look_they_came_from() {
+        let query = LookQuery {
+            range: Some(" -10 : 2.5e1".to_owned()),
+            stops: Some("-10:#0A0B0C,25:ffffff".to_owned()),
+            opacity: Some("0:0.5".to_owned()),
+            particle_size: Some("0:0.25,1:1".to_owned()),
+            doubt: Some("1".to_owned()),
+            ..LookQuery::default()
+        };
+        let look = query.parse().unwrap();
+        let parameters = look.parameters().join("&");
+        assert_eq!(
+            parameters,
+            "range=-10:25&stops=-10:0a0b0c,25:ffffff&opacity=0:0.5&particle_size=0:0.25,1:1&doubt=true"
+        );
+        let again = LookQuery {
+            range: Some("-10:25".to_owned()),
+            stops: Some("-10:0a0b0c,25:ffffff".to_owned()),
+            ..query
+        };
+        assert_eq!(again.parse().unwrap(), look);
+        assert!(!look.is_usual());
+    }
+
+    #[test]
+    fn without_parameters_all_is_as_usual() {
+        let look = LookQuery::default().parse().unwrap();
+        assert!(look.is_usual() && look.parameters().is_empty());
+        let style = look.style(Quantity::WindSpeed).unwrap();
+        let usual = contract::colour::TransferFunction::default_for(Quantity::WindSpeed);
+        assert_eq!(style, Style::with_transfer(usual));
+    }
+}

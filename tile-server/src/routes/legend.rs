@@ -1,0 +1,49 @@
+//! `/api/products/{product}/legend.json`, `.svg` and `.png`: what the colours of a layer mean.
+
+use axum::extract::State;
+use axum::http::{HeaderMap, StatusCode, header};
+use axum::response::{IntoResponse as _, Response};
+use contract::digest::Digest;
+use serde::Deserialize;
+
+use crate::error::ServerError;
+use crate::extract::{UrlPath, UrlQuery};
+use crate::legend::{Form, Legend};
+use crate::look::LookQuery;
+use crate::routes::picture::{CACHE_CONTROL, has_tag};
+use crate::state::AppState;
+
+#[derive(Debug, Deserialize)]
+pub(crate) struct LegendQuery {
+    manifest: Option<String>,
+    #[serde(flatten)]
+    look: LookQuery,
+}
+
+pub(crate) async fn get(
+    State(state): State<AppState>,
+    UrlPath((product, file)): UrlPath<(String, String)>,
+    UrlQuery(query): UrlQuery<LegendQuery>,
+    asked: HeaderMap,
+) -> Result<Response, ServerError> {
+    let form = file.strip_prefix("legend.").and_then(Form::named);
+    let form = form.ok_or(ServerError::UnknownAddress)?;
+    let layer = state
+        .catalogue
+        .version(&product, query.manifest.as_deref())
+        .await?;
+    let quantity = layer.manifest.quantity;
+    let style = query.look.parse()?.style(quantity)?;
+    let content = Legend::of(quantity, &style.transfer).encoded(form)?;
+    // Weak: the same text may be sent compressed or not.
+    let tag = format!("W/\"{}\"", Digest::of(&content));
+    let headers = [
+        (header::ETAG, tag.clone()),
+        (header::CACHE_CONTROL, CACHE_CONTROL.to_owned()),
+    ];
+    if has_tag(&asked, &tag) {
+        return Ok((StatusCode::NOT_MODIFIED, headers).into_response());
+    }
+    let content_type = [(header::CONTENT_TYPE, form.content_type())];
+    Ok((headers, content_type, content).into_response())
+}
