@@ -94,6 +94,7 @@ impl TransferFunction {
             Quantity::IceFraction => (Palette::Speed, 0.0, 100.0),
             Quantity::WaveHeight => (Palette::Speed, 0.0, 6.0),
             Quantity::Current => (Palette::Balance, -1.5, 1.5),
+            Quantity::Elevation => (Palette::Balance, -6000.0, 6000.0),
         };
         let stored = |shown: f64| (shown - display.offset) / display.factor;
         Self {

@@ -35,6 +35,8 @@ pub enum Quantity {
     Precipitation,
     /// Eastward or northward sea-water velocity, m s⁻¹.
     Current,
+    /// Height of the solid earth above the mean level of the sea, m, negative on the sea floor.
+    Elevation,
 }
 
 /// How a quantity is shown: `shown = stored * factor + offset`.
@@ -50,7 +52,7 @@ pub struct Display {
 
 impl Quantity {
     /// Every quantity.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::CarbonFlux,
         Self::AccumulatedCarbon,
         Self::SeaSurfaceTemperature,
@@ -63,6 +65,7 @@ impl Quantity {
         Self::WaveHeight,
         Self::Precipitation,
         Self::Current,
+        Self::Elevation,
     ];
 
     /// Unit of stored values.
@@ -75,7 +78,7 @@ impl Quantity {
             Self::WindSpeed | Self::Current => "m s-1",
             Self::Pco2 | Self::AirPressure => "Pa",
             Self::Salinity | Self::IceFraction => "1",
-            Self::WaveHeight => "m",
+            Self::WaveHeight | Self::Elevation => "m",
         }
     }
 
@@ -91,7 +94,7 @@ impl Quantity {
             Self::Salinity => ("", 1.0, 0.0),
             Self::AirPressure => ("hPa", 0.01, 0.0),
             Self::IceFraction => ("%", 100.0, 0.0),
-            Self::WaveHeight => ("m", 1.0, 0.0),
+            Self::WaveHeight | Self::Elevation => ("m", 1.0, 0.0),
             Self::Precipitation => ("mm d⁻¹", 86_400.0, 0.0),
         };
         Display {
@@ -116,6 +119,7 @@ impl Quantity {
             Self::WaveHeight => "Significant wave height",
             Self::Precipitation => "Precipitation",
             Self::Current => "Current",
+            Self::Elevation => "Elevation",
         }
     }
 
@@ -134,6 +138,8 @@ impl Quantity {
             Self::WaveHeight => 0.0..=40.0,
             Self::Precipitation => 0.0..=0.1,
             Self::Current => -10.0..=10.0,
+            // The Challenger Deep and Mount Everest, with room for other surfaces of reference.
+            Self::Elevation => -12_000.0..=9_500.0,
         }
     }
 }

@@ -94,6 +94,11 @@ impl Device {
             value: pair(&scene.value)?,
             accumulated: scene.accumulated.as_ref().map(pair).transpose()?,
             domain: self.resident.buffer(&self.gpu, &scene.domain)?,
+            terrain: scene
+                .terrain
+                .as_ref()
+                .map(|terrain| self.resident.buffer(&self.gpu, &terrain.elevation.cells))
+                .transpose()?,
         })
     }
 }

@@ -78,7 +78,9 @@ pub enum RenderError {
         source: image::ImageError,
     },
     /// Only volumes without a globe behind them are drawn another way.
-    #[error("the reference draws volumes without a globe behind them only")]
+    #[error(
+        "the reference draws volumes alone: no globe behind them, no surroundings, no sun of an instant"
+    )]
     NoReference,
     /// The thread that drew was lost.
     #[error("the drawing thread ended early")]

@@ -28,6 +28,7 @@ pub struct SceneBuffers {
     pub value: [wgpu::Buffer; 2],
     pub accumulated: Option<[wgpu::Buffer; 2]>,
     pub domain: wgpu::Buffer,
+    pub terrain: Option<wgpu::Buffer>,
 }
 
 /// What the stages of one frame share while they are recorded.
@@ -40,6 +41,7 @@ pub struct FrameContext<'a> {
     pub value_frames: [wgpu::Buffer; 2],
     pub accumulated_frames: Option<[wgpu::Buffer; 2]>,
     pub domain: wgpu::Buffer,
+    pub terrain: Option<wgpu::Buffer>,
     workspace: &'a mut Workspace,
 }
 
@@ -57,6 +59,7 @@ impl<'a> FrameContext<'a> {
             value,
             accumulated,
             domain,
+            terrain,
         } = scene;
         Ok(Self {
             gpu,
@@ -67,6 +70,7 @@ impl<'a> FrameContext<'a> {
             value_frames: value,
             accumulated_frames: accumulated,
             domain,
+            terrain,
             workspace,
         })
     }
@@ -179,7 +183,11 @@ impl Stages {
         scene: &SceneBuffers,
     ) -> Result<Vec<u8>, RenderError> {
         let params = plan.params_of(part);
-        if params.splat_count == 0 && plan.mode != Mode::Map && params.surface == 0 {
+        if params.splat_count == 0
+            && plan.mode != Mode::Map
+            && params.surface == 0
+            && params.in_context == 0
+        {
             return Ok(vec![
                 0;
                 part.size_px[0] as usize * part.size_px[1] as usize * 4

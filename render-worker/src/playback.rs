@@ -60,6 +60,11 @@ impl<'a> Playback<'a> {
             value: pair(&scene.value)?,
             accumulated: scene.accumulated.as_ref().map(pair).transpose()?,
             domain: gpu.storage("domain", scene.domain.content())?,
+            terrain: scene
+                .terrain
+                .as_ref()
+                .map(|terrain| gpu.storage("terrain", terrain.elevation.cells.content()))
+                .transpose()?,
         })
     }
 

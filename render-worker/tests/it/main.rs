@@ -7,7 +7,9 @@
 
 #[cfg(feature = "service")]
 mod batch;
+mod coast;
 mod compare;
+mod context;
 mod device;
 mod fill;
 #[cfg(feature = "service")]

@@ -3,7 +3,7 @@
 use std::sync::OnceLock;
 
 use bytemuck::Pod;
-use contract::job::{Mode, View};
+use contract::job::{Mode, RenderJob, View};
 use glam::Vec4;
 use render_worker::Scene;
 use render_worker::frame::{FrameContext, SceneBuffers};
@@ -12,6 +12,7 @@ use render_worker::passes::place::{self, Place};
 use render_worker::passes::splat::{self, HALF_BYTES, Splats, stored_at, unpacked};
 use render_worker::plan::Plan;
 use render_worker::stages::bin::{self, Bin, list_count};
+use render_worker::stages::compose::in_context::Surroundings;
 use render_worker::stages::compose::{self, Compose};
 use render_worker::stages::eye::{self, Eye};
 use render_worker::stages::interpolate::{self, Interpolate};
@@ -22,6 +23,7 @@ use render_worker::stages::particles::cpu::Inputs;
 use render_worker::stages::{particles, project};
 
 use crate::compare::worst;
+use crate::context::{everything, with_terrain};
 use crate::device::{checked_gpu, gpu};
 use crate::scenes::{FIVE_DEGREES, globe, job, ocean, tile};
 
@@ -42,10 +44,14 @@ struct Twins {
 
 impl Twins {
     fn of(mode: Mode, view: View) -> Self {
-        let scene = ocean(FIVE_DEGREES);
         let mut job = job(mode, view);
         job.style.globe_surface = true;
-        let plan = Plan::new(&job, &scene, u64::MAX).unwrap();
+        Self::of_job(&job, ocean(FIVE_DEGREES))
+    }
+
+    fn of_job(job: &RenderJob, scene: Scene) -> Self {
+        let mode = job.mode;
+        let plan = Plan::new(job, &scene, u64::MAX).unwrap();
         let mut params = plan.params_of(plan.parts()[0]);
         let carbon = scene.accumulated.as_ref().unwrap();
         let between = |interval: &render_worker::Interval, weight| {
@@ -95,7 +101,17 @@ impl Twins {
             eye::cpu::eye(&params, &list_ends, &entries, &mut picture);
         }
         let mut image = vec![0; picture.len()];
-        compose::cpu::compose(&params, &picture, scene.domain.content(), &mut image);
+        if params.in_context == 1 {
+            let around = Surroundings {
+                domain: scene.domain.content(),
+                terrain: scene.terrain.as_ref().unwrap().heights_m(),
+                ground_axes: &plan.ground_axes,
+                coast: &plan.coast,
+            };
+            compose::in_context::compose(&params, &picture, &around, &mut image);
+        } else {
+            compose::cpu::compose(&params, &picture, scene.domain.content(), &mut image);
+        }
         Self {
             scene,
             plan,
@@ -156,6 +172,11 @@ impl Twins {
             value: pair(&self.scene.value),
             accumulated: self.scene.accumulated.as_ref().map(pair),
             domain: gpu.storage("domain", self.scene.domain.content()).unwrap(),
+            terrain: self
+                .scene
+                .terrain
+                .as_ref()
+                .map(|terrain| buffer(terrain.heights_m())),
         };
         let mut frame = FrameContext::new(gpu, &mut workspace, &self.plan, *params, scene).unwrap();
         fill(&mut frame);
@@ -322,6 +343,9 @@ fn every_function_of_a_particle_is_in_the_pass_that_is_tested() {
     assert!(
         eye::SOURCE.contains(compose::FUNCTIONS) && compose::SOURCE.contains(compose::FUNCTIONS)
     );
+    for source in [eye::SOURCE_IN_CONTEXT, compose::SOURCE_IN_CONTEXT] {
+        assert!(source.contains(compose::FUNCTIONS_IN_CONTEXT));
+    }
 }
 
 #[test]
@@ -614,6 +638,100 @@ fn compose_matches_its_twin() {
                 twins.image.len(),
             );
             far_apart(&bytes(drawn), &expected, 1.01)
+        });
+    }
+}
+
+#[test]
+fn surroundings_match_their_twin_on_tiles_and_on_the_globe() {
+    let views = [tile(1, 0, 0, 256), globe(-120.0, 10.0, 1.5e7, 160)];
+    let faults = [
+        // The slope of the terrain, its height, the night, the coast, the sea above the floor.
+        ("2.0 * z[at + 4]", "2.0 * z[at - 4]"),
+        ("if (height_m < 0.0)", "if (height_m < 1000.0)"),
+        ("mix(NIGHT, 1.0,", "mix(1.0, NIGHT,"),
+        ("place.x % 4u * 8u", "(3u - place.x % 4u) * 8u"),
+        ("exp(params.seabed_per_m", "exp(-params.seabed_per_m"),
+    ];
+    for view in views {
+        let twins = Twins::of_job(&everything(Mode::Map, view), with_terrain(FIVE_DEGREES));
+        assert_eq!(twins.params.in_context, 1);
+        let expected = bytes(twins.image.iter().copied());
+        for (right, wrong) in faults {
+            let distance = |gpu: &Gpu, source: &str| {
+                let stage = Compose::of(gpu, compose::SOURCE, source);
+                let picture = |f: &mut FrameContext<'_>| {
+                    drop(f.upload(Slot::Picture, &twins.picture).unwrap());
+                };
+                let drawn: Vec<u32> = twins.run(
+                    gpu,
+                    picture,
+                    |f| stage.record(f).unwrap(),
+                    Slot::Image,
+                    twins.image.len(),
+                );
+                far_apart(&bytes(drawn), &expected, 1.01)
+            };
+            let source = compose::SOURCE_IN_CONTEXT;
+            prove("surroundings", source, right, wrong, distance);
+        }
+    }
+}
+
+#[test]
+fn the_eye_composes_in_surroundings_as_its_twin_does() {
+    for view in [tile(1, 0, 0, 256), globe(-120.0, 10.0, 1.5e7, 160)] {
+        let twins = Twins::of_job(&everything(Mode::Volume, view), with_terrain(FIVE_DEGREES));
+        let expected = bytes(twins.image.iter().copied());
+        let distance = |gpu: &Gpu, source: &str| {
+            let stage = Eye::of(gpu, eye::SOURCE, source);
+            let lists = |f: &mut FrameContext<'_>| {
+                f.upload(Slot::Counts, &twins.list_ends).unwrap();
+                f.upload(Slot::Entries, &twins.entries).unwrap();
+            };
+            let drawn: Vec<u32> = twins.run(
+                gpu,
+                lists,
+                |f| stage.record(f).unwrap(),
+                Slot::Image,
+                twins.image.len(),
+            );
+            far_apart(&bytes(drawn), &expected, 1.01)
+        };
+        let (right, wrong) = ("color += ground_color", "color -= ground_color");
+        prove("eye", eye::SOURCE_IN_CONTEXT, right, wrong, distance);
+    }
+}
+
+#[test]
+fn splats_in_the_sea_and_in_the_night_match_their_twins() {
+    let twins = Twins::of_job(
+        &everything(Mode::Volume, tile(1, 0, 0, 256)),
+        with_terrain(FIVE_DEGREES),
+    );
+    let expected = splat_numbers(&twins.splats, &twins.splats);
+    for (right, wrong) in [
+        ("exp(-params.sea_per_m", "exp(-0.5 * params.sea_per_m"),
+        (
+            "day_at(normal_of(particle))",
+            "day_at(-normal_of(particle))",
+        ),
+    ] {
+        prove("splat", splat::SOURCE, right, wrong, |gpu, source| {
+            let stage = Splats::new(gpu, source);
+            let [seen, lit] = twins.run_with(
+                gpu,
+                &twins.params,
+                |_| (),
+                |f| stage.record(f).unwrap(),
+                twins.stored(),
+            );
+            worst(
+                &splat_numbers(&twins.in_order(&seen, &lit), &twins.splats),
+                &expected,
+                0.0201,
+                1e-4,
+            )
         });
     }
 }

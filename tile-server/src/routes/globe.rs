@@ -11,6 +11,7 @@ use crate::extract::{UrlPath, UrlQuery, number, time, whole_number};
 use crate::request;
 use crate::routes::picture::{self, Shown};
 use crate::state::AppState;
+use crate::surroundings::SurroundingsQuery;
 
 /// Height that shows the whole disc with a margin, km.
 const HEIGHT_KM: f64 = 15_000.0;
@@ -27,6 +28,8 @@ pub(crate) struct GlobeQuery {
     height: Option<String>,
     surface: Option<String>,
     manifest: Option<String>,
+    #[serde(flatten)]
+    surroundings: SurroundingsQuery,
 }
 
 pub(crate) async fn get(
@@ -49,7 +52,10 @@ pub(crate) async fn get(
         Some("false") => false,
         Some(text) => return Err(ServerError::invalid("surface", text, "true or false")),
     };
-    picture::respond(&state, &headers, job, Shown::of(&layer, time)).await
+    let shown = Shown::of(&layer, time);
+    let around = &query.surroundings;
+    let job = around.around(job, &state.catalogue, shown.time).await?;
+    picture::respond(&state, &headers, job, shown).await
 }
 
 impl GlobeQuery {

@@ -16,6 +16,7 @@ use crate::extract::{UrlPath, UrlQuery, time};
 use crate::request;
 use crate::routes::products::bounds_deg;
 use crate::state::AppState;
+use crate::surroundings::SurroundingsQuery;
 
 /// Pixels a cell is wide at the deepest level that is offered: deeper levels would only magnify it.
 const CELL_PX: f64 = 64.0;
@@ -26,6 +27,8 @@ const TILE_PX: f64 = 256.0;
 pub(crate) struct TileJsonQuery {
     time: Option<String>,
     manifest: Option<String>,
+    #[serde(flatten)]
+    surroundings: SurroundingsQuery,
 }
 
 impl TileJsonQuery {
@@ -35,7 +38,9 @@ impl TileJsonQuery {
         // Named as it was found, not as it was written.
         let manifest = self.manifest.as_ref();
         let manifest = manifest.map(|_named| format!("manifest={}", layer.id));
-        let parts: Vec<String> = time.into_iter().chain(manifest).collect();
+        let surroundings = self.surroundings.of_tiles()?;
+        let parts = time.into_iter().chain(manifest).chain(surroundings);
+        let parts: Vec<String> = parts.collect();
         Ok(if parts.is_empty() {
             String::new()
         } else {

@@ -12,6 +12,7 @@ use crate::extract::{UrlPath, UrlQuery, time, whole_number};
 use crate::request;
 use crate::routes::picture::{self, Shown};
 use crate::state::AppState;
+use crate::surroundings::SurroundingsQuery;
 
 /// Pixels a side unless told otherwise.
 const SIZE_PX: u32 = 256;
@@ -23,6 +24,8 @@ pub(crate) struct TileQuery {
     time: Option<String>,
     size: Option<String>,
     manifest: Option<String>,
+    #[serde(flatten)]
+    surroundings: SurroundingsQuery,
 }
 
 pub(crate) async fn get(
@@ -42,8 +45,10 @@ pub(crate) async fn get(
     let time = time(query.time.as_deref())?;
     let job = request::job(&layer, mode, View::Tile { tile, size_px }, time)?;
     let shown = Shown::of(&layer, time);
-    // Who looks at an old version is no reason to draw a new one.
-    if state.catalogue.is_newest(&layer) {
+    let around = &query.surroundings;
+    let job = around.around(job, &state.catalogue, shown.time).await?;
+    // Who looks at an old version, or at what is not drawn ahead, is no reason to draw a new one.
+    if around.is_empty() && state.catalogue.is_newest(&layer) {
         let product = &layer.manifest.product;
         let at = time.map(|_asked| shown.time);
         state.hot.asked(product, mode, &job.view, at);

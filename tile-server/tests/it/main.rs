@@ -25,6 +25,7 @@ mod properties;
 mod regions;
 mod remote_store;
 mod serve;
+mod surroundings;
 mod tilejson;
 mod tiles;
 mod versions;

@@ -73,7 +73,8 @@ pub fn reference(
     scene: &Scene,
     fineness: Fineness,
 ) -> Result<Picture, RenderError> {
-    if job.mode != Mode::Volume || job.style.globe_surface {
+    let is_bare = job.style.context.is_empty() && job.style.sun.subsolar.is_none();
+    if job.mode != Mode::Volume || job.style.globe_surface || !is_bare {
         return Err(RenderError::NoReference);
     }
     let coarser = pyramid::suited(job, scene);
