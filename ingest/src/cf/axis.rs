@@ -11,6 +11,9 @@ use crate::rejection::Rejection;
 const TOLERANCE_CELLS: f64 = 0.02;
 /// Edges and steps closer than this (in cells) to a round fraction of a degree are taken to be that.
 const SNAP_CELLS: f64 = 2e-3;
+/// A longitude axis that misses the whole turn by less than this (in cells) was meant to make one: labels of single
+/// precision that were summed up drift so far.
+const TURN_CELLS: f64 = 0.05;
 
 /// What the labels of a grid's axes name.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
@@ -63,7 +66,7 @@ impl Mapping {
             ));
         }
         let (north_shift, west_shift) = registration.shifts();
-        let (dlat, dlon) = (snapped_step(lat), snapped_step(lon));
+        let (dlat, dlon) = (snapped_step(lat), closed_step(lon));
         let northernmost = if lat.step > 0.0 {
             lat.last()
         } else {
@@ -251,6 +254,16 @@ fn snapped_step(axis: Regular) -> f64 {
     step
 }
 
+/// A step of longitudes: the part of a turn that it was meant to be, if it is close to one.
+fn closed_step(axis: Regular) -> f64 {
+    let step = axis.step.abs();
+    let missed = (step * f64::from(axis.count) - 360.0).abs();
+    if missed < TURN_CELLS * step {
+        return 360.0 / f64::from(axis.count);
+    }
+    snapped_step(axis)
+}
+
 /// An edge as the multiple of half a cell it was meant to be, if it is close to one.
 fn snapped_edge(edge: f64, step: f64) -> f64 {
     let halves = (edge / step * 2.0).round();
@@ -334,6 +347,15 @@ mod tests {
             map(&lat, &lon, Registration::SouthEast).unwrap().grid,
             ONE_DEGREE
         );
+    }
+
+    #[test]
+    fn longitudes_that_drift_past_the_turn_make_one() {
+        // 5 minutes of arc, summed up with an error of a millionth of a degree each.
+        let lon = labels(0.0, 359.92 / 4319.0, 4320);
+        let m = map(&labels(89.5, -1.0, 180), &lon, Registration::Center).unwrap();
+        assert_eq!((m.grid.cols, m.grid.dlon_deg), (4320, 1.0 / 12.0));
+        assert!(m.grid.is_periodic());
     }
 
     #[test]
