@@ -59,7 +59,8 @@ fn over_relief(mut job: RenderJob, exaggeration: f64) -> RenderJob {
 
 /// A job with all surroundings at once.
 pub(crate) fn everything(mode: Mode, view: View) -> RenderJob {
-    let mut job = over_relief(job(mode, view), 15.0);
+    // Steep enough that every slope is seen in the bytes.
+    let mut job = over_relief(job(mode, view), 150.0);
     job.style.context.coastlines = true;
     job.style.context.sea_opacity = 0.3;
     job.style.sun.subsolar = Some(Subsolar {
