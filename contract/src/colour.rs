@@ -71,6 +71,7 @@ impl TransferFunction {
             Quantity::IceFraction => (Palette::Speed, 0.0, 100.0),
             Quantity::WaveHeight => (Palette::Speed, 0.0, 6.0),
             Quantity::Current => (Palette::Balance, -1.5, 1.5),
+            Quantity::Elevation => (Palette::Balance, -6000.0, 6000.0),
         };
         Self::linear(palette, display.stored(low), display.stored(high))
     }

@@ -4,11 +4,13 @@ use serde::{Deserialize, Serialize};
 
 use crate::ContractError;
 use crate::colour::TransferFunction;
+use crate::context::{Context, Relief};
 use crate::digest::Digest;
 use crate::grid::Grid;
 use crate::key::ObjectKey;
 use crate::manifest::Manifest;
 use crate::moment::Moment;
+use crate::sun::Sun;
 use crate::tile::Tile;
 use crate::time::TimeMs;
 
@@ -96,18 +98,6 @@ pub enum View {
     },
 }
 
-/// Where the light comes from, in the frame of east, north and up at every place of a map; for globe views the same
-/// frame at the point below the camera.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Sun {
-    /// Clockwise from north, degrees.
-    #[serde(with = "crate::exact")]
-    pub azimuth_deg: f64,
-    /// Above the horizon, degrees, 5 to 90.
-    #[serde(with = "crate::exact")]
-    pub elevation_deg: f64,
-}
-
 /// What a picture looks like.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Style {
@@ -130,6 +120,9 @@ pub struct Style {
     /// Draw cells whose gap was filled differently, by their estimated error: hatched on maps, paler as particles.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub doubt: bool,
+    /// Coast lines and the sea.
+    #[serde(default, skip_serializing_if = "Context::is_empty")]
+    pub context: Context,
 }
 
 /// Everything that shapes a picture and nothing else. Two jobs with the same digest are the same picture, byte for
@@ -147,6 +140,9 @@ pub struct RenderJob {
     /// Accumulated carbon that lifts and sinks the particles; without it they lie in a thin sheet.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub accumulated: Option<Moment>,
+    /// Relief of land and sea floor below the particles: on globe views with a surface, and on map tiles.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub relief: Option<Relief>,
     /// Mode.
     pub mode: Mode,
     /// View.
@@ -167,19 +163,17 @@ impl Style {
             sun: Sun {
                 azimuth_deg: 315.0,
                 elevation_deg: 40.0,
+                subsolar: None,
             },
             globe_surface: false,
             doubt: false,
+            context: Context::default(),
         }
     }
 
     fn validate(&self) -> Result<(), ContractError> {
         self.transfer.validate()?;
-        let numbers = [
-            self.height_m_per_kg_m2,
-            self.optical_depth,
-            self.sun.azimuth_deg,
-        ];
+        let numbers = [self.height_m_per_kg_m2, self.optical_depth];
         let bad = |reason: &str| {
             Err(ContractError::invalid(
                 "style",
@@ -196,15 +190,13 @@ impl Style {
         if !(1..=MAX_PARTICLES_PER_CELL).contains(&self.particles_per_cell) {
             return bad("particles a cell are 1 to 256");
         }
-        if !(5.0..=90.0).contains(&self.sun.elevation_deg) {
-            return bad("the sun stands 5 to 90 degrees above the horizon");
-        }
         if !(0.0..=100.0).contains(&self.optical_depth)
             || !(0.0..=1e9).contains(&self.height_m_per_kg_m2)
         {
             return bad("optical depth is 0 to 100, height 0 to 1e9 m per kg m-2");
         }
-        Ok(())
+        self.sun.validate()?;
+        self.context.validate()
     }
 }
 
@@ -282,10 +274,21 @@ impl RenderJob {
             grid: product.grid,
             value: moment(product)?,
             accumulated: accumulated.map(moment).transpose()?,
+            relief: None,
             mode,
             view,
             style,
         };
+        job.validate()?;
+        Ok(job)
+    }
+
+    /// The same picture over a relief.
+    ///
+    /// # Errors
+    /// A limit that is broken.
+    pub fn over(self, relief: Option<Relief>) -> Result<Self, ContractError> {
+        let job = Self { relief, ..self };
         job.validate()?;
         Ok(job)
     }
@@ -306,6 +309,7 @@ impl RenderJob {
         self.grid.validate()?;
         self.value.validate()?;
         self.accumulated.as_ref().map_or(Ok(()), Moment::validate)?;
+        self.relief.as_ref().map_or(Ok(()), Relief::validate)?;
         self.style.validate()?;
         self.view.validate()
     }
@@ -327,6 +331,7 @@ mod tests {
     use crate::colour::{Palette, Share, Stops};
     use crate::moment::After;
     use crate::quantity::Quantity;
+    use crate::sun::Subsolar;
 
     fn moment() -> Moment {
         Moment {
@@ -354,6 +359,7 @@ mod tests {
             },
             value: moment(),
             accumulated: None,
+            relief: None,
             mode: Mode::Volume,
             view: View::Tile {
                 tile: Tile { z: 1, x: 0, y: 0 },
@@ -374,6 +380,30 @@ mod tests {
         for unused in ["reversed", "colors", "opacity", "\"size\"", "doubt"] {
             assert!(!json.contains(unused), "{unused}: {json}");
         }
+    }
+
+    fn subsolar(lon_deg: f64) -> Subsolar {
+        let lat_deg = 20.0;
+        Subsolar { lon_deg, lat_deg }
+    }
+
+    fn relief(exaggeration: f64) -> Relief {
+        Relief {
+            grid: job().grid,
+            frame: "frames/etopo/a".parse().unwrap(),
+            exaggeration,
+        }
+    }
+
+    #[test]
+    fn a_job_of_an_older_program_keeps_its_name() {
+        let text = serde_json::to_string(&job()).unwrap();
+        for later in ["relief", "context", "subsolar"] {
+            assert!(!text.contains(later), "{text}");
+        }
+        assert!(text.contains(r#""sun":{"azimuth_deg":"315","elevation_deg":"40"}"#));
+        let back: RenderJob = serde_json::from_str(&text).unwrap();
+        assert_eq!(back.digest(), job().digest());
     }
 
     #[test]
@@ -410,6 +440,12 @@ mod tests {
         changed(|j| j.style.transfer.opacity = "0:0.5".parse().unwrap());
         changed(|j| j.style.transfer.opacity = "0:0.25".parse().unwrap());
         changed(|j| j.style.transfer.size = "0:0.5".parse().unwrap());
+        changed(|j| j.style.sun.subsolar = Some(subsolar(10.0)));
+        changed(|j| j.style.sun.subsolar = Some(subsolar(11.0)));
+        changed(|j| j.style.context.coastlines = true);
+        changed(|j| j.style.context.sea_opacity = 0.5);
+        changed(|j| j.relief = Some(relief(15.0)));
+        changed(|j| j.relief = Some(relief(30.0)));
         changed(|j| j.renderer_version += 1);
         let count = names.len();
         names.sort();
@@ -432,6 +468,9 @@ mod tests {
             job.value.after = Some(after("frames/p/b", odd.fract()));
             job.style.transfer.low = -odd * 1e-9;
             job.style.sun.azimuth_deg = odd;
+            job.style.sun.subsolar = Some(subsolar(-odd));
+            job.style.context.sea_opacity = odd.fract() * 0.9;
+            job.relief = Some(relief(odd));
             job.view = View::Globe {
                 lon_deg: odd,
                 lat_deg: -odd,
@@ -454,8 +493,12 @@ mod tests {
             width_px,
             height_px: 10,
         };
-        let broken: [fn(&mut RenderJob); 10] = [
+        let broken: [fn(&mut RenderJob); 14] = [
             |j| j.grid.rows = u32::MAX,
+            |j| j.style.sun.subsolar = Some(subsolar(f64::NAN)),
+            |j| j.style.sun.azimuth_deg = f64::INFINITY,
+            |j| j.style.context.sea_opacity = 1.0,
+            |j| j.relief = Some(relief(-1.0)),
             |j| j.value.before = Some("raw/p/a".parse().unwrap()),
             |j| {
                 j.accumulated = Some(Moment {

@@ -6,6 +6,7 @@
 
 pub mod chunk;
 pub mod colour;
+pub mod context;
 pub mod digest;
 pub mod earth;
 pub mod error;
@@ -20,6 +21,7 @@ pub mod observation;
 pub mod product;
 pub mod quantity;
 pub mod region;
+pub mod sun;
 pub mod tile;
 pub mod time;
 pub mod topic;

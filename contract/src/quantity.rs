@@ -35,6 +35,8 @@ pub enum Quantity {
     Precipitation,
     /// Eastward or northward sea-water velocity, m s⁻¹.
     Current,
+    /// Height of the solid earth above the mean level of the sea, m, negative on the sea floor.
+    Elevation,
 }
 
 /// How a quantity is shown: `shown = stored * factor + offset`.
@@ -62,7 +64,7 @@ impl Display {
 
 impl Quantity {
     /// Every quantity.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::CarbonFlux,
         Self::AccumulatedCarbon,
         Self::SeaSurfaceTemperature,
@@ -75,6 +77,7 @@ impl Quantity {
         Self::WaveHeight,
         Self::Precipitation,
         Self::Current,
+        Self::Elevation,
     ];
 
     /// Unit of stored values.
@@ -87,7 +90,7 @@ impl Quantity {
             Self::WindSpeed | Self::Current => "m s-1",
             Self::Pco2 | Self::AirPressure => "Pa",
             Self::Salinity | Self::IceFraction => "1",
-            Self::WaveHeight => "m",
+            Self::WaveHeight | Self::Elevation => "m",
         }
     }
 
@@ -103,7 +106,7 @@ impl Quantity {
             Self::Salinity => ("", 1.0, 0.0),
             Self::AirPressure => ("hPa", 0.01, 0.0),
             Self::IceFraction => ("%", 100.0, 0.0),
-            Self::WaveHeight => ("m", 1.0, 0.0),
+            Self::WaveHeight | Self::Elevation => ("m", 1.0, 0.0),
             Self::Precipitation => ("mm d⁻¹", 86_400.0, 0.0),
         };
         Display {
@@ -128,6 +131,7 @@ impl Quantity {
             Self::WaveHeight => "Significant wave height",
             Self::Precipitation => "Precipitation",
             Self::Current => "Current",
+            Self::Elevation => "Elevation",
         }
     }
 
@@ -146,6 +150,8 @@ impl Quantity {
             Self::WaveHeight => 0.0..=40.0,
             Self::Precipitation => 0.0..=0.1,
             Self::Current => -10.0..=10.0,
+            // The Challenger Deep and Mount Everest, with room for other surfaces of reference.
+            Self::Elevation => -12_000.0..=9_500.0,
         }
     }
 }

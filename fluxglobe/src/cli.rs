@@ -6,6 +6,7 @@ mod observations;
 mod pictures;
 mod services;
 mod show;
+mod surroundings;
 mod upkeep;
 
 use std::num::NonZeroU16;
@@ -26,6 +27,7 @@ pub(crate) use services::{
     Topics,
 };
 pub(crate) use show::settings as shown_settings;
+pub(crate) use surroundings::Surroundings;
 pub(crate) use upkeep::{Gc, Recompute, RecomputeWhat, Survey};
 
 /// See and count the ocean's carbon.
@@ -335,6 +337,8 @@ pub(crate) struct Picture {
     /// Particles a cell, 1 to 256.
     #[arg(long)]
     pub(crate) particles: Option<u32>,
+    #[command(flatten, next_help_heading = "Surroundings")]
+    pub(crate) surroundings: Surroundings,
     /// File to write.
     #[arg(short, long, value_name = "FILE.png")]
     pub(crate) output: PathBuf,
@@ -431,6 +435,36 @@ mod tests {
         let (own, shared) = help.split_once("Options of every command:").unwrap();
         assert!(own.contains("--json") && !own.contains("--data"), "{help}");
         assert!(shared.contains("--data") && !shared.contains("--json"));
+    }
+
+    #[test]
+    fn what_surrounds_a_picture_stands_apart_and_is_read_or_refused() {
+        let mut program = Cli::command();
+        program.build();
+        let render = program.find_subcommand_mut("render").unwrap();
+        for name in ["tile", "globe", "animation"] {
+            let command = render.find_subcommand_mut(name).unwrap();
+            let help = command.render_help().to_string();
+            let (own, apart) = help.split_once("Surroundings:").unwrap();
+            assert!(
+                own.contains("--layer") && own.contains("--output"),
+                "{help}"
+            );
+            assert!(apart.contains("--relief <PRODUCT>") && apart.contains("--sun <"));
+        }
+        let parse = |more: &[&str]| {
+            let words = "fluxglobe render globe --layer p --lon 0 --lat 0 -o a.png";
+            Cli::try_parse_from(words.split(' ').chain(more.iter().copied()))
+        };
+        assert!(parse(&["--coastlines", "--sun", "135,30", "--relief", "etopo20"]).is_ok());
+        for wrong in [
+            &["--sun", "noon"][..],
+            &["--relief-exaggeration", "3"],
+            &["--sea-opacity", "deep"],
+        ] {
+            let refused = parse(wrong).unwrap_err().to_string();
+            assert!(refused.contains(wrong[0]), "{refused}");
+        }
     }
 
     #[test]

@@ -60,8 +60,7 @@ impl Device {
         part: Part,
         scene: &Scene,
     ) -> Result<Vec<u8>, RenderError> {
-        let buffers =
-            self.scene_buffers(scene, &plan.held_cells(), plan.params.doubt == 1)?;
+        let buffers = self.scene_buffers(scene, &plan.held_cells(), plan.params.doubt == 1)?;
         // A poisoned pool is whole: workspaces are only pushed and popped.
         let idle = || self.idle.lock().unwrap_or_else(PoisonError::into_inner);
         let mut workspace = idle().pop().unwrap_or_default();
@@ -95,7 +94,10 @@ impl Device {
         let pair = |interval: &Interval| -> Result<[wgpu::Buffer; 2], RenderError> {
             Ok([frame(&interval.before)?, frame(&interval.after)?])
         };
-        let doubt = |frame: &Frame| self.resident.buffer(&self.gpu, frame.doubts(), held.clone());
+        let doubt = |frame: &Frame| {
+            self.resident
+                .buffer(&self.gpu, frame.doubts(), held.clone())
+        };
         let doubts = || -> Result<[wgpu::Buffer; 2], RenderError> {
             Ok([doubt(&scene.value.before)?, doubt(&scene.value.after)?])
         };
@@ -106,6 +108,15 @@ impl Device {
                 .resident
                 .buffer(&self.gpu, &scene.domain, held.clone())?,
             doubts: has_doubt.then(doubts).transpose()?,
+            terrain: scene
+                .terrain
+                .as_ref()
+                .map(|terrain| {
+                    let cells = &terrain.elevation.cells;
+                    self.resident
+                        .buffer(&self.gpu, cells, 0..cells.content().len())
+                })
+                .transpose()?,
         })
     }
 }

@@ -77,8 +77,10 @@ pub enum RenderError {
         height: u32,
         source: image::ImageError,
     },
-    /// Only volumes without a globe behind them are drawn another way, filled cells like all.
-    #[error("the reference draws volumes without a globe behind them and without doubt only")]
+    /// Only volumes without a globe behind them are drawn another way.
+    #[error(
+        "the reference draws volumes alone: no globe behind them, no surroundings, no doubt, no sun of an instant"
+    )]
     NoReference,
     /// The thread that drew was lost.
     #[error("the drawing thread ended early")]

@@ -30,6 +30,7 @@ pub struct SceneBuffers {
     pub domain: wgpu::Buffer,
     /// Doubts of both frames of values; none where they are not drawn.
     pub doubts: Option<[wgpu::Buffer; 2]>,
+    pub terrain: Option<wgpu::Buffer>,
 }
 
 /// What the stages of one frame share while they are recorded.
@@ -43,6 +44,7 @@ pub struct FrameContext<'a> {
     pub accumulated_frames: Option<[wgpu::Buffer; 2]>,
     pub domain: wgpu::Buffer,
     pub doubts: Option<[wgpu::Buffer; 2]>,
+    pub terrain: Option<wgpu::Buffer>,
     workspace: &'a mut Workspace,
 }
 
@@ -63,6 +65,7 @@ impl<'a> FrameContext<'a> {
             accumulated,
             domain,
             doubts,
+            terrain,
         } = scene;
         Ok(Self {
             gpu,
@@ -74,6 +77,7 @@ impl<'a> FrameContext<'a> {
             accumulated_frames: accumulated,
             domain,
             doubts,
+            terrain,
             workspace,
         })
     }
@@ -186,7 +190,11 @@ impl Stages {
         scene: &SceneBuffers,
     ) -> Result<Vec<u8>, RenderError> {
         let params = plan.params_of(part);
-        if params.splat_count == 0 && plan.mode != Mode::Map && params.surface == 0 {
+        if params.splat_count == 0
+            && plan.mode != Mode::Map
+            && params.surface == 0
+            && params.in_context == 0
+        {
             return Ok(vec![
                 0;
                 part.size_px[0] as usize * part.size_px[1] as usize * 4

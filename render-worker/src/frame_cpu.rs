@@ -5,8 +5,9 @@ use glam::Vec4;
 
 use crate::error::RenderError;
 use crate::plan::{Part, Plan};
-use crate::scene::{Interval, Scene};
+use crate::scene::{Interval, Scene, Terrain};
 use crate::stages::bin::list_count;
+use crate::stages::compose::in_context::{self, Surroundings};
 use crate::stages::layout::{Entry, Params, Particle, Splat};
 use crate::stages::particles::cpu::Inputs;
 use crate::stages::{bin, compose, doubt, eye, interpolate, light, map, particles, project};
@@ -64,7 +65,22 @@ pub fn draw(plan: &Plan, part: Part, scene: &Scene) -> Result<Vec<u8>, RenderErr
         eye::cpu::eye(&params, &list_ends, &entries, &mut picture);
     }
     let mut image = vec![0u32; pixels];
-    compose::cpu::compose(&params, &picture, scene.domain.content(), &mut image);
+    let domain = scene.domain.content();
+    if params.in_context == 1 {
+        let around = Surroundings {
+            domain,
+            terrain: scene
+                .terrain
+                .as_ref()
+                .map(Terrain::heights_m)
+                .unwrap_or_default(),
+            ground_axes: &plan.ground_axes,
+            coast: &plan.coast,
+        };
+        in_context::compose(&params, &picture, &around, &mut image);
+    } else {
+        compose::cpu::compose(&params, &picture, domain, &mut image);
+    }
     Ok(image.into_iter().flat_map(u32::to_le_bytes).collect())
 }
 

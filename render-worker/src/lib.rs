@@ -12,6 +12,7 @@
 #[macro_use]
 mod shared_struct;
 
+pub mod coast;
 mod device;
 pub mod error;
 pub mod frame;

@@ -68,6 +68,11 @@ impl<'a> Playback<'a> {
             accumulated: scene.accumulated.as_ref().map(pair).transpose()?,
             domain: gpu.storage("domain", scene.domain.content())?,
             doubts: scene.value.has_doubt().then(doubts).transpose()?,
+            terrain: scene
+                .terrain
+                .as_ref()
+                .map(|terrain| gpu.storage("terrain", terrain.elevation.cells.content()))
+                .transpose()?,
         })
     }
 

@@ -1,7 +1,8 @@
 //! Coarser versions of scenes: where many cells share a pixel, cells are drawn in blocks of four, of sixteen and so on.
 //!
 //! Values become means over cells with data; accumulated carbon becomes what keeps its mass. A block belongs to the
-//! domain if any of its cells does. Every coarser version is made once and kept with what it was made from.
+//! domain if any of its cells does. Every coarser version is made once and kept with what it was made from. The terrain
+//! has a grid and coarser versions of its own.
 
 use std::sync::Arc;
 
@@ -10,14 +11,47 @@ use contract::grid::Grid;
 use contract::job::RenderJob;
 
 use crate::plan::cell_px;
-use crate::scene::{Cells, Frame, Interval, Scene};
+use crate::scene::{Cells, Frame, Interval, Scene, Terrain};
 use crate::stages::layout::is_missing;
 
 /// Cells smaller than this are joined, pixels: blocks then measure half a pixel to one.
 const LEAST_CELL_PX: f64 = 0.5;
+/// Cells of the terrain smaller than this are joined, pixels: one pixel shows one cell, so what lies between is lost.
+const LEAST_TERRAIN_CELL_PX: f64 = 1.0;
 
 /// The version of a scene that a job is drawn from; none if it is the scene itself.
 pub(crate) fn suited(job: &RenderJob, scene: &Scene) -> Option<Scene> {
+    let product = suited_product(job, scene);
+    let terrain = scene.terrain.as_ref();
+    let Some(terrain) = terrain.and_then(|terrain| suited_terrain(job, terrain)) else {
+        return product;
+    };
+    let mut suited = product.unwrap_or_else(|| scene.clone());
+    suited.terrain = Some(terrain);
+    Some(suited)
+}
+
+/// The coarser terrain that a job is drawn from; none if it is the terrain itself.
+fn suited_terrain(job: &RenderJob, terrain: &Terrain) -> Option<Terrain> {
+    let mut suited: Option<Terrain> = None;
+    loop {
+        let finest = suited.as_ref().unwrap_or(terrain);
+        if cell_px(&job.view, &finest.grid) >= LEAST_TERRAIN_CELL_PX {
+            return suited;
+        }
+        let Some(grid) = halved(&finest.grid) else {
+            return suited;
+        };
+        let blocks = Blocks {
+            fine: &finest.grid,
+            grid: &grid,
+        };
+        let elevation = finest.elevation.coarser_mean(|cells| blocks.mean(cells));
+        suited = Some(Terrain { grid, elevation });
+    }
+}
+
+fn suited_product(job: &RenderJob, scene: &Scene) -> Option<Scene> {
     let mut suited: Option<Scene> = None;
     loop {
         let finest = suited.as_ref().unwrap_or(scene);
@@ -31,9 +65,8 @@ pub(crate) fn suited(job: &RenderJob, scene: &Scene) -> Option<Scene> {
     }
 }
 
-/// The same scene in blocks of two by two cells, if such blocks fit the earth.
-pub fn coarser(scene: &Scene) -> Option<Scene> {
-    let fine = &scene.grid;
+/// A grid of blocks of two by two cells, if such blocks fit the earth.
+fn halved(fine: &Grid) -> Option<Grid> {
     let grid = Grid {
         rows: fine.rows.div_ceil(2),
         cols: fine.cols.div_ceil(2),
@@ -42,9 +75,14 @@ pub fn coarser(scene: &Scene) -> Option<Scene> {
         ..*fine
     };
     // An odd number of columns all round, or of rows down to a pole, cannot be halved.
-    if grid.validate().is_err() || (fine.rows < 2 && fine.cols < 2) {
-        return None;
-    }
+    let fits = grid.validate().is_ok() && (fine.rows >= 2 || fine.cols >= 2);
+    fits.then_some(grid)
+}
+
+/// The same scene in blocks of two by two cells, if such blocks fit the earth; its terrain stays as it is.
+pub fn coarser(scene: &Scene) -> Option<Scene> {
+    let fine = &scene.grid;
+    let grid = halved(fine)?;
     let blocks = Blocks { fine, grid: &grid };
     let mean = |frame: &Arc<Frame>| frame.coarser_mean(|cells| blocks.mean(cells));
     let mass = |frame: &Arc<Frame>| frame.coarser_mass(|cells| blocks.mass(cells));
@@ -61,6 +99,7 @@ pub fn coarser(scene: &Scene) -> Option<Scene> {
             .accumulated
             .as_ref()
             .map(|interval| both(interval, &mass)),
+        terrain: scene.terrain.clone(),
     })
 }
 

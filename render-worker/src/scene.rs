@@ -1,4 +1,5 @@
-//! What there is to see at one instant: two adjacent frames of a product, of its accumulated carbon, and its domain.
+//! What there is to see at one instant: two adjacent frames of a product, of its accumulated carbon, its domain, and the
+//! terrain below.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
@@ -177,6 +178,22 @@ impl Interval {
     }
 }
 
+/// Land and sea floor, on a grid of their own.
+#[derive(Debug, Clone)]
+pub struct Terrain {
+    /// The grid.
+    pub grid: Grid,
+    /// Height above the level of the sea, m; [`MISSING`] where it is not known.
+    pub elevation: Arc<Frame>,
+}
+
+impl Terrain {
+    /// Height of every cell, m.
+    pub fn heights_m(&self) -> &[f32] {
+        self.elevation.cells.content()
+    }
+}
+
 /// Everything a picture is drawn from, apart from its job.
 #[derive(Debug, Clone)]
 pub struct Scene {
@@ -188,6 +205,8 @@ pub struct Scene {
     pub value: Interval,
     /// Accumulated carbon, kg m⁻².
     pub accumulated: Option<Interval>,
+    /// What lies below.
+    pub terrain: Option<Terrain>,
 }
 
 impl Scene {
@@ -204,6 +223,15 @@ impl Scene {
             .flatten()
             .flat_map(|interval| [&interval.before, &interval.after])
             .all(|frame| frame.cells.content.len() == self.grid.cell_count());
+        if let Some(Terrain { grid, elevation }) = &self.terrain {
+            grid.validate()?;
+            if elevation.cells.content.len() != grid.cell_count() {
+                return Err(RenderError::GridMismatch {
+                    product: "the relief".into(),
+                    accumulated: "its frame".into(),
+                });
+            }
+        }
         if fits && self.domain.content.len() == self.grid.cell_count() {
             self.grid.validate()?;
             return Ok(());

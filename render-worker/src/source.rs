@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use contract::context::Relief;
 use contract::grid::Grid;
 use contract::job::RenderJob;
 use contract::key::ObjectKey;
@@ -13,7 +14,7 @@ use storage::{StorageError, Store};
 use crate::error::RenderError;
 use crate::recent::Recent;
 use crate::renderer::Renderer;
-use crate::scene::{Cells, Frame, Interval, Scene};
+use crate::scene::{Cells, Frame, Interval, Scene, Terrain};
 use crate::stages::fill::Form;
 use crate::stages::fill::scaled::holds;
 
@@ -87,12 +88,47 @@ impl Source {
             Some(carbon) => Some(self.interval(grid, carbon).await?.1),
             None => None,
         };
+        let terrain = match &job.relief {
+            Some(relief) => Some(self.terrain(relief).await?),
+            None => None,
+        };
         Ok(Scene {
             grid: *grid,
             domain,
             value,
             accumulated,
+            terrain,
         })
+    }
+
+    /// The frame of a relief, as it is stored: what is missing stays so.
+    async fn terrain(&self, relief: &Relief) -> Result<Terrain, RenderError> {
+        let grid = relief.grid;
+        // No domain: its gaps are not filled.
+        let key = (relief.frame.clone(), relief.frame.clone());
+        let held = self.lock().frames.get(&key);
+        if let Some(elevation) = held {
+            self.frame_hits.fetch_add(1, Ordering::Relaxed);
+            // Found under its content, which says nothing of the grid of another job.
+            let fits = elevation.cells.content().len() == grid.cell_count();
+            let mismatch = || RenderError::GridMismatch {
+                product: "the job".to_owned(),
+                accumulated: relief.frame.to_string(),
+            };
+            return fits
+                .then_some(Terrain { grid, elevation })
+                .ok_or_else(mismatch);
+        }
+        self.frame_misses.fetch_add(1, Ordering::Relaxed);
+        let read = storage::frames::read(&self.store, &relief.frame, &grid).await;
+        let values = read.map_err(|source| RenderError::Store {
+            what: "the relief",
+            product: relief.frame.to_string(),
+            source: Box::new(source),
+        })?;
+        let elevation = Arc::new(Frame::new(values));
+        self.keep_frame(key, &elevation);
+        Ok(Terrain { grid, elevation })
     }
 
     /// The domain of a moment and the frames around it.

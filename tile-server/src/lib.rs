@@ -17,6 +17,9 @@
 //! | `/healthz`, `/readyz`, `/metrics` | the process lives; it can serve; Prometheus text |
 //! | `/` and below | the viewer's files |
 //!
+//! Pictures and TileJSON take `relief=&relief_exaggeration=&sea_opacity=&coastlines=&sun=&height_exaggeration=` besides:
+//! what surrounds the particles (`surroundings.rs`), part of the picture's name like everything else.
+//!
 //! Times are ISO 8601 and any instant is valid; a missing one is the middle of the last step. `from` and `to` bound
 //! the half-open period `[from, to)`. `manifest` names a version, as answers do; without it the newest one answers. An instant outside what a
 //! product covers shows the nearest one inside; pictures say so in `fluxglobe-time` and `fluxglobe-time-covered`. Every refusal is JSON, `{"error": reason}`.
@@ -46,6 +49,7 @@ mod router;
 mod routes;
 mod serve;
 mod state;
+mod surroundings;
 mod versions;
 
 pub use catalogue::{Accumulated, Layer};

@@ -13,6 +13,7 @@ use std::sync::Arc;
 use anyhow::{Context as _, Result, bail};
 use bytes::Bytes;
 use contract::manifest::Manifest;
+use contract::sun::SunChoice;
 use contract::time::TimeMs;
 use futures::stream::{self, StreamExt as _, TryStreamExt as _};
 use prometheus::Registry;
@@ -83,6 +84,10 @@ async fn shots(settings: &Settings, store: &Store, options: &RenderAnimation) ->
     let (from, to) = span(&product, options.from, options.to)?;
     let mut style = render::style(&product, &globe.picture)?;
     style.globe_surface = !globe.transparent;
+    let sun_of_time = globe.picture.surroundings.sun == Some(SunChoice::OfTime);
+    if !sun_of_time {
+        style = render::sunlit(style, &globe.picture, from);
+    }
     let shots = Shots {
         accumulated: render::accumulated(store, &product).await?,
         product,
@@ -91,6 +96,8 @@ async fn shots(settings: &Settings, store: &Store, options: &RenderAnimation) ->
         mode: globe.picture.mode,
         view,
         style,
+        sun_of_time,
+        relief: render::relief(store, settings, &globe.picture).await?,
         fps: options.fps,
         count: Shots::count_of(options.seconds, options.fps)?,
         turn_deg: options.turn,

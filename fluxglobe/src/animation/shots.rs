@@ -1,8 +1,10 @@
 //! The pictures of an animation: which job is the one of each number.
 
 use anyhow::{Result, bail};
+use contract::context::Relief;
 use contract::job::{Mode, RenderJob, Style, View};
 use contract::manifest::Manifest;
+use contract::sun::SunChoice;
 use contract::time::TimeMs;
 use serde::{Deserialize, Serialize};
 
@@ -27,6 +29,12 @@ pub(super) struct Shots {
     /// View of picture 0.
     pub(super) view: View,
     pub(super) style: Style,
+    /// Each picture has the sun of its own instant.
+    #[serde(default)]
+    pub(super) sun_of_time: bool,
+    /// What lies below.
+    #[serde(default)]
+    pub(super) relief: Option<Relief>,
     pub(super) fps: u16,
     pub(super) count: u32,
     /// Degrees that the camera moves east in all.
@@ -88,14 +96,11 @@ impl Shots {
             }
         }
         let (accumulated, time) = (self.accumulated.as_ref(), self.time(number)?);
-        let job = RenderJob::of(
-            &self.product,
-            accumulated,
-            time,
-            self.mode,
-            view,
-            self.style,
-        )?;
-        Ok(job)
+        let mut style = self.style;
+        if self.sun_of_time {
+            style.sun = SunChoice::OfTime.instead_of(style.sun, time);
+        }
+        let job = RenderJob::of(&self.product, accumulated, time, self.mode, view, style)?;
+        Ok(job.over(self.relief.clone())?)
     }
 }

@@ -66,6 +66,8 @@ fn shots(count: u32) -> Shots {
         mode: Mode::Volume,
         view,
         style: Style::with_transfer(TransferFunction::default_for(Quantity::CarbonFlux)),
+        sun_of_time: false,
+        relief: None,
         to: "2001-01-01".parse().unwrap(),
         fps: 25,
         count,
@@ -101,6 +103,18 @@ fn instants_divide_the_span_and_a_whole_turn_closes_to_a_ring() {
     // Past the date line: 170 + 40 * 183 / 366.
     assert!((lon(183) - -170.0).abs() < 1e-9, "{}", lon(183));
     assert_ne!(job(1).digest(), job(2).digest());
+}
+
+#[test]
+fn every_picture_has_the_sun_of_its_own_instant_if_that_is_asked_for() {
+    let sun_of = |shots: &Shots, number| shots.job(number).unwrap().style.sun.subsolar;
+    let mut shots = shots(366);
+    assert_eq!(sun_of(&shots, 7), None);
+    shots.sun_of_time = true;
+    // Midnight in Greenwich in January and in July: the sun over the date line, in the south and in the north.
+    let [january, july] = [0, 182].map(|number| sun_of(&shots, number).unwrap());
+    assert!(january.lon_deg.abs() > 175.0 && july.lon_deg.abs() > 175.0);
+    assert!(january.lat_deg < -22.0 && july.lat_deg > 22.0);
 }
 
 #[test]

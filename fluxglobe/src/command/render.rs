@@ -1,10 +1,11 @@
 //! `fluxglobe render`: a product, an instant and a view in, a PNG file out.
 
 use anyhow::{Context as _, Result};
+use contract::context::{Context, Relief};
 use contract::job::{RenderJob, Style, View};
 use contract::manifest::Manifest;
 use contract::tile::Tile;
-use contract::time::Period;
+use contract::time::{Period, TimeMs};
 use storage::Store;
 
 use crate::cli::{Picture, Render, RenderGlobe, Settings};
@@ -68,18 +69,42 @@ pub(crate) async fn job(
     let last = manifest.steps.last().context("the product has no step")?;
     let style = style(&manifest, picture)?;
     let time = picture.time.unwrap_or(last.period.mid());
-    if let Some(Period { start, end }) = manifest.extent()
-        && (time < start || time > end)
+    let extent = manifest.extent();
+    let shown = extent.map_or(time, |Period { start, end }| time.clamp(start, end));
+    if let Some(Period { start, end }) = extent
+        && shown != time
     {
-        let shown = time.clamp(start, end);
         progress::say(&format!(
             "{} covers {start} to {end} and has nothing of {time}; shown is {shown}",
             manifest.product
         ));
     }
     let lift = accumulated(store, &manifest).await?;
+    let style = sunlit(style, picture, shown);
     let job = RenderJob::of(&manifest, lift.as_ref(), time, picture.mode, view, style)?;
-    Ok(job)
+    Ok(job.over(relief(store, settings, picture).await?)?)
+}
+
+/// The style with the sun that a picture of this instant asks for.
+pub(crate) fn sunlit(mut style: Style, picture: &Picture, time: TimeMs) -> Style {
+    if let Some(choice) = picture.surroundings.sun {
+        style.sun = choice.instead_of(style.sun, time);
+    }
+    style
+}
+
+/// The newest version of the relief that a picture asks for.
+pub(crate) async fn relief(
+    store: &Store,
+    settings: &Settings,
+    picture: &Picture,
+) -> Result<Option<Relief>> {
+    let options = &picture.surroundings;
+    let Some(product) = &options.relief else {
+        return Ok(None);
+    };
+    let elevation = deployment::manifest(store, product, &settings.data).await?;
+    Ok(Some(Relief::of(&elevation, options.relief_exaggeration)?))
 }
 
 /// The newest version of a picture's product.
@@ -98,6 +123,13 @@ pub(crate) fn style(product: &Manifest, picture: &Picture) -> Result<Style> {
     style.slices = picture.slices.unwrap_or(style.slices);
     style.particles_per_cell = picture.particles.unwrap_or(style.particles_per_cell);
     style.doubt = picture.doubt;
+    let options = &picture.surroundings;
+    let height_m = options.height_exaggeration;
+    style.height_m_per_kg_m2 = height_m.unwrap_or(style.height_m_per_kg_m2);
+    style.context = Context {
+        sea_opacity: options.sea_opacity,
+        coastlines: options.coastlines,
+    };
     Ok(style)
 }
 

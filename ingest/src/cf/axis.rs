@@ -11,6 +11,9 @@ use crate::rejection::Rejection;
 const TOLERANCE_CELLS: f64 = 0.02;
 /// Edges and steps closer than this (in cells) to a round fraction of a degree are taken to be that.
 const SNAP_CELLS: f64 = 2e-3;
+/// A longitude axis that misses the whole turn by less than this (in cells) was meant to make one: labels of single
+/// precision that were summed up drift so far.
+const TURN_CELLS: f64 = 0.05;
 
 /// What the labels of a grid's axes name.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
@@ -19,6 +22,8 @@ pub(crate) enum Registration {
     /// The middle of a cell.
     #[default]
     Center,
+    /// The same; rows centred on the poles, half of which lies beyond, are left out.
+    CenterWithoutPoles,
     /// Corners of a cell.
     NorthWest,
     NorthEast,
@@ -61,7 +66,7 @@ impl Mapping {
             ));
         }
         let (north_shift, west_shift) = registration.shifts();
-        let (dlat, dlon) = (snapped_step(lat), snapped_step(lon));
+        let (dlat, dlon) = (snapped_step(lat), closed_step(lon));
         let northernmost = if lat.step > 0.0 {
             lat.last()
         } else {
@@ -72,13 +77,23 @@ impl Mapping {
         } else {
             lon.last()
         };
-        let north = snapped_edge(northernmost + north_shift * dlat, dlat);
+        let mut north = snapped_edge(northernmost + north_shift * dlat, dlat);
         let west = snapped_edge(westernmost - west_shift * dlon, dlon);
-        let file_rows = if lat.step > 0.0 {
+        let mut file_rows: Vec<u32> = if lat.step > 0.0 {
             (0..lat.count).rev().collect()
         } else {
             (0..lat.count).collect()
         };
+        if registration == Registration::CenterWithoutPoles {
+            let south = north - f64::from(lat.count) * dlat;
+            if south < -90.0 - SNAP_CELLS * dlat {
+                file_rows.pop();
+            }
+            if north > 90.0 + SNAP_CELLS * dlat {
+                file_rows.remove(0);
+                north -= dlat;
+            }
+        }
         let file_cols: Vec<u32> = if lon.step > 0.0 {
             (0..lon.count).collect()
         } else {
@@ -140,7 +155,7 @@ impl Mapping {
         };
         if north_deg > 90.0 + SNAP_CELLS * dlat || grid.south_deg() < -90.0 - SNAP_CELLS * dlat {
             let detail = "has cells that reach past a pole; if its labels are corners, say so with registration in a profile, \
-                          and if rows are centred on the poles, regrid it";
+                          and if rows are centred on the poles, leave them out with registration = \"center_without_poles\"";
             return Err(refused(names[0], detail));
         }
         grid.validate()
@@ -157,7 +172,7 @@ impl Registration {
     /// From label to northern edge, and from western edge to label, in cells.
     fn shifts(self) -> (f64, f64) {
         match self {
-            Self::Center => (0.5, 0.5),
+            Self::Center | Self::CenterWithoutPoles => (0.5, 0.5),
             Self::NorthWest => (0.0, 0.0),
             Self::NorthEast => (0.0, 1.0),
             Self::SouthWest => (1.0, 0.0),
@@ -237,6 +252,16 @@ fn snapped_step(axis: Regular) -> f64 {
         }
     }
     step
+}
+
+/// A step of longitudes: the part of a turn that it was meant to be, if it is close to one.
+fn closed_step(axis: Regular) -> f64 {
+    let step = axis.step.abs();
+    let missed = (step * f64::from(axis.count) - 360.0).abs();
+    if missed < TURN_CELLS * step {
+        return 360.0 / f64::from(axis.count);
+    }
+    snapped_step(axis)
 }
 
 /// An edge as the multiple of half a cell it was meant to be, if it is close to one.
@@ -321,6 +346,35 @@ mod tests {
         assert_eq!(
             map(&lat, &lon, Registration::SouthEast).unwrap().grid,
             ONE_DEGREE
+        );
+    }
+
+    #[test]
+    fn longitudes_that_drift_past_the_turn_make_one() {
+        // 5 minutes of arc, summed up with an error of a millionth of a degree each.
+        let lon = labels(0.0, 359.92 / 4319.0, 4320);
+        let m = map(&labels(89.5, -1.0, 180), &lon, Registration::Center).unwrap();
+        assert_eq!((m.grid.cols, m.grid.dlon_deg), (4320, 1.0 / 12.0));
+        assert!(m.grid.is_periodic());
+    }
+
+    #[test]
+    fn rows_centred_on_the_poles_are_refused_or_left_out() {
+        let (lat, lon) = (labels(-90.0, 0.5, 361), labels(20.0, 0.5, 721));
+        let refused = map(&lat, &lon, Registration::Center).unwrap_err();
+        assert!(refused.detail.contains("center_without_poles"));
+        let m = map(&lat, &lon, Registration::CenterWithoutPoles).unwrap();
+        assert_eq!(
+            (m.grid.rows, m.grid.north_deg, m.grid.south_deg()),
+            (359, 89.75, -89.75)
+        );
+        assert_eq!((m.file_rows[0], m.file_rows[358]), (359, 1));
+        assert_eq!((m.grid.cols, m.grid.west_deg), (720, -179.75));
+        // A grid without such rows is what it is without the word.
+        let (lat, lon) = (labels(-89.5, 1.0, 180), labels(0.5, 1.0, 360));
+        assert_eq!(
+            map(&lat, &lon, Registration::CenterWithoutPoles).unwrap(),
+            map(&lat, &lon, Registration::Center).unwrap()
         );
     }
 

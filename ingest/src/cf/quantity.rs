@@ -8,7 +8,7 @@ use crate::unit::Substance;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Named {
     pub(crate) quantity: Quantity,
-    /// Multiplies values to be positive out of the sea.
+    /// Multiplies values to be positive out of the sea, upwards.
     pub(crate) sign: f64,
     /// Of what a mass is.
     pub(crate) substance: Option<Substance>,
@@ -67,6 +67,17 @@ pub(crate) fn of_standard_name(name: &str) -> Option<Named> {
         | "northward_sea_water_velocity"
         | "surface_eastward_sea_water_velocity"
         | "surface_northward_sea_water_velocity" => plain(Quantity::Current),
+        "surface_altitude" | "bedrock_altitude" | "height_above_mean_sea_level" => {
+            plain(Quantity::Elevation)
+        }
+        // Depths are counted downwards.
+        "sea_floor_depth"
+        | "sea_floor_depth_below_geoid"
+        | "sea_floor_depth_below_mean_sea_level" => Some(Named {
+            quantity: Quantity::Elevation,
+            sign: -1.0,
+            substance: None,
+        }),
         _ => None,
     }
 }

@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 use super::Profile;
 
 /// Name and text of each, in the order in which they are tried.
-const TEXTS: [(&str, &str); 19] = [
+const TEXTS: [(&str, &str); 21] = [
     (
         "takahashi09-flux",
         include_str!("../../profiles/takahashi09-flux.toml"),
@@ -70,6 +70,8 @@ const TEXTS: [(&str, &str); 19] = [
         "takahashi09-salinity",
         include_str!("../../profiles/takahashi09-salinity.toml"),
     ),
+    ("etopo20", include_str!("../../profiles/etopo20.toml")),
+    ("etopo5", include_str!("../../profiles/etopo5.toml")),
 ];
 
 static SHIPPED: LazyLock<Vec<Profile>> = LazyLock::new(|| {

@@ -4,7 +4,8 @@ use std::f64::consts::PI;
 
 use contract::earth::SPHERE_RADIUS_M;
 use contract::job::RenderJob;
-use glam::DVec3;
+use contract::sun::{Subsolar, Sun};
+use glam::{DVec2, DVec3};
 
 use super::look;
 use crate::stages::layout::Params;
@@ -30,6 +31,23 @@ fn axes_at(lon_deg: f64, lat_deg: f64) -> [DVec3; 3] {
     let north = DVec3::new(-sin_lat * sin_lon, -sin_lat * cos_lon, cos_lat);
     let up = DVec3::new(cos_lat * sin_lon, cos_lat * cos_lon, sin_lat);
     [east, north, up]
+}
+
+/// Towards the sun over a place.
+pub(super) fn overhead(subsolar: Subsolar) -> DVec3 {
+    let [_east, _north, up] = axes_at(subsolar.lon_deg, subsolar.lat_deg);
+    up
+}
+
+/// Towards a sun that is the same everywhere: east, north and up.
+pub(super) fn local_sun(sun: &Sun) -> DVec3 {
+    let (sin_azimuth, cos_azimuth) = sun.azimuth_deg.to_radians().sin_cos();
+    let (sin_elevation, cos_elevation) = sun.elevation_deg.to_radians().sin_cos();
+    DVec3::new(
+        sin_azimuth * cos_elevation,
+        cos_azimuth * cos_elevation,
+        sin_elevation,
+    )
 }
 
 impl Camera {
@@ -78,8 +96,18 @@ impl Camera {
         );
     }
 
-    /// Towards the sun, which keeps its place in the frame of the self.
+    /// Where a place in front of it is seen, pixels east and south of the picture's middle.
+    pub(super) fn seen_px(&self, place: DVec3) -> DVec2 {
+        let sight = place - self.place;
+        let per_px = self.focal_px / sight.dot(-self.up);
+        DVec2::new(sight.dot(self.east), -sight.dot(self.north)) * per_px
+    }
+
+    /// Towards the sun: the real one, or one that keeps its place in the frame of the camera.
     pub(super) fn sun(&self, job: &RenderJob) -> DVec3 {
+        if let Some(subsolar) = job.style.sun.subsolar {
+            return overhead(subsolar);
+        }
         let (sin_azimuth, cos_azimuth) = job.style.sun.azimuth_deg.to_radians().sin_cos();
         let (sin_elevation, cos_elevation) = job.style.sun.elevation_deg.to_radians().sin_cos();
         (self.east * sin_azimuth + self.north * cos_azimuth) * cos_elevation
@@ -103,12 +131,14 @@ impl Camera {
         if sine >= 1.0 {
             return [horizon.min(PI); 2];
         }
-        let elevation = job
-            .style
-            .sun
-            .elevation_deg
-            .max(look::LOWEST_SUN_DEG)
-            .to_radians();
+        let elevation_deg = match job.style.sun.subsolar {
+            None => job.style.sun.elevation_deg,
+            Some(subsolar) => {
+                let sine = overhead(subsolar).dot(self.up);
+                sine.clamp(-1.0, 1.0).asin().to_degrees()
+            }
+        };
+        let elevation = elevation_deg.max(look::LOWEST_SUN_DEG).to_radians();
         let shadow = (heights[1] - heights[0]) / elevation.tan();
         let seen = sine.asin() - corner + margin;
         [seen, seen + 2.0 * margin + shadow].map(|angle| angle.min(horizon).min(PI))

@@ -4,6 +4,7 @@
 //! is computed here from the scene and the zoom level alone.
 
 mod camera;
+mod context;
 mod globe;
 mod look;
 mod shape;
@@ -21,8 +22,8 @@ use crate::error::RenderError;
 use crate::passes::splat::{HALF_BYTES, workgroups};
 use crate::scene::{Interval, Scene};
 use crate::stages::layout::{
-    Active, Axis, Col, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, Params, Row, SCREEN_TILE_PX, SQUARE,
-    SUBPIXELS, VIEW_TILE,
+    Active, Axis, Col, GroundAxis, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, Params, Row,
+    SCREEN_TILE_PX, SQUARE, SUBPIXELS, VIEW_TILE,
 };
 use look::Look;
 
@@ -54,6 +55,10 @@ pub struct Plan {
     pub active: Vec<Active>,
     pub axes: Vec<Axis>,
     pub palette: Vec<u32>,
+    /// Columns, then rows of a tile in its surroundings; empty otherwise.
+    pub ground_axes: Vec<GroundAxis>,
+    /// Words of the coast mask of the whole picture; empty without coast lines.
+    pub coast: Vec<u32>,
     size_px: [u32; 2],
 }
 
@@ -105,12 +110,15 @@ impl Plan {
             active: vec![],
             axes: vec![],
             palette: palette(job),
+            ground_axes: vec![],
+            coast: vec![],
             size_px,
         };
         match job.view {
             View::Tile { tile, size_px } => tile::plan(&mut plan, job, scene, tile, size_px),
             View::Globe { .. } => globe::plan(&mut plan, job, scene),
         }
+        context::plan(&mut plan, job, scene);
         plan.count_particles(most_buffer_bytes)?;
         plan.choose_band(most_buffer_bytes, most_held_bytes)?;
         Ok(plan)
@@ -283,6 +291,7 @@ fn common(job: &RenderJob, scene: &Scene) -> Params {
         ambient: look::AMBIENT,
         direct: look::DIRECT,
         map_alpha: look::MAP_ALPHA,
+        sea_per_m: style.context.sea_extinction_per_m() as f32,
         grid_west_rad: grid.west_deg.to_radians() as f32,
         grid_north_rad: grid.north_deg.to_radians() as f32,
         cols_per_rad: (1.0 / grid.dlon_deg.to_radians()) as f32,

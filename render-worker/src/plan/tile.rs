@@ -70,6 +70,8 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene, tile: Tile, 
     let heights_m = heights_m.map(|height_m| height_m * flattened);
     plan.params.height_m_per_kg_m2 *= flattened as f32;
     plan.params.height_limit_m *= flattened as f32;
+    // What lies as deep as before is drawn less deep.
+    plan.params.sea_per_m /= flattened as f32;
     plan.params.sheet_m *= flattened as f32;
     plan.params.height_px_per_m = (look::OBLIQUE * level.px_per_m) as f32;
     plan.params.slice_top = heights_m[1] as f32;
@@ -108,16 +110,21 @@ fn rows(
             let (north, south) = (edge_px(row), edge_px(row + 1));
             let height = (south - north).max(1e-6);
             let area_px = height * col_px;
+            let [north_rad, south_rad] =
+                [row, row + 1].map(|row| scene.grid.row_north_deg(row).to_radians());
+            let (sin_lat, cos_lat) = (0.5 * (north_rad + south_rad)).sin_cos();
             let radius = look.radius_px(Look::side(col_px, height), particles);
             // Rows far from the tile do not fit; they are never chosen.
             let y_sub = (north * subpixels).round().clamp(-1e9, 1e9) as i32;
             Row {
                 y_sub,
                 y_span_px: (south - north) as f32,
+                sin_lat: sin_lat as f32,
+                cos_lat: cos_lat as f32,
+                lat_span_rad: (north_rad - south_rad) as f32,
                 radius: radius as f32,
                 area_m2: area_m2(scene, row),
                 depth_gain: look.depth_gain(area_px, radius, particles, style_depth) as f32,
-                ..Row::default()
             }
         })
         .collect()
@@ -216,11 +223,14 @@ fn choose_cells(plan: &mut Plan, scene: &Scene, level: &Level, spans: [Span; 2])
                 - level.origin_px[0];
             if (west + width_px) * subpixels >= spans[0][0] && west * subpixels <= spans[0][1] {
                 let x_sub = (west * subpixels).round() as i32;
+                let middle_deg = grid.col_west_deg(col) + 0.5 * grid.dlon_deg;
+                let (sin_lon, cos_lon) = middle_deg.to_radians().sin_cos();
                 plan.cols.push(Col {
                     x_sub,
                     x_span_px: width_px as f32,
+                    sin_lon: sin_lon as f32,
+                    cos_lon: cos_lon as f32,
                     index: col,
-                    ..Col::default()
                 });
             }
         }

@@ -79,6 +79,7 @@ pub fn scene(grid: Grid) -> Scene {
         domain,
         value,
         accumulated: Some(accumulated),
+        terrain: None,
     }
 }
 
@@ -98,6 +99,7 @@ pub fn job(view: View) -> RenderJob {
         grid: ONE_DEGREE,
         value: moment("domain/made-up/0", "frames/made-up/0"),
         accumulated: Some(moment("domain/made-up-carbon/0", "frames/made-up-carbon/0")),
+        relief: None,
         mode: Mode::Volume,
         view,
         style: Style::with_transfer(TransferFunction::default_for(Quantity::CarbonFlux)),

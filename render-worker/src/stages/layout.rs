@@ -17,6 +17,13 @@ pub const SCAN_BLOCK: u32 = GROUP * 8;
 /// What stands for "no data" in grids: NaN is not reliable in shaders.
 pub const MISSING: f32 = -1.0e30;
 
+/// Colour of deep water in daylight, red, green and blue, 0 to 1.
+pub const WATER_RED: f32 = 0.04;
+/// See [`WATER_RED`].
+pub const WATER_GREEN: f32 = 0.14;
+/// See [`WATER_RED`].
+pub const WATER_BLUE: f32 = 0.24;
+
 /// [`Params::view`]: a map tile.
 pub const VIEW_TILE: u32 = 0;
 /// [`Params::view`]: the globe in perspective.
@@ -147,6 +154,35 @@ shared_struct! {
         pub shape_table: u32,
         /// Cells whose gap was filled are drawn differently.
         pub doubt: u32,
+        /// 1: the picture is composed with coast lines, terrain, sea or night (`stages/compose/in_context.wgsl`).
+        pub in_context: u32,
+        /// 1: particles of tiles are dimmed where it is night.
+        pub day_on: u32,
+        /// 1: thematic maps are dimmed where it is night.
+        pub night_on: u32,
+        /// 1: the sun is given in east, north and up of every place; else in the axes of eq. 4.
+        pub sun_is_local: u32,
+        /// Extinction of the sea for each metre below its surface that a particle is drawn at.
+        pub sea_per_m: f32,
+        /// The same for each metre below the level of the sea that its floor lies at.
+        pub seabed_per_m: f32,
+        pub terrain_on: u32,
+        pub terrain_rows: u32,
+        pub terrain_cols: u32,
+        pub terrain_periodic: u32,
+        pub terrain_west_rad: f32,
+        pub terrain_north_rad: f32,
+        pub terrain_cols_per_rad: f32,
+        pub terrain_rows_per_rad: f32,
+        /// Exaggeration over eight earth radii, m⁻¹: from sums of differences for each radian to slopes.
+        pub terrain_slope: f32,
+        pub coast_on: u32,
+        /// 1: coast lines lie over the picture, as on maps; else under it.
+        pub coast_above: u32,
+        pub coast_grey: f32,
+        pub coast_alpha: f32,
+        /// Words of the coast mask in a row of the whole picture.
+        pub coast_row_words: u32,
     }
 }
 
@@ -157,7 +193,7 @@ shared_struct! {
         pub y_sub: i32,
         /// Height, pixels (tiles).
         pub y_span_px: f32,
-        /// Of the row's middle latitude (globe).
+        /// Of the row's middle latitude.
         pub sin_lat: f32,
         pub cos_lat: f32,
         /// Height, radians.
@@ -178,7 +214,7 @@ shared_struct! {
         pub x_sub: i32,
         /// Width, pixels (tiles).
         pub x_span_px: f32,
-        /// Of the column's middle longitude (globe).
+        /// Of the column's middle longitude.
         pub sin_lon: f32,
         pub cos_lon: f32,
         /// Which column of the grid.
@@ -257,6 +293,19 @@ shared_struct! {
         pub index: i32,
         /// 0 at that cell's centre, 1 at the next one's.
         pub fraction: f32,
+    }
+}
+
+shared_struct! {
+    /// Where a pixel's column or row lies on the earth (tiles): its place between two cell centres of the terrain, and
+    /// its longitude or latitude.
+    pub struct GroundAxis {
+        /// Cell west or north of the place; may lie outside the grid.
+        pub index: i32,
+        /// 0 at that cell's centre, 1 at the next one's.
+        pub fraction: f32,
+        pub sin: f32,
+        pub cos: f32,
     }
 }
 

@@ -17,6 +17,10 @@ struct Params {
     light_v_y: f32, light_v_z: f32, center_px_x: f32, center_px_y: f32, grid_west_rad: f32, grid_north_rad: f32,
     cols_per_rad: f32, rows_per_rad: f32, edge_sharpness: f32, map_alpha: f32, surface: u32, origin_x_px: i32,
     origin_y_px: i32, entry_shift: u32, shape_table: u32, doubt: u32,
+    origin_y_px: i32, entry_shift: u32, in_context: u32, day_on: u32, night_on: u32, sun_is_local: u32, sea_per_m: f32,
+    seabed_per_m: f32, terrain_on: u32, terrain_rows: u32, terrain_cols: u32, terrain_periodic: u32,
+    terrain_west_rad: f32, terrain_north_rad: f32, terrain_cols_per_rad: f32, terrain_rows_per_rad: f32,
+    terrain_slope: f32, coast_on: u32, coast_above: u32, coast_grey: f32, coast_alpha: f32, coast_row_words: u32,
 }
 struct Row {
     y_sub: i32, y_span_px: f32, sin_lat: f32, cos_lat: f32, lat_span_rad: f32, radius: f32, area_m2: f32,
@@ -38,6 +42,9 @@ struct Entry {
 struct Axis {
     index: i32, fraction: f32,
 }
+struct GroundAxis {
+    index: i32, fraction: f32, sin: f32, cos: f32,
+}
 
 const GROUP: u32 = 128u;
 const SQUARE: u32 = 16u;
@@ -46,6 +53,9 @@ const SCREEN_TILE_SHIFT: u32 = 8u;
 const SUBPIXELS: i32 = 16;
 const DEPTH_ONE: f32 = 4096.0;
 const MISSING: f32 = -1.0e30;
+const WATER_RED: f32 = 0.04;
+const WATER_GREEN: f32 = 0.14;
+const WATER_BLUE: f32 = 0.24;
 const VIEW_TILE: u32 = 0u;
 const VIEW_GLOBE: u32 = 1u;
 const KERNEL_DOT: u32 = 0u;

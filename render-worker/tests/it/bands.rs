@@ -32,6 +32,7 @@ fn held(gpu: &Gpu, scene: &Scene, cells: Range<usize>) -> SceneBuffers {
         value: pair(&scene.value),
         accumulated: scene.accumulated.as_ref().map(pair),
         doubts: None,
+        terrain: None,
         domain: gpu
             .storage("domain", &scene.domain.content()[cells.clone()])
             .unwrap(),

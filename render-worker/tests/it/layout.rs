@@ -4,9 +4,9 @@ use render_worker::passes::{place, splat};
 use render_worker::stages::fill::level::{FillLevel, MOST_REACH_COLS};
 use render_worker::stages::fill::{self, exact, pairs, window};
 use render_worker::stages::layout::{
-    Axis, Col, DEPTH_ONE, Entry, GROUP, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, MISSING, Params,
-    Particle, Row, SCREEN_TILE_PX, SCREEN_TILE_SHIFT, SQUARE, SUBPIXELS, Splat, VIEW_GLOBE,
-    VIEW_TILE,
+    Axis, Col, DEPTH_ONE, Entry, GROUP, GroundAxis, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, MISSING,
+    Params, Particle, Row, SCREEN_TILE_PX, SCREEN_TILE_SHIFT, SQUARE, SUBPIXELS, Splat, VIEW_GLOBE,
+    VIEW_TILE, WATER_BLUE, WATER_GREEN, WATER_RED,
 };
 use render_worker::stages::{bin, compose, eye, interpolate, light, map};
 
@@ -60,7 +60,7 @@ fn difference(source: &str, name: &str, fields: Fields, size: usize) -> Option<S
     })
 }
 
-const SHARED: [(&str, Fields, usize); 7] = [
+const SHARED: [(&str, Fields, usize); 8] = [
     ("Params", Params::FIELDS, size_of::<Params>()),
     ("Row", Row::FIELDS, size_of::<Row>()),
     ("Col", Col::FIELDS, size_of::<Col>()),
@@ -68,6 +68,7 @@ const SHARED: [(&str, Fields, usize); 7] = [
     ("Splat", Splat::FIELDS, size_of::<Splat>()),
     ("Entry", Entry::FIELDS, size_of::<Entry>()),
     ("Axis", Axis::FIELDS, size_of::<Axis>()),
+    ("GroundAxis", GroundAxis::FIELDS, size_of::<GroundAxis>()),
 ];
 
 #[test]
@@ -134,6 +135,9 @@ fn constants_have_the_same_value_in_rust_and_wgsl() {
         ("SUBPIXELS", f64::from(SUBPIXELS)),
         ("DEPTH_ONE", f64::from(DEPTH_ONE)),
         ("MISSING", f64::from(MISSING)),
+        ("WATER_RED", f64::from(WATER_RED)),
+        ("WATER_GREEN", f64::from(WATER_GREEN)),
+        ("WATER_BLUE", f64::from(WATER_BLUE)),
         ("VIEW_TILE", f64::from(VIEW_TILE)),
         ("VIEW_GLOBE", f64::from(VIEW_GLOBE)),
         ("KERNEL_DOT", f64::from(KERNEL_DOT)),
@@ -167,8 +171,10 @@ fn every_shader_is_valid_without_extensions() {
         bin::SOURCE,
         place::SOURCE,
         eye::SOURCE,
+        eye::SOURCE_IN_CONTEXT,
         map::SOURCE,
         compose::SOURCE,
+        compose::SOURCE_IN_CONTEXT,
     ];
     for source in sources {
         let mut validator = naga::valid::Validator::new(

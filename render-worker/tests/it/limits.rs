@@ -25,6 +25,7 @@ fn constant(grid: Grid, value: f32) -> Scene {
         domain,
         value: value.clone(),
         accumulated: Some(value),
+        terrain: None,
     }
 }
 

@@ -8,7 +8,9 @@
 mod bands;
 #[cfg(feature = "service")]
 mod batch;
+mod coast;
 mod compare;
+mod context;
 mod device;
 mod fill;
 #[cfg(feature = "service")]

@@ -1,12 +1,13 @@
 //! The service over a store in memory: manifests and frames in, PNG out.
 
+use contract::context::Relief;
 use contract::grid::Grid;
 use contract::job::{Mode, RenderJob};
 use contract::quantity::Quantity;
 use render_worker::{Backend, RenderError, RenderService};
 use storage::Store;
 
-use crate::scenes::FIVE_DEGREES;
+use crate::scenes::{FIVE_DEGREES, ONE_DEGREE};
 use crate::stored::{at, product, two_months, two_months_in};
 
 fn alpha(png: &[u8]) -> Vec<u8> {
@@ -59,6 +60,41 @@ async fn gaps_of_the_domain_are_filled_before_anything_is_drawn() {
     let alpha = alpha(&service.draw(&late).await.unwrap());
     let (x, y) = (10, 18);
     assert!(alpha[y * 256 + x] > 200, "a map where the cloud was");
+}
+
+#[tokio::test]
+async fn a_stored_relief_on_a_grid_of_its_own_lies_below_the_picture() {
+    let store = Store::memory();
+    let (flux, carbon) = two_months(&store).await;
+    let heights = vec![-3000.0; ONE_DEGREE.cell_count()];
+    let relief = product(
+        &store,
+        "relief",
+        Quantity::Elevation,
+        ONE_DEGREE,
+        &[heights],
+    )
+    .await;
+    let relief = Relief::of(&relief, 15.0).unwrap();
+    let service = RenderService::new(store, Backend::Cpu).unwrap();
+    let plain = at(&flux, &carbon, "2000-01-30");
+    let job = plain.clone().over(Some(relief.clone())).unwrap();
+    let png = service.draw(&job).await.unwrap();
+    assert!(alpha(&png).iter().all(|alpha| *alpha == 255));
+    assert!(alpha(&service.draw(&plain).await.unwrap()).contains(&0));
+    // Of the grid of a relief nobody is believed either, whether its frame is in memory or not.
+    let mut wrong = relief.clone();
+    (wrong.grid.rows, wrong.grid.cols) = (90, 180);
+    (wrong.grid.dlat_deg, wrong.grid.dlon_deg) = (2.0, 2.0);
+    let mut unknown = relief;
+    unknown.frame = "frames/relief/nothing".parse().unwrap();
+    for (relief, is_unknown) in [(wrong, false), (unknown, true)] {
+        let job = plain.clone().over(Some(relief)).unwrap();
+        let refused = service.draw(&job).await.unwrap_err();
+        assert_eq!(refused.is_not_found(), is_unknown, "{refused}");
+    }
+    let refused = Relief::of(&flux, 15.0).unwrap_err().to_string();
+    assert!(refused.contains("a product of elevation"), "{refused}");
 }
 
 #[tokio::test]

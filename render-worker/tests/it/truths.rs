@@ -350,6 +350,7 @@ fn a_sea_of_full_flux_has_the_optical_depth_of_the_style() {
         domain,
         value,
         accumulated: None,
+        terrain: None,
     };
     for renderer in renderers("optical depth") {
         for (z, x, y) in [(3, 1, 3), (5, 7, 12), (6, 12, 28)] {

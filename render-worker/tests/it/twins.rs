@@ -15,6 +15,7 @@ use render_worker::passes::{
 };
 use render_worker::plan::Plan;
 use render_worker::stages::bin::{self, Bin, list_count};
+use render_worker::stages::compose::in_context::Surroundings;
 use render_worker::stages::compose::{self, Compose};
 use render_worker::stages::eye::{self, Eye};
 use render_worker::stages::interpolate::{self, Interpolate};
@@ -25,6 +26,7 @@ use render_worker::stages::particles::cpu::Inputs;
 use render_worker::stages::{doubt, particles, project};
 
 use crate::compare::worst;
+use crate::context::{everything, with_terrain};
 use crate::device::{checked_gpu, gpu};
 use crate::scenes::{FIVE_DEGREES, clouded, globe, job, ocean, tile};
 
@@ -45,7 +47,7 @@ struct Twins {
 
 impl Twins {
     fn of(mode: Mode, view: View) -> Self {
-        Self::of_job(job(mode, view))
+        Self::styled(mode, view, |_style| ())
     }
 
     /// Of an ocean under clouds, in stops of opacity and size and with doubt.
@@ -59,19 +61,19 @@ impl Twins {
 
     fn styled(mode: Mode, view: View, change: impl FnOnce(&mut Style)) -> Self {
         let mut job = job(mode, view);
-        change(&mut job.style);
-        Self::of_job(job)
-    }
-
-    fn of_job(mut job: RenderJob) -> Self {
-        let mode = job.mode;
         job.style.globe_surface = true;
+        change(&mut job.style);
         let scene = if job.style.doubt {
             clouded(FIVE_DEGREES)
         } else {
             ocean(FIVE_DEGREES)
         };
-        let plan = Plan::new(&job, &scene, u64::MAX).unwrap();
+        Self::of_job(&job, scene)
+    }
+
+    fn of_job(job: &RenderJob, scene: Scene) -> Self {
+        let mode = job.mode;
+        let plan = Plan::new(job, &scene, u64::MAX).unwrap();
         let mut params = plan.params_of(plan.parts()[0]);
         let carbon = scene.accumulated.as_ref().unwrap();
         let between = |interval: &render_worker::Interval, weight| {
@@ -129,7 +131,17 @@ impl Twins {
             eye::cpu::eye(&params, &list_ends, &entries, &mut picture);
         }
         let mut image = vec![0; picture.len()];
-        compose::cpu::compose(&params, &picture, scene.domain.content(), &mut image);
+        if params.in_context == 1 {
+            let around = Surroundings {
+                domain: scene.domain.content(),
+                terrain: scene.terrain.as_ref().unwrap().heights_m(),
+                ground_axes: &plan.ground_axes,
+                coast: &plan.coast,
+            };
+            compose::in_context::compose(&params, &picture, &around, &mut image);
+        } else {
+            compose::cpu::compose(&params, &picture, scene.domain.content(), &mut image);
+        }
         Self {
             scene,
             plan,
@@ -199,6 +211,11 @@ impl Twins {
                 [&self.scene.value.before, &self.scene.value.after]
                     .map(|frame| buffer(frame.doubts().content())),
             ),
+            terrain: self
+                .scene
+                .terrain
+                .as_ref()
+                .map(|terrain| buffer(terrain.heights_m())),
         };
         let mut frame = FrameContext::new(gpu, &mut workspace, &self.plan, *params, scene).unwrap();
         fill(&mut frame);
@@ -376,6 +393,9 @@ fn every_function_of_a_particle_is_in_the_pass_that_is_tested() {
     assert!(
         eye::SOURCE.contains(compose::FUNCTIONS) && compose::SOURCE.contains(compose::FUNCTIONS)
     );
+    for source in [eye::SOURCE_IN_CONTEXT, compose::SOURCE_IN_CONTEXT] {
+        assert!(source.contains(compose::FUNCTIONS_IN_CONTEXT));
+    }
 }
 
 #[test]
@@ -566,8 +586,8 @@ fn the_lists_hold_every_stored_splat_once_and_in_its_light() {
 }
 
 /// The image that the eye makes of the twins' lists on the GPU, as bytes.
-fn eye_image(twins: &Twins, gpu: &Gpu, source: &str, entry: &str) -> Vec<f32> {
-    let stage = Eye::of(gpu, source, entry);
+fn eye_image(twins: &Twins, gpu: &Gpu, source: &str, entry: &'static str) -> Vec<f32> {
+    let stage = Eye::of(gpu, source, eye::SOURCE_IN_CONTEXT, entry);
     let lists = |f: &mut FrameContext<'_>| {
         f.upload(Slot::Counts, &twins.list_ends).unwrap();
         f.upload(Slot::Entries, &twins.entries).unwrap();
@@ -621,9 +641,9 @@ fn pixels_that_work_alone_and_pixels_that_share_come_to_the_same_bytes() {
 
 #[test]
 fn what_lies_behind_a_covered_tile_is_left_out_and_not_missed() {
-    let mut thick = job(Mode::Volume, tile(1, 0, 0, 256));
-    thick.style.optical_depth = 60.0;
-    let twins = Twins::of_job(thick);
+    let twins = Twins::styled(Mode::Volume, tile(1, 0, 0, 256), |style| {
+        style.optical_depth = 60.0;
+    });
     let covered = twins.picture.iter().filter(|pixel| pixel.w > 0.9997);
     assert!(covered.count() > 1000);
     let expected = bytes(twins.image.iter().copied());
@@ -740,6 +760,108 @@ fn compose_matches_its_twin() {
                 twins.image.len(),
             );
             far_apart(&bytes(drawn), &expected, 1.01)
+        });
+    }
+}
+
+#[test]
+fn surroundings_match_their_twin_on_tiles_and_on_the_globe() {
+    let views = [tile(1, 0, 0, 256), globe(-120.0, 10.0, 1.5e7, 160)];
+    let faults = [
+        // The slope of the terrain, its height, the night, the coast, the sea above the floor.
+        ("2.0 * z[at + 4]", "2.0 * z[at - 4]"),
+        ("if (height_m < 0.0)", "if (height_m < 1000.0)"),
+        ("mix(NIGHT, 1.0,", "mix(1.0, NIGHT,"),
+        ("place.x % 4u * 8u", "(3u - place.x % 4u) * 8u"),
+        ("exp(params.seabed_per_m", "exp(-params.seabed_per_m"),
+    ];
+    for view in views {
+        let twins = Twins::of_job(&everything(Mode::Map, view), with_terrain(FIVE_DEGREES));
+        assert_eq!(twins.params.in_context, 1);
+        let expected = bytes(twins.image.iter().copied());
+        for (right, wrong) in faults {
+            let distance = |gpu: &Gpu, source: &str| {
+                let stage = Compose::of(gpu, compose::SOURCE, source);
+                let picture = |f: &mut FrameContext<'_>| {
+                    drop(f.upload(Slot::Picture, &twins.picture).unwrap());
+                };
+                let drawn: Vec<u32> = twins.run(
+                    gpu,
+                    picture,
+                    |f| stage.record(f).unwrap(),
+                    Slot::Image,
+                    twins.image.len(),
+                );
+                far_apart(&bytes(drawn), &expected, 1.01)
+            };
+            let source = compose::SOURCE_IN_CONTEXT;
+            prove("surroundings", source, right, wrong, distance);
+        }
+    }
+}
+
+#[test]
+fn the_eye_composes_in_surroundings_as_its_twin_does() {
+    for view in [tile(1, 0, 0, 256), globe(-120.0, 10.0, 1.5e7, 160)] {
+        let twins = Twins::of_job(&everything(Mode::Volume, view), with_terrain(FIVE_DEGREES));
+        let expected = bytes(twins.image.iter().copied());
+        let distance = |gpu: &Gpu, source: &str, entry| {
+            let stage = Eye::of(gpu, eye::SOURCE, source, entry);
+            let lists = |f: &mut FrameContext<'_>| {
+                f.upload(Slot::Counts, &twins.list_ends).unwrap();
+                f.upload(Slot::Entries, &twins.entries).unwrap();
+            };
+            let drawn: Vec<u32> = twins.run(
+                gpu,
+                lists,
+                |f| stage.record(f).unwrap(),
+                Slot::Image,
+                twins.image.len(),
+            );
+            far_apart(&bytes(drawn), &expected, 1.01)
+        };
+        let (right, wrong) = ("color += ground_color", "color -= ground_color");
+        for entry in [eye::SHARED, eye::ALONE] {
+            prove(
+                "eye",
+                eye::SOURCE_IN_CONTEXT,
+                right,
+                wrong,
+                |gpu, source| distance(gpu, source, entry),
+            );
+        }
+    }
+}
+
+#[test]
+fn splats_in_the_sea_and_in_the_night_match_their_twins() {
+    let twins = Twins::of_job(
+        &everything(Mode::Volume, tile(1, 0, 0, 256)),
+        with_terrain(FIVE_DEGREES),
+    );
+    let expected = splat_numbers(&twins.splats, &twins.splats);
+    for (right, wrong) in [
+        ("exp(-params.sea_per_m", "exp(-0.5 * params.sea_per_m"),
+        (
+            "day_at(normal_of(particle))",
+            "day_at(-normal_of(particle))",
+        ),
+    ] {
+        prove("splat", splat::SOURCE, right, wrong, |gpu, source| {
+            let stage = Splats::of(gpu, source);
+            let [seen, lit] = twins.run_with(
+                gpu,
+                &twins.params,
+                |_| (),
+                |f| stage.record(f).unwrap(),
+                twins.stored(),
+            );
+            worst(
+                &splat_numbers(&twins.in_order(&seen, &lit), &twins.splats),
+                &expected,
+                0.0201,
+                1e-4,
+            )
         });
     }
 }

@@ -12,6 +12,7 @@ use crate::look::LookQuery;
 use crate::request;
 use crate::routes::picture::{self, Shown};
 use crate::state::AppState;
+use crate::surroundings::SurroundingsQuery;
 
 /// Height that shows the whole disc with a margin, km.
 const HEIGHT_KM: f64 = 15_000.0;
@@ -30,6 +31,7 @@ pub(crate) struct GlobeQuery {
     manifest: Option<String>,
     #[serde(flatten)]
     look: LookQuery,
+    surroundings: SurroundingsQuery,
 }
 
 pub(crate) async fn get(
@@ -53,7 +55,10 @@ pub(crate) async fn get(
         Some(text) => return Err(ServerError::invalid("surface", text, "true or false")),
     };
     let job = request::job_in_style(&layer, mode, view, time, style)?;
-    picture::respond(&state, &headers, job, Shown::of(&layer, time)).await
+    let shown = Shown::of(&layer, time);
+    let around = &query.surroundings;
+    let job = around.around(job, &state.catalogue, shown.time).await?;
+    picture::respond(&state, &headers, job, shown).await
 }
 
 impl GlobeQuery {

@@ -17,6 +17,7 @@ use crate::look::LookQuery;
 use crate::request;
 use crate::routes::products::bounds_deg;
 use crate::state::AppState;
+use crate::surroundings::SurroundingsQuery;
 
 /// Pixels a cell is wide at the deepest level that is offered: deeper levels would only magnify it.
 const CELL_PX: f64 = 64.0;
@@ -29,6 +30,7 @@ pub(crate) struct TileJsonQuery {
     manifest: Option<String>,
     #[serde(flatten)]
     look: LookQuery,
+    surroundings: SurroundingsQuery,
 }
 
 impl TileJsonQuery {
@@ -41,7 +43,12 @@ impl TileJsonQuery {
         let look = self.look.parse()?;
         // What cannot be drawn is refused here, not by every tile.
         look.style(layer.manifest.quantity)?;
-        let parts = time.into_iter().chain(manifest).chain(look.parameters());
+        let around = self.surroundings.of_tiles()?;
+        let parts = time
+            .into_iter()
+            .chain(manifest)
+            .chain(look.parameters())
+            .chain(around);
         Ok(query_of(&parts.collect::<Vec<_>>()))
     }
 

@@ -13,6 +13,7 @@ use crate::look::LookQuery;
 use crate::request;
 use crate::routes::picture::{self, Shown};
 use crate::state::AppState;
+use crate::surroundings::SurroundingsQuery;
 
 /// Pixels a side unless told otherwise.
 const SIZE_PX: u32 = 256;
@@ -26,6 +27,7 @@ pub(crate) struct TileQuery {
     manifest: Option<String>,
     #[serde(flatten)]
     look: LookQuery,
+    surroundings: SurroundingsQuery,
 }
 
 pub(crate) async fn get(
@@ -48,8 +50,10 @@ pub(crate) async fn get(
     let view = View::Tile { tile, size_px };
     let job = request::job_in_style(&layer, mode, view, time, style)?;
     let shown = Shown::of(&layer, time);
-    // Who looks at an old version, or in colours of their own, is no reason to draw a new one.
-    if look.is_usual() && state.catalogue.is_newest(&layer) {
+    let around = &query.surroundings;
+    let job = around.around(job, &state.catalogue, shown.time).await?;
+    // Who looks at an old version, in colours of their own or at what is not drawn ahead, is no reason to draw a new one.
+    if look.is_usual() && around.is_empty() && state.catalogue.is_newest(&layer) {
         let product = &layer.manifest.product;
         let at = time.map(|_asked| shown.time);
         state.hot.asked(product, mode, &job.view, at);

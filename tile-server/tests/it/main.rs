@@ -26,6 +26,7 @@ mod properties;
 mod regions;
 mod remote_store;
 mod serve;
+mod surroundings;
 mod tilejson;
 mod tiles;
 mod versions;

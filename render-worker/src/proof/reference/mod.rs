@@ -73,7 +73,9 @@ pub fn reference(
     scene: &Scene,
     fineness: Fineness,
 ) -> Result<Picture, RenderError> {
-    if job.mode != Mode::Volume || job.style.globe_surface || job.style.doubt {
+    let style = &job.style;
+    let is_bare = style.context.is_empty() && style.sun.subsolar.is_none() && !style.doubt;
+    if job.mode != Mode::Volume || job.style.globe_surface || !is_bare {
         return Err(RenderError::NoReference);
     }
     let coarser = pyramid::suited(job, scene);

@@ -1,4 +1,4 @@
-//! CPU twin of `compose.wgsl`.
+//! CPU twin of `compose.wgsl` over the plain globe (`globe.wgsl`, `over_globe.wgsl`).
 
 use std::f32::consts::TAU;
 
@@ -7,16 +7,27 @@ use glam::{Vec3, Vec4};
 use crate::stages::layout::Params;
 use crate::stages::sphere::ground_below;
 
-const LAND: Vec3 = Vec3::new(0.36, 0.38, 0.40);
-const SEA: Vec3 = Vec3::new(0.035, 0.075, 0.14);
-const AIR: Vec3 = Vec3::new(0.30, 0.50, 0.80);
+pub(super) const LAND: Vec3 = Vec3::new(0.36, 0.38, 0.40);
+pub(super) const SEA: Vec3 = Vec3::new(0.035, 0.075, 0.14);
+pub(super) const AIR: Vec3 = Vec3::new(0.30, 0.50, 0.80);
 
-fn is_land(params: &Params, domain: &[u32], lon_rad: f32, lat_rad: f32) -> bool {
+pub(super) fn is_land(params: &Params, domain: &[u32], lon_rad: f32, lat_rad: f32) -> bool {
     let east = lon_rad - params.grid_west_rad;
     let col = ((east - (east / TAU).floor() * TAU) * params.cols_per_rad).floor() as i32;
     let row = ((params.grid_north_rad - lat_rad) * params.rows_per_rad).floor() as i32;
     let inside = row >= 0 && row < params.rows as i32 && col < params.cols as i32;
     inside && domain[row as usize * params.cols as usize + col as usize] == 0
+}
+
+pub(super) fn sunlight(sun: f32) -> f32 {
+    0.45 + 0.75 * sun.clamp(0.0, 1.0)
+}
+
+pub(super) fn hazy(params: &Params, color: Vec3, normal: Vec3) -> Vec3 {
+    let toward = Vec3::new(params.eye_x, params.eye_y, params.eye_z) - normal;
+    let facing = normal.dot(toward / toward.length()).clamp(0.0, 1.0);
+    let haze = (1.0 - facing) * (1.0 - facing) * (1.0 - facing);
+    color * (1.0 - 0.55 * haze) + AIR * (0.55 * haze)
 }
 
 fn surface_below(params: &Params, domain: &[u32], pixel: [u32; 2]) -> Vec4 {
@@ -33,12 +44,7 @@ fn surface_below(params: &Params, domain: &[u32], pixel: [u32; 2]) -> Vec4 {
     let sun = ground
         .normal
         .dot(Vec3::new(params.sun_x, params.sun_y, params.sun_z));
-    let toward = Vec3::new(params.eye_x, params.eye_y, params.eye_z) - ground.normal;
-    let facing = ground.normal.dot(toward / toward.length()).clamp(0.0, 1.0);
-    let haze = (1.0 - facing) * (1.0 - facing) * (1.0 - facing);
-    let lit = color * (0.45 + 0.75 * sun.clamp(0.0, 1.0));
-    let hazy = lit * (1.0 - 0.55 * haze) + AIR * (0.55 * haze);
-    hazy.extend(1.0) * cover
+    hazy(params, color * sunlight(sun), ground.normal).extend(1.0) * cover
 }
 
 /// Bytes of every pixel, red lowest, from the blended colours.
@@ -55,7 +61,7 @@ pub fn compose(params: &Params, picture: &[Vec4], domain: &[u32], image: &mut [u
     }
 }
 
-fn bytes_of(color: Vec4) -> u32 {
+pub(super) fn bytes_of(color: Vec4) -> u32 {
     let alpha = (color.w.clamp(0.0, 1.0) * 255.0 + 0.5) as u32;
     if alpha == 0 {
         return 0;

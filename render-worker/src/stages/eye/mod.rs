@@ -2,14 +2,18 @@
 
 pub mod cpu;
 
+use std::sync::OnceLock;
+
 use crate::error::RenderError;
 use crate::frame::FrameContext;
 use crate::gpu::{Gpu, Kernel, Slot};
+use crate::stages::compose;
 
 /// The shader.
 pub const SOURCE: &str = concat!(
     include_str!("../prelude.wgsl"),
     include_str!("../sphere.wgsl"),
+    include_str!("../compose/globe.wgsl"),
     include_str!("../compose/over_globe.wgsl"),
     include_str!("eye.wgsl"),
     include_str!("alone.wgsl")
@@ -19,27 +23,43 @@ pub const SOURCE: &str = concat!(
 pub const SHARED: &str = "eye";
 /// The one whose pixels work alone; for adapters that are programs.
 pub const ALONE: &str = "alone";
+/// The shader for pictures in their surroundings.
+pub const SOURCE_IN_CONTEXT: &str = concat!(
+    include_str!("../prelude.wgsl"),
+    include_str!("../sphere.wgsl"),
+    include_str!("../compose/globe.wgsl"),
+    include_str!("../compose/terrain.wgsl"),
+    include_str!("../compose/in_context.wgsl"),
+    include_str!("eye.wgsl"),
+    include_str!("alone.wgsl")
+);
+
+/// What the kind of particle is called where shaders are compiled, by its number.
+const KERNELS: [&str; 3] = ["KERNEL_DOT", "KERNEL_BALL", "KERNEL_CLOUD"];
 
 /// The compiled stage: one shader for each kind of particle, which is tested for every pixel of every entry otherwise.
 pub struct Eye {
     of_kernel: [Kernel; 3],
+    source_in_context: String,
+    entry: &'static str,
+    /// For pictures in their surroundings; compiled when they are first wanted.
+    in_context: [OnceLock<Kernel>; 3],
 }
 
 impl Eye {
-    /// Compiles the entry point that suits the device.
+    /// Compiles the entry point that suits the device, of [`SOURCE`] now and of [`SOURCE_IN_CONTEXT`] when it is wanted.
     pub fn new(gpu: &Gpu) -> Self {
         let entry = if gpu.is_software() { ALONE } else { SHARED };
-        Self::of(gpu, SOURCE, entry)
+        Self::of(gpu, SOURCE, SOURCE_IN_CONTEXT, entry)
     }
 
-    /// Compiles an entry point of `source`, [`SOURCE`] but for tests.
-    pub fn of(gpu: &Gpu, source: &str, entry: &str) -> Self {
-        let compiled = |kernel| {
-            let source = source.replace("params.kernel", kernel);
-            gpu.kernel("eye", &source, entry)
-        };
+    /// Compiles an entry point of other shaders, for tests.
+    pub fn of(gpu: &Gpu, source: &str, source_in_context: &str, entry: &'static str) -> Self {
         Self {
-            of_kernel: ["KERNEL_DOT", "KERNEL_BALL", "KERNEL_CLOUD"].map(compiled),
+            of_kernel: KERNELS.map(|kernel| compiled(gpu, source, kernel, entry)),
+            source_in_context: source_in_context.to_owned(),
+            entry,
+            in_context: Default::default(),
         }
     }
 
@@ -48,6 +68,26 @@ impl Eye {
         let counts = frame.room(Slot::Counts, 4)?;
         let entries = frame.room(Slot::Entries, 4)?;
         let image = frame.room(Slot::Image, frame.pixel_count() * 4)?;
+        let groups = [frame.params.tiles_x, frame.params.tiles_y];
+        let kind = frame.params.kernel as usize;
+        if frame.params.in_context == 1 {
+            let [terrain, axes, coast] = compose::surroundings(frame)?;
+            let gpu = frame.gpu;
+            let kernel = self.in_context[kind]
+                .get_or_init(|| compiled(gpu, &self.source_in_context, KERNELS[kind], self.entry));
+            let buffers = [
+                (0, &frame.params_buffer),
+                (1, &counts),
+                (2, &entries),
+                (3, &frame.domain),
+                (4, &image),
+                (5, &terrain),
+                (6, &axes),
+                (7, &coast),
+            ];
+            frame.recorder.dispatch(kernel, &buffers, groups);
+            return Ok(());
+        }
         let buffers = [
             (0, &frame.params_buffer),
             (1, &counts),
@@ -55,11 +95,14 @@ impl Eye {
             (3, &frame.domain),
             (4, &image),
         ];
-        frame.recorder.dispatch(
-            &self.of_kernel[frame.params.kernel as usize],
-            &buffers,
-            [frame.params.tiles_x, frame.params.tiles_y],
-        );
+        frame
+            .recorder
+            .dispatch(&self.of_kernel[kind], &buffers, groups);
         Ok(())
     }
+}
+
+fn compiled(gpu: &Gpu, source: &str, kernel: &str, entry: &str) -> Kernel {
+    let source = source.replace("params.kernel", kernel);
+    gpu.kernel("eye", &source, entry)
 }

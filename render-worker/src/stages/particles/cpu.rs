@@ -1,7 +1,9 @@
 //! CPU twin of `particles.wgsl`.
 
 use crate::stages::doubt::doubted;
-use crate::stages::layout::{Active, Params, Particle, Row, is_missing, nearest};
+use crate::stages::layout::{
+    Active, Params, Particle, Row, WATER_BLUE, WATER_GREEN, WATER_RED, is_missing, nearest,
+};
 
 /// 0.5 in 32 bits.
 const HALF_TURN: u32 = 0x8000_0000;
@@ -40,6 +42,20 @@ fn strength_of(params: &Params, value: f32, position: f32) -> f32 {
     } else {
         (value.abs() * params.strength_per_unit).clamp(0.0, 1.0)
     }
+}
+
+/// A colour seen through so much of the sea: what is lost of it is the water's own (Beer-Lambert).
+pub fn through_water(params: &Params, color: u32, depth_m: f32) -> u32 {
+    let kept = (-params.sea_per_m * depth_m).exp();
+    let channel = |water: f32, shift: u32| {
+        let water = water * 255.0;
+        let own = ((color >> shift) & 255) as f32;
+        (nearest(water + (own - water) * kept) as u32) << shift
+    };
+    channel(WATER_RED, 0)
+        | channel(WATER_GREEN, 8)
+        | channel(WATER_BLUE, 16)
+        | (color & 0xff00_0000)
 }
 
 /// One particle for every active cell and `k` below `particles_per_cell`, cell by cell.
@@ -105,6 +121,9 @@ fn one(params: &Params, inputs: &Inputs<'_>, cell: Active, k: u32) -> Particle {
     }
     particle.depth = params.optical_depth * opacity * envelope(phase);
     particle.color = inputs.palette[at] | (size << 24);
+    if params.sea_per_m > 0.0 && particle.height_m < 0.0 {
+        particle.color = through_water(params, particle.color, -particle.height_m);
+    }
     match inputs.doubt.get(cell.cell as usize) {
         Some(&doubt) if doubt > 0.0 => doubted(particle, doubt),
         Some(_) | None => particle,

@@ -29,6 +29,14 @@ fn strength_of(value: f32, position: f32) -> f32 {
     return clamp(abs(value) * params.strength_per_unit, 0.0, 1.0);
 }
 
+// A colour seen through so much of the sea: what is lost of it is the water's own (Beer-Lambert).
+fn through_water(color: u32, depth_m: f32) -> u32 {
+    let kept = exp(-params.sea_per_m * depth_m);
+    let water = vec3(WATER_RED, WATER_GREEN, WATER_BLUE) * 255.0;
+    let rgb = water + (vec3(f32(color & 255u), f32((color >> 8u) & 255u), f32((color >> 16u) & 255u)) - water) * kept;
+    return u32(nearest(rgb.x)) | (u32(nearest(rgb.y)) << 8u) | (u32(nearest(rgb.z)) << 16u) | (color & 0xff000000u);
+}
+
 // Particle `k` of a cell with data; `slot` is its column in the table, `carbon` what it has accumulated, kg m-2.
 fn particle_of(row: u32, slot: u32, k: u32, value: f32, carbon: f32) -> Particle {
     let col = cols[slot].index;
@@ -59,5 +67,8 @@ fn particle_of(row: u32, slot: u32, k: u32, value: f32, carbon: f32) -> Particle
     }
     particle.depth = params.optical_depth * opacity * envelope(phase);
     particle.color = palette[at] | (size << 24u);
+    if (params.sea_per_m > 0.0 && particle.height_m < 0.0) {
+        particle.color = through_water(particle.color, -particle.height_m);
+    }
     return particle;
 }

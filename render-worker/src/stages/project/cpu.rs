@@ -46,6 +46,27 @@ fn size_of(params: &Params, color: u32) -> f32 {
     1.0 + params.size_spread * ((color >> 24) as f32 / 255.0 - 1.0)
 }
 
+/// Where a particle's place lies on the globe, length 1.
+fn normal_of(params: &Params, row: &Row, col: &Col, particle: &Particle) -> Vec3 {
+    let lat = turned(
+        row.sin_lat,
+        row.cos_lat,
+        (0.5 - particle.south) * row.lat_span_rad,
+    );
+    let lon = turned(
+        col.sin_lon,
+        col.cos_lon,
+        (particle.east - 0.5) * params.lon_span_rad,
+    );
+    Vec3::new(lat.y * lon.x, lat.y * lon.y, lat.x)
+}
+
+/// Share of direct light at a place: 0 on the night side, with dusk between.
+fn day_at(params: &Params, normal: Vec3) -> f32 {
+    let sun = vector(params.sun_x, params.sun_y, params.sun_z);
+    smoothstep(-0.15, 0.35, normal.dot(sun))
+}
+
 fn on_tile(params: &Params, row: &Row, col: &Col, particle: &Particle) -> Splat {
     let subpixels = SUBPIXELS as f32;
     let ground_y = row.y_sub + nearest(particle.south * row.y_span_px * subpixels);
@@ -67,7 +88,11 @@ fn on_tile(params: &Params, row: &Row, col: &Col, particle: &Particle) -> Splat 
             + nearest(particle.height_m * params.light_shift_y_per_m)
             + params.light_origin_y,
         light_depth: tau * radius_px * radius_px * params.light_depth_gain,
-        day: 1.0,
+        day: if params.day_on == 1 {
+            day_at(params, normal_of(params, row, col, particle))
+        } else {
+            1.0
+        },
         color: particle.color,
     }
 }
@@ -86,17 +111,7 @@ fn is_hidden(normal: Vec3, distance: f32, camera: Vec3) -> bool {
 }
 
 fn on_globe(params: &Params, row: &Row, col: &Col, particle: &Particle) -> Splat {
-    let lat = turned(
-        row.sin_lat,
-        row.cos_lat,
-        (0.5 - particle.south) * row.lat_span_rad,
-    );
-    let lon = turned(
-        col.sin_lon,
-        col.cos_lon,
-        (particle.east - 0.5) * params.lon_span_rad,
-    );
-    let normal = Vec3::new(lat.y * lon.x, lat.y * lon.y, lat.x);
+    let normal = normal_of(params, row, col, particle);
     let distance = 1.0 + particle.height_m * params.per_earth_radius_m;
     let place = normal * distance;
     let camera = vector(params.eye_x, params.eye_y, params.eye_z);
@@ -138,11 +153,7 @@ fn on_globe(params: &Params, row: &Row, col: &Col, particle: &Particle) -> Splat
             * row.radius
             * row.radius
             * params.light_depth_gain,
-        day: smoothstep(
-            -0.15,
-            0.35,
-            normal.dot(vector(params.sun_x, params.sun_y, params.sun_z)),
-        ),
+        day: day_at(params, normal),
         color: particle.color,
     }
 }

@@ -21,6 +21,20 @@ fn size_of(color: u32) -> f32 {
     return 1.0 + params.size_spread * (f32(color >> 24u) / 255.0 - 1.0);
 }
 
+// Where a particle's place lies on the globe, length 1.
+fn normal_of(particle: Particle) -> vec3<f32> {
+    let row = rows[particle.row];
+    let col = cols[particle.slot];
+    let lat = turned(row.sin_lat, row.cos_lat, (0.5 - particle.south) * row.lat_span_rad);
+    let lon = turned(col.sin_lon, col.cos_lon, (particle.east - 0.5) * params.lon_span_rad);
+    return vec3(lat.y * lon.x, lat.y * lon.y, lat.x);
+}
+
+// Share of direct light at a place: 0 on the night side, with dusk between.
+fn day_at(normal: vec3<f32>) -> f32 {
+    return smoothstep(-0.15, 0.35, dot(normal, vec3(params.sun_x, params.sun_y, params.sun_z)));
+}
+
 fn on_tile(particle: Particle) -> Splat {
     let row = rows[particle.row];
     let col = cols[particle.slot];
@@ -38,16 +52,14 @@ fn on_tile(particle: Particle) -> Splat {
     splat.light_depth = splat.tau * splat.radius_px * splat.radius_px * params.light_depth_gain;
     splat.slice = slice_of(particle.height_m);
     splat.day = 1.0;
+    if (params.day_on == 1u) { splat.day = day_at(normal_of(particle)); }
     splat.color = particle.color;
     return splat;
 }
 
 fn on_globe(particle: Particle) -> Splat {
     let row = rows[particle.row];
-    let col = cols[particle.slot];
-    let lat = turned(row.sin_lat, row.cos_lat, (0.5 - particle.south) * row.lat_span_rad);
-    let lon = turned(col.sin_lon, col.cos_lon, (particle.east - 0.5) * params.lon_span_rad);
-    let normal = vec3(lat.y * lon.x, lat.y * lon.y, lat.x);
+    let normal = normal_of(particle);
     let distance = 1.0 + particle.height_m * params.per_earth_radius_m;
     let place = normal * distance;
     let camera = vec3(params.eye_x, params.eye_y, params.eye_z);
@@ -79,7 +91,7 @@ fn on_globe(particle: Particle) -> Splat {
     let v = dot(place, vec3(params.light_v_x, params.light_v_y, params.light_v_z)) - params.light_v0;
     splat.light_u = nearest(u * params.light_texels_per_unit * f32(params.light_unit));
     splat.light_v = nearest(v * params.light_texels_per_unit * f32(params.light_unit));
-    splat.day = smoothstep(-0.15, 0.35, dot(normal, vec3(params.sun_x, params.sun_y, params.sun_z)));
+    splat.day = day_at(normal);
     splat.color = particle.color;
     return splat;
 }

@@ -1,0 +1,199 @@
+//! What surrounds the particles of a picture: coast lines, the sea they sink into, the relief of land and sea floor.
+
+use serde::{Deserialize, Serialize};
+
+use crate::ContractError;
+use crate::grid::Grid;
+use crate::key::ObjectKey;
+use crate::manifest::Manifest;
+use crate::quantity::Quantity;
+
+/// How much larger heights of a relief are taken than they are, unless told otherwise: slopes of the sea floor are
+/// hardly seen without.
+pub const RELIEF_EXAGGERATION: f64 = 15.0;
+/// Most that heights of a relief are exaggerated.
+pub const MAX_RELIEF_EXAGGERATION: f64 = 1000.0;
+/// Most cells of a relief: 2^26, more than a grid of 2.5 minutes of arc all round has.
+pub const MAX_RELIEF_CELLS: u64 = 1 << 26;
+/// Most that the sea hides over [`SEA_OPACITY_DEPTH_M`].
+pub const MAX_SEA_OPACITY: f64 = 0.99;
+/// Drawn depth (that of particles as they are lifted and sunk, that of the sea floor as it is exaggerated) over which
+/// the sea hides the share that a style states, m.
+pub const SEA_OPACITY_DEPTH_M: f64 = 100_000.0;
+
+/// What is drawn besides the product, without data of its own. Nothing of it is in the name of a picture without it.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Context {
+    /// Share of what lies [`SEA_OPACITY_DEPTH_M`] below the sea surface that the sea hides, 0 to [`MAX_SEA_OPACITY`]:
+    /// Beer-Lambert. 0 draws no sea.
+    #[serde(
+        default,
+        with = "crate::exact",
+        skip_serializing_if = "crate::context::is_zero"
+    )]
+    pub sea_opacity: f64,
+    /// Draw coast lines.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub coastlines: bool,
+}
+
+/// The relief under a picture: one stored frame of elevation on a grid of its own.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Relief {
+    /// The grid of the frame.
+    #[serde(with = "crate::exact::grid")]
+    pub grid: Grid,
+    /// The frame.
+    pub frame: ObjectKey,
+    /// How much larger heights are taken than they are where slopes are shaded and the sea floor is seen through the
+    /// sea, 0 to [`MAX_RELIEF_EXAGGERATION`].
+    #[serde(with = "crate::exact")]
+    pub exaggeration: f64,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it so")]
+fn is_zero(number: &f64) -> bool {
+    *number == 0.0
+}
+
+impl Context {
+    /// Is nothing but the product drawn?
+    pub fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Share of light that a metre of drawn depth takes, as the exponent of Beer-Lambert, m⁻¹.
+    pub fn sea_extinction_per_m(&self) -> f64 {
+        -(1.0 - self.sea_opacity).ln() / SEA_OPACITY_DEPTH_M
+    }
+
+    pub(crate) fn validate(&self) -> Result<(), ContractError> {
+        if (0.0..=MAX_SEA_OPACITY).contains(&self.sea_opacity) {
+            return Ok(());
+        }
+        Err(ContractError::invalid(
+            "sea opacity",
+            &self.sea_opacity.to_string(),
+            format!("a share of 0 to {MAX_SEA_OPACITY}, such as 0.4"),
+        ))
+    }
+}
+
+impl Relief {
+    /// The relief that a version of an elevation product holds: its last step.
+    ///
+    /// # Errors
+    /// A product of another quantity, without steps, or a limit that is broken.
+    pub fn of(elevation: &Manifest, exaggeration: f64) -> Result<Self, ContractError> {
+        let bad = |reason: String| {
+            let name = elevation.product.to_string();
+            Err(ContractError::invalid("relief", &name, reason))
+        };
+        if elevation.quantity != Quantity::Elevation {
+            let title = elevation.quantity.title();
+            return bad(format!(
+                "it is {title}; name a product of elevation (land one, such as etopo20, with fluxglobe ingest)"
+            ));
+        }
+        let Some(step) = elevation.steps.last() else {
+            return bad("it has no steps".to_owned());
+        };
+        let relief = Self {
+            grid: elevation.grid,
+            frame: step.frame.clone(),
+            exaggeration,
+        };
+        relief.validate()?;
+        Ok(relief)
+    }
+
+    pub(crate) fn validate(&self) -> Result<(), ContractError> {
+        let bad = |text: &str, reason: String| Err(ContractError::invalid("relief", text, reason));
+        self.grid.validate()?;
+        let cells = u64::from(self.grid.rows) * u64::from(self.grid.cols);
+        if cells > MAX_RELIEF_CELLS {
+            let reason = format!("it has {cells} cells, at most {MAX_RELIEF_CELLS} are drawn");
+            return bad(self.frame.as_str(), reason);
+        }
+        if !self.frame.is_in("frames") {
+            return bad(self.frame.as_str(), "a frame is wanted".to_owned());
+        }
+        if !(0.0..=MAX_RELIEF_EXAGGERATION).contains(&self.exaggeration) {
+            let reason = format!("heights are exaggerated 0 to {MAX_RELIEF_EXAGGERATION} times");
+            return bad(&self.exaggeration.to_string(), reason);
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn relief() -> Relief {
+        Relief {
+            grid: Grid {
+                rows: 180,
+                cols: 360,
+                north_deg: 90.0,
+                west_deg: -180.0,
+                dlat_deg: 1.0,
+                dlon_deg: 1.0,
+            },
+            frame: "frames/etopo/a".parse().unwrap(),
+            exaggeration: 15.0,
+        }
+    }
+
+    #[test]
+    fn a_picture_without_surroundings_says_nothing_of_them() {
+        assert_eq!(serde_json::to_string(&Context::default()).unwrap(), "{}");
+        let both = Context {
+            sea_opacity: 0.25,
+            coastlines: true,
+        };
+        let text = serde_json::to_string(&both).unwrap();
+        assert_eq!(text, r#"{"sea_opacity":"0.25","coastlines":true}"#);
+        assert_eq!(serde_json::from_str::<Context>(&text).unwrap(), both);
+    }
+
+    #[test]
+    fn the_sea_hides_the_stated_share_over_the_stated_depth() {
+        let sea = Context {
+            sea_opacity: 0.4,
+            ..Context::default()
+        };
+        let kept = (-sea.sea_extinction_per_m() * SEA_OPACITY_DEPTH_M).exp();
+        assert!((kept - 0.6).abs() < 1e-12);
+        assert!(Context::default().sea_extinction_per_m().abs() < 1e-300);
+    }
+
+    #[test]
+    fn surroundings_beyond_a_limit_are_refused() {
+        for sea_opacity in [-0.1, 1.0, f64::NAN, f64::INFINITY] {
+            let context = Context {
+                sea_opacity,
+                ..Context::default()
+            };
+            let text = context.validate().unwrap_err().to_string();
+            assert!(text.contains("such as 0.4"), "{text}");
+        }
+        relief().validate().unwrap();
+        let broken: [fn(&mut Relief); 4] = [
+            |r| r.exaggeration = f64::NAN,
+            |r| r.exaggeration = 1e9,
+            |r| r.frame = "domain/etopo/a".parse().unwrap(),
+            |r| {
+                (r.grid.rows, r.grid.cols) = (10_800, 21_600);
+                (r.grid.dlat_deg, r.grid.dlon_deg) = (1.0 / 60.0, 1.0 / 60.0);
+            },
+        ];
+        for change in broken {
+            let mut relief = relief();
+            change(&mut relief);
+            assert!(relief.validate().is_err(), "{relief:?}");
+        }
+    }
+}

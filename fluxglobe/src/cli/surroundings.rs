@@ -1,0 +1,44 @@
+//! Words for what surrounds the particles of a picture, and for its sun.
+
+use clap::Args;
+use contract::context::RELIEF_EXAGGERATION;
+use contract::product::ProductId;
+use contract::sun::SunChoice;
+
+/// What is drawn besides the product.
+#[derive(Debug, Args)]
+pub(crate) struct Surroundings {
+    /// Land and sea floor of this elevation product below the particles, shaded by the sun, as in `--relief etopo20`.
+    #[arg(long, value_name = "PRODUCT")]
+    pub(crate) relief: Option<ProductId>,
+    /// How much steeper slopes of the relief are than they are, 0 to 1000.
+    #[arg(
+        long,
+        requires = "relief",
+        default_value_t = RELIEF_EXAGGERATION,
+        allow_negative_numbers = true,
+        value_name = "TIMES"
+    )]
+    pub(crate) relief_exaggeration: f64,
+    /// Share of what lies 100 km (as drawn) below the sea surface that the sea hides, 0 to 0.99, as in
+    /// `--sea-opacity 0.4`; without it the sea is clear.
+    #[arg(
+        long,
+        default_value_t = 0.0,
+        hide_default_value = true,
+        allow_negative_numbers = true,
+        value_name = "SHARE"
+    )]
+    pub(crate) sea_opacity: f64,
+    /// Draw coast lines.
+    #[arg(long)]
+    pub(crate) coastlines: bool,
+    /// Height of a kilogram of accumulated carbon per square metre, m: how far particles rise and sink, 0 to 1e9; 8e6 if
+    /// absent.
+    #[arg(long, allow_negative_numbers = true, value_name = "METRES")]
+    pub(crate) height_exaggeration: Option<f64>,
+    /// `time`: the real sun of the instant, with day and night; or its place in the sky in degrees,
+    /// AZIMUTH,ELEVATION, as in `--sun 135,30`; 315,40 if absent.
+    #[arg(long, value_name = "time|AZIMUTH,ELEVATION")]
+    pub(crate) sun: Option<SunChoice>,
+}

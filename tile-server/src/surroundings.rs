@@ -1,0 +1,176 @@
+//! What an address asks for besides a product, a mode, an instant and a view: relief, sea, coast lines, the sun, and how
+//! far particles rise.
+
+use contract::context::{RELIEF_EXAGGERATION, Relief};
+use contract::job::RenderJob;
+use contract::sun::SunChoice;
+use contract::time::TimeMs;
+use serde::Deserialize;
+
+use crate::catalogue::Catalogue;
+use crate::error::ServerError;
+use crate::extract::number;
+
+/// The parameters of an address that say it, as they were written.
+#[derive(Debug, Default, Deserialize)]
+pub(crate) struct SurroundingsQuery {
+    relief: Option<String>,
+    relief_exaggeration: Option<String>,
+    sea_opacity: Option<String>,
+    coastlines: Option<String>,
+    height_exaggeration: Option<String>,
+    sun: Option<String>,
+}
+
+/// The same as values.
+#[derive(Debug, Default, PartialEq)]
+struct Asked {
+    relief_exaggeration: Option<f64>,
+    sea_opacity: Option<f64>,
+    coastlines: Option<bool>,
+    height_exaggeration: Option<f64>,
+    sun: Option<SunChoice>,
+}
+
+impl SurroundingsQuery {
+    /// Is the plain picture asked for?
+    pub(crate) fn is_empty(&self) -> bool {
+        self.fields().into_iter().all(|(_, text)| text.is_none())
+    }
+
+    fn fields(&self) -> [(&'static str, Option<&str>); 6] {
+        [
+            ("relief", self.relief.as_deref()),
+            ("relief_exaggeration", self.relief_exaggeration.as_deref()),
+            ("sea_opacity", self.sea_opacity.as_deref()),
+            ("coastlines", self.coastlines.as_deref()),
+            ("height_exaggeration", self.height_exaggeration.as_deref()),
+            ("sun", self.sun.as_deref()),
+        ]
+    }
+
+    fn asked(&self) -> Result<Asked, ServerError> {
+        let real = |name, text: &Option<String>, valid| {
+            let text = text.as_deref();
+            text.map(|text| number(name, text, valid)).transpose()
+        };
+        let coastlines = match self.coastlines.as_deref() {
+            None => None,
+            Some("true") => Some(true),
+            Some("false") => Some(false),
+            Some(text) => return Err(ServerError::invalid("coastlines", text, "true or false")),
+        };
+        Ok(Asked {
+            relief_exaggeration: real(
+                "relief_exaggeration",
+                &self.relief_exaggeration,
+                "a number, 0 to 1000",
+            )?,
+            sea_opacity: real("sea_opacity", &self.sea_opacity, "a share, 0 to 0.99")?,
+            coastlines,
+            height_exaggeration: real(
+                "height_exaggeration",
+                &self.height_exaggeration,
+                "metres for each kilogram of carbon a square metre, 0 to 1e9",
+            )?,
+            sun: self.sun.as_deref().map(str::parse).transpose()?,
+        })
+    }
+
+    /// The same picture in its surroundings; `time` is the instant that it shows.
+    pub(crate) async fn around(
+        &self,
+        mut job: RenderJob,
+        catalogue: &Catalogue,
+        time: TimeMs,
+    ) -> Result<RenderJob, ServerError> {
+        if self.is_empty() {
+            return Ok(job);
+        }
+        let asked = self.asked()?;
+        let style = &mut job.style;
+        let context = &mut style.context;
+        context.sea_opacity = asked.sea_opacity.unwrap_or(context.sea_opacity);
+        context.coastlines = asked.coastlines.unwrap_or(context.coastlines);
+        let height_m = asked.height_exaggeration;
+        style.height_m_per_kg_m2 = height_m.unwrap_or(style.height_m_per_kg_m2);
+        if let Some(choice) = asked.sun {
+            style.sun = choice.instead_of(style.sun, time);
+        }
+        let relief = match &self.relief {
+            Some(product) => {
+                let elevation = catalogue.layer(product).await?;
+                let exaggeration = asked.relief_exaggeration.unwrap_or(RELIEF_EXAGGERATION);
+                Some(Relief::of(&elevation.manifest, exaggeration)?)
+            }
+            None => None,
+        };
+        Ok(job.over(relief)?)
+    }
+
+    /// The parameters as tiles take them, `name=value`, in one order and one spelling.
+    pub(crate) fn of_tiles(&self) -> Result<Vec<String>, ServerError> {
+        let asked = self.asked()?;
+        let relief = self.relief.as_ref();
+        // A name of letters, digits and hyphens, whatever else was written.
+        let relief = relief
+            .map(|name| name.parse::<contract::product::ProductId>())
+            .transpose()?;
+        let real = |number: Option<f64>| number.map(|number| number.to_string());
+        let values = [
+            relief.map(|name| name.to_string()),
+            real(asked.relief_exaggeration),
+            real(asked.sea_opacity),
+            asked.coastlines.map(|drawn| drawn.to_string()),
+            real(asked.height_exaggeration),
+            asked.sun.map(|sun| sun.to_string()),
+        ];
+        let named = self.fields().into_iter().zip(values);
+        Ok(named
+            .filter_map(|((name, _), value)| Some(format!("{name}={}", value?)))
+            .collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn query(
+        field: fn(&mut SurroundingsQuery) -> &mut Option<String>,
+        text: &str,
+    ) -> SurroundingsQuery {
+        let mut query = SurroundingsQuery::default();
+        *field(&mut query) = Some(text.to_owned());
+        query
+    }
+
+    #[test]
+    fn words_that_mean_nothing_are_refused_with_what_would_be_valid() {
+        let refused: [(SurroundingsQuery, &str); 5] = [
+            (query(|q| &mut q.sea_opacity, "half"), "a share"),
+            (query(|q| &mut q.coastlines, "yes"), "true or false"),
+            (query(|q| &mut q.sun, "noon"), "such as 315,40"),
+            (query(|q| &mut q.height_exaggeration, "inf"), "metres"),
+            (query(|q| &mut q.relief_exaggeration, ""), "0 to 1000"),
+        ];
+        for (query, valid) in refused {
+            let text = query.asked().unwrap_err().to_string();
+            assert!(text.contains(valid), "{text}");
+        }
+    }
+
+    #[test]
+    fn tiles_are_asked_for_in_one_spelling() {
+        let mut query = query(|q| &mut q.sun, "time");
+        query.relief = Some("etopo20".to_owned());
+        query.sea_opacity = Some("0.50".to_owned());
+        assert_eq!(
+            query.of_tiles().unwrap(),
+            ["relief=etopo20", "sea_opacity=0.5", "sun=time"]
+        );
+        query.relief = Some("a&b".to_owned());
+        assert!(query.of_tiles().is_err());
+        assert!(SurroundingsQuery::default().is_empty() && !query.is_empty());
+    }
+}
