@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::ContractError;
 use crate::colour::TransferFunction;
 use crate::digest::Digest;
+use crate::flow::{self, Flow};
 use crate::grid::Grid;
 use crate::key::ObjectKey;
 use crate::manifest::Manifest;
@@ -35,11 +36,21 @@ pub enum Mode {
     Sprites,
     /// Half-angle-sliced volume with shadows.
     Volume,
+    /// Particles that drift with a vector field, with trails.
+    Flow,
 }
 
 impl Mode {
-    /// All four, in the order they are offered.
-    pub const ALL: [Self; 4] = [Self::Map, Self::Points, Self::Sprites, Self::Volume];
+    /// All of them, in the order they are offered.
+    pub const ALL: [Self; 5] = [
+        Self::Map,
+        Self::Points,
+        Self::Sprites,
+        Self::Volume,
+        Self::Flow,
+    ];
+    /// Those that draw one product alone; a flow needs both parts of a vector.
+    pub const SCALAR: [Self; 4] = [Self::Map, Self::Points, Self::Sprites, Self::Volume];
 
     /// Name in URLs and on the command line.
     pub fn as_str(self) -> &'static str {
@@ -48,6 +59,7 @@ impl Mode {
             Self::Points => "points",
             Self::Sprites => "sprites",
             Self::Volume => "volume",
+            Self::Flow => "flow",
         }
     }
 }
@@ -63,7 +75,7 @@ impl std::str::FromStr for Mode {
 
     fn from_str(s: &str) -> Result<Self, Self::Err> {
         let found = Self::ALL.into_iter().find(|mode| mode.as_str() == s);
-        found.ok_or_else(|| ContractError::invalid("mode", s, "map, points, sprites or volume"))
+        found.ok_or_else(|| ContractError::invalid("mode", s, "map, points, sprites, volume or flow"))
     }
 }
 
@@ -144,6 +156,9 @@ pub struct RenderJob {
     /// Accumulated carbon that lifts and sinks the particles; without it they lie in a thin sheet.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub accumulated: Option<Moment>,
+    /// What makes the product drawn the eastward part of a vector; there if and only if the mode is [`Mode::Flow`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub flow: Option<Flow>,
     /// Mode.
     pub mode: Mode,
     /// View.
@@ -251,7 +266,7 @@ impl View {
 }
 
 impl RenderJob {
-    /// The job that draws a version of a product at an instant, lifted by a version of its accumulated carbon. A map has
+    /// The job that draws a version of a product at an instant in any mode but [`Mode::Flow`], lifted by a version of its accumulated carbon. A map has
     /// no particles to lift.
     ///
     /// # Errors
@@ -279,6 +294,7 @@ impl RenderJob {
             grid: product.grid,
             value: moment(product)?,
             accumulated: accumulated.map(moment).transpose()?,
+            flow: None,
             mode,
             view,
             style,
@@ -303,6 +319,7 @@ impl RenderJob {
         self.grid.validate()?;
         self.value.validate()?;
         self.accumulated.as_ref().map_or(Ok(()), Moment::validate)?;
+        flow::validate(self)?;
         self.style.validate()?;
         self.view.validate()
     }
@@ -350,6 +367,7 @@ mod tests {
             },
             value: moment(),
             accumulated: None,
+            flow: None,
             mode: Mode::Volume,
             view: View::Tile {
                 tile: Tile { z: 1, x: 0, y: 0 },

@@ -101,6 +101,7 @@ pub fn scene(grid: &Grid) -> Scene {
         domain,
         value,
         accumulated: Some(accumulated),
+        northward: None,
     }
 }
 
@@ -132,6 +133,7 @@ pub fn job(size_px: [u32; 2], slices: u32) -> Result<RenderJob> {
         grid: grid(1_000),
         value: moment("made-up")?,
         accumulated: Some(moment("made-up-carbon")?),
+        flow: None,
         mode: Mode::Volume,
         view: View::Globe {
             lon_deg: WEST_DEG + 0.5 * WIDTH_DEG,

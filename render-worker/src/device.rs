@@ -93,6 +93,7 @@ impl Device {
         Ok(SceneBuffers {
             value: pair(&scene.value)?,
             accumulated: scene.accumulated.as_ref().map(pair).transpose()?,
+            northward: scene.northward.as_ref().map(pair).transpose()?,
             domain: self.resident.buffer(&self.gpu, &scene.domain)?,
         })
     }

@@ -87,11 +87,16 @@ impl Source {
             Some(carbon) => Some(self.interval(grid, carbon).await?.1),
             None => None,
         };
+        let northward = match &job.flow {
+            Some(flow) => Some(self.interval(grid, &flow.northward).await?.1),
+            None => None,
+        };
         Ok(Scene {
             grid: *grid,
             domain,
             value,
             accumulated,
+            northward,
         })
     }
 

@@ -4,6 +4,7 @@
 //! is computed here from the scene and the zoom level alone.
 
 mod camera;
+mod flow;
 mod globe;
 mod look;
 mod tile;
@@ -77,6 +78,9 @@ impl Plan {
     ) -> Result<Self, RenderError> {
         job.validate()?;
         scene.validate()?;
+        if job.mode == Mode::Flow && scene.northward.is_none() {
+            return Err(RenderError::NoNorthward);
+        }
         let size_px = job.view.size_px();
         let mut plan = Self {
             id: NEXT_ID.fetch_add(1, Ordering::Relaxed),
@@ -99,7 +103,13 @@ impl Plan {
 
     fn count_particles(&mut self, most_buffer_bytes: u64) -> Result<(), RenderError> {
         let params = &mut self.params;
-        params.particles_each = params.particles_per_cell.clamp(1, PARTICLES_EACH);
+        params.particles_each = match self.mode {
+            // All dots of a trail, which lie along one way.
+            Mode::Flow => flow::TRAIL_DOTS,
+            Mode::Map | Mode::Points | Mode::Sprites | Mode::Volume => {
+                params.particles_per_cell.clamp(1, PARTICLES_EACH)
+            }
+        };
         let groups: u64 = workgroups(params).into_iter().map(u64::from).product();
         let count = groups * u64::from(SQUARE * SQUARE * params.particles_each);
         let limit = MOST_PARTICLES.min(most_buffer_bytes / HALF_BYTES);
@@ -215,7 +225,7 @@ fn common(job: &RenderJob, scene: &Scene) -> Params {
         turns_per_kg_m2: look::TURNS_PER_KG_M2,
         optical_depth: style.optical_depth as f32,
         kernel: match job.mode {
-            Mode::Points => KERNEL_DOT,
+            Mode::Points | Mode::Flow => KERNEL_DOT,
             Mode::Sprites => KERNEL_BALL,
             Mode::Volume | Mode::Map => KERNEL_CLOUD,
         },

@@ -12,6 +12,7 @@ mod device;
 mod fill;
 #[cfg(feature = "service")]
 mod fleet;
+mod flow;
 mod gallery;
 mod golden;
 mod layout;
