@@ -30,6 +30,12 @@ impl ProductId {
         let name = self.0.strip_suffix("-east")?;
         format!("{name}-north").parse().ok()
     }
+
+    /// The product whose northward part this one may be.
+    pub fn eastward(&self) -> Option<Self> {
+        let name = self.0.strip_suffix("-north")?;
+        format!("{name}-east").parse().ok()
+    }
 }
 
 impl std::str::FromStr for ProductId {

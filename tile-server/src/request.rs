@@ -11,6 +11,11 @@ use crate::error::ServerError;
 pub(crate) fn mode(layer: &Layer, text: &str) -> Result<Mode, ServerError> {
     let offered = layer.modes();
     let found = offered.iter().find(|mode| mode.as_str() == text);
+    if found.is_none() && text == Mode::Flow.as_str() {
+        return Err(ServerError::NoVector {
+            product: layer.manifest.product.to_string(),
+        });
+    }
     found.copied().ok_or_else(|| ServerError::UnknownMode {
         product: layer.manifest.product.to_string(),
         mode: text.chars().take(80).collect(),
@@ -40,6 +45,11 @@ pub fn job(
 ) -> Result<RenderJob, ServerError> {
     let manifest = &layer.manifest;
     let time = shown_time(layer, time);
+    if let (Mode::Flow, Some(part)) = (mode, &layer.northward) {
+        let style = Style::of_flow(manifest.quantity);
+        let northward = &part.manifest;
+        return Ok(RenderJob::of_flow(manifest, northward, time, view, style)?);
+    }
     let accumulated = layer.accumulated.as_ref();
     let accumulated = accumulated.filter(|lift| lift.holds_at(time));
     let style = Style::with_transfer(TransferFunction::default_for(manifest.quantity));

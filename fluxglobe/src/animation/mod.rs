@@ -85,6 +85,7 @@ async fn shots(settings: &Settings, store: &Store, options: &RenderAnimation) ->
     style.globe_surface = !globe.transparent;
     let shots = Shots {
         accumulated: render::accumulated(store, &product).await?,
+        northward: render::northward(store, &product, globe.picture.mode).await?,
         product,
         from,
         to,

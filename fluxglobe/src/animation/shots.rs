@@ -19,6 +19,9 @@ pub(super) struct Shots {
     pub(super) product: Manifest,
     /// Its accumulated carbon.
     pub(super) accumulated: Option<Manifest>,
+    /// The northward part of its vector, in the mode flow.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) northward: Option<Manifest>,
     /// Instant of picture 0.
     pub(super) from: TimeMs,
     /// First instant after the animation.
@@ -88,6 +91,10 @@ impl Shots {
             }
         }
         let (accumulated, time) = (self.accumulated.as_ref(), self.time(number)?);
+        if let (Mode::Flow, Some(northward)) = (self.mode, &self.northward) {
+            let style = self.style;
+            return Ok(RenderJob::of_flow(&self.product, northward, time, view, style)?);
+        }
         let job = RenderJob::of(
             &self.product,
             accumulated,

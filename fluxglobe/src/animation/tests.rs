@@ -62,6 +62,7 @@ fn shots(count: u32) -> Shots {
     Shots {
         product: product(),
         accumulated: None,
+        northward: None,
         from: "2000-01-01".parse().unwrap(),
         mode: Mode::Volume,
         view,

@@ -2,7 +2,7 @@
 
 use anyhow::{Context as _, Result};
 use contract::colour::TransferFunction;
-use contract::job::{RenderJob, Style, View};
+use contract::job::{Mode, RenderJob, Style, View};
 use contract::manifest::Manifest;
 use contract::tile::Tile;
 use contract::time::Period;
@@ -76,6 +76,9 @@ pub(crate) async fn job(
             manifest.product
         ));
     }
+    if let Some(part) = northward(store, &manifest, picture.mode).await? {
+        return Ok(RenderJob::of_flow(&manifest, &part, time, view, style)?);
+    }
     let lift = accumulated(store, &manifest).await?;
     let job = RenderJob::of(&manifest, lift.as_ref(), time, picture.mode, view, style)?;
     Ok(job)
@@ -92,10 +95,35 @@ pub(crate) async fn product(
 
 /// The style that the options of a picture ask for.
 pub(crate) fn style(product: &Manifest, picture: &Picture) -> Style {
-    let mut style = Style::with_transfer(TransferFunction::default_for(product.quantity));
+    let mut style = match picture.mode {
+        Mode::Flow => Style::of_flow(product.quantity),
+        Mode::Map | Mode::Points | Mode::Sprites | Mode::Volume => {
+            Style::with_transfer(TransferFunction::default_for(product.quantity))
+        }
+    };
     style.slices = picture.slices.unwrap_or(style.slices);
     style.particles_per_cell = picture.particles.unwrap_or(style.particles_per_cell);
     style
+}
+
+/// The northward part of the vector whose eastward part a product is, if the mode needs one.
+pub(crate) async fn northward(
+    store: &Store,
+    eastward: &Manifest,
+    mode: Mode,
+) -> Result<Option<Manifest>> {
+    if mode != Mode::Flow {
+        return Ok(None);
+    }
+    let name = &eastward.product;
+    let product = contract::flow::northward_of(eastward).with_context(|| {
+        format!("{name} is not drawn as a flow: name the eastward part of a current, NAME-east, which has landed beside NAME-north")
+    })?;
+    let latest = storage::manifests::latest(store, &product).await?;
+    let latest = latest.with_context(|| {
+        format!("{name} is not drawn as a flow before {product} has landed; ingest the same files with its profile")
+    })?;
+    Ok(Some(latest))
 }
 
 /// Accumulated carbon of just this version of a product, if it was derived.

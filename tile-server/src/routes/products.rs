@@ -42,6 +42,9 @@ struct Product<'a> {
     steps: Vec<StepTimes>,
     modes: &'static [Mode],
     legend: Legend,
+    /// That of the mode flow, where there is one: speeds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    flow_legend: Option<Legend>,
 }
 
 /// When a step holds.
@@ -117,6 +120,10 @@ fn product(layer: &Layer) -> Product<'_> {
             .collect(),
         modes: layer.modes(),
         legend: legend(manifest.quantity),
+        flow_legend: layer
+            .northward
+            .as_ref()
+            .map(|_part| speed_legend(manifest.quantity)),
     }
 }
 
@@ -132,8 +139,18 @@ pub(crate) fn rounded(number: f64) -> f64 {
 }
 
 fn legend(quantity: Quantity) -> Legend {
-    let display = quantity.display();
     let transfer = TransferFunction::default_for(quantity);
+    legend_of(quantity, &transfer, quantity.title())
+}
+
+/// Speeds of a vector whose parts are of a quantity.
+fn speed_legend(quantity: Quantity) -> Legend {
+    let transfer = TransferFunction::of_speed(quantity);
+    legend_of(quantity, &transfer, "Speed of the current")
+}
+
+fn legend_of(quantity: Quantity, transfer: &TransferFunction, label: &'static str) -> Legend {
+    let display = quantity.display();
     let shown = |stored: f64| rounded(stored * display.factor + display.offset);
     let stops = transfer.palette.stops();
     let last = (stops.len() - 1) as f64;
@@ -143,7 +160,7 @@ fn legend(quantity: Quantity) -> Legend {
         low: shown(transfer.low),
         high: shown(transfer.high),
         unit: display.unit,
-        label: quantity.title(),
+        label,
         stops: stops.iter().enumerate().map(stop).collect(),
     }
 }

@@ -48,6 +48,7 @@ pub(super) async fn plan(store: &Store, options: &Recompute) -> Result<Tiles> {
         id,
         extent,
         accumulated: accumulated.map(|derived| Accumulated::new(derived.id(), derived.into())),
+        northward: None,
         manifest: manifest.into(),
     };
     let stored: BTreeSet<ObjectKey> = store.list("tiles").await?.into_iter().collect();
