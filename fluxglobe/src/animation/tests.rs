@@ -105,6 +105,27 @@ fn instants_divide_the_span_and_a_whole_turn_closes_to_a_ring() {
 }
 
 #[test]
+fn the_pictures_of_a_flow_drift_from_one_to_the_next() {
+    let part = |name: &str| Manifest {
+        product: name.parse().unwrap(),
+        quantity: Quantity::Current,
+        ..product()
+    };
+    let mut shots = Shots {
+        product: part("sea-east"),
+        northward: Some(part("sea-north")),
+        mode: Mode::Flow,
+        ..shots(366)
+    };
+    let clock_s = |number| shots.job(number).unwrap().flow.unwrap().clock_s;
+    // A picture a day.
+    assert!((clock_s(31) - clock_s(30) - 86_400.0).abs() < 1e-3);
+    shots.northward = None;
+    let refused = shots.job(0).unwrap_err().to_string();
+    assert!(refused.contains("northward"), "{refused}");
+}
+
+#[test]
 fn too_many_pictures_and_too_many_pixels_are_refused() {
     assert_eq!(Shots::count_of(2.0, 25).unwrap(), 50);
     for (seconds, fps) in [
