@@ -26,18 +26,23 @@ pub(crate) struct Device {
 }
 
 impl Device {
-    /// Compiles the stages.
-    pub(crate) fn new(gpu: Gpu, number: u64) -> Result<Self, RenderError> {
+    /// Compiles the stages. Frames of `most_frame_bytes` stay between pictures, of a share of the device if none are named.
+    pub(crate) fn new(
+        gpu: Gpu,
+        number: u64,
+        most_frame_bytes: Option<u64>,
+    ) -> Result<Self, RenderError> {
         let stages = Stages::new(&gpu);
         let fill = Fill::new(&gpu, fill::Sources::default());
         gpu.check_fault("compiling shaders")?;
         tracing::info!(adapter = gpu.adapter_name(), number, "renderer is ready");
+        let resident = Resident::new(&gpu, most_frame_bytes);
         Ok(Self {
             gpu,
             stages,
             fill,
             idle: Mutex::default(),
-            resident: Resident::default(),
+            resident,
             number,
         })
     }
@@ -80,6 +85,11 @@ impl Device {
         // A software adapter is slower than the twin, which uses the same processor without a detour.
         let pays = !self.gpu.is_software() && Fill::fits(&self.gpu, grid);
         pays.then(|| self.fill.run(&self.gpu, form, grid, values, domain))
+    }
+
+    /// Brings the frames of a scene to the device.
+    pub(crate) fn prepare(&self, scene: &Scene) -> Result<(), RenderError> {
+        self.scene_buffers(scene).map(|_buffers| ())
     }
 
     fn scene_buffers(&self, scene: &Scene) -> Result<SceneBuffers, RenderError> {

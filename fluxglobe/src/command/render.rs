@@ -35,7 +35,7 @@ pub(crate) async fn run(settings: &Settings, options: Render) -> Result<()> {
     job.style.globe_surface = surface;
     job.validate()?;
     let bar = progress::bar("draw", 1);
-    let png = deployment::renderer(settings, store)
+    let png = deployment::single_renderer(settings, store)
         .await?
         .draw(&job)
         .await?;

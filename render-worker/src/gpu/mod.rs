@@ -2,6 +2,7 @@
 
 mod fault;
 mod kernel;
+mod memory;
 mod recorder;
 mod stamps;
 mod workspace;
@@ -32,6 +33,7 @@ pub struct Gpu {
     most_buffer_bytes: u64,
     checks: Checks,
     is_software: bool,
+    own_bytes: Option<u64>,
     fault: FaultNote,
 }
 
@@ -66,6 +68,7 @@ impl Gpu {
             .await
             .map_err(|e| RenderError::NoAdapter(Box::new(e)))?;
         let adapter_name = adapter.get_info().name;
+        let own_bytes = memory::own_bytes(&adapter);
         let is_software = adapter.get_info().device_type == wgpu::DeviceType::Cpu;
         let limits = adapter.limits();
         let most_buffer_bytes = limits
@@ -94,6 +97,7 @@ impl Gpu {
             most_buffer_bytes,
             checks,
             is_software,
+            own_bytes,
             fault,
         })
     }
@@ -123,6 +127,11 @@ impl Gpu {
     /// Is the adapter a program on the processor, such as lavapipe?
     pub fn is_software(&self) -> bool {
         self.is_software
+    }
+
+    /// Bytes of memory that are the device's own; none where that is the computer's, or where nobody says.
+    pub fn own_bytes(&self) -> Option<u64> {
+        self.own_bytes.filter(|_| !self.is_software)
     }
 
     /// Largest storage buffer of this device.

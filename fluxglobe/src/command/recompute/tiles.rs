@@ -98,7 +98,7 @@ pub(super) async fn draw(
     if let Some(log) = log {
         on_workers(log, &tiles.missing, &|| bar.inc(1)).await?;
     } else {
-        let renderer = deployment::renderer(settings, store.clone()).await?;
+        let renderer = deployment::single_renderer(settings, store.clone()).await?;
         for job in &tiles.missing {
             let png = renderer.draw(job).await?;
             store.put_new(&job.key(), png).await?;
