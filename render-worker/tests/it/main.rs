@@ -20,6 +20,8 @@ mod limits;
 mod lost_device;
 mod mass;
 #[cfg(feature = "service")]
+mod prefetch;
+#[cfg(feature = "service")]
 mod process;
 mod reference;
 mod scenes;
