@@ -186,7 +186,7 @@ impl Source {
         }
         let zero = |cell: &u32| if *cell == 0 { f32::NAN } else { 0.0 };
         let frame = Arc::new(Frame::new(domain.content().iter().map(zero).collect()));
-        self.keep_frame(key, &frame);
+        self.lock().keep(key, &frame, self.most_bytes);
         frame
     }
 
@@ -238,14 +238,14 @@ impl Source {
         };
         count.fetch_add(1, Ordering::Relaxed);
         let done = self.read(grid, moment, domain, frame).await;
-        if let Ok(frame) = &done {
-            self.keep_frame(key.clone(), frame);
-        }
         let mut held = self.lock();
         held.reading.remove(&key);
-        if wanted == Wanted::Ahead && done.is_ok() {
-            held.early.insert(key);
-            held.forget_dropped();
+        held.forget_dropped();
+        if let Ok(frame) = &done {
+            if wanted == Wanted::Ahead {
+                held.early.insert(key.clone());
+            }
+            held.keep(key, frame, self.most_bytes);
         }
         drop(held);
         drop(reading);
@@ -280,13 +280,6 @@ impl Source {
         Ok(Arc::new(filled.await.map_err(RenderError::Thread)??))
     }
 
-    fn keep_frame(&self, key: FrameKey, frame: &Arc<Frame>) {
-        let kept = Arc::clone(frame);
-        self.lock()
-            .frames
-            .keep(key, kept, self.most_bytes, |frame| frame.size_bytes());
-    }
-
     fn lock(&self) -> std::sync::MutexGuard<'_, Held> {
         // Maps are changed by single inserts and removals, so a poisoned lock still guards whole ones.
         self.held.lock().unwrap_or_else(PoisonError::into_inner)
@@ -294,6 +287,12 @@ impl Source {
 }
 
 impl Held {
+    fn keep(&mut self, key: FrameKey, frame: &Arc<Frame>, most_bytes: u64) {
+        let kept = Arc::clone(frame);
+        self.frames
+            .keep(key, kept, most_bytes, |frame| frame.size_bytes());
+    }
+
     /// Forgets of frames that went unwanted that they were early, and of readings that were given up.
     fn forget_dropped(&mut self) {
         self.reading
