@@ -52,9 +52,7 @@ pub fn check_parts(eastward: &Manifest, northward: &Manifest) -> Result<(), Cont
     if northward_of(eastward).as_ref() != Some(&northward.product)
         || northward.quantity != eastward.quantity
     {
-        return bad(
-            "its parts are two products of currents, NAME-east and NAME-north".to_owned(),
-        );
+        return bad("its parts are two products of currents, NAME-east and NAME-north".to_owned());
     }
     if eastward.grid != northward.grid {
         return bad("its parts do not lie on one grid".to_owned());
@@ -241,7 +239,10 @@ mod tests {
         let job = job(&part("sea-north", 1..=9), "2002-01-03T18:00:00Z").unwrap();
         let flow = job.flow.as_ref().unwrap();
         assert_eq!(flow.northward.product(), "sea-north");
-        assert_eq!(job.value.after.as_ref().unwrap().weight.to_bits(), 0.25f64.to_bits());
+        assert_eq!(
+            job.value.after.as_ref().unwrap().weight.to_bits(),
+            0.25f64.to_bits()
+        );
         assert_eq!(
             flow.northward.after.as_ref().unwrap().weight.to_bits(),
             0.25f64.to_bits()
@@ -282,7 +283,9 @@ mod tests {
         assert!(is_refused(&|job| job.flow = None));
         assert!(is_refused(&|job| job.accumulated = Some(job.value.clone())));
         for clock_s in [f64::NAN, f64::INFINITY, 2e12, -2e12] {
-            assert!(is_refused(&|job| job.flow.as_mut().unwrap().clock_s = clock_s));
+            assert!(is_refused(
+                &|job| job.flow.as_mut().unwrap().clock_s = clock_s
+            ));
         }
         assert!(is_refused(&|job| {
             let domain = job.value.before.clone().unwrap();

@@ -75,7 +75,9 @@ impl std::str::FromStr for Mode {
 
     fn from_str(s: &str) -> Result<Self, Self::Err> {
         let found = Self::ALL.into_iter().find(|mode| mode.as_str() == s);
-        found.ok_or_else(|| ContractError::invalid("mode", s, "map, points, sprites, volume or flow"))
+        found.ok_or_else(|| {
+            ContractError::invalid("mode", s, "map, points, sprites, volume or flow")
+        })
     }
 }
 

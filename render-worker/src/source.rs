@@ -107,9 +107,7 @@ impl Source {
     pub fn kept(&self) -> Kept {
         let held = self.lock();
         // A frame's key is `frames/PRODUCT/DIGEST`, or the domain's where accumulation starts.
-        let product = |(frame, _): &FrameKey| {
-            frame.as_str().split('/').nth(1).map(str::to_owned)
-        };
+        let product = |(frame, _): &FrameKey| frame.as_str().split('/').nth(1).map(str::to_owned);
         Kept {
             products: held.frames.keys().filter_map(product).collect(),
             frame_bytes: held.frames.sum(|frame| frame.size_bytes()),
@@ -295,8 +293,7 @@ impl Held {
 
     /// Forgets of frames that went unwanted that they were early, and of readings that were given up.
     fn forget_dropped(&mut self) {
-        self.reading
-            .retain(|_, turn| Arc::strong_count(turn) > 1);
+        self.reading.retain(|_, turn| Arc::strong_count(turn) > 1);
         if self.early.len() > MOST_EARLY {
             let there: BTreeSet<FrameKey> = self.frames.keys().cloned().collect();
             self.early.retain(|key| there.contains(key));

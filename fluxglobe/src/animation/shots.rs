@@ -93,7 +93,13 @@ impl Shots {
         let (accumulated, time) = (self.accumulated.as_ref(), self.time(number)?);
         if let (Mode::Flow, Some(northward)) = (self.mode, &self.northward) {
             let style = self.style;
-            return Ok(RenderJob::of_flow(&self.product, northward, time, view, style)?);
+            return Ok(RenderJob::of_flow(
+                &self.product,
+                northward,
+                time,
+                view,
+                style,
+            )?);
         }
         let job = RenderJob::of(
             &self.product,

@@ -104,7 +104,10 @@ fn upstream(spans: [Span; 2], level: &Level, reach_rad: f64) -> [Span; 2] {
     let [x, y] = spans;
     [
         [x[0] - across * subpixels, x[1] + across * subpixels],
-        [y[0] - up.max(0.0) * subpixels, y[1] + down.max(0.0) * subpixels],
+        [
+            y[0] - up.max(0.0) * subpixels,
+            y[1] + down.max(0.0) * subpixels,
+        ],
     ]
 }
 

@@ -173,7 +173,10 @@ impl Reader {
             learnt.last.clear();
         }
         let product = moment.product().to_owned();
-        let (before, heading) = *learnt.last.get(&product).unwrap_or(&(place, Heading::Unknown));
+        let (before, heading) = *learnt
+            .last
+            .get(&product)
+            .unwrap_or(&(place, Heading::Unknown));
         let heading = heading.after(before, place);
         learnt.last.insert(product, (place, heading));
         heading

@@ -210,7 +210,9 @@ fn a_whole_turn_brings_a_particle_back_to_where_it_was() {
     };
     let turn = period_s / life_s;
     let (fine, coarse) = (off_km(turn, 1440), off_km(turn, 60));
-    println!("a whole turn of 40 030 km ends {fine:.1} km away in steps of 28 km, {coarse:.0} km in 667 km");
+    println!(
+        "a whole turn of 40 030 km ends {fine:.1} km away in steps of 28 km, {coarse:.0} km in 667 km"
+    );
     assert!(fine < 60.0 && fine < coarse, "{fine} {coarse}");
     assert!(off_km(0.5 * turn, 1440) > 5000.0, "half a turn is seen");
 }
@@ -319,7 +321,11 @@ fn the_clock_and_the_field_change_the_picture_and_nothing_else_does() {
     let scene = gyres(FIVE_DEGREES);
     for renderer in renderers("clock") {
         for view in [tile(2, 0, 1, 256), globe(-120.0, 10.0, 1.5e7, 200)] {
-            let draw = |clock_s| renderer.render(&currents::job(view, clock_s), &scene).unwrap();
+            let draw = |clock_s| {
+                renderer
+                    .render(&currents::job(view, clock_s), &scene)
+                    .unwrap()
+            };
             let first = draw(1e7);
             assert_images_differ(&first, &draw(4e7));
             assert!(first == draw(1e7), "equal instants are equal bytes");

@@ -19,9 +19,7 @@ use render_worker::stages::eye::{self, Eye};
 use render_worker::stages::flow::cpu::Field;
 use render_worker::stages::flow::{self, Flow};
 use render_worker::stages::interpolate::{self, Interpolate};
-use render_worker::stages::layout::{
-    Active, Entry, MISSING, Params, Particle, Splat, Velocity,
-};
+use render_worker::stages::layout::{Active, Entry, MISSING, Params, Particle, Splat, Velocity};
 use render_worker::stages::light::{self, Light, texel_count};
 use render_worker::stages::map::{self, Map};
 use render_worker::stages::particles::cpu::Inputs;
@@ -202,11 +200,7 @@ impl Twins {
 }
 
 /// The grid at an instant; nothing of nothing.
-fn between(
-    params: &Params,
-    interval: Option<&render_worker::Interval>,
-    weight: f32,
-) -> Vec<f32> {
+fn between(params: &Params, interval: Option<&render_worker::Interval>, weight: f32) -> Vec<f32> {
     let Some(interval) = interval else {
         return vec![];
     };

@@ -2,7 +2,9 @@
 
 use glam::{Vec2, Vec3};
 
-use crate::stages::layout::{Active, MISSING, Params, Particle, Row, Velocity, is_missing, nearest};
+use crate::stages::layout::{
+    Active, MISSING, Params, Particle, Row, Velocity, is_missing, nearest,
+};
 use crate::stages::particles::cpu::{HALF_TURN, hash, shaken, unit};
 use crate::stages::project::cpu::turned;
 
