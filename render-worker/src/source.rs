@@ -230,17 +230,16 @@ impl Source {
         if let Some(frame) = self.held(&key, wanted) {
             return Ok(frame);
         }
-        let count = match wanted {
-            Wanted::Now => &self.frame_misses,
-            Wanted::Ahead => &self.early_reads,
-        };
-        count.fetch_add(1, Ordering::Relaxed);
+        if wanted == Wanted::Now {
+            self.frame_misses.fetch_add(1, Ordering::Relaxed);
+        }
         let done = self.read(grid, moment, domain, frame).await;
         let mut held = self.lock();
         held.reading.remove(&key);
         held.forget_dropped();
         if let Ok(frame) = &done {
             if wanted == Wanted::Ahead {
+                self.early_reads.fetch_add(1, Ordering::Relaxed);
                 held.early.insert(key.clone());
             }
             held.keep(key, frame, self.most_bytes);
