@@ -13,9 +13,9 @@ use super::{Plan, cell_px};
 use crate::scene::Scene;
 
 /// Dots of a trail.
-pub(super) const TRAIL_DOTS: u32 = 24;
+pub(super) const TRAIL_DOTS: u32 = 32;
 /// Way of a particle in its life at the top of the transfer function, pixels.
-const LIFE_PX: f64 = 120.0;
+const LIFE_PX: f64 = 110.0;
 /// The same in cells at most: a step along it is then one or two.
 const MOST_LIFE_CELLS: f64 = 48.0;
 /// Cells at the top of the transfer function in one step from a birthplace to a trail's end.
@@ -61,6 +61,7 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) -> f64 {
     params.flow_cols_per_m_s = (life_s / SPHERE_RADIUS_M / dlon_rad) as f32;
     params.flow_rows_per_m_s = (life_s / SPHERE_RADIUS_M / dlat_rad) as f32;
     params.flow_most_cols = (TAU / dlon_rad) as f32;
+    params.flow_px_per_m_s = (life_cells * cell_px / top_m_s) as f32;
     params.flow_most_m_s = (MOST_OVER_TOP * top_m_s) as f32;
     // Born in the middle of their lives.
     0.5 * MOST_OVER_TOP * life_rad

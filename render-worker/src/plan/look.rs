@@ -90,7 +90,7 @@ impl Look {
                 size_spread: 0.45,
                 shake_shift: 0,
                 area_px_per_particle: 36.0,
-                center_depth: Some(0.7),
+                center_depth: Some(0.8),
             },
             Mode::Volume | Mode::Map => Self {
                 radius_cells: 0.7,

@@ -157,6 +157,8 @@ shared_struct! {
         pub flow_most_cols: f32,
         /// Speed above which particles are drawn no faster, m/s.
         pub flow_most_m_s: f32,
+        /// Pixels on the equator, or below the camera, that 1 m/s drifts through in a life.
+        pub flow_px_per_m_s: f32,
     }
 }
 

@@ -19,6 +19,7 @@ struct Params {
     cols_per_rad: f32, rows_per_rad: f32, edge_sharpness: f32, map_alpha: f32, surface: u32, origin_x_px: i32,
     origin_y_px: i32, entry_shift: u32, flow_turn: f32, flow_cycle: u32, flow_share: u32, flow_lead_steps: u32,
     flow_cols_per_m_s: f32, flow_rows_per_m_s: f32, flow_most_cols: f32, flow_most_m_s: f32,
+    flow_px_per_m_s: f32,
 }
 struct Row {
     y_sub: i32, y_span_px: f32, sin_lat: f32, cos_lat: f32, lat_span_rad: f32, radius: f32, area_m2: f32,

@@ -132,7 +132,7 @@ fn kilometres(a: DVec3, b: DVec3) -> f64 {
 /// Of a tile that shows most of an ocean.
 const VIEW: fn() -> View = || tile(3, 1, 3, 256);
 /// Heads paler than this are young or about to fade, and may be born anew in the days that are compared.
-const LEAST_DEPTH: f32 = 0.4;
+const LEAST_DEPTH: f32 = 0.25;
 
 #[test]
 fn a_uniform_eastward_current_moves_particles_by_its_way_over_the_circle_of_latitude() {

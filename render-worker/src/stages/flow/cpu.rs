@@ -12,6 +12,8 @@ use crate::stages::project::cpu::turned;
 const TRAIL: f32 = 0.5;
 /// The last of its life in which a particle fades: 1 over this.
 const FADING: f32 = 8.0;
+/// Least share of a dot where dots lie close together: slow water is seen as faint dots.
+const LEAST_SPACING_PX: f32 = 0.08;
 
 /// Squares of larger ones would not be numbers.
 const MOST_SPEED: f32 = 1.0e6;
@@ -81,7 +83,7 @@ pub fn trails(params: &Params, inputs: &Inputs<'_>, particles: &mut [Particle]) 
     for (i, dots) in particles.chunks_exact_mut(each as usize).enumerate() {
         let cell = inputs.active[i / of_cell];
         let mut trail = inputs.field.trail_of(cell.cell, (i % of_cell) as u32);
-        let share = trail.age.min(TRAIL) / (each - 1) as f32;
+        let share = dot_share(params, trail.age);
         for (number, dot) in (0..).zip(dots) {
             if trail.open <= 0.0 {
                 *dot = Particle {
@@ -100,13 +102,21 @@ pub fn trails(params: &Params, inputs: &Inputs<'_>, particles: &mut [Particle]) 
     }
 }
 
+/// The share of a life between two dots of a trail.
+fn dot_share(params: &Params, age: f32) -> f32 {
+    age.min(TRAIL) / (params.particles_each - 1) as f32
+}
+
 fn dot_of(params: &Params, palette: &[u32], trail: &Trail, number: u32, speed: f32) -> Particle {
     let row = trail.row as i32 + trail.place.y.floor() as i32;
     let row = row.clamp(0, params.rows as i32 - 1);
     let taper = (number + 1) as f32 / params.particles_each as f32;
     let position = ((speed - params.transfer_low) * params.transfer_per_unit).clamp(0.0, 1.0);
     let alive = (trail.age / TRAIL).min(1.0) * ((1.0 - trail.age) * FADING).clamp(0.0, 1.0);
-    let opacity = params.depth_floor + (1.0 - params.depth_floor) * position.sqrt();
+    let spacing_px =
+        speed.min(params.flow_most_m_s) * params.flow_px_per_m_s * dot_share(params, trail.age);
+    let opacity = (params.depth_floor + (1.0 - params.depth_floor) * position.sqrt())
+        * spacing_px.clamp(LEAST_SPACING_PX, 1.0);
     Particle {
         row: row as u32,
         east: trail.place.x,
