@@ -12,8 +12,9 @@ use crate::stages::project::cpu::turned;
 const TRAIL: f32 = 0.5;
 /// The last of its life in which a particle fades: 1 over this.
 const FADING: f32 = 8.0;
-/// Least share of a dot where dots lie close together: slow water is seen as faint dots.
-const LEAST_SPACING_PX: f32 = 0.08;
+/// Dots that lie closer together are paler, down to a least share: slow water is seen as faint dots.
+const FULL_SPACING_PX: f32 = 0.6;
+const LEAST_SHARE: f32 = 0.12;
 
 /// Squares of larger ones would not be numbers.
 const MOST_SPEED: f32 = 1.0e6;
@@ -116,7 +117,7 @@ fn dot_of(params: &Params, palette: &[u32], trail: &Trail, number: u32, speed: f
     let spacing_px =
         speed.min(params.flow_most_m_s) * params.flow_px_per_m_s * dot_share(params, trail.age);
     let opacity = (params.depth_floor + (1.0 - params.depth_floor) * position.sqrt())
-        * spacing_px.clamp(LEAST_SPACING_PX, 1.0);
+        * (spacing_px / FULL_SPACING_PX).clamp(LEAST_SHARE, 1.0);
     Particle {
         row: row as u32,
         east: trail.place.x,

@@ -8,8 +8,9 @@
 const TRAIL = 0.5;
 // The last of its life in which a particle fades: 1 over this.
 const FADING = 8.0;
-// Least share of a dot where dots lie close together: slow water is seen as faint dots.
-const LEAST_SPACING_PX = 0.08;
+// Dots that lie closer together are paler, down to a least share: slow water is seen as faint dots.
+const FULL_SPACING_PX = 0.6;
+const LEAST_SHARE = 0.12;
 
 // Velocity east and north and 1, or zeros where there is no data.
 fn cell_velocity(row: i32, col: i32) -> vec3<f32> {
@@ -93,7 +94,7 @@ fn dot_of(row: u32, slot: u32, number: u32, trail: Trail, speed: f32) -> Particl
     particle.south = trail.place.y - f32(at - i32(row));
     // As much for each pixel of a trail, whatever its length.
     let spacing_px = min(speed, params.flow_most_m_s) * params.flow_px_per_m_s * dot_share(trail.age);
-    let opacity = (params.depth_floor + (1.0 - params.depth_floor) * sqrt(position)) * clamp(spacing_px, LEAST_SPACING_PX, 1.0);
+    let opacity = (params.depth_floor + (1.0 - params.depth_floor) * sqrt(position)) * clamp(spacing_px / FULL_SPACING_PX, LEAST_SHARE, 1.0);
     particle.depth = params.optical_depth * opacity * taper * taper * alive * trail.open;
     particle.color = palette[u32(nearest(position * 255.0))] | (u32(nearest(taper * 255.0)) << 24u);
     return particle;
