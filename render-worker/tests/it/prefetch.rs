@@ -13,7 +13,7 @@ use storage::Store;
 use crate::device::gpu_renderer;
 use crate::scenes::{FIVE_DEGREES, globe, job, ocean, tile};
 use crate::stored::product;
-use crate::worker::until;
+use crate::worker::{Worker, fleet, until};
 
 const MONTHS: u32 = 8;
 const QUARTER_DEGREE: Grid = Grid {
@@ -89,6 +89,26 @@ async fn the_frames_around_are_read_ahead_and_the_next_picture_finds_its_own() {
     until("February", || service.kept().early_reads == 5).await;
     let kept = service.kept();
     assert_eq!((kept.frame_misses, kept.early_hits), (2, 3));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_is_read_ahead_and_used_is_in_the_metrics() {
+    let store = Store::memory();
+    let flux = months(&store, "flux", FIVE_DEGREES).await;
+    let worker = Worker::start(&store, 2, 8);
+    let fleet = fleet(&[&worker.name]).await;
+    let count = |worker: &Worker, outcome| {
+        let name = "fluxglobe_render_worker_prefetch_frames_total";
+        worker.metric(name, &[("outcome", outcome)])
+    };
+    for (time, read, used) in [("2000-04-20", 2, 0), ("2000-05-20", 3, 1)] {
+        let job = map_at(&flux, time, small());
+        fleet.draw(&job, "t").await.unwrap();
+        worker
+            .until(time, |worker| count(worker, "read") == read)
+            .await;
+        assert_eq!(count(&worker, "used"), used, "{time}");
+    }
 }
 
 #[tokio::test(flavor = "multi_thread")]
