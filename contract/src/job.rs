@@ -6,6 +6,7 @@ use crate::ContractError;
 use crate::colour::TransferFunction;
 use crate::context::{Context, Relief};
 use crate::digest::Digest;
+use crate::flow::{self, Flow};
 use crate::grid::Grid;
 use crate::key::ObjectKey;
 use crate::manifest::Manifest;
@@ -37,11 +38,21 @@ pub enum Mode {
     Sprites,
     /// Half-angle-sliced volume with shadows.
     Volume,
+    /// Particles that drift with a vector field, with trails.
+    Flow,
 }
 
 impl Mode {
-    /// All four, in the order they are offered.
-    pub const ALL: [Self; 4] = [Self::Map, Self::Points, Self::Sprites, Self::Volume];
+    /// All of them, in the order they are offered.
+    pub const ALL: [Self; 5] = [
+        Self::Map,
+        Self::Points,
+        Self::Sprites,
+        Self::Volume,
+        Self::Flow,
+    ];
+    /// Those that draw one product alone; a flow needs both parts of a vector.
+    pub const SCALAR: [Self; 4] = [Self::Map, Self::Points, Self::Sprites, Self::Volume];
 
     /// Name in URLs and on the command line.
     pub fn as_str(self) -> &'static str {
@@ -50,6 +61,7 @@ impl Mode {
             Self::Points => "points",
             Self::Sprites => "sprites",
             Self::Volume => "volume",
+            Self::Flow => "flow",
         }
     }
 }
@@ -65,7 +77,9 @@ impl std::str::FromStr for Mode {
 
     fn from_str(s: &str) -> Result<Self, Self::Err> {
         let found = Self::ALL.into_iter().find(|mode| mode.as_str() == s);
-        found.ok_or_else(|| ContractError::invalid("mode", s, "map, points, sprites or volume"))
+        found.ok_or_else(|| {
+            ContractError::invalid("mode", s, "map, points, sprites, volume or flow")
+        })
     }
 }
 
@@ -143,6 +157,9 @@ pub struct RenderJob {
     /// Relief of land and sea floor below the particles: on globe views with a surface, and on map tiles.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub relief: Option<Relief>,
+    /// What makes the product drawn the eastward part of a vector; there if and only if the mode is [`Mode::Flow`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub flow: Option<Flow>,
     /// Mode.
     pub mode: Mode,
     /// View.
@@ -246,7 +263,7 @@ impl View {
 }
 
 impl RenderJob {
-    /// The job that draws a version of a product at an instant, lifted by a version of its accumulated carbon. A map has
+    /// The job that draws a version of a product at an instant in any mode but [`Mode::Flow`], lifted by a version of its accumulated carbon. A map has
     /// no particles to lift.
     ///
     /// # Errors
@@ -275,6 +292,7 @@ impl RenderJob {
             value: moment(product)?,
             accumulated: accumulated.map(moment).transpose()?,
             relief: None,
+            flow: None,
             mode,
             view,
             style,
@@ -310,6 +328,7 @@ impl RenderJob {
         self.value.validate()?;
         self.accumulated.as_ref().map_or(Ok(()), Moment::validate)?;
         self.relief.as_ref().map_or(Ok(()), Relief::validate)?;
+        flow::validate(self)?;
         self.style.validate()?;
         self.view.validate()
     }
@@ -360,6 +379,7 @@ mod tests {
             value: moment(),
             accumulated: None,
             relief: None,
+            flow: None,
             mode: Mode::Volume,
             view: View::Tile {
                 tile: Tile { z: 1, x: 0, y: 0 },

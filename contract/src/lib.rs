@@ -12,6 +12,7 @@ pub mod earth;
 pub mod error;
 pub mod event;
 mod exact;
+pub mod flow;
 pub mod grid;
 pub mod job;
 pub mod key;

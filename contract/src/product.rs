@@ -24,6 +24,18 @@ impl ProductId {
     pub fn accumulated(&self) -> Result<Self, ContractError> {
         format!("{}-accumulated", self.0).parse()
     }
+
+    /// The product of the northward part of a vector whose eastward part this one may be: `NAME-north` of `NAME-east`.
+    pub fn northward(&self) -> Option<Self> {
+        let name = self.0.strip_suffix("-east")?;
+        format!("{name}-north").parse().ok()
+    }
+
+    /// The product whose northward part this one may be.
+    pub fn eastward(&self) -> Option<Self> {
+        let name = self.0.strip_suffix("-north")?;
+        format!("{name}-east").parse().ok()
+    }
 }
 
 impl std::str::FromStr for ProductId {

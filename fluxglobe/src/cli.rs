@@ -325,7 +325,8 @@ pub(crate) struct Picture {
     /// Product.
     #[arg(long, alias = "product")]
     pub(crate) layer: ProductId,
-    /// map, points, sprites or volume.
+    /// map, points, sprites, volume or flow: trails that drift with a current, for a layer NAME-east beside NAME-north,
+    /// such as --layer globcurrent-east --mode flow.
     #[arg(long, default_value = "volume")]
     pub(crate) mode: Mode,
     /// Any instant; between stored steps the grids are interpolated. The middle of the last step if absent.

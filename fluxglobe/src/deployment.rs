@@ -9,7 +9,7 @@ use compute::Engine;
 use contract::manifest::Manifest;
 use contract::product::ProductId;
 use kafka_log::{KafkaLog, KafkaSettings};
-use render_worker::{Backend, RenderService};
+use render_worker::{Backend, Limits, RenderService};
 use storage::Store;
 use storage::log::{EmbeddedLog, EventLog};
 
@@ -77,14 +77,28 @@ pub(crate) fn engine(settings: &Settings, store: Store) -> Result<Engine> {
     })
 }
 
-/// The renderer on this machine's Vulkan device, or on its processor when asked to.
+/// The renderer on this machine's Vulkan device, or on its processor when asked to; for pictures that follow one another
+/// in time.
 pub(crate) async fn renderer(settings: &Settings, store: Store) -> Result<RenderService> {
+    renderer_of(settings, store, Limits::default()).await
+}
+
+/// The same for single pictures: nothing is read ahead for a next one.
+pub(crate) async fn single_renderer(settings: &Settings, store: Store) -> Result<RenderService> {
+    let limits = Limits {
+        frames_ahead: 0,
+        ..Limits::default()
+    };
+    renderer_of(settings, store, limits).await
+}
+
+async fn renderer_of(settings: &Settings, store: Store, limits: Limits) -> Result<RenderService> {
     let backend = if settings.cpu {
         Backend::Cpu
     } else {
         Backend::Gpu
     };
-    let make = move || RenderService::new(store, backend);
+    let make = move || RenderService::with_limits(store, backend, limits);
     Ok(tokio::task::spawn_blocking(make).await??)
 }
 

@@ -102,6 +102,7 @@ pub fn scene(grid: &Grid) -> Scene {
         value,
         accumulated: Some(accumulated),
         terrain: None,
+        northward: None,
     }
 }
 
@@ -134,6 +135,7 @@ pub fn job(size_px: [u32; 2], slices: u32) -> Result<RenderJob> {
         value: moment("made-up")?,
         accumulated: Some(moment("made-up-carbon")?),
         relief: None,
+        flow: None,
         mode: Mode::Volume,
         view: View::Globe {
             lon_deg: WEST_DEG + 0.5 * WIDTH_DEG,

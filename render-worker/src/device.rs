@@ -27,19 +27,24 @@ pub(crate) struct Device {
 }
 
 impl Device {
-    /// Compiles the stages.
-    pub(crate) fn new(gpu: Gpu, number: u64) -> Result<Self, RenderError> {
+    /// Compiles the stages. Frames of `most_frame_bytes` stay between pictures, of a share of the device if none are named.
+    pub(crate) fn new(
+        gpu: Gpu,
+        number: u64,
+        most_frame_bytes: Option<u64>,
+    ) -> Result<Self, RenderError> {
         let stages = Stages::new(&gpu);
         let fill = Fill::new(&gpu, fill::Sources::default());
         gpu.check_fault("compiling shaders")?;
         gpu.keep_pipelines();
         tracing::info!(adapter = gpu.adapter_name(), number, "renderer is ready");
+        let resident = Resident::new(&gpu, most_frame_bytes);
         Ok(Self {
             gpu,
             stages,
             fill,
             idle: Mutex::default(),
-            resident: Resident::default(),
+            resident,
             number,
         })
     }
@@ -84,6 +89,15 @@ impl Device {
         pays.then(|| self.fill.run(&self.gpu, form, grid, values, domain))
     }
 
+    /// Brings the frames of a scene to the device before anybody wants them, if they are held whole.
+    pub(crate) fn prepare(&self, scene: &Scene) -> Result<(), RenderError> {
+        if !Plan::holds_whole(&scene.grid) {
+            return Ok(());
+        }
+        let held = 0..scene.grid.cell_count();
+        self.scene_buffers(scene, &held, false).map(|_buffers| ())
+    }
+
     fn scene_buffers(
         &self,
         scene: &Scene,
@@ -104,6 +118,7 @@ impl Device {
         Ok(SceneBuffers {
             value: pair(&scene.value)?,
             accumulated: scene.accumulated.as_ref().map(pair).transpose()?,
+            northward: scene.northward.as_ref().map(pair).transpose()?,
             domain: self
                 .resident
                 .buffer(&self.gpu, &scene.domain, held.clone())?,

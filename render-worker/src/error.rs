@@ -56,6 +56,9 @@ pub enum RenderError {
         product: String,
         accumulated: String,
     },
+    /// A flow was to be drawn from one part of its vector.
+    #[error("a flow needs both parts of a vector, the scene has the eastward one only")]
+    NoNorthward,
     /// Reading frames failed.
     #[error("cannot read {what} of {product}")]
     Store {
@@ -107,6 +110,7 @@ impl RenderError {
             | Self::TooManyPairs { .. }
             | Self::NoExactFill
             | Self::GridMismatch { .. }
+            | Self::NoNorthward
             | Self::Encode { .. }
             | Self::NoReference => false,
         }
@@ -122,6 +126,7 @@ impl RenderError {
                 | Self::TooManyPairs { .. }
                 | Self::NoExactFill
                 | Self::GridMismatch { .. }
+                | Self::NoNorthward
         )
     }
 
@@ -153,6 +158,7 @@ impl RenderError {
             | Self::TooManyPairs { .. }
             | Self::NoExactFill
             | Self::GridMismatch { .. }
+            | Self::NoNorthward
             | Self::Encode { .. }
             | Self::NoReference => true,
             Self::Store { source, .. } => {

@@ -7,15 +7,17 @@ use crate::error::RenderError;
 use crate::gpu::{Gpu, Recorder, Slot, Stamps, Workspace};
 use crate::passes::place::Place;
 use crate::passes::splat::Splats;
+use crate::passes::trails::Trails;
 use crate::plan::{Part, Plan};
 use crate::stages::bin::{Bin, list_count};
 use crate::stages::compose::Compose;
 use crate::stages::eye::Eye;
+use crate::stages::flow::Flow;
 use crate::stages::interpolate::Interpolate;
 use crate::stages::layout::{Entry, Params};
 use crate::stages::light::Light;
 use crate::stages::map::Map;
-use crate::stages::{bin, compose, interpolate, map};
+use crate::stages::{bin, compose, flow, interpolate, map};
 
 /// Entries a list buffer starts with for each particle; a frame that needs more is drawn again with room for all.
 const FIRST_ENTRIES_PER_PARTICLE: u64 = 2;
@@ -27,6 +29,7 @@ const FIRST_ENTRIES: u64 = 1 << 16;
 pub struct SceneBuffers {
     pub value: [wgpu::Buffer; 2],
     pub accumulated: Option<[wgpu::Buffer; 2]>,
+    pub northward: Option<[wgpu::Buffer; 2]>,
     pub domain: wgpu::Buffer,
     /// Doubts of both frames of values; none where they are not drawn.
     pub doubts: Option<[wgpu::Buffer; 2]>,
@@ -42,6 +45,7 @@ pub struct FrameContext<'a> {
     pub params_buffer: wgpu::Buffer,
     pub value_frames: [wgpu::Buffer; 2],
     pub accumulated_frames: Option<[wgpu::Buffer; 2]>,
+    pub northward_frames: Option<[wgpu::Buffer; 2]>,
     pub domain: wgpu::Buffer,
     pub doubts: Option<[wgpu::Buffer; 2]>,
     pub terrain: Option<wgpu::Buffer>,
@@ -63,6 +67,7 @@ impl<'a> FrameContext<'a> {
         let SceneBuffers {
             value,
             accumulated,
+            northward,
             domain,
             doubts,
             terrain,
@@ -75,6 +80,7 @@ impl<'a> FrameContext<'a> {
             params_buffer,
             value_frames: value,
             accumulated_frames: accumulated,
+            northward_frames: northward,
             domain,
             doubts,
             terrain,
@@ -115,7 +121,9 @@ impl<'a> FrameContext<'a> {
 /// All compiled stages.
 pub struct Stages {
     interpolate: Interpolate,
+    flow: Flow,
     splats: Splats,
+    trails: Trails,
     light: Light,
     bin: Bin,
     place: Place,
@@ -129,7 +137,9 @@ impl Stages {
     pub fn new(gpu: &Gpu) -> Self {
         Self {
             interpolate: Interpolate::new(gpu, interpolate::SOURCE),
+            flow: Flow::new(gpu, flow::SOURCE),
             splats: Splats::new(gpu),
+            trails: Trails::new(gpu),
             light: Light::new(gpu),
             bin: Bin::new(gpu, bin::SOURCE),
             place: Place::new(gpu),
@@ -145,7 +155,12 @@ impl Stages {
             self.map.record(frame)?;
             self.compose.record(frame)
         } else {
-            self.splats.record(frame)?;
+            if frame.plan.mode == Mode::Flow {
+                self.flow.record(frame)?;
+                self.trails.record(frame)?;
+            } else {
+                self.splats.record(frame)?;
+            }
             if frame.params.light_on == 1 {
                 self.light.record(frame)?;
             }

@@ -8,9 +8,10 @@ use crate::plan::{Part, Plan};
 use crate::scene::{Interval, Scene, Terrain};
 use crate::stages::bin::list_count;
 use crate::stages::compose::in_context::{self, Surroundings};
+use crate::stages::flow::cpu::Field;
 use crate::stages::layout::{Entry, Params, Particle, Splat};
 use crate::stages::particles::cpu::Inputs;
-use crate::stages::{bin, compose, doubt, eye, interpolate, light, map, particles, project};
+use crate::stages::{bin, compose, doubt, eye, flow, interpolate, light, map, particles, project};
 
 /// Most particles of one picture.
 const MOST_PARTICLES: usize = 1 << 24;
@@ -44,15 +45,31 @@ pub fn draw(plan: &Plan, part: Part, scene: &Scene) -> Result<Vec<u8>, RenderErr
             });
         }
         let mut particles = vec![Particle::default(); count];
-        let inputs = Inputs {
-            active: &plan.active,
-            rows: &plan.rows,
-            value: &value,
-            accumulated: accumulated.as_deref().unwrap_or_default(),
-            palette: &plan.palette,
-            doubt: &doubt,
-        };
-        particles::cpu::generate(&params, &inputs, &mut particles);
+        if let (Mode::Flow, Some(northward)) = (plan.mode, &scene.northward) {
+            let north = interpolated(&params, params.northward_weight, northward);
+            let velocity = flow::cpu::velocities(&value, &north);
+            let field = Field {
+                params: &params,
+                rows: &plan.rows,
+                velocity: &velocity,
+            };
+            let inputs = flow::cpu::Inputs {
+                active: &plan.active,
+                field,
+                palette: &plan.palette,
+            };
+            flow::cpu::trails(&params, &inputs, &mut particles);
+        } else {
+            let inputs = Inputs {
+                active: &plan.active,
+                rows: &plan.rows,
+                value: &value,
+                accumulated: accumulated.as_deref().unwrap_or_default(),
+                palette: &plan.palette,
+                doubt: &doubt,
+            };
+            particles::cpu::generate(&params, &inputs, &mut particles);
+        }
         let mut splats = vec![Splat::default(); particles.len()];
         project::cpu::project(&params, &plan.rows, &plan.cols, &particles, &mut splats);
         if params.light_on == 1 {

@@ -13,6 +13,7 @@ pub(crate) struct Gauges {
     drawing: IntGauge,
     resident_bytes: IntGaugeVec,
     frame_reads: IntCounterVec,
+    prefetch: IntCounterVec,
     device_restarts: IntCounter,
 }
 
@@ -40,6 +41,13 @@ impl Gauges {
                 ),
                 &["outcome"],
             )?,
+            prefetch: IntCounterVec::new(
+                named(
+                    "prefetch_frames_total",
+                    "Frames read ahead, those of them that were wanted then, and times that it was given up.",
+                ),
+                &["outcome"],
+            )?,
             device_restarts: IntCounter::with_opts(named(
                 "device_restarts_total",
                 "Graphics devices that were given up and opened again.",
@@ -55,6 +63,7 @@ impl Collector for Gauges {
             self.drawing.desc(),
             self.resident_bytes.desc(),
             self.frame_reads.desc(),
+            self.prefetch.desc(),
             self.device_restarts.desc(),
         ]
         .concat()
@@ -82,12 +91,19 @@ impl Collector for Gauges {
         };
         reads("hit", kept.frame_hits);
         reads("miss", kept.frame_misses);
+        let early = |outcome: &str, total: u64| {
+            raise(&self.prefetch.with_label_values(&[outcome]), total);
+        };
+        early("read", kept.early_reads);
+        early("used", kept.early_hits);
+        early("cancelled", kept.early_cancelled);
         raise(&self.device_restarts, service.renderer().device_number());
         [
             self.queue_length.collect(),
             self.drawing.collect(),
             self.resident_bytes.collect(),
             self.frame_reads.collect(),
+            self.prefetch.collect(),
             self.device_restarts.collect(),
         ]
         .concat()

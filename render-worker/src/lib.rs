@@ -22,6 +22,7 @@ pub mod image;
 pub mod passes;
 pub mod plan;
 pub mod playback;
+mod prefetch;
 pub mod proof;
 pub mod pyramid;
 mod recent;

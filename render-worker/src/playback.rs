@@ -66,6 +66,7 @@ impl<'a> Playback<'a> {
         Ok(SceneBuffers {
             value: pair(&scene.value)?,
             accumulated: scene.accumulated.as_ref().map(pair).transpose()?,
+            northward: scene.northward.as_ref().map(pair).transpose()?,
             domain: gpu.storage("domain", scene.domain.content())?,
             doubts: scene.value.has_doubt().then(doubts).transpose()?,
             terrain: scene

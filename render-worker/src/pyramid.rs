@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use contract::earth::Earth;
 use contract::grid::Grid;
-use contract::job::RenderJob;
+use contract::job::{Mode, RenderJob};
 
 use crate::plan::cell_px;
 use crate::scene::{Cells, Frame, Interval, Scene, Terrain};
@@ -16,6 +16,8 @@ use crate::stages::layout::is_missing;
 
 /// Cells smaller than this are joined, pixels: blocks then measure half a pixel to one.
 const LEAST_CELL_PX: f64 = 0.5;
+/// The same where particles drift: a cell sends out one at least, whose trail is many times as long.
+const LEAST_FLOW_CELL_PX: f64 = 3.0;
 /// Cells of the terrain smaller than this are joined, pixels: one pixel shows one cell, so what lies between is lost.
 const LEAST_TERRAIN_CELL_PX: f64 = 1.0;
 
@@ -52,10 +54,14 @@ fn suited_terrain(job: &RenderJob, terrain: &Terrain) -> Option<Terrain> {
 }
 
 fn suited_product(job: &RenderJob, scene: &Scene) -> Option<Scene> {
+    let least_px = match job.mode {
+        Mode::Flow => LEAST_FLOW_CELL_PX,
+        Mode::Map | Mode::Points | Mode::Sprites | Mode::Volume => LEAST_CELL_PX,
+    };
     let mut suited: Option<Scene> = None;
     loop {
         let finest = suited.as_ref().unwrap_or(scene);
-        if cell_px(&job.view, &finest.grid) >= LEAST_CELL_PX {
+        if cell_px(&job.view, &finest.grid) >= least_px {
             return suited;
         }
         let Some(coarser) = coarser(finest) else {
@@ -100,6 +106,10 @@ pub fn coarser(scene: &Scene) -> Option<Scene> {
             .as_ref()
             .map(|interval| both(interval, &mass)),
         terrain: scene.terrain.clone(),
+        northward: scene
+            .northward
+            .as_ref()
+            .map(|interval| both(interval, &mean)),
     })
 }
 

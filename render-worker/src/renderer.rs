@@ -34,6 +34,7 @@ pub struct Renderer {
 /// The device in use; another takes its place after a fault, while pictures under way keep the old one.
 struct DeviceSlot {
     open: fn() -> Result<Gpu, RenderError>,
+    most_frame_bytes: Option<u64>,
     current: Mutex<Arc<Device>>,
     /// Held while a fresh device is opened, so that only one is.
     opening: Mutex<()>,
@@ -42,26 +43,36 @@ struct DeviceSlot {
 impl Renderer {
     /// Opens the device and compiles the stages.
     pub fn new(backend: Backend) -> Result<Self, RenderError> {
+        Self::keeping(backend, None)
+    }
+
+    /// The same with a limit of frames that stay on the device between pictures, bytes: a share of what the device has
+    /// if none is named.
+    pub fn keeping(backend: Backend, most_frame_bytes: Option<u64>) -> Result<Self, RenderError> {
         match backend {
             Backend::Cpu => Ok(Self {
                 name: "CPU twins".to_owned(),
                 device: None,
             }),
-            Backend::Gpu => Self::on(Gpu::open),
+            Backend::Gpu => Self::on(Gpu::open, most_frame_bytes),
         }
     }
 
     /// Opens the device with shaders that check every index and loop; slow, for tests.
     pub fn checked() -> Result<Self, RenderError> {
-        Self::on(Gpu::open_checked)
+        Self::on(Gpu::open_checked, None)
     }
 
-    fn on(open: fn() -> Result<Gpu, RenderError>) -> Result<Self, RenderError> {
-        let device = Device::new(open()?, 0)?;
+    fn on(
+        open: fn() -> Result<Gpu, RenderError>,
+        most_frame_bytes: Option<u64>,
+    ) -> Result<Self, RenderError> {
+        let device = Device::new(open()?, 0, most_frame_bytes)?;
         Ok(Self {
             name: device.gpu().adapter_name().to_owned(),
             device: Some(DeviceSlot {
                 open,
+                most_frame_bytes,
                 current: Mutex::new(Arc::new(device)),
                 opening: Mutex::default(),
             }),
@@ -98,7 +109,7 @@ impl Renderer {
         if slot.lock().number == failed_number {
             let adapter = self.name.as_str();
             tracing::warn!(adapter, "the graphics device failed, opening it again");
-            let fresh = Device::new((slot.open)()?, failed_number + 1)?;
+            let fresh = Device::new((slot.open)()?, failed_number + 1, slot.most_frame_bytes)?;
             *slot.lock() = Arc::new(fresh);
         }
         Ok(())
@@ -108,6 +119,16 @@ impl Renderer {
     pub fn lose_device(&self) {
         if let Some(device) = self.device() {
             device.gpu().lose();
+        }
+    }
+
+    /// Brings to the device what a scene is drawn from in a job's view, so that its picture need not wait for that.
+    pub(crate) fn prepare(&self, job: &RenderJob, scene: &Scene) -> Result<(), RenderError> {
+        scene.validate()?;
+        let coarser = pyramid::suited(job, scene);
+        match self.device() {
+            Some(device) => device.prepare(coarser.as_ref().unwrap_or(scene)),
+            None => Ok(()),
         }
     }
 

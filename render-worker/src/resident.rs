@@ -10,22 +10,37 @@ use crate::error::RenderError;
 use crate::gpu::Gpu;
 use crate::scene::Cells;
 
-/// Bytes kept at most, apart from frames in flight.
-const MOST_BYTES: u64 = 512 << 20;
+/// Share of a device's own memory for frames: the rest is for pictures in flight and for others.
+const SHARE: u64 = 8;
+/// Bytes kept where nobody knows what the device has.
+const UNKNOWN_BYTES: u64 = 512 << 20;
 
-/// Buffers by the id of their cells and the first of them held.
-#[derive(Default)]
+/// Buffers by the id of their cells and the part of them that is held.
 pub(crate) struct Resident {
     held: Mutex<Held>,
 }
 
-#[derive(Default)]
 struct Held {
+    /// Bytes kept at most, apart from frames in flight.
+    most_bytes: u64,
     by_id: BTreeMap<(u64, usize, usize), (wgpu::Buffer, u64)>,
     uses: u64,
 }
 
 impl Resident {
+    /// Nothing yet; up to so many bytes, a share of what the device has if none are named.
+    pub(crate) fn new(gpu: &Gpu, most_bytes: Option<u64>) -> Self {
+        let share = || gpu.own_bytes().map_or(UNKNOWN_BYTES, |own| own / SHARE);
+        let held = Held {
+            most_bytes: most_bytes.unwrap_or_else(share),
+            by_id: BTreeMap::new(),
+            uses: 0,
+        };
+        Self {
+            held: Mutex::new(held),
+        }
+    }
+
     /// Bytes held.
     pub(crate) fn bytes(&self) -> u64 {
         let held = self.held.lock().unwrap_or_else(PoisonError::into_inner);
@@ -61,7 +76,7 @@ impl Held {
 
     fn evict(&mut self) {
         let mut bytes = self.bytes();
-        while bytes > MOST_BYTES && self.by_id.len() > 1 {
+        while bytes > self.most_bytes && self.by_id.len() > 1 {
             let oldest = self
                 .by_id
                 .iter()

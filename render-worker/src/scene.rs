@@ -207,6 +207,8 @@ pub struct Scene {
     pub accumulated: Option<Interval>,
     /// What lies below.
     pub terrain: Option<Terrain>,
+    /// Northward part of the vector of which `value` is the eastward part, m s⁻¹.
+    pub northward: Option<Interval>,
 }
 
 impl Scene {
@@ -217,7 +219,11 @@ impl Scene {
 
     /// Checks that all parts have one number a cell.
     pub fn validate(&self) -> Result<(), RenderError> {
-        let frames = [Some(&self.value), self.accumulated.as_ref()];
+        let frames = [
+            Some(&self.value),
+            self.accumulated.as_ref(),
+            self.northward.as_ref(),
+        ];
         let fits = frames
             .into_iter()
             .flatten()

@@ -10,6 +10,7 @@ use tokio::sync::Semaphore;
 
 use crate::error::RenderError;
 use crate::image::Image;
+use crate::prefetch::Prefetch;
 use crate::renderer::{Backend, Renderer};
 use crate::scene::Scene;
 use crate::source::{Kept, Source};
@@ -21,14 +22,20 @@ pub struct Limits {
     pub pictures: NonZeroUsize,
     /// Bytes of frames kept in memory.
     pub frame_bytes: u64,
+    /// Bytes of frames kept on the device; none named is a share of what the device has.
+    pub device_frame_bytes: Option<u64>,
+    /// Frames of every product read ahead of the one drawn; none with 0.
+    pub frames_ahead: usize,
 }
 
 impl Default for Limits {
-    /// Two pictures, so that one is encoded while the next is drawn; half a GiB of frames.
+    /// Two pictures, so that one is encoded while the next is drawn; half a GiB of frames, the next one of them.
     fn default() -> Self {
         Self {
             pictures: NonZeroUsize::MIN.saturating_add(1),
             frame_bytes: 512 << 20,
+            device_frame_bytes: None,
+            frames_ahead: 1,
         }
     }
 }
@@ -41,6 +48,7 @@ pub type IsWanted = Arc<dyn Fn() -> bool + Send + Sync>;
 pub struct RenderService {
     renderer: Arc<Renderer>,
     source: Arc<Source>,
+    prefetch: Arc<Prefetch>,
     /// One permit a picture in flight.
     permits: Arc<Semaphore>,
 }
@@ -57,15 +65,22 @@ impl RenderService {
         backend: Backend,
         limits: Limits,
     ) -> Result<Self, RenderError> {
-        let renderer = Arc::new(Renderer::new(backend)?);
+        let renderer = Arc::new(Renderer::keeping(backend, limits.device_frame_bytes)?);
         let source = Arc::new(Source::new(
-            store,
+            store.clone(),
             Arc::clone(&renderer),
             limits.frame_bytes,
+        ));
+        let prefetch = Arc::new(Prefetch::new(
+            store,
+            Arc::clone(&source),
+            Arc::clone(&renderer),
+            limits.frames_ahead,
         ));
         Ok(Self {
             renderer,
             source,
+            prefetch,
             permits: Arc::new(Semaphore::new(limits.pictures.get())),
         })
     }
@@ -114,13 +129,16 @@ impl RenderService {
         is_wanted: IsWanted,
         held: impl Send + 'static,
     ) -> Result<Image, RenderError> {
-        let (renderer, job) = (Arc::clone(&self.renderer), job.clone());
+        let (renderer, own) = (Arc::clone(&self.renderer), job.clone());
         let drawing = tokio::task::spawn_blocking(move || {
-            let image = renderer.render_while(&job, &scene, &*is_wanted);
+            let image = renderer.render_while(&own, &scene, &*is_wanted);
             drop(held);
             image
         });
-        drawing.await.map_err(RenderError::Thread)?
+        let image = drawing.await.map_err(RenderError::Thread)??;
+        // Not before: what is wanted now goes first.
+        self.prefetch.drawn(job);
+        Ok(image)
     }
 
     /// Writes a picture as PNG.

@@ -1,6 +1,6 @@
 //! Where scenes come from: the frames that a job names, gaps filled once, kept while there is room.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -8,7 +8,7 @@ use contract::context::Relief;
 use contract::grid::Grid;
 use contract::job::RenderJob;
 use contract::key::ObjectKey;
-use contract::moment::Moment;
+use contract::moment::{After, Moment};
 use storage::{StorageError, Store};
 
 use crate::error::RenderError;
@@ -20,6 +20,8 @@ use crate::stages::fill::scaled::holds;
 
 /// Domains kept; each has four bytes a cell.
 const MOST_DOMAINS: u64 = 64;
+/// Early frames remembered before those that are gone are forgotten.
+const MOST_EARLY: usize = 256;
 
 /// Loads scenes from a store.
 pub struct Source {
@@ -30,6 +32,21 @@ pub struct Source {
     held: Mutex<Held>,
     frame_hits: AtomicU64,
     frame_misses: AtomicU64,
+    early_reads: AtomicU64,
+    early_hits: AtomicU64,
+    early_cancelled: AtomicU64,
+}
+
+/// A frame of a domain that its gaps were filled for.
+type FrameKey = (ObjectKey, ObjectKey);
+
+/// Why a frame is read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Wanted {
+    /// A picture waits for it.
+    Now,
+    /// One may come that needs it.
+    Ahead,
 }
 
 /// What a source keeps, and how often that helped.
@@ -43,13 +60,22 @@ pub struct Kept {
     pub frame_hits: u64,
     /// Frames that had to be read.
     pub frame_misses: u64,
+    /// Frames that were read before anybody wanted them.
+    pub early_reads: u64,
+    /// Those of them that were wanted then.
+    pub early_hits: u64,
+    /// Times that reading ahead was given up, because the view moved to another product.
+    pub early_cancelled: u64,
 }
 
 #[derive(Default)]
 struct Held {
     domains: Recent<ObjectKey, Arc<Cells<u32>>>,
-    /// By the key of the frame and of the domain that its gaps were filled for.
-    frames: Recent<(ObjectKey, ObjectKey), Arc<Frame>>,
+    frames: Recent<FrameKey, Arc<Frame>>,
+    /// Frames that nobody has wanted yet.
+    early: BTreeSet<FrameKey>,
+    /// Frames that are being read: whoever wants one too waits for it.
+    reading: BTreeMap<FrameKey, Arc<tokio::sync::Mutex<()>>>,
 }
 
 impl Source {
@@ -62,30 +88,57 @@ impl Source {
             held: Mutex::default(),
             frame_hits: AtomicU64::new(0),
             frame_misses: AtomicU64::new(0),
+            early_reads: AtomicU64::new(0),
+            early_hits: AtomicU64::new(0),
+            early_cancelled: AtomicU64::new(0),
         }
+    }
+
+    /// Bytes of frames that are kept at most.
+    pub(crate) fn most_bytes(&self) -> u64 {
+        self.most_bytes
+    }
+
+    /// Counts that reading ahead was given up.
+    pub(crate) fn count_cancelled(&self) {
+        self.early_cancelled.fetch_add(1, Ordering::Relaxed);
     }
 
     /// What is kept now.
     pub fn kept(&self) -> Kept {
         let held = self.lock();
         // A frame's key is `frames/PRODUCT/DIGEST`, or the domain's where accumulation starts.
-        let product = |(frame, _): &(ObjectKey, ObjectKey)| {
-            frame.as_str().split('/').nth(1).map(str::to_owned)
-        };
+        let product = |(frame, _): &FrameKey| frame.as_str().split('/').nth(1).map(str::to_owned);
         Kept {
             products: held.frames.keys().filter_map(product).collect(),
             frame_bytes: held.frames.sum(|frame| frame.size_bytes()),
             frame_hits: self.frame_hits.load(Ordering::Relaxed),
             frame_misses: self.frame_misses.load(Ordering::Relaxed),
+            early_reads: self.early_reads.load(Ordering::Relaxed),
+            early_hits: self.early_hits.load(Ordering::Relaxed),
+            early_cancelled: self.early_cancelled.load(Ordering::Relaxed),
         }
     }
 
     /// The scene of a job.
     pub async fn scene(&self, job: &RenderJob) -> Result<Scene, RenderError> {
+        self.scene_for(job, Wanted::Now).await
+    }
+
+    /// The same before anybody wants it.
+    pub(crate) async fn scene_ahead(&self, job: &RenderJob) -> Result<Scene, RenderError> {
+        self.scene_for(job, Wanted::Ahead).await
+    }
+
+    async fn scene_for(&self, job: &RenderJob, wanted: Wanted) -> Result<Scene, RenderError> {
         let grid = &job.grid;
-        let (domain, value) = self.interval(grid, &job.value).await?;
+        let (domain, value) = self.interval(grid, &job.value, wanted).await?;
         let accumulated = match &job.accumulated {
-            Some(carbon) => Some(self.interval(grid, carbon).await?.1),
+            Some(carbon) => Some(self.interval(grid, carbon, wanted).await?.1),
+            None => None,
+        };
+        let northward = match &job.flow {
+            Some(flow) => Some(self.interval(grid, &flow.northward, wanted).await?.1),
             None => None,
         };
         let terrain = match &job.relief {
@@ -98,6 +151,7 @@ impl Source {
             value,
             accumulated,
             terrain,
+            northward,
         })
     }
 
@@ -127,7 +181,7 @@ impl Source {
             source: Box::new(source),
         })?;
         let elevation = Arc::new(Frame::new(values));
-        self.keep_frame(key, &elevation);
+        self.lock().keep(key, &elevation, self.most_bytes);
         Ok(Terrain { grid, elevation })
     }
 
@@ -136,17 +190,18 @@ impl Source {
         &self,
         grid: &Grid,
         moment: &Moment,
+        wanted: Wanted,
     ) -> Result<(Arc<Cells<u32>>, Interval), RenderError> {
         let domain = self.domain(grid, moment).await?;
         let before = match &moment.before {
-            Some(frame) => self.frame(grid, moment, &domain, frame).await?,
+            Some(frame) => self.frame(grid, moment, &domain, frame, wanted).await?,
             None => self.nothing(moment, &domain),
         };
         let (after, weight) = match &moment.after {
-            Some(after) => (
-                self.frame(grid, moment, &domain, &after.frame).await?,
-                after.weight,
-            ),
+            Some(After { frame, weight }) => {
+                let frame = self.frame(grid, moment, &domain, frame, wanted).await?;
+                (frame, *weight)
+            }
             None => (Arc::clone(&before), 0.0),
         };
         let interval = Interval {
@@ -165,7 +220,7 @@ impl Source {
         }
         let zero = |cell: &u32| if *cell == 0 { f32::NAN } else { 0.0 };
         let frame = Arc::new(Frame::new(domain.content().iter().map(zero).collect()));
-        self.keep_frame(key, &frame);
+        self.lock().keep(key, &frame, self.most_bytes);
         frame
     }
 
@@ -199,33 +254,85 @@ impl Source {
         moment: &Moment,
         domain: &Arc<Cells<u32>>,
         frame: &ObjectKey,
+        wanted: Wanted,
     ) -> Result<Arc<Frame>, RenderError> {
         let key = (frame.clone(), moment.domain.clone());
-        let held = self.lock().frames.get(&key);
-        if let Some(frame) = held {
-            self.frame_hits.fetch_add(1, Ordering::Relaxed);
+        if let Some(frame) = self.held(&key, wanted) {
             return Ok(frame);
         }
-        self.frame_misses.fetch_add(1, Ordering::Relaxed);
+        // One reads, the others wait; if he gives up, the next one reads.
+        let turn = Arc::clone(self.lock().reading.entry(key.clone()).or_default());
+        let reading = turn.lock().await;
+        if let Some(frame) = self.held(&key, wanted) {
+            return Ok(frame);
+        }
+        if wanted == Wanted::Now {
+            self.frame_misses.fetch_add(1, Ordering::Relaxed);
+        }
+        let done = self.read(grid, moment, domain, frame).await;
+        let mut held = self.lock();
+        held.reading.remove(&key);
+        held.forget_dropped();
+        if let Ok(frame) = &done {
+            if wanted == Wanted::Ahead {
+                self.early_reads.fetch_add(1, Ordering::Relaxed);
+                held.early.insert(key.clone());
+            }
+            held.keep(key, frame, self.most_bytes);
+        }
+        drop(held);
+        drop(reading);
+        done
+    }
+
+    /// The frame of a key, if it is in memory.
+    fn held(&self, key: &FrameKey, wanted: Wanted) -> Option<Arc<Frame>> {
+        let mut held = self.lock();
+        let frame = held.frames.get(key)?;
+        if wanted == Wanted::Now {
+            self.frame_hits.fetch_add(1, Ordering::Relaxed);
+            if held.early.remove(key) {
+                self.early_hits.fetch_add(1, Ordering::Relaxed);
+            }
+        }
+        Some(frame)
+    }
+
+    /// A frame from the store, gaps filled.
+    async fn read(
+        &self,
+        grid: &Grid,
+        moment: &Moment,
+        domain: &Arc<Cells<u32>>,
+        frame: &ObjectKey,
+    ) -> Result<Arc<Frame>, RenderError> {
         let read = storage::frames::read(&self.store, frame, grid).await;
         let values = read.map_err(|e| failed("a frame", moment, e))?;
         let (renderer, grid, domain) = (Arc::clone(&self.renderer), *grid, Arc::clone(domain));
         let filled = tokio::task::spawn_blocking(move || fill(&renderer, &grid, values, &domain));
-        let frame = Arc::new(filled.await.map_err(RenderError::Thread)??);
-        self.keep_frame(key, &frame);
-        Ok(frame)
-    }
-
-    fn keep_frame(&self, key: (ObjectKey, ObjectKey), frame: &Arc<Frame>) {
-        let kept = Arc::clone(frame);
-        self.lock()
-            .frames
-            .keep(key, kept, self.most_bytes, |frame| frame.size_bytes());
+        Ok(Arc::new(filled.await.map_err(RenderError::Thread)??))
     }
 
     fn lock(&self) -> std::sync::MutexGuard<'_, Held> {
         // Maps are changed by single inserts and removals, so a poisoned lock still guards whole ones.
         self.held.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Held {
+    fn keep(&mut self, key: FrameKey, frame: &Arc<Frame>, most_bytes: u64) {
+        let kept = Arc::clone(frame);
+        self.frames
+            .keep(key, kept, most_bytes, |frame| frame.size_bytes());
+    }
+
+    /// Forgets of frames that went unwanted that they were early, and of readings that were given up.
+    fn forget_dropped(&mut self) {
+        self.reading.retain(|_, turn| Arc::strong_count(turn) > 1);
+        if self.early.len() > MOST_EARLY {
+            let there: BTreeSet<FrameKey> = self.frames.keys().cloned().collect();
+            self.early.retain(|key| there.contains(key));
+        }
     }
 }
 

@@ -6,6 +6,7 @@ mod snapshot;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use contract::flow::check_parts;
 use contract::manifest::ManifestId;
 use contract::product::ProductId;
 use contract::quantity::Quantity;
@@ -18,7 +19,7 @@ use crate::metrics::Metrics;
 use crate::versions::Versions;
 use snapshot::{FOLDER, Reader, Snapshot};
 
-pub use layer::{Accumulated, Layer};
+pub use layer::{Accumulated, Layer, Northward};
 
 /// How long a store is waited for by those who can be served from what was known before.
 const PATIENCE: Duration = Duration::from_secs(2);
@@ -104,7 +105,8 @@ impl Catalogue {
                 manifest: id.to_string(),
             });
         }
-        self.reader.versions.layer(&id).await
+        let older = self.reader.versions.layer(&id).await?;
+        Ok(drifting(older, newest.northward.as_ref()))
     }
 
     /// Is there no newer version known?
@@ -233,6 +235,19 @@ impl Catalogue {
         };
         state.reading = Some(reading.clone());
         reading
+    }
+}
+
+/// A version with the northward part of its product's vector, if they belong together: what it drifts with is no part of
+/// what was published under its name.
+fn drifting(layer: Arc<Layer>, northward: Option<&Northward>) -> Arc<Layer> {
+    let fits = |part: &&Northward| check_parts(&layer.manifest, &part.manifest).is_ok();
+    match northward.filter(fits) {
+        Some(part) => Arc::new(Layer {
+            northward: Some(part.clone()),
+            ..Layer::clone(&layer)
+        }),
+        None => layer,
     }
 }
 

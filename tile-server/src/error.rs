@@ -67,6 +67,11 @@ pub enum ServerError {
         mode: String,
         offered: String,
     },
+    /// Particles drift with a vector, and this product is a part of none.
+    #[error(
+        "product {product} is not drawn as a flow: that needs the eastward part of a current, NAME-east, and its northward part NAME-north on the same grid"
+    )]
+    NoVector { product: String },
     /// Nothing at the address.
     #[error("there is nothing at this address")]
     UnknownAddress,
@@ -125,7 +130,8 @@ impl ServerError {
             | Self::Missing { .. }
             | Self::OutsideGrid { .. }
             | Self::OutsidePeriod { .. }
-            | Self::NotAFlux { .. } => StatusCode::BAD_REQUEST,
+            | Self::NotAFlux { .. }
+            | Self::NoVector { .. } => StatusCode::BAD_REQUEST,
             Self::UnknownProduct { .. }
             | Self::EmptyProduct { .. }
             | Self::UnknownVersion { .. }

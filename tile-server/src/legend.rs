@@ -6,6 +6,7 @@ mod svg;
 mod ticks;
 
 use contract::colour::{AtStop, Rgb, Stops, TransferFunction};
+use contract::job::Mode;
 use contract::quantity::{Display, Quantity};
 use serde::Serialize;
 
@@ -93,6 +94,23 @@ impl Form {
 impl Legend {
     /// The legend of a quantity in the colours of a valid transfer function.
     pub fn of(quantity: Quantity, transfer: &TransferFunction) -> Self {
+        Self::labelled(quantity.title(), quantity, transfer)
+    }
+
+    /// The same for pictures of a mode: a flow is coloured by its speed.
+    pub fn of_mode(mode: Mode, quantity: Quantity, transfer: &TransferFunction) -> Self {
+        match mode {
+            Mode::Flow => Self::labelled("Speed of the current", quantity, transfer),
+            Mode::Map | Mode::Points | Mode::Sprites | Mode::Volume => Self::of(quantity, transfer),
+        }
+    }
+
+    /// Usual speeds of a vector whose parts are of a quantity.
+    pub(crate) fn of_speed(quantity: Quantity) -> Self {
+        Self::of_mode(Mode::Flow, quantity, &TransferFunction::of_speed(quantity))
+    }
+
+    fn labelled(label: &'static str, quantity: Quantity, transfer: &TransferFunction) -> Self {
         let display = quantity.display();
         let (low, high) = (
             rounded(display.shown(transfer.low), display, transfer),
@@ -102,7 +120,7 @@ impl Legend {
             low,
             high,
             unit: display.unit,
-            label: quantity.title(),
+            label,
             stops: colors(transfer),
             opacity: places(
                 transfer,

@@ -17,9 +17,10 @@
 //! | `/healthz`, `/readyz`, `/metrics` | the process lives; it can serve; Prometheus text |
 //! | `/` and below | the viewer's files |
 //!
+//! `mode` is `map`, `points`, `sprites` or `volume`; products that are the eastward part of a vector have `flow` as well.
+//!
 //! Pictures and TileJSON take `relief=&relief_exaggeration=&sea_opacity=&coastlines=&sun=&height_exaggeration=` besides:
 //! what surrounds the particles (`surroundings.rs`), part of the picture's name like everything else.
-//!
 //! Times are ISO 8601 and any instant is valid; a missing one is the middle of the last step. `from` and `to` bound
 //! the half-open period `[from, to)`. `manifest` names a version, as answers do; without it the newest one answers. An instant outside what a
 //! product covers shows the nearest one inside; pictures say so in `fluxglobe-time` and `fluxglobe-time-covered`. Every refusal is JSON, `{"error": reason}`.
@@ -52,7 +53,7 @@ mod state;
 mod surroundings;
 mod versions;
 
-pub use catalogue::{Accumulated, Layer};
+pub use catalogue::{Accumulated, Layer, Northward};
 pub use config::Settings;
 pub use error::{ServeError, ServerError};
 pub use request::job as picture_job;

@@ -1,7 +1,7 @@
 //! How a picture is to look: parameters of an address in, checked options and the style of a job out.
 
 use contract::colour::TransferOptions;
-use contract::job::Style;
+use contract::job::{Mode, Style};
 use contract::quantity::Quantity;
 use serde::Deserialize;
 
@@ -65,8 +65,13 @@ impl Look {
     }
 
     /// The style of a quantity that looks so.
-    pub(crate) fn style(&self, quantity: Quantity) -> Result<Style, ServerError> {
-        let mut style = Style::with_transfer(self.options.over(quantity)?);
+    pub(crate) fn style(&self, quantity: Quantity, mode: Mode) -> Result<Style, ServerError> {
+        let mut style = match mode {
+            Mode::Flow => Style::of_flow(self.options.over_speed(quantity)?),
+            Mode::Map | Mode::Points | Mode::Sprites | Mode::Volume => {
+                Style::with_transfer(self.options.over(quantity)?)
+            }
+        };
         style.doubt = self.doubt;
         Ok(style)
     }
@@ -126,7 +131,7 @@ mod tests {
     fn without_parameters_all_is_as_usual() {
         let look = LookQuery::default().parse().unwrap();
         assert!(look.is_usual() && look.parameters().is_empty());
-        let style = look.style(Quantity::WindSpeed).unwrap();
+        let style = look.style(Quantity::WindSpeed, Mode::Volume).unwrap();
         let usual = contract::colour::TransferFunction::default_for(Quantity::WindSpeed);
         assert_eq!(style, Style::with_transfer(usual));
     }

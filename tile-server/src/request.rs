@@ -11,6 +11,11 @@ use crate::look::Look;
 pub(crate) fn mode(layer: &Layer, text: &str) -> Result<Mode, ServerError> {
     let offered = layer.modes();
     let found = offered.iter().find(|mode| mode.as_str() == text);
+    if found.is_none() && text == Mode::Flow.as_str() {
+        return Err(ServerError::NoVector {
+            product: layer.manifest.product.to_string(),
+        });
+    }
     found.copied().ok_or_else(|| ServerError::UnknownMode {
         product: layer.manifest.product.to_string(),
         mode: text.chars().take(80).collect(),
@@ -38,7 +43,7 @@ pub fn job(
     view: View,
     time: Option<TimeMs>,
 ) -> Result<RenderJob, ServerError> {
-    let style = Look::default().style(layer.manifest.quantity)?;
+    let style = Look::default().style(layer.manifest.quantity, mode)?;
     job_in_style(layer, mode, view, time, style)
 }
 
@@ -52,6 +57,10 @@ pub(crate) fn job_in_style(
 ) -> Result<RenderJob, ServerError> {
     let manifest = &layer.manifest;
     let time = shown_time(layer, time);
+    if let (Mode::Flow, Some(part)) = (mode, &layer.northward) {
+        let northward = &part.manifest;
+        return Ok(RenderJob::of_flow(manifest, northward, time, view, style)?);
+    }
     let accumulated = layer.accumulated.as_ref();
     let accumulated = accumulated.filter(|lift| lift.holds_at(time));
     let lift = accumulated.map(|lift| &*lift.manifest);

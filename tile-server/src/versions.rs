@@ -33,7 +33,7 @@ impl Versions {
         }
     }
 
-    /// A version as it was published.
+    /// A version as it was published; what its particles drift with is another product.
     ///
     /// # Errors
     /// Not found if it was never there, or is there no more.
@@ -54,6 +54,7 @@ impl Versions {
             manifest,
             extent,
             accumulated,
+            northward: None,
         });
         if is_settled {
             self.known.insert(name, Arc::clone(&layer));

@@ -45,13 +45,28 @@ impl TransferOptions {
     /// # Errors
     /// Options that exclude each other, or a limit that is broken.
     pub fn over(&self, quantity: Quantity) -> Result<TransferFunction, ContractError> {
+        self.changed(quantity, TransferFunction::default_for(quantity))
+    }
+
+    /// That of the speed of a vector whose parts are of a quantity, with these changes.
+    ///
+    /// # Errors
+    /// As [`Self::over`].
+    pub fn over_speed(&self, quantity: Quantity) -> Result<TransferFunction, ContractError> {
+        self.changed(quantity, TransferFunction::of_speed(quantity))
+    }
+
+    fn changed(
+        &self,
+        quantity: Quantity,
+        usual: TransferFunction,
+    ) -> Result<TransferFunction, ContractError> {
         if let Some(palette) = self.palette
             && !self.colors.is_empty()
         {
             let reason = "colour stops take a palette's place: give one of the two";
             return Err(ContractError::invalid("palette", palette.as_str(), reason));
         }
-        let usual = TransferFunction::default_for(quantity);
         let display = quantity.display();
         let stored = |shown: f64| display.stored(shown);
         let range = self.range.map(|range| (range.low, range.high));

@@ -90,6 +90,7 @@ async fn shots(settings: &Settings, store: &Store, options: &RenderAnimation) ->
     }
     let shots = Shots {
         accumulated: render::accumulated(store, &product).await?,
+        northward: render::northward(store, &product, globe.picture.mode).await?,
         product,
         from,
         to,

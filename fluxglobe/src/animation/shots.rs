@@ -21,6 +21,9 @@ pub(super) struct Shots {
     pub(super) product: Manifest,
     /// Its accumulated carbon.
     pub(super) accumulated: Option<Manifest>,
+    /// The northward part of its vector, in the mode flow.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) northward: Option<Manifest>,
     /// Instant of picture 0.
     pub(super) from: TimeMs,
     /// First instant after the animation.
@@ -100,7 +103,13 @@ impl Shots {
         if self.sun_of_time {
             style.sun = SunChoice::OfTime.instead_of(style.sun, time);
         }
-        let job = RenderJob::of(&self.product, accumulated, time, self.mode, view, style)?;
+        let product = &self.product;
+        let job = match (self.mode, &self.northward) {
+            (Mode::Flow, Some(northward)) => {
+                RenderJob::of_flow(product, northward, time, view, style)?
+            }
+            (mode, _) => RenderJob::of(product, accumulated, time, mode, view, style)?,
+        };
         Ok(job.over(self.relief.clone())?)
     }
 }

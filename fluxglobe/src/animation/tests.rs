@@ -62,6 +62,7 @@ fn shots(count: u32) -> Shots {
     Shots {
         product: product(),
         accumulated: None,
+        northward: None,
         from: "2000-01-01".parse().unwrap(),
         mode: Mode::Volume,
         view,
@@ -115,6 +116,27 @@ fn every_picture_has_the_sun_of_its_own_instant_if_that_is_asked_for() {
     let [january, july] = [0, 182].map(|number| sun_of(&shots, number).unwrap());
     assert!(january.lon_deg.abs() > 175.0 && july.lon_deg.abs() > 175.0);
     assert!(january.lat_deg < -22.0 && july.lat_deg > 22.0);
+}
+
+#[test]
+fn the_pictures_of_a_flow_drift_from_one_to_the_next() {
+    let part = |name: &str| Manifest {
+        product: name.parse().unwrap(),
+        quantity: Quantity::Current,
+        ..product()
+    };
+    let mut shots = Shots {
+        product: part("sea-east"),
+        northward: Some(part("sea-north")),
+        mode: Mode::Flow,
+        ..shots(366)
+    };
+    let clock_s = |number| shots.job(number).unwrap().flow.unwrap().clock_s;
+    // A picture a day.
+    assert!((clock_s(31) - clock_s(30) - 86_400.0).abs() < 1e-3);
+    shots.northward = None;
+    let refused = shots.job(0).unwrap_err().to_string();
+    assert!(refused.contains("northward"), "{refused}");
 }
 
 #[test]

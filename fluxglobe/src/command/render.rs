@@ -2,7 +2,7 @@
 
 use anyhow::{Context as _, Result};
 use contract::context::{Context, Relief};
-use contract::job::{RenderJob, Style, View};
+use contract::job::{Mode, RenderJob, Style, View};
 use contract::manifest::Manifest;
 use contract::tile::Tile;
 use contract::time::{Period, TimeMs};
@@ -37,7 +37,7 @@ pub(crate) async fn run(settings: &Settings, options: Render) -> Result<()> {
     job.style.globe_surface = surface;
     job.validate()?;
     let bar = progress::bar("draw", 1);
-    let png = deployment::renderer(settings, store)
+    let png = deployment::single_renderer(settings, store)
         .await?
         .draw(&job)
         .await?;
@@ -79,9 +79,13 @@ pub(crate) async fn job(
             manifest.product
         ));
     }
-    let lift = accumulated(store, &manifest).await?;
     let style = sunlit(style, picture, shown);
-    let job = RenderJob::of(&manifest, lift.as_ref(), time, picture.mode, view, style)?;
+    let job = if let Some(part) = northward(store, &manifest, picture.mode).await? {
+        RenderJob::of_flow(&manifest, &part, time, view, style)?
+    } else {
+        let lift = accumulated(store, &manifest).await?;
+        RenderJob::of(&manifest, lift.as_ref(), time, picture.mode, view, style)?
+    };
     Ok(job.over(relief(store, settings, picture).await?)?)
 }
 
@@ -118,8 +122,13 @@ pub(crate) async fn product(
 
 /// The style that the options of a picture ask for.
 pub(crate) fn style(product: &Manifest, picture: &Picture) -> Result<Style> {
-    let transfer = picture.look.options().over(product.quantity)?;
-    let mut style = Style::with_transfer(transfer);
+    let (options, quantity) = (picture.look.options(), product.quantity);
+    let mut style = match picture.mode {
+        Mode::Flow => Style::of_flow(options.over_speed(quantity)?),
+        Mode::Map | Mode::Points | Mode::Sprites | Mode::Volume => {
+            Style::with_transfer(options.over(quantity)?)
+        }
+    };
     style.slices = picture.slices.unwrap_or(style.slices);
     style.particles_per_cell = picture.particles.unwrap_or(style.particles_per_cell);
     style.doubt = picture.doubt;
@@ -131,6 +140,26 @@ pub(crate) fn style(product: &Manifest, picture: &Picture) -> Result<Style> {
         coastlines: options.coastlines,
     };
     Ok(style)
+}
+
+/// The northward part of the vector whose eastward part a product is, if the mode needs one.
+pub(crate) async fn northward(
+    store: &Store,
+    eastward: &Manifest,
+    mode: Mode,
+) -> Result<Option<Manifest>> {
+    if mode != Mode::Flow {
+        return Ok(None);
+    }
+    let name = &eastward.product;
+    let product = contract::flow::northward_of(eastward).with_context(|| {
+        format!("{name} is not drawn as a flow: name the eastward part of a current, NAME-east, which has landed beside NAME-north")
+    })?;
+    let latest = storage::manifests::latest(store, &product).await?;
+    let latest = latest.with_context(|| {
+        format!("{name} is not drawn as a flow before {product} has landed; ingest the same files with its profile")
+    })?;
+    Ok(Some(latest))
 }
 
 /// Accumulated carbon of just this version of a product, if it was derived.

@@ -79,7 +79,7 @@ pub(crate) async fn all(
 fn paths(flux: &Manifest) -> Vec<String> {
     let product = &flux.product;
     let mut paths: Vec<String> = PAGES.iter().map(|path| (*path).to_owned()).collect();
-    for mode in contract::job::Mode::ALL {
+    for mode in contract::job::Mode::SCALAR {
         paths.push(format!("/tiles/{product}/{mode}/0/0/0.png"));
     }
     let center = flux

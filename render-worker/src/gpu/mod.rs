@@ -2,6 +2,7 @@
 
 mod fault;
 mod kernel;
+mod memory;
 mod pipelines;
 mod recorder;
 mod stamps;
@@ -35,6 +36,7 @@ pub struct Gpu {
     most_buffer_bytes: u64,
     checks: Checks,
     is_software: bool,
+    own_bytes: Option<u64>,
     fault: FaultNote,
     pipelines: Option<Pipelines>,
 }
@@ -72,6 +74,7 @@ impl Gpu {
         let info = adapter.get_info();
         let adapter_name = info.name.clone();
         let is_software = info.device_type == wgpu::DeviceType::Cpu;
+        let own_bytes = memory::own_bytes(&adapter);
         let limits = adapter.limits();
         let most_buffer_bytes = limits
             .max_buffer_size
@@ -101,6 +104,7 @@ impl Gpu {
             most_buffer_bytes,
             checks,
             is_software,
+            own_bytes,
             fault,
             pipelines,
         })
@@ -131,6 +135,11 @@ impl Gpu {
     /// Is the adapter a program on the processor, such as lavapipe?
     pub fn is_software(&self) -> bool {
         self.is_software
+    }
+
+    /// Bytes of memory that are the device's own; none where that is the computer's, or where nobody says.
+    pub fn own_bytes(&self) -> Option<u64> {
+        self.own_bytes.filter(|_| !self.is_software)
     }
 
     /// Largest storage buffer of this device.

@@ -1,10 +1,13 @@
 //! The two passes over particles, each made of the functions of several stages: storing what lies between them would
-//! cost more than the stages do.
+//! cost more than the stages do. Particles that drift have a first pass of their own, `trails`.
 //!
-//! Both keep sums for a workgroup's neighbours in a small table (`tally.wgsl`) and store splats in one order (`order.wgsl`).
+//! All keep sums for a workgroup's neighbours in a small table (`tally.wgsl`) and store splats in one order (`order.wgsl`); first
+//! passes store alike (`store.wgsl`).
 
 pub mod place;
 pub mod splat;
+mod store;
+pub mod trails;
 
 use crate::gpu::Gpu;
 

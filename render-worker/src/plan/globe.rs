@@ -9,7 +9,7 @@ use glam::DVec3;
 
 use super::camera::{Camera, write};
 use super::look::{self, Look};
-use super::{Plan, area_m2, cell_px, entry_shift, height_range_m};
+use super::{Plan, area_m2, cell_px, entry_shift, flow, height_range_m};
 use crate::scene::Scene;
 use crate::stages::layout::{Col, Row, VIEW_GLOBE};
 
@@ -75,9 +75,10 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) {
     plan.rows = rows(scene, &look, &camera, particles, job.style.optical_depth);
     let heights = height_range_m(job, scene).map(|height_m| height_m / SPHERE_RADIUS_M);
     let radius = radius_px / camera.focal_px * camera.height;
-    // From a cell's middle to its corner.
+    // From a cell's middle to its corner, and from there as far as its particles drift.
     let half_cell = (grid.dlon_deg.hypot(grid.dlat_deg) / 2.0).to_radians();
-    let [seen, drawn] = camera.cap_rad([width_px, height_px], job, heights, radius + half_cell);
+    let margin = radius + half_cell + flow::plan(plan, job, scene);
+    let [seen, drawn] = camera.cap_rad([width_px, height_px], job, heights, margin);
     let cap = |angle| Cap {
         heights,
         angle,

@@ -82,6 +82,16 @@ impl Look {
                 area_px_per_particle: 12.0,
                 center_depth: Some(2.0),
             },
+            // Heads of trails; `area_px_per_particle` is that of a trail.
+            Mode::Flow => Self {
+                radius_cells: 0.4,
+                min_radius_px: 0.9,
+                max_radius_px: 1.6,
+                size_spread: 0.45,
+                shake_shift: 0,
+                area_px_per_particle: 36.0,
+                center_depth: Some(0.8),
+            },
             Mode::Volume | Mode::Map => Self {
                 radius_cells: 0.7,
                 min_radius_px: 1.8,

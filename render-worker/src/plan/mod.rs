@@ -5,6 +5,7 @@
 
 mod camera;
 mod context;
+mod flow;
 mod globe;
 mod look;
 mod shape;
@@ -100,6 +101,9 @@ impl Plan {
     ) -> Result<Self, RenderError> {
         job.validate()?;
         scene.validate()?;
+        if job.mode == Mode::Flow && scene.northward.is_none() {
+            return Err(RenderError::NoNorthward);
+        }
         let size_px = job.view.size_px();
         let mut plan = Self {
             id: NEXT_ID.fetch_add(1, Ordering::Relaxed),
@@ -124,6 +128,11 @@ impl Plan {
         Ok(plan)
     }
 
+    /// Are frames on this grid held whole, whatever is drawn of them?
+    pub(crate) fn holds_whole(grid: &Grid) -> bool {
+        (grid.cell_count() * size_of::<f32>()) as u64 <= MOST_HELD_BYTES
+    }
+
     /// Cells of a frame that are on the device while this is drawn, whole rows of them.
     pub fn held_cells(&self) -> Range<usize> {
         self.params.held_first_cell as usize..self.params.held_end_cell as usize
@@ -143,7 +152,9 @@ impl Plan {
             params.first_row..params.first_row + params.row_count
         };
         let row_bytes = u64::from(cols) * CELL_BYTES;
-        let band = if u64::from(rows) * row_bytes <= most_held_bytes {
+        // What drifts comes from other rows than it is seen in.
+        let is_whole = self.mode == Mode::Flow;
+        let band = if is_whole || u64::from(rows) * row_bytes <= most_held_bytes {
             0..rows
         } else {
             let first = shown.start / BAND_ROWS * BAND_ROWS;
@@ -164,7 +175,13 @@ impl Plan {
 
     fn count_particles(&mut self, most_buffer_bytes: u64) -> Result<(), RenderError> {
         let params = &mut self.params;
-        params.particles_each = params.particles_per_cell.clamp(1, PARTICLES_EACH);
+        params.particles_each = match self.mode {
+            // All dots of a trail, which lie along one way.
+            Mode::Flow => flow::TRAIL_DOTS,
+            Mode::Map | Mode::Points | Mode::Sprites | Mode::Volume => {
+                params.particles_per_cell.clamp(1, PARTICLES_EACH)
+            }
+        };
         let groups: u64 = workgroups(params).into_iter().map(u64::from).product();
         let count = groups * u64::from(SQUARE * SQUARE * params.particles_each);
         let limit = MOST_PARTICLES.min(most_buffer_bytes / HALF_BYTES);
@@ -275,7 +292,7 @@ fn common(job: &RenderJob, scene: &Scene) -> Params {
         turns_per_kg_m2: look::TURNS_PER_KG_M2,
         optical_depth: style.optical_depth as f32,
         kernel: match job.mode {
-            Mode::Points => KERNEL_DOT,
+            Mode::Points | Mode::Flow => KERNEL_DOT,
             Mode::Sprites => KERNEL_BALL,
             Mode::Volume | Mode::Map => KERNEL_CLOUD,
         },

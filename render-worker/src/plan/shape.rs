@@ -44,7 +44,7 @@ pub(super) fn table(mode: Mode, transfer: &TransferFunction) -> Vec<u32> {
         let usual = match mode {
             // Maps are as opaque everywhere unless told otherwise.
             Mode::Map => 1.0,
-            Mode::Points | Mode::Sprites | Mode::Volume => {
+            Mode::Points | Mode::Sprites | Mode::Volume | Mode::Flow => {
                 let floor = f64::from(depth_floor(transfer));
                 floor + (1.0 - floor) * strength.sqrt()
             }

@@ -9,7 +9,7 @@ use contract::job::{Mode, RenderJob};
 use contract::tile::{MAX_LAT_DEG, Tile, mercator_lat_deg, mercator_x, mercator_y};
 
 use super::look::{self, Look};
-use super::{Plan, area_m2, cell_px, entry_shift, height_range_m};
+use super::{Plan, area_m2, cell_px, entry_shift, flow, height_range_m};
 use crate::scene::Scene;
 use crate::stages::layout::{Axis, Col, Row, SUBPIXELS, VIEW_TILE};
 use crate::stages::light::LOOK;
@@ -84,7 +84,33 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene, tile: Tile, 
         heights_m,
         look.radius_px(cell_px, particles),
     );
+    let spans = upstream(spans, &level, flow::plan(plan, job, scene));
     choose_cells(plan, scene, &level, spans);
+}
+
+/// Spans widened by as far as particles drift, radians, where meridians are closest.
+fn upstream(spans: [Span; 2], level: &Level, reach_rad: f64) -> [Span; 2] {
+    if reach_rad <= 0.0 {
+        return spans;
+    }
+    let lat_deg = |px: f64| mercator_lat_deg((level.origin_px[1] + px) / level.world_px);
+    let reach_deg = reach_rad.to_degrees();
+    let north_deg = (lat_deg(0.0) + reach_deg).clamp(-MAX_LAT_DEG, MAX_LAT_DEG);
+    let south_deg = (lat_deg(level.size_px) - reach_deg).clamp(-MAX_LAT_DEG, MAX_LAT_DEG);
+    let cos_lat = north_deg.abs().max(south_deg.abs()).to_radians().cos();
+    // No particle goes farther in half its life than half round the world.
+    let across = (reach_rad / cos_lat / TAU).min(0.5) * level.world_px;
+    let y_px = |lat_deg: f64| mercator_y(lat_deg) * level.world_px - level.origin_px[1];
+    let (up, down) = (-y_px(north_deg), y_px(south_deg) - level.size_px);
+    let subpixels = f64::from(SUBPIXELS);
+    let [x, y] = spans;
+    [
+        [x[0] - across * subpixels, x[1] + across * subpixels],
+        [
+            y[0] - up.max(0.0) * subpixels,
+            y[1] + down.max(0.0) * subpixels,
+        ],
+    ]
 }
 
 fn rows(

@@ -3,6 +3,7 @@
 //! Nothing here draws for people, and nothing that draws uses it. `reference` shares with the stages the job and its
 //! plan, not a line of how pictures come about.
 
+pub mod currents;
 pub mod difference;
 pub mod flip;
 pub mod ocean;

@@ -24,7 +24,7 @@ pub const ONE_DEGREE: Grid = Grid {
 /// Flux of 1 g C m⁻² a year, kg m⁻² s⁻¹.
 pub const GRAM_A_YEAR: f64 = 1e-3 / (365.25 * 86_400.0);
 
-fn is_land(lon: f64, lat: f64) -> bool {
+pub(super) fn is_land(lon: f64, lat: f64) -> bool {
     let blob = |x: f64, y: f64, rx: f64, ry: f64| {
         let dx = (lon - x + 540.0).rem_euclid(360.0) - 180.0;
         (dx / rx).powi(2) + ((lat - y) / ry).powi(2) < 1.0
@@ -80,6 +80,7 @@ pub fn scene(grid: Grid) -> Scene {
         value,
         accumulated: Some(accumulated),
         terrain: None,
+        northward: None,
     }
 }
 
@@ -100,6 +101,7 @@ pub fn job(view: View) -> RenderJob {
         value: moment("domain/made-up/0", "frames/made-up/0"),
         accumulated: Some(moment("domain/made-up-carbon/0", "frames/made-up-carbon/0")),
         relief: None,
+        flow: None,
         mode: Mode::Volume,
         view,
         style: Style::with_transfer(TransferFunction::default_for(Quantity::CarbonFlux)),

@@ -32,6 +32,15 @@ pub struct Settings {
     #[arg(long, env = "FLUXGLOBE_FRAME_MEMORY_MIB", default_value_t = 512,
           value_parser = value_parser!(u32).range(16..=1_048_576), value_name = "MIB")]
     pub frame_memory_mib: u32,
+    /// Memory of the graphics device for frames that stay on it between pictures, MiB, 16 to 1048576; an eighth of what
+    /// the device has if absent, 512 where that is not known.
+    #[arg(long, env = "FLUXGLOBE_DEVICE_FRAME_MEMORY_MIB",
+          value_parser = value_parser!(u32).range(16..=1_048_576), value_name = "MIB")]
+    pub device_frame_memory_mib: Option<u32>,
+    /// Frames of every product read ahead of the one drawn, in the direction in which time runs, 0 to 8; with 0 none.
+    #[arg(long, env = "FLUXGLOBE_FRAMES_AHEAD", default_value_t = 1,
+          value_parser = value_parser!(u8).range(0..=8), value_name = "COUNT")]
+    pub frames_ahead: u8,
     /// How long jobs under way may take to end when the worker is asked to stop, seconds, 0 to 600.
     #[arg(long, env = "FLUXGLOBE_RENDER_DRAIN_S", default_value_t = 25,
           value_parser = value_parser!(u16).range(0..=600), value_name = "SECONDS")]
@@ -43,6 +52,8 @@ impl Settings {
         Limits {
             pictures: self.at_once(),
             frame_bytes: u64::from(self.frame_memory_mib) << 20,
+            device_frame_bytes: self.device_frame_memory_mib.map(|mib| u64::from(mib) << 20),
+            frames_ahead: usize::from(self.frames_ahead),
         }
     }
 

@@ -48,6 +48,8 @@ shared_struct! {
         pub held_end_cell: u32,
         pub value_weight: f32,
         pub accumulated_weight: f32,
+        /// Of the later step in the northward part of a flow.
+        pub northward_weight: f32,
         pub has_accumulated: u32,
         pub transfer_low: f32,
         pub transfer_per_unit: f32,
@@ -183,6 +185,23 @@ shared_struct! {
         pub coast_alpha: f32,
         /// Words of the coast mask in a row of the whole picture.
         pub coast_row_words: u32,
+        /// How far into its life a particle is that is born at 0 in every life, 0 to 1 (flow).
+        pub flow_turn: f32,
+        /// Which of its lives that is.
+        pub flow_cycle: u32,
+        /// Share of the particles that live at all, of 2^32.
+        pub flow_share: u32,
+        /// Steps from a particle's birthplace to its trail's end.
+        pub flow_lead_steps: u32,
+        /// Columns on the equator, and rows, that 1 m/s drifts through in a life.
+        pub flow_cols_per_m_s: f32,
+        pub flow_rows_per_m_s: f32,
+        /// Columns of the whole circle: no particle goes farther in a life.
+        pub flow_most_cols: f32,
+        /// Speed above which particles are drawn no faster, m/s.
+        pub flow_most_m_s: f32,
+        /// Pixels on the equator, or below the camera, that 1 m/s drifts through in a life.
+        pub flow_px_per_m_s: f32,
     }
 }
 
@@ -196,7 +215,7 @@ shared_struct! {
         /// Of the row's middle latitude.
         pub sin_lat: f32,
         pub cos_lat: f32,
-        /// Height, radians.
+        /// Height, radians (the same).
         pub lat_span_rad: f32,
         /// Particle radius: pixels (tiles), earth radii (globe).
         pub radius: f32,
@@ -283,6 +302,14 @@ shared_struct! {
         pub size: u32,
         /// Red, green, blue, slice; 8 bits each, red lowest.
         pub color: u32,
+    }
+}
+
+shared_struct! {
+    /// Velocity of one cell of a flow, m/s; both parts [`MISSING`] where either is.
+    pub struct Velocity {
+        pub east: f32,
+        pub north: f32,
     }
 }
 

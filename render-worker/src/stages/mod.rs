@@ -10,6 +10,7 @@ pub mod bin;
 pub mod compose;
 pub mod eye;
 pub mod fill;
+pub mod flow;
 pub mod interpolate;
 pub mod light;
 pub mod map;

@@ -1,6 +1,7 @@
 // Shared by all stages: the structs of layout.rs, constants, hashing and small maths.
 struct Params {
-    rows: u32, cols: u32, periodic: u32, first_cell: u32, end_cell: u32, held_first_cell: u32, held_end_cell: u32, value_weight: f32, accumulated_weight: f32,
+    rows: u32, cols: u32, periodic: u32, first_cell: u32, end_cell: u32, held_first_cell: u32, held_end_cell: u32,
+    value_weight: f32, accumulated_weight: f32, northward_weight: f32,
     has_accumulated: u32, transfer_low: f32, transfer_per_unit: f32, strength_per_unit: f32, diverging: u32,
     depth_floor: f32, first_row: u32, row_count: u32, slot_count: u32, cap_least: f32, particles_per_cell: u32,
     particles_each: u32, splat_count: u32, shake_shift: u32, height_m_per_kg_m2: f32,
@@ -17,10 +18,13 @@ struct Params {
     light_v_y: f32, light_v_z: f32, center_px_x: f32, center_px_y: f32, grid_west_rad: f32, grid_north_rad: f32,
     cols_per_rad: f32, rows_per_rad: f32, edge_sharpness: f32, map_alpha: f32, surface: u32, origin_x_px: i32,
     origin_y_px: i32, entry_shift: u32, shape_table: u32, doubt: u32,
-    origin_y_px: i32, entry_shift: u32, in_context: u32, day_on: u32, night_on: u32, sun_is_local: u32, sea_per_m: f32,
+    in_context: u32, day_on: u32, night_on: u32, sun_is_local: u32, sea_per_m: f32,
     seabed_per_m: f32, terrain_on: u32, terrain_rows: u32, terrain_cols: u32, terrain_periodic: u32,
     terrain_west_rad: f32, terrain_north_rad: f32, terrain_cols_per_rad: f32, terrain_rows_per_rad: f32,
     terrain_slope: f32, coast_on: u32, coast_above: u32, coast_grey: f32, coast_alpha: f32, coast_row_words: u32,
+    flow_turn: f32, flow_cycle: u32, flow_share: u32, flow_lead_steps: u32,
+    flow_cols_per_m_s: f32, flow_rows_per_m_s: f32, flow_most_cols: f32, flow_most_m_s: f32,
+    flow_px_per_m_s: f32,
 }
 struct Row {
     y_sub: i32, y_span_px: f32, sin_lat: f32, cos_lat: f32, lat_span_rad: f32, radius: f32, area_m2: f32,
@@ -38,6 +42,9 @@ struct Splat {
 }
 struct Entry {
     place: u32, size: u32, color: u32,
+}
+struct Velocity {
+    east: f32, north: f32,
 }
 struct Axis {
     index: i32, fraction: f32,

@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use contract::job::Mode;
+use render_worker::proof::currents;
 use render_worker::{Backend, Image, Renderer};
 
 use crate::scenes::{ONE_DEGREE, globe, job, ocean, tile};
@@ -21,6 +22,7 @@ fn the_gallery_is_drawn_where_asked_for() {
     };
     let renderer = Renderer::new(backend).unwrap();
     let scene = stored().unwrap_or_else(|| ocean(ONE_DEGREE));
+    let gyres = currents::gyres(ONE_DEGREE);
     println!("{}", renderer.name());
     let views = [
         ("z0", tile(0, 0, 0, 256)),
@@ -36,12 +38,16 @@ fn the_gallery_is_drawn_where_asked_for() {
     for mode in Mode::ALL {
         let mut sheet = Sheet::default();
         for (name, view) in views {
-            let mut job = job(mode, view);
+            let (mut job, scene) = if mode == Mode::Flow {
+                (currents::job(view, 1e7), &gyres)
+            } else {
+                (job(mode, view), &scene)
+            };
             job.style.globe_surface = true;
-            renderer.render(&job, &scene).unwrap();
+            renderer.render(&job, scene).unwrap();
             let busy = busy_ms();
             let start = Instant::now();
-            let image = renderer.render(&job, &scene).unwrap();
+            let image = renderer.render(&job, scene).unwrap();
             let drawn = start.elapsed();
             let busy = busy_ms() - busy;
             let png = image.encode_png().unwrap();

@@ -2,8 +2,9 @@
 
 use std::path::PathBuf;
 
-use contract::job::{Mode, View};
-use render_worker::Image;
+use contract::job::{Mode, RenderJob, View};
+use render_worker::proof::currents::{self, gyres};
+use render_worker::{Image, Scene};
 
 use crate::compare::distance;
 use crate::device::renderers;
@@ -49,11 +50,13 @@ fn cropped(image: &Image) -> Image {
 }
 
 fn matches_golden(name: &str, mode: Mode, view: View) {
-    let scene = ocean(FIVE_DEGREES);
-    let mut job = job(mode, view);
+    matches_golden_of(name, &ocean(FIVE_DEGREES), job(mode, view));
+}
+
+fn matches_golden_of(name: &str, scene: &Scene, mut job: RenderJob) {
     job.style.globe_surface = true;
     for renderer in renderers("golden") {
-        let drawn = cropped(&renderer.render(&job, &scene).unwrap());
+        let drawn = cropped(&renderer.render(&job, scene).unwrap());
         let path = path(name);
         let is_twin = renderer.name() == "CPU twins";
         if is_twin && (is_set("BLESS") || (!path.exists() && !is_set("CI"))) {
@@ -115,6 +118,17 @@ fn volume_globes_match_their_golden_picture() {
         Mode::Volume,
         globe(-120.0, 10.0, 1.5e7, 160),
     );
+}
+
+#[test]
+fn flow_tiles_and_globes_match_their_golden_pictures() {
+    let scene = gyres(FIVE_DEGREES);
+    for (name, view) in [
+        ("flow_tile", tile(3, 1, 3, 256)),
+        ("flow_globe", globe(-120.0, 10.0, 1.5e7, 160)),
+    ] {
+        matches_golden_of(name, &scene, currents::job(view, 1e7));
+    }
 }
 
 #[test]

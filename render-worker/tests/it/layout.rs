@@ -1,14 +1,14 @@
 //! The structs and constants of Rust and WGSL, compared through naga.
 
-use render_worker::passes::{place, splat};
+use render_worker::passes::{place, splat, trails};
 use render_worker::stages::fill::level::{FillLevel, MOST_REACH_COLS};
 use render_worker::stages::fill::{self, exact, pairs, window};
 use render_worker::stages::layout::{
     Axis, Col, DEPTH_ONE, Entry, GROUP, GroundAxis, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, MISSING,
     Params, Particle, Row, SCREEN_TILE_PX, SCREEN_TILE_SHIFT, SQUARE, SUBPIXELS, Splat, VIEW_GLOBE,
-    VIEW_TILE, WATER_BLUE, WATER_GREEN, WATER_RED,
+    VIEW_TILE, Velocity, WATER_BLUE, WATER_GREEN, WATER_RED,
 };
-use render_worker::stages::{bin, compose, eye, interpolate, light, map};
+use render_worker::stages::{bin, compose, eye, flow, interpolate, light, map};
 
 type Fields = &'static [(&'static str, usize, &'static str)];
 
@@ -60,13 +60,14 @@ fn difference(source: &str, name: &str, fields: Fields, size: usize) -> Option<S
     })
 }
 
-const SHARED: [(&str, Fields, usize); 8] = [
+const SHARED: [(&str, Fields, usize); 9] = [
     ("Params", Params::FIELDS, size_of::<Params>()),
     ("Row", Row::FIELDS, size_of::<Row>()),
     ("Col", Col::FIELDS, size_of::<Col>()),
     ("Particle", Particle::FIELDS, size_of::<Particle>()),
     ("Splat", Splat::FIELDS, size_of::<Splat>()),
     ("Entry", Entry::FIELDS, size_of::<Entry>()),
+    ("Velocity", Velocity::FIELDS, size_of::<Velocity>()),
     ("Axis", Axis::FIELDS, size_of::<Axis>()),
     ("GroundAxis", GroundAxis::FIELDS, size_of::<GroundAxis>()),
 ];
@@ -163,6 +164,8 @@ fn every_shader_is_valid_without_extensions() {
     let sources = [
         interpolate::SOURCE,
         splat::SOURCE,
+        flow::SOURCE,
+        trails::SOURCE,
         fill::STENCIL_SOURCE,
         window::SOURCE,
         exact::SOURCE,

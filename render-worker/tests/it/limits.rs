@@ -26,6 +26,7 @@ fn constant(grid: Grid, value: f32) -> Scene {
         value: value.clone(),
         accumulated: Some(value),
         terrain: None,
+        northward: None,
     }
 }
 
@@ -33,7 +34,7 @@ fn constant(grid: Grid, value: f32) -> Scene {
 fn grids_without_a_finite_number_draw_nothing() {
     for renderer in renderers("empty grids") {
         for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -f32::MAX] {
-            for mode in Mode::ALL {
+            for mode in Mode::SCALAR {
                 for view in [tile(1, 0, 0, 256), globe(0.0, 0.0, 1e7, 64)] {
                     let image = renderer
                         .render(&job(mode, view), &constant(FIVE_DEGREES, value))
@@ -49,7 +50,7 @@ fn grids_without_a_finite_number_draw_nothing() {
 fn land_and_the_sky_are_transparent() {
     let scene = ocean(FIVE_DEGREES);
     for renderer in renderers("land") {
-        for mode in Mode::ALL {
+        for mode in Mode::SCALAR {
             // Inside the large made-up continent, and above a globe of half the picture's height.
             let land = renderer
                 .render(&job(mode, tile(5, 24, 10, 256)), &scene)
@@ -84,7 +85,7 @@ fn the_smallest_and_the_largest_of_everything_is_drawn() {
             (tile(16, 65_535, 65_535, 512), 1),
             (tile(16, 20_000, 31_000, 256), 256),
         ] {
-            for mode in Mode::ALL {
+            for mode in Mode::SCALAR {
                 let mut job = job(mode, view);
                 job.style.slices = slices;
                 job.style.sun.elevation_deg = 5.0;
@@ -117,7 +118,7 @@ fn a_tiny_grid_and_one_across_the_date_line_are_drawn() {
         // A handful of dots in cells of 30 degrees need not fall into a tile.
         for (grid, modes) in [
             (small, &[Mode::Map, Mode::Volume][..]),
-            (across, &Mode::ALL),
+            (across, &Mode::SCALAR),
         ] {
             let scene = constant(grid, 1e-9);
             for &mode in modes {

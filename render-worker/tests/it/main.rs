@@ -15,6 +15,7 @@ mod device;
 mod fill;
 #[cfg(feature = "service")]
 mod fleet;
+mod flow;
 mod gallery;
 mod golden;
 mod layout;
@@ -22,6 +23,8 @@ mod limits;
 mod look;
 mod lost_device;
 mod mass;
+#[cfg(feature = "service")]
+mod prefetch;
 #[cfg(feature = "service")]
 mod process;
 mod reference;

@@ -6,7 +6,7 @@ const SOURCES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/src");
 
 #[test]
 fn every_stage_and_every_form_of_filling_has_a_shader_and_a_twin() {
-    assert_eq!(check("stages"), 9);
+    assert_eq!(check("stages"), 10);
     assert_eq!(check("stages/fill"), 3);
 }
 
@@ -47,6 +47,7 @@ fn both_frames_list_the_same_stages_in_the_same_order() {
     let stages = [
         "interpolate",
         "map",
+        "flow",
         "particles",
         "project",
         "light",
@@ -68,6 +69,8 @@ fn both_frames_list_the_same_stages_in_the_same_order() {
         "interpolate",
         "map",
         "compose",
+        "flow",
+        "trails",
         "splats",
         "light",
         "bin",

@@ -12,14 +12,18 @@ use render_worker::passes::splat::{self, HALF_BYTES, Splats, stored_at, unpacked
 use render_worker::passes::{
     self,
     place::{self, Place},
+    trails::{self, Trails},
 };
 use render_worker::plan::Plan;
+use render_worker::proof::currents::{self, gyres};
 use render_worker::stages::bin::{self, Bin, list_count};
 use render_worker::stages::compose::in_context::Surroundings;
 use render_worker::stages::compose::{self, Compose};
 use render_worker::stages::eye::{self, Eye};
+use render_worker::stages::flow::cpu::Field;
+use render_worker::stages::flow::{self, Flow};
 use render_worker::stages::interpolate::{self, Interpolate};
-use render_worker::stages::layout::{Active, Entry, MISSING, Params, Particle, Splat};
+use render_worker::stages::layout::{Active, Entry, MISSING, Params, Particle, Splat, Velocity};
 use render_worker::stages::light::{self, Light, texel_count};
 use render_worker::stages::map::{self, Map};
 use render_worker::stages::particles::cpu::Inputs;
@@ -36,6 +40,7 @@ struct Twins {
     plan: Plan,
     params: Params,
     value: Vec<f32>,
+    velocity: Vec<Velocity>,
     splats: Vec<Splat>,
     deposited: Vec<u32>,
     light: Vec<u32>,
@@ -59,6 +64,13 @@ impl Twins {
         })
     }
 
+    /// Currents in trails.
+    fn of_flow(view: View) -> Self {
+        let mut job = currents::job(view, 1e7);
+        job.style.globe_surface = true;
+        Self::of_job(&job, gyres(FIVE_DEGREES))
+    }
+
     fn styled(mode: Mode, view: View, change: impl FnOnce(&mut Style)) -> Self {
         let mut job = job(mode, view);
         job.style.globe_surface = true;
@@ -75,20 +87,10 @@ impl Twins {
         let mode = job.mode;
         let plan = Plan::new(job, &scene, u64::MAX).unwrap();
         let mut params = plan.params_of(plan.parts()[0]);
-        let carbon = scene.accumulated.as_ref().unwrap();
-        let between = |interval: &render_worker::Interval, weight| {
-            let mut between = vec![0.0; scene.grid.cell_count()];
-            let (before, after) = (
-                interval.before.cells.content(),
-                interval.after.cells.content(),
-            );
-            interpolate::cpu::interpolate(&params, weight, before, after, &mut between);
-            between
-        };
-        let (value, accumulated) = (
-            between(&scene.value, params.value_weight),
-            between(carbon, params.accumulated_weight),
-        );
+        let value = between(&params, Some(&scene.value), params.value_weight);
+        let carbon = scene.accumulated.as_ref();
+        let accumulated = between(&params, carbon, params.accumulated_weight);
+        let northward = between(&params, scene.northward.as_ref(), params.northward_weight);
         let doubt = doubt::between(&params, &scene.value);
         let mut particles =
             vec![Particle::default(); plan.active.len() * params.particles_per_cell as usize];
@@ -103,7 +105,7 @@ impl Twins {
         let mut picture = vec![Vec4::ZERO; (params.width * params.height) as usize];
         let (mut splats, mut deposited, mut light) =
             (vec![Splat::default(); particles.len()], vec![], vec![]);
-        let (mut list_ends, mut entries) = (vec![], vec![]);
+        let (mut list_ends, mut entries, mut velocity) = (vec![], vec![], vec![]);
         if mode == Mode::Map {
             let inputs = map::cpu::Inputs {
                 value: &value,
@@ -113,7 +115,12 @@ impl Twins {
             };
             map::cpu::map(&params, &inputs, &mut picture);
         } else {
-            particles::cpu::generate(&params, &inputs, &mut particles);
+            if mode == Mode::Flow {
+                velocity = flow::cpu::velocities(&value, &northward);
+                drift(&params, &plan, &velocity, &mut particles);
+            } else {
+                particles::cpu::generate(&params, &inputs, &mut particles);
+            }
             project::cpu::project(&params, &plan.rows, &plan.cols, &particles, &mut splats);
             let mut shaded = splats.clone();
             if params.light_on == 1 {
@@ -147,6 +154,7 @@ impl Twins {
             plan,
             params,
             value,
+            velocity,
             splats,
             deposited,
             light,
@@ -206,6 +214,7 @@ impl Twins {
         let scene = SceneBuffers {
             value: pair(&self.scene.value),
             accumulated: self.scene.accumulated.as_ref().map(pair),
+            northward: self.scene.northward.as_ref().map(pair),
             domain: gpu.storage("domain", self.scene.domain.content()).unwrap(),
             doubts: Some(
                 [&self.scene.value.before, &self.scene.value.after]
@@ -247,6 +256,34 @@ impl Twins {
         let bytes = u64::from(self.params.splat_count) * HALF_BYTES;
         [(Slot::Seen, bytes), (Slot::Lit, bytes)]
     }
+}
+
+/// The grid at an instant; nothing of nothing.
+fn between(params: &Params, interval: Option<&render_worker::Interval>, weight: f32) -> Vec<f32> {
+    let Some(interval) = interval else {
+        return vec![];
+    };
+    let (before, after) = (
+        interval.before.cells.content(),
+        interval.after.cells.content(),
+    );
+    let mut between = vec![0.0; before.len()];
+    interpolate::cpu::interpolate(params, weight, before, after, &mut between);
+    between
+}
+
+fn drift(params: &Params, plan: &Plan, velocity: &[Velocity], particles: &mut [Particle]) {
+    let field = Field {
+        params,
+        rows: &plan.rows,
+        velocity,
+    };
+    let inputs = flow::cpu::Inputs {
+        active: &plan.active,
+        field,
+        palette: &plan.palette,
+    };
+    flow::cpu::trails(params, &inputs, particles);
 }
 
 /// The shader agrees with its twin and one with `right` replaced by `wrong` does not.
@@ -378,6 +415,75 @@ fn splats_match_their_twins_on_tiles_and_on_the_globe() {
 }
 
 #[test]
+fn velocities_match_their_twin() {
+    let twins = Twins::of_flow(tile(2, 0, 1, 256));
+    let numbers = |velocity: &[Velocity]| -> Vec<f32> {
+        let parts = velocity.iter().flat_map(|v| [v.east, v.north]);
+        parts.collect()
+    };
+    let expected = numbers(&twins.velocity);
+    assert!(expected.iter().any(|v| *v > 0.5) && expected.contains(&MISSING));
+    for (right, wrong) in [
+        (
+            "north_after[cell], params.northward_weight",
+            "north_after[cell], 0.0",
+        ),
+        (
+            "is_missing(east) || is_missing(north)",
+            "is_missing(east) && params.rows == 0u",
+        ),
+    ] {
+        prove("velocities", flow::SOURCE, right, wrong, |gpu, source| {
+            let stage = Flow::new(gpu, source);
+            let drawn: Vec<Velocity> = twins.run(
+                gpu,
+                |_| (),
+                |f| stage.record(f).unwrap(),
+                Slot::Velocity,
+                twins.velocity.len(),
+            );
+            worst(&numbers(&drawn), &expected, 1e-5, 1e-5)
+        });
+    }
+}
+
+#[test]
+fn drifting_splats_match_their_twins_on_tiles_and_on_the_globe() {
+    let faults = [
+        ("-drawn.y * params", "drawn.y * params"),
+        ("0.5 * share * here.rate", "share * here.rate"),
+        ("params.flow_cycle + u32(turn)", "params.flow_cycle"),
+        ("x = (x % cols + cols) % cols;", ""),
+        ("min(trail.open, here.open)", "trail.open"),
+    ];
+    let views = [tile(2, 0, 1, 256), globe(-178.0, 10.0, 1.5e7, 160)];
+    for view in views {
+        let twins = Twins::of_flow(view);
+        let expected = splat_numbers(&twins.splats, &twins.splats);
+        let drawn = twins.splats.iter().filter(|splat| splat.tau > 0.05).count();
+        assert!(drawn > 1000, "{drawn} dots");
+        for (right, wrong) in faults {
+            prove("trails", trails::SOURCE, right, wrong, |gpu, source| {
+                let stage = Trails::of(gpu, source);
+                let given = |f: &mut FrameContext<'_>| {
+                    drop(f.upload(Slot::Velocity, &twins.velocity).unwrap());
+                };
+                let [seen, lit] = twins.run_with(
+                    gpu,
+                    &twins.params,
+                    given,
+                    |f| stage.record(f).unwrap(),
+                    twins.stored(),
+                );
+                let drawn = splat_numbers(&twins.in_order(&seen, &lit), &twins.splats);
+                // A way of some hundred cells adds up what is rounded on it: two subpixels.
+                worst(&drawn, &expected, 0.0201, 1e-4)
+            });
+        }
+    }
+}
+
+#[test]
 fn every_function_of_a_particle_is_in_the_pass_that_is_tested() {
     for functions in [
         interpolate::FUNCTIONS,
@@ -388,6 +494,9 @@ fn every_function_of_a_particle_is_in_the_pass_that_is_tested() {
         bin::FUNCTIONS,
     ] {
         assert!(splat::SOURCE.contains(functions));
+    }
+    for functions in [flow::FUNCTIONS, project::FUNCTIONS, bin::FUNCTIONS] {
+        assert!(trails::SOURCE.contains(functions));
     }
     assert!(place::SOURCE.contains(light::SHADE_FUNCTIONS));
     assert!(

@@ -34,6 +34,8 @@ pub(crate) fn settings(draws_at_once: u8, draw_queue: u16) -> Settings {
         draws_at_once,
         draw_queue,
         frame_memory_mib: 64,
+        device_frame_memory_mib: None,
+        frames_ahead: 1,
         render_drain_s: 60,
     }
 }

@@ -1,4 +1,5 @@
-//! One version of a product as it is shown, with the accumulated carbon that lifts its particles.
+//! One version of a product as it is shown, with the accumulated carbon that lifts its particles and the northward part
+//! of the vector that they drift with.
 
 use std::sync::Arc;
 
@@ -18,6 +19,17 @@ pub struct Layer {
     pub extent: Period,
     /// The accumulated carbon that lifts its particles.
     pub accumulated: Option<Accumulated>,
+    /// The northward part of the vector whose eastward part it is, in its newest version.
+    pub northward: Option<Northward>,
+}
+
+/// The northward part of a vector.
+#[derive(Debug, Clone)]
+pub struct Northward {
+    /// Its name, which is costly to compute.
+    pub id: ManifestId,
+    /// Its manifest.
+    pub manifest: Arc<Manifest>,
 }
 
 /// Accumulated carbon of one version of a product.
@@ -50,11 +62,14 @@ impl Accumulated {
 
 impl Layer {
     /// Modes it can be drawn in. Accumulated carbon lifts the particles of another product; it has none of its own.
+    /// Particles drift with both parts of a vector.
     pub fn modes(&self) -> &'static [Mode] {
         if self.manifest.quantity == Quantity::AccumulatedCarbon {
             &[Mode::Map]
-        } else {
+        } else if self.northward.is_some() {
             &Mode::ALL
+        } else {
+            &Mode::SCALAR
         }
     }
 }

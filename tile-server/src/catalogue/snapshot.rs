@@ -4,12 +4,13 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use contract::flow::{check_parts, northward_of};
 use contract::key::ObjectKey;
 use contract::manifest::{Manifest, ManifestId};
 use contract::product::ProductId;
 use storage::{StorageError, Store, manifests};
 
-use super::layer::{Accumulated, Layer, equal_until};
+use super::layer::{Accumulated, Layer, Northward, equal_until};
 use crate::metrics::Metrics;
 use crate::versions::Versions;
 
@@ -81,6 +82,7 @@ impl Reader {
                 manifest: Arc::clone(manifest),
                 extent,
                 accumulated: self.accumulated(&known, manifest, id).await,
+                northward: northward(&known, manifest),
             };
             layers.insert(product.clone(), Arc::new(layer));
         }
@@ -143,4 +145,15 @@ impl Reader {
             }
         }
     }
+}
+
+/// The newest northward part of the vector whose eastward part a product is.
+fn northward(known: &BTreeMap<ProductId, Entry>, eastward: &Manifest) -> Option<Northward> {
+    let (_, manifest, id) = known.get(&northward_of(eastward)?)?;
+    check_parts(eastward, manifest).ok()?;
+    manifest.extent()?;
+    Some(Northward {
+        id: id.clone(),
+        manifest: Arc::clone(manifest),
+    })
 }

@@ -100,7 +100,8 @@ impl LiveService {
     async fn hear(&mut self, event: &Event) -> Result<(), StorageError> {
         match &event.body {
             Body::GranuleLanded { manifest, .. } => {
-                self.new_version(event, manifest).await.map(|_touched| ())
+                let touched = self.new_version(event, manifest).await?;
+                self.drift(event, manifest, &touched).await
             }
             Body::ProductDerived {
                 manifest,
@@ -212,6 +213,26 @@ impl LiveService {
         };
         if let Some(noticed) = event.noticed {
             self.state.freshness.expect_version(&layer.id, noticed);
+        }
+        self.state.news.tell(layer.id.clone(), touched.to_vec());
+        self.order(event, &layer, touched).await
+    }
+
+    /// Draws anew what drifts with this northward part of a vector, if it is one.
+    async fn drift(
+        &self,
+        event: &Event,
+        northward: &ManifestId,
+        touched: &[Period],
+    ) -> Result<(), StorageError> {
+        let Some(eastward) = northward.product.eastward() else {
+            return Ok(());
+        };
+        let Ok(layer) = self.state.catalogue.layer(eastward.as_str()).await else {
+            return Ok(());
+        };
+        if layer.northward.is_none() || touched.is_empty() {
+            return Ok(());
         }
         self.state.news.tell(layer.id.clone(), touched.to_vec());
         self.order(event, &layer, touched).await

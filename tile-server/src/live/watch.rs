@@ -26,6 +26,8 @@ pub struct Watch {
 struct Seen {
     version: Version,
     lift: Option<Version>,
+    /// What its particles drift with besides it.
+    northward: Option<Version>,
 }
 
 type Version = (ManifestId, Arc<Manifest>);
@@ -72,7 +74,7 @@ impl Watch {
         self.seen = Some(found);
     }
 
-    /// Tells what differs: the values, and what lifts their particles.
+    /// Tells what differs: the values, what lifts their particles, and what those drift with.
     fn compare(&self, before: Option<&Seen>, now: &Seen) {
         let (id, manifest) = &now.version;
         let version = before.map(|before| &before.version);
@@ -81,12 +83,20 @@ impl Watch {
             tracing::info!(manifest = %id, periods = touched.len(), "a new version is shown");
             self.state.news.tell(id.clone(), touched);
         }
-        let lift = before.and_then(|before| before.lift.as_ref());
-        if let (Some((new, carbon)), Some(_)) = (&now.lift, before)
-            && lift.is_none_or(|(old, _)| old != new)
-        {
-            let touched = touched(lift.map(|(_, old)| &**old), carbon);
-            self.state.news.tell(id.clone(), touched);
+        let Some(before) = before else {
+            return;
+        };
+        let others = [
+            (&before.lift, &now.lift),
+            (&before.northward, &now.northward),
+        ];
+        for (old, new) in others {
+            if let Some((new, manifest)) = new
+                && old.as_ref().is_none_or(|(old, _)| old != new)
+            {
+                let touched = touched(old.as_ref().map(|(_, old)| &**old), manifest);
+                self.state.news.tell(id.clone(), touched);
+            }
         }
     }
 }
@@ -99,5 +109,9 @@ fn seen(layer: &Layer) -> Seen {
             .accumulated
             .as_ref()
             .map(|lift| version(&lift.id, &lift.manifest)),
+        northward: layer
+            .northward
+            .as_ref()
+            .map(|part| version(&part.id, &part.manifest)),
     }
 }

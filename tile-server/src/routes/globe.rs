@@ -48,7 +48,7 @@ pub(crate) async fn get(
     let mode = request::mode(&layer, name)?;
     let view = query.view()?;
     let time = time(query.time.as_deref())?;
-    let mut style = query.look.parse()?.style(layer.manifest.quantity)?;
+    let mut style = query.look.parse()?.style(layer.manifest.quantity, mode)?;
     style.globe_surface = match query.surface.as_deref() {
         None | Some("true") => true,
         Some("false") => false,

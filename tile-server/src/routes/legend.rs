@@ -4,18 +4,21 @@ use axum::extract::State;
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse as _, Response};
 use contract::digest::Digest;
+use contract::job::Mode;
 use serde::Deserialize;
 
 use crate::error::ServerError;
 use crate::extract::{UrlPath, UrlQuery};
 use crate::legend::{Form, Legend};
 use crate::look::LookQuery;
+use crate::request;
 use crate::routes::picture::{CACHE_CONTROL, has_tag};
 use crate::state::AppState;
 
 #[derive(Debug, Deserialize)]
 pub(crate) struct LegendQuery {
     manifest: Option<String>,
+    mode: Option<String>,
     #[serde(flatten)]
     look: LookQuery,
 }
@@ -33,8 +36,12 @@ pub(crate) async fn get(
         .version(&product, query.manifest.as_deref())
         .await?;
     let quantity = layer.manifest.quantity;
-    let style = query.look.parse()?.style(quantity)?;
-    let content = Legend::of(quantity, &style.transfer).encoded(form)?;
+    let mode = match &query.mode {
+        Some(text) => request::mode(&layer, text)?,
+        None => Mode::Map,
+    };
+    let style = query.look.parse()?.style(quantity, mode)?;
+    let content = Legend::of_mode(mode, quantity, &style.transfer).encoded(form)?;
     // Weak: the same text may be sent compressed or not.
     let tag = format!("W/\"{}\"", Digest::of(&content));
     let headers = [

@@ -43,6 +43,9 @@ struct Product<'a> {
     steps: Vec<StepTimes>,
     modes: &'static [Mode],
     legend: Legend,
+    /// That of the mode flow, where there is one: speeds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    flow_legend: Option<Legend>,
 }
 
 /// When a step holds.
@@ -111,6 +114,10 @@ fn product(layer: &Layer) -> Product<'_> {
             manifest.quantity,
             &TransferFunction::default_for(manifest.quantity),
         ),
+        flow_legend: layer
+            .northward
+            .as_ref()
+            .map(|_part| Legend::of_speed(manifest.quantity)),
     }
 }
 

@@ -42,7 +42,7 @@ impl TileJsonQuery {
         let manifest = manifest.map(|_named| format!("manifest={}", layer.id));
         let look = self.look.parse()?;
         // What cannot be drawn is refused here, not by every tile.
-        look.style(layer.manifest.quantity)?;
+        look.style(layer.manifest.quantity, mode)?;
         let around = self.surroundings.of_tiles()?;
         let parts = time
             .into_iter()

@@ -46,7 +46,7 @@ pub(crate) async fn get(
     };
     let time = time(query.time.as_deref())?;
     let look = query.look.parse()?;
-    let style = look.style(layer.manifest.quantity)?;
+    let style = look.style(layer.manifest.quantity, mode)?;
     let view = View::Tile { tile, size_px };
     let job = request::job_in_style(&layer, mode, view, time, style)?;
     let shown = Shown::of(&layer, time);

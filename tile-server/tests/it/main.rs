@@ -12,6 +12,7 @@ mod connections;
 mod doubles;
 mod events;
 mod faults;
+mod flow;
 mod globe;
 mod health;
 mod hostile;

@@ -40,7 +40,7 @@ async fn a_tile_is_the_picture_of_the_job_its_address_means() {
 async fn every_mode_has_its_own_picture() {
     let app = TestApp::new().await;
     let mut pictures = vec![];
-    for mode in Mode::ALL {
+    for mode in Mode::SCALAR {
         pictures.push(app.get(&format!("/tiles/flux/{mode}/0/0/0.png")).await.body);
     }
     pictures.sort();

@@ -28,6 +28,8 @@ export interface Product {
   steps: { start: string; end: string; mid: string }[];
   modes: Mode[];
   legend: Legend;
+  /** Speeds, where the mode flow is offered. */
+  flow_legend?: Legend;
 }
 
 export interface PointSeries {

@@ -7,18 +7,20 @@ import { legendView } from "./legend";
 import { MODES, type Mode, type Store } from "./state";
 import type { TileCounts } from "./tiles";
 
-const MODE_TITLES: Record<Mode, string> = { map: "Map", points: "Points", sprites: "Sprites", volume: "Volume" };
+const MODE_TITLES: Record<Mode, string> = { map: "Map", points: "Points", sprites: "Sprites", volume: "Volume", flow: "Flow" };
 const MODE_HINTS: Record<Mode, string> = {
   map: "Thematic map",
   points: "Particles as points",
   sprites: "Particles as soft sprites",
   volume: "Particle volume, half-angle sliced: with shadows",
+  flow: "Trails that drift with the current",
 };
 
 export class Controls {
   /** Room for the toggle of observations. */
   readonly observations = el("div");
   readonly #store: Store;
+  #shown: Product | undefined;
   readonly #product = el("select", { id: "product", "aria-label": "Product" });
   readonly #modes = el("div", { class: "segments", role: "radiogroup", "aria-label": "Mode" });
   readonly #legend = el("div", { class: "legend-slot" });
@@ -75,10 +77,12 @@ export class Controls {
   setProduct(product: Product): void {
     this.#product.value = product.id;
     this.#product.title = chemistry(product.title);
-    this.#legend.replaceChildren(legendView(product.legend));
     this.#source.textContent = chemistry(product.source);
     this.#source.title = product.source;
-    this.#modes.replaceChildren(...MODES.map((mode) => this.#modeButton(mode, product.modes.includes(mode))));
+    // Few products are part of a vector: the others do not show a button that never works.
+    const listed = MODES.filter((mode) => mode !== "flow" || product.modes.includes(mode));
+    this.#modes.replaceChildren(...listed.map((mode) => this.#modeButton(mode, product.modes.includes(mode))));
+    this.#shown = product;
     this.#markMode();
   }
 
@@ -128,6 +132,11 @@ export class Controls {
   }
 
   #markMode(): void {
+    const product = this.#shown;
+    if (product) {
+      const isFlow = this.#store.state.mode === "flow" && product.modes.includes("flow");
+      this.#legend.replaceChildren(legendView((isFlow && product.flow_legend) || product.legend));
+    }
     for (const button of this.#modes.querySelectorAll<HTMLButtonElement>("button")) {
       const isChosen = button.dataset["mode"] === this.#store.state.mode;
       button.setAttribute("aria-checked", String(isChosen));

@@ -1,7 +1,7 @@
 //! What the page shows, in one place: a small store that parts read, change and listen to.
 
-export type Mode = "map" | "points" | "sprites" | "volume";
-export const MODES: readonly Mode[] = ["map", "points", "sprites", "volume"];
+export type Mode = "map" | "points" | "sprites" | "volume" | "flow";
+export const MODES: readonly Mode[] = ["map", "points", "sprites", "volume", "flow"];
 
 export type Tab = "place" | "budget" | "check" | "platform";
 /** Those that a shared address can open; which platform was chosen is no part of it. */

@@ -5,7 +5,7 @@ import { underOpacity } from "../src/fade";
 import { decodeHash, encodeHash } from "../src/hash";
 import { ticksOf } from "../src/legend";
 import { hasData, valueAt } from "../src/series";
-import { INITIAL, Store, type State } from "../src/state";
+import { INITIAL, MODES, Store, type State } from "../src/state";
 
 describe("the address", () => {
   const state: State = {
@@ -22,6 +22,11 @@ describe("the address", () => {
 
   it("carries a view there and back", () => {
     expect({ ...INITIAL, ...decodeHash(encodeHash(state)) }).toEqual(state);
+  });
+
+  it("knows every mode", () => {
+    for (const mode of MODES) expect(decodeHash(`#mode=${mode}`)).toEqual({ mode });
+    expect(MODES).toContain("flow");
   });
 
   it("leaves out what is as it is at first", () => {

@@ -44,7 +44,7 @@ struct Subject {
 pub(crate) async fn run(settings: &Settings, options: BenchQuality) -> Result<()> {
     let store = deployment::store(settings)?;
     let product = storage::manifests::latest(&store, &options.product).await?;
-    let service = deployment::renderer(settings, store.clone()).await?;
+    let service = deployment::single_renderer(settings, store.clone()).await?;
     let mut subjects = generated(options.size)?;
     match &product {
         Some(manifest) => subjects.extend(landed(&service, &store, manifest, options.size).await?),

@@ -48,6 +48,7 @@ pub(super) async fn plan(store: &Store, options: &Recompute) -> Result<Tiles> {
         id,
         extent,
         accumulated: accumulated.map(|derived| Accumulated::new(derived.id(), derived.into())),
+        northward: None,
         manifest: manifest.into(),
     };
     let stored: BTreeSet<ObjectKey> = store.list("tiles").await?.into_iter().collect();
@@ -97,7 +98,7 @@ pub(super) async fn draw(
     if let Some(log) = log {
         on_workers(log, &tiles.missing, &|| bar.inc(1)).await?;
     } else {
-        let renderer = deployment::renderer(settings, store.clone()).await?;
+        let renderer = deployment::single_renderer(settings, store.clone()).await?;
         for job in &tiles.missing {
             let png = renderer.draw(job).await?;
             store.put_new(&job.key(), png).await?;

@@ -7,10 +7,9 @@
 
 use crate::error::RenderError;
 use crate::frame::FrameContext;
-use crate::gpu::{Gpu, Kernel, Slot};
-use crate::stages::bin::list_count;
+use crate::gpu::{Gpu, Kernel};
+use crate::passes::store::Stored;
 use crate::stages::layout::{DEPTH_ONE, Params, SQUARE, SUBPIXELS, Splat};
-use crate::stages::light::texel_count;
 
 /// The shader.
 pub const SOURCE: &str = concat!(
@@ -24,6 +23,7 @@ pub const SOURCE: &str = concat!(
     include_str!("../../stages/bin/reach.wgsl"),
     include_str!("../tally.wgsl"),
     include_str!("../order.wgsl"),
+    include_str!("../store.wgsl"),
     include_str!("splat.wgsl"),
 );
 
@@ -84,23 +84,7 @@ impl Splats {
 
     /// Fills the slots of splats, of light and of list lengths.
     pub fn record(&self, frame: &mut FrameContext<'_>) -> Result<(), RenderError> {
-        let plan = frame.plan;
-        let rows = frame.upload_of_plan(Slot::Rows, &plan.rows)?;
-        let cols = frame.upload_of_plan(Slot::Cols, &plan.cols)?;
-        let palette = frame.upload_of_plan(Slot::Palette, &plan.palette)?;
-        let half_bytes = u64::from(frame.params.splat_count) * HALF_BYTES;
-        let seen = frame.room(Slot::Seen, half_bytes)?;
-        let lit = frame.room(Slot::Lit, half_bytes)?;
-        let light_bytes = if frame.params.light_on == 1 {
-            texel_count(&frame.params) as u64 * 4
-        } else {
-            4
-        };
-        let light = frame.room(Slot::Light, light_bytes)?;
-        let count_bytes = u64::from(list_count(&frame.params)) * 4;
-        let counts = frame.room(Slot::Counts, count_bytes)?;
-        frame.recorder.clear(&light, light_bytes);
-        frame.recorder.clear(&counts, count_bytes);
+        let stored = Stored::room(frame)?;
         let [before, after] = &frame.value_frames;
         // Bound but never read where nothing is accumulated.
         let [carbon_before, carbon_after] = frame
@@ -109,22 +93,14 @@ impl Splats {
             .unwrap_or(&frame.value_frames);
         // Bound but never read where doubt is not drawn.
         let [doubt_before, doubt_after] = frame.doubts.as_ref().unwrap_or(&frame.value_frames);
-        let buffers = [
-            (0, &frame.params_buffer),
-            (1, &rows),
-            (2, &cols),
-            (3, &palette),
+        let buffers = stored.with([
             (4, before),
             (5, after),
             (6, carbon_before),
             (7, carbon_after),
-            (8, &seen),
-            (9, &light),
-            (10, &counts),
-            (11, &lit),
             (12, doubt_before),
             (13, doubt_after),
-        ];
+        ]);
         let groups = workgroups(&frame.params);
         frame.recorder.dispatch_deep(&self.splat, &buffers, groups);
         Ok(())

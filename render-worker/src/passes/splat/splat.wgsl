@@ -1,51 +1,13 @@
 // From cells to stored splats in one pass: interpolate, generate, project; give depth to the light and count the lists.
 // One invocation makes a few particles of a cell; a workgroup covers a square of cells, whose particles are near one
 // another in the picture and in the light.
-@group(0) @binding(1) var<storage, read> rows: array<Row>;
-@group(0) @binding(2) var<storage, read> cols: array<Col>;
-@group(0) @binding(3) var<storage, read> palette: array<u32>;
 @group(0) @binding(4) var<storage, read> value_before: array<f32>;
 @group(0) @binding(5) var<storage, read> value_after: array<f32>;
 @group(0) @binding(6) var<storage, read> carbon_before: array<f32>;
 @group(0) @binding(7) var<storage, read> carbon_after: array<f32>;
-// Place on the screen, size and colour of every splat.
-@group(0) @binding(8) var<storage, read_write> seen: array<vec4<u32>>;
-// Place in the light, slice and day of every splat.
-@group(0) @binding(11) var<storage, read_write> lit: array<vec4<u32>>;
-@group(0) @binding(9) var<storage, read_write> light: array<atomic<u32>>;
-@group(0) @binding(10) var<storage, read_write> counts: array<atomic<u32>>;
 // Bound but never read where doubt is not drawn.
 @group(0) @binding(12) var<storage, read> doubt_before: array<f32>;
 @group(0) @binding(13) var<storage, read> doubt_after: array<f32>;
-
-// Keys of lists; those of light texels are below.
-const LIST_KEY = 0x80000000u;
-
-fn add_light(at: u32, amount: u32) {
-    let slot = take_slot(at);
-    if (slot == NO_SLOT) {
-        atomicAdd(&light[at], amount);
-    } else {
-        atomicAdd(&sums[slot], amount);
-    }
-}
-
-fn count_list(list: u32) {
-    let slot = take_slot(list | LIST_KEY);
-    if (slot == NO_SLOT) {
-        atomicAdd(&counts[list], 1u);
-    } else {
-        atomicAdd(&sums[slot], 1u);
-    }
-}
-
-fn is_in_cap(row: u32, slot: u32) -> bool {
-    if (params.view == VIEW_TILE) { return true; }
-    let lat = rows[row];
-    let lon = cols[slot];
-    let center = vec3(lat.cos_lat * lon.sin_lon, lat.cos_lat * lon.cos_lon, lat.sin_lat);
-    return dot(center, vec3(params.eye_x, params.eye_y, params.eye_z)) >= params.cap_least;
-}
 
 // Carbon of a cell, counted from the first held; what is missing has accumulated nothing.
 fn carbon_of(cell: u32) -> f32 {
@@ -53,20 +15,6 @@ fn carbon_of(cell: u32) -> f32 {
     let carbon = interpolated(carbon_before[cell], carbon_after[cell], params.accumulated_weight);
     if (is_missing(carbon)) { return 0.0; }
     return carbon;
-}
-
-fn store(at: u32, splat: Splat) {
-    let size = size_word(splat);
-    seen[at] = vec4(bitcast<u32>(splat.x_sub), bitcast<u32>(splat.y_sub), size, splat.color);
-    if (splat.tau <= 0.0) { return; }
-    if (params.light_on == 1u) { deposit(splat); }
-    if (size == 0u) { return; }
-    lit[at] = vec4(bitcast<u32>(splat.light_u), bitcast<u32>(splat.light_v),
-        bitcast<u32>(splat.slice), bitcast<u32>(splat.day));
-    let reach = reach_of(vec2(splat.x_sub, splat.y_sub), size);
-    for (var y = reach.low.y; y <= reach.high.y; y++) {
-        for (var x = reach.low.x; x <= reach.high.x; x++) { count_list(list_of(x, y, u32(splat.slice))); }
-    }
 }
 
 @compute @workgroup_size(SQUARE, SQUARE)
@@ -102,14 +50,5 @@ fn splat(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) w
         }
     }
     workgroupBarrier();
-    for (var slot = invocation; slot < TABLE; slot += SQUARE * SQUARE) {
-        let tag = atomicLoad(&tags[slot]);
-        if (tag == 0u) { continue; }
-        let key = tag - 1u;
-        if ((key & LIST_KEY) == 0u) {
-            atomicAdd(&light[key], atomicLoad(&sums[slot]));
-        } else {
-            atomicAdd(&counts[key & ~LIST_KEY], atomicLoad(&sums[slot]));
-        }
-    }
+    add_sums(invocation);
 }

@@ -6,7 +6,7 @@ use crate::stages::layout::{
 };
 
 /// 0.5 in 32 bits.
-const HALF_TURN: u32 = 0x8000_0000;
+pub const HALF_TURN: u32 = 0x8000_0000;
 
 /// What the stage reads.
 pub struct Inputs<'a> {
@@ -29,6 +29,11 @@ pub fn hash(x: u32) -> u32 {
 /// 32 random bits as a number in [0, 1).
 pub fn unit(bits: u32) -> f32 {
     (bits >> 8) as f32 * 5.9604645e-8
+}
+
+/// Random bits spread evenly round 0 over the mode's share of a cell.
+pub fn shaken(params: &Params, bits: u32) -> u32 {
+    (bits >> params.shake_shift).wrapping_sub(HALF_TURN >> params.shake_shift)
 }
 
 /// Thin at both ends of a column, so that particles appear and vanish unseen; mean 1.
@@ -71,12 +76,10 @@ fn one(params: &Params, inputs: &Inputs<'_>, cell: Active, k: u32) -> Particle {
     let row = cell.cell / params.cols;
     let value = inputs.value[cell.cell as usize];
     let bits = hash(hash(cell.cell) ^ k.wrapping_mul(0x9e3779b9));
-    let shaken =
-        |bits: u32| (bits >> params.shake_shift).wrapping_sub(HALF_TURN >> params.shake_shift);
     let along = |step: u32, bits: u32| {
         HALF_TURN
             .wrapping_add(k.wrapping_mul(step))
-            .wrapping_add(shaken(bits))
+            .wrapping_add(shaken(params, bits))
     };
     let (east, south) = (along(3242174889, bits), along(2447445414, hash(bits)));
     let across = (cell.cell % params.cols).wrapping_mul(1779033704);

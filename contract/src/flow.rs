@@ -1,0 +1,318 @@
+//! Vector fields: the product of the eastward part and that of the northward part in, one job of drifting particles out.
+//!
+//! A vector is two products on one grid with steps of the same periods, `NAME-east` and `NAME-north`.
+
+use serde::{Deserialize, Serialize};
+
+use crate::ContractError;
+use crate::colour::{Palette, TransferFunction};
+use crate::job::{Mode, RENDERER_VERSION, RenderJob, Style, View};
+use crate::manifest::{Bracket, Manifest};
+use crate::moment::Moment;
+use crate::product::ProductId;
+use crate::quantity::Quantity;
+use crate::time::{Period, TimeMs};
+
+/// Farthest a clock may be from 1970, s: beyond every year that has four digits.
+const MOST_CLOCK_S: f64 = 1e12;
+/// Trails of every cell at most, where cells are large on the screen.
+const TRAILS_PER_CELL: u32 = 64;
+
+/// What makes a product the eastward part of a vector that particles drift with.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Flow {
+    /// The northward part.
+    pub northward: Moment,
+    /// How long particles have drifted, s: since 1970, so that between two instants they move as far as the water does.
+    #[serde(with = "crate::exact")]
+    pub clock_s: f64,
+}
+
+/// Is it a part of a vector, positive and negative?
+fn is_component(quantity: Quantity) -> bool {
+    quantity == Quantity::Current
+}
+
+/// The product that holds the northward part of the vector of which this one is the eastward part.
+pub fn northward_of(eastward: &Manifest) -> Option<ProductId> {
+    let is_part = is_component(eastward.quantity);
+    eastward.product.northward().filter(|_| is_part)
+}
+
+/// Checks that two versions of products are the parts of one vector.
+///
+/// # Errors
+/// The names, quantities or grids that do not belong together.
+pub fn check_parts(eastward: &Manifest, northward: &Manifest) -> Result<(), ContractError> {
+    let bad = |reason: String| {
+        let name = format!("{} and {}", eastward.product, northward.product);
+        Err(ContractError::invalid("vector", &name, reason))
+    };
+    if northward_of(eastward).as_ref() != Some(&northward.product)
+        || northward.quantity != eastward.quantity
+    {
+        return bad("its parts are two products of currents, NAME-east and NAME-north".to_owned());
+    }
+    if eastward.grid != northward.grid {
+        return bad("its parts do not lie on one grid".to_owned());
+    }
+    Ok(())
+}
+
+/// Periods of the steps around an instant, and the weight of the second.
+fn around(manifest: &Manifest, time: TimeMs) -> Option<(Option<Period>, Option<Period>)> {
+    let Bracket {
+        before,
+        after,
+        weight,
+    } = manifest.bracket(time)?;
+    let period = |step: usize| manifest.steps[step].period;
+    Some((before.map(period), (weight > 0.0).then(|| period(after))))
+}
+
+impl RenderJob {
+    /// The job that draws particles drifting with a vector, by its parts' versions.
+    ///
+    /// # Errors
+    /// Products that are no parts of one vector, an instant around which they have different steps, a limit that is
+    /// broken.
+    pub fn of_flow(
+        eastward: &Manifest,
+        northward: &Manifest,
+        time: TimeMs,
+        view: View,
+        style: Style,
+    ) -> Result<Self, ContractError> {
+        check_parts(eastward, northward)?;
+        let empty = || {
+            let name = eastward.product.as_str();
+            ContractError::invalid("product", name, "it has no steps")
+        };
+        if around(eastward, time) != around(northward, time) {
+            let reason = format!(
+                "{} and {} have different steps there; land both parts of every file",
+                eastward.product, northward.product
+            );
+            let text = time.to_string();
+            return Err(ContractError::invalid("instant of a flow", &text, reason));
+        }
+        let job = Self {
+            renderer_version: RENDERER_VERSION,
+            grid: eastward.grid,
+            value: eastward.moment(time).ok_or_else(empty)?,
+            accumulated: None,
+            relief: None,
+            flow: Some(Flow {
+                northward: northward.moment(time).ok_or_else(empty)?,
+                clock_s: time.ms() as f64 / 1000.0,
+            }),
+            mode: Mode::Flow,
+            view,
+            style,
+        };
+        job.validate()?;
+        Ok(job)
+    }
+}
+
+impl Style {
+    /// What a flow looks like unless told otherwise, in colours by speed.
+    pub fn of_flow(speed: TransferFunction) -> Self {
+        Self {
+            particles_per_cell: TRAILS_PER_CELL,
+            ..Self::with_transfer(speed)
+        }
+    }
+}
+
+impl TransferFunction {
+    /// What the speed of a vector is drawn with whose parts are of this quantity.
+    pub fn of_speed(quantity: Quantity) -> Self {
+        let part = Self::default_for(quantity);
+        Self {
+            palette: Palette::Thermal,
+            low: 0.0,
+            high: part.low.abs().max(part.high.abs()),
+            ..part
+        }
+    }
+}
+
+/// Checks what a job from outside says of its flow.
+pub(crate) fn validate(job: &RenderJob) -> Result<(), ContractError> {
+    let bad = |reason: &str| {
+        let text = format!("{} {:?}", job.mode, job.flow);
+        Err(ContractError::invalid("flow", &text, reason))
+    };
+    let Some(flow) = &job.flow else {
+        return if job.mode == Mode::Flow {
+            bad("this mode needs the northward part of a vector")
+        } else {
+            Ok(())
+        };
+    };
+    if job.mode != Mode::Flow || job.accumulated.is_some() {
+        return bad("only the mode flow has a northward part, and nothing lifts its particles");
+    }
+    if !(-MOST_CLOCK_S..=MOST_CLOCK_S).contains(&flow.clock_s) {
+        return bad("its clock lies within 1e12 s of 1970");
+    }
+    flow.northward.validate()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::digest::Digest;
+    use crate::grid::Grid;
+    use crate::key::ObjectKey;
+    use crate::manifest::{MANIFEST_SCHEMA, Step};
+
+    const VIEW: View = View::Globe {
+        lon_deg: 0.0,
+        lat_deg: 0.0,
+        height_m: 1e6,
+        width_px: 10,
+        height_px: 10,
+    };
+
+    /// Days of January 2002.
+    fn part(name: &str, days: std::ops::RangeInclusive<u32>) -> Manifest {
+        let product: ProductId = name.parse().unwrap();
+        let step = |day: u32| Step {
+            period: Period {
+                start: TimeMs::from_ymd(2002, 1, day).unwrap(),
+                end: TimeMs::from_ymd(2002, 1, day + 1).unwrap(),
+            },
+            frame: ObjectKey::frame(&product, &Digest::of(format!("{name}{day}").as_bytes())),
+            raw_sha256: Digest::of(b""),
+            origin: String::new(),
+            valid_cells: 1,
+        };
+        Manifest {
+            schema: MANIFEST_SCHEMA,
+            number: 1,
+            title: String::new(),
+            quantity: Quantity::Current,
+            synthetic: false,
+            source: String::new(),
+            grid: Grid {
+                rows: 2,
+                cols: 4,
+                north_deg: 90.0,
+                west_deg: -180.0,
+                dlat_deg: 90.0,
+                dlon_deg: 90.0,
+            },
+            steps: days.map(step).collect(),
+            domain: ObjectKey::domain(&product, &Digest::of(b"d")),
+            series: vec![],
+            derived_from: None,
+            product,
+        }
+    }
+
+    fn job(north: &Manifest, time: &str) -> Result<RenderJob, ContractError> {
+        let style = Style::of_flow(Quantity::Current);
+        RenderJob::of_flow(
+            &part("sea-east", 1..=9),
+            north,
+            time.parse().unwrap(),
+            VIEW,
+            style,
+        )
+    }
+
+    #[test]
+    fn the_northward_part_of_a_vector_is_found_by_its_name() {
+        let of = |name: &str| northward_of(&part(name, 1..=1)).map(|id| id.to_string());
+        assert_eq!(of("sea-east").as_deref(), Some("sea-north"));
+        for other in ["sea-north", "sea", "beast", "east", "sea-eastern"] {
+            assert_eq!(of(other), None, "{other}");
+        }
+        let mut scalar = part("sea-east", 1..=1);
+        scalar.quantity = Quantity::Salinity;
+        assert_eq!(northward_of(&scalar), None);
+    }
+
+    #[test]
+    fn a_flow_names_both_parts_and_its_clock_is_the_instant() {
+        let job = job(&part("sea-north", 1..=9), "2002-01-03T18:00:00Z").unwrap();
+        let flow = job.flow.as_ref().unwrap();
+        assert_eq!(flow.northward.product(), "sea-north");
+        assert_eq!(
+            job.value.after.as_ref().unwrap().weight.to_bits(),
+            0.25f64.to_bits()
+        );
+        assert_eq!(
+            flow.northward.after.as_ref().unwrap().weight.to_bits(),
+            0.25f64.to_bits()
+        );
+        // 1 January 2002 was day 11 688.
+        let expected = (11_688.0 + 2.75) * 86_400.0;
+        assert!((flow.clock_s - expected).abs() < 1e-3, "{}", flow.clock_s);
+        let json = serde_json::to_string(&job).unwrap();
+        let back: RenderJob = serde_json::from_str(&json).unwrap();
+        assert_eq!((back.digest(), &back), (job.digest(), &job));
+    }
+
+    #[test]
+    fn parts_of_different_days_places_or_kinds_make_no_flow() {
+        let reason = |north: &Manifest, time| job(north, time).unwrap_err().to_string();
+        let short = part("sea-north", 1..=4);
+        assert!(job(&short, "2002-01-03").is_ok());
+        assert!(reason(&short, "2002-01-07").contains("different steps"));
+        let mut shifted = part("sea-north", 1..=9);
+        shifted.grid.west_deg = 0.0;
+        assert!(reason(&shifted, "2002-01-03").contains("one grid"));
+        assert!(reason(&part("lake-north", 1..=9), "2002-01-03").contains("NAME-north"));
+        let mut wind = part("sea-north", 1..=9);
+        wind.quantity = Quantity::WindSpeed;
+        assert!(reason(&wind, "2002-01-03").contains("currents"));
+    }
+
+    #[test]
+    fn a_job_says_flow_in_its_mode_and_in_its_parts_or_in_neither() {
+        let good = job(&part("sea-north", 1..=9), "2002-01-03").unwrap();
+        let is_refused = |change: &dyn Fn(&mut RenderJob)| {
+            let mut job = good.clone();
+            change(&mut job);
+            job.validate().is_err()
+        };
+        assert!(!is_refused(&|_| ()));
+        assert!(is_refused(&|job| job.mode = Mode::Points));
+        assert!(is_refused(&|job| job.flow = None));
+        assert!(is_refused(&|job| job.accumulated = Some(job.value.clone())));
+        for clock_s in [f64::NAN, f64::INFINITY, 2e12, -2e12] {
+            assert!(is_refused(
+                &|job| job.flow.as_mut().unwrap().clock_s = clock_s
+            ));
+        }
+        assert!(is_refused(&|job| {
+            let domain = job.value.before.clone().unwrap();
+            job.flow.as_mut().unwrap().northward.domain = domain;
+        }));
+    }
+
+    #[test]
+    fn a_job_without_a_flow_says_nothing_of_it() {
+        let mut plain = job(&part("sea-north", 1..=9), "2002-01-03").unwrap();
+        plain.flow = None;
+        plain.mode = Mode::Map;
+        plain.validate().unwrap();
+        assert!(!serde_json::to_string(&plain).unwrap().contains("flow"));
+    }
+
+    #[test]
+    fn the_clock_and_the_northward_part_are_in_the_name_of_the_picture() {
+        let north = part("sea-north", 1..=9);
+        let base = job(&north, "2002-01-03").unwrap();
+        let mut later = base.clone();
+        later.flow.as_mut().unwrap().clock_s += 1.0;
+        let mut other = base.clone();
+        other.flow.as_mut().unwrap().northward.before = None;
+        assert_ne!(base.key(), later.key());
+        assert_ne!(base.key(), other.key());
+    }
+}

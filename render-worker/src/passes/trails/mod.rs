@@ -1,0 +1,54 @@
+//! The first pass over particles that drift: the velocities of cells in; stored splats and the lengths of the lists out,
+//! as [`splat`](crate::passes::splat) makes them of particles that stand in their cells.
+//!
+//! It runs the functions of [`flow`](crate::stages::flow) and of the stages behind it.
+
+use crate::error::RenderError;
+use crate::frame::FrameContext;
+use crate::gpu::{Gpu, Kernel, Slot};
+use crate::passes::splat::workgroups;
+use crate::passes::store::Stored;
+
+/// The shader.
+pub const SOURCE: &str = concat!(
+    include_str!("../../stages/prelude.wgsl"),
+    include_str!("../../stages/particles/particles.wgsl"),
+    include_str!("../../stages/project/project.wgsl"),
+    include_str!("../../stages/light/texel.wgsl"),
+    include_str!("../../stages/light/deposit.wgsl"),
+    include_str!("../../stages/bin/reach.wgsl"),
+    include_str!("../tally.wgsl"),
+    include_str!("../order.wgsl"),
+    include_str!("../store.wgsl"),
+    include_str!("../../stages/flow/flow.wgsl"),
+    include_str!("trails.wgsl"),
+);
+
+/// The compiled pass.
+pub struct Trails {
+    trails: Kernel,
+}
+
+impl Trails {
+    /// Compiles the shader as it suits the device.
+    pub fn new(gpu: &Gpu) -> Self {
+        Self::of(gpu, &super::suited(gpu, SOURCE))
+    }
+
+    /// Compiles `source`, [`SOURCE`] but for tests.
+    pub fn of(gpu: &Gpu, source: &str) -> Self {
+        Self {
+            trails: gpu.kernel("trails", source, "trails"),
+        }
+    }
+
+    /// Fills the slots of splats, of light and of list lengths from that of velocities.
+    pub fn record(&self, frame: &mut FrameContext<'_>) -> Result<(), RenderError> {
+        let velocity = frame.room(Slot::Velocity, 8)?;
+        let stored = Stored::room(frame)?;
+        let buffers = stored.with([(4, &velocity)]);
+        let groups = workgroups(&frame.params);
+        frame.recorder.dispatch_deep(&self.trails, &buffers, groups);
+        Ok(())
+    }
+}

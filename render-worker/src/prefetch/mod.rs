@@ -1,0 +1,206 @@
+//! Frames read before they are wanted: the job drawn last in; the frames around it in time read, their gaps filled and
+//! brought to the device, one after the other, out.
+//!
+//! A job names frames, not steps. Which ones come next is read from the newest manifest of its product, and which way
+//! time runs is seen from one job to the next, so nobody who asks for pictures needs to say.
+
+mod neighbours;
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, OnceLock};
+use std::time::{Duration, Instant};
+
+use contract::job::RenderJob;
+use contract::manifest::Manifest;
+use contract::moment::Moment;
+use storage::{Store, manifests};
+use tokio::sync::watch;
+
+use crate::error::RenderError;
+use crate::recent::Recent;
+use crate::renderer::Renderer;
+use crate::source::Source;
+use neighbours::{Heading, next, place_of};
+
+/// Manifests remembered.
+const MOST_MANIFESTS: u64 = 32;
+/// A manifest younger than this is not read again for frames that it does not have: old versions are drawn, too.
+const LEAST_AGE: Duration = Duration::from_secs(5);
+/// Frames of one product that must fit into memory besides those ahead: two of the instant, two of the one before.
+const FRAMES_IN_USE: u64 = 4;
+/// Bytes of a cell: its value and the estimated error of a filled one.
+const CELL_BYTES: u64 = 8;
+
+/// What was drawn last; none before the first picture.
+type Wish = Option<Arc<RenderJob>>;
+
+/// Reads ahead of what is drawn, on a task of its own.
+pub(crate) struct Prefetch {
+    reader: Arc<Reader>,
+    /// The task's ear; there from the first picture on.
+    wish: OnceLock<watch::Sender<Wish>>,
+}
+
+struct Reader {
+    store: Store,
+    source: Arc<Source>,
+    renderer: Arc<Renderer>,
+    frames_ahead: usize,
+}
+
+/// A manifest, and when it was the newest.
+type Known = (Arc<Manifest>, Instant);
+
+/// What the task has learnt.
+#[derive(Default)]
+struct Learnt {
+    manifests: Recent<String, Known>,
+    /// Place of the last instant of a product, and the direction to it.
+    last: BTreeMap<String, (f64, Heading)>,
+}
+
+impl Prefetch {
+    /// Reads up to so many frames ahead of every product of a job; none with 0.
+    pub(crate) fn new(
+        store: Store,
+        source: Arc<Source>,
+        renderer: Arc<Renderer>,
+        frames_ahead: usize,
+    ) -> Self {
+        Self {
+            reader: Arc::new(Reader {
+                store,
+                source,
+                renderer,
+                frames_ahead,
+            }),
+            wish: OnceLock::new(),
+        }
+    }
+
+    /// Tells of a job that was drawn. Needs a runtime.
+    pub(crate) fn drawn(&self, job: &RenderJob) {
+        if self.reader.frames_ahead == 0 {
+            return;
+        }
+        let wish = self.wish.get_or_init(|| {
+            let (sender, ear) = watch::channel(None);
+            tokio::spawn(run(Arc::clone(&self.reader), ear));
+            sender
+        });
+        // Only the last one counts: whoever drags through time leaves nothing behind to be read.
+        wish.send_replace(Some(Arc::new(job.clone())));
+    }
+}
+
+/// Reads ahead of the last job until nobody draws any more. A job of other products ends what is under way.
+async fn run(reader: Arc<Reader>, mut ear: watch::Receiver<Wish>) {
+    let mut learnt = Learnt::default();
+    while ear.changed().await.is_ok() {
+        let wish = ear.borrow_and_update().clone();
+        let Some(job) = wish else {
+            continue;
+        };
+        let mut moved_on = ear.clone();
+        let left = async {
+            let is_away = |next: &Wish| next.as_ref().is_some_and(|next| is_other(&job, next));
+            moved_on.wait_for(is_away).await.is_ok()
+        };
+        tokio::select! {
+            read = reader.read_ahead(&job, &mut learnt) => {
+                if let Err(error) = read {
+                    // Whoever draws the frame meets the same and says so.
+                    tracing::debug!(error = error.in_full(), "no frame is read ahead");
+                }
+            }
+            _is_away = left => reader.source.count_cancelled(),
+        }
+    }
+}
+
+/// Are they of other products?
+fn is_other(a: &RenderJob, b: &RenderJob) -> bool {
+    a.value.domain != b.value.domain
+}
+
+impl Reader {
+    async fn read_ahead(&self, job: &RenderJob, learnt: &mut Learnt) -> Result<(), RenderError> {
+        let parts = [
+            Some(&job.value),
+            job.accumulated.as_ref(),
+            job.flow.as_ref().map(|flow| &flow.northward),
+        ];
+        let part_count = parts.iter().flatten().count() as u64;
+        let frames = part_count * (FRAMES_IN_USE + self.frames_ahead as u64);
+        let frame_bytes = job.grid.cell_count() as u64 * CELL_BYTES;
+        if frames * frame_bytes > self.source.most_bytes() {
+            return Ok(());
+        }
+        let heading = self.heading(&job.value, learnt).await;
+        let mut ahead: [Vec<Moment>; 3] = [vec![], vec![], vec![]];
+        for (part, ahead) in parts.into_iter().zip(&mut ahead) {
+            if let Some(moment) = part
+                && let Some(manifest) = self.manifest(moment, learnt).await
+            {
+                *ahead = next(&manifest, moment, heading, self.frames_ahead);
+            }
+        }
+        let longest = ahead.iter().map(Vec::len).max().unwrap_or(0);
+        for number in 0..longest {
+            let at = |part: &[Moment], own: &Moment| part.get(number).unwrap_or(own).clone();
+            let [value, accumulated, northward] = &ahead;
+            let mut early = job.clone();
+            early.value = at(value, &job.value);
+            early.accumulated = job.accumulated.as_ref().map(|own| at(accumulated, own));
+            if let Some(flow) = &mut early.flow {
+                flow.northward = at(northward, &flow.northward);
+            }
+            let scene = self.source.scene_ahead(&early).await?;
+            let renderer = Arc::clone(&self.renderer);
+            let preparing = tokio::task::spawn_blocking(move || renderer.prepare(&early, &scene));
+            preparing.await.map_err(RenderError::Thread)??;
+        }
+        Ok(())
+    }
+
+    /// The direction in which a product is played.
+    async fn heading(&self, moment: &Moment, learnt: &mut Learnt) -> Heading {
+        let manifest = self.manifest(moment, learnt).await;
+        let Some(place) = manifest.and_then(|manifest| place_of(&manifest, moment)) else {
+            return Heading::Unknown;
+        };
+        if learnt.last.len() as u64 > MOST_MANIFESTS {
+            learnt.last.clear();
+        }
+        let product = moment.product().to_owned();
+        let (before, heading) = *learnt
+            .last
+            .get(&product)
+            .unwrap_or(&(place, Heading::Unknown));
+        let heading = heading.after(before, place);
+        learnt.last.insert(product, (place, heading));
+        heading
+    }
+
+    /// The newest manifest of a moment's product, read again when the one known does not have the moment's frames.
+    async fn manifest(&self, moment: &Moment, learnt: &mut Learnt) -> Option<Arc<Manifest>> {
+        let product = moment.product().to_owned();
+        if let Some((manifest, read_at)) = learnt.manifests.get(&product) {
+            let is_of = place_of(&manifest, moment).is_some();
+            if is_of || read_at.elapsed() < LEAST_AGE {
+                return is_of.then_some(manifest);
+            }
+        }
+        let newest = manifests::latest(&self.store, &product.parse().ok()?).await;
+        let newest = match newest {
+            Ok(newest) => Arc::new(newest?),
+            Err(error) => {
+                tracing::debug!(%error, product, "no frame is read ahead");
+                return None;
+            }
+        };
+        let known = (Arc::clone(&newest), Instant::now());
+        learnt.manifests.keep(product, known, MOST_MANIFESTS, |_| 1);
+        Some(newest)
+    }
+}
