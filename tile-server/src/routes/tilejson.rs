@@ -5,6 +5,7 @@ use axum::extract::State;
 use axum::http::{HeaderMap, header};
 use axum::response::{IntoResponse as _, Response};
 use contract::grid::Grid;
+use contract::job::Mode;
 use contract::manifest::ManifestId;
 use contract::tile::{MAX_LAT_DEG, MAX_ZOOM};
 use contract::time::TimeMs;
@@ -35,7 +36,7 @@ pub(crate) struct TileJsonQuery {
 
 impl TileJsonQuery {
     /// The same query as tiles take it, in its canonical form.
-    fn of_tiles(&self, layer: &Layer) -> Result<String, ServerError> {
+    fn of_tiles(&self, layer: &Layer, mode: Mode) -> Result<String, ServerError> {
         let time = time(self.time.as_deref())?.map(|time| format!("time={time}"));
         // Named as it was found, not as it was written.
         let manifest = self.manifest.as_ref();
@@ -53,8 +54,12 @@ impl TileJsonQuery {
     }
 
     /// The drawing of the colours as HTML, which is one of the two things clients take a legend for.
-    fn legend(&self, origin: &str, layer: &Layer) -> Result<String, ServerError> {
-        let query = query_of(&self.look.parse()?.parameters()).replace('&', "&amp;");
+    fn legend(&self, origin: &str, layer: &Layer, mode: Mode) -> Result<String, ServerError> {
+        let mut parameters = self.look.parse()?.parameters();
+        if mode == Mode::Flow {
+            parameters.push(format!("mode={mode}"));
+        }
+        let query = query_of(&parameters).replace('&', "&amp;");
         let (product, title) = (&layer.manifest.product, layer.manifest.quantity.title());
         let address = format!("{origin}/api/products/{product}/legend.svg{query}");
         Ok(format!("<img src=\"{address}\" alt=\"{title}\">"))
@@ -99,7 +104,7 @@ pub(crate) async fn get(
     let named = query.manifest.as_deref();
     let layer = state.catalogue.version(&product, named).await?;
     let mode = request::mode(&layer, name)?;
-    let at = query.of_tiles(&layer)?;
+    let at = query.of_tiles(&layer, mode)?;
     let manifest = &layer.manifest;
     let origin = origin(&headers);
     let answer = TileJson {
@@ -115,7 +120,7 @@ pub(crate) async fn get(
         minzoom: 0,
         maxzoom: max_zoom(&manifest.grid),
         bounds: bounds(&manifest.grid),
-        legend: query.legend(&origin, &layer)?,
+        legend: query.legend(&origin, &layer, mode)?,
         manifest: &layer.id,
         times: manifest
             .steps
