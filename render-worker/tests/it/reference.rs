@@ -1,5 +1,6 @@
 //! The half-angle volume against pictures made another way, in double precision (`render_worker::proof::reference`).
 
+use contract::colour::Stops;
 use contract::job::{Mode, RenderJob};
 use render_worker::proof::{Difference, Fineness, Picture, against_slices, reference};
 use render_worker::{Backend, RenderError, Renderer, Scene};
@@ -49,6 +50,28 @@ fn the_volume_is_near_the_reference_and_the_number_sees_what_it_should_see() {
             "{worse} dB with {what}, {full} dB without"
         );
     }
+}
+
+#[test]
+fn stops_of_colour_opacity_and_size_mean_to_the_reference_what_they_mean_to_the_stages() {
+    let scene = ocean(ONE_DEGREE);
+    let mut job = job(Mode::Volume, globe(-122.0, 27.0, 2.2e6, 80));
+    let transfer = &mut job.style.transfer;
+    transfer.colors = "-1e-9:#2d004b,0:#f7f7f7,1e-9:#7f3b08".parse().unwrap();
+    transfer.opacity = "-1e-9:1,0:0.2,1e-9:1".parse().unwrap();
+    transfer.size = "-1e-9:1,0:0.7,1e-9:0.9".parse().unwrap();
+    let truth = reference(&job, &scene, Fineness::default()).unwrap();
+    let near = psnr_db(&drawn(&job, &scene), &truth);
+    let far = |change: fn(&mut RenderJob)| {
+        let mut job = job.clone();
+        change(&mut job);
+        psnr_db(&drawn(&job, &scene), &truth)
+    };
+    let colors = far(|job| job.style.transfer.colors = Stops::default());
+    let opacity = far(|job| job.style.transfer.opacity = Stops::default());
+    println!("{near:.2} dB, {colors:.2} dB in a palette, {opacity:.2} dB as opaque as usual");
+    assert!(near >= 42.0, "{near} dB");
+    assert!(colors < near - 10.0 && opacity < near - 10.0);
 }
 
 #[test]
@@ -115,7 +138,10 @@ fn a_picture_that_the_reference_cannot_draw_is_refused() {
     let scene = ocean(ONE_DEGREE);
     let mut with_globe = job(Mode::Volume, globe(0.0, 0.0, 5e6, 16));
     with_globe.style.globe_surface = true;
-    for job in [with_globe, job(Mode::Points, globe(0.0, 0.0, 5e6, 16))] {
+    let mut doubted = job(Mode::Volume, globe(0.0, 0.0, 5e6, 16));
+    doubted.style.doubt = true;
+    let points = job(Mode::Points, globe(0.0, 0.0, 5e6, 16));
+    for job in [with_globe, doubted, points] {
         let refused = reference(&job, &scene, Fineness::default());
         assert!(
             matches!(refused, Err(RenderError::NoReference)),
