@@ -10,7 +10,7 @@ use contract::quantity::Quantity;
 use render_worker::{Backend, Limits, RenderService, Renderer};
 use storage::Store;
 
-use crate::device::gpu_renderer;
+use crate::device::{gpu, gpu_renderer};
 use crate::scenes::{FIVE_DEGREES, globe, job, ocean, tile};
 use crate::stored::product;
 use crate::worker::{Worker, fleet, until};
@@ -168,6 +168,16 @@ async fn frames_read_ahead_lie_on_the_device_before_they_are_drawn() {
     until("four frames", || bytes() == 5 * frame_bytes).await;
     draw("2000-05-20").await;
     until("one more", || bytes() == 6 * frame_bytes).await;
+}
+
+#[test]
+fn a_device_says_what_memory_is_its_own_and_a_program_has_none() {
+    let Some(gpu) = gpu("memory of the device") else {
+        return;
+    };
+    let own_bytes = gpu.own_bytes();
+    assert_eq!(own_bytes.is_none(), gpu.is_software(), "{own_bytes:?}");
+    assert!(own_bytes.is_none_or(|own| own > 1 << 28));
 }
 
 #[test]

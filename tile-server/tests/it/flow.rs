@@ -1,11 +1,14 @@
 //! Layers of particles that drift: a product `NAME-east` beside `NAME-north`.
 
+use std::time::Duration;
+
 use axum::http::StatusCode;
 use contract::job::Mode;
 use contract::quantity::Quantity;
 use serde_json::json;
 
 use crate::app::TestApp;
+use crate::events::Viewer;
 
 async fn app() -> TestApp {
     let app = TestApp::new().await;
@@ -146,4 +149,28 @@ async fn a_new_northward_part_changes_flows_and_nothing_else_and_old_versions_dr
     let time = "2000-03-20";
     let drawn = app.drawer.last_job().flow.unwrap().northward;
     assert_eq!(drawn, app.moment("sea-north", time).await);
+}
+
+#[tokio::test]
+async fn without_a_log_a_new_northward_part_is_news_of_the_flow_too() {
+    let app = app().await;
+    let watch = app.state.watch().every(Duration::from_millis(20));
+    let watching = tokio::spawn(watch.run());
+    let mut viewer = Viewer::new(&app, None).await;
+    // What is there already is no news.
+    tokio::time::sleep(Duration::from_millis(200)).await;
+    let new = app
+        .land_last_month("sea-north", Quantity::Current, 2, None)
+        .await;
+    let mut names = vec![];
+    for _ in 0..2 {
+        let told = viewer.next().await.unwrap().data;
+        assert_eq!(told["touched"][0]["start"], "2000-02-01T00:00:00Z");
+        names.push(told["manifest"].as_str().unwrap().to_owned());
+    }
+    names.sort();
+    assert!(names[0].starts_with("sea-east@1-"), "{names:?}");
+    assert_eq!(names[1], new.to_string());
+    app.state.news.close();
+    watching.await.unwrap();
 }

@@ -322,3 +322,35 @@ async fn without_a_log_what_another_process_lands_is_told_all_the_same() {
     app.state.news.close();
     watching.await.unwrap();
 }
+
+#[tokio::test]
+async fn a_new_northward_part_is_news_of_the_flow_whose_hot_tiles_are_ordered() {
+    let live = Live::new().await;
+    for part in ["sea-east", "sea-north"] {
+        let id = live.app.land(part, Quantity::Current, 1).await;
+        live.landed(&id).await;
+    }
+    let tile = "/tiles/sea-east/flow/0/0/0.png?time=2000-03-20";
+    live.until(async || live.app.get(tile).await.status == 200)
+        .await;
+    let mut viewer = Viewer::new(&live.app, None).await;
+    let new = live
+        .app
+        .land_last_month("sea-north", Quantity::Current, 2, None)
+        .await;
+    live.landed(&new).await;
+    while viewer.next().await.unwrap().data["manifest"] != new.to_string() {}
+    let told = viewer.next().await.unwrap().data;
+    let manifest = told["manifest"].as_str().unwrap();
+    assert!(manifest.starts_with("sea-east@1-"), "{manifest}");
+    assert_eq!(told["touched"][0]["start"], "2000-02-01T00:00:00Z");
+    let wanted = live.app.moment("sea-north", "2000-03-20").await;
+    let is_wanted = |(_, job): &(Event, RenderJob)| {
+        let flow = job.flow.as_ref();
+        flow.is_some_and(|flow| flow.northward == wanted)
+    };
+    live.until(async || live.orders().await.iter().any(is_wanted))
+        .await;
+    live.stop.now();
+    live.running.await.unwrap();
+}
