@@ -214,7 +214,7 @@ mod tests {
     }
 
     fn job(north: &Manifest, time: &str) -> Result<RenderJob, ContractError> {
-        let style = Style::of_flow(Quantity::Current);
+        let style = Style::of_flow(TransferFunction::of_speed(Quantity::Current));
         RenderJob::of_flow(
             &part("sea-east", 1..=9),
             north,
