@@ -42,43 +42,27 @@ struct Twins {
 
 impl Twins {
     fn of(mode: Mode, view: View) -> Self {
-        Self::styled(mode, view, |_style| ())
+        Self::styled(mode, view, ocean(FIVE_DEGREES), |_style| ())
     }
 
     /// Of an ocean under clouds, in stops of opacity and size and with doubt.
     fn doubted(mode: Mode, view: View) -> Self {
-        Self::styled(mode, view, |style| {
+        Self::styled(mode, view, clouded(FIVE_DEGREES), |style| {
             style.transfer.opacity = "-1e-9:0.9,0:0.1,1e-9:0.7".parse().unwrap();
             style.transfer.size = "-1e-9:0.4,0:1,1e-9:0.6".parse().unwrap();
             style.doubt = true;
         })
     }
 
-    fn styled(mode: Mode, view: View, change: impl FnOnce(&mut Style)) -> Self {
+    fn styled(mode: Mode, view: View, scene: Scene, change: impl FnOnce(&mut Style)) -> Self {
         let mut job = job(mode, view);
         job.style.globe_surface = true;
         change(&mut job.style);
-        let scene = if job.style.doubt {
-            clouded(FIVE_DEGREES)
-        } else {
-            ocean(FIVE_DEGREES)
-        };
         let plan = Plan::new(&job, &scene, u64::MAX).unwrap();
         let mut params = plan.params_of(plan.parts()[0]);
         let carbon = scene.accumulated.as_ref().unwrap();
-        let between = |interval: &render_worker::Interval, weight| {
-            let mut between = vec![0.0; scene.grid.cell_count()];
-            let (before, after) = (
-                interval.before.cells.content(),
-                interval.after.cells.content(),
-            );
-            interpolate::cpu::interpolate(&params, weight, before, after, &mut between);
-            between
-        };
-        let (value, accumulated) = (
-            between(&scene.value, params.value_weight),
-            between(carbon, params.accumulated_weight),
-        );
+        let value = between(&params, &scene.value, params.value_weight);
+        let accumulated = between(&params, carbon, params.accumulated_weight);
         let doubt = doubt::between(&params, &scene.value);
         let mut particles =
             vec![Particle::default(); plan.active.len() * params.particles_per_cell as usize];
@@ -222,6 +206,14 @@ impl Twins {
         let bytes = u64::from(self.params.splat_count) * HALF_BYTES;
         [(Slot::Seen, bytes), (Slot::Lit, bytes)]
     }
+}
+
+/// The cells of two steps at an instant.
+fn between(params: &Params, interval: &render_worker::Interval, weight: f32) -> Vec<f32> {
+    let frames = [&interval.before, &interval.after].map(|frame| frame.cells.content());
+    let mut between = vec![0.0; frames[0].len()];
+    interpolate::cpu::interpolate(params, weight, frames[0], frames[1], &mut between);
+    between
 }
 
 /// The shader agrees with its twin and one with `right` replaced by `wrong` does not.
