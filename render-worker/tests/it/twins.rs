@@ -52,12 +52,12 @@ struct Twins {
 
 impl Twins {
     fn of(mode: Mode, view: View) -> Self {
-        Self::styled(mode, view, |_style| ())
+        Self::styled(mode, view, ocean(FIVE_DEGREES), |_style| ())
     }
 
     /// Of an ocean under clouds, in stops of opacity and size and with doubt.
     fn doubted(mode: Mode, view: View) -> Self {
-        Self::styled(mode, view, |style| {
+        Self::styled(mode, view, clouded(FIVE_DEGREES), |style| {
             style.transfer.opacity = "-1e-9:0.9,0:0.1,1e-9:0.7".parse().unwrap();
             style.transfer.size = "-1e-9:0.4,0:1,1e-9:0.6".parse().unwrap();
             style.doubt = true;
@@ -71,15 +71,10 @@ impl Twins {
         Self::of_job(&job, gyres(FIVE_DEGREES))
     }
 
-    fn styled(mode: Mode, view: View, change: impl FnOnce(&mut Style)) -> Self {
+    fn styled(mode: Mode, view: View, scene: Scene, change: impl FnOnce(&mut Style)) -> Self {
         let mut job = job(mode, view);
         job.style.globe_surface = true;
         change(&mut job.style);
-        let scene = if job.style.doubt {
-            clouded(FIVE_DEGREES)
-        } else {
-            ocean(FIVE_DEGREES)
-        };
         Self::of_job(&job, scene)
     }
 
@@ -750,7 +745,7 @@ fn pixels_that_work_alone_and_pixels_that_share_come_to_the_same_bytes() {
 
 #[test]
 fn what_lies_behind_a_covered_tile_is_left_out_and_not_missed() {
-    let twins = Twins::styled(Mode::Volume, tile(1, 0, 0, 256), |style| {
+    let twins = Twins::styled(Mode::Volume, tile(1, 0, 0, 256), ocean(FIVE_DEGREES), |style| {
         style.optical_depth = 60.0;
     });
     let covered = twins.picture.iter().filter(|pixel| pixel.w > 0.9997);
