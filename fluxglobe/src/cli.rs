@@ -338,7 +338,7 @@ pub(crate) struct Picture {
     /// Particles a cell, 1 to 256.
     #[arg(long)]
     pub(crate) particles: Option<u32>,
-    #[command(flatten, next_help_heading = "Surroundings")]
+    #[command(flatten)]
     pub(crate) surroundings: Surroundings,
     /// File to write.
     #[arg(short, long, value_name = "FILE.png")]
@@ -451,7 +451,12 @@ mod tests {
                 own.contains("--layer") && own.contains("--output"),
                 "{help}"
             );
+            let (apart, _) = apart.split_once("Options of every command:").unwrap();
             assert!(apart.contains("--relief <PRODUCT>") && apart.contains("--sun <"));
+            assert!(
+                !apart.contains("--output") && !apart.contains("--size"),
+                "{apart}"
+            );
         }
         let parse = |more: &[&str]| {
             let words = "fluxglobe render globe --layer p --lon 0 --lat 0 -o a.png";

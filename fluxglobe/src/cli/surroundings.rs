@@ -5,15 +5,19 @@ use contract::context::RELIEF_EXAGGERATION;
 use contract::product::ProductId;
 use contract::sun::SunChoice;
 
+/// The heading of these words in help texts.
+const HEADING: &str = "Surroundings";
+
 /// What is drawn besides the product.
 #[derive(Debug, Args)]
 pub(crate) struct Surroundings {
     /// Land and sea floor of this elevation product below the particles, shaded by the sun, as in `--relief etopo20`.
-    #[arg(long, value_name = "PRODUCT")]
+    #[arg(long, help_heading = HEADING, value_name = "PRODUCT")]
     pub(crate) relief: Option<ProductId>,
     /// How much steeper slopes of the relief are than they are, 0 to 1000.
     #[arg(
         long,
+        help_heading = HEADING,
         requires = "relief",
         default_value_t = RELIEF_EXAGGERATION,
         allow_negative_numbers = true,
@@ -24,6 +28,7 @@ pub(crate) struct Surroundings {
     /// `--sea-opacity 0.4`; without it the sea is clear.
     #[arg(
         long,
+        help_heading = HEADING,
         default_value_t = 0.0,
         hide_default_value = true,
         allow_negative_numbers = true,
@@ -31,14 +36,14 @@ pub(crate) struct Surroundings {
     )]
     pub(crate) sea_opacity: f64,
     /// Draw coast lines.
-    #[arg(long)]
+    #[arg(long, help_heading = HEADING)]
     pub(crate) coastlines: bool,
     /// Height of a kilogram of accumulated carbon per square metre, m: how far particles rise and sink, 0 to 1e9; 8e6 if
     /// absent.
-    #[arg(long, allow_negative_numbers = true, value_name = "METRES")]
+    #[arg(long, help_heading = HEADING, allow_negative_numbers = true, value_name = "METRES")]
     pub(crate) height_exaggeration: Option<f64>,
     /// `time`: the real sun of the instant, with day and night; or its place in the sky in degrees,
     /// AZIMUTH,ELEVATION, as in `--sun 135,30`; 315,40 if absent.
-    #[arg(long, value_name = "time|AZIMUTH,ELEVATION")]
+    #[arg(long, help_heading = HEADING, value_name = "time|AZIMUTH,ELEVATION")]
     pub(crate) sun: Option<SunChoice>,
 }

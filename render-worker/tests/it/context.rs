@@ -95,6 +95,37 @@ fn surroundings_have_no_seams() {
 }
 
 #[test]
+fn surroundings_are_whole_where_the_parts_of_a_globe_picture_meet() {
+    let scene = with_terrain(FIVE_DEGREES);
+    for renderer in renderers("parts") {
+        let draw = |width_px| {
+            let view = View::Globe {
+                lon_deg: -150.0,
+                lat_deg: 10.0,
+                height_m: 1.5e7,
+                width_px,
+                height_px: 64,
+            };
+            renderer
+                .render(&everything(Mode::Map, view), &scene)
+                .unwrap()
+        };
+        // The shorter side sets the focal length, so both show the same globe; the wide one is drawn in two parts that
+        // meet in the globe's middle.
+        let (wide, narrow) = (draw(4096), draw(64));
+        let pixels = (0..64).flat_map(|y| (0..64).map(move |x| (2048 - 32 + x, y)));
+        let middle = Image {
+            width: 64,
+            height: 64,
+            rgba8: pixels.flat_map(|(x, y)| wide.pixel(x, y)).collect(),
+        };
+        // The same to a subpixel: an edge of land may fall to the other side of a pixel.
+        let (most, pixels) = distance(&middle, &narrow);
+        assert!(pixels <= 20, "{most} {pixels}");
+    }
+}
+
+#[test]
 fn every_part_of_the_surroundings_is_seen_and_drawn_alike_by_both_back_ends() {
     let scene = with_terrain(FIVE_DEGREES);
     let parts: [(&str, fn(&mut RenderJob)); 5] = [
