@@ -17,7 +17,7 @@ use crate::stages::layout::is_missing;
 /// Cells smaller than this are joined, pixels: blocks then measure half a pixel to one.
 const LEAST_CELL_PX: f64 = 0.5;
 /// The same where particles drift: a cell sends out one at least, whose trail is many times as long.
-const LEAST_FLOW_CELL_PX: f64 = 3.0;
+const LEAST_FLOW_CELL_PX: f64 = 4.0;
 /// Cells of the terrain smaller than this are joined, pixels: one pixel shows one cell, so what lies between is lost.
 const LEAST_TERRAIN_CELL_PX: f64 = 1.0;
 

@@ -1,6 +1,6 @@
 //! Plans of globe views: a perspective camera above a place, looking at the earth's centre, north up.
 
-use std::f64::consts::{FRAC_PI_2, PI};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use contract::earth::SPHERE_RADIUS_M;
 use contract::grid::Grid;
@@ -217,11 +217,29 @@ fn light_frame(plan: &mut Plan, camera: &Camera, sun: DVec3, half: DVec3, cap: &
     );
 }
 
+/// Longitudes on either side of the camera's that a cap of this angle reaches; all of them round a pole.
+fn half_width(camera: &Camera, angle: f64) -> f64 {
+    let lat = camera.up.z.clamp(-1.0, 1.0).asin();
+    if lat.abs() + angle >= FRAC_PI_2 {
+        return PI;
+    }
+    // A little more, so that what is on the edge is left to the test of the cap.
+    (angle.sin() / lat.cos()).clamp(0.0, 1.0).asin() + 1e-3
+}
+
 /// Fills the table of columns and sets the rows and the cap within `horizon` of the point below the camera.
 fn choose_cells(plan: &mut Plan, scene: &Scene, camera: &Camera, horizon: f64) {
     let grid = &scene.grid;
     let lon = |col: u32| (grid.col_west_deg(col) + 0.5 * grid.dlon_deg).to_radians();
+    // A trail is many splats: columns that have no cell in the cap get no place for them.
+    let across = if plan.mode == Mode::Flow {
+        half_width(camera, horizon)
+    } else {
+        PI
+    };
+    let center = camera.up.x.atan2(camera.up.y);
     plan.cols = (0..grid.cols)
+        .filter(|&col| ((lon(col) - center + PI).rem_euclid(TAU) - PI).abs() <= across)
         .map(|col| Col {
             sin_lon: lon(col).sin() as f32,
             cos_lon: lon(col).cos() as f32,
@@ -230,7 +248,7 @@ fn choose_cells(plan: &mut Plan, scene: &Scene, camera: &Camera, horizon: f64) {
         })
         .collect();
     plan.params.cap_least = (horizon.cos() * camera.place.length()) as f32;
-    plan.params.slot_count = grid.cols;
+    plan.params.slot_count = plan.cols.len() as u32;
     // Rows with a middle in the cap, one more on either side: the cap itself is tested cell by cell.
     let below = camera.up.z.clamp(-1.0, 1.0).asin();
     let is_near = |row: u32| {

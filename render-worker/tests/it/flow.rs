@@ -380,6 +380,41 @@ fn speeds_beyond_all_reason_and_fields_of_nothing_are_drawn_quietly() {
 }
 
 #[test]
+fn a_globe_from_near_has_room_for_the_cells_in_sight_alone_and_shows_them_all() {
+    let scene = gyres(ONE_DEGREE);
+    for (lon, lat) in [(-120.0, 10.0), (179.0, -60.0), (20.0, 84.0)] {
+        let plan = |height_m| {
+            let job = currents::job(globe(lon, lat, height_m, 512), 0.0);
+            Plan::new(&job, &scene, u64::MAX).unwrap()
+        };
+        let near = plan(2.5e6);
+        // Every cell whose middle lies in the cap has its column.
+        let in_cap = |row: u32, col: u32| {
+            let place = ONE_DEGREE.cell_center(row, col);
+            let [x, y, z] = on_sphere([place.lon, place.lat]).to_array();
+            let eye = [near.params.eye_y, near.params.eye_x, near.params.eye_z].map(f64::from);
+            x * eye[0] + y * eye[1] + z * eye[2] > f64::from(near.params.cap_least) + 1e-6
+        };
+        let listed = |col: u32| near.cols.iter().any(|own| own.index == col);
+        let mut seen = 0;
+        for (row, col) in (0..180).flat_map(|row| (0..360).map(move |col| (row, col))) {
+            if in_cap(row, col) {
+                assert!(listed(col), "{row} {col} from {lon} {lat}");
+                seen += 1;
+            }
+        }
+        assert!(seen > 500);
+        let is_polar = lat > 80.0;
+        assert_eq!(near.cols.len() < 200, !is_polar, "{}", near.cols.len());
+    }
+    for renderer in renderers("near globes") {
+        let job = currents::job(globe(-120.0, 10.0, 2.5e6, 512), 1e7);
+        let image = renderer.render(&job, &scene).unwrap();
+        assert!(image.alpha().filter(|alpha| *alpha > 60).count() > 50_000);
+    }
+}
+
+#[test]
 fn a_flow_without_its_northward_part_is_refused() {
     let renderer = renderers("parts")[0];
     let job = currents::job(VIEW(), 0.0);
