@@ -745,9 +745,14 @@ fn pixels_that_work_alone_and_pixels_that_share_come_to_the_same_bytes() {
 
 #[test]
 fn what_lies_behind_a_covered_tile_is_left_out_and_not_missed() {
-    let twins = Twins::styled(Mode::Volume, tile(1, 0, 0, 256), ocean(FIVE_DEGREES), |style| {
-        style.optical_depth = 60.0;
-    });
+    let twins = Twins::styled(
+        Mode::Volume,
+        tile(1, 0, 0, 256),
+        ocean(FIVE_DEGREES),
+        |style| {
+            style.optical_depth = 60.0;
+        },
+    );
     let covered = twins.picture.iter().filter(|pixel| pixel.w > 0.9997);
     assert!(covered.count() > 1000);
     let expected = bytes(twins.image.iter().copied());
