@@ -370,7 +370,7 @@ fn speeds_beyond_all_reason_and_fields_of_nothing_are_drawn_quietly() {
                     renderer.render(&job, &scene).unwrap()
                 };
                 assert!(draw(&none, 1.5, 0.0).alpha().all(|alpha| alpha == 0));
-                for (top, clock_s) in [(1.5, 1e12), (1e-300, -1e12), (1e300, 1e12)] {
+                for (top, clock_s) in [(1.5, 1e12), (1e-29, -1e12), (1e20, 1e12)] {
                     let image = draw(&far, top, clock_s);
                     assert_eq!([image.width, image.height], view.size_px());
                 }

@@ -23,7 +23,9 @@ use render_worker::stages::eye::{self, Eye};
 use render_worker::stages::flow::cpu::Field;
 use render_worker::stages::flow::{self, Flow};
 use render_worker::stages::interpolate::{self, Interpolate};
-use render_worker::stages::layout::{Active, Entry, MISSING, Params, Particle, Splat, Velocity};
+use render_worker::stages::layout::{
+    Active, Entry, KERNEL_CLOUD, MISSING, Params, Particle, Splat, Velocity,
+};
 use render_worker::stages::light::{self, Light, texel_count};
 use render_worker::stages::map::{self, Map};
 use render_worker::stages::particles::cpu::Inputs;
@@ -350,7 +352,7 @@ fn interpolate_matches_its_twin() {
 }
 
 /// What a device stores of splats, as far as it is looked at again: those that are in a list or may be.
-fn splat_numbers(splats: &[Splat], expected: &[Splat]) -> Vec<f32> {
+fn splat_numbers(kernel: u32, splats: &[Splat], expected: &[Splat]) -> Vec<f32> {
     let numbers = |(s, expected): (&Splat, &Splat)| {
         if expected.tau < 1e-3 {
             return [0.0; 12];
@@ -360,7 +362,11 @@ fn splat_numbers(splats: &[Splat], expected: &[Splat]) -> Vec<f32> {
         let [r, g, b, a] = s.color.to_le_bytes().map(|byte| f32::from(byte) * 1e-2);
         let radius = s.radius_px * 1e-2 * 16.0;
         // A cloud keeps its mass when its radius is rounded.
-        let wider = s.radius_px / expected.radius_px;
+        let wider = if kernel == KERNEL_CLOUD {
+            s.radius_px / expected.radius_px
+        } else {
+            1.0
+        };
         let depth = s.tau * wider * wider * 1e-2 * 4096.0;
         [x, y, u, v, r, g, b, a, radius, depth, s.slice, s.day]
     };
@@ -387,7 +393,7 @@ fn splats_match_their_twins_on_tiles_and_on_the_globe() {
         (Twins::doubted_tile(), "PALENESS * doubt", "doubt"),
     ];
     for (twins, right, wrong) in faults {
-        let expected = splat_numbers(&twins.splats, &twins.splats);
+        let expected = splat_numbers(twins.params.kernel, &twins.splats, &twins.splats);
         prove("splat", splat::SOURCE, right, wrong, |gpu, source| {
             let stage = Splats::of(gpu, source);
             let outputs = twins.stored();
@@ -400,7 +406,11 @@ fn splats_match_their_twins_on_tiles_and_on_the_globe() {
             );
             // Colours are bytes and may round to a neighbour; a phase of a few turns loses a few bits.
             worst(
-                &splat_numbers(&twins.in_order(&seen, &lit), &twins.splats),
+                &splat_numbers(
+                    twins.params.kernel,
+                    &twins.in_order(&seen, &lit),
+                    &twins.splats,
+                ),
                 &expected,
                 0.0201,
                 1e-4,
@@ -454,7 +464,7 @@ fn drifting_splats_match_their_twins_on_tiles_and_on_the_globe() {
     let views = [tile(2, 0, 1, 256), globe(-178.0, 10.0, 1.5e7, 160)];
     for view in views {
         let twins = Twins::of_flow(view);
-        let expected = splat_numbers(&twins.splats, &twins.splats);
+        let expected = splat_numbers(twins.params.kernel, &twins.splats, &twins.splats);
         let drawn = twins.splats.iter().filter(|splat| splat.tau > 0.05).count();
         assert!(drawn > 1000, "{drawn} dots");
         for (right, wrong) in faults {
@@ -470,7 +480,11 @@ fn drifting_splats_match_their_twins_on_tiles_and_on_the_globe() {
                     |f| stage.record(f).unwrap(),
                     twins.stored(),
                 );
-                let drawn = splat_numbers(&twins.in_order(&seen, &lit), &twins.splats);
+                let drawn = splat_numbers(
+                    twins.params.kernel,
+                    &twins.in_order(&seen, &lit),
+                    &twins.splats,
+                );
                 // A way of some hundred cells adds up what is rounded on it: two subpixels.
                 worst(&drawn, &expected, 0.0201, 1e-4)
             });
@@ -726,7 +740,7 @@ fn eye_matches_its_twin_in_every_kernel() {
 }
 
 #[test]
-fn pixels_that_work_alone_and_pixels_that_share_come_to_the_same_bytes() {
+fn pixels_that_work_alone_and_pixels_that_share_come_to_the_same_picture() {
     for mode in [Mode::Volume, Mode::Sprites, Mode::Points] {
         let twins = Twins::of(mode, tile(1, 0, 0, 256));
         prove(
@@ -737,7 +751,8 @@ fn pixels_that_work_alone_and_pixels_that_share_come_to_the_same_bytes() {
             |gpu, source| {
                 let [shared, alone] =
                     [eye::SHARED, eye::ALONE].map(|entry| eye_image(&twins, gpu, source, entry));
-                if shared == alone { 0.0 } else { f32::INFINITY }
+                // A device may join a product and a sum in one of the two.
+                far_apart(&shared, &alone, 1.01)
             },
         );
     }
@@ -948,7 +963,7 @@ fn splats_in_the_sea_and_in_the_night_match_their_twins() {
         &everything(Mode::Volume, tile(1, 0, 0, 256)),
         with_terrain(FIVE_DEGREES),
     );
-    let expected = splat_numbers(&twins.splats, &twins.splats);
+    let expected = splat_numbers(twins.params.kernel, &twins.splats, &twins.splats);
     for (right, wrong) in [
         ("exp(-params.sea_per_m", "exp(-0.5 * params.sea_per_m"),
         (
@@ -966,7 +981,11 @@ fn splats_in_the_sea_and_in_the_night_match_their_twins() {
                 twins.stored(),
             );
             worst(
-                &splat_numbers(&twins.in_order(&seen, &lit), &twins.splats),
+                &splat_numbers(
+                    twins.params.kernel,
+                    &twins.in_order(&seen, &lit),
+                    &twins.splats,
+                ),
                 &expected,
                 0.0201,
                 1e-4,

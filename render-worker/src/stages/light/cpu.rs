@@ -6,9 +6,9 @@ use crate::stages::layout::{DEPTH_ONE, Params, Splat, nearest};
 const MOST_GIVEN: f32 = 16.0;
 const DARK: u32 = 0x7fff_ffff;
 
-/// Places in a cloud where its light is looked up, radii towards the eye, and what each counts: one look at the centre
-/// would draw clouds too dark, because the eye sees their near sides.
-const LOOKUPS: [(f32, f32); 3] = [(-LOOK, 2.0 / 9.0), (LOOK, 2.0 / 9.0), (0.0, 5.0 / 9.0)];
+/// Places in a cloud where its light is looked up, radii towards the eye: one look at the centre would draw clouds too
+/// dark, because the eye sees their near sides.
+const LOOKUPS: [f32; 2] = [-LOOK, LOOK];
 
 struct Texel {
     index: [i32; 2],
@@ -124,7 +124,7 @@ fn depth_before(params: &Params, light: &[u32], place: [i32; 2], slice: f32) -> 
 fn lit(params: &Params, light: &[u32], splat: &Splat) -> f32 {
     let (u, v) = (splat.light_u as f32, splat.light_v as f32);
     let (mut sum, mut weights) = (0.0, 0.0);
-    for (t, share) in LOOKUPS {
+    for t in LOOKUPS {
         let step = t * splat.radius_px;
         let place = [
             splat.light_u + nearest(step * (params.toward_u - params.toward_pull * u)),
@@ -134,7 +134,7 @@ fn lit(params: &Params, light: &[u32], splat: &Splat) -> f32 {
         let slice = (splat.slice + step * toward).clamp(0.0, params.slices as f32 - 0.001);
         // Where little light reaches, the eye sees little past what lies in front.
         let depth = depth_before(params, light, place, slice);
-        let seen = share * (-params.look_power * depth).exp();
+        let seen = (-params.look_power * depth).exp();
         sum += seen * (-depth).exp();
         weights += seen;
     }

@@ -15,10 +15,11 @@ pub const SEGMENTED: &str = "prefix";
 /// The one that sums a column up in one go, without waiting; for adapters that are programs.
 pub const STRAIGHT: &str = "straight";
 
-/// Radii before and behind its centre, along the sight line, at which a cloud looks its light up beside the centre: the
-/// root of 3/8, the outer of Gauss's three points for the density `(1 - r²)^1.5` along that line. They count 2/9 each.
-/// Nearer to the reference than a look at the centre alone by 9 dB.
-pub const LOOK: f32 = 0.612_372_4;
+/// Radii before and behind its centre, along the sight line, at which a cloud looks its light up: somewhat less than the
+/// root of the mean square distance of its mass there, 1 over the root of 6; what comes nearest to the reference. Gauss's
+/// three points (5/9 at the centre, 2/9 at the root of 3/8) are 1.4 dB nearer on a coast, 0.3 dB on the equator, and
+/// cost 0.05 ms of a frame of 4.5 M particles.
+pub const LOOK: f32 = 0.34;
 
 /// The functions that give depth to the light; [`splat`](crate::passes::splat) runs them.
 pub const DEPOSIT_FUNCTIONS: &str =

@@ -24,11 +24,8 @@ fn depth_before(place: vec2<i32>, slice: f32) -> f32 {
     return mix(north, south, texel.part.y);
 }
 
-// How far from a cloud's centre its light is looked up, radii, and what each look counts: Gauss's three points for the
-// density (1 - r^2)^1.5 along the sight line through the centre.
-const LOOK = 0.6123724; // sqrt(3 / 8)
-const ASIDE = 0.2222222; // 2 / 9
-const AMID = 0.5555556; // 5 / 9
+// How far from a cloud's centre its light is looked up, radii.
+const LOOK = 0.34;
 
 // Share of light at a place a step towards the eye times the share of what is seen there, and the latter.
 fn look(place: vec2<i32>, slice: f32, step: f32) -> vec2<f32> {
@@ -40,11 +37,10 @@ fn look(place: vec2<i32>, slice: f32, step: f32) -> vec2<f32> {
     return exp(-params.look_power * depth) * vec2(exp(-depth), 1.0);
 }
 
-// A splat's colour in its light, looked up before, at and behind the centre: one look at the centre would draw clouds
-// too dark, because the eye sees their near sides.
+// A splat's colour in its light, looked up before and behind the centre: one look at the centre would draw clouds too
+// dark, because the eye sees their near sides.
 fn shaded(color: u32, place: vec2<i32>, slice: f32, day: f32, radius_px: f32) -> u32 {
-    let step = LOOK * radius_px;
-    let sum = ASIDE * (look(place, slice, -step) + look(place, slice, step)) + AMID * look(place, slice, 0.0);
+    let sum = look(place, slice, -LOOK * radius_px) + look(place, slice, LOOK * radius_px);
     let lit = sum.x / max(sum.y, 1.0e-30);
     return dimmed(color, params.ambient + params.direct * lit * day);
 }
