@@ -525,8 +525,8 @@ fn light_is_given_and_lists_are_counted_as_the_twins_do() {
             (shared, "splat.light_depth - behind", "splat.light_depth"),
             (
                 shared,
-                "atomicAdd(&counts[key & ~LIST_KEY]",
-                "atomicMax(&counts[key & ~LIST_KEY]",
+                "atomicAdd(&counts[key & ~LIST_KEY], ",
+                "atomicAdd(&counts[key & ~LIST_KEY], 1u + ",
             ),
             (
                 &unshared,

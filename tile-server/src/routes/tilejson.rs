@@ -31,6 +31,7 @@ pub(crate) struct TileJsonQuery {
     manifest: Option<String>,
     #[serde(flatten)]
     look: LookQuery,
+    #[serde(flatten)]
     surroundings: SurroundingsQuery,
 }
 

@@ -27,6 +27,7 @@ pub(crate) struct TileQuery {
     manifest: Option<String>,
     #[serde(flatten)]
     look: LookQuery,
+    #[serde(flatten)]
     surroundings: SurroundingsQuery,
 }
 
