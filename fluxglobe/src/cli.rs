@@ -89,6 +89,10 @@ pub(crate) struct Settings {
 
 /// What to do.
 #[derive(Debug, Subcommand)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "one is made in the life of the program"
+)]
 pub(crate) enum Command {
     /// Take real data through the whole system, check the budgets, serve the globe.
     Demo(Demo),

@@ -19,6 +19,10 @@ const MOST_PARTICLES: usize = 1 << 24;
 const MOST_ENTRY_BYTES: u64 = 4 << 30;
 
 /// Draws one part; its pixels as RGBA8, red lowest.
+#[expect(
+    clippy::too_many_lines,
+    reason = "the stages in order, read side by side with `frame.rs`"
+)]
 pub fn draw(plan: &Plan, part: Part, scene: &Scene) -> Result<Vec<u8>, RenderError> {
     let params = plan.params_of(part);
     let pixels = params.width as usize * params.height as usize;

@@ -125,13 +125,13 @@ impl Legend {
             opacity: places(
                 transfer,
                 &transfer.opacity,
-                |share| share.get(),
+                contract::colour::Share::get,
                 |value| transfer.opacity(value),
             ),
             size: places(
                 transfer,
                 &transfer.size,
-                |share| share.get(),
+                contract::colour::Share::get,
                 |value| transfer.size(value),
             ),
             ticks: ticks::of(low, high),
@@ -270,12 +270,12 @@ mod tests {
     use super::*;
     use contract::colour::TransferOptions;
 
-    fn legend(quantity: Quantity, options: TransferOptions) -> Legend {
+    fn legend(quantity: Quantity, options: &TransferOptions) -> Legend {
         Legend::of(quantity, &options.over(quantity).unwrap())
     }
 
     fn usual(quantity: Quantity) -> Legend {
-        legend(quantity, TransferOptions::default())
+        legend(quantity, &TransferOptions::default())
     }
 
     #[test]
@@ -315,7 +315,7 @@ mod tests {
             opacity: "2:0.5,3:1,9:1".parse().unwrap(),
             ..TransferOptions::default()
         };
-        let legend = legend(Quantity::WindSpeed, options);
+        let legend = legend(Quantity::WindSpeed, &options);
         let expected = [
             (0.0, "#404040"),
             (0.5, "#808080"),
@@ -341,7 +341,7 @@ mod tests {
         };
         let (there, back) = (
             usual(Quantity::WindSpeed).stops,
-            legend(Quantity::WindSpeed, reversed).stops,
+            legend(Quantity::WindSpeed, &reversed).stops,
         );
         let colors = there.iter().map(|(_, color)| color);
         assert!(colors.eq(back.iter().rev().map(|(_, color)| color)));

@@ -44,7 +44,7 @@ pub fn job(
     time: Option<TimeMs>,
 ) -> Result<RenderJob, ServerError> {
     let style = Look::default().style(layer.manifest.quantity, mode)?;
-    job_in_style(layer, mode, view, time, style)
+    job_in_style(layer, mode, view, time, &style)
 }
 
 /// The same in a style.
@@ -53,16 +53,16 @@ pub(crate) fn job_in_style(
     mode: Mode,
     view: View,
     time: Option<TimeMs>,
-    style: Style,
+    style: &Style,
 ) -> Result<RenderJob, ServerError> {
     let manifest = &layer.manifest;
     let time = shown_time(layer, time);
     if let (Mode::Flow, Some(part)) = (mode, &layer.northward) {
         let northward = &part.manifest;
-        return Ok(RenderJob::of_flow(manifest, northward, time, view, style)?);
+        return Ok(RenderJob::of_flow(manifest, northward, time, view, *style)?);
     }
     let accumulated = layer.accumulated.as_ref();
     let accumulated = accumulated.filter(|lift| lift.holds_at(time));
     let lift = accumulated.map(|lift| &*lift.manifest);
-    Ok(RenderJob::of(manifest, lift, time, mode, view, style)?)
+    Ok(RenderJob::of(manifest, lift, time, mode, view, *style)?)
 }

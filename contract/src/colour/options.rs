@@ -45,7 +45,7 @@ impl TransferOptions {
     /// # Errors
     /// Options that exclude each other, or a limit that is broken.
     pub fn over(&self, quantity: Quantity) -> Result<TransferFunction, ContractError> {
-        self.changed(quantity, TransferFunction::default_for(quantity))
+        self.changed(quantity, &TransferFunction::default_for(quantity))
     }
 
     /// That of the speed of a vector whose parts are of a quantity, with these changes.
@@ -53,13 +53,13 @@ impl TransferOptions {
     /// # Errors
     /// As [`Self::over`].
     pub fn over_speed(&self, quantity: Quantity) -> Result<TransferFunction, ContractError> {
-        self.changed(quantity, TransferFunction::of_speed(quantity))
+        self.changed(quantity, &TransferFunction::of_speed(quantity))
     }
 
     fn changed(
         &self,
         quantity: Quantity,
-        usual: TransferFunction,
+        usual: &TransferFunction,
     ) -> Result<TransferFunction, ContractError> {
         if let Some(palette) = self.palette
             && !self.colors.is_empty()

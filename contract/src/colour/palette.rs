@@ -294,7 +294,7 @@ mod tests {
         Deuteranope,
     }
 
-    /// What an eye sees: Viénot, Brettel and Mollon (1999), doi:10.1002/(SICI)1520-6378(199908)24:4<243::AID-COL5>3.0.CO;2-3.
+    /// What an eye sees: Viénot, Brettel and Mollon (1999), Color Research & Application 24(4), 243-252.
     fn seen(linear: Triple, eye: Eye) -> Triple {
         let [mut l, mut m, s] = times(
             &[

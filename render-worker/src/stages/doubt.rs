@@ -78,7 +78,9 @@ mod tests {
 
     #[test]
     fn lines_of_the_hatching_come_back_after_its_width_and_are_as_strong_as_the_doubt() {
-        assert!(256 % HATCH_PX == 0, "lines go on in the next tile");
+        const {
+            assert!(256 % HATCH_PX == 0, "lines go on in the next tile");
+        }
         let params = Params::default();
         let gray = |doubt: f32, x: u32| hatched(&params, Vec3::splat(0.6), doubt, [x, 3]).x;
         for x in 0..40 {

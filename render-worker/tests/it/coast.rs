@@ -30,7 +30,8 @@ fn natural_earth() -> Option<PathBuf> {
     if folder.is_dir() {
         return Some(folder);
     }
-    println!("SKIPPED: no real shapes; set FLUXGLOBE_TEST_DATA (looked in {folder:?})");
+    let folder = folder.display();
+    println!("SKIPPED: no real shapes; set FLUXGLOBE_TEST_DATA (looked in {folder})");
     None
 }
 

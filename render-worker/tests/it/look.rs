@@ -128,7 +128,7 @@ fn what_users_make_transparent_is_not_there_and_what_they_make_small_covers_less
             let view = tile(4, 3, 7, 256);
             let of = |size: &str| {
                 let job = styled(mode, view, |style| {
-                    style.transfer.size = size.parse().unwrap()
+                    style.transfer.size = size.parse().unwrap();
                 });
                 mean_alpha(&renderer.render(&job, &scene).unwrap())
             };

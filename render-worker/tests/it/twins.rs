@@ -80,6 +80,7 @@ impl Twins {
         Self::of_job(&job, scene)
     }
 
+    #[expect(clippy::too_many_lines, reason = "the stages in order")]
     fn of_job(job: &RenderJob, scene: Scene) -> Self {
         let mode = job.mode;
         let plan = Plan::new(job, &scene, u64::MAX).unwrap();
@@ -626,6 +627,7 @@ fn same_lists(a: &[Vec<[u32; 3]>], b: &[Vec<[u32; 3]>]) -> bool {
 }
 
 #[test]
+#[expect(clippy::too_many_lines, reason = "two passes and a scan in one chain")]
 fn the_lists_hold_every_stored_splat_once_and_in_its_light() {
     for twins in [Twins::tile(), Twins::globe()] {
         let distance = |gpu: &Gpu, bin_source: &str, place_source: &str| {

@@ -55,7 +55,7 @@ pub(crate) async fn get(
         Some("false") => false,
         Some(text) => return Err(ServerError::invalid("surface", text, "true or false")),
     };
-    let job = request::job_in_style(&layer, mode, view, time, style)?;
+    let job = request::job_in_style(&layer, mode, view, time, &style)?;
     let shown = Shown::of(&layer, time);
     let around = &query.surroundings;
     let job = around.around(job, &state.catalogue, shown.time).await?;

@@ -49,7 +49,7 @@ pub(crate) async fn get(
     let look = query.look.parse()?;
     let style = look.style(layer.manifest.quantity, mode)?;
     let view = View::Tile { tile, size_px };
-    let job = request::job_in_style(&layer, mode, view, time, style)?;
+    let job = request::job_in_style(&layer, mode, view, time, &style)?;
     let shown = Shown::of(&layer, time);
     let around = &query.surroundings;
     let job = around.around(job, &state.catalogue, shown.time).await?;

@@ -48,7 +48,7 @@ pub const SOURCE_IN_CONTEXT: &str = concat!(
 
 /// The compiled stage.
 pub struct Compose {
-    compose: Kernel,
+    plain: Kernel,
     source_in_context: String,
     /// Compiled when it is first wanted.
     in_context: OnceLock<Kernel>,
@@ -63,7 +63,7 @@ impl Compose {
     /// The same with another shader for pictures in their surroundings.
     pub fn of(gpu: &Gpu, source: &str, source_in_context: &str) -> Self {
         Self {
-            compose: gpu.kernel("compose", source, "compose"),
+            plain: gpu.kernel("compose", source, "compose"),
             source_in_context: source_in_context.to_owned(),
             in_context: OnceLock::new(),
         }
@@ -98,7 +98,7 @@ impl Compose {
             (2, &frame.domain),
             (3, &image),
         ];
-        frame.recorder.dispatch(&self.compose, &buffers, groups);
+        frame.recorder.dispatch(&self.plain, &buffers, groups);
         Ok(())
     }
 }
