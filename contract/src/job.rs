@@ -16,7 +16,7 @@ use crate::tile::Tile;
 use crate::time::TimeMs;
 
 /// Raised whenever the renderer draws the same job differently, so that old pictures are not taken for new ones.
-pub const RENDERER_VERSION: u32 = 3;
+pub const RENDERER_VERSION: u32 = 4;
 /// Largest width and height of a picture, pixels.
 pub const MAX_IMAGE_PX: u32 = 4096;
 /// Most slices of a half-angle volume.

@@ -10,13 +10,14 @@ use contract::tile::Tile;
 use render_worker::frame::Stages;
 use render_worker::gpu::Gpu;
 use render_worker::playback::Playback;
+use render_worker::proof::{Difference, Fineness, Picture, differing_bytes, reference_of_cells};
 use render_worker::stages::fill::{Fill, Form, Sources, bench};
 use render_worker::{Backend, Image, Renderer, Scene};
 use serde::Serialize;
 
 use crate::classic::{self, Classic};
 use crate::stats::Times;
-use crate::{compare, encode, frames, scenery, tiles, twins};
+use crate::{encode, frames, scenery, tiles, twins};
 
 /// Longest time for one form on one grid.
 const MOST_FILLING: Duration = Duration::from_secs(4);
@@ -45,9 +46,15 @@ pub struct RenderBench {
     /// Frames read back and encoded; 0 leaves them out.
     #[arg(long, default_value_t = 0)]
     encode: usize,
+    /// Compare each picture with the same one in double precision, which takes minutes.
+    #[arg(long)]
+    reference: bool,
     /// Volume tiles; 0 leaves them out.
     #[arg(long, default_value_t = 0)]
     tiles: usize,
+    /// Cells of a whole earth of sea, in millions, whose north pole is looked at: particles crowd there; 0 leaves it out.
+    #[arg(long, default_value_t = 0.0)]
+    pole: f64,
     /// Largest grid whose gaps are filled, `ROWSxCOLUMNS`: every form, small grids first; nothing else is timed.
     #[arg(long)]
     fill: Option<String>,
@@ -76,13 +83,14 @@ struct Row {
     classic: Option<Against>,
     twins: Option<(Times, usize)>,
     encoded: Option<encode::Encoded>,
+    reference: Option<Difference>,
 }
 
 #[derive(Serialize)]
 struct Against {
     frame_ms: f64,
     times_faster: f64,
-    difference: Option<compare::Difference>,
+    difference: Option<Difference>,
 }
 
 /// Measures what the options ask for, and prints it.
@@ -108,6 +116,11 @@ pub fn run(args: &RenderBench) -> Result<()> {
         gpu.adapter_name(),
         start.elapsed().as_secs_f64()
     ));
+    if args.pole > 0.0 {
+        let (scene, job) = scenery::pole((args.pole * 1e6) as u64, [1920, 1080])?;
+        let measured = frames::measure(&gpu, &stages, &job, &scene, args.frames)?;
+        report_frames(&job, scenery::particles(&scene), &measured);
+    }
     for millions in &args.millions {
         let start = Instant::now();
         let grid = scenery::grid((millions * 1e6) as u64);
@@ -125,7 +138,7 @@ pub fn run(args: &RenderBench) -> Result<()> {
             for &slices in &args.slices {
                 let job = scenery::job(size_px, slices)?;
                 let row = row(args, &gpu, &stages, &job, &scene)?;
-                report(args, &row);
+                report(args, &job, &row);
             }
         }
         if args.tiles > 0 {
@@ -139,9 +152,10 @@ pub fn run(args: &RenderBench) -> Result<()> {
                     (0.443 * f64::from(1 << z)) as u32,
                 )?;
                 let times = tiles::measure(&renderer, &job, &scene, &[tile], args.tiles)?;
+                let block = tiles::of_block(&job, &scene, tile)?;
                 say(&format!(
-                    "  volume tile {tile:?} with PNG: median {:.2} ms, p99 {:.2} ms",
-                    times.median_ms, times.p99_ms
+                    "  volume tile {tile} with PNG: median {:.2} ms, p99 {:.2} ms; all {} tiles of its block {:.1} ms, in light of their own {:.1} ms",
+                    times.median_ms, times.p99_ms, block.tiles, block.shared_ms, block.own_ms
                 ));
             }
         }
@@ -167,6 +181,11 @@ fn row(
     let encoded = (args.encode > 0)
         .then(|| encode::measure(gpu, stages, job, scene, args.encode))
         .transpose()?;
+    let reference = args
+        .reference
+        .then(|| from_reference(gpu, stages, job, scene))
+        .transpose()?
+        .flatten();
     Ok(Row {
         adapter: gpu.adapter_name().to_owned(),
         particles: scenery::particles(scene),
@@ -177,7 +196,38 @@ fn row(
         classic,
         twins,
         encoded,
+        reference,
     })
+}
+
+/// How far a frame is from the picture in double precision of the same instant, which takes the processor minutes.
+fn from_reference(
+    gpu: &Gpu,
+    stages: &Stages,
+    job: &RenderJob,
+    scene: &Scene,
+) -> Result<Option<Difference>> {
+    let mut playback = Playback::new(gpu, stages, job, scene)?;
+    let steps = Playback::upload(gpu, scene)?;
+    let [width, height] = job.view.size_px();
+    let rgba8 = playback.image(&steps)?;
+    let image = Image {
+        width,
+        height,
+        rgba8,
+    };
+    let truth = reference_of_cells(job, scene, Fineness::default())?;
+    Ok(Difference::of(&Picture::from(&image), &truth))
+}
+
+fn in_words(d: &Difference) -> String {
+    let psnr = d
+        .psnr_db
+        .map_or_else(|| "equal".to_owned(), |db| format!("PSNR {db:.1} dB"));
+    format!(
+        "{psnr}, mean FLIP {:.4}, {:.3} % of pixels within one level, at most {:.1} levels",
+        d.mean_flip, d.within_one_level_percent, d.most_levels
+    )
 }
 
 /// The classic renderer on the same frame: first the pictures, then the times.
@@ -224,38 +274,23 @@ fn against(
     Ok(Against {
         frame_ms,
         times_faster: frame_ms / measured.frame.median_ms.max(1e-9),
-        difference: compare::difference(&ours, &theirs),
+        difference: Difference::of(&Picture::from(&ours), &Picture::from(&theirs)),
     })
 }
 
-fn report(args: &RenderBench, row: &Row) {
+fn report(args: &RenderBench, job: &RenderJob, row: &Row) {
     if args.json {
         say(&serde_json::to_string(row).unwrap_or_default());
         return;
     }
     let m = &row.measured;
-    say(&format!(
-        "{:>9} particles {}x{} {:>3} slices: frame median {:.3} ms, p99 {:.3} ms, wall {:.3} ms; {} entries, {:.1} times the mean in the fullest tile",
-        row.particles,
-        row.width,
-        row.height,
-        row.slices,
-        m.frame.median_ms,
-        m.frame.p99_ms,
-        m.frame_wall_ms,
-        m.entries,
-        m.fullest_over_mean
-    ));
-    let stages: Vec<_> = m
-        .stages
-        .iter()
-        .map(|(name, t)| format!("{name} {:.3}", t.median_ms))
-        .collect();
-    say(&format!("  {}", stages.join(", ")));
+    report_frames(job, row.particles, m);
     if let Some(c) = &row.classic {
         say(&format!(
-            "  classic {:.2} ms, {:.1} times; {:?}",
-            c.frame_ms, c.times_faster, c.difference
+            "  classic {:.2} ms, {:.1} times; {}",
+            c.frame_ms,
+            c.times_faster,
+            c.difference.as_ref().map_or_else(String::new, in_words)
         ));
     }
     if let Some((times, cores)) = &row.twins {
@@ -270,12 +305,34 @@ fn report(args: &RenderBench, row: &Row) {
             times.median_ms / splat.max(1e-9)
         ));
     }
+    if let Some(d) = &row.reference {
+        say(&format!("  from the reference: {}", in_words(d)));
+    }
     if let Some(e) = &row.encoded {
         say(&format!(
             "  read back and encoded on {} cores: {:.1} frames/s, PNG {} bytes",
             e.cores, e.frames_per_s, e.png_bytes
         ));
     }
+}
+
+fn report_frames(job: &RenderJob, particles: u64, m: &frames::Measured) {
+    let [width, height] = job.view.size_px();
+    say(&format!(
+        "{particles:>9} particles {width}x{height} {:>3} slices: frame median {:.3} ms, p99 {:.3} ms, wall {:.3} ms; {} entries, {:.1} times the mean in the fullest tile, {} in the longest list",
+        job.style.slices,
+        m.frame.median_ms,
+        m.frame.p99_ms,
+        m.frame_wall_ms,
+        m.entries,
+        m.fullest_over_mean,
+        m.longest_list
+    ));
+    let stages = m.stages.iter();
+    let stages: Vec<_> = stages
+        .map(|(name, t)| format!("{name} {:.3}", t.median_ms))
+        .collect();
+    say(&format!("  {}", stages.join(", ")));
 }
 
 /// Fills the gaps of made-up frames, a fifth of them missing, with every form.
@@ -365,14 +422,14 @@ fn compare_folders(a: &PathBuf, b: &PathBuf) -> Result<()> {
                 rgba8: picture.into_raw(),
             })
         };
-        let d = compare::difference(&read(a)?, &read(b)?).context("the sizes differ")?;
+        let pair = [read(a)?, read(b)?];
+        let [one, other] = [0, 1].map(|i: usize| Picture::from(&pair[i]));
+        let d = Difference::of(&one, &other).context("the sizes differ")?;
         say(&format!(
-            "{}: PSNR {:.1} dB, {:.3} % of pixels within one level, at most {} levels, {} bytes differ",
+            "{}: {}, {} bytes differ",
             name.display(),
-            d.psnr_db,
-            d.within_one_level * 100.0,
-            d.most_levels,
-            d.bytes
+            in_words(&d),
+            differing_bytes(&pair[0], &pair[1])
         ));
     }
     Ok(())

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::time::Instant;
 
-use anyhow::{Context as _, Result};
+use anyhow::{Context as _, Result, ensure};
 use contract::job::RenderJob;
 use render_worker::Scene;
 use render_worker::frame::Stages;
@@ -32,6 +32,8 @@ pub struct Measured {
     pub entries: u32,
     /// Those of its fullest screen tile over those of a tile that has any.
     pub fullest_over_mean: f64,
+    /// Entries of the longest list, one of a slice of a tile.
+    pub longest_list: u32,
 }
 
 /// Weights that move on with every frame, so that no two frames are alike.
@@ -83,12 +85,23 @@ pub fn measure(
     let ends: Vec<u32> = gpu
         .recorder()
         .download(&counts, list_count(&params) as usize)?;
+    let entries = ends.last().copied().unwrap_or_default();
+    let room = playback.workspace().entry_room();
+    ensure!(
+        entries <= room,
+        "{entries} entries in room for {room}: frames are not whole"
+    );
     Ok(Measured {
         frame: Times::of(periods.collect()),
         frame_wall_ms: wall_s / frames as f64 * 1e3,
         stages: stage_times,
-        entries: ends.last().copied().unwrap_or_default(),
+        entries,
         fullest_over_mean: fullest_over_mean(&ends, params.slices as usize),
+        longest_list: ends
+            .windows(2)
+            .map(|pair| pair[1] - pair[0])
+            .max()
+            .unwrap_or_default(),
     })
 }
 

@@ -3,7 +3,6 @@
 
 pub mod classic;
 pub mod command;
-pub mod compare;
 pub mod encode;
 pub mod frames;
 pub mod scenery;

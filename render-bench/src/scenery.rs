@@ -49,6 +49,16 @@ fn is_land(lon: f64, lat: f64) -> bool {
 }
 
 fn frame(grid: &Grid, value: impl Fn(f64, f64) -> f64 + Sync) -> Arc<Frame> {
+    everywhere(grid, |lon, lat| {
+        if is_land(lon, lat) {
+            f64::NAN
+        } else {
+            value(lon, lat)
+        }
+    })
+}
+
+fn everywhere(grid: &Grid, value: impl Fn(f64, f64) -> f64 + Sync) -> Arc<Frame> {
     let mut values = vec![f32::NAN; grid.cell_count()];
     let cores = thread::available_parallelism().map_or(1, usize::from);
     let rows_each = (grid.rows as usize).div_ceil(cores);
@@ -62,9 +72,7 @@ fn frame(grid: &Grid, value: impl Fn(f64, f64) -> f64 + Sync) -> Arc<Frame> {
                         grid.north_deg - grid.dlat_deg * ((part * rows_each + down) as f64 + 0.5);
                     for (col, cell) in row.iter_mut().enumerate() {
                         let lon = grid.west_deg + grid.dlon_deg * (col as f64 + 0.5);
-                        if !is_land(lon, lat) {
-                            *cell = value(lon, lat) as f32;
-                        }
+                        *cell = value(lon, lat) as f32;
                     }
                 }
             });
@@ -104,6 +112,48 @@ pub fn scene(grid: &Grid) -> Scene {
         terrain: None,
         northward: None,
     }
+}
+
+/// A whole earth of sea on at least so many cells, square in degrees, and the view of its north pole, where meridians run
+/// together and so do particles.
+///
+/// # Errors
+/// Never: its fixed words are valid.
+pub fn pole(cells: u64, size_px: [u32; 2]) -> Result<(Scene, RenderJob)> {
+    let rows = (cells as f64 / 2.0).sqrt().ceil();
+    let grid = Grid {
+        rows: rows as u32,
+        cols: 2 * rows as u32,
+        north_deg: 90.0,
+        west_deg: -180.0,
+        dlat_deg: 180.0 / rows,
+        dlon_deg: 180.0 / rows,
+    };
+    let water = |phase: f64| everywhere(&grid, move |lon, lat| flux(lon, lat, phase));
+    let value = Interval {
+        before: water(0.0),
+        after: water(0.5),
+        weight: 0.3,
+    };
+    let domain = Scene::domain_of(value.before.cells.content().iter().map(|_| true));
+    let scene = Scene {
+        grid,
+        domain,
+        value,
+        accumulated: None,
+        terrain: None,
+        northward: None,
+    };
+    let mut job = job(size_px, 64)?;
+    job.accumulated = None;
+    job.view = View::Globe {
+        lon_deg: 10.0,
+        lat_deg: 88.0,
+        height_m: 9.0e6,
+        width_px: size_px[0],
+        height_px: size_px[1],
+    };
+    Ok((scene, job))
 }
 
 /// Cells of sea.

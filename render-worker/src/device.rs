@@ -1,14 +1,16 @@
 //! A device with its compiled stages, the buffers that frames are drawn in and the frames that stay on it.
 
 use std::ops::Range;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use contract::grid::Grid;
+use contract::job::RenderJob;
 
 use crate::error::RenderError;
 use crate::frame::{SceneBuffers, Stages};
 use crate::gpu::{Gpu, Workspace};
-use crate::plan::{Part, Plan};
+use crate::lights::{LightCounts, Lights, SharedLight};
+use crate::plan::{Part, Plan, block};
 use crate::resident::Resident;
 use crate::scene::{Frame, Interval, Scene};
 use crate::stages::fill::{self, Fill, Filled, Form};
@@ -22,6 +24,8 @@ pub(crate) struct Device {
     idle: Mutex<Vec<Workspace>>,
     /// Frames of products that were drawn lately.
     resident: Resident,
+    /// Light of blocks of tiles that were drawn lately.
+    lights: Lights,
     /// How many devices this process had before.
     pub(crate) number: u64,
 }
@@ -39,12 +43,14 @@ impl Device {
         gpu.keep_pipelines();
         tracing::info!(adapter = gpu.adapter_name(), number, "renderer is ready");
         let resident = Resident::new(&gpu, most_frame_bytes);
+        let lights = Lights::new(&gpu);
         Ok(Self {
             gpu,
             stages,
             fill,
             idle: Mutex::default(),
             resident,
+            lights,
             number,
         })
     }
@@ -58,22 +64,62 @@ impl Device {
         self.resident.bytes()
     }
 
-    /// Draws one part of a picture.
+    /// How light was shared between pictures.
+    pub(crate) fn light_counts(&self) -> LightCounts {
+        self.lights.counts()
+    }
+
+    /// Draws one part of a picture, in shared light if there is any.
     pub(crate) fn draw(
         &self,
         plan: &Plan,
         part: Part,
         scene: &Scene,
+        light: Option<&wgpu::Buffer>,
     ) -> Result<Vec<u8>, RenderError> {
+        let mut buffers = self.scene_buffers(scene, &plan.held_cells(), plan.params.doubt == 1)?;
+        buffers.light = light.cloned();
+        self.in_workspace(|workspace| self.stages.draw(&self.gpu, workspace, plan, part, &buffers))
+    }
+
+    /// Makes the light of a plan for several pictures.
+    pub(crate) fn light(&self, plan: &Plan, scene: &Scene) -> Result<wgpu::Buffer, RenderError> {
         let buffers = self.scene_buffers(scene, &plan.held_cells(), plan.params.doubt == 1)?;
+        self.in_workspace(|workspace| {
+            self.stages
+                .shared_light(&self.gpu, workspace, plan, &buffers)
+        })
+    }
+
+    /// The light that a tile shares with its neighbours; none where it makes its own. The scene is the one drawn from.
+    pub(crate) fn light_of_block(
+        &self,
+        job: &RenderJob,
+        scene: &Scene,
+    ) -> Result<Option<Arc<SharedLight>>, RenderError> {
+        let Some(block) = block::of(job) else {
+            return Ok(None);
+        };
+        self.lights.of(&block, scene, || {
+            let plan = Plan::of_block(&block, scene, self.gpu.most_buffer_bytes())?;
+            let window = plan
+                .light_window
+                .expect("blocks are those of tiles that are lit");
+            let buffer = self.light(&plan, scene)?;
+            Ok(SharedLight { window, buffer })
+        })
+    }
+
+    fn in_workspace<T>(
+        &self,
+        work: impl FnOnce(&mut Workspace) -> Result<T, RenderError>,
+    ) -> Result<T, RenderError> {
         // A poisoned pool is whole: workspaces are only pushed and popped.
         let idle = || self.idle.lock().unwrap_or_else(PoisonError::into_inner);
         let mut workspace = idle().pop().unwrap_or_default();
-        let drawn = self
-            .stages
-            .draw(&self.gpu, &mut workspace, plan, part, &buffers);
+        let done = work(&mut workspace);
         idle().push(workspace);
-        drawn
+        done
     }
 
     /// Fills the gaps of one frame, if the device does that faster than the twin.
@@ -132,6 +178,7 @@ impl Device {
                         .buffer(&self.gpu, cells, 0..cells.content().len())
                 })
                 .transpose()?,
+            light: None,
         })
     }
 }

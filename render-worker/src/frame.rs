@@ -14,8 +14,8 @@ use crate::stages::compose::Compose;
 use crate::stages::eye::Eye;
 use crate::stages::flow::Flow;
 use crate::stages::interpolate::Interpolate;
-use crate::stages::layout::{Entry, Params};
-use crate::stages::light::Light;
+use crate::stages::layout::{Entry, LIGHT_ALONE, LIGHT_OWN, Params};
+use crate::stages::light::{Light, light_bytes};
 use crate::stages::map::Map;
 use crate::stages::{bin, compose, flow, interpolate, map};
 
@@ -34,6 +34,8 @@ pub struct SceneBuffers {
     /// Doubts of both frames of values; none where they are not drawn.
     pub doubts: Option<[wgpu::Buffer; 2]>,
     pub terrain: Option<wgpu::Buffer>,
+    /// Light that is shared between pictures; none where a picture makes its own.
+    pub light: Option<wgpu::Buffer>,
 }
 
 /// What the stages of one frame share while they are recorded.
@@ -49,6 +51,8 @@ pub struct FrameContext<'a> {
     pub domain: wgpu::Buffer,
     pub doubts: Option<[wgpu::Buffer; 2]>,
     pub terrain: Option<wgpu::Buffer>,
+    /// Light that is shared between pictures; none where this frame makes its own.
+    pub shared_light: Option<wgpu::Buffer>,
     workspace: &'a mut Workspace,
 }
 
@@ -71,6 +75,7 @@ impl<'a> FrameContext<'a> {
             domain,
             doubts,
             terrain,
+            light,
         } = scene;
         Ok(Self {
             gpu,
@@ -84,6 +89,7 @@ impl<'a> FrameContext<'a> {
             domain,
             doubts,
             terrain,
+            shared_light: light,
             workspace,
         })
     }
@@ -91,6 +97,14 @@ impl<'a> FrameContext<'a> {
     /// The buffer of a slot with room for `bytes`.
     pub fn room(&mut self, slot: Slot, bytes: u64) -> Result<wgpu::Buffer, RenderError> {
         self.workspace.room(self.gpu, slot, bytes)
+    }
+
+    /// The light: the shared one, or room for the frame's own.
+    pub fn light(&mut self) -> Result<wgpu::Buffer, RenderError> {
+        match &self.shared_light {
+            Some(light) => Ok(light.clone()),
+            None => self.room(Slot::Light, light_bytes(&self.params)),
+        }
     }
 
     /// The buffer of a slot with this content.
@@ -161,7 +175,7 @@ impl Stages {
             } else {
                 self.splats.record(frame)?;
             }
-            if frame.params.light_on == 1 {
+            if frame.params.light_on == LIGHT_OWN {
                 self.light.record(frame)?;
             }
             self.bin.record(frame)?;
@@ -193,6 +207,32 @@ impl Stages {
         }
         self.record(&mut frame)?;
         Ok(frame)
+    }
+
+    /// Makes the light of a plan for several pictures: twice the depth above the middle of each slice. Does not wait for
+    /// it; what is drawn later on this device finds it there.
+    pub fn shared_light(
+        &self,
+        gpu: &Gpu,
+        workspace: &mut Workspace,
+        plan: &Plan,
+        scene: &SceneBuffers,
+    ) -> Result<wgpu::Buffer, RenderError> {
+        let params = Params {
+            light_on: LIGHT_ALONE,
+            ..plan.params_of(Part::NONE)
+        };
+        let light = gpu.room("shared light", light_bytes(&params))?;
+        let scene = SceneBuffers {
+            light: Some(light.clone()),
+            ..scene.clone()
+        };
+        let mut frame = FrameContext::new(gpu, workspace, plan, params, scene)?;
+        self.splats.record(&mut frame)?;
+        self.light.record(&mut frame)?;
+        frame.recorder.submit();
+        gpu.check_fault("making light")?;
+        Ok(light)
     }
 
     /// Draws one part; its pixels as RGBA8, red lowest.

@@ -9,7 +9,7 @@ use crate::scene::{Interval, Scene, Terrain};
 use crate::stages::bin::list_count;
 use crate::stages::compose::in_context::{self, Surroundings};
 use crate::stages::flow::cpu::Field;
-use crate::stages::layout::{Entry, Params, Particle, Splat};
+use crate::stages::layout::{Entry, LIGHT_OFF, Params, Particle, Splat};
 use crate::stages::particles::cpu::Inputs;
 use crate::stages::{bin, compose, doubt, eye, flow, interpolate, light, map, particles, project};
 
@@ -76,7 +76,7 @@ pub fn draw(plan: &Plan, part: Part, scene: &Scene) -> Result<Vec<u8>, RenderErr
         }
         let mut splats = vec![Splat::default(); particles.len()];
         project::cpu::project(&params, &plan.rows, &plan.cols, &particles, &mut splats);
-        if params.light_on == 1 {
+        if params.light_on != LIGHT_OFF {
             let mut buffer = vec![0u32; light::texel_count(&params)];
             light::cpu::deposit(&params, &splats, &mut buffer);
             light::cpu::prefix(&params, &mut buffer);

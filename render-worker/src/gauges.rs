@@ -13,6 +13,7 @@ pub(crate) struct Gauges {
     drawing: IntGauge,
     resident_bytes: IntGaugeVec,
     frame_reads: IntCounterVec,
+    shared_lights: IntCounterVec,
     prefetch: IntCounterVec,
     device_restarts: IntCounter,
 }
@@ -31,13 +32,23 @@ impl Gauges {
             )?,
             drawing: IntGauge::with_opts(named("drawing", "Jobs that hold a permit to draw."))?,
             resident_bytes: IntGaugeVec::new(
-                named("resident_bytes", "Bytes of frames kept, by where."),
+                named(
+                    "resident_bytes",
+                    "Bytes of frames kept, in memory and on the device, and of shared light there.",
+                ),
                 &["place"],
             )?,
             frame_reads: IntCounterVec::new(
                 named(
                     "frame_reads_total",
                     "Frames wanted, by whether they were there.",
+                ),
+                &["outcome"],
+            )?,
+            shared_lights: IntCounterVec::new(
+                named(
+                    "shared_lights_total",
+                    "Blocks of tiles whose light was made, and tiles drawn in such light.",
                 ),
                 &["outcome"],
             )?,
@@ -63,6 +74,7 @@ impl Collector for Gauges {
             self.drawing.desc(),
             self.resident_bytes.desc(),
             self.frame_reads.desc(),
+            self.shared_lights.desc(),
             self.prefetch.desc(),
             self.device_restarts.desc(),
         ]
@@ -86,6 +98,13 @@ impl Collector for Gauges {
         };
         bytes("memory", kept.frame_bytes);
         bytes("device", service.renderer().resident_bytes());
+        let lights = service.renderer().light_counts();
+        bytes("light", lights.bytes);
+        let shared = |outcome: &str, total: u64| {
+            raise(&self.shared_lights.with_label_values(&[outcome]), total);
+        };
+        shared("made", lights.made);
+        shared("used", lights.used);
         let reads = |outcome: &str, total: u64| {
             raise(&self.frame_reads.with_label_values(&[outcome]), total);
         };
@@ -103,6 +122,7 @@ impl Collector for Gauges {
             self.drawing.collect(),
             self.resident_bytes.collect(),
             self.frame_reads.collect(),
+            self.shared_lights.collect(),
             self.prefetch.collect(),
             self.device_restarts.collect(),
         ]

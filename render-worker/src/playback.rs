@@ -74,6 +74,7 @@ impl<'a> Playback<'a> {
                 .as_ref()
                 .map(|terrain| gpu.storage("terrain", terrain.elevation.cells.content()))
                 .transpose()?,
+            light: None,
         })
     }
 

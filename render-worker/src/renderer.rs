@@ -10,10 +10,12 @@ use crate::error::RenderError;
 use crate::frame_cpu;
 use crate::gpu::Gpu;
 use crate::image::Image;
+use crate::lights::LightCounts;
 use crate::plan::{Part, Plan};
 use crate::pyramid;
 use crate::scene::Scene;
 use crate::stages::fill::{self, Filled, Form};
+use crate::stages::layout::{LIGHT_GIVEN, LIGHT_OWN};
 
 /// What draws.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -115,6 +117,12 @@ impl Renderer {
         Ok(())
     }
 
+    /// How light was shared between pictures on the device.
+    pub fn light_counts(&self) -> LightCounts {
+        self.device()
+            .map_or_else(LightCounts::default, |device| device.light_counts())
+    }
+
     /// Loses the device as a driver would, for tests of what happens then.
     pub fn lose_device(&self) {
         if let Some(device) = self.device() {
@@ -152,9 +160,25 @@ impl Renderer {
         scene.validate()?;
         let coarser = pyramid::suited(job, scene);
         let scene = coarser.as_ref().unwrap_or(scene);
-        let plan = match &device {
-            Some(_) => Plan::for_device(job, scene, most_buffer_bytes)?,
-            None => Plan::new(job, scene, most_buffer_bytes)?,
+        let shared = match &device {
+            Some(device) => device.light_of_block(job, scene)?,
+            None => None,
+        };
+        let mut plan = match (&device, &shared) {
+            (None, _) => Plan::new(job, scene, most_buffer_bytes)?,
+            (Some(_), None) => Plan::for_device(job, scene, most_buffer_bytes)?,
+            (Some(_), Some(light)) => Plan::lit_by(job, scene, most_buffer_bytes, light.window)?,
+        };
+        let parts = plan.parts();
+        let light = match (&device, &shared) {
+            (_, Some(shared)) => Some(shared.buffer.clone()),
+            // Parts of one picture lie in one light.
+            (Some(device), None) if parts.len() > 1 && plan.params.light_on == LIGHT_OWN => {
+                let light = device.light(&plan, scene)?;
+                plan.params.light_on = LIGHT_GIVEN;
+                Some(light)
+            }
+            _ => None,
         };
         let [width, height] = plan.size_px();
         let mut image = Image {
@@ -164,9 +188,9 @@ impl Renderer {
         };
         let draw = |part: Part| match &device {
             None => frame_cpu::draw(&plan, part, scene),
-            Some(device) => device.draw(&plan, part, scene),
+            Some(device) => device.draw(&plan, part, scene, light.as_ref()),
         };
-        for part in plan.parts() {
+        for part in parts {
             if !is_wanted() {
                 return Err(RenderError::NotWanted);
             }

@@ -5,7 +5,8 @@ use crate::frame::FrameContext;
 use crate::gpu::Slot;
 use crate::passes::splat::HALF_BYTES;
 use crate::stages::bin::list_count;
-use crate::stages::light::texel_count;
+use crate::stages::layout::{LIGHT_ALONE, LIGHT_OWN};
+use crate::stages::light::light_bytes;
 
 /// What `store.wgsl` binds.
 pub(super) struct Stored {
@@ -19,18 +20,18 @@ impl Stored {
         let rows = frame.upload_of_plan(Slot::Rows, &plan.rows)?;
         let cols = frame.upload_of_plan(Slot::Cols, &plan.cols)?;
         let palette = frame.upload_of_plan(Slot::Palette, &plan.palette)?;
-        let half_bytes = u64::from(frame.params.splat_count) * HALF_BYTES;
+        let light_on = frame.params.light_on;
+        // Light alone stores nothing else.
+        let is_stored = u64::from(light_on != LIGHT_ALONE);
+        let half_bytes = is_stored * u64::from(frame.params.splat_count) * HALF_BYTES;
         let seen = frame.room(Slot::Seen, half_bytes)?;
         let lit = frame.room(Slot::Lit, half_bytes)?;
-        let light_bytes = if frame.params.light_on == 1 {
-            texel_count(&frame.params) as u64 * 4
-        } else {
-            4
-        };
-        let light = frame.room(Slot::Light, light_bytes)?;
+        let light = frame.light()?;
         let count_bytes = u64::from(list_count(&frame.params)) * 4;
         let counts = frame.room(Slot::Counts, count_bytes)?;
-        frame.recorder.clear(&light, light_bytes);
+        if matches!(light_on, LIGHT_OWN | LIGHT_ALONE) {
+            frame.recorder.clear(&light, light_bytes(&frame.params));
+        }
         frame.recorder.clear(&counts, count_bytes);
         let buffers = [
             (0, frame.params_buffer.clone()),

@@ -38,11 +38,19 @@ fn is_in_cap(row: u32, slot: u32) -> bool {
     return dot(center, vec3(params.eye_x, params.eye_y, params.eye_z)) >= params.cap_least;
 }
 
+fn store_nothing(at: u32) {
+    if (params.light_on != LIGHT_ALONE) { seen[at] = vec4(0u); }
+}
+
 fn store(at: u32, splat: Splat) {
+    if (params.light_on == LIGHT_ALONE) {
+        if (splat.tau > 0.0) { deposit(splat); }
+        return;
+    }
     let size = size_word(splat);
     seen[at] = vec4(bitcast<u32>(splat.x_sub), bitcast<u32>(splat.y_sub), size, splat.color);
     if (splat.tau <= 0.0) { return; }
-    if (params.light_on == 1u) { deposit(splat); }
+    if (params.light_on == LIGHT_OWN) { deposit(splat); }
     if (size == 0u) { return; }
     lit[at] = vec4(bitcast<u32>(splat.light_u), bitcast<u32>(splat.light_v),
         bitcast<u32>(splat.slice), bitcast<u32>(splat.day));

@@ -24,7 +24,7 @@ pub(super) struct Camera {
 }
 
 /// East, north and up at a place, in the axes of eq. 4: x towards 90 E, y towards 0 E, z towards the north pole.
-fn axes_at(lon_deg: f64, lat_deg: f64) -> [DVec3; 3] {
+pub(super) fn axes_at(lon_deg: f64, lat_deg: f64) -> [DVec3; 3] {
     let (sin_lon, cos_lon) = lon_deg.to_radians().sin_cos();
     let (sin_lat, cos_lat) = lat_deg.to_radians().sin_cos();
     let east = DVec3::new(cos_lon, -sin_lon, 0.0);

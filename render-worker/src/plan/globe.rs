@@ -8,12 +8,13 @@ use contract::job::{Mode, RenderJob, View};
 use glam::DVec3;
 
 use super::camera::{Camera, write};
+use super::extent::Extent;
 use super::look::{self, Look};
 use super::{Plan, area_m2, cell_px, entry_shift, flow, height_range_m};
 use crate::scene::Scene;
-use crate::stages::layout::{Col, Row, VIEW_GLOBE};
+use crate::stages::layout::{Col, LIGHT_OFF, Row, VIEW_GLOBE};
 
-/// Light texels along a side at most: 64 slices of them are 27 MB.
+/// Light texels at most, the side of their square: 64 slices of them are 27 MB.
 const MOST_LIGHT_TEXELS: f64 = 320.0;
 /// Parts of a light texel that positions are rounded to.
 const LIGHT_UNIT: i32 = 256;
@@ -29,6 +30,8 @@ struct Cap {
     angle: f64,
     /// Of a full-size particle.
     radius: f64,
+    /// Where particles can be, of a regional product.
+    extent: Option<Extent>,
 }
 
 pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) {
@@ -83,6 +86,7 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) {
         heights,
         angle,
         radius,
+        extent: Extent::of(grid, camera.up, angle, heights),
     };
     // What lies beyond the seen cap falls into the first or last slice, from where it shadows as it should.
     let half = slice_planes(plan, job, camera.up, sun, &cap(seen));
@@ -128,7 +132,7 @@ fn rows(scene: &Scene, look: &Look, camera: &Camera, particles: u32, style_depth
         .collect()
 }
 
-/// Slices across the half-way vector between light and view, over the visible cap; the vector comes back.
+/// Slices across the half-way vector between light and view, over what is visible; the vector comes back.
 fn slice_planes(plan: &mut Plan, job: &RenderJob, up: DVec3, sun: DVec3, cap: &Cap) -> DVec3 {
     let Cap { heights, angle, .. } = *cap;
     let front_to_back = sun.dot(up) >= 0.0;
@@ -144,7 +148,11 @@ fn slice_planes(plan: &mut Plan, job: &RenderJob, up: DVec3, sun: DVec3, cap: &C
     };
     let near = (tilt - angle).max(0.0).cos();
     let far = (tilt + angle).min(PI).cos();
-    let (top, bottom) = (reach(near)[1] * near + 1e-4, reach(far)[0] * far - 1e-4);
+    let (mut top, mut bottom) = (reach(near)[1] * near + 1e-4, reach(far)[0] * far - 1e-4);
+    if let Some(extent) = &cap.extent {
+        let [low, high] = extent.along(half);
+        (top, bottom) = (top.min(high), bottom.max(low));
+    }
     let params = &mut plan.params;
     params.front_to_back = u32::from(front_to_back);
     params.slice_top = top as f32;
@@ -161,9 +169,10 @@ fn light_frame(plan: &mut Plan, camera: &Camera, sun: DVec3, half: DVec3, cap: &
         heights,
         angle,
         radius,
+        ..
     } = *cap;
     let params = &mut plan.params;
-    if params.light_on == 0 {
+    if params.light_on == LIGHT_OFF {
         return;
     }
     let across = if sun.cross(half).length() > 1e-6 {
@@ -180,12 +189,20 @@ fn light_frame(plan: &mut Plan, camera: &Camera, sun: DVec3, half: DVec3, cap: &
         2.0 * (angle / 2.0).sin() * (1.0 + heights[1])
     };
     let reach = chord + heights[1].max(-heights[0]);
-    let texel = (look::TEXEL_PER_RADIUS * radius).max(2.0 * reach / MOST_LIGHT_TEXELS);
-    let texels = (2.0 * reach / texel).ceil() as u32 + 2;
+    let [span_u, span_v] = [axis_u, axis_v].map(|axis| {
+        let middle = camera.up.dot(axis);
+        let [low, high] = cap.extent.as_ref().map_or([-2.0, 2.0], |e| e.along(axis));
+        // Clouds look their light up within their radius.
+        let low = (middle - reach).max(low - radius);
+        [low, (middle + reach).min(high + radius).max(low)]
+    });
+    let lengths = [span_u, span_v].map(|[low, high]| high - low);
+    let side = (lengths[0] * lengths[1]).sqrt();
+    let texel = (look::TEXEL_PER_RADIUS * radius).max(side / MOST_LIGHT_TEXELS);
     params.light_unit = LIGHT_UNIT;
-    (params.light_width, params.light_height) = (texels, texels);
-    params.light_u0 = (camera.up.dot(axis_u) - reach) as f32;
-    params.light_v0 = (camera.up.dot(axis_v) - reach) as f32;
+    [params.light_width, params.light_height] =
+        lengths.map(|length| (length / texel).ceil() as u32 + 2);
+    (params.light_u0, params.light_v0) = (span_u[0] as f32, span_v[0] as f32);
     params.light_texels_per_unit = (1.0 / texel) as f32;
     params.light_depth_gain = (look::LIGHT_DEPTH * PI / 3.0 / (texel * texel)) as f32;
     // The eye's own place in the light's axes and slices: what is as far from a place as a part of its distance lies

@@ -3,8 +3,10 @@
 //! Everything that must not depend on which tile is drawn (slice planes, light texels, particle sizes and numbers)
 //! is computed here from the scene and the zoom level alone.
 
+pub(crate) mod block;
 mod camera;
 mod context;
+mod extent;
 mod flow;
 mod globe;
 mod look;
@@ -23,9 +25,10 @@ use crate::error::RenderError;
 use crate::passes::splat::{HALF_BYTES, workgroups};
 use crate::scene::{Interval, Scene};
 use crate::stages::layout::{
-    Active, Axis, Col, GroundAxis, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, Params, Row,
-    SCREEN_TILE_PX, SQUARE, SUBPIXELS, VIEW_TILE,
+    Active, Axis, Col, GroundAxis, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, LIGHT_GIVEN, LIGHT_OFF,
+    LIGHT_OWN, Params, Row, SCREEN_TILE_PX, SQUARE, SUBPIXELS, VIEW_TILE,
 };
+pub use block::LightWindow;
 use look::Look;
 
 /// 0 stands for no plan.
@@ -60,6 +63,8 @@ pub struct Plan {
     pub ground_axes: Vec<GroundAxis>,
     /// Words of the coast mask of the whole picture; empty without coast lines.
     pub coast: Vec<u32>,
+    /// Which texels of its zoom level the light of a lit tile has; none for other pictures.
+    pub light_window: Option<LightWindow>,
     size_px: [u32; 2],
 }
 
@@ -68,6 +73,14 @@ pub struct Plan {
 pub struct Part {
     pub origin_px: [u32; 2],
     pub size_px: [u32; 2],
+}
+
+impl Part {
+    /// As good as no picture, for what is made besides.
+    pub const NONE: Self = Self {
+        origin_px: [0, 0],
+        size_px: [1, 1],
+    };
 }
 
 impl Plan {
@@ -92,6 +105,35 @@ impl Plan {
         Self::holding(job, scene, most_buffer_bytes, MOST_HELD_BYTES)
     }
 
+    /// The same for a tile in the light of its block: only what is seen of it is drawn, nothing gives light.
+    pub(crate) fn lit_by(
+        job: &RenderJob,
+        scene: &Scene,
+        most_buffer_bytes: u64,
+        light: LightWindow,
+    ) -> Result<Self, RenderError> {
+        Self::check(job, scene)?;
+        let mut plan = Self::viewed(job, scene, Some(light));
+        plan.params.light_on = LIGHT_GIVEN;
+        context::plan(&mut plan, job, scene);
+        plan.count_particles(most_buffer_bytes)?;
+        plan.choose_band(most_buffer_bytes, MOST_HELD_BYTES)?;
+        Ok(plan)
+    }
+
+    /// The plan of a block's light; `job` is what [`block::of`] made of a valid one.
+    pub(crate) fn of_block(
+        job: &RenderJob,
+        scene: &Scene,
+        most_buffer_bytes: u64,
+    ) -> Result<Self, RenderError> {
+        scene.validate()?;
+        let mut plan = Self::viewed(job, scene, None);
+        plan.count_particles(u64::MAX)?;
+        plan.choose_band(most_buffer_bytes, MOST_HELD_BYTES)?;
+        Ok(plan)
+    }
+
     /// The same with frames of more than `most_held_bytes` held in bands of rows.
     pub fn holding(
         job: &RenderJob,
@@ -99,11 +141,25 @@ impl Plan {
         most_buffer_bytes: u64,
         most_held_bytes: u64,
     ) -> Result<Self, RenderError> {
+        Self::check(job, scene)?;
+        let mut plan = Self::viewed(job, scene, None);
+        context::plan(&mut plan, job, scene);
+        plan.count_particles(most_buffer_bytes)?;
+        plan.choose_band(most_buffer_bytes, most_held_bytes)?;
+        Ok(plan)
+    }
+
+    fn check(job: &RenderJob, scene: &Scene) -> Result<(), RenderError> {
         job.validate()?;
         scene.validate()?;
         if job.mode == Mode::Flow && scene.northward.is_none() {
             return Err(RenderError::NoNorthward);
         }
+        Ok(())
+    }
+
+    /// What follows from the view, before anything is counted.
+    fn viewed(job: &RenderJob, scene: &Scene, light: Option<LightWindow>) -> Self {
         let size_px = job.view.size_px();
         let mut plan = Self {
             id: NEXT_ID.fetch_add(1, Ordering::Relaxed),
@@ -116,16 +172,16 @@ impl Plan {
             palette: palette(job),
             ground_axes: vec![],
             coast: vec![],
+            light_window: None,
             size_px,
         };
         match job.view {
-            View::Tile { tile, size_px } => tile::plan(&mut plan, job, scene, tile, size_px),
+            View::Tile { tile, size_px } => {
+                tile::plan(&mut plan, job, scene, (tile, size_px), light);
+            }
             View::Globe { .. } => globe::plan(&mut plan, job, scene),
         }
-        context::plan(&mut plan, job, scene);
-        plan.count_particles(most_buffer_bytes)?;
-        plan.choose_band(most_buffer_bytes, most_held_bytes)?;
-        Ok(plan)
+        plan
     }
 
     /// Are frames on this grid held whole, whatever is drawn of them?
@@ -302,7 +358,11 @@ fn common(job: &RenderJob, scene: &Scene) -> Params {
         shake_shift: look.shake_shift,
         min_radius_px: look.min_radius_px,
         max_radius_px: look::MAX_RADIUS_PX,
-        light_on: u32::from(job.mode == Mode::Volume),
+        light_on: if job.mode == Mode::Volume {
+            LIGHT_OWN
+        } else {
+            LIGHT_OFF
+        },
         shape_table: u32::from(shape::is_given(transfer)),
         doubt: u32::from(style.doubt && scene.value.has_doubt()),
         ambient: look::AMBIENT,

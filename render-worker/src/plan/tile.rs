@@ -9,9 +9,9 @@ use contract::job::{Mode, RenderJob};
 use contract::tile::{MAX_LAT_DEG, Tile, mercator_lat_deg, mercator_x, mercator_y};
 
 use super::look::{self, Look};
-use super::{Plan, area_m2, cell_px, entry_shift, flow, height_range_m};
+use super::{LightWindow, Plan, area_m2, cell_px, entry_shift, flow, height_range_m};
 use crate::scene::Scene;
-use crate::stages::layout::{Axis, Col, Row, SUBPIXELS, VIEW_TILE};
+use crate::stages::layout::{Axis, Col, LIGHT_OFF, Row, SUBPIXELS, VIEW_TILE};
 use crate::stages::light::LOOK;
 
 /// Smallest light texel, pixels: finer than the screen is of no use.
@@ -34,7 +34,14 @@ pub(super) fn world_px(tile: Tile, size_px: u32) -> f64 {
     f64::from(size_px) * f64::from(1u32 << tile.z)
 }
 
-pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene, tile: Tile, size_px: u32) {
+/// The plan of a tile of a number of pixels a side; with texels of light that others have filled, if any are given.
+pub(super) fn plan(
+    plan: &mut Plan,
+    job: &RenderJob,
+    scene: &Scene,
+    (tile, size_px): (Tile, u32),
+    light: Option<LightWindow>,
+) {
     let world_px = world_px(tile, size_px);
     let level = Level {
         world_px,
@@ -83,6 +90,7 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene, tile: Tile, 
         &level,
         heights_m,
         look.radius_px(cell_px, particles),
+        light,
     );
     let spans = upstream(spans, &level, flow::plan(plan, job, scene));
     choose_cells(plan, scene, &level, spans);
@@ -156,6 +164,34 @@ fn rows(
         .collect()
 }
 
+/// How the sun shines on a map.
+struct Shadows {
+    /// Way of a shadow across the ground for each metre of height, subpixels east and south.
+    per_m: [f64; 2],
+    /// Way in the light for each pixel towards the eye, subpixels. The eye looks straight down once height is drawn as a
+    /// way north: a pixel towards it is a pixel of height, above ground that lies as much farther south.
+    toward_eye: [f64; 2],
+    /// Of the sun's elevation.
+    sine: f64,
+}
+
+impl Shadows {
+    fn of(job: &RenderJob, level: &Level) -> Self {
+        let sun = &job.style.sun;
+        let elevation = sun.elevation_deg.max(look::LOWEST_SUN_DEG).to_radians();
+        let azimuth = sun.azimuth_deg.to_radians();
+        let sub_per_m = level.px_per_m * f64::from(SUBPIXELS);
+        let across = sub_per_m / elevation.tan();
+        let per_m = [-azimuth.sin() * across, azimuth.cos() * across];
+        let toward_eye = [per_m[0], per_m[1] + look::OBLIQUE * sub_per_m];
+        Self {
+            per_m,
+            toward_eye: toward_eye.map(|shift| shift / level.px_per_m),
+            sine: elevation.sin(),
+        }
+    }
+}
+
 /// Sets the light's parameters; where cells must be looked for comes back: x and y.
 fn light_and_reach(
     plan: &mut Plan,
@@ -163,6 +199,7 @@ fn light_and_reach(
     level: &Level,
     heights_m: [f64; 2],
     radius_px: f64,
+    given: Option<LightWindow>,
 ) -> [Span; 2] {
     let subpixels = f64::from(SUBPIXELS);
     let widest = plan
@@ -187,28 +224,20 @@ fn light_and_reach(
         [-margin, edge + margin],
         shift([-margin, edge + margin], look::OBLIQUE * per_m),
     ];
-    if plan.params.light_on == 0 {
+    if plan.params.light_on == LIGHT_OFF {
         return seen;
     }
-    let elevation = job
-        .style
-        .sun
-        .elevation_deg
-        .max(look::LOWEST_SUN_DEG)
-        .to_radians();
-    let azimuth = job.style.sun.azimuth_deg.to_radians();
-    let shadow_per_m = [
-        -azimuth.sin() / elevation.tan() * per_m,
-        azimuth.cos() / elevation.tan() * per_m,
-    ];
-    // The eye looks straight down once height is drawn as a way north: a pixel towards it is a pixel of height, above
-    // ground that lies as much farther south.
-    let toward_eye = [shadow_per_m[0], shadow_per_m[1] + look::OBLIQUE * per_m]
-        .map(|shift| shift / level.px_per_m);
+    let Shadows {
+        per_m: shadow_per_m,
+        toward_eye,
+        sine,
+    } = Shadows::of(job, level);
     let texel_px = (look::TEXEL_PER_RADIUS * radius_px).max(LEAST_TEXEL_PX);
     let unit = (texel_px * subpixels).round();
-    let mut origin = [0; 2];
-    let mut texels = [0; 2];
+    let mut window = LightWindow {
+        first: [0; 2],
+        texels: [0; 2],
+    };
     let mut reach = [[0.0; 2]; 2];
     for axis in 0..2 {
         let lit = shift(seen[axis], shadow_per_m[axis]);
@@ -216,15 +245,24 @@ fn light_and_reach(
         let looked = f64::from(LOOK) * widest * toward_eye[axis].abs();
         let lit = [lit[0] - looked, lit[1] + looked];
         let absolute = level.origin_px[axis] * subpixels;
-        let base = ((absolute + lit[0]) / unit).floor() - 1.0;
-        origin[axis] = (absolute - base * unit) as i32;
-        texels[axis] = (((absolute + lit[1]) / unit).floor() - base) as u32 + 3;
+        let first = ((absolute + lit[0]) / unit).floor() - 1.0;
+        window.first[axis] = first as i64;
+        window.texels[axis] = (((absolute + lit[1]) / unit).floor() - first) as u32 + 3;
         reach[axis] = shift(lit, -shadow_per_m[axis]);
     }
+    if let Some(given) = given {
+        // What only throws shadows into the tile has thrown them.
+        (window, reach) = (given, seen);
+    }
+    let origin = [0, 1].map(|axis| {
+        let absolute = level.origin_px[axis] * subpixels;
+        (absolute - window.first[axis] as f64 * unit) as i32
+    });
+    plan.light_window = Some(window);
     let params = &mut plan.params;
     params.light_unit = unit as i32;
     [params.light_origin_x, params.light_origin_y] = origin;
-    [params.light_width, params.light_height] = texels;
+    [params.light_width, params.light_height] = window.texels;
     [params.light_shift_x_per_m, params.light_shift_y_per_m] =
         shadow_per_m.map(|shift| shift as f32);
     params.look_power = look::LOOK_POWER_TILE;
@@ -232,8 +270,7 @@ fn light_and_reach(
     params.toward_v = toward_eye[1] as f32;
     params.toward_slice = (-f64::from(params.slices_per_unit) / level.px_per_m) as f32;
     let texel_px = unit / subpixels;
-    params.light_depth_gain =
-        (look::LIGHT_DEPTH * PI / 3.0 / (texel_px * texel_px) / elevation.sin()) as f32;
+    params.light_depth_gain = (look::LIGHT_DEPTH * PI / 3.0 / (texel_px * texel_px) / sine) as f32;
     reach
 }
 

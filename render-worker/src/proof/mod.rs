@@ -10,6 +10,6 @@ pub mod ocean;
 pub mod quality;
 pub mod reference;
 
-pub use difference::Difference;
+pub use difference::{Difference, differing_bytes};
 pub use quality::{QualityRow, against_slices};
-pub use reference::{Fineness, Picture, reference};
+pub use reference::{Fineness, Picture, reference, reference_of_cells};

@@ -12,6 +12,12 @@ pub const SCREEN_TILE_SHIFT: u32 = 8;
 pub const SUBPIXELS: i32 = 16;
 /// Optical depth 1 in the integers that light and eye sum up.
 pub const DEPTH_ONE: f32 = 4096.0;
+/// Lists of more entries are summed up in parts of so many.
+pub const HOT_ENTRIES: u32 = 1024;
+/// Most parts of a picture; lists that find no room are summed up whole.
+pub const MOST_HOT_PARTS: u32 = 4096;
+/// No list.
+pub const NO_LIST: u32 = u32::MAX;
 /// Counters that one workgroup of the scan sums up.
 pub const SCAN_BLOCK: u32 = GROUP * 8;
 /// What stands for "no data" in grids: NaN is not reliable in shaders.
@@ -28,6 +34,14 @@ pub const WATER_BLUE: f32 = 0.24;
 pub const VIEW_TILE: u32 = 0;
 /// [`Params::view`]: the globe in perspective.
 pub const VIEW_GLOBE: u32 = 1;
+/// [`Params::light_on`]: particles are not lit.
+pub const LIGHT_OFF: u32 = 0;
+/// [`Params::light_on`]: the picture makes its own light.
+pub const LIGHT_OWN: u32 = 1;
+/// [`Params::light_on`]: the light is there; nothing is given to it.
+pub const LIGHT_GIVEN: u32 = 2;
+/// [`Params::light_on`]: the light is made, and no picture.
+pub const LIGHT_ALONE: u32 = 3;
 /// [`Params::kernel`]: hard dots.
 pub const KERNEL_DOT: u32 = 0;
 /// [`Params::kernel`]: shaded balls with a soft edge.

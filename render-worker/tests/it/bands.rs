@@ -33,6 +33,7 @@ fn held(gpu: &Gpu, scene: &Scene, cells: Range<usize>) -> SceneBuffers {
         accumulated: scene.accumulated.as_ref().map(pair),
         doubts: None,
         terrain: None,
+        light: None,
         northward: None,
         domain: gpu
             .storage("domain", &scene.domain.content()[cells.clone()])

@@ -18,6 +18,7 @@ mod fleet;
 mod flow;
 mod gallery;
 mod golden;
+mod hot;
 mod layout;
 mod limits;
 mod look;
@@ -33,6 +34,7 @@ mod seams;
 #[cfg(feature = "service")]
 mod server;
 mod service;
+mod shared_light;
 mod smooth;
 mod stored;
 mod tidy;

@@ -39,7 +39,7 @@ impl Place {
     pub fn record(&self, frame: &mut FrameContext<'_>) -> Result<(), RenderError> {
         let seen = frame.room(Slot::Seen, 4)?;
         let lit = frame.room(Slot::Lit, 4)?;
-        let light = frame.room(Slot::Light, 4)?;
+        let light = frame.light()?;
         let counts = frame.room(Slot::Counts, 4)?;
         let entry_bytes = u64::from(frame.params.entry_capacity) * size_of::<Entry>() as u64;
         let entries = frame.room(Slot::Entries, entry_bytes)?;

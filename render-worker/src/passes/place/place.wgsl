@@ -35,7 +35,7 @@ fn place_own(at: u32) {
     let reach = reach_of(place, near.z);
     if (any(reach.low > reach.high)) { return; }
     var color = near.w;
-    if (params.light_on == 1u) {
+    if (params.light_on != LIGHT_OFF) {
         let radius_px = f32((near.z & 0xffffu) << params.entry_shift) / f32(SUBPIXELS);
         color = shaded(color, vec2(bitcast<i32>(far.x), bitcast<i32>(far.y)), slice, bitcast<f32>(far.w), radius_px);
     }

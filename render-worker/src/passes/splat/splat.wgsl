@@ -42,7 +42,7 @@ fn splat(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) w
         let k = workgroup.z * params.particles_each + j;
         let at = first + j * SQUARE * SQUARE;
         if (is_missing(value) || k >= params.particles_per_cell) {
-            seen[at] = vec4(0u);
+            store_nothing(at);
         } else {
             var particle = particle_of(row, slot, k, value, carbon);
             if (doubt > 0.0) { particle = doubted(particle, doubt); }

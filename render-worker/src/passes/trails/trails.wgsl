@@ -17,7 +17,7 @@ fn trails(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) 
     for (var number = 0u; number < params.particles_each; number++) {
         let at = first + number * SQUARE * SQUARE;
         if (trail.open <= 0.0) {
-            seen[at] = vec4(0u);
+            store_nothing(at);
         } else {
             let here = drift_at(row, trail.col, trail.place);
             trail.open = min(trail.open, here.open);

@@ -64,11 +64,24 @@ impl From<&Image> for Picture {
     }
 }
 
-/// Draws a volume without a globe behind it, as exactly as can be.
+/// Draws a volume without a globe behind it, as exactly as can be, from the cells that the renderer draws it from.
 ///
 /// # Errors
 /// What the plan of the job refuses; [`RenderError::NoReference`] for other modes than the volume.
 pub fn reference(
+    job: &RenderJob,
+    scene: &Scene,
+    fineness: Fineness,
+) -> Result<Picture, RenderError> {
+    let coarser = pyramid::suited(job, scene);
+    reference_of_cells(job, coarser.as_ref().unwrap_or(scene), fineness)
+}
+
+/// The same from every cell, however small they are.
+///
+/// # Errors
+/// Those of [`reference`].
+pub fn reference_of_cells(
     job: &RenderJob,
     scene: &Scene,
     fineness: Fineness,
@@ -78,8 +91,6 @@ pub fn reference(
     if job.mode != Mode::Volume || job.style.globe_surface || !is_bare {
         return Err(RenderError::NoReference);
     }
-    let coarser = pyramid::suited(job, scene);
-    let scene = coarser.as_ref().unwrap_or(scene);
     let plan = Plan::new(job, scene, u64::MAX)?;
     let space = Space::of(job);
     let clouds = clouds(&plan, job, scene, &space);

@@ -1,8 +1,22 @@
 // From the lengths of lists to their starts: an exclusive scan in three steps.
 @group(0) @binding(1) var<storage, read_write> counts: array<u32>;
 @group(0) @binding(2) var<storage, read_write> block_sums: array<u32>;
+// Long lists and their parts: see the eye's `hot.wgsl`.
+@group(0) @binding(3) var<storage, read_write> hot_lists: array<u32>;
+@group(0) @binding(4) var<storage, read_write> hot_parts: array<atomic<u32>>;
 
 const PER_INVOCATION = 8u;
+
+// Finds room for the parts of a long list.
+fn cut(list: u32, length: u32) {
+    let parts = (length + HOT_ENTRIES - 1u) / HOT_ENTRIES;
+    let first = atomicAdd(&hot_parts[0], parts);
+    let fits = first + parts <= MOST_HOT_PARTS;
+    for (var part = first; part < min(first + parts, MOST_HOT_PARTS); part++) {
+        atomicStore(&hot_parts[1u + part], select(NO_LIST, list, fits));
+    }
+    hot_lists[list] = select(0u, first + 1u, fits);
+}
 
 var<workgroup> partial: array<u32, GROUP>;
 
@@ -30,7 +44,11 @@ fn scan_blocks(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgro
     var sum = 0u;
     for (var j = 0u; j < PER_INVOCATION; j++) {
         before[j] = sum;
-        if (base + j < length) { sum += counts[base + j]; }
+        if (base + j < length) {
+            let own = counts[base + j];
+            sum += own;
+            if (own > HOT_ENTRIES) { cut(base + j, own); }
+        }
     }
     let start = scan_workgroup(invocation, sum);
     for (var j = 0u; j < PER_INVOCATION; j++) {

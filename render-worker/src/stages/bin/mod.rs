@@ -1,13 +1,14 @@
 //! Binning: the counting sort of splats into lists by screen tile and slice.
 //!
 //! Lists are counted in the pass that makes the splats and filled in the pass that places them; between the two, here,
-//! lengths become starts.
+//! lengths become starts. Lists that are long beyond the others are cut into parts for the eye.
 
 pub mod cpu;
 
 use crate::error::RenderError;
 use crate::frame::FrameContext;
 use crate::gpu::{Gpu, Kernel, Slot};
+use crate::stages::eye;
 use crate::stages::layout::{Params, SCAN_BLOCK};
 
 /// The functions that tell the lists of a splat.
@@ -47,10 +48,14 @@ impl Bin {
         let lists = list_count(&frame.params);
         let counts = frame.room(Slot::Counts, u64::from(lists) * 4)?;
         let sums = frame.room(Slot::BlockSums, u64::from(lists.div_ceil(SCAN_BLOCK)) * 4)?;
+        let [hot_lists, hot_parts] = eye::hot_room(frame)?;
         let params = &frame.params_buffer;
         let recorder = &mut frame.recorder;
+        recorder.clear(&hot_parts, 4);
         let scan = [(0, params), (1, &counts), (2, &sums)];
-        recorder.dispatch_list(&self.blocks, &scan, lists, SCAN_BLOCK);
+        let hot = [(3, &hot_lists), (4, &hot_parts)];
+        let blocks = [scan.as_slice(), &hot].concat();
+        recorder.dispatch_list(&self.blocks, &blocks, lists, SCAN_BLOCK);
         recorder.dispatch(&self.sums, &[(0, params), (2, &sums)], [1, 1]);
         recorder.dispatch_list(&self.add, &scan, lists, SCAN_BLOCK);
         Ok(())

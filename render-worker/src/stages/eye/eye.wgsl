@@ -114,6 +114,13 @@ fn eye(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(global_invocation_i
             let begin = ends[slice];
             let end = ends[slice + 1u];
             if (end <= begin) { continue; }
+            if (end - begin > HOT_ENTRIES) {
+                let first_part = hot_lists[first_list + first + slice];
+                if (first_part > 0u) {
+                    color = blended(color, hot_sum(first_part, end - begin, invocation));
+                    continue;
+                }
+            }
             var own = vec4(0u);
             for (var base = begin; base < end; base += SAFE) {
                 // Two invocations an entry.

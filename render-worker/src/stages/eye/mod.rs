@@ -7,7 +7,9 @@ use std::sync::OnceLock;
 use crate::error::RenderError;
 use crate::frame::FrameContext;
 use crate::gpu::{Gpu, Kernel, Slot};
+use crate::stages::bin::list_count;
 use crate::stages::compose;
+use crate::stages::layout::{MOST_HOT_PARTS, SCREEN_TILE_PX};
 
 /// The shader.
 pub const SOURCE: &str = concat!(
@@ -16,6 +18,7 @@ pub const SOURCE: &str = concat!(
     include_str!("../compose/globe.wgsl"),
     include_str!("../compose/over_globe.wgsl"),
     include_str!("eye.wgsl"),
+    include_str!("hot.wgsl"),
     include_str!("alone.wgsl")
 );
 
@@ -31,6 +34,7 @@ pub const SOURCE_IN_CONTEXT: &str = concat!(
     include_str!("../compose/terrain.wgsl"),
     include_str!("../compose/in_context.wgsl"),
     include_str!("eye.wgsl"),
+    include_str!("hot.wgsl"),
     include_str!("alone.wgsl")
 );
 
@@ -44,6 +48,19 @@ pub struct Eye {
     entry: &'static str,
     /// For pictures in their surroundings; compiled when they are first wanted.
     in_context: [OnceLock<Kernel>; 3],
+    /// Sums long lists up in parts; none where pixels work alone.
+    hot: Option<Kernel>,
+}
+
+/// Workgroups that take the parts of long lists in turn: as many as a large device runs at once.
+const HOT_GROUPS: u32 = 1024;
+
+/// The buffers of long lists and of their parts.
+pub fn hot_room(frame: &mut FrameContext<'_>) -> Result<[wgpu::Buffer; 2], RenderError> {
+    Ok([
+        frame.room(Slot::HotLists, u64::from(list_count(&frame.params)) * 4)?,
+        frame.room(Slot::HotParts, u64::from(1 + MOST_HOT_PARTS) * 4)?,
+    ])
 }
 
 impl Eye {
@@ -60,6 +77,7 @@ impl Eye {
             source_in_context: source_in_context.to_owned(),
             entry,
             in_context: Default::default(),
+            hot: (entry == SHARED).then(|| gpu.kernel("hot", source, "hot")),
         }
     }
 
@@ -68,6 +86,10 @@ impl Eye {
         let counts = frame.room(Slot::Counts, 4)?;
         let entries = frame.room(Slot::Entries, 4)?;
         let image = frame.room(Slot::Image, frame.pixel_count() * 4)?;
+        let long = self.hot.as_ref();
+        let long = long.map(|kernel| sum_up(kernel, frame)).transpose()?;
+        let long = long.iter().flatten();
+        let long: Vec<_> = long.map(|(binding, buffer)| (*binding, buffer)).collect();
         let groups = [frame.params.tiles_x, frame.params.tiles_y];
         let kind = frame.params.kernel as usize;
         if frame.params.in_context == 1 {
@@ -85,6 +107,7 @@ impl Eye {
                 (6, &axes),
                 (7, &coast),
             ];
+            let buffers = [&buffers, long.as_slice()].concat();
             frame.recorder.dispatch(kernel, &buffers, groups);
             return Ok(());
         }
@@ -95,11 +118,34 @@ impl Eye {
             (3, &frame.domain),
             (4, &image),
         ];
+        let buffers = [&buffers, long.as_slice()].concat();
         frame
             .recorder
             .dispatch(&self.of_kernel[kind], &buffers, groups);
         Ok(())
     }
+}
+
+/// Sums up the parts of long lists; what the eye reads of them comes back.
+fn sum_up(
+    kernel: &Kernel,
+    frame: &mut FrameContext<'_>,
+) -> Result<[(u32, wgpu::Buffer); 2], RenderError> {
+    let counts = frame.room(Slot::Counts, 4)?;
+    let entries = frame.room(Slot::Entries, 4)?;
+    let [lists, parts] = hot_room(frame)?;
+    let pixels = u64::from(SCREEN_TILE_PX * SCREEN_TILE_PX);
+    let sums = frame.room(Slot::HotSums, u64::from(MOST_HOT_PARTS) * pixels * 16)?;
+    let buffers = [
+        (0, &frame.params_buffer),
+        (1, &counts),
+        (2, &entries),
+        (8, &lists),
+        (9, &parts),
+        (10, &sums),
+    ];
+    frame.recorder.dispatch(kernel, &buffers, [HOT_GROUPS, 1]);
+    Ok([(8, lists), (10, sums)])
 }
 
 fn compiled(gpu: &Gpu, source: &str, kernel: &str, entry: &str) -> Kernel {

@@ -7,8 +7,8 @@ pub mod cpu;
 
 use crate::error::RenderError;
 use crate::frame::FrameContext;
-use crate::gpu::{Gpu, Kernel, Slot};
-use crate::stages::layout::{GROUP, Params};
+use crate::gpu::{Gpu, Kernel};
+use crate::stages::layout::{GROUP, LIGHT_OFF, Params};
 
 /// The entry point that cuts columns of texels into segments; for GPUs.
 pub const SEGMENTED: &str = "prefix";
@@ -42,6 +42,15 @@ pub fn texel_count(params: &Params) -> usize {
     params.light_width as usize * params.light_height as usize * (params.slices as usize + 1)
 }
 
+/// Bytes of the light buffer; of one that is bound but never read if particles are not lit.
+pub fn light_bytes(params: &Params) -> u64 {
+    if params.light_on == LIGHT_OFF {
+        4
+    } else {
+        texel_count(params) as u64 * 4
+    }
+}
+
 impl Light {
     /// Compiles the entry point that suits the device.
     pub fn new(gpu: &Gpu) -> Self {
@@ -63,7 +72,7 @@ impl Light {
 
     /// Turns the depth of each slice into twice the depth above its middle.
     pub fn record(&self, frame: &mut FrameContext<'_>) -> Result<(), RenderError> {
-        let light = frame.room(Slot::Light, 4)?;
+        let light = frame.light()?;
         let columns = frame.params.light_width * frame.params.light_height;
         let buffers = [(0, &frame.params_buffer), (1, &light)];
         frame

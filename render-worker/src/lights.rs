@@ -1,0 +1,194 @@
+//! Light that pictures share: a block of tiles in, the depth above the middle of every slice out, made once and kept.
+//!
+//! The first tile of a block at an instant makes its own light, so that nobody waits for a block of which nothing else
+//! is looked at; the second one makes the block's, which serves all others. Both kinds hold the same numbers.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use contract::job::RenderJob;
+
+use crate::error::RenderError;
+use crate::gpu::Gpu;
+use crate::plan::LightWindow;
+use crate::scene::{Interval, Scene};
+
+/// Share of a device's own memory for light.
+const SHARE: u64 = 16;
+/// Bytes kept where nobody knows what the device has.
+const UNKNOWN_BYTES: u64 = 256 << 20;
+/// Blocks remembered, those without light included.
+const MOST_BLOCKS: usize = 1024;
+
+/// The light of a block of tiles on the device.
+pub(crate) struct SharedLight {
+    pub(crate) window: LightWindow,
+    pub(crate) buffer: wgpu::Buffer,
+}
+
+/// How light was shared so far.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct LightCounts {
+    /// Bytes kept now.
+    pub bytes: u64,
+    /// Blocks whose light was made.
+    pub made: u64,
+    /// Tiles drawn in the light of a block.
+    pub used: u64,
+}
+
+/// What light depends on: the block with its style, and the frames of the instant as they are in memory.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+struct Key {
+    block: String,
+    frames: [Option<[u64; 3]>; 2],
+}
+
+/// The light of one block; locked while it is made.
+#[derive(Default)]
+enum State {
+    #[default]
+    NotMade,
+    Made(Arc<SharedLight>),
+    /// Too large to be shared.
+    Refused,
+}
+
+struct Block {
+    state: Arc<Mutex<State>>,
+    bytes: u64,
+    last_use: u64,
+}
+
+/// Lights by block, least recently used first to go.
+pub(crate) struct Lights {
+    most_bytes: u64,
+    held: Mutex<Held>,
+}
+
+#[derive(Default)]
+struct Held {
+    blocks: BTreeMap<Key, Block>,
+    uses: u64,
+    counts: LightCounts,
+}
+
+impl Key {
+    fn new(block: &RenderJob, scene: &Scene) -> Self {
+        let frames = |interval: &Interval| {
+            let weight = interval.weight.to_bits();
+            [
+                interval.before.cells.id(),
+                interval.after.cells.id(),
+                weight,
+            ]
+        };
+        Self {
+            block: block.key().to_string(),
+            frames: [
+                Some(frames(&scene.value)),
+                scene.accumulated.as_ref().map(frames),
+            ],
+        }
+    }
+}
+
+impl Lights {
+    /// None yet.
+    pub(crate) fn new(gpu: &Gpu) -> Self {
+        Self {
+            most_bytes: gpu.own_bytes().map_or(UNKNOWN_BYTES, |own| own / SHARE),
+            held: Mutex::default(),
+        }
+    }
+
+    /// Bytes, and what was made and used.
+    pub(crate) fn counts(&self) -> LightCounts {
+        self.lock().counts
+    }
+
+    /// The light of a block that was asked for before, made by `make` if it is not there; none the first time, and where
+    /// it is too large. Others who want the same wait until it is made.
+    ///
+    /// # Errors
+    /// What `make` fails with but for sizes.
+    pub(crate) fn of(
+        &self,
+        block: &RenderJob,
+        scene: &Scene,
+        make: impl FnOnce() -> Result<SharedLight, RenderError>,
+    ) -> Result<Option<Arc<SharedLight>>, RenderError> {
+        let key = Key::new(block, scene);
+        let Some(state) = self.lock().known(&key) else {
+            return Ok(None);
+        };
+        // What failed half-way left no light behind.
+        let mut state = state.lock().unwrap_or_else(PoisonError::into_inner);
+        if let State::NotMade = *state {
+            *state = match make() {
+                Ok(light) if light.buffer.size() <= self.most_bytes => {
+                    self.lock().keep(&key, &light, self.most_bytes);
+                    State::Made(Arc::new(light))
+                }
+                Ok(_)
+                | Err(RenderError::TooLarge { .. } | RenderError::TooManyParticles { .. }) => {
+                    State::Refused
+                }
+                Err(error) => return Err(error),
+            };
+        }
+        Ok(match &*state {
+            State::Made(light) => {
+                self.lock().counts.used += 1;
+                Some(Arc::clone(light))
+            }
+            State::NotMade | State::Refused => None,
+        })
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Held> {
+        // Counts and a map that is changed entry by entry: a poisoned lock still guards what is true.
+        self.held.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Held {
+    /// The place for a block's light; none if nobody asked for it before.
+    fn known(&mut self, key: &Key) -> Option<Arc<Mutex<State>>> {
+        self.uses += 1;
+        if let Some(block) = self.blocks.get_mut(key) {
+            block.last_use = self.uses;
+            return Some(Arc::clone(&block.state));
+        }
+        let block = Block {
+            state: Arc::default(),
+            bytes: 0,
+            last_use: self.uses,
+        };
+        self.blocks.insert(key.clone(), block);
+        if self.blocks.len() > MOST_BLOCKS {
+            self.forget_oldest();
+        }
+        None
+    }
+
+    fn keep(&mut self, key: &Key, light: &SharedLight, most_bytes: u64) {
+        self.counts.made += 1;
+        if let Some(block) = self.blocks.get_mut(key) {
+            block.bytes = light.buffer.size();
+            self.counts.bytes += block.bytes;
+        }
+        while self.counts.bytes > most_bytes && self.blocks.len() > 1 {
+            self.forget_oldest();
+        }
+    }
+
+    fn forget_oldest(&mut self) {
+        let ages = self.blocks.iter().map(|(key, block)| (block.last_use, key));
+        if let Some(oldest) = ages.min().map(|(_, key)| key.clone())
+            && let Some(block) = self.blocks.remove(&oldest)
+        {
+            self.counts.bytes -= block.bytes;
+        }
+    }
+}

@@ -1,0 +1,49 @@
+// Lists that are long beyond the others, where cells crowd (round a pole, along a limb): cut into parts, each summed up
+// by a workgroup of its own before the eye looks. Sums of integers are the same however they are cut.
+
+// Of a list of more than HOT_ENTRIES: its first part and 1; 0 where there was no room for its parts.
+@group(0) @binding(8) var<storage, read_write> hot_lists: array<u32>;
+// How many parts there are, and of each the list.
+@group(0) @binding(9) var<storage, read_write> hot_parts: array<u32>;
+// Red, green, blue and depth of every pixel of each part.
+@group(0) @binding(10) var<storage, read_write> hot_sums: array<u32>;
+
+const PART_SUMS = 1024u; // 4 times PIXELS
+
+// What all parts of a list add to a pixel; `first` is one more than its first part.
+fn hot_sum(first: u32, length: u32, pixel: u32) -> vec4<u32> {
+    var own = vec4(0u);
+    let end = first - 1u + (length + HOT_ENTRIES - 1u) / HOT_ENTRIES;
+    for (var part = first - 1u; part < end; part++) {
+        let at = part * PART_SUMS + pixel;
+        let more = vec4(hot_sums[at], hot_sums[at + PIXELS], hot_sums[at + 2u * PIXELS], hot_sums[at + 3u * PIXELS]);
+        own += min(more, vec4(MOST_SUM) - own);
+    }
+    return own;
+}
+
+@compute @workgroup_size(SCREEN_TILE_PX, SCREEN_TILE_PX)
+fn hot(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) invocation: u32) {
+    for (var channel = 0u; channel < 4u; channel++) { atomicStore(&sums[channel * PIXELS + invocation], 0u); }
+    workgroupBarrier();
+    let parts = min(hot_parts[0], MOST_HOT_PARTS);
+    for (var part = workgroup.x; part < parts; part += workgroups.x) {
+        let list = hot_parts[1u + part];
+        if (list == NO_LIST) { continue; }
+        var begin = 0u;
+        if (list > 0u) { begin = min(list_ends[list - 1u], params.entry_capacity); }
+        begin += (part + 1u - hot_lists[list]) * HOT_ENTRIES;
+        let end = min(begin + HOT_ENTRIES, min(list_ends[list], params.entry_capacity));
+        var own = vec4(0u);
+        for (var base = begin; base < end; base += SAFE) {
+            for (var at = base + (invocation >> 1u); at < min(base + SAFE, end); at += PIXELS / 2u) {
+                add(entries[at], i32(invocation & 1u));
+            }
+            workgroupBarrier();
+            own += min(taken(invocation), vec4(MOST_SUM) - own);
+            workgroupBarrier();
+        }
+        for (var channel = 0u; channel < 4u; channel++) { hot_sums[part * PART_SUMS + channel * PIXELS + invocation] = own[channel]; }
+    }
+}
