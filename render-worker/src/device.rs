@@ -91,7 +91,13 @@ impl Device {
         })
     }
 
-    /// The light that a tile shares with its neighbours; none where it makes its own. The scene is the one drawn from.
+    /// The light that a tile shares with its neighbours, if it is there.
+    pub(crate) fn made_light(&self, job: &RenderJob, scene: &Scene) -> Option<Arc<SharedLight>> {
+        self.lights.made(&block::of(job)?, scene)
+    }
+
+    /// The same, made if another tile of the block has asked for it; none where the tile makes its own. The scene is the
+    /// one drawn from.
     pub(crate) fn light_of_block(
         &self,
         job: &RenderJob,

@@ -107,6 +107,24 @@ impl Lights {
         self.lock().counts
     }
 
+    /// The light of a block if it is there; nothing waits, nothing is remembered.
+    pub(crate) fn made(&self, block: &RenderJob, scene: &Scene) -> Option<Arc<SharedLight>> {
+        let state = {
+            let mut held = self.lock();
+            held.uses += 1;
+            let use_count = held.uses;
+            let block = held.blocks.get_mut(&Key::new(block, scene))?;
+            block.last_use = use_count;
+            Arc::clone(&block.state)
+        };
+        let light = match state.try_lock().as_deref() {
+            Ok(State::Made(light)) => Some(Arc::clone(light)),
+            Ok(State::NotMade | State::Refused) | Err(_) => None,
+        };
+        self.lock().counts.used += u64::from(light.is_some());
+        light
+    }
+
     /// The light of a block that was asked for before, made by `make` if it is not there; none the first time, and where
     /// it is too large. Others who want the same wait until it is made.
     ///

@@ -10,7 +10,7 @@ use crate::error::RenderError;
 use crate::frame_cpu;
 use crate::gpu::Gpu;
 use crate::image::Image;
-use crate::lights::LightCounts;
+use crate::lights::{LightCounts, SharedLight};
 use crate::plan::{Part, Plan};
 use crate::pyramid;
 use crate::scene::Scene;
@@ -160,14 +160,9 @@ impl Renderer {
         scene.validate()?;
         let coarser = pyramid::suited(job, scene);
         let scene = coarser.as_ref().unwrap_or(scene);
-        let shared = match &device {
-            Some(device) => device.light_of_block(job, scene)?,
-            None => None,
-        };
-        let mut plan = match (&device, &shared) {
-            (None, _) => Plan::new(job, scene, most_buffer_bytes)?,
-            (Some(_), None) => Plan::for_device(job, scene, most_buffer_bytes)?,
-            (Some(_), Some(light)) => Plan::lit_by(job, scene, most_buffer_bytes, light.window)?,
+        let (mut plan, shared) = match &device {
+            None => (Plan::new(job, scene, most_buffer_bytes)?, None),
+            Some(device) => planned(device, job, scene)?,
         };
         let parts = plan.parts();
         let light = match (&device, &shared) {
@@ -218,6 +213,31 @@ impl DeviceSlot {
     fn lock(&self) -> std::sync::MutexGuard<'_, Arc<Device>> {
         // The slot is changed by one assignment, so a poisoned lock still guards a whole device.
         self.current.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// The plan of a picture and the light that it shares with others.
+fn planned(
+    device: &Device,
+    job: &RenderJob,
+    scene: &Scene,
+) -> Result<(Plan, Option<Arc<SharedLight>>), RenderError> {
+    let most_buffer_bytes = device.gpu().most_buffer_bytes();
+    let lit_by = |light: Arc<SharedLight>| {
+        let plan = Plan::lit_by(job, scene, most_buffer_bytes, light.window)?;
+        Ok((plan, Some(light)))
+    };
+    if let Some(light) = device.made_light(job, scene) {
+        return lit_by(light);
+    }
+    let own = Plan::for_device(job, scene, most_buffer_bytes)?;
+    // What shows nothing needs no light, and asks for none.
+    if own.params.splat_count == 0 {
+        return Ok((own, None));
+    }
+    match device.light_of_block(job, scene)? {
+        Some(light) => lit_by(light),
+        None => Ok((own, None)),
     }
 }
 

@@ -47,6 +47,11 @@ impl Extent {
         (!places.is_empty()).then_some(Self { places, sag })
     }
 
+    /// Places all over the region.
+    pub(super) fn places(&self) -> impl Iterator<Item = DVec3> {
+        self.places.iter().copied()
+    }
+
     /// Least and largest coordinate of the region along a direction.
     pub(super) fn along(&self, direction: DVec3) -> [f64; 2] {
         let reach = self.places.iter().map(|place| place.dot(direction));

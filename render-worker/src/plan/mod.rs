@@ -26,7 +26,7 @@ use crate::passes::splat::{HALF_BYTES, workgroups};
 use crate::scene::{Interval, Scene};
 use crate::stages::layout::{
     Active, Axis, Col, GroundAxis, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, LIGHT_GIVEN, LIGHT_OFF,
-    LIGHT_OWN, Params, Row, SCREEN_TILE_PX, SQUARE, SUBPIXELS, VIEW_TILE,
+    LIGHT_OWN, NEVER_LONG, Params, Row, SCREEN_TILE_PX, SQUARE, SUBPIXELS, VIEW_TILE,
 };
 pub use block::LightWindow;
 use look::Look;
@@ -43,6 +43,10 @@ const PART_PX: u32 = 2048;
 const MOST_HELD_BYTES: u64 = 256 << 20;
 /// Bands begin and end at multiples of so many rows, so that neighbouring pictures share them.
 const BAND_ROWS: u32 = 256;
+/// Shorter lists are not cut into parts: the parts of 1024 entries would be few.
+const LEAST_LONG_LIST: u32 = 2048;
+/// A list is long that holds so many times the particles that all screen tiles would have if they had the same.
+const LONG_OVER_FAIR: u32 = 4;
 /// Particles that one invocation makes, unless cells hold fewer: neighbours share sums, more of them share better.
 const PARTICLES_EACH: u32 = 4;
 
@@ -65,6 +69,8 @@ pub struct Plan {
     pub coast: Vec<u32>,
     /// Which texels of its zoom level the light of a lit tile has; none for other pictures.
     pub light_window: Option<LightWindow>,
+    /// Some screen tiles may hold many times the particles of others: a pole or the limb is in view.
+    pub is_crowded: bool,
     size_px: [u32; 2],
 }
 
@@ -173,6 +179,7 @@ impl Plan {
             ground_axes: vec![],
             coast: vec![],
             light_window: None,
+            is_crowded: false,
             size_px,
         };
         match job.view {
@@ -287,13 +294,20 @@ impl Plan {
     /// Parameters for drawing one part.
     pub fn params_of(&self, part: Part) -> Params {
         let [width, height] = part.size_px;
+        let tiles = [width, height].map(|px| px.div_ceil(SCREEN_TILE_PX));
+        let fair_share = self.params.splat_count / (tiles[0] * tiles[1]).max(1);
         Params {
             origin_x_px: part.origin_px[0] as i32,
             origin_y_px: part.origin_px[1] as i32,
             width,
             height,
-            tiles_x: width.div_ceil(SCREEN_TILE_PX),
-            tiles_y: height.div_ceil(SCREEN_TILE_PX),
+            tiles_x: tiles[0],
+            tiles_y: tiles[1],
+            long_list: if self.is_crowded {
+                LEAST_LONG_LIST.max(fair_share.saturating_mul(LONG_OVER_FAIR))
+            } else {
+                NEVER_LONG
+            },
             ..self.params
         }
     }

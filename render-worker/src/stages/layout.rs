@@ -12,8 +12,10 @@ pub const SCREEN_TILE_SHIFT: u32 = 8;
 pub const SUBPIXELS: i32 = 16;
 /// Optical depth 1 in the integers that light and eye sum up.
 pub const DEPTH_ONE: f32 = 4096.0;
-/// Lists of more entries are summed up in parts of so many.
-pub const HOT_ENTRIES: u32 = 1024;
+/// [`Params::long_list`]: no list is cut into parts.
+pub const NEVER_LONG: u32 = u32::MAX;
+/// Entries of a part of a long list.
+pub const PART_ENTRIES: u32 = 1024;
 /// Most parts of a picture; lists that find no room are summed up whole.
 pub const MOST_HOT_PARTS: u32 = 4096;
 /// No list.
@@ -97,6 +99,8 @@ shared_struct! {
         pub tiles_y: u32,
         pub slices: u32,
         pub entry_capacity: u32,
+        /// Lists of more entries are summed up in parts.
+        pub long_list: u32,
         pub min_radius_px: f32,
         pub max_radius_px: f32,
         pub size_spread: f32,

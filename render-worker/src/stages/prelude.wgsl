@@ -6,7 +6,7 @@ struct Params {
     depth_floor: f32, first_row: u32, row_count: u32, slot_count: u32, cap_least: f32, particles_per_cell: u32,
     particles_each: u32, splat_count: u32, shake_shift: u32, height_m_per_kg_m2: f32,
     height_limit_m: f32, sheet_m: f32, turns_per_kg_m2: f32, optical_depth: f32, view: u32, kernel: u32,
-    front_to_back: u32, width: u32, height: u32, tiles_x: u32, tiles_y: u32, slices: u32, entry_capacity: u32,
+    front_to_back: u32, width: u32, height: u32, tiles_x: u32, tiles_y: u32, slices: u32, entry_capacity: u32, long_list: u32,
     min_radius_px: f32, max_radius_px: f32, size_spread: f32, height_px_per_m: f32, slice_top: f32,
     slices_per_unit: f32, light_on: u32, light_width: u32, light_height: u32, light_unit: i32, light_origin_x: i32,
     light_origin_y: i32, light_shift_x_per_m: f32, light_shift_y_per_m: f32, light_depth_gain: f32, toward_u: f32, toward_v: f32,
@@ -59,7 +59,7 @@ const SCREEN_TILE_PX: u32 = 16u;
 const SCREEN_TILE_SHIFT: u32 = 8u;
 const SUBPIXELS: i32 = 16;
 const DEPTH_ONE: f32 = 4096.0;
-const HOT_ENTRIES: u32 = 1024u;
+const PART_ENTRIES: u32 = 1024u;
 const MOST_HOT_PARTS: u32 = 4096u;
 const NO_LIST: u32 = 0xffffffffu;
 const MISSING: f32 = -1.0e30;

@@ -10,12 +10,15 @@ use render_worker::plan::Plan;
 use render_worker::playback::Playback;
 use render_worker::stages::bin::{self, Bin, list_count};
 use render_worker::stages::eye::{self, Eye};
-use render_worker::stages::layout::{Entry, HOT_ENTRIES, MOST_HOT_PARTS, NO_LIST};
+use render_worker::stages::layout::{Entry, MOST_HOT_PARTS, NEVER_LONG, NO_LIST, PART_ENTRIES};
 use render_worker::stages::light::Light;
 use render_worker::{Frame, Interval, Scene};
 
 use crate::device::{checked_gpu, gpu};
-use crate::scenes::{GRAM_A_YEAR, globe, job};
+use crate::scenes::{GRAM_A_YEAR, globe, job, tile};
+
+/// Pictures as small as these have no list that holds others up: here lists are long beforehand.
+const LONG: u32 = PART_ENTRIES;
 
 /// Cells of a quarter of a degree all over the world: round a pole they crowd.
 const QUARTER_DEGREE: Grid = Grid {
@@ -60,12 +63,14 @@ fn draw(
     gpu: &Gpu,
     plan: &Plan,
     scene: &SceneBuffers,
+    long_list: u32,
     sources: [&str; 2],
     entry: &'static str,
 ) -> Drawn {
     let mut workspace = Workspace::default();
     let mut params = plan.params_of(plan.whole());
     params.entry_capacity = params.splat_count * 8;
+    params.long_list = long_list;
     let mut frame = FrameContext::new(gpu, &mut workspace, plan, params, scene.clone()).unwrap();
     let entry_bytes = u64::from(params.entry_capacity) * size_of::<Entry>() as u64;
     frame.room(Slot::Entries, entry_bytes).unwrap();
@@ -110,21 +115,14 @@ fn a_list_in_parts_is_a_list_as_a_whole() {
     let buffers = Playback::upload(gpu, &scene).unwrap();
     for mode in [Mode::Volume, Mode::Sprites] {
         let plan = Plan::for_device(&pole(mode), &scene, gpu.most_buffer_bytes()).unwrap();
-        // No list is long.
-        let uncut = bin::SOURCE.replace("own > HOT_ENTRIES", "own > 0xfffffffeu");
-        let uncut_eye =
-            eye::SOURCE.replace("end - begin > HOT_ENTRIES", "end - begin > 0xfffffffeu");
-        assert!(uncut != bin::SOURCE && uncut_eye != eye::SOURCE);
-        let whole = draw(gpu, &plan, &buffers, [&uncut, &uncut_eye], eye::SHARED);
+        assert!(plan.is_crowded);
+        let draw =
+            |long_list, sources, entry| draw(gpu, &plan, &buffers, long_list, sources, entry);
+        let sources = [bin::SOURCE, eye::SOURCE];
+        let whole = draw(NEVER_LONG, sources, eye::SHARED);
         assert_eq!(whole.parts[0], 0);
-        assert!(whole.longest > 3 * HOT_ENTRIES, "{}", whole.longest);
-        let cut = draw(
-            gpu,
-            &plan,
-            &buffers,
-            [bin::SOURCE, eye::SOURCE],
-            eye::SHARED,
-        );
+        assert!(whole.longest > 3 * PART_ENTRIES, "{}", whole.longest);
+        let cut = draw(LONG, sources, eye::SHARED);
         let taken = cut.parts[0] as usize;
         assert!(
             taken >= 8 && taken < MOST_HOT_PARTS as usize,
@@ -136,14 +134,31 @@ fn a_list_in_parts_is_a_list_as_a_whole() {
         let narrow = |source: &str| {
             source.replace("MOST_HOT_PARTS: u32 = 4096u", "MOST_HOT_PARTS: u32 = 5u")
         };
-        let [few, few_eye] = [narrow(bin::SOURCE), narrow(eye::SOURCE)];
+        let [few, few_eye] = [narrow(bin::SOURCE), narrow(&eye::with_parts(eye::SOURCE))];
         assert!(few != bin::SOURCE);
-        let short = draw(gpu, &plan, &buffers, [&few, &few_eye], eye::SHARED);
+        let short = draw(LONG, [&few, &few_eye], eye::SHARED);
         assert!(short.parts[0] as usize >= taken && short.pixels == whole.pixels);
-        let alone = draw(gpu, &plan, &buffers, [bin::SOURCE, eye::SOURCE], eye::ALONE);
-        let apart = alone.pixels.iter().zip(&whole.pixels);
-        assert!(apart.clone().all(|(a, b)| a.abs_diff(*b) <= 1), "{mode}");
+        let alone = draw(LONG, sources, eye::ALONE);
+        let mut apart = alone.pixels.iter().zip(&whole.pixels);
+        assert!(apart.all(|(a, b)| a.abs_diff(*b) <= 1), "{mode}");
     }
+}
+
+#[test]
+fn only_views_of_poles_and_limbs_look_for_long_lists() {
+    let scene = world(&QUARTER_DEGREE);
+    let is_crowded = |view| {
+        let plan = Plan::for_device(&job(Mode::Volume, view), &scene, u64::MAX).unwrap();
+        assert_eq!(
+            plan.params_of(plan.whole()).long_list == NEVER_LONG,
+            !plan.is_crowded
+        );
+        plan.is_crowded
+    };
+    assert!(!is_crowded(globe(10.0, 20.0, 2.0e6, 64)));
+    assert!(is_crowded(globe(10.0, -80.0, 2.0e6, 64)), "a pole");
+    assert!(is_crowded(globe(10.0, 20.0, 2.0e7, 64)), "the limb");
+    assert!(!is_crowded(tile(3, 2, 1, 256)));
 }
 
 #[test]
@@ -154,19 +169,15 @@ fn a_part_that_is_left_out_is_seen() {
     let scene = world(&QUARTER_DEGREE);
     let buffers = Playback::upload(gpu, &scene).unwrap();
     let plan = Plan::for_device(&pole(Mode::Volume), &scene, gpu.most_buffer_bytes()).unwrap();
-    let right = draw(
-        gpu,
-        &plan,
-        &buffers,
-        [bin::SOURCE, eye::SOURCE],
-        eye::SHARED,
-    );
+    let draw = |sources: [&str; 2]| draw(gpu, &plan, &buffers, LONG, sources, eye::SHARED);
+    let right = [bin::SOURCE.to_owned(), eye::with_parts(eye::SOURCE)];
+    let expected = draw([&right[0], &right[1]]);
     for (stage, from, to) in [
         (1, "part < end; part++", "part + 1u < end; part++"),
         (
             1,
-            "begin += (part + 1u - hot_lists[list]) * HOT_ENTRIES",
-            "begin += (part + 1u - hot_lists[list]) * 0u",
+            "(part + 1u - hot_lists[list]) * PART_ENTRIES",
+            "(part + 1u - hot_lists[list]) * 0u",
         ),
         (
             0,
@@ -174,19 +185,10 @@ fn a_part_that_is_left_out_is_seen() {
             "select(0u, first + 2u, fits)",
         ),
     ] {
-        let mut sources = [bin::SOURCE, eye::SOURCE].map(str::to_owned);
+        let mut sources = right.clone();
         sources[stage] = sources[stage].replace(from, to);
-        assert!(
-            sources[stage] != [bin::SOURCE, eye::SOURCE][stage],
-            "{from}"
-        );
-        let wrong = draw(
-            gpu,
-            &plan,
-            &buffers,
-            [&sources[0], &sources[1]],
-            eye::SHARED,
-        );
-        assert!(wrong.pixels != right.pixels, "{to}");
+        assert!(sources[stage] != right[stage], "{from}");
+        let wrong = draw([&sources[0], &sources[1]]);
+        assert!(wrong.pixels != expected.pixels, "{to}");
     }
 }

@@ -4,8 +4,8 @@ use render_worker::passes::{place, splat, trails};
 use render_worker::stages::fill::level::{FillLevel, MOST_REACH_COLS};
 use render_worker::stages::fill::{self, exact, pairs, window};
 use render_worker::stages::layout::{
-    Axis, Col, DEPTH_ONE, Entry, GROUP, GroundAxis, HOT_ENTRIES, KERNEL_BALL, KERNEL_CLOUD,
-    KERNEL_DOT, LIGHT_ALONE, LIGHT_GIVEN, LIGHT_OFF, LIGHT_OWN, MISSING, MOST_HOT_PARTS, NO_LIST,
+    Axis, Col, DEPTH_ONE, Entry, GROUP, GroundAxis, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT,
+    LIGHT_ALONE, LIGHT_GIVEN, LIGHT_OFF, LIGHT_OWN, MISSING, MOST_HOT_PARTS, NO_LIST, PART_ENTRIES,
     Params, Particle, Row, SCREEN_TILE_PX, SCREEN_TILE_SHIFT, SQUARE, SUBPIXELS, Splat, VIEW_GLOBE,
     VIEW_TILE, Velocity, WATER_BLUE, WATER_GREEN, WATER_RED,
 };
@@ -136,7 +136,7 @@ fn constants_have_the_same_value_in_rust_and_wgsl() {
         ("SCREEN_TILE_SHIFT", f64::from(SCREEN_TILE_SHIFT)),
         ("SUBPIXELS", f64::from(SUBPIXELS)),
         ("DEPTH_ONE", f64::from(DEPTH_ONE)),
-        ("HOT_ENTRIES", f64::from(HOT_ENTRIES)),
+        ("PART_ENTRIES", f64::from(PART_ENTRIES)),
         ("MOST_HOT_PARTS", f64::from(MOST_HOT_PARTS)),
         ("NO_LIST", f64::from(NO_LIST)),
         ("MISSING", f64::from(MISSING)),

@@ -1,4 +1,4 @@
-// From the lengths of lists to their starts: an exclusive scan in three steps.
+// From the lengths of lists to their starts: an exclusive scan in two steps.
 @group(0) @binding(1) var<storage, read_write> counts: array<u32>;
 @group(0) @binding(2) var<storage, read_write> block_sums: array<u32>;
 // Long lists and their parts: see the eye's `hot.wgsl`.
@@ -9,7 +9,7 @@ const PER_INVOCATION = 8u;
 
 // Finds room for the parts of a long list.
 fn cut(list: u32, length: u32) {
-    let parts = (length + HOT_ENTRIES - 1u) / HOT_ENTRIES;
+    let parts = (length + PART_ENTRIES - 1u) / PART_ENTRIES;
     let first = atomicAdd(&hot_parts[0], parts);
     let fits = first + parts <= MOST_HOT_PARTS;
     for (var part = first; part < min(first + parts, MOST_HOT_PARTS); part++) {
@@ -47,7 +47,7 @@ fn scan_blocks(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgro
         if (base + j < length) {
             let own = counts[base + j];
             sum += own;
-            if (own > HOT_ENTRIES) { cut(base + j, own); }
+            if (own > params.long_list) { cut(base + j, own); }
         }
     }
     let start = scan_workgroup(invocation, sum);
@@ -58,28 +58,17 @@ fn scan_blocks(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgro
 }
 
 @compute @workgroup_size(GROUP)
-fn scan_sums(@builtin(local_invocation_index) invocation: u32) {
-    let block = GROUP * PER_INVOCATION;
-    let blocks = (params.tiles_x * params.tiles_y * params.slices + block - 1u) / block;
-    let each = (blocks + GROUP - 1u) / GROUP;
-    let first = invocation * each;
-    var sum = 0u;
-    for (var j = first; j < min(first + each, blocks); j++) { sum += block_sums[j]; }
-    var start = scan_workgroup(invocation, sum);
-    for (var j = first; j < min(first + each, blocks); j++) {
-        let own = block_sums[j];
-        block_sums[j] = start;
-        start += own;
-    }
-}
-
-@compute @workgroup_size(GROUP)
 fn scan_add(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>,
     @builtin(local_invocation_index) invocation: u32) {
     let block = workgroup.x + workgroup.y * workgroups.x;
+    // Every workgroup sums up the blocks before its own: there are some hundred, and a step between would cost more.
+    var own = 0u;
+    for (var before = invocation; before < block; before += GROUP) { own += block_sums[before]; }
+    scan_workgroup(invocation, own);
+    let start = partial[GROUP - 1u];
     let length = params.tiles_x * params.tiles_y * params.slices;
     for (var j = 0u; j < PER_INVOCATION; j++) {
         let at = (block * PER_INVOCATION + j) * GROUP + invocation;
-        if (at < length) { counts[at] += block_sums[block]; }
+        if (at < length) { counts[at] += start; }
     }
 }

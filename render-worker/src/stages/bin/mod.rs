@@ -9,7 +9,7 @@ use crate::error::RenderError;
 use crate::frame::FrameContext;
 use crate::gpu::{Gpu, Kernel, Slot};
 use crate::stages::eye;
-use crate::stages::layout::{Params, SCAN_BLOCK};
+use crate::stages::layout::{NEVER_LONG, Params, SCAN_BLOCK};
 
 /// The functions that tell the lists of a splat.
 pub const FUNCTIONS: &str = include_str!("reach.wgsl");
@@ -21,9 +21,7 @@ pub const SOURCE: &str = concat!(include_str!("../prelude.wgsl"), include_str!("
 pub struct Bin {
     /// Scans each block of lists and sums it up.
     blocks: Kernel,
-    /// Scans the sums.
-    sums: Kernel,
-    /// Adds them to the blocks.
+    /// Adds to each block the sums of those before it.
     add: Kernel,
 }
 
@@ -38,7 +36,6 @@ impl Bin {
         let kernel = |entry| gpu.kernel(entry, source, entry);
         Self {
             blocks: kernel("scan_blocks"),
-            sums: kernel("scan_sums"),
             add: kernel("scan_add"),
         }
     }
@@ -51,12 +48,13 @@ impl Bin {
         let [hot_lists, hot_parts] = eye::hot_room(frame)?;
         let params = &frame.params_buffer;
         let recorder = &mut frame.recorder;
-        recorder.clear(&hot_parts, 4);
+        if frame.params.long_list != NEVER_LONG {
+            recorder.clear(&hot_parts, 4);
+        }
         let scan = [(0, params), (1, &counts), (2, &sums)];
         let hot = [(3, &hot_lists), (4, &hot_parts)];
         let blocks = [scan.as_slice(), &hot].concat();
         recorder.dispatch_list(&self.blocks, &blocks, lists, SCAN_BLOCK);
-        recorder.dispatch(&self.sums, &[(0, params), (2, &sums)], [1, 1]);
         recorder.dispatch_list(&self.add, &scan, lists, SCAN_BLOCK);
         Ok(())
     }

@@ -79,6 +79,9 @@ fn taken(at: u32) -> vec4<u32> {
     return vec4(taken_one(at), taken_one(PIXELS + at), taken_one(2u * PIXELS + at), taken_one(3u * PIXELS + at));
 }
 
+// What a list that is summed up in parts adds to a pixel, if it is such a list.
+struct LongSum { is_there: bool, own: vec4<u32> }
+
 fn is_covered(picture: vec4<f32>) -> bool {
     return params.front_to_back == 1u && picture.w > OPAQUE;
 }
@@ -114,12 +117,10 @@ fn eye(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(global_invocation_i
             let begin = ends[slice];
             let end = ends[slice + 1u];
             if (end <= begin) { continue; }
-            if (end - begin > HOT_ENTRIES) {
-                let first_part = hot_lists[first_list + first + slice];
-                if (first_part > 0u) {
-                    color = blended(color, hot_sum(first_part, end - begin, invocation));
-                    continue;
-                }
+            let long = long_sum(first_list + first + slice, end - begin, invocation);
+            if (long.is_there) {
+                color = blended(color, long.own);
+                continue;
             }
             var own = vec4(0u);
             for (var base = begin; base < end; base += SAFE) {

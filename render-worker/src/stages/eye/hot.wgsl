@@ -1,7 +1,7 @@
 // Lists that are long beyond the others, where cells crowd (round a pole, along a limb): cut into parts, each summed up
 // by a workgroup of its own before the eye looks. Sums of integers are the same however they are cut.
 
-// Of a list of more than HOT_ENTRIES: its first part and 1; 0 where there was no room for its parts.
+// Of a long list: its first part and 1; 0 where there was no room for its parts.
 @group(0) @binding(8) var<storage, read_write> hot_lists: array<u32>;
 // How many parts there are, and of each the list.
 @group(0) @binding(9) var<storage, read_write> hot_parts: array<u32>;
@@ -10,16 +10,19 @@
 
 const PART_SUMS = 1024u; // 4 times PIXELS
 
-// What all parts of a list add to a pixel; `first` is one more than its first part.
-fn hot_sum(first: u32, length: u32, pixel: u32) -> vec4<u32> {
+// What all parts of a list add to a pixel.
+fn long_sum(list: u32, length: u32, pixel: u32) -> LongSum {
+    if (length <= params.long_list) { return LongSum(false, vec4(0u)); }
+    let first = hot_lists[list];
+    if (first == 0u) { return LongSum(false, vec4(0u)); }
     var own = vec4(0u);
-    let end = first - 1u + (length + HOT_ENTRIES - 1u) / HOT_ENTRIES;
+    let end = first - 1u + (length + PART_ENTRIES - 1u) / PART_ENTRIES;
     for (var part = first - 1u; part < end; part++) {
         let at = part * PART_SUMS + pixel;
         let more = vec4(hot_sums[at], hot_sums[at + PIXELS], hot_sums[at + 2u * PIXELS], hot_sums[at + 3u * PIXELS]);
         own += min(more, vec4(MOST_SUM) - own);
     }
-    return own;
+    return LongSum(true, own);
 }
 
 @compute @workgroup_size(SCREEN_TILE_PX, SCREEN_TILE_PX)
@@ -33,8 +36,8 @@ fn hot(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) wor
         if (list == NO_LIST) { continue; }
         var begin = 0u;
         if (list > 0u) { begin = min(list_ends[list - 1u], params.entry_capacity); }
-        begin += (part + 1u - hot_lists[list]) * HOT_ENTRIES;
-        let end = min(begin + HOT_ENTRIES, min(list_ends[list], params.entry_capacity));
+        begin += (part + 1u - hot_lists[list]) * PART_ENTRIES;
+        let end = min(begin + PART_ENTRIES, min(list_ends[list], params.entry_capacity));
         var own = vec4(0u);
         for (var base = begin; base < end; base += SAFE) {
             for (var at = base + (invocation >> 1u); at < min(base + SAFE, end); at += PIXELS / 2u) {

@@ -9,7 +9,7 @@ use crate::frame::FrameContext;
 use crate::gpu::{Gpu, Kernel, Slot};
 use crate::stages::bin::list_count;
 use crate::stages::compose;
-use crate::stages::layout::{MOST_HOT_PARTS, SCREEN_TILE_PX};
+use crate::stages::layout::{MOST_HOT_PARTS, NEVER_LONG, Params, SCREEN_TILE_PX};
 
 /// The shader.
 pub const SOURCE: &str = concat!(
@@ -18,7 +18,7 @@ pub const SOURCE: &str = concat!(
     include_str!("../compose/globe.wgsl"),
     include_str!("../compose/over_globe.wgsl"),
     include_str!("eye.wgsl"),
-    include_str!("hot.wgsl"),
+    include_str!("whole.wgsl"),
     include_str!("alone.wgsl")
 );
 
@@ -34,7 +34,7 @@ pub const SOURCE_IN_CONTEXT: &str = concat!(
     include_str!("../compose/terrain.wgsl"),
     include_str!("../compose/in_context.wgsl"),
     include_str!("eye.wgsl"),
-    include_str!("hot.wgsl"),
+    include_str!("whole.wgsl"),
     include_str!("alone.wgsl")
 );
 
@@ -48,8 +48,22 @@ pub struct Eye {
     entry: &'static str,
     /// For pictures in their surroundings; compiled when they are first wanted.
     in_context: [OnceLock<Kernel>; 3],
-    /// Sums long lists up in parts; none where pixels work alone.
-    hot: Option<Kernel>,
+    /// For pictures where cells crowd; likewise.
+    crowded: OnceLock<Crowded>,
+    source: String,
+}
+
+/// The kernels that know of long lists.
+struct Crowded {
+    /// Sums up the parts.
+    hot: Kernel,
+    of_kernel: [OnceLock<Kernel>; 3],
+    in_context: [OnceLock<Kernel>; 3],
+}
+
+/// A shader of the eye that knows of lists in parts; [`SOURCE`] and [`SOURCE_IN_CONTEXT`] do not.
+pub fn with_parts(source: &str) -> String {
+    source.replace(include_str!("whole.wgsl"), include_str!("hot.wgsl"))
 }
 
 /// Workgroups that take the parts of long lists in turn: as many as a large device runs at once.
@@ -77,7 +91,8 @@ impl Eye {
             source_in_context: source_in_context.to_owned(),
             entry,
             in_context: Default::default(),
-            hot: (entry == SHARED).then(|| gpu.kernel("hot", source, "hot")),
+            crowded: OnceLock::new(),
+            source: source.to_owned(),
         }
     }
 
@@ -86,43 +101,50 @@ impl Eye {
         let counts = frame.room(Slot::Counts, 4)?;
         let entries = frame.room(Slot::Entries, 4)?;
         let image = frame.room(Slot::Image, frame.pixel_count() * 4)?;
-        let long = self.hot.as_ref();
-        let long = long.map(|kernel| sum_up(kernel, frame)).transpose()?;
-        let long = long.iter().flatten();
-        let long: Vec<_> = long.map(|(binding, buffer)| (*binding, buffer)).collect();
         let groups = [frame.params.tiles_x, frame.params.tiles_y];
-        let kind = frame.params.kernel as usize;
-        if frame.params.in_context == 1 {
-            let [terrain, axes, coast] = compose::surroundings(frame)?;
-            let gpu = frame.gpu;
-            let kernel = self.in_context[kind]
-                .get_or_init(|| compiled(gpu, &self.source_in_context, KERNELS[kind], self.entry));
-            let buffers = [
-                (0, &frame.params_buffer),
-                (1, &counts),
-                (2, &entries),
-                (3, &frame.domain),
-                (4, &image),
-                (5, &terrain),
-                (6, &axes),
-                (7, &coast),
-            ];
-            let buffers = [&buffers, long.as_slice()].concat();
-            frame.recorder.dispatch(kernel, &buffers, groups);
-            return Ok(());
-        }
-        let buffers = [
-            (0, &frame.params_buffer),
-            (1, &counts),
-            (2, &entries),
-            (3, &frame.domain),
-            (4, &image),
+        let is_crowded = frame.params.long_list != NEVER_LONG && self.entry == SHARED;
+        let mut buffers = vec![
+            (0, frame.params_buffer.clone()),
+            (1, counts),
+            (2, entries),
+            (3, frame.domain.clone()),
+            (4, image),
         ];
-        let buffers = [&buffers, long.as_slice()].concat();
-        frame
-            .recorder
-            .dispatch(&self.of_kernel[kind], &buffers, groups);
+        if frame.params.in_context == 1 {
+            buffers.extend((5..).zip(compose::surroundings(frame)?));
+        }
+        if is_crowded {
+            let hot = &self.crowded(frame.gpu).hot;
+            buffers.extend(sum_up(hot, frame)?);
+        }
+        let kernel = self.kernel(frame.gpu, &frame.params, is_crowded);
+        let buffers: Vec<_> = buffers.iter().map(|(at, buffer)| (*at, buffer)).collect();
+        frame.recorder.dispatch(kernel, &buffers, groups);
         Ok(())
+    }
+
+    /// The kernel of a picture, compiled if it is the first of its kind.
+    fn kernel(&self, gpu: &Gpu, params: &Params, is_crowded: bool) -> &Kernel {
+        let kind = params.kernel as usize;
+        let compiled = |source: &str| compiled(gpu, source, KERNELS[kind], self.entry);
+        let in_context = &self.source_in_context;
+        match (params.in_context == 1, is_crowded) {
+            (false, false) => &self.of_kernel[kind],
+            (true, false) => self.in_context[kind].get_or_init(|| compiled(in_context)),
+            (false, true) => self.crowded(gpu).of_kernel[kind]
+                .get_or_init(|| compiled(&with_parts(&self.source))),
+            (true, true) => {
+                self.crowded(gpu).in_context[kind].get_or_init(|| compiled(&with_parts(in_context)))
+            }
+        }
+    }
+
+    fn crowded(&self, gpu: &Gpu) -> &Crowded {
+        self.crowded.get_or_init(|| Crowded {
+            hot: gpu.kernel("hot", &with_parts(&self.source), "hot"),
+            of_kernel: Default::default(),
+            in_context: Default::default(),
+        })
     }
 }
 

@@ -94,8 +94,8 @@ fn the_lists_hold_every_stored_splat_once_and_in_its_light() {
         prove(
             "bin",
             bin::SOURCE,
-            "counts[at] += block_sums[block]",
-            "counts[at] += block_sums[block] + 1u",
+            "counts[at] += start",
+            "counts[at] += start + 1u",
             |gpu, source| distance(gpu, source, place::SOURCE),
         );
         let (shared, unshared) = (place::SOURCE, passes::unshared(place::SOURCE));
