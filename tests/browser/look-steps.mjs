@@ -59,14 +59,16 @@ export async function lookIsAsked(journey) {
   await shownIs(journey, `palette=${palette}`);
   assert.notEqual(await journey.shown(), before);
 
-  await page.locator("#range-low").fill("30");
-  await page.locator("#range-high").fill("20");
-  await page.locator("#range-high").press("Enter");
+  const { legend } = await journey.product();
+  await page.locator("#range-low").fill(String(legend.high + 1));
+  await page.locator("#range-low").press("Enter");
   await page.locator("#range-problem", { hasText: "below" }).waitFor();
   assert.equal((await journey.state()).look.range, null, "a range that does not rise is not taken");
   await page.locator("#range-low").fill("-20");
   await page.locator("#range-low").press("Enter");
   await page.locator("#range-problem").waitFor({ state: "hidden" });
+  await page.locator("#range-high").fill("20");
+  await page.locator("#range-high").press("Enter");
   await shownIs(journey, `palette=${palette}&range=-20:20`);
 
   const { mode, product } = await journey.state();
@@ -100,6 +102,27 @@ export async function addressKeepsLook(journey) {
   assert.equal(await page.locator(`input[name="palette"][value="${look.palette}"]`).isChecked(), true);
   assert.equal(await page.locator("#range-low").inputValue(), "-20");
   await eventually(async () => assert.equal(await tick(journey, "first"), -20));
+}
+
+/** Pictures that load out of sight, and the server's own image of the view. */
+export async function playbackAndViewFollowLook(journey) {
+  const { page, watch } = journey;
+  const { look, mode } = await journey.state();
+  const wanted = { palette: look.palette, range: "-20:20", reverse: undefined };
+  const from = watch.responses.length;
+  const before = await journey.shown();
+  await page.locator("#play").click();
+  await journey.until((shown) => window.fluxglobe.shown !== shown, before);
+  await page.locator("#play").click();
+  await page.locator("#render-view").click();
+  await page.locator("#view-image").waitFor();
+  await page.keyboard.press("Escape");
+  await journey.until(() => window.fluxglobe.tilesPending === 0);
+  const tiles = queries(watch, from, new RegExp(`/tiles/[^/]+/${mode}/`));
+  assert.ok(tiles.length > 0);
+  const views = queries(watch, from, /\/globe\//);
+  assert.equal(views.length, 1);
+  for (const query of [...tiles, ...views]) assert.deepEqual(colours(query), wanted);
 }
 
 export async function lookIsReset(journey) {

@@ -11,6 +11,7 @@ import {
   lookIsAsked,
   lookIsReset,
   palettesAndReliefsAreOffered,
+  playbackAndViewFollowLook,
   wrongLookIsIgnored,
 } from "./look-steps.mjs";
 import { newDataIsShown, newDataLands, observationsOfPlatform } from "./stream-steps.mjs";
@@ -65,6 +66,7 @@ test("the viewer", async (t) => {
     await step("offers palettes and reliefs", palettesAndReliefsAreOffered);
     await step("draws tiles and legend in a palette and a range that are chosen", lookIsAsked);
     await step("keeps the look in its address", addressKeepsLook);
+    await step("plays and renders views in the look", playbackAndViewFollowLook);
     await step("goes back to the usual look", lookIsReset);
     await step("passes over what an address asks of the look and is not there", wrongLookIsIgnored);
     await step("shows data that lands while it is open", newDataLands);
