@@ -86,6 +86,33 @@ export async function lookIsAsked(journey) {
   await journey.shot("look");
 }
 
+/** A picture must not stay under the legend of another one: tiles are held back here, the new legend is not. */
+export async function legendWaitsForPicture(journey) {
+  const { page } = journey;
+  const bar = () => page.locator("#legend .legend-bar").evaluate((element) => element.style.background);
+  const before = { bar: await bar(), look: (await journey.state()).look };
+  let release;
+  const held = new Promise((resolve) => (release = resolve));
+  const isReversed = (url) => url.searchParams.get("reverse") === "true";
+  const isTile = (url) => url.pathname.includes("/tiles/") && isReversed(url);
+  await page.route(isTile, async (route) => {
+    await held;
+    await route.continue();
+  });
+  const legend = page.waitForResponse((answer) => /legend\.json/.test(answer.url()) && isReversed(new URL(answer.url())));
+  await page.locator("#reversed").check();
+  await legend;
+  await journey.until(() => window.fluxglobe.tilesPending > 0);
+  assert.equal(await bar(), before.bar);
+  release();
+  await shownIs(journey, `palette=${before.look.palette}&range=-20:20&reverse=true`);
+  await eventually(async () => assert.notEqual(await bar(), before.bar));
+  await page.unroute(isTile);
+  await page.locator("#reversed").uncheck();
+  await shownIs(journey, `palette=${before.look.palette}&range=-20:20`);
+  await eventually(async () => assert.equal(await bar(), before.bar));
+}
+
 export async function addressKeepsLook(journey) {
   const { page, watch } = journey;
   const { look } = await journey.state();

@@ -8,6 +8,7 @@ import { Journey, LIMIT_MS } from "./journey.mjs";
 import { legendHasUnit, loads, plays, renderedView, sliderMoves, tilesArrive, volumeMode } from "./layer-steps.mjs";
 import {
   addressKeepsLook,
+  legendWaitsForPicture,
   lookIsAsked,
   lookIsReset,
   palettesAndReliefsAreOffered,
@@ -65,6 +66,7 @@ test("the viewer", async (t) => {
     await step("shows the rendered view in a dialog", renderedView);
     await step("offers palettes and reliefs", palettesAndReliefsAreOffered);
     await step("draws tiles and legend in a palette and a range that are chosen", lookIsAsked);
+    await step("keeps the legend of the picture in sight until the next one is there", legendWaitsForPicture);
     await step("keeps the look in its address", addressKeepsLook);
     await step("plays and renders views in the look", playbackAndViewFollowLook);
     await step("goes back to the usual look", lookIsReset);

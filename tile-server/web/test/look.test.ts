@@ -54,6 +54,7 @@ const SPEEDS = { low: 0, high: 1.5, unit: "m s⁻¹", label: "Speed", stops: ICE
 const CATALOGUE = new Catalogue([
   product("flux"),
   product("flux-accumulated", { quantity: "accumulated_carbon", derived_from: "flux@1-00000000" }),
+  product("sea-east-smooth", { quantity: "current", derived_from: "sea-east@1-00000000" }),
   product("etopo20", { quantity: "elevation", title: "ETOPO5" }),
   product("etopo5", { quantity: "elevation", steps: [] }),
   product("sea-east", { quantity: "current", flow_legend: SPEEDS }),
@@ -202,6 +203,12 @@ describe("the look panel", () => {
     expect(shown({ mode: "volume", product: "sea-east" })).toEqual([true, false, false, false]);
     expect(shown({ mode: "map", look: FULL })).toEqual([true, true, true, false]);
     expect(shown({ mode: "flow", product: "sea-east" })).toEqual([false, false, false, false]);
+  });
+
+  it("knows of the carbon that accumulated from a product, and takes nothing else for it", () => {
+    const lifted = CATALOGUE.products.map((each) => each.id).filter((id) => CATALOGUE.isLifted(id));
+    expect(lifted).toEqual(["flux"]);
+    expect(CATALOGUE.isLifted("flu")).toBe(false);
   });
 
   it("offers nothing before there is a product", () => {
