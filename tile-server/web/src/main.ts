@@ -311,7 +311,7 @@ function drawable(look: Look): Look {
 
 function keepAddress(): void {
   let timer: ReturnType<typeof setTimeout> | undefined;
-  store.on(["product", "mode", "timeMs", "camera", "opacity", "look", "place", "tab", "region"], () => {
+  store.on(["product", "mode", "timeMs", "camera", "opacity", "look", "place", "tab", "region", "observations"], () => {
     timer ??= setTimeout(() => {
       timer = undefined;
       history.replaceState(null, "", encodeHash(store.state));
@@ -327,7 +327,8 @@ function keepAddress(): void {
     }
     if (change.camera) globe.view = change.camera;
     askedMs = change.timeMs;
-    store.set({ place: null, tab: null, region: INITIAL.region, opacity: INITIAL.opacity, ...change, look });
+    const { region, opacity, observations } = INITIAL;
+    store.set({ place: null, tab: null, region, opacity, observations, ...change, look });
     // A change of product has looked at the instant already.
     if (askedMs !== undefined) useProduct();
   });
