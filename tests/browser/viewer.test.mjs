@@ -6,6 +6,15 @@ import { testHarness } from "./harness-self.mjs";
 import { openBrowser, Watch } from "./harness.mjs";
 import { Journey, LIMIT_MS } from "./journey.mjs";
 import { legendHasUnit, loads, plays, renderedView, sliderMoves, tilesArrive, volumeMode } from "./layer-steps.mjs";
+import {
+  addressKeepsLook,
+  legendWaitsForPicture,
+  lookIsAsked,
+  lookIsReset,
+  palettesAndReliefsAreOffered,
+  playbackAndViewFollowLook,
+  wrongLookIsIgnored,
+} from "./look-steps.mjs";
 import { newDataIsShown, newDataLands, observationsOfPlatform } from "./stream-steps.mjs";
 import { lostServer, refusedTiles, sharedAddress, timeOutside } from "./trouble-steps.mjs";
 
@@ -55,6 +64,13 @@ test("the viewer", async (t) => {
     await step("plots what a platform that is clicked measured", observationsOfPlatform);
     await step("fetches volume tiles in volume mode", volumeMode);
     await step("shows the rendered view in a dialog", renderedView);
+    await step("offers palettes and reliefs", palettesAndReliefsAreOffered);
+    await step("draws tiles and legend in a palette and a range that are chosen", lookIsAsked);
+    await step("keeps the legend of the picture in sight until the next one is there", legendWaitsForPicture);
+    await step("keeps the look in its address", addressKeepsLook);
+    await step("plays and renders views in the look", playbackAndViewFollowLook);
+    await step("goes back to the usual look", lookIsReset);
+    await step("passes over what an address asks of the look and is not there", wrongLookIsIgnored);
     await step("shows data that lands while it is open", newDataLands);
     await step("says so when its address asks for a time that there is nothing of", timeOutside);
     await step("has nothing to complain about at the end", async () => {});

@@ -234,13 +234,21 @@ fn colors(transfer: &TransferFunction) -> Vec<(f64, String)> {
             |value| Some(at(value)),
         );
     }
-    let mut stops: Vec<_> = transfer.palette.stops().to_vec();
+    let stops = transfer.palette.stops().iter();
     if transfer.reversed {
-        stops.reverse();
+        evenly_placed(stops.rev())
+    } else {
+        evenly_placed(stops)
     }
-    let last = (stops.len() - 1) as f64;
-    let stop = |(i, color): (usize, [u8; 3])| (i as f64 / last, Rgb(color).to_string());
-    stops.into_iter().enumerate().map(stop).collect()
+}
+
+/// Two colours or more at equal distances from 0 to 1.
+pub(crate) fn evenly_placed<'a>(
+    colors: impl ExactSizeIterator<Item = &'a [u8; 3]>,
+) -> Vec<(f64, String)> {
+    let last = (colors.len() - 1) as f64;
+    let stop = |(i, color): (usize, &[u8; 3])| (i as f64 / last, Rgb(*color).to_string());
+    colors.enumerate().map(stop).collect()
 }
 
 /// Stops as places of the range and what holds there, its ends included; none without stops.

@@ -10,6 +10,7 @@
 //! | `/api/products/{product}/point?lon=&lat=&manifest=` | series of the cell at a place |
 //! | `/api/products/{product}/budget?region=&from=&to=&step=&earth=&manifest=` | carbon budget |
 //! | `/api/regions` | regions with a name |
+//! | `/api/palettes` | palettes with a name |
 //! | `/api/check` | our budgets beside published ones, `null` where there is nothing to compare with |
 //! | `/api/events` | news of new versions as server-sent events |
 //! | `/api/observations/platforms?bbox=&from=&to=&property=&kind=` | buoys, ships, stations and profiles as GeoJSON |

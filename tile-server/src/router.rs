@@ -13,8 +13,8 @@ use crate::error::ServerError;
 use crate::middleware::{limits, panics::CountPanics, security, track};
 use crate::routes::picture::{COVERED, SHOWN_TIME};
 use crate::routes::{
-    budget, check, events, globe, health, legend, metrics, observations, platforms, point,
-    products, regions, tilejson, tiles, viewer,
+    budget, check, events, globe, health, legend, metrics, observations, palettes, platforms,
+    point, products, regions, tilejson, tiles, viewer,
 };
 use crate::state::AppState;
 
@@ -44,6 +44,7 @@ pub fn router(state: AppState) -> Router {
         .route("/api/products/{product}/budget", get(budget::get))
         .route("/api/products/{product}/{legend_file}", get(legend::get))
         .route("/api/regions", get(regions::list))
+        .route("/api/palettes", get(palettes::list))
         .route("/api/check", get(check::get))
         .route("/api/events", get(events::get))
         .route("/api/observations/platforms", get(platforms::get))

@@ -21,6 +21,7 @@ mod live;
 mod look;
 mod metrics;
 mod observations;
+mod palettes;
 mod point;
 mod products;
 mod properties;

@@ -1,5 +1,6 @@
 //! The server's JSON, typed, and one way to ask for it: a request in, the answer or an `ApiError` with the server's own reason out.
 import type { Bounds } from "./box";
+import { queryOf, type Parameter } from "./look-address";
 import type { Mode } from "./state";
 
 export interface Legend {
@@ -11,6 +12,12 @@ export interface Legend {
   stops: [number, string][];
   /** Round values to mark; an older server does not say. */
   ticks?: number[];
+}
+
+export interface Palette {
+  name: string;
+  /** Position 0..1 and a colour, as in legends. */
+  stops: [number, string][];
 }
 
 export interface Product {
@@ -154,9 +161,16 @@ function anyOf(a: AbortSignal, b: AbortSignal): AbortSignal {
 
 export const products = () => getJson<{ products: Product[] }>(address("api/products")).then((body) => body.products);
 export const regions = () => getJson<{ regions: Region[] }>(address("api/regions")).then((body) => body.regions);
+export const palettes = () => getJson<{ palettes: Palette[] }>(address("api/palettes")).then((body) => body.palettes);
 export const layerInfo = (product: string, mode: Mode) =>
   getJson<LayerInfo>(address(`tiles/${encodeURIComponent(product)}/${mode}.json`));
 export const healthUrl = () => address("healthz");
+
+/** What the colours of a look mean; `colours` are the parameters of it that a legend goes by. Only a flow's are of another value. */
+export function legend(product: string, mode: Mode, colours: readonly Parameter[]): Promise<Legend> {
+  const query = { ...(mode === "flow" ? { mode } : {}), ...Object.fromEntries(colours) };
+  return getJson<Legend>(address(`api/products/${encodeURIComponent(product)}/legend.json`, query));
+}
 
 /** Undefined where the server has no published values to hold against. */
 export async function check(): Promise<Check | undefined> {
@@ -188,10 +202,21 @@ export interface Version {
 }
 
 /** `{z}`, `{x}` and `{y}` are left for the imagery provider to fill. */
-export function tileTemplate(product: string, mode: Mode, timeIso: string, version: Version): string {
+export function tileTemplate(
+  product: string,
+  mode: Mode,
+  timeIso: string,
+  version: Version,
+  look: readonly Parameter[] = [],
+): string {
   const folder = address(`tiles/${encodeURIComponent(product)}/${mode}/`);
-  const query = `time=${encodeURIComponent(timeIso)}&manifest=${encodeURIComponent(version.manifest)}`;
-  return `${folder}{z}/{x}/{y}.png?${query}${version.revision > 0 ? `&revision=${version.revision}` : ""}`;
+  const query = queryOf([
+    ["time", encodeURIComponent(timeIso)],
+    ["manifest", encodeURIComponent(version.manifest)],
+    ...(version.revision > 0 ? [["revision", String(version.revision)] as const] : []),
+    ...look,
+  ]);
+  return `${folder}{z}/{x}/{y}.png?${query}`;
 }
 
 export interface GlobeView {
@@ -201,6 +226,7 @@ export interface GlobeView {
   timeIso: string;
   width: number;
   height: number;
+  look: readonly Parameter[];
 }
 
 export function globeUrl(product: string, mode: Mode, view: GlobeView): string {
@@ -211,5 +237,6 @@ export function globeUrl(product: string, mode: Mode, view: GlobeView): string {
     time: view.timeIso,
     width: String(view.width),
     height: String(view.height),
+    ...Object.fromEntries(view.look),
   });
 }

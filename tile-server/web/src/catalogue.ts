@@ -1,7 +1,8 @@
 //! The products as the page uses them: steps parsed, zoom limits fetched once, and the layer that a state describes.
 import * as api from "./api";
-import type { Product } from "./api";
+import type { Legend, Product } from "./api";
 import { titleText } from "./format";
+import { effective, type Look } from "./look";
 import type { Mode, State } from "./state";
 import type { LayerSpec } from "./tiles";
 import { clampToRange, parseSteps, toIso, type Step } from "./time";
@@ -11,6 +12,10 @@ const DEFAULT_MAX_ZOOM = 6;
 
 /** The quantity budgets are made of. */
 export const FLUX = "carbon_flux";
+/** The quantity that lifts and sinks the particles of what it was derived from. */
+const ACCUMULATED = "accumulated_carbon";
+/** The quantity reliefs are made of. */
+const ELEVATION = "elevation";
 
 export class Catalogue {
   readonly products: readonly Product[];
@@ -50,6 +55,29 @@ export class Catalogue {
     });
   }
 
+  /** What can lie below a layer. */
+  get reliefs(): Product[] {
+    return this.products.filter((product) => product.quantity === ELEVATION && product.steps.length > 0);
+  }
+
+  /** Carbon that accumulated lifts the product's particles. */
+  isLifted(id: string): boolean {
+    return this.products.some(
+      (product) => product.quantity === ACCUMULATED && product.derived_from?.startsWith(`${id}@`),
+    );
+  }
+
+  /** What the colours mean as long as nobody chose others. */
+  usualLegend(id: string | null, mode: Mode): Legend | undefined {
+    const product = this.find(id);
+    return (mode === "flow" ? product?.flow_legend : undefined) ?? product?.legend;
+  }
+
+  /** What is drawn of the chosen look in a mode. */
+  lookIn(mode: Mode, { product, look }: Readonly<State>): Look {
+    return effective(look, mode, product !== null && this.isLifted(product));
+  }
+
   stepsOf(id: string | null): readonly Step[] {
     return (id !== null && this.#steps.get(id)) || [];
   }
@@ -77,6 +105,7 @@ export class Catalogue {
       manifest: product.manifest,
       revision: this.#revisions.get(product.id) ?? 0,
       mode: state.mode,
+      look: this.lookIn(state.mode, state),
       timeIso: toIso(clampedMs),
       bounds: product.bounds,
       maxZoom: this.#maxZoom.get(`${product.id}/${state.mode}`) ?? DEFAULT_MAX_ZOOM,

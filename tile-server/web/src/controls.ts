@@ -1,9 +1,9 @@
-//! The layer card: product, mode, opacity, legend and what is loading; changes go to the store only.
+//! The layer card: product, mode, opacity and what is loading, with room for the legend; changes go to the store only.
 import type { Product } from "./api";
 import { el, icon } from "./dom";
 import { chemistry, titleText } from "./format";
 import { PICTURE } from "./icons";
-import { legendView } from "./legend";
+import { withoutColours } from "./look";
 import { MODES, type Mode, type Store } from "./state";
 import type { TileCounts } from "./tiles";
 
@@ -17,13 +17,13 @@ const MODE_HINTS: Record<Mode, string> = {
 };
 
 export class Controls {
+  /** Room for the legend. */
+  readonly legend = el("div", { class: "legend-slot" });
   /** Room for the toggle of observations. */
   readonly observations = el("div");
   readonly #store: Store;
-  #shown: Product | undefined;
   readonly #product = el("select", { id: "product", "aria-label": "Product" });
   readonly #modes = el("div", { class: "segments", role: "radiogroup", "aria-label": "Mode" });
-  readonly #legend = el("div", { class: "legend-slot" });
   readonly #source = el("p", { class: "source" });
   readonly #progress = el("div", { class: "progress", id: "progress", role: "status" });
 
@@ -38,7 +38,9 @@ export class Controls {
       value: String(store.state.opacity),
     });
     opacity.addEventListener("input", () => store.set({ opacity: Number(opacity.value) }));
-    this.#product.addEventListener("change", () => store.set({ product: this.#product.value }));
+    this.#product.addEventListener("change", () =>
+      store.set({ product: this.#product.value, look: withoutColours(store.state.look) }),
+    );
     container.append(
       el(
         "header",
@@ -49,7 +51,7 @@ export class Controls {
       ),
       el("label", { class: "field" }, el("span", { class: "visually-hidden" }, "Product"), this.#product),
       this.#modes,
-      this.#legend,
+      this.legend,
       this.observations,
       el("label", { class: "field row opacity" }, el("span", {}, "Opacity"), opacity),
       el(
@@ -82,7 +84,6 @@ export class Controls {
     // Few products are part of a vector: the others do not show a button that never works.
     const listed = MODES.filter((mode) => mode !== "flow" || product.modes.includes(mode));
     this.#modes.replaceChildren(...listed.map((mode) => this.#modeButton(mode, product.modes.includes(mode))));
-    this.#shown = product;
     this.#markMode();
   }
 
@@ -107,11 +108,18 @@ export class Controls {
         "data-mode": mode,
         title: MODE_HINTS[mode],
         disabled: !isOffered,
-        onclick: () => this.#store.set({ mode }),
+        onclick: () => this.#choose(mode),
         onkeydown: (event) => this.#turn(event as KeyboardEvent),
       },
       MODE_TITLES[mode],
     );
+  }
+
+  /** A flow is coloured by its speed: colours chosen for the one say nothing of the other. */
+  #choose(mode: Mode): void {
+    const { mode: before, look } = this.#store.state;
+    const isOtherValue = (mode === "flow") !== (before === "flow");
+    this.#store.set({ mode, look: isOtherValue ? withoutColours(look) : look });
   }
 
   /** Arrow keys move within the group, as radio buttons do. */
@@ -132,11 +140,6 @@ export class Controls {
   }
 
   #markMode(): void {
-    const product = this.#shown;
-    if (product) {
-      const isFlow = this.#store.state.mode === "flow" && product.modes.includes("flow");
-      this.#legend.replaceChildren(legendView((isFlow && product.flow_legend) || product.legend));
-    }
     for (const button of this.#modes.querySelectorAll<HTMLButtonElement>("button")) {
       const isChosen = button.dataset["mode"] === this.#store.state.mode;
       button.setAttribute("aria-checked", String(isChosen));

@@ -1,5 +1,7 @@
 //! The address bar's hash: a state in, a short readable text out, and back, so that a view can be shared as a link.
 import { wrapLon } from "./format";
+import { USUAL } from "./look";
+import { changeOf, parameters, queryOf } from "./look-address";
 import { MODES, TABS, type CameraView, type Mode, type Place, type State, type Tab } from "./state";
 import { toIso } from "./time";
 
@@ -10,6 +12,8 @@ export function encodeHash(state: Readonly<State>): string {
   if (Number.isFinite(state.timeMs)) parts.push(`time=${toIso(state.timeMs)}`);
   parts.push(`camera=${cameraText(state.camera)}`);
   if (state.opacity !== 0.9) parts.push(`opacity=${round(state.opacity, 2)}`);
+  const look = queryOf(parameters(state.look));
+  if (look !== "") parts.push(look);
   if (state.place) parts.push(`place=${round(state.place.lon, 3)},${round(state.place.lat, 3)}`);
   if (state.tab && TABS.includes(state.tab)) parts.push(`tab=${state.tab}`);
   if (state.region !== "global") parts.push(`region=${encodeURIComponent(state.region)}`);
@@ -39,6 +43,10 @@ function read(key: string, value: string, found: Partial<State>): void {
   else if (key === "tab" && TABS.includes(value as Tab)) found.tab = value as Tab;
   else if (key === "observations" && value === "on") found.observations = true;
   else if (key === "region" && value !== "") found.region = value;
+  else {
+    const change = changeOf(key, value);
+    if (change) found.look = { ...(found.look ?? USUAL), ...change };
+  }
 }
 
 function assign<K extends keyof State>(found: Partial<State>, key: K, value: State[K] | undefined): void {

@@ -21,6 +21,8 @@ const QUIET_FRAMES_BEFORE_FIRST = 5;
 const RESTLESS_LIMIT_MS = 4_000;
 
 export class LayerStage {
+  /** Told of every layer that comes into sight. */
+  onReveal: (spec: LayerSpec) => void = () => undefined;
   #shown: Prepared | undefined;
   #fade: { to: Prepared; startedMs: number; lengthMs: number } | undefined;
   #opacity: number;
@@ -74,6 +76,7 @@ export class LayerStage {
     this.#finishFade();
     this.#scene.imageryLayers.raiseToTop(next.layer);
     this.#fade = { to: next, startedMs: performance.now(), lengthMs: Math.max(1, lengthMs) };
+    this.onReveal(next.spec);
     this.#scene.requestRender();
   }
 

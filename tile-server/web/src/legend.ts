@@ -18,8 +18,8 @@ export function ticksOf(low: number, high: number, most = MOST_TICKS): number[] 
   return ticks;
 }
 
-export function gradientOf(legend: Legend): string {
-  return `linear-gradient(to right, ${legend.stops.map(([at, colour]) => `${colour} ${(at * 100).toFixed(2)}%`).join(", ")})`;
+export function gradientOf({ stops }: Pick<Legend, "stops">): string {
+  return `linear-gradient(to right, ${stops.map(([at, colour]) => `${colour} ${(at * 100).toFixed(2)}%`).join(", ")})`;
 }
 
 export function legendView(legend: Legend): HTMLElement {

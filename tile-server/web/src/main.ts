@@ -4,6 +4,7 @@ import "./style/base.css";
 import "./style/fields.css";
 import "./style/layer.css";
 import "./style/analysis.css";
+import "./style/look.css";
 import "./style/time.css";
 import "./style/messages.css";
 import "./style/phone.css";
@@ -20,6 +21,10 @@ import { titleText } from "./format";
 import { Globe } from "./globe";
 import { decodeHash, encodeHash } from "./hash";
 import { LayerStage } from "./layers";
+import { LegendCard } from "./legend-card";
+import { possible, withoutColours, type Look } from "./look";
+import { offerOf } from "./look-offer";
+import { LookPanel } from "./look-panel";
 import { Marks } from "./marks";
 import { Notices } from "./notices";
 import { ObservationLayer } from "./observation-layer";
@@ -46,6 +51,7 @@ let askedMs = asked.timeMs;
 const store = new Store({ ...INITIAL, ...asked });
 const notices = new Notices();
 let catalogue = new Catalogue([]);
+let palettes: readonly api.Palette[] = [];
 
 const globe = makeGlobe();
 const counts = new TileCounts();
@@ -79,8 +85,10 @@ const view = new ViewDialog(
   store,
   () => product()?.modes ?? [],
   () => product()?.synthetic ?? false,
+  (mode) => catalogue.lookIn(mode, store.state),
 );
 const controls = new Controls(byId("controls"), store, () => view.open());
+const legend = new LegendCard(controls.legend, (id, mode) => catalogue.usualLegend(id, mode), report);
 const timeline = new Timeline(byId("timeline"), store);
 const panels = new Panels(byId("panels"), store);
 const measured = new ObservationLayer(controls.observations, globe, store, panels, report);
@@ -98,11 +106,13 @@ const budgetPanel = new BudgetPanel(panels.bodies.budget, {
   markRegion: (box) => marks.region(box),
   onError: report,
 });
+const lookPanel = new LookPanel(panels.bodies.look, store, () => offerOf(catalogue, palettes, store.state));
 new CameraButtons(byId("camera"), globe);
 new Playback(store, presenter, steps, (timeMs) => catalogue.layerAt(store.state, timeMs));
 const probe = installProbe(store, counts, globe, () => stage.shownKey, () => measured.platforms);
 
 controls.watch(counts);
+stage.onReveal = (spec) => void legend.show(spec);
 globe
   .addBaseImagery()
   .catch(() => notices.show("base", "The base map is missing from this server; data is drawn on plain water."));
@@ -126,8 +136,16 @@ store.on(["mode", "product"], (state) => {
   catalogue.learn(state.product, state.mode).then(showLayer, (error: unknown) => report("layer", error));
 });
 store.on(["timeMs"], showLayer);
+store.on(["look"], (state, before) => {
+  // Another product or mode is shown when its zoom limits are known.
+  if (state.product === before.product && state.mode === before.mode) showLayer();
+});
+store.on(["look", "mode"], readyLegend);
 // A new wish is a new chance: an old complaint about pictures would only confuse.
-store.on(["mode", "product", "timeMs"], () => notices.clear("tiles"));
+store.on(["mode", "product", "timeMs", "look"], () => {
+  notices.clear("tiles");
+  notices.clear("legend");
+});
 store.on(["product", "timeMs"], () => notices.clear("outside"));
 keepAddress();
 void begin();
@@ -152,7 +170,9 @@ function makeGlobe(): Globe {
 /** Loads what the page needs; again when a lost server is back, where a whole picture in sight is kept. */
 async function begin(): Promise<void> {
   try {
-    catalogue = new Catalogue(await api.products(), catalogue);
+    const [products, named] = await Promise.all([api.products(), api.palettes()]);
+    catalogue = new Catalogue(products, catalogue);
+    palettes = named;
   } catch (error) {
     report("products", error);
     return;
@@ -168,10 +188,12 @@ async function begin(): Promise<void> {
   if (wanted !== null && !catalogue.find(wanted))
     notices.show("product", `The server has no product “${wanted}”; showing “${first.title}” instead.`);
   const chosen = catalogue.find(wanted) ?? first;
+  const look = drawable(store.state.look);
   if (store.state.product === chosen.id) {
+    store.set({ look });
     useProduct();
     bringIntoSight();
-  } else store.set({ product: chosen.id });
+  } else store.set({ product: chosen.id, look: wanted === null ? look : withoutColours(look) });
   await catalogue.learn(chosen.id, store.state.mode).catch((error: unknown) => report("layer", error));
   showLayer();
   void presenter.idle().then(() => probe.setReady());
@@ -206,6 +228,9 @@ async function renew(all: News[]): Promise<void> {
     // Told again of a version that is known: what lifts its particles is there now.
     if (catalogue.find(news.product)?.manifest === news.manifest) catalogue.revise(news.product);
   }
+  const relief = store.state.look.relief;
+  const isReliefNew = before !== undefined && all.some((news) => news.product === relief);
+  if (isReliefNew) catalogue.revise(before.id);
   try {
     catalogue = new Catalogue(await api.products(), catalogue);
   } catch (error) {
@@ -221,7 +246,9 @@ async function renew(all: News[]): Promise<void> {
     return;
   }
   controls.setProduct(now);
+  lookPanel.draw();
   const shown = all.filter((news) => news.product === now.id);
+  if (isReliefNew) showLayer();
   if (shown.length === 0) return;
   if (JSON.stringify(before.steps) !== JSON.stringify(now.steps)) useProduct();
   if (shown.some((news) => touches(news, store.state.timeMs))) showLayer();
@@ -238,6 +265,7 @@ function useProduct(): void {
   const known = steps();
   timeline.setSteps(known);
   budgetPanel.setSteps(known);
+  lookPanel.draw();
   if (known.length === 0) notices.show("steps", `“${chosen.title}” has no periods yet.`);
   else notices.clear("steps");
   const mode = chosen.modes.includes(store.state.mode) ? store.state.mode : (chosen.modes[0] ?? "map");
@@ -251,6 +279,7 @@ function useProduct(): void {
       ? (known[0]?.midMs ?? Number.NaN)
       : store.state.timeMs;
   store.set({ mode, timeMs });
+  readyLegend();
   if (isAsked && isOutside(known, wantedMs)) notices.show("outside", outsideText(titleText(chosen), known, wantedMs));
 }
 
@@ -265,9 +294,24 @@ function showLayer(): void {
   if (spec) presenter.want(spec);
 }
 
+/** A picture that is still to come brings its legend with it; until there is any, the legend is that of what is waited for. */
+function readyLegend(): void {
+  const { product: id, mode } = store.state;
+  if (!product() || id === null) return;
+  const layer = { product: id, mode, look: catalogue.lookIn(mode, store.state) };
+  if (stage.shownKey === undefined) void legend.show(layer);
+  else legend.learn(layer);
+}
+
+/** An address may name a palette or a relief that is not here. */
+function drawable(look: Look): Look {
+  const names = palettes.map((palette) => palette.name);
+  return possible(look, names, catalogue.reliefs.map((product) => product.id));
+}
+
 function keepAddress(): void {
   let timer: ReturnType<typeof setTimeout> | undefined;
-  store.on(["product", "mode", "timeMs", "camera", "opacity", "place", "tab", "region"], () => {
+  store.on(["product", "mode", "timeMs", "camera", "opacity", "look", "place", "tab", "region", "observations"], () => {
     timer ??= setTimeout(() => {
       timer = undefined;
       history.replaceState(null, "", encodeHash(store.state));
@@ -276,10 +320,15 @@ function keepAddress(): void {
   // A hash that is typed or pasted into an open page is meant as a whole new view.
   window.addEventListener("hashchange", () => {
     const change = decodeHash(location.hash);
-    if (change.product !== undefined && !catalogue.find(change.product)) delete change.product;
+    let look = drawable(change.look ?? INITIAL.look);
+    if (change.product !== undefined && !catalogue.find(change.product)) {
+      delete change.product;
+      look = withoutColours(look);
+    }
     if (change.camera) globe.view = change.camera;
     askedMs = change.timeMs;
-    store.set({ place: null, tab: null, region: INITIAL.region, opacity: INITIAL.opacity, ...change });
+    const { region, opacity, observations } = INITIAL;
+    store.set({ place: null, tab: null, region, opacity, observations, ...change, look });
     // A change of product has looked at the instant already.
     if (askedMs !== undefined) useProduct();
   });

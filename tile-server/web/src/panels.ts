@@ -1,12 +1,13 @@
-//! The analysis card: tabs for place, budget and check, one open at a time, closable so that the globe has the room.
+//! The card of tabs: place, budget, check and look, one open at a time, closable so that the globe has the room.
 import { el, icon } from "./dom";
-import { BARS, CLOSE, PIN, TICK, WAVE } from "./icons";
+import { BARS, CLOSE, PIN, SLIDERS, TICK, WAVE } from "./icons";
 import type { Store, Tab } from "./state";
 
 const TITLES: Record<Tab, [title: string, icon: string]> = {
   place: ["Place", PIN],
   budget: ["Budget", BARS],
   check: ["Check", TICK],
+  look: ["Look", SLIDERS],
   platform: ["Observed", WAVE],
 };
 
@@ -20,11 +21,12 @@ export class Panels {
   constructor(container: HTMLElement, store: Store) {
     this.#container = container;
     this.#store = store;
-    const list = el("div", { class: "tabs", role: "tablist", "aria-label": "Analysis" });
+    const list = el("div", { class: "tabs", role: "tablist", "aria-label": "Analysis and look" });
     this.bodies = {
       place: this.#body("place"),
       budget: this.#body("budget"),
       check: this.#body("check"),
+      look: this.#body("look"),
       platform: this.#body("platform"),
     };
     for (const tab of Object.keys(TITLES) as Tab[]) {

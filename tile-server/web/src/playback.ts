@@ -1,7 +1,7 @@
 //! Playback: loads the next instant out of sight, waits until it is due, shows it, and so on; a slow server stretches time, it never flashes.
 import type { Presenter } from "./presenter";
 import type { Store } from "./state";
-import type { LayerSpec } from "./tiles";
+import { isSameLayer, type LayerSpec } from "./tiles";
 import { nextInstant, PARTS_PER_STEP, quantise, strideFor, type Step } from "./time";
 
 export class Playback {
@@ -51,9 +51,9 @@ export class Playback {
       loadMs = performance.now() - startedMs;
       await until(shownAtMs + stride * frameMs);
       if (!prepared) continue;
-      // A hand on the slider or a new product made this picture obsolete while it loaded.
-      const isStale =
-        run.isOver || this.#specAt(timeMs)?.product !== spec.product || this.#specAt(timeMs)?.mode !== spec.mode;
+      // A hand on the slider, a new product or a new look made this picture obsolete while it loaded.
+      const now = this.#specAt(timeMs);
+      const isStale = run.isOver || now === undefined || !isSameLayer(now, spec);
       const wasMoved = quantise(this.#steps(), this.#store.state.timeMs) !== fromMs;
       if (isStale || wasMoved) {
         this.#presenter.discard(prepared);

@@ -1,6 +1,6 @@
 //! Decides which layer loads next: wishes from slider and playback in, one load at a time out, the newest wish first.
 import type { LayerStage, Prepared } from "./layers";
-import { layerKey, type LayerSpec } from "./tiles";
+import { isSameLayer, layerKey, type LayerSpec } from "./tiles";
 
 const FADE_MS = 220;
 
@@ -19,8 +19,7 @@ export class Presenter {
    * that the globe keeps moving, and of those that came meanwhile only the last is loaded.
    */
   want(spec: LayerSpec): void {
-    const isSameLayer = this.#loading?.spec.product === spec.product && this.#loading.spec.mode === spec.mode;
-    if (this.#loading && isSameLayer) {
+    if (this.#loading && isSameLayer(this.#loading.spec, spec)) {
       this.#next = layerKey(this.#loading.spec) === layerKey(spec) ? undefined : spec;
       return;
     }

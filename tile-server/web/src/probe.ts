@@ -10,7 +10,7 @@ export interface Probe {
   readonly tilesLoaded: number;
   readonly tilesPending: number;
   readonly tilesFailed: number;
-  /** `product:manifest/mode@instant` of the layer in sight. */
+  /** `product:manifest/mode?look@instant` of the layer in sight; no question mark in the usual look. */
   readonly shown: string | undefined;
   /** Names of the platforms on the globe, `dataset/platform`, with their place. */
   readonly platforms: readonly { id: string; lon: number; lat: number }[];

@@ -1,11 +1,12 @@
 //! What the page shows, in one place: a small store that parts read, change and listen to.
+import { USUAL, type Look } from "./look";
 
 export type Mode = "map" | "points" | "sprites" | "volume" | "flow";
 export const MODES: readonly Mode[] = ["map", "points", "sprites", "volume", "flow"];
 
-export type Tab = "place" | "budget" | "check" | "platform";
+export type Tab = "place" | "budget" | "check" | "look" | "platform";
 /** Those that a shared address can open; which platform was chosen is no part of it. */
-export const TABS: readonly Tab[] = ["place", "budget", "check"];
+export const TABS: readonly Tab[] = ["place", "budget", "check", "look"];
 
 export interface CameraView {
   lon: number;
@@ -29,6 +30,8 @@ export interface State {
   /** Playback pace in product steps per second. */
   stepsPerSecond: number;
   opacity: number;
+  /** Colours and surroundings of the layer. */
+  look: Look;
   place: Place | null;
   /** Open analysis tab; null when the panel is closed. */
   tab: Tab | null;
@@ -49,6 +52,7 @@ export const INITIAL: State = {
   playing: false,
   stepsPerSecond: 1,
   opacity: 0.9,
+  look: USUAL,
   place: null,
   tab: null,
   region: "global",

@@ -9,12 +9,16 @@ import {
 } from "cesium";
 import { tileTemplate, type Version } from "./api";
 import { isWhole, type Bounds } from "./box";
+import type { Look } from "./look";
+import { parameters, queryOf } from "./look-address";
 import type { Mode } from "./state";
 
 /** Everything that decides what a layer looks like; two equal keys are the same pictures. */
 export interface LayerSpec extends Version {
   readonly product: string;
   readonly mode: Mode;
+  /** Of what was chosen that which makes a difference in this mode. */
+  readonly look: Look;
   readonly timeIso: string;
   readonly bounds: Bounds;
   readonly maxZoom: number;
@@ -22,7 +26,17 @@ export interface LayerSpec extends Version {
 
 export function layerKey(spec: LayerSpec): string {
   const revision = spec.revision > 0 ? `+${spec.revision}` : "";
-  return `${spec.product}:${spec.manifest}${revision}/${spec.mode}@${spec.timeIso}`;
+  return `${spec.product}:${spec.manifest}${revision}/${kindOf(spec)}@${spec.timeIso}`;
+}
+
+/** Two instants of one layer: the same product in the same mode and look. */
+export function isSameLayer(a: LayerSpec, b: LayerSpec): boolean {
+  return a.product === b.product && kindOf(a) === kindOf(b);
+}
+
+function kindOf({ mode, look }: LayerSpec): string {
+  const query = queryOf(parameters(look));
+  return query === "" ? mode : `${mode}?${query}`;
 }
 
 /** Totals over all layers since the page was loaded. */
@@ -60,7 +74,7 @@ export class LayerTiles {
     counts: TileCounts,
     onFailure: (status: number | undefined, url: string) => void,
   ) {
-    const template = tileTemplate(spec.product, spec.mode, spec.timeIso, spec);
+    const template = tileTemplate(spec.product, spec.mode, spec.timeIso, spec, parameters(spec.look));
     const provider = new UrlTemplateImageryProvider({
       url: template,
       tilingScheme: new WebMercatorTilingScheme(),

@@ -3,6 +3,8 @@ import * as api from "./api";
 import { byId, el, icon } from "./dom";
 import { latText, lonText } from "./format";
 import { CLOSE, DOWNLOAD } from "./icons";
+import type { Look } from "./look";
+import { parameters } from "./look-address";
 import { MODES, type Mode, type Store } from "./state";
 import { formatInstant, toIso } from "./time";
 
@@ -13,6 +15,7 @@ export class ViewDialog {
   readonly #store: Store;
   readonly #offered: () => readonly Mode[];
   readonly #isSynthetic: () => boolean;
+  readonly #lookIn: (mode: Mode) => Look;
   readonly #dialog = el("dialog", { class: "view-dialog", "aria-labelledby": "view-title" });
   readonly #mode = el("select", { id: "view-mode", "aria-label": "Mode of the image" });
   readonly #frame = el("div", { class: "view-frame" });
@@ -21,10 +24,16 @@ export class ViewDialog {
   #imageUrl: string | undefined;
   #asked: AbortController | undefined;
 
-  constructor(store: Store, offered: () => readonly Mode[], isSynthetic: () => boolean) {
+  constructor(
+    store: Store,
+    offered: () => readonly Mode[],
+    isSynthetic: () => boolean,
+    lookIn: (mode: Mode) => Look,
+  ) {
     this.#store = store;
     this.#offered = offered;
     this.#isSynthetic = isSynthetic;
+    this.#lookIn = lookIn;
     const close = el(
       "button",
       { type: "button", class: "quiet", "aria-label": "Close", onclick: () => this.#dialog.close() },
@@ -64,6 +73,7 @@ export class ViewDialog {
       lat: camera.lat,
       heightKm: camera.heightKm,
       timeIso: toIso(timeMs),
+      look: parameters(this.#lookIn(mode)),
       ...imageSize(),
     });
     try {
