@@ -173,7 +173,7 @@ fn row(
     let [width, height] = job.view.size_px();
     let measured = frames::measure(gpu, stages, job, scene, args.frames)?;
     let classic = (args.classic > 0)
-        .then(|| against(args, gpu, stages, job, scene, &measured))
+        .then(|| against(args, job, scene, &measured))
         .transpose()?;
     let twins = (args.twins > 0)
         .then(|| twins::measure(job, scene, args.twins))
@@ -230,15 +230,16 @@ fn in_words(d: &Difference) -> String {
     )
 }
 
-/// The classic renderer on the same frame: first the pictures, then the times.
+/// The classic renderer on the same frame: first the pictures, then the times. On a device of its own: the first frames
+/// after a thousand render passes are slow, whoever draws them.
 fn against(
     args: &RenderBench,
-    gpu: &Gpu,
-    stages: &Stages,
     job: &RenderJob,
     scene: &Scene,
     measured: &frames::Measured,
 ) -> Result<Against> {
+    let gpu = &Gpu::open()?;
+    let stages = &Stages::new(gpu);
     let [width, height] = job.view.size_px();
     let name = format!(
         "{}-{width}x{height}-{}",

@@ -21,6 +21,16 @@ pub const ONE_DEGREE: Grid = Grid {
     dlon_deg: 1.0,
 };
 
+/// Seas off a western coast in cells of an eighth of a degree.
+pub const REGION: Grid = Grid {
+    rows: 328,
+    cols: 240,
+    north_deg: 41.0,
+    west_deg: -150.0,
+    dlat_deg: 0.125,
+    dlon_deg: 0.125,
+};
+
 /// Flux of 1 g C m⁻² a year, kg m⁻² s⁻¹.
 pub const GRAM_A_YEAR: f64 = 1e-3 / (365.25 * 86_400.0);
 

@@ -1,8 +1,8 @@
 //! The half-angle volume against pictures made another way, in double precision (`render_worker::proof::reference`).
 
 use contract::colour::Stops;
-use contract::grid::Grid;
 use contract::job::{Mode, RenderJob};
+use render_worker::proof::ocean::REGION;
 use render_worker::proof::{Difference, Fineness, Picture, against_slices, reference};
 use render_worker::{Backend, RenderError, Renderer, Scene};
 
@@ -104,20 +104,10 @@ fn more_slices_come_nearer_to_the_reference_on_a_globe_and_on_a_tile() {
     }
 }
 
-/// Seas off a coast in cells of a quarter of a degree.
-const REGION: Grid = Grid {
-    rows: 164,
-    cols: 120,
-    north_deg: 41.0,
-    west_deg: -150.0,
-    dlat_deg: 0.25,
-    dlon_deg: 0.25,
-};
-
 #[test]
 fn a_region_in_fine_cells_is_near_the_reference_from_afar() {
     let scene = ocean(REGION);
-    let mut job = job(Mode::Volume, globe(-135.0, 20.5, 5.3e6, 120));
+    let mut job = job(Mode::Volume, globe(-135.0, 20.5, 5.3e6, 160));
     job.style.particles_per_cell = 1;
     let truth = reference(&job, &scene, Fineness::default()).unwrap();
     let difference = Difference::of(&drawn(&job, &scene), &truth).unwrap();

@@ -113,7 +113,7 @@ fn table(report: &Report) -> Table {
     table
 }
 
-/// A coast and the equator on the globe, and a map tile; flux and carbon made up by formulas.
+/// A coast, the equator and a region on the globe, and a map tile; flux and carbon made up by formulas.
 fn generated(size: u32) -> Result<Vec<Subject>> {
     let scene = ocean::scene(ocean::ONE_DEGREE);
     let views = [
@@ -132,7 +132,14 @@ fn generated(size: u32) -> Result<Vec<Subject>> {
         job: ocean::job(view),
         scene: scene.clone(),
     };
-    Ok(views.into_iter().map(subject).collect())
+    let mut region = ocean::job(globe(-135.0, 20.5, 5.3e6, size));
+    region.style.particles_per_cell = 1;
+    let region = Subject {
+        name: "generated, a region in fine cells from 5300 km".to_owned(),
+        job: region,
+        scene: ocean::scene(ocean::REGION),
+    };
+    Ok(views.into_iter().map(subject).chain([region]).collect())
 }
 
 /// A landed product at the middle of its last step.

@@ -295,7 +295,10 @@ fn prove(test: &str, source: &str, right: &str, wrong: &str, distance: impl Fn(&
         return;
     };
     let apart = distance(checked, &faulty);
-    assert!(apart > 1.0, "{test}: the fault stays unseen, {apart}");
+    assert!(
+        apart > 1.0,
+        "{test}: '{wrong}' stays unseen, {apart} times the tolerance"
+    );
 }
 
 fn channels(colors: &[Vec4]) -> Vec<f32> {
