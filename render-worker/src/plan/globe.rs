@@ -245,7 +245,8 @@ fn light_frame(plan: &mut Plan, camera: &Camera, sun: DVec3, half: DVec3, cap: &
     let above_top = f64::from(params.slice_top) - eye.dot(half);
     params.toward_slice = (above_top * f64::from(params.slices_per_unit) * per_px) as f32;
     params.toward_pull = per_px as f32;
-    params.look_power = look::LOOK_POWER_GLOBE;
+    let radius_slices = radius * f64::from(params.slices_per_unit);
+    params.look_power = look::look_power(look::LOOK_POWER_GLOBE, radius_slices);
     write(
         axis_u,
         [

@@ -265,7 +265,8 @@ fn light_and_reach(
     [params.light_width, params.light_height] = window.texels;
     [params.light_shift_x_per_m, params.light_shift_y_per_m] =
         shadow_per_m.map(|shift| shift as f32);
-    params.look_power = look::LOOK_POWER_TILE;
+    let radius_slices = radius_px / level.px_per_m * f64::from(params.slices_per_unit);
+    params.look_power = look::look_power(look::LOOK_POWER_TILE, radius_slices);
     params.toward_u = toward_eye[0] as f32;
     params.toward_v = toward_eye[1] as f32;
     params.toward_slice = (-f64::from(params.slices_per_unit) / level.px_per_m) as f32;
