@@ -230,8 +230,8 @@ fn in_words(d: &Difference) -> String {
     )
 }
 
-/// The classic renderer on the same frame: first the pictures, then the times. On a device of its own: the first frames
-/// after a thousand render passes are slow, whoever draws them.
+/// The classic renderer on the same frame: first the pictures, then the times. On a device of its own, of
+/// which nothing remains when ours are timed.
 fn against(
     args: &RenderBench,
     job: &RenderJob,

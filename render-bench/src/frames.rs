@@ -1,7 +1,7 @@
 //! Whole frames that stay on the device, the instant changing from each to the next, and the stages they are made of.
 
 use std::collections::VecDeque;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result, ensure};
 use contract::job::RenderJob;
@@ -16,8 +16,8 @@ use crate::stats::Times;
 
 /// Frames on their way at once.
 const IN_FLIGHT: usize = 3;
-/// Frames before the clock runs.
-const WARM_UP: usize = 20;
+/// How long frames are drawn before the clock runs: a device that has idled for a second takes a while to wake up.
+const WARM_UP: Duration = Duration::from_millis(500);
 
 /// What a series of frames took.
 #[derive(Debug, Serialize)]
@@ -72,7 +72,10 @@ pub fn measure(
         gpu.wait()?;
         Ok(start.elapsed().as_secs_f64())
     };
-    series(WARM_UP, None)?;
+    let start = Instant::now();
+    while start.elapsed() < WARM_UP {
+        series(IN_FLIGHT, None)?;
+    }
     let wall_s = series(frames, ends.as_ref())?;
     let ended = ends
         .map(|ends| ends.take(gpu))

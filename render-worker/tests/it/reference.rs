@@ -39,7 +39,7 @@ fn the_volume_is_near_the_reference_and_the_number_sees_what_it_should_see() {
     println!(
         "PSNR against the float64 reference: {full:.2} dB at 64 slices, {few:.2} dB at 2, {other_light:.2} dB lit from the other side, {sprites:.2} dB for unlit sprites, {thin:.2} dB a fifth thinner"
     );
-    assert!(full >= 44.0, "{full} dB at 64 slices");
+    assert!(full >= 46.0, "{full} dB at 64 slices");
     for (worse, what) in [
         (few, "2 slices"),
         (other_light, "light from the other side"),
@@ -81,7 +81,7 @@ fn more_slices_come_nearer_to_the_reference_on_a_globe_and_on_a_tile() {
     let renderer = twins();
     let views = [
         ("globe", globe(-150.0, 0.0, 4.0e6, 64), 44.0),
-        ("tile", tile(3, 1, 3, 256), 46.0),
+        ("tile", tile(3, 1, 3, 256), 49.0),
     ];
     for (name, view, least_db) in views {
         let rows =
@@ -112,8 +112,8 @@ fn a_region_in_fine_cells_is_near_the_reference_from_afar() {
     let truth = reference(&job, &scene, Fineness::default()).unwrap();
     let difference = Difference::of(&drawn(&job, &scene), &truth).unwrap();
     println!("a region: {difference:?}");
-    // Light and slices that reached round the globe would be much coarser: 41.8 dB and 0.048.
-    assert!(difference.psnr_db.unwrap() >= 44.0 && difference.mean_flip <= 0.032);
+    // Light and slices that reached round the globe would be much coarser: 42 dB and 0.05.
+    assert!(difference.psnr_db.unwrap() >= 47.0 && difference.mean_flip <= 0.024);
     // The sea fills the middle of the picture, so that much is compared.
     let covered = truth.rgba.iter().filter(|pixel| pixel[3] > 0.1).count();
     assert!(covered * 3 > truth.rgba.len());

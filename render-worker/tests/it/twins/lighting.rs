@@ -1,5 +1,6 @@
 //! The light and its twins.
 
+use contract::job::Mode;
 use render_worker::frame::FrameContext;
 use render_worker::gpu::Slot;
 use render_worker::passes;
@@ -9,6 +10,7 @@ use render_worker::stages::light::{self, Light};
 
 use super::{Twins, prove};
 use crate::compare::worst;
+use crate::scenes::tile;
 
 #[test]
 fn light_is_given_and_lists_are_counted_as_the_twins_do() {
@@ -17,11 +19,6 @@ fn light_is_given_and_lists_are_counted_as_the_twins_do() {
         let (shared, unshared) = (splat::SOURCE, passes::unshared(splat::SOURCE));
         for (source, right, wrong) in [
             (shared, "splat.light_depth - behind", "splat.light_depth"),
-            (
-                shared,
-                "atomicAdd(&counts[key & ~LIST_KEY], ",
-                "atomicAdd(&counts[key & ~LIST_KEY], 1u + ",
-            ),
             (
                 &unshared,
                 "atomicAdd(&counts[list], 1u)",
@@ -56,6 +53,35 @@ fn light_is_given_and_lists_are_counted_as_the_twins_do() {
             });
         }
     }
+}
+
+#[test]
+fn neighbours_share_the_lengths_of_lists() {
+    // Without light, so that a workgroup's sums have room for lists whatever the order of its invocations.
+    let twins = Twins::of(Mode::Sprites, tile(2, 0, 1, 256));
+    let lists = list_count(&twins.params);
+    prove(
+        "lists of neighbours",
+        splat::SOURCE,
+        "atomicAdd(&counts[key & ~LIST_KEY], ",
+        "atomicAdd(&counts[key & ~LIST_KEY], 1u + ",
+        |gpu, source| {
+            let stage = Splats::of(gpu, source);
+            let [first, second] = twins.stored();
+            let [seen, lit, counts] = twins.run_with(
+                gpu,
+                &twins.params,
+                |_| (),
+                |f| stage.record(f).unwrap(),
+                [first, second, (Slot::Counts, u64::from(lists) * 4)],
+            );
+            let mut own = vec![0; lists as usize];
+            bin::cpu::count(&twins.params, &twins.in_order(&seen, &lit), &mut own);
+            assert!(own.iter().any(|length| *length > 1));
+            let same = own == bytemuck::pod_collect_to_vec::<u8, u32>(&counts);
+            if same { 0.0 } else { f32::INFINITY }
+        },
+    );
 }
 
 #[test]
