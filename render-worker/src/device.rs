@@ -14,6 +14,7 @@ use crate::plan::{Part, Plan, block};
 use crate::resident::Resident;
 use crate::scene::{Frame, Interval, Scene};
 use crate::stages::fill::{self, Fill, Filled, Form};
+use crate::stages::light::light_bytes;
 
 /// Everything that lives and dies with one device.
 pub(crate) struct Device {
@@ -108,11 +109,15 @@ impl Device {
         };
         self.lights.of(&block, scene, || {
             let plan = Plan::of_block(&block, scene, self.gpu.most_buffer_bytes())?;
-            let window = plan
-                .light_window
-                .expect("blocks are those of tiles that are lit");
+            let Some(window) = plan.light_window else {
+                return Ok(None);
+            };
+            // Asked before anything is allocated: what is too large must not cost the device.
+            if !self.lights.fits(light_bytes(&plan.params)) {
+                return Ok(None);
+            }
             let buffer = self.light(&plan, scene)?;
-            Ok(SharedLight { window, buffer })
+            Ok(Some(SharedLight { window, buffer }))
         })
     }
 

@@ -4,7 +4,7 @@
 //! is looked at; the second one makes the block's, which serves all others. Both kinds hold the same numbers.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 
 use contract::job::RenderJob;
 
@@ -16,7 +16,9 @@ use crate::scene::{Interval, Scene};
 /// Share of a device's own memory for light.
 const SHARE: u64 = 16;
 /// Bytes kept where nobody knows what the device has.
-const UNKNOWN_BYTES: u64 = 256 << 20;
+const UNKNOWN_BYTES: u64 = 512 << 20;
+/// Share of that which one block may take: a screen shows more than one.
+const BLOCK_SHARE: u64 = 2;
 /// Blocks remembered, those without light included.
 const MOST_BLOCKS: usize = 1024;
 
@@ -117,16 +119,28 @@ impl Lights {
             block.last_use = use_count;
             Arc::clone(&block.state)
         };
-        let light = match state.try_lock().as_deref() {
-            Ok(State::Made(light)) => Some(Arc::clone(light)),
-            Ok(State::NotMade | State::Refused) | Err(_) => None,
+        let state = match state.try_lock() {
+            Ok(state) => state,
+            // What failed half-way left no light behind.
+            Err(TryLockError::Poisoned(state)) => state.into_inner(),
+            Err(TryLockError::WouldBlock) => return None,
         };
+        let light = match &*state {
+            State::Made(light) => Some(Arc::clone(light)),
+            State::NotMade | State::Refused => None,
+        };
+        drop(state);
         self.lock().counts.used += u64::from(light.is_some());
         light
     }
 
+    /// May a block's light take so many bytes?
+    pub(crate) fn fits(&self, bytes: u64) -> bool {
+        bytes <= self.most_bytes / BLOCK_SHARE
+    }
+
     /// The light of a block that was asked for before, made by `make` if it is not there; none the first time, and where
-    /// it is too large. Others who want the same wait until it is made.
+    /// `make` has none to give. Others who want the same wait until it is made.
     ///
     /// # Errors
     /// What `make` fails with but for sizes.
@@ -134,21 +148,21 @@ impl Lights {
         &self,
         block: &RenderJob,
         scene: &Scene,
-        make: impl FnOnce() -> Result<SharedLight, RenderError>,
+        make: impl FnOnce() -> Result<Option<SharedLight>, RenderError>,
     ) -> Result<Option<Arc<SharedLight>>, RenderError> {
         let key = Key::new(block, scene);
-        let Some(state) = self.lock().known(&key) else {
+        let Some(place) = self.lock().known(&key) else {
             return Ok(None);
         };
-        // What failed half-way left no light behind.
-        let mut state = state.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut state = place.lock().unwrap_or_else(PoisonError::into_inner);
         if let State::NotMade = *state {
             *state = match make() {
-                Ok(light) if light.buffer.size() <= self.most_bytes => {
-                    self.lock().keep(&key, &light, self.most_bytes);
+                Ok(Some(light)) => {
+                    self.lock()
+                        .keep(&key, &place, light.buffer.size(), self.most_bytes);
                     State::Made(Arc::new(light))
                 }
-                Ok(_)
+                Ok(None)
                 | Err(RenderError::TooLarge { .. } | RenderError::TooManyParticles { .. }) => {
                     State::Refused
                 }
@@ -185,28 +199,44 @@ impl Held {
         };
         self.blocks.insert(key.clone(), block);
         if self.blocks.len() > MOST_BLOCKS {
-            self.forget_oldest();
+            let oldest = oldest(self.blocks.iter());
+            if let Some(key) = oldest {
+                self.forget(&key);
+            }
         }
         None
     }
 
-    fn keep(&mut self, key: &Key, light: &SharedLight, most_bytes: u64) {
+    /// Counts a light that was made, if its block has not been forgotten meanwhile, and makes room for it.
+    fn keep(&mut self, key: &Key, place: &Arc<Mutex<State>>, bytes: u64, most_bytes: u64) {
         self.counts.made += 1;
-        if let Some(block) = self.blocks.get_mut(key) {
-            block.bytes = light.buffer.size();
-            self.counts.bytes += block.bytes;
-        }
-        while self.counts.bytes > most_bytes && self.blocks.len() > 1 {
-            self.forget_oldest();
+        let block = self.blocks.get_mut(key);
+        let Some(block) = block.filter(|block| Arc::ptr_eq(&block.state, place)) else {
+            return;
+        };
+        self.counts.bytes += bytes - block.bytes;
+        block.bytes = bytes;
+        while self.counts.bytes > most_bytes {
+            let lit = self
+                .blocks
+                .iter()
+                .filter(|(own, block)| block.bytes > 0 && *own != key);
+            let Some(oldest) = oldest(lit) else {
+                return;
+            };
+            self.forget(&oldest);
         }
     }
 
-    fn forget_oldest(&mut self) {
-        let ages = self.blocks.iter().map(|(key, block)| (block.last_use, key));
-        if let Some(oldest) = ages.min().map(|(_, key)| key.clone())
-            && let Some(block) = self.blocks.remove(&oldest)
-        {
+    fn forget(&mut self, key: &Key) {
+        if let Some(block) = self.blocks.remove(key) {
             self.counts.bytes -= block.bytes;
         }
     }
+}
+
+/// The block that was not asked for for longest.
+fn oldest<'a>(blocks: impl Iterator<Item = (&'a Key, &'a Block)>) -> Option<Key> {
+    let oldest = blocks.min_by_key(|(_, block)| block.last_use);
+    oldest.map(|(key, _)| key.clone())
 }

@@ -160,6 +160,9 @@ impl Renderer {
         scene.validate()?;
         let coarser = pyramid::suited(job, scene);
         let scene = coarser.as_ref().unwrap_or(scene);
+        if !is_wanted() {
+            return Err(RenderError::NotWanted);
+        }
         let (mut plan, shared) = match &device {
             None => (Plan::new(job, scene, most_buffer_bytes)?, None),
             Some(device) => planned(device, job, scene)?,

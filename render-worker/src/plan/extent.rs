@@ -10,7 +10,8 @@ const MOST_WIDTH_DEG: f64 = 120.0;
 /// Steps along a side of the grid between places that are looked at.
 const STEPS: u32 = 64;
 
-/// Places at the lowest and the highest particles of a region, as far as they lie in a cap; earth radii.
+/// Places at the lowest and the highest particles of a region; earth radii. All of it, seen or not: what is seen changes
+/// place by place as the camera moves, and light and slices must not jump.
 pub(super) struct Extent {
     places: Vec<DVec3>,
     /// What lies between two places is no farther out than this.
@@ -18,8 +19,8 @@ pub(super) struct Extent {
 }
 
 impl Extent {
-    /// The part of a grid within an angle of the point below the camera, radians; none if it is not a region or not there.
-    pub(super) fn of(grid: &Grid, up: DVec3, cap_rad: f64, heights: [f64; 2]) -> Option<Self> {
+    /// That of a grid between two heights; none if it is not a region.
+    pub(super) fn of(grid: &Grid, heights: [f64; 2]) -> Option<Self> {
         let [width_deg, height_deg] = [
             f64::from(grid.cols) * grid.dlon_deg,
             f64::from(grid.rows) * grid.dlat_deg,
@@ -28,7 +29,6 @@ impl Extent {
             return None;
         }
         let step_rad = (width_deg.max(height_deg) / f64::from(STEPS)).to_radians();
-        let least_cosine = (cap_rad + 1.5 * step_rad).min(std::f64::consts::PI).cos();
         let share = |step: u32| f64::from(step) / f64::from(STEPS);
         let places = (0..=STEPS).flat_map(|y| (0..=STEPS).map(move |x| (x, y)));
         let places = places.map(|(x, y)| {
@@ -40,11 +40,10 @@ impl Extent {
             normal
         });
         let places: Vec<DVec3> = places
-            .filter(|normal| normal.dot(up) >= least_cosine)
             .flat_map(|normal| heights.map(|height| normal * (1.0 + height)))
             .collect();
         let sag = step_rad * step_rad / 4.0 * (1.0 + heights[1]) + 1e-6;
-        (!places.is_empty()).then_some(Self { places, sag })
+        Some(Self { places, sag })
     }
 
     /// Places all over the region.
@@ -79,7 +78,7 @@ mod tests {
     fn every_place_of_a_region_is_within_its_extent_and_little_else() {
         let [_, _, up] = axes_at(110.0, 10.0);
         let heights = [-0.02, 0.1];
-        let extent = Extent::of(&REGION, up, 0.9, heights).unwrap();
+        let extent = Extent::of(&REGION, heights).unwrap();
         let [_, east, _] = axes_at(37.0, 12.0);
         for direction in [up, east, DVec3::Z, -DVec3::X] {
             let [low, high] = extent.along(direction);
@@ -99,16 +98,11 @@ mod tests {
     }
 
     #[test]
-    fn the_globe_and_what_is_beyond_the_cap_have_no_extent() {
-        let [_, _, up] = axes_at(110.0, 10.0);
+    fn the_globe_has_no_extent() {
         let globe = Grid {
             cols: 360,
             ..REGION
         };
-        assert!(Extent::of(&globe, up, 0.9, [0.0, 0.1]).is_none());
-        assert!(Extent::of(&REGION, -up, 0.5, [0.0, 0.1]).is_none());
-        let whole = Extent::of(&REGION, up, 0.9, [0.0, 0.0]).unwrap();
-        let part = Extent::of(&REGION, up, 0.1, [0.0, 0.0]).unwrap();
-        assert!(part.along(DVec3::Z)[1] < whole.along(DVec3::Z)[1] - 0.2);
+        assert!(Extent::of(&globe, [0.0, 0.1]).is_none());
     }
 }

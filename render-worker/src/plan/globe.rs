@@ -28,7 +28,7 @@ const CROWDED_COSINE: f64 = 0.25;
 const NEAREST_OVER_FARTHEST: f64 = 4.0;
 
 /// The part of the shell that is drawn; lengths in earth radii.
-struct Cap {
+struct Cap<'a> {
     /// Lowest and highest particle, from the sea surface.
     heights: [f64; 2],
     /// Round the point below the camera, radians.
@@ -36,7 +36,7 @@ struct Cap {
     /// Of a full-size particle.
     radius: f64,
     /// Where particles can be, of a regional product.
-    extent: Option<Extent>,
+    extent: Option<&'a Extent>,
 }
 
 pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) {
@@ -87,11 +87,12 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) {
     let half_cell = (grid.dlon_deg.hypot(grid.dlat_deg) / 2.0).to_radians();
     let margin = radius + half_cell + flow::plan(plan, job, scene);
     let [seen, drawn] = camera.cap_rad([width_px, height_px], job, heights, margin);
+    let extent = Extent::of(grid, heights);
     let cap = |angle| Cap {
         heights,
         angle,
         radius,
-        extent: Extent::of(grid, camera.up, angle, heights),
+        extent: extent.as_ref(),
     };
     // What lies beyond the seen cap falls into the first or last slice, from where it shadows as it should.
     let half = slice_planes(plan, job, camera.up, sun, &cap(seen));
@@ -101,13 +102,13 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) {
 }
 
 /// Is there ground seen so flat, or so near a pole, that cells are many times narrower than elsewhere?
-fn is_crowded(plan: &Plan, camera: &Camera, cap: &Cap) -> bool {
+fn is_crowded(plan: &Plan, camera: &Camera, cap: &Cap<'_>) -> bool {
     let is_flat = |normal: DVec3| {
         let sight = camera.place - normal;
         sight.dot(normal) < CROWDED_COSINE * sight.length()
     };
     let horizon = (1.0 / (1.0 + camera.height)).acos();
-    let is_limb_seen = cap.extent.as_ref().map_or(cap.angle >= horizon, |extent| {
+    let is_limb_seen = cap.extent.map_or(cap.angle >= horizon, |extent| {
         extent
             .places()
             .any(|place| is_flat(place.normalize_or_zero()))
@@ -159,7 +160,7 @@ fn rows(scene: &Scene, look: &Look, camera: &Camera, particles: u32, style_depth
 }
 
 /// Slices across the half-way vector between light and view, over what is visible; the vector comes back.
-fn slice_planes(plan: &mut Plan, job: &RenderJob, up: DVec3, sun: DVec3, cap: &Cap) -> DVec3 {
+fn slice_planes(plan: &mut Plan, job: &RenderJob, up: DVec3, sun: DVec3, cap: &Cap<'_>) -> DVec3 {
     let Cap { heights, angle, .. } = *cap;
     let front_to_back = sun.dot(up) >= 0.0;
     let sum = if front_to_back { sun + up } else { sun - up };
@@ -175,9 +176,13 @@ fn slice_planes(plan: &mut Plan, job: &RenderJob, up: DVec3, sun: DVec3, cap: &C
     let near = (tilt - angle).max(0.0).cos();
     let far = (tilt + angle).min(PI).cos();
     let (mut top, mut bottom) = (reach(near)[1] * near + 1e-4, reach(far)[0] * far - 1e-4);
-    if let Some(extent) = &cap.extent {
+    if let Some(extent) = cap.extent {
         let [low, high] = extent.along(half);
-        (top, bottom) = (top.min(high), bottom.max(low));
+        // A region that is not in sight leaves nothing to cut.
+        let (own_top, own_bottom) = (top.min(high), bottom.max(low));
+        if own_top - own_bottom > 1e-4 {
+            (top, bottom) = (own_top, own_bottom);
+        }
     }
     let params = &mut plan.params;
     params.front_to_back = u32::from(front_to_back);
@@ -190,7 +195,7 @@ fn slice_planes(plan: &mut Plan, job: &RenderJob, up: DVec3, sun: DVec3, cap: &C
     half
 }
 
-fn light_frame(plan: &mut Plan, camera: &Camera, sun: DVec3, half: DVec3, cap: &Cap) {
+fn light_frame(plan: &mut Plan, camera: &Camera, sun: DVec3, half: DVec3, cap: &Cap<'_>) {
     let Cap {
         heights,
         angle,
@@ -217,7 +222,7 @@ fn light_frame(plan: &mut Plan, camera: &Camera, sun: DVec3, half: DVec3, cap: &
     let reach = chord + heights[1].max(-heights[0]);
     let [span_u, span_v] = [axis_u, axis_v].map(|axis| {
         let middle = camera.up.dot(axis);
-        let [low, high] = cap.extent.as_ref().map_or([-2.0, 2.0], |e| e.along(axis));
+        let [low, high] = cap.extent.map_or([-2.0, 2.0], |e| e.along(axis));
         // Clouds look their light up within their radius.
         let low = (middle - reach).max(low - radius);
         [low, (middle + reach).min(high + radius).max(low)]

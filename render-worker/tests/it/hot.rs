@@ -74,6 +74,8 @@ fn draw(
     let mut frame = FrameContext::new(gpu, &mut workspace, plan, params, scene.clone()).unwrap();
     let entry_bytes = u64::from(params.entry_capacity) * size_of::<Entry>() as u64;
     frame.room(Slot::Entries, entry_bytes).unwrap();
+    let part_bytes = u64::from(1 + MOST_HOT_PARTS) * 4;
+    frame.room(Slot::HotParts, part_bytes).unwrap();
     Splats::new(gpu).record(&mut frame).unwrap();
     if params.light_on == 1 {
         Light::new(gpu).record(&mut frame).unwrap();
@@ -85,7 +87,6 @@ fn draw(
     let [image, counts, parts] =
         [Slot::Image, Slot::Counts, Slot::HotParts].map(|slot| frame.room(slot, 4).unwrap());
     let lists = u64::from(list_count(&params)) * 4;
-    let part_bytes = u64::from(1 + MOST_HOT_PARTS) * 4;
     let image_bytes = frame.pixel_count() * 4;
     let read = [
         (&image, 0, image_bytes),

@@ -1,6 +1,7 @@
 //! No popping: what moves a little changes the picture a little, and half as far changes it about half as much.
 
 use contract::job::{Mode, RenderJob};
+use render_worker::proof::ocean::REGION;
 use render_worker::{Backend, Image, Renderer, Scene};
 
 use crate::scenes::{FIVE_DEGREES, ONE_DEGREE, globe, job, ocean, tile};
@@ -111,6 +112,21 @@ fn from_a_little_farther_the_volume_looks_a_little_different() {
         renderer.render(&seen(0.0, height), &scene).unwrap()
     });
     assert_eq!(roughness(&up, 40.0), None, "up");
+}
+
+#[test]
+fn past_the_edge_of_a_region_the_volume_moves_as_smoothly() {
+    let renderer = Renderer::new(Backend::Cpu).unwrap();
+    let scene = ocean(REGION);
+    // Light and slices reach to the region's edge and no farther than what is seen.
+    for (edge, lon_deg, lat_deg) in [("east", -121.0, 20.0), ("corner", -149.0, 40.0)] {
+        let changes = halving(&format!("view, {edge} of a region"), 0.2, |share| {
+            let view = globe(lon_deg + share, lat_deg, 2.0e6, 96);
+            renderer.render(&job(Mode::Volume, view), &scene).unwrap()
+        });
+        // Half a pixel and more of an edge that is sharp.
+        assert_eq!(roughness(&changes, 160.0), None, "{edge}");
+    }
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, RwLockReadGuard, Weak};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use contract::topic::Topic;
 use harness::node::Node;
@@ -121,7 +121,20 @@ impl Ground {
 
     pub(super) fn with_log<T>(&self, ask: impl AsyncFnOnce(&KafkaLog) -> T) -> T {
         let runtime = tokio::runtime::Runtime::new().unwrap();
-        runtime.block_on(async { ask(&KafkaLog::connect(&self.kafka).await.unwrap()).await })
+        runtime.block_on(async { ask(&self.log().await).await })
+    }
+
+    /// The log; on a busy machine a connection may need more than one try.
+    async fn log(&self) -> KafkaLog {
+        let mut tries = 1;
+        loop {
+            match KafkaLog::connect(&self.kafka).await {
+                Ok(log) => return log,
+                Err(error) => assert!(tries < 5, "no log after {tries} tries: {error}"),
+            }
+            tries += 1;
+            tokio::time::sleep(Duration::from_secs(2)).await;
+        }
     }
 
     /// Sends messages as any Kafka client might.

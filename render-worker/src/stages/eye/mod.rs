@@ -24,6 +24,8 @@ pub const SOURCE: &str = concat!(
 
 /// The entry point that shares the work of a screen tile; for GPUs.
 pub const SHARED: &str = "eye";
+/// The one that sums up parts of long lists.
+const HOT: &str = "hot";
 /// The one whose pixels work alone; for adapters that are programs.
 pub const ALONE: &str = "alone";
 /// The shader for pictures in their surroundings.
@@ -49,14 +51,15 @@ pub struct Eye {
     /// For pictures in their surroundings; compiled when they are first wanted.
     in_context: [OnceLock<Kernel>; 3],
     /// For pictures where cells crowd; likewise.
-    crowded: OnceLock<Crowded>,
+    crowded: Crowded,
     source: String,
 }
 
 /// The kernels that know of long lists.
+#[derive(Default)]
 struct Crowded {
-    /// Sums up the parts.
-    hot: Kernel,
+    /// Sum up the parts.
+    hot: [OnceLock<Kernel>; 3],
     of_kernel: [OnceLock<Kernel>; 3],
     in_context: [OnceLock<Kernel>; 3],
 }
@@ -71,9 +74,13 @@ const HOT_GROUPS: u32 = 1024;
 
 /// The buffers of long lists and of their parts.
 pub fn hot_room(frame: &mut FrameContext<'_>) -> Result<[wgpu::Buffer; 2], RenderError> {
+    // Bound but never written where no list is cut.
+    let is_cut = u64::from(frame.params.long_list != NEVER_LONG);
+    let lists = is_cut * u64::from(list_count(&frame.params));
+    let parts = is_cut * u64::from(1 + MOST_HOT_PARTS);
     Ok([
-        frame.room(Slot::HotLists, u64::from(list_count(&frame.params)) * 4)?,
-        frame.room(Slot::HotParts, u64::from(1 + MOST_HOT_PARTS) * 4)?,
+        frame.room(Slot::HotLists, lists * 4)?,
+        frame.room(Slot::HotParts, parts * 4)?,
     ])
 }
 
@@ -91,7 +98,7 @@ impl Eye {
             source_in_context: source_in_context.to_owned(),
             entry,
             in_context: Default::default(),
-            crowded: OnceLock::new(),
+            crowded: Crowded::default(),
             source: source.to_owned(),
         }
     }
@@ -114,7 +121,11 @@ impl Eye {
             buffers.extend((5..).zip(compose::surroundings(frame)?));
         }
         if is_crowded {
-            let hot = &self.crowded(frame.gpu).hot;
+            let kind = frame.params.kernel as usize;
+            let gpu = frame.gpu;
+            // Compiled as the eye is, so that it rounds as the eye does.
+            let hot = self.crowded.hot[kind]
+                .get_or_init(|| compiled(gpu, &with_parts(&self.source), KERNELS[kind], HOT));
             buffers.extend(sum_up(hot, frame)?);
         }
         let kernel = self.kernel(frame.gpu, &frame.params, is_crowded);
@@ -131,20 +142,13 @@ impl Eye {
         match (params.in_context == 1, is_crowded) {
             (false, false) => &self.of_kernel[kind],
             (true, false) => self.in_context[kind].get_or_init(|| compiled(in_context)),
-            (false, true) => self.crowded(gpu).of_kernel[kind]
-                .get_or_init(|| compiled(&with_parts(&self.source))),
+            (false, true) => {
+                self.crowded.of_kernel[kind].get_or_init(|| compiled(&with_parts(&self.source)))
+            }
             (true, true) => {
-                self.crowded(gpu).in_context[kind].get_or_init(|| compiled(&with_parts(in_context)))
+                self.crowded.in_context[kind].get_or_init(|| compiled(&with_parts(in_context)))
             }
         }
-    }
-
-    fn crowded(&self, gpu: &Gpu) -> &Crowded {
-        self.crowded.get_or_init(|| Crowded {
-            hot: gpu.kernel("hot", &with_parts(&self.source), "hot"),
-            of_kernel: Default::default(),
-            in_context: Default::default(),
-        })
     }
 }
 
@@ -170,7 +174,8 @@ fn sum_up(
     Ok([(8, lists), (10, sums)])
 }
 
-fn compiled(gpu: &Gpu, source: &str, kernel: &str, entry: &str) -> Kernel {
+fn compiled(gpu: &Gpu, source: &str, kernel: &str, entry: &'static str) -> Kernel {
     let source = source.replace("params.kernel", kernel);
-    gpu.kernel("eye", &source, entry)
+    let label = if entry == HOT { HOT } else { "eye" };
+    gpu.kernel(label, &source, entry)
 }
