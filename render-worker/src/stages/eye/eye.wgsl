@@ -79,6 +79,21 @@ fn taken(at: u32) -> vec4<u32> {
     return vec4(taken_one(at), taken_one(PIXELS + at), taken_one(2u * PIXELS + at), taken_one(3u * PIXELS + at));
 }
 
+// What entries add to a pixel, the whole workgroup at work: it adds them to all pixels together.
+fn summed(begin: u32, end: u32, pixel: u32) -> vec4<u32> {
+    var own = vec4(0u);
+    for (var base = begin; base < end; base += SAFE) {
+        // Two invocations an entry.
+        for (var at = base + (pixel >> 1u); at < min(base + SAFE, end); at += PIXELS / 2u) {
+            add(entries[at], i32(pixel & 1u));
+        }
+        workgroupBarrier();
+        own += min(taken(pixel), vec4(MOST_SUM) - own);
+        workgroupBarrier();
+    }
+    return own;
+}
+
 // What a list that is summed up in parts adds to a pixel, if it is such a list.
 struct LongSum { is_there: bool, own: vec4<u32> }
 
@@ -122,17 +137,7 @@ fn eye(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(global_invocation_i
                 color = blended(color, long.own);
                 continue;
             }
-            var own = vec4(0u);
-            for (var base = begin; base < end; base += SAFE) {
-                // Two invocations an entry.
-                for (var at = base + (invocation >> 1u); at < min(base + SAFE, end); at += PIXELS / 2u) {
-                    add(entries[at], i32(invocation & 1u));
-                }
-                workgroupBarrier();
-                own += min(taken(invocation), vec4(MOST_SUM) - own);
-                workgroupBarrier();
-            }
-            color = blended(color, own);
+            color = blended(color, summed(begin, end, invocation));
             if (is_worth_asking && slice % ASKED_EVERY == 0u) {
                 if (invocation == 0u) { is_open = 0u; }
                 workgroupBarrier();

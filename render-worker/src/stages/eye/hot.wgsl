@@ -38,15 +38,7 @@ fn hot(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) wor
         if (list > 0u) { begin = min(list_ends[list - 1u], params.entry_capacity); }
         begin += (part + 1u - hot_lists[list]) * PART_ENTRIES;
         let end = min(begin + PART_ENTRIES, min(list_ends[list], params.entry_capacity));
-        var own = vec4(0u);
-        for (var base = begin; base < end; base += SAFE) {
-            for (var at = base + (invocation >> 1u); at < min(base + SAFE, end); at += PIXELS / 2u) {
-                add(entries[at], i32(invocation & 1u));
-            }
-            workgroupBarrier();
-            own += min(taken(invocation), vec4(MOST_SUM) - own);
-            workgroupBarrier();
-        }
+        var own = summed(begin, end, invocation);
         for (var channel = 0u; channel < 4u; channel++) { hot_sums[part * PART_SUMS + channel * PIXELS + invocation] = own[channel]; }
     }
 }
