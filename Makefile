@@ -5,10 +5,14 @@ export CARGO_TARGET_DIR ?= $(HOME)/.cache/fluxglobe/target
 export FLUXGLOBE_TOOLS ?= $(HOME)/.cache/fluxglobe/tools
 export CMAKE ?= $(FLUXGLOBE_TOOLS)/bin/cmake
 export PIP ?= $(FLUXGLOBE_TOOLS)/bin/pip
+# What is built once from nothing and then run gains nothing by being split for the next edit.
+export CARGO_INCREMENTAL ?= 0
 # Mesa's device chooser would look for a desktop session and complain on servers, which have none.
 export NODEVICE_SELECT := 1
 
 fluxglobe := $(CARGO_TARGET_DIR)/debug/fluxglobe
+# Tests that ended without having run say so in here.
+not_run := $(CARGO_TARGET_DIR)/tests-not-run
 viewer := tile-server/web/dist/index.html
 viewer_sources := $(shell git ls-files tile-server/web)
 
@@ -60,7 +64,10 @@ test: test-tools $(viewer) ## Everything that CI runs
 	cd tile-server/web && npm run check && npm test
 	cargo build --locked --workspace --all-targets
 	deploy/services/services.sh install
-	FLUXGLOBE_FLUXENGINE=$$($(fluxglobe) demo --fetch-only) deploy/with-services.sh cargo test --locked --workspace
+	rm -f $(not_run)
+	fluxengine=$$(tests/data/fetch.sh) && FLUXGLOBE_FLUXENGINE=$$fluxengine FLUXGLOBE_SKIPPED=$(not_run) deploy/with-services.sh \
+		cargo test --locked --workspace --no-fail-fast --lib --bins --tests
+	tests/data/report.sh $(not_run)
 	cargo clippy --locked --workspace --all-targets -- -D warnings
 	deploy/check.sh
 

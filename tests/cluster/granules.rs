@@ -1,8 +1,8 @@
-//! Files to land: the real monthly fluxes where they are, else synthetic ones.
+//! Files to land: the real monthly fluxes, and small synthetic ones.
 
 use std::path::{Path, PathBuf};
 
-use harness::{program, real_data};
+use harness::program;
 
 /// Files and the product they land in.
 pub(crate) struct Granules {
@@ -14,34 +14,24 @@ pub(crate) struct Granules {
     pub(crate) tiles: &'static [(u32, u32, u32)],
 }
 
-/// Real files where they are, copied into `inbox`; else the generated China Sea.
+/// The real monthly fluxes, copied into `inbox`.
 pub(crate) fn some(inbox: &Path) -> Granules {
-    if let Some(folder) = real_data::fluxengine() {
-        let mut files: Vec<PathBuf> = std::fs::read_dir(folder.join("takahashi09"))
-            .unwrap()
-            .map(|entry| entry.unwrap().path())
-            .filter(|path| path.extension().is_some_and(|e| e == "nc"))
-            .collect();
-        files.sort();
-        let copied = files.iter().map(|file| {
-            let target = inbox.join(file.file_name().unwrap());
-            std::fs::copy(file, &target).unwrap();
-            target
-        });
-        return Granules {
-            files: copied.collect(),
-            product: "takahashi09-flux",
-            time: "2000-05-20T06:00:00Z",
-            tiles: &[(0, 0, 0), (2, 1, 1), (3, 0, 3)],
-        };
-    }
-    let file = inbox.join("china-sea.h5");
-    synthetic(&file, 1);
+    let mut files: Vec<PathBuf> = std::fs::read_dir(test_data::fluxengine("takahashi09"))
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.extension().is_some_and(|e| e == "nc"))
+        .collect();
+    files.sort();
+    let copied = files.iter().map(|file| {
+        let target = inbox.join(file.file_name().unwrap());
+        std::fs::copy(file, &target).unwrap();
+        target
+    });
     Granules {
-        files: vec![file],
-        product: "china-sea-synthetic",
-        time: "2009-05-20T06:00:00Z",
-        tiles: &[(0, 0, 0), (3, 6, 3), (4, 13, 6)],
+        files: copied.collect(),
+        product: "takahashi09-flux",
+        time: "2000-05-20T06:00:00Z",
+        tiles: &[(0, 0, 0), (2, 1, 1), (3, 0, 3)],
     }
 }
 

@@ -1,15 +1,14 @@
 //! Bad files and bad requests: one clear line each, the rest goes on, nothing lands twice.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use harness::program;
-use harness::real_data;
 use harness::server::Server;
 
 use crate::end_to_end::demo_data;
 
-fn flux_files(folder: &Path) -> Vec<PathBuf> {
-    let entries = std::fs::read_dir(folder.join("takahashi09")).unwrap();
+fn flux_files() -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(test_data::fluxengine("takahashi09")).unwrap();
     let mut files: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();
     files.sort();
     files
@@ -17,9 +16,7 @@ fn flux_files(folder: &Path) -> Vec<PathBuf> {
 
 #[test]
 fn a_batch_goes_on_past_bad_files_and_its_exit_code_says_so() {
-    let Some(files) = real_data::fluxengine().map(|folder| flux_files(&folder)) else {
-        return;
-    };
+    let files = flux_files();
     let data = tempfile::tempdir().unwrap();
     let make = |name: &str, content: &[u8]| {
         let path = data.path().join(name);
@@ -49,9 +46,7 @@ fn a_batch_goes_on_past_bad_files_and_its_exit_code_says_so() {
 
 #[test]
 fn the_same_file_twice_lands_once() {
-    let Some(files) = real_data::fluxengine().map(|folder| flux_files(&folder)) else {
-        return;
-    };
+    let files = flux_files();
     let data = tempfile::tempdir().unwrap();
     let good = files[3].to_str().unwrap();
     program::succeed(data.path(), &["ingest", good]).unwrap();
@@ -65,12 +60,11 @@ fn the_same_file_twice_lands_once() {
 
 #[test]
 fn a_swath_is_refused_with_its_reason() {
-    let Some(sets) = real_data::sets() else {
+    let Some(set) = test_data::set("wind_ascat_l2") else {
         return;
     };
     let data = tempfile::tempdir().unwrap();
-    let swath =
-        sets.join("wind_ascat_l2/ascat_20150702_084200_metopa_45145_eps_o_250_2300_ovw.l2.nc");
+    let swath = set.join("ascat_20150702_084200_metopa_45145_eps_o_250_2300_ovw.l2.nc");
     let talk = program::fail(data.path(), &["ingest", swath.to_str().unwrap()]).unwrap();
     assert!(talk.contains("swath"), "{talk}");
     assert_eq!(
@@ -98,7 +92,7 @@ fn commands_say_what_there_is() {
         ],
     );
     assert!(talk.unwrap().contains("a-z"));
-    let Some(data) = demo_data() else { return };
+    let data = demo_data();
     for (words, expected) in [
         (
             [
@@ -142,7 +136,7 @@ fn commands_say_what_there_is() {
 
 #[test]
 fn bad_requests_get_their_status_and_a_reason() {
-    let Some(data) = demo_data() else { return };
+    let data = demo_data();
     let server = Server::start(data, &["serve"]).unwrap();
     let cases = [
         ("/tiles/takahashi09-flux/volume/99/0/0.png", 400),

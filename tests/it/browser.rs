@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use harness::server::Server;
-use harness::{program, real_data};
+use harness::program;
 
 use crate::end_to_end::demo_data;
 
@@ -71,14 +71,13 @@ fn land_a_correction(data: &Path, file: &Path) -> String {
 
 #[test]
 fn the_page_shows_tiles_series_budgets_observations_and_news_without_an_error() {
-    let Some(demo) = demo_data() else { return };
+    let demo = demo_data();
     let folder = own_copy(demo);
     let data = folder.path();
     let observed = observations(data);
     program::succeed(data, &["ingest", observed.to_str().unwrap()]).unwrap();
-    let february = real_data::fluxengine()
-        .unwrap()
-        .join("takahashi09/M2001032.1200.a7.all_products.BIN.01feb011200.v1.20132321228.data.nc");
+    let february = test_data::fluxengine("takahashi09")
+        .join("M2001032.1200.a7.all_products.BIN.01feb011200.v1.20132321228.data.nc");
     let server = Server::start(data, &["serve"]).unwrap();
     let folder = Path::new(BROWSER);
     if !folder.join("node_modules").exists() {

@@ -6,7 +6,6 @@ pub mod http;
 pub mod node;
 pub mod program;
 pub mod proxy;
-pub mod real_data;
 pub mod server;
 pub mod servers;
 pub mod small_disk;

@@ -143,38 +143,23 @@ pub(crate) async fn ask(engine: &Engine, query: &BudgetQuery) -> BudgetAnswer {
     budget(engine, query).await.unwrap()
 }
 
-/// The twelve real grids, kg m⁻² s⁻¹; none where `FLUXGLOBE_FLUXENGINE` names no folder that holds them.
+/// The twelve real grids, kg m⁻² s⁻¹.
 ///
 /// Read as the demonstration's profile reads them: labels are north-west corners, the reference year is 2000, the unit
 /// is g C m⁻² a month.
-pub(crate) fn takahashi_year() -> Option<Vec<(Period, Vec<f32>)>> {
-    let folder = takahashi_folder()?;
-    let mut files: Vec<PathBuf> = std::fs::read_dir(folder)
+pub(crate) fn takahashi_year() -> Vec<(Period, Vec<f32>)> {
+    let mut files: Vec<PathBuf> = std::fs::read_dir(test_data::fluxengine("takahashi09"))
         .unwrap()
         .map(|entry| entry.unwrap().path())
         .collect();
     files.retain(|path| path.extension().is_some_and(|extension| extension == "nc"));
     files.sort();
     assert_eq!(files.len(), 12, "the folder holds one file a month");
-    Some(
-        files
-            .iter()
-            .zip(months(2000))
-            .map(|(file, period)| (period, read_flux(file, period)))
-            .collect(),
-    )
-}
-
-fn takahashi_folder() -> Option<PathBuf> {
-    let folder =
-        std::env::var_os("FLUXGLOBE_FLUXENGINE").map(|root| Path::new(&root).join("takahashi09"));
-    let folder = folder.filter(|folder| folder.is_dir());
-    if folder.is_none() {
-        eprintln!(
-            "SKIPPED: no real files; set FLUXGLOBE_FLUXENGINE to the folder that holds takahashi09"
-        );
-    }
-    folder
+    files
+        .iter()
+        .zip(months(2000))
+        .map(|(file, period)| (period, read_flux(file, period)))
+        .collect()
 }
 
 fn read_flux(file: &Path, period: Period) -> Vec<f32> {

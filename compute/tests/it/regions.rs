@@ -1,7 +1,5 @@
 //! Region files: their budgets against boxes, and real coast lines that nobody on this project drew.
 
-use std::path::PathBuf;
-
 use compute::Engine;
 use compute::region::{area, geojson_file, weights};
 use contract::earth::Earth;
@@ -34,21 +32,9 @@ async fn a_box_drawn_in_a_file_has_the_budget_of_the_box() {
     assert!((drawn.region_area_m2 / boxed.region_area_m2 - 1.0).abs() < 1e-9);
 }
 
-/// Folder of Natural Earth's shapes; none where there is none.
-fn natural_earth() -> Option<PathBuf> {
-    let beside = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data");
-    let root = std::env::var_os("FLUXGLOBE_TEST_DATA").unwrap_or_else(|| beside.into());
-    let folder = PathBuf::from(root).join("geo_natural_earth_geojson");
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    eprintln!("SKIPPED: no real shapes; set FLUXGLOBE_TEST_DATA (looked in {folder:?})");
-    None
-}
-
 #[test]
 fn real_land_and_real_ocean_make_the_earth() {
-    let Some(folder) = natural_earth() else {
+    let Some(folder) = test_data::set("geo_natural_earth_geojson") else {
         return;
     };
     let mut sum_m2 = 0.0;

@@ -1,9 +1,8 @@
-//! The real files, where they are at hand: numbers against those of another reader.
+//! The real files: numbers against those of another reader.
 //!
-//! `FLUXGLOBE_FLUXENGINE` is the folder `verification_data` of the unpacked FluxEngine 4.2.1 wheel;
-//! `FLUXGLOBE_TEST_DATA` holds the other sets (default `../shared/data` beside the workspace). A set that is not there is
-//! skipped and said so. Expected numbers: Python netCDF4 1.7 (masked by its own rules), numpy in float64, rows turned
-//! north first, multiplied by the unit factor that the comment names.
+//! The FluxEngine 4.2.1 wheel's `verification_data` (`test_data::fluxengine`) and the sets that only listed tests may do
+//! without (`test_data::set`). Expected numbers: Python netCDF4 1.7 (masked by its own rules), numpy in float64, rows
+//! turned north first, multiplied by the unit factor that the comment names.
 
 use std::path::{Path, PathBuf};
 
@@ -11,6 +10,7 @@ use contract::event::RejectReason;
 use contract::grid::Grid;
 use contract::time::Period;
 use ingest::{Outcome, Profile};
+use test_data::{fluxengine, set};
 
 use crate::fixture::{Place, refusal};
 
@@ -22,26 +22,6 @@ const ONE_DEGREE: Grid = Grid {
     dlat_deg: 1.0,
     dlon_deg: 1.0,
 };
-
-fn folder(variable: &str, default: Option<PathBuf>, inside: &str) -> Option<PathBuf> {
-    let root = std::env::var_os(variable).map(PathBuf::from).or(default);
-    let folder = root
-        .map(|root| root.join(inside))
-        .filter(|folder| folder.is_dir());
-    if folder.is_none() {
-        eprintln!("SKIPPED: {inside} is not there; set {variable}");
-    }
-    folder
-}
-
-pub(crate) fn fluxengine(inside: &str) -> Option<PathBuf> {
-    folder("FLUXGLOBE_FLUXENGINE", None, inside)
-}
-
-fn test_data(inside: &str) -> Option<PathBuf> {
-    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
-    folder("FLUXGLOBE_TEST_DATA", Some(beside), inside)
-}
 
 pub(crate) fn files(folder: &Path, part: &str) -> Vec<PathBuf> {
     let is_wanted = |path: &PathBuf| {
@@ -65,9 +45,7 @@ pub(crate) fn near(found: f64, expected: f64) {
 
 #[tokio::test]
 async fn takahashi_lands_with_corner_labels_and_the_reference_year() {
-    let Some(folder) = fluxengine("takahashi09") else {
-        return;
-    };
+    let folder = fluxengine("takahashi09");
     let place = Place::new();
     let outcomes = place.land(&files(&folder, "")).await;
     assert_eq!(outcomes.len(), 12);
@@ -131,7 +109,7 @@ async fn takahashi_lands_with_corner_labels_and_the_reference_year() {
 
 /// One family: folder, product, number of files, and July as valid cells, mean and one cell (row 100, column 30).
 struct Family {
-    folder: Option<PathBuf>,
+    folder: PathBuf,
     product: &'static str,
     files: usize,
     july_valid_cells: u64,
@@ -140,7 +118,7 @@ struct Family {
 }
 
 async fn assert_family(family: Family) {
-    let Some(folder) = family.folder else { return };
+    let folder = family.folder;
     let place = Place::new();
     let outcomes = place.land(&files(&folder, "")).await;
     assert_eq!(outcomes.len(), family.files);
@@ -222,7 +200,9 @@ async fn chlorophyll_lands_without_axes_time_or_unit_of_its_own() {
 /// A microatmosphere is 0.101325 Pa.
 #[tokio::test]
 async fn socat_lands_with_the_month_of_its_file_names() {
-    let folder = test_data("socatv4_fco2_2010_1deg_monthly");
+    let Some(folder) = set("socatv4_fco2_2010_1deg_monthly") else {
+        return;
+    };
     let (july_mean, july_cell) = (3.592_563_823e1, Some(4.130_017_266e1));
     assert_family(Family {
         folder,
@@ -299,7 +279,7 @@ async fn rain_lands_with_longitude_first() {
 /// 1 January 2002: 2552 of 41 x 81 cells, mean and the north-eastern cell of the eastward part.
 #[tokio::test]
 async fn daily_currents_land_as_a_region() {
-    let Some(folder) = test_data("currents_globcurrent_agulhas_2002_daily") else {
+    let Some(folder) = set("currents_globcurrent_agulhas_2002_daily") else {
         return;
     };
     let place = Place::new();
@@ -341,9 +321,7 @@ async fn daily_currents_land_as_a_region() {
 
 #[tokio::test]
 async fn one_file_can_land_as_several_products_by_profile() {
-    let Some(folder) = fluxengine("takahashi09") else {
-        return;
-    };
+    let folder = fluxengine("takahashi09");
     let place = Place::new();
     let profile = Profile::find("takahashi09-pco2").unwrap();
     let outcomes = place
@@ -368,7 +346,7 @@ async fn one_file_can_land_as_several_products_by_profile() {
 #[tokio::test]
 async fn swaths_are_refused_as_swaths() {
     for set in ["sst_ghrsst_l2p", "wind_ascat_l2"] {
-        let Some(folder) = test_data(set) else {
+        let Some(folder) = test_data::set(set) else {
             continue;
         };
         for file in files(&folder, "") {
@@ -387,7 +365,7 @@ async fn points_profiles_and_moorings_are_refused_with_a_line() {
         "ship_tracks_socat_dsg",
         "tropical_pacific_mooring_co2",
     ] {
-        let Some(folder) = test_data(set) else {
+        let Some(folder) = test_data::set(set) else {
             continue;
         };
         for file in files(&folder, "") {

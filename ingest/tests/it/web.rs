@@ -91,18 +91,16 @@ async fn inner_addresses_are_refused_before_anything_is_sent() {
     assert!(server.asked().is_empty(), "{:?}", server.asked());
 }
 
-/// A name whose address is found out by asking: this machine's own.
+/// A name whose address is found out by asking: this machine's own, or the one that every machine has.
 #[tokio::test]
 async fn a_name_that_resolves_to_an_inner_address_is_refused() {
     let place = Place::new();
     let server = WebServer::start(Box::new(|_| Answer::Whole("200 OK", vec![], vec![]))).await;
     let name = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap();
-    let name = name.trim();
-    let Ok(addresses) = tokio::net::lookup_host((name, 0)).await else {
-        eprintln!("SKIPPED: this machine's name {name:?} does not resolve");
-        return;
+    let name = match tokio::net::lookup_host((name.trim(), 0)).await {
+        Ok(_addresses) => name.trim(),
+        Err(_unknown) => "localhost",
     };
-    eprintln!("{name} is {:?}", addresses.collect::<Vec<_>>());
     let settings = guarded(&place, &[]).unwrap();
     let url = format!("http://{name}:{}/a.nc", server.address.port());
     let (reason, line) = refused(&place, &settings, &url).await;

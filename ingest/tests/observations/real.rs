@@ -1,24 +1,14 @@
-//! The real files, where they are at hand (`FLUXGLOBE_TEST_DATA`, else `../shared/data` beside the workspace).
+//! The real files of `FLUXGLOBE_TEST_DATA`: each test is on the list of `tests/data`.
 //!
 //! Expected numbers: Python netCDF4 1.7 and csv, sentinels taken out by hand, means in float64.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use contract::event::RejectReason;
 use contract::observation::{Observation, PlatformKind, Quality};
+use test_data::set;
 
 use crate::made::{observations, refusal};
-
-fn set(name: &str) -> Option<PathBuf> {
-    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
-    let root = std::env::var_os("FLUXGLOBE_TEST_DATA").map_or(beside, PathBuf::from);
-    let folder = root.join(name);
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    eprintln!("SKIPPED: {name} is not there; set FLUXGLOBE_TEST_DATA");
-    None
-}
 
 /// Number, mean, least and greatest value of a property.
 fn summary(all: &[Observation], property: &str) -> (usize, f64, f64, f64) {

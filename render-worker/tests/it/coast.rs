@@ -2,8 +2,6 @@
 //! `ne_110m_coastline.json` and `ne_50m_coastline.json` in the folder `geo_natural_earth_geojson` of the test data:
 //! `FLUXGLOBE_TEST_DATA=FOLDER BLESS=1 cargo test -p render-worker --test it coast`.
 
-use std::path::PathBuf;
-
 use contract::job::Mode;
 use contract::tile::{mercator_x, mercator_y};
 use render_worker::coast::{self, Mask, Place};
@@ -20,19 +18,6 @@ fn switch(variable: &str) -> Option<String> {
     std::env::var(variable)
         .ok()
         .filter(|value| !value.is_empty())
-}
-
-/// Folder of Natural Earth's shapes; none where there is none.
-fn natural_earth() -> Option<PathBuf> {
-    let beside = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data");
-    let root = switch("FLUXGLOBE_TEST_DATA").unwrap_or_else(|| beside.into());
-    let folder = PathBuf::from(root).join("geo_natural_earth_geojson");
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    let folder = folder.display();
-    println!("SKIPPED: no real shapes; set FLUXGLOBE_TEST_DATA (looked in {folder})");
-    None
 }
 
 /// The lines of a file, corners that are rounded to the same place left out.
@@ -70,7 +55,7 @@ fn line_of(coordinates: &[Value]) -> Vec<Place> {
 #[test]
 fn the_packed_lines_are_those_of_natural_earth() {
     assert!(coast::packed().len() <= MOST_BYTES);
-    let Some(folder) = natural_earth() else {
+    let Some(folder) = test_data::set("geo_natural_earth_geojson") else {
         return;
     };
     let scales = ["ne_110m_coastline.json", "ne_50m_coastline.json"]
