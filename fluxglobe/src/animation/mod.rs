@@ -37,6 +37,7 @@ pub(crate) async fn run(settings: &Settings, store: Store, options: RenderAnimat
     if options.globe.picture.time.is_some() {
         bail!("an animation has no one --time: give --from and --to");
     }
+    film::check(&options)?;
     let shots = Arc::new(shots(settings, &store, &options).await?);
     let drawer = drawer(settings, store, &options).await?;
     let mut film = Film::open(&options, &shots)?;
