@@ -21,7 +21,7 @@ use contract::time::TimeMs;
 pub(crate) use fill::{BenchFill, FillError, ProductsOf};
 pub(crate) use look::{Look, RenderLegend};
 pub(crate) use observations::{MatchTime, Matchup, Observations, ObservationsAsked};
-pub(crate) use pictures::{BenchCompare, BenchQuality, RenderAnimation};
+pub(crate) use pictures::{BenchCompare, BenchQuality, BenchServe, RenderAnimation};
 pub(crate) use services::{
     Bench, BenchStream, Executor, Ingestd, Notice, Rejected, RenderWorker, Scheduler, TileServer,
     Topics,
@@ -82,6 +82,14 @@ pub(crate) struct Settings {
     /// Draw with the processor alone instead of a Vulkan device.
     #[arg(long, env = "FLUXGLOBE_CPU", global = true)]
     pub(crate) cpu: bool,
+    /// Refuse to draw where there is no graphics card, instead of drawing in software.
+    #[arg(
+        long,
+        env = "FLUXGLOBE_REQUIRE_GPU",
+        global = true,
+        conflicts_with = "cpu"
+    )]
+    pub(crate) require_gpu: bool,
     /// Ballista partitions; answers are the same bits for any number.
     #[arg(long, env = "FLUXGLOBE_PARTITIONS", default_value = "2", global = true)]
     pub(crate) partitions: NonZeroU16,

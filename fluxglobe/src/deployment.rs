@@ -1,6 +1,6 @@
 //! What commands and services work on: one process with a data folder, or the servers that settings name.
 
-use std::num::NonZeroUsize;
+use std::num::{NonZeroU32, NonZeroUsize};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -77,10 +77,34 @@ pub(crate) fn engine(settings: &Settings, store: Store) -> Result<Engine> {
     })
 }
 
-/// The renderer on this machine's Vulkan device, or on its processor when asked to; for pictures that follow one another
-/// in time.
+/// What to draw with: this machine's Vulkan device, or its processor when asked to.
+pub(crate) fn backend(settings: &Settings) -> Backend {
+    if settings.cpu {
+        Backend::Cpu
+    } else if settings.require_gpu {
+        Backend::HardwareGpu
+    } else {
+        Backend::Gpu
+    }
+}
+
+/// The renderer for pictures that follow one another in time.
 pub(crate) async fn renderer(settings: &Settings, store: Store) -> Result<RenderService> {
-    renderer_of(settings, store, Limits::default()).await
+    renderer_at(settings, store, None).await
+}
+
+/// The same that draws so many pictures at the same time; as many as suit its adapter if none is named.
+pub(crate) async fn renderer_at(
+    settings: &Settings,
+    store: Store,
+    draws_at_once: Option<NonZeroU32>,
+) -> Result<RenderService> {
+    let count = draws_at_once.and_then(|count| NonZeroUsize::new(count.get() as usize));
+    let limits = Limits {
+        draws_at_once: count,
+        ..Limits::default()
+    };
+    renderer_of(settings, store, limits).await
 }
 
 /// The same for single pictures: nothing is read ahead for a next one.
@@ -93,11 +117,7 @@ pub(crate) async fn single_renderer(settings: &Settings, store: Store) -> Result
 }
 
 async fn renderer_of(settings: &Settings, store: Store, limits: Limits) -> Result<RenderService> {
-    let backend = if settings.cpu {
-        Backend::Cpu
-    } else {
-        Backend::Gpu
-    };
+    let backend = backend(settings);
     let make = move || RenderService::with_limits(store, backend, limits);
     Ok(tokio::task::spawn_blocking(make).await??)
 }

@@ -2,6 +2,7 @@
 
 mod observer;
 
+use std::num::NonZeroU32;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use async_trait::async_trait;
@@ -16,10 +17,14 @@ use render_worker::fleet::{Fleet, FleetError};
 use render_worker::{RenderError, RenderService};
 use tile_server::backend::{
     Analyse, BackendError, BudgetRequest, BudgetRow, BudgetStep as WantedStep, Check, Class, Draw,
-    RowCol,
+    RowCol, Turn,
 };
 
 pub(crate) use observer::Observer;
+
+/// Pictures asked of render workers at the same time. Each worker has a queue of its own, and is joined by others when
+/// 16 wait in it: one server alone must be able to fill that.
+const FLEET_DRAWS_AT_ONCE: NonZeroU32 = NonZeroU32::new(32).expect("32 is not 0");
 
 /// Pictures from the renderer in this process.
 pub(crate) struct Drawer {
@@ -51,11 +56,16 @@ pub(crate) struct Analyst {
 
 #[async_trait]
 impl Draw for Drawer {
-    async fn draw(&self, job: &RenderJob) -> Result<Bytes, BackendError> {
-        let picture = self.service.draw(job).await;
+    async fn draw(&self, job: &RenderJob, turn: Turn) -> Result<Bytes, BackendError> {
+        let picture = self.service.draw_in_turn(job, turn).await;
         let trouble = picture.as_ref().err().filter(|error| error.is_retryable());
         *self.trouble() = trouble.map(ToString::to_string);
         picture.map_err(render_failed)
+    }
+
+    fn draws_at_once(&self) -> NonZeroU32 {
+        let suited = u32::try_from(self.service.draws_at_once().get()).unwrap_or(u32::MAX);
+        NonZeroU32::new(suited).unwrap_or(NonZeroU32::MIN)
     }
 
     async fn ready(&self) -> Result<(), BackendError> {
@@ -118,12 +128,17 @@ pub(crate) struct FleetDrawer(pub(crate) Fleet);
 
 #[async_trait]
 impl Draw for FleetDrawer {
-    async fn draw(&self, job: &RenderJob) -> Result<Bytes, BackendError> {
+    async fn draw(&self, job: &RenderJob, turn: Turn) -> Result<Bytes, BackendError> {
         let trace = job.digest().short();
         let picture = self.0.draw(job, &trace).await;
+        drop(turn);
         picture
             .map(|picture| picture.png)
             .map_err(|error| fleet_failed(&error))
+    }
+
+    fn draws_at_once(&self) -> NonZeroU32 {
+        FLEET_DRAWS_AT_ONCE
     }
 
     async fn ready(&self) -> Result<(), BackendError> {

@@ -64,7 +64,7 @@ impl BatchService {
     }
 
     async fn read(&self, stop: &Stop) -> Result<(), StorageError> {
-        let at_once = self.desk.limits().draws_at_once.get();
+        let at_once = self.desk.draws_at_once();
         let mut reader = self.log.join(Topic::RenderJob, GROUP).await?;
         let mut work = FuturesUnordered::new();
         while !stop.is_said() {

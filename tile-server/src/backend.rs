@@ -3,6 +3,7 @@
 //! Left out on purpose: how a picture is drawn or a budget is summed. Both traits take and give values of `contract`
 //! and of this file only, so that the same server runs over a renderer in its process or one behind a network.
 
+use std::num::NonZeroU32;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -16,12 +17,34 @@ use contract::product::ProductId;
 use contract::region::Region;
 use contract::time::{Period, TimeMs};
 use serde::{Deserialize, Serialize};
+use tokio::sync::OwnedSemaphorePermit;
+
+/// Leave to draw one picture; the next one waiting gets it when this is dropped.
+///
+/// Whoever draws lets go of it as soon as what is scarce is free again, which is the device: a picture that is encoded
+/// holds up nobody. The default is that of a caller who gives out no turns.
+#[derive(Debug, Default)]
+pub struct Turn(Option<OwnedSemaphorePermit>);
+
+impl Turn {
+    pub(crate) fn new(permit: OwnedSemaphorePermit) -> Self {
+        Self(Some(permit))
+    }
+
+    /// Is it one of a bounded number?
+    pub fn is_counted(&self) -> bool {
+        self.0.is_some()
+    }
+}
 
 /// Draws pictures.
 #[async_trait]
 pub trait Draw: Send + Sync + 'static {
     /// The picture of a valid job as the bytes of a PNG with alpha; a job without data is a transparent picture.
-    async fn draw(&self, job: &RenderJob) -> Result<Bytes, BackendError>;
+    async fn draw(&self, job: &RenderJob, turn: Turn) -> Result<Bytes, BackendError>;
+
+    /// How many pictures it should be given to draw at the same time, where nobody says how many.
+    fn draws_at_once(&self) -> NonZeroU32;
 
     /// Can pictures be drawn now? The text of the error is shown to operators.
     async fn ready(&self) -> Result<(), BackendError>;

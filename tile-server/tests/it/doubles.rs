@@ -1,5 +1,6 @@
 //! Doubles for the ports: they record what they are asked, and answer what a test tells them to.
 
+use std::num::NonZeroU32;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
@@ -14,7 +15,7 @@ use storage::StorageError;
 use storage::log::{EmbeddedLog, EventLog, Follower, Message, Reader, Start};
 use tile_server::backend::{
     Analyse, BackendError, BudgetRequest, BudgetRow, Check, Class, Draw, ObservationPage,
-    ObservationQuestion, Observe, Platform, RowCol, TrackPoint, TrackQuestion,
+    ObservationQuestion, Observe, Platform, RowCol, TrackPoint, TrackQuestion, Turn,
 };
 use tokio::sync::Semaphore;
 
@@ -49,6 +50,9 @@ pub(crate) struct Drawer {
     /// While true, pictures wait for a permit of `turns` each.
     pub(crate) is_slow: AtomicBool,
     pub(crate) turns: Semaphore,
+    /// While true, pictures that are drawn are slow to be encoded: they wait for a permit of `turns` after they let go
+    /// of their turn.
+    pub(crate) encodes_slowly: AtomicBool,
 }
 
 impl Default for Drawer {
@@ -59,6 +63,7 @@ impl Default for Drawer {
             mood,
             is_slow: AtomicBool::new(false),
             turns: Semaphore::new(0),
+            encodes_slowly: AtomicBool::new(false),
         }
     }
 }
@@ -89,9 +94,13 @@ impl Drawer {
 
 #[async_trait]
 impl Draw for Drawer {
-    async fn draw(&self, job: &RenderJob) -> Result<Bytes, BackendError> {
+    async fn draw(&self, job: &RenderJob, turn: Turn) -> Result<Bytes, BackendError> {
         self.jobs.lock().unwrap().push(job.clone());
         if self.is_slow.load(Ordering::SeqCst) {
+            self.turns.acquire().await.unwrap().forget();
+        }
+        drop(turn);
+        if self.encodes_slowly.load(Ordering::SeqCst) {
             self.turns.acquire().await.unwrap().forget();
         }
         let mood = self.mood.lock().unwrap().clone();
@@ -101,6 +110,10 @@ impl Draw for Drawer {
         } else {
             Self::picture_of(job)
         })
+    }
+
+    fn draws_at_once(&self) -> NonZeroU32 {
+        NonZeroU32::new(2).unwrap()
     }
 
     async fn ready(&self) -> Result<(), BackendError> {
