@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use async_trait::async_trait;
 use contract::event::Event;
-use contract::topic::Topic;
+use contract::topic::{Origin, Topic};
 use rdkafka::consumer::{Consumer as _, StreamConsumer};
 use rdkafka::{Offset, TopicPartitionList};
 use storage::StorageError;
@@ -217,6 +217,10 @@ impl Reader for KafkaReader {
             }
             Err(failure) => Err(self.failed(failure)),
         }
+    }
+
+    fn lost(&mut self) -> Vec<Origin> {
+        self.inbox.lost()
     }
 
     async fn leave(self: Box<Self>) -> Result<(), StorageError> {
