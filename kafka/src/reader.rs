@@ -27,8 +27,9 @@ use crate::transaction::{Offsets, Record, Transactions};
 /// How long a member that the group left behind waits to be part of it again, so that it can move its offsets.
 const AGAIN_LIMIT: Duration = Duration::from_secs(20);
 const AGAIN_PAUSE: Duration = Duration::from_millis(100);
-/// How long leaving may take.
-const LEAVE_LIMIT: Duration = Duration::from_secs(5);
+/// How long leaving may take: a busy broker shares out the partitions of all who are left before it answers. The group
+/// does without a member by itself after its session; waiting longer than that gains nothing.
+const LEAVE_LIMIT: Duration = Duration::from_secs(30);
 
 /// Reads one topic with others of its group.
 pub(crate) struct KafkaReader {
