@@ -209,6 +209,7 @@ mod tests {
             domain: ObjectKey::domain(&product, &Digest::of(b"d")),
             series: vec![],
             derived_from: None,
+            notices: vec![],
             product,
         }
     }

@@ -18,6 +18,7 @@ pub mod job;
 pub mod key;
 pub mod manifest;
 pub mod moment;
+pub mod notice;
 pub mod observation;
 pub mod product;
 pub mod quantity;

@@ -8,12 +8,17 @@ use crate::ContractError;
 use crate::digest::Digest;
 use crate::grid::Grid;
 use crate::key::ObjectKey;
+use crate::notice::{NoticeOrder, NoticeRun};
 use crate::product::ProductId;
 use crate::quantity::Quantity;
 use crate::time::{Period, TimeMs};
 
-/// Version of the manifest's JSON.
-pub const MANIFEST_SCHEMA: u32 = 1;
+/// Version of the manifest's JSON. Those since [`OLDEST_MANIFEST_SCHEMA`] are read too.
+///
+/// 2: the order of the notices that brought the files.
+pub const MANIFEST_SCHEMA: u32 = 2;
+/// Oldest version that is read.
+pub const OLDEST_MANIFEST_SCHEMA: u32 = 1;
 
 /// One version of one product. Readers see it whole or not at all.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -43,6 +48,9 @@ pub struct Manifest {
     pub series: Vec<SeriesSegment>,
     /// The manifest this one was derived from, if it was computed rather than ingested.
     pub derived_from: Option<ManifestId>,
+    /// Place of the steps' files in the order of notices; of steps without one nothing is known, and any file is newer.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub notices: Vec<NoticeRun>,
 }
 
 /// One time step of a product.
@@ -81,6 +89,17 @@ impl Manifest {
             number: self.number,
             short_sha256: Digest::of_json(self).short(),
         }
+    }
+
+    /// Of each step the place of its file in the order of notices, as far as it is known.
+    pub fn notice_orders(&self) -> Vec<Option<NoticeOrder>> {
+        NoticeRun::orders(&self.notices, self.steps.len())
+    }
+
+    /// Index of the step of exactly this period.
+    pub fn step_of(&self, period: Period) -> Option<usize> {
+        let found = self.steps.binary_search_by_key(&period, |step| step.period);
+        found.ok()
     }
 
     /// First and last instant covered.
@@ -243,6 +262,7 @@ mod tests {
             domain: ObjectKey::domain(&product, &digest),
             series: vec![],
             derived_from: None,
+            notices: vec![],
             product,
         }
     }
@@ -308,6 +328,16 @@ mod tests {
                 weight: 0.5
             }
         );
+    }
+
+    /// Bytes as version 1 wrote them: they must keep their meaning and their name.
+    #[test]
+    fn a_manifest_of_version_1_is_read_and_keeps_its_name() {
+        let json = r#"{"schema":1,"product":"p","number":3,"title":"","quantity":"carbon_flux","synthetic":false,"source":"","grid":{"rows":1,"cols":1,"north_deg":1.0,"west_deg":0.0,"dlat_deg":1.0,"dlon_deg":1.0},"steps":[{"period":{"start":"2000-01-01T00:00:00Z","end":"2000-02-01T00:00:00Z"},"frame":"frames/p/e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855","raw_sha256":"e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855","origin":"f.nc","valid_cells":1}],"domain":"domain/p/e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855","series":[],"derived_from":null}"#;
+        let old: Manifest = serde_json::from_str(json).unwrap();
+        assert_eq!(serde_json::to_string(&old).unwrap(), json);
+        assert_eq!(old.id().to_string(), "p@3-ID_OF_VERSION_1");
+        assert_eq!(old.notice_orders(), [None]);
     }
 
     #[test]

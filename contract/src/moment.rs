@@ -130,6 +130,7 @@ mod tests {
             domain: ObjectKey::domain(&product, &Digest::of(b"d")),
             series: vec![],
             derived_from: None,
+            notices: vec![],
             product,
         }
     }

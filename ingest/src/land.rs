@@ -89,10 +89,12 @@ fn asked(path: &std::path::Path, batch: &Batch<'_>) -> Asked {
         shown,
         attempt: 1,
         cause: Event::new(trace(path), body),
+        given: None,
     };
     Asked {
         notice,
         origin: None,
+        file: 0,
     }
 }
 
@@ -133,7 +135,11 @@ pub(crate) async fn land_group(
 /// Takes the file of a notice as far as to the manifest.
 pub(crate) async fn prepare(pipeline: &Pipeline<'_>, asked: &Asked) -> Result<Ready, IngestError> {
     let prepared = match &asked.notice.order {
-        Ok(order) => pipeline.prepare(&asked.file(), order).await?,
+        Ok(order) => {
+            pipeline
+                .prepare(&asked.path(), order, asked.order())
+                .await?
+        }
         Err(rejection) => Prepared::Rejected(rejection.clone()),
     };
     asked.settle(pipeline.store, prepared).await
@@ -145,7 +151,7 @@ pub(crate) async fn commit(
     batch: &[(&Asked, &StoredGranule)],
 ) -> Result<Vec<Answer>, IngestError> {
     for (asked, _) in batch {
-        pipeline.progress.stage(&asked.file(), Stage::Commit, 0, 0);
+        pipeline.progress.stage(&asked.path(), Stage::Commit, 0, 0);
     }
     let running = pipeline.metrics.start("commit");
     let committed = answer::commit(pipeline.store, batch).await;

@@ -37,6 +37,7 @@ mod recipe;
 mod rejection;
 pub mod reread;
 mod settings;
+mod superseded;
 mod survey;
 mod unit;
 

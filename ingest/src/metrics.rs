@@ -18,6 +18,7 @@ pub struct Metrics {
     red: Red,
     notice_to_landed: Histogram,
     rejected: IntCounterVec,
+    superseded: IntCounter,
     bytes: IntCounter,
     /// NaN until it is known: no lag is not the same as none looked up.
     lag: Gauge,
@@ -52,6 +53,10 @@ impl Metrics {
                 ),
                 &["reason"],
             )?,
+            superseded: IntCounter::new(
+                "fluxglobe_ingestd_superseded_total",
+                "Files that were left as they are: files of later notices have their time.",
+            )?,
             bytes: IntCounter::new(
                 "fluxglobe_ingestd_fetched_bytes_total",
                 "Bytes of files that were fetched.",
@@ -64,6 +69,7 @@ impl Metrics {
         new.lag.set(f64::NAN);
         registry.register(Box::new(new.notice_to_landed.clone()))?;
         registry.register(Box::new(new.rejected.clone()))?;
+        registry.register(Box::new(new.superseded.clone()))?;
         registry.register(Box::new(new.bytes.clone()))?;
         registry.register(Box::new(new.lag.clone()))?;
         Ok(new)
@@ -99,6 +105,10 @@ impl Metrics {
 
     pub(crate) fn rejected(&self, reason: RejectReason) {
         self.rejected.with_label_values(&[class(reason)]).inc();
+    }
+
+    pub(crate) fn superseded(&self) {
+        self.superseded.inc();
     }
 
     pub(crate) fn lag(&self, messages: u64) {

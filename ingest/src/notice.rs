@@ -28,6 +28,9 @@ pub(crate) struct Notice {
     pub(crate) order_key: String,
     /// What every event about it follows from.
     pub(crate) cause: Event,
+    /// When it was given, by its sender's word but never later than its message came: the same however often it is
+    /// read, and when it is sent twice.
+    pub(crate) given: Option<TimeMs>,
 }
 
 /// How a file is to be landed.
@@ -51,10 +54,15 @@ impl Order {
 impl Notice {
     /// The notices of a message: at least one, so that every message is answered.
     pub(crate) fn of(message: &Message, settings: &Settings, now: TimeMs) -> Vec<Self> {
-        match read(message, settings, now) {
+        let came = message.time.unwrap_or(now);
+        let mut notices = match read(message, settings, came) {
             Ok(notices) => notices,
-            Err(rejection) => vec![Self::unreadable(message, rejection, now)],
+            Err(rejection) => vec![Self::unreadable(message, rejection, came)],
+        };
+        for notice in &mut notices {
+            notice.given = notice.cause.noticed.min(Some(came));
         }
+        notices
     }
 
     /// A message that says nothing is refused under its own place: its words are not to be trusted.
@@ -72,6 +80,7 @@ impl Notice {
             order: Err(rejection),
             attempt: 1,
             cause,
+            given: None,
         }
     }
 
@@ -115,6 +124,7 @@ impl Notice {
             attempt: *attempt,
             order_key,
             cause,
+            given: None,
         })
     }
 }

@@ -34,6 +34,13 @@ pub enum Outcome {
         /// Its periods.
         periods: Vec<Period>,
     },
+    /// Files of later notices have its time: it changes nothing.
+    Superseded {
+        /// The file.
+        file: PathBuf,
+        /// Newest manifest, which holds the newer files.
+        manifest: ManifestId,
+    },
     /// It holds observations, which are stored now.
     Observed {
         /// The file.
@@ -77,7 +84,9 @@ impl Outcome {
     /// Manifest that holds the file.
     pub fn manifest(&self) -> Option<&ManifestId> {
         match self {
-            Self::Landed { manifest, .. } | Self::AlreadyLanded { manifest, .. } => Some(manifest),
+            Self::Landed { manifest, .. }
+            | Self::AlreadyLanded { manifest, .. }
+            | Self::Superseded { manifest, .. } => Some(manifest),
             Self::Observed { .. } | Self::Rejected { .. } => None,
         }
     }
@@ -87,6 +96,7 @@ impl Outcome {
         match self {
             Self::Landed { file, .. }
             | Self::AlreadyLanded { file, .. }
+            | Self::Superseded { file, .. }
             | Self::Observed { file, .. }
             | Self::Rejected { file, .. } => file,
         }
@@ -109,25 +119,13 @@ impl Outcome {
                     ..
                 },
                 Some(raw_sha256),
-            ) => Body::GranuleLanded {
-                path,
-                raw_sha256,
-                manifest: manifest.clone(),
-                periods: periods.clone(),
-                revised: *revised,
-            },
+            ) => Body::granule_landed(path, raw_sha256, manifest.clone(), periods, *revised),
             (
                 Self::AlreadyLanded {
                     manifest, periods, ..
                 },
                 Some(raw_sha256),
-            ) => Body::GranuleLanded {
-                path,
-                raw_sha256,
-                manifest: manifest.clone(),
-                periods: periods.clone(),
-                revised: false,
-            },
+            ) => Body::granule_landed(path, raw_sha256, manifest.clone(), periods, false),
             (
                 Self::Rejected {
                     reason,
@@ -143,7 +141,8 @@ impl Outcome {
                 attempt,
                 origin,
             },
-            (Self::Observed { .. }, _) => return None,
+            // What has still to be told of a superseded file is not of the newest manifest: its answer has it.
+            (Self::Observed { .. } | Self::Superseded { .. }, _) => return None,
             (Self::Landed { .. } | Self::AlreadyLanded { .. }, None) => {
                 unreachable!("a landed file has a digest")
             }
@@ -179,6 +178,11 @@ impl Display for Outcome {
             Self::AlreadyLanded { file, manifest, .. } => {
                 write!(f, "{}: was in {manifest} already", file.display())
             }
+            Self::Superseded { file, manifest } => write!(
+                f,
+                "{}: left as it is: {manifest} has files of later notices for its time; to land it all the same, send a new notice",
+                file.display()
+            ),
             Self::Observed { file, stored } => write!(
                 f,
                 "{}: {} observations are new, {} replaced, {} were there",

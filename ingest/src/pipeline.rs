@@ -6,10 +6,12 @@ use std::path::Path;
 
 use contract::digest::Digest;
 use contract::event::RejectReason;
-use contract::manifest::{Manifest, ManifestId};
+use contract::manifest::ManifestId;
+use contract::notice::NoticeOrder;
 use contract::time::Period;
 use storage::{StorageError, Store, manifests};
 
+use crate::commit::is_later_or_same;
 use crate::error::{IngestError, Stop};
 use crate::fetch::RawGranule;
 use crate::gates::Gates;
@@ -40,6 +42,12 @@ pub(crate) enum Prepared {
         manifest: ManifestId,
         periods: Vec<Period>,
     },
+    /// Nothing: files of later notices have its time.
+    Superseded {
+        raw_sha256: Digest,
+        manifest: ManifestId,
+        periods: Vec<Period>,
+    },
     /// Nothing: it held observations, which are stored.
     Observed(Stored),
     /// Nothing: it is refused.
@@ -64,10 +72,11 @@ impl Pipeline<'_> {
         &self,
         shown: &Path,
         order: &Order,
+        place: Option<NoticeOrder>,
     ) -> Result<Prepared, IngestError> {
         let mut was_killed = false;
         for _ in 0..MAX_READS {
-            match self.stages(shown, order).await {
+            match self.stages(shown, order, place).await {
                 Ok(prepared) => return Ok(prepared),
                 Err(Stop::Rejected(rejection)) => return Ok(Prepared::Rejected(rejection)),
                 Err(Stop::Failed(IngestError::Changed { .. })) => {
@@ -90,7 +99,12 @@ impl Pipeline<'_> {
         Ok(Prepared::Rejected(Rejection::new(reason, "file", detail)))
     }
 
-    async fn stages(&self, shown: &Path, order: &Order) -> Result<Prepared, Stop> {
+    async fn stages(
+        &self,
+        shown: &Path,
+        order: &Order,
+        place: Option<NoticeOrder>,
+    ) -> Result<Prepared, Stop> {
         let Self {
             settings, metrics, ..
         } = self;
@@ -99,7 +113,7 @@ impl Pipeline<'_> {
         let raw = metrics.timed("fetch", fetched).await?;
         metrics.fetched(raw.size_bytes);
         let _pass = self.gates.enter(raw.size_bytes).await;
-        let read = self.read(shown, raw.clone(), order.wish()).await;
+        let read = self.read(shown, raw.clone(), order.wish(), place).await;
         match read {
             // Whatever is wrong with a file that changed meanwhile may be right the next time.
             Err(Stop::Rejected(rejection)) => {
@@ -110,7 +124,13 @@ impl Pipeline<'_> {
         }
     }
 
-    async fn read(&self, path: &Path, raw: RawGranule, wish: Wish<'_>) -> Result<Prepared, Stop> {
+    async fn read(
+        &self,
+        path: &Path,
+        raw: RawGranule,
+        wish: Wish<'_>,
+        place: Option<NoticeOrder>,
+    ) -> Result<Prepared, Stop> {
         let metrics = self.metrics;
         if let Some(format) = observation::recognise_text(&raw.head(TEXT_HEAD_BYTES).await?) {
             return self.observe_text(format, raw, wish).await;
@@ -125,7 +145,7 @@ impl Pipeline<'_> {
         self.progress.stage(path, Stage::Plan, 0, 0);
         let planned = plan::run(inspected, wish, self.settings);
         let planned = metrics.timed("plan", planned).await?;
-        if let Some(landed) = self.landed_before(&planned, wish).await? {
+        if let Some(landed) = self.nothing_to_do(&planned, wish, place).await? {
             return Ok(landed);
         }
         put::raw(self.store, &planned.target.product, &planned.raw).await?;
@@ -195,6 +215,7 @@ impl Pipeline<'_> {
             raw_sha256,
             grids,
             asked_by: None,
+            order: None,
         };
         Ok((granule, reading))
     }
@@ -244,37 +265,48 @@ impl Pipeline<'_> {
         self.metrics.timed("put", put).await.map(Some)
     }
 
-    /// Is this very file in the product? With a profile of the caller's own it is decoded all the same, since the same
-    /// bytes may mean other values by it.
-    async fn landed_before(
+    /// Is this very file in the product, or are files of later notices in all of its places? With a profile of the
+    /// caller's own it is decoded all the same, since the same bytes may mean other values by it.
+    async fn nothing_to_do(
         &self,
         planned: &PlannedGranule,
         wish: Wish<'_>,
+        place: Option<NoticeOrder>,
     ) -> Result<Option<Prepared>, IngestError> {
-        if wish.profile.is_some() {
+        if wish.profile.is_some() || planned.steps.is_empty() {
             return Ok(None);
         }
         let newest = manifests::latest(self.store, &planned.target.product).await;
         let Some(newest) = newest.map_err(IngestError::storage("read the newest manifest"))? else {
             return Ok(None);
         };
+        if newest.quantity != planned.target.quantity || newest.grid != planned.mapping.grid {
+            return Ok(None);
+        }
         let raw_sha256 = planned.raw.sha256;
         let periods: Vec<Period> = planned.steps.iter().map(|s| s.period).collect();
-        let is_there =
-            !periods.is_empty() && periods.iter().all(|p| holds(&newest, *p, raw_sha256));
-        let is_same =
-            newest.quantity == planned.target.quantity && newest.grid == planned.mapping.grid;
-        Ok((is_there && is_same).then(|| Prepared::AlreadyLanded {
-            raw_sha256,
-            manifest: newest.id(),
-            periods,
+        let orders = newest.notice_orders();
+        let mut is_superseded = false;
+        for period in &periods {
+            match newest.step_of(*period) {
+                Some(index) if newest.steps[index].raw_sha256 == raw_sha256 => {}
+                Some(index) if is_later_or_same(orders[index], place) => is_superseded = true,
+                _ => return Ok(None),
+            }
+        }
+        let manifest = newest.id();
+        Ok(Some(if is_superseded {
+            Prepared::Superseded {
+                raw_sha256,
+                manifest,
+                periods,
+            }
+        } else {
+            Prepared::AlreadyLanded {
+                raw_sha256,
+                manifest,
+                periods,
+            }
         }))
     }
-}
-
-fn holds(manifest: &Manifest, period: Period, raw_sha256: Digest) -> bool {
-    manifest
-        .steps
-        .iter()
-        .any(|step| step.period == period && step.raw_sha256 == raw_sha256)
 }

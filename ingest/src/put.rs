@@ -4,6 +4,7 @@ use contract::digest::Digest;
 use contract::grid::Grid;
 use contract::key::ObjectKey;
 use contract::manifest::Step;
+use contract::notice::NoticeOrder;
 use contract::product::ProductId;
 use contract::topic::Origin;
 use storage::Store;
@@ -29,6 +30,8 @@ pub(crate) struct StoredGranule {
     pub(crate) grids: Vec<StoredGrid>,
     /// The notice that it came with; none for files that no notice came for.
     pub(crate) asked_by: Option<Origin>,
+    /// Its place in the order of notices.
+    pub(crate) order: Option<NoticeOrder>,
 }
 
 /// Stores the file as it came.

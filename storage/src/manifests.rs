@@ -2,7 +2,7 @@
 
 use bytes::Bytes;
 use contract::key::ObjectKey;
-use contract::manifest::{MANIFEST_SCHEMA, Manifest, ManifestId};
+use contract::manifest::{MANIFEST_SCHEMA, Manifest, ManifestId, OLDEST_MANIFEST_SCHEMA};
 use contract::product::ProductId;
 
 use crate::{StorageError, Store};
@@ -34,6 +34,19 @@ pub async fn load(store: &Store, id: &ManifestId) -> Result<Manifest, StorageErr
     }
 }
 
+/// The manifest of a number, none if it is gone.
+pub async fn numbered(
+    store: &Store,
+    product: &ProductId,
+    number: u64,
+) -> Result<Option<Manifest>, StorageError> {
+    match read(store, &ObjectKey::manifest(product, number)).await {
+        Ok(manifest) => Ok(Some(manifest)),
+        Err(error) if error.is_not_found() => Ok(None),
+        Err(error) => Err(error),
+    }
+}
+
 /// Publishes a manifest whose objects are all durable.
 ///
 /// # Errors
@@ -52,9 +65,9 @@ async fn read(store: &Store, key: &ObjectKey) -> Result<Manifest, StorageError> 
         .grid
         .validate()
         .map_err(|e| StorageError::damaged(key.as_str(), e))?;
-    if manifest.schema != MANIFEST_SCHEMA {
+    if !(OLDEST_MANIFEST_SCHEMA..=MANIFEST_SCHEMA).contains(&manifest.schema) {
         let reason = format!(
-            "schema {} is unknown, this program reads {MANIFEST_SCHEMA}",
+            "schema {} is unknown, this program reads {OLDEST_MANIFEST_SCHEMA} to {MANIFEST_SCHEMA}",
             manifest.schema
         );
         return Err(StorageError::damaged(key.as_str(), reason));
@@ -90,6 +103,7 @@ mod tests {
             domain: ObjectKey::domain(&product, &Digest::of(b"")),
             series: vec![],
             derived_from: None,
+            notices: vec![],
             product,
         }
     }

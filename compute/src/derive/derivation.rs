@@ -105,6 +105,7 @@ impl<'a> Derivation<'a> {
             domain: self.domain,
             series: self.segments,
             derived_from: Some(self.source.id()),
+            notices: vec![],
         })
     }
 

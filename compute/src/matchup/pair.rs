@@ -171,6 +171,7 @@ mod tests {
             domain: ObjectKey::domain(&product, &digest),
             series: vec![],
             derived_from: None,
+            notices: vec![],
             product,
         }
     }

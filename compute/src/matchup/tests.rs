@@ -52,6 +52,7 @@ async fn product(store: &Store) -> Manifest {
         domain: ObjectKey::domain(&product, &Digest::of(b"")),
         series: vec![],
         derived_from: None,
+        notices: vec![],
         product,
     }
 }

@@ -47,6 +47,7 @@ fn product() -> Manifest {
         domain: ObjectKey::domain(&product, &Digest::of(b"domain")),
         series: vec![],
         derived_from: None,
+        notices: vec![],
         product,
     }
 }

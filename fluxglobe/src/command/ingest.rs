@@ -74,6 +74,7 @@ impl Line {
             Outcome::Landed { revised: true, .. } => ("revised", None, None),
             Outcome::Landed { .. } => ("landed", None, None),
             Outcome::AlreadyLanded { .. } => ("already_landed", None, None),
+            Outcome::Superseded { .. } => ("superseded", None, None),
             Outcome::Observed { .. } => ("observed", None, None),
             Outcome::Rejected {
                 reason,

@@ -29,12 +29,15 @@ pub(crate) async fn run(settings: &Settings, options: RenderWorker) -> Result<()
     });
     let server = Server::bind(desk.clone(), &options.render)?;
     tracing::info!(address = %server.address(), "render worker");
-    let serving = tokio::spawn(server.run(footing.stop.clone()));
-    if let Some(log) = footing.log(&options.kafka).await? {
-        BatchService::new(desk, log, options.render.drain())
-            .run(footing.stop.clone())
-            .await;
-    }
-    serving.await??;
-    footing.leave().await
+    let mut parts = footing.parts();
+    parts.start("render worker", server.run(footing.stop.clone()));
+    let own = footing.clone();
+    parts.start("render jobs", async move {
+        if let Some(log) = own.log(&options.kafka).await? {
+            let batch = BatchService::new(desk, log, options.render.drain());
+            batch.run(own.stop.clone()).await?;
+        }
+        Ok::<_, anyhow::Error>(())
+    });
+    footing.run(parts).await
 }

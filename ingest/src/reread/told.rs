@@ -50,16 +50,11 @@ fn told(before: &Manifest, now: &Manifest) -> Vec<Event> {
             continue;
         }
         let (origin, raw_sha256) = file;
+        let periods: Vec<_> = steps.iter().map(|step| step.period).collect();
         let trace = format!("reread-{}", raw_sha256.short());
         events.push(Event::new(
             trace,
-            Body::GranuleLanded {
-                path: origin.to_owned(),
-                raw_sha256,
-                manifest: now.id(),
-                periods: steps.iter().map(|step| step.period).collect(),
-                revised: true,
-            },
+            Body::granule_landed(origin.to_owned(), raw_sha256, now.id(), &periods, true),
         ));
     }
     events

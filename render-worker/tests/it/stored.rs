@@ -54,6 +54,7 @@ pub(crate) async fn product(
         domain,
         series: vec![],
         derived_from: None,
+        notices: vec![],
     };
     storage::manifests::commit(store, &manifest).await.unwrap();
     manifest

@@ -214,6 +214,7 @@ impl TestApp {
                     .unwrap(),
             }],
             derived_from,
+            notices: vec![],
             product,
         };
         manifests::commit(&self.store, &manifest).await.unwrap();

@@ -71,13 +71,14 @@ impl Live {
     }
 
     async fn landed(&self, manifest: &ManifestId) {
-        self.say(Body::GranuleLanded {
-            path: "a.nc".to_owned(),
-            raw_sha256: Digest::of(b"a"),
-            manifest: manifest.clone(),
-            periods: vec![],
-            revised: true,
-        })
+        let (path, sha256) = ("a.nc".to_owned(), Digest::of(b"a"));
+        self.say(Body::granule_landed(
+            path,
+            sha256,
+            manifest.clone(),
+            &[],
+            true,
+        ))
         .await;
     }
 
