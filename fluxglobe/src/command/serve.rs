@@ -33,7 +33,7 @@ pub(crate) async fn bind(
     let drawer = Drawer::new(deployment::renderer(settings, store.clone()).await?);
     let analyst = Analyst {
         local: Engine::local(store.clone()),
-        cluster: deployment::engine(settings, store.clone())?,
+        regions: deployment::region_engine(settings, store.clone())?,
         check,
     };
     let registry = Registry::new();

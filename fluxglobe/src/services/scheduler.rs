@@ -1,13 +1,12 @@
 //! `fluxglobe scheduler`: Ballista's scheduler, and the deriver that keeps derived products up with what lands.
 
-use std::num::NonZeroUsize;
-
 use anyhow::Result;
 use compute::Engine;
 use compute::service::{Deriver, Scheduler};
 
 use crate::cli;
 use crate::cli::Settings;
+use crate::deployment;
 use crate::services::Footing;
 
 pub(crate) async fn run(settings: &Settings, options: cli::Scheduler) -> Result<()> {
@@ -27,7 +26,7 @@ pub(crate) async fn run(settings: &Settings, options: cli::Scheduler) -> Result<
     // Executors and clients are served while the log is waited for.
     let serving = tokio::spawn(scheduler.run(footing.stop.clone()));
     if let Some(log) = footing.log(&options.kafka).await? {
-        let partitions = NonZeroUsize::from(settings.partitions);
+        let partitions = deployment::least_parts(settings);
         let engine = Engine::cluster(store, format!("http://{address}").parse()?, partitions);
         Deriver::new(engine, log, &footing.registry)?
             .run(footing.stop.clone())

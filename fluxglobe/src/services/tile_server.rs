@@ -24,7 +24,7 @@ pub(crate) async fn run(settings: &Settings, options: TileServer) -> Result<()> 
     let measured = observations::open(&options.observations, &store)?;
     let analyst = Analyst {
         local: Engine::local(store.clone()),
-        cluster: deployment::engine(settings, store.clone())?,
+        regions: deployment::region_engine(settings, store.clone())?,
         check: None,
     };
     let mut serve = options.serve;
