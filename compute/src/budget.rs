@@ -1,5 +1,6 @@
 //! Carbon budgets: B = the integral of the flux over a region's area and over time, exact at any parallelism.
 
+mod asked;
 pub mod chunk;
 pub mod fixed;
 pub mod named;

@@ -12,7 +12,7 @@ use datafusion::execution::runtime_env::RuntimeEnv;
 use datafusion::execution::session_state::SessionState;
 use url::{Host, Url};
 
-use crate::{ComputeError, state};
+use crate::{ComputeError, Objects, state};
 
 /// How long a question is asked again while the cluster is away.
 pub const PATIENCE: Duration = Duration::from_mins(2);
@@ -106,13 +106,15 @@ impl Cluster {
     /// The session whose queries go to the scheduler. Nothing is connected yet: each query connects by itself.
     pub(crate) fn session(
         &self,
+        objects: &Objects,
         runtime: Arc<RuntimeEnv>,
         partitions: NonZeroUsize,
     ) -> Result<SessionState, DataFusionError> {
-        let state = state::session_state(state::ballista_config(partitions), runtime)?;
+        let config = state::ballista_config(partitions);
+        let state = state::session_state(config, runtime, objects)?;
         let mut state = state.upgrade_for_ballista(self.scheduler.0.clone())?;
         // The upgrade to a Ballista session resets the functions to the built-in ones.
-        state::register_functions(&mut state)?;
+        state::register_functions(&mut state, objects)?;
         Ok(state)
     }
 }

@@ -120,7 +120,7 @@ mod tests {
     #[test]
     fn a_query_that_cannot_succeed_is_not_tried_again() {
         for text in [
-            "Job 1 failed: Task failed due to runtime execution error: DataFusionError(Execution(\"cell_mass: a cell's share is inf\"))",
+            "Job 1 failed: Task failed due to runtime execution error: DataFusionError(Execution(\"region_sums, chunk 3: a cell's share is inf\"))",
             "Job 1 failed: ObjectStore(NotFound { path: \"frames/a\" })",
             "code: FailedPrecondition, protocol version mismatch: scheduler=1, executor=2",
         ] {

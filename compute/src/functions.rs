@@ -2,22 +2,23 @@
 //!
 //! Every session that plans or runs our queries (client, scheduler, executor) gets them from here.
 
-mod cell_mass;
 mod column_sum;
 mod lists;
-mod region_area;
+mod region_sums;
 mod series_at;
 
 use std::sync::Arc;
 
+use datafusion::logical_expr::async_udf::AsyncScalarUDF;
 use datafusion::logical_expr::{AggregateUDF, ScalarUDF};
 
-/// Every scalar function.
-pub fn scalar_functions() -> Vec<Arc<ScalarUDF>> {
+use crate::Objects;
+
+/// Every scalar function; those that sum over a region read its weights from `objects`.
+pub fn scalar_functions(objects: &Objects) -> Vec<Arc<ScalarUDF>> {
+    let region_sums = region_sums::RegionSums::new(objects.clone());
     [
-        ScalarUDF::from(cell_mass::CellMass::new()),
-        ScalarUDF::from(region_area::ValidArea::new()),
-        ScalarUDF::from(region_area::TotalArea::new()),
+        AsyncScalarUDF::new(Arc::new(region_sums)).into_scalar_udf(),
         ScalarUDF::from(series_at::SeriesAt::new()),
     ]
     .map(Arc::new)

@@ -6,6 +6,7 @@
 pub mod area;
 mod box_cover;
 pub mod geojson_file;
+pub(crate) mod loaded;
 mod polygon_cover;
 mod rings;
 pub mod weights;

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use contract::key::ObjectKey;
 use datafusion::arrow::datatypes::SchemaRef;
+use datafusion::config::TableParquetOptions;
 use datafusion::datasource::file_format::parquet::ParquetFormat;
 use datafusion::datasource::listing::{
     ListingOptions, ListingTable, ListingTableConfig, ListingTableUrl,
@@ -12,6 +13,9 @@ use datafusion::execution::context::SessionContext;
 use storage::Store;
 
 use crate::ComputeError;
+
+/// What is read of a file's end at once: the footer of a frame of up to 16 groups of chunks.
+const FOOTER_BYTES: usize = 16 << 10;
 
 /// Makes a table of some objects of one layout.
 pub(crate) fn register(
@@ -26,7 +30,7 @@ pub(crate) fn register(
         .iter()
         .map(|key| address(store, key))
         .collect::<Result<Vec<_>, _>>()?;
-    let options = ListingOptions::new(Arc::new(ParquetFormat::default()));
+    let options = ListingOptions::new(Arc::new(ParquetFormat::default().with_options(reading())));
     let config = ListingTableConfig::new_with_multi_paths(urls)
         .with_listing_options(options.with_file_extension(".parquet"))
         .with_schema(Arc::clone(schema));
@@ -37,7 +41,19 @@ pub(crate) fn register(
     Ok(())
 }
 
-fn address(store: &Store, key: &ObjectKey) -> Result<ListingTableUrl, ComputeError> {
+/// How files of few and large rows are read.
+fn reading() -> TableParquetOptions {
+    let mut options = TableParquetOptions::default();
+    options.global.metadata_size_hint = Some(FOOTER_BYTES);
+    options.global.pushdown_filters = true;
+    // A mask over rows would have the pages of all of them fetched and decoded; runs of rows skip whole pages.
+    options.global.force_filter_selections = true;
+    options.global.bloom_filter_on_read = false;
+    options
+}
+
+/// Where SQL finds an object.
+pub(crate) fn address(store: &Store, key: &ObjectKey) -> Result<ListingTableUrl, ComputeError> {
     ListingTableUrl::try_new(store.sql_url(key), None)
         .map_err(ComputeError::engine("naming stored objects"))
 }

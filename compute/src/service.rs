@@ -12,6 +12,7 @@ mod executor_metrics;
 mod executor_settings;
 mod heartbeat;
 mod named_sums;
+mod room;
 pub mod scheduler;
 mod scheduler_metrics;
 mod scheduler_watch;

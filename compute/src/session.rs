@@ -31,8 +31,11 @@ pub struct Engine {
 
 struct Inner {
     store: Store,
+    objects: Objects,
     kind: Kind,
     partitions: NonZeroUsize,
+    /// Memory that queries in this process may take for what they must hold, bytes.
+    memory_bytes: usize,
     /// The session that all queries share; made once.
     session: OnceCell<Session>,
 }
@@ -58,6 +61,7 @@ impl std::ops::Deref for QueryContext {
     }
 }
 
+#[derive(Clone)]
 enum Kind {
     /// Ballista's scheduler and executor inside this process, spoken to over loopback.
     Standalone,
@@ -75,7 +79,13 @@ impl Engine {
 
     /// DataFusion in this process, for questions that touch few rows.
     pub fn local(store: Store) -> Self {
-        Self::new(store, Kind::Local, NonZeroUsize::MIN)
+        Self::in_process(store, NonZeroUsize::MIN)
+    }
+
+    /// DataFusion in this process, working on `partitions` parts of a query at a time: the answers of Ballista without
+    /// its scheduler, its executor and its intermediate files.
+    pub fn in_process(store: Store, partitions: NonZeroUsize) -> Self {
+        Self::new(store, Kind::Local, partitions)
     }
 
     /// A Ballista cluster, its queries cut into `partitions` parts. Its executors must read the same store by the same
@@ -101,23 +111,68 @@ impl Engine {
             patience,
             ..cluster.clone()
         });
-        Self::new(self.inner.store.clone(), kind, self.inner.partitions)
+        let inner = &self.inner;
+        Self::of(Inner {
+            kind,
+            session: OnceCell::new(),
+            store: inner.store.clone(),
+            objects: inner.objects.clone(),
+            ..**inner
+        })
+    }
+
+    /// The same engine, its queries in this process taking no more memory than this for what they must hold.
+    #[must_use]
+    pub fn with_memory_bytes(self, memory_bytes: usize) -> Self {
+        let inner = &self.inner;
+        Self::of(Inner {
+            memory_bytes,
+            kind: inner.kind.clone(),
+            session: OnceCell::new(),
+            store: inner.store.clone(),
+            objects: inner.objects.clone(),
+            ..**inner
+        })
+    }
+
+    /// The same engine, its queries reading objects from somewhere else.
+    #[must_use]
+    pub fn reading(self, objects: Objects) -> Self {
+        let inner = &self.inner;
+        Self::of(Inner {
+            objects,
+            kind: inner.kind.clone(),
+            session: OnceCell::new(),
+            store: inner.store.clone(),
+            ..**inner
+        })
     }
 
     fn new(store: Store, kind: Kind, partitions: NonZeroUsize) -> Self {
+        Self::of(Inner {
+            objects: Objects::of(&store),
+            store,
+            kind,
+            partitions,
+            memory_bytes: state::MEMORY_BYTES,
+            session: OnceCell::new(),
+        })
+    }
+
+    fn of(inner: Inner) -> Self {
         Self {
-            inner: Arc::new(Inner {
-                store,
-                kind,
-                partitions,
-                session: OnceCell::new(),
-            }),
+            inner: Arc::new(inner),
         }
     }
 
     /// The store that it reads and writes.
     pub fn store(&self) -> &Store {
         &self.inner.store
+    }
+
+    /// Where its queries read objects.
+    pub(crate) fn objects(&self) -> &Objects {
+        &self.inner.objects
     }
 
     /// Does every query pass through Ballista's scheduler?
@@ -213,15 +268,19 @@ impl Engine {
 impl Inner {
     async fn start(&self) -> Result<Session, ComputeError> {
         let failed = || ComputeError::engine("starting the query engine");
-        let runtime = Objects::of(&self.store).runtime().map_err(failed())?;
+        let objects = &self.objects;
+        let runtime = state::runtime(objects, self.memory_bytes).map_err(failed())?;
         match &self.kind {
-            Kind::Local => Ok(Session {
-                state: state::session_state(state::local_config(), runtime).map_err(failed())?,
-                work: None,
-            }),
+            Kind::Local => {
+                let config = state::local_config(self.partitions);
+                Ok(Session {
+                    state: state::session_state(config, runtime, objects).map_err(failed())?,
+                    work: None,
+                })
+            }
             Kind::Cluster(cluster) => Ok(Session {
                 state: cluster
-                    .session(runtime, self.partitions)
+                    .session(objects, runtime, self.partitions)
                     .map_err(failed())?,
                 work: None,
             }),
@@ -231,12 +290,12 @@ impl Inner {
                     "starting Ballista in this process"
                 );
                 let config = state::ballista_config(self.partitions);
-                let state = state::session_state(config, runtime).map_err(failed())?;
+                let state = state::session_state(config, runtime, objects).map_err(failed())?;
                 let (mut state, work) = standalone::start(state, self.partitions.get())
                     .await
                     .map_err(|e| failed()(DataFusionError::External(e.into())))?;
                 // The upgrade to a Ballista session resets the functions to the built-in ones.
-                state::register_functions(&mut state).map_err(failed())?;
+                state::register_functions(&mut state, objects).map_err(failed())?;
                 Ok(Session {
                     state,
                     work: Some(work),
@@ -276,6 +335,23 @@ mod tests {
         assert_ne!(
             top_of_plan(&Engine::local(Store::memory())).await,
             "DistributedQueryExec"
+        );
+    }
+
+    #[tokio::test(flavor = "multi_thread")]
+    async fn a_query_that_must_hold_more_than_its_memory_is_refused() {
+        let hold = |engine: Engine| async move {
+            let context = engine.context("test").await.unwrap();
+            let sql = "SELECT array_agg(a) FROM (SELECT unnest(range(0, 1000000)) a)";
+            context.sql(sql).await.unwrap().collect().await
+        };
+        let engine = || Engine::in_process(Store::memory(), NonZeroUsize::MIN);
+        assert!(hold(engine()).await.is_ok());
+        let refused = hold(engine().with_memory_bytes(1 << 20)).await.unwrap_err();
+        let root = refused.find_root();
+        assert!(
+            matches!(root, DataFusionError::ResourcesExhausted(_)),
+            "{root}"
         );
     }
 

@@ -1,4 +1,4 @@
-//! The one session state of client, scheduler and executor: functions, settings and where objects are read from.
+//! The one session state of client, scheduler and executor: functions and settings.
 
 use std::num::NonZeroUsize;
 use std::sync::Arc;
@@ -6,15 +6,13 @@ use std::sync::Arc;
 use ballista::extension::SessionConfigExt as _;
 use datafusion::error::DataFusionError;
 use datafusion::execution::FunctionRegistry as _;
+use datafusion::execution::memory_pool::FairSpillPool;
 use datafusion::execution::runtime_env::{RuntimeEnv, RuntimeEnvBuilder};
 use datafusion::execution::session_state::{SessionState, SessionStateBuilder};
 use datafusion::prelude::SessionConfig;
-use object_store::ObjectStore;
-use storage::Store;
-use url::Url;
 
 use crate::functions;
-use crate::steady_store::SteadyStore;
+use crate::objects::Objects;
 
 /// Largest message between client, scheduler and executor: a plan that names the frames of 100 years of days fits well.
 /// Geometry never travels in one, it goes through the object store.
@@ -26,36 +24,22 @@ const KEEPALIVE_SECONDS: u64 = 10;
 /// Between two tries to fetch an intermediate result; three tries, then the scheduler has it made again.
 const FETCH_RETRY_MS: u64 = 200;
 
-/// Where SQL reads objects: the root that URLs of this store begin with, and what answers for it.
-#[derive(Debug, Clone)]
-pub struct Objects {
-    root: Url,
-    store: Arc<dyn ObjectStore>,
-}
+/// Rows of a batch. A row is a chunk of up to 28 KiB, or a block of a series of up to 94 KiB a year of days: a batch is a
+/// few MiB, where the engine's own 8192 rows would be hundreds.
+const BATCH_ROWS: usize = 64;
+/// Memory that all queries of one process may take for what cannot be streamed, bytes.
+pub(crate) const MEMORY_BYTES: usize = 1 << 30;
 
-impl Objects {
-    /// Those of a store; reads that fail for a passing reason are tried again.
-    pub fn of(store: &Store) -> Self {
-        let (root, objects) = store.sql_root();
-        Self::new(root, objects)
-    }
-
-    /// Those of any object store under a root.
-    pub fn new(root: Url, store: Arc<dyn ObjectStore>) -> Self {
-        let store = Arc::new(SteadyStore::new(store));
-        Self { root, store }
-    }
-
-    /// A runtime that reads from here.
-    pub(crate) fn register(&self, runtime: &RuntimeEnv) {
-        runtime.register_object_store(&self.root, Arc::clone(&self.store));
-    }
-
-    pub(crate) fn runtime(&self) -> Result<Arc<RuntimeEnv>, DataFusionError> {
-        let runtime = RuntimeEnvBuilder::new().build_arc()?;
-        self.register(&runtime);
-        Ok(runtime)
-    }
+/// A runtime that reads from some objects and takes no more memory than this for what queries must hold.
+pub(crate) fn runtime(
+    objects: &Objects,
+    memory_bytes: usize,
+) -> Result<Arc<RuntimeEnv>, DataFusionError> {
+    let runtime = RuntimeEnvBuilder::new()
+        .with_memory_pool(Arc::new(FairSpillPool::new(memory_bytes)))
+        .build_arc()?;
+    objects.register(&runtime);
+    Ok(runtime)
 }
 
 /// Settings of a session whose queries are worked on in `partitions` parts by Ballista.
@@ -77,35 +61,55 @@ pub(crate) fn ballista_config(partitions: NonZeroUsize) -> SessionConfig {
         )
         .set_u64("ballista.client.io_retry_wait_time_ms", FETCH_RETRY_MS)
         .with_target_partitions(partitions.get())
-        .with_information_schema(false)
+        .of_chunks()
 }
 
-/// Settings of a session whose queries DataFusion works on in this process.
-pub(crate) fn local_config() -> SessionConfig {
+/// Settings of a session whose queries DataFusion works on in this process, in `partitions` parts.
+pub(crate) fn local_config(partitions: NonZeroUsize) -> SessionConfig {
     SessionConfig::new()
-        // One block of a series file is wanted: decode nothing of the others.
-        .set_bool("datafusion.execution.parquet.pushdown_filters", true)
-        .with_target_partitions(1)
-        .with_information_schema(false)
+        .with_target_partitions(partitions.get())
+        .of_chunks()
+}
+
+/// What every session needs whose rows are chunks.
+trait OfChunks {
+    fn of_chunks(self) -> Self;
+}
+
+impl OfChunks for SessionConfig {
+    fn of_chunks(self) -> Self {
+        self.with_information_schema(false)
+            .with_batch_size(BATCH_ROWS)
+            // A few of a file's rows are wanted: decode nothing of the others.
+            .set_bool("datafusion.execution.parquet.pushdown_filters", true)
+            // No plan of ours depends on them, and planning would read the footer of every file.
+            .with_collect_statistics(false)
+            // Chunks stay in the part that read them: only sums go from one part to another.
+            .with_round_robin_repartition(false)
+    }
 }
 
 /// A session's state: the settings, the runtime, and our functions beside the built-in ones.
 pub(crate) fn session_state(
     config: SessionConfig,
     runtime: Arc<RuntimeEnv>,
+    objects: &Objects,
 ) -> Result<SessionState, DataFusionError> {
     let mut state = SessionStateBuilder::new()
         .with_default_features()
         .with_config(config)
         .with_runtime_env(runtime)
         .build();
-    register_functions(&mut state)?;
+    register_functions(&mut state, objects)?;
     Ok(state)
 }
 
 /// Adds our functions, once more after anything that resets a state to the built-in ones.
-pub(crate) fn register_functions(state: &mut SessionState) -> Result<(), DataFusionError> {
-    for function in functions::scalar_functions() {
+pub(crate) fn register_functions(
+    state: &mut SessionState,
+    objects: &Objects,
+) -> Result<(), DataFusionError> {
+    for function in functions::scalar_functions(objects) {
         state.register_udf(function)?;
     }
     for function in functions::aggregate_functions() {

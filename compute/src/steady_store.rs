@@ -18,9 +18,8 @@ use futures::StreamExt as _;
 use futures::stream::{self, BoxStream};
 use object_store::path::Path;
 use object_store::{
-    CopyOptions, Error, GetOptions, GetRange, GetResult, GetResultPayload, ListResult,
-    MultipartUpload, ObjectMeta, ObjectStore, PutMultipartOptions, PutOptions, PutPayload,
-    PutResult, Result,
+    CopyOptions, Error, GetOptions, GetResult, GetResultPayload, ListResult, MultipartUpload,
+    ObjectMeta, ObjectStore, PutMultipartOptions, PutOptions, PutPayload, PutResult, Result,
 };
 
 /// How long one read is tried here; stores behind a network have tried for long before.
@@ -106,14 +105,10 @@ impl ObjectStore for SteadyStore {
     }
 
     async fn get_opts(&self, location: &Path, options: GetOptions) -> Result<GetResult> {
-        let is_small = match &options.range {
-            Some(GetRange::Bounded(range)) => range.end.saturating_sub(range.start) <= WHOLE_BYTES,
-            Some(GetRange::Suffix(bytes)) => *bytes <= WHOLE_BYTES,
-            _ => false,
-        };
         self.steadily(location, || async {
             let found = self.inner.get_opts(location, options.clone()).await?;
-            if is_small && !options.head {
+            let length_bytes = found.range.end.saturating_sub(found.range.start);
+            if length_bytes <= WHOLE_BYTES && !options.head {
                 whole(found).await
             } else {
                 Ok(found)

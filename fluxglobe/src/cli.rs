@@ -90,9 +90,15 @@ pub(crate) struct Settings {
         conflicts_with = "cpu"
     )]
     pub(crate) require_gpu: bool,
-    /// Ballista partitions; answers are the same bits for any number.
-    #[arg(long, env = "FLUXGLOBE_PARTITIONS", default_value = "2", global = true)]
-    pub(crate) partitions: NonZeroU16,
+    /// Parts that a query is cut into, on a cluster at least; as many as this machine has processors, or as the cluster's
+    /// executors have room for, if absent. Answers are the same bits for any number.
+    #[arg(
+        long,
+        env = "FLUXGLOBE_PARTITIONS",
+        global = true,
+        value_name = "COUNT"
+    )]
+    pub(crate) partitions: Option<NonZeroU16>,
 }
 
 /// What to do.
@@ -108,7 +114,7 @@ pub(crate) enum Command {
     Ingest(Ingest),
     /// List what has landed.
     Products(Products),
-    /// Statistics at a place.
+    /// Series at a place or over a region.
     #[command(subcommand)]
     Stats(Stats),
     /// Integrate a flux over a region and time (Tg C, positive out of the sea).
@@ -246,6 +252,8 @@ pub(crate) struct Products {
 pub(crate) enum Stats {
     /// The series of the cell at a place.
     Point(StatsPoint),
+    /// The mean over a region at every step, each cell by its area, with the area that holds data.
+    Polygon(StatsPolygon),
 }
 
 /// `fluxglobe stats point`.
@@ -260,6 +268,29 @@ pub(crate) struct StatsPoint {
     /// Latitude, degrees north.
     #[arg(long, allow_negative_numbers = true)]
     pub(crate) lat: f64,
+    /// JSON instead of a table.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// `fluxglobe stats polygon`.
+#[derive(Debug, Args)]
+pub(crate) struct StatsPolygon {
+    /// Product, of any quantity.
+    #[arg(long)]
+    pub(crate) product: ProductId,
+    /// `global`, a named region, a box WEST,SOUTH,EAST,NORTH, or a GeoJSON file.
+    #[arg(long, allow_hyphen_values = true)]
+    pub(crate) region: String,
+    /// First instant: 2000, 2000-03, 2000-03-15 or with a time of day. The product's first if absent.
+    #[arg(long)]
+    pub(crate) from: Option<TimeMs>,
+    /// First instant after the period. The product's end if absent.
+    #[arg(long)]
+    pub(crate) to: Option<TimeMs>,
+    /// Figure of the earth for areas: wgs84 or sphere (R = 6371 km).
+    #[arg(long, default_value = "wgs84")]
+    pub(crate) earth: Earth,
     /// JSON instead of a table.
     #[arg(long)]
     pub(crate) json: bool,
@@ -508,5 +539,11 @@ mod tests {
             "-10,-20,30,40",
         ];
         assert!(Cli::try_parse_from(words).is_ok());
+        let words = "fluxglobe stats polygon --product p --from 2000-02 --json --region";
+        let with = |region: &'static str| Cli::try_parse_from(words.split(' ').chain([region]));
+        assert!(with("-10,-20,30,40").is_ok());
+        let words = "fluxglobe stats polygon --product p";
+        let refused = Cli::try_parse_from(words.split(' ')).unwrap_err();
+        assert!(refused.to_string().contains("--region"), "{refused}");
     }
 }

@@ -68,13 +68,43 @@ pub(crate) async fn needed_log(
         .context("give Kafka's brokers: --kafka or FLUXGLOBE_KAFKA, HOST:PORT[,HOST:PORT...]")
 }
 
-/// The Ballista cluster that settings name, else Ballista in this process; it starts with its first query.
+/// Who works on whole products: the Ballista cluster that settings name, else Ballista in this process; it starts with
+/// its first query.
 pub(crate) fn engine(settings: &Settings, store: Store) -> Result<Engine> {
-    let partitions = NonZeroUsize::from(settings.partitions);
-    Ok(match &settings.cluster {
-        Some(scheduler) => Engine::cluster(store, scheduler.parse()?, partitions),
-        None => Engine::standalone(store, partitions),
-    })
+    match &settings.cluster {
+        Some(scheduler) => cluster(settings, store, scheduler),
+        None => Ok(Engine::standalone(store, processors(settings))),
+    }
+}
+
+/// Who sums over regions: the Ballista cluster that settings name, else DataFusion in this process, where a scheduler
+/// would take longer than the answer. The plan, the functions and the bits are the same (docs/decisions/009).
+pub(crate) fn region_engine(settings: &Settings, store: Store) -> Result<Engine> {
+    match &settings.cluster {
+        Some(scheduler) => cluster(settings, store, scheduler),
+        None => Ok(Engine::in_process(store, processors(settings))),
+    }
+}
+
+fn cluster(settings: &Settings, store: Store, scheduler: &str) -> Result<Engine> {
+    Ok(Engine::cluster(
+        store,
+        scheduler.parse()?,
+        least_parts(settings),
+    ))
+}
+
+/// Parts of a query that a cluster is asked for at least; its scheduler makes as many as its executors have room for.
+pub(crate) fn least_parts(settings: &Settings) -> NonZeroUsize {
+    settings
+        .partitions
+        .map_or(NonZeroUsize::MIN, NonZeroUsize::from)
+}
+
+/// Parts of a query in this process.
+fn processors(settings: &Settings) -> NonZeroUsize {
+    let there = || std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
+    settings.partitions.map_or_else(there, NonZeroUsize::from)
 }
 
 /// What to draw with: this machine's Vulkan device, or its processor when asked to.

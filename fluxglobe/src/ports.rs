@@ -9,6 +9,7 @@ use async_trait::async_trait;
 use bytes::Bytes;
 use compute::Engine;
 use compute::budget::{BudgetQuery, BudgetStep};
+use compute::stats::{RegionSeriesQuery, RegionValue, region_series_of};
 use compute::{ComputeError, ErrorClass};
 use contract::job::RenderJob;
 use contract::manifest::Manifest;
@@ -16,8 +17,8 @@ use contract::time::Period;
 use render_worker::fleet::{Fleet, FleetError};
 use render_worker::{RenderError, RenderService};
 use tile_server::backend::{
-    Analyse, BackendError, BudgetRequest, BudgetRow, BudgetStep as WantedStep, Check, Class, Draw,
-    RowCol, Turn,
+    Analyse, AreaRequest, AreaRow, AreaSeries, BackendError, BudgetRequest, BudgetRow,
+    BudgetStep as WantedStep, Check, Class, Draw, RowCol, Turn,
 };
 
 pub(crate) use observer::Observer;
@@ -46,10 +47,10 @@ impl Drawer {
     }
 }
 
-/// Series from DataFusion, budgets from Ballista, both in this process.
+/// Series of places from DataFusion in this process, those of regions and budgets from the cluster where there is one.
 pub(crate) struct Analyst {
     pub(crate) local: Engine,
-    pub(crate) cluster: Engine,
+    pub(crate) regions: Engine,
     /// Our budgets beside published ones, if the demo compared them.
     pub(crate) check: Option<Check>,
 }
@@ -103,7 +104,7 @@ impl Analyse for Analyst {
             },
             earth: request.earth,
         };
-        let answer = compute::budget::budget_of(&self.cluster, &query, &request.manifest)
+        let answer = compute::budget::budget_of(&self.regions, &query, &request.manifest)
             .await
             .map_err(compute_failed)?;
         let row = |row: compute::budget::BudgetRow| BudgetRow {
@@ -116,6 +117,33 @@ impl Analyse for Analyst {
             area_m2: row.area_m2,
         };
         Ok(answer.rows.into_iter().map(row).collect())
+    }
+
+    async fn area(&self, request: &AreaRequest) -> Result<AreaSeries, BackendError> {
+        let query = RegionSeriesQuery {
+            product: request.manifest.product.clone(),
+            region: request.region.clone(),
+            region_name: String::new(),
+            from: Some(request.period.start),
+            to: Some(request.period.end),
+            earth: request.earth,
+        };
+        let answer = region_series_of(&self.regions, &query, &request.manifest)
+            .await
+            .map_err(compute_failed)?;
+        let row = |value: RegionValue| AreaRow {
+            period: Period {
+                start: value.start,
+                end: value.end,
+            },
+            mean: value.mean,
+            area_m2: value.area_m2,
+            coverage_percent: value.coverage_percent,
+        };
+        Ok(AreaSeries {
+            region_area_m2: answer.region_area_m2,
+            rows: answer.series.into_iter().map(row).collect(),
+        })
     }
 
     async fn check(&self) -> Result<Option<Check>, BackendError> {

@@ -2,31 +2,54 @@
 
 use arrow::array::{Array as _, ArrayRef, ListArray, PrimitiveArray, RecordBatch, UInt32Array};
 use arrow::compute::concat_batches;
-use arrow::datatypes::{ArrowPrimitiveType, SchemaRef};
+use arrow::datatypes::{ArrowPrimitiveType, DataType, SchemaRef};
 use bytes::Bytes;
 use parquet::arrow::ArrowWriter;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use parquet::basic::{Compression, ZstdLevel};
 use parquet::file::properties::{EnabledStatistics, WriterProperties};
+use parquet::schema::types::ColumnPath;
 
 use crate::StorageError;
 
-/// Bytes of a table; `rows_per_group` is how many rows a reader must take at once.
+/// Bytes after which a page of arrays ends, which it does between rows: a row of 1024 values or more is a page of its
+/// own, so that a reader who wants some rows fetches and decodes those and no others.
+const PAGE_BYTES: usize = 4 << 10;
+
+/// Bytes of a table; `rows_per_group` is how many rows share their entries in the footer.
 pub(crate) fn encode(batch: &RecordBatch, rows_per_group: usize) -> Result<Bytes, StorageError> {
     let damaged = |e: parquet::errors::ParquetError| StorageError::damaged("table to write", e);
-    let properties = WriterProperties::builder()
-        .set_compression(Compression::ZSTD(ZstdLevel::default()))
-        .set_created_by("fluxglobe".to_owned())
-        .set_dictionary_enabled(false)
-        .set_statistics_enabled(EnabledStatistics::Chunk)
-        .set_max_row_group_row_count(Some(rows_per_group))
-        .build();
+    let properties = properties(batch, rows_per_group);
     let mut out = Vec::new();
     let mut writer =
         ArrowWriter::try_new(&mut out, batch.schema(), Some(properties)).map_err(damaged)?;
     writer.write(batch).map_err(damaged)?;
     writer.close().map_err(damaged)?;
     Ok(Bytes::from(out))
+}
+
+fn properties(batch: &RecordBatch, rows_per_group: usize) -> WriterProperties {
+    let mut properties = WriterProperties::builder()
+        .set_compression(Compression::ZSTD(ZstdLevel::default()))
+        .set_created_by("fluxglobe".to_owned())
+        .set_dictionary_enabled(false)
+        .set_statistics_enabled(EnabledStatistics::Chunk)
+        .set_max_row_group_row_count(Some(rows_per_group));
+    for field in batch.schema().fields() {
+        properties = match field.data_type() {
+            DataType::List(item) => {
+                let parts = [field.name(), "list", item.name()].map(str::to_owned);
+                let column = ColumnPath::new(parts.to_vec());
+                properties.set_column_data_page_size_limit(column, PAGE_BYTES)
+            }
+            // Where the pages of arrays lie is told to readers only beside statistics of some column's pages.
+            _ => properties.set_column_statistics_enabled(
+                ColumnPath::from(field.name().as_str()),
+                EnabledStatistics::Page,
+            ),
+        };
+    }
+    properties.build()
 }
 
 /// The table in some bytes, which must have this schema.
@@ -72,4 +95,45 @@ pub(crate) fn row_values<T: ArrowPrimitiveType>(
         .downcast_ref::<PrimitiveArray<T>>()
         .expect("the schema is checked in decode")
         .clone()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use arrow::array::{Float32Builder, ListBuilder};
+    use arrow::datatypes::{Field, Schema};
+    use parquet::file::metadata::{PageIndexPolicy, ParquetMetaDataReader};
+
+    use super::*;
+
+    #[test]
+    fn a_row_of_many_values_is_a_page_of_its_own() {
+        let item = Arc::new(Field::new("item", DataType::Float32, false));
+        let schema = Arc::new(Schema::new(vec![
+            Field::new("chunk", DataType::UInt32, false),
+            Field::new("values", DataType::List(Arc::clone(&item)), false),
+        ]));
+        let mut lists = ListBuilder::new(Float32Builder::new()).with_field(item);
+        for row in 0..100 {
+            let value = |i: usize| (i * row) as f32;
+            lists
+                .values()
+                .append_slice(&(0..7200).map(value).collect::<Vec<_>>());
+            lists.append(true);
+        }
+        let numbers = Arc::new(UInt32Array::from_iter_values(0..100));
+        let batch = RecordBatch::try_new(schema, vec![numbers, Arc::new(lists.finish())]).unwrap();
+        let bytes = encode(&batch, 64).unwrap();
+        let metadata = ParquetMetaDataReader::new()
+            .with_page_index_policy(PageIndexPolicy::Required)
+            .parse_and_finish(&bytes)
+            .unwrap();
+        let pages = |group: usize, column: usize| {
+            let pages = &metadata.offset_index().unwrap()[group][column];
+            pages.page_locations().len()
+        };
+        assert_eq!((pages(0, 0), pages(0, 1)), (1, 64));
+        assert_eq!((pages(1, 0), pages(1, 1)), (1, 36));
+    }
 }

@@ -1,11 +1,12 @@
-//! Series and budgets from the analyst, within limits; budgets are remembered, since their question names a version.
+//! Series and budgets from the analyst, within limits; those of regions are remembered, since their question names a
+//! version.
 
 use std::sync::Arc;
 
 use contract::digest::Digest;
 use quick_cache::sync::Cache;
 
-use crate::backend::{Analyse, BudgetRequest, BudgetRow, Check, RowCol};
+use crate::backend::{Analyse, AreaRequest, AreaSeries, BudgetRequest, BudgetRow, Check, RowCol};
 use crate::catalogue::Layer;
 use crate::error::ServerError;
 use crate::flights::Flights;
@@ -14,6 +15,8 @@ use crate::metrics::Metrics;
 
 /// Budgets remembered; one of 16 years by month takes 8 KiB.
 const BUDGETS: usize = 1000;
+/// Series over regions remembered; one of 16 years of days takes 280 KiB.
+const AREAS: usize = 100;
 
 /// The analyses of one server.
 pub struct Analyses {
@@ -22,6 +25,8 @@ pub struct Analyses {
     metrics: Metrics,
     budgets: Cache<Digest, Arc<[BudgetRow]>>,
     flights: Flights<Arc<[BudgetRow]>>,
+    areas: Cache<Digest, Arc<AreaSeries>>,
+    area_flights: Flights<Arc<AreaSeries>>,
 }
 
 impl Analyses {
@@ -33,6 +38,8 @@ impl Analyses {
             metrics,
             budgets: Cache::new(BUDGETS),
             flights: Flights::default(),
+            areas: Cache::new(AREAS),
+            area_flights: Flights::default(),
         }
     }
 
@@ -88,6 +95,34 @@ impl Analyses {
         let rows = self.flights.join(key, compute).await?;
         self.budgets.insert(key, Arc::clone(&rows));
         Ok(rows)
+    }
+
+    /// The series over a region of a request about `layer`.
+    pub async fn area(
+        &self,
+        layer: &Layer,
+        request: AreaRequest,
+    ) -> Result<Arc<AreaSeries>, ServerError> {
+        let asked = (&request.region, request.period, request.earth);
+        let key = Digest::of_json(&("area", &layer.id, asked));
+        if let Some(series) = self.areas.get(&key) {
+            return Ok(series);
+        }
+        let (analyst, gate, metrics) = (
+            Arc::clone(&self.analyst),
+            self.gate.clone(),
+            self.metrics.clone(),
+        );
+        let compute = || async move {
+            let _pass = gate
+                .enter()
+                .await
+                .inspect_err(|_busy| metrics.refused.inc())?;
+            Ok(Arc::new(analyst.area(&request).await?))
+        };
+        let series = self.area_flights.join(key, compute).await?;
+        self.areas.insert(key, Arc::clone(&series));
+        Ok(series)
     }
 
     /// Our budgets beside published ones.

@@ -1,4 +1,4 @@
-//! What this server asks of others: pictures, point series and budgets, as two traits that the binary fills in.
+//! What this server asks of others: pictures, series and budgets, as two traits that the binary fills in.
 //!
 //! Left out on purpose: how a picture is drawn or a budget is summed. Both traits take and give values of `contract`
 //! and of this file only, so that the same server runs over a renderer in its process or one behind a network.
@@ -62,6 +62,9 @@ pub trait Analyse: Send + Sync + 'static {
 
     /// The carbon budget of a region, one row for each step of time.
     async fn budget(&self, request: &BudgetRequest) -> Result<Vec<BudgetRow>, BackendError>;
+
+    /// The mean of a product over a region, one row for each step in the period.
+    async fn area(&self, request: &AreaRequest) -> Result<AreaSeries, BackendError>;
 
     /// Our budgets beside published ones; none where this deployment has nothing to compare with.
     async fn check(&self) -> Result<Option<Check>, BackendError>;
@@ -236,6 +239,41 @@ pub struct BudgetRow {
     pub coverage_percent: f64,
     /// Area with data, averaged over the period, m².
     pub area_m2: f64,
+}
+
+/// A series over a region that is asked for.
+#[derive(Debug, Clone)]
+pub struct AreaRequest {
+    /// A manifest of any quantity.
+    pub manifest: Arc<Manifest>,
+    /// Where.
+    pub region: Region,
+    /// When; overlaps the manifest's extent and does not reach past it.
+    pub period: Period,
+    /// Figure of the earth for cell areas.
+    pub earth: Earth,
+}
+
+/// A series over a region.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AreaSeries {
+    /// Area of the region, land included, m².
+    pub region_area_m2: f64,
+    /// Rows in the order of time.
+    pub rows: Vec<AreaRow>,
+}
+
+/// The mean of one step over a region.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AreaRow {
+    /// What the step covers.
+    pub period: Period,
+    /// Mean over the cells with data, each by its area, in the unit people read; none where no cell has any.
+    pub mean: Option<f64>,
+    /// Area with data, m².
+    pub area_m2: f64,
+    /// Share of the region's area with data, percent.
+    pub coverage_percent: f64,
 }
 
 /// Our numbers beside published ones.

@@ -8,6 +8,7 @@
 //! | `/api/products` | every product, its steps, modes and legend |
 //! | `/api/products/{product}/legend.json`, `.svg`, `.png` | what the colours mean |
 //! | `/api/products/{product}/point?lon=&lat=&manifest=` | series of the cell at a place |
+//! | `/api/products/{product}/area?region=&from=&to=&earth=&manifest=` | mean over a region at every step, with its coverage |
 //! | `/api/products/{product}/budget?region=&from=&to=&step=&earth=&manifest=` | carbon budget |
 //! | `/api/regions` | regions with a name |
 //! | `/api/palettes` | palettes with a name |

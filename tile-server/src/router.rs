@@ -13,7 +13,7 @@ use crate::error::ServerError;
 use crate::middleware::{limits, panics::CountPanics, security, track};
 use crate::routes::picture::{COVERED, SHOWN_TIME};
 use crate::routes::{
-    budget, check, events, globe, health, legend, metrics, observations, palettes, platforms,
+    area, budget, check, events, globe, health, legend, metrics, observations, palettes, platforms,
     point, products, regions, tilejson, tiles, viewer,
 };
 use crate::state::AppState;
@@ -41,6 +41,7 @@ pub fn router(state: AppState) -> Router {
         .route("/globe/{product}/{mode_png}", get(globe::get))
         .route("/api/products", get(products::list))
         .route("/api/products/{product}/point", get(point::get))
+        .route("/api/products/{product}/area", get(area::get))
         .route("/api/products/{product}/budget", get(budget::get))
         .route("/api/products/{product}/{legend_file}", get(legend::get))
         .route("/api/regions", get(regions::list))

@@ -1,5 +1,6 @@
 //! One file for each noun that can be asked for; the addresses are in `router`.
 
+pub(crate) mod area;
 pub(crate) mod budget;
 pub(crate) mod check;
 pub(crate) mod events;

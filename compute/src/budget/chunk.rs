@@ -37,6 +37,27 @@ pub fn valid_area_steps(values: &[f32], area_m2: &[f64]) -> Result<i128, OutOfRa
     total_steps(held.map(|(_, &area)| area))
 }
 
+/// Both sums of a chunk.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct ChunkSums {
+    /// As [`mass_steps`] gives it.
+    pub mass_steps: i128,
+    /// As [`valid_area_steps`] gives it.
+    pub area_steps: i128,
+}
+
+/// [`mass_steps`] and [`valid_area_steps`] in one walk over the cells.
+pub fn chunk_sums(values: &[f32], area_m2: &[f64], seconds: f64) -> Result<ChunkSums, OutOfRange> {
+    let mut sums = ChunkSums::default();
+    for (&value, &area) in values.iter().zip(area_m2) {
+        if !value.is_nan() && area != 0.0 {
+            sums.mass_steps += to_steps(f64::from(value) * area * seconds * MASS_STEPS_PER_KG)?;
+            sums.area_steps += to_steps(area * AREA_STEPS_PER_M2)?;
+        }
+    }
+    Ok(sums)
+}
+
 /// Area of all cells of a chunk, m² in steps of 10⁻⁶.
 pub fn total_area_steps(area_m2: &[f64]) -> Result<i128, OutOfRange> {
     total_steps(area_m2.iter().copied())
@@ -66,6 +87,17 @@ mod tests {
             15_000_000_000_000_000
         );
         assert_eq!(total_area_steps(&area).unwrap(), 25_000_000_000_000_000);
+    }
+
+    #[test]
+    fn one_walk_gives_both_sums() {
+        let (mut flux, mut area) = values();
+        flux[3..40].fill(f32::NAN);
+        area[30..90].fill(0.0);
+        let sums = chunk_sums(&flux, &area, 3600.0).unwrap();
+        assert_eq!(Ok(sums.mass_steps), mass_steps(&flux, &area, 3600.0));
+        assert_eq!(Ok(sums.area_steps), valid_area_steps(&flux, &area));
+        assert!(chunk_sums(&[f32::INFINITY], &[1.0], 1.0).is_err());
     }
 
     #[test]

@@ -17,13 +17,17 @@ const SMALL_STEPS: f64 = (1u64 << 62) as f64;
 #[error("a cell's share is {0}, beyond anything physical")]
 pub struct OutOfRange(pub f64);
 
+/// The largest number below one half: added to a number with its sign and cut to an integer, it rounds as `round` does
+/// (halves away from zero, and 0.499... to 0), without the call to the mathematical library that `round` is.
+const BELOW_HALF: f64 = 0.499_999_999_999_999_94;
+
 /// The nearest integer of a number of steps, halves away from zero.
+#[inline]
 pub fn to_steps(steps: f64) -> Result<i128, OutOfRange> {
-    let rounded = steps.round();
-    if rounded.abs() < SMALL_STEPS {
-        Ok(i128::from(rounded as i64))
-    } else if rounded.abs() < LIMIT_STEPS {
-        Ok(rounded as i128)
+    if steps.abs() < SMALL_STEPS {
+        Ok(i128::from((steps + BELOW_HALF.copysign(steps)) as i64))
+    } else if steps.abs() < LIMIT_STEPS {
+        Ok(steps as i128) // so large that it is an integer
     } else {
         Err(OutOfRange(steps)) // NaN comes here too: it is below nothing
     }
@@ -58,6 +62,30 @@ mod tests {
         assert_eq!(to_steps(1e25), Ok(10_000_000_000_000_000_905_969_664)); // the f64 next to 1e25
         for bad in [f64::NAN, f64::INFINITY, 1e40] {
             assert!(to_steps(bad).is_err());
+        }
+    }
+
+    #[test]
+    fn rounding_is_that_of_the_mathematical_library() {
+        let mut numbers = vec![0.0, 0.5, 0.499_999_999_999_999_94, 0.500_000_000_000_000_1];
+        for exponent in 0..100 {
+            let power = 2f64.powi(exponent);
+            for beside in [power, power.next_down(), power.next_up()] {
+                let halves = [0.5, 0.5f64.next_down(), 0.5f64.next_up(), 0.25, 0.75];
+                numbers.extend(halves.map(|half| beside + half));
+                numbers.push(beside);
+            }
+        }
+        let mut random = 1u64;
+        for _ in 0..100_000 {
+            random = random
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            let mantissa = (random >> 11) as f64 / (1u64 << 53) as f64;
+            numbers.push(mantissa * 2f64.powi((random % 70) as i32));
+        }
+        for number in numbers.iter().flat_map(|&number| [number, -number]) {
+            assert_eq!(to_steps(number), Ok(number.round() as i128), "{number:e}");
         }
     }
 

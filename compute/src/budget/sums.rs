@@ -6,14 +6,12 @@ use contract::digest::Digest;
 use contract::key::ObjectKey;
 use contract::manifest::{Manifest, ManifestId, Step};
 use contract::time::{Period, TimeMs};
-use datafusion::arrow::array::{AsArray as _, RecordBatch};
-use datafusion::arrow::datatypes::{Decimal128Type, TimestampMillisecondType};
 use serde::{Deserialize, Serialize};
 use storage::{StorageError, Store};
 
+use super::asked::asked;
 use super::rows::StepSum;
-use crate::session::QueryContext;
-use crate::{ComputeError, Engine, scan};
+use crate::{ComputeError, Engine};
 
 /// Version of stored sums: it changes when their bits or their layout do.
 const SCHEMA: u32 = 1;
@@ -28,25 +26,6 @@ pub enum Measure {
     Mass,
     /// Value x area: what a mean is made of.
     Mean,
-}
-
-/// One row a step: the seconds are those of the whole step; parts of steps are shared out afterwards, exactly.
-const STEP_SUMS: &str = "
-    SELECT period_start,
-           period_end,
-           SUM(cell_mass(\"values\", area_m2, $seconds)) AS mass,
-           SUM(valid_area(\"values\", area_m2)) AS area
-    FROM frames JOIN weights ON frames.chunk = weights.chunk
-    GROUP BY period_start, period_end";
-
-impl Measure {
-    fn sql(self) -> String {
-        let seconds = match self {
-            Self::Mass => "(CAST(period_end AS BIGINT) - CAST(period_start AS BIGINT)) / 1000.0",
-            Self::Mean => "CAST(1.0 AS DOUBLE)",
-        };
-        STEP_SUMS.replace("$seconds", seconds)
-    }
 }
 
 /// The sums of one version of a product over one region.
@@ -273,77 +252,4 @@ async fn earlier_rows(
         }
     }
     Ok(BTreeMap::new())
-}
-
-/// Exact sums of steps in their order, from the engine.
-async fn asked(
-    engine: &Engine,
-    steps: &[&Step],
-    weights: &ObjectKey,
-    measure: Measure,
-) -> Result<Vec<StepSum>, ComputeError> {
-    let frames: Vec<&ObjectKey> = steps.iter().map(|step| &step.frame).collect();
-    let job = Digest::of_json(&("sums", measure, &frames, weights));
-    let ask = |context| ask(engine, context, &frames, weights, measure);
-    let mut sums = BTreeMap::new();
-    for batch in &engine.answer(job, ask).await? {
-        for sum in sums_of(batch)? {
-            sums.insert(sum.period.start, sum);
-        }
-    }
-    let found: Option<Vec<StepSum>> = steps
-        .iter()
-        .map(|step| sums.remove(&step.period.start))
-        .collect();
-    found.filter(|_| sums.is_empty()).ok_or_else(|| {
-        let reason = format!(
-            "the engine did not answer for each of {} steps",
-            steps.len()
-        );
-        ComputeError::inconsistent("sums", reason)
-    })
-}
-
-async fn ask(
-    engine: &Engine,
-    context: QueryContext,
-    frames: &[&ObjectKey],
-    weights: &ObjectKey,
-    measure: Measure,
-) -> Result<Vec<RecordBatch>, ComputeError> {
-    let store = engine.store();
-    scan::register(&context, "frames", store, frames, &storage::frames::SCHEMA)?;
-    scan::register(
-        &context,
-        "weights",
-        store,
-        &[weights],
-        &storage::weights::SCHEMA,
-    )?;
-    let failed = || ComputeError::engine("summing over a region");
-    let query = context.sql(&measure.sql()).await.map_err(failed())?;
-    query.collect().await.map_err(failed())
-}
-
-fn sums_of(batch: &RecordBatch) -> Result<Vec<StepSum>, ComputeError> {
-    let time = |column: usize| {
-        batch
-            .column(column)
-            .as_primitive::<TimestampMillisecondType>()
-    };
-    let decimal = |column: usize| batch.column(column).as_primitive::<Decimal128Type>();
-    let (starts, ends, masses, areas) = (time(0), time(1), decimal(2), decimal(3));
-    (0..batch.num_rows())
-        .map(|row| {
-            let period = Period::new(
-                TimeMs::new(starts.value(row))?,
-                TimeMs::new(ends.value(row))?,
-            )?;
-            Ok(StepSum {
-                period,
-                mass_steps: masses.value(row),
-                area_steps: areas.value(row),
-            })
-        })
-        .collect()
 }

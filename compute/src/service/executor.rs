@@ -204,9 +204,9 @@ impl Executor {
 
     fn runner(&self) -> Result<TaskRunner, ComputeError> {
         let failed = || ComputeError::engine("starting the executor");
-        let base = self.objects.runtime().map_err(failed())?;
-        let state = state::session_state(state::ballista_config(NonZeroUsize::MIN), base)
-            .map_err(failed())?;
+        let config = state::ballista_config(NonZeroUsize::MIN);
+        let base = state::runtime(&self.objects, state::MEMORY_BYTES).map_err(failed())?;
+        let state = state::session_state(config, base, &self.objects).map_err(failed())?;
         let tasks = self.settings.tasks();
         let task_bytes = (self.settings.executor_memory_bytes / tasks as u64) as usize;
         let (objects, spills) = (self.objects.clone(), self.work.path().to_owned());

@@ -22,6 +22,7 @@ use tokio::net::TcpListener;
 use tokio::time::Instant;
 
 use super::background::Background;
+use super::room::Room;
 use super::scheduler_metrics::QueryMetrics;
 use super::scheduler_watch::Seen;
 use crate::{ComputeError, Objects, state};
@@ -88,13 +89,13 @@ impl Scheduler {
             .local_addr()
             .map_err(ComputeError::machine("address of the scheduler"))?;
         let objects = Objects::of(&store);
-        let config = Arc::new(config(settings, address, &objects)?);
+        let seen = Seen::register(registry)?;
+        let config = Arc::new(config(settings, address, &objects, seen.room.clone())?);
         let failed = || ComputeError::cluster("starting the scheduler");
         config.validate().map_err(failed())?;
         let cluster = BallistaCluster::new_from_config(&config)
             .await
             .map_err(failed())?;
-        let seen = Seen::register(registry)?;
         let metrics = Arc::new(QueryMetrics::register(registry)?);
         let mut server = SchedulerServer::new(
             address.to_string(),
@@ -176,12 +177,13 @@ fn config(
     settings: &SchedulerSettings,
     address: SocketAddr,
     objects: &Objects,
+    room: Room,
 ) -> Result<SchedulerConfig, ComputeError> {
-    let runtime = objects
-        .runtime()
+    let runtime = state::runtime(objects, state::MEMORY_BYTES)
         .map_err(ComputeError::engine("starting the scheduler"))?;
-    // The number of partitions comes with each query.
-    let sessions = move |config| state::session_state(config, Arc::clone(&runtime));
+    let objects = objects.clone();
+    let sessions =
+        move |config| state::session_state(room.fill(config), Arc::clone(&runtime), &objects);
     Ok(SchedulerConfig {
         scheduler_id: new_instance_id(),
         bind_host: address.ip().to_string(),

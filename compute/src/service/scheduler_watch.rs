@@ -11,6 +11,8 @@ use ballista_scheduler::state::task_manager::JobInfoCache;
 use futures::StreamExt as _;
 use prometheus::{IntCounter, IntGauge, Registry};
 
+use super::room::Room;
+
 /// How often waiting tasks are counted.
 const COUNT_INTERVAL: Duration = Duration::from_secs(1);
 
@@ -20,6 +22,8 @@ pub(super) struct Seen {
     pub(super) executors: IntGauge,
     lost: IntCounter,
     waiting_tasks: IntGauge,
+    /// Tasks that the executors work on at once.
+    pub(super) room: Room,
 }
 
 impl Seen {
@@ -43,6 +47,7 @@ impl Seen {
             executors,
             lost,
             waiting_tasks,
+            room: Room::default(),
         })
     }
 
@@ -54,8 +59,12 @@ impl Seen {
     ) {
         while let Some(change) = changes.next().await {
             let alive = manager.get_executors_state().await;
-            self.executors
-                .set(alive.map_or(0, |executors| executors.len() as i64));
+            let alive = alive.unwrap_or_default();
+            let tasks = alive
+                .iter()
+                .map(|(executor, ..)| executor.specification.vcores);
+            self.room.set(tasks.sum());
+            self.executors.set(alive.len() as i64);
             match change {
                 ClusterStateEvent::RegisteredExecutor { executor_id } => {
                     tracing::info!(executor = executor_id, "an executor is there");

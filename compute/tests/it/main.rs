@@ -19,6 +19,8 @@ mod parallel;
 #[cfg(test)]
 mod places;
 #[cfg(test)]
+mod reading;
+#[cfg(test)]
 mod recomputed;
 #[cfg(test)]
 mod regions;

@@ -7,7 +7,7 @@ use contract::time::Period;
 use crate::fixture::{ONE_DEGREE, ask, folder_store, land, parts, product, total, wavy_year};
 
 #[tokio::test(flavor = "multi_thread")]
-async fn one_three_and_sixteen_partitions_give_the_same_bits() {
+async fn any_number_of_partitions_gives_the_same_bits_with_ballista_and_without() {
     let (_folder, store) = folder_store();
     let id = product("wavy");
     land(
@@ -20,8 +20,9 @@ async fn one_three_and_sixteen_partitions_give_the_same_bits() {
     )
     .await;
     let mut answers = vec![];
-    for partitions in [1, 3, 16] {
-        let engine = Engine::standalone(store.clone(), parts(partitions));
+    let ballista = [1, 3, 16].map(|count| Engine::standalone(store.clone(), parts(count)));
+    let in_process = [1, 2, 8].map(|count| Engine::in_process(store.clone(), parts(count)));
+    for engine in ballista.into_iter().chain(in_process) {
         let mut rows = vec![];
         for region in ["global", "equatorial-pacific", "170.5,-33.3,-120.1,12.7"] {
             let query = compute::BudgetQuery {

@@ -27,8 +27,9 @@ pub(crate) async fn run(settings: &Settings, options: &Budget) -> Result<()> {
         },
         earth: options.earth,
     };
-    let bar = progress::bar("budget on Ballista", 1);
-    let answer = compute::budget::budget(&deployment::engine(settings, store)?, &query).await?;
+    let bar = progress::bar("sum over the region", 1);
+    let engine = deployment::region_engine(settings, store)?;
+    let answer = compute::budget::budget(&engine, &query).await?;
     bar.finish_and_clear();
     if options.json {
         return progress::result(&serde_json::to_string_pretty(&answer)?);

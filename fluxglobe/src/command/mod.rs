@@ -35,6 +35,7 @@ pub(crate) async fn run(settings: &Settings, command: Command) -> Result<ExitCod
             None => products::run(settings, &options).await?,
         },
         Command::Stats(Stats::Point(options)) => stats::point(settings, &options).await?,
+        Command::Stats(Stats::Polygon(options)) => stats::polygon(settings, &options).await?,
         Command::Budget(options) => budget::run(settings, &options).await?,
         Command::Derive(options) => derive::run(settings, options).await?,
         Command::Render(options) => render::run(settings, options).await?,

@@ -33,7 +33,7 @@ pub(crate) async fn bind(
     let renderer = deployment::renderer_at(settings, store.clone(), options.draws_at_once).await?;
     let analyst = Analyst {
         local: Engine::local(store.clone()),
-        cluster: deployment::engine(settings, store.clone())?,
+        regions: deployment::region_engine(settings, store.clone())?,
         check,
     };
     let registry = Registry::new();

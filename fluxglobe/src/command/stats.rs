@@ -1,17 +1,23 @@
-//! `fluxglobe stats point`: a product and a place in; the series of its cell as a table with bars, or JSON, out.
+//! `fluxglobe stats`: a product and a place or a region in; the series of its cell, or of the region's mean, as a table or
+//! JSON out.
 
 use anyhow::Result;
 use comfy_table::presets::NOTHING;
 use comfy_table::{CellAlignment, Table};
 use compute::Engine;
 use compute::point::PointAnswer;
+use compute::stats::{RegionSeries, RegionSeriesQuery, region_series};
 use contract::grid::LonLatDeg;
 
-use crate::cli::{Settings, StatsPoint};
+use crate::cli::{Settings, StatsPoint, StatsPolygon};
 use crate::{deployment, progress};
+
+use super::budget::region;
 
 /// Width of the longest bar, characters.
 const BAR_CHARS: f64 = 30.0;
+/// Square metres in a million square kilometres.
+const M2_PER_MILLION_KM2: f64 = 1e12;
 
 pub(crate) async fn point(settings: &Settings, options: &StatsPoint) -> Result<()> {
     let place = LonLatDeg::new(options.lon, options.lat)?;
@@ -29,6 +35,61 @@ pub(crate) async fn point(settings: &Settings, options: &StatsPoint) -> Result<(
     ));
     progress::say(&answer.source);
     Ok(())
+}
+
+pub(crate) async fn polygon(settings: &Settings, options: &StatsPolygon) -> Result<()> {
+    let query = RegionSeriesQuery {
+        product: options.product.clone(),
+        region: region(&options.region)?,
+        region_name: options.region.clone(),
+        from: options.from,
+        to: options.to,
+        earth: options.earth,
+    };
+    let store = deployment::store(settings)?;
+    deployment::manifest(&store, &options.product, &settings.data).await?;
+    let bar = progress::bar("mean over the region", 1);
+    let engine = deployment::region_engine(settings, store)?;
+    let answer = region_series(&engine, &query).await?;
+    bar.finish_and_clear();
+    if options.json {
+        return progress::result(&serde_json::to_string_pretty(&answer)?);
+    }
+    progress::result(&region_table(&answer).to_string())?;
+    progress::say(&format!(
+        "{} in {}, mean over {} ({:.3} 10⁶ km²), each cell by its area on the {} earth; cite {}",
+        answer.quantity,
+        answer.unit,
+        answer.region,
+        answer.region_area_m2 / M2_PER_MILLION_KM2,
+        answer.earth,
+        answer.manifest
+    ));
+    progress::say(&answer.source);
+    Ok(())
+}
+
+fn region_table(answer: &RegionSeries) -> Table {
+    let mut table = Table::new();
+    table.load_preset(NOTHING);
+    let unit = answer.unit.as_str();
+    table.set_header(["from", "to", unit, "% of area", "10⁶ km² with data"]);
+    for column in 2..5 {
+        if let Some(column) = table.column_mut(column) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    for step in &answer.series {
+        let mean = step.mean.map(|mean| format!("{mean:.4}"));
+        table.add_row([
+            progress::day(step.start),
+            progress::day(step.end),
+            mean.unwrap_or_else(|| "no data".to_owned()),
+            format!("{:.1}", step.coverage_percent),
+            format!("{:.3}", step.area_m2 / M2_PER_MILLION_KM2),
+        ]);
+    }
+    table
 }
 
 fn table(answer: &PointAnswer) -> Table {

@@ -1,13 +1,12 @@
 //! `fluxglobe scheduler`: Ballista's scheduler, and the deriver that keeps derived products up with what lands.
 
-use std::num::NonZeroUsize;
-
 use anyhow::Result;
 use compute::Engine;
 use compute::service::{Deriver, Scheduler};
 
 use crate::cli;
 use crate::cli::Settings;
+use crate::deployment;
 use crate::services::Footing;
 
 pub(crate) async fn run(settings: &Settings, options: cli::Scheduler) -> Result<()> {
@@ -24,7 +23,7 @@ pub(crate) async fn run(settings: &Settings, options: cli::Scheduler) -> Result<
         let readiness = readiness.clone();
         async move { crate::services::worst(readiness.as_ref()).await }
     });
-    let partitions = NonZeroUsize::from(settings.partitions);
+    let partitions = deployment::least_parts(settings);
     let engine = Engine::cluster(store, format!("http://{address}").parse()?, partitions);
     let mut parts = footing.parts();
     // Executors and clients are served while the log is waited for.

@@ -24,7 +24,7 @@ pub(crate) async fn run(settings: &Settings, options: TileServer) -> Result<()> 
     let measured = observations::open(&options.observations, &store)?;
     let analyst = Analyst {
         local: Engine::local(store.clone()),
-        cluster: deployment::engine(settings, store.clone())?,
+        regions: deployment::region_engine(settings, store.clone())?,
         check: None,
     };
     let mut serve = options.serve;
@@ -42,7 +42,10 @@ pub(crate) async fn run(settings: &Settings, options: TileServer) -> Result<()> 
     let mut parts = footing.parts();
     parts.start("tile server", server.run(footing.stop.said()));
     let own = footing.clone();
-    parts.start("news", async move { live(&own, &options.kafka, state).await });
+    parts.start(
+        "news",
+        async move { live(&own, &options.kafka, state).await },
+    );
     footing.run(parts).await
 }
 

@@ -115,7 +115,11 @@ pub(crate) async fn get(
 }
 
 /// The part of `[from, to)` that the product covers; all it covers if nothing is said.
-fn period(layer: &Layer, from: Option<TimeMs>, to: Option<TimeMs>) -> Result<Period, ServerError> {
+pub(crate) fn period(
+    layer: &Layer,
+    from: Option<TimeMs>,
+    to: Option<TimeMs>,
+) -> Result<Period, ServerError> {
     let extent = layer.extent;
     let outside = || ServerError::OutsidePeriod {
         product: layer.manifest.product.to_string(),
@@ -138,7 +142,7 @@ fn period(layer: &Layer, from: Option<TimeMs>, to: Option<TimeMs>) -> Result<Per
 }
 
 /// A region as the answer names it: by its name, or as `west,south,east,north`.
-fn region_name(asked: &str, region: &Region) -> String {
+pub(crate) fn region_name(asked: &str, region: &Region) -> String {
     let &Region::Box {
         west,
         south,

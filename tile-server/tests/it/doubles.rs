@@ -14,8 +14,9 @@ use contract::topic::{Origin, Topic};
 use storage::StorageError;
 use storage::log::{EmbeddedLog, EventLog, Follower, Message, Reader, Start};
 use tile_server::backend::{
-    Analyse, BackendError, BudgetRequest, BudgetRow, Check, Class, Draw, ObservationPage,
-    ObservationQuestion, Observe, Platform, RowCol, TrackPoint, TrackQuestion, Turn,
+    Analyse, AreaRequest, AreaRow, AreaSeries, BackendError, BudgetRequest, BudgetRow, Check,
+    Class, Draw, ObservationPage, ObservationQuestion, Observe, Platform, RowCol, TrackPoint,
+    TrackQuestion, Turn,
 };
 use tokio::sync::Semaphore;
 
@@ -125,6 +126,7 @@ impl Draw for Drawer {
 #[derive(Default)]
 pub(crate) struct Analyst {
     pub(crate) budgets: Mutex<Vec<BudgetRequest>>,
+    pub(crate) areas: Mutex<Vec<AreaRequest>>,
     pub(crate) check: Mutex<Option<Check>>,
     pub(crate) mood: Mutex<Mood>,
 }
@@ -163,6 +165,24 @@ impl Analyse for Analyst {
             coverage_percent: 92.5,
             area_m2: 3.3e14,
         }])
+    }
+
+    /// The first step has no data.
+    async fn area(&self, request: &AreaRequest) -> Result<AreaSeries, BackendError> {
+        self.mood().apply()?;
+        self.areas.lock().unwrap().push(request.clone());
+        let steps = request.manifest.steps.iter();
+        let inside = steps.filter(|step| step.period.overlaps(request.period));
+        let row = |(index, step): (usize, &contract::manifest::Step)| AreaRow {
+            period: step.period,
+            mean: (index > 0).then_some(index as f64 / 4.0),
+            area_m2: 1e12 * index as f64,
+            coverage_percent: 25.0 * index as f64,
+        };
+        Ok(AreaSeries {
+            region_area_m2: 4e12,
+            rows: inside.enumerate().map(row).collect(),
+        })
     }
 
     async fn check(&self) -> Result<Option<Check>, BackendError> {

@@ -5,6 +5,7 @@
 )]
 
 mod app;
+mod area;
 mod budget;
 mod caching;
 mod check;

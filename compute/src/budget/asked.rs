@@ -1,0 +1,121 @@
+//! Exact sums of a region's share of some steps, asked of the engine: chunks are read where the region is, and only sums
+//! leave the part of the query that read them.
+
+use std::collections::BTreeMap;
+
+use contract::digest::Digest;
+use contract::key::ObjectKey;
+use contract::manifest::Step;
+use contract::time::{Period, TimeMs};
+use datafusion::arrow::array::{AsArray as _, RecordBatch};
+use datafusion::arrow::datatypes::{Decimal128Type, TimestampMillisecondType};
+
+use super::rows::StepSum;
+use super::sums::Measure;
+use crate::region::loaded::RegionWeights;
+use crate::session::QueryContext;
+use crate::{ComputeError, Engine, scan};
+
+/// One row a step: the seconds are those of the whole step; parts of steps are shared out afterwards, exactly.
+///
+/// Weights are no table: a join would hold them beside every chunk, and under Ballista it would send every value to
+/// another part of the query. What is asked of the frames is which chunks to read.
+const STEP_SUMS: &str = "
+    SELECT period_start,
+           period_end,
+           SUM(get_field(sums, 'mass')) AS mass,
+           SUM(get_field(sums, 'area')) AS area
+    FROM (SELECT period_start,
+                 period_end,
+                 region_sums(\"values\", chunk, $seconds, '$weights') AS sums
+          FROM frames
+          WHERE $chunks)
+    GROUP BY period_start, period_end";
+
+/// The question about all frames, for a region's weights at an address.
+fn sql(measure: Measure, weights: &RegionWeights, address: &str) -> String {
+    let seconds = match measure {
+        Measure::Mass => "(CAST(period_end AS BIGINT) - CAST(period_start AS BIGINT)) / 1000.0",
+        Measure::Mean => "CAST(1.0 AS DOUBLE)",
+    };
+    let run = |(first, last): (u32, u32)| {
+        format!("chunk BETWEEN CAST({first} AS INT UNSIGNED) AND CAST({last} AS INT UNSIGNED)")
+    };
+    let chunks: Vec<String> = weights.runs().into_iter().map(run).collect();
+    STEP_SUMS
+        .replace("$seconds", seconds)
+        .replace("$chunks", &chunks.join(" OR "))
+        .replace("$weights", &address.replace('\'', "''"))
+}
+
+/// Exact sums of steps in their order.
+pub(super) async fn asked(
+    engine: &Engine,
+    steps: &[&Step],
+    weights: &ObjectKey,
+    measure: Measure,
+) -> Result<Vec<StepSum>, ComputeError> {
+    let frames: Vec<&ObjectKey> = steps.iter().map(|step| &step.frame).collect();
+    let job = Digest::of_json(&("sums", measure, &frames, weights));
+    let ask = |context| ask(engine, context, &frames, weights, measure);
+    let mut sums = BTreeMap::new();
+    for batch in &engine.answer(job, ask).await? {
+        for sum in sums_of(batch)? {
+            sums.insert(sum.period.start, sum);
+        }
+    }
+    let found: Option<Vec<StepSum>> = steps
+        .iter()
+        .map(|step| sums.remove(&step.period.start))
+        .collect();
+    found.filter(|_| sums.is_empty()).ok_or_else(|| {
+        let reason = format!(
+            "the engine did not answer for each of {} steps",
+            steps.len()
+        );
+        ComputeError::inconsistent("sums", reason)
+    })
+}
+
+async fn ask(
+    engine: &Engine,
+    context: QueryContext,
+    frames: &[&ObjectKey],
+    weights: &ObjectKey,
+    measure: Measure,
+) -> Result<Vec<RecordBatch>, ComputeError> {
+    let store = engine.store();
+    scan::register(&context, "frames", store, frames, &storage::frames::SCHEMA)?;
+    let address = store.sql_url(weights).to_string();
+    let failed = || ComputeError::engine("summing over a region");
+    let region = engine.objects().weights(&address).await.map_err(failed())?;
+    let sql = sql(measure, &region, &address);
+    let query = context.sql(&sql).await.map_err(failed())?;
+    query.collect().await.map_err(failed())
+}
+
+fn sums_of(batch: &RecordBatch) -> Result<Vec<StepSum>, ComputeError> {
+    let time = |column: usize| {
+        batch
+            .column(column)
+            .as_primitive::<TimestampMillisecondType>()
+    };
+    let decimal = |column: usize| batch.column(column).as_primitive::<Decimal128Type>();
+    let (starts, ends, masses, areas) = (time(0), time(1), decimal(2), decimal(3));
+    (0..batch.num_rows())
+        .map(|row| {
+            let period = Period::new(
+                TimeMs::new(starts.value(row))?,
+                TimeMs::new(ends.value(row))?,
+            )?;
+            Ok(StepSum {
+                period,
+                mass_steps: masses.value(row),
+                area_steps: areas.value(row),
+            })
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests;

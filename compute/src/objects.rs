@@ -1,0 +1,87 @@
+//! Where queries read objects: SQL's scans by address, and our functions the weights that they sum with.
+
+use std::sync::Arc;
+
+use bytes::Bytes;
+use datafusion::error::DataFusionError;
+use datafusion::execution::runtime_env::RuntimeEnv;
+use object_store::path::Path;
+use object_store::{ObjectStore, ObjectStoreExt as _};
+use storage::Store;
+use url::{Position, Url};
+
+use crate::region::loaded::{LoadedWeights, RegionWeights};
+use crate::steady_store::SteadyStore;
+
+/// The root that URLs of a store begin with, and what answers for it. Clones share what was read.
+#[derive(Debug, Clone)]
+pub struct Objects {
+    root: Url,
+    store: Arc<dyn ObjectStore>,
+    weights: Arc<LoadedWeights>,
+}
+
+impl Objects {
+    /// Those of a store; reads that fail for a passing reason are tried again.
+    pub fn of(store: &Store) -> Self {
+        let (root, objects) = store.sql_root();
+        Self::new(root, objects)
+    }
+
+    /// Those of any object store under a root.
+    pub fn new(root: Url, store: Arc<dyn ObjectStore>) -> Self {
+        Self {
+            root,
+            store: Arc::new(SteadyStore::new(store)),
+            weights: Arc::default(),
+        }
+    }
+
+    /// Makes scans of a runtime read from here.
+    pub(crate) fn register(&self, runtime: &RuntimeEnv) {
+        runtime.register_object_store(&self.root, Arc::clone(&self.store));
+    }
+
+    /// A region's weights by their address: read once, whoever asks and however often.
+    pub(crate) async fn weights(
+        &self,
+        address: &str,
+    ) -> Result<Arc<RegionWeights>, DataFusionError> {
+        self.weights
+            .get(address, async {
+                let content = self.content(address).await?;
+                let chunks = storage::weights::decode(address, content)
+                    .map_err(|e| DataFusionError::External(e.into()))?;
+                Ok(RegionWeights::new(chunks))
+            })
+            .await
+    }
+
+    async fn content(&self, address: &str) -> Result<Bytes, DataFusionError> {
+        let elsewhere = || {
+            let root = &self.root;
+            DataFusionError::Execution(format!("{address} is not in the store at {root}"))
+        };
+        let url = Url::parse(address).map_err(|_no_address| elsewhere())?;
+        if url[..Position::BeforePath] != self.root[..Position::BeforePath] {
+            return Err(elsewhere());
+        }
+        let path = Path::from_url_path(url.path()).map_err(|_no_path| elsewhere())?;
+        Ok(self.store.get(&path).await?.bytes().await?)
+    }
+}
+
+/// Two that read from the same place answer the same.
+impl PartialEq for Objects {
+    fn eq(&self, other: &Self) -> bool {
+        self.root == other.root
+    }
+}
+
+impl Eq for Objects {}
+
+impl std::hash::Hash for Objects {
+    fn hash<H: std::hash::Hasher>(&self, state: &mut H) {
+        self.root.hash(state);
+    }
+}

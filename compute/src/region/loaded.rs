@@ -1,0 +1,144 @@
+//! A region's weights in memory, by chunk: read from the store once and shared by every task of a process.
+
+use std::future::Future;
+use std::sync::Arc;
+
+use datafusion::error::DataFusionError;
+use quick_cache::Weighter;
+use quick_cache::sync::Cache;
+
+/// Weights held, bytes: those of the whole 1/60-degree China Sea take 35 MB. Larger ones are read anew by each task.
+const HELD_BYTES: u64 = 256 << 20;
+/// Regions held, a guess that sizes tables.
+const HELD_REGIONS: usize = 64;
+/// Runs of chunks that a predicate names at most.
+const MAX_RUNS: usize = 16;
+
+/// Areas of a region's share of every cell, m², by chunk.
+#[derive(Debug)]
+pub(crate) struct RegionWeights {
+    /// In the order of their numbers; chunks that the region does not touch are left out.
+    chunks: Vec<(u32, Vec<f64>)>,
+}
+
+impl RegionWeights {
+    pub(crate) fn new(mut chunks: Vec<(u32, Vec<f64>)>) -> Self {
+        chunks.sort_by_key(|(chunk, _)| *chunk);
+        Self { chunks }
+    }
+
+    /// Areas of the cells of a chunk; none where the region does not touch it.
+    pub(crate) fn areas_m2(&self, chunk: u32) -> Option<&[f64]> {
+        let at = self
+            .chunks
+            .binary_search_by_key(&chunk, |(chunk, _)| *chunk);
+        at.ok().map(|at| self.chunks[at].1.as_slice())
+    }
+
+    /// Runs of chunk numbers, `(first, last)`, that hold every chunk of the region and as few others as so few runs can.
+    pub(crate) fn runs(&self) -> Vec<(u32, u32)> {
+        runs(self.chunks.iter().map(|(chunk, _)| *chunk), MAX_RUNS)
+    }
+
+    fn size_bytes(&self) -> u64 {
+        let areas = self.chunks.iter().map(|(_, areas)| areas.len() as u64);
+        areas.sum::<u64>() * size_of::<f64>() as u64
+    }
+}
+
+fn runs(chunks: impl Iterator<Item = u32>, max_runs: usize) -> Vec<(u32, u32)> {
+    let mut runs: Vec<(u32, u32)> = vec![];
+    for chunk in chunks {
+        match runs.last_mut() {
+            Some((_, last)) if chunk <= *last + 1 => *last = chunk,
+            _ => runs.push((chunk, chunk)),
+        }
+    }
+    // The narrowest gaps are closed first: what lies in them is read in vain.
+    let mut gaps: Vec<u32> = runs.windows(2).map(|pair| pair[1].0 - pair[0].1).collect();
+    gaps.sort_unstable();
+    let closed = runs.len().saturating_sub(max_runs);
+    let Some(&widest) = closed.checked_sub(1).and_then(|last| gaps.get(last)) else {
+        return runs;
+    };
+    let mut joined: Vec<(u32, u32)> = vec![];
+    for run in runs {
+        match joined.last_mut() {
+            Some((_, last)) if run.0 - *last <= widest => *last = run.1,
+            _ => joined.push(run),
+        }
+    }
+    joined
+}
+
+/// Weights that this process has read.
+#[derive(Debug)]
+pub(crate) struct LoadedWeights {
+    held: Cache<String, Arc<RegionWeights>, Size>,
+}
+
+impl Default for LoadedWeights {
+    fn default() -> Self {
+        Self {
+            held: Cache::with_weighter(HELD_REGIONS, HELD_BYTES, Size),
+        }
+    }
+}
+
+impl LoadedWeights {
+    /// Those at an address; many who ask at once wait for one reading.
+    pub(crate) async fn get(
+        &self,
+        address: &str,
+        read: impl Future<Output = Result<RegionWeights, DataFusionError>>,
+    ) -> Result<Arc<RegionWeights>, DataFusionError> {
+        let reading = async { Ok(Arc::new(read.await?)) };
+        self.held.get_or_insert_async(address, reading).await
+    }
+}
+
+/// Counts bytes of areas.
+#[derive(Debug, Clone)]
+struct Size;
+
+impl Weighter<String, Arc<RegionWeights>> for Size {
+    fn weight(&self, _address: &String, weights: &Arc<RegionWeights>) -> u64 {
+        weights.size_bytes().max(1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_chunk_that_is_not_touched_has_no_areas() {
+        let weights = RegionWeights::new(vec![(7, vec![1.0]), (3, vec![2.0, 0.5])]);
+        assert_eq!(weights.areas_m2(3), Some(&[2.0, 0.5][..]));
+        assert_eq!(weights.areas_m2(5), None);
+        assert_eq!(weights.runs(), [(3, 3), (7, 7)]);
+    }
+
+    #[test]
+    fn neighbours_are_one_run_and_the_narrowest_gaps_are_closed() {
+        let chunks = [0, 1, 2, 10, 11, 13, 40];
+        assert_eq!(
+            runs(chunks.into_iter(), 4),
+            [(0, 2), (10, 11), (13, 13), (40, 40)]
+        );
+        assert_eq!(runs(chunks.into_iter(), 3), [(0, 2), (10, 13), (40, 40)]);
+        assert_eq!(runs(chunks.into_iter(), 1), [(0, 40)]);
+        assert!(runs([].into_iter(), 1).is_empty());
+    }
+
+    #[tokio::test]
+    async fn weights_are_read_once_and_a_failure_is_not_remembered() {
+        let loaded = LoadedWeights::default();
+        let failing = async { Err(DataFusionError::Execution("away".into())) };
+        assert!(loaded.get("a", failing).await.is_err());
+        let read = async { Ok(RegionWeights::new(vec![(1, vec![1.0])])) };
+        loaded.get("a", read).await.unwrap();
+        let never = async { panic!("read again") };
+        assert!(loaded.get("a", never).await.unwrap().areas_m2(1).is_some());
+    }
+}

@@ -1,0 +1,240 @@
+//! What sums over a region read of the store: the chunks of the region, from files of every layout.
+
+use std::fmt::{Display, Formatter};
+use std::ops::Range;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use async_trait::async_trait;
+use bytes::Bytes;
+use compute::budget::chunk::{mass_steps, valid_area_steps};
+use compute::budget::fixed::{MASS_DECIMALS, decimal_text};
+use compute::region::weights;
+use compute::{BudgetStep, Engine, Objects};
+use contract::chunk::frame_chunks;
+use contract::earth::Earth;
+use contract::grid::Grid;
+use contract::manifest::Manifest;
+use contract::quantity::Quantity;
+use contract::time::Period;
+use datafusion::arrow::array::RecordBatch;
+use datafusion::parquet::arrow::ArrowWriter;
+use datafusion::parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use datafusion::parquet::basic::{Compression, ZstdLevel};
+use datafusion::parquet::file::properties::{EnabledStatistics, WriterProperties};
+use futures::stream::BoxStream;
+use object_store::path::Path;
+use object_store::{
+    CopyOptions, GetOptions, GetResult, ListResult, MultipartUpload, ObjectMeta, ObjectStore,
+    PutMultipartOptions, PutOptions, PutPayload, PutResult, Result,
+};
+use storage::{Store, frames, manifests};
+
+use crate::fixture::{ask, folder_store, land, months, parts, product, total};
+
+/// A regional product, 8 x 6 chunks: half of what `rows` and `cols` of the China Sea are at a quarter of its resolution.
+const GRID: Grid = Grid {
+    rows: 450,
+    cols: 615,
+    north_deg: 41.0,
+    west_deg: 100.0,
+    dlat_deg: 41.0 / 450.0,
+    dlon_deg: 30.0 / 615.0,
+};
+
+/// A store that counts the bytes it hands out of frames.
+#[derive(Debug)]
+struct Counting {
+    inner: Arc<dyn ObjectStore>,
+    frame_bytes: AtomicU64,
+}
+
+impl Counting {
+    fn count(&self, at: &Path, bytes: u64) {
+        if at.as_ref().contains("frames/") {
+            self.frame_bytes.fetch_add(bytes, Ordering::Relaxed);
+        }
+    }
+}
+
+impl Display for Counting {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        f.write_str("counting")
+    }
+}
+
+#[async_trait]
+impl ObjectStore for Counting {
+    async fn put_opts(&self, at: &Path, what: PutPayload, o: PutOptions) -> Result<PutResult> {
+        self.inner.put_opts(at, what, o).await
+    }
+
+    async fn put_multipart_opts(
+        &self,
+        at: &Path,
+        o: PutMultipartOptions,
+    ) -> Result<Box<dyn MultipartUpload>> {
+        self.inner.put_multipart_opts(at, o).await
+    }
+
+    async fn get_opts(&self, at: &Path, o: GetOptions) -> Result<GetResult> {
+        let is_head = o.head;
+        let found = self.inner.get_opts(at, o).await?;
+        if !is_head {
+            self.count(at, found.range.end - found.range.start);
+        }
+        Ok(found)
+    }
+
+    async fn get_ranges(&self, at: &Path, ranges: &[Range<u64>]) -> Result<Vec<Bytes>> {
+        self.count(at, ranges.iter().map(|range| range.end - range.start).sum());
+        self.inner.get_ranges(at, ranges).await
+    }
+
+    fn delete_stream(
+        &self,
+        at: BoxStream<'static, Result<Path>>,
+    ) -> BoxStream<'static, Result<Path>> {
+        self.inner.delete_stream(at)
+    }
+
+    fn list(&self, prefix: Option<&Path>) -> BoxStream<'static, Result<ObjectMeta>> {
+        self.inner.list(prefix)
+    }
+
+    async fn list_with_delimiter(&self, prefix: Option<&Path>) -> Result<ListResult> {
+        self.inner.list_with_delimiter(prefix).await
+    }
+
+    async fn copy_opts(&self, from: &Path, to: &Path, o: CopyOptions) -> Result<()> {
+        self.inner.copy_opts(from, to, o).await
+    }
+}
+
+/// Four months of noise, which does not compress, with gaps.
+fn noise() -> Vec<(Period, Vec<f32>)> {
+    let mut random = 1u64;
+    let mut next = move || {
+        random = random
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
+        let share = (random >> 40) as f32 / (1u32 << 24) as f32;
+        if share < 0.2 {
+            f32::NAN
+        } else {
+            (share - 0.6) * 1e-8
+        }
+    };
+    let mut months = months(2000);
+    months.truncate(4);
+    let step = |period| (period, (0..GRID.cell_count()).map(|_| next()).collect());
+    months.into_iter().map(step).collect()
+}
+
+async fn frame_bytes(store: &Store, manifest: &Manifest) -> u64 {
+    let mut bytes = 0;
+    for step in &manifest.steps {
+        bytes += store.size_bytes(&step.frame).await.unwrap();
+    }
+    bytes
+}
+
+/// Share of the frames' bytes that a budget of a region reads.
+async fn share_read(store: &Store, manifest: &Manifest, region: &str) -> f64 {
+    let (root, inner) = store.sql_root();
+    let counting = Arc::new(Counting {
+        inner,
+        frame_bytes: AtomicU64::new(0),
+    });
+    let objects = Objects::new(root, Arc::clone(&counting) as Arc<dyn ObjectStore>);
+    let engine = Engine::in_process(store.clone(), parts(2)).reading(objects);
+    ask(&engine, &total(&manifest.product, region)).await;
+    let read = counting.frame_bytes.load(Ordering::Relaxed) as f64;
+    read / frame_bytes(store, manifest).await as f64
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_small_box_reads_its_chunks_and_no_others() {
+    let (_folder, store) = folder_store();
+    let flux = Quantity::CarbonFlux;
+    let manifest = land(&store, &product("noise"), flux, GRID, &noise(), 4).await;
+    let chunks = frame_chunks(&GRID).len() as f64;
+    assert!((chunks - 48.0).abs() < 0.1);
+    // One chunk of 48, and the ends of the files.
+    let one = share_read(&store, &manifest, "110,20,111,21").await;
+    assert!(one > 1.0 / chunks && one < 3.0 / chunks, "{one}");
+    // A row of six.
+    let row = share_read(&store, &manifest, "100,20,130,21").await;
+    assert!(row > 6.0 / chunks && row < 8.0 / chunks, "{row}");
+    let all = share_read(&store, &manifest, "global").await;
+    assert!(all > 0.95 && all < 1.1, "{all}");
+}
+
+/// A frame as it was written before a row of values was a page: pages of a megabyte, and no index of pages.
+fn old_layout(content: Bytes) -> Bytes {
+    let reader = ParquetRecordBatchReaderBuilder::try_new(content).unwrap();
+    let batches: Vec<RecordBatch> = reader.build().unwrap().map(|b| b.unwrap()).collect();
+    let properties = WriterProperties::builder()
+        .set_compression(Compression::ZSTD(ZstdLevel::default()))
+        .set_dictionary_enabled(false)
+        .set_statistics_enabled(EnabledStatistics::Chunk)
+        .set_offset_index_disabled(true)
+        .set_max_row_group_row_count(Some(64))
+        .build();
+    let mut out = vec![];
+    let mut writer = ArrowWriter::try_new(&mut out, batches[0].schema(), Some(properties)).unwrap();
+    batches
+        .iter()
+        .for_each(|batch| writer.write(batch).unwrap());
+    writer.close().unwrap();
+    out.into()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn frames_of_the_layout_before_have_the_same_sums() {
+    let (_folder, store) = folder_store();
+    let (id, flux) = (product("noise"), Quantity::CarbonFlux);
+    let manifest = land(&store, &id, flux, GRID, &noise(), 4).await;
+    let mut old = manifest.clone();
+    old.product = product("old");
+    for step in &mut old.steps {
+        let content = old_layout(store.get(&step.frame).await.unwrap());
+        let digest = contract::digest::Digest::of(&content);
+        step.frame = contract::key::ObjectKey::frame(&old.product, &digest);
+        store.put_new(&step.frame, content).await.unwrap();
+    }
+    manifests::commit(&store, &old).await.unwrap();
+    let monthly = |id, region| compute::BudgetQuery {
+        step: BudgetStep::Month,
+        ..total(id, region)
+    };
+    let engine = Engine::in_process(store, parts(2));
+    for region in ["110,20,111,21", "105.3,3.1,127.7,38.2"] {
+        let new = ask(&engine, &monthly(&id, region)).await.rows;
+        let before = ask(&engine, &monthly(&old.product, region)).await.rows;
+        assert_eq!(new.len(), 4);
+        assert_eq!(new, before, "{region}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_sums_are_those_of_the_kernels_chunk_by_chunk() {
+    let (_folder, store) = folder_store();
+    let (id, flux) = (product("noise"), Quantity::CarbonFlux);
+    let manifest = land(&store, &id, flux, GRID, &noise()[..1], 1).await;
+    let region = "105.3,3.1,127.7,38.2";
+    let weights = weights::compute(&GRID, &region.parse().unwrap(), Earth::Wgs84).unwrap();
+    let step = &manifest.steps[0];
+    let values = frames::read(&store, &step.frame, &GRID).await.unwrap();
+    let windows = frame_chunks(&GRID);
+    let (mut mass, mut area) = (0, 0);
+    for (chunk, areas) in &weights {
+        let cells = windows[*chunk as usize].cell_indices(&GRID);
+        let values: Vec<f32> = cells.map(|index| values[index]).collect();
+        mass += mass_steps(&values, areas, step.period.seconds()).unwrap();
+        area += valid_area_steps(&values, areas).unwrap();
+    }
+    let answer = ask(&Engine::local(store), &total(&id, region)).await;
+    assert_eq!(answer.rows[0].budget_kg, decimal_text(mass, MASS_DECIMALS));
+    assert!((answer.rows[0].area_m2 / (area as f64 / 1e6) - 1.0).abs() < 1e-12);
+}
