@@ -1,5 +1,6 @@
 //! Accumulated carbon: a product of fluxes in, a product of the carbon given off since a chosen start out.
 
+mod at_cell;
 mod derivation;
 pub(crate) mod exact;
 mod prior;
@@ -16,6 +17,7 @@ use storage::{StorageError, Store, manifests};
 
 use crate::{ComputeError, Engine, catalog};
 use derivation::Derivation;
+pub use at_cell::{CellCounts, counts_at_cell};
 use source::{SourceStep, steps_since};
 
 /// How often the commit is tried again when another writer takes the number.

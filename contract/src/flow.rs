@@ -189,6 +189,7 @@ mod tests {
             raw_sha256: Digest::of(b""),
             origin: String::new(),
             valid_cells: 1,
+            contributed: None,
         };
         Manifest {
             schema: MANIFEST_SCHEMA,

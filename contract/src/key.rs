@@ -29,6 +29,11 @@ impl ObjectKey {
         Self(format!("series/{product}/{sha256}.parquet"))
     }
 
+    /// Steps and time that each cell's sum after a step of accumulated carbon holds, named by its content.
+    pub fn contributed(product: &ProductId, sha256: &Digest) -> Self {
+        Self(format!("contributed/{product}/{sha256}.parquet"))
+    }
+
     /// The cells that hold data in some step, one byte a cell, named by its content.
     pub fn domain(product: &ProductId, sha256: &Digest) -> Self {
         Self(format!("domain/{product}/{sha256}"))
@@ -125,6 +130,7 @@ mod tests {
             ObjectKey::raw(&product, &digest),
             ObjectKey::frame(&product, &digest),
             ObjectKey::series(&product, &digest),
+            ObjectKey::contributed(&product, &digest),
             ObjectKey::domain(&product, &digest),
             ObjectKey::manifest(&product, 7),
             ObjectKey::weights(&digest),

@@ -67,6 +67,19 @@ pub struct Step {
     pub origin: String,
     /// Cells with data.
     pub valid_cells: u64,
+    /// How complete the sums of accumulated carbon are; none for means, and in versions that did not count it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub contributed: Option<Contributed>,
+}
+
+/// What of the accumulated time each cell's sum holds.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Contributed {
+    /// Steps and time that contributed, map-major chunks.
+    pub counts: ObjectKey,
+    /// Cells that had data in all of the accumulated time: a sum over one month of twelve is not a complete one.
+    pub complete_cells: u64,
 }
 
 /// A run of consecutive steps, stored time-major.
@@ -242,6 +255,7 @@ mod tests {
             raw_sha256: digest,
             origin: "f.nc".into(),
             valid_cells: 1,
+            contributed: None,
         };
         Manifest {
             schema: MANIFEST_SCHEMA,

@@ -72,6 +72,7 @@ pub(crate) async fn run(
             raw_sha256,
             origin,
             valid_cells,
+            contributed: None,
         },
     })
 }

@@ -6,7 +6,9 @@ use std::sync::Arc;
 use contract::digest::Digest;
 use quick_cache::sync::Cache;
 
-use crate::backend::{Analyse, AreaRequest, AreaSeries, BudgetRequest, BudgetRow, Check, RowCol};
+use crate::backend::{
+    Analyse, AreaRequest, AreaSeries, BudgetRequest, BudgetRow, Check, PointStep, RowCol,
+};
 use crate::catalogue::Layer;
 use crate::error::ServerError;
 use crate::flights::Flights;
@@ -48,7 +50,7 @@ impl Analyses {
         &self,
         layer: &Layer,
         cell: RowCol,
-    ) -> Result<Vec<Option<f64>>, ServerError> {
+    ) -> Result<Vec<PointStep>, ServerError> {
         let _pass = self
             .gate
             .enter()

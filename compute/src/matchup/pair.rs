@@ -151,6 +151,7 @@ mod tests {
             raw_sha256: digest,
             origin: "f.nc".into(),
             valid_cells: 1,
+            contributed: None,
         };
         Manifest {
             schema: MANIFEST_SCHEMA,

@@ -38,6 +38,7 @@ async fn product(store: &Store) -> Manifest {
             raw_sha256: Digest::of(b""),
             origin: "f.nc".into(),
             valid_cells: 4,
+            contributed: None,
         });
     }
     Manifest {

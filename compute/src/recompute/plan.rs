@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use contract::key::ObjectKey;
-use contract::manifest::Manifest;
+use contract::manifest::{Manifest, Step};
 use contract::quantity::Quantity;
 use contract::time::Period;
 use storage::{Store, manifests};
@@ -62,18 +62,17 @@ async fn frames(
     plan.start = chosen_start(store, &source.product).await?;
     let target = source.product.accumulated()?;
     let latest = manifests::latest(store, &target).await?;
-    let there: BTreeSet<ObjectKey> = store
-        .list(&format!("frames/{target}"))
-        .await?
-        .into_iter()
-        .collect();
+    let mut there = BTreeSet::new();
+    for folder in ["frames", "contributed"] {
+        there.extend(store.list(&format!("{folder}/{target}")).await?);
+    }
     let mut is_broken = false;
     for (index, (period, input)) in made_of(source, plan.start)?.into_iter().enumerate() {
         let stored = latest.as_ref().and_then(|latest| latest.steps.get(index));
         let reason = match stored {
             None => Some(Reason::Missing),
             Some(step) if step.raw_sha256 != input => Some(Reason::Stale),
-            Some(step) if !there.contains(&step.frame) => Some(Reason::Missing),
+            Some(step) if !is_whole(step, &there) => Some(Reason::Missing),
             Some(_) if is_broken => Some(Reason::Stale),
             Some(_) if is_forced && period.overlaps(window) => Some(Reason::Forced),
             Some(_) => None,
@@ -99,6 +98,12 @@ async fn frames(
         }
     }
     Ok(())
+}
+
+/// Are the objects of an accumulated step there?
+fn is_whole(step: &Step, there: &BTreeSet<ObjectKey>) -> bool {
+    let counts = step.contributed.as_ref();
+    there.contains(&step.frame) && counts.is_some_and(|counts| there.contains(&counts.counts))
 }
 
 /// Stored sums of the named regions that touch the grid.

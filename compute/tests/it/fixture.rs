@@ -68,6 +68,7 @@ pub(crate) async fn land(
             raw_sha256: Digest::of(&index.to_le_bytes()),
             origin: format!("step-{index}.nc"),
             valid_cells: values.iter().filter(|value| !value.is_nan()).count() as u64,
+            contributed: None,
         });
     }
     let mut segments = vec![];

@@ -27,6 +27,7 @@ fn product() -> Manifest {
         raw_sha256: Digest::of(b"file"),
         origin: "file.nc".into(),
         valid_cells: 1,
+        contributed: None,
     };
     Manifest {
         schema: MANIFEST_SCHEMA,

@@ -165,6 +165,7 @@ mod tests {
             raw_sha256: Digest::of(b""),
             origin: String::new(),
             valid_cells: 1,
+            contributed: None,
         };
         months.map(step).collect()
     }

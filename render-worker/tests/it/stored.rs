@@ -36,6 +36,7 @@ pub(crate) async fn product(
             raw_sha256: Digest::of(b""),
             origin: "made up".into(),
             valid_cells: 1,
+            contributed: None,
         });
     }
     let domain = storage::domain::write(store, &product, &domain)

@@ -192,6 +192,7 @@ impl TestApp {
                 raw_sha256: Digest::of(format!("{product}{number}{month}").as_bytes()),
                 origin: format!("month-{month}.nc"),
                 valid_cells: values.iter().filter(|value| !value.is_nan()).count() as u64,
+                contributed: None,
             });
         }
         let slices: Vec<&[f32]> = values.iter().map(Vec::as_slice).collect();

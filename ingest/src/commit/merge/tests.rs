@@ -33,6 +33,7 @@ fn granule(content: &str, periods: &[Period]) -> StoredGranule {
                 raw_sha256,
                 origin: "f.nc".into(),
                 valid_cells: 1,
+                contributed: None,
             },
         }
     };

@@ -31,6 +31,7 @@ fn step(file: &str, month: u32, edition: u32) -> Step {
         raw_sha256: Digest::of(file.as_bytes()),
         origin: format!("{file}.nc"),
         valid_cells: 1,
+        contributed: None,
     }
 }
 
