@@ -6,6 +6,7 @@ mod column_sum;
 mod lists;
 mod region_sums;
 mod series_at;
+mod sound;
 
 use std::sync::Arc;
 
@@ -20,6 +21,7 @@ pub fn scalar_functions(objects: &Objects) -> Vec<Arc<ScalarUDF>> {
     [
         AsyncScalarUDF::new(Arc::new(region_sums)).into_scalar_udf(),
         ScalarUDF::from(series_at::SeriesAt::new()),
+        ScalarUDF::from(sound::Sound::new()),
     ]
     .map(Arc::new)
     .to_vec()

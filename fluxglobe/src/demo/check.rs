@@ -1,13 +1,12 @@
 //! Our budgets beside published ones: computed once for a version of the product, then kept.
 
 use anyhow::Result;
-use bytes::Bytes;
 use compute::check::CheckRow;
 use contract::digest::Digest;
 use contract::key::ObjectKey;
 use contract::manifest::Manifest;
 use serde::{Deserialize, Serialize};
-use storage::Store;
+use storage::{StorageError, Store, document};
 use tile_server::backend::Check;
 
 use crate::cli::Settings;
@@ -64,9 +63,7 @@ pub(crate) async fn compare(
         rows,
         note: compute::published::CITATION.to_owned(),
     };
-    store
-        .put_new(&key, Bytes::from(serde_json::to_vec(&comparison)?))
-        .await?;
+    document::put_over(store, &key, &comparison).await?;
     Ok(comparison)
 }
 
@@ -85,9 +82,12 @@ fn key(flux: &Manifest) -> ObjectKey {
 }
 
 async fn read(store: &Store, key: &ObjectKey) -> Result<Option<Comparison>> {
-    match store.get(key).await {
-        Ok(content) => Ok(Some(serde_json::from_slice(&content)?)),
-        Err(error) if error.is_not_found() => Ok(None),
+    match document::get(store, key).await {
+        Ok(kept) => Ok(kept),
+        Err(error @ StorageError::Damaged { .. }) => {
+            tracing::warn!(%error, "published values are compared again");
+            Ok(None)
+        }
         Err(error) => Err(error.into()),
     }
 }
