@@ -7,6 +7,7 @@ mod has_data;
 mod lists;
 mod region_sums;
 mod series_at;
+mod sound;
 
 use std::sync::Arc;
 
@@ -22,6 +23,7 @@ pub fn scalar_functions(objects: &Objects) -> Vec<Arc<ScalarUDF>> {
         AsyncScalarUDF::new(Arc::new(region_sums)).into_scalar_udf(),
         ScalarUDF::from(has_data::HasData::new()),
         ScalarUDF::from(series_at::SeriesAt::new()),
+        ScalarUDF::from(sound::Sound::new()),
     ]
     .map(Arc::new)
     .to_vec()

@@ -11,8 +11,9 @@ use datafusion::arrow::datatypes::Float32Type;
 use serde::{Deserialize, Serialize};
 
 use crate::derive::{CellCounts, counts_at_cell};
+use crate::scan::{self, Layout};
 use crate::session::QueryContext;
-use crate::{ComputeError, Engine, catalog, scan};
+use crate::{ComputeError, Engine, catalog};
 
 /// The cell that a place lies in.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -159,26 +160,25 @@ async fn segment_values(
         .replace("$steps", &segment.steps.to_string())
         .replace("$block", &block.to_string());
     let job = Digest::of_json(&("series", &segment.series, &sql));
-    let batches = engine
-        .answer(job, |context| ask(engine, context, &segment.series, &sql))
-        .await?;
-    let rows: Vec<_> = batches
-        .iter()
-        .filter(|batch| batch.num_rows() > 0)
-        .collect();
-    match rows[..] {
-        [batch] if batch.num_rows() == 1 => Ok(batch
-            .column(0)
-            .as_list::<i32>()
-            .value(0)
-            .as_primitive::<Float32Type>()
-            .values()
-            .to_vec()),
-        _ => Err(ComputeError::inconsistent(
-            segment.series.to_string(),
-            format!("no single block {block}"),
-        )),
-    }
+    let answered = async {
+        let asked = engine.answer(job, |context| ask(engine, context, &segment.series, &sql));
+        only_row(&asked.await?).ok_or_else(|| {
+            let reason = format!("no single block {block}");
+            ComputeError::inconsistent(segment.series.to_string(), reason)
+        })
+    };
+    scan::or_damaged(engine.store(), &[&segment.series], answered.await).await
+}
+
+/// The values of an answer of one row.
+fn only_row(batches: &[RecordBatch]) -> Option<Vec<f32>> {
+    let mut with_rows = batches.iter().filter(|batch| batch.num_rows() > 0);
+    let batch = with_rows.next().filter(|batch| batch.num_rows() == 1)?;
+    let values = batch.column(0).as_list::<i32>().value(0);
+    with_rows
+        .next()
+        .is_none()
+        .then(|| values.as_primitive::<Float32Type>().values().to_vec())
 }
 
 async fn ask(
@@ -187,8 +187,8 @@ async fn ask(
     series: &ObjectKey,
     sql: &str,
 ) -> Result<Vec<RecordBatch>, ComputeError> {
-    let (store, schema) = (engine.store(), &storage::series::SCHEMA);
-    scan::register(&context, "series", store, &[series], schema)?;
+    let store = engine.store();
+    scan::register(&context, "series", store, &[series], Layout::Series).await?;
     let failed = || ComputeError::engine("reading a series");
     let query = context.sql(sql).await.map_err(failed())?;
     query.collect().await.map_err(failed())

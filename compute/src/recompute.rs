@@ -42,6 +42,8 @@ pub struct Request {
     pub what: Vec<What>,
     /// Whether also what is there and right by its name is computed again and compared.
     pub is_forced: bool,
+    /// Whether what is there is read first, and taken for missing if it is damaged.
+    pub is_verified: bool,
 }
 
 /// Why something is computed.

@@ -16,6 +16,7 @@ pub mod flow;
 pub mod grid;
 pub mod job;
 pub mod key;
+pub mod kind;
 pub mod manifest;
 pub mod moment;
 pub mod notice;

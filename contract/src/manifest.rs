@@ -13,9 +13,9 @@ use crate::product::ProductId;
 use crate::quantity::Quantity;
 use crate::time::{Period, TimeMs};
 
-/// Version of the manifest's JSON. Those since [`OLDEST_MANIFEST_SCHEMA`] are read too.
+/// Version of the manifest's JSON as it is written. Those since [`OLDEST_MANIFEST_SCHEMA`] are read too.
 ///
-/// 2: the order of the notices that brought the files.
+/// 2: the order of the notices that brought the files; a manifest is sealed when it is stored.
 pub const MANIFEST_SCHEMA: u32 = 2;
 /// Oldest version that is read.
 pub const OLDEST_MANIFEST_SCHEMA: u32 = 1;

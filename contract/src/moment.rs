@@ -254,7 +254,11 @@ mod tests {
                 after: after.map(counts),
             })
         };
-        assert_eq!(with_counts("2000-01-01"), None, "nothing is accumulated yet");
+        assert_eq!(
+            with_counts("2000-01-01"),
+            None,
+            "nothing is accumulated yet"
+        );
         assert_eq!(with_counts("2000-01-10"), both(None, Some("a")));
         assert_eq!(with_counts("2000-02-10"), both(Some("a"), Some("b")));
         assert_eq!(with_counts("2000-03-10"), both(Some("b"), None));

@@ -28,7 +28,7 @@ pub(crate) use services::{
 };
 pub(crate) use show::settings as shown_settings;
 pub(crate) use surroundings::Surroundings;
-pub(crate) use upkeep::{Gc, Recompute, RecomputeWhat, Survey};
+pub(crate) use upkeep::{Gc, Recompute, RecomputeWhat, Survey, Verify};
 
 /// See and count the ocean's carbon.
 ///
@@ -150,6 +150,8 @@ pub(crate) enum Command {
     Observations(Observations),
     /// Make anew what was derived from a product, where it is stale or missing.
     Recompute(Recompute),
+    /// Read every stored object and compare it with its name or seal; the exit code is 1 if one is damaged or missing.
+    Verify(Verify),
     /// Remove objects that no kept version needs.
     Gc(Gc),
     /// Show what would become of files: landed with which profile, or refused and why. Nothing is stored.

@@ -4,6 +4,7 @@
 //! newest is read again. Everything it names is durable before. A crash before the publication leaves objects that
 //! nothing names; the same files make the same objects again and land once.
 
+mod mend;
 mod merge;
 mod replace;
 mod segments;
@@ -24,6 +25,7 @@ use crate::rejection::Rejection;
 use crate::superseded;
 use merge::{Change, Merged};
 
+pub(crate) use mend::mend;
 pub(crate) use merge::is_later_or_same;
 pub(crate) use replace::replace;
 

@@ -1,7 +1,6 @@
-//! [`CheckedGrid`] in, [`EncodedGrid`] out: the bytes of a frame and the key that its digest gives it.
+//! [`CheckedGrid`] in, [`EncodedGrid`] out: the bytes of a frame and the key that the digest of its values gives it.
 
 use bytes::Bytes;
-use contract::digest::Digest;
 use contract::grid::Grid;
 use contract::key::ObjectKey;
 use contract::product::ProductId;
@@ -26,11 +25,10 @@ pub(crate) fn run(
 ) -> Result<EncodedGrid, IngestError> {
     let frame = storage::frames::encode(grid, &checked.values, checked.period)
         .map_err(IngestError::storage("encode a frame"))?;
-    let key = ObjectKey::frame(product, &Digest::of(&frame));
     Ok(EncodedGrid {
         period: checked.period,
-        key,
-        frame,
+        key: ObjectKey::frame(product, &frame.values_sha256),
+        frame: frame.content,
         valid_cells: checked.valid_cells,
     })
 }

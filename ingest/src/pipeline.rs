@@ -6,7 +6,8 @@ use std::path::Path;
 
 use contract::digest::Digest;
 use contract::event::RejectReason;
-use contract::manifest::ManifestId;
+use contract::key::ObjectKey;
+use contract::manifest::{Manifest, ManifestId};
 use contract::notice::NoticeOrder;
 use contract::time::Period;
 use storage::{StorageError, Store, manifests};
@@ -145,11 +146,16 @@ impl Pipeline<'_> {
         self.progress.stage(path, Stage::Plan, 0, 0);
         let planned = plan::run(inspected, wish, self.settings);
         let planned = metrics.timed("plan", planned).await?;
-        if let Some(landed) = self.nothing_to_do(&planned, wish, place).await? {
+        let newest = self.newest(&planned).await?;
+        let nothing_to_do = newest
+            .as_ref()
+            .and_then(|newest| nothing_to_do(newest, &planned, wish, place));
+        // Also of a file that is there: what is stored of it is compared, and replaced if it is damaged.
+        put::raw(self.store, &planned.target.product, &planned.raw).await?;
+        if let Some(landed) = nothing_to_do {
             return Ok(landed);
         }
-        put::raw(self.store, &planned.target.product, &planned.raw).await?;
-        let (granule, reading) = self.grids(path, planned).await?;
+        let (granule, reading) = self.grids(path, planned, newest.as_ref()).await?;
         match reading.put(self.store, &granule.target.product).await {
             // A program that reads otherwise under the same version noted it: the file lands all the same.
             Err(error @ StorageError::Conflict { .. }) => {
@@ -171,7 +177,8 @@ impl Pipeline<'_> {
         self.progress.stage(shown, Stage::Inspect, 0, 0);
         let inspected = inspect::run(raw, self.settings).await?;
         let planned = plan::run(inspected, wish, self.settings).await?;
-        let (granule, reading) = self.grids(shown, planned).await?;
+        let newest = self.newest(&planned).await?;
+        let (granule, reading) = self.grids(shown, planned, newest.as_ref()).await?;
         reading
             .put(self.store, &granule.target.product)
             .await
@@ -184,10 +191,11 @@ impl Pipeline<'_> {
         &self,
         path: &Path,
         mut planned: PlannedGranule,
+        newest: Option<&Manifest>,
     ) -> Result<(StoredGranule, Reading), Stop> {
         let mut grids = Vec::new();
         for index in 0..planned.steps.len() {
-            grids.extend(self.step(path, &mut planned, index).await?);
+            grids.extend(self.step(path, &mut planned, index, newest).await?);
         }
         planned.raw.check_unchanged()?;
         if grids.is_empty() {
@@ -226,6 +234,7 @@ impl Pipeline<'_> {
         path: &Path,
         planned: &mut PlannedGranule,
         index: usize,
+        newest: Option<&Manifest>,
     ) -> Result<Option<StoredGrid>, Stop> {
         let (number, count) = (index + 1, planned.steps.len());
         let tell = |stage| self.progress.stage(path, stage, number, count);
@@ -261,52 +270,62 @@ impl Pipeline<'_> {
             return Ok(None);
         };
         tell(Stage::Put);
-        let put = async { Ok(put::run(self.store, encoded, &planned.raw).await?) };
+        let there = newest.and_then(|newest| frame_of(newest, encoded.period));
+        let put = async { Ok(put::run(self.store, encoded, &planned.raw, &grid, there).await?) };
         self.metrics.timed("put", put).await.map(Some)
     }
 
-    /// Is this very file in the product, or are files of later notices in all of its places? With a profile of the
-    /// caller's own it is decoded all the same, since the same bytes may mean other values by it.
-    async fn nothing_to_do(
-        &self,
-        planned: &PlannedGranule,
-        wish: Wish<'_>,
-        place: Option<NoticeOrder>,
-    ) -> Result<Option<Prepared>, IngestError> {
-        if wish.profile.is_some() || planned.steps.is_empty() {
-            return Ok(None);
-        }
+    /// The newest version of the product that a file is of.
+    async fn newest(&self, planned: &PlannedGranule) -> Result<Option<Manifest>, IngestError> {
         let newest = manifests::latest(self.store, &planned.target.product).await;
-        let Some(newest) = newest.map_err(IngestError::storage("read the newest manifest"))? else {
-            return Ok(None);
-        };
-        if newest.quantity != planned.target.quantity || newest.grid != planned.mapping.grid {
-            return Ok(None);
-        }
-        let raw_sha256 = planned.raw.sha256;
-        let periods: Vec<Period> = planned.steps.iter().map(|s| s.period).collect();
-        let orders = newest.notice_orders();
-        let mut is_superseded = false;
-        for period in &periods {
-            match newest.step_of(*period) {
-                Some(index) if newest.steps[index].raw_sha256 == raw_sha256 => {}
-                Some(index) if is_later_or_same(orders[index], place) => is_superseded = true,
-                _ => return Ok(None),
-            }
-        }
-        let manifest = newest.id();
-        Ok(Some(if is_superseded {
-            Prepared::Superseded {
-                raw_sha256,
-                manifest,
-                periods,
-            }
-        } else {
-            Prepared::AlreadyLanded {
-                raw_sha256,
-                manifest,
-                periods,
-            }
-        }))
+        newest.map_err(IngestError::storage("read the newest manifest"))
     }
+}
+
+/// Is this very file in the product, or are files of later notices in all of its places? With a profile of the caller's
+/// own it is decoded all the same, since the same bytes may mean other values by it.
+fn nothing_to_do(
+    newest: &Manifest,
+    planned: &PlannedGranule,
+    wish: Wish<'_>,
+    place: Option<NoticeOrder>,
+) -> Option<Prepared> {
+    if wish.profile.is_some()
+        || planned.steps.is_empty()
+        || newest.quantity != planned.target.quantity
+        || newest.grid != planned.mapping.grid
+    {
+        return None;
+    }
+    let raw_sha256 = planned.raw.sha256;
+    let periods: Vec<Period> = planned.steps.iter().map(|s| s.period).collect();
+    let orders = newest.notice_orders();
+    let mut is_superseded = false;
+    for period in &periods {
+        match newest.step_of(*period) {
+            Some(index) if newest.steps[index].raw_sha256 == raw_sha256 => {}
+            Some(index) if is_later_or_same(orders[index], place) => is_superseded = true,
+            _ => return None,
+        }
+    }
+    let manifest = newest.id();
+    Some(if is_superseded {
+        Prepared::Superseded {
+            raw_sha256,
+            manifest,
+            periods,
+        }
+    } else {
+        Prepared::AlreadyLanded {
+            raw_sha256,
+            manifest,
+            periods,
+        }
+    })
+}
+
+/// The frame that a version has for a period.
+fn frame_of(manifest: &Manifest, period: Period) -> Option<&ObjectKey> {
+    let index = manifest.step_of(period)?;
+    Some(&manifest.steps[index].frame)
 }

@@ -7,7 +7,7 @@ use contract::manifest::Step;
 use contract::notice::NoticeOrder;
 use contract::product::ProductId;
 use contract::topic::Origin;
-use storage::Store;
+use storage::{Store, frames};
 
 use crate::encode::EncodedGrid;
 use crate::error::IngestError;
@@ -48,11 +48,13 @@ pub(crate) async fn raw(
     Ok(())
 }
 
-/// Stores one frame.
+/// Stores one frame, unless the frame that its product has for the period, if it has one, holds the same values.
 pub(crate) async fn run(
     store: &Store,
     encoded: EncodedGrid,
     raw: &RawGranule,
+    grid: &Grid,
+    there: Option<&ObjectKey>,
 ) -> Result<StoredGrid, IngestError> {
     let EncodedGrid {
         period,
@@ -60,15 +62,23 @@ pub(crate) async fn run(
         frame,
         valid_cells,
     } = encoded;
-    store
-        .put_new(&key, frame)
-        .await
-        .map_err(IngestError::storage("store a frame"))?;
+    let settled = match there {
+        Some(there) => frames::settle(store, there, &key, grid)
+            .await
+            .map_err(IngestError::storage("compare a frame with the one before"))?,
+        None => key.clone(),
+    };
+    if settled == key {
+        store
+            .put_new(&key, frame)
+            .await
+            .map_err(IngestError::storage("store a frame"))?;
+    }
     let (raw_sha256, origin) = (raw.sha256, raw.file_name.clone());
     Ok(StoredGrid {
         step: Step {
             period,
-            frame: key,
+            frame: settled,
             raw_sha256,
             origin,
             valid_cells,

@@ -107,7 +107,10 @@ impl Frame {
                 *lacking = MISSING;
             }
         }
-        self.lacking = lacking.iter().any(|lacking| *lacking > 0.0).then_some(lacking);
+        self.lacking = lacking
+            .iter()
+            .any(|lacking| *lacking > 0.0)
+            .then_some(lacking);
         self
     }
 

@@ -203,7 +203,10 @@ impl Source {
                 self.frame(grid, &domain, key, wanted).await?
             }
             // All that is accumulated until the end of the first step is of that step.
-            None => self.nothing(grid, &domain, part(&moment.domain, &counts.after)).await?,
+            None => {
+                self.nothing(grid, &domain, part(&moment.domain, &counts.after))
+                    .await?
+            }
         };
         let (after, weight) = match &moment.after {
             Some(After { frame, weight }) => {

@@ -15,9 +15,12 @@ use contract::chunk::{Window, frame_chunks};
 use contract::digest::Digest;
 use contract::grid::Grid;
 use contract::key::ObjectKey;
+use contract::kind::Vouched;
 use contract::product::ProductId;
 use contract::time::{Period, TimeMs};
 
+use crate::frames::shape_only;
+use crate::sound::damage;
 use crate::{StorageError, Store, parquet_table};
 
 const CHUNKS_PER_GROUP: usize = 64;
@@ -91,7 +94,9 @@ impl Contributed {
         let period_ms = self.period_ms();
         let share = |&milliseconds: &i64| (period_ms - milliseconds) as f64 / period_ms as f64;
         let cells = self.milliseconds.iter();
-        cells.map(|milliseconds| share(milliseconds) as f32).collect()
+        cells
+            .map(|milliseconds| share(milliseconds) as f32)
+            .collect()
     }
 
     fn period_ms(&self) -> i64 {
@@ -116,7 +121,9 @@ fn encode(grid: &Grid, counts: &Contributed) -> Result<Bytes, StorageError> {
     for window in &windows {
         for cell in window.cell_indices(grid) {
             steps.values().append_value(counts.steps[cell]);
-            milliseconds.values().append_value(counts.milliseconds[cell]);
+            milliseconds
+                .values()
+                .append_value(counts.milliseconds[cell]);
         }
         steps.append(true);
         milliseconds.append(true);
@@ -136,48 +143,62 @@ fn encode(grid: &Grid, counts: &Contributed) -> Result<Bytes, StorageError> {
         ],
     )
     .map_err(|e| StorageError::damaged("counts to write", e))?;
-    parquet_table::encode(&batch, CHUNKS_PER_GROUP)
+    parquet_table::encode(&batch, CHUNKS_PER_GROUP, &[grid.rows, grid.cols])
 }
 
-fn decode(object: &str, content: Bytes, grid: &Grid) -> Result<Contributed, StorageError> {
-    let damaged = |reason: &str| StorageError::damaged(object, reason);
-    let batch = parquet_table::decode(object, content, &SCHEMA)?;
-    let windows = frame_chunks(grid);
+/// Counts of what is named by its numbers; on the grid that they say, which must be `grid` where that is known.
+fn decode(
+    key: &ObjectKey,
+    content: Bytes,
+    grid: Option<&Grid>,
+) -> Result<Contributed, StorageError> {
+    let damaged = |reason: &str| damage::found(key, reason);
+    let table = parquet_table::decode(key, content, &SCHEMA)?;
+    let [rows, cols] = table.shape[..] else {
+        return Err(damaged("it does not say how large its grid is"));
+    };
+    if grid.is_some_and(|grid| (grid.rows, grid.cols) != (rows, cols)) {
+        return Err(damaged("it is of another grid than its product"));
+    }
+    let (batch, grid) = (&table.batch, shape_only(rows, cols));
+    let windows = frame_chunks(&grid);
     let row_count = batch.num_rows();
     if row_count != windows.len() || row_count == 0 {
         return Err(damaged("it has other chunks than its grid"));
     }
-    let (chunks, of_steps) = (
-        parquet_table::numbers(&batch, 0),
-        parquet_table::numbers(&batch, 3).value(0),
-    );
     let time = |column: usize| {
-        let times = batch.column(column).as_any();
-        let times: &arrow::array::PrimitiveArray<TimestampMillisecondType> =
-            times.downcast_ref().expect("the schema is checked in decode");
-        TimeMs::new(times.value(0)).map_err(|e| StorageError::damaged(object, e))
+        let times = parquet_table::numbers::<TimestampMillisecondType>(batch, column);
+        TimeMs::new(times.value(0)).map_err(|e| damage::found(key, e))
     };
-    let period = Period::new(time(1)?, time(2)?).map_err(|e| StorageError::damaged(object, e))?;
+    let period = Period::new(time(1)?, time(2)?).map_err(|e| damage::found(key, e))?;
     let mut counts = Contributed {
-        of_steps,
-        ..Contributed::nothing(grid, period.start)
+        of_steps: parquet_table::numbers::<UInt32Type>(batch, 3).value(0),
+        ..Contributed::nothing(&grid, period.start)
     };
     counts.period = period;
+    let chunks = parquet_table::numbers::<UInt32Type>(batch, 0);
     for row in 0..row_count {
-        let steps = parquet_table::row_values::<UInt32Type>(&batch, 4, row);
-        let milliseconds = parquet_table::row_values::<Int64Type>(&batch, 5, row);
-        let fits = |window: &&Window| {
-            [steps.len(), milliseconds.len()] == [window.cell_count(); 2]
-        };
+        let steps = parquet_table::row_values::<UInt32Type>(batch, 4, row);
+        let milliseconds = parquet_table::row_values::<Int64Type>(batch, 5, row);
+        let fits = |window: &&Window| [steps.len(), milliseconds.len()] == [window.cell_count(); 2];
         let window = windows.get(chunks.value(row) as usize).filter(fits);
         let window = window.ok_or_else(|| damaged("a chunk does not fit its grid"))?;
         let numbers = steps.values().iter().zip(milliseconds.values());
-        for (cell, (steps, milliseconds)) in window.cell_indices(grid).zip(numbers) {
+        for (cell, (steps, milliseconds)) in window.cell_indices(&grid).zip(numbers) {
             counts.steps[cell] = *steps;
             counts.milliseconds[cell] = *milliseconds;
         }
     }
-    Ok(counts)
+    if key.vouches() == Vouched::Values(counts.digest()) {
+        Ok(counts)
+    } else {
+        Err(damaged("its numbers are not those of its name"))
+    }
+}
+
+/// Has an object these numbers that its name says?
+pub(crate) fn check(key: &ObjectKey, content: Bytes) -> Result<(), StorageError> {
+    decode(key, content, None).map(|_counts| ())
 }
 
 /// Reads stored counts, which must be those that their name says.
@@ -186,13 +207,7 @@ pub async fn read(
     key: &ObjectKey,
     grid: &Grid,
 ) -> Result<Contributed, StorageError> {
-    let counts = decode(key.as_str(), store.get(key).await?, grid)?;
-    if key.as_str().contains(&counts.digest().to_string()) {
-        Ok(counts)
-    } else {
-        let reason = "its numbers are not those of its name";
-        Err(StorageError::damaged(key.as_str(), reason))
-    }
+    decode(key, store.get(key).await?, Some(grid))
 }
 
 /// Stores counts under the digest of their numbers.
@@ -208,12 +223,8 @@ pub async fn write(
         return Err(StorageError::damaged("counts to write", reason));
     }
     let key = ObjectKey::contributed(product, &counts.digest());
-    match store.put_new(&key, encode(grid, counts)?).await {
-        Ok(_) => Ok(key),
-        // Another version of the encoder wrote the same numbers; or what is there is damaged, which reading says.
-        Err(StorageError::Conflict { .. }) => read(store, &key, grid).await.map(|_same| key),
-        Err(e) => Err(e),
-    }
+    store.put_new(&key, encode(grid, counts)?).await?;
+    Ok(key)
 }
 
 #[cfg(test)]
@@ -255,14 +266,20 @@ mod tests {
         let (store, product) = (Store::memory(), "p".parse().unwrap());
         let key = write(&store, &product, &GRID, &counts()).await.unwrap();
         assert_eq!(read(&store, &key, &GRID).await.unwrap(), counts());
-        assert_eq!(write(&store, &product, &GRID, &counts()).await.unwrap(), key);
+        assert_eq!(
+            write(&store, &product, &GRID, &counts()).await.unwrap(),
+            key
+        );
         let mut other = counts();
         other.steps[7] += 1;
         let other_key = write(&store, &product, &GRID, &other).await.unwrap();
         assert_ne!(other_key, key);
         // Whole numbers under another name are somebody else's.
         let wrong = ObjectKey::contributed(&product, &Digest::of(b"wrong"));
-        store.put_new(&wrong, store.get(&key).await.unwrap()).await.unwrap();
+        store
+            .put_new(&wrong, store.get(&key).await.unwrap())
+            .await
+            .unwrap();
         let refused = read(&store, &wrong, &GRID).await.unwrap_err().to_string();
         assert!(refused.contains(wrong.as_str()), "{refused}");
         let narrower = Grid { cols: 129, ..GRID };

@@ -46,11 +46,7 @@ impl Analyses {
     }
 
     /// The values of a cell, one for each step, stored unit.
-    pub async fn point(
-        &self,
-        layer: &Layer,
-        cell: RowCol,
-    ) -> Result<Vec<PointStep>, ServerError> {
+    pub async fn point(&self, layer: &Layer, cell: RowCol) -> Result<Vec<PointStep>, ServerError> {
         let _pass = self
             .gate
             .enter()

@@ -56,10 +56,17 @@ pub(super) async fn budget_of(
     let mut counted = Counted::new(engine.store(), manifest);
     let areas = storage::weights::read(engine.store(), &key).await?;
     for row in &mut answer.rows {
-        let (start, end) = (counted.until(row.start).await?, counted.until(row.end).await?);
+        let (start, end) = (
+            counted.until(row.start).await?,
+            counted.until(row.end).await?,
+        );
         row.completeness = start.zip(end).map(|(start, end)| {
             let row_ms = row.end.ms() - row.start.ms();
-            let within: Vec<i64> = end.iter().zip(&start).map(|(end, start)| end - start).collect();
+            let within: Vec<i64> = end
+                .iter()
+                .zip(&start)
+                .map(|(end, start)| end - start)
+                .collect();
             completeness(manifest, &areas, &within, row_ms)
         });
     }

@@ -8,23 +8,27 @@ use contract::key::ObjectKey;
 use contract::manifest::Step;
 use contract::time::{Period, TimeMs};
 use datafusion::arrow::array::{AsArray as _, RecordBatch};
-use datafusion::arrow::datatypes::{Decimal128Type, TimestampMillisecondType};
+use datafusion::arrow::datatypes::{Decimal128Type, Int64Type, TimestampMillisecondType};
 
 use super::rows::StepSum;
 use super::sums::Measure;
 use crate::region::loaded::RegionWeights;
+use crate::scan::{self, Layout};
 use crate::session::QueryContext;
-use crate::{ComputeError, Engine, scan};
+use crate::{ComputeError, Engine};
 
 /// One row a step: the seconds are those of the whole step; parts of steps are shared out afterwards, exactly.
 ///
 /// Weights are no table: a join would hold them beside every chunk, and under Ballista it would send every value to
 /// another part of the query. What is asked of the frames is which chunks to read.
+///
+/// Chunks are counted: one that a damaged footer hides from the engine must not be missing from a sum in silence.
 const STEP_SUMS: &str = "
     SELECT period_start,
            period_end,
            SUM(get_field(sums, 'mass')) AS mass,
-           SUM(get_field(sums, 'area')) AS area
+           SUM(get_field(sums, 'area')) AS area,
+           SUM(get_field(sums, 'chunks')) AS chunks
     FROM (SELECT period_start,
                  period_end,
                  region_sums(\"values\", chunk, $seconds, '$weights') AS sums
@@ -58,9 +62,53 @@ pub(super) async fn asked(
     let frames: Vec<&ObjectKey> = steps.iter().map(|step| &step.frame).collect();
     let job = Digest::of_json(&("sums", measure, &frames, weights));
     let ask = |context| ask(engine, context, &frames, weights, measure);
+    let answered = async {
+        let answer = engine.answer(job, ask).await?;
+        in_order(steps, &answer)
+    };
+    let mut read = frames.clone();
+    read.push(weights);
+    scan::or_damaged(engine.store(), &read, answered.await).await
+}
+
+/// An answer of the engine: rows, and of how many chunks each must be.
+struct Answer {
+    batches: Vec<RecordBatch>,
+    chunk_count: usize,
+}
+
+async fn ask(
+    engine: &Engine,
+    context: QueryContext,
+    frames: &[&ObjectKey],
+    weights: &ObjectKey,
+    measure: Measure,
+) -> Result<Answer, ComputeError> {
+    let store = engine.store();
+    scan::register(&context, "frames", store, frames, Layout::Frames).await?;
+    let address = store.sql_url(weights).to_string();
+    let failed = || ComputeError::engine("summing over a region");
+    let region = engine.objects().weights(&address).await.map_err(failed())?;
+    let sql = sql(measure, &region, &address);
+    let query = context.sql(&sql).await.map_err(failed())?;
+    Ok(Answer {
+        batches: query.collect().await.map_err(failed())?,
+        chunk_count: region.chunk_count(),
+    })
+}
+
+/// The sums of each of these steps.
+fn in_order(steps: &[&Step], answer: &Answer) -> Result<Vec<StepSum>, ComputeError> {
     let mut sums = BTreeMap::new();
-    for batch in &engine.answer(job, ask).await? {
-        for sum in sums_of(batch)? {
+    for batch in &answer.batches {
+        for (sum, chunk_count) in sums_of(batch)? {
+            if usize::try_from(chunk_count) != Ok(answer.chunk_count) {
+                let reason = format!(
+                    "the engine summed {chunk_count} chunks of {}, the region touches {}",
+                    sum.period, answer.chunk_count
+                );
+                return Err(ComputeError::inconsistent("sums", reason));
+            }
             sums.insert(sum.period.start, sum);
         }
     }
@@ -77,24 +125,8 @@ pub(super) async fn asked(
     })
 }
 
-async fn ask(
-    engine: &Engine,
-    context: QueryContext,
-    frames: &[&ObjectKey],
-    weights: &ObjectKey,
-    measure: Measure,
-) -> Result<Vec<RecordBatch>, ComputeError> {
-    let store = engine.store();
-    scan::register(&context, "frames", store, frames, &storage::frames::SCHEMA)?;
-    let address = store.sql_url(weights).to_string();
-    let failed = || ComputeError::engine("summing over a region");
-    let region = engine.objects().weights(&address).await.map_err(failed())?;
-    let sql = sql(measure, &region, &address);
-    let query = context.sql(&sql).await.map_err(failed())?;
-    query.collect().await.map_err(failed())
-}
-
-fn sums_of(batch: &RecordBatch) -> Result<Vec<StepSum>, ComputeError> {
+/// Sums of steps, each with the number of chunks in it.
+fn sums_of(batch: &RecordBatch) -> Result<Vec<(StepSum, i64)>, ComputeError> {
     let time = |column: usize| {
         batch
             .column(column)
@@ -102,17 +134,19 @@ fn sums_of(batch: &RecordBatch) -> Result<Vec<StepSum>, ComputeError> {
     };
     let decimal = |column: usize| batch.column(column).as_primitive::<Decimal128Type>();
     let (starts, ends, masses, areas) = (time(0), time(1), decimal(2), decimal(3));
+    let chunk_counts = batch.column(4).as_primitive::<Int64Type>();
     (0..batch.num_rows())
         .map(|row| {
             let period = Period::new(
                 TimeMs::new(starts.value(row))?,
                 TimeMs::new(ends.value(row))?,
             )?;
-            Ok(StepSum {
+            let sum = StepSum {
                 period,
                 mass_steps: masses.value(row),
                 area_steps: areas.value(row),
-            })
+            };
+            Ok((sum, chunk_counts.value(row)))
         })
         .collect()
 }

@@ -44,7 +44,10 @@ pub async fn counts_at_cell(
     let is_same = steps.iter().map(|step| step.period);
     if !is_same.eq(manifest.steps.iter().map(|step| step.period)) {
         let reason = format!("its steps are not those of {}", source.id());
-        return Err(ComputeError::inconsistent(manifest.id().to_string(), reason));
+        return Err(ComputeError::inconsistent(
+            manifest.id().to_string(),
+            reason,
+        ));
     }
     let (mut had_data, mut with_data_ms) = (0, 0);
     let counts = |(index, (step, value)): (usize, (&super::SourceStep<'_>, &f32))| {
@@ -60,5 +63,7 @@ pub async fn counts_at_cell(
         }
     };
     let values = &values[skipped..];
-    Ok(Some(steps.iter().zip(values).enumerate().map(counts).collect()))
+    Ok(Some(
+        steps.iter().zip(values).enumerate().map(counts).collect(),
+    ))
 }

@@ -41,9 +41,7 @@ impl<'a> Prior<'a> {
             return Ok(nothing);
         };
         let equal = |(old, new): &(&Step, &SourceStep<'_>)| {
-            old.raw_sha256 == new.made_of
-                && old.period == new.period
-                && old.contributed.is_some()
+            old.raw_sha256 == new.made_of && old.period == new.period && old.contributed.is_some()
         };
         let step_count = latest.steps.iter().zip(steps).take_while(equal).count();
         let other_domain = if latest.domain == *domain_now {

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use contract::chunk::{Window, frame_chunks};
 use contract::digest::Digest;
 use contract::grid::Grid;
+use contract::key::ObjectKey;
 use datafusion::arrow::array::{AsArray as _, BooleanArray, RecordBatch};
 use datafusion::arrow::datatypes::{Int64Type, TimestampMillisecondType, UInt32Type};
 use datafusion::error::DataFusionError;
@@ -13,8 +14,9 @@ use futures::TryStreamExt as _;
 
 use super::source::SourceStep;
 use crate::budget::running::{add_sums, column_kg_m2};
+use crate::scan::{self, Layout};
 use crate::session::QueryContext;
-use crate::{ComputeError, Engine, scan};
+use crate::{ComputeError, Engine};
 
 /// One row a chunk and step: the sums after it, and which cells it adds to. Seconds are counted from the start of
 /// accumulation on.
@@ -72,7 +74,8 @@ pub(super) async fn accumulate_segment(
         }
         segment.finish()
     };
-    engine.answer(job, columns).await
+    let answered = engine.answer(job, columns).await;
+    scan::or_damaged(engine.store(), &frames_of(run), answered).await
 }
 
 /// The exact sums after the last step of a run, `[row, col]`, kg m⁻² in steps of 10⁻¹⁵.
@@ -101,7 +104,12 @@ pub(super) async fn sums_after(
         }
         all_chunks(taken, windows.len()).map(|()| sums)
     };
-    engine.answer(job, sums).await
+    let answered = engine.answer(job, sums).await;
+    scan::or_damaged(engine.store(), &frames_of(run), answered).await
+}
+
+fn frames_of<'a>(run: &[SourceStep<'a>]) -> Vec<&'a ObjectKey> {
+    run.iter().map(|step| &step.step.frame).collect()
 }
 
 fn failed() -> impl FnOnce(DataFusionError) -> ComputeError {
@@ -120,9 +128,8 @@ async fn query(
     sql: &str,
     run: &[SourceStep<'_>],
 ) -> Result<SendableRecordBatchStream, ComputeError> {
-    let frames: Vec<_> = run.iter().map(|step| &step.step.frame).collect();
-    let (store, schema) = (engine.store(), &storage::frames::SCHEMA);
-    scan::register(context, "frames", store, &frames, schema)?;
+    let (store, frames) = (engine.store(), frames_of(run));
+    scan::register(context, "frames", store, &frames, Layout::Frames).await?;
     let sql = sql.replace("$start", &run[0].period.start.ms().to_string());
     let query = context.sql(&sql).await.map_err(failed())?;
     query.execute_stream().await.map_err(failed())

@@ -7,7 +7,7 @@ use contract::grid::Grid;
 use contract::key::ObjectKey;
 use contract::region::Region;
 use serde::Serialize;
-use storage::Store;
+use storage::{StorageError, Store};
 
 use super::box_cover::{self, Bounds};
 use super::polygon_cover::Band;
@@ -21,6 +21,7 @@ const METHOD: u32 = 1;
 #[derive(Serialize)]
 struct Job<'a> {
     method: u32,
+    layout: u32,
     grid: &'a Grid,
     region: &'a Region,
     earth: Earth,
@@ -76,13 +77,15 @@ pub fn compute(
 pub fn key(grid: &Grid, region: &Region, earth: Earth) -> ObjectKey {
     ObjectKey::weights(&Digest::of_json(&Job {
         method: METHOD,
+        layout: storage::weights::LAYOUT,
         grid,
         region,
         earth,
     }))
 }
 
-/// The key of stored weights, which are computed if nobody did before; none if the region lies outside the grid.
+/// The key of stored weights, which are computed if nobody did before or if they are damaged; none if the region lies
+/// outside the grid.
 pub async fn stored(
     store: &Store,
     grid: &Grid,
@@ -90,9 +93,15 @@ pub async fn stored(
     earth: Earth,
 ) -> Result<Option<ObjectKey>, ComputeError> {
     let key = key(grid, region, earth);
-    if store.exists(&key).await? {
-        return Ok(Some(key));
-    }
+    let is_damaged = match storage::weights::check(store, &key).await {
+        Ok(()) => return Ok(Some(key)),
+        Err(e) if e.is_not_found() => false,
+        Err(error @ StorageError::Damaged { .. }) => {
+            tracing::warn!(%error, "weights are computed again");
+            true
+        }
+        Err(e) => return Err(e.into()),
+    };
     let (grid, region) = (*grid, region.clone());
     let chunks = tokio::task::spawn_blocking(move || compute(&grid, &region, earth))
         .await
@@ -100,7 +109,11 @@ pub async fn stored(
     if chunks.is_empty() {
         return Ok(None);
     }
-    storage::weights::write(store, &key, &chunks).await?;
+    if is_damaged {
+        storage::weights::write_over(store, &key, &chunks).await?;
+    } else {
+        storage::weights::write(store, &key, &chunks).await?;
+    }
     Ok(Some(key))
 }
 

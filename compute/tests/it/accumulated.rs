@@ -167,7 +167,11 @@ async fn a_sum_says_which_steps_and_how_much_time_it_holds() {
         assert_eq!(counts.steps, [whole.0, gapped.0, 0]);
         assert_eq!(counts.milliseconds, [whole.1, gapped.1, 0]);
         assert_eq!(counts.period.end.ms() - counts.period.start.ms(), whole.1);
-        let complete = derived.steps[step].contributed.as_ref().unwrap().complete_cells;
+        let complete = derived.steps[step]
+            .contributed
+            .as_ref()
+            .unwrap()
+            .complete_cells;
         assert_eq!(complete, if step == 0 { 2 } else { 1 }, "{step}");
     }
     // Counted from a chosen start on: a month cut at it counts as a step with the time that is left of it.
@@ -187,7 +191,10 @@ async fn a_month_that_nobody_landed_leaves_no_sum_complete() {
     land(&store, &id, flux, TINY, &steps, 4).await;
     let engine = Engine::standalone(store.clone(), parts(2));
     let derived = derive(&engine, "tiny", None).await;
-    let complete = derived.steps.iter().map(|step| step.contributed.as_ref().unwrap().complete_cells);
+    let complete = derived
+        .steps
+        .iter()
+        .map(|step| step.contributed.as_ref().unwrap().complete_cells);
     assert_eq!(complete.collect::<Vec<_>>(), [2, 1, 0]);
     let last = counts(&store, &derived, 2).await;
     assert_eq!((last.steps[0], last.of_steps), (3, 3));
@@ -224,8 +231,14 @@ async fn a_budget_of_sums_is_that_of_their_flux_and_says_which_are_complete() {
                 _ => (1.0, 1.0),
             };
             let cells = [own.complete_m2, own.incomplete_m2].map(|m2| m2 / cell_m2);
-            assert!((cells[0] - complete).abs() < 1e-9, "{step:?} {index} {cells:?}");
-            assert!((cells[1] - incomplete).abs() < 1e-9, "{step:?} {index} {cells:?}");
+            assert!(
+                (cells[0] - complete).abs() < 1e-9,
+                "{step:?} {index} {cells:?}"
+            );
+            assert!(
+                (cells[1] - incomplete).abs() < 1e-9,
+                "{step:?} {index} {cells:?}"
+            );
         }
     }
     // Before accumulation started there is nothing to sum.
@@ -265,17 +278,32 @@ async fn a_point_says_what_its_sums_hold_as_the_stored_counts_do() {
         let derived = derive(&engine, "tiny", start).await;
         for cell in 0..3 {
             let at = place(cell as f64 + 0.5);
-            let answer = compute::point_series(&local, &derived.product, at).await.unwrap();
+            let answer = compute::point_series(&local, &derived.product, at)
+                .await
+                .unwrap();
             for (step, point) in answer.series.iter().enumerate() {
-                let (own, stored) = (point.contributed.unwrap(), counts(&store, &derived, step).await);
-                assert_eq!((own.steps, own.of_steps), (stored.steps[cell], stored.of_steps));
+                let (own, stored) = (
+                    point.contributed.unwrap(),
+                    counts(&store, &derived, step).await,
+                );
+                assert_eq!(
+                    (own.steps, own.of_steps),
+                    (stored.steps[cell], stored.of_steps)
+                );
                 let lacking = 100.0 * f64::from(stored.lacking()[cell]);
                 assert!((own.time_percent + lacking - 100.0).abs() < 1e-4, "{own:?}");
             }
         }
     }
-    let of_flux = compute::point_series(&local, &id, place(0.5)).await.unwrap();
-    assert!(of_flux.series.iter().all(|point| point.contributed.is_none()));
+    let of_flux = compute::point_series(&local, &id, place(0.5))
+        .await
+        .unwrap();
+    assert!(
+        of_flux
+            .series
+            .iter()
+            .all(|point| point.contributed.is_none())
+    );
 }
 
 fn place(lon: f64) -> contract::grid::LonLatDeg {

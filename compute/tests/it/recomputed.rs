@@ -36,6 +36,7 @@ fn request(what: &[What]) -> Request {
         to: None,
         what: what.to_vec(),
         is_forced: false,
+        is_verified: false,
     }
 }
 

@@ -100,8 +100,8 @@ async fn read_as_centres_the_real_grids_would_fail_the_check() {
 
 #[test]
 fn the_independent_numbers_are_what_the_script_makes_of_the_files() {
-    let script = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../tests/reference/takahashi09_integral.py");
+    let script =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/reference/takahashi09_integral.py");
     let printed = Command::new(test_data::python())
         .arg(script)
         .arg(test_data::fluxengine("takahashi09"))

@@ -17,6 +17,7 @@ pub(crate) mod serve;
 mod stats;
 mod survey;
 mod topics;
+mod verify;
 
 use std::process::ExitCode;
 
@@ -55,6 +56,7 @@ pub(crate) async fn run(settings: &Settings, command: Command) -> Result<ExitCod
         Command::Observations(command) => observations::run(settings, command).await?,
         Command::Recompute(options) => recompute::run(settings, options).await?,
         Command::Survey(options) => survey::run(&options).await?,
+        Command::Verify(options) => return verify::run(settings, &options).await,
         Command::Gc(options) => gc::run(settings, &options).await?,
         Command::Bench(Bench::Stream(options)) => {
             let log = deployment::needed_log(settings, &options.kafka).await?;

@@ -38,6 +38,7 @@ pub(crate) async fn bind(
     };
     let registry = Registry::new();
     renderer.register(&registry)?;
+    storage::sound::damage::register(&registry)?;
     let state = AppState::new(
         &options,
         store.clone(),

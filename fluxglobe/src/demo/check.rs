@@ -1,13 +1,12 @@
 //! Our budgets beside what a paper and another program say: computed once for a version of the product, then kept.
 
 use anyhow::Result;
-use bytes::Bytes;
 use compute::check::CheckRow;
 use contract::digest::Digest;
 use contract::key::ObjectKey;
 use contract::manifest::Manifest;
 use serde::{Deserialize, Serialize};
-use storage::Store;
+use storage::{StorageError, Store, document};
 use tile_server::backend::{self as wire, Check};
 
 use crate::cli::Settings;
@@ -67,15 +66,16 @@ pub(crate) async fn compare(
     let bar = progress::bar("budgets on Ballista", 1);
     let engine = deployment::engine(settings, store.clone())?;
     let rows = compute::compare(&engine, &flux.product).await?;
-    progress::done(&bar, &format!("{} beside the paper's and independent ones", rows.len()));
+    progress::done(
+        &bar,
+        &format!("{} beside the paper's and independent ones", rows.len()),
+    );
     let comparison = Comparison {
         rows,
         note: compute::published::CITATION.to_owned(),
         method: compute::published::METHOD.to_owned(),
     };
-    store
-        .put_new(&key, Bytes::from(serde_json::to_vec(&comparison)?))
-        .await?;
+    document::put_over(store, &key, &comparison).await?;
     Ok(comparison)
 }
 
@@ -94,9 +94,12 @@ fn key(flux: &Manifest) -> ObjectKey {
 }
 
 async fn read(store: &Store, key: &ObjectKey) -> Result<Option<Comparison>> {
-    match store.get(key).await {
-        Ok(content) => Ok(Some(serde_json::from_slice(&content)?)),
-        Err(error) if error.is_not_found() => Ok(None),
+    match document::get(store, key).await {
+        Ok(kept) => Ok(kept),
+        Err(error @ StorageError::Damaged { .. }) => {
+            tracing::warn!(%error, "published values are compared again");
+            Ok(None)
+        }
         Err(error) => Err(error.into()),
     }
 }

@@ -43,10 +43,7 @@ pub(crate) fn against_published(comparison: &Comparison) -> String {
             verdict,
         ]);
     }
-    format!(
-        "{table}\nPaper: {}\n{}",
-        comparison.note, comparison.method
-    )
+    format!("{table}\nPaper: {}\n{}", comparison.note, comparison.method)
 }
 
 /// A value with the decimals and the uncertainty that it is printed with.

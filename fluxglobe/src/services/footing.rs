@@ -41,6 +41,7 @@ impl Footing {
     ) -> Result<Self> {
         let stop = service::when_asked_to_stop()?;
         let registry = service::admin::registry(service, protocol::PROGRAM)?;
+        storage::sound::damage::register(&registry)?;
         let board = Board::waiting_for(parts);
         let store_url = match &settings.store {
             Some(url) => url.clone(),

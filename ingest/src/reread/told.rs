@@ -3,10 +3,9 @@
 use std::collections::BTreeMap;
 
 use contract::event::{Body, Event};
-use contract::key::ObjectKey;
 use contract::manifest::{Manifest, Step};
 use contract::product::ProductId;
-use storage::{StorageError, Store, manifests};
+use storage::{Store, manifests};
 
 use crate::error::IngestError;
 
@@ -18,14 +17,13 @@ pub async fn events(store: &Store, product: &ProductId) -> Result<Vec<Event>, In
     let Some(now) = manifests::latest(store, product).await.map_err(read)? else {
         return Ok(vec![]);
     };
-    let key = ObjectKey::manifest(product, now.number.saturating_sub(1));
-    let before = match store.get(&key).await {
-        Ok(content) => serde_json::from_slice::<Manifest>(&content).map_err(|e| {
-            let (object, reason) = (key.to_string(), e.to_string());
-            IngestError::storage("read a manifest")(StorageError::Damaged { object, reason })
-        })?,
-        Err(e) if e.is_not_found() => return Ok(vec![]),
-        Err(e) => return Err(IngestError::storage("read a manifest")(e)),
+    let number = now.number.saturating_sub(1);
+    let read = IngestError::storage("read a manifest");
+    let Some(before) = manifests::numbered(store, product, number)
+        .await
+        .map_err(read)?
+    else {
+        return Ok(vec![]);
     };
     Ok(told(&before, &now))
 }

@@ -62,6 +62,7 @@ fn request() -> Request {
         to: None,
         profile: None,
         is_forced: false,
+        is_verified: false,
     }
 }
 

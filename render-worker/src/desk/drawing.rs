@@ -145,14 +145,22 @@ impl Inner {
         png: Bytes,
     ) -> Result<Option<Bytes>, RenderError> {
         let key = job.key();
-        match self.store.put_new(&key, png).await {
+        match self.store.put_new(&key, png.clone()).await {
             Ok(_new) => Ok(None),
-            Err(StorageError::Conflict { .. }) => {
-                let adapter = self.service.name();
-                tracing::error!(%key, adapter, "another adapter drew this job differently");
-                let theirs = self.store.get(&key).await;
-                Ok(Some(theirs.map_err(|e| picture_failed("read", &key, e))?))
-            }
+            Err(StorageError::Conflict { .. }) => match self.store.get(&key).await {
+                Ok(theirs) => {
+                    let adapter = self.service.name();
+                    tracing::error!(%key, adapter, "another adapter drew this job differently");
+                    Ok(Some(theirs))
+                }
+                Err(error @ StorageError::Damaged { .. }) => {
+                    tracing::warn!(%error, "a damaged picture is drawn again");
+                    let put = self.store.put_over(&key, png).await;
+                    put.map(|()| None)
+                        .map_err(|e| picture_failed("store", &key, e))
+                }
+                Err(e) => Err(picture_failed("read", &key, e)),
+            },
             Err(source) => Err(picture_failed("store", &key, source)),
         }
     }

@@ -50,7 +50,8 @@ fn map_of(carbon: &Manifest, time: &str, doubt: bool) -> RenderJob {
 fn different_columns(one: &[u8], other: &[u8]) -> Vec<u32> {
     let [one, other] = [one, other].map(|png| image::load_from_memory(png).unwrap().into_rgba8());
     let columns = 0..one.width();
-    let differs = |x: &u32| (0..one.height()).any(|y| one.get_pixel(*x, y) != other.get_pixel(*x, y));
+    let differs =
+        |x: &u32| (0..one.height()).any(|y| one.get_pixel(*x, y) != other.get_pixel(*x, y));
     columns.filter(differs).collect()
 }
 
@@ -101,7 +102,10 @@ async fn complete_sums_look_the_same_with_doubt_and_without() {
             service.draw(&plain).await.unwrap(),
             service.draw(&doubted).await.unwrap(),
         ];
-        assert!(different_columns(&pictures[0], &pictures[1]).is_empty(), "{time}");
+        assert!(
+            different_columns(&pictures[0], &pictures[1]).is_empty(),
+            "{time}"
+        );
     }
 }
 
@@ -128,7 +132,11 @@ async fn the_name_of_a_picture_depends_on_counts_only_where_they_show() {
         old
     };
     assert_eq!(key(&old, false), key(&less, false));
-    assert_eq!(map_of(&old, "2000-02-20", true).value.contributed, None, "unknown");
+    assert_eq!(
+        map_of(&old, "2000-02-20", true).value.contributed,
+        None,
+        "unknown"
+    );
 }
 
 #[tokio::test]

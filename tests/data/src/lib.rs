@@ -51,7 +51,9 @@ pub fn python() -> PathBuf {
         let home = variable("HOME")?;
         Some(home.join(".cache/fluxglobe/tools"))
     });
-    let python = tools.expect("HOME or FLUXGLOBE_TOOLS is set").join("bin/python");
+    let python = tools
+        .expect("HOME or FLUXGLOBE_TOOLS is set")
+        .join("bin/python");
     assert!(
         python.is_file(),
         "there is no {}: `make test` makes it; by hand: deploy/install-tools.sh test",

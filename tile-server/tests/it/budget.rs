@@ -120,7 +120,10 @@ async fn only_carbon_has_a_budget() {
 #[tokio::test]
 async fn a_budget_of_accumulated_carbon_says_how_complete_it_is() {
     let app = TestApp::new().await;
-    let body = app.get("/api/products/flux-accumulated/budget").await.json();
+    let body = app
+        .get("/api/products/flux-accumulated/budget")
+        .await
+        .json();
     let row = &body["rows"][0];
     assert_eq!(row["complete_m2"], json!(3e14));
     assert_eq!(row["incomplete_m2"], json!(3e13));
