@@ -15,8 +15,9 @@ use crate::sun::Sun;
 use crate::tile::Tile;
 use crate::time::TimeMs;
 
-/// Raised whenever the renderer draws the same job differently, so that old pictures are not taken for new ones.
-pub const RENDERER_VERSION: u32 = 4;
+/// Raised whenever the renderer draws the same job differently or writes the same picture in other bytes, so that old
+/// pictures are not taken for new ones: a name has one content for ever. `make bless` asks for it.
+pub const RENDERER_VERSION: u32 = 5;
 /// Largest width and height of a picture, pixels.
 pub const MAX_IMAGE_PX: u32 = 4096;
 /// Most slices of a half-angle volume.

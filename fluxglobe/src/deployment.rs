@@ -108,13 +108,14 @@ fn processors(settings: &Settings) -> NonZeroUsize {
 }
 
 /// What to draw with: this machine's Vulkan device, or its processor when asked to.
-pub(crate) fn backend(settings: &Settings) -> Backend {
-    if settings.cpu {
-        Backend::Cpu
-    } else if settings.require_gpu {
-        Backend::HardwareGpu
-    } else {
-        Backend::Gpu
+pub(crate) fn backend(settings: &Settings) -> Result<Backend> {
+    match (settings.cpu, settings.require_gpu) {
+        (true, true) => bail!(
+            "--cpu draws with the processor and --require-gpu with nothing but a graphics card: give one of them"
+        ),
+        (true, false) => Ok(Backend::Cpu),
+        (false, true) => Ok(Backend::HardwareGpu),
+        (false, false) => Ok(Backend::Gpu),
     }
 }
 
@@ -147,7 +148,7 @@ pub(crate) async fn single_renderer(settings: &Settings, store: Store) -> Result
 }
 
 async fn renderer_of(settings: &Settings, store: Store, limits: Limits) -> Result<RenderService> {
-    let backend = backend(settings);
+    let backend = backend(settings)?;
     let make = move || RenderService::with_limits(store, backend, limits);
     Ok(tokio::task::spawn_blocking(make).await??)
 }
