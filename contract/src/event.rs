@@ -82,6 +82,9 @@ pub enum Body {
         step_count: Option<u64>,
         /// Did it replace values that were there?
         revised: bool,
+        /// What was taken for granted when it was read, because nothing in the file says it. One line each.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        assumptions: Vec<String>,
     },
     /// A file was refused.
     #[serde(rename = "granule.rejected")]
@@ -189,7 +192,17 @@ impl Body {
             step_count: folded.as_ref().map(|_runs| periods.len() as u64),
             periods: folded.unwrap_or_else(|| periods.to_vec()),
             revised,
+            assumptions: vec![],
         }
+    }
+
+    /// The same, of a landed file that was read with assumptions.
+    #[must_use]
+    pub fn assuming(mut self, lines: &[String]) -> Self {
+        if let Self::GranuleLanded { assumptions, .. } = &mut self {
+            *assumptions = lines.to_vec();
+        }
+        self
     }
 
     /// Topic that events of this kind go to.

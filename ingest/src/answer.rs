@@ -186,12 +186,13 @@ pub(crate) async fn commit(
         }
         let is_due = !matches!(committed, Committed::AlreadyLanded { is_due: false, .. });
         let raw_sha256 = Some(granule.raw_sha256);
-        asked.answer(outcome(asked.path(), committed), raw_sha256, is_due)
+        let outcome = outcome(asked.path(), committed, &granule.assumptions);
+        asked.answer(outcome, raw_sha256, is_due)
     };
     Ok(committed.into_iter().zip(batch).map(answer).collect())
 }
 
-fn outcome(file: PathBuf, committed: Committed) -> Outcome {
+fn outcome(file: PathBuf, committed: Committed, assumptions: &[String]) -> Outcome {
     match committed {
         Committed::Landed {
             manifest,
@@ -202,6 +203,7 @@ fn outcome(file: PathBuf, committed: Committed) -> Outcome {
             manifest,
             periods,
             revised,
+            assumptions: assumptions.to_vec(),
         },
         Committed::AlreadyLanded {
             manifest, periods, ..

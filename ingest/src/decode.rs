@@ -4,6 +4,7 @@ use contract::time::Period;
 
 use crate::cf::axis::Mapping;
 use crate::cf::coordinate::{Axis, Role};
+use crate::decoder::session::Session;
 use crate::error::Stop;
 use crate::file::description::Part;
 use crate::plan::{PlannedGranule, PlannedStep};
@@ -20,17 +21,13 @@ pub(crate) async fn run(
     granule: &mut PlannedGranule,
     step: PlannedStep,
 ) -> Result<DecodedGrid, Stop> {
-    let part: Vec<Part> = granule.axes.iter().map(|axis| part(axis, step)).collect();
-    let expected = granule
-        .axes
-        .iter()
-        .filter(|a| is_plane(a))
-        .map(|a| a.len)
-        .product();
-    let stored = granule
-        .session
-        .read(&granule.variable.name, &part, expected)
-        .await?;
+    let is_good = is_good(granule, step).await?;
+    let (session, axes) = (&mut granule.session, &granule.axes);
+    let mut stored = plane(session, &granule.variable.name, axes, step).await?;
+    let cells = stored.iter_mut().zip(is_good.iter().flatten());
+    cells
+        .filter(|(_, is_good)| !**is_good)
+        .for_each(|(value, _)| *value = f64::NAN);
     let is_lat_first = granule.axes.iter().position(|a| a.role == Role::Latitude)
         < granule.axes.iter().position(|a| a.role == Role::Longitude);
     let len_of = |role| {
@@ -52,6 +49,32 @@ pub(crate) async fn run(
         period: step.period,
         values: turned(&granule.mapping, strides, &stored, convert),
     })
+}
+
+/// One map of a variable as stored, in the order of the file.
+async fn plane(
+    session: &mut Session,
+    variable: &str,
+    axes: &[Axis],
+    step: PlannedStep,
+) -> Result<Vec<f64>, Stop> {
+    let part: Vec<Part> = axes.iter().map(|axis| part(axis, step)).collect();
+    let expected = axes.iter().filter(|a| is_plane(a)).map(|a| a.len).product();
+    session.read(variable, &part, expected).await
+}
+
+/// Is every cell of the file's map good enough? None if nobody asks.
+async fn is_good(
+    granule: &mut PlannedGranule,
+    step: PlannedStep,
+) -> Result<Option<Vec<bool>>, Stop> {
+    let Some(quality) = &granule.quality else {
+        return Ok(None);
+    };
+    let stored = plane(&mut granule.session, &quality.variable, &quality.axes, step).await?;
+    Ok(Some(
+        stored.into_iter().map(|n| quality.accepts(n)).collect(),
+    ))
 }
 
 fn is_plane(axis: &Axis) -> bool {

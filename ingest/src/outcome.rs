@@ -24,6 +24,8 @@ pub enum Outcome {
         periods: Vec<Period>,
         /// Did it replace values that were there?
         revised: bool,
+        /// What was taken for granted, because nothing in the file says it. One line each.
+        assumptions: Vec<String>,
     },
     /// The same content was in the product before.
     AlreadyLanded {
@@ -116,10 +118,12 @@ impl Outcome {
                     manifest,
                     periods,
                     revised,
+                    assumptions,
                     ..
                 },
                 Some(raw_sha256),
-            ) => Body::granule_landed(path, raw_sha256, manifest.clone(), periods, *revised),
+            ) => Body::granule_landed(path, raw_sha256, manifest.clone(), periods, *revised)
+                .assuming(assumptions),
             (
                 Self::AlreadyLanded {
                     manifest, periods, ..
@@ -166,6 +170,7 @@ impl Display for Outcome {
                 manifest,
                 periods,
                 revised,
+                assumptions,
             } => {
                 let how = if *revised { "revised" } else { "landed" };
                 write!(
@@ -173,7 +178,9 @@ impl Display for Outcome {
                     "{}: {how} in {manifest} for {}",
                     file.display(),
                     span(periods)
-                )
+                )?;
+                let assumed = |text: &String| write!(f, "; assumed: {text}");
+                assumptions.iter().try_for_each(assumed)
             }
             Self::AlreadyLanded { file, manifest, .. } => {
                 write!(f, "{}: was in {manifest} already", file.display())

@@ -199,8 +199,16 @@ impl Pipeline<'_> {
         }
         planned.raw.check_unchanged()?;
         if grids.is_empty() {
-            let detail =
-                "holds no value in any step; correct fill value or valid range in a profile";
+            let detail = match &planned.quality {
+                None => {
+                    "holds no value in any step; correct fill value or valid range in a profile"
+                        .to_owned()
+                }
+                Some(quality) => format!(
+                    "holds no value in any step that is good enough by {:?}; correct fill value, valid range or [quality] in a profile",
+                    quality.variable
+                ),
+            };
             return Err(
                 Rejection::new(RejectReason::Values, &planned.variable.name, detail).into(),
             );
@@ -214,14 +222,17 @@ impl Pipeline<'_> {
             target,
             mapping,
             recipe,
+            assumptions,
             ..
         } = planned;
-        let reading = Reading::new(recipe, &target, mapping.grid, steps);
+        let mut reading = Reading::new(recipe, &target, mapping.grid, steps);
+        reading.assumptions.clone_from(&assumptions);
         let granule = StoredGranule {
             target,
             grid: mapping.grid,
             raw_sha256,
             grids,
+            assumptions,
             asked_by: None,
             order: None,
         };

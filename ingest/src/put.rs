@@ -28,6 +28,8 @@ pub(crate) struct StoredGranule {
     pub(crate) raw_sha256: Digest,
     /// In the order of time.
     pub(crate) grids: Vec<StoredGrid>,
+    /// What was taken for granted when it was read. One line each.
+    pub(crate) assumptions: Vec<String>,
     /// The notice that it came with; none for files that no notice came for.
     pub(crate) asked_by: Option<Origin>,
     /// Its place in the order of notices.

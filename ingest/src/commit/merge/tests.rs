@@ -48,6 +48,7 @@ fn granule(content: &str, periods: &[Period]) -> StoredGranule {
         },
         grid: GRID,
         raw_sha256,
+        assumptions: vec![],
         asked_by: None,
         order: None,
         grids: periods.iter().map(step).collect(),
