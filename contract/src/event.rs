@@ -7,6 +7,7 @@ use crate::digest::Digest;
 use crate::job::RenderJob;
 use crate::key::ObjectKey;
 use crate::manifest::ManifestId;
+use crate::masked::MaskedCells;
 use crate::observation::Observation;
 use crate::product::ProductId;
 use crate::time::{Period, TimeMs};
@@ -82,6 +83,9 @@ pub enum Body {
         step_count: Option<u64>,
         /// Did it replace values that were there?
         revised: bool,
+        /// Cells of all its steps that it gave a value for and that hold none; the manifest has them step by step.
+        #[serde(default, skip_serializing_if = "MaskedCells::is_none")]
+        masked: MaskedCells,
     },
     /// A file was refused.
     #[serde(rename = "granule.rejected")]
@@ -189,7 +193,17 @@ impl Body {
             step_count: folded.as_ref().map(|_runs| periods.len() as u64),
             periods: folded.unwrap_or_else(|| periods.to_vec()),
             revised,
+            masked: MaskedCells::default(),
         }
+    }
+
+    /// The same news of a file with what was masked of it.
+    #[must_use]
+    pub fn with_masked(mut self, cells: MaskedCells) -> Self {
+        if let Self::GranuleLanded { masked, .. } = &mut self {
+            *masked = cells;
+        }
+        self
     }
 
     /// Topic that events of this kind go to.

@@ -17,6 +17,7 @@ pub mod grid;
 pub mod job;
 pub mod key;
 pub mod manifest;
+pub mod masked;
 pub mod moment;
 pub mod notice;
 pub mod observation;

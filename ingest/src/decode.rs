@@ -1,5 +1,6 @@
 //! [`PlannedGranule`] in, one [`DecodedGrid`] a step out: values on the stored grid, in the stored unit.
 
+use contract::masked::MaskedCells;
 use contract::time::Period;
 
 use crate::cf::axis::Mapping;
@@ -13,6 +14,8 @@ use crate::plan::{PlannedGranule, PlannedStep};
 pub(crate) struct DecodedGrid {
     pub(crate) period: Period,
     pub(crate) values: Vec<f32>,
+    /// What the file gave a value for.
+    pub(crate) masked: MaskedCells,
 }
 
 /// Reads and turns one step.
@@ -21,12 +24,7 @@ pub(crate) async fn run(
     step: PlannedStep,
 ) -> Result<DecodedGrid, Stop> {
     let part: Vec<Part> = granule.axes.iter().map(|axis| part(axis, step)).collect();
-    let expected = granule
-        .axes
-        .iter()
-        .filter(|a| is_plane(a))
-        .map(|a| a.len)
-        .product();
+    let expected = granule.plane_cells();
     let stored = granule
         .session
         .read(&granule.variable.name, &part, expected)
@@ -46,16 +44,19 @@ pub(crate) async fn run(
         [1, len_of(Role::Latitude)]
     };
     let packing = &granule.packing;
+    let mut masked = MaskedCells::default();
     // One rounding to float32, at the end.
-    let convert = |stored: f64| (packing.value(stored) * step.factor + step.offset) as f32;
+    let convert = |stored: f64| {
+        let value = packing.value(stored);
+        masked.out_of_range += u64::from(value.is_nan() && !packing.is_missing(stored));
+        (value * step.factor + step.offset) as f32
+    };
+    let values = turned(&granule.mapping, strides, &stored, convert);
     Ok(DecodedGrid {
         period: step.period,
-        values: turned(&granule.mapping, strides, &stored, convert),
+        values,
+        masked,
     })
-}
-
-fn is_plane(axis: &Axis) -> bool {
-    matches!(axis.role, Role::Latitude | Role::Longitude)
 }
 
 fn part(axis: &Axis, step: PlannedStep) -> Part {
@@ -74,7 +75,7 @@ fn turned(
     mapping: &Mapping,
     strides: [usize; 2],
     stored: &[f64],
-    convert: impl Fn(f64) -> f32,
+    mut convert: impl FnMut(f64) -> f32,
 ) -> Vec<f32> {
     let mut values = Vec::with_capacity(mapping.grid.cell_count());
     for row in &mapping.file_rows {

@@ -4,6 +4,7 @@ use bytes::Bytes;
 use contract::digest::Digest;
 use contract::grid::Grid;
 use contract::key::ObjectKey;
+use contract::masked::MaskedCells;
 use contract::product::ProductId;
 use contract::time::Period;
 
@@ -17,6 +18,7 @@ pub(crate) struct EncodedGrid {
     pub(crate) key: ObjectKey,
     pub(crate) frame: Bytes,
     pub(crate) valid_cells: u64,
+    pub(crate) masked: MaskedCells,
 }
 
 pub(crate) fn run(
@@ -32,5 +34,6 @@ pub(crate) fn run(
         key,
         frame,
         valid_cells: checked.valid_cells,
+        masked: checked.masked,
     })
 }

@@ -7,14 +7,16 @@ use std::path::Path;
 use contract::digest::Digest;
 use contract::event::RejectReason;
 use contract::manifest::ManifestId;
+use contract::masked::MaskedCells;
 use contract::notice::NoticeOrder;
 use contract::time::Period;
 use storage::{StorageError, Store, manifests};
 
+use crate::answer::blame;
 use crate::commit::is_later_or_same;
 use crate::error::{IngestError, Stop};
 use crate::fetch::RawGranule;
-use crate::gates::Gates;
+use crate::gates::{Gates, Seat};
 use crate::metrics::{Metrics, ended};
 use crate::notice::Order;
 use crate::observation::{ObservationSink, Stored};
@@ -24,7 +26,7 @@ use crate::put::{StoredGranule, StoredGrid};
 use crate::reading::Reading;
 use crate::rejection::Rejection;
 use crate::settings::Settings;
-use crate::{check, decode, encode, fetch, inspect, observation, plan, put};
+use crate::{boundary, check, decode, encode, fetch, inspect, memory, observation, plan, put};
 
 /// Times a file that changes under our hands is read again.
 const MAX_READS: u32 = 3;
@@ -41,6 +43,7 @@ pub(crate) enum Prepared {
         raw_sha256: Digest,
         manifest: ManifestId,
         periods: Vec<Period>,
+        masked: MaskedCells,
     },
     /// Nothing: files of later notices have its time.
     Superseded {
@@ -76,7 +79,8 @@ impl Pipeline<'_> {
     ) -> Result<Prepared, IngestError> {
         let mut was_killed = false;
         for _ in 0..MAX_READS {
-            match self.stages(shown, order, place).await {
+            let stages = boundary::contained(Box::pin(self.stages(shown, order, place))).await;
+            match stages.unwrap_or_else(|panic| Err(panic.into())) {
                 Ok(prepared) => return Ok(prepared),
                 Err(Stop::Rejected(rejection)) => return Ok(Prepared::Rejected(rejection)),
                 Err(Stop::Failed(IngestError::Changed { .. })) => {
@@ -85,6 +89,10 @@ impl Pipeline<'_> {
                 Err(Stop::Failed(IngestError::Killed)) => {
                     tracing::warn!(file = %shown.display(), "its reader was killed");
                     was_killed = true;
+                }
+                Err(Stop::Failed(error)) if error.is_panic() => {
+                    tracing::error!(%error, file = %shown.display(), "a fault of the program");
+                    return Ok(Prepared::Rejected(blame(&error)));
                 }
                 Err(Stop::Failed(error)) => return Err(error),
             }
@@ -112,8 +120,8 @@ impl Pipeline<'_> {
         let fetched = fetch::run(&order.location, &order.expected, settings);
         let raw = metrics.timed("fetch", fetched).await?;
         metrics.fetched(raw.size_bytes);
-        let _pass = self.gates.enter(raw.size_bytes).await;
-        let read = self.read(shown, raw.clone(), order.wish(), place).await;
+        let seat = self.gates.seat().await;
+        let read = self.read(shown, raw.clone(), order.wish(), (place, seat)).await;
         match read {
             // Whatever is wrong with a file that changed meanwhile may be right the next time.
             Err(Stop::Rejected(rejection)) => {
@@ -129,10 +137,11 @@ impl Pipeline<'_> {
         path: &Path,
         raw: RawGranule,
         wish: Wish<'_>,
-        place: Option<NoticeOrder>,
+        (place, seat): (Option<NoticeOrder>, Seat<'_>),
     ) -> Result<Prepared, Stop> {
         let metrics = self.metrics;
         if let Some(format) = observation::recognise_text(&raw.head(TEXT_HEAD_BYTES).await?) {
+            let _pass = seat.with_memory(memory::of_text(raw.size_bytes)).await;
             return self.observe_text(format, raw, wish).await;
         }
         self.progress.stage(path, Stage::Inspect, 0, 0);
@@ -140,6 +149,8 @@ impl Pipeline<'_> {
             .timed("inspect", inspect::run(raw, self.settings))
             .await?;
         if wish.profile.is_none() && observation::recognise(&inspected.description).is_some() {
+            let needed = memory::of_observations(&inspected.description);
+            let _pass = seat.with_memory(needed).await;
             return self.observe(inspected, wish).await;
         }
         self.progress.stage(path, Stage::Plan, 0, 0);
@@ -148,6 +159,7 @@ impl Pipeline<'_> {
         if let Some(landed) = self.nothing_to_do(&planned, wish, place).await? {
             return Ok(landed);
         }
+        let _pass = seat.with_memory(memory::of_grids(&planned)).await;
         put::raw(self.store, &planned.target.product, &planned.raw).await?;
         let (granule, reading) = self.grids(path, planned).await?;
         match reading.put(self.store, &granule.target.product).await {
@@ -167,10 +179,24 @@ impl Pipeline<'_> {
         raw: RawGranule,
         wish: Wish<'_>,
     ) -> Result<Reading, Stop> {
-        let _pass = self.gates.enter(raw.size_bytes).await;
+        let reread = boundary::contained(Box::pin(self.reread_stages(shown, raw, wish))).await;
+        match reread.unwrap_or_else(|panic| Err(panic.into())) {
+            Err(Stop::Failed(error)) if error.is_panic() => Err(blame(&error).into()),
+            other => other,
+        }
+    }
+
+    async fn reread_stages(
+        &self,
+        shown: &Path,
+        raw: RawGranule,
+        wish: Wish<'_>,
+    ) -> Result<Reading, Stop> {
+        let seat = self.gates.seat().await;
         self.progress.stage(shown, Stage::Inspect, 0, 0);
         let inspected = inspect::run(raw, self.settings).await?;
         let planned = plan::run(inspected, wish, self.settings).await?;
+        let _pass = seat.with_memory(memory::of_grids(&planned)).await;
         let (granule, reading) = self.grids(shown, planned).await?;
         reading
             .put(self.store, &granule.target.product)
@@ -185,14 +211,19 @@ impl Pipeline<'_> {
         path: &Path,
         mut planned: PlannedGranule,
     ) -> Result<(StoredGranule, Reading), Stop> {
-        let mut grids = Vec::new();
+        let (mut grids, mut masked) = (Vec::new(), MaskedCells::default());
         for index in 0..planned.steps.len() {
-            grids.extend(self.step(path, &mut planned, index).await?);
+            let (grid, own) = self.step(path, &mut planned, index).await?;
+            grids.extend(grid);
+            masked = masked + own;
         }
         planned.raw.check_unchanged()?;
         if grids.is_empty() {
-            let detail =
-                "holds no value in any step; correct fill value or valid range in a profile";
+            let gap = if masked.is_none() { "" } else { " (" };
+            let end = if masked.is_none() { "" } else { ")" };
+            let detail = format!(
+                "holds no value in any step{gap}{masked}{end}; correct fill value or valid range in a profile"
+            );
             return Err(
                 Rejection::new(RejectReason::Values, &planned.variable.name, detail).into(),
             );
@@ -214,19 +245,20 @@ impl Pipeline<'_> {
             grid: mapping.grid,
             raw_sha256,
             grids,
+            masked,
             asked_by: None,
             order: None,
         };
         Ok((granule, reading))
     }
 
-    /// One time step: decode, check, encode, put. None if it holds no value at all.
+    /// One time step: decode, check, encode, put; and what was masked in it. None if it holds no value at all.
     async fn step(
         &self,
         path: &Path,
         planned: &mut PlannedGranule,
         index: usize,
-    ) -> Result<Option<StoredGrid>, Stop> {
+    ) -> Result<(Option<StoredGrid>, MaskedCells), Stop> {
         let (number, count) = (index + 1, planned.steps.len());
         let tell = |stage| self.progress.stage(path, stage, number, count);
         tell(Stage::Decode);
@@ -243,26 +275,27 @@ impl Pipeline<'_> {
         );
         let variable = planned.variable.name.clone();
         let metrics = self.metrics.clone();
-        let encoded = tokio::task::spawn_blocking(move || {
+        let (encoded, masked) = tokio::task::spawn_blocking(move || {
             let running = metrics.start("check");
             let checked = check::run(decoded, quantity, &variable).map_err(Stop::from);
             running.done(ended(&checked));
             let checked = checked?;
             if checked.valid_cells == 0 {
-                return Ok::<_, Stop>(None);
+                return Ok::<_, Stop>((None, checked.masked));
             }
             let running = metrics.start("encode");
             let encoded = encode::run(&checked, &product, &grid).map_err(Stop::from);
             running.done(ended(&encoded));
-            encoded.map(Some)
+            encoded.map(|encoded| (Some(encoded), checked.masked))
         })
         .await??;
         let Some(encoded) = encoded else {
-            return Ok(None);
+            return Ok((None, masked));
         };
         tell(Stage::Put);
         let put = async { Ok(put::run(self.store, encoded, &planned.raw).await?) };
-        self.metrics.timed("put", put).await.map(Some)
+        let stored = self.metrics.timed("put", put).await?;
+        Ok((Some(stored), masked))
     }
 
     /// Is this very file in the product, or are files of later notices in all of its places? With a profile of the
@@ -286,10 +319,12 @@ impl Pipeline<'_> {
         let raw_sha256 = planned.raw.sha256;
         let periods: Vec<Period> = planned.steps.iter().map(|s| s.period).collect();
         let orders = newest.notice_orders();
-        let mut is_superseded = false;
+        let (mut is_superseded, mut masked) = (false, MaskedCells::default());
         for period in &periods {
             match newest.step_of(*period) {
-                Some(index) if newest.steps[index].raw_sha256 == raw_sha256 => {}
+                Some(index) if newest.steps[index].raw_sha256 == raw_sha256 => {
+                    masked = masked + newest.steps[index].masked.unwrap_or_default();
+                }
                 Some(index) if is_later_or_same(orders[index], place) => is_superseded = true,
                 _ => return Ok(None),
             }
@@ -306,6 +341,7 @@ impl Pipeline<'_> {
                 raw_sha256,
                 manifest,
                 periods,
+                masked,
             }
         }))
     }

@@ -4,6 +4,7 @@ use contract::digest::Digest;
 use contract::grid::Grid;
 use contract::key::ObjectKey;
 use contract::manifest::Step;
+use contract::masked::MaskedCells;
 use contract::notice::NoticeOrder;
 use contract::product::ProductId;
 use contract::topic::Origin;
@@ -28,6 +29,8 @@ pub(crate) struct StoredGranule {
     pub(crate) raw_sha256: Digest,
     /// In the order of time.
     pub(crate) grids: Vec<StoredGrid>,
+    /// What was masked in all steps of the file: those without any value are in no manifest.
+    pub(crate) masked: MaskedCells,
     /// The notice that it came with; none for files that no notice came for.
     pub(crate) asked_by: Option<Origin>,
     /// Its place in the order of notices.
@@ -59,6 +62,7 @@ pub(crate) async fn run(
         key,
         frame,
         valid_cells,
+        masked,
     } = encoded;
     store
         .put_new(&key, frame)
@@ -72,6 +76,7 @@ pub(crate) async fn run(
             raw_sha256,
             origin,
             valid_cells,
+            masked: Some(masked),
         },
     })
 }

@@ -171,6 +171,7 @@ impl<'a> Derivation<'a> {
     async fn stored(&self, step: &SourceStep<'_>, values: &[f32]) -> Result<Step, ComputeError> {
         let (store, grid) = (self.store(), &self.source.grid);
         Ok(Step {
+            masked: None,
             period: step.period,
             frame: frames::write(store, self.target, grid, values, step.period).await?,
             raw_sha256: step.made_of,

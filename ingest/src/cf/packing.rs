@@ -51,13 +51,17 @@ impl Packing {
         }
     }
 
-    /// The value of a stored number, in the file's unit; NaN for no data.
+    /// Does the stored number say that there is no value? What is outside a valid range is a value that is not taken.
     #[expect(clippy::float_cmp, reason = "a fill value is one exact number")]
-    pub(crate) fn value(&self, stored: f64) -> f64 {
+    pub(crate) fn is_missing(&self, stored: f64) -> bool {
         let is_fill =
             |fill: &f64| *fill == stored || self.is_float32 && f64::from(*fill as f32) == stored;
-        if self.fills.iter().any(is_fill)
-            || !(self.valid_stored.0..=self.valid_stored.1).contains(&stored)
+        stored.is_nan() || stored.abs() > DEFAULT_FILL_FLOAT || self.fills.iter().any(is_fill)
+    }
+
+    /// The value of a stored number, in the file's unit; NaN for no data.
+    pub(crate) fn value(&self, stored: f64) -> f64 {
+        if self.is_missing(stored) || !(self.valid_stored.0..=self.valid_stored.1).contains(&stored)
         {
             return f64::NAN;
         }

@@ -5,10 +5,13 @@
 
 mod bad_input;
 mod cf_files;
+mod contained;
 mod faults;
 mod fixture;
 mod guarded;
 mod hostile;
+mod masked;
+mod memory;
 mod order;
 mod other_writers;
 mod real_files;
