@@ -181,6 +181,7 @@ mod tests {
     fn part(name: &str, days: std::ops::RangeInclusive<u32>) -> Manifest {
         let product: ProductId = name.parse().unwrap();
         let step = |day: u32| Step {
+            masked: None,
             period: Period {
                 start: TimeMs::from_ymd(2002, 1, day).unwrap(),
                 end: TimeMs::from_ymd(2002, 1, day + 1).unwrap(),

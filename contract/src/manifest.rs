@@ -8,6 +8,7 @@ use crate::ContractError;
 use crate::digest::Digest;
 use crate::grid::Grid;
 use crate::key::ObjectKey;
+use crate::masked::MaskedCells;
 use crate::notice::{NoticeOrder, NoticeRun};
 use crate::product::ProductId;
 use crate::quantity::Quantity;
@@ -67,6 +68,10 @@ pub struct Step {
     pub origin: String,
     /// Cells with data.
     pub valid_cells: u64,
+    /// Cells that the file gave a value for and that hold none here. None of steps that landed before these were counted
+    /// (what they lack is not known), and of computed ones.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub masked: Option<MaskedCells>,
     /// How complete the sums of accumulated carbon are; none for means, and in versions that did not count it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub contributed: Option<Contributed>,
@@ -95,6 +100,17 @@ pub struct SeriesSegment {
 }
 
 impl Manifest {
+    /// What was masked in its steps, as far as it was counted, and of how many steps it was not.
+    pub fn masked(&self) -> (MaskedCells, usize) {
+        let counted = self.steps.iter().filter_map(|step| step.masked);
+        let uncounted = self
+            .steps
+            .iter()
+            .filter(|step| step.masked.is_none())
+            .count();
+        (counted.sum(), uncounted)
+    }
+
     /// The name that answers cite.
     pub fn id(&self) -> ManifestId {
         ManifestId {
@@ -250,6 +266,7 @@ mod tests {
         let product: ProductId = "p".parse().unwrap();
         let digest = Digest::of(b"");
         let step = |month| Step {
+            masked: None,
             period: Period::month(2000, month).unwrap(),
             frame: ObjectKey::frame(&product, &digest),
             raw_sha256: digest,
@@ -352,6 +369,27 @@ mod tests {
         assert_eq!(serde_json::to_string(&old).unwrap(), json);
         assert_eq!(old.id().to_string(), "p@3-ID_OF_VERSION_1");
         assert_eq!(old.notice_orders(), [None]);
+    }
+
+    #[test]
+    fn what_is_masked_is_counted_apart_from_what_is_not_known() {
+        let mut m = manifest(Quantity::CarbonFlux);
+        let old = m.id();
+        assert_eq!(m.masked(), (MaskedCells::default(), 3));
+        let json = serde_json::to_string(&m).unwrap();
+        assert!(
+            !json.contains("masked"),
+            "a step of old times is as it was: {json}"
+        );
+        m.steps[0].masked = Some(MaskedCells::default());
+        m.steps[1].masked = Some(MaskedCells {
+            implausible: 7,
+            ..MaskedCells::default()
+        });
+        assert_eq!((m.masked().0.implausible, m.masked().1), (7, 1));
+        let json = serde_json::to_string(&m).unwrap();
+        assert_eq!(serde_json::from_str::<Manifest>(&json).unwrap(), m);
+        assert_ne!(m.id(), old);
     }
 
     #[test]

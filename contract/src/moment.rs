@@ -148,6 +148,7 @@ mod tests {
     fn manifest(quantity: Quantity, frames: &[&str]) -> Manifest {
         let product: ProductId = "p".parse().unwrap();
         let step = |(month, content): (u32, &&str)| Step {
+            masked: None,
             period: Period::month(2000, month).unwrap(),
             frame: frame(content),
             raw_sha256: Digest::of(b""),

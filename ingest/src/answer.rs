@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use contract::digest::Digest;
 use contract::event::{Body, Event, RejectReason};
 use contract::manifest::ManifestId;
+use contract::masked::MaskedCells;
 use contract::notice::NoticeOrder;
 use contract::time::{Period, TimeMs};
 use contract::topic::Origin;
@@ -127,6 +128,7 @@ impl Asked {
                 raw_sha256,
                 manifest,
                 periods,
+                masked,
             } => {
                 let is_due = match self.origin {
                     Some(origin) => {
@@ -138,6 +140,7 @@ impl Asked {
                     file: self.path(),
                     manifest,
                     periods,
+                    masked,
                 };
                 Ready::Answered(self.answer(outcome, Some(raw_sha256), is_due))
             }
@@ -186,13 +189,13 @@ pub(crate) async fn commit(
         }
         let is_due = !matches!(committed, Committed::AlreadyLanded { is_due: false, .. });
         let raw_sha256 = Some(granule.raw_sha256);
-        let outcome = outcome(asked.path(), committed, &granule.assumptions);
+        let outcome = outcome(asked.path(), committed, granule);
         asked.answer(outcome, raw_sha256, is_due)
     };
     Ok(committed.into_iter().zip(batch).map(answer).collect())
 }
 
-fn outcome(file: PathBuf, committed: Committed, assumptions: &[String]) -> Outcome {
+fn outcome(file: PathBuf, committed: Committed, granule: &StoredGranule) -> Outcome {
     match committed {
         Committed::Landed {
             manifest,
@@ -203,7 +206,8 @@ fn outcome(file: PathBuf, committed: Committed, assumptions: &[String]) -> Outco
             manifest,
             periods,
             revised,
-            assumptions: assumptions.to_vec(),
+            assumptions: granule.assumptions.clone(),
+            masked: granule.masked,
         },
         Committed::AlreadyLanded {
             manifest, periods, ..
@@ -211,6 +215,7 @@ fn outcome(file: PathBuf, committed: Committed, assumptions: &[String]) -> Outco
             file,
             manifest,
             periods,
+            masked: granule.masked,
         },
         Committed::Superseded { manifest, .. } => Outcome::Superseded { file, manifest },
         Committed::Rejected(rejection) => Outcome::rejected(file, rejection),

@@ -1,9 +1,11 @@
 //! [`PlannedGranule`] in, one [`DecodedGrid`] a step out: values on the stored grid, in the stored unit.
 
+use contract::masked::MaskedCells;
 use contract::time::Period;
 
 use crate::cf::axis::Mapping;
 use crate::cf::coordinate::{Axis, Role};
+use crate::cf::packing::Unpacked;
 use crate::decoder::session::Session;
 use crate::error::Stop;
 use crate::file::description::Part;
@@ -14,6 +16,8 @@ use crate::plan::{PlannedGranule, PlannedStep};
 pub(crate) struct DecodedGrid {
     pub(crate) period: Period,
     pub(crate) values: Vec<f32>,
+    /// What the file gave a value for.
+    pub(crate) masked: MaskedCells,
 }
 
 /// Reads and turns one step.
@@ -24,10 +28,13 @@ pub(crate) async fn run(
     let is_good = is_good(granule, step).await?;
     let (session, axes) = (&mut granule.session, &granule.axes);
     let mut stored = plane(session, &granule.variable.name, axes, step).await?;
+    let mut masked = MaskedCells::default();
     let cells = stored.iter_mut().zip(is_good.iter().flatten());
-    cells
-        .filter(|(_, is_good)| !**is_good)
-        .for_each(|(value, _)| *value = f64::NAN);
+    for (stored, _) in cells.filter(|(_, is_good)| !**is_good) {
+        let is_value = matches!(granule.packing.unpacked(*stored), Unpacked::Value(_));
+        masked.poor_quality += u64::from(is_value);
+        *stored = f64::NAN;
+    }
     let is_lat_first = granule.axes.iter().position(|a| a.role == Role::Latitude)
         < granule.axes.iter().position(|a| a.role == Role::Longitude);
     let len_of = |role| {
@@ -44,10 +51,22 @@ pub(crate) async fn run(
     };
     let packing = &granule.packing;
     // One rounding to float32, at the end.
-    let convert = |stored: f64| (packing.value(stored) * step.factor + step.offset) as f32;
+    let convert = |stored: f64| {
+        let value = match packing.unpacked(stored) {
+            Unpacked::Value(value) => value,
+            Unpacked::Missing => f64::NAN,
+            Unpacked::OutOfRange => {
+                masked.out_of_range += 1;
+                f64::NAN
+            }
+        };
+        (value * step.factor + step.offset) as f32
+    };
+    let values = turned(&granule.mapping, strides, &stored, convert);
     Ok(DecodedGrid {
         period: step.period,
-        values: turned(&granule.mapping, strides, &stored, convert),
+        values,
+        masked,
     })
 }
 
@@ -97,7 +116,7 @@ fn turned(
     mapping: &Mapping,
     strides: [usize; 2],
     stored: &[f64],
-    convert: impl Fn(f64) -> f32,
+    mut convert: impl FnMut(f64) -> f32,
 ) -> Vec<f32> {
     let mut values = Vec::with_capacity(mapping.grid.cell_count());
     for row in &mapping.file_rows {

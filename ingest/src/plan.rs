@@ -47,6 +47,15 @@ pub(crate) struct PlannedGranule {
     pub(crate) assumptions: Vec<String>,
 }
 
+impl PlannedGranule {
+    /// Cells of one map as it lies in the file.
+    pub(crate) fn plane_cells(&self) -> u64 {
+        let is_plane = |axis: &&Axis| matches!(axis.role, Role::Latitude | Role::Longitude);
+        let plane = self.axes.iter().filter(is_plane);
+        plane.map(|axis| axis.len).fold(1, u64::saturating_mul)
+    }
+}
+
 /// What a file becomes.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Target {

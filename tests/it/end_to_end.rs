@@ -182,7 +182,11 @@ fn the_mean_over_a_region_times_its_area_is_its_budget() {
     }
     let first = program::json(data, &[&words[..], &region, &["--to", "2000-02"]].concat());
     assert_eq!(first.unwrap()["series"].as_array().unwrap().len(), 1);
-    for (region, reason) in [("atlantis", "atlantis"), ("0,10,10,0", "region"), ("a.json", "a.json")] {
+    for (region, reason) in [
+        ("atlantis", "atlantis"),
+        ("0,10,10,0", "region"),
+        ("a.json", "a.json"),
+    ] {
         let refused = program::fail(data, &[&words[..], &["--region", region]].concat()).unwrap();
         assert!(refused.contains(reason), "{refused}");
     }

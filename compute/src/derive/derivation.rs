@@ -201,6 +201,7 @@ impl<'a> Derivation<'a> {
     ) -> Result<Step, ComputeError> {
         let (store, grid) = (self.store(), &self.source.grid);
         Ok(Step {
+            masked: None,
             period: step.period,
             frame: frames::write(store, self.target, grid, values, step.period).await?,
             raw_sha256: step.made_of,

@@ -33,6 +33,7 @@ async fn product(store: &Store) -> Manifest {
         let period = Period::month(2010, month).unwrap();
         let frame = frames::write(store, &product, &GRID, &values, period);
         steps.push(Step {
+            masked: None,
             period,
             frame: frame.await.unwrap(),
             raw_sha256: Digest::of(b""),

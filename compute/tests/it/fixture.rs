@@ -61,6 +61,7 @@ pub(crate) async fn land(
             .zip(values)
             .for_each(|(cell, value)| *cell |= !value.is_nan());
         listed.push(Step {
+            masked: None,
             period: *period,
             frame: frames::write(store, id, &grid, values, *period)
                 .await

@@ -28,6 +28,8 @@ pub(crate) struct Description {
     pub(crate) attributes: Attributes,
     /// Variables in the order of the file.
     pub(crate) variables: Vec<Variable>,
+    /// Most memory that is taken to unpack values of a variable, beside the values themselves, bytes.
+    pub(crate) library_bytes: u64,
 }
 
 /// One variable.

@@ -6,11 +6,14 @@
 mod axes;
 mod bad_input;
 mod cf_files;
+mod contained;
 mod faults;
 mod fixture;
 mod guarded;
 mod hostile;
 mod made;
+mod masked;
+mod memory;
 mod order;
 mod other_writers;
 mod quality;

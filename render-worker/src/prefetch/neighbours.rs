@@ -114,6 +114,7 @@ mod tests {
     fn manifest(quantity: Quantity, months: u32) -> Manifest {
         let product: ProductId = "p".parse().unwrap();
         let step = |month| Step {
+            masked: None,
             period: Period::month(2000, month).unwrap(),
             frame: frame(month),
             raw_sha256: Digest::of(b""),

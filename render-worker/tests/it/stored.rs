@@ -31,6 +31,7 @@ pub(crate) async fn product(
             *cell |= value.is_finite();
         }
         steps.push(Step {
+            masked: None,
             period,
             frame,
             raw_sha256: Digest::of(b""),

@@ -68,6 +68,7 @@ mod tests {
     /// A version with a frame a month, named by its content.
     fn manifest(contents: &[&str], domain: &str) -> Manifest {
         let step = |(i, content): (usize, &&str)| Step {
+            masked: None,
             period: month(i + 1),
             frame: ObjectKey::frame(&product(), &Digest::of(content.as_bytes())),
             raw_sha256: Digest::of(b""),

@@ -185,6 +185,7 @@ impl TestApp {
         for (month, values) in (1..).zip(&values) {
             let period = Period::month(2000, month).unwrap();
             steps.push(Step {
+                masked: None,
                 period,
                 frame: frames::write(&self.store, &product, &GRID, values, period)
                     .await

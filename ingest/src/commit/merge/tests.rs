@@ -2,6 +2,7 @@
 
 use contract::digest::Digest;
 use contract::key::ObjectKey;
+use contract::masked::MaskedCells;
 use contract::quantity::Quantity;
 use contract::time::Period;
 
@@ -28,6 +29,7 @@ fn granule(content: &str, periods: &[Period]) -> StoredGranule {
         );
         StoredGrid {
             step: Step {
+                masked: None,
                 period: *period,
                 frame,
                 raw_sha256,
@@ -51,6 +53,7 @@ fn granule(content: &str, periods: &[Period]) -> StoredGranule {
         assumptions: vec![],
         asked_by: None,
         order: None,
+        masked: MaskedCells::default(),
         grids: periods.iter().map(step).collect(),
     }
 }
