@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use contract::digest::Digest;
 use contract::event::{Body, Event, RejectReason};
 use contract::manifest::ManifestId;
-use contract::masked::MaskedCells;
 use contract::notice::NoticeOrder;
 use contract::time::{Period, TimeMs};
 use contract::topic::Origin;
