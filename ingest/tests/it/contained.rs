@@ -81,7 +81,8 @@ async fn a_panic_over_a_file_refuses_it_and_the_command_goes_on() {
             files: files(&place),
             ..Batch::default()
         };
-        let landed = ingest::land_files(&place.store, &place.log, &settings(), batch, &planted);
+        let settings = settings();
+        let landed = ingest::land_files(&place.store, &place.log, &settings, batch, &planted);
         let outcomes = landed.await.unwrap();
         assert!(planted.has_fired());
         let [

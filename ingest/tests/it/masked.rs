@@ -97,7 +97,7 @@ async fn what_is_masked_is_counted_step_by_step_and_told() {
         let own = metrics
             .iter()
             .find(|m| has("reason", reason, m) && has("product", "fgco2", m));
-        assert_eq!(own.unwrap().get_counter().value(), count as f64, "{reason}");
+        assert_eq!(own.unwrap().get_counter().get_value(), count as f64, "{reason}");
     }
 
     // A file that is there says the same again.

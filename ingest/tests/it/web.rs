@@ -314,7 +314,8 @@ async fn a_file_of_unknown_size_lands_where_the_spool_is_no_multiple_of_its_unit
     let ended = tokio::time::timeout(limit, outcome_of(&place, &settings, asked)).await;
     let outcome = ended.expect("it waits for ever");
     assert!(matches!(outcome, Outcome::Landed { .. }), "{outcome}");
-    let larger = refused(&place, &settings, &server.url("/larger.nc"));
+    let url = server.url("/larger.nc");
+    let larger = refused(&place, &settings, &url);
     let (reason, line) = tokio::time::timeout(limit, larger)
         .await
         .expect("it waits for ever");
