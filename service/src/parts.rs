@@ -111,7 +111,11 @@ fn judge(
         Err(panicked) => (panicked.id(), panicked.into()),
     };
     let part = names.get(&id).copied().unwrap_or("a part");
-    tracing::error!(part, error = in_full(source.as_ref()), "has ended; the service ends");
+    tracing::error!(
+        part,
+        error = in_full(source.as_ref()),
+        "has ended; the service ends"
+    );
     board.set(part, || async { Err::<String, _>("it has ended") });
     Some(PartEnded { part, source })
 }
@@ -159,7 +163,10 @@ mod tests {
         assert!(is_ready(&board).await);
         parts.start("ingest", async { Err::<(), _>("topic is gone") });
         let error = parts.run().await.unwrap_err();
-        assert_eq!((error.part, error.source.to_string().as_str()), ("ingest", "topic is gone"));
+        assert_eq!(
+            (error.part, error.source.to_string().as_str()),
+            ("ingest", "topic is gone")
+        );
         assert!(!is_ready(&board).await);
         assert!(stop.is_said());
     }
@@ -173,7 +180,10 @@ mod tests {
             Ok::<_, String>(())
         });
         let error = parts.run().await.unwrap_err();
-        assert!(error.source.to_string().contains("out of cheese"), "{error:?}");
+        assert!(
+            error.source.to_string().contains("out of cheese"),
+            "{error:?}"
+        );
 
         let (stop, board) = ready();
         let mut parts = Parts::new(&stop, &board);

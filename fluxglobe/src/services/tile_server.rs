@@ -42,7 +42,10 @@ pub(crate) async fn run(settings: &Settings, options: TileServer) -> Result<()> 
     let mut parts = footing.parts();
     parts.start("tile server", server.run(footing.stop.said()));
     let own = footing.clone();
-    parts.start("news", async move { live(&own, &options.kafka, state).await });
+    parts.start(
+        "news",
+        async move { live(&own, &options.kafka, state).await },
+    );
     footing.run(parts).await
 }
 

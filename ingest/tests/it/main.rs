@@ -9,6 +9,7 @@ mod faults;
 mod fixture;
 mod guarded;
 mod hostile;
+mod many_steps;
 mod order;
 mod other_writers;
 mod real_files;
