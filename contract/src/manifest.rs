@@ -367,7 +367,7 @@ mod tests {
         let json = r#"{"schema":1,"product":"p","number":3,"title":"","quantity":"carbon_flux","synthetic":false,"source":"","grid":{"rows":1,"cols":1,"north_deg":1.0,"west_deg":0.0,"dlat_deg":1.0,"dlon_deg":1.0},"steps":[{"period":{"start":"2000-01-01T00:00:00Z","end":"2000-02-01T00:00:00Z"},"frame":"frames/p/e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855","raw_sha256":"e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855","origin":"f.nc","valid_cells":1}],"domain":"domain/p/e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855","series":[],"derived_from":null}"#;
         let old: Manifest = serde_json::from_str(json).unwrap();
         assert_eq!(serde_json::to_string(&old).unwrap(), json);
-        assert_eq!(old.id().to_string(), "p@3-ID_OF_VERSION_1");
+        assert_eq!(old.id().to_string(), "p@3-56d19b9b");
         assert_eq!(old.notice_orders(), [None]);
     }
 

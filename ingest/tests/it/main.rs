@@ -14,6 +14,7 @@ mod hostile;
 mod made;
 mod masked;
 mod memory;
+mod many_steps;
 mod order;
 mod other_writers;
 mod quality;
