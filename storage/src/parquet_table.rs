@@ -12,9 +12,9 @@ use parquet::schema::types::ColumnPath;
 
 use crate::StorageError;
 
-/// Bytes after which a page of arrays ends, which it does between rows: a row of 1024 values or more is a page of its
+/// Bytes after which a page of arrays ends, which it does between rows: a row of 256 values or more is a page of its
 /// own, so that a reader who wants some rows fetches and decodes those and no others.
-const PAGE_BYTES: usize = 4 << 10;
+const PAGE_BYTES: usize = 1 << 10;
 
 /// Bytes of a table; `rows_per_group` is how many rows share their entries in the footer.
 pub(crate) fn encode(batch: &RecordBatch, rows_per_group: usize) -> Result<Bytes, StorageError> {
