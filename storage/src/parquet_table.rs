@@ -15,9 +15,9 @@ use parquet::schema::types::ColumnPath;
 use crate::StorageError;
 use crate::sound::{damage, seal};
 
-/// Bytes after which a page of arrays ends, which it does between rows: a row of 1024 values or more is a page of its
+/// Bytes after which a page of arrays ends, which it does between rows: a row of 256 values or more is a page of its
 /// own, so that a reader who wants some rows fetches and decodes those and no others.
-const PAGE_BYTES: usize = 4 << 10;
+const PAGE_BYTES: usize = 1 << 10;
 /// Name of the entry of a file that holds the lengths of what its values lie on.
 const SHAPE: &str = "fluxglobe.shape";
 

@@ -174,7 +174,7 @@ fn the_mean_over_a_region_times_its_area_is_its_budget() {
     };
     for (step, month) in steps.iter().zip(months) {
         let share = number(step, "coverage_percent");
-        assert!(share > 30.0 && share < 80.0, "land and gaps: {share}");
+        assert!(share > 20.0 && share < 95.0, "land and gaps: {share}");
         let seconds = (ms(step, "end") - ms(step, "start")) / 1000.0;
         let mass_g = number(step, "mean") * number(step, "area_m2") * seconds / SECONDS_PER_YEAR;
         let expected = number(month, "budget_tg") * G_PER_TG;
