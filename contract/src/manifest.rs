@@ -16,7 +16,8 @@ use crate::time::{Period, TimeMs};
 
 /// Version of the manifest's JSON as it is written. Those since [`OLDEST_MANIFEST_SCHEMA`] are read too.
 ///
-/// 2: the order of the notices that brought the files; a manifest is sealed when it is stored.
+/// 2: the order of the notices that brought the files; how complete accumulated sums are; a manifest is sealed when it is
+/// stored.
 pub const MANIFEST_SCHEMA: u32 = 2;
 /// Oldest version that is read.
 pub const OLDEST_MANIFEST_SCHEMA: u32 = 1;
