@@ -65,6 +65,17 @@ async fn begun(app: &TestApp, tiles: u64) -> Vec<impl Future<Output = Answer> + 
     all
 }
 
+/// Waits until so many pictures were begun to be drawn; false if that never comes.
+async fn were_drawn(app: &TestApp, count: usize) -> bool {
+    let drawn = async {
+        while app.drawer.drawn_count() < count {
+            tokio::task::yield_now().await;
+        }
+    };
+    let limit = Duration::from_mins(1);
+    tokio::time::timeout(limit, drawn).await.is_ok()
+}
+
 #[tokio::test]
 async fn a_picture_that_is_encoded_holds_up_no_other_and_counts_until_it_is_stored() {
     let app = TestApp::with(|settings| {
@@ -74,13 +85,7 @@ async fn a_picture_that_is_encoded_holds_up_no_other_and_counts_until_it_is_stor
     app.drawer.encodes_slowly.store(true, Ordering::SeqCst);
     let all = begun(&app, 3).await;
     // One may be drawn at once, and none is done: the first two are drawn though.
-    let drawn = async {
-        while app.drawer.drawn_count() < 3 {
-            tokio::task::yield_now().await;
-        }
-    };
-    let limit = Duration::from_mins(1);
-    assert!(tokio::time::timeout(limit, drawn).await.is_ok());
+    assert!(were_drawn(&app, 3).await);
     let sent_away = app.get(TILE).await;
     assert_eq!(sent_away.status, StatusCode::SERVICE_UNAVAILABLE);
     app.drawer.turns.add_permits(3);
@@ -95,9 +100,7 @@ async fn as_many_are_drawn_at_once_as_were_asked_for_or_as_suit_the_drawer() {
         let app = TestApp::with(|settings| settings.draws_at_once = asked).await;
         app.drawer.is_slow.store(true, Ordering::SeqCst);
         let all = begun(&app, 4).await;
-        while app.drawer.drawn_count() < at_once {
-            tokio::task::yield_now().await;
-        }
+        assert!(were_drawn(&app, at_once).await, "{asked:?}");
         // Whoever could begin has had the time to.
         for _ in 0..100 {
             tokio::task::yield_now().await;
