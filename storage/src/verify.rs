@@ -76,11 +76,11 @@ pub async fn run(
 ) -> Result<Report, StorageError> {
     let mut report = Report::default();
     let mut named = BTreeSet::new();
-    let mut checked = stream::iter(keys)
-        .map(|key| async move { Ok::<_, StorageError>((key, check(store, key).await?)) })
-        .buffered(AT_ONCE);
+    let checks: Vec<_> = keys.iter().map(|key| check(store, key.clone())).collect();
+    let mut checked = stream::iter(checks).buffered(AT_ONCE);
     let mut done_count = 0;
-    while let Some((key, found)) = checked.try_next().await? {
+    while let Some(found) = checked.try_next().await? {
+        let key = &keys[done_count];
         done_count += 1;
         match found {
             Checked::Sound(soundness, bytes) => {
@@ -139,15 +139,17 @@ pub async fn damaged(
     store: &Store,
     keys: impl IntoIterator<Item = ObjectKey>,
 ) -> Result<BTreeSet<ObjectKey>, StorageError> {
-    let checks = keys.into_iter().map(|key| async move {
-        let found = check(store, &key).await?;
-        Ok::<_, StorageError>(matches!(found, Checked::Damaged(_)).then_some(key))
-    });
-    let found: Vec<Option<ObjectKey>> = stream::iter(checks)
-        .buffer_unordered(AT_ONCE)
+    let keys: Vec<ObjectKey> = keys.into_iter().collect();
+    let checks: Vec<_> = keys.iter().map(|key| check(store, key.clone())).collect();
+    let found: Vec<Checked> = stream::iter(checks)
+        .buffered(AT_ONCE)
         .try_collect()
         .await?;
-    Ok(found.into_iter().flatten().collect())
+    let checked = keys.into_iter().zip(found);
+    Ok(checked
+        .filter(|(_, found)| matches!(found, Checked::Damaged(_)))
+        .map(|(key, _)| key)
+        .collect())
 }
 
 enum Checked {
@@ -157,15 +159,15 @@ enum Checked {
     Damaged(String),
 }
 
-async fn check(store: &Store, key: &ObjectKey) -> Result<Checked, StorageError> {
-    let content = match store.fetch(key).await {
+async fn check(store: &Store, key: ObjectKey) -> Result<Checked, StorageError> {
+    let content = match store.fetch(&key).await {
         Ok(content) => content,
         Err(e) if e.is_not_found() => return Ok(Checked::Gone),
         Err(StorageError::Damaged { reason, .. }) => return Ok(Checked::Damaged(reason)),
         Err(e) => return Err(e),
     };
-    let (own, bytes) = (key.clone(), content.len() as u64);
-    match sound::off_thread(move || sound::of_object(&own, &content)).await {
+    let bytes = content.len() as u64;
+    match sound::off_thread(move || sound::of_object(&key, &content)).await {
         Ok(soundness) => Ok(Checked::Sound(soundness, bytes)),
         Err(StorageError::Damaged { reason, .. }) => Ok(Checked::Damaged(reason)),
         Err(e) => Err(e),

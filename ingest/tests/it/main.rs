@@ -5,6 +5,7 @@
 
 mod bad_input;
 mod cf_files;
+mod damaged;
 mod faults;
 mod fixture;
 mod guarded;

@@ -52,6 +52,7 @@ async fn store() -> Store {
             series: series.unwrap(),
         }],
         derived_from: None,
+        notices: vec![],
     };
     manifests::commit(&store, &manifest).await.unwrap();
     let areas = [(0, vec![1.5; 15])];
