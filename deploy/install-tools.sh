@@ -71,4 +71,9 @@ pip_install() {
     fi
 }
 pip_install cmake 3.31.6
-if [ "$purpose" = test ]; then pip_install typos 1.52.0; fi
+if [ "$purpose" = test ]; then
+    pip_install typos 1.52.0
+    # What the reference computations in tests/reference import.
+    pip_install numpy 2.4.6
+    pip_install netCDF4 1.7.4
+fi

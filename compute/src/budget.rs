@@ -1,5 +1,6 @@
 //! Carbon budgets: B = the integral of the flux over a region's area and over time, exact at any parallelism.
 
+mod accumulated;
 mod asked;
 pub mod chunk;
 pub mod fixed;
@@ -9,6 +10,7 @@ pub mod rows;
 pub mod running;
 pub mod sums;
 
+pub use accumulated::Completeness;
 pub(crate) use query::steps_inside;
 pub use query::{BudgetAnswer, BudgetQuery, budget, budget_of};
 pub use rows::{BudgetRow, BudgetStep};

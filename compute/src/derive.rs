@@ -1,5 +1,6 @@
 //! Accumulated carbon: a product of fluxes in, a product of the carbon given off since a chosen start out.
 
+mod at_cell;
 mod derivation;
 pub(crate) mod exact;
 mod prior;
@@ -15,6 +16,7 @@ use contract::time::{Period, TimeMs};
 use storage::{StorageError, Store, manifests};
 
 use crate::{ComputeError, Engine, catalog};
+pub use at_cell::{CellCounts, counts_at_cell};
 use derivation::Derivation;
 use source::{SourceStep, steps_since};
 

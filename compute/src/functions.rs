@@ -3,6 +3,7 @@
 //! Every session that plans or runs our queries (client, scheduler, executor) gets them from here.
 
 mod column_sum;
+mod has_data;
 mod lists;
 mod region_sums;
 mod series_at;
@@ -20,6 +21,7 @@ pub fn scalar_functions(objects: &Objects) -> Vec<Arc<ScalarUDF>> {
     let region_sums = region_sums::RegionSums::new(objects.clone());
     [
         AsyncScalarUDF::new(Arc::new(region_sums)).into_scalar_udf(),
+        ScalarUDF::from(has_data::HasData::new()),
         ScalarUDF::from(series_at::SeriesAt::new()),
         ScalarUDF::from(sound::Sound::new()),
     ]

@@ -75,7 +75,10 @@ impl Objects {
 
 /// The key at the end of an address of weights: what they are checked as, and named by if they are damaged.
 fn key_at(address: &str) -> Result<ObjectKey, DataFusionError> {
-    let digits = address.rsplit('/').next().and_then(|name| name.strip_suffix(".parquet"));
+    let digits = address
+        .rsplit('/')
+        .next()
+        .and_then(|name| name.strip_suffix(".parquet"));
     let job = digits.and_then(|digits| digits.parse().ok());
     job.map(|job| ObjectKey::weights(&job))
         .ok_or_else(|| DataFusionError::Execution(format!("{address} is no address of weights")))

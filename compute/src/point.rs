@@ -10,8 +10,9 @@ use datafusion::arrow::array::{AsArray as _, RecordBatch};
 use datafusion::arrow::datatypes::Float32Type;
 use serde::{Deserialize, Serialize};
 
-use crate::session::QueryContext;
+use crate::derive::{CellCounts, counts_at_cell};
 use crate::scan::{self, Layout};
+use crate::session::QueryContext;
 use crate::{ComputeError, Engine, catalog};
 
 /// The cell that a place lies in.
@@ -38,6 +39,9 @@ pub struct PointValue {
     pub mid: TimeMs,
     /// Value in the answer's unit; none where the cell holds no data.
     pub value: Option<f64>,
+    /// What a sum of accumulated carbon holds; none for other values, and where nobody can tell any more.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub contributed: Option<CellCounts>,
 }
 
 /// A series with all that is needed to cite it.
@@ -88,14 +92,13 @@ pub async fn point_series(
     let display = manifest.quantity.display();
     let shown = |value: f32| f64::from(value) * display.factor + display.offset;
     let values = cell_values(engine, &manifest, row, col).await?;
-    let values = values
-        .into_iter()
-        .map(|value| (!value.is_nan()).then(|| shown(value)));
-    let point = |(step, value): (&contract::manifest::Step, Option<f64>)| PointValue {
+    let counts = counts_at_cell(engine, &manifest, row, col).await?;
+    let point = |(index, step): (usize, &contract::manifest::Step)| PointValue {
         start: step.period.start,
         end: step.period.end,
         mid: step.period.mid(),
-        value,
+        value: (!values[index].is_nan()).then(|| shown(values[index])),
+        contributed: counts.as_ref().map(|counts| counts[index]),
     };
     let center = manifest.grid.cell_center(row, col);
     Ok(PointAnswer {
@@ -114,7 +117,7 @@ pub async fn point_series(
             lon: center.lon,
             lat: center.lat,
         },
-        series: manifest.steps.iter().zip(values).map(point).collect(),
+        series: manifest.steps.iter().enumerate().map(point).collect(),
     })
 }
 

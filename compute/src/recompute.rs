@@ -21,7 +21,7 @@ pub use run::{Outcome, run};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum What {
-    /// Accumulated frames and their series.
+    /// Accumulated frames, what they lack, and their series.
     Frames,
     /// Sums that means over named regions are made of.
     Statistics,

@@ -7,6 +7,7 @@ use crate::digest::Digest;
 use crate::job::RenderJob;
 use crate::key::ObjectKey;
 use crate::manifest::ManifestId;
+use crate::masked::MaskedCells;
 use crate::observation::Observation;
 use crate::product::ProductId;
 use crate::time::{Period, TimeMs};
@@ -82,6 +83,12 @@ pub enum Body {
         step_count: Option<u64>,
         /// Did it replace values that were there?
         revised: bool,
+        /// What was taken for granted when it was read, because nothing in the file says it. One line each.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        assumptions: Vec<String>,
+        /// Cells of all its steps that it gave a value for and that hold none; the manifest has them step by step.
+        #[serde(default, skip_serializing_if = "MaskedCells::is_none")]
+        masked: MaskedCells,
     },
     /// A file was refused.
     #[serde(rename = "granule.rejected")]
@@ -189,7 +196,27 @@ impl Body {
             step_count: folded.as_ref().map(|_runs| periods.len() as u64),
             periods: folded.unwrap_or_else(|| periods.to_vec()),
             revised,
+            assumptions: vec![],
+            masked: MaskedCells::default(),
         }
+    }
+
+    /// The same, of a landed file that was read with assumptions.
+    #[must_use]
+    pub fn assuming(mut self, lines: &[String]) -> Self {
+        if let Self::GranuleLanded { assumptions, .. } = &mut self {
+            *assumptions = lines.to_vec();
+        }
+        self
+    }
+
+    /// The same news of a file with what was masked of it.
+    #[must_use]
+    pub fn with_masked(mut self, cells: MaskedCells) -> Self {
+        if let Self::GranuleLanded { masked, .. } = &mut self {
+            *masked = cells;
+        }
+        self
     }
 
     /// Topic that events of this kind go to.

@@ -26,13 +26,22 @@ impl ObjectKey {
     /// One time step as map-major chunks, named by its values: other bytes for the same values are the same frame.
     pub fn frame(product: &ProductId, values_sha256: &Digest) -> Self {
         let of_values = Self::OF_VALUES;
-        Self(format!("frames/{product}/{of_values}{values_sha256}.parquet"))
+        Self(format!(
+            "frames/{product}/{of_values}{values_sha256}.parquet"
+        ))
     }
 
     /// One segment of time as time-major chunks, named by its values.
     pub fn series(product: &ProductId, values_sha256: &Digest) -> Self {
         let of_values = Self::OF_VALUES;
-        Self(format!("series/{product}/{of_values}{values_sha256}.parquet"))
+        Self(format!(
+            "series/{product}/{of_values}{values_sha256}.parquet"
+        ))
+    }
+
+    /// Steps and time that each cell's sum after a step of accumulated carbon holds, named by its numbers.
+    pub fn contributed(product: &ProductId, sha256: &Digest) -> Self {
+        Self(format!("contributed/{product}/{sha256}.parquet"))
     }
 
     /// The cells that hold data in some step, one byte a cell, named by its bytes.
@@ -131,6 +140,7 @@ mod tests {
             ObjectKey::raw(&product, &digest),
             ObjectKey::frame(&product, &digest),
             ObjectKey::series(&product, &digest),
+            ObjectKey::contributed(&product, &digest),
             ObjectKey::domain(&product, &digest),
             ObjectKey::manifest(&product, 7),
             ObjectKey::weights(&digest),

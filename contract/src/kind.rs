@@ -10,6 +10,8 @@ pub enum Kind {
     Raw,
     /// One time step, map-major.
     Frame,
+    /// Steps and time that each sum of accumulated carbon holds, map-major.
+    Contributed,
     /// A run of steps, time-major.
     Series,
     /// The cells that hold data in some step.
@@ -51,9 +53,10 @@ pub enum Vouched {
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 16] = [
         Self::Raw,
         Self::Frame,
+        Self::Contributed,
         Self::Series,
         Self::Domain,
         Self::Manifest,
@@ -74,6 +77,7 @@ impl Kind {
         match self {
             Self::Raw => "raw",
             Self::Frame => "frames",
+            Self::Contributed => "contributed",
             Self::Series => "series",
             Self::Domain => "domain",
             Self::Manifest => "manifests",
@@ -107,6 +111,7 @@ impl ObjectKey {
                 Some(values) => digest(values).map_or(Vouched::Nothing, Vouched::Values),
                 None => digest(stem).map_or(Vouched::Nothing, Vouched::Bytes),
             },
+            Some(Kind::Contributed) => digest(stem).map_or(Vouched::Nothing, Vouched::Values),
             Some(Kind::Raw | Kind::Domain | Kind::Observations) => {
                 digest(stem).map_or(Vouched::Nothing, Vouched::Bytes)
             }
@@ -129,6 +134,11 @@ mod tests {
             (ObjectKey::frame(&product, &digest), Kind::Frame, values),
             (old_frame, Kind::Frame, bytes),
             (ObjectKey::series(&product, &digest), Kind::Series, values),
+            (
+                ObjectKey::contributed(&product, &digest),
+                Kind::Contributed,
+                values,
+            ),
             (ObjectKey::domain(&product, &digest), Kind::Domain, bytes),
             (
                 ObjectKey::observations(&product, &digest),

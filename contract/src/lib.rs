@@ -18,6 +18,7 @@ pub mod job;
 pub mod key;
 pub mod kind;
 pub mod manifest;
+pub mod masked;
 pub mod moment;
 pub mod notice;
 pub mod observation;

@@ -8,6 +8,7 @@ use crate::ContractError;
 use crate::digest::Digest;
 use crate::grid::Grid;
 use crate::key::ObjectKey;
+use crate::masked::MaskedCells;
 use crate::notice::{NoticeOrder, NoticeRun};
 use crate::product::ProductId;
 use crate::quantity::Quantity;
@@ -15,7 +16,8 @@ use crate::time::{Period, TimeMs};
 
 /// Version of the manifest's JSON as it is written. Those since [`OLDEST_MANIFEST_SCHEMA`] are read too.
 ///
-/// 2: the order of the notices that brought the files; a manifest is sealed when it is stored.
+/// 2: the order of the notices that brought the files; how complete accumulated sums are; a manifest is sealed when it is
+/// stored.
 pub const MANIFEST_SCHEMA: u32 = 2;
 /// Oldest version that is read.
 pub const OLDEST_MANIFEST_SCHEMA: u32 = 1;
@@ -67,6 +69,23 @@ pub struct Step {
     pub origin: String,
     /// Cells with data.
     pub valid_cells: u64,
+    /// Cells that the file gave a value for and that hold none here. None of steps that landed before these were counted
+    /// (what they lack is not known), and of computed ones.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub masked: Option<MaskedCells>,
+    /// How complete the sums of accumulated carbon are; none for means, and in versions that did not count it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub contributed: Option<Contributed>,
+}
+
+/// What of the accumulated time each cell's sum holds.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Contributed {
+    /// Steps and time that contributed, map-major chunks.
+    pub counts: ObjectKey,
+    /// Cells that had data in all of the accumulated time: a sum over one month of twelve is not a complete one.
+    pub complete_cells: u64,
 }
 
 /// A run of consecutive steps, stored time-major.
@@ -82,6 +101,17 @@ pub struct SeriesSegment {
 }
 
 impl Manifest {
+    /// What was masked in its steps, as far as it was counted, and of how many steps it was not.
+    pub fn masked(&self) -> (MaskedCells, usize) {
+        let counted = self.steps.iter().filter_map(|step| step.masked);
+        let uncounted = self
+            .steps
+            .iter()
+            .filter(|step| step.masked.is_none())
+            .count();
+        (counted.sum(), uncounted)
+    }
+
     /// The name that answers cite.
     pub fn id(&self) -> ManifestId {
         ManifestId {
@@ -237,11 +267,13 @@ mod tests {
         let product: ProductId = "p".parse().unwrap();
         let digest = Digest::of(b"");
         let step = |month| Step {
+            masked: None,
             period: Period::month(2000, month).unwrap(),
             frame: ObjectKey::frame(&product, &digest),
             raw_sha256: digest,
             origin: "f.nc".into(),
             valid_cells: 1,
+            contributed: None,
         };
         Manifest {
             schema: MANIFEST_SCHEMA,
@@ -336,8 +368,29 @@ mod tests {
         let json = r#"{"schema":1,"product":"p","number":3,"title":"","quantity":"carbon_flux","synthetic":false,"source":"","grid":{"rows":1,"cols":1,"north_deg":1.0,"west_deg":0.0,"dlat_deg":1.0,"dlon_deg":1.0},"steps":[{"period":{"start":"2000-01-01T00:00:00Z","end":"2000-02-01T00:00:00Z"},"frame":"frames/p/e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855","raw_sha256":"e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855","origin":"f.nc","valid_cells":1}],"domain":"domain/p/e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855","series":[],"derived_from":null}"#;
         let old: Manifest = serde_json::from_str(json).unwrap();
         assert_eq!(serde_json::to_string(&old).unwrap(), json);
-        assert_eq!(old.id().to_string(), "p@3-ID_OF_VERSION_1");
+        assert_eq!(old.id().to_string(), "p@3-56d19b9b");
         assert_eq!(old.notice_orders(), [None]);
+    }
+
+    #[test]
+    fn what_is_masked_is_counted_apart_from_what_is_not_known() {
+        let mut m = manifest(Quantity::CarbonFlux);
+        let old = m.id();
+        assert_eq!(m.masked(), (MaskedCells::default(), 3));
+        let json = serde_json::to_string(&m).unwrap();
+        assert!(
+            !json.contains("masked"),
+            "a step of old times is as it was: {json}"
+        );
+        m.steps[0].masked = Some(MaskedCells::default());
+        m.steps[1].masked = Some(MaskedCells {
+            implausible: 7,
+            ..MaskedCells::default()
+        });
+        assert_eq!((m.masked().0.implausible, m.masked().1), (7, 1));
+        let json = serde_json::to_string(&m).unwrap();
+        assert_eq!(serde_json::from_str::<Manifest>(&json).unwrap(), m);
+        assert_ne!(m.id(), old);
     }
 
     #[test]

@@ -83,12 +83,7 @@ pub(crate) struct Settings {
     #[arg(long, env = "FLUXGLOBE_CPU", global = true)]
     pub(crate) cpu: bool,
     /// Refuse to draw where there is no graphics card, instead of drawing in software.
-    #[arg(
-        long,
-        env = "FLUXGLOBE_REQUIRE_GPU",
-        global = true,
-        conflicts_with = "cpu"
-    )]
+    #[arg(long, env = "FLUXGLOBE_REQUIRE_GPU", global = true)]
     pub(crate) require_gpu: bool,
     /// Parts that a query is cut into, on a cluster at least; as many as this machine has processors, or as the cluster's
     /// executors have room for, if absent. Answers are the same bits for any number.

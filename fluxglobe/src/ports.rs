@@ -18,7 +18,7 @@ use render_worker::fleet::{Fleet, FleetError};
 use render_worker::{RenderError, RenderService};
 use tile_server::backend::{
     Analyse, AreaRequest, AreaRow, AreaSeries, BackendError, BudgetRequest, BudgetRow,
-    BudgetStep as WantedStep, Check, Class, Draw, RowCol, Turn,
+    BudgetStep as WantedStep, Check, Class, Contributed, Draw, PointStep, RowCol, Turn,
 };
 
 pub(crate) use observer::Observer;
@@ -83,11 +83,21 @@ impl Analyse for Analyst {
         &self,
         manifest: &Manifest,
         cell: RowCol,
-    ) -> Result<Vec<Option<f64>>, BackendError> {
-        let values = compute::point::cell_values(&self.local, manifest, cell.row, cell.col).await;
+    ) -> Result<Vec<PointStep>, BackendError> {
+        let RowCol { row, col } = cell;
+        let values = compute::point::cell_values(&self.local, manifest, row, col).await;
         let values = values.map_err(compute_failed)?;
-        let known = |value: f32| (!value.is_nan()).then_some(f64::from(value));
-        Ok(values.into_iter().map(known).collect())
+        let counts = compute::derive::counts_at_cell(&self.local, manifest, row, col).await;
+        let counts = counts.map_err(compute_failed)?;
+        let step = |(index, value): (usize, f32)| PointStep {
+            value: (!value.is_nan()).then_some(f64::from(value)),
+            contributed: counts.as_ref().map(|counts| Contributed {
+                steps: counts[index].steps,
+                of_steps: counts[index].of_steps,
+                time_percent: counts[index].time_percent,
+            }),
+        };
+        Ok(values.into_iter().enumerate().map(step).collect())
     }
 
     async fn budget(&self, request: &BudgetRequest) -> Result<Vec<BudgetRow>, BackendError> {
@@ -115,6 +125,9 @@ impl Analyse for Analyst {
             budget_tg: row.budget_tg,
             coverage_percent: row.coverage_percent,
             area_m2: row.area_m2,
+            complete_and_incomplete_m2: row
+                .completeness
+                .map(|own| [own.complete_m2, own.incomplete_m2]),
         };
         Ok(answer.rows.into_iter().map(row).collect())
     }

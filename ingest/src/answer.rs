@@ -127,6 +127,7 @@ impl Asked {
                 raw_sha256,
                 manifest,
                 periods,
+                masked,
             } => {
                 let is_due = match self.origin {
                     Some(origin) => {
@@ -138,6 +139,7 @@ impl Asked {
                     file: self.path(),
                     manifest,
                     periods,
+                    masked,
                 };
                 Ready::Answered(self.answer(outcome, Some(raw_sha256), is_due))
             }
@@ -186,12 +188,13 @@ pub(crate) async fn commit(
         }
         let is_due = !matches!(committed, Committed::AlreadyLanded { is_due: false, .. });
         let raw_sha256 = Some(granule.raw_sha256);
-        asked.answer(outcome(asked.path(), committed), raw_sha256, is_due)
+        let outcome = outcome(asked.path(), committed, granule);
+        asked.answer(outcome, raw_sha256, is_due)
     };
     Ok(committed.into_iter().zip(batch).map(answer).collect())
 }
 
-fn outcome(file: PathBuf, committed: Committed) -> Outcome {
+fn outcome(file: PathBuf, committed: Committed, granule: &StoredGranule) -> Outcome {
     match committed {
         Committed::Landed {
             manifest,
@@ -202,6 +205,8 @@ fn outcome(file: PathBuf, committed: Committed) -> Outcome {
             manifest,
             periods,
             revised,
+            assumptions: granule.assumptions.clone(),
+            masked: granule.masked,
         },
         Committed::AlreadyLanded {
             manifest, periods, ..
@@ -209,6 +214,7 @@ fn outcome(file: PathBuf, committed: Committed) -> Outcome {
             file,
             manifest,
             periods,
+            masked: granule.masked,
         },
         Committed::Superseded { manifest, .. } => Outcome::Superseded { file, manifest },
         Committed::Rejected(rejection) => Outcome::rejected(file, rejection),

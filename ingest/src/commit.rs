@@ -28,6 +28,7 @@ use merge::{Change, Merged};
 pub(crate) use mend::mend;
 pub(crate) use merge::is_later_or_same;
 pub(crate) use replace::replace;
+pub(crate) use segments::{MAX_SEGMENT_STEPS, MAX_SEGMENT_VALUES};
 
 /// Lost races for the next number before the caller is told; it may go on.
 const MAX_TRIES: u32 = 200;

@@ -3,6 +3,7 @@
 use bytes::Bytes;
 use contract::grid::Grid;
 use contract::key::ObjectKey;
+use contract::masked::MaskedCells;
 use contract::product::ProductId;
 use contract::time::Period;
 
@@ -16,6 +17,7 @@ pub(crate) struct EncodedGrid {
     pub(crate) key: ObjectKey,
     pub(crate) frame: Bytes,
     pub(crate) valid_cells: u64,
+    pub(crate) masked: MaskedCells,
 }
 
 pub(crate) fn run(
@@ -30,5 +32,6 @@ pub(crate) fn run(
         key: ObjectKey::frame(product, &frame.values_sha256),
         frame: frame.content,
         valid_cells: checked.valid_cells,
+        masked: checked.masked,
     })
 }

@@ -1,6 +1,8 @@
 //! What operators see of ingest: its operations, how fresh landed files are, what was refused, how much waits.
 
 use contract::event::RejectReason;
+use contract::masked::MaskedCells;
+use contract::product::ProductId;
 use contract::time::TimeMs;
 use prometheus::{Gauge, Histogram, HistogramOpts, IntCounter, IntCounterVec, Opts, Registry};
 use service::{Outcome, Red, Running};
@@ -20,6 +22,7 @@ pub struct Metrics {
     rejected: IntCounterVec,
     superseded: IntCounter,
     bytes: IntCounter,
+    masked: IntCounterVec,
     /// NaN until it is known: no lag is not the same as none looked up.
     lag: Gauge,
 }
@@ -61,6 +64,13 @@ impl Metrics {
                 "fluxglobe_ingestd_fetched_bytes_total",
                 "Bytes of files that were fetched.",
             )?,
+            masked: IntCounterVec::new(
+                Opts::new(
+                    "fluxglobe_ingestd_masked_cells_total",
+                    "Cells of landed files that the file gave a value for and that hold none, by why.",
+                ),
+                &["product", "reason"],
+            )?,
             lag: Gauge::new(
                 "fluxglobe_ingestd_lag_messages",
                 "Notices that no ingest service has finished.",
@@ -71,6 +81,7 @@ impl Metrics {
         registry.register(Box::new(new.rejected.clone()))?;
         registry.register(Box::new(new.superseded.clone()))?;
         registry.register(Box::new(new.bytes.clone()))?;
+        registry.register(Box::new(new.masked.clone()))?;
         registry.register(Box::new(new.lag.clone()))?;
         Ok(new)
     }
@@ -100,6 +111,14 @@ impl Metrics {
         if let Some(noticed) = noticed {
             let ms = (now.ms() - noticed.ms()).max(0);
             self.notice_to_landed.observe(ms as f64 / 1000.0);
+        }
+    }
+
+    /// Counts what was masked of a file that landed; nothing, too, so that each product has its series from the first file on.
+    pub(crate) fn masked(&self, product: &ProductId, masked: MaskedCells) {
+        for (reason, count) in masked.by_reason() {
+            let labels = [product.as_str(), reason];
+            self.masked.with_label_values(&labels).inc_by(count);
         }
     }
 

@@ -8,6 +8,7 @@ use contract::time::TimeMs;
 use contract::{ContractError, digest::Digest};
 use storage::log::Message;
 
+use crate::boundary;
 use crate::error::IngestError;
 use crate::fetch::{Expected, Location};
 use crate::plan::Wish;
@@ -55,7 +56,10 @@ impl Notice {
     /// The notices of a message: at least one, so that every message is answered.
     pub(crate) fn of(message: &Message, settings: &Settings, now: TimeMs) -> Vec<Self> {
         let came = message.time.unwrap_or(now);
-        let mut notices = match read(message, settings, came) {
+        let notices = boundary::called(|| read(message, settings, came));
+        // What the panic says may quote the message, like the text of an error below.
+        let fault = "makes this program fail: report it with the message";
+        let mut notices = match notices.unwrap_or_else(|_panic| Err(bad(fault))) {
             Ok(notices) => notices,
             Err(rejection) => vec![Self::unreadable(message, rejection, came)],
         };

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use contract::event::{Body, RejectReason};
 use contract::manifest::ManifestId;
+use contract::masked::MaskedCells;
 use contract::time::Period;
 use contract::topic::Origin;
 
@@ -24,6 +25,10 @@ pub enum Outcome {
         periods: Vec<Period>,
         /// Did it replace values that were there?
         revised: bool,
+        /// What was taken for granted, because nothing in the file says it. One line each.
+        assumptions: Vec<String>,
+        /// Cells that it gave a value for and that hold none, steps without any value among them.
+        masked: MaskedCells,
     },
     /// The same content was in the product before.
     AlreadyLanded {
@@ -33,6 +38,8 @@ pub enum Outcome {
         manifest: ManifestId,
         /// Its periods.
         periods: Vec<Period>,
+        /// Cells that it gave a value for and that hold none.
+        masked: MaskedCells,
     },
     /// Files of later notices have its time: it changes nothing.
     Superseded {
@@ -91,6 +98,14 @@ impl Outcome {
         }
     }
 
+    /// Cells that the file gave a value for and that hold none, if it is in a product.
+    pub fn masked(&self) -> Option<MaskedCells> {
+        match self {
+            Self::Landed { masked, .. } | Self::AlreadyLanded { masked, .. } => Some(*masked),
+            Self::Superseded { .. } | Self::Observed { .. } | Self::Rejected { .. } => None,
+        }
+    }
+
     /// The file.
     pub fn file(&self) -> &std::path::Path {
         match self {
@@ -116,16 +131,24 @@ impl Outcome {
                     manifest,
                     periods,
                     revised,
+                    assumptions,
+                    masked,
                     ..
                 },
                 Some(raw_sha256),
-            ) => Body::granule_landed(path, raw_sha256, manifest.clone(), periods, *revised),
+            ) => Body::granule_landed(path, raw_sha256, manifest.clone(), periods, *revised)
+                .assuming(assumptions)
+                .with_masked(*masked),
             (
                 Self::AlreadyLanded {
-                    manifest, periods, ..
+                    manifest,
+                    periods,
+                    masked,
+                    ..
                 },
                 Some(raw_sha256),
-            ) => Body::granule_landed(path, raw_sha256, manifest.clone(), periods, false),
+            ) => Body::granule_landed(path, raw_sha256, manifest.clone(), periods, false)
+                .with_masked(*masked),
             (
                 Self::Rejected {
                     reason,
@@ -166,14 +189,19 @@ impl Display for Outcome {
                 manifest,
                 periods,
                 revised,
+                assumptions,
+                masked,
             } => {
                 let how = if *revised { "revised" } else { "landed" };
+                let gap = if masked.is_none() { "" } else { "; " };
                 write!(
                     f,
-                    "{}: {how} in {manifest} for {}",
+                    "{}: {how} in {manifest} for {}{gap}{masked}",
                     file.display(),
                     span(periods)
-                )
+                )?;
+                let assumed = |text: &String| write!(f, "; assumed: {text}");
+                assumptions.iter().try_for_each(assumed)
             }
             Self::AlreadyLanded { file, manifest, .. } => {
                 write!(f, "{}: was in {manifest} already", file.display())

@@ -4,6 +4,7 @@ use contract::digest::Digest;
 use contract::grid::Grid;
 use contract::key::ObjectKey;
 use contract::manifest::Step;
+use contract::masked::MaskedCells;
 use contract::notice::NoticeOrder;
 use contract::product::ProductId;
 use contract::topic::Origin;
@@ -28,6 +29,10 @@ pub(crate) struct StoredGranule {
     pub(crate) raw_sha256: Digest,
     /// In the order of time.
     pub(crate) grids: Vec<StoredGrid>,
+    /// What was taken for granted when it was read. One line each.
+    pub(crate) assumptions: Vec<String>,
+    /// What was masked in all steps of the file: those without any value are in no manifest.
+    pub(crate) masked: MaskedCells,
     /// The notice that it came with; none for files that no notice came for.
     pub(crate) asked_by: Option<Origin>,
     /// Its place in the order of notices.
@@ -61,6 +66,7 @@ pub(crate) async fn run(
         key,
         frame,
         valid_cells,
+        masked,
     } = encoded;
     let settled = match there {
         Some(there) => frames::settle(store, there, &key, grid)
@@ -82,6 +88,8 @@ pub(crate) async fn run(
             raw_sha256,
             origin,
             valid_cells,
+            contributed: None,
+            masked: Some(masked),
         },
     })
 }

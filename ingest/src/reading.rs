@@ -35,6 +35,9 @@ pub(crate) struct Reading {
     pub(crate) grid: Grid,
     /// In the order of time, at least one.
     pub(crate) steps: Vec<Step>,
+    /// What was taken for granted, because nothing in the file says it. One line each.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) assumptions: Vec<String>,
 }
 
 impl Reading {
@@ -49,6 +52,7 @@ impl Reading {
             synthetic: target.synthetic,
             grid,
             steps,
+            assumptions: vec![],
         }
     }
 

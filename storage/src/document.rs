@@ -52,7 +52,6 @@ pub async fn get<T: DeserializeOwned>(
 }
 
 fn sealed<T: Serialize>(key: &ObjectKey, document: &T) -> Result<Bytes, StorageError> {
-    let text =
-        serde_json::to_vec(document).map_err(|e| StorageError::damaged(key.as_str(), e))?;
+    let text = serde_json::to_vec(document).map_err(|e| StorageError::damaged(key.as_str(), e))?;
     Ok(Bytes::from(seal::json(text)))
 }

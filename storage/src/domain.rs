@@ -39,7 +39,10 @@ mod tests {
         let cells = [true, false, true];
         let key = write(&store, &"p".parse().unwrap(), &cells).await.unwrap();
         assert_eq!(read(&store, &key).await.unwrap(), cells);
-        store.put_over(&key, Bytes::from(vec![1, 0, 0])).await.unwrap();
+        store
+            .put_over(&key, Bytes::from(vec![1, 0, 0]))
+            .await
+            .unwrap();
         let error = read(&store, &key).await.unwrap_err();
         assert!(error.to_string().contains(key.as_str()), "{error}");
     }

@@ -81,7 +81,9 @@ pub async fn settle(
     }
     for step in &mut next.steps {
         let start = step.period.start;
-        let there = newest.steps.binary_search_by_key(&start, |it| it.period.start);
+        let there = newest
+            .steps
+            .binary_search_by_key(&start, |it| it.period.start);
         let there = there.ok().map(|at| &newest.steps[at]);
         let is_renamed = |there: &&Step| there.period == step.period && there.frame != step.frame;
         if let Some(there) = there.filter(is_renamed) {
@@ -109,7 +111,10 @@ async fn read(store: &Store, key: &ObjectKey) -> Result<Option<Manifest>, Storag
     let Some(manifest) = document::get::<Manifest>(store, key).await? else {
         return Ok(None);
     };
-    manifest.grid.validate().map_err(|e| damage::found(key, e))?;
+    manifest
+        .grid
+        .validate()
+        .map_err(|e| damage::found(key, e))?;
     if !(OLDEST_MANIFEST_SCHEMA..=MANIFEST_SCHEMA).contains(&manifest.schema) {
         // Whole, but of a program to come.
         let reason = format!(
@@ -188,7 +193,10 @@ mod tests {
             flipped[at / 8] ^= 1 << (at % 8);
             store.put_over(&key, flipped.into()).await.unwrap();
             let error = latest(&store, &"p".parse().unwrap()).await.unwrap_err();
-            assert!(error.to_string().contains(key.as_str()), "bit {at}: {error}");
+            assert!(
+                error.to_string().contains(key.as_str()),
+                "bit {at}: {error}"
+            );
         }
     }
 }

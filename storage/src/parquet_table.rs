@@ -15,9 +15,9 @@ use parquet::schema::types::ColumnPath;
 use crate::StorageError;
 use crate::sound::{damage, seal};
 
-/// Bytes after which a page of arrays ends, which it does between rows: a row of 1024 values or more is a page of its
+/// Bytes after which a page of arrays ends, which it does between rows: a row of 256 values or more is a page of its
 /// own, so that a reader who wants some rows fetches and decodes those and no others.
-const PAGE_BYTES: usize = 4 << 10;
+const PAGE_BYTES: usize = 1 << 10;
 /// Name of the entry of a file that holds the lengths of what its values lie on.
 const SHAPE: &str = "fluxglobe.shape";
 
@@ -39,9 +39,7 @@ pub(crate) fn encode_as(
     let damaged = |e: parquet::errors::ParquetError| StorageError::damaged("table to write", e);
     let shape: Vec<String> = shape.iter().map(ToString::to_string).collect();
     let shape = KeyValue::new(SHAPE.to_owned(), shape.join(" "));
-    let properties = properties
-        .set_key_value_metadata(Some(vec![shape]))
-        .build();
+    let properties = properties.set_key_value_metadata(Some(vec![shape])).build();
     let mut out = Vec::new();
     let mut writer =
         ArrowWriter::try_new(&mut out, batch.schema(), Some(properties)).map_err(damaged)?;

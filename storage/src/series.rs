@@ -195,7 +195,10 @@ mod tests {
                 assert_eq!(run.value(at + 1), index * 10.0 + 1.0);
             }
         }
-        assert_eq!(decode(&key, content.clone()).unwrap(), [a.clone(), b.clone()]);
+        assert_eq!(
+            decode(&key, content.clone()).unwrap(),
+            [a.clone(), b.clone()]
+        );
         let swapped = encode(&grid, &[&b, &a]).unwrap();
         assert!(decode(&key, swapped.content).is_err());
     }

@@ -15,7 +15,7 @@ use contract::key::ObjectKey;
 use contract::kind::{Kind, Vouched};
 use serde::Deserialize;
 
-use crate::{StorageError, frames, series};
+use crate::{StorageError, contributed, frames, series};
 use seal::Seal;
 
 /// Version of a document's schema from which it is sealed.
@@ -83,6 +83,9 @@ pub fn of_object(key: &ObjectKey, content: &Bytes) -> Result<Soundness, StorageE
     match (key.vouches(), Kind::of(key)) {
         (Vouched::Values(_), Some(Kind::Series)) => {
             series::decode(key, content.clone())?;
+        }
+        (Vouched::Values(_), Some(Kind::Contributed)) => {
+            contributed::check(key, content.clone())?;
         }
         (Vouched::Values(_), _) => frames::check_values(key, content.clone())?,
         (

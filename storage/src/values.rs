@@ -74,6 +74,9 @@ mod tests {
     fn every_no_data_is_the_same_and_every_value_counts() {
         let of = |values: &[f32]| ValuesDigest::new("k").values(values).finish();
         assert_eq!(of(&[1.0, -f32::NAN]), of(&[1.0, f32::NAN]));
-        assert_ne!(of(&[1.0, 2.0]), of(&[1.0, f32::from_bits(2.0f32.to_bits() ^ 1)]));
+        assert_ne!(
+            of(&[1.0, 2.0]),
+            of(&[1.0, f32::from_bits(2.0f32.to_bits() ^ 1)])
+        );
     }
 }

@@ -76,11 +76,13 @@ pub async fn run(
 ) -> Result<Report, StorageError> {
     let mut report = Report::default();
     let mut named = BTreeSet::new();
-    let checks: Vec<_> = keys.iter().map(|key| check(store, key.clone())).collect();
+    let checks: Vec<_> = keys
+        .iter()
+        .map(|key| checked(store.clone(), key.clone()))
+        .collect();
     let mut checked = stream::iter(checks).buffered(AT_ONCE);
     let mut done_count = 0;
-    while let Some(found) = checked.try_next().await? {
-        let key = &keys[done_count];
+    while let Some((key, found)) = checked.try_next().await? {
         done_count += 1;
         match found {
             Checked::Sound(soundness, bytes) => {
@@ -89,15 +91,15 @@ pub async fn run(
                     Soundness::Sound => report.sound_count += 1,
                     Soundness::Unsealed => report.unsealed_count += 1,
                 }
-                if Kind::of(key) == Some(Kind::Manifest) {
-                    named.extend(names_of(store, key).await?);
+                if Kind::of(&key) == Some(Kind::Manifest) {
+                    named.extend(names_of(store, &key).await?);
                 }
                 progress(done_count, None);
             }
             Checked::Gone => progress(done_count, None),
             Checked::Damaged(reason) => {
                 let finding = Finding {
-                    key: key.clone(),
+                    key,
                     fault: Fault::Damaged,
                     reason,
                 };
@@ -139,17 +141,20 @@ pub async fn damaged(
     store: &Store,
     keys: impl IntoIterator<Item = ObjectKey>,
 ) -> Result<BTreeSet<ObjectKey>, StorageError> {
-    let keys: Vec<ObjectKey> = keys.into_iter().collect();
-    let checks: Vec<_> = keys.iter().map(|key| check(store, key.clone())).collect();
-    let found: Vec<Checked> = stream::iter(checks)
-        .buffered(AT_ONCE)
+    let checks: Vec<_> = keys
+        .into_iter()
+        .map(|key| if_damaged(store.clone(), key))
+        .collect();
+    let found: Vec<Option<ObjectKey>> = stream::iter(checks)
+        .buffer_unordered(AT_ONCE)
         .try_collect()
         .await?;
-    let checked = keys.into_iter().zip(found);
-    Ok(checked
-        .filter(|(_, found)| matches!(found, Checked::Damaged(_)))
-        .map(|(key, _)| key)
-        .collect())
+    Ok(found.into_iter().flatten().collect())
+}
+
+async fn if_damaged(store: Store, key: ObjectKey) -> Result<Option<ObjectKey>, StorageError> {
+    let found = check(&store, &key).await?;
+    Ok(matches!(found, Checked::Damaged(_)).then_some(key))
 }
 
 enum Checked {
@@ -159,15 +164,20 @@ enum Checked {
     Damaged(String),
 }
 
-async fn check(store: &Store, key: ObjectKey) -> Result<Checked, StorageError> {
-    let content = match store.fetch(&key).await {
+async fn checked(store: Store, key: ObjectKey) -> Result<(ObjectKey, Checked), StorageError> {
+    let found = check(&store, &key).await?;
+    Ok((key, found))
+}
+
+async fn check(store: &Store, key: &ObjectKey) -> Result<Checked, StorageError> {
+    let content = match store.fetch(key).await {
         Ok(content) => content,
         Err(e) if e.is_not_found() => return Ok(Checked::Gone),
         Err(StorageError::Damaged { reason, .. }) => return Ok(Checked::Damaged(reason)),
         Err(e) => return Err(e),
     };
-    let bytes = content.len() as u64;
-    match sound::off_thread(move || sound::of_object(&key, &content)).await {
+    let (own, bytes) = (key.clone(), content.len() as u64);
+    match sound::off_thread(move || sound::of_object(&own, &content)).await {
         Ok(soundness) => Ok(Checked::Sound(soundness, bytes)),
         Err(StorageError::Damaged { reason, .. }) => Ok(Checked::Damaged(reason)),
         Err(e) => Err(e),
@@ -183,6 +193,7 @@ async fn names_of(store: &Store, key: &ObjectKey) -> Result<Vec<ObjectKey>, Stor
     names.extend(manifest.series.iter().map(|segment| segment.series.clone()));
     for step in &manifest.steps {
         names.push(step.frame.clone());
+        names.extend(step.contributed.as_ref().map(|of| of.counts.clone()));
         if manifest.derived_from.is_none() {
             names.push(ObjectKey::raw(&manifest.product, &step.raw_sha256));
         }

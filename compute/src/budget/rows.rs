@@ -4,6 +4,7 @@ use contract::ContractError;
 use contract::time::{Period, TimeMs};
 use serde::{Deserialize, Serialize};
 
+use super::accumulated::Completeness;
 use super::fixed::{AREA_DECIMALS, MASS_DECIMALS, decimal_text, share};
 
 /// What one row of a budget covers.
@@ -64,6 +65,9 @@ pub struct BudgetRow {
     pub area_m2: f64,
     /// Area of the region, land included, m².
     pub region_area_m2: f64,
+    /// How complete the sums of accumulated carbon are; none for fluxes, and in versions that did not count it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub completeness: Option<Completeness>,
 }
 
 /// Kilograms in a teragram.
@@ -150,6 +154,7 @@ impl Total {
             coverage_percent: (100.0 * area_time_m2_ms / (region_area_m2 * row_ms)).min(100.0),
             area_m2: area_time_m2_ms / self.covered_ms as f64,
             region_area_m2,
+            completeness: None,
         }
     }
 }

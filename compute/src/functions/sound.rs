@@ -60,7 +60,9 @@ impl ScalarUDFImpl for Sound {
             {
                 Ok(values.clone())
             }
-            other => plan_err!("{NAME} takes a list, its check and what was checked, not {other:?}"),
+            other => {
+                plan_err!("{NAME} takes a list, its check and what was checked, not {other:?}")
+            }
         }
     }
 

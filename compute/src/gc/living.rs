@@ -99,6 +99,7 @@ fn add(living: &mut BTreeSet<ObjectKey>, manifest: &Manifest) -> Result<(), Comp
     living.extend(manifest.series.iter().map(|segment| segment.series.clone()));
     for step in &manifest.steps {
         living.insert(step.frame.clone());
+        living.extend(step.contributed.iter().map(|step| step.counts.clone()));
         living.insert(ObjectKey::raw(product, &step.raw_sha256));
     }
     if manifest.quantity == Quantity::AccumulatedCarbon {

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use contract::key::ObjectKey;
-use contract::manifest::Manifest;
+use contract::manifest::{Manifest, Step};
 use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::time::Period;
@@ -70,7 +70,7 @@ async fn frames(
         let reason = match stored {
             None => Some(Reason::Missing),
             Some(step) if step.raw_sha256 != input => Some(Reason::Stale),
-            Some(step) if !there.contains(&step.frame) => Some(Reason::Missing),
+            Some(step) if !is_whole(step, &there) => Some(Reason::Missing),
             Some(_) if is_broken => Some(Reason::Stale),
             Some(_) if request.is_forced && period.overlaps(window) => Some(Reason::Forced),
             Some(_) => None,
@@ -98,22 +98,35 @@ async fn frames(
     Ok(())
 }
 
-/// Frames that are there, and whole as far as that is asked for. A frame without its series or domain counts as gone:
-/// these are made with it.
+/// Are the objects of an accumulated step there?
+fn is_whole(step: &Step, there: &BTreeSet<ObjectKey>) -> bool {
+    let counts = step.contributed.as_ref();
+    there.contains(&step.frame) && counts.is_some_and(|counts| there.contains(&counts.counts))
+}
+
+/// Frames, and counts of what contributed to them, that are there, and whole as far as that is asked for. A frame without
+/// its series or domain counts as gone: these are made with it.
 async fn frames_there(
     store: &Store,
     latest: Option<&Manifest>,
     target: &ProductId,
     request: &Request,
 ) -> Result<BTreeSet<ObjectKey>, ComputeError> {
-    let listed = store.list(&format!("frames/{target}")).await?;
-    let mut there: BTreeSet<ObjectKey> = listed.into_iter().collect();
+    let mut there = BTreeSet::new();
+    for folder in ["frames", "contributed"] {
+        there.extend(store.list(&format!("{folder}/{target}")).await?);
+    }
     let Some(latest) = latest.filter(|_| request.is_verified) else {
         return Ok(there);
     };
     let series = latest.series.iter().map(|segment| &segment.series);
     let frames = latest.steps.iter().map(|step| &step.frame);
-    let named = series.chain(frames).chain([&latest.domain]);
+    let counts = latest
+        .steps
+        .iter()
+        .filter_map(|step| step.contributed.as_ref());
+    let counts = counts.map(|contributed| &contributed.counts);
+    let named = series.chain(frames).chain(counts).chain([&latest.domain]);
     let damaged = verify::damaged(store, named.cloned()).await?;
     there.retain(|frame| !damaged.contains(frame));
     for segment in &latest.series {

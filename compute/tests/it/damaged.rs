@@ -31,7 +31,15 @@ const BOX: &str = "-60,-60,60.5,59.5";
 async fn landed() -> (tempfile::TempDir, Store) {
     let (folder, store) = folder_store();
     let months = &wavy_year(&GRID)[..2];
-    land(&store, &product("wavy"), Quantity::CarbonFlux, GRID, months, 12).await;
+    land(
+        &store,
+        &product("wavy"),
+        Quantity::CarbonFlux,
+        GRID,
+        months,
+        12,
+    )
+    .await;
     (folder, store)
 }
 
@@ -89,7 +97,10 @@ async fn a_flipped_bit_of_a_frame_is_no_other_budget() {
         budget_of_box(&store).await.map(|answer| answer == right)
     });
     let errors = errors.await;
-    assert!(errors > 90, "{errors} errors only: what was read is not looked at");
+    assert!(
+        errors > 90,
+        "{errors} errors only: what was read is not looked at"
+    );
     assert!(damage::count(Kind::Frame) >= before + errors as u64);
 }
 
@@ -123,7 +134,10 @@ async fn a_flipped_bit_of_a_series_is_no_other_value_of_a_place() {
         ask().await.map(|answer| answer == right)
     });
     let errors = errors.await;
-    assert!(errors > 50, "{errors} errors only: what was read is not looked at");
+    assert!(
+        errors > 50,
+        "{errors} errors only: what was read is not looked at"
+    );
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -218,7 +232,10 @@ async fn damaged_derived_objects_are_made_again_when_they_are_looked_at() {
         flip[whole.len() / 2] ^= 1;
         store.put_over(key, flip.into()).await.unwrap();
         let unseen = plan(&store, &request(false)).await.unwrap();
-        assert!(unseen.items.is_empty(), "it was read without being asked to");
+        assert!(
+            unseen.items.is_empty(),
+            "it was read without being asked to"
+        );
         let seen = plan(&store, &request(true)).await.unwrap();
         assert!(!seen.items.is_empty(), "{key}");
         let outcome = run(&engine, &seen, &|_| ()).await.unwrap();

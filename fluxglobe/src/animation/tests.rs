@@ -22,11 +22,13 @@ use super::strip::Strip;
 fn product() -> Manifest {
     let product: ProductId = "made-up".parse().unwrap();
     let step = |month| Step {
+        masked: None,
         period: Period::month(2000, month).unwrap(),
         frame: ObjectKey::frame(&product, &Digest::of(&[month as u8])),
         raw_sha256: Digest::of(b"file"),
         origin: "file.nc".into(),
         valid_cells: 1,
+        contributed: None,
     };
     Manifest {
         schema: MANIFEST_SCHEMA,

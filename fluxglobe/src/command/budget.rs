@@ -5,7 +5,8 @@ use std::path::Path;
 use anyhow::Result;
 use comfy_table::presets::NOTHING;
 use comfy_table::{CellAlignment, Table};
-use compute::budget::{BudgetAnswer, BudgetQuery, BudgetStep};
+use compute::budget::{BudgetAnswer, BudgetQuery, BudgetRow, BudgetStep};
+use contract::quantity::Quantity;
 use contract::region::Region;
 
 use crate::cli::{Budget, Settings, Step};
@@ -13,7 +14,7 @@ use crate::{deployment, progress};
 
 pub(crate) async fn run(settings: &Settings, options: &Budget) -> Result<()> {
     let store = deployment::store(settings)?;
-    deployment::manifest(&store, &options.product, &settings.data).await?;
+    let product = deployment::manifest(&store, &options.product, &settings.data).await?;
     let query = BudgetQuery {
         product: options.product.clone(),
         region: region(&options.region)?,
@@ -39,6 +40,12 @@ pub(crate) async fn run(settings: &Settings, options: &Budget) -> Result<()> {
         "{} of {}, {} earth, positive out of the sea; cite {}",
         answer.unit, answer.region, answer.earth, answer.manifest
     ));
+    let is_counted = |row: &BudgetRow| row.completeness.is_some();
+    if product.quantity == Quantity::AccumulatedCarbon && !answer.rows.iter().all(is_counted) {
+        progress::say(
+            "how complete its sums are is unknown: an older version accumulated it; `fluxglobe derive accumulated` does it anew",
+        );
+    }
     progress::say(&answer.source);
     Ok(())
 }
@@ -57,20 +64,32 @@ pub(crate) fn region(text: &str) -> Result<Region> {
 fn table(answer: &BudgetAnswer) -> Table {
     let mut table = Table::new();
     table.load_preset(NOTHING);
-    table.set_header(["from", "to", "Tg C", "% of area", "10⁶ km² with data"]);
-    for column in 2..5 {
+    let is_counted = answer.rows.iter().any(|row| row.completeness.is_some());
+    let mut header = vec!["from", "to", "Tg C", "% of area", "10⁶ km² with data"];
+    if is_counted {
+        header.extend(["10⁶ km² complete", "incomplete", "% complete"]);
+    }
+    table.set_header(header);
+    for column in 2..8 {
         if let Some(column) = table.column_mut(column) {
             column.set_cell_alignment(CellAlignment::Right);
         }
     }
     for row in &answer.rows {
-        table.add_row([
+        let mut cells = vec![
             progress::day(row.start),
             progress::day(row.end),
             format!("{:.3}", row.budget_tg),
             format!("{:.1}", row.coverage_percent),
             format!("{:.3}", row.area_m2 / 1e12),
-        ]);
+        ];
+        if let Some(completeness) = &row.completeness {
+            cells.push(format!("{:.3}", completeness.complete_m2 / 1e12));
+            cells.push(format!("{:.3}", completeness.incomplete_m2 / 1e12));
+            let percent = completeness.percent();
+            cells.push(percent.map_or("no data".to_owned(), |percent| format!("{percent:.1}")));
+        }
+        table.add_row(cells);
     }
     table
 }

@@ -82,7 +82,7 @@ pub(crate) async fn run(settings: &Settings, options: &FillError) -> Result<()> 
         .into_iter()
         .map(u32::from)
         .collect();
-    let backend = deployment::backend(settings);
+    let backend = deployment::backend(settings)?;
     let renderer = tokio::task::spawn_blocking(move || Renderer::new(backend)).await??;
     let display = manifest.quantity.display();
     let (mut rows, mut all) = (vec![], vec![Score::default(); options.gap_cells.len()]);

@@ -68,7 +68,8 @@ fn summary(report: &Report) -> String {
 fn advice(report: &Report) -> Vec<String> {
     let mut advice = vec![];
     let found = |kinds: &[Kind]| {
-        let is_of = |finding: &&Finding| Kind::of(&finding.key).is_some_and(|it| kinds.contains(&it));
+        let is_of =
+            |finding: &&Finding| Kind::of(&finding.key).is_some_and(|it| kinds.contains(&it));
         report.findings.iter().find(is_of)
     };
     let made_again = [
@@ -84,7 +85,14 @@ fn advice(report: &Report) -> Vec<String> {
                 .to_owned(),
         );
     }
-    if found(&[Kind::Weights, Kind::Accumulating, Kind::Check, Kind::Reading]).is_some() {
+    if found(&[
+        Kind::Weights,
+        Kind::Accumulating,
+        Kind::Check,
+        Kind::Reading,
+    ])
+    .is_some()
+    {
         advice.push("weights, kept sums, comparisons and notes of readings are made again when they are next needed".to_owned());
     }
     if let Some(raw) = found(&[Kind::Raw]) {

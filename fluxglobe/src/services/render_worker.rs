@@ -18,7 +18,7 @@ pub(crate) async fn run(settings: &Settings, options: RenderWorker) -> Result<()
     }
     // Whoever asks for a picture is told within seconds that the store is away; the batch tries again by itself.
     let store = deployment::open_interactive(footing.store_url())?;
-    let backend = deployment::backend(settings);
+    let backend = deployment::backend(settings)?;
     let (render, registry) = (options.render.clone(), footing.registry.clone());
     let desk = tokio::task::spawn_blocking(move || open_desk(&render, store, backend, &registry))
         .await??;

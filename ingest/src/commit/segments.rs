@@ -10,9 +10,9 @@ use super::merge::Merged;
 use crate::error::IngestError;
 
 /// Most steps of a segment: a leap year of days.
-const MAX_SEGMENT_STEPS: usize = 366;
-/// Most values of a segment: what is held in memory to turn maps into series, 1 GiB.
-const MAX_SEGMENT_VALUES: usize = 1 << 28;
+pub(crate) const MAX_SEGMENT_STEPS: usize = 366;
+/// Most values of a segment, 1 GiB: what is held in memory to turn maps into series ([`crate::memory::of_series`]).
+pub(crate) const MAX_SEGMENT_VALUES: usize = 1 << 28;
 
 /// What was written.
 pub(super) struct Written {
@@ -160,11 +160,13 @@ mod tests {
 
     fn steps(months: impl Iterator<Item = (i32, u32)>) -> Vec<Step> {
         let step = |(year, month)| Step {
+            masked: None,
             period: Period::month(year, month).unwrap(),
             frame: ObjectKey::frame(&"p".parse().unwrap(), &Digest::of(b"")),
             raw_sha256: Digest::of(b""),
             origin: String::new(),
             valid_cells: 1,
+            contributed: None,
         };
         months.map(step).collect()
     }

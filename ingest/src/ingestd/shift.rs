@@ -315,8 +315,11 @@ fn tell(open: Open, pipeline: Pipeline<'_>) {
                 let reason = metrics::class(*reason);
                 tracing::warn!(trace, origin = %open.origin, reason, "refused {outcome}");
             }
-            Outcome::Landed { .. } => {
+            Outcome::Landed {
+                manifest, masked, ..
+            } => {
                 pipeline.metrics.landed(noticed, now());
+                pipeline.metrics.masked(&manifest.product, *masked);
                 tracing::info!(trace, origin = %open.origin, "{outcome}");
             }
             Outcome::Superseded { .. } => {

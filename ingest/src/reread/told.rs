@@ -19,10 +19,19 @@ pub async fn events(store: &Store, product: &ProductId) -> Result<Vec<Event>, In
     };
     let number = now.number.saturating_sub(1);
     let read = IngestError::storage("read a manifest");
-    let Some(before) = manifests::numbered(store, product, number).await.map_err(read)? else {
+    let Some(before) = manifests::numbered(store, product, number)
+        .await
+        .map_err(read)?
+    else {
         return Ok(vec![]);
     };
     Ok(told(&before, &now))
+}
+
+/// A step may be other than it was in what is said of it alone.
+fn have_same_values(before: &[&Step], now: &[&Step]) -> bool {
+    let values = |step: &&Step| (step.period, step.frame.clone());
+    before.iter().map(values).eq(now.iter().map(values))
 }
 
 fn told(before: &Manifest, now: &Manifest) -> Vec<Event> {
@@ -46,10 +55,14 @@ fn told(before: &Manifest, now: &Manifest) -> Vec<Event> {
         }
         let (origin, raw_sha256) = file;
         let periods: Vec<_> = steps.iter().map(|step| step.period).collect();
+        let revised = old
+            .get(&file)
+            .is_none_or(|before| !have_same_values(before, &steps));
         let trace = format!("reread-{}", raw_sha256.short());
         events.push(Event::new(
             trace,
-            Body::granule_landed(origin.to_owned(), raw_sha256, now.id(), &periods, true),
+            Body::granule_landed(origin.to_owned(), raw_sha256, now.id(), &periods, revised)
+                .with_masked(steps.iter().filter_map(|step| step.masked).sum()),
         ));
     }
     events

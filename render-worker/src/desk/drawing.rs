@@ -156,7 +156,8 @@ impl Inner {
                 Err(error @ StorageError::Damaged { .. }) => {
                     tracing::warn!(%error, "a damaged picture is drawn again");
                     let put = self.store.put_over(&key, png).await;
-                    put.map(|()| None).map_err(|e| picture_failed("store", &key, e))
+                    put.map(|()| None)
+                        .map_err(|e| picture_failed("store", &key, e))
                 }
                 Err(e) => Err(picture_failed("read", &key, e)),
             },

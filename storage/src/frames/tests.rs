@@ -63,7 +63,10 @@ fn equal_values_have_one_name_whatever_their_nan_and_their_bytes() {
     assert_eq!(frame(&other), frame(&values()));
     let (key, content) = frame(&values());
     let otherwise = otherwise(&values());
-    assert_ne!(otherwise, content, "these are the same bytes: this tests nothing");
+    assert_ne!(
+        otherwise, content,
+        "these are the same bytes: this tests nothing"
+    );
     assert!(decode(&key, otherwise, Some(&GRID)).is_ok());
     other[1] = 2.0;
     assert_ne!(frame(&other).0, key);
@@ -119,8 +122,7 @@ fn of_bytes(values: &[f32]) -> (ObjectKey, Bytes) {
     let batch = batch(&GRID, values, january()).unwrap();
     let batch = batch.project(&[0, 1, 2, 3]).unwrap();
     let mut out = vec![];
-    let mut writer =
-        parquet::arrow::ArrowWriter::try_new(&mut out, batch.schema(), None).unwrap();
+    let mut writer = parquet::arrow::ArrowWriter::try_new(&mut out, batch.schema(), None).unwrap();
     writer.write(&batch).unwrap();
     writer.close().unwrap();
     let name = format!("frames/p/{}.parquet", Digest::of(&out));
@@ -133,7 +135,10 @@ async fn a_frame_named_by_its_bytes_keeps_its_name_as_long_as_it_holds_its_value
     let (old, content) = of_bytes(&values());
     store.put_new(&old, content).await.unwrap();
     let (new, _) = frame(&values());
-    assert_eq!(read(&store, &old, &GRID).await.unwrap().len(), values().len());
+    assert_eq!(
+        read(&store, &old, &GRID).await.unwrap().len(),
+        values().len()
+    );
     assert_eq!(settle(&store, &old, &new, &GRID).await.unwrap(), old);
     let mut other = values();
     other[1] += 1.0;

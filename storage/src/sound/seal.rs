@@ -101,7 +101,9 @@ fn footer_of(content: &[u8]) -> Option<usize> {
     if name != PARQUET {
         return None;
     }
-    before.len().checked_sub(u32::from_le_bytes(*length) as usize)
+    before
+        .len()
+        .checked_sub(u32::from_le_bytes(*length) as usize)
 }
 
 fn digest_of(a: &[u8], b: &[u8]) -> Digest {
@@ -125,7 +127,10 @@ mod tests {
         let sealed = json(text.to_vec());
         assert_eq!(of_json(&sealed), Seal::Whole);
         assert_eq!(opened(&sealed), text);
-        assert_eq!((of_json(text), &opened(text)[..]), (Seal::Absent, &text[..]));
+        assert_eq!(
+            (of_json(text), &opened(text)[..]),
+            (Seal::Absent, &text[..])
+        );
         let read: serde_json::Value = serde_json::from_slice(&sealed).unwrap();
         assert_eq!(read["sha256"], Digest::of(text).to_string());
     }

@@ -21,7 +21,9 @@ const GRID: Grid = Grid {
 async fn store() -> Store {
     let store = Store::memory();
     let product: ProductId = "p".parse().unwrap();
-    let values: Vec<f32> = (0..15).map(|i| if i == 4 { f32::NAN } else { i as f32 }).collect();
+    let values: Vec<f32> = (0..15)
+        .map(|i| if i == 4 { f32::NAN } else { i as f32 })
+        .collect();
     let raw = Bytes::from("an input file");
     let period = Period::month(2000, 1).unwrap();
     let raw_sha256 = Digest::of(&raw);
@@ -44,6 +46,8 @@ async fn store() -> Store {
             raw_sha256,
             origin: "a.nc".to_owned(),
             valid_cells: 14,
+            contributed: None,
+            masked: None,
         }],
         domain: domain::write(&store, &product, &[true; 15]).await.unwrap(),
         series: vec![SeriesSegment {
@@ -102,7 +106,9 @@ async fn a_damaged_and_a_missing_object_are_findings_of_a_whole_store() {
     let before = damage::count(Kind::Series);
     store.put_over(series, flipped.into()).await.unwrap();
     store.remove(frame).await.unwrap();
-    let keys = verify::keys(&store, Some(&"p".parse().unwrap())).await.unwrap();
+    let keys = verify::keys(&store, Some(&"p".parse().unwrap()))
+        .await
+        .unwrap();
     let told = std::sync::Mutex::new(vec![]);
     let tell = |_, finding: Option<&verify::Finding>| told.lock().unwrap().extend(finding.cloned());
     let report = verify::run(&store, &keys, &tell).await.unwrap();

@@ -44,14 +44,16 @@ impl Store {
     /// `Damaged` for the first one that is.
     pub async fn check_once(&self, keys: &[&ObjectKey]) -> Result<(), StorageError> {
         let new = keys.iter().filter(|key| !self.checked.has(key));
-        let checks: Vec<_> = new.map(|key| self.check_whole((*key).clone())).collect();
+        let checks: Vec<_> = new
+            .map(|&key| self.clone().check_now(key.clone()))
+            .collect();
         stream::iter(checks)
             .buffer_unordered(AT_ONCE)
             .try_collect()
             .await
     }
 
-    async fn check_whole(&self, key: ObjectKey) -> Result<(), StorageError> {
+    async fn check_now(self, key: ObjectKey) -> Result<(), StorageError> {
         self.get(&key).await?;
         self.checked.add(&key);
         Ok(())

@@ -110,9 +110,7 @@ impl Store {
     async fn create(&self, key: &ObjectKey, content: &Bytes) -> Result<(), Error> {
         match &self.place {
             Place::Folder(root) => folder::create(root.clone(), key.clone(), content.clone()).await,
-            Place::Cloud
-                if content.len() > WHOLE_BYTES && key.vouches() != Vouched::Nothing =>
-            {
+            Place::Cloud if content.len() > WHOLE_BYTES && key.vouches() != Vouched::Nothing => {
                 self.send_parts(key, content).await
             }
             Place::Cloud | Place::Hdfs | Place::Memory => {

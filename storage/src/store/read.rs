@@ -7,8 +7,8 @@ use object_store::path::Path;
 use object_store::{Error, GetResultPayload, ObjectStoreExt as _};
 
 use super::{MAX_OBJECT_BYTES, PART_BYTES, PARTS_AT_ONCE, Place, Store, failed, hdfs, path};
-use crate::sound::{self, Soundness};
 use crate::StorageError;
+use crate::sound::{self, Soundness};
 
 impl Store {
     /// The whole content of an object, compared with its name or its seal. Large ones come in parts, several at a time.

@@ -42,6 +42,26 @@ pub fn fluxengine(inside: &str) -> PathBuf {
     folder
 }
 
+/// The Python that has what scripts of the tests import.
+///
+/// # Panics
+/// If `deploy/install-tools.sh test` has not made it.
+pub fn python() -> PathBuf {
+    let tools = variable("FLUXGLOBE_TOOLS").or_else(|| {
+        let home = variable("HOME")?;
+        Some(home.join(".cache/fluxglobe/tools"))
+    });
+    let python = tools
+        .expect("HOME or FLUXGLOBE_TOOLS is set")
+        .join("bin/python");
+    assert!(
+        python.is_file(),
+        "there is no {}: `make test` makes it; by hand: deploy/install-tools.sh test",
+        python.display()
+    );
+    python
+}
+
 /// A set of `FLUXGLOBE_TEST_DATA`; none, with a word on standard error and in the file that `FLUXGLOBE_SKIPPED` names,
 /// where there are no sets at all and this test is in [`LIST`].
 ///

@@ -49,6 +49,10 @@ struct Row {
     budget: f64,
     coverage_percent: f64,
     area_m2: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    complete_m2: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    incomplete_m2: Option<f64>,
 }
 
 impl From<&BudgetRow> for Row {
@@ -58,6 +62,7 @@ impl From<&BudgetRow> for Row {
             budget_tg,
             coverage_percent,
             area_m2,
+            complete_and_incomplete_m2,
             ..
         } = *row;
         Self {
@@ -66,6 +71,8 @@ impl From<&BudgetRow> for Row {
             budget: budget_tg,
             coverage_percent,
             area_m2,
+            complete_m2: complete_and_incomplete_m2.map(|[complete, _]| complete),
+            incomplete_m2: complete_and_incomplete_m2.map(|[_, incomplete]| incomplete),
         }
     }
 }
@@ -78,7 +85,10 @@ pub(crate) async fn get(
     let named = query.manifest.as_deref();
     let layer = state.catalogue.version(&product, named).await?;
     let manifest = &layer.manifest;
-    if manifest.quantity != Quantity::CarbonFlux {
+    if !matches!(
+        manifest.quantity,
+        Quantity::CarbonFlux | Quantity::AccumulatedCarbon
+    ) {
         let quantity = manifest.quantity.title();
         return Err(ServerError::NotAFlux {
             product: manifest.product.to_string(),

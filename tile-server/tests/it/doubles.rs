@@ -10,13 +10,14 @@ use contract::event::Event;
 use contract::job::RenderJob;
 use contract::manifest::Manifest;
 use contract::observation::Observation;
+use contract::quantity::Quantity;
 use contract::topic::{Origin, Topic};
 use storage::StorageError;
 use storage::log::{EmbeddedLog, EventLog, Follower, Message, Reader, Start};
 use tile_server::backend::{
     Analyse, AreaRequest, AreaRow, AreaSeries, BackendError, BudgetRequest, BudgetRow, Check,
-    Class, Draw, ObservationPage, ObservationQuestion, Observe, Platform, RowCol, TrackPoint,
-    TrackQuestion, Turn,
+    Class, Contributed, Draw, ObservationPage, ObservationQuestion, Observe, Platform, PointStep,
+    RowCol, TrackPoint, TrackQuestion, Turn,
 };
 use tokio::sync::Semaphore;
 
@@ -147,13 +148,21 @@ impl Analyse for Analyst {
         &self,
         manifest: &Manifest,
         cell: RowCol,
-    ) -> Result<Vec<Option<f64>>, BackendError> {
+    ) -> Result<Vec<PointStep>, BackendError> {
         self.mood().apply()?;
         if matches!(self.mood(), Mood::AnswersNonsense) {
             return Ok(vec![]);
         }
-        let value = |step| (cell.col != 0).then_some(f64::from(cell.row) + f64::from(step) / 100.0);
-        Ok((0..manifest.steps.len() as u32).map(value).collect())
+        let is_sum = manifest.quantity == Quantity::AccumulatedCarbon;
+        let point = |step| PointStep {
+            value: (cell.col != 0).then_some(f64::from(cell.row) + f64::from(step) / 100.0),
+            contributed: is_sum.then_some(Contributed {
+                steps: 1,
+                of_steps: step + 1,
+                time_percent: 100.0 / f64::from(step + 1),
+            }),
+        };
+        Ok((0..manifest.steps.len() as u32).map(point).collect())
     }
 
     async fn budget(&self, request: &BudgetRequest) -> Result<Vec<BudgetRow>, BackendError> {
@@ -164,6 +173,8 @@ impl Analyse for Analyst {
             budget_tg: -176.1,
             coverage_percent: 92.5,
             area_m2: 3.3e14,
+            complete_and_incomplete_m2: (request.manifest.quantity == Quantity::AccumulatedCarbon)
+                .then_some([3e14, 3e13]),
         }])
     }
 

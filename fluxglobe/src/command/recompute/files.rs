@@ -70,7 +70,10 @@ impl Files {
         if self.request.is_verified
             && let Some(mended) = reread::mend(store, &self.request.product).await?
         {
-            progress::say(&format!("{}: series and domain are whole again", mended.id()));
+            progress::say(&format!(
+                "{}: series and domain are whole again",
+                mended.id()
+            ));
         }
         // Also after a run that was killed before it could tell.
         if let Some(log) = log {

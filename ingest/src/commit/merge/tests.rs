@@ -2,6 +2,7 @@
 
 use contract::digest::Digest;
 use contract::key::ObjectKey;
+use contract::masked::MaskedCells;
 use contract::quantity::Quantity;
 use contract::time::Period;
 
@@ -28,11 +29,13 @@ fn granule(content: &str, periods: &[Period]) -> StoredGranule {
         );
         StoredGrid {
             step: Step {
+                masked: None,
                 period: *period,
                 frame,
                 raw_sha256,
                 origin: "f.nc".into(),
                 valid_cells: 1,
+                contributed: None,
             },
         }
     };
@@ -47,8 +50,10 @@ fn granule(content: &str, periods: &[Period]) -> StoredGranule {
         },
         grid: GRID,
         raw_sha256,
+        assumptions: vec![],
         asked_by: None,
         order: None,
+        masked: MaskedCells::default(),
         grids: periods.iter().map(step).collect(),
     }
 }

@@ -26,11 +26,13 @@ fn product() -> ProductId {
 fn step(file: &str, month: u32, edition: u32) -> Step {
     let frame = Digest::of(format!("{file} {month} {edition}").as_bytes());
     Step {
+        masked: None,
         period: Period::month(2000, month).unwrap(),
         frame: ObjectKey::frame(&product(), &frame),
         raw_sha256: Digest::of(file.as_bytes()),
         origin: format!("{file}.nc"),
         valid_cells: 1,
+        contributed: None,
     }
 }
 

@@ -112,7 +112,10 @@ async fn what_the_name_vouches_for_takes_the_place_of_what_is_damaged() {
     assert!(error.to_string().contains(named.as_str()), "{error}");
     // Other bytes, and no better.
     let wrong = store.put_new(&named, Bytes::from("another")).await;
-    assert!(matches!(wrong, Err(StorageError::Damaged { .. })), "{wrong:?}");
+    assert!(
+        matches!(wrong, Err(StorageError::Damaged { .. })),
+        "{wrong:?}"
+    );
     assert!(store.put_new(&named, content.clone()).await.unwrap());
     assert_eq!(store.get(&named).await.unwrap(), content);
     assert!(!store.put_new(&named, content).await.unwrap());
