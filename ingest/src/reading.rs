@@ -6,6 +6,7 @@
 use contract::digest::Digest;
 use contract::grid::Grid;
 use contract::key::ObjectKey;
+use contract::kind::Vouched;
 use contract::manifest::Step;
 use contract::product::ProductId;
 use contract::quantity::Quantity;
@@ -67,7 +68,9 @@ impl Reading {
         match document::put_new(store, &key, self).await {
             Err(conflict @ StorageError::Conflict { .. }) => {
                 match document::get::<Self>(store, &key).await {
-                    Ok(Some(there)) if there.schema == SCHEMA => return Err(conflict),
+                    Ok(Some(there)) if there.schema == SCHEMA && !self.renames(&there) => {
+                        return Err(conflict);
+                    }
                     Ok(_older) => {}
                     Err(error @ StorageError::Damaged { .. }) => {
                         tracing::warn!(%error, "a note of a reading is written again");
@@ -78,6 +81,28 @@ impl Reading {
             }
             noted => noted.map(|_new| ()),
         }
+    }
+}
+
+impl Reading {
+    /// Is it another reading but for the names of frames that were named by their bytes there? Those may be gone.
+    fn renames(&self, there: &Self) -> bool {
+        let is_renamed = |old: &Step, new: &Step| {
+            let named_alike = Step {
+                frame: new.frame.clone(),
+                ..old.clone()
+            };
+            old == new
+                || (named_alike == *new && matches!(old.frame.vouches(), Vouched::Bytes(_)))
+        };
+        let steps = there.steps.iter().zip(&self.steps);
+        let alike = Self {
+            steps: self.steps.clone(),
+            ..there.clone()
+        };
+        alike == *self
+            && there.steps.len() == self.steps.len()
+            && steps.into_iter().all(|(old, new)| is_renamed(old, new))
     }
 }
 

@@ -13,6 +13,8 @@ mod damaged;
 #[cfg(test)]
 mod fixture;
 #[cfg(test)]
+mod frozen;
+#[cfg(test)]
 mod incremental;
 #[cfg(test)]
 mod node;

@@ -7,6 +7,7 @@ mod axes;
 mod bad_input;
 mod cf_files;
 mod contained;
+mod damaged;
 mod faults;
 mod fixture;
 mod guarded;

@@ -10,6 +10,7 @@ mod conformance;
 mod cut_proxy;
 mod fault_proxy;
 mod faults;
+mod frozen;
 mod killed;
 mod name_node;
 mod restarts;

@@ -1,0 +1,251 @@
+//! Stores as earlier versions of this program wrote them, kept in `tests/frozen`: a folder a version of the manifest, each
+//! read whole here and compared with what was put in.
+//!
+//! `1` is a whole store, written by `fluxglobe ingest`, `recompute`, `derive` and `observations` of 0.1.0; what was asked of
+//! it then lies beside it and is asked again by the crates that answer. `2` holds what this crate writes; the test below
+//! writes it again and compares. A format that changes needs a folder of its own: `FLUXGLOBE_FREEZE=FOLDER` makes the last
+//! test write one.
+
+use std::path::{Path, PathBuf};
+
+use contract::digest::Digest;
+use contract::event::Event;
+use contract::grid::Grid;
+use contract::key::ObjectKey;
+use contract::kind::{Kind, Vouched};
+use contract::manifest::{
+    MANIFEST_SCHEMA, Manifest, OLDEST_MANIFEST_SCHEMA, SeriesSegment, Step,
+};
+use contract::product::ProductId;
+use contract::quantity::Quantity;
+use contract::time::Period;
+use storage::{Store, domain, frames, manifests, series, verify, weights};
+
+const ROWS: u32 = 61;
+const COLS: u32 = 20;
+const GRID: Grid = Grid {
+    rows: ROWS,
+    cols: COLS,
+    north_deg: 61.0,
+    west_deg: 0.0,
+    dlat_deg: 1.0,
+    dlon_deg: 1.0,
+};
+/// No fixture is larger.
+const MAX_BYTES: u64 = 16 << 10;
+
+fn frozen(version: u32) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("tests/frozen")
+        .join(version.to_string())
+}
+
+/// A copy of a frozen store: nothing here may change the one that is kept.
+fn copy(version: u32) -> (tempfile::TempDir, Store) {
+    fn copy_all(from: &Path, to: &Path) {
+        std::fs::create_dir_all(to).unwrap();
+        for entry in std::fs::read_dir(from).unwrap() {
+            let entry = entry.unwrap();
+            let to = to.join(entry.file_name());
+            if entry.file_type().unwrap().is_dir() {
+                copy_all(&entry.path(), &to);
+            } else {
+                assert!(entry.metadata().unwrap().len() <= MAX_BYTES, "{entry:?}");
+                std::fs::copy(entry.path(), to).unwrap();
+            }
+        }
+    }
+    let folder = tempfile::tempdir().unwrap();
+    copy_all(&frozen(version).join("objects"), folder.path());
+    let store = Store::open(folder.path().to_str().unwrap()).unwrap();
+    (folder, store)
+}
+
+/// What the file that the frozen product came from holds, g C m⁻² a month.
+fn grams(month: u32, row: u32, col: u32) -> Option<f32> {
+    let is_gap = (row + col).is_multiple_of(11) || (month, row, col) == (1, 60, 7);
+    let value = row as f32 - 30.0 + 2.0 * month as f32 + (col % 4) as f32 * 0.5;
+    (!is_gap).then_some(value)
+}
+
+/// The same, kg m⁻² s⁻¹, `[row, col]`.
+fn values(month: u32) -> (Period, Vec<f32>) {
+    let period = Period::month(2001, month).unwrap();
+    let value = |index: u32| match grams(month, index / COLS, index % COLS) {
+        Some(grams) => (f64::from(grams) * 1e-3 / period.seconds()) as f32,
+        None => f32::NAN,
+    };
+    (period, (0..ROWS * COLS).map(value).collect())
+}
+
+fn is_near(a: f32, b: f32) -> bool {
+    (a.is_nan() && b.is_nan()) || (a - b).abs() <= 1e-6 * b.abs()
+}
+
+fn product() -> ProductId {
+    "fgco2".parse().unwrap()
+}
+
+#[test]
+fn every_version_that_is_read_is_frozen() {
+    for version in OLDEST_MANIFEST_SCHEMA..=MANIFEST_SCHEMA {
+        let objects = frozen(version).join("objects");
+        assert!(objects.is_dir(), "no frozen store of version {version}");
+        for kind in [Kind::Manifest, Kind::Frame, Kind::Series, Kind::Domain, Kind::Weights] {
+            assert!(
+                objects.join(kind.folder()).is_dir(),
+                "no {kind:?} of version {version}"
+            );
+        }
+    }
+    assert_eq!(
+        weights::LAYOUT,
+        MANIFEST_SCHEMA,
+        "freeze weights of the new layout too"
+    );
+}
+
+#[tokio::test]
+async fn every_frozen_object_is_what_its_name_or_its_seal_says() {
+    for version in OLDEST_MANIFEST_SCHEMA..=MANIFEST_SCHEMA {
+        let (_folder, store) = copy(version);
+        let keys = verify::keys(&store, None).await.unwrap();
+        let report = verify::run(&store, &keys, &|_, _| ()).await.unwrap();
+        assert_eq!(report.findings, [], "version {version}");
+        // What was written before there were seals has none, and is read.
+        assert_eq!(report.unsealed_count > 0, version == 1);
+    }
+}
+
+#[tokio::test]
+async fn frozen_products_hold_the_values_that_were_put_in() {
+    for version in OLDEST_MANIFEST_SCHEMA..=MANIFEST_SCHEMA {
+        let (_folder, store) = copy(version);
+        let manifest = manifests::latest(&store, &product()).await;
+        let manifest = manifest.unwrap().unwrap();
+        assert_eq!((manifest.schema, manifest.steps.len()), (version, 2));
+        assert_eq!(manifest.grid, GRID);
+        let cells = domain::read(&store, &manifest.domain).await.unwrap();
+        for (month, step) in (1..).zip(&manifest.steps) {
+            let (period, expected) = values(month);
+            assert_eq!(step.period, period);
+            let is_of_bytes = matches!(step.frame.vouches(), Vouched::Bytes(_));
+            assert_eq!(is_of_bytes, version == 1);
+            let found = frames::read(&store, &step.frame, &GRID).await.unwrap();
+            for (index, (found, expected)) in found.iter().zip(&expected).enumerate() {
+                assert!(is_near(*found, *expected), "{version}, month {month}, cell {index}");
+                assert!(expected.is_nan() || cells[index]);
+            }
+        }
+        series::check(&store, &manifest.series[0].series).await.unwrap();
+    }
+}
+
+#[tokio::test]
+async fn version_1_keeps_the_names_that_were_cited_and_its_frames_keep_theirs() {
+    let (_folder, store) = copy(1);
+    let id = "fgco2@1-72149538".parse().unwrap();
+    let manifest = manifests::load(&store, &id).await.unwrap();
+    for step in &manifest.steps {
+        let values = frames::read(&store, &step.frame, &GRID).await.unwrap();
+        let named_now = frames::write(&store, &product(), &GRID, &values, step.period).await;
+        let named_now = named_now.unwrap();
+        assert_ne!(named_now, step.frame);
+        let settled = frames::settle(&store, &step.frame, &named_now, &GRID).await;
+        assert_eq!(settled.unwrap(), step.frame, "the same values are no revision");
+    }
+}
+
+#[test]
+fn events_of_version_1_are_read_as_they_were_written() {
+    let journal = std::fs::read_to_string(frozen(1).join("events/journal.jsonl")).unwrap();
+    let mut kinds = vec![];
+    for line in journal.lines() {
+        let entry: serde_json::Value = serde_json::from_str(line).unwrap();
+        let messages = entry["messages"].as_array();
+        for message in messages.into_iter().flatten() {
+            let text = message[1].as_str().unwrap();
+            let event = Event::from_json(text).unwrap();
+            assert_eq!(event.body.topic().as_str(), message[0].as_str().unwrap());
+            assert_eq!(event.to_json(), text);
+            kinds.push(event.body.topic().to_string());
+        }
+    }
+    for kind in ["granule.notice", "granule.landed", "granule.rejected", "product.derived"] {
+        assert!(kinds.iter().any(|found| found == kind), "no {kind}: {kinds:?}");
+    }
+}
+
+/// Writes the objects of version 2.
+async fn write(store: &Store) -> Manifest {
+    let raw = "a file that nobody keeps";
+    let raw_sha256 = Digest::of(raw.as_bytes());
+    let key = ObjectKey::raw(&product(), &raw_sha256);
+    store.put_new(&key, raw.into()).await.unwrap();
+    let mut steps = vec![];
+    let mut cells = vec![false; GRID.cell_count()];
+    let months = [values(1), values(2)];
+    for (period, values) in &months {
+        for (cell, value) in cells.iter_mut().zip(values) {
+            *cell |= !value.is_nan();
+        }
+        let frame = frames::write(store, &product(), &GRID, values, *period).await;
+        steps.push(Step {
+            period: *period,
+            frame: frame.unwrap(),
+            raw_sha256,
+            origin: "frozen-flux.nc".to_owned(),
+            valid_cells: values.iter().filter(|value| !value.is_nan()).count() as u64,
+        });
+    }
+    let views = months.each_ref().map(|(_, values)| values.as_slice());
+    let series = series::write(store, &product(), &GRID, &views).await;
+    let areas = [(0, vec![0.1; 60 * 20]), (1, vec![2.0 / 3.0; 20])];
+    let job = ObjectKey::weights(&Digest::of(b"a region"));
+    weights::write(store, &job, &areas).await.unwrap();
+    let manifest = Manifest {
+        schema: MANIFEST_SCHEMA,
+        product: product(),
+        number: 1,
+        title: "Frozen flux".to_owned(),
+        quantity: Quantity::CarbonFlux,
+        synthetic: true,
+        source: "made by a test".to_owned(),
+        grid: GRID,
+        steps,
+        domain: domain::write(store, &product(), &cells).await.unwrap(),
+        series: vec![SeriesSegment {
+            first_step: 0,
+            steps: 2,
+            series: series.unwrap(),
+        }],
+        derived_from: None,
+        notices: vec![],
+    };
+    manifests::commit(store, &manifest).await.unwrap();
+    manifest
+}
+
+/// Names, schemas and what they hold: a change of any of them is a new version.
+#[tokio::test]
+async fn what_is_written_now_is_named_as_in_the_newest_frozen_store() {
+    if let Some(folder) = std::env::var_os("FLUXGLOBE_FREEZE") {
+        write(&Store::open(folder.to_str().unwrap()).unwrap()).await;
+    }
+    let (_folder, kept) = copy(MANIFEST_SCHEMA);
+    let now = Store::memory();
+    let manifest = write(&now).await;
+    let newest = manifests::latest(&kept, &product()).await.unwrap();
+    assert_eq!(newest.unwrap(), manifest);
+    let (kept_keys, keys) = (
+        verify::keys(&kept, None).await.unwrap(),
+        verify::keys(&now, None).await.unwrap(),
+    );
+    assert_eq!(kept_keys, keys);
+    let job = ObjectKey::weights(&Digest::of(b"a region"));
+    let both = (
+        weights::read(&kept, &job).await.unwrap(),
+        weights::read(&now, &job).await.unwrap(),
+    );
+    assert_eq!(both.0, both.1);
+}
