@@ -187,9 +187,9 @@ fn old_layout(content: Bytes) -> Bytes {
         .build();
     let mut out = vec![];
     let mut writer = ArrowWriter::try_new(&mut out, batches[0].schema(), Some(properties)).unwrap();
-    batches
-        .iter()
-        .for_each(|batch| writer.write(batch).unwrap());
+    for batch in &batches {
+        writer.write(batch).unwrap();
+    }
     writer.close().unwrap();
     out.into()
 }
