@@ -4,8 +4,7 @@
 use std::sync::{Arc, LazyLock};
 
 use arrow::array::{
-    Array as _, Int64Builder, ListBuilder, RecordBatch, TimestampMillisecondArray, UInt32Array,
-    UInt32Builder,
+    Int64Builder, ListBuilder, RecordBatch, TimestampMillisecondArray, UInt32Array, UInt32Builder,
 };
 use arrow::datatypes::{
     DataType, Field, Int64Type, Schema, SchemaRef, TimeUnit, TimestampMillisecondType, UInt32Type,

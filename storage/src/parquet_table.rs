@@ -144,7 +144,7 @@ pub(crate) fn row_values<T: ArrowPrimitiveType>(
 mod tests {
     use std::sync::Arc;
 
-    use arrow::array::{Float32Builder, ListBuilder};
+    use arrow::array::{Float32Builder, ListBuilder, UInt32Array};
     use arrow::datatypes::{Field, Schema};
     use parquet::file::metadata::{PageIndexPolicy, ParquetMetaDataReader};
 

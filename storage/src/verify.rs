@@ -76,9 +76,11 @@ pub async fn run(
 ) -> Result<Report, StorageError> {
     let mut report = Report::default();
     let mut named = BTreeSet::new();
-    let mut checked = stream::iter(keys)
-        .map(|key| async move { Ok::<_, StorageError>((key, check(store, key).await?)) })
-        .buffered(AT_ONCE);
+    let checks: Vec<_> = keys
+        .iter()
+        .map(|key| checked(store.clone(), key.clone()))
+        .collect();
+    let mut checked = stream::iter(checks).buffered(AT_ONCE);
     let mut done_count = 0;
     while let Some((key, found)) = checked.try_next().await? {
         done_count += 1;
@@ -89,15 +91,15 @@ pub async fn run(
                     Soundness::Sound => report.sound_count += 1,
                     Soundness::Unsealed => report.unsealed_count += 1,
                 }
-                if Kind::of(key) == Some(Kind::Manifest) {
-                    named.extend(names_of(store, key).await?);
+                if Kind::of(&key) == Some(Kind::Manifest) {
+                    named.extend(names_of(store, &key).await?);
                 }
                 progress(done_count, None);
             }
             Checked::Gone => progress(done_count, None),
             Checked::Damaged(reason) => {
                 let finding = Finding {
-                    key: key.clone(),
+                    key,
                     fault: Fault::Damaged,
                     reason,
                 };
@@ -139,10 +141,10 @@ pub async fn damaged(
     store: &Store,
     keys: impl IntoIterator<Item = ObjectKey>,
 ) -> Result<BTreeSet<ObjectKey>, StorageError> {
-    let checks = keys.into_iter().map(|key| async move {
-        let found = check(store, &key).await?;
-        Ok::<_, StorageError>(matches!(found, Checked::Damaged(_)).then_some(key))
-    });
+    let checks: Vec<_> = keys
+        .into_iter()
+        .map(|key| if_damaged(store.clone(), key))
+        .collect();
     let found: Vec<Option<ObjectKey>> = stream::iter(checks)
         .buffer_unordered(AT_ONCE)
         .try_collect()
@@ -150,11 +152,21 @@ pub async fn damaged(
     Ok(found.into_iter().flatten().collect())
 }
 
+async fn if_damaged(store: Store, key: ObjectKey) -> Result<Option<ObjectKey>, StorageError> {
+    let found = check(&store, &key).await?;
+    Ok(matches!(found, Checked::Damaged(_)).then_some(key))
+}
+
 enum Checked {
     Sound(Soundness, u64),
     /// Removed since it was listed.
     Gone,
     Damaged(String),
+}
+
+async fn checked(store: Store, key: ObjectKey) -> Result<(ObjectKey, Checked), StorageError> {
+    let found = check(&store, &key).await?;
+    Ok((key, found))
 }
 
 async fn check(store: &Store, key: &ObjectKey) -> Result<Checked, StorageError> {

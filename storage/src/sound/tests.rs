@@ -46,6 +46,8 @@ async fn store() -> Store {
             raw_sha256,
             origin: "a.nc".to_owned(),
             valid_cells: 14,
+            contributed: None,
+            masked: None,
         }],
         domain: domain::write(&store, &product, &[true; 15]).await.unwrap(),
         series: vec![SeriesSegment {
@@ -54,6 +56,7 @@ async fn store() -> Store {
             series: series.unwrap(),
         }],
         derived_from: None,
+        notices: vec![],
     };
     manifests::commit(&store, &manifest).await.unwrap();
     let areas = [(0, vec![1.5; 15])];

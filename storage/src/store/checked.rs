@@ -44,14 +44,18 @@ impl Store {
     /// `Damaged` for the first one that is.
     pub async fn check_once(&self, keys: &[&ObjectKey]) -> Result<(), StorageError> {
         let new = keys.iter().filter(|key| !self.checked.has(key));
-        stream::iter(new)
-            .map(|key| async move {
-                self.get(key).await?;
-                self.checked.add(key);
-                Ok(())
-            })
+        let checks: Vec<_> = new
+            .map(|&key| self.clone().check_now(key.clone()))
+            .collect();
+        stream::iter(checks)
             .buffer_unordered(AT_ONCE)
             .try_collect()
             .await
+    }
+
+    async fn check_now(self, key: ObjectKey) -> Result<(), StorageError> {
+        self.get(&key).await?;
+        self.checked.add(&key);
+        Ok(())
     }
 }
