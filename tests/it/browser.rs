@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use harness::server::Server;
 use harness::program;
+use harness::server::Server;
 
 use crate::end_to_end::demo_data;
 

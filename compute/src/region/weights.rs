@@ -11,11 +11,24 @@ use storage::Store;
 
 use super::box_cover::{self, Bounds};
 use super::polygon_cover::Band;
-use super::rings::rings;
+use super::rings::{Ring, rings};
+use super::sea::sea;
 use crate::ComputeError;
 
-/// Version of the way weights are computed: it changes when their bits do.
-const METHOD: u32 = 1;
+/// Version of the way weights of boxes are computed: it changes when their bits do.
+const BOX_METHOD: u32 = 1;
+/// The same of polygons and of the sea. 2: edges are as wide as they are written, what overlaps counts once.
+const POLYGON_METHOD: u32 = 2;
+
+/// What of a region is weighed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Surface {
+    /// All of it.
+    All,
+    /// The sea in it.
+    Ocean,
+}
 
 /// What weights depend on.
 #[derive(Serialize)]
@@ -24,6 +37,8 @@ struct Job<'a> {
     grid: &'a Grid,
     region: &'a Region,
     earth: Earth,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    surface: Option<Surface>,
 }
 
 /// Areas of a region's share of every cell, m², by chunk number; only chunks with any area.
@@ -32,13 +47,21 @@ pub fn compute(
     region: &Region,
     earth: Earth,
 ) -> Result<Vec<(u32, Vec<f64>)>, ComputeError> {
-    let mut chunks = vec![];
-    let mut keep = |chunk: usize, areas: Vec<f64>| {
-        if areas.iter().any(|&area| area > 0.0) {
-            chunks.push((chunk as u32, areas));
-        }
-    };
+    compute_of(grid, region, earth, Surface::All)
+}
+
+/// The same of a surface.
+pub fn compute_of(
+    grid: &Grid,
+    region: &Region,
+    earth: Earth,
+    surface: Surface,
+) -> Result<Vec<(u32, Vec<f64>)>, ComputeError> {
     let bounds = match region {
+        _ if surface == Surface::Ocean => {
+            return ring_chunks(grid, &sea(&rings(region)?), earth);
+        }
+        Region::Polygons(_) => return ring_chunks(grid, &rings(region)?, earth),
         Region::Global => Bounds::global(grid),
         Region::Box {
             west,
@@ -51,34 +74,59 @@ pub fn compute(
             east: *east,
             north: *north,
         },
-        Region::Polygons(polygons) => {
-            let rings = rings(polygons)?;
-            let mut band = None;
-            for (chunk, window) in frame_chunks(grid).into_iter().enumerate() {
-                debug_assert_eq!(window.row % CHUNK_ROWS, 0, "chunks start at band rows");
-                let current = match band.take() {
-                    Some((row, current)) if row == window.row => current,
-                    _ => Band::new(&rings, grid, window.row, earth)?,
-                };
-                keep(chunk, current.window(window));
-                band = Some((window.row, current));
-            }
-            return Ok(chunks);
-        }
     };
+    let areas = |window| box_cover::areas_m2(bounds, grid, window, earth);
+    let windows = frame_chunks(grid).into_iter().enumerate();
+    Ok(windows
+        .map(|(chunk, window)| (chunk as u32, areas(window)))
+        .filter(any_area)
+        .collect())
+}
+
+fn any_area((_chunk, areas_m2): &(u32, Vec<f64>)) -> bool {
+    areas_m2.iter().any(|&area_m2| area_m2 > 0.0)
+}
+
+/// Areas inside of rings.
+fn ring_chunks(
+    grid: &Grid,
+    rings: &[Ring],
+    earth: Earth,
+) -> Result<Vec<(u32, Vec<f64>)>, ComputeError> {
+    let mut chunks = vec![];
+    let mut band = None;
     for (chunk, window) in frame_chunks(grid).into_iter().enumerate() {
-        keep(chunk, box_cover::areas_m2(bounds, grid, window, earth));
+        debug_assert_eq!(window.row % CHUNK_ROWS, 0, "chunks start at band rows");
+        let current = match band.take() {
+            Some((row, current)) if row == window.row => current,
+            _ => Band::new(rings, grid, window.row, earth)?,
+        };
+        chunks.push((chunk as u32, current.window(window)));
+        band = Some((window.row, current));
     }
+    chunks.retain(any_area);
     Ok(chunks)
 }
 
 /// Where weights are stored, whether they are there or not.
 pub fn key(grid: &Grid, region: &Region, earth: Earth) -> ObjectKey {
+    key_of(grid, region, earth, Surface::All)
+}
+
+/// The same of a surface.
+pub fn key_of(grid: &Grid, region: &Region, earth: Earth, surface: Surface) -> ObjectKey {
+    let is_polygonal = surface == Surface::Ocean || matches!(region, Region::Polygons(_));
     ObjectKey::weights(&Digest::of_json(&Job {
-        method: METHOD,
+        method: if is_polygonal {
+            POLYGON_METHOD
+        } else {
+            BOX_METHOD
+        },
         grid,
         region,
         earth,
+        // Left out for whole regions, whose keys are older than this.
+        surface: (surface != Surface::All).then_some(surface),
     }))
 }
 
@@ -89,12 +137,23 @@ pub async fn stored(
     region: &Region,
     earth: Earth,
 ) -> Result<Option<ObjectKey>, ComputeError> {
-    let key = key(grid, region, earth);
+    stored_of(store, grid, region, earth, Surface::All).await
+}
+
+/// The same of a surface; none also if nothing of the region on the grid is of it.
+pub async fn stored_of(
+    store: &Store,
+    grid: &Grid,
+    region: &Region,
+    earth: Earth,
+    surface: Surface,
+) -> Result<Option<ObjectKey>, ComputeError> {
+    let key = key_of(grid, region, earth, surface);
     if store.exists(&key).await? {
         return Ok(Some(key));
     }
     let (grid, region) = (*grid, region.clone());
-    let chunks = tokio::task::spawn_blocking(move || compute(&grid, &region, earth))
+    let chunks = tokio::task::spawn_blocking(move || compute_of(&grid, &region, earth, surface))
         .await
         .map_err(|e| ComputeError::inconsistent("weights", e))??;
     if chunks.is_empty() {

@@ -1,9 +1,13 @@
 //! Region files: their budgets against boxes, and real coast lines that nobody on this project drew.
 
+use std::process::Command;
+
 use compute::Engine;
-use compute::region::{area, geojson_file, weights};
+use compute::region::{area, file, weights};
 use contract::earth::Earth;
+use contract::grid::Grid;
 use contract::quantity::Quantity;
+use contract::region::Region;
 
 use crate::fixture::{ONE_DEGREE, ask, folder_store, land, parts, product, total, wavy_year};
 
@@ -13,13 +17,13 @@ async fn a_box_drawn_in_a_file_has_the_budget_of_the_box() {
     let id = product("wavy");
     let year = wavy_year(&ONE_DEGREE);
     land(&store, &id, Quantity::CarbonFlux, ONE_DEGREE, &year, 12).await;
-    // Across the date line, with corners that jump there and edges inside cells.
+    // Across the date line, once with longitudes past 180, with edges inside cells.
     let text = r#"{"type":"Feature","properties":{},"geometry":{"type":"Polygon","coordinates":
-        [[[170.5,-33.3],[-120.1,-33.3],[-120.1,12.7],[170.5,12.7],[170.5,-33.3]]]}}"#;
-    let file = folder.path().join("box.geojson");
-    std::fs::write(&file, text).unwrap();
+        [[[170.5,-33.3],[239.9,-33.3],[239.9,12.7],[170.5,12.7],[170.5,-33.3]]]}}"#;
+    let path = folder.path().join("box.geojson");
+    std::fs::write(&path, text).unwrap();
     let drawn = compute::BudgetQuery {
-        region: geojson_file::read(&file).unwrap(),
+        region: file::read(&path).unwrap(),
         ..total(&id, "global")
     };
     let engine = Engine::standalone(store, parts(2));
@@ -42,7 +46,7 @@ fn real_land_and_real_ocean_make_the_earth() {
         ("ne_110m_land.json", 1.45e14, 1.50e14),
         ("ne_110m_ocean.json", 3.60e14, 3.65e14),
     ] {
-        let region = geojson_file::read(&folder.join(name)).unwrap();
+        let region = file::read(&folder.join(name)).unwrap();
         let own_m2 = area::region_area_m2(&region, Earth::Wgs84).unwrap();
         assert!((least_m2..most_m2).contains(&own_m2), "{name} {own_m2}");
         let chunks = weights::compute(&ONE_DEGREE, &region, Earth::Wgs84).unwrap();
@@ -52,6 +56,97 @@ fn real_land_and_real_ocean_make_the_earth() {
     }
     let earth_m2 = Earth::Wgs84.cell_area_m2(-90.0, 90.0, 360.0);
     assert!((sum_m2 / earth_m2 - 1.0).abs() < 1e-9, "{sum_m2}");
-    let lines = geojson_file::read(&folder.join("ne_110m_coastline.json")).unwrap_err();
+    let lines = file::read(&folder.join("ne_110m_coastline.json")).unwrap_err();
     assert!(lines.to_string().contains("a LineString has no area"));
+}
+
+#[derive(serde::Deserialize)]
+struct Reference {
+    kind: String,
+    area_m2: f64,
+}
+
+/// Weights of a region on a grid, m² in all.
+fn weighed_m2(grid: &Grid, region: &Region) -> f64 {
+    let chunks = weights::compute(grid, region, Earth::Wgs84).unwrap();
+    chunks.iter().flat_map(|(_, areas)| areas).sum()
+}
+
+#[test]
+fn areas_of_500_regions_are_those_that_another_program_finds() {
+    let folder = tempfile::tempdir().unwrap();
+    let script = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../tests/reference/region_areas.py"
+    );
+    let run = Command::new(test_data::python())
+        .arg(script)
+        .arg(folder.path())
+        .output()
+        .unwrap();
+    let talk = String::from_utf8_lossy(&run.stderr);
+    assert!(run.status.success(), "{script}: {talk}");
+    let text = std::fs::read_to_string(folder.path().join("areas.json")).unwrap();
+    let references: Vec<Reference> = serde_json::from_str(&text).unwrap();
+    assert_eq!(references.len(), 500);
+    let mut worst = std::collections::BTreeMap::new();
+    for (index, Reference { kind, area_m2 }) in references.iter().enumerate() {
+        let of = |ending: &str| {
+            let file = folder.path().join(format!("{index:03}.{ending}"));
+            file::read(&file).unwrap_or_else(|e| panic!("{kind}: {e}"))
+        };
+        let region = of("geojson");
+        assert_eq!(of("wkt"), region, "{kind} {index}");
+        let own_m2 = area::region_area_m2(&region, Earth::Wgs84).unwrap();
+        let weighed_m2 = weighed_m2(&ONE_DEGREE, &region);
+        for ours_m2 in [own_m2, weighed_m2] {
+            let off = (ours_m2 / area_m2 - 1.0).abs();
+            let most: &mut f64 = worst.entry(kind.as_str()).or_default();
+            *most = most.max(off);
+            assert!(
+                off < 1e-6,
+                "{kind} {index}: {ours_m2} against {area_m2}, off by {off:.1e}"
+            );
+        }
+    }
+    eprintln!("farthest off, by kind: {worst:?}");
+}
+
+#[test]
+fn a_rectangle_is_the_same_region_as_text_geojson_and_well_known_text() {
+    for [west, south, east, north] in [[-100.0, -20.0, 100.0, 35.5], [170.0, -10.0, 190.0, 10.0]] {
+        let corners = [
+            [west, south],
+            [east, south],
+            [east, north],
+            [west, north],
+            [west, south],
+        ];
+        let boxed: Region = format!("{west},{south},{east},{north}").parse().unwrap();
+        let geojson = serde_json::json!({"type": "Polygon", "coordinates": [corners]}).to_string();
+        let places = corners.map(|[lon, lat]| format!("{lon} {lat}")).join(", ");
+        for text in [
+            geojson,
+            format!("POLYGON(({places}))"),
+            format!("MULTIPOLYGON((({places})))"),
+        ] {
+            let drawn: Region = text.parse().unwrap();
+            let (own, expected) = (
+                area::region_area_m2(&drawn, Earth::Wgs84).unwrap(),
+                area::region_area_m2(&boxed, Earth::Wgs84).unwrap(),
+            );
+            assert!(
+                (own / expected - 1.0).abs() < 1e-12,
+                "{text}: {own} {expected}"
+            );
+            let (own, expected) = (
+                weighed_m2(&ONE_DEGREE, &drawn),
+                weighed_m2(&ONE_DEGREE, &boxed),
+            );
+            assert!(
+                (own / expected - 1.0).abs() < 1e-12,
+                "{text}: {own} {expected}"
+            );
+        }
+    }
 }

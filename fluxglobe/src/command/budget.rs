@@ -6,6 +6,7 @@ use anyhow::Result;
 use comfy_table::presets::NOTHING;
 use comfy_table::{CellAlignment, Table};
 use compute::budget::{BudgetAnswer, BudgetQuery, BudgetStep};
+use compute::region::file;
 use contract::region::Region;
 
 use crate::cli::{Budget, Settings, Step};
@@ -43,14 +44,12 @@ pub(crate) async fn run(settings: &Settings, options: &Budget) -> Result<()> {
     Ok(())
 }
 
-/// A GeoJSON file, a named region or a box.
+/// A region file, a named region, a box, GeoJSON text or well-known text.
 pub(crate) fn region(text: &str) -> Result<Region> {
-    let extension = Path::new(text)
-        .extension()
-        .and_then(|extension| extension.to_str());
-    match extension.map(str::to_ascii_lowercase).as_deref() {
-        Some("geojson" | "json") => Ok(compute::region::geojson_file::read(Path::new(text))?),
-        _ => Ok(text.parse()?),
+    if file::is_file_name(text) {
+        Ok(file::read(Path::new(text))?)
+    } else {
+        Ok(text.parse()?)
     }
 }
 

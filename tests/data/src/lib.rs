@@ -29,7 +29,8 @@ pub fn listed() -> impl Iterator<Item = &'static str> {
 /// # Panics
 /// If it is not there: these data come with a package that everybody can have.
 pub fn fluxengine(inside: &str) -> PathBuf {
-    const ADVICE: &str = "`make test` fetches it; by hand: export FLUXGLOBE_FLUXENGINE=$(tests/data/fetch.sh)";
+    const ADVICE: &str =
+        "`make test` fetches it; by hand: export FLUXGLOBE_FLUXENGINE=$(tests/data/fetch.sh)";
     let root = variable("FLUXGLOBE_FLUXENGINE")
         .unwrap_or_else(|| panic!("FLUXGLOBE_FLUXENGINE is not set: {ADVICE}"));
     let folder = root.join(inside);
@@ -39,6 +40,26 @@ pub fn fluxengine(inside: &str) -> PathBuf {
         folder.display()
     );
     folder
+}
+
+/// The Python that has what scripts of the tests import.
+///
+/// # Panics
+/// If `deploy/install-tools.sh test` has not made it.
+pub fn python() -> PathBuf {
+    let tools = variable("FLUXGLOBE_TOOLS").or_else(|| {
+        let home = variable("HOME")?;
+        Some(home.join(".cache/fluxglobe/tools"))
+    });
+    let python = tools
+        .expect("HOME or FLUXGLOBE_TOOLS is set")
+        .join("bin/python");
+    assert!(
+        python.is_file(),
+        "there is no {}: `make test` makes it; by hand: deploy/install-tools.sh test",
+        python.display()
+    );
+    python
 }
 
 /// A set of `FLUXGLOBE_TEST_DATA`; none, with a word on standard error and in the file that `FLUXGLOBE_SKIPPED` names,
@@ -60,7 +81,9 @@ pub fn set(name: &str) -> Option<PathBuf> {
         !is_told && !root.is_dir(),
         "the set {name} is not there (looked in {folder}); set FLUXGLOBE_TEST_DATA to the folder of all sets"
     );
-    not_run(&format!("the set {name}, and FLUXGLOBE_TEST_DATA to say where"));
+    not_run(&format!(
+        "the set {name}, and FLUXGLOBE_TEST_DATA to say where"
+    ));
     None
 }
 
@@ -98,7 +121,10 @@ fn note(test: &str) {
 }
 
 fn variable(name: &str) -> Option<PathBuf> {
-    #[expect(clippy::disallowed_methods, reason = "tests have no command line of their own")]
+    #[expect(
+        clippy::disallowed_methods,
+        reason = "tests have no command line of their own"
+    )]
     let text = std::env::var(name).ok();
     text.filter(|text| !text.is_empty()).map(PathBuf::from)
 }
