@@ -1,15 +1,17 @@
 //! Carbon budgets: B = the integral of the flux over a region's area and over time, exact at any parallelism.
 
 mod asked;
+pub mod bands;
 pub mod chunk;
 pub mod fixed;
+pub mod gaps;
 pub mod named;
 mod query;
 pub mod rows;
 pub mod running;
 pub mod sums;
 
-pub(crate) use query::steps_inside;
+pub(crate) use query::{extent_of, steps_inside};
 pub use query::{BudgetAnswer, BudgetQuery, budget, budget_of};
 pub use rows::{BudgetRow, BudgetStep};
 pub use sums::Measure;

@@ -5,6 +5,7 @@
 
 pub mod area;
 mod box_cover;
+mod cut;
 pub mod extent;
 pub mod file;
 mod land;

@@ -1,11 +1,13 @@
 //! Regions that budgets are asked for: the globe, named regions, boxes and polygons.
 
+mod cells;
 mod named;
 mod text;
 
 use serde::{Deserialize, Serialize};
 
 use crate::ContractError;
+pub use cells::Cells;
 pub use named::{NAMED_REGIONS, NamedRegion};
 pub use text::MAX_TEXT_BYTES;
 

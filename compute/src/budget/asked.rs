@@ -4,15 +4,17 @@
 use std::collections::BTreeMap;
 
 use contract::digest::Digest;
+use contract::grid::Grid;
 use contract::key::ObjectKey;
 use contract::manifest::Step;
 use contract::time::{Period, TimeMs};
 use datafusion::arrow::array::{AsArray as _, RecordBatch};
 use datafusion::arrow::datatypes::{Decimal128Type, TimestampMillisecondType};
 
+use super::bands::{BAND_COUNT, BandSum, band_areas};
 use super::rows::StepSum;
 use super::sums::Measure;
-use crate::region::loaded::RegionWeights;
+use crate::region::weights::RegionKeys;
 use crate::session::QueryContext;
 use crate::{ComputeError, Engine, scan};
 
@@ -24,16 +26,58 @@ const STEP_SUMS: &str = "
     SELECT period_start,
            period_end,
            SUM(get_field(sums, 'mass')) AS mass,
-           SUM(get_field(sums, 'area')) AS area
+           SUM(get_field(sums, 'area')) AS area$bands
     FROM (SELECT period_start,
                  period_end,
-                 region_sums(\"values\", chunk, $seconds, '$weights') AS sums
+                 region_sums(\"values\", chunk, $seconds, '$weights') AS sums,
+                 band_sums(\"values\", chunk, $seconds, '$ocean', '$grid') AS bands
           FROM frames
           WHERE $chunks)
     GROUP BY period_start, period_end";
 
-/// The question about all frames, for a region's weights at an address.
-fn sql(measure: Measure, weights: &RegionWeights, address: &str) -> String {
+/// A region on a grid, its weights read.
+pub(super) struct AskedRegion {
+    grid: Grid,
+    /// Addresses of the weights.
+    all: String,
+    ocean: String,
+    /// Chunks that the region touches.
+    runs: Vec<(u32, u32)>,
+    /// Area of its sea in every band, m² in steps of 10⁻⁶.
+    pub(super) sea_steps: [i128; BAND_COUNT],
+}
+
+impl AskedRegion {
+    /// Reads the weights.
+    pub(super) async fn read(
+        engine: &Engine,
+        grid: &Grid,
+        weights: &RegionKeys,
+    ) -> Result<Self, ComputeError> {
+        let address = |key| engine.store().sql_url(key).to_string();
+        let (all, ocean) = (address(&weights.all), address(&weights.ocean));
+        let failed = || ComputeError::engine("reading a region's weights");
+        let whole = engine.objects().weights(&all).await.map_err(failed())?;
+        let sea = engine.objects().weights(&ocean).await.map_err(failed())?;
+        let sea_steps = band_areas(grid, sea.chunks())
+            .map_err(|e| ComputeError::inconsistent(weights.ocean.as_str(), e))?;
+        Ok(Self {
+            grid: *grid,
+            all,
+            ocean,
+            runs: whole.runs(),
+            sea_steps,
+        })
+    }
+
+    /// Bands that hold sea of it.
+    fn bands(&self) -> impl Iterator<Item = usize> {
+        (0..BAND_COUNT).filter(|band| self.sea_steps[*band] > 0)
+    }
+}
+
+/// The question about all frames.
+fn sql(measure: Measure, region: &AskedRegion) -> String {
     let seconds = match measure {
         Measure::Mass => "(CAST(period_end AS BIGINT) - CAST(period_start AS BIGINT)) / 1000.0",
         Measure::Mean => "CAST(1.0 AS DOUBLE)",
@@ -41,26 +85,36 @@ fn sql(measure: Measure, weights: &RegionWeights, address: &str) -> String {
     let run = |(first, last): (u32, u32)| {
         format!("chunk BETWEEN CAST({first} AS INT UNSIGNED) AND CAST({last} AS INT UNSIGNED)")
     };
-    let chunks: Vec<String> = weights.runs().into_iter().map(run).collect();
+    let chunks: Vec<String> = region.runs.iter().copied().map(run).collect();
+    let band = |band| {
+        let sum = |what| format!(", SUM(get_field(bands, '{what}_{band}')) AS {what}_{band}");
+        sum("mass") + &sum("area")
+    };
+    let quoted = |text: &str| text.replace('\'', "''");
+    let grid = serde_json::to_string(&region.grid).expect("a grid is plain numbers");
     STEP_SUMS
+        .replace("$bands", &region.bands().map(band).collect::<String>())
         .replace("$seconds", seconds)
         .replace("$chunks", &chunks.join(" OR "))
-        .replace("$weights", &address.replace('\'', "''"))
+        .replace("$weights", &quoted(&region.all))
+        .replace("$ocean", &quoted(&region.ocean))
+        .replace("$grid", &quoted(&grid))
 }
 
 /// Exact sums of steps in their order.
 pub(super) async fn asked(
     engine: &Engine,
     steps: &[&Step],
-    weights: &ObjectKey,
+    region: &AskedRegion,
     measure: Measure,
 ) -> Result<Vec<StepSum>, ComputeError> {
     let frames: Vec<&ObjectKey> = steps.iter().map(|step| &step.frame).collect();
+    let weights = (&region.all, &region.ocean);
     let job = Digest::of_json(&("sums", measure, &frames, weights));
-    let ask = |context| ask(engine, context, &frames, weights, measure);
+    let ask = |context| ask(engine, context, &frames, region, measure);
     let mut sums = BTreeMap::new();
     for batch in &engine.answer(job, ask).await? {
-        for sum in sums_of(batch)? {
+        for sum in sums_of(batch, region)? {
             sums.insert(sum.period.start, sum);
         }
     }
@@ -81,20 +135,17 @@ async fn ask(
     engine: &Engine,
     context: QueryContext,
     frames: &[&ObjectKey],
-    weights: &ObjectKey,
+    region: &AskedRegion,
     measure: Measure,
 ) -> Result<Vec<RecordBatch>, ComputeError> {
     let store = engine.store();
     scan::register(&context, "frames", store, frames, &storage::frames::SCHEMA)?;
-    let address = store.sql_url(weights).to_string();
     let failed = || ComputeError::engine("summing over a region");
-    let region = engine.objects().weights(&address).await.map_err(failed())?;
-    let sql = sql(measure, &region, &address);
-    let query = context.sql(&sql).await.map_err(failed())?;
+    let query = context.sql(&sql(measure, region)).await.map_err(failed())?;
     query.collect().await.map_err(failed())
 }
 
-fn sums_of(batch: &RecordBatch) -> Result<Vec<StepSum>, ComputeError> {
+fn sums_of(batch: &RecordBatch, region: &AskedRegion) -> Result<Vec<StepSum>, ComputeError> {
     let time = |column: usize| {
         batch
             .column(column)
@@ -102,6 +153,15 @@ fn sums_of(batch: &RecordBatch) -> Result<Vec<StepSum>, ComputeError> {
     };
     let decimal = |column: usize| batch.column(column).as_primitive::<Decimal128Type>();
     let (starts, ends, masses, areas) = (time(0), time(1), decimal(2), decimal(3));
+    let sea = |row: usize| {
+        let sum = |(index, band)| BandSum {
+            band,
+            mass_steps: decimal(4 + 2 * index).value(row),
+            area_steps: decimal(5 + 2 * index).value(row),
+        };
+        let bands = region.bands().enumerate().map(sum);
+        bands.filter(|sum| sum.area_steps > 0).collect()
+    };
     (0..batch.num_rows())
         .map(|row| {
             let period = Period::new(
@@ -112,6 +172,7 @@ fn sums_of(batch: &RecordBatch) -> Result<Vec<StepSum>, ComputeError> {
                 period,
                 mass_steps: masses.value(row),
                 area_steps: areas.value(row),
+                sea: sea(row),
             })
         })
         .collect()

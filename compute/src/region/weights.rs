@@ -6,7 +6,7 @@ use contract::earth::Earth;
 use contract::grid::Grid;
 use contract::key::ObjectKey;
 use contract::region::Region;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use storage::Store;
 
 use super::box_cover::{self, Bounds};
@@ -28,6 +28,39 @@ pub enum Surface {
     All,
     /// The sea in it.
     Ocean,
+}
+
+/// Where the weights of a region on a grid are, whether they are there or not.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RegionKeys {
+    /// Of all of it.
+    pub all: ObjectKey,
+    /// Of the sea in it.
+    pub ocean: ObjectKey,
+}
+
+impl RegionKeys {
+    /// Those of a region on a grid.
+    pub fn new(grid: &Grid, region: &Region, earth: Earth) -> Self {
+        Self {
+            all: key(grid, region, earth),
+            ocean: key_of(grid, region, earth, Surface::Ocean),
+        }
+    }
+
+    /// The same, once both are stored; none if the region lies outside the grid. The sea's may hold no chunk.
+    pub async fn stored(
+        store: &Store,
+        grid: &Grid,
+        region: &Region,
+        earth: Earth,
+    ) -> Result<Option<Self>, ComputeError> {
+        if stored(store, grid, region, earth).await?.is_none() {
+            return Ok(None);
+        }
+        let ocean = stored_of(store, grid, region, earth, Surface::Ocean).await?;
+        Ok(ocean.map(|_there| Self::new(grid, region, earth)))
+    }
 }
 
 /// What weights depend on.
@@ -140,7 +173,7 @@ pub async fn stored(
     stored_of(store, grid, region, earth, Surface::All).await
 }
 
-/// The same of a surface; none also if nothing of the region on the grid is of it.
+/// The same of a surface. Of the sea they are stored also where the region on the grid is all land, and hold no chunk.
 pub async fn stored_of(
     store: &Store,
     grid: &Grid,
@@ -156,7 +189,7 @@ pub async fn stored_of(
     let chunks = tokio::task::spawn_blocking(move || compute_of(&grid, &region, earth, surface))
         .await
         .map_err(|e| ComputeError::inconsistent("weights", e))??;
-    if chunks.is_empty() {
+    if chunks.is_empty() && surface == Surface::All {
         return Ok(None);
     }
     storage::weights::write(store, &key, &chunks).await?;

@@ -7,7 +7,7 @@ use compute::Engine;
 use compute::budget::{BudgetQuery, BudgetStep};
 use contract::earth::Earth;
 use contract::manifest::Manifest;
-use contract::region::Region;
+use contract::region::{Cells, Region};
 
 use crate::demo::check::Comparison;
 use crate::progress;
@@ -53,6 +53,7 @@ pub(crate) async fn synthetic(engine: &Engine, flux: &Manifest) -> Result<String
         to: None,
         step: BudgetStep::Month,
         earth: Earth::Wgs84,
+        cells: Cells::Whole,
     };
     let answer = compute::budget::budget_of(engine, &query, flux).await?;
     let mut table = table(&[

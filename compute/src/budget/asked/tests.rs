@@ -4,7 +4,6 @@ use std::num::NonZeroUsize;
 use std::sync::Arc;
 
 use contract::earth::Earth;
-use contract::grid::Grid;
 use contract::region::Region;
 use datafusion::arrow::datatypes::DataType;
 use datafusion::execution::context::SessionContext;
@@ -14,7 +13,6 @@ use storage::{Store, frames};
 
 use super::*;
 use crate::objects::Objects;
-use crate::region::weights;
 use crate::state;
 
 const GRID: Grid = Grid {
@@ -39,16 +37,17 @@ async fn plan(config: SessionConfig, region: &str) -> Arc<dyn ExecutionPlan> {
         keys.push(key.unwrap());
     }
     let region: Region = region.parse().unwrap();
-    let weights = weights::stored(&store, &GRID, &region, Earth::Wgs84).await;
-    let address = store.sql_url(&weights.unwrap().unwrap()).to_string();
+    let weights = RegionKeys::stored(&store, &GRID, &region, Earth::Wgs84).await;
+    let engine = Engine::local(store.clone());
+    let weights = weights.unwrap().unwrap();
+    let region = AskedRegion::read(&engine, &GRID, &weights).await.unwrap();
     let objects = Objects::of(&store);
-    let region = objects.weights(&address).await.unwrap();
     let runtime = state::runtime(&objects, state::MEMORY_BYTES).unwrap();
     let state = state::session_state(config, runtime, &objects).unwrap();
     let context = SessionContext::new_with_state(state);
     let keys: Vec<&ObjectKey> = keys.iter().collect();
     scan::register(&context, "frames", &store, &keys, &frames::SCHEMA).unwrap();
-    let query = context.sql(&sql(Measure::Mass, &region, &address)).await;
+    let query = context.sql(&sql(Measure::Mass, &region)).await;
     query.unwrap().create_physical_plan().await.unwrap()
 }
 
