@@ -11,7 +11,7 @@ pub mod rows;
 pub mod running;
 pub mod sums;
 
-pub(crate) use query::{extent_of, steps_inside};
 pub use query::{BudgetAnswer, BudgetQuery, budget, budget_of};
+pub(crate) use query::{extent_of, steps_inside};
 pub use rows::{BudgetRow, BudgetStep};
 pub use sums::Measure;

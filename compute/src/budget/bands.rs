@@ -97,7 +97,13 @@ mod tests {
 
     #[test]
     fn bands_of_all_chunks_are_the_sums_of_their_cells() {
-        let value = |i: usize| if i.is_multiple_of(7) { f32::NAN } else { i as f32 * 1e-12 };
+        let value = |i: usize| {
+            if i.is_multiple_of(7) {
+                f32::NAN
+            } else {
+                i as f32 * 1e-12
+            }
+        };
         let area = |i: usize| 1e9 + i as f64;
         let mut sums = [ChunkSums::default(); BAND_COUNT];
         let mut areas = [0; BAND_COUNT];
@@ -112,7 +118,10 @@ mod tests {
                 sum.area_steps += found.area_steps;
             }
             let all = band_areas(&GRID, [(chunk, &area_m2[..])].into_iter()).unwrap();
-            areas.iter_mut().zip(all).for_each(|(sum, area)| *sum += area);
+            areas
+                .iter_mut()
+                .zip(all)
+                .for_each(|(sum, area)| *sum += area);
         }
         for band in 0..BAND_COUNT {
             let south = BAND_DEG * band as f64 - 90.0;
@@ -123,7 +132,11 @@ mod tests {
             let cells: Vec<usize> = (0..GRID.cell_count()).filter(in_band).collect();
             let values: Vec<f32> = cells.iter().map(|&i| value(i)).collect();
             let area_m2: Vec<f64> = cells.iter().map(|&i| area(i)).collect();
-            assert_eq!(sums[band], chunk_sums(&values, &area_m2, 10.0).unwrap(), "{band}");
+            assert_eq!(
+                sums[band],
+                chunk_sums(&values, &area_m2, 10.0).unwrap(),
+                "{band}"
+            );
             assert_eq!(areas[band], total_area_steps(&area_m2).unwrap(), "{band}");
         }
     }

@@ -49,6 +49,12 @@ mod tests {
         };
         // A quarter of one band is missing, nothing of the next, all of the third: for that there is no mean.
         let gap = gap(&sea, &[held(3, -30, 300), held(4, 70, 100)]);
-        assert_eq!(gap, Gap { mass_kg: -10.0, area_m2: 100.0 });
+        assert_eq!(
+            gap,
+            Gap {
+                mass_kg: -10.0,
+                area_m2: 100.0
+            }
+        );
     }
 }

@@ -198,17 +198,15 @@ impl Total {
         let row_ms = (period.end.ms() - period.start.ms()) as f64;
         let covered_ms = self.covered_ms as f64;
         let ocean_with_data_m2 = m2_ms(self.sea_time) / covered_ms;
-        let on_grid_m2 = asked.sea_steps.iter().sum::<i128>() as f64 / 10f64.powi(AREA_DECIMALS as i32);
+        let on_grid_m2 =
+            asked.sea_steps.iter().sum::<i128>() as f64 / 10f64.powi(AREA_DECIMALS as i32);
         let has_gaps = on_grid_m2 > ocean_with_data_m2 * (1.0 + f64::EPSILON * 8.0);
         BudgetRow {
             start: period.start,
             end: period.end,
             budget_kg: decimal_text(self.mass_steps, MASS_DECIMALS),
             budget_tg: self.mass_steps as f64 / 10f64.powi(MASS_DECIMALS as i32) / KG_PER_TG,
-            coverage_percent: coverage_percent(
-                m2_ms(self.sea_time) / row_ms,
-                asked.ocean_area_m2,
-            ),
+            coverage_percent: coverage_percent(m2_ms(self.sea_time) / row_ms, asked.ocean_area_m2),
             area_m2: m2_ms(self.area_time) / covered_ms,
             region_area_m2: asked.region_area_m2,
             ocean_area_m2: asked.ocean_area_m2,
@@ -330,7 +328,11 @@ mod tests {
     #[test]
     fn gaps_are_estimated_apart_and_cells_count_as_asked() {
         let (sums, period) = ([month(1, 310)], period("2000-01-01", "2000-02-01"));
-        let of = |cells| super::rows(&[period], &sums, &asked(cells)).unwrap().remove(0);
+        let of = |cells| {
+            super::rows(&[period], &sums, &asked(cells))
+                .unwrap()
+                .remove(0)
+        };
         let (whole, share) = (of(Cells::Whole), of(Cells::OceanShare));
         assert_eq!(whole.budget_kg, "310.000000000");
         assert_eq!(share.budget_kg, "155.000000000");
@@ -348,11 +350,18 @@ mod tests {
     fn gaps_beside_nothing_have_no_estimate_and_no_gaps_are_nothing() {
         let period = period("2000-01-01", "2000-02-01");
         let row = |sea| {
-            let sum = StepSum { sea, ..month(1, 310) };
+            let sum = StepSum {
+                sea,
+                ..month(1, 310)
+            };
             rows(&[period], &[sum]).unwrap().remove(0)
         };
         assert_eq!(row(vec![]).gap_tg, None);
-        let full = BandSum { band: 20, mass_steps: 7, area_steps: 100_000_000 };
+        let full = BandSum {
+            band: 20,
+            mass_steps: 7,
+            area_steps: 100_000_000,
+        };
         assert_eq!(row(vec![full]).gap_tg, Some(0.0));
     }
 }

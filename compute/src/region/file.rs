@@ -74,7 +74,10 @@ mod tests {
                 SQUARE.replace("[1,1]", "[500000,4000000]"),
                 "no longitude, latitude",
             ),
-            (SQUARE.replace("[[0,0],[1,0],[1,1],", "["), "fewer than three"),
+            (
+                SQUARE.replace("[[0,0],[1,0],[1,1],", "["),
+                "fewer than three",
+            ),
             (String::new(), "global"),
         ] {
             let error = region("b.json", &text).unwrap_err().to_string();

@@ -15,7 +15,8 @@ pub(super) fn united(polygons: &[Checked]) -> Vec<Ring> {
     let mut rings = vec![];
     for group in groups(polygons) {
         let group: Vec<&Checked> = group.into_iter().map(|index| &polygons[index]).collect();
-        let [west, _, east, _] = bounds_deg(group.iter().flat_map(|polygon| polygon.rings().flatten()));
+        let [west, _, east, _] =
+            bounds_deg(group.iter().flat_map(|polygon| polygon.rings().flatten()));
         if east - west > 360.0 {
             // Parts may meet a turn apart: all are brought into the same longitudes.
             let cut: Vec<_> = group.iter().map(|polygon| in_the_world(polygon)).collect();

@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::budget::fixed::{AREA_DECIMALS, MASS_DECIMALS};
 use crate::budget::rows::{StepSum, coverage_percent};
-use crate::budget::{extent_of, steps_inside};
 use crate::budget::sums::{self, Measure};
+use crate::budget::{extent_of, steps_inside};
 use crate::region::weights::RegionKeys;
 use crate::{ComputeError, Engine, catalog};
 

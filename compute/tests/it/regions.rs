@@ -7,7 +7,8 @@ use compute::region::{area, file, weights};
 use contract::earth::Earth;
 use contract::grid::Grid;
 use contract::quantity::Quantity;
-use contract::region::Region;
+use contract::region::{Cells, Region};
+use contract::time::Period;
 
 use crate::fixture::{ONE_DEGREE, ask, folder_store, land, parts, product, total, wavy_year};
 
@@ -149,4 +150,81 @@ fn a_rectangle_is_the_same_region_as_text_geojson_and_well_known_text() {
             );
         }
     }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn coverage_is_of_the_sea_and_gaps_are_estimated_apart() {
+    /// 2⁻³⁰ kg m⁻² s⁻¹: an f32 holds it exactly.
+    const FLUX: f32 = 1.0 / (1u32 << 30) as f32;
+    let (_folder, store) = folder_store();
+    let month = Period::month(2000, 1).unwrap();
+    // Values everywhere, on land too; the second product lacks every second column between 30 and 40 degrees south.
+    let full = vec![FLUX; ONE_DEGREE.cell_count()];
+    let mut holed = full.clone();
+    for (index, value) in holed.iter_mut().enumerate() {
+        if (120..130).contains(&(index / 360)) && (index % 360).is_multiple_of(2) {
+            *value = f32::NAN;
+        }
+    }
+    for (name, values) in [("full", full), ("holed", holed)] {
+        let steps = [(month, values)];
+        land(
+            &store,
+            &product(name),
+            Quantity::CarbonFlux,
+            ONE_DEGREE,
+            &steps,
+            1,
+        )
+        .await;
+    }
+    let engine = Engine::standalone(store, parts(2));
+    let of = |name: &str, region: &str, cells| {
+        let query = compute::BudgetQuery {
+            cells,
+            ..total(&product(name), region)
+        };
+        let engine = &engine;
+        async move { ask(engine, &query).await }
+    };
+    let kg_per_m2 = f64::from(FLUX) * 31.0 * 86_400.0;
+    let close = |a: f64, b: f64, by: f64| assert!((a / b - 1.0).abs() < by, "{a} {b}");
+
+    let globe = of("full", "global", Cells::Whole).await;
+    let earth_m2 = Earth::Wgs84.cell_area_m2(-90.0, 90.0, 360.0);
+    close(globe.region_area_m2, earth_m2, 1e-12);
+    close(globe.ocean_area_m2, 362.9e12, 1e-3);
+    close(globe.rows[0].budget_tg, kg_per_m2 * earth_m2 / 1e9, 1e-9);
+    close(globe.rows[0].ocean_with_data_m2, globe.ocean_area_m2, 1e-8);
+    close(globe.rows[0].coverage_percent, 100.0, 1e-8);
+    assert_eq!(
+        (globe.rows[0].gap_tg, globe.cells),
+        (Some(0.0), Cells::Whole)
+    );
+    assert!(globe.notes.is_empty() && globe.gap_basis.contains("5 degrees"));
+    let share = of("full", "global", Cells::OceanShare).await;
+    close(
+        share.rows[0].budget_tg,
+        kg_per_m2 * globe.ocean_area_m2 / 1e9,
+        1e-8,
+    );
+    close(share.rows[0].area_m2, globe.ocean_area_m2, 1e-8);
+
+    // South of Africa: what is there and what the gaps would be make the whole again.
+    for cells in [Cells::Whole, Cells::OceanShare] {
+        let full = of("full", "0,-45,40,-30", cells).await;
+        let holed = of("holed", "0,-45,40,-30", cells).await;
+        let row = &holed.rows[0];
+        assert!(row.budget_tg < 0.8 * full.rows[0].budget_tg, "{row:?}");
+        assert!((50.0..80.0).contains(&row.coverage_percent), "{row:?}");
+        let missing_m2 = holed.ocean_area_m2 - row.ocean_with_data_m2;
+        close(row.gap_area_m2, missing_m2, 1e-6);
+        close(row.gap_tg.unwrap(), kg_per_m2 * missing_m2 / 1e9, 1e-6);
+    }
+    let inland = of("full", "5,20,10,25", Cells::Whole).await;
+    assert_eq!(
+        (inland.ocean_area_m2, inland.rows[0].coverage_percent),
+        (0.0, 0.0)
+    );
+    assert!(inland.rows[0].budget_tg > 0.0 && inland.notes[0].contains("no sea"));
 }

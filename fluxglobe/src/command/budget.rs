@@ -12,6 +12,8 @@ use contract::region::Region;
 use crate::cli::{Budget, Settings, Step};
 use crate::{deployment, progress};
 
+const M2_PER_MILLION_KM2: f64 = 1e12;
+
 pub(crate) async fn run(settings: &Settings, options: &Budget) -> Result<()> {
     let store = deployment::store(settings)?;
     deployment::manifest(&store, &options.product, &settings.data).await?;
@@ -27,6 +29,7 @@ pub(crate) async fn run(settings: &Settings, options: &Budget) -> Result<()> {
             Step::Total => BudgetStep::Total,
         },
         earth: options.earth,
+        cells: options.cells,
     };
     let bar = progress::bar("sum over the region", 1);
     let engine = deployment::region_engine(settings, store)?;
@@ -36,10 +39,25 @@ pub(crate) async fn run(settings: &Settings, options: &Budget) -> Result<()> {
         return progress::result(&serde_json::to_string_pretty(&answer)?);
     }
     progress::result(&table(&answer).to_string())?;
+    let million_km2 = |m2: f64| m2 / M2_PER_MILLION_KM2;
     progress::say(&format!(
-        "{} of {}, {} earth, positive out of the sea; cite {}",
-        answer.unit, answer.region, answer.earth, answer.manifest
+        "{} of {}, {} earth, positive out of the sea; {} ({}); cite {}",
+        answer.unit,
+        answer.region,
+        answer.earth,
+        answer.cells.title(),
+        answer.cells,
+        answer.manifest
     ));
+    progress::say(&format!(
+        "asked for {:.3} 10⁶ km², {:.3} of it sea; what gaps would add, not part of the budget: {}",
+        million_km2(answer.region_area_m2),
+        million_km2(answer.ocean_area_m2),
+        answer.gap_basis
+    ));
+    for note in &answer.notes {
+        progress::say(&format!("note: {note}"));
+    }
     progress::say(&answer.source);
     Ok(())
 }
@@ -56,8 +74,16 @@ pub(crate) fn region(text: &str) -> Result<Region> {
 fn table(answer: &BudgetAnswer) -> Table {
     let mut table = Table::new();
     table.load_preset(NOTHING);
-    table.set_header(["from", "to", "Tg C", "% of area", "10⁶ km² with data"]);
-    for column in 2..5 {
+    table.set_header([
+        "from",
+        "to",
+        "Tg C",
+        "% of sea",
+        "10⁶ km² of sea with data",
+        "gaps would add Tg C",
+        "for 10⁶ km²",
+    ]);
+    for column in 2..7 {
         if let Some(column) = table.column_mut(column) {
             column.set_cell_alignment(CellAlignment::Right);
         }
@@ -68,7 +94,10 @@ fn table(answer: &BudgetAnswer) -> Table {
             progress::day(row.end),
             format!("{:.3}", row.budget_tg),
             format!("{:.1}", row.coverage_percent),
-            format!("{:.3}", row.area_m2 / 1e12),
+            format!("{:.3}", row.ocean_with_data_m2 / M2_PER_MILLION_KM2),
+            row.gap_tg
+                .map_or_else(|| "unknown".to_owned(), |gap_tg| format!("{gap_tg:.3}")),
+            format!("{:.3}", row.gap_area_m2 / M2_PER_MILLION_KM2),
         ]);
     }
     table

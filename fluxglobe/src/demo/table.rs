@@ -60,7 +60,7 @@ pub(crate) async fn synthetic(engine: &Engine, flux: &Manifest) -> Result<String
         "SYNTHETIC: air-sea carbon of a generated sea",
         "to",
         "Tg C",
-        "% of area",
+        "% of sea",
     ]);
     for row in &answer.rows {
         let numbers = [
