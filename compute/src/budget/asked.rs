@@ -9,9 +9,10 @@ use contract::key::ObjectKey;
 use contract::manifest::Step;
 use contract::time::{Period, TimeMs};
 use datafusion::arrow::array::{AsArray as _, RecordBatch};
-use datafusion::arrow::datatypes::{Decimal128Type, TimestampMillisecondType};
+use datafusion::arrow::compute::cast;
+use datafusion::arrow::datatypes::{DataType, Decimal128Type, TimestampMillisecondType};
 
-use super::bands::{BAND_COUNT, BandSum, band_areas};
+use super::bands::{BAND_COUNT, band_areas, summed_bands};
 use super::rows::StepSum;
 use super::sums::Measure;
 use crate::region::weights::RegionKeys;
@@ -26,7 +27,8 @@ const STEP_SUMS: &str = "
     SELECT period_start,
            period_end,
            SUM(get_field(sums, 'mass')) AS mass,
-           SUM(get_field(sums, 'area')) AS area$bands
+           SUM(get_field(sums, 'area')) AS area,
+           STRING_AGG(bands, ' ') AS bands
     FROM (SELECT period_start,
                  period_end,
                  region_sums(\"values\", chunk, $seconds, '$weights') AS sums,
@@ -69,11 +71,6 @@ impl AskedRegion {
             sea_steps,
         })
     }
-
-    /// Bands that hold sea of it.
-    fn bands(&self) -> impl Iterator<Item = usize> {
-        (0..BAND_COUNT).filter(|band| self.sea_steps[*band] > 0)
-    }
 }
 
 /// The question about all frames.
@@ -86,14 +83,9 @@ fn sql(measure: Measure, region: &AskedRegion) -> String {
         format!("chunk BETWEEN CAST({first} AS INT UNSIGNED) AND CAST({last} AS INT UNSIGNED)")
     };
     let chunks: Vec<String> = region.runs.iter().copied().map(run).collect();
-    let band = |band| {
-        let sum = |what| format!(", SUM(get_field(bands, '{what}_{band}')) AS {what}_{band}");
-        sum("mass") + &sum("area")
-    };
     let quoted = |text: &str| text.replace('\'', "''");
     let grid = serde_json::to_string(&region.grid).expect("a grid is plain numbers");
     STEP_SUMS
-        .replace("$bands", &region.bands().map(band).collect::<String>())
         .replace("$seconds", seconds)
         .replace("$chunks", &chunks.join(" OR "))
         .replace("$weights", &quoted(&region.all))
@@ -114,7 +106,7 @@ pub(super) async fn asked(
     let ask = |context| ask(engine, context, &frames, region, measure);
     let mut sums = BTreeMap::new();
     for batch in &engine.answer(job, ask).await? {
-        for sum in sums_of(batch, region)? {
+        for sum in sums_of(batch)? {
             sums.insert(sum.period.start, sum);
         }
     }
@@ -145,7 +137,7 @@ async fn ask(
     query.collect().await.map_err(failed())
 }
 
-fn sums_of(batch: &RecordBatch, region: &AskedRegion) -> Result<Vec<StepSum>, ComputeError> {
+fn sums_of(batch: &RecordBatch) -> Result<Vec<StepSum>, ComputeError> {
     let time = |column: usize| {
         batch
             .column(column)
@@ -153,14 +145,11 @@ fn sums_of(batch: &RecordBatch, region: &AskedRegion) -> Result<Vec<StepSum>, Co
     };
     let decimal = |column: usize| batch.column(column).as_primitive::<Decimal128Type>();
     let (starts, ends, masses, areas) = (time(0), time(1), decimal(2), decimal(3));
+    let bands = cast(batch.column(4), &DataType::Utf8)
+        .map_err(|e| ComputeError::inconsistent("sums of bands", e))?;
     let sea = |row: usize| {
-        let sum = |(index, band)| BandSum {
-            band,
-            mass_steps: decimal(4 + 2 * index).value(row),
-            area_steps: decimal(5 + 2 * index).value(row),
-        };
-        let bands = region.bands().enumerate().map(sum);
-        bands.filter(|sum| sum.area_steps > 0).collect()
+        let text = bands.as_string::<i32>().value(row);
+        summed_bands(text).ok_or_else(|| ComputeError::inconsistent("sums of bands", text))
     };
     (0..batch.num_rows())
         .map(|row| {
@@ -172,7 +161,7 @@ fn sums_of(batch: &RecordBatch, region: &AskedRegion) -> Result<Vec<StepSum>, Co
                 period,
                 mass_steps: masses.value(row),
                 area_steps: areas.value(row),
-                sea: sea(row),
+                sea: sea(row)?,
             })
         })
         .collect()

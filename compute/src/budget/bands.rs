@@ -62,6 +62,45 @@ pub fn band_sums(
     Ok(sums)
 }
 
+/// Sums of bands as text, those without data left out: `band,mass_steps,area_steps`, with spaces between them.
+pub fn bands_text(sums: &[ChunkSums; BAND_COUNT]) -> String {
+    let held = sums
+        .iter()
+        .enumerate()
+        .filter(|(_, sum)| sum.area_steps != 0);
+    let words: Vec<String> = held
+        .map(|(band, sum)| format!("{band},{},{}", sum.mass_steps, sum.area_steps))
+        .collect();
+    words.join(" ")
+}
+
+/// The sums that a text of any number of chunks says; none if it is no such text.
+pub fn summed_bands(text: &str) -> Option<Vec<BandSum>> {
+    let mut sums: Vec<BandSum> = vec![];
+    for word in text.split_ascii_whitespace() {
+        let mut numbers = word.split(',');
+        let band = numbers
+            .next()?
+            .parse()
+            .ok()
+            .filter(|band| *band < BAND_COUNT)?;
+        let mass_steps: i128 = numbers.next()?.parse().ok()?;
+        let area_steps: i128 = numbers.next()?.parse().ok()?;
+        if let Some(sum) = sums.iter_mut().find(|sum| sum.band == band) {
+            sum.mass_steps = sum.mass_steps.checked_add(mass_steps)?;
+            sum.area_steps = sum.area_steps.checked_add(area_steps)?;
+        } else {
+            sums.push(BandSum {
+                band,
+                mass_steps,
+                area_steps,
+            });
+        }
+    }
+    sums.sort_unstable_by_key(|sum| sum.band);
+    Some(sums)
+}
+
 /// Area of all sea in every band, m² in steps of 10⁻⁶, of the chunks of a region's sea.
 pub fn band_areas<'a>(
     grid: &Grid,
@@ -138,6 +177,31 @@ mod tests {
                 "{band}"
             );
             assert_eq!(areas[band], total_area_steps(&area_m2).unwrap(), "{band}");
+        }
+    }
+
+    #[test]
+    fn texts_of_chunks_are_summed_in_any_order() {
+        let mut sums = [ChunkSums::default(); BAND_COUNT];
+        (sums[3].mass_steps, sums[3].area_steps) = (-7, 2);
+        (sums[35].mass_steps, sums[35].area_steps) = (1 << 90, 5);
+        let text = bands_text(&sums);
+        assert_eq!(text, format!("3,-7,2 35,{},5", 1i128 << 90));
+        let band = |band, mass_steps, area_steps| BandSum {
+            band,
+            mass_steps,
+            area_steps,
+        };
+        for joined in [
+            format!("{text}  4,1,1 3,6,1"),
+            format!("3,6,1 4,1,1 {text}"),
+        ] {
+            let expected = [band(3, -1, 3), band(4, 1, 1), band(35, 1 << 90, 5)];
+            assert_eq!(summed_bands(&joined).unwrap(), expected);
+        }
+        assert_eq!(summed_bands(" "), Some(vec![]));
+        for wrong in ["3", "3,1", "36,1,1", "3,x,1"] {
+            assert_eq!(summed_bands(wrong), None, "{wrong}");
         }
     }
 

@@ -1,5 +1,8 @@
 //! `band_sums(values, chunk, seconds, weights, grid)`: mass and valid area of a region's share of a chunk in every band of
-//! latitude, exact, as a structure of decimals: `mass_0`, `area_0`, `mass_1` and so on from the south pole.
+//! latitude that holds any, exact, as text (`budget::bands`).
+//!
+//! Text, because the engine calls an asynchronous function once for every field that is taken of its answer; and because
+//! `string_agg` then joins what the chunks of a step say, in any order: what is summed are integers.
 //!
 //! `weights` is the address of the region's stored weights, `grid` the product's grid as JSON.
 
@@ -7,8 +10,8 @@ use std::sync::Arc;
 
 use async_trait::async_trait;
 use contract::grid::Grid;
-use datafusion::arrow::array::{Array as _, ArrayRef, AsArray as _, StructArray};
-use datafusion::arrow::datatypes::{DataType, Fields, Float32Type, Float64Type, UInt32Type};
+use datafusion::arrow::array::{Array as _, ArrayRef, AsArray as _, StringArray};
+use datafusion::arrow::datatypes::{DataType, Float32Type, Float64Type, UInt32Type};
 use datafusion::common::{DataFusionError, Result, ScalarValue, exec_err};
 use datafusion::logical_expr::async_udf::AsyncScalarUDFImpl;
 use datafusion::logical_expr::{
@@ -16,10 +19,7 @@ use datafusion::logical_expr::{
 };
 
 use super::lists::{Argument, Lists, check_types, same_length};
-use super::region_sums::{area_field, decimals, mass_field};
-use crate::budget::bands::{BAND_COUNT, band_sums};
-use crate::budget::chunk::ChunkSums;
-use crate::budget::fixed::{AREA_DECIMALS, MASS_DECIMALS};
+use crate::budget::bands::{band_sums, bands_text};
 use crate::objects::Objects;
 use crate::region::loaded::RegionWeights;
 
@@ -40,16 +40,6 @@ impl BandSums {
     }
 }
 
-fn fields() -> Fields {
-    let band = |band| {
-        [
-            mass_field(&format!("mass_{band}")),
-            area_field(&format!("area_{band}")),
-        ]
-    };
-    (0..BAND_COUNT).flat_map(band).collect()
-}
-
 impl ScalarUDFImpl for BandSums {
     fn name(&self) -> &'static str {
         NAME
@@ -68,7 +58,7 @@ impl ScalarUDFImpl for BandSums {
             Argument::Scalar(DataType::Utf8),
         ];
         check_types(NAME, arguments, &expected)?;
-        Ok(DataType::Struct(fields()))
+        Ok(DataType::Utf8)
     }
 
     fn invoke_with_args(&self, _args: ScalarFunctionArgs) -> Result<ColumnarValue> {
@@ -95,7 +85,7 @@ fn text(arguments: &[ColumnarValue], index: usize) -> Result<&str> {
     }
 }
 
-fn sums(weights: &RegionWeights, grid: &Grid, arguments: &[ArrayRef]) -> Result<StructArray> {
+fn sums(weights: &RegionWeights, grid: &Grid, arguments: &[ArrayRef]) -> Result<StringArray> {
     let [values, chunks, seconds] = arguments else {
         return exec_err!("{NAME}: {} arrays", arguments.len());
     };
@@ -105,21 +95,15 @@ fn sums(weights: &RegionWeights, grid: &Grid, arguments: &[ArrayRef]) -> Result<
         seconds.as_primitive::<Float64Type>(),
     );
     let row = |row: usize| match weights.areas_m2(chunks.value(row)) {
-        None => Ok([ChunkSums::default(); BAND_COUNT]),
+        None => Ok(String::new()),
         Some(areas) => {
             let (values, areas) = same_length(NAME, lists.row(row), areas)?;
             let chunk = chunks.value(row);
             band_sums(grid, chunk, values, areas, seconds.value(row))
+                .map(|sums| bands_text(&sums))
                 .map_err(|e| DataFusionError::Execution(format!("{NAME}, chunk {chunk}: {e}")))
         }
     };
-    let rows: Vec<_> = (0..values.len()).map(row).collect::<Result<_>>()?;
-    let mut columns = vec![];
-    for band in 0..BAND_COUNT {
-        let masses = rows.iter().map(|bands| bands[band].mass_steps);
-        columns.push(decimals(masses, MASS_DECIMALS)?);
-        let areas = rows.iter().map(|bands| bands[band].area_steps);
-        columns.push(decimals(areas, AREA_DECIMALS)?);
-    }
-    Ok(StructArray::try_new(fields(), columns, None)?)
+    let rows: Vec<String> = (0..values.len()).map(row).collect::<Result<_>>()?;
+    Ok(StringArray::from(rows))
 }

@@ -42,19 +42,11 @@ impl RegionSums {
 
 /// Mass in kg and area in m²; the mass of a product that is no flux is its value x area.
 fn fields() -> Fields {
-    Fields::from(vec![mass_field("mass"), area_field("area")])
-}
-
-/// A field of masses.
-pub(super) fn mass_field(name: &str) -> Field {
-    let decimal = DataType::Decimal128(DIGITS, MASS_DECIMALS as i8);
-    Field::new(name, decimal, false)
-}
-
-/// A field of areas.
-pub(super) fn area_field(name: &str) -> Field {
-    let decimal = DataType::Decimal128(DIGITS, AREA_DECIMALS as i8);
-    Field::new(name, decimal, false)
+    let decimal = |decimals: u32| DataType::Decimal128(DIGITS, decimals as i8);
+    Fields::from(vec![
+        Field::new("mass", decimal(MASS_DECIMALS), false),
+        Field::new("area", decimal(AREA_DECIMALS), false),
+    ])
 }
 
 impl ScalarUDFImpl for RegionSums {
@@ -130,7 +122,7 @@ fn sums(
 }
 
 /// A column of decimals from integers of `decimals` decimals.
-pub(super) fn decimals(values: impl Iterator<Item = i128>, decimals: u32) -> Result<ArrayRef> {
+fn decimals(values: impl Iterator<Item = i128>, decimals: u32) -> Result<ArrayRef> {
     let array = Decimal128Array::from_iter_values(values);
     Ok(Arc::new(
         array.with_precision_and_scale(DIGITS, decimals as i8)?,
