@@ -342,12 +342,12 @@ mod tests {
     async fn a_query_that_must_hold_more_than_its_memory_is_refused() {
         let hold = |engine: Engine| async move {
             let context = engine.context("test").await.unwrap();
-            let sql = "SELECT array_agg(a) FROM (SELECT unnest(range(0, 1000000)) a)";
+            let sql = "SELECT array_agg(a) FROM (SELECT unnest(range(0, 20000)) a)";
             context.sql(sql).await.unwrap().collect().await
         };
         let engine = || Engine::in_process(Store::memory(), NonZeroUsize::MIN);
         assert!(hold(engine()).await.is_ok());
-        let refused = hold(engine().with_memory_bytes(1 << 20)).await.unwrap_err();
+        let refused = hold(engine().with_memory_bytes(64 << 10)).await.unwrap_err();
         let root = refused.find_root();
         assert!(
             matches!(root, DataFusionError::ResourcesExhausted(_)),

@@ -15,6 +15,9 @@ use storage::log::{EmbeddedLog, EventLog};
 
 use crate::cli::Settings;
 
+/// Parts of a query that read a store behind a network: a part has one request under way, and answers take milliseconds.
+const REMOTE_PARTS: NonZeroUsize = NonZeroUsize::new(16).expect("it is not 0");
+
 /// Opens the object store that settings name, else the one in the data folder.
 pub(crate) fn store(settings: &Settings) -> Result<Store> {
     if let Some(url) = &settings.store {
@@ -73,7 +76,7 @@ pub(crate) async fn needed_log(
 pub(crate) fn engine(settings: &Settings, store: Store) -> Result<Engine> {
     match &settings.cluster {
         Some(scheduler) => cluster(settings, store, scheduler),
-        None => Ok(Engine::standalone(store, processors(settings))),
+        None => Ok(Engine::standalone(store, parts_in_process(settings, false))),
     }
 }
 
@@ -82,7 +85,10 @@ pub(crate) fn engine(settings: &Settings, store: Store) -> Result<Engine> {
 pub(crate) fn region_engine(settings: &Settings, store: Store) -> Result<Engine> {
     match &settings.cluster {
         Some(scheduler) => cluster(settings, store, scheduler),
-        None => Ok(Engine::in_process(store, processors(settings))),
+        None => {
+            let parts = parts_in_process(settings, store.is_remote());
+            Ok(Engine::in_process(store, parts))
+        }
     }
 }
 
@@ -101,10 +107,15 @@ pub(crate) fn least_parts(settings: &Settings) -> NonZeroUsize {
         .map_or(NonZeroUsize::MIN, NonZeroUsize::from)
 }
 
-/// Parts of a query in this process.
-fn processors(settings: &Settings) -> NonZeroUsize {
-    let there = || std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
-    settings.partitions.map_or_else(there, NonZeroUsize::from)
+/// Parts of a query in this process: one a processor, and more where they wait for a network rather than for processors.
+fn parts_in_process(settings: &Settings, is_remote: bool) -> NonZeroUsize {
+    let there = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
+    let parts = if is_remote {
+        there.max(REMOTE_PARTS)
+    } else {
+        there
+    };
+    settings.partitions.map_or(parts, NonZeroUsize::from)
 }
 
 /// The renderer on this machine's Vulkan device, or on its processor when asked to; for pictures that follow one another

@@ -160,6 +160,14 @@ impl Store {
         &self.url
     }
 
+    /// Is it behind a network?
+    pub fn is_remote(&self) -> bool {
+        match self.place {
+            Place::Memory | Place::Folder(_) => false,
+            Place::Cloud | Place::Hdfs => true,
+        }
+    }
+
     /// Where an object is, for people and for `Store::open`'s kind of text; a folder's name is not escaped.
     pub fn url_of(&self, key: &ObjectKey) -> String {
         format!("{}{key}", self.url)
