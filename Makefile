@@ -17,7 +17,7 @@ viewer := tile-server/web/dist/index.html
 viewer_sources := $(shell git ls-files tile-server/web)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo build viewer check test faults bless services services-down cluster cluster-down tools test-tools
+.PHONY: help demo build release viewer check test faults bless services services-down cluster cluster-down tools test-tools
 
 help: ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 14
@@ -27,6 +27,10 @@ demo: build ## Ingest real data, compute budgets, serve the globe on http://loca
 
 build: tools viewer ## Build the program and the viewer
 	cargo build --locked -p fluxglobe
+
+release: tools viewer ## Build the program as deployments run it: optimised, under target/release
+	cargo build --locked --release -p fluxglobe
+	@echo 'install as root: install -m 755 $(CARGO_TARGET_DIR)/release/fluxglobe /usr/local/bin/'
 
 services: ## Install and start Kafka, PostGIS, S3, HDFS and Prometheus, each in its own folder and on its own port
 	deploy/services/services.sh install
@@ -45,6 +49,7 @@ cluster-down: ## Stop the services and the servers; data stay
 viewer: $(viewer)
 
 $(viewer): $(viewer_sources) | tools
+	@deploy/check-node.sh
 	# Not `npm ci`: it insists on other platforms' optional packages, which a partial mirror lacks. The lock file holds.
 	cd tile-server/web && npm install --no-save --no-audit --no-fund && npm run build
 
@@ -76,6 +81,6 @@ faults: test-tools $(viewer) ## kill -9 of every kind of process, 60 times, whil
 	deploy/services/services.sh install
 	FLUXGLOBE_KILLS=60 cargo test --locked -p tests --test cluster killed -- --nocapture
 
-bless: test-tools ## Draw the golden images anew and list what changed
-	BLESS=1 cargo test --locked -p render-worker
+bless: test-tools ## Draw the golden images anew, for a new RENDERER_VERSION, and list what changed
+	BLESS=1 cargo test --locked -p render-worker --test it golden
 	git status --short -- render-worker/tests/golden

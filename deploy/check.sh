@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Checks everything in deploy/, each kind of file with its own tool, and sees each check fail on a planted fault.
 #   deploy/check.sh            everything
-#   deploy/check.sh NAME...    shell, image, compose, prometheus, grafana, chart, unit
+#   deploy/check.sh NAME...    shell, node, image, compose, prometheus, grafana, chart, unit
 # The tools are installed by check/install.sh and, for promtool, services/prometheus.sh.
 set -euo pipefail
 
@@ -50,8 +50,19 @@ check_shell() {
     refused shellcheck SC2086 "$tools/bin/shellcheck" "$work/fault.sh"
 }
 
+check_node() {
+    local version
+    for version in v18.13.0 v20.20.2 v22.0.0 v25.1.0; do checked "Node $version builds the viewer" ./check-node.sh "$version"; done
+    for version in v16.20.1 v18.12.1 v21.3.0 nonsense; do refused 'the look at Node' 'install Node 22' ./check-node.sh "$version"; done
+}
+
+holds_release() { grep --quiet 'cargo build --locked --release' "$1" || { echo 'no release build' && return 1; }; }
+
 check_image() {
     checked 'hadolint of the Dockerfile' "$tools/bin/hadolint" Dockerfile
+    checked 'the image holds a release build' holds_release Dockerfile
+    sed 's/ --release//' Dockerfile >"$work/Dockerfile"
+    refused 'the look for a release build' 'no release build' holds_release "$work/Dockerfile"
     sed 's/^FROM debian:.*/FROM debian/' Dockerfile >"$work/Dockerfile"
     refused hadolint DL3006 "$tools/bin/hadolint" "$work/Dockerfile"
 }
@@ -122,22 +133,36 @@ check_chart() {
     refused 'the values schema' /kafka/security helm lint --kube-version 1.37.0 --set kafka.security=none helm/fluxglobe
     refused 'the values schema' /postgis/url \
         helm lint --kube-version 1.37.0 --set postgis.url=postgres://me:secret@host/database helm/fluxglobe
+    checked 'workers on a GPU refuse to draw without it' requires_gpu "$work/1.37-everything.yaml"
+    helm template test helm/fluxglobe --kube-version 1.37.0 --set renderWorker.gpu.enabled=false >"$work/no-gpu.yaml"
+    refused 'the look for FLUXGLOBE_REQUIRE_GPU' 'no worker' requires_gpu "$work/no-gpu.yaml"
     sed 's/formula: queries/formulae: queries/' "$work/1.37-everything.yaml" >"$work/fault.yaml"
     refused kubeconform formulae schemas_of 1.37 "$work/fault.yaml"
     sed 's/runAsNonRoot: true/runAsNonRoot: "yes"/' "$work/1.37-everything.yaml" >"$work/fault.yaml"
     refused kubeconform runAsNonRoot schemas_of 1.37 "$work/fault.yaml"
 }
 
+requires_gpu() { grep --quiet 'name: FLUXGLOBE_REQUIRE_GPU, value: "true"' "$1" || { echo 'no worker requires a GPU' && return 1; }; }
+
 check_unit() {
+    local unit
+    for unit in fluxglobe.service fluxglobe@.service; do
+        checked "folders and secrets of $unit" "$tools/bin/python" -B check/unit.py "$unit"
+    done
+    sed '/^StateDirectory=/d' fluxglobe@.service >"$work/fluxglobe@.service"
+    refused 'the look at a unit'"'"'s folders' 'has no StateDirectory' "$tools/bin/python" -B check/unit.py "$work/fluxglobe@.service"
+    sed 's|EXECUTOR_WORK=%S/fluxglobe-%i/|EXECUTOR_WORK=|' fluxglobe@.service >"$work/fluxglobe@.service"
+    refused 'the look at a unit'"'"'s folders' 'cannot write FLUXGLOBE_EXECUTOR_WORK' "$tools/bin/python" -B check/unit.py "$work/fluxglobe@.service"
+    sed '/KAFKA_PASSWORD_FILE/d' fluxglobe@.service >"$work/fluxglobe@.service"
+    refused 'the look at a unit'"'"'s secrets' FLUXGLOBE_KAFKA_PASSWORD_FILE "$tools/bin/python" -B check/unit.py "$work/fluxglobe@.service"
     if ! command -v systemd-analyze >/dev/null; then
         printf 'deploy: unit: systemd-analyze is not on this machine, left out\n'
         return
     fi
-    local unit
     # It wants the program to be there.
-    for unit in fluxglobe.service fluxglobe@.service; do
-        sed 's|^ExecStart=[^ ]*|ExecStart=/bin/true|' "$unit" >"$work/${unit/@/@tile-server}"
-        checked "systemd-analyze verify $unit" systemd-analyze verify "$work/${unit/@/@tile-server}"
+    for unit in fluxglobe.service fluxglobe@{ingestd,scheduler,executor,render-worker,tile-server}.service; do
+        sed 's|^ExecStart=[^ ]*|ExecStart=/bin/true|' "${unit/@*./@.}" >"$work/$unit"
+        checked "systemd-analyze verify $unit" unit_without_remarks "$work/$unit"
     done
     sed 's|^NoNewPrivileges|NoNewRights|' "$work/fluxglobe.service" >"$work/fault.service"
     refused 'systemd-analyze verify' NoNewRights unit_without_remarks "$work/fault.service"
@@ -152,6 +177,6 @@ unit_without_remarks() {
 
 check/install.sh
 if ! [ -x "$promtool" ]; then services/prometheus.sh install; fi
-if [ $# = 0 ]; then set -- shell image compose prometheus grafana chart unit; fi
+if [ $# = 0 ]; then set -- shell node image compose prometheus grafana chart unit; fi
 for name in "$@"; do "check_$name"; done
 printf '%d passed, 0 failed\n' "$ran"

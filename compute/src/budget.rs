@@ -1,5 +1,6 @@
 //! Carbon budgets: B = the integral of the flux over a region's area and over time, exact at any parallelism.
 
+mod accumulated;
 mod asked;
 pub mod bands;
 pub mod chunk;
@@ -11,6 +12,7 @@ pub mod rows;
 pub mod running;
 pub mod sums;
 
+pub use accumulated::Completeness;
 pub use query::{BudgetAnswer, BudgetQuery, budget, budget_of};
 pub(crate) use query::{extent_of, steps_inside};
 pub use rows::{BudgetRow, BudgetStep};

@@ -5,7 +5,7 @@ use contract::region::{Cells, NamedRegion};
 use futures::future::{try_join, try_join_all};
 use serde::{Deserialize, Serialize};
 
-use crate::published::{ANNUAL, AnnualBudget, MONTHLY_GRID_TG, MONTHLY_TOLERANCE};
+use crate::published::{ANNUAL, Annual, INTEGRALS, Stated};
 use crate::{BudgetQuery, BudgetStep, ComputeError, Engine, budget};
 use contract::earth::Earth;
 
@@ -25,27 +25,79 @@ const MONTHS: [&str; 12] = [
     "December",
 ];
 
-/// One line of the comparison.
+/// How far our integral of a grid may be from the independent one, as a share: what rounding of its kept digits and of
+/// stored fluxes (f32) to either side leaves open.
+const AGREEMENT: f64 = 1e-6;
+
+/// One line of the comparison: what a paper says, what an independent integration of its grid says, what we say.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CheckRow {
     /// Region, and the figure of the earth where it is not WGS84.
     pub what: String,
     /// Year or month.
     pub period: String,
-    /// As the paper prints it, if it does.
-    pub published: Option<f64>,
-    /// Integral of the same grid found outside this program: what ours is held to.
-    pub expected: f64,
-    /// Ours.
-    pub ours: f64,
     /// Unit of the values.
     pub unit: String,
-    /// Ours less the expected one.
+    /// The paper; none where it prints no such value.
+    pub paper: Option<AgainstPaper>,
+    /// Integral of the same grid by another program: what ours is held to.
+    pub independent: f64,
+    /// Ours.
+    pub ours: f64,
+    /// Ours less the independent one.
     pub difference: f64,
-    /// Largest difference that is taken.
-    pub tolerance: f64,
-    /// Is it?
-    pub within: bool,
+    /// Is that no more than rounding explains?
+    pub agrees: bool,
+}
+
+/// Ours against a printed value.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct AgainstPaper {
+    /// As printed.
+    pub stated: Stated,
+    /// Ours less the printed value.
+    pub difference: f64,
+    /// What the paper's uncertainty says of it.
+    pub verdict: Verdict,
+}
+
+/// What a paper's own uncertainty says of a difference.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// It is no larger.
+    Within,
+    /// It is larger.
+    Outside,
+    /// The paper states none: a difference is shown and not judged.
+    NoUncertaintyStated,
+}
+
+impl Verdict {
+    /// For people.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Within => "within",
+            Self::Outside => "outside",
+            Self::NoUncertaintyStated => "no uncertainty stated",
+        }
+    }
+}
+
+impl AgainstPaper {
+    fn of(stated: Stated, ours: f64) -> Self {
+        let difference = ours - stated.value;
+        let verdict = match stated.uncertainty {
+            None => Verdict::NoUncertaintyStated,
+            Some(uncertainty) if difference.abs() <= uncertainty => Verdict::Within,
+            Some(_) => Verdict::Outside,
+        };
+        Self {
+            stated,
+            difference,
+            verdict,
+        }
+    }
 }
 
 /// Compares the budgets of a product that holds the Takahashi et al. (2009) fluxes with the published ones.
@@ -63,7 +115,7 @@ pub async fn compare(engine: &Engine, product: &ProductId) -> Result<Vec<CheckRo
 async fn annual_row(
     engine: &Engine,
     product: &ProductId,
-    entry: &AnnualBudget,
+    entry: &Annual,
 ) -> Result<CheckRow, ComputeError> {
     let query = query(product, entry.region, BudgetStep::Total, entry.earth)?;
     let answer = budget(engine, &query).await?;
@@ -77,13 +129,16 @@ async fn annual_row(
     } else {
         format!("{name}, {}", entry.earth)
     };
+    let independent = INTEGRALS
+        .year_pg(entry.region, entry.earth)
+        .expect("every printed value has its integral");
     let line = Line {
         what,
         period: year.to_string(),
-        published: Some(entry.published_pg),
+        paper: Some(entry.paper),
         unit: "Pg C",
     };
-    Ok(line.row(entry.grid_pg, row.budget_tg / TG_PER_PG, entry.tolerance_pg))
+    Ok(line.row(independent, row.budget_tg / TG_PER_PG))
 }
 
 async fn monthly_rows(engine: &Engine, product: &ProductId) -> Result<Vec<CheckRow>, ComputeError> {
@@ -92,26 +147,26 @@ async fn monthly_rows(engine: &Engine, product: &ProductId) -> Result<Vec<CheckR
         &query(product, "global", BudgetStep::Month, Earth::Wgs84)?,
     )
     .await?;
-    if answer.rows.len() != MONTHLY_GRID_TG.len() {
+    if answer.rows.len() != MONTHS.len() {
         return Err(unlike_the_published(
             product,
             "it does not cover twelve months",
         ));
     }
-    let month = |(row, (expected, name)): (&crate::BudgetRow, (&f64, &str))| {
+    let month = |(row, (independent, name)): (&crate::BudgetRow, (&f64, &str))| {
         let (year, _) = row.start.year_month();
         let line = Line {
             what: "Global ocean".to_owned(),
             period: format!("{name} {year}"),
-            published: None,
+            paper: None,
             unit: "Tg C",
         };
-        line.row(*expected, row.budget_tg, MONTHLY_TOLERANCE * expected.abs())
+        line.row(*independent, row.budget_tg)
     };
     Ok(answer
         .rows
         .iter()
-        .zip(MONTHLY_GRID_TG.iter().zip(MONTHS))
+        .zip(INTEGRALS.months_tg.iter().zip(MONTHS))
         .map(month)
         .collect())
 }
@@ -144,23 +199,22 @@ fn unlike_the_published(product: &ProductId, reason: &str) -> ComputeError {
 struct Line {
     what: String,
     period: String,
-    published: Option<f64>,
+    paper: Option<Stated>,
     unit: &'static str,
 }
 
 impl Line {
-    fn row(self, expected: f64, ours: f64, tolerance: f64) -> CheckRow {
-        let difference = ours - expected;
+    fn row(self, independent: f64, ours: f64) -> CheckRow {
+        let difference = ours - independent;
         CheckRow {
             what: self.what,
             period: self.period,
-            published: self.published,
-            expected,
-            ours,
             unit: self.unit.to_owned(),
+            paper: self.paper.map(|stated| AgainstPaper::of(stated, ours)),
+            independent,
+            ours,
             difference,
-            tolerance,
-            within: difference.abs() <= tolerance,
+            agrees: difference.abs() <= AGREEMENT * independent.abs(),
         }
     }
 }
@@ -169,16 +223,34 @@ impl Line {
 mod tests {
     use super::*;
 
-    #[test]
-    fn a_value_is_within_its_tolerance_or_said_not_to_be() {
-        let line = || Line {
+    fn row(uncertainty: Option<f64>, ours: f64) -> CheckRow {
+        let stated = Stated {
+            value: -1.4,
+            decimals: 1,
+            uncertainty,
+        };
+        let line = Line {
             what: String::new(),
             period: String::new(),
-            published: None,
+            paper: Some(stated),
             unit: "Pg C",
         };
-        assert!(line().row(-1.404, -1.4042, 0.0028).within);
-        assert!(!line().row(-1.404, -1.398, 0.0028).within);
-        assert!(!line().row(-1.404, f64::NAN, 0.0028).within);
+        line.row(-1.404272, ours)
+    }
+
+    #[test]
+    fn ours_agrees_with_the_independent_integral_or_is_said_not_to() {
+        assert!(row(None, -1.404273).agrees);
+        assert!(!row(None, -1.40428).agrees);
+        assert!(!row(None, f64::NAN).agrees);
+    }
+
+    #[test]
+    fn only_a_stated_uncertainty_says_that_a_value_lies_within() {
+        let verdict = |uncertainty, ours| row(uncertainty, ours).paper.unwrap().verdict;
+        assert_eq!(verdict(Some(0.7), -1.404), Verdict::Within);
+        assert_eq!(verdict(Some(0.7), -2.3), Verdict::Outside);
+        assert_eq!(verdict(Some(0.7), f64::NAN), Verdict::Outside);
+        assert_eq!(verdict(None, -1.4), Verdict::NoUncertaintyStated);
     }
 }

@@ -1,5 +1,6 @@
 //! Accumulated carbon: a product of fluxes in, a product of the carbon given off since a chosen start out.
 
+mod at_cell;
 mod derivation;
 pub(crate) mod exact;
 mod prior;
@@ -15,6 +16,7 @@ use contract::time::{Period, TimeMs};
 use storage::{StorageError, Store, manifests};
 
 use crate::{ComputeError, Engine, catalog};
+pub use at_cell::{CellCounts, counts_at_cell};
 use derivation::Derivation;
 use source::{SourceStep, steps_since};
 
@@ -168,11 +170,14 @@ fn of_all(done_steps: usize, steps: &[SourceStep<'_>]) -> DeriveProgress {
 async fn commit(
     engine: &Engine,
     source: &Manifest,
-    derived: Manifest,
+    mut derived: Manifest,
 ) -> Result<Manifest, ComputeError> {
     let mut attempt = 1;
     loop {
         let latest = manifests::latest(engine.store(), &derived.product).await?;
+        if let Some(latest) = &latest {
+            manifests::settle(engine.store(), latest, &mut derived).await?;
+        }
         let number = latest.as_ref().map_or(1, |latest| latest.number + 1);
         if let Some(latest) = latest.filter(|latest| is_no_older(latest, source, &derived)) {
             return Ok(latest);
@@ -195,6 +200,7 @@ fn is_no_older(latest: &Manifest, source: &Manifest, derived: &Manifest) -> bool
     let is_newer = derived_from.is_some_and(|id| id.number > source.number);
     let same = Manifest {
         number: latest.number,
+        schema: latest.schema,
         ..derived.clone()
     };
     is_newer || *latest == same

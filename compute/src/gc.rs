@@ -1,6 +1,6 @@
 //! Clean-up: objects that no kept version names and that are old enough to be in nobody's hands.
 //!
-//! What makes up a version (frames, series, domains, raw files, manifests) is kept as long as its manifest is among the
+//! What makes up a version (frames, counts beside accumulated ones, series, domains, raw files, manifests) is kept as long as its manifest is among the
 //! newest of its product, or was a source of one that is; observations as long as one of the newest indexes of their
 //! dataset names them. What can be made again from those (tiles, sums, states of accumulation, comparisons) is kept as
 //! long as it is young or belongs to a kept version, what is known of the reading of a raw file as long as that file.
@@ -29,7 +29,14 @@ use crate::derive::exact;
 /// Folders of the numbered lists that name everything else.
 const LISTS: [&str; 2] = ["manifests", living::INDEXES];
 /// Folders of what versions are made of.
-const VERSIONED: [&str; 5] = ["domain", "frames", "observations", "raw", "series"];
+const VERSIONED: [&str; 6] = [
+    "contributed",
+    "domain",
+    "frames",
+    "observations",
+    "raw",
+    "series",
+];
 /// Folders of what can be made again.
 const MADE_AGAIN: [&str; 4] = [exact::FOLDER, "checks", sums::FOLDER, "tiles"];
 /// Folder of what is known of the reading of raw files, as `PRODUCT/RAW-RECIPE`.

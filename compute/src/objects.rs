@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use bytes::Bytes;
+use contract::key::ObjectKey;
 use datafusion::error::DataFusionError;
 use datafusion::execution::runtime_env::RuntimeEnv;
 use object_store::path::Path;
@@ -50,7 +51,8 @@ impl Objects {
         self.weights
             .get(address, async {
                 let content = self.content(address).await?;
-                let chunks = storage::weights::decode(address, content)
+                let key = key_at(address)?;
+                let chunks = storage::weights::decode(&key, content)
                     .map_err(|e| DataFusionError::External(e.into()))?;
                 Ok(RegionWeights::new(chunks))
             })
@@ -69,6 +71,17 @@ impl Objects {
         let path = Path::from_url_path(url.path()).map_err(|_no_path| elsewhere())?;
         Ok(self.store.get(&path).await?.bytes().await?)
     }
+}
+
+/// The key at the end of an address of weights: what they are checked as, and named by if they are damaged.
+fn key_at(address: &str) -> Result<ObjectKey, DataFusionError> {
+    let digits = address
+        .rsplit('/')
+        .next()
+        .and_then(|name| name.strip_suffix(".parquet"));
+    let job = digits.and_then(|digits| digits.parse().ok());
+    job.map(|job| ObjectKey::weights(&job))
+        .ok_or_else(|| DataFusionError::Execution(format!("{address} is no address of weights")))
 }
 
 /// Two that read from the same place answer the same.

@@ -10,8 +10,10 @@ use datafusion::arrow::array::{AsArray as _, RecordBatch};
 use datafusion::arrow::datatypes::Float32Type;
 use serde::{Deserialize, Serialize};
 
+use crate::derive::{CellCounts, counts_at_cell};
+use crate::scan::{self, Layout};
 use crate::session::QueryContext;
-use crate::{ComputeError, Engine, catalog, scan};
+use crate::{ComputeError, Engine, catalog};
 
 /// The cell that a place lies in.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -37,6 +39,9 @@ pub struct PointValue {
     pub mid: TimeMs,
     /// Value in the answer's unit; none where the cell holds no data.
     pub value: Option<f64>,
+    /// What a sum of accumulated carbon holds; none for other values, and where nobody can tell any more.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub contributed: Option<CellCounts>,
 }
 
 /// A series with all that is needed to cite it.
@@ -87,14 +92,13 @@ pub async fn point_series(
     let display = manifest.quantity.display();
     let shown = |value: f32| f64::from(value) * display.factor + display.offset;
     let values = cell_values(engine, &manifest, row, col).await?;
-    let values = values
-        .into_iter()
-        .map(|value| (!value.is_nan()).then(|| shown(value)));
-    let point = |(step, value): (&contract::manifest::Step, Option<f64>)| PointValue {
+    let counts = counts_at_cell(engine, &manifest, row, col).await?;
+    let point = |(index, step): (usize, &contract::manifest::Step)| PointValue {
         start: step.period.start,
         end: step.period.end,
         mid: step.period.mid(),
-        value,
+        value: (!values[index].is_nan()).then(|| shown(values[index])),
+        contributed: counts.as_ref().map(|counts| counts[index]),
     };
     let center = manifest.grid.cell_center(row, col);
     Ok(PointAnswer {
@@ -113,7 +117,7 @@ pub async fn point_series(
             lon: center.lon,
             lat: center.lat,
         },
-        series: manifest.steps.iter().zip(values).map(point).collect(),
+        series: manifest.steps.iter().enumerate().map(point).collect(),
     })
 }
 
@@ -156,26 +160,25 @@ async fn segment_values(
         .replace("$steps", &segment.steps.to_string())
         .replace("$block", &block.to_string());
     let job = Digest::of_json(&("series", &segment.series, &sql));
-    let batches = engine
-        .answer(job, |context| ask(engine, context, &segment.series, &sql))
-        .await?;
-    let rows: Vec<_> = batches
-        .iter()
-        .filter(|batch| batch.num_rows() > 0)
-        .collect();
-    match rows[..] {
-        [batch] if batch.num_rows() == 1 => Ok(batch
-            .column(0)
-            .as_list::<i32>()
-            .value(0)
-            .as_primitive::<Float32Type>()
-            .values()
-            .to_vec()),
-        _ => Err(ComputeError::inconsistent(
-            segment.series.to_string(),
-            format!("no single block {block}"),
-        )),
-    }
+    let answered = async {
+        let asked = engine.answer(job, |context| ask(engine, context, &segment.series, &sql));
+        only_row(&asked.await?).ok_or_else(|| {
+            let reason = format!("no single block {block}");
+            ComputeError::inconsistent(segment.series.to_string(), reason)
+        })
+    };
+    scan::or_damaged(engine.store(), &[&segment.series], answered.await).await
+}
+
+/// The values of an answer of one row.
+fn only_row(batches: &[RecordBatch]) -> Option<Vec<f32>> {
+    let mut with_rows = batches.iter().filter(|batch| batch.num_rows() > 0);
+    let batch = with_rows.next().filter(|batch| batch.num_rows() == 1)?;
+    let values = batch.column(0).as_list::<i32>().value(0);
+    with_rows
+        .next()
+        .is_none()
+        .then(|| values.as_primitive::<Float32Type>().values().to_vec())
 }
 
 async fn ask(
@@ -184,8 +187,8 @@ async fn ask(
     series: &ObjectKey,
     sql: &str,
 ) -> Result<Vec<RecordBatch>, ComputeError> {
-    let (store, schema) = (engine.store(), &storage::series::SCHEMA);
-    scan::register(&context, "series", store, &[series], schema)?;
+    let store = engine.store();
+    scan::register(&context, "series", store, &[series], Layout::Series).await?;
     let failed = || ComputeError::engine("reading a series");
     let query = context.sql(sql).await.map_err(failed())?;
     query.collect().await.map_err(failed())

@@ -1,68 +1,111 @@
-//! What others found: the published budgets of the Takahashi et al. (2009) climatology, and the integral of its grid.
+//! What others found: the budgets that Takahashi et al. (2009) print, and an integration of their grid by another program.
+
+use std::sync::LazyLock;
 
 use contract::earth::Earth;
+use serde::{Deserialize, Serialize};
 
-/// Where the published values come from.
+/// Where the printed values come from.
 pub const CITATION: &str = "Takahashi, T., et al. (2009), Climatological mean and decadal change in surface ocean pCO2, \
 and net sea-air CO2 flux over the global oceans, Deep-Sea Research II 56, 554-577, doi:10.1016/j.dsr2.2008.12.009";
 
-/// A year's budget of one region.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct AnnualBudget {
-    /// Name of the region.
-    pub region: &'static str,
-    /// Figure of the earth that the grid was integrated on.
-    pub earth: Earth,
-    /// As published, Pg C a year; positive out of the sea. The authors give 0.7 Pg C as the global value's uncertainty.
-    pub published_pg: f64,
-    /// Integral of the 1-degree grid that the FluxEngine package ships, found outside this program, Pg C a year.
-    pub grid_pg: f64,
-    /// How far our integral of the same grid may be from that, Pg C a year.
-    pub tolerance_pg: f64,
+/// Where the independent values come from.
+pub const METHOD: &str = "Independent: the same 1-degree grids, as FluxEngine 4.2.1 ships them, integrated in Python by \
+tests/reference/takahashi09_integral.py, which shares no code with Fluxglobe. The grid differs from the paper's tables by \
+its 1-degree coast lines.";
+
+/// A value as a paper prints it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Stated {
+    /// The value.
+    pub value: f64,
+    /// Decimals that are printed.
+    pub decimals: usize,
+    /// Its uncertainty, where the paper states one.
+    pub uncertainty: Option<f64>,
 }
 
-/// Bands are held to what three decimals and fractional cells leave open.
-const BAND_TOLERANCE_PG: f64 = 0.005;
+/// A year's budget of one region as the paper prints it, Pg C a year; positive out of the sea.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Annual {
+    /// Name of the region.
+    pub region: &'static str,
+    /// Figure of the earth that the grid is integrated on: the paper names none.
+    pub earth: Earth,
+    /// As printed.
+    pub paper: Stated,
+}
 
-/// Annual budgets, reference year 2000. The grid differs from the paper's table by its 1-degree coast lines.
-pub const ANNUAL: [AnnualBudget; 6] = [
-    global(Earth::Wgs84, -1.404),
-    global(Earth::Sphere, -1.398),
-    band("14n-50n", -0.70, -0.694),
-    band("14s-50s", -1.05, -1.021),
-    band("50s-62s", -0.06, -0.066),
-    band("equatorial-pacific", 0.48, 0.466),
+/// The paper's annual budgets, reference year 2000. It states an uncertainty of the global value alone, and no months.
+pub const ANNUAL: [Annual; 6] = [
+    global(Earth::Wgs84),
+    global(Earth::Sphere),
+    band("14n-50n", -0.70),
+    band("14s-50s", -1.05),
+    band("50s-62s", -0.06),
+    band("equatorial-pacific", 0.48),
 ];
 
-/// Global budgets of the months January to December of the same grid on WGS84, Tg C, found outside this program. The
-/// paper gives no months.
-pub const MONTHLY_GRID_TG: [f64; 12] = [
-    -176.1, -155.7, -141.5, -128.6, -125.7, -101.7, -52.3, -31.0, -36.1, -99.5, -160.4, -195.8,
-];
-
-/// How far a month may be off, as a share.
-pub const MONTHLY_TOLERANCE: f64 = 0.005;
-/// How far the globe's year may be off, as a share.
-const GLOBAL_TOLERANCE: f64 = 0.002;
-
-const fn global(earth: Earth, grid_pg: f64) -> AnnualBudget {
-    let tolerance_pg = GLOBAL_TOLERANCE * grid_pg.abs();
-    AnnualBudget {
+const fn global(earth: Earth) -> Annual {
+    Annual {
         region: "global",
         earth,
-        published_pg: -1.4,
-        grid_pg,
-        tolerance_pg,
+        paper: Stated {
+            value: -1.4,
+            decimals: 1,
+            uncertainty: Some(0.7),
+        },
     }
 }
 
-const fn band(region: &'static str, published_pg: f64, grid_pg: f64) -> AnnualBudget {
-    AnnualBudget {
+const fn band(region: &'static str, value: f64) -> Annual {
+    Annual {
         region,
         earth: Earth::Wgs84,
-        published_pg,
-        grid_pg,
-        tolerance_pg: BAND_TOLERANCE_PG,
+        paper: Stated {
+            value,
+            decimals: 2,
+            uncertainty: None,
+        },
+    }
+}
+
+/// The grid integrated by another program.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Integrals {
+    /// The year.
+    pub years: Vec<YearIntegral>,
+    /// January to December, the globe on WGS84, Tg C.
+    pub months_tg: Vec<f64>,
+}
+
+/// A year of one region.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct YearIntegral {
+    /// Name of the region.
+    pub region: String,
+    /// Figure of the earth.
+    pub earth: Earth,
+    /// Pg C.
+    pub pg: f64,
+}
+
+/// What `tests/reference/takahashi09_integral.py` printed; a test runs it and compares.
+pub const INTEGRALS_JSON: &str = include_str!("published/takahashi09.json");
+
+/// The same, read.
+pub static INTEGRALS: LazyLock<Integrals> = LazyLock::new(|| {
+    serde_json::from_str(INTEGRALS_JSON).expect("the shipped file is read by a test")
+});
+
+impl Integrals {
+    /// A region's year, Pg C.
+    pub fn year_pg(&self, region: &str, earth: Earth) -> Option<f64> {
+        let mut years = self.years.iter();
+        let found = years.find(|year| year.region == region && year.earth == earth);
+        found.map(|year| year.pg)
     }
 }
 
@@ -71,8 +114,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_months_make_the_year() {
-        let year_pg: f64 = MONTHLY_GRID_TG.iter().sum::<f64>() / 1000.0;
-        assert!((year_pg - ANNUAL[0].grid_pg).abs() < 0.001, "{year_pg}");
+    fn every_printed_value_has_its_integral_and_the_months_make_the_year() {
+        for annual in &ANNUAL {
+            let integral = INTEGRALS.year_pg(annual.region, annual.earth);
+            assert!(integral.is_some(), "{annual:?}");
+        }
+        assert_eq!(INTEGRALS.months_tg.len(), 12);
+        let year_pg: f64 = INTEGRALS.months_tg.iter().sum::<f64>() / 1000.0;
+        let whole = INTEGRALS.year_pg("global", Earth::Wgs84).unwrap();
+        assert!((year_pg - whole).abs() < 1e-5, "{year_pg} {whole}");
     }
 }

@@ -21,7 +21,7 @@ pub use run::{Outcome, run};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum What {
-    /// Accumulated frames and their series.
+    /// Accumulated frames, what they lack, and their series.
     Frames,
     /// Sums that means over named regions are made of.
     Statistics,
@@ -42,6 +42,8 @@ pub struct Request {
     pub what: Vec<What>,
     /// Whether also what is there and right by its name is computed again and compared.
     pub is_forced: bool,
+    /// Whether what is there is read first, and taken for missing if it is damaged.
+    pub is_verified: bool,
 }
 
 /// Why something is computed.

@@ -1,8 +1,9 @@
-//! Stored objects as tables: frames, weights and series under the names that SQL uses.
+//! Stored objects as tables: frames and series under the names that SQL uses, each row checked as it is read.
 
 use std::sync::Arc;
 
 use contract::key::ObjectKey;
+use contract::kind::Vouched;
 use datafusion::arrow::datatypes::SchemaRef;
 use datafusion::config::TableParquetOptions;
 use datafusion::datasource::file_format::parquet::ParquetFormat;
@@ -10,15 +11,81 @@ use datafusion::datasource::listing::{
     ListingOptions, ListingTable, ListingTableConfig, ListingTableUrl,
 };
 use datafusion::execution::context::SessionContext;
-use storage::Store;
+use storage::{StorageError, Store};
 
 use crate::ComputeError;
 
 /// What is read of a file's end at once: the footer of a frame of up to 16 groups of chunks.
 const FOOTER_BYTES: usize = 16 << 10;
 
-/// Makes a table of some objects of one layout.
-pub(crate) fn register(
+/// What rows of stored objects hold.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Layout {
+    Frames,
+    Series,
+}
+
+impl Layout {
+    fn schema(self) -> &'static SchemaRef {
+        match self {
+            Self::Frames => &storage::frames::SCHEMA,
+            Self::Series => &storage::series::SCHEMA,
+        }
+    }
+
+    /// The schema of objects that are named by their bytes; they have no checks in their rows.
+    fn schema_1(self) -> &'static SchemaRef {
+        match self {
+            Self::Frames => &storage::frames::SCHEMA_1,
+            Self::Series => &storage::series::SCHEMA_1,
+        }
+    }
+
+    /// What says which row it is.
+    fn keys(self) -> &'static str {
+        match self {
+            Self::Frames => "chunk, period_start, period_end",
+            Self::Series => "block",
+        }
+    }
+}
+
+/// Makes a table of some objects of one layout. Values come out of it only where they are what their row's check says.
+///
+/// Objects of before rows had checks are each compared with their name once, whole, before they are read in parts.
+pub(crate) async fn register(
+    context: &SessionContext,
+    table: &str,
+    store: &Store,
+    objects: &[&ObjectKey],
+    layout: Layout,
+) -> Result<(), ComputeError> {
+    let engine = || ComputeError::engine("naming stored objects");
+    let is_old = |key: &&ObjectKey| matches!(key.vouches(), Vouched::Bytes(_));
+    let (old, new): (Vec<&ObjectKey>, Vec<&ObjectKey>) = objects.iter().copied().partition(is_old);
+    let keys = layout.keys();
+    let mut parts = vec![];
+    if !new.is_empty() {
+        let stored = format!("{table}_stored");
+        list(context, &stored, store, &new, layout.schema())?;
+        parts.push(format!(
+            "SELECT {keys}, sound(\"values\", \"check\", {keys}) AS \"values\" FROM {stored}"
+        ));
+    }
+    if !old.is_empty() {
+        store.check_once(&old).await?;
+        let stored = format!("{table}_stored_1");
+        list(context, &stored, store, &old, layout.schema_1())?;
+        parts.push(format!("SELECT {keys}, \"values\" FROM {stored}"));
+    }
+    let checked = context.sql(&parts.join(" UNION ALL ")).await;
+    context
+        .register_table(table, checked.map_err(engine())?.into_view())
+        .map_err(engine())?;
+    Ok(())
+}
+
+fn list(
     context: &SessionContext,
     table: &str,
     store: &Store,
@@ -50,6 +117,29 @@ fn reading() -> TableParquetOptions {
     options.global.force_filter_selections = true;
     options.global.bloom_filter_on_read = false;
     options
+}
+
+/// An answer of the engine that read some objects; where it failed or did not fit because one of them is damaged, the
+/// error that names it.
+///
+/// The engine sees rows and pages, not objects: which one it was is found by reading each of them whole.
+pub(crate) async fn or_damaged<T>(
+    store: &Store,
+    keys: &[&ObjectKey],
+    answered: Result<T, ComputeError>,
+) -> Result<T, ComputeError> {
+    let error = match answered {
+        Err(error @ (ComputeError::Engine { .. } | ComputeError::Inconsistent { .. })) => error,
+        other => return other,
+    };
+    for key in keys {
+        match storage::verify::sound(store, key).await {
+            Err(damaged @ StorageError::Damaged { .. }) => return Err(damaged.into()),
+            // What failed first is told.
+            Ok(()) | Err(_) => {}
+        }
+    }
+    Err(error)
 }
 
 /// Where SQL finds an object.

@@ -347,7 +347,9 @@ mod tests {
         };
         let engine = || Engine::in_process(Store::memory(), NonZeroUsize::MIN);
         assert!(hold(engine()).await.is_ok());
-        let refused = hold(engine().with_memory_bytes(64 << 10)).await.unwrap_err();
+        let refused = hold(engine().with_memory_bytes(64 << 10))
+            .await
+            .unwrap_err();
         let root = refused.find_root();
         assert!(
             matches!(root, DataFusionError::ResourcesExhausted(_)),

@@ -84,7 +84,10 @@ impl OfChunks for SessionConfig {
             .set_bool("datafusion.execution.parquet.pushdown_filters", true)
             // The fields of a function's answer are not parts of a stored column: taken apart below the filter, the
             // function would be called twice, and for chunks that nobody asked for.
-            .set_bool("datafusion.optimizer.enable_leaf_expression_pushdown", false)
+            .set_bool(
+                "datafusion.optimizer.enable_leaf_expression_pushdown",
+                false,
+            )
             // No plan of ours depends on them, and planning would read the footer of every file.
             .with_collect_statistics(false)
             // Chunks stay in the part that read them: only sums go from one part to another.

@@ -7,13 +7,20 @@ use crate::digest::Digest;
 use crate::job::RenderJob;
 use crate::key::ObjectKey;
 use crate::manifest::ManifestId;
+use crate::masked::MaskedCells;
 use crate::observation::Observation;
 use crate::product::ProductId;
 use crate::time::{Period, TimeMs};
 use crate::topic::{Origin, Topic};
 
-/// Version of the events' JSON.
-pub const EVENT_SCHEMA: u32 = 1;
+/// Version of the events' JSON. Those since [`OLDEST_EVENT_SCHEMA`] are read too.
+///
+/// 2: a landed file of very many steps tells the runs of its periods.
+pub const EVENT_SCHEMA: u32 = 2;
+/// Oldest version that is read.
+pub const OLDEST_EVENT_SCHEMA: u32 = 1;
+/// Most periods that an event lists.
+pub const MAX_PERIODS: usize = 1000;
 /// Longest event, bytes.
 pub const MAX_EVENT_BYTES: usize = 1 << 20;
 /// Longest trace, bytes.
@@ -68,10 +75,20 @@ pub enum Body {
         raw_sha256: Digest,
         /// Manifest that holds it.
         manifest: ManifestId,
-        /// Periods it brought.
+        /// Periods it brought, in order. More than [`MAX_PERIODS`] are told as the runs without a gap that they make
+        /// up, and if those are still too many as the one period from the first to the last.
         periods: Vec<Period>,
+        /// How many steps they are, where `periods` does not list each; the manifest does.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        step_count: Option<u64>,
         /// Did it replace values that were there?
         revised: bool,
+        /// What was taken for granted when it was read, because nothing in the file says it. One line each.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        assumptions: Vec<String>,
+        /// Cells of all its steps that it gave a value for and that hold none; the manifest has them step by step.
+        #[serde(default, skip_serializing_if = "MaskedCells::is_none")]
+        masked: MaskedCells,
     },
     /// A file was refused.
     #[serde(rename = "granule.rejected")]
@@ -163,6 +180,45 @@ pub enum RejectReason {
 }
 
 impl Body {
+    /// A file is in a product: an event of bounded length, however many `periods` (in order) it brought.
+    pub fn granule_landed(
+        path: String,
+        raw_sha256: Digest,
+        manifest: ManifestId,
+        periods: &[Period],
+        revised: bool,
+    ) -> Self {
+        let folded = folded(periods);
+        Self::GranuleLanded {
+            path,
+            raw_sha256,
+            manifest,
+            step_count: folded.as_ref().map(|_runs| periods.len() as u64),
+            periods: folded.unwrap_or_else(|| periods.to_vec()),
+            revised,
+            assumptions: vec![],
+            masked: MaskedCells::default(),
+        }
+    }
+
+    /// The same, of a landed file that was read with assumptions.
+    #[must_use]
+    pub fn assuming(mut self, lines: &[String]) -> Self {
+        if let Self::GranuleLanded { assumptions, .. } = &mut self {
+            *assumptions = lines.to_vec();
+        }
+        self
+    }
+
+    /// The same news of a file with what was masked of it.
+    #[must_use]
+    pub fn with_masked(mut self, cells: MaskedCells) -> Self {
+        if let Self::GranuleLanded { masked, .. } = &mut self {
+            *masked = cells;
+        }
+        self
+    }
+
     /// Topic that events of this kind go to.
     pub fn topic(&self) -> Topic {
         match self {
@@ -194,6 +250,27 @@ impl Body {
             Self::RenderDone { key, .. } => key.to_string(),
         }
     }
+}
+
+/// Periods in order as runs without a gap, or as one if those are too many as well; none if they can be listed.
+fn folded(periods: &[Period]) -> Option<Vec<Period>> {
+    if periods.len() <= MAX_PERIODS {
+        return None;
+    }
+    let mut runs: Vec<Period> = vec![];
+    for period in periods {
+        match runs.last_mut() {
+            Some(last) if last.end >= period.start => last.end = last.end.max(period.end),
+            _ => runs.push(*period),
+        }
+    }
+    if let (true, Some(first), Some(last)) = (runs.len() > MAX_PERIODS, runs.first(), runs.last()) {
+        runs = vec![Period {
+            start: first.start,
+            end: last.end,
+        }];
+    }
+    Some(runs)
 }
 
 impl Event {
@@ -240,9 +317,9 @@ impl Event {
             return Err(bad(format!("it is longer than {MAX_EVENT_BYTES} bytes")));
         }
         let version: Version = serde_json::from_str(text).map_err(|e| bad(e.to_string()))?;
-        if version.schema != EVENT_SCHEMA {
+        if !(OLDEST_EVENT_SCHEMA..=EVENT_SCHEMA).contains(&version.schema) {
             return Err(bad(format!(
-                "schema {} is unknown, this program reads {EVENT_SCHEMA}",
+                "schema {} is unknown, this program reads {OLDEST_EVENT_SCHEMA} to {EVENT_SCHEMA}",
                 version.schema
             )));
         }
@@ -280,11 +357,62 @@ mod tests {
         assert_eq!(event.to_json(), NOTICE_V1);
     }
 
+    const LANDED_V1: &str = r#"{"schema":1,"trace":"t","body":{"kind":"granule.landed","path":"a.nc","raw_sha256":"e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855","manifest":"p@1-00000000","periods":[{"start":"2000-01-01T00:00:00Z","end":"2000-02-01T00:00:00Z"}],"revised":false}}"#;
+
+    #[test]
+    fn a_landed_file_of_version_1_still_parses() {
+        let event = Event::from_json(LANDED_V1).unwrap();
+        assert_eq!(event.to_json(), LANDED_V1);
+    }
+
+    fn landed(periods: &[Period]) -> (Vec<Period>, Option<u64>) {
+        let (sha, manifest) = (Digest::of(b""), "p@1-00000000".parse().unwrap());
+        let body = Body::granule_landed("a".repeat(4096), sha, manifest, periods, false);
+        let event = Event::new("t".repeat(MAX_TRACE_BYTES), body);
+        let json = event.to_json();
+        assert!(json.len() < MAX_EVENT_BYTES / 4, "{} bytes", json.len());
+        assert_eq!(Event::from_json(&json).unwrap(), event);
+        match event.body {
+            Body::GranuleLanded {
+                periods,
+                step_count,
+                ..
+            } => (periods, step_count),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn a_landed_file_of_very_many_steps_is_told_in_a_bounded_event() {
+        let hour = 3_600_000;
+        let at = |ms: i64| TimeMs::new(ms).unwrap();
+        let every = |hours: i64, count: i64| -> Vec<Period> {
+            let hourly = (0..count).map(|n| n * hours * hour);
+            hourly
+                .map(|ms| Period::new(at(ms), at(ms + hour)).unwrap())
+                .collect()
+        };
+        let few = every(1, MAX_PERIODS as i64);
+        assert_eq!(landed(&few), (few, None));
+        let whole = Period::new(at(0), at(100_000 * hour)).unwrap();
+        assert_eq!(landed(&every(1, 100_000)), (vec![whole], Some(100_000)));
+        let mut gap = every(1, 100_000);
+        gap.remove(50_000);
+        let told = landed(&gap);
+        assert_eq!((told.0.len(), told.1), (2, Some(99_999)));
+        let gaps = every(2, 100_000);
+        let extent = Period::new(at(0), gaps[99_999].end).unwrap();
+        assert_eq!(landed(&gaps), (vec![extent], Some(100_000)));
+    }
+
     #[test]
     fn another_version_is_named_in_the_refusal() {
         let error =
-            Event::from_json(&NOTICE_V1.replace("\"schema\":1", "\"schema\":2")).unwrap_err();
-        assert!(error.to_string().contains("schema 2 is unknown"), "{error}");
+            Event::from_json(&NOTICE_V1.replace("\"schema\":1", "\"schema\":99")).unwrap_err();
+        assert!(
+            error.to_string().contains("schema 99 is unknown"),
+            "{error}"
+        );
     }
 
     #[test]

@@ -181,6 +181,7 @@ mod tests {
     fn part(name: &str, days: std::ops::RangeInclusive<u32>) -> Manifest {
         let product: ProductId = name.parse().unwrap();
         let step = |day: u32| Step {
+            masked: None,
             period: Period {
                 start: TimeMs::from_ymd(2002, 1, day).unwrap(),
                 end: TimeMs::from_ymd(2002, 1, day + 1).unwrap(),
@@ -189,6 +190,7 @@ mod tests {
             raw_sha256: Digest::of(b""),
             origin: String::new(),
             valid_cells: 1,
+            contributed: None,
         };
         Manifest {
             schema: MANIFEST_SCHEMA,
@@ -209,6 +211,7 @@ mod tests {
             domain: ObjectKey::domain(&product, &Digest::of(b"d")),
             series: vec![],
             derived_from: None,
+            notices: vec![],
             product,
         }
     }

@@ -15,8 +15,9 @@ use crate::sun::Sun;
 use crate::tile::Tile;
 use crate::time::TimeMs;
 
-/// Raised whenever the renderer draws the same job differently, so that old pictures are not taken for new ones.
-pub const RENDERER_VERSION: u32 = 4;
+/// Raised whenever the renderer draws the same job differently or writes the same picture in other bytes, so that old
+/// pictures are not taken for new ones: a name has one content for ever. `make bless` asks for it.
+pub const RENDERER_VERSION: u32 = 5;
 /// Largest width and height of a picture, pixels.
 pub const MAX_IMAGE_PX: u32 = 4096;
 /// Most slices of a half-angle volume.
@@ -131,7 +132,8 @@ pub struct Style {
     pub sun: Sun,
     /// Draw a plain globe behind the particles of a globe view.
     pub globe_surface: bool,
-    /// Draw cells whose gap was filled differently, by their estimated error: hatched on maps, paler as particles.
+    /// Draw cells whose gap was filled differently, by their estimated error, and sums of accumulated carbon that lack
+    /// data of some of their time, by its share: hatched on maps, paler as particles.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub doubt: bool,
     /// Coast lines and the sea.
@@ -276,21 +278,29 @@ impl RenderJob {
         view: View,
         style: Style,
     ) -> Result<Self, ContractError> {
-        let moment = |manifest: &Manifest| {
+        let moment = |manifest: &Manifest, with_counts: bool| {
             let name = || manifest.product.to_string();
             let empty = || ContractError::invalid("product", &name(), "it has no steps");
             if manifest.grid != product.grid {
                 let reason = format!("it does not lie on the grid of {}", product.product);
                 return Err(ContractError::invalid("product", &name(), reason));
             }
-            manifest.moment(time).ok_or_else(empty)
+            let moment = if with_counts {
+                manifest.moment_with_counts(time)
+            } else {
+                manifest.moment(time)
+            };
+            moment.ok_or_else(empty)
         };
         let accumulated = accumulated.filter(|_| mode != Mode::Map);
         let job = Self {
             renderer_version: RENDERER_VERSION,
             grid: product.grid,
-            value: moment(product)?,
-            accumulated: accumulated.map(moment).transpose()?,
+            // Colours are doubted, heights are not.
+            value: moment(product, style.doubt)?,
+            accumulated: accumulated
+                .map(|accumulated| moment(accumulated, false))
+                .transpose()?,
             relief: None,
             flow: None,
             mode,
@@ -348,7 +358,7 @@ impl RenderJob {
 mod tests {
     use super::*;
     use crate::colour::{Palette, Share, Stops};
-    use crate::moment::After;
+    use crate::moment::{After, Counts};
     use crate::quantity::Quantity;
     use crate::sun::Subsolar;
 
@@ -357,12 +367,19 @@ mod tests {
             domain: "domain/p/d".parse().unwrap(),
             before: Some("frames/p/a".parse().unwrap()),
             after: Some(after("frames/p/b", 0.25)),
+            contributed: None,
         }
     }
 
     fn after(frame: &str, weight: f64) -> After {
         let frame = frame.parse().unwrap();
         After { frame, weight }
+    }
+
+    fn counts(before: &str) -> Option<Counts> {
+        let before = before.parse().ok();
+        let after = None;
+        Some(Counts { before, after })
     }
 
     fn job() -> RenderJob {
@@ -418,7 +435,7 @@ mod tests {
     #[test]
     fn a_job_of_an_older_program_keeps_its_name() {
         let text = serde_json::to_string(&job()).unwrap();
-        for later in ["relief", "context", "subsolar"] {
+        for later in ["relief", "context", "subsolar", "contributed"] {
             assert!(!text.contains(later), "{text}");
         }
         assert!(text.contains(r#""sun":{"azimuth_deg":"315","elevation_deg":"40"}"#));
@@ -442,6 +459,8 @@ mod tests {
         changed(|j| j.value.after = None);
         changed(|j| j.value.after = Some(after("frames/p/c", 0.25)));
         changed(|j| j.value.after = Some(after("frames/p/b", 0.5)));
+        changed(|j| j.value.contributed = counts("contributed/p/a"));
+        changed(|j| j.value.contributed = counts("contributed/p/b"));
         changed(|j| j.accumulated = Some(moment()));
         changed(|j| j.mode = Mode::Map);
         changed(|j| {

@@ -19,17 +19,32 @@ impl ObjectKey {
         Self(format!("raw/{product}/{sha256}"))
     }
 
-    /// One time step as map-major chunks, named by its content.
-    pub fn frame(product: &ProductId, sha256: &Digest) -> Self {
-        Self(format!("frames/{product}/{sha256}.parquet"))
+    /// Begins the names of objects that are named by the digest of their values. Those that came before them are named
+    /// by the digest of their bytes alone.
+    pub(crate) const OF_VALUES: &str = "v2-";
+
+    /// One time step as map-major chunks, named by its values: other bytes for the same values are the same frame.
+    pub fn frame(product: &ProductId, values_sha256: &Digest) -> Self {
+        let of_values = Self::OF_VALUES;
+        Self(format!(
+            "frames/{product}/{of_values}{values_sha256}.parquet"
+        ))
     }
 
-    /// One segment of time as time-major chunks, named by its content.
-    pub fn series(product: &ProductId, sha256: &Digest) -> Self {
-        Self(format!("series/{product}/{sha256}.parquet"))
+    /// One segment of time as time-major chunks, named by its values.
+    pub fn series(product: &ProductId, values_sha256: &Digest) -> Self {
+        let of_values = Self::OF_VALUES;
+        Self(format!(
+            "series/{product}/{of_values}{values_sha256}.parquet"
+        ))
     }
 
-    /// The cells that hold data in some step, one byte a cell, named by its content.
+    /// Steps and time that each cell's sum after a step of accumulated carbon holds, named by its numbers.
+    pub fn contributed(product: &ProductId, sha256: &Digest) -> Self {
+        Self(format!("contributed/{product}/{sha256}.parquet"))
+    }
+
+    /// The cells that hold data in some step, one byte a cell, named by its bytes.
     pub fn domain(product: &ProductId, sha256: &Digest) -> Self {
         Self(format!("domain/{product}/{sha256}"))
     }
@@ -125,6 +140,7 @@ mod tests {
             ObjectKey::raw(&product, &digest),
             ObjectKey::frame(&product, &digest),
             ObjectKey::series(&product, &digest),
+            ObjectKey::contributed(&product, &digest),
             ObjectKey::domain(&product, &digest),
             ObjectKey::manifest(&product, 7),
             ObjectKey::weights(&digest),

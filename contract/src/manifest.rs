@@ -8,12 +8,19 @@ use crate::ContractError;
 use crate::digest::Digest;
 use crate::grid::Grid;
 use crate::key::ObjectKey;
+use crate::masked::MaskedCells;
+use crate::notice::{NoticeOrder, NoticeRun};
 use crate::product::ProductId;
 use crate::quantity::Quantity;
 use crate::time::{Period, TimeMs};
 
-/// Version of the manifest's JSON.
-pub const MANIFEST_SCHEMA: u32 = 1;
+/// Version of the manifest's JSON as it is written. Those since [`OLDEST_MANIFEST_SCHEMA`] are read too.
+///
+/// 2: the order of the notices that brought the files; how complete accumulated sums are; a manifest is sealed when it is
+/// stored.
+pub const MANIFEST_SCHEMA: u32 = 2;
+/// Oldest version that is read.
+pub const OLDEST_MANIFEST_SCHEMA: u32 = 1;
 
 /// One version of one product. Readers see it whole or not at all.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -43,6 +50,9 @@ pub struct Manifest {
     pub series: Vec<SeriesSegment>,
     /// The manifest this one was derived from, if it was computed rather than ingested.
     pub derived_from: Option<ManifestId>,
+    /// Place of the steps' files in the order of notices; of steps without one nothing is known, and any file is newer.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub notices: Vec<NoticeRun>,
 }
 
 /// One time step of a product.
@@ -59,6 +69,23 @@ pub struct Step {
     pub origin: String,
     /// Cells with data.
     pub valid_cells: u64,
+    /// Cells that the file gave a value for and that hold none here. None of steps that landed before these were counted
+    /// (what they lack is not known), and of computed ones.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub masked: Option<MaskedCells>,
+    /// How complete the sums of accumulated carbon are; none for means, and in versions that did not count it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub contributed: Option<Contributed>,
+}
+
+/// What of the accumulated time each cell's sum holds.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Contributed {
+    /// Steps and time that contributed, map-major chunks.
+    pub counts: ObjectKey,
+    /// Cells that had data in all of the accumulated time: a sum over one month of twelve is not a complete one.
+    pub complete_cells: u64,
 }
 
 /// A run of consecutive steps, stored time-major.
@@ -74,6 +101,17 @@ pub struct SeriesSegment {
 }
 
 impl Manifest {
+    /// What was masked in its steps, as far as it was counted, and of how many steps it was not.
+    pub fn masked(&self) -> (MaskedCells, usize) {
+        let counted = self.steps.iter().filter_map(|step| step.masked);
+        let uncounted = self
+            .steps
+            .iter()
+            .filter(|step| step.masked.is_none())
+            .count();
+        (counted.sum(), uncounted)
+    }
+
     /// The name that answers cite.
     pub fn id(&self) -> ManifestId {
         ManifestId {
@@ -81,6 +119,17 @@ impl Manifest {
             number: self.number,
             short_sha256: Digest::of_json(self).short(),
         }
+    }
+
+    /// Of each step the place of its file in the order of notices, as far as it is known.
+    pub fn notice_orders(&self) -> Vec<Option<NoticeOrder>> {
+        NoticeRun::orders(&self.notices, self.steps.len())
+    }
+
+    /// Index of the step of exactly this period.
+    pub fn step_of(&self, period: Period) -> Option<usize> {
+        let found = self.steps.binary_search_by_key(&period, |step| step.period);
+        found.ok()
     }
 
     /// First and last instant covered.
@@ -218,11 +267,13 @@ mod tests {
         let product: ProductId = "p".parse().unwrap();
         let digest = Digest::of(b"");
         let step = |month| Step {
+            masked: None,
             period: Period::month(2000, month).unwrap(),
             frame: ObjectKey::frame(&product, &digest),
             raw_sha256: digest,
             origin: "f.nc".into(),
             valid_cells: 1,
+            contributed: None,
         };
         Manifest {
             schema: MANIFEST_SCHEMA,
@@ -243,6 +294,7 @@ mod tests {
             domain: ObjectKey::domain(&product, &digest),
             series: vec![],
             derived_from: None,
+            notices: vec![],
             product,
         }
     }
@@ -308,6 +360,37 @@ mod tests {
                 weight: 0.5
             }
         );
+    }
+
+    /// Bytes as version 1 wrote them: they must keep their meaning and their name.
+    #[test]
+    fn a_manifest_of_version_1_is_read_and_keeps_its_name() {
+        let json = r#"{"schema":1,"product":"p","number":3,"title":"","quantity":"carbon_flux","synthetic":false,"source":"","grid":{"rows":1,"cols":1,"north_deg":1.0,"west_deg":0.0,"dlat_deg":1.0,"dlon_deg":1.0},"steps":[{"period":{"start":"2000-01-01T00:00:00Z","end":"2000-02-01T00:00:00Z"},"frame":"frames/p/e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855","raw_sha256":"e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855","origin":"f.nc","valid_cells":1}],"domain":"domain/p/e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855","series":[],"derived_from":null}"#;
+        let old: Manifest = serde_json::from_str(json).unwrap();
+        assert_eq!(serde_json::to_string(&old).unwrap(), json);
+        assert_eq!(old.id().to_string(), "p@3-56d19b9b");
+        assert_eq!(old.notice_orders(), [None]);
+    }
+
+    #[test]
+    fn what_is_masked_is_counted_apart_from_what_is_not_known() {
+        let mut m = manifest(Quantity::CarbonFlux);
+        let old = m.id();
+        assert_eq!(m.masked(), (MaskedCells::default(), 3));
+        let json = serde_json::to_string(&m).unwrap();
+        assert!(
+            !json.contains("masked"),
+            "a step of old times is as it was: {json}"
+        );
+        m.steps[0].masked = Some(MaskedCells::default());
+        m.steps[1].masked = Some(MaskedCells {
+            implausible: 7,
+            ..MaskedCells::default()
+        });
+        assert_eq!((m.masked().0.implausible, m.masked().1), (7, 1));
+        let json = serde_json::to_string(&m).unwrap();
+        assert_eq!(serde_json::from_str::<Manifest>(&json).unwrap(), m);
+        assert_ne!(m.id(), old);
     }
 
     #[test]

@@ -20,6 +20,21 @@ pub struct Moment {
     /// Frame after the instant; none where the one before holds alone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub after: Option<After>,
+    /// How complete the sums of accumulated carbon are, where doubt is drawn and some are not complete.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub contributed: Option<Counts>,
+}
+
+/// Stored steps and time that contributed to sums, beside the frames of these sums.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Counts {
+    /// To the frame at the instant or before it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub before: Option<ObjectKey>,
+    /// To the frame after it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub after: Option<ObjectKey>,
 }
 
 /// A frame that the values move towards.
@@ -50,6 +65,28 @@ impl Manifest {
                 frame: frame(after),
                 weight,
             }),
+            contributed: None,
+        })
+    }
+
+    /// The same with how complete the sums are, for pictures that show it. Nothing is added to it where all sums are
+    /// complete, where values are no sums, and in versions that did not count.
+    pub fn moment_with_counts(&self, time: TimeMs) -> Option<Moment> {
+        let moment = self.moment(time)?;
+        let bracket = self.bracket(time)?;
+        let incomplete = |step: usize| {
+            let step = &self.steps[step];
+            let contributed = step.contributed.as_ref()?;
+            (contributed.complete_cells < step.valid_cells).then(|| contributed.counts.clone())
+        };
+        let after = moment.after.as_ref().map(|_| bracket.after);
+        let counts = Counts {
+            before: bracket.before.and_then(incomplete),
+            after: after.and_then(incomplete),
+        };
+        Some(Moment {
+            contributed: (counts != Counts::default()).then_some(counts),
+            ..moment
         })
     }
 }
@@ -73,6 +110,12 @@ impl Moment {
                 return bad(frame, "a frame is wanted");
             }
         }
+        let counts = self.contributed.iter();
+        for key in counts.flat_map(|counts| counts.before.iter().chain(&counts.after)) {
+            if !key.is_in("contributed") {
+                return bad(key, "counts of steps are wanted");
+            }
+        }
         match after {
             Some(After { frame, weight }) if !(*weight > 0.0 && *weight < 1.0) => {
                 bad(frame, "weights lie between 0 and 1")
@@ -92,7 +135,7 @@ mod tests {
     use super::*;
     use crate::digest::Digest;
     use crate::grid::Grid;
-    use crate::manifest::{MANIFEST_SCHEMA, Step};
+    use crate::manifest::{Contributed, MANIFEST_SCHEMA, Step};
     use crate::product::ProductId;
     use crate::quantity::Quantity;
     use crate::time::Period;
@@ -105,11 +148,13 @@ mod tests {
     fn manifest(quantity: Quantity, frames: &[&str]) -> Manifest {
         let product: ProductId = "p".parse().unwrap();
         let step = |(month, content): (u32, &&str)| Step {
+            masked: None,
             period: Period::month(2000, month).unwrap(),
             frame: frame(content),
             raw_sha256: Digest::of(b""),
             origin: String::new(),
             valid_cells: 1,
+            contributed: None,
         };
         Manifest {
             schema: MANIFEST_SCHEMA,
@@ -130,6 +175,7 @@ mod tests {
             domain: ObjectKey::domain(&product, &Digest::of(b"d")),
             series: vec![],
             derived_from: None,
+            notices: vec![],
             product,
         }
     }
@@ -177,6 +223,58 @@ mod tests {
         );
         let end = at(&carbon, "2000-02-01");
         assert_eq!((end.before, end.after), (Some(frame("a")), None));
+    }
+
+    #[test]
+    fn counts_belong_to_a_moment_where_sums_are_incomplete_and_are_asked_for() {
+        let mut carbon = manifest(Quantity::AccumulatedCarbon, &["a", "b", "c"]);
+        let counts = |content: &str| {
+            ObjectKey::contributed(&"p".parse().unwrap(), &Digest::of(content.as_bytes()))
+        };
+        for (step, (content, complete_cells)) in
+            carbon.steps.iter_mut().zip([("a", 0), ("b", 0), ("c", 1)])
+        {
+            step.contributed = Some(Contributed {
+                counts: counts(content),
+                complete_cells,
+            });
+        }
+        let with_counts = |time: &str| {
+            let moment = carbon.moment_with_counts(time.parse().unwrap()).unwrap();
+            moment.validate().unwrap();
+            let plain = Moment {
+                contributed: None,
+                ..moment.clone()
+            };
+            assert_eq!(plain, at(&carbon, time), "{time}");
+            moment.contributed
+        };
+        let both = |before: Option<&str>, after: Option<&str>| {
+            Some(Counts {
+                before: before.map(counts),
+                after: after.map(counts),
+            })
+        };
+        assert_eq!(
+            with_counts("2000-01-01"),
+            None,
+            "nothing is accumulated yet"
+        );
+        assert_eq!(with_counts("2000-01-10"), both(None, Some("a")));
+        assert_eq!(with_counts("2000-02-10"), both(Some("a"), Some("b")));
+        assert_eq!(with_counts("2000-03-10"), both(Some("b"), None));
+        assert_eq!(with_counts("2000-06-01"), None, "complete");
+        carbon.steps[1].contributed = None; // as an older version wrote it
+        let old = carbon.moment_with_counts("2000-03-10".parse().unwrap());
+        assert_eq!(old.unwrap().contributed, None);
+        let strange = Moment {
+            contributed: Some(Counts {
+                before: Some(frame("a")),
+                after: None,
+            }),
+            ..at(&carbon, "2000-02-10")
+        };
+        assert!(strange.validate().is_err());
     }
 
     #[test]

@@ -22,14 +22,14 @@ use contract::time::TimeMs;
 pub(crate) use fill::{BenchFill, FillError, ProductsOf};
 pub(crate) use look::{Look, RenderLegend};
 pub(crate) use observations::{MatchTime, Matchup, Observations, ObservationsAsked};
-pub(crate) use pictures::{BenchCompare, BenchQuality, RenderAnimation};
+pub(crate) use pictures::{BenchCompare, BenchQuality, BenchServe, RenderAnimation};
 pub(crate) use services::{
     Bench, BenchStream, Executor, Ingestd, Notice, Rejected, RenderWorker, Scheduler, TileServer,
     Topics,
 };
 pub(crate) use show::settings as shown_settings;
 pub(crate) use surroundings::Surroundings;
-pub(crate) use upkeep::{Gc, Recompute, RecomputeWhat, Survey};
+pub(crate) use upkeep::{Gc, Recompute, RecomputeWhat, Survey, Verify};
 
 /// See and count the ocean's carbon.
 ///
@@ -83,6 +83,9 @@ pub(crate) struct Settings {
     /// Draw with the processor alone instead of a Vulkan device.
     #[arg(long, env = "FLUXGLOBE_CPU", global = true)]
     pub(crate) cpu: bool,
+    /// Refuse to draw where there is no graphics card, instead of drawing in software.
+    #[arg(long, env = "FLUXGLOBE_REQUIRE_GPU", global = true)]
+    pub(crate) require_gpu: bool,
     /// Parts that a query is cut into, on a cluster at least; as many as this machine has processors, or as the cluster's
     /// executors have room for, if absent. Answers are the same bits for any number.
     #[arg(
@@ -143,6 +146,8 @@ pub(crate) enum Command {
     Observations(Observations),
     /// Make anew what was derived from a product, where it is stale or missing.
     Recompute(Recompute),
+    /// Read every stored object and compare it with its name or seal; the exit code is 1 if one is damaged or missing.
+    Verify(Verify),
     /// Remove objects that no kept version needs.
     Gc(Gc),
     /// Show what would become of files: landed with which profile, or refused and why. Nothing is stored.

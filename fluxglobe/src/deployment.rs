@@ -1,6 +1,6 @@
 //! What commands and services work on: one process with a data folder, or the servers that settings name.
 
-use std::num::NonZeroUsize;
+use std::num::{NonZeroU32, NonZeroUsize};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -118,10 +118,35 @@ fn parts_in_process(settings: &Settings, is_remote: bool) -> NonZeroUsize {
     settings.partitions.map_or(parts, NonZeroUsize::from)
 }
 
-/// The renderer on this machine's Vulkan device, or on its processor when asked to; for pictures that follow one another
-/// in time.
+/// What to draw with: this machine's Vulkan device, or its processor when asked to.
+pub(crate) fn backend(settings: &Settings) -> Result<Backend> {
+    match (settings.cpu, settings.require_gpu) {
+        (true, true) => bail!(
+            "--cpu draws with the processor and --require-gpu with nothing but a graphics card: give one of them"
+        ),
+        (true, false) => Ok(Backend::Cpu),
+        (false, true) => Ok(Backend::HardwareGpu),
+        (false, false) => Ok(Backend::Gpu),
+    }
+}
+
+/// The renderer for pictures that follow one another in time.
 pub(crate) async fn renderer(settings: &Settings, store: Store) -> Result<RenderService> {
-    renderer_of(settings, store, Limits::default()).await
+    renderer_at(settings, store, None).await
+}
+
+/// The same that draws so many pictures at the same time; as many as suit its adapter if none is named.
+pub(crate) async fn renderer_at(
+    settings: &Settings,
+    store: Store,
+    draws_at_once: Option<NonZeroU32>,
+) -> Result<RenderService> {
+    let count = draws_at_once.and_then(|count| NonZeroUsize::new(count.get() as usize));
+    let limits = Limits {
+        draws_at_once: count,
+        ..Limits::default()
+    };
+    renderer_of(settings, store, limits).await
 }
 
 /// The same for single pictures: nothing is read ahead for a next one.
@@ -134,11 +159,7 @@ pub(crate) async fn single_renderer(settings: &Settings, store: Store) -> Result
 }
 
 async fn renderer_of(settings: &Settings, store: Store, limits: Limits) -> Result<RenderService> {
-    let backend = if settings.cpu {
-        Backend::Cpu
-    } else {
-        Backend::Gpu
-    };
+    let backend = backend(settings)?;
     let make = move || RenderService::with_limits(store, backend, limits);
     Ok(tokio::task::spawn_blocking(make).await??)
 }

@@ -2,6 +2,7 @@
 
 mod observer;
 
+use std::num::NonZeroU32;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use async_trait::async_trait;
@@ -17,10 +18,14 @@ use render_worker::fleet::{Fleet, FleetError};
 use render_worker::{RenderError, RenderService};
 use tile_server::backend::{
     Analyse, AreaRequest, AreaRow, AreaSeries, BackendError, BudgetAnswer, BudgetRequest,
-    BudgetRow, BudgetStep as WantedStep, Check, Class, Draw, RowCol,
+    BudgetRow, BudgetStep as WantedStep, Check, Class, Contributed, Draw, PointStep, RowCol, Turn,
 };
 
 pub(crate) use observer::Observer;
+
+/// Pictures asked of render workers at the same time. Each worker has a queue of its own, and is joined by others when
+/// 16 wait in it: one server alone must be able to fill that.
+const FLEET_DRAWS_AT_ONCE: NonZeroU32 = NonZeroU32::new(32).expect("32 is not 0");
 
 /// Pictures from the renderer in this process.
 pub(crate) struct Drawer {
@@ -52,11 +57,16 @@ pub(crate) struct Analyst {
 
 #[async_trait]
 impl Draw for Drawer {
-    async fn draw(&self, job: &RenderJob) -> Result<Bytes, BackendError> {
-        let picture = self.service.draw(job).await;
+    async fn draw(&self, job: &RenderJob, turn: Turn) -> Result<Bytes, BackendError> {
+        let picture = self.service.draw_in_turn(job, turn).await;
         let trouble = picture.as_ref().err().filter(|error| error.is_retryable());
         *self.trouble() = trouble.map(ToString::to_string);
         picture.map_err(render_failed)
+    }
+
+    fn draws_at_once(&self) -> NonZeroU32 {
+        let suited = u32::try_from(self.service.draws_at_once().get()).unwrap_or(u32::MAX);
+        NonZeroU32::new(suited).unwrap_or(NonZeroU32::MIN)
     }
 
     async fn ready(&self) -> Result<(), BackendError> {
@@ -73,11 +83,21 @@ impl Analyse for Analyst {
         &self,
         manifest: &Manifest,
         cell: RowCol,
-    ) -> Result<Vec<Option<f64>>, BackendError> {
-        let values = compute::point::cell_values(&self.local, manifest, cell.row, cell.col).await;
+    ) -> Result<Vec<PointStep>, BackendError> {
+        let RowCol { row, col } = cell;
+        let values = compute::point::cell_values(&self.local, manifest, row, col).await;
         let values = values.map_err(compute_failed)?;
-        let known = |value: f32| (!value.is_nan()).then_some(f64::from(value));
-        Ok(values.into_iter().map(known).collect())
+        let counts = compute::derive::counts_at_cell(&self.local, manifest, row, col).await;
+        let counts = counts.map_err(compute_failed)?;
+        let step = |(index, value): (usize, f32)| PointStep {
+            value: (!value.is_nan()).then_some(f64::from(value)),
+            contributed: counts.as_ref().map(|counts| Contributed {
+                steps: counts[index].steps,
+                of_steps: counts[index].of_steps,
+                time_percent: counts[index].time_percent,
+            }),
+        };
+        Ok(values.into_iter().enumerate().map(step).collect())
     }
 
     async fn budget(&self, request: &BudgetRequest) -> Result<BudgetAnswer, BackendError> {
@@ -109,6 +129,9 @@ impl Analyse for Analyst {
             ocean_with_data_m2: row.ocean_with_data_m2,
             gap_tg: row.gap_tg,
             gap_area_m2: row.gap_area_m2,
+            complete_and_incomplete_m2: row
+                .completeness
+                .map(|own| [own.complete_m2, own.incomplete_m2]),
         };
         Ok(BudgetAnswer {
             region_area_m2: answer.region_area_m2,
@@ -158,12 +181,17 @@ pub(crate) struct FleetDrawer(pub(crate) Fleet);
 
 #[async_trait]
 impl Draw for FleetDrawer {
-    async fn draw(&self, job: &RenderJob) -> Result<Bytes, BackendError> {
+    async fn draw(&self, job: &RenderJob, turn: Turn) -> Result<Bytes, BackendError> {
         let trace = job.digest().short();
         let picture = self.0.draw(job, &trace).await;
+        drop(turn);
         picture
             .map(|picture| picture.png)
             .map_err(|error| fleet_failed(&error))
+    }
+
+    fn draws_at_once(&self) -> NonZeroU32 {
+        FLEET_DRAWS_AT_ONCE
     }
 
     async fn ready(&self) -> Result<(), BackendError> {

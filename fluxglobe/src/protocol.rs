@@ -13,30 +13,40 @@ use storage::{StorageError, Store};
 /// Where it is written.
 const KEY: &str = "protocol/current.json";
 
-/// Versions of everything that two processes exchange.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+/// Versions of what is stored and told under names that do not hold them. That of the renderer is not among them: the
+/// name of a picture holds it, and a render worker and whoever asks it compare theirs with every job.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 struct Protocol {
     event_schema: u32,
     manifest_schema: u32,
-    renderer_version: u32,
+}
+
+/// The same as others wrote it down; what this program does not know, it cannot agree to.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Written {
+    event_schema: u32,
+    manifest_schema: u32,
+    /// Programs up to 0.1.0 wrote theirs down.
+    #[serde(rename = "renderer_version")]
+    _renderer_version: Option<u32>,
 }
 
 const OURS: Protocol = Protocol {
     event_schema: EVENT_SCHEMA,
     manifest_schema: MANIFEST_SCHEMA,
-    renderer_version: RENDERER_VERSION,
 };
 
 /// Version of this program.
 pub(crate) const PROGRAM: &str = env!("CARGO_PKG_VERSION");
 
-/// The program's version and those of what its processes exchange: two programs whose last three are the same may run
-/// side by side.
+/// The program's version and those of what its processes exchange: two programs with the same events and manifests may run
+/// side by side, and draw for each other if their renderers are the same too.
 pub(crate) fn version() -> &'static str {
     static TEXT: LazyLock<String> = LazyLock::new(|| {
         format!(
             "{PROGRAM} (events {}, manifests {}, renderer {})",
-            OURS.event_schema, OURS.manifest_schema, OURS.renderer_version
+            OURS.event_schema, OURS.manifest_schema, RENDERER_VERSION
         )
     });
     &TEXT
@@ -70,33 +80,71 @@ pub(crate) async fn agree(store: &Store) -> Result<(), ProtocolError> {
     match store.put_new(&key, Bytes::from(ours.clone())).await {
         Ok(_new_or_equal) => Ok(()),
         Err(StorageError::Conflict { .. }) => {
-            let theirs = String::from_utf8_lossy(&store.get(&key).await?)
-                .chars()
-                .take(200)
-                .collect();
+            let theirs = store.get(&key).await?;
+            if fits(&theirs) {
+                return Ok(());
+            }
+            let theirs = String::from_utf8_lossy(&theirs).chars().take(200).collect();
             Err(ProtocolError::Differs { theirs, ours })
         }
         Err(error) => Err(error.into()),
     }
 }
 
+/// Is what others wrote down what this program reads and writes?
+fn fits(theirs: &[u8]) -> bool {
+    let written: Result<Written, _> = serde_json::from_slice(theirs);
+    written.is_ok_and(|theirs| {
+        let Written {
+            event_schema,
+            manifest_schema,
+            ..
+        } = theirs;
+        let theirs = Protocol {
+            event_schema,
+            manifest_schema,
+        };
+        theirs == OURS
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    async fn beside(theirs: String) -> Result<(), ProtocolError> {
+        let store = Store::memory();
+        let key = KEY.parse().unwrap();
+        store.put_new(&key, Bytes::from(theirs)).await.unwrap();
+        agree(&store).await
+    }
 
     #[tokio::test]
     async fn a_store_of_another_version_is_refused_with_both_named() {
         let store = Store::memory();
         agree(&store).await.unwrap();
         agree(&store).await.unwrap();
-        let other = Store::memory();
-        let key = KEY.parse().unwrap();
-        let theirs = Bytes::from_static(b"{\"event_schema\":99}");
-        other.put_new(&key, theirs).await.unwrap();
-        let error = agree(&other).await.unwrap_err();
-        assert!(
-            error.to_string().contains("99") && !error.is_retryable(),
-            "{error}"
+        let (events, manifests) = (EVENT_SCHEMA, MANIFEST_SCHEMA);
+        let unknown = format!(
+            r#"{{"event_schema":{events},"manifest_schema":{manifests},"frame_schema":99}}"#
         );
+        let newer = format!(r#"{{"event_schema":{events},"manifest_schema":99}}"#);
+        for theirs in [r#"{"event_schema":99}"#, "99, no JSON", &newer, &unknown] {
+            let error = beside(theirs.to_owned()).await.unwrap_err();
+            assert!(
+                error.to_string().contains("99") && !error.is_retryable(),
+                "{error}"
+            );
+        }
+    }
+
+    #[tokio::test]
+    async fn programs_whose_renderers_alone_differ_run_side_by_side() {
+        let (events, manifests) = (EVENT_SCHEMA, MANIFEST_SCHEMA);
+        let theirs = format!(
+            r#"{{"event_schema":{events},"manifest_schema":{manifests},"renderer_version":{}}}"#,
+            RENDERER_VERSION - 1
+        );
+        beside(theirs).await.unwrap();
     }
 }

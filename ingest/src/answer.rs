@@ -3,9 +3,13 @@
 use std::path::PathBuf;
 
 use contract::digest::Digest;
-use contract::event::{Event, RejectReason};
+use contract::event::{Body, Event, RejectReason};
+use contract::manifest::ManifestId;
+use contract::notice::NoticeOrder;
+use contract::time::{Period, TimeMs};
 use contract::topic::Origin;
 use storage::Store;
+use storage::log::Message;
 
 use crate::commit::{self, Committed};
 use crate::error::{Cause, IngestError};
@@ -15,6 +19,8 @@ use crate::outcome::Outcome;
 use crate::pipeline::Prepared;
 use crate::put::StoredGranule;
 use crate::rejection::Rejection;
+use crate::settings::Settings;
+use crate::superseded;
 
 /// What a notice is answered with.
 #[derive(Debug, Clone)]
@@ -29,6 +35,8 @@ pub(crate) struct Answer {
 pub(crate) struct Asked {
     pub(crate) notice: Notice,
     pub(crate) origin: Option<Origin>,
+    /// Number of the file among those of the message.
+    pub(crate) file: u32,
 }
 
 /// A file whose objects are durable, or its answer.
@@ -39,13 +47,55 @@ pub(crate) enum Ready {
 }
 
 impl Asked {
+    /// The files of a message.
+    pub(crate) fn of(message: &Message, settings: &Settings, now: TimeMs) -> Vec<Self> {
+        let notices = Notice::of(message, settings, now);
+        let asked = |(file, notice)| Self {
+            notice,
+            origin: Some(message.origin),
+            file,
+        };
+        (0..).zip(notices).map(asked).collect()
+    }
+
+    /// Its place in the order of notices; none of a file that no notice came for, which is newer than all that is there.
+    pub(crate) fn order(&self) -> Option<NoticeOrder> {
+        let Origin {
+            partition, offset, ..
+        } = self.origin?;
+        Some(NoticeOrder {
+            given: self.notice.given?,
+            partition,
+            offset,
+            file: self.file,
+        })
+    }
+
     /// The name that people know the file by.
-    pub(crate) fn file(&self) -> PathBuf {
+    pub(crate) fn path(&self) -> PathBuf {
         PathBuf::from(&self.notice.shown)
     }
 
     pub(crate) fn refused(&self, rejection: Rejection) -> Answer {
-        self.answer(Outcome::rejected(self.file(), rejection), None, true)
+        self.answer(Outcome::rejected(self.path(), rejection), None, true)
+    }
+
+    /// The answer to a file of whose time files of later notices are. If it was in a version before and nobody told of
+    /// that yet, its notice tells of that version now.
+    fn superseded(
+        &self,
+        manifest: ManifestId,
+        raw_sha256: Digest,
+        periods: &[Period],
+        held_by: Option<ManifestId>,
+    ) -> Answer {
+        let (file, shown) = (self.path(), self.notice.shown.clone());
+        let event = held_by.map(|held_by| {
+            let body = Body::granule_landed(shown, raw_sha256, held_by, periods, false);
+            self.notice.cause.followed_by(body)
+        });
+        let outcome = Outcome::Superseded { file, manifest };
+        Answer { outcome, event }
     }
 
     fn answer(&self, outcome: Outcome, raw_sha256: Option<Digest>, is_due: bool) -> Answer {
@@ -64,11 +114,12 @@ impl Asked {
         Ok(match prepared {
             Prepared::Stored(granule) => Ready::ToCommit(StoredGranule {
                 asked_by: self.origin,
+                order: self.order(),
                 ..granule
             }),
             Prepared::Rejected(rejection) => Ready::Answered(self.refused(rejection)),
             Prepared::Observed(stored) => {
-                let file = self.file();
+                let file = self.path();
                 let outcome = Outcome::Observed { file, stored };
                 Ready::Answered(self.answer(outcome, None, true))
             }
@@ -76,6 +127,7 @@ impl Asked {
                 raw_sha256,
                 manifest,
                 periods,
+                masked,
             } => {
                 let is_due = match self.origin {
                     Some(origin) => {
@@ -84,11 +136,28 @@ impl Asked {
                     None => true,
                 };
                 let outcome = Outcome::AlreadyLanded {
-                    file: self.file(),
+                    file: self.path(),
                     manifest,
                     periods,
+                    masked,
                 };
                 Ready::Answered(self.answer(outcome, Some(raw_sha256), is_due))
+            }
+            Prepared::Superseded {
+                raw_sha256,
+                manifest,
+                periods,
+            } => {
+                let product = &manifest.product;
+                let held_by = match self.origin {
+                    Some(origin) => {
+                        let is_noted =
+                            landing_note::is_noted(store, product, raw_sha256, origin).await?;
+                        superseded::untold(store, &manifest, raw_sha256, &periods, is_noted).await?
+                    }
+                    None => None,
+                };
+                Ready::Answered(self.superseded(manifest, raw_sha256, &periods, held_by))
             }
         })
     }
@@ -109,14 +178,23 @@ pub(crate) async fn commit(
         .collect();
     let committed = commit::run(store, product, &granules).await?;
     let answer = |(committed, (asked, granule)): (Committed, &(&Asked, &StoredGranule))| {
+        if let Committed::Superseded {
+            manifest,
+            periods,
+            held_by,
+        } = committed
+        {
+            return asked.superseded(manifest, granule.raw_sha256, &periods, held_by);
+        }
         let is_due = !matches!(committed, Committed::AlreadyLanded { is_due: false, .. });
         let raw_sha256 = Some(granule.raw_sha256);
-        asked.answer(outcome(asked.file(), committed), raw_sha256, is_due)
+        let outcome = outcome(asked.path(), committed, granule);
+        asked.answer(outcome, raw_sha256, is_due)
     };
     Ok(committed.into_iter().zip(batch).map(answer).collect())
 }
 
-fn outcome(file: PathBuf, committed: Committed) -> Outcome {
+fn outcome(file: PathBuf, committed: Committed, granule: &StoredGranule) -> Outcome {
     match committed {
         Committed::Landed {
             manifest,
@@ -127,6 +205,8 @@ fn outcome(file: PathBuf, committed: Committed) -> Outcome {
             manifest,
             periods,
             revised,
+            assumptions: granule.assumptions.clone(),
+            masked: granule.masked,
         },
         Committed::AlreadyLanded {
             manifest, periods, ..
@@ -134,7 +214,9 @@ fn outcome(file: PathBuf, committed: Committed) -> Outcome {
             file,
             manifest,
             periods,
+            masked: granule.masked,
         },
+        Committed::Superseded { manifest, .. } => Outcome::Superseded { file, manifest },
         Committed::Rejected(rejection) => Outcome::rejected(file, rejection),
     }
 }

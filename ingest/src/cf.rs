@@ -2,7 +2,11 @@
 
 pub(crate) mod axis;
 pub(crate) mod calendar;
+pub(crate) mod cell_methods;
 pub(crate) mod coordinate;
+pub(crate) mod flag;
 pub(crate) mod packing;
 pub(crate) mod period;
+pub(crate) mod projection;
 pub(crate) mod quantity;
+pub(crate) mod spacing;

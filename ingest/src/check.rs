@@ -1,6 +1,7 @@
-//! [`DecodedGrid`] in, [`CheckedGrid`] out: implausible values masked, or the file refused if there are many.
+//! [`DecodedGrid`] in, [`CheckedGrid`] out: implausible values masked and counted, or the file refused if there are many.
 
 use contract::event::RejectReason;
+use contract::masked::MaskedCells;
 use contract::quantity::Quantity;
 use contract::time::Period;
 
@@ -17,6 +18,8 @@ pub(crate) struct CheckedGrid {
     /// `[row, col]`, row 0 north, stored unit, NaN for no data.
     pub(crate) values: Vec<f32>,
     pub(crate) valid_cells: u64,
+    /// Cells that the file gave a value for.
+    pub(crate) masked: MaskedCells,
 }
 
 /// Checks one step. A step without any value passes with no valid cells; whether that is too little is for the file.
@@ -25,9 +28,13 @@ pub(crate) fn run(
     quantity: Quantity,
     variable: &str,
 ) -> Result<CheckedGrid, Rejection> {
-    let DecodedGrid { period, mut values } = grid;
+    let DecodedGrid {
+        period,
+        mut values,
+        masked,
+    } = grid;
     let plausible = quantity.plausible();
-    let (mut valid_cells, mut implausible_cells, mut example) = (0u64, 0u64, f32::NAN);
+    let (mut valid_cells, mut implausible, mut example) = (0u64, 0u64, f32::NAN);
     for value in &mut values {
         if value.is_nan() {
             continue;
@@ -35,15 +42,15 @@ pub(crate) fn run(
         if is_plausible(*value, &plausible) {
             valid_cells += 1;
         } else {
-            implausible_cells += 1;
+            implausible += 1;
             example = *value;
             *value = f32::NAN;
         }
     }
-    let all = valid_cells + implausible_cells;
-    if implausible_cells as f64 > MAX_IMPLAUSIBLE_SHARE * all as f64 {
+    let all = valid_cells + implausible;
+    if implausible as f64 > MAX_IMPLAUSIBLE_SHARE * all as f64 {
         let detail = format!(
-            "has {implausible_cells} of {all} values outside {:e} to {:e} {} in {period}, such as {example:e}; correct unit, scale or fill value in a profile",
+            "has {implausible} of {all} values outside {:e} to {:e} {} in {period}, such as {example:e}; correct unit, scale or fill value in a profile",
             plausible.start(),
             plausible.end(),
             quantity.unit()
@@ -54,6 +61,10 @@ pub(crate) fn run(
         period,
         values,
         valid_cells,
+        masked: MaskedCells {
+            implausible,
+            ..masked
+        },
     })
 }
 
@@ -68,15 +79,26 @@ mod tests {
 
     fn check(values: Vec<f32>) -> Result<CheckedGrid, Rejection> {
         let period = Period::month(2000, 1).unwrap();
-        run(DecodedGrid { period, values }, Quantity::IceFraction, "ice")
+        let masked = MaskedCells {
+            out_of_range: 3,
+            ..MaskedCells::default()
+        };
+        let grid = DecodedGrid {
+            period,
+            values,
+            masked,
+        };
+        run(grid, Quantity::IceFraction, "ice")
     }
 
     #[test]
-    fn a_few_implausible_values_are_masked() {
+    fn a_few_implausible_values_are_masked_and_counted() {
         let mut values = vec![0.5; 100];
         (values[0], values[1]) = (7.0, f32::NAN);
         let checked = check(values).unwrap();
         assert_eq!(checked.valid_cells, 98);
+        let counts = (checked.masked.implausible, checked.masked.out_of_range);
+        assert_eq!(counts, (1, 3), "one, and those masked before");
         assert!(checked.values[0].is_nan() && checked.values[1].is_nan());
         assert_eq!(check(vec![0.0, 1.0]).unwrap().valid_cells, 2);
     }
@@ -91,6 +113,7 @@ mod tests {
 
     #[test]
     fn a_step_without_values_has_no_valid_cells() {
-        assert_eq!(check(vec![f32::NAN; 10]).unwrap().valid_cells, 0);
+        let checked = check(vec![f32::NAN; 10]).unwrap();
+        assert_eq!((checked.valid_cells, checked.masked.implausible), (0, 0));
     }
 }

@@ -4,6 +4,7 @@
 //! newest is read again. Everything it names is durable before. A crash before the publication leaves objects that
 //! nothing names; the same files make the same objects again and land once.
 
+mod mend;
 mod merge;
 mod replace;
 mod segments;
@@ -12,6 +13,7 @@ use std::time::Duration;
 
 use backon::{BackoffBuilder as _, ExponentialBuilder};
 use contract::manifest::{MANIFEST_SCHEMA, Manifest, ManifestId};
+use contract::notice::NoticeRun;
 use contract::product::ProductId;
 use contract::time::Period;
 use storage::{StorageError, Store, manifests};
@@ -20,9 +22,13 @@ use crate::error::IngestError;
 use crate::landing_note;
 use crate::put::StoredGranule;
 use crate::rejection::Rejection;
+use crate::superseded;
 use merge::{Change, Merged};
 
+pub(crate) use mend::mend;
+pub(crate) use merge::is_later_or_same;
 pub(crate) use replace::replace;
+pub(crate) use segments::{MAX_SEGMENT_STEPS, MAX_SEGMENT_VALUES};
 
 /// Lost races for the next number before the caller is told; it may go on.
 const MAX_TRIES: u32 = 200;
@@ -43,6 +49,13 @@ pub(crate) enum Committed {
         periods: Vec<Period>,
         /// Is it this file's notice that has to tell?
         is_due: bool,
+    },
+    /// Files of later notices have its time.
+    Superseded {
+        manifest: ManifestId,
+        periods: Vec<Period>,
+        /// The version that held it before, if its notice has still to tell of that.
+        held_by: Option<ManifestId>,
     },
     Rejected(Rejection),
 }
@@ -141,6 +154,7 @@ async fn build(
         domain,
         series,
         derived_from: None,
+        notices: NoticeRun::of(&merged.orders),
     })
 }
 
@@ -177,6 +191,24 @@ impl<'a> Notes<'a> {
         Ok(())
     }
 
+    /// The version that held a file which newer ones replaced, if its notice has still to tell of it.
+    async fn untold(
+        &self,
+        index: usize,
+        newest: &ManifestId,
+        periods: &[Period],
+    ) -> Result<Option<ManifestId>, IngestError> {
+        let raw_sha256 = self.granules[index].raw_sha256;
+        let is_noted = match (self.before[index], self.granules[index].asked_by) {
+            (Some(before), _) => before,
+            (None, Some(origin)) => {
+                landing_note::is_noted(self.store, self.product, raw_sha256, origin).await?
+            }
+            (None, None) => false,
+        };
+        superseded::untold(self.store, newest, raw_sha256, periods, is_noted).await
+    }
+
     /// Is it the notice of a file that was there that has to tell of it?
     async fn is_due(&self, index: usize) -> Result<bool, IngestError> {
         let granule = &self.granules[index];
@@ -199,11 +231,11 @@ async fn outcomes(
     let mut all = Vec::with_capacity(merged.changes.len());
     for (index, change) in merged.changes.iter().enumerate() {
         let grids = &notes.granules[index].grids;
-        let periods = grids.iter().map(|g| g.step.period).collect();
+        let periods: Vec<Period> = grids.iter().map(|g| g.step.period).collect();
         all.push(match (change, manifest) {
-            (Change::Taken { revised }, Some(manifest)) => Committed::Landed {
+            (Change::Taken { revised, periods }, Some(manifest)) => Committed::Landed {
                 manifest: manifest.clone(),
-                periods,
+                periods: periods.clone(),
                 revised: *revised,
             },
             (Change::Same, Some(manifest)) => Committed::AlreadyLanded {
@@ -211,8 +243,13 @@ async fn outcomes(
                 periods,
                 is_due: notes.is_due(index).await?,
             },
+            (Change::Superseded, Some(manifest)) => Committed::Superseded {
+                manifest: manifest.clone(),
+                held_by: notes.untold(index, manifest, &periods).await?,
+                periods,
+            },
             (Change::Refused(rejection), _) => Committed::Rejected(rejection.clone()),
-            (Change::Taken { .. } | Change::Same, None) => {
+            (Change::Taken { .. } | Change::Same | Change::Superseded, None) => {
                 unreachable!("a file that is taken or there has a manifest")
             }
         });

@@ -1,9 +1,12 @@
 //! [`PlannedGranule`] in, one [`DecodedGrid`] a step out: values on the stored grid, in the stored unit.
 
+use contract::masked::MaskedCells;
 use contract::time::Period;
 
 use crate::cf::axis::Mapping;
 use crate::cf::coordinate::{Axis, Role};
+use crate::cf::packing::Unpacked;
+use crate::decoder::session::Session;
 use crate::error::Stop;
 use crate::file::description::Part;
 use crate::plan::{PlannedGranule, PlannedStep};
@@ -13,6 +16,8 @@ use crate::plan::{PlannedGranule, PlannedStep};
 pub(crate) struct DecodedGrid {
     pub(crate) period: Period,
     pub(crate) values: Vec<f32>,
+    /// What the file gave a value for.
+    pub(crate) masked: MaskedCells,
 }
 
 /// Reads and turns one step.
@@ -20,17 +25,16 @@ pub(crate) async fn run(
     granule: &mut PlannedGranule,
     step: PlannedStep,
 ) -> Result<DecodedGrid, Stop> {
-    let part: Vec<Part> = granule.axes.iter().map(|axis| part(axis, step)).collect();
-    let expected = granule
-        .axes
-        .iter()
-        .filter(|a| is_plane(a))
-        .map(|a| a.len)
-        .product();
-    let stored = granule
-        .session
-        .read(&granule.variable.name, &part, expected)
-        .await?;
+    let is_good = is_good(granule, step).await?;
+    let (session, axes) = (&mut granule.session, &granule.axes);
+    let mut stored = plane(session, &granule.variable.name, axes, step).await?;
+    let mut masked = MaskedCells::default();
+    let cells = stored.iter_mut().zip(is_good.iter().flatten());
+    for (stored, _) in cells.filter(|(_, is_good)| !**is_good) {
+        let is_value = matches!(granule.packing.unpacked(*stored), Unpacked::Value(_));
+        masked.poor_quality += u64::from(is_value);
+        *stored = f64::NAN;
+    }
     let is_lat_first = granule.axes.iter().position(|a| a.role == Role::Latitude)
         < granule.axes.iter().position(|a| a.role == Role::Longitude);
     let len_of = |role| {
@@ -47,11 +51,49 @@ pub(crate) async fn run(
     };
     let packing = &granule.packing;
     // One rounding to float32, at the end.
-    let convert = |stored: f64| (packing.value(stored) * step.factor + step.offset) as f32;
+    let convert = |stored: f64| {
+        let value = match packing.unpacked(stored) {
+            Unpacked::Value(value) => value,
+            Unpacked::Missing => f64::NAN,
+            Unpacked::OutOfRange => {
+                masked.out_of_range += 1;
+                f64::NAN
+            }
+        };
+        (value * step.factor + step.offset) as f32
+    };
+    let values = turned(&granule.mapping, strides, &stored, convert);
     Ok(DecodedGrid {
         period: step.period,
-        values: turned(&granule.mapping, strides, &stored, convert),
+        values,
+        masked,
     })
+}
+
+/// One map of a variable as stored, in the order of the file.
+async fn plane(
+    session: &mut Session,
+    variable: &str,
+    axes: &[Axis],
+    step: PlannedStep,
+) -> Result<Vec<f64>, Stop> {
+    let part: Vec<Part> = axes.iter().map(|axis| part(axis, step)).collect();
+    let expected = axes.iter().filter(|a| is_plane(a)).map(|a| a.len).product();
+    session.read(variable, &part, expected).await
+}
+
+/// Is every cell of the file's map good enough? None if nobody asks.
+async fn is_good(
+    granule: &mut PlannedGranule,
+    step: PlannedStep,
+) -> Result<Option<Vec<bool>>, Stop> {
+    let Some(quality) = &granule.quality else {
+        return Ok(None);
+    };
+    let stored = plane(&mut granule.session, &quality.variable, &quality.axes, step).await?;
+    Ok(Some(
+        stored.into_iter().map(|n| quality.accepts(n)).collect(),
+    ))
 }
 
 fn is_plane(axis: &Axis) -> bool {
@@ -74,7 +116,7 @@ fn turned(
     mapping: &Mapping,
     strides: [usize; 2],
     stored: &[f64],
-    convert: impl Fn(f64) -> f32,
+    mut convert: impl FnMut(f64) -> f32,
 ) -> Vec<f32> {
     let mut values = Vec::with_capacity(mapping.grid.cell_count());
     for row in &mapping.file_rows {

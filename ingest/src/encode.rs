@@ -1,9 +1,9 @@
-//! [`CheckedGrid`] in, [`EncodedGrid`] out: the bytes of a frame and the key that its digest gives it.
+//! [`CheckedGrid`] in, [`EncodedGrid`] out: the bytes of a frame and the key that the digest of its values gives it.
 
 use bytes::Bytes;
-use contract::digest::Digest;
 use contract::grid::Grid;
 use contract::key::ObjectKey;
+use contract::masked::MaskedCells;
 use contract::product::ProductId;
 use contract::time::Period;
 
@@ -17,6 +17,7 @@ pub(crate) struct EncodedGrid {
     pub(crate) key: ObjectKey,
     pub(crate) frame: Bytes,
     pub(crate) valid_cells: u64,
+    pub(crate) masked: MaskedCells,
 }
 
 pub(crate) fn run(
@@ -26,11 +27,11 @@ pub(crate) fn run(
 ) -> Result<EncodedGrid, IngestError> {
     let frame = storage::frames::encode(grid, &checked.values, checked.period)
         .map_err(IngestError::storage("encode a frame"))?;
-    let key = ObjectKey::frame(product, &Digest::of(&frame));
     Ok(EncodedGrid {
         period: checked.period,
-        key,
-        frame,
+        key: ObjectKey::frame(product, &frame.values_sha256),
+        frame: frame.content,
         valid_cells: checked.valid_cells,
+        masked: checked.masked,
     })
 }

@@ -63,6 +63,12 @@ pub enum IngestError {
     /// A background task ended early.
     #[error("a background task ended early: {0}")]
     Task(#[from] tokio::task::JoinError),
+    /// The program panicked over a file.
+    #[error("the program stopped short: {what}")]
+    Panicked {
+        /// What it said.
+        what: String,
+    },
     /// Observations could not be stored.
     #[error("cannot store observations: {source}")]
     Observations {
@@ -132,6 +138,15 @@ impl IngestError {
         matches!(self.cause(), Cause::Passing)
     }
 
+    /// Did the program panic?
+    pub(crate) fn is_panic(&self) -> bool {
+        match self {
+            Self::Panicked { .. } => true,
+            Self::Task(task) => task.is_panic(),
+            _ => false,
+        }
+    }
+
     /// Is there no room on a disk (or none left of somebody's share of it)?
     pub fn is_disk_full(&self) -> bool {
         use std::io::{Error as IoError, ErrorKind};
@@ -161,9 +176,11 @@ impl IngestError {
             | Self::Client { .. }
             | Self::Digest { .. }
             | Self::Generate { .. } => Cause::Place,
-            Self::Profile { .. } | Self::Reread { .. } | Self::Contract(_) | Self::Task(_) => {
-                Cause::Granule
-            }
+            Self::Profile { .. }
+            | Self::Reread { .. }
+            | Self::Contract(_)
+            | Self::Task(_)
+            | Self::Panicked { .. } => Cause::Granule,
         }
     }
 }

@@ -1,47 +1,126 @@
-//! How much is worked on at the same time: files, and bytes of files.
+//! How much is worked on at the same time: files, and the memory that they need.
 
 use tokio::sync::{Semaphore, SemaphorePermit};
 
+use crate::room::{Room, Taken};
 use crate::settings::Settings;
 
-/// Bytes are counted in units of this, so that they fit the semaphore's counter.
-const UNIT_BYTES: u64 = 64 << 10;
-
-/// Lets in a bounded number of files and bytes.
+/// Lets in a bounded number of files, which need a bounded amount of memory.
 #[derive(Debug)]
 pub(crate) struct Gates {
     files: Semaphore,
-    bytes: Semaphore,
-    units: u32,
+    memory: Room,
+    memory_bytes: u64,
 }
 
-/// Held while a file is worked on.
+/// A file's seat: what it needs is found out while it is held.
+#[derive(Debug)]
+pub(crate) struct Seat<'a> {
+    file: SemaphorePermit<'a>,
+    gates: &'a Gates,
+}
+
+/// Held while the values of a file are worked on.
 #[derive(Debug)]
 pub(crate) struct Pass<'a> {
     _file: SemaphorePermit<'a>,
-    _bytes: SemaphorePermit<'a>,
+    _memory: Taken,
 }
 
 impl Gates {
     pub(crate) fn new(settings: &Settings) -> Self {
-        let units = u32::try_from(settings.parallel_bytes / UNIT_BYTES).unwrap_or(u32::MAX);
-        let units = units.max(1);
         Self {
             files: Semaphore::new(settings.parallel_files.clamp(1, 64)),
-            bytes: Semaphore::new(units as usize),
-            units,
+            memory: Room::new(settings.parallel_bytes),
+            memory_bytes: settings.parallel_bytes,
         }
     }
 
-    /// Waits until there is room; a file larger than all of it has it alone.
-    pub(crate) async fn enter(&self, bytes: u64) -> Pass<'_> {
-        let units = u32::try_from(bytes.div_ceil(UNIT_BYTES)).unwrap_or(u32::MAX);
-        // Always in this order, so that nobody holds bytes and waits for a file.
+    /// Waits until there is memory for work that needs no seat.
+    pub(crate) async fn memory(&self, bytes: u64) -> Taken {
+        self.memory.take(bytes).await
+    }
+
+    /// Waits until there is a seat for a file.
+    pub(crate) async fn seat(&self) -> Seat<'_> {
         let file = self.files.acquire().await;
-        let bytes = self.bytes.acquire_many(units.clamp(1, self.units)).await;
-        Pass {
-            _file: file.expect("the gates are never closed"),
-            _bytes: bytes.expect("the gates are never closed"),
+        Seat {
+            file: file.expect("the gates are never closed"),
+            gates: self,
         }
+    }
+}
+
+impl<'a> Seat<'a> {
+    /// Waits until there is memory for the file; one that needs more than all of it has it alone.
+    ///
+    /// It takes the seat, so that a file asks once: always a seat first and then memory, and nobody who holds memory
+    /// waits for either.
+    pub(crate) async fn with_memory(self, bytes: u64) -> Pass<'a> {
+        let Gates {
+            memory,
+            memory_bytes,
+            ..
+        } = self.gates;
+        if bytes > *memory_bytes {
+            tracing::info!(
+                bytes,
+                limit_bytes = memory_bytes,
+                "a file needs more memory than files may have together; it is worked on alone"
+            );
+        }
+        Pass {
+            _memory: memory.take(bytes).await,
+            _file: self.file,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::room::UNIT_BYTES;
+    use crate::settings::DecoderCommand;
+    use futures::FutureExt as _;
+
+    fn gates(units: u64) -> Gates {
+        let program = "/nowhere".into();
+        let arguments = vec![];
+        let settings = Settings::with_decoder(DecoderCommand { program, arguments });
+        Gates::new(&Settings {
+            parallel_files: 2,
+            parallel_bytes: units * UNIT_BYTES,
+            ..settings
+        })
+    }
+
+    async fn enter(gates: &Gates, units: u64) -> Pass<'_> {
+        gates.seat().await.with_memory(units * UNIT_BYTES).await
+    }
+
+    #[test]
+    fn a_file_larger_than_all_memory_goes_alone_and_ends() {
+        let gates = gates(4);
+        let small = enter(&gates, 1).now_or_never().unwrap();
+        let mut large = Box::pin(enter(&gates, 400));
+        assert!(large.as_mut().now_or_never().is_none(), "it is not alone");
+        drop(small);
+        let alone = large.now_or_never().expect("it is alone now");
+        assert!(
+            enter(&gates, 1).now_or_never().is_none(),
+            "nobody is beside it"
+        );
+        drop(alone);
+        assert!(enter(&gates, 1).now_or_never().is_some());
+    }
+
+    #[test]
+    fn files_are_bounded_by_number_and_by_memory() {
+        let gates = gates(4);
+        let first = enter(&gates, 2).now_or_never().unwrap();
+        assert!(enter(&gates, 3).now_or_never().is_none(), "memory");
+        let second = enter(&gates, 1).now_or_never().unwrap();
+        assert!(enter(&gates, 1).now_or_never().is_none(), "files");
+        drop((first, second));
     }
 }

@@ -32,7 +32,7 @@ use crate::error::IngestError;
 use crate::gates::Gates;
 use crate::land::{self, COMMIT_FILES};
 use crate::metrics::Metrics;
-use crate::notice::{Notice, notice_body};
+use crate::notice::notice_body;
 use crate::observation::ObservationSink;
 use crate::outcome::Outcome;
 use crate::pipeline::Pipeline;
@@ -125,9 +125,8 @@ impl IngestService {
         let noticed = now();
         let event = |file: &PathBuf| {
             let body = notice_body(&file.display().to_string(), profile, product, 1);
-            let mut event = Event::new(trace(file, noticed), body);
-            event.noticed = Some(noticed);
-            event
+            // When it was given is when it came into the log, whose times never go back as a clock may.
+            Event::new(trace(file, noticed), body)
         };
         let events: Vec<Event> = files.iter().map(event).collect();
         for some in events.chunks(NOTICES_AT_ONCE) {
@@ -182,11 +181,7 @@ impl IngestService {
         let messages = reader.next(COMMIT_FILES, END_WAIT).await.map_err(read)?;
         let mut asked = Vec::with_capacity(messages.len());
         for message in &messages {
-            let notices = Notice::of(message, &self.settings, now());
-            asked.extend(notices.into_iter().map(|notice| Asked {
-                notice,
-                origin: Some(message.origin),
-            }));
+            asked.extend(Asked::of(message, &self.settings, now()));
         }
         let answers = land::land_group(&self.pipeline(progress), &asked).await?;
         let follows = |message: &storage::log::Message| {

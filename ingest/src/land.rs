@@ -10,10 +10,12 @@ use futures::{StreamExt as _, TryStreamExt as _};
 use storage::Store;
 use storage::log::EventLog;
 
-use crate::answer::{self, Answer, Asked, Ready};
-use crate::error::IngestError;
+use crate::answer::{self, Answer, Asked, Ready, blame};
+use crate::boundary;
+use crate::error::{Cause, IngestError};
 use crate::fetch::{Expected, Location};
 use crate::gates::Gates;
+use crate::memory;
 use crate::metrics::Metrics;
 use crate::notice::{Notice, Order, notice_body};
 use crate::outcome::Outcome;
@@ -89,10 +91,12 @@ fn asked(path: &std::path::Path, batch: &Batch<'_>) -> Asked {
         shown,
         attempt: 1,
         cause: Event::new(trace(path), body),
+        given: None,
     };
     Asked {
         notice,
         origin: None,
+        file: 0,
     }
 }
 
@@ -101,8 +105,14 @@ pub(crate) async fn land_group(
     pipeline: &Pipeline<'_>,
     group: &[Asked],
 ) -> Result<Vec<Answer>, IngestError> {
+    let prepared = async |asked: &Asked| match prepare(pipeline, asked).await {
+        Err(error) if error.cause() == Cause::Granule => {
+            Ok(Ready::Answered(asked.refused(blame(&error))))
+        }
+        other => other,
+    };
     let ready: Vec<Ready> = futures::stream::iter(group)
-        .map(|asked| prepare(pipeline, asked))
+        .map(prepared)
         .buffered(pipeline.settings.parallel_files.clamp(1, 64))
         .try_collect()
         .await?;
@@ -122,7 +132,7 @@ pub(crate) async fn land_group(
             .iter()
             .map(|(index, granule)| (&group[*index], granule))
             .collect();
-        let committed = commit(pipeline, &batch).await?;
+        let committed = commit_or_refuse(pipeline, &batch).await?;
         for ((index, _), answer) in stored.iter().zip(committed) {
             answers[*index] = Some(answer);
         }
@@ -133,10 +143,35 @@ pub(crate) async fn land_group(
 /// Takes the file of a notice as far as to the manifest.
 pub(crate) async fn prepare(pipeline: &Pipeline<'_>, asked: &Asked) -> Result<Ready, IngestError> {
     let prepared = match &asked.notice.order {
-        Ok(order) => pipeline.prepare(&asked.file(), order).await?,
+        Ok(order) => {
+            pipeline
+                .prepare(&asked.path(), order, asked.order())
+                .await?
+        }
         Err(rejection) => Prepared::Rejected(rejection.clone()),
     };
     asked.settle(pipeline.store, prepared).await
+}
+
+/// Publishes files of one product; if one of them makes the program fail, that one is refused and the others go on.
+async fn commit_or_refuse(
+    pipeline: &Pipeline<'_>,
+    batch: &[(&Asked, &StoredGranule)],
+) -> Result<Vec<Answer>, IngestError> {
+    match commit(pipeline, batch).await {
+        Err(error) if error.cause() == Cause::Granule => tracing::error!(%error, "one by one"),
+        other => return other,
+    }
+    let mut answers = Vec::with_capacity(batch.len());
+    for pair in batch {
+        match commit(pipeline, std::slice::from_ref(pair)).await {
+            Err(error) if error.cause() == Cause::Granule => {
+                answers.push(pair.0.refused(blame(&error)));
+            }
+            alone => answers.extend(alone?),
+        }
+    }
+    Ok(answers)
 }
 
 /// Publishes files of one product.
@@ -144,11 +179,16 @@ pub(crate) async fn commit(
     pipeline: &Pipeline<'_>,
     batch: &[(&Asked, &StoredGranule)],
 ) -> Result<Vec<Answer>, IngestError> {
-    for (asked, _) in batch {
-        pipeline.progress.stage(&asked.file(), Stage::Commit, 0, 0);
-    }
     let running = pipeline.metrics.start("commit");
-    let committed = answer::commit(pipeline.store, batch).await;
+    let granules = batch.iter().map(|(_, granule)| *granule);
+    let _memory = pipeline.gates.memory(memory::of_series(granules)).await;
+    let work = async {
+        for (asked, _) in batch {
+            pipeline.progress.stage(&asked.path(), Stage::Commit, 0, 0);
+        }
+        answer::commit(pipeline.store, batch).await
+    };
+    let committed = boundary::contained(work).await.flatten();
     running.done(match &committed {
         Ok(_) => service::Outcome::Ok,
         Err(error) if error.is_retryable() => service::Outcome::Retryable,

@@ -8,6 +8,7 @@
 //! Left out on purpose: swaths and irregular grids (refused).
 
 mod answer;
+mod boundary;
 mod cf;
 mod check;
 mod commit;
@@ -23,6 +24,7 @@ mod ingestd;
 mod inspect;
 mod land;
 mod landing_note;
+mod memory;
 mod metrics;
 mod notice;
 pub mod observation;
@@ -36,7 +38,9 @@ mod reading;
 mod recipe;
 mod rejection;
 pub mod reread;
+mod room;
 mod settings;
+mod superseded;
 mod survey;
 mod unit;
 

@@ -1,6 +1,8 @@
 //! What operators see of ingest: its operations, how fresh landed files are, what was refused, how much waits.
 
 use contract::event::RejectReason;
+use contract::masked::MaskedCells;
+use contract::product::ProductId;
 use contract::time::TimeMs;
 use prometheus::{Gauge, Histogram, HistogramOpts, IntCounter, IntCounterVec, Opts, Registry};
 use service::{Outcome, Red, Running};
@@ -18,7 +20,9 @@ pub struct Metrics {
     red: Red,
     notice_to_landed: Histogram,
     rejected: IntCounterVec,
+    superseded: IntCounter,
     bytes: IntCounter,
+    masked: IntCounterVec,
     /// NaN until it is known: no lag is not the same as none looked up.
     lag: Gauge,
 }
@@ -52,9 +56,20 @@ impl Metrics {
                 ),
                 &["reason"],
             )?,
+            superseded: IntCounter::new(
+                "fluxglobe_ingestd_superseded_total",
+                "Files that were left as they are: files of later notices have their time.",
+            )?,
             bytes: IntCounter::new(
                 "fluxglobe_ingestd_fetched_bytes_total",
                 "Bytes of files that were fetched.",
+            )?,
+            masked: IntCounterVec::new(
+                Opts::new(
+                    "fluxglobe_ingestd_masked_cells_total",
+                    "Cells of landed files that the file gave a value for and that hold none, by why.",
+                ),
+                &["product", "reason"],
             )?,
             lag: Gauge::new(
                 "fluxglobe_ingestd_lag_messages",
@@ -64,7 +79,9 @@ impl Metrics {
         new.lag.set(f64::NAN);
         registry.register(Box::new(new.notice_to_landed.clone()))?;
         registry.register(Box::new(new.rejected.clone()))?;
+        registry.register(Box::new(new.superseded.clone()))?;
         registry.register(Box::new(new.bytes.clone()))?;
+        registry.register(Box::new(new.masked.clone()))?;
         registry.register(Box::new(new.lag.clone()))?;
         Ok(new)
     }
@@ -97,8 +114,20 @@ impl Metrics {
         }
     }
 
+    /// Counts what was masked of a file that landed; nothing, too, so that each product has its series from the first file on.
+    pub(crate) fn masked(&self, product: &ProductId, masked: MaskedCells) {
+        for (reason, count) in masked.by_reason() {
+            let labels = [product.as_str(), reason];
+            self.masked.with_label_values(&labels).inc_by(count);
+        }
+    }
+
     pub(crate) fn rejected(&self, reason: RejectReason) {
         self.rejected.with_label_values(&[class(reason)]).inc();
+    }
+
+    pub(crate) fn superseded(&self) {
+        self.superseded.inc();
     }
 
     pub(crate) fn lag(&self, messages: u64) {

@@ -8,6 +8,7 @@ use contract::time::TimeMs;
 use contract::{ContractError, digest::Digest};
 use storage::log::Message;
 
+use crate::boundary;
 use crate::error::IngestError;
 use crate::fetch::{Expected, Location};
 use crate::plan::Wish;
@@ -28,6 +29,9 @@ pub(crate) struct Notice {
     pub(crate) order_key: String,
     /// What every event about it follows from.
     pub(crate) cause: Event,
+    /// When it was given, by its sender's word but never later than its message came: the same however often it is
+    /// read, and when it is sent twice.
+    pub(crate) given: Option<TimeMs>,
 }
 
 /// How a file is to be landed.
@@ -51,10 +55,18 @@ impl Order {
 impl Notice {
     /// The notices of a message: at least one, so that every message is answered.
     pub(crate) fn of(message: &Message, settings: &Settings, now: TimeMs) -> Vec<Self> {
-        match read(message, settings, now) {
+        let came = message.time.unwrap_or(now);
+        let notices = boundary::called(|| read(message, settings, came));
+        // What the panic says may quote the message, like the text of an error below.
+        let fault = "makes this program fail: report it with the message";
+        let mut notices = match notices.unwrap_or_else(|_panic| Err(bad(fault))) {
             Ok(notices) => notices,
-            Err(rejection) => vec![Self::unreadable(message, rejection, now)],
+            Err(rejection) => vec![Self::unreadable(message, rejection, came)],
+        };
+        for notice in &mut notices {
+            notice.given = notice.cause.noticed.min(Some(came));
         }
+        notices
     }
 
     /// A message that says nothing is refused under its own place: its words are not to be trusted.
@@ -72,6 +84,7 @@ impl Notice {
             order: Err(rejection),
             attempt: 1,
             cause,
+            given: None,
         }
     }
 
@@ -115,6 +128,7 @@ impl Notice {
             attempt: *attempt,
             order_key,
             cause,
+            given: None,
         })
     }
 }

@@ -37,6 +37,8 @@ use crate::error::Stop;
 use crate::file::description::Description;
 use crate::rejection::Rejection;
 
+pub(crate) use coordinate::MAX_VALUES;
+pub(crate) use gather::{MAX_OBSERVATIONS, OBSERVATION_BYTES};
 pub use path::{Reading, read_path};
 pub(crate) use recognise::{TextFormat, recognise, recognise_text};
 pub use sink::{ObservationSink, SinkError, Stored};

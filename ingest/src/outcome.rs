@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use contract::event::{Body, RejectReason};
 use contract::manifest::ManifestId;
+use contract::masked::MaskedCells;
 use contract::time::Period;
 use contract::topic::Origin;
 
@@ -24,6 +25,10 @@ pub enum Outcome {
         periods: Vec<Period>,
         /// Did it replace values that were there?
         revised: bool,
+        /// What was taken for granted, because nothing in the file says it. One line each.
+        assumptions: Vec<String>,
+        /// Cells that it gave a value for and that hold none, steps without any value among them.
+        masked: MaskedCells,
     },
     /// The same content was in the product before.
     AlreadyLanded {
@@ -33,6 +38,15 @@ pub enum Outcome {
         manifest: ManifestId,
         /// Its periods.
         periods: Vec<Period>,
+        /// Cells that it gave a value for and that hold none.
+        masked: MaskedCells,
+    },
+    /// Files of later notices have its time: it changes nothing.
+    Superseded {
+        /// The file.
+        file: PathBuf,
+        /// Newest manifest, which holds the newer files.
+        manifest: ManifestId,
     },
     /// It holds observations, which are stored now.
     Observed {
@@ -77,8 +91,18 @@ impl Outcome {
     /// Manifest that holds the file.
     pub fn manifest(&self) -> Option<&ManifestId> {
         match self {
-            Self::Landed { manifest, .. } | Self::AlreadyLanded { manifest, .. } => Some(manifest),
+            Self::Landed { manifest, .. }
+            | Self::AlreadyLanded { manifest, .. }
+            | Self::Superseded { manifest, .. } => Some(manifest),
             Self::Observed { .. } | Self::Rejected { .. } => None,
+        }
+    }
+
+    /// Cells that the file gave a value for and that hold none, if it is in a product.
+    pub fn masked(&self) -> Option<MaskedCells> {
+        match self {
+            Self::Landed { masked, .. } | Self::AlreadyLanded { masked, .. } => Some(*masked),
+            Self::Superseded { .. } | Self::Observed { .. } | Self::Rejected { .. } => None,
         }
     }
 
@@ -87,6 +111,7 @@ impl Outcome {
         match self {
             Self::Landed { file, .. }
             | Self::AlreadyLanded { file, .. }
+            | Self::Superseded { file, .. }
             | Self::Observed { file, .. }
             | Self::Rejected { file, .. } => file,
         }
@@ -106,28 +131,24 @@ impl Outcome {
                     manifest,
                     periods,
                     revised,
+                    assumptions,
+                    masked,
                     ..
                 },
                 Some(raw_sha256),
-            ) => Body::GranuleLanded {
-                path,
-                raw_sha256,
-                manifest: manifest.clone(),
-                periods: periods.clone(),
-                revised: *revised,
-            },
+            ) => Body::granule_landed(path, raw_sha256, manifest.clone(), periods, *revised)
+                .assuming(assumptions)
+                .with_masked(*masked),
             (
                 Self::AlreadyLanded {
-                    manifest, periods, ..
+                    manifest,
+                    periods,
+                    masked,
+                    ..
                 },
                 Some(raw_sha256),
-            ) => Body::GranuleLanded {
-                path,
-                raw_sha256,
-                manifest: manifest.clone(),
-                periods: periods.clone(),
-                revised: false,
-            },
+            ) => Body::granule_landed(path, raw_sha256, manifest.clone(), periods, false)
+                .with_masked(*masked),
             (
                 Self::Rejected {
                     reason,
@@ -143,7 +164,8 @@ impl Outcome {
                 attempt,
                 origin,
             },
-            (Self::Observed { .. }, _) => return None,
+            // What has still to be told of a superseded file is not of the newest manifest: its answer has it.
+            (Self::Observed { .. } | Self::Superseded { .. }, _) => return None,
             (Self::Landed { .. } | Self::AlreadyLanded { .. }, None) => {
                 unreachable!("a landed file has a digest")
             }
@@ -167,18 +189,28 @@ impl Display for Outcome {
                 manifest,
                 periods,
                 revised,
+                assumptions,
+                masked,
             } => {
                 let how = if *revised { "revised" } else { "landed" };
+                let gap = if masked.is_none() { "" } else { "; " };
                 write!(
                     f,
-                    "{}: {how} in {manifest} for {}",
+                    "{}: {how} in {manifest} for {}{gap}{masked}",
                     file.display(),
                     span(periods)
-                )
+                )?;
+                let assumed = |text: &String| write!(f, "; assumed: {text}");
+                assumptions.iter().try_for_each(assumed)
             }
             Self::AlreadyLanded { file, manifest, .. } => {
                 write!(f, "{}: was in {manifest} already", file.display())
             }
+            Self::Superseded { file, manifest } => write!(
+                f,
+                "{}: left as it is: {manifest} has files of later notices for its time; to land it all the same, send a new notice",
+                file.display()
+            ),
             Self::Observed { file, stored } => write!(
                 f,
                 "{}: {} observations are new, {} replaced, {} were there",

@@ -2,8 +2,12 @@
 //!
 //! Nothing of the variable is read yet; only coordinates, which are small. A profile overrides what the file says.
 
+mod bounds;
+mod coverage;
 mod date;
 mod place;
+mod quality;
+mod stamps;
 mod steps;
 mod target;
 
@@ -24,6 +28,7 @@ use crate::profile::Profile;
 use crate::recipe::Recipe;
 use crate::rejection::Rejection;
 use crate::settings::{Limits, Settings};
+pub(crate) use quality::Quality;
 
 /// A file of which is known what will be read and what it will become.
 pub(crate) struct PlannedGranule {
@@ -35,7 +40,20 @@ pub(crate) struct PlannedGranule {
     pub(crate) mapping: Mapping,
     pub(crate) packing: Packing,
     pub(crate) steps: Vec<PlannedStep>,
+    /// Which cells are good enough; all, if absent.
+    pub(crate) quality: Option<Quality>,
     pub(crate) recipe: Recipe,
+    /// What was taken for granted, because nothing in the file says it. One line each.
+    pub(crate) assumptions: Vec<String>,
+}
+
+impl PlannedGranule {
+    /// Cells of one map as it lies in the file.
+    pub(crate) fn plane_cells(&self) -> u64 {
+        let is_plane = |axis: &&Axis| matches!(axis.role, Role::Latitude | Role::Longitude);
+        let plane = self.axes.iter().filter(is_plane);
+        plane.map(|axis| axis.len).fold(1, u64::saturating_mul)
+    }
 }
 
 /// What a file becomes.
@@ -73,6 +91,7 @@ struct Planning<'a> {
     file_name: &'a str,
     profile: Option<&'a Profile>,
     limits: Limits,
+    assumptions: Vec<String>,
 }
 
 pub(crate) async fn run(
@@ -102,12 +121,22 @@ pub(crate) async fn run(
         file_name: &raw.file_name,
         profile,
         limits,
+        assumptions: vec![],
     };
     let (axes, mapping) = place::mapping(&mut planning, variable).await?;
-    let periods = steps::periods(&mut planning, &axes).await?;
+    let periods = steps::periods(&mut planning, variable, &axes).await?;
     let steps = steps::convert(variable, profile, meaning, &periods)?;
     let packing = target::packing(variable, profile)?;
-    let Planning { session, .. } = planning;
+    packing
+        .assumption
+        .iter()
+        .for_each(|text| planning.assume(text));
+    let quality = quality::plan(&mut planning, variable, &axes)?;
+    let Planning {
+        session,
+        assumptions,
+        ..
+    } = planning;
     Ok(PlannedGranule {
         session,
         target,
@@ -116,12 +145,22 @@ pub(crate) async fn run(
         mapping,
         packing,
         steps,
+        quality,
         recipe: Recipe::of(profile),
+        assumptions,
         raw,
     })
 }
 
 impl Planning<'_> {
+    /// Notes what is taken for granted; text of the file becomes one short line.
+    fn assume(&mut self, text: impl AsRef<str>) {
+        let line = Rejection::new(RejectReason::Values, "", text).detail;
+        if !self.assumptions.contains(&line) {
+            self.assumptions.push(line);
+        }
+    }
+
     /// All values of a coordinate variable, unpacked; NaN for fill values.
     async fn coordinate(&mut self, name: &str) -> Result<Vec<f64>, Stop> {
         /// Longest coordinate axis.

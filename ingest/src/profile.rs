@@ -15,7 +15,8 @@ use contract::quantity::Quantity;
 use serde::Deserialize;
 
 use crate::cf::axis::Registration;
-use crate::cf::period::Covers;
+use crate::cf::period::{Covers, StampAt};
+use crate::cf::quantity::has_direction;
 use crate::error::IngestError;
 use crate::file::description::{AttributeValue, Description};
 
@@ -46,6 +47,7 @@ pub struct Profile {
     pub(crate) grid: GridRules,
     #[serde(default)]
     pub(crate) time: Option<TimeRules>,
+    pub(crate) quality: Option<QualityRules>,
     /// Hash of all of it but the name and which files it is chosen for.
     #[serde(skip)]
     rules: Option<Digest>,
@@ -77,14 +79,33 @@ struct Match {
 pub(crate) struct VariableRules {
     pub(crate) name: String,
     pub(crate) unit: Option<String>,
-    /// Is a positive value into the sea in this file?
-    #[serde(default)]
-    pub(crate) positive_into_sea: bool,
+    /// Is a positive value into the sea in this file? The standard name says, if absent.
+    pub(crate) positive_into_sea: Option<bool>,
     pub(crate) fill_values: Option<Vec<f64>>,
     /// Values outside are no data; in the file's unit, unpacked.
     pub(crate) valid_range: Option<[f64; 2]>,
     pub(crate) scale_factor: Option<f64>,
     pub(crate) add_offset: Option<f64>,
+}
+
+/// Which cells are good enough, by another variable of the file; all that is stated must hold.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct QualityRules {
+    /// The variable that says how good every cell is.
+    pub(crate) variable: String,
+    /// Lowest and highest level that is good enough; unpacked.
+    pub(crate) at_least: Option<f64>,
+    pub(crate) at_most: Option<f64>,
+    /// Names of `flag_meanings`: at least one of these must be set,
+    #[serde(default)]
+    pub(crate) keep_flags: Vec<String>,
+    /// and none of these.
+    #[serde(default)]
+    pub(crate) reject_flags: Vec<String>,
+    /// Stored numbers that are not good enough, where names are missing or wrong.
+    #[serde(default)]
+    pub(crate) reject_values: Vec<f64>,
 }
 
 /// Where the cells are.
@@ -118,6 +139,8 @@ pub(crate) struct StatedGrid {
 pub(crate) struct TimeRules {
     pub(crate) from: TimeSource,
     pub(crate) covers: Covers,
+    /// Where in its step a stamp stands; if absent, at the start of days and hours, anywhere in a month or year.
+    pub(crate) stamp: Option<StampAt>,
     /// The year that replaces the one of the file: the reference year of a climatology.
     pub(crate) year: Option<i32>,
 }
@@ -166,6 +189,22 @@ impl Profile {
         }) = &profile.time
         {
             pattern::check(pattern, year.is_some()).map_err(bad)?;
+        }
+        if profile.variable.positive_into_sea == Some(true) && !has_direction(profile.quantity) {
+            let quantity = profile.quantity.title().to_lowercase();
+            return Err(bad(format!(
+                "states positive_into_sea, which {quantity} cannot be; leave it out"
+            )));
+        }
+        let empty = |rules: &QualityRules| {
+            rules.at_least.or(rules.at_most).is_none()
+                && rules.keep_flags.is_empty()
+                && rules.reject_flags.is_empty()
+                && rules.reject_values.is_empty()
+        };
+        if profile.quality.as_ref().is_some_and(empty) {
+            let detail = "states no rule in [quality]; give at_least, at_most, keep_flags, reject_flags or reject_values";
+            return Err(bad(detail.to_owned()));
         }
         if let Some(stated) = &profile.grid.stated {
             stated.grid.validate()?;
@@ -238,10 +277,10 @@ impl Profile {
                     .attributes
                     .text(name)
                     .is_some_and(|text| pattern::matches(wanted, text)),
-                (Some(AttributeValue::Numbers(_)), toml::Value::Integer(wanted)) => {
+                (Some(AttributeValue::Numbers { .. }), toml::Value::Integer(wanted)) => {
                     file.attributes.number(name) == Some(*wanted as f64)
                 }
-                (Some(AttributeValue::Numbers(_)), toml::Value::Float(wanted)) => {
+                (Some(AttributeValue::Numbers { .. }), toml::Value::Float(wanted)) => {
                     file.attributes.number(name) == Some(*wanted)
                 }
                 _ => false,

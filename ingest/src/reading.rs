@@ -3,7 +3,6 @@
 //! It tells whether a step is what the file would be read as now, and what of a re-reading that was killed is done. It
 //! lies in `readings/{product}/{raw}-{input}` and goes with its raw file.
 
-use bytes::Bytes;
 use contract::digest::Digest;
 use contract::grid::Grid;
 use contract::key::ObjectKey;
@@ -11,14 +10,14 @@ use contract::manifest::Step;
 use contract::product::ProductId;
 use contract::quantity::Quantity;
 use serde::{Deserialize, Serialize};
-use storage::{StorageError, Store};
+use storage::{StorageError, Store, document};
 
 use crate::error::IngestError;
 use crate::plan::Target;
 use crate::recipe::Recipe;
 
-/// Version of the note's JSON.
-const SCHEMA: u32 = 1;
+/// Version of the note's JSON as it is written. Those of version 1 are not sealed and are read as well.
+const SCHEMA: u32 = 2;
 /// Folder of the notes.
 const FOLDER: &str = "readings";
 
@@ -35,6 +34,9 @@ pub(crate) struct Reading {
     pub(crate) grid: Grid,
     /// In the order of time, at least one.
     pub(crate) steps: Vec<Step>,
+    /// What was taken for granted, because nothing in the file says it. One line each.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) assumptions: Vec<String>,
 }
 
 impl Reading {
@@ -49,10 +51,11 @@ impl Reading {
             synthetic: target.synthetic,
             grid,
             steps,
+            assumptions: vec![],
         }
     }
 
-    /// Notes it. An equal note may be there.
+    /// Notes it. An equal note may be there; one that is damaged, or of an older schema, is replaced.
     ///
     /// # Errors
     /// `Conflict` if the same file was read in the same way as something else.
@@ -61,8 +64,20 @@ impl Reading {
             return Ok(());
         };
         let key = key(product, &self.recipe, first.raw_sha256, &first.origin)?;
-        let json = serde_json::to_vec(self).map_err(|e| damaged(key.as_str(), &e.to_string()))?;
-        store.put_new(&key, Bytes::from(json)).await.map(|_new| ())
+        match document::put_new(store, &key, self).await {
+            Err(conflict @ StorageError::Conflict { .. }) => {
+                match document::get::<Self>(store, &key).await {
+                    Ok(Some(there)) if there.schema == SCHEMA => return Err(conflict),
+                    Ok(_older) => {}
+                    Err(error @ StorageError::Damaged { .. }) => {
+                        tracing::warn!(%error, "a note of a reading is written again");
+                    }
+                    Err(e) => return Err(e),
+                }
+                document::put_over(store, &key, self).await
+            }
+            noted => noted.map(|_new| ()),
+        }
     }
 }
 
@@ -93,17 +108,16 @@ pub(crate) fn raw_of(key: &ObjectKey) -> Option<Digest> {
     name.split_once('-')?.0.parse().ok()
 }
 
-/// One note; none if it is gone or was written by a program that notes other things.
+/// One note; none if it is gone, damaged, or was written by a program that notes other things: the file is read again.
 pub(crate) async fn get(store: &Store, key: &ObjectKey) -> Result<Option<Reading>, IngestError> {
-    let content = match store.get(key).await {
-        Ok(content) => content,
-        Err(e) if e.is_not_found() => return Ok(None),
-        Err(e) => return Err(IngestError::storage("read a reading")(e)),
-    };
-    let reading = serde_json::from_slice::<Reading>(&content);
-    Ok(reading
-        .ok()
-        .filter(|r| r.schema == SCHEMA && !r.steps.is_empty()))
+    match document::get::<Reading>(store, key).await {
+        Ok(reading) => Ok(reading.filter(|r| r.schema <= SCHEMA && !r.steps.is_empty())),
+        Err(error @ StorageError::Damaged { .. }) => {
+            tracing::warn!(%error, "a note of a reading is left alone");
+            Ok(None)
+        }
+        Err(e) => Err(IngestError::storage("read a reading")(e)),
+    }
 }
 
 fn damaged(object: &str, reason: &str) -> StorageError {

@@ -7,7 +7,9 @@ use crate::profile::Profile;
 
 /// Version of the way from a file's bytes to a frame's. It is raised with every change that gives other values or other
 /// frames for some file; what was read by an older one is then stale. A test compares the bytes of a known file.
-pub(crate) const DECODER: u32 = 1;
+///
+/// 2: masked cells are counted, valid ranges are read as CF says.
+pub(crate) const DECODER: u32 = 2;
 
 /// How a file was read.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]

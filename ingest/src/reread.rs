@@ -5,6 +5,7 @@
 //! manifest is published, whole. Old versions stay until they are cleaned up. Left out on purpose: files of
 //! observations, which replace themselves when they are sent again.
 
+mod mend;
 mod plan;
 mod run;
 mod told;
@@ -20,6 +21,7 @@ use serde::Serialize;
 use crate::profile::Profile;
 use crate::settings::Settings;
 
+pub use mend::mend;
 pub use plan::plan;
 pub use run::run;
 pub use told::events;
@@ -37,6 +39,8 @@ pub struct Request {
     pub profile: Option<Profile>,
     /// Whether also what is right by its name is read again and compared.
     pub is_forced: bool,
+    /// Whether what is there is read first, and taken for missing if it is damaged.
+    pub is_verified: bool,
 }
 
 /// What a run works with.

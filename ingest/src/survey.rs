@@ -85,7 +85,7 @@ pub async fn survey(files: &[PathBuf], settings: &Settings) -> Result<Vec<Row>, 
         let set = set_name(folder, &folders);
         for (asked, profile, outcome) in survey_set(files, settings).await? {
             let file = asked
-                .file()
+                .path()
                 .file_name()
                 .unwrap_or_default()
                 .to_string_lossy()
@@ -200,9 +200,9 @@ fn cells(row: &Row) -> (String, String) {
         .as_ref()
         .map_or_else(|| "CF".to_owned(), |name| format!("`{name}`"));
     match &row.outcome {
-        Outcome::Landed { manifest, .. } | Outcome::AlreadyLanded { manifest, .. } => {
-            (by, format!("lands in `{}`", manifest.product))
-        }
+        Outcome::Landed { manifest, .. }
+        | Outcome::AlreadyLanded { manifest, .. }
+        | Outcome::Superseded { manifest, .. } => (by, format!("lands in `{}`", manifest.product)),
         Outcome::Observed { .. } => (
             "observations".to_owned(),
             "stored as observations".to_owned(),

@@ -16,6 +16,8 @@ pub(crate) use parse::parse;
 const CO2_KG_PER_MOL: f64 = 0.044_009;
 /// Density by which a depth of rain becomes a mass, kg m⁻³: fresh water, as the convention has it.
 const WATER_KG_PER_M3: f64 = 1000.0;
+/// What is wrong with a unit whose powers cannot be counted.
+const TOO_HIGH: &str = "has powers too high; give a unit in a profile";
 
 /// Powers of the base units.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -80,9 +82,10 @@ impl Unit {
         };
         let months = self.dimension.month;
         // A month is a time; its length comes with the step.
+        let time = self.dimension.time.checked_add(months);
         let own = Dimension {
             month: 0,
-            time: self.dimension.time + months,
+            time: time.ok_or(TOO_HIGH)?,
             ..self.dimension
         };
         let extra = match quantity {
@@ -103,10 +106,21 @@ impl Unit {
             _ => return Err(wrong_kind(quantity)),
         };
         Ok(Conversion {
-            factor: self.factor * extra / target.factor,
+            factor: usable(self.factor * extra / target.factor)?,
             offset: self.offset,
             months,
         })
+    }
+}
+
+/// A factor that keeps a value what it is: neither 0 nor so large or small that digits of it are lost.
+fn usable(factor: f64) -> Result<f64, String> {
+    if factor.is_normal() && factor > 0.0 {
+        Ok(factor)
+    } else {
+        Err(format!(
+            "has the factor {factor:e}, which is no positive number of a usual size; give a unit in a profile"
+        ))
     }
 }
 
@@ -148,7 +162,8 @@ impl Conversion {
         } else {
             month_seconds(period)?
         };
-        Ok((self.factor * month_s.powi(self.months.into()), self.offset))
+        let factor = usable(self.factor * month_s.powi(self.months.into()))?;
+        Ok((factor, self.offset))
     }
 }
 
@@ -157,9 +172,11 @@ fn month_seconds(period: Period) -> Result<f64, String> {
     let advice = "a unit per month needs steps of whole months or within one month";
     let instant =
         |t: contract::time::TimeMs| chrono::DateTime::from_timestamp_millis(t.ms()).ok_or(advice);
+    let before =
+        |t: chrono::DateTime<chrono::Utc>| t.checked_sub_signed(chrono::Duration::milliseconds(1));
     let (start, last) = (
         instant(period.start)?,
-        instant(period.end)? - chrono::Duration::milliseconds(1),
+        before(instant(period.end)?).ok_or(advice)?,
     );
     let (first_month, last_month) = ((start.year(), start.month()), (last.year(), last.month()));
     if first_month == last_month {

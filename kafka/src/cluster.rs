@@ -166,7 +166,9 @@ impl Cluster {
 fn set_login(config: &mut ClientConfig, settings: &KafkaSettings) -> Result<(), KafkaFailure> {
     let (user, file) = (&settings.kafka_user, &settings.kafka_password_file);
     if !settings.kafka_security.has_sasl() {
-        return if user.is_some() || file.is_some() {
+        // A file that is named for all services, whether there is one or not, is not asked to be there.
+        let has_password = file.as_ref().is_some_and(|file| file.exists());
+        return if user.is_some() || has_password {
             Err(KafkaFailure::Settings(
                 "--kafka-user and --kafka-password-file need --kafka-security sasl_ssl or sasl_plaintext",
             ))
@@ -256,6 +258,10 @@ mod tests {
         settings.kafka_password_file = Some(folder.path().join("none"));
         assert!(refusal(&settings).contains("cannot be used"));
         settings.kafka_security = Security::Plaintext;
+        assert!(refusal(&settings).contains("need --kafka-security"));
+        settings.kafka_user = None;
+        assert!(Cluster::open(&settings).is_ok(), "no user, no password");
+        std::fs::write(folder.path().join("none"), "hush").unwrap();
         assert!(refusal(&settings).contains("need --kafka-security"));
     }
 

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use contract::topic::Topic;
+use contract::topic::{Origin, Topic};
 use rdkafka::ClientContext;
 use rdkafka::config::RDKafkaLogLevel;
 use rdkafka::consumer::{BaseConsumer, ConsumerContext, Rebalance};
@@ -36,6 +36,8 @@ struct State {
     waiting: VecDeque<Message>,
     waiting_bytes: usize,
     owned: BTreeMap<u32, Owned>,
+    /// Handed out and not finished when their partition was taken away.
+    lost: Vec<Origin>,
     /// Counts partitions given.
     given: u64,
     failure: Option<KafkaError>,
@@ -95,13 +97,21 @@ impl Inbox {
     /// Forgets a partition: its messages are somebody else's now.
     fn take_away(&self, partition: u32) {
         let mut state = self.state();
-        state.owned.remove(&partition);
+        if let Some(owned) = state.owned.remove(&partition) {
+            let lost = owned.water.unfinished(self.topic, partition);
+            state.lost.extend(lost);
+        }
         state
             .waiting
             .retain(|message| message.origin.partition != partition);
         state.waiting_bytes = state.waiting.iter().map(|m| m.content.len()).sum();
         drop(state);
         self.room.notify_one();
+    }
+
+    /// Takes out the places of messages that were lost with their partitions.
+    pub(crate) fn lost(&self) -> Vec<Origin> {
+        std::mem::take(&mut self.state().lost)
     }
 
     /// Puts a message in; says whether fetching must pause.
@@ -253,6 +263,7 @@ mod tests {
                 offset,
             },
             content: Bytes::from(vec![b'x'; bytes]),
+            time: None,
         }
     }
 
@@ -290,7 +301,11 @@ mod tests {
             inbox.put(message(partition, 1, 10));
         }
         let out = inbox.hand_out(3).unwrap();
+        assert_eq!(inbox.lost(), []);
         inbox.take_away(0);
+        let lost = [out[0].origin, out[1].origin];
+        assert_eq!(inbox.lost(), lost, "handed out and not finished");
+        assert_eq!(inbox.lost(), [], "told once");
         let steps = inbox.finish(out.iter().map(finished).collect());
         assert_eq!(steps.len(), 1);
         assert_eq!(steps[0].partition, 1);

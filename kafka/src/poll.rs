@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use contract::event::MAX_EVENT_BYTES;
+use contract::time::TimeMs;
 use contract::topic::{Origin, Topic};
 use futures::StreamExt as _;
 use rdkafka::Message as _;
@@ -115,5 +116,9 @@ pub(crate) fn of_topic(topic: Topic, message: &BorrowedMessage<'_>) -> Message {
             offset: u64::try_from(message.offset()).expect("fetched messages are numbered from 0"),
         },
         content: Bytes::copy_from_slice(kept),
+        time: message
+            .timestamp()
+            .to_millis()
+            .and_then(|ms| TimeMs::new(ms).ok()),
     }
 }

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use async_trait::async_trait;
 use contract::event::Event;
-use contract::topic::Topic;
+use contract::topic::{Origin, Topic};
 use rdkafka::consumer::{Consumer as _, StreamConsumer};
 use rdkafka::{Offset, TopicPartitionList};
 use storage::StorageError;
@@ -27,8 +27,9 @@ use crate::transaction::{Offsets, Record, Transactions};
 /// How long a member that the group left behind waits to be part of it again, so that it can move its offsets.
 const AGAIN_LIMIT: Duration = Duration::from_secs(20);
 const AGAIN_PAUSE: Duration = Duration::from_millis(100);
-/// How long leaving may take.
-const LEAVE_LIMIT: Duration = Duration::from_secs(5);
+/// How long leaving may take: a busy broker shares out the partitions of all who are left before it answers. The group
+/// does without a member by itself after its session; waiting longer than that gains nothing.
+const LEAVE_LIMIT: Duration = Duration::from_secs(30);
 
 /// Reads one topic with others of its group.
 pub(crate) struct KafkaReader {
@@ -217,6 +218,10 @@ impl Reader for KafkaReader {
             }
             Err(failure) => Err(self.failed(failure)),
         }
+    }
+
+    fn lost(&mut self) -> Vec<Origin> {
+        self.inbox.lost()
     }
 
     async fn leave(self: Box<Self>) -> Result<(), StorageError> {

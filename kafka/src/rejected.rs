@@ -97,6 +97,8 @@ async fn send_again(log: &dyn EventLog, message: &Message, path: &str) -> Result
     match message.event() {
         Ok(mut event) if event.body.topic() == message.origin.topic => {
             next_attempt(&mut event);
+            // It keeps its place in the order of notices: what was refused then is no newer for being sent again.
+            event.noticed = event.noticed.or(message.time);
             log.append(&[event]).await
         }
         // Not ours, or not understood: the bytes as they were.

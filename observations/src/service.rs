@@ -55,14 +55,22 @@ impl ObservationService {
     }
 
     /// Stores observations until `stop` is ready; what was begun is finished then, unless the store is away.
-    pub async fn run(&self, stop: impl Future<Output = ()>) {
+    ///
+    /// # Errors
+    /// The log is not set up as it must be. Everything that may pass is waited for.
+    pub async fn run(&self, stop: impl Future<Output = ()>) -> Result<(), StorageError> {
         let stop = stop.shared();
         let mut pauses = pauses();
-        while let Err(error) = self.read(stop.clone()).await {
+        loop {
+            let error = match self.read(stop.clone()).await {
+                Ok(()) => return Ok(()),
+                Err(error) if error.is_retryable() => error,
+                Err(error) => return Err(error),
+            };
             let pause = pauses.next().unwrap_or(WAIT);
             tracing::warn!(%error, "the log of observations broke off; joining again");
             tokio::select! {
-                () = stop.clone() => return,
+                () = stop.clone() => return Ok(()),
                 () = tokio::time::sleep(pause) => {}
             }
         }

@@ -171,6 +171,7 @@ fn moment(product: &str) -> Result<Moment> {
         domain: format!("domain/{product}/0").parse()?,
         before: Some(format!("frames/{product}/0").parse()?),
         after: None,
+        contributed: None,
     })
 }
 

@@ -39,12 +39,17 @@ impl BatchService {
     }
 
     /// Draws until asked to stop. A log that goes away is waited for; what was not finished comes again.
-    pub async fn run(self, stop: Stop) {
+    ///
+    /// # Errors
+    /// The log is not set up as it must be.
+    pub async fn run(self, stop: Stop) -> Result<(), StorageError> {
         let mut pauses = ::service::pauses();
         while !stop.is_said() {
             let begun = Instant::now();
-            let Err(error) = self.read(&stop).await else {
-                return;
+            let error = match self.read(&stop).await {
+                Ok(()) => return Ok(()),
+                Err(error) if error.is_retryable() => error,
+                Err(error) => return Err(error),
             };
             tracing::warn!(%error, "render jobs cannot be read; trying again");
             if begun.elapsed() > Duration::from_mins(1) {
@@ -56,6 +61,7 @@ impl BatchService {
                 () = tokio::time::sleep(pause) => {}
             }
         }
+        Ok(())
     }
 
     /// Can jobs be read now?
@@ -64,7 +70,7 @@ impl BatchService {
     }
 
     async fn read(&self, stop: &Stop) -> Result<(), StorageError> {
-        let at_once = self.desk.limits().draws_at_once.get();
+        let at_once = self.desk.draws_at_once();
         let mut reader = self.log.join(Topic::RenderJob, GROUP).await?;
         let mut work = FuturesUnordered::new();
         while !stop.is_said() {

@@ -11,6 +11,12 @@ pub enum RenderError {
         "no Vulkan adapter found; install the package mesa-vulkan-drivers for a software one, or draw with the CPU backend"
     )]
     NoAdapter(#[source] Box<wgpu::RequestAdapterError>),
+    /// There is a software adapter alone, where a graphics card is required.
+    #[error(
+        "a graphics card is required and there is none: the only Vulkan adapter is {adapter}, a program on the processor; \
+         give this machine or container a card and its driver, or start without --require-gpu"
+    )]
+    SoftwareAdapter { adapter: String },
     /// The adapter refused a device.
     #[error("adapter {adapter:?} gave no device")]
     NoDevice {
@@ -103,6 +109,7 @@ impl RenderError {
             | Self::NotWanted => true,
             Self::Store { source, .. } | Self::Picture { source, .. } => source.is_retryable(),
             Self::NoAdapter(_)
+            | Self::SoftwareAdapter { .. }
             | Self::NoDevice { .. }
             | Self::Job(_)
             | Self::TooManyParticles { .. }
@@ -164,9 +171,11 @@ impl RenderError {
             Self::Store { source, .. } => {
                 source.is_not_found() || matches!(**source, storage::StorageError::Damaged { .. })
             }
-            Self::NoAdapter(_) | Self::NoDevice { .. } | Self::Picture { .. } | Self::NotWanted => {
-                false
-            }
+            Self::NoAdapter(_)
+            | Self::SoftwareAdapter { .. }
+            | Self::NoDevice { .. }
+            | Self::Picture { .. }
+            | Self::NotWanted => false,
         }
     }
 

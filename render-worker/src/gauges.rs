@@ -5,12 +5,14 @@ use prometheus::proto::MetricFamily;
 use prometheus::{IntCounter, IntCounterVec, IntGauge, IntGaugeVec, Opts};
 
 use crate::desk::{Desk, METRICS};
+use crate::service::RenderService;
 
 /// Gauges of one desk.
 pub(crate) struct Gauges {
     desk: Desk,
     queue_length: IntGaugeVec,
     drawing: IntGauge,
+    encoding: IntGauge,
     resident_bytes: IntGaugeVec,
     frame_reads: IntCounterVec,
     shared_lights: IntCounterVec,
@@ -31,6 +33,10 @@ impl Gauges {
                 &["class"],
             )?,
             drawing: IntGauge::with_opts(named("drawing", "Jobs that hold a permit to draw."))?,
+            encoding: IntGauge::with_opts(named(
+                "encoding",
+                "Pictures that are written as PNG, each on a core.",
+            ))?,
             resident_bytes: IntGaugeVec::new(
                 named(
                     "resident_bytes",
@@ -72,6 +78,7 @@ impl Collector for Gauges {
         [
             self.queue_length.desc(),
             self.drawing.desc(),
+            self.encoding.desc(),
             self.resident_bytes.desc(),
             self.frame_reads.desc(),
             self.shared_lights.desc(),
@@ -92,6 +99,7 @@ impl Collector for Gauges {
         waiting("on_demand", condition.waiting_on_demand);
         waiting("batch", condition.waiting_batch);
         self.drawing.set(condition.in_flight as i64);
+        self.encoding.set(condition.encoding as i64);
         let bytes = |place: &str, bytes: u64| {
             let gauge = self.resident_bytes.with_label_values(&[place]);
             gauge.set(bytes as i64);
@@ -120,6 +128,7 @@ impl Collector for Gauges {
         [
             self.queue_length.collect(),
             self.drawing.collect(),
+            self.encoding.collect(),
             self.resident_bytes.collect(),
             self.frame_reads.collect(),
             self.shared_lights.collect(),
@@ -127,6 +136,38 @@ impl Collector for Gauges {
             self.device_restarts.collect(),
         ]
         .concat()
+    }
+}
+
+/// `fluxglobe_render_adapter_info`: what a service draws on.
+pub(crate) struct AdapterInfo {
+    service: RenderService,
+    info: IntGaugeVec,
+}
+
+impl AdapterInfo {
+    pub(crate) fn of(service: &RenderService) -> Result<Self, prometheus::Error> {
+        let help = "1, with what pictures are drawn on: its name, how it is reached, what kind of adapter it is.";
+        let name = "fluxglobe_render_adapter_info";
+        Ok(Self {
+            service: service.clone(),
+            info: IntGaugeVec::new(Opts::new(name, help), &["name", "backend", "type"])?,
+        })
+    }
+}
+
+impl Collector for AdapterInfo {
+    fn desc(&self) -> Vec<&Desc> {
+        self.info.desc()
+    }
+
+    fn collect(&self) -> Vec<MetricFamily> {
+        let adapter = self.service.renderer().adapter();
+        // After a fault it may be another one.
+        self.info.reset();
+        let labels = [adapter.name(), adapter.backend(), adapter.kind()];
+        self.info.with_label_values(&labels).set(1);
+        self.info.collect()
     }
 }
 

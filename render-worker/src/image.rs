@@ -18,10 +18,15 @@ pub struct Image {
 }
 
 impl Image {
-    /// The picture as PNG; the same picture is always the same bytes.
+    /// The picture as PNG; the same picture is always the same bytes. They are part of what a picture's name stands for:
+    /// other settings here, or another encoder, are another version of the renderer.
+    ///
+    /// Measured on 1920 x 1080 views of a volume, one core, milliseconds and KiB: Paeth 16 to 31 and 560 to 880, adaptive
+    /// 18 to 45 and the same, average 11 to 25 and up to 10 % more, up 6 to 26 and up to 26 % more; with deflate at its
+    /// usual level 123 to 435 and 60 to 90 %.
     pub fn encode_png(&self) -> Result<Bytes, RenderError> {
         let mut png = Vec::with_capacity(self.rgba8.len() / 4 + 1024);
-        PngEncoder::new_with_quality(&mut png, CompressionType::Fast, FilterType::Adaptive)
+        PngEncoder::new_with_quality(&mut png, CompressionType::Fast, FilterType::Paeth)
             .write_image(
                 &self.rgba8,
                 self.width,

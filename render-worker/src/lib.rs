@@ -12,8 +12,10 @@
 #[macro_use]
 mod shared_struct;
 
+mod adapter;
 pub mod coast;
 mod device;
+mod encoding;
 pub mod error;
 pub mod frame;
 pub mod frame_cpu;
@@ -48,6 +50,7 @@ pub mod server;
 pub mod wire;
 
 pub use crate::service::{Limits, RenderService};
+pub use adapter::Adapter;
 pub use error::RenderError;
 pub use image::Image;
 pub use lights::LightCounts;

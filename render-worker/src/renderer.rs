@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use contract::grid::Grid;
 use contract::job::RenderJob;
 
+use crate::adapter::Adapter;
 use crate::device::Device;
 use crate::error::RenderError;
 use crate::frame_cpu;
@@ -20,15 +21,18 @@ use crate::stages::layout::{LIGHT_GIVEN, LIGHT_OWN};
 /// What draws.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Backend {
-    /// Compute shaders on the most able Vulkan adapter.
+    /// Compute shaders on the most able Vulkan adapter, in software where there is no graphics card.
     Gpu,
+    /// The same, but never in software.
+    HardwareGpu,
     /// The stages' CPU twins.
     Cpu,
 }
 
 /// Draws pictures.
 pub struct Renderer {
-    name: String,
+    /// The one at the start.
+    adapter: Adapter,
     /// None for the CPU twins.
     device: Option<DeviceSlot>,
 }
@@ -53,10 +57,11 @@ impl Renderer {
     pub fn keeping(backend: Backend, most_frame_bytes: Option<u64>) -> Result<Self, RenderError> {
         match backend {
             Backend::Cpu => Ok(Self {
-                name: "CPU twins".to_owned(),
+                adapter: Adapter::twins(),
                 device: None,
             }),
             Backend::Gpu => Self::on(Gpu::open, most_frame_bytes),
+            Backend::HardwareGpu => Self::on(Gpu::open_hardware, most_frame_bytes),
         }
     }
 
@@ -71,7 +76,7 @@ impl Renderer {
     ) -> Result<Self, RenderError> {
         let device = Device::new(open()?, 0, most_frame_bytes)?;
         Ok(Self {
-            name: device.gpu().adapter_name().to_owned(),
+            adapter: device.gpu().adapter().clone(),
             device: Some(DeviceSlot {
                 open,
                 most_frame_bytes,
@@ -83,7 +88,15 @@ impl Renderer {
 
     /// Name of the adapter, or of the CPU twins.
     pub fn name(&self) -> &str {
-        &self.name
+        self.adapter.name()
+    }
+
+    /// What draws now: after a fault it may be another adapter than at the start.
+    pub fn adapter(&self) -> Adapter {
+        self.device().map_or_else(
+            || self.adapter.clone(),
+            |device| device.gpu().adapter().clone(),
+        )
     }
 
     /// The device to draw on now.
@@ -109,7 +122,7 @@ impl Renderer {
         };
         let _one_at_a_time = slot.opening.lock().unwrap_or_else(PoisonError::into_inner);
         if slot.lock().number == failed_number {
-            let adapter = self.name.as_str();
+            let adapter = self.name();
             tracing::warn!(adapter, "the graphics device failed, opening it again");
             let fresh = Device::new((slot.open)()?, failed_number + 1, slot.most_frame_bytes)?;
             *slot.lock() = Arc::new(fresh);
@@ -179,19 +192,25 @@ impl Renderer {
             _ => None,
         };
         let [width, height] = plan.size_px();
+        let draw = |part: Part| match &device {
+            _ if !is_wanted() => Err(RenderError::NotWanted),
+            None => frame_cpu::draw(&plan, part, scene),
+            Some(device) => device.draw(&plan, part, scene, light.as_ref()),
+        };
+        if let [whole] = parts[..] {
+            let rgba8 = draw(whole)?;
+            return Ok(Image {
+                width,
+                height,
+                rgba8,
+            });
+        }
         let mut image = Image {
             width,
             height,
             rgba8: vec![0; width as usize * height as usize * 4],
         };
-        let draw = |part: Part| match &device {
-            None => frame_cpu::draw(&plan, part, scene),
-            Some(device) => device.draw(&plan, part, scene, light.as_ref()),
-        };
         for part in parts {
-            if !is_wanted() {
-                return Err(RenderError::NotWanted);
-            }
             paste(&mut image, part, &draw(part)?);
         }
         Ok(image)

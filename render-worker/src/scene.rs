@@ -63,11 +63,15 @@ pub struct Frame {
     coarser_mean: OnceLock<Arc<Frame>>,
     /// What keeps the mass of blocks of four.
     coarser_mass: OnceLock<Arc<Frame>>,
+    /// Share of the accumulated time that every sum lacks, 0 to 1; none where all sums are complete, where values are
+    /// no sums, and where nobody asked.
+    lacking: Option<Vec<f32>>,
     /// Made when doubt is first drawn.
     doubts: OnceLock<Cells<f32>>,
 }
 
-/// Doubt of a filled cell with next to no estimated error: it is seen that it was not measured.
+/// Doubt of a filled cell with next to no estimated error, and of a sum that lacks next to nothing: it is seen that the
+/// one was not measured and the other is not complete.
 const LEAST_DOUBT: f32 = 0.4;
 
 impl Frame {
@@ -89,8 +93,25 @@ impl Frame {
             range: range.unwrap_or_default(),
             coarser_mean: OnceLock::new(),
             coarser_mass: OnceLock::new(),
+            lacking: None,
             doubts: OnceLock::new(),
         }
+    }
+
+    /// The same with the share of its time that every sum lacks, `[row, col]`, 0 to 1.
+    #[must_use]
+    pub fn with_lacking(mut self, mut lacking: Vec<f32>) -> Self {
+        for (lacking, value) in lacking.iter_mut().zip(&self.cells.content) {
+            // What is not there lacks nothing, also in the mean of a block.
+            if is_missing(*value) {
+                *lacking = MISSING;
+            }
+        }
+        self.lacking = lacking
+            .iter()
+            .any(|lacking| *lacking > 0.0)
+            .then_some(lacking);
+        self
     }
 
     /// A frame of filled values and their estimated errors.
@@ -105,32 +126,45 @@ impl Frame {
         self
     }
 
-    /// How much each cell is to be doubted: 0 where it was measured, else rising with its estimated error to 1.
+    /// How much each cell is to be doubted: 0 where it was measured and complete, else rising to 1 with its estimated
+    /// error or with what its sum lacks.
     pub fn doubts(&self) -> &Cells<f32> {
-        let doubt = |error: &f32| {
-            if *error > 0.0 {
-                // The root, because a few cells are far worse than most.
-                LEAST_DOUBT + (1.0 - LEAST_DOUBT) * (error / self.largest_error).sqrt()
-            } else {
-                0.0
-            }
-        };
+        // The root, because a few cells are far worse than most.
+        let doubt = |share: f32| LEAST_DOUBT + (1.0 - LEAST_DOUBT) * share.sqrt();
         self.doubts.get_or_init(|| {
-            Cells::new(match &self.errors {
-                Some(errors) => errors.content.iter().map(doubt).collect(),
-                None => vec![0.0; self.cells.content.len()],
-            })
+            let mut doubts = vec![0.0_f32; self.cells.content.len()];
+            let errors = self.errors.iter().flat_map(|errors| &errors.content);
+            for (own, error) in doubts.iter_mut().zip(errors) {
+                if *error > 0.0 {
+                    *own = doubt(error / self.largest_error);
+                }
+            }
+            let lacking = self.lacking.iter().flatten();
+            for (own, lacking) in doubts.iter_mut().zip(lacking) {
+                if *lacking > 0.0 {
+                    *own = own.max(doubt(*lacking));
+                }
+            }
+            Cells::new(doubts)
         })
     }
 
-    /// Blocks of four; an error becomes the mean of the four, as if they were wrong together.
+    /// Is there anything to doubt?
+    fn has_doubt(&self) -> bool {
+        self.largest_error > 0.0 || self.lacking.is_some()
+    }
+
+    /// Blocks of four; an error becomes the mean of the four, as if they were wrong together, and so does what they lack.
     pub(crate) fn coarser_mean(&self, make: impl Fn(&[f32]) -> Vec<f32>) -> Arc<Self> {
         let coarser = || {
-            let coarser = Self::new(make(&self.cells.content));
-            Arc::new(match &self.errors {
-                Some(errors) => coarser.with_errors(make(&errors.content)),
-                None => coarser,
-            })
+            let mut coarser = Self::new(make(&self.cells.content));
+            if let Some(errors) = &self.errors {
+                coarser = coarser.with_errors(make(&errors.content));
+            }
+            if let Some(lacking) = &self.lacking {
+                coarser = coarser.with_lacking(make(lacking));
+            }
+            Arc::new(coarser)
         };
         Arc::clone(self.coarser_mean.get_or_init(coarser))
     }
@@ -147,6 +181,7 @@ impl Frame {
                 .errors
                 .as_ref()
                 .map_or(0, |errors| errors.content.len())
+            + self.lacking.as_ref().map_or(0, Vec::len)
             + self.doubts.get().map_or(0, |doubts| doubts.content.len());
         (cells * size_of::<f32>()) as u64
     }
@@ -164,11 +199,11 @@ pub struct Interval {
 }
 
 impl Interval {
-    /// Was any gap filled in either step?
+    /// Was any gap filled in either step, or is any sum not complete?
     pub fn has_doubt(&self) -> bool {
         [&self.before, &self.after]
             .iter()
-            .any(|frame| frame.largest_error > 0.0)
+            .any(|frame| frame.has_doubt())
     }
 
     /// Smallest and largest value that any instant between the two steps can have.

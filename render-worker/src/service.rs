@@ -1,4 +1,7 @@
 //! Jobs in, PNG bytes out: a source and a renderer behind one asynchronous call with bounded concurrency.
+//!
+//! A picture has a turn to be drawn and then a core to be encoded on: turns are as many as suit the device, cores as many
+//! as there are, and no turn is held while a picture is encoded.
 
 use std::num::NonZeroUsize;
 use std::sync::Arc;
@@ -8,6 +11,7 @@ use contract::job::RenderJob;
 use storage::Store;
 use tokio::sync::Semaphore;
 
+use crate::encoding::Encoders;
 use crate::error::RenderError;
 use crate::image::Image;
 use crate::prefetch::Prefetch;
@@ -18,8 +22,8 @@ use crate::source::{Kept, Source};
 /// Limits of a service.
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
-    /// Pictures drawn at the same time.
-    pub pictures: NonZeroUsize,
+    /// Pictures drawn at the same time; none named is what suits the adapter. Those that are encoded do not count.
+    pub draws_at_once: Option<NonZeroUsize>,
     /// Bytes of frames kept in memory.
     pub frame_bytes: u64,
     /// Bytes of frames kept on the device; none named is a share of what the device has.
@@ -29,10 +33,10 @@ pub struct Limits {
 }
 
 impl Default for Limits {
-    /// Two pictures, so that one is encoded while the next is drawn; half a GiB of frames, the next one of them.
+    /// As many pictures as suit the adapter; half a GiB of frames, the next one of them.
     fn default() -> Self {
         Self {
-            pictures: NonZeroUsize::MIN.saturating_add(1),
+            draws_at_once: None,
             frame_bytes: 512 << 20,
             device_frame_bytes: None,
             frames_ahead: 1,
@@ -49,8 +53,10 @@ pub struct RenderService {
     renderer: Arc<Renderer>,
     source: Arc<Source>,
     prefetch: Arc<Prefetch>,
-    /// One permit a picture in flight.
-    permits: Arc<Semaphore>,
+    draws_at_once: NonZeroUsize,
+    /// One permit a picture that is drawn.
+    turns: Arc<Semaphore>,
+    encoders: Encoders,
 }
 
 impl RenderService {
@@ -77,12 +83,32 @@ impl RenderService {
             Arc::clone(&renderer),
             limits.frames_ahead,
         ));
+        let suited = || renderer.adapter().draws_at_once();
+        let draws_at_once = limits.draws_at_once.unwrap_or_else(suited);
         Ok(Self {
             renderer,
             source,
             prefetch,
-            permits: Arc::new(Semaphore::new(limits.pictures.get())),
+            draws_at_once,
+            turns: Arc::new(Semaphore::new(draws_at_once.get())),
+            encoders: Encoders::on_all_cores(),
         })
+    }
+
+    /// Pictures drawn at the same time.
+    pub fn draws_at_once(&self) -> NonZeroUsize {
+        self.draws_at_once
+    }
+
+    /// Pictures that are encoded now.
+    pub fn encoding_count(&self) -> usize {
+        self.encoders.busy()
+    }
+
+    /// Tells in the metrics what it draws on.
+    #[cfg(feature = "service")]
+    pub fn register(&self, registry: &prometheus::Registry) -> Result<(), prometheus::Error> {
+        registry.register(Box::new(crate::gauges::AdapterInfo::of(self)?))
     }
 
     /// Name of what draws.
@@ -102,18 +128,27 @@ impl RenderService {
 
     /// Draws a job; the PNG of equal jobs is equal. A job that the device fails at is drawn on a fresh one, once.
     pub async fn draw(&self, job: &RenderJob) -> Result<Bytes, RenderError> {
+        self.draw_in_turn(job, ()).await
+    }
+
+    /// The same for a caller who gives out turns as well: his is let go when the picture is drawn and its encoding begins.
+    pub async fn draw_in_turn(
+        &self,
+        job: &RenderJob,
+        turn: impl Send + Sync + 'static,
+    ) -> Result<Bytes, RenderError> {
         job.validate()?;
         // It is never closed, but a closed semaphore would only mean that nothing is counted.
-        let permit = Arc::new(Arc::clone(&self.permits).acquire_owned().await);
+        let own = Arc::clone(&self.turns).acquire_owned().await;
+        let turns = Arc::new((own, turn));
         let attempt = || async {
             let scene = self.scene(job).await?;
             let wanted: IsWanted = Arc::new(|| true);
-            let image = self
-                .picture(job, scene, wanted, Arc::clone(&permit))
-                .await?;
-            self.encode(image).await
+            let held = Arc::clone(&turns);
+            self.picture(job, scene, wanted, held).await
         };
-        self.on_a_sound_device(attempt).await
+        let image = self.on_a_sound_device(attempt).await?;
+        self.encode(image, turns).await
     }
 
     /// Loads what a job is drawn from.
@@ -141,10 +176,13 @@ impl RenderService {
         Ok(image)
     }
 
-    /// Writes a picture as PNG.
-    pub async fn encode(&self, image: Image) -> Result<Bytes, RenderError> {
-        let encoding = tokio::task::spawn_blocking(move || image.encode_png());
-        encoding.await.map_err(RenderError::Thread)?
+    /// Writes a picture as PNG; `turn` is let go when that begins, which may have to wait for a core.
+    pub async fn encode(
+        &self,
+        image: Image,
+        turn: impl Send + 'static,
+    ) -> Result<Bytes, RenderError> {
+        self.encoders.png(image, turn).await
     }
 
     /// Tries, and if the device failed tries once more on a fresh one.

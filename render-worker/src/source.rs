@@ -37,8 +37,8 @@ pub struct Source {
     early_cancelled: AtomicU64,
 }
 
-/// A frame of a domain that its gaps were filled for.
-type FrameKey = (ObjectKey, ObjectKey);
+/// A frame, the domain that its gaps were filled for, and the counts that say what its sums lack, if that is drawn.
+type FrameKey = (ObjectKey, ObjectKey, Option<ObjectKey>);
 
 /// Why a frame is read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -108,7 +108,7 @@ impl Source {
     pub fn kept(&self) -> Kept {
         let held = self.lock();
         // A frame's key is `frames/PRODUCT/DIGEST`, or the domain's where accumulation starts.
-        let product = |(frame, _): &FrameKey| frame.as_str().split('/').nth(1).map(str::to_owned);
+        let product = |(frame, ..): &FrameKey| frame.as_str().split('/').nth(1).map(str::to_owned);
         Kept {
             products: held.frames.keys().filter_map(product).collect(),
             frame_bytes: held.frames.sum(|frame| frame.size_bytes()),
@@ -159,7 +159,7 @@ impl Source {
     async fn terrain(&self, relief: &Relief) -> Result<Terrain, RenderError> {
         let grid = relief.grid;
         // No domain: its gaps are not filled.
-        let key = (relief.frame.clone(), relief.frame.clone());
+        let key = (relief.frame.clone(), relief.frame.clone(), None);
         let held = self.lock().frames.get(&key);
         if let Some(elevation) = held {
             self.frame_hits.fetch_add(1, Ordering::Relaxed);
@@ -193,14 +193,25 @@ impl Source {
         wanted: Wanted,
     ) -> Result<(Arc<Cells<u32>>, Interval), RenderError> {
         let domain = self.domain(grid, moment).await?;
+        let counts = moment.contributed.clone().unwrap_or_default();
+        let part = |frame: &ObjectKey, counts: &Option<ObjectKey>| {
+            (frame.clone(), moment.domain.clone(), counts.clone())
+        };
         let before = match &moment.before {
-            Some(frame) => self.frame(grid, moment, &domain, frame, wanted).await?,
-            None => self.nothing(moment, &domain),
+            Some(frame) => {
+                let key = part(frame, &counts.before);
+                self.frame(grid, &domain, key, wanted).await?
+            }
+            // All that is accumulated until the end of the first step is of that step.
+            None => {
+                self.nothing(grid, &domain, part(&moment.domain, &counts.after))
+                    .await?
+            }
         };
         let (after, weight) = match &moment.after {
             Some(After { frame, weight }) => {
-                let frame = self.frame(grid, moment, &domain, frame, wanted).await?;
-                (frame, *weight)
+                let key = part(frame, &counts.after);
+                (self.frame(grid, &domain, key, wanted).await?, *weight)
             }
             None => (Arc::clone(&before), 0.0),
         };
@@ -212,16 +223,36 @@ impl Source {
         Ok((domain, interval))
     }
 
-    /// Where accumulation starts: zero in every cell of the domain.
-    fn nothing(&self, moment: &Moment, domain: &Cells<u32>) -> Arc<Frame> {
-        let key = (moment.domain.clone(), moment.domain.clone());
+    /// Where accumulation starts: zero in every cell of the domain, which stands for the frame in the key.
+    async fn nothing(
+        &self,
+        grid: &Grid,
+        domain: &Cells<u32>,
+        key: FrameKey,
+    ) -> Result<Arc<Frame>, RenderError> {
         if let Some(frame) = self.lock().frames.get(&key) {
-            return frame;
+            return Ok(frame);
         }
         let zero = |cell: &u32| if *cell == 0 { f32::NAN } else { 0.0 };
-        let frame = Arc::new(Frame::new(domain.content().iter().map(zero).collect()));
+        let frame = Frame::new(domain.content().iter().map(zero).collect());
+        let frame = Arc::new(self.doubted(frame, grid, &key).await?);
         self.lock().keep(key, &frame, self.most_bytes);
-        frame
+        Ok(frame)
+    }
+
+    /// A frame with what its sums lack, if its key names counts.
+    async fn doubted(
+        &self,
+        frame: Frame,
+        grid: &Grid,
+        (_, domain, counts): &FrameKey,
+    ) -> Result<Frame, RenderError> {
+        let Some(counts) = counts else {
+            return Ok(frame);
+        };
+        let read = storage::contributed::read(&self.store, counts, grid).await;
+        let counts = read.map_err(|e| failed("the counts of steps", domain, e))?;
+        Ok(frame.with_lacking(counts.lacking()))
     }
 
     async fn domain(&self, grid: &Grid, moment: &Moment) -> Result<Arc<Cells<u32>>, RenderError> {
@@ -230,7 +261,7 @@ impl Source {
             domain
         } else {
             let read = storage::domain::read(&self.store, &moment.domain).await;
-            let flags = read.map_err(|e| failed("the domain", moment, e))?;
+            let flags = read.map_err(|e| failed("the domain", &moment.domain, e))?;
             let domain = Scene::domain_of(flags);
             let kept = Arc::clone(&domain);
             self.lock()
@@ -251,12 +282,10 @@ impl Source {
     async fn frame(
         &self,
         grid: &Grid,
-        moment: &Moment,
         domain: &Arc<Cells<u32>>,
-        frame: &ObjectKey,
+        key: FrameKey,
         wanted: Wanted,
     ) -> Result<Arc<Frame>, RenderError> {
-        let key = (frame.clone(), moment.domain.clone());
         if let Some(frame) = self.held(&key, wanted) {
             return Ok(frame);
         }
@@ -269,7 +298,7 @@ impl Source {
         if wanted == Wanted::Now {
             self.frame_misses.fetch_add(1, Ordering::Relaxed);
         }
-        let done = self.read(grid, moment, domain, frame).await;
+        let done = self.read(grid, domain, &key).await;
         let mut held = self.lock();
         held.reading.remove(&key);
         held.forget_dropped();
@@ -302,15 +331,17 @@ impl Source {
     async fn read(
         &self,
         grid: &Grid,
-        moment: &Moment,
         domain: &Arc<Cells<u32>>,
-        frame: &ObjectKey,
+        key: &FrameKey,
     ) -> Result<Arc<Frame>, RenderError> {
+        let (frame, of_domain, _) = key;
         let read = storage::frames::read(&self.store, frame, grid).await;
-        let values = read.map_err(|e| failed("a frame", moment, e))?;
-        let (renderer, grid, domain) = (Arc::clone(&self.renderer), *grid, Arc::clone(domain));
-        let filled = tokio::task::spawn_blocking(move || fill(&renderer, &grid, values, &domain));
-        Ok(Arc::new(filled.await.map_err(RenderError::Thread)??))
+        let values = read.map_err(|e| failed("a frame", of_domain, e))?;
+        let (renderer, of_grid, domain) = (Arc::clone(&self.renderer), *grid, Arc::clone(domain));
+        let fill = move || fill(&renderer, &of_grid, values, &domain);
+        let filled = tokio::task::spawn_blocking(fill).await;
+        let filled = filled.map_err(RenderError::Thread)??;
+        Ok(Arc::new(self.doubted(filled, grid, key).await?))
     }
 
     fn lock(&self) -> std::sync::MutexGuard<'_, Held> {
@@ -353,10 +384,12 @@ fn fill(
         .map(Frame::filled)
 }
 
-fn failed(what: &'static str, moment: &Moment, source: StorageError) -> RenderError {
+/// Named by the product, which a domain's folder is called after.
+fn failed(what: &'static str, domain: &ObjectKey, source: StorageError) -> RenderError {
+    let product = domain.as_str().split('/').nth(1).unwrap_or_default();
     RenderError::Store {
         what,
-        product: moment.product().to_owned(),
+        product: product.to_owned(),
         source: Box::new(source),
     }
 }

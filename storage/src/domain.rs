@@ -5,6 +5,7 @@ use contract::digest::Digest;
 use contract::key::ObjectKey;
 use contract::product::ProductId;
 
+use crate::sound::damage;
 use crate::{StorageError, Store};
 
 /// Stores a domain (`[row, col]`) under the digest of its bytes.
@@ -19,11 +20,11 @@ pub async fn write(
     Ok(key)
 }
 
-/// Reads a domain.
+/// Reads a domain, whose bytes must be those of its name.
 pub async fn read(store: &Store, key: &ObjectKey) -> Result<Vec<bool>, StorageError> {
     let content = store.get(key).await?;
     if content.iter().any(|&byte| byte > 1) {
-        return Err(StorageError::damaged(key.as_str(), "a byte is not 0 or 1"));
+        return Err(damage::found(key, "a byte is not 0 or 1"));
     }
     Ok(content.iter().map(|&byte| byte == 1).collect())
 }
@@ -38,5 +39,11 @@ mod tests {
         let cells = [true, false, true];
         let key = write(&store, &"p".parse().unwrap(), &cells).await.unwrap();
         assert_eq!(read(&store, &key).await.unwrap(), cells);
+        store
+            .put_over(&key, Bytes::from(vec![1, 0, 0]))
+            .await
+            .unwrap();
+        let error = read(&store, &key).await.unwrap_err();
+        assert!(error.to_string().contains(key.as_str()), "{error}");
     }
 }

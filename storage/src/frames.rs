@@ -1,26 +1,50 @@
 //! Frames: one time step map-major, a row a chunk with the chunk's values as one array.
+//!
+//! A frame is named by the digest of its values: other bytes for the same values are the same frame. Frames stored
+//! before that was so are named by the digest of their bytes and have no check in their rows; they are read as they are.
+
+mod names;
 
 use std::sync::{Arc, LazyLock};
 
 use arrow::array::{
     Float32Builder, ListBuilder, RecordBatch, TimestampMillisecondArray, UInt32Array,
 };
-use arrow::datatypes::{DataType, Field, Float32Type, Schema, SchemaRef, TimeUnit};
+use arrow::datatypes::{
+    DataType, Field, Float32Type, Schema, SchemaRef, TimeUnit, TimestampMillisecondType, UInt32Type,
+};
 use bytes::Bytes;
 use contract::chunk::frame_chunks;
 use contract::digest::Digest;
 use contract::grid::Grid;
 use contract::key::ObjectKey;
+use contract::kind::Vouched;
 use contract::product::ProductId;
-use contract::time::Period;
+use contract::time::{Period, TimeMs};
 
-use crate::{StorageError, Store, parquet_table};
+use crate::parquet_table::{self, Table};
+use crate::row_check::RowCheck;
+use crate::sound::{damage, off_thread};
+use crate::values::{ValuesDigest, no_data_alike};
+use crate::{Encoded, StorageError, Store};
+
+pub use names::settle;
 
 /// Chunks a reader takes at once: small enough to spread a large frame over partitions.
 const CHUNKS_PER_GROUP: usize = 64;
+/// Column of the values.
+const VALUES: usize = 3;
 
-/// Columns of a frame: `chunk`, `period_start`, `period_end`, `values`.
+/// Columns of a frame: `chunk`, `period_start`, `period_end`, `values`, and `check`, the [`RowCheck`] of the others in
+/// their order.
 pub static SCHEMA: LazyLock<SchemaRef> = LazyLock::new(|| {
+    let mut fields = SCHEMA_1.fields().to_vec();
+    fields.push(Arc::new(Field::new("check", DataType::UInt32, false)));
+    Arc::new(Schema::new(fields))
+});
+
+/// The same of frames that are named by their bytes.
+pub static SCHEMA_1: LazyLock<SchemaRef> = LazyLock::new(|| {
     let time = || DataType::Timestamp(TimeUnit::Millisecond, Some("UTC".into()));
     Arc::new(Schema::new(vec![
         Field::new("chunk", DataType::UInt32, false),
@@ -35,72 +59,170 @@ pub(crate) fn value_field() -> Arc<Field> {
     Arc::new(Field::new("item", DataType::Float32, false))
 }
 
-/// Bytes of a frame of `values` (`[row, col]`, stored unit, NaN no data).
-pub fn encode(grid: &Grid, values: &[f32], period: Period) -> Result<Bytes, StorageError> {
+/// A frame of `values` (`[row, col]`, stored unit, NaN no data) as bytes.
+pub fn encode(grid: &Grid, values: &[f32], period: Period) -> Result<Encoded, StorageError> {
+    let batch = batch(grid, values, period)?;
+    Ok(Encoded {
+        values_sha256: digest_of(grid, values, period),
+        content: parquet_table::encode(&batch, CHUNKS_PER_GROUP, &[grid.rows, grid.cols])?,
+    })
+}
+
+/// What a frame is: the shape of its grid, its period, its values row by row. Where the grid lies is not in it: axes of
+/// two files of one product may differ in their last digits.
+fn digest_of(grid: &Grid, values: &[f32], period: Period) -> Digest {
+    ValuesDigest::new("fluxglobe frame 2\n")
+        .number(grid.rows.into())
+        .number(grid.cols.into())
+        .number(period.start.ms())
+        .number(period.end.ms())
+        .values(values)
+        .finish()
+}
+
+fn batch(grid: &Grid, values: &[f32], period: Period) -> Result<RecordBatch, StorageError> {
     if values.len() != grid.cell_count() {
         let reason = format!("{} values for {} cells", values.len(), grid.cell_count());
         return Err(StorageError::damaged("frame to write", reason));
     }
     let windows = frame_chunks(grid);
     let mut lists = ListBuilder::new(Float32Builder::new()).with_field(value_field());
-    for window in &windows {
-        for index in window.cell_indices(grid) {
-            // One bit pattern for "no data", so that equal frames are equal bytes.
-            let value = values[index];
-            let value = if value.is_nan() { f32::NAN } else { value };
-            lists.values().append_value(value);
-        }
+    let mut checks = Vec::with_capacity(windows.len());
+    let mut chunk_values = vec![];
+    for (chunk, window) in windows.iter().enumerate() {
+        chunk_values.clear();
+        chunk_values.extend(window.cell_indices(grid).map(|i| no_data_alike(values[i])));
+        lists.values().append_slice(&chunk_values);
         lists.append(true);
+        checks.push(check_of_row(chunk as u32, period, &chunk_values));
     }
-    let time = |t: contract::time::TimeMs| {
+    let time = |t: TimeMs| {
         Arc::new(TimestampMillisecondArray::from(vec![t.ms(); windows.len()]).with_timezone("UTC"))
     };
-    let batch = RecordBatch::try_new(
+    RecordBatch::try_new(
         Arc::clone(&SCHEMA),
         vec![
             Arc::new(UInt32Array::from_iter_values(0..windows.len() as u32)),
             time(period.start),
             time(period.end),
             Arc::new(lists.finish()),
+            Arc::new(UInt32Array::from(checks)),
         ],
     )
-    .map_err(|e| StorageError::damaged("frame to write", e))?;
-    parquet_table::encode(&batch, CHUNKS_PER_GROUP)
+    .map_err(|e| StorageError::damaged("frame to write", e))
 }
 
-/// Values of a frame, `[row, col]`.
-pub fn decode(object: &str, content: Bytes, grid: &Grid) -> Result<Vec<f32>, StorageError> {
-    let batch = parquet_table::decode(object, content, &SCHEMA)?;
+fn check_of_row(chunk: u32, period: Period, values: &[f32]) -> u32 {
+    RowCheck::new()
+        .u32(chunk)
+        .i64(period.start.ms())
+        .i64(period.end.ms())
+        .f32s(values)
+        .finish()
+}
+
+/// Values of a frame, `[row, col]`, and its period.
+fn decode(
+    key: &ObjectKey,
+    content: Bytes,
+    grid: Option<&Grid>,
+) -> Result<(Vec<f32>, Period), StorageError> {
+    let damaged = |reason: String| damage::found(key, reason);
+    let name = match key.vouches() {
+        Vouched::Values(name) => Some(name),
+        Vouched::Bytes(_) | Vouched::Nothing => None,
+    };
+    let schema = if name.is_some() { &SCHEMA } else { &SCHEMA_1 };
+    let table = parquet_table::decode(key, content, schema)?;
+    let stored = match (&table.shape[..], grid) {
+        (&[rows, cols], _) => shape_only(rows, cols),
+        (_, Some(grid)) => *grid,
+        _ => return Err(damaged("it does not say how large its grid is".to_owned())),
+    };
+    if let Some(grid) = grid.filter(|grid| (grid.rows, grid.cols) != (stored.rows, stored.cols)) {
+        return Err(damaged(format!(
+            "it is of {} x {} cells, its product of {} x {}",
+            stored.rows, stored.cols, grid.rows, grid.cols
+        )));
+    }
+    let (values, period) = values_of(&table, &stored).map_err(damaged)?;
+    match name {
+        Some(name) if digest_of(&stored, &values, period) != name => {
+            Err(damaged("its values are not those of its name".to_owned()))
+        }
+        _ => Ok((values, period)),
+    }
+}
+
+/// A grid of which only the shape is known.
+pub(crate) fn shape_only(rows: u32, cols: u32) -> Grid {
+    Grid {
+        rows,
+        cols,
+        north_deg: 0.0,
+        west_deg: 0.0,
+        dlat_deg: 0.0,
+        dlon_deg: 0.0,
+    }
+}
+
+fn values_of(table: &Table, grid: &Grid) -> Result<(Vec<f32>, Period), String> {
+    let batch = &table.batch;
     let windows = frame_chunks(grid);
-    let chunks = parquet_table::numbers(&batch, 0);
-    if batch.num_rows() != windows.len() {
-        let reason = format!(
+    if batch.num_rows() != windows.len() || windows.is_empty() {
+        return Err(format!(
             "{} chunks, its grid has {}",
             batch.num_rows(),
             windows.len()
-        );
-        return Err(StorageError::damaged(object, reason));
+        ));
     }
+    let chunks = parquet_table::numbers::<UInt32Type>(batch, 0);
+    let time = |column| {
+        let times = parquet_table::numbers::<TimestampMillisecondType>(batch, column);
+        let first = times.value(0);
+        if times.values().iter().any(|time| *time != first) {
+            return Err("its chunks are of several periods".to_owned());
+        }
+        TimeMs::new(first).map_err(|e| e.to_string())
+    };
+    let period = Period::new(time(1)?, time(2)?).map_err(|e| e.to_string())?;
     let mut values = vec![f32::NAN; grid.cell_count()];
     for row in 0..batch.num_rows() {
-        let chunk = parquet_table::row_values::<Float32Type>(&batch, 3, row);
+        let chunk = parquet_table::row_values::<Float32Type>(batch, VALUES, row);
         let window = windows
             .get(chunks.value(row) as usize)
             .filter(|window| window.cell_count() == chunk.len())
-            .ok_or_else(|| StorageError::damaged(object, "a chunk does not fit its grid"))?;
+            .ok_or("a chunk does not fit its grid")?;
         for (index, value) in window.cell_indices(grid).zip(chunk.values()) {
             values[index] = *value;
         }
     }
-    Ok(values)
+    Ok((values, period))
 }
 
-/// Reads a stored frame.
+/// Has a frame that is named by its values these values?
+pub(crate) fn check_values(key: &ObjectKey, content: Bytes) -> Result<(), StorageError> {
+    decode(key, content, None).map(|_values| ())
+}
+
+/// Reads a stored frame, `[row, col]`. Its bytes and its values are compared with its name.
 pub async fn read(store: &Store, key: &ObjectKey, grid: &Grid) -> Result<Vec<f32>, StorageError> {
-    decode(key.as_str(), store.get(key).await?, grid)
+    read_with_period(store, key, grid)
+        .await
+        .map(|(values, _period)| values)
 }
 
-/// Stores a frame under the digest of its bytes.
+async fn read_with_period(
+    store: &Store,
+    key: &ObjectKey,
+    grid: &Grid,
+) -> Result<(Vec<f32>, Period), StorageError> {
+    let content = store.get(key).await?;
+    let (key, grid) = (key.clone(), *grid);
+    off_thread(move || decode(&key, content, Some(&grid))).await
+}
+
+/// Stores a frame under the digest of its values.
 pub async fn write(
     store: &Store,
     product: &ProductId,
@@ -108,62 +230,11 @@ pub async fn write(
     values: &[f32],
     period: Period,
 ) -> Result<ObjectKey, StorageError> {
-    let content = encode(grid, values, period)?;
-    let key = ObjectKey::frame(product, &Digest::of(&content));
-    store.put_new(&key, content).await?;
+    let encoded = encode(grid, values, period)?;
+    let key = ObjectKey::frame(product, &encoded.values_sha256);
+    store.put_new(&key, encoded.content).await?;
     Ok(key)
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const GRID: Grid = Grid {
-        rows: 70,
-        cols: 130,
-        north_deg: 35.0,
-        west_deg: 0.0,
-        dlat_deg: 1.0,
-        dlon_deg: 1.0,
-    };
-
-    fn values() -> Vec<f32> {
-        let value = |i: usize| {
-            if i.is_multiple_of(7) {
-                f32::NAN
-            } else {
-                i as f32
-            }
-        };
-        (0..GRID.cell_count()).map(value).collect()
-    }
-
-    #[test]
-    fn a_frame_round_trips_with_its_gaps() {
-        let period = Period::month(2000, 1).unwrap();
-        let bytes = encode(&GRID, &values(), period).unwrap();
-        let back = decode("f", bytes, &GRID).unwrap();
-        let bits = |v: &[f32]| v.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
-        assert_eq!(bits(&back), bits(&values()));
-    }
-
-    #[test]
-    fn equal_values_make_equal_bytes_whatever_their_nan() {
-        let period = Period::month(2000, 1).unwrap();
-        let mut other = values();
-        other[0] = -f32::NAN;
-        let a = encode(&GRID, &values(), period).unwrap();
-        assert_eq!(a, encode(&GRID, &other, period).unwrap());
-        other[1] = 2.0;
-        assert_ne!(a, encode(&GRID, &other, period).unwrap());
-    }
-
-    #[test]
-    fn bytes_that_are_no_frame_are_damaged() {
-        let half = encode(&GRID, &values(), Period::month(2000, 1).unwrap()).unwrap();
-        let other_grid = Grid { rows: 69, ..GRID };
-        assert!(decode("f", half.clone(), &other_grid).is_err());
-        assert!(decode("f", half.slice(..half.len() / 2), &GRID).is_err());
-        assert!(decode("f", Bytes::from("text"), &GRID).is_err());
-    }
-}
+mod tests;

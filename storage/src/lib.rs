@@ -1,17 +1,25 @@
 //! What lies durable between services: objects, manifests, frames, series, weights and the event log.
+//! What is read is checked: a damaged object is an error that names it, never a value.
 //!
 //! Every service reads and writes through this crate, so that a layout has one writer and one reader. Left out on
 //! purpose: what the values mean (contract) and what is done with them (the services).
 
+pub mod contributed;
+pub mod document;
 pub mod domain;
 pub mod error;
 pub mod frames;
 pub mod log;
 pub mod manifests;
 mod parquet_table;
+pub mod row_check;
 pub mod series;
+pub mod sound;
 pub mod store;
+mod values;
+pub mod verify;
 pub mod weights;
 
 pub use error::StorageError;
 pub use store::Store;
+pub use values::Encoded;

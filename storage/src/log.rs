@@ -13,6 +13,7 @@ use async_trait::async_trait;
 use bytes::Bytes;
 use contract::ContractError;
 use contract::event::Event;
+use contract::time::TimeMs;
 use contract::topic::{Origin, Topic};
 
 use crate::StorageError;
@@ -27,6 +28,8 @@ pub struct Message {
     pub origin: Origin,
     /// What, as it came.
     pub content: Bytes,
+    /// When it came into the log, however often it is read; none in logs that did not keep it.
+    pub time: Option<TimeMs>,
 }
 
 impl Message {
@@ -99,6 +102,12 @@ pub trait Reader: Send {
     /// Finishes messages, in any order. The offset of a partition moves past a message once all before it are finished
     /// too; what follows from a message is appended in the same step.
     async fn finish(&mut self, done: Vec<Finished>) -> Result<(), StorageError>;
+
+    /// Messages that were handed out, are not finished and belong to another member now, since this was asked last:
+    /// whatever is done about them is done by that one too.
+    fn lost(&mut self) -> Vec<Origin> {
+        vec![]
+    }
 
     /// Hands back what was not finished at once, so that nobody waits for this member.
     async fn leave(self: Box<Self>) -> Result<(), StorageError>;

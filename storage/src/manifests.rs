@@ -1,11 +1,13 @@
 //! Numbered manifests: the newest of a product, one by its name, and the commit of the next.
 
-use bytes::Bytes;
 use contract::key::ObjectKey;
-use contract::manifest::{MANIFEST_SCHEMA, Manifest, ManifestId};
+use contract::manifest::{
+    MANIFEST_SCHEMA, Manifest, ManifestId, OLDEST_MANIFEST_SCHEMA, SeriesSegment, Step,
+};
 use contract::product::ProductId;
 
-use crate::{StorageError, Store};
+use crate::sound::damage;
+use crate::{StorageError, Store, document, frames};
 
 /// Products that have a manifest, sorted by name.
 pub async fn products(store: &Store) -> Result<Vec<ProductId>, StorageError> {
@@ -17,20 +19,38 @@ pub async fn products(store: &Store) -> Result<Vec<ProductId>, StorageError> {
 pub async fn latest(store: &Store, product: &ProductId) -> Result<Option<Manifest>, StorageError> {
     let keys = store.list(&format!("manifests/{product}")).await?;
     match keys.last() {
-        Some(key) => read(store, key).await.map(Some),
+        Some(key) => read(store, key).await,
         None => Ok(None),
     }
+}
+
+/// The manifest of a product with a number; none if there is none (any more).
+pub async fn numbered(
+    store: &Store,
+    product: &ProductId,
+    number: u64,
+) -> Result<Option<Manifest>, StorageError> {
+    read(store, &ObjectKey::manifest(product, number)).await
 }
 
 /// The manifest of a name, which must still hold what it held when it was named.
 pub async fn load(store: &Store, id: &ManifestId) -> Result<Manifest, StorageError> {
     let key = ObjectKey::manifest(&id.product, id.number);
-    let manifest = read(store, &key).await?;
+    let Some(manifest) = read(store, &key).await? else {
+        let path = key.to_string();
+        return Err(StorageError::Object {
+            key: path.clone(),
+            source: object_store::Error::NotFound {
+                path,
+                source: "it was cleaned up, or never published".into(),
+            },
+        });
+    };
     if manifest.id() == *id {
         Ok(manifest)
     } else {
         let reason = format!("it is {}, not {id}", manifest.id());
-        Err(StorageError::damaged(key.as_str(), reason))
+        Err(damage::found(&key, reason))
     }
 }
 
@@ -40,26 +60,70 @@ pub async fn load(store: &Store, id: &ManifestId) -> Result<Manifest, StorageErr
 /// `Conflict` if another writer took the number: read the newest one again and build on it.
 pub async fn commit(store: &Store, manifest: &Manifest) -> Result<(), StorageError> {
     let key = ObjectKey::manifest(&manifest.product, manifest.number);
-    let json = serde_json::to_vec(manifest).map_err(|e| StorageError::damaged(key.as_str(), e))?;
-    store.put_new(&key, Bytes::from(json)).await.map(|_new| ())
+    if manifest.schema != MANIFEST_SCHEMA {
+        let reason = format!("to write, it is of schema {}", manifest.schema);
+        return Err(StorageError::damaged(key.as_str(), reason));
+    }
+    document::put_new(store, &key, manifest)
+        .await
+        .map(|_new| ())
 }
 
-async fn read(store: &Store, key: &ObjectKey) -> Result<Manifest, StorageError> {
-    let content = store.get(key).await?;
-    let manifest: Manifest =
-        serde_json::from_slice(&content).map_err(|e| StorageError::damaged(key.as_str(), e))?;
+/// Gives what the next version holds the names that the newest one has for the same values: what was named by its bytes
+/// is no other object for being named by its values.
+pub async fn settle(
+    store: &Store,
+    newest: &Manifest,
+    next: &mut Manifest,
+) -> Result<(), StorageError> {
+    if newest.grid != next.grid {
+        return Ok(());
+    }
+    for step in &mut next.steps {
+        let start = step.period.start;
+        let there = newest
+            .steps
+            .binary_search_by_key(&start, |it| it.period.start);
+        let there = there.ok().map(|at| &newest.steps[at]);
+        let is_renamed = |there: &&Step| there.period == step.period && there.frame != step.frame;
+        if let Some(there) = there.filter(is_renamed) {
+            step.frame = frames::settle(store, &there.frame, &step.frame, &next.grid).await?;
+        }
+    }
+    let frames = |manifest: &Manifest, segment: &SeriesSegment| {
+        let first = segment.first_step as usize;
+        let steps = manifest.steps.get(first..first + segment.steps as usize);
+        steps.map(|steps| steps.iter().map(|it| it.frame.clone()).collect::<Vec<_>>())
+    };
+    let mut series = next.series.clone();
+    for segment in &mut series {
+        let own = frames(next, segment);
+        let same = |there: &&SeriesSegment| own.is_some() && frames(newest, there) == own;
+        if let Some(there) = newest.series.iter().find(same) {
+            segment.series = there.series.clone();
+        }
+    }
+    next.series = series;
+    Ok(())
+}
+
+async fn read(store: &Store, key: &ObjectKey) -> Result<Option<Manifest>, StorageError> {
+    let Some(manifest) = document::get::<Manifest>(store, key).await? else {
+        return Ok(None);
+    };
     manifest
         .grid
         .validate()
-        .map_err(|e| StorageError::damaged(key.as_str(), e))?;
-    if manifest.schema != MANIFEST_SCHEMA {
+        .map_err(|e| damage::found(key, e))?;
+    if !(OLDEST_MANIFEST_SCHEMA..=MANIFEST_SCHEMA).contains(&manifest.schema) {
+        // Whole, but of a program to come.
         let reason = format!(
-            "schema {} is unknown, this program reads {MANIFEST_SCHEMA}",
+            "schema {} is unknown, this program reads {OLDEST_MANIFEST_SCHEMA} to {MANIFEST_SCHEMA}",
             manifest.schema
         );
         return Err(StorageError::damaged(key.as_str(), reason));
     }
-    Ok(manifest)
+    Ok(Some(manifest))
 }
 
 #[cfg(test)]
@@ -90,6 +154,7 @@ mod tests {
             domain: ObjectKey::domain(&product, &Digest::of(b"")),
             series: vec![],
             derived_from: None,
+            notices: vec![],
             product,
         }
     }
@@ -115,5 +180,23 @@ mod tests {
         commit(&store, &manifest(1, "mine")).await.unwrap();
         let second = commit(&store, &manifest(1, "yours")).await;
         assert!(matches!(second, Err(StorageError::Conflict { .. })));
+    }
+
+    #[tokio::test]
+    async fn a_manifest_with_a_flipped_bit_is_never_read_as_another_one() {
+        let store = Store::memory();
+        commit(&store, &manifest(1, "t")).await.unwrap();
+        let key = ObjectKey::manifest(&"p".parse().unwrap(), 1);
+        let whole = store.get(&key).await.unwrap();
+        for at in 0..whole.len() * 8 {
+            let mut flipped = whole.to_vec();
+            flipped[at / 8] ^= 1 << (at % 8);
+            store.put_over(&key, flipped.into()).await.unwrap();
+            let error = latest(&store, &"p".parse().unwrap()).await.unwrap_err();
+            assert!(
+                error.to_string().contains(key.as_str()),
+                "bit {at}: {error}"
+            );
+        }
     }
 }

@@ -1,34 +1,61 @@
-//! One record batch to Parquet bytes and back, with the same bytes for the same values.
+//! One record batch to sealed Parquet bytes and back, with the same bytes for the same values.
 
-use arrow::array::{Array as _, ArrayRef, ListArray, PrimitiveArray, RecordBatch, UInt32Array};
+use arrow::array::{Array as _, ArrayRef, ListArray, PrimitiveArray, RecordBatch};
 use arrow::compute::concat_batches;
 use arrow::datatypes::{ArrowPrimitiveType, DataType, SchemaRef};
 use bytes::Bytes;
+use contract::key::ObjectKey;
 use parquet::arrow::ArrowWriter;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use parquet::basic::{Compression, ZstdLevel};
-use parquet::file::properties::{EnabledStatistics, WriterProperties};
+use parquet::file::metadata::KeyValue;
+use parquet::file::properties::{EnabledStatistics, WriterProperties, WriterPropertiesBuilder};
 use parquet::schema::types::ColumnPath;
 
 use crate::StorageError;
+use crate::sound::{damage, seal};
 
-/// Bytes after which a page of arrays ends, which it does between rows: a row of 1024 values or more is a page of its
+/// Bytes after which a page of arrays ends, which it does between rows: a row of 256 values or more is a page of its
 /// own, so that a reader who wants some rows fetches and decodes those and no others.
-const PAGE_BYTES: usize = 4 << 10;
+const PAGE_BYTES: usize = 1 << 10;
+/// Name of the entry of a file that holds the lengths of what its values lie on.
+const SHAPE: &str = "fluxglobe.shape";
 
-/// Bytes of a table; `rows_per_group` is how many rows share their entries in the footer.
-pub(crate) fn encode(batch: &RecordBatch, rows_per_group: usize) -> Result<Bytes, StorageError> {
+/// Bytes of a table; `rows_per_group` is how many rows share their entries in the footer, `shape` what its values lie on.
+pub(crate) fn encode(
+    batch: &RecordBatch,
+    rows_per_group: usize,
+    shape: &[u32],
+) -> Result<Bytes, StorageError> {
+    encode_as(batch, shape, properties(batch, rows_per_group))
+}
+
+/// The same as another version of the libraries, or of this program, might write it.
+pub(crate) fn encode_as(
+    batch: &RecordBatch,
+    shape: &[u32],
+    properties: WriterPropertiesBuilder,
+) -> Result<Bytes, StorageError> {
     let damaged = |e: parquet::errors::ParquetError| StorageError::damaged("table to write", e);
-    let properties = properties(batch, rows_per_group);
+    let shape: Vec<String> = shape.iter().map(ToString::to_string).collect();
+    let shape = KeyValue::new(SHAPE.to_owned(), shape.join(" "));
+    let properties = properties.set_key_value_metadata(Some(vec![shape])).build();
     let mut out = Vec::new();
     let mut writer =
         ArrowWriter::try_new(&mut out, batch.schema(), Some(properties)).map_err(damaged)?;
     writer.write(batch).map_err(damaged)?;
     writer.close().map_err(damaged)?;
-    Ok(Bytes::from(out))
+    Ok(Bytes::from(seal::parquet(out)))
 }
 
-fn properties(batch: &RecordBatch, rows_per_group: usize) -> WriterProperties {
+/// A table that was read, and what its values lie on: nothing where the file does not say.
+pub(crate) struct Table {
+    pub(crate) batch: RecordBatch,
+    pub(crate) shape: Vec<u32>,
+}
+
+/// How tables are written.
+fn properties(batch: &RecordBatch, rows_per_group: usize) -> WriterPropertiesBuilder {
     let mut properties = WriterProperties::builder()
         .set_compression(Compression::ZSTD(ZstdLevel::default()))
         .set_created_by("fluxglobe".to_owned())
@@ -49,28 +76,44 @@ fn properties(batch: &RecordBatch, rows_per_group: usize) -> WriterProperties {
             ),
         };
     }
-    properties.build()
+    properties
 }
 
 /// The table in some bytes, which must have this schema.
 pub(crate) fn decode(
-    object: &str,
+    key: &ObjectKey,
     content: Bytes,
     schema: &SchemaRef,
-) -> Result<RecordBatch, StorageError> {
-    let damaged = |e: &dyn std::fmt::Display| StorageError::damaged(object, e);
+) -> Result<Table, StorageError> {
+    let damaged = |e: &dyn std::fmt::Display| damage::found(key, e);
     let builder = ParquetRecordBatchReaderBuilder::try_new(content).map_err(|e| damaged(&e))?;
+    let entries = builder.metadata().file_metadata().key_value_metadata();
+    let shape = entries
+        .into_iter()
+        .flatten()
+        .find(|entry| entry.key == SHAPE)
+        .and_then(|entry| entry.value.as_deref());
+    let shape = shape
+        .unwrap_or_default()
+        .split_whitespace()
+        .map(str::parse)
+        .collect::<Result<_, _>>()
+        .map_err(|e| damaged(&e))?;
     let reader = builder.build().map_err(|e| damaged(&e))?;
     let batches: Vec<RecordBatch> = reader.collect::<Result<_, _>>().map_err(|e| damaged(&e))?;
     let found = batches.first().map(RecordBatch::schema);
     if found.is_some_and(|found| found.fields() != schema.fields()) {
-        return Err(StorageError::damaged(object, "its columns are others"));
+        return Err(damaged(&"its columns are others"));
     }
-    concat_batches(schema, &batches).map_err(|e| damaged(&e))
+    let batch = concat_batches(schema, &batches).map_err(|e| damaged(&e))?;
+    Ok(Table { batch, shape })
 }
 
 /// A column of numbers of a decoded table.
-pub(crate) fn numbers(batch: &RecordBatch, column: usize) -> &UInt32Array {
+pub(crate) fn numbers<T: ArrowPrimitiveType>(
+    batch: &RecordBatch,
+    column: usize,
+) -> &PrimitiveArray<T> {
     batch
         .column(column)
         .as_any()
@@ -101,7 +144,7 @@ pub(crate) fn row_values<T: ArrowPrimitiveType>(
 mod tests {
     use std::sync::Arc;
 
-    use arrow::array::{Float32Builder, ListBuilder};
+    use arrow::array::{Float32Builder, ListBuilder, UInt32Array};
     use arrow::datatypes::{Field, Schema};
     use parquet::file::metadata::{PageIndexPolicy, ParquetMetaDataReader};
 
@@ -124,7 +167,7 @@ mod tests {
         }
         let numbers = Arc::new(UInt32Array::from_iter_values(0..100));
         let batch = RecordBatch::try_new(schema, vec![numbers, Arc::new(lists.finish())]).unwrap();
-        let bytes = encode(&batch, 64).unwrap();
+        let bytes = encode(&batch, 64, &[]).unwrap();
         let metadata = ParquetMetaDataReader::new()
             .with_page_index_policy(PageIndexPolicy::Required)
             .parse_and_finish(&bytes)

@@ -3,24 +3,35 @@
 use std::sync::{Arc, LazyLock};
 
 use arrow::array::{Float32Builder, ListBuilder, RecordBatch, UInt32Array};
-use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
+use arrow::datatypes::{DataType, Field, Float32Type, Schema, SchemaRef, UInt32Type};
 use bytes::Bytes;
 use contract::chunk::windows;
 use contract::digest::Digest;
 use contract::grid::Grid;
 use contract::key::ObjectKey;
+use contract::kind::Vouched;
 use contract::product::ProductId;
 
-use crate::frames::value_field;
-use crate::{StorageError, Store, parquet_table};
+use crate::frames::{shape_only, value_field};
+use crate::row_check::RowCheck;
+use crate::sound::{damage, off_thread};
+use crate::values::{ValuesDigest, no_data_alike};
+use crate::{Encoded, StorageError, Store, parquet_table};
 
 /// Rows and columns of a block: a point reads 64 cells, 94 KiB for a year of days.
 pub const BLOCK_CELLS: u32 = 8;
 /// Blocks a reader takes at once.
 const BLOCKS_PER_GROUP: usize = 32;
 
-/// Columns of a series: `block` and `values`, `[cell in the block, step]`.
+/// Columns of a series: `block`, `values`, `[cell in the block, step]`, and `check`, the [`RowCheck`] of both.
 pub static SCHEMA: LazyLock<SchemaRef> = LazyLock::new(|| {
+    let mut fields = SCHEMA_1.fields().to_vec();
+    fields.push(Arc::new(Field::new("check", DataType::UInt32, false)));
+    Arc::new(Schema::new(fields))
+});
+
+/// The same of series that are named by their bytes.
+pub static SCHEMA_1: LazyLock<SchemaRef> = LazyLock::new(|| {
     Arc::new(Schema::new(vec![
         Field::new("block", DataType::UInt32, false),
         Field::new("values", DataType::List(value_field()), false),
@@ -36,8 +47,27 @@ pub fn block_of(grid: &Grid, row: u32, col: u32) -> (u32, u32) {
     (i * blocks_across + j, cell)
 }
 
-/// Bytes of a series of `steps`, each `[row, col]` in the order of time.
-pub fn encode(grid: &Grid, steps: &[&[f32]]) -> Result<Bytes, StorageError> {
+/// A series of `steps`, each `[row, col]`, in the order of time, as bytes.
+pub fn encode(grid: &Grid, steps: &[&[f32]]) -> Result<Encoded, StorageError> {
+    let shape = [grid.rows, grid.cols, steps.len() as u32];
+    let batch = batch(grid, steps)?;
+    Ok(Encoded {
+        values_sha256: digest_of(grid, steps),
+        content: parquet_table::encode(&batch, BLOCKS_PER_GROUP, &shape)?,
+    })
+}
+
+/// What a series is: the shape of its grid and its steps in the order of time, each row by row.
+fn digest_of(grid: &Grid, steps: &[&[f32]]) -> Digest {
+    let shape = ValuesDigest::new("fluxglobe series 2\n")
+        .number(grid.rows.into())
+        .number(grid.cols.into())
+        .number(steps.len() as i64);
+    let all = steps.iter().fold(shape, |sum, step| sum.values(step));
+    all.finish()
+}
+
+fn batch(grid: &Grid, steps: &[&[f32]]) -> Result<RecordBatch, StorageError> {
     if steps.iter().any(|step| step.len() != grid.cell_count()) {
         return Err(StorageError::damaged(
             "series to write",
@@ -46,37 +76,87 @@ pub fn encode(grid: &Grid, steps: &[&[f32]]) -> Result<Bytes, StorageError> {
     }
     let blocks = windows(grid, BLOCK_CELLS, BLOCK_CELLS);
     let mut lists = ListBuilder::new(Float32Builder::new()).with_field(value_field());
-    for block in &blocks {
+    let mut checks = Vec::with_capacity(blocks.len());
+    let mut values = vec![];
+    for (number, block) in blocks.iter().enumerate() {
+        values.clear();
         for index in block.cell_indices(grid) {
-            for step in steps {
-                let value = step[index];
-                let value = if value.is_nan() { f32::NAN } else { value };
-                lists.values().append_value(value);
-            }
+            values.extend(steps.iter().map(|step| no_data_alike(step[index])));
         }
+        lists.values().append_slice(&values);
         lists.append(true);
+        let check = RowCheck::new().u32(number as u32).f32s(&values);
+        checks.push(check.finish());
     }
-    let batch = RecordBatch::try_new(
+    RecordBatch::try_new(
         Arc::clone(&SCHEMA),
         vec![
             Arc::new(UInt32Array::from_iter_values(0..blocks.len() as u32)),
             Arc::new(lists.finish()),
+            Arc::new(UInt32Array::from(checks)),
         ],
     )
-    .map_err(|e| StorageError::damaged("series to write", e))?;
-    parquet_table::encode(&batch, BLOCKS_PER_GROUP)
+    .map_err(|e| StorageError::damaged("series to write", e))
 }
 
-/// Stores a series under the digest of its bytes.
+/// The steps of a series that is named by its values, each `[row, col]`.
+pub(crate) fn decode(key: &ObjectKey, content: Bytes) -> Result<Vec<Vec<f32>>, StorageError> {
+    let damaged = |reason: &str| damage::found(key, reason);
+    let Vouched::Values(name) = key.vouches() else {
+        return Err(damaged("it is not named by its values"));
+    };
+    let table = parquet_table::decode(key, content, &SCHEMA)?;
+    let [rows, cols, step_count] = table.shape[..] else {
+        return Err(damaged("it does not say what its values lie on"));
+    };
+    let (grid, step_count) = (shape_only(rows, cols), step_count as usize);
+    let blocks = windows(&grid, BLOCK_CELLS, BLOCK_CELLS);
+    let numbers = parquet_table::numbers::<UInt32Type>(&table.batch, 0);
+    if table.batch.num_rows() != blocks.len() {
+        return Err(damaged("it has not every block of its grid once"));
+    }
+    let mut steps = vec![vec![f32::NAN; grid.cell_count()]; step_count];
+    for row in 0..blocks.len() {
+        let values = parquet_table::row_values::<Float32Type>(&table.batch, 1, row);
+        let block = blocks
+            .get(numbers.value(row) as usize)
+            .filter(|block| block.cell_count() * step_count == values.len())
+            .ok_or_else(|| damaged("a block does not fit its grid"))?;
+        let runs = values.values().chunks_exact(step_count.max(1));
+        for (index, run) in block.cell_indices(&grid).zip(runs) {
+            for (step, value) in steps.iter_mut().zip(run) {
+                step[index] = *value;
+            }
+        }
+    }
+    let views: Vec<&[f32]> = steps.iter().map(Vec::as_slice).collect();
+    if digest_of(&grid, &views) == name {
+        Ok(steps)
+    } else {
+        Err(damaged("its values are not those of its name"))
+    }
+}
+
+/// Is a stored series what its name says? It is read whole.
+pub async fn check(store: &Store, key: &ObjectKey) -> Result<(), StorageError> {
+    let content = store.get(key).await?;
+    if let Vouched::Values(_) = key.vouches() {
+        let key = key.clone();
+        off_thread(move || decode(&key, content).map(|_steps| ())).await?;
+    }
+    Ok(())
+}
+
+/// Stores a series under the digest of its values.
 pub async fn write(
     store: &Store,
     product: &ProductId,
     grid: &Grid,
     steps: &[&[f32]],
 ) -> Result<ObjectKey, StorageError> {
-    let content = encode(grid, steps)?;
-    let key = ObjectKey::series(product, &Digest::of(&content));
-    store.put_new(&key, content).await?;
+    let encoded = encode(grid, steps)?;
+    let key = ObjectKey::series(product, &encoded.values_sha256);
+    store.put_new(&key, encoded.content).await?;
     Ok(key)
 }
 
@@ -84,7 +164,6 @@ pub async fn write(
 #[expect(clippy::float_cmp, reason = "these values are exact")]
 mod tests {
     use super::*;
-    use arrow::datatypes::Float32Type;
 
     #[test]
     fn every_cell_finds_its_own_run() {
@@ -102,17 +181,25 @@ mod tests {
                 .collect()
         };
         let (a, b) = (step(0), step(1));
-        let bytes = encode(&grid, &[&a, &b]).unwrap();
-        let table = parquet_table::decode("s", bytes, &SCHEMA).unwrap();
+        let encoded = encode(&grid, &[&a, &b]).unwrap();
+        let key = ObjectKey::series(&"p".parse().unwrap(), &encoded.values_sha256);
+        let content = encoded.content;
+        let table = parquet_table::decode(&key, content.clone(), &SCHEMA).unwrap();
         for row in 0..grid.rows {
             for col in 0..grid.cols {
                 let (block, cell) = block_of(&grid, row, col);
-                let run = parquet_table::row_values::<Float32Type>(&table, 1, block as usize);
+                let run = parquet_table::row_values::<Float32Type>(&table.batch, 1, block as usize);
                 let index = (row * grid.cols + col) as f32;
                 let at = cell as usize * 2;
                 assert_eq!(run.value(at), index * 10.0);
                 assert_eq!(run.value(at + 1), index * 10.0 + 1.0);
             }
         }
+        assert_eq!(
+            decode(&key, content.clone()).unwrap(),
+            [a.clone(), b.clone()]
+        );
+        let swapped = encode(&grid, &[&b, &a]).unwrap();
+        assert!(decode(&key, swapped.content).is_err());
     }
 }

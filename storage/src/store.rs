@@ -5,6 +5,7 @@
 //! themselves, [`patient`] for HDFS), and nothing else.
 
 mod check;
+mod checked;
 mod clouds;
 mod create;
 #[cfg(test)]
@@ -29,6 +30,7 @@ use object_store::path::Path;
 use object_store::prefix::PrefixStore;
 use url::Url;
 
+use self::checked::Checked;
 use self::location::Location;
 use crate::StorageError;
 
@@ -54,6 +56,7 @@ pub struct Store {
     url: String,
     place: Place,
     patience: Patience,
+    checked: Arc<Checked>,
 }
 
 /// What kind of store it is, where that matters.
@@ -116,6 +119,7 @@ impl Store {
             url: "memory:///".to_owned(),
             place: Place::Memory,
             patience: Patience::default(),
+            checked: Arc::default(),
         }
     }
 
@@ -134,6 +138,7 @@ impl Store {
             url: format!("file://{}/", text.trim_end_matches('/')),
             place: Place::Folder(root),
             patience: Patience::default(),
+            checked: Arc::default(),
         })
     }
 
@@ -152,6 +157,7 @@ impl Store {
             url: format!("{root_url}{prefix}{slash}"),
             place,
             patience,
+            checked: Arc::default(),
         })
     }
 

@@ -125,6 +125,7 @@ fn an_ingest_service_whose_spool_is_full_waits_and_lands_everything_when_there_i
         executors: 1,
         ingestds: 1,
         render_workers: 1,
+        tile_servers: 1,
     };
     let mut cluster = Cluster::start(shape, inbox.path()).unwrap();
     let spool = cluster.setting("FLUXGLOBE_SPOOL").unwrap().to_owned();

@@ -1,8 +1,6 @@
-//! Files to land: the real monthly fluxes, and small synthetic ones.
+//! Files to land: the real monthly fluxes.
 
 use std::path::{Path, PathBuf};
-
-use harness::program;
 
 /// Files and the product they land in.
 pub(crate) struct Granules {
@@ -33,20 +31,4 @@ pub(crate) fn some(inbox: &Path) -> Granules {
         time: "2000-05-20T06:00:00Z",
         tiles: &[(0, 0, 0), (2, 1, 1), (3, 0, 3)],
     }
-}
-
-/// A small synthetic file; another seed makes other weather.
-pub(crate) fn synthetic(file: &Path, seed: u64) {
-    let (file, seed) = (file.to_str().unwrap(), seed.to_string());
-    let words = [
-        "generate",
-        "china-sea",
-        "--scale",
-        "0.05",
-        "--seed",
-        &seed,
-        "-o",
-        file,
-    ];
-    program::succeed(file.as_ref(), &words).unwrap();
 }

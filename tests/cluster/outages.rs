@@ -33,6 +33,7 @@ fn what_goes_away_and_comes_back_costs_nothing_but_time() {
         executors: 1,
         ingestds: 1,
         render_workers: 1,
+        tile_servers: 1,
     };
     let mut outage = Outage {
         cluster: Cluster::start(shape, inbox.path()).unwrap(),

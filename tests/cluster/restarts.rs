@@ -17,6 +17,7 @@ const ONE_OF_EACH: Shape = Shape {
     executors: 1,
     ingestds: 1,
     render_workers: 1,
+    tile_servers: 1,
 };
 
 #[test]

@@ -118,6 +118,7 @@ fn every_service_is_scraped_under_its_name_and_told_of_when_it_is_gone() {
         executors: 1,
         ingestds: 1,
         render_workers: 1,
+        tile_servers: 1,
     };
     let mut cluster = Cluster::start(shape, inbox.path()).unwrap();
     let prometheus = Prometheus::start(&cluster);

@@ -58,6 +58,58 @@ fn the_same_file_twice_lands_once() {
     );
 }
 
+/// Values past the range of a profile, as the line of the file, the list of products and their JSON count them.
+#[test]
+fn what_is_masked_is_counted_where_people_look() {
+    let data = tempfile::tempdir().unwrap();
+    let file = harness::granule::write(data.path(), 0, 0).unwrap();
+    let profile = |range: &str| {
+        let path = data.path().join("own.toml");
+        let text = format!(
+            "name = \"own\"\nproduct = \"own-flux\"\ntitle = \"Flux\"\nsource = \"a test\"\n\
+             quantity = \"carbon_flux\"\n[variable]\nname = \"fgco2\"\n{range}"
+        );
+        std::fs::write(&path, text).unwrap();
+        path.to_str().unwrap().to_owned()
+    };
+    let land = |range: &str| {
+        let words = [
+            "ingest",
+            file.to_str().unwrap(),
+            "--profile",
+            &profile(range),
+            "--json",
+        ];
+        program::json(data.path(), &words).unwrap()
+    };
+    let listed = || {
+        let all = program::json(data.path(), &["products", "--json"]).unwrap();
+        let output = program::run(data.path(), &["products"]).unwrap();
+        let talk = String::from_utf8(output.stderr).unwrap();
+        (all[0]["masked"].clone(), talk)
+    };
+    assert_eq!(land("")["masked"], serde_json::json!({}));
+    let (masked, talk) = listed();
+    assert_eq!(
+        (&masked["out_of_range"], &masked["steps"]),
+        (&0.into(), &0.into())
+    );
+    assert!(!talk.contains("masked"), "{talk}");
+
+    let line = land("valid_range = [-1e-8, 1e-8]\n");
+    let count = line["masked"]["out_of_range"].as_u64().unwrap();
+    assert!(count > 0, "{line}");
+    let (masked, talk) = listed();
+    assert_eq!(masked["out_of_range"], count);
+    assert_eq!(
+        (&masked["steps"], &masked["uncounted_steps"]),
+        (&1.into(), &0.into())
+    );
+    assert_eq!(masked["most"]["cells"], count);
+    let warning = format!("own-flux: {count} values masked ({count} outside the valid range)");
+    assert!(talk.contains(&warning), "{talk}");
+}
+
 #[test]
 fn a_swath_is_refused_with_its_reason() {
     let Some(set) = test_data::set("wind_ascat_l2") else {

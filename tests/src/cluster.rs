@@ -23,6 +23,8 @@ pub struct Shape {
     pub ingestds: usize,
     /// Render workers.
     pub render_workers: usize,
+    /// Tile servers.
+    pub tile_servers: usize,
 }
 
 impl Default for Shape {
@@ -31,6 +33,7 @@ impl Default for Shape {
             executors: 2,
             ingestds: 2,
             render_workers: 2,
+            tile_servers: 1,
         }
     }
 }
@@ -39,7 +42,7 @@ impl Default for Shape {
 pub struct Cluster {
     /// Services by name; dropped, and so killed, before the servers.
     pub nodes: BTreeMap<String, Node>,
-    /// Address of the tile server.
+    /// Address of the first tile server.
     pub tiles: String,
     /// What stands before S3.
     pub s3: Proxy,
@@ -101,6 +104,13 @@ impl Cluster {
             node.wait_until_ready()?;
         }
         Ok(cluster)
+    }
+
+    /// Addresses of all tile servers.
+    pub fn tile_servers(&self) -> Vec<String> {
+        let nodes = self.nodes.values();
+        let servers = nodes.filter(|node| node.name.starts_with("tile-server"));
+        servers.map(|node| node.admin.clone()).collect()
     }
 
     /// Settings that every process of the cluster has.
@@ -243,6 +253,13 @@ fn plan(shape: Shape) -> (Vec<Planned>, String, Vec<String>) {
     for i in 1..=shape.ingestds {
         add(format!("ingestd-{i}"), &["ingestd"], true);
     }
-    add("tile-server".to_owned(), &["tile-server"], false);
+    for i in 1..=shape.tile_servers {
+        let number = if i == 1 {
+            String::new()
+        } else {
+            format!("-{i}")
+        };
+        add(format!("tile-server{number}"), &["tile-server"], false);
+    }
     (planned, scheduler, renderers)
 }

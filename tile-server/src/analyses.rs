@@ -7,7 +7,7 @@ use contract::digest::Digest;
 use quick_cache::sync::Cache;
 
 use crate::backend::{
-    Analyse, AreaRequest, AreaSeries, BudgetAnswer, BudgetRequest, Check, RowCol,
+    Analyse, AreaRequest, AreaSeries, BudgetAnswer, BudgetRequest, Check, PointStep, RowCol,
 };
 use crate::catalogue::Layer;
 use crate::error::ServerError;
@@ -46,11 +46,7 @@ impl Analyses {
     }
 
     /// The values of a cell, one for each step, stored unit.
-    pub async fn point(
-        &self,
-        layer: &Layer,
-        cell: RowCol,
-    ) -> Result<Vec<Option<f64>>, ServerError> {
+    pub async fn point(&self, layer: &Layer, cell: RowCol) -> Result<Vec<PointStep>, ServerError> {
         let _pass = self
             .gate
             .enter()

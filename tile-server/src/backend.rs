@@ -3,6 +3,7 @@
 //! Left out on purpose: how a picture is drawn or a budget is summed. Both traits take and give values of `contract`
 //! and of this file only, so that the same server runs over a renderer in its process or one behind a network.
 
+use std::num::NonZeroU32;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -16,12 +17,34 @@ use contract::product::ProductId;
 use contract::region::{Cells, Region};
 use contract::time::{Period, TimeMs};
 use serde::{Deserialize, Serialize};
+use tokio::sync::OwnedSemaphorePermit;
+
+/// Leave to draw one picture; the next one waiting gets it when this is dropped.
+///
+/// Whoever draws lets go of it as soon as what is scarce is free again, which is the device: a picture that is encoded
+/// holds up nobody. The default is that of a caller who gives out no turns.
+#[derive(Debug, Default)]
+pub struct Turn(Option<OwnedSemaphorePermit>);
+
+impl Turn {
+    pub(crate) fn new(permit: OwnedSemaphorePermit) -> Self {
+        Self(Some(permit))
+    }
+
+    /// Is it one of a bounded number?
+    pub fn is_counted(&self) -> bool {
+        self.0.is_some()
+    }
+}
 
 /// Draws pictures.
 #[async_trait]
 pub trait Draw: Send + Sync + 'static {
     /// The picture of a valid job as the bytes of a PNG with alpha; a job without data is a transparent picture.
-    async fn draw(&self, job: &RenderJob) -> Result<Bytes, BackendError>;
+    async fn draw(&self, job: &RenderJob, turn: Turn) -> Result<Bytes, BackendError>;
+
+    /// How many pictures it should be given to draw at the same time, where nobody says how many.
+    fn draws_at_once(&self) -> NonZeroU32;
 
     /// Can pictures be drawn now? The text of the error is shown to operators.
     async fn ready(&self) -> Result<(), BackendError>;
@@ -30,12 +53,12 @@ pub trait Draw: Send + Sync + 'static {
 /// Computes series and budgets.
 #[async_trait]
 pub trait Analyse: Send + Sync + 'static {
-    /// The values of one cell, one for each step of the manifest in its order, stored unit; none where there is no data.
+    /// The values of one cell, one for each step of the manifest in its order.
     async fn point(
         &self,
         manifest: &Manifest,
         cell: RowCol,
-    ) -> Result<Vec<Option<f64>>, BackendError>;
+    ) -> Result<Vec<PointStep>, BackendError>;
 
     /// The carbon budget of a region, one row for each step of time.
     async fn budget(&self, request: &BudgetRequest) -> Result<BudgetAnswer, BackendError>;
@@ -161,6 +184,26 @@ pub struct RowCol {
     pub col: u32,
 }
 
+/// One step of a cell's series.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PointStep {
+    /// Stored unit; none where there is no data.
+    pub value: Option<f64>,
+    /// What a sum of accumulated carbon holds; none for other values, and where nobody can tell.
+    pub contributed: Option<Contributed>,
+}
+
+/// What a sum of accumulated carbon holds.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Contributed {
+    /// Steps that had data.
+    pub steps: u32,
+    /// Steps since accumulation started.
+    pub of_steps: u32,
+    /// Share of the time since then that had data, percent; below 100 the sum is not complete.
+    pub time_percent: f64,
+}
+
 /// How a budget's period is cut into rows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -193,7 +236,7 @@ impl std::str::FromStr for BudgetStep {
 /// A budget that is asked for.
 #[derive(Debug, Clone)]
 pub struct BudgetRequest {
-    /// A manifest of a carbon flux.
+    /// A manifest of a carbon flux or of accumulated carbon.
     pub manifest: Arc<Manifest>,
     /// Where.
     pub region: Region,
@@ -239,6 +282,8 @@ pub struct BudgetRow {
     pub gap_tg: Option<f64>,
     /// Area of the sea without data that the estimate stands for, m².
     pub gap_area_m2: f64,
+    /// Of accumulated carbon: area of cells with data in all of the period, and in some of it only, m².
+    pub complete_and_incomplete_m2: Option<[f64; 2]>,
 }
 
 /// A series over a region that is asked for.
@@ -280,30 +325,51 @@ pub struct AreaRow {
     pub coverage_percent: f64,
 }
 
-/// Our numbers beside published ones.
+/// Our numbers beside a paper's and another program's.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Check {
     /// Comparisons in the order they are shown.
     pub rows: Vec<CheckRow>,
-    /// Where the published numbers come from.
+    /// Where the paper's numbers come from.
     pub note: String,
+    /// Where the other program's numbers come from.
+    pub method: String,
 }
 
-/// One number of ours beside a published one.
+/// One number of ours beside the others.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CheckRow {
     /// Region, for people.
     pub what: String,
     /// Period, for people.
     pub period: String,
-    /// The published value.
-    pub published: f64,
-    /// Our value.
-    pub ours: f64,
-    /// Unit of both.
+    /// Unit of all of them.
     pub unit: String,
-    /// Ours against published; none where the published value is too small to divide by.
-    pub difference_percent: Option<f64>,
+    /// The paper's; none where it prints no such number.
+    pub paper: Option<Paper>,
+    /// Another program's, from the same grid.
+    pub independent: f64,
+    /// Ours.
+    pub ours: f64,
+    /// Ours less the other program's.
+    pub difference: f64,
+    /// Is that no more than rounding explains?
+    pub agrees: bool,
+}
+
+/// A number as a paper prints it, and what it says of ours.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Paper {
+    /// As printed.
+    pub value: f64,
+    /// Its uncertainty, where the paper states one.
+    pub uncertainty: Option<f64>,
+    /// Decimals that are printed.
+    pub decimals: usize,
+    /// Ours less the paper's.
+    pub difference: f64,
+    /// `within` or `outside` the paper's own uncertainty, or `no uncertainty stated`.
+    pub verdict: String,
 }
 
 /// What a failure means for who asked.

@@ -1,11 +1,12 @@
 //! Settings of the tile server: flags and environment variables in, plain values with limits out.
 
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::num::NonZeroU32;
 use std::path::PathBuf;
 
 const LISTEN: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), 8080);
 const TILE_MEMORY_BYTES: u64 = 256 << 20;
-const DRAWS_AT_ONCE: u32 = 2;
+const MOST_DRAWS_AT_ONCE: u32 = 1024;
 const DRAW_QUEUE: u32 = 256;
 const ANALYSES_AT_ONCE: u32 = 2;
 const ANALYSIS_QUEUE: u32 = 64;
@@ -28,10 +29,11 @@ pub struct Settings {
     /// Memory for drawn pictures, bytes, 0 to 64 GiB
     #[arg(long, env = "FLUXGLOBE_TILE_MEMORY_BYTES", default_value_t = TILE_MEMORY_BYTES, value_parser = clap::value_parser!(u64).range(0..=64 << 30))]
     pub tile_memory_bytes: u64,
-    /// Pictures drawn at the same time, 1 to 1024
-    #[arg(long, env = "FLUXGLOBE_DRAWS_AT_ONCE", default_value_t = DRAWS_AT_ONCE, value_parser = clap::value_parser!(u32).range(1..=1024))]
-    pub draws_at_once: u32,
-    /// Pictures that may wait to be drawn before clients are sent away, 0 to 65536
+    /// Pictures drawn at the same time, 1 to 1024; if absent 4 on a graphics card, 2 on a software adapter, as many as
+    /// there are cores with --cpu, and 32 where render workers draw. Pictures that are encoded do not count
+    #[arg(long, env = "FLUXGLOBE_DRAWS_AT_ONCE", value_parser = draws_at_once)]
+    pub draws_at_once: Option<NonZeroU32>,
+    /// Pictures that may wait to be drawn, or are drawn and not yet stored, before clients are sent away, 0 to 65536
     #[arg(long, env = "FLUXGLOBE_DRAW_QUEUE", default_value_t = DRAW_QUEUE, value_parser = clap::value_parser!(u32).range(0..=65_536))]
     pub draw_queue: u32,
     /// Series and budgets computed at the same time, 1 to 1024
@@ -66,7 +68,7 @@ impl Default for Settings {
             listen: LISTEN,
             viewer: None,
             tile_memory_bytes: TILE_MEMORY_BYTES,
-            draws_at_once: DRAWS_AT_ONCE,
+            draws_at_once: None,
             draw_queue: DRAW_QUEUE,
             analyses_at_once: ANALYSES_AT_ONCE,
             analysis_queue: ANALYSIS_QUEUE,
@@ -78,6 +80,13 @@ impl Default for Settings {
             idle_limit_s: IDLE_LIMIT_S,
         }
     }
+}
+
+/// A number of pictures: as many as a server may be told to draw at once.
+fn draws_at_once(text: &str) -> Result<NonZeroU32, String> {
+    let count: Option<NonZeroU32> = text.parse().ok();
+    let count = count.filter(|count| count.get() <= MOST_DRAWS_AT_ONCE);
+    count.ok_or_else(|| format!("a whole number, 1 to {MOST_DRAWS_AT_ONCE}"))
 }
 
 #[cfg(test)]
@@ -103,6 +112,7 @@ mod tests {
     fn values_beyond_their_limits_are_refused() {
         for flag in [
             ["--draws-at-once", "0"],
+            ["--draws-at-once", "1025"],
             ["--request-limit-s", "0"],
             ["--listen", "8080"],
             ["--draw-queue", "-1"],

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
+use crate::backend::Turn;
 use crate::error::ServerError;
 
 /// Bounds how much work runs and how much waits.
@@ -15,12 +16,18 @@ pub struct Gate {
     turns: Arc<Semaphore>,
 }
 
-/// The right to run; the next one waiting gets it when this is dropped.
+/// The right to run. Whoever has more to do when what is scarce is free again lets go of the turn before the place.
 #[derive(Debug)]
 pub struct Pass {
-    _place: OwnedSemaphorePermit,
-    _turn: OwnedSemaphorePermit,
+    /// Counts among those who run or wait.
+    pub place: Place,
+    /// The next one waiting gets it when this is dropped.
+    pub turn: Turn,
 }
+
+/// One of those who run or wait.
+#[derive(Debug)]
+pub struct Place(#[expect(dead_code, reason = "held, not read")] OwnedSemaphorePermit);
 
 impl Gate {
     /// A gate that `at_once` pass and at which `queue` may wait.
@@ -42,8 +49,8 @@ impl Gate {
             .await
             .map_err(|_closed| ServerError::Busy)?;
         Ok(Pass {
-            _place: place,
-            _turn: turn,
+            place: Place(place),
+            turn: Turn::new(turn),
         })
     }
 }
@@ -62,6 +69,21 @@ mod tests {
         assert!(matches!(gate.enter().await, Err(ServerError::Busy)));
         drop(first);
         assert!(second.await.is_ok());
+    }
+
+    #[tokio::test]
+    async fn who_lets_go_of_his_turn_alone_is_followed_and_keeps_his_place() {
+        let gate = Gate::new(1, 1);
+        let Pass { place, turn } = gate.enter().await.unwrap();
+        let mut second = Box::pin(gate.enter());
+        assert!(second.as_mut().now_or_never().is_none());
+        drop(turn);
+        let second = second.await.unwrap();
+        assert!(matches!(gate.enter().await, Err(ServerError::Busy)));
+        drop(place);
+        assert!(gate.enter().now_or_never().is_none(), "the third waits");
+        drop(second);
+        assert!(gate.enter().await.is_ok());
     }
 
     #[tokio::test]

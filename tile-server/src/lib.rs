@@ -12,7 +12,7 @@
 //! | `/api/products/{product}/budget?region=&from=&to=&step=&earth=&cells=&manifest=` | carbon budget, its coverage of the sea and what gaps would add |
 //! | `/api/regions` | regions with a name |
 //! | `/api/palettes` | palettes with a name |
-//! | `/api/check` | our budgets beside published ones, `null` where there is nothing to compare with |
+//! | `/api/check` | our budgets beside a paper's and an independent integration's, `null` where there is nothing to compare with |
 //! | `/api/events` | news of new versions as server-sent events |
 //! | `/api/observations/platforms?bbox=&from=&to=&property=&kind=` | buoys, ships, stations and profiles as GeoJSON |
 //! | `/api/observations/{dataset}/{platform}?property=&from=&to=&after=` | what one of them measured |

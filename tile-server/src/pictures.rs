@@ -11,10 +11,10 @@ use quick_cache::Weighter;
 use quick_cache::sync::Cache;
 use storage::{StorageError, Store};
 
-use crate::backend::Draw;
+use crate::backend::{Draw, Turn};
 use crate::error::ServerError;
 use crate::flights::Flights;
-use crate::gate::Gate;
+use crate::gate::{Gate, Pass};
 use crate::metrics::{Metrics, Source};
 
 /// What every PNG begins with (ISO/IEC 15948, 5.2).
@@ -111,7 +111,7 @@ impl Maker {
         let limit = stored.err().map(|StoreAway| AWAY_LIMIT);
         self.metrics.cache_misses.inc();
         let asked_at = Instant::now();
-        let pass = self
+        let Pass { place, turn } = self
             .gate
             .enter()
             .await
@@ -121,14 +121,15 @@ impl Maker {
             .observe(asked_at.elapsed().as_secs_f64());
         // Drawing goes on if those who asked go away: the work is half done, and the next one finds it in the store.
         let drawing = tokio::spawn(async move {
-            let picture = self.draw_within(limit, &job).await?;
+            let picture = self.draw_within(limit, &job, turn).await?;
             let picture = match limit {
                 None => self.keep(&key, picture).await,
                 // It could not be asked for a moment ago; the one who asks next stores it.
                 Some(_) => picture,
             };
             self.remember(digest, picture.clone());
-            drop(pass);
+            // The turn went to the next one when this was drawn; pictures that are encoded or stored count until here.
+            drop(place);
             Ok(picture)
         });
         drawing.await.unwrap_or_else(|e| {
@@ -155,11 +156,12 @@ impl Maker {
         &self,
         limit: Option<Duration>,
         job: &RenderJob,
+        turn: Turn,
     ) -> Result<Bytes, ServerError> {
         let Some(limit) = limit else {
-            return self.draw(job).await;
+            return self.draw(job, turn).await;
         };
-        let drawn = tokio::time::timeout(limit, self.draw(job)).await;
+        let drawn = tokio::time::timeout(limit, self.draw(job, turn)).await;
         drawn.unwrap_or_else(|_elapsed| {
             Err(ServerError::StoreAway {
                 limit_s: limit.as_secs(),
@@ -167,9 +169,9 @@ impl Maker {
         })
     }
 
-    async fn draw(&self, job: &RenderJob) -> Result<Bytes, ServerError> {
+    async fn draw(&self, job: &RenderJob, turn: Turn) -> Result<Bytes, ServerError> {
         let started_at = Instant::now();
-        let drawn = self.drawer.draw(job).await;
+        let drawn = self.drawer.draw(job, turn).await;
         let mode = job.mode.as_str();
         self.metrics
             .draw_duration_s

@@ -59,7 +59,10 @@ impl AppState {
         registry: Registry,
     ) -> Result<Self, ServeError> {
         let metrics = Metrics::register(&registry)?;
-        let draws = Gate::new(settings.draws_at_once, settings.draw_queue);
+        let at_once = settings
+            .draws_at_once
+            .unwrap_or_else(|| drawer.draws_at_once());
+        let draws = Gate::new(at_once.get(), settings.draw_queue);
         let analyses = Gate::new(settings.analyses_at_once, settings.analysis_queue);
         let max_age = Duration::from_millis(settings.catalogue_age_ms);
         let memory_bytes = settings.tile_memory_bytes;

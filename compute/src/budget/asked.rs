@@ -10,24 +10,28 @@ use contract::manifest::Step;
 use contract::time::{Period, TimeMs};
 use datafusion::arrow::array::{AsArray as _, RecordBatch};
 use datafusion::arrow::compute::cast;
-use datafusion::arrow::datatypes::{DataType, Decimal128Type, TimestampMillisecondType};
+use datafusion::arrow::datatypes::{DataType, Decimal128Type, Int64Type, TimestampMillisecondType};
 
 use super::bands::{BAND_COUNT, band_areas, summed_bands};
 use super::rows::StepSum;
 use super::sums::Measure;
 use crate::region::weights::RegionKeys;
+use crate::scan::{self, Layout};
 use crate::session::QueryContext;
-use crate::{ComputeError, Engine, scan};
+use crate::{ComputeError, Engine};
 
 /// One row a step: the seconds are those of the whole step; parts of steps are shared out afterwards, exactly.
 ///
 /// Weights are no table: a join would hold them beside every chunk, and under Ballista it would send every value to
 /// another part of the query. What is asked of the frames is which chunks to read.
+///
+/// Chunks are counted: one that a damaged footer hides from the engine must not be missing from a sum in silence.
 const STEP_SUMS: &str = "
     SELECT period_start,
            period_end,
            SUM(get_field(sums, 'mass')) AS mass,
            SUM(get_field(sums, 'area')) AS area,
+           SUM(get_field(sums, 'chunks')) AS chunks,
            STRING_AGG(bands, ' ') AS bands
     FROM (SELECT period_start,
                  period_end,
@@ -40,11 +44,13 @@ const STEP_SUMS: &str = "
 /// A region on a grid, its weights read.
 pub(super) struct AskedRegion {
     grid: Grid,
+    weights: RegionKeys,
     /// Addresses of the weights.
     all: String,
     ocean: String,
     /// Chunks that the region touches.
     runs: Vec<(u32, u32)>,
+    chunk_count: usize,
     /// Area of its sea in every band, m² in steps of 10⁻⁶.
     pub(super) sea_steps: [i128; BAND_COUNT],
 }
@@ -65,9 +71,11 @@ impl AskedRegion {
             .map_err(|e| ComputeError::inconsistent(weights.ocean.as_str(), e))?;
         Ok(Self {
             grid: *grid,
+            weights: weights.clone(),
             all,
             ocean,
             runs: whole.runs(),
+            chunk_count: whole.chunk_count(),
             sea_steps,
         })
     }
@@ -101,12 +109,52 @@ pub(super) async fn asked(
     measure: Measure,
 ) -> Result<Vec<StepSum>, ComputeError> {
     let frames: Vec<&ObjectKey> = steps.iter().map(|step| &step.frame).collect();
-    let weights = (&region.all, &region.ocean);
-    let job = Digest::of_json(&("sums", measure, &frames, weights));
+    let job = Digest::of_json(&("sums", measure, &frames, &region.weights));
     let ask = |context| ask(engine, context, &frames, region, measure);
+    let answered = async {
+        let answer = engine.answer(job, ask).await?;
+        in_order(steps, &answer)
+    };
+    let mut read = frames.clone();
+    read.extend([&region.weights.all, &region.weights.ocean]);
+    scan::or_damaged(engine.store(), &read, answered.await).await
+}
+
+/// An answer of the engine: rows, and of how many chunks each must be.
+struct Answer {
+    batches: Vec<RecordBatch>,
+    chunk_count: usize,
+}
+
+async fn ask(
+    engine: &Engine,
+    context: QueryContext,
+    frames: &[&ObjectKey],
+    region: &AskedRegion,
+    measure: Measure,
+) -> Result<Answer, ComputeError> {
+    let store = engine.store();
+    scan::register(&context, "frames", store, frames, Layout::Frames).await?;
+    let failed = || ComputeError::engine("summing over a region");
+    let query = context.sql(&sql(measure, region)).await.map_err(failed())?;
+    Ok(Answer {
+        batches: query.collect().await.map_err(failed())?,
+        chunk_count: region.chunk_count,
+    })
+}
+
+/// The sums of each of these steps.
+fn in_order(steps: &[&Step], answer: &Answer) -> Result<Vec<StepSum>, ComputeError> {
     let mut sums = BTreeMap::new();
-    for batch in &engine.answer(job, ask).await? {
-        for sum in sums_of(batch)? {
+    for batch in &answer.batches {
+        for (sum, chunk_count) in sums_of(batch)? {
+            if usize::try_from(chunk_count) != Ok(answer.chunk_count) {
+                let reason = format!(
+                    "the engine summed {chunk_count} chunks of {}, the region touches {}",
+                    sum.period, answer.chunk_count
+                );
+                return Err(ComputeError::inconsistent("sums", reason));
+            }
             sums.insert(sum.period.start, sum);
         }
     }
@@ -123,21 +171,8 @@ pub(super) async fn asked(
     })
 }
 
-async fn ask(
-    engine: &Engine,
-    context: QueryContext,
-    frames: &[&ObjectKey],
-    region: &AskedRegion,
-    measure: Measure,
-) -> Result<Vec<RecordBatch>, ComputeError> {
-    let store = engine.store();
-    scan::register(&context, "frames", store, frames, &storage::frames::SCHEMA)?;
-    let failed = || ComputeError::engine("summing over a region");
-    let query = context.sql(&sql(measure, region)).await.map_err(failed())?;
-    query.collect().await.map_err(failed())
-}
-
-fn sums_of(batch: &RecordBatch) -> Result<Vec<StepSum>, ComputeError> {
+/// Sums of steps, each with the number of chunks in it.
+fn sums_of(batch: &RecordBatch) -> Result<Vec<(StepSum, i64)>, ComputeError> {
     let time = |column: usize| {
         batch
             .column(column)
@@ -145,7 +180,8 @@ fn sums_of(batch: &RecordBatch) -> Result<Vec<StepSum>, ComputeError> {
     };
     let decimal = |column: usize| batch.column(column).as_primitive::<Decimal128Type>();
     let (starts, ends, masses, areas) = (time(0), time(1), decimal(2), decimal(3));
-    let bands = cast(batch.column(4), &DataType::Utf8)
+    let chunk_counts = batch.column(4).as_primitive::<Int64Type>();
+    let bands = cast(batch.column(5), &DataType::Utf8)
         .map_err(|e| ComputeError::inconsistent("sums of bands", e))?;
     let sea = |row: usize| {
         let text = bands.as_string::<i32>().value(row);
@@ -157,12 +193,13 @@ fn sums_of(batch: &RecordBatch) -> Result<Vec<StepSum>, ComputeError> {
                 TimeMs::new(starts.value(row))?,
                 TimeMs::new(ends.value(row))?,
             )?;
-            Ok(StepSum {
+            let sum = StepSum {
                 period,
                 mass_steps: masses.value(row),
                 area_steps: areas.value(row),
                 sea: sea(row)?,
-            })
+            };
+            Ok((sum, chunk_counts.value(row)))
         })
         .collect()
 }

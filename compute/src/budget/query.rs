@@ -8,6 +8,7 @@ use contract::region::{Cells, Region};
 use contract::time::{Period, TimeMs};
 use serde::{Deserialize, Serialize};
 
+use super::accumulated;
 use super::gaps::BASIS;
 use super::rows::{Asked, BudgetRow, BudgetStep, row_periods, rows};
 use super::sums::{self, Measure};
@@ -18,7 +19,7 @@ use crate::{ComputeError, Engine, catalog};
 /// What a budget is asked for.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BudgetQuery {
-    /// Product with a carbon flux.
+    /// Product with a carbon flux, or one of accumulated carbon.
     pub product: ProductId,
     /// Region.
     pub region: Region,
@@ -81,6 +82,9 @@ pub async fn budget_of(
     query: &BudgetQuery,
     manifest: &Manifest,
 ) -> Result<BudgetAnswer, ComputeError> {
+    if manifest.quantity == Quantity::AccumulatedCarbon {
+        return accumulated::budget_of(engine, query, manifest).await;
+    }
     if manifest.quantity != Quantity::CarbonFlux {
         return Err(ComputeError::NotAFlux {
             product: manifest.product.clone(),

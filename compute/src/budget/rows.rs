@@ -4,6 +4,7 @@ use contract::ContractError;
 use contract::time::{Period, TimeMs};
 use serde::{Deserialize, Serialize};
 
+use super::accumulated::Completeness;
 use super::bands::{BAND_COUNT, BandSum};
 use super::fixed::{AREA_DECIMALS, MASS_DECIMALS, decimal_text, share};
 use super::gaps::gap;
@@ -110,6 +111,9 @@ pub struct BudgetRow {
     /// Area of the sea without data that the estimate stands for, mean over the time that steps cover, m². What is
     /// missing besides has no estimate: bands without any data, sea beyond the grid, time without steps.
     pub gap_area_m2: f64,
+    /// How complete the sums of accumulated carbon are; none for fluxes, and in versions that did not count it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub completeness: Option<Completeness>,
 }
 
 /// Kilograms in a teragram.
@@ -213,6 +217,7 @@ impl Total {
             ocean_with_data_m2,
             gap_tg: (!has_gaps || self.gap_time_m2_ms > 0.0).then_some(self.gap_kg / KG_PER_TG),
             gap_area_m2: self.gap_time_m2_ms / covered_ms,
+            completeness: None,
         }
     }
 }

@@ -7,7 +7,7 @@ use contract::key::ObjectKey;
 use contract::manifest::{Manifest, ManifestId, Step};
 use contract::time::{Period, TimeMs};
 use serde::{Deserialize, Serialize};
-use storage::{StorageError, Store};
+use storage::{StorageError, Store, document, manifests};
 
 use super::asked::{AskedRegion, asked};
 use super::bands::{BAND_COUNT, BandSum};
@@ -15,8 +15,8 @@ use super::rows::StepSum;
 use crate::region::weights::RegionKeys;
 use crate::{ComputeError, Engine};
 
-/// Version of stored sums: it changes when their bits or their layout do. 2: the sea by bands of latitude.
-const SCHEMA: u32 = 2;
+/// Version of stored sums: it changes when their bits or their layout do. 3: the sea by bands of latitude.
+const SCHEMA: u32 = 3;
 /// How many versions back sums are looked for that can be taken over.
 const VERSIONS_BACK: u64 = 8;
 
@@ -137,7 +137,7 @@ pub(crate) async fn of_steps(
 ) -> Result<RegionSums, ComputeError> {
     let region = AskedRegion::read(engine, &manifest.grid, weights).await?;
     let key = key(&manifest.id(), weights, measure);
-    let stored = stored_rows(engine.store(), &key).await?;
+    let stored = stored_rows(engine.store(), &key).await?.rows();
     let known: Option<Vec<StepSum>> = steps
         .iter()
         .map(|step| stored.get(&step.frame)?.sum())
@@ -161,14 +161,18 @@ pub async fn store(
 ) -> Result<StoredSums, ComputeError> {
     let store = engine.store();
     let key = key(&manifest.id(), weights, measure);
-    if store.exists(&key).await? {
-        return Ok(StoredSums {
-            key,
-            computed_count: 0,
-            kept_count: manifest.steps.len(),
-        });
-    }
-    let mut known = earlier_rows(store, manifest, weights, measure).await?;
+    let mut known = match stored_rows(store, &key).await? {
+        Stored::Rows(_) => {
+            return Ok(StoredSums {
+                key,
+                computed_count: 0,
+                kept_count: manifest.steps.len(),
+            });
+        }
+        Stored::Nothing => earlier_rows(store, manifest, weights, measure).await?,
+        // Nothing else is trusted where one thing was damaged.
+        Stored::Damaged => BTreeMap::new(),
+    };
     let unknown: Vec<&Step> = manifest
         .steps
         .iter()
@@ -231,9 +235,16 @@ async fn put(
         measure,
         rows,
     };
-    let json =
-        serde_json::to_vec(&table).map_err(|e| ComputeError::inconsistent(key.as_str(), e))?;
-    store.put_new(&key, json.into()).await?;
+    match document::put_new(store, &key, &table).await {
+        Err(StorageError::Conflict { .. })
+            if matches!(stored_rows(store, &key).await?, Stored::Damaged) =>
+        {
+            document::put_over(store, &key, &table).await?;
+        }
+        put => {
+            put?;
+        }
+    }
     Ok(())
 }
 
@@ -248,26 +259,38 @@ fn row_of(frame: &ObjectKey, sum: &StepSum) -> Row {
     }
 }
 
-/// Stored rows by frame; none where there is no table that can be read: sums can always be computed again.
-async fn stored_rows(
-    store: &Store,
-    key: &ObjectKey,
-) -> Result<BTreeMap<ObjectKey, Row>, StorageError> {
-    let content = match store.get(key).await {
-        Ok(content) => content,
-        Err(e) if e.is_not_found() => return Ok(BTreeMap::new()),
-        Err(e) => return Err(e),
-    };
-    match serde_json::from_slice::<Table>(&content) {
-        Ok(table) if table.schema == SCHEMA => {
+/// What is stored under the key of a table.
+enum Stored {
+    /// The rows by frame.
+    Rows(BTreeMap<ObjectKey, Row>),
+    Nothing,
+    /// Something that is no table, or no longer the one that was stored: sums can always be computed again.
+    Damaged,
+}
+
+impl Stored {
+    fn rows(self) -> BTreeMap<ObjectKey, Row> {
+        match self {
+            Self::Rows(rows) => rows,
+            Self::Nothing | Self::Damaged => BTreeMap::new(),
+        }
+    }
+}
+
+async fn stored_rows(store: &Store, key: &ObjectKey) -> Result<Stored, StorageError> {
+    match document::get::<Table>(store, key).await {
+        Ok(Some(table)) => {
             let rows = table.rows.into_iter();
-            Ok(rows.map(|row| (row.frame.clone(), row)).collect())
+            Ok(Stored::Rows(
+                rows.map(|row| (row.frame.clone(), row)).collect(),
+            ))
         }
-        Ok(_) => Ok(BTreeMap::new()),
-        Err(error) => {
+        Ok(None) => Ok(Stored::Nothing),
+        Err(error @ StorageError::Damaged { .. }) => {
             tracing::warn!(%key, %error, "stored sums cannot be read; they are computed again");
-            Ok(BTreeMap::new())
+            Ok(Stored::Damaged)
         }
+        Err(e) => Err(e),
     }
 }
 
@@ -280,20 +303,16 @@ async fn earlier_rows(
 ) -> Result<BTreeMap<ObjectKey, Row>, ComputeError> {
     let oldest = manifest.number.saturating_sub(VERSIONS_BACK).max(1);
     for number in (oldest..manifest.number).rev() {
-        let at = ObjectKey::manifest(&manifest.product, number);
-        let content = match store.get(&at).await {
-            Ok(content) => content,
-            Err(e) if e.is_not_found() => break,
-            Err(e) => return Err(e.into()),
-        };
-        let Ok(earlier) = serde_json::from_slice::<Manifest>(&content) else {
+        let earlier = manifests::numbered(store, &manifest.product, number).await;
+        let Ok(Some(earlier)) = earlier else {
             break;
         };
         // Other cells, other weights.
         if earlier.grid != manifest.grid {
             break;
         }
-        let rows = stored_rows(store, &key(&earlier.id(), weights, measure)).await?;
+        let stored = stored_rows(store, &key(&earlier.id(), weights, measure)).await?;
+        let rows = stored.rows();
         if !rows.is_empty() {
             return Ok(rows);
         }

@@ -1,8 +1,9 @@
 //! One derivation: kept steps and new ones in the order of time, exact sums from one run of steps to the next.
 
-use contract::manifest::{MANIFEST_SCHEMA, Manifest, SeriesSegment, Step};
+use contract::manifest::{Contributed, MANIFEST_SCHEMA, Manifest, SeriesSegment, Step};
 use contract::product::ProductId;
 use contract::quantity::Quantity;
+use storage::contributed::{self, Contributed as Counts};
 use storage::{Store, domain, frames, series};
 
 use super::prior::Prior;
@@ -27,6 +28,8 @@ pub(super) struct Derivation<'a> {
     prior: Prior<'a>,
     /// Exact sums after the steps so far, from the first one on that is not kept.
     sums: Vec<i64>,
+    /// Steps and time that they hold.
+    counts: Counts,
     done: Vec<Step>,
     segments: Vec<SeriesSegment>,
 }
@@ -49,7 +52,8 @@ impl<'a> Derivation<'a> {
             ));
         }
         let domain = domain::write(store, target, &cells).await?;
-        let prior = Prior::of(store, latest, grid, steps, &domain).await?;
+        let mut prior = Prior::of(store, latest, grid, steps, &domain).await?;
+        let counts = prior.contributed(store, grid, steps).await?;
         let kept = &steps[..prior.step_count];
         let sums = match kept.last() {
             // With everything kept nobody asks for the sums.
@@ -71,6 +75,7 @@ impl<'a> Derivation<'a> {
             cells,
             prior,
             sums,
+            counts,
             done: vec![],
             segments: vec![],
         })
@@ -105,6 +110,7 @@ impl<'a> Derivation<'a> {
             domain: self.domain,
             series: self.segments,
             derived_from: Some(self.source.id()),
+            notices: vec![],
         })
     }
 
@@ -126,7 +132,7 @@ impl<'a> Derivation<'a> {
             progress(of_all(self.done.len(), self.steps));
             return Ok(());
         }
-        let columns = self.columns(first, run).await?;
+        let (columns, has_data) = self.columns(first, run).await?;
         let views: Vec<&[f32]> = columns.iter().map(Vec::as_slice).collect();
         let grid = &self.source.grid;
         self.segments.push(SeriesSegment {
@@ -134,10 +140,15 @@ impl<'a> Derivation<'a> {
             steps: run.len() as u32,
             series: series::write(self.store(), self.target, grid, &views).await?,
         });
+        let kept_count = run.len() - has_data.len();
         for (index, (step, values)) in run.iter().zip(&columns).enumerate() {
+            let contributed = match index.checked_sub(kept_count) {
+                Some(new) => self.counted(step, &has_data[new]).await?,
+                None => self.prior.counts(first + index).cloned(),
+            };
             let step = match self.prior.step(first + index) {
                 Some(kept) => kept.clone(),
-                None => self.stored(step, values).await?,
+                None => self.stored(step, values, contributed).await?,
             };
             self.done.push(step);
             progress(of_all(self.done.len(), self.steps));
@@ -145,36 +156,58 @@ impl<'a> Derivation<'a> {
         Ok(())
     }
 
-    /// Values of every step of a run, `[row, col]` each: read where they are kept, else accumulated.
+    /// Values of every step of a run, `[row, col]` each: read where they are kept, else accumulated; and of those that
+    /// are accumulated the cells with data.
     async fn columns(
         &mut self,
         first: usize,
         run: &[SourceStep<'_>],
-    ) -> Result<Vec<Vec<f32>>, ComputeError> {
+    ) -> Result<(Vec<Vec<f32>>, Vec<Vec<bool>>), ComputeError> {
         let kept_count = self.prior.step_count.saturating_sub(first).min(run.len());
         let mut columns = vec![];
         for index in first..first + kept_count {
             columns.push(self.prior.column(self.store(), index, &self.cells).await?);
         }
         let rest = &run[kept_count..];
-        if !rest.is_empty() {
-            let grid = &self.source.grid;
-            let (new, after) =
-                accumulate_segment(self.engine, grid, rest, &self.cells, &self.sums).await?;
-            columns.extend(new);
-            self.sums = after;
+        if rest.is_empty() {
+            return Ok((columns, vec![]));
         }
-        Ok(columns)
+        let grid = &self.source.grid;
+        let new = accumulate_segment(self.engine, grid, rest, &self.cells, &self.sums).await?;
+        columns.extend(new.columns);
+        self.sums = new.after;
+        Ok((columns, new.has_data))
     }
 
-    async fn stored(&self, step: &SourceStep<'_>, values: &[f32]) -> Result<Step, ComputeError> {
+    /// Counts a step in and stores what the sums hold after it.
+    async fn counted(
+        &mut self,
+        step: &SourceStep<'_>,
+        has_data: &[bool],
+    ) -> Result<Option<Contributed>, ComputeError> {
+        self.counts.add(step.period, has_data);
+        let (store, grid, counts) = (self.store(), &self.source.grid, &self.counts);
+        Ok(Some(Contributed {
+            counts: contributed::write(store, self.target, grid, counts).await?,
+            complete_cells: counts.complete_cells(),
+        }))
+    }
+
+    async fn stored(
+        &self,
+        step: &SourceStep<'_>,
+        values: &[f32],
+        contributed: Option<Contributed>,
+    ) -> Result<Step, ComputeError> {
         let (store, grid) = (self.store(), &self.source.grid);
         Ok(Step {
+            masked: None,
             period: step.period,
             frame: frames::write(store, self.target, grid, values, step.period).await?,
             raw_sha256: step.made_of,
             origin: format!("accumulated up to {}", step.step.origin),
             valid_cells: values.iter().filter(|value| !value.is_nan()).count() as u64,
+            contributed,
         })
     }
 }

@@ -1,6 +1,7 @@
 //! The exact sums that accumulation has come to after a step, kept so that the next step needs no earlier one.
 //!
-//! They can be computed again at any time, so that whatever is wrong with a stored one counts as not there.
+//! They can be computed again at any time, so that whatever is wrong with a stored one counts as not there. What is
+//! stored is sealed; what was stored before it was is computed again, too.
 
 use std::sync::Arc;
 
@@ -13,6 +14,7 @@ use datafusion::parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use datafusion::parquet::basic::{Compression, ZstdLevel};
 use datafusion::parquet::errors::ParquetError;
 use datafusion::parquet::file::properties::WriterProperties;
+use storage::sound::{Soundness, seal};
 use storage::{StorageError, Store};
 
 use crate::ComputeError;
@@ -31,8 +33,14 @@ pub(crate) const FOLDER: &str = "accumulating";
 pub(super) async fn keep(store: &Store, made_of: Digest, sums: &[i64]) -> Result<(), ComputeError> {
     let key = key(made_of);
     let content = encode(sums).map_err(|e| ComputeError::inconsistent(key.as_str(), e))?;
-    match store.put_new(&key, content.into()).await {
-        // Another version of the encoder wrote the same sums.
+    match store.put_new(&key, content.clone().into()).await {
+        // Another version of the encoder may have written the same sums.
+        Err(StorageError::Conflict { .. })
+            if kept(store, made_of, sums.len()).await?.as_deref() != Some(sums) =>
+        {
+            store.put_over(&key, content.into()).await?;
+            Ok(())
+        }
         Ok(_) | Err(StorageError::Conflict { .. }) => Ok(()),
         Err(e) => Err(e.into()),
     }
@@ -45,18 +53,21 @@ pub(super) async fn kept(
     cell_count: usize,
 ) -> Result<Option<Vec<i64>>, ComputeError> {
     let key = key(made_of);
-    let content = match store.get(&key).await {
-        Ok(content) => content,
+    let damaged = |error: &dyn std::fmt::Display| {
+        tracing::warn!(%key, %error, "stored sums cannot be read; they are computed again");
+        Ok(None)
+    };
+    let content = match store.get_with_soundness(&key).await {
+        Ok((content, Soundness::Sound)) => content,
+        Ok((_, Soundness::Unsealed)) => return Ok(None),
         Err(e) if e.is_not_found() => return Ok(None),
+        Err(error @ StorageError::Damaged { .. }) => return damaged(&error),
         Err(e) => return Err(e.into()),
     };
     match decode(content) {
         Ok(sums) if sums.len() == cell_count => Ok(Some(sums)),
         Ok(_) => Ok(None),
-        Err(error) => {
-            tracing::warn!(%key, %error, "stored sums cannot be read; they are computed again");
-            Ok(None)
-        }
+        Err(error) => damaged(&error),
     }
 }
 
@@ -73,7 +84,7 @@ fn encode(sums: &[i64]) -> Result<Vec<u8>, ParquetError> {
     let mut writer = ArrowWriter::try_new(&mut out, schema, Some(properties))?;
     writer.write(&batch)?;
     writer.close()?;
-    Ok(out)
+    Ok(seal::parquet(out))
 }
 
 fn decode(content: bytes::Bytes) -> Result<Vec<i64>, ParquetError> {
@@ -108,5 +119,13 @@ mod tests {
         assert!(kept(&store, other, 4).await.unwrap().is_none());
         store.put_new(&key(other), "PAR1".into()).await.unwrap();
         assert!(kept(&store, other, 4).await.unwrap().is_none());
+        let mut flipped = store.get(&key(made_of)).await.unwrap().to_vec();
+        flipped[30] ^= 1;
+        for damaged in [flipped.into(), "PAR1".into()] {
+            store.put_over(&key(made_of), damaged).await.unwrap();
+            assert!(kept(&store, made_of, 4).await.unwrap().is_none());
+            keep(&store, made_of, &sums).await.unwrap();
+            assert_eq!(kept(&store, made_of, 4).await.unwrap().unwrap(), sums);
+        }
     }
 }

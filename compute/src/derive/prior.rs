@@ -2,7 +2,8 @@
 
 use contract::grid::Grid;
 use contract::key::ObjectKey;
-use contract::manifest::{Manifest, SeriesSegment, Step};
+use contract::manifest::{self, Manifest, SeriesSegment, Step};
+use storage::contributed::{self, Contributed};
 use storage::{Store, domain, frames};
 
 use super::source::SourceStep;
@@ -18,6 +19,15 @@ pub(super) struct Prior<'a> {
 }
 
 impl<'a> Prior<'a> {
+    /// Everything is computed.
+    fn nothing() -> Self {
+        Self {
+            manifest: None,
+            step_count: 0,
+            other_domain: None,
+        }
+    }
+
     /// What of the newest manifest can be kept.
     pub(super) async fn of(
         store: &Store,
@@ -26,16 +36,12 @@ impl<'a> Prior<'a> {
         steps: &[SourceStep<'_>],
         domain_now: &ObjectKey,
     ) -> Result<Self, ComputeError> {
-        let nothing = Self {
-            manifest: None,
-            step_count: 0,
-            other_domain: None,
-        };
+        let nothing = Self::nothing();
         let Some(latest) = latest.filter(|latest| latest.grid == *grid) else {
             return Ok(nothing);
         };
         let equal = |(old, new): &(&Step, &SourceStep<'_>)| {
-            old.raw_sha256 == new.made_of && old.period == new.period
+            old.raw_sha256 == new.made_of && old.period == new.period && old.contributed.is_some()
         };
         let step_count = latest.steps.iter().zip(steps).take_while(equal).count();
         let other_domain = if latest.domain == *domain_now {
@@ -48,6 +54,37 @@ impl<'a> Prior<'a> {
             step_count,
             other_domain,
         })
+    }
+
+    /// What the sums after the last kept step hold; nothing before the first step, if none is kept. If the object is
+    /// gone, nothing is kept any more.
+    pub(super) async fn contributed(
+        &mut self,
+        store: &Store,
+        grid: &Grid,
+        steps: &[SourceStep<'_>],
+    ) -> Result<Contributed, ComputeError> {
+        let last = self.step_count.checked_sub(1);
+        if let Some(counts) = last.and_then(|last| self.counts(last)) {
+            match contributed::read(store, &counts.counts, grid).await {
+                Ok(contributed) => return Ok(contributed),
+                Err(e) if e.is_not_found() => {
+                    let key = &counts.counts;
+                    tracing::warn!(%key, "counts of steps are gone; all is accumulated again");
+                }
+                Err(e) => return Err(e.into()),
+            }
+        }
+        *self = Self::nothing();
+        let start = steps.first().map(|step| step.period.start);
+        let start = start.expect("there is a step to accumulate");
+        Ok(Contributed::nothing(grid, start))
+    }
+
+    /// What the sums after a kept step hold: it does not depend on the domain, for a cell that comes or goes had no data.
+    pub(super) fn counts(&self, index: usize) -> Option<&'a manifest::Contributed> {
+        let manifest = self.manifest.filter(|_| index < self.step_count)?;
+        manifest.steps[index].contributed.as_ref()
     }
 
     /// A kept step, if its very bytes are right too.

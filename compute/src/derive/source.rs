@@ -8,8 +8,10 @@ use serde::Serialize;
 
 use crate::ComputeError;
 
-/// Version of the way carbon is accumulated: it changes when its bits do.
-const METHOD: u32 = 1;
+/// Version of the way carbon is accumulated: it changes when its bits do, or what is kept beside them.
+///
+/// 2: the steps and the time that each sum holds.
+const METHOD: u32 = 2;
 
 /// A step of the source and the part of it after the start.
 #[derive(Debug, Clone, Copy)]

@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use contract::chunk::{Window, frame_chunks};
 use contract::digest::Digest;
 use contract::grid::Grid;
-use datafusion::arrow::array::{AsArray as _, RecordBatch};
+use contract::key::ObjectKey;
+use datafusion::arrow::array::{AsArray as _, BooleanArray, RecordBatch};
 use datafusion::arrow::datatypes::{Int64Type, TimestampMillisecondType, UInt32Type};
 use datafusion::error::DataFusionError;
 use datafusion::execution::SendableRecordBatchStream;
@@ -13,16 +14,19 @@ use futures::TryStreamExt as _;
 
 use super::source::SourceStep;
 use crate::budget::running::{add_sums, column_kg_m2};
+use crate::scan::{self, Layout};
 use crate::session::QueryContext;
-use crate::{ComputeError, Engine, scan};
+use crate::{ComputeError, Engine};
 
-/// One row a chunk and step. Seconds are counted from the start of accumulation on.
+/// One row a chunk and step: the sums after it, and which cells it adds to. Seconds are counted from the start of
+/// accumulation on.
 const RUNNING_SUMS: &str = "
     SELECT chunk,
            period_start,
            column_sum(\"values\", seconds) OVER (
                PARTITION BY chunk ORDER BY period_start ROWS BETWEEN UNBOUNDED PRECEDING AND CURRENT ROW
-           ) AS sums
+           ) AS sums,
+           has_data(\"values\") AS has_data
     FROM (
         SELECT chunk, period_start, \"values\",
                (CAST(period_end AS BIGINT) - GREATEST(CAST(period_start AS BIGINT), CAST($start AS BIGINT))) / 1000.0
@@ -41,8 +45,17 @@ const FINAL_SUMS: &str = "
     )
     GROUP BY chunk";
 
-/// Accumulated columns after every step of a run, kg m⁻², `[row, col]`, NaN outside the domain, and the exact sums
-/// after its last step.
+/// A run of steps, accumulated.
+pub(super) struct Accumulated {
+    /// Columns after every step, kg m⁻², `[row, col]`, NaN outside the domain.
+    pub(super) columns: Vec<Vec<f32>>,
+    /// Cells with data in every step, `[row, col]`.
+    pub(super) has_data: Vec<Vec<bool>>,
+    /// Exact sums after the last step, `[row, col]`, kg m⁻² in steps of 10⁻¹⁵.
+    pub(super) after: Vec<i64>,
+}
+
+/// Accumulates a run of steps.
 ///
 /// `before` holds the exact sums of the steps before (`[row, col]`, kg m⁻² in steps of 10⁻¹⁵).
 pub(super) async fn accumulate_segment(
@@ -51,7 +64,7 @@ pub(super) async fn accumulate_segment(
     run: &[SourceStep<'_>],
     domain: &[bool],
     before: &[i64],
-) -> Result<(Vec<Vec<f32>>, Vec<i64>), ComputeError> {
+) -> Result<Accumulated, ComputeError> {
     let job = job("running sums", run);
     let columns = |context: QueryContext| async move {
         let mut batches = query(engine, &context, RUNNING_SUMS, run).await?;
@@ -61,7 +74,8 @@ pub(super) async fn accumulate_segment(
         }
         segment.finish()
     };
-    engine.answer(job, columns).await
+    let answered = engine.answer(job, columns).await;
+    scan::or_damaged(engine.store(), &frames_of(run), answered).await
 }
 
 /// The exact sums after the last step of a run, `[row, col]`, kg m⁻² in steps of 10⁻¹⁵.
@@ -90,7 +104,12 @@ pub(super) async fn sums_after(
         }
         all_chunks(taken, windows.len()).map(|()| sums)
     };
-    engine.answer(job, sums).await
+    let answered = engine.answer(job, sums).await;
+    scan::or_damaged(engine.store(), &frames_of(run), answered).await
+}
+
+fn frames_of<'a>(run: &[SourceStep<'a>]) -> Vec<&'a ObjectKey> {
+    run.iter().map(|step| &step.step.frame).collect()
 }
 
 fn failed() -> impl FnOnce(DataFusionError) -> ComputeError {
@@ -109,9 +128,8 @@ async fn query(
     sql: &str,
     run: &[SourceStep<'_>],
 ) -> Result<SendableRecordBatchStream, ComputeError> {
-    let frames: Vec<_> = run.iter().map(|step| &step.step.frame).collect();
-    let (store, schema) = (engine.store(), &storage::frames::SCHEMA);
-    scan::register(context, "frames", store, &frames, schema)?;
+    let (store, frames) = (engine.store(), frames_of(run));
+    scan::register(context, "frames", store, &frames, Layout::Frames).await?;
     let sql = sql.replace("$start", &run[0].period.start.ms().to_string());
     let query = context.sql(&sql).await.map_err(failed())?;
     query.execute_stream().await.map_err(failed())
@@ -148,6 +166,7 @@ struct Segment<'a> {
     /// Exact sums after it.
     after: Vec<i64>,
     columns: Vec<Vec<f32>>,
+    has_data: Vec<Vec<bool>>,
     rows_taken: usize,
 }
 
@@ -164,6 +183,7 @@ impl<'a> Segment<'a> {
             before,
             after: before.to_vec(),
             columns: vec![vec![f32::NAN; grid.cell_count()]; run.len()],
+            has_data: vec![vec![false; grid.cell_count()]; run.len()],
             rows_taken: 0,
         }
     }
@@ -172,19 +192,28 @@ impl<'a> Segment<'a> {
         let chunks = batch.column(0).as_primitive::<UInt32Type>();
         let starts = batch.column(1).as_primitive::<TimestampMillisecondType>();
         let lists = batch.column(2).as_list::<i32>();
+        let flags = batch.column(3).as_list::<i32>();
         for row in 0..batch.num_rows() {
-            let sums = lists.value(row);
+            let (sums, has_data) = (lists.value(row), flags.value(row));
             self.take_chunk(
                 chunks.value(row),
                 starts.value(row),
                 sums.as_primitive::<Int64Type>().values(),
+                has_data.as_boolean(),
             )?;
         }
         Ok(())
     }
 
-    fn take_chunk(&mut self, chunk: u32, start_ms: i64, sums: &[i64]) -> Result<(), ComputeError> {
+    fn take_chunk(
+        &mut self,
+        chunk: u32,
+        start_ms: i64,
+        sums: &[i64],
+        has_data: &BooleanArray,
+    ) -> Result<(), ComputeError> {
         let window = window_of(&self.windows, chunk, sums.len())?;
+        window_of(&self.windows, chunk, has_data.len())?;
         let Some(&step) = self.index_of.get(&start_ms) else {
             let reason = format!("a step from {start_ms} ms on was not asked for");
             return Err(ComputeError::inconsistent("accumulated carbon", reason));
@@ -202,12 +231,19 @@ impl<'a> Segment<'a> {
                 self.after[index] = total;
             }
         }
+        for (&index, has_data) in indices.iter().zip(has_data.values()) {
+            self.has_data[step][index] = has_data;
+        }
         self.rows_taken += 1;
         Ok(())
     }
 
-    fn finish(self) -> Result<(Vec<Vec<f32>>, Vec<i64>), ComputeError> {
+    fn finish(self) -> Result<Accumulated, ComputeError> {
         all_chunks(self.rows_taken, self.windows.len() * self.columns.len())?;
-        Ok((self.columns, self.after))
+        Ok(Accumulated {
+            columns: self.columns,
+            has_data: self.has_data,
+            after: self.after,
+        })
     }
 }

@@ -1,5 +1,5 @@
 //! `region_sums(values, chunk, seconds, weights)`: mass and valid area of a region's share of a chunk, exact, as a
-//! structure of two decimals.
+//! structure of two decimals, and whether the region touches the chunk (1 or 0).
 //!
 //! `weights` is the address of the region's stored weights. They are read once a process and never pass a plan: nothing
 //! is joined, and of the values nothing but sums leaves the part of a query that read them.
@@ -7,7 +7,9 @@
 use std::sync::Arc;
 
 use async_trait::async_trait;
-use datafusion::arrow::array::{Array as _, ArrayRef, AsArray as _, Decimal128Array, StructArray};
+use datafusion::arrow::array::{
+    Array as _, ArrayRef, AsArray as _, Decimal128Array, Int64Array, StructArray,
+};
 use datafusion::arrow::datatypes::{DataType, Field, Fields, Float32Type, Float64Type, UInt32Type};
 use datafusion::common::{DataFusionError, Result, ScalarValue, exec_err};
 use datafusion::logical_expr::async_udf::AsyncScalarUDFImpl;
@@ -46,6 +48,7 @@ fn fields() -> Fields {
     Fields::from(vec![
         Field::new("mass", decimal(MASS_DECIMALS), false),
         Field::new("area", decimal(AREA_DECIMALS), false),
+        Field::new("chunks", DataType::Int64, false),
     ])
 }
 
@@ -114,9 +117,12 @@ fn sums(
     let rows: Vec<ChunkSums> = (0..values.len()).map(row).collect::<Result<_>>()?;
     let masses = rows.iter().map(|sums| sums.mass_steps);
     let areas = rows.iter().map(|sums| sums.area_steps);
+    let is_touched = |chunk: &u32| i64::from(weights.areas_m2(*chunk).is_some());
+    let touched = Int64Array::from_iter_values(chunks.values().iter().map(is_touched));
     let columns = vec![
         decimals(masses, MASS_DECIMALS)?,
         decimals(areas, AREA_DECIMALS)?,
+        Arc::new(touched),
     ];
     Ok(StructArray::try_new(fields(), columns, None)?)
 }

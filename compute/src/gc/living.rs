@@ -8,7 +8,7 @@ use contract::quantity::Quantity;
 use contract::region::NAMED_REGIONS;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
-use storage::{Store, manifests};
+use storage::{Store, document, manifests};
 
 use crate::ComputeError;
 use crate::budget::named::EARTH;
@@ -18,8 +18,8 @@ use crate::region::weights::RegionKeys;
 
 /// Folder of the numbered indexes of datasets of observations.
 pub(super) const INDEXES: &str = "observation-indexes";
-/// The version of the indexes' JSON whose files are known.
-const INDEX_SCHEMA: u32 = 1;
+/// The newest version of the indexes' JSON whose files are known.
+const INDEX_SCHEMA: u32 = 2;
 
 /// As much of an index of observations as says what it names.
 #[derive(Deserialize)]
@@ -72,7 +72,7 @@ async fn observed(
             let Some(index) = read::<Index>(store, &key).await? else {
                 continue;
             };
-            if index.schema != INDEX_SCHEMA {
+            if index.schema > INDEX_SCHEMA {
                 let reason = format!("its schema {} is unknown", index.schema);
                 return Err(ComputeError::inconsistent(key.as_str(), reason));
             }
@@ -88,15 +88,8 @@ async fn read<T: DeserializeOwned>(
     store: &Store,
     key: &ObjectKey,
 ) -> Result<Option<T>, ComputeError> {
-    let content = match store.get(key).await {
-        Ok(content) => content,
-        Err(e) if e.is_not_found() => return Ok(None),
-        Err(e) => return Err(e.into()),
-    };
     // A list that cannot be read names things that nobody knows: nothing may be removed.
-    serde_json::from_slice(&content)
-        .map(Some)
-        .map_err(|e| ComputeError::inconsistent(key.as_str(), e))
+    Ok(document::get(store, key).await?)
 }
 
 fn add(living: &mut BTreeSet<ObjectKey>, manifest: &Manifest) -> Result<(), ComputeError> {
@@ -106,6 +99,7 @@ fn add(living: &mut BTreeSet<ObjectKey>, manifest: &Manifest) -> Result<(), Comp
     living.extend(manifest.series.iter().map(|segment| segment.series.clone()));
     for step in &manifest.steps {
         living.insert(step.frame.clone());
+        living.extend(step.contributed.iter().map(|step| step.counts.clone()));
         living.insert(ObjectKey::raw(product, &step.raw_sha256));
     }
     if manifest.quantity == Quantity::AccumulatedCarbon {

@@ -146,11 +146,13 @@ mod tests {
         let product = "sst".parse().unwrap();
         let digest = Digest::of(b"");
         let step = |month: &u32| Step {
+            masked: None,
             period: Period::month(2010, *month).unwrap(),
             frame: ObjectKey::frame(&product, &digest),
             raw_sha256: digest,
             origin: "f.nc".into(),
             valid_cells: 1,
+            contributed: None,
         };
         Manifest {
             schema: MANIFEST_SCHEMA,
@@ -171,6 +173,7 @@ mod tests {
             domain: ObjectKey::domain(&product, &digest),
             series: vec![],
             derived_from: None,
+            notices: vec![],
             product,
         }
     }

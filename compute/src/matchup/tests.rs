@@ -33,11 +33,13 @@ async fn product(store: &Store) -> Manifest {
         let period = Period::month(2010, month).unwrap();
         let frame = frames::write(store, &product, &GRID, &values, period);
         steps.push(Step {
+            masked: None,
             period,
             frame: frame.await.unwrap(),
             raw_sha256: Digest::of(b""),
             origin: "f.nc".into(),
             valid_cells: 4,
+            contributed: None,
         });
     }
     Manifest {
@@ -52,6 +54,7 @@ async fn product(store: &Store) -> Manifest {
         domain: ObjectKey::domain(&product, &Digest::of(b"")),
         series: vec![],
         derived_from: None,
+        notices: vec![],
         product,
     }
 }

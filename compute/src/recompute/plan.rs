@@ -3,10 +3,11 @@
 use std::collections::BTreeSet;
 
 use contract::key::ObjectKey;
-use contract::manifest::Manifest;
+use contract::manifest::{Manifest, Step};
+use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::time::Period;
-use storage::{Store, manifests};
+use storage::{Store, manifests, verify};
 
 use super::{Item, Plan, Reason, Request, What};
 use crate::budget::named::{self, Touching};
@@ -29,10 +30,10 @@ pub async fn plan(store: &Store, request: &Request) -> Result<Plan, ComputeError
     let kinds: BTreeSet<What> = request.what.iter().copied().collect();
     for what in kinds {
         match what {
-            What::Frames => frames(store, &manifest, window, request.is_forced, &mut plan).await?,
-            What::Statistics => tables(store, &manifest, what, &mut plan).await?,
+            What::Frames => frames(store, &manifest, window, request, &mut plan).await?,
+            What::Statistics => tables(store, &manifest, what, request, &mut plan).await?,
             What::Budget if manifest.quantity == Quantity::CarbonFlux => {
-                tables(store, &manifest, what, &mut plan).await?;
+                tables(store, &manifest, what, request, &mut plan).await?;
             }
             What::Budget => {
                 return Err(ComputeError::NotAFlux {
@@ -50,7 +51,7 @@ async fn frames(
     store: &Store,
     source: &Manifest,
     window: Period,
-    is_forced: bool,
+    request: &Request,
     plan: &mut Plan,
 ) -> Result<(), ComputeError> {
     if source.quantity != Quantity::CarbonFlux {
@@ -62,20 +63,16 @@ async fn frames(
     plan.start = chosen_start(store, &source.product).await?;
     let target = source.product.accumulated()?;
     let latest = manifests::latest(store, &target).await?;
-    let there: BTreeSet<ObjectKey> = store
-        .list(&format!("frames/{target}"))
-        .await?
-        .into_iter()
-        .collect();
+    let there = frames_there(store, latest.as_ref(), &target, request).await?;
     let mut is_broken = false;
     for (index, (period, input)) in made_of(source, plan.start)?.into_iter().enumerate() {
         let stored = latest.as_ref().and_then(|latest| latest.steps.get(index));
         let reason = match stored {
             None => Some(Reason::Missing),
             Some(step) if step.raw_sha256 != input => Some(Reason::Stale),
-            Some(step) if !there.contains(&step.frame) => Some(Reason::Missing),
+            Some(step) if !is_whole(step, &there) => Some(Reason::Missing),
             Some(_) if is_broken => Some(Reason::Stale),
-            Some(_) if is_forced && period.overlaps(window) => Some(Reason::Forced),
+            Some(_) if request.is_forced && period.overlaps(window) => Some(Reason::Forced),
             Some(_) => None,
         };
         match reason {
@@ -101,11 +98,55 @@ async fn frames(
     Ok(())
 }
 
+/// Are the objects of an accumulated step there?
+fn is_whole(step: &Step, there: &BTreeSet<ObjectKey>) -> bool {
+    let counts = step.contributed.as_ref();
+    there.contains(&step.frame) && counts.is_some_and(|counts| there.contains(&counts.counts))
+}
+
+/// Frames, and counts of what contributed to them, that are there, and whole as far as that is asked for. A frame without
+/// its series or domain counts as gone: these are made with it.
+async fn frames_there(
+    store: &Store,
+    latest: Option<&Manifest>,
+    target: &ProductId,
+    request: &Request,
+) -> Result<BTreeSet<ObjectKey>, ComputeError> {
+    let mut there = BTreeSet::new();
+    for folder in ["frames", "contributed"] {
+        there.extend(store.list(&format!("{folder}/{target}")).await?);
+    }
+    let Some(latest) = latest.filter(|_| request.is_verified) else {
+        return Ok(there);
+    };
+    let series = latest.series.iter().map(|segment| &segment.series);
+    let frames = latest.steps.iter().map(|step| &step.frame);
+    let counts = latest
+        .steps
+        .iter()
+        .filter_map(|step| step.contributed.as_ref());
+    let counts = counts.map(|contributed| &contributed.counts);
+    let named = series.chain(frames).chain(counts).chain([&latest.domain]);
+    let damaged = verify::damaged(store, named.cloned()).await?;
+    there.retain(|frame| !damaged.contains(frame));
+    for segment in &latest.series {
+        let first = segment.first_step as usize;
+        let steps = latest.steps.get(first..first + segment.steps as usize);
+        if damaged.contains(&segment.series) || damaged.contains(&latest.domain) {
+            for step in steps.unwrap_or_default() {
+                there.remove(&step.frame);
+            }
+        }
+    }
+    Ok(there)
+}
+
 /// Stored sums of the named regions that touch the grid.
 async fn tables(
     store: &Store,
     manifest: &Manifest,
     what: What,
+    request: &Request,
     plan: &mut Plan,
 ) -> Result<(), ComputeError> {
     let measure = if what == What::Budget {
@@ -116,13 +157,18 @@ async fn tables(
     let Some(period) = manifest.extent() else {
         return Ok(());
     };
-    let there: BTreeSet<ObjectKey> = store
-        .list(&format!("{}/{}", sums::FOLDER, manifest.product))
-        .await?
-        .into_iter()
-        .collect();
+    let folder = format!("{}/{}", sums::FOLDER, manifest.product);
+    let mut there: BTreeSet<ObjectKey> = store.list(&folder).await?.into_iter().collect();
+    let mut damaged = BTreeSet::new();
+    if request.is_verified {
+        damaged = verify::damaged(store, there.iter().cloned()).await?;
+        there.retain(|table| !damaged.contains(table));
+    }
     for Touching { name, weights } in named::touching(store, &manifest.grid).await? {
-        let reason = if !there.contains(&sums::key(&manifest.id(), &weights, measure)) {
+        let key = sums::key(&manifest.id(), &weights, measure);
+        let reason = if damaged.contains(&key) {
+            Reason::Missing
+        } else if !there.contains(&key) {
             // A new version has no sums of its own yet, the first one never had any.
             if manifest.number > 1 && !there.is_empty() {
                 Reason::Stale

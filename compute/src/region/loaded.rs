@@ -27,6 +27,11 @@ impl RegionWeights {
         Self { chunks }
     }
 
+    /// Chunks that the region touches.
+    pub(crate) fn chunk_count(&self) -> usize {
+        self.chunks.len()
+    }
+
     /// Areas of the cells of a chunk; none where the region does not touch it.
     pub(crate) fn areas_m2(&self, chunk: u32) -> Option<&[f64]> {
         let at = self

@@ -7,7 +7,7 @@ use contract::grid::Grid;
 use contract::key::ObjectKey;
 use contract::region::Region;
 use serde::{Deserialize, Serialize};
-use storage::Store;
+use storage::{StorageError, Store};
 
 use super::box_cover::{self, Bounds};
 use super::polygon_cover::Band;
@@ -67,6 +67,7 @@ impl RegionKeys {
 #[derive(Serialize)]
 struct Job<'a> {
     method: u32,
+    layout: u32,
     grid: &'a Grid,
     region: &'a Region,
     earth: Earth,
@@ -155,6 +156,7 @@ pub fn key_of(grid: &Grid, region: &Region, earth: Earth, surface: Surface) -> O
         } else {
             BOX_METHOD
         },
+        layout: storage::weights::LAYOUT,
         grid,
         region,
         earth,
@@ -163,7 +165,8 @@ pub fn key_of(grid: &Grid, region: &Region, earth: Earth, surface: Surface) -> O
     }))
 }
 
-/// The key of stored weights, which are computed if nobody did before; none if the region lies outside the grid.
+/// The key of stored weights, which are computed if nobody did before or if they are damaged; none if the region lies
+/// outside the grid.
 pub async fn stored(
     store: &Store,
     grid: &Grid,
@@ -182,9 +185,15 @@ pub async fn stored_of(
     surface: Surface,
 ) -> Result<Option<ObjectKey>, ComputeError> {
     let key = key_of(grid, region, earth, surface);
-    if store.exists(&key).await? {
-        return Ok(Some(key));
-    }
+    let is_damaged = match storage::weights::check(store, &key).await {
+        Ok(()) => return Ok(Some(key)),
+        Err(e) if e.is_not_found() => false,
+        Err(error @ StorageError::Damaged { .. }) => {
+            tracing::warn!(%error, "weights are computed again");
+            true
+        }
+        Err(e) => return Err(e.into()),
+    };
     let (grid, region) = (*grid, region.clone());
     let chunks = tokio::task::spawn_blocking(move || compute_of(&grid, &region, earth, surface))
         .await
@@ -192,7 +201,11 @@ pub async fn stored_of(
     if chunks.is_empty() && surface == Surface::All {
         return Ok(None);
     }
-    storage::weights::write(store, &key, &chunks).await?;
+    if is_damaged {
+        storage::weights::write_over(store, &key, &chunks).await?;
+    } else {
+        storage::weights::write(store, &key, &chunks).await?;
+    }
     Ok(Some(key))
 }
 

@@ -158,7 +158,7 @@ impl Executor {
             self.settings.tasks(),
             Arc::clone(&nudge),
         );
-        let _nudging = Background(tokio::spawn(nudging));
+        let mut nudging = Background(tokio::spawn(nudging));
         let mut working = Background(tokio::spawn(poll_loop(
             SchedulerGrpcClient::new(self.courier.clone())
                 .max_decoding_message_size(state::MESSAGE_BYTES)
@@ -175,19 +175,23 @@ impl Executor {
             self.registration.clone(),
             self.courier.clone(),
         );
-        let _heart = Background(tokio::spawn(heart));
+        let mut heart = Background(tokio::spawn(heart));
         let janitor = Janitor {
             work: Arc::clone(&self.work),
             work_bytes: self.work_bytes,
             limit_bytes: self.settings.executor_work_bytes,
             hands: Arc::clone(&hands),
         };
-        let _janitor = Background(tokio::spawn(janitor.run()));
+        let mut janitor = Background(tokio::spawn(janitor.run()));
         let _obituaries = Background(tokio::spawn(tell_gone(self.courier.clone(), self.gone)));
         tokio::select! {
             () = stop.said() => {}
             ended = &mut serving.0 => return ended_early(ended),
             ended = &mut working.0 => return ended_early(ended),
+            // These never end but by a panic; without them the executor would look well and be given nothing, or too much.
+            ended = &mut nudging.0 => return ended_early(ended.map(Ok)),
+            ended = &mut heart.0 => return ended_early(ended.map(Ok)),
+            ended = &mut janitor.0 => return ended_early(ended.map(Ok)),
         }
         let limit = Duration::from_secs(self.settings.executor_drain_s);
         drain(&hands, self.settings.tasks(), &self.courier, limit).await;

@@ -70,8 +70,8 @@ pub struct Scheduler {
     query_count: Box<dyn Fn() -> usize + Send + Sync>,
     executors: IntGauge,
     store: Store,
-    _watch: Background<()>,
-    _count: Background<()>,
+    watch: Background<()>,
+    count: Background<()>,
 }
 
 impl Scheduler {
@@ -124,8 +124,8 @@ impl Scheduler {
             }),
             executors: seen.executors,
             store,
-            _watch: Background(tokio::spawn(watch)),
-            _count: Background(tokio::spawn(count)),
+            watch: Background(tokio::spawn(watch)),
+            count: Background(tokio::spawn(count)),
         })
     }
 
@@ -144,7 +144,7 @@ impl Scheduler {
     }
 
     /// Serves until asked to stop; then waits for running queries, within the limit of the settings.
-    pub async fn run(self, stop: Stop) -> Result<(), ComputeError> {
+    pub async fn run(mut self, stop: Stop) -> Result<(), ComputeError> {
         let (drain, query_count) = (self.drain, self.query_count);
         let drained = async move {
             stop.said().await;
@@ -160,8 +160,17 @@ impl Scheduler {
         tokio::select! {
             () = drained => Ok(()),
             served = self.serving => served.map_err(ComputeError::cluster("serving as scheduler")),
+            // These end by a panic alone; without them nobody would notice lost executors, or scale by what waits.
+            ended = &mut self.watch.0 => watched(ended),
+            ended = &mut self.count.0 => watched(ended),
         }
     }
+}
+
+fn watched(ended: Result<(), tokio::task::JoinError>) -> Result<(), ComputeError> {
+    ended
+        .map_err(BallistaError::TokioError)
+        .map_err(ComputeError::cluster("watching executors and queries"))
 }
 
 fn config(

@@ -3,14 +3,16 @@
 use std::sync::Mutex;
 
 use compute::derive::{DeriveProgress, derived};
-use compute::{Engine, derive_accumulated};
+use compute::{BudgetQuery, BudgetStep, Engine, derive_accumulated};
 use contract::earth::Earth;
 use contract::event::Body;
 use contract::grid::Grid;
 use contract::manifest::Manifest;
+use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::time::{Period, TimeMs};
 use storage::Store;
+use storage::contributed::{self, Contributed};
 
 use crate::fixture::{
     ONE_DEGREE, ask, folder_store, land, months, parts, product, total, wavy_year,
@@ -139,6 +141,169 @@ async fn a_gap_adds_nothing_and_land_stays_empty() {
         .unwrap();
     let last = series.series[3].value.unwrap();
     assert!((last / (1000.0 * whole) - 1.0).abs() < 1e-6, "{last}");
+}
+
+async fn counts(store: &Store, manifest: &Manifest, step: usize) -> Contributed {
+    let key = &manifest.steps[step].contributed.as_ref().unwrap().counts;
+    contributed::read(store, key, &manifest.grid).await.unwrap()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_sum_says_which_steps_and_how_much_time_it_holds() {
+    let (_folder, store) = folder_store();
+    let (id, flux) = (product("tiny"), Quantity::CarbonFlux);
+    land(&store, &id, flux, TINY, &tiny_year(), 4).await;
+    let engine = Engine::standalone(store.clone(), parts(2));
+    let derived = derive(&engine, "tiny", None).await;
+    let day_ms = 86_400_000;
+    let (mut whole, mut gapped) = ((0, 0), (0, 0));
+    for (step, days) in [31, 28, 31, 30].into_iter().enumerate() {
+        whole = (whole.0 + 1, whole.1 + days * day_ms);
+        if step != 1 {
+            gapped = (gapped.0 + 1, gapped.1 + days * day_ms);
+        }
+        let counts = counts(&store, &derived, step).await;
+        assert_eq!(counts.of_steps as usize, step + 1);
+        assert_eq!(counts.steps, [whole.0, gapped.0, 0]);
+        assert_eq!(counts.milliseconds, [whole.1, gapped.1, 0]);
+        assert_eq!(counts.period.end.ms() - counts.period.start.ms(), whole.1);
+        let complete = derived.steps[step]
+            .contributed
+            .as_ref()
+            .unwrap()
+            .complete_cells;
+        assert_eq!(complete, if step == 0 { 2 } else { 1 }, "{step}");
+    }
+    // Counted from a chosen start on: a month cut at it counts as a step with the time that is left of it.
+    let start = "2001-01-11".parse().ok();
+    let later = derive(&engine, "tiny", start).await;
+    let counts = counts(&store, &later, 1).await;
+    assert_eq!((counts.steps, counts.of_steps), (vec![2, 1, 0], 2));
+    assert_eq!(counts.milliseconds, [49 * day_ms, 21 * day_ms, 0]);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_month_that_nobody_landed_leaves_no_sum_complete() {
+    let (_folder, store) = folder_store();
+    let (id, flux) = (product("tiny"), Quantity::CarbonFlux);
+    let mut steps = tiny_year();
+    steps.remove(2);
+    land(&store, &id, flux, TINY, &steps, 4).await;
+    let engine = Engine::standalone(store.clone(), parts(2));
+    let derived = derive(&engine, "tiny", None).await;
+    let complete = derived
+        .steps
+        .iter()
+        .map(|step| step.contributed.as_ref().unwrap().complete_cells);
+    assert_eq!(complete.collect::<Vec<_>>(), [2, 1, 0]);
+    let last = counts(&store, &derived, 2).await;
+    assert_eq!((last.steps[0], last.of_steps), (3, 3));
+    assert!((last.lacking()[0] - 31.0 / 120.0).abs() < 1e-6);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_budget_of_sums_is_that_of_their_flux_and_says_which_are_complete() {
+    let (_folder, store) = folder_store();
+    let (id, flux) = (product("tiny"), Quantity::CarbonFlux);
+    land(&store, &id, flux, TINY, &tiny_year(), 4).await;
+    let engine = Engine::standalone(store.clone(), parts(2));
+    let derived = derive(&engine, "tiny", "2001-01-11".parse().ok()).await;
+    let question = |product: &ProductId, step| BudgetQuery {
+        from: "2001-01-11".parse().ok(),
+        to: "2001-03-16".parse().ok(),
+        step,
+        ..total(product, "global")
+    };
+    let cell_m2 = TINY.cell_area_m2(0, Earth::Wgs84);
+    for step in [BudgetStep::Month, BudgetStep::Total] {
+        let of_flux = ask(&engine, &question(&id, step)).await;
+        let of_sums = ask(&engine, &question(&derived.product, step)).await;
+        assert_eq!(of_sums.manifest, derived.id());
+        assert_eq!(of_sums.rows.len(), of_flux.rows.len());
+        for (index, (sums, flux)) in of_sums.rows.iter().zip(&of_flux.rows).enumerate() {
+            assert_eq!(sums.budget_kg, flux.budget_kg);
+            assert!(flux.completeness.is_none());
+            let own = sums.completeness.unwrap();
+            // The second cell lacks February; of all three months it has two.
+            let (complete, incomplete) = match (step, index) {
+                (BudgetStep::Month, 1) => (1.0, 0.0),
+                (BudgetStep::Month, _) => (2.0, 0.0),
+                _ => (1.0, 1.0),
+            };
+            let cells = [own.complete_m2, own.incomplete_m2].map(|m2| m2 / cell_m2);
+            assert!(
+                (cells[0] - complete).abs() < 1e-9,
+                "{step:?} {index} {cells:?}"
+            );
+            assert!(
+                (cells[1] - incomplete).abs() < 1e-9,
+                "{step:?} {index} {cells:?}"
+            );
+        }
+    }
+    // Before accumulation started there is nothing to sum.
+    let early = BudgetQuery {
+        from: None,
+        ..question(&derived.product, BudgetStep::Total)
+    };
+    let start: TimeMs = "2001-01-11".parse().unwrap();
+    assert_eq!(ask(&engine, &early).await.rows[0].start, start);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_version_that_did_not_count_has_a_budget_of_unknown_completeness() {
+    let (_folder, store) = folder_store();
+    let (id, flux) = (product("tiny"), Quantity::CarbonFlux);
+    land(&store, &id, flux, TINY, &tiny_year(), 4).await;
+    let engine = Engine::standalone(store.clone(), parts(2));
+    let mut old = derive(&engine, "tiny", None).await;
+    old.number += 1;
+    for step in &mut old.steps {
+        step.contributed = None;
+    }
+    storage::manifests::commit(&store, &old).await.unwrap();
+    let answer = ask(&engine, &total(&old.product, "global")).await;
+    assert_eq!(answer.manifest, old.id());
+    assert_eq!(answer.rows[0].completeness, None);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_point_says_what_its_sums_hold_as_the_stored_counts_do() {
+    let (_folder, store) = folder_store();
+    let (id, flux) = (product("tiny"), Quantity::CarbonFlux);
+    land(&store, &id, flux, TINY, &tiny_year(), 4).await;
+    let engine = Engine::standalone(store.clone(), parts(2));
+    let local = Engine::local(store.clone());
+    for start in [None, "2001-02-11".parse().ok()] {
+        let derived = derive(&engine, "tiny", start).await;
+        for cell in 0..3 {
+            let at = place(cell as f64 + 0.5);
+            let answer = compute::point_series(&local, &derived.product, at)
+                .await
+                .unwrap();
+            for (step, point) in answer.series.iter().enumerate() {
+                let (own, stored) = (
+                    point.contributed.unwrap(),
+                    counts(&store, &derived, step).await,
+                );
+                assert_eq!(
+                    (own.steps, own.of_steps),
+                    (stored.steps[cell], stored.of_steps)
+                );
+                let lacking = 100.0 * f64::from(stored.lacking()[cell]);
+                assert!((own.time_percent + lacking - 100.0).abs() < 1e-4, "{own:?}");
+            }
+        }
+    }
+    let of_flux = compute::point_series(&local, &id, place(0.5))
+        .await
+        .unwrap();
+    assert!(
+        of_flux
+            .series
+            .iter()
+            .all(|point| point.contributed.is_none())
+    );
 }
 
 fn place(lon: f64) -> contract::grid::LonLatDeg {

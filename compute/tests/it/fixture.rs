@@ -62,6 +62,7 @@ pub(crate) async fn land(
             .zip(values)
             .for_each(|(cell, value)| *cell |= !value.is_nan());
         listed.push(Step {
+            masked: None,
             period: *period,
             frame: frames::write(store, id, &grid, values, *period)
                 .await
@@ -69,6 +70,7 @@ pub(crate) async fn land(
             raw_sha256: Digest::of(&index.to_le_bytes()),
             origin: format!("step-{index}.nc"),
             valid_cells: values.iter().filter(|value| !value.is_nan()).count() as u64,
+            contributed: None,
         });
     }
     let mut segments = vec![];
@@ -97,6 +99,7 @@ pub(crate) async fn land(
         domain: domain::write(store, id, &cells).await.unwrap(),
         series: segments,
         derived_from: None,
+        notices: vec![],
     };
     manifests::commit(store, &manifest).await.unwrap();
     manifest

@@ -127,6 +127,41 @@ async fn without_stored_sums_they_are_computed_again_to_the_same_bits() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn without_stored_counts_all_is_accumulated_again_to_the_same_bits() {
+    let year = wavy_year(&FIVE_DEGREES);
+    let (folder, store) = folder_store();
+    put(&store, &year[..9].to_vec()).await;
+    derive(&store).await;
+    std::fs::remove_dir_all(folder.path().join("contributed")).unwrap();
+    put(&store, &year).await;
+    let derived = derive(&store).await;
+    assert_eq!(seen(&derived), seen(&from_nothing(&year).await));
+    for step in &derived.steps {
+        let counts = &step.contributed.as_ref().unwrap().counts;
+        assert!(store.exists(counts).await.unwrap(), "{counts}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_an_older_program_accumulated_without_counts_is_accumulated_again() {
+    let year = wavy_year(&FIVE_DEGREES);
+    let (_folder, store) = folder_store();
+    put(&store, &year[..9].to_vec()).await;
+    let mut old = derive(&store).await;
+    // As it was written before there were counts, word for word; such a manifest keeps its name.
+    for step in &mut old.steps {
+        step.contributed = None;
+    }
+    let text = serde_json::to_string(&old).unwrap();
+    assert!(!text.contains("contributed"), "{text}");
+    old.number += 1;
+    manifests::commit(&store, &old).await.unwrap();
+    put(&store, &year).await;
+    let derived = derive(&store).await;
+    assert_eq!(seen(&derived), seen(&from_nothing(&year).await));
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn what_is_computed_anew_and_comes_out_the_same_makes_no_version() {
     let year = wavy_year(&FIVE_DEGREES);
     let (folder, store) = folder_store();

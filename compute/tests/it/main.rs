@@ -9,6 +9,8 @@ mod cleaned;
 #[cfg(test)]
 mod cluster;
 #[cfg(test)]
+mod damaged;
+#[cfg(test)]
 mod fixture;
 #[cfg(test)]
 mod incremental;

@@ -27,6 +27,7 @@ pub(crate) enum Order {
     Scheduler {
         store: String,
         listen: SocketAddr,
+        lost_after_s: u64,
     },
     Executor {
         store: String,
@@ -70,17 +71,31 @@ async fn a_service_runs_here_when_a_test_starts_one() {
     });
     let registry = Registry::new();
     match order {
-        Order::Scheduler { store, listen } => run_scheduler(&store, listen, registry, stop).await,
+        Order::Scheduler { .. } => run_scheduler(order, registry, stop).await,
         Order::Executor { .. } => run_executor(order, registry, stop).await,
     }
     println!("ENDED");
 }
 
-async fn run_scheduler(store: &str, listen: SocketAddr, registry: Registry, stop: Stop) {
+async fn run_scheduler(order: Order, registry: Registry, stop: Stop) {
     use clap::Parser as _;
-    let listen = listen.to_string();
-    let line = SchedulerLine::parse_from(["scheduler", "--scheduler-listen", &listen]);
-    let store = Store::open(store).unwrap();
+    let Order::Scheduler {
+        store,
+        listen,
+        lost_after_s,
+    } = order
+    else {
+        unreachable!("the caller looked")
+    };
+    let (listen, lost_after_s) = (listen.to_string(), lost_after_s.to_string());
+    let line = SchedulerLine::parse_from([
+        "scheduler",
+        "--scheduler-listen",
+        &listen,
+        "--executor-lost-after-s",
+        &lost_after_s,
+    ]);
+    let store = Store::open(&store).unwrap();
     let scheduler = Scheduler::start(&line.settings, store, &registry)
         .await
         .unwrap();
@@ -253,14 +268,24 @@ pub(crate) struct Cluster {
     pub(crate) executors: Vec<Node>,
     store: String,
     work: tempfile::TempDir,
+    lost_after_s: u64,
 }
+
+/// What a scheduler waits for a sign of life unless told otherwise, as services do.
+const LOST_AFTER_S: u64 = 3;
 
 impl Cluster {
     pub(crate) fn start(store: &Path) -> Self {
+        Self::start_with(store, LOST_AFTER_S)
+    }
+
+    /// With a scheduler that waits so long for a sign of life of an executor.
+    pub(crate) fn start_with(store: &Path, lost_after_s: u64) -> Self {
         let store = store.to_str().unwrap().to_owned();
         let scheduler = Node::start(&Order::Scheduler {
             store: store.clone(),
             listen: "127.0.0.1:0".parse().unwrap(),
+            lost_after_s,
         });
         Self {
             address: scheduler.address(),
@@ -268,6 +293,7 @@ impl Cluster {
             executors: vec![],
             store,
             work: tempfile::tempdir().unwrap(),
+            lost_after_s,
         }
     }
 
@@ -291,6 +317,7 @@ impl Cluster {
         self.scheduler = Node::start(&Order::Scheduler {
             store: self.store.clone(),
             listen: self.address,
+            lost_after_s: self.lost_after_s,
         });
         self.scheduler.address();
     }

@@ -36,6 +36,7 @@ fn request(what: &[What]) -> Request {
         to: None,
         what: what.to_vec(),
         is_forced: false,
+        is_verified: false,
     }
 }
 
@@ -86,14 +87,18 @@ async fn a_lost_frame_is_planned_and_made_again_without_a_new_version() {
     let engine = Engine::local(store.clone());
     let derived = derive_accumulated(&engine, &product("wavy"), None, &|_| ()).await;
     let derived = derived.unwrap();
-    std::fs::remove_file(folder.path().join(derived.steps[8].frame.as_str())).unwrap();
-    let frames = request(&[What::Frames]);
-    let mend = plan(&store, &frames).await.unwrap();
-    assert_eq!(mend.items.len(), 4);
-    assert_eq!(mend.items[0].reason, Reason::Missing);
-    let outcome = run(&engine, &mend, &|_done| ()).await.unwrap();
-    assert_eq!(outcome.derived.unwrap(), derived);
-    assert!(store.exists(&derived.steps[8].frame).await.unwrap());
+    let step = &derived.steps[8];
+    let counts = &step.contributed.as_ref().unwrap().counts;
+    for lost in [&step.frame, counts] {
+        std::fs::remove_file(folder.path().join(lost.as_str())).unwrap();
+        let frames = request(&[What::Frames]);
+        let mend = plan(&store, &frames).await.unwrap();
+        assert_eq!(mend.items.len(), 4, "{lost}");
+        assert_eq!(mend.items[0].reason, Reason::Missing);
+        let outcome = run(&engine, &mend, &|_done| ()).await.unwrap();
+        assert_eq!(outcome.derived.unwrap(), derived);
+        assert!(store.exists(lost).await.unwrap());
+    }
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -193,6 +198,8 @@ async fn clean_up_takes_what_no_kept_version_names_and_nothing_young() {
     let mut versions = vec![];
     for round in 0..3 {
         year[4].1[300] = 1e-9 * round as f32;
+        // Data where the first version had none: other counts.
+        year[4].1[301] = if round == 0 { f32::NAN } else { 1e-9 };
         put(&store, &year).await;
         let derived = derive_accumulated(&engine, &product("wavy"), None, &|_| ()).await;
         versions.push(derived.unwrap());
@@ -224,8 +231,12 @@ async fn clean_up_takes_what_no_kept_version_names_and_nothing_young() {
     );
     for step in &versions[2].steps {
         assert!(store.exists(&step.frame).await.unwrap());
+        let counts = &step.contributed.as_ref().unwrap().counts;
+        assert!(store.exists(counts).await.unwrap());
     }
     assert!(!store.exists(&versions[0].steps[4].frame).await.unwrap());
+    let old_counts = &versions[0].steps[4].contributed.as_ref().unwrap().counts;
+    assert!(!store.exists(old_counts).await.unwrap());
     assert!(manifests::load(&store, &versions[0].id()).await.is_err());
     assert!(store.exists(&stranger).await.unwrap());
     let nothing = gc::plan(&store, keep, in_two_days).await.unwrap();

@@ -30,13 +30,8 @@ const COARSE: Grid = Grid {
 
 fn landed(trace: &str, manifest: &Manifest) -> Event {
     let last = manifest.steps.last().unwrap();
-    let body = Body::GranuleLanded {
-        path: "a.nc".to_owned(),
-        raw_sha256: Digest::of(b"a"),
-        manifest: manifest.id(),
-        periods: vec![last.period],
-        revised: false,
-    };
+    let (path, sha256) = ("a.nc".to_owned(), Digest::of(b"a"));
+    let body = Body::granule_landed(path, sha256, manifest.id(), &[last.period], false);
     Event::new(trace, body)
 }
 

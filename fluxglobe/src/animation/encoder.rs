@@ -4,7 +4,7 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::Stdio;
 
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Context as _, Result, anyhow, bail};
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::process::{Child, ChildStdin, Command};
 use tokio::task::JoinHandle;
@@ -32,6 +32,16 @@ impl Container {
             "webp" => Some(Self::Webp),
             "gif" => Some(Self::Gif),
             _ => None,
+        }
+    }
+
+    /// The encoder that these words name.
+    fn encoder(self) -> &'static str {
+        match self {
+            Self::Mp4 => "libx264",
+            Self::Webm => "libvpx-vp9",
+            Self::Webp => "libwebp_anim",
+            Self::Gif => "gif",
         }
     }
 
@@ -98,6 +108,41 @@ pub(super) struct Encoder {
     done: PathBuf,
 }
 
+/// Is ffmpeg there, and can it write this kind of film? Asked before anything is drawn for it.
+pub(super) fn check(program: &Path, container: Container) -> Result<()> {
+    let mut asked = std::process::Command::new(program);
+    asked.args(["-hide_banner", "-loglevel", "error", "-encoders"]);
+    let answer = asked
+        .stdin(Stdio::null())
+        .output()
+        .map_err(|error| not_started(program, error))?;
+    let listed = String::from_utf8_lossy(&answer.stdout);
+    let wanted = container.encoder();
+    if !listed.split_whitespace().any(|word| word == wanted) {
+        bail!(
+            "{} has no encoder {wanted}: install another build of ffmpeg (Debian's has it) or name it with --ffmpeg; \
+             {WITHOUT_IT}",
+            program.display()
+        );
+    }
+    Ok(())
+}
+
+/// What can be had all the same.
+const WITHOUT_IT: &str =
+    "without it, -o FILE.png makes an animated PNG and -o FOLDER single pictures";
+
+/// Why a program could not be started, and what to do.
+fn not_started(program: &Path, error: std::io::Error) -> anyhow::Error {
+    if error.kind() == std::io::ErrorKind::NotFound {
+        return anyhow!(
+            "{} is not there: install ffmpeg (Debian: apt-get install ffmpeg) or name it with --ffmpeg; {WITHOUT_IT}",
+            program.display()
+        );
+    }
+    anyhow::Error::new(error).context(format!("cannot start {}", program.display()))
+}
+
 impl Encoder {
     pub(super) fn start(
         program: &Path,
@@ -120,17 +165,8 @@ impl Encoder {
             .stdout(Stdio::null())
             .stderr(Stdio::piped())
             .kill_on_drop(true);
-        let mut child = match command.spawn() {
-            Ok(child) => child,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => bail!(
-                "{} is not there: install ffmpeg (Debian: apt-get install ffmpeg) or name it with --ffmpeg; \
-                 without it, -o FILE.png makes an animated PNG and -o FOLDER single pictures",
-                program.display()
-            ),
-            Err(error) => {
-                return Err(error).with_context(|| format!("cannot start {}", program.display()));
-            }
-        };
+        let spawned = command.spawn();
+        let mut child = spawned.map_err(|error| not_started(program, error))?;
         let pictures = child.stdin.take().context("the encoder has an input")?;
         let mut talk = child.stderr.take().context("the encoder has a voice")?;
         let said = tokio::spawn(async move {

@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::Result;
 use bytes::Bytes;
 
-use super::encoder::{Container, Encoder};
+use super::encoder::{self, Container, Encoder};
 use super::folder::Folder;
 use super::shots::Shots;
 use super::strip::Strip;
@@ -19,6 +19,15 @@ pub(super) enum Film {
     Strip(Box<Strip>),
     /// What ffmpeg writes.
     Encoder(Box<Encoder>),
+}
+
+/// Can the output of the options be written? What is not there is told before anything is drawn.
+pub(super) fn check(options: &RenderAnimation) -> Result<()> {
+    let kind = extension(&options.globe.picture.output);
+    match kind.as_deref().and_then(Container::named) {
+        Some(container) => encoder::check(&options.ffmpeg, container),
+        None => Ok(()),
+    }
 }
 
 impl Film {

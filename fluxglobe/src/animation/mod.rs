@@ -19,7 +19,7 @@ use futures::stream::{self, StreamExt as _, TryStreamExt as _};
 use prometheus::Registry;
 use render_worker::fleet::{Fleet, FleetSettings};
 use storage::Store;
-use tile_server::backend::Draw;
+use tile_server::backend::{Draw, Turn};
 
 use crate::cli::{RenderAnimation, Settings};
 use crate::command::render;
@@ -37,6 +37,7 @@ pub(crate) async fn run(settings: &Settings, store: Store, options: RenderAnimat
     if options.globe.picture.time.is_some() {
         bail!("an animation has no one --time: give --from and --to");
     }
+    film::check(&options)?;
     let shots = Arc::new(shots(settings, &store, &options).await?);
     let drawer = drawer(settings, store, &options).await?;
     let mut film = Film::open(&options, &shots)?;
@@ -48,7 +49,7 @@ pub(crate) async fn run(settings: &Settings, store: Store, options: RenderAnimat
             let (drawer, shots) = (Arc::clone(&drawer), Arc::clone(&shots));
             async move {
                 let job = shots.job(number)?;
-                let png = drawer.draw(&job).await;
+                let png = drawer.draw(&job, Turn::default()).await;
                 let time = shots.time(number)?;
                 let png = png.with_context(|| format!("picture {number}, {time}"))?;
                 anyhow::Ok((number, png))

@@ -13,7 +13,7 @@ use contract::quantity::Quantity;
 use contract::time::Period;
 use render_worker::Image;
 
-use super::encoder::{Container, Encoder};
+use super::encoder::{self, Container, Encoder};
 use super::folder::Folder;
 use super::shots::Shots;
 use super::strip::Strip;
@@ -22,11 +22,13 @@ use super::strip::Strip;
 fn product() -> Manifest {
     let product: ProductId = "made-up".parse().unwrap();
     let step = |month| Step {
+        masked: None,
         period: Period::month(2000, month).unwrap(),
         frame: ObjectKey::frame(&product, &Digest::of(&[month as u8])),
         raw_sha256: Digest::of(b"file"),
         origin: "file.nc".into(),
         valid_cells: 1,
+        contributed: None,
     };
     Manifest {
         schema: MANIFEST_SCHEMA,
@@ -47,6 +49,7 @@ fn product() -> Manifest {
         domain: ObjectKey::domain(&product, &Digest::of(b"domain")),
         series: vec![],
         derived_from: None,
+        notices: vec![],
         product,
     }
 }
@@ -235,6 +238,24 @@ fn an_encoder_that_is_not_there_is_asked_for_by_name() {
     let text = error.err().unwrap().to_string();
     assert!(
         text.contains("install ffmpeg") && text.contains("FILE.png"),
+        "{text}"
+    );
+    let early = encoder::check(missing, Container::Mp4).unwrap_err();
+    assert_eq!(early.to_string(), text);
+}
+
+#[test]
+fn an_encoder_that_cannot_write_the_kind_of_film_is_told_of_before_anything_is_drawn() {
+    let place = tempfile::tempdir().unwrap();
+    let program = place.path().join("encoder");
+    let lists = "#!/bin/sh\n[ \"$4\" = -encoders ] && echo ' V....D libvpx-vp9 VP9'\n";
+    std::fs::write(&program, lists).unwrap();
+    make_executable(&program);
+    encoder::check(&program, Container::Webm).unwrap();
+    let refused = encoder::check(&program, Container::Mp4).unwrap_err();
+    let text = refused.to_string();
+    assert!(
+        text.contains("no encoder libx264") && text.contains("FILE.png"),
         "{text}"
     );
 }

@@ -14,6 +14,7 @@ use contract::topic::Topic;
 use serde::Serialize;
 use storage::log::{EventLog, Follower, Start};
 
+use crate::bench::quantile;
 use crate::cli::BenchStream;
 use crate::command::notice;
 use crate::progress;
@@ -204,12 +205,6 @@ fn summarise(all: &[Times]) -> Summary {
     }
 }
 
-/// The smallest value that a share of all values does not exceed; `values` are sorted and there is one.
-fn quantile(values: &[f64], share: f64) -> f64 {
-    let rank = (share * values.len() as f64).ceil() as usize;
-    values[rank.clamp(1, values.len()) - 1]
-}
-
 fn table(summary: &Summary) -> Table {
     let mut table = Table::new();
     table.load_preset(NOTHING);
@@ -233,16 +228,6 @@ fn table(summary: &Summary) -> Table {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn quantiles_are_values_that_were_measured() {
-        let values: Vec<f64> = (1..=20).map(f64::from).collect();
-        assert_eq!(
-            (quantile(&values, 0.5), quantile(&values, 0.95)),
-            (10.0, 19.0)
-        );
-        assert_eq!(quantile(&[7.0], 0.95).to_bits(), 7.0_f64.to_bits());
-    }
 
     #[test]
     fn shares_of_the_stages_add_up_to_the_whole() {

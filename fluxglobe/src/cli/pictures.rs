@@ -1,8 +1,10 @@
 //! Words for animations and for measures of pictures.
 
+use std::num::NonZeroU16;
 use std::path::PathBuf;
 
 use clap::{Args, value_parser};
+use contract::job::Mode;
 use contract::product::ProductId;
 use contract::time::TimeMs;
 use render_worker::fleet::WorkerAddress;
@@ -85,6 +87,57 @@ pub(crate) struct BenchQuality {
     /// JSON instead of a table.
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+/// `fluxglobe bench serve`.
+#[derive(Debug, Args)]
+pub(crate) struct BenchServe {
+    /// Address of the server.
+    #[arg(long, default_value = "http://127.0.0.1:8080")]
+    pub(crate) url: String,
+    /// Product to ask for; the first one that is drawn in the mode if absent.
+    #[arg(long, value_name = "PRODUCT")]
+    pub(crate) layer: Option<ProductId>,
+    /// How it is drawn.
+    #[arg(long, default_value = "volume")]
+    pub(crate) mode: Mode,
+    /// Clients that ask at the same time, each for the next picture as soon as it has the last, 1 to 1024.
+    #[arg(long, default_value = "16", value_parser = clients)]
+    pub(crate) clients: NonZeroU16,
+    /// How long answers are counted.
+    #[arg(long, default_value = "20")]
+    pub(crate) seconds: NonZeroU16,
+    /// How long is asked before that, so that frames are read and kernels compiled.
+    #[arg(long, default_value_t = 3)]
+    pub(crate) warm_up_seconds: u16,
+    /// Tiles of this zoom level instead of views of the globe, 0 to 8.
+    #[arg(long, value_name = "ZOOM", value_parser = value_parser!(u8).range(0..=8))]
+    pub(crate) tiles: Option<u8>,
+    /// Width of a view, pixels.
+    #[arg(long, default_value_t = 1920, value_parser = value_parser!(u32).range(1..=4096))]
+    pub(crate) width: u32,
+    /// Height of a view, pixels.
+    #[arg(long, default_value_t = 1080, value_parser = value_parser!(u32).range(1..=4096))]
+    pub(crate) height: u32,
+    /// Longitude below the camera, degrees.
+    #[arg(long, default_value_t = 0.0, allow_hyphen_values = true)]
+    pub(crate) lon: f64,
+    /// Latitude below the camera, degrees.
+    #[arg(long, default_value_t = 0.0, allow_hyphen_values = true)]
+    pub(crate) lat: f64,
+    /// Height of the camera above the ground, km.
+    #[arg(long, default_value_t = 15_000.0)]
+    pub(crate) height_km: f64,
+    /// JSON instead of a table.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// A number of clients.
+fn clients(text: &str) -> Result<NonZeroU16, String> {
+    let count: Option<NonZeroU16> = text.parse().ok();
+    let count = count.filter(|count| count.get() <= 1024);
+    count.ok_or_else(|| "a whole number, 1 to 1024".to_owned())
 }
 
 /// `fluxglobe bench compare`.

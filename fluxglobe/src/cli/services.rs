@@ -9,7 +9,7 @@ use contract::digest::Digest;
 use contract::product::ProductId;
 use contract::topic::Origin;
 
-use super::{BenchCompare, BenchQuality};
+use super::{BenchCompare, BenchQuality, BenchServe};
 
 /// What every service is told besides its own settings.
 #[derive(Debug, Clone, Args)]
@@ -151,6 +151,8 @@ pub(crate) enum Rejected {
 pub(crate) enum Bench {
     /// How fresh a running cluster is: from a notice to a volume tile, and the share of each stage.
     Stream(BenchStream),
+    /// How many new pictures a running server gives to so many clients, and how long each waits.
+    Serve(BenchServe),
     /// How fast the renderer is on this machine, beside the classic raster renderer and the processor.
     Render(render_bench::command::RenderBench),
     /// How far volumes are from a reference in double precision, against the number of slices.

@@ -1,4 +1,4 @@
-//! Words of what maintainers do: recompute, remove, survey.
+//! Words of what maintainers do: recompute, verify, remove, survey.
 
 use std::num::NonZeroU16;
 use std::path::PathBuf;
@@ -80,6 +80,10 @@ pub(crate) struct Recompute {
     /// Also what is there and right by its name: made again and compared.
     #[arg(long)]
     pub(crate) force: bool,
+    /// Read what is there first, and make again what is damaged: frames, series and domain from raw/, sums and tiles from
+    /// those.
+    #[arg(long)]
+    pub(crate) verify: bool,
     /// Show the plan and do nothing.
     #[arg(long)]
     pub(crate) dry_run: bool,
@@ -88,6 +92,17 @@ pub(crate) struct Recompute {
     pub(crate) json: bool,
     #[command(flatten, next_help_heading = "Kafka")]
     pub(crate) kafka: kafka_log::KafkaSettings,
+}
+
+/// `fluxglobe verify`.
+#[derive(Debug, Args)]
+pub(crate) struct Verify {
+    /// Objects of this product or dataset only; of all, and pictures and weights too, if absent.
+    #[arg(long)]
+    pub(crate) product: Option<ProductId>,
+    /// What was found as JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 /// `fluxglobe gc`.

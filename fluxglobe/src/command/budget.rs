@@ -5,8 +5,9 @@ use std::path::Path;
 use anyhow::Result;
 use comfy_table::presets::NOTHING;
 use comfy_table::{CellAlignment, Table};
-use compute::budget::{BudgetAnswer, BudgetQuery, BudgetStep};
+use compute::budget::{BudgetAnswer, BudgetQuery, BudgetRow, BudgetStep};
 use compute::region::file;
+use contract::quantity::Quantity;
 use contract::region::Region;
 
 use crate::cli::{Budget, Settings, Step};
@@ -16,7 +17,7 @@ const M2_PER_MILLION_KM2: f64 = 1e12;
 
 pub(crate) async fn run(settings: &Settings, options: &Budget) -> Result<()> {
     let store = deployment::store(settings)?;
-    deployment::manifest(&store, &options.product, &settings.data).await?;
+    let product = deployment::manifest(&store, &options.product, &settings.data).await?;
     let query = BudgetQuery {
         product: options.product.clone(),
         region: region(&options.region)?,
@@ -58,6 +59,12 @@ pub(crate) async fn run(settings: &Settings, options: &Budget) -> Result<()> {
     for note in &answer.notes {
         progress::say(&format!("note: {note}"));
     }
+    let is_counted = |row: &BudgetRow| row.completeness.is_some();
+    if product.quantity == Quantity::AccumulatedCarbon && !answer.rows.iter().all(is_counted) {
+        progress::say(
+            "how complete its sums are is unknown: an older version accumulated it; `fluxglobe derive accumulated` does it anew",
+        );
+    }
     progress::say(&answer.source);
     Ok(())
 }
@@ -74,7 +81,8 @@ pub(crate) fn region(text: &str) -> Result<Region> {
 fn table(answer: &BudgetAnswer) -> Table {
     let mut table = Table::new();
     table.load_preset(NOTHING);
-    table.set_header([
+    let is_counted = answer.rows.iter().any(|row| row.completeness.is_some());
+    let mut header = vec![
         "from",
         "to",
         "Tg C",
@@ -82,14 +90,18 @@ fn table(answer: &BudgetAnswer) -> Table {
         "10⁶ km² of sea with data",
         "gaps would add Tg C",
         "for 10⁶ km²",
-    ]);
-    for column in 2..7 {
+    ];
+    if is_counted {
+        header.extend(["10⁶ km² complete", "incomplete", "% complete"]);
+    }
+    table.set_header(header);
+    for column in 2..10 {
         if let Some(column) = table.column_mut(column) {
             column.set_cell_alignment(CellAlignment::Right);
         }
     }
     for row in &answer.rows {
-        table.add_row([
+        let mut cells = vec![
             progress::day(row.start),
             progress::day(row.end),
             format!("{:.3}", row.budget_tg),
@@ -98,7 +110,14 @@ fn table(answer: &BudgetAnswer) -> Table {
             row.gap_tg
                 .map_or_else(|| "unknown".to_owned(), |gap_tg| format!("{gap_tg:.3}")),
             format!("{:.3}", row.gap_area_m2 / M2_PER_MILLION_KM2),
-        ]);
+        ];
+        if let Some(completeness) = &row.completeness {
+            cells.push(format!("{:.3}", completeness.complete_m2 / 1e12));
+            cells.push(format!("{:.3}", completeness.incomplete_m2 / 1e12));
+            let percent = completeness.percent();
+            cells.push(percent.map_or("no data".to_owned(), |percent| format!("{percent:.1}")));
+        }
+        table.add_row(cells);
     }
     table
 }

@@ -9,7 +9,7 @@ use comfy_table::{CellAlignment, Table};
 use contract::manifest::Manifest;
 use render_worker::stages::fill::hold_out::{HoldOut, Score};
 use render_worker::stages::fill::scaled::holds;
-use render_worker::{Backend, Image, Renderer};
+use render_worker::{Image, Renderer};
 use serde::Serialize;
 
 use crate::cli::{FillError, Settings};
@@ -82,11 +82,7 @@ pub(crate) async fn run(settings: &Settings, options: &FillError) -> Result<()> 
         .into_iter()
         .map(u32::from)
         .collect();
-    let backend = if settings.cpu {
-        Backend::Cpu
-    } else {
-        Backend::Gpu
-    };
+    let backend = deployment::backend(settings)?;
     let renderer = tokio::task::spawn_blocking(move || Renderer::new(backend)).await??;
     let display = manifest.quantity.display();
     let (mut rows, mut all) = (vec![], vec![Score::default(); options.gap_cells.len()]);

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use anyhow::Result;
 use contract::event::RejectReason;
+use contract::masked::MaskedCells;
 use ingest::{IngestService, Outcome};
 use observations::FileStore;
 use serde::Serialize;
@@ -66,6 +67,9 @@ struct Line {
     manifest: Option<String>,
     reason: Option<RejectReason>,
     detail: Option<String>,
+    /// Cells that the file gave a value for and that hold none, by why; absent of what is in no product.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    masked: Option<MaskedCells>,
 }
 
 impl Line {
@@ -74,6 +78,7 @@ impl Line {
             Outcome::Landed { revised: true, .. } => ("revised", None, None),
             Outcome::Landed { .. } => ("landed", None, None),
             Outcome::AlreadyLanded { .. } => ("already_landed", None, None),
+            Outcome::Superseded { .. } => ("superseded", None, None),
             Outcome::Observed { .. } => ("observed", None, None),
             Outcome::Rejected {
                 reason,
@@ -92,6 +97,7 @@ impl Line {
             manifest: outcome.manifest().map(ToString::to_string),
             reason,
             detail,
+            masked: outcome.masked(),
         }
     }
 }

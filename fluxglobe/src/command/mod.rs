@@ -17,6 +17,7 @@ pub(crate) mod serve;
 mod stats;
 mod survey;
 mod topics;
+mod verify;
 
 use std::process::ExitCode;
 
@@ -55,12 +56,14 @@ pub(crate) async fn run(settings: &Settings, command: Command) -> Result<ExitCod
         Command::Observations(command) => observations::run(settings, command).await?,
         Command::Recompute(options) => recompute::run(settings, options).await?,
         Command::Survey(options) => survey::run(&options).await?,
+        Command::Verify(options) => return verify::run(settings, &options).await,
         Command::Gc(options) => gc::run(settings, &options).await?,
         Command::Bench(Bench::Stream(options)) => {
             let log = deployment::needed_log(settings, &options.kafka).await?;
             bench::stream::run(log.as_ref(), &options).await?;
         }
         Command::Bench(Bench::Render(options)) => render_bench::command::run(&options)?,
+        Command::Bench(Bench::Serve(options)) => bench::serve::run(&options).await?,
         Command::Bench(Bench::Quality(options)) => bench::quality::run(settings, options).await?,
         Command::Bench(Bench::Compare(options)) => bench::compare::run(&options)?,
         Command::Bench(Bench::Fill(options)) => bench::fill::run(settings, &options)?,

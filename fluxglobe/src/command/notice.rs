@@ -19,8 +19,9 @@ const READ_BYTES: usize = 1 << 20;
 
 /// Prints notices, for a Kafka client of the caller's own.
 pub(crate) fn print(options: &Notice) -> Result<()> {
+    let mut clock = Clock::default();
     for file in &options.files {
-        progress::result(&notice(file, options)?.to_json())?;
+        progress::result(&notice(file, options, &mut clock)?.to_json())?;
     }
     Ok(())
 }
@@ -28,16 +29,17 @@ pub(crate) fn print(options: &Notice) -> Result<()> {
 /// Appends notices to the log.
 pub(crate) async fn send(log: &dyn EventLog, options: &Notice) -> Result<()> {
     let bar = progress::bar("send notices", options.files.len() as u64);
+    let mut clock = Clock::default();
     for files in options.files.chunks(AT_ONCE) {
-        let events: Result<Vec<Event>> = files.iter().map(|file| notice(file, options)).collect();
-        log.append(&events?).await?;
+        let events = files.iter().map(|file| notice(file, options, &mut clock));
+        log.append(&events.collect::<Result<Vec<Event>>>()?).await?;
         bar.inc(files.len() as u64);
     }
     progress::done(&bar, &format!("{} notices", options.files.len()));
     Ok(())
 }
 
-fn notice(file: &str, options: &Notice) -> Result<Event> {
+fn notice(file: &str, options: &Notice, clock: &mut Clock) -> Result<Event> {
     let is_address = file.contains("://") && !file.starts_with("file://");
     let (path, sha256, size_bytes) = if is_address {
         (file.to_owned(), options.sha256, None)
@@ -56,8 +58,26 @@ fn notice(file: &str, options: &Notice) -> Result<Event> {
         attempt: 1,
     };
     let mut event = Event::new(uuid::Uuid::new_v4().to_string(), body);
-    event.noticed = Some(now()?);
+    event.noticed = Some(clock.next()?);
     Ok(event)
+}
+
+/// Gives each notice a later time than the one before, since of two files for one period the later notice counts.
+#[derive(Default)]
+struct Clock {
+    last: Option<TimeMs>,
+}
+
+impl Clock {
+    fn next(&mut self) -> Result<TimeMs> {
+        let now = now()?;
+        let next = match self.last {
+            Some(last) if last >= now => TimeMs::new(last.ms() + 1)?,
+            _ => now,
+        };
+        self.last = Some(next);
+        Ok(next)
+    }
 }
 
 /// The clock on the wall.

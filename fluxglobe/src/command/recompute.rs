@@ -92,6 +92,7 @@ async fn plan(settings: &Settings, store: &Store, options: &Recompute) -> Result
             .filter(|what| is_flux || *what != What::Frames)
             .collect(),
         is_forced: options.force,
+        is_verified: options.verify,
     };
     Ok(compute::recompute::plan(store, &request).await?)
 }

@@ -30,17 +30,19 @@ pub(crate) async fn bind(
     check: Option<Check>,
 ) -> Result<Server> {
     options.viewer = options.viewer.or_else(viewer::built);
-    let drawer = Drawer::new(deployment::renderer(settings, store.clone()).await?);
+    let renderer = deployment::renderer_at(settings, store.clone(), options.draws_at_once).await?;
     let analyst = Analyst {
         local: Engine::local(store.clone()),
         regions: deployment::region_engine(settings, store.clone())?,
         check,
     };
     let registry = Registry::new();
+    renderer.register(&registry)?;
+    storage::sound::damage::register(&registry)?;
     let state = AppState::new(
         &options,
         store.clone(),
-        Arc::new(drawer),
+        Arc::new(Drawer::new(renderer)),
         Arc::new(analyst),
         registry,
     )?

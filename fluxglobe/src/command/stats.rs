@@ -103,21 +103,33 @@ fn table(answer: &PointAnswer) -> Table {
         .fold(0.0, |a: f64, v| a.max(v.abs()));
     let mut table = Table::new();
     table.load_preset(NOTHING);
-    table.set_header(["from", "to", answer.unit.as_str(), ""]);
-    if let Some(column) = table.column_mut(2) {
-        column.set_cell_alignment(CellAlignment::Right);
+    let is_counted = answer.series.iter().any(|step| step.contributed.is_some());
+    let mut header = vec!["from", "to", answer.unit.as_str(), ""];
+    if is_counted {
+        header.extend(["steps with data", "% of time"]);
+    }
+    table.set_header(header);
+    for column in [2, 4, 5] {
+        if let Some(column) = table.column_mut(column) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
     }
     for step in &answer.series {
         let (text, bar) = match step.value {
             Some(value) => (format!("{value:.4}"), bar(value, largest)),
             None => ("no data".to_owned(), String::new()),
         };
-        table.add_row([
+        let mut row = vec![
             progress::day(step.start),
             progress::day(step.end),
             text,
             bar,
-        ]);
+        ];
+        if let Some(counts) = &step.contributed {
+            row.push(format!("{} of {}", counts.steps, counts.of_steps));
+            row.push(format!("{:.1}", counts.time_percent));
+        }
+        table.add_row(row);
     }
     table
 }

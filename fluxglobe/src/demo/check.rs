@@ -1,47 +1,54 @@
-//! Our budgets beside published ones: computed once for a version of the product, then kept.
+//! Our budgets beside what a paper and another program say: computed once for a version of the product, then kept.
 
 use anyhow::Result;
-use bytes::Bytes;
 use compute::check::CheckRow;
 use contract::digest::Digest;
 use contract::key::ObjectKey;
 use contract::manifest::Manifest;
 use serde::{Deserialize, Serialize};
-use storage::Store;
-use tile_server::backend::Check;
+use storage::{StorageError, Store, document};
+use tile_server::backend::{self as wire, Check};
 
 use crate::cli::Settings;
 use crate::demo::source::SETS;
 use crate::{deployment, progress};
 
 /// Raised when the comparison itself changes, so that a kept one is not taken for it.
-const COMPARISON_VERSION: u32 = 1;
+const COMPARISON_VERSION: u32 = 2;
 
-/// A comparison and where the published values come from.
+/// A comparison and where the values beside ours come from.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct Comparison {
     pub(crate) rows: Vec<CheckRow>,
+    /// The paper.
     pub(crate) note: String,
+    /// The other program.
+    pub(crate) method: String,
 }
 
 impl Comparison {
     /// As the tile server tells it.
     pub(crate) fn to_wire(&self) -> Check {
-        // Where the paper prints no value of its own (the months), the integral of its grid stands in.
-        let row = |row: &CheckRow| tile_server::backend::CheckRow {
+        let row = |row: &CheckRow| wire::CheckRow {
             what: row.what.clone(),
             period: row.period.clone(),
-            published: row.published.unwrap_or(row.expected),
-            ours: row.ours,
             unit: row.unit.clone(),
-            difference_percent: Some(
-                (row.ours / row.published.unwrap_or(row.expected) - 1.0) * 100.0,
-            )
-            .filter(|percent| percent.is_finite()),
+            paper: row.paper.map(|paper| wire::Paper {
+                value: paper.stated.value,
+                uncertainty: paper.stated.uncertainty,
+                decimals: paper.stated.decimals,
+                difference: paper.difference,
+                verdict: paper.verdict.as_str().to_owned(),
+            }),
+            independent: row.independent,
+            ours: row.ours,
+            difference: row.difference,
+            agrees: row.agrees,
         };
         Check {
             rows: self.rows.iter().map(row).collect(),
             note: self.note.clone(),
+            method: self.method.clone(),
         }
     }
 }
@@ -59,14 +66,16 @@ pub(crate) async fn compare(
     let bar = progress::bar("budgets on Ballista", 1);
     let engine = deployment::engine(settings, store.clone())?;
     let rows = compute::compare(&engine, &flux.product).await?;
-    progress::done(&bar, &format!("{} beside published ones", rows.len()));
+    progress::done(
+        &bar,
+        &format!("{} beside the paper's and independent ones", rows.len()),
+    );
     let comparison = Comparison {
         rows,
         note: compute::published::CITATION.to_owned(),
+        method: compute::published::METHOD.to_owned(),
     };
-    store
-        .put_new(&key, Bytes::from(serde_json::to_vec(&comparison)?))
-        .await?;
+    document::put_over(store, &key, &comparison).await?;
     Ok(comparison)
 }
 
@@ -85,9 +94,12 @@ fn key(flux: &Manifest) -> ObjectKey {
 }
 
 async fn read(store: &Store, key: &ObjectKey) -> Result<Option<Comparison>> {
-    match store.get(key).await {
-        Ok(content) => Ok(Some(serde_json::from_slice(&content)?)),
-        Err(error) if error.is_not_found() => Ok(None),
+    match document::get(store, key).await {
+        Ok(kept) => Ok(kept),
+        Err(error @ StorageError::Damaged { .. }) => {
+            tracing::warn!(%error, "published values are compared again");
+            Ok(None)
+        }
         Err(error) => Err(error.into()),
     }
 }

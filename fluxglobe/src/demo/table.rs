@@ -5,6 +5,8 @@ use comfy_table::presets::NOTHING;
 use comfy_table::{CellAlignment, Table};
 use compute::Engine;
 use compute::budget::{BudgetQuery, BudgetStep};
+use compute::check::AgainstPaper;
+use compute::published::Stated;
 use contract::earth::Earth;
 use contract::manifest::Manifest;
 use contract::region::{Cells, Region};
@@ -12,35 +14,53 @@ use contract::region::{Cells, Region};
 use crate::demo::check::Comparison;
 use crate::progress;
 
-/// Ours against the published values.
+/// What the paper says, what an independent integration of its grid says, what we say.
 pub(crate) fn against_published(comparison: &Comparison) -> String {
     let mut table = table(&[
         "air-sea carbon, positive out of the sea",
         "period",
-        "published",
-        "grid",
-        "ours",
+        "paper",
+        "independent",
+        "Fluxglobe",
         "unit",
-        "",
+        "Fluxglobe against the paper",
     ]);
     for row in &comparison.rows {
         let decimals = if row.unit.starts_with("Pg") { 3 } else { 1 };
+        let mut verdict = row.paper.map_or(String::new(), |paper| judged(&paper));
+        if !row.agrees {
+            let off = format!("OFF the independent value by {:+.6}", row.difference);
+            verdict = [verdict, off].join("; ");
+        }
         table.add_row([
             row.what.clone(),
             row.period.clone(),
-            row.published
-                .map_or(String::new(), |value| format!("{value:.2}")),
-            format!("{:.decimals$}", row.expected),
+            row.paper
+                .map_or(String::new(), |paper| stated(&paper.stated)),
+            format!("{:.decimals$}", row.independent),
             format!("{:.decimals$}", row.ours),
             row.unit.clone(),
-            if row.within {
-                "ok".to_owned()
-            } else {
-                format!("off by {:.3}", row.difference)
-            },
+            verdict,
         ]);
     }
-    format!("{table}\n{}", comparison.note)
+    format!("{table}\nPaper: {}\n{}", comparison.note, comparison.method)
+}
+
+/// A value with the decimals and the uncertainty that it is printed with.
+fn stated(stated: &Stated) -> String {
+    let value = format!("{:.*}", stated.decimals, stated.value);
+    match stated.uncertainty {
+        Some(uncertainty) => format!("{value} ± {uncertainty}"),
+        None => value,
+    }
+}
+
+fn judged(paper: &AgainstPaper) -> String {
+    let (verdict, difference) = (paper.verdict.as_str(), paper.difference);
+    match paper.stated.uncertainty {
+        Some(uncertainty) => format!("{verdict} ± {uncertainty} (by {difference:+.3})"),
+        None => format!("{verdict}; differs by {difference:+.3}"),
+    }
 }
 
 /// Monthly budgets of a synthetic product: nothing is published about it.
@@ -88,4 +108,52 @@ fn table(header: &[&str]) -> Table {
         }
     }
     table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use compute::check::{CheckRow, Verdict};
+
+    #[test]
+    fn a_difference_without_a_stated_uncertainty_is_shown_and_not_judged() {
+        let row = |what: &str, paper: Option<AgainstPaper>, agrees| CheckRow {
+            what: what.to_owned(),
+            period: "2000".to_owned(),
+            unit: "Pg C".to_owned(),
+            paper,
+            independent: -1.404_272,
+            ours: -1.404_271,
+            difference: 1e-6,
+            agrees,
+        };
+        let paper = |uncertainty: Option<f64>, verdict| {
+            Some(AgainstPaper {
+                stated: Stated {
+                    value: -1.4,
+                    decimals: 1,
+                    uncertainty,
+                },
+                difference: -0.004_271,
+                verdict,
+            })
+        };
+        let comparison = Comparison {
+            rows: vec![
+                row("globe", paper(Some(0.7), Verdict::Within), true),
+                row("band", paper(None, Verdict::NoUncertaintyStated), true),
+                row("month", None, false),
+            ],
+            note: "The paper.".to_owned(),
+            method: "The script.".to_owned(),
+        };
+        let text = against_published(&comparison);
+        let line = |what: &str| text.lines().find(|line| line.contains(what)).unwrap();
+        assert!(line("globe").contains("-1.4 ± 0.7") && line("globe").contains("within ± 0.7"));
+        let band = line("band");
+        assert!(band.contains("no uncertainty stated; differs by -0.004"));
+        assert!(!band.contains("within") && !band.contains('±'), "{band}");
+        assert!(line("month").contains("OFF the independent value by +0.000001"));
+        assert!(text.contains("The paper.") && text.contains("The script."));
+    }
 }

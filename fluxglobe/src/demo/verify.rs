@@ -30,11 +30,11 @@ pub(crate) async fn all(
     for row in check
         .iter()
         .flat_map(|check| &check.rows)
-        .filter(|row| !row.within)
+        .filter(|row| !row.agrees)
     {
         failures.push(format!(
-            "{} {}: {} {} against {}",
-            row.what, row.period, row.ours, row.unit, row.expected
+            "{} {}: {} {}, an independent integration of the same grid gives {}",
+            row.what, row.period, row.ours, row.unit, row.independent
         ));
     }
     failures.extend(mass(settings, store, flux).await?);

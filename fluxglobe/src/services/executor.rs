@@ -28,6 +28,7 @@ pub(crate) async fn run(settings: &Settings, options: cli::Executor) -> Result<(
         let readiness = readiness.clone();
         async move { crate::services::worst(readiness.as_ref()).await }
     });
-    executor.run(footing.stop.clone()).await?;
-    footing.leave().await
+    let mut parts = footing.parts();
+    parts.start("executor", executor.run(footing.stop.clone()));
+    footing.run(parts).await
 }

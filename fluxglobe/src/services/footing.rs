@@ -1,19 +1,22 @@
 //! What every service stands on: its health address, the store and the event log, waited for until they are there.
 
 use std::net::SocketAddr;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use anyhow::{Context as _, Result, bail};
 use kafka_log::{KafkaLog, KafkaSettings};
 use service::admin::Admin;
-use service::{Board, Registry, Stop, until_there};
+use service::{Board, Parts, Registry, ServiceError, Stop, until_there};
 use storage::log::EventLog;
 use storage::{StorageError, Store};
+
+use tokio::task::JoinHandle;
 
 use crate::cli::Settings;
 use crate::protocol;
 
-/// A service that lives and is not yet ready.
+/// A service that lives and is not yet ready; clones are of the same one.
+#[derive(Clone)]
 pub(crate) struct Footing {
     pub(crate) registry: Registry,
     pub(crate) board: Arc<Board>,
@@ -22,8 +25,11 @@ pub(crate) struct Footing {
     store_url: String,
     /// Said when everything else has ended, so that the end can be watched.
     end: Stop,
-    admin: Option<tokio::task::JoinHandle<Result<(), service::ServiceError>>>,
+    admin: Admins,
 }
+
+/// The health address at work, until it is waited for.
+type Admins = Arc<Mutex<Option<JoinHandle<Result<(), ServiceError>>>>>;
 
 impl Footing {
     /// Takes the health address, if the service has one of its own. `parts` are what it waits for.
@@ -35,6 +41,7 @@ impl Footing {
     ) -> Result<Self> {
         let stop = service::when_asked_to_stop()?;
         let registry = service::admin::registry(service, protocol::PROGRAM)?;
+        storage::sound::damage::register(&registry)?;
         let board = Board::waiting_for(parts);
         let store_url = match &settings.store {
             Some(url) => url.clone(),
@@ -47,7 +54,13 @@ impl Footing {
             Some(address) => {
                 let admin = Admin::bind(address, registry.clone(), Arc::clone(&board) as _).await?;
                 tracing::info!(address = %admin.address(), service, "health and metrics");
-                Some(tokio::spawn(admin.run(end.clone())))
+                let (end, stop) = (end.clone(), stop.clone());
+                Some(tokio::spawn(async move {
+                    let ended = admin.run(end).await;
+                    // A service that cannot be asked is not left to itself.
+                    stop.now();
+                    ended
+                }))
             }
             None => None,
         };
@@ -57,7 +70,7 @@ impl Footing {
             stop,
             store_url,
             end,
-            admin,
+            admin: Arc::new(Mutex::new(admin)),
         })
     }
 
@@ -113,10 +126,29 @@ impl Footing {
         Ok(Some(log))
     }
 
+    /// Parts to come: they are told when the service is asked to stop, and `/readyz` says no once one of them is dead.
+    pub(crate) fn parts(&self) -> Parts {
+        Parts::new(&self.stop, &self.board)
+    }
+
+    /// The service at work: until it is asked to stop, or until one of its parts ends, which is its error.
+    pub(crate) async fn run(self, parts: Parts) -> Result<()> {
+        let ended = parts.run().await;
+        let left = self.leave().await;
+        ended?;
+        left
+    }
+
     /// Ends the health address; the last thing that a service does.
     pub(crate) async fn leave(self) -> Result<()> {
         self.end.now();
-        if let Some(admin) = self.admin {
+        // Taken once, whole.
+        let admin = self
+            .admin
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .take();
+        if let Some(admin) = admin {
             admin.await??;
         }
         tracing::info!("stopped");

@@ -48,10 +48,10 @@ pub(crate) async fn run(settings: &Settings, options: Ingestd) -> Result<()> {
     });
     let red = Red::register(&footing.registry, "observations")?;
     let observed = ObservationService::new(log, measured, red);
-    let (landed, ()) = tokio::join!(
-        granules.run(&Quiet, footing.stop.said()),
-        observed.run(footing.stop.said())
-    );
-    landed?;
-    footing.leave().await
+    let mut parts = footing.parts();
+    let said = footing.stop.said();
+    parts.start("ingest", async move { granules.run(&Quiet, said).await });
+    let said = footing.stop.said();
+    parts.start("observations", async move { observed.run(said).await });
+    footing.run(parts).await
 }

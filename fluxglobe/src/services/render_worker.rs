@@ -1,7 +1,6 @@
 //! `fluxglobe render-worker`: pictures on demand over gRPC, and those of `render.job`.
 
 use anyhow::Result;
-use render_worker::Backend;
 use render_worker::batch::BatchService;
 use render_worker::server::{Server, open_desk};
 
@@ -19,11 +18,7 @@ pub(crate) async fn run(settings: &Settings, options: RenderWorker) -> Result<()
     }
     // Whoever asks for a picture is told within seconds that the store is away; the batch tries again by itself.
     let store = deployment::open_interactive(footing.store_url())?;
-    let backend = if settings.cpu {
-        Backend::Cpu
-    } else {
-        Backend::Gpu
-    };
+    let backend = deployment::backend(settings)?;
     let (render, registry) = (options.render.clone(), footing.registry.clone());
     let desk = tokio::task::spawn_blocking(move || open_desk(&render, store, backend, &registry))
         .await??;
@@ -34,12 +29,15 @@ pub(crate) async fn run(settings: &Settings, options: RenderWorker) -> Result<()
     });
     let server = Server::bind(desk.clone(), &options.render)?;
     tracing::info!(address = %server.address(), "render worker");
-    let serving = tokio::spawn(server.run(footing.stop.clone()));
-    if let Some(log) = footing.log(&options.kafka).await? {
-        BatchService::new(desk, log, options.render.drain())
-            .run(footing.stop.clone())
-            .await;
-    }
-    serving.await??;
-    footing.leave().await
+    let mut parts = footing.parts();
+    parts.start("render worker", server.run(footing.stop.clone()));
+    let own = footing.clone();
+    parts.start("render jobs", async move {
+        if let Some(log) = own.log(&options.kafka).await? {
+            let batch = BatchService::new(desk, log, options.render.drain());
+            batch.run(own.stop.clone()).await?;
+        }
+        Ok::<_, anyhow::Error>(())
+    });
+    footing.run(parts).await
 }

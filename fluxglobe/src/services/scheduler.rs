@@ -23,15 +23,18 @@ pub(crate) async fn run(settings: &Settings, options: cli::Scheduler) -> Result<
         let readiness = readiness.clone();
         async move { crate::services::worst(readiness.as_ref()).await }
     });
+    let partitions = deployment::least_parts(settings);
+    let engine = Engine::cluster(store, format!("http://{address}").parse()?, partitions);
+    let mut parts = footing.parts();
     // Executors and clients are served while the log is waited for.
-    let serving = tokio::spawn(scheduler.run(footing.stop.clone()));
-    if let Some(log) = footing.log(&options.kafka).await? {
-        let partitions = deployment::least_parts(settings);
-        let engine = Engine::cluster(store, format!("http://{address}").parse()?, partitions);
-        Deriver::new(engine, log, &footing.registry)?
-            .run(footing.stop.clone())
-            .await?;
-    }
-    serving.await??;
-    footing.leave().await
+    parts.start("scheduler", scheduler.run(footing.stop.clone()));
+    let own = footing.clone();
+    parts.start("deriver", async move {
+        if let Some(log) = own.log(&options.kafka).await? {
+            let deriver = Deriver::new(engine, log, &own.registry)?;
+            deriver.run(own.stop.clone()).await?;
+        }
+        Ok::<_, anyhow::Error>(())
+    });
+    footing.run(parts).await
 }

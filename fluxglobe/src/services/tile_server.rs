@@ -39,14 +39,14 @@ pub(crate) async fn run(settings: &Settings, options: TileServer) -> Result<()> 
     .with_observations(Arc::new(Observer(measured)));
     let server = Server::bind(&serve, state.clone()).await?;
     tracing::info!(address = %server.address(), "tile server");
-    let serving = tokio::spawn(server.run(footing.stop.said()));
-    let live = live(&footing, &options.kafka, state).await;
-    if live.is_err() {
-        footing.stop.now();
-    }
-    serving.await??;
-    footing.leave().await?;
-    live
+    let mut parts = footing.parts();
+    parts.start("tile server", server.run(footing.stop.said()));
+    let own = footing.clone();
+    parts.start(
+        "news",
+        async move { live(&own, &options.kafka, state).await },
+    );
+    footing.run(parts).await
 }
 
 /// Follows the event log once store and log are there and of this version.
@@ -54,7 +54,7 @@ async fn live(footing: &Footing, kafka: &KafkaSettings, state: AppState) -> Resu
     if footing.store().await?.is_some()
         && let Some(log) = footing.log(kafka).await?
     {
-        state.live(log).run(footing.stop.clone()).await;
+        state.live(log).run(footing.stop.clone()).await?;
     }
     Ok(())
 }

@@ -2,6 +2,7 @@
 
 use contract::event::RejectReason;
 
+use super::projection;
 use crate::file::description::{Description, Variable};
 use crate::rejection::Rejection;
 
@@ -22,9 +23,24 @@ pub(crate) struct Axis {
     pub(crate) len: u64,
 }
 
-/// What a coordinate variable is. Units come first: real files carry other files' standard names by mistake, but no
-/// program works with `degrees_north` on a longitude.
+/// What says that a variable is a latitude or longitude.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Evidence {
+    /// Its units or its standard name.
+    Stated,
+    /// Nothing but what it is called.
+    NameAlone,
+}
+
+/// What a coordinate variable is.
 pub(crate) fn role_of(variable: &Variable) -> Role {
+    evidence(variable).map_or(Role::Other, |(role, _)| role)
+}
+
+/// What a coordinate variable is, and what says so. Units come first: real files carry other files' standard names by
+/// mistake, but no program works with `degrees_north` on a longitude. `axis` says which way a dimension runs, not that it
+/// is a longitude: the axes of every projection have it.
+pub(crate) fn evidence(variable: &Variable) -> Option<(Role, Evidence)> {
     let text = |name: &str| {
         variable
             .attributes
@@ -32,29 +48,36 @@ pub(crate) fn role_of(variable: &Variable) -> Role {
             .unwrap_or_default()
             .to_ascii_lowercase()
     };
-    let units = text("units");
-    match units.as_str() {
+    let (units, standard_name) = (text("units"), text("standard_name"));
+    if units.contains(" since ") {
+        return Some((Role::Time, Evidence::Stated));
+    }
+    if projection::of_coordinate(variable).is_some() {
+        return None;
+    }
+    match units.replace(' ', "_").as_str() {
         "degrees_north" | "degree_north" | "degrees_n" | "degree_n" | "degreesn" | "degreen" => {
-            return Role::Latitude;
+            return Some((Role::Latitude, Evidence::Stated));
         }
         "degrees_east" | "degree_east" | "degrees_e" | "degree_e" | "degreese" | "degreee" => {
-            return Role::Longitude;
+            return Some((Role::Longitude, Evidence::Stated));
         }
-        units if units.contains(" since ") => return Role::Time,
         _ => {}
     }
-    match (text("standard_name").as_str(), text("axis").as_str()) {
-        ("latitude", _) | (_, "y") => return Role::Latitude,
-        ("longitude", _) | (_, "x") => return Role::Longitude,
-        ("time", _) | (_, "t") => return Role::Time,
+    match standard_name.as_str() {
+        "latitude" => return Some((Role::Latitude, Evidence::Stated)),
+        "longitude" => return Some((Role::Longitude, Evidence::Stated)),
+        "time" => return Some((Role::Time, Evidence::Stated)),
+        _ if text("axis") == "t" => return Some((Role::Time, Evidence::Stated)),
         _ => {}
     }
-    match variable.name.to_ascii_lowercase().as_str() {
+    let role = match variable.name.to_ascii_lowercase().as_str() {
         "lat" | "latitude" | "nav_lat" => Role::Latitude,
         "lon" | "longitude" | "nav_lon" => Role::Longitude,
         "time" => Role::Time,
-        _ => Role::Other,
-    }
+        _ => return None,
+    };
+    Some((role, Evidence::NameAlone))
 }
 
 /// The axes of a variable, slowest first.
@@ -109,6 +132,9 @@ fn unnamed_coordinate<'a>(file: &'a Description, len: u64, taken: &[Axis]) -> Op
 
 /// A refusal for a variable without a latitude and a longitude axis, which says why.
 pub(crate) fn no_grid(file: &Description, variable: &Variable) -> Rejection {
+    if let Err(rejection) = projection::check(file, variable) {
+        return rejection;
+    }
     let is_plane =
         |v: &&Variable| v.dimensions.len() >= 2 && v.is_numeric() && v.name != variable.name;
     let swath = file
@@ -116,14 +142,26 @@ pub(crate) fn no_grid(file: &Description, variable: &Variable) -> Rejection {
         .iter()
         .filter(is_plane)
         .find(|v| matches!(role_of(v), Role::Latitude | Role::Longitude));
-    let detail = match swath {
-        Some(coordinate) => format!(
+    let unproven = variable
+        .dimensions
+        .iter()
+        .filter_map(|dimension| file.variable(dimension.name.as_deref()?))
+        .find(|v| role_of(v) == Role::Other && v.attributes.text("axis").is_some());
+    let detail = match (swath, unproven) {
+        (Some(coordinate), _) => format!(
             "is a swath: {:?} has {} dimensions, so every value has a place of its own; grid it to regular latitudes and longitudes first",
             coordinate.name,
             coordinate.dimensions.len()
         ),
-        None => "has no latitude and longitude axes; name them, or state the grid, in a profile"
-            .to_owned(),
+        (None, Some(axis)) => format!(
+            "has an axis {:?} of which axis = {:?} says the direction, but neither units (degrees_north, degrees_east) nor standard_name that it is a latitude or longitude; if it is, name it in a profile ([grid] latitude and longitude)",
+            axis.name,
+            axis.attributes.text("axis").unwrap_or_default()
+        ),
+        (None, None) => {
+            "has no latitude and longitude axes; name them, or state the grid, in a profile"
+                .to_owned()
+        }
     };
     Rejection::new(RejectReason::Grid, &variable.name, detail)
 }

@@ -1,4 +1,4 @@
-//! Which period a step covers: from a stated length, from neighbouring stamps, or from a file's coverage attributes.
+//! Which period a step covers, from a stated length and the place of the stamp in it.
 
 use contract::time::{Period, TimeMs};
 use serde::Deserialize;
@@ -7,6 +7,7 @@ use super::calendar::CalendarDate;
 use crate::file::description::Attributes;
 
 const DAY_MS: i64 = 86_400_000;
+const HOUR_MS: i64 = 3_600_000;
 
 /// How long the steps of a product are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
@@ -46,20 +47,96 @@ impl TryFrom<String> for Covers {
     }
 }
 
+/// Where in its period a stamp stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum StampAt {
+    Start,
+    Middle,
+    End,
+}
+
 impl Covers {
-    /// The period of this length that a stamp names.
+    /// The period of this length that a stamp names: the month or year that holds it, else the one that starts with it
+    /// (days at its midnight).
     pub(crate) fn period(self, stamp: CalendarDate) -> Result<Period, String> {
-        let text = |e: contract::ContractError| e.to_string();
-        let after = |start: TimeMs, ms: i64| {
-            Period::new(start, TimeMs::new(start.ms() + ms).map_err(text)?).map_err(text)
+        self.period_at(stamp, None)
+    }
+
+    /// The period of this length in which a stamp stands where it is said.
+    pub(crate) fn period_at(
+        self,
+        stamp: CalendarDate,
+        at: Option<StampAt>,
+    ) -> Result<Period, String> {
+        let after = |start_ms: i64, ms: i64| {
+            Period::new(time(start_ms)?, time(start_ms + ms)?).map_err(|e| e.to_string())
         };
-        match self {
-            Self::Month => Period::month(stamp.year, stamp.month).map_err(text),
-            Self::Year => Period::year(stamp.year).map_err(text),
-            Self::Days(count) => after(midnight(stamp)?, i64::from(count) * DAY_MS),
-            Self::Hours(count) => after(instant(stamp)?, i64::from(count) * 3_600_000),
+        let named = match at {
+            // An end is the first instant that does not belong to the period.
+            Some(StampAt::End) => before(stamp)?,
+            _ => stamp,
+        };
+        let text = |e: contract::ContractError| e.to_string();
+        match (self, at) {
+            (Self::Month, _) => Period::month(named.year, named.month).map_err(text),
+            (Self::Year, _) => Period::year(named.year).map_err(text),
+            (Self::Days(count), at) => {
+                let first_ms = midnight(named)?.ms();
+                let days = match at {
+                    None | Some(StampAt::Start) => 0,
+                    // Of an even number the stamp is the midnight in the middle, of an odd one its middle day.
+                    Some(StampAt::Middle) => i64::from(count) / 2,
+                    Some(StampAt::End) => i64::from(count) - 1,
+                };
+                after(first_ms - days * DAY_MS, i64::from(count) * DAY_MS)
+            }
+            (Self::Hours(count), at) => {
+                let (stamp_ms, ms) = (instant(stamp)?.ms(), i64::from(count) * HOUR_MS);
+                let early_ms = match at {
+                    None | Some(StampAt::Start) => 0,
+                    Some(StampAt::Middle) => ms / 2,
+                    Some(StampAt::End) => ms,
+                };
+                after(stamp_ms - early_ms, ms)
+            }
         }
     }
+}
+
+fn time(ms: i64) -> Result<TimeMs, String> {
+    TimeMs::new(ms).map_err(|e| e.to_string())
+}
+
+/// The date just before: the day before for a midnight.
+fn before(date: CalendarDate) -> Result<CalendarDate, String> {
+    if date.second > 0.0 {
+        return Ok(date);
+    }
+    let (year, month) = (date.year, date.month);
+    // The day before the first of a month is some day of the month before, in every calendar.
+    let (year, month, day) = match (month, date.day) {
+        (1, 1) => (year - 1, 12, 0),
+        (_, 1) => (year, month - 1, 0),
+        (_, day) => (year, month, day - 1),
+    };
+    if day > 0 {
+        return Ok(CalendarDate {
+            year,
+            month,
+            day,
+            ..date
+        });
+    }
+    let end_ms = midnight(date)?.ms();
+    let start = Period::month(year, month).map_err(|e| e.to_string())?.start;
+    let day = ((end_ms - start.ms()) / DAY_MS) as u32;
+    Ok(CalendarDate {
+        year,
+        month,
+        day,
+        ..date
+    })
 }
 
 fn midnight(date: CalendarDate) -> Result<TimeMs, String> {
@@ -76,41 +153,6 @@ fn midnight(date: CalendarDate) -> Result<TimeMs, String> {
 pub(crate) fn instant(date: CalendarDate) -> Result<TimeMs, String> {
     TimeMs::new(midnight(date)?.ms() + (date.second * 1000.0).round() as i64)
         .map_err(|e| e.to_string())
-}
-
-/// How long steps are, from the distance of their stamps; none if that does not tell.
-pub(crate) fn of_spacing(stamps: &[CalendarDate]) -> Option<Covers> {
-    let times: Vec<i64> = stamps
-        .iter()
-        .map(|s| instant(*s).map(TimeMs::ms))
-        .collect::<Result<_, _>>()
-        .ok()?;
-    let (first, rest) = times.split_first()?;
-    let spacings: Vec<i64> = std::iter::once(first)
-        .chain(rest)
-        .zip(rest)
-        .map(|(a, b)| b - a)
-        .collect();
-    let (low, high) = (*spacings.iter().min()?, *spacings.iter().max()?);
-    let months: Vec<i64> = stamps
-        .iter()
-        .map(|s| i64::from(s.year) * 12 + i64::from(s.month))
-        .collect();
-    let each_in_the_next_month = months.windows(2).all(|pair| pair[1] == pair[0] + 1);
-    match (low, high) {
-        _ if each_in_the_next_month && low >= 27 * DAY_MS => Some(Covers::Month),
-        (low, high) if low >= 364 * DAY_MS && high <= 367 * DAY_MS => Some(Covers::Year),
-        (low, high) if low != high || low <= 0 => None,
-        (ms, _) if ms % DAY_MS == 0 => u32::try_from(ms / DAY_MS)
-            .ok()
-            .filter(|n| *n <= 366)
-            .map(Covers::Days),
-        (ms, _) if ms % 3_600_000 == 0 => u32::try_from(ms / 3_600_000)
-            .ok()
-            .filter(|n| *n <= 8784)
-            .map(Covers::Hours),
-        _ => None,
-    }
 }
 
 /// How long the one step of a file is, from the attributes that say so.
@@ -163,18 +205,51 @@ mod tests {
     }
 
     #[test]
-    fn spacing_tells_months_days_and_years_apart() {
-        let months: Vec<_> = (1..=12).map(|m| stamp(2001, m, 15)).collect();
-        assert_eq!(of_spacing(&months), Some(Covers::Month));
-        let days: Vec<_> = (1..=20).map(|d| stamp(2001, 2, d)).collect();
-        assert_eq!(of_spacing(&days), Some(Covers::Days(1)));
-        let years: Vec<_> = (1999..=2004).map(|y| stamp(y, 7, 1)).collect();
-        assert_eq!(of_spacing(&years), Some(Covers::Year));
+    fn a_stamp_stands_where_it_is_said() {
+        let period =
+            |covers: Covers, stamp, at| covers.period_at(stamp, Some(at)).unwrap().to_string();
+        let noon = |year, month, day| CalendarDate {
+            second: 43_200.0,
+            ..stamp(year, month, day)
+        };
+        let month = "2010-01-01T00:00:00Z/2010-02-01T00:00:00Z";
         assert_eq!(
-            of_spacing(&[stamp(2001, 1, 1), stamp(2001, 1, 4), stamp(2001, 1, 5)]),
-            None
+            period(Covers::Month, stamp(2010, 2, 1), StampAt::End),
+            month
         );
-        assert_eq!(of_spacing(&[stamp(2001, 1, 1)]), None);
+        assert_eq!(
+            period(Covers::Month, stamp(2010, 1, 31), StampAt::End),
+            month
+        );
+        assert_eq!(
+            period(Covers::Month, stamp(2010, 1, 1), StampAt::Start),
+            month
+        );
+        let year = "2009-01-01T00:00:00Z/2010-01-01T00:00:00Z";
+        assert_eq!(period(Covers::Year, stamp(2010, 1, 1), StampAt::End), year);
+        let eight = "2010-01-01T00:00:00Z/2010-01-09T00:00:00Z";
+        assert_eq!(
+            period(Covers::Days(8), stamp(2010, 1, 5), StampAt::Middle),
+            eight
+        );
+        assert_eq!(
+            period(Covers::Days(8), stamp(2010, 1, 9), StampAt::End),
+            eight
+        );
+        let five = "2010-01-01T00:00:00Z/2010-01-06T00:00:00Z";
+        assert_eq!(
+            period(Covers::Days(5), noon(2010, 1, 3), StampAt::Middle),
+            five
+        );
+        assert_eq!(
+            period(Covers::Days(5), stamp(2010, 1, 3), StampAt::Middle),
+            five
+        );
+        let six_hours = "2010-01-01T09:00:00Z/2010-01-01T15:00:00Z";
+        assert_eq!(
+            period(Covers::Hours(6), noon(2010, 1, 1), StampAt::Middle),
+            six_hours
+        );
     }
 
     #[test]

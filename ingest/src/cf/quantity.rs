@@ -14,6 +14,33 @@ pub(crate) struct Named {
     pub(crate) substance: Option<Substance>,
 }
 
+/// Does the sign of a quantity tell a direction that files count either way?
+pub(crate) fn has_direction(quantity: Quantity) -> bool {
+    matches!(quantity, Quantity::CarbonFlux | Quantity::Elevation)
+}
+
+/// What turns a variable's values to be positive upwards, and the attribute that says so: `upward` or `downward` in the
+/// standard name, a height or a depth, or `positive = "up"` or `"down"`.
+pub(crate) fn directions(standard_name: &str, positive: &str) -> Vec<(&'static str, f64)> {
+    let word = |word: &str| standard_name.split('_').any(|part| part == word);
+    let named = of_standard_name(standard_name).filter(|named| has_direction(named.quantity));
+    let by_name = match named {
+        Some(named) => Some(named.sign),
+        None if word("downward") || word("depth") => Some(-1.0),
+        None if word("upward") => Some(1.0),
+        None => None,
+    };
+    let by_positive = match positive.to_ascii_lowercase().as_str() {
+        "up" => Some(1.0),
+        "down" => Some(-1.0),
+        _ => None,
+    };
+    let said = [("standard_name", by_name), ("positive", by_positive)];
+    said.into_iter()
+        .filter_map(|(what, sign)| Some((what, sign?)))
+        .collect()
+}
+
 /// What a standard name names, if it is a quantity that can be stored.
 pub(crate) fn of_standard_name(name: &str) -> Option<Named> {
     let plain = |quantity| {

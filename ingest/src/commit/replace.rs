@@ -5,12 +5,13 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use backon::BackoffBuilder as _;
 use contract::digest::Digest;
-use contract::manifest::{Manifest, Step};
+use contract::manifest::{MANIFEST_SCHEMA, Manifest, Step};
+use contract::notice::{NoticeOrder, NoticeRun};
 use contract::product::ProductId;
 use contract::time::Period;
 use storage::{StorageError, Store, manifests};
 
-use super::merge::{Merged, is_same_grid};
+use super::merge::{Merged, Taken, is_same_grid};
 use super::{MAX_TRIES, pauses, segments};
 use crate::error::IngestError;
 use crate::reading::Reading;
@@ -39,13 +40,14 @@ pub(crate) async fn replace(
         }
         let merged = Merged {
             steps: next.steps.clone(),
+            orders: vec![],
             changes: vec![],
             is_revision: true,
             last_taken: None,
         };
         let segments::Written { series, domain } =
             segments::write(store, product, &next.grid, Some(&newest), &merged).await?;
-        next.number = newest.number + 1;
+        (next.schema, next.number) = (MANIFEST_SCHEMA, newest.number + 1);
         (next.series, next.domain) = (series, domain);
         match manifests::commit(store, &next).await {
             Ok(()) => return Ok(Some(next)),
@@ -72,9 +74,13 @@ pub(super) fn file_of(step: &Step) -> (Digest, &str) {
 /// First every file gets the steps that it had and has, then those that are new, as far as no other file has their time:
 /// that one revised them.
 fn next(newest: &Manifest, readings: &[Reading]) -> Result<Manifest, String> {
-    let mut held: BTreeMap<(Digest, &str), Vec<Period>> = BTreeMap::new();
-    for step in &newest.steps {
-        held.entry(file_of(step)).or_default().push(step.period);
+    let before = newest.notice_orders();
+    let mut held: BTreeMap<(Digest, &str), BTreeSet<Period>> = BTreeMap::new();
+    let mut orders: BTreeMap<(Digest, &str), Option<NoticeOrder>> = BTreeMap::new();
+    for (step, order) in newest.steps.iter().zip(&before) {
+        held.entry(file_of(step)).or_default().insert(step.period);
+        let latest = orders.entry(file_of(step)).or_default();
+        *latest = (*order).max(*latest);
     }
     // What a file that holds nothing (any more) was read as is nobody's business.
     let taken: Vec<&Reading> = readings
@@ -101,9 +107,12 @@ fn next(newest: &Manifest, readings: &[Reading]) -> Result<Manifest, String> {
         later.push((reading, new, !had.is_empty()));
         steps.extend(had.into_iter().cloned());
     }
+    let mut occupied = Taken::default();
+    steps.iter().for_each(|step| occupied.insert(step.period));
     for (reading, new, mut is_placed) in later {
         for step in new {
-            if !steps.iter().any(|other| other.period.overlaps(step.period)) {
+            if !occupied.overlaps(step.period) {
+                occupied.insert(step.period);
                 steps.push(step.clone());
                 is_placed = true;
             }
@@ -117,7 +126,14 @@ fn next(newest: &Manifest, readings: &[Reading]) -> Result<Manifest, String> {
         }
     }
     steps.sort_by_key(|step| step.period);
+    // Reading a file anew does not make it a newer one: its steps keep its place in the order of notices.
+    let place = |step: &Step| match newest.step_of(step.period) {
+        Some(index) if file_of(&newest.steps[index]) == file_of(step) => before[index],
+        _ => orders.get(&file_of(step)).copied().flatten(),
+    };
+    let places: Vec<_> = steps.iter().map(place).collect();
     let mut next = Manifest {
+        notices: NoticeRun::of(&places),
         quantity: first.quantity,
         synthetic: first.synthetic,
         steps,

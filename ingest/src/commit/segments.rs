@@ -1,6 +1,5 @@
 //! Series segments and domain of the next manifest: only segments with a changed step are written again.
 
-use contract::digest::Digest;
 use contract::grid::Grid;
 use contract::key::ObjectKey;
 use contract::manifest::{Manifest, SeriesSegment, Step};
@@ -11,9 +10,9 @@ use super::merge::Merged;
 use crate::error::IngestError;
 
 /// Most steps of a segment: a leap year of days.
-const MAX_SEGMENT_STEPS: usize = 366;
-/// Most values of a segment: what is held in memory to turn maps into series, 1 GiB.
-const MAX_SEGMENT_VALUES: usize = 1 << 28;
+pub(crate) const MAX_SEGMENT_STEPS: usize = 366;
+/// Most values of a segment, 1 GiB: what is held in memory to turn maps into series ([`crate::memory::of_series`]).
+pub(crate) const MAX_SEGMENT_VALUES: usize = 1 << 28;
 
 /// What was written.
 pub(super) struct Written {
@@ -107,7 +106,7 @@ fn same_segment(manifest: &Manifest, steps: &[Step]) -> Option<ObjectKey> {
         .map(|segment| segment.series.clone())
 }
 
-async fn read_all(
+pub(super) async fn read_all(
     store: &Store,
     grid: &Grid,
     steps: &[Step],
@@ -123,7 +122,7 @@ async fn read_all(
     Ok(all)
 }
 
-fn mark(cells: &mut [bool], steps: &[Vec<f32>]) {
+pub(super) fn mark(cells: &mut [bool], steps: &[Vec<f32>]) {
     for values in steps {
         cells
             .iter_mut()
@@ -133,7 +132,7 @@ fn mark(cells: &mut [bool], steps: &[Vec<f32>]) {
 }
 
 /// Turning maps into series takes seconds for a large grid: not on a task that others wait for.
-async fn write_series(
+pub(super) async fn write_series(
     store: &Store,
     product: &ProductId,
     grid: &Grid,
@@ -142,12 +141,12 @@ async fn write_series(
     let grid = *grid;
     let encode =
         move || series::encode(&grid, &values.iter().map(Vec::as_slice).collect::<Vec<_>>());
-    let content = tokio::task::spawn_blocking(encode)
+    let series = tokio::task::spawn_blocking(encode)
         .await?
         .map_err(IngestError::storage("encode a series"))?;
-    let key = ObjectKey::series(product, &Digest::of(&content));
+    let key = ObjectKey::series(product, &series.values_sha256);
     store
-        .put_new(&key, content)
+        .put_new(&key, series.content)
         .await
         .map_err(IngestError::storage("store a series"))?;
     Ok(key)
@@ -156,15 +155,18 @@ async fn write_series(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use contract::digest::Digest;
     use contract::time::Period;
 
     fn steps(months: impl Iterator<Item = (i32, u32)>) -> Vec<Step> {
         let step = |(year, month)| Step {
+            masked: None,
             period: Period::month(year, month).unwrap(),
             frame: ObjectKey::frame(&"p".parse().unwrap(), &Digest::of(b"")),
             raw_sha256: Digest::of(b""),
             origin: String::new(),
             valid_cells: 1,
+            contributed: None,
         };
         months.map(step).collect()
     }

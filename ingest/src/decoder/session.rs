@@ -17,6 +17,8 @@ use crate::settings::{Limits, Settings};
 
 /// Last words of a reader that are kept to tell why it died.
 const MAX_LAST_WORDS_BYTES: u64 = 4096;
+/// Values that are taken from the reader at a time.
+const BLOCK_VALUES: usize = 1 << 17;
 
 /// One reader process with its file open.
 pub(crate) struct Session {
@@ -25,6 +27,7 @@ pub(crate) struct Session {
     output: ChildStdout,
     limits: Limits,
     deadline: Instant,
+    library_bytes: u64,
 }
 
 /// What became of waiting for the reader.
@@ -69,11 +72,20 @@ impl Session {
             output,
             limits,
             deadline: Instant::now() + limits.wall,
+            library_bytes: 0,
         };
         match session.message::<Opened>().await? {
-            Opened::Described(description) => Ok((session, description)),
+            Opened::Described(description) => {
+                session.library_bytes = description.library_bytes.min(limits.memory_bytes);
+                Ok((session, description))
+            }
             Opened::Rejected(rejection) => Err(rejection.cleaned().into()),
         }
+    }
+
+    /// Memory of the reader beside the values that are asked for, bytes.
+    pub(crate) fn library_bytes(&self) -> u64 {
+        self.library_bytes
     }
 
     /// Values of a part of a variable, as many as `expected`.
@@ -110,12 +122,17 @@ impl Session {
         }
     }
 
+    /// Values block by block: as bytes and as numbers at the same time a map would take its place twice.
     async fn values(&mut self, count: usize) -> Result<Vec<f64>, Stop> {
-        let bytes = self.bytes(count * 8).await?;
-        Ok(bytes
-            .chunks_exact(8)
-            .map(|b| f64::from_le_bytes([b[0], b[1], b[2], b[3], b[4], b[5], b[6], b[7]]))
-            .collect())
+        let mut values = Vec::with_capacity(count);
+        while values.len() < count {
+            let block = (count - values.len()).min(BLOCK_VALUES);
+            let bytes = self.bytes(block * 8).await?;
+            let number =
+                |b: &[u8]| f64::from_le_bytes([b[0], b[1], b[2], b[3], b[4], b[5], b[6], b[7]]);
+            values.extend(bytes.chunks_exact(8).map(number));
+        }
+        Ok(values)
     }
 
     async fn message<T: DeserializeOwned>(&mut self) -> Result<T, Stop> {

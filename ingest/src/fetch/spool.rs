@@ -4,18 +4,15 @@ use std::fs::{File, TryLockError};
 use std::io;
 use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use tempfile::{NamedTempFile, TempDir};
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 use crate::error::IngestError;
+use crate::room::{Room, Taken};
 
 /// Folders of processes begin so; a lock file of the same name with this ending is held while the process lives.
 const PREFIX: &str = "ingest-";
 const LOCK_SUFFIX: &str = ".lock";
-/// The budget is counted in units of this, so that it fits the semaphore's counter.
-const UNIT_BYTES: u64 = 64 << 10;
 
 /// A folder of this process, removed when it ends; what a killed process left behind is removed by the next one.
 #[derive(Debug)]
@@ -23,7 +20,7 @@ pub(super) struct Spool {
     folder: TempDir,
     lock: PathBuf,
     _locked: File,
-    room: Arc<Semaphore>,
+    room: Room,
     bytes: u64,
 }
 
@@ -32,7 +29,7 @@ pub(super) struct Spool {
 pub(super) struct Spooled {
     file: NamedTempFile,
     /// Given back after the file is gone.
-    room: OwnedSemaphorePermit,
+    room: Taken,
 }
 
 impl Spool {
@@ -42,12 +39,11 @@ impl Spool {
         std::fs::create_dir_all(parent).map_err(failed)?;
         remove_leftovers(parent).map_err(failed)?;
         let (folder, lock, locked) = own_folder(parent).map_err(failed)?;
-        let units = usize::try_from(bytes / UNIT_BYTES).unwrap_or(usize::MAX);
         let spool = Self {
             folder,
             lock,
             _locked: locked,
-            room: Arc::new(Semaphore::new(units.min(Semaphore::MAX_PERMITS))),
+            room: Room::new(bytes),
             bytes,
         };
         spool.check()?;
@@ -61,11 +57,7 @@ impl Spool {
 
     /// An empty file, once there is room for `bytes`. All room is taken at once, so that no two files wait for each other.
     pub(super) async fn file(&self, bytes: u64) -> Result<Spooled, IngestError> {
-        let units = u32::try_from(bytes.div_ceil(UNIT_BYTES)).unwrap_or(u32::MAX);
-        let room = Arc::clone(&self.room)
-            .acquire_many_owned(units)
-            .await
-            .expect("the semaphore is never closed");
+        let room = self.room.take(bytes).await;
         let file = NamedTempFile::new_in(self.folder.path())
             .map_err(|source| failed(self.folder.path(), source))?;
         Ok(Spooled { file, room })
@@ -100,9 +92,7 @@ impl Spooled {
 
     /// Gives back the room that the file turned out not to need.
     pub(super) fn shrink_to(&mut self, bytes: u64) {
-        let needed = bytes.div_ceil(UNIT_BYTES) as usize;
-        let surplus = self.room.num_permits().saturating_sub(needed);
-        drop(self.room.split(surplus));
+        self.room.shrink_to(bytes);
     }
 }
 
@@ -164,6 +154,7 @@ fn remove_leftovers(parent: &Path) -> io::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::room::UNIT_BYTES;
     use std::time::Duration;
 
     fn names(folder: &Path) -> Vec<String> {

@@ -28,6 +28,8 @@ pub(crate) struct Description {
     pub(crate) attributes: Attributes,
     /// Variables in the order of the file.
     pub(crate) variables: Vec<Variable>,
+    /// Most memory that is taken to unpack values of a variable, beside the values themselves, bytes.
+    pub(crate) library_bytes: u64,
 }
 
 /// One variable.
@@ -68,6 +70,19 @@ pub(crate) enum Kind {
     Other,
 }
 
+impl Kind {
+    /// The type as programs call it.
+    pub(crate) fn name(self) -> String {
+        match self {
+            Self::Integer(bytes) => format!("int{}", 8 * u16::from(bytes)),
+            Self::Unsigned(bytes) => format!("uint{}", 8 * u16::from(bytes)),
+            Self::Float(bytes) => format!("float{}", 8 * u16::from(bytes)),
+            Self::Text(_) => "text".to_owned(),
+            Self::Other => "of another type".to_owned(),
+        }
+    }
+}
+
 /// Attributes by name.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Attributes(pub(crate) BTreeMap<String, AttributeValue>);
@@ -78,8 +93,13 @@ pub(crate) struct Attributes(pub(crate) BTreeMap<String, AttributeValue>);
 pub(crate) enum AttributeValue {
     /// Text.
     Text(String),
-    /// One or more numbers; each as its bit pattern, since JSON holds neither NaN nor infinity.
-    Numbers(Vec<NumberBits>),
+    /// One or more numbers of a type, which tells what they speak of: stored numbers or unpacked ones.
+    Numbers {
+        /// How the file stores them.
+        kind: Kind,
+        /// Each as its bit pattern, since JSON holds neither NaN nor infinity.
+        bits: Vec<NumberBits>,
+    },
 }
 
 /// A float64 that survives JSON whatever it is.
@@ -109,16 +129,24 @@ impl Attributes {
             AttributeValue::Text(text) => {
                 Some(text.trim_matches(|c: char| c.is_whitespace() || c == '\0'))
             }
-            AttributeValue::Numbers(_) => None,
+            AttributeValue::Numbers { .. } => None,
         }
     }
 
     /// The numbers of an attribute.
     pub(crate) fn numbers(&self, name: &str) -> Option<Vec<f64>> {
         match self.0.get(name)? {
-            AttributeValue::Numbers(bits) => {
+            AttributeValue::Numbers { bits, .. } => {
                 Some(bits.iter().map(|b| f64::from_bits(b.0)).collect())
             }
+            AttributeValue::Text(_) => None,
+        }
+    }
+
+    /// How the numbers of an attribute are stored.
+    pub(crate) fn kind(&self, name: &str) -> Option<Kind> {
+        match self.0.get(name)? {
+            AttributeValue::Numbers { kind, .. } => Some(*kind),
             AttributeValue::Text(_) => None,
         }
     }
@@ -181,7 +209,10 @@ mod tests {
 
     #[test]
     fn numbers_that_json_cannot_hold_cross_the_border() {
-        let value = AttributeValue::Numbers(vec![f64::INFINITY.into(), (-0.0).into()]);
+        let value = AttributeValue::Numbers {
+            kind: Kind::Float(8),
+            bits: vec![f64::INFINITY.into(), (-0.0).into()],
+        };
         let json = serde_json::to_string(&value).unwrap();
         assert_eq!(
             serde_json::from_str::<AttributeValue>(&json).unwrap(),

@@ -4,8 +4,8 @@ use hdf5::types::{FixedAscii, FixedUnicode, TypeDescriptor, VarLenAscii, VarLenU
 use hdf5::{Attribute, Location};
 
 use super::description::{
-    AttributeValue, Attributes, MAX_ATTRIBUTE_NUMBERS, MAX_ATTRIBUTE_TEXT_BYTES, MAX_ATTRIBUTES,
-    MAX_NAME_BYTES,
+    AttributeValue, Attributes, Kind, MAX_ATTRIBUTE_NUMBERS, MAX_ATTRIBUTE_TEXT_BYTES,
+    MAX_ATTRIBUTES, MAX_NAME_BYTES,
 };
 
 /// Attributes of the netCDF library's own, which say nothing about the data.
@@ -36,12 +36,9 @@ fn read(attribute: &Attribute) -> Option<AttributeValue> {
         return None;
     }
     match attribute.dtype().ok()?.to_descriptor().ok()? {
-        TypeDescriptor::Integer(_) | TypeDescriptor::Unsigned(_) | TypeDescriptor::Float(_) => {
-            let numbers = attribute.read_raw::<f64>().ok()?;
-            Some(AttributeValue::Numbers(
-                numbers.into_iter().map(Into::into).collect(),
-            ))
-        }
+        TypeDescriptor::Integer(size) => numbers(attribute, Kind::Integer(size as u8)),
+        TypeDescriptor::Unsigned(size) => numbers(attribute, Kind::Unsigned(size as u8)),
+        TypeDescriptor::Float(size) => numbers(attribute, Kind::Float(size as u8)),
         TypeDescriptor::FixedAscii(_) => {
             let texts = attribute
                 .read_raw::<FixedAscii<MAX_ATTRIBUTE_TEXT_BYTES>>()
@@ -66,6 +63,14 @@ fn read(attribute: &Attribute) -> Option<AttributeValue> {
         }
         _ => None,
     }
+}
+
+fn numbers(attribute: &Attribute, kind: Kind) -> Option<AttributeValue> {
+    let numbers = attribute.read_raw::<f64>().ok()?;
+    Some(AttributeValue::Numbers {
+        kind,
+        bits: numbers.into_iter().map(Into::into).collect(),
+    })
 }
 
 /// Several texts are joined by spaces; bytes that are no UTF-8 are replaced.

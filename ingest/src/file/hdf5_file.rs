@@ -107,10 +107,10 @@ impl Hdf5File {
         let values = match whole_count {
             1 => dataset
                 .read_slice_1d::<f64, _>(selection)
-                .map(|a| a.into_iter().collect()),
+                .map(|values| values.into_raw_vec_and_offset().0),
             2 => dataset
                 .read_slice_2d::<f64, _>(selection)
-                .map(|a| a.into_iter().collect()),
+                .map(|values| values.into_raw_vec_and_offset().0),
             _ => {
                 return Err(corrupt(
                     name,
@@ -152,11 +152,13 @@ fn describe(file: &File) -> Result<Description, Rejection> {
         )
     })?;
     let mut variables = Vec::new();
+    let mut most_bytes = 0;
     for name in names {
         // A member that is no dataset (a group, a named type) or cannot be opened is passed over.
         if let Ok(dataset) = file.dataset(&name)
             && let Some(variable) = describe_dataset(file, &name, &dataset)?
         {
+            most_bytes = most_bytes.max(library_bytes(&dataset, variable.cell_count()));
             variables.push(variable);
         }
     }
@@ -169,7 +171,26 @@ fn describe(file: &File) -> Result<Description, Rejection> {
         format: format.to_owned(),
         attributes: hdf5_attribute::read_all(file),
         variables,
+        library_bytes: most_bytes,
     })
+}
+
+/// Most memory that the library takes to unpack values of a dataset: its cache, as far as there are chunks to fill it,
+/// and one chunk as it lies in the file, as it comes out of a filter, and as the next filter leaves it.
+fn library_bytes(dataset: &Dataset, cells: u128) -> u64 {
+    const COPIES_OF_A_CHUNK: u128 = 3;
+    let cell_bytes = dataset.dtype().map_or(8, |t| t.size()) as u128;
+    let Some(chunk) = dataset.chunk() else {
+        return 0;
+    };
+    let chunk_cells = chunk
+        .iter()
+        .fold(1u128, |n, len| n.saturating_mul(*len as u128));
+    // A larger chunk is refused before it is read.
+    let chunk_bytes = chunk_cells.saturating_mul(cell_bytes).min(MAX_CHUNK_BYTES);
+    let all_bytes = cells.saturating_mul(cell_bytes).max(chunk_bytes);
+    let cache_bytes = all_bytes.min(CHUNK_CACHE_BYTES as u128);
+    u64::try_from(cache_bytes + COPIES_OF_A_CHUNK * chunk_bytes).unwrap_or(u64::MAX)
 }
 
 fn is_scale(variable: &Variable) -> bool {

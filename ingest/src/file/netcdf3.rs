@@ -234,6 +234,7 @@ fn lay_out(header: &Header, file_bytes: u64) -> Result<(Description, Vec<Layout>
         format: "NetCDF classic".to_owned(),
         attributes: header.attributes.clone(),
         variables,
+        library_bytes: 0,
     };
     Ok((description, layouts))
 }

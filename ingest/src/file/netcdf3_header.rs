@@ -258,7 +258,10 @@ impl<'a> Cursor<'a> {
             let numbers = bytes
                 .chunks_exact(external.size_bytes() as usize)
                 .take(MAX_ATTRIBUTE_NUMBERS);
-            AttributeValue::Numbers(numbers.map(|b| external.number(b).into()).collect())
+            AttributeValue::Numbers {
+                kind: external.kind(),
+                bits: numbers.map(|b| external.number(b).into()).collect(),
+            }
         };
         Ok((name, value))
     }

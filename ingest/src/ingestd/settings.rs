@@ -61,7 +61,8 @@ pub struct ServiceSettings {
     #[arg(long, env = "FLUXGLOBE_PARALLEL_FILES", default_value_t = 2,
           value_parser = clap::value_parser!(u16).range(1..=64))]
     pub parallel_files: u16,
-    /// Bytes of files that are read at the same time, which bounds the memory; a larger file goes alone. 1 MiB to 1 TiB.
+    /// Memory that the files which are worked on may take together, their readers included, bytes: the cells that they
+    /// unpack to count, and not what they weigh. One that needs more goes alone. 1 MiB to 1 TiB.
     #[arg(long, env = "FLUXGLOBE_PARALLEL_BYTES", default_value_t = 1 << 30,
           value_parser = clap::value_parser!(u64).range(MIB..=TIB))]
     pub parallel_bytes: u64,

@@ -1,14 +1,14 @@
 //! The service at work, from joining the readers of notices to leaving them: takes notices, works on a bounded number of
 //! them at the same time, publishes what is ready, and finishes each with what follows from it.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::future::Future;
 use std::sync::Arc;
 use std::time::Duration;
 
 use contract::topic::Origin;
 use futures::FutureExt as _;
-use futures::future::Shared;
+use futures::future::{AbortHandle, Abortable, Shared};
 use futures::stream::StreamExt as _;
 use storage::log::{Finished, Message, Reader};
 use tokio::time::Instant;
@@ -20,7 +20,6 @@ use super::{GROUP, IngestService, TOPIC, now};
 use crate::answer::{Answer, Asked};
 use crate::error::IngestError;
 use crate::metrics;
-use crate::notice::Notice;
 use crate::outcome::Outcome;
 use crate::pipeline::Pipeline;
 use crate::progress::Progress;
@@ -36,6 +35,8 @@ struct Job {
     asked: Arc<Asked>,
     /// Number of its message.
     message: Number,
+    /// Ends its preparation.
+    prepare: AbortHandle,
 }
 
 /// A message some of whose files are under way.
@@ -85,6 +86,7 @@ pub(super) async fn run(
     let mut last_call = None;
     loop {
         shift.settle();
+        shift.give_up(&reader.lost());
         shift.publish();
         shift.finish(reader.as_mut()).await?;
         if last_call.is_none() && stop.clone().now_or_never().is_some() {
@@ -128,7 +130,10 @@ impl Shift<'_> {
         };
         let read = reader.next(room, wait);
         let messages = alongside(&mut self.work, &mut self.done, read).await;
-        for message in messages.map_err(IngestError::storage("read notices"))? {
+        let messages = messages.map_err(IngestError::storage("read notices"))?;
+        // Before anything is begun: what was lost may have come back, to be begun anew.
+        self.give_up(&reader.lost());
+        for message in messages {
             self.begin(&message);
         }
         Ok(())
@@ -138,23 +143,24 @@ impl Shift<'_> {
         let number = self.count();
         let mut answers = Vec::new();
         let mut trace = String::new();
-        for notice in Notice::of(message, &self.service.settings, now()) {
-            trace.clone_from(&notice.cause.trace);
+        for asked in Asked::of(message, &self.service.settings, now()) {
+            trace.clone_from(&asked.notice.cause.trace);
             let job = self.count();
             answers.push((job, None));
-            self.bench.add(job, notice.order_key.clone());
-            let asked = Arc::new(Asked {
-                notice,
-                origin: Some(message.origin),
-            });
+            self.bench.add(job, asked.notice.order_key.clone());
+            let asked = Arc::new(asked);
             let span = tracing::info_span!("notice", trace = asked.notice.cause.trace, origin = %message.origin);
             let work = work::prepare(self.pipeline, &self.service.health, job, Arc::clone(&asked));
-            self.work.push(Box::pin(work.instrument(span)));
+            let (prepare, registration) = AbortHandle::new_pair();
+            let work = Abortable::new(work.instrument(span), registration);
+            let work = work.map(|ended| ended.unwrap_or(Done::GivenUp));
+            self.work.push(Box::pin(work));
             self.jobs.insert(
                 job,
                 Job {
                     asked,
                     message: number,
+                    prepare,
                 },
             );
         }
@@ -165,6 +171,31 @@ impl Shift<'_> {
             running: self.service.metrics.start("notice"),
         };
         self.open.insert(number, open);
+    }
+
+    /// Ends what is under way for messages that another member has now: it does all of it again. What is being published
+    /// is published, as it would be by the other one.
+    fn give_up(&mut self, lost: &[Origin]) {
+        if lost.is_empty() {
+            return;
+        }
+        let lost: BTreeSet<Origin> = lost.iter().copied().collect();
+        let gone = self
+            .open
+            .extract_if(.., |_, open| lost.contains(&open.origin));
+        let jobs: Vec<Number> = gone
+            .flat_map(|(_, open)| open.answers.into_iter().map(|(job, _)| job))
+            .collect();
+        tracing::info!(
+            files = jobs.len(),
+            "given up: another member has their notices now"
+        );
+        for number in jobs {
+            self.bench.remove(number);
+            if let Some(job) = self.jobs.remove(&number) {
+                job.prepare.abort();
+            }
+        }
     }
 
     fn count(&mut self) -> Number {
@@ -195,6 +226,7 @@ impl Shift<'_> {
                     self.bench.ready(number, product, *granule);
                 }
                 Done::Answered(number, answer) => self.answered(number, &answer),
+                Done::GivenUp => {}
                 Done::Published(product, answers) => {
                     self.bench.free(&product);
                     for (number, answer) in answers {
@@ -283,9 +315,16 @@ fn tell(open: Open, pipeline: Pipeline<'_>) {
                 let reason = metrics::class(*reason);
                 tracing::warn!(trace, origin = %open.origin, reason, "refused {outcome}");
             }
-            Outcome::Landed { .. } => {
+            Outcome::Landed {
+                manifest, masked, ..
+            } => {
                 pipeline.metrics.landed(noticed, now());
+                pipeline.metrics.masked(&manifest.product, *masked);
                 tracing::info!(trace, origin = %open.origin, "{outcome}");
+            }
+            Outcome::Superseded { .. } => {
+                pipeline.metrics.superseded();
+                tracing::warn!(trace, origin = %open.origin, told = event.is_some(), "{outcome}");
             }
             Outcome::AlreadyLanded { .. } | Outcome::Observed { .. } => {
                 tracing::info!(trace, origin = %open.origin, told = event.is_some(), "{outcome}");

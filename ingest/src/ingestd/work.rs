@@ -24,6 +24,8 @@ pub(super) enum Done {
     ToPublish(Number, Box<StoredGranule>),
     Answered(Number, Box<Answer>),
     Published(ProductId, Vec<(Number, Answer)>),
+    /// Its message is somebody else's now.
+    GivenUp,
 }
 
 /// Polls the work that is under way while something else is waited for, which is never cancelled.

@@ -145,6 +145,7 @@ pub(super) fn notices(
             attempt: 1,
             order_key,
             cause,
+            given: None,
         }
     };
     Ok(data.iter().map(notice).collect())

@@ -23,6 +23,7 @@ fn of(content: impl Into<Vec<u8>>) -> Vec<Notice> {
     let message = Message {
         origin,
         content: content.into().into(),
+        time: None,
     };
     Notice::of(&message, &settings(), NOW.parse().unwrap())
 }

@@ -98,12 +98,9 @@ fn to_common(spelling: &str) -> (String, f64, f64) {
 
 /// `value = number * factor + offset` from one unit to another of the same kind.
 fn linear(own: Unit, target: Unit) -> Option<(f64, f64)> {
-    (own.dimension == target.dimension && own.dimension.month == 0).then(|| {
-        (
-            own.factor / target.factor,
-            (own.offset - target.offset) / target.factor,
-        )
-    })
+    let factor = own.factor / target.factor;
+    let is_alike = own.dimension == target.dimension && own.dimension.month == 0;
+    (is_alike && factor.is_normal()).then(|| (factor, (own.offset - target.offset) / target.factor))
 }
 
 /// Where a temperature is meant, `C` is a degree Celsius; elsewhere it is carbon.

@@ -12,7 +12,7 @@ use crate::file::description::{Description, Part, Variable};
 use crate::rejection::Rejection;
 
 /// Most values of one coordinate variable.
-pub(super) const MAX_VALUES: u64 = 1 << 24;
+pub(crate) const MAX_VALUES: u64 = 1 << 24;
 
 /// What a coordinate says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -7,7 +7,9 @@ use contract::observation::Observation;
 use crate::rejection::Rejection;
 
 /// Most observations of one file: about 300 MB.
-const MAX_OBSERVATIONS: usize = 1 << 20;
+pub(crate) const MAX_OBSERVATIONS: usize = 1 << 20;
+/// Memory of one observation with its texts, bytes.
+pub(crate) const OBSERVATION_BYTES: u64 = 300;
 
 /// The observations of one file.
 #[derive(Debug, Default)]

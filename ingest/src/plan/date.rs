@@ -1,5 +1,6 @@
 //! Dates in attributes and file names.
 
+use chrono::{DateTime, NaiveDate, NaiveDateTime, NaiveTime};
 use contract::event::RejectReason;
 use contract::time::{Period, TimeMs};
 
@@ -8,9 +9,22 @@ use crate::profile::pattern;
 use crate::rejection::Rejection;
 
 const DAY_MS: i64 = 86_400_000;
-const MONTHS: [&str; 12] = [
-    "jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec",
+/// Longest text that is read as a date.
+const MAX_DATE_BYTES: usize = 40;
+/// Days with a time, as people write them.
+const CLOCKS: [&str; 9] = [
+    "%Y%m%dT%H%M%S%.f",
+    "%Y%m%dT%H%M",
+    "%Y%m%d%H%M%S",
+    "%Y-%m-%dT%H:%M:%S%.f",
+    "%Y-%m-%dT%H:%M",
+    "%Y-%m-%d %H:%M:%S%.f",
+    "%Y-%m-%d %H:%M",
+    "%d-%b-%Y %H:%M:%S%.f",
+    "%d-%b-%Y %H:%M",
 ];
+/// Days without one, and how long each is.
+const DAYS: [(usize, &str); 3] = [(8, "%Y%m%d"), (10, "%Y-%m-%d"), (11, "%d-%b-%Y")];
 
 /// Midnight of a day of the real calendar.
 pub(super) fn day(year: i32, month: u32, day: u32) -> CalendarDate {
@@ -34,29 +48,44 @@ pub(super) fn of_instant(time: TimeMs) -> CalendarDate {
     }
 }
 
-/// `2010-01-01`, `20100101T000000Z`, `01-JAN-2010 00:00:00` and the like.
+/// `2010-01-01`, `20100101T000000Z`, `01-JAN-2010 00:00:00` and the like, to the second; without an offset it is UTC. Text
+/// that is not understood to its end is no date.
 pub(super) fn of_attribute(text: &str) -> Option<CalendarDate> {
+    let text = text.trim();
+    if text.len() > MAX_DATE_BYTES || !text.is_ascii() {
+        return None;
+    }
     if let Ok(time) = text.parse::<TimeMs>() {
         return Some(of_instant(time));
     }
-    let digits: Vec<u32> = text.chars().map_while(|c| c.to_digit(10)).collect();
-    let number =
-        |range: std::ops::Range<usize>| Some(digits.get(range)?.iter().fold(0, |n, d| n * 10 + d));
-    if digits.len() >= 8 {
-        return TimeMs::from_ymd(number(0..4)? as i32, number(4..6)?, number(6..8)?)
-            .ok()
-            .map(of_instant);
+    let time = |ms| TimeMs::new(ms).ok().map(of_instant);
+    let with_offset = CLOCKS
+        .iter()
+        .find_map(|clock| DateTime::parse_from_str(text, &format!("{clock}%#z")).ok());
+    if let Some(instant) = with_offset {
+        return time(instant.timestamp_millis());
     }
-    let mut parts = text.get(..11)?.split('-');
-    let (day, month, year) = (
-        parts.next()?,
-        parts.next()?.to_ascii_lowercase(),
-        parts.next()?,
-    );
-    let month = MONTHS.iter().position(|m| *m == month)? as u32 + 1;
-    TimeMs::from_ymd(year.parse().ok()?, month, day.parse().ok()?)
-        .ok()
-        .map(of_instant)
+    let plain = text
+        .trim_end_matches("UTC")
+        .trim_end_matches(['Z', 'z'])
+        .trim_end();
+    let clock = CLOCKS
+        .iter()
+        .find_map(|clock| NaiveDateTime::parse_from_str(plain, clock).ok());
+    if let Some(clock) = clock {
+        return time(clock.and_utc().timestamp_millis());
+    }
+    let day = DAYS
+        .iter()
+        .filter(|(len, _)| *len == plain.len())
+        .find_map(|(_, day)| NaiveDate::parse_from_str(plain, day).ok())?;
+    time(day.and_time(NaiveTime::MIN).and_utc().timestamp_millis())
+}
+
+/// Does a text name a day and no time of it?
+pub(super) fn names_a_day(text: &str) -> bool {
+    let text = text.trim();
+    of_attribute(text).is_some() && matches!(text.len(), 8 | 10 | 11) && !text.contains(':')
 }
 
 /// The date in a file name that fits a pattern; `year` where the name has none.
@@ -74,21 +103,26 @@ pub(super) fn of_file_name(
     let found = pattern::date(pattern, file_name).ok_or_else(bad)?;
     let named = found.year.map(|year| year as i32);
     let year = named.or(year).ok_or_else(bad)?;
+    let at_hour = |date| CalendarDate {
+        second: f64::from(found.hour.unwrap_or(0)) * 3600.0,
+        ..date
+    };
     if let Some(day_of_year) = found.day_of_year {
         let first = TimeMs::from_ymd(year, 1, 1).map_err(|_no_year| bad())?;
         let time = TimeMs::new(first.ms() + i64::from(day_of_year - 1) * DAY_MS);
-        return time.map(of_instant).map_err(|_far| bad());
+        return time.map(of_instant).map(at_hour).map_err(|_far| bad());
     }
-    Ok(day(
-        year,
-        found.month.ok_or_else(bad)?,
-        found.day.unwrap_or(1),
-    ))
+    let month = found.month.ok_or_else(bad)?;
+    Ok(at_hour(day(year, month, found.day.unwrap_or(1))))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn read(text: &str) -> Option<(i32, u32, u32, f64)> {
+        of_attribute(text).map(|d| (d.year, d.month, d.day, d.second))
+    }
 
     #[test]
     fn dates_in_attributes_are_read_in_the_ways_people_write_them() {
@@ -96,25 +130,53 @@ mod tests {
             "2010-01-05",
             "20100105T000000Z",
             "05-JAN-2010 00:00:00.000000",
+            "05-Jan-2010",
             "20100105",
             "2010-01-05T00:00:00Z",
+            "2010-01-05 00:00",
+            "2010-01-05 00:00:00 UTC",
         ] {
-            let found = of_attribute(text).unwrap();
-            assert_eq!(
-                (found.year, found.month, found.day, found.second),
-                (2010, 1, 5, 0.0),
-                "{text}"
-            );
+            assert_eq!(read(text), Some((2010, 1, 5, 0.0)), "{text}");
         }
-        for text in ["", "soon", "99999999", "5-JAN-2010", "٢٠١٠-01-01"] {
-            assert!(of_attribute(text).is_none(), "{text}");
+        for text in [
+            "",
+            "soon",
+            "99999999",
+            "5-JAN-2010",
+            "٢٠١٠-01-01",
+            "2010-01-05 at noon",
+            "20100105T",
+            "2010001000500000",
+        ] {
+            assert_eq!(read(text), None, "{text}");
         }
+    }
+
+    #[test]
+    fn the_time_of_day_is_kept() {
+        for text in [
+            "20231231T120000Z",
+            "20231231T120000",
+            "20231231T1200Z",
+            "20231231120000",
+            "2023-12-31T12:00:00.000Z",
+            "2023-12-31 12:00:00",
+            "31-DEC-2023 12:00:00.000000",
+            "2023-12-31T14:30:00+02:30",
+            "20231231T143000+0230",
+        ] {
+            assert_eq!(read(text), Some((2023, 12, 31, 43_200.0)), "{text}");
+        }
+        assert!(names_a_day("20231231") && names_a_day("2023-12-31"));
+        assert!(!names_a_day("20231231T120000Z") && !names_a_day("2023"));
     }
 
     #[test]
     fn a_file_name_gives_month_or_day_of_year() {
         let found = of_file_name("M{year}{day_of_year}*", "M2001060.nc", None).unwrap();
         assert_eq!((found.year, found.month, found.day), (2001, 3, 1));
+        let found = of_file_name("{year}{month}{day}{hour}*", "2001063018.nc", None).unwrap();
+        assert_eq!((found.day, found.second), (30, 64_800.0));
         let found = of_file_name("s{month}.nc", "s07.nc", Some(2011)).unwrap();
         assert_eq!((found.year, found.month), (2011, 7));
         assert!(

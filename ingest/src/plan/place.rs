@@ -3,12 +3,16 @@
 use contract::event::RejectReason;
 
 use super::Planning;
-use crate::cf::axis::{Mapping, Registration};
-use crate::cf::coordinate::{self, Axis, Role};
+use crate::cf::axis::Mapping;
+use crate::cf::coordinate::{self, Axis, Evidence, Role};
+use crate::cf::projection;
 use crate::error::Stop;
 use crate::file::description::{Dimension, Variable};
 use crate::profile::{GridRules, StatedGrid, TimeSource};
 use crate::rejection::Rejection;
+
+/// Longitudes of axes that begin anywhere and go once around stay below.
+const MAX_LON_DEG: f64 = 540.0;
 
 fn refused(object: &str, detail: impl AsRef<str>) -> Rejection {
     Rejection::new(RejectReason::Grid, object, detail)
@@ -20,6 +24,13 @@ pub(super) async fn mapping(
     variable: &Variable,
 ) -> Result<(Vec<Axis>, Mapping), Stop> {
     let rules = planning.profile.map(|p| p.grid.clone()).unwrap_or_default();
+    projection::check(planning.file, variable)?;
+    if let Some(name) = projection::missing(planning.file, variable) {
+        planning.assume(format!(
+            "{}: its grid_mapping {name:?} is not in the file; its axes are taken for latitude and longitude",
+            variable.name
+        ));
+    }
     let mut axes = coordinate::axes(planning.file, variable);
     name_axes(planning, variable, &rules, &mut axes)?;
     name_time(planning, variable, &mut axes);
@@ -46,7 +57,7 @@ pub(super) async fn mapping(
     }
     let mapping = match &rules.stated {
         Some(stated) => stated_mapping(variable, stated, &lat, &lon)?,
-        None => read_mapping(planning, rules.registration, &lat, &lon).await?,
+        None => read_mapping(planning, &rules, &lat, &lon).await?,
     };
     Ok((axes, mapping))
 }
@@ -69,11 +80,9 @@ fn name_axes(
                 "is no axis of the variable; name another one in the profile",
             )
         };
-        let dimension = planning
-            .file
-            .variable(name)
-            .and_then(|c| c.dimensions.first())
-            .ok_or_else(missing)?;
+        let coordinate = planning.file.variable(name).ok_or_else(missing)?;
+        projection::check_coordinate(coordinate)?;
+        let dimension = coordinate.dimensions.first().ok_or_else(missing)?;
         let is_along = |(_, own): &(&mut Axis, &Dimension)| *own == dimension;
         let (axis, _) = axes
             .iter_mut()
@@ -185,7 +194,7 @@ fn stated_mapping(
 
 async fn read_mapping(
     planning: &mut Planning<'_>,
-    registration: Registration,
+    rules: &GridRules,
     lat: &Axis,
     lon: &Axis,
 ) -> Result<Mapping, Stop> {
@@ -202,10 +211,42 @@ async fn read_mapping(
         )
         .into());
     }
+    for (name, labels, stated, most_deg) in [
+        (&names[0], &lat_deg, &rules.latitude, 90.0),
+        (&names[1], &lon_deg, &rules.longitude, MAX_LON_DEG),
+    ] {
+        if stated.is_none() {
+            check_evidence(planning, name, labels, most_deg)?;
+        }
+    }
     Ok(Mapping::from_labels(
         &lat_deg,
         &lon_deg,
-        registration,
+        rules.registration,
         [&names[0], &names[1]],
     )?)
+}
+
+/// Notes an axis that nothing but its name makes a latitude or longitude, and refuses it if it cannot be one.
+fn check_evidence(
+    planning: &mut Planning<'_>,
+    name: &str,
+    labels: &[f64],
+    most_deg: f64,
+) -> Result<(), Rejection> {
+    let found = planning.file.variable(name).and_then(coordinate::evidence);
+    let Some((role, Evidence::NameAlone)) = found else {
+        return Ok(());
+    };
+    let role = format!("{role:?}").to_lowercase();
+    if let Some(bad) = labels.iter().find(|label| label.abs() > most_deg) {
+        let detail = format!(
+            "holds {bad}, which is no {role} in degrees, and has neither units nor standard_name; say in a profile what it is, or regrid the file"
+        );
+        return Err(refused(name, detail));
+    }
+    planning.assume(format!(
+        "{name}: is taken for the {role} by its name alone; it has neither units (degrees_north, degrees_east) nor standard_name"
+    ));
+    Ok(())
 }

@@ -3,27 +3,27 @@
 use contract::event::RejectReason;
 use contract::time::Period;
 
-use super::{PlannedStep, Planning, date};
-use crate::cf::calendar::{Calendar, CalendarDate, TimeUnit};
+use super::bounds::{self, Bounds};
+use super::{PlannedStep, Planning, coverage, date, stamps};
+use crate::cf::calendar::CalendarDate;
+use crate::cf::cell_methods::{self, TimeMethod};
 use crate::cf::coordinate::{Axis, Role};
-use crate::cf::period;
 use crate::cf::quantity::Named;
+use crate::cf::{period, spacing};
 use crate::error::Stop;
-use crate::file::description::{Part, Variable};
+use crate::file::description::Variable;
 use crate::profile::{Profile, TimeRules, TimeSource};
 use crate::rejection::Rejection;
 use crate::unit;
 
-const ONE_STAMP: &str = "has one stamp and no bounds, so nothing says what it covers; say in a profile (covers = \"month\", say)";
-const NO_TIME: &str = "has no time axis and no attribute that says its period; say in a profile where the time comes from";
-
-fn refused(object: &str, detail: impl AsRef<str>) -> Rejection {
+pub(super) fn refused(object: &str, detail: impl AsRef<str>) -> Rejection {
     Rejection::new(RejectReason::Time, object, detail)
 }
 
 /// The periods of all steps, in the order of the file, not overlapping.
 pub(super) async fn periods(
     planning: &mut Planning<'_>,
+    variable: &Variable,
     axes: &[Axis],
 ) -> Result<Vec<Period>, Stop> {
     let count = axes
@@ -41,7 +41,7 @@ pub(super) async fn periods(
     }
     let periods = match planning.profile.and_then(|p| p.time.as_ref()) {
         Some(rules) => by_rules(planning, rules, count).await?,
-        None => by_file(planning, axes).await?,
+        None => by_file(planning, variable, axes).await?,
     };
     if periods.len() as u64 != count {
         let detail = format!(
@@ -72,7 +72,7 @@ async fn by_rules(
             name,
             unit,
             calendar,
-        } => stamps(planning, name, unit.as_deref(), calendar.as_deref()).await?,
+        } => stamps::read(planning, name, unit.as_deref(), calendar.as_deref()).await?,
         TimeSource::Attribute(name) => {
             let missing = || {
                 refused(
@@ -106,140 +106,69 @@ async fn by_rules(
     let period = |stamp| {
         rules
             .covers
-            .period(with_year(stamp))
+            .period_at(with_year(stamp), rules.stamp)
             .map_err(|e| refused("time", e).into())
     };
     stamps.into_iter().map(period).collect()
 }
 
-/// Time as CF has it: bounds, then the distance of stamps, then attributes about the coverage.
-async fn by_file(planning: &mut Planning<'_>, axes: &[Axis]) -> Result<Vec<Period>, Stop> {
+/// Time as CF has it: bounds, then `cell_methods`, the distance of stamps, and attributes about the coverage.
+async fn by_file(
+    planning: &mut Planning<'_>,
+    variable: &Variable,
+    axes: &[Axis],
+) -> Result<Vec<Period>, Stop> {
     let Some(name) = planning.time_variable(axes) else {
-        return Ok(vec![by_coverage(planning, "file", NO_TIME)?]);
+        return Ok(vec![coverage::period(planning, None)?]);
     };
-    let stamps = stamps(planning, &name, None, None).await?;
-    let bounds = planning
-        .file
-        .variable(&name)
-        .and_then(|v| v.attributes.text("bounds"))
-        .map(str::to_owned);
-    if let Some(bounds) = bounds
-        && let Some(periods) = by_bounds(planning, &name, &bounds, stamps.len() as u64).await?
-    {
+    let stamps = stamps::read(planning, &name, None, None).await?;
+    let method = variable.attributes.text("cell_methods");
+    let mut method = method.and_then(|text| cell_methods::of_time(text, &name));
+    match bounds::read(planning, &name, &stamps, method).await? {
+        Bounds::Periods(periods) => return Ok(periods),
+        Bounds::Instants => method = Some(TimeMethod::Point),
+        Bounds::Silent => {}
+    }
+    if let [stamp] = stamps[..] {
+        return Ok(vec![coverage::period(planning, Some((&name, stamp)))?]);
+    }
+    if method == Some(TimeMethod::Point) {
+        let periods = spacing::around(&stamps).map_err(|e| refused(&name, e))?;
+        planning.assume(format!(
+            "{name}: has values at instants; each stands for the time half way to its neighbours"
+        ));
         return Ok(periods);
     }
-    let covers =
-        period::of_spacing(&stamps).or_else(|| period::of_attributes(&planning.file.attributes));
-    let covers = match covers {
-        Some(covers) => covers,
-        None if stamps.len() == 1 => {
-            return Ok(vec![by_coverage(planning, &name, ONE_STAMP)?]);
-        }
-        None => {
-            return Err(refused(
-                &name,
-                "has stamps at uneven distances; say in a profile what a step covers",
-            )
-            .into());
-        }
-    };
-    stamps
-        .into_iter()
-        .map(|s| covers.period(s).map_err(|e| refused(&name, e).into()))
-        .collect()
+    Ok(by_spacing(planning, &name, &stamps)?)
 }
 
-/// The one period of a file from `time_coverage_start` and `time_coverage_end`.
-///
-/// Without them the refusal says `missing` of `object`.
-fn by_coverage(planning: &Planning<'_>, object: &str, missing: &str) -> Result<Period, Rejection> {
-    let attributes = &planning.file.attributes;
-    let at = |names: &[&str]| {
-        names
-            .iter()
-            .find_map(|name| attributes.text(name))
-            .and_then(date::of_attribute)
-    };
-    let start = at(&["time_coverage_start"]).ok_or_else(|| refused(object, missing))?;
-    if let Some(covers) = period::of_attributes(attributes) {
-        return covers
-            .period(start)
-            .map_err(|e| refused("time_coverage_start", e));
-    }
-    let end =
-        at(&["time_coverage_end", "time_coverage_stop"]).ok_or_else(|| refused(object, missing))?;
-    let both = period::instant(start).and_then(|s| Ok((s, period::instant(end)?)));
-    let (start, end) = both.map_err(|e| refused("time_coverage_start", e))?;
-    Period::new(start, end).map_err(|e| refused("time_coverage_end", e.to_string()))
-}
-
-/// Periods from a bounds variable of two numbers a step; none if there is no such variable.
-async fn by_bounds(
-    planning: &mut Planning<'_>,
-    time: &str,
-    bounds: &str,
-    count: u64,
-) -> Result<Option<Vec<Period>>, Stop> {
-    let Some(variable) = planning.file.variable(bounds) else {
-        return Ok(None);
-    };
-    let lens: Vec<u64> = variable.dimensions.iter().map(|d| d.len).collect();
-    if lens != [count, 2] || !variable.is_numeric() {
-        return Ok(None);
-    }
-    let unit = time_unit(planning, time, None, None)?;
-    let numbers = planning
-        .session
-        .read(bounds, &[Part::All, Part::All], count * 2)
-        .await?;
-    let at = |number: f64| {
-        unit.date(number)
-            .and_then(period::instant)
-            .map_err(|e| refused(bounds, e))
-    };
-    let period = |pair: &[f64]| {
-        Period::new(at(pair[0])?, at(pair[1])?).map_err(|e| refused(bounds, e.to_string()))
-    };
-    Ok(Some(
-        numbers
-            .chunks_exact(2)
-            .map(period)
-            .collect::<Result<_, Rejection>>()?,
-    ))
-}
-
-fn time_unit(
-    planning: &Planning<'_>,
-    name: &str,
-    unit: Option<&str>,
-    calendar: Option<&str>,
-) -> Result<TimeUnit, Rejection> {
-    let missing = || {
-        refused(
-            name,
-            "is not in the file; say in a profile where the time comes from",
-        )
-    };
-    let variable = planning.file.variable(name).ok_or_else(missing)?;
-    let unit = unit.or_else(|| variable.attributes.text("units"));
-    let unit = unit.ok_or_else(|| refused(name, "has no units; state them in a profile"))?;
-    let calendar = calendar.or_else(|| variable.attributes.text("calendar"));
-    let calendar = Calendar::parse(calendar).map_err(|e| refused(name, e))?;
-    TimeUnit::parse(unit, calendar).map_err(|e| refused(name, e))
-}
-
-async fn stamps(
+/// Steps from the distance of their stamps, or of the length that an attribute states.
+fn by_spacing(
     planning: &mut Planning<'_>,
     name: &str,
-    unit: Option<&str>,
-    calendar: Option<&str>,
-) -> Result<Vec<CalendarDate>, Stop> {
-    let unit = time_unit(planning, name, unit, calendar)?;
-    let numbers = planning.coordinate(name).await?;
-    numbers
-        .into_iter()
-        .map(|n| unit.date(n).map_err(|e| refused(name, e).into()))
-        .collect()
+    stamps: &[CalendarDate],
+) -> Result<Vec<Period>, Rejection> {
+    let stated = || {
+        Some(spacing::Spacing {
+            covers: period::of_attributes(&planning.file.attributes)?,
+            at: None,
+            assumption: Some("stamps are taken for the starts of the steps"),
+        })
+    };
+    let uneven = "has stamps at uneven distances; say in a profile what a step covers";
+    let spacing = spacing::of(stamps).or_else(stated);
+    let spacing::Spacing {
+        covers,
+        at,
+        assumption,
+    } = spacing.ok_or_else(|| refused(name, uneven))?;
+    if let Some(assumption) = assumption {
+        planning.assume(format!(
+            "{name}: has no bounds; {assumption} (if they are not, say stamp = \"middle\" or \"end\" in a profile)"
+        ));
+    }
+    let period = |stamp: &CalendarDate| covers.period_at(*stamp, at).map_err(|e| refused(name, e));
+    stamps.iter().map(period).collect()
 }
 
 /// The steps with the conversion of each to the stored unit.

@@ -7,7 +7,8 @@ use contract::quantity::Quantity;
 use super::Target;
 use crate::cf::coordinate::{self, Role};
 use crate::cf::packing::Packing;
-use crate::cf::quantity::{Named, of_standard_name};
+use crate::cf::projection;
+use crate::cf::quantity::{Named, directions, has_direction, of_standard_name};
 use crate::file::description::{Description, Variable};
 use crate::profile::Profile;
 use crate::rejection::Rejection;
@@ -22,7 +23,9 @@ pub(super) fn choose<'a>(
     profile: Option<&Profile>,
 ) -> Result<(&'a Variable, Named), Rejection> {
     let Some(profile) = profile else {
-        return choose_by_standard_name(file);
+        let (variable, named) = choose_by_standard_name(file)?;
+        let sign = sign(variable, named.quantity, None)?;
+        return Ok((variable, Named { sign, ..named }));
     };
     let name = &profile.variable.name;
     let missing = || {
@@ -36,26 +39,65 @@ pub(super) fn choose<'a>(
         .variable(name)
         .filter(|v| v.is_numeric())
         .ok_or_else(missing)?;
-    let sign = if profile.variable.positive_into_sea {
-        -1.0
-    } else {
-        1.0
-    };
-    // The stored unit of a carbon flux is a mass of carbon, and a profile that states a mass means that.
-    let stated = profile.variable.unit.as_ref().map(|_| Substance::Carbon);
     let by_name = variable
         .attributes
         .text("standard_name")
         .and_then(of_standard_name);
-    let substance = stated.or(by_name.and_then(|n| n.substance));
+    // The stored unit of a carbon flux is a mass of carbon, and a profile that states a mass means that, unless the
+    // standard name says of what it is.
+    let stated = profile.variable.unit.as_ref().map(|_| Substance::Carbon);
+    let substance = by_name.and_then(|n| n.substance).or(stated);
     Ok((
         variable,
         Named {
             quantity: profile.quantity,
-            sign,
+            sign: sign(
+                variable,
+                profile.quantity,
+                profile.variable.positive_into_sea,
+            )?,
             substance,
         },
     ))
+}
+
+/// What turns values to be positive out of the sea, or upwards: what the profile says and the file does not deny, else
+/// what the file says. A flux of which nobody says it is refused.
+fn sign(
+    variable: &Variable,
+    quantity: Quantity,
+    positive_into_sea: Option<bool>,
+) -> Result<f64, Rejection> {
+    if !has_direction(quantity) {
+        return Ok(1.0);
+    }
+    let text = |name: &str| variable.attributes.text(name).unwrap_or_default();
+    let said = directions(text("standard_name"), text("positive"));
+    let refused =
+        |detail: String| Err(Rejection::new(RejectReason::Values, &variable.name, detail));
+    let stated = positive_into_sea.map(|into| if into { -1.0 } else { 1.0 });
+    let against = said
+        .iter()
+        .find(|(_, sign)| stated.is_some_and(|stated: f64| stated * sign < 0.0));
+    if let (Some((attribute, _)), Some(into)) = (against, positive_into_sea) {
+        return refused(format!(
+            "has {attribute} {:?}, and its profile says positive_into_sea = {into}: they contradict each other; correct the profile, or the file if it is wrong",
+            text(attribute)
+        ));
+    }
+    match (stated, said.as_slice()) {
+        (Some(stated), _) => Ok(stated),
+        (None, [(_, first), (_, second)]) if first * second < 0.0 => refused(format!(
+            "has standard_name {:?} and positive = {:?}, which contradict each other; correct the file",
+            text("standard_name"),
+            text("positive")
+        )),
+        (None, [(_, sign), ..]) => Ok(*sign),
+        (None, []) if quantity == Quantity::CarbonFlux => refused(
+            "is a flux, and nothing says which way it is positive: no upward or downward in a standard_name; say positive_into_sea = true or false in the profile".to_owned(),
+        ),
+        (None, []) => Ok(1.0),
+    }
 }
 
 fn choose_by_standard_name(file: &Description) -> Result<(&Variable, Named), Rejection> {
@@ -73,7 +115,10 @@ fn choose_by_standard_name(file: &Description) -> Result<(&Variable, Named), Rej
         .filter_map(|v| named(v).map(|n| (*v, n)))
         .collect();
     let candidate = found.first().map(|(v, _)| *v).or(data.first().copied());
-    // That a file is a swath matters before what its variables are called.
+    // That a file is on another projection or a swath matters before what its variables are called.
+    if let Some(candidate) = candidate {
+        projection::check(file, candidate)?;
+    }
     if let Some(first) = candidate.filter(|first| is_swath(file, first)) {
         return Err(coordinate::no_grid(file, first));
     }
@@ -195,7 +240,7 @@ pub(super) fn packing(
         packing.scale = rules.scale_factor.unwrap_or(packing.scale);
         packing.offset = rules.add_offset.unwrap_or(packing.offset);
         if let Some([low, high]) = rules.valid_range {
-            packing.valid_values = (low, high);
+            packing = packing.with_valid_values(low, high);
         }
     }
     if !packing.scale.is_finite() || packing.scale == 0.0 || !packing.offset.is_finite() {

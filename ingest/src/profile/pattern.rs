@@ -7,6 +7,7 @@ pub(crate) struct Found {
     pub(crate) month: Option<u32>,
     pub(crate) day: Option<u32>,
     pub(crate) day_of_year: Option<u32>,
+    pub(crate) hour: Option<u32>,
 }
 
 /// Longest pattern and longest name, bytes: bounds the time that matching takes.
@@ -26,14 +27,16 @@ enum Field {
     Month,
     Day,
     DayOfYear,
+    Hour,
 }
 
 impl Field {
-    const ALL: [(&str, Self, usize); 4] = [
+    const ALL: [(&str, Self, usize); 5] = [
         ("{year}", Self::Year, 4),
         ("{month}", Self::Month, 2),
         ("{day}", Self::Day, 2),
         ("{day_of_year}", Self::DayOfYear, 3),
+        ("{hour}", Self::Hour, 2),
     ];
 
     fn digits(self) -> usize {
@@ -81,7 +84,7 @@ fn pieces(pattern: &str) -> Result<Vec<Piece>, String> {
             (_, Some((text, field, _))) => (Piece::Number(*field), text.len()),
             (b'{', None) => {
                 return Err(format!(
-                    "unknown field in pattern {pattern:?}; use {{year}}, {{month}}, {{day}}, {{day_of_year}}"
+                    "unknown field in pattern {pattern:?}; use {{year}}, {{month}}, {{day}}, {{day_of_year}}, {{hour}}"
                 ));
             }
             (b'*', _) => (Piece::AnyText, 1),
@@ -146,6 +149,8 @@ fn number(bytes: &[u8], at: usize, field: Field, found: &mut Found) -> Option<us
         Field::Day => &mut found.day,
         Field::DayOfYear if !(1..=366).contains(&value) => return None,
         Field::DayOfYear => &mut found.day_of_year,
+        Field::Hour if value > 23 => return None,
+        Field::Hour => &mut found.hour,
     };
     *slot = Some(value);
     Some(len)

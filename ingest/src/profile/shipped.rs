@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 use super::Profile;
 
 /// Name and text of each, in the order in which they are tried.
-const TEXTS: [(&str, &str); 21] = [
+const TEXTS: [(&str, &str); 26] = [
     (
         "takahashi09-flux",
         include_str!("../../profiles/takahashi09-flux.toml"),
@@ -72,6 +72,23 @@ const TEXTS: [(&str, &str); 21] = [
     ),
     ("etopo20", include_str!("../../profiles/etopo20.toml")),
     ("etopo5", include_str!("../../profiles/etopo5.toml")),
+    ("ostia-sst", include_str!("../../profiles/ostia-sst.toml")),
+    (
+        "modis-aqua-sst-month",
+        include_str!("../../profiles/modis-aqua-sst-month.toml"),
+    ),
+    (
+        "modis-aqua-sst-8day",
+        include_str!("../../profiles/modis-aqua-sst-8day.toml"),
+    ),
+    (
+        "ghrsst-l3-sst",
+        include_str!("../../profiles/ghrsst-l3-sst.toml"),
+    ),
+    (
+        "ghrsst-l4-sst",
+        include_str!("../../profiles/ghrsst-l4-sst.toml"),
+    ),
 ];
 
 static SHIPPED: LazyLock<Vec<Profile>> = LazyLock::new(|| {

@@ -6,7 +6,7 @@ use contract::digest::Digest;
 use contract::key::ObjectKey;
 use contract::manifest::{Manifest, Step};
 use futures::{StreamExt as _, TryStreamExt as _};
-use storage::{Store, manifests};
+use storage::{Store, manifests, verify};
 
 use super::{By, Item, Plan, Reason, Request};
 use crate::error::IngestError;
@@ -50,7 +50,7 @@ pub async fn plan(
     if manifest.derived_from.is_some() {
         return Ok(plan);
     }
-    let known = Known::of(store, &manifest).await?;
+    let known = Known::of(store, &manifest, request).await?;
     let files = files(&manifest, request);
     let read: Vec<Vec<Reading>> = futures::stream::iter(&files)
         .map(|file| known.readings(store, file))
@@ -135,7 +135,11 @@ struct Known<'a> {
 }
 
 impl<'a> Known<'a> {
-    async fn of(store: &Store, manifest: &'a Manifest) -> Result<Self, IngestError> {
+    async fn of(
+        store: &Store,
+        manifest: &'a Manifest,
+        request: &Request,
+    ) -> Result<Self, IngestError> {
         let product = &manifest.product;
         let list = async |folder: &str| {
             let listed = store.list(&format!("{folder}/{product}")).await;
@@ -147,11 +151,19 @@ impl<'a> Known<'a> {
                 notes.entry(raw).or_default().push(key);
             }
         }
+        let mut frames: BTreeSet<ObjectKey> = list("frames").await?.into_iter().collect();
+        if request.is_verified {
+            let named = manifest.steps.iter().map(|step| step.frame.clone());
+            let damaged = verify::damaged(store, named)
+                .await
+                .map_err(IngestError::storage("check what is stored"))?;
+            frames.retain(|frame| !damaged.contains(frame));
+        }
         let digest = |key: ObjectKey| key.as_str().rsplit('/').next()?.parse().ok();
         Ok(Self {
             manifest,
             notes,
-            frames: list("frames").await?.into_iter().collect(),
+            frames,
             raw: list("raw").await?.into_iter().filter_map(digest).collect(),
         })
     }

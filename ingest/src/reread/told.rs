@@ -3,10 +3,9 @@
 use std::collections::BTreeMap;
 
 use contract::event::{Body, Event};
-use contract::key::ObjectKey;
 use contract::manifest::{Manifest, Step};
 use contract::product::ProductId;
-use storage::{StorageError, Store, manifests};
+use storage::{Store, manifests};
 
 use crate::error::IngestError;
 
@@ -18,16 +17,21 @@ pub async fn events(store: &Store, product: &ProductId) -> Result<Vec<Event>, In
     let Some(now) = manifests::latest(store, product).await.map_err(read)? else {
         return Ok(vec![]);
     };
-    let key = ObjectKey::manifest(product, now.number.saturating_sub(1));
-    let before = match store.get(&key).await {
-        Ok(content) => serde_json::from_slice::<Manifest>(&content).map_err(|e| {
-            let (object, reason) = (key.to_string(), e.to_string());
-            IngestError::storage("read a manifest")(StorageError::Damaged { object, reason })
-        })?,
-        Err(e) if e.is_not_found() => return Ok(vec![]),
-        Err(e) => return Err(IngestError::storage("read a manifest")(e)),
+    let number = now.number.saturating_sub(1);
+    let read = IngestError::storage("read a manifest");
+    let Some(before) = manifests::numbered(store, product, number)
+        .await
+        .map_err(read)?
+    else {
+        return Ok(vec![]);
     };
     Ok(told(&before, &now))
+}
+
+/// A step may be other than it was in what is said of it alone.
+fn have_same_values(before: &[&Step], now: &[&Step]) -> bool {
+    let values = |step: &&Step| (step.period, step.frame.clone());
+    before.iter().map(values).eq(now.iter().map(values))
 }
 
 fn told(before: &Manifest, now: &Manifest) -> Vec<Event> {
@@ -50,16 +54,15 @@ fn told(before: &Manifest, now: &Manifest) -> Vec<Event> {
             continue;
         }
         let (origin, raw_sha256) = file;
+        let periods: Vec<_> = steps.iter().map(|step| step.period).collect();
+        let revised = old
+            .get(&file)
+            .is_none_or(|before| !have_same_values(before, &steps));
         let trace = format!("reread-{}", raw_sha256.short());
         events.push(Event::new(
             trace,
-            Body::GranuleLanded {
-                path: origin.to_owned(),
-                raw_sha256,
-                manifest: now.id(),
-                periods: steps.iter().map(|step| step.period).collect(),
-                revised: true,
-            },
+            Body::granule_landed(origin.to_owned(), raw_sha256, now.id(), &periods, revised)
+                .with_masked(steps.iter().filter_map(|step| step.masked).sum()),
         ));
     }
     events

@@ -3,7 +3,7 @@
 //! Words beside each other are multiplied; `/` divides by the next word or bracket, as in UDUNITS (`a/b c` is `a/b*c`).
 
 use super::symbol::look_up;
-use super::{Dimension, Substance, Unit};
+use super::{Dimension, Substance, TOO_HIGH, Unit, usable};
 
 /// Longest spelling that is read, bytes.
 const MAX_UNIT_BYTES: usize = 100;
@@ -130,7 +130,7 @@ fn number_or_power(digits: &str, is_power: bool) -> Result<Token, String> {
     let bad = || unknown(&format!("{digits:?}"));
     if is_power {
         let power: i8 = digits.parse().map_err(|_no_number| bad())?;
-        return if power.abs() <= MAX_POWER {
+        return if (-MAX_POWER..=MAX_POWER).contains(&power) {
             Ok(Token::Power(power))
         } else {
             Err(bad())
@@ -145,7 +145,7 @@ fn push_words(word: String, tokens: &mut Vec<Token>) {
         if let Some(unit) = word.strip_suffix(label)
             && !unit.is_empty()
             && look_up(&word).is_none()
-            && look_up(unit).is_some_and(|u| u.dimension.mass + u.dimension.amount == 1)
+            && look_up(unit).is_some_and(|u| is_mass_or_amount(u.dimension))
         {
             tokens.push(Token::Word(unit.to_owned()));
             tokens.push(Token::Word(label.to_owned()));
@@ -153,6 +153,10 @@ fn push_words(word: String, tokens: &mut Vec<Token>) {
         }
     }
     tokens.push(Token::Word(word));
+}
+
+fn is_mass_or_amount(dimension: Dimension) -> bool {
+    matches!((dimension.mass, dimension.amount), (1, 0) | (0, 1))
 }
 
 struct Parser<'a> {
@@ -196,7 +200,9 @@ impl Parser<'_> {
                     return Err("is not spelt as a unit; give one in a profile".to_owned());
                 }
             };
-            let power = self.power() * if divide { -1 } else { 1 };
+            let power = self.power();
+            // No power of a word is past MAX_POWER, so that each has its negative.
+            let power = if divide { -power } else { power };
             divide = false;
             total = times(total, part, power)?;
         }
@@ -259,13 +265,9 @@ fn times(total: Unit, part: Unit, power: i8) -> Result<Unit, String> {
     })();
     // Inside a product a degree Celsius is a difference of temperature: the offset falls away.
     let factor = total.factor * part.factor.powi(power.into());
-    let dimension = dimension.ok_or("has powers too high")?;
-    if !factor.is_finite() || factor <= 0.0 {
-        return Err("has a factor that is no positive number".to_owned());
-    }
     Ok(Unit {
-        dimension,
-        factor,
+        dimension: dimension.ok_or(TOO_HIGH)?,
+        factor: usable(factor)?,
         offset: 0.0,
         substance: total.substance.or(part.substance),
     })

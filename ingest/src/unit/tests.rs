@@ -1,6 +1,7 @@
 //! Units against values worked out by hand, and spellings that must be refused.
 
 use super::*;
+use proptest::prelude::*;
 
 /// Factor from the spelling to kg C m-2 s-1 for a step of one month.
 fn flux_factor(spelling: &str, year: i32, month: u32) -> f64 {
@@ -207,5 +208,87 @@ fn every_stored_unit_parses_to_itself() {
             (1.0, 0.0),
             "{quantity:?}"
         );
+    }
+}
+
+/// Words that are known, with prefixes, and some that are not.
+const WORDS: [&str; 24] = [
+    "g", "kg", "Pg", "t", "m", "km", "pm", "l", "s", "ns", "d", "mon", "month", "yr", "K", "degC",
+    "mol", "Tmol", "hPa", "%", "C", "CO2", "furlong", "1",
+];
+
+/// Spellings that look like units, with powers past every limit, and any text at all.
+fn spellings() -> impl Strategy<Value = String> {
+    let power = prop_oneof![
+        Just(String::new()),
+        (-130i32..130).prop_map(|n| n.to_string())
+    ];
+    let word = (
+        prop::sample::select(&WORDS[..]),
+        prop::sample::select(&["", "^", "**"][..]),
+        power,
+    )
+        .prop_map(|(word, sign, power)| format!("{word}{sign}{power}"));
+    let number = prop_oneof![
+        any::<u64>().prop_map(|n| n.to_string()),
+        Just("9".repeat(90))
+    ];
+    let mark = prop::sample::select(&[" ", "/", "(", ")", "*", ".", "-", "^"][..]);
+    let part = prop_oneof![8 => word, 1 => number, 3 => mark.prop_map(str::to_owned)];
+    let like = prop::collection::vec(part, 0..30).prop_map(|parts| parts.join(" "));
+    // The longest that is read: one word again and again.
+    let again = (prop::sample::select(&WORDS[..]), -9i32..10)
+        .prop_map(|(word, power)| format!("{word}{power} ").repeat(100 / (word.len() + 3)));
+    let pair = (again.clone(), again.clone())
+        .prop_map(|(a, b)| format!("{} {}", &a[..a.len().min(49)], &b[..b.len().min(49)]));
+    prop_oneof![3 => like, 2 => again, 3 => pair, 2 => ".{0,120}"]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 4096, ..ProptestConfig::default() })]
+
+    /// Whatever a file calls its unit, the answer is a factor that values can be multiplied by, or what is wrong.
+    #[test]
+    fn any_spelling_is_read_or_refused(spelling in spellings(), quantity in prop::sample::select(&Quantity::ALL[..])) {
+        let conversions = parse(&spelling)
+            .into_iter()
+            .flat_map(|unit| [None, Some(Substance::Carbon), Some(Substance::Co2)].map(|s| unit.to_quantity(quantity, s)));
+        for conversion in conversions.flatten() {
+            for months in [1, 3] {
+                let end = if months == 1 { "2000-02-01" } else { "2000-04-01" };
+                let period = Period::new("2000-01-01".parse().unwrap(), end.parse().unwrap()).unwrap();
+                if let Ok((factor, offset)) = conversion.for_period(period) {
+                    prop_assert!(factor.is_normal() && factor > 0.0 && offset.is_finite(), "{spelling}: {factor}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn powers_that_cannot_be_counted_are_refused() {
+    let many = |word: &str, times: usize| vec![word; times].join(" ");
+    // Each is within bounds; together, once a month is a time, they are not.
+    let unit = parse(&format!("{} {}", many("s9", 14), many("mon9", 2))).unwrap();
+    let error = unit.to_quantity(Quantity::CarbonFlux, None).unwrap_err();
+    assert!(error.contains("powers too high"), "{error}");
+    // The dimension is that of a flux, but no number holds so many months.
+    let spelling = format!("kg C m-2 s-1 {} {}", many("s9", 7), many("mon-9", 7));
+    let conversion = parse(&spelling)
+        .unwrap()
+        .to_quantity(Quantity::CarbonFlux, None)
+        .unwrap();
+    let error = conversion
+        .for_period(Period::month(2000, 1).unwrap())
+        .unwrap_err();
+    assert!(error.contains("factor"), "{error}");
+    for spelling in [
+        "m-128",
+        "m^-128",
+        "m127 s",
+        &many("Pg9", 24),
+        &many("pm9", 24),
+    ] {
+        assert!(parse(spelling).is_err(), "{spelling}");
     }
 }

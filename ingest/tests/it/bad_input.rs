@@ -152,6 +152,27 @@ async fn unknown_missing_and_wrong_units_are_refused() {
     assert_refused(&place, "none.nc", RejectReason::Unit, &["fgco2"]).await;
 }
 
+/// Each word is a unit; what they come to is past what a power, a factor or a spelling can be.
+#[tokio::test]
+async fn a_unit_whose_powers_overflow_is_refused_by_its_name() {
+    let place = Place::new();
+    let months = format!("{}{}", "s9 ".repeat(14), "mon9 ".repeat(2));
+    let cancelled = format!("g C m-2 s-1 {}{}", "s9 ".repeat(7), "mon-9 ".repeat(7));
+    for (unit, words) in [
+        (months.trim(), ["s9 s9 s9", "powers too high"]),
+        (cancelled.trim(), ["mon-9", "factor"]),
+        ("m-128", ["m-128", "unknown word"]),
+    ] {
+        let mut file = SmallFile::new();
+        file.unit = Box::leak(unit.to_owned().into_boxed_str());
+        file.write_classic(&place.path("overflow.nc"));
+        assert_refused(&place, "overflow.nc", RejectReason::Unit, &words).await;
+    }
+    SmallFile::new().write_classic(&place.path("next.nc"));
+    let outcomes = place.land(&[place.path("next.nc")]).await;
+    assert!(!outcomes[0].is_rejected(), "{}", outcomes[0]);
+}
+
 #[tokio::test]
 async fn a_file_without_time_is_refused() {
     let place = Place::new();

@@ -194,8 +194,8 @@ impl SmallFile {
         writer.close().unwrap();
     }
 
-    /// Plain HDF5 without dimension scales, by libhdf5.
-    pub(crate) fn write_hdf5(&self, path: &Path) {
+    /// Only its axes, as plain HDF5.
+    pub(crate) fn write_axes(&self, path: &Path) -> hdf5::File {
         let file = hdf5::File::create(path).unwrap();
         let axis = |name: &str, values: &[f64], unit: &str| {
             let dataset = file
@@ -212,6 +212,12 @@ impl SmallFile {
             axis("time", &self.time, unit);
             text(&file, "time_coverage_resolution", "P1M");
         }
+        file
+    }
+
+    /// Plain HDF5 without dimension scales, by libhdf5.
+    pub(crate) fn write_hdf5(&self, path: &Path) {
+        let file = self.write_axes(path);
         let (rows, cols) = (self.lat.len(), self.lon.len());
         let shape: Vec<usize> = if self.time_unit.is_some() {
             vec![self.time.len(), rows, cols]

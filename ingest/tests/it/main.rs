@@ -3,17 +3,27 @@
 #![expect(clippy::float_cmp, reason = "these numbers are exact")]
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod axes;
 mod bad_input;
 mod cf_files;
+mod contained;
 mod faults;
 mod fixture;
 mod guarded;
 mod hostile;
+mod made;
+mod many_steps;
+mod masked;
+mod memory;
+mod order;
 mod other_writers;
+mod quality;
 mod real_files;
 mod reread;
 mod sandbox;
 mod service;
+mod sign;
+mod stamps;
 mod survey;
 mod synthetic;
 mod tutorial_files;

@@ -62,6 +62,7 @@ fn request() -> Request {
         to: None,
         profile: None,
         is_forced: false,
+        is_verified: false,
     }
 }
 
@@ -338,7 +339,7 @@ async fn a_known_file_is_read_as_the_frames_of_this_decoders_version() {
             values.extend(value.to_le_bytes());
         }
     }
-    let (decoder, digest) = (1, Digest::of(&values).short());
+    let (decoder, digest) = (2, Digest::of(&values).short());
     let notes = place.store.list("readings").await.unwrap();
     let note = place.store.get(&notes[0]).await.unwrap();
     let note: serde_json::Value = serde_json::from_slice(&note).unwrap();

@@ -3,6 +3,7 @@
 
 use contract::time::Period;
 use ingest::Outcome;
+use test_data::fluxengine;
 
 use crate::fixture::Place;
 use crate::real_files::{files, near};

@@ -285,3 +285,41 @@ async fn a_cloud_notification_lands_its_data_file() {
             .is_empty()
     );
 }
+
+/// A server that does not say how much it sends is given room for all that is allowed: that is never more than there is.
+#[tokio::test]
+async fn a_file_of_unknown_size_lands_where_the_spool_is_no_multiple_of_its_unit() {
+    const SPOOL_BYTES: usize = (1 << 20) + 1000;
+    let place = Place::new();
+    SmallFile::new().write_classic(&place.path("source.nc"));
+    let mut content = std::fs::read(place.path("source.nc")).unwrap();
+    content.resize(SPOOL_BYTES, 0);
+    let unsized_answer = move |path: &str| {
+        let more = usize::from(path.contains("larger"));
+        let body = [content.as_slice(), &vec![0; more]].concat();
+        let chunk = [
+            format!("{:x}\r\n", body.len()).as_bytes(),
+            &body,
+            b"\r\n0\r\n\r\n",
+        ]
+        .concat();
+        let headers = vec!["transfer-encoding: chunked".to_owned()];
+        Answer::Whole("200 OK", headers, chunk)
+    };
+    let server = WebServer::start(Box::new(unsized_answer)).await;
+    let (host, spool) = (server.address.to_string(), SPOOL_BYTES.to_string());
+    let settings = guarded(&place, &["--allow-host", &host, "--spool-bytes", &spool]).unwrap();
+    let limit = std::time::Duration::from_mins(2);
+    let asked = notice(&server.url("/full.nc"), None, None);
+    let ended = tokio::time::timeout(limit, outcome_of(&place, &settings, asked)).await;
+    let outcome = ended.expect("it waits for ever");
+    assert!(matches!(outcome, Outcome::Landed { .. }), "{outcome}");
+    let url = server.url("/larger.nc");
+    let larger = refused(&place, &settings, &url);
+    let (reason, line) = tokio::time::timeout(limit, larger)
+        .await
+        .expect("it waits for ever");
+    assert_eq!(reason, RejectReason::TooLarge, "{line}");
+    assert!(line.contains(&spool), "{line}");
+    assert!(spool_is_empty(&place));
+}

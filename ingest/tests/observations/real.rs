@@ -2,8 +2,6 @@
 //!
 //! Expected numbers: Python netCDF4 1.7 and csv, sentinels taken out by hand, means in float64.
 
-use std::path::Path;
-
 use contract::event::RejectReason;
 use contract::observation::{Observation, PlatformKind, Quality};
 use test_data::set;

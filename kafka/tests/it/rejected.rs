@@ -61,6 +61,12 @@ pub(crate) async fn refusals_are_listed_and_sent_again_once(log: &dyn EventLog) 
             _ => None,
         })
         .collect();
+    let came = messages.iter().find(|message| message.origin == ours);
+    let again = messages.iter().filter_map(|message| message.event().ok());
+    let again = again.filter(|event| matches!(event.body, Body::GranuleNotice { attempt: 2, .. }));
+    let noticed: Vec<_> = again.map(|event| event.noticed).collect();
+    assert_eq!(noticed, [came.unwrap().time], "it is no newer for that");
+    assert!(noticed[0].is_some());
     attempts.sort_unstable();
     assert_eq!(attempts, [1, 2], "a notice is the next attempt");
 }

@@ -1,17 +1,16 @@
 //! The numbered index of a dataset: which file holds which month. The newest number is what readers see.
 
-use bytes::Bytes;
 use contract::key::ObjectKey;
 use contract::product::ProductId;
 use contract::time::TimeMs;
 use serde::{Deserialize, Serialize};
-use storage::{StorageError, Store};
+use storage::{StorageError, Store, document};
 
 use super::Rows;
 use crate::error::ObservationError;
 
-/// Version of the index's JSON.
-const SCHEMA: u32 = 1;
+/// Version of the index's JSON as it is written. Those of version 1 are not sealed and are read as well.
+const SCHEMA: u32 = 2;
 /// Folder of the indexes.
 const FOLDER: &str = "observation-indexes";
 
@@ -59,6 +58,7 @@ impl Index {
     /// The one after this.
     pub(super) fn next(self) -> Self {
         Self {
+            schema: SCHEMA,
             number: self.number + 1,
             ..self
         }
@@ -120,14 +120,15 @@ pub(super) async fn latest(
     let Some(key) = keys.last() else {
         return Ok(None);
     };
-    let damaged = |reason: String| ObservationError::damaged(key.as_str(), reason);
-    let content = store.get(key).await?;
-    let index: Index = serde_json::from_slice(&content).map_err(|e| damaged(e.to_string()))?;
-    if index.schema != SCHEMA {
-        return Err(damaged(format!(
-            "schema {} is unknown, this program reads {SCHEMA}",
+    let Some(index) = document::get::<Index>(store, key).await? else {
+        return Ok(None);
+    };
+    if index.schema > SCHEMA {
+        let reason = format!(
+            "schema {} is unknown, this program reads up to {SCHEMA}",
             index.schema
-        )));
+        );
+        return Err(ObservationError::damaged(key.as_str(), reason));
     }
     Ok(Some(index))
 }
@@ -138,8 +139,7 @@ pub(super) async fn latest(
 pub(super) async fn commit(store: &Store, index: &Index) -> Result<bool, ObservationError> {
     let name = format!("{FOLDER}/{}/{:010}.json", index.dataset, index.number);
     let key: ObjectKey = name.parse()?;
-    let json = serde_json::to_vec(index).map_err(|e| ObservationError::damaged(&name, e))?;
-    match store.put_new(&key, Bytes::from(json)).await {
+    match document::put_new(store, &key, index).await {
         Ok(is_new) => Ok(is_new),
         Err(StorageError::Conflict { .. }) => Ok(false),
         Err(e) => Err(e.into()),

@@ -33,7 +33,8 @@ impl Running {
                 .run(async {
                     stopped.await.unwrap_or_default();
                 })
-                .await;
+                .await
+                .unwrap();
         });
         Self { stop, task }
     }

@@ -14,6 +14,7 @@ use super::flight::{Flight, Outcome};
 use super::queue::{Class, Full, Permit};
 use super::{DeskError, Drawn, Inner, Origin};
 use crate::error::RenderError;
+use crate::image::Image;
 
 /// Shortest and longest hint when to ask a full worker again.
 const RETRY_HINT: [Duration; 2] = [Duration::from_millis(100), Duration::from_secs(30)];
@@ -28,10 +29,11 @@ impl Inner {
         let begun = Instant::now();
         let drawn = self.drawn(job, flight, &permit).await;
         self.note(&drawn);
-        let png = drawn?;
+        let image = drawn?;
         self.learn(begun.elapsed());
-        // Another may draw while this one is stored.
-        drop(permit);
+        // Another draws while this one is encoded and stored.
+        let encoding = self.service.encode(image, permit);
+        let png = self.measured("encode", encoding).await?;
         let count = |origin: &str| self.pictures.with_label_values(&[origin]).inc();
         match self.keep(job, png.clone()).await {
             Ok(None) => {
@@ -114,14 +116,13 @@ impl Inner {
         job: &RenderJob,
         flight: &Arc<Flight>,
         permit: &Arc<Permit>,
-    ) -> Result<Bytes, RenderError> {
+    ) -> Result<Image, RenderError> {
         let attempt = || async {
             let loading = flight.while_wanted(self.service.scene(job));
             let scene = self.measured("load", loading).await?;
             let held = Arc::clone(permit);
             let drawing = self.service.picture(job, scene, flight.is_wanted(), held);
-            let image = self.measured("draw", drawing).await?;
-            self.measured("encode", self.service.encode(image)).await
+            self.measured("draw", drawing).await
         };
         self.service.on_a_sound_device(attempt).await
     }
@@ -144,23 +145,35 @@ impl Inner {
         png: Bytes,
     ) -> Result<Option<Bytes>, RenderError> {
         let key = job.key();
-        match self.store.put_new(&key, png).await {
+        match self.store.put_new(&key, png.clone()).await {
             Ok(_new) => Ok(None),
-            Err(StorageError::Conflict { .. }) => {
-                let adapter = self.service.name();
-                tracing::error!(%key, adapter, "another adapter drew this job differently");
-                let theirs = self.store.get(&key).await;
-                Ok(Some(theirs.map_err(|e| picture_failed("read", &key, e))?))
-            }
+            Err(StorageError::Conflict { .. }) => match self.store.get(&key).await {
+                Ok(theirs) => {
+                    let adapter = self.service.name();
+                    tracing::error!(%key, adapter, "another adapter drew this job differently");
+                    Ok(Some(theirs))
+                }
+                Err(error @ StorageError::Damaged { .. }) => {
+                    tracing::warn!(%error, "a damaged picture is drawn again");
+                    let put = self.store.put_over(&key, png).await;
+                    put.map(|()| None)
+                        .map_err(|e| picture_failed("store", &key, e))
+                }
+                Err(e) => Err(picture_failed("read", &key, e)),
+            },
             Err(source) => Err(picture_failed("store", &key, source)),
         }
     }
 
-    fn note(&self, drawn: &Result<Bytes, RenderError>) {
+    fn note(&self, drawn: &Result<Image, RenderError>) {
         let away = &self.is_without_device;
         match drawn {
-            Ok(_png) => away.store(false, Ordering::Release),
-            Err(RenderError::NoAdapter(_) | RenderError::NoDevice { .. }) => {
+            Ok(_image) => away.store(false, Ordering::Release),
+            Err(
+                RenderError::NoAdapter(_)
+                | RenderError::SoftwareAdapter { .. }
+                | RenderError::NoDevice { .. },
+            ) => {
                 away.store(true, Ordering::Release);
             }
             Err(_other) => {}
@@ -177,7 +190,7 @@ impl Inner {
     /// When the queue should have moved on by itself.
     fn retry_after(&self, waiting: usize) -> Duration {
         let mean = Duration::from_micros(self.mean_us.load(Ordering::Relaxed));
-        let turns = waiting / self.limits.draws_at_once.get() + 1;
+        let turns = waiting / self.service.draws_at_once().get() + 1;
         let [shortest, longest] = RETRY_HINT;
         mean.saturating_mul(turns as u32).clamp(shortest, longest)
     }

@@ -4,7 +4,6 @@ mod drawing;
 mod flight;
 mod queue;
 
-use std::num::NonZeroUsize;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
@@ -30,15 +29,6 @@ pub const METRICS: &str = "render_worker";
 /// What a picture is thought to take before one was drawn.
 const FIRST_GUESS: Duration = Duration::from_millis(200);
 
-/// Bounds of a desk.
-#[derive(Debug, Clone, Copy)]
-pub struct DeskLimits {
-    /// Pictures drawn at the same time.
-    pub draws_at_once: NonZeroUsize,
-    /// Jobs that somebody waits for and that are not begun.
-    pub draw_queue: usize,
-}
-
 /// Draws jobs for many. Cheap to clone.
 #[derive(Clone)]
 pub struct Desk {
@@ -48,7 +38,6 @@ pub struct Desk {
 struct Inner {
     service: RenderService,
     store: Store,
-    limits: DeskLimits,
     queue: Arc<Queue>,
     flights: Flights,
     red: Red,
@@ -89,6 +78,8 @@ pub struct Condition {
     pub waiting_batch: usize,
     /// Jobs that are drawn.
     pub in_flight: usize,
+    /// Pictures that are encoded.
+    pub encoding: usize,
     /// Is nothing new taken?
     pub stopping: bool,
 }
@@ -127,11 +118,11 @@ impl From<RenderError> for DeskError {
 }
 
 impl Desk {
-    /// A desk whose metrics go to `registry`.
+    /// A desk whose metrics go to `registry`; at most `draw_queue` jobs that somebody waits for are not begun.
     pub fn new(
         service: RenderService,
         store: Store,
-        limits: DeskLimits,
+        draw_queue: usize,
         registry: &Registry,
     ) -> Result<Self, prometheus::Error> {
         let name = format!("fluxglobe_{METRICS}_pictures_total");
@@ -139,10 +130,9 @@ impl Desk {
         let pictures = IntCounterVec::new(Opts::new(name, help), &["origin"])?;
         registry.register(Box::new(pictures.clone()))?;
         let inner = Inner {
-            service,
             store,
-            limits,
-            queue: Queue::new(limits.draws_at_once.get(), limits.draw_queue),
+            queue: Queue::new(service.draws_at_once().get(), draw_queue),
+            service,
             flights: Flights::default(),
             red: Red::register(registry, METRICS)?,
             pictures,
@@ -154,6 +144,7 @@ impl Desk {
             inner: Arc::new(inner),
         };
         registry.register(Box::new(Gauges::of(&desk)?))?;
+        desk.service().register(registry)?;
         Ok(desk)
     }
 
@@ -214,7 +205,8 @@ impl Desk {
         Condition {
             waiting_on_demand: inner.queue.waiting(Class::OnDemand),
             waiting_batch: inner.queue.waiting(Class::Batch),
-            in_flight: inner.queue.in_use(inner.limits.draws_at_once.get()),
+            in_flight: inner.queue.in_use(self.draws_at_once()),
+            encoding: inner.service.encoding_count(),
             stopping: inner.stopping.load(Ordering::Acquire),
         }
     }
@@ -224,9 +216,9 @@ impl Desk {
         &self.inner.service
     }
 
-    /// Its bounds.
-    pub fn limits(&self) -> DeskLimits {
-        self.inner.limits
+    /// Pictures drawn at the same time.
+    pub(crate) fn draws_at_once(&self) -> usize {
+        self.inner.service.draws_at_once().get()
     }
 
     pub(crate) fn red(&self) -> &Red {

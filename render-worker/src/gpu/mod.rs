@@ -16,6 +16,7 @@ pub use workspace::{Slot, Workspace};
 use bytemuck::Pod;
 use wgpu::util::DeviceExt as _;
 
+use crate::adapter::Adapter;
 use crate::error::RenderError;
 use fault::FaultNote;
 use pipelines::Pipelines;
@@ -32,13 +33,21 @@ const WELCOME: wgpu::Features = wgpu::Features::TIMESTAMP_QUERY
 pub struct Gpu {
     device: wgpu::Device,
     queue: wgpu::Queue,
-    adapter_name: String,
+    adapter: Adapter,
     most_buffer_bytes: u64,
     checks: Checks,
-    is_software: bool,
     own_bytes: Option<u64>,
     fault: FaultNote,
     pipelines: Option<Pipelines>,
+}
+
+/// Which adapters will do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Wanted {
+    /// The most able one, a software one if there is no other.
+    Any,
+    /// A graphics card or nothing.
+    Hardware,
 }
 
 /// What shaders check while they run.
@@ -53,27 +62,33 @@ pub enum Checks {
 impl Gpu {
     /// Opens the most able Vulkan adapter, a software one if there is no other.
     pub fn open() -> Result<Self, RenderError> {
-        pollster::block_on(Self::request(Checks::Trusted))
+        pollster::block_on(Self::request(Wanted::Any, Checks::Trusted))
+    }
+
+    /// The same, but no software adapter.
+    pub fn open_hardware() -> Result<Self, RenderError> {
+        pollster::block_on(Self::request(Wanted::Hardware, Checks::Trusted))
     }
 
     /// The same with shaders that check themselves.
     pub fn open_checked() -> Result<Self, RenderError> {
-        pollster::block_on(Self::request(Checks::Full))
+        pollster::block_on(Self::request(Wanted::Any, Checks::Full))
     }
 
-    async fn request(checks: Checks) -> Result<Self, RenderError> {
+    async fn request(wanted: Wanted, checks: Checks) -> Result<Self, RenderError> {
         let instance = wgpu::Instance::default();
         let options = wgpu::RequestAdapterOptions {
             power_preference: wgpu::PowerPreference::HighPerformance,
             ..Default::default()
         };
-        let adapter = instance
-            .request_adapter(&options)
-            .await
-            .map_err(|e| RenderError::NoAdapter(Box::new(e)))?;
+        let found = instance.request_adapter(&options).await;
+        let adapter = found.map_err(|e| RenderError::NoAdapter(Box::new(e)))?;
         let info = adapter.get_info();
-        let adapter_name = info.name.clone();
-        let is_software = info.device_type == wgpu::DeviceType::Cpu;
+        let known = Adapter::of(&info);
+        if wanted == Wanted::Hardware && known.is_software() {
+            let adapter = known.name().to_owned();
+            return Err(RenderError::SoftwareAdapter { adapter });
+        }
         let own_bytes = memory::own_bytes(&adapter);
         let limits = adapter.limits();
         let most_buffer_bytes = limits
@@ -90,7 +105,7 @@ impl Gpu {
             .request_device(&descriptor)
             .await
             .map_err(|source| RenderError::NoDevice {
-                adapter: adapter_name.clone(),
+                adapter: known.name().to_owned(),
                 source: Box::new(source),
             })?;
         let fault = FaultNote::default();
@@ -100,10 +115,9 @@ impl Gpu {
         Ok(Self {
             device,
             queue,
-            adapter_name,
+            adapter: known,
             most_buffer_bytes,
             checks,
-            is_software,
             own_bytes,
             fault,
             pipelines,
@@ -127,19 +141,24 @@ impl Gpu {
         self.check_fault("drawing")
     }
 
+    /// What draws.
+    pub fn adapter(&self) -> &Adapter {
+        &self.adapter
+    }
+
     /// Name of the adapter.
     pub fn adapter_name(&self) -> &str {
-        &self.adapter_name
+        self.adapter.name()
     }
 
     /// Is the adapter a program on the processor, such as lavapipe?
     pub fn is_software(&self) -> bool {
-        self.is_software
+        self.adapter.is_software()
     }
 
     /// Bytes of memory that are the device's own; none where that is the computer's, or where nobody says.
     pub fn own_bytes(&self) -> Option<u64> {
-        self.own_bytes.filter(|_| !self.is_software)
+        self.own_bytes.filter(|_| !self.is_software())
     }
 
     /// Largest storage buffer of this device.

@@ -2,7 +2,7 @@
 
 use contract::key::ObjectKey;
 use contract::manifest::Manifest;
-use contract::moment::Moment;
+use contract::moment::{Counts, Moment};
 
 /// Which way time runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -79,10 +79,19 @@ pub(super) fn next(
         }
         wanted.push(step);
     }
+    // Of a picture that shows how complete sums are, the next ones will, too.
+    let counts = |step: usize| {
+        let contributed = manifest.steps[step].contributed.as_ref()?;
+        moment.contributed.as_ref().map(|_| Counts {
+            before: Some(contributed.counts.clone()),
+            after: None,
+        })
+    };
     let single = |step: i64| Moment {
         domain: moment.domain.clone(),
         before: Some(manifest.steps[step as usize].frame.clone()),
         after: None,
+        contributed: counts(step as usize),
     };
     wanted.into_iter().map(single).collect()
 }
@@ -105,11 +114,13 @@ mod tests {
     fn manifest(quantity: Quantity, months: u32) -> Manifest {
         let product: ProductId = "p".parse().unwrap();
         let step = |month| Step {
+            masked: None,
             period: Period::month(2000, month).unwrap(),
             frame: frame(month),
             raw_sha256: Digest::of(b""),
             origin: String::new(),
             valid_cells: 1,
+            contributed: None,
         };
         Manifest {
             schema: MANIFEST_SCHEMA,
@@ -130,6 +141,7 @@ mod tests {
             domain: ObjectKey::domain(&product, &Digest::of(b"d")),
             series: vec![],
             derived_from: None,
+            notices: vec![],
             product,
         }
     }

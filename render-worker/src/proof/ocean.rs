@@ -104,6 +104,7 @@ pub fn job(view: View) -> RenderJob {
         domain: key(domain),
         before: Some(key(frame)),
         after: None,
+        contributed: None,
     };
     RenderJob {
         renderer_version: RENDERER_VERSION,

@@ -67,7 +67,12 @@ pub fn open_desk(
     registry: &Registry,
 ) -> Result<Desk, ServerError> {
     let service = RenderService::with_limits(store.clone(), backend, settings.service_limits())?;
-    Ok(Desk::new(service, store, settings.desk_limits(), registry)?)
+    Ok(Desk::new(
+        service,
+        store,
+        usize::from(settings.draw_queue),
+        registry,
+    )?)
 }
 
 /// A server that holds its address but does not answer yet.

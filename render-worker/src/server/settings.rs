@@ -6,7 +6,6 @@ use std::time::Duration;
 
 use clap::value_parser;
 
-use crate::desk::DeskLimits;
 use crate::service::Limits;
 
 /// How a render worker listens and how much it takes on. A flag and a variable have the same name.
@@ -20,10 +19,11 @@ pub struct Settings {
         value_name = "ADDRESS"
     )]
     pub render_listen: SocketAddr,
-    /// Pictures drawn at the same time, 1 to 64; two keep a device busy while one of them is encoded.
-    #[arg(long, env = "FLUXGLOBE_DRAWS_AT_ONCE", default_value_t = 2,
+    /// Pictures drawn at the same time, 1 to 64; 4 on a graphics card and 2 on a software adapter if absent, and with
+    /// --cpu as many as there are cores. Pictures that are encoded do not count.
+    #[arg(long, env = "FLUXGLOBE_DRAWS_AT_ONCE",
           value_parser = value_parser!(u8).range(1..=64), value_name = "COUNT")]
-    pub draws_at_once: u8,
+    pub draws_at_once: Option<u8>,
     /// Jobs that may wait to be drawn on demand, 0 to 4096; more are sent away with a hint when to ask again.
     #[arg(long, env = "FLUXGLOBE_DRAW_QUEUE", default_value_t = 64,
           value_parser = value_parser!(u16).range(0..=4096), value_name = "COUNT")]
@@ -50,26 +50,17 @@ pub struct Settings {
 impl Settings {
     pub(crate) fn service_limits(&self) -> Limits {
         Limits {
-            pictures: self.at_once(),
+            draws_at_once: self
+                .draws_at_once
+                .and_then(|count| NonZeroUsize::new(usize::from(count))),
             frame_bytes: u64::from(self.frame_memory_mib) << 20,
             device_frame_bytes: self.device_frame_memory_mib.map(|mib| u64::from(mib) << 20),
             frames_ahead: usize::from(self.frames_ahead),
         }
     }
 
-    pub(crate) fn desk_limits(&self) -> DeskLimits {
-        DeskLimits {
-            draws_at_once: self.at_once(),
-            draw_queue: usize::from(self.draw_queue),
-        }
-    }
-
     /// How long the end may take.
     pub fn drain(&self) -> Duration {
         Duration::from_secs(u64::from(self.render_drain_s))
-    }
-
-    fn at_once(&self) -> NonZeroUsize {
-        NonZeroUsize::new(usize::from(self.draws_at_once)).unwrap_or(NonZeroUsize::MIN)
     }
 }

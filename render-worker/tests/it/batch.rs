@@ -10,8 +10,8 @@ use contract::topic::Topic;
 use render_worker::batch::{BatchService, GROUP};
 use render_worker::desk::Class;
 use service::Stop;
-use storage::Store;
 use storage::log::{EmbeddedLog, EventLog as _, contents};
+use storage::{StorageError, Store};
 use tokio::task::JoinHandle;
 
 use crate::stored::{quick, slow, two_months_in};
@@ -33,7 +33,7 @@ async fn events(log: &EmbeddedLog, topic: Topic) -> Vec<Event> {
 
 struct Batch {
     stop: Stop,
-    running: JoinHandle<()>,
+    running: JoinHandle<Result<(), StorageError>>,
 }
 
 impl Batch {
@@ -48,6 +48,7 @@ impl Batch {
         self.stop.now();
         tokio::time::timeout(LIMIT, self.running)
             .await
+            .unwrap()
             .unwrap()
             .unwrap();
     }

@@ -19,6 +19,7 @@ mod flow;
 mod gallery;
 mod golden;
 mod hot;
+mod incomplete;
 mod layout;
 mod limits;
 mod look;

@@ -45,7 +45,7 @@ async fn months(store: &Store, name: &str, grid: Grid) -> Manifest {
 
 fn limits(frames_ahead: usize) -> Limits {
     Limits {
-        pictures: NonZeroUsize::MIN,
+        draws_at_once: Some(NonZeroUsize::MIN),
         frames_ahead,
         ..Limits::default()
     }

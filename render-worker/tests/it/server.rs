@@ -352,6 +352,8 @@ async fn the_status_tells_what_is_resident_and_the_metrics_what_was_read() {
         (0, 0, false)
     );
     assert_eq!(status.adapter, "CPU twins");
+    let adapter = [("name", "CPU twins"), ("backend", "none"), ("type", "cpu")];
+    assert_eq!(worker.metric("fluxglobe_render_adapter_info", &adapter), 1);
     assert_eq!(status.version, Some(Version::own().into()));
     let reads = |outcome| {
         worker.metric(

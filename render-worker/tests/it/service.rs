@@ -1,12 +1,17 @@
 //! The service over a store in memory: manifests and frames in, PNG out.
 
+use std::num::NonZeroUsize;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use contract::context::Relief;
 use contract::grid::Grid;
 use contract::job::{Mode, RenderJob};
 use contract::quantity::Quantity;
-use render_worker::{Backend, RenderError, RenderService};
+use render_worker::{Backend, Limits, RenderError, RenderService, Renderer};
 use storage::Store;
 
+use crate::device::renderers;
 use crate::scenes::{FIVE_DEGREES, ONE_DEGREE};
 use crate::stored::{at, product, two_months, two_months_in};
 
@@ -158,6 +163,80 @@ async fn many_tasks_draw_at_the_same_time_and_agree() {
         pictures.push(task.await.unwrap());
     }
     assert!(pictures.windows(2).all(|pair| pair[0] == pair[1]));
+}
+
+/// Somebody's turn to draw, who looks at what is being encoded when it is let go.
+struct Turn {
+    service: RenderService,
+    encoding: Arc<AtomicUsize>,
+}
+
+impl Drop for Turn {
+    fn drop(&mut self) {
+        let count = self.service.encoding_count();
+        self.encoding.store(count, Ordering::SeqCst);
+    }
+}
+
+#[tokio::test]
+async fn a_turn_to_draw_is_over_when_encoding_begins_and_not_before_it_has_a_core() {
+    let store = Store::memory();
+    let job = two_months_in(&store).await;
+    let limits = Limits {
+        draws_at_once: Some(NonZeroUsize::MIN),
+        ..Limits::default()
+    };
+    let service = RenderService::with_limits(store, Backend::Cpu, limits).unwrap();
+    assert_eq!(service.draws_at_once(), NonZeroUsize::MIN);
+    let encoding = Arc::new(AtomicUsize::new(usize::MAX));
+    let turn = Turn {
+        service: service.clone(),
+        encoding: Arc::clone(&encoding),
+    };
+    let png = service.draw_in_turn(&job, turn).await.unwrap();
+    // None was encoded if it was let go after that or before a core was taken.
+    assert_eq!(encoding.load(Ordering::SeqCst), 1);
+    assert_eq!(service.encoding_count(), 0);
+    assert_eq!(png, service.draw(&job).await.unwrap());
+}
+
+#[test]
+fn as_many_pictures_are_drawn_at_once_as_suit_what_draws_unless_it_is_said() {
+    for renderer in renderers("draws at once") {
+        let adapter = renderer.adapter();
+        let suited = adapter.draws_at_once().get();
+        let cores = std::thread::available_parallelism().unwrap().get();
+        let expected = match (adapter.backend(), adapter.is_software()) {
+            ("none", true) => cores,
+            (_, true) => 2,
+            (_, false) => 4,
+        };
+        assert_eq!(suited, expected, "{adapter:?}");
+    }
+    let service = RenderService::new(Store::memory(), Backend::Cpu).unwrap();
+    assert_eq!(
+        service.draws_at_once(),
+        service.renderer().adapter().draws_at_once()
+    );
+}
+
+#[test]
+fn where_a_graphics_card_is_required_a_software_adapter_is_refused_by_name() {
+    let Some(any) = crate::device::gpu_renderer("a required card") else {
+        return;
+    };
+    match Renderer::new(Backend::HardwareGpu) {
+        Ok(renderer) => assert!(!renderer.adapter().is_software() && !any.adapter().is_software()),
+        Err(error) => {
+            assert!(any.adapter().is_software(), "{error}");
+            let text = error.to_string();
+            assert!(
+                text.contains(any.name()) && text.contains("--require-gpu"),
+                "{text}"
+            );
+            assert!(!error.is_retryable());
+        }
+    }
 }
 
 #[tokio::test]

@@ -31,11 +31,13 @@ pub(crate) async fn product(
             *cell |= value.is_finite();
         }
         steps.push(Step {
+            masked: None,
             period,
             frame,
             raw_sha256: Digest::of(b""),
             origin: "made up".into(),
             valid_cells: 1,
+            contributed: None,
         });
     }
     let domain = storage::domain::write(store, &product, &domain)
@@ -54,6 +56,7 @@ pub(crate) async fn product(
         domain,
         series: vec![],
         derived_from: None,
+        notices: vec![],
     };
     storage::manifests::commit(store, &manifest).await.unwrap();
     manifest

@@ -31,7 +31,7 @@ pub(crate) struct Worker {
 pub(crate) fn settings(draws_at_once: u8, draw_queue: u16) -> Settings {
     Settings {
         render_listen: "127.0.0.1:0".parse().unwrap(),
-        draws_at_once,
+        draws_at_once: Some(draws_at_once),
         draw_queue,
         frame_memory_mib: 64,
         device_frame_memory_mib: None,

@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 use async_trait::async_trait;
 use bytes::Bytes;
 use contract::event::{Event, MAX_EVENT_BYTES};
+use contract::time::TimeMs;
 use contract::topic::{Origin, Topic};
 use tokio::sync::Notify;
 
@@ -36,7 +37,9 @@ struct Shared {
 #[derive(Default)]
 struct State {
     journal: Option<Journal>,
-    topics: BTreeMap<Topic, Vec<Bytes>>,
+    topics: BTreeMap<Topic, Vec<Kept>>,
+    /// When the newest message came.
+    time: Option<TimeMs>,
     offsets: BTreeMap<String, u64>,
     /// Members of a group by their number; the first one reads, the others wait for it to leave.
     members: BTreeMap<String, Vec<u64>>,
@@ -44,6 +47,9 @@ struct State {
     /// Held for as long as the log is open, so that a second process is told instead of tearing lines.
     _lock: Option<File>,
 }
+
+/// A message and when it came.
+type Kept = (Option<TimeMs>, Bytes);
 
 impl EmbeddedLog {
     /// A log that is gone with the process.
@@ -86,8 +92,12 @@ impl Shared {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn write(&self, entry: Entry) -> Result<(), StorageError> {
+    fn write(&self, mut entry: Entry) -> Result<(), StorageError> {
         let mut state = self.state();
+        if !entry.messages.is_empty() {
+            // A clock that was set back must not make a later message look older.
+            entry.time = now().max(state.time);
+        }
         if let Some(journal) = &state.journal {
             journal
                 .append(&entry)
@@ -121,21 +131,22 @@ impl Shared {
 
 impl State {
     fn apply(&mut self, entry: Entry) {
+        let time = entry.time;
         for (topic, text) in entry.messages {
-            self.topics
-                .entry(topic)
-                .or_default()
-                .push(Bytes::from(text));
+            let kept = (time, Bytes::from(text));
+            self.topics.entry(topic).or_default().push(kept);
         }
+        self.time = time.max(self.time);
         self.offsets.extend(entry.offsets);
     }
 
     fn read(&self, topic: Topic, from: u64, max: usize) -> Vec<Message> {
         let all = self.topics.get(&topic).map_or(&[][..], Vec::as_slice);
         let numbered = all.iter().enumerate().skip(from as usize).take(max);
-        let message = |(offset, content): (usize, &Bytes)| Message {
+        let message = |(offset, (time, content)): (usize, &Kept)| Message {
             origin: origin(topic, offset as u64),
             content: content.clone(),
+            time: *time,
         };
         numbered.map(message).collect()
     }
@@ -271,6 +282,7 @@ impl Reader for EmbeddedReader {
         let written = self.shared.write(Entry {
             messages: lines(&ready.events)?,
             offsets,
+            ..Entry::default()
         });
         if written.is_err() {
             self.at = None;
@@ -330,6 +342,11 @@ fn check_length(topic: Topic, bytes: usize) -> Result<(), StorageError> {
         format!("message for {topic}"),
         reason,
     ))
+}
+
+/// The instant now; none on a clock that stands outside the years that instants have.
+fn now() -> Option<TimeMs> {
+    TimeMs::new(chrono::Utc::now().timestamp_millis()).ok()
 }
 
 fn origin(topic: Topic, offset: u64) -> Origin {
@@ -426,6 +443,26 @@ mod tests {
         let log = EmbeddedLog::open(folder.path()).unwrap();
         log.append(&[notice("b")]).await.unwrap();
         assert_eq!(read(&log, "g").await, [notice("a"), notice("b")]);
+    }
+
+    /// A clock that is set back makes no later message look older, also not after a restart.
+    #[tokio::test]
+    async fn messages_have_times_that_never_go_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let late = "2990-01-01T00:00:00Z";
+        let line = |time: &str| {
+            let text = notice("a").to_json().replace('"', "\\\"");
+            format!("{{\"messages\":[[\"granule.notice\",\"{text}\"]]{time}}}\n")
+        };
+        let journal = line("") + &line(&format!(",\"time\":\"{late}\""));
+        std::fs::write(folder.path().join("journal.jsonl"), journal).unwrap();
+        let log = EmbeddedLog::open(folder.path()).unwrap();
+        log.append(&[notice("b")]).await.unwrap();
+        let mut reader = log.join(TOPIC, "g").await.unwrap();
+        let messages = reader.next(9, Duration::ZERO).await.unwrap();
+        let times: Vec<_> = messages.iter().map(|message| message.time).collect();
+        let late = Some(late.parse().unwrap());
+        assert_eq!(times, [None, late, late]);
     }
 
     #[test]

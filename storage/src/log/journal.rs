@@ -5,6 +5,7 @@ use std::fs::{File, OpenOptions};
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::path::{Path, PathBuf};
 
+use contract::time::TimeMs;
 use contract::topic::Topic;
 use serde::{Deserialize, Serialize};
 
@@ -14,6 +15,9 @@ use serde::{Deserialize, Serialize};
 pub(super) struct Entry {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(super) messages: Vec<(Topic, String)>,
+    /// When the messages came; never earlier than those before, whatever the clock says.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) time: Option<TimeMs>,
     /// Offset to go on from, by `topic/group`.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub(super) offsets: BTreeMap<String, u64>,

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, VecDeque};
 
 use contract::event::Event;
-use contract::topic::Origin;
+use contract::topic::{Origin, Topic};
 
 use super::Finished;
 
@@ -69,6 +69,19 @@ impl LowWater {
         self.partitions.remove(&partition);
     }
 
+    /// Messages of a partition that were delivered and are not finished.
+    pub fn unfinished(&self, topic: Topic, partition: u32) -> Vec<Origin> {
+        let queue = self.partitions.get(&partition).into_iter().flatten();
+        let unfinished = queue.filter(|pending| pending.follows.is_none());
+        unfinished
+            .map(|pending| Origin {
+                topic,
+                partition,
+                offset: pending.offset,
+            })
+            .collect()
+    }
+
     /// Messages delivered and not yet passed.
     pub fn pending(&self) -> usize {
         self.partitions.values().map(VecDeque::len).sum()
@@ -79,7 +92,6 @@ impl LowWater {
 mod tests {
     use super::*;
     use contract::event::Body;
-    use contract::topic::Topic;
 
     fn origin(partition: u32, offset: u64) -> Origin {
         Origin {

@@ -4,8 +4,8 @@ use std::time::Instant;
 
 use backon::{BackoffBuilder as _, ExponentialBuilder};
 use bytes::Bytes;
-use contract::digest::Digest;
 use contract::key::ObjectKey;
+use contract::kind::Vouched;
 use futures::{StreamExt as _, TryStreamExt as _, stream};
 use object_store::{Error, ObjectStoreExt as _, PutMode, PutOptions, PutPayload};
 
@@ -13,7 +13,7 @@ use super::settings::Patience;
 use super::{
     MAX_OBJECT_BYTES, PART_BYTES, PARTS_AT_ONCE, Place, Store, failed, folder, hdfs, path,
 };
-use crate::StorageError;
+use crate::{StorageError, sound};
 
 /// Above this size an object that is named by its content is sent to a cloud in parts.
 const WHOLE_BYTES: usize = 64 << 20;
@@ -25,8 +25,11 @@ impl Store {
     /// object was written; so on any doubt the object is read back and compared, and if it is not there the request is
     /// sent again for as long as the store's patience lasts. A doubt that ends well is told as false.
     ///
-    /// Objects above 64 MiB go to a cloud in parts if their key names the digest of their bytes: the end of such an
-    /// upload replaces what is there, which are equal bytes then. Any other object is one conditional request.
+    /// Where the key names the digest of the content, other bytes that are there are either the same values in another
+    /// encoding, which are as good and stay, or damaged, and then they are replaced: the name vouches for ours.
+    ///
+    /// Objects above 64 MiB go to a cloud in parts if their key names the digest of their content: the end of such an
+    /// upload replaces what is there, which is equal then. Any other object is one conditional request.
     ///
     /// # Errors
     /// `Conflict` if other content is there. A retryable error after at most twice the patience.
@@ -58,7 +61,7 @@ impl Store {
             }
             match self.holds(key, &content).await? {
                 Some(true) => return Ok(false),
-                Some(false) => return Err(StorageError::Conflict { key: key.clone() }),
+                Some(false) => return self.put_beside(key, content).await,
                 None if begun.elapsed() > self.patience.retries => {
                     return Err(failed(key, error));
                 }
@@ -70,10 +73,44 @@ impl Store {
         }
     }
 
+    /// What becomes of an object where other bytes are.
+    async fn put_beside(&self, key: &ObjectKey, content: Bytes) -> Result<bool, StorageError> {
+        if key.vouches() == Vouched::Nothing {
+            return Err(StorageError::Conflict { key: key.clone() });
+        }
+        let theirs = self.fetch(key).await?;
+        let of = |key: &ObjectKey, content: &Bytes| {
+            let (key, content) = (key.clone(), content.clone());
+            sound::off_thread(move || sound::of_object(&key, &content))
+        };
+        match of(key, &theirs).await {
+            Ok(_sound) => Ok(false),
+            Err(error) => {
+                of(key, &content).await?;
+                tracing::warn!(%key, %error, "a damaged object is replaced by the whole one");
+                self.put_over(key, content).await.map(|()| true)
+            }
+        }
+    }
+
+    /// Stores an object in the place of what is there: for one that was found damaged and can be made again, or that an
+    /// older program wrote. Nothing else ever changes.
+    pub async fn put_over(&self, key: &ObjectKey, content: Bytes) -> Result<(), StorageError> {
+        let sent = match &self.place {
+            Place::Folder(root) => folder::replace(root.clone(), key.clone(), content).await,
+            Place::Cloud | Place::Hdfs | Place::Memory => {
+                let payload = PutPayload::from_bytes(content);
+                let sent = self.objects.put(&path(key), payload).await;
+                sent.map(|_put| ())
+            }
+        };
+        sent.map_err(|e| failed(key, e))
+    }
+
     async fn create(&self, key: &ObjectKey, content: &Bytes) -> Result<(), Error> {
         match &self.place {
             Place::Folder(root) => folder::create(root.clone(), key.clone(), content.clone()).await,
-            Place::Cloud if content.len() > WHOLE_BYTES && is_named_by_content(key, content) => {
+            Place::Cloud if content.len() > WHOLE_BYTES && key.vouches() != Vouched::Nothing => {
                 self.send_parts(key, content).await
             }
             Place::Cloud | Place::Hdfs | Place::Memory => {
@@ -170,12 +207,6 @@ impl Store {
 
 fn last_part(key: &ObjectKey) -> &str {
     key.as_str().rsplit('/').next().unwrap_or_default()
-}
-
-/// Does the last part of the key begin with the digest of these bytes?
-fn is_named_by_content(key: &ObjectKey, content: &[u8]) -> bool {
-    let stem = last_part(key).split('.').next().unwrap_or_default();
-    stem == Digest::of(content).to_string()
 }
 
 #[cfg(test)]

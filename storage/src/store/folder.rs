@@ -22,9 +22,30 @@ pub(super) async fn create(
     key: ObjectKey,
     content: Bytes,
 ) -> Result<(), object_store::Error> {
+    put(root, key, content, |from, to| fs::hard_link(from, to)).await
+}
+
+/// Puts an object in the place of what is there, whole or not at all.
+pub(super) async fn replace(
+    root: PathBuf,
+    key: ObjectKey,
+    content: Bytes,
+) -> Result<(), object_store::Error> {
+    put(root, key, content, |from, to| fs::rename(from, to)).await
+}
+
+/// How a file that is written gets its name.
+type Naming = fn(&Path, &Path) -> io::Result<()>;
+
+async fn put(
+    root: PathBuf,
+    key: ObjectKey,
+    content: Bytes,
+    name: Naming,
+) -> Result<(), object_store::Error> {
     let path = root.join(key.as_str());
     let written = tokio::task::spawn_blocking(move || {
-        let written = write(&path, &content);
+        let written = write(&path, &content, name);
         if matches!(&written, Ok(()))
             || matches!(&written, Err(e) if e.kind() == ErrorKind::AlreadyExists)
         {
@@ -40,16 +61,18 @@ pub(super) async fn create(
     }
 }
 
-fn write(path: &Path, content: &[u8]) -> io::Result<()> {
+fn write(path: &Path, content: &[u8], name: Naming) -> io::Result<()> {
     let (mut file, staging) = stage(path)?;
     let written = file
         .write_all(content)
         .and_then(|()| file.sync_all())
-        .and_then(|()| fs::hard_link(&staging, path));
+        .and_then(|()| name(&staging, path));
     let removed = fs::remove_file(&staging);
     written?;
     // The object stands; a second name that stays behind is listed by nobody.
-    if let Err(error) = removed {
+    if let Err(error) = removed
+        && error.kind() != ErrorKind::NotFound
+    {
         tracing::warn!(%error, file = %staging.display(), "a temporary file stays behind");
     }
     Ok(())
@@ -140,6 +163,10 @@ mod tests {
             again,
             Err(object_store::Error::AlreadyExists { .. })
         ));
+        let root = folder.path().to_owned();
+        let over = ("a/b".parse().unwrap(), Bytes::from("over"));
+        replace(root, over.0, over.1).await.unwrap();
+        assert_eq!(fs::read(folder.path().join("a/b")).unwrap(), b"over");
         let left = fs::read_dir(folder.path().join("a")).unwrap().count();
         assert_eq!(left, 4, "the object and the three files that were there");
     }

@@ -8,13 +8,31 @@ use object_store::{Error, GetResultPayload, ObjectStoreExt as _};
 
 use super::{MAX_OBJECT_BYTES, PART_BYTES, PARTS_AT_ONCE, Place, Store, failed, hdfs, path};
 use crate::StorageError;
+use crate::sound::{self, Soundness};
 
 impl Store {
-    /// The whole content of an object. Large ones come in parts, several at a time.
+    /// The whole content of an object, compared with its name or its seal. Large ones come in parts, several at a time.
     ///
     /// # Errors
-    /// `is_not_found` if there is no such object.
+    /// `is_not_found` if there is no such object; `Damaged` if its bytes are not those that were stored.
     pub async fn get(&self, key: &ObjectKey) -> Result<Bytes, StorageError> {
+        self.get_with_soundness(key)
+            .await
+            .map(|(content, _)| content)
+    }
+
+    /// The same, and whether there was anything to compare it with.
+    pub async fn get_with_soundness(
+        &self,
+        key: &ObjectKey,
+    ) -> Result<(Bytes, Soundness), StorageError> {
+        let content = self.fetch(key).await?;
+        let soundness = sound::of_large(key, &content).await?;
+        Ok((content, soundness))
+    }
+
+    /// The bytes under a key, whatever they are.
+    pub(crate) async fn fetch(&self, key: &ObjectKey) -> Result<Bytes, StorageError> {
         let path = path(key);
         let found = self.objects.get(&path).await.map_err(|e| failed(key, e))?;
         let size_bytes = found.meta.size;
@@ -45,7 +63,7 @@ impl Store {
         Ok(content.freeze())
     }
 
-    /// A part of an object, `range_bytes` from its beginning.
+    /// A part of an object, `range_bytes` from its beginning. It is not checked: whoever reads parts has a check of them.
     ///
     /// # Errors
     /// `Damaged` if the object is shorter.

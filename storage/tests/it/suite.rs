@@ -97,6 +97,7 @@ fn manifest(product: &ProductId, number: u64, title: &str) -> Manifest {
         domain: ObjectKey::domain(product, &Digest::of(b"")),
         series: vec![],
         derived_from: None,
+        notices: vec![],
     }
 }
 
@@ -248,7 +249,7 @@ pub(crate) async fn grids_and_manifests_round_trip(store: &Store) {
     let run_bytes = store.get(&run).await.unwrap();
     assert_eq!(
         run_bytes,
-        series::encode(&GRID, &[&values, &values]).unwrap()
+        series::encode(&GRID, &[&values, &values]).unwrap().content
     );
     let areas = vec![(3, vec![0.1, 0.0, 1e12]), (7, vec![2.0 / 3.0])];
     let weights_key = ObjectKey::weights(&Digest::of(b"job"));

@@ -47,21 +47,29 @@ impl LiveService {
 
     /// Follows until asked to stop. A log that goes away is waited for; of what was appended meanwhile viewers are told,
     /// but no tiles are ordered.
-    pub async fn run(mut self, stop: Stop) {
+    ///
+    /// # Errors
+    /// The log is not set up as it must be.
+    pub async fn run(mut self, stop: Stop) -> Result<(), StorageError> {
         let mut pauses = service::pauses();
         while !stop.is_said() {
             let ended = tokio::select! {
-                () = stop.said() => return,
+                () = stop.said() => break,
                 ended = self.follow() => ended,
             };
-            if let Err(error) = ended {
-                tracing::warn!(%error, "the event log cannot be followed; trying again");
+            match ended {
+                Ok(()) => {}
+                Err(error) if error.is_retryable() => {
+                    tracing::warn!(%error, "the event log cannot be followed; trying again");
+                }
+                Err(error) => return Err(error),
             }
             tokio::select! {
-                () = stop.said() => return,
+                () = stop.said() => break,
                 () = tokio::time::sleep(pauses.next().unwrap_or(WAIT)) => {}
             }
         }
+        Ok(())
     }
 
     async fn follow(&mut self) -> Result<(), StorageError> {

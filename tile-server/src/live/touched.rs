@@ -1,6 +1,6 @@
 //! Two versions of a product in; the times whose pictures differ out.
 
-use contract::manifest::Manifest;
+use contract::manifest::{Manifest, Step};
 use contract::time::Period;
 
 /// Times whose pictures the newer version draws from other values, in order and without overlap.
@@ -17,16 +17,12 @@ pub fn touched(before: Option<&Manifest>, now: &Manifest) -> Vec<Period> {
         return vec![extent];
     };
     let is_same = |i: usize| {
-        before
-            .steps
-            .iter()
-            .any(|old| old.period == now.steps[i].period && old.frame == now.steps[i].frame)
+        let new = &now.steps[i];
+        let old = before.step_of(new.period).map(|old| &before.steps[old]);
+        old.is_some_and(|old| old.frame == new.frame)
     };
-    let is_gone = before
-        .steps
-        .iter()
-        .any(|old| now.steps.iter().all(|new| new.period != old.period));
-    if is_gone {
+    let is_gone = |old: &Step| now.step_of(old.period).is_none();
+    if before.steps.iter().any(is_gone) {
         return vec![extent];
     }
     let mut all: Vec<Period> = vec![];
@@ -49,7 +45,7 @@ mod tests {
     use contract::digest::Digest;
     use contract::grid::Grid;
     use contract::key::ObjectKey;
-    use contract::manifest::{MANIFEST_SCHEMA, Step};
+    use contract::manifest::MANIFEST_SCHEMA;
     use contract::product::ProductId;
     use contract::quantity::Quantity;
 
@@ -68,11 +64,13 @@ mod tests {
     /// A version with a frame a month, named by its content.
     fn manifest(contents: &[&str], domain: &str) -> Manifest {
         let step = |(i, content): (usize, &&str)| Step {
+            masked: None,
             period: month(i + 1),
             frame: ObjectKey::frame(&product(), &Digest::of(content.as_bytes())),
             raw_sha256: Digest::of(b""),
             origin: String::new(),
             valid_cells: 1,
+            contributed: None,
         };
         Manifest {
             schema: MANIFEST_SCHEMA,
@@ -94,6 +92,7 @@ mod tests {
             domain: ObjectKey::domain(&product(), &Digest::of(domain.as_bytes())),
             series: vec![],
             derived_from: None,
+            notices: vec![],
         }
     }
 

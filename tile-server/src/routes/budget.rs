@@ -58,6 +58,10 @@ struct Row {
     ocean_with_data_m2: f64,
     gap: Option<f64>,
     gap_area_m2: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    complete_m2: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    incomplete_m2: Option<f64>,
 }
 
 impl From<&BudgetRow> for Row {
@@ -70,6 +74,7 @@ impl From<&BudgetRow> for Row {
             ocean_with_data_m2,
             gap_tg,
             gap_area_m2,
+            complete_and_incomplete_m2,
             ..
         } = *row;
         Self {
@@ -81,6 +86,8 @@ impl From<&BudgetRow> for Row {
             ocean_with_data_m2,
             gap: gap_tg,
             gap_area_m2,
+            complete_m2: complete_and_incomplete_m2.map(|[complete, _]| complete),
+            incomplete_m2: complete_and_incomplete_m2.map(|[_, incomplete]| incomplete),
         }
     }
 }
@@ -93,7 +100,10 @@ pub(crate) async fn get(
     let named = query.manifest.as_deref();
     let layer = state.catalogue.version(&product, named).await?;
     let manifest = &layer.manifest;
-    if manifest.quantity != Quantity::CarbonFlux {
+    if !matches!(
+        manifest.quantity,
+        Quantity::CarbonFlux | Quantity::AccumulatedCarbon
+    ) {
         let quantity = manifest.quantity.title();
         return Err(ServerError::NotAFlux {
             product: manifest.product.to_string(),

@@ -1,4 +1,4 @@
-//! `/api/check`: our budgets beside published ones, `null` where there is nothing to compare with.
+//! `/api/check`: our budgets beside a paper's and an independent integration's, `null` where there is nothing to compare with.
 
 use axum::Json;
 use axum::extract::State;

@@ -46,6 +46,7 @@ pub(crate) async fn ready(State(state): State<AppState>) -> Response {
     );
     let mut checks = vec![store, renderer, viewer_files(&state).await];
     checks.extend(log);
+    checks.extend(ending(&state));
     checks.extend(observations);
     let ready = checks.iter().all(|part| part.ok || !part.required);
     let status = if ready {
@@ -59,6 +60,16 @@ pub(crate) async fn ready(State(state): State<AppState>) -> Response {
         Json(Readiness { ready, checks }),
     )
         .into_response()
+}
+
+/// A server that was asked to end, or lost a part, is no place to send anybody.
+fn ending(state: &AppState) -> Option<Part> {
+    state.news.is_closed().then(|| Part {
+        name: "server",
+        ok: false,
+        required: true,
+        detail: "it ends; the log says why".to_owned(),
+    })
 }
 
 async fn store(state: &AppState) -> Part {
@@ -86,6 +97,8 @@ async fn store(state: &AppState) -> Part {
     }
 }
 
+/// Without it what is stored is still served, and so are budgets and the viewer; a picture that is not says 503 and when
+/// to come back. It is not required, or the loss of the last render worker would take every server away.
 async fn renderer(state: &AppState) -> Part {
     let (ok, detail) = match timeout(PART_LIMIT, state.drawer.ready()).await {
         Ok(Ok(())) => (true, "it draws".to_owned()),
@@ -98,7 +111,7 @@ async fn renderer(state: &AppState) -> Part {
     Part {
         name: "renderer",
         ok,
-        required: true,
+        required: false,
         detail,
     }
 }

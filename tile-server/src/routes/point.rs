@@ -9,7 +9,7 @@ use contract::manifest::ManifestId;
 use contract::product::ProductId;
 use serde::{Deserialize, Serialize};
 
-use crate::backend::RowCol;
+use crate::backend::{Contributed, RowCol};
 use crate::error::ServerError;
 use crate::extract::{UrlPath, UrlQuery, number};
 use crate::routes::products::{StepTimes, bounds_deg, rounded};
@@ -47,6 +47,8 @@ struct PointValue {
     #[serde(flatten)]
     times: StepTimes,
     value: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    contributed: Option<Contributed>,
 }
 
 pub(crate) async fn get(
@@ -81,9 +83,10 @@ pub(crate) async fn get(
         .steps
         .iter()
         .zip(values)
-        .map(|(step, value)| PointValue {
+        .map(|(step, own)| PointValue {
             times: step.period.into(),
-            value: value.map(shown).filter(|value| value.is_finite()),
+            value: own.value.map(shown).filter(|value| value.is_finite()),
+            contributed: own.contributed,
         });
     let center = manifest.grid.cell_center(row, col);
     let answer = PointSeries {

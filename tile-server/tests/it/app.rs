@@ -185,6 +185,7 @@ impl TestApp {
         for (month, values) in (1..).zip(&values) {
             let period = Period::month(2000, month).unwrap();
             steps.push(Step {
+                masked: None,
                 period,
                 frame: frames::write(&self.store, &product, &GRID, values, period)
                     .await
@@ -192,6 +193,7 @@ impl TestApp {
                 raw_sha256: Digest::of(format!("{product}{number}{month}").as_bytes()),
                 origin: format!("month-{month}.nc"),
                 valid_cells: values.iter().filter(|value| !value.is_nan()).count() as u64,
+                contributed: None,
             });
         }
         let slices: Vec<&[f32]> = values.iter().map(Vec::as_slice).collect();
@@ -214,6 +216,7 @@ impl TestApp {
                     .unwrap(),
             }],
             derived_from,
+            notices: vec![],
             product,
         };
         manifests::commit(&self.store, &manifest).await.unwrap();

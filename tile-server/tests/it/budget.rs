@@ -113,17 +113,29 @@ async fn periods_without_data_or_the_wrong_way_round_are_refused() {
 }
 
 #[tokio::test]
-async fn only_a_flux_has_a_budget() {
+async fn only_carbon_has_a_budget() {
     let app = TestApp::new().await;
-    for product in ["sst", "flux-accumulated"] {
-        let answer = app.get(&format!("/api/products/{product}/budget")).await;
-        assert_eq!(answer.status, StatusCode::BAD_REQUEST);
-        assert!(
-            answer.reason().contains("only a carbon flux has a budget"),
-            "{}",
-            answer.reason()
-        );
-    }
+    let answer = app.get("/api/products/sst/budget").await;
+    assert_eq!(answer.status, StatusCode::BAD_REQUEST);
+    assert!(
+        answer.reason().contains("only a carbon flux has a budget"),
+        "{}",
+        answer.reason()
+    );
+}
+
+#[tokio::test]
+async fn a_budget_of_accumulated_carbon_says_how_complete_it_is() {
+    let app = TestApp::new().await;
+    let body = app
+        .get("/api/products/flux-accumulated/budget")
+        .await
+        .json();
+    let row = &body["rows"][0];
+    assert_eq!(row["complete_m2"], json!(3e14));
+    assert_eq!(row["incomplete_m2"], json!(3e13));
+    let body = app.get("/api/products/flux/budget").await.json();
+    assert!(body["rows"][0].get("complete_m2").is_none(), "{body}");
 }
 
 #[tokio::test]

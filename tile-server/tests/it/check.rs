@@ -2,7 +2,7 @@
 
 use axum::http::StatusCode;
 use serde_json::json;
-use tile_server::backend::{Check, CheckRow};
+use tile_server::backend::{Check, CheckRow, Paper};
 
 use crate::app::TestApp;
 
@@ -17,19 +17,35 @@ async fn without_published_values_there_is_nothing_to_show() {
 #[tokio::test]
 async fn a_comparison_is_shown_as_it_was_made() {
     let app = TestApp::new().await;
-    let row = CheckRow {
-        what: "Global".to_owned(),
+    let row = |what: &str, paper: Option<Paper>| CheckRow {
+        what: what.to_owned(),
         period: "year".to_owned(),
-        published: -1.4,
-        ours: -1.404,
         unit: "Pg C".to_owned(),
-        difference_percent: None,
+        paper,
+        independent: -1.404_272,
+        ours: -1.404_271,
+        difference: 1e-6,
+        agrees: true,
+    };
+    let paper = Paper {
+        value: -0.7,
+        uncertainty: None,
+        decimals: 2,
+        difference: -0.7043,
+        verdict: "no uncertainty stated".to_owned(),
     };
     *app.analyst.check.lock().unwrap() = Some(Check {
-        rows: vec![row],
+        rows: vec![row("Band", Some(paper)), row("Month", None)],
         note: "A note.".to_owned(),
+        method: "A script.".to_owned(),
     });
-    let expected = json!({"note": "A note.", "rows": [{"what": "Global", "period": "year", "published": -1.4,
-        "ours": -1.404, "unit": "Pg C", "difference_percent": null}]});
+    let paper = json!({"value": -0.7, "uncertainty": null, "decimals": 2, "difference": -0.7043,
+        "verdict": "no uncertainty stated"});
+    let row = |what: &str, paper: &serde_json::Value| {
+        json!({"what": what, "period": "year", "unit": "Pg C", "paper": paper, "independent": -1.404_272,
+            "ours": -1.404_271, "difference": 1e-6, "agrees": true})
+    };
+    let expected = json!({"note": "A note.", "method": "A script.",
+        "rows": [row("Band", &paper), row("Month", &json!(null))]});
     assert_eq!(app.get("/api/check").await.json(), expected);
 }

@@ -1,5 +1,6 @@
 //! Doubles for the ports: they record what they are asked, and answer what a test tells them to.
 
+use std::num::NonZeroU32;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
@@ -9,13 +10,14 @@ use contract::event::Event;
 use contract::job::RenderJob;
 use contract::manifest::Manifest;
 use contract::observation::Observation;
+use contract::quantity::Quantity;
 use contract::topic::{Origin, Topic};
 use storage::StorageError;
 use storage::log::{EmbeddedLog, EventLog, Follower, Message, Reader, Start};
 use tile_server::backend::{
     Analyse, AreaRequest, AreaRow, AreaSeries, BackendError, BudgetAnswer, BudgetRequest,
-    BudgetRow, Check, Class, Draw, ObservationPage, ObservationQuestion, Observe, Platform, RowCol,
-    TrackPoint, TrackQuestion,
+    BudgetRow, Check, Class, Contributed, Draw, ObservationPage, ObservationQuestion, Observe,
+    Platform, PointStep, RowCol, TrackPoint, TrackQuestion, Turn,
 };
 use tokio::sync::Semaphore;
 
@@ -50,6 +52,9 @@ pub(crate) struct Drawer {
     /// While true, pictures wait for a permit of `turns` each.
     pub(crate) is_slow: AtomicBool,
     pub(crate) turns: Semaphore,
+    /// While true, pictures that are drawn are slow to be encoded: they wait for a permit of `turns` after they let go
+    /// of their turn.
+    pub(crate) encodes_slowly: AtomicBool,
 }
 
 impl Default for Drawer {
@@ -60,6 +65,7 @@ impl Default for Drawer {
             mood,
             is_slow: AtomicBool::new(false),
             turns: Semaphore::new(0),
+            encodes_slowly: AtomicBool::new(false),
         }
     }
 }
@@ -90,9 +96,13 @@ impl Drawer {
 
 #[async_trait]
 impl Draw for Drawer {
-    async fn draw(&self, job: &RenderJob) -> Result<Bytes, BackendError> {
+    async fn draw(&self, job: &RenderJob, turn: Turn) -> Result<Bytes, BackendError> {
         self.jobs.lock().unwrap().push(job.clone());
         if self.is_slow.load(Ordering::SeqCst) {
+            self.turns.acquire().await.unwrap().forget();
+        }
+        drop(turn);
+        if self.encodes_slowly.load(Ordering::SeqCst) {
             self.turns.acquire().await.unwrap().forget();
         }
         let mood = self.mood.lock().unwrap().clone();
@@ -102,6 +112,10 @@ impl Draw for Drawer {
         } else {
             Self::picture_of(job)
         })
+    }
+
+    fn draws_at_once(&self) -> NonZeroU32 {
+        NonZeroU32::new(2).unwrap()
     }
 
     async fn ready(&self) -> Result<(), BackendError> {
@@ -134,13 +148,21 @@ impl Analyse for Analyst {
         &self,
         manifest: &Manifest,
         cell: RowCol,
-    ) -> Result<Vec<Option<f64>>, BackendError> {
+    ) -> Result<Vec<PointStep>, BackendError> {
         self.mood().apply()?;
         if matches!(self.mood(), Mood::AnswersNonsense) {
             return Ok(vec![]);
         }
-        let value = |step| (cell.col != 0).then_some(f64::from(cell.row) + f64::from(step) / 100.0);
-        Ok((0..manifest.steps.len() as u32).map(value).collect())
+        let is_sum = manifest.quantity == Quantity::AccumulatedCarbon;
+        let point = |step| PointStep {
+            value: (cell.col != 0).then_some(f64::from(cell.row) + f64::from(step) / 100.0),
+            contributed: is_sum.then_some(Contributed {
+                steps: 1,
+                of_steps: step + 1,
+                time_percent: 100.0 / f64::from(step + 1),
+            }),
+        };
+        Ok((0..manifest.steps.len() as u32).map(point).collect())
     }
 
     async fn budget(&self, request: &BudgetRequest) -> Result<BudgetAnswer, BackendError> {
@@ -159,6 +181,9 @@ impl Analyse for Analyst {
                 ocean_with_data_m2: 3.3e14,
                 gap_tg: Some(-12.5),
                 gap_area_m2: 2.0e13,
+                complete_and_incomplete_m2: (request.manifest.quantity
+                    == Quantity::AccumulatedCarbon)
+                    .then_some([3e14, 3e13]),
             }],
         })
     }

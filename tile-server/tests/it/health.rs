@@ -37,15 +37,34 @@ async fn a_server_with_all_its_parts_is_ready() {
 }
 
 #[tokio::test]
-async fn a_server_without_its_renderer_lives_but_is_not_ready() {
+async fn a_server_without_its_renderer_is_ready_and_serves_what_is_stored() {
     let app = TestApp::new().await;
+    let (drawn, cold) = ("/tiles/flux/map/1/0/0.png", "/tiles/flux/map/1/1/0.png");
+    assert_eq!(app.get(drawn).await.status, StatusCode::OK);
     app.drawer
-        .set(Mood::fails(Class::Unavailable, "no graphics adapter"));
+        .set(Mood::fails(Class::Unavailable, "no render worker is up"));
     let answer = app.get("/readyz").await;
-    assert_eq!(answer.status, StatusCode::SERVICE_UNAVAILABLE);
+    assert_eq!(answer.status, StatusCode::OK);
     let body = answer.json();
-    assert_eq!(body["ready"], false);
-    assert_eq!(part(&body, "renderer")["detail"], "no graphics adapter");
+    assert_eq!(body["ready"], true);
+    let renderer = part(&body, "renderer");
+    assert_eq!(renderer["detail"], "no render worker is up");
+    assert_eq!(
+        (&renderer["ok"], &renderer["required"]),
+        (&Value::Bool(false), &Value::Bool(false))
+    );
+    // Another server over the same store has nothing in memory.
+    let other = TestApp::over(app.store.clone(), |_settings| {});
+    other
+        .drawer
+        .set(Mood::fails(Class::Unavailable, "no render worker is up"));
+    for path in [drawn, "/api/products/flux/budget", "/api/products"] {
+        assert_eq!(other.get(path).await.status, StatusCode::OK, "{path}");
+    }
+    let answer = other.get(cold).await;
+    assert_eq!(answer.status, StatusCode::SERVICE_UNAVAILABLE);
+    assert_eq!(answer.header("retry-after"), "5");
+    assert_eq!(answer.reason(), "no render worker is up");
     let live = app.get("/healthz").await;
     assert_eq!(
         (live.status, live.text().as_str()),

@@ -1,5 +1,6 @@
 //! What happens when there is too much to do, when something takes too long, and when something breaks.
 
+use std::num::NonZeroU32;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
@@ -8,15 +9,17 @@ use axum::http::{Request, StatusCode};
 use futures::FutureExt as _;
 use tile_server::backend::{BackendError, Class};
 
-use crate::app::TestApp;
+use crate::app::{Answer, TestApp};
 use crate::doubles::Mood;
 
 const TILE: &str = "/tiles/flux/volume/1/0/0.png";
 
 #[tokio::test]
 async fn when_the_queue_is_full_clients_are_sent_away_with_a_time_to_come_back() {
-    let app =
-        TestApp::with(|settings| (settings.draws_at_once, settings.draw_queue) = (1, 1)).await;
+    let app = TestApp::with(|settings| {
+        (settings.draws_at_once, settings.draw_queue) = (Some(NonZeroU32::MIN), 1);
+    })
+    .await;
     app.drawer.is_slow.store(true, Ordering::SeqCst);
     let mut drawn = Box::pin(app.get("/tiles/flux/map/2/0/0.png"));
     let mut waits = Box::pin(app.get("/tiles/flux/map/2/1/0.png"));
@@ -45,6 +48,67 @@ async fn when_the_queue_is_full_clients_are_sent_away_with_a_time_to_come_back()
         app.get("/tiles/flux/map/2/2/0.png").await.status,
         StatusCode::OK
     );
+}
+
+/// Requests for as many tiles, begun; they end when they are waited for.
+async fn begun(app: &TestApp, tiles: u64) -> Vec<impl Future<Output = Answer> + Unpin> {
+    let address = |x| format!("/tiles/flux/map/3/{x}/0.png");
+    let mut all = vec![];
+    for x in 0..tiles {
+        let mut one = Box::pin(async move { app.get(&address(x)).await });
+        while app.metric("fluxglobe_tile_server_cache_misses_total").await <= x {
+            assert!(one.as_mut().now_or_never().is_none());
+            tokio::task::yield_now().await;
+        }
+        all.push(one);
+    }
+    all
+}
+
+#[tokio::test]
+async fn a_picture_that_is_encoded_holds_up_no_other_and_counts_until_it_is_stored() {
+    let app = TestApp::with(|settings| {
+        (settings.draws_at_once, settings.draw_queue) = (Some(NonZeroU32::MIN), 2);
+    })
+    .await;
+    app.drawer.encodes_slowly.store(true, Ordering::SeqCst);
+    let all = begun(&app, 3).await;
+    // One may be drawn at once, and none is done: the first two are drawn though.
+    let drawn = async {
+        while app.drawer.drawn_count() < 3 {
+            tokio::task::yield_now().await;
+        }
+    };
+    let limit = Duration::from_mins(1);
+    assert!(tokio::time::timeout(limit, drawn).await.is_ok());
+    let sent_away = app.get(TILE).await;
+    assert_eq!(sent_away.status, StatusCode::SERVICE_UNAVAILABLE);
+    app.drawer.turns.add_permits(3);
+    for one in all {
+        assert_eq!(one.await.status, StatusCode::OK);
+    }
+}
+
+#[tokio::test]
+async fn as_many_are_drawn_at_once_as_were_asked_for_or_as_suit_the_drawer() {
+    for (asked, at_once) in [(None, 2), (NonZeroU32::new(3), 3)] {
+        let app = TestApp::with(|settings| settings.draws_at_once = asked).await;
+        app.drawer.is_slow.store(true, Ordering::SeqCst);
+        let all = begun(&app, 4).await;
+        while app.drawer.drawn_count() < at_once {
+            tokio::task::yield_now().await;
+        }
+        // Whoever could begin has had the time to.
+        for _ in 0..100 {
+            tokio::task::yield_now().await;
+        }
+        assert_eq!(app.drawer.drawn_count(), at_once);
+        app.drawer.turns.add_permits(4);
+        for one in all {
+            assert_eq!(one.await.status, StatusCode::OK);
+        }
+        assert_eq!(app.drawer.drawn_count(), 4);
+    }
 }
 
 #[tokio::test]

@@ -12,6 +12,7 @@ use contract::quantity::Quantity;
 use contract::time::TimeMs;
 use contract::topic::Topic;
 use service::Stop;
+use storage::StorageError;
 use storage::log::{EventLog as _, contents};
 use tokio::task::JoinHandle;
 
@@ -28,7 +29,7 @@ struct Live {
     app: TestApp,
     log: Arc<Log>,
     stop: Stop,
-    running: JoinHandle<()>,
+    running: JoinHandle<Result<(), StorageError>>,
 }
 
 impl Live {
@@ -71,13 +72,14 @@ impl Live {
     }
 
     async fn landed(&self, manifest: &ManifestId) {
-        self.say(Body::GranuleLanded {
-            path: "a.nc".to_owned(),
-            raw_sha256: Digest::of(b"a"),
-            manifest: manifest.clone(),
-            periods: vec![],
-            revised: true,
-        })
+        let (path, sha256) = ("a.nc".to_owned(), Digest::of(b"a"));
+        self.say(Body::granule_landed(
+            path,
+            sha256,
+            manifest.clone(),
+            &[],
+            true,
+        ))
         .await;
     }
 
@@ -124,7 +126,7 @@ async fn a_landed_version_is_shown_at_once_and_viewers_are_told() {
     let shown = live.app.get(address).await.json()["manifest"].clone();
     assert_eq!(shown, new.to_string());
     live.stop.now();
-    live.running.await.unwrap();
+    live.running.await.unwrap().unwrap();
 }
 
 #[tokio::test]
@@ -352,5 +354,5 @@ async fn a_new_northward_part_is_news_of_the_flow_whose_hot_tiles_are_ordered() 
     live.until(async || live.orders().await.iter().any(is_wanted))
         .await;
     live.stop.now();
-    live.running.await.unwrap();
+    live.running.await.unwrap().unwrap();
 }

@@ -33,6 +33,19 @@ async fn a_series_is_that_of_the_cell_in_the_unit_people_read() {
 }
 
 #[tokio::test]
+async fn sums_say_how_many_steps_and_how_much_time_they_hold() {
+    let app = TestApp::new().await;
+    let path = |product: &str| format!("/api/products/{product}/point?lon=12.3&lat=-3.2");
+    let body = app.get(&path("flux-accumulated")).await.json();
+    assert_eq!(
+        body["series"][1]["contributed"],
+        json!({"steps": 1, "of_steps": 2, "time_percent": 50.0})
+    );
+    let body = app.get(&path("sst")).await.json();
+    assert!(body["series"][1].get("contributed").is_none(), "{body}");
+}
+
+#[tokio::test]
 async fn a_cell_without_data_has_nulls() {
     let app = TestApp::new().await;
     let body = app

@@ -64,7 +64,7 @@ async fn it_answers_until_it_is_told_to_stop() {
     stop.send(()).unwrap();
     running.await.unwrap().unwrap();
     assert!(
-        told_at.elapsed() < Duration::from_secs(3),
+        told_at.elapsed() < Duration::from_secs(30),
         "{:?}",
         told_at.elapsed()
     );

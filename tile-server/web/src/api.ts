@@ -99,15 +99,28 @@ export interface Region {
 export interface CheckRow {
   what: string;
   period: string;
-  published: number;
-  ours: number;
   unit: string;
-  difference_percent: number | null;
+  /** None where the paper prints no such number. */
+  paper: CheckPaper | null;
+  /** Of the same grid, by another program. */
+  independent: number;
+  ours: number;
+  difference: number;
+  agrees: boolean;
+}
+
+export interface CheckPaper {
+  value: number;
+  uncertainty: number | null;
+  decimals: number;
+  difference: number;
+  verdict: "within" | "outside" | "no uncertainty stated";
 }
 
 export interface Check {
   rows: CheckRow[];
   note: string;
+  method: string;
 }
 
 export interface LayerInfo {

@@ -46,7 +46,8 @@ async fn plan(config: SessionConfig, region: &str) -> Arc<dyn ExecutionPlan> {
     let state = state::session_state(config, runtime, &objects).unwrap();
     let context = SessionContext::new_with_state(state);
     let keys: Vec<&ObjectKey> = keys.iter().collect();
-    scan::register(&context, "frames", &store, &keys, &frames::SCHEMA).unwrap();
+    let registered = scan::register(&context, "frames", &store, &keys, Layout::Frames);
+    registered.await.unwrap();
     let query = context.sql(&sql(Measure::Mass, &region)).await;
     query.unwrap().create_physical_plan().await.unwrap()
 }

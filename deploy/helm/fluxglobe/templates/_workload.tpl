@@ -92,6 +92,10 @@ spec:
             {{- range .ports }}{{ if eq .name "admin" }}
             - {name: FLUXGLOBE_ADMIN, value: "0.0.0.0:{{ .port }}"}
             {{- end }}{{ end }}
+            {{- if $gpu.enabled }}
+            # Without its GPU a pod says so and starts again: drawing in software on a GPU's node helps nobody.
+            - {name: FLUXGLOBE_REQUIRE_GPU, value: "true"}
+            {{- end }}
             {{- range .needs }}
             {{- include (printf "fluxglobe.environment.%s" .) $.root | nindent 12 }}
             {{- end }}

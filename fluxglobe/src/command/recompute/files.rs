@@ -39,6 +39,7 @@ impl Files {
             to: options.to,
             profile,
             is_forced: options.force,
+            is_verified: options.verify,
         };
         let plan = reread::plan(store, &settings.profiles, &request).await?;
         let workplace = Workplace {
@@ -65,6 +66,14 @@ impl Files {
                 Some(manifest) => progress::result(&manifest.id().to_string())?,
                 None => progress::say("every value is as it was: no new version"),
             }
+        }
+        if self.request.is_verified
+            && let Some(mended) = reread::mend(store, &self.request.product).await?
+        {
+            progress::say(&format!(
+                "{}: series and domain are whole again",
+                mended.id()
+            ));
         }
         // Also after a run that was killed before it could tell.
         if let Some(log) = log {

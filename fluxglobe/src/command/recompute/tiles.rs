@@ -10,7 +10,7 @@ use contract::key::ObjectKey;
 use contract::tile::Tile;
 use contract::topic::Topic;
 use storage::log::{EventLog, Start};
-use storage::{Store, manifests};
+use storage::{Store, manifests, verify};
 use tile_server::{Accumulated, Layer, picture_job};
 
 use crate::cli::{Recompute, Settings};
@@ -51,7 +51,11 @@ pub(super) async fn plan(store: &Store, options: &Recompute) -> Result<Tiles> {
         northward: None,
         manifest: manifest.into(),
     };
-    let stored: BTreeSet<ObjectKey> = store.list("tiles").await?.into_iter().collect();
+    let mut stored: BTreeSet<ObjectKey> = store.list("tiles").await?.into_iter().collect();
+    if options.verify {
+        let damaged = verify::damaged(store, stored.iter().cloned()).await?;
+        stored.retain(|tile| !damaged.contains(tile));
+    }
     let mut tiles = Tiles::default();
     for step in &layer.manifest.steps {
         let time = step.period.mid();

@@ -2,6 +2,7 @@
 
 use contract::digest::Digest;
 use contract::key::ObjectKey;
+use contract::masked::MaskedCells;
 use contract::quantity::Quantity;
 use contract::time::Period;
 
@@ -28,11 +29,13 @@ fn granule(content: &str, periods: &[Period]) -> StoredGranule {
         );
         StoredGrid {
             step: Step {
+                masked: None,
                 period: *period,
                 frame,
                 raw_sha256,
                 origin: "f.nc".into(),
                 valid_cells: 1,
+                contributed: None,
             },
         }
     };
@@ -47,13 +50,30 @@ fn granule(content: &str, periods: &[Period]) -> StoredGranule {
         },
         grid: GRID,
         raw_sha256,
+        assumptions: vec![],
         asked_by: None,
+        order: None,
+        masked: MaskedCells::default(),
         grids: periods.iter().map(step).collect(),
     }
 }
 
 fn month(month: u32) -> Period {
     Period::month(2000, month).unwrap()
+}
+
+fn placed(first: &StoredGranule) -> Vec<Placed> {
+    let merged = merge(None, std::slice::from_ref(first));
+    merged.steps.into_iter().zip(merged.orders).collect()
+}
+
+/// A file that came with the notice of some second.
+fn noticed(name: &str, periods: &[Period], second: u32) -> StoredGranule {
+    let order = format!("2020-01-01T00:00:{second:02}Z/0/0/0");
+    StoredGranule {
+        order: Some(order.parse().unwrap()),
+        ..granule(name, periods)
+    }
 }
 
 #[test]
@@ -68,28 +88,31 @@ fn months_in_any_order_become_steps_in_the_order_of_time() {
         merged
             .changes
             .iter()
-            .all(|c| *c == Change::Taken { revised: false })
+            .all(|c| matches!(c, Change::Taken { revised: false, .. }))
     );
 }
 
 #[test]
 fn the_same_file_again_changes_nothing_and_another_content_revises() {
-    let mut steps = merge(None, &[granule("a", &[month(1), month(2)])]).steps;
+    let mut steps = placed(&granule("a", &[month(1), month(2)]));
     assert_eq!(
         add(&mut steps, &granule("a", &[month(1), month(2)])),
         Change::Same
     );
     assert_eq!(
         add(&mut steps, &granule("b", &[month(2)])),
-        Change::Taken { revised: true }
+        Change::Taken {
+            revised: true,
+            periods: vec![month(2)]
+        }
     );
     assert_eq!(steps.len(), 2);
-    assert_eq!(steps[1].raw_sha256, Digest::of(b"b"));
+    assert_eq!(steps[1].0.raw_sha256, Digest::of(b"b"));
 }
 
 #[test]
 fn a_step_across_others_is_refused_and_leaves_them_whole() {
-    let mut steps = merge(None, &[granule("a", &[month(1), month(2)])]).steps;
+    let mut steps = placed(&granule("a", &[month(1), month(2)]));
     let before = steps.clone();
     let year = Period::year(2000).unwrap();
     let Change::Refused(rejection) = add(&mut steps, &granule("b", &[month(3), year])) else {
@@ -134,4 +157,51 @@ fn a_group_ends_before_the_first_period_that_comes_again() {
     ];
     assert_eq!(disjoint_prefix(&files), 2);
     assert_eq!(disjoint_prefix(&files[..2]), 2);
+}
+
+#[test]
+fn files_of_notices_in_any_order_end_as_the_same_steps() {
+    let [a, b, c] = [
+        noticed("a", &[month(1), month(2)], 1),
+        noticed("b", &[month(2), month(3)], 2),
+        noticed("c", &[month(1)], 3),
+    ];
+    let orders = [
+        [0, 1, 2],
+        [0, 2, 1],
+        [1, 0, 2],
+        [1, 2, 0],
+        [2, 0, 1],
+        [2, 1, 0],
+    ];
+    for order in orders {
+        let files = order.map(|index| [&a, &b, &c][index]);
+        let mut steps = vec![];
+        for file in files {
+            add(&mut steps, file);
+        }
+        let contents: Vec<_> = steps.iter().map(|(step, _)| step.raw_sha256).collect();
+        assert_eq!(
+            contents,
+            [b"c", b"b", b"b"].map(|c| Digest::of(c)),
+            "{order:?}"
+        );
+    }
+}
+
+#[test]
+fn a_file_without_a_notice_is_newer_and_one_of_the_same_notice_is_not() {
+    let mut steps = placed(&noticed("a", &[month(1)], 5));
+    assert_eq!(
+        add(&mut steps, &noticed("b", &[month(1)], 5)),
+        Change::Superseded
+    );
+    assert_eq!(
+        add(&mut steps, &noticed("b", &[month(1)], 4)),
+        Change::Superseded
+    );
+    let taken = |change| matches!(change, Change::Taken { revised: true, .. });
+    assert!(taken(add(&mut steps, &granule("by hand", &[month(1)]))));
+    // Nothing is known of what is there now.
+    assert!(taken(add(&mut steps, &noticed("b", &[month(1)], 4))));
 }

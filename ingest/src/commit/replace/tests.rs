@@ -26,11 +26,13 @@ fn product() -> ProductId {
 fn step(file: &str, month: u32, edition: u32) -> Step {
     let frame = Digest::of(format!("{file} {month} {edition}").as_bytes());
     Step {
+        masked: None,
         period: Period::month(2000, month).unwrap(),
         frame: ObjectKey::frame(&product(), &frame),
         raw_sha256: Digest::of(file.as_bytes()),
         origin: format!("{file}.nc"),
         valid_cells: 1,
+        contributed: None,
     }
 }
 
@@ -60,6 +62,7 @@ fn manifest(steps: Vec<Step>) -> Manifest {
         domain: ObjectKey::domain(&product(), &Digest::of(b"")),
         series: vec![],
         derived_from: None,
+        notices: vec![],
     }
 }
 
@@ -140,4 +143,26 @@ fn another_grid_is_taken_with_all_files_or_not_at_all() {
     };
     let both = [on(near, "a", 1), on(near, "b", 2)];
     assert_eq!(next(&newest, &both).unwrap().grid, GRID);
+}
+
+/// Otherwise a notice that is read again could put back what was revised, or an older file go over one read anew.
+#[test]
+fn a_file_that_is_read_anew_keeps_its_place_in_the_order_of_notices() {
+    let order = |second: u32| {
+        format!("2020-01-01T00:00:{second:02}Z/0/{second}/0")
+            .parse()
+            .ok()
+    };
+    let mut newest = manifest(vec![
+        step("a", 1, 0),
+        step("b", 2, 0),
+        step("a", 3, 0),
+        step("c", 4, 0),
+    ]);
+    newest.notices = NoticeRun::of(&[order(1), order(2), order(3), None]);
+    let anew = reading(vec![step("a", 1, 1), step("a", 3, 1), step("a", 5, 1)]);
+    let next = next(&newest, &[anew]).unwrap();
+    let orders = [order(1), order(2), order(3), None, order(3)];
+    assert_eq!(next.notice_orders(), orders);
+    assert_eq!(next.steps[4], step("a", 5, 1));
 }

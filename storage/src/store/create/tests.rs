@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::store::faulty::{Fault, Faulty, absent, broken, denied, exists};
+use contract::digest::Digest;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -88,7 +89,7 @@ async fn only_what_is_named_by_its_content_is_sent_in_parts() {
     let faulty = Faulty::new([]);
     let store = store(&faulty);
     let large = Bytes::from(vec![1; WHOLE_BYTES + 1]);
-    let named = ObjectKey::frame(&"p".parse().unwrap(), &Digest::of(&large));
+    let named = ObjectKey::raw(&"p".parse().unwrap(), &Digest::of(&large));
     assert!(store.put_new(&named, large.clone()).await.unwrap());
     assert!(!store.put_new(&named, large.clone()).await.unwrap());
     assert_eq!(faulty.multipart_count.load(Ordering::Relaxed), 1);
@@ -96,6 +97,28 @@ async fn only_what_is_named_by_its_content_is_sent_in_parts() {
     assert!(store.put_new(&key(), large.clone()).await.unwrap());
     assert_eq!(faulty.put_count(), 1);
     assert!(store.get(&named).await.unwrap() == large);
+}
+
+#[tokio::test]
+async fn what_the_name_vouches_for_takes_the_place_of_what_is_damaged() {
+    let store = Store::memory();
+    let content = Bytes::from("an input file");
+    let named = ObjectKey::raw(&"p".parse().unwrap(), &Digest::of(&content));
+    store
+        .put_over(&named, Bytes::from("an input fila"))
+        .await
+        .unwrap();
+    let error = store.get(&named).await.unwrap_err();
+    assert!(error.to_string().contains(named.as_str()), "{error}");
+    // Other bytes, and no better.
+    let wrong = store.put_new(&named, Bytes::from("another")).await;
+    assert!(
+        matches!(wrong, Err(StorageError::Damaged { .. })),
+        "{wrong:?}"
+    );
+    assert!(store.put_new(&named, content.clone()).await.unwrap());
+    assert_eq!(store.get(&named).await.unwrap(), content);
+    assert!(!store.put_new(&named, content).await.unwrap());
 }
 
 #[tokio::test]

@@ -1,0 +1,159 @@
+//! A budget of accumulated carbon: that of the flux which it was accumulated from, exact, and how complete it is.
+
+use contract::chunk::frame_chunks;
+use contract::key::ObjectKey;
+use contract::manifest::{Manifest, Step};
+use contract::time::TimeMs;
+use serde::{Deserialize, Serialize};
+use storage::{Store, contributed, manifests};
+
+use super::query::{BudgetAnswer, BudgetQuery, budget_of as budget_of_flux, steps_inside};
+use crate::region::weights;
+use crate::{ComputeError, Engine};
+
+/// How complete a row of accumulated carbon is: a cell with one month of twelve is not a complete one.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Completeness {
+    /// Area of the cells that hold data in all of the row's time, m².
+    pub complete_m2: f64,
+    /// Area of those that hold data in some of it only, m².
+    pub incomplete_m2: f64,
+}
+
+impl Completeness {
+    /// Share of the area with data that holds them in all of the time, percent; none without data.
+    pub fn percent(&self) -> Option<f64> {
+        let all_m2 = self.complete_m2 + self.incomplete_m2;
+        (all_m2 > 0.0).then(|| 100.0 * self.complete_m2 / all_m2)
+    }
+}
+
+/// The budget of a version of accumulated carbon, from where accumulation starts on.
+pub(super) async fn budget_of(
+    engine: &Engine,
+    query: &BudgetQuery,
+    manifest: &Manifest,
+) -> Result<BudgetAnswer, ComputeError> {
+    let (Some(source), Some(extent)) = (&manifest.derived_from, manifest.extent()) else {
+        return Err(ComputeError::NotAFlux {
+            product: manifest.product.clone(),
+            quantity: manifest.quantity,
+        });
+    };
+    let (window, _steps) = steps_inside(manifest, query.from, query.to)?;
+    let source = manifests::load(engine.store(), source).await?;
+    let of_flux = BudgetQuery {
+        product: source.product.clone(),
+        from: Some(window.start.max(extent.start)),
+        to: Some(window.end),
+        ..query.clone()
+    };
+    let mut answer = Box::pin(budget_of_flux(engine, &of_flux, &source)).await?;
+    answer.product = manifest.product.clone();
+    answer.manifest = manifest.id();
+    answer.title.clone_from(&manifest.title);
+    let key = weights::key(&manifest.grid, &query.region, query.earth);
+    let mut counted = Counted::new(engine.store(), manifest);
+    let areas = storage::weights::read(engine.store(), &key).await?;
+    for row in &mut answer.rows {
+        let (start, end) = (
+            counted.until(row.start).await?,
+            counted.until(row.end).await?,
+        );
+        row.completeness = start.zip(end).map(|(start, end)| {
+            let row_ms = row.end.ms() - row.start.ms();
+            let within: Vec<i64> = end
+                .iter()
+                .zip(&start)
+                .map(|(end, start)| end - start)
+                .collect();
+            completeness(manifest, &areas, &within, row_ms)
+        });
+    }
+    Ok(answer)
+}
+
+/// Areas of cells by whether `with_data_ms` (`[row, col]`) is all of a time, some or nothing.
+fn completeness(
+    manifest: &Manifest,
+    areas: &[(u32, Vec<f64>)],
+    with_data_ms: &[i64],
+    all_ms: i64,
+) -> Completeness {
+    let windows = frame_chunks(&manifest.grid);
+    let (mut complete_m2, mut incomplete_m2) = (0.0, 0.0);
+    for (chunk, areas) in areas {
+        let cells = windows[*chunk as usize].cell_indices(&manifest.grid);
+        for (cell, area_m2) in cells.zip(areas) {
+            match with_data_ms[cell] {
+                0 => {}
+                own_ms if own_ms == all_ms => complete_m2 += area_m2,
+                _ => incomplete_m2 += area_m2,
+            }
+        }
+    }
+    Completeness {
+        complete_m2,
+        incomplete_m2,
+    }
+}
+
+/// Time with data since the start of accumulation, ms, `[row, col]`.
+type WithData = Vec<i64>;
+
+/// Stored counts at any instant; the last one read is kept, because a row begins where the one before it ends.
+struct Counted<'a> {
+    store: &'a Store,
+    manifest: &'a Manifest,
+    last: Option<(ObjectKey, WithData)>,
+}
+
+impl<'a> Counted<'a> {
+    fn new(store: &'a Store, manifest: &'a Manifest) -> Self {
+        Self {
+            store,
+            manifest,
+            last: None,
+        }
+    }
+
+    /// Time with data until an instant; none where the version did not count it. A cell's part of a step that the
+    /// instant lies in is the part of that step's time.
+    async fn until(&mut self, time: TimeMs) -> Result<Option<WithData>, ComputeError> {
+        let steps = &self.manifest.steps;
+        let whole = steps.partition_point(|step| step.period.end <= time);
+        let before = match whole.checked_sub(1) {
+            Some(last) => self.after(&steps[last]).await?,
+            None => Some(vec![0; self.manifest.grid.cell_count()]),
+        };
+        let cut = steps.get(whole).filter(|step| step.period.start < time);
+        let (Some(mut with_data), Some(cut)) = (before.clone(), cut) else {
+            return Ok(before);
+        };
+        let Some(after) = self.after(cut).await? else {
+            return Ok(None);
+        };
+        let inside_ms = time.ms() - cut.period.start.ms();
+        for (own, after) in with_data.iter_mut().zip(after) {
+            if after > *own {
+                *own += inside_ms;
+            }
+        }
+        Ok(Some(with_data))
+    }
+
+    /// Time with data until the end of a step.
+    async fn after(&mut self, step: &Step) -> Result<Option<WithData>, ComputeError> {
+        let Some(counted) = &step.contributed else {
+            return Ok(None);
+        };
+        if let Some((_, with_data)) = self.last.as_ref().filter(|(key, _)| *key == counted.counts) {
+            return Ok(Some(with_data.clone()));
+        }
+        let grid = &self.manifest.grid;
+        let counts = contributed::read(self.store, &counted.counts, grid).await?;
+        let with_data = counts.milliseconds;
+        self.last = Some((counted.counts.clone(), with_data.clone()));
+        Ok(Some(with_data))
+    }
+}

@@ -1,0 +1,247 @@
+//! One bit flipped in stored objects, one after the other: an answer is the right one or an error that names the object,
+//! never another number; what can be made again is.
+
+use bytes::Bytes;
+use compute::region::weights;
+use compute::stats::{RegionSeriesQuery, region_series};
+use compute::{BudgetAnswer, Engine, budget, derive_accumulated, point_series};
+use contract::earth::Earth;
+use contract::grid::{Grid, LonLatDeg};
+use contract::key::ObjectKey;
+use contract::kind::Kind;
+use contract::quantity::Quantity;
+use contract::region::Region;
+use storage::sound::damage;
+use storage::{Store, manifests};
+
+use crate::fixture::{folder_store, land, product, total, wavy_year};
+
+/// Four chunks, three of them cut at the edges.
+const GRID: Grid = Grid {
+    rows: 61,
+    cols: 122,
+    north_deg: 61.0,
+    west_deg: -61.0,
+    dlat_deg: 2.0,
+    dlon_deg: 1.0,
+};
+/// Over all four chunks, its weights in none of the stored sums.
+const BOX: &str = "-60,-60,60.5,59.5";
+
+async fn landed() -> (tempfile::TempDir, Store) {
+    let (folder, store) = folder_store();
+    let months = &wavy_year(&GRID)[..2];
+    land(
+        &store,
+        &product("wavy"),
+        Quantity::CarbonFlux,
+        GRID,
+        months,
+        12,
+    )
+    .await;
+    (folder, store)
+}
+
+async fn first(store: &Store, kind: Kind) -> ObjectKey {
+    store.list(kind.folder()).await.unwrap().remove(0)
+}
+
+/// Every byte of the end of an object, where its footer is, and one in many of the rest; in each another bit.
+fn bits(content: &Bytes) -> impl Iterator<Item = (usize, u8)> {
+    let footer = content.len().saturating_sub(1100);
+    let step = (footer / 90).max(1);
+    let bytes = (0..footer).step_by(step).chain(footer..content.len());
+    bytes.map(|at| (at, 1 << (at % 8)))
+}
+
+/// Asks once for each flipped bit; `ask` says whether the answer was the right one, else gives the error. How many were
+/// errors.
+async fn flipped<F: Future<Output = Result<bool, String>>>(
+    store: &Store,
+    key: &ObjectKey,
+    ask: impl Fn() -> F,
+) -> usize {
+    let whole = store.get(key).await.unwrap();
+    let mut errors = 0;
+    for (at, bit) in bits(&whole) {
+        let mut flipped = whole.to_vec();
+        flipped[at] ^= bit;
+        store.put_over(key, flipped.into()).await.unwrap();
+        match ask().await {
+            Ok(is_right) => assert!(is_right, "{key}: another answer with byte {at} flipped"),
+            Err(error) => {
+                assert!(error.contains(key.as_str()), "{key}, byte {at}: {error}");
+                errors += 1;
+            }
+        }
+    }
+    store.put_over(key, whole).await.unwrap();
+    errors
+}
+
+async fn budget_of_box(store: &Store) -> Result<BudgetAnswer, String> {
+    // An engine that has seen nothing of the store: nothing is remembered from before the bit was flipped.
+    let engine = Engine::local(store.clone());
+    let asked = budget(&engine, &total(&product("wavy"), BOX)).await;
+    asked.map_err(|e| e.to_string())
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_flipped_bit_of_a_frame_is_no_other_budget() {
+    let (_folder, store) = landed().await;
+    let right = budget_of_box(&store).await.unwrap();
+    let frame = first(&store, Kind::Frame).await;
+    let before = damage::count(Kind::Frame);
+    let errors = flipped(&store, &frame, || async {
+        budget_of_box(&store).await.map(|answer| answer == right)
+    });
+    let errors = errors.await;
+    assert!(
+        errors > 90,
+        "{errors} errors only: what was read is not looked at"
+    );
+    assert!(damage::count(Kind::Frame) >= before + errors as u64);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_flipped_bit_of_a_frame_is_no_other_accumulated_carbon() {
+    let (_folder, store) = landed().await;
+    let frame = first(&store, Kind::Frame).await;
+    let mut flip = store.get(&frame).await.unwrap().to_vec();
+    let middle = flip.len() / 3;
+    flip[middle] ^= 8;
+    store.put_over(&frame, flip.into()).await.unwrap();
+    let engine = Engine::local(store.clone());
+    let derived = derive_accumulated(&engine, &product("wavy"), None, &|_| ()).await;
+    let error = derived.unwrap_err().to_string();
+    assert!(error.contains(frame.as_str()), "{error}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_flipped_bit_of_a_series_is_no_other_value_of_a_place() {
+    let (_folder, store) = landed().await;
+    let place = LonLatDeg::new(3.3, 4.5).unwrap();
+    let ask = async || {
+        let engine = Engine::local(store.clone());
+        let asked = point_series(&engine, &product("wavy"), place).await;
+        asked.map_err(|e| e.to_string())
+    };
+    let right = ask().await.unwrap();
+    assert!(right.series.iter().any(|point| point.value.is_some()));
+    let series = first(&store, Kind::Series).await;
+    let errors = flipped(&store, &series, || async {
+        ask().await.map(|answer| answer == right)
+    });
+    let errors = errors.await;
+    assert!(
+        errors > 50,
+        "{errors} errors only: what was read is not looked at"
+    );
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn damaged_weights_are_computed_again() {
+    let (_folder, store) = landed().await;
+    let right = budget_of_box(&store).await.unwrap();
+    let region: Region = BOX.parse().unwrap();
+    let key = weights::key(&GRID, &region, Earth::Wgs84);
+    let before = damage::count(Kind::Weights);
+    let whole = store.get(&key).await.unwrap();
+    let errors = flipped(&store, &key, || async {
+        let answer = budget_of_box(&store).await?;
+        Ok(answer == right && store.get(&key).await.unwrap() == whole)
+    });
+    assert_eq!(errors.await, 0);
+    assert!(damage::count(Kind::Weights) > before);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn damaged_sums_are_computed_again() {
+    let (_folder, store) = landed().await;
+    let engine = Engine::local(store.clone());
+    let manifest = manifests::latest(&store, &product("wavy")).await;
+    let manifest = manifest.unwrap().unwrap();
+    let region: Region = "global".parse().unwrap();
+    let weights = weights::RegionKeys::stored(&store, &GRID, &region, Earth::Wgs84).await;
+    let weights = weights.unwrap().unwrap();
+    let query = RegionSeriesQuery {
+        product: product("wavy"),
+        region: region.clone(),
+        region_name: "global".to_owned(),
+        from: None,
+        to: None,
+        earth: Earth::Wgs84,
+    };
+    let right = region_series(&engine, &query).await.unwrap();
+    let measure = compute::budget::Measure::Mean;
+    let sums = compute::budget::sums::store(&engine, &manifest, &weights, measure);
+    let key = sums.await.unwrap().key;
+    let whole = store.get(&key).await.unwrap();
+    for at in (0..whole.len()).step_by(17) {
+        let mut flip = whole.to_vec();
+        flip[at] ^= 1 << (at % 8);
+        store.put_over(&key, flip.into()).await.unwrap();
+        assert_eq!(region_series(&engine, &query).await.unwrap(), right);
+    }
+    let stored = compute::budget::sums::store(&engine, &manifest, &weights, measure);
+    assert_eq!(stored.await.unwrap().computed_count, 2);
+    assert_eq!(store.get(&key).await.unwrap(), whole);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_damaged_domain_or_manifest_is_named() {
+    let (_folder, store) = landed().await;
+    for kind in [Kind::Domain, Kind::Manifest] {
+        let key = first(&store, kind).await;
+        let whole = store.get(&key).await.unwrap();
+        let mut flip = whole.to_vec();
+        flip[whole.len() / 2] ^= 1;
+        store.put_over(&key, flip.into()).await.unwrap();
+        let engine = Engine::local(store.clone());
+        let derived = derive_accumulated(&engine, &product("wavy"), None, &|_| ()).await;
+        let error = derived.unwrap_err().to_string();
+        assert!(error.contains(key.as_str()), "{error}");
+        store.put_over(&key, whole).await.unwrap();
+    }
+}
+
+/// The derived product with a bit flipped in a frame, its series or its domain: made again under the same names.
+#[tokio::test(flavor = "multi_thread")]
+async fn damaged_derived_objects_are_made_again_when_they_are_looked_at() {
+    use compute::recompute::{Request, What, plan, run};
+    let (_folder, store) = landed().await;
+    let engine = Engine::local(store.clone());
+    let derived = derive_accumulated(&engine, &product("wavy"), None, &|_| ()).await;
+    let derived = derived.unwrap();
+    let request = |is_verified| Request {
+        product: product("wavy"),
+        from: None,
+        to: None,
+        what: vec![What::Frames],
+        is_forced: false,
+        is_verified,
+    };
+    for key in [
+        &derived.steps[1].frame,
+        &derived.series[0].series,
+        &derived.domain,
+    ] {
+        let whole = store.get(key).await.unwrap();
+        let mut flip = whole.to_vec();
+        flip[whole.len() / 2] ^= 1;
+        store.put_over(key, flip.into()).await.unwrap();
+        let unseen = plan(&store, &request(false)).await.unwrap();
+        assert!(
+            unseen.items.is_empty(),
+            "it was read without being asked to"
+        );
+        let seen = plan(&store, &request(true)).await.unwrap();
+        assert!(!seen.items.is_empty(), "{key}");
+        let outcome = run(&engine, &seen, &|_| ()).await.unwrap();
+        assert_eq!(outcome.derived.unwrap(), derived);
+        assert_eq!(store.get(key).await.unwrap(), whole);
+        let after = plan(&store, &request(true)).await.unwrap();
+        assert!(after.items.is_empty());
+    }
+}

@@ -1,0 +1,173 @@
+//! Kinds of stored objects, a folder each, and what the name of one says of its content.
+
+use crate::digest::Digest;
+use crate::key::ObjectKey;
+
+/// What an object is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Kind {
+    /// An input file as it came.
+    Raw,
+    /// One time step, map-major.
+    Frame,
+    /// Steps and time that each sum of accumulated carbon holds, map-major.
+    Contributed,
+    /// A run of steps, time-major.
+    Series,
+    /// The cells that hold data in some step.
+    Domain,
+    /// What a product consists of.
+    Manifest,
+    /// A region's share of every cell.
+    Weights,
+    /// Sums over a region, of every step of a version.
+    Sums,
+    /// Exact sums that accumulation has come to.
+    Accumulating,
+    /// Measurements of one dataset and month.
+    Observations,
+    /// Which file holds which month of a dataset.
+    ObservationIndex,
+    /// What a file was read as.
+    Reading,
+    /// Which notice landed a file.
+    Landing,
+    /// A comparison with published values.
+    Check,
+    /// A drawn picture.
+    Tile,
+    /// What all processes over a store agree on.
+    Protocol,
+}
+
+/// What the name of an object vouches for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Vouched {
+    /// Its bytes have this digest.
+    Bytes(Digest),
+    /// Its values have this digest, whatever bytes hold them.
+    Values(Digest),
+    /// Its name says where it belongs, or what it was made from, and nothing of its content.
+    Nothing,
+}
+
+impl Kind {
+    /// All of them.
+    pub const ALL: [Self; 16] = [
+        Self::Raw,
+        Self::Frame,
+        Self::Contributed,
+        Self::Series,
+        Self::Domain,
+        Self::Manifest,
+        Self::Weights,
+        Self::Sums,
+        Self::Accumulating,
+        Self::Observations,
+        Self::ObservationIndex,
+        Self::Reading,
+        Self::Landing,
+        Self::Check,
+        Self::Tile,
+        Self::Protocol,
+    ];
+
+    /// The top-level folder of such objects, and their name in metrics.
+    pub fn folder(self) -> &'static str {
+        match self {
+            Self::Raw => "raw",
+            Self::Frame => "frames",
+            Self::Contributed => "contributed",
+            Self::Series => "series",
+            Self::Domain => "domain",
+            Self::Manifest => "manifests",
+            Self::Weights => "weights",
+            Self::Sums => "sums",
+            Self::Accumulating => "accumulating",
+            Self::Observations => "observations",
+            Self::ObservationIndex => "observation-indexes",
+            Self::Reading => "readings",
+            Self::Landing => "landings",
+            Self::Check => "checks",
+            Self::Tile => "tiles",
+            Self::Protocol => "protocol",
+        }
+    }
+
+    /// The kind of a key's object; none for one that no part of Fluxglobe stores.
+    pub fn of(key: &ObjectKey) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| key.is_in(kind.folder()))
+    }
+}
+
+impl ObjectKey {
+    /// What its name vouches for.
+    pub fn vouches(&self) -> Vouched {
+        let name = self.as_str().rsplit('/').next().unwrap_or_default();
+        let stem = name.strip_suffix(".parquet").unwrap_or(name);
+        let digest = |text: &str| text.parse::<Digest>().ok();
+        match Kind::of(self) {
+            Some(Kind::Frame | Kind::Series) => match stem.strip_prefix(Self::OF_VALUES) {
+                Some(values) => digest(values).map_or(Vouched::Nothing, Vouched::Values),
+                None => digest(stem).map_or(Vouched::Nothing, Vouched::Bytes),
+            },
+            Some(Kind::Contributed) => digest(stem).map_or(Vouched::Nothing, Vouched::Values),
+            Some(Kind::Raw | Kind::Domain | Kind::Observations) => {
+                digest(stem).map_or(Vouched::Nothing, Vouched::Bytes)
+            }
+            _ => Vouched::Nothing,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_key_is_of_its_kind_and_vouches_for_what_it_names() {
+        let (product, digest) = ("p".parse().unwrap(), Digest::of(b"x"));
+        let (bytes, values) = (Vouched::Bytes(digest), Vouched::Values(digest));
+        let old_frame: ObjectKey = format!("frames/p/{digest}.parquet").parse().unwrap();
+        for (key, kind, vouched) in [
+            (ObjectKey::raw(&product, &digest), Kind::Raw, bytes),
+            (ObjectKey::frame(&product, &digest), Kind::Frame, values),
+            (old_frame, Kind::Frame, bytes),
+            (ObjectKey::series(&product, &digest), Kind::Series, values),
+            (
+                ObjectKey::contributed(&product, &digest),
+                Kind::Contributed,
+                values,
+            ),
+            (ObjectKey::domain(&product, &digest), Kind::Domain, bytes),
+            (
+                ObjectKey::observations(&product, &digest),
+                Kind::Observations,
+                bytes,
+            ),
+            (
+                ObjectKey::manifest(&product, 7),
+                Kind::Manifest,
+                Vouched::Nothing,
+            ),
+            (ObjectKey::weights(&digest), Kind::Weights, Vouched::Nothing),
+            (ObjectKey::check(&digest), Kind::Check, Vouched::Nothing),
+            (ObjectKey::tile(&digest), Kind::Tile, Vouched::Nothing),
+        ] {
+            assert_eq!((Kind::of(&key), key.vouches()), (Some(kind), vouched));
+        }
+        let other: ObjectKey = format!("elsewhere/{digest}").parse().unwrap();
+        assert_eq!(
+            (Kind::of(&other), other.vouches()),
+            (None, Vouched::Nothing)
+        );
+    }
+
+    #[test]
+    fn a_name_that_is_no_digest_vouches_for_nothing() {
+        for name in ["frames/p/a.parquet", "frames/p/v2-a.parquet", "raw/p/b"] {
+            let key: ObjectKey = name.parse().unwrap();
+            assert_eq!(key.vouches(), Vouched::Nothing);
+        }
+    }
+}

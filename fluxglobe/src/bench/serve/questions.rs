@@ -1,0 +1,240 @@
+//! What is asked: globe views or tiles of one product, each at an instant of its own.
+
+use anyhow::{Context as _, Result, ensure};
+use contract::tile::Tile;
+use contract::time::TimeMs;
+use serde::Deserialize;
+
+use crate::cli::BenchServe;
+
+/// Pixels a side of a tile.
+const TILE_PX: u32 = 256;
+/// Fraction of the golden section, in units of 2^-64: its multiples fill an interval evenly, none twice.
+const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
+
+/// The product asked about, as `/api/products` describes it.
+#[derive(Debug, Deserialize)]
+struct Product {
+    id: String,
+    /// West, south, east, north, degrees.
+    bounds: [f64; 4],
+    steps: Vec<Step>,
+    modes: Vec<String>,
+}
+
+#[derive(Debug, Deserialize)]
+struct Products {
+    products: Vec<Product>,
+}
+
+#[derive(Debug, Deserialize)]
+struct Step {
+    start: TimeMs,
+    end: TimeMs,
+}
+
+/// Addresses by number.
+pub(super) struct Questions {
+    pub(super) product: String,
+    /// What the answers must measure, pixels.
+    pub(super) size_px: [u32; 2],
+    /// Addresses without their instant.
+    places: Vec<String>,
+    first_ms: i64,
+    span_ms: u64,
+    /// Where in the span the first instant lies, in units of 2^-64: another place in every run.
+    seed: u64,
+}
+
+impl Questions {
+    /// Reads what the server has.
+    pub(super) async fn of(client: &reqwest::Client, options: &BenchServe) -> Result<Self> {
+        let address = format!("{}/api/products", options.url);
+        let answer = client.get(&address).send().await?.error_for_status()?;
+        let Products { products } = serde_json::from_slice(&answer.bytes().await?)?;
+        let product = chosen(products, options)?;
+        let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH)?;
+        Self::about(
+            &product,
+            options,
+            (now.as_nanos() as u64).wrapping_mul(GOLDEN),
+        )
+    }
+
+    fn about(product: &Product, options: &BenchServe, seed: u64) -> Result<Self> {
+        let first = product.steps.first().context("the product has no steps")?;
+        let last = product.steps.last().context("the product has no steps")?;
+        let span_ms = last.end.ms() - first.start.ms();
+        let span_ms = u64::try_from(span_ms).context("the product ends before it begins")?;
+        let places = match options.tiles {
+            Some(zoom) => tiles(product, options, zoom)?,
+            None => vec![view(product, options)],
+        };
+        Ok(Self {
+            product: product.id.clone(),
+            size_px: match options.tiles {
+                Some(_zoom) => [TILE_PX, TILE_PX],
+                None => [options.width, options.height],
+            },
+            places,
+            first_ms: first.start.ms(),
+            span_ms,
+            seed,
+        })
+    }
+
+    /// The address of a picture that nobody asked for before.
+    pub(super) fn address(&self, number: u64) -> String {
+        let place = &self.places[(number % self.places.len() as u64) as usize];
+        let share = u128::from(number.wrapping_mul(GOLDEN).wrapping_add(self.seed));
+        let after_ms = (share * u128::from(self.span_ms)) >> 64;
+        let time = TimeMs::new(self.first_ms + after_ms as i64);
+        let time = time.map_or_else(|_beyond| String::new(), |time| time.to_string());
+        format!("{place}time={time}")
+    }
+}
+
+fn chosen(products: Vec<Product>, options: &BenchServe) -> Result<Product> {
+    let mode = &options.mode.to_string();
+    let names: Vec<String> = products.iter().map(|one| one.id.clone()).collect();
+    let mut those = products.into_iter().filter(|one| one.modes.contains(mode));
+    let found = match &options.layer {
+        Some(layer) => those.find(|one| one.id == layer.to_string()),
+        None => those.next(),
+    };
+    found.with_context(|| {
+        let wanted = options.layer.as_ref();
+        let wanted = wanted.map_or("no product".to_owned(), |layer| {
+            format!("no product {layer}")
+        });
+        format!(
+            "{wanted} is there in the mode {mode}; there are {}",
+            names.join(", ")
+        )
+    })
+}
+
+fn view(product: &Product, options: &BenchServe) -> String {
+    format!(
+        "{}/globe/{}/{}.png?lon={}&lat={}&height_km={}&width={}&height={}&",
+        options.url,
+        product.id,
+        options.mode,
+        options.lon,
+        options.lat,
+        options.height_km,
+        options.width,
+        options.height
+    )
+}
+
+/// The tiles of a zoom level that lie on the product.
+fn tiles(product: &Product, options: &BenchServe, zoom: u8) -> Result<Vec<String>> {
+    let side = 1u32 << zoom;
+    let mut places = vec![];
+    for (y, x) in (0..side).flat_map(|y| (0..side).map(move |x| (y, x))) {
+        let tile = Tile::new(zoom, x, y)?;
+        if overlap(tile.bounds_deg(), product.bounds) {
+            places.push(format!(
+                "{}/tiles/{}/{}/{zoom}/{x}/{y}.png?",
+                options.url, product.id, options.mode
+            ));
+        }
+    }
+    ensure!(
+        !places.is_empty(),
+        "no tile of zoom {zoom} lies on {}",
+        product.id
+    );
+    Ok(places)
+}
+
+/// Do two boxes of west, south, east and north share an area, one of them perhaps a turn further east?
+fn overlap(a: [f64; 4], b: [f64; 4]) -> bool {
+    let is_level = a[1] < b[3] && b[1] < a[3];
+    let meets = |turn_deg: f64| a[0] < b[2] + turn_deg && b[0] + turn_deg < a[2];
+    is_level && [-360.0, 0.0, 360.0].into_iter().any(meets)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use clap::Parser as _;
+
+    use super::*;
+
+    #[derive(clap::Parser)]
+    struct Program {
+        #[command(flatten)]
+        options: BenchServe,
+    }
+
+    fn product() -> Product {
+        serde_json::from_str(
+            r#"{"id": "p", "bounds": [100, 0, 130, 40], "modes": ["map", "volume"],
+                "steps": [{"start": "2000-01-01T00:00:00Z", "end": "2000-02-01T00:00:00Z"},
+                          {"start": "2000-02-01T00:00:00Z", "end": "2000-03-01T00:00:00Z"}]}"#,
+        )
+        .unwrap()
+    }
+
+    fn options(words: &[&str]) -> BenchServe {
+        Program::parse_from([&["bench"], words].concat()).options
+    }
+
+    fn times(questions: &Questions, count: u64) -> BTreeSet<String> {
+        let time = |number| {
+            questions
+                .address(number)
+                .split("time=")
+                .nth(1)
+                .unwrap()
+                .to_owned()
+        };
+        (0..count).map(time).collect()
+    }
+
+    #[test]
+    fn instants_are_all_different_in_one_run_and_from_run_to_run() {
+        let about = |seed| Questions::about(&product(), &options(&[]), seed).unwrap();
+        let (first, second) = (times(&about(1), 5000), times(&about(u64::MAX / 3), 5000));
+        assert_eq!((first.len(), second.len()), (5000, 5000));
+        assert!(first.is_disjoint(&second));
+        let all = first.union(&second);
+        assert!(
+            all.clone()
+                .all(|time| time.starts_with("2000-01") || time.starts_with("2000-02"))
+        );
+    }
+
+    #[test]
+    fn views_have_the_size_asked_for_and_tiles_lie_on_the_product() {
+        let words = ["--width", "1920", "--height", "1080", "--lon", "115"];
+        let views = Questions::about(&product(), &options(&words), 0).unwrap();
+        assert_eq!(views.size_px, [1920, 1080]);
+        assert!(views.address(0).contains("/globe/p/volume.png?lon=115&"));
+        assert!(
+            views
+                .address(0)
+                .contains("&width=1920&height=1080&time=2000-01-01")
+        );
+        let tiles = Questions::about(&product(), &options(&["--tiles", "3"]), 0).unwrap();
+        // 90 to 135 E is column 6; the equator to 40.98 N is row 3.
+        assert_eq!(tiles.places.len(), 1);
+        assert!(tiles.address(7).contains("/tiles/p/volume/3/6/3.png?time="));
+    }
+
+    #[test]
+    fn a_product_that_is_not_there_is_told_with_those_that_are() {
+        let words = ["--layer", "q"];
+        let error = chosen(vec![product()], &options(&words)).unwrap_err();
+        assert!(
+            error.to_string().contains("no product q is there"),
+            "{error}"
+        );
+        assert!(error.to_string().contains("there are p"), "{error}");
+        assert!(chosen(vec![product()], &options(&["--mode", "flow"])).is_err());
+        assert_eq!(chosen(vec![product()], &options(&[])).unwrap().id, "p");
+    }
+}

@@ -1,0 +1,138 @@
+//! `fluxglobe verify`: every stored object read and compared with its name or seal, a line for each that is not sound.
+
+use std::process::ExitCode;
+
+use anyhow::Result;
+use contract::kind::Kind;
+use storage::verify::{self, Fault, Finding, Report};
+
+use crate::cli::{Settings, Verify};
+use crate::{deployment, progress};
+
+pub(crate) async fn run(settings: &Settings, options: &Verify) -> Result<ExitCode> {
+    let store = deployment::store(settings)?;
+    let product = options.product.as_ref();
+    let keys = verify::keys(&store, product).await?;
+    if let (Some(product), true) = (product, keys.is_empty()) {
+        deployment::manifest(&store, product, &settings.data).await?;
+    }
+    let bar = progress::bar("verify", keys.len() as u64);
+    let tell = |done: usize, finding: Option<&Finding>| {
+        bar.set_position(done as u64);
+        if let (Some(finding), false) = (finding, options.json) {
+            bar.suspend(|| progress::result(&line(finding)).ok());
+        }
+    };
+    let report = verify::run(&store, &keys, &tell).await?;
+    progress::done(&bar, &summary(&report));
+    if options.json {
+        progress::result(&serde_json::to_string_pretty(&report)?)?;
+    }
+    if report.findings.is_empty() {
+        return Ok(ExitCode::SUCCESS);
+    }
+    for advice in advice(&report) {
+        progress::say(&advice);
+    }
+    Ok(ExitCode::FAILURE)
+}
+
+fn line(finding: &Finding) -> String {
+    let Finding { key, fault, reason } = finding;
+    match fault {
+        Fault::Damaged => format!("{key} is damaged: {reason}"),
+        Fault::Missing => format!("{key} is missing: {reason}"),
+    }
+}
+
+fn summary(report: &Report) -> String {
+    let Report {
+        sound_count,
+        unsealed_count,
+        read_bytes,
+        findings,
+    } = report;
+    let unsealed = if *unsealed_count > 0 {
+        format!(", {unsealed_count} of before objects were sealed, with nothing to compare with")
+    } else {
+        String::new()
+    };
+    format!(
+        "{sound_count} objects are sound{unsealed}, {} are not; {:.1} MB read",
+        findings.len(),
+        *read_bytes as f64 / 1e6
+    )
+}
+
+/// What to do about what was found.
+fn advice(report: &Report) -> Vec<String> {
+    let mut advice = vec![];
+    let found = |kinds: &[Kind]| {
+        let is_of =
+            |finding: &&Finding| Kind::of(&finding.key).is_some_and(|it| kinds.contains(&it));
+        report.findings.iter().find(is_of)
+    };
+    let made_again = [
+        Kind::Frame,
+        Kind::Series,
+        Kind::Domain,
+        Kind::Sums,
+        Kind::Tile,
+    ];
+    if found(&made_again).is_some() {
+        advice.push(
+            "frames, series, domains, sums and tiles are made again by: fluxglobe recompute --product PRODUCT --verify"
+                .to_owned(),
+        );
+    }
+    if found(&[
+        Kind::Weights,
+        Kind::Accumulating,
+        Kind::Check,
+        Kind::Reading,
+    ])
+    .is_some()
+    {
+        advice.push("weights, kept sums, comparisons and notes of readings are made again when they are next needed".to_owned());
+    }
+    if let Some(raw) = found(&[Kind::Raw]) {
+        advice.push(format!(
+            "{} is an input file: ingest it again from where it came, which replaces what is damaged",
+            raw.key
+        ));
+    }
+    if let Some(list) = found(&[Kind::Manifest, Kind::Observations, Kind::ObservationIndex]) {
+        advice.push(format!(
+            "{} cannot be made again: restore it from a copy of the store",
+            list.key
+        ));
+    }
+    advice
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_kind_that_is_damaged_has_its_advice() {
+        let report = |key: &str| Report {
+            findings: vec![Finding {
+                key: key.parse().unwrap(),
+                fault: Fault::Damaged,
+                reason: "x".to_owned(),
+            }],
+            ..Report::default()
+        };
+        for (key, what_to_do) in [
+            ("frames/p/a.parquet", "recompute"),
+            ("raw/p/a", "ingest it again"),
+            ("manifests/p/1.json", "restore"),
+            ("weights/a.parquet", "when they are next needed"),
+        ] {
+            let advice = advice(&report(key)).join("; ");
+            assert!(advice.contains(what_to_do), "{key}: {advice}");
+        }
+        assert!(summary(&report("raw/p/a")).contains("1 are not"));
+    }
+}

@@ -1,0 +1,198 @@
+//! Periods from the bounds of a time axis: two numbers a step, of one stretch of time or of a climatology (CF 7.1, 7.4).
+
+use contract::time::{Period, TimeMs};
+
+use super::steps::refused;
+use super::{Planning, stamps};
+use crate::cf::calendar::CalendarDate;
+use crate::cf::cell_methods::TimeMethod;
+use crate::cf::period;
+use crate::error::Stop;
+use crate::file::description::Part;
+use crate::rejection::Rejection;
+
+/// What the bounds of a time axis say.
+pub(super) enum Bounds {
+    Periods(Vec<Period>),
+    /// Both bounds of every step are its stamp.
+    Instants,
+    /// There are none, or none that can be read.
+    Silent,
+}
+
+/// Reads the bounds of a time axis.
+pub(super) async fn read(
+    planning: &mut Planning<'_>,
+    time: &str,
+    stamps: &[CalendarDate],
+    method: Option<TimeMethod>,
+) -> Result<Bounds, Stop> {
+    let text = |name: &str| {
+        let variable = planning.file.variable(time)?;
+        variable.attributes.text(name).map(str::to_owned)
+    };
+    if let Some(name) = text("climatology") {
+        return climatology(planning, time, &name, stamps, method).await;
+    }
+    let Some(name) = text("bounds") else {
+        return Ok(Bounds::Silent);
+    };
+    let Some(dates) = dates(planning, time, &name, stamps.len() as u64).await? else {
+        planning.assume(format!(
+            "{time}: names bounds {name:?}, which are not there as two numbers a step; they are passed over"
+        ));
+        return Ok(Bounds::Silent);
+    };
+    let instants: Vec<[TimeMs; 2]> = dates
+        .iter()
+        .map(|pair| instants(&name, pair))
+        .collect::<Result<_, _>>()?;
+    if instants.iter().all(|[start, end]| start == end) {
+        return Ok(Bounds::Instants);
+    }
+    let mut periods = Vec::with_capacity(instants.len());
+    for ([start, end], stamp) in instants.into_iter().zip(stamps) {
+        let period = Period::new(start, end).map_err(|e| refused(&name, e.to_string()))?;
+        let stamp = period::instant(*stamp).map_err(|e| refused(time, e))?;
+        if stamp < start || stamp > end {
+            let detail = format!(
+                "has a stamp at {stamp} whose bounds in {name:?} are {period}; say in a profile where the time comes from"
+            );
+            return Err(refused(time, detail).into());
+        }
+        periods.push(period);
+    }
+    Ok(Bounds::Periods(periods))
+}
+
+fn instants(name: &str, pair: &[CalendarDate; 2]) -> Result<[TimeMs; 2], Rejection> {
+    let at = |date| period::instant(date).map_err(|e| refused(name, e));
+    Ok([at(pair[0])?, at(pair[1])?])
+}
+
+/// Both dates of every step; none if no variable of that shape holds them.
+async fn dates(
+    planning: &mut Planning<'_>,
+    time: &str,
+    bounds: &str,
+    count: u64,
+) -> Result<Option<Vec<[CalendarDate; 2]>>, Stop> {
+    let Some(variable) = planning.file.variable(bounds).filter(|v| v.is_numeric()) else {
+        return Ok(None);
+    };
+    let lens: Vec<u64> = variable.dimensions.iter().map(|d| d.len).collect();
+    // A scalar time has bounds of one dimension.
+    if lens != [count, 2] && !(count == 1 && lens == [2]) {
+        return Ok(None);
+    }
+    let parts = vec![Part::All; lens.len()];
+    let unit = stamps::unit(planning, time, None, None)?;
+    let numbers = planning.session.read(bounds, &parts, count * 2).await?;
+    let date = |number: f64| unit.date(number).map_err(|e| refused(bounds, e));
+    let pair = |pair: &[f64]| Ok([date(pair[0])?, date(pair[1])?]);
+    let pairs = numbers.chunks_exact(2).map(pair);
+    Ok(Some(pairs.collect::<Result<_, Rejection>>()?))
+}
+
+/// The steps of a climatology, each under the year of its stamp.
+async fn climatology(
+    planning: &mut Planning<'_>,
+    time: &str,
+    name: &str,
+    stamps: &[CalendarDate],
+    method: Option<TimeMethod>,
+) -> Result<Bounds, Stop> {
+    if method == Some(TimeMethod::WithinDays) {
+        let detail = "is a climatology of hours of the day (cell_methods has \"within days\"), whose steps are no stretches of time; give means of whole days";
+        return Err(refused(time, detail).into());
+    }
+    let Some(dates) = dates(planning, time, name, stamps.len() as u64).await? else {
+        let detail = format!(
+            "is a climatology whose bounds {name:?} are not there as two numbers a step; say in a profile what a step covers"
+        );
+        return Err(refused(time, detail).into());
+    };
+    let within = |(pair, stamp): (&[CalendarDate; 2], &CalendarDate)| {
+        within_year(*pair, *stamp).map_err(|e| refused(name, e))
+    };
+    let periods = dates
+        .iter()
+        .zip(stamps)
+        .map(within)
+        .collect::<Result<Vec<_>, _>>()?;
+    if let (Some(first), Some(last)) = (dates.first(), dates.last()) {
+        let (from, to) = (first[0].year, last[1]);
+        // The end of a year is the first instant of the next.
+        let to = to.year - i32::from((to.month, to.day, to.second <= 0.0) == (1, 1, true));
+        planning.assume(format!(
+            "{time}: is a climatology of {from} to {to}; its steps are stored under the years of their stamps"
+        ));
+    }
+    Ok(Bounds::Periods(periods))
+}
+
+/// The stretch of one year that a climatological step is of, in the year in which it holds the stamp.
+fn within_year([start, end]: [CalendarDate; 2], stamp: CalendarDate) -> Result<Period, String> {
+    let in_year = |date: CalendarDate, year: i32| {
+        // 29 February in a common year is the day after the 28th.
+        period::instant(CalendarDate { year, ..date }).or_else(|_no_day| {
+            period::instant(CalendarDate {
+                year,
+                month: 3,
+                day: 1,
+                ..date
+            })
+        })
+    };
+    let place = |date: CalendarDate| (date.month, date.day, date.second);
+    let turns = i32::from(place(end) <= place(start));
+    let of_year = |year: i32| {
+        let (from, to) = (in_year(start, year)?, in_year(end, year + turns)?);
+        Period::new(from, to).map_err(|e| e.to_string())
+    };
+    let stamp_time = period::instant(stamp)?;
+    for year in [stamp.year, stamp.year - 1] {
+        let period = of_year(year)?;
+        if period.start <= stamp_time && stamp_time <= period.end {
+            return Ok(period);
+        }
+    }
+    of_year(stamp.year)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cf::calendar::Calendar;
+
+    fn date(year: i32, month: u32, day: u32) -> CalendarDate {
+        CalendarDate {
+            year,
+            month,
+            day,
+            second: 0.0,
+            calendar: Calendar::Standard,
+        }
+    }
+
+    #[test]
+    fn a_climatological_step_lies_in_the_year_of_its_stamp() {
+        let of = |start, end, stamp| within_year([start, end], stamp).unwrap().to_string();
+        assert_eq!(
+            of(date(1961, 1, 1), date(1990, 2, 1), date(1975, 1, 16)),
+            "1975-01-01T00:00:00Z/1975-02-01T00:00:00Z"
+        );
+        assert_eq!(
+            of(date(1961, 12, 1), date(1991, 1, 1), date(1975, 12, 16)),
+            "1975-12-01T00:00:00Z/1976-01-01T00:00:00Z"
+        );
+        assert_eq!(
+            of(date(1960, 12, 1), date(1990, 3, 1), date(1975, 1, 16)),
+            "1974-12-01T00:00:00Z/1975-03-01T00:00:00Z"
+        );
+        assert_eq!(
+            of(date(1961, 1, 1), date(1991, 1, 1), date(1976, 7, 1)),
+            "1976-01-01T00:00:00Z/1977-01-01T00:00:00Z"
+        );
+    }
+}

@@ -1,0 +1,157 @@
+//! The one period of a file from its attributes: `time_coverage_start`, `time_coverage_end` and `time_coverage_resolution`.
+
+use contract::time::{Period, TimeMs};
+
+use super::steps::refused;
+use super::{Planning, date};
+use crate::cf::calendar::CalendarDate;
+use crate::cf::period::{self, Covers, StampAt};
+use crate::rejection::Rejection;
+
+const DAY_MS: i64 = 86_400_000;
+const HOUR_MS: i64 = 3_600_000;
+/// Coverage of at least this is meant to be of whole days: that of a day of orbits begins and ends with one of them.
+const WHOLE_DAYS_MS: i64 = 20 * HOUR_MS;
+/// How far from a midnight such an orbit may begin or end.
+const ORBITS_MS: i64 = 4 * HOUR_MS;
+/// An end that is this close before a midnight names the last instant instead of the first after it.
+const LAST_INSTANT_MS: i64 = 60_000;
+/// Coverage of whole days to within this that begins an hour or more from midnight is that of days of its own.
+const EXACT_MS: i64 = 60_000;
+
+const ONE_STAMP: &str = "has one stamp and no bounds, so nothing says what it covers; say in a profile (covers = \"month\", say)";
+const NO_TIME: &str = "has no time axis and no attribute that says its period; say in a profile where the time comes from";
+
+/// What the attributes of a file say.
+struct Coverage {
+    start: TimeMs,
+    end: Option<TimeMs>,
+}
+
+impl Coverage {
+    fn of(planning: &Planning<'_>) -> Option<Self> {
+        let attributes = &planning.file.attributes;
+        let text = |name: &str| attributes.text(name);
+        let instant = |text: &str| period::instant(date::of_attribute(text)?).ok();
+        let start = instant(text("time_coverage_start")?)?;
+        let end = |name: &&str| {
+            let text = text(name)?;
+            let end = instant(text)?;
+            // A day without a time is its whole.
+            let day_ms = if date::names_a_day(text) { DAY_MS } else { 0 };
+            TimeMs::new(end.ms() + day_ms)
+                .ok()
+                .filter(|end| *end > start)
+        };
+        let end = ["time_coverage_end", "time_coverage_stop"]
+            .iter()
+            .find_map(end);
+        Some(Self { start, end })
+    }
+}
+
+/// The one period of a file that has a stamp (of the variable `time`), or none.
+pub(super) fn period(
+    planning: &mut Planning<'_>,
+    stamp: Option<(&str, CalendarDate)>,
+) -> Result<Period, Rejection> {
+    let coverage = Coverage::of(planning);
+    let resolution = period::of_attributes(&planning.file.attributes);
+    let found = match (resolution, &coverage, stamp) {
+        (Some(covers), _, stamp) => by_resolution(planning, covers, coverage.as_ref(), stamp)?,
+        (
+            None,
+            Some(Coverage {
+                start,
+                end: Some(end),
+            }),
+            _,
+        ) => snapped(planning, *start, *end)?,
+        (None, _, Some((time, _))) => return Err(refused(time, ONE_STAMP)),
+        (None, _, None) => return Err(refused("file", NO_TIME)),
+    };
+    check_stamp(found, stamp)?;
+    Ok(found)
+}
+
+/// The period of a stated length: a month or year that holds the stamp, days from the start of the coverage.
+fn by_resolution(
+    planning: &mut Planning<'_>,
+    covers: Covers,
+    coverage: Option<&Coverage>,
+    stamp: Option<(&str, CalendarDate)>,
+) -> Result<Period, Rejection> {
+    let attribute = "time_coverage_resolution";
+    if let Some(Coverage { start, .. }) = coverage {
+        let start = match nearest_midnight(*start) {
+            Some((midnight, off_ms)) if off_ms <= ORBITS_MS => midnight,
+            _ => *start,
+        };
+        return covers
+            .period(date::of_instant(start))
+            .map_err(|e| refused("time_coverage_start", e));
+    }
+    let Some((time, stamp)) = stamp else {
+        return Err(refused("file", NO_TIME));
+    };
+    let is_edge = stamp.day == 1 && stamp.second <= 0.0;
+    if is_edge || !matches!(covers, Covers::Month | Covers::Year) {
+        planning.assume(format!(
+            "{time}: its one stamp is taken for the start of the step that {attribute} gives the length of"
+        ));
+    }
+    covers
+        .period_at(stamp, Some(StampAt::Start))
+        .map_err(|e| refused(time, e))
+}
+
+/// Coverage as it is, or the whole days that it was meant to be.
+fn snapped(planning: &mut Planning<'_>, start: TimeMs, end: TimeMs) -> Result<Period, Rejection> {
+    let bad = |e: contract::ContractError| refused("time_coverage_end", e.to_string());
+    let as_it_is = Period::new(start, end).map_err(bad)?;
+    let length_ms = end.ms() - start.ms();
+    let (Some((first, first_off_ms)), Some((last, last_off_ms))) =
+        (nearest_midnight(start), nearest_midnight(end))
+    else {
+        return Ok(as_it_is);
+    };
+    let is_whole = (length_ms + EXACT_MS).rem_euclid(DAY_MS) <= 2 * EXACT_MS;
+    let is_of_its_own = is_whole && first_off_ms >= HOUR_MS && last_off_ms >= HOUR_MS;
+    if length_ms < WHOLE_DAYS_MS || first_off_ms.max(last_off_ms) > ORBITS_MS || is_of_its_own {
+        return Ok(as_it_is);
+    }
+    let whole = Period::new(first, last).map_err(bad)?;
+    let is_last_instant = end <= last && last_off_ms <= LAST_INSTANT_MS;
+    if first_off_ms > 0 || last_off_ms > 0 && !is_last_instant {
+        planning.assume(format!(
+            "file: time_coverage_start and _end, {start} and {end}, are taken for the whole days {whole}"
+        ));
+    }
+    Ok(whole)
+}
+
+/// The nearest midnight, and how far it is, ms.
+fn nearest_midnight(time: TimeMs) -> Option<(TimeMs, i64)> {
+    let midnight_ms = (time.ms() + DAY_MS / 2).div_euclid(DAY_MS) * DAY_MS;
+    Some((
+        TimeMs::new(midnight_ms).ok()?,
+        (time.ms() - midnight_ms).abs(),
+    ))
+}
+
+/// Refuses a stamp that is more than a day from the period that attributes give.
+fn check_stamp(period: Period, stamp: Option<(&str, CalendarDate)>) -> Result<(), Rejection> {
+    let Some((time, stamp)) = stamp else {
+        return Ok(());
+    };
+    let Ok(stamp) = period::instant(stamp) else {
+        return Ok(());
+    };
+    if stamp.ms() < period.start.ms() - DAY_MS || stamp.ms() > period.end.ms() + DAY_MS {
+        let detail = format!(
+            "has its stamp at {stamp}, but time_coverage_start and its like say {period}; say in a profile which is right"
+        );
+        return Err(refused(time, detail));
+    }
+    Ok(())
+}

@@ -1,0 +1,43 @@
+//! The stamps of a time axis: its numbers as dates of its calendar.
+
+use super::Planning;
+use super::steps::refused;
+use crate::cf::calendar::{Calendar, CalendarDate, TimeUnit};
+use crate::error::Stop;
+use crate::rejection::Rejection;
+
+/// The unit of a time variable; `unit` and `calendar` instead of those of the file.
+pub(super) fn unit(
+    planning: &Planning<'_>,
+    name: &str,
+    unit: Option<&str>,
+    calendar: Option<&str>,
+) -> Result<TimeUnit, Rejection> {
+    let missing = || {
+        refused(
+            name,
+            "is not in the file; say in a profile where the time comes from",
+        )
+    };
+    let variable = planning.file.variable(name).ok_or_else(missing)?;
+    let unit = unit.or_else(|| variable.attributes.text("units"));
+    let unit = unit.ok_or_else(|| refused(name, "has no units; state them in a profile"))?;
+    let calendar = calendar.or_else(|| variable.attributes.text("calendar"));
+    let calendar = Calendar::parse(calendar).map_err(|e| refused(name, e))?;
+    TimeUnit::parse(unit, calendar).map_err(|e| refused(name, e))
+}
+
+/// All stamps of a time variable.
+pub(super) async fn read(
+    planning: &mut Planning<'_>,
+    name: &str,
+    stated: Option<&str>,
+    calendar: Option<&str>,
+) -> Result<Vec<CalendarDate>, Stop> {
+    let unit = unit(planning, name, stated, calendar)?;
+    let numbers = planning.coordinate(name).await?;
+    numbers
+        .into_iter()
+        .map(|n| unit.date(n).map_err(|e| refused(name, e).into()))
+        .collect()
+}

@@ -1,0 +1,387 @@
+//! Which period a step covers: bounds, cell methods, spacing, coverage; and what is said where none of them tells.
+
+use contract::event::{Body, RejectReason};
+use contract::time::Period;
+use contract::topic::Topic;
+use ingest::{Outcome, Profile};
+
+use crate::fixture::{Place, events, refusal};
+use crate::made::{Made, MadeFile, Values};
+
+/// Periods and assumptions of a file that lands.
+async fn told(file: &MadeFile, profile: Option<&Profile>) -> (Vec<Period>, Vec<String>) {
+    let place = Place::new();
+    file.write(&place.path("a.nc"));
+    let outcome = place
+        .land_with(&[place.path("a.nc")], profile)
+        .await
+        .remove(0);
+    let Outcome::Landed {
+        periods,
+        assumptions,
+        ..
+    } = outcome
+    else {
+        panic!("{outcome}")
+    };
+    (periods, assumptions)
+}
+
+async fn assert_refused(file: &MadeFile, words: &[&str]) {
+    let place = Place::new();
+    file.write(&place.path("a.nc"));
+    let (reason, line) = refusal(&place.land(&[place.path("a.nc")]).await);
+    assert_eq!(reason, RejectReason::Time, "{line}");
+    for word in words {
+        assert!(line.contains(word), "{word:?} is not in {line:?}");
+    }
+    eprintln!("{line}");
+}
+
+fn period(start: &str, end: &str) -> Period {
+    Period::new(start.parse().unwrap(), end.parse().unwrap()).unwrap()
+}
+
+fn with_bounds(file: MadeFile, attribute: &'static str, bounds: &[f64]) -> MadeFile {
+    let bounds = Made::new("edges", &["time", "two"], Values::Doubles(bounds.to_vec()));
+    file.but("time", |v| v.text(attribute, "edges"))
+        .with(bounds)
+}
+
+fn method(file: MadeFile, text: &'static str) -> MadeFile {
+    file.but("sst", |v| v.text("cell_methods", text))
+}
+
+#[tokio::test]
+async fn bounds_say_it_whatever_the_stamps_are() {
+    let file = with_bounds(
+        MadeFile::sst(2).numbers("time", &[4.0, 12.0]),
+        "bounds",
+        &[0.0, 8.0, 8.0, 16.0],
+    );
+    let (periods, assumptions) = told(&file, None).await;
+    assert_eq!(
+        periods,
+        [
+            period("2001-01-01", "2001-01-09"),
+            period("2001-01-09", "2001-01-17")
+        ]
+    );
+    assert_eq!(assumptions, Vec::<String>::new());
+}
+
+#[tokio::test]
+async fn bounds_that_miss_their_stamps_are_refused_and_lost_ones_are_noted() {
+    let file = with_bounds(
+        MadeFile::sst(2).numbers("time", &[4.0, 99.0]),
+        "bounds",
+        &[0.0, 8.0, 8.0, 16.0],
+    );
+    assert_refused(
+        &file,
+        &["time: ", "2001-04-10", "\"edges\"", "2001-01-09", "profile"],
+    )
+    .await;
+    let lost = MadeFile::sst(2).but("time", |v| v.text("bounds", "edges"));
+    let (_, assumptions) = told(&lost, None).await;
+    assert!(
+        assumptions[0].contains("\"edges\"") && assumptions[0].contains("not there"),
+        "{assumptions:?}"
+    );
+}
+
+#[tokio::test]
+async fn a_climatology_lies_in_the_years_of_its_stamps() {
+    // January and February of 1961 to 1990, as days since 2001.
+    let days = [-14_610.0, -3_987.0, -14_579.0, -3_959.0];
+    let file = MadeFile::sst(2).numbers("time", &[15.0, 45.0]);
+    let file = method(
+        with_bounds(file, "climatology", &days),
+        "time: mean within years time: mean over years",
+    );
+    let (periods, assumptions) = told(&file, None).await;
+    assert_eq!(
+        periods,
+        [
+            Period::month(2001, 1).unwrap(),
+            Period::month(2001, 2).unwrap()
+        ]
+    );
+    assert!(
+        assumptions[0].contains("climatology of 1961 to 1990"),
+        "{assumptions:?}"
+    );
+    let hours = method(
+        file.clone(),
+        "time: maximum within days time: mean over days",
+    );
+    assert_refused(&hours, &["time: ", "within days", "whole days"]).await;
+    let mut lost = file;
+    lost.variables.retain(|v| v.name != "edges");
+    assert_refused(&lost, &["time: ", "climatology", "\"edges\"", "profile"]).await;
+}
+
+#[tokio::test]
+async fn instants_stand_for_the_time_around_their_stamps() {
+    let hours = MadeFile::sst(3).numbers("time", &[0.0, 0.25, 0.5]);
+    let (periods, assumptions) = told(&method(hours.clone(), "time: point"), None).await;
+    assert_eq!(
+        periods[0],
+        period("2000-12-31T21:00:00Z", "2001-01-01T03:00:00Z")
+    );
+    assert_eq!(
+        periods[2],
+        period("2001-01-01T09:00:00Z", "2001-01-01T15:00:00Z")
+    );
+    assert!(assumptions[0].contains("instants"), "{assumptions:?}");
+    // Bounds that are their stamps say the same.
+    let empty = with_bounds(hours.clone(), "bounds", &[0.0, 0.0, 0.25, 0.25, 0.5, 0.5]);
+    assert_eq!(told(&empty, None).await.0, periods);
+    let (means, assumptions) = told(&method(hours, "time: mean"), None).await;
+    assert_eq!(means[0], period("2001-01-01", "2001-01-01T06:00:00Z"));
+    assert!(
+        assumptions[0].contains("starts of the steps"),
+        "{assumptions:?}"
+    );
+}
+
+#[tokio::test]
+async fn centred_stamps_are_told_by_where_they_stand() {
+    let noons = MadeFile::sst(2).numbers("time", &[0.5, 1.5]);
+    let (periods, assumptions) = told(&noons, None).await;
+    assert_eq!(
+        (periods[0], assumptions.len()),
+        (period("2001-01-01", "2001-01-02"), 0)
+    );
+    let pentads = MadeFile::sst(2).numbers("time", &[2.5, 7.5]);
+    let (periods, assumptions) = told(&pentads, None).await;
+    assert_eq!(
+        (periods[0], assumptions.len()),
+        (period("2001-01-01", "2001-01-06"), 0)
+    );
+    let months = MadeFile::sst(3).numbers("time", &[15.0, 45.0, 74.0]);
+    assert_eq!(
+        told(&months, None).await,
+        (
+            (1..=3).map(|m| Period::month(2001, m).unwrap()).collect(),
+            vec![]
+        )
+    );
+}
+
+#[tokio::test]
+async fn where_nothing_tells_the_assumption_is_printed_and_stored() {
+    let place = Place::new();
+    MadeFile::sst(2)
+        .numbers("time", &[3.0, 11.0])
+        .write(&place.path("a.nc"));
+    let outcomes = place.land(&[place.path("a.nc")]).await;
+    let line = outcomes[0].to_string();
+    assert!(
+        line.contains("assumed: time: has no bounds; stamps are taken for the starts"),
+        "{line}"
+    );
+    assert!(line.contains("stamp = \"middle\""), "{line}");
+    let notes = place.store.list("readings").await.unwrap();
+    let note = place.store.get(&notes[0]).await.unwrap();
+    let note: serde_json::Value = serde_json::from_slice(&note).unwrap();
+    let stored = note["assumptions"][0].as_str().unwrap();
+    assert!(line.ends_with(stored), "{line} {stored}");
+    let landed = events(&place.log, Topic::GranuleLanded).await;
+    let Body::GranuleLanded { assumptions, .. } = &landed[0].body else {
+        panic!("{landed:?}")
+    };
+    assert_eq!(assumptions, &[stored]);
+}
+
+#[tokio::test]
+async fn a_profile_says_where_stamps_stand() {
+    let profile = |stamp: &str| {
+        let text = format!(
+            "name = 'p'\nproduct = 'p'\ntitle = 't'\nsource = 's'\nquantity = 'sea_surface_temperature'\n[variable]\nname = 'sst'\n[time]\nfrom = {{ variable = {{ name = 'time' }} }}\ncovers = '8 days'\n{stamp}"
+        );
+        Profile::parse("p", &text)
+    };
+    let file = MadeFile::sst(2).numbers("time", &[8.0, 16.0]);
+    for (stamp, start, end) in [
+        ("", "2001-01-09", "2001-01-17"),
+        ("stamp = 'start'", "2001-01-09", "2001-01-17"),
+        ("stamp = 'middle'", "2001-01-05", "2001-01-13"),
+        ("stamp = 'end'", "2001-01-01", "2001-01-09"),
+    ] {
+        let (periods, _) = told(&file, Some(&profile(stamp).unwrap())).await;
+        assert_eq!(periods[0], period(start, end), "{stamp}");
+    }
+    let error = profile("stamp = 'centre'").unwrap_err().to_string();
+    assert!(
+        error.contains("centre") && error.contains("middle"),
+        "{error}"
+    );
+}
+
+/// Attributes of a file without a time axis.
+fn covering(start: &'static str, end: &'static str) -> MadeFile {
+    let mut file = MadeFile::sst(1);
+    file.variables.retain(|v| v.name != "time");
+    let map = |v: Made| Made {
+        dimensions: vec!["lat", "lon"],
+        ..v
+    };
+    file.but("sst", map)
+        .text("time_coverage_start", start)
+        .text("time_coverage_end", end)
+}
+
+#[tokio::test]
+async fn the_hour_of_a_compact_date_is_kept() {
+    let file = covering("20231231T120000Z", "20231231T180000Z");
+    let (periods, assumptions) = told(&file, None).await;
+    assert_eq!(
+        periods,
+        [period("2023-12-31T12:00:00Z", "2023-12-31T18:00:00Z")]
+    );
+    assert!(assumptions.is_empty());
+    let text = "name = 'p'\nproduct = 'p'\ntitle = 't'\nsource = 's'\nquantity = 'sea_surface_temperature'\n[variable]\nname = 'sst'\n[time]\nfrom = { attribute = 'time_coverage_start' }\ncovers = '6 hours'\n";
+    let profile = Profile::parse("p", text).unwrap();
+    assert_eq!(told(&file, Some(&profile)).await.0, periods);
+    assert_refused(
+        &covering("20231231 at noon", "20231231T180000Z"),
+        &["file: ", "profile"],
+    )
+    .await;
+}
+
+/// Months and eight days as NASA's maps of MODIS have them, one after the other: whole days, and no overlap.
+#[tokio::test]
+async fn coverage_that_passes_midnight_by_an_orbit_is_of_whole_days() {
+    for coverage in [
+        [
+            ("2010-01-01T00:05:00Z", "2010-02-01T00:10:00Z"),
+            ("2010-02-01T00:05:00Z", "2010-03-01T00:10:00Z"),
+        ],
+        [
+            ("2010-01-01T00:05:00.000Z", "2010-01-09T02:59:59.000Z"),
+            ("2010-01-09T00:00:01.000Z", "2010-01-17T02:54:59.000Z"),
+        ],
+        [
+            ("2009-12-31T22:35:01.000Z", "2010-01-02T01:19:59.000Z"),
+            ("2010-01-01T22:40:00.000Z", "2010-01-03T01:29:59.000Z"),
+        ],
+    ] {
+        let place = Place::new();
+        let files: Vec<_> = (0..2).map(|i| place.path(&format!("{i}.nc"))).collect();
+        for ((start, end), path) in coverage.iter().zip(&files) {
+            covering(start, end).write(path);
+        }
+        let outcomes = place.land(&files).await;
+        for outcome in &outcomes {
+            let Outcome::Landed {
+                periods,
+                assumptions,
+                ..
+            } = outcome
+            else {
+                panic!("{outcome}")
+            };
+            assert_eq!(
+                (
+                    periods[0].start.ms() % 86_400_000,
+                    periods[0].end.ms() % 86_400_000
+                ),
+                (0, 0),
+                "{outcome}"
+            );
+            assert!(
+                assumptions[0].contains("time_coverage_start"),
+                "{assumptions:?}"
+            );
+        }
+        let steps = place.newest("sst").await.steps;
+        assert_eq!(steps[0].period.end, steps[1].period.start);
+        assert_eq!(&steps[0].period.start.to_string()[..10], "2010-01-01");
+    }
+    let (periods, _) = told(
+        &covering("2010-01-01T00:05:00Z", "2010-02-01T00:10:00Z"),
+        None,
+    )
+    .await;
+    assert_eq!(periods, [Period::month(2010, 1).unwrap()]);
+}
+
+#[tokio::test]
+async fn coverage_that_means_what_it_says_stays() {
+    for (start, end, from, to) in [
+        // The last second, and a day without a time, are within.
+        (
+            "2010-01-01T00:00:00Z",
+            "2010-01-31T23:59:59Z",
+            "2010-01-01",
+            "2010-02-01",
+        ),
+        ("2010-01-01", "2010-01-31", "2010-01-01", "2010-02-01"),
+        ("20100101", "20100131", "2010-01-01", "2010-02-01"),
+        // Days of their own, parts of a day.
+        (
+            "2010-01-01T03:00:00Z",
+            "2010-01-02T03:00:00Z",
+            "2010-01-01T03:00:00Z",
+            "2010-01-02T03:00:00Z",
+        ),
+        (
+            "2010-01-01T12:00:00Z",
+            "2010-01-03T00:00:00Z",
+            "2010-01-01T12:00:00Z",
+            "2010-01-03",
+        ),
+        (
+            "2010-01-01T00:05:00Z",
+            "2010-01-01T06:05:00Z",
+            "2010-01-01T00:05:00Z",
+            "2010-01-01T06:05:00Z",
+        ),
+    ] {
+        let (periods, assumptions) = told(&covering(start, end), None).await;
+        assert_eq!(periods, [period(from, to)], "{start} {end}");
+        assert!(assumptions.is_empty(), "{assumptions:?}");
+    }
+}
+
+#[tokio::test]
+async fn one_stamp_and_the_coverage_must_agree() {
+    let file = |day: f64, resolution: Option<&'static str>| {
+        let file = MadeFile::sst(1).numbers("time", &[day]);
+        let file = file
+            .text("time_coverage_start", "2001-01-01T00:00:00Z")
+            .text("time_coverage_end", "2001-02-01T00:00:00Z");
+        resolution.into_iter().fold(file, |file, text| {
+            file.text("time_coverage_resolution", text)
+        })
+    };
+    for resolution in [None, Some("P1M")] {
+        // In the month, and at its end.
+        for day in [0.0, 15.0, 31.0] {
+            let (periods, _) = told(&file(day, resolution), None).await;
+            assert_eq!(
+                periods,
+                [Period::month(2001, 1).unwrap()],
+                "{day} {resolution:?}"
+            );
+        }
+        assert_refused(
+            &file(60.0, resolution),
+            &["time: ", "2001-03-02", "time_coverage_start", "profile"],
+        )
+        .await;
+    }
+    let lone = MadeFile::sst(1).text("time_coverage_resolution", "P1M");
+    let (periods, assumptions) = told(&lone, None).await;
+    assert_eq!(periods, [Period::month(2001, 1).unwrap()]);
+    assert!(
+        assumptions[0].contains("start of the step"),
+        "{assumptions:?}"
+    );
+    assert_eq!(
+        told(&lone.numbers("time", &[15.0]), None).await.1,
+        Vec::<String>::new()
+    );
+}

@@ -1,0 +1,163 @@
+//! Seals: the digest of an object's bytes, kept inside it where readers of its format pass over it.
+//!
+//! A JSON document ends in a member `sha256`, the digest of the text without that member. A Parquet file has a mark and
+//! the digest of all its other bytes between its last page and its footer, where no address in it points to. One flipped
+//! bit breaks a seal or what it seals, never both: what had a seal is then broken, or no longer what its version must be.
+
+use contract::digest::Digest;
+use sha2::{Digest as _, Sha256};
+
+/// Before the digest in a Parquet file.
+const MARK: &[u8; 8] = b"FLUXSEAL";
+const DIGEST_BYTES: usize = 32;
+const SEAL_BYTES: usize = MARK.len() + DIGEST_BYTES;
+/// Length of the footer and the format's name, the last bytes of a Parquet file.
+const END_BYTES: usize = 8;
+const PARQUET: &[u8; 4] = b"PAR1";
+/// Before the digest in a document.
+const MEMBER: &[u8] = b",\"sha256\":\"";
+/// After it.
+const MEMBER_END: &[u8] = b"\"}";
+const HEX_BYTES: usize = 64;
+
+/// What became of an object's seal.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Seal {
+    /// The bytes are those that were sealed.
+    Whole,
+    /// They are others.
+    Broken,
+    /// There is none.
+    Absent,
+}
+
+/// Seals the text of a JSON object that has members.
+pub fn json(mut text: Vec<u8>) -> Vec<u8> {
+    let digest = Digest::of(&text);
+    debug_assert!(text.len() > 2 && text.ends_with(b"}"), "an object");
+    text.pop();
+    text.extend_from_slice(MEMBER);
+    text.extend_from_slice(digest.to_string().as_bytes());
+    text.extend_from_slice(MEMBER_END);
+    text
+}
+
+/// The text of a document without its seal.
+pub(crate) fn opened(content: &[u8]) -> Vec<u8> {
+    match parts_of_json(content) {
+        Some((before, _)) => [before, b"}"].concat(),
+        None => content.to_vec(),
+    }
+}
+
+/// The seal of a JSON document.
+pub(crate) fn of_json(content: &[u8]) -> Seal {
+    match parts_of_json(content) {
+        None => Seal::Absent,
+        Some((before, told)) => {
+            let found = digest_of(before, b"}");
+            whole_if(found.to_string().as_bytes() == told)
+        }
+    }
+}
+
+/// What stands before the seal, and the digest in it.
+fn parts_of_json(content: &[u8]) -> Option<(&[u8], &[u8])> {
+    let rest = content.strip_suffix(MEMBER_END)?;
+    let (rest, told) = rest.split_at_checked(rest.len().checked_sub(HEX_BYTES)?)?;
+    Some((rest.strip_suffix(MEMBER)?, told))
+}
+
+/// Seals a Parquet file; bytes that are none are left as they are.
+pub fn parquet(mut content: Vec<u8>) -> Vec<u8> {
+    if let Some(footer) = footer_of(&content) {
+        let digest: [u8; DIGEST_BYTES] = Sha256::digest(&content).into();
+        content.splice(footer..footer, MARK.iter().copied().chain(digest));
+    }
+    content
+}
+
+/// The seal of a Parquet file.
+pub(crate) fn of_parquet(content: &[u8]) -> Seal {
+    let sealed = || {
+        let footer = footer_of(content)?;
+        let (before, end) = content.split_at(footer);
+        let (data, seal) = before.split_at_checked(before.len().checked_sub(SEAL_BYTES)?)?;
+        Some((data, seal.strip_prefix(MARK)?, end))
+    };
+    match sealed() {
+        None => Seal::Absent,
+        Some((data, told, end)) => {
+            let told: Result<[u8; DIGEST_BYTES], _> = told.try_into();
+            whole_if(told.is_ok_and(|told| digest_of(data, end) == Digest::from_bytes(told)))
+        }
+    }
+}
+
+/// Where the footer of a Parquet file begins.
+fn footer_of(content: &[u8]) -> Option<usize> {
+    let (before, end) = content.split_at_checked(content.len().checked_sub(END_BYTES)?)?;
+    let (length, name) = end.split_first_chunk::<4>()?;
+    if name != PARQUET {
+        return None;
+    }
+    before
+        .len()
+        .checked_sub(u32::from_le_bytes(*length) as usize)
+}
+
+fn digest_of(a: &[u8], b: &[u8]) -> Digest {
+    let mut hasher = Sha256::new();
+    hasher.update(a);
+    hasher.update(b);
+    Digest::from_bytes(hasher.finalize().into())
+}
+
+fn whole_if(is_whole: bool) -> Seal {
+    if is_whole { Seal::Whole } else { Seal::Broken }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sealed_document_is_json_and_opens_as_what_it_was() {
+        let text = br#"{"schema":2,"a":[1,{"b":"}"}]}"#;
+        let sealed = json(text.to_vec());
+        assert_eq!(of_json(&sealed), Seal::Whole);
+        assert_eq!(opened(&sealed), text);
+        assert_eq!(
+            (of_json(text), &opened(text)[..]),
+            (Seal::Absent, &text[..])
+        );
+        let read: serde_json::Value = serde_json::from_slice(&sealed).unwrap();
+        assert_eq!(read["sha256"], Digest::of(text).to_string());
+    }
+
+    #[test]
+    fn no_bit_of_a_sealed_document_can_change_unseen() {
+        let sealed = json(br#"{"schema":2,"a":"text"}"#.to_vec());
+        for at in 0..sealed.len() * 8 {
+            let mut flipped = sealed.clone();
+            flipped[at / 8] ^= 1 << (at % 8);
+            assert_ne!(of_json(&flipped), Seal::Whole, "bit {at}");
+        }
+    }
+
+    #[test]
+    fn no_bit_of_a_sealed_table_can_change_unseen() {
+        // Pages, a footer of three bytes, its length, the format's name.
+        let file = b"PAR1pages\x01\x02\x03\x03\0\0\0PAR1".to_vec();
+        assert_eq!(of_parquet(&file), Seal::Absent);
+        let sealed = parquet(file);
+        assert_eq!(of_parquet(&sealed), Seal::Whole);
+        for at in 0..sealed.len() * 8 {
+            let mut flipped = sealed.clone();
+            flipped[at / 8] ^= 1 << (at % 8);
+            assert_ne!(of_parquet(&flipped), Seal::Whole, "bit {at}");
+        }
+        assert_eq!(of_parquet(b""), Seal::Absent);
+        assert_eq!(of_parquet(b"\xff\xff\xff\xffPAR1"), Seal::Absent);
+    }
+}

@@ -1,0 +1,202 @@
+//! A whole store read and checked: every object against its name or its seal, every version for what it names.
+
+use std::collections::BTreeSet;
+
+use contract::key::ObjectKey;
+use contract::kind::Kind;
+use contract::manifest::Manifest;
+use contract::product::ProductId;
+use futures::{StreamExt as _, TryStreamExt as _, stream};
+use serde::Serialize;
+
+use crate::sound::{self, Soundness};
+use crate::{StorageError, Store, document};
+
+/// Objects that are read at the same time.
+const AT_ONCE: usize = 4;
+
+/// What is wrong with an object.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Fault {
+    /// It is not what was stored.
+    Damaged,
+    /// A version names it, and it is not there.
+    Missing,
+}
+
+/// An object that is not as it must be.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Finding {
+    /// Its key.
+    pub key: ObjectKey,
+    /// What is wrong.
+    pub fault: Fault,
+    /// How that was seen.
+    pub reason: String,
+}
+
+/// What a store was found to be.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
+pub struct Report {
+    /// Objects that are what their names or seals say.
+    pub sound_count: usize,
+    /// Objects that nothing says of what they should be: written before their kind was sealed.
+    pub unsealed_count: usize,
+    /// Bytes read.
+    pub read_bytes: u64,
+    /// What is wrong, sorted by key.
+    pub findings: Vec<Finding>,
+}
+
+/// Every object of the kinds that are stored, or those of one product alone, kind by kind.
+pub async fn keys(
+    store: &Store,
+    product: Option<&ProductId>,
+) -> Result<Vec<ObjectKey>, StorageError> {
+    let mut keys = vec![];
+    for kind in Kind::ALL {
+        let folder = match product {
+            Some(product) => format!("{}/{product}", kind.folder()),
+            None => kind.folder().to_owned(),
+        };
+        keys.extend(store.list(&folder).await?);
+    }
+    Ok(keys)
+}
+
+/// Reads and checks all of these; `progress` is told how many are done, and of each finding as it is made.
+///
+/// # Errors
+/// The store does not answer. Whatever is wrong with an object is a finding.
+pub async fn run(
+    store: &Store,
+    keys: &[ObjectKey],
+    progress: &(dyn Fn(usize, Option<&Finding>) + Send + Sync),
+) -> Result<Report, StorageError> {
+    let mut report = Report::default();
+    let mut named = BTreeSet::new();
+    let checks: Vec<_> = keys
+        .iter()
+        .map(|key| checked(store.clone(), key.clone()))
+        .collect();
+    let mut checked = stream::iter(checks).buffered(AT_ONCE);
+    let mut done_count = 0;
+    while let Some((key, found)) = checked.try_next().await? {
+        done_count += 1;
+        match found {
+            Checked::Sound(soundness, bytes) => {
+                report.read_bytes += bytes;
+                match soundness {
+                    Soundness::Sound => report.sound_count += 1,
+                    Soundness::Unsealed => report.unsealed_count += 1,
+                }
+                if Kind::of(&key) == Some(Kind::Manifest) {
+                    named.extend(names_of(store, &key).await?);
+                }
+                progress(done_count, None);
+            }
+            Checked::Gone => progress(done_count, None),
+            Checked::Damaged(reason) => {
+                let finding = Finding {
+                    key,
+                    fault: Fault::Damaged,
+                    reason,
+                };
+                progress(done_count, Some(&finding));
+                report.findings.push(finding);
+            }
+        }
+    }
+    drop(checked);
+    let there: BTreeSet<&ObjectKey> = keys.iter().collect();
+    for key in named.iter().filter(|key| !there.contains(key)) {
+        // Landed, perhaps, after the keys were listed.
+        if store.exists(key).await? {
+            continue;
+        }
+        let finding = Finding {
+            key: key.clone(),
+            fault: Fault::Missing,
+            reason: "a manifest names it".to_owned(),
+        };
+        progress(done_count, Some(&finding));
+        report.findings.push(finding);
+    }
+    report.findings.sort_by(|a, b| a.key.cmp(&b.key));
+    Ok(report)
+}
+
+/// Is an object what its name or its seal says?
+///
+/// # Errors
+/// `Damaged` if it is not.
+pub async fn sound(store: &Store, key: &ObjectKey) -> Result<(), StorageError> {
+    let (own, content) = (key.clone(), store.fetch(key).await?);
+    sound::off_thread(move || sound::of_object(&own, &content).map(|_soundness| ())).await
+}
+
+/// Those of these objects that are damaged, and may be made again.
+pub async fn damaged(
+    store: &Store,
+    keys: impl IntoIterator<Item = ObjectKey>,
+) -> Result<BTreeSet<ObjectKey>, StorageError> {
+    let checks: Vec<_> = keys
+        .into_iter()
+        .map(|key| if_damaged(store.clone(), key))
+        .collect();
+    let found: Vec<Option<ObjectKey>> = stream::iter(checks)
+        .buffer_unordered(AT_ONCE)
+        .try_collect()
+        .await?;
+    Ok(found.into_iter().flatten().collect())
+}
+
+async fn if_damaged(store: Store, key: ObjectKey) -> Result<Option<ObjectKey>, StorageError> {
+    let found = check(&store, &key).await?;
+    Ok(matches!(found, Checked::Damaged(_)).then_some(key))
+}
+
+enum Checked {
+    Sound(Soundness, u64),
+    /// Removed since it was listed.
+    Gone,
+    Damaged(String),
+}
+
+async fn checked(store: Store, key: ObjectKey) -> Result<(ObjectKey, Checked), StorageError> {
+    let found = check(&store, &key).await?;
+    Ok((key, found))
+}
+
+async fn check(store: &Store, key: &ObjectKey) -> Result<Checked, StorageError> {
+    let content = match store.fetch(key).await {
+        Ok(content) => content,
+        Err(e) if e.is_not_found() => return Ok(Checked::Gone),
+        Err(StorageError::Damaged { reason, .. }) => return Ok(Checked::Damaged(reason)),
+        Err(e) => return Err(e),
+    };
+    let (own, bytes) = (key.clone(), content.len() as u64);
+    match sound::off_thread(move || sound::of_object(&own, &content)).await {
+        Ok(soundness) => Ok(Checked::Sound(soundness, bytes)),
+        Err(StorageError::Damaged { reason, .. }) => Ok(Checked::Damaged(reason)),
+        Err(e) => Err(e),
+    }
+}
+
+/// What a manifest names.
+async fn names_of(store: &Store, key: &ObjectKey) -> Result<Vec<ObjectKey>, StorageError> {
+    let Some(manifest) = document::get::<Manifest>(store, key).await? else {
+        return Ok(vec![]);
+    };
+    let mut names = vec![manifest.domain.clone()];
+    names.extend(manifest.series.iter().map(|segment| segment.series.clone()));
+    for step in &manifest.steps {
+        names.push(step.frame.clone());
+        names.extend(step.contributed.as_ref().map(|of| of.counts.clone()));
+        if manifest.derived_from.is_none() {
+            names.push(ObjectKey::raw(&manifest.product, &step.raw_sha256));
+        }
+    }
+    Ok(names)
+}
