@@ -75,5 +75,7 @@ if [ "$purpose" = test ]; then
     pip_install typos 1.52.0
     # What the reference computations in tests/reference import.
     pip_install numpy 2.4.6
+    pip_install pyproj 3.7.2
+    pip_install shapely 2.2.0
     pip_install netCDF4 1.7.4
 fi

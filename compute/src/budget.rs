@@ -2,8 +2,10 @@
 
 mod accumulated;
 mod asked;
+pub mod bands;
 pub mod chunk;
 pub mod fixed;
+pub mod gaps;
 pub mod named;
 mod query;
 pub mod rows;
@@ -11,7 +13,7 @@ pub mod running;
 pub mod sums;
 
 pub use accumulated::Completeness;
-pub(crate) use query::steps_inside;
 pub use query::{BudgetAnswer, BudgetQuery, budget, budget_of};
+pub(crate) use query::{extent_of, steps_inside};
 pub use rows::{BudgetRow, BudgetStep};
 pub use sums::Measure;

@@ -1,7 +1,7 @@
 //! Our budgets beside the published ones: what a demonstration prints and what it is held to.
 
 use contract::product::ProductId;
-use contract::region::NamedRegion;
+use contract::region::{Cells, NamedRegion};
 use futures::future::{try_join, try_join_all};
 use serde::{Deserialize, Serialize};
 
@@ -186,6 +186,8 @@ fn query(
         to: None,
         step,
         earth,
+        // As the authors of the 1-degree grids integrate them: no cell is cut at the coast.
+        cells: Cells::Whole,
     })
 }
 

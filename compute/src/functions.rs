@@ -2,6 +2,7 @@
 //!
 //! Every session that plans or runs our queries (client, scheduler, executor) gets them from here.
 
+mod band_sums;
 mod column_sum;
 mod has_data;
 mod lists;
@@ -19,8 +20,10 @@ use crate::Objects;
 /// Every scalar function; those that sum over a region read its weights from `objects`.
 pub fn scalar_functions(objects: &Objects) -> Vec<Arc<ScalarUDF>> {
     let region_sums = region_sums::RegionSums::new(objects.clone());
+    let band_sums = band_sums::BandSums::new(objects.clone());
     [
         AsyncScalarUDF::new(Arc::new(region_sums)).into_scalar_udf(),
+        AsyncScalarUDF::new(Arc::new(band_sums)).into_scalar_udf(),
         ScalarUDF::from(has_data::HasData::new()),
         ScalarUDF::from(series_at::SeriesAt::new()),
         ScalarUDF::from(sound::Sound::new()),

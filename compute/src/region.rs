@@ -1,12 +1,18 @@
-//! Regions on grids: the exact area of a region's share of every cell.
+//! Regions on grids: the exact area of a region's share of every cell, and of the sea in it.
 //!
-//! A region's edges are straight in longitude and latitude, as GeoJSON says. Areas lie on the chosen figure of the
-//! earth.
+//! A region's edges are straight in longitude and latitude, as RFC 7946 says; every place in it counts once
+//! (docs/decisions/008-regions.md). Areas lie on the chosen figure of the earth.
 
 pub mod area;
 mod box_cover;
-pub mod geojson_file;
+mod cut;
+pub mod extent;
+pub mod file;
+mod land;
+mod lattice;
 pub(crate) mod loaded;
 mod polygon_cover;
 mod rings;
+mod sea;
+mod union;
 pub mod weights;

@@ -16,6 +16,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use contract::earth::Earth;
 use contract::job::Mode;
 use contract::product::ProductId;
+use contract::region::Cells;
 use contract::time::TimeMs;
 
 pub(crate) use fill::{BenchFill, FillError, ProductsOf};
@@ -276,7 +277,7 @@ pub(crate) struct StatsPolygon {
     /// Product, of any quantity.
     #[arg(long)]
     pub(crate) product: ProductId,
-    /// `global`, a named region, a box WEST,SOUTH,EAST,NORTH, or a GeoJSON file.
+    /// `global`, a named region, a box WEST,SOUTH,EAST,NORTH, a GeoJSON or WKT file, or the text of one.
     #[arg(long, allow_hyphen_values = true)]
     pub(crate) region: String,
     /// First instant: 2000, 2000-03, 2000-03-15 or with a time of day. The product's first if absent.
@@ -310,7 +311,7 @@ pub(crate) struct Budget {
     /// Product, a carbon flux.
     #[arg(long)]
     pub(crate) product: ProductId,
-    /// `global`, a named region, a box WEST,SOUTH,EAST,NORTH, or a GeoJSON file.
+    /// `global`, a named region, a box WEST,SOUTH,EAST,NORTH, a GeoJSON or WKT file, or the text of one.
     #[arg(long, default_value = "global", allow_hyphen_values = true)]
     pub(crate) region: String,
     /// First instant: 2000, 2000-03, 2000-03-15 or with a time of day. The product's first if absent.
@@ -325,6 +326,9 @@ pub(crate) struct Budget {
     /// Figure of the earth for areas: wgs84 or sphere (R = 6371 km).
     #[arg(long, default_value = "wgs84")]
     pub(crate) earth: Earth,
+    /// How cells on the coast count: whole, or by their ocean-share.
+    #[arg(long, default_value = "whole")]
+    pub(crate) cells: Cells,
     /// JSON instead of a table.
     #[arg(long)]
     pub(crate) json: bool,

@@ -17,8 +17,8 @@ use contract::time::Period;
 use render_worker::fleet::{Fleet, FleetError};
 use render_worker::{RenderError, RenderService};
 use tile_server::backend::{
-    Analyse, AreaRequest, AreaRow, AreaSeries, BackendError, BudgetRequest, BudgetRow,
-    BudgetStep as WantedStep, Check, Class, Contributed, Draw, PointStep, RowCol, Turn,
+    Analyse, AreaRequest, AreaRow, AreaSeries, BackendError, BudgetAnswer, BudgetRequest,
+    BudgetRow, BudgetStep as WantedStep, Check, Class, Contributed, Draw, PointStep, RowCol, Turn,
 };
 
 pub(crate) use observer::Observer;
@@ -100,7 +100,7 @@ impl Analyse for Analyst {
         Ok(values.into_iter().enumerate().map(step).collect())
     }
 
-    async fn budget(&self, request: &BudgetRequest) -> Result<Vec<BudgetRow>, BackendError> {
+    async fn budget(&self, request: &BudgetRequest) -> Result<BudgetAnswer, BackendError> {
         let query = BudgetQuery {
             product: request.manifest.product.clone(),
             region: request.region.clone(),
@@ -113,6 +113,7 @@ impl Analyse for Analyst {
                 WantedStep::Total => BudgetStep::Total,
             },
             earth: request.earth,
+            cells: request.cells,
         };
         let answer = compute::budget::budget_of(&self.regions, &query, &request.manifest)
             .await
@@ -125,11 +126,20 @@ impl Analyse for Analyst {
             budget_tg: row.budget_tg,
             coverage_percent: row.coverage_percent,
             area_m2: row.area_m2,
+            ocean_with_data_m2: row.ocean_with_data_m2,
+            gap_tg: row.gap_tg,
+            gap_area_m2: row.gap_area_m2,
             complete_and_incomplete_m2: row
                 .completeness
                 .map(|own| [own.complete_m2, own.incomplete_m2]),
         };
-        Ok(answer.rows.into_iter().map(row).collect())
+        Ok(BudgetAnswer {
+            region_area_m2: answer.region_area_m2,
+            ocean_area_m2: answer.ocean_area_m2,
+            gap_basis: answer.gap_basis,
+            notes: answer.notes,
+            rows: answer.rows.into_iter().map(row).collect(),
+        })
     }
 
     async fn area(&self, request: &AreaRequest) -> Result<AreaSeries, BackendError> {
@@ -155,6 +165,8 @@ impl Analyse for Analyst {
         };
         Ok(AreaSeries {
             region_area_m2: answer.region_area_m2,
+            ocean_area_m2: answer.ocean_area_m2,
+            notes: answer.notes,
             rows: answer.series.into_iter().map(row).collect(),
         })
     }

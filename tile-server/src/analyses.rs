@@ -7,7 +7,7 @@ use contract::digest::Digest;
 use quick_cache::sync::Cache;
 
 use crate::backend::{
-    Analyse, AreaRequest, AreaSeries, BudgetRequest, BudgetRow, Check, PointStep, RowCol,
+    Analyse, AreaRequest, AreaSeries, BudgetAnswer, BudgetRequest, Check, PointStep, RowCol,
 };
 use crate::catalogue::Layer;
 use crate::error::ServerError;
@@ -25,8 +25,8 @@ pub struct Analyses {
     analyst: Arc<dyn Analyse>,
     gate: Gate,
     metrics: Metrics,
-    budgets: Cache<Digest, Arc<[BudgetRow]>>,
-    flights: Flights<Arc<[BudgetRow]>>,
+    budgets: Cache<Digest, Arc<BudgetAnswer>>,
+    flights: Flights<Arc<BudgetAnswer>>,
     areas: Cache<Digest, Arc<AreaSeries>>,
     area_flights: Flights<Arc<AreaSeries>>,
 }
@@ -62,21 +62,21 @@ impl Analyses {
         Ok(values)
     }
 
-    /// The budget rows of a request about `layer`.
+    /// The budget of a request about `layer`.
     pub async fn budget(
         &self,
         layer: &Layer,
         request: BudgetRequest,
-    ) -> Result<Arc<[BudgetRow]>, ServerError> {
+    ) -> Result<Arc<BudgetAnswer>, ServerError> {
         let key = Digest::of_json(&(
             &layer.id,
             &request.region,
             request.period,
             request.step,
-            request.earth,
+            (request.earth, request.cells),
         ));
-        if let Some(rows) = self.budgets.get(&key) {
-            return Ok(rows);
+        if let Some(answer) = self.budgets.get(&key) {
+            return Ok(answer);
         }
         let (analyst, gate, metrics) = (
             Arc::clone(&self.analyst),
@@ -88,11 +88,11 @@ impl Analyses {
                 .enter()
                 .await
                 .inspect_err(|_busy| metrics.refused.inc())?;
-            Ok(analyst.budget(&request).await?.into())
+            Ok(Arc::new(analyst.budget(&request).await?))
         };
-        let rows = self.flights.join(key, compute).await?;
-        self.budgets.insert(key, Arc::clone(&rows));
-        Ok(rows)
+        let answer = self.flights.join(key, compute).await?;
+        self.budgets.insert(key, Arc::clone(&answer));
+        Ok(answer)
     }
 
     /// The series over a region of a request about `layer`.

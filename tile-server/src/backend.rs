@@ -14,7 +14,7 @@ use contract::job::RenderJob;
 use contract::manifest::Manifest;
 use contract::observation::{Observation, PlatformKind, Quality};
 use contract::product::ProductId;
-use contract::region::Region;
+use contract::region::{Cells, Region};
 use contract::time::{Period, TimeMs};
 use serde::{Deserialize, Serialize};
 use tokio::sync::OwnedSemaphorePermit;
@@ -61,7 +61,7 @@ pub trait Analyse: Send + Sync + 'static {
     ) -> Result<Vec<PointStep>, BackendError>;
 
     /// The carbon budget of a region, one row for each step of time.
-    async fn budget(&self, request: &BudgetRequest) -> Result<Vec<BudgetRow>, BackendError>;
+    async fn budget(&self, request: &BudgetRequest) -> Result<BudgetAnswer, BackendError>;
 
     /// The mean of a product over a region, one row for each step in the period.
     async fn area(&self, request: &AreaRequest) -> Result<AreaSeries, BackendError>;
@@ -246,6 +246,23 @@ pub struct BudgetRequest {
     pub step: BudgetStep,
     /// Figure of the earth for cell areas.
     pub earth: Earth,
+    /// How cells on the coast count.
+    pub cells: Cells,
+}
+
+/// A budget.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BudgetAnswer {
+    /// Area of the region, land included, m².
+    pub region_area_m2: f64,
+    /// Area of the sea in it, m².
+    pub ocean_area_m2: f64,
+    /// What estimates of gaps are made of.
+    pub gap_basis: String,
+    /// How the region was taken where that may surprise.
+    pub notes: Vec<String>,
+    /// One row for each step of time.
+    pub rows: Vec<BudgetRow>,
 }
 
 /// The budget of one period.
@@ -255,10 +272,16 @@ pub struct BudgetRow {
     pub period: Period,
     /// Carbon given off by the sea, Tg, positive out of the sea.
     pub budget_tg: f64,
-    /// Share of the region's area with data, averaged over the period, percent.
+    /// Share of the region's sea with data, averaged over the period, percent.
     pub coverage_percent: f64,
-    /// Area with data, averaged over the period, m².
+    /// Area that counted, averaged over the period, m²: with whole cells also land on the coast.
     pub area_m2: f64,
+    /// Area of the sea with data, averaged over the period, m².
+    pub ocean_with_data_m2: f64,
+    /// What the sea without data would add, an estimate that is no part of the budget, Tg.
+    pub gap_tg: Option<f64>,
+    /// Area of the sea without data that the estimate stands for, m².
+    pub gap_area_m2: f64,
     /// Of accumulated carbon: area of cells with data in all of the period, and in some of it only, m².
     pub complete_and_incomplete_m2: Option<[f64; 2]>,
 }
@@ -281,6 +304,10 @@ pub struct AreaRequest {
 pub struct AreaSeries {
     /// Area of the region, land included, m².
     pub region_area_m2: f64,
+    /// Area of the sea in it, m².
+    pub ocean_area_m2: f64,
+    /// How the region was taken where that may surprise.
+    pub notes: Vec<String>,
     /// Rows in the order of time.
     pub rows: Vec<AreaRow>,
 }
@@ -294,7 +321,7 @@ pub struct AreaRow {
     pub mean: Option<f64>,
     /// Area with data, m².
     pub area_m2: f64,
-    /// Share of the region's area with data, percent.
+    /// Share of the region's sea with data, percent.
     pub coverage_percent: f64,
 }
 

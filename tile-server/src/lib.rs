@@ -9,7 +9,7 @@
 //! | `/api/products/{product}/legend.json`, `.svg`, `.png` | what the colours mean |
 //! | `/api/products/{product}/point?lon=&lat=&manifest=` | series of the cell at a place |
 //! | `/api/products/{product}/area?region=&from=&to=&earth=&manifest=` | mean over a region at every step, with its coverage |
-//! | `/api/products/{product}/budget?region=&from=&to=&step=&earth=&manifest=` | carbon budget |
+//! | `/api/products/{product}/budget?region=&from=&to=&step=&earth=&cells=&manifest=` | carbon budget, its coverage of the sea and what gaps would add |
 //! | `/api/regions` | regions with a name |
 //! | `/api/palettes` | palettes with a name |
 //! | `/api/check` | our budgets beside a paper's and an independent integration's, `null` where there is nothing to compare with |

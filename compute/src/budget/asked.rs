@@ -4,15 +4,18 @@
 use std::collections::BTreeMap;
 
 use contract::digest::Digest;
+use contract::grid::Grid;
 use contract::key::ObjectKey;
 use contract::manifest::Step;
 use contract::time::{Period, TimeMs};
 use datafusion::arrow::array::{AsArray as _, RecordBatch};
-use datafusion::arrow::datatypes::{Decimal128Type, Int64Type, TimestampMillisecondType};
+use datafusion::arrow::compute::cast;
+use datafusion::arrow::datatypes::{DataType, Decimal128Type, Int64Type, TimestampMillisecondType};
 
+use super::bands::{BAND_COUNT, band_areas, summed_bands};
 use super::rows::StepSum;
 use super::sums::Measure;
-use crate::region::loaded::RegionWeights;
+use crate::region::weights::RegionKeys;
 use crate::scan::{self, Layout};
 use crate::session::QueryContext;
 use crate::{ComputeError, Engine};
@@ -28,16 +31,58 @@ const STEP_SUMS: &str = "
            period_end,
            SUM(get_field(sums, 'mass')) AS mass,
            SUM(get_field(sums, 'area')) AS area,
-           SUM(get_field(sums, 'chunks')) AS chunks
+           SUM(get_field(sums, 'chunks')) AS chunks,
+           STRING_AGG(bands, ' ') AS bands
     FROM (SELECT period_start,
                  period_end,
-                 region_sums(\"values\", chunk, $seconds, '$weights') AS sums
+                 region_sums(\"values\", chunk, $seconds, '$weights') AS sums,
+                 band_sums(\"values\", chunk, $seconds, '$ocean', '$grid') AS bands
           FROM frames
           WHERE $chunks)
     GROUP BY period_start, period_end";
 
-/// The question about all frames, for a region's weights at an address.
-fn sql(measure: Measure, weights: &RegionWeights, address: &str) -> String {
+/// A region on a grid, its weights read.
+pub(super) struct AskedRegion {
+    grid: Grid,
+    weights: RegionKeys,
+    /// Addresses of the weights.
+    all: String,
+    ocean: String,
+    /// Chunks that the region touches.
+    runs: Vec<(u32, u32)>,
+    chunk_count: usize,
+    /// Area of its sea in every band, m² in steps of 10⁻⁶.
+    pub(super) sea_steps: [i128; BAND_COUNT],
+}
+
+impl AskedRegion {
+    /// Reads the weights.
+    pub(super) async fn read(
+        engine: &Engine,
+        grid: &Grid,
+        weights: &RegionKeys,
+    ) -> Result<Self, ComputeError> {
+        let address = |key| engine.store().sql_url(key).to_string();
+        let (all, ocean) = (address(&weights.all), address(&weights.ocean));
+        let failed = || ComputeError::engine("reading a region's weights");
+        let whole = engine.objects().weights(&all).await.map_err(failed())?;
+        let sea = engine.objects().weights(&ocean).await.map_err(failed())?;
+        let sea_steps = band_areas(grid, sea.chunks())
+            .map_err(|e| ComputeError::inconsistent(weights.ocean.as_str(), e))?;
+        Ok(Self {
+            grid: *grid,
+            weights: weights.clone(),
+            all,
+            ocean,
+            runs: whole.runs(),
+            chunk_count: whole.chunk_count(),
+            sea_steps,
+        })
+    }
+}
+
+/// The question about all frames.
+fn sql(measure: Measure, region: &AskedRegion) -> String {
     let seconds = match measure {
         Measure::Mass => "(CAST(period_end AS BIGINT) - CAST(period_start AS BIGINT)) / 1000.0",
         Measure::Mean => "CAST(1.0 AS DOUBLE)",
@@ -45,29 +90,33 @@ fn sql(measure: Measure, weights: &RegionWeights, address: &str) -> String {
     let run = |(first, last): (u32, u32)| {
         format!("chunk BETWEEN CAST({first} AS INT UNSIGNED) AND CAST({last} AS INT UNSIGNED)")
     };
-    let chunks: Vec<String> = weights.runs().into_iter().map(run).collect();
+    let chunks: Vec<String> = region.runs.iter().copied().map(run).collect();
+    let quoted = |text: &str| text.replace('\'', "''");
+    let grid = serde_json::to_string(&region.grid).expect("a grid is plain numbers");
     STEP_SUMS
         .replace("$seconds", seconds)
         .replace("$chunks", &chunks.join(" OR "))
-        .replace("$weights", &address.replace('\'', "''"))
+        .replace("$weights", &quoted(&region.all))
+        .replace("$ocean", &quoted(&region.ocean))
+        .replace("$grid", &quoted(&grid))
 }
 
 /// Exact sums of steps in their order.
 pub(super) async fn asked(
     engine: &Engine,
     steps: &[&Step],
-    weights: &ObjectKey,
+    region: &AskedRegion,
     measure: Measure,
 ) -> Result<Vec<StepSum>, ComputeError> {
     let frames: Vec<&ObjectKey> = steps.iter().map(|step| &step.frame).collect();
-    let job = Digest::of_json(&("sums", measure, &frames, weights));
-    let ask = |context| ask(engine, context, &frames, weights, measure);
+    let job = Digest::of_json(&("sums", measure, &frames, &region.weights));
+    let ask = |context| ask(engine, context, &frames, region, measure);
     let answered = async {
         let answer = engine.answer(job, ask).await?;
         in_order(steps, &answer)
     };
     let mut read = frames.clone();
-    read.push(weights);
+    read.extend([&region.weights.all, &region.weights.ocean]);
     scan::or_damaged(engine.store(), &read, answered.await).await
 }
 
@@ -81,19 +130,16 @@ async fn ask(
     engine: &Engine,
     context: QueryContext,
     frames: &[&ObjectKey],
-    weights: &ObjectKey,
+    region: &AskedRegion,
     measure: Measure,
 ) -> Result<Answer, ComputeError> {
     let store = engine.store();
     scan::register(&context, "frames", store, frames, Layout::Frames).await?;
-    let address = store.sql_url(weights).to_string();
     let failed = || ComputeError::engine("summing over a region");
-    let region = engine.objects().weights(&address).await.map_err(failed())?;
-    let sql = sql(measure, &region, &address);
-    let query = context.sql(&sql).await.map_err(failed())?;
+    let query = context.sql(&sql(measure, region)).await.map_err(failed())?;
     Ok(Answer {
         batches: query.collect().await.map_err(failed())?,
-        chunk_count: region.chunk_count(),
+        chunk_count: region.chunk_count,
     })
 }
 
@@ -135,6 +181,12 @@ fn sums_of(batch: &RecordBatch) -> Result<Vec<(StepSum, i64)>, ComputeError> {
     let decimal = |column: usize| batch.column(column).as_primitive::<Decimal128Type>();
     let (starts, ends, masses, areas) = (time(0), time(1), decimal(2), decimal(3));
     let chunk_counts = batch.column(4).as_primitive::<Int64Type>();
+    let bands = cast(batch.column(5), &DataType::Utf8)
+        .map_err(|e| ComputeError::inconsistent("sums of bands", e))?;
+    let sea = |row: usize| {
+        let text = bands.as_string::<i32>().value(row);
+        summed_bands(text).ok_or_else(|| ComputeError::inconsistent("sums of bands", text))
+    };
     (0..batch.num_rows())
         .map(|row| {
             let period = Period::new(
@@ -145,6 +197,7 @@ fn sums_of(batch: &RecordBatch) -> Result<Vec<(StepSum, i64)>, ComputeError> {
                 period,
                 mass_steps: masses.value(row),
                 area_steps: areas.value(row),
+                sea: sea(row)?,
             };
             Ok((sum, chunk_counts.value(row)))
         })

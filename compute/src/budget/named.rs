@@ -2,13 +2,12 @@
 
 use contract::earth::Earth;
 use contract::grid::Grid;
-use contract::key::ObjectKey;
 use contract::manifest::Manifest;
 use contract::region::{NAMED_REGIONS, Region};
 use storage::Store;
 
 use super::sums::{self, Measure, StoredSums};
-use crate::region::weights;
+use crate::region::weights::{self, RegionKeys};
 use crate::{ComputeError, Engine};
 
 /// The figure of the earth that sums are stored for.
@@ -20,7 +19,7 @@ pub(crate) struct Touching {
     /// Its name.
     pub(crate) name: &'static str,
     /// Where its weights are, or would be.
-    pub(crate) weights: ObjectKey,
+    pub(crate) weights: RegionKeys,
 }
 
 /// The named regions that have any area on a grid. Nothing is written.
@@ -28,8 +27,8 @@ pub(crate) async fn touching(store: &Store, grid: &Grid) -> Result<Vec<Touching>
     let mut touching = vec![];
     for named in NAMED_REGIONS {
         let region: Region = named.name.parse()?;
-        let (grid, weights) = (*grid, weights::key(grid, &region, EARTH));
-        if !store.exists(&weights).await? {
+        let (grid, weights) = (*grid, RegionKeys::new(grid, &region, EARTH));
+        if !store.exists(&weights.all).await? {
             let cover = move || weights::compute(&grid, &region, EARTH);
             let covered = tokio::task::spawn_blocking(cover).await;
             if covered
@@ -63,8 +62,8 @@ pub(crate) async fn stored_weights(
     engine: &Engine,
     manifest: &Manifest,
     name: &str,
-) -> Result<ObjectKey, ComputeError> {
+) -> Result<RegionKeys, ComputeError> {
     let region: Region = name.parse()?;
-    let weights = weights::stored(engine.store(), &manifest.grid, &region, EARTH).await?;
+    let weights = RegionKeys::stored(engine.store(), &manifest.grid, &region, EARTH).await?;
     weights.ok_or_else(|| ComputeError::inconsistent(name, "it does not touch the product's grid"))
 }

@@ -4,14 +4,16 @@ use contract::earth::Earth;
 use contract::manifest::{Manifest, ManifestId, Step};
 use contract::product::ProductId;
 use contract::quantity::Quantity;
-use contract::region::Region;
+use contract::region::{Cells, Region};
 use contract::time::{Period, TimeMs};
 use serde::{Deserialize, Serialize};
 
 use super::accumulated;
-use super::rows::{BudgetRow, BudgetStep, row_periods, rows};
+use super::gaps::BASIS;
+use super::rows::{Asked, BudgetRow, BudgetStep, row_periods, rows};
 use super::sums::{self, Measure};
-use crate::region::{area, weights};
+use crate::region::extent::{Extent, extent};
+use crate::region::weights::RegionKeys;
 use crate::{ComputeError, Engine, catalog};
 
 /// What a budget is asked for.
@@ -31,6 +33,8 @@ pub struct BudgetQuery {
     pub step: BudgetStep,
     /// Figure of the earth.
     pub earth: Earth,
+    /// How cells on the coast count.
+    pub cells: Cells,
 }
 
 /// A budget with all that is needed to cite it.
@@ -50,8 +54,18 @@ pub struct BudgetAnswer {
     pub region: String,
     /// Figure of the earth.
     pub earth: Earth,
-    /// Unit of `budget_tg`.
+    /// How cells on the coast count.
+    pub cells: Cells,
+    /// Unit of `budget_tg` and `gap_tg`.
     pub unit: String,
+    /// Area of the region, land included, m².
+    pub region_area_m2: f64,
+    /// Area of the sea in it, m².
+    pub ocean_area_m2: f64,
+    /// What estimates of gaps are made of.
+    pub gap_basis: String,
+    /// How the region was taken where that may surprise.
+    pub notes: Vec<String>,
     /// Rows in the order of time.
     pub rows: Vec<BudgetRow>,
 }
@@ -78,15 +92,21 @@ pub async fn budget_of(
         });
     }
     let (window, steps) = steps_inside(manifest, query.from, query.to)?;
-    let region_area_m2 = area::region_area_m2(&query.region, query.earth)?;
+    let extent = extent_of(&query.region, query.earth).await?;
     let weights =
-        weights::stored(engine.store(), &manifest.grid, &query.region, query.earth).await?;
+        RegionKeys::stored(engine.store(), &manifest.grid, &query.region, query.earth).await?;
     let Some(weights) = weights else {
         let (product, bounds) = (manifest.product.clone(), catalog::bounds_text(manifest));
         return Err(ComputeError::RegionOutside { product, bounds });
     };
     let sums = sums::of_steps(engine, manifest, &steps, &weights, Measure::Mass).await?;
-    let rows = rows(&row_periods(window, query.step)?, &sums, region_area_m2).ok_or_else(|| {
+    let asked = Asked {
+        region_area_m2: extent.area_m2,
+        ocean_area_m2: extent.ocean_m2,
+        sea_steps: sums.sea_steps,
+        cells: query.cells,
+    };
+    let rows = rows(&row_periods(window, query.step)?, &sums.steps, &asked).ok_or_else(|| {
         ComputeError::inconsistent(manifest.id().to_string(), "its sums exceed 128 bits")
     })?;
     Ok(BudgetAnswer {
@@ -97,9 +117,22 @@ pub async fn budget_of(
         synthetic: manifest.synthetic,
         region: query.region_name.clone(),
         earth: query.earth,
+        cells: query.cells,
         unit: "Tg C".to_owned(),
+        region_area_m2: extent.area_m2,
+        ocean_area_m2: extent.ocean_m2,
+        gap_basis: BASIS.to_owned(),
+        notes: extent.notes,
         rows,
     })
+}
+
+/// The extent of a region: overlaid with all land, which takes a while.
+pub(crate) async fn extent_of(region: &Region, earth: Earth) -> Result<Extent, ComputeError> {
+    let region = region.clone();
+    tokio::task::spawn_blocking(move || extent(&region, earth))
+        .await
+        .map_err(|e| ComputeError::inconsistent("region", e))?
 }
 
 /// The asked period and the steps that reach into it.

@@ -5,7 +5,10 @@ use contract::time::{Period, TimeMs};
 use serde::{Deserialize, Serialize};
 
 use super::accumulated::Completeness;
+use super::bands::{BAND_COUNT, BandSum};
 use super::fixed::{AREA_DECIMALS, MASS_DECIMALS, decimal_text, share};
+use super::gaps::gap;
+use contract::region::Cells;
 
 /// What one row of a budget covers.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -38,7 +41,7 @@ impl std::str::FromStr for BudgetStep {
 }
 
 /// Exact sums of one step over a region.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StepSum {
     /// What the step covers.
     pub period: Period,
@@ -46,6 +49,39 @@ pub struct StepSum {
     pub mass_steps: i128,
     /// Area that holds data, m² in steps of 10⁻⁶.
     pub area_steps: i128,
+    /// The same of the sea alone, by bands of latitude that hold any.
+    pub sea: Vec<BandSum>,
+}
+
+impl StepSum {
+    /// Area of the sea that holds data, m² in steps of 10⁻⁶.
+    pub fn sea_area_steps(&self) -> i128 {
+        self.sea.iter().map(|sum| sum.area_steps).sum()
+    }
+
+    /// Mass and area that count.
+    fn counted(&self, cells: Cells) -> (i128, i128) {
+        match cells {
+            Cells::Whole => (self.mass_steps, self.area_steps),
+            Cells::OceanShare => (
+                self.sea.iter().map(|sum| sum.mass_steps).sum(),
+                self.sea_area_steps(),
+            ),
+        }
+    }
+}
+
+/// What sums are set against.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Asked {
+    /// Area of the region, land included, m².
+    pub region_area_m2: f64,
+    /// Area of the sea in it, wherever the grid lies, m².
+    pub ocean_area_m2: f64,
+    /// Area of its sea on the grid in every band, m² in steps of 10⁻⁶.
+    pub sea_steps: [i128; BAND_COUNT],
+    /// How cells on the coast count.
+    pub cells: Cells,
 }
 
 /// One row of a budget.
@@ -59,12 +95,22 @@ pub struct BudgetRow {
     pub budget_kg: String,
     /// The same in Tg (10⁹ kg).
     pub budget_tg: f64,
-    /// Share of the region's area and of the row's time that holds data, percent. Land counts as without data.
+    /// Share of the region's sea and of the row's time that holds data, percent; 0 where the region holds no sea.
     pub coverage_percent: f64,
-    /// Area that holds data, mean over the time that steps cover, m².
+    /// Area that counted, mean over the time that steps cover, m²: with whole cells also land on the coast.
     pub area_m2: f64,
     /// Area of the region, land included, m².
     pub region_area_m2: f64,
+    /// Area of the sea in it, m².
+    pub ocean_area_m2: f64,
+    /// Area of the sea in it that holds data, mean over the time that steps cover, m².
+    pub ocean_with_data_m2: f64,
+    /// What the sea without data would add to the budget at the mean of its band of latitude, Tg: an estimate, never
+    /// part of the budget. None where there are gaps and nothing to estimate any of them from.
+    pub gap_tg: Option<f64>,
+    /// Area of the sea without data that the estimate stands for, mean over the time that steps cover, m². What is
+    /// missing besides has no estimate: bands without any data, sea beyond the grid, time without steps.
+    pub gap_area_m2: f64,
     /// How complete the sums of accumulated carbon are; none for fluxes, and in versions that did not count it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub completeness: Option<Completeness>,
@@ -99,7 +145,7 @@ pub fn row_periods(window: Period, step: BudgetStep) -> Result<Vec<Period>, Cont
 /// One row of each period that some step reaches into.
 ///
 /// A step that lies partly inside counts by the share of its time. None if a sum leaves 128 bits.
-pub fn rows(periods: &[Period], sums: &[StepSum], region_area_m2: f64) -> Option<Vec<BudgetRow>> {
+pub fn rows(periods: &[Period], sums: &[StepSum], asked: &Asked) -> Option<Vec<BudgetRow>> {
     let mut rows = vec![];
     for &period in periods {
         let first = sums.partition_point(|sum| sum.period.end <= period.start);
@@ -108,10 +154,10 @@ pub fn rows(periods: &[Period], sums: &[StepSum], region_area_m2: f64) -> Option
             .take_while(|sum| sum.period.start < period.end);
         let mut total = Total::default();
         for sum in inside {
-            total.add(sum, period)?;
+            total.add(sum, period, asked)?;
         }
         if total.covered_ms > 0 {
-            rows.push(total.row(period, region_area_m2));
+            rows.push(total.row(period, asked));
         }
     }
     Some(rows)
@@ -123,45 +169,88 @@ struct Total {
     mass_steps: i128,
     /// Area x time, 10⁻⁶ m² ms.
     area_time: i128,
+    /// The same of the sea.
+    sea_time: i128,
+    gap_kg: f64,
+    /// Area of gaps with an estimate x time, m² ms.
+    gap_time_m2_ms: f64,
     covered_ms: i64,
 }
 
 impl Total {
-    fn add(&mut self, sum: &StepSum, row: Period) -> Option<()> {
+    fn add(&mut self, sum: &StepSum, row: Period, asked: &Asked) -> Option<()> {
         let start = sum.period.start.max(row.start);
         let end = sum.period.end.min(row.end);
         let inside_ms = end.ms() - start.ms();
         let whole_ms = sum.period.end.ms() - sum.period.start.ms();
-        self.mass_steps =
-            self.mass_steps
-                .checked_add(share(sum.mass_steps, inside_ms, whole_ms)?)?;
-        self.area_time = self
-            .area_time
-            .checked_add(sum.area_steps.checked_mul(i128::from(inside_ms))?)?;
+        let (mass_steps, area_steps) = sum.counted(asked.cells);
+        self.mass_steps = self
+            .mass_steps
+            .checked_add(share(mass_steps, inside_ms, whole_ms)?)?;
+        let of_time = |steps: i128| steps.checked_mul(i128::from(inside_ms));
+        self.area_time = self.area_time.checked_add(of_time(area_steps)?)?;
+        self.sea_time = self.sea_time.checked_add(of_time(sum.sea_area_steps())?)?;
+        let gap = gap(&asked.sea_steps, &sum.sea);
+        self.gap_kg += gap.mass_kg * (inside_ms as f64 / whole_ms as f64);
+        self.gap_time_m2_ms += gap.area_m2 * inside_ms as f64;
         self.covered_ms += inside_ms;
         Some(())
     }
 
-    fn row(&self, period: Period, region_area_m2: f64) -> BudgetRow {
-        let area_time_m2_ms = self.area_time as f64 / 10f64.powi(AREA_DECIMALS as i32);
+    fn row(&self, period: Period, asked: &Asked) -> BudgetRow {
+        let m2_ms = |steps: i128| steps as f64 / 10f64.powi(AREA_DECIMALS as i32);
         let row_ms = (period.end.ms() - period.start.ms()) as f64;
+        let covered_ms = self.covered_ms as f64;
+        let ocean_with_data_m2 = m2_ms(self.sea_time) / covered_ms;
+        let on_grid_m2 =
+            asked.sea_steps.iter().sum::<i128>() as f64 / 10f64.powi(AREA_DECIMALS as i32);
+        let has_gaps = on_grid_m2 > ocean_with_data_m2 * (1.0 + f64::EPSILON * 8.0);
         BudgetRow {
             start: period.start,
             end: period.end,
             budget_kg: decimal_text(self.mass_steps, MASS_DECIMALS),
             budget_tg: self.mass_steps as f64 / 10f64.powi(MASS_DECIMALS as i32) / KG_PER_TG,
-            // Cells and the whole region are rounded apart, so a full region could come out a hair above.
-            coverage_percent: (100.0 * area_time_m2_ms / (region_area_m2 * row_ms)).min(100.0),
-            area_m2: area_time_m2_ms / self.covered_ms as f64,
-            region_area_m2,
+            coverage_percent: coverage_percent(m2_ms(self.sea_time) / row_ms, asked.ocean_area_m2),
+            area_m2: m2_ms(self.area_time) / covered_ms,
+            region_area_m2: asked.region_area_m2,
+            ocean_area_m2: asked.ocean_area_m2,
+            ocean_with_data_m2,
+            gap_tg: (!has_gaps || self.gap_time_m2_ms > 0.0).then_some(self.gap_kg / KG_PER_TG),
+            gap_area_m2: self.gap_time_m2_ms / covered_ms,
             completeness: None,
         }
+    }
+}
+
+/// Share of the sea that holds data, percent; 0 where there is no sea. Cells and the whole sea are rounded apart, so that
+/// a full region could come out a hair above.
+pub fn coverage_percent(with_data_m2: f64, ocean_area_m2: f64) -> f64 {
+    if ocean_area_m2 > 0.0 {
+        (100.0 * with_data_m2 / ocean_area_m2).min(100.0)
+    } else {
+        0.0
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A region of 200 m², half of it sea in one band.
+    fn asked(cells: Cells) -> Asked {
+        let mut sea_steps = [0; BAND_COUNT];
+        sea_steps[20] = 100_000_000;
+        Asked {
+            region_area_m2: 200.0,
+            ocean_area_m2: 100.0,
+            sea_steps,
+            cells,
+        }
+    }
+
+    fn rows(periods: &[Period], sums: &[StepSum]) -> Option<Vec<BudgetRow>> {
+        super::rows(periods, sums, &asked(Cells::Whole))
+    }
 
     fn period(start: &str, end: &str) -> Period {
         Period::new(start.parse().unwrap(), end.parse().unwrap()).unwrap()
@@ -172,7 +261,12 @@ mod tests {
         StepSum {
             period: Period::month(2000, month).unwrap(),
             mass_steps: mass_kg * scale,
-            area_steps: 50_000_000,
+            area_steps: 60_000_000,
+            sea: vec![BandSum {
+                band: 20,
+                mass_steps: mass_kg * scale / 2,
+                area_steps: 50_000_000,
+            }],
         }
     }
 
@@ -198,18 +292,18 @@ mod tests {
     #[test]
     fn a_step_partly_inside_counts_by_its_share_of_time() {
         let sums = [month(1, 310), month(2, 290)];
-        let rows = rows(&[period("2000-01-31", "2000-02-11")], &sums, 100.0).unwrap();
+        let rows = rows(&[period("2000-01-31", "2000-02-11")], &sums).unwrap();
         assert_eq!(rows[0].budget_kg, "110.000000000"); // 1 of 31 days of 310 and 10 of 29 days of 290
-        assert!((rows[0].area_m2 - 50.0).abs() < 1e-9);
+        assert!((rows[0].area_m2 - 60.0).abs() < 1e-9);
         assert!((rows[0].coverage_percent - 50.0).abs() < 1e-9);
     }
 
     #[test]
     fn time_without_steps_lowers_the_coverage() {
         let sums = [month(1, 310)];
-        let rows = rows(&[period("2000-01-01", "2000-03-03")], &sums, 100.0).unwrap(); // 31 of 62 days
+        let rows = rows(&[period("2000-01-01", "2000-03-03")], &sums).unwrap(); // 31 of 62 days
         assert!((rows[0].coverage_percent - 25.0).abs() < 1e-9);
-        assert!((rows[0].area_m2 - 50.0).abs() < 1e-9);
+        assert!((rows[0].area_m2 - 60.0).abs() < 1e-9);
     }
 
     #[test]
@@ -218,7 +312,7 @@ mod tests {
             period("1999-01-01", "2000-01-01"),
             period("2000-02-01", "2000-03-01"),
         ];
-        assert!(rows(&periods, &[month(1, 1)], 1.0).unwrap().is_empty());
+        assert!(rows(&periods, &[month(1, 1)]).unwrap().is_empty());
     }
 
     #[test]
@@ -228,11 +322,51 @@ mod tests {
             .map(|d| period(&format!("2000-01-{d:02}"), &format!("2000-01-{:02}", d + 1)))
             .chain([period("2000-01-31", "2000-02-01")])
             .collect();
-        let sum: f64 = rows(&days, &sums, 1.0)
+        let sum: f64 = rows(&days, &sums)
             .unwrap()
             .iter()
             .map(|row| row.budget_tg)
             .sum();
         assert!((sum * KG_PER_TG - 1.0).abs() < 1e-7);
+    }
+
+    #[test]
+    fn gaps_are_estimated_apart_and_cells_count_as_asked() {
+        let (sums, period) = ([month(1, 310)], period("2000-01-01", "2000-02-01"));
+        let of = |cells| {
+            super::rows(&[period], &sums, &asked(cells))
+                .unwrap()
+                .remove(0)
+        };
+        let (whole, share) = (of(Cells::Whole), of(Cells::OceanShare));
+        assert_eq!(whole.budget_kg, "310.000000000");
+        assert_eq!(share.budget_kg, "155.000000000");
+        assert_eq!((whole.area_m2, share.area_m2), (60.0, 50.0));
+        for row in [whole, share] {
+            assert_eq!((row.region_area_m2, row.ocean_area_m2), (200.0, 100.0));
+            assert_eq!((row.ocean_with_data_m2, row.coverage_percent), (50.0, 50.0));
+            // As much sea is missing as holds 155 kg.
+            assert!((row.gap_tg.unwrap() * KG_PER_TG - 155.0).abs() < 1e-9);
+            assert_eq!(row.gap_area_m2, 50.0);
+        }
+    }
+
+    #[test]
+    fn gaps_beside_nothing_have_no_estimate_and_no_gaps_are_nothing() {
+        let period = period("2000-01-01", "2000-02-01");
+        let row = |sea| {
+            let sum = StepSum {
+                sea,
+                ..month(1, 310)
+            };
+            rows(&[period], &[sum]).unwrap().remove(0)
+        };
+        assert_eq!(row(vec![]).gap_tg, None);
+        let full = BandSum {
+            band: 20,
+            mass_steps: 7,
+            area_steps: 100_000_000,
+        };
+        assert_eq!(row(vec![full]).gap_tg, Some(0.0));
     }
 }

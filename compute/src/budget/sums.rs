@@ -9,12 +9,14 @@ use contract::time::{Period, TimeMs};
 use serde::{Deserialize, Serialize};
 use storage::{StorageError, Store, document, manifests};
 
-use super::asked::asked;
+use super::asked::{AskedRegion, asked};
+use super::bands::{BAND_COUNT, BandSum};
 use super::rows::StepSum;
+use crate::region::weights::RegionKeys;
 use crate::{ComputeError, Engine};
 
-/// Version of stored sums: it changes when their bits or their layout do.
-const SCHEMA: u32 = 2;
+/// Version of stored sums: it changes when their bits or their layout do. 3: the sea by bands of latitude.
+const SCHEMA: u32 = 3;
 /// How many versions back sums are looked for that can be taken over.
 const VERSIONS_BACK: u64 = 8;
 
@@ -34,7 +36,7 @@ pub enum Measure {
 struct Table {
     schema: u32,
     manifest: ManifestId,
-    weights: ObjectKey,
+    weights: RegionKeys,
     measure: Measure,
     rows: Vec<Row>,
 }
@@ -48,6 +50,43 @@ struct Row {
     end: TimeMs,
     mass_steps: String,
     area_steps: String,
+    sea: Vec<SeaBand>,
+}
+
+/// The sea with data in a band.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SeaBand {
+    band: usize,
+    mass_steps: String,
+    area_steps: String,
+}
+
+impl SeaBand {
+    fn of(sum: &BandSum) -> Self {
+        Self {
+            band: sum.band,
+            mass_steps: sum.mass_steps.to_string(),
+            area_steps: sum.area_steps.to_string(),
+        }
+    }
+
+    fn sum(&self) -> Option<BandSum> {
+        Some(BandSum {
+            band: Some(self.band).filter(|band| *band < BAND_COUNT)?,
+            mass_steps: self.mass_steps.parse().ok()?,
+            area_steps: self.area_steps.parse().ok()?,
+        })
+    }
+}
+
+/// Exact sums of some steps over a region, and the sea that they are sums of.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct RegionSums {
+    /// In the order of time.
+    pub(crate) steps: Vec<StepSum>,
+    /// Area of all sea of the region on the grid in every band, m² in steps of 10⁻⁶.
+    pub(crate) sea_steps: [i128; BAND_COUNT],
 }
 
 impl Row {
@@ -56,6 +95,7 @@ impl Row {
             period: Period::new(self.start, self.end).ok()?,
             mass_steps: self.mass_steps.parse().ok()?,
             area_steps: self.area_steps.parse().ok()?,
+            sea: self.sea.iter().map(SeaBand::sum).collect::<Option<_>>()?,
         })
     }
 }
@@ -72,12 +112,12 @@ pub struct StoredSums {
 }
 
 /// Hash of all that a version's sums over a region's weights are made of.
-pub(crate) fn input(manifest: &ManifestId, weights: &ObjectKey, measure: Measure) -> Digest {
+pub(crate) fn input(manifest: &ManifestId, weights: &RegionKeys, measure: Measure) -> Digest {
     Digest::of_json(&(SCHEMA, manifest, weights, measure))
 }
 
 /// The key of a version's sums over a region's weights.
-pub fn key(manifest: &ManifestId, weights: &ObjectKey, measure: Measure) -> ObjectKey {
+pub fn key(manifest: &ManifestId, weights: &RegionKeys, measure: Measure) -> ObjectKey {
     let digest = input(manifest, weights, measure);
     format!("{FOLDER}/{}/{digest}.json", manifest.product)
         .parse()
@@ -92,19 +132,23 @@ pub(crate) async fn of_steps(
     engine: &Engine,
     manifest: &Manifest,
     steps: &[&Step],
-    weights: &ObjectKey,
+    weights: &RegionKeys,
     measure: Measure,
-) -> Result<Vec<StepSum>, ComputeError> {
+) -> Result<RegionSums, ComputeError> {
+    let region = AskedRegion::read(engine, &manifest.grid, weights).await?;
     let key = key(&manifest.id(), weights, measure);
     let stored = stored_rows(engine.store(), &key).await?.rows();
     let known: Option<Vec<StepSum>> = steps
         .iter()
         .map(|step| stored.get(&step.frame)?.sum())
         .collect();
-    match known {
-        Some(sums) => Ok(sums),
-        None => asked(engine, steps, weights, measure).await,
-    }
+    Ok(RegionSums {
+        steps: match known {
+            Some(sums) => sums,
+            None => asked(engine, steps, &region, measure).await?,
+        },
+        sea_steps: region.sea_steps,
+    })
 }
 
 /// Stores the sums of all steps of a version, unless they are there. Those of frames that an earlier version had too
@@ -112,7 +156,7 @@ pub(crate) async fn of_steps(
 pub async fn store(
     engine: &Engine,
     manifest: &Manifest,
-    weights: &ObjectKey,
+    weights: &RegionKeys,
     measure: Measure,
 ) -> Result<StoredSums, ComputeError> {
     let store = engine.store();
@@ -136,7 +180,8 @@ pub async fn store(
         .collect();
     let computed_count = unknown.len();
     if computed_count > 0 {
-        let sums = asked(engine, &unknown, weights, measure).await?;
+        let region = AskedRegion::read(engine, &manifest.grid, weights).await?;
+        let sums = asked(engine, &unknown, &region, measure).await?;
         known.extend(unknown.iter().zip(sums).map(|(step, sum)| {
             let row = row_of(&step.frame, &sum);
             (step.frame.clone(), row)
@@ -161,11 +206,12 @@ pub async fn store(
 pub(crate) async fn verify(
     engine: &Engine,
     manifest: &Manifest,
-    weights: &ObjectKey,
+    weights: &RegionKeys,
     measure: Measure,
 ) -> Result<(), ComputeError> {
     let steps: Vec<&Step> = manifest.steps.iter().collect();
-    let sums = asked(engine, &steps, weights, measure).await?;
+    let region = AskedRegion::read(engine, &manifest.grid, weights).await?;
+    let sums = asked(engine, &steps, &region, measure).await?;
     let rows = steps
         .iter()
         .zip(&sums)
@@ -176,7 +222,7 @@ pub(crate) async fn verify(
 async fn put(
     store: &Store,
     manifest: &Manifest,
-    weights: &ObjectKey,
+    weights: &RegionKeys,
     measure: Measure,
     rows: Vec<Row>,
 ) -> Result<(), ComputeError> {
@@ -209,6 +255,7 @@ fn row_of(frame: &ObjectKey, sum: &StepSum) -> Row {
         end: sum.period.end,
         mass_steps: sum.mass_steps.to_string(),
         area_steps: sum.area_steps.to_string(),
+        sea: sum.sea.iter().map(SeaBand::of).collect(),
     }
 }
 
@@ -251,7 +298,7 @@ async fn stored_rows(store: &Store, key: &ObjectKey) -> Result<Stored, StorageEr
 async fn earlier_rows(
     store: &Store,
     manifest: &Manifest,
-    weights: &ObjectKey,
+    weights: &RegionKeys,
     measure: Measure,
 ) -> Result<BTreeMap<ObjectKey, Row>, ComputeError> {
     let oldest = manifest.number.saturating_sub(VERSIONS_BACK).max(1);

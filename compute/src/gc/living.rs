@@ -14,7 +14,7 @@ use crate::ComputeError;
 use crate::budget::named::EARTH;
 use crate::budget::{Measure, sums};
 use crate::derive::exact;
-use crate::region::weights;
+use crate::region::weights::RegionKeys;
 
 /// Folder of the numbered indexes of datasets of observations.
 pub(super) const INDEXES: &str = "observation-indexes";
@@ -119,7 +119,7 @@ fn named_sums(manifest: &Manifest) -> Result<Vec<ObjectKey>, ComputeError> {
     let (id, mut keys) = (manifest.id(), vec![]);
     for named in NAMED_REGIONS {
         let region = named.name.parse()?;
-        let weights = weights::key(&manifest.grid, &region, EARTH);
+        let weights = RegionKeys::new(&manifest.grid, &region, EARTH);
         for measure in [Measure::Mass, Measure::Mean] {
             keys.push(sums::key(&id, &weights, measure));
         }

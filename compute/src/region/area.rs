@@ -19,7 +19,7 @@ pub fn region_area_m2(region: &Region, earth: Earth) -> Result<f64, ComputeError
             east,
             north,
         } => Ok(earth.cell_area_m2(*south, *north, east - west)),
-        Region::Polygons(polygons) => Ok(rings(polygons)?
+        Region::Polygons(_) => Ok(rings(region)?
             .iter()
             .map(|ring| signed_area_m2(ring, earth))
             .sum()),

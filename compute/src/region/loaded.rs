@@ -40,6 +40,13 @@ impl RegionWeights {
         at.ok().map(|at| self.chunks[at].1.as_slice())
     }
 
+    /// Areas of the cells of every chunk that the region touches, with its number.
+    pub(crate) fn chunks(&self) -> impl Iterator<Item = (u32, &[f64])> {
+        self.chunks
+            .iter()
+            .map(|(chunk, areas)| (*chunk, areas.as_slice()))
+    }
+
     /// Runs of chunk numbers, `(first, last)`, that hold every chunk of the region and as few others as so few runs can.
     pub(crate) fn runs(&self) -> Vec<(u32, u32)> {
         runs(self.chunks.iter().map(|(chunk, _)| *chunk), MAX_RUNS)

@@ -9,12 +9,13 @@ use contract::earth::Earth;
 use contract::grid::Grid;
 
 use super::area::integral_m2;
-use super::rings::{Ring, bad};
+use super::cut::TURNS_DEG;
+use super::rings::Ring;
 use crate::ComputeError;
 
 /// Shares of a cell this close to none or all are none or all: rounding of sums over a row's edges.
-const SNAP: f64 = 1e-10;
-/// Shares of a cell beyond 0 and 1 by more than this come from rings that cross or overlap.
+const SNAP: f64 = 1e-12;
+/// Shares of a cell beyond 0 and 1 by more than this cannot come from rings that count every place once.
 const SLACK: f64 = 1e-6;
 
 /// Areas of the polygon's share of every cell of a band of rows, row-major over the whole width of the grid.
@@ -36,7 +37,7 @@ impl Band {
         let mut cover = Cover::new(grid, first_row, rows, earth);
         for ring in rings {
             let (west, east) = ring.lon_range_deg();
-            for turn in [-720.0, -360.0, 0.0, 360.0, 720.0] {
+            for turn in TURNS_DEG {
                 if west + turn < grid.east_deg() && east + turn > grid.west_deg {
                     ring.edges()
                         .for_each(|edge| cover.add_edge(edge.map(|[lon, lat]| [lon + turn, lat])));
@@ -202,9 +203,8 @@ impl<'a> Cover<'a> {
 fn checked(area_m2: f64, whole_m2: f64) -> Result<f64, ComputeError> {
     let share = area_m2 / whole_m2;
     if !(-SLACK..=1.0 + SLACK).contains(&share) {
-        return Err(bad(
-            "its rings cross themselves or each other; repair the polygon",
-        ));
+        let reason = format!("a cell would be covered {share} times");
+        return Err(ComputeError::inconsistent("the region's rings", reason));
     }
     Ok(if share < SNAP {
         0.0

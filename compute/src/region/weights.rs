@@ -6,16 +6,62 @@ use contract::earth::Earth;
 use contract::grid::Grid;
 use contract::key::ObjectKey;
 use contract::region::Region;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use storage::{StorageError, Store};
 
 use super::box_cover::{self, Bounds};
 use super::polygon_cover::Band;
-use super::rings::rings;
+use super::rings::{Ring, rings};
+use super::sea::sea;
 use crate::ComputeError;
 
-/// Version of the way weights are computed: it changes when their bits do.
-const METHOD: u32 = 1;
+/// Version of the way weights of boxes are computed: it changes when their bits do.
+const BOX_METHOD: u32 = 1;
+/// The same of polygons and of the sea. 2: edges are as wide as they are written, what overlaps counts once.
+const POLYGON_METHOD: u32 = 2;
+
+/// What of a region is weighed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Surface {
+    /// All of it.
+    All,
+    /// The sea in it.
+    Ocean,
+}
+
+/// Where the weights of a region on a grid are, whether they are there or not.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RegionKeys {
+    /// Of all of it.
+    pub all: ObjectKey,
+    /// Of the sea in it.
+    pub ocean: ObjectKey,
+}
+
+impl RegionKeys {
+    /// Those of a region on a grid.
+    pub fn new(grid: &Grid, region: &Region, earth: Earth) -> Self {
+        Self {
+            all: key(grid, region, earth),
+            ocean: key_of(grid, region, earth, Surface::Ocean),
+        }
+    }
+
+    /// The same, once both are stored; none if the region lies outside the grid. The sea's may hold no chunk.
+    pub async fn stored(
+        store: &Store,
+        grid: &Grid,
+        region: &Region,
+        earth: Earth,
+    ) -> Result<Option<Self>, ComputeError> {
+        if stored(store, grid, region, earth).await?.is_none() {
+            return Ok(None);
+        }
+        let ocean = stored_of(store, grid, region, earth, Surface::Ocean).await?;
+        Ok(ocean.map(|_there| Self::new(grid, region, earth)))
+    }
+}
 
 /// What weights depend on.
 #[derive(Serialize)]
@@ -25,6 +71,8 @@ struct Job<'a> {
     grid: &'a Grid,
     region: &'a Region,
     earth: Earth,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    surface: Option<Surface>,
 }
 
 /// Areas of a region's share of every cell, m², by chunk number; only chunks with any area.
@@ -33,13 +81,21 @@ pub fn compute(
     region: &Region,
     earth: Earth,
 ) -> Result<Vec<(u32, Vec<f64>)>, ComputeError> {
-    let mut chunks = vec![];
-    let mut keep = |chunk: usize, areas: Vec<f64>| {
-        if areas.iter().any(|&area| area > 0.0) {
-            chunks.push((chunk as u32, areas));
-        }
-    };
+    compute_of(grid, region, earth, Surface::All)
+}
+
+/// The same of a surface.
+pub fn compute_of(
+    grid: &Grid,
+    region: &Region,
+    earth: Earth,
+    surface: Surface,
+) -> Result<Vec<(u32, Vec<f64>)>, ComputeError> {
     let bounds = match region {
+        _ if surface == Surface::Ocean => {
+            return ring_chunks(grid, &sea(&rings(region)?), earth);
+        }
+        Region::Polygons(_) => return ring_chunks(grid, &rings(region)?, earth),
         Region::Global => Bounds::global(grid),
         Region::Box {
             west,
@@ -52,35 +108,60 @@ pub fn compute(
             east: *east,
             north: *north,
         },
-        Region::Polygons(polygons) => {
-            let rings = rings(polygons)?;
-            let mut band = None;
-            for (chunk, window) in frame_chunks(grid).into_iter().enumerate() {
-                debug_assert_eq!(window.row % CHUNK_ROWS, 0, "chunks start at band rows");
-                let current = match band.take() {
-                    Some((row, current)) if row == window.row => current,
-                    _ => Band::new(&rings, grid, window.row, earth)?,
-                };
-                keep(chunk, current.window(window));
-                band = Some((window.row, current));
-            }
-            return Ok(chunks);
-        }
     };
+    let areas = |window| box_cover::areas_m2(bounds, grid, window, earth);
+    let windows = frame_chunks(grid).into_iter().enumerate();
+    Ok(windows
+        .map(|(chunk, window)| (chunk as u32, areas(window)))
+        .filter(any_area)
+        .collect())
+}
+
+fn any_area((_chunk, areas_m2): &(u32, Vec<f64>)) -> bool {
+    areas_m2.iter().any(|&area_m2| area_m2 > 0.0)
+}
+
+/// Areas inside of rings.
+fn ring_chunks(
+    grid: &Grid,
+    rings: &[Ring],
+    earth: Earth,
+) -> Result<Vec<(u32, Vec<f64>)>, ComputeError> {
+    let mut chunks = vec![];
+    let mut band = None;
     for (chunk, window) in frame_chunks(grid).into_iter().enumerate() {
-        keep(chunk, box_cover::areas_m2(bounds, grid, window, earth));
+        debug_assert_eq!(window.row % CHUNK_ROWS, 0, "chunks start at band rows");
+        let current = match band.take() {
+            Some((row, current)) if row == window.row => current,
+            _ => Band::new(rings, grid, window.row, earth)?,
+        };
+        chunks.push((chunk as u32, current.window(window)));
+        band = Some((window.row, current));
     }
+    chunks.retain(any_area);
     Ok(chunks)
 }
 
 /// Where weights are stored, whether they are there or not.
 pub fn key(grid: &Grid, region: &Region, earth: Earth) -> ObjectKey {
+    key_of(grid, region, earth, Surface::All)
+}
+
+/// The same of a surface.
+pub fn key_of(grid: &Grid, region: &Region, earth: Earth, surface: Surface) -> ObjectKey {
+    let is_polygonal = surface == Surface::Ocean || matches!(region, Region::Polygons(_));
     ObjectKey::weights(&Digest::of_json(&Job {
-        method: METHOD,
+        method: if is_polygonal {
+            POLYGON_METHOD
+        } else {
+            BOX_METHOD
+        },
         layout: storage::weights::LAYOUT,
         grid,
         region,
         earth,
+        // Left out for whole regions, whose keys are older than this.
+        surface: (surface != Surface::All).then_some(surface),
     }))
 }
 
@@ -92,7 +173,18 @@ pub async fn stored(
     region: &Region,
     earth: Earth,
 ) -> Result<Option<ObjectKey>, ComputeError> {
-    let key = key(grid, region, earth);
+    stored_of(store, grid, region, earth, Surface::All).await
+}
+
+/// The same of a surface. Of the sea they are stored also where the region on the grid is all land, and hold no chunk.
+pub async fn stored_of(
+    store: &Store,
+    grid: &Grid,
+    region: &Region,
+    earth: Earth,
+    surface: Surface,
+) -> Result<Option<ObjectKey>, ComputeError> {
+    let key = key_of(grid, region, earth, surface);
     let is_damaged = match storage::weights::check(store, &key).await {
         Ok(()) => return Ok(Some(key)),
         Err(e) if e.is_not_found() => false,
@@ -103,10 +195,10 @@ pub async fn stored(
         Err(e) => return Err(e.into()),
     };
     let (grid, region) = (*grid, region.clone());
-    let chunks = tokio::task::spawn_blocking(move || compute(&grid, &region, earth))
+    let chunks = tokio::task::spawn_blocking(move || compute_of(&grid, &region, earth, surface))
         .await
         .map_err(|e| ComputeError::inconsistent("weights", e))??;
-    if chunks.is_empty() {
+    if chunks.is_empty() && surface == Surface::All {
         return Ok(None);
     }
     if is_damaged {

@@ -8,10 +8,10 @@ use contract::time::TimeMs;
 use serde::{Deserialize, Serialize};
 
 use crate::budget::fixed::{AREA_DECIMALS, MASS_DECIMALS};
-use crate::budget::rows::StepSum;
-use crate::budget::steps_inside;
+use crate::budget::rows::{StepSum, coverage_percent};
 use crate::budget::sums::{self, Measure};
-use crate::region::{area, weights};
+use crate::budget::{extent_of, steps_inside};
+use crate::region::weights::RegionKeys;
 use crate::{ComputeError, Engine, catalog};
 
 /// What a series over a region is asked for.
@@ -42,7 +42,7 @@ pub struct RegionValue {
     pub mean: Option<f64>,
     /// Area that holds data, m².
     pub area_m2: f64,
-    /// Share of the region's area that holds data, percent. Land counts as without data.
+    /// Share of the region's sea that holds data, percent; 0 where it holds no sea.
     pub coverage_percent: f64,
 }
 
@@ -67,6 +67,10 @@ pub struct RegionSeries {
     pub region: String,
     /// Area of the region, land included, m².
     pub region_area_m2: f64,
+    /// Area of the sea in it, m².
+    pub ocean_area_m2: f64,
+    /// How the region was taken where that may surprise.
+    pub notes: Vec<String>,
     /// Figure of the earth.
     pub earth: Earth,
     /// Values in the order of time.
@@ -89,9 +93,9 @@ pub async fn region_series_of(
     manifest: &Manifest,
 ) -> Result<RegionSeries, ComputeError> {
     let (_window, steps) = steps_inside(manifest, query.from, query.to)?;
-    let region_area_m2 = area::region_area_m2(&query.region, query.earth)?;
+    let extent = extent_of(&query.region, query.earth).await?;
     let weights =
-        weights::stored(engine.store(), &manifest.grid, &query.region, query.earth).await?;
+        RegionKeys::stored(engine.store(), &manifest.grid, &query.region, query.earth).await?;
     let Some(weights) = weights else {
         let (product, bounds) = (manifest.product.clone(), catalog::bounds_text(manifest));
         return Err(ComputeError::RegionOutside { product, bounds });
@@ -105,10 +109,10 @@ pub async fn region_series_of(
             end: sum.period.end,
             mean: mean.map(|mean| mean * display.factor + display.offset),
             area_m2,
-            // Cells and the whole region are rounded apart, so a full region could come out a hair above.
-            coverage_percent: (100.0 * area_m2 / region_area_m2).min(100.0),
+            coverage_percent: coverage_percent(m2(sum.sea_area_steps()), extent.ocean_m2),
         }
     };
+    let series = sums.steps.iter().map(value).collect();
     Ok(RegionSeries {
         product: manifest.product.clone(),
         manifest: manifest.id(),
@@ -118,15 +122,21 @@ pub async fn region_series_of(
         quantity: manifest.quantity.title().to_owned(),
         unit: display.unit.to_owned(),
         region: query.region_name.clone(),
-        region_area_m2,
+        region_area_m2: extent.area_m2,
+        ocean_area_m2: extent.ocean_m2,
+        notes: extent.notes,
         earth: query.earth,
-        series: sums.iter().map(value).collect(),
+        series,
     })
+}
+
+fn m2(steps: i128) -> f64 {
+    steps as f64 / 10f64.powi(AREA_DECIMALS as i32)
 }
 
 /// Mean in the stored unit over the cells with data, none without any, and their area, m².
 fn mean_and_area(sum: &StepSum) -> (Option<f64>, f64) {
-    let area_m2 = sum.area_steps as f64 / 10f64.powi(AREA_DECIMALS as i32);
+    let area_m2 = m2(sum.area_steps);
     let integral = sum.mass_steps as f64 / 10f64.powi(MASS_DECIMALS as i32);
     ((sum.area_steps > 0).then(|| integral / area_m2), area_m2)
 }

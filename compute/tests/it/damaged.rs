@@ -163,7 +163,7 @@ async fn damaged_sums_are_computed_again() {
     let manifest = manifests::latest(&store, &product("wavy")).await;
     let manifest = manifest.unwrap().unwrap();
     let region: Region = "global".parse().unwrap();
-    let weights = weights::stored(&store, &GRID, &region, Earth::Wgs84).await;
+    let weights = weights::RegionKeys::stored(&store, &GRID, &region, Earth::Wgs84).await;
     let weights = weights.unwrap().unwrap();
     let query = RegionSeriesQuery {
         product: product("wavy"),

@@ -10,6 +10,7 @@ use contract::grid::Grid;
 use contract::manifest::{MANIFEST_SCHEMA, Manifest, SeriesSegment, Step};
 use contract::product::ProductId;
 use contract::quantity::Quantity;
+use contract::region::Cells;
 use contract::time::Period;
 use storage::{Store, domain, frames, manifests, series};
 
@@ -139,6 +140,7 @@ pub(crate) fn total(id: &ProductId, region: &str) -> BudgetQuery {
         to: None,
         step: BudgetStep::Total,
         earth: Earth::Wgs84,
+        cells: Cells::Whole,
     }
 }
 

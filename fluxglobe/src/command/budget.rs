@@ -6,11 +6,14 @@ use anyhow::Result;
 use comfy_table::presets::NOTHING;
 use comfy_table::{CellAlignment, Table};
 use compute::budget::{BudgetAnswer, BudgetQuery, BudgetRow, BudgetStep};
+use compute::region::file;
 use contract::quantity::Quantity;
 use contract::region::Region;
 
 use crate::cli::{Budget, Settings, Step};
 use crate::{deployment, progress};
+
+const M2_PER_MILLION_KM2: f64 = 1e12;
 
 pub(crate) async fn run(settings: &Settings, options: &Budget) -> Result<()> {
     let store = deployment::store(settings)?;
@@ -27,6 +30,7 @@ pub(crate) async fn run(settings: &Settings, options: &Budget) -> Result<()> {
             Step::Total => BudgetStep::Total,
         },
         earth: options.earth,
+        cells: options.cells,
     };
     let bar = progress::bar("sum over the region", 1);
     let engine = deployment::region_engine(settings, store)?;
@@ -36,10 +40,25 @@ pub(crate) async fn run(settings: &Settings, options: &Budget) -> Result<()> {
         return progress::result(&serde_json::to_string_pretty(&answer)?);
     }
     progress::result(&table(&answer).to_string())?;
+    let million_km2 = |m2: f64| m2 / M2_PER_MILLION_KM2;
     progress::say(&format!(
-        "{} of {}, {} earth, positive out of the sea; cite {}",
-        answer.unit, answer.region, answer.earth, answer.manifest
+        "{} of {}, {} earth, positive out of the sea; {} ({}); cite {}",
+        answer.unit,
+        answer.region,
+        answer.earth,
+        answer.cells.title(),
+        answer.cells,
+        answer.manifest
     ));
+    progress::say(&format!(
+        "asked for {:.3} 10⁶ km², {:.3} of it sea; what gaps would add, not part of the budget: {}",
+        million_km2(answer.region_area_m2),
+        million_km2(answer.ocean_area_m2),
+        answer.gap_basis
+    ));
+    for note in &answer.notes {
+        progress::say(&format!("note: {note}"));
+    }
     let is_counted = |row: &BudgetRow| row.completeness.is_some();
     if product.quantity == Quantity::AccumulatedCarbon && !answer.rows.iter().all(is_counted) {
         progress::say(
@@ -50,14 +69,12 @@ pub(crate) async fn run(settings: &Settings, options: &Budget) -> Result<()> {
     Ok(())
 }
 
-/// A GeoJSON file, a named region or a box.
+/// A region file, a named region, a box, GeoJSON text or well-known text.
 pub(crate) fn region(text: &str) -> Result<Region> {
-    let extension = Path::new(text)
-        .extension()
-        .and_then(|extension| extension.to_str());
-    match extension.map(str::to_ascii_lowercase).as_deref() {
-        Some("geojson" | "json") => Ok(compute::region::geojson_file::read(Path::new(text))?),
-        _ => Ok(text.parse()?),
+    if file::is_file_name(text) {
+        Ok(file::read(Path::new(text))?)
+    } else {
+        Ok(text.parse()?)
     }
 }
 
@@ -65,12 +82,20 @@ fn table(answer: &BudgetAnswer) -> Table {
     let mut table = Table::new();
     table.load_preset(NOTHING);
     let is_counted = answer.rows.iter().any(|row| row.completeness.is_some());
-    let mut header = vec!["from", "to", "Tg C", "% of area", "10⁶ km² with data"];
+    let mut header = vec![
+        "from",
+        "to",
+        "Tg C",
+        "% of sea",
+        "10⁶ km² of sea with data",
+        "gaps would add Tg C",
+        "for 10⁶ km²",
+    ];
     if is_counted {
         header.extend(["10⁶ km² complete", "incomplete", "% complete"]);
     }
     table.set_header(header);
-    for column in 2..8 {
+    for column in 2..10 {
         if let Some(column) = table.column_mut(column) {
             column.set_cell_alignment(CellAlignment::Right);
         }
@@ -81,7 +106,10 @@ fn table(answer: &BudgetAnswer) -> Table {
             progress::day(row.end),
             format!("{:.3}", row.budget_tg),
             format!("{:.1}", row.coverage_percent),
-            format!("{:.3}", row.area_m2 / 1e12),
+            format!("{:.3}", row.ocean_with_data_m2 / M2_PER_MILLION_KM2),
+            row.gap_tg
+                .map_or_else(|| "unknown".to_owned(), |gap_tg| format!("{gap_tg:.3}")),
+            format!("{:.3}", row.gap_area_m2 / M2_PER_MILLION_KM2),
         ];
         if let Some(completeness) = &row.completeness {
             cells.push(format!("{:.3}", completeness.complete_m2 / 1e12));

@@ -65,6 +65,9 @@ pub(crate) async fn polygon(settings: &Settings, options: &StatsPolygon) -> Resu
         answer.earth,
         answer.manifest
     ));
+    for note in &answer.notes {
+        progress::say(&format!("note: {note}"));
+    }
     progress::say(&answer.source);
     Ok(())
 }
@@ -73,7 +76,7 @@ fn region_table(answer: &RegionSeries) -> Table {
     let mut table = Table::new();
     table.load_preset(NOTHING);
     let unit = answer.unit.as_str();
-    table.set_header(["from", "to", unit, "% of area", "10⁶ km² with data"]);
+    table.set_header(["from", "to", unit, "% of sea", "10⁶ km² with data"]);
     for column in 2..5 {
         if let Some(column) = table.column_mut(column) {
             column.set_cell_alignment(CellAlignment::Right);

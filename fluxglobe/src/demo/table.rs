@@ -9,7 +9,7 @@ use compute::check::AgainstPaper;
 use compute::published::Stated;
 use contract::earth::Earth;
 use contract::manifest::Manifest;
-use contract::region::Region;
+use contract::region::{Cells, Region};
 
 use crate::demo::check::Comparison;
 use crate::progress;
@@ -73,13 +73,14 @@ pub(crate) async fn synthetic(engine: &Engine, flux: &Manifest) -> Result<String
         to: None,
         step: BudgetStep::Month,
         earth: Earth::Wgs84,
+        cells: Cells::Whole,
     };
     let answer = compute::budget::budget_of(engine, &query, flux).await?;
     let mut table = table(&[
         "SYNTHETIC: air-sea carbon of a generated sea",
         "to",
         "Tg C",
-        "% of area",
+        "% of sea",
     ]);
     for row in &answer.rows {
         let numbers = [

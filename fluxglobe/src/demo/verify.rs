@@ -6,7 +6,7 @@ use anyhow::{Context as _, Result};
 use compute::budget::{BudgetQuery, BudgetStep};
 use contract::earth::Earth;
 use contract::manifest::Manifest;
-use contract::region::Region;
+use contract::region::{Cells, Region};
 use storage::Store;
 use tile_server::Server;
 
@@ -151,6 +151,7 @@ async fn mass(settings: &Settings, store: &Store, flux: &Manifest) -> Result<Opt
         to: None,
         step: BudgetStep::Total,
         earth: Earth::Wgs84,
+        cells: Cells::Whole,
     };
     let answer =
         compute::budget::budget_of(&deployment::engine(settings, store.clone())?, &query, flux)

@@ -34,6 +34,8 @@ struct Area<'a> {
     manifest: &'a ManifestId,
     region: String,
     region_area_m2: f64,
+    ocean_area_m2: f64,
+    notes: &'a [String],
     earth: Earth,
     unit: &'static str,
     series: Vec<AreaValue>,
@@ -71,7 +73,7 @@ pub(crate) async fn get(
     let Some(asked) = query.region.as_deref() else {
         return Err(ServerError::Missing {
             name: "region",
-            wanted: "global, a name that /api/regions lists, or west,south,east,north in degrees",
+            wanted: "global, a name that /api/regions lists, west,south,east,north in degrees, GeoJSON or WKT text",
         });
     };
     let request = AreaRequest {
@@ -90,6 +92,8 @@ pub(crate) async fn get(
         manifest: &layer.id,
         region,
         region_area_m2: series.region_area_m2,
+        ocean_area_m2: series.ocean_area_m2,
+        notes: &series.notes,
         earth,
         unit: manifest.quantity.display().unit,
         series: series.rows.iter().map(AreaValue::from).collect(),

@@ -10,7 +10,7 @@ use contract::earth::Earth;
 use contract::manifest::ManifestId;
 use contract::product::ProductId;
 use contract::quantity::Quantity;
-use contract::region::{NamedRegion, Region};
+use contract::region::{Cells, NamedRegion, Region};
 use contract::time::{Period, TimeMs};
 use serde::{Deserialize, Serialize};
 
@@ -29,6 +29,7 @@ pub(crate) struct BudgetQuery {
     to: Option<String>,
     step: Option<String>,
     earth: Option<String>,
+    cells: Option<String>,
     manifest: Option<String>,
 }
 
@@ -38,7 +39,12 @@ struct Budget<'a> {
     manifest: &'a ManifestId,
     region: String,
     earth: Earth,
+    cells: Cells,
     unit: &'static str,
+    region_area_m2: f64,
+    ocean_area_m2: f64,
+    gap_basis: &'a str,
+    notes: &'a [String],
     rows: Vec<Row>,
 }
 
@@ -49,6 +55,9 @@ struct Row {
     budget: f64,
     coverage_percent: f64,
     area_m2: f64,
+    ocean_with_data_m2: f64,
+    gap: Option<f64>,
+    gap_area_m2: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
     complete_m2: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -62,6 +71,9 @@ impl From<&BudgetRow> for Row {
             budget_tg,
             coverage_percent,
             area_m2,
+            ocean_with_data_m2,
+            gap_tg,
+            gap_area_m2,
             complete_and_incomplete_m2,
             ..
         } = *row;
@@ -71,6 +83,9 @@ impl From<&BudgetRow> for Row {
             budget: budget_tg,
             coverage_percent,
             area_m2,
+            ocean_with_data_m2,
+            gap: gap_tg,
+            gap_area_m2,
             complete_m2: complete_and_incomplete_m2.map(|[complete, _]| complete),
             incomplete_m2: complete_and_incomplete_m2.map(|[_, incomplete]| incomplete),
         }
@@ -109,17 +124,26 @@ pub(crate) async fn get(
             .earth
             .as_deref()
             .map_or(Ok(Earth::default()), str::parse)?,
+        cells: query
+            .cells
+            .as_deref()
+            .map_or(Ok(Cells::default()), str::parse)?,
     };
     let (region, earth) = (region_name(region, &request.region), request.earth);
-    let rows = state.analyses.budget(&layer, request).await?;
-    let rows = rows.iter().map(Row::from).collect();
+    let cells = request.cells;
+    let sums = state.analyses.budget(&layer, request).await?;
     let answer = Budget {
         product: &manifest.product,
         manifest: &layer.id,
         region,
         earth,
+        cells,
         unit: "Tg C",
-        rows,
+        region_area_m2: sums.region_area_m2,
+        ocean_area_m2: sums.ocean_area_m2,
+        gap_basis: &sums.gap_basis,
+        notes: &sums.notes,
+        rows: sums.rows.iter().map(Row::from).collect(),
     };
     Ok(([(header::CACHE_CONTROL, "no-cache")], Json(answer)).into_response())
 }

@@ -2,7 +2,7 @@
 
 use axum::http::StatusCode;
 use contract::earth::Earth;
-use contract::region::Region;
+use contract::region::{Cells, Region};
 use serde_json::json;
 use tile_server::backend::{BudgetRequest, BudgetStep, Class};
 
@@ -27,8 +27,13 @@ async fn an_answer_carries_everything_a_citation_needs() {
     );
     assert!(body["manifest"].as_str().unwrap().starts_with("flux@1-"));
     let row = json!({"start": "2000-01-01T00:00:00Z", "end": "2000-04-01T00:00:00Z", "budget": -176.1,
-        "coverage_percent": 92.5, "area_m2": 3.3e14});
+        "coverage_percent": 92.5, "area_m2": 3.4e14, "ocean_with_data_m2": 3.3e14, "gap": -12.5, "gap_area_m2": 2.0e13});
     assert_eq!(body["rows"], json!([row]));
+    let areas = (&body["region_area_m2"], &body["ocean_area_m2"]);
+    assert_eq!(areas, (&json!(5.1e14), &json!(3.6e14)));
+    assert_eq!(body["cells"], json!("whole"));
+    assert_eq!(body["gap_basis"], json!("the mean of the band"));
+    assert_eq!(body["notes"], json!(["taken as written"]));
     let request = last(&app);
     assert_eq!(
         (request.region, request.step, request.earth),
@@ -39,7 +44,7 @@ async fn an_answer_carries_everything_a_citation_needs() {
 #[tokio::test]
 async fn every_parameter_reaches_the_analyst() {
     let app = TestApp::new().await;
-    let path = "/api/products/flux/budget?region=170,-10,-170,10&from=2000-02&to=2000-03&step=total&earth=sphere";
+    let path = "/api/products/flux/budget?region=170,-10,-170,10&from=2000-02&to=2000-03&step=total&earth=sphere&cells=ocean-share";
     let body = app.get(path).await.json();
     assert_eq!(body["region"], "170,-10,190,10");
     let request = last(&app);
@@ -60,6 +65,8 @@ async fn every_parameter_reaches_the_analyst() {
         (request.step, request.earth),
         (BudgetStep::Total, Earth::Sphere)
     );
+    assert_eq!(request.cells, Cells::OceanShare);
+    assert_eq!(body["cells"], json!("ocean-share"));
 }
 
 #[tokio::test]
@@ -149,4 +156,31 @@ async fn a_failed_budget_is_not_remembered() {
         app.get("/api/products/flux/budget").await.status,
         StatusCode::OK
     );
+}
+
+#[tokio::test]
+async fn a_polygon_in_the_question_is_the_region_as_geojson_and_as_well_known_text() {
+    let app = TestApp::new().await;
+    let corners = "[[-100,-10],[100,-10],[100,10],[-100,10],[-100,-10]]";
+    let geojson = format!(r#"{{"type":"Polygon","coordinates":[{corners}]}}"#);
+    let wkt = "POLYGON((-100 -10,100 -10,100 10,-100 10,-100 -10))";
+    let mut regions = vec![];
+    for text in [geojson.as_str(), wkt] {
+        let encoded: String = text.bytes().map(|byte| format!("%{byte:02X}")).collect();
+        let path = format!("/api/products/flux/budget?region={encoded}");
+        let answer = app.get(&path).await;
+        assert_eq!(answer.status, StatusCode::OK, "{}", answer.text());
+        assert_eq!(answer.json()["region"], json!(text));
+        regions.push(last(&app).region);
+    }
+    assert_eq!(regions[0], regions[1]);
+    let Region::Polygons(polygons) = &regions[0] else {
+        panic!("{regions:?}")
+    };
+    assert_eq!(polygons[0].outer[1], [100.0, -10.0]);
+    let answer = app
+        .get("/api/products/flux/budget?region=POINT(0%200)")
+        .await;
+    assert_eq!(answer.status, StatusCode::BAD_REQUEST);
+    assert!(answer.reason().contains("no area"), "{}", answer.reason());
 }

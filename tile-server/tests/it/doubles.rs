@@ -15,9 +15,9 @@ use contract::topic::{Origin, Topic};
 use storage::StorageError;
 use storage::log::{EmbeddedLog, EventLog, Follower, Message, Reader, Start};
 use tile_server::backend::{
-    Analyse, AreaRequest, AreaRow, AreaSeries, BackendError, BudgetRequest, BudgetRow, Check,
-    Class, Contributed, Draw, ObservationPage, ObservationQuestion, Observe, Platform, PointStep,
-    RowCol, TrackPoint, TrackQuestion, Turn,
+    Analyse, AreaRequest, AreaRow, AreaSeries, BackendError, BudgetAnswer, BudgetRequest,
+    BudgetRow, Check, Class, Contributed, Draw, ObservationPage, ObservationQuestion, Observe,
+    Platform, PointStep, RowCol, TrackPoint, TrackQuestion, Turn,
 };
 use tokio::sync::Semaphore;
 
@@ -165,17 +165,27 @@ impl Analyse for Analyst {
         Ok((0..manifest.steps.len() as u32).map(point).collect())
     }
 
-    async fn budget(&self, request: &BudgetRequest) -> Result<Vec<BudgetRow>, BackendError> {
+    async fn budget(&self, request: &BudgetRequest) -> Result<BudgetAnswer, BackendError> {
         self.mood().apply()?;
         self.budgets.lock().unwrap().push(request.clone());
-        Ok(vec![BudgetRow {
-            period: request.period,
-            budget_tg: -176.1,
-            coverage_percent: 92.5,
-            area_m2: 3.3e14,
-            complete_and_incomplete_m2: (request.manifest.quantity == Quantity::AccumulatedCarbon)
-                .then_some([3e14, 3e13]),
-        }])
+        Ok(BudgetAnswer {
+            region_area_m2: 5.1e14,
+            ocean_area_m2: 3.6e14,
+            gap_basis: "the mean of the band".to_owned(),
+            notes: vec!["taken as written".to_owned()],
+            rows: vec![BudgetRow {
+                period: request.period,
+                budget_tg: -176.1,
+                coverage_percent: 92.5,
+                area_m2: 3.4e14,
+                ocean_with_data_m2: 3.3e14,
+                gap_tg: Some(-12.5),
+                gap_area_m2: 2.0e13,
+                complete_and_incomplete_m2: (request.manifest.quantity
+                    == Quantity::AccumulatedCarbon)
+                    .then_some([3e14, 3e13]),
+            }],
+        })
     }
 
     /// The first step has no data.
@@ -192,6 +202,8 @@ impl Analyse for Analyst {
         };
         Ok(AreaSeries {
             region_area_m2: 4e12,
+            ocean_area_m2: 3e12,
+            notes: vec![],
             rows: inside.enumerate().map(row).collect(),
         })
     }

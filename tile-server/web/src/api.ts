@@ -53,16 +53,30 @@ export interface BudgetRow {
   start: string;
   end: string;
   budget: number;
+  /** Of the sea. */
   coverage_percent: number;
+  /** What counted: with whole cells also land on the coast. */
   area_m2: number;
+  ocean_with_data_m2: number;
+  /** What the sea without data would add: an estimate, no part of the budget. */
+  gap: number | null;
+  gap_area_m2: number;
 }
+
+export type Cells = "whole" | "ocean-share";
 
 export interface Budget {
   product: string;
   manifest: string;
   region: string;
   earth: string;
+  cells: Cells;
   unit: string;
+  region_area_m2: number;
+  ocean_area_m2: number;
+  gap_basis: string;
+  /** How the region was taken where that may surprise. */
+  notes: string[];
   rows: BudgetRow[];
 }
 
@@ -73,6 +87,7 @@ export interface BudgetQuery {
   to: string;
   step: "month" | "year" | "total";
   earth: "wgs84" | "sphere";
+  cells: Cells;
 }
 
 export interface Region {

@@ -1,5 +1,5 @@
 //! The budget's question: a region by name, drawn or typed, a period, a step and an earth; a query out.
-import type { BudgetQuery, Region } from "./api";
+import type { BudgetQuery, Cells, Region } from "./api";
 import { boxText, parseBox, type Bounds } from "./box";
 import { el, icon } from "./dom";
 import { PENCIL } from "./icons";
@@ -47,6 +47,10 @@ export class BudgetForm {
     ["wgs84", "WGS84"],
     ["sphere", "Sphere"],
   ]);
+  readonly #cells = choice("cells", "Cells on the coast", [
+    ["whole", "Whole"],
+    ["ocean-share", "Share of sea"],
+  ]);
   #regions: readonly Region[] = [];
   #steps: readonly Step[] = [];
 
@@ -65,9 +69,10 @@ export class BudgetForm {
         el("label", { class: "field" }, el("span", {}, "To"), this.#to),
         el("label", { class: "field" }, el("span", {}, "Step"), this.#step),
         el("label", { class: "field" }, el("span", {}, "Earth"), this.#earth),
+        el("label", { class: "field" }, el("span", {}, "Coast cells"), this.#cells),
       ),
     );
-    for (const select of [this.#from, this.#to, this.#step, this.#earth])
+    for (const select of [this.#from, this.#to, this.#step, this.#earth, this.#cells])
       select.addEventListener("change", () => context.onChange());
     this.#region.addEventListener("change", () => this.#regionChosen());
     this.#boxRow.addEventListener("submit", (event) => {
@@ -129,6 +134,7 @@ export class BudgetForm {
       to: toIso(to.endMs),
       step: this.#step.value as "month" | "year",
       earth: this.#earth.value as "wgs84" | "sphere",
+      cells: this.#cells.value as Cells,
     };
   }
 

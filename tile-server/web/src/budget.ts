@@ -1,6 +1,6 @@
 //! The budget panel: region, period and earth in; total, coverage, bars, a table and citable downloads out.
 import * as api from "./api";
-import type { Budget, BudgetQuery, Region } from "./api";
+import type { Budget, BudgetQuery, BudgetRow, Cells, Region } from "./api";
 import { BudgetForm } from "./budget-form";
 import type { Bounds } from "./box";
 import { barChart, type Chart } from "./chart";
@@ -170,11 +170,32 @@ export class BudgetPanel {
       el(
         "p",
         { class: "muted" },
-        `${row.start.slice(0, 10)} to ${row.end.slice(0, 10)}; coverage ${numberText(row.coverage_percent, 1)} % of the region: data on ${areaText(row.area_m2)}. `,
+        `${row.start.slice(0, 10)} to ${row.end.slice(0, 10)}. `,
         isCarbon ? "Negative: the sea takes carbon up." : null,
       ),
+      el(
+        "p",
+        { class: "muted", id: "budget-coverage" },
+        `Asked for ${areaText(total.region_area_m2)}, ${areaText(total.ocean_area_m2)} of it sea; sea with data ` +
+          `${areaText(row.ocean_with_data_m2)}, ${numberText(row.coverage_percent, 1)} %. ${CELLS[total.cells]}`,
+      ),
+      el("p", { class: "muted", id: "budget-gaps" }, gapText(row, unit, total.gap_basis)),
+      ...total.notes.map((note) => el("p", { class: "problem" }, note)),
     ];
   }
+}
+
+const CELLS: Record<Cells, string> = {
+  whole: "Cells with data count whole, land on the coast too.",
+  "ocean-share": "Cells with data count by their share of sea.",
+};
+
+/** What gaps would add, never added in silence. */
+function gapText(row: BudgetRow, unit: string, basis: string): string {
+  if (row.gap === null) return "There are gaps, and nothing beside them to estimate them from.";
+  if (row.gap_area_m2 === 0) return "No gaps in the sea that could be estimated.";
+  const added = numberText(row.gap, totalDigits(row.gap));
+  return `Not in the budget: gaps of ${areaText(row.gap_area_m2)} would add ${added} ${unit} (${basis}).`;
 }
 
 /** Four figures and at least one decimal: -1404.3, 27.03, 0.1234. */

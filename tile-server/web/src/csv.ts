@@ -21,10 +21,23 @@ export function budgetCsv(answer: Budget): string {
       `manifest: ${answer.manifest}`,
       `region: ${answer.region}`,
       `earth: ${answer.earth}`,
+      `cells: ${answer.cells}`,
       `unit: ${answer.unit}`,
+      `region area: ${answer.region_area_m2} m2, ocean ${answer.ocean_area_m2} m2`,
+      `gap, no part of the budget: ${answer.gap_basis}`,
+      ...answer.notes.map((note) => `note: ${note}`),
     ],
-    ["start", "end", "budget", "coverage_percent", "area_m2"],
-    answer.rows.map((row) => [row.start, row.end, row.budget, row.coverage_percent, row.area_m2]),
+    ["start", "end", "budget", "coverage_percent", "area_m2", "ocean_with_data_m2", "gap", "gap_area_m2"],
+    answer.rows.map((row) => [
+      row.start,
+      row.end,
+      row.budget,
+      row.coverage_percent,
+      row.area_m2,
+      row.ocean_with_data_m2,
+      row.gap,
+      row.gap_area_m2,
+    ]),
   );
 }
 

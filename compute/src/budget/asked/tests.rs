@@ -4,7 +4,6 @@ use std::num::NonZeroUsize;
 use std::sync::Arc;
 
 use contract::earth::Earth;
-use contract::grid::Grid;
 use contract::region::Region;
 use datafusion::arrow::datatypes::DataType;
 use datafusion::execution::context::SessionContext;
@@ -14,7 +13,6 @@ use storage::{Store, frames};
 
 use super::*;
 use crate::objects::Objects;
-use crate::region::weights;
 use crate::state;
 
 const GRID: Grid = Grid {
@@ -39,17 +37,18 @@ async fn plan(config: SessionConfig, region: &str) -> Arc<dyn ExecutionPlan> {
         keys.push(key.unwrap());
     }
     let region: Region = region.parse().unwrap();
-    let weights = weights::stored(&store, &GRID, &region, Earth::Wgs84).await;
-    let address = store.sql_url(&weights.unwrap().unwrap()).to_string();
+    let weights = RegionKeys::stored(&store, &GRID, &region, Earth::Wgs84).await;
+    let engine = Engine::local(store.clone());
+    let weights = weights.unwrap().unwrap();
+    let region = AskedRegion::read(&engine, &GRID, &weights).await.unwrap();
     let objects = Objects::of(&store);
-    let region = objects.weights(&address).await.unwrap();
     let runtime = state::runtime(&objects, state::MEMORY_BYTES).unwrap();
     let state = state::session_state(config, runtime, &objects).unwrap();
     let context = SessionContext::new_with_state(state);
     let keys: Vec<&ObjectKey> = keys.iter().collect();
     let registered = scan::register(&context, "frames", &store, &keys, Layout::Frames);
     registered.await.unwrap();
-    let query = context.sql(&sql(Measure::Mass, &region, &address)).await;
+    let query = context.sql(&sql(Measure::Mass, &region)).await;
     query.unwrap().create_physical_plan().await.unwrap()
 }
 
@@ -77,7 +76,9 @@ async fn values_are_summed_where_they_are_read() {
         assert!(!text.contains("Join") && !text.contains("Sort"), "{text}");
         // The function is handed them and adds its sums; the projection above it drops them.
         assert_eq!(carriers(&plan), ["async_func"], "{text}");
-        assert_eq!(text.matches("region_sums(").count(), 1, "{text}");
+        for function in ["region_sums(", "band_sums("] {
+            assert_eq!(text.matches(function).count(), 1, "{text}");
+        }
         // Each part sums by itself before anything is sent to another.
         let lines: Vec<&str> = text.lines().map(str::trim_start).collect();
         let first = |name: &str| lines.iter().position(|line| line.starts_with(name));

@@ -1,0 +1,121 @@
+//! How large a region is and how much of it is sea; what a reader should know of how it was taken.
+
+use contract::earth::Earth;
+use contract::region::{Polygon, Region};
+
+use super::area::{region_area_m2, signed_area_m2};
+use super::rings::{Ring, rings};
+use super::sea::sea;
+use crate::ComputeError;
+
+/// Edges wider than this may have been meant to go the other way round, degrees.
+const WIDE_EDGE_DEG: f64 = 180.0;
+/// Share of the area by which polygons that overlap differ from their union before it is worth a word.
+const OVERLAP_SHARE: f64 = 1e-6;
+
+/// Areas of a region, wherever grids may lie, and notes about its shape.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Extent {
+    /// Area asked for, m².
+    pub area_m2: f64,
+    /// Area of the sea in it, m².
+    pub ocean_m2: f64,
+    /// How the region was taken where that may surprise.
+    pub notes: Vec<String>,
+}
+
+/// The extent of a region.
+pub fn extent(region: &Region, earth: Earth) -> Result<Extent, ComputeError> {
+    let area_m2 = region_area_m2(region, earth)?;
+    let of_sea: f64 = sea(&rings(region)?)
+        .iter()
+        .map(|ring| signed_area_m2(ring, earth))
+        .sum();
+    let mut notes = vec![];
+    if let Region::Polygons(polygons) = region {
+        notes.extend(wide_edge(polygons));
+        notes.extend(overlap(polygons, area_m2, earth));
+    }
+    let ocean_m2 = of_sea.clamp(0.0, area_m2);
+    if ocean_m2 == 0.0 {
+        notes.push("no sea lies in the region: it has no coverage, and no gaps".to_owned());
+    }
+    Ok(Extent {
+        area_m2,
+        ocean_m2,
+        notes,
+    })
+}
+
+/// The widest edge, if it is so wide that it may have been meant to cross the date line.
+fn wide_edge(polygons: &[Polygon]) -> Option<String> {
+    let width_deg = |[from, to]: &[[f64; 2]; 2]| (to[0] - from[0]).abs();
+    let edges = polygons
+        .iter()
+        .flat_map(|polygon| std::iter::once(&polygon.outer).chain(&polygon.holes))
+        .flat_map(|ring| Ring::new(ring.clone()).edges().collect::<Vec<_>>());
+    let [from, to] = edges
+        .filter(|edge| width_deg(edge) > WIDE_EDGE_DEG)
+        // Edges along a parallel from 180 to -180 are how maps of the whole world end.
+        .filter(|[from, to]| from[1].abs() < 90.0 || to[1].abs() < 90.0)
+        .max_by(|a, b| width_deg(a).total_cmp(&width_deg(b)))?;
+    let width_deg = width_deg(&[from, to]);
+    Some(format!(
+        "the edge from {},{} to {},{} is taken {width_deg} degrees wide, straight in longitude (RFC 7946); if it is meant \
+         to cross the date line, write longitudes past 180 or cut the polygon there; if the ring is meant to hold a pole, \
+         lead it along 180 to the pole and back along -180",
+        from[0], from[1], to[0], to[1]
+    ))
+}
+
+/// A word about polygons that cross or overlap.
+fn overlap(polygons: &[Polygon], area_m2: f64, earth: Earth) -> Option<String> {
+    let size = |ring: &Vec<[f64; 2]>| signed_area_m2(&Ring::new(ring.clone()), earth).abs();
+    let added_m2: f64 = polygons
+        .iter()
+        .map(|p| size(&p.outer) - p.holes.iter().map(size).sum::<f64>())
+        .sum();
+    ((added_m2 / area_m2 - 1.0).abs() > OVERLAP_SHARE).then(|| {
+        format!(
+            "rings cross, overlap or repeat: added up they would be {:.6} million km², every place counted once it is {:.6}",
+            added_m2 / 1e12,
+            area_m2 / 1e12
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn notes(text: &str) -> Vec<String> {
+        extent(&text.parse().unwrap(), Earth::Wgs84).unwrap().notes
+    }
+
+    #[test]
+    fn an_edge_that_jumps_across_the_date_line_is_taken_as_written_and_said_to_be() {
+        let jumping = notes("POLYGON((179 -20,-179 -20,-179 -10,179 -10,179 -20))");
+        assert_eq!(jumping.len(), 1, "{jumping:?}");
+        assert!(jumping[0].contains("358 degrees wide"), "{jumping:?}");
+        assert!(jumping[0].contains("past 180"), "{jumping:?}");
+        let passing = notes("POLYGON((179 -20,181 -20,181 -10,179 -10,179 -20))");
+        assert_eq!(passing, Vec::<String>::new());
+    }
+
+    #[test]
+    fn what_overlaps_is_said_with_both_areas() {
+        let twice = notes(
+            "MULTIPOLYGON(((-30 0,-20 0,-20 10,-30 10,-30 0)),((-30 0,-20 0,-20 10,-30 10,-30 0)))",
+        );
+        assert_eq!(twice.len(), 1, "{twice:?}");
+        assert!(
+            twice[0].contains("2.449") && twice[0].contains("1.224"),
+            "{twice:?}"
+        );
+    }
+
+    #[test]
+    fn a_region_without_sea_says_so() {
+        assert!(notes("5,20,10,25")[0].contains("no sea"));
+    }
+}

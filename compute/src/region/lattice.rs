@@ -1,0 +1,89 @@
+//! Rings on a lattice of integers, where they are overlaid without rounding (`i_overlay`).
+
+use i_overlay::core::fill_rule::FillRule;
+use i_overlay::core::overlay::{IntOverlayOptions, Overlay};
+use i_overlay::core::overlay_rule::OverlayRule;
+use i_overlay::core::solver::Solver;
+use i_overlay::i_float::int::point::IntPoint;
+use i_overlay::i_shape::int::shape::{IntContour, IntShapes};
+
+use super::rings::Ring;
+
+/// Largest coordinate, as a power of two: what the library leaves room for in its products of 64 bits.
+const COORDINATE_BITS: i32 = 30;
+/// Finest lattice, as a power of two of points in a degree: doubles at 720 degrees are no finer.
+const FINEST_BITS: i32 = 42;
+
+/// Points that are a power of two apart, so that whole and half degrees lie on it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Lattice {
+    origin_deg: [f64; 2],
+    points_per_deg: f64,
+}
+
+impl Lattice {
+    /// The finest lattice that holds west, south, east, north: 2 to 4 parts in 10⁹ of the wider side.
+    pub(super) fn over([west, south, east, north]: [f64; 4]) -> Self {
+        let half_deg = (0.5 * (east - west).max(north - south)).max(f64::MIN_POSITIVE);
+        // A bit is left for the origin, which is a point of the lattice and so not quite in the middle.
+        let bits = COORDINATE_BITS - 1 - half_deg.log2().floor() as i32;
+        let points_per_deg = f64::from(bits.min(FINEST_BITS)).exp2();
+        let on_lattice = |deg: f64| (deg * points_per_deg).round() / points_per_deg;
+        let origin_deg = [0.5 * (west + east), 0.5 * (south + north)].map(on_lattice);
+        Self {
+            origin_deg,
+            points_per_deg,
+        }
+    }
+
+    /// The nearest points of a ring's corners.
+    pub(super) fn contour(&self, corners: &[[f64; 2]]) -> IntContour {
+        let number = |deg: f64, origin: f64| ((deg - origin) * self.points_per_deg).round() as i32;
+        let [lon, lat] = self.origin_deg;
+        corners
+            .iter()
+            .map(|corner| IntPoint::new(number(corner[0], lon), number(corner[1], lat)))
+            .collect()
+    }
+
+    /// The rings of shapes: outer ones against the clock, holes with it.
+    pub(super) fn rings(&self, shapes: &IntShapes) -> Vec<Ring> {
+        let deg = |number: i32, origin: f64| f64::from(number) / self.points_per_deg + origin;
+        let [lon, lat] = self.origin_deg;
+        let ring = |contour: &IntContour| {
+            let corners = contour
+                .iter()
+                .map(|point| [deg(point.x, lon), deg(point.y, lat)]);
+            Ring::new(corners.collect())
+        };
+        shapes.iter().flatten().map(ring).collect()
+    }
+}
+
+/// What the subject's rings go round, less what the others go round: shapes of an outer ring, against the clock, and
+/// holes, with it.
+pub(super) fn difference(subject: &[IntContour], others: &[IntContour]) -> IntShapes {
+    let options = IntOverlayOptions::keep_all_points();
+    let mut overlay = Overlay::with_contours_custom(subject, others, options, Solver::default());
+    let rule = if others.is_empty() {
+        OverlayRule::Subject
+    } else {
+        OverlayRule::Difference
+    };
+    overlay.overlay(rule, FillRule::NonZero)
+}
+
+/// Edges of rings without their direction, in order.
+pub(super) fn edges<'a>(contours: impl Iterator<Item = &'a IntContour>) -> Vec<[i32; 4]> {
+    let mut edges: Vec<_> = contours
+        .flat_map(|contour| contour.iter().zip(contour.iter().cycle().skip(1)))
+        .filter(|(from, to)| from != to)
+        .map(|(from, to)| {
+            let (from, to) = ([from.x, from.y], [to.x, to.y]);
+            let (low, high) = (from.min(to), from.max(to));
+            [low[0], low[1], high[0], high[1]]
+        })
+        .collect();
+    edges.sort_unstable();
+    edges
+}
