@@ -92,8 +92,7 @@ impl Reading {
                 frame: new.frame.clone(),
                 ..old.clone()
             };
-            old == new
-                || (named_alike == *new && matches!(old.frame.vouches(), Vouched::Bytes(_)))
+            old == new || (named_alike == *new && matches!(old.frame.vouches(), Vouched::Bytes(_)))
         };
         let steps = there.steps.iter().zip(&self.steps);
         let alike = Self {

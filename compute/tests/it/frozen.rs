@@ -41,13 +41,19 @@ fn answer_of_then(name: &str) -> serde_json::Value {
 async fn a_budget_of_the_frozen_store_is_what_it_was() {
     let (_folder, store) = store();
     let engine = Engine::local(store);
-    for (region, name) in [("1,-50,15,55", "budget-box.json"), ("global", "budget-global.json")] {
+    for (region, name) in [
+        ("1,-50,15,55", "budget-box.json"),
+        ("global", "budget-global.json"),
+    ] {
         let now = budget(&engine, &total(&product("fgco2"), region)).await;
         let now = serde_json::to_value(now.unwrap()).unwrap();
         let then = answer_of_then(name);
         assert_eq!(now["manifest"], then["manifest"]);
         for what in ["start", "end", "budget_kg", "area_m2"] {
-            assert_eq!(now["rows"][0][what], then["rows"][0][what], "{region}: {what}");
+            assert_eq!(
+                now["rows"][0][what], then["rows"][0][what],
+                "{region}: {what}"
+            );
         }
     }
 }
@@ -64,7 +70,10 @@ async fn a_place_of_the_frozen_store_has_the_series_that_it_had() {
     assert_eq!(steps.len(), 2);
     for (step, then) in steps.iter().enumerate() {
         let now = &now["series"][step];
-        assert_eq!((&now["start"], &now["value"]), (&then["start"], &then["value"]));
+        assert_eq!(
+            (&now["start"], &now["value"]),
+            (&then["start"], &then["value"])
+        );
     }
 }
 
@@ -96,7 +105,14 @@ async fn what_was_derived_then_is_kept_now() {
     let now = derive_accumulated(&engine, &product("fgco2"), None, &|_| ()).await;
     let now = now.unwrap();
     let frames = |m: &contract::manifest::Manifest| {
-        m.steps.iter().map(|step| step.frame.clone()).collect::<Vec<_>>()
+        m.steps
+            .iter()
+            .map(|step| step.frame.clone())
+            .collect::<Vec<_>>()
     };
-    assert_eq!(frames(&now), frames(&then), "the same values are no revision");
+    assert_eq!(
+        frames(&now),
+        frames(&then),
+        "the same values are no revision"
+    );
 }

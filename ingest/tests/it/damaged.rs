@@ -41,7 +41,10 @@ async fn flip(store: &Store, key: &ObjectKey) {
     let middle = content.len() / 2;
     content[middle] ^= 2;
     store.put_over(key, content.into()).await.unwrap();
-    assert!(store.get(key).await.is_err(), "{key}: the fault is not seen");
+    assert!(
+        store.get(key).await.is_err(),
+        "{key}: the fault is not seen"
+    );
 }
 
 async fn landed() -> (Place, PathBuf, Manifest) {
@@ -152,5 +155,9 @@ async fn a_damaged_frame_of_before_is_replaced_by_one_that_is_named_by_its_value
     assert!(matches!(after.steps[0].frame.vouches(), Vouched::Values(_)));
     assert_eq!(after.steps[1], before.steps[1]);
     let now = place.values(&after, 0).await;
-    assert!(now.iter().zip(&right).all(|(a, b)| a.to_bits() == b.to_bits()));
+    assert!(
+        now.iter()
+            .zip(&right)
+            .all(|(a, b)| a.to_bits() == b.to_bits())
+    );
 }

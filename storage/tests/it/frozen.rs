@@ -13,9 +13,7 @@ use contract::event::Event;
 use contract::grid::Grid;
 use contract::key::ObjectKey;
 use contract::kind::{Kind, Vouched};
-use contract::manifest::{
-    MANIFEST_SCHEMA, Manifest, OLDEST_MANIFEST_SCHEMA, SeriesSegment, Step,
-};
+use contract::manifest::{MANIFEST_SCHEMA, Manifest, OLDEST_MANIFEST_SCHEMA, SeriesSegment, Step};
 use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::time::Period;
@@ -91,7 +89,13 @@ fn every_version_that_is_read_is_frozen() {
     for version in OLDEST_MANIFEST_SCHEMA..=MANIFEST_SCHEMA {
         let objects = frozen(version).join("objects");
         assert!(objects.is_dir(), "no frozen store of version {version}");
-        for kind in [Kind::Manifest, Kind::Frame, Kind::Series, Kind::Domain, Kind::Weights] {
+        for kind in [
+            Kind::Manifest,
+            Kind::Frame,
+            Kind::Series,
+            Kind::Domain,
+            Kind::Weights,
+        ] {
             assert!(
                 objects.join(kind.folder()).is_dir(),
                 "no {kind:?} of version {version}"
@@ -133,11 +137,16 @@ async fn frozen_products_hold_the_values_that_were_put_in() {
             assert_eq!(is_of_bytes, version == 1);
             let found = frames::read(&store, &step.frame, &GRID).await.unwrap();
             for (index, (found, expected)) in found.iter().zip(&expected).enumerate() {
-                assert!(is_near(*found, *expected), "{version}, month {month}, cell {index}");
+                assert!(
+                    is_near(*found, *expected),
+                    "{version}, month {month}, cell {index}"
+                );
                 assert!(expected.is_nan() || cells[index]);
             }
         }
-        series::check(&store, &manifest.series[0].series).await.unwrap();
+        series::check(&store, &manifest.series[0].series)
+            .await
+            .unwrap();
     }
 }
 
@@ -152,7 +161,11 @@ async fn version_1_keeps_the_names_that_were_cited_and_its_frames_keep_theirs() 
         let named_now = named_now.unwrap();
         assert_ne!(named_now, step.frame);
         let settled = frames::settle(&store, &step.frame, &named_now, &GRID).await;
-        assert_eq!(settled.unwrap(), step.frame, "the same values are no revision");
+        assert_eq!(
+            settled.unwrap(),
+            step.frame,
+            "the same values are no revision"
+        );
     }
 }
 
@@ -171,8 +184,16 @@ fn events_of_version_1_are_read_as_they_were_written() {
             kinds.push(event.body.topic().to_string());
         }
     }
-    for kind in ["granule.notice", "granule.landed", "granule.rejected", "product.derived"] {
-        assert!(kinds.iter().any(|found| found == kind), "no {kind}: {kinds:?}");
+    for kind in [
+        "granule.notice",
+        "granule.landed",
+        "granule.rejected",
+        "product.derived",
+    ] {
+        assert!(
+            kinds.iter().any(|found| found == kind),
+            "no {kind}: {kinds:?}"
+        );
     }
 }
 
