@@ -133,10 +133,11 @@ pub(crate) async fn or_damaged<T>(
         other => return other,
     };
     for key in keys {
-        match storage::verify::sound(store, key).await {
-            Err(damaged @ StorageError::Damaged { .. }) => return Err(damaged.into()),
-            // What failed first is told.
-            Ok(()) | Err(_) => {}
+        // Of other errors what failed first is told.
+        if let Err(damaged @ StorageError::Damaged { .. }) =
+            storage::verify::sound(store, key).await
+        {
+            return Err(damaged.into());
         }
     }
     Err(error)

@@ -376,10 +376,10 @@ mod tests {
         After { frame, weight }
     }
 
-    fn counts(before: &str) -> Option<Counts> {
+    fn counts(before: &str) -> Counts {
         let before = before.parse().ok();
         let after = None;
-        Some(Counts { before, after })
+        Counts { before, after }
     }
 
     fn job() -> RenderJob {
@@ -459,8 +459,8 @@ mod tests {
         changed(|j| j.value.after = None);
         changed(|j| j.value.after = Some(after("frames/p/c", 0.25)));
         changed(|j| j.value.after = Some(after("frames/p/b", 0.5)));
-        changed(|j| j.value.contributed = counts("contributed/p/a"));
-        changed(|j| j.value.contributed = counts("contributed/p/b"));
+        changed(|j| j.value.contributed = Some(counts("contributed/p/a")));
+        changed(|j| j.value.contributed = Some(counts("contributed/p/b")));
         changed(|j| j.accumulated = Some(moment()));
         changed(|j| j.mode = Mode::Map);
         changed(|j| {

@@ -83,13 +83,11 @@ pub(crate) fn engine(settings: &Settings, store: Store) -> Result<Engine> {
 /// Who sums over regions: the Ballista cluster that settings name, else DataFusion in this process, where a scheduler
 /// would take longer than the answer. The plan, the functions and the bits are the same (docs/decisions/009).
 pub(crate) fn region_engine(settings: &Settings, store: Store) -> Result<Engine> {
-    match &settings.cluster {
-        Some(scheduler) => cluster(settings, store, scheduler),
-        None => {
-            let parts = parts_in_process(settings, store.is_remote());
-            Ok(Engine::in_process(store, parts))
-        }
+    if let Some(scheduler) = &settings.cluster {
+        return cluster(settings, store, scheduler);
     }
+    let parts = parts_in_process(settings, store.is_remote());
+    Ok(Engine::in_process(store, parts))
 }
 
 fn cluster(settings: &Settings, store: Store, scheduler: &str) -> Result<Engine> {

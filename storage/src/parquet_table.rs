@@ -40,10 +40,18 @@ pub(crate) fn encode_as(
     let shape: Vec<String> = shape.iter().map(ToString::to_string).collect();
     let shape = KeyValue::new(SHAPE.to_owned(), shape.join(" "));
     let properties = properties.set_key_value_metadata(Some(vec![shape])).build();
+    let rows_at_once = properties.max_row_group_row_count().unwrap_or(usize::MAX);
     let mut out = Vec::new();
     let mut writer =
         ArrowWriter::try_new(&mut out, batch.schema(), Some(properties)).map_err(damaged)?;
-    writer.write(batch).map_err(damaged)?;
+    // Group by group: the writer cuts a batch by calling itself for the rest, once a group, and a series of some 20
+    // million cells has so many groups that it would run out of stack, which ends the process.
+    let mut first = 0;
+    while first < batch.num_rows() {
+        let rows = rows_at_once.clamp(1, batch.num_rows() - first);
+        writer.write(&batch.slice(first, rows)).map_err(damaged)?;
+        first += rows;
+    }
     writer.close().map_err(damaged)?;
     Ok(Bytes::from(seal::parquet(out)))
 }
@@ -149,6 +157,21 @@ mod tests {
     use parquet::file::metadata::{PageIndexPolicy, ParquetMetaDataReader};
 
     use super::*;
+
+    #[test]
+    fn a_table_of_very_many_groups_needs_no_stack_for_them() {
+        const ROWS: u32 = 5000;
+        const STACK_BYTES: usize = 512 << 10;
+        let field = Field::new("chunk", DataType::UInt32, false);
+        let numbers = Arc::new(UInt32Array::from_iter_values(0..ROWS));
+        let schema = Arc::new(Schema::new(vec![field]));
+        let batch = RecordBatch::try_new(schema, vec![numbers]).unwrap();
+        let encode = move || encode(&batch, 1, &[ROWS]).unwrap();
+        let thread = std::thread::Builder::new().stack_size(STACK_BYTES);
+        let content = thread.spawn(encode).unwrap().join().unwrap();
+        let reader = ParquetRecordBatchReaderBuilder::try_new(content).unwrap();
+        assert_eq!(reader.metadata().num_row_groups(), ROWS as usize);
+    }
 
     #[test]
     fn a_row_of_many_values_is_a_page_of_its_own() {

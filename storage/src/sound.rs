@@ -55,8 +55,7 @@ pub(crate) fn of_bytes(key: &ObjectKey, content: &[u8]) -> Result<Soundness, Sto
             ),
         ) => (seal::of_json(content), false),
         (Vouched::Nothing, Some(Kind::Tile)) => {
-            return png::check(content)
-                .map_or_else(|reason| damaged(reason), |()| Ok(Soundness::Sound));
+            return png::check(content).map_or_else(damaged, |()| Ok(Soundness::Sound));
         }
         (Vouched::Nothing, _) => (Seal::Absent, false),
     };

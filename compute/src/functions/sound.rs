@@ -157,7 +157,9 @@ mod tests {
         for (column, other) in others.into_iter().enumerate() {
             let mut columns = columns();
             if column == 0 {
-                columns.iter_mut().for_each(|it| *it = it.slice(0, 1));
+                for it in &mut columns {
+                    *it = it.slice(0, 1);
+                }
             }
             columns[column] = other;
             let error = invoke(columns).unwrap_err();

@@ -32,7 +32,7 @@ use storage::{Store, frames, manifests};
 
 use crate::fixture::{ask, folder_store, land, months, parts, product, total};
 
-/// A regional product, 8 x 6 chunks: half of what `rows` and `cols` of the China Sea are at a quarter of its resolution.
+/// A regional product, 8 x 6 chunks.
 const GRID: Grid = Grid {
     rows: 450,
     cols: 615,
@@ -158,14 +158,18 @@ async fn a_small_box_reads_its_chunks_and_no_others() {
     let (_folder, store) = folder_store();
     let flux = Quantity::CarbonFlux;
     let manifest = land(&store, &product("noise"), flux, GRID, &noise(), 4).await;
-    let chunks = frame_chunks(&GRID).len() as f64;
-    assert!((chunks - 48.0).abs() < 0.1);
-    // One chunk of 48, and the ends of the files.
+    assert_eq!(frame_chunks(&GRID).len(), 48);
+    let share = |cells: f64| cells / GRID.cell_count() as f64;
+    // One chunk, and the end of each file.
+    let end = 0.03;
     let one = share_read(&store, &manifest, "110,20,111,21").await;
-    assert!(one > 1.0 / chunks && one < 3.0 / chunks, "{one}");
-    // A row of six.
-    let row = share_read(&store, &manifest, "100,20,130,21").await;
-    assert!(row > 6.0 / chunks && row < 8.0 / chunks, "{row}");
+    assert!(one > share(7200.0) && one < share(7200.0) + end, "{one}");
+    // A row of six, the easternmost 15 columns wide.
+    let (row, cells) = (
+        share_read(&store, &manifest, "100,20,130,21").await,
+        60.0 * 615.0,
+    );
+    assert!(row > share(cells) && row < share(cells) + end, "{row}");
     let all = share_read(&store, &manifest, "global").await;
     assert!(all > 0.95 && all < 1.1, "{all}");
 }
@@ -173,7 +177,7 @@ async fn a_small_box_reads_its_chunks_and_no_others() {
 /// A frame as it was written before a row of values was a page: pages of a megabyte, and no index of pages.
 fn old_layout(content: Bytes) -> Bytes {
     let reader = ParquetRecordBatchReaderBuilder::try_new(content).unwrap();
-    let batches: Vec<RecordBatch> = reader.build().unwrap().map(|b| b.unwrap()).collect();
+    let batches: Vec<RecordBatch> = reader.build().unwrap().map(Result::unwrap).collect();
     let properties = WriterProperties::builder()
         .set_compression(Compression::ZSTD(ZstdLevel::default()))
         .set_dictionary_enabled(false)
@@ -183,9 +187,9 @@ fn old_layout(content: Bytes) -> Bytes {
         .build();
     let mut out = vec![];
     let mut writer = ArrowWriter::try_new(&mut out, batches[0].schema(), Some(properties)).unwrap();
-    batches
-        .iter()
-        .for_each(|batch| writer.write(batch).unwrap());
+    for batch in &batches {
+        writer.write(batch).unwrap();
+    }
     writer.close().unwrap();
     out.into()
 }

@@ -36,6 +36,10 @@ impl RecomputeWhat {
 
 /// `fluxglobe recompute`.
 #[derive(Debug, Args)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each is a switch of the command line"
+)]
 pub(crate) struct Recompute {
     /// Product that others are derived from.
     #[arg(long)]

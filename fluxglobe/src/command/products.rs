@@ -167,6 +167,8 @@ pub(crate) async fn run(settings: &Settings, options: &Products) -> Result<()> {
         ]);
     }
     progress::result(&table.to_string())?;
-    warnings.iter().for_each(|line| progress::say(line));
+    for line in &warnings {
+        progress::say(line);
+    }
     Ok(())
 }

@@ -139,7 +139,7 @@ mod tests {
         };
         let comparison = Comparison {
             rows: vec![
-                row("globe", paper(Some(0.7), Verdict::Within), true),
+                row("whole", paper(Some(0.7), Verdict::Within), true),
                 row("band", paper(None, Verdict::NoUncertaintyStated), true),
                 row("month", None, false),
             ],
@@ -148,7 +148,7 @@ mod tests {
         };
         let text = against_published(&comparison);
         let line = |what: &str| text.lines().find(|line| line.contains(what)).unwrap();
-        assert!(line("globe").contains("-1.4 ± 0.7") && line("globe").contains("within ± 0.7"));
+        assert!(line("whole").contains("-1.4 ± 0.7") && line("whole").contains("within ± 0.7"));
         let band = line("band");
         assert!(band.contains("no uncertainty stated; differs by -0.004"));
         assert!(!band.contains("within") && !band.contains('±'), "{band}");

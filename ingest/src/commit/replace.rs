@@ -69,19 +69,35 @@ pub(super) fn file_of(step: &Step) -> (Digest, &str) {
     (step.raw_sha256, &step.origin)
 }
 
+/// What each file holds, and its latest place in the order of notices.
+#[expect(
+    clippy::type_complexity,
+    reason = "two maps by file, named where they are taken"
+)]
+fn files_of<'a>(
+    newest: &'a Manifest,
+    before: &[Option<NoticeOrder>],
+) -> (
+    BTreeMap<(Digest, &'a str), BTreeSet<Period>>,
+    BTreeMap<(Digest, &'a str), Option<NoticeOrder>>,
+) {
+    let mut held: BTreeMap<_, BTreeSet<Period>> = BTreeMap::new();
+    let mut orders: BTreeMap<_, Option<NoticeOrder>> = BTreeMap::new();
+    for (step, order) in newest.steps.iter().zip(before) {
+        held.entry(file_of(step)).or_default().insert(step.period);
+        let latest = orders.entry(file_of(step)).or_default();
+        *latest = (*order).max(*latest);
+    }
+    (held, orders)
+}
+
 /// The newest manifest with other steps; its number, series and domain are still the old ones. Pure.
 ///
 /// First every file gets the steps that it had and has, then those that are new, as far as no other file has their time:
 /// that one revised them.
 fn next(newest: &Manifest, readings: &[Reading]) -> Result<Manifest, String> {
     let before = newest.notice_orders();
-    let mut held: BTreeMap<(Digest, &str), BTreeSet<Period>> = BTreeMap::new();
-    let mut orders: BTreeMap<(Digest, &str), Option<NoticeOrder>> = BTreeMap::new();
-    for (step, order) in newest.steps.iter().zip(&before) {
-        held.entry(file_of(step)).or_default().insert(step.period);
-        let latest = orders.entry(file_of(step)).or_default();
-        *latest = (*order).max(*latest);
-    }
+    let (held, orders) = files_of(newest, &before);
     // What a file that holds nothing (any more) was read as is nobody's business.
     let taken: Vec<&Reading> = readings
         .iter()
@@ -108,7 +124,9 @@ fn next(newest: &Manifest, readings: &[Reading]) -> Result<Manifest, String> {
         steps.extend(had.into_iter().cloned());
     }
     let mut occupied = Taken::default();
-    steps.iter().for_each(|step| occupied.insert(step.period));
+    for step in &steps {
+        occupied.insert(step.period);
+    }
     for (reading, new, mut is_placed) in later {
         for step in new {
             if !occupied.overlaps(step.period) {

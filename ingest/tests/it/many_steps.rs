@@ -8,7 +8,7 @@ use contract::event::{Body, MAX_EVENT_BYTES};
 use contract::time::Period;
 use contract::topic::Topic;
 use ingest::{IngestService, Outcome, Quiet};
-use storage::log::{EmbeddedLog, EventLog};
+use storage::log::{EmbeddedLog, EventLog as _};
 
 use crate::fixture::{Place, events, settings};
 

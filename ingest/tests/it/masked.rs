@@ -65,7 +65,10 @@ async fn what_is_masked_is_counted_step_by_step_and_told() {
         settings(),
     )
     .with_metrics(Metrics::register(&registry).unwrap());
-    service.notify(&[path.clone()], None, None).await.unwrap();
+    service
+        .notify(std::slice::from_ref(&path), None, None)
+        .await
+        .unwrap();
     let landed = run_until(&service, log.as_ref(), Topic::GranuleLanded, 1).await;
     assert_eq!(told(&landed), [masked(2, 1)]);
 
@@ -97,7 +100,11 @@ async fn what_is_masked_is_counted_step_by_step_and_told() {
         let own = metrics
             .iter()
             .find(|m| has("reason", reason, m) && has("product", "fgco2", m));
-        assert_eq!(own.unwrap().get_counter().get_value(), count as f64, "{reason}");
+        assert_eq!(
+            own.unwrap().get_counter().get_value(),
+            count as f64,
+            "{reason}"
+        );
     }
 
     // A file that is there says the same again.

@@ -144,7 +144,7 @@ async fn a_frame_named_by_its_bytes_keeps_its_name_as_long_as_it_holds_its_value
     other[1] += 1.0;
     let (other, _) = frame(&other);
     assert_eq!(settle(&store, &old, &other, &GRID).await.unwrap(), other);
-    let (lost, content) = of_bytes(&[1.0; 70 * 130]);
+    let (lost, content) = of_bytes(&vec![1.0; GRID.cell_count()]);
     let mut damaged = content.to_vec();
     damaged[100] ^= 1;
     assert_eq!(settle(&store, &lost, &new, &GRID).await.unwrap(), new);

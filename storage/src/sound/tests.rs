@@ -123,7 +123,7 @@ async fn a_damaged_and_a_missing_object_are_findings_of_a_whole_store() {
     assert_eq!(told.into_inner().unwrap().len(), 2);
     assert!(damage::count(Kind::Series) > before);
     let mend = verify::damaged(&store, keys).await.unwrap();
-    assert_eq!(mend.into_iter().collect::<Vec<_>>(), [series.clone()]);
+    assert_eq!(mend, [series.clone()].into());
 }
 
 #[tokio::test]

@@ -217,6 +217,8 @@ async fn write(store: &Store) -> Manifest {
             raw_sha256,
             origin: "frozen-flux.nc".to_owned(),
             valid_cells: values.iter().filter(|value| !value.is_nan()).count() as u64,
+            contributed: None,
+            masked: None,
         });
     }
     let views = months.each_ref().map(|(_, values)| values.as_slice());

@@ -65,6 +65,24 @@ async fn begun(app: &TestApp, tiles: u64) -> Vec<impl Future<Output = Answer> + 
     all
 }
 
+/// Waits with those who ask until so many pictures were begun to be drawn; false if that never comes.
+async fn were_drawn(
+    app: &TestApp,
+    all: &mut [impl Future<Output = Answer> + Unpin],
+    count: usize,
+) -> bool {
+    let drawn = async {
+        while app.drawer.drawn_count() < count {
+            for one in &mut *all {
+                assert!(one.now_or_never().is_none());
+            }
+            tokio::task::yield_now().await;
+        }
+    };
+    let limit = Duration::from_mins(1);
+    tokio::time::timeout(limit, drawn).await.is_ok()
+}
+
 #[tokio::test]
 async fn a_picture_that_is_encoded_holds_up_no_other_and_counts_until_it_is_stored() {
     let app = TestApp::with(|settings| {
@@ -72,15 +90,9 @@ async fn a_picture_that_is_encoded_holds_up_no_other_and_counts_until_it_is_stor
     })
     .await;
     app.drawer.encodes_slowly.store(true, Ordering::SeqCst);
-    let all = begun(&app, 3).await;
+    let mut all = begun(&app, 3).await;
     // One may be drawn at once, and none is done: the first two are drawn though.
-    let drawn = async {
-        while app.drawer.drawn_count() < 3 {
-            tokio::task::yield_now().await;
-        }
-    };
-    let limit = Duration::from_mins(1);
-    assert!(tokio::time::timeout(limit, drawn).await.is_ok());
+    assert!(were_drawn(&app, &mut all, 3).await);
     let sent_away = app.get(TILE).await;
     assert_eq!(sent_away.status, StatusCode::SERVICE_UNAVAILABLE);
     app.drawer.turns.add_permits(3);
@@ -94,12 +106,13 @@ async fn as_many_are_drawn_at_once_as_were_asked_for_or_as_suit_the_drawer() {
     for (asked, at_once) in [(None, 2), (NonZeroU32::new(3), 3)] {
         let app = TestApp::with(|settings| settings.draws_at_once = asked).await;
         app.drawer.is_slow.store(true, Ordering::SeqCst);
-        let all = begun(&app, 4).await;
-        while app.drawer.drawn_count() < at_once {
-            tokio::task::yield_now().await;
-        }
+        let mut all = begun(&app, 4).await;
+        assert!(were_drawn(&app, &mut all, at_once).await, "{asked:?}");
         // Whoever could begin has had the time to.
         for _ in 0..100 {
+            for one in &mut all {
+                assert!(one.now_or_never().is_none());
+            }
             tokio::task::yield_now().await;
         }
         assert_eq!(app.drawer.drawn_count(), at_once);

@@ -20,7 +20,7 @@ pub(super) fn check(body: &[u8], size_px: [u32; 2]) -> Result<()> {
     let side = |bytes: &[u8]| {
         bytes
             .iter()
-            .fold(0, |side, byte| side << 8 | u32::from(*byte))
+            .fold(0, |side, byte| (side << 8) | u32::from(*byte))
     };
     let found = [side(width), side(height)];
     ensure!(

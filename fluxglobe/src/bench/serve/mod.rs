@@ -124,11 +124,15 @@ async fn misses(client: &reqwest::Client, url: &str) -> Result<u64> {
         .await?
         .text()
         .await?;
-    let line = text
-        .lines()
-        .find_map(|line| line.strip_prefix(MISSES)?.strip_prefix(' '));
-    let count = line.with_context(|| format!("{url}/metrics does not tell of {MISSES}"))?;
-    Ok(count.trim().parse()?)
+    // With labels in a cluster, without them where one process does everything.
+    let is_it = |line: &&str| {
+        let rest = line.strip_prefix(MISSES);
+        rest.is_some_and(|rest| rest.starts_with([' ', '{']))
+    };
+    let line = text.lines().find(is_it);
+    let count = line.and_then(|line| line.rsplit(' ').next());
+    let count = count.with_context(|| format!("{url}/metrics does not tell of {MISSES}"))?;
+    Ok(count.parse()?)
 }
 
 /// Answers to what was asked while answers are counted.
