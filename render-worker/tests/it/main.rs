@@ -11,6 +11,7 @@ mod batch;
 mod coast;
 mod compare;
 mod context;
+mod damaged;
 mod device;
 mod fill;
 #[cfg(feature = "service")]
