@@ -13,6 +13,7 @@ use bytes::Bytes;
 use contract::digest::Digest;
 use contract::key::ObjectKey;
 use contract::kind::{Kind, Vouched};
+use parquet::file::metadata::ParquetMetaDataReader;
 use serde::Deserialize;
 
 use crate::{StorageError, contributed, frames, series};
@@ -94,6 +95,12 @@ pub fn of_object(key: &ObjectKey, content: &Bytes) -> Result<Soundness, StorageE
             ),
         ) => {
             check_document(key, content, found)?;
+        }
+        (Vouched::Nothing, Some(Kind::Weights | Kind::Accumulating)) => {
+            // Where the end of a file is damaged, no seal is found either.
+            ParquetMetaDataReader::new()
+                .parse_and_finish(content)
+                .map_err(|e| damage::found(key, e))?;
         }
         (Vouched::Nothing, Some(Kind::Landing)) => {
             // The name of a note ends in the place that it holds.

@@ -2,7 +2,7 @@
 //!
 //! A JSON document ends in a member `sha256`, the digest of the text without that member. A Parquet file has a mark and
 //! the digest of all its other bytes between its last page and its footer, where no address in it points to. One flipped
-//! bit breaks a seal or what it seals, never both: what had a seal is then broken, or no longer what its version must be.
+//! bit breaks a seal or what it seals, never both: what had a seal is then broken, or no file of its format any more.
 
 use contract::digest::Digest;
 use sha2::{Digest as _, Sha256};
@@ -83,14 +83,16 @@ pub(crate) fn of_parquet(content: &[u8]) -> Seal {
         let footer = footer_of(content)?;
         let (before, end) = content.split_at(footer);
         let (data, seal) = before.split_at_checked(before.len().checked_sub(SEAL_BYTES)?)?;
-        Some((data, seal.strip_prefix(MARK)?, end))
+        let (mark, told) = seal.split_at(MARK.len());
+        let told: [u8; DIGEST_BYTES] = told.try_into().ok()?;
+        let is_right = digest_of(data, end) == Digest::from_bytes(told);
+        Some((mark == MARK, is_right))
     };
     match sealed() {
-        None => Seal::Absent,
-        Some((data, told, end)) => {
-            let told: Result<[u8; DIGEST_BYTES], _> = told.try_into();
-            whole_if(told.is_ok_and(|told| digest_of(data, end) == Digest::from_bytes(told)))
-        }
+        Some((true, true)) => Seal::Whole,
+        // A mark or a digest alone: the other one was there.
+        Some((true, false) | (false, true)) => Seal::Broken,
+        Some((false, false)) | None => Seal::Absent,
     }
 }
 
