@@ -10,8 +10,8 @@ use contract::topic::Topic;
 use render_worker::batch::{BatchService, GROUP};
 use render_worker::desk::Class;
 use service::Stop;
-use storage::{StorageError, Store};
 use storage::log::{EmbeddedLog, EventLog as _, contents};
+use storage::{StorageError, Store};
 use tokio::task::JoinHandle;
 
 use crate::stored::{quick, slow, two_months_in};
