@@ -156,12 +156,19 @@ fn victims(cluster: &Cluster) -> Vec<String> {
 fn until_taken_over(cluster: &Cluster, victim: &str, round: usize, sender: &Sender, truth: &Truth) {
     until_landed(cluster, victim, sender, truth);
     if victim.starts_with("render") {
-        let day = 1 + round % 28;
-        let path = format!(
-            "/tiles/{FOUGHT}/map/{MAP_TILE}.png?time=2000-02-{day:02}T0{}",
-            round % 10
-        );
-        let drawn = |cluster: &Cluster| Ok((cluster.get(&path)?.status == 200).then_some(()));
+        let (day, hour) = (1 + round % 28, round % 24);
+        let path =
+            format!("/tiles/{FOUGHT}/map/{MAP_TILE}.png?time=2000-02-{day:02}T{hour:02}:00:00Z");
+        let drawn = |cluster: &Cluster| {
+            let tile = cluster.get(&path)?;
+            anyhow::ensure!(
+                tile.status == 200,
+                "{path}: {} {}",
+                tile.status,
+                tile.text()
+            );
+            Ok(Some(()))
+        };
         cluster.wait_for("new picture", LIMIT, drawn).unwrap();
     }
     if victim.starts_with("executor") {
