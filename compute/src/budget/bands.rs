@@ -217,7 +217,7 @@ mod tests {
         };
         assert_eq!((band_of(&globe, 0), band_of(&globe, 179)), (35, 0));
         assert_eq!((band_of(&globe, 89), band_of(&globe, 90)), (18, 17));
-        let none = band_sums(&globe, 9, &[1.0; 7200], &[1.0; 7200], 1.0).unwrap();
+        let none = band_sums(&globe, 9, &vec![1.0; 7200], &vec![1.0; 7200], 1.0).unwrap();
         assert!(none.iter().all(|sums| sums.area_steps == 0));
     }
 }

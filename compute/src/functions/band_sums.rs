@@ -79,10 +79,10 @@ impl AsyncScalarUDFImpl for BandSums {
 }
 
 fn text(arguments: &[ColumnarValue], index: usize) -> Result<&str> {
-    match arguments.get(index) {
-        Some(ColumnarValue::Scalar(ScalarValue::Utf8(Some(text)))) => Ok(text),
-        _ => exec_err!("{NAME}: argument {index} is not one text"),
+    if let Some(ColumnarValue::Scalar(ScalarValue::Utf8(Some(text)))) = arguments.get(index) {
+        return Ok(text);
     }
+    exec_err!("{NAME}: argument {index} is not one text")
 }
 
 fn sums(weights: &RegionWeights, grid: &Grid, arguments: &[ArrayRef]) -> Result<StringArray> {

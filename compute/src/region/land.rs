@@ -56,7 +56,7 @@ mod tests {
         let corners: usize = LAND.iter().map(Vec::len).sum();
         assert_eq!((LAND.len(), corners), (1420, 58_566));
         let [west, south, east, north] = bounds_deg(LAND.iter().flatten());
-        assert_eq!([west, south, east], [-180.0, -90.0, 180.0]);
+        assert_eq!((west, south, east), (-180.0, -90.0, 180.0));
         assert!((83.5..83.7).contains(&north), "{north}");
     }
 
