@@ -167,7 +167,12 @@ async fn segment_values(
             ComputeError::inconsistent(segment.series.to_string(), reason)
         })
     };
-    scan::or_damaged(engine.store(), &[&segment.series], answered.await).await
+    scan::or_damaged(
+        engine.store(),
+        &[&segment.series],
+        scan::caught(answered).await,
+    )
+    .await
 }
 
 /// The values of an answer of one row.

@@ -1,5 +1,6 @@
 //! Stored objects as tables: frames and series under the names that SQL uses, each row checked as it is read.
 
+use std::panic::AssertUnwindSafe;
 use std::sync::Arc;
 
 use contract::key::ObjectKey;
@@ -11,6 +12,7 @@ use datafusion::datasource::listing::{
     ListingOptions, ListingTable, ListingTableConfig, ListingTableUrl,
 };
 use datafusion::execution::context::SessionContext;
+use futures::FutureExt as _;
 use storage::{StorageError, Store};
 
 use crate::ComputeError;
@@ -117,6 +119,20 @@ fn reading() -> TableParquetOptions {
     options.global.force_filter_selections = true;
     options.global.bloom_filter_on_read = false;
     options
+}
+
+/// A question to the engine. A damaged footer can make the Parquet library panic where it should give an error: that is
+/// one.
+pub(crate) async fn caught<T>(
+    asked: impl Future<Output = Result<T, ComputeError>>,
+) -> Result<T, ComputeError> {
+    match AssertUnwindSafe(asked).catch_unwind().await {
+        Ok(answered) => answered,
+        Err(_panic) => {
+            let reason = "it gave up on what it read";
+            Err(ComputeError::inconsistent("the query engine", reason))
+        }
+    }
 }
 
 /// An answer of the engine that read some objects; where it failed or did not fit because one of them is damaged, the
