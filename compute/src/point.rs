@@ -170,7 +170,7 @@ async fn segment_values(
     scan::or_damaged(
         engine.store(),
         &[&segment.series],
-        scan::caught(answered).await,
+        scan::caught(Box::pin(answered)).await,
     )
     .await
 }

@@ -117,7 +117,12 @@ pub(super) async fn asked(
     };
     let mut read = frames.clone();
     read.extend([&region.weights.all, &region.weights.ocean]);
-    scan::or_damaged(engine.store(), &read, scan::caught(answered).await).await
+    scan::or_damaged(
+        engine.store(),
+        &read,
+        scan::caught(Box::pin(answered)).await,
+    )
+    .await
 }
 
 /// An answer of the engine: rows, and of how many chunks each must be.
