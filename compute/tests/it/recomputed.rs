@@ -11,6 +11,7 @@ use contract::grid::Grid;
 use contract::manifest::Manifest;
 use contract::quantity::Quantity;
 use contract::time::{Period, TimeMs};
+use storage::sound::seal;
 use storage::{Store, manifests};
 
 use crate::fixture::{ask, folder_store, land, product, total, wavy_year};
@@ -118,7 +119,7 @@ async fn forced_recomputation_compares_with_what_is_stored() {
     let again = plan(&store, &forced).await.unwrap();
     assert!(again.items.iter().all(|item| item.reason == Reason::Forced));
     run(&engine, &again, &|_| ()).await.unwrap();
-    // The planted fault: one digit of one stored sum.
+    // The planted fault: one digit of one stored sum, sealed as if it were right.
     let tables = folder.path().join("sums/wavy");
     let table = std::fs::read_dir(tables)
         .unwrap()
@@ -127,11 +128,17 @@ async fn forced_recomputation_compares_with_what_is_stored() {
         .unwrap()
         .path();
     let text = std::fs::read_to_string(&table).unwrap();
-    let spoilt = text.replacen("\"mass_steps\":\"", "\"mass_steps\":\"7", 1);
+    let (unsealed, _seal) = text.rsplit_once(",\"sha256\":\"").unwrap();
+    let spoilt = unsealed.replacen("\"mass_steps\":\"", "\"mass_steps\":\"7", 1);
     let spoilt = spoilt.replacen(":\"7-", ":\"-7", 1);
-    assert_ne!(spoilt, text);
-    std::fs::write(&table, spoilt).unwrap();
+    assert_ne!(spoilt, unsealed);
+    let sealed = seal::json(format!("{spoilt}}}").into_bytes());
+    std::fs::write(&table, sealed).unwrap();
     assert!(run(&engine, &again, &|_| ()).await.is_err());
+    // Under a seal that is not its own it is damaged, and made again as it was.
+    std::fs::write(&table, text.replacen(unsealed, &spoilt, 1)).unwrap();
+    run(&engine, &again, &|_| ()).await.unwrap();
+    assert_eq!(std::fs::read_to_string(&table).unwrap(), text);
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -97,8 +97,10 @@ fn areas_of_500_regions_are_those_that_another_program_finds() {
             file::read(&file).unwrap_or_else(|e| panic!("{kind}: {e}"))
         };
         let region = of("geojson");
-        assert_eq!(of("wkt"), region, "{kind} {index}");
         let own_m2 = area::region_area_m2(&region, Earth::Wgs84).unwrap();
+        // Two readers of one decimal number may differ in its last bit.
+        let as_text_m2 = area::region_area_m2(&of("wkt"), Earth::Wgs84).unwrap();
+        assert!((as_text_m2 / own_m2 - 1.0).abs() < 1e-9, "{kind} {index}");
         let weighed_m2 = weighed_m2(&ONE_DEGREE, &region);
         for ours_m2 in [own_m2, weighed_m2] {
             let off = (ours_m2 / area_m2 - 1.0).abs();
