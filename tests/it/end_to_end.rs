@@ -184,7 +184,7 @@ fn the_mean_over_a_region_times_its_area_is_its_budget() {
     assert_eq!(first.unwrap()["series"].as_array().unwrap().len(), 1);
     for (region, reason) in [
         ("atlantis", "atlantis"),
-        ("0,10,10,0", "region"),
+        ("0,10,10,0", "latitudes"),
         ("a.json", "a.json"),
     ] {
         let refused = program::fail(data, &[&words[..], &["--region", region]].concat()).unwrap();

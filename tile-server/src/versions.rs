@@ -5,7 +5,7 @@ use std::sync::Arc;
 use contract::manifest::{Manifest, ManifestId};
 use contract::quantity::Quantity;
 use quick_cache::sync::Cache;
-use storage::{StorageError, Store, manifests};
+use storage::{StorageError, Store, document, manifests};
 
 use crate::catalogue::{Accumulated, Layer};
 use crate::error::ServerError;
@@ -100,12 +100,7 @@ impl Versions {
         };
         let keys = self.store.list(&format!("manifests/{product}")).await?;
         for key in keys.iter().rev().take(DERIVATIONS) {
-            let content = match self.store.get(key).await {
-                Ok(content) => content,
-                Err(error) if error.is_not_found() => continue,
-                Err(error) => return Err(error),
-            };
-            let Ok(derived) = serde_json::from_slice::<Manifest>(&content) else {
+            let Some(derived) = document::get::<Manifest>(&self.store, key).await? else {
                 continue;
             };
             if derived.derived_from.as_ref() == Some(id) {

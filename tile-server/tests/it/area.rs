@@ -69,7 +69,7 @@ async fn what_cannot_be_asked_is_refused_with_what_can() {
         ("", "/api/regions"),
         ("region=atlantis", "atlantis"),
         ("region=1,2,3", "1,2,3"),
-        ("region=0,10,10,0", "region"),
+        ("region=0,10,10,0", "latitudes"),
         ("region=global&from=2001", "covers 2000-01-01"),
         (
             "region=global&from=2000-03&to=2000-02",
