@@ -33,7 +33,8 @@ fn a_file_that_is_not_the_promised_one_is_refused() {
 fn gibberish(of: &Event) -> [Vec<u8>; 5] {
     let text = of.to_json();
     [
-        text.replace("\"schema\":1", "\"schema\":99").into_bytes(),
+        text.replace(&format!("\"schema\":{}", of.schema), "\"schema\":99")
+            .into_bytes(),
         text.replace("\"trace\"", "\"extra\":1,\"trace\"")
             .into_bytes(),
         text.as_bytes()[..text.len() / 2].to_vec(),
