@@ -166,10 +166,12 @@ fn counts_are_there(cluster: &Cluster, prometheus: &Prometheus, inbox: &Path) {
     cluster
         .wait_for("count of every service", LIMIT, counted)
         .unwrap();
-    let schemes = COUNTING
-        .iter()
-        .copied()
-        .chain(["observations", "build_info"]);
+    let schemes = COUNTING.iter().copied().chain([
+        "observations",
+        "build_info",
+        "render_adapter_info",
+        "storage",
+    ]);
     let schemes: Vec<String> = schemes.map(|part| format!("fluxglobe_{part}")).collect();
     for name in prometheus.names().unwrap() {
         assert!(
