@@ -28,7 +28,7 @@ pub use scatter::scatter_svg;
 pub enum TimeMatch {
     /// The step that covers it.
     Nearest,
-    /// The two steps whose middles it lies between, weighted (eq. 3 of the renderer).
+    /// The two steps whose middles it lies between, weighted (eq. 3 in docs/method.md).
     Linear,
 }
 

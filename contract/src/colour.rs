@@ -1,4 +1,4 @@
-//! Transfer functions: from a value to colour, opacity and size (eq. 2 of the method), shared by legends and pictures.
+//! Transfer functions: from a value to colour, opacity and size (eq. 2 in docs/method.md), shared by legends and pictures.
 
 mod options;
 mod palette;

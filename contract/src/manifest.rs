@@ -145,7 +145,7 @@ impl Manifest {
     ///
     /// A step's mean holds at the middle of its period; before the first middle and after the last the nearest
     /// step holds. Accumulated carbon holds at the *end* of its period and grows from zero at the first start.
-    /// This is the weight of eq. 3.
+    /// This is the weight of eq. 3 in docs/method.md.
     pub fn bracket(&self, time: TimeMs) -> Option<Bracket> {
         let accumulated = self.quantity == Quantity::AccumulatedCarbon;
         let at = |step: &Step| {

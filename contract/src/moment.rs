@@ -43,7 +43,7 @@ pub struct Counts {
 pub struct After {
     /// The frame.
     pub frame: ObjectKey,
-    /// Its weight (eq. 3), above 0 and below 1.
+    /// Its weight (eq. 3 in docs/method.md), above 0 and below 1.
     #[serde(with = "crate::exact")]
     pub weight: f64,
 }
