@@ -6,7 +6,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::ContractError;
 use crate::colour::{Palette, TransferFunction};
-use crate::job::{Mode, RENDERER_VERSION, RenderJob, Style, View};
 use crate::manifest::{Bracket, Manifest};
 use crate::moment::Moment;
 use crate::product::ProductId;
@@ -15,8 +14,6 @@ use crate::time::{Period, TimeMs};
 
 /// Farthest a clock may be from 1970, s: beyond every year that has four digits.
 const MOST_CLOCK_S: f64 = 1e12;
-/// Trails of every cell at most, where cells are large on the screen.
-const TRAILS_PER_CELL: u32 = 64;
 
 /// What makes a product the eastward part of a vector that particles drift with.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -60,8 +57,11 @@ pub fn check_parts(eastward: &Manifest, northward: &Manifest) -> Result<(), Cont
     Ok(())
 }
 
-/// Periods of the steps around an instant, and the weight of the second.
-fn around(manifest: &Manifest, time: TimeMs) -> Option<(Option<Period>, Option<Period>)> {
+/// Periods of the steps around an instant, the second only where it has weight.
+pub(crate) fn steps_around(
+    manifest: &Manifest,
+    time: TimeMs,
+) -> Option<(Option<Period>, Option<Period>)> {
     let Bracket {
         before,
         after,
@@ -69,61 +69,6 @@ fn around(manifest: &Manifest, time: TimeMs) -> Option<(Option<Period>, Option<P
     } = manifest.bracket(time)?;
     let period = |step: usize| manifest.steps[step].period;
     Some((before.map(period), (weight > 0.0).then(|| period(after))))
-}
-
-impl RenderJob {
-    /// The job that draws particles drifting with a vector, by its parts' versions.
-    ///
-    /// # Errors
-    /// Products that are no parts of one vector, an instant around which they have different steps, a limit that is
-    /// broken.
-    pub fn of_flow(
-        eastward: &Manifest,
-        northward: &Manifest,
-        time: TimeMs,
-        view: View,
-        style: Style,
-    ) -> Result<Self, ContractError> {
-        check_parts(eastward, northward)?;
-        let empty = || {
-            let name = eastward.product.as_str();
-            ContractError::invalid("product", name, "it has no steps")
-        };
-        if around(eastward, time) != around(northward, time) {
-            let reason = format!(
-                "{} and {} have different steps there; land both parts of every file",
-                eastward.product, northward.product
-            );
-            let text = time.to_string();
-            return Err(ContractError::invalid("instant of a flow", &text, reason));
-        }
-        let job = Self {
-            renderer_version: RENDERER_VERSION,
-            grid: eastward.grid,
-            value: eastward.moment(time).ok_or_else(empty)?,
-            accumulated: None,
-            relief: None,
-            flow: Some(Flow {
-                northward: northward.moment(time).ok_or_else(empty)?,
-                clock_s: time.ms() as f64 / 1000.0,
-            }),
-            mode: Mode::Flow,
-            view,
-            style,
-        };
-        job.validate()?;
-        Ok(job)
-    }
-}
-
-impl Style {
-    /// What a flow looks like unless told otherwise, in colours by speed.
-    pub fn of_flow(speed: TransferFunction) -> Self {
-        Self {
-            particles_per_cell: TRAILS_PER_CELL,
-            ..Self::with_transfer(speed)
-        }
-    }
 }
 
 impl TransferFunction {
@@ -139,26 +84,19 @@ impl TransferFunction {
     }
 }
 
-/// Checks what a job from outside says of its flow.
-pub(crate) fn validate(job: &RenderJob) -> Result<(), ContractError> {
-    let bad = |reason: &str| {
-        let text = format!("{} {:?}", job.mode, job.flow);
-        Err(ContractError::invalid("flow", &text, reason))
-    };
-    let Some(flow) = &job.flow else {
-        return if job.mode == Mode::Flow {
-            bad("this mode needs the northward part of a vector")
-        } else {
-            Ok(())
-        };
-    };
-    if job.mode != Mode::Flow || job.accumulated.is_some() {
-        return bad("only the mode flow has a northward part, and nothing lifts its particles");
+impl Flow {
+    /// Checks a flow that came from outside.
+    ///
+    /// # Errors
+    /// A limit that is broken.
+    pub(crate) fn validate(&self) -> Result<(), ContractError> {
+        if !(-MOST_CLOCK_S..=MOST_CLOCK_S).contains(&self.clock_s) {
+            let text = format!("{self:?}");
+            let reason = "its clock lies within 1e12 s of 1970";
+            return Err(ContractError::invalid("flow", &text, reason));
+        }
+        self.northward.validate()
     }
-    if !(-MOST_CLOCK_S..=MOST_CLOCK_S).contains(&flow.clock_s) {
-        return bad("its clock lies within 1e12 s of 1970");
-    }
-    flow.northward.validate()
 }
 
 #[cfg(test)]
@@ -166,6 +104,7 @@ mod tests {
     use super::*;
     use crate::digest::Digest;
     use crate::grid::Grid;
+    use crate::job::{Mode, RenderJob, Style, View};
     use crate::key::ObjectKey;
     use crate::manifest::{MANIFEST_SCHEMA, Step};
 

@@ -6,14 +6,12 @@ use crate::ContractError;
 use crate::colour::TransferFunction;
 use crate::context::{Context, Relief};
 use crate::digest::Digest;
-use crate::flow::{self, Flow};
+use crate::flow::Flow;
 use crate::grid::Grid;
 use crate::key::ObjectKey;
-use crate::manifest::Manifest;
 use crate::moment::Moment;
 use crate::sun::Sun;
 use crate::tile::Tile;
-use crate::time::TimeMs;
 
 /// Raised whenever the renderer draws the same job differently or writes the same picture in other bytes, so that old
 /// pictures are not taken for new ones: a name has one content for ever. `make bless` asks for it.
@@ -265,62 +263,6 @@ impl View {
 }
 
 impl RenderJob {
-    /// The job that draws a version of a product at an instant in any mode but [`Mode::Flow`], lifted by a version of its accumulated carbon. A map has
-    /// no particles to lift.
-    ///
-    /// # Errors
-    /// A product without steps, two that do not lie on one grid, or a limit that is broken.
-    pub fn of(
-        product: &Manifest,
-        accumulated: Option<&Manifest>,
-        time: TimeMs,
-        mode: Mode,
-        view: View,
-        style: Style,
-    ) -> Result<Self, ContractError> {
-        let moment = |manifest: &Manifest, with_counts: bool| {
-            let name = || manifest.product.to_string();
-            let empty = || ContractError::invalid("product", &name(), "it has no steps");
-            if manifest.grid != product.grid {
-                let reason = format!("it does not lie on the grid of {}", product.product);
-                return Err(ContractError::invalid("product", &name(), reason));
-            }
-            let moment = if with_counts {
-                manifest.moment_with_counts(time)
-            } else {
-                manifest.moment(time)
-            };
-            moment.ok_or_else(empty)
-        };
-        let accumulated = accumulated.filter(|_| mode != Mode::Map);
-        let job = Self {
-            renderer_version: RENDERER_VERSION,
-            grid: product.grid,
-            // Colours are doubted, heights are not.
-            value: moment(product, style.doubt)?,
-            accumulated: accumulated
-                .map(|accumulated| moment(accumulated, false))
-                .transpose()?,
-            relief: None,
-            flow: None,
-            mode,
-            view,
-            style,
-        };
-        job.validate()?;
-        Ok(job)
-    }
-
-    /// The same picture over a relief.
-    ///
-    /// # Errors
-    /// A limit that is broken.
-    pub fn over(self, relief: Option<Relief>) -> Result<Self, ContractError> {
-        let job = Self { relief, ..self };
-        job.validate()?;
-        Ok(job)
-    }
-
     /// Checks every limit of a job that came from outside.
     ///
     /// # Errors
@@ -338,9 +280,25 @@ impl RenderJob {
         self.value.validate()?;
         self.accumulated.as_ref().map_or(Ok(()), Moment::validate)?;
         self.relief.as_ref().map_or(Ok(()), Relief::validate)?;
-        flow::validate(self)?;
+        self.validate_flow()?;
         self.style.validate()?;
         self.view.validate()
+    }
+
+    fn validate_flow(&self) -> Result<(), ContractError> {
+        let bad = |reason: &str| {
+            let text = format!("{} {:?}", self.mode, self.flow);
+            Err(ContractError::invalid("flow", &text, reason))
+        };
+        match &self.flow {
+            None if self.mode == Mode::Flow => {
+                bad("this mode needs the northward part of a vector")
+            }
+            Some(_) if self.mode != Mode::Flow || self.accumulated.is_some() => {
+                bad("only the mode flow has a northward part, and nothing lifts its particles")
+            }
+            flow => flow.as_ref().map_or(Ok(()), Flow::validate),
+        }
     }
 
     /// The digest that names the picture.

@@ -22,6 +22,7 @@ pub mod masked;
 pub mod moment;
 pub mod notice;
 pub mod observation;
+pub mod picture;
 pub mod product;
 pub mod quantity;
 pub mod region;

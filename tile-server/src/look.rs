@@ -1,8 +1,7 @@
-//! How a picture is to look: parameters of an address in, checked options and the style of a job out.
+//! How a picture is to look: parameters of an address in, checked options out.
 
 use contract::colour::TransferOptions;
-use contract::job::{Mode, Style};
-use contract::quantity::Quantity;
+use contract::picture::PictureOptions;
 use serde::Deserialize;
 
 use crate::error::ServerError;
@@ -64,16 +63,13 @@ impl Look {
         *self == Self::default()
     }
 
-    /// The style of a quantity that looks so.
-    pub(crate) fn style(&self, quantity: Quantity, mode: Mode) -> Result<Style, ServerError> {
-        let mut style = match mode {
-            Mode::Flow => Style::of_flow(self.options.over_speed(quantity)?),
-            Mode::Map | Mode::Points | Mode::Sprites | Mode::Volume => {
-                Style::with_transfer(self.options.over(quantity)?)
-            }
-        };
-        style.doubt = self.doubt;
-        Ok(style)
+    /// The same in the words of every picture.
+    pub(crate) fn options(&self) -> PictureOptions {
+        PictureOptions {
+            transfer: self.options,
+            doubt: self.doubt,
+            ..PictureOptions::default()
+        }
     }
 
     /// Parameters that ask for the same look, in their canonical form: nothing in them needs escaping.
@@ -131,8 +127,6 @@ mod tests {
     fn without_parameters_all_is_as_usual() {
         let look = LookQuery::default().parse().unwrap();
         assert!(look.is_usual() && look.parameters().is_empty());
-        let style = look.style(Quantity::WindSpeed, Mode::Volume).unwrap();
-        let usual = contract::colour::TransferFunction::default_for(Quantity::WindSpeed);
-        assert_eq!(style, Style::with_transfer(usual));
+        assert_eq!(look.options(), PictureOptions::default());
     }
 }

@@ -1,11 +1,12 @@
 //! From an address to a render job: a layer, a mode, an instant and a view in, everything that shapes the picture out.
 
-use contract::job::{Mode, RenderJob, Style, View};
+use contract::context::Relief;
+use contract::job::{Mode, RenderJob, View};
+use contract::picture::{self, PictureOptions, PictureRequest, PictureSources};
 use contract::time::TimeMs;
 
 use crate::catalogue::Layer;
 use crate::error::ServerError;
-use crate::look::Look;
 
 /// The mode of an address, if the layer is drawn in it.
 pub(crate) fn mode(layer: &Layer, text: &str) -> Result<Mode, ServerError> {
@@ -27,42 +28,42 @@ pub(crate) fn mode(layer: &Layer, text: &str) -> Result<Mode, ServerError> {
     })
 }
 
-/// The instant that is shown: the one asked for, or the nearest that the product covers; the middle of its last step
-/// unless one is asked for.
+/// The instant that is shown of a layer, see [`contract::picture::shown_time`].
 pub(crate) fn shown_time(layer: &Layer, time: Option<TimeMs>) -> TimeMs {
-    let last = layer.manifest.steps.last();
-    let middle = last.map_or(layer.extent.end, |last| last.period.mid());
-    time.unwrap_or(middle)
-        .clamp(layer.extent.start, layer.extent.end)
+    // A layer is a version with steps.
+    picture::shown_time(&layer.manifest, time).unwrap_or(layer.extent.end)
 }
 
-/// The job of a picture in the usual style. Without a time it shows the middle of the last step.
+/// The job of a picture in the usual look. Without a time it shows the middle of the last step.
 pub fn job(
     layer: &Layer,
     mode: Mode,
     view: View,
     time: Option<TimeMs>,
 ) -> Result<RenderJob, ServerError> {
-    let style = Look::default().style(layer.manifest.quantity, mode)?;
-    job_in_style(layer, mode, view, time, &style)
+    let request = PictureRequest {
+        mode,
+        view,
+        time,
+        options: PictureOptions::default(),
+    };
+    job_of(layer, &request, None)
 }
 
-/// The same in a style.
-pub(crate) fn job_in_style(
+/// The job of a picture of a layer, over a relief if there is one.
+pub(crate) fn job_of(
     layer: &Layer,
-    mode: Mode,
-    view: View,
-    time: Option<TimeMs>,
-    style: &Style,
+    request: &PictureRequest,
+    relief: Option<Relief>,
 ) -> Result<RenderJob, ServerError> {
-    let manifest = &layer.manifest;
-    let time = shown_time(layer, time);
-    if let (Mode::Flow, Some(part)) = (mode, &layer.northward) {
-        let northward = &part.manifest;
-        return Ok(RenderJob::of_flow(manifest, northward, time, view, *style)?);
-    }
+    let time = shown_time(layer, request.time);
     let accumulated = layer.accumulated.as_ref();
     let accumulated = accumulated.filter(|lift| lift.holds_at(time));
-    let lift = accumulated.map(|lift| &*lift.manifest);
-    Ok(RenderJob::of(manifest, lift, time, mode, view, *style)?)
+    let sources = PictureSources {
+        product: &layer.manifest,
+        accumulated: accumulated.map(|lift| &*lift.manifest),
+        northward: layer.northward.as_ref().map(|part| &*part.manifest),
+        relief,
+    };
+    Ok(request.job(&sources)?)
 }

@@ -2,9 +2,8 @@
 //! far particles rise.
 
 use contract::context::{RELIEF_EXAGGERATION, Relief};
-use contract::job::RenderJob;
+use contract::picture::PictureOptions;
 use contract::sun::SunChoice;
-use contract::time::TimeMs;
 use serde::Deserialize;
 
 use crate::catalogue::Catalogue;
@@ -77,35 +76,30 @@ impl SurroundingsQuery {
         })
     }
 
-    /// The same picture in its surroundings; `time` is the instant that it shows.
-    pub(crate) async fn around(
-        &self,
-        mut job: RenderJob,
-        catalogue: &Catalogue,
-        time: TimeMs,
-    ) -> Result<RenderJob, ServerError> {
-        if self.is_empty() {
-            return Ok(job);
-        }
+    /// The options of a picture, with what is asked for here.
+    pub(crate) fn around(&self, options: PictureOptions) -> Result<PictureOptions, ServerError> {
         let asked = self.asked()?;
-        let style = &mut job.style;
-        let context = &mut style.context;
-        context.sea_opacity = asked.sea_opacity.unwrap_or(context.sea_opacity);
-        context.coastlines = asked.coastlines.unwrap_or(context.coastlines);
-        let height_m = asked.height_exaggeration;
-        style.height_m_per_kg_m2 = height_m.unwrap_or(style.height_m_per_kg_m2);
-        if let Some(choice) = asked.sun {
-            style.sun = choice.instead_of(style.sun, time);
-        }
-        let relief = match &self.relief {
-            Some(product) => {
-                let elevation = catalogue.layer(product).await?;
-                let exaggeration = asked.relief_exaggeration.unwrap_or(RELIEF_EXAGGERATION);
-                Some(Relief::of(&elevation.manifest, exaggeration)?)
-            }
-            None => None,
+        Ok(PictureOptions {
+            sea_opacity: asked.sea_opacity,
+            coastlines: asked.coastlines,
+            height_m_per_kg_m2: asked.height_exaggeration,
+            sun: asked.sun,
+            ..options
+        })
+    }
+
+    /// The newest version of the relief that is asked for.
+    pub(crate) async fn relief(
+        &self,
+        catalogue: &Catalogue,
+    ) -> Result<Option<Relief>, ServerError> {
+        let Some(product) = &self.relief else {
+            return Ok(None);
         };
-        Ok(job.over(relief)?)
+        let exaggeration = self.asked()?.relief_exaggeration;
+        let elevation = catalogue.layer(product).await?;
+        let exaggeration = exaggeration.unwrap_or(RELIEF_EXAGGERATION);
+        Ok(Some(Relief::of(&elevation.manifest, exaggeration)?))
     }
 
     /// The parameters as tiles take them, `name=value`, in one order and one spelling.

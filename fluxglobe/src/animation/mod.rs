@@ -22,9 +22,8 @@ use storage::Store;
 use tile_server::backend::{Draw, Turn};
 
 use crate::cli::{RenderAnimation, Settings};
-use crate::command::render;
 use crate::ports::{Drawer, FleetDrawer};
-use crate::{deployment, progress};
+use crate::{deployment, picture, progress};
 use film::Film;
 use shots::Shots;
 
@@ -80,18 +79,19 @@ pub(crate) async fn run(settings: &Settings, store: Store, options: RenderAnimat
 
 async fn shots(settings: &Settings, store: &Store, options: &RenderAnimation) -> Result<Shots> {
     let globe = &options.globe;
-    let view = render::view_of(globe);
-    let product = render::product(store, settings, &globe.picture).await?;
+    let view = picture::view_of(globe);
+    let product = picture::product(store, settings, &globe.picture).await?;
     let (from, to) = span(&product, options.from, options.to)?;
-    let mut style = render::style(&product, &globe.picture)?;
-    style.globe_surface = !globe.transparent;
     let sun_of_time = globe.picture.surroundings.sun == Some(SunChoice::OfTime);
-    if !sun_of_time {
-        style = render::sunlit(style, &globe.picture, from);
+    let mut asked = picture::options(&globe.picture, !globe.transparent);
+    if sun_of_time {
+        // Each picture has its own.
+        asked.sun = None;
     }
+    let style = asked.style(product.quantity, globe.picture.mode, from)?;
     let shots = Shots {
-        accumulated: render::accumulated(store, &product).await?,
-        northward: render::northward(store, &product, globe.picture.mode).await?,
+        accumulated: picture::accumulated(store, &product).await?,
+        northward: picture::northward(store, &product, globe.picture.mode).await?,
         product,
         from,
         to,
@@ -99,7 +99,7 @@ async fn shots(settings: &Settings, store: &Store, options: &RenderAnimation) ->
         view,
         style,
         sun_of_time,
-        relief: render::relief(store, settings, &globe.picture).await?,
+        relief: picture::relief(store, settings, &globe.picture).await?,
         fps: options.fps,
         count: Shots::count_of(options.seconds, options.fps)?,
         turn_deg: options.turn,

@@ -4,6 +4,7 @@ use anyhow::{Result, bail};
 use contract::context::Relief;
 use contract::job::{Mode, RenderJob, Style, View};
 use contract::manifest::Manifest;
+use contract::picture::PictureSources;
 use contract::sun::SunChoice;
 use contract::time::TimeMs;
 use serde::{Deserialize, Serialize};
@@ -98,18 +99,17 @@ impl Shots {
                 *lon_deg = (turned + 180.0).rem_euclid(360.0) - 180.0;
             }
         }
-        let (accumulated, time) = (self.accumulated.as_ref(), self.time(number)?);
+        let time = self.time(number)?;
         let mut style = self.style;
         if self.sun_of_time {
             style.sun = SunChoice::OfTime.instead_of(style.sun, time);
         }
-        let product = &self.product;
-        let job = match (self.mode, &self.northward) {
-            (Mode::Flow, Some(northward)) => {
-                RenderJob::of_flow(product, northward, time, view, style)?
-            }
-            (mode, _) => RenderJob::of(product, accumulated, time, mode, view, style)?,
+        let sources = PictureSources {
+            product: &self.product,
+            accumulated: self.accumulated.as_ref(),
+            northward: self.northward.as_ref(),
+            relief: self.relief.clone(),
         };
-        Ok(job.over(self.relief.clone())?)
+        Ok(sources.job(self.mode, view, time, style)?)
     }
 }

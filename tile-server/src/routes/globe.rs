@@ -4,6 +4,7 @@ use axum::extract::State;
 use axum::http::HeaderMap;
 use axum::response::Response;
 use contract::job::View;
+use contract::picture::PictureRequest;
 use serde::Deserialize;
 
 use crate::error::ServerError;
@@ -49,16 +50,21 @@ pub(crate) async fn get(
     let mode = request::mode(&layer, name)?;
     let view = query.view()?;
     let time = time(query.time.as_deref())?;
-    let mut style = query.look.parse()?.style(layer.manifest.quantity, mode)?;
-    style.globe_surface = match query.surface.as_deref() {
+    let mut options = query.surroundings.around(query.look.parse()?.options())?;
+    options.globe_surface = match query.surface.as_deref() {
         None | Some("true") => true,
         Some("false") => false,
         Some(text) => return Err(ServerError::invalid("surface", text, "true or false")),
     };
-    let job = request::job_in_style(&layer, mode, view, time, &style)?;
+    let request = PictureRequest {
+        mode,
+        view,
+        time,
+        options,
+    };
+    let relief = query.surroundings.relief(&state.catalogue).await?;
+    let job = request::job_of(&layer, &request, relief)?;
     let shown = Shown::of(&layer, time);
-    let around = &query.surroundings;
-    let job = around.around(job, &state.catalogue, shown.time).await?;
     picture::respond(&state, &headers, job, shown).await
 }
 

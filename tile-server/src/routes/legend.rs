@@ -40,7 +40,11 @@ pub(crate) async fn get(
         Some(text) => request::mode(&layer, text)?,
         None => Mode::Map,
     };
-    let style = query.look.parse()?.style(quantity, mode)?;
+    let style = query
+        .look
+        .parse()?
+        .options()
+        .style(quantity, mode, layer.extent.end)?;
     let content = Legend::of_mode(mode, quantity, &style.transfer).encoded(form)?;
     // Weak: the same text may be sent compressed or not.
     let tag = format!("W/\"{}\"", Digest::of(&content));

@@ -44,7 +44,8 @@ impl TileJsonQuery {
         let manifest = manifest.map(|_named| format!("manifest={}", layer.id));
         let look = self.look.parse()?;
         // What cannot be drawn is refused here, not by every tile.
-        look.style(layer.manifest.quantity, mode)?;
+        look.options()
+            .style(layer.manifest.quantity, mode, layer.extent.end)?;
         let around = self.surroundings.of_tiles()?;
         let parts = time
             .into_iter()

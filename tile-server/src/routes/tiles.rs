@@ -4,6 +4,7 @@ use axum::extract::State;
 use axum::http::HeaderMap;
 use axum::response::Response;
 use contract::job::{Mode, View};
+use contract::picture::PictureRequest;
 use contract::tile::Tile;
 use serde::Deserialize;
 
@@ -47,12 +48,16 @@ pub(crate) async fn get(
     };
     let time = time(query.time.as_deref())?;
     let look = query.look.parse()?;
-    let style = look.style(layer.manifest.quantity, mode)?;
-    let view = View::Tile { tile, size_px };
-    let job = request::job_in_style(&layer, mode, view, time, &style)?;
-    let shown = Shown::of(&layer, time);
     let around = &query.surroundings;
-    let job = around.around(job, &state.catalogue, shown.time).await?;
+    let request = PictureRequest {
+        mode,
+        view: View::Tile { tile, size_px },
+        time,
+        options: around.around(look.options())?,
+    };
+    let relief = around.relief(&state.catalogue).await?;
+    let job = request::job_of(&layer, &request, relief)?;
+    let shown = Shown::of(&layer, time);
     // Who looks at an old version, in colours of their own or at what is not drawn ahead, is no reason to draw a new one.
     if look.is_usual() && around.is_empty() && state.catalogue.is_newest(&layer) {
         let product = &layer.manifest.product;

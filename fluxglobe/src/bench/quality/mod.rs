@@ -9,6 +9,7 @@ use comfy_table::{CellAlignment, Table};
 use contract::colour::TransferFunction;
 use contract::job::{Mode, RenderJob, Style, View};
 use contract::manifest::Manifest;
+use contract::picture::PictureSources;
 use contract::tile::Tile;
 use render_worker::proof::{QualityRow, against_slices, ocean};
 use render_worker::{RenderService, Scene};
@@ -16,8 +17,7 @@ use serde::Serialize;
 use storage::Store;
 
 use crate::cli::{BenchQuality, Settings};
-use crate::command::render;
-use crate::{deployment, progress};
+use crate::{deployment, picture, progress};
 
 /// What is printed.
 #[derive(Debug, Serialize)]
@@ -150,7 +150,7 @@ async fn landed(
     size: u32,
 ) -> Result<Vec<Subject>> {
     let last = manifest.steps.last().context("the product has no step")?;
-    let accumulated = render::accumulated(store, manifest).await?;
+    let accumulated = picture::accumulated(store, manifest).await?;
     let views = [
         (
             "North Atlantic from 4000 km",
@@ -162,14 +162,11 @@ async fn landed(
     for (name, view) in views {
         let style = Style::with_transfer(TransferFunction::default_for(manifest.quantity));
         let time = last.period.mid();
-        let job = RenderJob::of(
-            manifest,
-            accumulated.as_ref(),
-            time,
-            Mode::Volume,
-            view,
-            style,
-        )?;
+        let sources = PictureSources {
+            accumulated: accumulated.as_ref(),
+            ..PictureSources::of(manifest)
+        };
+        let job = sources.job(Mode::Volume, view, time, style)?;
         subjects.push(Subject {
             name: format!("{}, {name}", manifest.product),
             scene: service.scene(&job).await?,

@@ -1,0 +1,326 @@
+//! What a picture is asked to be, in the words that the command line, addresses and recomputations share. Together with
+//! the versions of the products that it shows it becomes a [`RenderJob`]: here and nowhere else.
+
+use crate::ContractError;
+use crate::colour::{TransferFunction, TransferOptions};
+use crate::context::{Context, Relief};
+use crate::flow::{Flow, check_parts, steps_around};
+use crate::job::{Mode, RENDERER_VERSION, RenderJob, Style, View};
+use crate::manifest::Manifest;
+use crate::quantity::Quantity;
+use crate::sun::SunChoice;
+use crate::time::TimeMs;
+
+/// Trails of every cell at most, where cells are large on the screen.
+const TRAILS_PER_CELL: u32 = 64;
+
+/// What somebody asks of the look of a picture; all of it the usual where nothing was asked.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct PictureOptions {
+    /// Colours, opacity and size.
+    pub transfer: TransferOptions,
+    /// Draw cells whose gap was filled, and sums that are not complete, differently.
+    pub doubt: bool,
+    /// Half-angle slices.
+    pub slices: Option<u32>,
+    /// Particles of every cell with data.
+    pub particles_per_cell: Option<u32>,
+    /// Height of a kilogram of accumulated carbon per square metre, m.
+    pub height_m_per_kg_m2: Option<f64>,
+    /// Share of what lies 100 km below the sea surface that the sea hides.
+    pub sea_opacity: Option<f64>,
+    /// Draw coast lines.
+    pub coastlines: Option<bool>,
+    /// Light.
+    pub sun: Option<SunChoice>,
+    /// Draw a plain globe behind the particles of a globe view.
+    pub globe_surface: bool,
+}
+
+/// A picture that somebody asks for, of whichever versions of its products there are.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PictureRequest {
+    /// Mode.
+    pub mode: Mode,
+    /// View.
+    pub view: View,
+    /// Instant, see [`shown_time`].
+    pub time: Option<TimeMs>,
+    /// Look.
+    pub options: PictureOptions,
+}
+
+/// The versions of products that a picture is drawn from.
+#[derive(Debug, Clone)]
+pub struct PictureSources<'a> {
+    /// The product drawn.
+    pub product: &'a Manifest,
+    /// Its accumulated carbon, which lifts and sinks the particles.
+    pub accumulated: Option<&'a Manifest>,
+    /// The northward part of the vector whose eastward part the product is; [`Mode::Flow`] needs it.
+    pub northward: Option<&'a Manifest>,
+    /// Land and sea floor below the particles.
+    pub relief: Option<Relief>,
+}
+
+/// The instant that is shown: the one asked for, or the nearest that the product covers; the middle of its last step
+/// unless one is asked for.
+///
+/// # Errors
+/// A product without steps.
+pub fn shown_time(product: &Manifest, time: Option<TimeMs>) -> Result<TimeMs, ContractError> {
+    let (Some(last), Some(extent)) = (product.steps.last(), product.extent()) else {
+        let name = product.product.as_str();
+        return Err(ContractError::invalid("product", name, "it has no steps"));
+    };
+    let time = time.unwrap_or(last.period.mid());
+    Ok(time.clamp(extent.start, extent.end))
+}
+
+impl PictureOptions {
+    /// The style of a quantity that looks so at an instant.
+    ///
+    /// # Errors
+    /// Options of colours that contradict each other or do not fit the quantity.
+    pub fn style(
+        &self,
+        quantity: Quantity,
+        mode: Mode,
+        time: TimeMs,
+    ) -> Result<Style, ContractError> {
+        let usual = match mode {
+            Mode::Flow => Style::of_flow(self.transfer.over_speed(quantity)?),
+            Mode::Map | Mode::Points | Mode::Sprites | Mode::Volume => {
+                Style::with_transfer(self.transfer.over(quantity)?)
+            }
+        };
+        let Context {
+            sea_opacity,
+            coastlines,
+        } = usual.context;
+        Ok(Style {
+            slices: self.slices.unwrap_or(usual.slices),
+            particles_per_cell: self.particles_per_cell.unwrap_or(usual.particles_per_cell),
+            height_m_per_kg_m2: self.height_m_per_kg_m2.unwrap_or(usual.height_m_per_kg_m2),
+            sun: self
+                .sun
+                .map_or(usual.sun, |choice| choice.instead_of(usual.sun, time)),
+            globe_surface: self.globe_surface,
+            doubt: self.doubt,
+            context: Context {
+                sea_opacity: self.sea_opacity.unwrap_or(sea_opacity),
+                coastlines: self.coastlines.unwrap_or(coastlines),
+            },
+            ..usual
+        })
+    }
+}
+
+impl PictureRequest {
+    /// The job that draws it.
+    ///
+    /// # Errors
+    /// A product without steps, products that do not belong together, or a limit that is broken.
+    pub fn job(&self, sources: &PictureSources<'_>) -> Result<RenderJob, ContractError> {
+        let time = shown_time(sources.product, self.time)?;
+        let style = self
+            .options
+            .style(sources.product.quantity, self.mode, time)?;
+        sources.job(self.mode, self.view, time, style)
+    }
+}
+
+impl<'a> PictureSources<'a> {
+    /// A product alone.
+    pub fn of(product: &'a Manifest) -> Self {
+        Self {
+            product,
+            accumulated: None,
+            northward: None,
+            relief: None,
+        }
+    }
+
+    /// The job that draws these versions in a finished style.
+    ///
+    /// # Errors
+    /// As [`PictureRequest::job`].
+    pub fn job(
+        &self,
+        mode: Mode,
+        view: View,
+        time: TimeMs,
+        style: Style,
+    ) -> Result<RenderJob, ContractError> {
+        let job = match (mode, self.northward) {
+            (Mode::Flow, Some(northward)) => {
+                RenderJob::of_flow(self.product, northward, time, view, style)?
+            }
+            (mode, _) => RenderJob::of(self.product, self.accumulated, time, mode, view, style)?,
+        };
+        job.over(self.relief.clone())
+    }
+}
+
+impl RenderJob {
+    /// The job that draws a version of a product at an instant in any mode but [`Mode::Flow`], lifted by a version of its accumulated carbon. A map has
+    /// no particles to lift.
+    ///
+    /// # Errors
+    /// A product without steps, two that do not lie on one grid, or a limit that is broken.
+    pub fn of(
+        product: &Manifest,
+        accumulated: Option<&Manifest>,
+        time: TimeMs,
+        mode: Mode,
+        view: View,
+        style: Style,
+    ) -> Result<Self, ContractError> {
+        let moment = |manifest: &Manifest, with_counts: bool| {
+            let name = || manifest.product.to_string();
+            let empty = || ContractError::invalid("product", &name(), "it has no steps");
+            if manifest.grid != product.grid {
+                let reason = format!("it does not lie on the grid of {}", product.product);
+                return Err(ContractError::invalid("product", &name(), reason));
+            }
+            let moment = if with_counts {
+                manifest.moment_with_counts(time)
+            } else {
+                manifest.moment(time)
+            };
+            moment.ok_or_else(empty)
+        };
+        let accumulated = accumulated.filter(|_| mode != Mode::Map);
+        let job = Self {
+            renderer_version: RENDERER_VERSION,
+            grid: product.grid,
+            // Colours are doubted, heights are not.
+            value: moment(product, style.doubt)?,
+            accumulated: accumulated
+                .map(|accumulated| moment(accumulated, false))
+                .transpose()?,
+            relief: None,
+            flow: None,
+            mode,
+            view,
+            style,
+        };
+        job.validate()?;
+        Ok(job)
+    }
+
+    /// The same picture over a relief.
+    ///
+    /// # Errors
+    /// A limit that is broken.
+    pub fn over(self, relief: Option<Relief>) -> Result<Self, ContractError> {
+        let job = Self { relief, ..self };
+        job.validate()?;
+        Ok(job)
+    }
+
+    /// The job that draws particles drifting with a vector, by its parts' versions.
+    ///
+    /// # Errors
+    /// Products that are no parts of one vector, an instant around which they have different steps, a limit that is
+    /// broken.
+    pub fn of_flow(
+        eastward: &Manifest,
+        northward: &Manifest,
+        time: TimeMs,
+        view: View,
+        style: Style,
+    ) -> Result<Self, ContractError> {
+        check_parts(eastward, northward)?;
+        let empty = || {
+            let name = eastward.product.as_str();
+            ContractError::invalid("product", name, "it has no steps")
+        };
+        if steps_around(eastward, time) != steps_around(northward, time) {
+            let reason = format!(
+                "{} and {} have different steps there; land both parts of every file",
+                eastward.product, northward.product
+            );
+            let text = time.to_string();
+            return Err(ContractError::invalid("instant of a flow", &text, reason));
+        }
+        let job = Self {
+            renderer_version: RENDERER_VERSION,
+            grid: eastward.grid,
+            value: eastward.moment(time).ok_or_else(empty)?,
+            accumulated: None,
+            relief: None,
+            flow: Some(Flow {
+                northward: northward.moment(time).ok_or_else(empty)?,
+                clock_s: time.ms() as f64 / 1000.0,
+            }),
+            mode: Mode::Flow,
+            view,
+            style,
+        };
+        job.validate()?;
+        Ok(job)
+    }
+}
+
+impl Style {
+    /// What a flow looks like unless told otherwise, in colours by speed.
+    pub fn of_flow(speed: TransferFunction) -> Self {
+        Self {
+            particles_per_cell: TRAILS_PER_CELL,
+            ..Self::with_transfer(speed)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_not_asked_for_is_as_usual() {
+        let time = "2000-02-01".parse().unwrap();
+        for mode in Mode::ALL {
+            let style = PictureOptions::default().style(Quantity::Current, mode, time);
+            let usual = match mode {
+                Mode::Flow => {
+                    Style::of_flow(crate::colour::TransferFunction::of_speed(Quantity::Current))
+                }
+                _ => Style::with_transfer(crate::colour::TransferFunction::default_for(
+                    Quantity::Current,
+                )),
+            };
+            assert_eq!(style.unwrap(), usual, "{mode}");
+        }
+    }
+
+    #[test]
+    fn every_option_reaches_the_style() {
+        let time: TimeMs = "2000-06-21T12:00:00Z".parse().unwrap();
+        let style = |options: PictureOptions| {
+            options
+                .style(Quantity::CarbonFlux, Mode::Volume, time)
+                .unwrap()
+        };
+        let usual = style(PictureOptions::default());
+        let changes: [fn(&mut PictureOptions); 9] = [
+            |o| o.transfer.reversed = true,
+            |o| o.doubt = true,
+            |o| o.slices = Some(7),
+            |o| o.particles_per_cell = Some(3),
+            |o| o.height_m_per_kg_m2 = Some(1.0),
+            |o| o.sea_opacity = Some(0.5),
+            |o| o.coastlines = Some(true),
+            |o| o.sun = Some(SunChoice::OfTime),
+            |o| o.globe_surface = true,
+        ];
+        let mut seen = vec![usual];
+        for change in changes {
+            let mut options = PictureOptions::default();
+            change(&mut options);
+            let changed = style(options);
+            assert!(!seen.contains(&changed), "{options:?}");
+            seen.push(changed);
+        }
+    }
+}

@@ -1,0 +1,127 @@
+//! From the options of a picture to its render job: the same words and the same function as an address has.
+
+use anyhow::{Context as _, Result};
+use contract::context::Relief;
+use contract::job::{Mode, RenderJob, View};
+use contract::manifest::Manifest;
+use contract::picture::{PictureOptions, PictureRequest, PictureSources, shown_time};
+use contract::time::Period;
+use storage::Store;
+
+use crate::cli::{Picture, RenderGlobe, Settings};
+use crate::{deployment, progress};
+
+/// The view that the options of a globe's picture ask for.
+pub(crate) fn view_of(globe: &RenderGlobe) -> View {
+    View::Globe {
+        lon_deg: globe.lon,
+        lat_deg: globe.lat,
+        height_m: globe.height * 1000.0,
+        width_px: globe.size.0,
+        height_px: globe.size.1,
+    }
+}
+
+/// The job that the options of a picture ask for, over the newest version of its product.
+pub(crate) async fn job(
+    store: &Store,
+    settings: &Settings,
+    picture: &Picture,
+    view: View,
+    globe_surface: bool,
+) -> Result<RenderJob> {
+    let product = product(store, settings, picture).await?;
+    let shown = shown_time(&product, picture.time)?;
+    if let Some(time) = picture.time
+        && let Some(Period { start, end }) = product.extent()
+        && shown != time
+    {
+        progress::say(&format!(
+            "{} covers {start} to {end} and has nothing of {time}; shown is {shown}",
+            product.product
+        ));
+    }
+    let northward = northward(store, &product, picture.mode).await?;
+    let accumulated = accumulated(store, &product).await?;
+    let sources = PictureSources {
+        product: &product,
+        accumulated: accumulated.as_ref(),
+        northward: northward.as_ref(),
+        relief: relief(store, settings, picture).await?,
+    };
+    let request = PictureRequest {
+        mode: picture.mode,
+        view,
+        time: picture.time,
+        options: options(picture, globe_surface),
+    };
+    Ok(request.job(&sources)?)
+}
+
+/// What the options of a picture ask of its look.
+pub(crate) fn options(picture: &Picture, globe_surface: bool) -> PictureOptions {
+    let surroundings = &picture.surroundings;
+    PictureOptions {
+        transfer: picture.look.options(),
+        doubt: picture.doubt,
+        slices: picture.slices,
+        particles_per_cell: picture.particles,
+        height_m_per_kg_m2: surroundings.height_exaggeration,
+        sea_opacity: Some(surroundings.sea_opacity),
+        coastlines: Some(surroundings.coastlines),
+        sun: surroundings.sun,
+        globe_surface,
+    }
+}
+
+/// The newest version of the relief that a picture asks for.
+pub(crate) async fn relief(
+    store: &Store,
+    settings: &Settings,
+    picture: &Picture,
+) -> Result<Option<Relief>> {
+    let options = &picture.surroundings;
+    let Some(product) = &options.relief else {
+        return Ok(None);
+    };
+    let elevation = deployment::manifest(store, product, &settings.data).await?;
+    Ok(Some(Relief::of(&elevation, options.relief_exaggeration)?))
+}
+
+/// The newest version of a picture's product.
+pub(crate) async fn product(
+    store: &Store,
+    settings: &Settings,
+    picture: &Picture,
+) -> Result<Manifest> {
+    deployment::manifest(store, &picture.layer, &settings.data).await
+}
+
+/// The northward part of the vector whose eastward part a product is, if the mode needs one.
+pub(crate) async fn northward(
+    store: &Store,
+    eastward: &Manifest,
+    mode: Mode,
+) -> Result<Option<Manifest>> {
+    if mode != Mode::Flow {
+        return Ok(None);
+    }
+    let name = &eastward.product;
+    let product = contract::flow::northward_of(eastward).with_context(|| {
+        format!("{name} is not drawn as a flow: name the eastward part of a current, NAME-east, which has landed beside NAME-north")
+    })?;
+    let latest = storage::manifests::latest(store, &product).await?;
+    let latest = latest.with_context(|| {
+        format!("{name} is not drawn as a flow before {product} has landed; ingest the same files with its profile")
+    })?;
+    Ok(Some(latest))
+}
+
+/// Accumulated carbon of just this version of a product, if it was derived.
+pub(crate) async fn accumulated(store: &Store, manifest: &Manifest) -> Result<Option<Manifest>> {
+    let Ok(product) = manifest.product.accumulated() else {
+        return Ok(None);
+    };
+    let latest = storage::manifests::latest(store, &product).await?;
+    Ok(latest.filter(|derived| derived.derived_from == Some(manifest.id())))
+}

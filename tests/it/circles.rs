@@ -1,0 +1,321 @@
+//! Files of a crate know one another in one direction: read from the sources, names followed to where they are defined.
+//!
+//! What is seen: `use`, and paths that start at `crate`, `self`, `super`, a child module or a name brought in by `use`.
+//! Re-exports are followed, and are no knowledge themselves. Code of tests and the inside of macros are left out.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use petgraph::algo::tarjan_scc;
+use petgraph::graphmap::DiGraphMap;
+use syn::visit::{self, Visit};
+use syn::{Attribute, Item, ItemMod, UseTree, Visibility};
+
+/// Crates whose sources are read, by folder and root file.
+const CRATES: &[&str] = &[
+    "contract/src/lib.rs",
+    "storage/src/lib.rs",
+    "kafka/src/lib.rs",
+    "observations/src/lib.rs",
+    "service/src/lib.rs",
+    "ingest/src/lib.rs",
+    "compute/src/lib.rs",
+    "render-worker/src/lib.rs",
+    "render-bench/src/lib.rs",
+    "tile-server/src/lib.rs",
+    "fluxglobe/src/main.rs",
+];
+
+/// Re-exports of one name that are followed.
+const MOST_RE_EXPORTS: u32 = 8;
+
+/// A module's path from the root of its crate.
+type Module = Vec<String>;
+
+/// What one file says.
+#[derive(Default)]
+struct Source {
+    file: PathBuf,
+    /// Names brought in, with where they come from as written.
+    brought: BTreeMap<String, Vec<String>>,
+    /// Of these, what others may take from here.
+    passed_on: BTreeSet<String>,
+    /// Modules whose every name is brought in.
+    brought_whole: Vec<Vec<String>>,
+    /// Paths in its code.
+    paths: BTreeSet<Vec<String>>,
+}
+
+fn is_of_tests(attributes: &[Attribute]) -> bool {
+    attributes.iter().any(|attribute| {
+        let mut is_test = false;
+        if attribute.path().is_ident("cfg") {
+            let _ = attribute.parse_nested_meta(|meta| {
+                is_test |= meta.path.is_ident("test");
+                Ok(())
+            });
+        }
+        is_test
+    })
+}
+
+impl Source {
+    fn take(&mut self, tree: &UseTree, mut prefix: Vec<String>, is_passed_on: bool) {
+        let mut bring = |name: String, path: Vec<String>| {
+            if is_passed_on {
+                self.passed_on.insert(name.clone());
+            }
+            self.brought.insert(name, path);
+        };
+        match tree {
+            UseTree::Path(path) => {
+                prefix.push(path.ident.to_string());
+                self.take(&path.tree, prefix, is_passed_on);
+            }
+            UseTree::Name(name) if name.ident == "self" => {
+                let own = prefix.last().cloned().unwrap_or_default();
+                bring(own, prefix);
+            }
+            UseTree::Name(name) => {
+                prefix.push(name.ident.to_string());
+                bring(name.ident.to_string(), prefix);
+            }
+            UseTree::Rename(rename) => {
+                if rename.ident != "self" {
+                    prefix.push(rename.ident.to_string());
+                }
+                bring(rename.rename.to_string(), prefix);
+            }
+            UseTree::Glob(_) => self.brought_whole.push(prefix),
+            UseTree::Group(group) => {
+                for tree in &group.items {
+                    self.take(tree, prefix.clone(), is_passed_on);
+                }
+            }
+        }
+    }
+}
+
+impl<'ast> Visit<'ast> for Source {
+    fn visit_item(&mut self, item: &'ast Item) {
+        match item {
+            Item::Mod(module) if is_of_tests(&module.attrs) => {}
+            Item::Fn(function) if is_of_tests(&function.attrs) => {}
+            Item::Impl(block) if is_of_tests(&block.attrs) => {}
+            Item::Use(used) if is_of_tests(&used.attrs) => {}
+            Item::Use(used) => {
+                let is_passed_on = !matches!(used.vis, Visibility::Inherited);
+                self.take(&used.tree, vec![], is_passed_on);
+            }
+            item => visit::visit_item(self, item),
+        }
+    }
+
+    fn visit_path(&mut self, path: &'ast syn::Path) {
+        if path.leading_colon.is_none() && path.segments.len() > 1 {
+            let names = path.segments.iter().map(|part| part.ident.to_string());
+            self.paths.insert(names.collect());
+        }
+        visit::visit_path(self, path);
+    }
+}
+
+/// The files of a crate by module.
+struct Crate {
+    sources: BTreeMap<Module, Source>,
+}
+
+impl Crate {
+    fn read(root: &Path) -> Self {
+        let mut sources = BTreeMap::new();
+        let folder = root.parent().unwrap().to_owned();
+        let mut open = vec![(Module::new(), root.to_owned(), folder)];
+        while let Some((module, file, folder)) = open.pop() {
+            let text = std::fs::read_to_string(&file).unwrap();
+            let parsed =
+                syn::parse_file(&text).unwrap_or_else(|e| panic!("{}: {e}", file.display()));
+            let mut source = Source {
+                file,
+                ..Source::default()
+            };
+            source.visit_file(&parsed);
+            for item in &parsed.items {
+                let Item::Mod(child) = item else { continue };
+                let Some((file, folder)) = file_of(child, &folder) else {
+                    continue;
+                };
+                let mut path = module.clone();
+                path.push(child.ident.to_string());
+                open.push((path, file, folder));
+            }
+            sources.insert(module, source);
+        }
+        Self { sources }
+    }
+
+    /// The module in which a path that is written in `from` starts, and the rest of it; none if it leads out of the crate.
+    fn start(&self, from: &Module, path: &[String]) -> Option<(Module, Vec<String>)> {
+        let (first, rest) = path.split_first()?;
+        let mut module = from.clone();
+        match first.as_str() {
+            "crate" => return Some((vec![], rest.to_vec())),
+            "self" => return Some((module, rest.to_vec())),
+            "super" => {
+                module.pop()?;
+                // More of the same may follow.
+                let follows = rest.first().is_some_and(|next| next == "super");
+                return if follows {
+                    self.start(&module, rest)
+                } else {
+                    Some((module, rest.to_vec()))
+                };
+            }
+            _ => {}
+        }
+        let mut child = module.clone();
+        child.push(first.clone());
+        if self.sources.contains_key(&child) {
+            return Some((child, rest.to_vec()));
+        }
+        let brought = self.sources[from].brought.get(first)?;
+        // `use serde;` and the like brings in what is outside; so does a name that is brought in as itself.
+        if brought.first() == Some(first) {
+            return None;
+        }
+        let (module, mut way) = self.start(from, brought)?;
+        way.extend_from_slice(rest);
+        Some((module, way))
+    }
+
+    /// The module that defines what a path leads to; none if it leads out of the crate or to a whole module.
+    fn definer(&self, from: &Module, path: &[String], depth: u32) -> Option<Module> {
+        let (mut module, way) = self.start(from, path)?;
+        let mut way = way.as_slice();
+        while let Some((name, rest)) = way.split_first() {
+            let mut child = module.clone();
+            child.push(name.clone());
+            if self.sources.contains_key(&child) {
+                module = child;
+                way = rest;
+                continue;
+            }
+            let source = &self.sources[&module];
+            if depth < MOST_RE_EXPORTS && source.passed_on.contains(name) {
+                let mut on = source.brought[name].clone();
+                on.extend_from_slice(rest);
+                return self.definer(&module, &on, depth + 1);
+            }
+            return Some(module);
+        }
+        None
+    }
+
+    /// Which file takes a name from which other.
+    fn edges(&self) -> BTreeMap<(&Path, &Path), String> {
+        let mut edges = BTreeMap::new();
+        for (module, source) in &self.sources {
+            let brought = source
+                .brought
+                .iter()
+                .filter(|(name, _)| !source.passed_on.contains(*name))
+                .map(|(_, path)| path);
+            for path in brought.chain(&source.paths) {
+                let Some(other) = self.definer(module, path, 0) else {
+                    continue;
+                };
+                let other = self.sources[&other].file.as_path();
+                if other != source.file {
+                    let name = path.last().cloned().unwrap_or_default();
+                    edges.entry((source.file.as_path(), other)).or_insert(name);
+                }
+            }
+            for path in &source.brought_whole {
+                let mut whole = path.clone();
+                whole.push("*".to_owned());
+                if let Some(other) = self.definer(module, &whole, 0) {
+                    let other = self.sources[&other].file.as_path();
+                    if other != source.file {
+                        edges.insert((source.file.as_path(), other), "*".to_owned());
+                    }
+                }
+            }
+        }
+        edges
+    }
+
+    /// Files that know one another in both directions, with the names that tie them.
+    fn circles(&self) -> Vec<String> {
+        let edges = self.edges();
+        let graph: DiGraphMap<&Path, ()> = edges.keys().map(|(from, to)| (*from, *to)).collect();
+        let tied = |circle: &Vec<&Path>| {
+            let inside = edges
+                .iter()
+                .filter(|((from, to), _)| circle.contains(from) && circle.contains(to));
+            let lines = inside.map(|((from, to), name)| {
+                format!("\n  {} takes {name} from {}", from.display(), to.display())
+            });
+            format!("{} files:{}", circle.len(), lines.collect::<String>())
+        };
+        let mut circles: Vec<_> = tarjan_scc(&graph)
+            .into_iter()
+            .filter(|circle| circle.len() > 1)
+            .collect();
+        circles.iter_mut().for_each(|circle| circle.sort());
+        circles.sort();
+        circles.iter().map(tied).collect()
+    }
+}
+
+/// The file of a child module, and the folder of its own children; none for one that is written in place or for tests.
+fn file_of(child: &ItemMod, folder: &Path) -> Option<(PathBuf, PathBuf)> {
+    if child.content.is_some() || is_of_tests(&child.attrs) {
+        return None;
+    }
+    let own = folder.join(child.ident.to_string());
+    let beside = own.with_extension("rs");
+    let file = if beside.is_file() {
+        beside
+    } else {
+        own.join("mod.rs")
+    };
+    // Generated code is included elsewhere.
+    file.is_file().then_some((file, own))
+}
+
+#[test]
+fn files_of_a_crate_know_one_another_in_one_direction() {
+    let workspace = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
+    let mut found = vec![];
+    for root in CRATES {
+        let read = Crate::read(&workspace.join(root));
+        assert!(
+            read.edges().len() > 3,
+            "{root}: its files were not understood"
+        );
+        found.extend(read.circles());
+    }
+    let prefix = format!("{}/", workspace.display());
+    assert!(
+        found.is_empty(),
+        "{}",
+        found.join("\n").replace(&prefix, "")
+    );
+}
+
+#[test]
+fn a_circle_is_seen_through_re_exports_and_modules_brought_in() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    write("lib.rs", "mod a; mod b; mod c; pub use a::A;");
+    write("a.rs", "use crate::b; pub struct A(b::B);");
+    write("b.rs", "use crate::A; pub struct B(Option<Box<A>>);");
+    write(
+        "c.rs",
+        "use super::A; #[cfg(test)] mod tests { use crate::b::B; } struct C(A);",
+    );
+    let read = Crate::read(&folder.path().join("lib.rs"));
+    let circles = read.circles();
+    assert_eq!(circles.len(), 1, "{circles:?}");
+    assert!(circles[0].starts_with("2 files:"), "{circles:?}");
+    assert!(circles[0].contains("takes A from"), "{circles:?}");
+}
