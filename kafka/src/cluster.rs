@@ -4,6 +4,7 @@ use contract::event::MAX_EVENT_BYTES;
 use contract::topic::Topic;
 use rdkafka::ClientConfig;
 use rdkafka::config::RDKafkaLogLevel;
+use storage::StorageError;
 
 use crate::settings::{KafkaSettings, Security};
 use crate::{KafkaFailure, secret};
@@ -160,6 +161,21 @@ impl Cluster {
             .set("heartbeat.interval.ms", HEARTBEAT_MS.to_string())
             .set("max.poll.interval.ms", "60000");
         config
+    }
+}
+
+impl KafkaSettings {
+    /// Checks what can be checked without asking a broker: that brokers are named, that the settings go together, that
+    /// the files they name are there and the secrets in them are lines of text.
+    ///
+    /// # Errors
+    /// `LogSetup`, naming the setting.
+    pub fn check(&self) -> Result<(), StorageError> {
+        let log = self.kafka.as_deref().unwrap_or("on Kafka");
+        match Cluster::open(self) {
+            Ok(_cluster) => Ok(()),
+            Err(failure) => Err(failure.of_log(log)),
+        }
     }
 }
 

@@ -2,10 +2,6 @@
 
 use std::path::PathBuf;
 
-use storage::StorageError;
-
-use crate::cluster::Cluster;
-
 /// Most brokers that a list of brokers may name.
 const MAX_SERVERS: usize = 32;
 /// Longest prefix and instance name, bytes.
@@ -131,19 +127,6 @@ pub struct KafkaSettings {
 }
 
 impl KafkaSettings {
-    /// Checks what can be checked without asking a broker: that brokers are named, that the settings go together, that
-    /// the files they name are there and the secrets in them are lines of text.
-    ///
-    /// # Errors
-    /// `LogSetup`, naming the setting.
-    pub fn check(&self) -> Result<(), StorageError> {
-        let log = self.kafka.as_deref().unwrap_or("on Kafka");
-        match Cluster::open(self) {
-            Ok(_cluster) => Ok(()),
-            Err(failure) => Err(failure.of_log(log)),
-        }
-    }
-
     /// Brokers without encryption or login, all else as by default.
     pub fn plain(servers: impl Into<String>) -> Self {
         Self {

@@ -1,18 +1,12 @@
-//! The one trait of both homes of observations, and which home a setting means.
-
-use std::sync::Arc;
+//! The one trait of both homes of observations.
 
 use async_trait::async_trait;
 use contract::observation::Observation;
 use serde::{Deserialize, Serialize};
-use storage::Store;
 
 use crate::error::ObservationError;
-use crate::files::FileStore;
 use crate::filter::{Filter, Page};
 use crate::platform::Platform;
-use crate::postgis::PostgisStore;
-use crate::settings::ObservationSettings;
 use crate::track::{TrackPoint, TrackQuery};
 
 /// What became of the observations of one call; of several of one name only the last is counted.
@@ -56,15 +50,4 @@ pub trait ObservationStore: Send + Sync {
 
     /// Can observations be stored and asked for now? Answers within two seconds.
     async fn ready(&self) -> Result<(), ObservationError>;
-}
-
-/// The home that the settings name: a database, or files in the object store. Nothing is connected to yet.
-pub fn open(
-    settings: &ObservationSettings,
-    store: &Store,
-) -> Result<Arc<dyn ObservationStore>, ObservationError> {
-    match settings.database()? {
-        Some(database) => Ok(Arc::new(PostgisStore::new(&database)?)),
-        None => Ok(Arc::new(FileStore::new(store.clone()))),
-    }
 }

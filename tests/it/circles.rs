@@ -1,8 +1,10 @@
 //! Files of a crate know one another in one direction: read from the sources, names followed to where they are defined.
 //!
 //! What is seen: `use`, and paths that start at `crate`, `self`, `super`, a child module or a name brought in by `use`.
-//! Re-exports are followed, and are no knowledge themselves. Code of tests and the inside of macros are left out.
+//! Re-exports are followed, and are no knowledge themselves. A module and what lies below it are one thing: it may take
+//! from its parts and they from it. Code of tests and the inside of macros are left out.
 
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
@@ -219,24 +221,23 @@ impl Crate {
                 .iter()
                 .filter(|(name, _)| !source.passed_on.contains(*name))
                 .map(|(_, path)| path);
-            for path in brought.chain(&source.paths) {
-                let Some(other) = self.definer(module, path, 0) else {
+            let whole = source.brought_whole.iter().map(|path| {
+                let mut all = path.clone();
+                all.push("*".to_owned());
+                Cow::Owned(all)
+            });
+            let paths = brought.chain(&source.paths).map(Cow::Borrowed);
+            for path in paths.chain(whole) {
+                let Some(other) = self.definer(module, &path, 0) else {
                     continue;
                 };
+                if module.starts_with(&other) {
+                    continue;
+                }
                 let other = self.sources[&other].file.as_path();
                 if other != source.file {
                     let name = path.last().cloned().unwrap_or_default();
                     edges.entry((source.file.as_path(), other)).or_insert(name);
-                }
-            }
-            for path in &source.brought_whole {
-                let mut whole = path.clone();
-                whole.push("*".to_owned());
-                if let Some(other) = self.definer(module, &whole, 0) {
-                    let other = self.sources[&other].file.as_path();
-                    if other != source.file {
-                        edges.insert((source.file.as_path(), other), "*".to_owned());
-                    }
                 }
             }
         }

@@ -6,6 +6,7 @@
 //! | time for a request's head | clients that send their request a byte at a time, so that it never begins |
 //! | time without a byte in either direction | clients that are gone without a word, or never take their answer |
 
+pub(crate) mod counts;
 mod guarded;
 mod phase;
 
@@ -15,7 +16,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use axum::serve::Listener;
-use prometheus::{IntCounterVec, IntGauge, Opts, Registry};
+use prometheus::IntGauge;
 use tokio::io::AsyncReadExt as _;
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
@@ -23,6 +24,7 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use crate::config::Settings;
 use crate::metrics::Metrics;
 
+use counts::Counts;
 pub(crate) use guarded::Guarded;
 
 /// What a client beyond the limit is told.
@@ -41,33 +43,6 @@ pub(crate) struct Limits {
     pub(crate) head: Duration,
     /// Without a byte in either direction.
     pub(crate) idle: Duration,
-}
-
-/// How many connections there are and were ended.
-#[derive(Debug, Clone)]
-pub(crate) struct Counts {
-    open: IntGauge,
-    /// By the limit that they broke.
-    ended: IntCounterVec,
-}
-
-impl Counts {
-    pub(crate) fn register(registry: &Registry) -> Result<Self, prometheus::Error> {
-        let open = IntGauge::new(
-            "fluxglobe_tile_server_connections_count",
-            "Connections that are open.",
-        )?;
-        let ended = IntCounterVec::new(
-            Opts::new(
-                "fluxglobe_tile_server_connections_ended_total",
-                "Connections ended by this server, by the limit that they broke.",
-            ),
-            &["why"],
-        )?;
-        registry.register(Box::new(open.clone()))?;
-        registry.register(Box::new(ended.clone()))?;
-        Ok(Self { open, ended })
-    }
 }
 
 /// A socket that lets in as many as there is room for.

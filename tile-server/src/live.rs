@@ -14,9 +14,27 @@ mod service;
 mod touched;
 mod watch;
 
+use std::sync::Arc;
+
+use storage::log::EventLog;
+
+use crate::state::AppState;
 pub use freshness::Freshness;
 pub use hot::{HotTile, HotTiles};
 pub use news::{Item, Listener, News};
 pub use service::LiveService;
 pub use touched::touched;
 pub use watch::Watch;
+
+impl AppState {
+    /// What keeps this server up with the event log.
+    pub fn live(&self, log: Arc<dyn EventLog>) -> LiveService {
+        self.log.get_or_init(|| Arc::clone(&log));
+        LiveService::new(self.clone(), log)
+    }
+
+    /// What keeps the viewers of this server up with the store, where there is no event log to follow.
+    pub fn watch(&self) -> Watch {
+        Watch::new(self.clone())
+    }
+}

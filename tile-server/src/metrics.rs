@@ -9,7 +9,7 @@ use prometheus::{
 
 pub use prometheus::Registry;
 
-use crate::connections::Counts;
+use crate::connections::counts::Counts;
 
 /// Bounds of request times, seconds: a cached tile is under a millisecond, a budget some seconds.
 const REQUEST_BOUNDS_S: [f64; 12] = [

@@ -13,7 +13,7 @@ use crate::catalogue::Catalogue;
 use crate::config::Settings;
 use crate::error::ServeError;
 use crate::gate::Gate;
-use crate::live::{Freshness, HotTiles, LiveService, News, Watch};
+use crate::live::{Freshness, HotTiles, News};
 use crate::metrics::{Metrics, Registry};
 use crate::pictures::Pictures;
 
@@ -94,17 +94,6 @@ impl AppState {
         // Set once, when the parts are put together; a second one would change nothing.
         self.observer.get_or_init(|| observer);
         self
-    }
-
-    /// What keeps this server up with the event log.
-    pub fn live(&self, log: Arc<dyn EventLog>) -> LiveService {
-        self.log.get_or_init(|| Arc::clone(&log));
-        LiveService::new(self.clone(), log)
-    }
-
-    /// What keeps the viewers of this server up with the store, where there is no event log to follow.
-    pub fn watch(&self) -> Watch {
-        Watch::new(self.clone())
     }
 }
 
