@@ -11,6 +11,7 @@
 use bytes::Bytes;
 use contract::digest::Digest;
 use contract::key::ObjectKey;
+use contract::kind::Kind;
 use contract::product::ProductId;
 use contract::topic::Origin;
 use storage::Store;
@@ -21,7 +22,8 @@ fn key(product: &ProductId, raw_sha256: Digest, origin: Origin) -> Result<Object
     let Origin {
         partition, offset, ..
     } = origin;
-    Ok(format!("landings/{product}/{raw_sha256}-{partition}-{offset}").parse()?)
+    let folder = Kind::Landing.folder();
+    Ok(format!("{folder}/{product}/{raw_sha256}-{partition}-{offset}").parse()?)
 }
 
 /// Notes that a notice is about to publish a file; true if that was noted before.

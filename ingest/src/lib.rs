@@ -19,6 +19,7 @@ pub mod error;
 mod fetch;
 mod file;
 mod gates;
+mod gc;
 mod generate;
 mod ingestd;
 mod inspect;
@@ -46,6 +47,7 @@ mod unit;
 
 pub use error::IngestError;
 pub use fetch::{AllowedHost, Patience, Sources};
+pub use gc::{LandingNotes, Readings};
 pub use generate::generate_china_sea;
 pub use ingestd::{IngestService, ServiceSettings};
 pub use land::{Batch, land_files};

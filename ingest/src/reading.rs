@@ -6,6 +6,7 @@
 use contract::digest::Digest;
 use contract::grid::Grid;
 use contract::key::ObjectKey;
+use contract::kind::Kind;
 use contract::kind::Vouched;
 use contract::manifest::Step;
 use contract::product::ProductId;
@@ -19,8 +20,6 @@ use crate::recipe::Recipe;
 
 /// Version of the note's JSON as it is written. Those of version 1 are not sealed and are read as well.
 const SCHEMA: u32 = 2;
-/// Folder of the notes.
-const FOLDER: &str = "readings";
 
 /// What one file was read as; its frames are durable.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -113,7 +112,7 @@ pub(crate) fn key(
     file_name: &str,
 ) -> Result<ObjectKey, StorageError> {
     let input = recipe.input(raw_sha256, file_name);
-    let text = format!("{FOLDER}/{product}/{raw_sha256}-{input}");
+    let text = format!("{}/{product}/{raw_sha256}-{input}", Kind::Reading.folder());
     text.parse().map_err(|_no_key| damaged(&text, "is no key"))
 }
 
@@ -122,7 +121,9 @@ pub(crate) async fn keys(
     store: &Store,
     product: &ProductId,
 ) -> Result<Vec<ObjectKey>, IngestError> {
-    let listed = store.list(&format!("{FOLDER}/{product}")).await;
+    let listed = store
+        .list(&format!("{}/{product}", Kind::Reading.folder()))
+        .await;
     listed.map_err(IngestError::storage("list readings"))
 }
 

@@ -4,7 +4,7 @@
 //! with create-if-absent, so that of two writers one commits and the other begins again on what is there then.
 
 mod columns;
-mod index;
+pub(crate) mod index;
 mod table;
 
 use std::collections::BTreeMap;

@@ -9,6 +9,7 @@ pub mod document;
 pub mod domain;
 pub mod error;
 pub mod frames;
+pub mod gc;
 pub mod log;
 pub mod manifests;
 mod parquet_table;

@@ -1,6 +1,7 @@
 //! Numbered manifests: the newest of a product, one by its name, and the commit of the next.
 
 use contract::key::ObjectKey;
+use contract::kind::Kind;
 use contract::manifest::{
     MANIFEST_SCHEMA, Manifest, ManifestId, OLDEST_MANIFEST_SCHEMA, SeriesSegment, Step,
 };
@@ -11,13 +12,15 @@ use crate::{StorageError, Store, document, frames};
 
 /// Products that have a manifest, sorted by name.
 pub async fn products(store: &Store) -> Result<Vec<ProductId>, StorageError> {
-    let names = store.folders("manifests").await?;
+    let names = store.folders(Kind::Manifest.folder()).await?;
     Ok(names.iter().filter_map(|name| name.parse().ok()).collect())
 }
 
 /// The newest manifest of a product, if it has one.
 pub async fn latest(store: &Store, product: &ProductId) -> Result<Option<Manifest>, StorageError> {
-    let keys = store.list(&format!("manifests/{product}")).await?;
+    let keys = store
+        .list(&format!("{}/{product}", Kind::Manifest.folder()))
+        .await?;
     match keys.last() {
         Some(key) => read(store, key).await,
         None => Ok(None),

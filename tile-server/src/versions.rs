@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use contract::kind::Kind;
 use contract::manifest::{Manifest, ManifestId};
 use contract::quantity::Quantity;
 use quick_cache::sync::Cache;
@@ -98,7 +99,10 @@ impl Versions {
         let Ok(product) = manifest.product.accumulated() else {
             return Ok(None);
         };
-        let keys = self.store.list(&format!("manifests/{product}")).await?;
+        let keys = self
+            .store
+            .list(&format!("{}/{product}", Kind::Manifest.folder()))
+            .await?;
         for key in keys.iter().rev().take(DERIVATIONS) {
             let Some(derived) = document::get::<Manifest>(&self.store, key).await? else {
                 continue;

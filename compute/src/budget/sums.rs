@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use contract::digest::Digest;
 use contract::key::ObjectKey;
+use contract::kind::Kind;
 use contract::manifest::{Manifest, ManifestId, Step};
 use contract::time::{Period, TimeMs};
 use serde::{Deserialize, Serialize};
@@ -119,13 +120,10 @@ pub(crate) fn input(manifest: &ManifestId, weights: &RegionKeys, measure: Measur
 /// The key of a version's sums over a region's weights.
 pub fn key(manifest: &ManifestId, weights: &RegionKeys, measure: Measure) -> ObjectKey {
     let digest = input(manifest, weights, measure);
-    format!("{FOLDER}/{}/{digest}.json", manifest.product)
+    format!("{}/{}/{digest}.json", Kind::Sums.folder(), manifest.product)
         .parse()
         .expect("a folder, a product and a digest make a key")
 }
-
-/// Folder of all stored sums.
-pub(crate) const FOLDER: &str = "sums";
 
 /// Exact sums of some steps of a version, in the order of time.
 pub(crate) async fn of_steps(

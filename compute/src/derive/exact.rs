@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use contract::digest::Digest;
 use contract::key::ObjectKey;
+use contract::kind::Kind;
 use datafusion::arrow::array::{AsArray as _, Int64Array, RecordBatch};
 use datafusion::arrow::datatypes::{DataType, Field, Int64Type, Schema};
 use datafusion::parquet::arrow::ArrowWriter;
@@ -21,13 +22,10 @@ use crate::ComputeError;
 
 /// The key of the sums after a step, named by what that step is made of.
 pub(crate) fn key(made_of: Digest) -> ObjectKey {
-    format!("{FOLDER}/{made_of}.parquet")
+    format!("{}/{made_of}.parquet", Kind::Accumulating.folder())
         .parse()
         .expect("a folder and a digest make a key")
 }
-
-/// Folder of all of them.
-pub(crate) const FOLDER: &str = "accumulating";
 
 /// Stores the sums after a step: `[row, col]`, kg m⁻² in steps of 10⁻¹⁵.
 pub(super) async fn keep(store: &Store, made_of: Digest, sums: &[i64]) -> Result<(), ComputeError> {

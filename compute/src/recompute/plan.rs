@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use contract::key::ObjectKey;
+use contract::kind::Kind;
 use contract::manifest::{Manifest, Step};
 use contract::product::ProductId;
 use contract::quantity::Quantity;
@@ -157,7 +158,7 @@ async fn tables(
     let Some(period) = manifest.extent() else {
         return Ok(());
     };
-    let folder = format!("{}/{}", sums::FOLDER, manifest.product);
+    let folder = format!("{}/{}", Kind::Sums.folder(), manifest.product);
     let mut there: BTreeSet<ObjectKey> = store.list(&folder).await?.into_iter().collect();
     let mut damaged = BTreeSet::new();
     if request.is_verified {

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use compute::gc::{self, Keep};
+use compute::gc::Computed;
 use compute::recompute::{Reason, Request, What, plan, run};
 use compute::stats::{RegionSeriesQuery, region_series};
 use compute::{Engine, derive_accumulated};
@@ -11,6 +11,7 @@ use contract::grid::Grid;
 use contract::manifest::Manifest;
 use contract::quantity::Quantity;
 use contract::time::{Period, TimeMs};
+use storage::gc::{self, Keep, Owner, Versions};
 use storage::sound::seal;
 use storage::{Store, manifests};
 
@@ -217,18 +218,21 @@ async fn clean_up_takes_what_no_kept_version_names_and_nothing_young() {
         versions: 1,
         age: Duration::from_hours(24),
     };
+    let owners: &[&dyn Owner] = &[&Versions, &Computed];
     let now = now();
     assert!(
-        gc::plan(&store, keep, now)
+        gc::plan(&store, owners, keep, now)
             .await
             .unwrap()
             .garbage
             .is_empty()
     );
     let in_two_days = TimeMs::new(now.ms() + 2 * 86_400_000).unwrap();
-    let removal = gc::plan(&store, keep, in_two_days).await.unwrap();
+    let removal = gc::plan(&store, owners, keep, in_two_days).await.unwrap();
     assert!(removal.size_bytes() > 0);
-    let removed = gc::run(&store, &removal, keep, &|_done| ()).await.unwrap();
+    let removed = gc::run(&store, owners, &removal, keep, &|_done| ())
+        .await
+        .unwrap();
     assert_eq!(removed, removal.garbage.len());
 
     let target = product("wavy-accumulated");
@@ -246,7 +250,7 @@ async fn clean_up_takes_what_no_kept_version_names_and_nothing_young() {
     assert!(!store.exists(old_counts).await.unwrap());
     assert!(manifests::load(&store, &versions[0].id()).await.is_err());
     assert!(store.exists(&stranger).await.unwrap());
-    let nothing = gc::plan(&store, keep, in_two_days).await.unwrap();
+    let nothing = gc::plan(&store, owners, keep, in_two_days).await.unwrap();
     assert!(nothing.garbage.is_empty());
     // What is left is enough to go on from.
     year[11].1[300] = 5e-9;

@@ -4,11 +4,25 @@
 use std::time::Duration;
 
 use anyhow::Result;
-use compute::gc::{self, Keep};
+use compute::gc::Computed;
+use ingest::{LandingNotes, Readings};
+use observations::Datasets;
+use storage::gc::{self, Keep, Owner, Pictures, Versions};
 
 use crate::cli::{Gc, Settings};
 use crate::command::notice;
 use crate::{deployment, progress};
+
+/// Everybody who lays out objects that clean-up may remove. Weights are never removed: what they were made from is in
+/// their name alone.
+const OWNERS: [&dyn Owner; 6] = [
+    &Versions,
+    &Pictures,
+    &Computed,
+    &Datasets,
+    &Readings,
+    &LandingNotes,
+];
 
 pub(crate) async fn run(settings: &Settings, options: &Gc) -> Result<()> {
     let store = deployment::store(settings)?;
@@ -16,7 +30,7 @@ pub(crate) async fn run(settings: &Settings, options: &Gc) -> Result<()> {
         versions: usize::from(options.keep_versions.get()),
         age: Duration::from_hours(24) * u32::from(options.keep_days),
     };
-    let plan = gc::plan(&store, keep, notice::now()?).await?;
+    let plan = gc::plan(&store, &OWNERS, keep, notice::now()?).await?;
     for garbage in &plan.garbage {
         progress::result(&format!("{} {}", garbage.key, garbage.size_bytes))?;
     }
@@ -35,7 +49,23 @@ pub(crate) async fn run(settings: &Settings, options: &Gc) -> Result<()> {
         return Ok(());
     }
     let bar = progress::bar("remove", plan.count() as u64);
-    gc::run(&store, &plan, keep, &|done| bar.set_position(done as u64)).await?;
+    let progress = |done| bar.set_position(done as u64);
+    gc::run(&store, &OWNERS, &plan, keep, &progress).await?;
     progress::done(&bar, &summary);
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contract::kind::Kind;
+
+    #[test]
+    fn every_kind_of_object_has_one_owner_or_is_never_removed() {
+        for kind in Kind::ALL {
+            let owners = OWNERS.iter().filter(|owner| owner.kinds().contains(&kind));
+            let is_kept_for_ever = matches!(kind, Kind::Weights | Kind::Protocol);
+            assert_eq!(owners.count(), usize::from(!is_kept_for_ever), "{kind:?}");
+        }
+    }
 }

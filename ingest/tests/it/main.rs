@@ -6,6 +6,7 @@
 mod axes;
 mod bad_input;
 mod cf_files;
+mod cleaned;
 mod contained;
 mod damaged;
 mod faults;

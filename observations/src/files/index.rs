@@ -1,6 +1,9 @@
 //! The numbered index of a dataset: which file holds which month. The newest number is what readers see.
 
+use std::collections::BTreeSet;
+
 use contract::key::ObjectKey;
+use contract::kind::Kind;
 use contract::product::ProductId;
 use contract::time::TimeMs;
 use serde::{Deserialize, Serialize};
@@ -11,8 +14,6 @@ use crate::error::ObservationError;
 
 /// Version of the index's JSON as it is written. Those of version 1 are not sealed and are read as well.
 const SCHEMA: u32 = 2;
-/// Folder of the indexes.
-const FOLDER: &str = "observation-indexes";
 
 /// One version of one dataset.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -107,8 +108,38 @@ impl Month {
 
 /// Datasets that have an index, sorted by name.
 pub(super) async fn datasets(store: &Store) -> Result<Vec<ProductId>, ObservationError> {
-    let names = store.folders(FOLDER).await?;
+    let names = store.folders(Kind::ObservationIndex.folder()).await?;
     Ok(names.iter().filter_map(|name| name.parse().ok()).collect())
+}
+
+/// The newest indexes of every dataset and the files that they name, as keys.
+///
+/// # Errors
+/// An index that cannot be read: it names files that nobody knows.
+pub(crate) async fn named_by_newest(
+    store: &Store,
+    versions: usize,
+) -> Result<BTreeSet<ObjectKey>, StorageError> {
+    let mut keys = BTreeSet::new();
+    for dataset in store.folders(Kind::ObservationIndex.folder()).await? {
+        let indexes = store
+            .list(&format!("{}/{dataset}", Kind::ObservationIndex.folder()))
+            .await?;
+        for key in indexes.into_iter().rev().take(versions) {
+            let Some(index) = document::get::<Index>(store, &key).await? else {
+                continue;
+            };
+            if index.schema > SCHEMA {
+                return Err(StorageError::Damaged {
+                    object: key.to_string(),
+                    reason: format!("its schema {} is unknown", index.schema),
+                });
+            }
+            keys.extend(index.months.into_iter().map(|month| month.file));
+            keys.insert(key);
+        }
+    }
+    Ok(keys)
 }
 
 /// The newest index of a dataset, if it has one.
@@ -116,7 +147,9 @@ pub(super) async fn latest(
     store: &Store,
     dataset: &ProductId,
 ) -> Result<Option<Index>, ObservationError> {
-    let keys = store.list(&format!("{FOLDER}/{dataset}")).await?;
+    let keys = store
+        .list(&format!("{}/{dataset}", Kind::ObservationIndex.folder()))
+        .await?;
     let Some(key) = keys.last() else {
         return Ok(None);
     };
@@ -137,7 +170,12 @@ pub(super) async fn latest(
 ///
 /// An equal index of another writer is a lost race too: what this writer brought was there before it.
 pub(super) async fn commit(store: &Store, index: &Index) -> Result<bool, ObservationError> {
-    let name = format!("{FOLDER}/{}/{:010}.json", index.dataset, index.number);
+    let name = format!(
+        "{}/{}/{:010}.json",
+        Kind::ObservationIndex.folder(),
+        index.dataset,
+        index.number
+    );
     let key: ObjectKey = name.parse()?;
     match document::put_new(store, &key, index).await {
         Ok(is_new) => Ok(is_new),

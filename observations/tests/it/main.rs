@@ -3,6 +3,7 @@
 #![expect(clippy::float_cmp, reason = "these numbers are exact")]
 #![expect(clippy::print_stdout, reason = "a test that measures says what")]
 
+mod cleaned;
 mod conformance;
 mod homes;
 mod interruptions;

@@ -1,0 +1,201 @@
+//! Clean-up: objects that are in nobody's use and old enough to be in nobody's hands.
+//!
+//! What is in use is said by those who lay it out ([`Owner`]); this module knows no folder. Nothing is removed of a kind
+//! that no owner speaks for. Half-written files of killed writers go when no writer can be at them any more.
+
+mod owner;
+mod versions;
+
+use std::collections::BTreeSet;
+use std::time::Duration;
+
+use contract::key::ObjectKey;
+use contract::kind::Kind;
+use contract::time::TimeMs;
+use futures::TryStreamExt as _;
+use object_store::ObjectStore as _;
+use object_store::path::Path;
+use serde::Serialize;
+
+use crate::store::Leftover;
+use crate::{StorageError, Store};
+
+pub use owner::{Kept, LEAST_AGE, Owner};
+pub use versions::{Pictures, Versions};
+
+/// Kinds of the numbered lists that name everything else.
+const LISTS: [Kind; 2] = [Kind::Manifest, Kind::ObservationIndex];
+
+/// What is kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Keep {
+    /// Newest versions of each product, at least one.
+    pub versions: usize,
+    /// Whatever was written so long ago or later; at least what its owner says.
+    pub age: Duration,
+}
+
+/// An object that would be removed.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Garbage {
+    /// Its key.
+    pub key: ObjectKey,
+    /// Its size.
+    pub size_bytes: u64,
+}
+
+/// What would be removed.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
+pub struct GcPlan {
+    /// Objects, numbered lists first: a version is gone before what it is made of.
+    pub garbage: Vec<Garbage>,
+    /// Files that killed writers left half-written.
+    #[serde(skip)]
+    pub leftovers: Vec<Leftover>,
+    /// Objects that were looked at and stay.
+    pub kept_count: usize,
+}
+
+impl GcPlan {
+    /// Size of all that would be removed.
+    pub fn size_bytes(&self) -> u64 {
+        let objects = self.garbage.iter().map(|garbage| garbage.size_bytes);
+        let leftovers = self.leftovers.iter().map(|leftover| leftover.size_bytes);
+        objects.chain(leftovers).sum()
+    }
+
+    /// Number of all that would be removed.
+    pub fn count(&self) -> usize {
+        self.garbage.len() + self.leftovers.len()
+    }
+}
+
+/// What all owners say is in use.
+struct InUse<'a> {
+    owners: &'a [&'a dyn Owner],
+    keys: BTreeSet<ObjectKey>,
+}
+
+impl<'a> InUse<'a> {
+    async fn read(
+        store: &Store,
+        owners: &'a [&'a dyn Owner],
+        keep: Keep,
+    ) -> Result<Self, StorageError> {
+        let kept = Kept::read(store, keep.versions.max(1)).await?;
+        let mut keys = BTreeSet::new();
+        for owner in owners {
+            keys.append(&mut owner.in_use(store, &kept).await?);
+        }
+        Ok(Self { owners, keys })
+    }
+
+    fn holds(&self, key: &ObjectKey) -> bool {
+        let is_with_one = |owner: &&dyn Owner| {
+            let other = owner.lives_with(key);
+            other.is_some_and(|other| self.keys.contains(&other))
+        };
+        self.keys.contains(key) || self.owners.iter().any(is_with_one)
+    }
+}
+
+/// What clean-up at an instant would remove. Nothing is changed.
+///
+/// # Errors
+/// A store that does not answer, and a list that cannot be read: it names things that nobody knows.
+pub async fn plan(
+    store: &Store,
+    owners: &[&dyn Owner],
+    keep: Keep,
+    now: TimeMs,
+) -> Result<GcPlan, StorageError> {
+    let in_use = InUse::read(store, owners, keep).await?;
+    let mut plan = GcPlan::default();
+    let mut kinds: Vec<(Kind, Duration)> = owners
+        .iter()
+        .flat_map(|owner| owner.kinds().iter().map(|kind| (*kind, owner.least_age())))
+        .collect();
+    // Lists come first: nobody may find a version whose parts are gone.
+    kinds.sort_by_key(|(kind, _)| (!LISTS.contains(kind), *kind));
+    for (kind, least_age) in kinds {
+        let folder = kind.folder();
+        let oldest_ms = now.ms() - keep.age.max(least_age).as_millis() as i64;
+        let mut found = store.object_store().list(Some(&Path::from(folder)));
+        let failed = |source| StorageError::Object {
+            key: folder.to_owned(),
+            source,
+        };
+        let mut garbage = vec![];
+        while let Some(meta) = found.try_next().await.map_err(failed)? {
+            // Names that are no keys of ours are not ours to remove.
+            let Ok(key) = meta.location.as_ref().parse::<ObjectKey>() else {
+                continue;
+            };
+            let is_young = meta.last_modified.timestamp_millis() >= oldest_ms;
+            if is_young || in_use.holds(&key) {
+                plan.kept_count += 1;
+            } else {
+                let size_bytes = meta.size;
+                garbage.push(Garbage { key, size_bytes });
+            }
+        }
+        garbage.sort_by(|a, b| a.key.cmp(&b.key));
+        plan.garbage.extend(garbage);
+    }
+    plan.leftovers = store.leftovers(keep.age.max(LEAST_AGE)).await?;
+    Ok(plan)
+}
+
+/// Removes what a plan names, but for what has come into use since.
+///
+/// Returns how many objects and half-written files were removed. A run that was killed is resumed by planning again.
+///
+/// # Errors
+/// As [`plan`]; and what was put to use by a new version while it was removed, by name.
+pub async fn run(
+    store: &Store,
+    owners: &[&dyn Owner],
+    plan: &GcPlan,
+    keep: Keep,
+    progress: &(dyn Fn(usize) + Send + Sync),
+) -> Result<usize, StorageError> {
+    let in_use = InUse::read(store, owners, keep).await?;
+    let mut removed = BTreeSet::new();
+    for (index, garbage) in plan.garbage.iter().enumerate() {
+        if !in_use.holds(&garbage.key) {
+            store.remove(&garbage.key).await?;
+            removed.insert(&garbage.key);
+        }
+        progress(index + 1);
+    }
+    let leftovers_count = if plan.leftovers.is_empty() {
+        0
+    } else {
+        store.remove_leftovers(keep.age.max(LEAST_AGE)).await?
+    };
+    progress(plan.count());
+    // Something equal to an old object may have been stored, and found there, just before it went.
+    let matters = |key: &&ObjectKey| {
+        let kind = Kind::of(key);
+        let owner = owners
+            .iter()
+            .find(|owner| kind.is_some_and(|kind| owner.kinds().contains(&kind)));
+        owner.is_some_and(|owner| !owner.is_made_again())
+    };
+    let now_in_use = InUse::read(store, owners, keep).await?;
+    let lost: Vec<String> = now_in_use
+        .keys
+        .iter()
+        .filter(|key| removed.contains(key) && matters(key))
+        .map(ToString::to_string)
+        .collect();
+    if lost.is_empty() {
+        Ok(removed.len() + leftovers_count)
+    } else {
+        Err(StorageError::Damaged {
+            object: lost.join(", "),
+            reason: "a new version came to use it while it was removed; ingest or derive it again"
+                .to_owned(),
+        })
+    }
+}
