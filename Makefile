@@ -13,8 +13,6 @@ export NODEVICE_SELECT := 1
 fluxglobe := $(CARGO_TARGET_DIR)/debug/fluxglobe
 # Tests that ended without having run say so in here.
 not_run := $(CARGO_TARGET_DIR)/tests-not-run
-# What the lints say, until the tests have ended.
-lints := $(CARGO_TARGET_DIR)/lints
 viewer := tile-server/web/dist/index.html
 viewer_sources := $(shell git ls-files tile-server/web)
 
@@ -72,14 +70,8 @@ test: test-tools $(viewer) ## Everything that CI runs
 	cargo build --locked --workspace --all-targets
 	deploy/services/services.sh install
 	rm -f $(not_run)
-	# Lints work while tests wait for servers; they begin once the tests hold what they need of the build.
-	@fluxengine=$$(tests/data/fetch.sh) || exit 1; \
-	(sleep 60; exec nice -n 19 cargo clippy --locked --workspace --all-targets -- -D warnings) >$(lints) 2>&1 & lint=$$!; \
-	FLUXGLOBE_FLUXENGINE=$$fluxengine FLUXGLOBE_SKIPPED=$(not_run) deploy/with-services.sh \
-	    cargo test --locked --workspace --no-fail-fast --lib --bins --tests; tests=$$?; \
-	echo "cargo clippy --workspace --all-targets:"; wait $$lint; lint=$$?; cat $(lints); \
-	[ $$tests -eq 0 ] || echo "tests failed; one of them again: deploy/with-services.sh cargo test -p CRATE --test SUITE NAME"; \
-	exit $$((tests || lint))
+	fluxengine=$$(tests/data/fetch.sh) && FLUXGLOBE_FLUXENGINE=$$fluxengine FLUXGLOBE_SKIPPED=$(not_run) \
+		deploy/with-services.sh tests/run.py
 	tests/data/report.sh $(not_run)
 	deploy/check.sh
 

@@ -1,0 +1,97 @@
+#!/usr/bin/env python3
+"""Runs every test of the workspace, with the lints beside them, and ends with 0 if all of it is in order.
+
+    tests/run.py [SUITE...]         suites by name, such as `kafka-log/it` or `tests/cluster`; all of them if none is named
+
+Everything must have been built: `cargo build --workspace --all-targets`. Suites that mostly wait, for servers or for
+processes that were killed, go one after the other beside those that compute; lints take what time both leave. What a suite
+says is shown when it ends. A suite that fails hides no other.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import threading
+import time
+
+# Suites that mostly wait, longest last.
+WAITING = ["observations/it", "storage/it", "kafka-log/it", "tests/cluster"]
+CARGO = os.environ.get("CARGO", "cargo")
+ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+shown = threading.Lock()
+
+
+def suites():
+    """Test programs by name: path, folder that they run in, and whether they hold tests of binaries or libraries."""
+    build = [CARGO, "test", "--locked", "--workspace", "--no-run", "--lib", "--bins", "--tests"]
+    messages = subprocess.run(
+        [*build, "--message-format=json-render-diagnostics"], cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True
+    ).stdout
+    found = {}
+    for line in messages.splitlines():
+        message = json.loads(line)
+        if not message.get("executable") or not message.get("profile", {}).get("test"):
+            continue
+        folder = os.path.dirname(message["manifest_path"])
+        package = message["package_id"].split("#")[-1].split("@")[0]
+        if "#" not in message["package_id"] or package[0].isdigit():
+            package = os.path.basename(folder)
+        kind = message["target"]["kind"][0]
+        target = message["target"]["name"]
+        name = f"{package}/{target}" if kind == "test" else f"{package}/{kind}:{target}"
+        again = {"test": f"--test {target}", "bin": f"--bin {target}"}.get(kind, "--lib")
+        found[name] = (message["executable"], folder, f"cargo test -p {package} {again}")
+    return found
+
+
+def run(name, command, folder, again, results):
+    """Runs one suite, shows what it said, and notes how it ended."""
+    start = time.monotonic()
+    environment = {**os.environ, "CARGO": CARGO, "CARGO_MANIFEST_DIR": folder}
+    ended = subprocess.run(
+        command, cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace"
+    )
+    seconds = time.monotonic() - start
+    with shown:
+        print(f"\n===== {name}: {' '.join(command)}", flush=True)
+        print(ended.stdout, flush=True)
+    results.append((name, ended.returncode, seconds, again))
+
+
+def lane(names, found, results):
+    for name in names:
+        program, folder, again = found[name]
+        run(name, [program], folder, again, results)
+
+
+def main():
+    found = suites()
+    wanted = sys.argv[1:] or list(found)
+    unknown = [name for name in [*wanted, *WAITING] if name not in found]
+    if unknown:
+        sys.exit(f"no such suite: {', '.join(unknown)}; there are {', '.join(sorted(found))}")
+    results = []
+    lanes = [
+        [name for name in WAITING if name in wanted],
+        [name for name in wanted if name not in WAITING],
+    ]
+    threads = [threading.Thread(target=lane, args=(names, found, results)) for names in lanes]
+    if not sys.argv[1:]:
+        lints = ["nice", "-n", "19", CARGO, "clippy", "--locked", "--workspace", "--all-targets", "--", "-D", "warnings"]
+        threads.append(threading.Thread(target=run, args=("lints", lints, ROOT, "make check", results)))
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    print("\n===== all suites")
+    for name, code, seconds, _ in sorted(results, key=lambda result: -result[2]):
+        print(f"{seconds:7.1f} s  {'ok' if code == 0 else 'FAILED'}  {name}")
+    failed = [(name, again) for name, code, _, again in results if code != 0]
+    for name, again in failed:
+        server = "" if name == "lints" else "deploy/with-services.sh "
+        print(f"again: {server}{again}")
+    sys.exit(1 if failed else 0)
+
+
+main()
