@@ -4,6 +4,7 @@
 #![expect(clippy::print_stdout, reason = "a test that measures says what")]
 
 mod conformance;
+mod frozen;
 mod homes;
 mod interruptions;
 mod same_answers;
