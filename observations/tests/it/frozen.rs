@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use contract::digest::Digest;
 use contract::observation::{Observation, PlatformKind, Quality};
 use observations::{FileStore, Filter, ObservationStore as _};
 use storage::Store;
@@ -146,4 +147,26 @@ async fn a_flipped_bit_of_observations_is_an_error_that_names_their_object() {
         }
         assert!(all(&store).await.is_ok());
     }
+}
+
+/// Tables that are there were made by these: what is to change gets a migration of its own.
+#[test]
+fn migrations_that_were_applied_are_what_they_were() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut lines = vec![];
+    for entry in std::fs::read_dir(folder.join("migrations")).unwrap() {
+        let path = entry.unwrap().path();
+        let sql = std::fs::read(&path).unwrap();
+        let name = path.file_name().unwrap().to_str().unwrap();
+        lines.push(format!("{} {name}\n", Digest::of(&sql)));
+    }
+    lines.sort_by(|a, b| a[65..].cmp(&b[65..]));
+    let now = lines.concat();
+    if let Some(folder) = std::env::var_os("FLUXGLOBE_FREEZE").map(PathBuf::from) {
+        std::fs::write(folder.join("migrations.txt"), &now).unwrap();
+    }
+    let then = folder.join("../storage/tests/frozen/2/migrations.txt");
+    let then = std::fs::read_to_string(then).unwrap();
+    assert!(now.starts_with(&then), "{then} became {now}");
+    assert_eq!(now, then, "freeze the new one too");
 }

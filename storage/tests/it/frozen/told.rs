@@ -237,6 +237,18 @@ async fn a_frozen_log_holds_what_was_told_and_how_far_its_readers_had_come() {
     assert_eq!(lines(&frozen(2).join("events")), lines(now.path()));
 }
 
+/// By its key a message finds its partition: what must stay in order must keep it.
+#[test]
+fn events_share_the_keys_that_they_shared() {
+    let line = |event: Event| format!("{} {}\n", event.body.topic(), event.body.order_key());
+    let now: String = told().into_iter().map(line).collect();
+    if let Some(folder) = to_freeze() {
+        std::fs::write(folder.join("order-keys.txt"), &now).unwrap();
+    }
+    let then = std::fs::read_to_string(frozen(2).join("order-keys.txt")).unwrap();
+    assert_eq!(then, now);
+}
+
 #[tokio::test]
 async fn the_log_of_version_1_is_read_and_gone_on_with() {
     let folder = copy_of(1, "events");
