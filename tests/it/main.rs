@@ -5,6 +5,7 @@
 mod animation;
 mod bad_input;
 mod browser;
+mod damaged;
 mod dependencies;
 mod end_to_end;
 mod harness_self;
