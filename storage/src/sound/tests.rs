@@ -63,7 +63,8 @@ async fn store() -> Store {
     weights::write(&store, &ObjectKey::weights(&raw_sha256), &areas)
         .await
         .unwrap();
-    let counts = contributed::Contributed::nothing(&GRID, period.start);
+    let mut counts = contributed::Contributed::nothing(&GRID, period.start);
+    counts.add(period, &[true; 15]);
     contributed::write(&store, &product, &GRID, &counts)
         .await
         .unwrap();

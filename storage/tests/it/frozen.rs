@@ -291,7 +291,8 @@ async fn what_is_written_now_is_named_as_in_the_newest_frozen_store() {
 #[tokio::test]
 async fn a_frozen_version_says_what_was_masked_and_in_which_order_files_came() {
     let (_folder, store) = copy(2);
-    let [first, second] = [1, 2].map(|number| manifests::numbered(&store, &product(), number));
+    let id = product();
+    let [first, second] = [1, 2].map(|number| manifests::numbered(&store, &id, number));
     let (first, second) = (
         first.await.unwrap().unwrap(),
         second.await.unwrap().unwrap(),

@@ -82,7 +82,6 @@ pub(super) fn full() -> RenderJob {
         after: counts(b"after"),
     });
     let style = &mut job.style;
-    style.transfer.reversed = true;
     style.transfer.colors = "-1e-9:#102030,1e-9:#ffeedd".parse().unwrap();
     style.transfer.opacity = "0:0.5".parse().unwrap();
     style.transfer.size = "0:0.25".parse().unwrap();
@@ -101,9 +100,9 @@ pub(super) fn full() -> RenderJob {
     job
 }
 
-/// Particles that drift with a current.
+/// Particles that drift with a current, in colours that are turned round.
 fn flow() -> RenderJob {
-    RenderJob {
+    let mut job = RenderJob {
         value: moment("current-east", None),
         flow: Some(Flow {
             northward: moment("current-north", None),
@@ -111,7 +110,9 @@ fn flow() -> RenderJob {
         }),
         mode: Mode::Flow,
         ..plain()
-    }
+    };
+    job.style.transfer.reversed = true;
+    job
 }
 
 #[test]
