@@ -133,7 +133,7 @@ fn noise() -> Vec<(Period, Vec<f32>)> {
 }
 
 /// Most requests that a sum over a region may need of a frame.
-const MOST_REQUESTS: f64 = 0.0;
+const MOST_REQUESTS: f64 = 5.0;
 
 async fn frame_bytes(store: &Store, manifest: &Manifest) -> u64 {
     let mut bytes = 0;
@@ -187,7 +187,7 @@ async fn a_small_box_reads_its_chunks_and_no_others() {
     assert!(is_own(row.share, 60.0 * 615.0), "{row:?}");
     let all = read(&store, &manifest, "global").await;
     assert!(all.share > 0.95 && all.share < 1.1, "{all:?}");
-    // Its size, its end, which chunks it has, their values: behind a network each takes milliseconds.
+    // Its size, its end, where its pages are, which chunks it has, their values: behind a network each takes milliseconds.
     for read in [one, row, all] {
         assert!(read.requests <= MOST_REQUESTS, "{read:?}");
     }
