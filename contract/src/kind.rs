@@ -124,6 +124,37 @@ impl ObjectKey {
 mod tests {
     use super::*;
 
+    /// A new kind has no arm here; it must be in the list of all, too.
+    fn next(kind: Kind) -> Option<Kind> {
+        match kind {
+            Kind::Raw => Some(Kind::Frame),
+            Kind::Frame => Some(Kind::Contributed),
+            Kind::Contributed => Some(Kind::Series),
+            Kind::Series => Some(Kind::Domain),
+            Kind::Domain => Some(Kind::Manifest),
+            Kind::Manifest => Some(Kind::Weights),
+            Kind::Weights => Some(Kind::Sums),
+            Kind::Sums => Some(Kind::Accumulating),
+            Kind::Accumulating => Some(Kind::Observations),
+            Kind::Observations => Some(Kind::ObservationIndex),
+            Kind::ObservationIndex => Some(Kind::Reading),
+            Kind::Reading => Some(Kind::Landing),
+            Kind::Landing => Some(Kind::Check),
+            Kind::Check => Some(Kind::Tile),
+            Kind::Tile => Some(Kind::Protocol),
+            Kind::Protocol => None,
+        }
+    }
+
+    #[test]
+    fn every_kind_is_listed_and_has_a_folder_of_its_own() {
+        let all = std::iter::successors(Some(Kind::Raw), |kind| next(*kind));
+        assert_eq!(all.collect::<Vec<_>>(), Kind::ALL);
+        let folders = Kind::ALL.map(Kind::folder);
+        let distinct: std::collections::BTreeSet<&str> = folders.into();
+        assert_eq!(distinct.len(), Kind::ALL.len());
+    }
+
     #[test]
     fn every_key_is_of_its_kind_and_vouches_for_what_it_names() {
         let (product, digest) = ("p".parse().unwrap(), Digest::of(b"x"));

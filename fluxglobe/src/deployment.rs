@@ -1,7 +1,7 @@
 //! What commands and services work on: one process with a data folder, or the servers that settings name.
 
 use std::num::{NonZeroU32, NonZeroUsize};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::{Context as _, Result, bail};
@@ -43,9 +43,14 @@ pub(crate) fn open_interactive(url: &str) -> Result<Store, storage::StorageError
     Store::open_with(url, &settings)
 }
 
+/// Folder of the event log in the data folder.
+pub(crate) fn events(settings: &Settings) -> PathBuf {
+    settings.data.join("events")
+}
+
 /// Opens the event log in the data folder; one process at a time writes it.
 pub(crate) fn embedded_log(settings: &Settings) -> Result<EmbeddedLog> {
-    Ok(EmbeddedLog::open(&settings.data.join("events"))?)
+    Ok(EmbeddedLog::open(&events(settings))?)
 }
 
 /// Opens the event log that settings name, else the one in the data folder; none over a shared store without Kafka,

@@ -2,13 +2,13 @@
 
 use std::sync::LazyLock;
 
-use bytes::Bytes;
 use contract::event::EVENT_SCHEMA;
 use contract::job::RENDERER_VERSION;
 use contract::key::ObjectKey;
 use contract::manifest::MANIFEST_SCHEMA;
 use serde::{Deserialize, Serialize};
-use storage::{StorageError, Store};
+use storage::sound::seal;
+use storage::{StorageError, Store, document};
 
 /// Where it is written.
 const KEY: &str = "protocol/current.json";
@@ -17,6 +17,8 @@ const KEY: &str = "protocol/current.json";
 /// name of a picture holds it, and a render worker and whoever asks it compare theirs with every job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 struct Protocol {
+    /// Of this document: from 2 on it is sealed.
+    schema: u32,
     event_schema: u32,
     manifest_schema: u32,
 }
@@ -25,6 +27,8 @@ struct Protocol {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Written {
+    #[serde(rename = "schema")]
+    _schema: Option<u32>,
     event_schema: u32,
     manifest_schema: u32,
     /// Programs up to 0.1.0 wrote theirs down.
@@ -33,6 +37,7 @@ struct Written {
 }
 
 const OURS: Protocol = Protocol {
+    schema: 2,
     event_schema: EVENT_SCHEMA,
     manifest_schema: MANIFEST_SCHEMA,
 };
@@ -74,16 +79,19 @@ impl ProtocolError {
 }
 
 /// Writes down our versions, or compares them with those that are written down.
+///
+/// # Errors
+/// `Differs` with both, `Storage` with the name of what is written down if that is damaged.
 pub(crate) async fn agree(store: &Store) -> Result<(), ProtocolError> {
     let key: ObjectKey = KEY.parse().expect("the key is constant and valid");
-    let ours = serde_json::to_string(&OURS).expect("a struct of numbers is JSON");
-    match store.put_new(&key, Bytes::from(ours.clone())).await {
+    match document::put_new(store, &key, &OURS).await {
         Ok(_new_or_equal) => Ok(()),
         Err(StorageError::Conflict { .. }) => {
-            let theirs = store.get(&key).await?;
+            let theirs = seal::opened(&store.get(&key).await?);
             if fits(&theirs) {
                 return Ok(());
             }
+            let ours = serde_json::to_string(&OURS).expect("a struct of numbers is JSON");
             let theirs = String::from_utf8_lossy(&theirs).chars().take(200).collect();
             Err(ProtocolError::Differs { theirs, ours })
         }
@@ -100,16 +108,16 @@ fn fits(theirs: &[u8]) -> bool {
             manifest_schema,
             ..
         } = theirs;
-        let theirs = Protocol {
-            event_schema,
-            manifest_schema,
-        };
-        theirs == OURS
+        (event_schema, manifest_schema) == (OURS.event_schema, OURS.manifest_schema)
     })
 }
 
 #[cfg(test)]
 mod tests {
+    use std::path::{Path, PathBuf};
+
+    use bytes::Bytes;
+
     use super::*;
 
     async fn beside(theirs: String) -> Result<(), ProtocolError> {
@@ -146,5 +154,49 @@ mod tests {
             RENDERER_VERSION - 1
         );
         beside(theirs).await.unwrap();
+    }
+
+    fn frozen() -> Vec<u8> {
+        let store = concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../storage/tests/frozen/2/objects"
+        );
+        std::fs::read(Path::new(store).join(KEY)).unwrap()
+    }
+
+    #[tokio::test]
+    async fn a_store_that_was_frozen_is_agreed_on() {
+        if let Some(folder) = std::env::var_os("FLUXGLOBE_FREEZE").map(PathBuf::from) {
+            let store = Store::open(folder.join("objects").to_str().unwrap()).unwrap();
+            agree(&store).await.unwrap();
+        }
+        assert_eq!(
+            (EVENT_SCHEMA, MANIFEST_SCHEMA),
+            (2, 2),
+            "freeze what is agreed on now, too"
+        );
+        let text = String::from_utf8(frozen()).unwrap();
+        beside(text.clone()).await.unwrap();
+        // What programs wrote before it was sealed.
+        beside(r#"{"event_schema":2,"manifest_schema":2}"#.to_owned())
+            .await
+            .unwrap();
+        let store = Store::memory();
+        agree(&store).await.unwrap();
+        assert_eq!(store.get(&KEY.parse().unwrap()).await.unwrap(), text);
+    }
+
+    #[tokio::test]
+    async fn a_flipped_bit_of_what_was_agreed_is_an_error_that_names_it() {
+        let whole = frozen();
+        for at in 0..whole.len() * 8 {
+            let mut flipped = whole.clone();
+            flipped[at / 8] ^= 1 << (at % 8);
+            let store = Store::memory();
+            let key = KEY.parse().unwrap();
+            store.put_new(&key, Bytes::from(flipped)).await.unwrap();
+            let error = agree(&store).await.unwrap_err();
+            assert!(error.to_string().contains(KEY), "bit {at}: {error}");
+        }
     }
 }

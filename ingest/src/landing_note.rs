@@ -14,7 +14,7 @@ use contract::key::ObjectKey;
 use contract::kind::Kind;
 use contract::product::ProductId;
 use contract::topic::Origin;
-use storage::Store;
+use storage::{StorageError, Store};
 
 use crate::error::IngestError;
 
@@ -34,11 +34,16 @@ pub(crate) async fn note(
     origin: Origin,
 ) -> Result<bool, IngestError> {
     let content = Bytes::from(origin.to_string());
-    let is_new = store
-        .put_new(&key(product, raw_sha256, origin)?, content)
-        .await
-        .map_err(IngestError::storage("note a landing"))?;
-    Ok(!is_new)
+    let key = key(product, raw_sha256, origin)?;
+    match store.put_new(&key, content.clone()).await {
+        // Its name says what it must hold.
+        Err(error @ StorageError::Conflict { .. }) => {
+            tracing::warn!(%key, %error, "a damaged note of a landing is written again");
+            store.put_over(&key, content).await.map(|()| true)
+        }
+        noted => noted.map(|is_new| !is_new),
+    }
+    .map_err(IngestError::storage("note a landing"))
 }
 
 /// Has this notice begun to publish the file before?
@@ -52,4 +57,55 @@ pub(crate) async fn is_noted(
         .exists(&key(product, raw_sha256, origin)?)
         .await
         .map_err(IngestError::storage("look up a landing"))
+}
+
+#[cfg(test)]
+mod tests {
+    use contract::topic::Topic;
+    use test_data::frozen;
+
+    use super::*;
+
+    fn origin(partition: u32, offset: u64) -> Origin {
+        Origin {
+            topic: Topic::GranuleNotice,
+            partition,
+            offset,
+        }
+    }
+
+    #[tokio::test]
+    async fn frozen_notes_of_landings_are_known_again() {
+        let product: ProductId = "fgco2".parse().unwrap();
+        let raw_1 = "8b68d6787313235796d847a4fb4abfd2e31c2e289d16c049f3acadc63b4f2393";
+        let raw_2 = Digest::of(b"a file that nobody keeps");
+        if let Some(folder) = frozen::to_freeze() {
+            let objects = folder.join("objects");
+            let store = Store::open(objects.to_str().unwrap()).unwrap();
+            note(&store, &product, raw_2, origin(3, 17)).await.unwrap();
+        }
+        for (version, raw, origin) in [
+            (1, raw_1.parse().unwrap(), origin(0, 0)),
+            (2, raw_2, origin(3, 17)),
+        ] {
+            let folder = tempfile::tempdir().unwrap();
+            frozen::copy(version, "objects/landings", &folder.path().join("landings"));
+            let store = Store::open(folder.path().to_str().unwrap()).unwrap();
+            let is_noted = is_noted(&store, &product, raw, origin).await;
+            assert!(is_noted.unwrap(), "version {version}");
+            assert!(note(&store, &product, raw, origin).await.unwrap());
+            // A damaged note is there all the same, and is whole again.
+            let key = key(&product, raw, origin).unwrap();
+            let whole = store.get(&key).await.unwrap();
+            let damaged = Bytes::from("granule.notice/9/9");
+            store.put_over(&key, damaged).await.unwrap();
+            assert!(note(&store, &product, raw, origin).await.unwrap());
+            assert_eq!(store.get(&key).await.unwrap(), whole);
+            let next = Origin {
+                offset: origin.offset + 1,
+                ..origin
+            };
+            assert!(!note(&store, &product, raw, next).await.unwrap());
+        }
+    }
 }

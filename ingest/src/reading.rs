@@ -151,3 +151,6 @@ fn damaged(object: &str, reason: &str) -> StorageError {
         reason: reason.to_owned(),
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -6,6 +6,7 @@ mod animation;
 mod bad_input;
 mod browser;
 mod circles;
+mod damaged;
 mod dependencies;
 mod end_to_end;
 mod harness_self;

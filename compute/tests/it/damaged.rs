@@ -1,20 +1,25 @@
 //! One bit flipped in stored objects, one after the other: an answer is the right one or an error that names the object,
 //! never another number; what can be made again is.
 
+use std::collections::BTreeSet;
+
 use bytes::Bytes;
 use compute::region::weights;
 use compute::stats::{RegionSeriesQuery, region_series};
-use compute::{BudgetAnswer, Engine, budget, derive_accumulated, point_series};
+use compute::{BudgetAnswer, ComputeError, Engine, budget, derive_accumulated, point_series};
 use contract::earth::Earth;
 use contract::grid::{Grid, LonLatDeg};
 use contract::key::ObjectKey;
 use contract::kind::Kind;
 use contract::quantity::Quantity;
 use contract::region::Region;
+use contract::time::Period;
 use storage::sound::damage;
-use storage::{Store, manifests};
+use storage::verify::{self, Fault};
+use storage::{Store, frames, manifests};
 
 use crate::fixture::{folder_store, land, product, total, wavy_year};
+use crate::frozen;
 
 /// Four chunks, three of them cut at the edges.
 const GRID: Grid = Grid {
@@ -244,4 +249,109 @@ async fn damaged_derived_objects_are_made_again_when_they_are_looked_at() {
         let after = plan(&store, &request(true)).await.unwrap();
         assert!(after.items.is_empty());
     }
+}
+
+/// All that is asked of the store below, each answer as text: numbers of a region and a place, of fluxes and of what they
+/// add up to, and what a month more comes to.
+async fn answers(store: &Store) -> Vec<Result<String, String>> {
+    fn text<T: serde::Serialize>(asked: Result<T, ComputeError>) -> Result<String, String> {
+        let text = |answer: T| serde_json::to_string(&answer).unwrap();
+        asked.map(text).map_err(|e| e.to_string())
+    }
+    let (flux, carbon) = (product("fgco2"), product("fgco2-accumulated"));
+    let engine = Engine::local(store.clone());
+    let mut answers = vec![];
+    for (id, region) in [
+        (&flux, "1,-50,15,55"),
+        (&flux, "global"),
+        (&carbon, "global"),
+    ] {
+        answers.push(text(budget(&engine, &total(id, region)).await));
+    }
+    let means = RegionSeriesQuery {
+        product: flux.clone(),
+        region: "global".parse().unwrap(),
+        region_name: "global".to_owned(),
+        from: None,
+        to: None,
+        earth: Earth::Wgs84,
+    };
+    answers.push(text(region_series(&engine, &means).await));
+    let place = LonLatDeg::new(3.5, 10.5).unwrap();
+    for id in [&flux, &carbon] {
+        answers.push(text(point_series(&engine, id, place).await));
+    }
+    answers.push(text(
+        derive_accumulated(&engine, &flux, None, &|_| ()).await,
+    ));
+    answers
+}
+
+/// The frozen store of all kinds of objects, a month more landed in it that nothing is derived from yet.
+async fn store_of_all_kinds() -> (tempfile::TempDir, Store) {
+    let (folder, store) = frozen::store(2);
+    let (id, flux) = (product("fgco2"), Quantity::CarbonFlux);
+    let source = manifests::latest(&store, &id).await.unwrap().unwrap();
+    let mut months = vec![];
+    for step in &source.steps {
+        let values = frames::read(&store, &step.frame, &source.grid).await;
+        months.push((step.period, values.unwrap()));
+    }
+    let march = months[1].1.iter().map(|value| value * 0.3).collect();
+    months.push((Period::month(2001, 3).unwrap(), march));
+    land(&store, &id, flux, source.grid, &months, 12).await;
+    (folder, store)
+}
+
+/// Each object of a store of all kinds with one bit flipped, alone: it is found by whoever looks through the store, and
+/// whoever asks gets the right answer, because what is damaged was not needed or can be made again, or an error with its
+/// name.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_flipped_bit_of_any_object_of_a_store_is_no_other_number() {
+    let (_folder, store) = store_of_all_kinds().await;
+    let keys = verify::keys(&store, None).await.unwrap();
+    let kinds: BTreeSet<Kind> = keys.iter().filter_map(Kind::of).collect();
+    assert_eq!(kinds.len(), Kind::ALL.len(), "{kinds:?}");
+    let right = answers(&store).await;
+    assert!(right.iter().all(Result::is_ok), "{right:?}");
+    let mut refused = BTreeSet::new();
+    for key in keys {
+        let kind = Kind::of(&key).unwrap();
+        let (_folder, store) = store_of_all_kinds().await;
+        let mut flipped = store.get(&key).await.unwrap().to_vec();
+        let at = flipped.len() * 5 / 8;
+        flipped[at] ^= 1 << (at % 8);
+        store.put_over(&key, flipped.into()).await.unwrap();
+        let before = damage::count(kind);
+        let all = verify::keys(&store, None).await.unwrap();
+        let report = verify::run(&store, &all, &|_, _| ()).await.unwrap();
+        let found: Vec<_> = report
+            .findings
+            .iter()
+            .map(|it| (&it.key, it.fault))
+            .collect();
+        assert_eq!(found, [(&key, Fault::Damaged)]);
+        assert!(damage::count(kind) > before, "{key} is not counted");
+        for (now, right) in answers(&store).await.iter().zip(&right) {
+            match now {
+                Ok(_) => assert_eq!(now, right, "{key}"),
+                Err(error) => {
+                    assert!(error.contains(key.as_str()), "{key}: {error}");
+                    refused.insert(kind);
+                }
+            }
+        }
+    }
+    let needed = [
+        Kind::Frame,
+        Kind::Contributed,
+        Kind::Series,
+        Kind::Domain,
+        Kind::Manifest,
+    ];
+    assert_eq!(
+        refused,
+        needed.into(),
+        "what is not asked for tests nothing"
+    );
 }

@@ -42,17 +42,19 @@ const GRID: Grid = Grid {
     dlon_deg: 30.0 / 615.0,
 };
 
-/// A store that counts the bytes it hands out of frames.
+/// A store that counts the requests for frames, and the bytes that it hands out of them.
 #[derive(Debug)]
 struct Counting {
     inner: Arc<dyn ObjectStore>,
     frame_bytes: AtomicU64,
+    frame_requests: AtomicU64,
 }
 
 impl Counting {
     fn count(&self, at: &Path, bytes: u64) {
         if at.as_ref().contains("frames/") {
             self.frame_bytes.fetch_add(bytes, Ordering::Relaxed);
+            self.frame_requests.fetch_add(1, Ordering::Relaxed);
         }
     }
 }
@@ -80,9 +82,8 @@ impl ObjectStore for Counting {
     async fn get_opts(&self, at: &Path, o: GetOptions) -> Result<GetResult> {
         let is_head = o.head;
         let found = self.inner.get_opts(at, o).await?;
-        if !is_head {
-            self.count(at, found.range.end - found.range.start);
-        }
+        let bytes = found.range.end - found.range.start;
+        self.count(at, if is_head { 0 } else { bytes });
         Ok(found)
     }
 
@@ -131,6 +132,9 @@ fn noise() -> Vec<(Period, Vec<f32>)> {
     months.into_iter().map(step).collect()
 }
 
+/// Most requests that a sum over a region may need of a frame.
+const MOST_REQUESTS: f64 = 5.0;
+
 async fn frame_bytes(store: &Store, manifest: &Manifest) -> u64 {
     let mut bytes = 0;
     for step in &manifest.steps {
@@ -139,18 +143,30 @@ async fn frame_bytes(store: &Store, manifest: &Manifest) -> u64 {
     bytes
 }
 
-/// Share of the frames' bytes that a budget of a region reads.
-async fn share_read(store: &Store, manifest: &Manifest, region: &str) -> f64 {
+/// What a budget of a region asks of the frames.
+#[derive(Debug)]
+struct Read {
+    /// Share of their bytes.
+    share: f64,
+    /// Requests a frame.
+    requests: f64,
+}
+
+async fn read(store: &Store, manifest: &Manifest, region: &str) -> Read {
     let (root, inner) = store.sql_root();
     let counting = Arc::new(Counting {
         inner,
         frame_bytes: AtomicU64::new(0),
+        frame_requests: AtomicU64::new(0),
     });
     let objects = Objects::new(root, Arc::clone(&counting) as Arc<dyn ObjectStore>);
     let engine = Engine::in_process(store.clone(), parts(2)).reading(objects);
     ask(&engine, &total(&manifest.product, region)).await;
-    let read = counting.frame_bytes.load(Ordering::Relaxed) as f64;
-    read / frame_bytes(store, manifest).await as f64
+    let count = |of: &AtomicU64| of.load(Ordering::Relaxed) as f64;
+    Read {
+        share: count(&counting.frame_bytes) / frame_bytes(store, manifest).await as f64,
+        requests: count(&counting.frame_requests) / manifest.steps.len() as f64,
+    }
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -162,16 +178,19 @@ async fn a_small_box_reads_its_chunks_and_no_others() {
     let share = |cells: f64| cells / GRID.cell_count() as f64;
     // One chunk, and the end of each file.
     let end = 0.03;
-    let one = share_read(&store, &manifest, "110,20,111,21").await;
-    assert!(one > share(7200.0) && one < share(7200.0) + end, "{one}");
+    let one = read(&store, &manifest, "110,20,111,21").await;
+    let is_own =
+        |share_read: f64, cells: f64| share_read > share(cells) && share_read < share(cells) + end;
+    assert!(is_own(one.share, 7200.0), "{one:?}");
     // A row of six, the easternmost 15 columns wide.
-    let (row, cells) = (
-        share_read(&store, &manifest, "100,20,130,21").await,
-        60.0 * 615.0,
-    );
-    assert!(row > share(cells) && row < share(cells) + end, "{row}");
-    let all = share_read(&store, &manifest, "global").await;
-    assert!(all > 0.95 && all < 1.1, "{all}");
+    let row = read(&store, &manifest, "100,20,130,21").await;
+    assert!(is_own(row.share, 60.0 * 615.0), "{row:?}");
+    let all = read(&store, &manifest, "global").await;
+    assert!(all.share > 0.95 && all.share < 1.1, "{all:?}");
+    // Its size, its end, where its pages are, which chunks it has, their values: behind a network each takes milliseconds.
+    for read in [one, row, all] {
+        assert!(read.requests <= MOST_REQUESTS, "{read:?}");
+    }
 }
 
 /// A frame as it was written before a row of values was a page: pages of a megabyte, and no index of pages.

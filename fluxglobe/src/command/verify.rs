@@ -1,9 +1,13 @@
-//! `fluxglobe verify`: every stored object read and compared with its name or seal, a line for each that is not sound.
+//! `fluxglobe verify`: every stored object read and compared with its name or seal, and the journal of the event log in the
+//! data folder; a line for each that is not sound.
 
+use std::path::Path;
 use std::process::ExitCode;
 
 use anyhow::Result;
 use contract::kind::Kind;
+use storage::StorageError;
+use storage::log::EmbeddedLog;
 use storage::verify::{self, Fault, Finding, Report};
 
 use crate::cli::{Settings, Verify};
@@ -23,7 +27,13 @@ pub(crate) async fn run(settings: &Settings, options: &Verify) -> Result<ExitCod
             bar.suspend(|| progress::result(&line(finding)).ok());
         }
     };
-    let report = verify::run(&store, &keys, &tell).await?;
+    let mut report = verify::run(&store, &keys, &tell).await?;
+    if product.is_none()
+        && let Some(finding) = journal(&deployment::events(settings))?
+    {
+        tell(keys.len(), Some(&finding));
+        report.findings.push(finding);
+    }
     progress::done(&bar, &summary(&report));
     if options.json {
         progress::result(&serde_json::to_string_pretty(&report)?)?;
@@ -35,6 +45,19 @@ pub(crate) async fn run(settings: &Settings, options: &Verify) -> Result<ExitCod
         progress::say(&advice);
     }
     Ok(ExitCode::FAILURE)
+}
+
+/// What is wrong with the journal of the event log in a folder. It is no object: its key is where it lies in the data.
+fn journal(events: &Path) -> Result<Option<Finding>> {
+    match EmbeddedLog::check(events) {
+        Ok(_entries) => Ok(None),
+        Err(StorageError::Damaged { object, reason }) => Ok(Some(Finding {
+            key: "events/journal.jsonl".parse()?,
+            fault: Fault::Damaged,
+            reason: format!("{object}: {reason}"),
+        })),
+        Err(error) => Err(error.into()),
+    }
 }
 
 fn line(finding: &Finding) -> String {
@@ -74,6 +97,7 @@ fn advice(report: &Report) -> Vec<String> {
     };
     let made_again = [
         Kind::Frame,
+        Kind::Contributed,
         Kind::Series,
         Kind::Domain,
         Kind::Sums,
@@ -81,19 +105,25 @@ fn advice(report: &Report) -> Vec<String> {
     ];
     if found(&made_again).is_some() {
         advice.push(
-            "frames, series, domains, sums and tiles are made again by: fluxglobe recompute --product PRODUCT --verify"
+            "frames, counts, series, domains, sums and tiles are made again by: fluxglobe recompute --product PRODUCT --verify"
                 .to_owned(),
         );
     }
-    if found(&[
+    let when_needed = [
         Kind::Weights,
         Kind::Accumulating,
         Kind::Check,
         Kind::Reading,
-    ])
-    .is_some()
-    {
-        advice.push("weights, kept sums, comparisons and notes of readings are made again when they are next needed".to_owned());
+        Kind::Landing,
+    ];
+    if found(&when_needed).is_some() {
+        advice.push("weights, kept sums, comparisons and notes of readings and landings are made again when they are next needed".to_owned());
+    }
+    if let Some(protocol) = found(&[Kind::Protocol]) {
+        advice.push(format!(
+            "{} is written again by the next service that starts: remove it",
+            protocol.key
+        ));
     }
     if let Some(raw) = found(&[Kind::Raw]) {
         advice.push(format!(
@@ -115,7 +145,30 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_damaged_journal_is_a_finding_and_a_whole_one_or_none_is_not() {
+        let folder = tempfile::tempdir().unwrap();
+        assert_eq!(journal(folder.path()).unwrap(), None);
+        let path = folder.path().join("journal.jsonl");
+        std::fs::write(&path, "{\"offsets\":{\"granule.notice/ingest\":1}}\n").unwrap();
+        assert_eq!(journal(folder.path()).unwrap(), None);
+        std::fs::write(&path, "{\"offsets\":{\"granule.notice/ingest\":1]}\n").unwrap();
+        let finding = journal(folder.path()).unwrap().unwrap();
+        assert!(line(&finding).contains("entry 1 of"), "{}", line(&finding));
+    }
+
+    #[test]
     fn each_kind_that_is_damaged_has_its_advice() {
+        for kind in Kind::ALL {
+            let report = Report {
+                findings: vec![Finding {
+                    key: format!("{}/p/a", kind.folder()).parse().unwrap(),
+                    fault: Fault::Damaged,
+                    reason: "x".to_owned(),
+                }],
+                ..Report::default()
+            };
+            assert_eq!(advice(&report).len(), 1, "{kind:?}");
+        }
         let report = |key: &str| Report {
             findings: vec![Finding {
                 key: key.parse().unwrap(),

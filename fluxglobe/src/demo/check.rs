@@ -16,9 +16,15 @@ use crate::{deployment, progress};
 /// Raised when the comparison itself changes, so that a kept one is not taken for it.
 const COMPARISON_VERSION: u32 = 2;
 
+/// Version of a kept comparison's JSON: from 2 on it is sealed.
+const SCHEMA: u32 = 2;
+
 /// A comparison and where the values beside ours come from.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Comparison {
+    /// None of those that were kept before this was said.
+    #[serde(default)]
+    schema: u32,
     pub(crate) rows: Vec<CheckRow>,
     /// The paper.
     pub(crate) note: String,
@@ -71,6 +77,7 @@ pub(crate) async fn compare(
         &format!("{} beside the paper's and independent ones", rows.len()),
     );
     let comparison = Comparison {
+        schema: SCHEMA,
         rows,
         note: compute::published::CITATION.to_owned(),
         method: compute::published::METHOD.to_owned(),
@@ -101,5 +108,81 @@ async fn read(store: &Store, key: &ObjectKey) -> Result<Option<Comparison>> {
             Ok(None)
         }
         Err(error) => Err(error.into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::{Path, PathBuf};
+
+    use super::*;
+
+    const FROZEN: &str = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../storage/tests/frozen/2/objects"
+    );
+
+    fn frozen_key() -> ObjectKey {
+        ObjectKey::check(&Digest::of_json(&(COMPARISON_VERSION, "fgco2@1-0a1b2c3d")))
+    }
+
+    fn compared() -> Comparison {
+        let row = |paper| {
+            let row = serde_json::json!({
+                "what": "Global ocean", "period": "2000", "unit": "Pg C", "paper": paper,
+                "independent": -1.404, "ours": -1.4041, "difference": -0.0001, "agrees": true,
+            });
+            serde_json::from_value(row).unwrap()
+        };
+        Comparison {
+            schema: SCHEMA,
+            rows: vec![
+                row(serde_json::json!({
+                    "stated": {"value": -1.4, "uncertainty": 0.7, "decimals": 1},
+                    "difference": -0.0041, "verdict": "within",
+                })),
+                row(serde_json::Value::Null),
+            ],
+            note: "a paper".to_owned(),
+            method: "another program".to_owned(),
+        }
+    }
+
+    /// A store that holds a comparison alone.
+    async fn store(content: Vec<u8>) -> Store {
+        let store = Store::memory();
+        store.put_new(&frozen_key(), content.into()).await.unwrap();
+        store
+    }
+
+    #[tokio::test]
+    async fn a_frozen_comparison_is_shown_as_it_was_made() {
+        if let Some(folder) = std::env::var_os("FLUXGLOBE_FREEZE").map(PathBuf::from) {
+            let store = Store::open(folder.join("objects").to_str().unwrap()).unwrap();
+            document::put_new(&store, &frozen_key(), &compared())
+                .await
+                .unwrap();
+        }
+        let kept = std::fs::read(Path::new(FROZEN).join(frozen_key().as_str())).unwrap();
+        let found = read(&store(kept).await, &frozen_key())
+            .await
+            .unwrap()
+            .unwrap();
+        assert_eq!(found, compared());
+        let shown = found.to_wire();
+        let paper = shown.rows[0].paper.as_ref().unwrap();
+        assert_eq!((paper.verdict.as_str(), paper.decimals), ("within", 1));
+        assert!(shown.rows[1].paper.is_none() && shown.rows[1].agrees);
+    }
+
+    #[tokio::test]
+    async fn a_comparison_with_a_flipped_bit_is_made_again() {
+        let kept = std::fs::read(Path::new(FROZEN).join(frozen_key().as_str())).unwrap();
+        for at in 0..kept.len() * 8 {
+            let mut flipped = kept.clone();
+            flipped[at / 8] ^= 1 << (at % 8);
+            let found = read(&store(flipped).await, &frozen_key()).await.unwrap();
+            assert_eq!(found, None, "bit {at}");
+        }
     }
 }

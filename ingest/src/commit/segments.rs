@@ -29,13 +29,15 @@ pub(super) async fn write(
     merged: &Merged,
 ) -> Result<Written, IngestError> {
     let steps = &merged.steps;
-    let mut cells = match newest {
-        // What was replaced may have held the only value of a cell: then the domain is built from nothing.
-        Some(newest) if !merged.is_revision => domain::read(store, &newest.domain)
+    // What was replaced may have held the only value of a cell: then the domain is built from nothing.
+    let grown = newest.filter(|_| !merged.is_revision);
+    let before = match grown {
+        Some(newest) => domain::read(store, &newest.domain)
             .await
             .map_err(IngestError::storage("read the domain"))?,
-        _ => vec![false; grid.cell_count()],
+        None => vec![false; grid.cell_count()],
     };
+    let mut cells = before.clone();
     let mut segments = Vec::new();
     for (first, count) in runs(steps, grid) {
         let own = &steps[first..first + count];
@@ -59,9 +61,13 @@ pub(super) async fn write(
             series,
         }));
     }
-    let domain = domain::write(store, product, &cells)
-        .await
-        .map_err(IngestError::storage("store the domain"))?;
+    let domain = match grown {
+        // It was read just now: to store it again would be two requests for nothing.
+        Some(newest) if cells == before => newest.domain.clone(),
+        _ => domain::write(store, product, &cells)
+            .await
+            .map_err(IngestError::storage("store the domain"))?,
+    };
     Ok(Written {
         series: segments,
         domain,

@@ -1,7 +1,7 @@
 //! Stored objects with a flipped bit: found when files are read anew, and made whole again from `raw/`; and a store of an
 //! earlier version, whose frames are named otherwise and are no others for that.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use contract::key::ObjectKey;
 use contract::kind::{Kind, Vouched};
@@ -105,21 +105,8 @@ async fn a_damaged_note_of_a_reading_is_written_again() {
 
 /// A place whose store is a copy of the one that version 0.1.0 wrote.
 fn frozen() -> Place {
-    fn copy_all(from: &Path, to: &Path) {
-        std::fs::create_dir_all(to).unwrap();
-        for entry in std::fs::read_dir(from).unwrap() {
-            let entry = entry.unwrap();
-            let to = to.join(entry.file_name());
-            if entry.file_type().unwrap().is_dir() {
-                copy_all(&entry.path(), &to);
-            } else {
-                std::fs::copy(entry.path(), to).unwrap();
-            }
-        }
-    }
     let place = Place::new();
-    let objects = Path::new(env!("CARGO_MANIFEST_DIR")).join("../storage/tests/frozen/1/objects");
-    copy_all(&objects, &place.path("objects"));
+    test_data::frozen::copy(1, "objects", &place.path("objects"));
     let store = Store::open(place.path("objects").to_str().unwrap()).unwrap();
     Place { store, ..place }
 }

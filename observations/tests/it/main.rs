@@ -5,6 +5,7 @@
 
 mod cleaned;
 mod conformance;
+mod frozen;
 mod homes;
 mod interruptions;
 mod same_answers;

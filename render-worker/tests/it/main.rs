@@ -17,6 +17,8 @@ mod fill;
 #[cfg(feature = "service")]
 mod fleet;
 mod flow;
+#[cfg(feature = "service")]
+mod frozen;
 mod gallery;
 mod golden;
 mod hot;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::{File, TryLockError};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -20,6 +20,8 @@ use crate::StorageError;
 /// How long a lock held by another process is waited for.
 const LOCK_PATIENCE: Duration = Duration::from_secs(1);
 const LOCK_PAUSE: Duration = Duration::from_millis(20);
+/// File of the log in its folder.
+const JOURNAL: &str = "journal.jsonl";
 
 /// A log in a folder, or in memory when it has none; clones share it.
 #[derive(Clone)]
@@ -58,13 +60,15 @@ impl EmbeddedLog {
     }
 
     /// Opens the log in a folder.
+    ///
+    /// # Errors
+    /// `Damaged` with the file and the entry if its journal does not hold what was written.
     pub fn open(folder: &Path) -> Result<Self, StorageError> {
         std::fs::create_dir_all(folder).map_err(|e| failed(folder, e))?;
         let lock_path = folder.join("lock");
         let lock = File::create(&lock_path).map_err(|e| failed(&lock_path, e))?;
         take_lock(&lock, folder)?;
-        let path: PathBuf = folder.join("journal.jsonl");
-        let (journal, entries) = Journal::open(path.clone()).map_err(|e| failed(&path, e))?;
+        let (journal, entries) = Journal::open(folder.join(JOURNAL))?;
         let mut state = State {
             journal: Some(journal),
             _lock: Some(lock),
@@ -74,6 +78,14 @@ impl EmbeddedLog {
             state.apply(entry);
         }
         Ok(Self::with_state(state))
+    }
+
+    /// Reads the journal of the log in a folder, whoever writes to it now. How many entries it has; none if there is none.
+    ///
+    /// # Errors
+    /// As of [`EmbeddedLog::open`].
+    pub fn check(folder: &Path) -> Result<Option<usize>, StorageError> {
+        Journal::check(&folder.join(JOURNAL))
     }
 
     fn with_state(state: State) -> Self {
@@ -93,15 +105,17 @@ impl Shared {
     }
 
     fn write(&self, mut entry: Entry) -> Result<(), StorageError> {
+        if entry == Entry::default() {
+            return Ok(());
+        }
         let mut state = self.state();
         if !entry.messages.is_empty() {
             // A clock that was set back must not make a later message look older.
             entry.time = now().max(state.time);
         }
-        if let Some(journal) = &state.journal {
-            journal
-                .append(&entry)
-                .map_err(|e| failed(journal.path(), e))?;
+        if let Some(journal) = &mut state.journal {
+            let done = journal.append(&entry);
+            done.map_err(|e| failed(journal.path(), e))?;
         }
         state.apply(entry);
         drop(state);
@@ -443,6 +457,32 @@ mod tests {
         let log = EmbeddedLog::open(folder.path()).unwrap();
         log.append(&[notice("b")]).await.unwrap();
         assert_eq!(read(&log, "g").await, [notice("a"), notice("b")]);
+    }
+
+    #[tokio::test]
+    async fn a_flipped_bit_of_the_journal_is_named_and_no_other_message() {
+        let folder = tempfile::tempdir().unwrap();
+        let log = EmbeddedLog::open(folder.path()).unwrap();
+        log.append(&[notice("a")]).await.unwrap();
+        log.append(&[]).await.unwrap();
+        log.append(&[notice("b")]).await.unwrap();
+        drop(log);
+        let path = folder.path().join("journal.jsonl");
+        let whole = std::fs::read_to_string(&path).unwrap();
+        std::fs::write(
+            &path,
+            whole.replacen(r#"\"path\":\"b\""#, r#"\"path\":\"c\""#, 1),
+        )
+        .unwrap();
+        let error = EmbeddedLog::check(folder.path()).unwrap_err();
+        assert!(error.to_string().contains("entry 2 of"), "{error}");
+        let error = EmbeddedLog::open(folder.path()).err().unwrap();
+        let text = error.to_string();
+        assert!(
+            text.contains("entry 2 of") && text.contains("journal.jsonl"),
+            "{text}"
+        );
+        assert!(!error.is_retryable());
     }
 
     /// A clock that is set back makes no later message look older, also not after a restart.

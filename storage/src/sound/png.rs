@@ -34,14 +34,15 @@ pub(super) fn check(content: &[u8]) -> Result<(), &'static str> {
     }
 }
 
+/// One black pixel, as another program wrote it.
+#[cfg(test)]
+pub(super) const PIXEL: &[u8] =
+    b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\0\x01\0\0\0\x01\x08\0\0\0\0\x3a\x7e\x9b\x55\
+    \0\0\0\nIDAT\x78\xda\x63\x60\0\0\0\x02\0\x01\xe5\x27\xde\xfc\0\0\0\0IEND\xae\x42\x60\x82";
+
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// One black pixel, as another program wrote it.
-    const PIXEL: &[u8] =
-        b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\0\x01\0\0\0\x01\x08\0\0\0\0\x3a\x7e\x9b\x55\
-        \0\0\0\nIDAT\x78\xda\x63\x60\0\0\0\x02\0\x01\xe5\x27\xde\xfc\0\0\0\0IEND\xae\x42\x60\x82";
 
     #[test]
     fn a_bit_flipped_anywhere_in_a_picture_is_found() {

@@ -43,7 +43,7 @@ pub fn json(mut text: Vec<u8>) -> Vec<u8> {
 }
 
 /// The text of a document without its seal.
-pub(crate) fn opened(content: &[u8]) -> Vec<u8> {
+pub fn opened(content: &[u8]) -> Vec<u8> {
     match parts_of_json(content) {
         Some((before, _)) => [before, b"}"].concat(),
         None => content.to_vec(),

@@ -17,7 +17,7 @@ const GRID: Grid = Grid {
     dlon_deg: 1.0,
 };
 
-/// An object of each kind that this crate writes, or that is checked here whoever writes it.
+/// An object of each kind, whoever writes it.
 async fn store() -> Store {
     let store = Store::memory();
     let product: ProductId = "p".parse().unwrap();
@@ -63,7 +63,27 @@ async fn store() -> Store {
     weights::write(&store, &ObjectKey::weights(&raw_sha256), &areas)
         .await
         .unwrap();
-    for name in ["sums/p/a.json", "readings/p/a", "checks/a.json"] {
+    let mut counts = contributed::Contributed::nothing(&GRID, period.start);
+    counts.add(period, &[true; 15]);
+    contributed::write(&store, &product, &GRID, &counts)
+        .await
+        .unwrap();
+    let sums = format!("accumulating/{raw_sha256}.parquet");
+    let table = weights::encode(&areas).unwrap();
+    store.put_new(&sums.parse().unwrap(), table).await.unwrap();
+    let rows = Bytes::from("rows of measurements");
+    let key = ObjectKey::observations(&product, &Digest::of(&rows));
+    store.put_new(&key, rows).await.unwrap();
+    let picture = Bytes::from_static(png::PIXEL);
+    let key = ObjectKey::tile(&raw_sha256);
+    store.put_new(&key, picture).await.unwrap();
+    for name in [
+        "sums/p/a.json",
+        "readings/p/a",
+        "checks/a.json",
+        "observation-indexes/p/1.json",
+        "protocol/current.json",
+    ] {
         let document = serde_json::json!({"schema": 2, "name": name});
         document::put_new(&store, &name.parse().unwrap(), &document)
             .await
@@ -81,17 +101,23 @@ async fn a_bit_flipped_in_any_object_is_found_named_and_counted() {
     let keys = verify::keys(&store, None).await.unwrap();
     let kinds = keys.iter().map(|key| Kind::of(key).unwrap().folder());
     let kinds: std::collections::BTreeSet<&str> = kinds.collect();
-    assert_eq!(kinds.len(), 10, "{kinds:?}");
+    assert_eq!(kinds.len(), Kind::ALL.len(), "{kinds:?}");
     let sound = verify::run(&store, &keys, &|_, _| ()).await.unwrap();
     assert_eq!((sound.sound_count, sound.findings), (keys.len(), vec![]));
     for key in &keys {
         let whole = store.get(key).await.unwrap();
+        let kind = Kind::of(key).unwrap();
+        let before = damage::count(kind);
         for at in 0..whole.len() * 8 {
             let mut flipped = whole.to_vec();
             flipped[at / 8] ^= 1 << (at % 8);
-            let flipped = Bytes::from(flipped);
-            assert!(of_object(key, &flipped).is_err(), "{key}, bit {at}");
+            let error = of_object(key, &Bytes::from(flipped)).map(|_sound| ());
+            let error = error.expect_err(&format!("{key}, bit {at}")).to_string();
+            assert!(error.contains(key.as_str()), "bit {at}: {error}");
         }
+        // Tests beside this one count, too.
+        let counted = damage::count(kind) - before;
+        assert!(counted >= whole.len() as u64 * 8, "{key}: {counted}");
     }
 }
 

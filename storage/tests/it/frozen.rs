@@ -1,22 +1,24 @@
-//! Stores as earlier versions of this program wrote them, kept in `tests/frozen`: a folder a version of the manifest, each
-//! read whole here and compared with what was put in.
-//!
-//! `1` is a whole store, written by `fluxglobe ingest`, `recompute`, `derive` and `observations` of 0.1.0; what was asked of
-//! it then lies beside it and is asked again by the crates that answer. `2` holds what this crate writes; the test below
-//! writes it again and compares. A format that changes needs a folder of its own: `FLUXGLOBE_FREEZE=FOLDER` makes the last
-//! test write one.
+//! Stores as earlier versions of this program wrote them, kept in `tests/frozen` (its README says how): a folder a version
+//! of the manifest, each read whole here and compared with what was put in. What other crates write into a store is read
+//! there; `kinds` lists who reads what, and lets no kind of object be without.
+
+mod jobs;
+mod kinds;
+mod told;
 
 use std::path::{Path, PathBuf};
 
 use contract::digest::Digest;
-use contract::event::Event;
 use contract::grid::Grid;
 use contract::key::ObjectKey;
 use contract::kind::{Kind, Vouched};
 use contract::manifest::{MANIFEST_SCHEMA, Manifest, OLDEST_MANIFEST_SCHEMA, SeriesSegment, Step};
+use contract::masked::MaskedCells;
+use contract::notice::NoticeRun;
 use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::time::Period;
+use storage::contributed::{self, Contributed};
 use storage::{Store, domain, frames, manifests, series, verify, weights};
 
 const ROWS: u32 = 61;
@@ -38,8 +40,22 @@ fn frozen(version: u32) -> PathBuf {
         .join(version.to_string())
 }
 
+/// Where what is written now is to be frozen, if that is asked for.
+fn to_freeze() -> Option<PathBuf> {
+    let folder = PathBuf::from(std::env::var_os("FLUXGLOBE_FREEZE")?);
+    std::fs::create_dir_all(&folder).unwrap();
+    Some(folder)
+}
+
 /// A copy of a frozen store: nothing here may change the one that is kept.
 fn copy(version: u32) -> (tempfile::TempDir, Store) {
+    let folder = copy_of(version, "objects");
+    let store = Store::open(folder.path().to_str().unwrap()).unwrap();
+    (folder, store)
+}
+
+/// A copy of a part of what is frozen of a version.
+fn copy_of(version: u32, part: &str) -> tempfile::TempDir {
     fn copy_all(from: &Path, to: &Path) {
         std::fs::create_dir_all(to).unwrap();
         for entry in std::fs::read_dir(from).unwrap() {
@@ -54,9 +70,8 @@ fn copy(version: u32) -> (tempfile::TempDir, Store) {
         }
     }
     let folder = tempfile::tempdir().unwrap();
-    copy_all(&frozen(version).join("objects"), folder.path());
-    let store = Store::open(folder.path().to_str().unwrap()).unwrap();
-    (folder, store)
+    copy_all(&frozen(version).join(part), folder.path());
+    folder
 }
 
 /// What the file that the frozen product came from holds, g C m⁻² a month.
@@ -82,31 +97,6 @@ fn is_near(a: f32, b: f32) -> bool {
 
 fn product() -> ProductId {
     "fgco2".parse().unwrap()
-}
-
-#[test]
-fn every_version_that_is_read_is_frozen() {
-    for version in OLDEST_MANIFEST_SCHEMA..=MANIFEST_SCHEMA {
-        let objects = frozen(version).join("objects");
-        assert!(objects.is_dir(), "no frozen store of version {version}");
-        for kind in [
-            Kind::Manifest,
-            Kind::Frame,
-            Kind::Series,
-            Kind::Domain,
-            Kind::Weights,
-        ] {
-            assert!(
-                objects.join(kind.folder()).is_dir(),
-                "no {kind:?} of version {version}"
-            );
-        }
-    }
-    assert_eq!(
-        weights::LAYOUT,
-        MANIFEST_SCHEMA,
-        "freeze weights of the new layout too"
-    );
 }
 
 #[tokio::test]
@@ -169,34 +159,6 @@ async fn version_1_keeps_the_names_that_were_cited_and_its_frames_keep_theirs() 
     }
 }
 
-#[test]
-fn events_of_version_1_are_read_as_they_were_written() {
-    let journal = std::fs::read_to_string(frozen(1).join("events/journal.jsonl")).unwrap();
-    let mut kinds = vec![];
-    for line in journal.lines() {
-        let entry: serde_json::Value = serde_json::from_str(line).unwrap();
-        let messages = entry["messages"].as_array();
-        for message in messages.into_iter().flatten() {
-            let text = message[1].as_str().unwrap();
-            let event = Event::from_json(text).unwrap();
-            assert_eq!(event.body.topic().as_str(), message[0].as_str().unwrap());
-            assert_eq!(event.to_json(), text);
-            kinds.push(event.body.topic().to_string());
-        }
-    }
-    for kind in [
-        "granule.notice",
-        "granule.landed",
-        "granule.rejected",
-        "product.derived",
-    ] {
-        assert!(
-            kinds.iter().any(|found| found == kind),
-            "no {kind}: {kinds:?}"
-        );
-    }
-}
-
 /// Writes the objects of version 2.
 async fn write(store: &Store) -> Manifest {
     let raw = "a file that nobody keeps";
@@ -246,29 +208,125 @@ async fn write(store: &Store) -> Manifest {
         notices: vec![],
     };
     manifests::commit(store, &manifest).await.unwrap();
+    contributed::write(store, &product(), &GRID, &counts())
+        .await
+        .unwrap();
+    let manifest = revised(manifest);
+    manifests::commit(store, &manifest).await.unwrap();
     manifest
+}
+
+/// The next version, with all that a version may say.
+fn revised(first: Manifest) -> Manifest {
+    let given = ["2001-03-01T00:00:00.007Z/3/17/1", "2001-03-02/0/18/0"];
+    let orders = given.map(|order| order.parse().ok());
+    let mut next = Manifest {
+        number: 2,
+        notices: NoticeRun::of(&orders),
+        ..first
+    };
+    next.steps[0].masked = Some(MaskedCells {
+        out_of_range: 3,
+        poor_quality: 0,
+        implausible: 7,
+    });
+    next.steps[1].masked = Some(MaskedCells::default());
+    next
+}
+
+/// What both months together hold.
+fn counts() -> Contributed {
+    let [january, february] = [values(1), values(2)];
+    let mut counts = Contributed::nothing(&GRID, january.0.start);
+    for (period, values) in [january, february] {
+        let has_data: Vec<bool> = values.iter().map(|value| !value.is_nan()).collect();
+        counts.add(period, &has_data);
+    }
+    counts
+}
+
+/// The objects of a store that this crate alone writes.
+async fn own(store: &Store) -> Vec<ObjectKey> {
+    let mut keys = vec![];
+    for kind in [
+        Kind::Raw,
+        Kind::Frame,
+        Kind::Series,
+        Kind::Domain,
+        Kind::Contributed,
+        Kind::Manifest,
+    ] {
+        let folder = format!("{}/{}", kind.folder(), product());
+        keys.extend(store.list(&folder).await.unwrap());
+    }
+    keys
 }
 
 /// Names, schemas and what they hold: a change of any of them is a new version.
 #[tokio::test]
 async fn what_is_written_now_is_named_as_in_the_newest_frozen_store() {
-    if let Some(folder) = std::env::var_os("FLUXGLOBE_FREEZE") {
-        write(&Store::open(folder.to_str().unwrap()).unwrap()).await;
+    if let Some(folder) = to_freeze() {
+        let objects = folder.join("objects");
+        write(&Store::open(objects.to_str().unwrap()).unwrap()).await;
     }
     let (_folder, kept) = copy(MANIFEST_SCHEMA);
     let now = Store::memory();
     let manifest = write(&now).await;
     let newest = manifests::latest(&kept, &product()).await.unwrap();
     assert_eq!(newest.unwrap(), manifest);
-    let (kept_keys, keys) = (
-        verify::keys(&kept, None).await.unwrap(),
-        verify::keys(&now, None).await.unwrap(),
-    );
-    assert_eq!(kept_keys, keys);
+    assert_eq!(own(&kept).await, own(&now).await);
     let job = ObjectKey::weights(&Digest::of(b"a region"));
     let both = (
         weights::read(&kept, &job).await.unwrap(),
         weights::read(&now, &job).await.unwrap(),
     );
     assert_eq!(both.0, both.1);
+    assert_eq!(
+        weights::LAYOUT,
+        MANIFEST_SCHEMA,
+        "freeze weights of the new layout too"
+    );
+}
+
+#[tokio::test]
+async fn a_frozen_version_says_what_was_masked_and_in_which_order_files_came() {
+    let (_folder, store) = copy(2);
+    let id = product();
+    let [first, second] = [1, 2].map(|number| manifests::numbered(&store, &id, number));
+    let (first, second) = (
+        first.await.unwrap().unwrap(),
+        second.await.unwrap().unwrap(),
+    );
+    assert_eq!(
+        (first.masked().1, first.notice_orders()),
+        (2, vec![None; 2])
+    );
+    let (masked, uncounted) = second.masked();
+    assert_eq!((masked.out_of_range, masked.implausible), (3, 7));
+    assert_eq!((masked.total(), uncounted), (10, 0));
+    let orders: Vec<_> = second.notice_orders().into_iter().flatten().collect();
+    let at = "2001-03-01T00:00:00.007Z".parse().unwrap();
+    assert_eq!(
+        (orders[0].given, orders[0].partition, orders[0].offset),
+        (at, 3, 17)
+    );
+    assert!(orders[0].file == 1 && orders[0] < orders[1]);
+}
+
+#[tokio::test]
+async fn frozen_counts_are_the_numbers_that_were_put_in() {
+    let (_folder, store) = copy(2);
+    let keys = store.list("contributed/fgco2").await.unwrap();
+    let found = contributed::read(&store, &keys[0], &GRID).await.unwrap();
+    assert_eq!((keys.len(), &found), (1, &counts()));
+    // A cell without data in January, one without any, one with all.
+    let at = |row: u32, col: u32| (row * COLS + col) as usize;
+    let day_ms = 86_400_000;
+    let hold = |cell: usize| (found.steps[cell], found.milliseconds[cell] / day_ms);
+    assert_eq!(hold(at(60, 7)), (1, 28));
+    assert_eq!((hold(at(5, 6)), hold(at(5, 7))), ((0, 0), (2, 59)));
+    assert_eq!(
+        (found.of_steps, found.period.seconds()),
+        (2, 59.0 * 86_400.0)
+    );
 }

@@ -8,6 +8,8 @@
 //! | further sets | `FLUXGLOBE_TEST_DATA`, else `../shared/data` beside the checkout | failure where the variable is set or the test is not in [`LIST`] |
 #![expect(clippy::print_stderr, reason = "a test that does not run says so")]
 
+pub mod frozen;
+
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 

@@ -1,0 +1,88 @@
+//! `fluxglobe verify` over a data folder with objects of every kind, one bit flipped in each, alone; and commands over a
+//! damaged journal.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use contract::kind::Kind;
+use harness::program;
+use test_data::frozen;
+
+/// A data folder as a program of this version of the manifest left it.
+fn data() -> tempfile::TempDir {
+    let data = tempfile::tempdir().unwrap();
+    for part in ["objects", "events"] {
+        frozen::copy(2, part, &data.path().join(part));
+    }
+    data
+}
+
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let mut all = vec![];
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            all.extend(files(&path));
+        } else {
+            all.push(path);
+        }
+    }
+    all.sort();
+    all
+}
+
+fn flip(path: &Path) {
+    let mut content = std::fs::read(path).unwrap();
+    let at = content.len() * 5 / 8;
+    content[at] ^= 1 << (at % 8);
+    std::fs::write(path, content).unwrap();
+}
+
+/// Keys that `fluxglobe verify` names.
+fn named(data: &Path) -> Vec<String> {
+    let output = program::run(data, &["verify", "--json"]).unwrap();
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let findings = report["findings"].as_array().unwrap();
+    assert_eq!(output.status.success(), findings.is_empty());
+    let key = |finding: &serde_json::Value| finding["key"].as_str().unwrap().to_owned();
+    findings.iter().map(key).collect()
+}
+
+#[test]
+fn a_flipped_bit_of_any_object_or_of_the_journal_is_named_by_verify() {
+    let data = data();
+    let data = data.path();
+    assert_eq!(named(data), [""; 0]);
+    let mut kinds = BTreeSet::new();
+    for path in files(data) {
+        let key = path.strip_prefix(data).unwrap().to_str().unwrap();
+        let key = key.strip_prefix("objects/").unwrap_or(key).to_owned();
+        let folder = key.split('/').next().unwrap().to_owned();
+        // The first of each kind: the others are what it is.
+        if !kinds.insert(folder) {
+            continue;
+        }
+        let whole = std::fs::read(&path).unwrap();
+        flip(&path);
+        assert_eq!(named(data), [key]);
+        std::fs::write(&path, whole).unwrap();
+    }
+    assert_eq!(kinds.len(), Kind::ALL.len() + 1, "{kinds:?}");
+    assert_eq!(named(data), [""; 0]);
+}
+
+#[test]
+fn a_damaged_journal_ends_a_command_with_its_entry_and_stays_as_it_is() {
+    let data = data();
+    let journal = data.path().join("events/journal.jsonl");
+    flip(&journal);
+    let damaged = std::fs::read(&journal).unwrap();
+    let file = data.path().join("any.nc");
+    std::fs::write(&file, "no grid").unwrap();
+    let talk = program::fail(data.path(), &["ingest", file.to_str().unwrap()]).unwrap();
+    assert!(
+        talk.contains("entry ") && talk.contains("journal.jsonl is damaged"),
+        "{talk}"
+    );
+    assert_eq!(std::fs::read(&journal).unwrap(), damaged);
+}
