@@ -7,13 +7,14 @@ pub mod chunk;
 pub mod fixed;
 pub mod gaps;
 pub mod named;
+pub(crate) mod over_region;
 mod query;
 pub mod rows;
 pub mod running;
 pub mod sums;
 
 pub use accumulated::Completeness;
+pub(crate) use query::steps_inside;
 pub use query::{BudgetAnswer, BudgetQuery, budget, budget_of};
-pub(crate) use query::{extent_of, steps_inside};
 pub use rows::{BudgetRow, BudgetStep};
 pub use sums::Measure;

@@ -188,6 +188,7 @@ fn query(
         earth,
         // As the authors of the 1-degree grids integrate them: no cell is cut at the coast.
         cells: Cells::Whole,
+        ocean: None,
     })
 }
 

@@ -64,6 +64,14 @@ pub enum ComputeError {
         /// What is wrong and what to do.
         reason: String,
     },
+    /// A product that cannot say what of a cell is sea, or not for the cells that are summed.
+    #[error("{product} cannot say what is sea: {reason}")]
+    OceanShares {
+        /// Its name, or that of its frame.
+        product: String,
+        /// What is wrong and what to do.
+        reason: String,
+    },
     /// A region file that cannot be read or holds no region.
     #[error("region file {file}: {reason}")]
     RegionFile {
@@ -154,6 +162,7 @@ impl ComputeError {
             | Self::RegionOutside { .. }
             | Self::PlaceOutside { .. }
             | Self::Region { .. }
+            | Self::OceanShares { .. }
             | Self::RegionFile { .. }
             | Self::SchedulerUrl { .. }
             | Self::Contract(_) => ErrorClass::BadRequest,

@@ -11,6 +11,8 @@ use object_store::{ObjectStore, ObjectStoreExt as _};
 use storage::Store;
 use url::{Position, Url};
 
+use crate::ComputeError;
+use crate::region::computed::ComputedWeights;
 use crate::region::loaded::{LoadedWeights, RegionWeights};
 use crate::steady_store::SteadyStore;
 
@@ -43,11 +45,19 @@ impl Objects {
         runtime.register_object_store(&self.root, Arc::clone(&self.store));
     }
 
-    /// A region's weights by their address: read once, whoever asks and however often.
+    /// A region's weights by their address, or by the question that they answer: read or computed once, whoever asks and
+    /// however often.
     pub(crate) async fn weights(
         &self,
         address: &str,
     ) -> Result<Arc<RegionWeights>, DataFusionError> {
+        if let Some(question) = ComputedWeights::of_text(address).map_err(external)? {
+            let computing = self.computed(question);
+            return self
+                .weights
+                .get(&ComputedWeights::name(address), computing)
+                .await;
+        }
         self.weights
             .get(address, async {
                 let content = self.content(address).await?;
@@ -57,6 +67,21 @@ impl Objects {
                 Ok(RegionWeights::new(chunks))
             })
             .await
+    }
+
+    async fn computed(&self, question: ComputedWeights) -> Result<RegionWeights, DataFusionError> {
+        let shares = match (question.surface.shares(), &question.shares_at) {
+            (Some(shares), Some(address)) => {
+                let content = self.content(address).await?;
+                let values = storage::frames::of_bytes(&shares.frame, content, &question.grid);
+                Some(values.map_err(|e| DataFusionError::External(e.into()))?)
+            }
+            _ => None,
+        };
+        let computing = move || question.chunks(shares.as_deref());
+        let chunks = tokio::task::spawn_blocking(computing).await;
+        let chunks = chunks.map_err(|e| DataFusionError::External(e.into()))?;
+        chunks.map(RegionWeights::new).map_err(external)
     }
 
     async fn content(&self, address: &str) -> Result<Bytes, DataFusionError> {
@@ -71,6 +96,10 @@ impl Objects {
         let path = Path::from_url_path(url.path()).map_err(|_no_path| elsewhere())?;
         Ok(self.store.get(&path).await?.bytes().await?)
     }
+}
+
+fn external(error: ComputeError) -> DataFusionError {
+    DataFusionError::External(error.into())
 }
 
 /// The key at the end of an address of weights: what they are checked as, and named by if they are damaged.

@@ -3,8 +3,10 @@
 //! A region's edges are straight in longitude and latitude, as RFC 7946 says; every place in it counts once
 //! (docs/decisions/008-regions.md). Areas lie on the chosen figure of the earth.
 
+pub(crate) mod address;
 pub mod area;
 mod box_cover;
+pub(crate) mod computed;
 mod cut;
 pub mod extent;
 pub mod file;
@@ -14,5 +16,6 @@ pub(crate) mod loaded;
 mod polygon_cover;
 mod rings;
 mod sea;
+pub mod shares;
 mod union;
 pub mod weights;

@@ -27,6 +27,8 @@ const QUERY_LIMIT: Duration = Duration::from_hours(1);
 #[derive(Clone)]
 pub struct Engine {
     inner: Arc<Inner>,
+    /// May a question about a region leave its weights in the store?
+    stores_weights: bool,
 }
 
 struct Inner {
@@ -112,7 +114,7 @@ impl Engine {
             ..cluster.clone()
         });
         let inner = &self.inner;
-        Self::of(Inner {
+        self.with(Inner {
             kind,
             session: OnceCell::new(),
             store: inner.store.clone(),
@@ -125,7 +127,7 @@ impl Engine {
     #[must_use]
     pub fn with_memory_bytes(self, memory_bytes: usize) -> Self {
         let inner = &self.inner;
-        Self::of(Inner {
+        self.with(Inner {
             memory_bytes,
             kind: inner.kind.clone(),
             session: OnceCell::new(),
@@ -139,13 +141,27 @@ impl Engine {
     #[must_use]
     pub fn reading(self, objects: Objects) -> Self {
         let inner = &self.inner;
-        Self::of(Inner {
+        self.with(Inner {
             objects,
             kind: inner.kind.clone(),
             session: OnceCell::new(),
             store: inner.store.clone(),
             ..**inner
         })
+    }
+
+    /// The same engine for questions of strangers: weights of the regions that they think of are computed for each
+    /// question and stored nowhere.
+    #[must_use]
+    pub fn storing_no_weights(&self) -> Self {
+        Self {
+            stores_weights: false,
+            ..self.clone()
+        }
+    }
+
+    pub(crate) fn stores_weights(&self) -> bool {
+        self.stores_weights
     }
 
     fn new(store: Store, kind: Kind, partitions: NonZeroUsize) -> Self {
@@ -159,9 +175,18 @@ impl Engine {
         })
     }
 
+    /// The same engine but for its inside.
+    fn with(&self, inner: Inner) -> Self {
+        Self {
+            stores_weights: self.stores_weights,
+            ..Self::of(inner)
+        }
+    }
+
     fn of(inner: Inner) -> Self {
         Self {
             inner: Arc::new(inner),
+            stores_weights: true,
         }
     }
 

@@ -68,7 +68,9 @@ impl TransferFunction {
             Quantity::Pco2 => (Palette::Thermal, 280.0, 440.0),
             Quantity::Salinity => (Palette::Thermal, 30.0, 38.0),
             Quantity::AirPressure => (Palette::Thermal, 980.0, 1035.0),
-            Quantity::IceFraction => (Palette::Speed, 0.0, 100.0),
+            Quantity::IceFraction | Quantity::SeaAreaFraction | Quantity::LandAreaFraction => {
+                (Palette::Speed, 0.0, 100.0)
+            }
             Quantity::WaveHeight => (Palette::Speed, 0.0, 6.0),
             Quantity::Current => (Palette::Balance, -1.5, 1.5),
             Quantity::Elevation => (Palette::Balance, -6000.0, 6000.0),

@@ -37,6 +37,10 @@ pub enum Quantity {
     Current,
     /// Height of the solid earth above the mean level of the sea, m, negative on the sea floor.
     Elevation,
+    /// Share of a cell that is sea, 1.
+    SeaAreaFraction,
+    /// Share of a cell that is land, 1.
+    LandAreaFraction,
 }
 
 /// How a quantity is shown: `shown = stored * factor + offset`.
@@ -64,7 +68,7 @@ impl Display {
 
 impl Quantity {
     /// Every quantity.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 15] = [
         Self::CarbonFlux,
         Self::AccumulatedCarbon,
         Self::SeaSurfaceTemperature,
@@ -78,6 +82,8 @@ impl Quantity {
         Self::Precipitation,
         Self::Current,
         Self::Elevation,
+        Self::SeaAreaFraction,
+        Self::LandAreaFraction,
     ];
 
     /// Unit of stored values.
@@ -89,7 +95,9 @@ impl Quantity {
             Self::Chlorophyll => "kg m-3",
             Self::WindSpeed | Self::Current => "m s-1",
             Self::Pco2 | Self::AirPressure => "Pa",
-            Self::Salinity | Self::IceFraction => "1",
+            Self::Salinity | Self::IceFraction | Self::SeaAreaFraction | Self::LandAreaFraction => {
+                "1"
+            }
             Self::WaveHeight | Self::Elevation => "m",
         }
     }
@@ -105,7 +113,7 @@ impl Quantity {
             Self::Pco2 => ("µatm", 1.0 / 0.101_325, 0.0),
             Self::Salinity => ("", 1.0, 0.0),
             Self::AirPressure => ("hPa", 0.01, 0.0),
-            Self::IceFraction => ("%", 100.0, 0.0),
+            Self::IceFraction | Self::SeaAreaFraction | Self::LandAreaFraction => ("%", 100.0, 0.0),
             Self::WaveHeight | Self::Elevation => ("m", 1.0, 0.0),
             Self::Precipitation => ("mm d⁻¹", 86_400.0, 0.0),
         };
@@ -132,6 +140,8 @@ impl Quantity {
             Self::Precipitation => "Precipitation",
             Self::Current => "Current",
             Self::Elevation => "Elevation",
+            Self::SeaAreaFraction => "Share of sea",
+            Self::LandAreaFraction => "Share of land",
         }
     }
 
@@ -146,7 +156,7 @@ impl Quantity {
             Self::Pco2 => 0.0..=500.0,
             Self::Salinity => 0.0..=60.0,
             Self::AirPressure => 80_000.0..=110_000.0,
-            Self::IceFraction => 0.0..=1.0,
+            Self::IceFraction | Self::SeaAreaFraction | Self::LandAreaFraction => 0.0..=1.0,
             Self::WaveHeight => 0.0..=40.0,
             Self::Precipitation => 0.0..=0.1,
             Self::Current => -10.0..=10.0,

@@ -24,8 +24,8 @@ pub(crate) use look::{Look, RenderLegend};
 pub(crate) use observations::{MatchTime, Matchup, Observations, ObservationsAsked};
 pub(crate) use pictures::{BenchCompare, BenchQuality, BenchServe, RenderAnimation};
 pub(crate) use services::{
-    Bench, BenchStream, Executor, Ingestd, Notice, Rejected, RenderWorker, Scheduler, TileServer,
-    Topics,
+    Bench, BenchBudget, BenchStream, Executor, Ingestd, Notice, Rejected, RenderWorker, Scheduler,
+    TileServer, Topics,
 };
 pub(crate) use show::settings as shown_settings;
 pub(crate) use surroundings::Surroundings;
@@ -286,9 +286,13 @@ pub(crate) struct StatsPolygon {
     /// First instant after the period. The product's end if absent.
     #[arg(long)]
     pub(crate) to: Option<TimeMs>,
-    /// Figure of the earth for areas: wgs84 or sphere (R = 6371 km).
+    /// Figure of the earth for areas: wgs84, sphere (R = 6371 km) or local-radius (as FluxEngine sums).
     #[arg(long, default_value = "wgs84")]
     pub(crate) earth: Earth,
+    /// Product that says how much of every cell is sea or land (sea_area_fraction, land_area_fraction), on the same grid.
+    /// Natural Earth's land, 1:50 million, if absent.
+    #[arg(long, value_name = "PRODUCT")]
+    pub(crate) ocean: Option<ProductId>,
     /// JSON instead of a table.
     #[arg(long)]
     pub(crate) json: bool,
@@ -323,12 +327,16 @@ pub(crate) struct Budget {
     /// Rows of the answer.
     #[arg(long, value_enum, default_value = "total")]
     pub(crate) step: Step,
-    /// Figure of the earth for areas: wgs84 or sphere (R = 6371 km).
+    /// Figure of the earth for areas: wgs84, sphere (R = 6371 km) or local-radius (as FluxEngine sums).
     #[arg(long, default_value = "wgs84")]
     pub(crate) earth: Earth,
     /// How cells on the coast count: whole, or by their ocean-share.
     #[arg(long, default_value = "whole")]
     pub(crate) cells: Cells,
+    /// Product that says how much of every cell is sea or land (sea_area_fraction, land_area_fraction), on the same grid.
+    /// Natural Earth's land, 1:50 million, if absent.
+    #[arg(long, value_name = "PRODUCT")]
+    pub(crate) ocean: Option<ProductId>,
     /// JSON instead of a table.
     #[arg(long)]
     pub(crate) json: bool,
@@ -438,7 +446,7 @@ pub(crate) struct RenderGlobe {
 /// `fluxglobe generate`.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Generate {
-    /// Synthetic monthly CO2 flux of the China Sea, 2009: 1800 x 2460 cells of 1/60 degree, HDF5.
+    /// Synthetic CO2 flux of the China Sea, 2009, by months or days: 1800 x 2460 cells of 1/60 degree, HDF5.
     ChinaSea {
         /// Share of the full size along each side, 0.01 to 1.
         #[arg(long, default_value_t = 1.0)]
@@ -446,6 +454,9 @@ pub(crate) enum Generate {
         /// Another seed makes other weather.
         #[arg(long, default_value_t = 1)]
         seed: u64,
+        /// So many days from the start of 2009, 1 to 365, instead of its months.
+        #[arg(long, value_parser = clap::value_parser!(u16).range(1..=365))]
+        days: Option<u16>,
         /// File to write.
         #[arg(short, long, default_value = "china-sea-synthetic.h5")]
         output: PathBuf,

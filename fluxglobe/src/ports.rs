@@ -49,10 +49,21 @@ impl Drawer {
 
 /// Series of places from DataFusion in this process, those of regions and budgets from the cluster where there is one.
 pub(crate) struct Analyst {
-    pub(crate) local: Engine,
-    pub(crate) regions: Engine,
+    local: Engine,
+    regions: Engine,
     /// Our budgets beside published ones, if the demo compared them.
-    pub(crate) check: Option<Check>,
+    check: Option<Check>,
+}
+
+impl Analyst {
+    /// Whoever may ask over HTTP may think of any number of regions: nothing of them is stored.
+    pub(crate) fn new(local: Engine, regions: &Engine, check: Option<Check>) -> Self {
+        Self {
+            local,
+            regions: regions.storing_no_weights(),
+            check,
+        }
+    }
 }
 
 #[async_trait]
@@ -114,6 +125,7 @@ impl Analyse for Analyst {
             },
             earth: request.earth,
             cells: request.cells,
+            ocean: request.ocean.clone(),
         };
         let answer = compute::budget::budget_of(&self.regions, &query, &request.manifest)
             .await
@@ -136,6 +148,7 @@ impl Analyse for Analyst {
         Ok(BudgetAnswer {
             region_area_m2: answer.region_area_m2,
             ocean_area_m2: answer.ocean_area_m2,
+            ocean_source: answer.ocean_source,
             gap_basis: answer.gap_basis,
             notes: answer.notes,
             rows: answer.rows.into_iter().map(row).collect(),
@@ -150,6 +163,7 @@ impl Analyse for Analyst {
             from: Some(request.period.start),
             to: Some(request.period.end),
             earth: request.earth,
+            ocean: request.ocean.clone(),
         };
         let answer = region_series_of(&self.regions, &query, &request.manifest)
             .await
@@ -166,6 +180,7 @@ impl Analyse for Analyst {
         Ok(AreaSeries {
             region_area_m2: answer.region_area_m2,
             ocean_area_m2: answer.ocean_area_m2,
+            ocean_source: answer.ocean_source,
             notes: answer.notes,
             rows: answer.series.into_iter().map(row).collect(),
         })
@@ -239,4 +254,150 @@ fn render_failed(error: RenderError) -> BackendError {
         Class::Internal
     };
     BackendError::new(class, error.to_string()).because(error)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::num::NonZeroUsize;
+    use std::sync::Arc;
+
+    use contract::digest::Digest;
+    use contract::earth::Earth;
+    use contract::grid::Grid;
+    use contract::manifest::{MANIFEST_SCHEMA, Step};
+    use contract::product::ProductId;
+    use contract::quantity::Quantity;
+    use contract::region::Cells;
+    use storage::{Store, domain, frames, manifests};
+
+    use super::*;
+
+    const GRID: Grid = Grid {
+        rows: 36,
+        cols: 72,
+        north_deg: 90.0,
+        west_deg: -180.0,
+        dlat_deg: 5.0,
+        dlon_deg: 5.0,
+    };
+
+    async fn land(store: &Store, name: &str, quantity: Quantity, value: f32) -> Arc<Manifest> {
+        let product: ProductId = name.parse().unwrap();
+        let period = Period::month(2000, 1).unwrap();
+        let values = vec![value; GRID.cell_count()];
+        let frame = frames::write(store, &product, &GRID, &values, period).await;
+        let cells = vec![true; GRID.cell_count()];
+        let manifest = Manifest {
+            schema: MANIFEST_SCHEMA,
+            number: 1,
+            title: name.to_owned(),
+            quantity,
+            synthetic: true,
+            source: "made by a test".to_owned(),
+            grid: GRID,
+            steps: vec![Step {
+                masked: None,
+                period,
+                frame: frame.unwrap(),
+                raw_sha256: Digest::of(name.as_bytes()),
+                origin: "made".to_owned(),
+                valid_cells: GRID.cell_count() as u64,
+                contributed: None,
+            }],
+            domain: domain::write(store, &product, &cells).await.unwrap(),
+            series: vec![],
+            derived_from: None,
+            notices: vec![],
+            product,
+        };
+        manifests::commit(store, &manifest).await.unwrap();
+        Arc::new(manifest)
+    }
+
+    fn budget_of(manifest: &Arc<Manifest>, region: &str, cells: Cells) -> BudgetRequest {
+        BudgetRequest {
+            manifest: Arc::clone(manifest),
+            region: region.parse().unwrap(),
+            period: manifest.extent().unwrap(),
+            step: WantedStep::Total,
+            earth: Earth::Wgs84,
+            cells,
+            ocean: None,
+        }
+    }
+
+    #[tokio::test(flavor = "multi_thread")]
+    async fn whatever_is_asked_over_http_the_store_stays_as_it_is() {
+        let store = Store::memory();
+        let flux = land(&store, "flux", Quantity::CarbonFlux, 1e-9).await;
+        let land = land(&store, "mask", Quantity::LandAreaFraction, 0.25).await;
+        let regions = Engine::in_process(store.clone(), NonZeroUsize::MIN);
+        let analyst = Analyst::new(Engine::local(store.clone()), &regions, None);
+        let before = store.list("").await.unwrap();
+        for i in 1..20 {
+            let region = format!("{i},-{i},{}.5,{i}.5", i + 30);
+            let mut request = budget_of(&flux, &region, Cells::OceanShare);
+            analyst.budget(&request).await.unwrap();
+            request.ocean = Some(Arc::clone(&land));
+            analyst.budget(&request).await.unwrap();
+            let area = AreaRequest {
+                manifest: Arc::clone(&flux),
+                region: request.region,
+                period: request.period,
+                earth: Earth::Sphere,
+                ocean: request.ocean,
+            };
+            analyst.area(&area).await.unwrap();
+        }
+        assert_eq!(store.list("").await.unwrap(), before);
+    }
+
+    #[tokio::test(flavor = "multi_thread")]
+    async fn how_cells_count_and_what_is_sea_reach_the_sums() {
+        let store = Store::memory();
+        let flux = land(&store, "flux", Quantity::CarbonFlux, 1e-9).await;
+        let mask = land(&store, "mask", Quantity::LandAreaFraction, 0.25).await;
+        let regions = Engine::in_process(store.clone(), NonZeroUsize::MIN);
+        let analyst = Analyst::new(Engine::local(store), &regions, None);
+        // Half of South America.
+        let region = "-75,-30,-50,0";
+        let of = async |cells, ocean| {
+            let request = BudgetRequest {
+                ocean,
+                ..budget_of(&flux, region, cells)
+            };
+            analyst.budget(&request).await.unwrap()
+        };
+        let whole = of(Cells::Whole, None).await;
+        let share = of(Cells::OceanShare, None).await;
+        assert!(share.rows[0].budget_tg < 0.5 * whole.rows[0].budget_tg);
+        let masked = of(Cells::OceanShare, Some(Arc::clone(&mask))).await;
+        let ratio = masked.rows[0].budget_tg / whole.rows[0].budget_tg;
+        assert!((ratio - 0.75).abs() < 1e-9, "{ratio}");
+        assert!((masked.ocean_area_m2 / whole.region_area_m2 - 0.75).abs() < 1e-9);
+        assert!(
+            masked.ocean_source.starts_with("mask@1-"),
+            "{}",
+            masked.ocean_source
+        );
+        // The other way round: what is no mask is told, as the asker's fault.
+        let refused = BudgetRequest {
+            ocean: Some(Arc::clone(&flux)),
+            ..budget_of(&mask, region, Cells::Whole)
+        };
+        assert_eq!(
+            analyst.budget(&refused).await.unwrap_err().class,
+            Class::BadRequest
+        );
+        let refused = BudgetRequest {
+            ocean: Some(Arc::clone(&flux)),
+            ..budget_of(&flux, region, Cells::Whole)
+        };
+        let refused = analyst.budget(&refused).await.unwrap_err();
+        assert_eq!(refused.class, Class::BadRequest);
+        assert!(
+            refused.text.contains("flux cannot say what is sea"),
+            "{refused}"
+        );
+    }
 }

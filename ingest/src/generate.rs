@@ -1,7 +1,7 @@
 //! The generator of the synthetic China Sea product: a scale and a seed in, an HDF5 file out, the same bytes each time.
 //!
 //! It has the shape of the product in the paper this project continues (1800 x 2460 cells of 1/60 degree, 12 months of
-//! 2009), with a coast, clouds and seasons that look right on a globe. It is made up: every file says `synthetic = 1`.
+//! 2009, or days of it), with a coast, clouds and seasons that look right on a globe. It is made up: every file says `synthetic = 1`.
 
 mod coast;
 mod flux;
@@ -64,12 +64,45 @@ impl Shape {
     }
 }
 
+/// Steps of a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum GeneratedSteps {
+    /// The months of 2009.
+    Months,
+    /// So many days from the start of 2009, 1 to 365: the month's map, stronger and weaker over nine days.
+    Days(u16),
+}
+
+impl GeneratedSteps {
+    /// Days since the start of 2009 at which steps begin, and at which the last one ends.
+    fn edges(self) -> Vec<f64> {
+        match self {
+            Self::Months => (0..=12).map(writer::first_day).collect(),
+            Self::Days(count) => (0..=count).map(f64::from).collect(),
+        }
+    }
+
+    /// The month that a step lies in, and by how much its flux is multiplied.
+    fn month_and_strength(self, step: usize) -> (usize, f32) {
+        match self {
+            Self::Months => (step, 1.0),
+            Self::Days(_) => {
+                let is_begun = |month: &usize| writer::first_day(*month) <= step as f64;
+                let month = (0..12).rev().find(is_begun).unwrap_or(0);
+                let phase = step as f64 / 9.0 * std::f64::consts::TAU;
+                (month, (1.0 + 0.25 * phase.sin()) as f32)
+            }
+        }
+    }
+}
+
 /// Writes the synthetic China Sea product. `scale` is 1 for 1800 x 2460 cells, 0.1 for 180 x 246; `progress` is told
-/// months done and months in all.
+/// steps done and steps in all.
 pub fn generate_china_sea(
     path: &Path,
     scale: f64,
     seed: u64,
+    steps: GeneratedSteps,
     progress: &dyn Fn(usize, usize),
 ) -> Result<(), IngestError> {
     let failed = |detail: String| IngestError::Generate {
@@ -85,13 +118,33 @@ pub fn generate_china_sea(
         .collect();
     // A reader never sees half a file.
     let part = path.with_extension("part");
-    let written = writer::write(&part, shape, seed, |month| {
-        progress(month, 12);
-        month_values(shape, &is_sea, month, noise)
+    let edges = steps.edges();
+    let step_count = edges.len() - 1;
+    if !(1..=365).contains(&step_count) {
+        return Err(failed(format!("{step_count} days are not 1 to 365")));
+    }
+    let mut last: Option<(usize, Vec<f32>)> = None;
+    let written = writer::write(&part, shape, seed, &edges, |step| {
+        progress(step, step_count);
+        let (month, strength) = steps.month_and_strength(step);
+        let map = match last.take() {
+            Some((own, map)) if own == month => map,
+            _ => month_values(shape, &is_sea, month, noise),
+        };
+        let stronger = |value: &f32| {
+            if *value == FILL {
+                FILL
+            } else {
+                value * strength
+            }
+        };
+        let values = map.iter().map(stronger).collect();
+        last = Some((month, map));
+        values
     });
     written.map_err(|e| failed(e.to_string()))?;
     std::fs::rename(&part, path).map_err(|e| failed(e.to_string()))?;
-    progress(12, 12);
+    progress(step_count, step_count);
     Ok(())
 }
 
@@ -136,7 +189,8 @@ mod tests {
     fn bytes(scale: f64, seed: u64) -> Vec<u8> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("china-sea.nc");
-        generate_china_sea(&path, scale, seed, &|_, _| {}).unwrap();
+        let months = GeneratedSteps::Months;
+        generate_china_sea(&path, scale, seed, months, &|_, _| {}).unwrap();
         std::fs::read(path).unwrap()
     }
 
@@ -146,6 +200,24 @@ mod tests {
         std::thread::sleep(std::time::Duration::from_millis(1100)); // past a second, in case a time stamp were written
         assert!(first == bytes(0.02, 1));
         assert!(first != bytes(0.02, 2));
+    }
+
+    #[test]
+    fn days_lie_in_their_months() {
+        let days = GeneratedSteps::Days(365);
+        assert_eq!(days.edges().len(), 366);
+        for (day, month) in [(0, 0), (30, 0), (31, 1), (58, 1), (59, 2), (364, 11)] {
+            assert_eq!(days.month_and_strength(day).0, month, "{day}");
+        }
+        assert_eq!(GeneratedSteps::Months.month_and_strength(7), (7, 1.0));
+        assert_eq!(
+            GeneratedSteps::Months.edges()[12].to_bits(),
+            365.0f64.to_bits()
+        );
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("none.nc");
+        let none = generate_china_sea(&path, 0.02, 1, GeneratedSteps::Days(0), &|_, _| {});
+        assert!(none.unwrap_err().to_string().contains("0 days"));
     }
 
     #[test]

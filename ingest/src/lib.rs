@@ -48,7 +48,7 @@ mod unit;
 pub use error::IngestError;
 pub use fetch::{AllowedHost, Patience, Sources};
 pub use gc::{LandingNotes, Readings};
-pub use generate::generate_china_sea;
+pub use generate::{GeneratedSteps, generate_china_sea};
 pub use ingestd::{IngestService, ServiceSettings};
 pub use land::{Batch, land_files};
 pub use metrics::Metrics;

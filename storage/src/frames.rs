@@ -24,7 +24,7 @@ use contract::time::{Period, TimeMs};
 
 use crate::parquet_table::{self, Table};
 use crate::row_check::RowCheck;
-use crate::sound::{damage, off_thread};
+use crate::sound::{self, damage, off_thread};
 use crate::values::{ValuesDigest, no_data_alike};
 use crate::{Encoded, StorageError, Store};
 
@@ -210,6 +210,12 @@ pub async fn read(store: &Store, key: &ObjectKey, grid: &Grid) -> Result<Vec<f32
     read_with_period(store, key, grid)
         .await
         .map(|(values, _period)| values)
+}
+
+/// The same of bytes that somebody else read from under its key.
+pub fn of_bytes(key: &ObjectKey, content: Bytes, grid: &Grid) -> Result<Vec<f32>, StorageError> {
+    sound::of_bytes(key, &content)?;
+    decode(key, content, Some(grid)).map(|(values, _period)| values)
 }
 
 async fn read_with_period(

@@ -13,7 +13,8 @@ folder=$cache/fluxengine-4.2.1
 # What the demo fetched is the same file.
 demo=$HOME/.cache/fluxglobe/demo/$wheel
 
-if ! [ -d "$folder" ]; then
+# What an earlier fetch left out is fetched with all else.
+if ! [ -f "$folder/fluxengine/data/onedeg_land.nc" ]; then
     mkdir -p "$cache"
     if ! [ -f "$cache/$wheel" ]; then
         if [ -f "$demo" ]; then
@@ -35,12 +36,15 @@ if ! [ -d "$folder" ]; then
 import pathlib, sys, zipfile
 
 # Only plain files of data below these two; names are checked by zipfile, which keeps them inside the folder.
-wanted = ("fluxengine/data/verification_data/", "fluxengine/tutorials/")
+wanted = ("fluxengine/data/", "fluxengine/tutorials/")
 with zipfile.ZipFile(sys.argv[1]) as wheel:
     names = [name for name in wheel.namelist() if name.startswith(wanted) and not name.endswith(".py")]
     wheel.extractall(pathlib.Path(sys.argv[2]), names)
 END
+    rm -rf "$folder.old"
+    if [ -d "$folder" ]; then mv "$folder" "$folder.old"; fi
     mv "$folder.part" "$folder"
+    rm -rf "$folder.old"
     rm "$cache/$wheel"
 fi
 echo "$folder/fluxengine/data/verification_data"

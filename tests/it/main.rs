@@ -11,3 +11,4 @@ mod dependencies;
 mod end_to_end;
 mod harness_self;
 mod reread;
+mod sea;

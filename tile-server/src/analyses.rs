@@ -74,6 +74,7 @@ impl Analyses {
             request.period,
             request.step,
             (request.earth, request.cells),
+            request.ocean.as_ref().map(|ocean| ocean.id()),
         ));
         if let Some(answer) = self.budgets.get(&key) {
             return Ok(answer);
@@ -101,7 +102,8 @@ impl Analyses {
         layer: &Layer,
         request: AreaRequest,
     ) -> Result<Arc<AreaSeries>, ServerError> {
-        let asked = (&request.region, request.period, request.earth);
+        let ocean = request.ocean.as_ref().map(|ocean| ocean.id());
+        let asked = (&request.region, request.period, request.earth, ocean);
         let key = Digest::of_json(&("area", &layer.id, asked));
         if let Some(series) = self.areas.get(&key) {
             return Ok(series);

@@ -248,6 +248,8 @@ pub struct BudgetRequest {
     pub earth: Earth,
     /// How cells on the coast count.
     pub cells: Cells,
+    /// A manifest that says how much of every cell is sea or land; Natural Earth if none.
+    pub ocean: Option<Arc<Manifest>>,
 }
 
 /// A budget.
@@ -257,6 +259,8 @@ pub struct BudgetAnswer {
     pub region_area_m2: f64,
     /// Area of the sea in it, m².
     pub ocean_area_m2: f64,
+    /// What says which part of a cell is sea.
+    pub ocean_source: String,
     /// What estimates of gaps are made of.
     pub gap_basis: String,
     /// How the region was taken where that may surprise.
@@ -297,6 +301,8 @@ pub struct AreaRequest {
     pub period: Period,
     /// Figure of the earth for cell areas.
     pub earth: Earth,
+    /// A manifest that says how much of every cell is sea or land; Natural Earth if none.
+    pub ocean: Option<Arc<Manifest>>,
 }
 
 /// A series over a region.
@@ -306,6 +312,8 @@ pub struct AreaSeries {
     pub region_area_m2: f64,
     /// Area of the sea in it, m².
     pub ocean_area_m2: f64,
+    /// What says which part of a cell is sea.
+    pub ocean_source: String,
     /// How the region was taken where that may surprise.
     pub notes: Vec<String>,
     /// Rows in the order of time.

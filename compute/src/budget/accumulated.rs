@@ -7,8 +7,10 @@ use contract::time::TimeMs;
 use serde::{Deserialize, Serialize};
 use storage::{Store, contributed, manifests};
 
+use super::over_region::weights;
 use super::query::{BudgetAnswer, BudgetQuery, budget_of as budget_of_flux, steps_inside};
-use crate::region::weights;
+use crate::region::address::weights_failed;
+use crate::region::loaded::RegionWeights;
 use crate::{ComputeError, Engine};
 
 /// How complete a row of accumulated carbon is: a cell with one month of twelve is not a complete one.
@@ -52,9 +54,10 @@ pub(super) async fn budget_of(
     answer.product = manifest.product.clone();
     answer.manifest = manifest.id();
     answer.title.clone_from(&manifest.title);
-    let key = weights::key(&manifest.grid, &query.region, query.earth);
+    let address = weights(engine, manifest, query.area()).await?.all;
+    let areas = engine.objects().weights(&address).await;
+    let areas = areas.map_err(weights_failed)?;
     let mut counted = Counted::new(engine.store(), manifest);
-    let areas = storage::weights::read(engine.store(), &key).await?;
     for row in &mut answer.rows {
         let (start, end) = (
             counted.until(row.start).await?,
@@ -76,14 +79,14 @@ pub(super) async fn budget_of(
 /// Areas of cells by whether `with_data_ms` (`[row, col]`) is all of a time, some or nothing.
 fn completeness(
     manifest: &Manifest,
-    areas: &[(u32, Vec<f64>)],
+    areas: &RegionWeights,
     with_data_ms: &[i64],
     all_ms: i64,
 ) -> Completeness {
     let windows = frame_chunks(&manifest.grid);
     let (mut complete_m2, mut incomplete_m2) = (0.0, 0.0);
-    for (chunk, areas) in areas {
-        let cells = windows[*chunk as usize].cell_indices(&manifest.grid);
+    for (chunk, areas) in areas.chunks() {
+        let cells = windows[chunk as usize].cell_indices(&manifest.grid);
         for (cell, area_m2) in cells.zip(areas) {
             match with_data_ms[cell] {
                 0 => {}

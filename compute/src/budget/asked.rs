@@ -15,7 +15,7 @@ use datafusion::arrow::datatypes::{DataType, Decimal128Type, Int64Type, Timestam
 use super::bands::{BAND_COUNT, band_areas, summed_bands};
 use super::rows::StepSum;
 use super::sums::Measure;
-use crate::region::weights::RegionKeys;
+use crate::region::address::{RegionAddress, weights_failed};
 use crate::scan::{self, Layout};
 use crate::session::QueryContext;
 use crate::{ComputeError, Engine};
@@ -44,13 +44,12 @@ const STEP_SUMS: &str = "
 /// A region on a grid, its weights read.
 pub(super) struct AskedRegion {
     grid: Grid,
-    weights: RegionKeys,
-    /// Addresses of the weights.
-    all: String,
-    ocean: String,
+    weights: RegionAddress,
     /// Chunks that the region touches.
     runs: Vec<(u32, u32)>,
     chunk_count: usize,
+    /// Area of the region on the grid, m².
+    pub(super) on_grid_m2: f64,
     /// Area of its sea in every band, m² in steps of 10⁻⁶.
     pub(super) sea_steps: [i128; BAND_COUNT],
 }
@@ -60,22 +59,21 @@ impl AskedRegion {
     pub(super) async fn read(
         engine: &Engine,
         grid: &Grid,
-        weights: &RegionKeys,
+        weights: &RegionAddress,
     ) -> Result<Self, ComputeError> {
-        let address = |key| engine.store().sql_url(key).to_string();
-        let (all, ocean) = (address(&weights.all), address(&weights.ocean));
-        let failed = || ComputeError::engine("reading a region's weights");
-        let whole = engine.objects().weights(&all).await.map_err(failed())?;
-        let sea = engine.objects().weights(&ocean).await.map_err(failed())?;
+        let weighed = async |address: &str| {
+            let weights = engine.objects().weights(address).await;
+            weights.map_err(weights_failed)
+        };
+        let (whole, sea) = (weighed(&weights.all).await?, weighed(&weights.ocean).await?);
         let sea_steps = band_areas(grid, sea.chunks())
-            .map_err(|e| ComputeError::inconsistent(weights.ocean.as_str(), e))?;
+            .map_err(|e| ComputeError::inconsistent(weights.keys.ocean.as_str(), e))?;
         Ok(Self {
             grid: *grid,
             weights: weights.clone(),
-            all,
-            ocean,
             runs: whole.runs(),
             chunk_count: whole.chunk_count(),
+            on_grid_m2: whole.chunks().flat_map(|(_, areas_m2)| areas_m2).sum(),
             sea_steps,
         })
     }
@@ -96,8 +94,8 @@ fn sql(measure: Measure, region: &AskedRegion) -> String {
     STEP_SUMS
         .replace("$seconds", seconds)
         .replace("$chunks", &chunks.join(" OR "))
-        .replace("$weights", &quoted(&region.all))
-        .replace("$ocean", &quoted(&region.ocean))
+        .replace("$weights", &quoted(&region.weights.all))
+        .replace("$ocean", &quoted(&region.weights.ocean))
         .replace("$grid", &quoted(&grid))
 }
 
@@ -109,14 +107,15 @@ pub(super) async fn asked(
     measure: Measure,
 ) -> Result<Vec<StepSum>, ComputeError> {
     let frames: Vec<&ObjectKey> = steps.iter().map(|step| &step.frame).collect();
-    let job = Digest::of_json(&("sums", measure, &frames, &region.weights));
+    let keys = &region.weights.keys;
+    let job = Digest::of_json(&("sums", measure, &frames, keys));
     let ask = |context| ask(engine, context, &frames, region, measure);
     let answered = async {
         let answer = engine.answer(job, ask).await?;
         in_order(steps, &answer)
     };
     let mut read = frames.clone();
-    read.extend([&region.weights.all, &region.weights.ocean]);
+    read.extend([&keys.all, &keys.ocean]);
     scan::or_damaged(
         engine.store(),
         &read,

@@ -1,5 +1,7 @@
 //! A budget: a region's weights, exact sums of every step, calendar rows.
 
+use std::sync::Arc;
+
 use contract::earth::Earth;
 use contract::manifest::{Manifest, ManifestId, Step};
 use contract::product::ProductId;
@@ -10,10 +12,9 @@ use serde::{Deserialize, Serialize};
 
 use super::accumulated;
 use super::gaps::BASIS;
+use super::over_region::{AskedArea, over_region};
 use super::rows::{Asked, BudgetRow, BudgetStep, row_periods, rows};
-use super::sums::{self, Measure};
-use crate::region::extent::{Extent, extent};
-use crate::region::weights::RegionKeys;
+use super::sums::Measure;
 use crate::{ComputeError, Engine, catalog};
 
 /// What a budget is asked for.
@@ -35,6 +36,18 @@ pub struct BudgetQuery {
     pub earth: Earth,
     /// How cells on the coast count.
     pub cells: Cells,
+    /// A version of a product on the same grid that says how much of every cell is sea or land; Natural Earth if absent.
+    pub ocean: Option<Arc<Manifest>>,
+}
+
+impl BudgetQuery {
+    pub(super) fn area(&self) -> AskedArea<'_> {
+        AskedArea {
+            region: &self.region,
+            earth: self.earth,
+            ocean: self.ocean.as_deref(),
+        }
+    }
 }
 
 /// A budget with all that is needed to cite it.
@@ -56,6 +69,9 @@ pub struct BudgetAnswer {
     pub earth: Earth,
     /// How cells on the coast count.
     pub cells: Cells,
+    /// What says which part of a cell is sea.
+    #[serde(default)]
+    pub ocean_source: String,
     /// Unit of `budget_tg` and `gap_tg`.
     pub unit: String,
     /// Area of the region, land included, m².
@@ -92,14 +108,8 @@ pub async fn budget_of(
         });
     }
     let (window, steps) = steps_inside(manifest, query.from, query.to)?;
-    let extent = extent_of(&query.region, query.earth).await?;
-    let weights =
-        RegionKeys::stored(engine.store(), &manifest.grid, &query.region, query.earth).await?;
-    let Some(weights) = weights else {
-        let (product, bounds) = (manifest.product.clone(), catalog::bounds_text(manifest));
-        return Err(ComputeError::RegionOutside { product, bounds });
-    };
-    let sums = sums::of_steps(engine, manifest, &steps, &weights, Measure::Mass).await?;
+    let over = over_region(engine, manifest, &steps, query.area(), Measure::Mass).await?;
+    let (sums, extent) = (over.sums, over.extent);
     let asked = Asked {
         region_area_m2: extent.area_m2,
         ocean_area_m2: extent.ocean_m2,
@@ -118,6 +128,7 @@ pub async fn budget_of(
         region: query.region_name.clone(),
         earth: query.earth,
         cells: query.cells,
+        ocean_source: over.ocean_source,
         unit: "Tg C".to_owned(),
         region_area_m2: extent.area_m2,
         ocean_area_m2: extent.ocean_m2,
@@ -125,14 +136,6 @@ pub async fn budget_of(
         notes: extent.notes,
         rows,
     })
-}
-
-/// The extent of a region: overlaid with all land, which takes a while.
-pub(crate) async fn extent_of(region: &Region, earth: Earth) -> Result<Extent, ComputeError> {
-    let region = region.clone();
-    tokio::task::spawn_blocking(move || extent(&region, earth))
-        .await
-        .map_err(|e| ComputeError::inconsistent("region", e))?
 }
 
 /// The asked period and the steps that reach into it.

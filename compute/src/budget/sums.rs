@@ -13,6 +13,7 @@ use storage::{StorageError, Store, document, manifests};
 use super::asked::{AskedRegion, asked};
 use super::bands::{BAND_COUNT, BandSum};
 use super::rows::StepSum;
+use crate::region::address::RegionAddress;
 use crate::region::weights::RegionKeys;
 use crate::{ComputeError, Engine};
 
@@ -88,6 +89,8 @@ pub(crate) struct RegionSums {
     pub(crate) steps: Vec<StepSum>,
     /// Area of all sea of the region on the grid in every band, m² in steps of 10⁻⁶.
     pub(crate) sea_steps: [i128; BAND_COUNT],
+    /// Area of the region on the grid, m².
+    pub(crate) on_grid_m2: f64,
 }
 
 impl Row {
@@ -130,11 +133,11 @@ pub(crate) async fn of_steps(
     engine: &Engine,
     manifest: &Manifest,
     steps: &[&Step],
-    weights: &RegionKeys,
+    weights: &RegionAddress,
     measure: Measure,
 ) -> Result<RegionSums, ComputeError> {
     let region = AskedRegion::read(engine, &manifest.grid, weights).await?;
-    let key = key(&manifest.id(), weights, measure);
+    let key = key(&manifest.id(), &weights.keys, measure);
     let stored = stored_rows(engine.store(), &key).await?.rows();
     let known: Option<Vec<StepSum>> = steps
         .iter()
@@ -146,6 +149,7 @@ pub(crate) async fn of_steps(
             None => asked(engine, steps, &region, measure).await?,
         },
         sea_steps: region.sea_steps,
+        on_grid_m2: region.on_grid_m2,
     })
 }
 
@@ -178,7 +182,8 @@ pub async fn store(
         .collect();
     let computed_count = unknown.len();
     if computed_count > 0 {
-        let region = AskedRegion::read(engine, &manifest.grid, weights).await?;
+        let stored = RegionAddress::stored(store, weights.clone());
+        let region = AskedRegion::read(engine, &manifest.grid, &stored).await?;
         let sums = asked(engine, &unknown, &region, measure).await?;
         known.extend(unknown.iter().zip(sums).map(|(step, sum)| {
             let row = row_of(&step.frame, &sum);
@@ -208,7 +213,8 @@ pub(crate) async fn verify(
     measure: Measure,
 ) -> Result<(), ComputeError> {
     let steps: Vec<&Step> = manifest.steps.iter().collect();
-    let region = AskedRegion::read(engine, &manifest.grid, weights).await?;
+    let stored = RegionAddress::stored(engine.store(), weights.clone());
+    let region = AskedRegion::read(engine, &manifest.grid, &stored).await?;
     let sums = asked(engine, &steps, &region, measure).await?;
     let rows = steps
         .iter()

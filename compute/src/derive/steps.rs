@@ -74,7 +74,7 @@ pub(super) async fn accumulate_segment(
         }
         segment.finish()
     };
-    let answered = engine.answer(job, columns).await;
+    let answered = scan::caught(Box::pin(engine.answer(job, columns))).await;
     scan::or_damaged(engine.store(), &frames_of(run), answered).await
 }
 
@@ -104,7 +104,7 @@ pub(super) async fn sums_after(
         }
         all_chunks(taken, windows.len()).map(|()| sums)
     };
-    let answered = engine.answer(job, sums).await;
+    let answered = scan::caught(Box::pin(engine.answer(job, sums))).await;
     scan::or_damaged(engine.store(), &frames_of(run), answered).await
 }
 

@@ -24,27 +24,41 @@ pub struct Extent {
     pub notes: Vec<String>,
 }
 
-/// The extent of a region.
+/// The extent of a region; its sea is what is no land of Natural Earth.
 pub fn extent(region: &Region, earth: Earth) -> Result<Extent, ComputeError> {
-    let area_m2 = region_area_m2(region, earth)?;
-    let of_sea: f64 = sea(&rings(region)?)
+    let of_sea = sea(&rings(region)?)
         .iter()
         .map(|ring| signed_area_m2(ring, earth))
         .sum();
+    Ok(outline(region, earth)?.with_ocean(of_sea))
+}
+
+/// The extent of a region without its sea.
+pub(crate) fn outline(region: &Region, earth: Earth) -> Result<Extent, ComputeError> {
+    let area_m2 = region_area_m2(region, earth)?;
     let mut notes = vec![];
     if let Region::Polygons(polygons) = region {
         notes.extend(wide_edge(polygons));
         notes.extend(overlap(polygons, area_m2, earth));
     }
-    let ocean_m2 = of_sea.clamp(0.0, area_m2);
-    if ocean_m2 == 0.0 {
-        notes.push("no sea lies in the region: it has no coverage, and no gaps".to_owned());
-    }
     Ok(Extent {
         area_m2,
-        ocean_m2,
+        ocean_m2: 0.0,
         notes,
     })
+}
+
+impl Extent {
+    /// The same with so much sea in it.
+    pub(crate) fn with_ocean(mut self, ocean_m2: f64) -> Self {
+        // Both areas are rounded apart.
+        self.ocean_m2 = ocean_m2.clamp(0.0, self.area_m2);
+        if self.ocean_m2 == 0.0 {
+            let none = "no sea lies in the region: it has no coverage, and no gaps";
+            self.notes.push(none.to_owned());
+        }
+        self
+    }
 }
 
 /// The widest edge, if it is so wide that it may have been meant to cross the date line.

@@ -9,10 +9,12 @@ use contract::region::Region;
 use serde::{Deserialize, Serialize};
 use storage::{StorageError, Store};
 
+use super::address::OnGrid;
 use super::box_cover::{self, Bounds};
 use super::polygon_cover::Band;
 use super::rings::{Ring, rings};
 use super::sea::sea;
+use super::shares::Shares;
 use crate::ComputeError;
 
 /// Version of the way weights of boxes are computed: it changes when their bits do.
@@ -21,13 +23,25 @@ const BOX_METHOD: u32 = 1;
 const POLYGON_METHOD: u32 = 2;
 
 /// What of a region is weighed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Surface {
     /// All of it.
     All,
-    /// The sea in it.
+    /// The sea in it: what is no land of Natural Earth.
     Ocean,
+    /// The sea in it by the shares of cells that a product says.
+    Shares(Shares),
+}
+
+impl Surface {
+    /// The shares it takes from a product.
+    pub(crate) fn shares(&self) -> Option<&Shares> {
+        match self {
+            Self::Shares(shares) => Some(shares),
+            Self::All | Self::Ocean => None,
+        }
+    }
 }
 
 /// Where the weights of a region on a grid are, whether they are there or not.
@@ -42,9 +56,19 @@ pub struct RegionKeys {
 impl RegionKeys {
     /// Those of a region on a grid.
     pub fn new(grid: &Grid, region: &Region, earth: Earth) -> Self {
+        Self::of(OnGrid {
+            grid,
+            region,
+            earth,
+            ocean: &Surface::Ocean,
+        })
+    }
+
+    pub(crate) fn of(asked: OnGrid<'_>) -> Self {
+        let key = |surface| key_of(asked.grid, asked.region, asked.earth, surface);
         Self {
-            all: key(grid, region, earth),
-            ocean: key_of(grid, region, earth, Surface::Ocean),
+            all: key(&Surface::All),
+            ocean: key(asked.ocean),
         }
     }
 
@@ -55,11 +79,26 @@ impl RegionKeys {
         region: &Region,
         earth: Earth,
     ) -> Result<Option<Self>, ComputeError> {
+        let ocean = &Surface::Ocean;
+        let asked = OnGrid {
+            grid,
+            region,
+            earth,
+            ocean,
+        };
+        Self::stored_of(store, asked).await
+    }
+
+    pub(crate) async fn stored_of(
+        store: &Store,
+        asked: OnGrid<'_>,
+    ) -> Result<Option<Self>, ComputeError> {
+        let (grid, region, earth) = (asked.grid, asked.region, asked.earth);
         if stored(store, grid, region, earth).await?.is_none() {
             return Ok(None);
         }
-        let ocean = stored_of(store, grid, region, earth, Surface::Ocean).await?;
-        Ok(ocean.map(|_there| Self::new(grid, region, earth)))
+        let ocean = stored_of(store, grid, region, earth, asked.ocean).await?;
+        Ok(ocean.map(|_there| Self::of(asked)))
     }
 }
 
@@ -72,7 +111,7 @@ struct Job<'a> {
     region: &'a Region,
     earth: Earth,
     #[serde(skip_serializing_if = "Option::is_none")]
-    surface: Option<Surface>,
+    surface: Option<&'a Surface>,
 }
 
 /// Areas of a region's share of every cell, m², by chunk number; only chunks with any area.
@@ -81,18 +120,28 @@ pub fn compute(
     region: &Region,
     earth: Earth,
 ) -> Result<Vec<(u32, Vec<f64>)>, ComputeError> {
-    compute_of(grid, region, earth, Surface::All)
+    compute_of(grid, region, earth, &Surface::All, None)
 }
 
-/// The same of a surface.
+/// The same of a surface; `shares` is the frame `[row, col]` that it takes its shares from, where it does.
 pub fn compute_of(
     grid: &Grid,
     region: &Region,
     earth: Earth,
-    surface: Surface,
+    surface: &Surface,
+    shares: Option<&[f32]>,
 ) -> Result<Vec<(u32, Vec<f64>)>, ComputeError> {
+    if let Surface::Shares(own) = surface {
+        let values = shares.filter(|values| values.len() == grid.cell_count());
+        let values = values.ok_or_else(|| {
+            ComputeError::inconsistent(own.frame.as_str(), "it was not read, or is of another grid")
+        })?;
+        let mut chunks = own.weigh(grid, compute(grid, region, earth)?, values)?;
+        chunks.retain(any_area);
+        return Ok(chunks);
+    }
     let bounds = match region {
-        _ if surface == Surface::Ocean => {
+        _ if *surface == Surface::Ocean => {
             return ring_chunks(grid, &sea(&rings(region)?), earth);
         }
         Region::Polygons(_) => return ring_chunks(grid, &rings(region)?, earth),
@@ -144,12 +193,12 @@ fn ring_chunks(
 
 /// Where weights are stored, whether they are there or not.
 pub fn key(grid: &Grid, region: &Region, earth: Earth) -> ObjectKey {
-    key_of(grid, region, earth, Surface::All)
+    key_of(grid, region, earth, &Surface::All)
 }
 
 /// The same of a surface.
-pub fn key_of(grid: &Grid, region: &Region, earth: Earth, surface: Surface) -> ObjectKey {
-    let is_polygonal = surface == Surface::Ocean || matches!(region, Region::Polygons(_));
+pub fn key_of(grid: &Grid, region: &Region, earth: Earth, surface: &Surface) -> ObjectKey {
+    let is_polygonal = *surface == Surface::Ocean || matches!(region, Region::Polygons(_));
     ObjectKey::weights(&Digest::of_json(&Job {
         method: if is_polygonal {
             POLYGON_METHOD
@@ -161,7 +210,7 @@ pub fn key_of(grid: &Grid, region: &Region, earth: Earth, surface: Surface) -> O
         region,
         earth,
         // Left out for whole regions, whose keys are older than this.
-        surface: (surface != Surface::All).then_some(surface),
+        surface: (*surface != Surface::All).then_some(surface),
     }))
 }
 
@@ -173,7 +222,7 @@ pub async fn stored(
     region: &Region,
     earth: Earth,
 ) -> Result<Option<ObjectKey>, ComputeError> {
-    stored_of(store, grid, region, earth, Surface::All).await
+    stored_of(store, grid, region, earth, &Surface::All).await
 }
 
 /// The same of a surface. Of the sea they are stored also where the region on the grid is all land, and hold no chunk.
@@ -182,7 +231,7 @@ pub async fn stored_of(
     grid: &Grid,
     region: &Region,
     earth: Earth,
-    surface: Surface,
+    surface: &Surface,
 ) -> Result<Option<ObjectKey>, ComputeError> {
     let key = key_of(grid, region, earth, surface);
     let is_damaged = match storage::weights::check(store, &key).await {
@@ -194,11 +243,16 @@ pub async fn stored_of(
         }
         Err(e) => return Err(e.into()),
     };
-    let (grid, region) = (*grid, region.clone());
-    let chunks = tokio::task::spawn_blocking(move || compute_of(&grid, &region, earth, surface))
+    let values = match surface.shares() {
+        Some(shares) => Some(storage::frames::read(store, &shares.frame, grid).await?),
+        None => None,
+    };
+    let (grid, region, own) = (*grid, region.clone(), surface.clone());
+    let cover = move || compute_of(&grid, &region, earth, &own, values.as_deref());
+    let chunks = tokio::task::spawn_blocking(cover)
         .await
         .map_err(|e| ComputeError::inconsistent("weights", e))??;
-    if chunks.is_empty() && surface == Surface::All {
+    if chunks.is_empty() && *surface == Surface::All {
         return Ok(None);
     }
     if is_damaged {

@@ -1,5 +1,7 @@
 //! The series of a product over a region: its mean over the cells that hold data, by area, for every step.
 
+use std::sync::Arc;
+
 use contract::earth::Earth;
 use contract::manifest::{Manifest, ManifestId};
 use contract::product::ProductId;
@@ -8,10 +10,10 @@ use contract::time::TimeMs;
 use serde::{Deserialize, Serialize};
 
 use crate::budget::fixed::{AREA_DECIMALS, MASS_DECIMALS};
+use crate::budget::over_region::{AskedArea, over_region};
 use crate::budget::rows::{StepSum, coverage_percent};
-use crate::budget::sums::{self, Measure};
-use crate::budget::{extent_of, steps_inside};
-use crate::region::weights::RegionKeys;
+use crate::budget::steps_inside;
+use crate::budget::sums::Measure;
 use crate::{ComputeError, Engine, catalog};
 
 /// What a series over a region is asked for.
@@ -29,6 +31,8 @@ pub struct RegionSeriesQuery {
     pub to: Option<TimeMs>,
     /// Figure of the earth.
     pub earth: Earth,
+    /// A version of a product on the same grid that says how much of every cell is sea or land; Natural Earth if absent.
+    pub ocean: Option<Arc<Manifest>>,
 }
 
 /// One step of a series.
@@ -69,6 +73,9 @@ pub struct RegionSeries {
     pub region_area_m2: f64,
     /// Area of the sea in it, m².
     pub ocean_area_m2: f64,
+    /// What says which part of a cell is sea.
+    #[serde(default)]
+    pub ocean_source: String,
     /// How the region was taken where that may surprise.
     pub notes: Vec<String>,
     /// Figure of the earth.
@@ -93,14 +100,13 @@ pub async fn region_series_of(
     manifest: &Manifest,
 ) -> Result<RegionSeries, ComputeError> {
     let (_window, steps) = steps_inside(manifest, query.from, query.to)?;
-    let extent = extent_of(&query.region, query.earth).await?;
-    let weights =
-        RegionKeys::stored(engine.store(), &manifest.grid, &query.region, query.earth).await?;
-    let Some(weights) = weights else {
-        let (product, bounds) = (manifest.product.clone(), catalog::bounds_text(manifest));
-        return Err(ComputeError::RegionOutside { product, bounds });
+    let area = AskedArea {
+        region: &query.region,
+        earth: query.earth,
+        ocean: query.ocean.as_deref(),
     };
-    let sums = sums::of_steps(engine, manifest, &steps, &weights, Measure::Mean).await?;
+    let over = over_region(engine, manifest, &steps, area, Measure::Mean).await?;
+    let (sums, extent) = (over.sums, over.extent);
     let display = manifest.quantity.display();
     let value = |sum: &StepSum| {
         let (mean, area_m2) = mean_and_area(sum);
@@ -124,6 +130,7 @@ pub async fn region_series_of(
         region: query.region_name.clone(),
         region_area_m2: extent.area_m2,
         ocean_area_m2: extent.ocean_m2,
+        ocean_source: over.ocean_source,
         notes: extent.notes,
         earth: query.earth,
         series,

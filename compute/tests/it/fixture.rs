@@ -141,6 +141,7 @@ pub(crate) fn total(id: &ProductId, region: &str) -> BudgetQuery {
         step: BudgetStep::Total,
         earth: Earth::Wgs84,
         cells: Cells::Whole,
+        ocean: None,
     }
 }
 

@@ -13,11 +13,15 @@ mod damaged;
 #[cfg(test)]
 mod fixture;
 #[cfg(test)]
+mod fluxengine;
+#[cfg(test)]
 mod frozen;
 #[cfg(test)]
 mod incremental;
 #[cfg(test)]
 mod node;
+#[cfg(test)]
+mod ocean;
 #[cfg(test)]
 mod parallel;
 #[cfg(test)]
@@ -28,6 +32,8 @@ mod reading;
 mod recomputed;
 #[cfg(test)]
 mod regions;
+#[cfg(test)]
+mod strangers;
 #[cfg(test)]
 mod takahashi;
 #[cfg(test)]

@@ -177,6 +177,7 @@ async fn a_mean_over_a_region_is_the_mean_by_area() {
         from: None,
         to: None,
         earth: Earth::Sphere,
+        ocean: None,
     };
     let answer = region_series(&Engine::local(store), &query).await.unwrap();
     let strip = |south: f64, north: f64| north.to_radians().sin() - south.to_radians().sin();

@@ -1,5 +1,6 @@
 //! `fluxglobe bench`: figures measured, never asserted.
 
+pub(crate) mod budget;
 pub(crate) mod compare;
 pub(crate) mod fill;
 pub(crate) mod quality;

@@ -95,7 +95,8 @@ async fn granule(options: &BenchStream, seed: u64) -> Result<PathBuf> {
     let file = options.inbox.join(format!("bench-stream-{seed:06}.h5"));
     let target = file.clone();
     tokio::task::spawn_blocking(move || {
-        ingest::generate_china_sea(&target, SCALE, seed + 1, &|_done, _all| ())
+        let months = ingest::GeneratedSteps::Months;
+        ingest::generate_china_sea(&target, SCALE, seed + 1, months, &|_done, _all| ())
     })
     .await??;
     Ok(file)

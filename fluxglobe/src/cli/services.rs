@@ -153,6 +153,8 @@ pub(crate) enum Bench {
     Stream(BenchStream),
     /// How many new pictures a running server gives to so many clients, and how long each waits.
     Serve(BenchServe),
+    /// Budgets of a year of days, each a process of its own, beside a script on xarray if a Python is given.
+    Budget(BenchBudget),
     /// How fast the renderer is on this machine, beside the classic raster renderer and the processor.
     Render(render_bench::command::RenderBench),
     /// How far volumes are from a reference in double precision, against the number of slices.
@@ -161,6 +163,29 @@ pub(crate) enum Bench {
     Compare(BenchCompare),
     /// Gap filling on this machine's Vulkan device, or with --cpu on the processor: every form, small grids first.
     Fill(super::BenchFill),
+}
+
+/// `fluxglobe bench budget`.
+#[derive(Debug, Args)]
+pub(crate) struct BenchBudget {
+    /// Folder for the generated file, the store it lands in and what the script keeps. What is there is used again.
+    #[arg(long, value_name = "FOLDER")]
+    pub(crate) work: PathBuf,
+    /// Days of the generated product, 1 to 365.
+    #[arg(long, default_value_t = 365, value_parser = clap::value_parser!(u16).range(1..=365))]
+    pub(crate) days: u16,
+    /// Share of 1800 x 2460 cells along each side, 0.01 to 1.
+    #[arg(long, default_value_t = 0.25)]
+    pub(crate) scale: f64,
+    /// Times that each budget is asked for, after a first time.
+    #[arg(long, default_value = "5")]
+    pub(crate) runs: NonZeroU16,
+    /// A Python with xarray, dask, netCDF4, zarr and shapely: the same budgets of the same file by a script.
+    #[arg(long, value_name = "PROGRAM")]
+    pub(crate) python: Option<PathBuf>,
+    /// JSON instead of a table.
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 /// `fluxglobe bench stream`.

@@ -1,14 +1,18 @@
 //! `fluxglobe budget`: a product, a region and a period in; a table or JSON of Tg C with its coverage and source out.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use anyhow::Result;
 use comfy_table::presets::NOTHING;
 use comfy_table::{CellAlignment, Table};
 use compute::budget::{BudgetAnswer, BudgetQuery, BudgetRow, BudgetStep};
 use compute::region::file;
+use contract::manifest::Manifest;
+use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::region::Region;
+use storage::Store;
 
 use crate::cli::{Budget, Settings, Step};
 use crate::{deployment, progress};
@@ -31,6 +35,7 @@ pub(crate) async fn run(settings: &Settings, options: &Budget) -> Result<()> {
         },
         earth: options.earth,
         cells: options.cells,
+        ocean: ocean(settings, &store, options.ocean.as_ref()).await?,
     };
     let bar = progress::bar("sum over the region", 1);
     let engine = deployment::region_engine(settings, store)?;
@@ -56,6 +61,7 @@ pub(crate) async fn run(settings: &Settings, options: &Budget) -> Result<()> {
         million_km2(answer.ocean_area_m2),
         answer.gap_basis
     ));
+    progress::say(&format!("what is sea: {}", answer.ocean_source));
     for note in &answer.notes {
         progress::say(&format!("note: {note}"));
     }
@@ -67,6 +73,19 @@ pub(crate) async fn run(settings: &Settings, options: &Budget) -> Result<()> {
     }
     progress::say(&answer.source);
     Ok(())
+}
+
+/// The newest version of the product that says what is sea.
+pub(crate) async fn ocean(
+    settings: &Settings,
+    store: &Store,
+    product: Option<&ProductId>,
+) -> Result<Option<Arc<Manifest>>> {
+    let Some(product) = product else {
+        return Ok(None);
+    };
+    let manifest = deployment::manifest(store, product, &settings.data).await?;
+    Ok(Some(Arc::new(manifest)))
 }
 
 /// A region file, a named region, a box, GeoJSON text or well-known text.

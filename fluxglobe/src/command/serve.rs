@@ -31,11 +31,8 @@ pub(crate) async fn bind(
 ) -> Result<Server> {
     options.viewer = options.viewer.or_else(viewer::built);
     let renderer = deployment::renderer_at(settings, store.clone(), options.draws_at_once).await?;
-    let analyst = Analyst {
-        local: Engine::local(store.clone()),
-        regions: deployment::region_engine(settings, store.clone())?,
-        check,
-    };
+    let regions = deployment::region_engine(settings, store.clone())?;
+    let analyst = Analyst::new(Engine::local(store.clone()), &regions, check);
     let registry = Registry::new();
     renderer.register(&registry)?;
     storage::sound::damage::register(&registry)?;

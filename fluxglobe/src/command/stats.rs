@@ -12,7 +12,7 @@ use contract::grid::LonLatDeg;
 use crate::cli::{Settings, StatsPoint, StatsPolygon};
 use crate::{deployment, progress};
 
-use super::budget::region;
+use super::budget::{ocean, region};
 
 /// Width of the longest bar, characters.
 const BAR_CHARS: f64 = 30.0;
@@ -38,6 +38,7 @@ pub(crate) async fn point(settings: &Settings, options: &StatsPoint) -> Result<(
 }
 
 pub(crate) async fn polygon(settings: &Settings, options: &StatsPolygon) -> Result<()> {
+    let store = deployment::store(settings)?;
     let query = RegionSeriesQuery {
         product: options.product.clone(),
         region: region(&options.region)?,
@@ -45,8 +46,8 @@ pub(crate) async fn polygon(settings: &Settings, options: &StatsPolygon) -> Resu
         from: options.from,
         to: options.to,
         earth: options.earth,
+        ocean: ocean(settings, &store, options.ocean.as_ref()).await?,
     };
-    let store = deployment::store(settings)?;
     deployment::manifest(&store, &options.product, &settings.data).await?;
     let bar = progress::bar("mean over the region", 1);
     let engine = deployment::region_engine(settings, store)?;
@@ -65,6 +66,7 @@ pub(crate) async fn polygon(settings: &Settings, options: &StatsPolygon) -> Resu
         answer.earth,
         answer.manifest
     ));
+    progress::say(&format!("what is sea: {}", answer.ocean_source));
     for note in &answer.notes {
         progress::say(&format!("note: {note}"));
     }

@@ -109,7 +109,12 @@ async fn synthetic_inputs(store: &Store, cache: &Path) -> Result<Inputs> {
     let file = cache.join("china-sea-synthetic.h5");
     if !file.exists() {
         let unfinished = cache.join("china-sea-synthetic.part");
-        generate::china_sea(&unfinished, SYNTHETIC_SCALE, SYNTHETIC_SEED)?;
+        generate::china_sea(
+            &unfinished,
+            SYNTHETIC_SCALE,
+            SYNTHETIC_SEED,
+            ingest::GeneratedSteps::Months,
+        )?;
         std::fs::rename(&unfinished, &file)?;
     }
     Ok(Inputs {

@@ -74,6 +74,7 @@ pub(crate) async fn synthetic(engine: &Engine, flux: &Manifest) -> Result<String
         step: BudgetStep::Month,
         earth: Earth::Wgs84,
         cells: Cells::Whole,
+        ocean: None,
     };
     let answer = compute::budget::budget_of(engine, &query, flux).await?;
     let mut table = table(&[

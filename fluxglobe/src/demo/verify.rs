@@ -152,6 +152,7 @@ async fn mass(settings: &Settings, store: &Store, flux: &Manifest) -> Result<Opt
         step: BudgetStep::Total,
         earth: Earth::Wgs84,
         cells: Cells::Whole,
+        ocean: None,
     };
     let answer =
         compute::budget::budget_of(&deployment::engine(settings, store.clone())?, &query, flux)

@@ -22,11 +22,8 @@ pub(crate) async fn run(settings: &Settings, options: TileServer) -> Result<()> 
     let store = deployment::open_interactive(footing.store_url())?;
     let fleet = Fleet::start(&options.fleet, &footing.registry)?;
     let measured = observations::open(&options.observations, &store)?;
-    let analyst = Analyst {
-        local: Engine::local(store.clone()),
-        regions: deployment::region_engine(settings, store.clone())?,
-        check: None,
-    };
+    let regions = deployment::region_engine(settings, store.clone())?;
+    let analyst = Analyst::new(Engine::local(store.clone()), &regions, None);
     let mut serve = options.serve;
     serve.viewer = serve.viewer.or_else(viewer::built);
     let state = AppState::new(

@@ -86,6 +86,8 @@ pub(crate) fn of_standard_name(name: &str) -> Option<Named> {
             plain(Quantity::AirPressure)
         }
         "sea_ice_area_fraction" => plain(Quantity::IceFraction),
+        "sea_area_fraction" => plain(Quantity::SeaAreaFraction),
+        "land_area_fraction" => plain(Quantity::LandAreaFraction),
         "sea_surface_wave_significant_height" => plain(Quantity::WaveHeight),
         "precipitation_flux" | "rainfall_flux" | "lwe_precipitation_rate" | "rainfall_rate" => {
             plain(Quantity::Precipitation)

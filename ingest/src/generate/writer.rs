@@ -23,12 +23,14 @@ struct Axes {
     side: Dataset,
 }
 
-/// Writes the file; `month` gives the values of a month, `[row, col]` from the south.
+/// Writes the file; `edges_days` are days since the start of the year at which steps begin and the last one ends, `values`
+/// gives those of a step, `[row, col]` from the south.
 pub(super) fn write(
     path: &Path,
     shape: Shape,
     seed: u64,
-    month: impl Fn(usize) -> Vec<f32>,
+    edges_days: &[f64],
+    mut values: impl FnMut(usize) -> Vec<f32>,
 ) -> hdf5::Result<()> {
     // No object may carry the time of its making: the same seed gives the same bytes.
     let file = File::with_options()
@@ -48,8 +50,9 @@ pub(super) fn write(
     file.new_attr::<i32>()
         .create("synthetic")?
         .write_scalar(&1)?;
-    let axes = write_axes(&file, shape)?;
-    let flux = create_flux(&file, shape, &axes)?;
+    let axes = write_axes(&file, shape, edges_days)?;
+    let step_count = edges_days.len() - 1;
+    let flux = create_flux(&file, shape, step_count, &axes)?;
     let (rows, cols) = (shape.rows as usize, shape.cols as usize);
     let all = |count| SliceOrIndex::SliceCount {
         start: 0,
@@ -57,8 +60,8 @@ pub(super) fn write(
         count,
         block: 1,
     };
-    for index in 0..12 {
-        let values = month(index);
+    for index in 0..step_count {
+        let values = values(index);
         let map = ArrayView2::from_shape((rows, cols), &values)?;
         let selection =
             hdf5::Hyperslab::from(vec![SliceOrIndex::Index(index), all(rows), all(cols)]);
@@ -67,8 +70,7 @@ pub(super) fn write(
     file.close()
 }
 
-fn write_axes(file: &File, shape: Shape) -> hdf5::Result<Axes> {
-    let days: Vec<f64> = (0..=12).map(first_day).collect();
+fn write_axes(file: &File, shape: Shape, days: &[f64]) -> hdf5::Result<Axes> {
     let middles: Vec<f64> = days.windows(2).map(|d| f64::midpoint(d[0], d[1])).collect();
     let lats: Vec<f64> = (0..shape.rows).map(|r| shape.lat_deg(r)).collect();
     let lons: Vec<f64> = (0..shape.cols).map(|c| shape.lon_deg(c)).collect();
@@ -105,14 +107,14 @@ fn write_axes(file: &File, shape: Shape) -> hdf5::Result<Axes> {
     let bounds = file
         .new_dataset::<f64>()
         .obj_track_times(false)
-        .shape([12, 2])
+        .shape([days.len() - 1, 2])
         .create("time_bnds")?;
     bounds.write_raw(&pairs)?;
     attach(file, &bounds, &[&axes.time, &axes.side])?;
     Ok(axes)
 }
 
-fn create_flux(file: &File, shape: Shape, axes: &Axes) -> hdf5::Result<Dataset> {
+fn create_flux(file: &File, shape: Shape, step_count: usize, axes: &Axes) -> hdf5::Result<Dataset> {
     let (rows, cols) = (shape.rows as usize, shape.cols as usize);
     let flux = file
         .new_dataset::<f32>()
@@ -121,7 +123,7 @@ fn create_flux(file: &File, shape: Shape, axes: &Axes) -> hdf5::Result<Dataset> 
         .shuffle()
         .deflate(DEFLATE_LEVEL)
         .fill_value(FILL)
-        .shape([12, rows, cols])
+        .shape([step_count, rows, cols])
         .create("co2_flux")?;
     let attributes = [
         (
@@ -144,7 +146,7 @@ fn create_flux(file: &File, shape: Shape, axes: &Axes) -> hdf5::Result<Dataset> 
 }
 
 /// Days from the start of the year to the start of a month, 12 for the start of the next year.
-fn first_day(month: usize) -> f64 {
+pub(super) fn first_day(month: usize) -> f64 {
     let start = |year, month| {
         contract::time::TimeMs::from_ymd(year, month, 1).map(|t| t.ms() as f64 / 86_400_000.0)
     };

@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 use super::Profile;
 
 /// Name and text of each, in the order in which they are tried.
-const TEXTS: [(&str, &str); 26] = [
+const TEXTS: [(&str, &str); 27] = [
     (
         "takahashi09-flux",
         include_str!("../../profiles/takahashi09-flux.toml"),
@@ -72,6 +72,10 @@ const TEXTS: [(&str, &str); 26] = [
     ),
     ("etopo20", include_str!("../../profiles/etopo20.toml")),
     ("etopo5", include_str!("../../profiles/etopo5.toml")),
+    (
+        "onedeg-land",
+        include_str!("../../profiles/onedeg-land.toml"),
+    ),
     ("ostia-sst", include_str!("../../profiles/ostia-sst.toml")),
     (
         "modis-aqua-sst-month",

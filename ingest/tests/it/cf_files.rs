@@ -5,6 +5,7 @@ use contract::time::Period;
 use ingest::Outcome;
 
 use crate::fixture::{FILL, GRID, Place, SmallFile, series_maps};
+use crate::made::{Made, MadeFile, Values};
 
 const G_PER_KG: f32 = 1e-3;
 
@@ -250,4 +251,43 @@ async fn months_of_several_years_are_cut_into_segments_and_old_ones_are_kept() {
     assert_eq!(second.series[0].series, first.series[0].series);
     assert_ne!(second.series[1].series, first.series[1].series);
     assert_eq!(second.steps[3].period, Period::month(2001, 3).unwrap());
+}
+
+#[tokio::test]
+async fn shares_of_land_and_sea_land_as_shares_of_one_whatever_their_unit() {
+    for (name, unit, stored_by, quantity) in [
+        ("land_area_fraction", "%", 0.01, Quantity::LandAreaFraction),
+        ("land_area_fraction", "1", 1.0, Quantity::LandAreaFraction),
+        (
+            "sea_area_fraction",
+            "percent",
+            0.01,
+            Quantity::SeaAreaFraction,
+        ),
+        ("sea_area_fraction", "1", 1.0, Quantity::SeaAreaFraction),
+    ] {
+        let place = Place::new();
+        let path = place.path("mask.nc");
+        let share = |cell: usize| (cell % 5) as f64 / 4.0;
+        let values = (0..32).map(|cell| (share(cell) / stored_by) as f32);
+        let mask = Made::new(
+            "mask",
+            &["time", "lat", "lon"],
+            Values::Floats(values.collect()),
+        );
+        let mask = mask.text("standard_name", name).text("units", unit);
+        MadeFile::days(1).with(mask).write(&path);
+        let outcomes = place.land(&[path]).await;
+        let Outcome::Landed { manifest, .. } = &outcomes[0] else {
+            panic!("{name} in {unit}: {}", outcomes[0])
+        };
+        let manifest = place.newest(manifest.product.as_str()).await;
+        assert_eq!(manifest.quantity, quantity);
+        for (cell, value) in place.values(&manifest, 0).await.into_iter().enumerate() {
+            assert!(
+                (f64::from(value) - share(cell)).abs() < 1e-7,
+                "{cell}: {value}"
+            );
+        }
+    }
 }

@@ -231,6 +231,24 @@ async fn ice_lands() {
 }
 
 #[tokio::test]
+async fn the_share_of_land_lands_as_one_map() {
+    let place = Place::new();
+    let outcomes = place.land(&[test_data::fluxengine_land()]).await;
+    assert!(
+        matches!(outcomes[0], Outcome::Landed { .. }),
+        "{}",
+        outcomes[0]
+    );
+    let manifest = place.newest("onedeg-land").await;
+    assert_eq!((manifest.grid, manifest.steps.len()), (ONE_DEGREE, 1));
+    let values = place.values(&manifest, 0).await;
+    let mean = values.iter().copied().map(f64::from).sum::<f64>() / 64_800.0;
+    near(mean, 0.330_960_635_940_334_5);
+    // Greece, row 56 from the north.
+    near(f64::from(values[56 * 360 + 215]), 0.639_401_197_433_471_7);
+}
+
+#[tokio::test]
 async fn air_pressure_lands() {
     let folder = fluxengine("air_pressure/2010");
     let (july_mean, july_cell) = (1.007_509_890e5, Some(1.012_988_838e5));

@@ -9,7 +9,8 @@ use crate::fixture::Place;
 async fn the_generated_file_lands_as_synthetic() {
     let place = Place::new();
     let path = place.path("china-sea.nc");
-    ingest::generate_china_sea(&path, 0.05, 1, &|_, _| {}).unwrap();
+    let months = ingest::GeneratedSteps::Months;
+    ingest::generate_china_sea(&path, 0.05, 1, months, &|_, _| {}).unwrap();
     let outcomes = place.land(&[path]).await;
     assert!(
         matches!(&outcomes[0], Outcome::Landed { periods, .. } if periods.len() == 12),

@@ -44,6 +44,20 @@ pub fn fluxengine(inside: &str) -> PathBuf {
     folder
 }
 
+/// The share of land that FluxEngine sums with, beside its verification data.
+///
+/// # Panics
+/// If it is not there.
+pub fn fluxengine_land() -> PathBuf {
+    let file = fluxengine("").with_file_name("onedeg_land.nc");
+    assert!(
+        file.is_file(),
+        "there is no {}: tests/data/fetch.sh fetches it",
+        file.display()
+    );
+    file
+}
+
 /// The Python that has what scripts of the tests import.
 ///
 /// # Panics

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::backend::{AreaRequest, AreaRow};
 use crate::error::ServerError;
 use crate::extract::{UrlPath, UrlQuery, time};
-use crate::routes::budget::{period, region_name};
+use crate::routes::budget::{ocean, period, region_name};
 use crate::routes::products::StepTimes;
 use crate::state::AppState;
 
@@ -25,6 +25,7 @@ pub(crate) struct AreaQuery {
     from: Option<String>,
     to: Option<String>,
     earth: Option<String>,
+    ocean: Option<String>,
     manifest: Option<String>,
 }
 
@@ -35,6 +36,7 @@ struct Area<'a> {
     region: String,
     region_area_m2: f64,
     ocean_area_m2: f64,
+    ocean_source: &'a str,
     notes: &'a [String],
     earth: Earth,
     unit: &'static str,
@@ -84,6 +86,7 @@ pub(crate) async fn get(
             .earth
             .as_deref()
             .map_or(Ok(Earth::default()), str::parse)?,
+        ocean: ocean(&state, query.ocean.as_deref()).await?,
     };
     let (region, earth) = (region_name(asked, &request.region), request.earth);
     let series = state.analyses.area(&layer, request).await?;
@@ -93,6 +96,7 @@ pub(crate) async fn get(
         region,
         region_area_m2: series.region_area_m2,
         ocean_area_m2: series.ocean_area_m2,
+        ocean_source: &series.ocean_source,
         notes: &series.notes,
         earth,
         unit: manifest.quantity.display().unit,

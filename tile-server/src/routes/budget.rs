@@ -7,7 +7,7 @@ use axum::extract::State;
 use axum::http::header;
 use axum::response::{IntoResponse as _, Response};
 use contract::earth::Earth;
-use contract::manifest::ManifestId;
+use contract::manifest::{Manifest, ManifestId};
 use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::region::{Cells, NamedRegion, Region};
@@ -30,6 +30,7 @@ pub(crate) struct BudgetQuery {
     step: Option<String>,
     earth: Option<String>,
     cells: Option<String>,
+    ocean: Option<String>,
     manifest: Option<String>,
 }
 
@@ -43,6 +44,7 @@ struct Budget<'a> {
     unit: &'static str,
     region_area_m2: f64,
     ocean_area_m2: f64,
+    ocean_source: &'a str,
     gap_basis: &'a str,
     notes: &'a [String],
     rows: Vec<Row>,
@@ -128,6 +130,7 @@ pub(crate) async fn get(
             .cells
             .as_deref()
             .map_or(Ok(Cells::default()), str::parse)?,
+        ocean: ocean(&state, query.ocean.as_deref()).await?,
     };
     let (region, earth) = (region_name(region, &request.region), request.earth);
     let cells = request.cells;
@@ -141,11 +144,24 @@ pub(crate) async fn get(
         unit: "Tg C",
         region_area_m2: sums.region_area_m2,
         ocean_area_m2: sums.ocean_area_m2,
+        ocean_source: &sums.ocean_source,
         gap_basis: &sums.gap_basis,
         notes: &sums.notes,
         rows: sums.rows.iter().map(Row::from).collect(),
     };
     Ok(([(header::CACHE_CONTROL, "no-cache")], Json(answer)).into_response())
+}
+
+/// The newest version of the product that says what is sea.
+pub(crate) async fn ocean(
+    state: &AppState,
+    product: Option<&str>,
+) -> Result<Option<Arc<Manifest>>, ServerError> {
+    let Some(product) = product else {
+        return Ok(None);
+    };
+    let layer = state.catalogue.version(product, None).await?;
+    Ok(Some(Arc::clone(&layer.manifest)))
 }
 
 /// The part of `[from, to)` that the product covers; all it covers if nothing is said.

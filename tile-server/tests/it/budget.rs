@@ -2,6 +2,7 @@
 
 use axum::http::StatusCode;
 use contract::earth::Earth;
+use contract::quantity::Quantity;
 use contract::region::{Cells, Region};
 use serde_json::json;
 use tile_server::backend::{BudgetRequest, BudgetStep, Class};
@@ -34,6 +35,7 @@ async fn an_answer_carries_everything_a_citation_needs() {
     assert_eq!(body["cells"], json!("whole"));
     assert_eq!(body["gap_basis"], json!("the mean of the band"));
     assert_eq!(body["notes"], json!(["taken as written"]));
+    assert_eq!(body["ocean_source"], json!("a coast"));
     let request = last(&app);
     assert_eq!(
         (request.region, request.step, request.earth),
@@ -67,6 +69,29 @@ async fn every_parameter_reaches_the_analyst() {
     );
     assert_eq!(request.cells, Cells::OceanShare);
     assert_eq!(body["cells"], json!("ocean-share"));
+}
+
+#[tokio::test]
+async fn a_product_may_say_what_is_sea_and_another_one_is_another_question() {
+    let app = TestApp::new().await;
+    app.land("mask", Quantity::LandAreaFraction, 1).await;
+    for path in ["flux/budget?region=global", "sst/area?region=global"] {
+        let coast = app.get(&format!("/api/products/{path}")).await.json();
+        assert_eq!(coast["ocean_source"], json!("a coast"));
+        let path = format!("/api/products/{path}&ocean=mask");
+        let masked = app.get(&path).await.json();
+        let source = masked["ocean_source"].as_str().unwrap();
+        assert!(source.starts_with("mask@1-"), "{source}");
+        // Remembered apart, and once.
+        assert_eq!(app.get(&path).await.json(), masked);
+        let unknown = app.get(&format!("{path}ed")).await;
+        assert_eq!(unknown.status, StatusCode::NOT_FOUND, "{}", unknown.text());
+    }
+    let budgets = app.analyst.budgets.lock().unwrap();
+    assert_eq!(
+        (budgets.len(), app.analyst.areas.lock().unwrap().len()),
+        (2, 2)
+    );
 }
 
 #[tokio::test]

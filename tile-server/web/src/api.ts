@@ -74,6 +74,8 @@ export interface Budget {
   unit: string;
   region_area_m2: number;
   ocean_area_m2: number;
+  /** What says which part of a cell is sea. */
+  ocean_source: string;
   gap_basis: string;
   /** How the region was taken where that may surprise. */
   notes: string[];

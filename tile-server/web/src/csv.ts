@@ -23,7 +23,7 @@ export function budgetCsv(answer: Budget): string {
       `earth: ${answer.earth}`,
       `cells: ${answer.cells}`,
       `unit: ${answer.unit}`,
-      `region area: ${answer.region_area_m2} m2, ocean ${answer.ocean_area_m2} m2`,
+      `region area: ${answer.region_area_m2} m2, ocean ${answer.ocean_area_m2} m2 (${answer.ocean_source})`,
       `gap, no part of the budget: ${answer.gap_basis}`,
       ...answer.notes.map((note) => `note: ${note}`),
     ],

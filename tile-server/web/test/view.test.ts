@@ -113,6 +113,7 @@ describe("files", () => {
       unit: "Tg C",
       region_area_m2: 5e14,
       ocean_area_m2: 3.6e14,
+      ocean_source: "a coast",
       gap_basis: "means of bands",
       notes: ["taken as written"],
       rows: [
@@ -128,7 +129,7 @@ describe("files", () => {
       ],
     });
     expect(text).toBe(
-      "# product: p\n# manifest: m-1\n# region: global\n# earth: wgs84\n# cells: whole\n# unit: Tg C\n# region area: 500000000000000 m2, ocean 360000000000000 m2\n# gap, no part of the budget: means of bands\n# note: taken as written\nstart,end,budget,coverage_percent,area_m2,ocean_with_data_m2,gap,gap_area_m2\n2000-01-01T00:00:00Z,2000-02-01T00:00:00Z,-176.1,92.5,300000000000000,290000000000000,,0\n",
+      "# product: p\n# manifest: m-1\n# region: global\n# earth: wgs84\n# cells: whole\n# unit: Tg C\n# region area: 500000000000000 m2, ocean 360000000000000 m2 (a coast)\n# gap, no part of the budget: means of bands\n# note: taken as written\nstart,end,budget,coverage_percent,area_m2,ocean_with_data_m2,gap,gap_area_m2\n2000-01-01T00:00:00Z,2000-02-01T00:00:00Z,-176.1,92.5,300000000000000,290000000000000,,0\n",
     );
   });
 

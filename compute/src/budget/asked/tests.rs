@@ -13,6 +13,7 @@ use storage::{Store, frames};
 
 use super::*;
 use crate::objects::Objects;
+use crate::region::weights::RegionKeys;
 use crate::state;
 
 const GRID: Grid = Grid {
@@ -39,7 +40,7 @@ async fn plan(config: SessionConfig, region: &str) -> Arc<dyn ExecutionPlan> {
     let region: Region = region.parse().unwrap();
     let weights = RegionKeys::stored(&store, &GRID, &region, Earth::Wgs84).await;
     let engine = Engine::local(store.clone());
-    let weights = weights.unwrap().unwrap();
+    let weights = RegionAddress::stored(&store, weights.unwrap().unwrap());
     let region = AskedRegion::read(&engine, &GRID, &weights).await.unwrap();
     let objects = Objects::of(&store);
     let runtime = state::runtime(&objects, state::MEMORY_BYTES).unwrap();

@@ -205,7 +205,7 @@ fn rings_that_repeat_within_one_cell_count_once() {
 
 #[test]
 fn the_sea_of_a_region_has_a_key_of_its_own() {
-    let ocean = key_of(&ONE_DEGREE, &Region::Global, Earth::Wgs84, Surface::Ocean);
+    let ocean = key_of(&ONE_DEGREE, &Region::Global, Earth::Wgs84, &Surface::Ocean);
     assert_ne!(ocean, key(&ONE_DEGREE, &Region::Global, Earth::Wgs84));
 }
 
@@ -216,7 +216,7 @@ fn the_sea_of_a_cell_is_all_of_it_in_the_open_and_none_inland() {
         let mut field = vec![0.0; ONE_DEGREE.cell_count()];
         let region = region.parse().unwrap();
         for (chunk, areas) in
-            compute_of(&ONE_DEGREE, &region, Earth::Wgs84, Surface::Ocean).unwrap()
+            compute_of(&ONE_DEGREE, &region, Earth::Wgs84, &Surface::Ocean, None).unwrap()
         {
             for (index, area) in windows[chunk as usize].cell_indices(&ONE_DEGREE).zip(areas) {
                 field[index] = area;

@@ -1,0 +1,106 @@
+//! Sums over a region and what they are set against: its area, its sea, and who says what is sea.
+
+use contract::earth::Earth;
+use contract::manifest::{Manifest, Step};
+use contract::region::Region;
+
+use super::fixed::AREA_DECIMALS;
+use super::sums::{self, Measure, RegionSums};
+use crate::region::address::{OnGrid, RegionAddress};
+use crate::region::extent::{Extent, extent, outline};
+use crate::region::shares::{self, Shares};
+use crate::region::weights::Surface;
+use crate::{ComputeError, Engine, catalog};
+
+/// Share of a region that a grid must lack before a reader is told.
+const OUTSIDE_SHARE: f64 = 1e-6;
+/// Square metres in a million square kilometres.
+const M2_PER_MILLION_KM2: f64 = 1e12;
+
+/// A region as it is asked for.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct AskedArea<'a> {
+    pub(crate) region: &'a Region,
+    pub(crate) earth: Earth,
+    /// A version of a product that says shares of sea or land; Natural Earth if none.
+    pub(crate) ocean: Option<&'a Manifest>,
+}
+
+/// Sums of steps over a region.
+#[derive(Debug)]
+pub(crate) struct OverRegion {
+    pub(crate) sums: RegionSums,
+    pub(crate) extent: Extent,
+    /// What says which part of a cell is sea.
+    pub(crate) ocean_source: String,
+}
+
+/// The weights of an area on a product's grid.
+///
+/// # Errors
+/// `RegionOutside` where they have nothing in common, `OceanShares` for a product that cannot say what is sea.
+pub(crate) async fn weights(
+    engine: &Engine,
+    manifest: &Manifest,
+    asked: AskedArea<'_>,
+) -> Result<RegionAddress, ComputeError> {
+    let surface = match asked.ocean {
+        Some(ocean) => Surface::Shares(Shares::of(ocean, manifest)?),
+        None => Surface::Ocean,
+    };
+    let on_grid = OnGrid {
+        grid: &manifest.grid,
+        region: asked.region,
+        earth: asked.earth,
+        ocean: &surface,
+    };
+    let found = RegionAddress::of(engine, on_grid).await?;
+    found.ok_or_else(|| ComputeError::RegionOutside {
+        product: manifest.product.clone(),
+        bounds: catalog::bounds_text(manifest),
+    })
+}
+
+/// The sums of some steps of a product over an area.
+pub(crate) async fn over_region(
+    engine: &Engine,
+    manifest: &Manifest,
+    steps: &[&Step],
+    asked: AskedArea<'_>,
+    measure: Measure,
+) -> Result<OverRegion, ComputeError> {
+    let has_shares = asked.ocean.is_some();
+    let (region, earth) = (asked.region.clone(), asked.earth);
+    // Overlaid with all land, which takes a while.
+    let measured = move || {
+        if has_shares {
+            outline(&region, earth)
+        } else {
+            extent(&region, earth)
+        }
+    };
+    let found = tokio::task::spawn_blocking(measured)
+        .await
+        .map_err(|e| ComputeError::inconsistent("region", e))?;
+    let mut extent = found?;
+    let weights = weights(engine, manifest, asked).await?;
+    let sums = sums::of_steps(engine, manifest, steps, &weights, measure).await?;
+    if has_shares {
+        let area_m2 = extent.area_m2;
+        if sums.on_grid_m2 < area_m2 * (1.0 - OUTSIDE_SHARE) {
+            extent.notes.push(format!(
+                "of the region's {:.6} million km² {:.6} lie on the grid, and nobody says how much of the rest is sea: it is \
+                 left out of the sea asked for",
+                area_m2 / M2_PER_MILLION_KM2,
+                sums.on_grid_m2 / M2_PER_MILLION_KM2
+            ));
+        }
+        let sea_steps: i128 = sums.sea_steps.iter().sum();
+        extent = extent.with_ocean(sea_steps as f64 / 10f64.powi(AREA_DECIMALS as i32));
+    }
+    Ok(OverRegion {
+        sums,
+        extent,
+        ocean_source: shares::source(asked.ocean),
+    })
+}

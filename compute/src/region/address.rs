@@ -1,0 +1,118 @@
+//! How queries name a region's weights: by where they are stored, or by the question itself.
+//!
+//! An engine that answers strangers stores nothing for them, however many regions they think of. Regions that have a name
+//! are few: their weights are stored for everybody.
+
+use contract::earth::Earth;
+use contract::grid::Grid;
+use contract::key::ObjectKey;
+use contract::region::{NAMED_REGIONS, Region};
+use storage::{StorageError, Store};
+
+use super::computed::ComputedWeights;
+use super::weights::{RegionKeys, Surface};
+use crate::budget::named::EARTH;
+use crate::{ComputeError, Engine};
+
+/// A region on a grid.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct OnGrid<'a> {
+    pub(crate) grid: &'a Grid,
+    pub(crate) region: &'a Region,
+    pub(crate) earth: Earth,
+    /// How its sea is told.
+    pub(crate) ocean: &'a Surface,
+}
+
+/// A region's weights as queries name them.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct RegionAddress {
+    /// What they are stored under, if anybody stored them; sums are named by it either way.
+    pub(crate) keys: RegionKeys,
+    /// Of all of the region: an address, or a question.
+    pub(crate) all: String,
+    /// The same of its sea.
+    pub(crate) ocean: String,
+}
+
+impl RegionAddress {
+    /// Weights that are stored.
+    pub(crate) fn stored(store: &Store, keys: RegionKeys) -> Self {
+        let address = |key| store.sql_url(key).to_string();
+        Self {
+            all: address(&keys.all),
+            ocean: address(&keys.ocean),
+            keys,
+        }
+    }
+
+    /// The weights of a region, stored now if the engine may; none if it lies outside the grid.
+    pub(crate) async fn of(
+        engine: &Engine,
+        asked: OnGrid<'_>,
+    ) -> Result<Option<Self>, ComputeError> {
+        let store = engine.store();
+        if engine.stores_weights() || is_for_everybody(asked) {
+            let keys = RegionKeys::stored_of(store, asked).await?;
+            return Ok(keys.map(|keys| Self::stored(store, keys)));
+        }
+        let keys = RegionKeys::of(asked);
+        let all = found_or_asked(store, &keys.all, asked, &Surface::All).await?;
+        let ocean = found_or_asked(store, &keys.ocean, asked, asked.ocean).await?;
+        let whole = engine.objects().weights(&all).await;
+        let is_outside = whole.map_err(weights_failed)?.chunk_count() == 0;
+        Ok((!is_outside).then_some(Self { keys, all, ocean }))
+    }
+}
+
+/// One of a bounded number of regions, weighed as the sums are that are stored of new versions.
+fn is_for_everybody(asked: OnGrid<'_>) -> bool {
+    let is_named = || {
+        let mut regions = NAMED_REGIONS.iter().map(|named| named.region());
+        regions.any(|region| region == *asked.region)
+    };
+    asked.earth == EARTH && *asked.ocean == Surface::Ocean && is_named()
+}
+
+/// The address of stored weights, else the question.
+async fn found_or_asked(
+    store: &Store,
+    key: &ObjectKey,
+    asked: OnGrid<'_>,
+    surface: &Surface,
+) -> Result<String, ComputeError> {
+    match storage::weights::check(store, key).await {
+        Ok(()) => return Ok(store.sql_url(key).to_string()),
+        Err(e) if e.is_not_found() => {}
+        Err(error @ StorageError::Damaged { .. }) => {
+            tracing::warn!(%error, "weights are computed again");
+        }
+        Err(e) => return Err(e.into()),
+    }
+    let question = ComputedWeights {
+        grid: *asked.grid,
+        region: asked.region.clone(),
+        earth: asked.earth,
+        surface: surface.clone(),
+        shares_at: surface
+            .shares()
+            .map(|shares| store.sql_url(&shares.frame).to_string()),
+    };
+    question.check_size()?;
+    Ok(question.text())
+}
+
+/// Why weights could not be had, in the words of whoever found out.
+pub(crate) fn weights_failed(error: datafusion::error::DataFusionError) -> ComputeError {
+    use datafusion::error::DataFusionError::External;
+    match error {
+        External(source) => match source.downcast::<ComputeError>() {
+            Ok(own) => *own,
+            Err(other) => match other.downcast::<StorageError>() {
+                Ok(own) => (*own).into(),
+                Err(other) => ComputeError::engine("reading a region's weights")(External(other)),
+            },
+        },
+        other => ComputeError::engine("reading a region's weights")(other),
+    }
+}

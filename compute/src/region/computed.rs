@@ -1,0 +1,254 @@
+//! Weights as a question of their own: a region on a grid as text in a query, computed by whoever reads it and stored by
+//! nobody.
+
+use contract::digest::Digest;
+use contract::earth::Earth;
+use contract::grid::Grid;
+use contract::region::{Polygon, Region};
+use serde::{Deserialize, Serialize};
+
+use super::cut::bounds_deg;
+use super::weights::{Surface, compute_of};
+use crate::ComputeError;
+
+/// What such a text begins with; addresses of stored weights do not.
+const MARK: &str = "computed:";
+/// Most cells that a region's bounds may hold: their areas take 64 MiB, and a process keeps them for a while.
+const MAX_CELLS: u64 = 8 << 20;
+
+/// What weights are computed from.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct ComputedWeights {
+    pub(crate) grid: Grid,
+    pub(crate) region: Region,
+    pub(crate) earth: Earth,
+    pub(crate) surface: Surface,
+    /// Address of the frame that the surface takes its shares from.
+    pub(crate) shares_at: Option<String>,
+}
+
+impl ComputedWeights {
+    /// As it stands in a query.
+    pub(crate) fn text(&self) -> String {
+        let json = serde_json::to_string(&Written::of(self)).expect("it is plain numbers");
+        format!("{MARK}{json}")
+    }
+
+    /// The question of a text; none if it is an address.
+    ///
+    /// # Errors
+    /// `Inconsistent` if it is neither.
+    pub(crate) fn of_text(text: &str) -> Result<Option<Self>, ComputeError> {
+        let Some(json) = text.strip_prefix(MARK) else {
+            return Ok(None);
+        };
+        serde_json::from_str::<Written>(json)
+            .map(|written| Some(written.read()))
+            .map_err(|e| ComputeError::inconsistent("weights to compute", e))
+    }
+
+    /// What the answer is remembered by.
+    pub(crate) fn name(text: &str) -> String {
+        format!("{MARK}{}", Digest::of(text.as_bytes()))
+    }
+
+    /// # Errors
+    /// `Region` if its weights could take more memory than a question that stores nothing may.
+    pub(crate) fn check_size(&self) -> Result<(), ComputeError> {
+        let cells = cells_in_bounds(&self.grid, &self.region);
+        if cells <= MAX_CELLS {
+            return Ok(());
+        }
+        let reason = format!(
+            "it spans {cells} cells; at most {MAX_CELLS} are weighed for a question over the network: ask for a named or a \
+             smaller region, or with `fluxglobe budget`, which stores the weights"
+        );
+        Err(ComputeError::Region { reason })
+    }
+
+    /// Areas of the region's share of every cell, m², by chunk; `shares` is `[row, col]`, where the surface needs them.
+    pub(crate) fn chunks(
+        &self,
+        shares: Option<&[f32]>,
+    ) -> Result<Vec<(u32, Vec<f64>)>, ComputeError> {
+        self.check_size()?;
+        compute_of(&self.grid, &self.region, self.earth, &self.surface, shares)
+    }
+}
+
+/// The same as text: numbers by their bits, since readers of decimal numbers may differ in the last one, and weights that
+/// were computed here and there are the same.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Written {
+    cells: [u32; 2],
+    north_west_dlat_dlon: [u64; 4],
+    region: WrittenRegion,
+    earth: Earth,
+    surface: Surface,
+    shares_at: Option<String>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum WrittenRegion {
+    Global,
+    Box([u64; 4]),
+    /// Each an outer ring and its holes.
+    Polygons(Vec<Vec<Vec<[u64; 2]>>>),
+}
+
+impl Written {
+    fn of(weights: &ComputedWeights) -> Self {
+        let (grid, bits) = (&weights.grid, |numbers: [f64; 4]| numbers.map(f64::to_bits));
+        let ring = |ring: &Vec<[f64; 2]>| ring.iter().map(|at| at.map(f64::to_bits)).collect();
+        let rings = |polygon: &Polygon| {
+            let outer = std::iter::once(&polygon.outer);
+            outer.chain(&polygon.holes).map(ring).collect()
+        };
+        Self {
+            cells: [grid.rows, grid.cols],
+            north_west_dlat_dlon: bits([
+                grid.north_deg,
+                grid.west_deg,
+                grid.dlat_deg,
+                grid.dlon_deg,
+            ]),
+            region: match &weights.region {
+                Region::Global => WrittenRegion::Global,
+                Region::Box {
+                    west,
+                    south,
+                    east,
+                    north,
+                } => WrittenRegion::Box(bits([*west, *south, *east, *north])),
+                Region::Polygons(polygons) => {
+                    WrittenRegion::Polygons(polygons.iter().map(rings).collect())
+                }
+            },
+            earth: weights.earth,
+            surface: weights.surface.clone(),
+            shares_at: weights.shares_at.clone(),
+        }
+    }
+
+    fn read(self) -> ComputedWeights {
+        let [rows, cols] = self.cells;
+        let [north_deg, west_deg, dlat_deg, dlon_deg] =
+            self.north_west_dlat_dlon.map(f64::from_bits);
+        let ring = |ring: Vec<[u64; 2]>| ring.iter().map(|at| at.map(f64::from_bits)).collect();
+        let polygon = |rings: Vec<Vec<[u64; 2]>>| {
+            let mut rings = rings.into_iter().map(ring);
+            Polygon {
+                outer: rings.next().unwrap_or_default(),
+                holes: rings.collect(),
+            }
+        };
+        ComputedWeights {
+            grid: Grid {
+                rows,
+                cols,
+                north_deg,
+                west_deg,
+                dlat_deg,
+                dlon_deg,
+            },
+            region: match self.region {
+                WrittenRegion::Global => Region::Global,
+                WrittenRegion::Box(edges) => {
+                    let [west, south, east, north] = edges.map(f64::from_bits);
+                    Region::Box {
+                        west,
+                        south,
+                        east,
+                        north,
+                    }
+                }
+                WrittenRegion::Polygons(polygons) => {
+                    Region::Polygons(polygons.into_iter().map(polygon).collect())
+                }
+            },
+            earth: self.earth,
+            surface: self.surface,
+            shares_at: self.shares_at,
+        }
+    }
+}
+
+/// How many cells of a grid a region can touch at most.
+fn cells_in_bounds(grid: &Grid, region: &Region) -> u64 {
+    let [west, south, east, north] = match region {
+        Region::Global => return grid.cell_count() as u64,
+        Region::Box {
+            west,
+            south,
+            east,
+            north,
+        } => [*west, *south, *east, *north],
+        Region::Polygons(polygons) => {
+            let corners = |polygon: &'_ Polygon| polygon.outer.clone();
+            bounds_deg(&polygons.iter().flat_map(corners).collect::<Vec<_>>())
+        }
+    };
+    let across = |degrees: f64, cell_deg: f64, most: u32| {
+        // Both ends may lie inside a cell.
+        ((degrees / cell_deg).ceil() as u64 + 1).min(u64::from(most))
+    };
+    across(north - south, grid.dlat_deg, grid.rows) * across(east - west, grid.dlon_deg, grid.cols)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn asked(cells_a_degree: u32, region: &str) -> ComputedWeights {
+        ComputedWeights {
+            grid: Grid {
+                rows: 180 * cells_a_degree,
+                cols: 360 * cells_a_degree,
+                north_deg: 90.0,
+                west_deg: -180.0,
+                dlat_deg: 1.0 / f64::from(cells_a_degree),
+                dlon_deg: 1.0 / f64::from(cells_a_degree),
+            },
+            region: region.parse().unwrap(),
+            earth: Earth::Wgs84,
+            surface: Surface::All,
+            shares_at: None,
+        }
+    }
+
+    #[test]
+    fn a_question_is_read_as_it_is_written_and_addresses_are_none() {
+        let holed = "POLYGON((0.1 0,10 0.3,10 10,0.1 0),(5 1,6 1,6 2,5 1))";
+        for region in ["global", "-0.1,0.2,170.3,0.30000000000000004", holed] {
+            let question = asked(7, region);
+            let text = question.text();
+            assert_eq!(ComputedWeights::of_text(&text).unwrap(), Some(question));
+        }
+        assert_eq!(ComputedWeights::of_text("file:///weights/a").unwrap(), None);
+        assert!(ComputedWeights::of_text("computed:{}").is_err());
+    }
+
+    #[test]
+    fn what_could_take_much_memory_is_refused_before_it_is_computed() {
+        for (region, cells) in [
+            ("global", 21_600 * 10_800),
+            ("-180,-90,180,90", 21_600 * 10_800),
+        ] {
+            assert_eq!(
+                cells_in_bounds(&asked(60, region).grid, &region.parse().unwrap()),
+                cells
+            );
+            let refused = asked(60, region).chunks(None).unwrap_err().to_string();
+            assert!(refused.contains("fluxglobe budget"), "{refused}");
+        }
+        let polygon = "POLYGON((10 10,20 10,20 20,10 10))";
+        assert_eq!(
+            cells_in_bounds(&asked(60, polygon).grid, &polygon.parse().unwrap()),
+            601 * 601
+        );
+        assert!(asked(60, polygon).check_size().is_ok());
+        assert!(asked(1, "global").check_size().is_ok());
+    }
+}
