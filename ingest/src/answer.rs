@@ -118,9 +118,17 @@ impl Asked {
                 ..granule
             }),
             Prepared::Rejected(rejection) => Ready::Answered(self.refused(rejection)),
-            Prepared::Observed(stored) => {
-                let file = self.path();
-                let outcome = Outcome::Observed { file, stored };
+            Prepared::Observed {
+                dataset,
+                stored,
+                masked,
+            } => {
+                let outcome = Outcome::Observed {
+                    file: self.path(),
+                    dataset,
+                    stored,
+                    masked,
+                };
                 Ready::Answered(self.answer(outcome, None, true))
             }
             Prepared::AlreadyLanded {

@@ -10,6 +10,7 @@ use contract::key::ObjectKey;
 use contract::manifest::{Manifest, ManifestId};
 use contract::masked::MaskedCells;
 use contract::notice::NoticeOrder;
+use contract::product::ProductId;
 use contract::time::Period;
 use storage::{StorageError, Store, manifests};
 
@@ -53,7 +54,11 @@ pub(crate) enum Prepared {
         periods: Vec<Period>,
     },
     /// Nothing: it held observations, which are stored.
-    Observed(Stored),
+    Observed {
+        dataset: ProductId,
+        stored: Stored,
+        masked: MaskedCells,
+    },
     /// Nothing: it is refused.
     Rejected(Rejection),
 }

@@ -52,7 +52,12 @@ pub(crate) fn of_bytes(key: &ObjectKey, content: &[u8]) -> Result<Soundness, Sto
         (
             Vouched::Nothing,
             Some(
-                Kind::Manifest | Kind::Sums | Kind::ObservationIndex | Kind::Reading | Kind::Check,
+                Kind::Manifest
+                | Kind::Sums
+                | Kind::ObservationIndex
+                | Kind::ObservationFile
+                | Kind::Reading
+                | Kind::Check,
             ),
         ) => (seal::of_json(content), false),
         (Vouched::Nothing, Some(Kind::Tile)) => {
@@ -91,7 +96,12 @@ pub fn of_object(key: &ObjectKey, content: &Bytes) -> Result<Soundness, StorageE
         (
             Vouched::Nothing,
             Some(
-                Kind::Manifest | Kind::Sums | Kind::ObservationIndex | Kind::Reading | Kind::Check,
+                Kind::Manifest
+                | Kind::Sums
+                | Kind::ObservationIndex
+                | Kind::ObservationFile
+                | Kind::Reading
+                | Kind::Check,
             ),
         ) => {
             check_document(key, content, found)?;

@@ -326,7 +326,19 @@ fn tell(open: Open, pipeline: Pipeline<'_>) {
                 pipeline.metrics.superseded();
                 tracing::warn!(trace, origin = %open.origin, told = event.is_some(), "{outcome}");
             }
-            Outcome::AlreadyLanded { .. } | Outcome::Observed { .. } => {
+            Outcome::Observed {
+                dataset,
+                stored,
+                masked,
+                ..
+            } => {
+                // A file that comes again brings nothing, and masks nothing.
+                if stored.new + stored.replaced > 0 {
+                    pipeline.metrics.masked(dataset, *masked);
+                }
+                tracing::info!(trace, origin = %open.origin, "{outcome}");
+            }
+            Outcome::AlreadyLanded { .. } => {
                 tracing::info!(trace, origin = %open.origin, told = event.is_some(), "{outcome}");
             }
         }

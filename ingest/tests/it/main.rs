@@ -16,6 +16,7 @@ mod made;
 mod many_steps;
 mod masked;
 mod memory;
+mod observed;
 mod order;
 mod other_writers;
 mod quality;

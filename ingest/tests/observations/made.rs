@@ -21,7 +21,7 @@ pub(crate) fn settings() -> Settings {
 
 pub(crate) async fn observations(path: &Path) -> Vec<Observation> {
     match read_path(path, None, &settings()).await.unwrap() {
-        Reading::Observations(observations) => observations,
+        Reading::Observations(found) => found.observations,
         other => panic!("{}: {other:?}", path.display()),
     }
 }
@@ -29,7 +29,7 @@ pub(crate) async fn observations(path: &Path) -> Vec<Observation> {
 pub(crate) async fn refusal(path: &Path) -> Rejection {
     match read_path(path, None, &settings()).await.unwrap() {
         Reading::Refused(rejection) => rejection,
-        Reading::Observations(all) => panic!("{} observations of {}", all.len(), path.display()),
+        Reading::Observations(found) => panic!("{found:?} of {}", path.display()),
         Reading::Other => panic!("{} is told to hold no observations", path.display()),
     }
 }
@@ -421,7 +421,8 @@ async fn mutated_texts_end_in_observations_or_a_refusal() {
                 continue;
             }
             match read_path(&path, None, &settings()).await.unwrap() {
-                Reading::Observations(all) => {
+                Reading::Observations(found) => {
+                    let all = found.observations;
                     assert!(all.iter().all(|o| o.validate().is_ok()));
                     outcomes[0] += 1;
                 }

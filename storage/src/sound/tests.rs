@@ -63,7 +63,12 @@ async fn store() -> Store {
     weights::write(&store, &ObjectKey::weights(&raw_sha256), &areas)
         .await
         .unwrap();
-    for name in ["sums/p/a.json", "readings/p/a", "checks/a.json"] {
+    for name in [
+        "sums/p/a.json",
+        "observation-files/p/a",
+        "readings/p/a",
+        "checks/a.json",
+    ] {
         let document = serde_json::json!({"schema": 2, "name": name});
         document::put_new(&store, &name.parse().unwrap(), &document)
             .await
@@ -81,7 +86,7 @@ async fn a_bit_flipped_in_any_object_is_found_named_and_counted() {
     let keys = verify::keys(&store, None).await.unwrap();
     let kinds = keys.iter().map(|key| Kind::of(key).unwrap().folder());
     let kinds: std::collections::BTreeSet<&str> = kinds.collect();
-    assert_eq!(kinds.len(), 10, "{kinds:?}");
+    assert_eq!(kinds.len(), 11, "{kinds:?}");
     let sound = verify::run(&store, &keys, &|_, _| ()).await.unwrap();
     assert_eq!((sound.sound_count, sound.findings), (keys.len(), vec![]));
     for key in &keys {
