@@ -87,6 +87,15 @@ pub struct ServiceSettings {
     #[arg(long, env = "FLUXGLOBE_FETCH_LIMIT_S", default_value_t = 1800,
           value_parser = clap::value_parser!(u64).range(1..=86_400))]
     pub fetch_limit_s: u64,
+    /// A source that does not answer for so long, or sends less than --fetch-slowest-bytes-s on average, is left and asked
+    /// again, within --fetch-patience-s; seconds, 1 to 3600.
+    #[arg(long, env = "FLUXGLOBE_FETCH_SILENCE_S", default_value_t = 30,
+          value_parser = clap::value_parser!(u64).range(1..=3600))]
+    pub fetch_silence_s: u64,
+    /// The slowest that a source may be, bytes a second, at most 1 GiB; 0 for any that sends something.
+    #[arg(long, env = "FLUXGLOBE_FETCH_SLOWEST_BYTES_S", default_value_t = 4096,
+          value_parser = clap::value_parser!(u64).range(0..=1 << 30))]
+    pub fetch_slowest_bytes_s: u64,
     /// How long work that is under way may take after the service was asked to stop, seconds, at most an hour. What is not
     /// done then is done again by another process.
     #[arg(long, env = "FLUXGLOBE_DRAIN_S", default_value_t = 25,
@@ -113,6 +122,8 @@ impl ServiceSettings {
                 tries: self.fetch_tries,
                 away: Duration::from_secs(self.fetch_patience_s),
                 one_try: Duration::from_secs(self.fetch_limit_s),
+                silence: Duration::from_secs(self.fetch_silence_s),
+                slowest_bytes_s: self.fetch_slowest_bytes_s,
                 ..Patience::default()
             },
         };

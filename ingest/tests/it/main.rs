@@ -25,6 +25,7 @@ mod reread;
 mod sandbox;
 mod service;
 mod sign;
+mod slow_sources;
 mod stamps;
 mod survey;
 mod synthetic;
