@@ -4,21 +4,21 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use contract::event::{Body, MAX_EVENT_BYTES};
+use contract::event::{Body, MAX_EVENT_BYTES, RejectReason};
 use contract::time::Period;
 use contract::topic::Topic;
-use ingest::{IngestService, Outcome, Quiet};
+use ingest::{Batch, IngestService, Outcome, Quiet};
 use storage::log::{EmbeddedLog, EventLog as _};
 
-use crate::fixture::{Place, events, settings};
+use crate::fixture::{Place, SmallFile, events, refusal, settings};
 
 /// A period takes 62 bytes of an event: these are more than one may have, by a fifth.
 const STEPS: usize = 20_000;
 const HOUR_MS: i64 = 3_600_000;
-const LAT: [f64; 1] = [0.0];
-const LON: [f64; 2] = [-90.0, 90.0];
+const LAT: [f64; 2] = [45.0, -45.0];
+const LON: [f64; 4] = [-135.0, -45.0, 45.0, 135.0];
 
-/// Hourly maps of two cells from 2001 on.
+/// Hourly maps of eight cells from 2001 on.
 fn write(path: &Path) {
     let mut set = netcdf3::DataSet::new();
     set.add_global_attr_string("time_coverage_resolution", "PT1H")
@@ -107,4 +107,20 @@ async fn a_file_of_more_steps_than_an_event_can_list_lands_and_is_told_in_a_boun
         (&[whole][..], Some(STEPS as u64))
     );
     assert_eq!(*id, manifest.id());
+}
+
+#[tokio::test]
+async fn a_file_of_one_step_more_than_a_file_may_have_is_refused() {
+    let place = Place::new();
+    SmallFile::new().write_classic(&place.path("two.nc"));
+    let mut settings = settings();
+    settings.limits.steps = 1;
+    let batch = Batch {
+        files: vec![place.path("two.nc")],
+        ..Batch::default()
+    };
+    let landed = ingest::land_files(&place.store, &place.log, &settings, batch, &Quiet);
+    let (reason, line) = refusal(&landed.await.unwrap());
+    assert_eq!(reason, RejectReason::TooLarge, "{line}");
+    assert!(line.contains("2 steps, 1 to 1"), "{line}");
 }
