@@ -44,7 +44,7 @@ pub use note::{FileNote, notes};
 pub(crate) use note::put as put_note;
 pub use path::{Reading, read_path};
 pub(crate) use recognise::{TextFormat, recognise, recognise_text};
-pub use sink::{ObservationSink, SinkError, Stored};
+pub use sink::{ObservationSink, SinkCause, SinkError, Stored};
 
 /// Largest text file of observations, bytes: a ship's year every second has half of it.
 pub(crate) const MAX_TEXT_BYTES: u64 = 256 << 20;

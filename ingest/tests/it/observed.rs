@@ -8,7 +8,7 @@ use async_trait::async_trait;
 use contract::event::{Body, RejectReason};
 use contract::observation::Observation;
 use contract::topic::Topic;
-use ingest::observation::{ObservationSink, SinkError, Stored, notes};
+use ingest::observation::{ObservationSink, SinkCause, SinkError, Stored, notes};
 use ingest::{IngestService, Metrics, Quiet};
 use prometheus::Registry;
 use storage::log::{EmbeddedLog, EventLog};
@@ -31,13 +31,17 @@ fn write(place: &Place, name: &str, hot: usize) -> PathBuf {
     path
 }
 
-/// Keeps observations by what names them here: their time and property.
+/// Keeps observations, unless there is a cause not to.
 #[derive(Default)]
-struct Kept(Mutex<Vec<Observation>>);
+struct Kept(Mutex<Vec<Observation>>, Option<SinkCause>);
 
 #[async_trait]
 impl ObservationSink for Kept {
     async fn put(&self, observations: Vec<Observation>) -> Result<Stored, SinkError> {
+        if let Some(cause) = self.1 {
+            let source = "numeric field overflow".into();
+            return Err(SinkError { source, cause });
+        }
         let mut kept = self.0.lock().unwrap();
         let mut stored = Stored::default();
         for new in observations {
@@ -62,8 +66,12 @@ struct Station {
 
 impl Station {
     fn new() -> Self {
+        Self::with(Kept::default())
+    }
+
+    fn with(kept: Kept) -> Self {
         let (place, log) = (Place::new(), Arc::new(EmbeddedLog::memory()));
-        let (kept, registry) = (Arc::new(Kept::default()), Registry::new());
+        let (kept, registry) = (Arc::new(kept), Registry::new());
         let service = IngestService::new(
             place.store.clone(),
             Arc::clone(&log) as Arc<dyn EventLog>,
@@ -146,5 +154,22 @@ async fn a_file_of_which_much_cannot_be_true_is_refused_and_nothing_of_it_is_kep
     assert_eq!(*reason, RejectReason::Values);
     assert!(detail.starts_with("air_temperature: has 6 of 100"), "{detail}");
     assert!(station.kept.0.lock().unwrap().is_empty());
+    assert_eq!(notes(&station.place.store).await.unwrap(), vec![]);
+}
+
+/// What the store can never take is not tried for ever: the file is refused and the next one is stored.
+#[tokio::test]
+async fn observations_that_can_never_be_stored_refuse_their_file() {
+    let cause = Some(SinkCause::Observations);
+    let station = Station::with(Kept(Mutex::default(), cause));
+    station.land(write(&station.place, "a", 0)).await;
+    let refused = events(station.log.as_ref(), Topic::GranuleRejected).await;
+    let [event] = refused.as_slice() else {
+        panic!("{refused:?}")
+    };
+    let Body::GranuleRejected { detail, .. } = &event.body else {
+        panic!("{event:?}")
+    };
+    assert!(detail.contains("numeric field overflow"), "{detail}");
     assert_eq!(notes(&station.place.store).await.unwrap(), vec![]);
 }
