@@ -32,6 +32,8 @@ pub(super) struct Gathered {
     found: Vec<Observation>,
     /// Values outside the valid range that the file states.
     out_of_range: u64,
+    /// Values without a place or a time.
+    unplaced: u64,
     /// By property.
     tallies: BTreeMap<String, Tally>,
 }
@@ -80,6 +82,11 @@ impl Gathered {
         self.out_of_range += 1;
     }
 
+    /// Counts a value whose place or time the file does not say, or that cannot be.
+    pub(super) fn unplaced(&mut self) {
+        self.unplaced += 1;
+    }
+
     fn tally(&mut self, property: &str) -> &mut Tally {
         // Most observations are of a property that came before.
         if !self.tallies.contains_key(property) {
@@ -93,7 +100,7 @@ impl Gathered {
     /// What was found. A file of which much cannot be true is refused, and one without any observation: `why` is the
     /// reason if no value was found at all.
     pub(super) fn finish(self, why: Rejection) -> Result<Found, Rejection> {
-        let mut implausible = 0;
+        let mut implausible = self.unplaced;
         for (property, tally) in &self.tallies {
             let all = tally.taken + tally.implausible;
             if tally.implausible as f64 > MAX_IMPLAUSIBLE_SHARE * all as f64 {
@@ -112,7 +119,7 @@ impl Gathered {
         };
         if self.found.is_empty() && !masked.is_none() {
             let detail =
-                format!("holds no observation ({masked}); correct its valid range or fill value");
+                format!("holds no observation ({masked}); correct its places, times, valid range or fill value");
             return Err(Rejection::new(RejectReason::Values, "file", detail));
         }
         if self.found.is_empty() {

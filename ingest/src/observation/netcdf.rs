@@ -125,65 +125,69 @@ async fn take(
         .collect();
     let mut cell = vec![0; lens.len()];
     for (at, stored) in stored.into_iter().enumerate() {
-        let number = match packing.unpacked(stored) {
-            Unpacked::Value(number) => number,
-            Unpacked::Missing => continue,
-            Unpacked::OutOfRange => {
-                gathered.out_of_range();
-                continue;
-            }
-        };
-        let value = match measured.conversion.given(number) {
-            Given::Value(value) => value,
-            Given::Missing => continue,
-            Given::Implausible(value) => {
-                gathered.implausible(&measured.conversion, value);
-                continue;
-            }
-        };
+        let number = packing.unpacked(stored);
+        if number == Unpacked::Missing {
+            continue;
+        }
         let mut rest = at;
         for (index, len) in cell.iter_mut().zip(&lens).rev() {
             *index = rest % len;
             rest /= len;
         }
-        if let Some(observation) = sample(measured, shared, &cell, value)? {
-            gathered.take(observation)?;
-        }
+        sample(measured, shared, &cell, number, gathered)?;
     }
     Ok(())
 }
 
-/// The observation of one cell; none where there is no place or time, or its flag says that there is no value.
+/// Takes the observation of one cell, or counts why its number is none; unless its flag says that there is no value.
 fn sample(
     measured: &Measured<'_>,
     shared: &Shared,
     cell: &[usize],
-    value: f64,
-) -> Result<Option<Observation>, Rejection> {
+    number: Unpacked,
+    gathered: &mut Gathered,
+) -> Result<(), Rejection> {
     let at = |coordinate: &Coordinate| coordinate.at(cell, &shared.sampling);
-    let (time, lat_deg, lon_deg) = (
-        at(&measured.time),
-        at(&measured.latitude),
-        at(&measured.longitude),
-    );
-    if time.is_nan() || lat_deg.is_nan() || lon_deg.is_nan() {
-        return Ok(None);
-    }
-    let depth_m = match &measured.depth {
-        Some((coordinate, to)) => at(coordinate) * to.factor,
-        None => 0.0,
-    };
     let verdicts = measured
         .flags
         .iter()
         .map(|(flag, scheme)| scheme.verdict(at(flag)));
     let verdict: Option<Verdict> = verdicts.reduce(worse);
     let Some(quality) = verdict.unwrap_or(Some(Quality::NotEvaluated)) else {
-        return Ok(None);
+        return Ok(());
     };
     let conversion = &measured.conversion;
+    let value = match number {
+        Unpacked::Value(number) => conversion.given(number),
+        Unpacked::Missing => Given::Missing,
+        Unpacked::OutOfRange => {
+            gathered.out_of_range();
+            return Ok(());
+        }
+    };
+    let value = match value {
+        Given::Value(value) => value,
+        Given::Missing => return Ok(()),
+        Given::Implausible(value) => {
+            gathered.implausible(conversion, value);
+            return Ok(());
+        }
+    };
+    let (time, lat_deg, lon_deg) = (
+        at(&measured.time),
+        at(&measured.latitude),
+        at(&measured.longitude),
+    );
+    if time.is_nan() || lat_deg.is_nan() || lon_deg.is_nan() {
+        gathered.unplaced();
+        return Ok(());
+    }
+    let depth_m = match &measured.depth {
+        Some((coordinate, to)) => at(coordinate) * to.factor,
+        None => 0.0,
+    };
     let is_longitude = conversion.property == "longitude";
-    Ok(Some(Observation {
+    gathered.take(Observation {
         dataset: shared.dataset.clone(),
         platform: shared.sampling.name(measured.variable, cell),
         kind: shared.kind,
@@ -199,7 +203,7 @@ fn sample(
         },
         unit: conversion.unit.clone(),
         quality,
-    }))
+    })
 }
 
 fn instant(measured: &Measured<'_>, number: f64) -> Result<TimeMs, Rejection> {

@@ -110,7 +110,10 @@ pub(super) fn read(content: &[u8], source: Source<'_>) -> Result<Found, Rejectio
                 good += 1;
                 reading.take(&columns, &row)?;
             }
-            None => bad += 1,
+            None => {
+                bad += 1;
+                reading.pass_over(&columns, &record);
+            }
         }
     }
     if bad * READABLE_IN > good + bad {
@@ -162,6 +165,17 @@ impl Reading {
         Ok(())
     }
 
+    /// Counts the values of a row without a place or a time.
+    fn pass_over(&mut self, columns: &Columns, record: &ByteRecord) {
+        for measured in &columns.measured {
+            let number = number(record, measured.at);
+            let given = number.map(|number| measured.conversion.given(number));
+            if matches!(given, Some(Given::Value(_) | Given::Implausible(_))) {
+                self.gathered.unplaced();
+            }
+        }
+    }
+
     /// The observations, now that it is known who moved.
     fn finish(self) -> Result<Found, Rejection> {
         let none = Rejection::new(RejectReason::Values, "file", "holds no measured value");
@@ -197,6 +211,12 @@ impl Span {
     }
 }
 
+/// The number in a field of a row.
+fn number(record: &ByteRecord, at: usize) -> Option<f64> {
+    let text = std::str::from_utf8(record.get(at)?).ok()?;
+    text.trim().parse().ok()
+}
+
 /// A row with a place and a time.
 struct Row<'a> {
     record: &'a ByteRecord,
@@ -222,14 +242,11 @@ impl<'a> Row<'a> {
         std::str::from_utf8(self.record.get(at?)?).ok()
     }
 
-    fn number(&self, at: usize) -> Option<f64> {
-        self.text(Some(at))?.trim().parse().ok()
-    }
 
     /// A depth or a flag.
     fn remark(&self, at: usize) -> Option<f64> {
         let is_one = |number: &f64| *number > MISSING_BELOW && *number < MISSING_ABOVE;
-        self.number(at).filter(is_one)
+        number(self.record, at).filter(is_one)
     }
 
     /// What was measured, what its number is, and its depth and quality; not what its flag calls missing.
@@ -240,7 +257,7 @@ impl<'a> Row<'a> {
         let depth_m = columns.depth.and_then(|at| self.remark(at)).unwrap_or(0.0);
         let flag = columns.flag.and_then(|at| self.remark(at));
         columns.measured.iter().filter_map(move |measured| {
-            let value = measured.conversion.given(self.number(measured.at)?);
+            let value = measured.conversion.given(number(self.record, measured.at)?);
             let quality = match flag {
                 Some(flag) if measured.is_flagged => Scheme::Woce.verdict(flag)?,
                 _ => Quality::NotEvaluated,
@@ -304,6 +321,9 @@ mod tests {
         let text = format!("{TABLE}{}{hot}", row.repeat(40));
         let found = read(text.as_bytes(), SOURCE).unwrap();
         assert_eq!(found.masked.implausible, 2, "-999 is none of them");
+        let lost = row.replace("70.9", "95.0");
+        let found = read(format!("{text}{lost}").as_bytes(), SOURCE).unwrap();
+        assert_eq!(found.masked.implausible, 2 + 3, "no place has such values");
         let refused = read(format!("{text}{}", hot.repeat(3)).as_bytes(), SOURCE).unwrap_err();
         assert_eq!(refused.reason, RejectReason::Values, "{refused}");
     }
