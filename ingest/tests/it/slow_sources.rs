@@ -33,8 +33,14 @@ async fn a_file_of_a_sound_source_lands_while_others_trickle_and_are_silent() {
     notices.push(notice(&sound.url("/a.h5"), None, None));
     log.append(&notices).await.unwrap();
     // Longer than this test waits: none of them is given up meanwhile.
-    let flags = ["--allow-host", "127.0.0.1", "--fetch-silence-s", "600"];
-    let flags = [&flags[..], &["--fetch-slowest-bytes-s", "0"]].concat();
+    let flags = [
+        "--allow-host",
+        "127.0.0.1",
+        "--fetch-silence-s",
+        "600",
+        "--fetch-slowest-bytes-s",
+        "0",
+    ];
     let service = IngestService::new(
         place.store.clone(),
         Arc::clone(&log) as Arc<dyn EventLog>,
