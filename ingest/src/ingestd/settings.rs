@@ -66,7 +66,8 @@ pub struct ServiceSettings {
     #[arg(long, env = "FLUXGLOBE_PARALLEL_BYTES", default_value_t = 1 << 30,
           value_parser = clap::value_parser!(u64).range(MIB..=TIB))]
     pub parallel_bytes: u64,
-    /// Notices that are under way at the same time, waiting for their source included, 1 to 1024.
+    /// Notices that are under way at the same time, 1 to 1024. Those that wait for a source that is slow or away are not
+    /// counted, up to 16 times as many.
     #[arg(long, env = "FLUXGLOBE_PARALLEL_NOTICES", default_value_t = 64,
           value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub parallel_notices: u16,
