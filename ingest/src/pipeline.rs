@@ -87,7 +87,8 @@ impl Pipeline<'_> {
     ) -> Result<Prepared, IngestError> {
         let mut was_killed = false;
         for _ in 0..MAX_READS {
-            let stages = boundary::contained(Box::pin(self.stages(shown, order, place, source_wait)));
+            let stages =
+                boundary::contained(Box::pin(self.stages(shown, order, place, source_wait)));
             let stages = stages.await;
             match stages.unwrap_or_else(|panic| Err(panic.into())) {
                 Ok(prepared) => return Ok(prepared),

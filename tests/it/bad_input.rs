@@ -125,7 +125,8 @@ fn what_is_no_observation_is_listed() {
     assert_eq!(landed["masked"], serde_json::json!({"implausible": 1}));
     let listed = program::run(data.path(), &["observations", "list"]).unwrap();
     let talk = String::from_utf8(listed.stderr).unwrap();
-    let warning = "ndbc: 1 value masked (1 implausible) in 1 of 1 files; most in 44005h2012.txt, 1 beside 47";
+    let warning =
+        "ndbc: 1 value masked (1 implausible) in 1 of 1 files; most in 44005h2012.txt, 1 beside 47";
     assert!(talk.contains(warning), "{talk}");
 }
 

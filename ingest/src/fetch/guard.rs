@@ -194,10 +194,10 @@ impl Guarded {
             chunks,
             length,
             most: self.most(limits),
-            slowest: Slowest {
+            slowest: Some(Slowest {
                 bytes_s: slowest_bytes_s,
                 within: silence,
-            },
+            }),
         };
         keep.check_length(expected)?;
         let waiting = Instant::now();

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use bytes::Bytes;
+use futures::StreamExt as _;
 use futures::stream::BoxStream;
 use tokio::io::{AsyncWriteExt as _, BufWriter};
 
@@ -26,8 +27,8 @@ pub(super) struct Keep<'a> {
     pub(super) length: Option<u64>,
     /// What is allowed, bytes.
     pub(super) most: u64,
-    /// The slowest that it may come.
-    pub(super) slowest: Slowest,
+    /// The slowest that it may come; as it likes if absent.
+    pub(super) slowest: Option<Slowest>,
 }
 
 impl Keep<'_> {
@@ -43,8 +44,11 @@ impl Keep<'_> {
         let writer = tokio::fs::File::from_std(spooled.file().try_clone().map_err(unwritten)?);
         let mut writer = BufWriter::with_capacity(WRITE_BYTES, writer);
         let mut check = Check::of(expected)?;
-        let mut pace = Pace::new(self.slowest);
-        while let Some(chunk) = pace.next(&mut self.chunks).await {
+        let mut pace = self.slowest.map(Pace::new);
+        while let Some(chunk) = match &mut pace {
+            Some(pace) => pace.next(&mut self.chunks).await,
+            None => self.chunks.next().await,
+        } {
             let chunk = chunk?;
             check.update(&chunk)?;
             if check.size_bytes() > room {

@@ -104,7 +104,11 @@ mod tests {
 
     #[tokio::test]
     async fn a_source_that_trickles_or_is_silent_is_left_and_others_are_not() {
-        let all = (sent(1000, 1, 20), sent(2, 1 << 20, 60_000), sent(60, 200, 50));
+        let all = (
+            sent(1000, 1, 20),
+            sent(2, 1 << 20, 60_000),
+            sent(60, 200, 50),
+        );
         let (slow, silent, good) = tokio::join!(all.0, all.1, all.2);
         let slow = slow.unwrap_err();
         assert!(slow.contains("bytes came in"), "{slow}");

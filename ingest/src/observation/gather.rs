@@ -118,8 +118,9 @@ impl Gathered {
             ..MaskedCells::default()
         };
         if self.found.is_empty() && !masked.is_none() {
-            let detail =
-                format!("holds no observation ({masked}); correct its places, times, valid range or fill value");
+            let detail = format!(
+                "holds no observation ({masked}); correct its places, times, valid range or fill value"
+            );
             return Err(Rejection::new(RejectReason::Values, "file", detail));
         }
         if self.found.is_empty() {

@@ -77,11 +77,7 @@ async fn reading(
 }
 
 /// Observations of a text file; none if it is no text of observations.
-fn text(
-    path: &Path,
-    source: Source<'_>,
-    limits: Limits,
-) -> Result<Option<Found>, Rejection> {
+fn text(path: &Path, source: Source<'_>, limits: Limits) -> Result<Option<Found>, Rejection> {
     let unreadable = |e: std::io::Error| {
         Rejection::new(
             RejectReason::Unreadable,

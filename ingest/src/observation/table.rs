@@ -242,7 +242,6 @@ impl<'a> Row<'a> {
         std::str::from_utf8(self.record.get(at?)?).ok()
     }
 
-
     /// A depth or a flag.
     fn remark(&self, at: usize) -> Option<f64> {
         let is_one = |number: &f64| *number > MISSING_BELOW && *number < MISSING_ABOVE;

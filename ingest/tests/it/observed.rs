@@ -143,7 +143,9 @@ async fn what_is_no_observation_is_counted_once_and_kept_with_its_file() {
 #[tokio::test]
 async fn a_file_of_which_much_cannot_be_true_is_refused_and_nothing_of_it_is_kept() {
     let station = Station::new();
-    station.land(write(&station.place, "a", LINES / 20 + 1)).await;
+    station
+        .land(write(&station.place, "a", LINES / 20 + 1))
+        .await;
     let refused = events(station.log.as_ref(), Topic::GranuleRejected).await;
     let [event] = refused.as_slice() else {
         panic!("{refused:?}")
@@ -152,7 +154,10 @@ async fn a_file_of_which_much_cannot_be_true_is_refused_and_nothing_of_it_is_kep
         panic!("{event:?}")
     };
     assert_eq!(*reason, RejectReason::Values);
-    assert!(detail.starts_with("air_temperature: has 6 of 100"), "{detail}");
+    assert!(
+        detail.starts_with("air_temperature: has 6 of 100"),
+        "{detail}"
+    );
     assert!(station.kept.0.lock().unwrap().is_empty());
     assert_eq!(notes(&station.place.store).await.unwrap(), vec![]);
 }

@@ -83,7 +83,10 @@ async fn a_reader_that_floods_or_lies_is_not_believed() {
 async fn a_reader_that_dies_while_its_file_is_planned_refuses_it_and_the_next_one_lands() {
     for (end, reason) in [
         ("kill -SEGV $$", RejectReason::Corrupt),
-        ("echo memory allocation failed >&2; exit 1", RejectReason::TooLarge),
+        (
+            "echo memory allocation failed >&2; exit 1",
+            RejectReason::TooLarge,
+        ),
         ("yes", RejectReason::Corrupt),
     ] {
         let (place, log) = (Place::new(), Arc::new(EmbeddedLog::memory()));
@@ -103,7 +106,11 @@ async fn a_reader_that_dies_while_its_file_is_planned_refuses_it_and_the_next_on
         let stages = Stages::default();
         let outcomes = service.drain(&stages).await.unwrap();
         assert_eq!(refusal(&outcomes[..1]).0, reason, "{}", outcomes[0]);
-        assert!(matches!(outcomes[1], Outcome::Landed { .. }), "{}", outcomes[1]);
+        assert!(
+            matches!(outcomes[1], Outcome::Landed { .. }),
+            "{}",
+            outcomes[1]
+        );
         assert_eq!(stages.last_of("bad.nc"), Some(Stage::Plan));
         assert_eq!(log.lag(Topic::GranuleNotice, "ingest").await.unwrap(), 0);
     }
@@ -147,11 +154,15 @@ fn nothing_but_the_reader_process_opens_data_files() {
     files(&root, &mut found);
     let opens = |path: &PathBuf| {
         let text = std::fs::read_to_string(path).unwrap();
-        ["hdf5::", "netcdf3::", "DataFile"].iter().any(|word| text.contains(word))
+        ["hdf5::", "netcdf3::", "DataFile"]
+            .iter()
+            .any(|word| text.contains(word))
     };
     let own = |path: &PathBuf| {
         let path = path.strip_prefix(&root).unwrap();
-        let folders = ["file", "generate"].iter().any(|folder| path.starts_with(folder));
+        let folders = ["file", "generate"]
+            .iter()
+            .any(|folder| path.starts_with(folder));
         folders || path == Path::new("file.rs") || path == Path::new("decoder/child.rs")
     };
     let (known, others): (Vec<_>, Vec<_>) = found.into_iter().filter(opens).partition(own);

@@ -240,22 +240,31 @@ async fn rows_the_other_way_round() {
 #[tokio::test]
 async fn values_outside_the_range_of_their_file_are_counted_and_fill_values_are_not() {
     let folder = tempfile::tempdir().unwrap();
-    let mut draft = Draft::new("timeSeries", &[("platform", 1), ("time", 5), ("letters", 2)])
-        .names("platform", "timeseries_id", "aa")
-        .axes("platform", "time", 1, 5)
-        .variable(
-            "sst",
-            &["platform", "time"],
-            SST,
-            vec![11.0, 12.0, f64::NAN, 21.0, 22.0],
-        );
-    draft.set.add_var_attr_f64("sst", "valid_max", vec![20.0]).unwrap();
+    let mut draft = Draft::new(
+        "timeSeries",
+        &[("platform", 1), ("time", 5), ("letters", 2)],
+    )
+    .names("platform", "timeseries_id", "aa")
+    .axes("platform", "time", 1, 5)
+    .variable(
+        "sst",
+        &["platform", "time"],
+        SST,
+        vec![11.0, 12.0, f64::NAN, 21.0, 22.0],
+    );
+    draft
+        .set
+        .add_var_attr_f64("sst", "valid_max", vec![20.0])
+        .unwrap();
     let path = draft.write(folder.path());
     let Reading::Observations(found) = read_path(&path, None, &settings()).await.unwrap() else {
         panic!("refused")
     };
     assert_eq!(found.observations.len(), 2);
-    assert_eq!((found.masked.out_of_range, found.masked.implausible), (2, 0));
+    assert_eq!(
+        (found.masked.out_of_range, found.masked.implausible),
+        (2, 0)
+    );
 }
 
 #[tokio::test]
