@@ -166,8 +166,9 @@ mod tests {
             .map(|_| taken(&turns, &source).unwrap())
             .collect();
         source.is_away("no answer");
-        let why = turns.take(&source, Duration::ZERO).await.unwrap_err();
-        assert_eq!(why, "no answer");
+        let waiting = turns.take(&source, Duration::ZERO);
+        let told = tokio::time::timeout(Duration::from_mins(1), waiting).await;
+        assert_eq!(told.unwrap().unwrap_err(), "no answer");
         // One that answers is waited for, however long.
         source.answered();
         let waiting = turns.take(&source, Duration::ZERO);

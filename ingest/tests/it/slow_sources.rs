@@ -75,7 +75,10 @@ async fn a_source_that_trickles_or_is_silent_is_given_up() {
     let flags = ["--allow-host", "127.0.0.1", "--fetch-silence-s", "1"];
     let settings = guarded(&place, &flags).unwrap();
     for (server, words) in [(trickling, "bytes came in"), (silent, "no answer in 1 s")] {
-        let (reason, line) = refused(&place, &settings, &server.url("/a.h5")).await;
+        let url = server.url("/a.h5");
+        let refused = refused(&place, &settings, &url);
+        let refused = tokio::time::timeout(Duration::from_mins(2), refused).await;
+        let (reason, line) = refused.expect("it is waited for without end");
         assert_eq!(reason, RejectReason::Unavailable, "{line}");
         assert!(line.contains(words), "{line}");
         assert!(!server.asked().is_empty(), "the fault fired");
