@@ -28,6 +28,8 @@ pub enum Kind {
     Observations,
     /// Which file holds which month of a dataset.
     ObservationIndex,
+    /// What a file of observations held, and what of it is none.
+    ObservationFile,
     /// What a file was read as.
     Reading,
     /// Which notice landed a file.
@@ -53,7 +55,7 @@ pub enum Vouched {
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 17] = [
         Self::Raw,
         Self::Frame,
         Self::Contributed,
@@ -65,6 +67,7 @@ impl Kind {
         Self::Accumulating,
         Self::Observations,
         Self::ObservationIndex,
+        Self::ObservationFile,
         Self::Reading,
         Self::Landing,
         Self::Check,
@@ -86,6 +89,7 @@ impl Kind {
             Self::Accumulating => "accumulating",
             Self::Observations => "observations",
             Self::ObservationIndex => "observation-indexes",
+            Self::ObservationFile => "observation-files",
             Self::Reading => "readings",
             Self::Landing => "landings",
             Self::Check => "checks",

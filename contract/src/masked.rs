@@ -1,6 +1,7 @@
 //! Cells of a map that the file gives a value for and that hold none here: how many, and why.
 //!
-//! A cell that the file itself calls empty (a fill value) is none of them.
+//! A cell that the file itself calls empty (a fill value) is none of them. Values of files of observations are counted in
+//! the same way.
 
 use serde::{Deserialize, Serialize};
 

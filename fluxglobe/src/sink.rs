@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use async_trait::async_trait;
 use contract::observation::Observation;
-use ingest::observation::{ObservationSink, SinkError, Stored};
-use observations::ObservationStore;
+use ingest::observation::{ObservationSink, SinkCause, SinkError, Stored};
+use observations::{ErrorClass, ObservationStore};
 
 /// An observation store as ingest's sink.
 pub(crate) struct Sink(pub(crate) Arc<dyn ObservationStore>);
@@ -14,10 +14,14 @@ pub(crate) struct Sink(pub(crate) Arc<dyn ObservationStore>);
 impl ObservationSink for Sink {
     async fn put(&self, observations: Vec<Observation>) -> Result<Stored, SinkError> {
         let counts = self.0.upsert(&observations).await.map_err(|error| {
-            let is_retryable = error.is_retryable();
+            let cause = match error.class() {
+                ErrorClass::Retryable => SinkCause::Passing,
+                ErrorClass::Internal => SinkCause::Store,
+                ErrorClass::BadRequest => SinkCause::Observations,
+            };
             SinkError {
                 source: Box::new(error),
-                is_retryable,
+                cause,
             }
         })?;
         Ok(Stored {

@@ -20,6 +20,7 @@ use crate::pipeline::Prepared;
 use crate::put::StoredGranule;
 use crate::rejection::Rejection;
 use crate::settings::Settings;
+use crate::source_wait::SourceWait;
 use crate::superseded;
 
 /// What a notice is answered with.
@@ -37,6 +38,7 @@ pub(crate) struct Asked {
     pub(crate) origin: Option<Origin>,
     /// Number of the file among those of the message.
     pub(crate) file: u32,
+    pub(crate) source_wait: SourceWait,
 }
 
 /// A file whose objects are durable, or its answer.
@@ -54,6 +56,7 @@ impl Asked {
             notice,
             origin: Some(message.origin),
             file,
+            source_wait: SourceWait::default(),
         };
         (0..).zip(notices).map(asked).collect()
     }
@@ -118,9 +121,17 @@ impl Asked {
                 ..granule
             }),
             Prepared::Rejected(rejection) => Ready::Answered(self.refused(rejection)),
-            Prepared::Observed(stored) => {
-                let file = self.path();
-                let outcome = Outcome::Observed { file, stored };
+            Prepared::Observed {
+                dataset,
+                stored,
+                masked,
+            } => {
+                let outcome = Outcome::Observed {
+                    file: self.path(),
+                    dataset,
+                    stored,
+                    masked,
+                };
                 Ready::Answered(self.answer(outcome, None, true))
             }
             Prepared::AlreadyLanded {

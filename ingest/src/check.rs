@@ -9,7 +9,7 @@ use crate::decode::DecodedGrid;
 use crate::rejection::Rejection;
 
 /// Share of the valid values that may be implausible (and is masked); more than that is a wrong unit or a wrong scale.
-const MAX_IMPLAUSIBLE_SHARE: f64 = 0.05;
+pub(crate) const MAX_IMPLAUSIBLE_SHARE: f64 = 0.05;
 
 /// One step whose values can be true.
 #[derive(Debug, Clone, PartialEq)]

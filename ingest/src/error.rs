@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use contract::ContractError;
 use storage::StorageError;
 
+use crate::observation::SinkCause;
 use crate::rejection::Rejection;
 
 /// A failure of ingest itself. A bad file is a [`Rejection`], never one of these.
@@ -165,12 +166,15 @@ impl IngestError {
                 _ if source.is_not_found() => Cause::Stored,
                 _ => Cause::Place,
             },
-            Self::Observations { source } if source.is_retryable => Cause::Passing,
+            Self::Observations { source } => match source.cause {
+                SinkCause::Passing => Cause::Passing,
+                SinkCause::Store => Cause::Place,
+                SinkCause::Observations => Cause::Granule,
+            },
             Self::Changed { .. } | Self::Contended { .. } | Self::Spool { .. } | Self::Killed => {
                 Cause::Passing
             }
-            Self::Observations { .. }
-            | Self::Spawn { .. }
+            Self::Spawn { .. }
             | Self::Pipe { .. }
             | Self::Setting { .. }
             | Self::Client { .. }

@@ -11,10 +11,12 @@ mod keep;
 mod local;
 mod location;
 mod object;
+mod pace;
 mod patience;
 mod raw;
 mod spool;
 mod stored;
+mod turns;
 
 pub(crate) use checksum::{Expected, Method};
 pub(crate) use guard::Allowed;

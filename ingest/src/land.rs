@@ -24,6 +24,7 @@ use crate::profile::Profile;
 use crate::progress::{Progress, Stage};
 use crate::put::StoredGranule;
 use crate::settings::Settings;
+use crate::source_wait::SourceWait;
 
 /// Files that are published together: bounds what a crash makes be done again.
 pub(crate) const COMMIT_FILES: usize = 64;
@@ -97,6 +98,7 @@ fn asked(path: &std::path::Path, batch: &Batch<'_>) -> Asked {
         notice,
         origin: None,
         file: 0,
+        source_wait: SourceWait::default(),
     }
 }
 
@@ -145,7 +147,7 @@ pub(crate) async fn prepare(pipeline: &Pipeline<'_>, asked: &Asked) -> Result<Re
     let prepared = match &asked.notice.order {
         Ok(order) => {
             pipeline
-                .prepare(&asked.path(), order, asked.order())
+                .prepare(&asked.path(), order, asked.order(), &asked.source_wait)
                 .await?
         }
         Err(rejection) => Prepared::Rejected(rejection.clone()),

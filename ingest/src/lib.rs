@@ -41,6 +41,7 @@ mod rejection;
 pub mod reread;
 mod room;
 mod settings;
+mod source_wait;
 mod superseded;
 mod survey;
 mod unit;

@@ -63,7 +63,12 @@ pub(crate) fn of_series<'a>(granules: impl IntoIterator<Item = &'a StoredGranule
         let most = MAX_SEGMENT_VALUES.max(cells);
         cells.saturating_mul(steps.min(MAX_SEGMENT_STEPS)).min(most)
     });
-    values.max().unwrap_or(0) as u64 * SERIES_BYTES
+    of_segment(values.max().unwrap_or(0))
+}
+
+/// A segment of a series of so many values, as maps and as runs of cells.
+pub(crate) fn of_segment(values: usize) -> u64 {
+    (values as u64).saturating_mul(SERIES_BYTES)
 }
 
 /// Observations that are gathered before they are stored.

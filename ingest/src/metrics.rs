@@ -67,7 +67,7 @@ impl Metrics {
             masked: IntCounterVec::new(
                 Opts::new(
                     "fluxglobe_ingestd_masked_cells_total",
-                    "Cells of landed files that the file gave a value for and that hold none, by why.",
+                    "Cells that landed files gave a value for and that hold none, and values of files of observations that are none, by product or dataset and why.",
                 ),
                 &["product", "reason"],
             )?,

@@ -18,6 +18,7 @@ mod measured;
 mod name;
 mod ndbc;
 mod netcdf;
+mod note;
 mod path;
 mod property;
 mod quality;
@@ -29,7 +30,6 @@ mod table;
 mod table_columns;
 mod table_time;
 
-use contract::observation::Observation;
 use contract::product::ProductId;
 
 use crate::decoder::session::Session;
@@ -38,10 +38,13 @@ use crate::file::description::Description;
 use crate::rejection::Rejection;
 
 pub(crate) use coordinate::MAX_VALUES;
+pub use gather::Found;
 pub(crate) use gather::{MAX_OBSERVATIONS, OBSERVATION_BYTES};
+pub(crate) use note::put as put_note;
+pub use note::{FileNote, notes};
 pub use path::{Reading, read_path};
 pub(crate) use recognise::{TextFormat, recognise, recognise_text};
-pub use sink::{ObservationSink, SinkError, Stored};
+pub use sink::{ObservationSink, SinkCause, SinkError, Stored};
 
 /// Largest text file of observations, bytes: a ship's year every second has half of it.
 pub(crate) const MAX_TEXT_BYTES: u64 = 256 << 20;
@@ -55,21 +58,21 @@ pub(crate) struct Source<'a> {
     pub(crate) dataset: Option<&'a ProductId>,
 }
 
-/// Observations of a NetCDF file that [`recognise`] knows.
+/// What a NetCDF file holds that [`recognise`] knows.
 pub(crate) async fn read(
     session: &mut Session,
     description: &Description,
     source: Source<'_>,
-) -> Result<Vec<Observation>, Stop> {
+) -> Result<Found, Stop> {
     netcdf::read(session, description, source).await
 }
 
-/// Observations of a text file that [`recognise_text`] knows.
+/// What a text file holds that [`recognise_text`] knows.
 pub(crate) fn read_text(
     format: TextFormat,
     content: &[u8],
     source: Source<'_>,
-) -> Result<Vec<Observation>, Rejection> {
+) -> Result<Found, Rejection> {
     match format {
         TextFormat::Ndbc => ndbc::read(content, source),
         TextFormat::Table => table::read(content, source),

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use contract::event::{Body, RejectReason};
 use contract::manifest::ManifestId;
 use contract::masked::MaskedCells;
+use contract::product::ProductId;
 use contract::time::Period;
 use contract::topic::Origin;
 
@@ -52,8 +53,12 @@ pub enum Outcome {
     Observed {
         /// The file.
         file: PathBuf,
+        /// Their dataset.
+        dataset: ProductId,
         /// What became of them.
         stored: Stored,
+        /// Values that it gave and that are no observations.
+        masked: MaskedCells,
     },
     /// It was refused.
     Rejected {
@@ -98,11 +103,13 @@ impl Outcome {
         }
     }
 
-    /// Cells that the file gave a value for and that hold none, if it is in a product.
+    /// Cells that the file gave a value for and that hold none, if it is in a product; values that are no observations.
     pub fn masked(&self) -> Option<MaskedCells> {
         match self {
-            Self::Landed { masked, .. } | Self::AlreadyLanded { masked, .. } => Some(*masked),
-            Self::Superseded { .. } | Self::Observed { .. } | Self::Rejected { .. } => None,
+            Self::Landed { masked, .. }
+            | Self::AlreadyLanded { masked, .. }
+            | Self::Observed { masked, .. } => Some(*masked),
+            Self::Superseded { .. } | Self::Rejected { .. } => None,
         }
     }
 
@@ -211,14 +218,22 @@ impl Display for Outcome {
                 "{}: left as it is: {manifest} has files of later notices for its time; to land it all the same, send a new notice",
                 file.display()
             ),
-            Self::Observed { file, stored } => write!(
-                f,
-                "{}: {} observations are new, {} replaced, {} were there",
-                file.display(),
-                stored.new,
-                stored.replaced,
-                stored.same
-            ),
+            Self::Observed {
+                file,
+                stored,
+                masked,
+                ..
+            } => {
+                let gap = if masked.is_none() { "" } else { "; " };
+                write!(
+                    f,
+                    "{}: {} observations are new, {} replaced, {} were there{gap}{masked}",
+                    file.display(),
+                    stored.new,
+                    stored.replaced,
+                    stored.same
+                )
+            }
             Self::Rejected {
                 file,
                 object,

@@ -10,6 +10,7 @@ use contract::key::ObjectKey;
 use contract::manifest::{Manifest, ManifestId};
 use contract::masked::MaskedCells;
 use contract::notice::NoticeOrder;
+use contract::product::ProductId;
 use contract::time::Period;
 use storage::{StorageError, Store, manifests};
 
@@ -27,6 +28,7 @@ use crate::put::{StoredGranule, StoredGrid};
 use crate::reading::Reading;
 use crate::rejection::Rejection;
 use crate::settings::Settings;
+use crate::source_wait::SourceWait;
 use crate::{boundary, check, decode, encode, fetch, inspect, memory, observation, plan, put};
 
 /// Times a file that changes under our hands is read again.
@@ -53,7 +55,11 @@ pub(crate) enum Prepared {
         periods: Vec<Period>,
     },
     /// Nothing: it held observations, which are stored.
-    Observed(Stored),
+    Observed {
+        dataset: ProductId,
+        stored: Stored,
+        masked: MaskedCells,
+    },
     /// Nothing: it is refused.
     Rejected(Rejection),
 }
@@ -77,10 +83,13 @@ impl Pipeline<'_> {
         shown: &Path,
         order: &Order,
         place: Option<NoticeOrder>,
+        source_wait: &SourceWait,
     ) -> Result<Prepared, IngestError> {
         let mut was_killed = false;
         for _ in 0..MAX_READS {
-            let stages = boundary::contained(Box::pin(self.stages(shown, order, place))).await;
+            let stages =
+                boundary::contained(Box::pin(self.stages(shown, order, place, source_wait)));
+            let stages = stages.await;
             match stages.unwrap_or_else(|panic| Err(panic.into())) {
                 Ok(prepared) => return Ok(prepared),
                 Err(Stop::Rejected(rejection)) => return Ok(Prepared::Rejected(rejection)),
@@ -113,13 +122,14 @@ impl Pipeline<'_> {
         shown: &Path,
         order: &Order,
         place: Option<NoticeOrder>,
+        source_wait: &SourceWait,
     ) -> Result<Prepared, Stop> {
         let Self {
             settings, metrics, ..
         } = self;
         self.progress.stage(shown, Stage::Fetch, 0, 0);
         let fetched = fetch::run(&order.location, &order.expected, settings);
-        let raw = metrics.timed("fetch", fetched).await?;
+        let raw = metrics.timed("fetch", source_wait.during(fetched)).await?;
         metrics.fetched(raw.size_bytes);
         let seat = self.gates.seat().await;
         let read = self

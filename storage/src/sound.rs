@@ -55,6 +55,7 @@ pub(crate) fn of_bytes(key: &ObjectKey, content: &[u8]) -> Result<Soundness, Sto
                 Kind::Manifest
                 | Kind::Sums
                 | Kind::ObservationIndex
+                | Kind::ObservationFile
                 | Kind::Reading
                 | Kind::Check
                 | Kind::Protocol,
@@ -99,6 +100,7 @@ pub fn of_object(key: &ObjectKey, content: &Bytes) -> Result<Soundness, StorageE
                 Kind::Manifest
                 | Kind::Sums
                 | Kind::ObservationIndex
+                | Kind::ObservationFile
                 | Kind::Reading
                 | Kind::Check
                 | Kind::Protocol,

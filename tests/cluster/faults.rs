@@ -31,8 +31,11 @@ const FOUGHT: &str = "fgco2";
 /// Months that are there before the first kill.
 const FIRST_MONTHS: usize = 4;
 /// The error budget: how many questions may go without an answer, and for how long in a row. Two tile servers are asked,
-/// one after the other. A wrong answer is none too many.
-const MISSING_SHARE: f64 = 0.25;
+/// one after the other, so that one of them always can answer: of 377 questions none went without. A few may, where a
+/// machine is so slow that both are busy; a wrong answer is none too many. The time says that something stood still, not
+/// how fast it has to be.
+const MISSING_SHARE: f64 = 0.02;
+const MISSING_FEW: f64 = 2.0;
 const LONGEST_GAP: Duration = Duration::from_mins(1);
 /// A place with data: longitude and latitude, degrees.
 const PLACE: (&str, &str) = ("-150", "2");
@@ -310,10 +313,10 @@ fn assert_answered(load: Load) {
             "nothing was answered: the load asked nothing"
         );
         let asked = (tally.right + tally.missing) as f64;
-        let share = tally.missing as f64 / asked;
+        let missing = tally.missing as f64;
         assert!(
-            share <= MISSING_SHARE,
-            "{share} of the questions had no answer"
+            missing <= MISSING_FEW + MISSING_SHARE * asked,
+            "{missing} of {asked} questions had no answer"
         );
         assert!(tally.longest_gap <= LONGEST_GAP, "{:?}", tally.longest_gap);
     }

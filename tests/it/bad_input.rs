@@ -111,6 +111,26 @@ fn what_is_masked_is_counted_where_people_look() {
 }
 
 #[test]
+fn what_is_no_observation_is_listed() {
+    let data = tempfile::tempdir().unwrap();
+    let file = data.path().join("44005h2012.txt");
+    let line = |hour: usize| {
+        let air_c = if hour == 7 { "87.5" } else { " 6.1" };
+        format!("2012 01 01 {hour:02} 50  5.5  {air_c}\n")
+    };
+    let lines: String = (0..24).map(line).collect();
+    std::fs::write(&file, format!("#YY  MM DD hh mm WSPD  ATMP\n{lines}")).unwrap();
+    let words = ["ingest", file.to_str().unwrap(), "--json"];
+    let landed = program::json(data.path(), &words).unwrap();
+    assert_eq!(landed["masked"], serde_json::json!({"implausible": 1}));
+    let listed = program::run(data.path(), &["observations", "list"]).unwrap();
+    let talk = String::from_utf8(listed.stderr).unwrap();
+    let warning =
+        "ndbc: 1 value masked (1 implausible) in 1 of 1 files; most in 44005h2012.txt, 1 beside 47";
+    assert!(talk.contains(warning), "{talk}");
+}
+
+#[test]
 fn a_swath_is_refused_with_its_reason() {
     let Some(set) = test_data::set("wind_ascat_l2") else {
         return;

@@ -67,7 +67,7 @@ struct Line {
     manifest: Option<String>,
     reason: Option<RejectReason>,
     detail: Option<String>,
-    /// Cells that the file gave a value for and that hold none, by why; absent of what is in no product.
+    /// Values that the file gave and that are none here, by why; absent of what did not land.
     #[serde(skip_serializing_if = "Option::is_none")]
     masked: Option<MaskedCells>,
 }

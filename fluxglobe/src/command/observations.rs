@@ -4,6 +4,7 @@ use anyhow::{Context as _, Result, bail};
 use comfy_table::Table;
 use comfy_table::presets::NOTHING;
 use compute::matchup::{self, TimeMatch};
+use contract::masked::MaskedCells;
 use contract::observation::{Observation, Quality};
 use observations::{Filter, ObservationStore};
 
@@ -36,12 +37,16 @@ fn filter(asked: &ObservationsAsked) -> Result<Filter> {
 }
 
 async fn list(settings: &Settings, asked: &ObservationsAsked) -> Result<()> {
-    let store = observations::open(&asked.store, &deployment::store(settings)?)?;
+    let objects = deployment::store(settings)?;
+    let store = observations::open(&asked.store, &objects)?;
     let platforms = store.platforms(&filter(asked)?).await?;
+    let warnings = masked(&objects, asked).await?;
+    let warn = || warnings.iter().for_each(|line| progress::say(line));
     if asked.json {
         for platform in &platforms {
             progress::result(&serde_json::to_string(platform)?)?;
         }
+        warn();
         return Ok(());
     }
     if platforms.is_empty() {
@@ -72,7 +77,32 @@ async fn list(settings: &Settings, asked: &ObservationsAsked) -> Result<()> {
             p.properties.join(" "),
         ]);
     }
-    progress::result(&table.to_string())
+    progress::result(&table.to_string())?;
+    warn();
+    Ok(())
+}
+
+/// Of each dataset that was asked for, what files gave a value for and what is no observation.
+async fn masked(store: &storage::Store, asked: &ObservationsAsked) -> Result<Vec<String>> {
+    let mut lines = vec![];
+    for (dataset, notes) in ingest::observation::notes(store).await? {
+        let all: MaskedCells = notes.iter().map(|note| note.masked).sum();
+        let is_asked = asked.dataset.as_ref().is_none_or(|asked| *asked == dataset);
+        let Some(most) = notes.iter().max_by_key(|note| note.masked.total()) else {
+            continue;
+        };
+        if is_asked && !all.is_none() {
+            let files = notes.iter().filter(|note| !note.masked.is_none()).count();
+            lines.push(format!(
+                "{dataset}: {all} in {files} of {} files; most in {}, {} beside {} observations",
+                notes.len(),
+                most.file,
+                most.masked.total(),
+                most.observations
+            ));
+        }
+    }
+    Ok(lines)
 }
 
 async fn query(settings: &Settings, asked: &ObservationsAsked) -> Result<()> {

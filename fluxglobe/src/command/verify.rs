@@ -131,6 +131,12 @@ fn advice(report: &Report) -> Vec<String> {
             raw.key
         ));
     }
+    if let Some(note) = found(&[Kind::ObservationFile]) {
+        advice.push(format!(
+            "{} is a note of a file of observations: ingest that file again, which replaces the note",
+            note.key
+        ));
+    }
     if let Some(list) = found(&[Kind::Manifest, Kind::Observations, Kind::ObservationIndex]) {
         advice.push(format!(
             "{} cannot be made again: restore it from a copy of the store",

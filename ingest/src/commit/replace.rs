@@ -14,13 +14,17 @@ use storage::{StorageError, Store, manifests};
 use super::merge::{Merged, Taken, is_same_grid};
 use super::{MAX_TRIES, pauses, segments};
 use crate::error::IngestError;
+use crate::gates::Gates;
+use crate::memory;
 use crate::reading::Reading;
 
 /// Publishes readings in the place of what their files were read as before; none if nothing is other than before.
 ///
-/// What other writers publish meanwhile stays: a file that was revised keeps its revision.
+/// What other writers publish meanwhile stays: a file that was revised keeps its revision. It waits for the memory that
+/// turning maps into series takes, as a landing does.
 pub(crate) async fn replace(
     store: &Store,
+    gates: &Gates,
     product: &ProductId,
     readings: &[Reading],
 ) -> Result<Option<Manifest>, IngestError> {
@@ -45,6 +49,8 @@ pub(crate) async fn replace(
             is_revision: true,
             last_taken: None,
         };
+        let values = segments::most_values(&next.steps, &next.grid);
+        let _memory = gates.memory(memory::of_segment(values)).await;
         let segments::Written { series, domain } =
             segments::write(store, product, &next.grid, Some(&newest), &merged).await?;
         (next.schema, next.number) = (MANIFEST_SCHEMA, newest.number + 1);

@@ -91,6 +91,12 @@ fn runs(steps: &[Step], grid: &Grid) -> Vec<(usize, usize)> {
     runs
 }
 
+/// Values of the largest segment of all: as many are held at once while every segment is read or written again.
+pub(super) fn most_values(steps: &[Step], grid: &Grid) -> usize {
+    let longest = runs(steps, grid).into_iter().map(|(_, count)| count).max();
+    longest.unwrap_or(0).saturating_mul(grid.cell_count())
+}
+
 fn year(step: &Step) -> i32 {
     step.period.start.year_month().0
 }
@@ -195,5 +201,8 @@ mod tests {
             [(0, 2), (2, 2), (4, 1)]
         );
         assert_eq!(runs(&[], &grid(2, 4)), []);
+        assert_eq!(most_values(&two_years[3..], &grid(2, 4)), 12 * 8);
+        assert_eq!(most_values(&two_years, &grid(1 << 13, 1 << 14)), 2 << 27);
+        assert_eq!(most_values(&[], &grid(2, 4)), 0);
     }
 }

@@ -69,7 +69,19 @@ fn converse(path: &std::path::Path, plane_cells: u64) -> std::io::Result<()> {
             return out.flush();
         }
     };
-    protocol::write(&mut out, &Opened::Described(file.description().clone()))?;
+    let described = protocol::encode(&Opened::Described(file.description().clone()));
+    match described {
+        Ok(described) => out.write_all(&described)?,
+        // This is the file's doing: it must not look like a parent that is gone.
+        Err(too_long) => {
+            let detail = format!(
+                "has names and attributes of too many bytes ({too_long}); give it with fewer"
+            );
+            let rejection = Rejection::new(RejectReason::TooLarge, "file", detail);
+            protocol::write(&mut out, &Opened::Rejected(rejection))?;
+            return out.flush();
+        }
+    }
     out.flush()?;
     while let Some(request) = protocol::read::<Request>(&mut input)? {
         match answer(&mut file, &request, plane_cells) {

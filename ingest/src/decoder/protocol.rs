@@ -8,8 +8,9 @@ use serde::{Deserialize, Serialize};
 use crate::file::description::{Description, Part};
 use crate::rejection::Rejection;
 
-/// Longest message, bytes: a description of 4096 variables with their attributes fits many times.
-pub(super) const MAX_MESSAGE_BYTES: u32 = 64 << 20;
+/// Longest message, bytes: a description of 4096 variables with twenty attributes each fits three times. What is read of
+/// it takes some times as much, beside the memory that files wait for.
+pub(super) const MAX_MESSAGE_BYTES: u32 = 16 << 20;
 
 /// What the reader says first.
 #[derive(Debug, Serialize, Deserialize)]

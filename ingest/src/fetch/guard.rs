@@ -2,11 +2,10 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use contract::event::RejectReason;
 use futures::StreamExt as _;
-use tokio::sync::Semaphore;
 
 use super::checksum::Expected;
 use super::http::{self, AllowedHost, Web};
@@ -14,15 +13,14 @@ use super::keep::Keep;
 use super::local;
 use super::location::Location;
 use super::object::{self, AllowedStore};
-use super::patience::{Miss, Patience, Tries, limited};
+use super::pace::Slowest;
+use super::patience::{Miss, Patience, Tries, answered, given_up, limited};
 use super::raw::RawGranule;
-use super::spool::{Spool, Spooled};
+use super::spool::Spool;
+use super::turns::Turns;
 use crate::error::{IngestError, Stop};
 use crate::rejection::Rejection;
 use crate::settings::Limits;
-
-/// Files that are fetched at the same time; those that wait for their source to come back are not counted.
-const PARALLEL_FETCHES: usize = 8;
 
 /// What may be read. Clones share connections and spool.
 #[derive(Debug, Clone, Default)]
@@ -37,7 +35,7 @@ struct Guarded {
     stores: Vec<AllowedStore>,
     spool: Spool,
     patience: Patience,
-    slots: Semaphore,
+    turns: Turns,
 }
 
 /// What a service may read, as its settings say it.
@@ -76,7 +74,7 @@ impl Sources {
             web: Web::new(allowed.hosts)?,
             spool: Spool::open(&allowed.spool, allowed.spool_bytes)?,
             patience: allowed.patience,
-            slots: Semaphore::new(PARALLEL_FETCHES),
+            turns: Turns::default(),
         }))))
     }
 
@@ -120,24 +118,27 @@ impl Guarded {
         expected: &Expected,
         limits: Limits,
     ) -> Result<RawGranule, Stop> {
+        let source = self.turns.source(location.source());
+        let patience = self.patience.away;
         let mut tries = Tries::new(self.patience);
         loop {
-            let slot = self.slots.acquire().await;
-            let spooled = match location {
-                Location::File(_) => None,
-                Location::Web(_) | Location::Object(_) => {
-                    let most = self.most(limits);
-                    let room = expected.size_bytes.unwrap_or(most).min(most);
-                    Some(self.spool.file(room).await?)
-                }
-            };
-            let begun = Instant::now();
-            let tried = self.try_once(location, spooled, expected, limits).await;
+            let turn = self.turns.take(&source, patience).await;
+            let turn = turn.map_err(|why| given_up(patience, &why))?;
+            // Waiting for room of our own is not the source's fault.
+            let (begun, mut for_room) = (Instant::now(), Duration::ZERO);
+            let tried = self.try_once(location, expected, limits, &mut for_room);
+            let tried = tried.await;
+            match &tried {
+                Ok(_) | Err(Miss::Absent(_)) => source.answered(),
+                Err(Miss::Away(why)) => source.is_away(why),
+                Err(Miss::Stop(_)) => {}
+            }
             match tried {
                 Ok(raw) => return Ok(raw),
                 Err(miss) => {
-                    drop(slot);
-                    tries.after(miss, begun.elapsed(), location).await?;
+                    drop(turn);
+                    let spent = begun.elapsed().saturating_sub(for_room);
+                    tries.after(miss, spent, location).await?;
                 }
             }
         }
@@ -148,47 +149,60 @@ impl Guarded {
         limits.file_bytes.min(self.spool.bytes())
     }
 
+    /// Tries to have a file; adds to `for_room` how long it waited for room in the spool. That is waited for once the
+    /// source has answered: one that never does takes no room from others.
     async fn try_once(
         self: &Arc<Self>,
         location: &Location,
-        spooled: Option<Spooled>,
         expected: &Expected,
         limits: Limits,
+        for_room: &mut Duration,
     ) -> Result<RawGranule, Miss> {
-        let keep = |chunks, length| Keep {
+        let Patience {
+            one_try,
+            silence,
+            slowest_bytes_s,
+            ..
+        } = self.patience;
+        let (chunks, length) = match location {
+            Location::File(path) => {
+                let (own, path, expected) = (Arc::clone(self), path.clone(), expected.clone());
+                let read = move || local::inside(&own.folders, &path, &expected, limits);
+                let read = async {
+                    let read = tokio::task::spawn_blocking(read).await;
+                    read.map_err(Miss::task)?
+                };
+                return limited(one_try, read).await;
+            }
+            Location::Web(url) => {
+                let response = answered(silence.min(one_try), self.web.get(url)).await?;
+                let length = response.content_length();
+                let chunks = response.bytes_stream();
+                let chunks = chunks.map(|chunk| chunk.map_err(http::away));
+                (chunks.boxed(), length)
+            }
+            Location::Object(url) => {
+                let found = limited(one_try, object::get(&self.stores, url)).await?;
+                let length = Some(found.meta.size);
+                let chunks = found.into_stream();
+                let chunks = chunks.map(|chunk| chunk.map_err(object::miss));
+                (chunks.boxed(), length)
+            }
+        };
+        let keep = Keep {
             file_name: location.file_name(),
             chunks,
             length,
             most: self.most(limits),
+            slowest: Some(Slowest {
+                bytes_s: slowest_bytes_s,
+                within: silence,
+            }),
         };
-        let fetched = async {
-            match (location, spooled) {
-                (Location::Web(url), Some(spooled)) => {
-                    let response = self.web.get(url).await?;
-                    let length = response.content_length();
-                    let chunks = response.bytes_stream();
-                    let chunks = chunks.map(|chunk| chunk.map_err(http::away)).boxed();
-                    keep(chunks, length).run(spooled, expected).await
-                }
-                (Location::Object(url), Some(spooled)) => {
-                    let found = object::get(&self.stores, url).await?;
-                    let length = Some(found.meta.size);
-                    let chunks = found.into_stream();
-                    let chunks = chunks.map(|chunk| chunk.map_err(object::miss)).boxed();
-                    keep(chunks, length).run(spooled, expected).await
-                }
-                (Location::File(path), _) => {
-                    let (own, path, expected) = (Arc::clone(self), path.clone(), expected.clone());
-                    let read = move || local::inside(&own.folders, &path, &expected, limits);
-                    tokio::task::spawn_blocking(read)
-                        .await
-                        .map_err(Miss::task)?
-                }
-                (Location::Web(_) | Location::Object(_), None) => {
-                    unreachable!("there is a place for what comes over the network")
-                }
-            }
-        };
-        limited(self.patience.one_try, fetched).await
+        keep.check_length(expected)?;
+        let waiting = Instant::now();
+        let spooled = self.spool.file(keep.room(expected)).await?;
+        *for_room += waiting.elapsed();
+        limited(one_try, keep.run(spooled, expected)).await
     }
 }

@@ -10,6 +10,7 @@ use tokio::io::{AsyncWriteExt as _, BufWriter};
 
 use super::checksum::{Check, Expected, wrong_size};
 use super::local;
+use super::pace::{Pace, Slowest};
 use super::patience::Miss;
 use super::raw::{Held, RawGranule, Stamp};
 use super::spool::{self, Spooled};
@@ -26,6 +27,8 @@ pub(super) struct Keep<'a> {
     pub(super) length: Option<u64>,
     /// What is allowed, bytes.
     pub(super) most: u64,
+    /// The slowest that it may come; as it likes if absent.
+    pub(super) slowest: Option<Slowest>,
 }
 
 impl Keep<'_> {
@@ -35,20 +38,20 @@ impl Keep<'_> {
         mut spooled: Spooled,
         expected: &Expected,
     ) -> Result<RawGranule, Miss> {
-        if let Some(length) = self.length {
-            self.check_length(length, expected)?;
-            spooled.shrink_to(length);
-        }
-        let room = self.length.or(expected.size_bytes).unwrap_or(self.most);
+        let room = self.room(expected);
         let folder = spooled.path().to_owned();
         let unwritten = |source| unwritten(&folder, source);
         let writer = tokio::fs::File::from_std(spooled.file().try_clone().map_err(unwritten)?);
         let mut writer = BufWriter::with_capacity(WRITE_BYTES, writer);
         let mut check = Check::of(expected)?;
-        while let Some(chunk) = self.chunks.next().await {
+        let mut pace = self.slowest.map(Pace::new);
+        while let Some(chunk) = match &mut pace {
+            Some(pace) => pace.next(&mut self.chunks).await,
+            None => self.chunks.next().await,
+        } {
             let chunk = chunk?;
             check.update(&chunk)?;
-            if check.size_bytes() > room.min(self.most) {
+            if check.size_bytes() > room {
                 return Err(self.beyond(check.size_bytes(), expected).into());
             }
             writer.write_all(&chunk).await.map_err(unwritten)?;
@@ -65,11 +68,19 @@ impl Keep<'_> {
         Ok(RawGranule::new(folder, self.file_name, sha256, stamp, held))
     }
 
-    fn check_length(&self, length: u64, expected: &Expected) -> Result<(), Rejection> {
-        if length > self.most {
-            return Err(local::too_large(length, self.most));
+    /// Refuses what is announced to be too large, or another file than its notice is of.
+    pub(super) fn check_length(&self, expected: &Expected) -> Result<(), Rejection> {
+        match self.length {
+            Some(length) if length > self.most => Err(local::too_large(length, self.most)),
+            Some(length) => wrong_size(expected, length).map_or(Ok(()), Err),
+            None => Ok(()),
         }
-        wrong_size(expected, length).map_or(Ok(()), Err)
+    }
+
+    /// Bytes that it is announced to have, or all that is allowed.
+    pub(super) fn room(&self, expected: &Expected) -> u64 {
+        let announced = self.length.or(expected.size_bytes);
+        announced.unwrap_or(self.most).min(self.most)
     }
 
     /// The refusal of a file that is longer than announced, or than allowed.

@@ -49,6 +49,20 @@ impl Location {
         }
     }
 
+    /// What is asked for the file: a host and port, a bucket, or the disks of this machine.
+    pub(super) fn source(&self) -> String {
+        match self {
+            Self::File(_) => "file".to_owned(),
+            Self::Web(url) | Self::Object(url) => {
+                let host = url.host_str().unwrap_or_default();
+                match url.port_or_known_default() {
+                    Some(port) => format!("{}://{host}:{port}", url.scheme()),
+                    None => format!("{}://{host}", url.scheme()),
+                }
+            }
+        }
+    }
+
     /// Last part of the path, for people and for patterns of file names.
     pub(crate) fn file_name(&self) -> String {
         match self {

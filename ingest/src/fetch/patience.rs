@@ -22,6 +22,10 @@ pub struct Patience {
     pub longest_pause: Duration,
     /// Time limit of one try.
     pub one_try: Duration,
+    /// A source that sends nothing for so long, or less than `slowest_bytes_s` on average, is left and asked again.
+    pub silence: Duration,
+    /// The slowest that a source may be, bytes a second.
+    pub slowest_bytes_s: u64,
 }
 
 impl Default for Patience {
@@ -32,6 +36,8 @@ impl Default for Patience {
             first_pause: Duration::from_millis(500),
             longest_pause: Duration::from_secs(15),
             one_try: Duration::from_mins(30),
+            silence: Duration::from_secs(30),
+            slowest_bytes_s: 4096,
         }
     }
 }
@@ -94,10 +100,7 @@ impl Tries {
             Miss::Away(why) => (why, self.spent >= self.patience.away),
         };
         if is_over {
-            let seconds = self.spent.as_secs();
-            let detail =
-                format!("could not be had in {seconds} s: {why}; send it again when it is there");
-            return Err(Rejection::new(RejectReason::Unavailable, "file", detail).into());
+            return Err(given_up(self.spent, &why));
         }
         tracing::info!(%location, why, "not had yet; trying again");
         let pause = self.pauses.next().unwrap_or(self.patience.longest_pause);
@@ -105,6 +108,13 @@ impl Tries {
         tokio::time::sleep(pause).await;
         Ok(())
     }
+}
+
+/// The refusal of a file that its source did not give in so long.
+pub(super) fn given_up(spent: Duration, why: &str) -> Stop {
+    let seconds = spent.as_secs();
+    let detail = format!("could not be had in {seconds} s: {why}; send it again when it is there");
+    Rejection::new(RejectReason::Unavailable, "file", detail).into()
 }
 
 /// A try under its time limit.
@@ -118,6 +128,17 @@ pub(super) async fn limited<T>(
             "not all of it came in {} s",
             limit.as_secs()
         ))),
+    }
+}
+
+/// The first answer of a source, within a time.
+pub(super) async fn answered<T>(
+    limit: Duration,
+    asked: impl Future<Output = Result<T, Miss>>,
+) -> Result<T, Miss> {
+    match tokio::time::timeout(limit, asked).await {
+        Ok(done) => done,
+        Err(_elapsed) => Err(Miss::Away(format!("no answer in {} s", limit.as_secs()))),
     }
 }
 

@@ -58,8 +58,12 @@ impl RawFiles {
             chunks: chunks.map(|c| c.map_err(|e| Miss::from(failed(e)))).boxed(),
             length: Some(size_bytes),
             most: self.spool.bytes(),
+            // A store of our own that is slow is waited for.
+            slowest: None,
         };
-        match kept.run(spooled, &Expected::default()).await {
+        let expected = Expected::default();
+        kept.check_length(&expected)?;
+        match kept.run(spooled, &expected).await {
             Ok(raw) if raw.sha256 == raw_sha256 => Ok(raw),
             Ok(raw) => Err(damaged(&key, &format!("its digest is {} now", raw.sha256)).into()),
             Err(Miss::Stop(stop)) => Err(stop),

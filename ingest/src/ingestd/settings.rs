@@ -66,7 +66,8 @@ pub struct ServiceSettings {
     #[arg(long, env = "FLUXGLOBE_PARALLEL_BYTES", default_value_t = 1 << 30,
           value_parser = clap::value_parser!(u64).range(MIB..=TIB))]
     pub parallel_bytes: u64,
-    /// Notices that are under way at the same time, waiting for their source included, 1 to 1024.
+    /// Notices that are under way at the same time, 1 to 1024. Those that wait for a source that is slow or away are not
+    /// counted, up to 16 times as many.
     #[arg(long, env = "FLUXGLOBE_PARALLEL_NOTICES", default_value_t = 64,
           value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub parallel_notices: u16,
@@ -87,6 +88,15 @@ pub struct ServiceSettings {
     #[arg(long, env = "FLUXGLOBE_FETCH_LIMIT_S", default_value_t = 1800,
           value_parser = clap::value_parser!(u64).range(1..=86_400))]
     pub fetch_limit_s: u64,
+    /// A source that does not answer for so long, or sends less than --fetch-slowest-bytes-s on average, is left and asked
+    /// again, within --fetch-patience-s; seconds, 1 to 3600.
+    #[arg(long, env = "FLUXGLOBE_FETCH_SILENCE_S", default_value_t = 30,
+          value_parser = clap::value_parser!(u64).range(1..=3600))]
+    pub fetch_silence_s: u64,
+    /// The slowest that a source may be, bytes a second, at most 1 GiB; 0 for any that sends something.
+    #[arg(long, env = "FLUXGLOBE_FETCH_SLOWEST_BYTES_S", default_value_t = 4096,
+          value_parser = clap::value_parser!(u64).range(0..=1 << 30))]
+    pub fetch_slowest_bytes_s: u64,
     /// How long work that is under way may take after the service was asked to stop, seconds, at most an hour. What is not
     /// done then is done again by another process.
     #[arg(long, env = "FLUXGLOBE_DRAIN_S", default_value_t = 25,
@@ -113,6 +123,8 @@ impl ServiceSettings {
                 tries: self.fetch_tries,
                 away: Duration::from_secs(self.fetch_patience_s),
                 one_try: Duration::from_secs(self.fetch_limit_s),
+                silence: Duration::from_secs(self.fetch_silence_s),
+                slowest_bytes_s: self.fetch_slowest_bytes_s,
                 ..Patience::default()
             },
         };

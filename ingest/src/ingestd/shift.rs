@@ -30,6 +30,9 @@ const IDLE_WAIT: Duration = Duration::from_millis(250);
 /// And while something is: bounds how late what is done is finished.
 const BUSY_WAIT: Duration = Duration::from_millis(20);
 
+/// Messages that may wait for their sources for each that may be under way: what is kept of them is small.
+const WAITING_FOR_EACH: usize = 16;
+
 /// A file that is under way.
 struct Job {
     asked: Arc<Asked>,
@@ -114,10 +117,18 @@ pub(super) async fn run(
 }
 
 impl Shift<'_> {
+    /// How many further messages may be taken. Those that wait for a source that is slow or away take no place from others,
+    /// as long as they are not very many.
     fn room(&self) -> usize {
-        self.service
-            .parallel_notices
-            .saturating_sub(self.open.len())
+        let is_waited_for = |number: &Number| {
+            let job = self.jobs.get(number);
+            job.is_some_and(|job| job.asked.source_wait.is_long())
+        };
+        let waits = |open: &&Open| open.answers.iter().any(|(number, _)| is_waited_for(number));
+        let waiting = self.open.values().filter(waits).count();
+        let parallel = self.service.parallel_notices;
+        let places = parallel + waiting.min(parallel.saturating_mul(WAITING_FOR_EACH));
+        places.saturating_sub(self.open.len())
     }
 
     /// Takes further messages, as many as there is room for.
@@ -326,7 +337,19 @@ fn tell(open: Open, pipeline: Pipeline<'_>) {
                 pipeline.metrics.superseded();
                 tracing::warn!(trace, origin = %open.origin, told = event.is_some(), "{outcome}");
             }
-            Outcome::AlreadyLanded { .. } | Outcome::Observed { .. } => {
+            Outcome::Observed {
+                dataset,
+                stored,
+                masked,
+                ..
+            } => {
+                // A file that comes again brings nothing, and masks nothing.
+                if stored.new + stored.replaced > 0 {
+                    pipeline.metrics.masked(dataset, *masked);
+                }
+                tracing::info!(trace, origin = %open.origin, "{outcome}");
+            }
+            Outcome::AlreadyLanded { .. } => {
                 tracing::info!(trace, origin = %open.origin, told = event.is_some(), "{outcome}");
             }
         }

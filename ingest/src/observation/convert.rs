@@ -3,7 +3,10 @@
 use super::property::{self, COMMON_UNITS, DEGREE, Property};
 use crate::unit::{self, Unit};
 
-/// How stored numbers become values: `value = number * factor + offset`, none if it cannot be true.
+/// From here on numbers stand for no value: 1e35 and the like.
+const NO_NUMBER: f64 = 1e30;
+
+/// How stored numbers become values: `value = number * factor + offset`.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Conversion {
     /// Name of the property.
@@ -13,6 +16,17 @@ pub(super) struct Conversion {
     factor: f64,
     offset: f64,
     known: Option<&'static Property>,
+}
+
+/// What a number of a file is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Given {
+    /// A value, in the stored unit.
+    Value(f64),
+    /// No value.
+    Missing,
+    /// What cannot be true, in the stored unit.
+    Implausible(f64),
 }
 
 impl Conversion {
@@ -32,14 +46,39 @@ impl Conversion {
         })
     }
 
-    /// The value of a number of the file.
-    pub(super) fn value(&self, number: f64) -> Option<f64> {
+    /// What a number of the file is.
+    pub(super) fn given(&self, number: f64) -> Given {
         let value = number * self.factor + self.offset;
-        let is_true = self
+        let can_be = self
             .known
             .is_none_or(|known| known.plausible.contains(&value));
-        (value.is_finite() && is_true).then_some(value)
+        if value.is_finite() && can_be && number.abs() < NO_NUMBER {
+            Given::Value(value)
+        } else if stands_for_nothing(number) {
+            Given::Missing
+        } else {
+            Given::Implausible(value)
+        }
     }
+
+    /// What its values can be, for people.
+    pub(super) fn bounds(&self) -> String {
+        self.known.map_or_else(String::new, |known| {
+            let (low, high) = (known.plausible.start(), known.plausible.end());
+            format!(", which is not of {low} to {high}")
+        })
+    }
+}
+
+/// Does a number that cannot be true stand for no value, where the file has no fill value of its own? No number, a very
+/// large one, and nines (99.9, -999, -9999.9): the stand-ins of WOCE, SOCAT, NDBC and EPIC.
+fn stands_for_nothing(number: f64) -> bool {
+    if number.is_nan() || number.is_finite() && number.abs() >= NO_NUMBER {
+        return true;
+    }
+    // Float32 in the file: -999.9 is no short decimal as a float64.
+    let digits = (number.abs() as f32).to_string().replace('.', "");
+    digits.len() > 1 && digits.bytes().all(|digit| digit == b'9')
 }
 
 /// Unit, factor and offset for a property that is known.
@@ -156,8 +195,15 @@ fn is_salinity(spelling: &str) -> bool {
 mod tests {
     use super::*;
 
+    fn given(property: &str, unit: &str, number: f64) -> Given {
+        Conversion::new(property, unit).unwrap().given(number)
+    }
+
     fn value(property: &str, unit: &str, number: f64) -> Option<f64> {
-        Conversion::new(property, unit).unwrap().value(number)
+        match given(property, unit, number) {
+            Given::Value(value) => Some(value),
+            Given::Missing | Given::Implausible(_) => None,
+        }
     }
 
     #[test]
@@ -198,21 +244,31 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_true_is_no_value() {
-        for number in [-999.0, 1e35, f64::NAN, 99.9, f64::INFINITY] {
-            assert_eq!(value("sea_surface_temperature", "degree_C", number), None);
+    fn what_cannot_be_true_is_told_from_what_stands_for_no_value() {
+        let sst = |number| given("sea_surface_temperature", "degree_C", number);
+        let float32 = f64::from(-999.9f32);
+        for number in [-999.0, -99.99, 99.9, 9999.0, float32, 1e35, -1e34, f64::NAN] {
+            assert_eq!(sst(number), Given::Missing, "{number}");
         }
+        for number in [-30.0, 290.0, -900.0, 9.0e9, f64::INFINITY] {
+            assert!(matches!(sst(number), Given::Implausible(_)), "{number}");
+        }
+        // Nines that can be true are values.
+        assert_eq!(given("wind_speed", "m s-1", 99.0), Given::Value(99.0));
+        assert_eq!(given("longitude", "degree", -99.9), Given::Value(-99.9));
+        let bounds = Conversion::new("wind_speed", "m s-1").unwrap().bounds();
+        assert_eq!(bounds, ", which is not of 0 to 120");
     }
 
     #[test]
     fn unknown_properties_keep_a_unit_of_their_kind() {
         let conversion = Conversion::new("temperature_equi", "degrees C").unwrap();
         assert_eq!(conversion.unit, "K");
-        assert!((conversion.value(-1.16).unwrap() - 271.99).abs() < 1e-9);
+        assert!((value("temperature_equi", "degrees C", -1.16).unwrap() - 271.99).abs() < 1e-9);
         let other = Conversion::new("ph", "total scale").unwrap();
         assert_eq!(
-            (other.unit.as_str(), other.value(8.1)),
-            ("total scale", Some(8.1))
+            (other.unit.as_str(), other.given(8.1)),
+            ("total scale", Given::Value(8.1))
         );
         let hostile = Conversion::new("x", &"\u{1b}é".repeat(100)).unwrap();
         assert!(hostile.unit.len() <= 32 && !hostile.unit.chars().any(char::is_control));

@@ -1,9 +1,15 @@
-//! Observations of one file as they are found, within the limits of the contract and of memory.
+//! Observations of one file as they are found, within the limits of the contract and of memory; what the file gives a
+//! value for and what is no observation is counted.
+
+use std::collections::BTreeMap;
 
 use contract::event::RejectReason;
 use contract::grid::wrap_lon_deg;
+use contract::masked::MaskedCells;
 use contract::observation::Observation;
 
+use super::convert::Conversion;
+use crate::check::MAX_IMPLAUSIBLE_SHARE;
 use crate::rejection::Rejection;
 
 /// Most observations of one file: about 300 MB.
@@ -11,18 +17,38 @@ pub(crate) const MAX_OBSERVATIONS: usize = 1 << 20;
 /// Memory of one observation with its texts, bytes.
 pub(crate) const OBSERVATION_BYTES: u64 = 300;
 
+/// What was found in a file.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Found {
+    /// At least one.
+    pub observations: Vec<Observation>,
+    /// Values that the file gave and that are no observations.
+    pub masked: MaskedCells,
+}
+
 /// The observations of one file.
 #[derive(Debug, Default)]
 pub(super) struct Gathered {
     found: Vec<Observation>,
-    /// Those that break a limit of the contract: a place past a pole, say.
-    broken: u64,
-    /// What was wrong with the first of them.
-    first_break: Option<String>,
+    /// Values outside the valid range that the file states.
+    out_of_range: u64,
+    /// Values without a place or a time.
+    unplaced: u64,
+    /// By property.
+    tallies: BTreeMap<String, Tally>,
+}
+
+/// How many values of a property can be true.
+#[derive(Debug, Default)]
+struct Tally {
+    taken: u64,
+    implausible: u64,
+    /// What is wrong with the first that cannot.
+    example: String,
 }
 
 impl Gathered {
-    /// Takes an observation; one that breaks a limit is counted and left out.
+    /// Takes an observation; one that breaks a limit of the contract (a place past a pole, say) is counted and left out.
     pub(super) fn take(&mut self, observation: Observation) -> Result<(), Rejection> {
         if self.found.len() >= MAX_OBSERVATIONS {
             let detail = format!(
@@ -30,32 +56,171 @@ impl Gathered {
             );
             return Err(Rejection::new(RejectReason::TooLarge, "file", detail));
         }
-        match observation.validate() {
-            Ok(()) => self.found.push(Observation {
-                lon_deg: wrap_lon_deg(observation.lon_deg),
-                ..observation
-            }),
-            Err(error) => {
-                self.broken += 1;
-                self.first_break.get_or_insert_with(|| error.to_string());
+        let checked = observation.validate();
+        let tally = self.tally(&observation.property);
+        match checked {
+            Ok(()) => {
+                tally.taken += 1;
+                self.found.push(Observation {
+                    lon_deg: wrap_lon_deg(observation.lon_deg),
+                    ..observation
+                });
             }
+            Err(error) => tally.mask(|| error.to_string()),
         }
         Ok(())
     }
 
-    /// The observations; a file without any is refused, and `why` is the reason if none was found at all.
-    pub(super) fn finish(self, why: Rejection) -> Result<Vec<Observation>, Rejection> {
-        match self.first_break {
-            Some(first) if self.found.is_empty() => {
-                let detail = format!("holds no valid observation: {first}");
-                Err(Rejection::new(RejectReason::Values, "file", detail))
-            }
-            Some(first) => {
-                tracing::warn!(count = self.broken, first, "observations are left out");
-                Ok(self.found)
-            }
-            None if self.found.is_empty() => Err(why),
-            None => Ok(self.found),
+    /// Counts a value that cannot be true, in the stored unit.
+    pub(super) fn implausible(&mut self, conversion: &Conversion, value: f64) {
+        let tally = self.tally(&conversion.property);
+        tally.mask(|| format!("{value:e} {}{}", conversion.unit, conversion.bounds()));
+    }
+
+    /// Counts a value outside the valid range that the file states.
+    pub(super) fn out_of_range(&mut self) {
+        self.out_of_range += 1;
+    }
+
+    /// Counts a value whose place or time the file does not say, or that cannot be.
+    pub(super) fn unplaced(&mut self) {
+        self.unplaced += 1;
+    }
+
+    fn tally(&mut self, property: &str) -> &mut Tally {
+        // Most observations are of a property that came before.
+        if !self.tallies.contains_key(property) {
+            self.tallies.insert(property.to_owned(), Tally::default());
         }
+        self.tallies
+            .get_mut(property)
+            .expect("it was put in just now")
+    }
+
+    /// What was found. A file of which much cannot be true is refused, and one without any observation: `why` is the
+    /// reason if no value was found at all.
+    pub(super) fn finish(self, why: Rejection) -> Result<Found, Rejection> {
+        let mut implausible = self.unplaced;
+        for (property, tally) in &self.tallies {
+            let all = tally.taken + tally.implausible;
+            if tally.implausible as f64 > MAX_IMPLAUSIBLE_SHARE * all as f64 {
+                let detail = format!(
+                    "has {} of {all} values that cannot be true, such as {}; correct unit, fill value or places in the file",
+                    tally.implausible, tally.example
+                );
+                return Err(Rejection::new(RejectReason::Values, property, detail));
+            }
+            implausible += tally.implausible;
+        }
+        let masked = MaskedCells {
+            out_of_range: self.out_of_range,
+            implausible,
+            ..MaskedCells::default()
+        };
+        if self.found.is_empty() && !masked.is_none() {
+            let detail = format!(
+                "holds no observation ({masked}); correct its places, times, valid range or fill value"
+            );
+            return Err(Rejection::new(RejectReason::Values, "file", detail));
+        }
+        if self.found.is_empty() {
+            return Err(why);
+        }
+        Ok(Found {
+            observations: self.found,
+            masked,
+        })
+    }
+}
+
+impl Tally {
+    fn mask(&mut self, example: impl FnOnce() -> String) {
+        if self.implausible == 0 {
+            self.example = example();
+        }
+        self.implausible += 1;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contract::observation::{PlatformKind, Quality};
+
+    fn sst(value: f64, lat_deg: f64) -> Observation {
+        Observation {
+            dataset: "buoys".parse().unwrap(),
+            platform: "1".to_owned(),
+            kind: PlatformKind::Buoy,
+            time: "2012-01-01T00:50:00Z".parse().unwrap(),
+            lon_deg: 190.0,
+            lat_deg,
+            depth_m: 0.6,
+            property: "sea_surface_temperature".to_owned(),
+            value,
+            unit: "K".to_owned(),
+            quality: Quality::NotEvaluated,
+        }
+    }
+
+    fn why() -> Rejection {
+        Rejection::new(RejectReason::NoVariable, "file", "nothing")
+    }
+
+    /// So many values, and so many that are none: by their number, by their place, and by the file's own range.
+    fn gathered(good: usize, [hot, lost, outside]: [usize; 3]) -> Gathered {
+        let conversion = Conversion::new("sea_surface_temperature", "K").unwrap();
+        let mut gathered = Gathered::default();
+        for _ in 0..good {
+            gathered.take(sst(290.0, 10.0)).unwrap();
+        }
+        for _ in 0..hot {
+            gathered.implausible(&conversion, 400.0);
+        }
+        for _ in 0..lost {
+            gathered.take(sst(290.0, 91.0)).unwrap();
+        }
+        for _ in 0..outside {
+            gathered.out_of_range();
+        }
+        gathered
+    }
+
+    #[test]
+    fn a_few_values_that_cannot_be_true_are_left_out_and_counted() {
+        let found = gathered(38, [1, 1, 5]).finish(why()).unwrap();
+        assert_eq!(found.observations.len(), 38);
+        let masked = found.masked;
+        assert_eq!((masked.implausible, masked.out_of_range), (2, 5));
+    }
+
+    #[test]
+    fn many_of_one_property_refuse_the_file_however_good_the_others_are() {
+        let mut gathered = gathered(37, [2, 0, 0]);
+        for _ in 0..1000 {
+            let property = "air_temperature".to_owned();
+            gathered
+                .take(Observation {
+                    property,
+                    ..sst(290.0, 10.0)
+                })
+                .unwrap();
+        }
+        let refused = gathered.finish(why()).unwrap_err();
+        assert_eq!(refused.reason, RejectReason::Values);
+        assert_eq!(refused.object, "sea_surface_temperature");
+        for word in ["2 of 39", "4e2 K", "270", "325"] {
+            assert!(refused.detail.contains(word), "{refused}");
+        }
+    }
+
+    #[test]
+    fn a_file_without_observations_says_why() {
+        let none = gathered(0, [0, 0, 0]).finish(why()).unwrap_err();
+        assert_eq!(none, why());
+        let outside = gathered(0, [0, 0, 3]).finish(why()).unwrap_err();
+        assert_eq!(outside.reason, RejectReason::Values);
+        assert!(outside.detail.contains("3 values masked"), "{outside}");
+        assert!(gathered(0, [0, 1, 0]).finish(why()).is_err());
     }
 }

@@ -7,8 +7,8 @@ use contract::event::RejectReason;
 use contract::observation::{Observation, PlatformKind, Quality};
 use contract::time::TimeMs;
 
-use super::convert::Conversion;
-use super::gather::Gathered;
+use super::convert::{Conversion, Given};
+use super::gather::{Found, Gathered};
 use super::{MAX_TEXT_BYTES, Source, name, station};
 use crate::rejection::Rejection;
 
@@ -157,7 +157,7 @@ impl Layout {
 }
 
 /// Reads a file.
-pub(super) fn read(content: &[u8], source: Source<'_>) -> Result<Vec<Observation>, Rejection> {
+pub(super) fn read(content: &[u8], source: Source<'_>) -> Result<Found, Rejection> {
     if content.len() as u64 > MAX_TEXT_BYTES {
         let detail = format!("has more than {MAX_TEXT_BYTES} bytes of text");
         return Err(Rejection::new(RejectReason::TooLarge, "file", detail));
@@ -192,11 +192,16 @@ pub(super) fn read(content: &[u8], source: Source<'_>) -> Result<Vec<Observation
         good += 1;
         for (at, column, conversion) in &layout.measured {
             let number = words.get(*at).and_then(|word| word.parse::<f64>().ok());
-            let Some(value) = number
-                .filter(|n| is_measured(*n, column))
-                .and_then(|n| conversion.value(n))
-            else {
+            let Some(number) = number.filter(|n| is_measured(*n, column)) else {
                 continue;
+            };
+            let value = match conversion.given(number) {
+                Given::Value(value) => value,
+                Given::Missing => continue,
+                Given::Implausible(value) => {
+                    gathered.implausible(conversion, value);
+                    continue;
+                }
             };
             gathered.take(Observation {
                 dataset: dataset.clone(),
@@ -245,7 +250,11 @@ mod tests {
 
     #[test]
     fn a_line_becomes_values_in_stored_units_without_its_nines() {
-        let found = read(OLD.as_bytes(), SOURCE).unwrap();
+        let Found {
+            observations: found,
+            masked,
+        } = read(OLD.as_bytes(), SOURCE).unwrap();
+        assert!(masked.is_none(), "nines are no values: {masked}");
         let of = |property: &str| {
             found
                 .iter()
@@ -282,6 +291,31 @@ mod tests {
             1,
         );
         assert_eq!(read(new.as_bytes(), SOURCE), read(OLD.as_bytes(), SOURCE));
+    }
+
+    #[test]
+    fn what_cannot_be_true_is_counted_and_a_column_of_it_refuses_the_file() {
+        let lines = |air_c: &dyn Fn(usize) -> f64| {
+            let line = |hour: usize| {
+                format!(
+                    "2012 01 {:02} {:02} 50  99  5.5  6.3  0.89  5.56  4.60 999 1007.8 {:5.1}   8.1 999.0 99.0 99.00\n",
+                    hour / 24 + 1,
+                    hour % 24,
+                    air_c(hour)
+                )
+            };
+            let header = OLD.lines().next().unwrap();
+            format!("{header}\n{}", (0..100).map(line).collect::<String>())
+        };
+        let few = lines(&|hour| if hour < 5 { 87.5 } else { 6.1 });
+        let found = read(few.as_bytes(), SOURCE).unwrap();
+        assert_eq!(found.masked.implausible, 5);
+        let of_air = |o: &&Observation| o.property == "air_temperature";
+        assert_eq!(found.observations.iter().filter(of_air).count(), 95);
+        let many = lines(&|hour| if hour < 6 { 87.5 } else { 6.1 });
+        let refused = read(many.as_bytes(), SOURCE).unwrap_err();
+        assert_eq!(refused.object, "air_temperature");
+        assert!(refused.detail.contains("6 of 100"), "{refused}");
     }
 
     #[test]

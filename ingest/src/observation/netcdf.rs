@@ -5,14 +5,16 @@ use contract::observation::{Observation, PlatformKind, Quality};
 use contract::product::ProductId;
 use contract::time::TimeMs;
 
+use super::convert::Given;
 use super::coordinate::{self, Coordinate};
 use super::epic;
-use super::gather::Gathered;
+use super::gather::{Found, Gathered};
 use super::measured::{self, Measured};
 use super::quality::{Verdict, worse};
 use super::recognise::{Feature, recognise};
 use super::sampling::Sampling;
 use super::{Source, name};
+use crate::cf::packing::{Packing, Unpacked};
 use crate::cf::period;
 use crate::decoder::session::Session;
 use crate::error::Stop;
@@ -31,7 +33,7 @@ pub(super) async fn read(
     session: &mut Session,
     file: &Description,
     source: Source<'_>,
-) -> Result<Vec<Observation>, Stop> {
+) -> Result<Found, Stop> {
     let Some(feature) = recognise(file).filter(|feature| *feature != Feature::Unplaced) else {
         let detail = "has series of platforms, but nothing in the file says where the platforms are; \
                       give it with latitude, longitude and units (CF discrete sampling geometry)";
@@ -106,14 +108,15 @@ fn kind(file: &Description, feature: Feature) -> PlatformKind {
     }
 }
 
-/// Takes every sample of a variable that has a value, a place and a time.
+/// Takes every sample of a variable that has a value, a place and a time; counts values that are none.
 async fn take(
     session: &mut Session,
     measured: &Measured<'_>,
     shared: &Shared,
     gathered: &mut Gathered,
 ) -> Result<(), Stop> {
-    let values = coordinate::read(session, measured.variable).await?;
+    let stored = coordinate::read_stored(session, measured.variable).await?;
+    let packing = Packing::of(measured.variable);
     let lens: Vec<usize> = measured
         .variable
         .dimensions
@@ -121,53 +124,70 @@ async fn take(
         .map(|d| d.len as usize)
         .collect();
     let mut cell = vec![0; lens.len()];
-    for (at, number) in values.into_iter().enumerate() {
+    for (at, stored) in stored.into_iter().enumerate() {
+        let number = packing.unpacked(stored);
+        if number == Unpacked::Missing {
+            continue;
+        }
         let mut rest = at;
         for (index, len) in cell.iter_mut().zip(&lens).rev() {
             *index = rest % len;
             rest /= len;
         }
-        if let Some(observation) = sample(measured, shared, &cell, number)? {
-            gathered.take(observation)?;
-        }
+        sample(measured, shared, &cell, number, gathered)?;
     }
     Ok(())
 }
 
-/// The observation of one cell; none where there is no value, place or time.
+/// Takes the observation of one cell, or counts why its number is none; unless its flag says that there is no value.
 fn sample(
     measured: &Measured<'_>,
     shared: &Shared,
     cell: &[usize],
-    number: f64,
-) -> Result<Option<Observation>, Rejection> {
-    let Some(value) = measured.conversion.value(number) else {
-        return Ok(None);
-    };
+    number: Unpacked,
+    gathered: &mut Gathered,
+) -> Result<(), Rejection> {
     let at = |coordinate: &Coordinate| coordinate.at(cell, &shared.sampling);
-    let (time, lat_deg, lon_deg) = (
-        at(&measured.time),
-        at(&measured.latitude),
-        at(&measured.longitude),
-    );
-    if time.is_nan() || lat_deg.is_nan() || lon_deg.is_nan() {
-        return Ok(None);
-    }
-    let depth_m = match &measured.depth {
-        Some((coordinate, to)) => at(coordinate) * to.factor,
-        None => 0.0,
-    };
     let verdicts = measured
         .flags
         .iter()
         .map(|(flag, scheme)| scheme.verdict(at(flag)));
     let verdict: Option<Verdict> = verdicts.reduce(worse);
     let Some(quality) = verdict.unwrap_or(Some(Quality::NotEvaluated)) else {
-        return Ok(None);
+        return Ok(());
     };
     let conversion = &measured.conversion;
+    let value = match number {
+        Unpacked::Value(number) => conversion.given(number),
+        Unpacked::Missing => Given::Missing,
+        Unpacked::OutOfRange => {
+            gathered.out_of_range();
+            return Ok(());
+        }
+    };
+    let value = match value {
+        Given::Value(value) => value,
+        Given::Missing => return Ok(()),
+        Given::Implausible(value) => {
+            gathered.implausible(conversion, value);
+            return Ok(());
+        }
+    };
+    let (time, lat_deg, lon_deg) = (
+        at(&measured.time),
+        at(&measured.latitude),
+        at(&measured.longitude),
+    );
+    if time.is_nan() || lat_deg.is_nan() || lon_deg.is_nan() {
+        gathered.unplaced();
+        return Ok(());
+    }
+    let depth_m = match &measured.depth {
+        Some((coordinate, to)) => at(coordinate) * to.factor,
+        None => 0.0,
+    };
     let is_longitude = conversion.property == "longitude";
-    Ok(Some(Observation {
+    gathered.take(Observation {
         dataset: shared.dataset.clone(),
         platform: shared.sampling.name(measured.variable, cell),
         kind: shared.kind,
@@ -183,7 +203,7 @@ fn sample(
         },
         unit: conversion.unit.clone(),
         quality,
-    }))
+    })
 }
 
 fn instant(measured: &Measured<'_>, number: f64) -> Result<TimeMs, Rejection> {

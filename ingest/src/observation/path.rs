@@ -4,10 +4,9 @@ use std::io::Read as _;
 use std::path::Path;
 
 use contract::event::RejectReason;
-use contract::observation::Observation;
 use contract::product::ProductId;
 
-use super::{MAX_TEXT_BYTES, Source, read, read_text, recognise, recognise_text};
+use super::{Found, MAX_TEXT_BYTES, Source, read, read_text, recognise, recognise_text};
 use crate::decoder::session::Session;
 use crate::error::{IngestError, Stop};
 use crate::rejection::Rejection;
@@ -20,7 +19,7 @@ const HEAD_BYTES: u64 = 256 << 10;
 #[derive(Debug, Clone, PartialEq)]
 pub enum Reading {
     /// Its observations.
-    Observations(Vec<Observation>),
+    Observations(Found),
     /// One of observations that cannot be read, or no file that can be read at all.
     Refused(Rejection),
     /// A file of something else: a grid, perhaps.
@@ -61,8 +60,8 @@ async fn reading(
     })
     .await
     .map_err(IngestError::from)??;
-    if let Some(observations) = text {
-        return Ok(Reading::Observations(observations));
+    if let Some(found) = text {
+        return Ok(Reading::Observations(found));
     }
     let (mut session, description) = Session::open(path, settings).await?;
     if recognise(&description).is_none() {
@@ -78,11 +77,7 @@ async fn reading(
 }
 
 /// Observations of a text file; none if it is no text of observations.
-fn text(
-    path: &Path,
-    source: Source<'_>,
-    limits: Limits,
-) -> Result<Option<Vec<Observation>>, Rejection> {
+fn text(path: &Path, source: Source<'_>, limits: Limits) -> Result<Option<Found>, Rejection> {
     let unreadable = |e: std::io::Error| {
         Rejection::new(
             RejectReason::Unreadable,

@@ -9,7 +9,7 @@ pub(super) struct Property {
     pub(super) name: &'static str,
     /// Unit of stored values.
     pub(super) unit: &'static str,
-    /// Values that can be true, stored unit; anything outside stands for no value.
+    /// Values that can be true, stored unit.
     pub(super) plausible: RangeInclusive<f64>,
 }
 

@@ -20,8 +20,19 @@ pub struct Stored {
 pub struct SinkError {
     /// The store's own words.
     pub source: Box<dyn std::error::Error + Send + Sync>,
-    /// May the same call succeed later?
-    pub is_retryable: bool,
+    /// Where the cause lies.
+    pub cause: SinkCause,
+}
+
+/// Where the cause lies: whoever hands over observations waits, or refuses their file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SinkCause {
+    /// The same call may succeed later.
+    Passing,
+    /// Somebody must mend the store or its settings.
+    Store,
+    /// One of the observations can never be stored as it is.
+    Observations,
 }
 
 /// Takes the observations of a file.

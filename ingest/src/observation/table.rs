@@ -10,7 +10,8 @@ use contract::observation::{Observation, PlatformKind, Quality};
 use contract::product::ProductId;
 use csv::{ByteRecord, ReaderBuilder};
 
-use super::gather::Gathered;
+use super::convert::{Conversion, Given};
+use super::gather::{Found, Gathered};
 use super::quality::Scheme;
 use super::table_columns::Columns;
 use super::{MAX_TEXT_BYTES, Source, name, table_time};
@@ -20,7 +21,7 @@ use crate::rejection::Rejection;
 const MAX_COMMENT_LINES: usize = 10_000;
 /// A table of which more than one row in this many has no place or time is damaged.
 const READABLE_IN: u64 = 10;
-/// Numbers at and below stand for no value (-999, -9999); so do those at and above the other.
+/// Depths and flags at and below stand for none (-999, -9999); so do those at and above the other.
 const MISSING_BELOW: f64 = -900.0;
 const MISSING_ABOVE: f64 = 1e30;
 /// A platform that moves less than this is a station, degrees.
@@ -69,7 +70,7 @@ fn columns(content: &[u8]) -> Option<(Columns, usize)> {
 }
 
 /// Reads a table.
-pub(super) fn read(content: &[u8], source: Source<'_>) -> Result<Vec<Observation>, Rejection> {
+pub(super) fn read(content: &[u8], source: Source<'_>) -> Result<Found, Rejection> {
     if content.len() as u64 > MAX_TEXT_BYTES {
         let detail = format!("has more than {MAX_TEXT_BYTES} bytes of text");
         return Err(Rejection::new(RejectReason::TooLarge, "file", detail));
@@ -109,7 +110,10 @@ pub(super) fn read(content: &[u8], source: Source<'_>) -> Result<Vec<Observation
                 good += 1;
                 reading.take(&columns, &row)?;
             }
-            None => bad += 1,
+            None => {
+                bad += 1;
+                reading.pass_over(&columns, &record);
+            }
         }
     }
     if bad * READABLE_IN > good + bad {
@@ -135,7 +139,15 @@ impl Reading {
         let platform = platform.unwrap_or_else(|| self.lone_platform.clone());
         let span = self.spans.entry(platform.clone()).or_default();
         span.widen(row.place);
-        for (property, value, unit, depth_m, quality) in row.values(columns) {
+        for (conversion, value, depth_m, quality) in row.values(columns) {
+            let value = match value {
+                Given::Value(value) => value,
+                Given::Missing => continue,
+                Given::Implausible(value) => {
+                    self.gathered.implausible(conversion, value);
+                    continue;
+                }
+            };
             self.gathered.take(Observation {
                 dataset: self.dataset.clone(),
                 platform: platform.clone(),
@@ -144,20 +156,31 @@ impl Reading {
                 lon_deg: row.place[0],
                 lat_deg: row.place[1],
                 depth_m,
-                property: property.to_owned(),
+                property: conversion.property.clone(),
                 value,
-                unit: unit.to_owned(),
+                unit: conversion.unit.clone(),
                 quality,
             })?;
         }
         Ok(())
     }
 
+    /// Counts the values of a row without a place or a time.
+    fn pass_over(&mut self, columns: &Columns, record: &ByteRecord) {
+        for measured in &columns.measured {
+            let number = number(record, measured.at);
+            let given = number.map(|number| measured.conversion.given(number));
+            if matches!(given, Some(Given::Value(_) | Given::Implausible(_))) {
+                self.gathered.unplaced();
+            }
+        }
+    }
+
     /// The observations, now that it is known who moved.
-    fn finish(self) -> Result<Vec<Observation>, Rejection> {
+    fn finish(self) -> Result<Found, Rejection> {
         let none = Rejection::new(RejectReason::Values, "file", "holds no measured value");
         let mut found = self.gathered.finish(none)?;
-        for observation in &mut found {
+        for observation in &mut found.observations {
             let span = self.spans.get(&observation.platform);
             if span.is_some_and(Span::is_one_place) {
                 observation.kind = PlatformKind::Station;
@@ -188,6 +211,12 @@ impl Span {
     }
 }
 
+/// The number in a field of a row.
+fn number(record: &ByteRecord, at: usize) -> Option<f64> {
+    let text = std::str::from_utf8(record.get(at)?).ok()?;
+    text.trim().parse().ok()
+}
+
 /// A row with a place and a time.
 struct Row<'a> {
     record: &'a ByteRecord,
@@ -213,33 +242,27 @@ impl<'a> Row<'a> {
         std::str::from_utf8(self.record.get(at?)?).ok()
     }
 
-    fn number(&self, at: usize) -> Option<f64> {
-        let number: f64 = self.text(Some(at))?.trim().parse().ok()?;
-        (number > MISSING_BELOW && number < MISSING_ABOVE).then_some(number)
+    /// A depth or a flag.
+    fn remark(&self, at: usize) -> Option<f64> {
+        let is_one = |number: &f64| *number > MISSING_BELOW && *number < MISSING_ABOVE;
+        number(self.record, at).filter(is_one)
     }
 
-    /// Property, value, unit, depth and quality of what was measured.
+    /// What was measured, what its number is, and its depth and quality; not what its flag calls missing.
     fn values(
         &self,
         columns: &'a Columns,
-    ) -> impl Iterator<Item = (&'a str, f64, &'a str, f64, Quality)> {
-        let depth_m = columns.depth.and_then(|at| self.number(at)).unwrap_or(0.0);
-        let flag = columns.flag.and_then(|at| self.number(at));
+    ) -> impl Iterator<Item = (&'a Conversion, Given, f64, Quality)> {
+        let depth_m = columns.depth.and_then(|at| self.remark(at)).unwrap_or(0.0);
+        let flag = columns.flag.and_then(|at| self.remark(at));
         columns.measured.iter().filter_map(move |measured| {
-            let value = measured.conversion.value(self.number(measured.at)?)?;
+            let value = measured.conversion.given(number(self.record, measured.at)?);
             let quality = match flag {
                 Some(flag) if measured.is_flagged => Scheme::Woce.verdict(flag)?,
                 _ => Quality::NotEvaluated,
             };
             let height_m = measured.height_m.unwrap_or(depth_m);
-            let conversion = &measured.conversion;
-            Some((
-                conversion.property.as_str(),
-                value,
-                conversion.unit.as_str(),
-                height_m,
-                quality,
-            ))
+            Some((&measured.conversion, value, height_m, quality))
         })
     }
 }
@@ -258,7 +281,11 @@ mod tests {
 
     #[test]
     fn rows_become_observations_with_their_flags() {
-        let found = read(TABLE.as_bytes(), SOURCE).unwrap();
+        let Found {
+            observations: found,
+            masked,
+        } = read(TABLE.as_bytes(), SOURCE).unwrap();
+        assert!(masked.is_none(), "{masked}");
         let of = |property: &str| -> Vec<_> {
             let those = found.iter().filter(|o| o.property == property);
             those.map(|o| (o.value, o.quality)).collect()
@@ -282,8 +309,22 @@ mod tests {
     #[test]
     fn what_stays_at_one_place_is_a_station() {
         let fixed = TABLE.replace("181.7\t70.8", "181.5\t70.9");
-        let found = read(fixed.as_bytes(), SOURCE).unwrap();
+        let found = read(fixed.as_bytes(), SOURCE).unwrap().observations;
         assert!(found.iter().all(|o| o.kind == PlatformKind::Station));
+    }
+
+    #[test]
+    fn values_that_cannot_be_true_are_counted() {
+        let row = "33HQ\t2015\t7\t14\t7\t14\t40\t181.5\t70.9\t5\t31.5\t-1.0\t30\t271.4\t2\n";
+        let hot = row.replace("-1.0", "71.0").replace("31.5", "-950.0");
+        let text = format!("{TABLE}{}{hot}", row.repeat(40));
+        let found = read(text.as_bytes(), SOURCE).unwrap();
+        assert_eq!(found.masked.implausible, 2, "-999 is none of them");
+        let lost = row.replace("70.9", "95.0");
+        let found = read(format!("{text}{lost}").as_bytes(), SOURCE).unwrap();
+        assert_eq!(found.masked.implausible, 2 + 3, "no place has such values");
+        let refused = read(format!("{text}{}", hot.repeat(3)).as_bytes(), SOURCE).unwrap_err();
+        assert_eq!(refused.reason, RejectReason::Values, "{refused}");
     }
 
     #[test]

@@ -1,13 +1,12 @@
 //! The way of a file of observations: read, and handed to their store.
 
 use contract::event::RejectReason;
-use contract::observation::Observation;
 
 use super::{Pipeline, Prepared};
 use crate::error::{IngestError, Stop};
 use crate::fetch::RawGranule;
 use crate::inspect::InspectedGranule;
-use crate::observation::{self, TextFormat};
+use crate::observation::{self, Found, TextFormat};
 use crate::plan::Wish;
 use crate::rejection::Rejection;
 
@@ -28,16 +27,17 @@ impl Pipeline<'_> {
             return Err(Rejection::new(RejectReason::TooLarge, "file", detail).into());
         }
         let (content, product) = (raw.content().await?, wish.product.cloned());
+        let file_name = raw.file_name.clone();
         let read = move || {
             let source = observation::Source {
-                file_name: &raw.file_name,
+                file_name: &file_name,
                 dataset: product.as_ref(),
             };
             observation::read_text(format, &content, source)
         };
-        let rows = async { Ok(tokio::task::spawn_blocking(read).await??) };
-        let rows = self.metrics.timed("decode", rows).await?;
-        self.store_observations(rows).await
+        let found = async { Ok(tokio::task::spawn_blocking(read).await??) };
+        let found = self.metrics.timed("decode", found).await?;
+        self.store_observations(found, &raw).await
     }
 
     /// Observations of a NetCDF file.
@@ -56,20 +56,37 @@ impl Pipeline<'_> {
             dataset: wish.product,
         };
         let read = observation::read(&mut session, &description, source);
-        let rows = self.metrics.timed("decode", read).await?;
+        let found = self.metrics.timed("decode", read).await?;
         raw.check_unchanged()?;
-        self.store_observations(rows).await
+        self.store_observations(found, &raw).await
     }
 
-    async fn store_observations(&self, rows: Vec<Observation>) -> Result<Prepared, Stop> {
+    /// Stores what was found in a file, and then notes the file.
+    async fn store_observations(&self, found: Found, raw: &RawGranule) -> Result<Prepared, Stop> {
+        let Found {
+            observations,
+            masked,
+        } = found;
+        let (Some(first), count) = (observations.first(), observations.len() as u64) else {
+            unreachable!("a file without observations is refused")
+        };
+        let dataset = first.dataset.clone();
         let Some(sink) = self.observations else {
             let detail = "holds observations, and there is no place for them here";
             return Err(Rejection::new(RejectReason::NoVariable, "file", detail).into());
         };
         let put = async {
-            let stored = sink.put(rows).await;
-            Ok(stored.map_err(|source| IngestError::Observations { source })?)
+            let stored = sink.put(observations).await;
+            let stored = stored.map_err(|source| IngestError::Observations { source })?;
+            let told = (raw.file_name.as_str(), count, masked);
+            observation::put_note(self.store, &dataset, raw.sha256, told).await?;
+            Ok(stored)
         };
-        self.metrics.timed("put", put).await.map(Prepared::Observed)
+        let stored = self.metrics.timed("put", put).await?;
+        Ok(Prepared::Observed {
+            dataset,
+            stored,
+            masked,
+        })
     }
 }

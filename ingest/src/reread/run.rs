@@ -81,7 +81,7 @@ pub async fn run(
             ),
         });
     }
-    commit::replace(store, &request.product, &readings).await
+    commit::replace(store, &gates, &request.product, &readings).await
 }
 
 /// What every file needs.

@@ -1,18 +1,19 @@
-//! A file of as many steps as a file may have: its event stays within what the event log takes, and nothing that is done
-//! about it grows with the square of its steps.
+//! A file of more steps than an event can list: its event stays within what the event log takes. What is done about as
+//! many steps as a file may have without reading them is tested where it is done (`commit::merge`, `contract::event`).
 
 use std::path::Path;
 use std::sync::Arc;
 
-use contract::event::{Body, MAX_EVENT_BYTES};
+use contract::event::{Body, MAX_EVENT_BYTES, RejectReason};
 use contract::time::Period;
 use contract::topic::Topic;
-use ingest::{IngestService, Outcome, Quiet};
+use ingest::{Batch, IngestService, Outcome, Quiet};
 use storage::log::{EmbeddedLog, EventLog as _};
 
-use crate::fixture::{Place, events, settings};
+use crate::fixture::{Place, SmallFile, events, refusal, settings};
 
-const STEPS: usize = 100_000;
+/// A period takes 62 bytes of an event: these are more than one may have, by a fifth.
+const STEPS: usize = 20_000;
 const HOUR_MS: i64 = 3_600_000;
 const LAT: [f64; 2] = [45.0, -45.0];
 const LON: [f64; 4] = [-135.0, -45.0, 45.0, 135.0];
@@ -55,7 +56,7 @@ fn write(path: &Path) {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_file_of_100_000_steps_lands_and_is_told_in_a_bounded_event() {
+async fn a_file_of_more_steps_than_an_event_can_list_lands_and_is_told_in_a_bounded_event() {
     let (place, log) = (Place::new(), Arc::new(EmbeddedLog::memory()));
     write(&place.path("hourly.nc"));
     let mut settings = settings();
@@ -63,13 +64,12 @@ async fn a_file_of_100_000_steps_lands_and_is_told_in_a_bounded_event() {
     settings.limits.cpu_s = 600;
     settings.limits.wall = std::time::Duration::from_mins(30);
     let service = IngestService::new(place.store.clone(), Arc::clone(&log) as _, settings);
+    let mut outcomes = vec![];
     for _ in 0..2 {
         let file = [place.path("hourly.nc")];
         service.notify(&file, None, None).await.unwrap();
+        outcomes.extend(service.drain(&Quiet).await.unwrap());
     }
-    let begun = std::time::Instant::now();
-    let outcomes = service.drain(&Quiet).await.unwrap();
-    println!("landed in {:.1} s", begun.elapsed().as_secs_f64());
     assert!(
         matches!(&outcomes[0], Outcome::Landed { periods, .. } if periods.len() == STEPS),
         "{}",
@@ -107,4 +107,20 @@ async fn a_file_of_100_000_steps_lands_and_is_told_in_a_bounded_event() {
         (&[whole][..], Some(STEPS as u64))
     );
     assert_eq!(*id, manifest.id());
+}
+
+#[tokio::test]
+async fn a_file_of_one_step_more_than_a_file_may_have_is_refused() {
+    let place = Place::new();
+    SmallFile::new().write_classic(&place.path("two.nc"));
+    let mut settings = settings();
+    settings.limits.steps = 1;
+    let batch = Batch {
+        files: vec![place.path("two.nc")],
+        ..Batch::default()
+    };
+    let landed = ingest::land_files(&place.store, &place.log, &settings, batch, &Quiet);
+    let (reason, line) = refusal(&landed.await.unwrap());
+    assert_eq!(reason, RejectReason::TooLarge, "{line}");
+    assert!(line.contains("2 steps, 1 to 1"), "{line}");
 }

@@ -1,10 +1,16 @@
 //! The reader process as an enemy: it dies, hangs, floods, lies or is asked for what lies outside its file.
 
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use contract::event::RejectReason;
+use contract::topic::Topic;
 use hdf5::Extent;
-use ingest::{Batch, DecoderCommand, IngestError, Outcome, Quiet, Settings};
+use ingest::{
+    Batch, DecoderCommand, IngestError, IngestService, Outcome, Progress, Quiet, Settings, Stage,
+};
+use storage::log::{EmbeddedLog, EventLog};
 
 use crate::fixture::{FILL, Place, SmallFile, open_again, refusal, settings, text};
 
@@ -69,6 +75,122 @@ async fn a_reader_that_floods_or_lies_is_not_believed() {
         let (reason, line) = refused_by(script).await;
         assert_eq!(reason, RejectReason::Corrupt, "{script}: {line}");
     }
+}
+
+/// A file is planned from what its reader tells and from axes that are read by it: whatever these do to the library, the
+/// partition goes on.
+#[tokio::test]
+async fn a_reader_that_dies_while_its_file_is_planned_refuses_it_and_the_next_one_lands() {
+    for (end, reason) in [
+        ("kill -SEGV $$", RejectReason::Corrupt),
+        (
+            "echo memory allocation failed >&2; exit 1",
+            RejectReason::TooLarge,
+        ),
+        ("yes", RejectReason::Corrupt),
+    ] {
+        let (place, log) = (Place::new(), Arc::new(EmbeddedLog::memory()));
+        SmallFile::new().write_classic(&place.path("bad.nc"));
+        SmallFile::new().write_hdf5(&place.path("good.h5"));
+        let reader = env!("CARGO_BIN_EXE_decode-file");
+        // It describes the file, and ends when its first axis is asked for.
+        let bad = format!("{reader} \"$0\" \"$@\" </dev/null; head -c 1 >/dev/null; {end}");
+        let script = format!("case \"$0\" in *bad*) {bad};; esac; exec {reader} \"$0\" \"$@\"");
+        let service = IngestService::new(
+            place.store.clone(),
+            Arc::clone(&log) as Arc<dyn EventLog>,
+            scripted(&script),
+        );
+        let files = [place.path("bad.nc"), place.path("good.h5")];
+        service.notify(&files, None, None).await.unwrap();
+        let stages = Stages::default();
+        let outcomes = service.drain(&stages).await.unwrap();
+        assert_eq!(refusal(&outcomes[..1]).0, reason, "{}", outcomes[0]);
+        assert!(
+            matches!(outcomes[1], Outcome::Landed { .. }),
+            "{}",
+            outcomes[1]
+        );
+        assert_eq!(stages.last_of("bad.nc"), Some(Stage::Plan));
+        assert_eq!(log.lag(Topic::GranuleNotice, "ingest").await.unwrap(), 0);
+    }
+}
+
+/// How far each file came.
+#[derive(Default)]
+struct Stages(Mutex<Vec<(PathBuf, Stage)>>);
+
+impl Stages {
+    fn last_of(&self, name: &str) -> Option<Stage> {
+        let told = self.0.lock().unwrap();
+        let own = told.iter().rfind(|(file, _)| file.ends_with(name));
+        own.map(|(_, stage)| *stage)
+    }
+}
+
+impl Progress for Stages {
+    fn stage(&self, file: &Path, stage: Stage, _step: usize, _steps: usize) {
+        self.0.lock().unwrap().push((file.to_owned(), stage));
+    }
+
+    fn done(&self, _outcome: &Outcome) {}
+}
+
+/// The libraries that parse files are called by the reader process alone; the other files here write one, for tests.
+#[test]
+fn nothing_but_the_reader_process_opens_data_files() {
+    fn files(folder: &Path, found: &mut Vec<PathBuf>) {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                files(&path, found);
+            } else {
+                found.push(path);
+            }
+        }
+    }
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut found = vec![];
+    files(&root, &mut found);
+    let opens = |path: &PathBuf| {
+        let text = std::fs::read_to_string(path).unwrap();
+        ["hdf5::", "netcdf3::", "DataFile"]
+            .iter()
+            .any(|word| text.contains(word))
+    };
+    let own = |path: &PathBuf| {
+        let path = path.strip_prefix(&root).unwrap();
+        let folders = ["file", "generate"]
+            .iter()
+            .any(|folder| path.starts_with(folder));
+        folders || path == Path::new("file.rs") || path == Path::new("decoder/child.rs")
+    };
+    let (known, others): (Vec<_>, Vec<_>) = found.into_iter().filter(opens).partition(own);
+    assert!(known.len() > 3, "{known:?}");
+    assert_eq!(others, Vec::<PathBuf>::new());
+}
+
+/// What a file declares is told in a message of bounded length: a longer one is the file's fault, and not the reader's.
+#[tokio::test]
+async fn attributes_beyond_what_a_description_may_hold_refuse_the_file() {
+    let place = Place::new();
+    let mut set = netcdf3::DataSet::new();
+    set.add_fixed_dim("x", 1).unwrap();
+    // Each byte is six in a message.
+    let text = "\u{1}".repeat(4096);
+    set.add_var_i8("wordy", &["x"]).unwrap();
+    for number in 0..1000 {
+        let name = format!("a{number}");
+        set.add_var_attr_string("wordy", &name, &text).unwrap();
+    }
+    let path = place.path("wordy.nc");
+    let mut writer = netcdf3::FileWriter::open(&path).unwrap();
+    writer.set_def(&set, netcdf3::Version::Classic, 0).unwrap();
+    writer.write_var_i8("wordy", &[0]).unwrap();
+    writer.close().unwrap();
+    let (reason, line) = refusal(&land(&place, &settings(), "wordy.nc").await.unwrap());
+    assert_eq!(reason, RejectReason::TooLarge, "{line}");
+    assert!(line.contains("attributes"), "{line}");
 }
 
 /// A reader that somebody else kills is started again; if it dies again and again the file is refused and not the others.

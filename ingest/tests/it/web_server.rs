@@ -3,9 +3,10 @@
 use std::fmt::Write as _;
 use std::net::SocketAddr;
 use std::sync::{Arc, Mutex};
+use std::time::Duration;
 
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
-use tokio::net::TcpListener;
+use tokio::net::{TcpListener, TcpStream};
 
 /// What is answered to a path.
 pub(crate) type Answers = dyn Fn(&str) -> Answer + Send + Sync;
@@ -16,7 +17,14 @@ pub(crate) enum Answer {
     Whole(&'static str, Vec<String>, Vec<u8>),
     /// The same, but the connection ends after half of the body.
     Half(Vec<u8>),
+    /// A file of a mebibyte, a byte at a time.
+    Trickle,
+    /// None.
+    Silence,
 }
+
+/// Between two bytes of a trickle.
+const PAUSE: Duration = Duration::from_millis(50);
 
 /// The server; it ends with the runtime.
 pub(crate) struct WebServer {
@@ -45,8 +53,14 @@ impl WebServer {
                     let text = String::from_utf8_lossy(&head).into_owned();
                     let path = text.split(' ').nth(1).unwrap_or_default().to_owned();
                     seen.lock().unwrap().push(path.clone());
-                    let bytes = bytes_of(answers(&path));
-                    stream.write_all(&bytes).await.ok();
+                    match answers(&path) {
+                        Answer::Trickle => trickle(stream).await,
+                        // Until the other side goes.
+                        Answer::Silence => drop(stream.read_u8().await),
+                        answer => {
+                            stream.write_all(&bytes_of(answer)).await.ok();
+                        }
+                    }
                 });
             }
         });
@@ -62,10 +76,20 @@ impl WebServer {
     }
 }
 
+async fn trickle(mut stream: TcpStream) {
+    let head = b"HTTP/1.1 200 OK\r\ncontent-length: 1048576\r\n\r\n";
+    let mut sent = stream.write_all(head).await;
+    while sent.is_ok() {
+        tokio::time::sleep(PAUSE).await;
+        sent = stream.write_u8(0).await;
+    }
+}
+
 fn bytes_of(answer: Answer) -> Vec<u8> {
     let (status, headers, body, shown) = match answer {
         Answer::Whole(status, headers, body) => (status, headers, body.clone(), body.len()),
         Answer::Half(body) => ("200 OK", vec![], body.clone(), body.len() / 2),
+        Answer::Trickle | Answer::Silence => unreachable!("these have no bytes of their own"),
     };
     let mut text = format!("HTTP/1.1 {status}\r\nconnection: close\r\n");
     let is_sized = headers

@@ -21,7 +21,7 @@ pub(crate) fn settings() -> Settings {
 
 pub(crate) async fn observations(path: &Path) -> Vec<Observation> {
     match read_path(path, None, &settings()).await.unwrap() {
-        Reading::Observations(observations) => observations,
+        Reading::Observations(found) => found.observations,
         other => panic!("{}: {other:?}", path.display()),
     }
 }
@@ -29,7 +29,7 @@ pub(crate) async fn observations(path: &Path) -> Vec<Observation> {
 pub(crate) async fn refusal(path: &Path) -> Rejection {
     match read_path(path, None, &settings()).await.unwrap() {
         Reading::Refused(rejection) => rejection,
-        Reading::Observations(all) => panic!("{} observations of {}", all.len(), path.display()),
+        Reading::Observations(found) => panic!("{found:?} of {}", path.display()),
         Reading::Other => panic!("{} is told to hold no observations", path.display()),
     }
 }
@@ -238,6 +238,36 @@ async fn rows_the_other_way_round() {
 }
 
 #[tokio::test]
+async fn values_outside_the_range_of_their_file_are_counted_and_fill_values_are_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut draft = Draft::new(
+        "timeSeries",
+        &[("platform", 1), ("time", 5), ("letters", 2)],
+    )
+    .names("platform", "timeseries_id", "aa")
+    .axes("platform", "time", 1, 5)
+    .variable(
+        "sst",
+        &["platform", "time"],
+        SST,
+        vec![11.0, 12.0, f64::NAN, 21.0, 22.0],
+    );
+    draft
+        .set
+        .add_var_attr_f64("sst", "valid_max", vec![20.0])
+        .unwrap();
+    let path = draft.write(folder.path());
+    let Reading::Observations(found) = read_path(&path, None, &settings()).await.unwrap() else {
+        panic!("refused")
+    };
+    assert_eq!(found.observations.len(), 2);
+    assert_eq!(
+        (found.masked.out_of_range, found.masked.implausible),
+        (2, 0)
+    );
+}
+
+#[tokio::test]
 async fn casts_have_the_depth_of_each_sample_and_flags_that_say_what_they_mean() {
     let folder = tempfile::tempdir().unwrap();
     let file = Draft::new("profile", &[("cast", 2), ("z", 2), ("letters", 2)])
@@ -421,7 +451,8 @@ async fn mutated_texts_end_in_observations_or_a_refusal() {
                 continue;
             }
             match read_path(&path, None, &settings()).await.unwrap() {
-                Reading::Observations(all) => {
+                Reading::Observations(found) => {
+                    let all = found.observations;
                     assert!(all.iter().all(|o| o.validate().is_ok()));
                     outcomes[0] += 1;
                 }

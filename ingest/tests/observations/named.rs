@@ -159,7 +159,8 @@ async fn mutated_files_with_texts_end_in_observations_or_a_refusal() {
             bytes[at] = byte;
             std::fs::write(&path, &bytes).unwrap();
             match read_path(&path, None, &settings).await.unwrap() {
-                Reading::Observations(all) => {
+                Reading::Observations(found) => {
+                    let all = found.observations;
                     assert!(all.iter().all(|o| o.validate().is_ok()));
                     read += 1;
                 }

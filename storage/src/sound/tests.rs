@@ -79,6 +79,7 @@ async fn store() -> Store {
     store.put_new(&key, picture).await.unwrap();
     for name in [
         "sums/p/a.json",
+        "observation-files/p/a",
         "readings/p/a",
         "checks/a.json",
         "observation-indexes/p/1.json",

@@ -1,6 +1,7 @@
 //! A server under test: a memory store with a small product in it, the real router, and doubles for the two ports.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use axum::Router;
 use axum::body::{Body, Bytes, to_bytes};
@@ -29,6 +30,8 @@ pub(crate) const GRID: Grid = Grid {
     dlat_deg: 10.0,
     dlon_deg: 10.0,
 };
+/// Longest wait for an answer: a server whose limits are gone would keep a test for ever.
+const ANSWER_LIMIT: Duration = Duration::from_mins(2);
 /// Steps of every product: January to March 2000.
 pub(crate) const MONTHS: u32 = 3;
 
@@ -248,19 +251,18 @@ impl TestApp {
     }
 
     pub(crate) async fn send(&self, request: Request<Body>) -> Answer {
-        let (parts, body) = self
-            .router
-            .clone()
-            .oneshot(request)
-            .await
-            .unwrap()
-            .into_parts();
-        let body = to_bytes(body, 64 << 20).await.unwrap();
-        Answer {
-            status: parts.status,
-            headers: parts.headers,
-            body,
-        }
+        let uri = request.uri().clone();
+        let answered = async {
+            let answer = self.router.clone().oneshot(request).await.unwrap();
+            let (parts, body) = answer.into_parts();
+            Answer {
+                status: parts.status,
+                headers: parts.headers,
+                body: to_bytes(body, 64 << 20).await.unwrap(),
+            }
+        };
+        let answer = tokio::time::timeout(ANSWER_LIMIT, answered).await;
+        answer.unwrap_or_else(|_late| panic!("{uri} is not answered"))
     }
 
     /// The count in one line of `/metrics`, 0 if it is not there.

@@ -159,6 +159,25 @@ fn a_group_ends_before_the_first_period_that_comes_again() {
     assert_eq!(disjoint_prefix(&files[..2]), 2);
 }
 
+/// As many steps as a file may have: with work that grows with their square this test takes minutes.
+#[test]
+fn a_file_of_very_many_steps_is_told_from_itself_and_from_its_revision() {
+    const STEPS: i64 = 100_000;
+    const HOUR_MS: i64 = 3_600_000;
+    let time = |hour: i64| TimeMs::new(hour * HOUR_MS).unwrap();
+    let hour = |hour| Period::new(time(hour), time(hour + 1)).unwrap();
+    let periods: Vec<Period> = (0..STEPS).map(hour).collect();
+    let [file, revision] = [("a", 1), ("b", 2)].map(|(name, at)| noticed(name, &periods, at));
+    assert_eq!(disjoint_prefix(&[file.clone(), file.clone()]), 1);
+    let mut steps = placed(&file);
+    assert_eq!(steps.len(), periods.len());
+    assert_eq!(add(&mut steps, &file), Change::Same);
+    let taken = add(&mut steps, &revision);
+    let revised = true;
+    assert_eq!(taken, Change::Taken { revised, periods });
+    assert_eq!(add(&mut steps, &file), Change::Superseded);
+}
+
 #[test]
 fn files_of_notices_in_any_order_end_as_the_same_steps() {
     let [a, b, c] = [

@@ -8,6 +8,7 @@ use contract::quantity::Quantity;
 use super::*;
 use crate::plan::Target;
 use crate::recipe::Recipe;
+use crate::settings::{DecoderCommand, Settings};
 
 const GRID: Grid = Grid {
     rows: 2,
@@ -165,4 +166,39 @@ fn a_file_that_is_read_anew_keeps_its_place_in_the_order_of_notices() {
     let orders = [order(1), order(2), order(3), None, order(3)];
     assert_eq!(next.notice_orders(), orders);
     assert_eq!(next.steps[4], step("a", 5, 1));
+}
+
+/// Maps of all files are turned into series at once: no more of that than there is memory for.
+#[tokio::test]
+async fn series_are_made_anew_once_there_is_memory_for_them() {
+    let store = Store::memory();
+    let frame = async |month: u32, value: f32| {
+        let period = Period::month(2000, month).unwrap();
+        let written = storage::frames::write(&store, &product(), &GRID, &[value; 8], period).await;
+        Step {
+            frame: written.unwrap(),
+            ..step("a", month, 0)
+        }
+    };
+    let mut newest = manifest(vec![frame(1, 1.0).await, frame(2, 2.0).await]);
+    newest.number = 1;
+    manifests::commit(&store, &newest).await.unwrap();
+    let anew = [reading(vec![frame(1, 3.0).await, frame(2, 2.0).await])];
+    let decoder = DecoderCommand {
+        program: "/nowhere".into(),
+        arguments: vec![],
+    };
+    let gates = Gates::new(&Settings {
+        parallel_bytes: 1,
+        ..Settings::with_decoder(decoder)
+    });
+    let held = gates.memory(1).await;
+    let product = product();
+    let mut replaced = Box::pin(replace(&store, &gates, &product, &anew));
+    let early = tokio::time::timeout(std::time::Duration::from_millis(300), &mut replaced).await;
+    assert!(early.is_err(), "it did not wait: {early:?}");
+    drop(held);
+    let replaced = replaced.await.unwrap().unwrap();
+    assert_eq!((replaced.number, replaced.series.len()), (2, 1));
+    assert_eq!(replaced.steps, anew[0].steps);
 }
