@@ -1,7 +1,7 @@
 //! Titles of what is new, each once.
 import { describe, expect, it } from "vitest";
-import type { Product } from "../src/api";
-import { Catalogue } from "../src/catalogue";
+import type { Product } from "../src/api/api";
+import { Catalogue } from "../src/state/catalogue";
 
 function product(id: string, title: string, derived_from: string | null = null): Product {
   return {

@@ -1,13 +1,13 @@
 //! The look of a layer: in addresses and back, what of it makes a difference, and what the panel offers.
 import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
-import { globeUrl, tileTemplate, type Palette, type Product } from "../src/api";
-import { Catalogue } from "../src/catalogue";
-import { decodeHash, encodeHash } from "../src/hash";
-import { effective, possible, USUAL, withoutColours, type Look } from "../src/look";
-import { changeOf, colourParameters, parameters, parseRange, queryOf } from "../src/look-address";
-import { offerOf } from "../src/look-offer";
-import { INITIAL, type State } from "../src/state";
-import { isSameLayer, layerKey, type LayerSpec } from "../src/tiles";
+import { globeUrl, tileTemplate, type Palette, type Product } from "../src/api/api";
+import { Catalogue } from "../src/state/catalogue";
+import { decodeHash, encodeHash } from "../src/state/hash";
+import { effective, possible, USUAL, withoutColours, type Look } from "../src/look/look";
+import { changeOf, colourParameters, parameters, parseRange, queryOf } from "../src/look/address";
+import { offerOf } from "../src/look/offer";
+import { INITIAL, type State } from "../src/state/store";
+import { isSameLayer, layerKey, type LayerSpec } from "../src/globe/tiles";
 
 beforeEach(() => vi.stubGlobal("document", { baseURI: "http://host/below/" }));
 afterEach(() => vi.unstubAllGlobals());

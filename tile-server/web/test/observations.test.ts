@@ -1,13 +1,13 @@
 //! Observations and news: pure parts of what the page makes of them.
 import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
-import { tileTemplate } from "../src/api";
-import { denseLine } from "../src/box";
-import { Catalogue } from "../src/catalogue";
-import { decodeHash, encodeHash } from "../src/hash";
-import { groupsOf, isTrusted, qualityText } from "../src/measured";
-import { countText, series, seriesUrl, type Measured, type Platform } from "../src/observations";
-import { INITIAL } from "../src/state";
-import { parseNews, touches, Updates, type News, type Stream } from "../src/updates";
+import { tileTemplate } from "../src/api/api";
+import { denseLine } from "../src/globe/box";
+import { Catalogue } from "../src/state/catalogue";
+import { decodeHash, encodeHash } from "../src/state/hash";
+import { groupsOf, isTrusted, qualityText } from "../src/panels/measured";
+import { countText, series, seriesUrl, type Measured, type Platform } from "../src/api/observations";
+import { INITIAL } from "../src/state/store";
+import { parseNews, touches, Updates, type News, type Stream } from "../src/api/updates";
 
 beforeEach(() => vi.stubGlobal("document", { baseURI: "http://host/below/" }));
 afterEach(() => {

@@ -1,11 +1,11 @@
 //! The shareable address, series values, cross-fades, ticks and files: pure parts of what the page shows.
 import { describe, expect, it } from "vitest";
-import { budgetCsv, seriesCsv } from "../src/csv";
-import { underOpacity } from "../src/fade";
-import { decodeHash, encodeHash } from "../src/hash";
-import { ticksOf } from "../src/legend";
-import { hasData, valueAt } from "../src/series";
-import { INITIAL, MODES, Store, type State } from "../src/state";
+import { budgetCsv, seriesCsv } from "../src/panels/csv";
+import { underOpacity } from "../src/globe/fade";
+import { decodeHash, encodeHash } from "../src/state/hash";
+import { ticksOf } from "../src/look/legend";
+import { hasData, valueAt } from "../src/panels/series";
+import { INITIAL, MODES, Store, type State } from "../src/state/store";
 
 describe("the address", () => {
   const state: State = {
