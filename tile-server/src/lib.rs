@@ -46,6 +46,7 @@ pub mod live;
 mod look;
 pub mod metrics;
 mod middleware;
+mod openapi;
 mod pictures;
 mod request;
 mod router;
