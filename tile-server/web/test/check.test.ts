@@ -1,6 +1,6 @@
 //! The check table: what is said of printed numbers with and without an uncertainty.
 import { describe, expect, it } from "vitest";
-import type { CheckPaper, CheckRow } from "../src/api/api";
+import type { CheckPaper, CheckRow } from "../src/api/types";
 import { statedText, verdictText } from "../src/panels/check";
 
 const paper: CheckPaper = { value: -1.4, uncertainty: 0.7, decimals: 1, difference: -0.0043, verdict: "within" };

@@ -11,11 +11,11 @@ import {
   positionOf,
   quantise,
   rangeOf,
+  type Step,
   stepLabel,
   strideFor,
   timeNames,
   toIso,
-  type Step,
 } from "../src/time/steps";
 
 const at = (iso: string): number => Date.parse(iso);

@@ -1,57 +1,16 @@
-//! The server's observations, typed: which platforms there are and what one of them measured.
-import { address, getJson } from "./api";
-
-export const KINDS = ["buoy", "ship", "station", "profile"] as const;
-export type Kind = (typeof KINDS)[number];
-
-/** Best first. */
-export const QUALITIES = ["good", "not_evaluated", "questionable", "bad"] as const;
-export type Quality = (typeof QUALITIES)[number];
-
-type Position = [lon: number, lat: number];
-
-export interface Platform {
-  id: string;
-  geometry: { type: "Point"; coordinates: Position } | { type: "MultiLineString"; coordinates: Position[][] };
-  properties: {
-    dataset: string;
-    platform: string;
-    kind: Kind;
-    first: string;
-    last: string;
-    lon: number;
-    lat: number;
-    properties: string[];
-    count: number;
-  };
-}
-
-export interface Measured {
-  time: string;
-  lon: number;
-  lat: number;
-  depth_m: number;
-  property: string;
-  value: number;
-  unit: string;
-  quality: Quality;
-}
-
-export interface MeasuredSeries {
-  dataset: string;
-  platform: string;
-  series: Measured[];
-  next: string | null;
-}
+//! Observations: which platforms there are and what one of them measured.
+import { address, getJson } from "./client";
+import type { Answer, Measured, MeasuredSeries, Platform, QueryTexts } from "./types";
+import { KINDS } from "./words";
 
 /** Answers of one series; a plot of more values than these hold would not show more. */
 const MOST_PAGES = 5;
 
 export const platforms = (signal: AbortSignal) =>
-  getJson<{ features: Platform[] }>(address("api/observations/platforms"), signal).then((body) => body.features);
+  getJson<Answer<"platforms">>(address("api/observations/platforms"), signal).then((body) => body.features);
 
-export function seriesUrl(dataset: string, platform: string, query: Record<string, string> = {}): string {
-  return address(`api/observations/${encodeURIComponent(dataset)}/${encodeURIComponent(platform)}`, query);
+export function seriesUrl(dataset: string, platform: string, query: QueryTexts<"observations"> = {}): string {
+  return address(`api/observations/${encodeURIComponent(dataset)}/${encodeURIComponent(platform)}`, { ...query });
 }
 
 /** All pages of a series, or the first ones where there are very many; `next` is then where to go on. */
@@ -59,10 +18,8 @@ export async function series(dataset: string, platform: string, signal: AbortSig
   const all: Measured[] = [];
   let after: string | null = null;
   for (let page = 0; page < MOST_PAGES; page++) {
-    const answer: MeasuredSeries = await getJson(
-      seriesUrl(dataset, platform, after === null ? {} : { after }),
-      signal,
-    );
+    const url = seriesUrl(dataset, platform, after === null ? {} : { after });
+    const answer: MeasuredSeries = await getJson<Answer<"observations">>(url, signal);
     all.push(...answer.series);
     after = answer.next;
     if (after === null) break;

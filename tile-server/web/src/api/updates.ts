@@ -1,12 +1,6 @@
 //! News of new data: the server's event stream in, what became new in small bundles out; it finds its own way back after a break.
-import { address } from "./api";
-
-/** A product has a new version, or looks different from these instants on. */
-export interface News {
-  product: string;
-  manifest: string;
-  touched: { start: string; end: string }[];
-}
+import { address } from "./client";
+import type { News } from "./types";
 
 /** What landed together is told together: one reload instead of one for each. */
 const GATHER_MS = 300;

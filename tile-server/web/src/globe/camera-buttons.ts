@@ -1,7 +1,7 @@
 //! Buttons beside the globe: nearer, further, north up, and back to where the page began.
 import { el, icon } from "../page/dom";
-import type { Globe } from "./globe";
 import { HOUSE, MINUS, NORTH, PLUS } from "../page/icons";
+import type { Globe } from "./globe";
 
 export class CameraButtons {
   constructor(container: HTMLElement, globe: Globe) {

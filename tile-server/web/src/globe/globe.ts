@@ -15,8 +15,8 @@ import {
   buildModuleUrl,
   type Scene,
 } from "cesium";
+import { type CameraView, HOME, type Place } from "../state/camera";
 import type { Bounds } from "./box";
-import { HOME, type CameraView, type Place } from "../state/store";
 
 /** The base picture is dimmed: the data's colours are what is to be read. */
 const BASE_LOOK = { brightness: 0.62, saturation: 0.55, contrast: 1.08, gamma: 1.0 };

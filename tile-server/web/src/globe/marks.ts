@@ -1,7 +1,7 @@
 //! Marks on the globe: the chosen place, the grid cell its series belongs to, and the budget's region as an outline.
 import { Cartesian3, Color, Material, PointPrimitiveCollection, PolylineCollection, type Scene } from "cesium";
-import { outline, type Bounds, type LonLat } from "./box";
-import type { Place } from "../state/store";
+import type { Place } from "../state/camera";
+import { type Bounds, type LonLat, outline } from "./box";
 
 const PLACE_COLOUR = "#ffd166";
 const REGION_COLOUR = "#7fe7ff";

@@ -1,7 +1,7 @@
 //! Platforms on the globe: buoys, stations and casts as points, ships as tracks with their last place; a canvas point in, the platform there out.
 import { Cartesian3, Color, Material, PointPrimitiveCollection, PolylineCollection, type Scene } from "cesium";
+import type { Kind, Platform } from "../api/types";
 import { denseLine } from "./box";
-import type { Kind, Platform } from "../api/observations";
 
 const COLOURS: Record<Kind, string> = { buoy: "#ffe08a", ship: "#ff9bd2", station: "#b7f28f", profile: "#c9b6ff" };
 /** A little above the ellipsoid, and below the mark of a chosen place. */

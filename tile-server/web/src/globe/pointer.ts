@@ -1,8 +1,8 @@
 //! Pointer on the globe: a click gives a place; in drawing mode a drag gives a box.
 import { ScreenSpaceEventHandler, ScreenSpaceEventType } from "cesium";
-import { boxFromCorners, type Bounds } from "./box";
+import type { Place } from "../state/camera";
+import { type Bounds, boxFromCorners } from "./box";
 import type { Globe } from "./globe";
-import type { Place } from "../state/store";
 
 interface Drawing {
   start: Place | undefined;

@@ -1,6 +1,6 @@
 //! Decides which layer loads next: wishes from slider and playback in, one load at a time out, the newest wish first.
+import { isSameLayer, layerKey, type LayerSpec } from "./layer";
 import type { LayerStage, Prepared } from "./stage";
-import { isSameLayer, layerKey, type LayerSpec } from "./tiles";
 
 const FADE_MS = 220;
 

@@ -1,7 +1,8 @@
 //! Double-buffered product layers on the globe: a new instant loads out of sight, then fades in over the old one, so that nothing flashes.
 import { ImageryLayer, type Scene } from "cesium";
 import { underOpacity } from "./fade";
-import { layerKey, LayerTiles, type LayerSpec, type TileCounts } from "./tiles";
+import { layerKey, type LayerSpec } from "./layer";
+import { LayerTiles, type TileCounts } from "./tiles";
 
 /** A layer that has loaded what the present view needs and waits for its turn. */
 export interface Prepared {

@@ -7,37 +7,10 @@ import {
   UrlTemplateImageryProvider,
   WebMercatorTilingScheme,
 } from "cesium";
-import { tileTemplate, type Version } from "../api/api";
-import { isWhole, type Bounds } from "./box";
-import type { Look } from "../look/look";
-import { parameters, queryOf } from "../look/address";
-import type { Mode } from "../state/store";
-
-/** Everything that decides what a layer looks like; two equal keys are the same pictures. */
-export interface LayerSpec extends Version {
-  readonly product: string;
-  readonly mode: Mode;
-  /** Of what was chosen that which makes a difference in this mode. */
-  readonly look: Look;
-  readonly timeIso: string;
-  readonly bounds: Bounds;
-  readonly maxZoom: number;
-}
-
-export function layerKey(spec: LayerSpec): string {
-  const revision = spec.revision > 0 ? `+${spec.revision}` : "";
-  return `${spec.product}:${spec.manifest}${revision}/${kindOf(spec)}@${spec.timeIso}`;
-}
-
-/** Two instants of one layer: the same product in the same mode and look. */
-export function isSameLayer(a: LayerSpec, b: LayerSpec): boolean {
-  return a.product === b.product && kindOf(a) === kindOf(b);
-}
-
-function kindOf({ mode, look }: LayerSpec): string {
-  const query = queryOf(parameters(look));
-  return query === "" ? mode : `${mode}?${query}`;
-}
+import { tileTemplate } from "../api/pictures";
+import { parameters } from "../look/address";
+import { type Bounds, isWhole } from "./box";
+import type { LayerSpec } from "./layer";
 
 /** Totals over all layers since the page was loaded. */
 export class TileCounts {

@@ -1,17 +1,16 @@
 //! A look in addresses, its own page's and the server's: a look in, named parameters out, and back. The usual look needs none.
+import type { Parameter } from "../api/pictures";
 import {
+  type Look,
   MOST_HEIGHT_M_PER_KG_M2,
   MOST_RELIEF_EXAGGERATION,
   MOST_SEA_OPACITY,
-  USUAL,
-  type Look,
   type Range,
+  USUAL,
 } from "./look";
 
 /** Largest value that pictures are computed with. */
 const MOST_VALUE = 1e20;
-
-export type Parameter = readonly [name: string, value: string];
 
 /** Parameters of an address that a legend goes by. */
 export function colourParameters({ palette, range, reversed }: Look): Parameter[] {
@@ -38,11 +37,6 @@ export function parameters(look: Look): Parameter[] {
     look.sunOfTime ? ["sun", "time"] : null,
   ];
   return all.filter((one) => one !== null);
-}
-
-/** `name=value&…`; of the values' letters only those of numbers, names and ranges occur, which addresses carry as they are. */
-export function queryOf(parameters: readonly Parameter[]): string {
-  return parameters.map(([name, value]) => `${name}=${value}`).join("&");
 }
 
 /** What one parameter of an address changes; undefined where it says nothing valid. */

@@ -1,13 +1,17 @@
 //! The legend of what is in sight: a layer in, its colour bar out. Colours that somebody chose are described by the server.
-import * as api from "../api/api";
-import type { Legend } from "../api/api";
+import { queryOf } from "../api/pictures";
+import * as api from "../api/requests";
+import type { Legend, Mode } from "../api/types";
+import { colourParameters } from "./address";
 import { legendView } from "./legend";
-import { colourParameters, queryOf } from "./address";
-import type { Mode } from "../state/store";
-import type { LayerSpec } from "../globe/tiles";
+import type { Look } from "./look";
 
 /** What colours depend on. */
-export type Coloured = Pick<LayerSpec, "product" | "mode" | "look">;
+export interface Coloured {
+  readonly product: string;
+  readonly mode: Mode;
+  readonly look: Look;
+}
 
 /** Ranges are typed by hand: nobody comes back to more than these. */
 const MOST_KNOWN = 50;

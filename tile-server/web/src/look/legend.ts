@@ -1,5 +1,5 @@
 //! The colour bar: a product's legend in, a bar with ticks and unit out.
-import type { Legend } from "../api/api";
+import type { Legend } from "../api/types";
 import { el } from "../page/dom";
 import { chemistry, digitsFor, numberText, unitText } from "../page/format";
 
@@ -23,6 +23,7 @@ export function gradientOf({ stops }: Pick<Legend, "stops">): string {
 }
 
 export function legendView(legend: Legend): HTMLElement {
+  // Older servers do not say.
   const ticks = legend.ticks ?? ticksOf(legend.low, legend.high);
   const digits = Math.max(...ticks.map((tick) => fractionDigits(tick, legend.high - legend.low)));
   const bar = el("div", { class: "legend-bar", "aria-hidden": "true" });

@@ -1,5 +1,5 @@
 //! How a layer is to look: what a reader chose, what of it makes a difference, and what this server can draw.
-import type { Mode } from "../state/store";
+import type { Mode } from "../api/types";
 
 /** Values of the first and the last colour, in the legend's unit. */
 export interface Range {

@@ -1,9 +1,9 @@
 //! What the look panel can offer: catalogue, palettes and state in, the choices that make sense now out.
-import type { Palette } from "../api/api";
-import type { Catalogue } from "../state/catalogue";
+import type { Palette } from "../api/types";
 import { titleText } from "../page/format";
-import { canDoubt, hasHeight, hasSea, type Range } from "./look";
+import type { Catalogue } from "../state/catalogue";
 import type { State } from "../state/store";
+import { canDoubt, hasHeight, hasSea, type Range } from "./look";
 
 export interface PaletteChoice extends Palette {
   title: string;

@@ -1,12 +1,12 @@
 //! The look panel: how the layer is drawn in, changes of it to the store out.
 import { el } from "../page/dom";
-import { USUAL, type Look } from "./look";
+import { toggle } from "../page/toggle";
+import type { Store } from "../state/store";
+import { type Look, USUAL } from "./look";
 import type { LookOffer } from "./offer";
 import { PaletteList } from "./palette-list";
 import { RangeForm } from "./range-form";
-import type { Store } from "../state/store";
 import { SurroundingsForm } from "./surroundings-form";
-import { toggle } from "../page/toggle";
 
 export class LookPanel {
   readonly #store: Store;

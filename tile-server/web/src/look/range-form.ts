@@ -1,8 +1,8 @@
 //! The range of values that the colours span: two typed numbers in, a range out; null is the product's own.
 import { el } from "../page/dom";
 import { unitText } from "../page/format";
-import type { Range } from "./look";
 import { parseRange } from "./address";
+import type { Range } from "./look";
 
 export class RangeForm {
   readonly element: HTMLElement;

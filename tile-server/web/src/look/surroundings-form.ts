@@ -1,10 +1,10 @@
 //! What surrounds the layer: coast lines, relief, sea, height of particles and sun; a look in, changes of it out.
 import { el } from "../page/dom";
 import { numberText } from "../page/format";
-import type { Look } from "./look";
-import type { LookOffer } from "./offer";
 import { Slider } from "../page/slider";
 import { toggle } from "../page/toggle";
+import type { Look } from "./look";
+import type { LookOffer } from "./offer";
 
 /** Slopes beyond this are walls; the server takes more from an address. */
 const SLIDER_RELIEF = 100;

@@ -1,5 +1,6 @@
 //! Watches for a server that went away: a failed request starts it, the health address ends it, and the page then asks again.
-import { ApiError, getJson, healthUrl } from "../api/api";
+import { ApiError, getJson } from "../api/client";
+import { healthUrl } from "../api/requests";
 import type { Notices } from "./notices";
 
 const RETRY_MS = 3_000;

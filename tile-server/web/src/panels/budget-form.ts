@@ -1,9 +1,9 @@
 //! The budget's question: a region by name, drawn or typed, a period, a step and an earth; a query out.
-import type { BudgetQuery, Cells, Region } from "../api/api";
-import { boxText, parseBox, type Bounds } from "../globe/box";
+import type { BudgetQuery, Cells, Region } from "../api/types";
+import { type Bounds, boxText, parseBox } from "../globe/box";
 import { el, icon } from "../page/dom";
 import { PENCIL } from "../page/icons";
-import { stepLabel, toIso, type Step } from "../time/steps";
+import { type Step, stepLabel, toIso } from "../time/steps";
 
 const BOX = "box";
 

@@ -1,16 +1,17 @@
 //! The budget panel: region, period and earth in; total, coverage, bars, a table and citable downloads out.
-import * as api from "../api/api";
-import type { Budget, BudgetQuery, BudgetRow, Cells, Region } from "../api/api";
-import { BudgetForm } from "./budget-form";
+import { ApiError } from "../api/client";
+import * as api from "../api/requests";
+import type { Budget, BudgetQuery, BudgetRow, Cells, Region } from "../api/types";
 import type { Bounds } from "../globe/box";
-import { barChart, type Chart } from "./chart";
-import { budgetCsv } from "./csv";
 import { el, icon, saveText } from "../page/dom";
 import { areaText, digitsFor, numberText, unitText } from "../page/format";
 import { DOWNLOAD } from "../page/icons";
-import { manifestLine } from "./manifest";
 import type { Store } from "../state/store";
 import type { Step } from "../time/steps";
+import { BudgetForm } from "./budget-form";
+import { barChart, type Chart } from "./chart";
+import { budgetCsv } from "./csv";
+import { manifestLine } from "./manifest";
 
 const TG_PER_PG = 1000;
 
@@ -90,7 +91,7 @@ export class BudgetPanel {
     } catch (error) {
       if (asked.signal.aborted) return;
       this.#say(error instanceof Error ? error.message : String(error));
-      if (error instanceof api.ApiError && error.kind === "unreachable") this.#context.onError("budget", error);
+      if (error instanceof ApiError && error.kind === "unreachable") this.#context.onError("budget", error);
     } finally {
       if (this.#asked === asked) this.#result.classList.remove("waiting");
     }

@@ -1,8 +1,8 @@
 //! Plots: a series as a line with gaps and a cursor at the present instant, a budget as signed bars; uPlot draws, this dresses.
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
-import type { Sample } from "./series";
 import { timeNames } from "../time/steps";
+import type { Sample } from "./series";
 
 const INK = "#9fb6c6";
 const GRID = "rgba(140, 180, 205, 0.14)";

@@ -1,5 +1,5 @@
 //! The check table: what the paper says, what another program makes of its grid, what we say.
-import type { Check, CheckPaper, CheckRow } from "../api/api";
+import type { Check, CheckPaper, CheckRow } from "../api/types";
 import { el } from "../page/dom";
 import { chemistry, digitsFor, numberText, unitText } from "../page/format";
 

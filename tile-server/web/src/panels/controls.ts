@@ -1,11 +1,12 @@
 //! The layer card: product, mode, opacity and what is loading, with room for the legend; changes go to the store only.
-import type { Product } from "../api/api";
+import type { Mode, Product } from "../api/types";
+import { MODES } from "../api/words";
+import type { TileCounts } from "../globe/tiles";
+import { withoutColours } from "../look/look";
 import { el, icon } from "../page/dom";
 import { chemistry, titleText } from "../page/format";
 import { PICTURE } from "../page/icons";
-import { withoutColours } from "../look/look";
-import { MODES, type Mode, type Store } from "../state/store";
-import type { TileCounts } from "../globe/tiles";
+import type { Store } from "../state/store";
 
 const MODE_TITLES: Record<Mode, string> = { map: "Map", points: "Points", sprites: "Sprites", volume: "Volume", flow: "Flow" };
 const MODE_HINTS: Record<Mode, string> = {

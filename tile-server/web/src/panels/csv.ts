@@ -1,5 +1,5 @@
 //! Pure comma-separated text: an answer of the server in, a file with its provenance in comment lines out.
-import type { Budget, PointSeries } from "../api/api";
+import type { Budget, PointSeries } from "../api/types";
 
 export function seriesCsv(answer: PointSeries): string {
   return lines(

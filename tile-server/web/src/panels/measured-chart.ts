@@ -1,7 +1,7 @@
 //! The plot of measurements: trusted values as a line with points, doubtful ones as points of another colour beside it.
 import type uPlot from "uplot";
-import { dress, mount, padded, type Chart } from "./chart";
-import { isTrusted, type Group } from "./measured";
+import { type Chart, dress, mount, padded } from "./chart";
+import { type Group, isTrusted } from "./measured";
 
 const TRUSTED = "#5fd4e8";
 const DOUBTFUL = "#f2906b";

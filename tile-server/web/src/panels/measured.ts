@@ -1,6 +1,7 @@
 //! Pure sorting of measurements: what one platform measured in, one plottable group for each property and depth out.
+import type { Kind, Measured, Quality } from "../api/types";
+import { QUALITIES } from "../api/words";
 import { chemistry } from "../page/format";
-import { QUALITIES, type Kind, type Measured, type Quality } from "../api/observations";
 
 export interface Point {
   /** An instant in milliseconds since 1970, or a depth in m for a cast. */

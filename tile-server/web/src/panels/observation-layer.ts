@@ -1,12 +1,12 @@
 //! Observations switched on and off: the toggle in the state in, platforms on the globe and the chosen one's panel out.
-import { el } from "../page/dom";
-import type { Globe } from "../globe/globe";
 import * as observations from "../api/observations";
-import type { Platform } from "../api/observations";
-import { PlatformPanel } from "./platform";
+import type { Platform } from "../api/types";
+import type { Globe } from "../globe/globe";
 import { PlatformLayer } from "../globe/platforms";
-import type { Panels } from "./panels";
+import { el } from "../page/dom";
 import type { Store } from "../state/store";
+import type { Panels } from "./panels";
+import { PlatformPanel } from "./platform";
 
 export class ObservationLayer {
   readonly #store: Store;

@@ -1,16 +1,18 @@
 //! The place panel: a chosen point in, its series as a plot with the value at the present instant out; a place can be typed as well.
-import * as api from "../api/api";
-import type { PointSeries } from "../api/api";
-import { contains, type Bounds } from "../globe/box";
-import { seriesChart, type Chart } from "./chart";
-import { seriesCsv } from "./csv";
+import { ApiError } from "../api/client";
+import * as api from "../api/requests";
+import type { PointSeries } from "../api/types";
+import { type Bounds, contains } from "../globe/box";
 import { el, icon, saveText } from "../page/dom";
 import { chemistry, latText, lonText, unitText, valueText } from "../page/format";
 import { DOWNLOAD } from "../page/icons";
-import { manifestLine } from "./manifest";
-import { hasData, valueAt, type Sample } from "./series";
-import type { Place, Store } from "../state/store";
+import type { Place } from "../state/camera";
+import type { Store } from "../state/store";
 import { clampToRange, formatInstant, parseSteps, quantise, rangeOf, type Step } from "../time/steps";
+import { type Chart, seriesChart } from "./chart";
+import { seriesCsv } from "./csv";
+import { manifestLine } from "./manifest";
+import { hasData, type Sample, valueAt } from "./series";
 
 export interface PlaceContext {
   store: Store;
@@ -78,7 +80,7 @@ export class PlacePanel {
       if (asked.signal.aborted) return;
       const reason = error instanceof Error ? error.message : String(error);
       this.#content.replaceChildren(this.#title(place), el("p", { class: "problem" }, reason));
-      if (error instanceof api.ApiError && error.kind === "unreachable") this.#context.onError("point", error);
+      if (error instanceof ApiError && error.kind === "unreachable") this.#context.onError("point", error);
     }
   }
 

@@ -1,11 +1,11 @@
 //! The observations panel: a platform in, what it measured as a plot with units and quality out.
+import * as observations from "../api/observations";
+import type { MeasuredSeries, Platform } from "../api/types";
 import { el } from "../page/dom";
 import { chemistry, latText, lonText, unitText } from "../page/format";
-import { groupsOf, qualityText, type Group } from "./measured";
-import { measuredChart } from "./measured-chart";
 import type { Chart } from "./chart";
-import * as observations from "../api/observations";
-import type { MeasuredSeries, Platform } from "../api/observations";
+import { type Group, groupsOf, qualityText } from "./measured";
+import { measuredChart } from "./measured-chart";
 
 export class PlatformPanel {
   readonly #body: HTMLElement;

@@ -1,11 +1,14 @@
 //! "Render this view": the server's own image of what the camera looks down on, in a dialog, to look at or keep.
-import * as api from "../api/api";
+import { getPicture } from "../api/client";
+import { globeUrl } from "../api/pictures";
+import type { Mode } from "../api/types";
+import { MODES } from "../api/words";
+import { parameters } from "../look/address";
+import type { Look } from "../look/look";
 import { byId, el, icon } from "../page/dom";
 import { latText, lonText } from "../page/format";
 import { CLOSE, DOWNLOAD } from "../page/icons";
-import type { Look } from "../look/look";
-import { parameters } from "../look/address";
-import { MODES, type Mode, type Store } from "../state/store";
+import type { Store } from "../state/store";
 import { formatInstant, toIso } from "../time/steps";
 
 /** The longer side: enough for a slide, and a few seconds' work where the server has no graphics chip. */
@@ -68,7 +71,7 @@ export class ViewDialog {
     this.#caption.textContent = `${formatInstant(timeMs)}, over ${latText(camera.lat, 1)}, ${lonText(camera.lon, 1)}, ${Math.round(camera.heightKm)} km up${this.#isSynthetic() ? " – synthetic data" : ""}`;
     this.#frame.replaceChildren(el("p", { class: "muted busy-line" }, "The server is drawing …"));
     const mode = this.#mode.value as Mode;
-    const url = api.globeUrl(product, mode, {
+    const url = globeUrl(product, mode, {
       lon: camera.lon,
       lat: camera.lat,
       heightKm: camera.heightKm,
@@ -77,7 +80,7 @@ export class ViewDialog {
       ...imageSize(),
     });
     try {
-      const blob = await imageBlob(url, asked.signal);
+      const blob = await getPicture(url, asked.signal);
       if (asked.signal.aborted) return;
       this.#show(blob, `${product}-${mode}-${toIso(timeMs).replace(/:/g, "")}.png`);
     } catch (error) {
@@ -98,18 +101,6 @@ export class ViewDialog {
     this.#save.download = name;
     this.#save.hidden = false;
   }
-}
-
-async function imageBlob(url: string, signal: AbortSignal): Promise<Blob> {
-  let response: Response;
-  try {
-    response = await fetch(url, { signal });
-  } catch (error) {
-    if (signal.aborted) throw error;
-    throw new api.ApiError("unreachable", 0, "The server does not answer.");
-  }
-  if (!response.ok) throw new api.ApiError("refused", response.status, await api.reasonOf(response));
-  return response.blob();
 }
 
 /** The window's shape, so that the image shows about what the globe shows. */

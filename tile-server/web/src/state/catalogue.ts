@@ -1,11 +1,11 @@
 //! The products as the page uses them: steps parsed, zoom limits fetched once, and the layer that a state describes.
-import * as api from "../api/api";
-import type { Legend, Product } from "../api/api";
-import { titleText } from "../page/format";
+import * as api from "../api/requests";
+import type { Legend, Mode, Product } from "../api/types";
+import type { LayerSpec } from "../globe/layer";
 import { effective, type Look } from "../look/look";
-import type { Mode, State } from "./store";
-import type { LayerSpec } from "../globe/tiles";
-import { clampToRange, parseSteps, toIso, type Step } from "../time/steps";
+import { titleText } from "../page/format";
+import { clampToRange, parseSteps, type Step, toIso } from "../time/steps";
+import type { State } from "./store";
 
 /** Where the server does not say how deep its tiles go; Cesium stretches the deepest ones beyond. */
 const DEFAULT_MAX_ZOOM = 6;

@@ -1,9 +1,13 @@
 //! The address bar's hash: a state in, a short readable text out, and back, so that a view can be shared as a link.
-import { wrapLon } from "../page/format";
+import { queryOf } from "../api/pictures";
+import type { Mode } from "../api/types";
+import { MODES } from "../api/words";
+import { changeOf, parameters } from "../look/address";
 import { USUAL } from "../look/look";
-import { changeOf, parameters, queryOf } from "../look/address";
-import { MODES, TABS, type CameraView, type Mode, type Place, type State, type Tab } from "./store";
+import { wrapLon } from "../page/format";
 import { toIso } from "../time/steps";
+import type { CameraView, Place } from "./camera";
+import { type State, type Tab, TABS } from "./store";
 
 export function encodeHash(state: Readonly<State>): string {
   const parts: string[] = [];

@@ -1,25 +1,11 @@
 //! What the page shows, in one place: a small store that parts read, change and listen to.
-import { USUAL, type Look } from "../look/look";
-
-export type Mode = "map" | "points" | "sprites" | "volume" | "flow";
-export const MODES: readonly Mode[] = ["map", "points", "sprites", "volume", "flow"];
+import type { Mode } from "../api/types";
+import { type Look, USUAL } from "../look/look";
+import { type CameraView, HOME, type Place } from "./camera";
 
 export type Tab = "place" | "budget" | "check" | "look" | "platform";
 /** Those that a shared address can open; which platform was chosen is no part of it. */
 export const TABS: readonly Tab[] = ["place", "budget", "check", "look"];
-
-export interface CameraView {
-  lon: number;
-  lat: number;
-  heightKm: number;
-  headingDeg: number;
-  pitchDeg: number;
-}
-
-export interface Place {
-  lon: number;
-  lat: number;
-}
 
 export interface State {
   product: string | null;
@@ -41,9 +27,6 @@ export interface State {
   observations: boolean;
   camera: CameraView;
 }
-
-/** The tropical Pacific, where the sea breathes out most, with both subtropical sinks in sight. */
-export const HOME: CameraView = { lon: -150, lat: 8, heightKm: 15000, headingDeg: 0, pitchDeg: -90 };
 
 export const INITIAL: State = {
   product: null,

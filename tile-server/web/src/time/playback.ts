@@ -1,8 +1,8 @@
 //! Playback: loads the next instant out of sight, waits until it is due, shows it, and so on; a slow server stretches time, it never flashes.
+import { isSameLayer, type LayerSpec } from "../globe/layer";
 import type { Presenter } from "../globe/presenter";
 import type { Store } from "../state/store";
-import { isSameLayer, type LayerSpec } from "../globe/tiles";
-import { nextInstant, PARTS_PER_STEP, quantise, strideFor, type Step } from "./steps";
+import { nextInstant, PARTS_PER_STEP, quantise, type Step, strideFor } from "./steps";
 
 export class Playback {
   #run: { isOver: boolean } | undefined;

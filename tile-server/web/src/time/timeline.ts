@@ -9,8 +9,8 @@ import {
   PARTS_PER_STEP,
   positionOf,
   quantise,
-  stepLabel,
   type Step,
+  stepLabel,
 } from "./steps";
 
 const SPEEDS = [0.25, 0.5, 1, 2, 4];
