@@ -39,4 +39,4 @@ export type Answer<Name extends keyof operations> = operations[Name]["responses"
   : never;
 
 /** What a budget is asked for with; the newest version answers. */
-export type BudgetQuery = Required<Omit<Query<"budget">, "manifest">>;
+export type BudgetQuery = Required<Pick<Query<"budget">, "region" | "from" | "to" | "step" | "earth" | "cells">>;
