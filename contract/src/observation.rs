@@ -125,9 +125,7 @@ impl Quality {
     /// # Errors
     /// Not 1 to 4.
     pub fn from_flag(flag: u8) -> Result<Self, ContractError> {
-        let found = Self::ALL
-            .into_iter()
-            .find(|quality| quality.flag() == flag);
+        let found = Self::ALL.into_iter().find(|quality| quality.flag() == flag);
         found.ok_or_else(|| {
             ContractError::invalid("quality flag", &flag.to_string(), "1, 2, 3 or 4")
         })

@@ -8,8 +8,8 @@ pub(crate) mod words;
 use std::sync::LazyLock;
 
 use utoipa::openapi::header::HeaderBuilder;
-use utoipa::openapi::path::{Operation, ParameterIn};
-use utoipa::openapi::{ContentBuilder, ObjectBuilder, Ref, Response, ResponseBuilder, Type};
+use utoipa::openapi::path::{Operation, Parameter, ParameterIn};
+use utoipa::openapi::{ContentBuilder, ObjectBuilder, Ref, RefOr, Response, ResponseBuilder, Type};
 use utoipa::{Modify, OpenApi};
 
 use crate::error::Refusal;
@@ -27,9 +27,9 @@ const RETRY_AFTER: &str = "Seconds after which the same request may succeed";
         title = "Fluxglobe",
         description = "Map tiles, views of the globe, series, carbon budgets, the catalogue and observations.\n\n\
             Everything is read with GET or HEAD, by anybody; other methods are answered with 405. Times are ISO 8601 and \
-            any instant is valid, not only stored steps; `from` and `to` bound the half-open period `[from, to)`. Every \
-            answer names its version in `manifest`, and the parameter of that name asks for it again. Every refusal is \
-            a `Refusal`; those with `Retry-After` may succeed later."
+            any instant is valid, not only stored steps; `from` and `to` bound the half-open period `[from, to)`. \
+            Answers about a product name its version in `manifest`, and the parameter of that name asks for it again. \
+            Every refusal is a `Refusal`; those with `Retry-After` may succeed later."
     ),
     servers((url = "/", description = "This server")),
     paths(
@@ -95,7 +95,11 @@ impl Modify for Refusals {
 /// How an operation may be refused.
 fn refusals(operation: &Operation) -> Vec<(&'static str, Response)> {
     let parameters = operation.parameters.as_deref().unwrap_or_default();
-    let takes = |place: &ParameterIn| parameters.iter().any(|one| one.parameter_in == *place);
+    let takes = |place: &ParameterIn| {
+        let is_there =
+            |one: &RefOr<Parameter>| matches!(one, RefOr::T(one) if one.parameter_in == *place);
+        parameters.iter().any(is_there)
+    };
     let mut all = vec![
         ("500", refusal("A defect of this server", false)),
         (
@@ -130,7 +134,7 @@ fn refusal(text: &str, may_succeed_later: bool) -> Response {
     }
     let seconds = ObjectBuilder::new().schema_type(Type::Integer);
     let header = HeaderBuilder::new()
-        .schema(seconds)
+        .schema(Some(seconds))
         .description(Some(RETRY_AFTER));
     response.header("retry-after", header.build()).build()
 }

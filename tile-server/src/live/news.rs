@@ -6,8 +6,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use contract::manifest::ManifestId;
 use contract::time::Period;
 use serde::Serialize;
-use utoipa::ToSchema;
 use tokio::sync::broadcast;
+use utoipa::ToSchema;
 
 use crate::error::ServerError;
 use crate::openapi::words;

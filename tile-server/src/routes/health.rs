@@ -7,8 +7,8 @@ use axum::extract::State;
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse as _, Response};
 use serde::Serialize;
-use utoipa::ToSchema;
 use tokio::time::timeout;
+use utoipa::ToSchema;
 
 use crate::catalogue::Probe;
 use crate::routes::viewer;

@@ -21,23 +21,50 @@ const ROUTER: &str = include_str!("../../src/router.rs");
 
 /// One address of every operation, and what is sent along.
 const ASKED: [(&str, &str); 20] = [
-    ("/tiles/{product}/{mode}/{z}/{x}/{y}.png", "/tiles/flux/volume/1/0/1@2x.png"),
+    (
+        "/tiles/{product}/{mode}/{z}/{x}/{y}.png",
+        "/tiles/flux/volume/1/0/1@2x.png",
+    ),
     ("/tiles/{product}/{mode}.json", "/tiles/flux/volume.json"),
     ("/globe/{product}/{mode}.png", "/globe/flux/map.png"),
     ("/api/products", "/api/products"),
-    ("/api/products/{product}/legend.{form}", "/api/products/flux/legend.json"),
-    ("/api/products/{product}/legend.{form}", "/api/products/flux/legend.svg"),
-    ("/api/products/{product}/legend.{form}", "/api/products/flux/legend.png"),
-    ("/api/products/{product}/point", "/api/products/flux/point?lon=0&lat=0"),
-    ("/api/products/{product}/point", "/api/products/flux-accumulated/point?lon=-175&lat=0"),
-    ("/api/products/{product}/area", "/api/products/sst/area?region=global"),
-    ("/api/products/{product}/budget", "/api/products/flux-accumulated/budget?step=year"),
+    (
+        "/api/products/{product}/legend.{form}",
+        "/api/products/flux/legend.json",
+    ),
+    (
+        "/api/products/{product}/legend.{form}",
+        "/api/products/flux/legend.svg",
+    ),
+    (
+        "/api/products/{product}/legend.{form}",
+        "/api/products/flux/legend.png",
+    ),
+    (
+        "/api/products/{product}/point",
+        "/api/products/flux/point?lon=0&lat=0",
+    ),
+    (
+        "/api/products/{product}/point",
+        "/api/products/flux-accumulated/point?lon=-175&lat=0",
+    ),
+    (
+        "/api/products/{product}/area",
+        "/api/products/sst/area?region=global",
+    ),
+    (
+        "/api/products/{product}/budget",
+        "/api/products/flux-accumulated/budget?step=year",
+    ),
     ("/api/regions", "/api/regions"),
     ("/api/palettes", "/api/palettes"),
     ("/api/check", "/api/check"),
     ("/api/openapi.json", "/api/openapi.json"),
     ("/api/observations/platforms", "/api/observations/platforms"),
-    ("/api/observations/{dataset}/{platform}", "/api/observations/buoys/51001"),
+    (
+        "/api/observations/{dataset}/{platform}",
+        "/api/observations/buoys/51001",
+    ),
     ("/healthz", "/healthz"),
     ("/readyz", "/readyz"),
     ("/metrics", "/metrics"),
@@ -103,11 +130,18 @@ fn operation<'a>(description: &'a Value, path: &str) -> &'a Value {
 fn hold(description: &Value, path: &str, address: &str, answer: &Answer) {
     let status = answer.status.as_u16().to_string();
     let response = &operation(description, path)["responses"][&status];
-    assert!(response.is_object(), "{address}: {status} is not described: {}", answer.text());
+    assert!(
+        response.is_object(),
+        "{address}: {status} is not described: {}",
+        answer.text()
+    );
     let sent = answer.header("content-type");
     let sent = sent.split(';').next().unwrap_or_default().trim();
     let content = &response["content"][sent];
-    assert!(content.is_object(), "{address}: {sent:?} is not described for {status}");
+    assert!(
+        content.is_object(),
+        "{address}: {sent:?} is not described for {status}"
+    );
     if sent == "application/json" {
         let found = problems(description, &content["schema"], &answer.json());
         assert!(found.is_empty(), "{address}: {found:#?}");
@@ -115,7 +149,10 @@ fn hold(description: &Value, path: &str, address: &str, answer: &Answer) {
     for (name, _header) in response["headers"].as_object().into_iter().flatten() {
         // What a product covers is told only where another instant is shown than was asked for.
         let is_there = !answer.header(name).is_empty() || name == "fluxglobe-time-covered";
-        assert!(is_there || status == "503" || status == "504", "{address}: no {name}");
+        assert!(
+            is_there || status == "503" || status == "504",
+            "{address}: no {name}"
+        );
     }
 }
 
@@ -127,7 +164,10 @@ async fn the_committed_description_is_what_the_server_says() {
         std::fs::write(COMMITTED, &said).unwrap();
     }
     let committed = std::fs::read_to_string(Path::new(COMMITTED)).unwrap_or_default();
-    let differs = committed.lines().zip(said.lines()).position(|(a, b)| a != b);
+    let differs = committed
+        .lines()
+        .zip(said.lines())
+        .position(|(a, b)| a != b);
     assert!(
         committed == said,
         "openapi.json is not what the server says, from line {}: `make describe` writes it anew, and the \
@@ -138,7 +178,13 @@ async fn the_committed_description_is_what_the_server_says() {
 
 /// A path whose parts that differ from request to request are stars.
 fn shape(path: &str) -> String {
-    let star = |part: &str| if part.contains('{') { "*".to_owned() } else { part.to_owned() };
+    let star = |part: &str| {
+        if part.contains('{') {
+            "*".to_owned()
+        } else {
+            part.to_owned()
+        }
+    };
     path.split('/').map(star).collect::<Vec<_>>().join("/")
 }
 
@@ -170,12 +216,20 @@ async fn every_answer_is_as_described() {
     for (path, address) in ASKED {
         unasked.remove(path);
         let answer = app.get(address).await;
-        assert_eq!(answer.status, StatusCode::OK, "{address}: {}", answer.text());
+        assert_eq!(
+            answer.status,
+            StatusCode::OK,
+            "{address}: {}",
+            answer.text()
+        );
         hold(&description, path, address, &answer);
     }
     assert_eq!(unasked, BTreeSet::from([ENDLESS]));
     let nothing = TestApp::empty(|_settings| {});
-    for (path, address) in [("/api/check", "/api/check"), ("/api/products", "/api/products")] {
+    for (path, address) in [
+        ("/api/check", "/api/check"),
+        ("/api/products", "/api/products"),
+    ] {
         hold(&description, path, address, &nothing.get(address).await);
     }
 }
@@ -191,7 +245,10 @@ async fn what_viewers_are_told_is_as_described() {
     let description = described().await;
     let answer = &operation(&description, ENDLESS)["responses"]["200"];
     let schema = &answer["content"]["text/event-stream"]["schema"];
-    assert_eq!(problems(&description, schema, &told.data), Vec::<String>::new());
+    assert_eq!(
+        problems(&description, schema, &told.data),
+        Vec::<String>::new()
+    );
 }
 
 #[tokio::test]
@@ -199,19 +256,38 @@ async fn every_refusal_is_as_described() {
     let app = rich().await;
     let description = described().await;
     let refused = [
-        ("/tiles/{product}/{mode}/{z}/{x}/{y}.png", "/tiles/flux/volume/99/0/0.png"),
-        ("/tiles/{product}/{mode}/{z}/{x}/{y}.png", "/tiles/none/volume/0/0/0.png"),
+        (
+            "/tiles/{product}/{mode}/{z}/{x}/{y}.png",
+            "/tiles/flux/volume/99/0/0.png",
+        ),
+        (
+            "/tiles/{product}/{mode}/{z}/{x}/{y}.png",
+            "/tiles/none/volume/0/0/0.png",
+        ),
         ("/tiles/{product}/{mode}.json", "/tiles/flux/none.json"),
         ("/globe/{product}/{mode}.png", "/globe/flux/map.png?width=0"),
-        ("/api/products/{product}/point", "/api/products/flux/point?lon=0"),
-        ("/api/products/{product}/point", "/api/products/flux/point?lon=0&lat=89"),
+        (
+            "/api/products/{product}/point",
+            "/api/products/flux/point?lon=0",
+        ),
+        (
+            "/api/products/{product}/point",
+            "/api/products/flux/point?lon=0&lat=89",
+        ),
         ("/api/products/{product}/area", "/api/products/flux/area"),
         ("/api/products/{product}/budget", "/api/products/sst/budget"),
-        ("/api/observations/{dataset}/{platform}", "/api/observations/buoys/51001?limit=0"),
+        (
+            "/api/observations/{dataset}/{platform}",
+            "/api/observations/buoys/51001?limit=0",
+        ),
     ];
     for (path, address) in refused {
         let answer = app.get(address).await;
-        assert!(answer.status.is_client_error(), "{address}: {}", answer.status);
+        assert!(
+            answer.status.is_client_error(),
+            "{address}: {}",
+            answer.status
+        );
         hold(&description, path, address, &answer);
     }
     let without = TestApp::new().await;
@@ -249,12 +325,19 @@ async fn every_parameter_that_is_described_is_read() {
                 .collect();
             let address = format!("{address}?{}", query.join("&"));
             let answer = app.get(&address).await;
-            assert!(answer.status.is_client_error(), "{address}: {}", answer.status);
+            assert!(
+                answer.status.is_client_error(),
+                "{address}: {}",
+                answer.status
+            );
             *refused.entry(name).or_default() += 1;
         }
     }
     assert!(refused.len() > 25, "{refused:?}");
-    assert!(refused["time"] >= 3 && refused["palette"] >= 5, "{refused:?}");
+    assert!(
+        refused["time"] >= 3 && refused["palette"] >= 5,
+        "{refused:?}"
+    );
 }
 
 #[test]

@@ -15,7 +15,10 @@ fn resolved<'a>(description: &'a Value, schema: &'a Value) -> &'a Value {
     match schema["$ref"].as_str() {
         Some(address) => {
             let target = description.pointer(address.trim_start_matches('#'));
-            resolved(description, target.unwrap_or_else(|| panic!("no {address}")))
+            resolved(
+                description,
+                target.unwrap_or_else(|| panic!("no {address}")),
+            )
         }
         None => schema,
     }
@@ -43,11 +46,14 @@ fn hold(description: &Value, schema: &Value, value: &Value, at: &str, found: &mu
         match value.as_object() {
             Some(_) if fields.is_empty() => {}
             Some(object) => {
-                for name in object.keys().filter(|name| !fields.contains_key(*name)) {
+                for name in object
+                    .keys()
+                    .filter(|name| !fields.contains_key(name.as_str()))
+                {
                     found.push(format!("{at}.{name} is not described"));
                 }
                 for (name, (field, is_required)) in &fields {
-                    match object.get(name) {
+                    match object.get(*name) {
                         Some(value) => {
                             hold(description, field, value, &format!("{at}.{name}"), found);
                         }
@@ -59,7 +65,9 @@ fn hold(description: &Value, schema: &Value, value: &Value, at: &str, found: &mu
             None => found.push(format!("{at}: {value} is no object")),
         }
     }
-    if let Some(items) = value.as_array() {
+    if let Some(items) = value.as_array()
+        && schema["type"] == "array"
+    {
         let first = schema["prefixItems"].as_array();
         let first = first.map_or(&[][..], Vec::as_slice);
         if items.len() < first.len() {
