@@ -17,7 +17,7 @@ viewer := tile-server/web/dist/index.html
 viewer_sources := $(shell git ls-files tile-server/web)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo build release viewer check test faults bless services services-down cluster cluster-down tools test-tools
+.PHONY: help demo build release viewer check test faults bless describe services services-down cluster cluster-down tools test-tools
 
 help: ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 14
@@ -83,3 +83,8 @@ faults: test-tools $(viewer) ## kill -9 of every kind of process, 60 times, whil
 bless: test-tools ## Draw the golden images anew, for a new RENDERER_VERSION, and list what changed
 	BLESS=1 cargo test --locked -p render-worker --test it golden
 	git status --short -- render-worker/tests/golden
+
+describe: test-tools $(viewer) ## Write tile-server/openapi.json and the viewer's types anew, after a change of the HTTP API
+	BLESS=1 cargo test --locked -p tile-server --test it openapi
+	cd tile-server/web && npm run generate
+	git status --short -- tile-server/openapi.json tile-server/web/src/api/schema.ts

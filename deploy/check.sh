@@ -52,8 +52,8 @@ check_shell() {
 
 check_node() {
     local version
-    for version in v18.13.0 v20.20.2 v22.0.0 v25.1.0; do checked "Node $version builds the viewer" ./check-node.sh "$version"; done
-    for version in v16.20.1 v18.12.1 v21.3.0 nonsense; do refused 'the look at Node' 'install Node 22' ./check-node.sh "$version"; done
+    for version in v18.17.0 v20.20.2 v22.0.0 v25.1.0; do checked "Node $version builds the viewer" ./check-node.sh "$version"; done
+    for version in v16.20.1 v18.16.1 v21.3.0 nonsense; do refused 'the look at Node' 'install Node 22' ./check-node.sh "$version"; done
 }
 
 holds_release() { grep --quiet 'cargo build --locked --release' "$1" || { echo 'no release build' && return 1; }; }

@@ -28,6 +28,9 @@ pub enum Earth {
 }
 
 impl Earth {
+    /// All of them.
+    pub const ALL: [Self; 2] = [Self::Wgs84, Self::Sphere];
+
     /// Area between the equator and latitude `lat_rad`, per radian of longitude, m²; odd in latitude.
     ///
     /// Source: Snyder (1987), Map Projections, USGS Professional Paper 1395, eq. 3-12 (authalic q), times a²/2. With the

@@ -102,6 +102,14 @@ impl std::str::FromStr for PlatformKind {
 }
 
 impl Quality {
+    /// All of them, best first.
+    pub const ALL: [Self; 4] = [
+        Self::Good,
+        Self::NotEvaluated,
+        Self::Questionable,
+        Self::Bad,
+    ];
+
     /// Its number in the primary scheme, 1 to 4.
     pub fn flag(self) -> u8 {
         match self {
@@ -117,13 +125,7 @@ impl Quality {
     /// # Errors
     /// Not 1 to 4.
     pub fn from_flag(flag: u8) -> Result<Self, ContractError> {
-        let all = [
-            Self::Good,
-            Self::NotEvaluated,
-            Self::Questionable,
-            Self::Bad,
-        ];
-        let found = all.into_iter().find(|quality| quality.flag() == flag);
+        let found = Self::ALL.into_iter().find(|quality| quality.flag() == flag);
         found.ok_or_else(|| {
             ContractError::invalid("quality flag", &flag.to_string(), "1, 2, 3 or 4")
         })

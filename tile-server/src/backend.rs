@@ -18,6 +18,7 @@ use contract::region::{Cells, Region};
 use contract::time::{Period, TimeMs};
 use serde::{Deserialize, Serialize};
 use tokio::sync::OwnedSemaphorePermit;
+use utoipa::ToSchema;
 
 /// Leave to draw one picture; the next one waiting gets it when this is dropped.
 ///
@@ -194,7 +195,7 @@ pub struct PointStep {
 }
 
 /// What a sum of accumulated carbon holds.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
 pub struct Contributed {
     /// Steps that had data.
     pub steps: u32,
@@ -205,7 +206,7 @@ pub struct Contributed {
 }
 
 /// How a budget's period is cut into rows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum BudgetStep {
     /// Calendar months.
@@ -334,7 +335,7 @@ pub struct AreaRow {
 }
 
 /// Our numbers beside a paper's and another program's.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Check {
     /// Comparisons in the order they are shown.
     pub rows: Vec<CheckRow>,
@@ -345,7 +346,7 @@ pub struct Check {
 }
 
 /// One number of ours beside the others.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct CheckRow {
     /// Region, for people.
     pub what: String,
@@ -354,6 +355,7 @@ pub struct CheckRow {
     /// Unit of all of them.
     pub unit: String,
     /// The paper's; none where it prints no such number.
+    #[schema(required)]
     pub paper: Option<Paper>,
     /// Another program's, from the same grid.
     pub independent: f64,
@@ -366,11 +368,12 @@ pub struct CheckRow {
 }
 
 /// A number as a paper prints it, and what it says of ours.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Paper {
     /// As printed.
     pub value: f64,
     /// Its uncertainty, where the paper states one.
+    #[schema(required)]
     pub uncertainty: Option<f64>,
     /// Decimals that are printed.
     pub decimals: usize,

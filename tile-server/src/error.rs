@@ -7,8 +7,9 @@ use axum::Json;
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use contract::ContractError;
-use serde_json::json;
+use serde::Serialize;
 use storage::StorageError;
+use utoipa::ToSchema;
 
 use crate::backend::{BackendError, Class};
 
@@ -16,6 +17,13 @@ use crate::backend::{BackendError, Class};
 const RETRY_BUSY_S: u16 = 1;
 /// How long a client is asked to wait when a part does not answer, seconds.
 const RETRY_UNAVAILABLE_S: u16 = 5;
+
+/// The body of every answer that is none.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct Refusal {
+    /// What failed, on which object, and what would be valid; one line for people.
+    error: String,
+}
 
 /// Why a request has no answer.
 #[derive(Debug, Clone, thiserror::Error)]
@@ -195,7 +203,7 @@ impl IntoResponse for ServerError {
             let cause = std::error::Error::source(&self).map(ToString::to_string);
             tracing::warn!(status = status.as_u16(), error = %self, cause, "a request failed");
         }
-        let mut response = (status, Json(json!({ "error": self.text() }))).into_response();
+        let mut response = (status, Json(Refusal { error: self.text() })).into_response();
         let headers = response.headers_mut();
         headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
         if let Some(seconds) = self.retry_after_s() {

@@ -9,6 +9,7 @@ use contract::colour::{AtStop, Rgb, Stops, TransferFunction};
 use contract::job::Mode;
 use contract::quantity::{Display, Quantity};
 use serde::Serialize;
+use utoipa::ToSchema;
 
 use crate::error::ServerError;
 
@@ -32,13 +33,17 @@ const DOT_PX: f64 = 9.0;
 const DOTS: u32 = 17;
 
 /// What the colours of a layer mean, in the unit people read. Places lie between `low` (0) and `high` (1).
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Legend {
+    /// Value of the first colour.
     low: f64,
+    /// Value of the last colour.
     high: f64,
+    /// Unit of the values.
     unit: &'static str,
+    /// What the values are, for people.
     label: &'static str,
-    /// Place and colour, straight in between.
+    /// Place and colour (`#rrggbb`), straight in between.
     stops: Vec<(f64, String)>,
     /// Place and share of the usual optical depth, where users gave any.
     #[serde(skip_serializing_if = "Vec::is_empty")]

@@ -3,18 +3,35 @@
 use contract::colour::TransferOptions;
 use contract::picture::PictureOptions;
 use serde::Deserialize;
+use utoipa::IntoParams;
 
 use crate::error::ServerError;
+use crate::openapi::words;
 
 /// Parameters that every picture and its legend take; see [`Look`].
-#[derive(Debug, Clone, Default, Deserialize)]
+#[derive(Debug, Clone, Default, Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
 pub(crate) struct LookQuery {
+    /// Colours; the quantity's own unless one is named. Not together with `stops`.
+    #[param(value_type = Option<words::Palette>)]
     palette: Option<String>,
+    /// Values of the first and the last colour, `LOW:HIGH`, in the unit of the legend.
+    #[param(example = "-40:40")]
     range: Option<String>,
+    /// Colours at values, `VALUE:rrggbb` with commas between, 2 to 16 in rising order, in the unit of the legend.
+    #[param(example = "-10:0a0b0c,25:ffffff")]
     stops: Option<String>,
+    /// Shares of the usual optical depth at values, `VALUE:SHARE` with commas between, 0 to 1.
+    #[param(example = "0:0.5,10:1")]
     opacity: Option<String>,
+    /// Shares of a particle's full radius at values, `VALUE:SHARE` with commas between, 0 to 1.
+    #[param(example = "0:0.25,1:1")]
     particle_size: Option<String>,
+    /// The colours run the other way.
+    #[param(value_type = Option<bool>)]
     reverse: Option<String>,
+    /// Cells whose gap was filled are drawn differently.
+    #[param(value_type = Option<bool>)]
     doubt: Option<String>,
 }
 

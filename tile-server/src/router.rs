@@ -13,8 +13,8 @@ use crate::error::ServerError;
 use crate::middleware::{limits, panics::CountPanics, security, track};
 use crate::routes::picture::{COVERED, SHOWN_TIME};
 use crate::routes::{
-    area, budget, check, events, globe, health, legend, metrics, observations, palettes, platforms,
-    point, products, regions, tilejson, tiles, viewer,
+    area, budget, check, events, globe, health, legend, metrics, observations, openapi, palettes,
+    platforms, point, products, regions, tilejson, tiles, viewer,
 };
 use crate::state::AppState;
 
@@ -47,6 +47,7 @@ pub fn router(state: AppState) -> Router {
         .route("/api/regions", get(regions::list))
         .route("/api/palettes", get(palettes::list))
         .route("/api/check", get(check::get))
+        .route("/api/openapi.json", get(openapi::get))
         .route("/api/events", get(events::get))
         .route("/api/observations/platforms", get(platforms::get))
         .route(

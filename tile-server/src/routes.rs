@@ -9,6 +9,7 @@ pub(crate) mod health;
 pub(crate) mod legend;
 pub(crate) mod metrics;
 pub(crate) mod observations;
+pub(crate) mod openapi;
 pub(crate) mod palettes;
 pub(crate) mod picture;
 pub(crate) mod platforms;

@@ -5,19 +5,32 @@ use contract::context::{RELIEF_EXAGGERATION, Relief};
 use contract::picture::PictureOptions;
 use contract::sun::SunChoice;
 use serde::Deserialize;
+use utoipa::IntoParams;
 
 use crate::catalogue::Catalogue;
 use crate::error::ServerError;
 use crate::extract::number;
 
 /// The parameters of an address that say it, as they were written.
-#[derive(Debug, Default, Deserialize)]
+#[derive(Debug, Default, Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
 pub(crate) struct SurroundingsQuery {
+    /// An elevation product below the layer.
     relief: Option<String>,
+    /// How much larger the heights of `relief` are taken than they are; 15 unless told otherwise.
+    #[param(value_type = Option<f64>, minimum = 0, maximum = 1000)]
     relief_exaggeration: Option<String>,
+    /// Share of what lies deep below the sea surface that the sea hides.
+    #[param(value_type = Option<f64>, minimum = 0, maximum = 0.99)]
     sea_opacity: Option<String>,
+    /// Coast lines are drawn.
+    #[param(value_type = Option<bool>)]
     coastlines: Option<String>,
+    /// How far a kilogram of accumulated carbon a square metre lifts particles, m m² kg⁻¹.
+    #[param(value_type = Option<f64>, minimum = 0, maximum = 1e9)]
     height_exaggeration: Option<String>,
+    /// Where the light comes from: `AZIMUTH,ELEVATION` in degrees, or `time` for where the sun stood at the instant shown.
+    #[param(example = "315,40")]
     sun: Option<String>,
 }
 

@@ -16,6 +16,9 @@ pub enum Cells {
 }
 
 impl Cells {
+    /// All of them.
+    pub const ALL: [Self; 2] = [Self::Whole, Self::OceanShare];
+
     /// As people write it.
     pub fn name(self) -> &'static str {
         match self {
@@ -43,7 +46,7 @@ impl std::str::FromStr for Cells {
     type Err = ContractError;
 
     fn from_str(s: &str) -> Result<Self, Self::Err> {
-        [Self::Whole, Self::OceanShare]
+        Self::ALL
             .into_iter()
             .find(|cells| cells.name() == s)
             .ok_or_else(|| ContractError::invalid("cells", s, "use whole or ocean-share"))
@@ -56,7 +59,7 @@ mod tests {
 
     #[test]
     fn names_are_read_as_they_are_written() {
-        for cells in [Cells::Whole, Cells::OceanShare] {
+        for cells in Cells::ALL {
             assert_eq!(cells.to_string().parse::<Cells>().unwrap(), cells);
             let json = serde_json::to_string(&cells).unwrap();
             assert_eq!(json, format!("\"{cells}\""));

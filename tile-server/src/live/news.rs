@@ -7,8 +7,10 @@ use contract::manifest::ManifestId;
 use contract::time::Period;
 use serde::Serialize;
 use tokio::sync::broadcast;
+use utoipa::ToSchema;
 
 use crate::error::ServerError;
+use crate::openapi::words;
 
 /// Items kept for those who come back.
 const KEPT: usize = 256;
@@ -18,7 +20,8 @@ const BEHIND: usize = 64;
 const MOST_LISTENERS: usize = 4096;
 
 /// A new version of a product.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[schema(as = News)]
 pub struct Item {
     /// Number, rising.
     #[serde(skip)]
@@ -26,8 +29,10 @@ pub struct Item {
     /// Name of the product.
     pub product: String,
     /// The new version.
+    #[schema(value_type = String)]
     pub manifest: ManifestId,
     /// Times whose pictures changed.
+    #[schema(value_type = Vec<words::Period>)]
     pub touched: Vec<Period>,
 }
 

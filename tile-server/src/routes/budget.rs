@@ -13,56 +13,105 @@ use contract::quantity::Quantity;
 use contract::region::{Cells, NamedRegion, Region};
 use contract::time::{Period, TimeMs};
 use serde::{Deserialize, Serialize};
+use utoipa::{IntoParams, ToSchema};
 
-use crate::backend::{BudgetRequest, BudgetRow};
+use crate::backend::{BudgetRequest, BudgetRow, BudgetStep};
 use crate::catalogue::Layer;
 use crate::error::ServerError;
 use crate::extract::{UrlPath, UrlQuery, time};
+use crate::openapi::words;
 use crate::routes::products::rounded;
 use crate::state::AppState;
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct BudgetQuery {
+    /// `global` (the default), a name that `/api/regions` lists, `west,south,east,north` in degrees, GeoJSON or
+    /// well-known text.
     region: Option<String>,
+    /// First instant, ISO 8601 UTC; the product's own unless one is given.
     from: Option<String>,
+    /// First instant after the period; the product's own unless one is given.
     to: Option<String>,
+    /// How the period is cut into rows; `month` unless told otherwise.
+    #[param(value_type = Option<BudgetStep>)]
     step: Option<String>,
+    /// Figure of the earth for areas; `wgs84` unless one is given.
+    #[param(value_type = Option<words::Earth>)]
     earth: Option<String>,
+    /// How cells on the coast count; `whole` unless told otherwise.
+    #[param(value_type = Option<words::Cells>)]
     cells: Option<String>,
+    /// Landed product whose cells say how much of them is sea or land, in place of Natural Earth.
     ocean: Option<String>,
+    /// Version, as answers name it; the newest unless one is given.
     manifest: Option<String>,
 }
 
-#[derive(Debug, Serialize)]
+/// The carbon that a region gave off.
+#[derive(Debug, Serialize, ToSchema)]
 struct Budget<'a> {
+    /// Name of the product.
+    #[schema(value_type = String)]
     product: &'a ProductId,
+    /// Version that was read, to be cited.
+    #[schema(value_type = String)]
     manifest: &'a ManifestId,
+    /// The region by its name, or as `west,south,east,north`.
     region: String,
+    /// Figure of the earth for areas.
+    #[schema(value_type = words::Earth)]
     earth: Earth,
+    /// How cells on the coast counted.
+    #[schema(value_type = words::Cells)]
     cells: Cells,
+    /// Unit of budgets and gaps, `Tg C`.
     unit: &'static str,
+    /// Area of the region, land included, m².
     region_area_m2: f64,
+    /// Area of the sea in it, m².
     ocean_area_m2: f64,
+    /// What said how much of each cell is sea.
     ocean_source: &'a str,
+    /// What estimates of gaps are made of.
     gap_basis: &'a str,
+    /// How the region was taken where that may surprise.
     notes: &'a [String],
+    /// In the order of time.
     rows: Vec<Row>,
 }
 
-#[derive(Debug, Serialize)]
+/// The budget of one period.
+#[derive(Debug, Serialize, ToSchema)]
+#[schema(as = BudgetRow)]
 struct Row {
+    /// First instant, ISO 8601 UTC.
+    #[schema(value_type = String, format = DateTime)]
     start: TimeMs,
+    /// First instant after it.
+    #[schema(value_type = String, format = DateTime)]
     end: TimeMs,
+    /// Carbon given off by the sea, Tg, positive out of the sea.
     budget: f64,
+    /// Share of the region's sea with data, averaged over the period, percent.
     coverage_percent: f64,
+    /// Area that counted, averaged over the period, m²: with whole cells also land on the coast.
     area_m2: f64,
+    /// Area of the sea with data, averaged over the period, m².
     ocean_with_data_m2: f64,
+    /// What the sea without data would add, Tg: an estimate, no part of the budget; none where nothing is known of it.
+    #[schema(required)]
     gap: Option<f64>,
+    /// Area of the sea without data that the estimate stands for, m².
     gap_area_m2: f64,
+    /// Of accumulated carbon: area of cells with data in all of the period, m².
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     complete_m2: Option<f64>,
+    /// Of accumulated carbon: area of cells with data in some of the period only, m².
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     incomplete_m2: Option<f64>,
 }
 
@@ -94,6 +143,15 @@ impl From<&BudgetRow> for Row {
     }
 }
 
+/// The carbon budget of a region: by month, by year or in all, with its coverage and what gaps would add.
+#[utoipa::path(
+    get,
+    path = "/api/products/{product}/budget",
+    operation_id = "budget",
+    tag = "statistics",
+    params(("product" = String, Path, description = "Name of a carbon flux or of accumulated carbon"), BudgetQuery),
+    responses((status = 200, description = "One row for each step of time", body = Budget<'static>)),
+)]
 pub(crate) async fn get(
     State(state): State<AppState>,
     UrlPath(product): UrlPath<String>,

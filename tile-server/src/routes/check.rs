@@ -7,6 +7,14 @@ use crate::backend::Check;
 use crate::error::ServerError;
 use crate::state::AppState;
 
+/// Our budgets beside a paper's and an independent integration's; `null` where there is nothing to compare with.
+#[utoipa::path(
+    get,
+    path = "/api/check",
+    operation_id = "check",
+    tag = "statistics",
+    responses((status = 200, description = "The comparison", body = Option<Check>)),
+)]
 pub(crate) async fn get(State(state): State<AppState>) -> Result<Json<Option<Check>>, ServerError> {
     state.analyses.check().await.map(Json)
 }

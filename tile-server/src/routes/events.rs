@@ -17,7 +17,17 @@ use crate::state::AppState;
 /// A comment is sent this often, so that nobody between takes the silence for an end.
 const HEARTBEAT: Duration = Duration::from_secs(15);
 
-/// News from now on; with `Last-Event-ID` those missed since are told first.
+/// News of new versions from now on, as server-sent events named `product`.
+///
+/// The data of each is one `News`; with `Last-Event-ID` those missed since are told first. A comment comes every 15 s.
+#[utoipa::path(
+    get,
+    path = "/api/events",
+    operation_id = "events",
+    tag = "catalogue",
+    params(("Last-Event-ID" = Option<u64>, Header, description = "Number of the last event that was received")),
+    responses((status = 200, description = "Events for as long as the client listens", body = Item, content_type = "text/event-stream")),
+)]
 pub(crate) async fn get(
     State(state): State<AppState>,
     headers: HeaderMap,

@@ -6,10 +6,12 @@ use axum::response::Response;
 use contract::job::View;
 use contract::picture::PictureRequest;
 use serde::Deserialize;
+use utoipa::IntoParams;
 
 use crate::error::ServerError;
 use crate::extract::{UrlPath, UrlQuery, number, time, whole_number};
 use crate::look::LookQuery;
+use crate::openapi::words;
 use crate::request;
 use crate::routes::picture::{self, Shown};
 use crate::state::AppState;
@@ -20,22 +22,63 @@ const HEIGHT_KM: f64 = 15_000.0;
 /// Width and height unless told otherwise, pixels.
 const SIZE_PX: u32 = 512;
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
 pub(crate) struct GlobeQuery {
+    /// Longitude below the camera, degrees east; 0 unless one is given.
+    #[param(value_type = Option<f64>)]
     lon: Option<String>,
+    /// Latitude below the camera, degrees north; 0 unless one is given.
+    #[param(value_type = Option<f64>, minimum = -90, maximum = 90)]
     lat: Option<String>,
+    /// Height of the camera above the ground, km; 15000 unless one is given.
+    #[param(value_type = Option<f64>, minimum = 1, maximum = 1e6)]
     height_km: Option<String>,
+    /// Instant, ISO 8601 UTC (a year, month or day means its start); the middle of the last step unless one is given.
+    #[param(example = "2000-01-16T12:00:00Z")]
     time: Option<String>,
+    /// Width of the picture, pixels; 512 unless one is given.
+    #[param(value_type = Option<u32>, minimum = 1, maximum = 4096)]
     width: Option<String>,
+    /// Height of the picture, pixels; 512 unless one is given.
+    #[param(value_type = Option<u32>, minimum = 1, maximum = 4096)]
     height: Option<String>,
+    /// The ground is drawn below the particles; yes unless told otherwise.
+    #[param(value_type = Option<bool>)]
     surface: Option<String>,
+    /// Version, as answers name it; the newest unless one is given.
     manifest: Option<String>,
     #[serde(flatten)]
+    #[param(ignore)]
     look: LookQuery,
     #[serde(flatten)]
+    #[param(ignore)]
     surroundings: SurroundingsQuery,
 }
 
+/// The globe from straight above a place, as a PNG of any size.
+#[utoipa::path(
+    get,
+    path = "/globe/{product}/{mode}.png",
+    operation_id = "globe_view",
+    tag = "pictures",
+    params(
+        ("product" = String, Path, description = "Name of the product"),
+        ("mode" = words::Mode, Path, description = "How it is drawn; a product lists its modes"),
+        GlobeQuery,
+        LookQuery,
+        SurroundingsQuery,
+    ),
+    responses(
+        (status = 200, description = "The view", content(("image/png")),
+            headers(
+                ("etag" = String, description = "Names the job: the same tag is the same picture, byte for byte"),
+                ("fluxglobe-time" = String, description = "The instant that is shown, ISO 8601"),
+                ("fluxglobe-time-covered" = String, description = "`start/end` of what there is, where another instant is shown than was asked for"),
+            )),
+        (status = 304, description = "The copy that `If-None-Match` names is still right"),
+    ),
+)]
 pub(crate) async fn get(
     State(state): State<AppState>,
     UrlPath((product, file)): UrlPath<(String, String)>,

@@ -8,6 +8,7 @@ use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse as _, Response};
 use serde::Serialize;
 use tokio::time::timeout;
+use utoipa::ToSchema;
 
 use crate::catalogue::Probe;
 use crate::routes::viewer;
@@ -16,27 +17,51 @@ use crate::state::AppState;
 /// A part that needs longer than this to say that it is there is as good as away.
 const PART_LIMIT: Duration = Duration::from_secs(2);
 
-#[derive(Debug, Serialize)]
+/// Can the server do its work, and which part of it cannot?
+#[derive(Debug, Serialize, ToSchema)]
 struct Readiness {
+    /// Every part that is required is there.
     ready: bool,
+    /// All parts.
     checks: Vec<Part>,
 }
 
-#[derive(Debug, Serialize)]
+/// A part of the server.
+#[derive(Debug, Serialize, ToSchema)]
 struct Part {
+    /// Its name.
     name: &'static str,
+    /// It is there.
     ok: bool,
     /// Can the server not do without it?
     required: bool,
+    /// One line for operators.
     detail: String,
 }
 
 /// The process answers. It asks nobody, so that a failing neighbour does not get this process restarted.
+#[utoipa::path(
+    get,
+    path = "/healthz",
+    operation_id = "health",
+    tag = "operation",
+    responses((status = 200, description = "`ok`", body = String)),
+)]
 pub(crate) async fn live() -> Response {
     ([(header::CACHE_CONTROL, "no-store")], "ok\n").into_response()
 }
 
 /// Every part, asked now.
+#[utoipa::path(
+    get,
+    path = "/readyz",
+    operation_id = "readiness",
+    tag = "operation",
+    responses(
+        (status = 200, description = "It can serve", body = Readiness),
+        (status = 503, description = "A part that is required is away", body = Readiness),
+    ),
+)]
 pub(crate) async fn ready(State(state): State<AppState>) -> Response {
     let (store, renderer, log, observations) = tokio::join!(
         store(&state),

@@ -6,23 +6,51 @@ use axum::response::{IntoResponse as _, Response};
 use contract::digest::Digest;
 use contract::job::Mode;
 use serde::Deserialize;
+use utoipa::IntoParams;
 
 use crate::error::ServerError;
 use crate::extract::{UrlPath, UrlQuery};
 use crate::legend::{Form, Legend};
 use crate::look::LookQuery;
+use crate::openapi::words;
 use crate::request;
 use crate::routes::picture::{CACHE_CONTROL, has_tag};
 use crate::state::AppState;
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
 pub(crate) struct LegendQuery {
+    /// Version, as answers name it; the newest unless one is given.
     manifest: Option<String>,
+    /// Mode of the pictures: a flow is coloured by its speed.
+    #[param(value_type = Option<words::Mode>)]
     mode: Option<String>,
     #[serde(flatten)]
+    #[param(ignore)]
     look: LookQuery,
 }
 
+/// What the colours of a layer mean: numbers, a drawing or pixels.
+#[utoipa::path(
+    get,
+    path = "/api/products/{product}/legend.{form}",
+    operation_id = "legend",
+    tag = "catalogue",
+    params(
+        ("product" = String, Path, description = "Name of the product"),
+        ("form" = words::LegendForm, Path, description = "What the legend is written as"),
+        LegendQuery,
+        LookQuery,
+    ),
+    responses(
+        (status = 200, description = "The legend in the form that was asked for", content(
+            (Legend = "application/json"),
+            ("image/svg+xml"),
+            ("image/png"),
+        ), headers(("etag" = String, description = "Weak; names the content"))),
+        (status = 304, description = "The copy that `If-None-Match` names is still right"),
+    ),
+)]
 pub(crate) async fn get(
     State(state): State<AppState>,
     UrlPath((product, file)): UrlPath<(String, String)>,

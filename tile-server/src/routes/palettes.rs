@@ -3,21 +3,36 @@
 use axum::Json;
 use contract::colour::Palette;
 use serde::Serialize;
+use utoipa::ToSchema;
 
 use crate::legend::evenly_placed;
+use crate::openapi::words;
 
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct Palettes {
+    /// In the order they are offered.
     palettes: Vec<Named>,
 }
 
-#[derive(Debug, Serialize)]
+/// A palette with its colours.
+#[derive(Debug, Serialize, ToSchema)]
+#[schema(as = PaletteColours)]
 struct Named {
+    /// As the parameter `palette` takes it.
+    #[schema(value_type = words::Palette)]
     name: &'static str,
-    /// Place and colour, straight in between.
+    /// Place from 0 to 1 and colour (`#rrggbb`), straight in between.
     stops: Vec<(f64, String)>,
 }
 
+/// Palettes that a look can name.
+#[utoipa::path(
+    get,
+    path = "/api/palettes",
+    operation_id = "palettes",
+    tag = "catalogue",
+    responses((status = 200, description = "All of them", body = Palettes)),
+)]
 pub(crate) async fn list() -> Json<Palettes> {
     let named = Palette::ALL.iter().map(|palette| Named {
         name: palette.as_str(),

@@ -5,13 +5,16 @@ use axum::extract::State;
 use axum::http::header;
 use axum::response::{IntoResponse as _, Response};
 use contract::observation::{PlatformKind, Quality};
+use contract::product::ProductId;
 use contract::region::Region;
-use serde::Deserialize;
-use serde_json::{Value, json};
+use contract::time::TimeMs;
+use serde::{Deserialize, Serialize};
+use utoipa::{IntoParams, ToSchema};
 
 use crate::backend::{ObservationQuestion, Observe, Platform, TrackPoint, TrackQuestion};
 use crate::error::ServerError;
 use crate::extract::{UrlQuery, time};
+use crate::openapi::words;
 use crate::state::AppState;
 
 /// Platforms of one answer: as many points as a globe still shows apart.
@@ -21,17 +24,111 @@ const TRACK_POINTS: u32 = 2000;
 /// Tracks of one answer: each is a question of its own.
 const MOST_TRACKS: usize = 50;
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct PlatformQuery {
+    /// Where: a region as budgets take it, such as `west,south,east,north` in degrees; everywhere unless one is given.
     bbox: Option<String>,
+    /// First instant, ISO 8601 UTC.
     from: Option<String>,
+    /// First instant after the period.
     to: Option<String>,
+    /// What was measured, such as `sea_surface_temperature`.
     property: Option<String>,
+    /// What carries the instruments.
+    #[param(value_type = Option<words::PlatformKind>)]
     kind: Option<String>,
+    /// Data set.
     dataset: Option<String>,
 }
 
+/// Platforms as GeoJSON (RFC 7946).
+#[derive(Debug, Serialize, ToSchema)]
+struct Platforms {
+    #[serde(rename = "type")]
+    #[schema(inline)]
+    kind: Collection,
+    /// By data set and name.
+    features: Vec<PlatformFeature>,
+}
+
+#[derive(Debug, Serialize, ToSchema)]
+enum Collection {
+    FeatureCollection,
+}
+
+#[derive(Debug, Serialize, ToSchema)]
+enum Member {
+    Feature,
+}
+
+/// A platform.
+#[derive(Debug, Serialize, ToSchema)]
+#[schema(as = Platform)]
+struct PlatformFeature {
+    #[serde(rename = "type")]
+    #[schema(inline)]
+    kind: Member,
+    /// `dataset/platform`.
+    id: String,
+    geometry: Geometry,
+    properties: PlatformProperties,
+}
+
+/// Places as longitude and latitude, degrees: the last one, or the track of a ship.
+#[derive(Debug, PartialEq, Serialize, ToSchema)]
+#[serde(tag = "type")]
+enum Geometry {
+    Point {
+        #[schema(value_type = (f64, f64))]
+        coordinates: [f64; 2],
+    },
+    MultiLineString {
+        #[schema(value_type = Vec<Vec<(f64, f64)>>)]
+        coordinates: Vec<Vec<[f64; 2]>>,
+    },
+}
+
+/// What there is of a platform.
+#[derive(Debug, Serialize, ToSchema)]
+struct PlatformProperties {
+    /// Data set.
+    #[schema(value_type = String)]
+    dataset: ProductId,
+    /// Name in it.
+    platform: String,
+    /// What it is.
+    #[schema(value_type = words::PlatformKind)]
+    kind: PlatformKind,
+    /// First observation, ISO 8601 UTC.
+    #[schema(value_type = String, format = DateTime)]
+    first: TimeMs,
+    /// Last observation.
+    #[schema(value_type = String, format = DateTime)]
+    last: TimeMs,
+    /// Last longitude, degrees east.
+    lon: f64,
+    /// Last latitude, degrees north.
+    lat: f64,
+    /// What was measured.
+    properties: Vec<String>,
+    /// Observations.
+    count: u64,
+}
+
+/// Buoys, ships, stations and profiles, with the tracks of ships.
+#[utoipa::path(
+    get,
+    path = "/api/observations/platforms",
+    operation_id = "platforms",
+    tag = "observations",
+    params(PlatformQuery),
+    responses(
+        (status = 200, description = "Those with observations that the question is about", body = Platforms),
+        (status = 404, description = "This server has no observations", body = crate::error::Refusal),
+    ),
+)]
 pub(crate) async fn get(
     State(state): State<AppState>,
     UrlQuery(query): UrlQuery<PlatformQuery>,
@@ -40,16 +137,19 @@ pub(crate) async fn get(
     let question = query.question()?;
     let mut features = vec![];
     let mut tracks = 0;
-    for platform in &observer.platforms(&question).await? {
+    for platform in observer.platforms(&question).await? {
         let track = if platform.kind == PlatformKind::Ship && tracks < MOST_TRACKS {
             tracks += 1;
-            track(observer.as_ref(), platform, &question).await?
+            track(observer.as_ref(), &platform, &question).await?
         } else {
             vec![]
         };
         features.push(feature(platform, &track));
     }
-    let answer = json!({ "type": "FeatureCollection", "features": features });
+    let answer = Platforms {
+        kind: Collection::FeatureCollection,
+        features,
+    };
     Ok(([(header::CACHE_CONTROL, "no-cache")], Json(answer)).into_response())
 }
 
@@ -88,28 +188,32 @@ async fn track(
     Ok(observer.track(&question).await?)
 }
 
-fn feature(platform: &Platform, track: &[TrackPoint]) -> Value {
+fn feature(platform: Platform, track: &[TrackPoint]) -> PlatformFeature {
     let geometry = if track.len() > 1 {
-        json!({ "type": "MultiLineString", "coordinates": lines(track) })
+        Geometry::MultiLineString {
+            coordinates: lines(track),
+        }
     } else {
-        json!({ "type": "Point", "coordinates": [platform.lon_deg, platform.lat_deg] })
+        Geometry::Point {
+            coordinates: [platform.lon_deg, platform.lat_deg],
+        }
     };
-    json!({
-        "type": "Feature",
-        "id": format!("{}/{}", platform.dataset, platform.name),
-        "geometry": geometry,
-        "properties": {
-            "dataset": platform.dataset,
-            "platform": platform.name,
-            "kind": platform.kind,
-            "first": platform.first,
-            "last": platform.last,
-            "lon": platform.lon_deg,
-            "lat": platform.lat_deg,
-            "properties": platform.properties,
-            "count": platform.count,
+    PlatformFeature {
+        kind: Member::Feature,
+        id: format!("{}/{}", platform.dataset, platform.name),
+        geometry,
+        properties: PlatformProperties {
+            dataset: platform.dataset,
+            platform: platform.name,
+            kind: platform.kind,
+            first: platform.first,
+            last: platform.last,
+            lon: platform.lon_deg,
+            lat: platform.lat_deg,
+            properties: platform.properties,
+            count: platform.count,
         },
-    })
+    }
 }
 
 /// A track as lines that stay on one side of the date line, each ending where it crosses (RFC 7946, 3.1.9).

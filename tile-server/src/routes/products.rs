@@ -13,46 +13,77 @@ use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::time::{Period, TimeMs};
 use serde::Serialize;
+use utoipa::ToSchema;
 
 use crate::catalogue::Layer;
 use crate::error::ServerError;
 use crate::legend::Legend;
+use crate::openapi::words;
 use crate::routes::picture::has_tag;
 use crate::state::AppState;
 
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, ToSchema)]
 struct Products<'a> {
+    /// By name.
     products: Vec<Product<'a>>,
 }
 
 /// One product. `shown = stored * display_factor + display_offset`.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, ToSchema)]
 struct Product<'a> {
+    /// Name.
+    #[schema(value_type = String)]
     id: &'a ProductId,
+    /// For people.
     title: &'a str,
+    /// What its values are.
+    #[schema(value_type = words::Quantity)]
     quantity: Quantity,
+    /// Unit of the stored values.
     unit: &'static str,
+    /// Unit that people read: that of series, means and legends.
     display_unit: &'static str,
+    /// Display units in a stored unit.
     display_factor: f64,
+    /// Display units, added after the factor.
     display_offset: f64,
+    /// Made up, not observed.
     synthetic: bool,
+    /// Who made it, to be cited.
     source: &'a str,
+    /// Its newest version.
+    #[schema(value_type = String)]
     manifest: &'a ManifestId,
+    /// The version it was computed from; none where it was ingested.
+    #[schema(value_type = Option<String>, required)]
     derived_from: Option<&'a ManifestId>,
+    /// West, south, east, north, degrees; east may pass 180.
+    #[schema(value_type = (f64, f64, f64, f64))]
     bounds: [f64; 4],
+    /// In the order of time.
     steps: Vec<StepTimes>,
+    /// Ways it can be drawn.
+    #[schema(value_type = Vec<words::Mode>)]
     modes: &'static [Mode],
+    /// What its own colours mean.
     legend: Legend,
     /// That of the mode flow, where there is one: speeds.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     flow_legend: Option<Legend>,
 }
 
 /// When a step holds.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct StepTimes {
+    /// First instant, ISO 8601 UTC.
+    #[schema(value_type = String, format = DateTime)]
     start: TimeMs,
+    /// First instant after it.
+    #[schema(value_type = String, format = DateTime)]
     end: TimeMs,
+    /// Middle.
+    #[schema(value_type = String, format = DateTime)]
     mid: TimeMs,
 }
 
@@ -66,6 +97,17 @@ impl From<Period> for StepTimes {
     }
 }
 
+/// Every product with its newest version, steps, modes and legend.
+#[utoipa::path(
+    get,
+    path = "/api/products",
+    operation_id = "products",
+    tag = "catalogue",
+    responses(
+        (status = 200, description = "All products", body = Products<'static>, headers(("etag" = String, description = "Weak; changes with any version"))),
+        (status = 304, description = "The copy that `If-None-Match` names is still right"),
+    ),
+)]
 pub(crate) async fn list(
     State(state): State<AppState>,
     asked: HeaderMap,

@@ -10,11 +10,13 @@ use contract::manifest::ManifestId;
 use contract::tile::{MAX_LAT_DEG, MAX_ZOOM};
 use contract::time::TimeMs;
 use serde::{Deserialize, Serialize};
+use utoipa::{IntoParams, ToSchema};
 
 use crate::catalogue::Layer;
 use crate::error::ServerError;
 use crate::extract::{UrlPath, UrlQuery, time};
 use crate::look::LookQuery;
+use crate::openapi::words;
 use crate::request;
 use crate::routes::products::bounds_deg;
 use crate::state::AppState;
@@ -25,13 +27,19 @@ const CELL_PX: f64 = 64.0;
 /// Width of a tile, pixels.
 const TILE_PX: f64 = 256.0;
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
 pub(crate) struct TileJsonQuery {
+    /// Instant that the tiles show, ISO 8601 UTC.
+    #[param(example = "2000-01-16T12:00:00Z")]
     time: Option<String>,
+    /// Version, as answers name it; the newest unless one is given.
     manifest: Option<String>,
     #[serde(flatten)]
+    #[param(ignore)]
     look: LookQuery,
     #[serde(flatten)]
+    #[param(ignore)]
     surroundings: SurroundingsQuery,
 }
 
@@ -77,23 +85,52 @@ fn query_of(parts: &[String]) -> String {
 }
 
 /// TileJSON 3.0.0, and beyond it the version and the instants of the layer.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, ToSchema)]
 struct TileJson<'a> {
+    /// Version of the format, `3.0.0`.
     tilejson: &'static str,
+    /// For people.
     name: String,
+    /// The quantity.
     description: &'a str,
+    /// The source, as HTML.
     attribution: String,
+    /// `xyz`.
     scheme: &'static str,
+    /// Address of the tiles with `{z}`, `{x}` and `{y}`, everything that was asked for in it.
     tiles: [String; 1],
+    /// Least zoom.
     minzoom: u8,
+    /// Zoom beyond which tiles would only be magnified.
     maxzoom: u8,
+    /// West, south, east, north, degrees, within the map's world.
+    #[schema(value_type = (f64, f64, f64, f64))]
     bounds: [f64; 4],
+    /// The drawn legend, as HTML.
     legend: String,
+    /// Version.
+    #[schema(value_type = String)]
     manifest: &'a ManifestId,
     /// Middles of the steps; every instant between the first and the last is valid as well.
+    #[schema(value_type = Vec<String>)]
     times: Vec<TimeMs>,
 }
 
+/// What a map client needs to know of a layer: TileJSON 3.0.0 with its version and instants.
+#[utoipa::path(
+    get,
+    path = "/tiles/{product}/{mode}.json",
+    operation_id = "tilejson",
+    tag = "pictures",
+    params(
+        ("product" = String, Path, description = "Name of the product"),
+        ("mode" = words::Mode, Path, description = "How it is drawn; a product lists its modes"),
+        TileJsonQuery,
+        LookQuery,
+        SurroundingsQuery,
+    ),
+    responses((status = 200, description = "The layer", body = TileJson<'static>)),
+)]
 pub(crate) async fn get(
     State(state): State<AppState>,
     UrlPath((product, file)): UrlPath<(String, String)>,

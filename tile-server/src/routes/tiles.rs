@@ -7,10 +7,12 @@ use contract::job::{Mode, View};
 use contract::picture::PictureRequest;
 use contract::tile::Tile;
 use serde::Deserialize;
+use utoipa::IntoParams;
 
 use crate::error::ServerError;
 use crate::extract::{UrlPath, UrlQuery, time, whole_number};
 use crate::look::LookQuery;
+use crate::openapi::words;
 use crate::request;
 use crate::routes::picture::{self, Shown};
 use crate::state::AppState;
@@ -21,17 +23,51 @@ const SIZE_PX: u32 = 256;
 /// Pixels a side of a tile for screens with double resolution.
 const SIZE_2X_PX: u32 = 512;
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
 pub(crate) struct TileQuery {
+    /// Instant, ISO 8601 UTC (a year, month or day means its start); the middle of the last step unless one is given.
+    #[param(example = "2000-01-16T12:00:00Z")]
     time: Option<String>,
+    /// Pixels a side, 256 or 512.
+    #[param(value_type = Option<u32>)]
     size: Option<String>,
+    /// Version, as answers name it; the newest unless one is given.
     manifest: Option<String>,
     #[serde(flatten)]
+    #[param(ignore)]
     look: LookQuery,
     #[serde(flatten)]
+    #[param(ignore)]
     surroundings: SurroundingsQuery,
 }
 
+/// A map tile at any instant: Web Mercator (EPSG:3857), XYZ scheme, PNG with alpha.
+#[utoipa::path(
+    get,
+    path = "/tiles/{product}/{mode}/{z}/{x}/{y}.png",
+    operation_id = "tile",
+    tag = "pictures",
+    params(
+        ("product" = String, Path, description = "Name of the product"),
+        ("mode" = words::Mode, Path, description = "How it is drawn; a product lists its modes"),
+        ("z" = u32, Path, description = "Zoom, 0 to 16"),
+        ("x" = u32, Path, description = "Column, from the west"),
+        ("y" = String, Path, description = "Row, from the north; `@2x` after it asks for 512 pixels", pattern = r"^\d+(@2x)?$"),
+        TileQuery,
+        LookQuery,
+        SurroundingsQuery,
+    ),
+    responses(
+        (status = 200, description = "The tile; transparent where there is no data", content(("image/png")),
+            headers(
+                ("etag" = String, description = "Names the job: the same tag is the same picture, byte for byte"),
+                ("fluxglobe-time" = String, description = "The instant that is shown, ISO 8601"),
+                ("fluxglobe-time-covered" = String, description = "`start/end` of what there is, where another instant is shown than was asked for"),
+            )),
+        (status = 304, description = "The copy that `If-None-Match` names is still right"),
+    ),
+)]
 pub(crate) async fn get(
     State(state): State<AppState>,
     UrlPath((product, mode, z, x, y)): UrlPath<(String, String, String, String, String)>,

@@ -9,7 +9,7 @@ use tile_server::backend::{Class, Platform, TrackPoint};
 use crate::app::TestApp;
 use crate::doubles::Mood;
 
-fn platform(name: &str, kind: PlatformKind) -> Platform {
+pub(crate) fn platform(name: &str, kind: PlatformKind) -> Platform {
     Platform {
         dataset: "buoys".parse().unwrap(),
         name: name.to_owned(),
@@ -23,7 +23,7 @@ fn platform(name: &str, kind: PlatformKind) -> Platform {
     }
 }
 
-fn observation(hour: u32, quality: Quality) -> Observation {
+pub(crate) fn observation(hour: u32, quality: Quality) -> Observation {
     Observation {
         dataset: "buoys".parse().unwrap(),
         platform: "51001".to_owned(),

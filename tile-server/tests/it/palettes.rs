@@ -8,7 +8,7 @@ use contract::quantity::Quantity;
 
 use crate::app::TestApp;
 
-const VIEWER: &str = include_str!("../../web/src/look.ts");
+const VIEWER: &str = include_str!("../../web/src/look/look.ts");
 
 #[tokio::test]
 async fn every_palette_that_is_listed_can_be_asked_for_and_looks_as_listed() {

@@ -1,8 +1,8 @@
 //! `window.fluxglobe`: what a test or a curious reader may watch, never change.
-import type { Globe } from "./globe";
-import type { Platform } from "./observations";
-import type { State, Store } from "./state";
-import type { TileCounts } from "./tiles";
+import type { Platform } from "./api/types";
+import type { Globe } from "./globe/globe";
+import type { TileCounts } from "./globe/tiles";
+import type { State, Store } from "./state/store";
 
 export interface Probe {
   /** The catalogue is there and the first layer is drawn. */

@@ -1,6 +1,6 @@
 //! Boxes on the globe: the short way round, the date line, typed text and outlines.
 import { describe, expect, it } from "vitest";
-import { boxFromCorners, boxText, contains, outline, parseBox } from "../src/box";
+import { boxFromCorners, boxText, contains, outline, parseBox } from "../src/globe/box";
 
 describe("a drawn box", () => {
   it("is the same from either corner", () => {

@@ -1,7 +1,7 @@
 //! Titles of what is new, each once.
 import { describe, expect, it } from "vitest";
-import type { Product } from "../src/api";
-import { Catalogue } from "../src/catalogue";
+import type { Product } from "../src/api/types";
+import { Catalogue } from "../src/state/catalogue";
 
 function product(id: string, title: string, derived_from: string | null = null): Product {
   return {
@@ -10,6 +10,8 @@ function product(id: string, title: string, derived_from: string | null = null):
     quantity: "carbon_flux",
     unit: "",
     display_unit: "",
+    display_factor: 1,
+    display_offset: 0,
     synthetic: false,
     source: "",
     manifest: `${id}@1-00000000`,
@@ -17,7 +19,7 @@ function product(id: string, title: string, derived_from: string | null = null):
     bounds: [-180, -90, 180, 90],
     steps: [],
     modes: ["map"],
-    legend: { low: 0, high: 1, unit: "", label: "", stops: [] },
+    legend: { low: 0, high: 1, unit: "", label: "", stops: [], ticks: [] },
   };
 }
 

@@ -1,7 +1,7 @@
 //! The check table: what is said of printed numbers with and without an uncertainty.
 import { describe, expect, it } from "vitest";
-import type { CheckPaper, CheckRow } from "../src/api";
-import { statedText, verdictText } from "../src/check";
+import type { CheckPaper, CheckRow } from "../src/api/types";
+import { statedText, verdictText } from "../src/panels/check";
 
 const paper: CheckPaper = { value: -1.4, uncertainty: 0.7, decimals: 1, difference: -0.0043, verdict: "within" };
 const row: CheckRow = {

@@ -1,6 +1,16 @@
 //! Units and numbers as text: the signs a reader of a journal expects.
 import { describe, expect, it } from "vitest";
-import { areaText, chemistry, digitsFor, latText, lonText, numberText, titleText, unitText, wrapLon } from "../src/format";
+import {
+  areaText,
+  chemistry,
+  digitsFor,
+  latText,
+  lonText,
+  numberText,
+  titleText,
+  unitText,
+  wrapLon,
+} from "../src/page/format";
 
 const plain = (text: string): string => text.replace(/\u202f/g, " ").replace(/\u2009/g, "_");
 

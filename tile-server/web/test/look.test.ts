@@ -1,13 +1,14 @@
 //! The look of a layer: in addresses and back, what of it makes a difference, and what the panel offers.
 import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
-import { globeUrl, tileTemplate, type Palette, type Product } from "../src/api";
-import { Catalogue } from "../src/catalogue";
-import { decodeHash, encodeHash } from "../src/hash";
-import { effective, possible, USUAL, withoutColours, type Look } from "../src/look";
-import { changeOf, colourParameters, parameters, parseRange, queryOf } from "../src/look-address";
-import { offerOf } from "../src/look-offer";
-import { INITIAL, type State } from "../src/state";
-import { isSameLayer, layerKey, type LayerSpec } from "../src/tiles";
+import { globeUrl, queryOf, tileTemplate } from "../src/api/pictures";
+import type { Palette, Product } from "../src/api/types";
+import { isSameLayer, layerKey, type LayerSpec } from "../src/globe/layer";
+import { changeOf, colourParameters, parameters, parseRange } from "../src/look/address";
+import { effective, type Look, possible, USUAL, withoutColours } from "../src/look/look";
+import { offerOf } from "../src/look/offer";
+import { Catalogue } from "../src/state/catalogue";
+import { decodeHash, encodeHash } from "../src/state/hash";
+import { INITIAL, type State } from "../src/state/store";
 
 beforeEach(() => vi.stubGlobal("document", { baseURI: "http://host/below/" }));
 afterEach(() => vi.unstubAllGlobals());
@@ -38,6 +39,8 @@ function product(id: string, change: Partial<Product> = {}): Product {
     quantity: "carbon_flux",
     unit: "",
     display_unit: "",
+    display_factor: 1,
+    display_offset: 0,
     synthetic: false,
     source: "",
     manifest: `${id}@1-00000000`,
@@ -45,12 +48,12 @@ function product(id: string, change: Partial<Product> = {}): Product {
     bounds: [-180, -90, 180, 90],
     steps,
     modes: ["map", "volume"],
-    legend: { low: -40, high: 40, unit: "g C m⁻² yr⁻¹", label: "", stops: BALANCE.stops },
+    legend: { low: -40, high: 40, unit: "g C m⁻² yr⁻¹", label: "", stops: BALANCE.stops, ticks: [] },
     ...change,
   };
 }
 
-const SPEEDS = { low: 0, high: 1.5, unit: "m s⁻¹", label: "Speed", stops: ICE.stops };
+const SPEEDS = { low: 0, high: 1.5, unit: "m s⁻¹", label: "Speed", stops: ICE.stops, ticks: [] };
 const CATALOGUE = new Catalogue([
   product("flux"),
   product("flux-accumulated", { quantity: "accumulated_carbon", derived_from: "flux@1-00000000" }),

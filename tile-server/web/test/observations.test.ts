@@ -1,13 +1,14 @@
 //! Observations and news: pure parts of what the page makes of them.
 import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
-import { tileTemplate } from "../src/api";
-import { denseLine } from "../src/box";
-import { Catalogue } from "../src/catalogue";
-import { decodeHash, encodeHash } from "../src/hash";
-import { groupsOf, isTrusted, qualityText } from "../src/measured";
-import { countText, series, seriesUrl, type Measured, type Platform } from "../src/observations";
-import { INITIAL } from "../src/state";
-import { parseNews, touches, Updates, type News, type Stream } from "../src/updates";
+import { countText, series, seriesUrl } from "../src/api/observations";
+import { tileTemplate } from "../src/api/pictures";
+import type { Measured, News, Platform } from "../src/api/types";
+import { parseNews, type Stream, touches, Updates } from "../src/api/updates";
+import { denseLine } from "../src/globe/box";
+import { groupsOf, isTrusted, qualityText } from "../src/panels/measured";
+import { Catalogue } from "../src/state/catalogue";
+import { decodeHash, encodeHash } from "../src/state/hash";
+import { INITIAL } from "../src/state/store";
 
 beforeEach(() => vi.stubGlobal("document", { baseURI: "http://host/below/" }));
 afterEach(() => {

@@ -11,12 +11,12 @@ import {
   positionOf,
   quantise,
   rangeOf,
+  type Step,
   stepLabel,
   strideFor,
   timeNames,
   toIso,
-  type Step,
-} from "../src/time";
+} from "../src/time/steps";
 
 const at = (iso: string): number => Date.parse(iso);
 const month = (start: string, end: string): { start: string; end: string; mid: string } => ({

@@ -1,11 +1,12 @@
 //! The shareable address, series values, cross-fades, ticks and files: pure parts of what the page shows.
 import { describe, expect, it } from "vitest";
-import { budgetCsv, seriesCsv } from "../src/csv";
-import { underOpacity } from "../src/fade";
-import { decodeHash, encodeHash } from "../src/hash";
-import { ticksOf } from "../src/legend";
-import { hasData, valueAt } from "../src/series";
-import { INITIAL, MODES, Store, type State } from "../src/state";
+import { MODES } from "../src/api/words";
+import { underOpacity } from "../src/globe/fade";
+import { ticksOf } from "../src/look/legend";
+import { budgetCsv, seriesCsv } from "../src/panels/csv";
+import { hasData, valueAt } from "../src/panels/series";
+import { decodeHash, encodeHash } from "../src/state/hash";
+import { INITIAL, type State, Store } from "../src/state/store";
 
 describe("the address", () => {
   const state: State = {

@@ -1,0 +1,149 @@
+//! The description of every address that clients may ask, OpenAPI 3.1: written beside each handler, gathered here.
+//!
+//! `openapi.json` beside this crate's sources is what it says; a test holds the two together, and the viewer's types are
+//! generated from it.
+
+pub(crate) mod words;
+
+use std::sync::LazyLock;
+
+use utoipa::openapi::header::HeaderBuilder;
+use utoipa::openapi::path::{Operation, Parameter, ParameterIn};
+use utoipa::openapi::{ContentBuilder, ObjectBuilder, Ref, RefOr, Response, ResponseBuilder, Type};
+use utoipa::{Modify, OpenApi};
+
+use crate::error::Refusal;
+use crate::routes::{
+    area, budget, check, events, globe, health, legend, metrics, observations, openapi, palettes,
+    platforms, point, products, regions, tilejson, tiles,
+};
+
+/// What an operation that takes long or needs others answers when it cannot.
+const RETRY_AFTER: &str = "Seconds after which the same request may succeed";
+
+#[derive(OpenApi)]
+#[openapi(
+    info(
+        title = "Fluxglobe",
+        description = "Map tiles, views of the globe, series, carbon budgets, the catalogue and observations.\n\n\
+            Everything is read with GET or HEAD, by anybody; other methods are answered with 405. Times are ISO 8601 and \
+            any instant is valid, not only stored steps; `from` and `to` bound the half-open period `[from, to)`. \
+            Answers about a product name its version in `manifest`, and the parameter of that name asks for it again. \
+            Every refusal is a `Refusal`; those with `Retry-After` may succeed later."
+    ),
+    servers((url = "/", description = "This server")),
+    paths(
+        tiles::get,
+        tilejson::get,
+        globe::get,
+        products::list,
+        legend::get,
+        regions::list,
+        palettes::list,
+        events::get,
+        openapi::get,
+        point::get,
+        area::get,
+        budget::get,
+        check::get,
+        platforms::get,
+        observations::get,
+        health::live,
+        health::ready,
+        metrics::get,
+    ),
+    components(schemas(
+        Refusal,
+        crate::backend::BudgetStep,
+        words::Cells,
+        words::Earth,
+        words::LegendForm,
+        words::Mode,
+        words::Palette,
+        words::PlatformKind,
+        words::Quality,
+        words::Quantity,
+    )),
+    tags(
+        (name = "pictures", description = "Tiles and views of the globe"),
+        (name = "catalogue", description = "What there is, and what is new"),
+        (name = "statistics", description = "Numbers of places and regions"),
+        (name = "observations", description = "Buoys, ships, stations and profiles"),
+        (name = "operation", description = "For those who run the server"),
+    ),
+    modifiers(&Refusals),
+)]
+struct Description;
+
+/// Adds what the layers below all handlers answer, so that no handler has to say it.
+struct Refusals;
+
+impl Modify for Refusals {
+    fn modify(&self, description: &mut utoipa::openapi::OpenApi) {
+        let items = description.paths.paths.values_mut();
+        for operation in items.filter_map(|item| item.get.as_mut()) {
+            for (status, response) in refusals(operation) {
+                let answers = &mut operation.responses.responses;
+                answers
+                    .entry(status.to_owned())
+                    .or_insert_with(|| response.into());
+            }
+        }
+    }
+}
+
+/// How an operation may be refused.
+fn refusals(operation: &Operation) -> Vec<(&'static str, Response)> {
+    let parameters = operation.parameters.as_deref().unwrap_or_default();
+    let takes = |place: &ParameterIn| {
+        let is_there =
+            |one: &RefOr<Parameter>| matches!(one, RefOr::T(one) if one.parameter_in == *place);
+        parameters.iter().any(is_there)
+    };
+    let mut all = vec![
+        ("500", refusal("A defect of this server", false)),
+        (
+            "503",
+            refusal(
+                "Too much to do, or a part that is needed does not answer",
+                true,
+            ),
+        ),
+        ("504", refusal("The answer took too long", true)),
+    ];
+    if takes(&ParameterIn::Path) || takes(&ParameterIn::Query) {
+        let text = "A parameter is not valid, or missing; the reason says what would be";
+        all.push(("400", refusal(text, false)));
+    }
+    if takes(&ParameterIn::Path) {
+        let text = "Nothing of that name; the reason says where names are listed";
+        all.push(("404", refusal(text, false)));
+    }
+    all
+}
+
+fn refusal(text: &str, may_succeed_later: bool) -> Response {
+    let body = ContentBuilder::new()
+        .schema(Some(Ref::from_schema_name("Refusal")))
+        .build();
+    let response = ResponseBuilder::new()
+        .description(text)
+        .content("application/json", body);
+    if !may_succeed_later {
+        return response.build();
+    }
+    let seconds = ObjectBuilder::new().schema_type(Type::Integer);
+    let header = HeaderBuilder::new()
+        .schema(Some(seconds))
+        .description(Some(RETRY_AFTER));
+    response.header("retry-after", header.build()).build()
+}
+
+/// The description as JSON; the same program always says the same bytes.
+pub(crate) fn json() -> &'static str {
+    static JSON: LazyLock<String> = LazyLock::new(|| {
+        let text = Description::openapi().to_pretty_json();
+        text.expect("a description has string keys only") + "\n"
+    });
+    &JSON
+}

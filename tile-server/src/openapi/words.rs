@@ -1,0 +1,78 @@
+//! Words of the contract as schemas: each list comes from the type that parses and writes it, so that none is a copy.
+
+use std::borrow::Cow;
+
+use serde_json::json;
+use utoipa::openapi::schema::{KnownFormat, SchemaFormat};
+use utoipa::openapi::{ObjectBuilder, RefOr, Schema, Type};
+use utoipa::{PartialSchema, ToSchema};
+
+macro_rules! words {
+    ($(#[doc = $doc:literal] $name:ident = $all:expr;)+) => {$(
+        #[doc = $doc]
+        pub(crate) enum $name {}
+
+        impl PartialSchema for $name {
+            fn schema() -> RefOr<Schema> {
+                let words = $all.map(|word| json!(word));
+                ObjectBuilder::new()
+                    .schema_type(Type::String)
+                    .description(Some($doc.trim()))
+                    .enum_values(Some(words))
+                    .into()
+            }
+        }
+
+        impl ToSchema for $name {
+            fn name() -> Cow<'static, str> {
+                Cow::Borrowed(stringify!($name))
+            }
+        }
+    )+};
+}
+
+words! {
+    /// How a layer is drawn: a thematic map, particles as points, sprites or a volume with shadows, or trails of a flow.
+    Mode = contract::job::Mode::ALL;
+    /// What the values of a product are.
+    Quantity = contract::quantity::Quantity::ALL;
+    /// Figure of the earth for areas.
+    Earth = contract::earth::Earth::ALL;
+    /// How cells on the coast count: all of their area in the region, or the share of it that is sea.
+    Cells = contract::region::Cells::ALL;
+    /// A list of colours with a name.
+    Palette = contract::colour::Palette::ALL;
+    /// What carries the instruments.
+    PlatformKind = contract::observation::PlatformKind::ALL;
+    /// How far a value may be trusted, best first: the primary flags of IOC Manuals and Guides 54, volume 3 (2013).
+    Quality = contract::observation::Quality::ALL;
+    /// What a legend is written as.
+    LegendForm = crate::legend::Form::ALL.map(crate::legend::Form::as_str);
+}
+
+/// A half-open period `[start, end)`.
+pub(crate) enum Period {}
+
+impl PartialSchema for Period {
+    fn schema() -> RefOr<Schema> {
+        let instant = |text: &str| {
+            ObjectBuilder::new()
+                .schema_type(Type::String)
+                .format(Some(SchemaFormat::KnownFormat(KnownFormat::DateTime)))
+                .description(Some(text))
+        };
+        ObjectBuilder::new()
+            .description(Some("A half-open period `[start, end)`."))
+            .property("start", instant("First instant, ISO 8601 UTC."))
+            .property("end", instant("First instant after it."))
+            .required("start")
+            .required("end")
+            .into()
+    }
+}
+
+impl ToSchema for Period {
+    fn name() -> Cow<'static, str> {
+        Cow::Borrowed("Period")
+    }
+}

@@ -1,0 +1,380 @@
+//! `/api/openapi.json`: it is the committed one, it names every route, and answers are what it says.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use axum::http::StatusCode;
+use contract::observation::{PlatformKind, Quality};
+use contract::quantity::Quantity;
+use contract::time::Period;
+use serde_json::{Value, json};
+use tile_server::backend::{Check, CheckRow, Paper, TrackPoint};
+
+use crate::app::{Answer, TestApp};
+use crate::doubles::Mood;
+use crate::events::Viewer;
+use crate::observations::{observation, platform};
+use crate::schema::problems;
+
+const COMMITTED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/openapi.json");
+const ROUTER: &str = include_str!("../../src/router.rs");
+
+/// One address of every operation, and what is sent along.
+const ASKED: [(&str, &str); 20] = [
+    (
+        "/tiles/{product}/{mode}/{z}/{x}/{y}.png",
+        "/tiles/flux/volume/1/0/1@2x.png",
+    ),
+    ("/tiles/{product}/{mode}.json", "/tiles/flux/volume.json"),
+    ("/globe/{product}/{mode}.png", "/globe/flux/map.png"),
+    ("/api/products", "/api/products"),
+    (
+        "/api/products/{product}/legend.{form}",
+        "/api/products/flux/legend.json",
+    ),
+    (
+        "/api/products/{product}/legend.{form}",
+        "/api/products/flux/legend.svg",
+    ),
+    (
+        "/api/products/{product}/legend.{form}",
+        "/api/products/flux/legend.png",
+    ),
+    (
+        "/api/products/{product}/point",
+        "/api/products/flux/point?lon=0&lat=0",
+    ),
+    (
+        "/api/products/{product}/point",
+        "/api/products/flux-accumulated/point?lon=-175&lat=0",
+    ),
+    (
+        "/api/products/{product}/area",
+        "/api/products/sst/area?region=global",
+    ),
+    (
+        "/api/products/{product}/budget",
+        "/api/products/flux-accumulated/budget?step=year",
+    ),
+    ("/api/regions", "/api/regions"),
+    ("/api/palettes", "/api/palettes"),
+    ("/api/check", "/api/check"),
+    ("/api/openapi.json", "/api/openapi.json"),
+    ("/api/observations/platforms", "/api/observations/platforms"),
+    (
+        "/api/observations/{dataset}/{platform}",
+        "/api/observations/buoys/51001",
+    ),
+    ("/healthz", "/healthz"),
+    ("/readyz", "/readyz"),
+    ("/metrics", "/metrics"),
+];
+/// What never ends is listened to instead.
+const ENDLESS: &str = "/api/events";
+
+/// Parameters that are free text: no value of theirs is wrong.
+const FREE_TEXT: [&str; 2] = ["property", "after"];
+
+async fn described() -> Value {
+    let app = TestApp::new().await;
+    app.get("/api/openapi.json").await.json()
+}
+
+/// A server that has something of everything.
+async fn rich() -> TestApp {
+    let app = TestApp::new().await.observing();
+    app.land("sea-east", Quantity::Current, 1).await;
+    app.land("sea-north", Quantity::Current, 1).await;
+    let ship = platform("MLCE", PlatformKind::Ship);
+    *app.observer.platforms.lock().unwrap() = vec![platform("51001", PlatformKind::Buoy), ship];
+    let at = |lon_deg: f64| TrackPoint {
+        time: "2020-01-01".parse().unwrap(),
+        lon_deg,
+        lat_deg: 10.0,
+    };
+    *app.observer.track.lock().unwrap() = vec![at(178.0), at(-178.0), at(-177.0)];
+    *app.observer.observations.lock().unwrap() =
+        vec![observation(0, Quality::Good), observation(1, Quality::Bad)];
+    let row = |paper| CheckRow {
+        what: "Sea".to_owned(),
+        period: "year".to_owned(),
+        unit: "Pg C".to_owned(),
+        paper,
+        independent: -1.4,
+        ours: -1.4,
+        difference: 0.0,
+        agrees: true,
+    };
+    let paper = Paper {
+        value: -1.4,
+        uncertainty: Some(0.7),
+        decimals: 1,
+        difference: 0.0,
+        verdict: "within".to_owned(),
+    };
+    *app.analyst.check.lock().unwrap() = Some(Check {
+        rows: vec![row(Some(paper)), row(None)],
+        note: "A note.".to_owned(),
+        method: "A script.".to_owned(),
+    });
+    app
+}
+
+fn operation<'a>(description: &'a Value, path: &str) -> &'a Value {
+    let found = &description["paths"][path]["get"];
+    assert!(found.is_object(), "{path} is not described");
+    found
+}
+
+/// Status, content type and body of an answer, held against an operation.
+fn hold(description: &Value, path: &str, address: &str, answer: &Answer) {
+    let status = answer.status.as_u16().to_string();
+    let response = &operation(description, path)["responses"][&status];
+    assert!(
+        response.is_object(),
+        "{address}: {status} is not described: {}",
+        answer.text()
+    );
+    let sent = answer.header("content-type");
+    let sent = sent.split(';').next().unwrap_or_default().trim();
+    let content = &response["content"][sent];
+    assert!(
+        content.is_object(),
+        "{address}: {sent:?} is not described for {status}"
+    );
+    if sent == "application/json" {
+        let found = problems(description, &content["schema"], &answer.json());
+        assert!(found.is_empty(), "{address}: {found:#?}");
+    }
+    for (name, _header) in response["headers"].as_object().into_iter().flatten() {
+        // What a product covers is told only where another instant is shown than was asked for.
+        let is_there = !answer.header(name).is_empty() || name == "fluxglobe-time-covered";
+        assert!(
+            is_there || status == "503" || status == "504",
+            "{address}: no {name}"
+        );
+    }
+}
+
+#[tokio::test]
+async fn the_committed_description_is_what_the_server_says() {
+    let app = TestApp::new().await;
+    let said = app.get("/api/openapi.json").await.text();
+    if std::env::var_os("BLESS").is_some() {
+        std::fs::write(COMMITTED, &said).unwrap();
+    }
+    let committed = std::fs::read_to_string(Path::new(COMMITTED)).unwrap_or_default();
+    let differs = committed
+        .lines()
+        .zip(said.lines())
+        .position(|(a, b)| a != b);
+    assert!(
+        committed == said,
+        "openapi.json is not what the server says, from line {}: `make describe` writes it anew, and the \
+         viewer's types",
+        differs.unwrap_or_default() + 1
+    );
+}
+
+/// A path whose parts that differ from request to request are stars.
+fn shape(path: &str) -> String {
+    let star = |part: &str| {
+        if part.contains('{') {
+            "*".to_owned()
+        } else {
+            part.to_owned()
+        }
+    };
+    path.split('/').map(star).collect::<Vec<_>>().join("/")
+}
+
+#[tokio::test]
+async fn every_route_is_described_and_nothing_else() {
+    let routes: BTreeSet<String> = ROUTER
+        .split(".route(")
+        .skip(1)
+        .filter_map(|rest| rest.split('"').nth(1))
+        .map(shape)
+        .collect();
+    assert!(routes.len() > 15, "{routes:?}");
+    let description = described().await;
+    let paths = description["paths"].as_object().unwrap();
+    let described: BTreeSet<String> = paths.keys().map(|path| shape(path)).collect();
+    assert_eq!(described, routes);
+}
+
+#[tokio::test]
+async fn every_answer_is_as_described() {
+    let app = rich().await;
+    let description = described().await;
+    let mut unasked: BTreeSet<&str> = description["paths"]
+        .as_object()
+        .unwrap()
+        .keys()
+        .map(String::as_str)
+        .collect();
+    for (path, address) in ASKED {
+        unasked.remove(path);
+        let answer = app.get(address).await;
+        assert_eq!(
+            answer.status,
+            StatusCode::OK,
+            "{address}: {}",
+            answer.text()
+        );
+        hold(&description, path, address, &answer);
+    }
+    assert_eq!(unasked, BTreeSet::from([ENDLESS]));
+    let nothing = TestApp::empty(|_settings| {});
+    for (path, address) in [
+        ("/api/check", "/api/check"),
+        ("/api/products", "/api/products"),
+    ] {
+        hold(&description, path, address, &nothing.get(address).await);
+    }
+}
+
+#[tokio::test]
+async fn what_viewers_are_told_is_as_described() {
+    let app = TestApp::new().await;
+    let mut viewer = Viewer::new(&app, None).await;
+    let manifest = app.land("sst", Quantity::SeaSurfaceTemperature, 2).await;
+    let touched = Period::month(2000, 3).unwrap();
+    app.state.news.tell(manifest, vec![touched]);
+    let told = viewer.next().await.unwrap();
+    let description = described().await;
+    let answer = &operation(&description, ENDLESS)["responses"]["200"];
+    let schema = &answer["content"]["text/event-stream"]["schema"];
+    assert_eq!(
+        problems(&description, schema, &told.data),
+        Vec::<String>::new()
+    );
+}
+
+#[tokio::test]
+async fn every_refusal_is_as_described() {
+    let app = rich().await;
+    let description = described().await;
+    let refused = [
+        (
+            "/tiles/{product}/{mode}/{z}/{x}/{y}.png",
+            "/tiles/flux/volume/99/0/0.png",
+        ),
+        (
+            "/tiles/{product}/{mode}/{z}/{x}/{y}.png",
+            "/tiles/none/volume/0/0/0.png",
+        ),
+        ("/tiles/{product}/{mode}.json", "/tiles/flux/none.json"),
+        ("/globe/{product}/{mode}.png", "/globe/flux/map.png?width=0"),
+        (
+            "/api/products/{product}/point",
+            "/api/products/flux/point?lon=0",
+        ),
+        (
+            "/api/products/{product}/point",
+            "/api/products/flux/point?lon=0&lat=89",
+        ),
+        ("/api/products/{product}/area", "/api/products/flux/area"),
+        ("/api/products/{product}/budget", "/api/products/sst/budget"),
+        (
+            "/api/observations/{dataset}/{platform}",
+            "/api/observations/buoys/51001?limit=0",
+        ),
+    ];
+    for (path, address) in refused {
+        let answer = app.get(address).await;
+        assert!(
+            answer.status.is_client_error(),
+            "{address}: {}",
+            answer.status
+        );
+        hold(&description, path, address, &answer);
+    }
+    let without = TestApp::new().await;
+    let path = "/api/observations/platforms";
+    hold(&description, path, path, &without.get(path).await);
+    let busy = Mood::fails(tile_server::backend::Class::Busy, "later");
+    app.analyst.set(busy);
+    let path = "/api/products/{product}/budget";
+    let address = "/api/products/flux/budget?region=0,0,10,10";
+    let answer = app.get(address).await;
+    assert_eq!(answer.status, StatusCode::SERVICE_UNAVAILABLE);
+    assert_ne!(answer.header("retry-after"), "");
+    hold(&description, path, address, &answer);
+}
+
+/// A parameter that no handler reads would be taken in silence, whatever its value.
+#[tokio::test]
+async fn every_parameter_that_is_described_is_read() {
+    let app = rich().await;
+    let description = described().await;
+    let mut refused: BTreeMap<&str, u32> = BTreeMap::new();
+    for (path, address) in ASKED {
+        let parameters = operation(&description, path)["parameters"].as_array();
+        for parameter in parameters.into_iter().flatten() {
+            let name = parameter["name"].as_str().unwrap();
+            if parameter["in"] != "query" || FREE_TEXT.contains(&name) {
+                continue;
+            }
+            let (address, query) = address.split_once('?').unwrap_or((address, ""));
+            let others = query.split('&').filter(|one| !one.is_empty());
+            let others = others.filter(|one| one.split('=').next() != Some(name));
+            let query: Vec<String> = others
+                .map(str::to_owned)
+                .chain([format!("{name}=%01nonsense")])
+                .collect();
+            let address = format!("{address}?{}", query.join("&"));
+            let answer = app.get(&address).await;
+            assert!(
+                answer.status.is_client_error(),
+                "{address}: {}",
+                answer.status
+            );
+            *refused.entry(name).or_default() += 1;
+        }
+    }
+    assert!(refused.len() > 25, "{refused:?}");
+    assert!(
+        refused["time"] >= 3 && refused["palette"] >= 5,
+        "{refused:?}"
+    );
+}
+
+#[test]
+fn what_is_not_as_described_is_found() {
+    let description = json!({"components": {"schemas": {
+        "Word": {"type": "string", "enum": ["a", "b"]},
+        "Base": {"type": "object", "required": ["x"], "properties": {"x": {"type": "number"}}},
+    }}});
+    let schema = json!({"allOf": [
+        {"$ref": "#/components/schemas/Base"},
+        {"type": "object", "required": ["word", "maybe"], "properties": {
+            "word": {"$ref": "#/components/schemas/Word"},
+            "maybe": {"type": ["integer", "null"]},
+            "pair": {"type": "array", "items": false, "prefixItems": [{"type": "number"}, {"type": "string"}]},
+        }},
+    ]});
+    let of = |value: Value| problems(&description, &schema, &value);
+    let right = json!({"x": 1.5, "word": "a", "maybe": null, "pair": [1, "b"]});
+    assert_eq!(of(right.clone()), Vec::<String>::new());
+    let wrong = [
+        ("x", json!("1")),
+        ("x", json!(null)),
+        ("word", json!("c")),
+        ("maybe", json!(1.5)),
+        ("pair", json!([1])),
+        ("pair", json!([1, "b", 2])),
+        ("pair", json!(["b", 1])),
+        ("unknown", json!(1)),
+    ];
+    for (name, value) in wrong {
+        let mut answer = right.clone();
+        answer[name] = value.clone();
+        assert!(!of(answer).is_empty(), "{name}: {value}");
+    }
+    for name in ["x", "word", "maybe"] {
+        let mut answer = right.clone();
+        answer.as_object_mut().unwrap().remove(name);
+        assert!(!of(answer).is_empty(), "without {name}");
+    }
+}

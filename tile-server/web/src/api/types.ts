@@ -1,0 +1,42 @@
+//! What the server answers and takes, by the names that the page uses: all of it generated from the server's own description.
+import type { components, operations } from "./schema";
+
+type Schemas = components["schemas"];
+
+export type Mode = Schemas["Mode"];
+export type Legend = Schemas["Legend"];
+export type Palette = Schemas["PaletteColours"];
+export type Product = Schemas["Product"];
+export type StepTimes = Schemas["StepTimes"];
+export type PointSeries = Schemas["PointSeries"];
+export type Cells = Schemas["Cells"];
+export type Earth = Schemas["Earth"];
+export type Budget = Schemas["Budget"];
+export type BudgetRow = Schemas["BudgetRow"];
+export type BudgetStep = Schemas["BudgetStep"];
+export type Region = Schemas["Region"];
+export type Check = Schemas["Check"];
+export type CheckRow = Schemas["CheckRow"];
+export type CheckPaper = Schemas["Paper"];
+export type News = Schemas["News"];
+export type Refusal = Schemas["Refusal"];
+export type Kind = Schemas["PlatformKind"];
+export type Quality = Schemas["Quality"];
+export type Platform = Schemas["Platform"];
+export type Measured = Schemas["Measured"];
+export type MeasuredSeries = Schemas["MeasuredSeries"];
+
+/** Parameters that an operation takes after the question mark. */
+export type Query<Name extends keyof operations> = NonNullable<operations[Name]["parameters"]["query"]>;
+/** The same as an address has them. */
+export type QueryTexts<Name extends keyof operations> = { [Parameter in keyof Query<Name>]?: string };
+
+/** What an operation answers as JSON. */
+export type Answer<Name extends keyof operations> = operations[Name]["responses"] extends {
+  200: { content: { "application/json": infer Body } };
+}
+  ? Body
+  : never;
+
+/** What a budget is asked for with; the newest version answers. */
+export type BudgetQuery = Required<Pick<Query<"budget">, "region" | "from" | "to" | "step" | "earth" | "cells">>;

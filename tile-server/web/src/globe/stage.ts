@@ -1,0 +1,146 @@
+//! Double-buffered product layers on the globe: a new instant loads out of sight, then fades in over the old one, so that nothing flashes.
+import { ImageryLayer, type Scene } from "cesium";
+import { underOpacity } from "./fade";
+import { layerKey, type LayerSpec } from "./layer";
+import { LayerTiles, type TileCounts } from "./tiles";
+
+/** A layer that has loaded what the present view needs and waits for its turn. */
+export interface Prepared {
+  readonly spec: LayerSpec;
+  readonly key: string;
+  readonly layer: ImageryLayer;
+  readonly tiles: LayerTiles;
+}
+
+/**
+ * Quiet frames in a row before a layer counts as loaded: Cesium's queue is empty for a moment between a level of tiles and
+ * the finer one that replaces it, and for longer before a new layer's first tile enters it.
+ */
+const QUIET_FRAMES = 2;
+const QUIET_FRAMES_BEFORE_FIRST = 5;
+/** While somebody keeps turning the globe new ground never stops loading; after this the layer is shown as it is. */
+const RESTLESS_LIMIT_MS = 4_000;
+
+export class LayerStage {
+  /** Told of every layer that comes into sight. */
+  onReveal: (spec: LayerSpec) => void = () => undefined;
+  #shown: Prepared | undefined;
+  #fade: { to: Prepared; startedMs: number; lengthMs: number } | undefined;
+  #opacity: number;
+  readonly #scene: Scene;
+  readonly #counts: TileCounts;
+  readonly #onFailure: (status: number | undefined, url: string) => void;
+
+  constructor(
+    scene: Scene,
+    counts: TileCounts,
+    opacity: number,
+    onFailure: (status: number | undefined, url: string) => void,
+  ) {
+    this.#scene = scene;
+    this.#counts = counts;
+    this.#opacity = opacity;
+    this.#onFailure = onFailure;
+    scene.preRender.addEventListener(() => this.#advanceFade());
+  }
+
+  /** What the eye sees, or is about to see. */
+  get shownKey(): string | undefined {
+    return (this.#fade?.to ?? this.#shown)?.key;
+  }
+
+  /** `key` is in sight, and no tile of it is missing. */
+  hasWhole(key: string): boolean {
+    const shown = this.#fade?.to ?? this.#shown;
+    return shown?.key === key && shown.tiles.failed === 0;
+  }
+
+  set opacity(opacity: number) {
+    this.#opacity = opacity;
+    if (!this.#fade && this.#shown) this.#shown.layer.alpha = opacity;
+    this.#scene.requestRender();
+  }
+
+  /** Loads a layer invisibly; null when `signal` ended it first or none of its tiles came, so that the old picture stays. */
+  async prepare(spec: LayerSpec, signal: AbortSignal): Promise<Prepared | null> {
+    const tiles = new LayerTiles(spec, this.#counts, this.#onFailure);
+    const layer = new ImageryLayer(tiles.provider, { alpha: 0 });
+    this.#scene.imageryLayers.add(layer);
+    const prepared = { spec, key: layerKey(spec), layer, tiles };
+    const isLoaded = await this.#settled(tiles, signal);
+    if (isLoaded && !tiles.isLost) return prepared;
+    this.#remove(prepared);
+    return null;
+  }
+
+  reveal(next: Prepared, lengthMs: number): void {
+    this.#finishFade();
+    this.#scene.imageryLayers.raiseToTop(next.layer);
+    this.#fade = { to: next, startedMs: performance.now(), lengthMs: Math.max(1, lengthMs) };
+    this.onReveal(next.spec);
+    this.#scene.requestRender();
+  }
+
+  discard(prepared: Prepared): void {
+    this.#remove(prepared);
+  }
+
+  /** Empties the stage: another product's picture must not stay under a new product's legend. */
+  clear(): void {
+    this.#finishFade();
+    if (this.#shown) this.#remove(this.#shown);
+    this.#shown = undefined;
+    this.#scene.requestRender();
+  }
+
+  #settled(tiles: LayerTiles, signal: AbortSignal): Promise<boolean> {
+    return new Promise((resolve) => {
+      const startedMs = performance.now();
+      let quietFrames = 0;
+      const end = (isLoaded: boolean): void => {
+        unlisten();
+        signal.removeEventListener("abort", giveUp);
+        resolve(isLoaded);
+      };
+      const giveUp = (): void => end(false);
+      const unlisten = this.#scene.postRender.addEventListener(() => {
+        const isRestless = performance.now() - startedMs > RESTLESS_LIMIT_MS;
+        const isQuiet = tiles.pending === 0 && (this.#scene.globe.tilesLoaded || isRestless);
+        quietFrames = isQuiet ? quietFrames + 1 : 0;
+        if (quietFrames >= (tiles.requested > 0 ? QUIET_FRAMES : QUIET_FRAMES_BEFORE_FIRST)) end(true);
+        else this.#scene.requestRender();
+      });
+      if (signal.aborted) end(false);
+      signal.addEventListener("abort", giveUp, { once: true });
+      this.#scene.requestRender();
+    });
+  }
+
+  #advanceFade(): void {
+    const fade = this.#fade;
+    if (!fade) return;
+    const part = (performance.now() - fade.startedMs) / fade.lengthMs;
+    if (part >= 1) {
+      this.#finishFade();
+      return;
+    }
+    fade.to.layer.alpha = this.#opacity * Math.max(0, part);
+    if (this.#shown) this.#shown.layer.alpha = underOpacity(this.#opacity, fade.to.layer.alpha);
+    this.#scene.requestRender();
+  }
+
+  #finishFade(): void {
+    const fade = this.#fade;
+    if (!fade) return;
+    this.#fade = undefined;
+    fade.to.layer.alpha = this.#opacity;
+    if (this.#shown) this.#remove(this.#shown);
+    this.#shown = fade.to;
+    this.#scene.requestRender();
+  }
+
+  #remove(prepared: Prepared): void {
+    this.#scene.imageryLayers.remove(prepared.layer, true);
+    this.#scene.requestRender();
+  }
+}

@@ -1,0 +1,114 @@
+//! One product layer's tiles: an imagery provider per instant, and counts of what is on its way for the progress line and the tests.
+import {
+  Rectangle,
+  RequestErrorEvent,
+  RequestState,
+  TileProviderError,
+  UrlTemplateImageryProvider,
+  WebMercatorTilingScheme,
+} from "cesium";
+import { tileTemplate } from "../api/pictures";
+import { parameters } from "../look/address";
+import { type Bounds, isWhole } from "./box";
+import type { LayerSpec } from "./layer";
+
+/** Totals over all layers since the page was loaded. */
+export class TileCounts {
+  loaded = 0;
+  pending = 0;
+  failed = 0;
+  readonly #listeners: (() => void)[] = [];
+
+  onChange(listener: () => void): void {
+    this.#listeners.push(listener);
+  }
+
+  add(change: { loaded?: number; pending?: number; failed?: number }): void {
+    this.loaded += change.loaded ?? 0;
+    this.pending += change.pending ?? 0;
+    this.failed += change.failed ?? 0;
+    for (const listener of this.#listeners) listener();
+  }
+}
+
+const TILE_PX = 256;
+/** Web Mercator ends here; the two caps beyond have no tiles. */
+const MERCATOR_LAT_DEG = 85.05112878;
+
+export class LayerTiles {
+  readonly provider: UrlTemplateImageryProvider;
+  /** Requests of this layer that have not ended yet. */
+  pending = 0;
+  requested = 0;
+  failed = 0;
+
+  constructor(
+    readonly spec: LayerSpec,
+    counts: TileCounts,
+    onFailure: (status: number | undefined, url: string) => void,
+  ) {
+    const template = tileTemplate(spec.product, spec.mode, spec.timeIso, spec, parameters(spec.look));
+    const provider = new UrlTemplateImageryProvider({
+      url: template,
+      tilingScheme: new WebMercatorTilingScheme(),
+      tileWidth: TILE_PX,
+      tileHeight: TILE_PX,
+      maximumLevel: spec.maxZoom,
+      rectangle: rectangleOf(spec.bounds),
+      enablePickFeatures: false,
+    });
+    this.provider = provider;
+    this.#countRequests(provider, counts);
+    provider.errorEvent.addEventListener((error: TileProviderError) => {
+      const cause: unknown = error.error;
+      const url = template
+        .replace("{z}", String(error.level))
+        .replace("{x}", String(error.x))
+        .replace("{y}", String(error.y));
+      onFailure(cause instanceof RequestErrorEvent ? cause.statusCode : undefined, url);
+    });
+  }
+
+  /** Nothing of this layer came: there is no picture to show, only one to lose. */
+  get isLost(): boolean {
+    return this.requested > 0 && this.failed === this.requested;
+  }
+
+  /** The provider's own method is kept and only watched: Cesium decides what to ask for and when. */
+  #countRequests(provider: UrlTemplateImageryProvider, counts: TileCounts): void {
+    const request = provider.requestImage.bind(provider);
+    provider.requestImage = (x, y, level, req) => {
+      const promise = request(x, y, level, req);
+      if (!promise) return promise;
+      this.pending += 1;
+      this.requested += 1;
+      counts.add({ pending: 1 });
+      const end = (outcome: { loaded?: number; failed?: number }): void => {
+        this.pending -= 1;
+        this.failed += outcome.failed ?? 0;
+        counts.add({ pending: -1, ...outcome });
+      };
+      promise.then(
+        () => end({ loaded: 1 }),
+        () => {
+          // Cesium calls requests off when nearer ground needs the line, and asks again later: that is no failure.
+          const isCalledOff = req?.state === RequestState.CANCELLED;
+          if (isCalledOff) this.requested -= 1;
+          end(isCalledOff ? {} : { failed: 1 });
+        },
+      );
+      return promise;
+    };
+  }
+}
+
+function rectangleOf(bounds: Bounds): Rectangle {
+  const [west, south, east, north] = bounds;
+  const low = Math.max(south, -MERCATOR_LAT_DEG);
+  const high = Math.min(north, MERCATOR_LAT_DEG);
+  const crossesDateLine = west < -180 || east > 180 || west > east;
+  // A tile is the same whichever way it is reached; a rectangle across the date line is not worth the special cases.
+  return isWhole(bounds) || crossesDateLine
+    ? Rectangle.fromDegrees(-180, low, 180, high)
+    : Rectangle.fromDegrees(west, low, east, high);
+}

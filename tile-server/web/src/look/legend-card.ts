@@ -1,0 +1,75 @@
+//! The legend of what is in sight: a layer in, its colour bar out. Colours that somebody chose are described by the server.
+import { queryOf } from "../api/pictures";
+import * as api from "../api/requests";
+import type { Legend, Mode } from "../api/types";
+import { colourParameters } from "./address";
+import { legendView } from "./legend";
+import type { Look } from "./look";
+
+/** What colours depend on. */
+export interface Coloured {
+  readonly product: string;
+  readonly mode: Mode;
+  readonly look: Look;
+}
+
+/** Ranges are typed by hand: nobody comes back to more than these. */
+const MOST_KNOWN = 50;
+
+export class LegendCard {
+  readonly #slot: HTMLElement;
+  readonly #usual: (product: string, mode: Mode) => Legend | undefined;
+  readonly #onError: (key: string, error: unknown) => void;
+  readonly #known = new Map<string, Promise<Legend>>();
+  #wanted = "";
+  #shown = "";
+
+  constructor(
+    slot: HTMLElement,
+    usual: (product: string, mode: Mode) => Legend | undefined,
+    onError: (key: string, error: unknown) => void,
+  ) {
+    this.#slot = slot;
+    this.#usual = usual;
+    this.#onError = onError;
+  }
+
+  /** Asks for a legend that will be shown when its picture comes. */
+  learn(layer: Coloured): void {
+    // A failure is told when the legend is needed.
+    this.#legendOf(layer).catch(() => undefined);
+  }
+
+  /** A picture must not stay under the legend of another one: this goes by what is in sight, not by what was chosen. */
+  async show(layer: Coloured): Promise<void> {
+    const wanted = keyOf(layer);
+    this.#wanted = wanted;
+    try {
+      const legend = await this.#legendOf(layer);
+      if (this.#wanted !== wanted || this.#shown === wanted) return;
+      this.#shown = wanted;
+      this.#slot.replaceChildren(legendView(legend));
+    } catch (error) {
+      this.#onError("legend", error);
+    }
+  }
+
+  async #legendOf(layer: Coloured): Promise<Legend> {
+    const colours = colourParameters(layer.look);
+    const usual = colours.length === 0 ? this.#usual(layer.product, layer.mode) : undefined;
+    if (usual) return usual;
+    const key = keyOf(layer);
+    const known = this.#known.get(key);
+    if (known) return known;
+    if (this.#known.size >= MOST_KNOWN) this.#known.clear();
+    const asked = api.legend(layer.product, layer.mode, colours);
+    this.#known.set(key, asked);
+    // What failed is asked for again.
+    asked.catch(() => this.#known.delete(key));
+    return asked;
+  }
+}
+
+function keyOf({ product, mode, look }: Coloured): string {
+  return `${product}/${mode === "flow" ? mode : ""}?${queryOf(colourParameters(look))}`;
+}

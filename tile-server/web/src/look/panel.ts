@@ -1,0 +1,53 @@
+//! The look panel: how the layer is drawn in, changes of it to the store out.
+import { el } from "../page/dom";
+import { toggle } from "../page/toggle";
+import type { Store } from "../state/store";
+import { type Look, USUAL } from "./look";
+import type { LookOffer } from "./offer";
+import { PaletteList } from "./palette-list";
+import { RangeForm } from "./range-form";
+import { SurroundingsForm } from "./surroundings-form";
+
+export class LookPanel {
+  readonly #store: Store;
+  readonly #offer: () => LookOffer | undefined;
+  readonly #palettes = new PaletteList((palette) => this.#change({ palette }));
+  readonly #reversed = toggle("reversed", "Reversed", (reversed) => this.#change({ reversed }));
+  readonly #range = new RangeForm((range) => this.#change({ range }));
+  readonly #doubt = toggle("doubt", "Mark cells that were filled", (doubt) => this.#change({ doubt }));
+  readonly #surroundings = new SurroundingsForm((change) => this.#change(change));
+
+  constructor(body: HTMLElement, store: Store, offer: () => LookOffer | undefined) {
+    this.#store = store;
+    this.#offer = offer;
+    body.append(
+      this.#palettes.element,
+      el("div", { class: "look-group" }, this.#reversed.element, this.#range.element, this.#doubt.element),
+      this.#surroundings.element,
+      el("button", { type: "button", class: "wide", id: "look-reset", onclick: () => this.#reset() }, "Reset the look"),
+    );
+    store.on(["look", "mode", "product"], () => this.draw());
+  }
+
+  /** Again where the catalogue is another one. */
+  draw(): void {
+    const offer = this.#offer();
+    if (!offer) return;
+    const { look } = this.#store.state;
+    this.#palettes.show(offer.palettes, look.palette, look.reversed);
+    this.#reversed.show(look.reversed);
+    this.#range.show(look.range, offer.range, offer.unit);
+    this.#doubt.show(look.doubt);
+    this.#doubt.element.hidden = !offer.canDoubt;
+    this.#surroundings.show(look, offer);
+  }
+
+  #reset(): void {
+    this.#store.set({ look: USUAL });
+    this.#range.clear();
+  }
+
+  #change(change: Partial<Look>): void {
+    this.#store.set({ look: { ...this.#store.state.look, ...change } });
+  }
+}

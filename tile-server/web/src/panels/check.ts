@@ -1,0 +1,68 @@
+//! The check table: what the paper says, what another program makes of its grid, what we say.
+import type { Check, CheckPaper, CheckRow } from "../api/types";
+import { el } from "../page/dom";
+import { chemistry, digitsFor, numberText, unitText } from "../page/format";
+
+export function drawCheck(body: HTMLElement, check: Check): void {
+  const head = ["What", "Paper", "Independent", "Fluxglobe", "Against the paper"].map((title, column) =>
+    el("th", { scope: "col", class: column > 0 && column < 4 ? "number" : "" }, title),
+  );
+  const digits = digitsByUnit(check.rows);
+  const rows = check.rows.map((row) => rowView(row, digits.get(row.unit) ?? 0));
+  body.replaceChildren(
+    el("p", { class: "muted" }, "Budgets by three hands, positive out of the sea."),
+    el(
+      "div",
+      { class: "table-scroll" },
+      el("table", { id: "check-table" }, el("thead", {}, el("tr", {}, ...head)), el("tbody", {}, ...rows)),
+    ),
+    el("p", { class: "muted" }, "Paper: ", chemistry(check.note)),
+    el("p", { class: "muted" }, chemistry(check.method)),
+  );
+}
+
+/** Rows of one unit get the same decimals, else two equal numbers look different. */
+function digitsByUnit(rows: readonly CheckRow[]): Map<string, number> {
+  const largest = new Map<string, number>();
+  for (const { unit, independent, ours } of rows) {
+    largest.set(unit, Math.max(largest.get(unit) ?? 0, Math.abs(independent), Math.abs(ours)));
+  }
+  return new Map([...largest].map(([unit, magnitude]) => [unit, digitsFor(magnitude, 4)]));
+}
+
+/** A printed number with the decimals and the uncertainty that the paper gives it. */
+export function statedText(paper: CheckPaper | null): string {
+  if (paper === null) return "–";
+  const value = numberText(paper.value, paper.decimals);
+  return paper.uncertainty === null ? value : `${value} ± ${numberText(paper.uncertainty, paper.decimals)}`;
+}
+
+/** Only the paper's own uncertainty says that a number lies within it; a difference without one is shown as it is. */
+export function verdictText(row: CheckRow): string {
+  const { paper } = row;
+  const texts: string[] = [];
+  if (paper !== null) {
+    const sign = paper.difference > 0 ? "+" : "";
+    const difference = sign + numberText(paper.difference, 3);
+    texts.push(`${paper.verdict} (${difference})`);
+  }
+  if (!row.agrees) texts.push("off the independent number");
+  return texts.join("; ");
+}
+
+function rowView(row: CheckRow, digits: number): HTMLElement {
+  return el(
+    "tr",
+    {},
+    el(
+      "th",
+      { scope: "row" },
+      chemistry(row.what),
+      el("span", { class: "period" }, `${row.period}, ${unitText(row.unit)}`),
+    ),
+    el("td", { class: "number" }, statedText(row.paper)),
+    el("td", { class: "number" }, numberText(row.independent, digits)),
+    el("td", { class: "number" }, numberText(row.ours, digits)),
+    el("td", {}, verdictText(row)),
+  );
+}

@@ -1,0 +1,150 @@
+//! The layer card: product, mode, opacity and what is loading, with room for the legend; changes go to the store only.
+import type { Mode, Product } from "../api/types";
+import { MODES } from "../api/words";
+import type { TileCounts } from "../globe/tiles";
+import { withoutColours } from "../look/look";
+import { el, icon } from "../page/dom";
+import { chemistry, titleText } from "../page/format";
+import { PICTURE } from "../page/icons";
+import type { Store } from "../state/store";
+
+const MODE_TITLES: Record<Mode, string> = { map: "Map", points: "Points", sprites: "Sprites", volume: "Volume", flow: "Flow" };
+const MODE_HINTS: Record<Mode, string> = {
+  map: "Thematic map",
+  points: "Particles as points",
+  sprites: "Particles as soft sprites",
+  volume: "Particle volume, half-angle sliced: with shadows",
+  flow: "Trails that drift with the current",
+};
+
+export class Controls {
+  /** Room for the legend. */
+  readonly legend = el("div", { class: "legend-slot" });
+  /** Room for the toggle of observations. */
+  readonly observations = el("div");
+  readonly #store: Store;
+  readonly #product = el("select", { id: "product", "aria-label": "Product" });
+  readonly #modes = el("div", { class: "segments", role: "radiogroup", "aria-label": "Mode" });
+  readonly #source = el("p", { class: "source" });
+  readonly #progress = el("div", { class: "progress", id: "progress", role: "status" });
+
+  constructor(container: HTMLElement, store: Store, onRenderView: () => void) {
+    this.#store = store;
+    const opacity = el("input", {
+      type: "range",
+      id: "opacity",
+      min: "0",
+      max: "1",
+      step: "0.05",
+      value: String(store.state.opacity),
+    });
+    opacity.addEventListener("input", () => store.set({ opacity: Number(opacity.value) }));
+    this.#product.addEventListener("change", () =>
+      store.set({ product: this.#product.value, look: withoutColours(store.state.look) }),
+    );
+    container.append(
+      el(
+        "header",
+        { class: "brand" },
+        el("img", { src: "./favicon.svg", alt: "", width: "26", height: "26" }),
+        el("h1", {}, "Fluxglobe"),
+        this.#progress,
+      ),
+      el("label", { class: "field" }, el("span", { class: "visually-hidden" }, "Product"), this.#product),
+      this.#modes,
+      this.legend,
+      this.observations,
+      el("label", { class: "field row opacity" }, el("span", {}, "Opacity"), opacity),
+      el(
+        "button",
+        { type: "button", class: "wide", id: "render-view", onclick: onRenderView },
+        icon(PICTURE),
+        "Render this view",
+      ),
+      this.#source,
+    );
+    store.on(["mode"], () => this.#markMode());
+    store.on(["opacity"], (state) => {
+      opacity.value = String(state.opacity);
+    });
+  }
+
+  setProducts(products: readonly Product[]): void {
+    this.#product.replaceChildren(
+      ...products.map((product) =>
+        el("option", { value: product.id }, titleText(product)),
+      ),
+    );
+  }
+
+  setProduct(product: Product): void {
+    this.#product.value = product.id;
+    this.#product.title = chemistry(product.title);
+    this.#source.textContent = chemistry(product.source);
+    this.#source.title = product.source;
+    // Few products are part of a vector: the others do not show a button that never works.
+    const listed = MODES.filter((mode) => mode !== "flow" || product.modes.includes(mode));
+    this.#modes.replaceChildren(...listed.map((mode) => this.#modeButton(mode, product.modes.includes(mode))));
+    this.#markMode();
+  }
+
+  /** The line of what is on its way; empty when all is there. */
+  watch(counts: TileCounts): void {
+    counts.onChange(() => {
+      const isBusy = counts.pending > 0;
+      this.#progress.classList.toggle("busy", isBusy);
+      this.#progress.textContent = isBusy
+        ? `${counts.pending} ${counts.pending === 1 ? "tile" : "tiles"} on the way`
+        : "";
+    });
+  }
+
+  #modeButton(mode: Mode, isOffered: boolean): HTMLElement {
+    return el(
+      "button",
+      {
+        type: "button",
+        role: "radio",
+        class: "segment",
+        "data-mode": mode,
+        title: MODE_HINTS[mode],
+        disabled: !isOffered,
+        onclick: () => this.#choose(mode),
+        onkeydown: (event) => this.#turn(event as KeyboardEvent),
+      },
+      MODE_TITLES[mode],
+    );
+  }
+
+  /** A flow is coloured by its speed: colours chosen for the one say nothing of the other. */
+  #choose(mode: Mode): void {
+    const { mode: before, look } = this.#store.state;
+    const isOtherValue = (mode === "flow") !== (before === "flow");
+    this.#store.set({ mode, look: isOtherValue ? withoutColours(look) : look });
+  }
+
+  /** Arrow keys move within the group, as radio buttons do. */
+  #turn(event: KeyboardEvent): void {
+    const by =
+      event.key === "ArrowRight" || event.key === "ArrowDown"
+        ? 1
+        : event.key === "ArrowLeft" || event.key === "ArrowUp"
+          ? -1
+          : 0;
+    if (by === 0) return;
+    event.preventDefault();
+    const offered = [...this.#modes.querySelectorAll<HTMLButtonElement>("button:not(:disabled)")];
+    const at = offered.findIndex((button) => button.dataset["mode"] === this.#store.state.mode);
+    const next = offered[(at + by + offered.length) % offered.length];
+    next?.click();
+    next?.focus();
+  }
+
+  #markMode(): void {
+    for (const button of this.#modes.querySelectorAll<HTMLButtonElement>("button")) {
+      const isChosen = button.dataset["mode"] === this.#store.state.mode;
+      button.setAttribute("aria-checked", String(isChosen));
+      button.tabIndex = isChosen ? 0 : -1;
+    }
+  }
+}

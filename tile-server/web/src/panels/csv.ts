@@ -1,0 +1,56 @@
+//! Pure comma-separated text: an answer of the server in, a file with its provenance in comment lines out.
+import type { Budget, PointSeries } from "../api/types";
+
+export function seriesCsv(answer: PointSeries): string {
+  return lines(
+    [
+      `product: ${answer.product}`,
+      `manifest: ${answer.manifest}`,
+      `cell centre: lon ${answer.cell.lon}, lat ${answer.cell.lat}`,
+      `unit: ${answer.unit}`,
+    ],
+    ["start", "end", "mid", "value"],
+    answer.series.map((row) => [row.start, row.end, row.mid, row.value]),
+  );
+}
+
+export function budgetCsv(answer: Budget): string {
+  return lines(
+    [
+      `product: ${answer.product}`,
+      `manifest: ${answer.manifest}`,
+      `region: ${answer.region}`,
+      `earth: ${answer.earth}`,
+      `cells: ${answer.cells}`,
+      `unit: ${answer.unit}`,
+      `region area: ${answer.region_area_m2} m2, ocean ${answer.ocean_area_m2} m2 (${answer.ocean_source})`,
+      `gap, no part of the budget: ${answer.gap_basis}`,
+      ...answer.notes.map((note) => `note: ${note}`),
+    ],
+    ["start", "end", "budget", "coverage_percent", "area_m2", "ocean_with_data_m2", "gap", "gap_area_m2"],
+    answer.rows.map((row) => [
+      row.start,
+      row.end,
+      row.budget,
+      row.coverage_percent,
+      row.area_m2,
+      row.ocean_with_data_m2,
+      row.gap,
+      row.gap_area_m2,
+    ]),
+  );
+}
+
+/** No data is an empty field. */
+function lines(
+  comments: readonly string[],
+  header: readonly string[],
+  rows: readonly (readonly (string | number | null)[])[],
+): string {
+  const text = [
+    ...comments.map((comment) => `# ${comment}`),
+    header.join(","),
+    ...rows.map((row) => row.map((field) => field ?? "").join(",")),
+  ];
+  return `${text.join("\n")}\n`;
+}

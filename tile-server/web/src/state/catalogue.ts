@@ -1,0 +1,114 @@
+//! The products as the page uses them: steps parsed, zoom limits fetched once, and the layer that a state describes.
+import * as api from "../api/requests";
+import type { Legend, Mode, Product } from "../api/types";
+import type { LayerSpec } from "../globe/layer";
+import { effective, type Look } from "../look/look";
+import { titleText } from "../page/format";
+import { clampToRange, parseSteps, type Step, toIso } from "../time/steps";
+import type { State } from "./store";
+
+/** Where the server does not say how deep its tiles go; Cesium stretches the deepest ones beyond. */
+const DEFAULT_MAX_ZOOM = 6;
+
+/** The quantity budgets are made of. */
+export const FLUX = "carbon_flux";
+/** The quantity that lifts and sinks the particles of what it was derived from. */
+const ACCUMULATED = "accumulated_carbon";
+/** The quantity reliefs are made of. */
+const ELEVATION = "elevation";
+
+export class Catalogue {
+  readonly products: readonly Product[];
+  readonly #steps = new Map<string, readonly Step[]>();
+  readonly #maxZoom: Map<string, number>;
+  readonly #revisions: Map<string, number>;
+
+  constructor(products: readonly Product[], before?: Catalogue) {
+    this.products = products;
+    this.#maxZoom = new Map(before ? before.#maxZoom : []);
+    this.#revisions = new Map(before ? before.#revisions : []);
+    for (const product of products) this.#steps.set(product.id, parseSteps(product.steps));
+  }
+
+  find(id: string | null): Product | undefined {
+    return this.products.find((product) => product.id === id);
+  }
+
+  /** What a page without a wish shows: observed before synthetic, carbon fluxes before the rest, then what can be drawn in the most ways. */
+  get first(): Product | undefined {
+    return [...this.products].sort(
+      (a, b) =>
+        Number(a.synthetic) - Number(b.synthetic) ||
+        Number(b.quantity === FLUX) - Number(a.quantity === FLUX) ||
+        b.modes.length - a.modes.length,
+    )[0];
+  }
+
+  /** Titles of products, each once; what was derived from another one of them goes without saying. */
+  titlesOf(ids: readonly string[]): string[] {
+    const goesWithoutSaying = (product: Product | undefined): boolean =>
+      ids.some((id) => product?.derived_from?.startsWith(`${id}@`));
+    const told = [...new Set(ids)].filter((id) => !goesWithoutSaying(this.find(id)));
+    return told.map((id) => {
+      const product = this.find(id);
+      return product ? titleText(product) : id;
+    });
+  }
+
+  /** What can lie below a layer. */
+  get reliefs(): Product[] {
+    return this.products.filter((product) => product.quantity === ELEVATION && product.steps.length > 0);
+  }
+
+  /** Carbon that accumulated lifts the product's particles. */
+  isLifted(id: string): boolean {
+    return this.products.some(
+      (product) => product.quantity === ACCUMULATED && product.derived_from?.startsWith(`${id}@`),
+    );
+  }
+
+  /** What the colours mean as long as nobody chose others. */
+  usualLegend(id: string | null, mode: Mode): Legend | undefined {
+    const product = this.find(id);
+    return (mode === "flow" ? product?.flow_legend : undefined) ?? product?.legend;
+  }
+
+  /** What is drawn of the chosen look in a mode. */
+  lookIn(mode: Mode, { product, look }: Readonly<State>): Look {
+    return effective(look, mode, product !== null && this.isLifted(product));
+  }
+
+  stepsOf(id: string | null): readonly Step[] {
+    return (id !== null && this.#steps.get(id)) || [];
+  }
+
+  /** Asks for a layer's zoom limits unless they are known. */
+  async learn(product: string, mode: Mode): Promise<void> {
+    const key = `${product}/${mode}`;
+    if (this.#maxZoom.has(key)) return;
+    const info = await api.layerInfo(product, mode);
+    this.#maxZoom.set(key, Number.isInteger(info.maxzoom) ? info.maxzoom : DEFAULT_MAX_ZOOM);
+  }
+
+  /** The same version looks different now: its pictures are asked for again. */
+  revise(product: string): void {
+    this.#revisions.set(product, (this.#revisions.get(product) ?? 0) + 1);
+  }
+
+  /** The layer to draw at `timeMs`; undefined until product and time are known. */
+  layerAt(state: Readonly<State>, timeMs: number): LayerSpec | undefined {
+    const product = this.find(state.product);
+    if (!product || !Number.isFinite(timeMs)) return undefined;
+    const clampedMs = clampToRange(this.stepsOf(product.id), timeMs);
+    return {
+      product: product.id,
+      manifest: product.manifest,
+      revision: this.#revisions.get(product.id) ?? 0,
+      mode: state.mode,
+      look: this.lookIn(state.mode, state),
+      timeIso: toIso(clampedMs),
+      bounds: product.bounds,
+      maxZoom: this.#maxZoom.get(`${product.id}/${state.mode}`) ?? DEFAULT_MAX_ZOOM,
+    };
+  }
+}

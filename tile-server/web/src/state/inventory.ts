@@ -1,0 +1,54 @@
+//! What the server has at the moment, and which of it the state means: answers in; the chosen product, its steps and layers out.
+import * as api from "../api/requests";
+import type { Mode, Palette, Product } from "../api/types";
+import type { LayerSpec } from "../globe/layer";
+import { possible, type Look } from "../look/look";
+import type { Step } from "../time/steps";
+import { Catalogue } from "./catalogue";
+import type { Store } from "./store";
+
+export class Inventory {
+  /** Replaced whole: who keeps an older one sees what there was. */
+  catalogue = new Catalogue([]);
+  palettes: readonly Palette[] = [];
+  readonly #store: Store;
+
+  constructor(store: Store) {
+    this.#store = store;
+  }
+
+  /** Products and palettes; nothing changes where one of them does not come. */
+  async load(): Promise<void> {
+    const [products, palettes] = await Promise.all([api.products(), api.palettes()]);
+    this.catalogue = new Catalogue(products, this.catalogue);
+    this.palettes = palettes;
+  }
+
+  /** Products alone. */
+  async renew(): Promise<void> {
+    this.catalogue = new Catalogue(await api.products(), this.catalogue);
+  }
+
+  /** The chosen product. */
+  get product(): Product | undefined {
+    return this.catalogue.find(this.#store.state.product);
+  }
+
+  get steps(): readonly Step[] {
+    return this.catalogue.stepsOf(this.#store.state.product);
+  }
+
+  layerAt(timeMs: number): LayerSpec | undefined {
+    return this.catalogue.layerAt(this.#store.state, timeMs);
+  }
+
+  lookIn(mode: Mode): Look {
+    return this.catalogue.lookIn(mode, this.#store.state);
+  }
+
+  /** An address may name a palette or a relief that is not here. */
+  drawable(look: Look): Look {
+    const palettes = this.palettes.map((palette) => palette.name);
+    return possible(look, palettes, this.catalogue.reliefs.map((product) => product.id));
+  }
+}
