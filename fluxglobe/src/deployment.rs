@@ -9,7 +9,8 @@ use compute::Engine;
 use contract::manifest::Manifest;
 use contract::product::ProductId;
 use kafka_log::{KafkaLog, KafkaSettings};
-use render_worker::{Backend, Limits, RenderService};
+use render::Backend;
+use render_worker::{Limits, RenderService};
 use storage::Store;
 use storage::log::{EmbeddedLog, EventLog};
 

@@ -15,7 +15,7 @@ use contract::job::RenderJob;
 use contract::manifest::Manifest;
 use contract::time::Period;
 use render_worker::fleet::{Fleet, FleetError};
-use render_worker::{RenderError, RenderService};
+use render_worker::{DrawError, RenderService};
 use tile_server::backend::{
     Analyse, AreaRequest, AreaRow, AreaSeries, BackendError, BudgetAnswer, BudgetRequest,
     BudgetRow, BudgetStep as WantedStep, Check, Class, Contributed, Draw, PointStep, RowCol, Turn,
@@ -228,7 +228,7 @@ fn compute_failed(error: ComputeError) -> BackendError {
     BackendError::new(class, error.to_string()).because(error)
 }
 
-fn render_failed(error: RenderError) -> BackendError {
+fn render_failed(error: DrawError) -> BackendError {
     let class = if error.is_bad_request() {
         Class::BadRequest
     } else if error.is_not_found() {

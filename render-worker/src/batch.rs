@@ -9,12 +9,13 @@ use contract::job::RenderJob;
 use contract::topic::Topic;
 use futures::FutureExt as _;
 use futures::stream::{FuturesUnordered, StreamExt as _};
+use render::RenderError;
 use storage::StorageError;
 use storage::log::{EventLog, Finished, Message};
 use tracing::Instrument as _;
 
 use crate::desk::{Class, Desk, DeskError, Drawn};
-use crate::error::RenderError;
+use crate::error::DrawError;
 
 /// Group of readers that share the jobs.
 pub const GROUP: &str = "render";
@@ -149,13 +150,13 @@ impl BatchService {
         })
     }
 
-    async fn draw_and_keep(&self, job: &RenderJob) -> Result<(), Arc<RenderError>> {
+    async fn draw_and_keep(&self, job: &RenderJob) -> Result<(), Arc<DrawError>> {
         let Drawn { png, kept, .. } = match self.desk.draw(job, Class::Batch).await {
             Ok(drawn) => drawn,
             Err(DeskError::Render(error)) => return Err(error),
             // The batch is not counted, and it stops by itself: both are passing.
             Err(DeskError::Full { .. } | DeskError::Stopping) => {
-                return Err(Arc::new(RenderError::NotWanted));
+                return Err(Arc::new(RenderError::NotWanted.into()));
             }
         };
         if !kept {

@@ -8,15 +8,14 @@ use std::sync::Arc;
 
 use bytes::Bytes;
 use contract::job::RenderJob;
+use render::scene::Scene;
+use render::{Backend, Image, RenderError, Renderer};
 use storage::Store;
 use tokio::sync::Semaphore;
 
 use crate::encoding::Encoders;
-use crate::error::RenderError;
-use crate::image::Image;
+use crate::error::DrawError;
 use crate::prefetch::Prefetch;
-use crate::renderer::{Backend, Renderer};
-use crate::scene::Scene;
 use crate::source::{Kept, Source};
 
 /// Limits of a service.
@@ -61,16 +60,12 @@ pub struct RenderService {
 
 impl RenderService {
     /// Opens the backend with the default limits. Blocks while shaders compile.
-    pub fn new(store: Store, backend: Backend) -> Result<Self, RenderError> {
+    pub fn new(store: Store, backend: Backend) -> Result<Self, DrawError> {
         Self::with_limits(store, backend, Limits::default())
     }
 
     /// Opens the backend.
-    pub fn with_limits(
-        store: Store,
-        backend: Backend,
-        limits: Limits,
-    ) -> Result<Self, RenderError> {
+    pub fn with_limits(store: Store, backend: Backend, limits: Limits) -> Result<Self, DrawError> {
         let renderer = Arc::new(Renderer::keeping(backend, limits.device_frame_bytes)?);
         let source = Arc::new(Source::new(
             store.clone(),
@@ -106,7 +101,6 @@ impl RenderService {
     }
 
     /// Tells in the metrics what it draws on.
-    #[cfg(feature = "service")]
     pub fn register(&self, registry: &prometheus::Registry) -> Result<(), prometheus::Error> {
         registry.register(Box::new(crate::gauges::AdapterInfo::of(self)?))
     }
@@ -127,7 +121,7 @@ impl RenderService {
     }
 
     /// Draws a job; the PNG of equal jobs is equal. A job that the device fails at is drawn on a fresh one, once.
-    pub async fn draw(&self, job: &RenderJob) -> Result<Bytes, RenderError> {
+    pub async fn draw(&self, job: &RenderJob) -> Result<Bytes, DrawError> {
         self.draw_in_turn(job, ()).await
     }
 
@@ -136,8 +130,8 @@ impl RenderService {
         &self,
         job: &RenderJob,
         turn: impl Send + Sync + 'static,
-    ) -> Result<Bytes, RenderError> {
-        job.validate()?;
+    ) -> Result<Bytes, DrawError> {
+        job.validate().map_err(RenderError::from)?;
         // It is never closed, but a closed semaphore would only mean that nothing is counted.
         let own = Arc::clone(&self.turns).acquire_owned().await;
         let turns = Arc::new((own, turn));
@@ -152,7 +146,7 @@ impl RenderService {
     }
 
     /// Loads what a job is drawn from.
-    pub async fn scene(&self, job: &RenderJob) -> Result<Scene, RenderError> {
+    pub async fn scene(&self, job: &RenderJob) -> Result<Scene, DrawError> {
         self.source.scene(job).await
     }
 
@@ -163,14 +157,14 @@ impl RenderService {
         scene: Scene,
         is_wanted: IsWanted,
         held: impl Send + 'static,
-    ) -> Result<Image, RenderError> {
+    ) -> Result<Image, DrawError> {
         let (renderer, own) = (Arc::clone(&self.renderer), job.clone());
         let drawing = tokio::task::spawn_blocking(move || {
             let image = renderer.render_while(&own, &scene, &*is_wanted);
             drop(held);
             image
         });
-        let image = drawing.await.map_err(RenderError::Thread)??;
+        let image = drawing.await.map_err(DrawError::Thread)??;
         // Not before: what is wanted now goes first.
         self.prefetch.drawn(job);
         Ok(image)
@@ -181,14 +175,14 @@ impl RenderService {
         &self,
         image: Image,
         turn: impl Send + 'static,
-    ) -> Result<Bytes, RenderError> {
+    ) -> Result<Bytes, DrawError> {
         self.encoders.png(image, turn).await
     }
 
     /// Tries, and if the device failed tries once more on a fresh one.
-    pub async fn on_a_sound_device<T, F>(&self, attempt: impl Fn() -> F) -> Result<T, RenderError>
+    pub async fn on_a_sound_device<T, F>(&self, attempt: impl Fn() -> F) -> Result<T, DrawError>
     where
-        F: Future<Output = Result<T, RenderError>>,
+        F: Future<Output = Result<T, DrawError>>,
     {
         let number = self.renderer.device_number();
         match attempt().await {
@@ -202,9 +196,9 @@ impl RenderService {
     }
 
     /// Opens a fresh device in place of the one of this number; see [`Renderer::renew`].
-    pub async fn renew(&self, failed_number: u64) -> Result<(), RenderError> {
+    pub async fn renew(&self, failed_number: u64) -> Result<(), DrawError> {
         let renderer = Arc::clone(&self.renderer);
         let renewing = tokio::task::spawn_blocking(move || renderer.renew(failed_number));
-        renewing.await.map_err(RenderError::Thread)?
+        Ok(renewing.await.map_err(DrawError::Thread)??)
     }
 }

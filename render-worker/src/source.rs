@@ -9,14 +9,14 @@ use contract::grid::Grid;
 use contract::job::RenderJob;
 use contract::key::ObjectKey;
 use contract::moment::{After, Moment};
+use render::scene::{Cells, Frame, Interval, Scene, Terrain};
+use render::stages::fill::Form;
+use render::stages::fill::scaled::holds;
+use render::{RenderError, Renderer};
 use storage::{StorageError, Store};
 
-use crate::error::RenderError;
+use crate::error::DrawError;
 use crate::recent::Recent;
-use crate::renderer::Renderer;
-use crate::scene::{Cells, Frame, Interval, Scene, Terrain};
-use crate::stages::fill::Form;
-use crate::stages::fill::scaled::holds;
 
 /// Domains kept; each has four bytes a cell.
 const MOST_DOMAINS: u64 = 64;
@@ -121,16 +121,16 @@ impl Source {
     }
 
     /// The scene of a job.
-    pub async fn scene(&self, job: &RenderJob) -> Result<Scene, RenderError> {
+    pub async fn scene(&self, job: &RenderJob) -> Result<Scene, DrawError> {
         self.scene_for(job, Wanted::Now).await
     }
 
     /// The same before anybody wants it.
-    pub(crate) async fn scene_ahead(&self, job: &RenderJob) -> Result<Scene, RenderError> {
+    pub(crate) async fn scene_ahead(&self, job: &RenderJob) -> Result<Scene, DrawError> {
         self.scene_for(job, Wanted::Ahead).await
     }
 
-    async fn scene_for(&self, job: &RenderJob, wanted: Wanted) -> Result<Scene, RenderError> {
+    async fn scene_for(&self, job: &RenderJob, wanted: Wanted) -> Result<Scene, DrawError> {
         let grid = &job.grid;
         let (domain, value) = self.interval(grid, &job.value, wanted).await?;
         let accumulated = match &job.accumulated {
@@ -156,7 +156,7 @@ impl Source {
     }
 
     /// The frame of a relief, as it is stored: what is missing stays so.
-    async fn terrain(&self, relief: &Relief) -> Result<Terrain, RenderError> {
+    async fn terrain(&self, relief: &Relief) -> Result<Terrain, DrawError> {
         let grid = relief.grid;
         // No domain: its gaps are not filled.
         let key = (relief.frame.clone(), relief.frame.clone(), None);
@@ -165,17 +165,14 @@ impl Source {
             self.frame_hits.fetch_add(1, Ordering::Relaxed);
             // Found under its content, which says nothing of the grid of another job.
             let fits = elevation.cells.content().len() == grid.cell_count();
-            let mismatch = || RenderError::GridMismatch {
-                product: "the job".to_owned(),
-                accumulated: relief.frame.to_string(),
-            };
+            let mismatch = || mismatch(&relief.frame);
             return fits
                 .then_some(Terrain { grid, elevation })
                 .ok_or_else(mismatch);
         }
         self.frame_misses.fetch_add(1, Ordering::Relaxed);
         let read = storage::frames::read(&self.store, &relief.frame, &grid).await;
-        let values = read.map_err(|source| RenderError::Store {
+        let values = read.map_err(|source| DrawError::Store {
             what: "the relief",
             product: relief.frame.to_string(),
             source: Box::new(source),
@@ -191,7 +188,7 @@ impl Source {
         grid: &Grid,
         moment: &Moment,
         wanted: Wanted,
-    ) -> Result<(Arc<Cells<u32>>, Interval), RenderError> {
+    ) -> Result<(Arc<Cells<u32>>, Interval), DrawError> {
         let domain = self.domain(grid, moment).await?;
         let counts = moment.contributed.clone().unwrap_or_default();
         let part = |frame: &ObjectKey, counts: &Option<ObjectKey>| {
@@ -229,7 +226,7 @@ impl Source {
         grid: &Grid,
         domain: &Cells<u32>,
         key: FrameKey,
-    ) -> Result<Arc<Frame>, RenderError> {
+    ) -> Result<Arc<Frame>, DrawError> {
         if let Some(frame) = self.lock().frames.get(&key) {
             return Ok(frame);
         }
@@ -246,7 +243,7 @@ impl Source {
         frame: Frame,
         grid: &Grid,
         (_, domain, counts): &FrameKey,
-    ) -> Result<Frame, RenderError> {
+    ) -> Result<Frame, DrawError> {
         let Some(counts) = counts else {
             return Ok(frame);
         };
@@ -255,7 +252,7 @@ impl Source {
         Ok(frame.with_lacking(counts.lacking()))
     }
 
-    async fn domain(&self, grid: &Grid, moment: &Moment) -> Result<Arc<Cells<u32>>, RenderError> {
+    async fn domain(&self, grid: &Grid, moment: &Moment) -> Result<Arc<Cells<u32>>, DrawError> {
         let held = self.lock().domains.get(&moment.domain);
         let domain = if let Some(domain) = held {
             domain
@@ -273,10 +270,7 @@ impl Source {
         if domain.content().len() == grid.cell_count() {
             return Ok(domain);
         }
-        Err(RenderError::GridMismatch {
-            product: "the job".to_owned(),
-            accumulated: moment.domain.to_string(),
-        })
+        Err(mismatch(&moment.domain))
     }
 
     async fn frame(
@@ -285,7 +279,7 @@ impl Source {
         domain: &Arc<Cells<u32>>,
         key: FrameKey,
         wanted: Wanted,
-    ) -> Result<Arc<Frame>, RenderError> {
+    ) -> Result<Arc<Frame>, DrawError> {
         if let Some(frame) = self.held(&key, wanted) {
             return Ok(frame);
         }
@@ -333,14 +327,14 @@ impl Source {
         grid: &Grid,
         domain: &Arc<Cells<u32>>,
         key: &FrameKey,
-    ) -> Result<Arc<Frame>, RenderError> {
+    ) -> Result<Arc<Frame>, DrawError> {
         let (frame, of_domain, _) = key;
         let read = storage::frames::read(&self.store, frame, grid).await;
         let values = read.map_err(|e| failed("a frame", of_domain, e))?;
         let (renderer, of_grid, domain) = (Arc::clone(&self.renderer), *grid, Arc::clone(domain));
         let fill = move || fill(&renderer, &of_grid, values, &domain);
         let filled = tokio::task::spawn_blocking(fill).await;
-        let filled = filled.map_err(RenderError::Thread)??;
+        let filled = filled.map_err(DrawError::Thread)??;
         Ok(Arc::new(self.doubted(filled, grid, key).await?))
     }
 
@@ -372,22 +366,30 @@ fn fill(
     grid: &Grid,
     values: Vec<f32>,
     domain: &Cells<u32>,
-) -> Result<Frame, RenderError> {
+) -> Result<Frame, DrawError> {
     let domain = domain.content();
     let mut gaps = values.iter().zip(domain);
     let has_gaps = gaps.any(|(value, domain)| *domain != 0 && !holds(*value));
     if !has_gaps || domain.len() != values.len() {
         return Ok(Frame::new(values));
     }
-    renderer
-        .fill(Form::Window, grid, &values, domain)
-        .map(Frame::filled)
+    let filled = renderer.fill(Form::Window, grid, &values, domain)?;
+    Ok(Frame::filled(filled))
+}
+
+/// What is stored does not lie on the grid of the job.
+fn mismatch(key: &ObjectKey) -> DrawError {
+    let mismatch = RenderError::GridMismatch {
+        product: "the job".to_owned(),
+        accumulated: key.to_string(),
+    };
+    mismatch.into()
 }
 
 /// Named by the product, which a domain's folder is called after.
-fn failed(what: &'static str, domain: &ObjectKey, source: StorageError) -> RenderError {
+fn failed(what: &'static str, domain: &ObjectKey, source: StorageError) -> DrawError {
     let product = domain.as_str().split('/').nth(1).unwrap_or_default();
-    RenderError::Store {
+    DrawError::Store {
         what,
         product: product.to_owned(),
         source: Box::new(source),

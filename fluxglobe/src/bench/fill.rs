@@ -4,9 +4,9 @@
 use std::time::Duration;
 
 use anyhow::Result;
-use render_worker::gpu::Gpu;
-use render_worker::stages::fill::bench::{self, Timing};
-use render_worker::stages::fill::{Fill, Sources};
+use render::gpu::Gpu;
+use render::stages::fill::{Fill, Sources};
+use render_proof::fill::timing::{self, Timing};
 use serde::Serialize;
 
 use crate::cli::{BenchFill, Settings};
@@ -52,11 +52,11 @@ pub(crate) fn run(settings: &Settings, options: &BenchFill) -> Result<()> {
     if !options.json {
         progress::result(HEADER)?;
     }
-    for case in bench::cases([options.size[0], options.size[1]], options.share) {
+    for case in timing::cases([options.size[0], options.size[1]], options.share) {
         for form in options.forms.iter().map(|form| form.form()) {
             let timing = match &on_gpu {
-                Some((gpu, fill)) => bench::bench_fill(gpu, fill, case, form, runs, limit),
-                None => bench::bench_twin(case, form, runs, limit),
+                Some((gpu, fill)) => timing::bench_fill(gpu, fill, case, form, runs, limit),
+                None => timing::bench_twin(case, form, runs, limit),
             };
             match timing {
                 Ok(timing) => print(options, &Row::new(&timing, adapter))?,

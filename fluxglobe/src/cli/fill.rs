@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
 use contract::product::ProductId;
-use render_worker::stages::fill::Form;
+use render::stages::fill::Form;
 
 /// `fluxglobe products ...`: more about one product.
 #[derive(Debug, Subcommand)]

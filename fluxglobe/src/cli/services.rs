@@ -154,7 +154,7 @@ pub(crate) enum Bench {
     /// How many new pictures a running server gives to so many clients, and how long each waits.
     Serve(BenchServe),
     /// How fast the renderer is on this machine, beside the classic raster renderer and the processor.
-    Render(render_bench::command::RenderBench),
+    Render(render_proof::bench::command::RenderBench),
     /// How far volumes are from a reference in double precision, against the number of slices.
     Quality(BenchQuality),
     /// How far two pictures are apart: decibels, levels, bytes, FLIP.

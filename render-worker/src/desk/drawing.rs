@@ -8,13 +8,13 @@ use ::service::Outcome as Ended;
 use bytes::Bytes;
 use contract::job::RenderJob;
 use contract::key::ObjectKey;
+use render::{Image, RenderError};
 use storage::StorageError;
 
 use super::flight::{Flight, Outcome};
 use super::queue::{Class, Full, Permit};
 use super::{DeskError, Drawn, Inner, Origin};
-use crate::error::RenderError;
-use crate::image::Image;
+use crate::error::DrawError;
 
 /// Shortest and longest hint when to ask a full worker again.
 const RETRY_HINT: [Duration; 2] = [Duration::from_millis(100), Duration::from_secs(30)];
@@ -71,7 +71,7 @@ impl Inner {
     }
 
     /// The picture, if it was drawn before. A store that cannot be asked is one more reason to draw.
-    async fn stored(&self, job: &RenderJob) -> Result<Option<Drawn>, RenderError> {
+    async fn stored(&self, job: &RenderJob) -> Result<Option<Drawn>, DrawError> {
         match self.store.get(&job.key()).await {
             Ok(png) => {
                 self.pictures.with_label_values(&["stored"]).inc();
@@ -116,7 +116,7 @@ impl Inner {
         job: &RenderJob,
         flight: &Arc<Flight>,
         permit: &Arc<Permit>,
-    ) -> Result<Image, RenderError> {
+    ) -> Result<Image, DrawError> {
         let attempt = || async {
             let loading = flight.while_wanted(self.service.scene(job));
             let scene = self.measured("load", loading).await?;
@@ -130,8 +130,8 @@ impl Inner {
     async fn measured<T>(
         &self,
         operation: &'static str,
-        work: impl Future<Output = Result<T, RenderError>>,
-    ) -> Result<T, RenderError> {
+        work: impl Future<Output = Result<T, DrawError>>,
+    ) -> Result<T, DrawError> {
         let running = self.red.start(operation);
         let done = work.await;
         running.done(done.as_ref().map_or_else(ended, |_there| Ended::Ok));
@@ -143,7 +143,7 @@ impl Inner {
         &self,
         job: &RenderJob,
         png: Bytes,
-    ) -> Result<Option<Bytes>, RenderError> {
+    ) -> Result<Option<Bytes>, DrawError> {
         let key = job.key();
         match self.store.put_new(&key, png.clone()).await {
             Ok(_new) => Ok(None),
@@ -165,15 +165,15 @@ impl Inner {
         }
     }
 
-    fn note(&self, drawn: &Result<Image, RenderError>) {
+    fn note(&self, drawn: &Result<Image, DrawError>) {
         let away = &self.is_without_device;
         match drawn {
             Ok(_image) => away.store(false, Ordering::Release),
-            Err(
+            Err(DrawError::Render(
                 RenderError::NoAdapter(_)
                 | RenderError::SoftwareAdapter { .. }
                 | RenderError::NoDevice { .. },
-            ) => {
+            )) => {
                 away.store(true, Ordering::Release);
             }
             Err(_other) => {}
@@ -197,9 +197,9 @@ impl Inner {
 }
 
 /// How an operation ended that brought no picture.
-fn ended(error: &RenderError) -> Ended {
+fn ended(error: &DrawError) -> Ended {
     match error {
-        RenderError::NotWanted => Ended::Dropped,
+        error if error.is_not_wanted() => Ended::Dropped,
         error if error.is_bad_request() || error.is_not_found() => Ended::Refused,
         error if error.is_retryable() => Ended::Retryable,
         _ => Ended::Failed,
@@ -210,8 +210,8 @@ pub(super) fn picture_failed(
     what: &'static str,
     key: &ObjectKey,
     source: StorageError,
-) -> RenderError {
-    RenderError::Picture {
+) -> DrawError {
+    DrawError::Picture {
         what,
         key: key.clone(),
         source: Box::new(source),

@@ -4,11 +4,12 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use contract::digest::Digest;
+use render::RenderError;
 use tokio::sync::watch;
 
 use super::{DeskError, Drawn};
 use crate::desk::queue::Class;
-use crate::error::RenderError;
+use crate::error::DrawError;
 use crate::service::IsWanted;
 
 /// How a job ended.
@@ -82,11 +83,11 @@ impl Flight {
     /// Work that is given up when nobody waits any more.
     pub(super) async fn while_wanted<T>(
         &self,
-        work: impl Future<Output = Result<T, RenderError>>,
-    ) -> Result<T, RenderError> {
+        work: impl Future<Output = Result<T, DrawError>>,
+    ) -> Result<T, DrawError> {
         tokio::select! {
             done = work => done,
-            () = self.outcome.closed() => Err(RenderError::NotWanted),
+            () = self.outcome.closed() => Err(RenderError::NotWanted.into()),
         }
     }
 

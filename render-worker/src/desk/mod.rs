@@ -12,10 +12,11 @@ use ::service::Red;
 use bytes::Bytes;
 use contract::job::RenderJob;
 use prometheus::{IntCounterVec, Opts, Registry};
+use render::RenderError;
 use storage::Store;
 use tracing::Instrument as _;
 
-use crate::error::RenderError;
+use crate::error::DrawError;
 use crate::gauges::Gauges;
 use crate::service::RenderService;
 use drawing::picture_failed;
@@ -98,7 +99,7 @@ pub enum DeskError {
     Stopping,
     /// It could not be drawn.
     #[error(transparent)]
-    Render(Arc<RenderError>),
+    Render(Arc<DrawError>),
 }
 
 impl DeskError {
@@ -111,8 +112,8 @@ impl DeskError {
     }
 }
 
-impl From<RenderError> for DeskError {
-    fn from(error: RenderError) -> Self {
+impl From<DrawError> for DeskError {
+    fn from(error: DrawError) -> Self {
         Self::Render(Arc::new(error))
     }
 }
@@ -154,7 +155,8 @@ impl Desk {
         if class == Class::OnDemand && inner.stopping.load(Ordering::Acquire) {
             return Err(DeskError::Stopping);
         }
-        job.validate().map_err(RenderError::from)?;
+        let valid = job.validate().map_err(RenderError::from);
+        valid.map_err(DrawError::from)?;
         let digest = job.digest();
         let (passenger, opened) = inner.flights.board(digest, class);
         if let Some(flight) = opened {
@@ -166,7 +168,7 @@ impl Desk {
                     let fly = async move { desk.fly(&job, &flight, class).await };
                     tokio::spawn(fly.in_current_span()).await
                 };
-                let outcome = flown.unwrap_or_else(|lost| Err(RenderError::Thread(lost).into()));
+                let outcome = flown.unwrap_or_else(|lost| Err(DrawError::Thread(lost).into()));
                 desk.flights.land(&digest, &flight, outcome);
             };
             tokio::spawn(flying.in_current_span());
@@ -175,7 +177,7 @@ impl Desk {
     }
 
     /// Puts a picture into the store; done already is done.
-    pub async fn keep(&self, job: &RenderJob, png: Bytes) -> Result<(), RenderError> {
+    pub async fn keep(&self, job: &RenderJob, png: Bytes) -> Result<(), DrawError> {
         self.inner.keep(job, png).await.map(|_theirs| ())
     }
 
@@ -185,7 +187,7 @@ impl Desk {
     }
 
     /// Can pictures be drawn now? What there is, for operators.
-    pub async fn ready(&self) -> Result<String, RenderError> {
+    pub async fn ready(&self) -> Result<String, DrawError> {
         // Nobody brings jobs to a worker that is not ready, so it tries by itself to become so.
         if self.inner.is_without_device.load(Ordering::Acquire) {
             let service = &self.inner.service;

@@ -13,12 +13,12 @@ use std::time::{Duration, Instant};
 use contract::job::RenderJob;
 use contract::manifest::Manifest;
 use contract::moment::Moment;
+use render::Renderer;
 use storage::{Store, manifests};
 use tokio::sync::watch;
 
-use crate::error::RenderError;
+use crate::error::DrawError;
 use crate::recent::Recent;
-use crate::renderer::Renderer;
 use crate::source::Source;
 use neighbours::{Heading, next, place_of};
 
@@ -124,7 +124,7 @@ fn is_other(a: &RenderJob, b: &RenderJob) -> bool {
 }
 
 impl Reader {
-    async fn read_ahead(&self, job: &RenderJob, learnt: &mut Learnt) -> Result<(), RenderError> {
+    async fn read_ahead(&self, job: &RenderJob, learnt: &mut Learnt) -> Result<(), DrawError> {
         let parts = [
             Some(&job.value),
             job.accumulated.as_ref(),
@@ -158,7 +158,7 @@ impl Reader {
             let scene = self.source.scene_ahead(&early).await?;
             let renderer = Arc::clone(&self.renderer);
             let preparing = tokio::task::spawn_blocking(move || renderer.prepare(&early, &scene));
-            preparing.await.map_err(RenderError::Thread)??;
+            preparing.await.map_err(DrawError::Thread)??;
         }
         Ok(())
     }

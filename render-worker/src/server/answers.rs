@@ -9,7 +9,6 @@ use tonic::{Request, Response, Status};
 use tracing::Instrument as _;
 
 use crate::desk::{Class, Desk, DeskError, Drawn, Origin};
-use crate::error::RenderError;
 use crate::wire::proto::renderer_server::Renderer;
 use crate::wire::proto::{
     DrawReply, DrawRequest, Origin as OriginCode, StatusReply, StatusRequest,
@@ -117,7 +116,7 @@ fn refusal(error: &DeskError) -> Status {
     if error.is_not_found() {
         return Status::not_found(text);
     }
-    if matches!(**error, RenderError::NotWanted) {
+    if error.is_not_wanted() {
         return Status::cancelled(text);
     }
     tracing::warn!(error = error.in_full(), "a job cannot be drawn");

@@ -6,14 +6,15 @@ mod settings;
 use std::net::SocketAddr;
 use std::time::Duration;
 
+use render::Backend;
+
 use ::service::Stop;
 use prometheus::Registry;
 use storage::Store;
 use tonic::transport::server::TcpIncoming;
 
 use crate::desk::Desk;
-use crate::error::RenderError;
-use crate::renderer::Backend;
+use crate::error::DrawError;
 use crate::service::RenderService;
 use crate::wire::proto::renderer_server::RendererServer;
 use crate::wire::{MOST_REQUEST_BYTES, Version};
@@ -33,7 +34,7 @@ const PING: Duration = Duration::from_secs(10);
 pub enum ServerError {
     /// No renderer.
     #[error(transparent)]
-    Render(#[from] RenderError),
+    Render(#[from] DrawError),
     /// Two metrics of one name.
     #[error("a metric cannot be registered")]
     Metrics(#[from] prometheus::Error),

@@ -3,8 +3,9 @@
 
 use contract::key::ObjectKey;
 use contract::kind::Kind;
+use render::Backend;
+use render_worker::RenderService;
 use render_worker::desk::{Class, Origin};
-use render_worker::{Backend, RenderService};
 use storage::Store;
 use storage::sound::damage;
 

@@ -181,7 +181,7 @@ async fn workers_may_come_later_than_those_who_ask() {
     let refused = fleet.draw(&quick(&job, 1), "t").await.unwrap_err();
     assert!(matches!(refused, FleetError::Unavailable(_)), "{refused}");
     let own = render_worker::wire::Version::own();
-    let backend = render_worker::Backend::Cpu;
+    let backend = render::Backend::Cpu;
     let _worker = Worker::start_with(&store, &worker_settings, backend, own);
     until("it is found", || fleet.health()[&name] == Health::Up).await;
     assert_eq!(fleet.ready().await.unwrap(), "1 of 1 render workers");

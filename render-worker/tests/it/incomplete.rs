@@ -3,7 +3,8 @@
 use contract::job::{Mode, RenderJob, Style};
 use contract::manifest::{Contributed, Manifest};
 use contract::quantity::Quantity;
-use render_worker::{Backend, RenderService};
+use render::Backend;
+use render_worker::RenderService;
 use storage::{Store, contributed};
 
 use crate::scenes::{FIVE_DEGREES, job, tile};

@@ -2,14 +2,16 @@
 
 use contract::job::Mode;
 use contract::job::RenderJob;
-use render_worker::{Backend, RenderError, RenderService};
+use render::{Backend, RenderError};
+use render_worker::{DrawError, RenderService};
 use storage::Store;
 
+use crate::device;
 use crate::stored::two_months_in;
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_job_is_drawn_on_a_fresh_device_when_its_own_is_lost() {
-    if crate::device::gpu("a lost device").is_none() {
+    if !device::is_wanted("a lost device") {
         return;
     }
     let store = Store::memory();
@@ -34,7 +36,7 @@ async fn a_job_is_drawn_on_a_fresh_device_when_its_own_is_lost() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_job_that_loses_every_device_fails_and_the_next_one_is_drawn() {
-    if crate::device::gpu("a job that loses devices").is_none() {
+    if !device::is_wanted("a job that loses devices") {
         return;
     }
     let store = Store::memory();
@@ -48,7 +50,10 @@ async fn a_job_that_loses_every_device_fails_and_the_next_one_is_drawn() {
     };
     let failed = service.on_a_sound_device(poison).await.unwrap_err();
     assert!(failed.is_device_fault() && failed.is_final(), "{failed}");
-    assert!(!matches!(failed, RenderError::NoAdapter(_)));
+    assert!(!matches!(
+        failed,
+        DrawError::Render(RenderError::NoAdapter(_))
+    ));
     assert_eq!(
         service.renderer().device_number(),
         1,
@@ -60,7 +65,7 @@ async fn a_job_that_loses_every_device_fails_and_the_next_one_is_drawn() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn many_that_draw_on_a_device_that_is_lost_share_one_fresh_one() {
-    if crate::device::gpu("many on a lost device").is_none() {
+    if !device::is_wanted("many on a lost device") {
         return;
     }
     let store = Store::memory();

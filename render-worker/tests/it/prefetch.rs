@@ -7,11 +7,12 @@ use contract::grid::Grid;
 use contract::job::{Mode, RenderJob, View};
 use contract::manifest::Manifest;
 use contract::quantity::Quantity;
-use render_worker::{Backend, Limits, RenderService, Renderer};
+use render::Backend;
+use render_worker::{Limits, RenderService};
 use storage::Store;
 
-use crate::device::{gpu, gpu_renderer};
-use crate::scenes::{FIVE_DEGREES, globe, job, ocean, tile};
+use crate::device;
+use crate::scenes::{FIVE_DEGREES, globe, job, tile};
 use crate::stored::product;
 use crate::worker::{Worker, fleet, until};
 
@@ -151,7 +152,7 @@ async fn reading_ahead_ends_when_the_view_moves_to_another_product() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn frames_read_ahead_lie_on_the_device_before_they_are_drawn() {
-    if gpu_renderer("frames on the device").is_none() {
+    if !device::is_wanted("frames on the device") {
         return;
     }
     let store = Store::memory();
@@ -170,38 +171,13 @@ async fn frames_read_ahead_lie_on_the_device_before_they_are_drawn() {
     until("one more", || bytes() == 6 * frame_bytes).await;
 }
 
-#[test]
-fn a_device_says_what_memory_is_its_own_and_a_program_has_none() {
-    let Some(gpu) = gpu("memory of the device") else {
-        return;
-    };
-    let own_bytes = gpu.own_bytes();
-    assert_eq!(own_bytes.is_none(), gpu.is_software(), "{own_bytes:?}");
-    assert!(own_bytes.is_none_or(|own| own > 1 << 28));
-}
-
-#[test]
-fn frames_on_the_device_stay_within_their_limit() {
-    if gpu_renderer("limit of the device").is_none() {
-        return;
-    }
-    let scene = ocean(FIVE_DEGREES);
-    let frame_bytes = FIVE_DEGREES.cell_count() as u64 * 4;
-    for (limit, held) in [(3 * frame_bytes, 3), (1, 1), (64 << 20, 5)] {
-        let renderer = Renderer::keeping(Backend::Gpu, Some(limit)).unwrap();
-        let job = job(Mode::Volume, tile(1, 0, 0, 256));
-        renderer.render(&job, &scene).unwrap();
-        assert_eq!(renderer.resident_bytes(), held * frame_bytes, "{limit}");
-    }
-}
-
 /// Prints what docs/performance.md tells.
 #[tokio::test(flavor = "multi_thread")]
 async fn the_first_picture_of_a_step_waits_for_its_drawing_alone() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path().to_str().unwrap()).unwrap();
     let flux = months(&store, "flux", QUARTER_DEGREE).await;
-    let backend = if gpu_renderer("first pictures").is_some() {
+    let backend = if device::is_wanted("first pictures") {
         Backend::Gpu
     } else {
         Backend::Cpu

@@ -6,7 +6,7 @@ use std::process::{Child, Command, Stdio};
 
 use ::service::Stop;
 use prometheus::Registry;
-use render_worker::Backend;
+use render::Backend;
 use render_worker::server::{Server, open_desk};
 use storage::Store;
 

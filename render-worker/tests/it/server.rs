@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use contract::job::{Mode, RenderJob};
-use render_worker::Backend;
+use render::Backend;
 use render_worker::desk::Origin;
 use render_worker::fleet::FleetError;
 use render_worker::wire::Version;
@@ -28,7 +28,7 @@ async fn a_picture_is_the_same_bytes_by_grpc_as_in_process() {
     let store = Store::memory();
     let job = two_months_in(&store).await;
     let mut backends = vec![Backend::Cpu];
-    if crate::device::gpu("bytes by gRPC").is_some() {
+    if crate::device::is_wanted("bytes by gRPC") {
         backends.push(Backend::Gpu);
     }
     for backend in backends {

@@ -8,10 +8,11 @@ use contract::context::Relief;
 use contract::grid::Grid;
 use contract::job::{Mode, RenderJob};
 use contract::quantity::Quantity;
-use render_worker::{Backend, Limits, RenderError, RenderService, Renderer};
+use render::stages::layout::is_missing;
+use render::{Backend, RenderError, Renderer, pyramid};
+use render_worker::{DrawError, Limits, RenderService, Source};
 use storage::Store;
 
-use crate::device::renderers;
 use crate::scenes::{FIVE_DEGREES, ONE_DEGREE};
 use crate::stored::{at, product, two_months, two_months_in};
 
@@ -133,7 +134,7 @@ async fn jobs_that_name_what_is_not_there_are_refused() {
     for wrong in [mismatched, wider] {
         assert!(matches!(
             service.draw(&wrong).await,
-            Err(RenderError::GridMismatch { .. })
+            Err(DrawError::Render(RenderError::GridMismatch { .. }))
         ));
     }
     let (time, view, style) = ("2000-01-30".parse().unwrap(), job.view, job.style);
@@ -202,41 +203,11 @@ async fn a_turn_to_draw_is_over_when_encoding_begins_and_not_before_it_has_a_cor
 
 #[test]
 fn as_many_pictures_are_drawn_at_once_as_suit_what_draws_unless_it_is_said() {
-    for renderer in renderers("draws at once") {
-        let adapter = renderer.adapter();
-        let suited = adapter.draws_at_once().get();
-        let cores = std::thread::available_parallelism().unwrap().get();
-        let expected = match (adapter.backend(), adapter.is_software()) {
-            ("none", true) => cores,
-            (_, true) => 2,
-            (_, false) => 4,
-        };
-        assert_eq!(suited, expected, "{adapter:?}");
-    }
     let service = RenderService::new(Store::memory(), Backend::Cpu).unwrap();
     assert_eq!(
         service.draws_at_once(),
         service.renderer().adapter().draws_at_once()
     );
-}
-
-#[test]
-fn where_a_graphics_card_is_required_a_software_adapter_is_refused_by_name() {
-    let Some(any) = crate::device::gpu_renderer("a required card") else {
-        return;
-    };
-    match Renderer::new(Backend::HardwareGpu) {
-        Ok(renderer) => assert!(!renderer.adapter().is_software() && !any.adapter().is_software()),
-        Err(error) => {
-            assert!(any.adapter().is_software(), "{error}");
-            let text = error.to_string();
-            assert!(
-                text.contains(any.name()) && text.contains("--require-gpu"),
-                "{text}"
-            );
-            assert!(!error.is_retryable());
-        }
-    }
 }
 
 #[tokio::test]
@@ -264,4 +235,30 @@ async fn a_landing_leaves_pictures_that_it_does_not_touch_their_name_and_their_b
     assert_ne!(old.key(), new.key());
     let (old, new) = (service.draw(&old).await, service.draw(&new).await);
     assert_ne!(old.unwrap(), new.unwrap());
+}
+
+#[tokio::test]
+async fn frames_of_a_product_come_filled_with_the_errors_beside_them() {
+    let store = Store::memory();
+    // The second month has a cloud over row 20, columns 0 to 5.
+    let job = two_months_in(&store).await;
+    let renderer = Renderer::new(Backend::Cpu).unwrap();
+    let source = Source::new(store, Arc::new(renderer), u64::MAX);
+    let scene = source.scene(&job).await.unwrap();
+    assert!(scene.value.before.errors.is_none() && scene.value.before.largest_error == 0.0);
+    let after = &scene.value.after;
+    let errors = after.errors.as_ref().unwrap().content();
+    let cloud = 20 * 72..20 * 72 + 6;
+    for (cell, error) in errors.iter().enumerate() {
+        let (is_land, is_cloud) = (scene.domain.content()[cell] == 0, cloud.contains(&cell));
+        assert_eq!(is_missing(*error), is_land, "cell {cell}");
+        assert_eq!(*error > 0.0, is_cloud, "cell {cell}: {error}");
+        assert!(*error <= after.largest_error);
+    }
+    // Blocks of four cells: rows 20 and 21, the first four columns; half of their cells were measured.
+    let coarser = pyramid::coarser(&scene).unwrap();
+    let error = coarser.value.after.errors.as_ref().unwrap().content()[10 * 36];
+    let expected = 0.25 * (errors[20 * 72] + errors[20 * 72 + 1]);
+    assert!((error / expected - 1.0).abs() < 1e-5, "{error} {expected}");
+    assert!(coarser.value.before.errors.is_none());
 }

@@ -5,12 +5,13 @@ use std::time::Duration;
 
 use ::service::Stop;
 use prometheus::Registry;
+use render::Backend;
+use render_worker::RenderService;
 use render_worker::desk::Desk;
 use render_worker::fleet::{Fleet, FleetSettings};
 use render_worker::server::{Server, ServerError, Settings, open_desk};
 use render_worker::wire::Version;
 use render_worker::wire::proto::renderer_client::RendererClient;
-use render_worker::{Backend, RenderService};
 use storage::Store;
 use tokio::task::JoinHandle;
 use tonic::transport::Channel;

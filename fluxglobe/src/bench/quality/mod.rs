@@ -3,6 +3,7 @@
 
 mod plot;
 
+use ::render::Scene;
 use anyhow::{Context as _, Result};
 use comfy_table::presets::NOTHING;
 use comfy_table::{CellAlignment, Table};
@@ -10,8 +11,8 @@ use contract::colour::TransferFunction;
 use contract::job::{Mode, RenderJob, Style, View};
 use contract::manifest::Manifest;
 use contract::tile::Tile;
-use render_worker::proof::{QualityRow, against_slices, ocean};
-use render_worker::{RenderService, Scene};
+use render_proof::{QualityRow, against_slices, ocean};
+use render_worker::RenderService;
 use serde::Serialize;
 use storage::Store;
 
