@@ -14,7 +14,7 @@ use storage::StorageError;
 use storage::log::{EventLog, Finished, Message};
 use tracing::Instrument as _;
 
-use crate::desk::{Class, Desk, DeskError, Drawn};
+use crate::desk::{Desk, DeskError, Drawn, Order};
 use crate::error::DrawError;
 
 /// Group of readers that share the jobs.
@@ -71,7 +71,7 @@ impl BatchService {
     }
 
     async fn read(&self, stop: &Stop) -> Result<(), StorageError> {
-        let at_once = self.desk.draws_at_once();
+        let at_once = self.desk.draws_at_once().get();
         let mut reader = self.log.join(Topic::RenderJob, GROUP).await?;
         let mut work = FuturesUnordered::new();
         while !stop.is_said() {
@@ -151,7 +151,7 @@ impl BatchService {
     }
 
     async fn draw_and_keep(&self, job: &RenderJob) -> Result<(), Arc<DrawError>> {
-        let Drawn { png, kept, .. } = match self.desk.draw(job, Class::Batch).await {
+        let Drawn { png, kept, .. } = match self.desk.draw(job, Order::batch()).await {
             Ok(drawn) => drawn,
             Err(DeskError::Render(error)) => return Err(error),
             // The batch is not counted, and it stops by itself: both are passing.

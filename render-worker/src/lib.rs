@@ -10,13 +10,13 @@ mod encoding;
 pub mod error;
 pub mod fleet;
 mod gauges;
+pub mod pipeline;
 mod prefetch;
-mod recent;
 pub mod server;
-pub mod service;
 pub mod source;
 pub mod wire;
 
-pub use crate::service::{Limits, RenderService};
+pub use desk::Desk;
 pub use error::DrawError;
+pub use pipeline::Limits;
 pub use source::Source;

@@ -1,10 +1,10 @@
-//! Frames that stay on the device between pictures, least recently drawn first to go.
+//! Frames that stay on the device between pictures.
 
-use std::collections::BTreeMap;
 use std::ops::Range;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use bytemuck::Pod;
+use quick_cache::sync::{Cache, DefaultLifecycle};
+use quick_cache::{DefaultHashBuilder, OptionsBuilder, Weighter};
 
 use crate::error::RenderError;
 use crate::gpu::Gpu;
@@ -14,28 +14,33 @@ use crate::scene::Cells;
 const SHARE: u64 = 8;
 /// Bytes kept where nobody knows what the device has.
 const UNKNOWN_BYTES: u64 = 512 << 20;
+/// About as many frames are kept.
+const TYPICAL_FRAMES: usize = 256;
+/// Share of the memory for frames that were drawn again: the rest is for those that have just come, of which a picture
+/// needs several.
+const PROVEN_SHARE: f64 = 0.5;
 
 /// The cells of a frame, and the part of them that is held.
 type Id = (u64, usize, usize);
 
 /// Buffers by what they hold. One that is being sent is waited for by those who want the same, and by nobody else.
-pub(crate) struct Resident<B = wgpu::Buffer> {
-    held: Mutex<Held<B>>,
+pub(crate) struct Resident<B: Clone = wgpu::Buffer> {
+    held: Cache<Id, Held<B>, ByBytes>,
 }
 
+#[derive(Clone)]
 struct Held<B> {
-    /// Bytes kept at most, apart from frames in flight.
-    most_bytes: u64,
-    by_id: BTreeMap<Id, Slot<B>>,
-    uses: u64,
+    buffer: B,
+    bytes: u64,
 }
 
-/// The place of one buffer; locked while it is sent.
-struct Slot<B> {
-    buffer: Arc<Mutex<Option<B>>>,
-    /// 0 until it is there.
-    bytes: u64,
-    last_use: u64,
+#[derive(Clone)]
+struct ByBytes;
+
+impl<B> Weighter<Id, Held<B>> for ByBytes {
+    fn weight(&self, _id: &Id, held: &Held<B>) -> u64 {
+        held.bytes
+    }
 }
 
 impl Resident {
@@ -61,19 +66,23 @@ impl Resident {
 
 impl<B: Clone> Resident<B> {
     fn holding(most_bytes: u64) -> Self {
-        let held = Held {
-            most_bytes,
-            by_id: BTreeMap::new(),
-            uses: 0,
-        };
+        // One shard: in several, each would have a part of the memory that a frame may not fit into.
+        let options = OptionsBuilder::new()
+            .shards(1)
+            .estimated_items_capacity(TYPICAL_FRAMES)
+            .weight_capacity(most_bytes)
+            .hot_allocation(PROVEN_SHARE)
+            .build()
+            .expect("both capacities are given");
+        let (hasher, lifecycle) = (DefaultHashBuilder::default(), DefaultLifecycle::default());
         Self {
-            held: Mutex::new(held),
+            held: Cache::with_options(options, ByBytes, hasher, lifecycle),
         }
     }
 
     /// Bytes held.
     pub(crate) fn bytes(&self) -> u64 {
-        self.lock().bytes()
+        self.held.weight()
     }
 
     /// What is held under an id, made if it is not there; nothing else waits for that.
@@ -83,64 +92,13 @@ impl<B: Clone> Resident<B> {
         size: impl FnOnce(&B) -> u64,
         make: impl FnOnce() -> Result<B, RenderError>,
     ) -> Result<B, RenderError> {
-        let slot = self.lock().slot(id);
-        // What failed half-way left nothing behind.
-        let mut place = slot.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(buffer) = &*place {
-            return Ok(buffer.clone());
-        }
-        let buffer = make()?;
-        *place = Some(buffer.clone());
-        drop(place);
-        self.lock().count(id, &slot, size(&buffer));
-        Ok(buffer)
-    }
-
-    fn lock(&self) -> MutexGuard<'_, Held<B>> {
-        // Entries come and go whole, so a poisoned lock still guards what is true.
-        self.held.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-impl<B> Held<B> {
-    fn bytes(&self) -> u64 {
-        self.by_id.values().map(|slot| slot.bytes).sum()
-    }
-
-    /// The place of a buffer, which may not be there yet.
-    fn slot(&mut self, id: Id) -> Arc<Mutex<Option<B>>> {
-        self.uses += 1;
-        let slot = self.by_id.entry(id).or_insert_with(|| Slot {
-            buffer: Arc::default(),
-            bytes: 0,
-            last_use: 0,
-        });
-        slot.last_use = self.uses;
-        Arc::clone(&slot.buffer)
-    }
-
-    /// Counts a buffer that was made, if it has not been forgotten meanwhile, and makes room for it.
-    fn count(&mut self, id: Id, place: &Arc<Mutex<Option<B>>>, made_bytes: u64) {
-        let slot = self.by_id.get_mut(&id);
-        if let Some(slot) = slot.filter(|slot| Arc::ptr_eq(&slot.buffer, place)) {
-            slot.bytes = made_bytes;
-            self.evict();
-        }
-    }
-
-    fn evict(&mut self) {
-        let mut bytes = self.bytes();
-        while bytes > self.most_bytes && self.by_id.len() > 1 {
-            let oldest = self
-                .by_id
-                .iter()
-                .min_by_key(|(_, slot)| slot.last_use)
-                .map(|(id, _)| *id);
-            let Some(slot) = oldest.and_then(|id| self.by_id.remove(&id)) else {
-                return;
-            };
-            bytes -= slot.bytes;
-        }
+        let make = || -> Result<Held<B>, RenderError> {
+            let buffer = make()?;
+            let bytes = size(&buffer);
+            Ok(Held { buffer, bytes })
+        };
+        let held = self.held.get_or_insert_with(&id, make)?;
+        Ok(held.buffer)
     }
 }
 
@@ -203,8 +161,8 @@ mod tests {
     }
 
     #[test]
-    fn what_was_used_longest_ago_makes_room() {
-        let resident = Resident::<u64>::holding(2);
+    fn what_is_drawn_again_stays_and_what_came_once_makes_room() {
+        let resident = Resident::<u64>::holding(4);
         let made = |number: u64| {
             let mut made = false;
             let make = || {
@@ -214,8 +172,19 @@ mod tests {
             resident.kept(id(number), |_buffer| 1, make).unwrap();
             made
         };
-        assert!(made(1) && made(2) && !made(1) && made(3));
-        assert_eq!(resident.bytes(), 2);
-        assert!(!made(1) && made(2));
+        assert!(made(1) && made(2) && made(3) && made(4));
+        assert!(!made(1) && !made(2) && !made(3) && !made(4));
+        for later in 5..20 {
+            assert!(made(later), "{later}");
+            assert_eq!(resident.bytes(), 4);
+            assert!(!made(later), "{later} is there for the next picture");
+        }
+    }
+
+    #[test]
+    fn what_is_larger_than_all_room_is_had_and_not_held() {
+        let resident = Resident::<u64>::holding(4);
+        let had = resident.kept(id(1), |_buffer| 5, || Ok(7)).unwrap();
+        assert_eq!((had, resident.bytes()), (7, 0));
     }
 }

@@ -6,6 +6,7 @@ use contract::job::{Mode, RenderJob, Style, View};
 use contract::manifest::Manifest;
 use contract::tile::Tile;
 use contract::time::{Period, TimeMs};
+use render_worker::desk::{Order, Storing};
 use storage::Store;
 
 use crate::cli::{Picture, Render, RenderGlobe, Settings};
@@ -37,10 +38,9 @@ pub(crate) async fn run(settings: &Settings, options: Render) -> Result<()> {
     job.style.globe_surface = surface;
     job.validate()?;
     let bar = progress::bar("draw", 1);
-    let png = deployment::single_renderer(settings, store)
-        .await?
-        .draw(&job)
-        .await?;
+    let desk = deployment::single_desk(settings, store).await?;
+    let order = Order::on_demand(Storing::Nothing);
+    let png = desk.draw(&job, order).await?.png;
     std::fs::write(&picture.output, &png)
         .with_context(|| format!("cannot write {}", picture.output.display()))?;
     progress::done(&bar, &format!("{} bytes", png.len()));

@@ -3,11 +3,13 @@
 use contract::job::Mode;
 use contract::job::RenderJob;
 use render::{Backend, RenderError};
-use render_worker::{DrawError, RenderService};
+use render_worker::DrawError;
+use render_worker::pipeline::IsWanted;
 use storage::Store;
 
 use crate::device;
-use crate::stored::two_months_in;
+use crate::here::Here;
+use crate::stored::{quick, two_months_in};
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_job_is_drawn_on_a_fresh_device_when_its_own_is_lost() {
@@ -16,7 +18,7 @@ async fn a_job_is_drawn_on_a_fresh_device_when_its_own_is_lost() {
     }
     let store = Store::memory();
     let job = two_months_in(&store).await;
-    let service = RenderService::new(store, Backend::Gpu).unwrap();
+    let service = Here::new(store, Backend::Gpu);
     for (lost, mode) in (0..).zip([Mode::Volume, Mode::Map, Mode::Sprites]) {
         let job = RenderJob {
             mode,
@@ -41,11 +43,11 @@ async fn a_job_that_loses_every_device_fails_and_the_next_one_is_drawn() {
     }
     let store = Store::memory();
     let job = two_months_in(&store).await;
-    let service = RenderService::new(store, Backend::Gpu).unwrap();
+    let service = Here::new(store, Backend::Gpu);
     let poison = || async {
         let scene = service.scene(&job).await?;
         service.renderer().lose_device();
-        let wanted: render_worker::service::IsWanted = std::sync::Arc::new(|| true);
+        let wanted: IsWanted = std::sync::Arc::new(|| true);
         service.picture(&job, scene, wanted, ()).await
     };
     let failed = service.on_a_sound_device(poison).await.unwrap_err();
@@ -70,15 +72,20 @@ async fn many_that_draw_on_a_device_that_is_lost_share_one_fresh_one() {
     }
     let store = Store::memory();
     let job = two_months_in(&store).await;
-    let service = RenderService::new(store, Backend::Gpu).unwrap();
-    let before = service.draw(&job).await.unwrap();
+    let service = Here::new(store, Backend::Gpu);
+    // Equal jobs would be one.
+    let jobs: Vec<RenderJob> = (0..6).map(|number| quick(&job, number)).collect();
+    let mut before = vec![];
+    for job in &jobs {
+        before.push(service.draw(job).await.unwrap());
+    }
     service.renderer().lose_device();
-    let draw = || {
+    let draw = |job: &RenderJob| {
         let (service, job) = (service.clone(), job.clone());
         tokio::spawn(async move { service.draw(&job).await.unwrap() })
     };
-    let tasks: Vec<_> = (0..6).map(|_| draw()).collect();
-    for task in tasks {
+    let tasks: Vec<_> = jobs.iter().map(draw).collect();
+    for (task, before) in tasks.into_iter().zip(before) {
         assert_eq!(task.await.unwrap(), before);
     }
     assert_eq!(service.renderer().device_number(), 1);

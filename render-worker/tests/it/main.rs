@@ -7,9 +7,11 @@
 
 mod batch;
 mod damaged;
+mod desk;
 mod device;
 mod fleet;
 mod gallery;
+mod here;
 mod incomplete;
 mod lost_device;
 mod prefetch;

@@ -8,13 +8,14 @@ use contract::job::{Mode, RenderJob, View};
 use contract::manifest::Manifest;
 use contract::quantity::Quantity;
 use render::Backend;
-use render_worker::{Limits, RenderService};
+use render_worker::Limits;
 use storage::Store;
 
 use crate::device;
+use crate::here::Here;
 use crate::scenes::{FIVE_DEGREES, globe, job, tile};
 use crate::stored::product;
-use crate::worker::{Worker, fleet, until};
+use crate::worker::{USUAL, Worker, fleet, until};
 
 const MONTHS: u32 = 8;
 const QUARTER_DEGREE: Grid = Grid {
@@ -65,7 +66,7 @@ fn small() -> View {
 async fn the_frames_around_are_read_ahead_and_the_next_picture_finds_its_own() {
     let store = Store::memory();
     let flux = months(&store, "flux", FIVE_DEGREES).await;
-    let service = RenderService::with_limits(store, Backend::Cpu, limits(1)).unwrap();
+    let service = Here::with_limits(store, Backend::Cpu, limits(1));
     let draw = async |time: &str| {
         let job = map_at(&flux, time, small());
         service.draw(&job).await.unwrap();
@@ -104,7 +105,7 @@ async fn what_is_read_ahead_and_used_is_in_the_metrics() {
     };
     for (time, read, used) in [("2000-04-20", 2, 0), ("2000-05-20", 3, 1)] {
         let job = map_at(&flux, time, small());
-        fleet.draw(&job, "t").await.unwrap();
+        fleet.draw(&job, USUAL, "t").await.unwrap();
         worker
             .until(time, |worker| count(worker, "read") == read)
             .await;
@@ -122,7 +123,7 @@ async fn nothing_is_read_ahead_where_that_is_off_or_frames_would_push_one_anothe
         ..limits(1)
     };
     for limits in [limits(0), tight] {
-        let service = RenderService::with_limits(store.clone(), Backend::Cpu, limits).unwrap();
+        let service = Here::with_limits(store.clone(), Backend::Cpu, limits);
         for (time, misses) in [("2000-04-20", 2), ("2000-05-20", 3), ("2000-06-20", 4)] {
             let job = map_at(&flux, time, small());
             service.draw(&job).await.unwrap();
@@ -137,7 +138,7 @@ async fn reading_ahead_ends_when_the_view_moves_to_another_product() {
     let store = Store::memory();
     let large = months(&store, "large", QUARTER_DEGREE).await;
     let other = months(&store, "other", FIVE_DEGREES).await;
-    let service = RenderService::with_limits(store, Backend::Cpu, limits(8)).unwrap();
+    let service = Here::with_limits(store, Backend::Cpu, limits(8));
     let job = map_at(&large, "2000-04-20", small());
     service.draw(&job).await.unwrap();
     let job = map_at(&other, "2000-04-20", small());
@@ -157,7 +158,7 @@ async fn frames_read_ahead_lie_on_the_device_before_they_are_drawn() {
     }
     let store = Store::memory();
     let flux = months(&store, "flux", FIVE_DEGREES).await;
-    let service = RenderService::with_limits(store, Backend::Gpu, limits(1)).unwrap();
+    let service = Here::with_limits(store, Backend::Gpu, limits(1));
     let draw = async |time: &str| {
         let job = map_at(&flux, time, tile(2, 0, 1, 256));
         service.draw(&job).await.unwrap()
@@ -184,7 +185,7 @@ async fn the_first_picture_of_a_step_waits_for_its_drawing_alone() {
     };
     for (frames_ahead, misses) in [(0, 1), (1, 0)] {
         let limits = limits(frames_ahead);
-        let service = RenderService::with_limits(store.clone(), backend, limits).unwrap();
+        let service = Here::with_limits(store.clone(), backend, limits);
         let timed = async |time: &str| -> Duration {
             let job = map_at(&flux, time, tile(3, 1, 3, 256));
             let begun = Instant::now();

@@ -10,7 +10,7 @@ use tokio::sync::watch;
 use super::{DeskError, Drawn};
 use crate::desk::queue::Class;
 use crate::error::DrawError;
-use crate::service::IsWanted;
+use crate::pipeline::IsWanted;
 
 /// How a job ended.
 pub(super) type Outcome = Result<Drawn, DeskError>;
@@ -24,46 +24,46 @@ pub(super) struct Flight {
 
 /// All jobs under way by their digest.
 #[derive(Default)]
-pub(super) struct Flights {
+pub(super) struct SingleFlight {
     by_job: Mutex<BTreeMap<Digest, Arc<Flight>>>,
 }
 
-/// A caller's end of a flight; dropping it is giving up.
-pub(super) struct Passenger {
+/// One who waits for a job under way; dropping it is giving up.
+pub(super) struct Waiter {
     outcome: watch::Receiver<Option<Outcome>>,
 }
 
-impl Flights {
-    /// Joins the flight of a job, or opens one, which the caller must then fly and [`land`](Self::land).
-    pub(super) fn board(&self, job: Digest, class: Class) -> (Passenger, Option<Arc<Flight>>) {
+impl SingleFlight {
+    /// Waits for a job under way, or begins it, which the caller must then draw and [`complete`](Self::complete).
+    pub(super) fn join(&self, job: Digest, class: Class) -> (Waiter, Option<Arc<Flight>>) {
         let urgent = class == Class::OnDemand;
-        let mut flights = self.lock();
-        let known = flights.get(&job);
+        let mut under_way = self.lock();
+        let known = under_way.get(&job);
         // A flight that all have left ends at its next step: too late to join.
         if let Some(flight) = known.filter(|flight| flight.outcome.receiver_count() > 0) {
             if urgent {
                 flight.urgent.send_replace(true);
             }
-            return (flight.passenger(), None);
+            return (flight.waiter(), None);
         }
         let flight = Arc::new(Flight {
             outcome: watch::Sender::new(None),
             urgent: watch::Sender::new(urgent),
         });
-        flights.insert(job, Arc::clone(&flight));
-        (flight.passenger(), Some(flight))
+        under_way.insert(job, Arc::clone(&flight));
+        (flight.waiter(), Some(flight))
     }
 
-    /// Ends a flight.
-    pub(super) fn land(&self, job: &Digest, flight: &Arc<Flight>, outcome: Outcome) {
-        let mut flights = self.lock();
-        if flights
+    /// Ends a job with its outcome.
+    pub(super) fn complete(&self, job: &Digest, flight: &Arc<Flight>, outcome: Outcome) {
+        let mut under_way = self.lock();
+        if under_way
             .get(job)
             .is_some_and(|known| Arc::ptr_eq(known, flight))
         {
-            flights.remove(job);
+            under_way.remove(job);
         }
-        drop(flights);
+        drop(under_way);
         flight.outcome.send_replace(Some(outcome));
     }
 
@@ -74,8 +74,8 @@ impl Flights {
 }
 
 impl Flight {
-    fn passenger(&self) -> Passenger {
-        Passenger {
+    fn waiter(&self) -> Waiter {
+        Waiter {
             outcome: self.outcome.subscribe(),
         }
     }
@@ -105,12 +105,12 @@ impl Flight {
     }
 }
 
-impl Passenger {
+impl Waiter {
     /// The outcome, shared by all.
     pub(super) async fn outcome(mut self) -> Outcome {
-        let landed = self.outcome.wait_for(Option::is_some).await;
+        let ended = self.outcome.wait_for(Option::is_some).await;
         // A sender without an outcome is gone only if its process is ending.
-        landed.map_or(Err(DeskError::Stopping), |outcome| {
+        ended.map_or(Err(DeskError::Stopping), |outcome| {
             outcome.clone().unwrap_or(Err(DeskError::Stopping))
         })
     }

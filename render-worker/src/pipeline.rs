@@ -1,7 +1,6 @@
-//! Jobs in, PNG bytes out: a source and a renderer behind one asynchronous call with bounded concurrency.
+//! The steps of one picture: frames loaded and filled, drawn on a sound device, encoded.
 //!
-//! A picture has a turn to be drawn and then a core to be encoded on: turns are as many as suit the device, cores as many
-//! as there are, and no turn is held while a picture is encoded.
+//! A step knows nothing of who asks, in which order, or what is stored: that is the business of the [`desk`](crate::desk).
 
 use std::num::NonZeroUsize;
 use std::sync::Arc;
@@ -9,20 +8,21 @@ use std::sync::Arc;
 use bytes::Bytes;
 use contract::job::RenderJob;
 use render::scene::Scene;
-use render::{Backend, Image, RenderError, Renderer};
+use render::{Backend, Image, Renderer};
 use storage::Store;
-use tokio::sync::Semaphore;
 
 use crate::encoding::Encoders;
 use crate::error::DrawError;
 use crate::prefetch::Prefetch;
 use crate::source::{Kept, Source};
 
-/// Limits of a service.
+/// What one worker takes on.
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
     /// Pictures drawn at the same time; none named is what suits the adapter. Those that are encoded do not count.
     pub draws_at_once: Option<NonZeroUsize>,
+    /// Jobs that somebody waits for and that are not begun; more are sent away.
+    pub draw_queue: usize,
     /// Bytes of frames kept in memory.
     pub frame_bytes: u64,
     /// Bytes of frames kept on the device; none named is a share of what the device has.
@@ -36,6 +36,7 @@ impl Default for Limits {
     fn default() -> Self {
         Self {
             draws_at_once: None,
+            draw_queue: 256,
             frame_bytes: 512 << 20,
             device_frame_bytes: None,
             frames_ahead: 1,
@@ -46,26 +47,18 @@ impl Default for Limits {
 /// Asked between the parts of a picture: does anybody still want it?
 pub type IsWanted = Arc<dyn Fn() -> bool + Send + Sync>;
 
-/// Draws jobs from a store. Cheap to clone, shared by all tasks.
+/// Takes the steps of any number of pictures. Cheap to clone, shared by all tasks.
 #[derive(Clone)]
-pub struct RenderService {
+pub struct Pipeline {
     renderer: Arc<Renderer>,
     source: Arc<Source>,
     prefetch: Arc<Prefetch>,
-    draws_at_once: NonZeroUsize,
-    /// One permit a picture that is drawn.
-    turns: Arc<Semaphore>,
     encoders: Encoders,
 }
 
-impl RenderService {
-    /// Opens the backend with the default limits. Blocks while shaders compile.
-    pub fn new(store: Store, backend: Backend) -> Result<Self, DrawError> {
-        Self::with_limits(store, backend, Limits::default())
-    }
-
-    /// Opens the backend.
-    pub fn with_limits(store: Store, backend: Backend, limits: Limits) -> Result<Self, DrawError> {
+impl Pipeline {
+    /// Opens the backend. Blocks while shaders compile.
+    pub fn open(store: Store, backend: Backend, limits: &Limits) -> Result<Self, DrawError> {
         let renderer = Arc::new(Renderer::keeping(backend, limits.device_frame_bytes)?);
         let source = Arc::new(Source::new(
             store.clone(),
@@ -78,31 +71,17 @@ impl RenderService {
             Arc::clone(&renderer),
             limits.frames_ahead,
         ));
-        let suited = || renderer.adapter().draws_at_once();
-        let draws_at_once = limits.draws_at_once.unwrap_or_else(suited);
         Ok(Self {
             renderer,
             source,
             prefetch,
-            draws_at_once,
-            turns: Arc::new(Semaphore::new(draws_at_once.get())),
             encoders: Encoders::on_all_cores(),
         })
-    }
-
-    /// Pictures drawn at the same time.
-    pub fn draws_at_once(&self) -> NonZeroUsize {
-        self.draws_at_once
     }
 
     /// Pictures that are encoded now.
     pub fn encoding_count(&self) -> usize {
         self.encoders.busy()
-    }
-
-    /// Tells in the metrics what it draws on.
-    pub fn register(&self, registry: &prometheus::Registry) -> Result<(), prometheus::Error> {
-        registry.register(Box::new(crate::gauges::AdapterInfo::of(self)?))
     }
 
     /// Name of what draws.
@@ -120,32 +99,7 @@ impl RenderService {
         self.source.kept()
     }
 
-    /// Draws a job; the PNG of equal jobs is equal. A job that the device fails at is drawn on a fresh one, once.
-    pub async fn draw(&self, job: &RenderJob) -> Result<Bytes, DrawError> {
-        self.draw_in_turn(job, ()).await
-    }
-
-    /// The same for a caller who gives out turns as well: his is let go when the picture is drawn and its encoding begins.
-    pub async fn draw_in_turn(
-        &self,
-        job: &RenderJob,
-        turn: impl Send + Sync + 'static,
-    ) -> Result<Bytes, DrawError> {
-        job.validate().map_err(RenderError::from)?;
-        // It is never closed, but a closed semaphore would only mean that nothing is counted.
-        let own = Arc::clone(&self.turns).acquire_owned().await;
-        let turns = Arc::new((own, turn));
-        let attempt = || async {
-            let scene = self.scene(job).await?;
-            let wanted: IsWanted = Arc::new(|| true);
-            let held = Arc::clone(&turns);
-            self.picture(job, scene, wanted, held).await
-        };
-        let image = self.on_a_sound_device(attempt).await?;
-        self.encode(image, turns).await
-    }
-
-    /// Loads what a job is drawn from.
+    /// Loads what a valid job is drawn from.
     pub async fn scene(&self, job: &RenderJob) -> Result<Scene, DrawError> {
         self.source.scene(job).await
     }
