@@ -15,7 +15,6 @@ pub(crate) struct Gauges {
     encoding: IntGauge,
     resident_bytes: IntGaugeVec,
     frame_reads: IntCounterVec,
-    shared_lights: IntCounterVec,
     prefetch: IntCounterVec,
     device_restarts: IntCounter,
 }
@@ -40,7 +39,7 @@ impl Gauges {
             resident_bytes: IntGaugeVec::new(
                 named(
                     "resident_bytes",
-                    "Bytes of frames kept, in memory and on the device, and of shared light there.",
+                    "Bytes of frames kept, in memory and on the device.",
                 ),
                 &["place"],
             )?,
@@ -48,13 +47,6 @@ impl Gauges {
                 named(
                     "frame_reads_total",
                     "Frames wanted, by whether they were there.",
-                ),
-                &["outcome"],
-            )?,
-            shared_lights: IntCounterVec::new(
-                named(
-                    "shared_lights_total",
-                    "Blocks of tiles whose light was made, and tiles drawn in such light.",
                 ),
                 &["outcome"],
             )?,
@@ -81,7 +73,6 @@ impl Collector for Gauges {
             self.encoding.desc(),
             self.resident_bytes.desc(),
             self.frame_reads.desc(),
-            self.shared_lights.desc(),
             self.prefetch.desc(),
             self.device_restarts.desc(),
         ]
@@ -106,13 +97,6 @@ impl Collector for Gauges {
         };
         bytes("memory", kept.frame_bytes);
         bytes("device", pipeline.renderer().resident_bytes());
-        let lights = pipeline.renderer().light_counts();
-        bytes("light", lights.bytes);
-        let shared = |outcome: &str, total: u64| {
-            raise(&self.shared_lights.with_label_values(&[outcome]), total);
-        };
-        shared("made", lights.made);
-        shared("used", lights.used);
         let reads = |outcome: &str, total: u64| {
             raise(&self.frame_reads.with_label_values(&[outcome]), total);
         };
@@ -131,7 +115,6 @@ impl Collector for Gauges {
             self.encoding.collect(),
             self.resident_bytes.collect(),
             self.frame_reads.collect(),
-            self.shared_lights.collect(),
             self.prefetch.collect(),
             self.device_restarts.collect(),
         ]

@@ -1,20 +1,17 @@
 //! A device with its compiled stages, the buffers that frames are drawn in and the frames that stay on it.
 
 use std::ops::Range;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Mutex, PoisonError};
 
 use contract::grid::Grid;
-use contract::job::RenderJob;
 
 use crate::error::RenderError;
 use crate::frame::{SceneBuffers, Stages};
 use crate::gpu::{Gpu, Workspace};
-use crate::lights::{LightCounts, Lights, SharedLight};
-use crate::plan::{Part, Plan, block};
+use crate::plan::{Part, Plan};
 use crate::resident::Resident;
 use crate::scene::{Frame, Interval, Scene};
 use crate::stages::fill::{self, Fill, Filled, Form};
-use crate::stages::light::light_bytes;
 
 /// Everything that lives and dies with one device.
 pub(crate) struct Device {
@@ -25,8 +22,6 @@ pub(crate) struct Device {
     idle: Mutex<Vec<Workspace>>,
     /// Frames of products that were drawn lately.
     resident: Resident,
-    /// Light of blocks of tiles that were drawn lately.
-    lights: Lights,
     /// How many devices this process had before.
     pub(crate) number: u64,
 }
@@ -44,14 +39,12 @@ impl Device {
         gpu.keep_pipelines();
         tracing::info!(adapter = gpu.adapter_name(), number, "renderer is ready");
         let resident = Resident::new(&gpu, most_frame_bytes);
-        let lights = Lights::new(&gpu);
         Ok(Self {
             gpu,
             stages,
             fill,
             idle: Mutex::default(),
             resident,
-            lights,
             number,
         })
     }
@@ -65,12 +58,7 @@ impl Device {
         self.resident.bytes()
     }
 
-    /// How light was shared between pictures.
-    pub(crate) fn light_counts(&self) -> LightCounts {
-        self.lights.counts()
-    }
-
-    /// Draws one part of a picture, in shared light if there is any.
+    /// Draws one part of a picture, in the light that all parts lie in if there is any.
     pub(crate) fn draw(
         &self,
         plan: &Plan,
@@ -83,41 +71,12 @@ impl Device {
         self.in_workspace(|workspace| self.stages.draw(&self.gpu, workspace, plan, part, &buffers))
     }
 
-    /// Makes the light of a plan for several pictures.
+    /// Makes the light that all parts of a picture lie in.
     pub(crate) fn light(&self, plan: &Plan, scene: &Scene) -> Result<wgpu::Buffer, RenderError> {
         let buffers = self.scene_buffers(scene, &plan.held_cells(), plan.params.doubt == 1)?;
         self.in_workspace(|workspace| {
             self.stages
                 .shared_light(&self.gpu, workspace, plan, &buffers)
-        })
-    }
-
-    /// The light that a tile shares with its neighbours, if it is there.
-    pub(crate) fn made_light(&self, job: &RenderJob, scene: &Scene) -> Option<Arc<SharedLight>> {
-        self.lights.made(&block::of(job)?, scene)
-    }
-
-    /// The same, made if another tile of the block has asked for it; none where the tile makes its own. The scene is the
-    /// one drawn from.
-    pub(crate) fn light_of_block(
-        &self,
-        job: &RenderJob,
-        scene: &Scene,
-    ) -> Result<Option<Arc<SharedLight>>, RenderError> {
-        let Some(block) = block::of(job) else {
-            return Ok(None);
-        };
-        self.lights.of(&block, scene, || {
-            let plan = Plan::of_block(&block, scene, self.gpu.most_buffer_bytes())?;
-            let Some(window) = plan.light_window else {
-                return Ok(None);
-            };
-            // Asked before anything is allocated: what is too large must not cost the device.
-            if !self.lights.fits(light_bytes(&plan.params)) {
-                return Ok(None);
-            }
-            let buffer = self.light(&plan, scene)?;
-            Ok(Some(SharedLight { window, buffer }))
         })
     }
 

@@ -11,7 +11,6 @@ use crate::error::RenderError;
 use crate::frame_cpu;
 use crate::gpu::Gpu;
 use crate::image::Image;
-use crate::lights::{LightCounts, SharedLight};
 use crate::plan::{Part, Plan};
 use crate::pyramid;
 use crate::scene::Scene;
@@ -130,12 +129,6 @@ impl Renderer {
         Ok(())
     }
 
-    /// How light was shared between pictures on the device.
-    pub fn light_counts(&self) -> LightCounts {
-        self.device()
-            .map_or_else(LightCounts::default, |device| device.light_counts())
-    }
-
     /// Loses the device as a driver would, for tests of what happens then.
     pub fn lose_device(&self) {
         if let Some(device) = self.device() {
@@ -176,15 +169,14 @@ impl Renderer {
         if !is_wanted() {
             return Err(RenderError::NotWanted);
         }
-        let (mut plan, shared) = match &device {
-            None => (Plan::new(job, scene, most_buffer_bytes)?, None),
-            Some(device) => planned(device, job, scene)?,
+        let mut plan = match &device {
+            None => Plan::new(job, scene, most_buffer_bytes)?,
+            Some(_device) => Plan::for_device(job, scene, most_buffer_bytes)?,
         };
         let parts = plan.parts();
-        let light = match (&device, &shared) {
-            (_, Some(shared)) => Some(shared.buffer.clone()),
+        let light = match &device {
             // Parts of one picture lie in one light.
-            (Some(device), None) if parts.len() > 1 && plan.params.light_on == LIGHT_OWN => {
+            Some(device) if parts.len() > 1 && plan.params.light_on == LIGHT_OWN => {
                 let light = device.light(&plan, scene)?;
                 plan.params.light_on = LIGHT_GIVEN;
                 Some(light)
@@ -235,31 +227,6 @@ impl DeviceSlot {
     fn lock(&self) -> std::sync::MutexGuard<'_, Arc<Device>> {
         // The slot is changed by one assignment, so a poisoned lock still guards a whole device.
         self.current.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-/// The plan of a picture and the light that it shares with others.
-fn planned(
-    device: &Device,
-    job: &RenderJob,
-    scene: &Scene,
-) -> Result<(Plan, Option<Arc<SharedLight>>), RenderError> {
-    let most_buffer_bytes = device.gpu().most_buffer_bytes();
-    let lit_by = |light: Arc<SharedLight>| {
-        let plan = Plan::lit_by(job, scene, most_buffer_bytes, light.window)?;
-        Ok((plan, Some(light)))
-    };
-    if let Some(light) = device.made_light(job, scene) {
-        return lit_by(light);
-    }
-    let own = Plan::for_device(job, scene, most_buffer_bytes)?;
-    // What shows nothing needs no light, and asks for none.
-    if own.params.splat_count == 0 {
-        return Ok((own, None));
-    }
-    match device.light_of_block(job, scene)? {
-        Some(light) => lit_by(light),
-        None => Ok((own, None)),
     }
 }
 

@@ -153,10 +153,9 @@ pub fn run(args: &RenderBench) -> Result<()> {
                     (0.443 * f64::from(1 << z)) as u32,
                 )?;
                 let times = tiles::measure(&renderer, &job, &scene, &[tile], args.tiles)?;
-                let block = tiles::of_block(&job, &scene, tile)?;
                 say(&format!(
-                    "  volume tile {tile} with PNG: median {:.2} ms, p99 {:.2} ms; all {} tiles of its block {:.1} ms, in light of their own {:.1} ms",
-                    times.median_ms, times.p99_ms, block.tiles, block.shared_ms, block.own_ms
+                    "  volume tile {tile} with PNG: median {:.2} ms, p99 {:.2} ms",
+                    times.median_ms, times.p99_ms
                 ));
             }
         }

@@ -3,7 +3,6 @@
 //! Everything that must not depend on which tile is drawn (slice planes, light texels, particle sizes and numbers)
 //! is computed here from the scene and the zoom level alone.
 
-pub(crate) mod block;
 mod camera;
 mod context;
 mod extent;
@@ -25,10 +24,9 @@ use crate::error::RenderError;
 use crate::passes::splat::{HALF_BYTES, workgroups};
 use crate::scene::{Interval, Scene};
 use crate::stages::layout::{
-    Active, Axis, Col, GroundAxis, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, LIGHT_GIVEN, LIGHT_OFF,
-    LIGHT_OWN, NEVER_LONG, Params, Row, SCREEN_TILE_PX, SQUARE, SUBPIXELS, VIEW_TILE,
+    Active, Axis, Col, GroundAxis, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, LIGHT_OFF, LIGHT_OWN,
+    NEVER_LONG, Params, Row, SCREEN_TILE_PX, SQUARE, SUBPIXELS, VIEW_TILE,
 };
-pub use block::LightWindow;
 use look::Look;
 
 /// 0 stands for no plan.
@@ -67,8 +65,6 @@ pub struct Plan {
     pub ground_axes: Vec<GroundAxis>,
     /// Words of the coast mask of the whole picture; empty without coast lines.
     pub coast: Vec<u32>,
-    /// Which texels of its zoom level the light of a lit tile has; none for other pictures.
-    pub light_window: Option<LightWindow>,
     /// Some screen tiles may hold many times the particles of others: a pole or the limb is in view.
     pub is_crowded: bool,
     size_px: [u32; 2],
@@ -111,35 +107,6 @@ impl Plan {
         Self::holding(job, scene, most_buffer_bytes, MOST_HELD_BYTES)
     }
 
-    /// The same for a tile in the light of its block: only what is seen of it is drawn, nothing gives light.
-    pub(crate) fn lit_by(
-        job: &RenderJob,
-        scene: &Scene,
-        most_buffer_bytes: u64,
-        light: LightWindow,
-    ) -> Result<Self, RenderError> {
-        Self::check(job, scene)?;
-        let mut plan = Self::viewed(job, scene, Some(light));
-        plan.params.light_on = LIGHT_GIVEN;
-        context::plan(&mut plan, job, scene);
-        plan.count_particles(most_buffer_bytes)?;
-        plan.choose_band(most_buffer_bytes, MOST_HELD_BYTES)?;
-        Ok(plan)
-    }
-
-    /// The plan of a block's light; `job` is what [`block::of`] made of a valid one.
-    pub(crate) fn of_block(
-        job: &RenderJob,
-        scene: &Scene,
-        most_buffer_bytes: u64,
-    ) -> Result<Self, RenderError> {
-        scene.validate()?;
-        let mut plan = Self::viewed(job, scene, None);
-        plan.count_particles(u64::MAX)?;
-        plan.choose_band(most_buffer_bytes, MOST_HELD_BYTES)?;
-        Ok(plan)
-    }
-
     /// The same with frames of more than `most_held_bytes` held in bands of rows.
     pub fn holding(
         job: &RenderJob,
@@ -148,7 +115,7 @@ impl Plan {
         most_held_bytes: u64,
     ) -> Result<Self, RenderError> {
         Self::check(job, scene)?;
-        let mut plan = Self::viewed(job, scene, None);
+        let mut plan = Self::viewed(job, scene);
         context::plan(&mut plan, job, scene);
         plan.count_particles(most_buffer_bytes)?;
         plan.choose_band(most_buffer_bytes, most_held_bytes)?;
@@ -165,7 +132,7 @@ impl Plan {
     }
 
     /// What follows from the view, before anything is counted.
-    fn viewed(job: &RenderJob, scene: &Scene, light: Option<LightWindow>) -> Self {
+    fn viewed(job: &RenderJob, scene: &Scene) -> Self {
         let size_px = job.view.size_px();
         let mut plan = Self {
             id: NEXT_ID.fetch_add(1, Ordering::Relaxed),
@@ -178,13 +145,12 @@ impl Plan {
             palette: palette(job),
             ground_axes: vec![],
             coast: vec![],
-            light_window: None,
             is_crowded: false,
             size_px,
         };
         match job.view {
             View::Tile { tile, size_px } => {
-                tile::plan(&mut plan, job, scene, (tile, size_px), light);
+                tile::plan(&mut plan, job, scene, (tile, size_px));
             }
             View::Globe { .. } => globe::plan(&mut plan, job, scene),
         }

@@ -9,7 +9,7 @@ use contract::job::{Mode, RenderJob};
 use contract::tile::{MAX_LAT_DEG, Tile, mercator_lat_deg, mercator_x, mercator_y};
 
 use super::look::{self, Look};
-use super::{LightWindow, Plan, area_m2, cell_px, entry_shift, flow, height_range_m};
+use super::{Plan, area_m2, cell_px, entry_shift, flow, height_range_m};
 use crate::scene::Scene;
 use crate::stages::layout::{Axis, Col, LIGHT_OFF, Row, SUBPIXELS, VIEW_TILE};
 use crate::stages::light::LOOK;
@@ -34,14 +34,8 @@ pub(super) fn world_px(tile: Tile, size_px: u32) -> f64 {
     f64::from(size_px) * f64::from(1u32 << tile.z)
 }
 
-/// The plan of a tile of a number of pixels a side; with texels of light that others have filled, if any are given.
-pub(super) fn plan(
-    plan: &mut Plan,
-    job: &RenderJob,
-    scene: &Scene,
-    (tile, size_px): (Tile, u32),
-    light: Option<LightWindow>,
-) {
+/// The plan of a tile of a number of pixels a side.
+pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene, (tile, size_px): (Tile, u32)) {
     let world_px = world_px(tile, size_px);
     let level = Level {
         world_px,
@@ -90,7 +84,6 @@ pub(super) fn plan(
         &level,
         heights_m,
         look.radius_px(cell_px, particles),
-        light,
     );
     let spans = upstream(spans, &level, flow::plan(plan, job, scene));
     choose_cells(plan, scene, &level, spans);
@@ -199,7 +192,6 @@ fn light_and_reach(
     level: &Level,
     heights_m: [f64; 2],
     radius_px: f64,
-    given: Option<LightWindow>,
 ) -> [Span; 2] {
     let subpixels = f64::from(SUBPIXELS);
     let widest = plan
@@ -234,10 +226,7 @@ fn light_and_reach(
     } = Shadows::of(job, level);
     let texel_px = (look::TEXEL_PER_RADIUS * radius_px).max(LEAST_TEXEL_PX);
     let unit = (texel_px * subpixels).round();
-    let mut window = LightWindow {
-        first: [0; 2],
-        texels: [0; 2],
-    };
+    let (mut origin, mut texels) = ([0; 2], [0; 2]);
     let mut reach = [[0.0; 2]; 2];
     for axis in 0..2 {
         let lit = shift(seen[axis], shadow_per_m[axis]);
@@ -246,23 +235,14 @@ fn light_and_reach(
         let lit = [lit[0] - looked, lit[1] + looked];
         let absolute = level.origin_px[axis] * subpixels;
         let first = ((absolute + lit[0]) / unit).floor() - 1.0;
-        window.first[axis] = first as i64;
-        window.texels[axis] = (((absolute + lit[1]) / unit).floor() - first) as u32 + 3;
+        origin[axis] = (absolute - first * unit) as i32;
+        texels[axis] = (((absolute + lit[1]) / unit).floor() - first) as u32 + 3;
         reach[axis] = shift(lit, -shadow_per_m[axis]);
     }
-    if let Some(given) = given {
-        // What only throws shadows into the tile has thrown them.
-        (window, reach) = (given, seen);
-    }
-    let origin = [0, 1].map(|axis| {
-        let absolute = level.origin_px[axis] * subpixels;
-        (absolute - window.first[axis] as f64 * unit) as i32
-    });
-    plan.light_window = Some(window);
     let params = &mut plan.params;
     params.light_unit = unit as i32;
     [params.light_origin_x, params.light_origin_y] = origin;
-    [params.light_width, params.light_height] = window.texels;
+    [params.light_width, params.light_height] = texels;
     [params.light_shift_x_per_m, params.light_shift_y_per_m] =
         shadow_per_m.map(|shift| shift as f32);
     let radius_slices = radius_px / level.px_per_m * f64::from(params.slices_per_unit);
