@@ -45,14 +45,9 @@ pub enum RenderError {
         bytes: u64,
         limit: u64,
     },
-    /// Gaps times cells with data, where every pair is met.
-    #[error(
-        "{pairs} pairs of a gap and a cell with data, at most {limit} are met one by one; use the form window or exact"
-    )]
-    TooManyPairs { pairs: u64, limit: u64 },
     /// Multilevel summation over a pole.
     #[error(
-        "the grid comes too near a pole, or cannot be halved often enough, for the exact form; use the form window or pairs"
+        "the grid comes too near a pole, or cannot be halved often enough, for the exact form; use the form window"
     )]
     NoExactFill,
     /// Two products drawn together lie on different grids.
@@ -87,7 +82,6 @@ impl RenderError {
             | Self::Job(_)
             | Self::TooManyParticles { .. }
             | Self::TooLarge { .. }
-            | Self::TooManyPairs { .. }
             | Self::NoExactFill
             | Self::GridMismatch { .. }
             | Self::NoNorthward
@@ -102,7 +96,6 @@ impl RenderError {
             Self::Job(_)
                 | Self::TooManyParticles { .. }
                 | Self::TooLarge { .. }
-                | Self::TooManyPairs { .. }
                 | Self::NoExactFill
                 | Self::GridMismatch { .. }
                 | Self::NoNorthward
@@ -123,7 +116,6 @@ impl RenderError {
             | Self::Job(_)
             | Self::TooManyParticles { .. }
             | Self::TooLarge { .. }
-            | Self::TooManyPairs { .. }
             | Self::NoExactFill
             | Self::GridMismatch { .. }
             | Self::NoNorthward

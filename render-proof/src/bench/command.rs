@@ -355,13 +355,12 @@ fn fills(gpu: &Gpu, size: &str) -> Result<()> {
                 }
             };
             say(&format!(
-                "{:<11} {:>4} x {:<4} gaps of {:>2}: median {:>10.3} ms, {:>6.2} % measured; from all pairs {:?}, RMSE over spread {:?}, digest {}",
+                "{:<11} {:>4} x {:<4} gaps of {:>2}: median {:>10.3} ms; from all pairs {:?}, RMSE over spread {:?}, digest {}",
                 form.name(),
                 case.rows,
                 case.cols,
                 case.missing.side_cells,
                 timing.median_s() * 1e3,
-                100.0 * timing.measured_share,
                 timing.from_all_pairs,
                 timing.rmse_of_hidden,
                 timing

@@ -1,4 +1,4 @@
-//! All pairs in float64, cell by cell, written for truth and not for speed: what every form is compared with.
+//! All pairs in float64, cell by cell, written for truth and not for speed: what every form of filling is compared with.
 
 use contract::grid::Grid;
 
@@ -31,4 +31,35 @@ pub fn answers_at(grid: &Grid, values: &[f32], cells: &[usize]) -> Vec<f64> {
         sum / weights
     };
     cells.iter().map(answer).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn grid(rows: u32, cols: u32, north_deg: f64, step_deg: f64) -> Grid {
+        Grid {
+            rows,
+            cols,
+            north_deg,
+            west_deg: 0.0,
+            dlat_deg: step_deg,
+            dlon_deg: step_deg,
+        }
+    }
+
+    #[test]
+    fn weights_are_inverse_squared_distances_on_the_sphere() {
+        let gap = f32::NAN;
+        // On the equator, 1 from the 1 and 2 from the 4: (1/1 * 1 + 1/4 * 4) / (1/1 + 1/4) = 1.6.
+        let row = answers_at(&grid(1, 4, 0.005, 0.01), &[1.0, gap, gap, 4.0], &[1]);
+        assert!((row[0] - 1.6).abs() < 1e-6, "{row:?}");
+        // At 60 N, twice as far from the 0 in the north as from the 1 in the west: 1 / (1 + 1/4) = 0.8.
+        let mut values = [gap; 9];
+        (values[1], values[3]) = (0.0, 1.0);
+        let square = answers_at(&grid(3, 3, 60.015, 0.01), &values, &[4]);
+        assert!((square[0] - 0.8).abs() < 1e-3, "{square:?}");
+        let empty = answers_at(&grid(1, 2, 0.0, 1.0), &[gap, gap], &[0]);
+        assert!(empty[0].is_nan());
+    }
 }

@@ -37,12 +37,9 @@ pub struct Timing {
     pub gaps: usize,
     /// Seconds of each run of the whole frame, shortest first: on the device, without upload and read-back.
     pub seconds: Vec<f64>,
-    /// Share of the gaps that were really filled in a run; below 1 the seconds are scaled up from that.
-    pub measured_share: f64,
-    /// Largest difference from all pairs in float64 among some gaps, as a share of the values' range; none if only a
-    /// part was filled.
+    /// Largest difference from all pairs in float64 among some gaps, as a share of the values' range; none without gaps.
     pub from_all_pairs: Option<f64>,
-    /// The filled values, so that two devices can be compared: equal bits, equal digests. None if only a part was filled.
+    /// The filled values, so that two devices can be compared: equal bits, equal digests. None without gaps.
     pub values_digest: Option<Digest>,
     /// Against the values that were hidden, in units of their standard deviation.
     pub rmse_of_hidden: Option<f64>,
@@ -112,7 +109,6 @@ impl Made {
             case,
             gaps: self.hidden.len(),
             seconds: vec![0.0],
-            measured_share: 1.0,
             from_all_pairs: None,
             values_digest: None,
             rmse_of_hidden: None,
@@ -172,8 +168,7 @@ pub fn bench_twin(
     Ok(timing)
 }
 
-/// Fills one case with one form `runs` times, or fewer if that takes longer than `limit`. Forms that meet every pair
-/// fill only as many gaps as the limit allows.
+/// Fills one case with one form `runs` times, or fewer if that takes longer than `limit`.
 pub fn bench_fill(
     gpu: &Gpu,
     fill: &Fill,
@@ -189,48 +184,28 @@ pub fn bench_fill(
         return Ok(timing);
     };
     let prepared = fill.prepared(gpu, form, &made.grid, &task)?;
-    let all = prepared.pieces();
-    let mut pieces = all.min(1);
-    // The first run also clears buffers and warms the device up; more pieces until the time is well used.
-    let mut once = submitted(gpu, &prepared, pieces, 1)?;
-    loop {
-        let more = pieces.saturating_mul(4).min(all);
-        if more == pieces || once * (more / pieces) > limit / 4 {
-            break;
-        }
-        pieces = more;
-        once = submitted(gpu, &prepared, pieces, 1)?;
-    }
-    once = submitted(gpu, &prepared, pieces, 1)?;
+    // The first run also clears buffers and warms the device up.
+    submitted(gpu, &prepared, 1)?;
+    let once = submitted(gpu, &prepared, 1)?;
     let repeats = (LEAST_SUBMISSION.as_secs_f64() / once.as_secs_f64())
         .clamp(1.0, f64::from(MOST_REPEATS)) as u32;
-    let scale = f64::from(all) / f64::from(pieces) / f64::from(repeats);
-    timing.measured_share = f64::from(pieces) / f64::from(all);
     timing.seconds.clear();
     while timing.seconds.is_empty() || (timing.seconds.len() < runs && started.elapsed() < limit) {
-        timing
-            .seconds
-            .push(submitted(gpu, &prepared, pieces, repeats)?.as_secs_f64() * scale);
+        let took = submitted(gpu, &prepared, repeats)?;
+        timing.seconds.push(took.as_secs_f64() / f64::from(repeats));
     }
     timing.seconds.sort_by(f64::total_cmp);
-    if pieces == all {
-        let answers = gpu
-            .recorder()
-            .download(prepared.answers(), 2 * made.values.len())?;
-        made.check(&task.filled(&made.values, &answers), &mut timing);
-    }
+    let answers = gpu
+        .recorder()
+        .download(prepared.answers(), 2 * made.values.len())?;
+    made.check(&task.filled(&made.values, &answers), &mut timing);
     Ok(timing)
 }
 
-fn submitted(
-    gpu: &Gpu,
-    prepared: &Prepared<'_>,
-    pieces: u32,
-    repeats: u32,
-) -> Result<Duration, RenderError> {
+fn submitted(gpu: &Gpu, prepared: &Prepared<'_>, repeats: u32) -> Result<Duration, RenderError> {
     let mut recorder = gpu.recorder();
     for _ in 0..repeats {
-        prepared.record(&mut recorder, pieces);
+        prepared.record(&mut recorder);
     }
     let started = Instant::now();
     // A few bytes come back, so that the end of the work is known.

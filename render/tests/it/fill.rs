@@ -65,24 +65,6 @@ fn from_all_pairs(grid: &Grid, values: &[f32], domain: &[u32], filled: &Filled) 
 }
 
 #[test]
-fn all_pairs_agree_with_float64_to_the_last_bits() {
-    for grid in [SEA, FIVE_DEGREES] {
-        let (values, domain) = frame(&grid);
-        let filled = fill::on_cpu(Form::Pairs, &grid, &values, &domain).unwrap();
-        let apart = from_all_pairs(&grid, &values, &domain, &filled);
-        assert!(apart < 2e-6, "{apart}");
-        // The same cells at the equator, where they are wider: another place on the sphere would be seen.
-        let flat = Grid {
-            north_deg: 0.5 * f64::from(grid.rows) * grid.dlat_deg,
-            ..grid
-        };
-        if flat.north_deg < 2.0 {
-            assert!(from_all_pairs(&flat, &values, &domain, &filled) > 1e-4);
-        }
-    }
-}
-
-#[test]
 fn multilevel_summation_gives_the_answer_of_all_pairs_within_its_tolerance() {
     let all_round = Grid {
         rows: 120,
@@ -103,6 +85,15 @@ fn multilevel_summation_gives_the_answer_of_all_pairs_within_its_tolerance() {
             apart > 100.0 * f64::from(exact::TOLERANCE),
             "another form is told apart: {apart}"
         );
+        // The same cells at the equator, where they are wider: another place on the sphere would be seen.
+        let flat = Grid {
+            north_deg: 0.5 * f64::from(grid.rows) * grid.dlat_deg,
+            ..grid
+        };
+        if flat.north_deg < 2.0 {
+            let apart = from_all_pairs(&flat, &values, &domain, &filled);
+            assert!(apart > 10.0 * f64::from(exact::TOLERANCE), "{apart}");
+        }
     }
 }
 
@@ -143,7 +134,7 @@ fn a_wrong_shader_of_any_form_is_seen() {
     };
     let (values, domain) = frame(&SEA);
     let (window, exact): (Shader, Shader) = (|all| &mut all.window, |all| &mut all.exact);
-    let (pairs, stencil): (Shader, Shader) = (|all| &mut all.pairs, |all| &mut all.stencil);
+    let stencil: Shader = |all| &mut all.stencil;
     let faults = [
         (Form::Window, window, "0.1875, sides", "0.1874, sides"),
         (Form::Window, window, "dy <= 2", "dy <= 1"),
@@ -156,8 +147,6 @@ fn a_wrong_shader_of_any_form_is_seen() {
         ),
         (Form::Exact, exact, "0.5859375", "0.5859374"),
         (Form::Exact, exact, "at.y % 2u == 0u", "at.y % 2u == 1u"),
-        (Form::Pairs, pairs, "lane < end", "lane < end - 1u"),
-        (Form::NaivePairs, pairs, "total += line;", "total = line;"),
     ];
     for (form, shader, right, wrong) in faults {
         let mut sources = Sources::default();
@@ -332,18 +321,6 @@ fn frames_without_data_or_without_gaps_are_left_alone() {
     let filled = fill::on_cpu(Form::Exact, &FIVE_DEGREES, &values, &domain).unwrap();
     let apart = from_all_pairs(&FIVE_DEGREES, &values, &domain, &filled);
     assert!(apart < f64::from(exact::TOLERANCE), "{apart}");
-    let huge = Grid {
-        rows: 4000,
-        cols: 4000,
-        ..SEA
-    };
-    let values: Vec<f32> = (0..huge.cell_count())
-        .map(|cell| if cell % 2 == 0 { 1.0 } else { f32::NAN })
-        .collect();
-    assert!(
-        fill::on_cpu(Form::Pairs, &huge, &values, &vec![1; values.len()]).is_err(),
-        "too many pairs are refused"
-    );
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use render::passes::{place, splat, trails};
 use render::stages::fill::level::{FillLevel, MOST_REACH_COLS};
-use render::stages::fill::{self, exact, pairs, window};
+use render::stages::fill::{self, exact, window};
 use render::stages::layout::{
     Axis, Col, DEPTH_ONE, Entry, GROUP, GroundAxis, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT,
     LIGHT_ALONE, LIGHT_GIVEN, LIGHT_OFF, LIGHT_OWN, MISSING, MOST_HOT_PARTS, NO_LIST, PART_ENTRIES,
@@ -78,12 +78,7 @@ fn structs_have_the_same_fields_in_rust_and_wgsl() {
     for (name, fields, size) in SHARED {
         assert_eq!(difference(eye::SOURCE, name, fields, size), None);
     }
-    let fills = [
-        fill::STENCIL_SOURCE,
-        window::SOURCE,
-        exact::SOURCE,
-        pairs::SOURCE,
-    ];
+    let fills = [fill::STENCIL_SOURCE, window::SOURCE, exact::SOURCE];
     for source in fills {
         let size = size_of::<FillLevel>();
         assert_eq!(
@@ -162,8 +157,6 @@ fn constants_have_the_same_value_in_rust_and_wgsl() {
     let width = constant(fill::STENCIL_SOURCE, "WIDTH");
     let segment = constant(fill::STENCIL_SOURCE, "SEGMENT");
     assert_eq!(segment as u32, width as u32 + 2 * MOST_REACH_COLS);
-    let most_cols = constant(pairs::SOURCE, "MOST_COLS");
-    assert_eq!(most_cols as u32, pairs::MOST_COLS);
     assert_eq!(SCREEN_TILE_PX as i32 * SUBPIXELS, 1 << SCREEN_TILE_SHIFT);
 }
 
@@ -177,7 +170,6 @@ fn every_shader_is_valid_without_extensions() {
         fill::STENCIL_SOURCE,
         window::SOURCE,
         exact::SOURCE,
-        pairs::SOURCE,
         light::SOURCE,
         bin::SOURCE,
         place::SOURCE,

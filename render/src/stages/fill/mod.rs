@@ -2,8 +2,7 @@
 //! of the error of each, out. Done once when a frame is loaded, because it depends on the product only.
 //!
 //! All forms are inverse distance weighting of power 2 (Shepard 1968, doi:10.1145/800186.810616) with the distance on
-//! the sphere: [`window`] is what products are drawn with, [`exact`] gives the answer of all pairs of cells quickly,
-//! [`pairs`] gives it slowly. Every product of two numbers is rounded before it is added, on every device, so that a
+//! the sphere: [`window`] is what products are drawn with, [`exact`] gives the answer of all pairs of cells. Every product of two numbers is rounded before it is added, on every device, so that a
 //! form has the same bits on all of them and on the processor. Land is what holds no data in any step: it stays empty.
 
 mod band;
@@ -12,7 +11,6 @@ pub mod exact;
 pub mod ladder;
 pub mod level;
 mod on_device;
-pub mod pairs;
 pub mod scaled;
 pub mod sphere;
 pub mod window;
@@ -29,17 +27,12 @@ use band::Band;
 use exact::Exact;
 use ladder::Ladder;
 use on_device::{DeviceLadder, Rooms};
-use pairs::{PairRooms, Pairs};
 use scaled::{Scaled, holds};
 use window::Window;
 
 /// The shader of the sums that [`window`] and [`exact`] share.
 pub const STENCIL_SOURCE: &str = concat!(include_str!("fill.wgsl"), include_str!("stencil.wgsl"));
 
-/// Most pairs of cells that are met one by one: minutes of a large GPU.
-const MOST_PAIRS: u64 = 1 << 42;
-/// The same for the twins.
-const MOST_PAIRS_ON_CPU: u64 = 1 << 36;
 /// Most rows: workgroups in one dimension of a dispatch.
 const MOST_ROWS: u32 = 65_535;
 
@@ -50,23 +43,17 @@ pub enum Form {
     Window,
     /// All pairs by multilevel summation.
     Exact,
-    /// All pairs through shared memory.
-    Pairs,
-    /// All pairs from global memory.
-    NaivePairs,
 }
 
 impl Form {
     /// All forms, the quickest first.
-    pub const ALL: [Self; 4] = [Self::Window, Self::Exact, Self::Pairs, Self::NaivePairs];
+    pub const ALL: [Self; 2] = [Self::Window, Self::Exact];
 
     /// What tables and settings call it.
     pub fn name(self) -> &'static str {
         match self {
             Self::Window => "window",
             Self::Exact => "exact",
-            Self::Pairs => "pairs",
-            Self::NaivePairs => "naive-pairs",
         }
     }
 }
@@ -102,16 +89,6 @@ impl Task {
         })
     }
 
-    fn pairs(&self) -> u64 {
-        let gaps = self.gaps.iter().filter(|gap| **gap != 0).count() as u64;
-        gaps * self
-            .scaled
-            .values
-            .iter()
-            .filter(|value| holds(**value))
-            .count() as u64
-    }
-
     /// The frame with the answers of a device or a twin in its gaps.
     pub fn filled(&self, values: &[f32], answers: &[f32]) -> Filled {
         let mut filled = unfilled(values);
@@ -139,14 +116,6 @@ fn exact_ladder(grid: &Grid) -> Result<Ladder, RenderError> {
     exact::ladder(grid).ok_or(RenderError::NoExactFill)
 }
 
-fn check_pairs(pairs: u64, limit: u64) -> Result<(), RenderError> {
-    if pairs > limit {
-        Err(RenderError::TooManyPairs { pairs, limit })
-    } else {
-        Ok(())
-    }
-}
-
 /// Fills one frame with the twins; the same bits as on a device.
 ///
 /// `values`, `domain`: `[row, col]`, one number a cell; values NaN or [`MISSING`] where there is no data.
@@ -164,10 +133,6 @@ pub fn on_cpu(
         let answers = match form {
             Form::Window => window::cpu::answers(&window::ladder(grid), scaled, &task.gaps),
             Form::Exact => exact::cpu::answers(&exact_ladder(grid)?, scaled, &task.gaps),
-            Form::Pairs | Form::NaivePairs => {
-                check_pairs(task.pairs(), MOST_PAIRS_ON_CPU)?;
-                pairs::cpu::answers(grid, &pairs::tables(grid), scaled, &task.gaps)
-            }
         };
         Ok(task.filled(values, &answers))
     })
@@ -177,7 +142,6 @@ pub fn on_cpu(
 pub struct Sources {
     pub window: Cow<'static, str>,
     pub exact: Cow<'static, str>,
-    pub pairs: Cow<'static, str>,
     pub stencil: Cow<'static, str>,
 }
 
@@ -186,7 +150,6 @@ impl Default for Sources {
         Self {
             window: window::SOURCE.into(),
             exact: exact::SOURCE.into(),
-            pairs: pairs::SOURCE.into(),
             stencil: STENCIL_SOURCE.into(),
         }
     }
@@ -197,7 +160,6 @@ pub struct Fill {
     sources: Sources,
     window: Window,
     exact: OnceLock<Exact>,
-    pairs: OnceLock<Pairs>,
     /// Tables of the last grid of the window's form: products have many frames of one grid.
     tables: Mutex<Option<Arc<DeviceLadder>>>,
 }
@@ -208,7 +170,6 @@ impl Fill {
         Self {
             window: Window::new(gpu, &sources),
             exact: OnceLock::new(),
-            pairs: OnceLock::new(),
             tables: Mutex::default(),
             sources,
         }
@@ -234,7 +195,7 @@ impl Fill {
             };
             let prepared = self.prepared(gpu, form, grid, &task)?;
             let mut recorder = gpu.recorder();
-            prepared.record(&mut recorder, prepared.pieces());
+            prepared.record(&mut recorder);
             let answers = recorder.download(prepared.answers(), 2 * values.len())?;
             Ok(task.filled(values, &answers))
         })
@@ -259,24 +220,6 @@ impl Fill {
                 let exact = self.exact.get_or_init(|| Exact::new(gpu, &self.sources));
                 Ready::Exact(exact, Rooms::new(gpu, &ladder, values, gaps)?)
             }
-            Form::Pairs | Form::NaivePairs => {
-                let is_naive = form == Form::NaivePairs;
-                check_pairs(task.pairs(), MOST_PAIRS)?;
-                if !is_naive && grid.cols > pairs::MOST_COLS {
-                    let (bytes, limit) =
-                        (4 * u64::from(grid.cols), 4 * u64::from(pairs::MOST_COLS));
-                    return Err(RenderError::TooLarge {
-                        what: "weights of a row",
-                        bytes,
-                        limit,
-                    });
-                }
-                let pairs = self
-                    .pairs
-                    .get_or_init(|| Pairs::new(gpu, &self.sources.pairs));
-                let rooms = PairRooms::new(gpu, grid, values, gaps)?;
-                Ready::Pairs(pairs, Box::new(rooms), is_naive)
-            }
         }))
     }
 
@@ -297,26 +240,14 @@ pub struct Prepared<'a>(Ready<'a>);
 enum Ready<'a> {
     Window(&'a Window, Rooms),
     Exact(&'a Exact, Rooms),
-    Pairs(&'a Pairs, Box<PairRooms>, bool),
 }
 
 impl Prepared<'_> {
-    /// How many pieces it is made of, which may be recorded apart.
-    pub fn pieces(&self) -> u32 {
-        match &self.0 {
-            Ready::Window(..) | Ready::Exact(..) => 1,
-            Ready::Pairs(_, rooms, is_naive) => rooms.pieces(*is_naive),
-        }
-    }
-
-    /// Records its first `pieces`.
-    pub fn record(&self, recorder: &mut crate::gpu::Recorder<'_>, pieces: u32) {
+    /// Records all of it.
+    pub fn record(&self, recorder: &mut crate::gpu::Recorder<'_>) {
         match &self.0 {
             Ready::Window(window, rooms) => window.record(recorder, rooms),
             Ready::Exact(exact, rooms) => exact.record(recorder, rooms),
-            Ready::Pairs(pairs, rooms, is_naive) => {
-                pairs.record(recorder, rooms, *is_naive, pieces);
-            }
         }
     }
 
@@ -324,7 +255,6 @@ impl Prepared<'_> {
     pub fn answers(&self) -> &wgpu::Buffer {
         match &self.0 {
             Ready::Window(_, rooms) | Ready::Exact(_, rooms) => &rooms.levels[0].answers,
-            Ready::Pairs(_, rooms, _) => &rooms.answers,
         }
     }
 }
