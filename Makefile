@@ -81,8 +81,8 @@ faults: test-tools $(viewer) ## kill -9 of every kind of process, 60 times, whil
 	FLUXGLOBE_KILLS=60 cargo test --locked -p tests --test cluster killed -- --nocapture
 
 bless: test-tools ## Draw the golden images anew, for a new RENDERER_VERSION, and list what changed
-	BLESS=1 cargo test --locked -p render-worker --test it golden
-	git status --short -- render-worker/tests/golden
+	BLESS=1 cargo test --locked -p render --test it golden
+	git status --short -- render/tests/golden
 
 describe: test-tools $(viewer) ## Write tile-server/openapi.json and the viewer's types anew, after a change of the HTTP API
 	BLESS=1 cargo test --locked -p tile-server --test it openapi

@@ -47,8 +47,7 @@ def board() -> Dashboard:
             number(
                 "Pictures that differ",
                 "Two renderers drew different bytes for one job within a day. Worry above 0.",
-                f"sum(increase({TILES}_conflicts_total[24h]))"
-                f' + (sum(increase({WORKER}_pictures_total{{origin="conflict"}}[24h])) or vector(0))',
+                f'sum(increase({WORKER}_pictures_total{{origin="conflict"}}[24h])) or vector(0)',
                 "none",
                 (None, GREEN),
                 (1, RED),

@@ -9,7 +9,9 @@ use compute::Engine;
 use contract::manifest::Manifest;
 use contract::product::ProductId;
 use kafka_log::{KafkaLog, KafkaSettings};
-use render_worker::{Backend, Limits, RenderService};
+use prometheus::Registry;
+use render::Backend;
+use render_worker::{Desk, Limits};
 use storage::Store;
 use storage::log::{EmbeddedLog, EventLog};
 
@@ -133,38 +135,25 @@ pub(crate) fn backend(settings: &Settings) -> Result<Backend> {
     }
 }
 
-/// The renderer for pictures that follow one another in time.
-pub(crate) async fn renderer(settings: &Settings, store: Store) -> Result<RenderService> {
-    renderer_at(settings, store, None).await
-}
-
-/// The same that draws so many pictures at the same time; as many as suit its adapter if none is named.
-pub(crate) async fn renderer_at(
+/// A desk in this process, whose metrics go to `registry`.
+pub(crate) async fn desk(
     settings: &Settings,
     store: Store,
-    draws_at_once: Option<NonZeroU32>,
-) -> Result<RenderService> {
-    let count = draws_at_once.and_then(|count| NonZeroUsize::new(count.get() as usize));
-    let limits = Limits {
-        draws_at_once: count,
-        ..Limits::default()
-    };
-    renderer_of(settings, store, limits).await
+    limits: Limits,
+    registry: &Registry,
+) -> Result<Desk> {
+    let (backend, registry) = (backend(settings)?, registry.clone());
+    let open = move || Desk::open(store, backend, &limits, &registry);
+    Ok(tokio::task::spawn_blocking(open).await??)
 }
 
-/// The same for single pictures: nothing is read ahead for a next one.
-pub(crate) async fn single_renderer(settings: &Settings, store: Store) -> Result<RenderService> {
+/// The same for single pictures of a command: nothing is read ahead for a next one.
+pub(crate) async fn single_desk(settings: &Settings, store: Store) -> Result<Desk> {
     let limits = Limits {
         frames_ahead: 0,
         ..Limits::default()
     };
-    renderer_of(settings, store, limits).await
-}
-
-async fn renderer_of(settings: &Settings, store: Store, limits: Limits) -> Result<RenderService> {
-    let backend = backend(settings)?;
-    let make = move || RenderService::with_limits(store, backend, limits);
-    Ok(tokio::task::spawn_blocking(make).await??)
+    desk(settings, store, limits, &Registry::new()).await
 }
 
 /// The newest manifest of a product, or an error that names the products there are.

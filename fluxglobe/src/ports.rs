@@ -14,11 +14,13 @@ use compute::{ComputeError, ErrorClass};
 use contract::job::RenderJob;
 use contract::manifest::Manifest;
 use contract::time::Period;
+use render_worker::Desk;
+use render_worker::desk::{DeskError, Order, Storing};
 use render_worker::fleet::{Fleet, FleetError};
-use render_worker::{RenderError, RenderService};
 use tile_server::backend::{
     Analyse, AreaRequest, AreaRow, AreaSeries, BackendError, BudgetAnswer, BudgetRequest,
-    BudgetRow, BudgetStep as WantedStep, Check, Class, Contributed, Draw, PointStep, RowCol, Turn,
+    BudgetRow, BudgetStep as WantedStep, Check, Class, Contributed, Draw, Keep, PointStep, RowCol,
+    Turn,
 };
 
 pub(crate) use observer::Observer;
@@ -27,17 +29,17 @@ pub(crate) use observer::Observer;
 /// 16 wait in it: one server alone must be able to fill that.
 const FLEET_DRAWS_AT_ONCE: NonZeroU32 = NonZeroU32::new(32).expect("32 is not 0");
 
-/// Pictures from the renderer in this process.
+/// Pictures from the desk in this process, which is the one that a render worker has.
 pub(crate) struct Drawer {
-    service: RenderService,
+    desk: Desk,
     /// Why the last picture failed, if its device or thread was lost; cleared by the next one that succeeds.
     trouble: Mutex<Option<String>>,
 }
 
 impl Drawer {
-    pub(crate) fn new(service: RenderService) -> Self {
+    pub(crate) fn new(desk: Desk) -> Self {
         Self {
-            service,
+            desk,
             trouble: Mutex::default(),
         }
     }
@@ -68,15 +70,19 @@ impl Analyst {
 
 #[async_trait]
 impl Draw for Drawer {
-    async fn draw(&self, job: &RenderJob, turn: Turn) -> Result<Bytes, BackendError> {
-        let picture = self.service.draw_in_turn(job, turn).await;
-        let trouble = picture.as_ref().err().filter(|error| error.is_retryable());
-        *self.trouble() = trouble.map(ToString::to_string);
-        picture.map_err(render_failed)
+    async fn draw(&self, job: &RenderJob, keep: Keep, turn: Turn) -> Result<Bytes, BackendError> {
+        let order = Order::on_demand(storing(keep));
+        let drawn = self.desk.draw_in_turn(job, order, turn).await;
+        *self.trouble() = match &drawn {
+            Err(DeskError::Render(error)) if error.is_retryable() => Some(error.to_string()),
+            // A queue that is full is no trouble.
+            _ => None,
+        };
+        drawn.map(|drawn| drawn.png).map_err(desk_failed)
     }
 
     fn draws_at_once(&self) -> NonZeroU32 {
-        let suited = u32::try_from(self.service.draws_at_once().get()).unwrap_or(u32::MAX);
+        let suited = u32::try_from(self.desk.draws_at_once().get()).unwrap_or(u32::MAX);
         NonZeroU32::new(suited).unwrap_or(NonZeroU32::MIN)
     }
 
@@ -196,9 +202,9 @@ pub(crate) struct FleetDrawer(pub(crate) Fleet);
 
 #[async_trait]
 impl Draw for FleetDrawer {
-    async fn draw(&self, job: &RenderJob, turn: Turn) -> Result<Bytes, BackendError> {
+    async fn draw(&self, job: &RenderJob, keep: Keep, turn: Turn) -> Result<Bytes, BackendError> {
         let trace = job.digest().short();
-        let picture = self.0.draw(job, &trace).await;
+        let picture = self.0.draw(job, storing(keep), &trace).await;
         drop(turn);
         picture
             .map(|picture| picture.png)
@@ -243,17 +249,27 @@ fn compute_failed(error: ComputeError) -> BackendError {
     BackendError::new(class, error.to_string()).because(error)
 }
 
-fn render_failed(error: RenderError) -> BackendError {
-    let class = if error.is_bad_request() {
-        Class::BadRequest
-    } else if error.is_not_found() {
-        Class::NotFound
-    } else if error.is_retryable() {
-        Class::Unavailable
-    } else {
-        Class::Internal
+fn desk_failed(error: DeskError) -> BackendError {
+    let text = error.to_string();
+    let class = match &error {
+        DeskError::Full { retry_after, .. } => {
+            return BackendError::new(Class::Busy, text).after(*retry_after);
+        }
+        DeskError::Stopping => Class::Unavailable,
+        DeskError::Render(error) if error.is_bad_request() => Class::BadRequest,
+        DeskError::Render(error) if error.is_not_found() => Class::NotFound,
+        DeskError::Render(error) if error.is_retryable() => Class::Unavailable,
+        DeskError::Render(_) => Class::Internal,
     };
-    BackendError::new(class, error.to_string()).because(error)
+    BackendError::new(class, text).because(error)
+}
+
+/// Whoever asks has looked in the store.
+fn storing(keep: Keep) -> Storing {
+    match keep {
+        Keep::Yes => Storing::Keep,
+        Keep::No => Storing::Nothing,
+    }
 }
 
 #[cfg(test)]

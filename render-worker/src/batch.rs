@@ -9,12 +9,13 @@ use contract::job::RenderJob;
 use contract::topic::Topic;
 use futures::FutureExt as _;
 use futures::stream::{FuturesUnordered, StreamExt as _};
+use render::RenderError;
 use storage::StorageError;
 use storage::log::{EventLog, Finished, Message};
 use tracing::Instrument as _;
 
-use crate::desk::{Class, Desk, DeskError, Drawn};
-use crate::error::RenderError;
+use crate::desk::{Desk, DeskError, Drawn, Order};
+use crate::error::DrawError;
 
 /// Group of readers that share the jobs.
 pub const GROUP: &str = "render";
@@ -70,7 +71,7 @@ impl BatchService {
     }
 
     async fn read(&self, stop: &Stop) -> Result<(), StorageError> {
-        let at_once = self.desk.draws_at_once();
+        let at_once = self.desk.draws_at_once().get();
         let mut reader = self.log.join(Topic::RenderJob, GROUP).await?;
         let mut work = FuturesUnordered::new();
         while !stop.is_said() {
@@ -149,13 +150,13 @@ impl BatchService {
         })
     }
 
-    async fn draw_and_keep(&self, job: &RenderJob) -> Result<(), Arc<RenderError>> {
-        let Drawn { png, kept, .. } = match self.desk.draw(job, Class::Batch).await {
+    async fn draw_and_keep(&self, job: &RenderJob) -> Result<(), Arc<DrawError>> {
+        let Drawn { png, kept, .. } = match self.desk.draw(job, Order::batch()).await {
             Ok(drawn) => drawn,
             Err(DeskError::Render(error)) => return Err(error),
             // The batch is not counted, and it stops by itself: both are passing.
             Err(DeskError::Full { .. } | DeskError::Stopping) => {
-                return Err(Arc::new(RenderError::NotWanted));
+                return Err(Arc::new(RenderError::NotWanted.into()));
             }
         };
         if !kept {

@@ -5,10 +5,10 @@ use std::sync::Arc;
 use std::thread;
 
 use bytes::Bytes;
+use render::Image;
 use tokio::sync::Semaphore;
 
-use crate::error::RenderError;
-use crate::image::Image;
+use crate::error::DrawError;
 
 /// The cores that encode pictures. Cheap to clone.
 #[derive(Clone)]
@@ -42,15 +42,15 @@ impl Encoders {
         &self,
         image: Image,
         turn: impl Send + 'static,
-    ) -> Result<Bytes, RenderError> {
-        self.run(turn, move || image.encode_png()).await?
+    ) -> Result<Bytes, DrawError> {
+        Ok(self.run(turn, move || image.encode_png()).await??)
     }
 
     async fn run<T: Send + 'static>(
         &self,
         turn: impl Send + 'static,
         work: impl FnOnce() -> T + Send + 'static,
-    ) -> Result<T, RenderError> {
+    ) -> Result<T, DrawError> {
         // It is never closed, but a closed semaphore would only mean that nothing is counted.
         let core = Arc::clone(&self.cores).acquire_owned().await;
         drop(turn);
@@ -59,7 +59,7 @@ impl Encoders {
             drop(core);
             done
         });
-        working.await.map_err(RenderError::Thread)
+        working.await.map_err(DrawError::Thread)
     }
 }
 

@@ -1,140 +1,47 @@
-//! What can go wrong between a render job and its picture.
+//! What can go wrong between a render job and its stored picture.
 
-use contract::ContractError;
 use contract::key::ObjectKey;
+use render::RenderError;
+use storage::StorageError;
 
-/// A job that could not be drawn.
+/// A job whose picture could not be had.
 #[derive(Debug, thiserror::Error)]
-pub enum RenderError {
-    /// No Vulkan adapter on this machine.
-    #[error(
-        "no Vulkan adapter found; install the package mesa-vulkan-drivers for a software one, or draw with the CPU backend"
-    )]
-    NoAdapter(#[source] Box<wgpu::RequestAdapterError>),
-    /// There is a software adapter alone, where a graphics card is required.
-    #[error(
-        "a graphics card is required and there is none: the only Vulkan adapter is {adapter}, a program on the processor; \
-         give this machine or container a card and its driver, or start without --require-gpu"
-    )]
-    SoftwareAdapter { adapter: String },
-    /// The adapter refused a device.
-    #[error("adapter {adapter:?} gave no device")]
-    NoDevice {
-        adapter: String,
-        source: Box<wgpu::RequestDeviceError>,
-    },
-    /// The device stopped answering.
-    #[error("the graphics device stopped while {what}")]
-    DeviceStopped { what: &'static str },
-    /// The device has no memory left.
-    #[error("the graphics device was out of memory while {what}")]
-    OutOfMemory { what: &'static str },
-    /// The job breaks a limit of the contract.
-    #[error("job refused")]
-    Job(#[from] ContractError),
-    /// More particles than one picture may have.
-    #[error(
-        "the picture needs {count} particles, at most {limit} are drawn; use fewer particles a cell or a smaller view"
-    )]
-    TooManyParticles { count: u64, limit: u64 },
-    /// A buffer larger than the device or the limit allows.
-    #[error(
-        "{what} need {bytes} bytes, the device holds at most {limit}; use a smaller picture or fewer slices"
-    )]
-    TooLarge {
-        what: &'static str,
-        bytes: u64,
-        limit: u64,
-    },
-    /// Gaps times cells with data, where every pair is met.
-    #[error(
-        "{pairs} pairs of a gap and a cell with data, at most {limit} are met one by one; use the form window or exact"
-    )]
-    TooManyPairs { pairs: u64, limit: u64 },
-    /// Multilevel summation over a pole.
-    #[error(
-        "the grid comes too near a pole, or cannot be halved often enough, for the exact form; use the form window or pairs"
-    )]
-    NoExactFill,
-    /// Two products drawn together lie on different grids.
-    #[error("{accumulated} does not lie on the grid of {product}")]
-    GridMismatch {
-        product: String,
-        accumulated: String,
-    },
-    /// A flow was to be drawn from one part of its vector.
-    #[error("a flow needs both parts of a vector, the scene has the eastward one only")]
-    NoNorthward,
+pub enum DrawError {
+    /// The engine could not draw it.
+    #[error(transparent)]
+    Render(#[from] RenderError),
     /// Reading frames failed.
     #[error("cannot read {what} of {product}")]
     Store {
         what: &'static str,
         product: String,
-        source: Box<storage::StorageError>,
+        source: Box<StorageError>,
     },
     /// The picture could not be read from the store or put there.
     #[error("cannot {what} picture {key}")]
     Picture {
         what: &'static str,
         key: ObjectKey,
-        source: Box<storage::StorageError>,
+        source: Box<StorageError>,
     },
-    /// The picture could not be written as PNG.
-    #[error("cannot encode a picture of {width} x {height} pixels")]
-    Encode {
-        width: u32,
-        height: u32,
-        source: image::ImageError,
-    },
-    /// Only volumes without a globe behind them are drawn another way.
-    #[error(
-        "the reference draws volumes alone: no globe behind them, no surroundings, no doubt, no sun of an instant"
-    )]
-    NoReference,
     /// The thread that drew was lost.
     #[error("the drawing thread ended early")]
     Thread(#[source] tokio::task::JoinError),
-    /// Whoever wanted the picture has gone.
-    #[error("nobody waits for the picture any more")]
-    NotWanted,
 }
 
-impl RenderError {
+impl DrawError {
     /// May the same job succeed later?
     pub fn is_retryable(&self) -> bool {
         match self {
-            Self::DeviceStopped { .. }
-            | Self::OutOfMemory { .. }
-            | Self::Thread(_)
-            | Self::NotWanted => true,
+            Self::Render(error) => error.is_retryable(),
             Self::Store { source, .. } | Self::Picture { source, .. } => source.is_retryable(),
-            Self::NoAdapter(_)
-            | Self::SoftwareAdapter { .. }
-            | Self::NoDevice { .. }
-            | Self::Job(_)
-            | Self::TooManyParticles { .. }
-            | Self::TooLarge { .. }
-            | Self::TooManyPairs { .. }
-            | Self::NoExactFill
-            | Self::GridMismatch { .. }
-            | Self::NoNorthward
-            | Self::Encode { .. }
-            | Self::NoReference => false,
+            Self::Thread(_) => true,
         }
     }
 
     /// Is the job, not the worker, to blame?
     pub fn is_bad_request(&self) -> bool {
-        matches!(
-            self,
-            Self::Job(_)
-                | Self::TooManyParticles { .. }
-                | Self::TooLarge { .. }
-                | Self::TooManyPairs { .. }
-                | Self::NoExactFill
-                | Self::GridMismatch { .. }
-                | Self::NoNorthward
-        )
+        matches!(self, Self::Render(error) if error.is_bad_request())
     }
 
     /// Does the job name something that is not stored?
@@ -145,10 +52,10 @@ impl RenderError {
     /// Is the device to blame, so that a fresh one may draw the job?
     pub fn is_device_fault(&self) -> bool {
         match self {
-            Self::DeviceStopped { .. } | Self::OutOfMemory { .. } => true,
+            Self::Render(error) => error.is_device_fault(),
             // Drivers and the library over them give up by a panic where they have no error to return.
             Self::Thread(lost) => lost.is_panic(),
-            _ => false,
+            Self::Store { .. } | Self::Picture { .. } => false,
         }
     }
 
@@ -156,27 +63,18 @@ impl RenderError {
     /// its own; a store or a machine that cannot be used is not.
     pub fn is_final(&self) -> bool {
         match self {
-            Self::DeviceStopped { .. }
-            | Self::OutOfMemory { .. }
-            | Self::Thread(_)
-            | Self::Job(_)
-            | Self::TooManyParticles { .. }
-            | Self::TooLarge { .. }
-            | Self::TooManyPairs { .. }
-            | Self::NoExactFill
-            | Self::GridMismatch { .. }
-            | Self::NoNorthward
-            | Self::Encode { .. }
-            | Self::NoReference => true,
+            Self::Render(error) => error.is_final(),
+            Self::Thread(_) => true,
             Self::Store { source, .. } => {
-                source.is_not_found() || matches!(**source, storage::StorageError::Damaged { .. })
+                source.is_not_found() || matches!(**source, StorageError::Damaged { .. })
             }
-            Self::NoAdapter(_)
-            | Self::SoftwareAdapter { .. }
-            | Self::NoDevice { .. }
-            | Self::Picture { .. }
-            | Self::NotWanted => false,
+            Self::Picture { .. } => false,
         }
+    }
+
+    /// Has whoever wanted the picture gone?
+    pub fn is_not_wanted(&self) -> bool {
+        matches!(self, Self::Render(RenderError::NotWanted))
     }
 
     /// The error and what it came from, in one line.

@@ -5,7 +5,7 @@ use prometheus::proto::MetricFamily;
 use prometheus::{IntCounter, IntCounterVec, IntGauge, IntGaugeVec, Opts};
 
 use crate::desk::{Desk, METRICS};
-use crate::service::RenderService;
+use crate::pipeline::Pipeline;
 
 /// Gauges of one desk.
 pub(crate) struct Gauges {
@@ -15,7 +15,6 @@ pub(crate) struct Gauges {
     encoding: IntGauge,
     resident_bytes: IntGaugeVec,
     frame_reads: IntCounterVec,
-    shared_lights: IntCounterVec,
     prefetch: IntCounterVec,
     device_restarts: IntCounter,
 }
@@ -40,7 +39,7 @@ impl Gauges {
             resident_bytes: IntGaugeVec::new(
                 named(
                     "resident_bytes",
-                    "Bytes of frames kept, in memory and on the device, and of shared light there.",
+                    "Bytes of frames kept, in memory and on the device.",
                 ),
                 &["place"],
             )?,
@@ -48,13 +47,6 @@ impl Gauges {
                 named(
                     "frame_reads_total",
                     "Frames wanted, by whether they were there.",
-                ),
-                &["outcome"],
-            )?,
-            shared_lights: IntCounterVec::new(
-                named(
-                    "shared_lights_total",
-                    "Blocks of tiles whose light was made, and tiles drawn in such light.",
                 ),
                 &["outcome"],
             )?,
@@ -81,7 +73,6 @@ impl Collector for Gauges {
             self.encoding.desc(),
             self.resident_bytes.desc(),
             self.frame_reads.desc(),
-            self.shared_lights.desc(),
             self.prefetch.desc(),
             self.device_restarts.desc(),
         ]
@@ -90,8 +81,8 @@ impl Collector for Gauges {
 
     fn collect(&self) -> Vec<MetricFamily> {
         let condition = self.desk.condition();
-        let service = self.desk.service();
-        let kept = service.kept();
+        let pipeline = self.desk.pipeline();
+        let kept = pipeline.kept();
         let waiting = |class: &str, count: usize| {
             let gauge = self.queue_length.with_label_values(&[class]);
             gauge.set(count as i64);
@@ -105,14 +96,7 @@ impl Collector for Gauges {
             gauge.set(bytes as i64);
         };
         bytes("memory", kept.frame_bytes);
-        bytes("device", service.renderer().resident_bytes());
-        let lights = service.renderer().light_counts();
-        bytes("light", lights.bytes);
-        let shared = |outcome: &str, total: u64| {
-            raise(&self.shared_lights.with_label_values(&[outcome]), total);
-        };
-        shared("made", lights.made);
-        shared("used", lights.used);
+        bytes("device", pipeline.renderer().resident_bytes());
         let reads = |outcome: &str, total: u64| {
             raise(&self.frame_reads.with_label_values(&[outcome]), total);
         };
@@ -124,14 +108,13 @@ impl Collector for Gauges {
         early("read", kept.early_reads);
         early("used", kept.early_hits);
         early("cancelled", kept.early_cancelled);
-        raise(&self.device_restarts, service.renderer().device_number());
+        raise(&self.device_restarts, pipeline.renderer().device_number());
         [
             self.queue_length.collect(),
             self.drawing.collect(),
             self.encoding.collect(),
             self.resident_bytes.collect(),
             self.frame_reads.collect(),
-            self.shared_lights.collect(),
             self.prefetch.collect(),
             self.device_restarts.collect(),
         ]
@@ -139,18 +122,18 @@ impl Collector for Gauges {
     }
 }
 
-/// `fluxglobe_render_adapter_info`: what a service draws on.
+/// `fluxglobe_render_adapter_info`: what a desk draws on.
 pub(crate) struct AdapterInfo {
-    service: RenderService,
+    pipeline: Pipeline,
     info: IntGaugeVec,
 }
 
 impl AdapterInfo {
-    pub(crate) fn of(service: &RenderService) -> Result<Self, prometheus::Error> {
+    pub(crate) fn of(pipeline: &Pipeline) -> Result<Self, prometheus::Error> {
         let help = "1, with what pictures are drawn on: its name, how it is reached, what kind of adapter it is.";
         let name = "fluxglobe_render_adapter_info";
         Ok(Self {
-            service: service.clone(),
+            pipeline: pipeline.clone(),
             info: IntGaugeVec::new(Opts::new(name, help), &["name", "backend", "type"])?,
         })
     }
@@ -162,7 +145,7 @@ impl Collector for AdapterInfo {
     }
 
     fn collect(&self) -> Vec<MetricFamily> {
-        let adapter = self.service.renderer().adapter();
+        let adapter = self.pipeline.renderer().adapter();
         // After a fault it may be another one.
         self.info.reset();
         let labels = [adapter.name(), adapter.backend(), adapter.kind()];

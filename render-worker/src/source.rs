@@ -1,27 +1,31 @@
 //! Where scenes come from: the frames that a job names, gaps filled once, kept while there is room.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::collections::BTreeSet;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use contract::context::Relief;
 use contract::grid::Grid;
 use contract::job::RenderJob;
 use contract::key::ObjectKey;
 use contract::moment::{After, Moment};
+use quick_cache::sync::{Cache, DefaultLifecycle};
+use quick_cache::{DefaultHashBuilder, OptionsBuilder, Weighter};
+use render::scene::{Cells, Frame, Interval, Scene, Terrain};
+use render::stages::fill::Form;
+use render::stages::fill::scaled::holds;
+use render::{RenderError, Renderer};
 use storage::{StorageError, Store};
 
-use crate::error::RenderError;
-use crate::recent::Recent;
-use crate::renderer::Renderer;
-use crate::scene::{Cells, Frame, Interval, Scene, Terrain};
-use crate::stages::fill::Form;
-use crate::stages::fill::scaled::holds;
+use crate::error::DrawError;
 
 /// Domains kept; each has four bytes a cell.
-const MOST_DOMAINS: u64 = 64;
-/// Early frames remembered before those that are gone are forgotten.
-const MOST_EARLY: usize = 256;
+const MOST_DOMAINS: usize = 64;
+/// About as many frames are kept: of a degree they are many more, of a sixtieth of one fewer.
+const TYPICAL_FRAMES: usize = 256;
+/// Share of the memory for frames that were wanted again: the rest is for those that have just come, of which a picture
+/// needs several.
+const PROVEN_SHARE: f64 = 0.5;
 
 /// Loads scenes from a store.
 pub struct Source {
@@ -29,7 +33,9 @@ pub struct Source {
     /// Fills the gaps.
     renderer: Arc<Renderer>,
     most_bytes: u64,
-    held: Mutex<Held>,
+    domains: Cache<ObjectKey, Arc<Cells<u32>>>,
+    /// One reads a frame, others who want it wait; if he gives up, the next one reads.
+    frames: Cache<FrameKey, Held, ByBytes>,
     frame_hits: AtomicU64,
     frame_misses: AtomicU64,
     early_reads: AtomicU64,
@@ -39,6 +45,25 @@ pub struct Source {
 
 /// A frame, the domain that its gaps were filled for, and the counts that say what its sums lack, if that is drawn.
 type FrameKey = (ObjectKey, ObjectKey, Option<ObjectKey>);
+
+/// A frame in memory.
+#[derive(Clone)]
+struct Held {
+    frame: Arc<Frame>,
+    /// What it weighs, which must not change while it is here.
+    bytes: u64,
+    /// Nobody has wanted it yet.
+    is_early: Arc<AtomicBool>,
+}
+
+#[derive(Clone)]
+struct ByBytes;
+
+impl Weighter<FrameKey, Held> for ByBytes {
+    fn weight(&self, _key: &FrameKey, held: &Held) -> u64 {
+        held.bytes
+    }
+}
 
 /// Why a frame is read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -68,24 +93,37 @@ pub struct Kept {
     pub early_cancelled: u64,
 }
 
-#[derive(Default)]
-struct Held {
-    domains: Recent<ObjectKey, Arc<Cells<u32>>>,
-    frames: Recent<FrameKey, Arc<Frame>>,
-    /// Frames that nobody has wanted yet.
-    early: BTreeSet<FrameKey>,
-    /// Frames that are being read: whoever wants one too waits for it.
-    reading: BTreeMap<FrameKey, Arc<tokio::sync::Mutex<()>>>,
+impl Held {
+    fn new(frame: Frame, wanted: Wanted) -> Self {
+        Self {
+            bytes: frame.size_bytes(),
+            frame: Arc::new(frame),
+            is_early: Arc::new(AtomicBool::new(wanted == Wanted::Ahead)),
+        }
+    }
 }
 
 impl Source {
     /// A source that keeps frames up to `most_bytes`.
+    ///
+    /// # Panics
+    /// Never: its options are complete.
     pub fn new(store: Store, renderer: Arc<Renderer>, most_bytes: u64) -> Self {
+        // One shard: in several, each would have a part of the memory that a frame may not fit into.
+        let options = OptionsBuilder::new()
+            .shards(1)
+            .estimated_items_capacity(TYPICAL_FRAMES)
+            .weight_capacity(most_bytes)
+            .hot_allocation(PROVEN_SHARE)
+            .build()
+            .expect("both capacities are given");
+        let (hasher, lifecycle) = (DefaultHashBuilder::default(), DefaultLifecycle::default());
         Self {
             store,
             renderer,
             most_bytes,
-            held: Mutex::default(),
+            domains: Cache::new(MOST_DOMAINS),
+            frames: Cache::with_options(options, ByBytes, hasher, lifecycle),
             frame_hits: AtomicU64::new(0),
             frame_misses: AtomicU64::new(0),
             early_reads: AtomicU64::new(0),
@@ -106,12 +144,13 @@ impl Source {
 
     /// What is kept now.
     pub fn kept(&self) -> Kept {
-        let held = self.lock();
         // A frame's key is `frames/PRODUCT/DIGEST`, or the domain's where accumulation starts.
-        let product = |(frame, ..): &FrameKey| frame.as_str().split('/').nth(1).map(str::to_owned);
+        let product = |((frame, ..), _): (FrameKey, Held)| {
+            frame.as_str().split('/').nth(1).map(str::to_owned)
+        };
         Kept {
-            products: held.frames.keys().filter_map(product).collect(),
-            frame_bytes: held.frames.sum(|frame| frame.size_bytes()),
+            products: self.frames.iter().filter_map(product).collect(),
+            frame_bytes: self.frames.weight(),
             frame_hits: self.frame_hits.load(Ordering::Relaxed),
             frame_misses: self.frame_misses.load(Ordering::Relaxed),
             early_reads: self.early_reads.load(Ordering::Relaxed),
@@ -121,16 +160,16 @@ impl Source {
     }
 
     /// The scene of a job.
-    pub async fn scene(&self, job: &RenderJob) -> Result<Scene, RenderError> {
+    pub async fn scene(&self, job: &RenderJob) -> Result<Scene, DrawError> {
         self.scene_for(job, Wanted::Now).await
     }
 
     /// The same before anybody wants it.
-    pub(crate) async fn scene_ahead(&self, job: &RenderJob) -> Result<Scene, RenderError> {
+    pub(crate) async fn scene_ahead(&self, job: &RenderJob) -> Result<Scene, DrawError> {
         self.scene_for(job, Wanted::Ahead).await
     }
 
-    async fn scene_for(&self, job: &RenderJob, wanted: Wanted) -> Result<Scene, RenderError> {
+    async fn scene_for(&self, job: &RenderJob, wanted: Wanted) -> Result<Scene, DrawError> {
         let grid = &job.grid;
         let (domain, value) = self.interval(grid, &job.value, wanted).await?;
         let accumulated = match &job.accumulated {
@@ -156,33 +195,33 @@ impl Source {
     }
 
     /// The frame of a relief, as it is stored: what is missing stays so.
-    async fn terrain(&self, relief: &Relief) -> Result<Terrain, RenderError> {
+    async fn terrain(&self, relief: &Relief) -> Result<Terrain, DrawError> {
         let grid = relief.grid;
         // No domain: its gaps are not filled.
         let key = (relief.frame.clone(), relief.frame.clone(), None);
-        let held = self.lock().frames.get(&key);
-        if let Some(elevation) = held {
+        if let Some(held) = self.frames.get(&key) {
+            let elevation = held.frame;
             self.frame_hits.fetch_add(1, Ordering::Relaxed);
             // Found under its content, which says nothing of the grid of another job.
             let fits = elevation.cells.content().len() == grid.cell_count();
-            let mismatch = || RenderError::GridMismatch {
-                product: "the job".to_owned(),
-                accumulated: relief.frame.to_string(),
-            };
+            let mismatch = || mismatch(&relief.frame);
             return fits
                 .then_some(Terrain { grid, elevation })
                 .ok_or_else(mismatch);
         }
         self.frame_misses.fetch_add(1, Ordering::Relaxed);
         let read = storage::frames::read(&self.store, &relief.frame, &grid).await;
-        let values = read.map_err(|source| RenderError::Store {
+        let values = read.map_err(|source| DrawError::Store {
             what: "the relief",
             product: relief.frame.to_string(),
             source: Box::new(source),
         })?;
-        let elevation = Arc::new(Frame::new(values));
-        self.lock().keep(key, &elevation, self.most_bytes);
-        Ok(Terrain { grid, elevation })
+        let held = Held::new(Frame::new(values), Wanted::Now);
+        self.frames.insert(key, held.clone());
+        Ok(Terrain {
+            grid,
+            elevation: held.frame,
+        })
     }
 
     /// The domain of a moment and the frames around it.
@@ -191,7 +230,7 @@ impl Source {
         grid: &Grid,
         moment: &Moment,
         wanted: Wanted,
-    ) -> Result<(Arc<Cells<u32>>, Interval), RenderError> {
+    ) -> Result<(Arc<Cells<u32>>, Interval), DrawError> {
         let domain = self.domain(grid, moment).await?;
         let counts = moment.contributed.clone().unwrap_or_default();
         let part = |frame: &ObjectKey, counts: &Option<ObjectKey>| {
@@ -229,15 +268,15 @@ impl Source {
         grid: &Grid,
         domain: &Cells<u32>,
         key: FrameKey,
-    ) -> Result<Arc<Frame>, RenderError> {
-        if let Some(frame) = self.lock().frames.get(&key) {
-            return Ok(frame);
+    ) -> Result<Arc<Frame>, DrawError> {
+        if let Some(held) = self.frames.get(&key) {
+            return Ok(held.frame);
         }
         let zero = |cell: &u32| if *cell == 0 { f32::NAN } else { 0.0 };
         let frame = Frame::new(domain.content().iter().map(zero).collect());
-        let frame = Arc::new(self.doubted(frame, grid, &key).await?);
-        self.lock().keep(key, &frame, self.most_bytes);
-        Ok(frame)
+        let held = Held::new(self.doubted(frame, grid, &key).await?, Wanted::Now);
+        self.frames.insert(key, held.clone());
+        Ok(held.frame)
     }
 
     /// A frame with what its sums lack, if its key names counts.
@@ -246,7 +285,7 @@ impl Source {
         frame: Frame,
         grid: &Grid,
         (_, domain, counts): &FrameKey,
-    ) -> Result<Frame, RenderError> {
+    ) -> Result<Frame, DrawError> {
         let Some(counts) = counts else {
             return Ok(frame);
         };
@@ -255,28 +294,19 @@ impl Source {
         Ok(frame.with_lacking(counts.lacking()))
     }
 
-    async fn domain(&self, grid: &Grid, moment: &Moment) -> Result<Arc<Cells<u32>>, RenderError> {
-        let held = self.lock().domains.get(&moment.domain);
-        let domain = if let Some(domain) = held {
-            domain
-        } else {
+    async fn domain(&self, grid: &Grid, moment: &Moment) -> Result<Arc<Cells<u32>>, DrawError> {
+        let reading = async {
             let read = storage::domain::read(&self.store, &moment.domain).await;
             let flags = read.map_err(|e| failed("the domain", &moment.domain, e))?;
-            let domain = Scene::domain_of(flags);
-            let kept = Arc::clone(&domain);
-            self.lock()
-                .domains
-                .keep(moment.domain.clone(), kept, MOST_DOMAINS, |_| 1);
-            domain
+            Ok::<_, DrawError>(Scene::domain_of(flags))
         };
+        let kept = self.domains.get_or_insert_async(&moment.domain, reading);
+        let domain = kept.await?;
         // Before anything as large as the grid claims to be is laid out.
         if domain.content().len() == grid.cell_count() {
             return Ok(domain);
         }
-        Err(RenderError::GridMismatch {
-            product: "the job".to_owned(),
-            accumulated: moment.domain.to_string(),
-        })
+        Err(mismatch(&moment.domain))
     }
 
     async fn frame(
@@ -285,46 +315,30 @@ impl Source {
         domain: &Arc<Cells<u32>>,
         key: FrameKey,
         wanted: Wanted,
-    ) -> Result<Arc<Frame>, RenderError> {
-        if let Some(frame) = self.held(&key, wanted) {
-            return Ok(frame);
-        }
-        // One reads, the others wait; if he gives up, the next one reads.
-        let turn = Arc::clone(self.lock().reading.entry(key.clone()).or_default());
-        let reading = turn.lock().await;
-        if let Some(frame) = self.held(&key, wanted) {
-            return Ok(frame);
-        }
+    ) -> Result<Arc<Frame>, DrawError> {
+        let place = match self.frames.get_value_or_guard_async(&key).await {
+            Ok(held) => {
+                if wanted == Wanted::Now {
+                    self.frame_hits.fetch_add(1, Ordering::Relaxed);
+                    let was_early = held.is_early.swap(false, Ordering::Relaxed);
+                    self.early_hits
+                        .fetch_add(u64::from(was_early), Ordering::Relaxed);
+                }
+                return Ok(held.frame);
+            }
+            Err(place) => place,
+        };
         if wanted == Wanted::Now {
             self.frame_misses.fetch_add(1, Ordering::Relaxed);
         }
-        let done = self.read(grid, domain, &key).await;
-        let mut held = self.lock();
-        held.reading.remove(&key);
-        held.forget_dropped();
-        if let Ok(frame) = &done {
-            if wanted == Wanted::Ahead {
-                self.early_reads.fetch_add(1, Ordering::Relaxed);
-                held.early.insert(key.clone());
-            }
-            held.keep(key, frame, self.most_bytes);
+        let held = Held::new(self.read(grid, domain, &key).await?, wanted);
+        if wanted == Wanted::Ahead {
+            self.early_reads.fetch_add(1, Ordering::Relaxed);
         }
-        drop(held);
-        drop(reading);
-        done
-    }
-
-    /// The frame of a key, if it is in memory.
-    fn held(&self, key: &FrameKey, wanted: Wanted) -> Option<Arc<Frame>> {
-        let mut held = self.lock();
-        let frame = held.frames.get(key)?;
-        if wanted == Wanted::Now {
-            self.frame_hits.fetch_add(1, Ordering::Relaxed);
-            if held.early.remove(key) {
-                self.early_hits.fetch_add(1, Ordering::Relaxed);
-            }
-        }
-        Some(frame)
+        let frame = Arc::clone(&held.frame);
+        // A frame that is too large to be kept is drawn all the same.
+        drop(place.insert(held));
+        Ok(frame)
     }
 
     /// A frame from the store, gaps filled.
@@ -333,37 +347,15 @@ impl Source {
         grid: &Grid,
         domain: &Arc<Cells<u32>>,
         key: &FrameKey,
-    ) -> Result<Arc<Frame>, RenderError> {
+    ) -> Result<Frame, DrawError> {
         let (frame, of_domain, _) = key;
         let read = storage::frames::read(&self.store, frame, grid).await;
         let values = read.map_err(|e| failed("a frame", of_domain, e))?;
         let (renderer, of_grid, domain) = (Arc::clone(&self.renderer), *grid, Arc::clone(domain));
         let fill = move || fill(&renderer, &of_grid, values, &domain);
         let filled = tokio::task::spawn_blocking(fill).await;
-        let filled = filled.map_err(RenderError::Thread)??;
-        Ok(Arc::new(self.doubted(filled, grid, key).await?))
-    }
-
-    fn lock(&self) -> std::sync::MutexGuard<'_, Held> {
-        // Maps are changed by single inserts and removals, so a poisoned lock still guards whole ones.
-        self.held.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-impl Held {
-    fn keep(&mut self, key: FrameKey, frame: &Arc<Frame>, most_bytes: u64) {
-        let kept = Arc::clone(frame);
-        self.frames
-            .keep(key, kept, most_bytes, |frame| frame.size_bytes());
-    }
-
-    /// Forgets of frames that went unwanted that they were early, and of readings that were given up.
-    fn forget_dropped(&mut self) {
-        self.reading.retain(|_, turn| Arc::strong_count(turn) > 1);
-        if self.early.len() > MOST_EARLY {
-            let there: BTreeSet<FrameKey> = self.frames.keys().cloned().collect();
-            self.early.retain(|key| there.contains(key));
-        }
+        let filled = filled.map_err(DrawError::Thread)??;
+        self.doubted(filled, grid, key).await
     }
 }
 
@@ -372,22 +364,30 @@ fn fill(
     grid: &Grid,
     values: Vec<f32>,
     domain: &Cells<u32>,
-) -> Result<Frame, RenderError> {
+) -> Result<Frame, DrawError> {
     let domain = domain.content();
     let mut gaps = values.iter().zip(domain);
     let has_gaps = gaps.any(|(value, domain)| *domain != 0 && !holds(*value));
     if !has_gaps || domain.len() != values.len() {
         return Ok(Frame::new(values));
     }
-    renderer
-        .fill(Form::Window, grid, &values, domain)
-        .map(Frame::filled)
+    let filled = renderer.fill(Form::Window, grid, &values, domain)?;
+    Ok(Frame::filled(filled))
+}
+
+/// What is stored does not lie on the grid of the job.
+fn mismatch(key: &ObjectKey) -> DrawError {
+    let mismatch = RenderError::GridMismatch {
+        product: "the job".to_owned(),
+        accumulated: key.to_string(),
+    };
+    mismatch.into()
 }
 
 /// Named by the product, which a domain's folder is called after.
-fn failed(what: &'static str, domain: &ObjectKey, source: StorageError) -> RenderError {
+fn failed(what: &'static str, domain: &ObjectKey, source: StorageError) -> DrawError {
     let product = domain.as_str().split('/').nth(1).unwrap_or_default();
-    RenderError::Store {
+    DrawError::Store {
         what,
         product: product.to_owned(),
         source: Box::new(source),

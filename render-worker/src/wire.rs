@@ -5,6 +5,8 @@ use std::time::Duration;
 use contract::job::RENDERER_VERSION;
 use tonic::metadata::MetadataMap;
 
+use crate::desk::Storing;
+
 pub mod proto {
     //! Types made from `proto/render.proto`.
     #![expect(
@@ -72,6 +74,26 @@ impl From<Version> for proto::Version {
         Self {
             program: version.program,
             renderer: version.renderer,
+        }
+    }
+}
+
+impl From<Storing> for proto::Storing {
+    fn from(storing: Storing) -> Self {
+        match storing {
+            Storing::LookUpAndKeep => Self::Unspecified,
+            Storing::Keep => Self::Keep,
+            Storing::Nothing => Self::Nothing,
+        }
+    }
+}
+
+impl From<proto::Storing> for Storing {
+    fn from(code: proto::Storing) -> Self {
+        match code {
+            proto::Storing::Unspecified => Self::LookUpAndKeep,
+            proto::Storing::Keep => Self::Keep,
+            proto::Storing::Nothing => Self::Nothing,
         }
     }
 }

@@ -38,11 +38,21 @@ impl Turn {
     }
 }
 
-/// Draws pictures.
+/// Is a picture kept in the store?
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Keep {
+    /// It was looked for and is not there.
+    Yes,
+    /// The store does not answer: it is given out alone.
+    No,
+}
+
+/// Draws pictures, and stores them: whoever draws one is the one who writes it.
 #[async_trait]
 pub trait Draw: Send + Sync + 'static {
-    /// The picture of a valid job as the bytes of a PNG with alpha; a job without data is a transparent picture.
-    async fn draw(&self, job: &RenderJob, turn: Turn) -> Result<Bytes, BackendError>;
+    /// The picture of a valid job as the bytes of a PNG with alpha; a job without data is a transparent picture. If
+    /// another one is in the store under its name, that one is given: it was served before.
+    async fn draw(&self, job: &RenderJob, keep: Keep, turn: Turn) -> Result<Bytes, BackendError>;
 
     /// How many pictures it should be given to draw at the same time, where nobody says how many.
     fn draws_at_once(&self) -> NonZeroU32;

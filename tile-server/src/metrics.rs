@@ -66,9 +66,7 @@ pub struct Metrics {
     pub draw_wait_s: Histogram,
     /// Requests sent away because too many waited.
     pub refused: IntCounter,
-    /// Pictures whose bytes differed from those stored under the same name: a defect of a renderer.
-    pub conflicts: IntCounter,
-    /// Failed reads and writes of the store.
+    /// Failed reads of the store.
     pub store_failures: IntCounter,
     /// Panics that were caught.
     pub panics: IntCounter,
@@ -137,14 +135,7 @@ impl Metrics {
                 "refused_total",
                 "Requests sent away because too many waited.",
             )?,
-            conflicts: counter(
-                "conflicts_total",
-                "Pictures that differed from those stored under the same name.",
-            )?,
-            store_failures: counter(
-                "store_failures_total",
-                "Failed reads and writes of the store.",
-            )?,
+            store_failures: counter("store_failures_total", "Failed reads of the store.")?,
             panics: counter("panics_total", "Panics that were caught.")?,
             products: gauge("products_count", "Products known.")?,
             connections: Counts::register(registry)?,

@@ -1,4 +1,5 @@
-//! Pictures by their job: from memory, from the object store, or drawn once for all who wait, within limits.
+//! Pictures by their job: from memory, from the object store, or drawn once for all who wait, within limits. Who draws
+//! a picture stores it; this only looks.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -11,7 +12,7 @@ use quick_cache::Weighter;
 use quick_cache::sync::Cache;
 use storage::{StorageError, Store};
 
-use crate::backend::{Draw, Turn};
+use crate::backend::{Draw, Keep, Turn};
 use crate::error::ServerError;
 use crate::flights::Flights;
 use crate::gate::{Gate, Pass};
@@ -122,11 +123,6 @@ impl Maker {
         // Drawing goes on if those who asked go away: the work is half done, and the next one finds it in the store.
         let drawing = tokio::spawn(async move {
             let picture = self.draw_within(limit, &job, turn).await?;
-            let picture = match limit {
-                None => self.keep(&key, picture).await,
-                // It could not be asked for a moment ago; the one who asks next stores it.
-                Some(_) => picture,
-            };
             self.remember(digest, picture.clone());
             // The turn went to the next one when this was drawn; pictures that are encoded or stored count until here.
             drop(place);
@@ -144,6 +140,11 @@ impl Maker {
         let error = match looked {
             Ok(Ok(picture)) => return Ok(Some(picture)),
             Ok(Err(error)) if error.is_not_found() => return Ok(None),
+            Ok(Err(error @ StorageError::Damaged { .. })) => {
+                self.metrics.store_failures.inc();
+                tracing::warn!(%error, object.key = %key, "a damaged picture is drawn again");
+                return Ok(None);
+            }
             Ok(Err(error)) => error.to_string(),
             Err(_elapsed) => format!("no answer within {} s", STORE_LIMIT.as_secs()),
         };
@@ -159,9 +160,10 @@ impl Maker {
         turn: Turn,
     ) -> Result<Bytes, ServerError> {
         let Some(limit) = limit else {
-            return self.draw(job, turn).await;
+            return self.draw(job, Keep::Yes, turn).await;
         };
-        let drawn = tokio::time::timeout(limit, self.draw(job, turn)).await;
+        // It could not be asked for a moment ago; it is stored when it is drawn for the one who asks next.
+        let drawn = tokio::time::timeout(limit, self.draw(job, Keep::No, turn)).await;
         drawn.unwrap_or_else(|_elapsed| {
             Err(ServerError::StoreAway {
                 limit_s: limit.as_secs(),
@@ -169,9 +171,9 @@ impl Maker {
         })
     }
 
-    async fn draw(&self, job: &RenderJob, turn: Turn) -> Result<Bytes, ServerError> {
+    async fn draw(&self, job: &RenderJob, keep: Keep, turn: Turn) -> Result<Bytes, ServerError> {
         let started_at = Instant::now();
-        let drawn = self.drawer.draw(job, turn).await;
+        let drawn = self.drawer.draw(job, keep, turn).await;
         let mode = job.mode.as_str();
         self.metrics
             .draw_duration_s
@@ -189,22 +191,6 @@ impl Maker {
         let outcome = if drawn.is_ok() { "ok" } else { "failed" };
         self.metrics.drawn.with_label_values(&[mode, outcome]).inc();
         drawn
-    }
-
-    /// Stores a picture and gives it back. If another one is there under the same name, that one was already served,
-    /// so it is served again; a store that fails costs a second drawing one day, not this answer.
-    async fn keep(&self, key: &ObjectKey, picture: Bytes) -> Bytes {
-        let Err(error) = self.store.put_new(key, picture.clone()).await else {
-            return picture;
-        };
-        if matches!(error, StorageError::Conflict { .. }) {
-            self.metrics.conflicts.inc();
-            tracing::error!(object.key = %key, "the same job was drawn with other bytes; the stored ones are served");
-            return self.stored(key).await.ok().flatten().unwrap_or(picture);
-        }
-        self.metrics.store_failures.inc();
-        tracing::warn!(%error, object.key = %key, "a picture cannot be stored");
-        picture
     }
 
     fn remember(&self, digest: Digest, picture: Bytes) {

@@ -17,9 +17,10 @@ use contract::sun::SunChoice;
 use contract::time::TimeMs;
 use futures::stream::{self, StreamExt as _, TryStreamExt as _};
 use prometheus::Registry;
+use render_worker::Limits;
 use render_worker::fleet::{Fleet, FleetSettings};
 use storage::Store;
-use tile_server::backend::{Draw, Turn};
+use tile_server::backend::{Draw, Keep, Turn};
 
 use crate::cli::{RenderAnimation, Settings};
 use crate::ports::{Drawer, FleetDrawer};
@@ -48,7 +49,7 @@ pub(crate) async fn run(settings: &Settings, store: Store, options: RenderAnimat
             let (drawer, shots) = (Arc::clone(&drawer), Arc::clone(&shots));
             async move {
                 let job = shots.job(number)?;
-                let png = drawer.draw(&job, Turn::default()).await;
+                let png = drawer.draw(&job, Keep::No, Turn::default()).await;
                 let time = shots.time(number)?;
                 let png = png.with_context(|| format!("picture {number}, {time}"))?;
                 anyhow::Ok((number, png))
@@ -136,8 +137,9 @@ async fn drawer(
     options: &RenderAnimation,
 ) -> Result<Arc<dyn Draw>> {
     if options.render_workers.is_empty() {
-        let service = deployment::renderer(settings, store).await?;
-        return Ok(Arc::new(Drawer::new(service)));
+        let limits = Limits::default();
+        let desk = deployment::desk(settings, store, limits, &Registry::new()).await?;
+        return Ok(Arc::new(Drawer::new(desk)));
     }
     let fleet = FleetSettings {
         render_workers: options.render_workers.clone(),

@@ -11,7 +11,7 @@ use contract::manifest::{MANIFEST_SCHEMA, Manifest, Step};
 use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::time::Period;
-use render_worker::Image;
+use render::Image;
 
 use super::encoder::{self, Container, Encoder};
 use super::folder::Folder;

@@ -6,8 +6,8 @@ use std::path::Path;
 
 use anyhow::{Context as _, Result, bail};
 use image::{ImageFormat, ImageReader, Limits};
-use render_worker::Image;
-use render_worker::proof::{Difference, Picture, difference};
+use render::Image;
+use render_proof::{Difference, Picture, difference};
 use serde::Serialize;
 
 use crate::cli::BenchCompare;

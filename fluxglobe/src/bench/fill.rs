@@ -4,9 +4,9 @@
 use std::time::Duration;
 
 use anyhow::Result;
-use render_worker::gpu::Gpu;
-use render_worker::stages::fill::bench::{self, Timing};
-use render_worker::stages::fill::{Fill, Sources};
+use render::gpu::Gpu;
+use render::stages::fill::{Fill, Sources};
+use render_proof::fill::timing::{self, Timing};
 use serde::Serialize;
 
 use crate::cli::{BenchFill, Settings};
@@ -23,8 +23,6 @@ struct Row {
     runs: usize,
     median_ms: f64,
     p99_ms: f64,
-    /// Below 1 where only a part of the gaps was filled and the times are scaled up.
-    measured_share: f64,
     /// Largest difference from all pairs in float64, share of the range.
     from_all_pairs: Option<f64>,
     /// Root mean square error of hidden values over their standard deviation.
@@ -52,11 +50,11 @@ pub(crate) fn run(settings: &Settings, options: &BenchFill) -> Result<()> {
     if !options.json {
         progress::result(HEADER)?;
     }
-    for case in bench::cases([options.size[0], options.size[1]], options.share) {
+    for case in timing::cases([options.size[0], options.size[1]], options.share) {
         for form in options.forms.iter().map(|form| form.form()) {
             let timing = match &on_gpu {
-                Some((gpu, fill)) => bench::bench_fill(gpu, fill, case, form, runs, limit),
-                None => bench::bench_twin(case, form, runs, limit),
+                Some((gpu, fill)) => timing::bench_fill(gpu, fill, case, form, runs, limit),
+                None => timing::bench_twin(case, form, runs, limit),
             };
             match timing {
                 Ok(timing) => print(options, &Row::new(&timing, adapter))?,
@@ -71,7 +69,7 @@ pub(crate) fn run(settings: &Settings, options: &BenchFill) -> Result<()> {
     Ok(())
 }
 
-const HEADER: &str = "form         rows   cols  missing  gap  runs   median ms      p99 ms  measured  from all pairs  RMSE/spread    digest";
+const HEADER: &str = "form         rows   cols  missing  gap  runs   median ms      p99 ms  from all pairs  RMSE/spread    digest";
 
 impl Row {
     fn new(timing: &Timing, adapter: &str) -> Self {
@@ -85,7 +83,6 @@ impl Row {
             runs,
             median_ms: timing.median_s() * 1e3,
             p99_ms: timing.seconds[(runs * 99 / 100).min(runs - 1)] * 1e3,
-            measured_share: timing.measured_share,
             from_all_pairs: timing.from_all_pairs,
             rmse_over_spread: timing.rmse_of_hidden,
             digest: timing.values_digest.map(|digest| digest.short()),
@@ -105,7 +102,7 @@ fn print(options: &BenchFill, row: &Row) -> Result<()> {
         .rmse_over_spread
         .map_or_else(|| "-".to_owned(), |rmse| format!("{rmse:.4}"));
     progress::result(&format!(
-        "{:<11} {:>5} {:>6} {:>8} {:>4} {:>5} {:>11.3} {:>11.3} {:>8.2}% {:>15} {:>12}  {}",
+        "{:<11} {:>5} {:>6} {:>8} {:>4} {:>5} {:>11.3} {:>11.3} {:>15} {:>12}  {}",
         row.form,
         row.rows,
         row.cols,
@@ -114,7 +111,6 @@ fn print(options: &BenchFill, row: &Row) -> Result<()> {
         row.runs,
         row.median_ms,
         row.p99_ms,
-        100.0 * row.measured_share,
         apart,
         rmse,
         row.digest.as_deref().unwrap_or("-"),

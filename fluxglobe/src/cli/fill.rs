@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
 use contract::product::ProductId;
-use render_worker::stages::fill::Form;
+use render::stages::fill::Form;
 
 /// `fluxglobe products ...`: more about one product.
 #[derive(Debug, Subcommand)]
@@ -21,10 +21,6 @@ pub(crate) enum FillForm {
     Window,
     /// Every gap from all cells, by multilevel summation.
     Exact,
-    /// The same, pair by pair through shared memory.
-    Pairs,
-    /// The same, pair by pair from global memory.
-    NaivePairs,
 }
 
 impl FillForm {
@@ -33,8 +29,6 @@ impl FillForm {
         match self {
             Self::Window => Form::Window,
             Self::Exact => Form::Exact,
-            Self::Pairs => Form::Pairs,
-            Self::NaivePairs => Form::NaivePairs,
         }
     }
 }
@@ -83,13 +77,13 @@ pub(crate) struct BenchFill {
         long,
         value_enum,
         value_delimiter = ',',
-        default_value = "window,exact,pairs,naive-pairs"
+        default_value = "window,exact"
     )]
     pub(crate) forms: Vec<FillForm>,
     /// Runs of each form.
     #[arg(long, default_value = "50")]
     pub(crate) runs: NonZeroU32,
-    /// Longest time for one line of the table, seconds; forms that need longer are measured on a part and scaled up.
+    /// Longest time for one line of the table, seconds.
     #[arg(long, default_value = "10", value_parser = clap::value_parser!(u64).range(1..=3600))]
     pub(crate) limit_s: u64,
     /// One JSON object a line.

@@ -7,9 +7,9 @@ use anyhow::{Context as _, Result};
 use comfy_table::presets::NOTHING;
 use comfy_table::{CellAlignment, Table};
 use contract::manifest::Manifest;
-use render_worker::stages::fill::hold_out::{HoldOut, Score};
-use render_worker::stages::fill::scaled::holds;
-use render_worker::{Image, Renderer};
+use render::stages::fill::scaled::holds;
+use render::{Image, Renderer};
+use render_proof::fill::hold_out::{HoldOut, Score};
 use serde::Serialize;
 
 use crate::cli::{FillError, Settings};

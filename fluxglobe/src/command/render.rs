@@ -3,6 +3,7 @@
 use anyhow::{Context as _, Result};
 use contract::job::View;
 use contract::tile::Tile;
+use render_worker::desk::{Order, Storing};
 
 use crate::cli::{Render, Settings};
 use crate::command::legend;
@@ -31,10 +32,9 @@ pub(crate) async fn run(settings: &Settings, options: Render) -> Result<()> {
     };
     let job = picture::job(&store, settings, &asked, view, surface).await?;
     let bar = progress::bar("draw", 1);
-    let png = deployment::single_renderer(settings, store)
-        .await?
-        .draw(&job)
-        .await?;
+    let desk = deployment::single_desk(settings, store).await?;
+    let order = Order::on_demand(Storing::Nothing);
+    let png = desk.draw(&job, order).await?.png;
     std::fs::write(&asked.output, &png)
         .with_context(|| format!("cannot write {}", asked.output.display()))?;
     progress::done(&bar, &format!("{} bytes", png.len()));

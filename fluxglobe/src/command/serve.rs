@@ -1,10 +1,12 @@
 //! `fluxglobe serve`: a data folder in, tiles, views, statistics and the viewer over HTTP out.
 
+use std::num::NonZeroUsize;
 use std::sync::Arc;
 
 use anyhow::{Context as _, Result};
 use compute::Engine;
 use observations::FileStore;
+use render_worker::Limits;
 use storage::Store;
 use tile_server::backend::Check;
 use tile_server::metrics::Registry;
@@ -30,16 +32,22 @@ pub(crate) async fn bind(
     check: Option<Check>,
 ) -> Result<Server> {
     options.viewer = options.viewer.or_else(viewer::built);
-    let renderer = deployment::renderer_at(settings, store.clone(), options.draws_at_once).await?;
+    let registry = Registry::new();
+    let limits = Limits {
+        draws_at_once: options
+            .draws_at_once
+            .map(|count| NonZeroUsize::try_from(count).unwrap_or(NonZeroUsize::MAX)),
+        draw_queue: options.draw_queue as usize,
+        ..Limits::default()
+    };
+    let desk = deployment::desk(settings, store.clone(), limits, &registry).await?;
     let regions = deployment::region_engine(settings, store.clone())?;
     let analyst = Analyst::new(Engine::local(store.clone()), &regions, check);
-    let registry = Registry::new();
-    renderer.register(&registry)?;
     storage::sound::damage::register(&registry)?;
     let state = AppState::new(
         &options,
         store.clone(),
-        Arc::new(Drawer::new(renderer)),
+        Arc::new(Drawer::new(desk)),
         Arc::new(analyst),
         registry,
     )?

@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use render_worker::batch::BatchService;
-use render_worker::server::{Server, open_desk};
+use render_worker::server::Server;
 
 use crate::cli::{RenderWorker, Settings};
 use crate::deployment;
@@ -18,10 +18,8 @@ pub(crate) async fn run(settings: &Settings, options: RenderWorker) -> Result<()
     }
     // Whoever asks for a picture is told within seconds that the store is away; the batch tries again by itself.
     let store = deployment::open_interactive(footing.store_url())?;
-    let backend = deployment::backend(settings)?;
-    let (render, registry) = (options.render.clone(), footing.registry.clone());
-    let desk = tokio::task::spawn_blocking(move || open_desk(&render, store, backend, &registry))
-        .await??;
+    let limits = options.render.limits();
+    let desk = deployment::desk(settings, store, limits, &footing.registry).await?;
     let asked = desk.clone();
     footing.board.set("renderer", move || {
         let asked = asked.clone();

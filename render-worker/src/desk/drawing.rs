@@ -8,70 +8,65 @@ use ::service::Outcome as Ended;
 use bytes::Bytes;
 use contract::job::RenderJob;
 use contract::key::ObjectKey;
+use render::{Image, RenderError};
 use storage::StorageError;
 
-use super::flight::{Flight, Outcome};
-use super::queue::{Class, Full, Permit};
-use super::{DeskError, Drawn, Inner, Origin};
-use crate::error::RenderError;
-use crate::image::Image;
+use super::queue::{Full, Permit};
+use super::single_flight::{Flight, Outcome};
+use super::{Class, DeskError, Drawn, Inner, Order, Origin, Storing, Turn};
+use crate::error::DrawError;
 
 /// Shortest and longest hint when to ask a full worker again.
 const RETRY_HINT: [Duration; 2] = [Duration::from_millis(100), Duration::from_secs(30)];
 
 impl Inner {
     /// One job from the store or from the device.
-    pub(super) async fn fly(&self, job: &RenderJob, flight: &Arc<Flight>, class: Class) -> Outcome {
-        if let Some(drawn) = flight.while_wanted(self.stored(job)).await? {
+    pub(super) async fn make(
+        &self,
+        job: &RenderJob,
+        flight: &Arc<Flight>,
+        order: Order,
+        turn: Turn,
+    ) -> Outcome {
+        if order.storing == Storing::LookUpAndKeep
+            && let Some(drawn) = flight.while_wanted(self.stored(job)).await?
+        {
             return Ok(drawn);
         }
-        let permit = Arc::new(self.turn(flight, class).await?);
+        let permit = Arc::new((self.turn(flight, order.class).await?, turn));
         let begun = Instant::now();
         let drawn = self.drawn(job, flight, &permit).await;
         self.note(&drawn);
         let image = drawn?;
         self.learn(begun.elapsed());
         // Another draws while this one is encoded and stored.
-        let encoding = self.service.encode(image, permit);
+        let encoding = self.pipeline.encode(image, permit);
         let png = self.measured("encode", encoding).await?;
-        let count = |origin: &str| self.pictures.with_label_values(&[origin]).inc();
-        match self.keep(job, png.clone()).await {
-            Ok(None) => {
-                count("drawn");
-                let origin = Origin::Drawn;
-                Ok(Drawn {
-                    png,
-                    origin,
-                    kept: true,
-                })
-            }
-            Ok(Some(theirs)) => {
-                count("conflict");
-                let origin = Origin::Stored;
-                Ok(Drawn {
-                    png: theirs,
-                    origin,
-                    kept: true,
-                })
-            }
+        Ok(self.kept(job, png, order.storing).await)
+    }
+
+    /// A picture after what the store has to do with it.
+    async fn kept(&self, job: &RenderJob, png: Bytes, storing: Storing) -> Drawn {
+        let kept = match storing {
+            Storing::LookUpAndKeep | Storing::Keep => self.keep(job, png.clone()).await.map(Some),
+            Storing::Nothing => Ok(None),
+        };
+        let (count, png, origin, kept) = match kept {
+            Ok(Some(None)) => ("drawn", png, Origin::Drawn, true),
+            Ok(Some(Some(theirs))) => ("conflict", theirs, Origin::Stored, true),
+            Ok(None) => ("drawn", png, Origin::Drawn, false),
             Err(error) => {
-                count("not_kept");
-                tracing::warn!(
-                    error = error.in_full(),
-                    "a picture is given out but not kept"
-                );
-                let origin = Origin::Drawn;
-                Ok(Drawn {
-                    png,
-                    origin,
-                    kept: false,
-                })
+                let error = error.in_full();
+                tracing::warn!(error, "a picture is given out but not kept");
+                ("not_kept", png, Origin::Drawn, false)
             }
-        }
+        };
+        self.pictures.with_label_values(&[count]).inc();
+        Drawn { png, origin, kept }
     }
 
     /// The picture, if it was drawn before. A store that cannot be asked is one more reason to draw.
-    async fn stored(&self, job: &RenderJob) -> Result<Option<Drawn>, RenderError> {
+    async fn stored(&self, job: &RenderJob) -> Result<Option<Drawn>, DrawError> {
         match self.store.get(&job.key()).await {
             Ok(png) => {
                 self.pictures.with_label_values(&["stored"]).inc();
@@ -115,23 +110,23 @@ impl Inner {
         &self,
         job: &RenderJob,
         flight: &Arc<Flight>,
-        permit: &Arc<Permit>,
-    ) -> Result<Image, RenderError> {
+        permit: &Arc<(Permit, Turn)>,
+    ) -> Result<Image, DrawError> {
         let attempt = || async {
-            let loading = flight.while_wanted(self.service.scene(job));
+            let loading = flight.while_wanted(self.pipeline.scene(job));
             let scene = self.measured("load", loading).await?;
             let held = Arc::clone(permit);
-            let drawing = self.service.picture(job, scene, flight.is_wanted(), held);
+            let drawing = self.pipeline.picture(job, scene, flight.is_wanted(), held);
             self.measured("draw", drawing).await
         };
-        self.service.on_a_sound_device(attempt).await
+        self.pipeline.on_a_sound_device(attempt).await
     }
 
     async fn measured<T>(
         &self,
         operation: &'static str,
-        work: impl Future<Output = Result<T, RenderError>>,
-    ) -> Result<T, RenderError> {
+        work: impl Future<Output = Result<T, DrawError>>,
+    ) -> Result<T, DrawError> {
         let running = self.red.start(operation);
         let done = work.await;
         running.done(done.as_ref().map_or_else(ended, |_there| Ended::Ok));
@@ -143,13 +138,13 @@ impl Inner {
         &self,
         job: &RenderJob,
         png: Bytes,
-    ) -> Result<Option<Bytes>, RenderError> {
+    ) -> Result<Option<Bytes>, DrawError> {
         let key = job.key();
         match self.store.put_new(&key, png.clone()).await {
             Ok(_new) => Ok(None),
             Err(StorageError::Conflict { .. }) => match self.store.get(&key).await {
                 Ok(theirs) => {
-                    let adapter = self.service.name();
+                    let adapter = self.pipeline.name();
                     tracing::error!(%key, adapter, "another adapter drew this job differently");
                     Ok(Some(theirs))
                 }
@@ -165,15 +160,15 @@ impl Inner {
         }
     }
 
-    fn note(&self, drawn: &Result<Image, RenderError>) {
+    fn note(&self, drawn: &Result<Image, DrawError>) {
         let away = &self.is_without_device;
         match drawn {
             Ok(_image) => away.store(false, Ordering::Release),
-            Err(
+            Err(DrawError::Render(
                 RenderError::NoAdapter(_)
                 | RenderError::SoftwareAdapter { .. }
                 | RenderError::NoDevice { .. },
-            ) => {
+            )) => {
                 away.store(true, Ordering::Release);
             }
             Err(_other) => {}
@@ -190,16 +185,16 @@ impl Inner {
     /// When the queue should have moved on by itself.
     fn retry_after(&self, waiting: usize) -> Duration {
         let mean = Duration::from_micros(self.mean_us.load(Ordering::Relaxed));
-        let turns = waiting / self.service.draws_at_once().get() + 1;
+        let turns = waiting / self.draws_at_once.get() + 1;
         let [shortest, longest] = RETRY_HINT;
         mean.saturating_mul(turns as u32).clamp(shortest, longest)
     }
 }
 
 /// How an operation ended that brought no picture.
-fn ended(error: &RenderError) -> Ended {
+fn ended(error: &DrawError) -> Ended {
     match error {
-        RenderError::NotWanted => Ended::Dropped,
+        error if error.is_not_wanted() => Ended::Dropped,
         error if error.is_bad_request() || error.is_not_found() => Ended::Refused,
         error if error.is_retryable() => Ended::Retryable,
         _ => Ended::Failed,
@@ -210,8 +205,8 @@ pub(super) fn picture_failed(
     what: &'static str,
     key: &ObjectKey,
     source: StorageError,
-) -> RenderError {
-    RenderError::Picture {
+) -> DrawError {
+    DrawError::Picture {
         what,
         key: key.clone(),
         source: Box::new(source),

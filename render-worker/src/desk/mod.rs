@@ -1,9 +1,13 @@
-//! A worker's desk: jobs come in from many sides, each is drawn once, kept in the store and given to all who asked.
+//! The one way from a job to its picture, for a worker of a cluster and for a server that draws in its own process: jobs
+//! come in from many sides, each is drawn once, in turn, kept in the store and given to all who asked.
 
 mod drawing;
-mod flight;
+mod order;
 mod queue;
+mod single_flight;
 
+use std::any::Any;
+use std::num::NonZeroUsize;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
@@ -12,16 +16,18 @@ use ::service::Red;
 use bytes::Bytes;
 use contract::job::RenderJob;
 use prometheus::{IntCounterVec, Opts, Registry};
+use render::{Backend, RenderError};
 use storage::Store;
 use tracing::Instrument as _;
 
-use crate::error::RenderError;
-use crate::gauges::Gauges;
-use crate::service::RenderService;
+use crate::error::DrawError;
+use crate::gauges::{AdapterInfo, Gauges};
+use crate::pipeline::{Limits, Pipeline};
 use drawing::picture_failed;
-use flight::Flights;
 use queue::Queue;
+use single_flight::SingleFlight;
 
+pub use order::{Order, Storing};
 pub use queue::Class;
 
 /// Name of this service in its metrics.
@@ -36,10 +42,11 @@ pub struct Desk {
 }
 
 struct Inner {
-    service: RenderService,
+    pipeline: Pipeline,
     store: Store,
+    draws_at_once: NonZeroUsize,
     queue: Arc<Queue>,
-    flights: Flights,
+    flights: SingleFlight,
     red: Red,
     pictures: IntCounterVec,
     /// Running mean of what a picture takes, microseconds.
@@ -98,7 +105,7 @@ pub enum DeskError {
     Stopping,
     /// It could not be drawn.
     #[error(transparent)]
-    Render(Arc<RenderError>),
+    Render(Arc<DrawError>),
 }
 
 impl DeskError {
@@ -111,29 +118,58 @@ impl DeskError {
     }
 }
 
-impl From<RenderError> for DeskError {
-    fn from(error: RenderError) -> Self {
+impl From<DrawError> for DeskError {
+    fn from(error: DrawError) -> Self {
         Self::Render(Arc::new(error))
     }
 }
 
+/// A desk that cannot be opened.
+#[derive(Debug, thiserror::Error)]
+pub enum OpenError {
+    /// No renderer.
+    #[error(transparent)]
+    Render(#[from] DrawError),
+    /// Two metrics of one name.
+    #[error("a metric cannot be registered")]
+    Metrics(#[from] prometheus::Error),
+}
+
+impl OpenError {
+    /// May the same succeed later?
+    pub fn is_retryable(&self) -> bool {
+        match self {
+            Self::Render(error) => error.is_retryable(),
+            Self::Metrics(_) => false,
+        }
+    }
+}
+
+/// What a caller holds who gives out turns to draw as well.
+type Turn = Box<dyn Any + Send + Sync>;
+
 impl Desk {
-    /// A desk whose metrics go to `registry`; at most `draw_queue` jobs that somebody waits for are not begun.
-    pub fn new(
-        service: RenderService,
+    /// Opens the backend and a desk before it, whose metrics go to `registry`. Blocks while shaders compile.
+    pub fn open(
         store: Store,
-        draw_queue: usize,
+        backend: Backend,
+        limits: &Limits,
         registry: &Registry,
-    ) -> Result<Self, prometheus::Error> {
+    ) -> Result<Self, OpenError> {
+        let pipeline = Pipeline::open(store.clone(), backend, limits)?;
+        let suited = || pipeline.renderer().adapter().draws_at_once();
+        let draws_at_once = limits.draws_at_once.unwrap_or_else(suited);
         let name = format!("fluxglobe_{METRICS}_pictures_total");
         let help = "Pictures given out, by where they came from.";
         let pictures = IntCounterVec::new(Opts::new(name, help), &["origin"])?;
         registry.register(Box::new(pictures.clone()))?;
+        registry.register(Box::new(AdapterInfo::of(&pipeline)?))?;
         let inner = Inner {
             store,
-            queue: Queue::new(service.draws_at_once().get(), draw_queue),
-            service,
-            flights: Flights::default(),
+            queue: Queue::new(draws_at_once.get(), limits.draw_queue),
+            draws_at_once,
+            pipeline,
+            flights: SingleFlight::default(),
             red: Red::register(registry, METRICS)?,
             pictures,
             mean_us: AtomicU64::new(FIRST_GUESS.as_micros() as u64),
@@ -144,38 +180,50 @@ impl Desk {
             inner: Arc::new(inner),
         };
         registry.register(Box::new(Gauges::of(&desk)?))?;
-        desk.service().register(registry)?;
         Ok(desk)
     }
 
-    /// The picture of a job. Dropping the future gives it up; a picture that all have given up is not drawn on.
-    pub async fn draw(&self, job: &RenderJob, class: Class) -> Result<Drawn, DeskError> {
+    /// The picture of a job. Dropping the future gives it up; a picture that all have given up is not drawn on. Whoever
+    /// joins an equal job under way has its picture as that one was ordered.
+    pub async fn draw(&self, job: &RenderJob, order: Order) -> Result<Drawn, DeskError> {
+        self.draw_in_turn(job, order, ()).await
+    }
+
+    /// The same for a caller who gives out turns as well: his is let go with the desk's own, when the picture is drawn
+    /// and its encoding begins.
+    pub async fn draw_in_turn(
+        &self,
+        job: &RenderJob,
+        order: Order,
+        turn: impl Send + Sync + 'static,
+    ) -> Result<Drawn, DeskError> {
         let inner = &self.inner;
-        if class == Class::OnDemand && inner.stopping.load(Ordering::Acquire) {
+        if order.class == Class::OnDemand && inner.stopping.load(Ordering::Acquire) {
             return Err(DeskError::Stopping);
         }
-        job.validate().map_err(RenderError::from)?;
+        let valid = job.validate().map_err(RenderError::from);
+        valid.map_err(DrawError::from)?;
         let digest = job.digest();
-        let (passenger, opened) = inner.flights.board(digest, class);
-        if let Some(flight) = opened {
-            let (desk, job) = (Arc::clone(inner), job.clone());
+        let (waiter, begun) = inner.flights.join(digest, order.class);
+        if let Some(flight) = begun {
+            let (desk, job, turn) = (Arc::clone(inner), job.clone(), Box::new(turn) as Turn);
             let flying = async move {
-                // Its own task, so that a panic lands the flight too.
-                let flown = {
+                // Its own task, so that a panic completes the flight too.
+                let drawn = {
                     let (desk, flight) = (Arc::clone(&desk), Arc::clone(&flight));
-                    let fly = async move { desk.fly(&job, &flight, class).await };
-                    tokio::spawn(fly.in_current_span()).await
+                    let make = async move { desk.make(&job, &flight, order, turn).await };
+                    tokio::spawn(make.in_current_span()).await
                 };
-                let outcome = flown.unwrap_or_else(|lost| Err(RenderError::Thread(lost).into()));
-                desk.flights.land(&digest, &flight, outcome);
+                let outcome = drawn.unwrap_or_else(|lost| Err(DrawError::Thread(lost).into()));
+                desk.flights.complete(&digest, &flight, outcome);
             };
             tokio::spawn(flying.in_current_span());
         }
-        passenger.outcome().await
+        waiter.outcome().await
     }
 
     /// Puts a picture into the store; done already is done.
-    pub async fn keep(&self, job: &RenderJob, png: Bytes) -> Result<(), RenderError> {
+    pub async fn keep(&self, job: &RenderJob, png: Bytes) -> Result<(), DrawError> {
         self.inner.keep(job, png).await.map(|_theirs| ())
     }
 
@@ -185,18 +233,19 @@ impl Desk {
     }
 
     /// Can pictures be drawn now? What there is, for operators.
-    pub async fn ready(&self) -> Result<String, RenderError> {
+    pub async fn ready(&self) -> Result<String, DrawError> {
         // Nobody brings jobs to a worker that is not ready, so it tries by itself to become so.
         if self.inner.is_without_device.load(Ordering::Acquire) {
-            let service = &self.inner.service;
-            service.renew(service.renderer().device_number()).await?;
+            let pipeline = &self.inner.pipeline;
+            let failed = pipeline.renderer().device_number();
+            pipeline.renew(failed).await?;
             self.inner.is_without_device.store(false, Ordering::Release);
         }
         // Any answer about any key is a store that can be read.
         let probe = contract::key::ObjectKey::tile(&contract::digest::Digest::of(b"ready"));
         let asked = self.inner.store.exists(&probe).await;
         asked.map_err(|source| picture_failed("look for", &probe, source))?;
-        Ok(format!("draws on {}", self.service().name()))
+        Ok(format!("draws on {}", self.pipeline().name()))
     }
 
     /// How it is.
@@ -205,20 +254,20 @@ impl Desk {
         Condition {
             waiting_on_demand: inner.queue.waiting(Class::OnDemand),
             waiting_batch: inner.queue.waiting(Class::Batch),
-            in_flight: inner.queue.in_use(self.draws_at_once()),
-            encoding: inner.service.encoding_count(),
+            in_flight: inner.queue.in_use(inner.draws_at_once.get()),
+            encoding: inner.pipeline.encoding_count(),
             stopping: inner.stopping.load(Ordering::Acquire),
         }
     }
 
-    /// What draws.
-    pub fn service(&self) -> &RenderService {
-        &self.inner.service
+    /// What takes the steps of its pictures.
+    pub fn pipeline(&self) -> &Pipeline {
+        &self.inner.pipeline
     }
 
     /// Pictures drawn at the same time.
-    pub(crate) fn draws_at_once(&self) -> usize {
-        self.inner.service.draws_at_once().get()
+    pub fn draws_at_once(&self) -> NonZeroUsize {
+        self.inner.draws_at_once
     }
 
     pub(crate) fn red(&self) -> &Red {

@@ -20,9 +20,9 @@ use futures::stream::{FuturesUnordered, StreamExt as _};
 use prometheus::{IntCounterVec, IntGaugeVec, Opts, Registry};
 use tokio::time::Instant;
 
-use crate::desk::Origin;
+use crate::desk::{Origin, Storing};
 use crate::wire::Version;
-use crate::wire::proto::{DrawReply, DrawRequest, Origin as OriginCode};
+use crate::wire::proto::{DrawReply, DrawRequest, Origin as OriginCode, Storing as StoringCode};
 use member::Member;
 use refusals::Refusals;
 
@@ -113,9 +113,14 @@ impl Fleet {
     }
 
     /// The picture of a job within the time of the settings. Dropping the future cancels it on the workers.
-    pub async fn draw(&self, job: &RenderJob, trace: &str) -> Result<Picture, FleetError> {
+    pub async fn draw(
+        &self,
+        job: &RenderJob,
+        storing: Storing,
+        trace: &str,
+    ) -> Result<Picture, FleetError> {
         let running = self.inner.red.start("draw");
-        let drawn = self.inner.draw(job, trace).await;
+        let drawn = self.inner.draw(job, storing, trace).await;
         running.done(drawn.as_ref().map_or_else(ended, |_picture| Ended::Ok));
         drawn
     }
@@ -143,7 +148,12 @@ impl Fleet {
 }
 
 impl Inner {
-    async fn draw(&self, job: &RenderJob, trace: &str) -> Result<Picture, FleetError> {
+    async fn draw(
+        &self,
+        job: &RenderJob,
+        storing: Storing,
+        trace: &str,
+    ) -> Result<Picture, FleetError> {
         job.validate()
             .map_err(|e| FleetError::BadRequest(e.to_string()))?;
         let limit = self.settings.deadline();
@@ -154,6 +164,7 @@ impl Inner {
             job_json: serde_json::to_string(job)
                 .map_err(|e| FleetError::BadRequest(e.to_string()))?,
             trace: trace.to_owned(),
+            storing: StoringCode::from(storing).into(),
         };
         let asking = self.ask(place::of(job), &request, deadline);
         let asked = tokio::time::timeout_at(deadline, asking).await;

@@ -13,17 +13,17 @@ use std::time::{Duration, Instant};
 use contract::job::RenderJob;
 use contract::manifest::Manifest;
 use contract::moment::Moment;
+use quick_cache::unsync::Cache;
+use render::Renderer;
 use storage::{Store, manifests};
 use tokio::sync::watch;
 
-use crate::error::RenderError;
-use crate::recent::Recent;
-use crate::renderer::Renderer;
+use crate::error::DrawError;
 use crate::source::Source;
 use neighbours::{Heading, next, place_of};
 
 /// Manifests remembered.
-const MOST_MANIFESTS: u64 = 32;
+const MOST_MANIFESTS: usize = 32;
 /// A manifest younger than this is not read again for frames that it does not have: old versions are drawn, too.
 const LEAST_AGE: Duration = Duration::from_secs(5);
 /// Frames of one product that must fit into memory besides those ahead: two of the instant, two of the one before.
@@ -52,9 +52,8 @@ struct Reader {
 type Known = (Arc<Manifest>, Instant);
 
 /// What the task has learnt.
-#[derive(Default)]
 struct Learnt {
-    manifests: Recent<String, Known>,
+    manifests: Cache<String, Known>,
     /// Place of the last instant of a product, and the direction to it.
     last: BTreeMap<String, (f64, Heading)>,
 }
@@ -95,7 +94,10 @@ impl Prefetch {
 
 /// Reads ahead of the last job until nobody draws any more. A job of other products ends what is under way.
 async fn run(reader: Arc<Reader>, mut ear: watch::Receiver<Wish>) {
-    let mut learnt = Learnt::default();
+    let mut learnt = Learnt {
+        manifests: Cache::new(MOST_MANIFESTS),
+        last: BTreeMap::new(),
+    };
     while ear.changed().await.is_ok() {
         let wish = ear.borrow_and_update().clone();
         let Some(job) = wish else {
@@ -124,7 +126,7 @@ fn is_other(a: &RenderJob, b: &RenderJob) -> bool {
 }
 
 impl Reader {
-    async fn read_ahead(&self, job: &RenderJob, learnt: &mut Learnt) -> Result<(), RenderError> {
+    async fn read_ahead(&self, job: &RenderJob, learnt: &mut Learnt) -> Result<(), DrawError> {
         let parts = [
             Some(&job.value),
             job.accumulated.as_ref(),
@@ -158,7 +160,7 @@ impl Reader {
             let scene = self.source.scene_ahead(&early).await?;
             let renderer = Arc::clone(&self.renderer);
             let preparing = tokio::task::spawn_blocking(move || renderer.prepare(&early, &scene));
-            preparing.await.map_err(RenderError::Thread)??;
+            preparing.await.map_err(DrawError::Thread)??;
         }
         Ok(())
     }
@@ -169,7 +171,7 @@ impl Reader {
         let Some(place) = manifest.and_then(|manifest| place_of(&manifest, moment)) else {
             return Heading::Unknown;
         };
-        if learnt.last.len() as u64 > MOST_MANIFESTS {
+        if learnt.last.len() > MOST_MANIFESTS {
             learnt.last.clear();
         }
         let product = moment.product().to_owned();
@@ -185,7 +187,7 @@ impl Reader {
     /// The newest manifest of a moment's product, read again when the one known does not have the moment's frames.
     async fn manifest(&self, moment: &Moment, learnt: &mut Learnt) -> Option<Arc<Manifest>> {
         let product = moment.product().to_owned();
-        if let Some((manifest, read_at)) = learnt.manifests.get(&product) {
+        if let Some((manifest, read_at)) = learnt.manifests.get(&product).cloned() {
             let is_of = place_of(&manifest, moment).is_some();
             if is_of || read_at.elapsed() < LEAST_AGE {
                 return is_of.then_some(manifest);
@@ -200,7 +202,7 @@ impl Reader {
             }
         };
         let known = (Arc::clone(&newest), Instant::now());
-        learnt.manifests.keep(product, known, MOST_MANIFESTS, |_| 1);
+        learnt.manifests.insert(product, known);
         Some(newest)
     }
 }

@@ -8,8 +8,7 @@ use contract::job::RenderJob;
 use tonic::{Request, Response, Status};
 use tracing::Instrument as _;
 
-use crate::desk::{Class, Desk, DeskError, Drawn, Origin};
-use crate::error::RenderError;
+use crate::desk::{Desk, DeskError, Drawn, Order, Origin};
 use crate::wire::proto::renderer_server::Renderer;
 use crate::wire::proto::{
     DrawReply, DrawRequest, Origin as OriginCode, StatusReply, StatusRequest,
@@ -50,10 +49,10 @@ impl Renderer for Answers {
         _request: Request<StatusRequest>,
     ) -> Result<Response<StatusReply>, Status> {
         let condition = self.desk.condition();
-        let kept = self.desk.service().kept();
+        let kept = self.desk.pipeline().kept();
         Ok(Response::new(StatusReply {
             version: Some(self.version.clone().into()),
-            adapter: self.desk.service().name().to_owned(),
+            adapter: self.desk.pipeline().name().to_owned(),
             queue_length: condition.waiting_on_demand as u32,
             in_flight: condition.in_flight as u32,
             stopping: condition.stopping,
@@ -73,6 +72,7 @@ impl Answers {
             let text = format!("the caller does not fit this render worker: {quarrel}");
             return Err(Status::failed_precondition(text));
         }
+        let order = Order::on_demand(request.storing().into());
         let trace = request.trace;
         if trace.len() > MAX_TRACE_BYTES || trace.chars().any(char::is_control) {
             return Err(Status::invalid_argument(
@@ -82,7 +82,7 @@ impl Answers {
         let job: RenderJob = serde_json::from_str(&request.job_json)
             .map_err(|e| Status::invalid_argument(format!("the job cannot be read: {e}")))?;
         let span = tracing::info_span!("draw", trace, job = job.digest().short());
-        let drawing = self.desk.draw(&job, Class::OnDemand).instrument(span);
+        let drawing = self.desk.draw(&job, order).instrument(span);
         let drawn = match timeout {
             None => drawing.await,
             Some(timeout) => {
@@ -117,7 +117,7 @@ fn refusal(error: &DeskError) -> Status {
     if error.is_not_found() {
         return Status::not_found(text);
     }
-    if matches!(**error, RenderError::NotWanted) {
+    if error.is_not_wanted() {
         return Status::cancelled(text);
     }
     tracing::warn!(error = error.in_full(), "a job cannot be drawn");

@@ -7,14 +7,9 @@ use std::net::SocketAddr;
 use std::time::Duration;
 
 use ::service::Stop;
-use prometheus::Registry;
-use storage::Store;
 use tonic::transport::server::TcpIncoming;
 
 use crate::desk::Desk;
-use crate::error::RenderError;
-use crate::renderer::Backend;
-use crate::service::RenderService;
 use crate::wire::proto::renderer_server::RendererServer;
 use crate::wire::{MOST_REQUEST_BYTES, Version};
 use answers::Answers;
@@ -28,15 +23,9 @@ const MOST_HEADER_BYTES: u32 = 16 << 10;
 /// A caller that does not answer a ping for so long is gone, and so are his calls.
 const PING: Duration = Duration::from_secs(10);
 
-/// A worker that cannot start or that ended by itself.
+/// A server that cannot start or that ended by itself.
 #[derive(Debug, thiserror::Error)]
 pub enum ServerError {
-    /// No renderer.
-    #[error(transparent)]
-    Render(#[from] RenderError),
-    /// Two metrics of one name.
-    #[error("a metric cannot be registered")]
-    Metrics(#[from] prometheus::Error),
     /// The address cannot be listened on.
     #[error("cannot listen on {address}; is another process there? Give another address")]
     Listen {
@@ -52,27 +41,10 @@ impl ServerError {
     /// May the same start succeed later?
     pub fn is_retryable(&self) -> bool {
         match self {
-            Self::Render(error) => error.is_retryable(),
-            Self::Metrics(_) | Self::Listen { .. } => false,
+            Self::Listen { .. } => false,
             Self::Stopped(_) => true,
         }
     }
-}
-
-/// Opens the renderer and the desk before it. Blocks while shaders compile.
-pub fn open_desk(
-    settings: &Settings,
-    store: Store,
-    backend: Backend,
-    registry: &Registry,
-) -> Result<Desk, ServerError> {
-    let service = RenderService::with_limits(store.clone(), backend, settings.service_limits())?;
-    Ok(Desk::new(
-        service,
-        store,
-        usize::from(settings.draw_queue),
-        registry,
-    )?)
 }
 
 /// A server that holds its address but does not answer yet.

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use clap::value_parser;
 
-use crate::service::Limits;
+use crate::pipeline::Limits;
 
 /// How a render worker listens and how much it takes on. A flag and a variable have the same name.
 #[derive(Debug, Clone, clap::Args)]
@@ -48,11 +48,13 @@ pub struct Settings {
 }
 
 impl Settings {
-    pub(crate) fn service_limits(&self) -> Limits {
+    /// What the worker takes on.
+    pub fn limits(&self) -> Limits {
         Limits {
             draws_at_once: self
                 .draws_at_once
                 .and_then(|count| NonZeroUsize::new(usize::from(count))),
+            draw_queue: usize::from(self.draw_queue),
             frame_bytes: u64::from(self.frame_memory_mib) << 20,
             device_frame_bytes: self.device_frame_memory_mib.map(|mib| u64::from(mib) << 20),
             frames_ahead: usize::from(self.frames_ahead),

@@ -8,14 +8,14 @@ use contract::event::{Body, Event, RejectReason};
 use contract::job::RenderJob;
 use contract::topic::Topic;
 use render_worker::batch::{BatchService, GROUP};
-use render_worker::desk::Class;
+use render_worker::desk::{Class, Order};
 use service::Stop;
 use storage::log::{EmbeddedLog, EventLog as _, contents};
 use storage::{StorageError, Store};
 use tokio::task::JoinHandle;
 
 use crate::stored::{quick, slow, two_months_in};
-use crate::worker::{LIMIT, Worker};
+use crate::worker::{LIMIT, USUAL, Worker};
 
 fn wanted(job: &RenderJob, trace: &str) -> Event {
     Event::new(
@@ -176,8 +176,9 @@ async fn whoever_waits_for_a_picture_comes_before_the_batch() {
     let job = two_months_in(&store).await;
     let worker = Worker::start(&store, 1, 8);
     let draw = |job: RenderJob, class| {
-        let desk = worker.desk.clone();
-        tokio::spawn(async move { desk.draw(&job, class).await.unwrap() })
+        let (desk, storing) = (worker.desk.clone(), USUAL);
+        let order = Order { class, storing };
+        tokio::spawn(async move { desk.draw(&job, order).await.unwrap() })
     };
     let first = draw(slow(&job, 1), Class::Batch);
     worker

@@ -3,13 +3,14 @@
 
 use contract::key::ObjectKey;
 use contract::kind::Kind;
-use render_worker::desk::{Class, Origin};
-use render_worker::{Backend, RenderService};
+use render::Backend;
+use render_worker::desk::{Order, Origin};
 use storage::Store;
 use storage::sound::damage;
 
+use crate::here::Here;
 use crate::stored::{quick, two_months_in};
-use crate::worker::Worker;
+use crate::worker::{USUAL, Worker};
 
 async fn flip(store: &Store, key: &ObjectKey, byte: usize) {
     let mut content = store.get(key).await.unwrap().to_vec();
@@ -33,13 +34,13 @@ async fn a_flipped_bit_of_a_frame_or_a_domain_is_no_picture() {
         for byte in [5, 400, whole.len() / 2, whole.len() - 9] {
             flip(&store, key, byte).await;
             // One that has nothing in memory.
-            let service = RenderService::new(store.clone(), Backend::Cpu).unwrap();
+            let service = Here::new(store.clone(), Backend::Cpu);
             let error = service.draw(&job).await.unwrap_err().in_full();
             assert!(error.contains(key.as_str()), "byte {byte}: {error}");
             store.put_over(key, whole.clone()).await.unwrap();
         }
     }
-    let service = RenderService::new(store, Backend::Cpu).unwrap();
+    let service = Here::new(store, Backend::Cpu);
     assert!(service.draw(&job).await.is_ok());
 }
 
@@ -48,11 +49,12 @@ async fn a_flipped_bit_of_a_picture_is_drawn_over() {
     let store = Store::memory();
     let job = quick(&two_months_in(&store).await, 1);
     let worker = Worker::start(&store, 1, 4);
-    let drawn = worker.desk.draw(&job, Class::OnDemand).await.unwrap();
+    let order = Order::on_demand(USUAL);
+    let drawn = worker.desk.draw(&job, order).await.unwrap();
     assert_eq!(store.get(&job.key()).await.unwrap(), drawn.png);
     flip(&store, &job.key(), drawn.png.len() / 2).await;
     let before = damage::count(Kind::Tile);
-    let again = worker.desk.draw(&job, Class::OnDemand).await.unwrap();
+    let again = worker.desk.draw(&job, order).await.unwrap();
     assert!(again.origin == Origin::Drawn && again.png == drawn.png);
     assert!(damage::count(Kind::Tile) > before);
     assert_eq!(store.get(&job.key()).await.unwrap(), drawn.png);

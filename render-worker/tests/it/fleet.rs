@@ -14,7 +14,7 @@ use storage::Store;
 use crate::process::WorkerProcess;
 use crate::stored::{at, quick, slow, two_months, two_months_in};
 use crate::worker::{
-    LIMIT, Worker, ask, drawn_here, fleet, fleet_settings, fleet_with, metric, until,
+    LIMIT, USUAL, Worker, ask, drawn_here, fleet, fleet_settings, fleet_with, metric, until,
 };
 
 const TRIES: &str = "fluxglobe_render_fleet_tries_total";
@@ -49,7 +49,7 @@ async fn pictures_between_the_same_frames_are_drawn_on_one_worker() {
         for (number, time) in (0..).zip(times) {
             let job = quick(&at(&flux, &carbon, time), number);
             let first = first_asked(&job, &names);
-            let picture = fleet.draw(&job, "t").await.unwrap();
+            let picture = fleet.draw(&job, USUAL, "t").await.unwrap();
             assert_eq!(picture.worker, first, "{interval}");
             by_interval
                 .entry(interval)
@@ -113,7 +113,7 @@ async fn a_worker_killed_in_the_middle_of_a_tile_has_it_drawn_elsewhere_with_equ
     assert_eq!(picture.png, drawn_here(&alone, &job).await);
     // The next picture does not ask the lost one first.
     let tries = metric(&registry, TRIES, &[]);
-    fleet.draw(&quick(&job, 1), "t").await.unwrap();
+    fleet.draw(&quick(&job, 1), USUAL, "t").await.unwrap();
     assert_eq!(metric(&registry, TRIES, &[]), tries + 1);
 }
 
@@ -131,7 +131,7 @@ async fn a_frozen_worker_is_not_waited_for() {
     let job = quick(&job, 1);
     let first = first_asked(&job, &names);
     processes.iter().find(|p| p.name == first).unwrap().freeze();
-    let picture = fleet.draw(&job, "t").await.unwrap();
+    let picture = fleet.draw(&job, USUAL, "t").await.unwrap();
     assert_ne!(picture.worker, first);
     assert_eq!(
         metric(&registry, TRIES, &[("outcome", "hedged")]),
@@ -157,7 +157,7 @@ async fn a_full_worker_is_passed_over() {
     let drawing = ask(&fleet, &slow(&job, 1));
     full.until("it is full", |w| w.desk.condition().in_flight == 1)
         .await;
-    let picture = fleet.draw(&quick(&job, 1), "t").await.unwrap();
+    let picture = fleet.draw(&quick(&job, 1), USUAL, "t").await.unwrap();
     assert_ne!(picture.worker, first);
     assert_eq!(metric(&registry, TRIES, &[("outcome", "busy")]), 1);
     drawing.await.unwrap().unwrap();
@@ -178,14 +178,14 @@ async fn workers_may_come_later_than_those_who_ask() {
         fleet.ready().await,
         Err(FleetError::Unavailable(_))
     ));
-    let refused = fleet.draw(&quick(&job, 1), "t").await.unwrap_err();
+    let refused = fleet.draw(&quick(&job, 1), USUAL, "t").await.unwrap_err();
     assert!(matches!(refused, FleetError::Unavailable(_)), "{refused}");
     let own = render_worker::wire::Version::own();
-    let backend = render_worker::Backend::Cpu;
+    let backend = render::Backend::Cpu;
     let _worker = Worker::start_with(&store, &worker_settings, backend, own);
     until("it is found", || fleet.health()[&name] == Health::Up).await;
     assert_eq!(fleet.ready().await.unwrap(), "1 of 1 render workers");
-    fleet.draw(&quick(&job, 1), "t").await.unwrap();
+    fleet.draw(&quick(&job, 1), USUAL, "t").await.unwrap();
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -200,7 +200,7 @@ async fn a_name_brings_the_workers_at_its_addresses() {
         fleet.health().values().any(|health| *health == Health::Up)
     })
     .await;
-    let picture = fleet.draw(&quick(&job, 1), "t").await.unwrap();
+    let picture = fleet.draw(&quick(&job, 1), USUAL, "t").await.unwrap();
     assert_eq!(picture.worker, worker.name);
 }
 
@@ -213,7 +213,7 @@ async fn no_answer_within_the_time_is_an_error_within_the_time() {
     let fleet = fleet_with(&settings, &Registry::new()).await;
     process.freeze();
     let begun = Instant::now();
-    let late = fleet.draw(&quick(&job, 1), "t").await.unwrap_err();
+    let late = fleet.draw(&quick(&job, 1), USUAL, "t").await.unwrap_err();
     let took = begun.elapsed();
     let limit = Duration::from_millis(400);
     assert_eq!(late, FleetError::Late { deadline: limit });
@@ -229,11 +229,11 @@ async fn a_job_that_no_worker_would_draw_is_asked_of_none() {
     let fleet = fleet_with(&fleet_settings(&[&worker.name]), &registry).await;
     let mut beyond = job.clone();
     beyond.style.slices = 0;
-    let refused = fleet.draw(&beyond, "t").await.unwrap_err();
+    let refused = fleet.draw(&beyond, USUAL, "t").await.unwrap_err();
     assert!(matches!(refused, FleetError::BadRequest(_)), "{refused}");
     let mut unknown = job;
     unknown.value.domain = "domain/nothing/0".parse().unwrap();
     assert_eq!(metric(&registry, TRIES, &[]), 0);
-    let refused = fleet.draw(&unknown, "t").await.unwrap_err();
+    let refused = fleet.draw(&unknown, USUAL, "t").await.unwrap_err();
     assert!(matches!(refused, FleetError::NotFound(_)), "{refused}");
 }

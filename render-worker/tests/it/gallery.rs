@@ -3,8 +3,8 @@
 use std::time::Instant;
 
 use contract::job::Mode;
-use render_worker::proof::currents;
-use render_worker::{Backend, Image, Renderer};
+use render::{Backend, Image, Renderer};
+use render_proof::currents;
 
 use crate::scenes::{ONE_DEGREE, globe, job, ocean, tile};
 
@@ -138,7 +138,7 @@ fn busy_ms() -> i64 {
 }
 
 /// The scene of a climatology in a store, if `GALLERY_STORE` names the folder.
-fn stored() -> Option<render_worker::Scene> {
+fn stored() -> Option<render::Scene> {
     #[expect(clippy::disallowed_methods, reason = "a test's own switch")]
     let store = storage::Store::open(
         &std::env::var("GALLERY_STORE")

@@ -3,9 +3,10 @@
 use contract::job::{Mode, RenderJob, Style};
 use contract::manifest::{Contributed, Manifest};
 use contract::quantity::Quantity;
-use render_worker::{Backend, RenderService};
+use render::Backend;
 use storage::{Store, contributed};
 
+use crate::here::Here;
 use crate::scenes::{FIVE_DEGREES, job, tile};
 use crate::stored::product;
 
@@ -59,7 +60,7 @@ fn different_columns(one: &[u8], other: &[u8]) -> Vec<u32> {
 async fn incomplete_sums_are_hatched_where_doubt_is_drawn() {
     let store = Store::memory();
     let carbon = carbon(&store, "carbon", COMPLETE_FROM_COL).await;
-    let service = RenderService::new(store, Backend::Cpu).unwrap();
+    let service = Here::new(store, Backend::Cpu);
     let draw = |job: RenderJob| {
         let service = &service;
         async move { service.draw(&job).await.unwrap() }
@@ -94,7 +95,7 @@ async fn incomplete_sums_are_hatched_where_doubt_is_drawn() {
 async fn complete_sums_look_the_same_with_doubt_and_without() {
     let store = Store::memory();
     let carbon = carbon(&store, "carbon", 0).await;
-    let service = RenderService::new(store, Backend::Cpu).unwrap();
+    let service = Here::new(store, Backend::Cpu);
     for time in ["2000-01-20", "2000-02-20", "2000-03-01"] {
         let [plain, doubted] = [false, true].map(|doubt| map_of(&carbon, time, doubt));
         assert_eq!(plain.value, doubted.value, "{time}");
@@ -156,7 +157,7 @@ async fn where_accumulation_starts_what_the_first_step_lacks_is_hatched_at_once(
         complete_cells: counts.complete_cells(),
     });
     carbon.steps = vec![first];
-    let service = RenderService::new(store, Backend::Cpu).unwrap();
+    let service = Here::new(store, Backend::Cpu);
     let pictures = [false, true].map(|doubt| map_of(&carbon, "2000-02-01T01:00:00Z", doubt));
     let plain = service.draw(&pictures[0]).await.unwrap();
     let doubted = service.draw(&pictures[1]).await.unwrap();

@@ -2,19 +2,23 @@
 
 use contract::job::Mode;
 use contract::job::RenderJob;
-use render_worker::{Backend, RenderError, RenderService};
+use render::{Backend, RenderError};
+use render_worker::DrawError;
+use render_worker::pipeline::IsWanted;
 use storage::Store;
 
-use crate::stored::two_months_in;
+use crate::device;
+use crate::here::Here;
+use crate::stored::{quick, two_months_in};
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_job_is_drawn_on_a_fresh_device_when_its_own_is_lost() {
-    if crate::device::gpu("a lost device").is_none() {
+    if !device::is_wanted("a lost device") {
         return;
     }
     let store = Store::memory();
     let job = two_months_in(&store).await;
-    let service = RenderService::new(store, Backend::Gpu).unwrap();
+    let service = Here::new(store, Backend::Gpu);
     for (lost, mode) in (0..).zip([Mode::Volume, Mode::Map, Mode::Sprites]) {
         let job = RenderJob {
             mode,
@@ -34,21 +38,24 @@ async fn a_job_is_drawn_on_a_fresh_device_when_its_own_is_lost() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_job_that_loses_every_device_fails_and_the_next_one_is_drawn() {
-    if crate::device::gpu("a job that loses devices").is_none() {
+    if !device::is_wanted("a job that loses devices") {
         return;
     }
     let store = Store::memory();
     let job = two_months_in(&store).await;
-    let service = RenderService::new(store, Backend::Gpu).unwrap();
+    let service = Here::new(store, Backend::Gpu);
     let poison = || async {
         let scene = service.scene(&job).await?;
         service.renderer().lose_device();
-        let wanted: render_worker::service::IsWanted = std::sync::Arc::new(|| true);
+        let wanted: IsWanted = std::sync::Arc::new(|| true);
         service.picture(&job, scene, wanted, ()).await
     };
     let failed = service.on_a_sound_device(poison).await.unwrap_err();
     assert!(failed.is_device_fault() && failed.is_final(), "{failed}");
-    assert!(!matches!(failed, RenderError::NoAdapter(_)));
+    assert!(!matches!(
+        failed,
+        DrawError::Render(RenderError::NoAdapter(_))
+    ));
     assert_eq!(
         service.renderer().device_number(),
         1,
@@ -60,20 +67,25 @@ async fn a_job_that_loses_every_device_fails_and_the_next_one_is_drawn() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn many_that_draw_on_a_device_that_is_lost_share_one_fresh_one() {
-    if crate::device::gpu("many on a lost device").is_none() {
+    if !device::is_wanted("many on a lost device") {
         return;
     }
     let store = Store::memory();
     let job = two_months_in(&store).await;
-    let service = RenderService::new(store, Backend::Gpu).unwrap();
-    let before = service.draw(&job).await.unwrap();
+    let service = Here::new(store, Backend::Gpu);
+    // Equal jobs would be one.
+    let jobs: Vec<RenderJob> = (0..6).map(|number| quick(&job, number)).collect();
+    let mut before = vec![];
+    for job in &jobs {
+        before.push(service.draw(job).await.unwrap());
+    }
     service.renderer().lose_device();
-    let draw = || {
+    let draw = |job: &RenderJob| {
         let (service, job) = (service.clone(), job.clone());
         tokio::spawn(async move { service.draw(&job).await.unwrap() })
     };
-    let tasks: Vec<_> = (0..6).map(|_| draw()).collect();
-    for task in tasks {
+    let tasks: Vec<_> = jobs.iter().map(draw).collect();
+    for (task, before) in tasks.into_iter().zip(before) {
         assert_eq!(task.await.unwrap(), before);
     }
     assert_eq!(service.renderer().device_number(), 1);

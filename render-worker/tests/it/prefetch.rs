@@ -7,13 +7,15 @@ use contract::grid::Grid;
 use contract::job::{Mode, RenderJob, View};
 use contract::manifest::Manifest;
 use contract::quantity::Quantity;
-use render_worker::{Backend, Limits, RenderService, Renderer};
+use render::Backend;
+use render_worker::Limits;
 use storage::Store;
 
-use crate::device::{gpu, gpu_renderer};
-use crate::scenes::{FIVE_DEGREES, globe, job, ocean, tile};
+use crate::device;
+use crate::here::Here;
+use crate::scenes::{FIVE_DEGREES, globe, job, tile};
 use crate::stored::product;
-use crate::worker::{Worker, fleet, until};
+use crate::worker::{USUAL, Worker, fleet, until};
 
 const MONTHS: u32 = 8;
 const QUARTER_DEGREE: Grid = Grid {
@@ -64,7 +66,7 @@ fn small() -> View {
 async fn the_frames_around_are_read_ahead_and_the_next_picture_finds_its_own() {
     let store = Store::memory();
     let flux = months(&store, "flux", FIVE_DEGREES).await;
-    let service = RenderService::with_limits(store, Backend::Cpu, limits(1)).unwrap();
+    let service = Here::with_limits(store, Backend::Cpu, limits(1));
     let draw = async |time: &str| {
         let job = map_at(&flux, time, small());
         service.draw(&job).await.unwrap();
@@ -103,7 +105,7 @@ async fn what_is_read_ahead_and_used_is_in_the_metrics() {
     };
     for (time, read, used) in [("2000-04-20", 2, 0), ("2000-05-20", 3, 1)] {
         let job = map_at(&flux, time, small());
-        fleet.draw(&job, "t").await.unwrap();
+        fleet.draw(&job, USUAL, "t").await.unwrap();
         worker
             .until(time, |worker| count(worker, "read") == read)
             .await;
@@ -121,7 +123,7 @@ async fn nothing_is_read_ahead_where_that_is_off_or_frames_would_push_one_anothe
         ..limits(1)
     };
     for limits in [limits(0), tight] {
-        let service = RenderService::with_limits(store.clone(), Backend::Cpu, limits).unwrap();
+        let service = Here::with_limits(store.clone(), Backend::Cpu, limits);
         for (time, misses) in [("2000-04-20", 2), ("2000-05-20", 3), ("2000-06-20", 4)] {
             let job = map_at(&flux, time, small());
             service.draw(&job).await.unwrap();
@@ -136,7 +138,7 @@ async fn reading_ahead_ends_when_the_view_moves_to_another_product() {
     let store = Store::memory();
     let large = months(&store, "large", QUARTER_DEGREE).await;
     let other = months(&store, "other", FIVE_DEGREES).await;
-    let service = RenderService::with_limits(store, Backend::Cpu, limits(8)).unwrap();
+    let service = Here::with_limits(store, Backend::Cpu, limits(8));
     let job = map_at(&large, "2000-04-20", small());
     service.draw(&job).await.unwrap();
     let job = map_at(&other, "2000-04-20", small());
@@ -151,12 +153,12 @@ async fn reading_ahead_ends_when_the_view_moves_to_another_product() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn frames_read_ahead_lie_on_the_device_before_they_are_drawn() {
-    if gpu_renderer("frames on the device").is_none() {
+    if !device::is_wanted("frames on the device") {
         return;
     }
     let store = Store::memory();
     let flux = months(&store, "flux", FIVE_DEGREES).await;
-    let service = RenderService::with_limits(store, Backend::Gpu, limits(1)).unwrap();
+    let service = Here::with_limits(store, Backend::Gpu, limits(1));
     let draw = async |time: &str| {
         let job = map_at(&flux, time, tile(2, 0, 1, 256));
         service.draw(&job).await.unwrap()
@@ -170,45 +172,20 @@ async fn frames_read_ahead_lie_on_the_device_before_they_are_drawn() {
     until("one more", || bytes() == 6 * frame_bytes).await;
 }
 
-#[test]
-fn a_device_says_what_memory_is_its_own_and_a_program_has_none() {
-    let Some(gpu) = gpu("memory of the device") else {
-        return;
-    };
-    let own_bytes = gpu.own_bytes();
-    assert_eq!(own_bytes.is_none(), gpu.is_software(), "{own_bytes:?}");
-    assert!(own_bytes.is_none_or(|own| own > 1 << 28));
-}
-
-#[test]
-fn frames_on_the_device_stay_within_their_limit() {
-    if gpu_renderer("limit of the device").is_none() {
-        return;
-    }
-    let scene = ocean(FIVE_DEGREES);
-    let frame_bytes = FIVE_DEGREES.cell_count() as u64 * 4;
-    for (limit, held) in [(3 * frame_bytes, 3), (1, 1), (64 << 20, 5)] {
-        let renderer = Renderer::keeping(Backend::Gpu, Some(limit)).unwrap();
-        let job = job(Mode::Volume, tile(1, 0, 0, 256));
-        renderer.render(&job, &scene).unwrap();
-        assert_eq!(renderer.resident_bytes(), held * frame_bytes, "{limit}");
-    }
-}
-
 /// Prints what docs/performance.md tells.
 #[tokio::test(flavor = "multi_thread")]
 async fn the_first_picture_of_a_step_waits_for_its_drawing_alone() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path().to_str().unwrap()).unwrap();
     let flux = months(&store, "flux", QUARTER_DEGREE).await;
-    let backend = if gpu_renderer("first pictures").is_some() {
+    let backend = if device::is_wanted("first pictures") {
         Backend::Gpu
     } else {
         Backend::Cpu
     };
     for (frames_ahead, misses) in [(0, 1), (1, 0)] {
         let limits = limits(frames_ahead);
-        let service = RenderService::with_limits(store.clone(), backend, limits).unwrap();
+        let service = Here::with_limits(store.clone(), backend, limits);
         let timed = async |time: &str| -> Duration {
             let job = map_at(&flux, time, tile(3, 1, 3, 256));
             let begun = Instant::now();

@@ -6,8 +6,9 @@ use std::process::{Child, Command, Stdio};
 
 use ::service::Stop;
 use prometheus::Registry;
-use render_worker::Backend;
-use render_worker::server::{Server, open_desk};
+use render::Backend;
+use render_worker::Desk;
+use render_worker::server::Server;
 use storage::Store;
 
 use crate::worker::settings;
@@ -84,7 +85,8 @@ fn a_worker_serves_until_its_input_ends() {
     let runtime = tokio::runtime::Runtime::new().unwrap();
     runtime.block_on(async {
         let settings = settings(1, 8);
-        let desk = open_desk(&settings, store, Backend::Cpu, &Registry::new()).unwrap();
+        let limits = settings.limits();
+        let desk = Desk::open(store, Backend::Cpu, &limits, &Registry::new()).unwrap();
         let server = Server::bind(desk, &settings).unwrap();
         println!("{ANNOUNCED}{}", server.address());
         let stop = Stop::new();

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use contract::job::{Mode, RenderJob};
-use render_worker::Backend;
+use render::Backend;
 use render_worker::desk::Origin;
 use render_worker::fleet::FleetError;
 use render_worker::wire::Version;
@@ -12,14 +12,18 @@ use render_worker::wire::proto::{DrawRequest, StatusRequest};
 use storage::Store;
 use tonic::{Code, Request};
 
+use crate::here::Here;
 use crate::stored::{quick, slow, two_months_in};
-use crate::worker::{LIMIT, Worker, ask, drawn_here, fleet, fleet_settings, fleet_with, settings};
+use crate::worker::{
+    LIMIT, USUAL, Worker, ask, drawn_here, fleet, fleet_settings, fleet_with, settings,
+};
 
 fn request(job: &RenderJob) -> DrawRequest {
     DrawRequest {
         version: Some(Version::own().into()),
         job_json: serde_json::to_string(job).unwrap(),
         trace: "test".into(),
+        storing: 0,
     }
 }
 
@@ -28,7 +32,7 @@ async fn a_picture_is_the_same_bytes_by_grpc_as_in_process() {
     let store = Store::memory();
     let job = two_months_in(&store).await;
     let mut backends = vec![Backend::Cpu];
-    if crate::device::gpu("bytes by gRPC").is_some() {
+    if crate::device::is_wanted("bytes by gRPC") {
         backends.push(Backend::Gpu);
     }
     for backend in backends {
@@ -37,18 +41,18 @@ async fn a_picture_is_the_same_bytes_by_grpc_as_in_process() {
         assert_eq!(two_months_in(&own).await, job);
         let worker = Worker::start_with(&own, &settings(2, 8), backend, Version::own());
         let fleet = fleet(&[&worker.name]).await;
-        let local = render_worker::RenderService::new(store.clone(), backend).unwrap();
+        let local = Here::new(store.clone(), backend);
         for mode in Mode::SCALAR {
             let job = RenderJob {
                 mode,
                 ..job.clone()
             };
             let here = local.draw(&job).await.unwrap();
-            let there = fleet.draw(&job, "t").await.unwrap();
+            let there = fleet.draw(&job, USUAL, "t").await.unwrap();
             assert_eq!(there.origin, Origin::Drawn);
             assert_eq!(there.png, here, "{mode}");
             assert_eq!(own.get(&job.key()).await.unwrap(), here, "it is kept");
-            let again = fleet.draw(&job, "t").await.unwrap();
+            let again = fleet.draw(&job, USUAL, "t").await.unwrap();
             assert_eq!((again.origin, again.png), (Origin::Stored, here));
         }
     }
@@ -107,14 +111,14 @@ async fn a_full_worker_says_when_to_ask_again_and_draws_what_it_took() {
     worker
         .until("one waits", |w| w.desk.condition().waiting_on_demand == 1)
         .await;
-    let refused = fleet.draw(&quick(&job, 2), "t").await.unwrap_err();
+    let refused = fleet.draw(&quick(&job, 2), USUAL, "t").await.unwrap_err();
     let FleetError::Busy { retry_after } = refused else {
         panic!("not busy: {refused}");
     };
     assert!(retry_after >= Duration::from_millis(100), "{retry_after:?}");
     drawing.await.unwrap().unwrap();
     waiting.await.unwrap().unwrap();
-    fleet.draw(&quick(&job, 2), "t").await.unwrap();
+    fleet.draw(&quick(&job, 2), USUAL, "t").await.unwrap();
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -227,7 +231,7 @@ async fn versions_that_differ_are_told_on_both_sides_before_anything_is_drawn() 
     let fleet = fleet(&[&worker.name]).await;
     let not_ready = fleet.ready().await.unwrap_err().to_string();
     assert!(not_ready.contains("0.0.0-older"), "{not_ready}");
-    let refused = fleet.draw(&job, "t").await.unwrap_err();
+    let refused = fleet.draw(&job, USUAL, "t").await.unwrap_err();
     assert!(
         matches!(&refused, FleetError::Unavailable(text) if text.contains("0.0.0-older")),
         "{refused}"
@@ -256,7 +260,7 @@ async fn a_stopping_worker_sends_others_away_and_finishes_what_it_took() {
     worker
         .until("it stops", |w| w.desk.condition().stopping)
         .await;
-    let refused = fleet.draw(&quick(&job, 2), "t").await.unwrap_err();
+    let refused = fleet.draw(&quick(&job, 2), USUAL, "t").await.unwrap_err();
     assert!(matches!(refused, FleetError::Unavailable(_)), "{refused}");
     assert!(!drawing.is_finished());
     drawing.await.unwrap().unwrap();
@@ -384,7 +388,7 @@ async fn a_caller_asks_one_worker_for_no_more_than_it_may() {
     worker
         .until("one is drawn", |w| w.desk.condition().in_flight == 1)
         .await;
-    let refused = fleet.draw(&quick(&job, 1), "t").await.unwrap_err();
+    let refused = fleet.draw(&quick(&job, 1), USUAL, "t").await.unwrap_err();
     assert!(matches!(refused, FleetError::Busy { .. }), "{refused}");
     assert_eq!(
         worker.desk.condition().waiting_on_demand,

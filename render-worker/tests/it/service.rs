@@ -8,12 +8,14 @@ use contract::context::Relief;
 use contract::grid::Grid;
 use contract::job::{Mode, RenderJob};
 use contract::quantity::Quantity;
-use render_worker::{Backend, Limits, RenderError, RenderService, Renderer};
+use render::stages::layout::is_missing;
+use render::{Backend, RenderError, Renderer, pyramid};
+use render_worker::{DrawError, Limits, Source};
 use storage::Store;
 
-use crate::device::renderers;
+use crate::here::Here;
 use crate::scenes::{FIVE_DEGREES, ONE_DEGREE};
-use crate::stored::{at, product, two_months, two_months_in};
+use crate::stored::{at, product, quick, two_months, two_months_in};
 
 fn alpha(png: &[u8]) -> Vec<u8> {
     image::load_from_memory(png)
@@ -28,7 +30,7 @@ fn alpha(png: &[u8]) -> Vec<u8> {
 async fn a_stored_product_is_drawn_at_any_instant_in_every_mode() {
     let store = Store::memory();
     let (flux, carbon) = two_months(&store).await;
-    let service = RenderService::new(store, Backend::Cpu).unwrap();
+    let service = Here::new(store, Backend::Cpu);
     for mode in Mode::SCALAR {
         let mut pictures = vec![];
         for time in [
@@ -59,7 +61,7 @@ async fn a_stored_product_is_drawn_at_any_instant_in_every_mode() {
 async fn gaps_of_the_domain_are_filled_before_anything_is_drawn() {
     let store = Store::memory();
     let (flux, carbon) = two_months(&store).await;
-    let service = RenderService::new(store, Backend::Cpu).unwrap();
+    let service = Here::new(store, Backend::Cpu);
     // Row 20 (10 S to 15 S), columns 0 to 5: seen on the tile south of the equator at the date line.
     let late = at(&flux, &carbon, "2000-03-01");
     let alpha = alpha(&service.draw(&late).await.unwrap());
@@ -81,7 +83,7 @@ async fn a_stored_relief_on_a_grid_of_its_own_lies_below_the_picture() {
     )
     .await;
     let relief = Relief::of(&relief, 15.0).unwrap();
-    let service = RenderService::new(store, Backend::Cpu).unwrap();
+    let service = Here::new(store, Backend::Cpu);
     let plain = at(&flux, &carbon, "2000-01-30");
     let job = plain.clone().over(Some(relief.clone())).unwrap();
     let png = service.draw(&job).await.unwrap();
@@ -120,7 +122,7 @@ async fn jobs_that_name_what_is_not_there_are_refused() {
         &[vec![1.0, 2.0]],
     )
     .await;
-    let service = RenderService::new(store, Backend::Cpu).unwrap();
+    let service = Here::new(store, Backend::Cpu);
     let mut unknown = job.clone();
     unknown.value.domain = "domain/nothing/0".parse().unwrap();
     let refused = service.draw(&unknown).await.unwrap_err();
@@ -131,10 +133,12 @@ async fn jobs_that_name_what_is_not_there_are_refused() {
     let mut wider = job.clone();
     (wider.grid.rows, wider.grid.dlat_deg) = (1 << 20, 1e-4);
     for wrong in [mismatched, wider] {
-        assert!(matches!(
-            service.draw(&wrong).await,
-            Err(RenderError::GridMismatch { .. })
-        ));
+        let refused = service.draw(&wrong).await.unwrap_err();
+        let expected = matches!(
+            *refused,
+            DrawError::Render(RenderError::GridMismatch { .. })
+        );
+        assert!(expected, "{refused}");
     }
     let (time, view, style) = ("2000-01-30".parse().unwrap(), job.view, job.style);
     let quarrel = RenderJob::of(&flux, Some(&small), time, Mode::Volume, view, style).unwrap_err();
@@ -145,29 +149,25 @@ async fn jobs_that_name_what_is_not_there_are_refused() {
 }
 
 #[tokio::test]
-async fn many_tasks_draw_at_the_same_time_and_agree() {
+async fn many_tasks_draw_at_the_same_time_and_agree_with_one_after_the_other() {
     let store = Store::memory();
     let job = two_months_in(&store).await;
-    let service = RenderService::new(store, Backend::Cpu).unwrap();
-    let job = RenderJob {
-        mode: Mode::Volume,
-        ..job
-    };
-    let draw = || {
+    let service = Here::new(store, Backend::Cpu);
+    // Equal jobs would be one.
+    let jobs: Vec<RenderJob> = (0..8).map(|number| quick(&job, number)).collect();
+    let draw = |job: &RenderJob| {
         let (service, job) = (service.clone(), job.clone());
         tokio::spawn(async move { service.draw(&job).await.unwrap() })
     };
-    let tasks: Vec<_> = (0..8).map(|_| draw()).collect();
-    let mut pictures = vec![];
-    for task in tasks {
-        pictures.push(task.await.unwrap());
+    let tasks: Vec<_> = jobs.iter().map(draw).collect();
+    for (task, job) in tasks.into_iter().zip(&jobs) {
+        assert_eq!(task.await.unwrap(), service.draw(job).await.unwrap());
     }
-    assert!(pictures.windows(2).all(|pair| pair[0] == pair[1]));
 }
 
 /// Somebody's turn to draw, who looks at what is being encoded when it is let go.
 struct Turn {
-    service: RenderService,
+    service: Here,
     encoding: Arc<AtomicUsize>,
 }
 
@@ -186,8 +186,8 @@ async fn a_turn_to_draw_is_over_when_encoding_begins_and_not_before_it_has_a_cor
         draws_at_once: Some(NonZeroUsize::MIN),
         ..Limits::default()
     };
-    let service = RenderService::with_limits(store, Backend::Cpu, limits).unwrap();
-    assert_eq!(service.draws_at_once(), NonZeroUsize::MIN);
+    let service = Here::with_limits(store, Backend::Cpu, limits);
+    assert_eq!(service.desk.draws_at_once(), NonZeroUsize::MIN);
     let encoding = Arc::new(AtomicUsize::new(usize::MAX));
     let turn = Turn {
         service: service.clone(),
@@ -202,41 +202,11 @@ async fn a_turn_to_draw_is_over_when_encoding_begins_and_not_before_it_has_a_cor
 
 #[test]
 fn as_many_pictures_are_drawn_at_once_as_suit_what_draws_unless_it_is_said() {
-    for renderer in renderers("draws at once") {
-        let adapter = renderer.adapter();
-        let suited = adapter.draws_at_once().get();
-        let cores = std::thread::available_parallelism().unwrap().get();
-        let expected = match (adapter.backend(), adapter.is_software()) {
-            ("none", true) => cores,
-            (_, true) => 2,
-            (_, false) => 4,
-        };
-        assert_eq!(suited, expected, "{adapter:?}");
-    }
-    let service = RenderService::new(Store::memory(), Backend::Cpu).unwrap();
+    let service = Here::new(Store::memory(), Backend::Cpu);
     assert_eq!(
-        service.draws_at_once(),
+        service.desk.draws_at_once(),
         service.renderer().adapter().draws_at_once()
     );
-}
-
-#[test]
-fn where_a_graphics_card_is_required_a_software_adapter_is_refused_by_name() {
-    let Some(any) = crate::device::gpu_renderer("a required card") else {
-        return;
-    };
-    match Renderer::new(Backend::HardwareGpu) {
-        Ok(renderer) => assert!(!renderer.adapter().is_software() && !any.adapter().is_software()),
-        Err(error) => {
-            assert!(any.adapter().is_software(), "{error}");
-            let text = error.to_string();
-            assert!(
-                text.contains(any.name()) && text.contains("--require-gpu"),
-                "{text}"
-            );
-            assert!(!error.is_retryable());
-        }
-    }
 }
 
 #[tokio::test]
@@ -250,7 +220,7 @@ async fn a_landing_leaves_pictures_that_it_does_not_touch_their_name_and_their_b
         ..flux.steps[0].clone()
     });
     assert_ne!(longer.id(), flux.id());
-    let service = RenderService::new(store, Backend::Cpu).unwrap();
+    let service = Here::new(store, Backend::Cpu);
     let middle = "2000-02-15T12:00:00Z";
     for time in ["2000-01-30", middle] {
         let (old, new) = (at(&flux, &carbon, time), at(&longer, &carbon, time));
@@ -264,4 +234,30 @@ async fn a_landing_leaves_pictures_that_it_does_not_touch_their_name_and_their_b
     assert_ne!(old.key(), new.key());
     let (old, new) = (service.draw(&old).await, service.draw(&new).await);
     assert_ne!(old.unwrap(), new.unwrap());
+}
+
+#[tokio::test]
+async fn frames_of_a_product_come_filled_with_the_errors_beside_them() {
+    let store = Store::memory();
+    // The second month has a cloud over row 20, columns 0 to 5.
+    let job = two_months_in(&store).await;
+    let renderer = Renderer::new(Backend::Cpu).unwrap();
+    let source = Source::new(store, Arc::new(renderer), u64::MAX);
+    let scene = source.scene(&job).await.unwrap();
+    assert!(scene.value.before.errors.is_none() && scene.value.before.largest_error == 0.0);
+    let after = &scene.value.after;
+    let errors = after.errors.as_ref().unwrap().content();
+    let cloud = 20 * 72..20 * 72 + 6;
+    for (cell, error) in errors.iter().enumerate() {
+        let (is_land, is_cloud) = (scene.domain.content()[cell] == 0, cloud.contains(&cell));
+        assert_eq!(is_missing(*error), is_land, "cell {cell}");
+        assert_eq!(*error > 0.0, is_cloud, "cell {cell}: {error}");
+        assert!(*error <= after.largest_error);
+    }
+    // Blocks of four cells: rows 20 and 21, the first four columns; half of their cells were measured.
+    let coarser = pyramid::coarser(&scene).unwrap();
+    let error = coarser.value.after.errors.as_ref().unwrap().content()[10 * 36];
+    let expected = 0.25 * (errors[20 * 72] + errors[20 * 72 + 1]);
+    assert!((error / expected - 1.0).abs() < 1e-5, "{error} {expected}");
+    assert!(coarser.value.before.errors.is_none());
 }

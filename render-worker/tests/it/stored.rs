@@ -62,7 +62,7 @@ pub(crate) async fn product(
     manifest
 }
 
-fn values(frame: &render_worker::Frame) -> Vec<f32> {
+fn values(frame: &render::Frame) -> Vec<f32> {
     frame
         .cells
         .content()

@@ -5,18 +5,23 @@ use std::time::Duration;
 
 use ::service::Stop;
 use prometheus::Registry;
-use render_worker::desk::Desk;
+use render::Backend;
+use render_worker::desk::{Desk, Storing};
 use render_worker::fleet::{Fleet, FleetSettings};
-use render_worker::server::{Server, ServerError, Settings, open_desk};
+use render_worker::server::{Server, ServerError, Settings};
 use render_worker::wire::Version;
 use render_worker::wire::proto::renderer_client::RendererClient;
-use render_worker::{Backend, RenderService};
 use storage::Store;
 use tokio::task::JoinHandle;
 use tonic::transport::Channel;
 
+use crate::here::Here;
+
 /// Anything that takes longer than this has failed.
 pub(crate) const LIMIT: Duration = Duration::from_mins(2);
+
+/// What a caller who has not looked in the store asks for.
+pub(crate) const USUAL: Storing = Storing::LookUpAndKeep;
 
 /// A running worker.
 pub(crate) struct Worker {
@@ -58,7 +63,8 @@ impl Worker {
         version: Version,
     ) -> Self {
         let registry = Registry::new();
-        let desk = open_desk(settings, store.clone(), backend, &registry).unwrap();
+        let limits = settings.limits();
+        let desk = Desk::open(store.clone(), backend, &limits, &registry).unwrap();
         let server = Server::bind(desk.clone(), settings).unwrap();
         let name = server.address().to_string();
         let stop = Stop::new();
@@ -150,7 +156,7 @@ pub(crate) async fn fleet_with(settings: &FleetSettings, registry: &Registry) ->
 
 /// What a job looks like, drawn in this process without a server.
 pub(crate) async fn drawn_here(store: &Store, job: &contract::job::RenderJob) -> bytes::Bytes {
-    let service = RenderService::new(store.clone(), Backend::Cpu).unwrap();
+    let service = Here::new(store.clone(), Backend::Cpu);
     service.draw(job).await.unwrap()
 }
 
@@ -160,5 +166,5 @@ pub(crate) fn ask(
     job: &contract::job::RenderJob,
 ) -> JoinHandle<Result<render_worker::fleet::Picture, render_worker::fleet::FleetError>> {
     let (fleet, job) = (Arc::clone(fleet), job.clone());
-    tokio::spawn(async move { fleet.draw(&job, "test").await })
+    tokio::spawn(async move { fleet.draw(&job, USUAL, "test").await })
 }

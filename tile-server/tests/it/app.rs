@@ -104,7 +104,7 @@ impl TestApp {
             ..Settings::default()
         };
         change(&mut settings);
-        let (drawer, analyst) = (Arc::new(Drawer::default()), Arc::new(Analyst::default()));
+        let (drawer, analyst) = (Arc::new(Drawer::over(&store)), Arc::new(Analyst::default()));
         let state = AppState::new(
             &settings,
             store.clone(),

@@ -6,9 +6,9 @@ use std::time::Duration;
 use axum::http::StatusCode;
 use contract::quantity::Quantity;
 use futures::future::join_all;
+use tile_server::backend::Keep;
 
 use crate::app::TestApp;
-use crate::doubles::Drawer;
 
 const TILE: &str = "/tiles/flux/volume/1/0/0.png?time=2000-02-01";
 
@@ -169,30 +169,35 @@ async fn a_map_keeps_its_picture_when_the_accumulated_carbon_is_derived_later() 
 }
 
 #[tokio::test]
-async fn a_renderer_that_contradicts_the_store_is_counted_and_the_stored_picture_is_served() {
+async fn whoever_draws_a_picture_is_the_one_who_stores_it() {
     let app = TestApp::with(|settings| settings.tile_memory_bytes = 0).await;
-    app.get("/tiles/flux/volume/1/0/0.png?time=2000-02-02")
-        .await;
-    app.drawer.is_slow.store(true, Ordering::SeqCst);
-    // Another server stores a picture of the same job while ours is being drawn.
-    let elsewhere = async {
-        while app.drawer.drawn_count() == 1 {
-            tokio::task::yield_now().await;
-        }
-        let theirs = Drawer::other_picture_of(&app.drawer.last_job());
-        app.store
-            .put_new(&app.drawer.last_job().key(), theirs)
-            .await
-            .unwrap();
-        app.drawer.turns.add_permits(1);
-    };
-    let (answer, ()) = tokio::join!(app.get(TILE), elsewhere);
-    assert_eq!(answer.status, StatusCode::OK);
-    assert_eq!(
-        answer.body,
-        Drawer::other_picture_of(&app.drawer.last_job())
-    );
-    assert_eq!(app.metric("fluxglobe_tile_server_conflicts_total").await, 1);
+    app.drawer.stores_nothing.store(true, Ordering::SeqCst);
+    let first = app.get(TILE).await;
+    assert_eq!(first.status, StatusCode::OK);
+    let key = app.drawer.last_job().key();
+    assert!(!app.store.exists(&key).await.unwrap());
+    app.drawer.stores_nothing.store(false, Ordering::SeqCst);
+    for _ in 0..2 {
+        assert_eq!(app.get(TILE).await.body, first.body);
+    }
+    assert_eq!(app.store.get(&key).await.unwrap(), first.body);
+    assert_eq!(app.drawer.drawn_count(), 2, "the third time it is there");
+    assert_eq!(*app.drawer.keeps.lock().unwrap(), [Keep::Yes, Keep::Yes]);
+}
+
+#[tokio::test]
+async fn a_damaged_picture_is_drawn_to_be_stored_anew() {
+    let app = TestApp::with(|settings| settings.tile_memory_bytes = 0).await;
+    let first = app.get(TILE).await;
+    let key = app.drawer.last_job().key();
+    let mut damaged = first.body.to_vec();
+    let middle = damaged.len() / 2;
+    damaged[middle] ^= 1;
+    app.store.put_over(&key, damaged.into()).await.unwrap();
+    assert!(app.store.get(&key).await.is_err(), "the fault was planted");
+    assert_eq!(app.get(TILE).await.body, first.body);
+    assert_eq!(app.store.get(&key).await.unwrap(), first.body);
+    assert_eq!(*app.drawer.keeps.lock().unwrap(), [Keep::Yes, Keep::Yes]);
 }
 
 #[tokio::test]

@@ -12,12 +12,12 @@ use contract::manifest::Manifest;
 use contract::observation::Observation;
 use contract::quantity::Quantity;
 use contract::topic::{Origin, Topic};
-use storage::StorageError;
 use storage::log::{EmbeddedLog, EventLog, Follower, Message, Reader, Start};
+use storage::{StorageError, Store};
 use tile_server::backend::{
     Analyse, AreaRequest, AreaRow, AreaSeries, BackendError, BudgetAnswer, BudgetRequest,
-    BudgetRow, Check, Class, Contributed, Draw, ObservationPage, ObservationQuestion, Observe,
-    Platform, PointStep, RowCol, TrackPoint, TrackQuestion, Turn,
+    BudgetRow, Check, Class, Contributed, Draw, Keep, ObservationPage, ObservationQuestion,
+    Observe, Platform, PointStep, RowCol, TrackPoint, TrackQuestion, Turn,
 };
 use tokio::sync::Semaphore;
 
@@ -47,7 +47,10 @@ impl Mood {
 
 /// Draws nothing: its picture is a pixel with the digest of the job beside it.
 pub(crate) struct Drawer {
+    store: Store,
     pub(crate) jobs: Mutex<Vec<RenderJob>>,
+    /// Whether each was to be stored.
+    pub(crate) keeps: Mutex<Vec<Keep>>,
     pub(crate) mood: Mutex<Mood>,
     /// While true, pictures wait for a permit of `turns` each.
     pub(crate) is_slow: AtomicBool,
@@ -55,22 +58,40 @@ pub(crate) struct Drawer {
     /// While true, pictures that are drawn are slow to be encoded: they wait for a permit of `turns` after they let go
     /// of their turn.
     pub(crate) encodes_slowly: AtomicBool,
+    /// While true, what is to be stored is not.
+    pub(crate) stores_nothing: AtomicBool,
 }
 
 impl Default for Drawer {
+    /// One whose store nobody looks into.
     fn default() -> Self {
-        let (jobs, mood) = (Mutex::default(), Mutex::default());
-        Self {
-            jobs,
-            mood,
-            is_slow: AtomicBool::new(false),
-            turns: Semaphore::new(0),
-            encodes_slowly: AtomicBool::new(false),
-        }
+        Self::over(&Store::memory())
     }
 }
 
 impl Drawer {
+    /// One that keeps its pictures in a store, as all that draw do.
+    pub(crate) fn over(store: &Store) -> Self {
+        Self {
+            store: store.clone(),
+            jobs: Mutex::default(),
+            keeps: Mutex::default(),
+            mood: Mutex::default(),
+            is_slow: AtomicBool::new(false),
+            turns: Semaphore::new(0),
+            encodes_slowly: AtomicBool::new(false),
+            stores_nothing: AtomicBool::new(false),
+        }
+    }
+
+    /// Puts a picture into the store over whatever is there.
+    async fn keep(&self, job: &RenderJob, picture: &Bytes) {
+        if !self.stores_nothing.load(Ordering::SeqCst) {
+            // A store that fails costs a second drawing.
+            drop(self.store.put_over(&job.key(), picture.clone()).await);
+        }
+    }
+
     pub(crate) fn drawn_count(&self) -> usize {
         self.jobs.lock().unwrap().len()
     }
@@ -85,11 +106,6 @@ impl Drawer {
 
     pub(crate) fn picture_of(job: &RenderJob) -> Bytes {
         picture(&job.digest().to_string())
-    }
-
-    /// What a renderer might draw that does not agree with ours.
-    pub(crate) fn other_picture_of(job: &RenderJob) -> Bytes {
-        picture(&format!("{}!", job.digest()))
     }
 }
 
@@ -108,8 +124,9 @@ fn picture(text: &str) -> Bytes {
 
 #[async_trait]
 impl Draw for Drawer {
-    async fn draw(&self, job: &RenderJob, turn: Turn) -> Result<Bytes, BackendError> {
+    async fn draw(&self, job: &RenderJob, keep: Keep, turn: Turn) -> Result<Bytes, BackendError> {
         self.jobs.lock().unwrap().push(job.clone());
+        self.keeps.lock().unwrap().push(keep);
         if self.is_slow.load(Ordering::SeqCst) {
             self.turns.acquire().await.unwrap().forget();
         }
@@ -119,11 +136,14 @@ impl Draw for Drawer {
         }
         let mood = self.mood.lock().unwrap().clone();
         mood.apply()?;
-        Ok(if matches!(mood, Mood::AnswersNonsense) {
-            Bytes::from("no picture")
-        } else {
-            Self::picture_of(job)
-        })
+        if matches!(mood, Mood::AnswersNonsense) {
+            return Ok(Bytes::from("no picture"));
+        }
+        let picture = Self::picture_of(job);
+        if keep == Keep::Yes {
+            self.keep(job, &picture).await;
+        }
+        Ok(picture)
     }
 
     fn draws_at_once(&self) -> NonZeroU32 {

@@ -24,6 +24,8 @@ struct Bucket {
     /// Requests are taken and never answered.
     is_silent: AtomicBool,
     unanswered: AtomicUsize,
+    /// Method and key of every request.
+    requests: Mutex<Vec<(Method, String)>>,
 }
 
 async fn object(
@@ -38,6 +40,8 @@ async fn object(
         std::future::pending::<()>().await;
     }
     let key = path.map(|Path(key)| key).unwrap_or_default();
+    let request = (method.clone(), key.clone());
+    bucket.requests.lock().unwrap().push(request);
     if key.is_empty() {
         return listing(&bucket, query.get("prefix").map_or("", String::as_str));
     }
@@ -165,4 +169,26 @@ async fn a_crowd_that_comes_while_nothing_is_known_waits_for_one_failure_only() 
         1,
         "asked once for all"
     );
+}
+
+#[tokio::test]
+async fn a_picture_that_was_never_drawn_is_one_look_up_and_one_write() {
+    let (bucket, store) = remote().await;
+    let app = TestApp::over(store, |_settings| {});
+    app.land("flux", Quantity::CarbonFlux, 1).await;
+    let tile = "/tiles/flux/map/0/0/0.png";
+    assert_eq!(app.get(tile).await.status, StatusCode::OK);
+    let of_pictures = || -> Vec<Method> {
+        let requests = bucket.requests.lock().unwrap();
+        let pictures = requests.iter().filter(|(_, key)| key.starts_with("tiles/"));
+        pictures.map(|(method, _)| method.clone()).collect()
+    };
+    assert_eq!(of_pictures(), [Method::GET, Method::PUT]);
+    assert_eq!(app.get(tile).await.status, StatusCode::OK);
+    assert_eq!(of_pictures().len(), 2, "in memory");
+    // What was not to be stored is looked for again, and nothing else.
+    app.drawer.stores_nothing.store(true, Ordering::SeqCst);
+    let other = "/tiles/flux/map/1/0/0.png";
+    assert_eq!(app.get(other).await.status, StatusCode::OK);
+    assert_eq!(of_pictures()[2..], [Method::GET], "who draws is who writes");
 }

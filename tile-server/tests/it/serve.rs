@@ -77,9 +77,9 @@ async fn a_request_under_way_is_finished_before_the_end() {
         drain_limit_s: 20,
         ..settings()
     };
-    let drawer = Arc::new(Drawer::default());
-    drawer.is_slow.store(true, Ordering::SeqCst);
     let app = crate::app::TestApp::new().await;
+    let drawer = Arc::new(Drawer::over(&app.store));
+    drawer.is_slow.store(true, Ordering::SeqCst);
     let state = AppState::new(
         &settings,
         app.store,

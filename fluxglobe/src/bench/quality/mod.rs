@@ -3,6 +3,7 @@
 
 mod plot;
 
+use ::render::Scene;
 use anyhow::{Context as _, Result};
 use comfy_table::presets::NOTHING;
 use comfy_table::{CellAlignment, Table};
@@ -11,8 +12,8 @@ use contract::job::{Mode, RenderJob, Style, View};
 use contract::manifest::Manifest;
 use contract::picture::PictureSources;
 use contract::tile::Tile;
-use render_worker::proof::{QualityRow, against_slices, ocean};
-use render_worker::{RenderService, Scene};
+use render_proof::{QualityRow, against_slices, ocean};
+use render_worker::Desk;
 use serde::Serialize;
 use storage::Store;
 
@@ -44,10 +45,10 @@ struct Subject {
 pub(crate) async fn run(settings: &Settings, options: BenchQuality) -> Result<()> {
     let store = deployment::store(settings)?;
     let product = storage::manifests::latest(&store, &options.product).await?;
-    let service = deployment::single_renderer(settings, store.clone()).await?;
+    let desk = deployment::single_desk(settings, store.clone()).await?;
     let mut subjects = generated(options.size)?;
     match &product {
-        Some(manifest) => subjects.extend(landed(&service, &store, manifest, options.size).await?),
+        Some(manifest) => subjects.extend(landed(&desk, &store, manifest, options.size).await?),
         None => progress::say(&format!(
             "{} has not landed here: generated scenes only",
             options.product
@@ -57,9 +58,10 @@ pub(crate) async fn run(settings: &Settings, options: BenchQuality) -> Result<()
     let mut scenes = vec![];
     for subject in subjects {
         bar.set_message(subject.name.clone());
-        let (service, slices) = (service.clone(), options.slices.clone());
+        let (desk, slices) = (desk.clone(), options.slices.clone());
         let measure = move || -> Result<Measured> {
-            let rows = against_slices(service.renderer(), &subject.job, &subject.scene, &slices)?;
+            let renderer = desk.pipeline().renderer();
+            let rows = against_slices(renderer, &subject.job, &subject.scene, &slices)?;
             Ok(Measured {
                 name: subject.name,
                 rows,
@@ -74,7 +76,7 @@ pub(crate) async fn run(settings: &Settings, options: BenchQuality) -> Result<()
         std::fs::write(path, svg).with_context(|| format!("cannot write {}", path.display()))?;
     }
     let report = Report {
-        renderer: service.name().to_owned(),
+        renderer: desk.pipeline().name().to_owned(),
         scenes,
     };
     if options.json {
@@ -144,7 +146,7 @@ fn generated(size: u32) -> Result<Vec<Subject>> {
 
 /// A landed product at the middle of its last step.
 async fn landed(
-    service: &RenderService,
+    desk: &Desk,
     store: &Store,
     manifest: &Manifest,
     size: u32,
@@ -169,7 +171,7 @@ async fn landed(
         let job = sources.job(Mode::Volume, view, time, style)?;
         subjects.push(Subject {
             name: format!("{}, {name}", manifest.product),
-            scene: service.scene(&job).await?,
+            scene: desk.pipeline().scene(&job).await?,
             job,
         });
     }

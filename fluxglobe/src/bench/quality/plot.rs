@@ -45,7 +45,7 @@ fn draw(scenes: &[Measured], text: &mut String) -> Result<(), Box<dyn std::error
     let area = SVGBackend::with_string(text, SIZE).into_drawing_area();
     area.fill(&WHITE)?;
     let (left, right) = area.split_horizontally(SIZE.0 / 2);
-    let lines = |value: fn(&render_worker::proof::Difference) -> Option<f64>| {
+    let lines = |value: fn(&render_proof::Difference) -> Option<f64>| {
         let line = |scene: &Measured| {
             let points = scene.rows.iter();
             points
@@ -139,7 +139,7 @@ fn panel(
 
 #[cfg(test)]
 mod tests {
-    use render_worker::proof::{Difference, QualityRow};
+    use render_proof::{Difference, QualityRow};
 
     use super::*;
 

@@ -37,7 +37,7 @@ pub(super) fn check(body: &[u8], size_px: [u32; 2]) -> Result<()> {
 
 #[cfg(test)]
 mod tests {
-    use render_worker::Image;
+    use render::Image;
 
     use super::*;
 

@@ -9,6 +9,7 @@ use contract::job::{Mode, RenderJob, View};
 use contract::key::ObjectKey;
 use contract::tile::Tile;
 use contract::topic::Topic;
+use render_worker::desk::{Class, Order, Origin, Storing};
 use storage::log::{EventLog, Start};
 use storage::{Store, manifests, verify};
 use tile_server::{Accumulated, Layer, picture_job};
@@ -102,10 +103,20 @@ pub(super) async fn draw(
     if let Some(log) = log {
         on_workers(log, &tiles.missing, &|| bar.inc(1)).await?;
     } else {
-        let renderer = deployment::single_renderer(settings, store.clone()).await?;
+        let desk = deployment::single_desk(settings, store).await?;
+        let order = Order {
+            class: Class::Batch,
+            storing: Storing::Keep,
+        };
         for job in &tiles.missing {
-            let png = renderer.draw(job).await?;
-            store.put_new(&job.key(), png).await?;
+            let drawn = desk.draw(job, order).await?;
+            if drawn.origin == Origin::Stored {
+                bail!("{} is stored with other bytes, which stay", job.key());
+            }
+            if !drawn.kept {
+                // Whoever asks for tiles wants them stored: the reason ends the command.
+                desk.keep(job, drawn.png).await?;
+            }
             bar.inc(1);
         }
     }

@@ -1,0 +1,371 @@
+//! The classic half-angle renderer, kept as an honest baseline: particles sorted by slice, and for every slice one render
+//! pass for the eye, which looks its shadow up in the light's picture, and one into the light's picture.
+
+use anyhow::{Context as _, Result, ensure};
+use contract::job::RenderJob;
+use render::frame::FrameContext;
+use render::gpu::{Gpu, Slot, Workspace};
+use render::passes::splat::Splats;
+use render::plan::Plan;
+use render::playback::{Playback, Steps};
+use render::stages::layout::{GROUP, Params};
+use render::{Image, Scene};
+use wgpu::util::DeviceExt as _;
+
+const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
+/// Particle radius over light texel, as in the compute renderer.
+const LIGHT_RADIUS_TEXELS: f32 = 1.0 / 0.612;
+/// Slices of the sorting shaders.
+const MOST_SLICES: u32 = 256;
+
+/// A view with its pipelines and targets.
+pub struct Classic<'a> {
+    gpu: &'a Gpu,
+    splats: Splats,
+    plan: Plan,
+    workspace: Workspace,
+    pipelines: Pipelines,
+    eye: wgpu::Texture,
+    light: wgpu::Texture,
+    slice_counts: wgpu::Buffer,
+    draws: wgpu::Buffer,
+    order: wgpu::Buffer,
+}
+
+struct Pipelines {
+    count: wgpu::ComputePipeline,
+    start: wgpu::ComputePipeline,
+    order: wgpu::ComputePipeline,
+    eye: wgpu::RenderPipeline,
+    light: wgpu::RenderPipeline,
+}
+
+impl<'a> Classic<'a> {
+    /// The renderer for a job's view; the light must be on the eye's side of the volume.
+    pub fn new(gpu: &'a Gpu, job: &RenderJob, scene: &Scene) -> Result<Self> {
+        let plan = Plan::holding(job, scene, gpu.most_buffer_bytes(), u64::MAX)?;
+        let params = plan.params_of(plan.whole());
+        ensure!(
+            params.front_to_back == 1 && params.light_on == 1,
+            "only drawn towards the light"
+        );
+        let features = gpu.device().features();
+        ensure!(
+            features.contains(wgpu::Features::INDIRECT_FIRST_INSTANCE),
+            "the adapter cannot start instances inside a list"
+        );
+        let buffer = |label, bytes: u64, usage| {
+            gpu.device().create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size: bytes,
+                usage: usage | wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            })
+        };
+        let target = |label, width, height| {
+            gpu.device().create_texture(&wgpu::TextureDescriptor {
+                label: Some(label),
+                size: wgpu::Extent3d {
+                    width,
+                    height,
+                    depth_or_array_layers: 1,
+                },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format: FORMAT,
+                usage: wgpu::TextureUsages::RENDER_ATTACHMENT
+                    | wgpu::TextureUsages::TEXTURE_BINDING
+                    | wgpu::TextureUsages::COPY_SRC,
+                view_formats: &[],
+            })
+        };
+        Ok(Self {
+            gpu,
+            splats: Splats::new(gpu),
+            workspace: Workspace::default(),
+            pipelines: Pipelines::new(gpu.device(), &params),
+            eye: target("eye", params.width, params.height),
+            light: target("light", params.light_width, params.light_height),
+            slice_counts: buffer(
+                "slice counts",
+                u64::from(MOST_SLICES) * 4,
+                wgpu::BufferUsages::empty(),
+            ),
+            draws: buffer(
+                "draws",
+                u64::from(MOST_SLICES) * 16,
+                wgpu::BufferUsages::INDIRECT,
+            ),
+            order: buffer(
+                "order",
+                u64::from(params.splat_count) * 4,
+                wgpu::BufferUsages::empty(),
+            ),
+            plan,
+        })
+    }
+
+    /// Draws an instant; the picture stays on the device. Does not wait.
+    #[expect(
+        clippy::too_many_lines,
+        reason = "one list of passes, read from top to bottom"
+    )]
+    pub fn draw(&mut self, steps: &Steps, weights: (f32, f32)) -> Result<()> {
+        (
+            self.plan.params.value_weight,
+            self.plan.params.accumulated_weight,
+        ) = weights;
+        let params = self.plan.params_of(self.plan.whole());
+        let mut frame = FrameContext::new(
+            self.gpu,
+            &mut self.workspace,
+            &self.plan,
+            params,
+            steps.clone(),
+        )?;
+        self.splats.record(&mut frame)?;
+        let (seen, lit) = (frame.room(Slot::Seen, 4)?, frame.room(Slot::Lit, 4)?);
+        let uniform = frame.params_buffer.clone();
+        let encoder = frame.recorder.encoder();
+        encoder.clear_buffer(&self.slice_counts, 0, None);
+        let device = self.gpu.device();
+        let light_view = self
+            .light
+            .create_view(&wgpu::TextureViewDescriptor::default());
+        let eye_view = self
+            .eye
+            .create_view(&wgpu::TextureViewDescriptor::default());
+        let bind = |layout: &wgpu::BindGroupLayout, bindings: &[u32]| {
+            let entries: Vec<_> = bindings
+                .iter()
+                .map(|&binding| wgpu::BindGroupEntry {
+                    binding,
+                    resource: match binding {
+                        0 => uniform.as_entire_binding(),
+                        1 => seen.as_entire_binding(),
+                        7 => lit.as_entire_binding(),
+                        3 => wgpu::BindingResource::TextureView(&light_view),
+                        4 => self.slice_counts.as_entire_binding(),
+                        5 => self.draws.as_entire_binding(),
+                        _ => self.order.as_entire_binding(),
+                    },
+                })
+                .collect();
+            device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: None,
+                layout,
+                entries: &entries,
+            })
+        };
+        let groups = params.splat_count.div_ceil(GROUP);
+        let across = groups.min(65_535);
+        let lists = [across, groups.div_ceil(across.max(1))];
+        let sort: [(&wgpu::ComputePipeline, &[u32], [u32; 2]); 3] = [
+            (&self.pipelines.count, &[0, 1, 4, 7], lists),
+            (&self.pipelines.start, &[0, 4, 5], [1, 1]),
+            (&self.pipelines.order, &[0, 1, 4, 6, 7], lists),
+        ];
+        for (pipeline, bindings, [x, y]) in sort {
+            let group = bind(&pipeline.get_bind_group_layout(0), bindings);
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(0, &group, &[]);
+            pass.dispatch_workgroups(x, y, 1);
+        }
+        let eye_group = bind(
+            &self.pipelines.eye.get_bind_group_layout(0),
+            &[0, 1, 2, 3, 7],
+        );
+        let light_group = bind(
+            &self.pipelines.light.get_bind_group_layout(0),
+            &[0, 1, 2, 7],
+        );
+        for slice in 0..params.slices {
+            let sides = [
+                (&eye_view, &self.pipelines.eye, &eye_group),
+                (&light_view, &self.pipelines.light, &light_group),
+            ];
+            // Slice 0 finds the light's picture as the last frame left it unless it is cleared before.
+            let sides = if slice == 0 {
+                [sides[1], sides[0], sides[1]]
+            } else {
+                [sides[0], sides[1], sides[1]]
+            };
+            for (step, (view, pipeline, group)) in sides
+                .into_iter()
+                .enumerate()
+                .take(if slice == 0 { 3 } else { 2 })
+            {
+                let is_clear = slice == 0 && step < 2;
+                let load = if is_clear {
+                    wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT)
+                } else {
+                    wgpu::LoadOp::Load
+                };
+                let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                    label: None,
+                    color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                        view,
+                        depth_slice: None,
+                        resolve_target: None,
+                        ops: wgpu::Operations {
+                            load,
+                            store: wgpu::StoreOp::Store,
+                        },
+                    })],
+                    ..Default::default()
+                });
+                if slice == 0 && step == 0 {
+                    continue;
+                }
+                pass.set_pipeline(pipeline);
+                pass.set_bind_group(0, group, &[]);
+                pass.draw_indirect(&self.draws, u64::from(slice) * 16);
+            }
+        }
+        frame.recorder.submit();
+        Ok(())
+    }
+
+    /// The picture last drawn, straight alpha.
+    pub fn image(&self) -> Result<Image> {
+        let (width, height) = (self.eye.width(), self.eye.height());
+        let row_bytes = (width * 8).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let bytes = u64::from(row_bytes) * u64::from(height);
+        let buffer = self
+            .gpu
+            .device()
+            .create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label: Some("picture"),
+                contents: &vec![0; bytes as usize],
+                usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
+            });
+        let mut recorder = self.gpu.recorder();
+        recorder.encoder().copy_texture_to_buffer(
+            self.eye.as_image_copy(),
+            wgpu::TexelCopyBufferInfo {
+                buffer: &buffer,
+                layout: wgpu::TexelCopyBufferLayout {
+                    offset: 0,
+                    bytes_per_row: Some(row_bytes),
+                    rows_per_image: None,
+                },
+            },
+            self.eye.size(),
+        );
+        let [content] = recorder.download_parts([(&buffer, 0, bytes)])?;
+        let rows = content.chunks_exact(row_bytes as usize);
+        let rgba8 = rows
+            .flat_map(|row| row[..width as usize * 8].chunks_exact(8))
+            .flat_map(|texel| {
+                let channel = |i: usize| half(u16::from_le_bytes([texel[2 * i], texel[2 * i + 1]]));
+                let alpha = channel(3);
+                let byte = |x: f32| (x.clamp(0.0, 1.0) * 255.0).round() as u8;
+                let color = |i| byte(if alpha > 0.0 { channel(i) / alpha } else { 0.0 });
+                [color(0), color(1), color(2), byte(alpha)]
+            })
+            .collect();
+        Ok(Image {
+            width,
+            height,
+            rgba8,
+        })
+    }
+}
+
+/// A non-negative half-precision number.
+fn half(bits: u16) -> f32 {
+    let (exponent, mantissa) = (i32::from(bits >> 10 & 31), f32::from(bits & 0x3ff));
+    if exponent == 0 {
+        mantissa * 2f32.powi(-24)
+    } else {
+        (1.0 + mantissa / 1024.0) * 2f32.powi(exponent - 15)
+    }
+}
+
+impl Pipelines {
+    #[expect(clippy::too_many_lines, reason = "descriptors of five pipelines")]
+    fn new(device: &wgpu::Device, params: &Params) -> Self {
+        // Light depth of a splat from its depth on the screen, at the scale of what lies below the camera.
+        let height =
+            (params.eye_x.powi(2) + params.eye_y.powi(2) + params.eye_z.powi(2)).sqrt() - 1.0;
+        let scale = params.focal_px / height;
+        let gain = params.light_depth_gain / (scale * scale);
+        let source = format!(
+            "{}\nconst LIGHT_RADIUS_TEXELS = {LIGHT_RADIUS_TEXELS:?};\nconst LIGHT_GAIN = {gain:?};\n{}",
+            render::stages::PRELUDE,
+            include_str!("classic.wgsl")
+        );
+        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some("classic"),
+            source: wgpu::ShaderSource::Wgsl(source.into()),
+        });
+        let compute = |entry| {
+            device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                label: Some(entry),
+                layout: None,
+                module: &module,
+                entry_point: Some(entry),
+                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                cache: None,
+            })
+        };
+        let render = |vertex, fragment, blend| {
+            device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+                label: Some(vertex),
+                layout: None,
+                vertex: wgpu::VertexState {
+                    module: &module,
+                    entry_point: Some(vertex),
+                    compilation_options: wgpu::PipelineCompilationOptions::default(),
+                    buffers: &[],
+                },
+                primitive: wgpu::PrimitiveState {
+                    topology: wgpu::PrimitiveTopology::TriangleStrip,
+                    ..Default::default()
+                },
+                depth_stencil: None,
+                multisample: wgpu::MultisampleState::default(),
+                fragment: Some(wgpu::FragmentState {
+                    module: &module,
+                    entry_point: Some(fragment),
+                    compilation_options: wgpu::PipelineCompilationOptions::default(),
+                    targets: &[Some(wgpu::ColorTargetState {
+                        format: FORMAT,
+                        blend: Some(blend),
+                        write_mask: wgpu::ColorWrites::ALL,
+                    })],
+                }),
+                multiview_mask: None,
+                cache: None,
+            })
+        };
+        let component = |src_factor| wgpu::BlendComponent {
+            src_factor,
+            dst_factor: wgpu::BlendFactor::One,
+            operation: wgpu::BlendOperation::Add,
+        };
+        let both = |factor| wgpu::BlendState {
+            color: component(factor),
+            alpha: component(factor),
+        };
+        Self {
+            count: compute("count_slices"),
+            start: compute("start_slices"),
+            order: compute("order_slices"),
+            // What is nearer was drawn before.
+            eye: render(
+                "eye_corner",
+                "eye_pixel",
+                both(wgpu::BlendFactor::OneMinusDstAlpha),
+            ),
+            light: render("light_corner", "light_pixel", both(wgpu::BlendFactor::One)),
+        }
+    }
+}
+
+/// The frames of a scene on the device.
+pub fn steps(gpu: &Gpu, scene: &Scene) -> Result<Steps> {
+    Playback::upload(gpu, scene).context("uploading the frames")
+}

@@ -1,0 +1,446 @@
+//! The command: options in, one table out. Pictures are compared before speed is.
+
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context as _, Result};
+use clap::Args;
+use contract::job::RenderJob;
+use contract::tile::Tile;
+use render::frame::Stages;
+use render::gpu::Gpu;
+use render::playback::Playback;
+use render::stages::fill::{Fill, Form, Sources};
+use render::{Backend, Image, Renderer, Scene};
+use serde::Serialize;
+
+use crate::bench::classic::{self, Classic};
+use crate::bench::stats::Times;
+use crate::bench::{encode, frames, scenery, tiles, twins};
+use crate::fill::timing;
+use crate::{Difference, Fineness, Picture, differing_bytes, reference_of_cells};
+
+/// Longest time for one form on one grid.
+const MOST_FILLING: Duration = Duration::from_secs(4);
+
+/// Measure the renderer on this machine.
+#[derive(Debug, Args)]
+pub struct RenderBench {
+    /// Particles of each scene, in millions.
+    #[arg(long, value_delimiter = ',', default_value = "0.1,1,4.43")]
+    millions: Vec<f64>,
+    /// Pictures, `WIDTHxHEIGHT`.
+    #[arg(long, value_delimiter = ',', default_value = "1920x1080")]
+    sizes: Vec<String>,
+    /// Half-angle slices.
+    #[arg(long, value_delimiter = ',', default_value = "64")]
+    slices: Vec<u32>,
+    /// Frames of each series.
+    #[arg(long, default_value_t = 200)]
+    frames: usize,
+    /// Frames of the classic renderer; 0 leaves it out.
+    #[arg(long, default_value_t = 10)]
+    classic: usize,
+    /// Runs of the CPU twins; 0 leaves them out.
+    #[arg(long, default_value_t = 5)]
+    twins: usize,
+    /// Frames read back and encoded; 0 leaves them out.
+    #[arg(long, default_value_t = 0)]
+    encode: usize,
+    /// Compare each picture with the same one in double precision, which takes minutes.
+    #[arg(long)]
+    reference: bool,
+    /// Volume tiles; 0 leaves them out.
+    #[arg(long, default_value_t = 0)]
+    tiles: usize,
+    /// Cells of a whole earth of sea, in millions, whose north pole is looked at: particles crowd there; 0 leaves it out.
+    #[arg(long, default_value_t = 0.0)]
+    pole: f64,
+    /// Largest grid whose gaps are filled, `ROWSxCOLUMNS`: every form, small grids first; nothing else is timed.
+    #[arg(long)]
+    fill: Option<String>,
+    /// Folder for the pictures.
+    #[arg(long)]
+    pictures: Option<PathBuf>,
+    /// Folder for the same few pictures on every machine, to be compared with those of another adapter; nothing is timed.
+    #[arg(long)]
+    samples: Option<PathBuf>,
+    /// Compare two folders of sample pictures; nothing is timed.
+    #[arg(long, num_args = 2, value_names = ["A", "B"])]
+    compare: Option<Vec<PathBuf>>,
+    /// One JSON line a scene instead of the table.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct Row {
+    adapter: String,
+    particles: u64,
+    width: u32,
+    height: u32,
+    slices: u32,
+    measured: frames::Measured,
+    classic: Option<Against>,
+    twins: Option<(Times, usize)>,
+    encoded: Option<encode::Encoded>,
+    reference: Option<Difference>,
+}
+
+#[derive(Serialize)]
+struct Against {
+    frame_ms: f64,
+    times_faster: f64,
+    difference: Option<Difference>,
+}
+
+/// Measures what the options ask for, and prints it.
+///
+/// # Errors
+/// No device, a size that is none, a scene that is too large, a file that cannot be written.
+pub fn run(args: &RenderBench) -> Result<()> {
+    if let Some(folders) = &args.compare {
+        return compare_folders(&folders[0], &folders[1]);
+    }
+    if let Some(folder) = &args.samples {
+        return samples(folder);
+    }
+    let gpu = Gpu::open()?;
+    if let Some(size) = &args.fill {
+        return fills(&gpu, size);
+    }
+    let start = Instant::now();
+    let stages = Stages::new(&gpu);
+    gpu.keep_pipelines();
+    talk(&format!(
+        "{}; shaders compiled in {:.2} s",
+        gpu.adapter_name(),
+        start.elapsed().as_secs_f64()
+    ));
+    if args.pole > 0.0 {
+        let (scene, job) = scenery::pole((args.pole * 1e6) as u64, [1920, 1080])?;
+        let measured = frames::measure(&gpu, &stages, &job, &scene, args.frames)?;
+        report_frames(&job, scenery::particles(&scene), &measured);
+    }
+    for millions in &args.millions {
+        let start = Instant::now();
+        let grid = scenery::grid((millions * 1e6) as u64);
+        let scene = scenery::scene(&grid);
+        let particles = scenery::particles(&scene);
+        talk(&format!(
+            "{particles} particles on {} x {} cells, made in {:.1} s",
+            grid.rows,
+            grid.cols,
+            start.elapsed().as_secs_f64()
+        ));
+        for size in &args.sizes {
+            let (width, height) = size.split_once('x').context("a size is WIDTHxHEIGHT")?;
+            let size_px = [width.parse()?, height.parse()?];
+            for &slices in &args.slices {
+                let job = scenery::job(size_px, slices)?;
+                let row = row(args, &gpu, &stages, &job, &scene)?;
+                report(args, &job, &row);
+            }
+        }
+        if args.tiles > 0 {
+            let renderer = Renderer::new(Backend::Gpu)?;
+            let job = scenery::job([256, 256], 64)?;
+            for z in [3, 4, 5, 6] {
+                // Round 115 E, 20 N.
+                let tile = Tile::new(
+                    z,
+                    (0.819 * f64::from(1 << z)) as u32,
+                    (0.443 * f64::from(1 << z)) as u32,
+                )?;
+                let times = tiles::measure(&renderer, &job, &scene, &[tile], args.tiles)?;
+                say(&format!(
+                    "  volume tile {tile} with PNG: median {:.2} ms, p99 {:.2} ms",
+                    times.median_ms, times.p99_ms
+                ));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn row(
+    args: &RenderBench,
+    gpu: &Gpu,
+    stages: &Stages,
+    job: &RenderJob,
+    scene: &Scene,
+) -> Result<Row> {
+    let [width, height] = job.view.size_px();
+    let measured = frames::measure(gpu, stages, job, scene, args.frames)?;
+    let classic = (args.classic > 0)
+        .then(|| against(args, job, scene, &measured))
+        .transpose()?;
+    let twins = (args.twins > 0)
+        .then(|| twins::measure(job, scene, args.twins))
+        .transpose()?;
+    let encoded = (args.encode > 0)
+        .then(|| encode::measure(gpu, stages, job, scene, args.encode))
+        .transpose()?;
+    let reference = args
+        .reference
+        .then(|| from_reference(gpu, stages, job, scene))
+        .transpose()?
+        .flatten();
+    Ok(Row {
+        adapter: gpu.adapter_name().to_owned(),
+        particles: scenery::particles(scene),
+        width,
+        height,
+        slices: job.style.slices,
+        measured,
+        classic,
+        twins,
+        encoded,
+        reference,
+    })
+}
+
+/// How far a frame is from the picture in double precision of the same instant, which takes the processor minutes.
+fn from_reference(
+    gpu: &Gpu,
+    stages: &Stages,
+    job: &RenderJob,
+    scene: &Scene,
+) -> Result<Option<Difference>> {
+    let mut playback = Playback::new(gpu, stages, job, scene)?;
+    let steps = Playback::upload(gpu, scene)?;
+    let [width, height] = job.view.size_px();
+    let rgba8 = playback.image(&steps)?;
+    let image = Image {
+        width,
+        height,
+        rgba8,
+    };
+    let truth = reference_of_cells(job, scene, Fineness::default())?;
+    Ok(Difference::of(&Picture::from(&image), &truth))
+}
+
+fn in_words(d: &Difference) -> String {
+    let psnr = d
+        .psnr_db
+        .map_or_else(|| "equal".to_owned(), |db| format!("PSNR {db:.1} dB"));
+    format!(
+        "{psnr}, mean FLIP {:.4}, {:.3} % of pixels within one level, at most {:.1} levels",
+        d.mean_flip, d.within_one_level_percent, d.most_levels
+    )
+}
+
+/// The classic renderer on the same frame: first the pictures, then the times. On a device of its own, of
+/// which nothing remains when ours are timed.
+fn against(
+    args: &RenderBench,
+    job: &RenderJob,
+    scene: &Scene,
+    measured: &frames::Measured,
+) -> Result<Against> {
+    let gpu = &Gpu::open()?;
+    let stages = &Stages::new(gpu);
+    let [width, height] = job.view.size_px();
+    let name = format!(
+        "{}-{width}x{height}-{}",
+        scenery::particles(scene),
+        job.style.slices
+    );
+    let steps = classic::steps(gpu, scene)?;
+    let mut playback = Playback::new(gpu, stages, job, scene)?;
+    let mut classic = Classic::new(gpu, job, scene)?;
+    let weights = frames::weights(7);
+    playback.seek(weights.0, weights.1);
+    let ours = Image {
+        width,
+        height,
+        rgba8: playback.image(&steps)?,
+    };
+    classic.draw(&steps, weights)?;
+    let theirs = classic.image()?;
+    if let Some(folder) = &args.pictures {
+        std::fs::create_dir_all(folder)?;
+        std::fs::write(folder.join(format!("{name}.png")), ours.encode_png()?)?;
+        std::fs::write(
+            folder.join(format!("{name}-classic.png")),
+            theirs.encode_png()?,
+        )?;
+    }
+    let start = Instant::now();
+    for frame in 0..args.classic {
+        classic.draw(&steps, frames::weights(frame))?;
+    }
+    gpu.wait()?;
+    let frame_ms = start.elapsed().as_secs_f64() / args.classic as f64 * 1e3;
+    Ok(Against {
+        frame_ms,
+        times_faster: frame_ms / measured.frame.median_ms.max(1e-9),
+        difference: Difference::of(&Picture::from(&ours), &Picture::from(&theirs)),
+    })
+}
+
+fn report(args: &RenderBench, job: &RenderJob, row: &Row) {
+    if args.json {
+        say(&serde_json::to_string(row).unwrap_or_default());
+        return;
+    }
+    let m = &row.measured;
+    report_frames(job, row.particles, m);
+    if let Some(c) = &row.classic {
+        say(&format!(
+            "  classic {:.2} ms, {:.1} times; {}",
+            c.frame_ms,
+            c.times_faster,
+            c.difference.as_ref().map_or_else(String::new, in_words)
+        ));
+    }
+    if let Some((times, cores)) = &row.twins {
+        let splat = m
+            .stages
+            .iter()
+            .find(|(name, _)| name == "splat")
+            .map_or(0.0, |(_, t)| t.median_ms);
+        say(&format!(
+            "  interpolation and particles on {cores} cores {:.1} ms, {:.0} times the pass that also lights and counts",
+            times.median_ms,
+            times.median_ms / splat.max(1e-9)
+        ));
+    }
+    if let Some(d) = &row.reference {
+        say(&format!("  from the reference: {}", in_words(d)));
+    }
+    if let Some(e) = &row.encoded {
+        say(&format!(
+            "  read back and encoded on {} cores: {:.1} frames/s, PNG {} bytes",
+            e.cores, e.frames_per_s, e.png_bytes
+        ));
+    }
+}
+
+fn report_frames(job: &RenderJob, particles: u64, m: &frames::Measured) {
+    let [width, height] = job.view.size_px();
+    say(&format!(
+        "{particles:>9} particles {width}x{height} {:>3} slices: frame median {:.3} ms, p99 {:.3} ms, wall {:.3} ms; {} entries, {:.1} times the mean in the fullest tile, {} in the longest list",
+        job.style.slices,
+        m.frame.median_ms,
+        m.frame.p99_ms,
+        m.frame_wall_ms,
+        m.entries,
+        m.fullest_over_mean,
+        m.longest_list
+    ));
+    let stages = m.stages.iter();
+    let stages: Vec<_> = stages
+        .map(|(name, t)| format!("{name} {:.3}", t.median_ms))
+        .collect();
+    say(&format!("  {}", stages.join(", ")));
+}
+
+/// Fills the gaps of made-up frames, a fifth of them missing, with every form.
+fn fills(gpu: &Gpu, size: &str) -> Result<()> {
+    let (rows, cols) = size.split_once('x').context("a size is ROWSxCOLUMNS")?;
+    let fill = Fill::new(gpu, Sources::default());
+    for case in timing::cases([rows.parse()?, cols.parse()?], 0.2) {
+        for form in Form::ALL {
+            let timing = match timing::bench_fill(gpu, &fill, case, form, 50, MOST_FILLING) {
+                Ok(timing) => timing,
+                Err(error) => {
+                    say(&format!(
+                        "{} of {} x {}: {error}",
+                        form.name(),
+                        case.rows,
+                        case.cols
+                    ));
+                    continue;
+                }
+            };
+            say(&format!(
+                "{:<11} {:>4} x {:<4} gaps of {:>2}: median {:>10.3} ms; from all pairs {:?}, RMSE over spread {:?}, digest {}",
+                form.name(),
+                case.rows,
+                case.cols,
+                case.missing.side_cells,
+                timing.median_s() * 1e3,
+                timing.from_all_pairs,
+                timing.rmse_of_hidden,
+                timing
+                    .values_digest
+                    .map_or_else(|| "-".to_owned(), |digest| digest.short())
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Draws the same pictures on every machine.
+fn samples(folder: &PathBuf) -> Result<()> {
+    std::fs::create_dir_all(folder)?;
+    let renderer = Renderer::new(Backend::Gpu)?;
+    let scene = scenery::scene(&scenery::grid(200_000));
+    let mut globe = scenery::job([640, 480], 64)?;
+    globe.style.particles_per_cell = 4;
+    let mut jobs = vec![("globe", globe)];
+    for (name, z, x, y) in [
+        ("tile-4", 4, 13, 7),
+        ("tile-5", 5, 26, 14),
+        ("tile-7", 7, 104, 56),
+    ] {
+        let mut job = scenery::job([256, 256], 64)?;
+        job.style.particles_per_cell = 16;
+        job.view = contract::job::View::Tile {
+            tile: Tile::new(z, x, y)?,
+            size_px: 256,
+        };
+        jobs.push((name, job));
+    }
+    for (name, job) in jobs {
+        let image = renderer.render(&job, &scene)?;
+        std::fs::write(folder.join(format!("{name}.png")), image.encode_png()?)?;
+    }
+    say(&format!(
+        "{}: pictures in {}",
+        renderer.name(),
+        folder.display()
+    ));
+    Ok(())
+}
+
+fn compare_folders(a: &PathBuf, b: &PathBuf) -> Result<()> {
+    let mut names: Vec<_> = std::fs::read_dir(a)?
+        .map(|entry| entry.map(|e| e.file_name()))
+        .collect::<Result<_, _>>()?;
+    names.sort();
+    for name in names {
+        let read = |folder: &PathBuf| -> Result<Image> {
+            let path = folder.join(&name);
+            let picture = image::open(&path)
+                .with_context(|| path.display().to_string())?
+                .into_rgba8();
+            Ok(Image {
+                width: picture.width(),
+                height: picture.height(),
+                rgba8: picture.into_raw(),
+            })
+        };
+        let pair = [read(a)?, read(b)?];
+        let [one, other] = [0, 1].map(|i: usize| Picture::from(&pair[i]));
+        let d = Difference::of(&one, &other).context("the sizes differ")?;
+        say(&format!(
+            "{}: {}, {} bytes differ",
+            name.display(),
+            in_words(&d),
+            differing_bytes(&pair[0], &pair[1])
+        ));
+    }
+    Ok(())
+}
+
+#[expect(clippy::print_stdout, reason = "results of a command")]
+fn say(line: &str) {
+    println!("{line}");
+}
+
+#[expect(clippy::print_stderr, reason = "talk of a command")]
+fn talk(line: &str) {
+    eprintln!("{line}");
+}

@@ -1,0 +1,8 @@
+//! Tests of what proves the engine, against the engine, one binary.
+#![expect(
+    clippy::unwrap_used,
+    reason = "all of this binary is tests; clippy allows it in test functions only"
+)]
+
+mod fill;
+mod reference;

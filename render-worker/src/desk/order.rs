@@ -1,0 +1,39 @@
+//! How a picture is wanted.
+
+use super::Class;
+
+/// Who wants a picture, and what the store has to do with it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Order {
+    /// Who wants it.
+    pub class: Class,
+    /// What the store has to do with it.
+    pub storing: Storing,
+}
+
+/// What the store has to do with a picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Storing {
+    /// It is looked for there, and kept there once it is drawn.
+    LookUpAndKeep,
+    /// Whoever orders it has looked, and it was not there: it is kept there.
+    Keep,
+    /// Nothing: it is drawn and given out.
+    Nothing,
+}
+
+impl Order {
+    /// For somebody who waits.
+    pub fn on_demand(storing: Storing) -> Self {
+        let class = Class::OnDemand;
+        Self { class, storing }
+    }
+
+    /// For later; looked for and kept, for nobody waits for its bytes.
+    pub fn batch() -> Self {
+        Self {
+            class: Class::Batch,
+            storing: Storing::LookUpAndKeep,
+        }
+    }
+}

@@ -1,0 +1,158 @@
+//! The steps of one picture: frames loaded and filled, drawn on a sound device, encoded.
+//!
+//! A step knows nothing of who asks, in which order, or what is stored: that is the business of the [`desk`](crate::desk).
+
+use std::num::NonZeroUsize;
+use std::sync::Arc;
+
+use bytes::Bytes;
+use contract::job::RenderJob;
+use render::scene::Scene;
+use render::{Backend, Image, Renderer};
+use storage::Store;
+
+use crate::encoding::Encoders;
+use crate::error::DrawError;
+use crate::prefetch::Prefetch;
+use crate::source::{Kept, Source};
+
+/// What one worker takes on.
+#[derive(Debug, Clone, Copy)]
+pub struct Limits {
+    /// Pictures drawn at the same time; none named is what suits the adapter. Those that are encoded do not count.
+    pub draws_at_once: Option<NonZeroUsize>,
+    /// Jobs that somebody waits for and that are not begun; more are sent away.
+    pub draw_queue: usize,
+    /// Bytes of frames kept in memory.
+    pub frame_bytes: u64,
+    /// Bytes of frames kept on the device; none named is a share of what the device has.
+    pub device_frame_bytes: Option<u64>,
+    /// Frames of every product read ahead of the one drawn; none with 0.
+    pub frames_ahead: usize,
+}
+
+impl Default for Limits {
+    /// As many pictures as suit the adapter; half a GiB of frames, the next one of them.
+    fn default() -> Self {
+        Self {
+            draws_at_once: None,
+            draw_queue: 256,
+            frame_bytes: 512 << 20,
+            device_frame_bytes: None,
+            frames_ahead: 1,
+        }
+    }
+}
+
+/// Asked between the parts of a picture: does anybody still want it?
+pub type IsWanted = Arc<dyn Fn() -> bool + Send + Sync>;
+
+/// Takes the steps of any number of pictures. Cheap to clone, shared by all tasks.
+#[derive(Clone)]
+pub struct Pipeline {
+    renderer: Arc<Renderer>,
+    source: Arc<Source>,
+    prefetch: Arc<Prefetch>,
+    encoders: Encoders,
+}
+
+impl Pipeline {
+    /// Opens the backend. Blocks while shaders compile.
+    pub fn open(store: Store, backend: Backend, limits: &Limits) -> Result<Self, DrawError> {
+        let renderer = Arc::new(Renderer::keeping(backend, limits.device_frame_bytes)?);
+        let source = Arc::new(Source::new(
+            store.clone(),
+            Arc::clone(&renderer),
+            limits.frame_bytes,
+        ));
+        let prefetch = Arc::new(Prefetch::new(
+            store,
+            Arc::clone(&source),
+            Arc::clone(&renderer),
+            limits.frames_ahead,
+        ));
+        Ok(Self {
+            renderer,
+            source,
+            prefetch,
+            encoders: Encoders::on_all_cores(),
+        })
+    }
+
+    /// Pictures that are encoded now.
+    pub fn encoding_count(&self) -> usize {
+        self.encoders.busy()
+    }
+
+    /// Name of what draws.
+    pub fn name(&self) -> &str {
+        self.renderer.name()
+    }
+
+    /// What draws.
+    pub fn renderer(&self) -> &Renderer {
+        &self.renderer
+    }
+
+    /// Frames in memory.
+    pub fn kept(&self) -> Kept {
+        self.source.kept()
+    }
+
+    /// Loads what a valid job is drawn from.
+    pub async fn scene(&self, job: &RenderJob) -> Result<Scene, DrawError> {
+        self.source.scene(job).await
+    }
+
+    /// Draws a loaded scene; `held` is let go when the drawing thread has ended, also if nobody waits for it.
+    pub async fn picture(
+        &self,
+        job: &RenderJob,
+        scene: Scene,
+        is_wanted: IsWanted,
+        held: impl Send + 'static,
+    ) -> Result<Image, DrawError> {
+        let (renderer, own) = (Arc::clone(&self.renderer), job.clone());
+        let drawing = tokio::task::spawn_blocking(move || {
+            let image = renderer.render_while(&own, &scene, &*is_wanted);
+            drop(held);
+            image
+        });
+        let image = drawing.await.map_err(DrawError::Thread)??;
+        // Not before: what is wanted now goes first.
+        self.prefetch.drawn(job);
+        Ok(image)
+    }
+
+    /// Writes a picture as PNG; `turn` is let go when that begins, which may have to wait for a core.
+    pub async fn encode(
+        &self,
+        image: Image,
+        turn: impl Send + 'static,
+    ) -> Result<Bytes, DrawError> {
+        self.encoders.png(image, turn).await
+    }
+
+    /// Tries, and if the device failed tries once more on a fresh one.
+    pub async fn on_a_sound_device<T, F>(&self, attempt: impl Fn() -> F) -> Result<T, DrawError>
+    where
+        F: Future<Output = Result<T, DrawError>>,
+    {
+        let number = self.renderer.device_number();
+        match attempt().await {
+            Err(error) if error.is_device_fault() => {
+                tracing::warn!(error = error.in_full(), "drawing again on a fresh device");
+                self.renew(number).await?;
+                attempt().await
+            }
+            done => done,
+        }
+    }
+
+    /// Opens a fresh device in place of the one of this number; see [`Renderer::renew`].
+    pub async fn renew(&self, failed_number: u64) -> Result<(), DrawError> {
+        let renderer = Arc::clone(&self.renderer);
+        let renewing = tokio::task::spawn_blocking(move || renderer.renew(failed_number));
+        Ok(renewing.await.map_err(DrawError::Thread)??)
+    }
+}

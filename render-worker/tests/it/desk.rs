@@ -1,0 +1,61 @@
+//! What the store has to do with a picture, as it was ordered: looked for or not, kept or not, and other bytes there.
+
+use contract::job::RenderJob;
+use render_worker::desk::{Drawn, Order, Origin, Storing};
+use storage::Store;
+
+use crate::stored::{quick, two_months_in};
+use crate::worker::Worker;
+
+async fn drawn(worker: &Worker, job: &RenderJob, storing: Storing) -> Drawn {
+    let order = Order::on_demand(storing);
+    worker.desk.draw(job, order).await.unwrap()
+}
+
+fn pictures(worker: &Worker, origin: &str) -> u64 {
+    worker.metric(
+        "fluxglobe_render_worker_pictures_total",
+        &[("origin", origin)],
+    )
+}
+
+#[tokio::test]
+async fn a_picture_is_looked_for_and_kept_as_it_was_ordered() {
+    let store = Store::memory();
+    let job = quick(&two_months_in(&store).await, 1);
+    let worker = Worker::start(&store, 1, 4);
+    let aside = drawn(&worker, &job, Storing::Nothing).await;
+    assert_eq!((aside.origin, aside.kept), (Origin::Drawn, false));
+    assert!(!store.exists(&job.key()).await.unwrap());
+    let kept = drawn(&worker, &job, Storing::Keep).await;
+    assert_eq!((kept.origin, kept.kept), (Origin::Drawn, true));
+    assert_eq!(store.get(&job.key()).await.unwrap(), kept.png);
+    assert_eq!(kept.png, aside.png);
+    // It is there now: whoever looks finds it, whoever does not draws it again.
+    let found = drawn(&worker, &job, Storing::LookUpAndKeep).await;
+    assert_eq!((found.origin, found.kept), (Origin::Stored, true));
+    let again = drawn(&worker, &job, Storing::Keep).await;
+    assert_eq!((again.origin, again.kept), (Origin::Drawn, true));
+    assert_eq!((found.png, again.png), (kept.png.clone(), kept.png));
+    assert_eq!(
+        (pictures(&worker, "drawn"), pictures(&worker, "stored")),
+        (3, 1)
+    );
+}
+
+#[tokio::test]
+async fn a_picture_that_contradicts_the_store_is_counted_and_the_stored_one_is_given() {
+    let store = Store::memory();
+    let job = two_months_in(&store).await;
+    let (job, other) = (quick(&job, 1), quick(&job, 2));
+    let worker = Worker::start(&store, 1, 4);
+    // What another adapter drew under the same name.
+    let theirs = drawn(&worker, &other, Storing::Nothing).await.png;
+    store.put_new(&job.key(), theirs.clone()).await.unwrap();
+    let given = drawn(&worker, &job, Storing::Keep).await;
+    assert_eq!((given.origin, given.kept), (Origin::Stored, true));
+    assert_eq!(given.png, theirs);
+    assert_eq!(pictures(&worker, "conflict"), 1);
+    let aside = drawn(&worker, &job, Storing::Nothing).await;
+    assert_ne!(aside.png, theirs);
+}

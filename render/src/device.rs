@@ -1,0 +1,154 @@
+//! A device with its compiled stages, the buffers that frames are drawn in and the frames that stay on it.
+
+use std::ops::Range;
+use std::sync::{Mutex, PoisonError};
+
+use contract::grid::Grid;
+
+use crate::error::RenderError;
+use crate::frame::{SceneBuffers, Stages};
+use crate::gpu::{Gpu, Workspace};
+use crate::plan::{Part, Plan};
+use crate::resident::Resident;
+use crate::scene::{Frame, Interval, Scene};
+use crate::stages::fill::{self, Fill, Filled, Form};
+
+/// Everything that lives and dies with one device.
+pub(crate) struct Device {
+    gpu: Gpu,
+    stages: Stages,
+    fill: Fill,
+    /// Buffers of frames that are not in flight; as many as ever were in flight at once.
+    idle: Mutex<Vec<Workspace>>,
+    /// Frames of products that were drawn lately.
+    resident: Resident,
+    /// How many devices this process had before.
+    pub(crate) number: u64,
+}
+
+impl Device {
+    /// Compiles the stages. Frames of `most_frame_bytes` stay between pictures, of a share of the device if none are named.
+    pub(crate) fn new(
+        gpu: Gpu,
+        number: u64,
+        most_frame_bytes: Option<u64>,
+    ) -> Result<Self, RenderError> {
+        let stages = Stages::new(&gpu);
+        let fill = Fill::new(&gpu, fill::Sources::default());
+        gpu.check_fault("compiling shaders")?;
+        gpu.keep_pipelines();
+        tracing::info!(adapter = gpu.adapter_name(), number, "renderer is ready");
+        let resident = Resident::new(&gpu, most_frame_bytes);
+        Ok(Self {
+            gpu,
+            stages,
+            fill,
+            idle: Mutex::default(),
+            resident,
+            number,
+        })
+    }
+
+    pub(crate) fn gpu(&self) -> &Gpu {
+        &self.gpu
+    }
+
+    /// Bytes of frames that stay on the device.
+    pub(crate) fn resident_bytes(&self) -> u64 {
+        self.resident.bytes()
+    }
+
+    /// Draws one part of a picture, in the light that all parts lie in if there is any.
+    pub(crate) fn draw(
+        &self,
+        plan: &Plan,
+        part: Part,
+        scene: &Scene,
+        light: Option<&wgpu::Buffer>,
+    ) -> Result<Vec<u8>, RenderError> {
+        let mut buffers = self.scene_buffers(scene, &plan.held_cells(), plan.params.doubt == 1)?;
+        buffers.light = light.cloned();
+        self.in_workspace(|workspace| self.stages.draw(&self.gpu, workspace, plan, part, &buffers))
+    }
+
+    /// Makes the light that all parts of a picture lie in.
+    pub(crate) fn light(&self, plan: &Plan, scene: &Scene) -> Result<wgpu::Buffer, RenderError> {
+        let buffers = self.scene_buffers(scene, &plan.held_cells(), plan.params.doubt == 1)?;
+        self.in_workspace(|workspace| {
+            self.stages
+                .shared_light(&self.gpu, workspace, plan, &buffers)
+        })
+    }
+
+    fn in_workspace<T>(
+        &self,
+        work: impl FnOnce(&mut Workspace) -> Result<T, RenderError>,
+    ) -> Result<T, RenderError> {
+        // A poisoned pool is whole: workspaces are only pushed and popped.
+        let idle = || self.idle.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut workspace = idle().pop().unwrap_or_default();
+        let done = work(&mut workspace);
+        idle().push(workspace);
+        done
+    }
+
+    /// Fills the gaps of one frame, if the device does that faster than the twin.
+    pub(crate) fn fill(
+        &self,
+        form: Form,
+        grid: &Grid,
+        values: &[f32],
+        domain: &[u32],
+    ) -> Option<Result<Filled, RenderError>> {
+        // A software adapter is slower than the twin, which uses the same processor without a detour.
+        let pays = !self.gpu.is_software() && Fill::fits(&self.gpu, grid);
+        pays.then(|| self.fill.run(&self.gpu, form, grid, values, domain))
+    }
+
+    /// Brings the frames of a scene to the device before anybody wants them, if they are held whole.
+    pub(crate) fn prepare(&self, scene: &Scene) -> Result<(), RenderError> {
+        if !Plan::holds_whole(&scene.grid) {
+            return Ok(());
+        }
+        let held = 0..scene.grid.cell_count();
+        self.scene_buffers(scene, &held, false).map(|_buffers| ())
+    }
+
+    fn scene_buffers(
+        &self,
+        scene: &Scene,
+        held: &Range<usize>,
+        has_doubt: bool,
+    ) -> Result<SceneBuffers, RenderError> {
+        let frame = |frame: &Frame| self.resident.buffer(&self.gpu, &frame.cells, held.clone());
+        let pair = |interval: &Interval| -> Result<[wgpu::Buffer; 2], RenderError> {
+            Ok([frame(&interval.before)?, frame(&interval.after)?])
+        };
+        let doubt = |frame: &Frame| {
+            self.resident
+                .buffer(&self.gpu, frame.doubts(), held.clone())
+        };
+        let doubts = || -> Result<[wgpu::Buffer; 2], RenderError> {
+            Ok([doubt(&scene.value.before)?, doubt(&scene.value.after)?])
+        };
+        Ok(SceneBuffers {
+            value: pair(&scene.value)?,
+            accumulated: scene.accumulated.as_ref().map(pair).transpose()?,
+            northward: scene.northward.as_ref().map(pair).transpose()?,
+            domain: self
+                .resident
+                .buffer(&self.gpu, &scene.domain, held.clone())?,
+            doubts: has_doubt.then(doubts).transpose()?,
+            terrain: scene
+                .terrain
+                .as_ref()
+                .map(|terrain| {
+                    let cells = &terrain.elevation.cells;
+                    self.resident
+                        .buffer(&self.gpu, cells, 0..cells.content().len())
+                })
+                .transpose()?,
+            light: None,
+        })
+    }
+}

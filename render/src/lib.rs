@@ -1,0 +1,38 @@
+//! Jobs and scenes in, pictures out: the whole method in compute shaders, every stage with its CPU twin.
+//!
+//! ```text
+//! frames -> interpolate -> particles -> project -> light -> bin -> eye -> compose -> image
+//!                     \-> map ------------------------------------------/
+//! ```
+//! Nothing is rasterised: data-centre GPUs are wired for compute. Sums whose order is not fixed are sums of integers,
+//! and everything that a tile shares with its neighbours is absolute, so pictures have no seams and equal jobs give
+//! equal bytes.
+//!
+//! Left out on purpose: where frames come from, who asks, in which order, and where pictures go (`render-worker`); what
+//! proves and measures all this (`render-proof`).
+
+#[macro_use]
+mod shared_struct;
+
+mod adapter;
+pub mod coast;
+mod device;
+pub mod error;
+pub mod frame;
+pub mod frame_cpu;
+pub mod gpu;
+pub mod image;
+pub mod passes;
+pub mod plan;
+pub mod playback;
+pub mod pyramid;
+pub mod renderer;
+mod resident;
+pub mod scene;
+pub mod stages;
+
+pub use adapter::Adapter;
+pub use error::RenderError;
+pub use image::Image;
+pub use renderer::{Backend, Renderer};
+pub use scene::{Frame, Interval, Scene};

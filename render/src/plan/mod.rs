@@ -1,0 +1,405 @@
+//! From a job and a scene to plain data for the stages: parameters, tables and the list of cells to draw.
+//!
+//! Everything that must not depend on which tile is drawn (slice planes, light texels, particle sizes and numbers)
+//! is computed here from the scene and the zoom level alone.
+
+mod camera;
+mod context;
+mod extent;
+mod flow;
+mod globe;
+mod look;
+mod shape;
+mod tile;
+
+use std::ops::Range;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use contract::earth::Earth;
+use contract::grid::Grid;
+use contract::job::{Mode, RenderJob, View};
+use glam::Vec3;
+
+use crate::error::RenderError;
+use crate::passes::splat::{HALF_BYTES, workgroups};
+use crate::scene::{Interval, Scene};
+use crate::stages::layout::{
+    Active, Axis, Col, GroundAxis, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, LIGHT_OFF, LIGHT_OWN,
+    NEVER_LONG, Params, Row, SCREEN_TILE_PX, SQUARE, SUBPIXELS, VIEW_TILE,
+};
+use look::Look;
+
+/// 0 stands for no plan.
+static NEXT_ID: AtomicU64 = AtomicU64::new(1);
+
+/// Most particles of one picture, those of cells without data included.
+const MOST_PARTICLES: u64 = 1 << 27;
+/// Largest part of a picture drawn at once, pixels a side; a multiple of the screen tile.
+const PART_PX: u32 = 2048;
+/// Frames of more bytes are not held whole but in bands of the rows that a picture shows: four frames and a domain of
+/// this size leave room for the rest on a device of 2 GiB.
+const MOST_HELD_BYTES: u64 = 256 << 20;
+/// Bands begin and end at multiples of so many rows, so that neighbouring pictures share them.
+const BAND_ROWS: u32 = 256;
+/// Shorter lists are not cut into parts: the parts of 1024 entries would be few.
+const LEAST_LONG_LIST: u32 = 2048;
+/// A list is long that holds so many times the particles that all screen tiles would have if they had the same.
+const LONG_OVER_FAIR: u32 = 4;
+/// Particles that one invocation makes, unless cells hold fewer: neighbours share sums, more of them share better.
+const PARTICLES_EACH: u32 = 4;
+
+/// Everything the stages need for one picture.
+#[derive(Debug, Clone)]
+pub struct Plan {
+    /// Different for every plan made by this process; what is copied is the same.
+    pub id: u64,
+    pub mode: Mode,
+    pub params: Params,
+    pub rows: Vec<Row>,
+    pub cols: Vec<Col>,
+    /// The cells to draw, listed for the twins; devices find them by themselves.
+    pub active: Vec<Active>,
+    pub axes: Vec<Axis>,
+    pub palette: Vec<u32>,
+    /// Columns, then rows of a tile in its surroundings; empty otherwise.
+    pub ground_axes: Vec<GroundAxis>,
+    /// Words of the coast mask of the whole picture; empty without coast lines.
+    pub coast: Vec<u32>,
+    /// Some screen tiles may hold many times the particles of others: a pole or the limb is in view.
+    pub is_crowded: bool,
+    size_px: [u32; 2],
+}
+
+/// A rectangle of the picture that is drawn at once.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Part {
+    pub origin_px: [u32; 2],
+    pub size_px: [u32; 2],
+}
+
+impl Part {
+    /// As good as no picture, for what is made besides.
+    pub const NONE: Self = Self {
+        origin_px: [0, 0],
+        size_px: [1, 1],
+    };
+}
+
+impl Plan {
+    /// The plan of a valid job with the list of its cells; `most_buffer_bytes` is the largest buffer to be filled.
+    pub fn new(
+        job: &RenderJob,
+        scene: &Scene,
+        most_buffer_bytes: u64,
+    ) -> Result<Self, RenderError> {
+        // The twins read frames where they are, whole.
+        let mut plan = Self::holding(job, scene, most_buffer_bytes, u64::MAX)?;
+        plan.list_cells(scene);
+        Ok(plan)
+    }
+
+    /// The same without the list; quick, whatever the size of the grid.
+    pub fn for_device(
+        job: &RenderJob,
+        scene: &Scene,
+        most_buffer_bytes: u64,
+    ) -> Result<Self, RenderError> {
+        Self::holding(job, scene, most_buffer_bytes, MOST_HELD_BYTES)
+    }
+
+    /// The same with frames of more than `most_held_bytes` held in bands of rows.
+    pub fn holding(
+        job: &RenderJob,
+        scene: &Scene,
+        most_buffer_bytes: u64,
+        most_held_bytes: u64,
+    ) -> Result<Self, RenderError> {
+        Self::check(job, scene)?;
+        let mut plan = Self::viewed(job, scene);
+        context::plan(&mut plan, job, scene);
+        plan.count_particles(most_buffer_bytes)?;
+        plan.choose_band(most_buffer_bytes, most_held_bytes)?;
+        Ok(plan)
+    }
+
+    fn check(job: &RenderJob, scene: &Scene) -> Result<(), RenderError> {
+        job.validate()?;
+        scene.validate()?;
+        if job.mode == Mode::Flow && scene.northward.is_none() {
+            return Err(RenderError::NoNorthward);
+        }
+        Ok(())
+    }
+
+    /// What follows from the view, before anything is counted.
+    fn viewed(job: &RenderJob, scene: &Scene) -> Self {
+        let size_px = job.view.size_px();
+        let mut plan = Self {
+            id: NEXT_ID.fetch_add(1, Ordering::Relaxed),
+            mode: job.mode,
+            params: common(job, scene),
+            rows: vec![],
+            cols: vec![],
+            active: vec![],
+            axes: vec![],
+            palette: palette(job),
+            ground_axes: vec![],
+            coast: vec![],
+            is_crowded: false,
+            size_px,
+        };
+        match job.view {
+            View::Tile { tile, size_px } => {
+                tile::plan(&mut plan, job, scene, (tile, size_px));
+            }
+            View::Globe { .. } => globe::plan(&mut plan, job, scene),
+        }
+        plan
+    }
+
+    /// Are frames on this grid held whole, whatever is drawn of them?
+    pub(crate) fn holds_whole(grid: &Grid) -> bool {
+        (grid.cell_count() * size_of::<f32>()) as u64 <= MOST_HELD_BYTES
+    }
+
+    /// Cells of a frame that are on the device while this is drawn, whole rows of them.
+    pub fn held_cells(&self) -> Range<usize> {
+        self.params.held_first_cell as usize..self.params.held_end_cell as usize
+    }
+
+    fn choose_band(
+        &mut self,
+        most_buffer_bytes: u64,
+        most_held_bytes: u64,
+    ) -> Result<(), RenderError> {
+        const CELL_BYTES: u64 = size_of::<f32>() as u64;
+        let params = &mut self.params;
+        let (rows, cols) = (params.rows, params.cols);
+        let shown = if self.mode == Mode::Map {
+            params.first_cell / cols..params.end_cell.div_ceil(cols)
+        } else {
+            params.first_row..params.first_row + params.row_count
+        };
+        let row_bytes = u64::from(cols) * CELL_BYTES;
+        // What drifts comes from other rows than it is seen in.
+        let is_whole = self.mode == Mode::Flow;
+        let band = if is_whole || u64::from(rows) * row_bytes <= most_held_bytes {
+            0..rows
+        } else {
+            let first = shown.start / BAND_ROWS * BAND_ROWS;
+            first..shown.end.next_multiple_of(BAND_ROWS).min(rows)
+        };
+        let bytes = u64::from(band.end - band.start) * row_bytes;
+        if bytes > most_buffer_bytes {
+            return Err(RenderError::TooLarge {
+                what: "rows of a frame that the picture shows",
+                bytes,
+                limit: most_buffer_bytes,
+            });
+        }
+        params.held_first_cell = band.start * cols;
+        params.held_end_cell = band.end * cols;
+        Ok(())
+    }
+
+    fn count_particles(&mut self, most_buffer_bytes: u64) -> Result<(), RenderError> {
+        let params = &mut self.params;
+        params.particles_each = match self.mode {
+            // All dots of a trail, which lie along one way.
+            Mode::Flow => flow::TRAIL_DOTS,
+            Mode::Map | Mode::Points | Mode::Sprites | Mode::Volume => {
+                params.particles_per_cell.clamp(1, PARTICLES_EACH)
+            }
+        };
+        let groups: u64 = workgroups(params).into_iter().map(u64::from).product();
+        let count = groups * u64::from(SQUARE * SQUARE * params.particles_each);
+        let limit = MOST_PARTICLES.min(most_buffer_bytes / HALF_BYTES);
+        if count > limit {
+            return Err(RenderError::TooManyParticles { count, limit });
+        }
+        params.splat_count = count as u32;
+        Ok(())
+    }
+
+    /// Lists the cells of the domain that a device would visit, by the rule of `splat.wgsl`.
+    fn list_cells(&mut self, scene: &Scene) {
+        let params = &self.params;
+        let domain = scene.domain.content();
+        let rows = params.first_row..params.first_row + params.row_count;
+        for row in rows {
+            for (slot, col) in (0..).zip(&self.cols) {
+                let cell = row * params.cols + col.index;
+                if domain[cell as usize] != 0 && is_in_cap(params, &self.rows[row as usize], col) {
+                    self.active.push(Active { cell, slot });
+                }
+            }
+        }
+    }
+
+    /// The picture cut into parts that are drawn at once, in reading order.
+    pub fn parts(&self) -> Vec<Part> {
+        let [width, height] = self.size_px;
+        let starts = |length: u32| (0..length).step_by(PART_PX as usize);
+        let part = |x: u32, y: u32| Part {
+            origin_px: [x, y],
+            size_px: [PART_PX.min(width - x), PART_PX.min(height - y)],
+        };
+        starts(height)
+            .flat_map(|y| starts(width).map(move |x| part(x, y)))
+            .collect()
+    }
+
+    /// The whole picture as one part.
+    pub fn whole(&self) -> Part {
+        Part {
+            origin_px: [0, 0],
+            size_px: self.size_px,
+        }
+    }
+
+    /// Parameters for drawing one part.
+    pub fn params_of(&self, part: Part) -> Params {
+        let [width, height] = part.size_px;
+        let tiles = [width, height].map(|px| px.div_ceil(SCREEN_TILE_PX));
+        let fair_share = self.params.splat_count / (tiles[0] * tiles[1]).max(1);
+        Params {
+            origin_x_px: part.origin_px[0] as i32,
+            origin_y_px: part.origin_px[1] as i32,
+            width,
+            height,
+            tiles_x: tiles[0],
+            tiles_y: tiles[1],
+            long_list: if self.is_crowded {
+                LEAST_LONG_LIST.max(fair_share.saturating_mul(LONG_OVER_FAIR))
+            } else {
+                NEVER_LONG
+            },
+            ..self.params
+        }
+    }
+
+    /// Whole picture, pixels.
+    pub fn size_px(&self) -> [u32; 2] {
+        self.size_px
+    }
+}
+
+/// Side of a grid's cells in a view, pixels: at the equator of a tile's level, below the camera of a globe view.
+pub fn cell_px(view: &View, grid: &Grid) -> f64 {
+    let cell_deg = (grid.dlon_deg * grid.dlat_deg).sqrt();
+    match *view {
+        View::Tile { tile, size_px } => tile::world_px(tile, size_px) * cell_deg / 360.0,
+        View::Globe {
+            lon_deg,
+            lat_deg,
+            height_m,
+            ..
+        } => {
+            let camera = camera::Camera::above(lon_deg, lat_deg, height_m, view.size_px());
+            cell_deg.to_radians() * camera.focal_px / camera.height
+        }
+    }
+}
+
+/// Parameters that do not depend on the view.
+fn common(job: &RenderJob, scene: &Scene) -> Params {
+    let (style, grid) = (&job.style, &scene.grid);
+    let transfer = &style.transfer;
+    let look = Look::of(job.mode);
+    Params {
+        rows: grid.rows,
+        cols: grid.cols,
+        periodic: u32::from(grid.is_periodic()),
+        end_cell: grid.cell_count() as u32,
+        value_weight: scene.value.weight as f32,
+        accumulated_weight: scene
+            .accumulated
+            .as_ref()
+            .map_or(0.0, |interval| interval.weight as f32),
+        has_accumulated: u32::from(scene.accumulated.is_some()),
+        transfer_low: transfer.low as f32,
+        transfer_per_unit: (1.0 / (transfer.high - transfer.low)) as f32,
+        strength_per_unit: (1.0 / transfer.low.abs().max(transfer.high.abs())) as f32,
+        diverging: u32::from(shape::is_diverging(transfer)),
+        depth_floor: shape::depth_floor(transfer),
+        height_m_per_kg_m2: style.height_m_per_kg_m2 as f32,
+        height_limit_m: look::HEIGHT_LIMIT_M as f32,
+        sheet_m: look::SHEET_M as f32,
+        turns_per_kg_m2: look::TURNS_PER_KG_M2,
+        optical_depth: style.optical_depth as f32,
+        kernel: match job.mode {
+            Mode::Points | Mode::Flow => KERNEL_DOT,
+            Mode::Sprites => KERNEL_BALL,
+            Mode::Volume | Mode::Map => KERNEL_CLOUD,
+        },
+        front_to_back: 1,
+        slices: style.slices,
+        size_spread: shape::size_spread(transfer, &look),
+        shake_shift: look.shake_shift,
+        min_radius_px: look.min_radius_px,
+        max_radius_px: look::MAX_RADIUS_PX,
+        light_on: if job.mode == Mode::Volume {
+            LIGHT_OWN
+        } else {
+            LIGHT_OFF
+        },
+        shape_table: u32::from(shape::is_given(transfer)),
+        doubt: u32::from(style.doubt && scene.value.has_doubt()),
+        ambient: look::AMBIENT,
+        direct: look::DIRECT,
+        map_alpha: look::MAP_ALPHA,
+        sea_per_m: style.context.sea_extinction_per_m() as f32,
+        grid_west_rad: grid.west_deg.to_radians() as f32,
+        grid_north_rad: grid.north_deg.to_radians() as f32,
+        cols_per_rad: (1.0 / grid.dlon_deg.to_radians()) as f32,
+        rows_per_rad: (1.0 / grid.dlat_deg.to_radians()) as f32,
+        lon_span_rad: grid.dlon_deg.to_radians() as f32,
+        ..Params::default()
+    }
+}
+
+/// 256 colours of the transfer function, red lowest; behind them its opacity and size where users gave any.
+fn palette(job: &RenderJob) -> Vec<u32> {
+    let transfer = &job.style.transfer;
+    let byte = |share: f64| (share * 255.0).round() as u32;
+    let colors = (0..256).map(|i| {
+        let value = transfer.low + (transfer.high - transfer.low) * f64::from(i) / 255.0;
+        let [r, g, b] = transfer.color(value);
+        byte(r) | byte(g) << 8 | byte(b) << 16
+    });
+    colors.chain(shape::table(job.mode, transfer)).collect()
+}
+
+/// Lowest and highest particle, m: from the frames, so that every tile of an instant has the same slice planes.
+fn height_range_m(job: &RenderJob, scene: &Scene) -> [f64; 2] {
+    let [low, high] = scene.accumulated.as_ref().map_or([0.0; 2], Interval::range);
+    let scaled = |kg_m2: f32| {
+        (f64::from(kg_m2) * job.style.height_m_per_kg_m2)
+            .clamp(-look::HEIGHT_LIMIT_M, look::HEIGHT_LIMIT_M)
+    };
+    // Half the sheet, and a metre so that rounding cannot put a particle outside.
+    let sheet = 0.5 * look::SHEET_M + 1.0;
+    [scaled(low).min(0.0) - sheet, scaled(high).max(0.0) + sheet]
+}
+
+/// Shift that makes positions up to `widest_px` beyond a screen tile fit 16 bits with their sign.
+fn entry_shift(widest_px: f64) -> u32 {
+    let farthest_sub = (widest_px + 2.0 * f64::from(SCREEN_TILE_PX)) * f64::from(SUBPIXELS);
+    (farthest_sub / f64::from(i16::MAX)).max(1.0).log2().ceil() as u32
+}
+
+/// Is a cell near enough to the place below the camera to be seen, or to shadow what is seen?
+fn is_in_cap(params: &Params, row: &Row, col: &Col) -> bool {
+    let center = Vec3::new(
+        row.cos_lat * col.sin_lon,
+        row.cos_lat * col.cos_lon,
+        row.sin_lat,
+    );
+    params.view == VIEW_TILE
+        || center.dot(Vec3::new(params.eye_x, params.eye_y, params.eye_z)) >= params.cap_least
+}
+
+/// Area of the cells of every row, m².
+fn area_m2(scene: &Scene, row: u32) -> f32 {
+    scene.grid.cell_area_m2(row, Earth::Wgs84) as f32
+}

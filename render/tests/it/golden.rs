@@ -1,0 +1,205 @@
+//! Golden pictures, drawn by the CPU twins and kept small; the GPU must draw nearly the same. `BLESS=1` rewrites those
+//! that changed, if the renderer has a new version.
+
+mod record;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+use contract::digest::Digest;
+use contract::job::{Mode, RENDERER_VERSION, RenderJob, View};
+use render::{Image, Scene};
+use render_proof::currents::{self, gyres};
+
+use crate::compare::distance;
+use crate::device::renderers;
+use crate::scenes::{FIVE_DEGREES, globe, job, ocean, tile};
+use record::{Record, digest};
+
+/// Largest file.
+const MOST_BYTES: u64 = 64 << 10;
+/// Largest difference of a channel between two back ends, and share of pixels that differ by more than one.
+const MAX_DIFF: u8 = 6;
+const DIFF_PIXELS_PER_MILLE: usize = 5;
+
+/// Largest difference of a channel between two drawings by the twins: the maths library of another system.
+const TWIN_DIFF: u8 = 1;
+
+fn folder() -> &'static Path {
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden"))
+}
+
+fn path(name: &str) -> PathBuf {
+    folder().join(format!("{name}.png"))
+}
+
+fn record() -> Record {
+    let text = std::fs::read_to_string(folder().join("versions.txt")).unwrap();
+    text.parse().unwrap()
+}
+
+/// Writes a picture that is not there yet or is to be blessed, if this version of the renderer may draw it.
+fn bless(name: &str, drawn: &Image) {
+    static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
+    let _one = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
+    let there = std::fs::read(path(name)).ok().map(|bytes| decode(&bytes));
+    let is_same = |there: &Image| {
+        (there.width, there.height) == (drawn.width, drawn.height)
+            && distance(drawn, there).0 <= TWIN_DIFF
+    };
+    // What differs by rounding alone stays as it is: blessing twice, or elsewhere, changes nothing.
+    let kept = there.filter(is_same);
+    let picture = kept.as_ref().unwrap_or(drawn);
+    let mut record = record();
+    let added = record.add(RENDERER_VERSION, name, digest(picture));
+    added.unwrap_or_else(|reason| panic!("{reason}"));
+    std::fs::write(folder().join("versions.txt"), record.to_string()).unwrap();
+    if kept.is_none() {
+        std::fs::write(path(name), drawn.encode_png().unwrap()).unwrap();
+        println!("wrote {}", path(name).display());
+    }
+}
+
+#[expect(clippy::disallowed_methods, reason = "a test's own switches")]
+fn is_set(variable: &str) -> bool {
+    std::env::var(variable).is_ok_and(|value| !value.is_empty() && value != "0")
+}
+
+fn decode(bytes: &[u8]) -> Image {
+    let image = image::load_from_memory_with_format(bytes, image::ImageFormat::Png)
+        .unwrap()
+        .into_rgba8();
+    Image {
+        width: image.width(),
+        height: image.height(),
+        rgba8: image.into_raw(),
+    }
+}
+
+/// The middle of a tile, so that files stay small; all of a globe.
+fn cropped(image: &Image) -> Image {
+    if image.width != 256 {
+        return image.clone();
+    }
+    let pixels = (64..192).flat_map(|y| (64..192).flat_map(move |x| image.pixel(x, y)));
+    Image {
+        width: 128,
+        height: 128,
+        rgba8: pixels.collect(),
+    }
+}
+
+fn matches_golden(name: &str, mode: Mode, view: View) {
+    matches_golden_of(name, &ocean(FIVE_DEGREES), job(mode, view));
+}
+
+fn matches_golden_of(name: &str, scene: &Scene, mut job: RenderJob) {
+    job.style.globe_surface = true;
+    for renderer in renderers("golden") {
+        let drawn = cropped(&renderer.render(&job, scene).unwrap());
+        let path = path(name);
+        let is_twin = renderer.name() == "CPU twins";
+        if is_twin && (is_set("BLESS") || (!path.exists() && !is_set("CI"))) {
+            bless(name, &drawn);
+        }
+        let bytes = std::fs::read(&path)
+            .unwrap_or_else(|e| panic!("{}: {e}; BLESS=1 draws it", path.display()));
+        assert!(
+            bytes.len() as u64 <= MOST_BYTES,
+            "{} is too large",
+            path.display()
+        );
+        let (most, pixels) = distance(&drawn, &decode(&bytes));
+        let all = (drawn.width * drawn.height) as usize;
+        // On this machine the twins draw their own pictures to the byte, but for the maths library of another system.
+        let (most_diff, most_pixels) = if is_twin {
+            (TWIN_DIFF, 0)
+        } else {
+            (MAX_DIFF, all * DIFF_PIXELS_PER_MILLE / 1000)
+        };
+        assert!(
+            most <= most_diff && pixels <= most_pixels,
+            "{name} by {}: at most {most} apart, {pixels} of {all} pixels by more than one",
+            renderer.name()
+        );
+    }
+}
+
+#[test]
+fn map_tiles_match_their_golden_picture() {
+    matches_golden("map_tile", Mode::Map, tile(1, 0, 0, 256));
+}
+
+#[test]
+fn points_tiles_match_their_golden_picture() {
+    matches_golden("points_tile", Mode::Points, tile(2, 0, 1, 256));
+}
+
+#[test]
+fn sprites_tiles_match_their_golden_picture() {
+    matches_golden("sprites_tile", Mode::Sprites, tile(3, 1, 3, 256));
+}
+
+#[test]
+fn volume_tiles_match_their_golden_picture() {
+    matches_golden("volume_tile", Mode::Volume, tile(2, 0, 1, 256));
+}
+
+#[test]
+fn map_globes_match_their_golden_picture() {
+    matches_golden("map_globe", Mode::Map, globe(-120.0, 10.0, 1.5e7, 160));
+}
+
+#[test]
+fn volume_globes_match_their_golden_picture() {
+    matches_golden(
+        "volume_globe",
+        Mode::Volume,
+        globe(-120.0, 10.0, 1.5e7, 160),
+    );
+}
+
+#[test]
+fn flow_tiles_and_globes_match_their_golden_pictures() {
+    let scene = gyres(FIVE_DEGREES);
+    for (name, view) in [
+        ("flow_tile", tile(3, 1, 3, 256)),
+        ("flow_globe", globe(-120.0, 10.0, 1.5e7, 160)),
+    ] {
+        matches_golden_of(name, &scene, currents::job(view, 1e7));
+    }
+}
+
+#[test]
+fn the_golden_pictures_are_those_of_this_version_of_the_renderer() {
+    // They are being written then, by the other tests of this program.
+    if is_set("BLESS") {
+        return;
+    }
+    let mut there = BTreeMap::<String, Digest>::new();
+    for entry in std::fs::read_dir(folder()).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|extension| extension == "png") {
+            let name = path.file_stem().unwrap().to_str().unwrap().to_owned();
+            there.insert(name, digest(&decode(&std::fs::read(&path).unwrap())));
+        }
+    }
+    assert!(!there.is_empty());
+    let quarrels = record().quarrels(RENDERER_VERSION, &there);
+    assert!(quarrels.is_empty(), "{}", quarrels.join("\n"));
+}
+
+#[test]
+fn a_golden_picture_of_something_else_is_seen() {
+    let drawn = |mode| {
+        renderers("golden")[0]
+            .render(&job(mode, tile(2, 0, 1, 256)), &ocean(FIVE_DEGREES))
+            .unwrap()
+    };
+    let (most, pixels) = distance(
+        &cropped(&drawn(Mode::Volume)),
+        &cropped(&drawn(Mode::Sprites)),
+    );
+    assert!(most > MAX_DIFF && pixels > 128 * 128 * DIFF_PIXELS_PER_MILLE / 1000);
+}

@@ -1,0 +1,28 @@
+//! Tests of the engine as a whole and of its stages, one binary.
+#![expect(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "all of this binary is tests; clippy allows these in test functions only"
+)]
+
+mod adapters;
+mod bands;
+mod coast;
+mod compare;
+mod context;
+mod device;
+mod fill;
+mod flow;
+mod golden;
+mod hot;
+mod layout;
+mod light_of_parts;
+mod limits;
+mod look;
+mod mass;
+mod scenes;
+mod seams;
+mod smooth;
+mod tidy;
+mod truths;
+mod twins;

@@ -1,0 +1,121 @@
+//! Nothing is lost or made on the way from the grid to the picture: carbon, light's depth, the eye's depth.
+
+use contract::earth::Earth;
+use contract::job::Mode;
+use render::plan::Plan;
+use render::stages::interpolate::cpu::interpolated;
+use render::stages::layout::{DEPTH_ONE, Params, Particle, Splat, is_missing};
+use render::stages::{light, particles, project};
+use render::{Interval, Scene};
+
+use crate::scenes::{ONE_DEGREE, globe, job, ocean, tile};
+
+struct Drawn {
+    params: Params,
+    particles: Vec<Particle>,
+    splats: Vec<Splat>,
+    carbon: Vec<f32>,
+    cells: Vec<u32>,
+}
+
+fn at(interval: &Interval) -> Vec<f32> {
+    let (before, after) = (
+        interval.before.cells.content(),
+        interval.after.cells.content(),
+    );
+    let pairs = before.iter().zip(after);
+    pairs
+        .map(|(a, b)| interpolated(*a, *b, interval.weight as f32))
+        .collect()
+}
+
+fn drawn(view: contract::job::View, scene: &Scene) -> Drawn {
+    let plan = Plan::new(&job(Mode::Volume, view), scene, u64::MAX).unwrap();
+    let params = plan.params_of(plan.parts()[0]);
+    let (value, carbon) = (at(&scene.value), at(scene.accumulated.as_ref().unwrap()));
+    let count = plan.active.len() * params.particles_per_cell as usize;
+    let mut particles = vec![Particle::default(); count];
+    let inputs = particles::cpu::Inputs {
+        active: &plan.active,
+        rows: &plan.rows,
+        value: &value,
+        accumulated: &carbon,
+        palette: &plan.palette,
+        doubt: &[],
+    };
+    particles::cpu::generate(&params, &inputs, &mut particles);
+    let mut splats = vec![Splat::default(); particles.len()];
+    project::cpu::project(&params, &plan.rows, &plan.cols, &particles, &mut splats);
+    Drawn {
+        params,
+        particles,
+        splats,
+        carbon,
+        cells: plan.active.iter().map(|active| active.cell).collect(),
+    }
+}
+
+#[test]
+fn the_particles_of_a_picture_carry_the_carbon_of_its_cells_to_a_millionth() {
+    let scene = ocean(ONE_DEGREE);
+    for view in [
+        tile(3, 1, 3, 256),
+        tile(5, 6, 13, 256),
+        globe(-150.0, 0.0, 4.0e6, 96),
+    ] {
+        let drawn = drawn(view, &scene);
+        let carried_kg: f64 = drawn.particles.iter().map(|p| f64::from(p.mass_kg)).sum();
+        let (mut held_kg, mut moved_kg) = (0.0, 0.0);
+        for &cell in &drawn.cells {
+            let kg_m2 = drawn.carbon[cell as usize];
+            if !is_missing(kg_m2) {
+                let area_m2 = scene
+                    .grid
+                    .cell_area_m2(cell / scene.grid.cols, Earth::Wgs84);
+                held_kg += f64::from(kg_m2) * area_m2;
+                moved_kg += f64::from(kg_m2.abs()) * area_m2;
+            }
+        }
+        println!("{view:?}: {carried_kg:.9e} kg carried, {held_kg:.9e} kg held");
+        // Sinks and sources cancel: the tolerance is of what is moved either way.
+        assert!(moved_kg > 1e9 && (carried_kg - held_kg).abs() < 1e-6 * moved_kg);
+    }
+}
+
+#[test]
+fn the_light_buffer_holds_the_depth_of_every_particle_to_the_last_integer() {
+    let scene = ocean(ONE_DEGREE);
+    let drawn = drawn(globe(-150.0, 0.0, 4.0e6, 96), &scene);
+    let texels = light::texel_count(&drawn.params);
+    let held = |buffer: &[u32]| buffer.iter().map(|&depth| u64::from(depth)).sum::<u64>();
+    let mut all = vec![0u32; texels];
+    light::cpu::deposit(&drawn.params, &drawn.splats, &mut all);
+
+    // In two parts and the other way round: integers do not mind.
+    let mut parts = vec![0u32; texels];
+    let backwards: Vec<Splat> = drawn.splats.iter().rev().copied().collect();
+    let (first, second) = backwards.split_at(backwards.len() / 3);
+    light::cpu::deposit(&drawn.params, second, &mut parts);
+    light::cpu::deposit(&drawn.params, first, &mut parts);
+    assert_eq!(all, parts);
+
+    // The sum of what each gives alone, and nothing beside the buffer: within half an integer for each of eight shares.
+    let given: f64 = drawn
+        .splats
+        .iter()
+        .filter(|splat| splat.tau > 0.0)
+        .map(|splat| f64::from(splat.light_depth))
+        .sum();
+    let shown = drawn.splats.iter().filter(|splat| splat.tau > 0.0).count();
+    let kept = held(&all) as f64 / f64::from(DEPTH_ONE);
+    println!("depth given {given:.6}, kept {kept:.6}, {shown} particles");
+    let rounding = 8.0 * 0.5 * shown as f64 / f64::from(DEPTH_ONE);
+    assert!((kept - given).abs() < rounding && (kept / given - 1.0).abs() < 2e-3);
+
+    // The layer behind the last slice holds twice everything.
+    let total = held(&all);
+    light::cpu::prefix(&drawn.params, &mut all);
+    let layer = (drawn.params.light_width * drawn.params.light_height) as usize;
+    let last = &all[drawn.params.slices as usize * layer..];
+    assert_eq!(held(&last[..layer]), 2 * total);
+}

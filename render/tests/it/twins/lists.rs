@@ -1,0 +1,120 @@
+//! Counting, scanning, placing and their twins.
+
+use render::gpu::{Gpu, Slot};
+use render::passes;
+use render::passes::place::{self, Place};
+use render::passes::splat::{self, Splats};
+use render::stages::bin::{self, Bin, list_count};
+use render::stages::layout::Entry;
+use render::stages::light::{self, Light};
+
+use super::{Twins, prove};
+
+/// The entries of every list in an order that does not depend on arrival.
+fn sorted_lists(list_ends: &[u32], entries: &[Entry]) -> Vec<Vec<[u32; 3]>> {
+    let starts = std::iter::once(0).chain(list_ends.iter().copied());
+    let lists = starts.zip(list_ends).map(|(start, end)| {
+        let list = entries
+            .get(start as usize..*end as usize)
+            .unwrap_or_default();
+        let mut list: Vec<_> = list
+            .iter()
+            .map(|entry| [entry.place, entry.size, entry.color])
+            .collect();
+        list.sort_unstable();
+        list
+    });
+    lists.collect()
+}
+
+/// Do two sets of lists hold the same entries, their colours but for the last bit?
+fn same_lists(a: &[Vec<[u32; 3]>], b: &[Vec<[u32; 3]>]) -> bool {
+    let same_color = |a: u32, b: u32| {
+        let channels = a.to_le_bytes().into_iter().zip(b.to_le_bytes());
+        channels.into_iter().all(|(a, b)| a.abs_diff(b) <= 1) && a >> 24 == b >> 24
+    };
+    let same = |a: &[u32; 3], b: &[u32; 3]| a[..2] == b[..2] && same_color(a[2], b[2]);
+    a.len() == b.len()
+        && a.iter()
+            .zip(b)
+            .all(|(a, b)| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| same(a, b)))
+}
+
+#[test]
+#[expect(clippy::too_many_lines, reason = "two passes and a scan in one chain")]
+fn the_lists_hold_every_stored_splat_once_and_in_its_light() {
+    for twins in [Twins::tile(), Twins::globe()] {
+        let distance = |gpu: &Gpu, bin_source: &str, place_source: &str| {
+            let splats = Splats::of(gpu, splat::SOURCE);
+            let light = Light::new(gpu);
+            let bin = Bin::new(gpu, bin_source);
+            let place = Place::of(gpu, place_source);
+            let mut params = twins.params;
+            // Rounding may put a few more splats into a list than the twins have.
+            params.entry_capacity += params.entry_capacity / 8 + 1024;
+            let [first, second] = twins.stored();
+            let [seen, lit, above, ends, entries] = twins.run_with(
+                gpu,
+                &params,
+                |_| (),
+                |f| {
+                    splats.record(f).unwrap();
+                    light.record(f).unwrap();
+                    bin.record(f).unwrap();
+                    place.record(f).unwrap();
+                },
+                [
+                    first,
+                    second,
+                    (Slot::Light, twins.light.len() as u64 * 4),
+                    (Slot::Counts, u64::from(list_count(&params)) * 4),
+                    (
+                        Slot::Entries,
+                        u64::from(params.entry_capacity) * size_of::<Entry>() as u64,
+                    ),
+                ],
+            );
+            let mut splats = twins.in_order(&seen, &lit);
+            let above: Vec<u32> = bytemuck::pod_collect_to_vec(&above);
+            light::cpu::shade(&params, &above, &mut splats);
+            let mut own_ends = vec![0; list_count(&params) as usize];
+            bin::cpu::count(&params, &splats, &mut own_ends);
+            let mut own = vec![Entry::default(); bin::cpu::scan(&mut own_ends) as usize];
+            bin::cpu::scatter(&params, &splats, &mut own_ends, &mut own);
+            assert!(!own.is_empty());
+            let ends: Vec<u32> = bytemuck::pod_collect_to_vec(&ends);
+            let entries: Vec<Entry> = bytemuck::pod_collect_to_vec(&entries);
+            let same = own_ends == ends
+                && same_lists(
+                    &sorted_lists(&ends, &entries),
+                    &sorted_lists(&own_ends, &own),
+                );
+            if same { 0.0 } else { f32::INFINITY }
+        };
+        prove(
+            "bin",
+            bin::SOURCE,
+            "counts[at] += start",
+            "counts[at] += start + 1u",
+            |gpu, source| distance(gpu, source, place::SOURCE),
+        );
+        let (shared, unshared) = (place::SOURCE, passes::unshared(place::SOURCE));
+        for (source, right, wrong) in [
+            (shared, "vec2(exp(-depth), 1.0)", "vec2(exp(depth), 1.0)"),
+            (
+                shared,
+                "atomicAdd(&counts[tag - 1u], atomicLoad",
+                "atomicAdd(&counts[tag - 1u], 1u + atomicLoad",
+            ),
+            (
+                &unshared,
+                "return atomicAdd(&counts[list], 1u)",
+                "return atomicAdd(&counts[list], 2u)",
+            ),
+        ] {
+            prove("place", source, right, wrong, |gpu, source| {
+                distance(gpu, bin::SOURCE, source)
+            });
+        }
+    }
+}

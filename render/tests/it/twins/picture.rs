@@ -1,0 +1,144 @@
+//! Thematic maps, composition and their twins.
+
+use contract::job::Mode;
+use glam::Vec4;
+use render::frame::FrameContext;
+use render::gpu::{Gpu, Slot};
+use render::stages::compose::{self, Compose};
+use render::stages::eye::{self, Eye};
+use render::stages::map::{self, Map};
+
+use super::{Twins, bytes, channels, far_apart, prove};
+use crate::context::{everything, with_terrain};
+use crate::scenes::{FIVE_DEGREES, globe, tile};
+
+#[test]
+fn map_matches_its_twin_on_tiles_and_on_the_globe() {
+    let views = [tile(2, 0, 1, 256), globe(-120.0, 10.0, 1.5e7, 160)];
+    let plain = views.map(|view| {
+        (
+            Twins::of(Mode::Map, view),
+            "mix(north, south",
+            "mix(south, north",
+        )
+    });
+    let [on_tile, on_globe] = views.map(|view| Twins::doubted(Mode::Map, view));
+    let doubted = [
+        (on_tile, "* doubt * line_at(pixel)", "* doubt"),
+        (
+            on_globe,
+            "palette[256u + at] & 0xffffu",
+            "palette[256u + at] & 0x7fffu",
+        ),
+    ];
+    for (twins, right, wrong) in plain.into_iter().chain(doubted) {
+        let expected = channels(&twins.picture);
+        prove("map", map::SOURCE, right, wrong, |gpu, source| {
+            let stage = Map::new(gpu, source);
+            let value =
+                |f: &mut FrameContext<'_>| drop(f.upload(Slot::Value, &twins.value).unwrap());
+            let drawn: Vec<Vec4> = twins.run(
+                gpu,
+                value,
+                |f| stage.record(f).unwrap(),
+                Slot::Picture,
+                expected.len() / 4,
+            );
+            // A colour may be the next of the palette's 256.
+            far_apart(&channels(&drawn), &expected, 0.02)
+        });
+    }
+}
+
+#[test]
+fn compose_matches_its_twin() {
+    let twins = Twins::globe();
+    let expected = bytes(twins.image.iter().copied());
+    for (right, wrong) in [
+        ("rgb.y << 8u", "rgb.z << 8u"),
+        ("0.55 * haze", "0.05 * haze"),
+    ] {
+        prove("compose", compose::SOURCE, right, wrong, |gpu, source| {
+            let stage = Compose::new(gpu, source);
+            let picture =
+                |f: &mut FrameContext<'_>| drop(f.upload(Slot::Picture, &twins.picture).unwrap());
+            let drawn: Vec<u32> = twins.run(
+                gpu,
+                picture,
+                |f| stage.record(f).unwrap(),
+                Slot::Image,
+                twins.image.len(),
+            );
+            far_apart(&bytes(drawn), &expected, 1.01)
+        });
+    }
+}
+
+#[test]
+fn surroundings_match_their_twin_on_tiles_and_on_the_globe() {
+    let views = [tile(1, 0, 0, 256), globe(-120.0, 10.0, 1.5e7, 160)];
+    let faults = [
+        // The slope of the terrain, its height, the night, the coast, the sea above the floor.
+        ("2.0 * z[at + 4]", "2.0 * z[at - 4]"),
+        ("if (height_m < 0.0)", "if (height_m < 1000.0)"),
+        ("mix(NIGHT, 1.0,", "mix(1.0, NIGHT,"),
+        ("place.x % 4u * 8u", "(3u - place.x % 4u) * 8u"),
+        ("exp(params.seabed_per_m", "exp(-params.seabed_per_m"),
+    ];
+    for view in views {
+        let twins = Twins::of_job(&everything(Mode::Map, view), with_terrain(FIVE_DEGREES));
+        assert_eq!(twins.params.in_context, 1);
+        let expected = bytes(twins.image.iter().copied());
+        for (right, wrong) in faults {
+            let distance = |gpu: &Gpu, source: &str| {
+                let stage = Compose::of(gpu, compose::SOURCE, source);
+                let picture = |f: &mut FrameContext<'_>| {
+                    drop(f.upload(Slot::Picture, &twins.picture).unwrap());
+                };
+                let drawn: Vec<u32> = twins.run(
+                    gpu,
+                    picture,
+                    |f| stage.record(f).unwrap(),
+                    Slot::Image,
+                    twins.image.len(),
+                );
+                far_apart(&bytes(drawn), &expected, 1.01)
+            };
+            let source = compose::SOURCE_IN_CONTEXT;
+            prove("surroundings", source, right, wrong, distance);
+        }
+    }
+}
+
+#[test]
+fn the_eye_composes_in_surroundings_as_its_twin_does() {
+    for view in [tile(1, 0, 0, 256), globe(-120.0, 10.0, 1.5e7, 160)] {
+        let twins = Twins::of_job(&everything(Mode::Volume, view), with_terrain(FIVE_DEGREES));
+        let expected = bytes(twins.image.iter().copied());
+        let distance = |gpu: &Gpu, source: &str, entry| {
+            let stage = Eye::of(gpu, eye::SOURCE, source, entry);
+            let lists = |f: &mut FrameContext<'_>| {
+                f.upload(Slot::Counts, &twins.list_ends).unwrap();
+                f.upload(Slot::Entries, &twins.entries).unwrap();
+            };
+            let drawn: Vec<u32> = twins.run(
+                gpu,
+                lists,
+                |f| stage.record(f).unwrap(),
+                Slot::Image,
+                twins.image.len(),
+            );
+            far_apart(&bytes(drawn), &expected, 1.01)
+        };
+        let (right, wrong) = ("color += ground_color", "color -= ground_color");
+        for entry in [eye::SHARED, eye::ALONE] {
+            prove(
+                "eye",
+                eye::SOURCE_IN_CONTEXT,
+                right,
+                wrong,
+                |gpu, source| distance(gpu, source, entry),
+            );
+        }
+    }
+}

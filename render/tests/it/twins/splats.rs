@@ -1,0 +1,118 @@
+//! The pass that makes splats, and the twins of what it is made of.
+
+use contract::job::Mode;
+use render::passes::splat::{self, Splats};
+use render::passes::{place, trails};
+use render::stages::{bin, compose, doubt, eye, flow, interpolate, light, particles, project};
+
+use super::{Twins, prove, splat_numbers};
+use crate::compare::worst;
+use crate::context::{everything, with_terrain};
+use crate::scenes::{FIVE_DEGREES, tile};
+
+#[test]
+fn splats_match_their_twins_on_tiles_and_on_the_globe() {
+    let faults = [
+        (Twins::tile(), "place.x + shaken", "place.y + shaken"),
+        (Twins::tile(), "ground_y - nearest(", "ground_y + nearest("),
+        (
+            Twins::globe(),
+            "1.0 + particle.height_m",
+            "1.0 - particle.height_m",
+        ),
+        (Twins::doubted_tile(), "shape >> 16u", "shape >> 17u"),
+        (Twins::doubted_tile(), "shape & 0xffffu", "shape & 0x7fffu"),
+        (
+            Twins::doubted_tile(),
+            "doubt_after[cell] - before",
+            "doubt_after[cell]",
+        ),
+        (Twins::doubted_tile(), "PALENESS * doubt", "doubt"),
+    ];
+    for (twins, right, wrong) in faults {
+        let expected = splat_numbers(twins.params.kernel, &twins.splats, &twins.splats);
+        prove("splat", splat::SOURCE, right, wrong, |gpu, source| {
+            let stage = Splats::of(gpu, source);
+            let outputs = twins.stored();
+            let [seen, lit] = twins.run_with(
+                gpu,
+                &twins.params,
+                |_| (),
+                |f| stage.record(f).unwrap(),
+                outputs,
+            );
+            // Colours are bytes and may round to a neighbour; a phase of a few turns loses a few bits.
+            worst(
+                &splat_numbers(
+                    twins.params.kernel,
+                    &twins.in_order(&seen, &lit),
+                    &twins.splats,
+                ),
+                &expected,
+                0.0201,
+                1e-4,
+            )
+        });
+    }
+}
+
+#[test]
+fn every_function_of_a_particle_is_in_the_pass_that_is_tested() {
+    for functions in [
+        interpolate::FUNCTIONS,
+        particles::FUNCTIONS,
+        doubt::FUNCTIONS,
+        project::FUNCTIONS,
+        light::DEPOSIT_FUNCTIONS,
+        bin::FUNCTIONS,
+    ] {
+        assert!(splat::SOURCE.contains(functions));
+    }
+    for functions in [flow::FUNCTIONS, project::FUNCTIONS, bin::FUNCTIONS] {
+        assert!(trails::SOURCE.contains(functions));
+    }
+    assert!(place::SOURCE.contains(light::SHADE_FUNCTIONS));
+    assert!(
+        eye::SOURCE.contains(compose::FUNCTIONS) && compose::SOURCE.contains(compose::FUNCTIONS)
+    );
+    for source in [eye::SOURCE_IN_CONTEXT, compose::SOURCE_IN_CONTEXT] {
+        assert!(source.contains(compose::FUNCTIONS_IN_CONTEXT));
+    }
+}
+
+#[test]
+fn splats_in_the_sea_and_in_the_night_match_their_twins() {
+    let twins = Twins::of_job(
+        &everything(Mode::Volume, tile(1, 0, 0, 256)),
+        with_terrain(FIVE_DEGREES),
+    );
+    let expected = splat_numbers(twins.params.kernel, &twins.splats, &twins.splats);
+    for (right, wrong) in [
+        ("exp(-params.sea_per_m", "exp(-0.5 * params.sea_per_m"),
+        (
+            "day_at(normal_of(particle))",
+            "day_at(-normal_of(particle))",
+        ),
+    ] {
+        prove("splat", splat::SOURCE, right, wrong, |gpu, source| {
+            let stage = Splats::of(gpu, source);
+            let [seen, lit] = twins.run_with(
+                gpu,
+                &twins.params,
+                |_| (),
+                |f| stage.record(f).unwrap(),
+                twins.stored(),
+            );
+            worst(
+                &splat_numbers(
+                    twins.params.kernel,
+                    &twins.in_order(&seen, &lit),
+                    &twins.splats,
+                ),
+                &expected,
+                0.0201,
+                1e-4,
+            )
+        });
+    }
+}
