@@ -22,8 +22,9 @@ const CRATES: &[&str] = &[
     "service/src/lib.rs",
     "ingest/src/lib.rs",
     "compute/src/lib.rs",
+    "render/src/lib.rs",
     "render-worker/src/lib.rs",
-    "render-bench/src/lib.rs",
+    "render-proof/src/lib.rs",
     "tile-server/src/lib.rs",
     "fluxglobe/src/main.rs",
 ];

@@ -13,8 +13,8 @@ use crate::cli::{Gc, Settings};
 use crate::command::notice;
 use crate::{deployment, progress};
 
-/// Everybody who lays out objects that clean-up may remove. Weights are never removed: what they were made from is in
-/// their name alone.
+/// Everybody who lays out objects that clean-up may remove. Never removed are weights (what they were made from is in
+/// their name alone), notes of files of observations, and what all services agree on.
 const OWNERS: [&dyn Owner; 6] = [
     &Versions,
     &Pictures,
@@ -64,7 +64,10 @@ mod tests {
     fn every_kind_of_object_has_one_owner_or_is_never_removed() {
         for kind in Kind::ALL {
             let owners = OWNERS.iter().filter(|owner| owner.kinds().contains(&kind));
-            let is_kept_for_ever = matches!(kind, Kind::Weights | Kind::Protocol);
+            let is_kept_for_ever = matches!(
+                kind,
+                Kind::Weights | Kind::ObservationFile | Kind::Protocol
+            );
             assert_eq!(owners.count(), usize::from(!is_kept_for_ever), "{kind:?}");
         }
     }

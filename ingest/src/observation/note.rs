@@ -5,6 +5,7 @@
 
 use contract::digest::Digest;
 use contract::key::ObjectKey;
+use contract::kind::Kind;
 use contract::masked::MaskedCells;
 use contract::product::ProductId;
 use futures::{StreamExt as _, TryStreamExt as _};
@@ -15,8 +16,6 @@ use crate::error::IngestError;
 
 /// Version of the note's JSON; the first that is sealed.
 const SCHEMA: u32 = 2;
-/// Folder of the notes.
-const FOLDER: &str = "observation-files";
 /// Notes that are read at the same time.
 const NOTES_AT_ONCE: usize = 16;
 
@@ -34,6 +33,11 @@ pub struct FileNote {
     pub masked: MaskedCells,
 }
 
+fn key(dataset: &ProductId, raw_sha256: Digest) -> Result<ObjectKey, IngestError> {
+    let folder = Kind::ObservationFile.folder();
+    Ok(format!("{folder}/{dataset}/{raw_sha256}").parse()?)
+}
+
 /// Notes what a file holds, once its observations are durable; as it is read now, if it was read otherwise before.
 pub(crate) async fn put(
     store: &Store,
@@ -41,7 +45,7 @@ pub(crate) async fn put(
     raw_sha256: Digest,
     (file, observations, masked): (&str, u64, MaskedCells),
 ) -> Result<(), IngestError> {
-    let key: ObjectKey = format!("{FOLDER}/{dataset}/{raw_sha256}").parse()?;
+    let key = key(dataset, raw_sha256)?;
     let note = FileNote {
         schema: SCHEMA,
         file: file.to_owned(),
@@ -61,12 +65,12 @@ pub(crate) async fn put(
 /// The store does not answer, or a note is damaged.
 pub async fn notes(store: &Store) -> Result<Vec<(ProductId, Vec<FileNote>)>, StorageError> {
     let mut all = vec![];
-    for name in store.folders(FOLDER).await? {
+    for name in store.folders(Kind::ObservationFile.folder()).await? {
         // Names that are none of ours are not ours to read.
         let Ok(dataset) = name.parse::<ProductId>() else {
             continue;
         };
-        let keys = store.list(&format!("{FOLDER}/{dataset}")).await?;
+        let keys = store.list(&format!("{}/{dataset}", Kind::ObservationFile.folder())).await?;
         let reads = keys
             .into_iter()
             .map(|key| async move { document::get::<FileNote>(store, &key).await });
@@ -77,4 +81,37 @@ pub async fn notes(store: &Store) -> Result<Vec<(ProductId, Vec<FileNote>)>, Sto
         all.push((dataset, notes.into_iter().flatten().collect()));
     }
     Ok(all)
+}
+
+#[cfg(test)]
+mod tests {
+    use test_data::frozen;
+
+    use super::*;
+
+    #[tokio::test]
+    async fn frozen_notes_of_files_of_observations_say_what_they_said() {
+        let dataset: ProductId = "buoys".parse().unwrap();
+        let raw = Digest::of(b"a file of observations that nobody keeps");
+        let masked: MaskedCells =
+            serde_json::from_value(serde_json::json!({"implausible": 2})).unwrap();
+        if let Some(folder) = frozen::to_freeze() {
+            let objects = folder.join("objects");
+            let store = Store::open(objects.to_str().unwrap()).unwrap();
+            put(&store, &dataset, raw, ("buoys.csv", 17, masked.clone()))
+                .await
+                .unwrap();
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let notes_of_2 = "observation-files";
+        frozen::copy(2, &format!("objects/{notes_of_2}"), &folder.path().join(notes_of_2));
+        let store = Store::open(folder.path().to_str().unwrap()).unwrap();
+        let expected = FileNote {
+            schema: 2,
+            file: "buoys.csv".to_owned(),
+            observations: 17,
+            masked,
+        };
+        assert_eq!(notes(&store).await.unwrap(), [(dataset, vec![expected])]);
+    }
 }

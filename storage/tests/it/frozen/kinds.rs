@@ -53,6 +53,11 @@ fn reader(kind: Kind) -> Reader {
             "observations/tests/it/frozen.rs",
             "frozen_observations_are_those_that_were_stored",
         ),
+        // Not counted before version 2.
+        Kind::ObservationFile => since_2(
+            "ingest/src/observation/note.rs",
+            "frozen_notes_of_files_of_observations_say_what_they_said",
+        ),
         Kind::Reading => since_1(
             "ingest/src/reading/tests.rs",
             "frozen_notes_of_readings_say_what_they_said",
