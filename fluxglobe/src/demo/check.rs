@@ -33,6 +33,15 @@ pub(crate) struct Comparison {
 }
 
 impl Comparison {
+    pub(crate) fn new(rows: Vec<CheckRow>, note: String, method: String) -> Self {
+        Self {
+            schema: SCHEMA,
+            rows,
+            note,
+            method,
+        }
+    }
+
     /// As the tile server tells it.
     pub(crate) fn to_wire(&self) -> Check {
         let row = |row: &CheckRow| wire::CheckRow {
@@ -76,12 +85,8 @@ pub(crate) async fn compare(
         &bar,
         &format!("{} beside the paper's and independent ones", rows.len()),
     );
-    let comparison = Comparison {
-        schema: SCHEMA,
-        rows,
-        note: compute::published::CITATION.to_owned(),
-        method: compute::published::METHOD.to_owned(),
-    };
+    let (note, method) = (compute::published::CITATION, compute::published::METHOD);
+    let comparison = Comparison::new(rows, note.to_owned(), method.to_owned());
     document::put_over(store, &key, &comparison).await?;
     Ok(comparison)
 }

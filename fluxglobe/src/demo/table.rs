@@ -139,15 +139,13 @@ mod tests {
                 verdict,
             })
         };
-        let comparison = Comparison {
-            rows: vec![
-                row("whole", paper(Some(0.7), Verdict::Within), true),
-                row("band", paper(None, Verdict::NoUncertaintyStated), true),
-                row("month", None, false),
-            ],
-            note: "The paper.".to_owned(),
-            method: "The script.".to_owned(),
-        };
+        let rows = vec![
+            row("whole", paper(Some(0.7), Verdict::Within), true),
+            row("band", paper(None, Verdict::NoUncertaintyStated), true),
+            row("month", None, false),
+        ];
+        let (note, method) = ("The paper.".to_owned(), "The script.".to_owned());
+        let comparison = Comparison::new(rows, note, method);
         let text = against_published(&comparison);
         let line = |what: &str| text.lines().find(|line| line.contains(what)).unwrap();
         assert!(line("whole").contains("-1.4 ± 0.7") && line("whole").contains("within ± 0.7"));

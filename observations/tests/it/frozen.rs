@@ -72,8 +72,8 @@ fn rows() -> Vec<Observation> {
     rows[1].lon_deg = -180.0;
     rows[2].lat_deg = 89.999_999_999;
     rows[2].depth_m = -12.5;
-    rows[3].property = "mole_fraction_of_carbon_dioxide_in_dry_air".to_owned();
-    rows[3].unit = "1e-6".to_owned();
+    let (property, unit) = ("mole_fraction_of_carbon_dioxide_in_dry_air", "1e-6");
+    (rows[3].property, rows[3].unit) = (property.to_owned(), unit.to_owned());
     rows
 }
 

@@ -59,20 +59,26 @@ async fn store() -> Store {
         notices: vec![],
     };
     manifests::commit(&store, &manifest).await.unwrap();
+    put_others(&store, &product, raw_sha256, period).await;
+    store
+}
+
+/// The kinds that no manifest of an input's product names.
+async fn put_others(store: &Store, product: &ProductId, raw_sha256: Digest, period: Period) {
     let areas = [(0, vec![1.5; 15])];
-    weights::write(&store, &ObjectKey::weights(&raw_sha256), &areas)
+    weights::write(store, &ObjectKey::weights(&raw_sha256), &areas)
         .await
         .unwrap();
     let mut counts = contributed::Contributed::nothing(&GRID, period.start);
     counts.add(period, &[true; 15]);
-    contributed::write(&store, &product, &GRID, &counts)
+    contributed::write(store, product, &GRID, &counts)
         .await
         .unwrap();
     let sums = format!("accumulating/{raw_sha256}.parquet");
     let table = weights::encode(&areas).unwrap();
     store.put_new(&sums.parse().unwrap(), table).await.unwrap();
     let rows = Bytes::from("rows of measurements");
-    let key = ObjectKey::observations(&product, &Digest::of(&rows));
+    let key = ObjectKey::observations(product, &Digest::of(&rows));
     store.put_new(&key, rows).await.unwrap();
     let picture = Bytes::from_static(png::PIXEL);
     let key = ObjectKey::tile(&raw_sha256);
@@ -86,14 +92,13 @@ async fn store() -> Store {
         "protocol/current.json",
     ] {
         let document = serde_json::json!({"schema": 2, "name": name});
-        document::put_new(&store, &name.parse().unwrap(), &document)
+        document::put_new(store, &name.parse().unwrap(), &document)
             .await
             .unwrap();
     }
     let note = format!("landings/p/{raw_sha256}-0-17");
     let origin = Bytes::from("granule.notice/0/17");
     store.put_new(&note.parse().unwrap(), origin).await.unwrap();
-    store
 }
 
 #[tokio::test]

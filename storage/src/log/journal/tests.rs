@@ -37,6 +37,11 @@ fn read(path: &Path) -> Result<Vec<Entry>, StorageError> {
     Journal::open(path.to_owned()).map(|(_, entries)| entries)
 }
 
+/// Whole lines.
+fn lines_in(content: &[u8]) -> usize {
+    content.split(|&byte| byte == b'\n').count() - 1
+}
+
 /// Flips each bit from a byte on; how the error must name its entry.
 fn assert_every_bit_counts(path: &Path, from: usize, names: impl Fn(usize) -> Vec<usize>) {
     let whole = std::fs::read(path).unwrap();
@@ -48,10 +53,7 @@ fn assert_every_bit_counts(path: &Path, from: usize, names: impl Fn(usize) -> Ve
         assert!(matches!(error, StorageError::Damaged { .. }), "{error}");
         let text = error.to_string();
         assert!(text.contains(path.to_str().unwrap()), "{text}");
-        let line = whole[..at / 8]
-            .iter()
-            .filter(|&&byte| byte == b'\n')
-            .count();
+        let line = lines_in(&whole[..at / 8]);
         let named = names(line + 1);
         assert!(
             named
@@ -140,10 +142,7 @@ fn a_journal_cut_anywhere_holds_the_whole_lines_before_the_cut_and_goes_on_from_
                 length,
                 "it was changed"
             );
-            let before = whole[..length]
-                .iter()
-                .filter(|&&byte| byte == b'\n')
-                .count();
+            let before = lines_in(&whole[..length]);
             let (mut journal, entries) = Journal::open(path.clone()).unwrap();
             assert_eq!(entries.len(), before, "{length} bytes");
             journal.append(&entry(9)).unwrap();
