@@ -64,10 +64,8 @@ mod tests {
     fn every_kind_of_object_has_one_owner_or_is_never_removed() {
         for kind in Kind::ALL {
             let owners = OWNERS.iter().filter(|owner| owner.kinds().contains(&kind));
-            let is_kept_for_ever = matches!(
-                kind,
-                Kind::Weights | Kind::ObservationFile | Kind::Protocol
-            );
+            let is_kept_for_ever =
+                matches!(kind, Kind::Weights | Kind::ObservationFile | Kind::Protocol);
             assert_eq!(owners.count(), usize::from(!is_kept_for_ever), "{kind:?}");
         }
     }

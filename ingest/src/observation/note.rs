@@ -70,7 +70,9 @@ pub async fn notes(store: &Store) -> Result<Vec<(ProductId, Vec<FileNote>)>, Sto
         let Ok(dataset) = name.parse::<ProductId>() else {
             continue;
         };
-        let keys = store.list(&format!("{}/{dataset}", Kind::ObservationFile.folder())).await?;
+        let keys = store
+            .list(&format!("{}/{dataset}", Kind::ObservationFile.folder()))
+            .await?;
         let reads = keys
             .into_iter()
             .map(|key| async move { document::get::<FileNote>(store, &key).await });
@@ -104,7 +106,11 @@ mod tests {
         }
         let folder = tempfile::tempdir().unwrap();
         let notes_of_2 = "observation-files";
-        frozen::copy(2, &format!("objects/{notes_of_2}"), &folder.path().join(notes_of_2));
+        frozen::copy(
+            2,
+            &format!("objects/{notes_of_2}"),
+            &folder.path().join(notes_of_2),
+        );
         let store = Store::open(folder.path().to_str().unwrap()).unwrap();
         let expected = FileNote {
             schema: 2,

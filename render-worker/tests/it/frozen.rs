@@ -7,14 +7,15 @@ use contract::colour::TransferFunction;
 use contract::job::{Mode, RENDERER_VERSION, RenderJob, Style};
 use contract::kind::Kind;
 use contract::manifest::Manifest;
-use render_worker::desk::{Class, Origin};
-use render_worker::{Backend, RenderService};
+use render::Backend;
+use render_worker::desk::{Order, Origin};
 use storage::sound::damage;
 use storage::{Store, manifests, verify};
 use test_data::frozen;
 
+use crate::here::Here;
 use crate::scenes::{globe, tile};
-use crate::worker::Worker;
+use crate::worker::{USUAL, Worker};
 
 /// The renderer that drew the picture. Another one gives it another name; a store keeps it until it is cleaned.
 const RENDERER: u32 = 5;
@@ -45,7 +46,11 @@ async fn a_frozen_picture_is_found_under_the_name_of_its_job() {
         let store = Store::open(folder.join("objects").to_str().unwrap()).unwrap();
         let worker = Worker::start(&store, 1, 4);
         let job = job(&store).await;
-        worker.desk.draw(&job, Class::OnDemand).await.unwrap();
+        worker
+            .desk
+            .draw(&job, Order::on_demand(USUAL))
+            .await
+            .unwrap();
     }
     let (_folder, kept) = store(2);
     let of_now = job(&kept).await;
@@ -63,7 +68,11 @@ async fn a_frozen_picture_is_found_under_the_name_of_its_job() {
     assert!(is_drawn(10, 240) && !is_drawn(100, 240) && !is_drawn(10, 20));
     if RENDERER_VERSION == RENDERER {
         let worker = Worker::start(&kept, 1, 4);
-        let found = worker.desk.draw(&of_now, Class::OnDemand).await.unwrap();
+        let found = worker
+            .desk
+            .draw(&of_now, Order::on_demand(USUAL))
+            .await
+            .unwrap();
         assert!(found.origin == Origin::Stored && found.png == png);
     }
     let (_folder, old) = store(1);
@@ -78,7 +87,7 @@ async fn a_frozen_picture_is_found_under_the_name_of_its_job() {
 async fn pictures(store: &Store) -> Result<Vec<Vec<u8>>, String> {
     let mut drawn = vec![];
     // One that has nothing in memory.
-    let service = RenderService::new(store.clone(), Backend::Cpu).unwrap();
+    let service = Here::new(store.clone(), Backend::Cpu);
     let latest = async |product: &str| {
         let latest = manifests::latest(store, &product.parse().unwrap()).await;
         latest.map(Option::unwrap).map_err(|e| e.to_string())
