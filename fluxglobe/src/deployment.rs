@@ -1,6 +1,6 @@
 //! What commands and services work on: one process with a data folder, or the servers that settings name.
 
-use std::num::{NonZeroU32, NonZeroUsize};
+use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 

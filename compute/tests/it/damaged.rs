@@ -216,6 +216,7 @@ async fn damaged_sums_are_computed_again() {
         to: None,
         earth: Earth::Wgs84,
         ocean: None,
+        ocean: None,
     };
     let right = region_series(&engine, &query).await.unwrap();
     let measure = compute::budget::Measure::Mean;

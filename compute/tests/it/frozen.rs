@@ -211,6 +211,7 @@ async fn frozen_sums_answer_where_no_frame_can() {
         from: None,
         to: None,
         earth: Earth::Wgs84,
+        ocean: None,
     };
     let means = region_series(&engine, &means).await.unwrap();
     let january = &means.series[0];
