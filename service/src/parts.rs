@@ -147,6 +147,12 @@ mod tests {
         Report::of(board.parts().await).ready
     }
 
+    /// How the parts end: a service that goes on over a dead part would keep a test for ever.
+    async fn ended(parts: Parts) -> Result<(), PartEnded> {
+        let ended = tokio::time::timeout(Duration::from_mins(1), parts.run()).await;
+        ended.expect("the service goes on over a dead part")
+    }
+
     /// Ends when asked, after it saw whether the service still calls itself ready.
     async fn patient(stop: Stop, board: Arc<Board>) -> Result<(), String> {
         stop.said().await;
@@ -162,7 +168,7 @@ mod tests {
         parts.start("patient", patient(stop.clone(), Arc::clone(&board)));
         assert!(is_ready(&board).await);
         parts.start("ingest", async { Err::<(), _>("topic is gone") });
-        let error = parts.run().await.unwrap_err();
+        let error = ended(parts).await.unwrap_err();
         assert_eq!(
             (error.part, error.source.to_string().as_str()),
             ("ingest", "topic is gone")
@@ -179,7 +185,7 @@ mod tests {
             assert!(stop_is_far(), "out of cheese");
             Ok::<_, String>(())
         });
-        let error = parts.run().await.unwrap_err();
+        let error = ended(parts).await.unwrap_err();
         assert!(
             error.source.to_string().contains("out of cheese"),
             "{error:?}"
@@ -189,7 +195,7 @@ mod tests {
         let mut parts = Parts::new(&stop, &board);
         parts.start("hasty", async { Ok::<_, String>(()) });
         parts.start("patient", patient(stop.clone(), Arc::clone(&board)));
-        assert_eq!(parts.run().await.unwrap_err().part, "hasty");
+        assert_eq!(ended(parts).await.unwrap_err().part, "hasty");
     }
 
     /// Never true: a plain panic would make the rest of the part dead code.
@@ -209,7 +215,7 @@ mod tests {
             });
         }
         stop.now();
-        parts.run().await.unwrap();
+        ended(parts).await.unwrap();
         assert!(is_ready(&board).await);
     }
 
@@ -220,6 +226,6 @@ mod tests {
         parts.last_words = Duration::from_millis(10);
         parts.start("deaf", std::future::pending::<Result<(), String>>());
         parts.start("failing", async { Err::<(), _>("no") });
-        assert_eq!(parts.run().await.unwrap_err().part, "failing");
+        assert_eq!(ended(parts).await.unwrap_err().part, "failing");
     }
 }

@@ -18,10 +18,13 @@ use crate::fixture::{FILL, Place, SmallFile, open_again, refusal, settings, text
 fn scripted(script: &str) -> Settings {
     let program = "/bin/sh".into();
     let arguments = vec!["-c".into(), script.into()];
-    Settings {
+    let mut settings = Settings {
         decoder: DecoderCommand { program, arguments },
         ..settings()
-    }
+    };
+    // Where processor time is the limit, a busy machine may take long to give it.
+    settings.limits.wall = Duration::from_mins(10);
+    settings
 }
 
 async fn land(place: &Place, settings: &Settings, name: &str) -> Result<Vec<Outcome>, IngestError> {
