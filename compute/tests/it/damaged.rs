@@ -216,7 +216,6 @@ async fn damaged_sums_are_computed_again() {
         to: None,
         earth: Earth::Wgs84,
         ocean: None,
-        ocean: None,
     };
     let right = region_series(&engine, &query).await.unwrap();
     let measure = compute::budget::Measure::Mean;
@@ -315,6 +314,7 @@ async fn answers(store: &Store) -> Vec<Result<String, String>> {
         from: None,
         to: None,
         earth: Earth::Wgs84,
+        ocean: None,
     };
     answers.push(text(region_series(&engine, &means).await));
     let place = LonLatDeg::new(3.5, 10.5).unwrap();
