@@ -15,7 +15,7 @@ use url::{Host, Url};
 use crate::{ComputeError, Objects, state};
 
 /// How long a question is asked again while the cluster is away.
-pub const PATIENCE: Duration = Duration::from_mins(2);
+pub const RETRY_LIMIT: Duration = Duration::from_mins(2);
 /// The port of a scheduler that is named without one.
 const DEFAULT_PORT: u16 = 50050;
 /// A scheduler that does not answer within this is not there.
@@ -99,7 +99,7 @@ impl std::str::FromStr for SchedulerUrl {
 #[derive(Debug, Clone)]
 pub(crate) struct Cluster {
     pub(crate) scheduler: SchedulerUrl,
-    pub(crate) patience: Duration,
+    pub(crate) retry_limit: Duration,
 }
 
 impl Cluster {

@@ -15,7 +15,7 @@ use contract::quantity::Quantity;
 use contract::time::{Period, TimeMs};
 use storage::{StorageError, Store, manifests};
 
-use crate::{ComputeError, Engine, catalog};
+use crate::{ComputeError, Engine, catalogue};
 pub use at_cell::{CellCounts, counts_at_cell};
 use derivation::Derivation;
 use source::{SourceStep, steps_since};
@@ -93,7 +93,7 @@ async fn derive(
 
 /// The newest version of a product that is a flux of carbon.
 async fn flux(store: &Store, product: &ProductId) -> Result<Manifest, ComputeError> {
-    let source = catalog::product(store, product).await?;
+    let source = catalogue::product(store, product).await?;
     if source.quantity == Quantity::CarbonFlux {
         Ok(source)
     } else {

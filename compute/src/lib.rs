@@ -5,7 +5,7 @@
 //! same bits however many parts it was computed in.
 
 pub mod budget;
-pub mod catalog;
+pub mod catalogue;
 pub mod check;
 pub mod cluster;
 pub mod derive;
@@ -19,13 +19,13 @@ pub mod point;
 pub mod published;
 pub mod recompute;
 pub mod region;
+mod retry_store;
 mod scan;
 pub mod service;
 mod session;
 mod standalone;
 mod state;
 pub mod stats;
-mod steady_store;
 
 pub use budget::{BudgetAnswer, BudgetQuery, BudgetRow, BudgetStep, budget};
 pub use check::{CheckRow, compare};

@@ -14,7 +14,7 @@ use url::{Position, Url};
 use crate::ComputeError;
 use crate::region::computed::ComputedWeights;
 use crate::region::loaded::{LoadedWeights, RegionWeights};
-use crate::steady_store::SteadyStore;
+use crate::retry_store::RetryStore;
 
 /// The root that URLs of a store begin with, and what answers for it. Clones share what was read.
 #[derive(Debug, Clone)]
@@ -35,7 +35,7 @@ impl Objects {
     pub fn new(root: Url, store: Arc<dyn ObjectStore>) -> Self {
         Self {
             root,
-            store: Arc::new(SteadyStore::new(store)),
+            store: Arc::new(RetryStore::new(store)),
             weights: Arc::default(),
         }
     }

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use crate::derive::{CellCounts, counts_at_cell};
 use crate::scan::{self, Layout};
 use crate::session::QueryContext;
-use crate::{ComputeError, Engine, catalog};
+use crate::{ComputeError, Engine, catalogue};
 
 /// The cell that a place lies in.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -80,9 +80,9 @@ pub async fn point_series(
     product: &ProductId,
     place: LonLatDeg,
 ) -> Result<PointAnswer, ComputeError> {
-    let manifest = catalog::product(engine.store(), product).await?;
+    let manifest = catalogue::product(engine.store(), product).await?;
     let Some((row, col)) = manifest.grid.cell_at(place) else {
-        let bounds = catalog::bounds_text(&manifest);
+        let bounds = catalogue::bounds_text(&manifest);
         return Err(ComputeError::PlaceOutside {
             product: product.clone(),
             place,

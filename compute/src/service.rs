@@ -5,13 +5,13 @@
 //! what is stored is named by its content, so that doing it twice changes nothing.
 
 mod background;
-mod courier;
 pub mod deriver;
 pub mod executor;
 mod executor_metrics;
 mod executor_settings;
 mod heartbeat;
 mod named_sums;
+mod retry_channel;
 mod room;
 pub mod scheduler;
 mod scheduler_metrics;

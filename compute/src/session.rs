@@ -93,24 +93,24 @@ impl Engine {
     /// A Ballista cluster, its queries cut into `partitions` parts. Its executors must read the same store by the same
     /// address.
     ///
-    /// A query whose scheduler or executors are lost is asked again, for at most [`cluster::PATIENCE`]: queries only read
+    /// A query whose scheduler or executors are lost is asked again, for at most [`cluster::RETRY_LIMIT`]: queries only read
     /// objects that never change, so that asking twice does no harm.
     pub fn cluster(store: Store, scheduler: SchedulerUrl, partitions: NonZeroUsize) -> Self {
         let cluster = Cluster {
             scheduler,
-            patience: cluster::PATIENCE,
+            retry_limit: cluster::RETRY_LIMIT,
         };
         Self::new(store, Kind::Cluster(cluster), partitions)
     }
 
     /// The same engine, waiting so long for a cluster that is away; other engines have nobody to wait for.
     #[must_use]
-    pub fn with_patience(&self, patience: Duration) -> Self {
+    pub fn with_retry_limit(&self, retry_limit: Duration) -> Self {
         let Kind::Cluster(cluster) = &self.inner.kind else {
             return self.clone();
         };
         let kind = Kind::Cluster(Cluster {
-            patience,
+            retry_limit,
             ..cluster.clone()
         });
         let inner = &self.inner;
@@ -220,7 +220,7 @@ impl Engine {
 
     /// Works on a question; `job` is the hash of all that its answer depends on.
     ///
-    /// On a cluster, `ask` is called again when it failed for a reason that passes, as long as there is patience.
+    /// On a cluster, `ask` is called again when it failed for a reason that passes, as long as there is retry limit.
     pub(crate) async fn answer<T, F, Fut>(&self, job: Digest, ask: F) -> Result<T, ComputeError>
     where
         F: Fn(QueryContext) -> Fut,
@@ -244,7 +244,7 @@ impl Engine {
                 }
             };
             match pauses.next() {
-                Some(pause) if begun.elapsed() + pause < cluster.patience => {
+                Some(pause) if begun.elapsed() + pause < cluster.retry_limit => {
                     tracing::warn!(job = name, %error, "the cluster lost a query; asking again");
                     tokio::time::sleep(pause).await;
                 }
@@ -386,7 +386,7 @@ mod tests {
     async fn a_cluster_that_stays_away_is_told_of_when_patience_ends() {
         let nowhere = "http://127.0.0.1:1".parse().unwrap();
         let engine = Engine::cluster(Store::memory(), nowhere, NonZeroUsize::MIN)
-            .with_patience(Duration::from_millis(500));
+            .with_retry_limit(Duration::from_millis(500));
         assert!(engine.ready().await.is_err());
         let tries = std::sync::atomic::AtomicU32::new(0);
         let ask = |context: QueryContext| {

@@ -7,10 +7,10 @@ use serde::{Deserialize, Serialize};
 use crate::ContractError;
 use crate::colour::{Palette, TransferFunction};
 use crate::manifest::{Bracket, Manifest};
-use crate::moment::Moment;
 use crate::product::ProductId;
 use crate::quantity::Quantity;
 use crate::time::{Period, TimeMs};
+use crate::time_sample::TimeSample;
 
 /// Farthest a clock may be from 1970, s: beyond every year that has four digits.
 const MOST_CLOCK_S: f64 = 1e12;
@@ -20,7 +20,7 @@ const MOST_CLOCK_S: f64 = 1e12;
 #[serde(deny_unknown_fields)]
 pub struct Flow {
     /// The northward part.
-    pub northward: Moment,
+    pub northward: TimeSample,
     /// How long particles have drifted, s: since 1970, so that between two instants they move as far as the water does.
     #[serde(with = "crate::exact")]
     pub clock_s: f64,

@@ -9,9 +9,9 @@ use crate::digest::Digest;
 use crate::flow::Flow;
 use crate::grid::Grid;
 use crate::key::ObjectKey;
-use crate::moment::Moment;
 use crate::sun::Sun;
 use crate::tile::Tile;
+use crate::time_sample::TimeSample;
 
 /// Raised whenever the renderer draws the same job differently or writes the same picture in other bytes, so that old
 /// pictures are not taken for new ones: a name has one content for ever. `make bless` asks for it.
@@ -132,8 +132,9 @@ pub struct Style {
     pub globe_surface: bool,
     /// Draw cells whose gap was filled differently, by their estimated error, and sums of accumulated carbon that lack
     /// data of some of their time, by its share: hatched on maps, paler as particles.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub doubt: bool,
+    // Spelt as in the names of pictures that are stored.
+    #[serde(rename = "doubt", default, skip_serializing_if = "std::ops::Not::not")]
+    pub uncertainty: bool,
     /// Coast lines and the sea.
     #[serde(default, skip_serializing_if = "Context::is_empty")]
     pub context: Context,
@@ -150,10 +151,10 @@ pub struct RenderJob {
     #[serde(with = "crate::exact::grid")]
     pub grid: Grid,
     /// The product drawn.
-    pub value: Moment,
+    pub value: TimeSample,
     /// Accumulated carbon that lifts and sinks the particles; without it they lie in a thin sheet.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub accumulated: Option<Moment>,
+    pub accumulated: Option<TimeSample>,
     /// Relief of land and sea floor below the particles: on globe views with a surface, and on map tiles.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub relief: Option<Relief>,
@@ -183,7 +184,7 @@ impl Style {
                 subsolar: None,
             },
             globe_surface: false,
-            doubt: false,
+            uncertainty: false,
             context: Context::default(),
         }
     }
@@ -278,7 +279,9 @@ impl RenderJob {
         }
         self.grid.validate()?;
         self.value.validate()?;
-        self.accumulated.as_ref().map_or(Ok(()), Moment::validate)?;
+        self.accumulated
+            .as_ref()
+            .map_or(Ok(()), TimeSample::validate)?;
         self.relief.as_ref().map_or(Ok(()), Relief::validate)?;
         self.validate_flow()?;
         self.style.validate()?;
@@ -316,12 +319,12 @@ impl RenderJob {
 mod tests {
     use super::*;
     use crate::colour::{Palette, Share, Stops};
-    use crate::moment::{After, Counts};
     use crate::quantity::Quantity;
     use crate::sun::Subsolar;
+    use crate::time_sample::{After, Counts};
 
-    fn moment() -> Moment {
-        Moment {
+    fn sample() -> TimeSample {
+        TimeSample {
             domain: "domain/p/d".parse().unwrap(),
             before: Some("frames/p/a".parse().unwrap()),
             after: Some(after("frames/p/b", 0.25)),
@@ -351,7 +354,7 @@ mod tests {
                 dlat_deg: 90.0,
                 dlon_deg: 90.0,
             },
-            value: moment(),
+            value: sample(),
             accumulated: None,
             relief: None,
             flow: None,
@@ -419,7 +422,7 @@ mod tests {
         changed(|j| j.value.after = Some(after("frames/p/b", 0.5)));
         changed(|j| j.value.contributed = Some(counts("contributed/p/a")));
         changed(|j| j.value.contributed = Some(counts("contributed/p/b")));
-        changed(|j| j.accumulated = Some(moment()));
+        changed(|j| j.accumulated = Some(sample()));
         changed(|j| j.mode = Mode::Map);
         changed(|j| {
             j.view = View::Tile {
@@ -429,7 +432,7 @@ mod tests {
         });
         changed(|j| j.style.slices = 32);
         changed(|j| j.style.sun.azimuth_deg = 0.0);
-        changed(|j| j.style.doubt = true);
+        changed(|j| j.style.uncertainty = true);
         changed(|j| j.style.transfer.palette = Palette::Ice);
         changed(|j| j.style.transfer.reversed = true);
         changed(|j| j.style.transfer.high *= 2.0);
@@ -498,9 +501,9 @@ mod tests {
             |j| j.relief = Some(relief(-1.0)),
             |j| j.value.before = Some("raw/p/a".parse().unwrap()),
             |j| {
-                j.accumulated = Some(Moment {
+                j.accumulated = Some(TimeSample {
                     after: Some(after("frames/p/b", 2.0)),
-                    ..moment()
+                    ..sample()
                 });
             },
             |j| j.style.slices = 1_000_000_000,

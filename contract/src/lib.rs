@@ -19,7 +19,6 @@ pub mod key;
 pub mod kind;
 pub mod manifest;
 pub mod masked;
-pub mod moment;
 pub mod notice;
 pub mod observation;
 pub mod picture;
@@ -29,6 +28,7 @@ pub mod region;
 pub mod sun;
 pub mod tile;
 pub mod time;
+pub mod time_sample;
 pub mod topic;
 
 pub use error::ContractError;

@@ -20,7 +20,7 @@ pub struct PictureOptions {
     /// Colours, opacity and size.
     pub transfer: TransferOptions,
     /// Draw cells whose gap was filled, and sums that are not complete, differently.
-    pub doubt: bool,
+    pub uncertainty: bool,
     /// Half-angle slices.
     pub slices: Option<u32>,
     /// Particles of every cell with data.
@@ -106,7 +106,7 @@ impl PictureOptions {
                 .sun
                 .map_or(usual.sun, |choice| choice.instead_of(usual.sun, time)),
             globe_surface: self.globe_surface,
-            doubt: self.doubt,
+            uncertainty: self.uncertainty,
             context: Context {
                 sea_opacity: self.sea_opacity.unwrap_or(sea_opacity),
                 coastlines: self.coastlines.unwrap_or(coastlines),
@@ -176,28 +176,28 @@ impl RenderJob {
         view: View,
         style: Style,
     ) -> Result<Self, ContractError> {
-        let moment = |manifest: &Manifest, with_counts: bool| {
+        let sample = |manifest: &Manifest, with_counts: bool| {
             let name = || manifest.product.to_string();
             let empty = || ContractError::invalid("product", &name(), "it has no steps");
             if manifest.grid != product.grid {
                 let reason = format!("it does not lie on the grid of {}", product.product);
                 return Err(ContractError::invalid("product", &name(), reason));
             }
-            let moment = if with_counts {
-                manifest.moment_with_counts(time)
+            let sample = if with_counts {
+                manifest.time_sample_with_counts(time)
             } else {
-                manifest.moment(time)
+                manifest.time_sample(time)
             };
-            moment.ok_or_else(empty)
+            sample.ok_or_else(empty)
         };
         let accumulated = accumulated.filter(|_| mode != Mode::Map);
         let job = Self {
             renderer_version: RENDERER_VERSION,
             grid: product.grid,
-            // Colours are doubted, heights are not.
-            value: moment(product, style.doubt)?,
+            // Colours are uncertain, heights are not.
+            value: sample(product, style.uncertainty)?,
             accumulated: accumulated
-                .map(|accumulated| moment(accumulated, false))
+                .map(|accumulated| sample(accumulated, false))
                 .transpose()?,
             relief: None,
             flow: None,
@@ -247,11 +247,11 @@ impl RenderJob {
         let job = Self {
             renderer_version: RENDERER_VERSION,
             grid: eastward.grid,
-            value: eastward.moment(time).ok_or_else(empty)?,
+            value: eastward.time_sample(time).ok_or_else(empty)?,
             accumulated: None,
             relief: None,
             flow: Some(Flow {
-                northward: northward.moment(time).ok_or_else(empty)?,
+                northward: northward.time_sample(time).ok_or_else(empty)?,
                 clock_s: time.ms() as f64 / 1000.0,
             }),
             mode: Mode::Flow,
@@ -305,7 +305,7 @@ mod tests {
         let usual = style(PictureOptions::default());
         let changes: [fn(&mut PictureOptions); 9] = [
             |o| o.transfer.reversed = true,
-            |o| o.doubt = true,
+            |o| o.uncertainty = true,
             |o| o.slices = Some(7),
             |o| o.particles_per_cell = Some(3),
             |o| o.height_m_per_kg_m2 = Some(1.0),

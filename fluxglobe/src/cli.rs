@@ -399,7 +399,10 @@ pub(crate) struct Picture {
     pub(crate) look: Look,
     /// Draw cells whose gap was filled differently, by their estimated error: hatched on maps, paler as particles.
     #[arg(long, help_heading = look::HEADING)]
-    pub(crate) doubt: bool,
+    pub(crate) uncertainty: bool,
+    /// What it was called before.
+    #[arg(long = "doubt", hide = true, num_args = 0, default_missing_value = "", value_parser = look::old_word)]
+    pub(crate) _doubt: Option<bool>,
 }
 
 /// `fluxglobe render tile`.

@@ -41,7 +41,7 @@ pub(crate) fn interactive_store(settings: &Settings) -> Result<Store> {
 /// Opens a store for those whom people wait for.
 pub(crate) fn open_interactive(url: &str) -> Result<Store, storage::StorageError> {
     let mut settings = storage::store::Settings::from_environment();
-    settings.patience = storage::store::Patience::interactive();
+    settings.retry_limits = storage::store::RetryLimits::interactive();
     Store::open_with(url, &settings)
 }
 

@@ -63,7 +63,7 @@ pub(crate) fn options(picture: &Picture, globe_surface: bool) -> PictureOptions 
     let surroundings = &picture.surroundings;
     PictureOptions {
         transfer: picture.look.options(),
-        doubt: picture.doubt,
+        uncertainty: picture.uncertainty,
         slices: picture.slices,
         particles_per_cell: picture.particles,
         height_m_per_kg_m2: surroundings.height_exaggeration,

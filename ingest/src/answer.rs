@@ -14,7 +14,7 @@ use storage::log::Message;
 use crate::commit::{self, Committed};
 use crate::error::{Cause, IngestError};
 use crate::landing_note;
-use crate::notice::Notice;
+use crate::notice::PendingNotice;
 use crate::outcome::Outcome;
 use crate::pipeline::Prepared;
 use crate::put::StoredGranule;
@@ -34,7 +34,7 @@ pub(crate) struct Answer {
 /// A notice and the message it came with; none for files that no notice came for.
 #[derive(Debug, Clone)]
 pub(crate) struct Asked {
-    pub(crate) notice: Notice,
+    pub(crate) notice: PendingNotice,
     pub(crate) origin: Option<Origin>,
     /// Number of the file among those of the message.
     pub(crate) file: u32,
@@ -51,7 +51,7 @@ pub(crate) enum Ready {
 impl Asked {
     /// The files of a message.
     pub(crate) fn of(message: &Message, settings: &Settings, now: TimeMs) -> Vec<Self> {
-        let notices = Notice::of(message, settings, now);
+        let notices = PendingNotice::of(message, settings, now);
         let asked = |(file, notice)| Self {
             notice,
             origin: Some(message.origin),
@@ -102,7 +102,7 @@ impl Asked {
     }
 
     fn answer(&self, outcome: Outcome, raw_sha256: Option<Digest>, is_due: bool) -> Answer {
-        let Notice { attempt, cause, .. } = &self.notice;
+        let PendingNotice { attempt, cause, .. } = &self.notice;
         let body = outcome.event(raw_sha256, *attempt, self.origin);
         let event = body.filter(|_| is_due).map(|body| cause.followed_by(body));
         Answer { outcome, event }

@@ -1,4 +1,4 @@
-//! Notice in, [`RawGranule`] out: a file that can be read here, and its digest.
+//! A notice in, [`RawGranule`] out: a file that can be read here, and its digest.
 //!
 //! A file on the command line is read where it is. The service reads only what its settings allow ([`Sources`]): files in
 //! allowed folders, public addresses, allowed stores; what comes over the network goes to the [`spool`] first.
@@ -12,8 +12,8 @@ mod local;
 mod location;
 mod object;
 mod pace;
-mod patience;
 mod raw;
+mod retry;
 mod spool;
 mod stored;
 mod turns;
@@ -23,8 +23,8 @@ pub(crate) use guard::Allowed;
 pub use guard::Sources;
 pub use http::AllowedHost;
 pub(crate) use location::Location;
-pub use patience::Patience;
 pub(crate) use raw::RawGranule;
+pub use retry::RetryLimits;
 pub(crate) use stored::RawFiles;
 
 use crate::error::Stop;

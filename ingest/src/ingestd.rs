@@ -5,9 +5,9 @@
 //! is untold is told ([`crate::landing_note`]). Whatever fails around the service is waited for; no notice is refused
 //! because a store, the log or a disk was away.
 
-mod bench;
 mod health;
-mod insist;
+mod publish_queue;
+mod retry;
 mod settings;
 mod shift;
 mod work;

@@ -17,7 +17,7 @@ use crate::fetch::{Expected, Location};
 use crate::gates::Gates;
 use crate::memory;
 use crate::metrics::Metrics;
-use crate::notice::{Notice, Order, notice_body};
+use crate::notice::{Order, PendingNotice, notice_body};
 use crate::outcome::Outcome;
 use crate::pipeline::{Pipeline, Prepared};
 use crate::profile::Profile;
@@ -81,7 +81,7 @@ pub(crate) fn asked_for(batch: &Batch<'_>) -> Vec<Asked> {
 fn asked(path: &std::path::Path, batch: &Batch<'_>) -> Asked {
     let shown = path.display().to_string();
     let body = notice_body(&shown, None, None, 1);
-    let notice = Notice {
+    let notice = PendingNotice {
         order_key: body.order_key(),
         order: Ok(Order {
             location: Location::File(path.to_owned()),

@@ -1,4 +1,4 @@
-//! Notice of a file in, landed product out: fetch, inspect, plan, decode, check, encode, put, commit.
+//! A notice of a file in, landed product out: fetch, inspect, plan, decode, check, encode, put, commit.
 //!
 //! ```text
 //! notice -> RawGranule -> InspectedGranule -> PlannedGranule -> DecodedGrid -> CheckedGrid -> EncodedGrid -> StoredGrid -> manifest
@@ -47,7 +47,7 @@ mod survey;
 mod unit;
 
 pub use error::IngestError;
-pub use fetch::{AllowedHost, Patience, Sources};
+pub use fetch::{AllowedHost, RetryLimits, Sources};
 pub use gc::{LandingNotes, Readings};
 pub use generate::{GeneratedSteps, generate_china_sea};
 pub use ingestd::{IngestService, ServiceSettings};

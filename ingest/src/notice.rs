@@ -1,4 +1,4 @@
-//! Message in, [`Notice`]s out: which files there are to land, in our own words or in those of other systems.
+//! Message in, [`PendingNotice`]s out: which files there are to land, in our own words or in those of other systems.
 
 mod cnm;
 
@@ -18,7 +18,7 @@ use crate::settings::Settings;
 
 /// A file that there is to land.
 #[derive(Debug, Clone)]
-pub(crate) struct Notice {
+pub(crate) struct PendingNotice {
     /// Where it is, as it is shown and told.
     pub(crate) shown: String,
     /// What is to be done, or why it cannot be.
@@ -52,7 +52,7 @@ impl Order {
     }
 }
 
-impl Notice {
+impl PendingNotice {
     /// The notices of a message: at least one, so that every message is answered.
     pub(crate) fn of(message: &Message, settings: &Settings, now: TimeMs) -> Vec<Self> {
         let came = message.time.unwrap_or(now);
@@ -150,7 +150,11 @@ pub(crate) fn notice_body(
     }
 }
 
-fn read(message: &Message, settings: &Settings, now: TimeMs) -> Result<Vec<Notice>, Rejection> {
+fn read(
+    message: &Message,
+    settings: &Settings,
+    now: TimeMs,
+) -> Result<Vec<PendingNotice>, Rejection> {
     if message.content.len() > MAX_EVENT_BYTES {
         return Err(bad(&format!("is longer than {MAX_EVENT_BYTES} bytes")));
     }
@@ -161,7 +165,7 @@ fn read(message: &Message, settings: &Settings, now: TimeMs) -> Result<Vec<Notic
     let event = message.event().map_err(|error| match error {
         ContractError::Invalid { reason, .. } => bad(&reason),
     })?;
-    Ok(vec![Notice::of_event(event, settings, now)?])
+    Ok(vec![PendingNotice::of_event(event, settings, now)?])
 }
 
 /// A profile by its name; a file of one only where the user names it, and not whoever sends a message.

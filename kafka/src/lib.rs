@@ -10,10 +10,10 @@
 mod append;
 mod blocking;
 mod cluster;
+mod consumer_queue;
 mod context;
 mod error;
 mod follower;
-mod inbox;
 mod lag;
 mod log;
 mod look_up;

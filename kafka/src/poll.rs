@@ -16,7 +16,7 @@ use storage::log::Message;
 use tokio::sync::oneshot;
 use tokio::task::JoinHandle;
 
-use crate::inbox::{Inbox, Member};
+use crate::consumer_queue::{ConsumerQueue, Member};
 use crate::off_thread::OffThread;
 
 /// A reader that takes nothing out for so long pauses the fetching. Shares and troubles wait for it.
@@ -29,11 +29,14 @@ pub(crate) struct Polling {
 }
 
 impl Polling {
-    pub(crate) fn start(consumer: OffThread<StreamConsumer<Member>>, inbox: Arc<Inbox>) -> Self {
+    pub(crate) fn start(
+        consumer: OffThread<StreamConsumer<Member>>,
+        queue: Arc<ConsumerQueue>,
+    ) -> Self {
         let (stop, stopped) = oneshot::channel();
         let task = tokio::spawn(async move {
-            if let Err(error) = poll(&consumer, &inbox, stopped).await {
-                inbox.fail(error);
+            if let Err(error) = poll(&consumer, &queue, stopped).await {
+                queue.fail(error);
             }
         });
         Self {
@@ -53,7 +56,7 @@ impl Polling {
 
 async fn poll(
     consumer: &StreamConsumer<Member>,
-    inbox: &Inbox,
+    queue: &ConsumerQueue,
     mut stopped: oneshot::Receiver<()>,
 ) -> KafkaResult<()> {
     let mut received = consumer.stream();
@@ -62,8 +65,8 @@ async fn poll(
         tokio::select! {
             biased;
             _ended = &mut stopped => return Ok(()),
-            () = inbox.room.notified(), if is_paused => {
-                if inbox.has_room() {
+            () = queue.room.notified(), if is_paused => {
+                if queue.has_room() {
                     consumer.resume(&consumer.assignment()?)?;
                     is_paused = false;
                 }
@@ -71,11 +74,11 @@ async fn poll(
             next = received.next() => match next.expect("a stream of messages has no end") {
                 Ok(message) => {
                     // Partitions given while paused are not paused yet: their first message pauses them.
-                    let is_full = inbox.put(of_topic(inbox.topic(), &message));
+                    let is_full = queue.put(of_topic(queue.topic(), &message));
                     if is_full {
                         let has_room = tokio::select! {
                             _ended = &mut stopped => return Ok(()),
-                            has_room = gets_room_soon(inbox) => has_room,
+                            has_room = gets_room_soon(queue) => has_room,
                         };
                         if !has_room {
                             consumer.pause(&consumer.assignment()?)?;
@@ -85,7 +88,7 @@ async fn poll(
                 }
                 Err(error @ KafkaError::MessageConsumptionFatal(_)) => return Err(error),
                 // The client mends these by itself, or cannot; the reader asks when it gets nothing.
-                Err(error) => tracing::debug!(%error, topic = %inbox.topic(), "fetching is disturbed"),
+                Err(error) => tracing::debug!(%error, topic = %queue.topic(), "fetching is disturbed"),
             },
         }
         // Messages that are there already must not keep others from running.
@@ -95,10 +98,10 @@ async fn poll(
 
 /// Does the reader take something out before it pays to pause? After a pause the client needs up to a second to fetch again,
 /// so that a quick reader would wait for it time and again.
-async fn gets_room_soon(inbox: &Inbox) -> bool {
+async fn gets_room_soon(queue: &ConsumerQueue) -> bool {
     let room = async {
-        while inbox.is_full() {
-            inbox.room.notified().await;
+        while queue.is_full() {
+            queue.room.notified().await;
         }
     };
     tokio::time::timeout(PAUSE_AFTER, room).await.is_ok()

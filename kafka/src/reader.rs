@@ -16,8 +16,8 @@ use crate::KafkaFailure;
 use crate::append::record;
 use crate::blocking::blocking;
 use crate::cluster::Cluster;
+use crate::consumer_queue::{ConsumerQueue, Member, Step};
 use crate::context::Context;
-use crate::inbox::{Inbox, Member, Step};
 use crate::off_thread::OffThread;
 use crate::poll::Polling;
 use crate::probe::are_brokers_there;
@@ -37,7 +37,7 @@ pub(crate) struct KafkaReader {
     topic: Topic,
     consumer: OffThread<StreamConsumer<Member>>,
     context: Context,
-    inbox: Arc<Inbox>,
+    queue: Arc<ConsumerQueue>,
     polling: Polling,
     transactions: Transactions,
     /// Keeps the name of the transactions from the next reader of this process.
@@ -60,10 +60,10 @@ impl KafkaReader {
         let part = format!("{group}.{}", slot.number());
         let transactions = Transactions::open(cluster, &part).await?;
         let context = Context::default();
-        let inbox = Arc::new(Inbox::new(topic));
+        let queue = Arc::new(ConsumerQueue::new(topic));
         let member = Member {
             context: context.clone(),
-            inbox: Arc::clone(&inbox),
+            queue: Arc::clone(&queue),
         };
         let consumer: StreamConsumer<Member> = cluster
             .member(&group)
@@ -73,13 +73,13 @@ impl KafkaReader {
         consumer
             .subscribe(&[&cluster.topic(topic)])
             .map_err(|e| context.failure(STEP, e))?;
-        let polling = Polling::start(consumer.clone(), Arc::clone(&inbox));
+        let polling = Polling::start(consumer.clone(), Arc::clone(&queue));
         Ok(Self {
             cluster: cluster.clone(),
             topic,
             consumer,
             context,
-            inbox,
+            queue,
             polling,
             transactions,
             _slot: slot,
@@ -117,7 +117,7 @@ impl KafkaReader {
                 Ok((consumer.group_metadata(), consumer.assignment_lost()))
             })
             .await?;
-            steps.retain(|step| self.inbox.is_still_owned(step));
+            steps.retain(|step| self.queue.is_still_owned(step));
             if steps.is_empty() {
                 return Ok(());
             }
@@ -176,12 +176,12 @@ impl Reader for KafkaReader {
         }
         let until = Instant::now() + wait;
         loop {
-            let inbox = Arc::clone(&self.inbox);
-            let news = inbox.news.notified();
+            let queue = Arc::clone(&self.queue);
+            let news = queue.news.notified();
             tokio::pin!(news);
             // Registered before looking, so that nothing that comes in between is slept through.
             news.as_mut().enable();
-            match self.inbox.hand_out(max) {
+            match self.queue.hand_out(max) {
                 Ok(messages) if messages.is_empty() => {}
                 Ok(messages) => return Ok(messages),
                 Err(error) => {
@@ -205,7 +205,7 @@ impl Reader for KafkaReader {
         for event in done.iter().flat_map(|finished| &finished.follows) {
             record(&self.cluster, event)?;
         }
-        let steps = self.inbox.finish(done);
+        let steps = self.queue.finish(done);
         if steps.is_empty() {
             return Ok(());
         }
@@ -221,7 +221,7 @@ impl Reader for KafkaReader {
     }
 
     fn lost(&mut self) -> Vec<Origin> {
-        self.inbox.lost()
+        self.queue.lost()
     }
 
     async fn leave(self: Box<Self>) -> Result<(), StorageError> {

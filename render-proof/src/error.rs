@@ -10,7 +10,7 @@ pub enum ProofError {
     Render(#[from] RenderError),
     /// Only volumes without a globe behind them are drawn another way.
     #[error(
-        "the reference draws volumes alone: no globe behind them, no surroundings, no doubt, no sun of an instant"
+        "the reference draws volumes alone: no globe behind them, no surroundings, no uncertainty, no sun of an instant"
     )]
     NoReference,
 }

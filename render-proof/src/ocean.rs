@@ -6,8 +6,8 @@ use std::sync::Arc;
 use contract::colour::TransferFunction;
 use contract::grid::Grid;
 use contract::job::{Mode, RENDERER_VERSION, RenderJob, Style, View};
-use contract::moment::Moment;
 use contract::quantity::Quantity;
+use contract::time_sample::TimeSample;
 use render::scene::{Frame, Interval, Scene};
 
 /// The grid of the 1-degree climatology.
@@ -109,7 +109,7 @@ pub fn scene(grid: Grid) -> Scene {
 /// Never: its fixed words are valid.
 pub fn job(view: View) -> RenderJob {
     let key = |text: &str| text.parse().expect("the name is constant");
-    let moment = |domain: &str, frame: &str| Moment {
+    let sample = |domain: &str, frame: &str| TimeSample {
         domain: key(domain),
         before: Some(key(frame)),
         after: None,
@@ -118,8 +118,8 @@ pub fn job(view: View) -> RenderJob {
     RenderJob {
         renderer_version: RENDERER_VERSION,
         grid: ONE_DEGREE,
-        value: moment("domain/made-up/0", "frames/made-up/0"),
-        accumulated: Some(moment("domain/made-up-carbon/0", "frames/made-up-carbon/0")),
+        value: sample("domain/made-up/0", "frames/made-up/0"),
+        accumulated: Some(sample("domain/made-up-carbon/0", "frames/made-up-carbon/0")),
         relief: None,
         flow: None,
         mode: Mode::Volume,

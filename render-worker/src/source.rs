@@ -8,7 +8,7 @@ use contract::context::Relief;
 use contract::grid::Grid;
 use contract::job::RenderJob;
 use contract::key::ObjectKey;
-use contract::moment::{After, Moment};
+use contract::time_sample::{After, TimeSample};
 use quick_cache::sync::{Cache, DefaultLifecycle};
 use quick_cache::{DefaultHashBuilder, OptionsBuilder, Weighter};
 use render::scene::{Cells, Frame, Interval, Scene, Terrain};
@@ -224,30 +224,30 @@ impl Source {
         })
     }
 
-    /// The domain of a moment and the frames around it.
+    /// The domain of a sample and the frames around it.
     async fn interval(
         &self,
         grid: &Grid,
-        moment: &Moment,
+        sample: &TimeSample,
         wanted: Wanted,
     ) -> Result<(Arc<Cells<u32>>, Interval), DrawError> {
-        let domain = self.domain(grid, moment).await?;
-        let counts = moment.contributed.clone().unwrap_or_default();
+        let domain = self.domain(grid, sample).await?;
+        let counts = sample.contributed.clone().unwrap_or_default();
         let part = |frame: &ObjectKey, counts: &Option<ObjectKey>| {
-            (frame.clone(), moment.domain.clone(), counts.clone())
+            (frame.clone(), sample.domain.clone(), counts.clone())
         };
-        let before = match &moment.before {
+        let before = match &sample.before {
             Some(frame) => {
                 let key = part(frame, &counts.before);
                 self.frame(grid, &domain, key, wanted).await?
             }
             // All that is accumulated until the end of the first step is of that step.
             None => {
-                self.nothing(grid, &domain, part(&moment.domain, &counts.after))
+                self.nothing(grid, &domain, part(&sample.domain, &counts.after))
                     .await?
             }
         };
-        let (after, weight) = match &moment.after {
+        let (after, weight) = match &sample.after {
             Some(After { frame, weight }) => {
                 let key = part(frame, &counts.after);
                 (self.frame(grid, &domain, key, wanted).await?, *weight)
@@ -274,13 +274,13 @@ impl Source {
         }
         let zero = |cell: &u32| if *cell == 0 { f32::NAN } else { 0.0 };
         let frame = Frame::new(domain.content().iter().map(zero).collect());
-        let held = Held::new(self.doubted(frame, grid, &key).await?, Wanted::Now);
+        let held = Held::new(self.uncertain(frame, grid, &key).await?, Wanted::Now);
         self.frames.insert(key, held.clone());
         Ok(held.frame)
     }
 
     /// A frame with what its sums lack, if its key names counts.
-    async fn doubted(
+    async fn uncertain(
         &self,
         frame: Frame,
         grid: &Grid,
@@ -294,19 +294,19 @@ impl Source {
         Ok(frame.with_lacking(counts.lacking()))
     }
 
-    async fn domain(&self, grid: &Grid, moment: &Moment) -> Result<Arc<Cells<u32>>, DrawError> {
+    async fn domain(&self, grid: &Grid, sample: &TimeSample) -> Result<Arc<Cells<u32>>, DrawError> {
         let reading = async {
-            let read = storage::domain::read(&self.store, &moment.domain).await;
-            let flags = read.map_err(|e| failed("the domain", &moment.domain, e))?;
+            let read = storage::domain::read(&self.store, &sample.domain).await;
+            let flags = read.map_err(|e| failed("the domain", &sample.domain, e))?;
             Ok::<_, DrawError>(Scene::domain_of(flags))
         };
-        let kept = self.domains.get_or_insert_async(&moment.domain, reading);
+        let kept = self.domains.get_or_insert_async(&sample.domain, reading);
         let domain = kept.await?;
         // Before anything as large as the grid claims to be is laid out.
         if domain.content().len() == grid.cell_count() {
             return Ok(domain);
         }
-        Err(mismatch(&moment.domain))
+        Err(mismatch(&sample.domain))
     }
 
     async fn frame(
@@ -355,7 +355,7 @@ impl Source {
         let fill = move || fill(&renderer, &of_grid, values, &domain);
         let filled = tokio::task::spawn_blocking(fill).await;
         let filled = filled.map_err(DrawError::Thread)??;
-        self.doubted(filled, grid, key).await
+        self.uncertain(filled, grid, key).await
     }
 }
 

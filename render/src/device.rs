@@ -66,14 +66,16 @@ impl Device {
         scene: &Scene,
         light: Option<&wgpu::Buffer>,
     ) -> Result<Vec<u8>, RenderError> {
-        let mut buffers = self.scene_buffers(scene, &plan.held_cells(), plan.params.doubt == 1)?;
+        let mut buffers =
+            self.scene_buffers(scene, &plan.held_cells(), plan.params.uncertainty == 1)?;
         buffers.light = light.cloned();
         self.in_workspace(|workspace| self.stages.draw(&self.gpu, workspace, plan, part, &buffers))
     }
 
     /// Makes the light that all parts of a picture lie in.
     pub(crate) fn light(&self, plan: &Plan, scene: &Scene) -> Result<wgpu::Buffer, RenderError> {
-        let buffers = self.scene_buffers(scene, &plan.held_cells(), plan.params.doubt == 1)?;
+        let buffers =
+            self.scene_buffers(scene, &plan.held_cells(), plan.params.uncertainty == 1)?;
         self.in_workspace(|workspace| {
             self.stages
                 .shared_light(&self.gpu, workspace, plan, &buffers)
@@ -118,18 +120,21 @@ impl Device {
         &self,
         scene: &Scene,
         held: &Range<usize>,
-        has_doubt: bool,
+        has_uncertainty: bool,
     ) -> Result<SceneBuffers, RenderError> {
         let frame = |frame: &Frame| self.resident.buffer(&self.gpu, &frame.cells, held.clone());
         let pair = |interval: &Interval| -> Result<[wgpu::Buffer; 2], RenderError> {
             Ok([frame(&interval.before)?, frame(&interval.after)?])
         };
-        let doubt = |frame: &Frame| {
+        let uncertainty = |frame: &Frame| {
             self.resident
-                .buffer(&self.gpu, frame.doubts(), held.clone())
+                .buffer(&self.gpu, frame.uncertainties(), held.clone())
         };
-        let doubts = || -> Result<[wgpu::Buffer; 2], RenderError> {
-            Ok([doubt(&scene.value.before)?, doubt(&scene.value.after)?])
+        let uncertainties = || -> Result<[wgpu::Buffer; 2], RenderError> {
+            Ok([
+                uncertainty(&scene.value.before)?,
+                uncertainty(&scene.value.after)?,
+            ])
         };
         Ok(SceneBuffers {
             value: pair(&scene.value)?,
@@ -138,7 +143,7 @@ impl Device {
             domain: self
                 .resident
                 .buffer(&self.gpu, &scene.domain, held.clone())?,
-            doubts: has_doubt.then(doubts).transpose()?,
+            uncertainties: has_uncertainty.then(uncertainties).transpose()?,
             terrain: scene
                 .terrain
                 .as_ref()

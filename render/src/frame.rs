@@ -31,8 +31,8 @@ pub struct SceneBuffers {
     pub accumulated: Option<[wgpu::Buffer; 2]>,
     pub northward: Option<[wgpu::Buffer; 2]>,
     pub domain: wgpu::Buffer,
-    /// Doubts of both frames of values; none where they are not drawn.
-    pub doubts: Option<[wgpu::Buffer; 2]>,
+    /// Uncertainties of both frames of values; none where they are not drawn.
+    pub uncertainties: Option<[wgpu::Buffer; 2]>,
     pub terrain: Option<wgpu::Buffer>,
     /// Light that is shared between pictures; none where a picture makes its own.
     pub light: Option<wgpu::Buffer>,
@@ -49,7 +49,7 @@ pub struct FrameContext<'a> {
     pub accumulated_frames: Option<[wgpu::Buffer; 2]>,
     pub northward_frames: Option<[wgpu::Buffer; 2]>,
     pub domain: wgpu::Buffer,
-    pub doubts: Option<[wgpu::Buffer; 2]>,
+    pub uncertainties: Option<[wgpu::Buffer; 2]>,
     pub terrain: Option<wgpu::Buffer>,
     /// Light that is shared between pictures; none where this frame makes its own.
     pub shared_light: Option<wgpu::Buffer>,
@@ -65,15 +65,15 @@ impl<'a> FrameContext<'a> {
         mut params: Params,
         scene: SceneBuffers,
     ) -> Result<Self, RenderError> {
-        // Steps without a filled gap have no doubts to read.
-        params.doubt &= u32::from(scene.doubts.is_some());
+        // Steps without a filled gap have no uncertainties to read.
+        params.uncertainty &= u32::from(scene.uncertainties.is_some());
         let params_buffer = workspace.upload(gpu, Slot::Params, &[params])?;
         let SceneBuffers {
             value,
             accumulated,
             northward,
             domain,
-            doubts,
+            uncertainties,
             terrain,
             light,
         } = scene;
@@ -87,7 +87,7 @@ impl<'a> FrameContext<'a> {
             accumulated_frames: accumulated,
             northward_frames: northward,
             domain,
-            doubts,
+            uncertainties,
             terrain,
             shared_light: light,
             workspace,

@@ -11,7 +11,9 @@ use crate::stages::compose::in_context::{self, Surroundings};
 use crate::stages::flow::cpu::Field;
 use crate::stages::layout::{Entry, LIGHT_OFF, Params, Particle, Splat};
 use crate::stages::particles::cpu::Inputs;
-use crate::stages::{bin, compose, doubt, eye, flow, interpolate, light, map, particles, project};
+use crate::stages::{
+    bin, compose, eye, flow, interpolate, light, map, particles, project, uncertainty,
+};
 
 /// Most particles of one picture.
 const MOST_PARTICLES: usize = 1 << 24;
@@ -28,13 +30,13 @@ pub fn draw(plan: &Plan, part: Part, scene: &Scene) -> Result<Vec<u8>, RenderErr
     let pixels = params.width as usize * params.height as usize;
     let mut picture = vec![Vec4::ZERO; pixels];
     let value = interpolated(&params, params.value_weight, &scene.value);
-    let doubt = doubt::between(&params, &scene.value);
+    let uncertainty = uncertainty::between(&params, &scene.value);
     if plan.mode == Mode::Map {
         let inputs = map::cpu::Inputs {
             value: &value,
             palette: &plan.palette,
             axes: &plan.axes,
-            doubt: &doubt,
+            uncertainty: &uncertainty,
         };
         map::cpu::map(&params, &inputs, &mut picture);
     } else {
@@ -70,7 +72,7 @@ pub fn draw(plan: &Plan, part: Part, scene: &Scene) -> Result<Vec<u8>, RenderErr
                 value: &value,
                 accumulated: accumulated.as_deref().unwrap_or_default(),
                 palette: &plan.palette,
-                doubt: &doubt,
+                uncertainty: &uncertainty,
             };
             particles::cpu::generate(&params, &inputs, &mut particles);
         }

@@ -57,10 +57,13 @@ impl<'a> Playback<'a> {
                 gpu.storage("frame", interval.after.cells.content())?,
             ])
         };
-        let doubts = || -> Result<[wgpu::Buffer; 2], RenderError> {
+        let uncertainties = || -> Result<[wgpu::Buffer; 2], RenderError> {
             Ok([
-                gpu.storage("doubts", scene.value.before.doubts().content())?,
-                gpu.storage("doubts", scene.value.after.doubts().content())?,
+                gpu.storage(
+                    "uncertainties",
+                    scene.value.before.uncertainties().content(),
+                )?,
+                gpu.storage("uncertainties", scene.value.after.uncertainties().content())?,
             ])
         };
         Ok(SceneBuffers {
@@ -68,7 +71,11 @@ impl<'a> Playback<'a> {
             accumulated: scene.accumulated.as_ref().map(pair).transpose()?,
             northward: scene.northward.as_ref().map(pair).transpose()?,
             domain: gpu.storage("domain", scene.domain.content())?,
-            doubts: scene.value.has_doubt().then(doubts).transpose()?,
+            uncertainties: scene
+                .value
+                .has_uncertainty()
+                .then(uncertainties)
+                .transpose()?,
             terrain: scene
                 .terrain
                 .as_ref()

@@ -55,7 +55,7 @@ pub struct Frame {
     /// Estimated error (1σ) of every value in its unit: 0 where it was measured, above where a gap was filled; none if
     /// there was no gap. [`MISSING`] where there is no data.
     pub errors: Option<Cells<f32>>,
-    /// The largest of them, 0 without any: what a style scales its doubt by.
+    /// The largest of them, 0 without any: what a style scales its uncertainty by.
     pub largest_error: f32,
     /// Smallest and largest value, 0 and 0 without data.
     pub range: [f32; 2],
@@ -66,13 +66,13 @@ pub struct Frame {
     /// Share of the accumulated time that every sum lacks, 0 to 1; none where all sums are complete, where values are
     /// no sums, and where nobody asked.
     lacking: Option<Vec<f32>>,
-    /// Made when doubt is first drawn.
-    doubts: OnceLock<Cells<f32>>,
+    /// Made when uncertainty is first drawn.
+    uncertainties: OnceLock<Cells<f32>>,
 }
 
-/// Doubt of a filled cell with next to no estimated error, and of a sum that lacks next to nothing: it is seen that the
+/// Uncertainty of a filled cell with next to no estimated error, and of a sum that lacks next to nothing: it is seen that the
 /// one was not measured and the other is not complete.
-const LEAST_DOUBT: f32 = 0.4;
+const LEAST_UNCERTAINTY: f32 = 0.4;
 
 impl Frame {
     /// A frame from values with NaN (or anything not finite) where there is no data.
@@ -94,7 +94,7 @@ impl Frame {
             coarser_mean: OnceLock::new(),
             coarser_mass: OnceLock::new(),
             lacking: None,
-            doubts: OnceLock::new(),
+            uncertainties: OnceLock::new(),
         }
     }
 
@@ -126,31 +126,31 @@ impl Frame {
         self
     }
 
-    /// How much each cell is to be doubted: 0 where it was measured and complete, else rising to 1 with its estimated
+    /// How much each cell is to be uncertain: 0 where it was measured and complete, else rising to 1 with its estimated
     /// error or with what its sum lacks.
-    pub fn doubts(&self) -> &Cells<f32> {
+    pub fn uncertainties(&self) -> &Cells<f32> {
         // The root, because a few cells are far worse than most.
-        let doubt = |share: f32| LEAST_DOUBT + (1.0 - LEAST_DOUBT) * share.sqrt();
-        self.doubts.get_or_init(|| {
-            let mut doubts = vec![0.0_f32; self.cells.content.len()];
+        let uncertainty = |share: f32| LEAST_UNCERTAINTY + (1.0 - LEAST_UNCERTAINTY) * share.sqrt();
+        self.uncertainties.get_or_init(|| {
+            let mut uncertainties = vec![0.0_f32; self.cells.content.len()];
             let errors = self.errors.iter().flat_map(|errors| &errors.content);
-            for (own, error) in doubts.iter_mut().zip(errors) {
+            for (own, error) in uncertainties.iter_mut().zip(errors) {
                 if *error > 0.0 {
-                    *own = doubt(error / self.largest_error);
+                    *own = uncertainty(error / self.largest_error);
                 }
             }
             let lacking = self.lacking.iter().flatten();
-            for (own, lacking) in doubts.iter_mut().zip(lacking) {
+            for (own, lacking) in uncertainties.iter_mut().zip(lacking) {
                 if *lacking > 0.0 {
-                    *own = own.max(doubt(*lacking));
+                    *own = own.max(uncertainty(*lacking));
                 }
             }
-            Cells::new(doubts)
+            Cells::new(uncertainties)
         })
     }
 
-    /// Is there anything to doubt?
-    fn has_doubt(&self) -> bool {
+    /// Is there anything to uncertainty?
+    fn has_uncertainty(&self) -> bool {
         self.largest_error > 0.0 || self.lacking.is_some()
     }
 
@@ -182,7 +182,10 @@ impl Frame {
                 .as_ref()
                 .map_or(0, |errors| errors.content.len())
             + self.lacking.as_ref().map_or(0, Vec::len)
-            + self.doubts.get().map_or(0, |doubts| doubts.content.len());
+            + self
+                .uncertainties
+                .get()
+                .map_or(0, |uncertainties| uncertainties.content.len());
         (cells * size_of::<f32>()) as u64
     }
 }
@@ -200,10 +203,10 @@ pub struct Interval {
 
 impl Interval {
     /// Was any gap filled in either step, or is any sum not complete?
-    pub fn has_doubt(&self) -> bool {
+    pub fn has_uncertainty(&self) -> bool {
         [&self.before, &self.after]
             .iter()
-            .any(|frame| frame.has_doubt())
+            .any(|frame| frame.has_uncertainty())
     }
 
     /// Smallest and largest value that any instant between the two steps can have.

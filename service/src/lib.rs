@@ -7,18 +7,18 @@ mod board;
 mod error;
 mod logging;
 mod parts;
-mod patience;
 mod readiness;
 mod red;
+mod retry;
 mod stop;
 
 pub use board::Board;
 pub use error::ServiceError;
 pub use logging::{LogFormat, start_logging};
 pub use parts::{PartEnded, Parts};
-pub use patience::{pauses, until_there};
 pub use readiness::{Part, Readiness, Report};
 pub use red::{Outcome, Red, Running};
+pub use retry::{pauses, until_there};
 pub use stop::{Stop, when_asked_to_stop};
 
 /// Registry that a service's metrics go to.

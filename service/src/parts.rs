@@ -154,7 +154,7 @@ mod tests {
     }
 
     /// Ends when asked, after it saw whether the service still calls itself ready.
-    async fn patient(stop: Stop, board: Arc<Board>) -> Result<(), String> {
+    async fn waits_to_be_asked(stop: Stop, board: Arc<Board>) -> Result<(), String> {
         stop.said().await;
         let is_ready = is_ready(&board).await;
         assert!(!is_ready, "/readyz says yes over a dead part");
@@ -165,7 +165,10 @@ mod tests {
     async fn the_first_lasting_error_ends_all_and_says_why() {
         let (stop, board) = ready();
         let mut parts = Parts::new(&stop, &board);
-        parts.start("patient", patient(stop.clone(), Arc::clone(&board)));
+        parts.start(
+            "patient",
+            waits_to_be_asked(stop.clone(), Arc::clone(&board)),
+        );
         assert!(is_ready(&board).await);
         parts.start("ingest", async { Err::<(), _>("topic is gone") });
         let error = ended(parts).await.unwrap_err();
@@ -194,7 +197,10 @@ mod tests {
         let (stop, board) = ready();
         let mut parts = Parts::new(&stop, &board);
         parts.start("hasty", async { Ok::<_, String>(()) });
-        parts.start("patient", patient(stop.clone(), Arc::clone(&board)));
+        parts.start(
+            "patient",
+            waits_to_be_asked(stop.clone(), Arc::clone(&board)),
+        );
         assert_eq!(ended(parts).await.unwrap_err().part, "hasty");
     }
 

@@ -14,8 +14,8 @@ mod folder;
 mod hdfs;
 mod leftovers;
 mod location;
-mod patient;
 mod read;
+mod retry_store;
 mod settings;
 
 use std::fmt::{Debug, Formatter};
@@ -35,7 +35,7 @@ use self::location::Location;
 use crate::StorageError;
 
 pub use self::leftovers::Leftover;
-pub use self::settings::{Patience, Settings};
+pub use self::settings::{RetryLimits, Settings};
 
 /// Largest object: a frame of the largest grid is 1 GiB uncompressed.
 const MAX_OBJECT_BYTES: u64 = 2 << 30;
@@ -55,7 +55,7 @@ pub struct Store {
     /// Where keys begin, ending in `/`.
     url: String,
     place: Place,
-    patience: Patience,
+    retry_limits: RetryLimits,
     checked: Arc<Checked>,
 }
 
@@ -88,7 +88,7 @@ impl Store {
             location: location::shown(location),
             reason,
         };
-        let patience = settings.patience;
+        let retry_limits = settings.retry_limits;
         match location::parse(location).map_err(bad)? {
             Location::Memory => Ok(Self::memory()),
             Location::Folder(folder) => Self::folder(&folder).map_err(bad),
@@ -99,12 +99,12 @@ impl Store {
             } => {
                 let root = clouds::open(cloud, &name, settings).map_err(bad)?;
                 let root_url = format!("{}://{name}/", cloud.scheme());
-                Self::remote(root, &root_url, &prefix, Place::Cloud, patience).map_err(bad)
+                Self::remote(root, &root_url, &prefix, Place::Cloud, retry_limits).map_err(bad)
             }
             Location::Hdfs { node, prefix } => {
                 let root = hdfs::open(&node, settings).map_err(bad)?;
                 let root_url = format!("hdfs://{node}/");
-                Self::remote(root, &root_url, &prefix, Place::Hdfs, patience).map_err(bad)
+                Self::remote(root, &root_url, &prefix, Place::Hdfs, retry_limits).map_err(bad)
             }
         }
     }
@@ -118,7 +118,7 @@ impl Store {
             root_url: Url::parse("memory:///").expect("this text is a URL"),
             url: "memory:///".to_owned(),
             place: Place::Memory,
-            patience: Patience::default(),
+            retry_limits: RetryLimits::default(),
             checked: Arc::default(),
         }
     }
@@ -137,7 +137,7 @@ impl Store {
             root_url: Url::parse("file:///").expect("this text is a URL"),
             url: format!("file://{}/", text.trim_end_matches('/')),
             place: Place::Folder(root),
-            patience: Patience::default(),
+            retry_limits: RetryLimits::default(),
             checked: Arc::default(),
         })
     }
@@ -147,7 +147,7 @@ impl Store {
         root_url: &str,
         prefix: &Path,
         place: Place,
-        patience: Patience,
+        retry_limits: RetryLimits,
     ) -> Result<Self, String> {
         let slash = if prefix.as_ref().is_empty() { "" } else { "/" };
         Ok(Self {
@@ -156,7 +156,7 @@ impl Store {
             root_url: Url::parse(root_url).map_err(|e| e.to_string())?,
             url: format!("{root_url}{prefix}{slash}"),
             place,
-            patience,
+            retry_limits,
             checked: Arc::default(),
         })
     }

@@ -11,9 +11,9 @@ use crate::backend::{
 };
 use crate::catalogue::Layer;
 use crate::error::ServerError;
-use crate::flights::Flights;
 use crate::gate::Gate;
 use crate::metrics::Metrics;
+use crate::single_flight::SingleFlight;
 
 /// Budgets remembered; one of 16 years by month takes 8 KiB.
 const BUDGETS: usize = 1000;
@@ -26,9 +26,9 @@ pub struct Analyses {
     gate: Gate,
     metrics: Metrics,
     budgets: Cache<Digest, Arc<BudgetAnswer>>,
-    flights: Flights<Arc<BudgetAnswer>>,
+    flights: SingleFlight<Arc<BudgetAnswer>>,
     areas: Cache<Digest, Arc<AreaSeries>>,
-    area_flights: Flights<Arc<AreaSeries>>,
+    area_flights: SingleFlight<Arc<AreaSeries>>,
 }
 
 impl Analyses {
@@ -39,9 +39,9 @@ impl Analyses {
             gate,
             metrics,
             budgets: Cache::new(BUDGETS),
-            flights: Flights::default(),
+            flights: SingleFlight::default(),
             areas: Cache::new(AREAS),
-            area_flights: Flights::default(),
+            area_flights: SingleFlight::default(),
         }
     }
 

@@ -22,7 +22,7 @@ use snapshot::{FOLDER, Reader, Snapshot};
 pub use layer::{Accumulated, Layer, Northward};
 
 /// How long a store is waited for by those who can be served from what was known before.
-const PATIENCE: Duration = Duration::from_secs(2);
+const RETRY_LIMIT: Duration = Duration::from_secs(2);
 
 /// What the store says of its products.
 #[derive(Debug, Clone, Copy)]
@@ -182,8 +182,8 @@ impl Catalogue {
         if before.is_first() {
             return reading.answer.await;
         }
-        let patience = PATIENCE.saturating_sub(reading.begun.elapsed());
-        let read = tokio::time::timeout(patience, reading.answer).await;
+        let retry_limits = RETRY_LIMIT.saturating_sub(reading.begun.elapsed());
+        let read = tokio::time::timeout(retry_limits, reading.answer).await;
         Ok(match read {
             Ok(Ok(snapshot)) => snapshot,
             Ok(Err(_)) | Err(_) => before,

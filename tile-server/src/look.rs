@@ -32,6 +32,9 @@ pub(crate) struct LookQuery {
     reverse: Option<String>,
     /// Cells whose gap was filled are drawn differently.
     #[param(value_type = Option<bool>)]
+    uncertainty: Option<String>,
+    /// What it was called before; told apart from what nobody ever understood.
+    #[param(ignore)]
     doubt: Option<String>,
 }
 
@@ -39,12 +42,16 @@ pub(crate) struct LookQuery {
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Look {
     options: TransferOptions,
-    doubt: bool,
+    uncertainty: bool,
 }
 
 impl LookQuery {
     /// The texts as values.
     pub(crate) fn parse(&self) -> Result<Look, ServerError> {
+        if let Some(text) = &self.doubt {
+            let now = "it is written uncertainty=true now";
+            return Err(ServerError::invalid("doubt", text, now));
+        }
         Ok(Look {
             options: TransferOptions {
                 palette: parsed(self.palette.as_ref())?,
@@ -54,7 +61,7 @@ impl LookQuery {
                 size: parsed(self.particle_size.as_ref())?.unwrap_or_default(),
                 reversed: flag("reverse", self.reverse.as_deref())?,
             },
-            doubt: flag("doubt", self.doubt.as_deref())?,
+            uncertainty: flag("uncertainty", self.uncertainty.as_deref())?,
         })
     }
 }
@@ -84,7 +91,7 @@ impl Look {
     pub(crate) fn options(&self) -> PictureOptions {
         PictureOptions {
             transfer: self.options,
-            doubt: self.doubt,
+            uncertainty: self.uncertainty,
             ..PictureOptions::default()
         }
     }
@@ -103,7 +110,7 @@ impl Look {
             stops("opacity", options.opacity.to_string()),
             stops("particle_size", options.size.to_string()),
             flag("reverse", options.reversed),
-            flag("doubt", self.doubt),
+            flag("uncertainty", self.uncertainty),
         ]
         .into_iter()
         .flatten()
@@ -122,14 +129,14 @@ mod tests {
             stops: Some("-10:#0A0B0C,25:ffffff".to_owned()),
             opacity: Some("0:0.5".to_owned()),
             particle_size: Some("0:0.25,1:1".to_owned()),
-            doubt: Some("1".to_owned()),
+            uncertainty: Some("1".to_owned()),
             ..LookQuery::default()
         };
         let look = query.parse().unwrap();
         let parameters = look.parameters().join("&");
         assert_eq!(
             parameters,
-            "range=-10:25&stops=-10:0a0b0c,25:ffffff&opacity=0:0.5&particle_size=0:0.25,1:1&doubt=true"
+            "range=-10:25&stops=-10:0a0b0c,25:ffffff&opacity=0:0.5&particle_size=0:0.25,1:1&uncertainty=true"
         );
         let again = LookQuery {
             range: Some("-10:25".to_owned()),

@@ -14,9 +14,9 @@ use storage::{StorageError, Store};
 
 use crate::backend::{Draw, Keep, Turn};
 use crate::error::ServerError;
-use crate::flights::Flights;
 use crate::gate::{Gate, Pass};
 use crate::metrics::{Metrics, Source};
+use crate::single_flight::SingleFlight;
 
 /// What every PNG begins with (ISO/IEC 15948, 5.2).
 const PNG_SIGNATURE: [u8; 8] = [0x89, b'P', b'N', b'G', 0x0d, 0x0a, 0x1a, 0x0a];
@@ -41,7 +41,7 @@ impl Weighter<Digest, Bytes> for ByBytes {
 
 /// The pictures of one server.
 pub struct Pictures {
-    flights: Flights<Bytes>,
+    flights: SingleFlight<Bytes>,
     maker: Arc<Maker>,
 }
 
@@ -72,7 +72,7 @@ impl Pictures {
             ByBytes,
         );
         Self {
-            flights: Flights::default(),
+            flights: SingleFlight::default(),
             maker: Arc::new(Maker {
                 store,
                 drawer,

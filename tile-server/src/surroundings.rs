@@ -36,7 +36,7 @@ pub(crate) struct SurroundingsQuery {
 
 /// The same as values.
 #[derive(Debug, Default, PartialEq)]
-struct Asked {
+struct ParsedSurroundings {
     relief_exaggeration: Option<f64>,
     sea_opacity: Option<f64>,
     coastlines: Option<bool>,
@@ -61,7 +61,7 @@ impl SurroundingsQuery {
         ]
     }
 
-    fn asked(&self) -> Result<Asked, ServerError> {
+    fn parsed(&self) -> Result<ParsedSurroundings, ServerError> {
         let real = |name, text: &Option<String>, valid| {
             let text = text.as_deref();
             text.map(|text| number(name, text, valid)).transpose()
@@ -72,7 +72,7 @@ impl SurroundingsQuery {
             Some("false") => Some(false),
             Some(text) => return Err(ServerError::invalid("coastlines", text, "true or false")),
         };
-        Ok(Asked {
+        Ok(ParsedSurroundings {
             relief_exaggeration: real(
                 "relief_exaggeration",
                 &self.relief_exaggeration,
@@ -91,7 +91,7 @@ impl SurroundingsQuery {
 
     /// The options of a picture, with what is asked for here.
     pub(crate) fn around(&self, options: PictureOptions) -> Result<PictureOptions, ServerError> {
-        let asked = self.asked()?;
+        let asked = self.parsed()?;
         Ok(PictureOptions {
             sea_opacity: asked.sea_opacity,
             coastlines: asked.coastlines,
@@ -109,7 +109,7 @@ impl SurroundingsQuery {
         let Some(product) = &self.relief else {
             return Ok(None);
         };
-        let exaggeration = self.asked()?.relief_exaggeration;
+        let exaggeration = self.parsed()?.relief_exaggeration;
         let elevation = catalogue.layer(product).await?;
         let exaggeration = exaggeration.unwrap_or(RELIEF_EXAGGERATION);
         Ok(Some(Relief::of(&elevation.manifest, exaggeration)?))
@@ -117,7 +117,7 @@ impl SurroundingsQuery {
 
     /// The parameters as tiles take them, `name=value`, in one order and one spelling.
     pub(crate) fn of_tiles(&self) -> Result<Vec<String>, ServerError> {
-        let asked = self.asked()?;
+        let asked = self.parsed()?;
         let relief = self.relief.as_ref();
         // A name of letters, digits and hyphens, whatever else was written.
         let relief = relief
@@ -162,7 +162,7 @@ mod tests {
             (query(|q| &mut q.relief_exaggeration, ""), "0 to 1000"),
         ];
         for (query, valid) in refused {
-            let text = query.asked().unwrap_err().to_string();
+            let text = query.parsed().unwrap_err().to_string();
             assert!(text.contains(valid), "{text}");
         }
     }

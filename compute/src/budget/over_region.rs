@@ -10,7 +10,7 @@ use crate::region::address::{OnGrid, RegionAddress};
 use crate::region::extent::{Extent, extent, outline};
 use crate::region::shares::{self, Shares};
 use crate::region::weights::Surface;
-use crate::{ComputeError, Engine, catalog};
+use crate::{ComputeError, Engine, catalogue};
 
 /// Share of a region that a grid must lack before a reader is told.
 const OUTSIDE_SHARE: f64 = 1e-6;
@@ -57,7 +57,7 @@ pub(crate) async fn weights(
     let found = RegionAddress::of(engine, on_grid).await?;
     found.ok_or_else(|| ComputeError::RegionOutside {
         product: manifest.product.clone(),
-        bounds: catalog::bounds_text(manifest),
+        bounds: catalogue::bounds_text(manifest),
     })
 }
 

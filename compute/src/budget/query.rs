@@ -15,7 +15,7 @@ use super::gaps::BASIS;
 use super::over_region::{AskedArea, over_region};
 use super::rows::{Asked, BudgetRow, BudgetStep, row_periods, rows};
 use super::sums::Measure;
-use crate::{ComputeError, Engine, catalog};
+use crate::{ComputeError, Engine, catalogue};
 
 /// What a budget is asked for.
 #[derive(Debug, Clone, PartialEq)]
@@ -88,7 +88,7 @@ pub struct BudgetAnswer {
 
 /// Computes a budget.
 pub async fn budget(engine: &Engine, query: &BudgetQuery) -> Result<BudgetAnswer, ComputeError> {
-    let manifest = catalog::product(engine.store(), &query.product).await?;
+    let manifest = catalogue::product(engine.store(), &query.product).await?;
     budget_of(engine, query, &manifest).await
 }
 

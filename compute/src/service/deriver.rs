@@ -21,7 +21,7 @@ use storage::log::{EventLog, Finished, Message, Reader};
 
 use super::named_sums::NamedSums;
 use crate::derive::{chosen_start, derived};
-use crate::{ComputeError, Engine, ErrorClass, catalog, derive_accumulated};
+use crate::{ComputeError, Engine, ErrorClass, catalogue, derive_accumulated};
 
 /// Derivers of this group share the products among them.
 pub const GROUP: &str = "derive";
@@ -187,7 +187,7 @@ impl Deriver {
     }
 
     async fn derived_now(&self, product: &ProductId) -> Result<Option<Manifest>, ComputeError> {
-        let source = catalog::product(self.engine.store(), product).await?;
+        let source = catalogue::product(self.engine.store(), product).await?;
         if source.quantity != Quantity::CarbonFlux {
             return Ok(None);
         }

@@ -40,10 +40,10 @@ use tokio_stream::wrappers::TcpListenerStream;
 use tonic::transport::Channel;
 
 use super::background::Background;
-use super::courier::Courier;
 use super::executor_metrics::CountedEngine;
 use super::executor_settings::ExecutorSettings;
 use super::heartbeat;
+use super::retry_channel::RetryChannel;
 use super::scheduler::store_part;
 use super::work::WorkFolder;
 use crate::{ComputeError, Objects, state};
@@ -75,7 +75,7 @@ pub struct Executor {
     objects: Objects,
     store: Store,
     channel: Channel,
-    courier: Courier,
+    retry_channel: RetryChannel,
     red: Red,
     work_bytes: IntGauge,
 }
@@ -116,7 +116,7 @@ impl Executor {
         tracing::info!(%address, executor = id, tasks = settings.tasks(), "executor");
         Ok(Self {
             registration: registration(settings, &id, address),
-            courier: Courier::new(channel.clone(), &id),
+            retry_channel: RetryChannel::new(channel.clone(), &id),
             red: Red::register(registry, "executor")?,
             settings: settings.clone(),
             listener,
@@ -143,7 +143,7 @@ impl Executor {
     /// Whether it can do its work.
     pub fn readiness(&self) -> Arc<dyn Readiness> {
         Arc::new(ExecutorReadiness {
-            courier: self.courier.clone(),
+            retry_channel: self.retry_channel.clone(),
             store: self.store.clone(),
         })
     }
@@ -160,7 +160,7 @@ impl Executor {
         );
         let mut nudging = Background(tokio::spawn(nudging));
         let mut working = Background(tokio::spawn(poll_loop(
-            SchedulerGrpcClient::new(self.courier.clone())
+            SchedulerGrpcClient::new(self.retry_channel.clone())
                 .max_decoding_message_size(state::MESSAGE_BYTES)
                 .max_encoding_message_size(state::MESSAGE_BYTES),
             Arc::new(self.runner()?),
@@ -173,7 +173,7 @@ impl Executor {
         let heart = heartbeat::run(
             self.channel,
             self.registration.clone(),
-            self.courier.clone(),
+            self.retry_channel.clone(),
         );
         let mut heart = Background(tokio::spawn(heart));
         let janitor = Janitor {
@@ -183,7 +183,10 @@ impl Executor {
             hands: Arc::clone(&hands),
         };
         let mut janitor = Background(tokio::spawn(janitor.run()));
-        let _obituaries = Background(tokio::spawn(tell_gone(self.courier.clone(), self.gone)));
+        let _obituaries = Background(tokio::spawn(tell_gone(
+            self.retry_channel.clone(),
+            self.gone,
+        )));
         tokio::select! {
             () = stop.said() => {}
             ended = &mut serving.0 => return ended_early(ended),
@@ -194,9 +197,13 @@ impl Executor {
             ended = &mut janitor.0 => return ended_early(ended.map(Ok)),
         }
         let limit = Duration::from_secs(self.settings.executor_drain_s);
-        drain(&hands, self.settings.tasks(), &self.courier, limit).await;
+        drain(&hands, self.settings.tasks(), &self.retry_channel, limit).await;
         let id = &self.registration.id;
-        if let Err(error) = self.courier.tell_gone(id, "it was asked to stop").await {
+        if let Err(error) = self
+            .retry_channel
+            .tell_gone(id, "it was asked to stop")
+            .await
+        {
             tracing::warn!(%error, "left without a word; the scheduler notices by itself");
         }
         Ok(())
@@ -270,12 +277,12 @@ async fn keep_asking(hands: Arc<Semaphore>, tasks: usize, nudge: Arc<Notify>) {
 }
 
 /// Takes no more tasks and waits for those under way, and then for the report on the last of them.
-async fn drain(hands: &Semaphore, tasks: usize, courier: &Courier, limit: Duration) {
+async fn drain(hands: &Semaphore, tasks: usize, retry_channel: &RetryChannel, limit: Duration) {
     let is_idle = || hands.available_permits() == tasks;
     let was_idle = is_idle();
     if was_idle {
         // A task that ended just now is reported with the next request, which an idle executor makes at once.
-        reported(courier, IDLE_REPORT).await;
+        reported(retry_channel, IDLE_REPORT).await;
     }
     let is_still_idle = was_idle && is_idle();
     let Ok(Ok(_held)) = tokio::time::timeout(limit, hands.acquire_many(tasks as u32)).await else {
@@ -283,23 +290,23 @@ async fn drain(hands: &Semaphore, tasks: usize, courier: &Courier, limit: Durati
         return;
     };
     if !is_still_idle {
-        reported(courier, LAST_REPORT.min(limit)).await;
+        reported(retry_channel, LAST_REPORT.min(limit)).await;
     }
 }
 
 /// Waits for two requests to be answered: the one under way may have been made before the last task ended.
-async fn reported(courier: &Courier, limit: Duration) {
-    let (enough, begun) = (courier.answer_count() + 2, Instant::now());
-    while courier.answer_count() < enough && begun.elapsed() < limit {
+async fn reported(retry_channel: &RetryChannel, limit: Duration) {
+    let (enough, begun) = (retry_channel.answer_count() + 2, Instant::now());
+    while retry_channel.answer_count() < enough && begun.elapsed() < limit {
         tokio::time::sleep(Duration::from_millis(20)).await;
     }
 }
 
 /// Tells the scheduler of executors that died here and left their folders, so that it need not wait for them.
-async fn tell_gone(courier: Courier, gone: Vec<String>) {
+async fn tell_gone(retry_channel: RetryChannel, gone: Vec<String>) {
     for id in gone {
         let mut pauses = ::service::pauses();
-        while let Err(error) = courier.tell_gone(&id, "its process is gone").await {
+        while let Err(error) = retry_channel.tell_gone(&id, "its process is gone").await {
             tracing::debug!(executor = id, %error, "the scheduler cannot be told yet");
             tokio::time::sleep(pauses.next().unwrap_or(AWAY)).await;
         }
@@ -362,7 +369,7 @@ fn registration(
 }
 
 struct ExecutorReadiness {
-    courier: Courier,
+    retry_channel: RetryChannel,
     store: Store,
 }
 
@@ -370,7 +377,7 @@ struct ExecutorReadiness {
 impl Readiness for ExecutorReadiness {
     async fn parts(&self) -> Vec<Part> {
         let seen = async {
-            match self.courier.silence() {
+            match self.retry_channel.silence() {
                 Some(silence) if silence < AWAY => Ok("it answers".to_owned()),
                 Some(silence) => Err(format!("not seen for {} s", silence.as_secs())),
                 None => Err("never seen yet".to_owned()),

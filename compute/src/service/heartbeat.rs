@@ -11,20 +11,24 @@ use ballista_core::serde::protobuf::{
 };
 use tonic::transport::Channel;
 
-use super::courier::Courier;
+use super::retry_channel::RetryChannel;
 
 /// Between two signs of life.
 const INTERVAL: Duration = Duration::from_secs(1);
 
 /// Gives signs of life until it is dropped. The scheduler learns of the executor by its first request for work; signs
 /// before that, and after a restart of the scheduler, are refused and forgotten.
-pub(super) async fn run(channel: Channel, registration: ExecutorRegistration, courier: Courier) {
+pub(super) async fn run(
+    channel: Channel,
+    registration: ExecutorRegistration,
+    retry_channel: RetryChannel,
+) {
     let mut scheduler = SchedulerGrpcClient::new(channel);
     let mut ticks = tokio::time::interval(INTERVAL);
     ticks.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
     loop {
         ticks.tick().await;
-        if courier.answer_count() == 0 {
+        if retry_channel.answer_count() == 0 {
             continue;
         }
         let sign = scheduler.heart_beat_from_executor(HeartBeatParams {
@@ -36,7 +40,7 @@ pub(super) async fn run(channel: Channel, registration: ExecutorRegistration, co
             metadata: Some(registration.clone()),
         });
         match tokio::time::timeout(INTERVAL, sign).await {
-            Ok(Ok(_seen)) => courier.is_there(),
+            Ok(Ok(_seen)) => retry_channel.is_there(),
             Ok(Err(error)) => tracing::debug!(%error, "a sign of life was refused"),
             Err(_elapsed) => tracing::debug!("a sign of life was not answered"),
         }

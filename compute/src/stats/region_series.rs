@@ -14,7 +14,7 @@ use crate::budget::over_region::{AskedArea, over_region};
 use crate::budget::rows::{StepSum, coverage_percent};
 use crate::budget::steps_inside;
 use crate::budget::sums::Measure;
-use crate::{ComputeError, Engine, catalog};
+use crate::{ComputeError, Engine, catalogue};
 
 /// What a series over a region is asked for.
 #[derive(Debug, Clone, PartialEq)]
@@ -89,7 +89,7 @@ pub async fn region_series(
     engine: &Engine,
     query: &RegionSeriesQuery,
 ) -> Result<RegionSeries, ComputeError> {
-    let manifest = catalog::product(engine.store(), &query.product).await?;
+    let manifest = catalogue::product(engine.store(), &query.product).await?;
     region_series_of(engine, query, &manifest).await
 }
 

@@ -9,6 +9,11 @@ use contract::product::ProductId;
 /// Where help lists them: apart from what says which picture.
 pub(super) const HEADING: &str = "Look";
 
+/// Refuses `--doubt` with what to write.
+pub(super) fn old_word(_nothing: &str) -> Result<bool, String> {
+    Err("it is called --uncertainty now".to_owned())
+}
+
 /// What changes colours, opacity and size from the usual.
 #[derive(Debug, Args)]
 pub(crate) struct Look {
@@ -82,7 +87,7 @@ mod tests {
             "--opacity",
             "-40:1,0:0.1,40:1",
             "--particle-size=-40:1",
-            "--doubt",
+            "--uncertainty",
         ];
         let Command::Render(Render::Tile(tile)) = parsed(&words).unwrap().command else {
             panic!("it is a tile");
@@ -90,7 +95,7 @@ mod tests {
         let options = tile.picture.look.options();
         assert_eq!(options.opacity.as_slice().len(), 3);
         assert_eq!(options.range.unwrap().to_string(), "-40:40");
-        assert!(tile.picture.doubt && !options.is_default());
+        assert!(tile.picture.uncertainty && !options.is_default());
     }
 
     #[test]

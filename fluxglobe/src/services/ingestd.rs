@@ -9,7 +9,7 @@ use observations::ObservationService;
 use service::Red;
 
 use crate::cli::{Ingestd, Settings};
-use crate::services::Footing;
+use crate::services::ServiceContext;
 use crate::sink::Sink;
 
 pub(crate) async fn run(settings: &Settings, options: Ingestd) -> Result<()> {
@@ -18,16 +18,16 @@ pub(crate) async fn run(settings: &Settings, options: Ingestd) -> Result<()> {
     options.kafka.check()?;
     options.observations.database()?;
     let parts = ["store", "event log", "observations", "ingest"];
-    let footing = Footing::take(settings, "ingestd", Some(options.admin), &parts).await?;
-    let Some(store) = footing.store().await? else {
-        return footing.leave().await;
+    let context = ServiceContext::take(settings, "ingestd", Some(options.admin), &parts).await?;
+    let Some(store) = context.store().await? else {
+        return context.leave().await;
     };
-    let Some(log) = footing.log(&options.kafka).await? else {
-        return footing.leave().await;
+    let Some(log) = context.log(&options.kafka).await? else {
+        return context.leave().await;
     };
     let measured = observations::open(&options.observations, &store)?;
     let asked = Arc::clone(&measured);
-    footing.board.set("observations", move || {
+    context.board.set("observations", move || {
         let asked = Arc::clone(&asked);
         async move {
             asked
@@ -38,20 +38,20 @@ pub(crate) async fn run(settings: &Settings, options: Ingestd) -> Result<()> {
     });
     let drain = Duration::from_secs(options.ingest.drain_s);
     let granules = IngestService::new(store, Arc::clone(&log), ingest)
-        .with_metrics(Metrics::register(&footing.registry)?)
+        .with_metrics(Metrics::register(&context.registry)?)
         .with_observations(Arc::new(Sink(Arc::clone(&measured))))
         .with_bounds(usize::from(options.ingest.parallel_notices), drain);
     let asked = granules.clone();
-    footing.board.set("ingest", move || {
+    context.board.set("ingest", move || {
         let asked = asked.clone();
         async move { crate::services::worst(&asked).await }
     });
-    let red = Red::register(&footing.registry, "observations")?;
+    let red = Red::register(&context.registry, "observations")?;
     let observed = ObservationService::new(log, measured, red);
-    let mut parts = footing.parts();
-    let said = footing.stop.said();
+    let mut parts = context.parts();
+    let said = context.stop.said();
     parts.start("ingest", async move { granules.run(&Quiet, said).await });
-    let said = footing.stop.said();
+    let said = context.stop.said();
     parts.start("observations", async move { observed.run(said).await });
-    footing.run(parts).await
+    context.run(parts).await
 }

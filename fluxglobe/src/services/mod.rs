@@ -3,14 +3,14 @@
 //! Every service starts whatever else runs: it answers /healthz at once, says in /readyz what it still waits for, and
 //! goes on when that is there.
 
+mod context;
 pub(crate) mod executor;
-mod footing;
 pub(crate) mod ingestd;
 pub(crate) mod render_worker;
 pub(crate) mod scheduler;
 pub(crate) mod tile_server;
 
-pub(crate) use footing::Footing;
+pub(crate) use context::ServiceContext;
 
 use service::Readiness;
 

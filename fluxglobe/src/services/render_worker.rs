@@ -6,30 +6,31 @@ use render_worker::server::Server;
 
 use crate::cli::{RenderWorker, Settings};
 use crate::deployment;
-use crate::services::Footing;
+use crate::services::ServiceContext;
 
 pub(crate) async fn run(settings: &Settings, options: RenderWorker) -> Result<()> {
     // Settings and secrets are looked at before anything is waited for.
     options.kafka.check()?;
     let parts = ["store", "renderer", "event log"];
-    let footing = Footing::take(settings, "render-worker", Some(options.admin), &parts).await?;
-    if footing.store().await?.is_none() {
-        return footing.leave().await;
+    let context =
+        ServiceContext::take(settings, "render-worker", Some(options.admin), &parts).await?;
+    if context.store().await?.is_none() {
+        return context.leave().await;
     }
     // Whoever asks for a picture is told within seconds that the store is away; the batch tries again by itself.
-    let store = deployment::open_interactive(footing.store_url())?;
+    let store = deployment::open_interactive(context.store_url())?;
     let limits = options.render.limits();
-    let desk = deployment::desk(settings, store, limits, &footing.registry).await?;
+    let desk = deployment::desk(settings, store, limits, &context.registry).await?;
     let asked = desk.clone();
-    footing.board.set("renderer", move || {
+    context.board.set("renderer", move || {
         let asked = asked.clone();
         async move { asked.ready().await }
     });
     let server = Server::bind(desk.clone(), &options.render)?;
     tracing::info!(address = %server.address(), "render worker");
-    let mut parts = footing.parts();
-    parts.start("render worker", server.run(footing.stop.clone()));
-    let own = footing.clone();
+    let mut parts = context.parts();
+    parts.start("render worker", server.run(context.stop.clone()));
+    let own = context.clone();
     parts.start("render jobs", async move {
         if let Some(log) = own.log(&options.kafka).await? {
             let batch = BatchService::new(desk, log, options.render.drain());
@@ -37,5 +38,5 @@ pub(crate) async fn run(settings: &Settings, options: RenderWorker) -> Result<()
         }
         Ok::<_, anyhow::Error>(())
     });
-    footing.run(parts).await
+    context.run(parts).await
 }

@@ -7,28 +7,28 @@ use compute::service::{Deriver, Scheduler};
 use crate::cli;
 use crate::cli::Settings;
 use crate::deployment;
-use crate::services::Footing;
+use crate::services::ServiceContext;
 
 pub(crate) async fn run(settings: &Settings, options: cli::Scheduler) -> Result<()> {
     // Settings and secrets are looked at before anything is waited for.
     options.kafka.check()?;
     let parts = ["store", "event log", "scheduler"];
-    let footing = Footing::take(settings, "scheduler", Some(options.admin), &parts).await?;
-    let Some(store) = footing.store().await? else {
-        return footing.leave().await;
+    let context = ServiceContext::take(settings, "scheduler", Some(options.admin), &parts).await?;
+    let Some(store) = context.store().await? else {
+        return context.leave().await;
     };
-    let scheduler = Scheduler::start(&options.ballista, store.clone(), &footing.registry).await?;
+    let scheduler = Scheduler::start(&options.ballista, store.clone(), &context.registry).await?;
     let (readiness, address) = (scheduler.readiness(), scheduler.address());
-    footing.board.set("scheduler", move || {
+    context.board.set("scheduler", move || {
         let readiness = readiness.clone();
         async move { crate::services::worst(readiness.as_ref()).await }
     });
     let partitions = deployment::least_parts(settings);
     let engine = Engine::cluster(store, format!("http://{address}").parse()?, partitions);
-    let mut parts = footing.parts();
+    let mut parts = context.parts();
     // Executors and clients are served while the log is waited for.
-    parts.start("scheduler", scheduler.run(footing.stop.clone()));
-    let own = footing.clone();
+    parts.start("scheduler", scheduler.run(context.stop.clone()));
+    let own = context.clone();
     parts.start("deriver", async move {
         if let Some(log) = own.log(&options.kafka).await? {
             let deriver = Deriver::new(engine, log, &own.registry)?;
@@ -36,5 +36,5 @@ pub(crate) async fn run(settings: &Settings, options: cli::Scheduler) -> Result<
         }
         Ok::<_, anyhow::Error>(())
     });
-    footing.run(parts).await
+    context.run(parts).await
 }

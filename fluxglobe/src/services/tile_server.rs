@@ -10,17 +10,17 @@ use tile_server::{AppState, Server};
 
 use crate::cli::{Settings, TileServer};
 use crate::ports::{Analyst, FleetDrawer, Observer};
-use crate::services::Footing;
+use crate::services::ServiceContext;
 use crate::{deployment, viewer};
 
 pub(crate) async fn run(settings: &Settings, options: TileServer) -> Result<()> {
     // Settings and secrets are looked at before anything is waited for.
     options.kafka.check()?;
     options.observations.database()?;
-    let footing = Footing::take(settings, "tile-server", None, &[]).await?;
+    let context = ServiceContext::take(settings, "tile-server", None, &[]).await?;
     // Opening asks nobody: /healthz is answered while the store is waited for, and /readyz says so.
-    let store = deployment::open_interactive(footing.store_url())?;
-    let fleet = Fleet::start(&options.fleet, &footing.registry)?;
+    let store = deployment::open_interactive(context.store_url())?;
+    let fleet = Fleet::start(&options.fleet, &context.registry)?;
     let measured = observations::open(&options.observations, &store)?;
     let regions = deployment::region_engine(settings, store.clone())?;
     let analyst = Analyst::new(Engine::local(store.clone()), &regions, None);
@@ -31,27 +31,27 @@ pub(crate) async fn run(settings: &Settings, options: TileServer) -> Result<()> 
         store,
         Arc::new(FleetDrawer(fleet)),
         Arc::new(analyst),
-        footing.registry.clone(),
+        context.registry.clone(),
     )?
     .with_observations(Arc::new(Observer(measured)));
     let server = Server::bind(&serve, state.clone()).await?;
     tracing::info!(address = %server.address(), "tile server");
-    let mut parts = footing.parts();
-    parts.start("tile server", server.run(footing.stop.said()));
-    let own = footing.clone();
+    let mut parts = context.parts();
+    parts.start("tile server", server.run(context.stop.said()));
+    let own = context.clone();
     parts.start(
         "news",
         async move { live(&own, &options.kafka, state).await },
     );
-    footing.run(parts).await
+    context.run(parts).await
 }
 
 /// Follows the event log once store and log are there and of this version.
-async fn live(footing: &Footing, kafka: &KafkaSettings, state: AppState) -> Result<()> {
-    if footing.store().await?.is_some()
-        && let Some(log) = footing.log(kafka).await?
+async fn live(context: &ServiceContext, kafka: &KafkaSettings, state: AppState) -> Result<()> {
+    if context.store().await?.is_some()
+        && let Some(log) = context.log(kafka).await?
     {
-        state.live(log).run(footing.stop.clone()).await?;
+        state.live(log).run(context.stop.clone()).await?;
     }
     Ok(())
 }

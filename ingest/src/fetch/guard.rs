@@ -14,8 +14,8 @@ use super::local;
 use super::location::Location;
 use super::object::{self, AllowedStore};
 use super::pace::Slowest;
-use super::patience::{Miss, Patience, Tries, answered, given_up, limited};
 use super::raw::RawGranule;
+use super::retry::{Miss, RetryLimits, Tries, answered, given_up, limited};
 use super::spool::Spool;
 use super::turns::Turns;
 use crate::error::{IngestError, Stop};
@@ -34,7 +34,7 @@ struct Guarded {
     web: Web,
     stores: Vec<AllowedStore>,
     spool: Spool,
-    patience: Patience,
+    retry_limits: RetryLimits,
     turns: Turns,
 }
 
@@ -46,7 +46,7 @@ pub(crate) struct Allowed {
     pub(crate) stores: Vec<String>,
     pub(crate) spool: PathBuf,
     pub(crate) spool_bytes: u64,
-    pub(crate) patience: Patience,
+    pub(crate) retry_limits: RetryLimits,
 }
 
 impl Sources {
@@ -73,7 +73,7 @@ impl Sources {
             stores: stores.collect::<Result<_, IngestError>>()?,
             web: Web::new(allowed.hosts)?,
             spool: Spool::open(&allowed.spool, allowed.spool_bytes)?,
-            patience: allowed.patience,
+            retry_limits: allowed.retry_limits,
             turns: Turns::default(),
         }))))
     }
@@ -111,7 +111,7 @@ impl Sources {
 }
 
 impl Guarded {
-    /// Has a file, however often its source must be asked, within the patience that the settings give.
+    /// Has a file, however often its source must be asked, within the retry limit that the settings give.
     async fn fetch(
         self: &Arc<Self>,
         location: &Location,
@@ -119,11 +119,11 @@ impl Guarded {
         limits: Limits,
     ) -> Result<RawGranule, Stop> {
         let source = self.turns.source(location.source());
-        let patience = self.patience.away;
-        let mut tries = Tries::new(self.patience);
+        let retry_limits = self.retry_limits.away;
+        let mut tries = Tries::new(self.retry_limits);
         loop {
-            let turn = self.turns.take(&source, patience).await;
-            let turn = turn.map_err(|why| given_up(patience, &why))?;
+            let turn = self.turns.take(&source, retry_limits).await;
+            let turn = turn.map_err(|why| given_up(retry_limits, &why))?;
             // Waiting for room of our own is not the source's fault.
             let (begun, mut for_room) = (Instant::now(), Duration::ZERO);
             let tried = self.try_once(location, expected, limits, &mut for_room);
@@ -158,12 +158,12 @@ impl Guarded {
         limits: Limits,
         for_room: &mut Duration,
     ) -> Result<RawGranule, Miss> {
-        let Patience {
+        let RetryLimits {
             one_try,
             silence,
             slowest_bytes_s,
             ..
-        } = self.patience;
+        } = self.retry_limits;
         let (chunks, length) = match location {
             Location::File(path) => {
                 let (own, path, expected) = (Arc::clone(self), path.clone(), expected.clone());

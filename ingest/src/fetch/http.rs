@@ -16,7 +16,7 @@ use url::{Host, Url};
 
 use super::address::is_public;
 use super::location::shown;
-use super::patience::Miss;
+use super::retry::Miss;
 use crate::error::{IngestError, Stop};
 use crate::rejection::Rejection;
 

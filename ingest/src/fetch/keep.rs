@@ -11,8 +11,8 @@ use tokio::io::{AsyncWriteExt as _, BufWriter};
 use super::checksum::{Check, Expected, wrong_size};
 use super::local;
 use super::pace::{Pace, Slowest};
-use super::patience::Miss;
 use super::raw::{Held, RawGranule, Stamp};
+use super::retry::Miss;
 use super::spool::{self, Spooled};
 use crate::rejection::Rejection;
 

@@ -10,8 +10,8 @@ use contract::event::RejectReason;
 
 use super::checksum::{Check, Expected, wrong_size};
 use super::location::file_name;
-use super::patience::Miss;
 use super::raw::{Held, RawGranule, Stamp};
+use super::retry::Miss;
 use crate::error::Stop;
 use crate::rejection::Rejection;
 use crate::settings::Limits;

@@ -8,7 +8,7 @@ use object_store::{GetResult, ObjectStore, ObjectStoreExt as _};
 use storage::Store;
 use url::Url;
 
-use super::patience::Miss;
+use super::retry::Miss;
 use crate::error::IngestError;
 use crate::rejection::Rejection;
 

@@ -6,7 +6,7 @@ use bytes::Bytes;
 use futures::StreamExt as _;
 use futures::stream::BoxStream;
 
-use super::patience::Miss;
+use super::retry::Miss;
 
 /// The slowest that a source may be.
 #[derive(Debug, Clone, Copy)]

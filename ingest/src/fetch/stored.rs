@@ -11,8 +11,8 @@ use storage::{StorageError, Store};
 
 use super::checksum::Expected;
 use super::keep::Keep;
-use super::patience::Miss;
 use super::raw::RawGranule;
+use super::retry::Miss;
 use super::spool::Spool;
 use crate::error::{IngestError, Stop};
 

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use crate::error::IngestError;
-use crate::fetch::{Allowed, AllowedHost, Patience, Sources};
+use crate::fetch::{Allowed, AllowedHost, RetryLimits, Sources};
 use crate::profile::Profiles;
 use crate::settings::{DecoderCommand, Limits, Settings};
 
@@ -81,15 +81,15 @@ pub struct ServiceSettings {
     pub fetch_tries: u32,
     /// How long a source is asked again that does not answer or is out of order, seconds, at most a week; then the notice
     /// is refused.
-    #[arg(long, env = "FLUXGLOBE_FETCH_PATIENCE_S", default_value_t = 300,
+    #[arg(long, env = "FLUXGLOBE_FETCH_RETRY_S", default_value_t = 300,
           value_parser = clap::value_parser!(u64).range(0..=604_800))]
-    pub fetch_patience_s: u64,
+    pub fetch_retry_s: u64,
     /// Time limit of one try to fetch a file, seconds, 1 to 86400.
     #[arg(long, env = "FLUXGLOBE_FETCH_LIMIT_S", default_value_t = 1800,
           value_parser = clap::value_parser!(u64).range(1..=86_400))]
     pub fetch_limit_s: u64,
     /// A source that does not answer for so long, or sends less than --fetch-slowest-bytes-s on average, is left and asked
-    /// again, within --fetch-patience-s; seconds, 1 to 3600.
+    /// again, within --fetch-retry limit-s; seconds, 1 to 3600.
     #[arg(long, env = "FLUXGLOBE_FETCH_SILENCE_S", default_value_t = 30,
           value_parser = clap::value_parser!(u64).range(1..=3600))]
     pub fetch_silence_s: u64,
@@ -119,13 +119,13 @@ impl ServiceSettings {
             stores: self.allow_store.clone(),
             spool: self.spool.clone(),
             spool_bytes: self.spool_bytes,
-            patience: Patience {
+            retry_limits: RetryLimits {
                 tries: self.fetch_tries,
-                away: Duration::from_secs(self.fetch_patience_s),
+                away: Duration::from_secs(self.fetch_retry_s),
                 one_try: Duration::from_secs(self.fetch_limit_s),
                 silence: Duration::from_secs(self.fetch_silence_s),
                 slowest_bytes_s: self.fetch_slowest_bytes_s,
-                ..Patience::default()
+                ..RetryLimits::default()
             },
         };
         Ok(Settings {

@@ -14,7 +14,7 @@ use storage::log::{Finished, Message, Reader};
 use tokio::time::Instant;
 use tracing::Instrument as _;
 
-use super::bench::{Bench, Number};
+use super::publish_queue::{Number, PublishQueue};
 use super::work::{self, Done, Work, alongside};
 use super::{GROUP, IngestService, TOPIC, now};
 use crate::answer::{Answer, Asked};
@@ -54,7 +54,7 @@ struct Open {
 struct Shift<'a> {
     service: &'a IngestService,
     pipeline: Pipeline<'a>,
-    bench: Bench<StoredGranule>,
+    publish_queue: PublishQueue<StoredGranule>,
     jobs: BTreeMap<Number, Job>,
     open: BTreeMap<Number, Open>,
     next: Number,
@@ -78,7 +78,7 @@ pub(super) async fn run(
     let mut shift = Shift {
         service,
         pipeline: service.pipeline(progress),
-        bench: Bench::default(),
+        publish_queue: PublishQueue::default(),
         jobs: BTreeMap::new(),
         open: BTreeMap::new(),
         next: 0,
@@ -158,7 +158,7 @@ impl Shift<'_> {
             trace.clone_from(&asked.notice.cause.trace);
             let job = self.count();
             answers.push((job, None));
-            self.bench.add(job, asked.notice.order_key.clone());
+            self.publish_queue.add(job, asked.notice.order_key.clone());
             let asked = Arc::new(asked);
             let span = tracing::info_span!("notice", trace = asked.notice.cause.trace, origin = %message.origin);
             let work = work::prepare(self.pipeline, &self.service.health, job, Arc::clone(&asked));
@@ -202,7 +202,7 @@ impl Shift<'_> {
             "given up: another member has their notices now"
         );
         for number in jobs {
-            self.bench.remove(number);
+            self.publish_queue.remove(number);
             if let Some(job) = self.jobs.remove(&number) {
                 job.prepare.abort();
             }
@@ -234,12 +234,12 @@ impl Shift<'_> {
             match done {
                 Done::ToPublish(number, granule) => {
                     let product = granule.target.product.clone();
-                    self.bench.ready(number, product, *granule);
+                    self.publish_queue.ready(number, product, *granule);
                 }
                 Done::Answered(number, answer) => self.answered(number, &answer),
                 Done::GivenUp => {}
                 Done::Published(product, answers) => {
-                    self.bench.free(&product);
+                    self.publish_queue.free(&product);
                     for (number, answer) in answers {
                         self.answered(number, &answer);
                     }
@@ -249,7 +249,7 @@ impl Shift<'_> {
     }
 
     fn answered(&mut self, number: Number, answer: &Answer) {
-        self.bench.remove(number);
+        self.publish_queue.remove(number);
         let Some(job) = self.jobs.remove(&number) else {
             return;
         };
@@ -268,7 +268,7 @@ impl Shift<'_> {
 
     /// Begins to publish what may be.
     fn publish(&mut self) {
-        for (product, files) in self.bench.take() {
+        for (product, files) in self.publish_queue.take() {
             let batch = files.into_iter().filter_map(|(number, granule)| {
                 let asked = Arc::clone(&self.jobs.get(&number)?.asked);
                 Some((number, asked, granule))

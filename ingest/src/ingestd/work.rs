@@ -7,9 +7,9 @@ use std::sync::Arc;
 use contract::product::ProductId;
 use futures::stream::{FuturesUnordered, StreamExt as _};
 
-use super::bench::Number;
 use super::health::Health;
-use super::insist::insist;
+use super::publish_queue::Number;
+use super::retry::retry;
 use crate::answer::{Answer, Asked, Ready, blame};
 use crate::land;
 use crate::pipeline::Pipeline;
@@ -51,7 +51,7 @@ pub(super) async fn prepare(
     number: Number,
     asked: Arc<Asked>,
 ) -> Done {
-    let ready = insist(health, "prepare", || land::prepare(&pipeline, &asked)).await;
+    let ready = retry(health, "prepare", || land::prepare(&pipeline, &asked)).await;
     match ready {
         Ok(Ready::ToCommit(granule)) => Done::ToPublish(number, Box::new(granule)),
         Ok(Ready::Answered(answer)) => Done::Answered(number, Box::new(answer)),
@@ -70,7 +70,7 @@ pub(super) async fn publish(
         .iter()
         .map(|(_, asked, granule)| (asked.as_ref(), granule))
         .collect();
-    let together = insist(health, "publish", || land::commit(&pipeline, &pairs)).await;
+    let together = retry(health, "publish", || land::commit(&pipeline, &pairs)).await;
     let answers = match together {
         Ok(answers) => answers,
         Err(error) if pairs.len() == 1 => vec![pairs[0].0.refused(blame(&error))],
@@ -78,7 +78,7 @@ pub(super) async fn publish(
             let mut answers = Vec::with_capacity(pairs.len());
             for pair in &pairs {
                 let own = std::slice::from_ref(pair);
-                let alone = insist(health, "publish", || land::commit(&pipeline, own)).await;
+                let alone = retry(health, "publish", || land::commit(&pipeline, own)).await;
                 answers.extend(alone.unwrap_or_else(|error| vec![pair.0.refused(blame(&error))]));
             }
             answers

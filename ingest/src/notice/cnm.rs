@@ -7,7 +7,7 @@ use contract::event::{Event, MAX_TRACE_BYTES};
 use contract::time::TimeMs;
 use serde::Deserialize;
 
-use super::{Notice, Order, bad, notice_body};
+use super::{Order, PendingNotice, bad, notice_body};
 use crate::fetch::{Expected, Location, Method};
 use crate::profile::Profiles;
 use crate::rejection::Rejection;
@@ -79,7 +79,7 @@ pub(super) fn notices(
     content: &[u8],
     profiles: &Profiles,
     now: TimeMs,
-) -> Result<Vec<Notice>, Rejection> {
+) -> Result<Vec<PendingNotice>, Rejection> {
     let message: Message = serde_json::from_slice(content)
         .map_err(|e| bad(&format!("is no cloud notification: {e}")))?;
     if !is_known(&message.version) {
@@ -139,7 +139,7 @@ pub(super) fn notices(
                 product: None,
             })
         };
-        Notice {
+        PendingNotice {
             shown,
             order: order(),
             attempt: 1,

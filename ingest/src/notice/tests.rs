@@ -14,7 +14,7 @@ fn settings() -> Settings {
     })
 }
 
-fn of(content: impl Into<Vec<u8>>) -> Vec<Notice> {
+fn of(content: impl Into<Vec<u8>>) -> Vec<PendingNotice> {
     let origin = Origin {
         topic: Topic::GranuleNotice,
         partition: 3,
@@ -25,7 +25,7 @@ fn of(content: impl Into<Vec<u8>>) -> Vec<Notice> {
         content: content.into().into(),
         time: None,
     };
-    Notice::of(&message, &settings(), NOW.parse().unwrap())
+    PendingNotice::of(&message, &settings(), NOW.parse().unwrap())
 }
 
 fn refusal(content: impl Into<Vec<u8>>) -> String {
@@ -70,7 +70,7 @@ fn our_own_notice_keeps_what_it_says() {
 fn a_cloud_notification_becomes_a_notice_of_each_data_file() {
     let notices = of(cnm(|_| ()));
     assert_eq!(notices.len(), 1);
-    let Notice {
+    let PendingNotice {
         shown,
         order,
         cause,

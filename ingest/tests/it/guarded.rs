@@ -32,7 +32,7 @@ pub(crate) fn guarded(place: &Place, flags: &[&str]) -> Result<Settings, IngestE
         &spool,
         "--fetch-tries",
         "2",
-        "--fetch-patience-s",
+        "--fetch-retry-s",
         "1",
     ];
     let flags = Flags::parse_from(always.iter().chain(flags));

@@ -189,7 +189,7 @@ async fn a_source_that_comes_back_gives_its_file() {
     };
     let server = WebServer::start(Box::new(answers)).await;
     let host = server.address.to_string();
-    let flags = ["--allow-host", &host, "--fetch-patience-s", "60"];
+    let flags = ["--allow-host", &host, "--fetch-retry-s", "60"];
     let settings = guarded(&place, &flags).unwrap();
     let outcome = outcome_of(&place, &settings, notice(&server.url("/a.h5"), None, None)).await;
     assert!(matches!(outcome, Outcome::Landed { .. }), "{outcome}");

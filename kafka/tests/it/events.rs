@@ -12,7 +12,7 @@ use tokio::time::Instant;
 pub(crate) const FROM: Topic = Topic::GranuleNotice;
 pub(crate) const TO: Topic = Topic::GranuleRejected;
 /// A test waits so long for what must come: a group may have to notice a killed member first.
-pub(crate) const PATIENCE: Duration = Duration::from_mins(1);
+pub(crate) const WAIT_LIMIT: Duration = Duration::from_mins(1);
 pub(crate) const MOMENT: Duration = Duration::from_millis(200);
 
 pub(crate) fn notice(path: &str) -> Event {
@@ -82,7 +82,7 @@ pub(crate) fn paths(messages: &[Message]) -> Vec<String> {
 
 /// Reads until `count` messages came.
 pub(crate) async fn read(reader: &mut dyn Reader, count: usize) -> Vec<Message> {
-    let (mut all, until) = (vec![], Instant::now() + PATIENCE);
+    let (mut all, until) = (vec![], Instant::now() + WAIT_LIMIT);
     while all.len() < count {
         assert!(
             Instant::now() < until,
@@ -96,7 +96,7 @@ pub(crate) async fn read(reader: &mut dyn Reader, count: usize) -> Vec<Message> 
 
 /// The lag of a group. A transaction that a killed process left open holds the answer back until it is ended.
 pub(crate) async fn lag(log: &dyn EventLog, group: &str) -> u64 {
-    let until = Instant::now() + PATIENCE;
+    let until = Instant::now() + WAIT_LIMIT;
     loop {
         match log.lag(FROM, group).await {
             Ok(lag) => return lag,
@@ -108,7 +108,7 @@ pub(crate) async fn lag(log: &dyn EventLog, group: &str) -> u64 {
 /// Reads and finishes, a follow-up for each, until the group has no message before it.
 pub(crate) async fn work_off(log: &dyn EventLog, group: &str) {
     let mut reader = log.join(FROM, group).await.unwrap();
-    let until = Instant::now() + PATIENCE;
+    let until = Instant::now() + WAIT_LIMIT;
     loop {
         let messages = reader.next(64, MOMENT).await.unwrap();
         if messages.is_empty() && lag(log, group).await == 0 {

@@ -12,7 +12,7 @@ use storage::log::{EventLog as _, Start, contents};
 use tokio::time::Instant;
 
 use crate::events::{
-    FROM, MOMENT, PATIENCE, assert_one_each, finished, finished_with_one, notice, notice_of,
+    FROM, MOMENT, WAIT_LIMIT, assert_one_each, finished, finished_with_one, notice, notice_of,
     notices, paths, read, work_off,
 };
 use crate::own_topics::{OwnTopics, end, open, open_with, own_settings, servers};
@@ -244,7 +244,7 @@ async fn a_member_is_told_what_it_lost_with_its_partitions() {
     let held = read(&mut *first, 40).await;
     assert_eq!(first.lost(), []);
     let mut second = own.log.join(FROM, "g").await.unwrap();
-    let (mut lost, until) = (vec![], Instant::now() + PATIENCE);
+    let (mut lost, until) = (vec![], Instant::now() + WAIT_LIMIT);
     while lost.is_empty() {
         assert!(Instant::now() < until, "nothing was lost");
         first.next(1, MOMENT).await.unwrap();

@@ -8,8 +8,8 @@ use anyhow::Result;
 use contract::colour::TransferFunction;
 use contract::grid::Grid;
 use contract::job::{Mode, RENDERER_VERSION, RenderJob, Style, View};
-use contract::moment::Moment;
 use contract::quantity::Quantity;
+use contract::time_sample::TimeSample;
 use render::{Frame, Interval, Scene};
 
 /// Share of the region that is sea in these scenes.
@@ -166,8 +166,8 @@ pub fn particles(scene: &Scene) -> u64 {
         .sum()
 }
 
-fn moment(product: &str) -> Result<Moment> {
-    Ok(Moment {
+fn time_sample(product: &str) -> Result<TimeSample> {
+    Ok(TimeSample {
         domain: format!("domain/{product}/0").parse()?,
         before: Some(format!("frames/{product}/0").parse()?),
         after: None,
@@ -183,8 +183,8 @@ pub fn job(size_px: [u32; 2], slices: u32) -> Result<RenderJob> {
     Ok(RenderJob {
         renderer_version: RENDERER_VERSION,
         grid: grid(1_000),
-        value: moment("made-up")?,
-        accumulated: Some(moment("made-up-carbon")?),
+        value: time_sample("made-up")?,
+        accumulated: Some(time_sample("made-up-carbon")?),
         relief: None,
         flow: None,
         mode: Mode::Volume,

@@ -53,7 +53,7 @@ fn one(plan: &Plan, scene: &Scene, run: usize, cores: usize) {
                     value,
                     accumulated: carbon,
                     palette: &plan.palette,
-                    doubt: &[],
+                    uncertainty: &[],
                 };
                 generate(&plan.params, &inputs, &mut particles);
                 project::cpu::project(&plan.params, &plan.rows, &plan.cols, &particles, splats);

@@ -105,13 +105,14 @@ fn cloud(
         .unwrap_or(0.0);
     let (row, col) = (active.cell / grid.cols, active.cell % grid.cols);
     let bits = scrambled(scrambled(active.cell) ^ k.wrapping_mul(0x9e37_79b9));
-    // Places of one cell are spread evenly by two irrational steps and then shaken.
+    // Places of one cell are spread evenly by two irrational steps and then jittered.
     let place = |step: u32, bits: u32| {
-        let shaken = (bits >> params.shake_shift).wrapping_sub(0x8000_0000 >> params.shake_shift);
+        let jittered =
+            (bits >> params.jitter_shift).wrapping_sub(0x8000_0000 >> params.jitter_shift);
         share(
             0x8000_0000u32
                 .wrapping_add(k.wrapping_mul(step))
-                .wrapping_add(shaken),
+                .wrapping_add(jittered),
         )
     };
     let east = place(3_242_174_889, bits);

@@ -86,7 +86,7 @@ pub fn reference_of_cells(
     fineness: Fineness,
 ) -> Result<Picture, ProofError> {
     let style = &job.style;
-    let is_bare = style.context.is_empty() && style.sun.subsolar.is_none() && !style.doubt;
+    let is_bare = style.context.is_empty() && style.sun.subsolar.is_none() && !style.uncertainty;
     if job.mode != Mode::Volume || job.style.globe_surface || !is_bare {
         return Err(ProofError::NoReference);
     }

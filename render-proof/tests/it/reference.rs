@@ -160,10 +160,10 @@ fn a_picture_that_the_reference_cannot_draw_is_refused() {
     let scene = ocean(ONE_DEGREE);
     let mut with_globe = job(Mode::Volume, globe(0.0, 0.0, 5e6, 16));
     with_globe.style.globe_surface = true;
-    let mut doubted = job(Mode::Volume, globe(0.0, 0.0, 5e6, 16));
-    doubted.style.doubt = true;
+    let mut uncertain = job(Mode::Volume, globe(0.0, 0.0, 5e6, 16));
+    uncertain.style.uncertainty = true;
     let points = job(Mode::Points, globe(0.0, 0.0, 5e6, 16));
-    for job in [with_globe, doubted, points] {
+    for job in [with_globe, uncertain, points] {
         let refused = reference(&job, &scene, Fineness::default());
         assert!(
             matches!(refused, Err(ProofError::NoReference)),

@@ -5,6 +5,6 @@ use contract::job::RenderJob;
 /// The frame that the instant has passed, which names the product as well. Frames are named by their content, so a new
 /// version of a product leaves what did not change where it is.
 pub(super) fn of(job: &RenderJob) -> &str {
-    let moment = &job.value;
-    moment.before.as_ref().unwrap_or(&moment.domain).as_str()
+    let sample = &job.value;
+    sample.before.as_ref().unwrap_or(&sample.domain).as_str()
 }

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use contract::job::RenderJob;
 use contract::manifest::Manifest;
-use contract::moment::Moment;
+use contract::time_sample::TimeSample;
 use quick_cache::unsync::Cache;
 use render::Renderer;
 use storage::{Store, manifests};
@@ -139,17 +139,18 @@ impl Reader {
             return Ok(());
         }
         let heading = self.heading(&job.value, learnt).await;
-        let mut ahead: [Vec<Moment>; 3] = [vec![], vec![], vec![]];
+        let mut ahead: [Vec<TimeSample>; 3] = [vec![], vec![], vec![]];
         for (part, ahead) in parts.into_iter().zip(&mut ahead) {
-            if let Some(moment) = part
-                && let Some(manifest) = self.manifest(moment, learnt).await
+            if let Some(sample) = part
+                && let Some(manifest) = self.manifest(sample, learnt).await
             {
-                *ahead = next(&manifest, moment, heading, self.frames_ahead);
+                *ahead = next(&manifest, sample, heading, self.frames_ahead);
             }
         }
         let longest = ahead.iter().map(Vec::len).max().unwrap_or(0);
         for number in 0..longest {
-            let at = |part: &[Moment], own: &Moment| part.get(number).unwrap_or(own).clone();
+            let at =
+                |part: &[TimeSample], own: &TimeSample| part.get(number).unwrap_or(own).clone();
             let [value, accumulated, northward] = &ahead;
             let mut early = job.clone();
             early.value = at(value, &job.value);
@@ -166,15 +167,15 @@ impl Reader {
     }
 
     /// The direction in which a product is played.
-    async fn heading(&self, moment: &Moment, learnt: &mut Learnt) -> Heading {
-        let manifest = self.manifest(moment, learnt).await;
-        let Some(place) = manifest.and_then(|manifest| place_of(&manifest, moment)) else {
+    async fn heading(&self, sample: &TimeSample, learnt: &mut Learnt) -> Heading {
+        let manifest = self.manifest(sample, learnt).await;
+        let Some(place) = manifest.and_then(|manifest| place_of(&manifest, sample)) else {
             return Heading::Unknown;
         };
         if learnt.last.len() > MOST_MANIFESTS {
             learnt.last.clear();
         }
-        let product = moment.product().to_owned();
+        let product = sample.product().to_owned();
         let (before, heading) = *learnt
             .last
             .get(&product)
@@ -184,11 +185,11 @@ impl Reader {
         heading
     }
 
-    /// The newest manifest of a moment's product, read again when the one known does not have the moment's frames.
-    async fn manifest(&self, moment: &Moment, learnt: &mut Learnt) -> Option<Arc<Manifest>> {
-        let product = moment.product().to_owned();
+    /// The newest manifest of a sample's product, read again when the one known does not have the sample's frames.
+    async fn manifest(&self, sample: &TimeSample, learnt: &mut Learnt) -> Option<Arc<Manifest>> {
+        let product = sample.product().to_owned();
         if let Some((manifest, read_at)) = learnt.manifests.get(&product).cloned() {
-            let is_of = place_of(&manifest, moment).is_some();
+            let is_of = place_of(&manifest, sample).is_some();
             if is_of || read_at.elapsed() < LEAST_AGE {
                 return is_of.then_some(manifest);
             }

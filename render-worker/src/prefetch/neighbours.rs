@@ -2,7 +2,7 @@
 
 use contract::key::ObjectKey;
 use contract::manifest::Manifest;
-use contract::moment::{Counts, Moment};
+use contract::time_sample::{Counts, TimeSample};
 
 /// Which way time runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,40 +26,40 @@ impl Heading {
     }
 }
 
-/// Steps of a moment's frames, first and last; -1 stands before the first step, where accumulation starts.
-fn steps_of(manifest: &Manifest, moment: &Moment) -> Option<[i64; 2]> {
+/// Steps of a sample's frames, first and last; -1 stands before the first step, where accumulation starts.
+fn steps_of(manifest: &Manifest, sample: &TimeSample) -> Option<[i64; 2]> {
     let index = |frame: &ObjectKey| {
         let found = manifest.steps.iter().position(|step| step.frame == *frame);
         found.map(|index| index as i64)
     };
-    let before = match &moment.before {
+    let before = match &sample.before {
         Some(frame) => index(frame)?,
         None => -1,
     };
-    let after = match &moment.after {
+    let after = match &sample.after {
         Some(after) => index(&after.frame)?,
         None => before,
     };
     Some([before, after])
 }
 
-/// Where in a product a moment lies: 2.25 is a quarter of the way from the third step to the fourth. None if the
+/// Where in a product a sample lies: 2.25 is a quarter of the way from the third step to the fourth. None if the
 /// product does not have its frames.
-pub(super) fn place_of(manifest: &Manifest, moment: &Moment) -> Option<f64> {
-    let [before, _] = steps_of(manifest, moment)?;
-    let weight = moment.after.as_ref().map_or(0.0, |after| after.weight);
+pub(super) fn place_of(manifest: &Manifest, sample: &TimeSample) -> Option<f64> {
+    let [before, _] = steps_of(manifest, sample)?;
+    let weight = sample.after.as_ref().map_or(0.0, |after| after.weight);
     Some(before as f64 + weight)
 }
 
-/// The moments of single frames that are wanted next, nearest first: `most` of them in the direction of time, in both
+/// The samples of single frames that are wanted next, nearest first: `most` of them in the direction of time, in both
 /// if that is not known. Who plays a product to its end goes on at its start.
 pub(super) fn next(
     manifest: &Manifest,
-    moment: &Moment,
+    sample: &TimeSample,
     heading: Heading,
     most: usize,
-) -> Vec<Moment> {
-    let Some([first, last]) = steps_of(manifest, moment) else {
+) -> Vec<TimeSample> {
+    let Some([first, last]) = steps_of(manifest, sample) else {
         return vec![];
     };
     let each = |i: i64| {
@@ -82,13 +82,13 @@ pub(super) fn next(
     // Of a picture that shows how complete sums are, the next ones will, too.
     let counts = |step: usize| {
         let contributed = manifest.steps[step].contributed.as_ref()?;
-        moment.contributed.as_ref().map(|_| Counts {
+        sample.contributed.as_ref().map(|_| Counts {
             before: Some(contributed.counts.clone()),
             after: None,
         })
     };
-    let single = |step: i64| Moment {
-        domain: moment.domain.clone(),
+    let single = |step: i64| TimeSample {
+        domain: sample.domain.clone(),
         before: Some(manifest.steps[step as usize].frame.clone()),
         after: None,
         contributed: counts(step as usize),
@@ -147,10 +147,11 @@ mod tests {
     }
 
     fn wanted(manifest: &Manifest, time: &str, heading: Heading, most: usize) -> Vec<u32> {
-        let moment = manifest.moment(time.parse().unwrap()).unwrap();
-        let next = next(manifest, &moment, heading, most).into_iter();
-        let month = |moment: Moment| (1..=12).find(|month| moment.before == Some(frame(*month)));
-        next.map(|moment| month(moment).unwrap()).collect()
+        let sample = manifest.time_sample(time.parse().unwrap()).unwrap();
+        let next = next(manifest, &sample, heading, most).into_iter();
+        let month =
+            |sample: TimeSample| (1..=12).find(|month| sample.before == Some(frame(*month)));
+        next.map(|sample| month(sample).unwrap()).collect()
     }
 
     #[test]
@@ -170,8 +171,8 @@ mod tests {
         let carbon = manifest(Quantity::AccumulatedCarbon, 12);
         assert_eq!(wanted(&carbon, "2000-01-10", Heading::Forward, 1), [2]);
         let at = |time: &str| {
-            let moment = carbon.moment(time.parse().unwrap()).unwrap();
-            place_of(&carbon, &moment).unwrap()
+            let sample = carbon.time_sample(time.parse().unwrap()).unwrap();
+            place_of(&carbon, &sample).unwrap()
         };
         assert!(at("2000-01-01") < at("2000-01-10") && at("2000-01-10") < at("2000-02-10"));
     }
@@ -181,7 +182,7 @@ mod tests {
         let two = manifest(Quantity::CarbonFlux, 2);
         assert_eq!(wanted(&two, "2000-01-30", Heading::Unknown, 4), [0_u32; 0]);
         let flux = manifest(Quantity::CarbonFlux, 12);
-        let mut stranger = flux.moment("2000-05-01".parse().unwrap()).unwrap();
+        let mut stranger = flux.time_sample("2000-05-01".parse().unwrap()).unwrap();
         stranger.before = Some("frames/p/elsewhere".parse().unwrap());
         assert!(next(&flux, &stranger, Heading::Forward, 1).is_empty());
         assert_eq!(place_of(&flux, &stranger), None);

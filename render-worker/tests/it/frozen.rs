@@ -98,7 +98,7 @@ async fn pictures(store: &Store) -> Result<Vec<Vec<u8>>, String> {
         (&carbon, None, Mode::Map),
     ] {
         let mut style = Style::with_transfer(TransferFunction::default_for(product.quantity));
-        (style.slices, style.particles_per_cell, style.doubt) = (1, 1, true);
+        (style.slices, style.particles_per_cell, style.uncertainty) = (1, 1, true);
         let (time, view) = ("2001-02-01".parse().unwrap(), globe(10.0, 30.0, 2e7, 64));
         let job = RenderJob::of(product, accumulated, time, mode, view, style).unwrap();
         let picture = service.draw(&job).await.map_err(|e| e.in_full())?;

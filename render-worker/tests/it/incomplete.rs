@@ -1,4 +1,4 @@
-//! Sums of accumulated carbon that lack data of some of their time: hatched where doubt is drawn, and nowhere else.
+//! Sums of accumulated carbon that lack data of some of their time: hatched where uncertainty is drawn, and nowhere else.
 
 use contract::job::{Mode, RenderJob, Style};
 use contract::manifest::{Contributed, Manifest};
@@ -38,10 +38,10 @@ async fn carbon(store: &Store, name: &str, lacking_cols: usize) -> Manifest {
     manifest
 }
 
-fn map_of(carbon: &Manifest, time: &str, doubt: bool) -> RenderJob {
+fn map_of(carbon: &Manifest, time: &str, uncertainty: bool) -> RenderJob {
     let view = tile(0, 0, 0, 256);
     let style = Style {
-        doubt,
+        uncertainty,
         ..job(Mode::Map, view).style
     };
     RenderJob::of(carbon, None, time.parse().unwrap(), Mode::Map, view, style).unwrap()
@@ -57,7 +57,7 @@ fn different_columns(one: &[u8], other: &[u8]) -> Vec<u32> {
 }
 
 #[tokio::test]
-async fn incomplete_sums_are_hatched_where_doubt_is_drawn() {
+async fn incomplete_sums_are_hatched_where_uncertainty_is_drawn() {
     let store = Store::memory();
     let carbon = carbon(&store, "carbon", COMPLETE_FROM_COL).await;
     let service = Here::new(store, Backend::Cpu);
@@ -73,10 +73,10 @@ async fn incomplete_sums_are_hatched_where_doubt_is_drawn() {
         ("2000-03-01", true),
     ] {
         let plain = draw(map_of(&carbon, time, false)).await;
-        let doubted = draw(map_of(&carbon, time, true)).await;
-        let columns = different_columns(&plain, &doubted);
+        let uncertain = draw(map_of(&carbon, time, true)).await;
+        let columns = different_columns(&plain, &uncertain);
         assert_eq!(!columns.is_empty(), is_hatched, "{time}");
-        // Between centres of cells doubt fades, as colours do: half a cell beyond the edge.
+        // Between centres of cells uncertainty fades, as colours do: half a cell beyond the edge.
         let edge_px = (COMPLETE_FROM_COL as f64 + 0.5) * 256.0 / COLS as f64;
         // The other edge of the map is the date line, which the first column lies at.
         let wrapped = (COLS as f64 - 0.5) * 256.0 / COLS as f64;
@@ -92,16 +92,17 @@ async fn incomplete_sums_are_hatched_where_doubt_is_drawn() {
 }
 
 #[tokio::test]
-async fn complete_sums_look_the_same_with_doubt_and_without() {
+async fn complete_sums_look_the_same_with_uncertainty_and_without() {
     let store = Store::memory();
     let carbon = carbon(&store, "carbon", 0).await;
     let service = Here::new(store, Backend::Cpu);
     for time in ["2000-01-20", "2000-02-20", "2000-03-01"] {
-        let [plain, doubted] = [false, true].map(|doubt| map_of(&carbon, time, doubt));
-        assert_eq!(plain.value, doubted.value, "{time}");
+        let [plain, uncertain] =
+            [false, true].map(|uncertainty| map_of(&carbon, time, uncertainty));
+        assert_eq!(plain.value, uncertain.value, "{time}");
         let pictures = [
             service.draw(&plain).await.unwrap(),
-            service.draw(&doubted).await.unwrap(),
+            service.draw(&uncertain).await.unwrap(),
         ];
         assert!(
             different_columns(&pictures[0], &pictures[1]).is_empty(),
@@ -122,7 +123,7 @@ async fn the_name_of_a_picture_depends_on_counts_only_where_they_show() {
     for (step, other) in same.steps.iter_mut().zip(&more.steps) {
         step.contributed.clone_from(&other.contributed);
     }
-    let key = |manifest: &Manifest, doubt| map_of(manifest, "2000-02-20", doubt).key();
+    let key = |manifest: &Manifest, uncertainty| map_of(manifest, "2000-02-20", uncertainty).key();
     assert_eq!(key(&less, false), key(&same, false));
     assert_ne!(key(&less, true), key(&same, true));
     let old = {
@@ -158,8 +159,9 @@ async fn where_accumulation_starts_what_the_first_step_lacks_is_hatched_at_once(
     });
     carbon.steps = vec![first];
     let service = Here::new(store, Backend::Cpu);
-    let pictures = [false, true].map(|doubt| map_of(&carbon, "2000-02-01T01:00:00Z", doubt));
+    let pictures =
+        [false, true].map(|uncertainty| map_of(&carbon, "2000-02-01T01:00:00Z", uncertainty));
     let plain = service.draw(&pictures[0]).await.unwrap();
-    let doubted = service.draw(&pictures[1]).await.unwrap();
-    assert!(different_columns(&plain, &doubted).len() > 60);
+    let uncertain = service.draw(&pictures[1]).await.unwrap();
+    assert!(different_columns(&plain, &uncertain).len() > 60);
 }

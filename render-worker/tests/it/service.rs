@@ -129,7 +129,7 @@ async fn jobs_that_name_what_is_not_there_are_refused() {
     assert!(refused.is_not_found(), "{refused}");
     // Nothing that a job says of its grid makes anybody lay out more than is stored.
     let mut mismatched = job.clone();
-    mismatched.accumulated = small.moment("2000-01-30".parse().unwrap());
+    mismatched.accumulated = small.time_sample("2000-01-30".parse().unwrap());
     let mut wider = job.clone();
     (wider.grid.rows, wider.grid.dlat_deg) = (1 << 20, 1e-4);
     for wrong in [mismatched, wider] {

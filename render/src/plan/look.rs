@@ -66,7 +66,7 @@ pub(super) struct Look {
     /// Radius of a particle without flux is smaller by this share.
     pub size_spread: f32,
     /// Random places spread over 2 to the minus this of a cell.
-    pub shake_shift: u32,
+    pub jitter_shift: u32,
     /// Pixels for each particle: fewer particles a cell are drawn where cells are small.
     pub area_px_per_particle: f64,
     /// Optical depth at the centre if it is the same at any size, over the style's optical depth.
@@ -81,7 +81,7 @@ impl Look {
                 min_radius_px: 1.2,
                 max_radius_px: 3.5,
                 size_spread: 0.3,
-                shake_shift: 0,
+                jitter_shift: 0,
                 area_px_per_particle: 7.0,
                 center_depth: Some(3.0),
             },
@@ -90,7 +90,7 @@ impl Look {
                 min_radius_px: 2.2,
                 max_radius_px: 28.0,
                 size_spread: 0.45,
-                shake_shift: 0,
+                jitter_shift: 0,
                 area_px_per_particle: 12.0,
                 center_depth: Some(2.0),
             },
@@ -100,7 +100,7 @@ impl Look {
                 min_radius_px: 0.9,
                 max_radius_px: 1.6,
                 size_spread: 0.45,
-                shake_shift: 0,
+                jitter_shift: 0,
                 area_px_per_particle: 36.0,
                 center_depth: Some(0.8),
             },
@@ -109,7 +109,7 @@ impl Look {
                 min_radius_px: 1.8,
                 max_radius_px: f64::INFINITY,
                 size_spread: 0.1,
-                shake_shift: 3,
+                jitter_shift: 3,
                 area_px_per_particle: 1.8,
                 center_depth: None,
             },

@@ -335,7 +335,7 @@ fn common(job: &RenderJob, scene: &Scene) -> Params {
         front_to_back: 1,
         slices: style.slices,
         size_spread: shape::size_spread(transfer, &look),
-        shake_shift: look.shake_shift,
+        jitter_shift: look.jitter_shift,
         min_radius_px: look.min_radius_px,
         max_radius_px: look::MAX_RADIUS_PX,
         light_on: if job.mode == Mode::Volume {
@@ -344,7 +344,7 @@ fn common(job: &RenderJob, scene: &Scene) -> Params {
             LIGHT_OFF
         },
         shape_table: u32::from(shape::is_given(transfer)),
-        doubt: u32::from(style.doubt && scene.value.has_doubt()),
+        uncertainty: u32::from(style.uncertainty && scene.value.has_uncertainty()),
         ambient: look::AMBIENT,
         direct: look::DIRECT,
         map_alpha: look::MAP_ALPHA,

@@ -84,7 +84,7 @@ shared_struct! {
         /// Places for splats, those of cells without data included.
         pub splat_count: u32,
         /// Random places spread over 2 to the minus this of a cell.
-        pub shake_shift: u32,
+        pub jitter_shift: u32,
         pub height_m_per_kg_m2: f32,
         pub height_limit_m: f32,
         pub sheet_m: f32,
@@ -173,7 +173,7 @@ shared_struct! {
         /// The palette is followed by 256 words of opacity (low 16 bits) and size (next 8).
         pub shape_table: u32,
         /// Cells whose gap was filled are drawn differently.
-        pub doubt: u32,
+        pub uncertainty: u32,
         /// 1: the picture is composed with coast lines, terrain, sea or night (`stages/compose/in_context.wgsl`).
         pub in_context: u32,
         /// 1: particles of tiles are dimmed where it is night.

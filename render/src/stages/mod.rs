@@ -5,9 +5,9 @@
 /// What every shader of a stage begins with: structs, constants and small functions.
 pub const PRELUDE: &str = include_str!("prelude.wgsl");
 
-pub mod doubt;
 pub mod layout;
 pub mod sphere;
+pub mod uncertainty;
 
 pub mod bin;
 pub mod compose;

@@ -31,7 +31,7 @@ fn held(gpu: &Gpu, scene: &Scene, cells: Range<usize>) -> SceneBuffers {
     SceneBuffers {
         value: pair(&scene.value),
         accumulated: scene.accumulated.as_ref().map(pair),
-        doubts: None,
+        uncertainties: None,
         terrain: None,
         light: None,
         northward: None,

@@ -20,11 +20,11 @@ fn full(style: &mut Style) {
     style.transfer.colors = "-1e-9:#440154,0:#21918c,1e-9:#fde725".parse().unwrap();
     style.transfer.opacity = "-1e-9:1,0:0.2,1e-9:1".parse().unwrap();
     style.transfer.size = "-1e-9:1,0:0.5,1e-9:1".parse().unwrap();
-    style.doubt = true;
+    style.uncertainty = true;
 }
 
 #[test]
-fn stops_and_doubt_leave_no_seams() {
+fn stops_and_uncertainty_leave_no_seams() {
     let scene = clouded(ONE_DEGREE);
     for renderer in renderers("look seams") {
         for mode in [Mode::Map, Mode::Sprites, Mode::Volume] {
@@ -139,50 +139,56 @@ fn what_users_make_transparent_is_not_there_and_what_they_make_small_covers_less
 }
 
 #[test]
-fn doubt_rises_with_the_estimated_error_and_is_none_where_a_cell_was_measured() {
+fn uncertainty_rises_with_the_estimated_error_and_is_none_where_a_cell_was_measured() {
     let frame = clouded(FIVE_DEGREES).value.before;
-    let (errors, doubts) = (
+    let (errors, uncertainties) = (
         frame.errors.as_ref().unwrap().content(),
-        frame.doubts().content(),
+        frame.uncertainties().content(),
     );
-    let mut cells: Vec<_> = errors.iter().zip(doubts).collect();
+    let mut cells: Vec<_> = errors.iter().zip(uncertainties).collect();
     assert!(
         cells
             .iter()
-            .all(|(error, doubt)| (**error > 0.0) == (**doubt > 0.3))
+            .all(|(error, uncertainty)| (**error > 0.0) == (**uncertainty > 0.3))
     );
     cells.retain(|(error, _)| **error > 0.0);
     cells.sort_by(|a, b| a.0.total_cmp(b.0));
     assert!(cells.len() > 200 && cells.is_sorted_by(|a, b| a.1 <= b.1));
     let most = cells.last().unwrap();
     assert!((most.1 - 1.0).abs() < 1e-6 && most.1 - cells[0].1 > 0.3);
-    // Without a gap nobody doubts anything.
+    // Without a gap nobody uncertainties anything.
     let whole = ocean(FIVE_DEGREES).value.before;
-    assert!(whole.doubts().content().iter().all(|doubt| *doubt == 0.0));
+    assert!(
+        whole
+            .uncertainties()
+            .content()
+            .iter()
+            .all(|uncertainty| *uncertainty == 0.0)
+    );
 }
 
 #[test]
-fn doubt_is_seen_where_gaps_were_filled_and_nowhere_else() {
+fn uncertainty_is_seen_where_gaps_were_filled_and_nowhere_else() {
     let (scene, whole) = (clouded(ONE_DEGREE), ocean(ONE_DEGREE));
-    let doubt = |style: &mut Style| style.doubt = true;
-    for renderer in renderers("doubt") {
+    let uncertainty = |style: &mut Style| style.uncertainty = true;
+    for renderer in renderers("uncertainty") {
         for mode in Mode::SCALAR {
             let view = tile(2, 0, 1, 256);
-            let (plain, doubted) = (job(mode, view), styled(mode, view, doubt));
+            let (plain, uncertain) = (job(mode, view), styled(mode, view, uncertainty));
             let draw = |job: &RenderJob, scene: &Scene| renderer.render(job, scene).unwrap();
-            // Without a gap there is no doubt, to the byte.
-            assert!(draw(&plain, &whole) == draw(&doubted, &whole), "{mode}");
-            let (sure, unsure) = (draw(&plain, &scene), draw(&doubted, &scene));
+            // Without a gap there is no uncertainty, to the byte.
+            assert!(draw(&plain, &whole) == draw(&uncertain, &whole), "{mode}");
+            let (sure, unsure) = (draw(&plain, &scene), draw(&uncertain, &scene));
             assert_images_differ(&sure, &unsure);
         }
         // On a map every pixel tells: tile 2/0/1 covers 180 W to 90 W, 0 to 66.5 N, in 2.8 pixels a degree.
         let view = tile(2, 0, 1, 256);
         let sure = renderer.render(&job(Mode::Map, view), &scene).unwrap();
         let unsure = renderer
-            .render(&styled(Mode::Map, view, doubt), &scene)
+            .render(&styled(Mode::Map, view, uncertainty), &scene)
             .unwrap();
-        let doubts =
-            [&scene.value.before, &scene.value.after].map(|frame| frame.doubts().content());
+        let uncertainties =
+            [&scene.value.before, &scene.value.after].map(|frame| frame.uncertainties().content());
         let (mut changed, mut checked) = (0, 0);
         for x in 0..256 {
             // The last row of pixels lies at the equator, between rows 89 and 90.
@@ -191,7 +197,7 @@ fn doubt_is_seen_where_gaps_were_filled_and_nowhere_else() {
             let cells = cols.iter().flat_map(|col| [89 * 360 + col, 90 * 360 + col]);
             let is_measured = cells
                 .into_iter()
-                .all(|cell| doubts.iter().all(|d| d[cell] <= 0.0));
+                .all(|cell| uncertainties.iter().all(|d| d[cell] <= 0.0));
             let is_same = sure.pixel(x, 255) == unsure.pixel(x, 255);
             if is_measured {
                 assert!(is_same, "{} column {x}", renderer.name());

@@ -41,7 +41,7 @@ fn drawn(view: contract::job::View, scene: &Scene) -> Drawn {
         value: &value,
         accumulated: &carbon,
         palette: &plan.palette,
-        doubt: &[],
+        uncertainty: &[],
     };
     particles::cpu::generate(&params, &inputs, &mut particles);
     let mut splats = vec![Splat::default(); particles.len()];

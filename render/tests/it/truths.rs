@@ -104,7 +104,7 @@ fn all_particles(scene: &Scene, job: &RenderJob, carbon: &[f32]) -> (Plan, Vec<P
         value: &value,
         accumulated: carbon,
         palette: &plan.palette,
-        doubt: &[],
+        uncertainty: &[],
     };
     generate(&plan.params, &inputs, &mut particles);
     (plan, particles)

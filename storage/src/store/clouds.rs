@@ -8,7 +8,7 @@ use object_store::gcp::{GoogleCloudStorageBuilder, GoogleConfigKey};
 use object_store::{BackoffConfig, ClientConfigKey, ObjectStore, RetryConfig};
 
 use super::location::Cloud;
-use super::settings::{Patience, Settings};
+use super::settings::{RetryLimits, Settings};
 
 /// Opens a bucket; nothing is sent yet.
 ///
@@ -57,14 +57,14 @@ fn s3(bucket: &str, settings: &Settings) -> Result<Arc<dyn ObjectStore>, String>
         "AWS_ENDPOINT_URL",
         "AWS_ALLOW_HTTP",
     )?;
-    for (key, value) in client_options(settings.patience, plain) {
+    for (key, value) in client_options(settings.retry_limits, plain) {
         builder = builder.with_config(Key::Client(key), value);
     }
     let store = builder
         .with_bucket_name(bucket)
         // Objects are created once: a store that cannot promise that is found out by `check_writable`.
         .with_config(Key::ConditionalPut, "etag")
-        .with_retry(retries(settings.patience))
+        .with_retry(retries(settings.retry_limits))
         .build();
     Ok(Arc::new(store.map_err(|e| e.to_string())?))
 }
@@ -95,12 +95,12 @@ fn google(bucket: &str, settings: &Settings) -> Result<Arc<dyn ObjectStore>, Str
         "GOOGLE_BASE_URL",
         "GOOGLE_ALLOW_HTTP",
     )?;
-    for (key, value) in client_options(settings.patience, plain) {
+    for (key, value) in client_options(settings.retry_limits, plain) {
         builder = builder.with_config(Key::Client(key), value);
     }
     let store = builder
         .with_bucket_name(bucket)
-        .with_retry(retries(settings.patience))
+        .with_retry(retries(settings.retry_limits))
         .build();
     Ok(Arc::new(store.map_err(|e| e.to_string())?))
 }
@@ -136,12 +136,12 @@ fn azure(container: &str, settings: &Settings) -> Result<Arc<dyn ObjectStore>, S
         "AZURE_STORAGE_ENDPOINT",
         "AZURE_ALLOW_HTTP",
     )?;
-    for (key, value) in client_options(settings.patience, plain) {
+    for (key, value) in client_options(settings.retry_limits, plain) {
         builder = builder.with_config(Key::Client(key), value);
     }
     let store = builder
         .with_container_name(container)
-        .with_retry(retries(settings.patience))
+        .with_retry(retries(settings.retry_limits))
         .build();
     Ok(Arc::new(store.map_err(|e| e.to_string())?))
 }
@@ -175,25 +175,28 @@ fn plain_http(
 }
 
 /// Time limits and encryption, as every cloud's builder takes them.
-fn client_options(patience: Patience, is_plain: bool) -> [(ClientConfigKey, String); 3] {
+fn client_options(retry_limits: RetryLimits, is_plain: bool) -> [(ClientConfigKey, String); 3] {
     let seconds = |limit: std::time::Duration| format!("{} ms", limit.as_millis());
     [
         (ClientConfigKey::AllowHttp, is_plain.to_string()),
-        (ClientConfigKey::ConnectTimeout, seconds(patience.connect)),
-        (ClientConfigKey::Timeout, seconds(patience.request)),
+        (
+            ClientConfigKey::ConnectTimeout,
+            seconds(retry_limits.connect),
+        ),
+        (ClientConfigKey::Timeout, seconds(retry_limits.request)),
     ]
 }
 
-fn retries(patience: Patience) -> RetryConfig {
+fn retries(retry_limits: RetryLimits) -> RetryConfig {
     RetryConfig {
         backoff: BackoffConfig {
-            init_backoff: Patience::FIRST_PAUSE,
-            max_backoff: Patience::LONGEST_PAUSE,
+            init_backoff: RetryLimits::FIRST_PAUSE,
+            max_backoff: RetryLimits::LONGEST_PAUSE,
             base: 2.0,
         },
         // Time is the limit: pauses only grow, so that this many are never reached.
         max_retries: 10_000,
-        retry_timeout: patience.retries,
+        retry_timeout: retry_limits.retries,
     }
 }
 

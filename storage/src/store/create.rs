@@ -9,7 +9,7 @@ use contract::kind::Vouched;
 use futures::{StreamExt as _, TryStreamExt as _, stream};
 use object_store::{Error, ObjectStoreExt as _, PutMode, PutOptions, PutPayload};
 
-use super::settings::Patience;
+use super::settings::RetryLimits;
 use super::{
     MAX_OBJECT_BYTES, PART_BYTES, PARTS_AT_ONCE, Place, Store, failed, folder, hdfs, path,
 };
@@ -23,7 +23,7 @@ impl Store {
     ///
     /// A store can answer "already exists" to its own half-answered request, and an answer can be lost after the
     /// object was written; so on any doubt the object is read back and compared, and if it is not there the request is
-    /// sent again for as long as the store's patience lasts. A doubt that ends well is told as false.
+    /// sent again for as long as the store's retry limit lasts. A doubt that ends well is told as false.
     ///
     /// Where the key names the digest of the content, other bytes that are there are either the same values in another
     /// encoding, which are as good and stay, or damaged, and then they are replaced: the name vouches for ours.
@@ -32,7 +32,7 @@ impl Store {
     /// upload replaces what is there, which is equal then. Any other object is one conditional request.
     ///
     /// # Errors
-    /// `Conflict` if other content is there. A retryable error after at most twice the patience.
+    /// `Conflict` if other content is there. A retryable error after at most twice the retry limit.
     pub async fn put_new(&self, key: &ObjectKey, content: Bytes) -> Result<bool, StorageError> {
         if content.len() as u64 > MAX_OBJECT_BYTES {
             return Err(StorageError::damaged(
@@ -46,8 +46,8 @@ impl Store {
         }
         let begun = Instant::now();
         let mut pauses = ExponentialBuilder::default()
-            .with_min_delay(Patience::FIRST_PAUSE)
-            .with_max_delay(Patience::LONGEST_PAUSE)
+            .with_min_delay(RetryLimits::FIRST_PAUSE)
+            .with_max_delay(RetryLimits::LONGEST_PAUSE)
             .with_jitter()
             .without_max_times()
             .build();
@@ -62,14 +62,14 @@ impl Store {
             match self.holds(key, &content).await? {
                 Some(true) => return Ok(false),
                 Some(false) => return self.put_beside(key, content).await,
-                None if begun.elapsed() > self.patience.retries => {
+                None if begun.elapsed() > self.retry_limits.retries => {
                     return Err(failed(key, error));
                 }
                 None => {
                     tracing::info!(%key, %error, "not there after a doubtful answer: sent again");
                 }
             }
-            tokio::time::sleep(pauses.next().unwrap_or(Patience::LONGEST_PAUSE)).await;
+            tokio::time::sleep(pauses.next().unwrap_or(RetryLimits::LONGEST_PAUSE)).await;
         }
     }
 

@@ -6,7 +6,7 @@ use hdfs_native_object_store::HdfsObjectStoreBuilder;
 use object_store::{Error, ObjectStore};
 use tokio::runtime::{Handle, Runtime};
 
-use super::patient::Patient;
+use super::retry_store::RetryStore;
 use super::settings::Settings;
 
 /// Opens the file system of a name node (`HOST:PORT`) or a name service; nothing is sent yet.
@@ -26,12 +26,13 @@ pub(super) fn open(node: &str, settings: &Settings) -> Result<Arc<dyn ObjectStor
             .build()?;
         Ok(Arc::new(client) as Arc<dyn ObjectStore>)
     };
-    let store = Patient::new(Box::new(connect), settings.patience, classify).map_err(|e| {
-        format!(
-            "{e}; give hdfs://HOST:PORT/PREFIX, or set HADOOP_CONF_DIR to the folder whose \
+    let store =
+        RetryStore::new(Box::new(connect), settings.retry_limits, classify).map_err(|e| {
+            format!(
+                "{e}; give hdfs://HOST:PORT/PREFIX, or set HADOOP_CONF_DIR to the folder whose \
              hdfs-site.xml knows the name service"
-        )
-    })?;
+            )
+        })?;
     Ok(Arc::new(store))
 }
 

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 /// How long a remote store is waited for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Patience {
+pub struct RetryLimits {
     /// For a connection.
     pub connect: Duration,
     /// For one request with its answer: a read of 16 MiB; a write of 64 MiB, or of a whole object that must be sent
@@ -16,7 +16,7 @@ pub struct Patience {
     pub retries: Duration,
 }
 
-impl Patience {
+impl RetryLimits {
     /// First pause before another try; later ones grow, each with its own jitter.
     pub(super) const FIRST_PAUSE: Duration = Duration::from_millis(100);
     /// Longest pause: how late an answering store is noticed.
@@ -32,7 +32,7 @@ impl Patience {
     }
 }
 
-impl Default for Patience {
+impl Default for RetryLimits {
     /// Outlasts a store that fails for a minute, and ends well before a group of readers takes its member for dead.
     fn default() -> Self {
         Self {
@@ -43,12 +43,12 @@ impl Default for Patience {
     }
 }
 
-/// Variables and patience; the values of variables are secrets and are never shown.
+/// Variables and retry limit; the values of variables are secrets and are never shown.
 #[derive(Clone, Default)]
 pub struct Settings {
     variables: BTreeMap<String, String>,
     /// How long the store is waited for.
-    pub patience: Patience,
+    pub retry_limits: RetryLimits,
 }
 
 impl Settings {
@@ -70,7 +70,7 @@ impl Settings {
                 // An empty variable is how shells and compose files say "not set".
                 .filter(|(name, value)| is_known(name) && !value.is_empty())
                 .collect(),
-            patience: Patience::default(),
+            retry_limits: RetryLimits::default(),
         }
     }
 
@@ -104,7 +104,7 @@ impl Debug for Settings {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Settings")
             .field("variables", &self.variables.keys())
-            .field("patience", &self.patience)
+            .field("retry_limits", &self.retry_limits)
             .finish()
     }
 }

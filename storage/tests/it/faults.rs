@@ -5,20 +5,20 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 use contract::digest::Digest;
 use contract::key::ObjectKey;
-use storage::store::{Patience, Settings};
+use storage::store::{RetryLimits, Settings};
 use storage::{StorageError, Store};
 
 use crate::fault_proxy::{Fault, FaultProxy};
 use crate::stores;
 use crate::suite::noise;
 
-/// Settings of this process with another endpoint and less patience.
+/// Settings of this process with another endpoint and less retry limit.
 fn settings(endpoint: &str, retries: Duration) -> Settings {
     let variables = std::env::vars()
         .filter(|(name, _)| !name.starts_with("AWS_ENDPOINT_URL"))
         .chain([("AWS_ENDPOINT_URL".to_owned(), endpoint.to_owned())]);
     let mut settings = Settings::from_variables(variables);
-    settings.patience = Patience {
+    settings.retry_limits = RetryLimits {
         connect: Duration::from_secs(1),
         request: Duration::from_secs(3),
         retries,

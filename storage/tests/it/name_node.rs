@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 use contract::key::ObjectKey;
 use storage::Store;
-use storage::store::{Patience, Settings};
+use storage::store::{RetryLimits, Settings};
 
 use crate::cut_proxy::{CutProxy, Mood};
 use crate::stores;
@@ -20,7 +20,7 @@ async fn behind_proxy() -> (CutProxy, Store) {
     let (node, prefix) = rest.split_once('/').unwrap();
     let proxy = CutProxy::start(node).await;
     let mut settings = Settings::from_environment();
-    settings.patience = Patience {
+    settings.retry_limits = RetryLimits {
         connect: Duration::from_secs(1),
         request: REQUEST,
         retries: Duration::from_mins(1),

@@ -13,7 +13,7 @@ use crate::suite::noise;
 
 const WRITERS: u64 = 8;
 const OBJECT_BYTES: usize = 100_000;
-/// How long the server is gone each time; less than the patience of a store.
+/// How long the server is gone each time; less than the retry limit of a store.
 const AWAY: Duration = Duration::from_secs(1);
 
 /// A server in a folder and on a port of its own; stopped with this value.

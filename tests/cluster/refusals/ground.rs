@@ -70,7 +70,7 @@ impl Ground {
             ("FLUXGLOBE_EXECUTOR_WORK", path("work")),
             ("FLUXGLOBE_CLUSTER", format!("http://{scheduler}")),
             ("FLUXGLOBE_FETCH_TRIES", "2".to_owned()),
-            ("FLUXGLOBE_FETCH_PATIENCE_S", "1".to_owned()),
+            ("FLUXGLOBE_FETCH_RETRY_S", "1".to_owned()),
             ("FLUXGLOBE_CPU", "true".to_owned()),
             ("FLUXGLOBE_LOG", "info".to_owned()),
         ];

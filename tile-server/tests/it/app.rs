@@ -9,10 +9,10 @@ use axum::http::{HeaderMap, Request, StatusCode};
 use contract::digest::Digest;
 use contract::grid::Grid;
 use contract::manifest::{MANIFEST_SCHEMA, Manifest, ManifestId, SeriesSegment, Step};
-use contract::moment::Moment;
 use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::time::Period;
+use contract::time_sample::TimeSample;
 use serde_json::Value;
 use storage::{Store, domain, frames, manifests, series};
 use tile_server::metrics::Registry;
@@ -227,9 +227,9 @@ impl TestApp {
     }
 
     /// What the newest version of a product is made of at an instant.
-    pub(crate) async fn moment(&self, product: &str, time: &str) -> Moment {
+    pub(crate) async fn time_sample(&self, product: &str, time: &str) -> TimeSample {
         let newest = manifests::latest(&self.store, &product.parse().unwrap()).await;
-        let moment = newest.unwrap().unwrap().moment(time.parse().unwrap());
+        let moment = newest.unwrap().unwrap().time_sample(time.parse().unwrap());
         moment.unwrap()
     }
 

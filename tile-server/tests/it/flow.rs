@@ -29,9 +29,9 @@ async fn a_flow_tile_is_drawn_from_both_parts_and_moves_with_the_instant() {
     assert_eq!(answer.status, StatusCode::OK);
     let job = app.drawer.last_job();
     assert_eq!((job.mode, &job.accumulated), (Mode::Flow, &None));
-    assert_eq!(job.value, app.moment("sea-east", time).await);
+    assert_eq!(job.value, app.time_sample("sea-east", time).await);
     let flow = job.flow.unwrap();
-    assert_eq!(flow.northward, app.moment("sea-north", time).await);
+    assert_eq!(flow.northward, app.time_sample("sea-north", time).await);
     assert!(
         (flow.clock_s - 950_162_400.0).abs() < 1e-3,
         "{}",
@@ -148,7 +148,7 @@ async fn a_new_northward_part_changes_flows_and_nothing_else_and_old_versions_dr
     assert_ne!(tag("flow", &named).await, tag("flow", "").await);
     let time = "2000-03-20";
     let drawn = app.drawer.last_job().flow.unwrap().northward;
-    assert_eq!(drawn, app.moment("sea-north", time).await);
+    assert_eq!(drawn, app.time_sample("sea-north", time).await);
 }
 
 #[tokio::test]

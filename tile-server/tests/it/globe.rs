@@ -26,7 +26,7 @@ async fn a_view_is_the_picture_of_the_job_its_address_means() {
             height_px: 360
         }
     );
-    assert_eq!(job.value, app.moment("flux", "2000-02-03").await);
+    assert_eq!(job.value, app.time_sample("flux", "2000-02-03").await);
     assert!(job.style.globe_surface);
     assert_eq!(answer.header("etag"), format!("\"{}\"", job.digest()));
 }

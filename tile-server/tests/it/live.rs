@@ -155,9 +155,9 @@ async fn exactly_the_hot_tiles_that_it_touches_are_ordered() {
         .collect();
     asked.sort_by_key(|(mode, _)| *mode);
     let (march, february, newest) = (
-        live.app.moment("sst", "2000-03-20").await,
-        live.app.moment("sst", "2000-02-20").await,
-        live.app.moment("sst", "2000-03-16T12:00:00Z").await,
+        live.app.time_sample("sst", "2000-03-20").await,
+        live.app.time_sample("sst", "2000-02-20").await,
+        live.app.time_sample("sst", "2000-03-16T12:00:00Z").await,
     );
     assert_eq!(
         asked,
@@ -216,8 +216,8 @@ async fn pictures_of_a_flux_wait_for_what_lifts_their_particles() {
     let orders = live.orders().await;
     assert_eq!(orders.len(), 1);
     let time = "2000-03-20";
-    assert_eq!(orders[0].1.value, live.app.moment("flux", time).await);
-    let lifting = live.app.moment(product, time).await;
+    assert_eq!(orders[0].1.value, live.app.time_sample("flux", time).await);
+    let lifting = live.app.time_sample(product, time).await;
     assert_eq!(orders[0].1.accumulated, Some(lifting));
 }
 
@@ -346,7 +346,7 @@ async fn a_new_northward_part_is_news_of_the_flow_whose_hot_tiles_are_ordered() 
     let manifest = told["manifest"].as_str().unwrap();
     assert!(manifest.starts_with("sea-east@1-"), "{manifest}");
     assert_eq!(told["touched"][0]["start"], "2000-02-01T00:00:00Z");
-    let wanted = live.app.moment("sea-north", "2000-03-20").await;
+    let wanted = live.app.time_sample("sea-north", "2000-03-20").await;
     let is_wanted = |(_, job): &(Event, RenderJob)| {
         let flow = job.flow.as_ref();
         flow.is_some_and(|flow| flow.northward == wanted)

@@ -9,7 +9,7 @@ use serde_json::json;
 use crate::app::TestApp;
 
 const LOOK: &str =
-    "palette=ice&range=10:30&opacity=10:0.2,30:1&particle_size=10:0.5&reverse=true&doubt=1";
+    "palette=ice&range=10:30&opacity=10:0.2,30:1&particle_size=10:0.5&reverse=true&uncertainty=1";
 
 #[tokio::test]
 async fn a_look_is_a_part_of_the_job_in_stored_units() {
@@ -25,13 +25,13 @@ async fn a_look_is_a_part_of_the_job_in_stored_units() {
         assert!((transfer.low - 283.15).abs() < 1e-9 && (transfer.high - 303.15).abs() < 1e-9);
         assert!((transfer.opacity(293.15).unwrap() - 0.6).abs() < 1e-9);
         assert!((transfer.size(293.15).unwrap() - 0.5).abs() < 1e-9);
-        assert!(transfer.reversed && job.style.doubt);
+        assert!(transfer.reversed && job.style.uncertainty);
         assert_eq!(answer.header("etag"), format!("\"{}\"", job.digest()));
         assert_ne!(answer.header("etag"), plain.header("etag"));
         let transfer = TransferFunction::default_for(Quantity::SeaSurfaceTemperature);
         let rest = Style {
             transfer,
-            doubt: false,
+            uncertainty: false,
             ..job.style
         };
         assert_eq!(rest, usual, "nothing else changed");
@@ -52,7 +52,7 @@ async fn one_look_written_in_two_ways_is_one_picture() {
     assert_eq!(stops, tag("stops=-4.0e1:11387F,%2040:760E24").await);
     assert_eq!(
         stops,
-        tag("stops=-40:11387f,40:760e24&range=-40:40&doubt=0").await
+        tag("stops=-40:11387f,40:760e24&range=-40:40&uncertainty=0").await
     );
     let usual = tag("").await;
     assert_eq!(
@@ -76,18 +76,19 @@ async fn looks_of_their_own_are_not_drawn_before_they_are_asked_for() {
 #[tokio::test]
 async fn tilejson_names_tiles_and_legend_of_the_look_asked_for() {
     let app = TestApp::new().await;
-    let path = "/tiles/flux/map.json?stops=-40:%2311387f,40:%23760e24&doubt=1&time=2000-02-01";
+    let path =
+        "/tiles/flux/map.json?stops=-40:%2311387f,40:%23760e24&uncertainty=1&time=2000-02-01";
     let body = app.get_with(path, &[("host", "h:1")]).await.json();
     let template = body["tiles"][0].as_str().unwrap();
-    let end = "&stops=-40:11387f,40:760e24&doubt=true";
+    let end = "&stops=-40:11387f,40:760e24&uncertainty=true";
     assert!(template.ends_with(end), "{template}");
     let tile = template.replace("http://h:1", "").replace("{z}", "0");
     let tile = tile.replace("{x}", "0").replace("{y}", "0");
     assert_eq!(app.get(&tile).await.status, StatusCode::OK);
-    assert!(app.drawer.last_job().style.doubt);
+    assert!(app.drawer.last_job().style.uncertainty);
     assert_eq!(
         body["legend"],
-        "<img src=\"http://h:1/api/products/flux/legend.svg?stops=-40:11387f,40:760e24&amp;doubt=true\" alt=\"Air-sea CO₂ flux\">"
+        "<img src=\"http://h:1/api/products/flux/legend.svg?stops=-40:11387f,40:760e24&amp;uncertainty=true\" alt=\"Air-sea CO₂ flux\">"
     );
     let plain = app.get("/tiles/flux/map.json").await.json();
     assert!(

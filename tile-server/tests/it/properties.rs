@@ -39,7 +39,7 @@ fn query() -> impl Strategy<Value = String> {
         "stops",
         "opacity",
         "particle_size",
-        "doubt",
+        "uncertainty",
         "x",
     ]);
     let value = prop_oneof![

@@ -13,7 +13,7 @@ use axum::response::{IntoResponse as _, Response};
 use axum::routing::any;
 use contract::quantity::Quantity;
 use storage::Store;
-use storage::store::{Patience, Settings};
+use storage::store::{RetryLimits, Settings};
 
 use crate::app::TestApp;
 
@@ -104,7 +104,7 @@ async fn remote() -> (Arc<Bucket>, Store) {
     ];
     let owned = variables.map(|(name, value)| (name.to_owned(), value.to_owned()));
     let mut settings = Settings::from_variables(owned);
-    settings.patience = Patience::interactive();
+    settings.retry_limits = RetryLimits::interactive();
     let store = Store::open_with("s3://bucket", &settings).unwrap();
     (bucket, store)
 }

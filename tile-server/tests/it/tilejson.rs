@@ -43,7 +43,7 @@ async fn its_tiles_are_there() {
         .replace("{x}", "0")
         .replace("{y}", "0");
     assert_eq!(app.get(&tile).await.status, StatusCode::OK);
-    let meant = app.moment("flux", "2000-02-01T00:00:00Z").await;
+    let meant = app.time_sample("flux", "2000-02-01T00:00:00Z").await;
     assert_eq!(app.drawer.last_job().value, meant);
 }
 

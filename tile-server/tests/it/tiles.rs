@@ -30,8 +30,8 @@ async fn a_tile_is_the_picture_of_the_job_its_address_means() {
     );
     assert_eq!(job.mode, Mode::Volume);
     let time = "2000-02-10T06:00:00Z";
-    assert_eq!(job.value, app.moment("flux", time).await);
-    let lift = app.moment("flux-accumulated", time).await;
+    assert_eq!(job.value, app.time_sample("flux", time).await);
+    let lift = app.time_sample("flux-accumulated", time).await;
     assert_eq!(job.accumulated, Some(lift));
     assert!(!job.style.globe_surface);
 }
@@ -52,7 +52,7 @@ async fn every_mode_has_its_own_picture() {
 async fn without_a_time_the_middle_of_the_last_step_is_drawn() {
     let app = TestApp::new().await;
     app.get("/tiles/flux/volume/0/0/0.png").await;
-    let middle = app.moment("flux", "2000-03-16T12:00:00Z").await;
+    let middle = app.time_sample("flux", "2000-03-16T12:00:00Z").await;
     assert_eq!(app.drawer.last_job().value, middle);
 }
 
@@ -101,7 +101,7 @@ async fn accumulated_carbon_that_came_from_another_version_does_not_lift_particl
     app.land("flux", Quantity::CarbonFlux, 2).await;
     app.get("/tiles/flux/volume/0/0/0.png").await;
     assert_eq!(app.drawer.last_job().accumulated, None);
-    let new = app.moment("flux", "2000-03-16T12:00:00Z").await;
+    let new = app.time_sample("flux", "2000-03-16T12:00:00Z").await;
     assert_eq!(app.drawer.last_job().value, new);
 }
 
@@ -181,7 +181,7 @@ async fn offsets_of_times_survive_the_address() {
     for time in ["2000-02-10T06:00:00%2B02:00", "2000-02-10T06:00:00+02:00"] {
         app.get(&format!("/tiles/flux/volume/0/0/0.png?time={time}"))
             .await;
-        let meant = app.moment("flux", "2000-02-10T04:00:00Z").await;
+        let meant = app.time_sample("flux", "2000-02-10T04:00:00Z").await;
         assert_eq!(app.drawer.last_job().value, meant);
     }
 }

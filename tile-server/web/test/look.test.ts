@@ -17,7 +17,7 @@ const FULL: Look = {
   palette: "ice",
   reversed: true,
   range: { low: -10, high: 2.5 },
-  doubt: true,
+  uncertainty: true,
   relief: "etopo20",
   reliefExaggeration: 40,
   seaOpacity: 0.35,
@@ -26,7 +26,7 @@ const FULL: Look = {
   sunOfTime: true,
 };
 const FULL_QUERY =
-  "palette=ice&range=-10:2.5&reverse=true&doubt=true&relief=etopo20&relief_exaggeration=40&sea_opacity=0.35&coastlines=true&height_exaggeration=4000000&sun=time";
+  "palette=ice&range=-10:2.5&reverse=true&uncertainty=true&relief=etopo20&relief_exaggeration=40&sea_opacity=0.35&coastlines=true&height_exaggeration=4000000&sun=time";
 
 const BALANCE: Palette = { name: "balance", stops: [[0, "#11387f"], [0.5, "#f0f0ee"], [1, "#760e24"]] };
 const ICE: Palette = { name: "ice", stops: [[0, "#030512"], [1, "#eafcfd"]] };
@@ -97,7 +97,7 @@ describe("a look in an address", () => {
       ["range", "0:Infinity"],
       ["range", "-1e30:1"],
       ["reverse", "1"],
-      ["doubt", ""],
+      ["uncertainty", ""],
       ["coastlines", "false"],
       ["relief", "../etopo"],
       ["relief_exaggeration", ""],
@@ -159,7 +159,7 @@ describe("of a look", () => {
     expect(effective({ ...FULL, relief: null }, "volume", true).seaOpacity).toBe(0.35);
     expect(effective({ ...FULL, relief: null }, "volume", false).seaOpacity).toBe(0);
     expect(effective(FULL, "volume", true)).toEqual(FULL);
-    expect(effective(FULL, "flow", false).doubt).toBe(false);
+    expect(effective(FULL, "flow", false).uncertainty).toBe(false);
   });
 
   it("what this server does not have is forgotten, and the rest kept as it is", () => {
@@ -198,8 +198,8 @@ describe("the look panel", () => {
 
   it("offers sea and height where there is something below or above the sea", () => {
     const shown = (change: Partial<State>) => {
-      const { canDoubt, hasRelief, hasSea, hasHeight } = offer(change) ?? {};
-      return [canDoubt, hasRelief, hasSea, hasHeight];
+      const { canUncertainty, hasRelief, hasSea, hasHeight } = offer(change) ?? {};
+      return [canUncertainty, hasRelief, hasSea, hasHeight];
     };
     expect(shown({ mode: "map" })).toEqual([true, false, false, false]);
     expect(shown({ mode: "volume" })).toEqual([true, false, true, true]);

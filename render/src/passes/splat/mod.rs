@@ -16,7 +16,7 @@ pub const SOURCE: &str = concat!(
     include_str!("../../stages/prelude.wgsl"),
     include_str!("../../stages/interpolate/between.wgsl"),
     include_str!("../../stages/particles/particles.wgsl"),
-    include_str!("../../stages/doubt.wgsl"),
+    include_str!("../../stages/uncertainty.wgsl"),
     include_str!("../../stages/project/project.wgsl"),
     include_str!("../../stages/light/texel.wgsl"),
     include_str!("../../stages/light/deposit.wgsl"),
@@ -91,15 +91,16 @@ impl Splats {
             .accumulated_frames
             .as_ref()
             .unwrap_or(&frame.value_frames);
-        // Bound but never read where doubt is not drawn.
-        let [doubt_before, doubt_after] = frame.doubts.as_ref().unwrap_or(&frame.value_frames);
+        // Bound but never read where uncertainty is not drawn.
+        let [uncertainty_before, uncertainty_after] =
+            frame.uncertainties.as_ref().unwrap_or(&frame.value_frames);
         let buffers = stored.with([
             (4, before),
             (5, after),
             (6, carbon_before),
             (7, carbon_after),
-            (12, doubt_before),
-            (13, doubt_after),
+            (12, uncertainty_before),
+            (13, uncertainty_after),
         ]);
         let groups = workgroups(&frame.params);
         frame.recorder.dispatch_deep(&self.splat, &buffers, groups);

@@ -5,9 +5,9 @@
 @group(0) @binding(5) var<storage, read> value_after: array<f32>;
 @group(0) @binding(6) var<storage, read> carbon_before: array<f32>;
 @group(0) @binding(7) var<storage, read> carbon_after: array<f32>;
-// Bound but never read where doubt is not drawn.
-@group(0) @binding(12) var<storage, read> doubt_before: array<f32>;
-@group(0) @binding(13) var<storage, read> doubt_after: array<f32>;
+// Bound but never read where uncertainty is not drawn.
+@group(0) @binding(12) var<storage, read> uncertainty_before: array<f32>;
+@group(0) @binding(13) var<storage, read> uncertainty_after: array<f32>;
 
 // Carbon of a cell, counted from the first held; what is missing has accumulated nothing.
 fn carbon_of(cell: u32) -> f32 {
@@ -27,13 +27,13 @@ fn splat(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) w
     let row = params.first_row + down;
     var value = MISSING;
     var carbon = 0.0;
-    var doubt = 0.0;
+    var uncertainty = 0.0;
     if (down < params.row_count && slot < params.slot_count) {
         let cell = row * params.cols + cols[slot].index - params.held_first_cell;
         value = interpolated(value_before[cell], value_after[cell], params.value_weight);
         if (!is_missing(value)) {
             carbon = carbon_of(cell);
-            doubt = doubt_of(cell);
+            uncertainty = uncertainty_of(cell);
             if (!is_in_cap(row, slot)) { value = MISSING; }
         }
     }
@@ -45,7 +45,7 @@ fn splat(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) w
             store_nothing(at);
         } else {
             var particle = particle_of(row, slot, k, value, carbon);
-            if (doubt > 0.0) { particle = doubted(particle, doubt); }
+            if (uncertainty > 0.0) { particle = uncertain(particle, uncertainty); }
             store(at, splat_of(particle));
         }
     }

@@ -5,7 +5,7 @@ use glam::{Vec2, Vec3};
 use crate::stages::layout::{
     Active, MISSING, Params, Particle, Row, Velocity, is_missing, nearest,
 };
-use crate::stages::particles::cpu::{HALF_TURN, hash, shaken, unit};
+use crate::stages::particles::cpu::{HALF_TURN, hash, jittered, unit};
 use crate::stages::project::cpu::turned;
 
 /// Longest trail, lives.
@@ -219,7 +219,7 @@ impl Field<'_> {
         }
         let along = |step: u32, bits: u32| {
             let start = HALF_TURN.wrapping_add(number.wrapping_mul(step));
-            unit(start.wrapping_add(shaken(params, bits)))
+            unit(start.wrapping_add(jittered(params, bits)))
         };
         trail.place = Vec2::new(along(3242174889, life), along(2447445414, hash(life)));
         trail.open = 1.0;

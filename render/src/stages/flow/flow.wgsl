@@ -66,7 +66,7 @@ fn trail_of(row: u32, slot: u32, number: u32) -> Trail {
     let life = hash(bits ^ ((params.flow_cycle + u32(turn)) * 0x85ebca6bu));
     if (hash(life ^ 0x68bc21ebu) > params.flow_share) { return trail; }
     let start = vec2(HALF_TURN) + number * vec2(3242174889u, 2447445414u);
-    trail.place = vec2(unit(start.x + shaken(life)), unit(start.y + shaken(hash(life))));
+    trail.place = vec2(unit(start.x + jittered(life)), unit(start.y + jittered(hash(life))));
     trail.open = 1.0;
     let share = (max(trail.age - TRAIL, 0.0) - 0.5) / f32(params.flow_lead_steps);
     for (var step = 0u; step < params.flow_lead_steps; step++) {

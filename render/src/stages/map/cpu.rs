@@ -4,9 +4,9 @@ use std::f32::consts::TAU;
 
 use glam::{Vec2, Vec3, Vec4};
 
-use crate::stages::doubt::hatched;
 use crate::stages::layout::{Axis, Params, VIEW_TILE, is_missing, nearest};
 use crate::stages::sphere::ground_below;
+use crate::stages::uncertainty::hatched;
 
 /// What the stage reads.
 pub struct Inputs<'a> {
@@ -14,8 +14,8 @@ pub struct Inputs<'a> {
     pub palette: &'a [u32],
     /// Columns, then rows of a tile.
     pub axes: &'a [Axis],
-    /// Doubt of every cell; empty where it is not drawn.
-    pub doubt: &'a [f32],
+    /// Uncertainty of every cell; empty where it is not drawn.
+    pub uncertainty: &'a [f32],
 }
 
 /// Every pixel of a thematic map.
@@ -72,14 +72,15 @@ fn cell_value(params: &Params, value: &[f32], row: i32, col: i32) -> Vec2 {
     }
 }
 
-fn cell_doubt(params: &Params, doubt: &[f32], row: i32, col: i32) -> f32 {
-    cell_at(params, row, col).map_or(0.0, |cell| doubt[cell])
+fn cell_uncertainty(params: &Params, uncertainty: &[f32], row: i32, col: i32) -> f32 {
+    cell_at(params, row, col).map_or(0.0, |cell| uncertainty[cell])
 }
 
-fn doubt_at(params: &Params, doubt: &[f32], [x, y]: [Axis; 2]) -> f32 {
+fn uncertainty_at(params: &Params, uncertainty: &[f32], [x, y]: [Axis; 2]) -> f32 {
     let mix = |a: f32, b: f32, t: f32| a * (1.0 - t) + b * t;
     let along = |row| {
-        let [west, east] = [x.index, x.index + 1].map(|col| cell_doubt(params, doubt, row, col));
+        let [west, east] =
+            [x.index, x.index + 1].map(|col| cell_uncertainty(params, uncertainty, row, col));
         mix(west, east, x.fraction)
     };
     mix(along(y.index), along(y.index + 1), y.fraction)
@@ -117,9 +118,9 @@ fn color_at(params: &Params, inputs: &Inputs<'_>, [x, y]: [Axis; 2], pixel: [u32
     let color = palette[at];
     let channel = |shift: u32| ((color >> shift) & 255) as f32 / 255.0;
     let mut rgb = Vec3::new(channel(0), channel(8), channel(16));
-    if params.doubt == 1 {
-        let doubt = doubt_at(params, inputs.doubt, [x, y]);
-        rgb = hatched(params, rgb, doubt, pixel);
+    if params.uncertainty == 1 {
+        let uncertainty = uncertainty_at(params, inputs.uncertainty, [x, y]);
+        rgb = hatched(params, rgb, uncertainty, pixel);
     }
     rgb.extend(1.0) * alpha
 }

@@ -3,9 +3,9 @@
 @group(0) @binding(2) var<storage, read> palette: array<u32>;
 @group(0) @binding(3) var<storage, read> axes: array<Axis>;
 @group(0) @binding(4) var<storage, read_write> picture: array<vec4<f32>>;
-// Bound but never read where doubt is not drawn.
-@group(0) @binding(5) var<storage, read> doubt_before: array<f32>;
-@group(0) @binding(6) var<storage, read> doubt_after: array<f32>;
+// Bound but never read where uncertainty is not drawn.
+@group(0) @binding(5) var<storage, read> uncertainty_before: array<f32>;
+@group(0) @binding(6) var<storage, read> uncertainty_after: array<f32>;
 
 // Cells that are not there.
 const NO_CELL = 0xffffffffu;
@@ -29,15 +29,15 @@ fn cell_value(row: i32, col: i32) -> vec2<f32> {
     return vec2(value, 1.0);
 }
 
-fn cell_doubt(row: i32, col: i32) -> f32 {
+fn cell_uncertainty(row: i32, col: i32) -> f32 {
     let cell = cell_at(row, col);
     if (cell == NO_CELL) { return 0.0; }
-    return doubt_of(cell);
+    return uncertainty_of(cell);
 }
 
-fn doubt_at(x: Axis, y: Axis) -> f32 {
-    let north = mix(cell_doubt(y.index, x.index), cell_doubt(y.index, x.index + 1), x.fraction);
-    let south = mix(cell_doubt(y.index + 1, x.index), cell_doubt(y.index + 1, x.index + 1), x.fraction);
+fn uncertainty_at(x: Axis, y: Axis) -> f32 {
+    let north = mix(cell_uncertainty(y.index, x.index), cell_uncertainty(y.index, x.index + 1), x.fraction);
+    let south = mix(cell_uncertainty(y.index + 1, x.index), cell_uncertainty(y.index + 1, x.index + 1), x.fraction);
     return mix(north, south, y.fraction);
 }
 
@@ -53,7 +53,7 @@ fn color_at(x: Axis, y: Axis, pixel: vec2<u32>) -> vec4<f32> {
     if (params.shape_table == 1u) { alpha *= f32(palette[256u + at] & 0xffffu) / 65535.0; }
     let color = palette[at];
     var rgb = vec3(f32(color & 255u), f32((color >> 8u) & 255u), f32((color >> 16u) & 255u)) / 255.0;
-    if (params.doubt == 1u) { rgb = hatched(rgb, doubt_at(x, y), pixel); }
+    if (params.uncertainty == 1u) { rgb = hatched(rgb, uncertainty_at(x, y), pixel); }
     return vec4(rgb, 1.0) * alpha;
 }
 

@@ -11,7 +11,7 @@ use crate::stages::layout::Axis;
 pub const SOURCE: &str = concat!(
     include_str!("../prelude.wgsl"),
     include_str!("../sphere.wgsl"),
-    include_str!("../doubt.wgsl"),
+    include_str!("../uncertainty.wgsl"),
     include_str!("map.wgsl")
 );
 
@@ -41,16 +41,17 @@ impl Map {
             frame.upload(Slot::Axes, &plan.axes)?;
         }
         let picture = frame.room(Slot::Picture, frame.pixel_count() * 16)?;
-        // Bound but never read where doubt is not drawn.
-        let [doubt_before, doubt_after] = frame.doubts.as_ref().unwrap_or(&frame.value_frames);
+        // Bound but never read where uncertainty is not drawn.
+        let [uncertainty_before, uncertainty_after] =
+            frame.uncertainties.as_ref().unwrap_or(&frame.value_frames);
         let buffers = [
             (0, &frame.params_buffer),
             (1, &value),
             (2, &palette),
             (3, &axes),
             (4, &picture),
-            (5, doubt_before),
-            (6, doubt_after),
+            (5, uncertainty_before),
+            (6, uncertainty_after),
         ];
         frame.recorder.dispatch(
             &self.map,

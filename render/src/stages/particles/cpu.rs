@@ -1,9 +1,9 @@
 //! CPU twin of `particles.wgsl`.
 
-use crate::stages::doubt::doubted;
 use crate::stages::layout::{
     Active, Params, Particle, Row, WATER_BLUE, WATER_GREEN, WATER_RED, is_missing, nearest,
 };
+use crate::stages::uncertainty::uncertain;
 
 /// 0.5 in 32 bits.
 pub const HALF_TURN: u32 = 0x8000_0000;
@@ -15,8 +15,8 @@ pub struct Inputs<'a> {
     pub value: &'a [f32],
     pub accumulated: &'a [f32],
     pub palette: &'a [u32],
-    /// Doubt of every cell; empty where it is not drawn.
-    pub doubt: &'a [f32],
+    /// Uncertainty of every cell; empty where it is not drawn.
+    pub uncertainty: &'a [f32],
 }
 
 /// Output permutation of a 32-bit linear congruential generator (PCG-RXS-M-XS, O'Neill 2014).
@@ -32,8 +32,8 @@ pub fn unit(bits: u32) -> f32 {
 }
 
 /// Random bits spread evenly round 0 over the mode's share of a cell.
-pub fn shaken(params: &Params, bits: u32) -> u32 {
-    (bits >> params.shake_shift).wrapping_sub(HALF_TURN >> params.shake_shift)
+pub fn jittered(params: &Params, bits: u32) -> u32 {
+    (bits >> params.jitter_shift).wrapping_sub(HALF_TURN >> params.jitter_shift)
 }
 
 /// Thin at both ends of a column, so that particles appear and vanish unseen; mean 1.
@@ -79,7 +79,7 @@ fn one(params: &Params, inputs: &Inputs<'_>, cell: Active, k: u32) -> Particle {
     let along = |step: u32, bits: u32| {
         HALF_TURN
             .wrapping_add(k.wrapping_mul(step))
-            .wrapping_add(shaken(params, bits))
+            .wrapping_add(jittered(params, bits))
     };
     let (east, south) = (along(3242174889, bits), along(2447445414, hash(bits)));
     let across = (cell.cell % params.cols).wrapping_mul(1779033704);
@@ -127,8 +127,8 @@ fn one(params: &Params, inputs: &Inputs<'_>, cell: Active, k: u32) -> Particle {
     if params.sea_per_m > 0.0 && particle.height_m < 0.0 {
         particle.color = through_water(params, particle.color, -particle.height_m);
     }
-    match inputs.doubt.get(cell.cell as usize) {
-        Some(&doubt) if doubt > 0.0 => doubted(particle, doubt),
+    match inputs.uncertainty.get(cell.cell as usize) {
+        Some(&uncertainty) if uncertainty > 0.0 => uncertain(particle, uncertainty),
         Some(_) | None => particle,
     }
 }

@@ -15,8 +15,8 @@ fn unit(bits: u32) -> f32 {
 }
 
 // Random bits spread evenly round 0 over the mode's share of a cell.
-fn shaken(bits: u32) -> u32 {
-    return (bits >> params.shake_shift) - (HALF_TURN >> params.shake_shift);
+fn jittered(bits: u32) -> u32 {
+    return (bits >> params.jitter_shift) - (HALF_TURN >> params.jitter_shift);
 }
 
 // Thin at both ends of a column, so that particles appear and vanish unseen; mean 1.
@@ -42,15 +42,15 @@ fn particle_of(row: u32, slot: u32, k: u32, value: f32, carbon: f32) -> Particle
     let col = cols[slot].index;
     let cell = row * params.cols + col;
     let bits = hash(hash(cell) ^ (k * 0x9e3779b9u));
-    // An additive sequence (R2, Roberts 2018) round the cell's centre, shaken by random numbers: little for clouds,
+    // An additive sequence (R2, Roberts 2018) round the cell's centre, jittered by random numbers: little for clouds,
     // which then cover the sea evenly, wholly for dots, which must not stand in rows. Golden sections up the column.
     let place = vec2(HALF_TURN) + k * vec2(3242174889u, 2447445414u);
     let start = row * 2654435769u + col * 1779033704u + k * 2654435769u;
     var particle: Particle;
     particle.row = row;
     particle.slot = slot;
-    particle.east = unit(place.x + shaken(bits));
-    particle.south = unit(place.y + shaken(hash(bits)));
+    particle.east = unit(place.x + jittered(bits));
+    particle.south = unit(place.y + jittered(hash(bits)));
     let phase = fract(unit(start + (hash(bits ^ 0x85ebca6bu) >> 3u)) + params.turns_per_kg_m2 * abs(carbon));
     let column_m = clamp(carbon * params.height_m_per_kg_m2, -params.height_limit_m, params.height_limit_m);
     let position = clamp((value - params.transfer_low) * params.transfer_per_unit, 0.0, 1.0);

@@ -28,7 +28,7 @@ use render::stages::layout::{
 use render::stages::light::{self, texel_count};
 use render::stages::map::{self};
 use render::stages::particles::cpu::Inputs;
-use render::stages::{compose, doubt, eye, interpolate, particles, project};
+use render::stages::{compose, eye, interpolate, particles, project, uncertainty};
 use render_proof::currents::{self, gyres};
 
 use crate::compare::worst;
@@ -56,12 +56,12 @@ impl Twins {
         Self::styled(mode, view, ocean(FIVE_DEGREES), |_style| ())
     }
 
-    /// Of an ocean under clouds, in stops of opacity and size and with doubt.
-    fn doubted(mode: Mode, view: View) -> Self {
+    /// Of an ocean under clouds, in stops of opacity and size and with uncertainty.
+    fn uncertain(mode: Mode, view: View) -> Self {
         Self::styled(mode, view, clouded(FIVE_DEGREES), |style| {
             style.transfer.opacity = "-1e-9:0.9,0:0.1,1e-9:0.7".parse().unwrap();
             style.transfer.size = "-1e-9:0.4,0:1,1e-9:0.6".parse().unwrap();
-            style.doubt = true;
+            style.uncertainty = true;
         })
     }
 
@@ -88,7 +88,7 @@ impl Twins {
         let carbon = scene.accumulated.as_ref();
         let accumulated = between(&params, carbon, params.accumulated_weight);
         let northward = between(&params, scene.northward.as_ref(), params.northward_weight);
-        let doubt = doubt::between(&params, &scene.value);
+        let uncertainty = uncertainty::between(&params, &scene.value);
         let mut particles =
             vec![Particle::default(); plan.active.len() * params.particles_per_cell as usize];
         let inputs = Inputs {
@@ -97,7 +97,7 @@ impl Twins {
             value: &value,
             accumulated: &accumulated,
             palette: &plan.palette,
-            doubt: &doubt,
+            uncertainty: &uncertainty,
         };
         let mut picture = vec![Vec4::ZERO; (params.width * params.height) as usize];
         let (mut splats, mut deposited, mut light) =
@@ -108,7 +108,7 @@ impl Twins {
                 value: &value,
                 palette: &plan.palette,
                 axes: &plan.axes,
-                doubt: &doubt,
+                uncertainty: &uncertainty,
             };
             map::cpu::map(&params, &inputs, &mut picture);
         } else {
@@ -162,9 +162,9 @@ impl Twins {
         }
     }
 
-    fn doubted_tile() -> &'static Self {
+    fn uncertain_tile() -> &'static Self {
         static TWINS: OnceLock<Twins> = OnceLock::new();
-        TWINS.get_or_init(|| Self::doubted(Mode::Volume, tile(2, 0, 1, 256)))
+        TWINS.get_or_init(|| Self::uncertain(Mode::Volume, tile(2, 0, 1, 256)))
     }
 
     fn tile() -> &'static Self {
@@ -213,9 +213,9 @@ impl Twins {
             accumulated: self.scene.accumulated.as_ref().map(pair),
             northward: self.scene.northward.as_ref().map(pair),
             domain: gpu.storage("domain", self.scene.domain.content()).unwrap(),
-            doubts: Some(
+            uncertainties: Some(
                 [&self.scene.value.before, &self.scene.value.after]
-                    .map(|frame| buffer(frame.doubts().content())),
+                    .map(|frame| buffer(frame.uncertainties().content())),
             ),
             terrain: self
                 .scene

@@ -22,16 +22,16 @@ fn map_matches_its_twin_on_tiles_and_on_the_globe() {
             "mix(south, north",
         )
     });
-    let [on_tile, on_globe] = views.map(|view| Twins::doubted(Mode::Map, view));
-    let doubted = [
-        (on_tile, "* doubt * line_at(pixel)", "* doubt"),
+    let [on_tile, on_globe] = views.map(|view| Twins::uncertain(Mode::Map, view));
+    let uncertain = [
+        (on_tile, "* uncertainty * line_at(pixel)", "* uncertainty"),
         (
             on_globe,
             "palette[256u + at] & 0xffffu",
             "palette[256u + at] & 0x7fffu",
         ),
     ];
-    for (twins, right, wrong) in plain.into_iter().chain(doubted) {
+    for (twins, right, wrong) in plain.into_iter().chain(uncertain) {
         let expected = channels(&twins.picture);
         prove("map", map::SOURCE, right, wrong, |gpu, source| {
             let stage = Map::new(gpu, source);

@@ -3,7 +3,9 @@
 use contract::job::Mode;
 use render::passes::splat::{self, Splats};
 use render::passes::{place, trails};
-use render::stages::{bin, compose, doubt, eye, flow, interpolate, light, particles, project};
+use render::stages::{
+    bin, compose, eye, flow, interpolate, light, particles, project, uncertainty,
+};
 
 use super::{Twins, prove, splat_numbers};
 use crate::compare::worst;
@@ -13,21 +15,29 @@ use crate::scenes::{FIVE_DEGREES, tile};
 #[test]
 fn splats_match_their_twins_on_tiles_and_on_the_globe() {
     let faults = [
-        (Twins::tile(), "place.x + shaken", "place.y + shaken"),
+        (Twins::tile(), "place.x + jittered", "place.y + jittered"),
         (Twins::tile(), "ground_y - nearest(", "ground_y + nearest("),
         (
             Twins::globe(),
             "1.0 + particle.height_m",
             "1.0 - particle.height_m",
         ),
-        (Twins::doubted_tile(), "shape >> 16u", "shape >> 17u"),
-        (Twins::doubted_tile(), "shape & 0xffffu", "shape & 0x7fffu"),
+        (Twins::uncertain_tile(), "shape >> 16u", "shape >> 17u"),
         (
-            Twins::doubted_tile(),
-            "doubt_after[cell] - before",
-            "doubt_after[cell]",
+            Twins::uncertain_tile(),
+            "shape & 0xffffu",
+            "shape & 0x7fffu",
         ),
-        (Twins::doubted_tile(), "PALENESS * doubt", "doubt"),
+        (
+            Twins::uncertain_tile(),
+            "uncertainty_after[cell] - before",
+            "uncertainty_after[cell]",
+        ),
+        (
+            Twins::uncertain_tile(),
+            "PALENESS * uncertainty",
+            "uncertainty",
+        ),
     ];
     for (twins, right, wrong) in faults {
         let expected = splat_numbers(twins.params.kernel, &twins.splats, &twins.splats);
@@ -61,7 +71,7 @@ fn every_function_of_a_particle_is_in_the_pass_that_is_tested() {
     for functions in [
         interpolate::FUNCTIONS,
         particles::FUNCTIONS,
-        doubt::FUNCTIONS,
+        uncertainty::FUNCTIONS,
         project::FUNCTIONS,
         light::DEPOSIT_FUNCTIONS,
         bin::FUNCTIONS,

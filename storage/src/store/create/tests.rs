@@ -11,9 +11,9 @@ fn store(faulty: &Arc<Faulty>) -> Store {
     Store {
         objects: Arc::clone(faulty) as _,
         place: Place::Cloud,
-        patience: Patience {
+        retry_limits: RetryLimits {
             retries: Duration::from_millis(600),
-            ..Patience::default()
+            ..RetryLimits::default()
         },
         ..Store::memory()
     }

@@ -7,11 +7,11 @@ use contract::flow::Flow;
 use contract::job::{Mode, RENDERER_VERSION, RenderJob, Style, View};
 use contract::key::ObjectKey;
 use contract::manifest::MANIFEST_SCHEMA;
-use contract::moment::{After, Counts, Moment};
 use contract::observation::{PlatformKind, Quality};
 use contract::quantity::Quantity;
 use contract::sun::Subsolar;
 use contract::tile::Tile;
+use contract::time_sample::{After, Counts, TimeSample};
 
 use super::{GRID, frozen, to_freeze};
 
@@ -19,11 +19,11 @@ use super::{GRID, frozen, to_freeze};
 const RENDERER: u32 = 5;
 
 /// What a product is made of at an instant, one part of it for each of these.
-fn moment(product: &str, weight: Option<f64>) -> Moment {
+fn time_sample(product: &str, weight: Option<f64>) -> TimeSample {
     let (id, of) = (product.parse().unwrap(), |part: &str| {
         Digest::of(part.as_bytes())
     });
-    Moment {
+    TimeSample {
         domain: ObjectKey::domain(&id, &of("domain")),
         before: Some(ObjectKey::frame(&id, &of("before"))),
         after: weight.map(|weight| After {
@@ -40,7 +40,7 @@ fn plain() -> RenderJob {
     RenderJob {
         renderer_version: RENDERER,
         grid: GRID,
-        value: moment("flux", Some(0.25)),
+        value: time_sample("flux", Some(0.25)),
         accumulated: None,
         relief: None,
         flow: None,
@@ -56,9 +56,9 @@ fn plain() -> RenderJob {
 /// A view of the globe that says all that a job may say.
 pub(super) fn full() -> RenderJob {
     let mut job = RenderJob {
-        accumulated: Some(Moment {
+        accumulated: Some(TimeSample {
             before: None,
-            ..moment("flux-accumulated", Some(1.0 / 3.0))
+            ..time_sample("flux-accumulated", Some(1.0 / 3.0))
         }),
         relief: Some(Relief {
             frame: ObjectKey::frame(&"etopo".parse().unwrap(), &Digest::of(b"relief")),
@@ -92,7 +92,7 @@ pub(super) fn full() -> RenderJob {
         lon_deg: 12.34,
         lat_deg: -23.4,
     });
-    (style.globe_surface, style.doubt) = (true, true);
+    (style.globe_surface, style.uncertainty) = (true, true);
     style.context = Context {
         sea_opacity: 0.4,
         coastlines: true,
@@ -103,9 +103,9 @@ pub(super) fn full() -> RenderJob {
 /// Particles that drift with a current, in colours that are turned round.
 fn flow() -> RenderJob {
     let mut job = RenderJob {
-        value: moment("current-east", None),
+        value: time_sample("current-east", None),
         flow: Some(Flow {
-            northward: moment("current-north", None),
+            northward: time_sample("current-north", None),
             clock_s: 978_350_400.125,
         }),
         mode: Mode::Flow,

@@ -1601,7 +1601,7 @@ export interface operations {
                 /** @description The colours run the other way. */
                 reverse?: boolean;
                 /** @description Cells whose gap was filled are drawn differently. */
-                doubt?: boolean;
+                uncertainty?: boolean;
             };
             header?: never;
             path: {
@@ -1862,7 +1862,7 @@ export interface operations {
                 /** @description The colours run the other way. */
                 reverse?: boolean;
                 /** @description Cells whose gap was filled are drawn differently. */
-                doubt?: boolean;
+                uncertainty?: boolean;
                 /** @description An elevation product below the layer. */
                 relief?: string;
                 /** @description How much larger the heights of `relief` are taken than they are; 15 unless told otherwise. */
@@ -2149,7 +2149,7 @@ export interface operations {
                 /** @description The colours run the other way. */
                 reverse?: boolean;
                 /** @description Cells whose gap was filled are drawn differently. */
-                doubt?: boolean;
+                uncertainty?: boolean;
                 /** @description An elevation product below the layer. */
                 relief?: string;
                 /** @description How much larger the heights of `relief` are taken than they are; 15 unless told otherwise. */
@@ -2274,7 +2274,7 @@ export interface operations {
                 /** @description The colours run the other way. */
                 reverse?: boolean;
                 /** @description Cells whose gap was filled are drawn differently. */
-                doubt?: boolean;
+                uncertainty?: boolean;
                 /** @description An elevation product below the layer. */
                 relief?: string;
                 /** @description How much larger the heights of `relief` are taken than they are; 15 unless told otherwise. */

@@ -28,7 +28,7 @@ export function parameters(look: Look): Parameter[] {
   const isExaggerated = relief !== null && reliefExaggeration !== USUAL.reliefExaggeration;
   const all: (Parameter | null)[] = [
     ...colourParameters(look),
-    look.doubt ? ["doubt", "true"] : null,
+    look.uncertainty ? ["uncertainty", "true"] : null,
     relief === null ? null : ["relief", relief],
     isExaggerated ? ["relief_exaggeration", String(reliefExaggeration)] : null,
     seaOpacity === USUAL.seaOpacity ? null : ["sea_opacity", String(seaOpacity)],
@@ -48,7 +48,7 @@ const READERS = new Map<string, (text: string) => Partial<Look> | undefined>([
   ["palette", (text) => (/^[a-z]{1,40}$/.test(text) ? { palette: text } : undefined)],
   ["range", rangeOf],
   ["reverse", (text) => (text === "true" ? { reversed: true } : undefined)],
-  ["doubt", (text) => (text === "true" ? { doubt: true } : undefined)],
+  ["uncertainty", (text) => (text === "true" ? { uncertainty: true } : undefined)],
   ["relief", (text) => (/^[a-z][a-z0-9-]{0,63}$/.test(text) ? { relief: text } : undefined)],
   ["relief_exaggeration", (text) => upTo(MOST_RELIEF_EXAGGERATION, text, (reliefExaggeration) => ({ reliefExaggeration }))],
   ["sea_opacity", (text) => upTo(MOST_SEA_OPACITY, text, (seaOpacity) => ({ seaOpacity }))],

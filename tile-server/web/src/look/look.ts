@@ -14,7 +14,7 @@ export interface Look {
   /** Null is the product's own. */
   readonly range: Range | null;
   /** Cells whose gap was filled are marked. */
-  readonly doubt: boolean;
+  readonly uncertainty: boolean;
   /** An elevation product below the layer. */
   readonly relief: string | null;
   /** How much larger its heights are taken than they are. */
@@ -33,7 +33,7 @@ export const USUAL: Look = {
   palette: null,
   reversed: false,
   range: null,
-  doubt: false,
+  uncertainty: false,
   relief: null,
   reliefExaggeration: 15,
   seaOpacity: 0,
@@ -58,10 +58,10 @@ export function withoutColours(look: Look): Look {
 
 /** The part of a look that makes a difference: what would change no pixel must not change the address. */
 export function effective(look: Look, mode: Mode, isLifted: boolean): Look {
-  const { doubt, seaOpacity, heightMPerKgM2 } = USUAL;
+  const { uncertainty, seaOpacity, heightMPerKgM2 } = USUAL;
   return {
     ...look,
-    ...(canDoubt(mode) ? {} : { doubt }),
+    ...(canUncertainty(mode) ? {} : { uncertainty }),
     ...(hasSea(look, mode, isLifted) ? {} : { seaOpacity }),
     ...(hasHeight(mode, isLifted) ? {} : { heightMPerKgM2 }),
   };
@@ -75,7 +75,7 @@ export function possible(look: Look, palettes: readonly string[], reliefs: reado
 }
 
 /** Trails of a flow do not show which cells were filled. */
-export function canDoubt(mode: Mode): boolean {
+export function canUncertainty(mode: Mode): boolean {
   return mode !== "flow";
 }
 

@@ -3,7 +3,7 @@ import type { Palette } from "../api/types";
 import { titleText } from "../page/format";
 import type { Catalogue } from "../state/catalogue";
 import type { State } from "../state/store";
-import { canDoubt, hasHeight, hasSea, type Range } from "./look";
+import { canUncertainty, hasHeight, hasSea, type Range } from "./look";
 
 export interface PaletteChoice extends Palette {
   title: string;
@@ -17,7 +17,7 @@ export interface LookOffer {
   range: Range;
   unit: string;
   reliefs: { id: string; title: string }[];
-  canDoubt: boolean;
+  canUncertainty: boolean;
   hasRelief: boolean;
   hasSea: boolean;
   hasHeight: boolean;
@@ -41,7 +41,7 @@ export function offerOf(
     range: { low: legend.low, high: legend.high },
     unit: legend.unit,
     reliefs: catalogue.reliefs.map((each) => ({ id: each.id, title: titleText(each) })),
-    canDoubt: canDoubt(mode),
+    canUncertainty: canUncertainty(mode),
     hasRelief: look.relief !== null,
     hasSea: hasSea(look, mode, isLifted),
     hasHeight: hasHeight(mode, isLifted),

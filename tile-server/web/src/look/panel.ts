@@ -14,7 +14,7 @@ export class LookPanel {
   readonly #palettes = new PaletteList((palette) => this.#change({ palette }));
   readonly #reversed = toggle("reversed", "Reversed", (reversed) => this.#change({ reversed }));
   readonly #range = new RangeForm((range) => this.#change({ range }));
-  readonly #doubt = toggle("doubt", "Mark cells that were filled", (doubt) => this.#change({ doubt }));
+  readonly #uncertainty = toggle("uncertainty", "Mark cells that were filled", (uncertainty) => this.#change({ uncertainty }));
   readonly #surroundings = new SurroundingsForm((change) => this.#change(change));
 
   constructor(body: HTMLElement, store: Store, offer: () => LookOffer | undefined) {
@@ -22,7 +22,7 @@ export class LookPanel {
     this.#offer = offer;
     body.append(
       this.#palettes.element,
-      el("div", { class: "look-group" }, this.#reversed.element, this.#range.element, this.#doubt.element),
+      el("div", { class: "look-group" }, this.#reversed.element, this.#range.element, this.#uncertainty.element),
       this.#surroundings.element,
       el("button", { type: "button", class: "wide", id: "look-reset", onclick: () => this.#reset() }, "Reset the look"),
     );
@@ -37,8 +37,8 @@ export class LookPanel {
     this.#palettes.show(offer.palettes, look.palette, look.reversed);
     this.#reversed.show(look.reversed);
     this.#range.show(look.range, offer.range, offer.unit);
-    this.#doubt.show(look.doubt);
-    this.#doubt.element.hidden = !offer.canDoubt;
+    this.#uncertainty.show(look.uncertainty);
+    this.#uncertainty.element.hidden = !offer.canUncertainty;
     this.#surroundings.show(look, offer);
   }
 

@@ -4,7 +4,7 @@ import { type Chart, dress, mount, padded } from "./chart";
 import { type Group, isTrusted } from "./measured";
 
 const TRUSTED = "#5fd4e8";
-const DOUBTFUL = "#f2906b";
+const UNCERTAINTYFUL = "#f2906b";
 
 /** `unit` is shown at the axis. */
 export function measuredChart(container: HTMLElement, group: Group, unit: string): Chart {
@@ -19,7 +19,7 @@ export function measuredChart(container: HTMLElement, group: Group, unit: string
       {},
       // Gaps are where doubtful values are: the line goes on over them, as they are no measurement to trust.
       { stroke: TRUSTED, width: 1.5, spanGaps: true, points: dot(TRUSTED, 4) },
-      { stroke: DOUBTFUL, width: 0, paths: () => null, points: dot(DOUBTFUL, 6) },
+      { stroke: UNCERTAINTYFUL, width: 0, paths: () => null, points: dot(UNCERTAINTYFUL, 6) },
     ],
   };
   if (!isOverTime && below && left) {

@@ -31,7 +31,7 @@ const LONGEST_PAUSE: Duration = Duration::from_secs(1);
 
 /// A way to a scheduler; clones share it.
 #[derive(Debug, Clone)]
-pub(super) struct Courier {
+pub(super) struct RetryChannel {
     channel: Channel,
     executor_id: Arc<str>,
     state: Arc<State>,
@@ -48,7 +48,7 @@ struct State {
     is_doubtful: AtomicBool,
 }
 
-impl Courier {
+impl RetryChannel {
     pub(super) fn new(channel: Channel, executor_id: &str) -> Self {
         Self {
             channel,
@@ -157,7 +157,7 @@ impl Courier {
     }
 }
 
-impl Service<http::Request<Body>> for Courier {
+impl Service<http::Request<Body>> for RetryChannel {
     type Response = http::Response<Body>;
     type Error = StdError;
     type Future = BoxFuture<'static, Result<Self::Response, Self::Error>>;

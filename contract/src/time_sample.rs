@@ -8,10 +8,10 @@ use crate::manifest::{Bracket, Manifest};
 use crate::time::TimeMs;
 
 /// What a product's values at an instant are made of. All of it is named by content, so versions of a product that
-/// agree about an instant have equal moments there, whatever they differ in elsewhere.
+/// agree about an instant have equal samples there, whatever they differ in elsewhere.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Moment {
+pub struct TimeSample {
     /// Cells that hold data in some step: gaps in them are filled.
     pub domain: ObjectKey,
     /// Frame at the instant or before it; none where accumulation starts, that is zero in every cell of the domain.
@@ -20,7 +20,7 @@ pub struct Moment {
     /// Frame after the instant; none where the one before holds alone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub after: Option<After>,
-    /// How complete the sums of accumulated carbon are, where doubt is drawn and some are not complete.
+    /// How complete the sums of accumulated carbon are, where uncertainty is drawn and some are not complete.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub contributed: Option<Counts>,
 }
@@ -50,14 +50,14 @@ pub struct After {
 
 impl Manifest {
     /// What the values at an instant are made of; none without steps.
-    pub fn moment(&self, time: TimeMs) -> Option<Moment> {
+    pub fn time_sample(&self, time: TimeMs) -> Option<TimeSample> {
         let Bracket {
             before,
             after,
             weight,
         } = self.bracket(time)?;
         let frame = |step: usize| self.steps[step].frame.clone();
-        Some(Moment {
+        Some(TimeSample {
             domain: self.domain.clone(),
             before: before.map(frame),
             // A frame without weight shows nowhere: it may come and go without a trace.
@@ -71,34 +71,34 @@ impl Manifest {
 
     /// The same with how complete the sums are, for pictures that show it. Nothing is added to it where all sums are
     /// complete, where values are no sums, and in versions that did not count.
-    pub fn moment_with_counts(&self, time: TimeMs) -> Option<Moment> {
-        let moment = self.moment(time)?;
+    pub fn time_sample_with_counts(&self, time: TimeMs) -> Option<TimeSample> {
+        let sample = self.time_sample(time)?;
         let bracket = self.bracket(time)?;
         let incomplete = |step: usize| {
             let step = &self.steps[step];
             let contributed = step.contributed.as_ref()?;
             (contributed.complete_cells < step.valid_cells).then(|| contributed.counts.clone())
         };
-        let after = moment.after.as_ref().map(|_| bracket.after);
+        let after = sample.after.as_ref().map(|_| bracket.after);
         let counts = Counts {
             before: bracket.before.and_then(incomplete),
             after: after.and_then(incomplete),
         };
-        Some(Moment {
+        Some(TimeSample {
             contributed: (counts != Counts::default()).then_some(counts),
-            ..moment
+            ..sample
         })
     }
 }
 
-impl Moment {
-    /// Checks a moment that came from outside.
+impl TimeSample {
+    /// Checks a sample that came from outside.
     ///
     /// # Errors
     /// Objects of other kinds than frames and a domain, or a weight that is none.
     pub fn validate(&self) -> Result<(), ContractError> {
         let bad = |key: &ObjectKey, reason: &str| {
-            Err(ContractError::invalid("moment", key.as_str(), reason))
+            Err(ContractError::invalid("sample", key.as_str(), reason))
         };
         if !self.domain.is_in("domain") {
             return bad(&self.domain, "a domain is wanted");
@@ -180,8 +180,8 @@ mod tests {
         }
     }
 
-    fn at(manifest: &Manifest, time: &str) -> Moment {
-        manifest.moment(time.parse().unwrap()).unwrap()
+    fn at(manifest: &Manifest, time: &str) -> TimeSample {
+        manifest.time_sample(time.parse().unwrap()).unwrap()
     }
 
     #[test]
@@ -194,7 +194,7 @@ mod tests {
         }
         // The middle of what was the last step: the frame after it has no weight yet.
         let middle = Period::month(2000, 2).unwrap().mid();
-        assert_eq!(old.moment(middle), new.moment(middle));
+        assert_eq!(old.time_sample(middle), new.time_sample(middle));
         assert_ne!(at(&old, "2000-02-20"), at(&new, "2000-02-20"));
         let revised = flux(&["a", "B"]);
         assert_eq!(at(&old, "2000-01-10"), at(&revised, "2000-01-10"));
@@ -240,14 +240,16 @@ mod tests {
             });
         }
         let with_counts = |time: &str| {
-            let moment = carbon.moment_with_counts(time.parse().unwrap()).unwrap();
-            moment.validate().unwrap();
-            let plain = Moment {
+            let sample = carbon
+                .time_sample_with_counts(time.parse().unwrap())
+                .unwrap();
+            sample.validate().unwrap();
+            let plain = TimeSample {
                 contributed: None,
-                ..moment.clone()
+                ..sample.clone()
             };
             assert_eq!(plain, at(&carbon, time), "{time}");
-            moment.contributed
+            sample.contributed
         };
         let both = |before: Option<&str>, after: Option<&str>| {
             Some(Counts {
@@ -265,9 +267,9 @@ mod tests {
         assert_eq!(with_counts("2000-03-10"), both(Some("b"), None));
         assert_eq!(with_counts("2000-06-01"), None, "complete");
         carbon.steps[1].contributed = None; // as an older version wrote it
-        let old = carbon.moment_with_counts("2000-03-10".parse().unwrap());
+        let old = carbon.time_sample_with_counts("2000-03-10".parse().unwrap());
         assert_eq!(old.unwrap().contributed, None);
-        let strange = Moment {
+        let strange = TimeSample {
             contributed: Some(Counts {
                 before: Some(frame("a")),
                 after: None,
@@ -285,10 +287,10 @@ mod tests {
             let frame = frame.parse().unwrap();
             Some(After { frame, weight })
         };
-        let is_refused = |change: &dyn Fn(&mut Moment)| {
-            let mut moment = good.clone();
-            change(&mut moment);
-            moment.validate().is_err()
+        let is_refused = |change: &dyn Fn(&mut TimeSample)| {
+            let mut sample = good.clone();
+            change(&mut sample);
+            sample.validate().is_err()
         };
         assert!(is_refused(&|m| m.domain = frame("a")));
         assert!(is_refused(&|m| m.before = Some("raw/p/x".parse().unwrap())));

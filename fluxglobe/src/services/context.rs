@@ -17,7 +17,7 @@ use crate::protocol;
 
 /// A service that lives and is not yet ready; clones are of the same one.
 #[derive(Clone)]
-pub(crate) struct Footing {
+pub(crate) struct ServiceContext {
     pub(crate) registry: Registry,
     pub(crate) board: Arc<Board>,
     /// Said when the service is asked to stop.
@@ -31,7 +31,7 @@ pub(crate) struct Footing {
 /// The health address at work, until it is waited for.
 type Admins = Arc<Mutex<Option<JoinHandle<Result<(), ServiceError>>>>>;
 
-impl Footing {
+impl ServiceContext {
     /// Takes the health address, if the service has one of its own. `parts` are what it waits for.
     pub(crate) async fn take(
         settings: &Settings,

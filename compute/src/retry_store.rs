@@ -23,25 +23,25 @@ use object_store::{
 };
 
 /// How long one read is tried here; stores behind a network have tried for long before.
-const PATIENCE: Duration = Duration::from_secs(5);
+const RETRY_LIMIT: Duration = Duration::from_secs(5);
 /// The largest part of an object that is fetched as one: more is handed on as it comes.
 const WHOLE_BYTES: u64 = 64 << 20;
 
 /// The decorator. Writes pass through: nothing is written on the way of a query.
 #[derive(Debug)]
-pub(crate) struct SteadyStore {
+pub(crate) struct RetryStore {
     inner: Arc<dyn ObjectStore>,
     /// How long one read is tried.
-    patience: Duration,
+    retry_limit: Duration,
 }
 
-impl SteadyStore {
+impl RetryStore {
     pub(crate) fn new(inner: Arc<dyn ObjectStore>) -> Self {
-        let patience = PATIENCE;
-        Self { inner, patience }
+        let retry_limit = RETRY_LIMIT;
+        Self { inner, retry_limit }
     }
 
-    /// Tries until it succeeds, fails for good, or patience is at its end.
+    /// Tries until it succeeds, fails for good, or retry limit is at its end.
     async fn steadily<T, F, Fut>(&self, what: &Path, attempt: F) -> Result<T>
     where
         F: Fn() -> Fut,
@@ -55,7 +55,7 @@ impl SteadyStore {
                 ended => return ended,
             };
             match pauses.next() {
-                Some(pause) if begun.elapsed() + pause < self.patience => {
+                Some(pause) if begun.elapsed() + pause < self.retry_limit => {
                     tracing::debug!(object = %what, %error, "reading again");
                     tokio::time::sleep(pause).await;
                 }
@@ -65,9 +65,9 @@ impl SteadyStore {
     }
 }
 
-impl Display for SteadyStore {
+impl Display for RetryStore {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
-        write!(f, "steady {}", self.inner)
+        write!(f, "store {}", self.inner)
     }
 }
 
@@ -86,7 +86,7 @@ fn as_io(error: Error) -> Error {
 }
 
 #[async_trait]
-impl ObjectStore for SteadyStore {
+impl ObjectStore for RetryStore {
     async fn put_opts(
         &self,
         location: &Path,
@@ -224,22 +224,22 @@ mod tests {
         }
     }
 
-    async fn failing(times: u32) -> (Arc<Failing>, SteadyStore) {
+    async fn failing(times: u32) -> (Arc<Failing>, RetryStore) {
         let inner = InMemory::new();
         inner.put(&Path::from("a"), "content".into()).await.unwrap();
         let failing = Arc::new(Failing {
             inner,
             left: AtomicU32::new(times),
         });
-        let mut steady = SteadyStore::new(Arc::clone(&failing) as Arc<dyn ObjectStore>);
-        steady.patience = Duration::from_secs(2);
-        (failing, steady)
+        let mut store = RetryStore::new(Arc::clone(&failing) as Arc<dyn ObjectStore>);
+        store.retry_limit = Duration::from_secs(2);
+        (failing, store)
     }
 
     #[tokio::test]
     async fn a_read_that_fails_for_a_while_is_tried_until_it_succeeds() {
-        let (failing, steady) = failing(3).await;
-        let part = steady.get_range(&Path::from("a"), 0..3).await.unwrap();
+        let (failing, store) = failing(3).await;
+        let part = store.get_range(&Path::from("a"), 0..3).await.unwrap();
         assert_eq!(part, "con");
         assert_eq!(
             failing.left.load(Ordering::Relaxed),
@@ -250,10 +250,10 @@ mod tests {
 
     #[tokio::test]
     async fn what_fails_for_long_is_an_io_error_at_its_root() {
-        let (_failing, steady) = failing(u32::MAX).await;
+        let (_failing, store) = failing(u32::MAX).await;
         let begun = Instant::now();
-        let error = steady.head(&Path::from("a")).await.unwrap_err();
-        assert!(begun.elapsed() <= 2 * steady.patience);
+        let error = store.head(&Path::from("a")).await.unwrap_err();
+        assert!(begun.elapsed() <= 2 * store.retry_limit);
         assert!(error.to_string().contains("500"), "{error}");
         let error = DataFusionError::from(error);
         assert!(
@@ -264,8 +264,8 @@ mod tests {
 
     #[tokio::test]
     async fn an_object_that_is_not_there_is_not_waited_for() {
-        let (_failing, steady) = failing(0).await;
-        let missing = steady.head(&Path::from("b")).await.unwrap_err();
+        let (_failing, store) = failing(0).await;
+        let missing = store.head(&Path::from("b")).await.unwrap_err();
         assert!(matches!(missing, Error::NotFound { .. }));
     }
 }

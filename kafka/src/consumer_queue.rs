@@ -22,7 +22,7 @@ const MAX_UNFINISHED: usize = 10_000;
 
 /// Shared by a reader, the task that fetches for it, and the client's notes of partitions given and taken.
 #[derive(Debug)]
-pub(crate) struct Inbox {
+pub(crate) struct ConsumerQueue {
     topic: Topic,
     state: Mutex<State>,
     /// Rung when a message is there or fetching failed.
@@ -65,7 +65,7 @@ pub(crate) struct Step {
     pub(crate) ready: Ready,
 }
 
-impl Inbox {
+impl ConsumerQueue {
     pub(crate) fn new(topic: Topic) -> Self {
         Self {
             topic,
@@ -206,7 +206,7 @@ impl Inbox {
 #[derive(Debug, Clone)]
 pub(crate) struct Member {
     pub(crate) context: Context,
-    pub(crate) inbox: std::sync::Arc<Inbox>,
+    pub(crate) queue: std::sync::Arc<ConsumerQueue>,
 }
 
 impl ClientContext for Member {
@@ -224,17 +224,17 @@ impl ConsumerContext for Member {
         match change {
             Rebalance::Assign(list) => {
                 for partition in numbers(list) {
-                    self.inbox.give(partition);
+                    self.queue.give(partition);
                 }
             }
             Rebalance::Revoke(list) => {
                 for partition in numbers(list) {
-                    self.inbox.take_away(partition);
+                    self.queue.take_away(partition);
                 }
             }
             Rebalance::Error(error) => tracing::warn!(%error, "partitions could not be shared out"),
         }
-        let topic = self.inbox.topic();
+        let topic = self.queue.topic();
         tracing::debug!(%topic, ?change, "partitions change hands");
     }
 }
@@ -276,43 +276,43 @@ mod tests {
 
     #[test]
     fn fetching_pauses_when_messages_or_bytes_are_many_and_goes_on_when_half_are_out() {
-        let inbox = Inbox::new(Topic::GranuleNotice);
-        inbox.give(0);
-        let full = (0..9999).find(|&n| inbox.put(message(0, n, 1))).unwrap();
+        let queue = ConsumerQueue::new(Topic::GranuleNotice);
+        queue.give(0);
+        let full = (0..9999).find(|&n| queue.put(message(0, n, 1))).unwrap();
         assert_eq!(full as usize + 1, MAX_WAITING);
-        assert!(!inbox.has_room());
-        let out = inbox.hand_out(MAX_WAITING / 2).unwrap();
-        assert!(inbox.has_room());
+        assert!(!queue.has_room());
+        let out = queue.hand_out(MAX_WAITING / 2).unwrap();
+        assert!(queue.has_room());
         assert_eq!(out.len(), MAX_WAITING / 2);
         let big = MAX_WAITING_BYTES / 4;
         let count = (0..9999)
-            .find(|&n| inbox.put(message(0, 5000 + n, big)))
+            .find(|&n| queue.put(message(0, 5000 + n, big)))
             .unwrap();
         assert_eq!(count, 3);
     }
 
     #[test]
     fn a_partition_that_is_taken_away_takes_its_messages_with_it() {
-        let inbox = Inbox::new(Topic::GranuleNotice);
-        inbox.give(0);
-        inbox.give(1);
+        let queue = ConsumerQueue::new(Topic::GranuleNotice);
+        queue.give(0);
+        queue.give(1);
         for partition in [0, 1] {
-            inbox.put(message(partition, 0, 10));
-            inbox.put(message(partition, 1, 10));
+            queue.put(message(partition, 0, 10));
+            queue.put(message(partition, 1, 10));
         }
-        let out = inbox.hand_out(3).unwrap();
-        assert_eq!(inbox.lost(), []);
-        inbox.take_away(0);
+        let out = queue.hand_out(3).unwrap();
+        assert_eq!(queue.lost(), []);
+        queue.take_away(0);
         let lost = [out[0].origin, out[1].origin];
-        assert_eq!(inbox.lost(), lost, "handed out and not finished");
-        assert_eq!(inbox.lost(), [], "told once");
-        let steps = inbox.finish(out.iter().map(finished).collect());
+        assert_eq!(queue.lost(), lost, "handed out and not finished");
+        assert_eq!(queue.lost(), [], "told once");
+        let steps = queue.finish(out.iter().map(finished).collect());
         assert_eq!(steps.len(), 1);
         assert_eq!(steps[0].partition, 1);
-        assert_eq!(inbox.waiting_bytes(), 10);
-        inbox.put(message(0, 2, 10));
+        assert_eq!(queue.waiting_bytes(), 10);
+        queue.put(message(0, 2, 10));
         assert_eq!(
-            inbox.waiting_bytes(),
+            queue.waiting_bytes(),
             10,
             "a late message of a lost partition"
         );
@@ -320,31 +320,31 @@ mod tests {
 
     #[test]
     fn a_step_of_a_partition_that_was_away_in_between_is_no_longer_ours() {
-        let inbox = Inbox::new(Topic::GranuleNotice);
-        inbox.give(0);
-        inbox.put(message(0, 0, 1));
-        let out = inbox.hand_out(1).unwrap();
-        let steps = inbox.finish(vec![finished(&out[0])]);
-        assert!(inbox.is_still_owned(&steps[0]));
-        inbox.take_away(0);
-        inbox.give(0);
-        assert!(!inbox.is_still_owned(&steps[0]));
+        let queue = ConsumerQueue::new(Topic::GranuleNotice);
+        queue.give(0);
+        queue.put(message(0, 0, 1));
+        let out = queue.hand_out(1).unwrap();
+        let steps = queue.finish(vec![finished(&out[0])]);
+        assert!(queue.is_still_owned(&steps[0]));
+        queue.take_away(0);
+        queue.give(0);
+        assert!(!queue.is_still_owned(&steps[0]));
     }
 
     #[test]
     fn a_reader_that_never_finishes_its_oldest_message_is_stopped() {
-        let inbox = Inbox::new(Topic::GranuleNotice);
-        inbox.give(0);
+        let queue = ConsumerQueue::new(Topic::GranuleNotice);
+        queue.give(0);
         let mut count = 0;
         loop {
-            inbox.put(message(0, count as u64, 0));
-            let out = inbox.hand_out(10).unwrap();
+            queue.put(message(0, count as u64, 0));
+            let out = queue.hand_out(10).unwrap();
             if out.is_empty() {
                 break;
             }
             count += out.len();
             let later = out.iter().filter(|message| message.origin.offset > 0);
-            assert!(inbox.finish(later.map(finished).collect()).is_empty());
+            assert!(queue.finish(later.map(finished).collect()).is_empty());
         }
         assert_eq!(count, MAX_UNFINISHED);
     }

@@ -15,7 +15,7 @@ use object_store::{
     Result,
 };
 
-use super::settings::Patience;
+use super::settings::RetryLimits;
 use crate::error::may_pass;
 
 /// Answers up to this size are read whole within one try; longer ones are handed on piece by piece. Writes have one
@@ -25,7 +25,7 @@ const WHOLE_BYTES: u64 = 64 << 20;
 /// A store whose every call is bounded in time. Only for stores whose `put` creates whole objects or none, so that a
 /// put can be tried again. Clones share it.
 #[derive(Clone)]
-pub(super) struct Patient {
+pub(super) struct RetryStore {
     shared: Arc<Shared>,
 }
 
@@ -33,7 +33,7 @@ struct Shared {
     /// What calls are made with; another after a silence, for a connection may be dead without saying so.
     client: RwLock<Client>,
     connect: Connect,
-    patience: Patience,
+    retry_limits: RetryLimits,
     /// Gives an error of the client the kind that it has, where the client does not.
     classify: fn(Error) -> Error,
 }
@@ -43,17 +43,17 @@ type Client = Arc<dyn ObjectStore>;
 /// Makes a client with connections of its own.
 pub(super) type Connect = Box<dyn Fn() -> Result<Client> + Send + Sync>;
 
-impl Patient {
+impl RetryStore {
     pub(super) fn new(
         connect: Connect,
-        patience: Patience,
+        retry_limits: RetryLimits,
         classify: fn(Error) -> Error,
     ) -> Result<Self> {
         Ok(Self {
             shared: Arc::new(Shared {
                 client: RwLock::new(connect()?),
                 connect,
-                patience,
+                retry_limits,
                 classify,
             }),
         })
@@ -81,7 +81,8 @@ impl Patient {
     where
         F: Future<Output = Result<T>>,
     {
-        self.tried_within(self.shared.patience.request, call).await
+        self.tried_within(self.shared.retry_limits.request, call)
+            .await
     }
 
     async fn tried_within<T, F>(
@@ -94,8 +95,8 @@ impl Patient {
     {
         let begun = Instant::now();
         let pauses = ExponentialBuilder::default()
-            .with_min_delay(Patience::FIRST_PAUSE)
-            .with_max_delay(Patience::LONGEST_PAUSE)
+            .with_min_delay(RetryLimits::FIRST_PAUSE)
+            .with_max_delay(RetryLimits::LONGEST_PAUSE)
             .with_jitter()
             .without_max_times();
         let once = || {
@@ -104,7 +105,7 @@ impl Patient {
             async move { self.bounded(limit, &client, answer).await }
         };
         once.retry(pauses)
-            .when(|error| is_worth_a_try(error) && begun.elapsed() < self.shared.patience.retries)
+            .when(|error| is_worth_a_try(error) && begun.elapsed() < self.shared.retry_limits.retries)
             .notify(|error, pause| {
                 tracing::info!(%error, pause_ms = pause.as_millis() as u64, "trying the store again");
             })
@@ -170,20 +171,20 @@ fn generic(reason: String) -> Error {
     }
 }
 
-impl Debug for Patient {
+impl Debug for RetryStore {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
         Display::fmt(self, f)
     }
 }
 
-impl Display for Patient {
+impl Display for RetryStore {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
         Display::fmt(&self.client(), f)
     }
 }
 
 #[async_trait]
-impl ObjectStore for Patient {
+impl ObjectStore for RetryStore {
     async fn put_opts(
         &self,
         location: &Path,
@@ -191,7 +192,7 @@ impl ObjectStore for Patient {
         options: PutOptions,
     ) -> Result<PutResult> {
         let shares = 1 + payload.content_length() as u64 / WHOLE_BYTES;
-        let limit = self.shared.patience.request * u32::try_from(shares).unwrap_or(u32::MAX);
+        let limit = self.shared.retry_limits.request * u32::try_from(shares).unwrap_or(u32::MAX);
         self.tried_within(limit, |client| {
             let (payload, options) = (payload.clone(), options.clone());
             async move { client.put_opts(location, payload, options).await }
@@ -220,7 +221,7 @@ impl ObjectStore for Patient {
         {
             let bounded =
                 stream::try_unfold((self.clone(), pieces), |(me, mut pieces)| async move {
-                    let (limit, client) = (me.shared.patience.request, me.client());
+                    let (limit, client) = (me.shared.retry_limits.request, me.client());
                     let piece = me.bounded(limit, &client, pieces.try_next()).await?;
                     Ok(piece.map(|piece| (piece, (me, pieces))))
                 });
@@ -266,7 +267,7 @@ impl ObjectStore for Patient {
     async fn copy_opts(&self, from: &Path, to: &Path, options: CopyOptions) -> Result<()> {
         let client = self.client();
         let copied = client.copy_opts(from, to, options);
-        self.bounded(self.shared.patience.request, &client, copied)
+        self.bounded(self.shared.retry_limits.request, &client, copied)
             .await
     }
 
@@ -274,7 +275,7 @@ impl ObjectStore for Patient {
     async fn rename_opts(&self, from: &Path, to: &Path, options: RenameOptions) -> Result<()> {
         let client = self.client();
         let renamed = client.rename_opts(from, to, options);
-        self.bounded(self.shared.patience.request, &client, renamed)
+        self.bounded(self.shared.retry_limits.request, &client, renamed)
             .await
     }
 }

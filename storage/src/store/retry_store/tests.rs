@@ -1,4 +1,4 @@
-//! Patience against a store that fails, loses answers and falls silent.
+//! Retries against a store that fails, loses answers and falls silent.
 
 use super::*;
 use crate::store::faulty::{Fault, Faulty, broken, denied, exists};
@@ -6,16 +6,16 @@ use bytes::Bytes;
 use object_store::ObjectStoreExt as _;
 use std::sync::Mutex;
 
-const SHORT: Patience = Patience {
+const SHORT: RetryLimits = RetryLimits {
     connect: Duration::from_millis(100),
     request: Duration::from_millis(200),
     retries: Duration::from_millis(1500),
 };
 
-fn patient(inner: &Arc<Faulty>) -> Patient {
+fn retrying(inner: &Arc<Faulty>) -> RetryStore {
     let inner = Arc::clone(inner);
     let connect = Box::new(move || Ok(Arc::clone(&inner) as Client));
-    Patient::new(connect, SHORT, |e| e).unwrap()
+    RetryStore::new(connect, SHORT, |e| e).unwrap()
 }
 
 fn here() -> Path {
@@ -25,7 +25,7 @@ fn here() -> Path {
 #[tokio::test]
 async fn a_failure_that_passes_is_waited_for() {
     let inner = Faulty::new([Fault::Fail(broken), Fault::Hang, Fault::Fail(broken)]);
-    patient(&inner).put(&here(), "x".into()).await.unwrap();
+    retrying(&inner).put(&here(), "x".into()).await.unwrap();
     assert_eq!(inner.put_count(), 4);
 }
 
@@ -33,7 +33,7 @@ async fn a_failure_that_passes_is_waited_for() {
 async fn a_store_that_never_answers_is_given_up_in_bounded_time() {
     let inner = Faulty::always(Fault::Hang);
     let begun = Instant::now();
-    let error = patient(&inner).put(&here(), "x".into()).await.unwrap_err();
+    let error = retrying(&inner).put(&here(), "x".into()).await.unwrap_err();
     assert!(
         error.to_string().contains("no answer within 0.2 s"),
         "{error}"
@@ -52,7 +52,7 @@ async fn a_store_that_never_answers_is_given_up_in_bounded_time() {
 async fn what_will_not_change_is_not_tried_again() {
     for refuse in [denied as fn() -> Error, exists] {
         let inner = Faulty::always(Fault::Fail(refuse));
-        let error = patient(&inner).put(&here(), "x".into()).await.unwrap_err();
+        let error = retrying(&inner).put(&here(), "x".into()).await.unwrap_err();
         assert_eq!(error.to_string(), refuse().to_string());
         assert_eq!(inner.put_count(), 1);
     }
@@ -62,7 +62,7 @@ async fn what_will_not_change_is_not_tried_again() {
 async fn reads_wait_too_whole_or_in_part() {
     let inner = Faulty::new([]);
     inner.inner.put(&here(), "hello".into()).await.unwrap();
-    let store = patient(&inner);
+    let store = retrying(&inner);
     let expect = async |answer: &'static str, range: Option<std::ops::Range<u64>>| {
         inner
             .gets
@@ -93,7 +93,7 @@ async fn long_answers_come_piece_by_piece() {
     let inner = Faulty::new([]);
     let long = Bytes::from(vec![7; WHOLE_BYTES as usize + 1]);
     inner.inner.put(&here(), long.clone().into()).await.unwrap();
-    let found = patient(&inner).get(&here()).await.unwrap();
+    let found = retrying(&inner).get(&here()).await.unwrap();
     assert!(found.bytes().await.unwrap() == long);
 }
 
@@ -102,7 +102,7 @@ async fn a_silent_client_is_left_for_a_new_one() {
     let clients = Mutex::new(vec![Faulty::new([]), Faulty::always(Fault::Hang)]);
     let last = Arc::clone(&clients.lock().unwrap()[0]);
     let connect = Box::new(move || Ok(clients.lock().unwrap().pop().unwrap() as Client));
-    let store = Patient::new(connect, SHORT, |e| e).unwrap();
+    let store = RetryStore::new(connect, SHORT, |e| e).unwrap();
     store.put(&here(), "x".into()).await.unwrap();
     assert_eq!(last.put_count(), 1);
 }

@@ -15,11 +15,11 @@ type Flight<V> = BoxFuture<'static, Result<V, ServerError>>;
 /// Answers under way, by the digest of what was asked.
 ///
 /// Only those who wait keep an answer under way alive: when the last one goes away, it is dropped.
-pub(crate) struct Flights<V: Clone + Send + Sync + 'static> {
+pub(crate) struct SingleFlight<V: Clone + Send + Sync + 'static> {
     under_way: Mutex<HashMap<Digest, WeakShared<Flight<V>>>>,
 }
 
-impl<V: Clone + Send + Sync + 'static> Default for Flights<V> {
+impl<V: Clone + Send + Sync + 'static> Default for SingleFlight<V> {
     fn default() -> Self {
         Self {
             under_way: Mutex::default(),
@@ -29,12 +29,12 @@ impl<V: Clone + Send + Sync + 'static> Default for Flights<V> {
 
 /// One who waits; leaving takes an answer nobody waits for off the list.
 struct Waiting<'a, V: Clone + Send + Sync + 'static> {
-    flights: &'a Flights<V>,
+    flights: &'a SingleFlight<V>,
     key: Digest,
     flight: Option<Shared<Flight<V>>>,
 }
 
-impl<V: Clone + Send + Sync + 'static> Flights<V> {
+impl<V: Clone + Send + Sync + 'static> SingleFlight<V> {
     /// Waits for the answer under way for `key`, or starts it. `start` is called only if there is none.
     pub(crate) async fn join<F>(
         &self,
@@ -105,7 +105,7 @@ mod tests {
 
     #[tokio::test]
     async fn many_who_ask_at_once_get_one_answer() {
-        let flights = Flights::<u32>::default();
+        let flights = SingleFlight::<u32>::default();
         let (starts, go) = (AtomicU32::new(0), Arc::new(Notify::new()));
         let ask = || {
             flights.join(key(), || {
@@ -136,7 +136,7 @@ mod tests {
 
     #[tokio::test]
     async fn what_nobody_waits_for_is_dropped_and_started_anew() {
-        let flights = Flights::<u32>::default();
+        let flights = SingleFlight::<u32>::default();
         let mut lost = Box::pin(flights.join(key(), std::future::pending));
         assert!(lost.as_mut().now_or_never().is_none());
         drop(lost);

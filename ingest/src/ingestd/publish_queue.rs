@@ -9,7 +9,7 @@ pub(super) type Number = u64;
 
 /// Files that are not published yet.
 #[derive(Debug)]
-pub(super) struct Bench<T> {
+pub(super) struct PublishQueue<T> {
     files: BTreeMap<Number, File<T>>,
     /// Products that are being published: one at a time each, so that a process does not race with itself.
     busy: BTreeSet<ProductId>,
@@ -29,7 +29,7 @@ enum State<T> {
     Publishing,
 }
 
-impl<T> Default for Bench<T> {
+impl<T> Default for PublishQueue<T> {
     fn default() -> Self {
         Self {
             files: BTreeMap::new(),
@@ -38,7 +38,7 @@ impl<T> Default for Bench<T> {
     }
 }
 
-impl<T> Bench<T> {
+impl<T> PublishQueue<T> {
     /// A file came.
     pub(super) fn add(&mut self, number: Number, key: String) {
         let state = State::Preparing;
@@ -106,23 +106,23 @@ mod tests {
 
     #[test]
     fn files_of_one_key_keep_their_order_and_others_overtake() {
-        let mut bench = Bench::default();
+        let mut queue = PublishQueue::default();
         for (number, key) in [(1, "k"), (2, "k"), (3, "other")] {
-            bench.add(number, key.to_owned());
+            queue.add(number, key.to_owned());
         }
-        bench.ready(2, product("p"), ());
-        bench.ready(3, product("p"), ());
+        queue.ready(2, product("p"), ());
+        queue.ready(3, product("p"), ());
         assert_eq!(
-            numbers(&bench.take()),
+            numbers(&queue.take()),
             [("p", vec![3])],
             "1 is slow, 2 must wait for it"
         );
-        bench.ready(1, product("p"), ());
-        assert!(bench.take().is_empty(), "p is being published");
-        bench.remove(3);
-        bench.free(&product("p"));
+        queue.ready(1, product("p"), ());
+        assert!(queue.take().is_empty(), "p is being published");
+        queue.remove(3);
+        queue.free(&product("p"));
         assert_eq!(
-            numbers(&bench.take()),
+            numbers(&queue.take()),
             [("p", vec![1, 2])],
             "together, in order"
         );
@@ -130,27 +130,27 @@ mod tests {
 
     #[test]
     fn an_answered_file_holds_nobody_up() {
-        let mut bench = Bench::default();
-        bench.add(1, "k".to_owned());
-        bench.add(2, "k".to_owned());
-        bench.ready(2, product("p"), ());
-        assert!(bench.take().is_empty());
-        bench.remove(1);
-        assert_eq!(numbers(&bench.take()), [("p", vec![2])]);
+        let mut queue = PublishQueue::default();
+        queue.add(1, "k".to_owned());
+        queue.add(2, "k".to_owned());
+        queue.ready(2, product("p"), ());
+        assert!(queue.take().is_empty());
+        queue.remove(1);
+        assert_eq!(numbers(&queue.take()), [("p", vec![2])]);
     }
 
     #[test]
     fn a_file_behind_a_busy_product_holds_its_key() {
-        let mut bench = Bench::default();
+        let mut queue = PublishQueue::default();
         for (number, key) in [(1, "a"), (2, "b"), (3, "b")] {
-            bench.add(number, key.to_owned());
+            queue.add(number, key.to_owned());
         }
-        bench.ready(1, product("p"), ());
-        assert_eq!(bench.take().len(), 1);
-        bench.ready(2, product("p"), ());
-        bench.ready(3, product("q"), ());
+        queue.ready(1, product("p"), ());
+        assert_eq!(queue.take().len(), 1);
+        queue.ready(2, product("p"), ());
+        queue.ready(3, product("q"), ());
         assert!(
-            bench.take().is_empty(),
+            queue.take().is_empty(),
             "3 comes after 2, which waits for p"
         );
     }

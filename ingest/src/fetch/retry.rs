@@ -11,7 +11,7 @@ use crate::rejection::Rejection;
 
 /// How often and how long a source is asked again.
 #[derive(Debug, Clone, Copy)]
-pub struct Patience {
+pub struct RetryLimits {
     /// Tries of a source that answers that the file is not there, or not for us: an announced file can come late.
     pub tries: u32,
     /// How long a source that cannot be reached, or says that it is out of order, is asked again.
@@ -28,7 +28,7 @@ pub struct Patience {
     pub slowest_bytes_s: u64,
 }
 
-impl Default for Patience {
+impl Default for RetryLimits {
     fn default() -> Self {
         Self {
             tries: 5,
@@ -61,7 +61,7 @@ impl<E: Into<Stop>> From<E> for Miss {
 
 /// Tries one file.
 pub(super) struct Tries {
-    patience: Patience,
+    retry_limits: RetryLimits,
     pauses: ExponentialBackoff,
     /// Spent on tries and pauses; waiting for room of our own is not the source's fault.
     spent: Duration,
@@ -69,12 +69,12 @@ pub(super) struct Tries {
 }
 
 impl Tries {
-    pub(super) fn new(patience: Patience) -> Self {
+    pub(super) fn new(retry_limits: RetryLimits) -> Self {
         Self {
-            patience,
+            retry_limits,
             pauses: ExponentialBuilder::default()
-                .with_min_delay(patience.first_pause)
-                .with_max_delay(patience.longest_pause)
+                .with_min_delay(retry_limits.first_pause)
+                .with_max_delay(retry_limits.longest_pause)
                 .without_max_times()
                 .with_jitter()
                 .build(),
@@ -95,15 +95,18 @@ impl Tries {
             Miss::Stop(stop) => return Err(stop),
             Miss::Absent(why) => {
                 self.absent += 1;
-                (why, self.absent >= self.patience.tries)
+                (why, self.absent >= self.retry_limits.tries)
             }
-            Miss::Away(why) => (why, self.spent >= self.patience.away),
+            Miss::Away(why) => (why, self.spent >= self.retry_limits.away),
         };
         if is_over {
             return Err(given_up(self.spent, &why));
         }
         tracing::info!(%location, why, "not had yet; trying again");
-        let pause = self.pauses.next().unwrap_or(self.patience.longest_pause);
+        let pause = self
+            .pauses
+            .next()
+            .unwrap_or(self.retry_limits.longest_pause);
         self.spent += pause;
         tokio::time::sleep(pause).await;
         Ok(())

@@ -7,7 +7,7 @@ use crate::error::{Cause, IngestError};
 const TRIES_OF_A_FILE: u32 = 3;
 
 /// Tries until it succeeds, or until the file or what is stored of its product is to blame.
-pub(super) async fn insist<T, F>(
+pub(super) async fn retry<T, F>(
     health: &Health,
     what: &'static str,
     mut attempt: impl FnMut() -> F,
