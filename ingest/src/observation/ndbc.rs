@@ -192,10 +192,8 @@ pub(super) fn read(content: &[u8], source: Source<'_>) -> Result<Found, Rejectio
         good += 1;
         for (at, column, conversion) in &layout.measured {
             let number = words.get(*at).and_then(|word| word.parse::<f64>().ok());
-            let Some(number) = number.filter(|n| is_measured(*n, column)) else {
-                continue;
-            };
-            let value = match conversion.given(number) {
+            let number = number.filter(|n| is_measured(*n, column));
+            let value = match number.map_or(Given::Missing, |n| conversion.given(n)) {
                 Given::Value(value) => value,
                 Given::Missing => continue,
                 Given::Implausible(value) => {

@@ -105,15 +105,12 @@ pub(super) fn read(content: &[u8], source: Source<'_>) -> Result<Found, Rejectio
     let mut record = ByteRecord::new();
     let broken = |e: csv::Error| Rejection::new(RejectReason::Corrupt, "file", e.to_string());
     while rows.read_byte_record(&mut record).map_err(broken)? {
-        match Row::of(&columns, &record) {
-            Some(row) => {
-                good += 1;
-                reading.take(&columns, &row)?;
-            }
-            None => {
-                bad += 1;
-                reading.pass_over(&columns, &record);
-            }
+        if let Some(row) = Row::of(&columns, &record) {
+            good += 1;
+            reading.take(&columns, &row)?;
+        } else {
+            bad += 1;
+            reading.pass_over(&columns, &record);
         }
     }
     if bad * READABLE_IN > good + bad {

@@ -19,12 +19,13 @@ const LINES: usize = 100;
 
 /// Hours of a buoy, of which the first ones have an air temperature that no air has.
 fn write(place: &Place, name: &str, hot: usize) -> PathBuf {
-    let mut text = "#YY  MM DD hh mm WSPD  ATMP\n".to_owned();
-    for hour in 0..LINES {
+    let line = |hour: usize| {
         let air_c = if hour < hot { "87.5" } else { " 6.1" };
         let (day, hour) = (hour / 24 + 1, hour % 24);
-        text += &format!("2012 01 {day:02} {hour:02} 50  5.5  {air_c}\n");
-    }
+        format!("2012 01 {day:02} {hour:02} 50  5.5  {air_c}\n")
+    };
+    let lines: String = (0..LINES).map(line).collect();
+    let text = format!("#YY  MM DD hh mm WSPD  ATMP\n{lines}");
     std::fs::create_dir_all(place.path(name)).unwrap();
     let path = place.path(name).join("44005h2012.txt");
     std::fs::write(&path, text).unwrap();

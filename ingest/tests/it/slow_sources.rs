@@ -26,7 +26,11 @@ async fn a_file_of_a_sound_source_lands_while_others_trickle_and_are_silent() {
     let sound = Box::new(move |_: &str| Answer::Whole("200 OK", vec![], content.clone()));
     let sound = WebServer::start(sound).await;
     let slow = |index: usize| {
-        let server = if index % 3 == 0 { &silent } else { &trickling };
+        let server = if index.is_multiple_of(3) {
+            &silent
+        } else {
+            &trickling
+        };
         notice(&server.url(&format!("/{index}.h5")), None, None)
     };
     let mut notices: Vec<_> = (0..SLOW).map(slow).collect();
