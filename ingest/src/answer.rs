@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use contract::digest::Digest;
-use contract::event::{Body, Event, RejectReason};
+use contract::event::{Body, Event};
 use contract::manifest::ManifestId;
 use contract::notice::NoticeOrder;
 use contract::time::{Period, TimeMs};
@@ -12,7 +12,7 @@ use storage::Store;
 use storage::log::Message;
 
 use crate::commit::{self, Committed};
-use crate::error::{Cause, IngestError};
+use crate::error::IngestError;
 use crate::landing_note;
 use crate::notice::PendingNotice;
 use crate::outcome::Outcome;
@@ -230,21 +230,4 @@ fn outcome(file: PathBuf, committed: Committed, granule: &StoredGranule) -> Outc
         Committed::Superseded { manifest, .. } => Outcome::Superseded { file, manifest },
         Committed::Rejected(rejection) => Outcome::rejected(file, rejection),
     }
-}
-
-/// The refusal of a file that makes the program fail however often it is tried, so that others need not wait behind it.
-pub(crate) fn blame(error: &IngestError) -> Rejection {
-    let (reason, object, advice) = match error.cause() {
-        Cause::Stored => (
-            RejectReason::Conflict,
-            "product",
-            "mend what is stored, then send the notice again",
-        ),
-        Cause::Passing | Cause::Place | Cause::Granule => (
-            RejectReason::Unreadable,
-            "file",
-            "this is a fault of the program: report it with the file",
-        ),
-    };
-    Rejection::new(reason, object, format!("{error}; {advice}"))
 }

@@ -6,8 +6,9 @@ use crate::decoder::session::Session;
 use crate::error::Stop;
 use crate::fetch::RawGranule;
 use crate::file::description::Description;
+use crate::limits::Limits;
 use crate::rejection::Rejection;
-use crate::settings::{Limits, Settings};
+use crate::settings::Settings;
 
 /// A file whose contents are listed; its reader process waits for questions.
 pub(crate) struct InspectedGranule {

@@ -10,7 +10,8 @@ use futures::{StreamExt as _, TryStreamExt as _};
 use storage::Store;
 use storage::log::EventLog;
 
-use crate::answer::{self, Answer, Asked, Ready, blame};
+use crate::answer::{self, Answer, Asked, Ready};
+use crate::blame::blame;
 use crate::boundary;
 use crate::error::{Cause, IngestError};
 use crate::fetch::{Expected, Location};

@@ -8,6 +8,7 @@
 //! Left out on purpose: swaths and irregular grids (refused).
 
 mod answer;
+mod blame;
 mod boundary;
 mod cf;
 mod check;
@@ -25,6 +26,7 @@ mod ingestd;
 mod inspect;
 mod land;
 mod landing_note;
+mod limits;
 mod memory;
 mod metrics;
 mod notice;
@@ -52,10 +54,11 @@ pub use gc::{LandingNotes, Readings};
 pub use generate::{GeneratedSteps, generate_china_sea};
 pub use ingestd::{IngestService, ServiceSettings};
 pub use land::{Batch, land_files};
+pub use limits::Limits;
 pub use metrics::Metrics;
 pub use outcome::Outcome;
 pub use profile::{Profile, Profiles, shipped};
 pub use progress::{Progress, Quiet, Stage};
 pub use rejection::Rejection;
-pub use settings::{DecoderCommand, Limits, Settings};
+pub use settings::{DecoderCommand, Settings};
 pub use survey::{Row, data_files, markdown, survey};

@@ -14,7 +14,7 @@ use contract::product::ProductId;
 use contract::time::Period;
 use storage::{StorageError, Store, manifests};
 
-use crate::answer::blame;
+use crate::blame::blame;
 use crate::commit::is_later_or_same;
 use crate::error::{IngestError, Stop};
 use crate::fetch::RawGranule;

@@ -7,6 +7,7 @@ mod coverage;
 mod date;
 mod place;
 mod quality;
+mod refused;
 mod stamps;
 mod steps;
 mod target;
@@ -24,10 +25,11 @@ use crate::error::Stop;
 use crate::fetch::RawGranule;
 use crate::file::description::{Description, Part, Variable};
 use crate::inspect::InspectedGranule;
+use crate::limits::Limits;
 use crate::profile::Profile;
 use crate::recipe::Recipe;
 use crate::rejection::Rejection;
-use crate::settings::{Limits, Settings};
+use crate::settings::Settings;
 pub(crate) use quality::Quality;
 
 /// A file of which is known what will be read and what it will become.

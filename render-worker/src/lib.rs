@@ -4,6 +4,7 @@
 //! process. `source` knows where frames come from and keeps those in use, `prefetch` reads what comes next. A `fleet` of
 //! such servers is what others ask.
 
+mod adapter_info;
 pub mod batch;
 pub mod desk;
 mod encoding;

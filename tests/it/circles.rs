@@ -29,6 +29,9 @@ const CRATES: &[&str] = &[
     "fluxglobe/src/main.rs",
 ];
 
+/// Circles that are there and have still to be cut: one may get smaller, and none may be added.
+const STILL_TIED: &[&[&str]] = &[];
+
 /// Re-exports of one name that are followed.
 const MOST_RE_EXPORTS: u32 = 8;
 
@@ -245,26 +248,27 @@ impl Crate {
         edges
     }
 
-    /// Files that know one another in both directions, with the names that tie them.
-    fn circles(&self) -> Vec<String> {
+    /// Files that know one another in both directions, sorted, with the names that tie them.
+    fn circles(&self) -> Vec<(Vec<&Path>, String)> {
         let edges = self.edges();
         let graph: DiGraphMap<&Path, ()> = edges.keys().map(|(from, to)| (*from, *to)).collect();
-        let tied = |circle: &Vec<&Path>| {
+        let mut circles = vec![];
+        for mut circle in tarjan_scc(&graph) {
+            if circle.len() < 2 {
+                continue;
+            }
+            circle.sort();
             let inside = edges
                 .iter()
                 .filter(|((from, to), _)| circle.contains(from) && circle.contains(to));
             let lines = inside.map(|((from, to), name)| {
                 format!("\n  {} takes {name} from {}", from.display(), to.display())
             });
-            format!("{} files:{}", circle.len(), lines.collect::<String>())
-        };
-        let mut circles: Vec<_> = tarjan_scc(&graph)
-            .into_iter()
-            .filter(|circle| circle.len() > 1)
-            .collect();
-        circles.iter_mut().for_each(|circle| circle.sort());
+            let text = format!("{} files:{}", circle.len(), lines.collect::<String>());
+            circles.push((circle, text));
+        }
         circles.sort();
-        circles.iter().map(tied).collect()
+        circles
     }
 }
 
@@ -287,21 +291,34 @@ fn file_of(child: &ItemMod, folder: &Path) -> Option<(PathBuf, PathBuf)> {
 #[test]
 fn files_of_a_crate_know_one_another_in_one_direction() {
     let workspace = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
-    let mut found = vec![];
+    let (mut new, mut left) = (vec![], BTreeSet::new());
     for root in CRATES {
         let read = Crate::read(&workspace.join(root));
         assert!(
             read.edges().len() > 3,
             "{root}: its files were not understood"
         );
-        found.extend(read.circles());
+        for (files, text) in read.circles() {
+            let names = files
+                .iter()
+                .map(|file| file.strip_prefix(workspace).unwrap());
+            let names: BTreeSet<&str> = names.map(|name| name.to_str().unwrap()).collect();
+            // A circle may lose files, not win any.
+            let known = STILL_TIED
+                .iter()
+                .position(|known| names.iter().all(|name| known.contains(name)));
+            match known {
+                Some(known) => _ = left.insert(known),
+                None => new.push(text),
+            }
+        }
     }
     let prefix = format!("{}/", workspace.display());
-    assert!(
-        found.is_empty(),
-        "{}",
-        found.join("\n").replace(&prefix, "")
-    );
+    assert!(new.is_empty(), "{}", new.join("\n").replace(&prefix, ""));
+    let cut: Vec<_> = (0..STILL_TIED.len())
+        .filter(|i| !left.contains(i))
+        .collect();
+    assert!(cut.is_empty(), "cut: take numbers {cut:?} off the list");
 }
 
 #[test]
@@ -318,6 +335,6 @@ fn a_circle_is_seen_through_re_exports_and_modules_brought_in() {
     let read = Crate::read(&folder.path().join("lib.rs"));
     let circles = read.circles();
     assert_eq!(circles.len(), 1, "{circles:?}");
-    assert!(circles[0].starts_with("2 files:"), "{circles:?}");
-    assert!(circles[0].contains("takes A from"), "{circles:?}");
+    assert_eq!(circles[0].0.len(), 2, "{circles:?}");
+    assert!(circles[0].1.contains("takes A from"), "{circles:?}");
 }

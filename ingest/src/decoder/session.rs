@@ -12,8 +12,9 @@ use tokio::time::Instant;
 use super::protocol::{self, Answer, Opened, Request};
 use crate::error::{IngestError, Stop};
 use crate::file::description::{Description, Part};
+use crate::limits::Limits;
 use crate::rejection::Rejection;
-use crate::settings::{Limits, Settings};
+use crate::settings::Settings;
 
 /// Last words of a reader that are kept to tell why it died.
 const MAX_LAST_WORDS_BYTES: u64 = 4096;

@@ -19,8 +19,8 @@ use super::retry::{Miss, RetryLimits, Tries, answered, given_up, limited};
 use super::spool::Spool;
 use super::turns::Turns;
 use crate::error::{IngestError, Stop};
+use crate::limits::Limits;
 use crate::rejection::Rejection;
-use crate::settings::Limits;
 
 /// What may be read. Clones share connections and spool.
 #[derive(Debug, Clone, Default)]

@@ -13,8 +13,8 @@ use super::location::file_name;
 use super::raw::{Held, RawGranule, Stamp};
 use super::retry::Miss;
 use crate::error::Stop;
+use crate::limits::Limits;
 use crate::rejection::Rejection;
-use crate::settings::Limits;
 
 /// Bytes read at a time.
 const READ_BYTES: usize = 1 << 20;

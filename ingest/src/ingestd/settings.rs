@@ -5,8 +5,9 @@ use std::time::Duration;
 
 use crate::error::IngestError;
 use crate::fetch::{Allowed, AllowedHost, RetryLimits, Sources};
+use crate::limits::Limits;
 use crate::profile::Profiles;
-use crate::settings::{DecoderCommand, Limits, Settings};
+use crate::settings::{DecoderCommand, Settings};
 
 const MIB: u64 = 1 << 20;
 const TIB: u64 = 1 << 40;

@@ -9,8 +9,9 @@ use contract::product::ProductId;
 use super::{Found, MAX_TEXT_BYTES, Source, read, read_text, recognise, recognise_text};
 use crate::decoder::session::Session;
 use crate::error::{IngestError, Stop};
+use crate::limits::Limits;
 use crate::rejection::Rejection;
-use crate::settings::{Limits, Settings};
+use crate::settings::Settings;
 
 /// Bytes that tell of which kind a text file is.
 const HEAD_BYTES: u64 = 256 << 10;

@@ -2,7 +2,7 @@
 
 use contract::time::{Period, TimeMs};
 
-use super::steps::refused;
+use super::refused::refused;
 use super::{Planning, stamps};
 use crate::cf::calendar::CalendarDate;
 use crate::cf::cell_methods::TimeMethod;

@@ -1,7 +1,7 @@
 //! The stamps of a time axis: its numbers as dates of its calendar.
 
 use super::Planning;
-use super::steps::refused;
+use super::refused::refused;
 use crate::cf::calendar::{Calendar, CalendarDate, TimeUnit};
 use crate::error::Stop;
 use crate::rejection::Rejection;

@@ -4,6 +4,7 @@ use contract::event::RejectReason;
 use contract::time::Period;
 
 use super::bounds::{self, Bounds};
+use super::refused::refused;
 use super::{PlannedStep, Planning, coverage, date, stamps};
 use crate::cf::calendar::CalendarDate;
 use crate::cf::cell_methods::{self, TimeMethod};
@@ -15,10 +16,6 @@ use crate::file::description::Variable;
 use crate::profile::{Profile, TimeRules, TimeSource};
 use crate::rejection::Rejection;
 use crate::unit;
-
-pub(super) fn refused(object: &str, detail: impl AsRef<str>) -> Rejection {
-    Rejection::new(RejectReason::Time, object, detail)
-}
 
 /// The periods of all steps, in the order of the file, not overlapping.
 pub(super) async fn periods(

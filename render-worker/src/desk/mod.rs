@@ -20,8 +20,9 @@ use render::{Backend, RenderError};
 use storage::Store;
 use tracing::Instrument as _;
 
+use crate::adapter_info::AdapterInfo;
 use crate::error::DrawError;
-use crate::gauges::{AdapterInfo, Gauges};
+use crate::gauges::Gauges;
 use crate::pipeline::{Limits, Pipeline};
 use drawing::picture_failed;
 use queue::Queue;
