@@ -330,6 +330,8 @@ export interface components {
              * @description Area of the sea in it, m².
              */
             ocean_area_m2: number;
+            /** @description What said how much of each cell is sea. */
+            ocean_source: string;
             /** @description Name of the product. */
             product: string;
             /** @description The region by its name, or as `west,south,east,north`. */
@@ -379,6 +381,8 @@ export interface components {
              * @description Area of the sea in it, m².
              */
             ocean_area_m2: number;
+            /** @description What said how much of each cell is sea. */
+            ocean_source: string;
             /** @description Name of the product. */
             product: string;
             /** @description The region by its name, or as `west,south,east,north`. */
@@ -866,7 +870,7 @@ export interface components {
          * @description What the values of a product are.
          * @enum {string}
          */
-        Quantity: "carbon_flux" | "accumulated_carbon" | "sea_surface_temperature" | "chlorophyll" | "wind_speed" | "pco2" | "salinity" | "air_pressure" | "ice_fraction" | "wave_height" | "precipitation" | "current" | "elevation";
+        Quantity: "carbon_flux" | "accumulated_carbon" | "sea_surface_temperature" | "chlorophyll" | "wind_speed" | "pco2" | "salinity" | "air_pressure" | "ice_fraction" | "wave_height" | "precipitation" | "current" | "elevation" | "sea_area_fraction" | "land_area_fraction";
         /** @description Can the server do its work, and which part of it cannot? */
         Readiness: {
             /** @description All parts. */
@@ -1407,6 +1411,8 @@ export interface operations {
                 to?: string;
                 /** @description Figure of the earth for areas; `wgs84` unless one is given. */
                 earth?: components["schemas"]["Earth"];
+                /** @description Landed product whose cells say how much of them is sea or land, in place of Natural Earth. */
+                ocean?: string;
                 /** @description Version, as answers name it; the newest unless one is given. */
                 manifest?: string;
             };
@@ -1497,6 +1503,8 @@ export interface operations {
                 earth?: components["schemas"]["Earth"];
                 /** @description How cells on the coast count; `whole` unless told otherwise. */
                 cells?: components["schemas"]["Cells"];
+                /** @description Landed product whose cells say how much of them is sea or land, in place of Natural Earth. */
+                ocean?: string;
                 /** @description Version, as answers name it; the newest unless one is given. */
                 manifest?: string;
             };
@@ -2406,4 +2414,4 @@ export const platformTypeValues: ReadonlyArray<FlattenedDeepRequired<components>
 export const platformKindValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["PlatformKind"]> = ["buoy", "ship", "station", "profile"];
 export const platformsTypeValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Platforms"]["type"]> = ["FeatureCollection"];
 export const qualityValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Quality"]> = ["good", "not_evaluated", "questionable", "bad"];
-export const quantityValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Quantity"]> = ["carbon_flux", "accumulated_carbon", "sea_surface_temperature", "chlorophyll", "wind_speed", "pco2", "salinity", "air_pressure", "ice_fraction", "wave_height", "precipitation", "current", "elevation"];
+export const quantityValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Quantity"]> = ["carbon_flux", "accumulated_carbon", "sea_surface_temperature", "chlorophyll", "wind_speed", "pco2", "salinity", "air_pressure", "ice_fraction", "wave_height", "precipitation", "current", "elevation", "sea_area_fraction", "land_area_fraction"];
