@@ -190,7 +190,7 @@ impl Frame {
     }
 }
 
-/// Two adjacent steps and the weight of the second (eq. 3).
+/// Two adjacent steps and the weight of the second (eq. 3 in docs/method.md).
 #[derive(Debug, Clone)]
 pub struct Interval {
     /// The step before the instant.

@@ -1,6 +1,6 @@
 //! The space that clouds are in: which way the eye looks through it, and where its sun is.
 //!
-//! Globe views: earth radii, in the axes of eq. 4 (x towards 90 E, y towards 0 E, z towards the north pole). Map tiles:
+//! Globe views: earth radii, in the axes of eq. 4 (docs/method.md) (x towards 90 E, y towards 0 E, z towards the north pole). Map tiles:
 //! pixels east and south on the screen and up; what is higher is already moved north by the slope of the view, so that
 //! the eye looks straight down and the sun stands askew.
 

@@ -25,7 +25,7 @@ const POLE_DEG: f64 = 89.9;
 pub struct Corner {
     /// On the map: shares of the world's width and height from its north-west.
     pub share: [f64; 2],
-    /// On the globe, in the axes of eq. 4.
+    /// On the globe, in the axes of eq. 4 (docs/method.md).
     pub normal: DVec3,
 }
 

@@ -23,7 +23,7 @@ pub(super) struct Camera {
     pub height: f64,
 }
 
-/// East, north and up at a place, in the axes of eq. 4: x towards 90 E, y towards 0 E, z towards the north pole.
+/// East, north and up at a place, in the axes of eq. 4 (docs/method.md): x towards 90 E, y towards 0 E, z towards the north pole.
 pub(super) fn axes_at(lon_deg: f64, lat_deg: f64) -> [DVec3; 3] {
     let (sin_lon, cos_lon) = lon_deg.to_radians().sin_cos();
     let (sin_lat, cos_lat) = lat_deg.to_radians().sin_cos();

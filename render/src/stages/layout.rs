@@ -180,7 +180,7 @@ shared_struct! {
         pub day_on: u32,
         /// 1: thematic maps are dimmed where it is night.
         pub night_on: u32,
-        /// 1: the sun is given in east, north and up of every place; else in the axes of eq. 4.
+        /// 1: the sun is given in east, north and up of every place; else in the axes of eq. 4 (docs/method.md).
         pub sun_is_local: u32,
         /// Extinction of the sea for each metre below its surface that a particle is drawn at.
         pub sea_per_m: f32,

@@ -2,7 +2,7 @@
 
 use crate::stages::layout::{MISSING, Params, is_missing};
 
-/// Value between two adjacent frames, `weight` of the way from `v1` to `v2` (eq. 3); missing if either is, unless the
+/// Value between two adjacent frames, `weight` of the way from `v1` to `v2` (eq. 3 in docs/method.md); missing if either is, unless the
 /// instant is that of the first frame.
 pub fn interpolated(v1: f32, v2: f32, weight: f32) -> f32 {
     if weight <= 0.0 {

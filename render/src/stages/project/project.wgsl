@@ -1,4 +1,4 @@
-// A particle on the screen and in the light: map projection for tiles, eq. 4 and a perspective camera for the globe.
+// A particle on the screen and in the light: map projection for tiles, eq. 4 (docs/method.md) and a perspective camera for the globe.
 // Reads `rows` and `cols`.
 // Half a cell beyond which the series for small angles is not good enough.
 const WIDE_CELL_RAD = 0.2;

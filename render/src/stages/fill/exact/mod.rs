@@ -2,7 +2,7 @@
 //!
 //! The weight 1/d² is split into a part that ends within [`REACH`] cells and one that is smooth on that scale; the
 //! smooth part is summed on a grid half as fine, where it is split again, and so on (Brandt and Lubrecht 1990,
-//! doi:10.1016/0021-9991(90)90105-A; the smoothing by a Taylor polynomial is that of multilevel summation for Coulomb
+//! Journal of Computational Physics 90, 348; the smoothing by a Taylor polynomial is that of multilevel summation for Coulomb
 //! sums, Hardy et al. 2015, doi:10.1021/ct5009075). Six-point Lagrange interpolation carries values between levels.
 //! Against all pairs in float64 the answers are within [`TOLERANCE`] of the values' range; tests hold it to that.
 
