@@ -90,14 +90,14 @@ impl SurroundingsQuery {
     }
 
     /// The options of a picture, with what is asked for here.
-    pub(crate) fn around(&self, options: PictureOptions) -> Result<PictureOptions, ServerError> {
+    pub(crate) fn around(&self, options: &PictureOptions) -> Result<PictureOptions, ServerError> {
         let asked = self.parsed()?;
         Ok(PictureOptions {
             sea_opacity: asked.sea_opacity,
             coastlines: asked.coastlines,
             height_m_per_kg_m2: asked.height_exaggeration,
             sun: asked.sun,
-            ..options
+            ..*options
         })
     }
 

@@ -93,7 +93,7 @@ pub(crate) async fn get(
     let mode = request::mode(&layer, name)?;
     let view = query.view()?;
     let time = time(query.time.as_deref())?;
-    let mut options = query.surroundings.around(query.look.parse()?.options())?;
+    let mut options = query.surroundings.around(&query.look.parse()?.options())?;
     options.globe_surface = match query.surface.as_deref() {
         None | Some("true") => true,
         Some("false") => false,

@@ -89,7 +89,7 @@ pub(crate) async fn get(
         mode,
         view: View::Tile { tile, size_px },
         time,
-        options: around.around(look.options())?,
+        options: around.around(&look.options())?,
     };
     let relief = around.relief(&state.catalogue).await?;
     let job = request::job_of(&layer, &request, relief)?;
