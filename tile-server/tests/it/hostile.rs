@@ -104,7 +104,7 @@ const BAD_ADDRESSES: &[(&str, &str)] = &[
         "/api/products/flux/budget?step=week",
         "month, year or total",
     ),
-    ("/api/products/flux/budget?earth=flat", "wgs84 or sphere"),
+    ("/api/products/flux/budget?earth=flat", "local-radius"),
     ("/api/products/flux/budget?form=2000", "unknown field"),
 ];
 
