@@ -289,7 +289,7 @@ pub(crate) struct StatsPolygon {
     /// Figure of the earth for areas: wgs84, sphere (R = 6371 km) or local-radius (as FluxEngine sums).
     #[arg(long, default_value = "wgs84")]
     pub(crate) earth: Earth,
-    /// Product that says how much of every cell is sea or land (sea_area_fraction, land_area_fraction), on the same grid.
+    /// Product that says how much of every cell is sea or land (`sea_area_fraction`, `land_area_fraction`), on the same grid.
     /// Natural Earth's land, 1:50 million, if absent.
     #[arg(long, value_name = "PRODUCT")]
     pub(crate) ocean: Option<ProductId>,
@@ -333,7 +333,7 @@ pub(crate) struct Budget {
     /// How cells on the coast count: whole, or by their ocean-share.
     #[arg(long, default_value = "whole")]
     pub(crate) cells: Cells,
-    /// Product that says how much of every cell is sea or land (sea_area_fraction, land_area_fraction), on the same grid.
+    /// Product that says how much of every cell is sea or land (`sea_area_fraction`, `land_area_fraction`), on the same grid.
     /// Natural Earth's land, 1:50 million, if absent.
     #[arg(long, value_name = "PRODUCT")]
     pub(crate) ocean: Option<ProductId>,

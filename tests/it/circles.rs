@@ -114,10 +114,12 @@ fn is_of_tests(attributes: &[Attribute]) -> bool {
     attributes.iter().any(|attribute| {
         let mut is_test = false;
         if attribute.path().is_ident("cfg") {
-            let _ = attribute.parse_nested_meta(|meta| {
+            let read = attribute.parse_nested_meta(|meta| {
                 is_test |= meta.path.is_ident("test");
                 Ok(())
             });
+            // A condition of another form is none of tests.
+            is_test &= read.is_ok();
         }
         is_test
     })

@@ -43,6 +43,10 @@ fn landed() -> (tempfile::TempDir, Value) {
 }
 
 #[test]
+#[expect(
+    clippy::too_many_lines,
+    reason = "one table of totals, asked of one store"
+)]
 fn fluxengines_budget_is_had_with_its_authors_choices_by_name() {
     let (folder, said) = landed();
     let data = folder.path().join("data");

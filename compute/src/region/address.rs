@@ -6,7 +6,7 @@
 use contract::earth::Earth;
 use contract::grid::Grid;
 use contract::key::ObjectKey;
-use contract::region::{NAMED_REGIONS, Region};
+use contract::region::{NAMED_REGIONS, NamedRegion, Region};
 use storage::{StorageError, Store};
 
 use super::computed::ComputedWeights;
@@ -68,7 +68,7 @@ impl RegionAddress {
 /// One of a bounded number of regions, weighed as the sums are that are stored of new versions.
 fn is_for_everybody(asked: OnGrid<'_>) -> bool {
     let is_named = || {
-        let mut regions = NAMED_REGIONS.iter().map(|named| named.region());
+        let mut regions = NAMED_REGIONS.iter().map(NamedRegion::region);
         regions.any(|region| region == *asked.region)
     };
     asked.earth == EARTH && *asked.ocean == Surface::Ocean && is_named()

@@ -100,7 +100,7 @@ mod tests {
         if let Some(folder) = frozen::to_freeze() {
             let objects = folder.join("objects");
             let store = Store::open(objects.to_str().unwrap()).unwrap();
-            put(&store, &dataset, raw, ("buoys.csv", 17, masked.clone()))
+            put(&store, &dataset, raw, ("buoys.csv", 17, masked))
                 .await
                 .unwrap();
         }

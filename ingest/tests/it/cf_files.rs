@@ -269,14 +269,15 @@ async fn shares_of_land_and_sea_land_as_shares_of_one_whatever_their_unit() {
         let place = Place::new();
         let path = place.path("mask.nc");
         let share = |cell: usize| (cell % 5) as f64 / 4.0;
-        let values = (0..32).map(|cell| (share(cell) / stored_by) as f32);
+        // Two days alike: how far one stamp reaches, nothing would say.
+        let values = (0..64).map(|cell| (share(cell % 32) / stored_by) as f32);
         let mask = Made::new(
             "mask",
             &["time", "lat", "lon"],
             Values::Floats(values.collect()),
         );
         let mask = mask.text("standard_name", name).text("units", unit);
-        MadeFile::days(1).with(mask).write(&path);
+        MadeFile::days(2).with(mask).write(&path);
         let outcomes = place.land(&[path]).await;
         let Outcome::Landed { manifest, .. } = &outcomes[0] else {
             panic!("{name} in {unit}: {}", outcomes[0])

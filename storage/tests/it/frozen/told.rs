@@ -209,7 +209,7 @@ async fn a_frozen_log_holds_what_was_told_and_how_far_its_readers_had_come() {
         let found = messages(&log, topic).await;
         let texts: Vec<String> = expected.iter().map(Event::to_json).collect();
         let found_texts: Vec<&[u8]> = found.iter().map(|it| &it.content[..]).collect();
-        let texts: Vec<&[u8]> = texts.iter().map(|it| it.as_bytes()).collect();
+        let texts: Vec<&[u8]> = texts.iter().map(String::as_bytes).collect();
         assert_eq!(found_texts, texts, "{topic}");
         for (message, expected) in found.iter().zip(expected) {
             assert!(message.time.is_some());
