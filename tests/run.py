@@ -45,10 +45,10 @@ def suites():
     return found
 
 
-def run(name, command, folder, again, results):
+def run(name, command, folder, again, results, **more):
     """Runs one suite, shows what it said, and notes how it ended."""
     start = time.monotonic()
-    environment = {**os.environ, "CARGO": CARGO, "CARGO_MANIFEST_DIR": folder}
+    environment = {**os.environ, **more}
     ended = subprocess.run(
         command, cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace"
     )
@@ -62,7 +62,8 @@ def run(name, command, folder, again, results):
 def lane(names, found, results):
     for name in names:
         program, folder, again = found[name]
-        run(name, [program], folder, again, results)
+        # What cargo tells a test program. Cargo itself must not hear it: build scripts would run anew.
+        run(name, [program], folder, again, results, CARGO=CARGO, CARGO_MANIFEST_DIR=folder)
 
 
 def main():
