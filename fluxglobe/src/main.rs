@@ -16,10 +16,14 @@ mod sink;
 mod viewer;
 
 use std::process::ExitCode;
+use std::time::Duration;
 
 use clap::{CommandFactory as _, FromArgMatches as _};
 
 use crate::cli::{Cli, Command, Settings};
+
+/// What ends within this time ends in order.
+const SHUTDOWN_LIMIT: Duration = Duration::from_secs(3);
 
 fn main() -> ExitCode {
     let mut program = Cli::command();
@@ -50,8 +54,9 @@ fn run(settings: &Settings, command: Command) -> anyhow::Result<ExitCode> {
         .enable_all()
         .build()?;
     let outcome = runtime.block_on(command::run(settings, command));
-    // Ballista's executor keeps threads of its own; nobody waits for them.
-    runtime.shutdown_background();
+    // Tasks are dropped before `main` ends: drivers' exit handlers must find no device that is still held. What computes
+    // or waits for a server beyond that is not waited for.
+    runtime.shutdown_timeout(SHUTDOWN_LIMIT);
     outcome
 }
 
