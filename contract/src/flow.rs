@@ -114,6 +114,7 @@ mod tests {
         height_m: 1e6,
         width_px: 10,
         height_px: 10,
+        angles: crate::camera::CameraAngles::NADIR,
     };
 
     /// Days of January 2002.

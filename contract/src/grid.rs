@@ -38,6 +38,22 @@ impl LonLatDeg {
     }
 }
 
+impl std::str::FromStr for LonLatDeg {
+    type Err = ContractError;
+
+    /// `LON,LAT`.
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let numbers = text
+            .split_once(',')
+            .and_then(|(lon, lat)| Some((lon.trim().parse().ok()?, lat.trim().parse().ok()?)));
+        let Some((lon, lat)) = numbers else {
+            let valid = "LON,LAT: degrees east and north, such as -95,0";
+            return Err(ContractError::invalid("place", text, valid));
+        };
+        Self::new(lon, lat)
+    }
+}
+
 /// Longitude wrapped into [-180, 180).
 pub fn wrap_lon_deg(lon: f64) -> f64 {
     if (-180.0..180.0).contains(&lon) {

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::ContractError;
+use crate::camera::{CameraAngles, MAX_CAMERA_HEIGHT_M, MIN_CAMERA_HEIGHT_M};
 use crate::colour::TransferFunction;
 use crate::context::{Context, Relief};
 use crate::digest::Digest;
@@ -22,8 +23,6 @@ pub const MAX_IMAGE_PX: u32 = 4096;
 pub const MAX_SLICES: u32 = 256;
 /// Most particles a cell may carry.
 pub const MAX_PARTICLES_PER_CELL: u32 = 256;
-/// Farthest camera above the ground, m.
-pub const MAX_CAMERA_HEIGHT_M: f64 = 1e9;
 
 /// How a product is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
@@ -93,7 +92,7 @@ pub enum View {
         /// Pixels a side.
         size_px: u32,
     },
-    /// The globe in perspective, the camera looking at the earth's centre, north up.
+    /// The globe in perspective.
     Globe {
         /// Longitude below the camera, degrees.
         #[serde(with = "crate::exact")]
@@ -108,6 +107,9 @@ pub enum View {
         width_px: u32,
         /// Picture height, pixels.
         height_px: u32,
+        /// Which way the camera looks: straight down with north up unless told otherwise.
+        #[serde(default, skip_serializing_if = "CameraAngles::is_usual")]
+        angles: CameraAngles,
     },
 }
 
@@ -251,13 +253,14 @@ impl View {
                 lon_deg,
                 lat_deg,
                 height_m,
+                angles,
                 ..
             } => {
                 crate::grid::LonLatDeg::new(lon_deg, lat_deg)?;
-                if !(1e3..=MAX_CAMERA_HEIGHT_M).contains(&height_m) {
+                if !(MIN_CAMERA_HEIGHT_M..=MAX_CAMERA_HEIGHT_M).contains(&height_m) {
                     return bad("the camera stands 1 km to 1 million km above the ground");
                 }
-                Ok(())
+                angles.validate(height_m, self.size_px())
             }
         }
     }
@@ -477,6 +480,7 @@ mod tests {
                 height_m: odd * 1e6,
                 width_px: 10,
                 height_px: 10,
+                angles: crate::camera::CameraAngles::NADIR,
             };
             let back: RenderJob =
                 serde_json::from_str(&serde_json::to_string(&job).unwrap()).unwrap();
@@ -492,6 +496,7 @@ mod tests {
             height_m,
             width_px,
             height_px: 10,
+            angles: crate::camera::CameraAngles::NADIR,
         };
         let broken: [fn(&mut RenderJob); 14] = [
             |j| j.grid.rows = u32::MAX,

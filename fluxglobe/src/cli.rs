@@ -14,6 +14,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use contract::earth::Earth;
+use contract::grid::LonLatDeg;
 use contract::job::Mode;
 use contract::product::ProductId;
 use contract::region::Cells;
@@ -429,21 +430,70 @@ pub(crate) struct RenderTile {
 pub(crate) struct RenderGlobe {
     #[command(flatten)]
     pub(crate) picture: Picture,
-    /// Longitude below the camera, degrees east.
-    #[arg(long, allow_negative_numbers = true)]
-    pub(crate) lon: f64,
-    /// Latitude below the camera, degrees north.
-    #[arg(long, allow_negative_numbers = true)]
-    pub(crate) lat: f64,
-    /// Height of the camera above the ground, km.
-    #[arg(long, default_value_t = 15_000.0)]
-    pub(crate) height: f64,
+    #[command(flatten)]
+    pub(crate) camera: Camera,
     /// Width and height of the picture, pixels.
     #[arg(long, default_value = "1280x960", value_parser = size)]
     pub(crate) size: (u32, u32),
     /// Leave out the plain globe behind the particles.
     #[arg(long)]
     pub(crate) transparent: bool,
+}
+
+/// Where the camera of a globe's picture is and which way it looks: over a place, or at one.
+#[derive(Debug, Args)]
+pub(crate) struct Camera {
+    /// Longitude below the camera, degrees east.
+    #[arg(
+        long,
+        allow_negative_numbers = true,
+        required_unless_present = "look_at"
+    )]
+    pub(crate) lon: Option<f64>,
+    /// Latitude below the camera, degrees north.
+    #[arg(
+        long,
+        allow_negative_numbers = true,
+        required_unless_present = "look_at"
+    )]
+    pub(crate) lat: Option<f64>,
+    /// Height of the camera above the ground, km.
+    #[arg(long, default_value_t = 15_000.0)]
+    pub(crate) height: f64,
+    /// Place in the middle of the picture, degrees east and north: instead of the one below the camera.
+    #[arg(
+        long,
+        value_name = "LON,LAT",
+        allow_hyphen_values = true,
+        conflicts_with_all = ["lon", "lat", "height"]
+    )]
+    pub(crate) look_at: Option<LonLatDeg>,
+    /// From the camera to the place that is looked at, km.
+    #[arg(long, value_name = "KM", default_value_t = 15_000.0, requires = "look_at")]
+    pub(crate) distance: f64,
+    /// Direction of view, clockwise from north, degrees.
+    #[arg(
+        long,
+        value_name = "DEGREES",
+        default_value_t = 0.0,
+        allow_negative_numbers = true
+    )]
+    pub(crate) heading: f64,
+    /// 0 looks straight down, 90 along the ground below the camera; with --look-at, at the place that is looked at, 0 to
+    /// 90; degrees.
+    #[arg(long, value_name = "DEGREES", default_value_t = 0.0)]
+    pub(crate) tilt: f64,
+    /// Lean of the camera to the right, degrees.
+    #[arg(
+        long,
+        value_name = "DEGREES",
+        default_value_t = 0.0,
+        allow_negative_numbers = true
+    )]
+    pub(crate) roll: f64,
+    /// Field of view across the shorter side of the picture, degrees, 1 to 120.
+    #[arg(long, value_name = "DEGREES", default_value_t = 45.0)]
+    pub(crate) fov: f64,
 }
 
 /// `fluxglobe generate`.

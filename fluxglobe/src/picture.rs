@@ -1,7 +1,9 @@
 //! From the options of a picture to its render job: the same words and the same function as an address has.
 
 use anyhow::{Context as _, Result};
+use contract::camera::{CameraAngles, LookAt};
 use contract::context::Relief;
+use contract::grid::LonLatDeg;
 use contract::job::{Mode, RenderJob, View};
 use contract::manifest::Manifest;
 use contract::picture::{PictureOptions, PictureRequest, PictureSources, shown_time};
@@ -12,14 +14,35 @@ use crate::cli::{Picture, RenderGlobe, Settings};
 use crate::{deployment, progress};
 
 /// The view that the options of a globe's picture ask for.
-pub(crate) fn view_of(globe: &RenderGlobe) -> View {
-    View::Globe {
-        lon_deg: globe.lon,
-        lat_deg: globe.lat,
-        height_m: globe.height * 1000.0,
-        width_px: globe.size.0,
-        height_px: globe.size.1,
+pub(crate) fn view_of(globe: &RenderGlobe) -> Result<View> {
+    let camera = &globe.camera;
+    let angles = CameraAngles {
+        heading_deg: camera.heading,
+        tilt_deg: camera.tilt,
+        roll_deg: camera.roll,
+        field_of_view_deg: camera.fov,
+    };
+    let (width_px, height_px) = globe.size;
+    if let Some(target) = camera.look_at {
+        let look_at = LookAt {
+            target,
+            distance_m: camera.distance * 1000.0,
+            angles,
+        };
+        return Ok(look_at.view([width_px, height_px])?);
     }
+    let place = LonLatDeg::new(
+        camera.lon.unwrap_or_default(),
+        camera.lat.unwrap_or_default(),
+    )?;
+    Ok(View::Globe {
+        lon_deg: place.lon,
+        lat_deg: place.lat,
+        height_m: camera.height * 1000.0,
+        width_px,
+        height_px,
+        angles,
+    })
 }
 
 /// The job that the options of a picture ask for, over the newest version of its product.

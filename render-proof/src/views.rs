@@ -11,6 +11,7 @@ pub fn globe(lon_deg: f64, lat_deg: f64, height_m: f64, size_px: u32) -> View {
         height_m,
         width_px: size_px,
         height_px: size_px,
+        angles: contract::camera::CameraAngles::NADIR,
     }
 }
 

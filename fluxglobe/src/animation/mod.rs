@@ -80,7 +80,7 @@ pub(crate) async fn run(settings: &Settings, store: Store, options: RenderAnimat
 
 async fn shots(settings: &Settings, store: &Store, options: &RenderAnimation) -> Result<Shots> {
     let globe = &options.globe;
-    let view = picture::view_of(globe);
+    let view = picture::view_of(globe)?;
     let product = picture::product(store, settings, &globe.picture).await?;
     let (from, to) = span(&product, options.from, options.to)?;
     let sun_of_time = globe.picture.surroundings.sun == Some(SunChoice::OfTime);

@@ -61,6 +61,7 @@ fn shots(count: u32) -> Shots {
         height_m: 1e7,
         width_px: 6,
         height_px: 4,
+        angles: contract::camera::CameraAngles::NADIR,
     };
     Shots {
         product: product(),

@@ -128,6 +128,9 @@ pub(crate) struct BenchServe {
     /// Height of the camera above the ground, km.
     #[arg(long, default_value_t = 15_000.0)]
     pub(crate) height_km: f64,
+    /// Tilt of the camera, degrees; 0 looks straight down.
+    #[arg(long, default_value_t = 0.0)]
+    pub(crate) tilt: f64,
     /// JSON instead of a table.
     #[arg(long)]
     pub(crate) json: bool,

@@ -24,7 +24,7 @@ pub(crate) async fn run(settings: &Settings, options: Render) -> Result<()> {
             )
         }
         Render::Globe(globe) => {
-            let view = picture::view_of(&globe);
+            let view = picture::view_of(&globe)?;
             (globe.picture, view, !globe.transparent)
         }
         Render::Animation(animation) => return animation::run(settings, store, animation).await,

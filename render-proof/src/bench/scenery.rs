@@ -152,6 +152,7 @@ pub fn pole(cells: u64, size_px: [u32; 2]) -> Result<(Scene, RenderJob)> {
         height_m: 9.0e6,
         width_px: size_px[0],
         height_px: size_px[1],
+        angles: contract::camera::CameraAngles::NADIR,
     };
     Ok((scene, job))
 }
@@ -194,6 +195,7 @@ pub fn job(size_px: [u32; 2], slices: u32) -> Result<RenderJob> {
             height_m: CAMERA_HEIGHT_M,
             width_px: size_px[0],
             height_px: size_px[1],
+            angles: contract::camera::CameraAngles::NADIR,
         },
         style,
     })

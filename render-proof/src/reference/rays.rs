@@ -201,6 +201,7 @@ mod tests {
             height_m: 2.0e6,
             width_px: 9,
             height_px: 9,
+            angles: contract::camera::CameraAngles::NADIR,
         });
         job.style.sun.elevation_deg = 90.0;
         Space::of(&job)

@@ -11,8 +11,6 @@ use contract::job::{RenderJob, View};
 use contract::tile::{mercator_x, mercator_y};
 use glam::{DVec2, DVec3};
 
-/// Opening of the camera across the shorter side, degrees.
-const OPENING_DEG: f64 = 45.0;
 /// Pixels north for each pixel of height: the slope of the view of map tiles.
 const SLOPE: f64 = 0.35;
 /// The sun of map tiles stands no lower, degrees.
@@ -31,7 +29,7 @@ pub(super) struct Space {
 enum Eye {
     Globe {
         place: DVec3,
-        /// East, north, up.
+        /// Right and up in the picture, and from it towards the camera.
         axes: [DVec3; 3],
         focal_px: f64,
         center_px: DVec2,
@@ -72,15 +70,23 @@ impl Space {
                 height_m,
                 width_px,
                 height_px,
+                angles,
             } => {
-                let axes = axes(lon_deg.to_radians(), lat_deg.to_radians());
-                let [east, north, up] = axes;
+                let [east, north, up] = axes(lon_deg.to_radians(), lat_deg.to_radians());
                 let size_px = DVec2::new(f64::from(width_px), f64::from(height_px));
-                let half_opening = (OPENING_DEG / 2.0).to_radians();
+                let half_opening = (angles.field_of_view_deg / 2.0).to_radians();
+                // Turned about the vertical, then about the picture's level axis, then about the line of sight.
+                let turned = |[a, b]: [DVec3; 2], angle_deg: f64| {
+                    let (sin, cos) = angle_deg.to_radians().sin_cos();
+                    [a * cos - b * sin, b * cos + a * sin]
+                };
+                let [right, ahead] = turned([east, north], angles.heading_deg);
+                let [back, top] = turned([up, ahead], angles.tilt_deg);
+                let [right, top] = turned([right, top], angles.roll_deg);
                 Self {
                     eye: Eye::Globe {
                         place: up * (1.0 + height_m / SPHERE_RADIUS_M),
-                        axes,
+                        axes: [right, top, back],
                         focal_px: size_px.min_element() / 2.0 / half_opening.tan(),
                         center_px: size_px / 2.0,
                     },
@@ -158,12 +164,12 @@ impl Space {
         match self.eye {
             Eye::Globe {
                 place,
-                axes: [east, north, up],
+                axes: [right, top, back],
                 focal_px,
                 center_px,
             } => {
                 let off = (pixel - center_px) / focal_px;
-                let sight = east * off.x - north * off.y - up;
+                let sight = right * off.x - top * off.y - back;
                 Ray {
                     start: place,
                     ahead: sight / sight.length(),
@@ -182,17 +188,17 @@ impl Space {
         match self.eye {
             Eye::Globe {
                 place,
-                axes: [east, north, up],
+                axes: [right, top, back],
                 focal_px,
                 center_px,
             } => {
                 let sight = center - place;
-                let ahead = -sight.dot(up);
+                let ahead = -sight.dot(back);
                 let nearest = ahead - radius;
                 if nearest <= 0.0 {
                     return None;
                 }
-                let off = DVec2::new(sight.dot(east), -sight.dot(north));
+                let off = DVec2::new(sight.dot(right), -sight.dot(top));
                 // Any point of the ball is within a radius sideways and in depth.
                 let reach = radius / nearest * (1.0 + off.length() / ahead);
                 Some((center_px + off / ahead * focal_px, reach * focal_px))

@@ -134,6 +134,7 @@ pub(crate) fn slow(job: &RenderJob, number: u32) -> RenderJob {
             height_m: 1e7,
             width_px: 1024,
             height_px: 1024,
+            angles: contract::camera::CameraAngles::NADIR,
         },
         ..job.clone()
     };

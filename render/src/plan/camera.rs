@@ -1,26 +1,37 @@
 //! The camera of a globe view: where it stands, what it sees of the globe, and where its sun stands.
 
-use std::f64::consts::PI;
-
+use contract::camera::CameraAngles;
 use contract::earth::SPHERE_RADIUS_M;
-use contract::job::RenderJob;
+use contract::job::{RenderJob, View};
 use contract::sun::{Subsolar, Sun};
 use glam::{DVec2, DVec3};
 
+use super::footprint::{self, Footprint};
 use super::look;
 use crate::stages::layout::Params;
 
-/// Vertical opening of the camera (of the shorter side), degrees.
-const OPENING_DEG: f64 = 45.0;
+/// What is nearer to the camera than this share of twice its height is not drawn; `project.wgsl` has the same.
+const NEAR_SHARE: f64 = 0.01;
 
-/// A camera above a place; lengths in earth radii.
+/// Flattest angle between a sight line and the normal of slices, radians.
+const MOST_SLANT_RAD: f64 = 1.48;
+
+/// A camera over a place; lengths in earth radii.
 pub(super) struct Camera {
     pub place: DVec3,
-    pub east: DVec3,
-    pub north: DVec3,
-    pub up: DVec3,
+    /// East, north and up at the place below it.
+    pub ground: [DVec3; 3],
+    /// Towards the right and the upper edge of the picture, and along the line of sight.
+    pub right: DVec3,
+    pub top: DVec3,
+    pub forward: DVec3,
     pub focal_px: f64,
     pub height: f64,
+    /// To the nearest ground in the picture.
+    pub nearest: f64,
+    /// Between the line of sight and straight down, and between it and a corner of the picture, radians.
+    tilt: f64,
+    corner: f64,
 }
 
 /// East, north and up at a place, in the axes of eq. 4 (docs/method.md): x towards 90 E, y towards 0 E, z towards the north pole.
@@ -51,19 +62,50 @@ pub(super) fn local_sun(sun: &Sun) -> DVec3 {
 }
 
 impl Camera {
-    /// Above a place, looking down, north up; `size_px` is the picture's width and height.
-    pub(super) fn above(lon_deg: f64, lat_deg: f64, height_m: f64, size_px: [u32; 2]) -> Self {
-        let [east, north, up] = axes_at(lon_deg, lat_deg);
+    /// That of a globe view; none of any other.
+    pub(super) fn of(view: &View) -> Option<Self> {
+        match *view {
+            View::Tile { .. } => None,
+            View::Globe {
+                lon_deg,
+                lat_deg,
+                height_m,
+                angles,
+                ..
+            } => Some(Self::over([lon_deg, lat_deg], height_m, &angles, view.size_px())),
+        }
+    }
+
+    fn over(
+        [lon_deg, lat_deg]: [f64; 2],
+        height_m: f64,
+        angles: &CameraAngles,
+        size_px: [u32; 2],
+    ) -> Self {
+        let ground @ [east, north, up] = axes_at(lon_deg, lat_deg);
+        let (sin_heading, cos_heading) = angles.heading_deg.to_radians().sin_cos();
+        let (sin_tilt, cos_tilt) = angles.tilt_deg.to_radians().sin_cos();
+        let (sin_roll, cos_roll) = angles.roll_deg.to_radians().sin_cos();
+        let ahead = east * sin_heading + north * cos_heading;
+        let level = east * cos_heading - north * sin_heading;
+        let upright = up * sin_tilt + ahead * cos_tilt;
+        let half_side_px = f64::from(size_px[0].min(size_px[1])) / 2.0;
+        let focal_px = half_side_px / (angles.field_of_view_deg / 2.0).to_radians().tan();
+        let corner_px = f64::from(size_px[0]).hypot(f64::from(size_px[1])) / 2.0;
         let height = height_m / SPHERE_RADIUS_M;
-        let side_px = f64::from(size_px[0].min(size_px[1]));
-        let focal_px = side_px / 2.0 / (OPENING_DEG / 2.0).to_radians().tan();
+        let tilt = angles.tilt_deg.to_radians();
+        let corner = (corner_px / focal_px).atan();
         Self {
             place: up * (1.0 + height),
-            east,
-            north,
-            up,
+            ground,
+            right: level * cos_roll - upright * sin_roll,
+            top: upright * cos_roll + level * sin_roll,
+            forward: ahead * sin_tilt - up * cos_tilt,
             focal_px,
             height,
+            nearest: footprint::nearest_ground(height, (tilt - corner).max(0.0)),
+            tilt,
+            corner,
         }
     }
 
@@ -75,7 +117,7 @@ impl Camera {
             [&mut params.eye_x, &mut params.eye_y, &mut params.eye_z],
         );
         write(
-            self.east,
+            self.right,
             [
                 &mut params.right_x,
                 &mut params.right_y,
@@ -83,11 +125,11 @@ impl Camera {
             ],
         );
         write(
-            self.north,
+            self.top,
             [&mut params.up_x, &mut params.up_y, &mut params.up_z],
         );
         write(
-            -self.up,
+            self.forward,
             [
                 &mut params.forward_x,
                 &mut params.forward_y,
@@ -96,11 +138,17 @@ impl Camera {
         );
     }
 
+    /// Places with a coordinate of at least 0 are far enough ahead to be drawn.
+    pub(super) fn ahead(&self, place: DVec3) -> f64 {
+        let least = NEAR_SHARE * (self.place.length_squared() - 1.0);
+        (place - self.place).dot(self.forward) - least
+    }
+
     /// Where a place in front of it is seen, pixels east and south of the picture's middle.
     pub(super) fn seen_px(&self, place: DVec3) -> DVec2 {
         let sight = place - self.place;
-        let per_px = self.focal_px / sight.dot(-self.up);
-        DVec2::new(sight.dot(self.east), -sight.dot(self.north)) * per_px
+        let per_px = self.focal_px / sight.dot(self.forward);
+        DVec2::new(sight.dot(self.right), -sight.dot(self.top)) * per_px
     }
 
     /// Towards the sun: the real one, or one that keeps its place in the frame of the camera.
@@ -110,38 +158,41 @@ impl Camera {
         }
         let (sin_azimuth, cos_azimuth) = job.style.sun.azimuth_deg.to_radians().sin_cos();
         let (sin_elevation, cos_elevation) = job.style.sun.elevation_deg.to_radians().sin_cos();
-        (self.east * sin_azimuth + self.north * cos_azimuth) * cos_elevation
-            + self.up * sin_elevation
+        let [east, north, up] = self.ground;
+        (east * sin_azimuth + north * cos_azimuth) * cos_elevation + up * sin_elevation
     }
 
-    /// Angles round the point below the camera within which particles can be seen, and can shadow what is seen.
-    pub(super) fn cap_rad(
-        &self,
-        size_px: [u32; 2],
-        job: &RenderJob,
-        heights: [f64; 2],
-        margin: f64,
-    ) -> [f64; 2] {
-        let distance = 1.0 + self.height;
-        let deepest = 1.0 + heights[0];
-        let horizon = (1.0 / distance).acos() + (1.0 / (1.0 + heights[1])).acos() + margin;
-        let corner_px = f64::from(size_px[0]).hypot(f64::from(size_px[1])) / 2.0;
-        let corner = (corner_px / self.focal_px).atan();
-        let sine = distance * corner.sin() / deepest;
-        if sine >= 1.0 {
-            return [horizon.min(PI); 2];
-        }
+    /// The part of the globe within which particles between two heights can be seen, and can shadow what is seen;
+    /// `margin` is how far they are drawn from their places, radians.
+    pub(super) fn footprint(&self, job: &RenderJob, heights: [f64; 2], margin: f64) -> Footprint {
+        let [_east, _north, up] = self.ground;
         let elevation_deg = match job.style.sun.subsolar {
             None => job.style.sun.elevation_deg,
             Some(subsolar) => {
-                let sine = overhead(subsolar).dot(self.up);
+                let sine = overhead(subsolar).dot(up);
                 sine.clamp(-1.0, 1.0).asin().to_degrees()
             }
         };
         let elevation = elevation_deg.max(look::LOWEST_SUN_DEG).to_radians();
         let shadow = (heights[1] - heights[0]) / elevation.tan();
-        let seen = sine.asin() - corner + margin;
-        [seen, seen + 2.0 * margin + shadow].map(|angle| angle.min(horizon).min(PI))
+        if self.tilt == 0.0 {
+            return Footprint::below(up, self.height, self.corner, heights, [margin, shadow]);
+        }
+        let level = self.forward - up * self.forward.dot(up);
+        let ahead = level.try_normalize().unwrap_or(self.top);
+        let cone = [self.tilt, self.corner];
+        Footprint::ahead([up, ahead], self.height, cone, heights, [margin, shadow])
+    }
+
+    /// Largest angle between the line of sight and the half-way vector at which slices are met in one order all over the
+    /// picture, radians.
+    pub(super) fn most_half_angle(&self) -> f64 {
+        MOST_SLANT_RAD - self.corner
+    }
+
+    /// Looks straight down?
+    pub(super) fn is_upright(&self) -> bool {
+        self.tilt == 0.0
     }
 }
 

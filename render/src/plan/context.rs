@@ -115,18 +115,10 @@ fn ground_axis(cells: f64, angle_deg: f64) -> GroundAxis {
 }
 
 fn coast_lines(plan: &mut Plan, job: &RenderJob) {
-    let mask = match job.view {
-        View::Tile { tile, size_px } => on_tile(tile, size_px),
-        View::Globe {
-            lon_deg,
-            lat_deg,
-            height_m,
-            width_px,
-            height_px,
-        } => {
-            let size_px = [width_px, height_px];
-            on_globe(&Camera::above(lon_deg, lat_deg, height_m, size_px), size_px)
-        }
+    let mask = match (job.view, Camera::of(&job.view)) {
+        (View::Tile { tile, size_px }, _) => on_tile(tile, size_px),
+        (view, Some(camera)) => on_globe(&camera, view.size_px()),
+        (View::Globe { .. }, None) => return,
     };
     plan.coast = mask.into_words();
     let params = &mut plan.params;
@@ -158,26 +150,28 @@ fn on_tile(tile: Tile, size_px: u32) -> Mask {
 /// Lines in front of the horizon.
 fn on_globe(camera: &Camera, size_px: [u32; 2]) -> Mask {
     let mut mask = Mask::new([0.0; 2], size_px);
-    let px_per_deg = camera.focal_px / camera.height * 1f64.to_radians();
+    let px_per_deg = camera.focal_px / camera.nearest * 1f64.to_radians();
     let middle_px = DVec2::new(f64::from(size_px[0]), f64::from(size_px[1])) / 2.0;
+    // Places of the unit sphere are seen where the camera is above their horizon.
+    let above = |place: DVec3| place.dot(camera.place) - 1.0;
     for line in coast::lines(px_per_deg) {
         for pair in line.windows(2) {
-            if let Some([a, b]) = before_horizon(camera, &pair[0], &pair[1]) {
-                let seen = |place| camera.seen_px(place) + middle_px;
-                mask.draw(seen(a), seen(b));
+            let seen = clipped([pair[0].normal, pair[1].normal], above)
+                .and_then(|pair| clipped(pair, |place| camera.ahead(place)));
+            if let Some([a, b]) = seen {
+                let at = |place| camera.seen_px(place) + middle_px;
+                mask.draw(at(a), at(b));
             }
         }
     }
     mask
 }
 
-/// The part of a line between two corners that the camera sees.
-fn before_horizon(camera: &Camera, a: &Corner, b: &Corner) -> Option<[DVec3; 2]> {
-    let (a, b) = (a.normal, b.normal);
-    // Places of the unit sphere are seen where the camera is above their horizon.
-    let [above_a, above_b] = [a, b].map(|place| place.dot(camera.place) - 1.0);
-    let crossing = || a + (b - a) * (above_a / (above_a - above_b));
-    match (above_a >= 0.0, above_b >= 0.0) {
+/// The part of a line whose coordinate, which changes evenly along it, is not negative.
+fn clipped([a, b]: [DVec3; 2], coordinate: impl Fn(DVec3) -> f64) -> Option<[DVec3; 2]> {
+    let [at_a, at_b] = [a, b].map(coordinate);
+    let crossing = || a + (b - a) * (at_a / (at_a - at_b));
+    match (at_a >= 0.0, at_b >= 0.0) {
         (true, true) => Some([a, b]),
         (true, false) => Some([a, crossing()]),
         (false, true) => Some([crossing(), b]),

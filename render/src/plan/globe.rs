@@ -1,14 +1,15 @@
-//! Plans of globe views: a perspective camera above a place, looking at the earth's centre, north up.
+//! Plans of globe views: a perspective camera over a place.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use contract::earth::SPHERE_RADIUS_M;
 use contract::grid::Grid;
-use contract::job::{Mode, RenderJob, View};
+use contract::job::{Mode, RenderJob};
 use glam::DVec3;
 
 use super::camera::{Camera, write};
 use super::extent::Extent;
+use super::footprint::Footprint;
 use super::look::{self, Look};
 use super::{Plan, area_m2, cell_px, entry_shift, flow, height_range_m};
 use crate::scene::Scene;
@@ -31,7 +32,9 @@ const NEAREST_OVER_FARTHEST: f64 = 4.0;
 struct Cap<'a> {
     /// Lowest and highest particle, from the sea surface.
     heights: [f64; 2],
-    /// Round the point below the camera, radians.
+    /// Its middle.
+    center: DVec3,
+    /// From there to its edge, radians.
     angle: f64,
     /// Of a full-size particle.
     radius: f64,
@@ -40,17 +43,10 @@ struct Cap<'a> {
 }
 
 pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) {
-    let View::Globe {
-        lon_deg,
-        lat_deg,
-        height_m,
-        width_px,
-        height_px,
-    } = job.view
-    else {
+    let Some(camera) = Camera::of(&job.view) else {
         return;
     };
-    let camera = Camera::above(lon_deg, lat_deg, height_m, [width_px, height_px]);
+    let [width_px, height_px] = job.view.size_px();
     let grid = &scene.grid;
     let cell_px = cell_px(&job.view, grid);
     let params = &mut plan.params;
@@ -68,8 +64,7 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) {
     );
     if job.mode == Mode::Map {
         let margin = 2.0 * grid.dlat_deg.to_radians();
-        let [seen, _] = camera.cap_rad([width_px, height_px], job, [0.0; 2], margin);
-        interpolate_rows(plan, grid, &camera, seen);
+        interpolate_rows(plan, grid, &camera.footprint(job, [0.0; 2], margin));
         return;
     }
     let look = Look::of(job.mode);
@@ -82,23 +77,24 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) {
     params.entry_shift = entry_shift(widest_px);
     plan.rows = rows(scene, &look, &camera, particles, job.style.optical_depth);
     let heights = height_range_m(job, scene).map(|height_m| height_m / SPHERE_RADIUS_M);
-    let radius = radius_px / camera.focal_px * camera.height;
+    let radius = radius_px / camera.focal_px * camera.nearest;
     // From a cell's middle to its corner, and from there as far as its particles drift.
     let half_cell = (grid.dlon_deg.hypot(grid.dlat_deg) / 2.0).to_radians();
     let margin = radius + half_cell + flow::plan(plan, job, scene);
-    let [seen, drawn] = camera.cap_rad([width_px, height_px], job, heights, margin);
+    let footprint = camera.footprint(job, heights, margin);
     let extent = Extent::of(grid, heights);
     let cap = |angle| Cap {
         heights,
+        center: footprint.center,
         angle,
         radius,
         extent: extent.as_ref(),
     };
     // What lies beyond the seen cap falls into the first or last slice, from where it shadows as it should.
-    let half = slice_planes(plan, job, camera.up, sun, &cap(seen));
-    light_frame(plan, &camera, sun, half, &cap(drawn));
-    choose_cells(plan, scene, &camera, drawn);
-    plan.is_crowded = is_crowded(plan, &camera, &cap(seen));
+    let half = slice_planes(plan, job, &camera, sun, &cap(footprint.seen));
+    light_frame(plan, &camera, sun, half, &cap(footprint.drawn));
+    choose_cells(plan, scene, &camera, &footprint);
+    plan.is_crowded = is_crowded(plan, &camera, &cap(footprint.seen));
 }
 
 /// Is there ground seen so flat, or so near a pole, that cells are many times narrower than elsewhere?
@@ -121,9 +117,10 @@ fn is_crowded(plan: &Plan, camera: &Camera, cap: &Cap<'_>) -> bool {
     is_limb_seen || is_pole_seen
 }
 
-/// Rows within an angle of the point below the camera.
-fn interpolate_rows(plan: &mut Plan, grid: &Grid, camera: &Camera, angle: f64) {
-    let below_deg = camera.up.z.clamp(-1.0, 1.0).asin().to_degrees();
+/// Rows that are seen.
+fn interpolate_rows(plan: &mut Plan, grid: &Grid, footprint: &Footprint) {
+    let angle = footprint.seen;
+    let below_deg = footprint.center.z.clamp(-1.0, 1.0).asin().to_degrees();
     let row = |lat_deg: f64| {
         ((grid.north_deg - lat_deg) / grid.dlat_deg).clamp(0.0, f64::from(grid.rows))
     };
@@ -143,7 +140,7 @@ fn rows(scene: &Scene, look: &Look, camera: &Camera, particles: u32, style_depth
             );
             let lat = 0.5 * (north + south);
             let area = (north.sin() - south.sin()) * grid.dlon_deg.to_radians();
-            let per_radian_px = camera.focal_px / camera.height;
+            let per_radian_px = camera.focal_px / camera.nearest;
             let side = Look::side(area / (north - south), north - south);
             let radius = look.radius_px(side * per_radian_px, particles) / per_radian_px;
             Row {
@@ -160,12 +157,19 @@ fn rows(scene: &Scene, look: &Look, camera: &Camera, particles: u32, style_depth
 }
 
 /// Slices across the half-way vector between light and view, over what is visible; the vector comes back.
-fn slice_planes(plan: &mut Plan, job: &RenderJob, up: DVec3, sun: DVec3, cap: &Cap<'_>) -> DVec3 {
+fn slice_planes(
+    plan: &mut Plan,
+    job: &RenderJob,
+    camera: &Camera,
+    sun: DVec3,
+    cap: &Cap<'_>,
+) -> DVec3 {
     let Cap { heights, angle, .. } = *cap;
-    let front_to_back = sun.dot(up) >= 0.0;
-    let sum = if front_to_back { sun + up } else { sun - up };
-    let half = sum / sum.length();
-    let tilt = half.dot(up).clamp(-1.0, 1.0).acos();
+    let toward = -camera.forward;
+    let front_to_back = sun.dot(toward) >= 0.0;
+    let view = if front_to_back { toward } else { -toward };
+    let half = half_way(sun, view, camera);
+    let tilt = half.dot(cap.center).clamp(-1.0, 1.0).acos();
     let reach = |cosine: f64| {
         if cosine > 0.0 {
             [1.0 + heights[0], 1.0 + heights[1]]
@@ -195,6 +199,19 @@ fn slice_planes(plan: &mut Plan, job: &RenderJob, up: DVec3, sun: DVec3, cap: &C
     half
 }
 
+/// Half-way between two directions, but so near the line of sight that all sight lines of the picture meet the slices in
+/// one order.
+fn half_way(sun: DVec3, view: DVec3, camera: &Camera) -> DVec3 {
+    let sum = sun + view;
+    let half = sum / sum.length();
+    let most = camera.most_half_angle();
+    if camera.is_upright() || half.dot(view) >= most.cos() {
+        return half;
+    }
+    let across = sun - view * sun.dot(view);
+    view * most.cos() + across / across.length() * most.sin()
+}
+
 fn light_frame(plan: &mut Plan, camera: &Camera, sun: DVec3, half: DVec3, cap: &Cap<'_>) {
     let Cap {
         heights,
@@ -209,11 +226,11 @@ fn light_frame(plan: &mut Plan, camera: &Camera, sun: DVec3, half: DVec3, cap: &
     let across = if sun.cross(half).length() > 1e-6 {
         sun.cross(half)
     } else {
-        camera.east
+        camera.right
     };
     let axis_u = across / across.length();
     let axis_v = sun.cross(axis_u);
-    // Every point of the cap lies within a chord of the point below the camera.
+    // Every point of the cap lies within a chord of its middle.
     let chord = if angle >= FRAC_PI_2 {
         1.0 + heights[1]
     } else {
@@ -221,7 +238,7 @@ fn light_frame(plan: &mut Plan, camera: &Camera, sun: DVec3, half: DVec3, cap: &
     };
     let reach = chord + heights[1].max(-heights[0]);
     let [span_u, span_v] = [axis_u, axis_v].map(|axis| {
-        let middle = camera.up.dot(axis);
+        let middle = cap.center.dot(axis);
         let [low, high] = cap.extent.map_or([-2.0, 2.0], |e| e.along(axis));
         // Clouds look their light up within their radius.
         let low = (middle - reach).max(low - radius);
@@ -270,9 +287,9 @@ fn light_frame(plan: &mut Plan, camera: &Camera, sun: DVec3, half: DVec3, cap: &
     );
 }
 
-/// Longitudes on either side of the camera's that a cap of this angle reaches; all of them round a pole.
-fn half_width(camera: &Camera, angle: f64) -> f64 {
-    let lat = camera.up.z.clamp(-1.0, 1.0).asin();
+/// Longitudes on either side of a cap's middle that it reaches; all of them round a pole.
+fn half_width(center: DVec3, angle: f64) -> f64 {
+    let lat = center.z.clamp(-1.0, 1.0).asin();
     if lat.abs() + angle >= FRAC_PI_2 {
         return PI;
     }
@@ -280,19 +297,20 @@ fn half_width(camera: &Camera, angle: f64) -> f64 {
     (angle.sin() / lat.cos()).clamp(0.0, 1.0).asin() + 1e-3
 }
 
-/// Fills the table of columns and sets the rows and the cap within `horizon` of the point below the camera.
-fn choose_cells(plan: &mut Plan, scene: &Scene, camera: &Camera, horizon: f64) {
+/// Fills the table of columns and sets the rows and the cap that are drawn.
+fn choose_cells(plan: &mut Plan, scene: &Scene, camera: &Camera, footprint: &Footprint) {
     let grid = &scene.grid;
+    let Footprint { center, drawn, .. } = *footprint;
     let lon = |col: u32| (grid.col_west_deg(col) + 0.5 * grid.dlon_deg).to_radians();
     // A trail is many splats: columns that have no cell in the cap get no place for them.
     let across = if plan.mode == Mode::Flow {
-        half_width(camera, horizon)
+        half_width(center, drawn)
     } else {
         PI
     };
-    let center = camera.up.x.atan2(camera.up.y);
+    let middle = center.x.atan2(center.y);
     plan.cols = (0..grid.cols)
-        .filter(|&col| ((lon(col) - center + PI).rem_euclid(TAU) - PI).abs() <= across)
+        .filter(|&col| ((lon(col) - middle + PI).rem_euclid(TAU) - PI).abs() <= across)
         .map(|col| Col {
             sin_lon: lon(col).sin() as f32,
             cos_lon: lon(col).cos() as f32,
@@ -300,13 +318,19 @@ fn choose_cells(plan: &mut Plan, scene: &Scene, camera: &Camera, horizon: f64) {
             ..Col::default()
         })
         .collect();
-    plan.params.cap_least = (horizon.cos() * camera.place.length()) as f32;
-    plan.params.slot_count = plan.cols.len() as u32;
+    let distance = camera.place.length();
+    let params = &mut plan.params;
+    write(
+        center * distance,
+        [&mut params.cap_x, &mut params.cap_y, &mut params.cap_z],
+    );
+    params.cap_least = (drawn.cos() * distance) as f32;
+    params.slot_count = plan.cols.len() as u32;
     // Rows with a middle in the cap, one more on either side: the cap itself is tested cell by cell.
-    let below = camera.up.z.clamp(-1.0, 1.0).asin();
+    let below = center.z.clamp(-1.0, 1.0).asin();
     let is_near = |row: u32| {
         let lat = f64::from(plan.rows[row as usize].sin_lat).asin();
-        (lat - below).abs() <= horizon + grid.dlat_deg.to_radians()
+        (lat - below).abs() <= drawn + grid.dlat_deg.to_radians()
     };
     let first = (0..grid.rows).find(|&row| is_near(row));
     let last = (0..grid.rows).rfind(|&row| is_near(row));

@@ -7,6 +7,7 @@ mod camera;
 mod context;
 mod extent;
 mod flow;
+mod footprint;
 mod globe;
 mod look;
 mod shape;
@@ -284,20 +285,14 @@ impl Plan {
     }
 }
 
-/// Side of a grid's cells in a view, pixels: at the equator of a tile's level, below the camera of a globe view.
+/// Side of a grid's cells in a view, pixels: at the equator of a tile's level, where a globe view's ground is nearest.
 pub fn cell_px(view: &View, grid: &Grid) -> f64 {
     let cell_deg = (grid.dlon_deg * grid.dlat_deg).sqrt();
     match *view {
         View::Tile { tile, size_px } => tile::world_px(tile, size_px) * cell_deg / 360.0,
-        View::Globe {
-            lon_deg,
-            lat_deg,
-            height_m,
-            ..
-        } => {
-            let camera = camera::Camera::above(lon_deg, lat_deg, height_m, view.size_px());
-            cell_deg.to_radians() * camera.focal_px / camera.height
-        }
+        View::Globe { .. } => camera::Camera::of(view).map_or(0.0, |camera| {
+            cell_deg.to_radians() * camera.focal_px / camera.nearest
+        }),
     }
 }
 
@@ -396,7 +391,7 @@ fn is_in_cap(params: &Params, row: &Row, col: &Col) -> bool {
         row.sin_lat,
     );
     params.view == VIEW_TILE
-        || center.dot(Vec3::new(params.eye_x, params.eye_y, params.eye_z)) >= params.cap_least
+        || center.dot(Vec3::new(params.cap_x, params.cap_y, params.cap_z)) >= params.cap_least
 }
 
 /// Area of the cells of every row, m².

@@ -76,7 +76,10 @@ shared_struct! {
         pub first_row: u32,
         pub row_count: u32,
         pub slot_count: u32,
-        /// Least cosine of a cell's angle to the place below the camera, times the camera's distance (globe).
+        /// Towards the middle of the cap that is drawn, of any length, and what a cell's place times it is at least (globe).
+        pub cap_x: f32,
+        pub cap_y: f32,
+        pub cap_z: f32,
         pub cap_least: f32,
         pub particles_per_cell: u32,
         /// Particles of its cell that one invocation makes.

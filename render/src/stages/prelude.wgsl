@@ -3,7 +3,7 @@ struct Params {
     rows: u32, cols: u32, periodic: u32, first_cell: u32, end_cell: u32, held_first_cell: u32, held_end_cell: u32,
     value_weight: f32, accumulated_weight: f32, northward_weight: f32,
     has_accumulated: u32, transfer_low: f32, transfer_per_unit: f32, strength_per_unit: f32, diverging: u32,
-    depth_floor: f32, first_row: u32, row_count: u32, slot_count: u32, cap_least: f32, particles_per_cell: u32,
+    depth_floor: f32, first_row: u32, row_count: u32, slot_count: u32, cap_x: f32, cap_y: f32, cap_z: f32, cap_least: f32, particles_per_cell: u32,
     particles_each: u32, splat_count: u32, jitter_shift: u32, height_m_per_kg_m2: f32,
     height_limit_m: f32, sheet_m: f32, turns_per_kg_m2: f32, optical_depth: f32, view: u32, kernel: u32,
     front_to_back: u32, width: u32, height: u32, tiles_x: u32, tiles_y: u32, slices: u32, entry_capacity: u32, long_list: u32,

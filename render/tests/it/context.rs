@@ -105,6 +105,7 @@ fn surroundings_are_whole_where_the_parts_of_a_globe_picture_meet() {
                 height_m: 1.5e7,
                 width_px,
                 height_px: 64,
+                angles: contract::camera::CameraAngles::NADIR,
             };
             renderer
                 .render(&everything(Mode::Map, view), &scene)

@@ -74,6 +74,7 @@ fn the_smallest_and_the_largest_of_everything_is_drawn() {
         height_m,
         width_px,
         height_px,
+        angles: contract::camera::CameraAngles::NADIR,
     };
     for renderer in renderers("limits") {
         for (view, slices) in [

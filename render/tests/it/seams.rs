@@ -137,6 +137,7 @@ fn a_globe_picture_is_whole_where_its_parts_meet() {
             height_m: 1.5e7,
             width_px,
             height_px: 64,
+            angles: contract::camera::CameraAngles::NADIR,
         };
         // The shorter side sets the focal length, so both show the same globe; the wide one is drawn in two parts that
         // meet in the globe's middle.

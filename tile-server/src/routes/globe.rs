@@ -3,6 +3,8 @@
 use axum::extract::State;
 use axum::http::HeaderMap;
 use axum::response::Response;
+use contract::camera::{CameraAngles, LookAt};
+use contract::grid::LonLatDeg;
 use contract::job::View;
 use contract::picture::PictureRequest;
 use serde::Deserialize;
@@ -25,15 +27,34 @@ const SIZE_PX: u32 = 512;
 #[derive(Debug, Deserialize, IntoParams)]
 #[into_params(parameter_in = Query)]
 pub(crate) struct GlobeQuery {
-    /// Longitude below the camera, degrees east; 0 unless one is given.
+    /// Longitude below the camera, degrees east; 0 unless one is given. Not with `look_at`.
     #[param(value_type = Option<f64>)]
     lon: Option<String>,
-    /// Latitude below the camera, degrees north; 0 unless one is given.
+    /// Latitude below the camera, degrees north; 0 unless one is given. Not with `look_at`.
     #[param(value_type = Option<f64>, minimum = -90, maximum = 90)]
     lat: Option<String>,
-    /// Height of the camera above the ground, km; 15000 unless one is given.
+    /// Height of the camera above the ground, km; 15000 unless one is given. Not with `look_at`.
     #[param(value_type = Option<f64>, minimum = 1, maximum = 1e6)]
     height_km: Option<String>,
+    /// `LON,LAT`: the place in the middle of the picture, instead of the one below the camera; `tilt` is then that of the
+    /// line of sight against the vertical there.
+    #[param(example = "-95,0")]
+    look_at: Option<String>,
+    /// From the camera to the place that is looked at, km; 15000 unless one is given. Only with `look_at`.
+    #[param(value_type = Option<f64>, minimum = 1, maximum = 1e6)]
+    distance_km: Option<String>,
+    /// Direction of view, clockwise from north, degrees; 0 unless one is given.
+    #[param(value_type = Option<f64>, minimum = -360, maximum = 360)]
+    heading: Option<String>,
+    /// 0 looks straight down, 90 along the ground, degrees; 0 unless one is given.
+    #[param(value_type = Option<f64>, minimum = 0, maximum = 180)]
+    tilt: Option<String>,
+    /// Lean of the camera to the right, degrees; 0 unless one is given.
+    #[param(value_type = Option<f64>, minimum = -180, maximum = 180)]
+    roll: Option<String>,
+    /// Field of view across the shorter side of the picture, degrees; 45 unless one is given.
+    #[param(value_type = Option<f64>, minimum = 1, maximum = 120)]
+    fov: Option<String>,
     /// Instant, ISO 8601 UTC (a year, month or day means its start); the middle of the last step unless one is given.
     #[param(example = "2000-01-16T12:00:00Z")]
     time: Option<String>,
@@ -56,7 +77,7 @@ pub(crate) struct GlobeQuery {
     surroundings: SurroundingsQuery,
 }
 
-/// The globe from straight above a place, as a PNG of any size.
+/// The globe from a camera over a place or looking at one, as a PNG of any size.
 #[utoipa::path(
     get,
     path = "/globe/{product}/{mode}.png",
@@ -113,16 +134,78 @@ pub(crate) async fn get(
 
 impl GlobeQuery {
     fn view(&self) -> Result<View, ServerError> {
-        let real = |name, text: &Option<String>, default: f64, valid| {
-            text.as_deref()
-                .map_or(Ok(default), |text| number(name, text, valid))
-        };
         let pixels = |name, text: &Option<String>| {
             text.as_deref().map_or(Ok(SIZE_PX), |text| {
                 whole_number(name, text, "whole pixels, 1 to 4096")
             })
         };
-        let place = contract::grid::LonLatDeg::new(
+        let size_px = [
+            pixels("width", &self.width)?,
+            pixels("height", &self.height)?,
+        ];
+        let angles = self.angles()?;
+        let Some(target) = self.look_at.as_deref() else {
+            return self.standing_over(angles, size_px);
+        };
+        for (name, given) in [
+            ("lon", &self.lon),
+            ("lat", &self.lat),
+            ("height_km", &self.height_km),
+        ] {
+            if let Some(text) = given {
+                let valid = "either the place below the camera, or look_at with distance_km";
+                return Err(ServerError::invalid(name, text, valid));
+            }
+        }
+        let look_at = LookAt {
+            target: target.parse()?,
+            distance_m: 1000.0
+                * real(
+                    "distance_km",
+                    &self.distance_km,
+                    HEIGHT_KM,
+                    "kilometres from the place, 1 to 1e6",
+                )?,
+            angles,
+        };
+        Ok(look_at.view(size_px)?)
+    }
+
+    fn angles(&self) -> Result<CameraAngles, ServerError> {
+        let usual = CameraAngles::NADIR;
+        Ok(CameraAngles {
+            heading_deg: real(
+                "heading",
+                &self.heading,
+                usual.heading_deg,
+                "degrees clockwise from north, -360 to 360",
+            )?,
+            tilt_deg: real(
+                "tilt",
+                &self.tilt,
+                usual.tilt_deg,
+                "degrees from straight down, 0 to 180",
+            )?,
+            roll_deg: real("roll", &self.roll, usual.roll_deg, "degrees, -180 to 180")?,
+            field_of_view_deg: real(
+                "fov",
+                &self.fov,
+                usual.field_of_view_deg,
+                "degrees across the shorter side, 1 to 120",
+            )?,
+        })
+    }
+
+    fn standing_over(
+        &self,
+        angles: CameraAngles,
+        [width_px, height_px]: [u32; 2],
+    ) -> Result<View, ServerError> {
+        if let Some(text) = &self.distance_km {
+            let valid = "only with look_at=LON,LAT; height_km is that above the ground";
+            return Err(ServerError::invalid("distance_km", text, valid));
+        }
+        let place = LonLatDeg::new(
             real("lon", &self.lon, 0.0, "degrees east")?,
             real("lat", &self.lat, 0.0, "degrees north, -90 to 90")?,
         )?;
@@ -136,8 +219,19 @@ impl GlobeQuery {
                     HEIGHT_KM,
                     "kilometres above the ground, 1 to 1e6",
                 )?,
-            width_px: pixels("width", &self.width)?,
-            height_px: pixels("height", &self.height)?,
+            width_px,
+            height_px,
+            angles,
         })
     }
+}
+
+fn real(
+    name: &'static str,
+    text: &Option<String>,
+    default: f64,
+    valid: &'static str,
+) -> Result<f64, ServerError> {
+    text.as_deref()
+        .map_or(Ok(default), |text| number(name, text, valid))
 }

@@ -1,6 +1,8 @@
 //! `/globe/{product}/{mode}.png`.
 
 use axum::http::StatusCode;
+use contract::camera::{CameraAngles, LookAt};
+use contract::grid::LonLatDeg;
 use contract::job::View;
 
 use crate::app::TestApp;
@@ -23,7 +25,8 @@ async fn a_view_is_the_picture_of_the_job_its_address_means() {
             lat_deg,
             height_m,
             width_px: 640,
-            height_px: 360
+            height_px: 360,
+            angles: CameraAngles::NADIR,
         }
     );
     assert_eq!(job.value, app.time_sample("flux", "2000-02-03").await);
@@ -46,4 +49,62 @@ async fn particles_can_be_drawn_without_a_globe_behind_them() {
     let app = TestApp::new().await;
     app.get("/globe/flux/volume.png?surface=false").await;
     assert!(!app.drawer.last_job().style.globe_surface);
+}
+
+#[tokio::test]
+async fn a_camera_is_turned_and_looks_at_a_place() {
+    let app = TestApp::new().await;
+    let turned = "heading=-30&tilt=50&roll=5&fov=60";
+    let angles = CameraAngles {
+        heading_deg: -30.0,
+        tilt_deg: 50.0,
+        roll_deg: 5.0,
+        field_of_view_deg: 60.0,
+    };
+    app.get(&format!("/globe/flux/volume.png?lat=10&{turned}"))
+        .await;
+    let View::Globe {
+        lat_deg,
+        angles: own,
+        ..
+    } = app.drawer.last_job().view
+    else {
+        panic!("a globe")
+    };
+    assert_eq!((lat_deg, own), (10.0, angles));
+    let path = format!("/globe/flux/volume.png?look_at=-95,0&distance_km=3000&{turned}");
+    assert_eq!(app.get(&path).await.status, StatusCode::OK);
+    let look_at = LookAt {
+        target: LonLatDeg { lon: -95.0, lat: 0.0 },
+        distance_m: 3e6,
+        angles,
+    };
+    assert_eq!(
+        app.drawer.last_job().view,
+        look_at.view([512, 512]).unwrap()
+    );
+}
+
+#[tokio::test]
+async fn a_camera_that_cannot_be_is_refused_with_what_can() {
+    let app = TestApp::new().await;
+    for (query, said) in [
+        ("fov=0", "1 to 120"),
+        ("fov=180", "1 to 120"),
+        ("tilt=80", "the earth is seen with a tilt of 0 to"),
+        ("tilt=-1", "0 to 180"),
+        ("height_km=0.5", "1 km"),
+        ("height_km=-10", "1 km"),
+        ("heading=nan", "-360 to 360"),
+        ("look_at=5", "LON,LAT"),
+        ("look_at=0,91", "-90 to 90"),
+        ("look_at=0,0&lon=3", "either"),
+        ("look_at=0,0&tilt=95", "0 to 90"),
+        ("distance_km=5", "only with look_at"),
+        ("width=100000&height=1000", "4096"),
+    ] {
+        let answer = app.get(&format!("/globe/flux/volume.png?{query}")).await;
+        assert_eq!(answer.status, StatusCode::BAD_REQUEST, "{query}");
+        assert!(answer.text().contains(said), "{query}: {}", answer.text());
+    }
 }

@@ -185,6 +185,7 @@ fn globe(lon_deg: f64, lat_deg: f64, height_m: f64, size: u32) -> View {
         height_m,
         width_px: size,
         height_px: size,
+        angles: contract::camera::CameraAngles::NADIR,
     }
 }
 

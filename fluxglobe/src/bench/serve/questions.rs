@@ -116,13 +116,14 @@ fn chosen(products: Vec<Product>, options: &BenchServe) -> Result<Product> {
 
 fn view(product: &Product, options: &BenchServe) -> String {
     format!(
-        "{}/globe/{}/{}.png?lon={}&lat={}&height_km={}&width={}&height={}&",
+        "{}/globe/{}/{}.png?lon={}&lat={}&height_km={}&tilt={}&width={}&height={}&",
         options.url,
         product.id,
         options.mode,
         options.lon,
         options.lat,
         options.height_km,
+        options.tilt,
         options.width,
         options.height
     )

@@ -72,6 +72,7 @@ pub(super) fn full() -> RenderJob {
             height_m: 1.2e7,
             width_px: 1920,
             height_px: 1080,
+            angles: contract::camera::CameraAngles::NADIR,
         },
         ..plain()
     };

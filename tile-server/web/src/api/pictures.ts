@@ -39,6 +39,9 @@ export interface GlobeView {
   lon: number;
   lat: number;
   heightKm: number;
+  headingDeg: number;
+  /** -90 looks straight down. */
+  pitchDeg: number;
   timeIso: string;
   width: number;
   height: number;
@@ -50,6 +53,8 @@ export function globeUrl(product: string, mode: Mode, view: GlobeView): string {
     lon: view.lon.toFixed(4),
     lat: view.lat.toFixed(4),
     height_km: view.heightKm.toFixed(1),
+    heading: view.headingDeg.toFixed(2),
+    tilt: (90 + view.pitchDeg).toFixed(2),
     time: view.timeIso,
     width: String(view.width),
     height: String(view.height),

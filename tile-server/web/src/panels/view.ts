@@ -75,6 +75,8 @@ export class ViewDialog {
       lon: camera.lon,
       lat: camera.lat,
       heightKm: camera.heightKm,
+      headingDeg: camera.headingDeg,
+      pitchDeg: camera.pitchDeg,
       timeIso: toIso(timeMs),
       look: parameters(this.#lookIn(mode)),
       ...imageSize(),
