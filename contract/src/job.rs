@@ -233,7 +233,11 @@ impl View {
         }
     }
 
-    fn validate(&self) -> Result<(), ContractError> {
+    /// Checks every limit of a view.
+    ///
+    /// # Errors
+    /// The limit that is broken, with what would be valid.
+    pub fn validate(&self) -> Result<(), ContractError> {
         let bad = |reason: &str| Err(ContractError::invalid("view", &format!("{self:?}"), reason));
         if self
             .size_px()

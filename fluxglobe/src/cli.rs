@@ -447,14 +447,14 @@ pub(crate) struct Camera {
     #[arg(
         long,
         allow_negative_numbers = true,
-        required_unless_present = "look_at"
+        required_unless_present_any = ["look_at", "key_frames"]
     )]
     pub(crate) lon: Option<f64>,
     /// Latitude below the camera, degrees north.
     #[arg(
         long,
         allow_negative_numbers = true,
-        required_unless_present = "look_at"
+        required_unless_present_any = ["look_at", "key_frames"]
     )]
     pub(crate) lat: Option<f64>,
     /// Height of the camera above the ground, km.

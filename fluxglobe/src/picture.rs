@@ -10,25 +10,32 @@ use contract::picture::{PictureOptions, PictureRequest, PictureSources, shown_ti
 use contract::time::Period;
 use storage::Store;
 
-use crate::cli::{Picture, RenderGlobe, Settings};
+use crate::cli::{Camera, Picture, RenderGlobe, Settings};
 use crate::{deployment, progress};
 
-/// The view that the options of a globe's picture ask for.
-pub(crate) fn view_of(globe: &RenderGlobe) -> Result<View> {
-    let camera = &globe.camera;
-    let angles = CameraAngles {
+/// The camera that looks at a place, where one is given.
+pub(crate) fn look_at(camera: &Camera) -> Option<LookAt> {
+    camera.look_at.map(|target| LookAt {
+        target,
+        distance_m: camera.distance * 1000.0,
+        angles: angles(camera),
+    })
+}
+
+fn angles(camera: &Camera) -> CameraAngles {
+    CameraAngles {
         heading_deg: camera.heading,
         tilt_deg: camera.tilt,
         roll_deg: camera.roll,
         field_of_view_deg: camera.fov,
-    };
+    }
+}
+
+/// The view that the options of a globe's picture ask for.
+pub(crate) fn view_of(globe: &RenderGlobe) -> Result<View> {
+    let camera = &globe.camera;
     let (width_px, height_px) = globe.size;
-    if let Some(target) = camera.look_at {
-        let look_at = LookAt {
-            target,
-            distance_m: camera.distance * 1000.0,
-            angles,
-        };
+    if let Some(look_at) = look_at(camera) {
         return Ok(look_at.view([width_px, height_px])?);
     }
     let place = LonLatDeg::new(
@@ -41,7 +48,7 @@ pub(crate) fn view_of(globe: &RenderGlobe) -> Result<View> {
         height_m: camera.height * 1000.0,
         width_px,
         height_px,
-        angles,
+        angles: angles(camera),
     })
 }
 

@@ -5,6 +5,7 @@
 mod encoder;
 mod film;
 mod folder;
+mod path;
 mod shots;
 mod strip;
 
@@ -26,8 +27,11 @@ use crate::cli::{RenderAnimation, Settings};
 use crate::ports::{Drawer, FleetDrawer};
 use crate::{deployment, picture, progress};
 use film::Film;
+use path::CameraPath;
 use shots::Shots;
 
+/// Length of a film unless told otherwise.
+const USUAL_SECONDS: f64 = 12.0;
 /// Longest wait for one picture of a busy fleet, milliseconds.
 const DEADLINE_MS: u32 = 120_000;
 /// A worker that takes longer than this has the next one asked too, milliseconds.
@@ -80,7 +84,12 @@ pub(crate) async fn run(settings: &Settings, store: Store, options: RenderAnimat
 
 async fn shots(settings: &Settings, store: &Store, options: &RenderAnimation) -> Result<Shots> {
     let globe = &options.globe;
-    let view = picture::view_of(globe)?;
+    let path = path(options)?;
+    let size_px = [globe.size.0, globe.size.1];
+    let view = match &path {
+        Some(path) => path.view(0.0, size_px)?,
+        None => picture::view_of(globe)?,
+    };
     let product = picture::product(store, settings, &globe.picture).await?;
     let (from, to) = span(&product, options.from, options.to)?;
     let sun_of_time = globe.picture.surroundings.sun == Some(SunChoice::OfTime);
@@ -102,11 +111,32 @@ async fn shots(settings: &Settings, store: &Store, options: &RenderAnimation) ->
         sun_of_time,
         relief: picture::relief(store, settings, &globe.picture).await?,
         fps: options.fps,
-        count: Shots::count_of(options.seconds, options.fps)?,
+        count: Shots::count_of(seconds(options, path.as_ref()), options.fps)?,
         turn_deg: options.turn,
+        path,
     };
     shots.validate()?;
     Ok(shots)
+}
+
+/// The way of the camera, if it has one.
+fn path(options: &RenderAnimation) -> Result<Option<CameraPath>> {
+    if let Some(file) = &options.key_frames {
+        return Ok(Some(CameraPath::read(file)?));
+    }
+    let (Some(turn_deg), Some(look_at)) =
+        (options.orbit, picture::look_at(&options.globe.camera))
+    else {
+        return Ok(None);
+    };
+    let path = CameraPath::orbit(&look_at, turn_deg, seconds(options, None))?;
+    Ok(Some(path))
+}
+
+/// Length of the film: that asked for, else that of the camera's way.
+fn seconds(options: &RenderAnimation, path: Option<&CameraPath>) -> f64 {
+    let of_path = path.map_or(USUAL_SECONDS, CameraPath::seconds);
+    options.seconds.unwrap_or(of_path)
 }
 
 /// The span of an animation, which must lie within a product's in part.

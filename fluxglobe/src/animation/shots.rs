@@ -9,6 +9,8 @@ use contract::sun::SunChoice;
 use contract::time::TimeMs;
 use serde::{Deserialize, Serialize};
 
+use super::path::CameraPath;
+
 /// Most pictures: ten minutes at 60 a second.
 const MOST_SHOTS: u32 = 36_000;
 /// Most pixels of all pictures: those of ten minutes of 4K at 60 a second.
@@ -43,6 +45,9 @@ pub(super) struct Shots {
     pub(super) count: u32,
     /// Degrees that the camera moves east in all.
     pub(super) turn_deg: f64,
+    /// The way of the camera, instead.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) path: Option<CameraPath>,
 }
 
 impl Shots {
@@ -89,8 +94,12 @@ impl Shots {
         Ok(TimeMs::new(i64::try_from(ms)?)?)
     }
 
-    /// The job of a picture.
-    pub(super) fn job(&self, number: u32) -> Result<RenderJob> {
+    /// The view of a picture.
+    fn view(&self, number: u32) -> Result<View> {
+        if let Some(path) = &self.path {
+            let seconds = f64::from(number) / f64::from(self.fps);
+            return path.view(seconds, self.view.size_px());
+        }
         let mut view = self.view;
         if let View::Globe { lon_deg, .. } = &mut view {
             let turned = *lon_deg + self.turn_deg * f64::from(number) / f64::from(self.count);
@@ -99,6 +108,12 @@ impl Shots {
                 *lon_deg = (turned + 180.0).rem_euclid(360.0) - 180.0;
             }
         }
+        Ok(view)
+    }
+
+    /// The job of a picture.
+    pub(super) fn job(&self, number: u32) -> Result<RenderJob> {
+        let view = self.view(number)?;
         let time = self.time(number)?;
         let mut style = self.style;
         if self.sun_of_time {

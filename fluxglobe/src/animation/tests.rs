@@ -77,6 +77,7 @@ fn shots(count: u32) -> Shots {
         fps: 25,
         count,
         turn_deg: 40.0,
+        path: None,
     }
 }
 

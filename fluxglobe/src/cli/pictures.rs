@@ -32,17 +32,34 @@ pub(crate) struct RenderAnimation {
     /// Pictures a second, 1 to 120.
     #[arg(long, default_value_t = 25, value_parser = value_parser!(u16).range(1..=120))]
     pub(crate) fps: u16,
-    /// Length, seconds; at most 36000 pictures in all.
-    #[arg(long, default_value_t = 12.0)]
-    pub(crate) seconds: f64,
+    /// Length, seconds; that of the key frames if there are any, else 12; at most 36000 pictures in all.
+    #[arg(long)]
+    pub(crate) seconds: Option<f64>,
     /// Degrees that the camera moves east in all.
     #[arg(
         long,
         default_value_t = 0.0,
         allow_negative_numbers = true,
-        value_name = "DEGREES"
+        value_name = "DEGREES",
+        conflicts_with = "look_at"
     )]
     pub(crate) turn: f64,
+    /// Degrees that the camera goes round the place of --look-at in all, clockwise.
+    #[arg(
+        long,
+        allow_negative_numbers = true,
+        value_name = "DEGREES",
+        requires = "look_at"
+    )]
+    pub(crate) orbit: Option<f64>,
+    /// Way of the camera: a JSON list of {"seconds", "look_at": [LON, LAT], "distance_km", "heading", "tilt", "roll", "fov",
+    /// "easing": "in-out" or "linear"}; the first is at 0 seconds.
+    #[arg(
+        long,
+        value_name = "FILE.json",
+        conflicts_with_all = ["lon", "lat", "height", "look_at", "distance", "heading", "tilt", "roll", "fov", "turn", "orbit"]
+    )]
+    pub(crate) key_frames: Option<PathBuf>,
     /// Render workers to draw on, HOST:PORT[,HOST:PORT...]; this process if none is given.
     #[arg(
         long,
