@@ -444,18 +444,10 @@ pub(crate) struct RenderGlobe {
 #[derive(Debug, Args)]
 pub(crate) struct Camera {
     /// Longitude below the camera, degrees east.
-    #[arg(
-        long,
-        allow_negative_numbers = true,
-        required_unless_present_any = ["look_at", "key_frames"]
-    )]
+    #[arg(long, allow_negative_numbers = true)]
     pub(crate) lon: Option<f64>,
     /// Latitude below the camera, degrees north.
-    #[arg(
-        long,
-        allow_negative_numbers = true,
-        required_unless_present_any = ["look_at", "key_frames"]
-    )]
+    #[arg(long, allow_negative_numbers = true)]
     pub(crate) lat: Option<f64>,
     /// Height of the camera above the ground, km.
     #[arg(long, default_value_t = 15_000.0)]

@@ -1,6 +1,6 @@
 //! From the options of a picture to its render job: the same words and the same function as an address has.
 
-use anyhow::{Context as _, Result};
+use anyhow::{Context as _, Result, bail};
 use contract::camera::{CameraAngles, LookAt};
 use contract::context::Relief;
 use contract::grid::LonLatDeg;
@@ -38,10 +38,10 @@ pub(crate) fn view_of(globe: &RenderGlobe) -> Result<View> {
     if let Some(look_at) = look_at(camera) {
         return Ok(look_at.view([width_px, height_px])?);
     }
-    let place = LonLatDeg::new(
-        camera.lon.unwrap_or_default(),
-        camera.lat.unwrap_or_default(),
-    )?;
+    let (Some(lon), Some(lat)) = (camera.lon, camera.lat) else {
+        bail!("a picture of the globe needs a camera: --lon and --lat, or --look-at LON,LAT");
+    };
+    let place = LonLatDeg::new(lon, lat)?;
     Ok(View::Globe {
         lon_deg: place.lon,
         lat_deg: place.lat,

@@ -1,5 +1,7 @@
 //! Views of the globe and of the map in one line each.
 
+use contract::camera::{CameraAngles, LookAt};
+use contract::grid::LonLatDeg;
 use contract::job::View;
 use contract::tile::Tile;
 
@@ -11,8 +13,27 @@ pub fn globe(lon_deg: f64, lat_deg: f64, height_m: f64, size_px: u32) -> View {
         height_m,
         width_px: size_px,
         height_px: size_px,
-        angles: contract::camera::CameraAngles::NADIR,
+        angles: CameraAngles::NADIR,
     }
+}
+
+/// A square picture of a place, degrees, from so many metres away, with a heading and a tilt there.
+///
+/// # Panics
+/// A distance below a kilometre, a tilt beyond 0 to 90.
+#[expect(clippy::expect_used, reason = "views of tests and benches are written down")]
+pub fn looking_at(target: [f64; 2], distance_m: f64, [heading_deg, tilt_deg]: [f64; 2], size_px: u32) -> View {
+    let [lon, lat] = target;
+    let look_at = LookAt {
+        target: LonLatDeg { lon, lat },
+        distance_m,
+        angles: CameraAngles {
+            heading_deg,
+            tilt_deg,
+            ..CameraAngles::NADIR
+        },
+    };
+    look_at.view([size_px; 2]).expect("a valid camera")
 }
 
 /// A map tile, of which there is one.

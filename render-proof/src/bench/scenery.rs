@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::thread;
 
 use anyhow::Result;
+use contract::camera::CameraAngles;
 use contract::colour::TransferFunction;
 use contract::grid::Grid;
 use contract::job::{Mode, RENDERER_VERSION, RenderJob, Style, View};
@@ -152,7 +153,7 @@ pub fn pole(cells: u64, size_px: [u32; 2]) -> Result<(Scene, RenderJob)> {
         height_m: 9.0e6,
         width_px: size_px[0],
         height_px: size_px[1],
-        angles: contract::camera::CameraAngles::NADIR,
+        angles: CameraAngles::NADIR,
     };
     Ok((scene, job))
 }
@@ -195,7 +196,7 @@ pub fn job(size_px: [u32; 2], slices: u32) -> Result<RenderJob> {
             height_m: CAMERA_HEIGHT_M,
             width_px: size_px[0],
             height_px: size_px[1],
-            angles: contract::camera::CameraAngles::NADIR,
+            angles: CameraAngles::NADIR,
         },
         style,
     })

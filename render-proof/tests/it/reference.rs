@@ -4,7 +4,7 @@ use contract::colour::Stops;
 use contract::job::{Mode, RenderJob, View};
 use render::{Backend, Renderer, Scene};
 use render_proof::ocean::{ONE_DEGREE, REGION, scene as ocean};
-use render_proof::views::{globe, tile};
+use render_proof::views::{globe, looking_at, tile};
 use render_proof::{Difference, Fineness, Picture, ProofError, against_slices, reference};
 
 fn job(mode: Mode, view: View) -> RenderJob {
@@ -106,6 +106,28 @@ fn more_slices_come_nearer_to_the_reference_on_a_globe_and_on_a_tile() {
         assert!(
             eight.mean_flip > 1.5 * usual.mean_flip && many.mean_flip < 1.5 * usual.mean_flip,
             "{name}"
+        );
+    }
+}
+
+#[test]
+fn from_any_side_the_volume_is_near_the_reference() {
+    let scene = ocean(ONE_DEGREE);
+    for (target, distance_m, angles, least_db) in [
+        ([-122.0, 27.0], 2.2e6, [0.0, 45.0], 40.0),
+        ([-122.0, 27.0], 2.2e6, [150.0, 60.0], 40.0),
+        ([-150.0, 0.0], 3.0e6, [-45.0, 75.0], 40.0),
+        // Against the sun and with it, the limb in sight.
+        ([-150.0, 0.0], 6.0e6, [135.0, 50.0], 40.0),
+        ([-150.0, 0.0], 6.0e6, [-45.0, 50.0], 40.0),
+    ] {
+        let job = job(Mode::Volume, looking_at(target, distance_m, angles, 96));
+        let truth = reference(&job, &scene, Fineness::default()).unwrap();
+        let difference = Difference::of(&drawn(&job, &scene), &truth).unwrap();
+        println!("{target:?} from {distance_m} m, {angles:?}: {difference:?}");
+        assert!(
+            difference.psnr_db.unwrap() >= least_db,
+            "{target:?} {angles:?}: {difference:?}"
         );
     }
 }

@@ -14,7 +14,7 @@ use render_proof::currents::{self, gyres};
 
 use crate::compare::distance;
 use crate::device::renderers;
-use crate::scenes::{FIVE_DEGREES, globe, job, ocean, tile};
+use crate::scenes::{FIVE_DEGREES, globe, job, looking_at, ocean, tile};
 use record::{Record, digest};
 
 /// Largest file.
@@ -158,6 +158,17 @@ fn volume_globes_match_their_golden_picture() {
         Mode::Volume,
         globe(-120.0, 10.0, 1.5e7, 160),
     );
+}
+
+#[test]
+fn tilted_volumes_maps_and_coasts_match_their_golden_pictures() {
+    let near = looking_at([-122.0, 25.0], 2.5e6, [60.0, 70.0], 192);
+    let limb = looking_at([-140.0, 50.0], 6.0e6, [-10.0, 40.0], 192);
+    matches_golden("volume_low", Mode::Volume, near);
+    matches_golden("map_low", Mode::Map, near);
+    let mut job = job(Mode::Volume, limb);
+    job.style.context.coastlines = true;
+    matches_golden_of("volume_limb", &ocean(FIVE_DEGREES), job);
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Made-up scenes: a smooth flux field with land, and what it has accumulated.
 
 pub(crate) use render_proof::ocean::{FIVE_DEGREES, GRAM_A_YEAR, ONE_DEGREE, scene as ocean};
-pub(crate) use render_proof::views::{globe, tile};
+pub(crate) use render_proof::views::{globe, looking_at, tile};
 
 use std::sync::Arc;
 

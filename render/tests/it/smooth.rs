@@ -5,7 +5,7 @@ use render::plan::Plan;
 use render::{Backend, Image, Renderer, Scene};
 use render_proof::ocean::REGION;
 
-use crate::scenes::{FIVE_DEGREES, ONE_DEGREE, globe, job, ocean, tile};
+use crate::scenes::{FIVE_DEGREES, ONE_DEGREE, globe, job, looking_at, ocean, tile};
 
 /// Of all channels, premultiplied: mean and largest change, levels.
 fn change(a: &Image, b: &Image) -> (f64, f64) {
@@ -113,6 +113,23 @@ fn from_a_little_farther_the_volume_looks_a_little_different() {
         renderer.render(&seen(0.0, height), &scene).unwrap()
     });
     assert_eq!(roughness(&up, 40.0), None, "up");
+}
+
+#[test]
+fn a_camera_that_turns_a_little_sees_the_volume_a_little_different() {
+    let renderer = Renderer::new(Backend::Cpu).unwrap();
+    let scene = ocean(FIVE_DEGREES);
+    let turn = |what: &str, step: f64, angles: fn(f64) -> [f64; 2]| {
+        let changes = halving(what, step, |by| {
+            let view = looking_at([-150.0, 5.0], 5.0e6, angles(by), 96);
+            renderer.render(&job(Mode::Volume, view), &scene).unwrap()
+        });
+        assert_eq!(roughness(&changes, 40.0), None, "{what}");
+    };
+    turn("tilt", 0.4, |by| [20.0, 50.0 + by]);
+    turn("heading", 0.4, |by| [20.0 + by, 50.0]);
+    // From one order of the slices to the other: looking along the light.
+    turn("low", 0.3, |by| [135.0, 80.0 + by]);
 }
 
 #[test]
