@@ -127,7 +127,7 @@ fn a_camera_that_turns_a_little_sees_the_volume_a_little_different() {
         assert_eq!(roughness(&changes, 40.0), None, "{what}");
     };
     turn("tilt", 0.4, |by| [20.0, 50.0 + by]);
-    turn("heading", 0.4, |by| [20.0 + by, 50.0]);
+    turn("heading", 2.0, |by| [20.0 + by, 50.0]);
     // From one order of the slices to the other: looking along the light.
     turn("low", 0.3, |by| [135.0, 80.0 + by]);
 }
