@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::{Context as _, Result, bail, ensure};
 use contract::camera::{CameraAngles, FIELD_OF_VIEW_DEG, LookAt};
-use contract::grid::LonLatDeg;
+use contract::grid::{LonLatDeg, wrap_lon_deg};
 use contract::job::View;
 use serde::{Deserialize, Serialize};
 
@@ -196,18 +196,17 @@ impl KeyFrame {
     }
 
     fn look_at(&self) -> LookAt {
-        let round = |angle: f64| (angle + 180.0).rem_euclid(360.0) - 180.0;
         let [lon, lat] = self.look_at;
         LookAt {
             target: LonLatDeg {
-                lon: round(lon),
+                lon: wrap_lon_deg(lon),
                 lat,
             },
             distance_m: self.distance_km * 1000.0,
             angles: CameraAngles {
-                heading_deg: round(self.heading),
+                heading_deg: wrap_lon_deg(self.heading),
                 tilt_deg: self.tilt,
-                roll_deg: round(self.roll),
+                roll_deg: wrap_lon_deg(self.roll),
                 field_of_view_deg: self.fov,
             },
         }
