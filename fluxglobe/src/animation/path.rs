@@ -186,7 +186,7 @@ impl KeyFrame {
         let mix = |a: f64, b: f64| a + (b - a) * share;
         Self {
             look_at: along(self.look_at, after.look_at, share),
-            distance_km: mix(self.distance_km.ln(), after.distance_km.ln()).exp(),
+            distance_km: self.distance_km * (after.distance_km / self.distance_km).powf(share),
             heading: mix(self.heading, after.heading),
             tilt: mix(self.tilt, after.tilt),
             roll: mix(self.roll, after.roll),
