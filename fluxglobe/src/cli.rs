@@ -461,7 +461,12 @@ pub(crate) struct Camera {
     )]
     pub(crate) look_at: Option<LonLatDeg>,
     /// From the camera to the place that is looked at, km.
-    #[arg(long, value_name = "KM", default_value_t = 15_000.0, requires = "look_at")]
+    #[arg(
+        long,
+        value_name = "KM",
+        default_value_t = 15_000.0,
+        requires = "look_at"
+    )]
     pub(crate) distance: f64,
     /// Direction of view, clockwise from north, degrees.
     #[arg(

@@ -21,8 +21,16 @@ pub fn globe(lon_deg: f64, lat_deg: f64, height_m: f64, size_px: u32) -> View {
 ///
 /// # Panics
 /// A distance below a kilometre, a tilt beyond 0 to 90.
-#[expect(clippy::expect_used, reason = "views of tests and benches are written down")]
-pub fn looking_at(target: [f64; 2], distance_m: f64, [heading_deg, tilt_deg]: [f64; 2], size_px: u32) -> View {
+#[expect(
+    clippy::expect_used,
+    reason = "views of tests and benches are written down"
+)]
+pub fn looking_at(
+    target: [f64; 2],
+    distance_m: f64,
+    [heading_deg, tilt_deg]: [f64; 2],
+    size_px: u32,
+) -> View {
     let [lon, lat] = target;
     let look_at = LookAt {
         target: LonLatDeg { lon, lat },

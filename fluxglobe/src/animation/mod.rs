@@ -124,8 +124,7 @@ fn path(options: &RenderAnimation) -> Result<Option<CameraPath>> {
     if let Some(file) = &options.key_frames {
         return Ok(Some(CameraPath::read(file)?));
     }
-    let (Some(turn_deg), Some(look_at)) =
-        (options.orbit, picture::look_at(&options.globe.camera))
+    let (Some(turn_deg), Some(look_at)) = (options.orbit, picture::look_at(&options.globe.camera))
     else {
         return Ok(None);
     };

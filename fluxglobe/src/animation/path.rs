@@ -267,7 +267,10 @@ mod tests {
         );
         // Twice as far and twice as far again; a whole turn is half done.
         assert!((half.distance_m - 2e6).abs() < 1e-3, "{}", half.distance_m);
-        assert_eq!((half.angles.heading_deg, half.angles.tilt_deg), (-90.0, 30.0));
+        assert_eq!(
+            (half.angles.heading_deg, half.angles.tilt_deg),
+            (-90.0, 30.0)
+        );
         // At rest at both ends.
         for (a, b) in [(0.0, 0.01), (4.0, 3.99)] {
             let moved = (state(&path, a).distance_m / state(&path, b).distance_m).ln();
@@ -282,7 +285,10 @@ mod tests {
     #[test]
     fn an_orbit_goes_evenly_round_and_closes() {
         let look_at = LookAt {
-            target: LonLatDeg { lon: 10.0, lat: 50.0 },
+            target: LonLatDeg {
+                lon: 10.0,
+                lat: 50.0,
+            },
             distance_m: 2e6,
             angles: CameraAngles {
                 heading_deg: 30.0,
@@ -294,8 +300,16 @@ mod tests {
         let size = [8, 6];
         let close = |a: View, b: View| match (a, b) {
             (
-                View::Globe { lon_deg: a, lat_deg: c, .. },
-                View::Globe { lon_deg: b, lat_deg: d, .. },
+                View::Globe {
+                    lon_deg: a,
+                    lat_deg: c,
+                    ..
+                },
+                View::Globe {
+                    lon_deg: b,
+                    lat_deg: d,
+                    ..
+                },
             ) => (a - b).abs() < 1e-9 && (c - d).abs() < 1e-9,
             _ => false,
         };
@@ -303,10 +317,16 @@ mod tests {
         assert_eq!(first, look_at.view(size).unwrap());
         assert!(close(path.view(8.0, size).unwrap(), first));
         let quarter = LookAt {
-            angles: CameraAngles { heading_deg: 120.0, ..look_at.angles },
+            angles: CameraAngles {
+                heading_deg: 120.0,
+                ..look_at.angles
+            },
             ..look_at
         };
-        assert!(close(path.view(2.0, size).unwrap(), quarter.view(size).unwrap()));
+        assert!(close(
+            path.view(2.0, size).unwrap(),
+            quarter.view(size).unwrap()
+        ));
     }
 
     #[test]
@@ -319,7 +339,10 @@ mod tests {
         let first = frame(0.0, "");
         assert!(two(&frame(1.0, ""), &frame(2.0, "")).contains("key frame 1 of 2"));
         let order = two(&first, &frame(-3.0, ""));
-        assert!(order.contains("key frame 2 of 2") && order.contains("-3 s"), "{order}");
+        assert!(
+            order.contains("key frame 2 of 2") && order.contains("-3 s"),
+            "{order}"
+        );
         for (broken, part) in [
             (r#", "tilt": 95"#, "0 to 90"),
             (r#", "fov": 0"#, "1 to 120"),

@@ -72,7 +72,12 @@ impl Camera {
                 height_m,
                 angles,
                 ..
-            } => Some(Self::over([lon_deg, lat_deg], height_m, &angles, view.size_px())),
+            } => Some(Self::over(
+                [lon_deg, lat_deg],
+                height_m,
+                &angles,
+                view.size_px(),
+            )),
         }
     }
 

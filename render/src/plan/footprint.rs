@@ -151,8 +151,7 @@ mod tests {
     /// Does the footprint hold every place between the heights along sight lines all over the cone?
     fn holds(height: f64, tilt: f64, corner: f64) {
         let (up, ahead, side) = (DVec3::Z, DVec3::X, DVec3::Y);
-        let footprint =
-            Footprint::ahead([up, ahead], height, [tilt, corner], HEIGHTS, [0.0, 0.0]);
+        let footprint = Footprint::ahead([up, ahead], height, [tilt, corner], HEIGHTS, [0.0, 0.0]);
         let camera = up * (1.0 + height);
         let axis = ahead * tilt.sin() - up * tilt.cos();
         let across = up * tilt.sin() + ahead * tilt.cos();

@@ -75,7 +75,10 @@ async fn a_camera_is_turned_and_looks_at_a_place() {
     let path = format!("/globe/flux/volume.png?look_at=-95,0&distance_km=3000&{turned}");
     assert_eq!(app.get(&path).await.status, StatusCode::OK);
     let look_at = LookAt {
-        target: LonLatDeg { lon: -95.0, lat: 0.0 },
+        target: LonLatDeg {
+            lon: -95.0,
+            lat: 0.0,
+        },
         distance_m: 3e6,
         angles,
     };
