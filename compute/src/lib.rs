@@ -26,6 +26,7 @@ mod session;
 mod standalone;
 mod state;
 pub mod stats;
+mod tail_store;
 
 pub use budget::{BudgetAnswer, BudgetQuery, BudgetRow, BudgetStep, budget};
 pub use check::{CheckRow, compare};

@@ -15,6 +15,7 @@ use crate::ComputeError;
 use crate::region::computed::ComputedWeights;
 use crate::region::loaded::{LoadedWeights, RegionWeights};
 use crate::retry_store::RetryStore;
+use crate::tail_store::TailStore;
 
 /// The root that URLs of a store begin with, and what answers for it. Clones share what was read.
 #[derive(Debug, Clone)]
@@ -35,7 +36,7 @@ impl Objects {
     pub fn new(root: Url, store: Arc<dyn ObjectStore>) -> Self {
         Self {
             root,
-            store: Arc::new(RetryStore::new(store)),
+            store: Arc::new(TailStore::new(Arc::new(RetryStore::new(store)))),
             weights: Arc::default(),
         }
     }

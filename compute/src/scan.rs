@@ -16,9 +16,7 @@ use futures::FutureExt as _;
 use storage::{StorageError, Store};
 
 use crate::ComputeError;
-
-/// What is read of a file's end at once: the footer of a frame of up to 16 groups of chunks.
-const FOOTER_BYTES: usize = 16 << 10;
+use crate::tail_store::TAIL_BYTES;
 
 /// What rows of stored objects hold.
 #[derive(Debug, Clone, Copy)]
@@ -113,7 +111,7 @@ fn list(
 /// How files of few and large rows are read.
 fn reading() -> TableParquetOptions {
     let mut options = TableParquetOptions::default();
-    options.global.metadata_size_hint = Some(FOOTER_BYTES);
+    options.global.metadata_size_hint = Some(TAIL_BYTES as usize);
     options.global.pushdown_filters = true;
     // A mask over rows would have the pages of all of them fetched and decoded; runs of rows skip whole pages.
     options.global.force_filter_selections = true;

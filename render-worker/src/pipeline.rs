@@ -23,7 +23,7 @@ pub struct Limits {
     pub draws_at_once: Option<NonZeroUsize>,
     /// Jobs that somebody waits for and that are not begun; more are sent away.
     pub draw_queue: usize,
-    /// Bytes of frames kept in memory.
+    /// Bytes of frames kept in memory; see [`Source::new`] for frames larger than half of them.
     pub frame_bytes: u64,
     /// Bytes of frames kept on the device; none named is a share of what the device has.
     pub device_frame_bytes: Option<u64>,

@@ -50,18 +50,26 @@ type FrameKey = (ObjectKey, ObjectKey, Option<ObjectKey>);
 #[derive(Clone)]
 struct Held {
     frame: Arc<Frame>,
-    /// What it weighs, which must not change while it is here.
+    /// Its size, which must not change while it is here.
     bytes: u64,
     /// Nobody has wanted it yet.
     is_early: Arc<AtomicBool>,
 }
 
+/// The weight of a frame is its size. One of more than half of all room weighs a half: the cache would turn it away, and a
+/// picture lies between two.
 #[derive(Clone)]
-struct ByBytes;
+struct ByBytes {
+    most_bytes: u64,
+}
 
 impl Weighter<FrameKey, Held> for ByBytes {
     fn weight(&self, _key: &FrameKey, held: &Held) -> u64 {
-        held.bytes
+        if held.bytes <= self.most_bytes {
+            held.bytes.min(self.most_bytes / 2)
+        } else {
+            held.bytes
+        }
     }
 }
 
@@ -104,7 +112,7 @@ impl Held {
 }
 
 impl Source {
-    /// A source that keeps frames up to `most_bytes`.
+    /// A source that keeps frames up to `most_bytes`, or two that are each larger than half of that and not larger than it.
     ///
     /// # Panics
     /// Never: its options are complete.
@@ -123,7 +131,7 @@ impl Source {
             renderer,
             most_bytes,
             domains: Cache::new(MOST_DOMAINS),
-            frames: Cache::with_options(options, ByBytes, hasher, lifecycle),
+            frames: Cache::with_options(options, ByBytes { most_bytes }, hasher, lifecycle),
             frame_hits: AtomicU64::new(0),
             frame_misses: AtomicU64::new(0),
             early_reads: AtomicU64::new(0),
@@ -150,7 +158,7 @@ impl Source {
         };
         Kept {
             products: self.frames.iter().filter_map(product).collect(),
-            frame_bytes: self.frames.weight(),
+            frame_bytes: self.frames.iter().map(|(_, held)| held.bytes).sum(),
             frame_hits: self.frame_hits.load(Ordering::Relaxed),
             frame_misses: self.frame_misses.load(Ordering::Relaxed),
             early_reads: self.early_reads.load(Ordering::Relaxed),

@@ -229,6 +229,7 @@ pub async fn write(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use arrow::compute::concat_batches;
 
     const GRID: Grid = Grid {
         rows: 70,
@@ -283,5 +284,33 @@ mod tests {
         assert!(refused.contains(wrong.as_str()), "{refused}");
         let narrower = Grid { cols: 129, ..GRID };
         assert!(read(&store, &key, &narrower).await.is_err());
+    }
+
+    #[test]
+    fn counts_that_lack_a_chunk_or_have_one_twice_are_damaged() {
+        // The last chunk holds nothing: without it the numbers are the same.
+        let january = Period::month(2001, 1).unwrap();
+        let last = frame_chunks(&GRID).pop().unwrap();
+        let mut has_data = vec![true; GRID.cell_count()];
+        for cell in last.cell_indices(&GRID) {
+            has_data[cell] = false;
+        }
+        let mut counts = Contributed::nothing(&GRID, january.start);
+        counts.add(january, &has_data);
+        let key = ObjectKey::contributed(&"p".parse().unwrap(), &counts.digest());
+        let content = encode(&GRID, &counts).unwrap();
+        let whole = parquet_table::decode(&key, content, &SCHEMA).unwrap().batch;
+        let without = whole.slice(0, whole.num_rows() - 1);
+        let twice = concat_batches(&SCHEMA, [&whole, &whole.slice(0, 1)]).unwrap();
+        let read = |batch: &RecordBatch| {
+            let shape = [GRID.rows, GRID.cols];
+            let content = parquet_table::encode(batch, CHUNKS_PER_GROUP, &shape).unwrap();
+            decode(&key, content, Some(&GRID))
+        };
+        assert_eq!(read(&whole).unwrap(), counts);
+        for batch in [&without, &twice] {
+            let error = read(batch).unwrap_err().to_string();
+            assert!(error.contains("other chunks"), "{error}");
+        }
     }
 }

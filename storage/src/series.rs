@@ -165,6 +165,7 @@ pub async fn write(
 #[expect(clippy::float_cmp, reason = "these values are exact")]
 mod tests {
     use super::*;
+    use arrow::compute::concat_batches;
 
     #[test]
     fn every_cell_finds_its_own_run() {
@@ -202,5 +203,28 @@ mod tests {
         );
         let swapped = encode(&grid, &[&b, &a]).unwrap();
         assert!(decode(&key, swapped.content).is_err());
+    }
+
+    #[test]
+    fn a_series_that_lacks_a_block_or_has_one_twice_is_damaged() {
+        let grid = shape_only(9, 16);
+        // The last block holds no data: without it the values are the same.
+        let step: Vec<f32> = (0..grid.cell_count())
+            .map(|i| if i < 8 * 16 + 8 { i as f32 } else { f32::NAN })
+            .collect();
+        let name = digest_of(&grid, &[&step]);
+        let key = ObjectKey::series(&"p".parse().unwrap(), &name);
+        let whole = batch(&grid, &[&step]).unwrap();
+        let without = whole.slice(0, whole.num_rows() - 1);
+        let twice = concat_batches(&SCHEMA, [&whole, &whole.slice(0, 1)]).unwrap();
+        let read = |batch: &RecordBatch| {
+            let content = parquet_table::encode(batch, BLOCKS_PER_GROUP, &[9, 16, 1]).unwrap();
+            decode(&key, content)
+        };
+        assert!(read(&whole).is_ok());
+        for batch in [&without, &twice] {
+            let error = read(batch).unwrap_err().to_string();
+            assert!(error.contains("every block"), "{error}");
+        }
     }
 }

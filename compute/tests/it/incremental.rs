@@ -67,6 +67,20 @@ async fn month_after_month_gives_the_bits_of_the_whole_year_at_once() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn months_that_are_accumulated_are_not_read_again() {
+    let year = wavy_year(&FIVE_DEGREES);
+    let (folder, store) = folder_store();
+    let early = put(&store, &year[..9].to_vec()).await;
+    derive(&store).await;
+    put(&store, &year).await;
+    for step in &early.steps {
+        std::fs::remove_file(folder.path().join(step.frame.as_str())).unwrap();
+    }
+    let derived = derive(&store).await;
+    assert_eq!(seen(&derived), seen(&from_nothing(&year).await));
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_revised_month_redoes_itself_and_what_follows_and_nothing_before() {
     let year = wavy_year(&FIVE_DEGREES);
     let (_folder, store) = folder_store();

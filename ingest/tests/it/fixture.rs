@@ -217,6 +217,11 @@ impl SmallFile {
 
     /// Plain HDF5 without dimension scales, by libhdf5.
     pub(crate) fn write_hdf5(&self, path: &Path) {
+        drop(self.write_hdf5_open(path));
+    }
+
+    /// The same, for more to be written to it.
+    pub(crate) fn write_hdf5_open(&self, path: &Path) -> hdf5::File {
         let file = self.write_axes(path);
         let (rows, cols) = (self.lat.len(), self.lon.len());
         let shape: Vec<usize> = if self.time_unit.is_some() {
@@ -242,6 +247,7 @@ impl SmallFile {
             .unwrap()
             .write_scalar(&FILL)
             .unwrap();
+        file
     }
 }
 

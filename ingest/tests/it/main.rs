@@ -3,6 +3,7 @@
 #![expect(clippy::float_cmp, reason = "these numbers are exact")]
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod attributes;
 mod axes;
 mod bad_input;
 mod cf_files;

@@ -47,22 +47,34 @@ impl Inner {
 
     /// A picture after what the store has to do with it.
     async fn kept(&self, job: &RenderJob, png: Bytes, storing: Storing) -> Drawn {
-        let kept = match storing {
-            Storing::LookUpAndKeep | Storing::Keep => self.keep(job, png.clone()).await.map(Some),
-            Storing::Nothing => Ok(None),
+        let (count, drawn) = match storing {
+            Storing::LookUpAndKeep | Storing::Keep => self.put(job, png).await,
+            Storing::Nothing => {
+                let (origin, kept) = (Origin::Drawn, false);
+                ("drawn", Drawn { png, origin, kept })
+            }
         };
-        let (count, png, origin, kept) = match kept {
-            Ok(Some(None)) => ("drawn", png, Origin::Drawn, true),
-            Ok(Some(Some(theirs))) => ("conflict", theirs, Origin::Stored, true),
-            Ok(None) => ("drawn", png, Origin::Drawn, false),
+        self.pictures.with_label_values(&[count]).inc();
+        drawn
+    }
+
+    /// A picture that was not kept, given to somebody who ordered it to be.
+    pub(super) async fn kept_after_all(&self, job: &RenderJob, drawn: Drawn) -> Drawn {
+        self.put(job, drawn.png).await.1
+    }
+
+    /// What is given out of a picture that is to be kept, and the name of how that went.
+    async fn put(&self, job: &RenderJob, png: Bytes) -> (&'static str, Drawn) {
+        let (name, png, origin, kept) = match self.keep(job, png.clone()).await {
+            Ok(None) => ("drawn", png, Origin::Drawn, true),
+            Ok(Some(theirs)) => ("conflict", theirs, Origin::Stored, true),
             Err(error) => {
                 let error = error.in_full();
                 tracing::warn!(error, "a picture is given out but not kept");
                 ("not_kept", png, Origin::Drawn, false)
             }
         };
-        self.pictures.with_label_values(&[count]).inc();
-        Drawn { png, origin, kept }
+        (name, Drawn { png, origin, kept })
     }
 
     /// The picture, if it was drawn before. A store that cannot be asked is one more reason to draw.

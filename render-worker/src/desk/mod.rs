@@ -185,7 +185,7 @@ impl Desk {
     }
 
     /// The picture of a job. Dropping the future gives it up; a picture that all have given up is not drawn on. Whoever
-    /// joins an equal job under way has its picture as that one was ordered.
+    /// joins an equal job under way has the picture of that one, and has it kept if that one did not.
     pub async fn draw(&self, job: &RenderJob, order: Order) -> Result<Drawn, DeskError> {
         self.draw_in_turn(job, order, ()).await
     }
@@ -206,6 +206,7 @@ impl Desk {
         valid.map_err(DrawError::from)?;
         let digest = job.digest();
         let (waiter, begun) = inner.flights.join(digest, order.class);
+        let has_joined = begun.is_none();
         if let Some(flight) = begun {
             let (desk, job, turn) = (Arc::clone(inner), job.clone(), Box::new(turn) as Turn);
             let flying = async move {
@@ -220,7 +221,11 @@ impl Desk {
             };
             tokio::spawn(flying.in_current_span());
         }
-        waiter.outcome().await
+        let drawn = waiter.outcome().await?;
+        if has_joined && !drawn.kept && order.storing != Storing::Nothing {
+            return Ok(inner.kept_after_all(job, drawn).await);
+        }
+        Ok(drawn)
     }
 
     /// Puts a picture into the store; done already is done.

@@ -28,7 +28,8 @@ pub struct Settings {
     #[arg(long, env = "FLUXGLOBE_DRAW_QUEUE", default_value_t = 64,
           value_parser = value_parser!(u16).range(0..=4096), value_name = "COUNT")]
     pub draw_queue: u16,
-    /// Memory for frames of products drawn lately, MiB, 16 to 1048576.
+    /// Memory for frames of products drawn lately, MiB, 16 to 1048576. A frame of more than half of it counts as half:
+    /// two such ones are kept, between which a picture lies; one of more than all of it is read anew for every picture.
     #[arg(long, env = "FLUXGLOBE_FRAME_MEMORY_MIB", default_value_t = 512,
           value_parser = value_parser!(u32).range(16..=1_048_576), value_name = "MIB")]
     pub frame_memory_mib: u32,

@@ -59,3 +59,33 @@ async fn a_picture_that_contradicts_the_store_is_counted_and_the_stored_one_is_g
     let aside = drawn(&worker, &job, Storing::Nothing).await;
     assert_ne!(aside.png, theirs);
 }
+
+#[tokio::test]
+async fn whoever_joins_a_job_under_way_has_its_picture_kept_as_he_ordered() {
+    let store = Store::memory();
+    let job = two_months_in(&store).await;
+    let worker = Worker::start(&store, 1, 4);
+    for (number, storing) in [(1, Storing::Keep), (2, Storing::LookUpAndKeep)] {
+        let job = quick(&job, number);
+        let (aside, kept) = tokio::join!(
+            drawn(&worker, &job, Storing::Nothing),
+            drawn(&worker, &job, storing)
+        );
+        let count = pictures(&worker, "drawn");
+        assert_eq!(count, u64::from(number), "both are one job: {storing:?}");
+        assert_eq!((aside.origin, aside.kept), (Origin::Drawn, false));
+        assert_eq!((kept.origin, kept.kept), (Origin::Drawn, true));
+        assert_eq!(store.get(&job.key()).await.unwrap(), kept.png);
+    }
+    // Another one is there meanwhile: it is given to whoever asks for what is kept, and to nobody else.
+    let [job, other] = [3, 1].map(|number| quick(&job, number));
+    let theirs = store.get(&other.key()).await.unwrap();
+    store.put_new(&job.key(), theirs.clone()).await.unwrap();
+    let (aside, given) = tokio::join!(
+        drawn(&worker, &job, Storing::Nothing),
+        drawn(&worker, &job, Storing::Keep)
+    );
+    assert_eq!(pictures(&worker, "drawn"), 3);
+    assert_eq!((given.origin, given.kept), (Origin::Stored, true));
+    assert!(given.png == theirs && aside.png != theirs);
+}

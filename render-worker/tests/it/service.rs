@@ -261,3 +261,30 @@ async fn frames_of_a_product_come_filled_with_the_errors_beside_them() {
     assert!((error / expected - 1.0).abs() < 1e-5, "{error} {expected}");
     assert!(coarser.value.before.errors.is_none());
 }
+
+#[tokio::test]
+async fn two_frames_that_each_fill_more_than_half_of_the_room_are_kept() {
+    let store = Store::memory();
+    // The second month has gaps: its errors make it twice as large as the first.
+    let job = RenderJob {
+        accumulated: None,
+        ..two_months_in(&store).await
+    };
+    let whole_bytes = FIVE_DEGREES.cell_count() as u64 * 8;
+    let renderer = Arc::new(Renderer::new(Backend::Cpu).unwrap());
+    for (most_bytes, misses, kept_bytes) in [
+        (whole_bytes, 2, whole_bytes * 3 / 2),
+        (whole_bytes * 3 / 4, 3, whole_bytes / 2),
+    ] {
+        let source = Source::new(store.clone(), Arc::clone(&renderer), most_bytes);
+        for _ in 0..2 {
+            source.scene(&job).await.unwrap();
+        }
+        let kept = source.kept();
+        assert_eq!(
+            (kept.frame_misses, kept.frame_bytes),
+            (misses, kept_bytes),
+            "{most_bytes}"
+        );
+    }
+}

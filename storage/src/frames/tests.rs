@@ -1,6 +1,7 @@
 //! Frames in memory: what is written is what is read, and nothing else is.
 
 use super::*;
+use arrow::compute::concat_batches;
 use parquet::basic::{Compression, ZstdLevel};
 use parquet::file::properties::WriterProperties;
 
@@ -91,6 +92,27 @@ fn bytes_that_are_not_the_frame_of_their_name_are_damaged() {
         let error = decode(&key, content, Some(grid)).unwrap_err();
         assert!(matches!(error, StorageError::Damaged { .. }), "{error}");
         assert!(error.to_string().contains(key.as_str()), "{error}");
+    }
+}
+
+#[test]
+fn a_frame_that_lacks_a_chunk_or_has_one_twice_is_damaged_though_its_values_are_those_of_its_name()
+{
+    let mut values = values();
+    let last = frame_chunks(&GRID).pop().unwrap();
+    for cell in last.cell_indices(&GRID) {
+        values[cell] = f32::NAN;
+    }
+    let (key, content) = frame(&values);
+    assert!(decode(&key, content, Some(&GRID)).is_ok());
+    let whole = batch(&GRID, &values, january()).unwrap();
+    let without = whole.slice(0, whole.num_rows() - 1);
+    let twice = concat_batches(&SCHEMA, [&whole, &whole.slice(0, 1)]).unwrap();
+    for batch in [without, twice] {
+        let shape = [GRID.rows, GRID.cols];
+        let content = parquet_table::encode(&batch, CHUNKS_PER_GROUP, &shape).unwrap();
+        let error = decode(&key, content, Some(&GRID)).unwrap_err().to_string();
+        assert!(error.contains("chunks, its grid has 4"), "{error}");
     }
 }
 

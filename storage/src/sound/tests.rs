@@ -156,6 +156,8 @@ async fn a_damaged_and_a_missing_object_are_findings_of_a_whole_store() {
     );
     assert_eq!(told.into_inner().unwrap().len(), 2);
     assert!(damage::count(Kind::Series) > before);
+    let error = verify::sound(&store, series).await.unwrap_err().to_string();
+    assert!(error.contains(series.as_str()), "{error}");
     let mend = verify::damaged(&store, keys).await.unwrap();
     assert_eq!(mend, [series.clone()].into());
 }

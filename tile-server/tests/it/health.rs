@@ -73,6 +73,22 @@ async fn a_server_without_its_renderer_is_ready_and_serves_what_is_stored() {
 }
 
 #[tokio::test]
+async fn a_server_that_ends_is_not_ready_whatever_its_parts_say() {
+    let app = TestApp::new().await;
+    assert_eq!(app.get("/readyz").await.status, StatusCode::OK);
+    app.state.news.close();
+    let answer = app.get("/readyz").await;
+    assert_eq!(answer.status, StatusCode::SERVICE_UNAVAILABLE);
+    let body = answer.json();
+    assert_eq!(
+        (&body["ready"], &part(&body, "store")["ok"]),
+        (&Value::Bool(false), &Value::Bool(true))
+    );
+    assert_eq!(part(&body, "server")["ok"], false);
+    assert_eq!(app.get("/healthz").await.status, StatusCode::OK);
+}
+
+#[tokio::test]
 async fn a_server_without_its_log_or_its_observations_says_so_and_serves_on() {
     let app = TestApp::new().await.observing();
     let log = Arc::new(Log::default());

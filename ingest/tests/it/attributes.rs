@@ -1,0 +1,50 @@
+//! HDF5 files with attributes of any size and number: what is kept of them is bounded, and the file lands.
+
+use hdf5::Location;
+use ingest::Outcome;
+
+use crate::fixture::{Place, SmallFile, text};
+
+/// More than the reader may say of a file.
+const HUGE_BYTES: usize = 32 << 20;
+
+/// Numbers in the room of an attribute, 64 KiB: together more than the reader may say of a file.
+fn many_numbers(owner: &Location) {
+    for index in 0..160 {
+        let attribute = owner.new_attr::<f64>().shape(8000);
+        let attribute = attribute.create(&*format!("numbers{index}")).unwrap();
+        attribute.write_raw(&vec![0.1; 8000]).unwrap();
+    }
+}
+
+/// Texts as long as they are kept, five times as many as are looked at.
+fn many_texts(owner: &Location) {
+    let value = "x".repeat(4096);
+    for index in 0..5 * 1024 {
+        text(owner, &format!("text{index}"), &value);
+    }
+}
+
+#[tokio::test]
+async fn attributes_of_any_size_and_number_are_bounded_and_their_file_lands() {
+    let cases: [(&str, fn(&Location)); 3] = [
+        ("long.h5", |owner| {
+            text(owner, "history", &"x".repeat(HUGE_BYTES));
+        }),
+        ("numbers.h5", many_numbers),
+        ("texts.h5", many_texts),
+    ];
+    for (name, add) in cases {
+        let place = Place::new();
+        let path = place.path(name);
+        let file = SmallFile::new().write_hdf5_open(&path);
+        let beside = file.new_dataset::<i8>().shape([1]).create("beside");
+        add(&beside.unwrap());
+        file.close().unwrap();
+        let outcomes = place.land(&[path]).await;
+        assert!(
+            matches!(outcomes[..], [Outcome::Landed { .. }]),
+            "{name}: {outcomes:?}"
+        );
+    }
+}
