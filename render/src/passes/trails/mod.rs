@@ -4,10 +4,10 @@
 //! It runs the functions of [`flow`](crate::stages::flow) and of the stages behind it.
 
 use crate::error::RenderError;
-use crate::frame::FrameContext;
+use crate::frame_context::FrameContext;
 use crate::gpu::{Gpu, Kernel, Slot};
-use crate::passes::splat::workgroups;
 use crate::passes::store::Stored;
+use crate::stages::sizes::workgroups;
 
 /// The shader.
 pub const SOURCE: &str = concat!(
@@ -32,13 +32,13 @@ pub struct Trails {
 impl Trails {
     /// Compiles the shader as it suits the device.
     pub fn new(gpu: &Gpu) -> Self {
-        Self::of(gpu, &super::suited(gpu, SOURCE))
+        Self::of(gpu, SOURCE, super::suited(gpu))
     }
 
-    /// Compiles `source`, [`SOURCE`] but for tests.
-    pub fn of(gpu: &Gpu, source: &str) -> Self {
+    /// Compiles `source`, [`SOURCE`] but for tests, with a table of sums of so many probes.
+    pub fn of(gpu: &Gpu, source: &str, probes: u32) -> Self {
         Self {
-            trails: gpu.kernel("trails", source, "trails"),
+            trails: super::compiled(gpu, "trails", source, probes),
         }
     }
 
