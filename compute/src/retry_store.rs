@@ -127,7 +127,7 @@ impl ObjectStore for RetryStore {
 
     async fn list_with_delimiter(&self, prefix: Option<&Path>) -> Result<ListResult> {
         let what = prefix.cloned().unwrap_or_default();
-        self.steadily(&what, || self.inner.list_with_delimiter(prefix))
+        self.read(&what, || self.inner.list_with_delimiter(prefix))
             .await
     }
 
