@@ -10,7 +10,6 @@ pub(crate) mod computed;
 mod cut;
 pub mod extent;
 pub mod file;
-mod land;
 mod lattice;
 pub(crate) mod loaded;
 mod polygon_cover;

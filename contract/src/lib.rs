@@ -18,6 +18,7 @@ pub mod grid;
 pub mod job;
 pub mod key;
 pub mod kind;
+pub mod land;
 pub mod manifest;
 pub mod masked;
 pub mod notice;

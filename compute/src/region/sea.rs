@@ -1,7 +1,8 @@
 //! The sea in a region: its rings less the land, exactly, whatever the grid.
 
+use contract::land::LAND;
+
 use super::cut::{bounds_deg, inside, into_the_world};
-use super::land::LAND;
 use super::lattice::{Lattice, difference};
 use super::rings::Ring;
 

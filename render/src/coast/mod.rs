@@ -2,6 +2,7 @@
 //!
 //! Natural Earth (public domain), 1:110 million and 1:50 million. `tests/it/coast.rs` packs them and tells how.
 
+pub mod land;
 mod mask;
 mod packed;
 

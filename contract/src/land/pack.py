@@ -2,7 +2,7 @@
 """Packs the land of Natural Earth (1:50 million, public domain) as `land.bin`; `land.rs` says how it is read.
 
     npm pack world-atlas@2.0.2 && tar xzf world-atlas-2.0.2.tgz
-    compute/src/region/land/pack.py package/land-50m.json [--check]
+    contract/src/land/pack.py package/land-50m.json [--check]
 
 `--check` compares with the packed file instead of writing it. Every outer ring is kept: led round the earth the short
 way where the source was stitched at the date line, closed over the pole (Antarctica), then cut at the date line. Holes
