@@ -67,16 +67,22 @@ impl Device {
         scene: &Scene,
         light: Option<&wgpu::Buffer>,
     ) -> Result<Vec<u8>, RenderError> {
-        let mut buffers =
-            self.scene_buffers(scene, &plan.held_cells(), plan.params.values.has_uncertainty == 1)?;
+        let mut buffers = self.scene_buffers(
+            scene,
+            &plan.held_cells(),
+            plan.params.values.has_uncertainty == 1,
+        )?;
         buffers.light = light.cloned();
         self.in_workspace(|workspace| self.stages.draw(&self.gpu, workspace, plan, part, &buffers))
     }
 
     /// Makes the light that all parts of a picture lie in.
     pub(crate) fn light(&self, plan: &Plan, scene: &Scene) -> Result<wgpu::Buffer, RenderError> {
-        let buffers =
-            self.scene_buffers(scene, &plan.held_cells(), plan.params.values.has_uncertainty == 1)?;
+        let buffers = self.scene_buffers(
+            scene,
+            &plan.held_cells(),
+            plan.params.values.has_uncertainty == 1,
+        )?;
         self.in_workspace(|workspace| {
             self.stages
                 .shared_light(&self.gpu, workspace, plan, &buffers)

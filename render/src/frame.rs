@@ -147,7 +147,8 @@ impl Stages {
             ]);
         }
         let entry_bytes = size_of::<Entry>() as u64;
-        let first = (u64::from(params.cells.splat_count) * FIRST_ENTRIES_PER_PARTICLE).max(FIRST_ENTRIES);
+        let first =
+            (u64::from(params.cells.splat_count) * FIRST_ENTRIES_PER_PARTICLE).max(FIRST_ENTRIES);
         let mut capacity = (workspace.room_bytes(Slot::Entries) / entry_bytes).max(first);
         loop {
             let room = capacity.min(gpu.most_buffer_bytes() / entry_bytes) as u32;

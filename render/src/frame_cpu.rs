@@ -42,8 +42,8 @@ pub fn draw(plan: &Plan, part: Part, scene: &Scene) -> Result<Vec<u8>, RenderErr
         map::cpu::map(&params, &inputs, &mut picture);
     } else {
         let accumulated = scene.accumulated.as_ref();
-        let accumulated =
-            accumulated.map(|interval| interpolated(&params, params.values.accumulated_weight, interval));
+        let accumulated = accumulated
+            .map(|interval| interpolated(&params, params.values.accumulated_weight, interval));
         let count = plan.active.len() * params.cells.particles_per_cell as usize;
         if count > MOST_PARTICLES {
             return Err(RenderError::TooManyParticles {

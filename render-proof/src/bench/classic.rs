@@ -8,9 +8,9 @@ use render::gpu::{Gpu, Slot, Workspace, uniform};
 use render::passes::splat::Splats;
 use render::plan::Plan;
 use render::playback::{Playback, Steps};
-use render::stages::{bin, light};
 use render::stages::layout::GROUP;
 use render::stages::params::{Params, Uniform};
+use render::stages::{bin, light};
 use render::{Image, Scene, passes, stages};
 use wgpu::util::DeviceExt as _;
 

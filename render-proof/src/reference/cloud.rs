@@ -107,8 +107,8 @@ fn cloud(
     let bits = scrambled(scrambled(active.cell) ^ k.wrapping_mul(0x9e37_79b9));
     // Places of one cell are spread evenly by two irrational steps and then jittered.
     let place = |step: u32, bits: u32| {
-        let jittered =
-            (bits >> params.particles.jitter_shift).wrapping_sub(0x8000_0000 >> params.particles.jitter_shift);
+        let jittered = (bits >> params.particles.jitter_shift)
+            .wrapping_sub(0x8000_0000 >> params.particles.jitter_shift);
         share(
             0x8000_0000u32
                 .wrapping_add(k.wrapping_mul(step))
@@ -125,7 +125,8 @@ fn cloud(
     let phase = (share(first) + f64::from(params.particles.turns_per_kg_m2) * carbon.abs()).fract();
 
     let limit_m = f64::from(params.particles.height_limit_m);
-    let column_m = (carbon * f64::from(params.particles.height_m_per_kg_m2)).clamp(-limit_m, limit_m);
+    let column_m =
+        (carbon * f64::from(params.particles.height_m_per_kg_m2)).clamp(-limit_m, limit_m);
     let height_m = column_m * phase + f64::from(params.particles.sheet_m) * (phase - 0.5);
     let transfer = &job.style.transfer;
     let strength = if transfer.low < 0.0 && transfer.high > 0.0 {

@@ -38,7 +38,6 @@ impl Kernel {
             compilation_options: wgpu::PipelineCompilationOptions {
                 constants,
                 zero_initialize_workgroup_memory: false,
-                ..Default::default()
             },
             cache: gpu.pipelines.as_ref().map(Pipelines::cache),
         });

@@ -12,8 +12,8 @@ use super::extent::Extent;
 use super::look::{self, Look};
 use super::{Plan, area_m2, cell_px, entry_shift, flow, height_range_m};
 use crate::scene::Scene;
-use crate::stages::layout::{Col, LIGHT_OFF, Row, VIEW_GLOBE};
 use crate::stages::interpolate::params::InterpolateParams;
+use crate::stages::layout::{Col, LIGHT_OFF, Row, VIEW_GLOBE};
 use crate::stages::params::Params;
 
 /// Light texels at most, the side of their square: 64 slices of them are 27 MB.
@@ -238,7 +238,9 @@ fn light_frame(plan: &mut Plan, camera: &Camera, sun: DVec3, half: DVec3, cap: &
     };
     let texel = (look::TEXEL_PER_RADIUS * radius).max(side / most_texels);
     lighting.unit = LIGHT_UNIT;
-    lighting.size = lengths.map(|length| (length / texel).ceil() as u32 + 2).into();
+    lighting.size = lengths
+        .map(|length| (length / texel).ceil() as u32 + 2)
+        .into();
     (projection.light_u, projection.light_v) = (axis_u.as_vec3(), axis_v.as_vec3());
     (projection.light_u0, projection.light_v0) = (span_u[0] as f32, span_v[0] as f32);
     projection.light_texels_per_unit = (1.0 / texel) as f32;

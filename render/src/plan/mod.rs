@@ -22,9 +22,12 @@ use glam::{UVec2, Vec3};
 
 use crate::error::RenderError;
 use crate::scene::{Interval, Scene};
-use crate::stages::layout::{Active, Axis, Col, GroundAxis, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, LIGHT_OFF, LIGHT_OWN, NEVER_LONG, Row, SCREEN_TILE_PX, SQUARE, SUBPIXELS, VIEW_TILE};
 use crate::stages::bin::params::ListParams;
 use crate::stages::interpolate::params::InterpolateParams;
+use crate::stages::layout::{
+    Active, Axis, Col, GroundAxis, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, LIGHT_OFF, LIGHT_OWN,
+    NEVER_LONG, Row, SCREEN_TILE_PX, SQUARE, SUBPIXELS, VIEW_TILE,
+};
 use crate::stages::light::params::LightParams;
 use crate::stages::map::params::MapParams;
 use crate::stages::params::{GridParams, Params, ValueParams, ViewParams};

@@ -20,14 +20,10 @@ pub struct Ground {
 /// What the centre of a pixel of a globe view shows.
 pub fn ground_below(params: &Params, pixel: [u32; 2]) -> Ground {
     let view = &params.view;
-    let x = ((pixel[0] as i32 + view.origin_px.x) as f32 + 0.5 - view.center_px.x)
-        / view.focal_px;
-    let y = (view.center_px.y - (pixel[1] as i32 + view.origin_px.y) as f32 - 0.5)
-        / view.focal_px;
+    let x = ((pixel[0] as i32 + view.origin_px.x) as f32 + 0.5 - view.center_px.x) / view.focal_px;
+    let y = (view.center_px.y - (pixel[1] as i32 + view.origin_px.y) as f32 - 0.5) / view.focal_px;
     let camera = view.eye;
-    let toward = view.forward
-        + view.right * x
-        + view.up * y;
+    let toward = view.forward + view.right * x + view.up * y;
     let sight = toward / toward.length();
     let nearest_at = -camera.dot(sight);
     let foot = camera + sight * nearest_at;

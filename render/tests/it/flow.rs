@@ -393,7 +393,12 @@ fn a_globe_from_near_has_room_for_the_cells_in_sight_alone_and_shows_them_all() 
         let in_cap = |row: u32, col: u32| {
             let place = ONE_DEGREE.cell_center(row, col);
             let [x, y, z] = on_sphere([place.lon, place.lat]).to_array();
-            let eye = [near.params.view.eye.y, near.params.view.eye.x, near.params.view.eye.z].map(f64::from);
+            let eye = [
+                near.params.view.eye.y,
+                near.params.view.eye.x,
+                near.params.view.eye.z,
+            ]
+            .map(f64::from);
             x * eye[0] + y * eye[1] + z * eye[2] > f64::from(near.params.cells.cap_least) + 1e-6
         };
         let listed = |col: u32| near.cols.iter().any(|own| own.index == col);

@@ -152,7 +152,7 @@ fn only_views_of_poles_and_limbs_look_for_long_lists() {
     let is_crowded = |view| {
         let plan = Plan::for_device(&job(Mode::Volume, view), &scene, u64::MAX).unwrap();
         assert_eq!(
-            plan.params_of(plan.whole()).long_list == NEVER_LONG,
+            plan.params_of(plan.whole()).lists.long_list == NEVER_LONG,
             !plan.is_crowded
         );
         plan.is_crowded

@@ -6,7 +6,12 @@ use render::gpu::FIRST_UNIFORM;
 use render::passes::{scatter, splat, trails};
 use render::stages::fill::level::{FillLevel, MOST_REACH_COLS};
 use render::stages::fill::{self, exact, window};
-use render::stages::layout::{Axis, Col, DEPTH_ONE, Entry, GROUP, GroundAxis, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, LIGHT_ALONE, LIGHT_GIVEN, LIGHT_OFF, LIGHT_OWN, LOOK, MISSING, MOST_HOT_PARTS, NO_LIST, PART_ENTRIES, Particle, Row, SCREEN_TILE_PX, SCREEN_TILE_SHIFT, SQUARE, SUBPIXELS, Splat, VIEW_GLOBE, VIEW_TILE, Velocity, WATER_BLUE, WATER_GREEN, WATER_RED};
+use render::stages::layout::{
+    Axis, Col, DEPTH_ONE, Entry, GROUP, GroundAxis, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT,
+    LIGHT_ALONE, LIGHT_GIVEN, LIGHT_OFF, LIGHT_OWN, LOOK, MISSING, MOST_HOT_PARTS, NO_LIST,
+    PART_ENTRIES, Particle, Row, SCREEN_TILE_PX, SCREEN_TILE_SHIFT, SQUARE, SUBPIXELS, Splat,
+    VIEW_GLOBE, VIEW_TILE, Velocity, WATER_BLUE, WATER_GREEN, WATER_RED,
+};
 use render::stages::params::{Fields, Params};
 use render::stages::{bin, compose, eye, flow, interpolate, light, map};
 
@@ -153,16 +158,28 @@ fn a_swapped_missing_or_misplaced_field_is_seen() {
         ("rows: u32, cols: u32", "cols: u32, rows: u32"),
         ("rows: u32, ", ""),
         ("rows: u32", "rows: f32"),
-        ("eye: vec3<f32>, focal_px: f32", "focal_px: f32, eye: vec3<f32>"),
+        (
+            "eye: vec3<f32>, focal_px: f32",
+            "focal_px: f32, eye: vec3<f32>",
+        ),
         ("center_px: vec2<f32>", "center_px: vec2<i32>"),
-        ("@binding(17) var<uniform> grid", "@binding(18) var<uniform> grid"),
-        ("var<uniform> values: ValueParams", "var<uniform> values: GridParams"),
+        (
+            "@binding(17) var<uniform> grid",
+            "@binding(18) var<uniform> grid",
+        ),
+        (
+            "var<uniform> values: ValueParams",
+            "var<uniform> values: GridParams",
+        ),
     ] {
         // A shader that does not read the field.
         let source = light::SOURCE.replacen(right, wrong, 1);
         assert_ne!(source, light::SOURCE);
         let mut compared = params(&source).into_iter();
-        assert!(compared.any(|(_, difference)| difference.is_some()), "{wrong}");
+        assert!(
+            compared.any(|(_, difference)| difference.is_some()),
+            "{wrong}"
+        );
     }
 }
 

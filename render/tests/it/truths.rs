@@ -8,7 +8,10 @@ use render::plan::Plan;
 use render::pyramid::coarser;
 use render::scene::{Frame, Interval, Scene};
 use render::stages::interpolate::cpu::interpolated;
-use render::stages::layout::{Active, Col, DEPTH_ONE, Entry, KERNEL_CLOUD, MISSING, Particle, Row, SCREEN_TILE_PX, SUBPIXELS, Splat, VIEW_GLOBE, is_missing};
+use render::stages::layout::{
+    Active, Col, DEPTH_ONE, Entry, KERNEL_CLOUD, MISSING, Particle, Row, SCREEN_TILE_PX, SUBPIXELS,
+    Splat, VIEW_GLOBE, is_missing,
+};
 use render::stages::light::params::LightParams;
 use render::stages::params::{Params, ViewParams};
 use render::stages::particles::cpu::{Inputs, envelope, generate};

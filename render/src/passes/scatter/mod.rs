@@ -33,7 +33,8 @@ impl Scatter {
     /// Compiles `source`, [`SOURCE`] but for tests, with a table of sums of so many probes.
     pub fn of(gpu: &Gpu, source: &str, probes: u32) -> Self {
         Self {
-            scatter: super::compiled(gpu, "scatter", source, probes).reading(&[View, Cells, Lighting, Lists]),
+            scatter: super::compiled(gpu, "scatter", source, probes)
+                .reading(&[View, Cells, Lighting, Lists]),
         }
     }
 
@@ -53,7 +54,9 @@ impl Scatter {
             (5, &lit),
         ];
         let groups = workgroups(&frame.params);
-        frame.recorder.dispatch_deep(&self.scatter, &buffers, groups);
+        frame
+            .recorder
+            .dispatch_deep(&self.scatter, &buffers, groups);
         Ok(())
     }
 }

@@ -10,7 +10,9 @@ use crate::frame_context::FrameContext;
 use crate::gpu::{Gpu, Kernel};
 use crate::passes::store::Stored;
 use crate::stages::layout::{DEPTH_ONE, SUBPIXELS, Splat};
-use crate::stages::params::Uniform::{Cells, Grid, Lighting, Lists, Particles, Projection, Values, View};
+use crate::stages::params::Uniform::{
+    Cells, Grid, Lighting, Lists, Particles, Projection, Values, View,
+};
 use crate::stages::sizes::workgroups;
 
 /// The shader.
@@ -60,7 +62,9 @@ impl Splats {
     /// Compiles `source`, [`SOURCE`] but for tests, with a table of sums of so many probes.
     pub fn of(gpu: &Gpu, source: &str, probes: u32) -> Self {
         Self {
-            splat: super::compiled(gpu, "splat", source, probes).reading(&[View, Grid, Values, Cells, Particles, Projection, Lighting, Lists]),
+            splat: super::compiled(gpu, "splat", source, probes).reading(&[
+                View, Grid, Values, Cells, Particles, Projection, Lighting, Lists,
+            ]),
         }
     }
 

@@ -5,9 +5,11 @@
 
 use crate::error::RenderError;
 use crate::frame_context::FrameContext;
-use crate::stages::params::Uniform::{Cells, Flow, Grid, Lighting, Lists, Particles, Projection, Values, View};
 use crate::gpu::{Gpu, Kernel, Slot};
 use crate::passes::store::Stored;
+use crate::stages::params::Uniform::{
+    Cells, Flow, Grid, Lighting, Lists, Particles, Projection, Values, View,
+};
 use crate::stages::sizes::workgroups;
 
 /// The shader.
@@ -40,7 +42,9 @@ impl Trails {
     /// Compiles `source`, [`SOURCE`] but for tests, with a table of sums of so many probes.
     pub fn of(gpu: &Gpu, source: &str, probes: u32) -> Self {
         Self {
-            trails: super::compiled(gpu, "trails", source, probes).reading(&[View, Grid, Values, Cells, Particles, Flow, Projection, Lighting, Lists]),
+            trails: super::compiled(gpu, "trails", source, probes).reading(&[
+                View, Grid, Values, Cells, Particles, Flow, Projection, Lighting, Lists,
+            ]),
         }
     }
 

@@ -1,6 +1,8 @@
 //! CPU twin of `reach.wgsl`, `bin.wgsl` and of the second half of the sort in `scatter.wgsl`.
 
-use crate::stages::layout::{DEPTH_ONE, Entry, KERNEL_CLOUD, SCREEN_TILE_SHIFT, SUBPIXELS, Splat, nearest};
+use crate::stages::layout::{
+    DEPTH_ONE, Entry, KERNEL_CLOUD, SCREEN_TILE_SHIFT, SUBPIXELS, Splat, nearest,
+};
 use crate::stages::params::Params;
 
 const MOST_DEPTH: f32 = 15.0;
@@ -13,7 +15,8 @@ fn radius_of(params: &Params, splat: &Splat) -> i32 {
 fn depth_of(params: &Params, splat: &Splat) -> u32 {
     let mut tau = splat.tau;
     if params.lists.kernel == KERNEL_CLOUD {
-        let rounded_px = (radius_of(params, splat) << params.lists.entry_shift) as f32 / SUBPIXELS as f32;
+        let rounded_px =
+            (radius_of(params, splat) << params.lists.entry_shift) as f32 / SUBPIXELS as f32;
         let wider = splat.radius_px / rounded_px;
         tau *= wider * wider;
     }
@@ -73,7 +76,8 @@ pub fn scatter(params: &Params, splats: &[Splat], counts: &mut [u32], entries: &
             let tile = list as u32 / params.view.slices;
             let corner = [tile % params.view.tiles.x, tile / params.view.tiles.x]
                 .map(|t| (t << SCREEN_TILE_SHIFT) as i32);
-            let offset = |place: i32, corner: i32| ((place - corner) >> params.lists.entry_shift) as u32;
+            let offset =
+                |place: i32, corner: i32| ((place - corner) >> params.lists.entry_shift) as u32;
             let place =
                 (offset(splat.x_sub, corner[0]) & 0xffff) | (offset(splat.y_sub, corner[1]) << 16);
             entries[counts[list] as usize] = Entry { place, size, color };

@@ -42,9 +42,7 @@ fn surface_below(params: &Params, domain: &[u32], pixel: [u32; 2]) -> Vec4 {
     } else {
         SEA
     };
-    let sun = ground
-        .normal
-        .dot(params.view.sun);
+    let sun = ground.normal.dot(params.view.sun);
     hazy(params, color * sunlight(sun), ground.normal).extend(1.0) * cover
 }
 

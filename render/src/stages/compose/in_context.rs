@@ -96,7 +96,8 @@ fn spot_on_globe(params: &Params, pixel: [u32; 2]) -> Spot {
     let cos_lat = equatorial.length();
     let east = ground.lon_rad - params.terrain_grid.west_rad;
     let x = (east - (east / TAU).floor() * TAU) * params.terrain_grid.cols_per_rad - 0.5;
-    let y = (params.terrain_grid.north_rad - ground.lat_rad) * params.terrain_grid.rows_per_rad - 0.5;
+    let y =
+        (params.terrain_grid.north_rad - ground.lat_rad) * params.terrain_grid.rows_per_rad - 0.5;
     Spot {
         on_ground: true,
         x: axis_at(x),

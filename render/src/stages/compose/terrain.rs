@@ -33,8 +33,7 @@ fn is_inside(params: &Params, x: Axis, y: Axis) -> bool {
     let terrain_grid = &params.terrain_grid;
     let east = x.index as f32 + x.fraction + 0.5;
     let south = y.index as f32 + y.fraction + 0.5;
-    let is_across =
-        terrain_grid.periodic == 1 || (0.0..=terrain_grid.cols as f32).contains(&east);
+    let is_across = terrain_grid.periodic == 1 || (0.0..=terrain_grid.cols as f32).contains(&east);
     is_across && (0.0..=terrain_grid.rows as f32).contains(&south)
 }
 
@@ -126,21 +125,26 @@ pub fn tint(height_m: f32) -> Vec3 {
 #[expect(clippy::float_cmp, reason = "these values are exact")]
 mod tests {
     use super::*;
+    use crate::stages::compose::params::ContextParams;
     use crate::stages::layout::MISSING;
     use crate::stages::params::GridParams;
 
     /// A grid of 8 x 8 cells of a tenth of a radian.
     fn params() -> Params {
-        let mut params = Params::default();
-        params.terrain_grid = GridParams {
-            rows: 8,
-            cols: 8,
-            cols_per_rad: 10.0,
-            rows_per_rad: 10.0,
-            ..GridParams::default()
-        };
-        params.context.terrain_slope = 1.0 / 8.0 / 1000.0;
-        params
+        Params {
+            terrain_grid: GridParams {
+                rows: 8,
+                cols: 8,
+                cols_per_rad: 10.0,
+                rows_per_rad: 10.0,
+                ..GridParams::default()
+            },
+            context: ContextParams {
+                terrain_slope: 1.0 / 8.0 / 1000.0,
+                ..ContextParams::default()
+            },
+            ..Params::default()
+        }
     }
 
     fn at(index: i32, fraction: f32) -> Axis {

@@ -2,7 +2,9 @@
 
 use glam::{Vec2, Vec4};
 
-use crate::stages::layout::{DEPTH_ONE, Entry, KERNEL_BALL, KERNEL_CLOUD, SCREEN_TILE_PX, SUBPIXELS};
+use crate::stages::layout::{
+    DEPTH_ONE, Entry, KERNEL_BALL, KERNEL_CLOUD, SCREEN_TILE_PX, SUBPIXELS,
+};
 use crate::stages::params::Params;
 
 const MOST_SUM: u32 = 0x7fff_ffff;
@@ -52,7 +54,8 @@ pub fn blended(front_to_back: bool, picture: Vec4, sums: [u32; 4]) -> Vec4 {
 pub fn eye(params: &Params, list_ends: &[u32], entries: &[Entry], picture: &mut [Vec4]) {
     for tile_y in 0..params.view.tiles.y {
         for tile_x in 0..params.view.tiles.x {
-            let first_list = ((tile_y * params.view.tiles.x + tile_x) * params.view.slices) as usize;
+            let first_list =
+                ((tile_y * params.view.tiles.x + tile_x) * params.view.slices) as usize;
             let first = if first_list == 0 {
                 0
             } else {
@@ -104,7 +107,8 @@ fn add(params: &Params, entry: &Entry, sums: &mut Sums) {
             let center = Vec2::new(x as f32 + 0.5, y as f32 + 0.5) * pixel_units;
             let offset = (center - Vec2::new(east, south)) * inverse_radius;
             let q = offset.dot(offset);
-            let amount = (depth * weight_at(params.lists.kernel, q, radius / pixel_units) + 0.5) as u32;
+            let amount =
+                (depth * weight_at(params.lists.kernel, q, radius / pixel_units) + 0.5) as u32;
             let sum = &mut sums[y * TILE + x];
             for (channel, plain) in rgb.into_iter().enumerate() {
                 let lit = if params.lists.kernel == KERNEL_BALL {

@@ -8,7 +8,9 @@ use crate::error::RenderError;
 use crate::frame_context::FrameContext;
 use crate::gpu::{Gpu, Kernel, Slot};
 use crate::stages::compose;
-use crate::stages::layout::{KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, MOST_HOT_PARTS, NEVER_LONG, SCREEN_TILE_PX};
+use crate::stages::layout::{
+    KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, MOST_HOT_PARTS, NEVER_LONG, SCREEN_TILE_PX,
+};
 use crate::stages::params::Uniform::Lists;
 use crate::stages::sizes::list_count;
 

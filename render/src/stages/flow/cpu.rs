@@ -111,12 +111,14 @@ fn dot_of(params: &Params, palette: &[u32], trail: &Trail, number: u32, speed: f
     let row = trail.row as i32 + trail.place.y.floor() as i32;
     let row = row.clamp(0, params.grid.rows as i32 - 1);
     let taper = (number + 1) as f32 / params.cells.particles_each as f32;
-    let position = ((speed - params.values.transfer_low) * params.values.transfer_per_unit).clamp(0.0, 1.0);
+    let position =
+        ((speed - params.values.transfer_low) * params.values.transfer_per_unit).clamp(0.0, 1.0);
     let alive = (trail.age / TRAIL).min(1.0) * ((1.0 - trail.age) * FADING).clamp(0.0, 1.0);
     let spacing_px =
         speed.min(params.flow.most_m_s) * params.flow.px_per_m_s * dot_share(params, trail.age);
     let at_color = nearest(position * 255.0) as usize;
-    let mut opacity = params.particles.depth_floor + (1.0 - params.particles.depth_floor) * position.sqrt();
+    let mut opacity =
+        params.particles.depth_floor + (1.0 - params.particles.depth_floor) * position.sqrt();
     if params.values.has_shape == 1 {
         opacity = (palette[256 + at_color] & 0xffff) as f32 / 65535.0;
     }

@@ -31,7 +31,9 @@ impl Flow {
     /// Compiles `source`, [`SOURCE`] but for tests.
     pub fn new(gpu: &Gpu, source: &str) -> Self {
         Self {
-            velocities: gpu.kernel("velocities", source, "velocities").reading(&[Grid, Values]),
+            velocities: gpu
+                .kernel("velocities", source, "velocities")
+                .reading(&[Grid, Values]),
         }
     }
 

@@ -53,7 +53,9 @@ impl Light {
     /// Compiles an entry point of `source`, [`SOURCE`] but for tests.
     pub fn of(gpu: &Gpu, source: &str, entry: &str) -> Self {
         Self {
-            prefix: gpu.kernel("light", source, entry).reading(&[View, Lighting]),
+            prefix: gpu
+                .kernel("light", source, entry)
+                .reading(&[View, Lighting]),
             columns: if entry == STRAIGHT { GROUP } else { 32 },
         }
     }

@@ -105,13 +105,14 @@ fn color_at(params: &Params, inputs: &Inputs<'_>, [x, y]: [Axis; 2], pixel: [u32
         x.fraction,
     );
     let value = mix(north, south, y.fraction);
-    let mut alpha =
-        params.thematic.alpha * ((value.y - 0.5) * params.thematic.edge_sharpness + 0.5).clamp(0.0, 1.0);
+    let mut alpha = params.thematic.alpha
+        * ((value.y - 0.5) * params.thematic.edge_sharpness + 0.5).clamp(0.0, 1.0);
     if alpha <= 0.0 {
         return Vec4::ZERO;
     }
-    let position =
-        ((value.x / value.y - params.values.transfer_low) * params.values.transfer_per_unit).clamp(0.0, 1.0);
+    let position = ((value.x / value.y - params.values.transfer_low)
+        * params.values.transfer_per_unit)
+        .clamp(0.0, 1.0);
     let at = nearest(position * 255.0) as usize;
     if params.values.has_shape == 1 {
         alpha *= (palette[256 + at] & 0xffff) as f32 / 65535.0;

@@ -26,7 +26,9 @@ impl Map {
     /// Compiles `source`, [`SOURCE`] but for tests.
     pub fn new(gpu: &Gpu, source: &str) -> Self {
         Self {
-            map: gpu.kernel("map", source, "map").reading(&[View, Grid, Values, Thematic]),
+            map: gpu
+                .kernel("map", source, "map")
+                .reading(&[View, Grid, Values, Thematic]),
         }
     }
 

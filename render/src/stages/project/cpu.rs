@@ -120,8 +120,7 @@ fn on_globe(params: &Params, row: &Row, col: &Col, particle: &Particle) -> Splat
         return Splat::default();
     }
     let scale = view.focal_px / ahead;
-    let x = sight.dot(view.right) * scale
-        + view.center_px.x;
+    let x = sight.dot(view.right) * scale + view.center_px.x;
     let y = view.center_px.y - sight.dot(view.up) * scale;
     let oblique = (sight.length() / ahead).sqrt();
     let full_px = row.radius * scale * oblique;
@@ -131,20 +130,15 @@ fn on_globe(params: &Params, row: &Row, col: &Col, particle: &Particle) -> Splat
     }
     let radius_px = radius_px.max(projection.min_radius_px);
     let thinned = full_px / radius_px;
-    let u =
-        place.dot(projection.light_u) - projection.light_u0;
-    let v =
-        place.dot(projection.light_v) - projection.light_v0;
+    let u = place.dot(projection.light_u) - projection.light_u0;
+    let v = place.dot(projection.light_v) - projection.light_v0;
     let to_light = projection.light_texels_per_unit * params.lighting.unit as f32;
     Splat {
         x_sub: nearest(x * SUBPIXELS as f32) - view.origin_px.x * SUBPIXELS,
         y_sub: nearest(y * SUBPIXELS as f32) - view.origin_px.y * SUBPIXELS,
         radius_px,
         tau: particle.depth * row.depth_gain * thinned * thinned,
-        slice: slice_of(
-            params,
-            place.dot(projection.half),
-        ),
+        slice: slice_of(params, place.dot(projection.half)),
         light_u: nearest(u * to_light),
         light_v: nearest(v * to_light),
         light_depth: particle.depth

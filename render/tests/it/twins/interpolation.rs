@@ -1,9 +1,9 @@
 //! Interpolation and its twin.
 
 use render::gpu::Slot;
+use render::stages::interpolate::params::InterpolateParams;
 use render::stages::interpolate::{self, Interpolate};
 use render::stages::layout::MISSING;
-use render::stages::interpolate::params::InterpolateParams;
 
 use super::{Twins, prove};
 use crate::compare::worst;

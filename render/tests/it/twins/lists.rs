@@ -100,7 +100,11 @@ fn the_lists_hold_every_stored_splat_once_and_in_its_light() {
             |gpu, source| distance(gpu, source, (scatter::SOURCE, SHARED_PROBES)),
         );
         for (probes, right, wrong) in [
-            (SHARED_PROBES, "vec2(exp(-depth), 1.0)", "vec2(exp(depth), 1.0)"),
+            (
+                SHARED_PROBES,
+                "vec2(exp(-depth), 1.0)",
+                "vec2(exp(depth), 1.0)",
+            ),
             (
                 SHARED_PROBES,
                 "atomicAdd(&counts[tag - 1u], atomicLoad",

@@ -24,9 +24,9 @@ use render::stages::compose::in_context::Surroundings;
 use render::stages::flow::cpu::Field;
 use render::stages::flow::{self};
 use render::stages::layout::{Active, Entry, KERNEL_CLOUD, LIGHT_OWN, Particle, Splat, Velocity};
-use render::stages::params::Params;
 use render::stages::light;
 use render::stages::map::{self};
+use render::stages::params::Params;
 use render::stages::particles::cpu::Inputs;
 use render::stages::sizes::{HALF_BYTES, list_count, stored_at, texel_count};
 use render::stages::{compose, eye, interpolate, particles, project, uncertainty};
@@ -88,7 +88,11 @@ impl Twins {
         let value = between(&params, Some(&scene.value), params.values.weight);
         let carbon = scene.accumulated.as_ref();
         let accumulated = between(&params, carbon, params.values.accumulated_weight);
-        let northward = between(&params, scene.northward.as_ref(), params.values.northward_weight);
+        let northward = between(
+            &params,
+            scene.northward.as_ref(),
+            params.values.northward_weight,
+        );
         let uncertainty = uncertainty::between(&params, &scene.value);
         let mut particles =
             vec![Particle::default(); plan.active.len() * params.cells.particles_per_cell as usize];

@@ -132,13 +132,9 @@ fn the_eye_composes_in_surroundings_as_its_twin_does() {
         };
         let (right, wrong) = ("color += ground_color", "color -= ground_color");
         for entry in [eye::SHARED, eye::ALONE] {
-            prove(
-                "eye",
-                eye::SOURCE,
-                right,
-                wrong,
-                |gpu, source| distance(gpu, source, entry),
-            );
+            prove("eye", eye::SOURCE, right, wrong, |gpu, source| {
+                distance(gpu, source, entry)
+            });
         }
     }
 }
