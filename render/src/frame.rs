@@ -14,7 +14,7 @@ use crate::stages::compose::Compose;
 use crate::stages::eye::Eye;
 use crate::stages::flow::Flow;
 use crate::stages::interpolate::Interpolate;
-use crate::stages::layout::{Entry, LIGHT_ALONE, LIGHT_OWN, Params};
+use crate::stages::layout::{Entry, LIGHT_ALONE, LIGHT_OWN};
 use crate::stages::light::Light;
 use crate::stages::map::Map;
 use crate::stages::sizes::{light_bytes, list_count};
@@ -68,7 +68,7 @@ impl Stages {
             } else {
                 self.splats.record(frame)?;
             }
-            if frame.params.light_on == LIGHT_OWN {
+            if frame.params.lighting.mode == LIGHT_OWN {
                 self.light.record(frame)?;
             }
             self.bin.record(frame)?;
@@ -93,7 +93,7 @@ impl Stages {
         stamps: Option<&'a Stamps>,
     ) -> Result<FrameContext<'a>, RenderError> {
         let mut params = plan.params_of(part);
-        params.entry_capacity = capacity;
+        params.lists.entry_capacity = capacity;
         let mut frame = FrameContext::new(gpu, workspace, plan, params, scene.clone())?;
         if let Some(stamps) = stamps {
             frame.recorder.stamp(stamps);
@@ -111,10 +111,8 @@ impl Stages {
         plan: &Plan,
         scene: &SceneBuffers,
     ) -> Result<wgpu::Buffer, RenderError> {
-        let params = Params {
-            light_on: LIGHT_ALONE,
-            ..plan.params_of(Part::NONE)
-        };
+        let mut params = plan.params_of(Part::NONE);
+        params.lighting.mode = LIGHT_ALONE;
         let light = gpu.room("shared light", light_bytes(&params))?;
         let scene = SceneBuffers {
             light: Some(light.clone()),
@@ -138,10 +136,10 @@ impl Stages {
         scene: &SceneBuffers,
     ) -> Result<Vec<u8>, RenderError> {
         let params = plan.params_of(part);
-        if params.splat_count == 0
+        if params.cells.splat_count == 0
             && plan.mode != Mode::Map
-            && params.surface == 0
-            && params.in_context == 0
+            && params.context.surface == 0
+            && !params.in_context
         {
             return Ok(vec![
                 0;
@@ -149,7 +147,8 @@ impl Stages {
             ]);
         }
         let entry_bytes = size_of::<Entry>() as u64;
-        let first = (u64::from(params.splat_count) * FIRST_ENTRIES_PER_PARTICLE).max(FIRST_ENTRIES);
+        let first =
+            (u64::from(params.cells.splat_count) * FIRST_ENTRIES_PER_PARTICLE).max(FIRST_ENTRIES);
         let mut capacity = (workspace.room_bytes(Slot::Entries) / entry_bytes).max(first);
         loop {
             let room = capacity.min(gpu.most_buffer_bytes() / entry_bytes) as u32;

@@ -4,12 +4,16 @@
 //! All keep sums for a workgroup's neighbours in a small table (`tally.wgsl`) and store splats in one order (`order.wgsl`); first
 //! passes store alike (`store.wgsl`).
 
+pub mod cells;
 pub mod scatter;
 pub mod splat;
 mod store;
 pub mod trails;
 
 use crate::gpu::{Gpu, Kernel};
+
+/// Which cells the passes draw, and where they store their splats.
+pub const CELLS: &str = include_str!("order.wgsl");
 
 /// Probes of the table of sums that are shared with neighbours: after so many a key has no slot.
 pub const SHARED_PROBES: u32 = 12;

@@ -8,7 +8,7 @@ use glam::{DVec2, DVec3};
 
 use super::footprint::{self, Footprint};
 use super::look;
-use crate::stages::layout::Params;
+use crate::stages::params::ViewParams;
 
 /// What is nearer to the camera than this share of twice its height is not drawn; `project.wgsl` has the same.
 const NEAR_SHARE: f64 = 0.01;
@@ -115,32 +115,12 @@ impl Camera {
     }
 
     /// Sets what the stages need of it.
-    pub(super) fn write(&self, params: &mut Params) {
-        params.focal_px = self.focal_px as f32;
-        write(
-            self.place,
-            [&mut params.eye_x, &mut params.eye_y, &mut params.eye_z],
-        );
-        write(
-            self.right,
-            [
-                &mut params.right_x,
-                &mut params.right_y,
-                &mut params.right_z,
-            ],
-        );
-        write(
-            self.top,
-            [&mut params.up_x, &mut params.up_y, &mut params.up_z],
-        );
-        write(
-            self.forward,
-            [
-                &mut params.forward_x,
-                &mut params.forward_y,
-                &mut params.forward_z,
-            ],
-        );
+    pub(super) fn write(&self, view: &mut ViewParams) {
+        view.focal_px = self.focal_px as f32;
+        view.eye = self.place.as_vec3();
+        view.right = self.right.as_vec3();
+        view.up = self.top.as_vec3();
+        view.forward = self.forward.as_vec3();
     }
 
     /// Places with a coordinate of at least 0 are far enough ahead to be drawn.
@@ -198,12 +178,5 @@ impl Camera {
     /// Looks straight down?
     pub(super) fn is_upright(&self) -> bool {
         self.tilt == 0.0
-    }
-}
-
-/// Sets three parameters from a vector.
-pub(super) fn write(vector: DVec3, fields: [&mut f32; 3]) {
-    for (field, value) in fields.into_iter().zip(vector.to_array()) {
-        *field = value as f32;
     }
 }

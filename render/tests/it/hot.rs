@@ -70,15 +70,15 @@ fn draw(
 ) -> Drawn {
     let mut workspace = Workspace::default();
     let mut params = plan.params_of(plan.whole());
-    params.entry_capacity = params.splat_count * 8;
-    params.long_list = long_list;
+    params.lists.entry_capacity = params.cells.splat_count * 8;
+    params.lists.long_list = long_list;
     let mut frame = FrameContext::new(gpu, &mut workspace, plan, params, scene.clone()).unwrap();
-    let entry_bytes = u64::from(params.entry_capacity) * size_of::<Entry>() as u64;
+    let entry_bytes = u64::from(params.lists.entry_capacity) * size_of::<Entry>() as u64;
     frame.room(Slot::Entries, entry_bytes).unwrap();
     let part_bytes = u64::from(1 + MOST_HOT_PARTS) * 4;
     frame.room(Slot::HotParts, part_bytes).unwrap();
     Splats::new(gpu).record(&mut frame).unwrap();
-    if params.light_on == 1 {
+    if params.lighting.mode == 1 {
         Light::new(gpu).record(&mut frame).unwrap();
     }
     Bin::new(gpu, sources[0]).record(&mut frame).unwrap();
@@ -152,7 +152,7 @@ fn only_views_of_poles_and_limbs_look_for_long_lists() {
     let is_crowded = |view| {
         let plan = Plan::for_device(&job(Mode::Volume, view), &scene, u64::MAX).unwrap();
         assert_eq!(
-            plan.params_of(plan.whole()).long_list == NEVER_LONG,
+            plan.params_of(plan.whole()).lists.long_list == NEVER_LONG,
             !plan.is_crowded
         );
         plan.is_crowded

@@ -18,7 +18,11 @@ fn light_is_given_and_lists_are_counted_as_the_twins_do() {
     for twins in [Twins::tile(), Twins::globe()] {
         let expected: Vec<f32> = twins.deposited.iter().map(|&depth| depth as f32).collect();
         for (probes, right, wrong) in [
-            (SHARED_PROBES, "splat.light_depth - behind", "splat.light_depth"),
+            (
+                SHARED_PROBES,
+                "splat.light_depth - behind",
+                "splat.light_depth",
+            ),
             (
                 NO_PROBES,
                 "atomicAdd(&counts[list], 1u)",

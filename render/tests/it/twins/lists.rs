@@ -52,7 +52,7 @@ fn the_lists_hold_every_stored_splat_once_and_in_its_light() {
             let scatter = Scatter::of(gpu, scatter_source, probes);
             let mut params = twins.params;
             // Rounding may put a few more splats into a list than the twins have.
-            params.entry_capacity += params.entry_capacity / 8 + 1024;
+            params.lists.entry_capacity += params.lists.entry_capacity / 8 + 1024;
             let [first, second] = twins.stored();
             let [seen, lit, above, ends, entries] = twins.run_with(
                 gpu,
@@ -71,7 +71,7 @@ fn the_lists_hold_every_stored_splat_once_and_in_its_light() {
                     (Slot::Counts, u64::from(list_count(&params)) * 4),
                     (
                         Slot::Entries,
-                        u64::from(params.entry_capacity) * size_of::<Entry>() as u64,
+                        u64::from(params.lists.entry_capacity) * size_of::<Entry>() as u64,
                     ),
                 ],
             );
@@ -100,7 +100,11 @@ fn the_lists_hold_every_stored_splat_once_and_in_its_light() {
             |gpu, source| distance(gpu, source, (scatter::SOURCE, SHARED_PROBES)),
         );
         for (probes, right, wrong) in [
-            (SHARED_PROBES, "vec2(exp(-depth), 1.0)", "vec2(exp(depth), 1.0)"),
+            (
+                SHARED_PROBES,
+                "vec2(exp(-depth), 1.0)",
+                "vec2(exp(depth), 1.0)",
+            ),
             (
                 SHARED_PROBES,
                 "atomicAdd(&counts[tag - 1u], atomicLoad",
