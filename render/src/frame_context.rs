@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use bytemuck::Pod;
 
+use crate::coast::land;
 use crate::error::RenderError;
 use crate::gpu::{Gpu, Recorder, Slot, Workspace};
 use crate::plan::Plan;
@@ -122,6 +123,20 @@ impl<'a> FrameContext<'a> {
     ) -> Result<wgpu::Buffer, RenderError> {
         let plan = self.plan.id;
         self.workspace.upload_once(self.gpu, slot, plan, content)
+    }
+
+    /// How much of every place is land, at the plan's level; any buffer where no globe is seen.
+    pub fn land(&mut self) -> Result<wgpu::Buffer, RenderError> {
+        let cols = self.params.context.land_size.x;
+        if cols == 0 {
+            return Ok(self.scene.domain.clone());
+        }
+        let level = land::level_of(cols);
+        let words = &land::COVER[land::words(level)];
+        // Plans count from 1.
+        let owner = u64::MAX - u64::from(level);
+        self.workspace
+            .upload_once(self.gpu, Slot::Land, owner, words)
     }
 
     /// Pixels of the part.

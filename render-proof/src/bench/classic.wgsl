@@ -38,7 +38,7 @@ fn eye_corner(@builtin(vertex_index) vertex: u32, @builtin(instance_index) insta
     var corner: Corner;
     corner.offset = corner_of(vertex);
     corner.position = clip(center + corner.offset * radius, vec2<f32>(view.size_px));
-    corner.color = vec4(min(rgb * shade, vec3(1.0)), f32(near.z >> 16u) / DEPTH_ONE);
+    corner.color = vec4(min(rgb * shade, vec3(1.0)), f32(near.z >> 16u) / lists.depth_one);
     return corner;
 }
 
@@ -65,7 +65,7 @@ fn light_corner(@builtin(vertex_index) vertex: u32, @builtin(instance_index) ins
     let radius = LIGHT_RADIUS_TEXELS;
     corner.position = clip(center + corner.offset * radius, vec2<f32>(lighting.size));
     let radius_px = f32((near.z & 0xffffu) << lists.entry_shift) / f32(SUBPIXELS);
-    let mass = f32(near.z >> 16u) / DEPTH_ONE * radius_px * radius_px * LIGHT_GAIN;
+    let mass = f32(near.z >> 16u) / lists.depth_one * radius_px * radius_px * LIGHT_GAIN;
     corner.color = vec4(mass * 3.0 / (3.14159265 * radius * radius));
     return corner;
 }

@@ -1,6 +1,7 @@
 //! How much of every place of the earth is land, as grids of bytes from fine to coarse: what a globe shows below its
 //! particles, whatever data there are.
 
+use std::ops::Range;
 use std::sync::LazyLock;
 
 use contract::land::LAND;
@@ -38,8 +39,23 @@ pub fn size(level: u32) -> [u32; 2] {
 }
 
 /// The first word of a level.
-pub fn first_word(level: u32) -> u32 {
+fn first_word(level: u32) -> u32 {
     (0..level).map(|finer| size(finer).iter().product::<u32>() / 4).sum()
+}
+
+/// Cells of a level for each radian.
+pub fn per_rad(level: u32) -> f64 {
+    f64::from(FINEST_PER_DEG >> level).to_degrees()
+}
+
+/// The words of a level.
+pub fn words(level: u32) -> Range<usize> {
+    first_word(level) as usize..first_word(level + 1) as usize
+}
+
+/// The level with so many columns.
+pub fn level_of(cols: u32) -> u32 {
+    (360 * FINEST_PER_DEG / cols.max(1)).ilog2()
 }
 
 /// The level whose cells are about as large as a pixel, or a little larger.

@@ -12,6 +12,7 @@ use super::extent::Extent;
 use super::footprint::Footprint;
 use super::look::{self, Look};
 use super::{Plan, area_m2, cell_px, entry_shift, flow, height_range_m};
+use crate::coast::land;
 use crate::scene::Scene;
 use crate::stages::interpolate::params::InterpolateParams;
 use crate::stages::layout::{Col, LIGHT_OFF, Row, VIEW_GLOBE};
@@ -58,6 +59,11 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) {
     params.projection.per_earth_radius_m = (1.0 / SPHERE_RADIUS_M) as f32;
     params.view.center_px = UVec2::new(width_px, height_px).as_vec2() / 2.0;
     camera.write(&mut params.view);
+    if job.style.globe_surface {
+        let level = land::level(camera.focal_px / camera.nearest * 1f64.to_radians());
+        params.context.land_size = land::size(level).into();
+        params.context.land_per_rad = land::per_rad(level) as f32;
+    }
     let sun = camera.sun(job);
     params.view.sun = sun.as_vec3();
     if job.mode == Mode::Map {

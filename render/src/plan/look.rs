@@ -55,6 +55,34 @@ const CLOUDS_OVER_A_POINT: f64 = 50.0;
 /// Radius of the largest clouds over the side of a cell: larger ones would blur what the grid resolves.
 const WIDEST_CELLS: f64 = 1.6;
 
+/// Whole numbers that sums of the light and the eye may reach.
+const MOST_SUM: f64 = 2_147_483_648.0;
+/// Depth of a whole beam of light over that of a cell's column at most: along the sheet of particles at the limb it is
+/// some fifty times as deep.
+const DEEPEST_BEAM: f64 = 512.0;
+/// Largest number that an entry has for the depth of a splat.
+const MOST_ENTRY_DEPTH: f64 = 65_535.0;
+/// Optical depth 1 in the integers of the eye: coarser than the first, thick splats would be rounded; finer than the
+/// second, slices that are no thicker than they may be would reach the end of their sums.
+const EYE_ONE: [f64; 2] = [4096.0, 65_536.0];
+
+/// Optical depth 1 in the integers that the light sums up, a power of two: as fine as sums of a beam allow, so that the
+/// share of each of very many thin particles counts. The same for all pictures of a style.
+pub(super) fn light_one(style_depth: f64) -> f32 {
+    let deepest = DEEPEST_BEAM * LIGHT_DEPTH * style_depth.max(0.01);
+    power_of_two((MOST_SUM / deepest).clamp(4096.0, 16_777_216.0))
+}
+
+/// The same in the integers that the eye sums up, for splats of at most this depth.
+pub(super) fn eye_one(deepest_splat: f64) -> f32 {
+    let [coarsest, finest] = EYE_ONE;
+    power_of_two((MOST_ENTRY_DEPTH / deepest_splat.max(1e-3)).clamp(coarsest, finest))
+}
+
+fn power_of_two(most: f64) -> f32 {
+    most.log2().floor().exp2() as f32
+}
+
 /// How particles of one mode look.
 pub(super) struct Look {
     /// Radius over the side of a cell; for clouds the least.

@@ -53,6 +53,8 @@ const BAND_ROWS: u32 = 256;
 const LEAST_LONG_LIST: u32 = 2048;
 /// A list is long that holds so many times the particles that all screen tiles would have if they had the same.
 const LONG_OVER_FAIR: u32 = 4;
+/// Largest share of its depth that a particle has at a place in its column.
+const MOST_ENVELOPE: f64 = 12.0 / 11.0;
 /// Particles that one invocation makes, unless cells hold fewer: neighbours share sums, more of them share better.
 const PARTICLES_EACH: u32 = 4;
 
@@ -125,6 +127,7 @@ impl Plan {
         Self::check(job, scene)?;
         let mut plan = Self::viewed(job, scene);
         context::plan(&mut plan, job, scene);
+        plan.choose_units(job);
         plan.count_particles(most_buffer_bytes)?;
         plan.choose_band(most_buffer_bytes, most_held_bytes)?;
         Ok(plan)
@@ -173,6 +176,19 @@ impl Plan {
     /// Cells of a frame that are on the device while this is drawn, whole rows of them.
     pub fn held_cells(&self) -> Range<usize> {
         self.params.grid.held_first_cell as usize..self.params.grid.held_end_cell as usize
+    }
+
+    /// Whole numbers that depths are summed up in: by what all pictures of a style or of a zoom level share, so that
+    /// neighbours round alike.
+    fn choose_units(&mut self, job: &RenderJob) {
+        let style_depth = job.style.optical_depth;
+        let gain = self.rows.iter().map(|row| f64::from(row.depth_gain));
+        let gain = gain.fold(0.0, f64::max);
+        let thinnest = 1.0 - f64::from(self.params.projection.size_spread);
+        let params = &mut self.params;
+        params.lighting.depth_one = look::light_one(style_depth);
+        params.lists.depth_one =
+            look::eye_one(style_depth * gain * MOST_ENVELOPE / (thinnest * thinnest).max(1e-3));
     }
 
     fn choose_band(

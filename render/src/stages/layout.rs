@@ -10,8 +10,6 @@ pub const SCREEN_TILE_PX: u32 = 16;
 pub const SCREEN_TILE_SHIFT: u32 = 8;
 /// Positions on the screen are whole multiples of this part of a pixel, so that no two tiles round them differently.
 pub const SUBPIXELS: i32 = 16;
-/// Optical depth 1 in the integers that light and eye sum up.
-pub const DEPTH_ONE: f32 = 4096.0;
 /// `ListParams::long_list`: no list is cut into parts.
 pub const NEVER_LONG: u32 = u32::MAX;
 /// Entries of a part of a long list.
@@ -149,7 +147,7 @@ shared_struct! {
         /// Centre from the screen tile's corner, east in the low and south in the high 16 bits, both signed, in
         /// subpixels shifted right by `ListParams::entry_shift`.
         pub place: u32,
-        /// Radius in the same unit in the low 16 bits, optical depth at the centre times [`DEPTH_ONE`] in the high.
+        /// Radius in the same unit in the low 16 bits, optical depth at the centre times `depth_one` of the lists in the high.
         pub size: u32,
         /// Red, green, blue, slice; 8 bits each, red lowest.
         pub color: u32,

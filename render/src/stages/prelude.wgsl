@@ -56,7 +56,6 @@ const SQUARE: u32 = 16u;
 const SCREEN_TILE_PX: u32 = 16u;
 const SCREEN_TILE_SHIFT: u32 = 8u;
 const SUBPIXELS: i32 = 16;
-const DEPTH_ONE: f32 = 4096.0;
 const PART_ENTRIES: u32 = 1024u;
 const MOST_HOT_PARTS: u32 = 4096u;
 const NO_LIST: u32 = 0xffffffffu;

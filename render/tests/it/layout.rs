@@ -7,7 +7,7 @@ use render::passes::{scatter, splat, trails};
 use render::stages::fill::level::{FillLevel, MOST_REACH_COLS};
 use render::stages::fill::{self, exact, window};
 use render::stages::layout::{
-    Axis, Col, DEPTH_ONE, Entry, GROUP, GroundAxis, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT,
+    Axis, Col, Entry, GROUP, GroundAxis, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT,
     LIGHT_ALONE, LIGHT_GIVEN, LIGHT_OFF, LIGHT_OWN, LOOK, MISSING, MOST_HOT_PARTS, NO_LIST,
     PART_ENTRIES, Particle, Row, SCREEN_TILE_PX, SCREEN_TILE_SHIFT, SQUARE, SUBPIXELS, Splat,
     VIEW_GLOBE, VIEW_TILE, Velocity, WATER_BLUE, WATER_GREEN, WATER_RED,
@@ -208,7 +208,6 @@ fn constants_have_the_same_value_in_rust_and_wgsl() {
         ("SCREEN_TILE_PX", f64::from(SCREEN_TILE_PX)),
         ("SCREEN_TILE_SHIFT", f64::from(SCREEN_TILE_SHIFT)),
         ("SUBPIXELS", f64::from(SUBPIXELS)),
-        ("DEPTH_ONE", f64::from(DEPTH_ONE)),
         ("PART_ENTRIES", f64::from(PART_ENTRIES)),
         ("MOST_HOT_PARTS", f64::from(MOST_HOT_PARTS)),
         ("NO_LIST", f64::from(NO_LIST)),

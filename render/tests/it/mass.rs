@@ -4,7 +4,7 @@ use contract::earth::Earth;
 use contract::job::Mode;
 use render::plan::Plan;
 use render::stages::interpolate::cpu::interpolated;
-use render::stages::layout::{DEPTH_ONE, Particle, Splat, is_missing};
+use render::stages::layout::{Particle, Splat, is_missing};
 use render::stages::params::Params;
 use render::stages::sizes::texel_count;
 use render::stages::{light, particles, project};
@@ -109,9 +109,9 @@ fn the_light_buffer_holds_the_depth_of_every_particle_to_the_last_integer() {
         .map(|splat| f64::from(splat.light_depth))
         .sum();
     let shown = drawn.splats.iter().filter(|splat| splat.tau > 0.0).count();
-    let kept = held(&all) as f64 / f64::from(DEPTH_ONE);
+    let kept = held(&all) as f64 / f64::from(drawn.params.lighting.depth_one);
     println!("depth given {given:.6}, kept {kept:.6}, {shown} particles");
-    let rounding = 8.0 * 0.5 * shown as f64 / f64::from(DEPTH_ONE);
+    let rounding = 8.0 * 0.5 * shown as f64 / f64::from(drawn.params.lighting.depth_one);
     assert!((kept - given).abs() < rounding && (kept / given - 1.0).abs() < 2e-3);
 
     // The layer behind the last slice holds twice everything.

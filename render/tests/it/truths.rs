@@ -9,7 +9,7 @@ use render::pyramid::coarser;
 use render::scene::{Frame, Interval, Scene};
 use render::stages::interpolate::cpu::interpolated;
 use render::stages::layout::{
-    Active, Col, DEPTH_ONE, Entry, KERNEL_CLOUD, MISSING, Particle, Row, SCREEN_TILE_PX, SUBPIXELS,
+    Active, Col, Entry, KERNEL_CLOUD, MISSING, Particle, Row, SCREEN_TILE_PX, SUBPIXELS,
     Splat, VIEW_GLOBE, is_missing,
 };
 use render::stages::light::params::LightParams;
@@ -211,6 +211,7 @@ fn a_uniform_slab_dims_light_as_exp_of_minus_its_depth() {
         unit: 16,
         ambient: 0.0,
         direct: 1.0,
+        depth_one: 4096.0,
         ..LightParams::default()
     };
     let per_slice = depth / slices as f32;
@@ -231,7 +232,7 @@ fn a_uniform_slab_dims_light_as_exp_of_minus_its_depth() {
     let mut buffer = vec![0; texel_count(&params)];
     light::cpu::deposit(&params, &splats, &mut buffer);
     let given: f64 =
-        buffer.iter().map(|&depth| f64::from(depth)).sum::<f64>() / f64::from(DEPTH_ONE);
+        buffer.iter().map(|&depth| f64::from(depth)).sum::<f64>() / f64::from(params.lighting.depth_one);
     let had = splats.len() as f64 * f64::from(per_slice);
     assert!(
         (given / had - 1.0).abs() < 1e-3,

@@ -9,7 +9,8 @@ use crate::error::RenderError;
 use crate::frame_context::FrameContext;
 use crate::gpu::{Gpu, Kernel};
 use crate::passes::store::Stored;
-use crate::stages::layout::{DEPTH_ONE, SUBPIXELS, Splat};
+use crate::stages::bin::params::ListParams;
+use crate::stages::layout::{SUBPIXELS, Splat};
 use crate::stages::params::Uniform::{
     Cells, Grid, Lighting, Lists, Particles, Projection, Values, View,
 };
@@ -38,12 +39,12 @@ pub struct Splats {
 }
 
 /// A splat as a device stores it: the words of both halves, as `splat.wgsl` writes them.
-pub fn unpacked(seen: [u32; 4], lit: [u32; 4], entry_shift: u32) -> Splat {
+pub fn unpacked(seen: [u32; 4], lit: [u32; 4], lists: &ListParams) -> Splat {
     Splat {
         x_sub: seen[0] as i32,
         y_sub: seen[1] as i32,
-        radius_px: ((seen[2] & 0xffff) << entry_shift) as f32 / SUBPIXELS as f32,
-        tau: (seen[2] >> 16) as f32 / DEPTH_ONE,
+        radius_px: ((seen[2] & 0xffff) << lists.entry_shift) as f32 / SUBPIXELS as f32,
+        tau: (seen[2] >> 16) as f32 / lists.depth_one,
         slice: f32::from_bits(lit[2]),
         light_u: lit[0] as i32,
         light_v: lit[1] as i32,

@@ -1,11 +1,11 @@
 //! CPU twin of `reach.wgsl`, `bin.wgsl` and of the second half of the sort in `scatter.wgsl`.
 
 use crate::stages::layout::{
-    DEPTH_ONE, Entry, KERNEL_CLOUD, SCREEN_TILE_SHIFT, SUBPIXELS, Splat, nearest,
+    Entry, KERNEL_CLOUD, SCREEN_TILE_SHIFT, SUBPIXELS, Splat, nearest,
 };
 use crate::stages::params::Params;
 
-const MOST_DEPTH: f32 = 15.0;
+const MOST_DEPTH: f32 = 65_535.0;
 
 fn radius_of(params: &Params, splat: &Splat) -> i32 {
     (nearest(splat.radius_px * SUBPIXELS as f32) >> params.lists.entry_shift).max(1)
@@ -20,7 +20,7 @@ fn depth_of(params: &Params, splat: &Splat) -> u32 {
         let wider = splat.radius_px / rounded_px;
         tau *= wider * wider;
     }
-    (tau.min(MOST_DEPTH) * DEPTH_ONE + 0.5) as u32
+    ((tau * params.lists.depth_one).min(MOST_DEPTH) + 0.5) as u32
 }
 
 /// Screen tiles a splat touches, as half-open ranges of columns and rows.

@@ -10,5 +10,7 @@ shared_struct! {
         pub entry_capacity: u32,
         /// Lists of more entries are summed up in parts.
         pub long_list: u32,
+        /// Optical depth 1 in the integers that the eye sums up.
+        pub depth_one: f32,
     }
 }

@@ -2,7 +2,7 @@
 // that those who count and those who scatter entries cannot disagree.
 
 // Depth of one splat at one pixel: a colour sum of the eye grows by less than 2^24 at once and cannot wrap.
-const MOST_DEPTH = 15.0;
+const MOST_DEPTH = 65535.0;
 
 // First and last screen tile that a splat touches, x and y; empty if it touches none.
 struct Reach { low: vec2<i32>, high: vec2<i32> }
@@ -16,7 +16,7 @@ fn size_word(splat: Splat) -> u32 {
         let wider = splat.radius_px / (f32(radius << lists.entry_shift) / f32(SUBPIXELS));
         tau *= wider * wider;
     }
-    let depth = u32(min(tau, MOST_DEPTH) * DEPTH_ONE + 0.5);
+    let depth = u32(min(tau * lists.depth_one, MOST_DEPTH) + 0.5);
     if (splat.tau <= 0.0 || depth == 0u) { return 0u; }
     return u32(radius) | (depth << 16u);
 }

@@ -6,9 +6,7 @@ fn surface_below(pixel: vec2<u32>) -> vec4<f32> {
     let ground = ground_below(pixel);
     let cover = clamp(ground.rim_px + 0.5, 0.0, 1.0);
     if (!ground.on_ground) { return vec4(AIR * 0.5, 1.0) * cover; }
-    var color = SEA;
-    if (is_land(ground.lon, ground.lat)) { color = LAND; }
-    let lit = color * sunlight(dot(ground.normal, view.sun));
+    let lit = plain(ground.lon, ground.lat, SEA, pixel) * sunlight(dot(ground.normal, view.sun));
     return vec4(hazy(lit, ground.normal), 1.0) * cover;
 }
 

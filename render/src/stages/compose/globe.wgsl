@@ -1,10 +1,41 @@
 // What is seen of a plain globe, and a colour as bytes. Reads `domain`.
+@group(0) @binding(11) var<storage, read> land: array<u32>;
+
 const LAND = vec3(0.36, 0.38, 0.40);
 const SEA = vec3(0.035, 0.075, 0.14);
 const AIR = vec3(0.30, 0.50, 0.80);
+// Sea that the product has no data of is hatched, so much lighter.
+const HATCH = vec3(0.05, 0.06, 0.07);
+const HATCH_PX = 8;
+const HATCH_LINE_PX = 2;
 
-// Sea where the product has data in some step and outside its grid, land elsewhere.
-fn is_land(lon: f32, lat: f32) -> bool {
+fn land_cell(col: i32, row: i32) -> f32 {
+    let size = vec2<i32>(context.land_size);
+    let at = u32(clamp(row, 0, size.y - 1) * size.x + (col % size.x + size.x) % size.x);
+    return f32((land[at / 4u] >> (at % 4u * 8u)) & 255u) / 255.0;
+}
+
+// Share of a place that is land, between four cells.
+fn land_share(lon: f32, lat: f32) -> f32 {
+    let place = vec2(lon, -lat) * context.land_per_rad + vec2<f32>(context.land_size) * 0.5 - 0.5;
+    let index = floor(place);
+    let part = place - index;
+    let cell = vec2<i32>(index);
+    let north = mix(land_cell(cell.x, cell.y), land_cell(cell.x + 1, cell.y), part.x);
+    let south = mix(land_cell(cell.x, cell.y + 1), land_cell(cell.x + 1, cell.y + 1), part.x);
+    return mix(north, south, part.y);
+}
+
+// The plain globe in even light: land where land is, sea of a colour, hatched where the product has no data.
+fn plain(lon: f32, lat: f32, water: vec3<f32>, pixel: vec2<u32>) -> vec3<f32> {
+    var sea = water;
+    let place = vec2<i32>(pixel) + view.origin_px;
+    if ((place.x + place.y) % HATCH_PX < HATCH_LINE_PX && is_unsampled(lon, lat)) { sea += HATCH; }
+    return mix(sea, LAND, land_share(lon, lat));
+}
+
+// Does the product have no data there, at any step, though its grid goes there?
+fn is_unsampled(lon: f32, lat: f32) -> bool {
     let east = lon - grid.west_rad;
     let col = i32(floor((east - floor(east / TURN) * TURN) * grid.cols_per_rad));
     let row = i32(floor((grid.north_rad - lat) * grid.rows_per_rad));

@@ -4,7 +4,7 @@ use std::f32::consts::TAU;
 
 use glam::{Vec2, Vec3, Vec4};
 
-use super::cpu::{AIR, LAND, SEA, bytes_of, hazy, is_land, sunlight};
+use super::cpu::{AIR, SEA, bytes_of, hazy, plain, sunlight};
 use super::terrain::{Ground, ground_at, tint};
 use crate::stages::layout::{Axis, GroundAxis, VIEW_TILE, WATER_BLUE, WATER_GREEN, WATER_RED};
 use crate::stages::params::Params;
@@ -133,7 +133,12 @@ fn lit_terrain(params: &Params, ground: &Ground, sun: Vec3) -> Vec3 {
     mix(WATER * sunlight(sun.z), floor_color, kept)
 }
 
-fn ground_color(params: &Params, around: &Surroundings<'_>, spot: &Spot) -> Vec4 {
+fn ground_color(
+    params: &Params,
+    around: &Surroundings<'_>,
+    spot: &Spot,
+    pixel: [u32; 2],
+) -> Vec4 {
     if params.context.surface == 0 {
         return Vec4::ZERO;
     }
@@ -152,14 +157,13 @@ fn ground_color(params: &Params, around: &Surroundings<'_>, spot: &Spot) -> Vec4
     let lit = if let Some(ground) = ground {
         lit_terrain(params, &ground, spot.sun)
     } else {
-        let color = if is_land(params, around.domain, spot.lon_rad, spot.lat_rad) {
-            LAND
-        } else if params.context.has_water == 1 {
+        let water = if params.context.has_water == 1 {
             WATER
         } else {
             SEA
         };
-        color * sunlight(spot.sun.z)
+        let place = [spot.lon_rad, spot.lat_rad];
+        plain(params, around.domain, place, water, pixel) * sunlight(spot.sun.z)
     };
     hazy(params, lit, spot.normal).extend(1.0) * spot.cover
 }
@@ -205,5 +209,5 @@ fn composed(params: &Params, blended: Vec4, around: &Surroundings<'_>, pixel: [u
     } else {
         color += line * (1.0 - color.w);
     }
-    color + ground_color(params, around, &spot) * (1.0 - color.w)
+    color + ground_color(params, around, &spot, pixel) * (1.0 - color.w)
 }

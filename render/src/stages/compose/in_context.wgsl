@@ -1,7 +1,7 @@
 // A blended colour in its surroundings: coast lines, the terrain through the sea, the night. Bindings are beyond
 // those of the stages that compose.
 struct ContextParams {
-    surface: u32, has_water: u32, night_on: u32, terrain_on: u32, terrain_slope: f32, seabed_per_m: f32, coast_on: u32,
+    land_size: vec2<u32>, land_per_rad: f32, surface: u32, has_water: u32, night_on: u32, terrain_on: u32, terrain_slope: f32, seabed_per_m: f32, coast_on: u32,
     coast_above: u32, coast_grey: f32, coast_alpha: f32, coast_row_words: u32,
 }
 @group(0) @binding(27) var<uniform> context: ContextParams;
@@ -70,7 +70,7 @@ fn lit_terrain(ground: Terrain, sun: vec3<f32>) -> vec3<f32> {
     return mix(water, floor_color, exp(context.seabed_per_m * ground.height_m));
 }
 
-fn ground_color(spot: Spot) -> vec4<f32> {
+fn ground_color(spot: Spot, pixel: vec2<u32>) -> vec4<f32> {
     if (context.surface == 0u) { return vec4(0.0); }
     if (!spot.on_ground) { return vec4(AIR * 0.5, 1.0) * spot.cover; }
     var ground: Terrain;
@@ -83,10 +83,9 @@ fn ground_color(spot: Spot) -> vec4<f32> {
     if (ground.is_known) {
         lit = lit_terrain(ground, spot.sun);
     } else {
-        var color = SEA;
-        if (context.has_water == 1u) { color = vec3(WATER_RED, WATER_GREEN, WATER_BLUE); }
-        if (is_land(spot.lon, spot.lat)) { color = LAND; }
-        lit = color * sunlight(spot.sun.z);
+        var water = SEA;
+        if (context.has_water == 1u) { water = vec3(WATER_RED, WATER_GREEN, WATER_BLUE); }
+        lit = plain(spot.lon, spot.lat, water, pixel) * sunlight(spot.sun.z);
     }
     return vec4(hazy(lit, spot.normal), 1.0) * spot.cover;
 }
@@ -112,6 +111,6 @@ fn in_context(pixel: vec2<u32>, blended: vec4<f32>) -> vec4<f32> {
     } else {
         color += line * (1.0 - color.w);
     }
-    color += ground_color(spot) * (1.0 - color.w);
+    color += ground_color(spot, pixel) * (1.0 - color.w);
     return color;
 }

@@ -15,6 +15,9 @@ use crate::stages::layout::GroundAxis;
 use crate::stages::params::Uniform;
 use crate::stages::params::Uniform::{Context, Grid, TerrainGrid, View};
 
+/// Where the share of land is bound.
+pub(crate) const LAND_BINDING: u32 = 11;
+
 /// The function that the eye runs for its own pixels.
 pub const FUNCTIONS: &str = concat!(
     include_str!("../sphere.wgsl"),
@@ -66,6 +69,7 @@ impl Compose {
         let picture = frame.room(Slot::Picture, 16)?;
         let image = frame.room(Slot::Image, frame.pixel_count() * 4)?;
         let [terrain, axes, coast] = surroundings(frame)?;
+        let land = frame.land()?;
         let kernel = if frame.params.in_context {
             let compiled = || compiled(frame.gpu, &self.source, true);
             self.in_context.get_or_init(compiled)
@@ -79,6 +83,7 @@ impl Compose {
             (5, &terrain),
             (6, &axes),
             (7, &coast),
+            (LAND_BINDING, &land),
         ];
         let groups = frame.params.view.tiles.to_array();
         frame.recorder.dispatch(kernel, &buffers, groups);

@@ -1,8 +1,13 @@
 //! What composition reads: mirrored in `in_context.wgsl`.
 
+use glam::UVec2;
+
 shared_struct! {
     /// What surrounds the particles.
     pub struct ContextParams {
+        /// Columns and rows of the grid that says how much of a place is land.
+        pub land_size: UVec2,
+        pub land_per_rad: f32,
         /// 1: the globe, or the terrain of a tile, is seen.
         pub surface: u32,
         /// 1: the sea has a colour of its own, into which what lies in it fades.

@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec4};
 
 use crate::stages::layout::{
-    DEPTH_ONE, Entry, KERNEL_BALL, KERNEL_CLOUD, SCREEN_TILE_PX, SUBPIXELS,
+    Entry, KERNEL_BALL, KERNEL_CLOUD, SCREEN_TILE_PX, SUBPIXELS,
 };
 use crate::stages::params::Params;
 
@@ -30,12 +30,13 @@ fn ball_light(offset: Vec2) -> f32 {
 }
 
 /// Colour with alpha, premultiplied, once the slice with these sums is blended into it.
-pub fn blended(front_to_back: bool, picture: Vec4, sums: [u32; 4]) -> Vec4 {
+pub fn blended(params: &Params, picture: Vec4, sums: [u32; 4]) -> Vec4 {
+    let front_to_back = params.view.front_to_back == 1;
     if sums[3] == 0 || (front_to_back && picture.w > OPAQUE) {
         return picture;
     }
     let depth = sums[3] as f32;
-    let alpha = 1.0 - (-depth / DEPTH_ONE).exp();
+    let alpha = 1.0 - (-depth / params.lists.depth_one).exp();
     let rgb = Vec4::new(
         sums[0] as f32,
         sums[1] as f32,
@@ -82,7 +83,7 @@ fn screen_tile(params: &Params, list: &[Entry]) -> [Vec4; TILE * TILE] {
             add(params, entry, &mut sums);
         }
         for (color, sums) in colors.iter_mut().zip(sums) {
-            *color = blended(params.view.front_to_back == 1, *color, sums);
+            *color = blended(params, *color, sums);
         }
     }
     colors

@@ -104,7 +104,7 @@ fn is_covered(picture: vec4<f32>) -> bool {
 // Colour with alpha, premultiplied, once the slice with these sums is blended into it.
 fn blended(picture: vec4<f32>, sums: vec4<u32>) -> vec4<f32> {
     if (sums.w == 0u || is_covered(picture)) { return picture; }
-    let alpha = 1.0 - exp(-f32(sums.w) / DEPTH_ONE);
+    let alpha = 1.0 - exp(-f32(sums.w) / lists.depth_one);
     let slice = vec4(vec3<f32>(sums.xyz) / (f32(sums.w) * 255.0), 1.0) * alpha;
     if (view.front_to_back == 1u) { return picture + slice * (1.0 - picture.w); }
     return picture * (1.0 - alpha) + slice;

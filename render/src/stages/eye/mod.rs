@@ -96,6 +96,7 @@ impl Eye {
             (4, image),
         ];
         buffers.extend((5..).zip(compose::surroundings(frame)?));
+        buffers.push((compose::LAND_BINDING, frame.land()?));
         if has_parts {
             self.sum_up(frame)?;
         }

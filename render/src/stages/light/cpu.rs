@@ -1,9 +1,9 @@
 //! CPU twin of `deposit.wgsl`, `light.wgsl` and `shade.wgsl`.
 
-use crate::stages::layout::{DEPTH_ONE, LOOK, Splat, nearest};
+use crate::stages::layout::{LOOK, Splat, nearest};
 use crate::stages::params::Params;
 
-const MOST_GIVEN: f32 = 16.0;
+const MOST_GIVEN: f32 = (1 << 25) as f32;
 const DARK: u32 = 0x7fff_ffff;
 
 /// Places in a cloud where its light is looked up, radii towards the eye: one look at the centre would draw clouds too
@@ -54,6 +54,7 @@ fn give_slice(params: &Params, texel: &Texel, slice: i32, depth: f32, light: &mu
         index: [x, y],
         part,
     } = *texel;
+    let one = params.lighting.depth_one;
     let east = depth * part[0];
     let west = depth - east;
     let shares = [
@@ -64,7 +65,7 @@ fn give_slice(params: &Params, texel: &Texel, slice: i32, depth: f32, light: &mu
     ];
     for (texel, depth) in shares {
         if let Some(at) = address(params, texel, at) {
-            light[at] = light[at].wrapping_add((depth.min(MOST_GIVEN) * DEPTH_ONE + 0.5) as u32);
+            light[at] = light[at].wrapping_add(((depth * one).min(MOST_GIVEN) + 0.5) as u32);
         }
     }
 }
@@ -92,7 +93,7 @@ fn depth_above(params: &Params, light: &[u32], texel: [i32; 2], middle: i32, par
             .and_then(|slice| address(params, texel, slice));
         at.map_or(0.0, |at| light[at] as f32)
     };
-    0.5 * mix(depth_at(middle), depth_at(middle + 1), part) / DEPTH_ONE
+    0.5 * mix(depth_at(middle), depth_at(middle + 1), part) / params.lighting.depth_one
 }
 
 fn dimmed(color: u32, shade: f32) -> u32 {

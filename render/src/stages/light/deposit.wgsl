@@ -1,10 +1,10 @@
 // A splat gives its optical depth to the light buffer, through `add_light`.
 
-// Depth that one splat may give to one texel: sums of 2^15 splats stay below 2^31.
-const MOST_GIVEN = 16.0;
+// What one splat may give to one texel at most, and it is dark there.
+const MOST_GIVEN = 33554432.0; // 2^25
 
 fn give(texel: vec2<i32>, slice: u32, depth: f32) {
-    let amount = u32(min(depth, MOST_GIVEN) * DEPTH_ONE + 0.5);
+    let amount = u32(min(depth * lighting.depth_one, MOST_GIVEN) + 0.5);
     if (amount > 0u && inside(texel)) { add_light(address(texel, slice), amount); }
 }
 

@@ -19,5 +19,7 @@ shared_struct! {
         pub look_power: f32,
         pub ambient: f32,
         pub direct: f32,
+        /// Optical depth 1 in the integers that the light sums up.
+        pub depth_one: f32,
     }
 }

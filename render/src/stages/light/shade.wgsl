@@ -6,7 +6,7 @@ fn depth_above(texel: vec2<i32>, middle: i32, part: f32) -> f32 {
     if (!inside(texel)) { return 0.0; }
     var before = 0.0;
     if (middle >= 0) { before = f32(light[address(texel, u32(middle))]); }
-    return 0.5 * mix(before, f32(light[address(texel, u32(middle + 1))]), part) / DEPTH_ONE;
+    return 0.5 * mix(before, f32(light[address(texel, u32(middle + 1))]), part) / lighting.depth_one;
 }
 
 fn dimmed(color: u32, shade: f32) -> u32 {

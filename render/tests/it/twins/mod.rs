@@ -228,7 +228,7 @@ impl Twins {
         active
             .flat_map(|cell| (0..each).map(move |k| (cell, k)))
             .map(|(cell, k)| at(cell, k))
-            .map(|at| unpacked(seen[at], lit[at], self.params.lists.entry_shift))
+            .map(|at| unpacked(seen[at], lit[at], &self.params.lists))
             .collect()
     }
 
