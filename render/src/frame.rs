@@ -5,9 +5,10 @@ use contract::job::Mode;
 use crate::error::RenderError;
 use crate::frame_context::{FrameContext, SceneBuffers};
 use crate::gpu::{Gpu, Slot, Stamps, Workspace};
-use crate::passes::scatter::Scatter;
-use crate::passes::splat::Splats;
-use crate::passes::trails::Trails;
+use crate::passes;
+use crate::passes::scatter::{self, Scatter};
+use crate::passes::splat::{self, Splats};
+use crate::passes::trails::{self, Trails};
 use crate::plan::{Part, Plan};
 use crate::stages::bin::Bin;
 use crate::stages::compose::Compose;
@@ -42,14 +43,15 @@ pub struct Stages {
 impl Stages {
     /// Compiles every stage.
     pub fn new(gpu: &Gpu) -> Self {
+        let probes = passes::probes(gpu);
         Self {
             interpolate: Interpolate::new(gpu, interpolate::SOURCE),
             flow: Flow::new(gpu, flow::SOURCE),
-            splats: Splats::new(gpu),
-            trails: Trails::new(gpu),
+            splats: Splats::new(gpu, splat::SOURCE, probes),
+            trails: Trails::new(gpu, trails::SOURCE, probes),
             light: Light::new(gpu),
             bin: Bin::new(gpu, bin::SOURCE),
-            scatter: Scatter::new(gpu),
+            scatter: Scatter::new(gpu, scatter::SOURCE, probes),
             eye: Eye::new(gpu),
             map: Map::new(gpu, map::SOURCE),
             compose: Compose::new(gpu, compose::SOURCE),

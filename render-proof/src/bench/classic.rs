@@ -5,7 +5,7 @@ use anyhow::{Context as _, Result, ensure};
 use contract::job::RenderJob;
 use render::frame_context::FrameContext;
 use render::gpu::{Gpu, Slot, Workspace, uniform};
-use render::passes::splat::Splats;
+use render::passes::splat::{self, Splats};
 use render::plan::Plan;
 use render::playback::{Playback, Steps};
 use render::stages::layout::GROUP;
@@ -84,7 +84,7 @@ impl<'a> Classic<'a> {
         };
         Ok(Self {
             gpu,
-            splats: Splats::new(gpu),
+            splats: Splats::new(gpu, splat::SOURCE, passes::probes(gpu)),
             workspace: Workspace::default(),
             pipelines: Pipelines::new(gpu.device(), &params),
             eye: target("eye", params.view.size_px.x, params.view.size_px.y),

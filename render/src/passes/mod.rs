@@ -20,8 +20,8 @@ pub const SHARED_PROBES: u32 = 12;
 /// Nobody shares sums: that pays on GPUs alone.
 pub const NO_PROBES: u32 = 0;
 
-/// A pass that shares sums as it suits the device.
-fn suited(gpu: &Gpu) -> u32 {
+/// What suits the device.
+pub fn probes(gpu: &Gpu) -> u32 {
     if gpu.is_software() {
         NO_PROBES
     } else {

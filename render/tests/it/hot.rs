@@ -4,8 +4,9 @@ use contract::grid::Grid;
 use contract::job::{Mode, RenderJob};
 use render::frame_context::{FrameContext, SceneBuffers};
 use render::gpu::{Gpu, Slot, Workspace};
-use render::passes::scatter::Scatter;
-use render::passes::splat::Splats;
+use render::passes;
+use render::passes::scatter::{self, Scatter};
+use render::passes::splat::{self, Splats};
 use render::plan::Plan;
 use render::playback::Playback;
 use render::stages::bin::{self, Bin};
@@ -77,12 +78,16 @@ fn draw(
     frame.room(Slot::Entries, entry_bytes).unwrap();
     let part_bytes = u64::from(1 + MOST_HOT_PARTS) * 4;
     frame.room(Slot::HotParts, part_bytes).unwrap();
-    Splats::new(gpu).record(&mut frame).unwrap();
+    Splats::new(gpu, splat::SOURCE, passes::probes(gpu))
+        .record(&mut frame)
+        .unwrap();
     if params.lighting.mode == 1 {
         Light::new(gpu).record(&mut frame).unwrap();
     }
     Bin::new(gpu, sources[0]).record(&mut frame).unwrap();
-    Scatter::new(gpu).record(&mut frame).unwrap();
+    Scatter::new(gpu, scatter::SOURCE, passes::probes(gpu))
+        .record(&mut frame)
+        .unwrap();
     let eye = Eye::of(gpu, sources[1], entry);
     eye.record(&mut frame).unwrap();
     let [image, counts, parts] =

@@ -25,13 +25,8 @@ pub struct Scatter {
 }
 
 impl Scatter {
-    /// Compiles the shader as it suits the device.
-    pub fn new(gpu: &Gpu) -> Self {
-        Self::of(gpu, SOURCE, super::suited(gpu))
-    }
-
     /// Compiles `source`, [`SOURCE`] but for tests, with a table of sums of so many probes.
-    pub fn of(gpu: &Gpu, source: &str, probes: u32) -> Self {
+    pub fn new(gpu: &Gpu, source: &str, probes: u32) -> Self {
         Self {
             scatter: super::compiled(gpu, "scatter", source, probes)
                 .reading(&[View, Cells, Lighting, Lists]),

@@ -55,13 +55,8 @@ pub fn unpacked(seen: [u32; 4], lit: [u32; 4], lists: &ListParams) -> Splat {
 }
 
 impl Splats {
-    /// Compiles the shader as it suits the device.
-    pub fn new(gpu: &Gpu) -> Self {
-        Self::of(gpu, SOURCE, super::suited(gpu))
-    }
-
     /// Compiles `source`, [`SOURCE`] but for tests, with a table of sums of so many probes.
-    pub fn of(gpu: &Gpu, source: &str, probes: u32) -> Self {
+    pub fn new(gpu: &Gpu, source: &str, probes: u32) -> Self {
         Self {
             splat: super::compiled(gpu, "splat", source, probes).reading(&[
                 View, Grid, Values, Cells, Particles, Projection, Lighting, Lists,

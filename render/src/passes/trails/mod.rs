@@ -34,13 +34,8 @@ pub struct Trails {
 }
 
 impl Trails {
-    /// Compiles the shader as it suits the device.
-    pub fn new(gpu: &Gpu) -> Self {
-        Self::of(gpu, SOURCE, super::suited(gpu))
-    }
-
     /// Compiles `source`, [`SOURCE`] but for tests, with a table of sums of so many probes.
-    pub fn of(gpu: &Gpu, source: &str, probes: u32) -> Self {
+    pub fn new(gpu: &Gpu, source: &str, probes: u32) -> Self {
         Self {
             trails: super::compiled(gpu, "trails", source, probes).reading(&[
                 View, Grid, Values, Cells, Particles, Flow, Projection, Lighting, Lists,

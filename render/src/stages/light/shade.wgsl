@@ -25,7 +25,7 @@ fn depth_before(place: vec2<i32>, slice: f32) -> f32 {
 }
 
 // How far from a cloud's centre its light is looked up, radii.
-const LOOK = 0.34;
+const LOOK: f32 = 0.34;
 
 // Share of light at a place a step towards the eye times the share of what is seen there, and the latter.
 fn look(place: vec2<i32>, slice: f32, step: f32) -> vec2<f32> {

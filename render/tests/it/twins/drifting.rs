@@ -61,7 +61,7 @@ fn drifting_splats_match_their_twins_on_tiles_and_on_the_globe() {
         assert!(drawn > 1000, "{drawn} dots");
         for (right, wrong) in faults {
             prove("trails", trails::SOURCE, right, wrong, |gpu, source| {
-                let stage = Trails::of(gpu, source, SHARED_PROBES);
+                let stage = Trails::new(gpu, source, SHARED_PROBES);
                 let given = |f: &mut FrameContext<'_>| {
                     drop(f.upload(Slot::Velocity, &twins.velocity).unwrap());
                 };

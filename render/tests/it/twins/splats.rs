@@ -42,7 +42,7 @@ fn splats_match_their_twins_on_tiles_and_on_the_globe() {
     for (twins, right, wrong) in faults {
         let expected = splat_numbers(twins.params.lists.kernel, &twins.splats, &twins.splats);
         prove("splat", splat::SOURCE, right, wrong, |gpu, source| {
-            let stage = Splats::of(gpu, source, SHARED_PROBES);
+            let stage = Splats::new(gpu, source, SHARED_PROBES);
             let outputs = twins.stored();
             let [seen, lit] = twins.run_with(
                 gpu,
@@ -102,7 +102,7 @@ fn splats_in_the_sea_and_in_the_night_match_their_twins() {
         ),
     ] {
         prove("splat", splat::SOURCE, right, wrong, |gpu, source| {
-            let stage = Splats::of(gpu, source, SHARED_PROBES);
+            let stage = Splats::new(gpu, source, SHARED_PROBES);
             let [seen, lit] = twins.run_with(
                 gpu,
                 &twins.params,
