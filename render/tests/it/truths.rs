@@ -258,6 +258,7 @@ fn clouds(side_px: u32) -> Params {
     params.view.slices = 4;
     params.view.front_to_back = 1;
     params.lists.kernel = KERNEL_CLOUD;
+    params.lists.depth_one = 4096.0;
     params
 }
 
