@@ -4,6 +4,8 @@
 //! from it. Left out on purpose: input and output, async, GPU, SQL.
 #![warn(missing_docs, clippy::missing_errors_doc)]
 
+pub mod budget;
+pub mod check;
 pub mod chunk;
 pub mod colour;
 pub mod context;
@@ -17,6 +19,7 @@ pub mod grid;
 pub mod job;
 pub mod key;
 pub mod kind;
+pub mod listing;
 pub mod manifest;
 pub mod masked;
 pub mod notice;
@@ -25,6 +28,7 @@ pub mod picture;
 pub mod product;
 pub mod quantity;
 pub mod region;
+pub mod series;
 pub mod sun;
 pub mod tile;
 pub mod time;
