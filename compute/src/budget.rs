@@ -13,8 +13,5 @@ pub mod rows;
 pub mod running;
 pub mod sums;
 
-pub use accumulated::Completeness;
-pub(crate) use query::steps_inside;
-pub use query::{BudgetAnswer, BudgetQuery, budget, budget_of};
-pub use rows::{BudgetRow, BudgetStep};
-pub use sums::Measure;
+pub use asked::Measure;
+pub use query::{budget, budget_of};

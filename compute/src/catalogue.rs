@@ -19,9 +19,3 @@ pub async fn product(store: &Store, id: &ProductId) -> Result<Manifest, ComputeE
         }),
     }
 }
-
-/// Bounds of a grid for people.
-pub(crate) fn bounds_text(manifest: &Manifest) -> String {
-    let [west, south, east, north] = manifest.grid.bounds_deg();
-    format!("{west} to {east} degrees east, {south} to {north} degrees north")
-}

@@ -1,13 +1,14 @@
 //! Our budgets beside the published ones: what a demonstration prints and what it is held to.
 
+use contract::budget::{BudgetQuery, BudgetRow, BudgetStep};
+use contract::check::{AgainstPaper, CheckRow, Stated, Verdict};
+use contract::earth::Earth;
 use contract::product::ProductId;
 use contract::region::{Cells, NamedRegion};
 use futures::future::{try_join, try_join_all};
-use serde::{Deserialize, Serialize};
 
-use crate::published::{ANNUAL, Annual, INTEGRALS, Stated};
-use crate::{BudgetQuery, BudgetStep, ComputeError, Engine, budget};
-use contract::earth::Earth;
+use crate::published::{ANNUAL, Annual, INTEGRALS};
+use crate::{ComputeError, Engine, budget};
 
 const TG_PER_PG: f64 = 1000.0;
 const MONTHS: [&str; 12] = [
@@ -29,74 +30,17 @@ const MONTHS: [&str; 12] = [
 /// stored fluxes (f32) to either side leaves open.
 const AGREEMENT: f64 = 1e-6;
 
-/// One line of the comparison: what a paper says, what an independent integration of its grid says, what we say.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct CheckRow {
-    /// Region, and the figure of the earth where it is not WGS84.
-    pub what: String,
-    /// Year or month.
-    pub period: String,
-    /// Unit of the values.
-    pub unit: String,
-    /// The paper; none where it prints no such value.
-    pub paper: Option<AgainstPaper>,
-    /// Integral of the same grid by another program: what ours is held to.
-    pub independent: f64,
-    /// Ours.
-    pub ours: f64,
-    /// Ours less the independent one.
-    pub difference: f64,
-    /// Is that no more than rounding explains?
-    pub agrees: bool,
-}
-
-/// Ours against a printed value.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct AgainstPaper {
-    /// As printed.
-    pub stated: Stated,
-    /// Ours less the printed value.
-    pub difference: f64,
-    /// What the paper's uncertainty says of it.
-    pub verdict: Verdict,
-}
-
-/// What a paper's own uncertainty says of a difference.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Verdict {
-    /// It is no larger.
-    Within,
-    /// It is larger.
-    Outside,
-    /// The paper states none: a difference is shown and not judged.
-    NoUncertaintyStated,
-}
-
-impl Verdict {
-    /// For people.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Within => "within",
-            Self::Outside => "outside",
-            Self::NoUncertaintyStated => "no uncertainty stated",
-        }
-    }
-}
-
-impl AgainstPaper {
-    fn of(stated: Stated, ours: f64) -> Self {
-        let difference = ours - stated.value;
-        let verdict = match stated.uncertainty {
-            None => Verdict::NoUncertaintyStated,
-            Some(uncertainty) if difference.abs() <= uncertainty => Verdict::Within,
-            Some(_) => Verdict::Outside,
-        };
-        Self {
-            stated,
-            difference,
-            verdict,
-        }
+fn against(stated: Stated, ours: f64) -> AgainstPaper {
+    let difference = ours - stated.value;
+    let verdict = match stated.uncertainty {
+        None => Verdict::NoUncertaintyStated,
+        Some(uncertainty) if difference.abs() <= uncertainty => Verdict::Within,
+        Some(_) => Verdict::Outside,
+    };
+    AgainstPaper {
+        stated,
+        difference,
+        verdict,
     }
 }
 
@@ -153,7 +97,7 @@ async fn monthly_rows(engine: &Engine, product: &ProductId) -> Result<Vec<CheckR
             "it does not cover twelve months",
         ));
     }
-    let month = |(row, (independent, name)): (&crate::BudgetRow, (&f64, &str))| {
+    let month = |(row, (independent, name)): (&BudgetRow, (&f64, &str))| {
         let (year, _) = row.start.year_month();
         let line = Line {
             what: "Global ocean".to_owned(),
@@ -177,18 +121,12 @@ fn query(
     step: BudgetStep,
     earth: Earth,
 ) -> Result<BudgetQuery, ComputeError> {
-    let (product, region, region_name) = (product.clone(), name.parse()?, name.to_owned());
     Ok(BudgetQuery {
-        product,
-        region,
-        region_name,
-        from: None,
-        to: None,
         step,
         earth,
         // As the authors of the 1-degree grids integrate them: no cell is cut at the coast.
         cells: Cells::Whole,
-        ocean: None,
+        ..BudgetQuery::new(product.clone(), name.parse()?)
     })
 }
 
@@ -211,7 +149,7 @@ impl Line {
             what: self.what,
             period: self.period,
             unit: self.unit.to_owned(),
-            paper: self.paper.map(|stated| AgainstPaper::of(stated, ours)),
+            paper: self.paper.map(|stated| against(stated, ours)),
             independent,
             ours,
             difference,

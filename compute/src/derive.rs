@@ -16,7 +16,7 @@ use contract::time::{Period, TimeMs};
 use storage::{StorageError, Store, manifests};
 
 use crate::{ComputeError, Engine, catalogue};
-pub use at_cell::{CellCounts, counts_at_cell};
+pub(crate) use at_cell::counts_at_cell;
 use derivation::Derivation;
 use source::{SourceStep, steps_since};
 

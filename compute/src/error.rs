@@ -2,10 +2,8 @@
 
 use ballista_core::error::BallistaError;
 use contract::ContractError;
-use contract::grid::LonLatDeg;
 use contract::product::ProductId;
 use contract::quantity::Quantity;
-use contract::time::Period;
 use datafusion::error::DataFusionError;
 use storage::StorageError;
 
@@ -30,31 +28,11 @@ pub enum ComputeError {
         /// What it measures.
         quantity: Quantity,
     },
-    /// The asked period holds no step.
-    #[error("{product} has no step in {asked}; it covers {}", extent(*.covered))]
-    NoStep {
-        /// Product.
-        product: ProductId,
-        /// Asked period.
-        asked: String,
-        /// What the product covers.
-        covered: Option<Period>,
-    },
     /// The region and the product's grid have no area in common.
     #[error("the region does not touch the grid of {product}, which covers {bounds}")]
     RegionOutside {
         /// Product.
         product: ProductId,
-        /// West, south, east, north.
-        bounds: String,
-    },
-    /// The place lies outside the product's grid.
-    #[error("{},{} lies outside the grid of {product}, which covers {bounds}", .place.lon, .place.lat)]
-    PlaceOutside {
-        /// Product.
-        product: ProductId,
-        /// Asked place.
-        place: LonLatDeg,
         /// West, south, east, north.
         bounds: String,
     },
@@ -158,9 +136,7 @@ impl ComputeError {
         match self {
             Self::UnknownProduct { .. } => ErrorClass::NotFound,
             Self::NotAFlux { .. }
-            | Self::NoStep { .. }
             | Self::RegionOutside { .. }
-            | Self::PlaceOutside { .. }
             | Self::Region { .. }
             | Self::OceanShares { .. }
             | Self::RegionFile { .. }
@@ -225,10 +201,6 @@ fn list(known: &[ProductId]) -> String {
     } else {
         names.join(", ")
     }
-}
-
-fn extent(covered: Option<Period>) -> String {
-    covered.map_or_else(|| "nothing".to_owned(), |period| period.to_string())
 }
 
 #[cfg(test)]

@@ -11,10 +11,9 @@ use contract::region::NAMED_REGIONS;
 use storage::gc::{Kept, Owner};
 use storage::{StorageError, Store};
 
-use crate::budget::named::EARTH;
 use crate::budget::{Measure, sums};
 use crate::derive::exact;
-use crate::region::weights::RegionKeys;
+use crate::region::weights::{EARTH, RegionKeys};
 
 /// Sums, states of accumulation and comparisons: kept while they are young or belong to a kept version.
 #[derive(Debug)]

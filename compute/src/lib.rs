@@ -28,11 +28,11 @@ mod state;
 pub mod stats;
 mod tail_store;
 
-pub use budget::{BudgetAnswer, BudgetQuery, BudgetRow, BudgetStep, budget};
-pub use check::{CheckRow, compare};
+pub use budget::budget;
+pub use check::compare;
 pub use cluster::SchedulerUrl;
 pub use derive::{DeriveProgress, derive_accumulated};
 pub use error::{ComputeError, ErrorClass};
 pub use objects::Objects;
-pub use point::{PointAnswer, point_series};
+pub use point::point_series;
 pub use session::Engine;

@@ -2,8 +2,9 @@
 
 use std::sync::LazyLock;
 
+use contract::check::Stated;
 use contract::earth::Earth;
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 
 /// Where the printed values come from.
 pub const CITATION: &str = "Takahashi, T., et al. (2009), Climatological mean and decadal change in surface ocean pCO2, \
@@ -13,17 +14,6 @@ and net sea-air CO2 flux over the global oceans, Deep-Sea Research II 56, 554-57
 pub const METHOD: &str = "Independent: the same 1-degree grids, as FluxEngine 4.2.1 ships them, integrated in Python by \
 tests/reference/takahashi09_integral.py, which shares no code with Fluxglobe. The grid differs from the paper's tables by \
 its 1-degree coast lines.";
-
-/// A value as a paper prints it.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Stated {
-    /// The value.
-    pub value: f64,
-    /// Decimals that are printed.
-    pub decimals: usize,
-    /// Its uncertainty, where the paper states one.
-    pub uncertainty: Option<f64>,
-}
 
 /// A year's budget of one region as the paper prints it, Pg C a year; positive out of the sea.
 #[derive(Debug, Clone, Copy, PartialEq)]

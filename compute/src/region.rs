@@ -4,7 +4,7 @@
 //! (docs/decisions/008-regions.md). Areas lie on the chosen figure of the earth.
 
 pub(crate) mod address;
-pub mod area;
+mod area;
 mod box_cover;
 pub(crate) mod computed;
 mod cut;
@@ -13,6 +13,7 @@ pub mod file;
 mod lattice;
 pub(crate) mod loaded;
 mod polygon_cover;
+mod ring;
 mod rings;
 mod sea;
 pub mod shares;

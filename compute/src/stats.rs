@@ -1,8 +1,8 @@
 //! Statistics: array kernels (plain slices in, plain values out), and series over regions made of exact sums.
 
+mod cell_series;
 pub mod region_series;
 pub mod series;
 
-pub use region_series::{
-    RegionSeries, RegionSeriesQuery, RegionValue, region_series, region_series_of,
-};
+pub(crate) use cell_series::cell_values;
+pub use region_series::{region_series, region_series_of};

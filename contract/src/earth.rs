@@ -1,6 +1,7 @@
 //! The figures of the earth used for areas: geodetic latitude bands in, square metres out.
 
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
 /// Equatorial radius of WGS84, m (NIMA TR8350.2).
 pub const WGS84_EQUATORIAL_RADIUS_M: f64 = 6_378_137.0;
@@ -12,7 +13,7 @@ const WGS84_ECCENTRICITY_SQ: f64 = 6.694_379_990_141_317e-3;
 pub const SPHERE_RADIUS_M: f64 = 6_371_000.0;
 
 /// Figure of the earth for areas.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Earth {
     /// The WGS84 ellipsoid.
@@ -28,9 +29,6 @@ pub enum Earth {
 }
 
 impl Earth {
-    /// All of them.
-    pub const ALL: [Self; 2] = [Self::Wgs84, Self::Sphere];
-
     /// Area between the equator and latitude `lat_rad`, per radian of longitude, m²; odd in latitude.
     ///
     /// Source: Snyder (1987), Map Projections, USGS Professional Paper 1395, eq. 3-12 (authalic q), times a²/2. With the

@@ -63,6 +63,11 @@ pub fn wrap_lon_deg(lon: f64) -> f64 {
     }
 }
 
+/// Degrees without the noise that arithmetic adds to them: nine decimals, 0.1 mm.
+pub fn rounded_deg(deg: f64) -> f64 {
+    (deg * 1e9).round() / 1e9
+}
+
 /// A regular latitude-longitude grid of cells. Values are row-major `[row, col]`, NaN where there is no data.
 ///
 /// `north_deg` and `west_deg` are *edges* of the first row and column, never centres. Grids that cross the date
@@ -185,6 +190,12 @@ impl Grid {
             self.east_deg(),
             self.north_deg,
         ]
+    }
+
+    /// The same without the noise of its steps' sum; east may pass 180.
+    pub fn shown_bounds_deg(&self) -> [f64; 4] {
+        let [west, south, east, north] = self.bounds_deg().map(rounded_deg);
+        [west, south.max(-90.0), east, north.min(90.0)]
     }
 }
 

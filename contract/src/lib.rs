@@ -4,7 +4,9 @@
 //! from it. Left out on purpose: input and output, async, GPU, SQL.
 #![warn(missing_docs, clippy::missing_errors_doc)]
 
+pub mod budget;
 pub mod camera;
+pub mod check;
 pub mod chunk;
 pub mod colour;
 pub mod context;
@@ -19,6 +21,7 @@ pub mod job;
 pub mod key;
 pub mod kind;
 pub mod land;
+pub mod listing;
 pub mod manifest;
 pub mod masked;
 pub mod notice;
@@ -27,6 +30,7 @@ pub mod picture;
 pub mod product;
 pub mod quantity;
 pub mod region;
+pub mod series;
 pub mod sun;
 pub mod tile;
 pub mod time;

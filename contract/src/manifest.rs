@@ -1,5 +1,7 @@
 //! The numbered list of what a product consists of: the only thing that changes, and it changes whole.
 
+mod inside;
+
 use std::fmt::{Display, Formatter};
 
 use serde::{Deserialize, Serialize};

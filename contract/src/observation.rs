@@ -1,19 +1,25 @@
 //! Observations: single measurements of buoys, ships, stations and profiles, with what makes each one itself.
 
+mod query;
+
 use std::fmt::{Display, Formatter};
 
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
 use crate::ContractError;
 use crate::grid::LonLatDeg;
 use crate::product::ProductId;
 use crate::time::TimeMs;
+pub use query::{Filter, MAX_LIMIT, MAX_PLACES, Page, Platform, TrackPoint, TrackQuery};
 
 /// Deepest and highest place of a measurement, m below the surface.
 const DEPTH_M: std::ops::RangeInclusive<f64> = -1000.0..=12_000.0;
 
 /// What carries the instruments.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, ToSchema,
+)]
 #[serde(rename_all = "lowercase")]
 pub enum PlatformKind {
     /// Stays where it is moored: one place, a series in time.
@@ -28,7 +34,9 @@ pub enum PlatformKind {
 
 /// How far a value may be trusted: the primary flags of IOC Manuals and Guides 54, volume 3 (2013). Missing values are
 /// no observations.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, ToSchema,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum Quality {
     /// Passed the required tests (1).
@@ -42,7 +50,7 @@ pub enum Quality {
 }
 
 /// One measured value. Platform, dataset, property, time and depth together name it: the same name again replaces it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Observation {
     /// The data set that it belongs to.

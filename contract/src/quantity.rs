@@ -1,6 +1,7 @@
 //! What a product measures, in which unit it is stored, and in which unit people read it.
 
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
 /// Mass of carbon in one mole of CO2, kg (IUPAC 2021 standard atomic weight of carbon, conventional value 12.011).
 pub const CARBON_KG_PER_MOL: f64 = 0.012_011;
@@ -8,7 +9,7 @@ pub const CARBON_KG_PER_MOL: f64 = 0.012_011;
 pub const SECONDS_PER_YEAR: f64 = 365.25 * 86_400.0;
 
 /// A measured quantity. Values are stored in [`Quantity::unit`]; conversion to it happens once, at ingest.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Quantity {
     /// Air-sea flux of CO2 as mass of carbon, kg m⁻² s⁻¹, positive out of the sea.

@@ -1,5 +1,6 @@
 //! Regions that budgets are asked for: the globe, named regions, boxes and polygons.
 
+mod asked;
 mod cells;
 mod named;
 mod text;
@@ -7,6 +8,7 @@ mod text;
 use serde::{Deserialize, Serialize};
 
 use crate::ContractError;
+pub use asked::AskedRegion;
 pub use cells::Cells;
 pub use named::{NAMED_REGIONS, NamedRegion};
 pub use text::MAX_TEXT_BYTES;

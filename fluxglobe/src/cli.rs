@@ -12,7 +12,8 @@ mod upkeep;
 use std::num::NonZeroU16;
 use std::path::PathBuf;
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, Parser, Subcommand};
+use contract::budget::BudgetStep;
 use contract::earth::Earth;
 use contract::grid::LonLatDeg;
 use contract::job::Mode;
@@ -299,17 +300,6 @@ pub(crate) struct StatsPolygon {
     pub(crate) json: bool,
 }
 
-/// Rows of a budget.
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub(crate) enum Step {
-    /// A row a calendar month.
-    Month,
-    /// A row a calendar year.
-    Year,
-    /// One row.
-    Total,
-}
-
 /// `fluxglobe budget`.
 #[derive(Debug, Args)]
 pub(crate) struct Budget {
@@ -325,9 +315,9 @@ pub(crate) struct Budget {
     /// First instant after the period. The product's end if absent.
     #[arg(long)]
     pub(crate) to: Option<TimeMs>,
-    /// Rows of the answer.
-    #[arg(long, value_enum, default_value = "total")]
-    pub(crate) step: Step,
+    /// What a row of the answer covers: a calendar month, a calendar year, or the total of the period.
+    #[arg(long, default_value_t, value_name = "month|year|total")]
+    pub(crate) step: BudgetStep,
     /// Figure of the earth for areas: wgs84, sphere (R = 6371 km) or local-radius (as FluxEngine sums).
     #[arg(long, default_value = "wgs84")]
     pub(crate) earth: Earth,

@@ -7,21 +7,17 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use async_trait::async_trait;
 use bytes::Bytes;
-use compute::Engine;
-use compute::budget::{BudgetQuery, BudgetStep};
-use compute::stats::{RegionSeriesQuery, RegionValue, region_series_of};
-use compute::{ComputeError, ErrorClass};
+use compute::{ComputeError, Engine, ErrorClass};
+use contract::budget::{BudgetAnswer, BudgetQuery};
+use contract::check::Check;
+use contract::grid::LonLatDeg;
 use contract::job::RenderJob;
-use contract::manifest::Manifest;
-use contract::time::Period;
+use contract::manifest::{Manifest, ManifestId};
+use contract::series::{PointSeries, RegionSeries, RegionSeriesQuery};
 use render_worker::Desk;
 use render_worker::desk::{DeskError, Order, Storing};
 use render_worker::fleet::{Fleet, FleetError};
-use tile_server::backend::{
-    Analyse, AreaRequest, AreaRow, AreaSeries, BackendError, BudgetAnswer, BudgetRequest,
-    BudgetRow, BudgetStep as WantedStep, Check, Class, Contributed, Draw, Keep, PointStep, RowCol,
-    Turn,
-};
+use tile_server::backend::{Analyse, BackendError, Class, Draw, Keep, Turn};
 
 pub(crate) use observer::Observer;
 
@@ -99,97 +95,29 @@ impl Analyse for Analyst {
     async fn point(
         &self,
         manifest: &Manifest,
-        cell: RowCol,
-    ) -> Result<Vec<PointStep>, BackendError> {
-        let RowCol { row, col } = cell;
-        let values = compute::point::cell_values(&self.local, manifest, row, col).await;
-        let values = values.map_err(compute_failed)?;
-        let counts = compute::derive::counts_at_cell(&self.local, manifest, row, col).await;
-        let counts = counts.map_err(compute_failed)?;
-        let step = |(index, value): (usize, f32)| PointStep {
-            value: (!value.is_nan()).then_some(f64::from(value)),
-            contributed: counts.as_ref().map(|counts| Contributed {
-                steps: counts[index].steps,
-                of_steps: counts[index].of_steps,
-                time_percent: counts[index].time_percent,
-            }),
-        };
-        Ok(values.into_iter().enumerate().map(step).collect())
+        id: &ManifestId,
+        place: LonLatDeg,
+    ) -> Result<PointSeries, BackendError> {
+        let answer = compute::point::point_series_of(&self.local, manifest, id.clone(), place);
+        answer.await.map_err(compute_failed)
     }
 
-    async fn budget(&self, request: &BudgetRequest) -> Result<BudgetAnswer, BackendError> {
-        let query = BudgetQuery {
-            product: request.manifest.product.clone(),
-            region: request.region.clone(),
-            region_name: String::new(),
-            from: Some(request.period.start),
-            to: Some(request.period.end),
-            step: match request.step {
-                WantedStep::Month => BudgetStep::Month,
-                WantedStep::Year => BudgetStep::Year,
-                WantedStep::Total => BudgetStep::Total,
-            },
-            earth: request.earth,
-            cells: request.cells,
-            ocean: request.ocean.clone(),
-        };
-        let answer = compute::budget::budget_of(&self.regions, &query, &request.manifest)
-            .await
-            .map_err(compute_failed)?;
-        let row = |row: compute::budget::BudgetRow| BudgetRow {
-            period: Period {
-                start: row.start,
-                end: row.end,
-            },
-            budget_tg: row.budget_tg,
-            coverage_percent: row.coverage_percent,
-            area_m2: row.area_m2,
-            ocean_with_data_m2: row.ocean_with_data_m2,
-            gap_tg: row.gap_tg,
-            gap_area_m2: row.gap_area_m2,
-            complete_and_incomplete_m2: row
-                .completeness
-                .map(|own| [own.complete_m2, own.incomplete_m2]),
-        };
-        Ok(BudgetAnswer {
-            region_area_m2: answer.region_area_m2,
-            ocean_area_m2: answer.ocean_area_m2,
-            ocean_source: answer.ocean_source,
-            gap_basis: answer.gap_basis,
-            notes: answer.notes,
-            rows: answer.rows.into_iter().map(row).collect(),
-        })
+    async fn budget(
+        &self,
+        manifest: &Manifest,
+        query: &BudgetQuery,
+    ) -> Result<BudgetAnswer, BackendError> {
+        let answer = compute::budget::budget_of(&self.regions, query, manifest);
+        answer.await.map_err(compute_failed)
     }
 
-    async fn area(&self, request: &AreaRequest) -> Result<AreaSeries, BackendError> {
-        let query = RegionSeriesQuery {
-            product: request.manifest.product.clone(),
-            region: request.region.clone(),
-            region_name: String::new(),
-            from: Some(request.period.start),
-            to: Some(request.period.end),
-            earth: request.earth,
-            ocean: request.ocean.clone(),
-        };
-        let answer = region_series_of(&self.regions, &query, &request.manifest)
-            .await
-            .map_err(compute_failed)?;
-        let row = |value: RegionValue| AreaRow {
-            period: Period {
-                start: value.start,
-                end: value.end,
-            },
-            mean: value.mean,
-            area_m2: value.area_m2,
-            coverage_percent: value.coverage_percent,
-        };
-        Ok(AreaSeries {
-            region_area_m2: answer.region_area_m2,
-            ocean_area_m2: answer.ocean_area_m2,
-            ocean_source: answer.ocean_source,
-            notes: answer.notes,
-            rows: answer.series.into_iter().map(row).collect(),
-        })
+    async fn area(
+        &self,
+        manifest: &Manifest,
+        query: &RegionSeriesQuery,
+    ) -> Result<RegionSeries, BackendError> {
+        let answer = compute::stats::region_series_of(&self.regions, query, manifest);
+        answer.await.map_err(compute_failed)
     }
 
     async fn check(&self) -> Result<Option<Check>, BackendError> {
@@ -284,6 +212,7 @@ mod tests {
     use contract::product::ProductId;
     use contract::quantity::Quantity;
     use contract::region::Cells;
+    use contract::time::Period;
     use storage::{Store, domain, frames, manifests};
 
     use super::*;
@@ -330,15 +259,12 @@ mod tests {
         Arc::new(manifest)
     }
 
-    fn budget_of(manifest: &Arc<Manifest>, region: &str, cells: Cells) -> BudgetRequest {
-        BudgetRequest {
-            manifest: Arc::clone(manifest),
-            region: region.parse().unwrap(),
-            period: manifest.extent().unwrap(),
-            step: WantedStep::Total,
-            earth: Earth::Wgs84,
+    fn total(region: &str, cells: Cells, ocean: Option<Arc<Manifest>>) -> BudgetQuery {
+        let product = "flux".parse().unwrap();
+        BudgetQuery {
             cells,
-            ocean: None,
+            ocean,
+            ..BudgetQuery::new(product, region.parse().unwrap())
         }
     }
 
@@ -352,18 +278,16 @@ mod tests {
         let before = store.list("").await.unwrap();
         for i in 1..20 {
             let region = format!("{i},-{i},{}.5,{i}.5", i + 30);
-            let mut request = budget_of(&flux, &region, Cells::OceanShare);
-            analyst.budget(&request).await.unwrap();
-            request.ocean = Some(Arc::clone(&land));
-            analyst.budget(&request).await.unwrap();
-            let area = AreaRequest {
-                manifest: Arc::clone(&flux),
-                region: request.region,
-                period: request.period,
+            for ocean in [None, Some(Arc::clone(&land))] {
+                let query = total(&region, Cells::OceanShare, ocean);
+                analyst.budget(&flux, &query).await.unwrap();
+            }
+            let query = RegionSeriesQuery {
                 earth: Earth::Sphere,
-                ocean: request.ocean,
+                ocean: Some(Arc::clone(&land)),
+                ..RegionSeriesQuery::new(flux.product.clone(), region.parse().unwrap())
             };
-            analyst.area(&area).await.unwrap();
+            analyst.area(&flux, &query).await.unwrap();
         }
         assert_eq!(store.list("").await.unwrap(), before);
     }
@@ -378,11 +302,8 @@ mod tests {
         // Half of South America.
         let region = "-75,-30,-50,0";
         let of = async |cells, ocean| {
-            let request = BudgetRequest {
-                ocean,
-                ..budget_of(&flux, region, cells)
-            };
-            analyst.budget(&request).await.unwrap()
+            let query = total(region, cells, ocean);
+            analyst.budget(&flux, &query).await.unwrap()
         };
         let whole = of(Cells::Whole, None).await;
         let share = of(Cells::OceanShare, None).await;
@@ -397,19 +318,10 @@ mod tests {
             masked.ocean_source
         );
         // The other way round: what is no mask is told, as the asker's fault.
-        let refused = BudgetRequest {
-            ocean: Some(Arc::clone(&flux)),
-            ..budget_of(&mask, region, Cells::Whole)
-        };
-        assert_eq!(
-            analyst.budget(&refused).await.unwrap_err().class,
-            Class::BadRequest
-        );
-        let refused = BudgetRequest {
-            ocean: Some(Arc::clone(&flux)),
-            ..budget_of(&flux, region, Cells::Whole)
-        };
-        let refused = analyst.budget(&refused).await.unwrap_err();
+        let by_flux = total(region, Cells::Whole, Some(Arc::clone(&flux)));
+        let refused = analyst.budget(&mask, &by_flux).await.unwrap_err();
+        assert_eq!(refused.class, Class::BadRequest);
+        let refused = analyst.budget(&flux, &by_flux).await.unwrap_err();
         assert_eq!(refused.class, Class::BadRequest);
         assert!(
             refused.text.contains("flux cannot say what is sea"),

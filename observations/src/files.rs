@@ -13,7 +13,7 @@ use std::time::Duration;
 use async_trait::async_trait;
 use contract::digest::Digest;
 use contract::key::ObjectKey;
-use contract::observation::Observation;
+use contract::observation::{Filter, Observation, Page, Platform, TrackPoint, TrackQuery};
 use contract::product::ProductId;
 use contract::time::TimeMs;
 use futures::{StreamExt as _, TryStreamExt as _, stream};
@@ -21,12 +21,11 @@ use retry::Backoff;
 use storage::Store;
 
 use crate::error::ObservationError;
-use crate::filter::{CheckedFilter, Filter, Page};
+use crate::filter::{self, CheckedFilter};
 use crate::key::Key;
-use crate::platform::{Gathering, Platform};
+use crate::platform::Gathering;
 use crate::store::{Counts, ObservationStore};
-use crate::track::{TrackPoint, TrackQuery};
-use crate::{batch, key};
+use crate::{batch, key, track};
 use index::{Index, Month};
 
 /// Attempts to commit before other writers are given the right of way.
@@ -201,8 +200,8 @@ impl ObservationStore for FileStore {
     }
 
     async fn query(&self, filter: &Filter) -> Result<Page, ObservationError> {
-        let checked = filter.checked()?;
-        let after = filter.after.as_ref().map(|token| &token.0);
+        let checked = CheckedFilter::new(filter)?;
+        let after = checked.after.as_ref();
         let from = filter.from.max(after.map(|key| key.time));
         let mut rows = vec![];
         for (_, mut months) in self.months(&checked).await? {
@@ -216,11 +215,11 @@ impl ObservationStore for FileStore {
                 break;
             }
         }
-        Ok(Page::cut(rows, filter.limit))
+        Ok(filter::page(rows, filter.limit))
     }
 
     async fn platforms(&self, filter: &Filter) -> Result<Vec<Platform>, ObservationError> {
-        let checked = filter.checked()?;
+        let checked = CheckedFilter::new(filter)?;
         let mut gathering = Gathering::default();
         for (_, months) in self.months(&checked).await? {
             for row in self.wanted(&checked, filter.from, months).await? {
@@ -231,7 +230,7 @@ impl ObservationStore for FileStore {
     }
 
     async fn track(&self, query: &TrackQuery) -> Result<Vec<TrackPoint>, ObservationError> {
-        query.validate()?;
+        track::check(query)?;
         let filter = Filter {
             from: query.from,
             to: query.to,
@@ -239,7 +238,7 @@ impl ObservationStore for FileStore {
             platforms: vec![query.platform.clone()],
             ..Filter::default()
         };
-        let checked = filter.checked()?;
+        let checked = CheckedFilter::new(&filter)?;
         let mut places: Vec<TrackPoint> = vec![];
         for (_, months) in self.months(&checked).await? {
             let rows = self.wanted(&checked, query.from, months).await?;

@@ -2,10 +2,14 @@
 
 use std::cmp::Ordering;
 
+use contract::ContractError;
 use contract::observation::Observation;
 use contract::product::ProductId;
 use contract::time::TimeMs;
 use serde::{Deserialize, Serialize};
+
+/// Longest text of a key, bytes.
+const MAX_TEXT_BYTES: usize = 1024;
 
 /// The natural key; keys are ordered by time, dataset, platform, property, depth, texts by their bytes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -26,6 +30,29 @@ impl Key {
             property: observation.property.clone(),
             depth_m: observation.depth_m,
         }
+    }
+}
+
+/// The `next` of a page: its JSON as hexadecimal text.
+impl std::fmt::Display for Key {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let json = serde_json::to_string(self).map_err(|_never| std::fmt::Error)?;
+        json.bytes().try_for_each(|byte| write!(f, "{byte:02x}"))
+    }
+}
+
+impl std::str::FromStr for Key {
+    type Err = ContractError;
+
+    fn from_str(s: &str) -> Result<Self, Self::Err> {
+        let bad = || ContractError::invalid("page token", s, "the `next` of an answer");
+        if s.len() > MAX_TEXT_BYTES || !s.len().is_multiple_of(2) || !s.is_ascii() {
+            return Err(bad());
+        }
+        let byte = |at: usize| u8::from_str_radix(&s[at..at + 2], 16);
+        let json: Result<Vec<u8>, _> = (0..s.len()).step_by(2).map(byte).collect();
+        let json = json.map_err(|_no_hex| bad())?;
+        serde_json::from_slice(&json).map_err(|_no_key| bad())
     }
 }
 

@@ -21,14 +21,12 @@ mod settings;
 mod store;
 mod track;
 
+pub use contract::observation::{Filter, MAX_LIMIT, Page, Platform, TrackPoint, TrackQuery};
 pub use error::{ErrorClass, ObservationError};
 pub use files::FileStore;
-pub use filter::{Filter, MAX_LIMIT, Page, PageToken};
 pub use gc::Datasets;
 pub use open::open;
-pub use platform::Platform;
 pub use postgis::PostgisStore;
 pub use service::ObservationService;
 pub use settings::{DatabaseSettings, ObservationSettings};
 pub use store::{Counts, ObservationStore};
-pub use track::{TrackPoint, TrackQuery};

@@ -2,35 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use contract::observation::{Observation, PlatformKind};
+use contract::observation::{Observation, Platform};
 use contract::product::ProductId;
 use contract::time::TimeMs;
-use serde::{Deserialize, Serialize};
-
-/// One platform of a dataset, over those of its observations that were asked for.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Platform {
-    /// Its dataset.
-    pub dataset: ProductId,
-    /// Its name in the dataset.
-    pub name: String,
-    /// What it is, as its last observation says.
-    pub kind: PlatformKind,
-    /// Time of its first observation.
-    pub first: TimeMs,
-    /// Time of its last observation.
-    pub last: TimeMs,
-    /// West, south, east, north of its places, degrees; east passes 180 where they lie on both sides of the date line.
-    pub bounds_deg: [f64; 4],
-    /// Longitude of its last observation, degrees.
-    pub lon_deg: f64,
-    /// Latitude of its last observation, degrees.
-    pub lat_deg: f64,
-    /// What it measures, sorted.
-    pub properties: Vec<String>,
-    /// Number of observations.
-    pub count: u64,
-}
 
 /// The narrower of the bounds that run from -180 to 180 and those from 0 to 360.
 ///
@@ -100,18 +74,21 @@ impl Gathering {
 
     /// At most `limit` platforms, by dataset and name.
     pub(crate) fn finish(self, limit: u32) -> Vec<Platform> {
-        let platforms = self.found.into_iter().map(|((dataset, name), g)| Platform {
-            dataset,
-            name,
-            kind: g.last.kind,
-            first: g.first,
-            last: g.last.time,
-            bounds_deg: bounds_deg(g.plain, g.eastward, g.lat),
-            lon_deg: g.last.lon_deg,
-            lat_deg: g.last.lat_deg,
-            properties: g.properties.into_iter().collect(),
-            count: g.count,
-        });
+        let platforms = self
+            .found
+            .into_iter()
+            .map(|((dataset, platform), g)| Platform {
+                dataset,
+                platform,
+                kind: g.last.kind,
+                first: g.first,
+                last: g.last.time,
+                bounds_deg: bounds_deg(g.plain, g.eastward, g.lat),
+                lon_deg: g.last.lon_deg,
+                lat_deg: g.last.lat_deg,
+                properties: g.properties.into_iter().collect(),
+                count: g.count,
+            });
         platforms.take(limit as usize).collect()
     }
 }

@@ -6,16 +6,14 @@ mod row;
 mod upsert;
 
 use async_trait::async_trait;
-use contract::observation::Observation;
+use contract::observation::{Filter, Observation, Page, Platform, TrackPoint, TrackQuery};
 use tokio_postgres::types::ToSql;
 
-use crate::batch;
 use crate::error::ObservationError;
-use crate::filter::{Filter, Page};
-use crate::platform::Platform;
+use crate::filter::{self, CheckedFilter};
 use crate::settings::DatabaseSettings;
 use crate::store::{Counts, ObservationStore};
-use crate::track::{TrackPoint, TrackQuery};
+use crate::{batch, track};
 use pool::Connections;
 use question::Question;
 
@@ -58,25 +56,25 @@ impl ObservationStore for PostgisStore {
     }
 
     async fn query(&self, filter: &Filter) -> Result<Page, ObservationError> {
-        let checked = filter.checked()?;
+        let checked = CheckedFilter::new(filter)?;
         let question = question::observations(&checked);
         let rows = self.rows("reading observations", &question).await?;
         let observations = rows
             .iter()
             .map(row::observation)
             .collect::<Result<_, _>>()?;
-        Ok(Page::cut(observations, filter.limit))
+        Ok(filter::page(observations, filter.limit))
     }
 
     async fn platforms(&self, filter: &Filter) -> Result<Vec<Platform>, ObservationError> {
-        let checked = filter.checked()?;
+        let checked = CheckedFilter::new(filter)?;
         let question = question::platforms(&checked);
         let rows = self.rows("reading platforms", &question).await?;
         rows.iter().map(row::platform).collect()
     }
 
     async fn track(&self, query: &TrackQuery) -> Result<Vec<TrackPoint>, ObservationError> {
-        query.validate()?;
+        track::check(query)?;
         let question = question::track(query);
         let rows = self.rows("reading a track", &question).await?;
         rows.iter().map(row::track_point).collect()

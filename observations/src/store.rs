@@ -1,13 +1,10 @@
 //! The one trait of both homes of observations.
 
 use async_trait::async_trait;
-use contract::observation::Observation;
+use contract::observation::{Filter, Observation, Page, Platform, TrackPoint, TrackQuery};
 use serde::{Deserialize, Serialize};
 
 use crate::error::ObservationError;
-use crate::filter::{Filter, Page};
-use crate::platform::Platform;
-use crate::track::{TrackPoint, TrackQuery};
 
 /// What became of the observations of one call; of several of one name only the last is counted.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]

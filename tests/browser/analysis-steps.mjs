@@ -50,7 +50,7 @@ export async function budgetTotal(journey) {
   const { page } = journey;
   await page.locator("#tab-budget").click();
   await page.locator("#budget-total").waitFor();
-  const { id, manifest, steps } = await journey.product();
+  const { product: id, manifest, steps } = await journey.product();
   const answer = await journey.api(`api/products/${id}/budget`, {
     region: "global",
     from: steps[0].start,
@@ -61,7 +61,7 @@ export async function budgetTotal(journey) {
   const [total] = answer.rows;
   await eventually(async () => {
     const text = await page.locator("#budget-total").innerText();
-    assert.ok(Math.abs(number(text) - total.budget) <= 0.05 + 1e-9, `${text} must be ${total.budget}`);
+    assert.ok(Math.abs(number(text) - total.budget_tg) <= 0.05 + 1e-9, `${text} must be ${total.budget_tg}`);
     const named = await page.locator("#panel-budget .manifest code").innerText();
     assert.ok(named.includes(manifest), "the manifest must be named");
     assert.equal(await page.locator("#budget-table tbody tr").count(), steps.length);

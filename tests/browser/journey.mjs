@@ -37,7 +37,7 @@ export class Journey {
   /** The product on show, as the server describes it. */
   async product() {
     const { product } = await this.state();
-    return (await this.api("api/products")).products.find((each) => each.id === product);
+    return (await this.api("api/products")).products.find((each) => each.product === product);
   }
 
   async shot(name) {

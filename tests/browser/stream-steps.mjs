@@ -86,7 +86,7 @@ export async function newDataLands(journey) {
 /** The page's half alone: a planted stream tells of new data, and the pictures in sight are asked for again. */
 export async function newDataIsShown(journey) {
   const { page, base, watch } = journey;
-  const { id, title, manifest, steps } = await journey.product();
+  const { product: id, title, manifest, steps } = await journey.product();
   const touched = [{ start: steps[0].start, end: steps[steps.length - 1].end }];
   const data = JSON.stringify({ product: id, manifest, touched });
   await page.goto("about:blank");

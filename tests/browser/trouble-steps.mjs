@@ -4,7 +4,7 @@ import { iso } from "./reading.mjs";
 
 export async function sharedAddress(journey) {
   const { page, base } = journey;
-  const { id, steps } = await journey.product();
+  const { product: id, steps } = await journey.product();
   const time = steps[Math.min(3, steps.length - 1)].mid;
   await page.route("**/api/products", async (route) => {
     const answer = await route.fetch();
@@ -29,7 +29,7 @@ export async function sharedAddress(journey) {
 /** An address that asks for an instant that there is nothing of. */
 export async function timeOutside(journey) {
   const { page, base } = journey;
-  const { id, steps } = await journey.product();
+  const { product: id, steps } = await journey.product();
   const last = steps[steps.length - 1].end;
   await page.goto("about:blank");
   await page.goto(new URL(`#product=${id}&mode=map&time=2150-07-01`, base).href);

@@ -116,7 +116,7 @@ fn until_derived(cluster: &Cluster, granules: &Granules) -> Result<()> {
         ) else {
             return Ok(None);
         };
-        let is_whole = flux["steps"] == 12 && derived["derived_from"] == flux["manifest"];
+        let is_whole = flux["step_count"] == 12 && derived["derived_from"] == flux["manifest"];
         Ok(is_whole.then_some(()))
     })
 }

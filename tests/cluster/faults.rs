@@ -380,7 +380,7 @@ pub(crate) fn until_whole(cluster: &Cluster, months: usize) {
         let (Some(flux), Some(derived)) = (find(PRODUCT), find(ACCUMULATED)) else {
             return Ok(None);
         };
-        let is_whole = flux["steps"] == months && derived["derived_from"] == flux["manifest"];
+        let is_whole = flux["step_count"] == months && derived["derived_from"] == flux["manifest"];
         Ok(is_whole.then_some(()))
     };
     cluster.wait_for("whole product", LIMIT, look).unwrap();

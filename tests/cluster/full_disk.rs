@@ -34,7 +34,7 @@ fn months(data: &Path) -> u64 {
     let all = products.as_array().unwrap().iter();
     let mut own = all.filter(|product| product["product"] == PRODUCT);
     own.next()
-        .map_or(0, |product| product["steps"].as_u64().unwrap())
+        .map_or(0, |product| product["step_count"].as_u64().unwrap())
 }
 
 /// How often each file was told of as landed in the journal of a data folder.

@@ -41,7 +41,7 @@ fn a_batch_goes_on_past_bad_files_and_its_exit_code_says_so() {
         );
     }
     let products = program::json(data.path(), &["products", "--json"]).unwrap();
-    assert_eq!(products[0]["steps"], 1, "{products}");
+    assert_eq!(products[0]["step_count"], 1, "{products}");
 }
 
 #[test]

@@ -256,7 +256,7 @@ fn the_server_tells_what_was_computed() {
         .as_array()
         .unwrap()
         .iter()
-        .map(|p| p["id"].as_str().unwrap())
+        .map(|p| p["product"].as_str().unwrap())
         .collect();
     for id in [
         "takahashi09-flux",
@@ -275,7 +275,7 @@ fn the_server_tells_what_was_computed() {
         .as_array()
         .unwrap()
         .iter()
-        .map(|row| row["budget"].as_f64().unwrap());
+        .map(|row| row["budget_tg"].as_f64().unwrap());
     assert_eq!(
         over_http.collect::<Vec<_>>(),
         rows(&budget(data, &["--step", "month"]))

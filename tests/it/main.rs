@@ -11,4 +11,5 @@ mod dependencies;
 mod end_to_end;
 mod harness_self;
 mod reread;
+mod same_answers;
 mod sea;

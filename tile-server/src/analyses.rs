@@ -3,12 +3,14 @@
 
 use std::sync::Arc;
 
+use contract::budget::{BudgetAnswer, BudgetQuery};
+use contract::check::Check;
 use contract::digest::Digest;
+use contract::grid::LonLatDeg;
+use contract::series::{PointSeries, RegionSeries, RegionSeriesQuery};
 use quick_cache::sync::Cache;
 
-use crate::backend::{
-    Analyse, AreaRequest, AreaSeries, BudgetAnswer, BudgetRequest, Check, PointStep, RowCol,
-};
+use crate::backend::Analyse;
 use crate::catalogue::Layer;
 use crate::error::ServerError;
 use crate::gate::Gate;
@@ -27,8 +29,8 @@ pub struct Analyses {
     metrics: Metrics,
     budgets: Cache<Digest, Arc<BudgetAnswer>>,
     flights: SingleFlight<Arc<BudgetAnswer>>,
-    areas: Cache<Digest, Arc<AreaSeries>>,
-    area_flights: SingleFlight<Arc<AreaSeries>>,
+    areas: Cache<Digest, Arc<RegionSeries>>,
+    area_flights: SingleFlight<Arc<RegionSeries>>,
 }
 
 impl Analyses {
@@ -45,36 +47,36 @@ impl Analyses {
         }
     }
 
-    /// The values of a cell, one for each step, stored unit.
-    pub async fn point(&self, layer: &Layer, cell: RowCol) -> Result<Vec<PointStep>, ServerError> {
+    /// The series of the cell at a place.
+    pub async fn point(&self, layer: &Layer, place: LonLatDeg) -> Result<PointSeries, ServerError> {
         let _pass = self
             .gate
             .enter()
             .await
             .inspect_err(|_busy| self.metrics.refused.inc())?;
-        let values = self.analyst.point(&layer.manifest, cell).await?;
-        let steps = layer.manifest.steps.len();
-        if values.len() != steps {
+        let (manifest, id) = (&layer.manifest, &layer.id);
+        let answer = self.analyst.point(manifest, id, place).await?;
+        let (values, steps) = (answer.series.len(), manifest.steps.len());
+        if values != steps {
             return Err(ServerError::Defect {
-                what: format!("the analyst gave {} values for {steps} steps", values.len()),
+                what: format!("the analyst gave {values} values for {steps} steps"),
             });
         }
-        Ok(values)
+        Ok(answer)
     }
 
-    /// The budget of a request about `layer`.
+    /// A budget of `layer`.
     pub async fn budget(
         &self,
         layer: &Layer,
-        request: BudgetRequest,
+        query: BudgetQuery,
     ) -> Result<Arc<BudgetAnswer>, ServerError> {
         let key = Digest::of_json(&(
             &layer.id,
-            &request.region,
-            request.period,
-            request.step,
-            (request.earth, request.cells),
-            request.ocean.as_ref().map(|ocean| ocean.id()),
+            (&query.region, &query.region_name),
+            (query.from, query.to, query.step),
+            (query.earth, query.cells),
+            query.ocean.as_ref().map(|ocean| ocean.id()),
         ));
         if let Some(answer) = self.budgets.get(&key) {
             return Ok(answer);
@@ -84,26 +86,28 @@ impl Analyses {
             self.gate.clone(),
             self.metrics.clone(),
         );
+        let manifest = Arc::clone(&layer.manifest);
         let compute = || async move {
             let _pass = gate
                 .enter()
                 .await
                 .inspect_err(|_busy| metrics.refused.inc())?;
-            Ok(Arc::new(analyst.budget(&request).await?))
+            Ok(Arc::new(analyst.budget(&manifest, &query).await?))
         };
         let answer = self.flights.join(key, compute).await?;
         self.budgets.insert(key, Arc::clone(&answer));
         Ok(answer)
     }
 
-    /// The series over a region of a request about `layer`.
+    /// A series of `layer` over a region.
     pub async fn area(
         &self,
         layer: &Layer,
-        request: AreaRequest,
-    ) -> Result<Arc<AreaSeries>, ServerError> {
-        let ocean = request.ocean.as_ref().map(|ocean| ocean.id());
-        let asked = (&request.region, request.period, request.earth, ocean);
+        query: RegionSeriesQuery,
+    ) -> Result<Arc<RegionSeries>, ServerError> {
+        let ocean = query.ocean.as_ref().map(|ocean| ocean.id());
+        let region = (&query.region, &query.region_name);
+        let asked = (region, query.from, query.to, query.earth, ocean);
         let key = Digest::of_json(&("area", &layer.id, asked));
         if let Some(series) = self.areas.get(&key) {
             return Ok(series);
@@ -113,12 +117,13 @@ impl Analyses {
             self.gate.clone(),
             self.metrics.clone(),
         );
+        let manifest = Arc::clone(&layer.manifest);
         let compute = || async move {
             let _pass = gate
                 .enter()
                 .await
                 .inspect_err(|_busy| metrics.refused.inc())?;
-            Ok(Arc::new(analyst.area(&request).await?))
+            Ok(Arc::new(analyst.area(&manifest, &query).await?))
         };
         let series = self.area_flights.join(key, compute).await?;
         self.areas.insert(key, Arc::clone(&series));

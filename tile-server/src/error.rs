@@ -40,23 +40,6 @@ pub enum ServerError {
         name: &'static str,
         wanted: &'static str,
     },
-    /// A question about a place where the product has no cells.
-    #[error("{lon}, {lat} lies outside product {product}, which covers {covers}")]
-    OutsideGrid {
-        product: String,
-        lon: f64,
-        lat: f64,
-        covers: String,
-    },
-    /// A question about a time the product has no steps for.
-    #[error("product {product} has no data in that period: it covers {covers}")]
-    OutsidePeriod { product: String, covers: String },
-    /// A budget of something that is no flux.
-    #[error("product {product} is {quantity}: only a carbon flux has a budget")]
-    NotAFlux {
-        product: String,
-        quantity: &'static str,
-    },
     /// No such product.
     #[error("there is no product {name:?}; /api/products lists those there are")]
     UnknownProduct { name: String },
@@ -136,9 +119,6 @@ impl ServerError {
             Self::Contract(_)
             | Self::Address { .. }
             | Self::Missing { .. }
-            | Self::OutsideGrid { .. }
-            | Self::OutsidePeriod { .. }
-            | Self::NotAFlux { .. }
             | Self::NoVector { .. } => StatusCode::BAD_REQUEST,
             Self::UnknownProduct { .. }
             | Self::EmptyProduct { .. }

@@ -1,7 +1,10 @@
 //! Parts of an address as typed values, with the reason as JSON where they are not.
 
+use std::str::FromStr;
+
 use axum::extract::{FromRequestParts, Path, Query};
 use axum::http::request::Parts;
+use contract::ContractError;
 use contract::time::TimeMs;
 use serde::de::DeserializeOwned;
 
@@ -68,6 +71,13 @@ pub(crate) fn whole_number(
 pub(crate) fn number(what: &'static str, text: &str, valid: &str) -> Result<f64, ServerError> {
     let number = text.parse().ok().filter(|value: &f64| value.is_finite());
     number.ok_or_else(|| ServerError::invalid(what, text, valid))
+}
+
+/// A value, if there is one.
+pub(crate) fn parsed<T: FromStr<Err = ContractError>>(
+    text: Option<&str>,
+) -> Result<Option<T>, ServerError> {
+    Ok(text.map(str::parse).transpose()?)
 }
 
 /// An instant, if there is one.

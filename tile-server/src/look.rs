@@ -6,6 +6,7 @@ use serde::Deserialize;
 use utoipa::IntoParams;
 
 use crate::error::ServerError;
+use crate::extract::parsed;
 use crate::openapi::words;
 
 /// Parameters that every picture and its legend take; see [`Look`].
@@ -54,23 +55,16 @@ impl LookQuery {
         }
         Ok(Look {
             options: TransferOptions {
-                palette: parsed(self.palette.as_ref())?,
-                range: parsed(self.range.as_ref())?,
-                colors: parsed(self.stops.as_ref())?.unwrap_or_default(),
-                opacity: parsed(self.opacity.as_ref())?.unwrap_or_default(),
-                size: parsed(self.particle_size.as_ref())?.unwrap_or_default(),
+                palette: parsed(self.palette.as_deref())?,
+                range: parsed(self.range.as_deref())?,
+                colors: parsed(self.stops.as_deref())?.unwrap_or_default(),
+                opacity: parsed(self.opacity.as_deref())?.unwrap_or_default(),
+                size: parsed(self.particle_size.as_deref())?.unwrap_or_default(),
                 reversed: flag("reverse", self.reverse.as_deref())?,
             },
             uncertainty: flag("uncertainty", self.uncertainty.as_deref())?,
         })
     }
-}
-
-fn parsed<T: std::str::FromStr>(text: Option<&String>) -> Result<Option<T>, ServerError>
-where
-    ServerError: From<T::Err>,
-{
-    Ok(text.map(|text| text.parse()).transpose()?)
 }
 
 fn flag(what: &'static str, text: Option<&str>) -> Result<bool, ServerError> {

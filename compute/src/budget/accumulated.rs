@@ -1,60 +1,28 @@
 //! A budget of accumulated carbon: that of the flux which it was accumulated from, exact, and how complete it is.
 
+use contract::budget::{BudgetAnswer, BudgetQuery, Completeness};
 use contract::chunk::frame_chunks;
 use contract::key::ObjectKey;
 use contract::manifest::{Manifest, Step};
 use contract::time::TimeMs;
-use serde::{Deserialize, Serialize};
-use storage::{Store, contributed, manifests};
+use storage::{Store, contributed};
 
-use super::over_region::weights;
-use super::query::{BudgetAnswer, BudgetQuery, budget_of as budget_of_flux, steps_inside};
+use super::over_region::{AskedArea, weights};
 use crate::region::address::weights_failed;
 use crate::region::loaded::RegionWeights;
 use crate::{ComputeError, Engine};
 
-/// How complete a row of accumulated carbon is: a cell with one month of twelve is not a complete one.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Completeness {
-    /// Area of the cells that hold data in all of the row's time, m².
-    pub complete_m2: f64,
-    /// Area of those that hold data in some of it only, m².
-    pub incomplete_m2: f64,
-}
-
-impl Completeness {
-    /// Share of the area with data that holds them in all of the time, percent; none without data.
-    pub fn percent(&self) -> Option<f64> {
-        let all_m2 = self.complete_m2 + self.incomplete_m2;
-        (all_m2 > 0.0).then(|| 100.0 * self.complete_m2 / all_m2)
-    }
-}
-
-/// The budget of a version of accumulated carbon, from where accumulation starts on.
-pub(super) async fn budget_of(
+/// The budget of the flux as that of a version of the carbon that was accumulated from it.
+pub(super) async fn completed(
     engine: &Engine,
     query: &BudgetQuery,
     manifest: &Manifest,
+    mut answer: BudgetAnswer,
 ) -> Result<BudgetAnswer, ComputeError> {
-    let (Some(source), Some(extent)) = (&manifest.derived_from, manifest.extent()) else {
-        return Err(ComputeError::NotAFlux {
-            product: manifest.product.clone(),
-            quantity: manifest.quantity,
-        });
-    };
-    let (window, _steps) = steps_inside(manifest, query.from, query.to)?;
-    let source = manifests::load(engine.store(), source).await?;
-    let of_flux = BudgetQuery {
-        product: source.product.clone(),
-        from: Some(window.start.max(extent.start)),
-        to: Some(window.end),
-        ..query.clone()
-    };
-    let mut answer = Box::pin(budget_of_flux(engine, &of_flux, &source)).await?;
     answer.product = manifest.product.clone();
     answer.manifest = manifest.id();
     answer.title.clone_from(&manifest.title);
-    let address = weights(engine, manifest, query.area()).await?.all;
+    let address = weights(engine, manifest, AskedArea::of(query)).await?.all;
     let areas = engine.objects().weights(&address).await;
     let areas = areas.map_err(weights_failed)?;
     let mut counted = Counted::new(engine.store(), manifest);

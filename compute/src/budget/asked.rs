@@ -11,10 +11,10 @@ use contract::time::{Period, TimeMs};
 use datafusion::arrow::array::{AsArray as _, RecordBatch};
 use datafusion::arrow::compute::cast;
 use datafusion::arrow::datatypes::{DataType, Decimal128Type, Int64Type, TimestampMillisecondType};
+use serde::{Deserialize, Serialize};
 
 use super::bands::{BAND_COUNT, band_areas, summed_bands};
 use super::rows::StepSum;
-use super::sums::Measure;
 use crate::region::address::{RegionAddress, weights_failed};
 use crate::scan::{self, Layout};
 use crate::session::QueryContext;
@@ -40,6 +40,16 @@ const STEP_SUMS: &str = "
           FROM frames
           WHERE $chunks)
     GROUP BY period_start, period_end";
+
+/// What is summed over cells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Measure {
+    /// Flux x area x time: a mass, kg.
+    Mass,
+    /// Value x area: what a mean is made of.
+    Mean,
+}
 
 /// A region on a grid, its weights read.
 pub(super) struct AskedRegion {

@@ -1,17 +1,14 @@
 //! Sums of the named regions: which of them touch a grid, and storing those of a new version.
 
-use contract::earth::Earth;
 use contract::grid::Grid;
 use contract::manifest::Manifest;
 use contract::region::{NAMED_REGIONS, Region};
 use storage::Store;
 
-use super::sums::{self, Measure, StoredSums};
-use crate::region::weights::{self, RegionKeys};
+use super::asked::Measure;
+use super::sums::{self, StoredSums};
+use crate::region::weights::{self, EARTH, RegionKeys};
 use crate::{ComputeError, Engine};
-
-/// The figure of the earth that sums are stored for.
-pub const EARTH: Earth = Earth::Wgs84;
 
 /// A named region that touches a grid.
 #[derive(Debug, Clone, PartialEq, Eq)]

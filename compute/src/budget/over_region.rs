@@ -1,16 +1,18 @@
 //! Sums over a region and what they are set against: its area, its sea, and who says what is sea.
 
+use contract::budget::BudgetQuery;
 use contract::earth::Earth;
 use contract::manifest::{Manifest, Step};
 use contract::region::Region;
 
+use super::asked::Measure;
 use super::fixed::AREA_DECIMALS;
-use super::sums::{self, Measure, RegionSums};
-use crate::region::address::{OnGrid, RegionAddress};
+use super::sums::{self, RegionSums};
+use crate::region::address::RegionAddress;
 use crate::region::extent::{Extent, extent, outline};
 use crate::region::shares::{self, Shares};
-use crate::region::weights::Surface;
-use crate::{ComputeError, Engine, catalogue};
+use crate::region::weights::{OnGrid, Surface};
+use crate::{ComputeError, Engine};
 
 /// Share of a region that a grid must lack before a reader is told.
 const OUTSIDE_SHARE: f64 = 1e-6;
@@ -24,6 +26,17 @@ pub(crate) struct AskedArea<'a> {
     pub(crate) earth: Earth,
     /// A version of a product that says shares of sea or land; Natural Earth if none.
     pub(crate) ocean: Option<&'a Manifest>,
+}
+
+impl<'a> AskedArea<'a> {
+    /// That of a budget.
+    pub(crate) fn of(query: &'a BudgetQuery) -> Self {
+        Self {
+            region: &query.region,
+            earth: query.earth,
+            ocean: query.ocean.as_deref(),
+        }
+    }
 }
 
 /// Sums of steps over a region.
@@ -57,7 +70,7 @@ pub(crate) async fn weights(
     let found = RegionAddress::of(engine, on_grid).await?;
     found.ok_or_else(|| ComputeError::RegionOutside {
         product: manifest.product.clone(),
-        bounds: catalogue::bounds_text(manifest),
+        bounds: manifest.bounds_text(),
     })
 }
 

@@ -1,44 +1,13 @@
 //! Calendar rows of a budget: exact sums of steps in, rows with budget and coverage out.
 
 use contract::ContractError;
-use contract::time::{Period, TimeMs};
-use serde::{Deserialize, Serialize};
+use contract::budget::{BudgetRow, BudgetStep};
+use contract::region::Cells;
+use contract::time::Period;
 
-use super::accumulated::Completeness;
 use super::bands::{BAND_COUNT, BandSum};
 use super::fixed::{AREA_DECIMALS, MASS_DECIMALS, decimal_text, share};
 use super::gaps::gap;
-use contract::region::Cells;
-
-/// What one row of a budget covers.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum BudgetStep {
-    /// Calendar months.
-    Month,
-    /// Calendar years.
-    #[default]
-    Year,
-    /// The whole asked period.
-    Total,
-}
-
-impl std::str::FromStr for BudgetStep {
-    type Err = ContractError;
-
-    fn from_str(s: &str) -> Result<Self, Self::Err> {
-        match s {
-            "month" => Ok(Self::Month),
-            "year" => Ok(Self::Year),
-            "total" => Ok(Self::Total),
-            _ => Err(ContractError::invalid(
-                "step",
-                s,
-                "use month, year or total",
-            )),
-        }
-    }
-}
 
 /// Exact sums of one step over a region.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -82,38 +51,6 @@ pub struct Asked {
     pub sea_steps: [i128; BAND_COUNT],
     /// How cells on the coast count.
     pub cells: Cells,
-}
-
-/// One row of a budget.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct BudgetRow {
-    /// First instant.
-    pub start: TimeMs,
-    /// First instant after it.
-    pub end: TimeMs,
-    /// Carbon that left the sea, kg, exact, as decimal text; negative where the sea took it up.
-    pub budget_kg: String,
-    /// The same in Tg (10⁹ kg).
-    pub budget_tg: f64,
-    /// Share of the region's sea and of the row's time that holds data, percent; 0 where the region holds no sea.
-    pub coverage_percent: f64,
-    /// Area that counted, mean over the time that steps cover, m²: with whole cells also land on the coast.
-    pub area_m2: f64,
-    /// Area of the region, land included, m².
-    pub region_area_m2: f64,
-    /// Area of the sea in it, m².
-    pub ocean_area_m2: f64,
-    /// Area of the sea in it that holds data, mean over the time that steps cover, m².
-    pub ocean_with_data_m2: f64,
-    /// What the sea without data would add to the budget at the mean of its band of latitude, Tg: an estimate, never
-    /// part of the budget. None where there are gaps and nothing to estimate any of them from.
-    pub gap_tg: Option<f64>,
-    /// Area of the sea without data that the estimate stands for, mean over the time that steps cover, m². What is
-    /// missing besides has no estimate: bands without any data, sea beyond the grid, time without steps.
-    pub gap_area_m2: f64,
-    /// How complete the sums of accumulated carbon are; none for fluxes, and in versions that did not count it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub completeness: Option<Completeness>,
 }
 
 /// Kilograms in a teragram.

@@ -10,7 +10,7 @@ use contract::time::{Period, TimeMs};
 use serde::{Deserialize, Serialize};
 use storage::{StorageError, Store, document, manifests};
 
-use super::asked::{AskedRegion, asked};
+use super::asked::{AskedRegion, Measure, asked};
 use super::bands::{BAND_COUNT, BandSum};
 use super::rows::StepSum;
 use crate::region::address::RegionAddress;
@@ -21,16 +21,6 @@ use crate::{ComputeError, Engine};
 const SCHEMA: u32 = 3;
 /// How many versions back sums are looked for that can be taken over.
 const VERSIONS_BACK: u64 = 8;
-
-/// What is summed over cells.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Measure {
-    /// Flux x area x time: a mass, kg.
-    Mass,
-    /// Value x area: what a mean is made of.
-    Mean,
-}
 
 /// The sums of one version of a product over one region.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -1,29 +1,18 @@
 //! How complete the sums of one cell are, told from the series of the flux that they were accumulated from.
 
 use contract::manifest::Manifest;
-use serde::{Deserialize, Serialize};
+use contract::series::CellCounts;
 use storage::manifests;
 
 use super::source::steps_since;
-use crate::point::cell_values;
+use crate::stats::cell_values;
 use crate::{ComputeError, Engine};
-
-/// What the sum of a cell after a step holds.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct CellCounts {
-    /// Steps that had data.
-    pub steps: u32,
-    /// Steps since accumulation started.
-    pub of_steps: u32,
-    /// Share of the time since then that had data, percent; below 100 the sum is not complete.
-    pub time_percent: f64,
-}
 
 /// What the sums of a cell hold after each step of a version of accumulated carbon; none for other products, and where
 /// the version that it was accumulated from is gone.
 ///
 /// Counts are stored by map, which is slow to read for one cell; the series of the source, read once, says the same.
-pub async fn counts_at_cell(
+pub(crate) async fn counts_at_cell(
     engine: &Engine,
     manifest: &Manifest,
     row: u32,

@@ -38,34 +38,22 @@ pub(super) fn steps_since(
     source: &Manifest,
     start: Option<TimeMs>,
 ) -> Result<Vec<SourceStep<'_>>, ComputeError> {
+    let (_window, inside) = source.steps_inside(start, None)?;
     let mut steps: Vec<SourceStep<'_>> = vec![];
-    for step in &source.steps {
+    for step in inside {
         let from = start.map_or(step.period.start, |start| start.max(step.period.start));
-        if from < step.period.end {
-            let period = Period::new(from, step.period.end)?;
-            let made_of = Digest::of_json(&MadeOf {
-                kind: "accumulated",
-                method: METHOD,
-                before: steps.last().map(|step| step.made_of),
-                period,
-                frame: &step.frame,
-            });
-            steps.push(SourceStep {
-                step,
-                period,
-                made_of,
-            });
-        }
-    }
-    if steps.is_empty() {
-        let asked = start.map_or_else(
-            || "any period".to_owned(),
-            |start| format!("the time from {start} on"),
-        );
-        return Err(ComputeError::NoStep {
-            product: source.product.clone(),
-            asked,
-            covered: source.extent(),
+        let period = Period::new(from, step.period.end)?;
+        let made_of = Digest::of_json(&MadeOf {
+            kind: "accumulated",
+            method: METHOD,
+            before: steps.last().map(|step| step.made_of),
+            period,
+            frame: &step.frame,
+        });
+        steps.push(SourceStep {
+            step,
+            period,
+            made_of,
         });
     }
     Ok(steps)

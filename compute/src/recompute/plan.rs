@@ -12,14 +12,14 @@ use storage::{Store, manifests, verify};
 
 use super::{Item, Plan, Reason, Request, What};
 use crate::budget::named::{self, Touching};
-use crate::budget::{Measure, steps_inside, sums};
+use crate::budget::{Measure, sums};
 use crate::derive::{chosen_start, made_of};
 use crate::{ComputeError, catalogue};
 
 /// What a request comes to. Nothing is written.
 pub async fn plan(store: &Store, request: &Request) -> Result<Plan, ComputeError> {
     let manifest = catalogue::product(store, &request.product).await?;
-    let (window, _steps) = steps_inside(&manifest, request.from, request.to)?;
+    let (window, _steps) = manifest.steps_inside(request.from, request.to)?;
     let mut plan = Plan {
         manifest: manifest.id(),
         items: vec![],

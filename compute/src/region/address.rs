@@ -3,26 +3,13 @@
 //! An engine that answers strangers stores nothing for them, however many regions they think of. Regions that have a name
 //! are few: their weights are stored for everybody.
 
-use contract::earth::Earth;
-use contract::grid::Grid;
 use contract::key::ObjectKey;
-use contract::region::{NAMED_REGIONS, NamedRegion, Region};
+use contract::region::{NAMED_REGIONS, NamedRegion};
 use storage::{StorageError, Store};
 
 use super::computed::ComputedWeights;
-use super::weights::{RegionKeys, Surface};
-use crate::budget::named::EARTH;
+use super::weights::{EARTH, OnGrid, RegionKeys, Surface};
 use crate::{ComputeError, Engine};
-
-/// A region on a grid.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct OnGrid<'a> {
-    pub(crate) grid: &'a Grid,
-    pub(crate) region: &'a Region,
-    pub(crate) earth: Earth,
-    /// How its sea is told.
-    pub(crate) ocean: &'a Surface,
-}
 
 /// A region's weights as queries name them.
 #[derive(Debug, Clone, PartialEq, Eq)]

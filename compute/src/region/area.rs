@@ -1,30 +1,11 @@
-//! Areas of whole regions, and the integrals along edges that they are made of.
+//! Areas inside rings, and the integrals along edges that they are made of.
 
 use contract::earth::Earth;
-use contract::region::Region;
 
-use super::rings::{Ring, rings};
-use crate::ComputeError;
+use super::ring::Ring;
 
 /// Widest span of latitude that one quadrature takes, degrees.
 const SPAN_DEG: f64 = 5.0;
-
-/// Area of a region, m², wherever grids may lie.
-pub fn region_area_m2(region: &Region, earth: Earth) -> Result<f64, ComputeError> {
-    match region {
-        Region::Global => Ok(earth.cell_area_m2(-90.0, 90.0, 360.0)),
-        Region::Box {
-            west,
-            south,
-            east,
-            north,
-        } => Ok(earth.cell_area_m2(*south, *north, east - west)),
-        Region::Polygons(_) => Ok(rings(region)?
-            .iter()
-            .map(|ring| signed_area_m2(ring, earth))
-            .sum()),
-    }
-}
 
 /// Area inside a ring, m²: positive if its corners run against the clock. By Green's theorem it is the integral of
 /// longitude over the zone function along the ring, or minus that of the zone function over longitude.
@@ -68,9 +49,10 @@ pub(super) fn integral_m2(earth: Earth, from: [f64; 2], to: [f64; 2], base: f64)
 
 #[cfg(test)]
 mod tests {
-    use contract::region::Polygon;
+    use contract::region::{Polygon, Region};
 
     use super::*;
+    use crate::region::extent::region_area_m2;
 
     fn polygon(corners: &[[f64; 2]]) -> Region {
         Region::Polygons(vec![Polygon {

@@ -3,8 +3,9 @@
 use contract::earth::Earth;
 use contract::region::{Polygon, Region};
 
-use super::area::{region_area_m2, signed_area_m2};
-use super::rings::{Ring, rings};
+use super::area::signed_area_m2;
+use super::ring::Ring;
+use super::rings::rings;
 use super::sea::sea;
 use crate::ComputeError;
 
@@ -22,6 +23,23 @@ pub struct Extent {
     pub ocean_m2: f64,
     /// How the region was taken where that may surprise.
     pub notes: Vec<String>,
+}
+
+/// Area of a region, m², wherever grids may lie.
+pub fn region_area_m2(region: &Region, earth: Earth) -> Result<f64, ComputeError> {
+    match region {
+        Region::Global => Ok(earth.cell_area_m2(-90.0, 90.0, 360.0)),
+        Region::Box {
+            west,
+            south,
+            east,
+            north,
+        } => Ok(earth.cell_area_m2(*south, *north, east - west)),
+        Region::Polygons(_) => Ok(rings(region)?
+            .iter()
+            .map(|ring| signed_area_m2(ring, earth))
+            .sum()),
+    }
 }
 
 /// The extent of a region; its sea is what is no land of Natural Earth.

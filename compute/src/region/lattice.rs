@@ -7,7 +7,7 @@ use i_overlay::core::solver::Solver;
 use i_overlay::i_float::int::point::IntPoint;
 use i_overlay::i_shape::int::shape::{IntContour, IntShapes};
 
-use super::rings::Ring;
+use super::ring::Ring;
 
 /// Largest coordinate, as a power of two: what the library leaves room for in its products of 64 bits.
 const COORDINATE_BITS: i32 = 30;

@@ -10,7 +10,7 @@ use contract::grid::Grid;
 
 use super::area::integral_m2;
 use super::cut::TURNS_DEG;
-use super::rings::Ring;
+use super::ring::Ring;
 use crate::ComputeError;
 
 /// Shares of a cell this close to none or all are none or all: rounding of sums over a row's edges.

@@ -4,7 +4,7 @@ use contract::land::LAND;
 
 use super::cut::{bounds_deg, inside, into_the_world};
 use super::lattice::{Lattice, difference};
-use super::rings::Ring;
+use super::ring::Ring;
 
 /// The rings of what is sea inside of some rings; none where all is land.
 pub(super) fn sea(rings: &[Ring]) -> Vec<Ring> {
@@ -68,7 +68,7 @@ mod tests {
     fn open_sea_is_all_sea_and_inland_none() {
         let open = "-40,20,-30,30";
         let region: Region = open.parse().unwrap();
-        let own = crate::region::area::region_area_m2(&region, Earth::Wgs84).unwrap();
+        let own = crate::region::extent::region_area_m2(&region, Earth::Wgs84).unwrap();
         assert!((sea_m2(open) / own - 1.0).abs() < 1e-8);
         // The Sahara, and the Caspian Sea: enclosed waters are land.
         for inland in ["5,20,10,25", "50,38,52,41"] {

@@ -1,11 +1,13 @@
 //! Polygons made one region: what crosses, overlaps or repeats is counted once; what does not keeps its corners.
 
+use contract::earth::Earth;
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree, RTreeObject as _};
 
+use super::area::signed_area_m2;
 use super::cut::{bounds_deg, into_the_world};
 use super::lattice::{Lattice, difference, edges};
-use super::rings::{Checked, Ring};
+use super::ring::{Checked, Ring};
 
 /// The rings of the union of polygons.
 ///
@@ -74,17 +76,26 @@ fn overlaid(polygons: &[Parts], as_written: Option<&[&Checked]>) -> Vec<Ring> {
     }
     match as_written {
         Some(polygons) if edges(given.iter()) == edges(shapes.iter().flatten()) => {
-            let turned = |polygon: &&Checked| {
-                let outer = Ring::turned(polygon.outer.clone(), true);
+            let rings = |polygon: &&Checked| {
+                let outer = turned(polygon.outer.clone(), true);
                 let holes = polygon.holes.iter().cloned();
                 std::iter::once(outer)
-                    .chain(holes.map(|hole| Ring::turned(hole, false)))
+                    .chain(holes.map(|hole| turned(hole, false)))
                     .collect::<Vec<_>>()
             };
-            polygons.iter().flat_map(turned).collect()
+            polygons.iter().flat_map(rings).collect()
         }
         _ => lattice.rings(&shapes),
     }
+}
+
+/// A ring that runs against the clock, or with it.
+fn turned(mut corners: Vec<[f64; 2]>, against_the_clock: bool) -> Ring {
+    let ring = Ring::new(corners.clone());
+    if (signed_area_m2(&ring, Earth::Sphere) > 0.0) != against_the_clock {
+        corners.reverse();
+    }
+    Ring::new(corners)
 }
 
 /// Polygons in groups whose bounds meet, also some turns apart.

@@ -9,10 +9,10 @@ use contract::region::Region;
 use serde::{Deserialize, Serialize};
 use storage::{StorageError, Store};
 
-use super::address::OnGrid;
 use super::box_cover::{self, Bounds};
 use super::polygon_cover::Band;
-use super::rings::{Ring, rings};
+use super::ring::Ring;
+use super::rings::rings;
 use super::sea::sea;
 use super::shares::Shares;
 use crate::ComputeError;
@@ -21,6 +21,8 @@ use crate::ComputeError;
 const BOX_METHOD: u32 = 1;
 /// The same of polygons and of the sea. 2: edges are as wide as they are written, what overlaps counts once.
 const POLYGON_METHOD: u32 = 2;
+/// The figure of the earth that weights and sums of named regions are stored for.
+pub const EARTH: Earth = Earth::Wgs84;
 
 /// What of a region is weighed.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -42,6 +44,16 @@ impl Surface {
             Self::All | Self::Ocean => None,
         }
     }
+}
+
+/// A region on a grid.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct OnGrid<'a> {
+    pub(crate) grid: &'a Grid,
+    pub(crate) region: &'a Region,
+    pub(crate) earth: Earth,
+    /// How its sea is told.
+    pub(crate) ocean: &'a Surface,
 }
 
 /// Where the weights of a region on a grid are, whether they are there or not.

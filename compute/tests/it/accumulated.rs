@@ -3,7 +3,8 @@
 use std::sync::Mutex;
 
 use compute::derive::{DeriveProgress, derived};
-use compute::{BudgetQuery, BudgetStep, Engine, derive_accumulated};
+use compute::{Engine, derive_accumulated};
+use contract::budget::{BudgetQuery, BudgetStep};
 use contract::earth::Earth;
 use contract::event::Body;
 use contract::grid::Grid;

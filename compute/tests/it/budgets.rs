@@ -1,6 +1,7 @@
 //! Budgets with known answers, and questions that have none.
 
-use compute::{BudgetStep, ComputeError, Engine, ErrorClass, budget};
+use compute::{ComputeError, Engine, ErrorClass, budget};
+use contract::budget::{BudgetQuery, BudgetStep};
 use contract::earth::Earth;
 use contract::grid::Grid;
 use contract::quantity::Quantity;
@@ -47,7 +48,7 @@ async fn an_even_flux_integrates_to_area_times_time() {
     assert!((globe.rows[0].area_m2 / area_m2 - 1.0).abs() < 1e-12);
 
     // Half a cell, a third of a row, across the date line, and parts of two months.
-    let query = compute::BudgetQuery {
+    let query = BudgetQuery {
         from: Some("2000-01-31".parse().unwrap()),
         to: Some("2000-02-11".parse().unwrap()),
         step: BudgetStep::Month,
@@ -68,7 +69,7 @@ async fn an_even_flux_integrates_to_area_times_time() {
 
     let sphere = ask(
         &engine,
-        &compute::BudgetQuery {
+        &BudgetQuery {
             earth: Earth::Sphere,
             ..total(&id, "global")
         },
@@ -102,7 +103,7 @@ async fn months_and_years_and_the_total_are_the_same_mass() {
     ] {
         let answer = ask(
             &engine,
-            &compute::BudgetQuery {
+            &BudgetQuery {
                 step,
                 ..total(&id, "14n-50n")
             },
@@ -221,7 +222,7 @@ async fn small_products(store: &storage::Store) {
     }
 }
 
-async fn refusal(engine: &Engine, query: compute::BudgetQuery) -> ComputeError {
+async fn refusal(engine: &Engine, query: BudgetQuery) -> ComputeError {
     budget(engine, &query).await.unwrap_err()
 }
 
@@ -247,7 +248,7 @@ async fn periods_without_a_step_are_refused_with_what_there_is() {
     let (_folder, store) = folder_store();
     small_products(&store).await;
     let engine = Engine::local(store);
-    let between = |from: &str, to: &str| compute::BudgetQuery {
+    let between = |from: &str, to: &str| BudgetQuery {
         from: from.parse().ok(),
         to: to.parse().ok(),
         ..total(&product("flux"), "global")

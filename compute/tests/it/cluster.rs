@@ -2,7 +2,8 @@
 
 use std::time::{Duration, Instant};
 
-use compute::{BudgetAnswer, BudgetQuery, BudgetStep, Engine, budget, derive_accumulated};
+use compute::{Engine, budget, derive_accumulated};
+use contract::budget::{BudgetAnswer, BudgetQuery, BudgetStep};
 use contract::quantity::Quantity;
 use contract::region::{Polygon, Region};
 use storage::Store;

@@ -5,14 +5,16 @@ use std::collections::BTreeSet;
 
 use bytes::Bytes;
 use compute::region::weights;
-use compute::stats::{RegionSeriesQuery, region_series};
-use compute::{BudgetAnswer, ComputeError, Engine, budget, derive_accumulated, point_series};
+use compute::stats::region_series;
+use compute::{ComputeError, Engine, budget, derive_accumulated, point_series};
+use contract::budget::BudgetAnswer;
 use contract::earth::Earth;
 use contract::grid::{Grid, LonLatDeg};
 use contract::key::ObjectKey;
 use contract::kind::Kind;
 use contract::quantity::Quantity;
 use contract::region::Region;
+use contract::series::RegionSeriesQuery;
 use contract::time::Period;
 use storage::sound::damage;
 use storage::verify::{self, Fault};

@@ -3,7 +3,8 @@
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
-use compute::{BudgetAnswer, BudgetQuery, BudgetStep, Engine, budget};
+use compute::{Engine, budget};
+use contract::budget::{BudgetAnswer, BudgetQuery, BudgetStep};
 use contract::digest::Digest;
 use contract::earth::Earth;
 use contract::grid::Grid;

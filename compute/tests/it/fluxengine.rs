@@ -5,7 +5,8 @@ use std::path::Path;
 use std::process::Command;
 use std::sync::Arc;
 
-use compute::{BudgetQuery, BudgetStep, Engine};
+use compute::Engine;
+use contract::budget::{BudgetQuery, BudgetStep};
 use contract::earth::Earth;
 use contract::manifest::Manifest;
 use contract::quantity::Quantity;

@@ -2,7 +2,7 @@
 
 use compute::budget::{Measure, sums};
 use compute::region::weights::RegionKeys;
-use compute::stats::{RegionSeriesQuery, region_series};
+use compute::stats::region_series;
 use compute::{Engine, budget, derive_accumulated, point_series};
 use contract::earth::Earth;
 use contract::grid::LonLatDeg;
@@ -10,6 +10,7 @@ use contract::key::ObjectKey;
 use contract::kind::Kind;
 use contract::manifest::{MANIFEST_SCHEMA, Manifest, OLDEST_MANIFEST_SCHEMA};
 use contract::region::Region;
+use contract::series::RegionSeriesQuery;
 use contract::time::Period;
 use storage::{Store, frames, manifests};
 use test_data::frozen;

@@ -3,13 +3,15 @@
 use std::sync::Arc;
 
 use compute::budget::budget;
-use compute::stats::{RegionSeriesQuery, region_series};
-use compute::{BudgetQuery, ComputeError, Engine, ErrorClass};
+use compute::stats::region_series;
+use compute::{ComputeError, Engine, ErrorClass};
+use contract::budget::BudgetQuery;
 use contract::earth::Earth;
 use contract::grid::Grid;
 use contract::manifest::Manifest;
 use contract::quantity::Quantity;
 use contract::region::Cells;
+use contract::series::RegionSeriesQuery;
 use contract::time::Period;
 use storage::Store;
 

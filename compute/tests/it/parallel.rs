@@ -1,6 +1,7 @@
 //! The same bits however many parts a budget is computed in, and in whatever order files are read.
 
-use compute::{BudgetStep, Engine};
+use compute::Engine;
+use contract::budget::{BudgetQuery, BudgetStep};
 use contract::quantity::Quantity;
 use contract::time::Period;
 
@@ -25,7 +26,7 @@ async fn any_number_of_partitions_gives_the_same_bits_with_ballista_and_without(
     for engine in ballista.into_iter().chain(in_process) {
         let mut rows = vec![];
         for region in ["global", "equatorial-pacific", "170.5,-33.3,-120.1,12.7"] {
-            let query = compute::BudgetQuery {
+            let query = BudgetQuery {
                 step: BudgetStep::Month,
                 ..total(&id, region)
             };

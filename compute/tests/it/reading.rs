@@ -10,7 +10,8 @@ use bytes::Bytes;
 use compute::budget::chunk::{mass_steps, valid_area_steps};
 use compute::budget::fixed::{MASS_DECIMALS, decimal_text};
 use compute::region::weights;
-use compute::{BudgetStep, Engine, Objects};
+use compute::{Engine, Objects};
+use contract::budget::{BudgetQuery, BudgetStep};
 use contract::chunk::frame_chunks;
 use contract::earth::Earth;
 use contract::grid::Grid;
@@ -246,7 +247,7 @@ async fn frames_of_the_layout_before_have_the_same_sums() {
         store.put_new(&step.frame, content).await.unwrap();
     }
     manifests::commit(&store, &old).await.unwrap();
-    let monthly = |id, region| compute::BudgetQuery {
+    let monthly = |id, region| BudgetQuery {
         step: BudgetStep::Month,
         ..total(id, region)
     };

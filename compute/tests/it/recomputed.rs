@@ -4,12 +4,13 @@ use std::time::Duration;
 
 use compute::gc::Computed;
 use compute::recompute::{Reason, Request, What, plan, run};
-use compute::stats::{RegionSeriesQuery, region_series};
+use compute::stats::region_series;
 use compute::{Engine, derive_accumulated};
 use contract::earth::Earth;
 use contract::grid::Grid;
 use contract::manifest::Manifest;
 use contract::quantity::Quantity;
+use contract::series::RegionSeriesQuery;
 use contract::time::{Period, TimeMs};
 use storage::gc::{self, Keep, Owner, Versions};
 use storage::sound::seal;

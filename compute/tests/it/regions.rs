@@ -3,7 +3,8 @@
 use std::process::Command;
 
 use compute::Engine;
-use compute::region::{area, file, weights};
+use compute::region::{extent, file, weights};
+use contract::budget::BudgetQuery;
 use contract::earth::Earth;
 use contract::grid::Grid;
 use contract::quantity::Quantity;
@@ -23,7 +24,7 @@ async fn a_box_drawn_in_a_file_has_the_budget_of_the_box() {
         [[[170.5,-33.3],[239.9,-33.3],[239.9,12.7],[170.5,12.7],[170.5,-33.3]]]}}"#;
     let path = folder.path().join("box.geojson");
     std::fs::write(&path, text).unwrap();
-    let drawn = compute::BudgetQuery {
+    let drawn = BudgetQuery {
         region: file::read(&path).unwrap(),
         ..total(&id, "global")
     };
@@ -48,7 +49,7 @@ fn real_land_and_real_ocean_make_the_earth() {
         ("ne_110m_ocean.json", 3.60e14, 3.65e14),
     ] {
         let region = file::read(&folder.join(name)).unwrap();
-        let own_m2 = area::region_area_m2(&region, Earth::Wgs84).unwrap();
+        let own_m2 = extent::region_area_m2(&region, Earth::Wgs84).unwrap();
         assert!((least_m2..most_m2).contains(&own_m2), "{name} {own_m2}");
         let chunks = weights::compute(&ONE_DEGREE, &region, Earth::Wgs84).unwrap();
         let weighted_m2: f64 = chunks.iter().flat_map(|(_, areas)| areas).sum();
@@ -97,9 +98,9 @@ fn areas_of_500_regions_are_those_that_another_program_finds() {
             file::read(&file).unwrap_or_else(|e| panic!("{kind}: {e}"))
         };
         let region = of("geojson");
-        let own_m2 = area::region_area_m2(&region, Earth::Wgs84).unwrap();
+        let own_m2 = extent::region_area_m2(&region, Earth::Wgs84).unwrap();
         // Two readers of one decimal number may differ in its last bit.
-        let as_text_m2 = area::region_area_m2(&of("wkt"), Earth::Wgs84).unwrap();
+        let as_text_m2 = extent::region_area_m2(&of("wkt"), Earth::Wgs84).unwrap();
         assert!((as_text_m2 / own_m2 - 1.0).abs() < 1e-9, "{kind} {index}");
         let weighed_m2 = weighed_m2(&ONE_DEGREE, &region);
         for ours_m2 in [own_m2, weighed_m2] {
@@ -135,8 +136,8 @@ fn a_rectangle_is_the_same_region_as_text_geojson_and_well_known_text() {
         ] {
             let drawn: Region = text.parse().unwrap();
             let (own, expected) = (
-                area::region_area_m2(&drawn, Earth::Wgs84).unwrap(),
-                area::region_area_m2(&boxed, Earth::Wgs84).unwrap(),
+                extent::region_area_m2(&drawn, Earth::Wgs84).unwrap(),
+                extent::region_area_m2(&boxed, Earth::Wgs84).unwrap(),
             );
             assert!(
                 (own / expected - 1.0).abs() < 1e-12,
@@ -182,7 +183,7 @@ async fn coverage_is_of_the_sea_and_gaps_are_estimated_apart() {
     }
     let engine = Engine::standalone(store, parts(2));
     let of = |name: &str, region: &str, cells| {
-        let query = compute::BudgetQuery {
+        let query = BudgetQuery {
             cells,
             ..total(&product(name), region)
         };

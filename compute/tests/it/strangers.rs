@@ -1,12 +1,14 @@
 //! Questions of strangers: however many regions they think of, the store stays as it is, and the answers are those of
 //! everybody.
 
-use compute::budget::{BudgetQuery, budget};
-use compute::stats::{RegionSeriesQuery, region_series};
+use compute::budget::budget;
+use compute::stats::region_series;
 use compute::{Engine, derive_accumulated};
+use contract::budget::BudgetQuery;
 use contract::earth::Earth;
 use contract::quantity::Quantity;
 use contract::region::Cells;
+use contract::series::RegionSeriesQuery;
 use storage::Store;
 
 use crate::fixture::{ONE_DEGREE, folder_store, land, parts, product, total, wavy_year};

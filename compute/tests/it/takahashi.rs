@@ -3,9 +3,10 @@
 use std::path::Path;
 use std::process::Command;
 
-use compute::check::Verdict;
 use compute::published::INTEGRALS;
-use compute::{BudgetStep, Engine, compare, derive_accumulated};
+use compute::{Engine, compare, derive_accumulated};
+use contract::budget::{BudgetQuery, BudgetStep};
+use contract::check::Verdict;
 use contract::earth::Earth;
 use contract::quantity::Quantity;
 
@@ -85,7 +86,7 @@ async fn read_as_centres_the_real_grids_would_fail_the_check() {
     assert!(rows.iter().any(|row| !row.agrees));
     let band = ask(
         &engine,
-        &compute::BudgetQuery {
+        &BudgetQuery {
             step: BudgetStep::Year,
             ..total(&id, "50s-62s")
         },

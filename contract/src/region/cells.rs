@@ -1,11 +1,12 @@
 //! How cells on the coast count in a sum over a region.
 
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
 use crate::ContractError;
 
 /// How much of a cell with data counts.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Cells {
     /// All of it that lies in the region, its land too: as climatologies on coarse grids are integrated.

@@ -6,15 +6,15 @@ use std::sync::Arc;
 use anyhow::Result;
 use comfy_table::presets::NOTHING;
 use comfy_table::{CellAlignment, Table};
-use compute::budget::{BudgetAnswer, BudgetQuery, BudgetRow, BudgetStep};
 use compute::region::file;
+use contract::budget::{BudgetAnswer, BudgetQuery, BudgetRow};
 use contract::manifest::Manifest;
 use contract::product::ProductId;
 use contract::quantity::Quantity;
-use contract::region::Region;
+use contract::region::AskedRegion;
 use storage::Store;
 
-use crate::cli::{Budget, Settings, Step};
+use crate::cli::{Budget, Settings};
 use crate::{deployment, progress};
 
 const M2_PER_MILLION_KM2: f64 = 1e12;
@@ -23,19 +23,13 @@ pub(crate) async fn run(settings: &Settings, options: &Budget) -> Result<()> {
     let store = deployment::store(settings)?;
     let product = deployment::manifest(&store, &options.product, &settings.data).await?;
     let query = BudgetQuery {
-        product: options.product.clone(),
-        region: region(&options.region)?,
-        region_name: options.region.clone(),
         from: options.from,
         to: options.to,
-        step: match options.step {
-            Step::Month => BudgetStep::Month,
-            Step::Year => BudgetStep::Year,
-            Step::Total => BudgetStep::Total,
-        },
+        step: options.step,
         earth: options.earth,
         cells: options.cells,
         ocean: ocean(settings, &store, options.ocean.as_ref()).await?,
+        ..BudgetQuery::new(options.product.clone(), region(&options.region)?)
     };
     let bar = progress::bar("sum over the region", 1);
     let engine = deployment::region_engine(settings, store)?;
@@ -89,9 +83,10 @@ pub(crate) async fn ocean(
 }
 
 /// A region file, a named region, a box, GeoJSON text or well-known text.
-pub(crate) fn region(text: &str) -> Result<Region> {
+pub(crate) fn region(text: &str) -> Result<AskedRegion> {
     if file::is_file_name(text) {
-        Ok(file::read(Path::new(text))?)
+        let (region, name) = (file::read(Path::new(text))?, text.to_owned());
+        Ok(AskedRegion { region, name })
     } else {
         Ok(text.parse()?)
     }

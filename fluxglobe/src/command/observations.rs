@@ -5,8 +5,8 @@ use comfy_table::Table;
 use comfy_table::presets::NOTHING;
 use compute::matchup::{self, TimeMatch};
 use contract::masked::MaskedCells;
-use contract::observation::{Observation, Quality};
-use observations::{Filter, ObservationStore};
+use contract::observation::{Filter, MAX_LIMIT, Observation};
+use observations::ObservationStore;
 
 use crate::cli::{MatchTime, Matchup, Observations, ObservationsAsked, Settings};
 use crate::command::budget;
@@ -21,18 +21,16 @@ pub(crate) async fn run(settings: &Settings, command: Observations) -> Result<()
 }
 
 fn filter(asked: &ObservationsAsked) -> Result<Filter> {
-    let region = budget::region(&asked.region)?;
     Ok(Filter {
-        region,
+        region: budget::region(&asked.region)?.region,
         from: asked.from,
         to: asked.to,
         properties: asked.property.clone().into_iter().collect(),
         datasets: asked.dataset.clone().into_iter().collect(),
         platforms: asked.platform.clone().into_iter().collect(),
         kinds: asked.kind.into_iter().collect(),
-        worst: Quality::Bad,
-        limit: asked.limit.min(observations::MAX_LIMIT),
-        after: None,
+        limit: asked.limit.min(MAX_LIMIT),
+        ..Filter::default()
     })
 }
 
@@ -68,7 +66,7 @@ async fn list(settings: &Settings, asked: &ObservationsAsked) -> Result<()> {
     for p in platforms {
         table.add_row([
             p.dataset.to_string(),
-            p.name,
+            p.platform,
             p.kind.to_string(),
             progress::day(p.first),
             progress::day(p.last),
@@ -139,7 +137,7 @@ async fn query(settings: &Settings, asked: &ObservationsAsked) -> Result<()> {
 async fn all(store: &dyn ObservationStore, asked: &ObservationsAsked) -> Result<Vec<Observation>> {
     let (mut filter, mut rows) = (filter(asked)?, vec![]);
     loop {
-        filter.limit = (asked.limit - rows.len() as u32).min(observations::MAX_LIMIT);
+        filter.limit = (asked.limit - rows.len() as u32).min(MAX_LIMIT);
         let page = store.query(&filter).await?;
         rows.extend(page.observations);
         if page.next.is_none() || rows.len() >= asked.limit as usize {

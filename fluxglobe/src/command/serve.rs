@@ -5,10 +5,10 @@ use std::sync::Arc;
 
 use anyhow::{Context as _, Result};
 use compute::Engine;
+use contract::check::Check;
 use observations::FileStore;
 use render_worker::Limits;
 use storage::Store;
-use tile_server::backend::Check;
 use tile_server::metrics::Registry;
 use tile_server::{AppState, Server};
 

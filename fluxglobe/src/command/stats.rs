@@ -5,9 +5,9 @@ use anyhow::Result;
 use comfy_table::presets::NOTHING;
 use comfy_table::{CellAlignment, Table};
 use compute::Engine;
-use compute::point::PointAnswer;
-use compute::stats::{RegionSeries, RegionSeriesQuery, region_series};
+use compute::stats::region_series;
 use contract::grid::LonLatDeg;
+use contract::series::{PointSeries, RegionSeries, RegionSeriesQuery};
 
 use crate::cli::{Settings, StatsPoint, StatsPolygon};
 use crate::{deployment, progress};
@@ -31,7 +31,11 @@ pub(crate) async fn point(settings: &Settings, options: &StatsPoint) -> Result<(
     progress::result(&table(&answer).to_string())?;
     progress::say(&format!(
         "{} in {}, mean of the cell around {:.4}, {:.4}; cite {}",
-        answer.quantity, answer.unit, answer.cell.lon, answer.cell.lat, answer.manifest
+        answer.quantity.title(),
+        answer.unit,
+        answer.cell.lon_deg,
+        answer.cell.lat_deg,
+        answer.manifest
     ));
     progress::say(&answer.source);
     Ok(())
@@ -40,13 +44,11 @@ pub(crate) async fn point(settings: &Settings, options: &StatsPoint) -> Result<(
 pub(crate) async fn polygon(settings: &Settings, options: &StatsPolygon) -> Result<()> {
     let store = deployment::store(settings)?;
     let query = RegionSeriesQuery {
-        product: options.product.clone(),
-        region: region(&options.region)?,
-        region_name: options.region.clone(),
         from: options.from,
         to: options.to,
         earth: options.earth,
         ocean: ocean(settings, &store, options.ocean.as_ref()).await?,
+        ..RegionSeriesQuery::new(options.product.clone(), region(&options.region)?)
     };
     deployment::manifest(&store, &options.product, &settings.data).await?;
     let bar = progress::bar("mean over the region", 1);
@@ -59,7 +61,7 @@ pub(crate) async fn polygon(settings: &Settings, options: &StatsPolygon) -> Resu
     progress::result(&region_table(&answer).to_string())?;
     progress::say(&format!(
         "{} in {}, mean over {} ({:.3} 10⁶ km²), each cell by its area on the {} earth; cite {}",
-        answer.quantity,
+        answer.quantity.title(),
         answer.unit,
         answer.region,
         answer.region_area_m2 / M2_PER_MILLION_KM2,
@@ -97,7 +99,7 @@ fn region_table(answer: &RegionSeries) -> Table {
     table
 }
 
-fn table(answer: &PointAnswer) -> Table {
+fn table(answer: &PointSeries) -> Table {
     let largest = answer
         .series
         .iter()

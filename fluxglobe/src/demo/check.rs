@@ -1,13 +1,12 @@
 //! Our budgets beside what a paper and another program say: computed once for a version of the product, then kept.
 
 use anyhow::Result;
-use compute::check::CheckRow;
+use contract::check::Check;
 use contract::digest::Digest;
 use contract::key::ObjectKey;
 use contract::manifest::Manifest;
 use serde::{Deserialize, Serialize};
 use storage::{StorageError, Store, document};
-use tile_server::backend::{self as wire, Check};
 
 use crate::cli::Settings;
 use crate::demo::source::SETS;
@@ -19,61 +18,18 @@ const COMPARISON_VERSION: u32 = 2;
 /// Version of a kept comparison's JSON: from 2 on it is sealed.
 const SCHEMA: u32 = 2;
 
-/// A comparison and where the values beside ours come from.
+/// A comparison as it is kept.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Comparison {
+struct Kept {
     /// None of those that were kept before this was said.
     #[serde(default)]
     schema: u32,
-    pub(crate) rows: Vec<CheckRow>,
-    /// The paper.
-    pub(crate) note: String,
-    /// The other program.
-    pub(crate) method: String,
-}
-
-impl Comparison {
-    pub(crate) fn new(rows: Vec<CheckRow>, note: String, method: String) -> Self {
-        Self {
-            schema: SCHEMA,
-            rows,
-            note,
-            method,
-        }
-    }
-
-    /// As the tile server tells it.
-    pub(crate) fn to_wire(&self) -> Check {
-        let row = |row: &CheckRow| wire::CheckRow {
-            what: row.what.clone(),
-            period: row.period.clone(),
-            unit: row.unit.clone(),
-            paper: row.paper.map(|paper| wire::Paper {
-                value: paper.stated.value,
-                uncertainty: paper.stated.uncertainty,
-                decimals: paper.stated.decimals,
-                difference: paper.difference,
-                verdict: paper.verdict.as_str().to_owned(),
-            }),
-            independent: row.independent,
-            ours: row.ours,
-            difference: row.difference,
-            agrees: row.agrees,
-        };
-        Check {
-            rows: self.rows.iter().map(row).collect(),
-            note: self.note.clone(),
-            method: self.method.clone(),
-        }
-    }
+    #[serde(flatten)]
+    check: Check,
 }
 
 /// Compares a version of the flux with the published values, or takes the comparison that is kept.
-pub(crate) async fn compare(
-    settings: &Settings,
-    store: &Store,
-    flux: &Manifest,
-) -> Result<Comparison> {
+pub(crate) async fn compare(settings: &Settings, store: &Store, flux: &Manifest) -> Result<Check> {
     let key = key(flux);
     if let Some(kept) = read(store, &key).await? {
         return Ok(kept);
@@ -85,10 +41,15 @@ pub(crate) async fn compare(
         &bar,
         &format!("{} beside the paper's and independent ones", rows.len()),
     );
-    let (note, method) = (compute::published::CITATION, compute::published::METHOD);
-    let comparison = Comparison::new(rows, note.to_owned(), method.to_owned());
-    document::put_over(store, &key, &comparison).await?;
-    Ok(comparison)
+    let check = Check {
+        rows,
+        note: compute::published::CITATION.to_owned(),
+        method: compute::published::METHOD.to_owned(),
+    };
+    let schema = SCHEMA;
+    let kept = Kept { schema, check };
+    document::put_over(store, &key, &kept).await?;
+    Ok(kept.check)
 }
 
 /// The comparison that is kept for the newest version of the demo's flux, if there is one.
@@ -96,18 +57,16 @@ pub(crate) async fn stored(store: &Store) -> Result<Option<Check>> {
     let Some(flux) = storage::manifests::latest(store, &SETS[0].product.parse()?).await? else {
         return Ok(None);
     };
-    Ok(read(store, &key(&flux))
-        .await?
-        .map(|comparison| comparison.to_wire()))
+    read(store, &key(&flux)).await
 }
 
 fn key(flux: &Manifest) -> ObjectKey {
     ObjectKey::check(&Digest::of_json(&(COMPARISON_VERSION, flux.id())))
 }
 
-async fn read(store: &Store, key: &ObjectKey) -> Result<Option<Comparison>> {
-    match document::get(store, key).await {
-        Ok(kept) => Ok(kept),
+async fn read(store: &Store, key: &ObjectKey) -> Result<Option<Check>> {
+    match document::get::<Kept>(store, key).await {
+        Ok(kept) => Ok(kept.map(|kept| kept.check)),
         Err(error @ StorageError::Damaged { .. }) => {
             tracing::warn!(%error, "published values are compared again");
             Ok(None)
@@ -131,7 +90,7 @@ mod tests {
         ObjectKey::check(&Digest::of_json(&(COMPARISON_VERSION, "fgco2@1-0a1b2c3d")))
     }
 
-    fn compared() -> Comparison {
+    fn compared() -> Kept {
         let row = |paper| {
             let row = serde_json::json!({
                 "what": "Global ocean", "period": "2000", "unit": "Pg C", "paper": paper,
@@ -139,8 +98,7 @@ mod tests {
             });
             serde_json::from_value(row).unwrap()
         };
-        Comparison {
-            schema: SCHEMA,
+        let check = Check {
             rows: vec![
                 row(serde_json::json!({
                     "stated": {"value": -1.4, "uncertainty": 0.7, "decimals": 1},
@@ -150,7 +108,9 @@ mod tests {
             ],
             note: "a paper".to_owned(),
             method: "another program".to_owned(),
-        }
+        };
+        let schema = SCHEMA;
+        Kept { schema, check }
     }
 
     /// A store that holds a comparison alone.
@@ -173,11 +133,7 @@ mod tests {
             .await
             .unwrap()
             .unwrap();
-        assert_eq!(found, compared());
-        let shown = found.to_wire();
-        let paper = shown.rows[0].paper.as_ref().unwrap();
-        assert_eq!((paper.verdict.as_str(), paper.decimals), ("within", 1));
-        assert!(shown.rows[1].paper.is_none() && shown.rows[1].agrees);
+        assert_eq!(found, compared().check);
     }
 
     #[tokio::test]

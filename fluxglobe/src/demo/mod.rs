@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::Result;
+use contract::check::Check;
 use contract::product::ProductId;
 use storage::Store;
 
@@ -49,8 +50,7 @@ pub(crate) async fn run(settings: &Settings, options: Demo) -> Result<ExitCode> 
             &table::synthetic(&deployment::engine(settings, store.clone())?, &flux).await?,
         )?,
     }
-    let wire = check.as_ref().map(check::Comparison::to_wire);
-    let server = serve::bind(settings, store.clone(), options.serve, wire).await?;
+    let server = serve::bind(settings, store.clone(), options.serve, check.clone()).await?;
     if !options.exit_after_check {
         serve::announce(&server);
         progress::say(&format!("{:>24} Ctrl-C", "stop with"));
@@ -124,11 +124,7 @@ async fn synthetic_inputs(store: &Store, cache: &Path) -> Result<Inputs> {
 }
 
 /// Lands, accumulates and compares; what is done already is not done again.
-async fn compute(
-    settings: &Settings,
-    store: &Store,
-    inputs: &Inputs,
-) -> Result<Option<check::Comparison>> {
+async fn compute(settings: &Settings, store: &Store, inputs: &Inputs) -> Result<Option<Check>> {
     let accumulated = inputs.flux.accumulated()?;
     let flux = storage::manifests::latest(store, &inputs.flux).await?;
     let derived = storage::manifests::latest(store, &accumulated).await?;

@@ -4,18 +4,14 @@ use anyhow::Result;
 use comfy_table::presets::NOTHING;
 use comfy_table::{CellAlignment, Table};
 use compute::Engine;
-use compute::budget::{BudgetQuery, BudgetStep};
-use compute::check::AgainstPaper;
-use compute::published::Stated;
-use contract::earth::Earth;
+use contract::budget::{BudgetQuery, BudgetStep};
+use contract::check::{AgainstPaper, Check, Stated};
 use contract::manifest::Manifest;
-use contract::region::{Cells, Region};
 
-use crate::demo::check::Comparison;
 use crate::progress;
 
 /// What the paper says, what an independent integration of its grid says, what we say.
-pub(crate) fn against_published(comparison: &Comparison) -> String {
+pub(crate) fn against_published(comparison: &Check) -> String {
     let mut table = table(&[
         "air-sea carbon, positive out of the sea",
         "period",
@@ -66,15 +62,8 @@ fn judged(paper: &AgainstPaper) -> String {
 /// Monthly budgets of a synthetic product: nothing is published about it.
 pub(crate) async fn synthetic(engine: &Engine, flux: &Manifest) -> Result<String> {
     let query = BudgetQuery {
-        product: flux.product.clone(),
-        region: Region::Global,
-        region_name: "global".to_owned(),
-        from: None,
-        to: None,
         step: BudgetStep::Month,
-        earth: Earth::Wgs84,
-        cells: Cells::Whole,
-        ocean: None,
+        ..BudgetQuery::new(flux.product.clone(), "global".parse()?)
     };
     let answer = compute::budget::budget_of(engine, &query, flux).await?;
     let mut table = table(&[
@@ -114,7 +103,7 @@ fn table(header: &[&str]) -> Table {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use compute::check::{CheckRow, Verdict};
+    use contract::check::{CheckRow, Verdict};
 
     #[test]
     fn a_difference_without_a_stated_uncertainty_is_shown_and_not_judged() {
@@ -145,7 +134,7 @@ mod tests {
             row("month", None, false),
         ];
         let (note, method) = ("The paper.".to_owned(), "The script.".to_owned());
-        let comparison = Comparison::new(rows, note, method);
+        let comparison = Check { rows, note, method };
         let text = against_published(&comparison);
         let line = |what: &str| text.lines().find(|line| line.contains(what)).unwrap();
         assert!(line("whole").contains("-1.4 ± 0.7") && line("whole").contains("within ± 0.7"));

@@ -3,15 +3,14 @@
 use std::time::Duration;
 
 use anyhow::{Context as _, Result};
-use compute::budget::{BudgetQuery, BudgetStep};
+use contract::budget::BudgetQuery;
+use contract::check::Check;
 use contract::earth::Earth;
 use contract::manifest::Manifest;
-use contract::region::{Cells, Region};
 use storage::Store;
 use tile_server::Server;
 
 use crate::cli::Settings;
-use crate::demo::check::Comparison;
 use crate::{deployment, progress};
 
 /// Largest relative difference between the accumulated frames' sum and the printed budget.
@@ -24,7 +23,7 @@ pub(crate) async fn all(
     store: &Store,
     server: Server,
     flux: &Manifest,
-    check: Option<&Comparison>,
+    check: Option<&Check>,
 ) -> Result<Vec<String>> {
     let mut failures = vec![];
     for row in check
@@ -143,17 +142,7 @@ async fn mass(settings: &Settings, store: &Store, flux: &Manifest) -> Result<Opt
     let in_frames_tg: f64 = cells
         .map(|(index, value)| f64::from(*value) * area_m2(index) / 1e9)
         .sum();
-    let query = BudgetQuery {
-        product: flux.product.clone(),
-        region: Region::Global,
-        region_name: "global".to_owned(),
-        from: None,
-        to: None,
-        step: BudgetStep::Total,
-        earth: Earth::Wgs84,
-        cells: Cells::Whole,
-        ocean: None,
-    };
+    let query = BudgetQuery::new(flux.product.clone(), "global".parse()?);
     let answer =
         compute::budget::budget_of(&deployment::engine(settings, store.clone())?, &query, flux)
             .await?;

@@ -1,12 +1,12 @@
 //! Questions as SQL with numbered parameters: nothing that was asked stands in the text.
 
+use contract::observation::TrackQuery;
 use contract::product::ProductId;
 use tokio_postgres::types::ToSql;
 
 use super::upsert::system_time;
 use crate::area::Area;
 use crate::filter::CheckedFilter;
-use crate::track::TrackQuery;
 
 /// A statement and its parameters.
 pub(super) struct Question<'a> {
@@ -41,11 +41,10 @@ impl<'a> Question<'a> {
 }
 
 /// Rows from the page on, one more than the limit.
-pub(super) fn observations<'a>(checked: &CheckedFilter<'a>) -> Question<'a> {
+pub(super) fn observations<'a>(checked: &'a CheckedFilter<'_>) -> Question<'a> {
     let mut question = Question::new();
     let mut wanted = conditions(&mut question, checked);
-    if let Some(token) = &checked.filter.after {
-        let key = &token.0;
+    if let Some(key) = &checked.after {
         let key = [
             question.parameter(system_time(key.time)),
             question.parameter(key.dataset.as_str()),
@@ -68,7 +67,7 @@ pub(super) fn observations<'a>(checked: &CheckedFilter<'a>) -> Question<'a> {
 }
 
 /// Platforms of the wanted rows; the last row of a platform is that of its latest time, then first property, least depth.
-pub(super) fn platforms<'a>(checked: &CheckedFilter<'a>) -> Question<'a> {
+pub(super) fn platforms<'a>(checked: &'a CheckedFilter<'_>) -> Question<'a> {
     let mut question = Question::new();
     let wanted = conditions(&mut question, checked);
     let limit = question.parameter(i64::from(checked.filter.limit));
@@ -127,7 +126,7 @@ fn all_of(conditions: &[String]) -> String {
     }
 }
 
-fn conditions<'a>(question: &mut Question<'a>, checked: &CheckedFilter<'a>) -> Vec<String> {
+fn conditions<'a>(question: &mut Question<'a>, checked: &'a CheckedFilter<'_>) -> Vec<String> {
     let filter = checked.filter;
     let mut all = vec![];
     if let Some(from) = filter.from {

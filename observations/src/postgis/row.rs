@@ -2,14 +2,13 @@
 
 use std::time::SystemTime;
 
-use contract::observation::{Observation, PlatformKind, Quality};
+use contract::observation::{Observation, Platform, PlatformKind, Quality, TrackPoint};
 use contract::time::TimeMs;
 use tokio_postgres::Row;
 use tokio_postgres::types::FromSql;
 
 use crate::error::ObservationError;
-use crate::platform::{Platform, bounds_deg};
-use crate::track::TrackPoint;
+use crate::platform::bounds_deg;
 
 /// A row of [`super::question::observations`].
 pub(super) fn observation(row: &Row) -> Result<Observation, ObservationError> {
@@ -34,7 +33,7 @@ pub(super) fn platform(row: &Row) -> Result<Platform, ObservationError> {
         |first: usize| Ok::<[f64; 2], ObservationError>([get(row, first)?, get(row, first + 1)?]);
     Ok(Platform {
         dataset: parsed(row, 0)?,
-        name: get(row, 1)?,
+        platform: get(row, 1)?,
         kind: parsed::<PlatformKind>(row, 2)?,
         first: time(row, 3)?,
         last: time(row, 4)?,

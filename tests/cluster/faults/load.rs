@@ -150,7 +150,7 @@ impl Client {
         let truth = Arc::clone(&self.truth);
         let found = match self.kind {
             Kind::Tile => truth.of_picture(&answer.body),
-            Kind::Budget => of_rows(answer, "rows", "budget", |m, v| truth.of_budget(m, v)),
+            Kind::Budget => of_rows(answer, "rows", "budget_tg", |m, v| truth.of_budget(m, v)),
             Kind::Series => of_rows(answer, "series", "value", |m, v| truth.of_value(m, v)),
         };
         let Some(found) = found else {

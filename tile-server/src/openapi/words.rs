@@ -34,18 +34,8 @@ macro_rules! words {
 words! {
     /// How a layer is drawn: a thematic map, particles as points, sprites or a volume with shadows, or trails of a flow.
     Mode = contract::job::Mode::ALL;
-    /// What the values of a product are.
-    Quantity = contract::quantity::Quantity::ALL;
-    /// Figure of the earth for areas.
-    Earth = contract::earth::Earth::ALL;
-    /// How cells on the coast count: all of their area in the region, or the share of it that is sea.
-    Cells = contract::region::Cells::ALL;
     /// A list of colours with a name.
     Palette = contract::colour::Palette::ALL;
-    /// What carries the instruments.
-    PlatformKind = contract::observation::PlatformKind::ALL;
-    /// How far a value may be trusted, best first: the primary flags of IOC Manuals and Guides 54, volume 3 (2013).
-    Quality = contract::observation::Quality::ALL;
     /// What a legend is written as.
     LegendForm = crate::legend::Form::ALL.map(crate::legend::Form::as_str);
 }

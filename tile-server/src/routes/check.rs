@@ -2,8 +2,8 @@
 
 use axum::Json;
 use axum::extract::State;
+use contract::check::Check;
 
-use crate::backend::Check;
 use crate::error::ServerError;
 use crate::state::AppState;
 

@@ -7,17 +7,14 @@ use axum::Json;
 use axum::extract::State;
 use axum::http::header;
 use axum::response::{IntoResponse as _, Response};
-use contract::observation::{PlatformKind, Quality};
-use contract::product::ProductId;
+use contract::observation::{Filter, Platform, PlatformKind, TrackPoint, TrackQuery};
 use contract::region::Region;
-use contract::time::TimeMs;
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
 
-use crate::backend::{ObservationQuestion, Observe, Platform, TrackPoint, TrackQuestion};
+use crate::backend::Observe;
 use crate::error::ServerError;
-use crate::extract::{UrlQuery, time};
-use crate::openapi::words;
+use crate::extract::{UrlQuery, parsed, time};
 use crate::state::AppState;
 
 /// Platforms of one answer: as many points as a globe still shows apart.
@@ -30,8 +27,11 @@ const MOST_TRACKS: usize = 50;
 #[derive(Debug, Deserialize, IntoParams)]
 #[into_params(parameter_in = Query)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct PlatformQuery {
+pub(crate) struct PlatformParameters {
     /// Where: a region as budgets take it, such as `west,south,east,north` in degrees; everywhere unless one is given.
+    region: Option<String>,
+    /// What it was called before; told apart from what nobody ever understood.
+    #[param(ignore)]
     bbox: Option<String>,
     /// First instant, ISO 8601 UTC.
     from: Option<String>,
@@ -40,7 +40,7 @@ pub(crate) struct PlatformQuery {
     /// What was measured, such as `sea_surface_temperature`.
     property: Option<String>,
     /// What carries the instruments.
-    #[param(value_type = Option<words::PlatformKind>)]
+    #[param(value_type = Option<PlatformKind>)]
     kind: Option<String>,
     /// Data set.
     dataset: Option<String>,
@@ -68,7 +68,6 @@ enum Member {
 
 /// A platform.
 #[derive(Debug, Serialize, ToSchema)]
-#[schema(as = Platform)]
 struct PlatformFeature {
     #[serde(rename = "type")]
     #[schema(inline)]
@@ -76,7 +75,8 @@ struct PlatformFeature {
     /// `dataset/platform`.
     id: String,
     geometry: Geometry,
-    properties: PlatformProperties,
+    /// What there is of it.
+    properties: Platform,
 }
 
 /// Places as longitude and latitude, degrees: the last one, or the track of a ship.
@@ -93,40 +93,13 @@ enum Geometry {
     },
 }
 
-/// What there is of a platform.
-#[derive(Debug, Serialize, ToSchema)]
-struct PlatformProperties {
-    /// Data set.
-    #[schema(value_type = String)]
-    dataset: ProductId,
-    /// Name in it.
-    platform: String,
-    /// What it is.
-    #[schema(value_type = words::PlatformKind)]
-    kind: PlatformKind,
-    /// First observation, ISO 8601 UTC.
-    #[schema(value_type = String, format = DateTime)]
-    first: TimeMs,
-    /// Last observation.
-    #[schema(value_type = String, format = DateTime)]
-    last: TimeMs,
-    /// Last longitude, degrees east.
-    lon: f64,
-    /// Last latitude, degrees north.
-    lat: f64,
-    /// What was measured.
-    properties: Vec<String>,
-    /// Observations.
-    count: u64,
-}
-
 /// Buoys, ships, stations and profiles, with the tracks of ships.
 #[utoipa::path(
     get,
     path = "/api/observations/platforms",
     operation_id = "platforms",
     tag = "observations",
-    params(PlatformQuery),
+    params(PlatformParameters),
     responses(
         (status = 200, description = "Those with observations that the question is about", body = Platforms),
         (status = 404, description = "This server has no observations", body = crate::error::Refusal),
@@ -134,16 +107,16 @@ struct PlatformProperties {
 )]
 pub(crate) async fn get(
     State(state): State<AppState>,
-    UrlQuery(query): UrlQuery<PlatformQuery>,
+    UrlQuery(asked): UrlQuery<PlatformParameters>,
 ) -> Result<Response, ServerError> {
     let observer = state.observer.get().ok_or(ServerError::NoObservations)?;
-    let question = query.question()?;
+    let filter = asked.filter()?;
     let mut features = vec![];
     let mut tracks = 0;
-    for platform in observer.platforms(&question).await? {
+    for platform in observer.platforms(&filter).await? {
         let track = if platform.kind == PlatformKind::Ship && tracks < MOST_TRACKS {
             tracks += 1;
-            track(observer.as_ref(), &platform, &question).await?
+            track(observer.as_ref(), &platform, &filter).await?
         } else {
             vec![]
         };
@@ -156,22 +129,24 @@ pub(crate) async fn get(
     Ok(([(header::CACHE_CONTROL, "no-cache")], Json(answer)).into_response())
 }
 
-impl PlatformQuery {
-    fn question(&self) -> Result<ObservationQuestion, ServerError> {
-        let region: Region = self.bbox.as_deref().unwrap_or("global").parse()?;
-        let kinds = self.kind.as_deref().map(str::parse).transpose()?;
-        let dataset = self.dataset.as_deref().map(str::parse).transpose()?;
-        Ok(ObservationQuestion {
-            region,
+impl PlatformParameters {
+    fn filter(&self) -> Result<Filter, ServerError> {
+        if let Some(text) = &self.bbox {
+            return Err(ServerError::invalid(
+                "bbox",
+                text,
+                "it is written region=... now",
+            ));
+        }
+        Ok(Filter {
+            region: parsed(self.region.as_deref())?.unwrap_or(Region::Global),
             from: time(self.from.as_deref())?,
             to: time(self.to.as_deref())?,
-            datasets: dataset.into_iter().collect(),
-            platforms: vec![],
-            kinds: kinds.into_iter().collect(),
+            datasets: parsed(self.dataset.as_deref())?.into_iter().collect(),
+            kinds: parsed(self.kind.as_deref())?.into_iter().collect(),
             properties: self.property.clone().into_iter().collect(),
-            worst: Quality::Questionable,
             limit: MOST_PLATFORMS,
-            after: None,
+            ..Filter::default()
         })
     }
 }
@@ -179,16 +154,15 @@ impl PlatformQuery {
 async fn track(
     observer: &dyn Observe,
     platform: &Platform,
-    question: &ObservationQuestion,
+    filter: &Filter,
 ) -> Result<Vec<TrackPoint>, ServerError> {
-    let question = TrackQuestion {
-        dataset: platform.dataset.clone(),
-        platform: platform.name.clone(),
-        from: question.from,
-        to: question.to,
+    let query = TrackQuery {
+        from: filter.from,
+        to: filter.to,
         limit: TRACK_POINTS,
+        ..TrackQuery::new(platform.dataset.clone(), platform.platform.as_str())
     };
-    Ok(observer.track(&question).await?)
+    Ok(observer.track(&query).await?)
 }
 
 fn feature(platform: Platform, track: &[TrackPoint]) -> PlatformFeature {
@@ -203,19 +177,9 @@ fn feature(platform: Platform, track: &[TrackPoint]) -> PlatformFeature {
     };
     PlatformFeature {
         kind: Member::Feature,
-        id: format!("{}/{}", platform.dataset, platform.name),
+        id: format!("{}/{}", platform.dataset, platform.platform),
         geometry,
-        properties: PlatformProperties {
-            dataset: platform.dataset,
-            platform: platform.name,
-            kind: platform.kind,
-            first: platform.first,
-            last: platform.last,
-            lon: platform.lon_deg,
-            lat: platform.lat_deg,
-            properties: platform.properties,
-            count: platform.count,
-        },
+        properties: platform,
     }
 }
 

@@ -6,11 +6,8 @@ use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse as _, Response};
 use contract::colour::TransferFunction;
 use contract::digest::Digest;
-use contract::grid::Grid;
 use contract::job::Mode;
-use contract::manifest::ManifestId;
-use contract::product::ProductId;
-use contract::quantity::Quantity;
+use contract::listing::ListedProduct;
 use contract::time::{Period, TimeMs};
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -23,43 +20,22 @@ use crate::routes::picture::has_tag;
 use crate::state::AppState;
 
 #[derive(Debug, Serialize, ToSchema)]
-struct Products<'a> {
+struct Products {
     /// By name.
-    products: Vec<Product<'a>>,
+    products: Vec<Product>,
 }
 
-/// One product. `shown = stored * display_factor + display_offset`.
+/// One product, with what it takes to show it: `shown = stored * display_factor + display_offset`.
 #[derive(Debug, Serialize, ToSchema)]
-struct Product<'a> {
-    /// Name.
-    #[schema(value_type = String)]
-    id: &'a ProductId,
-    /// For people.
-    title: &'a str,
-    /// What its values are.
-    #[schema(value_type = words::Quantity)]
-    quantity: Quantity,
+struct Product {
+    #[serde(flatten)]
+    listed: ListedProduct,
     /// Unit of the stored values.
-    unit: &'static str,
-    /// Unit that people read: that of series, means and legends.
-    display_unit: &'static str,
-    /// Display units in a stored unit.
+    stored_unit: &'static str,
+    /// Shown units in a stored unit.
     display_factor: f64,
-    /// Display units, added after the factor.
+    /// Shown units, added after the factor.
     display_offset: f64,
-    /// Made up, not observed.
-    synthetic: bool,
-    /// Who made it, to be cited.
-    source: &'a str,
-    /// Its newest version.
-    #[schema(value_type = String)]
-    manifest: &'a ManifestId,
-    /// The version it was computed from; none where it was ingested.
-    #[schema(value_type = Option<String>, required)]
-    derived_from: Option<&'a ManifestId>,
-    /// West, south, east, north, degrees; east may pass 180.
-    #[schema(value_type = (f64, f64, f64, f64))]
-    bounds: [f64; 4],
     /// In the order of time.
     steps: Vec<StepTimes>,
     /// Ways it can be drawn.
@@ -75,15 +51,12 @@ struct Product<'a> {
 
 /// When a step holds.
 #[derive(Debug, Serialize, ToSchema)]
-pub(crate) struct StepTimes {
-    /// First instant, ISO 8601 UTC.
-    #[schema(value_type = String, format = DateTime)]
+struct StepTimes {
+    /// First instant.
     start: TimeMs,
     /// First instant after it.
-    #[schema(value_type = String, format = DateTime)]
     end: TimeMs,
     /// Middle.
-    #[schema(value_type = String, format = DateTime)]
     mid: TimeMs,
 }
 
@@ -104,7 +77,7 @@ impl From<Period> for StepTimes {
     operation_id = "products",
     tag = "catalogue",
     responses(
-        (status = 200, description = "All products", body = Products<'static>, headers(("etag" = String, description = "Weak; changes with any version"))),
+        (status = 200, description = "All products", body = Products, headers(("etag" = String, description = "Weak; changes with any version"))),
         (status = 304, description = "The copy that `If-None-Match` names is still right"),
     ),
 )]
@@ -130,22 +103,14 @@ pub(crate) async fn list(
     Ok((headers, Json(Products { products })).into_response())
 }
 
-fn product(layer: &Layer) -> Product<'_> {
+fn product(layer: &Layer) -> Product {
     let manifest = &layer.manifest;
     let display = manifest.quantity.display();
     Product {
-        id: &manifest.product,
-        title: &manifest.title,
-        quantity: manifest.quantity,
-        unit: manifest.quantity.unit(),
-        display_unit: display.unit,
+        listed: ListedProduct::of(manifest, layer.id.clone()),
+        stored_unit: manifest.quantity.unit(),
         display_factor: display.factor,
         display_offset: display.offset,
-        synthetic: manifest.synthetic,
-        source: &manifest.source,
-        manifest: &layer.id,
-        derived_from: manifest.derived_from.as_ref(),
-        bounds: bounds_deg(&manifest.grid),
         steps: manifest
             .steps
             .iter()
@@ -161,15 +126,4 @@ fn product(layer: &Layer) -> Product<'_> {
             .as_ref()
             .map(|_part| Legend::of_speed(manifest.quantity)),
     }
-}
-
-/// West, south, east, north of a grid, degrees, without the noise of its steps' sum; east may pass 180.
-pub(crate) fn bounds_deg(grid: &Grid) -> [f64; 4] {
-    let [west, south, east, north] = grid.bounds_deg().map(rounded);
-    [west, south.max(-90.0), east, north.min(90.0)]
-}
-
-/// A number for people without the noise that arithmetic adds to it: nine decimals, 0.1 mm for degrees.
-pub(crate) fn rounded(number: f64) -> f64 {
-    (number * 1e9).round() / 1e9
 }

@@ -21,7 +21,7 @@ struct Named {
     title: &'static str,
     /// West, south, east, north, degrees; west greater than east crosses the date line.
     #[schema(value_type = (f64, f64, f64, f64))]
-    bounds: [f64; 4],
+    bounds_deg: [f64; 4],
 }
 
 /// Regions with a name.
@@ -36,7 +36,7 @@ pub(crate) async fn list() -> Json<Regions> {
     let named = NAMED_REGIONS.iter().map(|r| Named {
         name: r.name,
         title: r.title,
-        bounds: r.bounds_deg,
+        bounds_deg: r.bounds_deg,
     });
     Json(Regions {
         regions: named.collect(),

@@ -18,7 +18,6 @@ use crate::extract::{UrlPath, UrlQuery, time};
 use crate::look::LookQuery;
 use crate::openapi::words;
 use crate::request;
-use crate::routes::products::bounds_deg;
 use crate::state::AppState;
 use crate::surroundings::SurroundingsQuery;
 
@@ -221,7 +220,7 @@ fn max_zoom(grid: &Grid) -> u8 {
 
 /// West, south, east, north within the map's world; a grid across the date line is on both sides of it.
 fn bounds(grid: &Grid) -> [f64; 4] {
-    let [west, south, east, north] = bounds_deg(grid);
+    let [west, south, east, north] = grid.shown_bounds_deg();
     let (west, east) = if east > 180.0 {
         (-180.0, 180.0)
     } else {

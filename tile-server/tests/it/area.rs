@@ -3,13 +3,14 @@
 use axum::http::StatusCode;
 use contract::earth::Earth;
 use contract::region::Region;
+use contract::series::RegionSeriesQuery;
 use serde_json::json;
-use tile_server::backend::{AreaRequest, Class};
+use tile_server::backend::Class;
 
 use crate::app::TestApp;
 use crate::doubles::Mood;
 
-fn last(app: &TestApp) -> AreaRequest {
+fn last(app: &TestApp) -> RegionSeriesQuery {
     app.analyst.areas.lock().unwrap().last().unwrap().clone()
 }
 
@@ -57,8 +58,8 @@ async fn every_parameter_reaches_the_analyst_once() {
     assert_eq!(request.region, expected);
     assert_eq!(request.earth, Earth::Sphere);
     assert_eq!(
-        request.period.to_string(),
-        "2000-02-01T00:00:00Z/2000-03-01T00:00:00Z"
+        (request.from, request.to),
+        ("2000-02".parse().ok(), "2000-03".parse().ok())
     );
 }
 

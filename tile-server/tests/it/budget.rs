@@ -1,16 +1,17 @@
 //! `/api/products/{product}/budget`.
 
 use axum::http::StatusCode;
+use contract::budget::{BudgetQuery, BudgetStep};
 use contract::earth::Earth;
 use contract::quantity::Quantity;
 use contract::region::{Cells, Region};
 use serde_json::json;
-use tile_server::backend::{BudgetRequest, BudgetStep, Class};
+use tile_server::backend::Class;
 
 use crate::app::TestApp;
 use crate::doubles::Mood;
 
-fn last(app: &TestApp) -> BudgetRequest {
+fn last(app: &TestApp) -> BudgetQuery {
     app.analyst.budgets.lock().unwrap().last().unwrap().clone()
 }
 
@@ -27,8 +28,10 @@ async fn an_answer_carries_everything_a_citation_needs() {
         (&json!("wgs84"), &json!("Tg C"))
     );
     assert!(body["manifest"].as_str().unwrap().starts_with("flux@1-"));
-    let row = json!({"start": "2000-01-01T00:00:00Z", "end": "2000-04-01T00:00:00Z", "budget": -176.1,
-        "coverage_percent": 92.5, "area_m2": 3.4e14, "ocean_with_data_m2": 3.3e14, "gap": -12.5, "gap_area_m2": 2.0e13});
+    let row = json!({"start": "2000-01-01T00:00:00Z", "end": "2000-04-01T00:00:00Z",
+        "budget_kg": "-176100000000.000000000", "budget_tg": -176.1, "coverage_percent": 92.5, "area_m2": 3.4e14,
+        "region_area_m2": 5.1e14, "ocean_area_m2": 3.6e14, "ocean_with_data_m2": 3.3e14, "gap_tg": -12.5,
+        "gap_area_m2": 2.0e13});
     assert_eq!(body["rows"], json!([row]));
     let areas = (&body["region_area_m2"], &body["ocean_area_m2"]);
     assert_eq!(areas, (&json!(5.1e14), &json!(3.6e14)));
@@ -39,7 +42,7 @@ async fn an_answer_carries_everything_a_citation_needs() {
     let request = last(&app);
     assert_eq!(
         (request.region, request.step, request.earth),
-        (Region::Global, BudgetStep::Month, Earth::Wgs84)
+        (Region::Global, BudgetStep::Total, Earth::Wgs84)
     );
 }
 
@@ -60,8 +63,8 @@ async fn every_parameter_reaches_the_analyst() {
         }
     );
     assert_eq!(
-        request.period.to_string(),
-        "2000-02-01T00:00:00Z/2000-03-01T00:00:00Z"
+        (request.from, request.to),
+        ("2000-02".parse().ok(), "2000-03".parse().ok())
     );
     assert_eq!(
         (request.step, request.earth),
@@ -105,16 +108,22 @@ async fn named_regions_are_named_in_the_answer() {
 }
 
 #[tokio::test]
-async fn a_longer_period_is_cut_to_what_there_is() {
+async fn a_period_is_taken_as_it_is_asked_for() {
     let app = TestApp::new().await;
-    for query in ["from=0001&to=9999", "from=1999", "to=2001", ""] {
+    let (start, end) = ("2000-01-01T00:00:00Z", "2000-04-01T00:00:00Z");
+    for (query, row) in [
+        (
+            "from=1990&to=2010",
+            ["1990-01-01T00:00:00Z", "2010-01-01T00:00:00Z"],
+        ),
+        ("from=1999", ["1999-01-01T00:00:00Z", end]),
+        ("to=2001", [start, "2001-01-01T00:00:00Z"]),
+        ("", [start, end]),
+    ] {
         let answer = app.get(&format!("/api/products/flux/budget?{query}")).await;
         assert_eq!(answer.status, StatusCode::OK, "{query}: {}", answer.text());
-        assert_eq!(
-            last(&app).period.to_string(),
-            "2000-01-01T00:00:00Z/2000-04-01T00:00:00Z",
-            "{query}"
-        );
+        let rows = &answer.json()["rows"];
+        assert_eq!([&rows[0]["start"], &rows[0]["end"]], row, "{query}");
     }
 }
 
@@ -157,10 +166,10 @@ async fn a_budget_of_accumulated_carbon_says_how_complete_it_is() {
         .await
         .json();
     let row = &body["rows"][0];
-    assert_eq!(row["complete_m2"], json!(3e14));
-    assert_eq!(row["incomplete_m2"], json!(3e13));
+    let expected = json!({"complete_m2": 3e14, "incomplete_m2": 3e13});
+    assert_eq!(row["completeness"], expected);
     let body = app.get("/api/products/flux/budget").await.json();
-    assert!(body["rows"][0].get("complete_m2").is_none(), "{body}");
+    assert!(body["rows"][0].get("completeness").is_none(), "{body}");
 }
 
 #[tokio::test]

@@ -6,19 +6,21 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use async_trait::async_trait;
 use axum::body::Bytes;
+use contract::budget::{BudgetAnswer, BudgetQuery, BudgetRow, Completeness};
+use contract::check::Check;
 use contract::event::Event;
+use contract::grid::LonLatDeg;
 use contract::job::RenderJob;
-use contract::manifest::Manifest;
-use contract::observation::Observation;
+use contract::manifest::{Manifest, ManifestId, Step};
+use contract::observation::{Filter, Observation, Page, Platform, TrackPoint, TrackQuery};
 use contract::quantity::Quantity;
+use contract::series::{
+    Cell, CellCounts, PointSeries, PointValue, RegionSeries, RegionSeriesQuery, RegionValue,
+};
 use contract::topic::{Origin, Topic};
 use storage::log::{EmbeddedLog, EventLog, Follower, Message, Reader, Start};
 use storage::{StorageError, Store};
-use tile_server::backend::{
-    Analyse, AreaRequest, AreaRow, AreaSeries, BackendError, BudgetAnswer, BudgetRequest,
-    BudgetRow, Check, Class, Contributed, Draw, Keep, ObservationPage, ObservationQuestion,
-    Observe, Platform, PointStep, RowCol, TrackPoint, TrackQuestion, Turn,
-};
+use tile_server::backend::{Analyse, BackendError, Class, Draw, Keep, Observe, Turn};
 use tokio::sync::Semaphore;
 
 /// How a double answers.
@@ -155,11 +157,13 @@ impl Draw for Drawer {
     }
 }
 
-/// Computes nothing: a cell's value is `row + step / 100` in the stored unit, missing in column 0.
+/// Computes nothing: a cell's value is `row + step / 100`, missing in column 0.
 #[derive(Default)]
 pub(crate) struct Analyst {
-    pub(crate) budgets: Mutex<Vec<BudgetRequest>>,
-    pub(crate) areas: Mutex<Vec<AreaRequest>>,
+    pub(crate) budgets: Mutex<Vec<BudgetQuery>>,
+    /// Of each budget the number of the version that it is of.
+    pub(crate) versions: Mutex<Vec<u64>>,
+    pub(crate) areas: Mutex<Vec<RegionSeriesQuery>>,
     pub(crate) check: Mutex<Option<Check>>,
     pub(crate) mood: Mutex<Mood>,
 }
@@ -179,66 +183,126 @@ impl Analyse for Analyst {
     async fn point(
         &self,
         manifest: &Manifest,
-        cell: RowCol,
-    ) -> Result<Vec<PointStep>, BackendError> {
+        id: &ManifestId,
+        place: LonLatDeg,
+    ) -> Result<PointSeries, BackendError> {
         self.mood().apply()?;
-        if matches!(self.mood(), Mood::AnswersNonsense) {
-            return Ok(vec![]);
-        }
+        let (row, col) = manifest.cell_inside(place).unwrap();
         let is_sum = manifest.quantity == Quantity::AccumulatedCarbon;
-        let point = |step| PointStep {
-            value: (cell.col != 0).then_some(f64::from(cell.row) + f64::from(step) / 100.0),
-            contributed: is_sum.then_some(Contributed {
+        let value = |(index, step): (u32, &Step)| PointValue {
+            start: step.period.start,
+            end: step.period.end,
+            mid: step.period.mid(),
+            value: (col != 0).then_some(f64::from(row) + f64::from(index) / 100.0),
+            contributed: is_sum.then_some(CellCounts {
                 steps: 1,
-                of_steps: step + 1,
-                time_percent: 100.0 / f64::from(step + 1),
+                of_steps: index + 1,
+                time_percent: 100.0 / f64::from(index + 1),
             }),
         };
-        Ok((0..manifest.steps.len() as u32).map(point).collect())
+        let mut series: Vec<_> = (0..).zip(&manifest.steps).map(value).collect();
+        if matches!(self.mood(), Mood::AnswersNonsense) {
+            series.clear();
+        }
+        let center = manifest.grid.cell_center(row, col);
+        Ok(PointSeries {
+            product: manifest.product.clone(),
+            manifest: id.clone(),
+            title: manifest.title.clone(),
+            source: manifest.source.clone(),
+            synthetic: manifest.synthetic,
+            quantity: manifest.quantity,
+            unit: manifest.quantity.display().unit.to_owned(),
+            lon_deg: place.lon,
+            lat_deg: place.lat,
+            cell: Cell {
+                row,
+                col,
+                lon_deg: center.lon,
+                lat_deg: center.lat,
+            },
+            series,
+        })
     }
 
-    async fn budget(&self, request: &BudgetRequest) -> Result<BudgetAnswer, BackendError> {
+    /// One row of all that is asked for.
+    async fn budget(
+        &self,
+        manifest: &Manifest,
+        query: &BudgetQuery,
+    ) -> Result<BudgetAnswer, BackendError> {
         self.mood().apply()?;
-        self.budgets.lock().unwrap().push(request.clone());
+        self.budgets.lock().unwrap().push(query.clone());
+        self.versions.lock().unwrap().push(manifest.number);
+        let (window, _steps) = query.steps(manifest).unwrap();
+        let is_sum = manifest.quantity == Quantity::AccumulatedCarbon;
         Ok(BudgetAnswer {
+            product: manifest.product.clone(),
+            manifest: manifest.id(),
+            title: manifest.title.clone(),
+            source: manifest.source.clone(),
+            synthetic: manifest.synthetic,
+            region: query.region_name.clone(),
+            earth: query.earth,
+            cells: query.cells,
+            ocean_source: ocean_source(query.ocean.as_deref()),
+            unit: "Tg C".to_owned(),
             region_area_m2: 5.1e14,
             ocean_area_m2: 3.6e14,
-            ocean_source: ocean_source(request.ocean.as_deref()),
             gap_basis: "the mean of the band".to_owned(),
             notes: vec!["taken as written".to_owned()],
             rows: vec![BudgetRow {
-                period: request.period,
+                start: window.start,
+                end: window.end,
+                budget_kg: "-176100000000.000000000".to_owned(),
                 budget_tg: -176.1,
                 coverage_percent: 92.5,
                 area_m2: 3.4e14,
+                region_area_m2: 5.1e14,
+                ocean_area_m2: 3.6e14,
                 ocean_with_data_m2: 3.3e14,
                 gap_tg: Some(-12.5),
                 gap_area_m2: 2.0e13,
-                complete_and_incomplete_m2: (request.manifest.quantity
-                    == Quantity::AccumulatedCarbon)
-                    .then_some([3e14, 3e13]),
+                completeness: is_sum.then_some(Completeness {
+                    complete_m2: 3e14,
+                    incomplete_m2: 3e13,
+                }),
             }],
         })
     }
 
     /// The first step has no data.
-    async fn area(&self, request: &AreaRequest) -> Result<AreaSeries, BackendError> {
+    async fn area(
+        &self,
+        manifest: &Manifest,
+        query: &RegionSeriesQuery,
+    ) -> Result<RegionSeries, BackendError> {
         self.mood().apply()?;
-        self.areas.lock().unwrap().push(request.clone());
-        let steps = request.manifest.steps.iter();
-        let inside = steps.filter(|step| step.period.overlaps(request.period));
-        let row = |(index, step): (usize, &contract::manifest::Step)| AreaRow {
-            period: step.period,
+        self.areas.lock().unwrap().push(query.clone());
+        let (_window, inside) = manifest.steps_inside(query.from, query.to).unwrap();
+        let value = |(index, step): (usize, &Step)| RegionValue {
+            start: step.period.start,
+            end: step.period.end,
+            mid: step.period.mid(),
             mean: (index > 0).then_some(index as f64 / 4.0),
             area_m2: 1e12 * index as f64,
             coverage_percent: 25.0 * index as f64,
         };
-        Ok(AreaSeries {
+        Ok(RegionSeries {
+            product: manifest.product.clone(),
+            manifest: manifest.id(),
+            title: manifest.title.clone(),
+            source: manifest.source.clone(),
+            synthetic: manifest.synthetic,
+            quantity: manifest.quantity,
+            unit: manifest.quantity.display().unit.to_owned(),
+            region: query.region_name.clone(),
             region_area_m2: 4e12,
             ocean_area_m2: 3e12,
-            ocean_source: ocean_source(request.ocean.as_deref()),
+            ocean_source: ocean_source(query.ocean.as_deref()),
             notes: vec![],
-            rows: inside.enumerate().map(row).collect(),
+            earth: query.earth,
+            series: inside.into_iter().enumerate().map(value).collect(),
         })
     }
 
@@ -258,7 +322,7 @@ pub(crate) struct Observer {
     pub(crate) platforms: Mutex<Vec<Platform>>,
     pub(crate) track: Mutex<Vec<TrackPoint>>,
     pub(crate) observations: Mutex<Vec<Observation>>,
-    pub(crate) questions: Mutex<Vec<ObservationQuestion>>,
+    pub(crate) questions: Mutex<Vec<Filter>>,
     pub(crate) mood: Mutex<Mood>,
 }
 
@@ -267,11 +331,11 @@ impl Observer {
         *self.mood.lock().unwrap() = mood;
     }
 
-    pub(crate) fn last_question(&self) -> ObservationQuestion {
+    pub(crate) fn last_question(&self) -> Filter {
         self.questions.lock().unwrap().last().unwrap().clone()
     }
 
-    fn asked(&self, question: &ObservationQuestion) -> Result<(), BackendError> {
+    fn asked(&self, question: &Filter) -> Result<(), BackendError> {
         self.questions.lock().unwrap().push(question.clone());
         self.mood.lock().unwrap().clone().apply()
     }
@@ -279,31 +343,25 @@ impl Observer {
 
 #[async_trait]
 impl Observe for Observer {
-    async fn platforms(
-        &self,
-        question: &ObservationQuestion,
-    ) -> Result<Vec<Platform>, BackendError> {
-        self.asked(question)?;
+    async fn platforms(&self, filter: &Filter) -> Result<Vec<Platform>, BackendError> {
+        self.asked(filter)?;
         Ok(self.platforms.lock().unwrap().clone())
     }
 
-    async fn track(&self, _question: &TrackQuestion) -> Result<Vec<TrackPoint>, BackendError> {
+    async fn track(&self, _query: &TrackQuery) -> Result<Vec<TrackPoint>, BackendError> {
         Ok(self.track.lock().unwrap().clone())
     }
 
     /// Pages begin where `after`, a number, says.
-    async fn observations(
-        &self,
-        question: &ObservationQuestion,
-    ) -> Result<ObservationPage, BackendError> {
-        self.asked(question)?;
+    async fn observations(&self, filter: &Filter) -> Result<Page, BackendError> {
+        self.asked(filter)?;
         let all = self.observations.lock().unwrap().clone();
-        let start = question
+        let start = filter
             .after
             .as_ref()
             .map_or(0, |after| after.parse().unwrap());
-        let end = all.len().min(start + question.limit as usize);
-        Ok(ObservationPage {
+        let end = all.len().min(start + filter.limit as usize);
+        Ok(Page {
             observations: all[start..end].to_vec(),
             next: (end < all.len()).then(|| end.to_string()),
         })

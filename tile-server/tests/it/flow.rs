@@ -98,7 +98,7 @@ async fn the_list_of_products_offers_a_flow_with_a_legend_of_speeds_where_there_
         let products = body["products"].as_array().unwrap();
         products
             .iter()
-            .find(|product| product["id"] == id)
+            .find(|product| product["product"] == id)
             .unwrap()
             .clone()
     };

@@ -1,10 +1,10 @@
 //! `/api/observations/platforms` and `/api/observations/{dataset}/{platform}`.
 
 use axum::http::StatusCode;
-use contract::observation::{Observation, PlatformKind, Quality};
+use contract::observation::{Observation, Platform, PlatformKind, Quality, TrackPoint};
 use contract::region::Region;
 use serde_json::json;
-use tile_server::backend::{Class, Platform, TrackPoint};
+use tile_server::backend::Class;
 
 use crate::app::TestApp;
 use crate::doubles::Mood;
@@ -12,10 +12,11 @@ use crate::doubles::Mood;
 pub(crate) fn platform(name: &str, kind: PlatformKind) -> Platform {
     Platform {
         dataset: "buoys".parse().unwrap(),
-        name: name.to_owned(),
+        platform: name.to_owned(),
         kind,
         first: "2020-01-01".parse().unwrap(),
         last: "2020-02-01".parse().unwrap(),
+        bounds_deg: [-155.0, 0.5, -155.0, 0.5],
         lon_deg: -155.0,
         lat_deg: 0.5,
         properties: vec!["sea_surface_temperature".to_owned()],
@@ -69,8 +70,8 @@ async fn platforms_are_points_and_ships_are_tracks() {
         buoy["geometry"],
         json!({"type": "Point", "coordinates": [-155.0, 0.5]})
     );
-    assert_eq!(buoy["properties"]["kind"], "buoy");
-    assert_eq!(buoy["properties"]["count"], 3);
+    let row = serde_json::to_value(platform("51001", PlatformKind::Buoy)).unwrap();
+    assert_eq!(buoy["properties"], row);
     let track = [
         [[178.0, 10.0], [180.0, 10.0]].to_vec(),
         [[-180.0, 10.0], [-178.0, 10.0], [-177.0, 10.0]].to_vec(),
@@ -107,7 +108,7 @@ async fn many_buoys_take_no_ship_its_track_but_there_is_a_limit() {
 #[tokio::test]
 async fn the_question_is_what_the_address_says() {
     let app = TestApp::new().await.observing();
-    app.get("/api/observations/platforms?bbox=170,-10,-170,10&from=2020-01-01&to=2021-01-01&property=wind_speed&kind=ship")
+    app.get("/api/observations/platforms?region=170,-10,-170,10&from=2020-01-01&to=2021-01-01&property=wind_speed&kind=ship")
         .await;
     let asked = app.observer.last_question();
     assert_eq!(asked.region, "170,-10,-170,10".parse::<Region>().unwrap());
@@ -116,6 +117,7 @@ async fn the_question_is_what_the_address_says() {
     assert_eq!(asked.properties, ["wind_speed"]);
     assert_eq!(asked.kinds, [PlatformKind::Ship]);
     assert!(asked.limit >= 10_000, "the limit is one of platforms too");
+    assert_eq!(asked.worst, Quality::Bad, "as the series counts");
 }
 
 #[tokio::test]
@@ -124,18 +126,17 @@ async fn a_series_tells_unit_and_quality_a_page_at_a_time() {
     app.observer.observations.lock().unwrap()[1].quality = Quality::Bad;
     let path = "/api/observations/buoys/51001?limit=2&property=sea_surface_temperature";
     let first = app.get(path).await.json();
-    assert_eq!(first["dataset"], "buoys");
-    assert_eq!(first["platform"], "51001");
     assert_eq!(
-        first["series"][1],
-        json!({"time": "2020-01-01T01:00:00Z", "lon": -155.0, "lat": 0.5, "depth_m": 1.5,
-            "property": "sea_surface_temperature", "value": 26.0, "unit": "degC", "quality": "bad"})
+        first["observations"][1],
+        json!({"dataset": "buoys", "platform": "51001", "kind": "buoy", "time": "2020-01-01T01:00:00Z",
+            "lon_deg": -155.0, "lat_deg": 0.5, "depth_m": 1.5, "property": "sea_surface_temperature", "value": 26.0,
+            "unit": "degC", "quality": "bad"})
     );
     let mut next = first["next"].clone();
     let mut count = 2;
     while let Some(after) = next.as_str() {
         let page = app.get(&format!("{path}&after={after}")).await.json();
-        count += page["series"].as_array().unwrap().len();
+        count += page["observations"].as_array().unwrap().len();
         next = page["next"].clone();
     }
     assert_eq!(count, 5);
@@ -160,8 +161,8 @@ async fn names_of_platforms_may_hold_anything() {
 async fn bad_questions_say_what_is_wrong_and_reach_nobody() {
     let app = with_buoy().await;
     for path in [
-        "platforms?bbox=1,2,3",
-        "platforms?bbox=0,-91,1,1",
+        "platforms?region=1,2,3",
+        "platforms?region=0,-91,1,1",
         "platforms?from=yesterday",
         "platforms?kind=whale",
         "platforms?dataset=../secret",
@@ -177,6 +178,14 @@ async fn bad_questions_say_what_is_wrong_and_reach_nobody() {
         assert!(!answer.reason().is_empty());
     }
     assert!(app.observer.questions.lock().unwrap().is_empty());
+}
+
+#[tokio::test]
+async fn what_was_called_otherwise_before_is_answered_with_what_to_write() {
+    let app = with_buoy().await;
+    let answer = app.get("/api/observations/platforms?bbox=0,0,1,1").await;
+    assert_eq!(answer.status, StatusCode::BAD_REQUEST);
+    assert!(answer.reason().contains("region="), "{}", answer.reason());
 }
 
 #[tokio::test]

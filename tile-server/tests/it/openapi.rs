@@ -4,11 +4,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use axum::http::StatusCode;
-use contract::observation::{PlatformKind, Quality};
+use contract::check::{AgainstPaper, Check, CheckRow, Stated, Verdict};
+use contract::observation::{PlatformKind, Quality, TrackPoint};
 use contract::quantity::Quantity;
 use contract::time::Period;
 use serde_json::{Value, json};
-use tile_server::backend::{Check, CheckRow, Paper, TrackPoint};
 
 use crate::app::{Answer, TestApp};
 use crate::doubles::Mood;
@@ -105,12 +105,14 @@ async fn rich() -> TestApp {
         difference: 0.0,
         agrees: true,
     };
-    let paper = Paper {
-        value: -1.4,
-        uncertainty: Some(0.7),
-        decimals: 1,
+    let paper = AgainstPaper {
+        stated: Stated {
+            value: -1.4,
+            decimals: 1,
+            uncertainty: Some(0.7),
+        },
         difference: 0.0,
-        verdict: "within".to_owned(),
+        verdict: Verdict::Within,
     };
     *app.analyst.check.lock().unwrap() = Some(Check {
         rows: vec![row(Some(paper)), row(None)],

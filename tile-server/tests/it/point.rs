@@ -20,13 +20,14 @@ async fn a_series_is_that_of_the_cell_in_the_unit_people_read() {
     );
     assert_eq!(
         body["cell"],
-        json!({"row": 6, "col": 19, "lon": 15.0, "lat": -5.0})
+        json!({"row": 6, "col": 19, "lon_deg": 15.0, "lat_deg": -5.0})
     );
-    assert_eq!((&body["lon"], &body["lat"]), (&json!(12.3), &json!(-3.2)));
+    let asked = (&body["lon_deg"], &body["lat_deg"]);
+    assert_eq!(asked, (&json!(12.3), &json!(-3.2)));
     let series = body["series"].as_array().unwrap();
     assert_eq!(series.len(), 3);
     let value = series[1]["value"].as_f64().unwrap();
-    assert!((value - (6.01 - 273.15)).abs() < 1e-9, "{value}");
+    assert!((value - 6.01).abs() < 1e-9, "{value}");
     assert_eq!(series[1]["start"], "2000-02-01T00:00:00Z");
     assert_eq!(series[1]["mid"], "2000-02-15T12:00:00Z");
     assert!(body["manifest"].as_str().unwrap().starts_with("sst@1-"));
@@ -68,7 +69,7 @@ async fn a_place_outside_the_grid_is_a_bad_request_that_says_what_is_inside() {
     let answer = app.get("/api/products/sst/point?lon=0&lat=75").await;
     assert_eq!(answer.status, StatusCode::BAD_REQUEST);
     assert!(
-        answer.reason().contains("latitudes -60 to 60"),
+        answer.reason().contains("-60 to 60 degrees north"),
         "{}",
         answer.reason()
     );

@@ -10,16 +10,16 @@ async fn a_product_tells_what_a_viewer_needs() {
     let app = TestApp::new().await;
     let body = app.get("/api/products").await.json();
     let flux = &body["products"][0];
-    assert_eq!(flux["id"], "flux");
+    assert_eq!(flux["product"], "flux");
     assert_eq!(flux["title"], "Test flux");
     assert_eq!(flux["quantity"], "carbon_flux");
     assert_eq!(
-        (&flux["unit"], &flux["display_unit"]),
+        (&flux["stored_unit"], &flux["unit"]),
         (&json!("kg m-2 s-1"), &json!("g C m⁻² yr⁻¹"))
     );
     assert!((flux["display_factor"].as_f64().unwrap() - 1000.0 * 365.25 * 86_400.0).abs() < 1.0);
     assert_eq!(flux["synthetic"], false);
-    assert_eq!(flux["bounds"], json!([-180.0, -60.0, 180.0, 60.0]));
+    assert_eq!(flux["bounds_deg"], json!([-180.0, -60.0, 180.0, 60.0]));
     assert_eq!(flux["modes"], json!(["map", "points", "sprites", "volume"]));
     let january = json!({"start": "2000-01-01T00:00:00Z", "end": "2000-02-01T00:00:00Z", "mid": "2000-01-16T12:00:00Z"});
     assert_eq!(flux["steps"][0], january);
@@ -40,7 +40,7 @@ async fn fluxes_come_first_and_accumulated_carbon_last_with_maps_only() {
     let products = body["products"].as_array().unwrap();
     let ids: Vec<_> = products
         .iter()
-        .map(|product| product["id"].as_str().unwrap())
+        .map(|product| product["product"].as_str().unwrap())
         .collect();
     assert_eq!(ids, ["flux", "sst", "flux-accumulated"]);
     assert_eq!(products[2]["modes"], json!(["map"]));
@@ -69,7 +69,7 @@ async fn a_damaged_manifest_does_not_hide_the_other_products() {
         .as_array()
         .unwrap()
         .iter()
-        .map(|p| p["id"].clone())
+        .map(|p| p["product"].clone())
         .collect();
     assert_eq!(
         ids,
@@ -99,7 +99,7 @@ async fn synthetic_products_say_so() {
         .as_array()
         .unwrap()
         .iter()
-        .find(|p| p["id"] == "synthetic-sea")
+        .find(|p| p["product"] == "synthetic-sea")
         .unwrap();
     assert_eq!(synthetic["synthetic"], true);
 }

@@ -13,7 +13,7 @@ async fn every_region_that_is_listed_can_be_asked_for() {
     for region in regions {
         let (name, bounds) = (
             region["name"].as_str().unwrap(),
-            region["bounds"].as_array().unwrap(),
+            region["bounds_deg"].as_array().unwrap(),
         );
         assert_eq!(bounds.len(), 4, "{name}");
         assert!(!region["title"].as_str().unwrap().is_empty(), "{name}");

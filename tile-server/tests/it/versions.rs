@@ -9,7 +9,7 @@ use crate::app::TestApp;
 async fn version(app: &TestApp, product: &str) -> String {
     let products = app.get("/api/products").await.json();
     let all = products["products"].as_array().unwrap();
-    let found = all.iter().find(|one| one["id"] == product).unwrap();
+    let found = all.iter().find(|one| one["product"] == product).unwrap();
     found["manifest"].as_str().unwrap().to_owned()
 }
 
@@ -53,9 +53,8 @@ async fn series_and_budgets_tell_the_version_that_was_asked_for() {
         let named = format!("{path}manifest={}", old.as_str().unwrap());
         assert_eq!(app.get(&named).await.json()["manifest"], old);
     }
-    let budgets = app.analyst.budgets.lock().unwrap();
-    let computed: Vec<u64> = budgets.iter().map(|asked| asked.manifest.number).collect();
-    assert_eq!(computed, [1, 2], "the old one was remembered");
+    let computed = app.analyst.versions.lock().unwrap();
+    assert_eq!(*computed, [1, 2], "the old one was remembered");
 }
 
 #[tokio::test]

@@ -85,7 +85,7 @@ const placePanel = new PlacePanel(panels.bodies.place, {
   store,
   steps: () => inventory.steps,
   label: () => inventory.product?.legend.label ?? "",
-  bounds: () => inventory.product?.bounds,
+  bounds: () => inventory.product?.bounds_deg,
   onError: report,
 });
 const budgetPanel = new BudgetPanel(panels.bodies.budget, {

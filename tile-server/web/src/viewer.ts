@@ -111,12 +111,12 @@ export class Viewer {
       notices.show("product", `The server has no product “${wanted}”; showing “${first.title}” instead.`);
     const chosen = catalogue.find(wanted) ?? first;
     const look = inventory.drawable(store.state.look);
-    if (store.state.product === chosen.id) {
+    if (store.state.product === chosen.product) {
       store.set({ look });
       this.#useProduct();
       this.#bringIntoSight();
-    } else store.set({ product: chosen.id, look: wanted === null ? look : withoutColours(look) });
-    await catalogue.learn(chosen.id, store.state.mode).catch((error: unknown) => report("layer", error));
+    } else store.set({ product: chosen.product, look: wanted === null ? look : withoutColours(look) });
+    await catalogue.learn(chosen.product, store.state.mode).catch((error: unknown) => report("layer", error));
     this.#showLayer();
     void presenter.idle().then(onReady);
     await this.#loadAside();
@@ -133,7 +133,7 @@ export class Viewer {
     }
     const relief = store.state.look.relief;
     const isReliefNew = before !== undefined && all.some((news) => news.product === relief);
-    if (isReliefNew) inventory.catalogue.revise(before.id);
+    if (isReliefNew) inventory.catalogue.revise(before.product);
     try {
       await inventory.renew();
     } catch (error) {
@@ -151,7 +151,7 @@ export class Viewer {
     }
     controls.setProduct(now);
     lookPanel.draw();
-    const shown = all.filter((news) => news.product === now.id);
+    const shown = all.filter((news) => news.product === now.product);
     if (isReliefNew) this.#showLayer();
     if (shown.length === 0) return;
     if (JSON.stringify(before.steps) !== JSON.stringify(now.steps)) this.#useProduct();
@@ -229,7 +229,7 @@ export class Viewer {
   /** Only for a product that was chosen: new data of the one in sight must not turn the globe. */
   #bringIntoSight(): void {
     const { store, inventory, globe } = this.#parts;
-    const bounds = inventory.product?.bounds;
+    const bounds = inventory.product?.bounds_deg;
     if (bounds && !contains(bounds, store.state.camera) && !this.#isPlaced) globe.lookAt(bounds);
   }
 

@@ -34,18 +34,24 @@ const ICE: Palette = { name: "ice", stops: [[0, "#030512"], [1, "#eafcfd"]] };
 function product(id: string, change: Partial<Product> = {}): Product {
   const steps = [{ start: "2000-01-01T00:00:00Z", end: "2000-02-01T00:00:00Z", mid: "2000-01-16T12:00:00Z" }];
   return {
-    id,
+    product: id,
     title: `The ${id}`,
     quantity: "carbon_flux",
     unit: "",
-    display_unit: "",
+    stored_unit: "",
     display_factor: 1,
     display_offset: 0,
     synthetic: false,
     source: "",
     manifest: `${id}@1-00000000`,
     derived_from: null,
-    bounds: [-180, -90, 180, 90],
+    rows: 180,
+    cols: 360,
+    bounds_deg: [-180, -90, 180, 90],
+    step_count: 0,
+    start: null,
+    end: null,
+    masked: { out_of_range: 0, poor_quality: 0, implausible: 0, steps: 0, uncounted_steps: 0 },
     steps,
     modes: ["map", "volume"],
     legend: { low: -40, high: 40, unit: "g C m⁻² yr⁻¹", label: "", stops: BALANCE.stops, ticks: [] },
@@ -210,7 +216,7 @@ describe("the look panel", () => {
   });
 
   it("knows of the carbon that accumulated from a product, and takes nothing else for it", () => {
-    const lifted = CATALOGUE.products.map((each) => each.id).filter((id) => CATALOGUE.isLifted(id));
+    const lifted = CATALOGUE.products.map((each) => each.product).filter((id) => CATALOGUE.isLifted(id));
     expect(lifted).toEqual(["flux"]);
     expect(CATALOGUE.isLifted("flu")).toBe(false);
   });

@@ -2,7 +2,7 @@
 import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
 import { countText, series, seriesUrl } from "../src/api/observations";
 import { tileTemplate } from "../src/api/pictures";
-import type { Measured, News, Platform } from "../src/api/types";
+import type { News, Observation, Platform } from "../src/api/types";
 import { parseNews, type Stream, touches, Updates } from "../src/api/updates";
 import { denseLine } from "../src/globe/box";
 import { groupsOf, isTrusted, qualityText } from "../src/panels/measured";
@@ -16,9 +16,10 @@ afterEach(() => {
   vi.useRealTimers();
 });
 
-function measured(change: Partial<Measured>): Measured {
-  const base = { time: "2020-01-01T00:00:00Z", lon: 1, lat: 2, depth_m: 1, property: "sea_temperature" };
-  return { ...base, value: 20, unit: "degC", quality: "good", ...change };
+function measured(change: Partial<Observation>): Observation {
+  const base = { dataset: "d", platform: "p", time: "2020-01-01T00:00:00Z", lon_deg: 1, lat_deg: 2, depth_m: 1 };
+  const usual = { kind: "buoy", property: "sea_temperature", value: 20, unit: "degC", quality: "good" } as const;
+  return { ...base, ...usual, ...change };
 }
 
 describe("what a platform measured", () => {
@@ -94,15 +95,15 @@ describe("platforms", () => {
     vi.stubGlobal("fetch", (url: string) => {
       asked.push(new URL(url).searchParams.get("after") ?? "");
       const next = asked.length < 3 ? String(asked.length) : null;
-      return Promise.resolve(new Response(JSON.stringify({ series: [measured({})], next })));
+      return Promise.resolve(new Response(JSON.stringify({ observations: [measured({})], next })));
     });
     const answer = await series("d", "p", new AbortController().signal);
     expect(asked).toEqual(["", "1", "2"]);
-    expect(answer.series).toHaveLength(3);
+    expect(answer.observations).toHaveLength(3);
     expect(answer.next).toBeNull();
-    vi.stubGlobal("fetch", () => Promise.resolve(new Response(JSON.stringify({ series: [measured({})], next: "x" }))));
+    vi.stubGlobal("fetch", () => Promise.resolve(new Response(JSON.stringify({ observations: [measured({})], next: "x" }))));
     const endless = await series("d", "p", new AbortController().signal);
-    expect(endless.series).toHaveLength(5);
+    expect(endless.observations).toHaveLength(5);
     expect(endless.next).toBe("x");
   });
 
@@ -190,7 +191,7 @@ describe("news", () => {
       tileTemplate("flux", "map", "2000-01-01T00:00:00Z", { manifest, revision });
     expect(address("flux@1-00000000", 0)).toContain(".png?time=2000-01-01T00%3A00%3A00Z&manifest=flux%401-00000000");
     expect(new Set([address("a", 0), address("b", 0), address("a", 1)]).size).toBe(3);
-    const product = { id: "flux", manifest: "a", bounds: [0, 0, 1, 1], steps: [] } as never;
+    const product = { product: "flux", manifest: "a", bounds_deg: [0, 0, 1, 1], steps: [] } as never;
     const before = new Catalogue([product]);
     before.revise("flux");
     const layer = new Catalogue([product], before).layerAt({ ...INITIAL, product: "flux" }, 0);

@@ -108,6 +108,9 @@ describe("files", () => {
     const text = budgetCsv({
       product: "p",
       manifest: "m-1",
+      title: "A flux",
+      source: "somebody",
+      synthetic: false,
       region: "global",
       earth: "wgs84",
       cells: "whole",
@@ -120,17 +123,20 @@ describe("files", () => {
       rows: [
         {
           ...row,
-          budget: -176.1,
+          budget_kg: "-176100000000.000000000",
+          budget_tg: -176.1,
           coverage_percent: 92.5,
           area_m2: 3e14,
+          region_area_m2: 5e14,
+          ocean_area_m2: 3.6e14,
           ocean_with_data_m2: 2.9e14,
-          gap: null,
+          gap_tg: null,
           gap_area_m2: 0,
         },
       ],
     });
     expect(text).toBe(
-      "# product: p\n# manifest: m-1\n# region: global\n# earth: wgs84\n# cells: whole\n# unit: Tg C\n# region area: 500000000000000 m2, ocean 360000000000000 m2 (a coast)\n# gap, no part of the budget: means of bands\n# note: taken as written\nstart,end,budget,coverage_percent,area_m2,ocean_with_data_m2,gap,gap_area_m2\n2000-01-01T00:00:00Z,2000-02-01T00:00:00Z,-176.1,92.5,300000000000000,290000000000000,,0\n",
+      "# product: p\n# manifest: m-1\n# region: global\n# earth: wgs84\n# cells: whole\n# unit: Tg C\n# region area: 500000000000000 m2, ocean 360000000000000 m2 (a coast)\n# gap, no part of the budget: means of bands\n# note: taken as written\nstart,end,budget_tg,coverage_percent,area_m2,ocean_with_data_m2,gap_tg,gap_area_m2\n2000-01-01T00:00:00Z,2000-02-01T00:00:00Z,-176.1,92.5,300000000000000,290000000000000,,0\n",
     );
   });
 
@@ -138,10 +144,14 @@ describe("files", () => {
     const text = seriesCsv({
       product: "p",
       manifest: "m-1",
+      title: "A flux",
+      source: "somebody",
+      synthetic: false,
+      quantity: "carbon_flux",
       unit: "g C m-2 yr-1",
-      lon: 0,
-      lat: 0,
-      cell: { row: 1, col: 2, lon: 0.5, lat: 0.5 },
+      lon_deg: 0,
+      lat_deg: 0,
+      cell: { row: 1, col: 2, lon_deg: 0.5, lat_deg: 0.5 },
       series: [{ ...row, mid: "2000-01-16T12:00:00Z", value: null }],
     });
     expect(text.trimEnd().endsWith(",2000-01-16T12:00:00Z,")).toBe(true);

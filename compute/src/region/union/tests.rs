@@ -3,7 +3,7 @@
 use contract::earth::Earth;
 use contract::region::{Polygon, Region};
 
-use crate::region::area::region_area_m2;
+use crate::region::extent::region_area_m2;
 use crate::region::rings::rings;
 
 type Corners = Vec<[f64; 2]>;

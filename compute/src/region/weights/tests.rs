@@ -4,7 +4,7 @@ use contract::region::{NamedRegion, Polygon};
 use proptest::prelude::*;
 
 use super::*;
-use crate::region::area::region_area_m2;
+use crate::region::extent::region_area_m2;
 
 const ONE_DEGREE: Grid = Grid {
     rows: 180,

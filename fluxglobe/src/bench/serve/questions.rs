@@ -15,9 +15,9 @@ const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
 /// The product asked about, as `/api/products` describes it.
 #[derive(Debug, Deserialize)]
 struct Product {
-    id: String,
+    product: String,
     /// West, south, east, north, degrees.
-    bounds: [f64; 4],
+    bounds_deg: [f64; 4],
     steps: Vec<Step>,
     modes: Vec<String>,
 }
@@ -71,7 +71,7 @@ impl Questions {
             None => vec![view(product, options)],
         };
         Ok(Self {
-            product: product.id.clone(),
+            product: product.product.clone(),
             size_px: match options.tiles {
                 Some(_zoom) => [TILE_PX, TILE_PX],
                 None => [options.width, options.height],
@@ -96,10 +96,10 @@ impl Questions {
 
 fn chosen(products: Vec<Product>, options: &BenchServe) -> Result<Product> {
     let mode = &options.mode.to_string();
-    let names: Vec<String> = products.iter().map(|one| one.id.clone()).collect();
+    let names: Vec<String> = products.iter().map(|one| one.product.clone()).collect();
     let mut those = products.into_iter().filter(|one| one.modes.contains(mode));
     let found = match &options.layer {
-        Some(layer) => those.find(|one| one.id == layer.to_string()),
+        Some(layer) => those.find(|one| one.product == layer.to_string()),
         None => those.next(),
     };
     found.with_context(|| {
@@ -118,7 +118,7 @@ fn view(product: &Product, options: &BenchServe) -> String {
     format!(
         "{}/globe/{}/{}.png?lon={}&lat={}&height_km={}&tilt={}&width={}&height={}&",
         options.url,
-        product.id,
+        product.product,
         options.mode,
         options.lon,
         options.lat,
@@ -135,17 +135,17 @@ fn tiles(product: &Product, options: &BenchServe, zoom: u8) -> Result<Vec<String
     let mut places = vec![];
     for (y, x) in (0..side).flat_map(|y| (0..side).map(move |x| (y, x))) {
         let tile = Tile::new(zoom, x, y)?;
-        if overlap(tile.bounds_deg(), product.bounds) {
+        if overlap(tile.bounds_deg(), product.bounds_deg) {
             places.push(format!(
                 "{}/tiles/{}/{}/{zoom}/{x}/{y}.png?",
-                options.url, product.id, options.mode
+                options.url, product.product, options.mode
             ));
         }
     }
     ensure!(
         !places.is_empty(),
         "no tile of zoom {zoom} lies on {}",
-        product.id
+        product.product
     );
     Ok(places)
 }
@@ -173,7 +173,7 @@ mod tests {
 
     fn product() -> Product {
         serde_json::from_str(
-            r#"{"id": "p", "bounds": [100, 0, 130, 40], "modes": ["map", "volume"],
+            r#"{"product": "p", "bounds_deg": [100, 0, 130, 40], "modes": ["map", "volume"],
                 "steps": [{"start": "2000-01-01T00:00:00Z", "end": "2000-02-01T00:00:00Z"},
                           {"start": "2000-02-01T00:00:00Z", "end": "2000-03-01T00:00:00Z"}]}"#,
         )
@@ -236,6 +236,6 @@ mod tests {
         );
         assert!(error.to_string().contains("there are p"), "{error}");
         assert!(chosen(vec![product()], &options(&["--mode", "flow"])).is_err());
-        assert_eq!(chosen(vec![product()], &options(&[])).unwrap().id, "p");
+        assert_eq!(chosen(vec![product()], &options(&[])).unwrap().product, "p");
     }
 }

@@ -70,7 +70,7 @@ pub(crate) async fn pages_join_to_the_whole(home: &Home) {
         let page = store.query(&filter).await.unwrap();
         assert!(page.observations.len() <= 37);
         joined.extend(page.observations);
-        filter.after = page.next.map(|token| token.to_string().parse().unwrap());
+        filter.after = page.next;
         if filter.after.is_none() {
             break;
         }
@@ -247,7 +247,10 @@ pub(crate) async fn platforms_are_summed_up_over_what_is_wanted(home: &Home) {
     ];
     store.upsert(&rows).await.unwrap();
     let found = store.platforms(&Filter::default()).await.unwrap();
-    let names: Vec<_> = found.iter().map(|p| (p.name.as_str(), p.count)).collect();
+    let names: Vec<_> = found
+        .iter()
+        .map(|p| (p.platform.as_str(), p.count))
+        .collect();
     assert_eq!(names, [("buoy", 1), ("ship", 3)]);
     let ship = &found[1];
     assert_eq!(ship.kind, PlatformKind::Ship);

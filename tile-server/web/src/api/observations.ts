@@ -1,6 +1,6 @@
 //! Observations: which platforms there are and what one of them measured.
 import { address, getJson } from "./client";
-import type { Answer, Measured, MeasuredSeries, Platform, QueryTexts } from "./types";
+import type { Answer, Observation, ObservationPage, Platform, QueryTexts } from "./types";
 import { KINDS } from "./words";
 
 /** Answers of one series; a plot of more values than these hold would not show more. */
@@ -14,17 +14,17 @@ export function seriesUrl(dataset: string, platform: string, query: QueryTexts<"
 }
 
 /** All pages of a series, or the first ones where there are very many; `next` is then where to go on. */
-export async function series(dataset: string, platform: string, signal: AbortSignal): Promise<MeasuredSeries> {
-  const all: Measured[] = [];
+export async function series(dataset: string, platform: string, signal: AbortSignal): Promise<ObservationPage> {
+  const all: Observation[] = [];
   let after: string | null = null;
   for (let page = 0; page < MOST_PAGES; page++) {
     const url = seriesUrl(dataset, platform, after === null ? {} : { after });
-    const answer: MeasuredSeries = await getJson<Answer<"observations">>(url, signal);
-    all.push(...answer.series);
+    const answer: ObservationPage = await getJson<Answer<"observations">>(url, signal);
+    all.push(...answer.observations);
     after = answer.next;
     if (after === null) break;
   }
-  return { dataset, platform, series: all, next: after };
+  return { observations: all, next: after };
 }
 
 /** `3 buoys, 1 ship`; the kinds that are there, in their order. */

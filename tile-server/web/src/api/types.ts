@@ -11,20 +11,20 @@ export type StepTimes = Schemas["StepTimes"];
 export type PointSeries = Schemas["PointSeries"];
 export type Cells = Schemas["Cells"];
 export type Earth = Schemas["Earth"];
-export type Budget = Schemas["Budget"];
+export type Budget = Schemas["BudgetAnswer"];
 export type BudgetRow = Schemas["BudgetRow"];
 export type BudgetStep = Schemas["BudgetStep"];
 export type Region = Schemas["Region"];
 export type Check = Schemas["Check"];
 export type CheckRow = Schemas["CheckRow"];
-export type CheckPaper = Schemas["Paper"];
+export type CheckPaper = Schemas["AgainstPaper"];
 export type News = Schemas["News"];
 export type Refusal = Schemas["Refusal"];
 export type Kind = Schemas["PlatformKind"];
 export type Quality = Schemas["Quality"];
-export type Platform = Schemas["Platform"];
-export type Measured = Schemas["Measured"];
-export type MeasuredSeries = Schemas["MeasuredSeries"];
+export type Platform = Schemas["PlatformFeature"];
+export type Observation = Schemas["Observation"];
+export type ObservationPage = Schemas["ObservationPage"];
 
 /** Parameters that an operation takes after the question mark. */
 export type Query<Name extends keyof operations> = NonNullable<operations[Name]["parameters"]["query"]>;

@@ -37,7 +37,7 @@ export class PlatformLayer {
   }
 
   #draw(platform: Platform, isChosen: boolean): void {
-    const { lon, lat, kind } = platform.properties;
+    const { lon_deg, lat_deg, kind } = platform.properties;
     const colour = Color.fromCssColorString(COLOURS[kind]);
     if (platform.geometry.type === "MultiLineString") {
       for (const line of platform.geometry.coordinates) {
@@ -51,7 +51,7 @@ export class PlatformLayer {
     }
     this.#points.add({
       id: platform,
-      position: Cartesian3.fromDegrees(lon, lat, HEIGHT_M),
+      position: Cartesian3.fromDegrees(lon_deg, lat_deg, HEIGHT_M),
       color: colour,
       outlineColor: Color.fromCssColorString(isChosen ? "#ffffff" : "#0b1a26"),
       outlineWidth: 2,

@@ -40,7 +40,7 @@ export function offerOf(
     palettes: palettes.map(choice),
     range: { low: legend.low, high: legend.high },
     unit: legend.unit,
-    reliefs: catalogue.reliefs.map((each) => ({ id: each.id, title: titleText(each) })),
+    reliefs: catalogue.reliefs.map((each) => ({ id: each.product, title: titleText(each) })),
     canUncertainty: canUncertainty(mode),
     hasRelief: look.relief !== null,
     hasSea: hasSea(look, mode, isLifted),

@@ -115,7 +115,7 @@ export class BudgetForm {
     const box = parseBox(region);
     if (typeof box !== "string") return box;
     if (region === "global") return null;
-    return this.#regions.find((known) => known.name === region)?.bounds ?? null;
+    return this.#regions.find((known) => known.name === region)?.bounds_deg ?? null;
   }
 
   /** Undefined while the period is empty or there are no steps. */

@@ -144,7 +144,7 @@ export class BudgetPanel {
     const rows = answer.rows.map((row) => ({
       startMs: Date.parse(row.start),
       endMs: Date.parse(row.end),
-      value: row.budget,
+      value: row.budget_tg,
     }));
     this.#chart = barChart(plot, rows, query.step === "year" ? `${unit} per year` : `${unit} per period`);
   }
@@ -154,7 +154,7 @@ export class BudgetPanel {
     if (!row) return [el("p", { class: "problem" }, "The period holds no stored step.")];
     const isCarbon = total.unit === "Tg C";
     const petagrams = isCarbon
-      ? el("span", { class: "muted" }, `= ${numberText(row.budget / TG_PER_PG, 3)} Pg C`)
+      ? el("span", { class: "muted" }, `= ${numberText(row.budget_tg / TG_PER_PG, 3)} Pg C`)
       : null;
     return [
       el(
@@ -162,8 +162,8 @@ export class BudgetPanel {
         { class: "reading" },
         el(
           "strong",
-          { id: "budget-total", "data-value": String(row.budget) },
-          numberText(row.budget, totalDigits(row.budget)),
+          { id: "budget-total", "data-value": String(row.budget_tg) },
+          numberText(row.budget_tg, totalDigits(row.budget_tg)),
         ),
         el("span", { class: "unit" }, unit),
         petagrams,
@@ -193,9 +193,9 @@ const CELLS: Record<Cells, string> = {
 
 /** What gaps would add, never added in silence. */
 function gapText(row: BudgetRow, unit: string, basis: string): string {
-  if (row.gap === null) return "There are gaps, and nothing beside them to estimate them from.";
+  if (row.gap_tg === null) return "There are gaps, and nothing beside them to estimate them from.";
   if (row.gap_area_m2 === 0) return "No gaps in the sea that could be estimated.";
-  const added = numberText(row.gap, totalDigits(row.gap));
+  const added = numberText(row.gap_tg, totalDigits(row.gap_tg));
   return `Not in the budget: gaps of ${areaText(row.gap_area_m2)} would add ${added} ${unit} (${basis}).`;
 }
 
@@ -212,7 +212,7 @@ function table(answer: Budget, unit: string): HTMLElement {
       {},
       el("td", {}, row.start.slice(0, 10)),
       el("td", {}, row.end.slice(0, 10)),
-      el("td", { class: "number" }, numberText(row.budget, 2)),
+      el("td", { class: "number" }, numberText(row.budget_tg, 2)),
       el("td", { class: "number" }, `${numberText(row.coverage_percent, 1)} %`),
     ),
   );

@@ -33,8 +33,9 @@ function digitsByUnit(rows: readonly CheckRow[]): Map<string, number> {
 /** A printed number with the decimals and the uncertainty that the paper gives it. */
 export function statedText(paper: CheckPaper | null): string {
   if (paper === null) return "–";
-  const value = numberText(paper.value, paper.decimals);
-  return paper.uncertainty === null ? value : `${value} ± ${numberText(paper.uncertainty, paper.decimals)}`;
+  const { value, uncertainty, decimals } = paper.stated;
+  const text = numberText(value, decimals);
+  return uncertainty === null ? text : `${text} ± ${numberText(uncertainty, decimals)}`;
 }
 
 /** Only the paper's own uncertainty says that a number lies within it; a difference without one is shown as it is. */
@@ -44,7 +45,7 @@ export function verdictText(row: CheckRow): string {
   if (paper !== null) {
     const sign = paper.difference > 0 ? "+" : "";
     const difference = sign + numberText(paper.difference, 3);
-    texts.push(`${paper.verdict} (${difference})`);
+    texts.push(`${paper.verdict.replaceAll("_", " ")} (${difference})`);
   }
   if (!row.agrees) texts.push("off the independent number");
   return texts.join("; ");

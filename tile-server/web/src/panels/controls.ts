@@ -72,13 +72,13 @@ export class Controls {
   setProducts(products: readonly Product[]): void {
     this.#product.replaceChildren(
       ...products.map((product) =>
-        el("option", { value: product.id }, titleText(product)),
+        el("option", { value: product.product }, titleText(product)),
       ),
     );
   }
 
   setProduct(product: Product): void {
-    this.#product.value = product.id;
+    this.#product.value = product.product;
     this.#product.title = chemistry(product.title);
     this.#source.textContent = chemistry(product.source);
     this.#source.title = product.source;

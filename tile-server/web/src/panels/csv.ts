@@ -6,7 +6,7 @@ export function seriesCsv(answer: PointSeries): string {
     [
       `product: ${answer.product}`,
       `manifest: ${answer.manifest}`,
-      `cell centre: lon ${answer.cell.lon}, lat ${answer.cell.lat}`,
+      `cell centre: lon ${answer.cell.lon_deg}, lat ${answer.cell.lat_deg}`,
       `unit: ${answer.unit}`,
     ],
     ["start", "end", "mid", "value"],
@@ -27,15 +27,15 @@ export function budgetCsv(answer: Budget): string {
       `gap, no part of the budget: ${answer.gap_basis}`,
       ...answer.notes.map((note) => `note: ${note}`),
     ],
-    ["start", "end", "budget", "coverage_percent", "area_m2", "ocean_with_data_m2", "gap", "gap_area_m2"],
+    ["start", "end", "budget_tg", "coverage_percent", "area_m2", "ocean_with_data_m2", "gap_tg", "gap_area_m2"],
     answer.rows.map((row) => [
       row.start,
       row.end,
-      row.budget,
+      row.budget_tg,
       row.coverage_percent,
       row.area_m2,
       row.ocean_with_data_m2,
-      row.gap,
+      row.gap_tg,
       row.gap_area_m2,
     ]),
   );

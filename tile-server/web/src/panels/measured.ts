@@ -1,5 +1,5 @@
 //! Pure sorting of measurements: what one platform measured in, one plottable group for each property and depth out.
-import type { Kind, Measured, Quality } from "../api/types";
+import type { Kind, Observation, Quality } from "../api/types";
 import { QUALITIES } from "../api/words";
 import { chemistry } from "../page/format";
 
@@ -21,7 +21,7 @@ export interface Group {
 }
 
 /** A cast is one place and time at many depths: it is plotted over depth, everything else over time. */
-export function groupsOf(kind: Kind, measured: readonly Measured[]): Group[] {
+export function groupsOf(kind: Kind, measured: readonly Observation[]): Group[] {
   const over = kind === "profile" ? "depth" : "time";
   const depths = new Map<string, Set<number>>();
   for (const one of measured) {

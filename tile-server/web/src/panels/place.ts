@@ -100,7 +100,7 @@ export class PlacePanel {
     const cell = el(
       "p",
       { class: "muted" },
-      `Grid cell centred on ${latText(answer.cell.lat)}, ${lonText(answer.cell.lon)} (row ${answer.cell.row}, column ${answer.cell.col})`,
+      `Grid cell centred on ${latText(answer.cell.lat_deg)}, ${lonText(answer.cell.lon_deg)} (row ${answer.cell.row}, column ${answer.cell.col})`,
     );
     if (!hasData(samples)) {
       this.#content.replaceChildren(

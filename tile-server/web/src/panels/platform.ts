@@ -1,6 +1,6 @@
 //! The observations panel: a platform in, what it measured as a plot with units and quality out.
 import * as observations from "../api/observations";
-import type { MeasuredSeries, Platform } from "../api/types";
+import type { ObservationPage, Platform } from "../api/types";
 import { el } from "../page/dom";
 import { chemistry, latText, lonText, unitText } from "../page/format";
 import type { Chart } from "./chart";
@@ -37,8 +37,8 @@ export class PlatformPanel {
     }
   }
 
-  #draw(platform: Platform, answer: MeasuredSeries): void {
-    const groups = groupsOf(platform.properties.kind, answer.series);
+  #draw(platform: Platform, answer: ObservationPage): void {
+    const groups = groupsOf(platform.properties.kind, answer.observations);
     const [first] = groups;
     if (!first) {
       this.#body.replaceChildren(...head(platform), el("p", { class: "no-data" }, "It measured nothing in this period."));
@@ -54,7 +54,7 @@ export class PlatformPanel {
     const more =
       answer.next === null
         ? null
-        : el("p", { class: "muted" }, `The first ${answer.series.length} values; the server has more.`);
+        : el("p", { class: "muted" }, `The first ${answer.observations.length} values; the server has more.`);
     const { dataset, platform: name } = platform.properties;
     const json = el(
       "a",
@@ -97,11 +97,11 @@ export class PlatformPanel {
 }
 
 function head(platform: Platform): HTMLElement[] {
-  const { platform: name, kind, dataset, lon, lat, first, last, count } = platform.properties;
+  const { platform: name, kind, dataset, lon_deg, lat_deg, first, last, count } = platform.properties;
   const days = first.slice(0, 10) === last.slice(0, 10) ? first.slice(0, 10) : `${first.slice(0, 10)} to ${last.slice(0, 10)}`;
   return [
     el("h2", { class: "place-title", id: "platform-name" }, name),
     el("p", { class: "muted" }, `${kind[0]?.toUpperCase()}${kind.slice(1)} of ${chemistry(dataset)}`),
-    el("p", { class: "muted" }, `${latText(lat)}, ${lonText(lon)}; ${days}; ${count} observations`),
+    el("p", { class: "muted" }, `${latText(lat_deg)}, ${lonText(lon_deg)}; ${days}; ${count} observations`),
   ];
 }

@@ -27,11 +27,11 @@ export class Catalogue {
     this.products = products;
     this.#maxZoom = new Map(before ? before.#maxZoom : []);
     this.#revisions = new Map(before ? before.#revisions : []);
-    for (const product of products) this.#steps.set(product.id, parseSteps(product.steps));
+    for (const product of products) this.#steps.set(product.product, parseSteps(product.steps));
   }
 
   find(id: string | null): Product | undefined {
-    return this.products.find((product) => product.id === id);
+    return this.products.find((product) => product.product === id);
   }
 
   /** What a page without a wish shows: observed before synthetic, carbon fluxes before the rest, then what can be drawn in the most ways. */
@@ -99,16 +99,16 @@ export class Catalogue {
   layerAt(state: Readonly<State>, timeMs: number): LayerSpec | undefined {
     const product = this.find(state.product);
     if (!product || !Number.isFinite(timeMs)) return undefined;
-    const clampedMs = clampToRange(this.stepsOf(product.id), timeMs);
+    const clampedMs = clampToRange(this.stepsOf(product.product), timeMs);
     return {
-      product: product.id,
+      product: product.product,
       manifest: product.manifest,
-      revision: this.#revisions.get(product.id) ?? 0,
+      revision: this.#revisions.get(product.product) ?? 0,
       mode: state.mode,
       look: this.lookIn(state.mode, state),
       timeIso: toIso(clampedMs),
-      bounds: product.bounds,
-      maxZoom: this.#maxZoom.get(`${product.id}/${state.mode}`) ?? DEFAULT_MAX_ZOOM,
+      bounds: product.bounds_deg,
+      maxZoom: this.#maxZoom.get(`${product.product}/${state.mode}`) ?? DEFAULT_MAX_ZOOM,
     };
   }
 }

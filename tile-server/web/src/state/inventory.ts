@@ -49,6 +49,6 @@ export class Inventory {
   /** An address may name a palette or a relief that is not here. */
   drawable(look: Look): Look {
     const palettes = this.palettes.map((palette) => palette.name);
-    return possible(look, palettes, this.catalogue.reliefs.map((product) => product.id));
+    return possible(look, palettes, this.catalogue.reliefs.map((product) => product.product));
   }
 }

@@ -1,0 +1,55 @@
+//! A region as somebody asks for it: its shape, and what answers call it.
+
+use super::{NamedRegion, Region};
+use crate::ContractError;
+use crate::grid::rounded_deg;
+
+/// A region and its name in answers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AskedRegion {
+    /// Its shape.
+    pub region: Region,
+    /// Its name, `west,south,east,north`, or the text or file that it was asked for with.
+    pub name: String,
+}
+
+impl std::str::FromStr for AskedRegion {
+    type Err = ContractError;
+
+    /// Parses what [`Region`] does.
+    fn from_str(s: &str) -> Result<Self, Self::Err> {
+        let region: Region = s.parse()?;
+        let name = match region {
+            Region::Box {
+                west,
+                south,
+                east,
+                north,
+            } if NamedRegion::find(s).is_none() => [west, south, east, north]
+                .map(|edge| rounded_deg(edge).to_string())
+                .join(","),
+            _ => s.to_owned(),
+        };
+        Ok(Self { region, name })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_box_is_called_by_its_edges_and_all_else_as_it_is_written() {
+        for (asked, name) in [
+            ("14n-50n", "14n-50n"),
+            ("global", "global"),
+            ("170,-10,-170,10", "170,-10,190,10"),
+            ("POLYGON((0 0,1 0,0 1,0 0))", "POLYGON((0 0,1 0,0 1,0 0))"),
+        ] {
+            let own: AskedRegion = asked.parse().unwrap();
+            assert_eq!(own.name, name);
+            assert_eq!(own.region, asked.parse().unwrap());
+        }
+        assert!("atlantis".parse::<AskedRegion>().is_err());
+    }
+}

@@ -1,0 +1,128 @@
+//! One question has one answer, field by field: on the command line with `--json`, and over HTTP.
+
+use std::path::Path;
+
+use harness::server::Server;
+use harness::{granule, program};
+use serde_json::Value;
+
+/// Three months of a flux, what accumulated of it, and a buoy.
+fn landed() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let data = folder.path();
+    let land = |file: &Path, more: &[&str]| {
+        let words = ["ingest", file.to_str().unwrap()];
+        program::succeed(data, &[&words[..], more].concat()).unwrap();
+    };
+    for month in 0..3 {
+        land(
+            &granule::write(data, month, 0).unwrap(),
+            &["--product", "flux"],
+        );
+    }
+    let derive = ["derive", "accumulated", "--product", "flux"];
+    program::succeed(data, &derive).unwrap();
+    let line = |hour: u32| {
+        let wind = f64::from(hour) / 4.0;
+        format!("2012 01 01 {hour:02} 50  {wind}   6.1\n")
+    };
+    let lines: String = (0..24).map(line).collect();
+    let buoy = data.join("44005h2012.txt");
+    std::fs::write(&buoy, format!("#YY  MM DD hh mm WSPD  ATMP\n{lines}")).unwrap();
+    land(&buoy, &[]);
+    folder
+}
+
+/// Every byte of a text as an address carries it.
+fn escaped(text: &str) -> String {
+    text.bytes()
+        .fold(String::new(), |sofar, byte| sofar + &format!("%{byte:02X}"))
+}
+
+/// A line each.
+fn lines(data: &Path, words: &str) -> Vec<Value> {
+    let words: Vec<&str> = words.split(' ').chain(["--json"]).collect();
+    let text = program::succeed(data, &words).unwrap();
+    let line = |line: &str| serde_json::from_str(line).unwrap();
+    text.lines().map(line).collect()
+}
+
+#[test]
+fn a_question_on_the_command_line_and_over_http_has_one_answer() {
+    let folder = landed();
+    let data = folder.path();
+    let server = Server::start(data, &["serve"]).unwrap();
+    let polygon = r#"{"type":"Polygon","coordinates":[[[0.5,0],[40,0],[20,33],[0.5,0]]]}"#;
+    let drawn = (
+        format!("stats polygon --product flux --region {polygon} --to 2000-03"),
+        format!("flux/area?region={}&to=2000-03", escaped(polygon)),
+    );
+    let questions = [
+        ("budget --product flux", "flux/budget"),
+        (
+            "budget --product flux --region 170,-20,-170.5,33.3 --step month --cells ocean-share --earth local-radius",
+            "flux/budget?region=170,-20,-170.5,33.3&step=month&cells=ocean-share&earth=local-radius",
+        ),
+        (
+            "budget --product flux --region 14n-50n --step year --from 1999-02 --to 2000-02-10",
+            "flux/budget?region=14n-50n&step=year&from=1999-02&to=2000-02-10",
+        ),
+        (
+            "budget --product flux-accumulated --step month",
+            "flux-accumulated/budget?step=month",
+        ),
+        (drawn.0.as_str(), drawn.1.as_str()),
+        (
+            "stats polygon --product flux --region china-sea --earth sphere",
+            "flux/area?region=china-sea&earth=sphere",
+        ),
+        (
+            "stats point --product flux --lon 181.3 --lat -4.1",
+            "flux/point?lon=181.3&lat=-4.1",
+        ),
+        (
+            "stats point --product flux-accumulated --lon 2 --lat 40",
+            "flux-accumulated/point?lon=2&lat=40",
+        ),
+    ];
+    for (words, path) in questions {
+        let words: Vec<&str> = words.split_whitespace().chain(["--json"]).collect();
+        let printed = program::json(data, &words).unwrap();
+        let served = server.get(&format!("/api/products/{path}")).unwrap();
+        assert_eq!(served.status, 200, "{path}: {}", served.text());
+        let rows = printed.get("rows").or(printed.get("series")).unwrap();
+        assert!(!rows.as_array().unwrap().is_empty(), "{printed}");
+        assert_eq!(served.json().unwrap(), printed, "{path}");
+    }
+}
+
+#[test]
+fn what_there_is_has_one_name_for_each_of_its_parts() {
+    let folder = landed();
+    let data = folder.path();
+    let server = Server::start(data, &["serve"]).unwrap();
+    let json = |path: &str| server.get(path).unwrap().json().unwrap();
+    let printed = program::json(data, &["products", "--json"]).unwrap();
+    let served = json("/api/products");
+    let (printed, served) = (printed.as_array(), served["products"].as_array());
+    let (printed, served) = (printed.unwrap(), served.unwrap());
+    assert_eq!((printed.len(), served.len()), (2, 2));
+    for own in printed {
+        let same = |other: &&Value| other["product"] == own["product"];
+        let other = served.iter().find(same).unwrap();
+        for (field, value) in own.as_object().unwrap() {
+            assert_eq!(&other[field], value, "{field}");
+        }
+    }
+    let listed = lines(data, "observations list");
+    let served = json("/api/observations/platforms");
+    let served = served["features"].as_array().unwrap();
+    let served: Vec<&Value> = served.iter().map(|one| &one["properties"]).collect();
+    assert_eq!(listed.iter().collect::<Vec<_>>(), served);
+    let platform = listed[0]["platform"].as_str().unwrap();
+    let asked = format!("observations query --dataset ndbc --platform {platform}");
+    let measured = lines(data, &asked);
+    assert_eq!(measured.len(), 48);
+    let served = json(&format!("/api/observations/ndbc/{platform}"));
+    assert_eq!(served["observations"], Value::from(measured));
+}
