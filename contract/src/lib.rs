@@ -22,6 +22,7 @@ pub mod key;
 pub mod kind;
 pub mod land;
 pub mod listing;
+pub mod look_at;
 pub mod manifest;
 pub mod masked;
 pub mod notice;

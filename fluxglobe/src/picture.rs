@@ -1,10 +1,11 @@
 //! From the options of a picture to its render job: the same words and the same function as an address has.
 
 use anyhow::{Context as _, Result, bail};
-use contract::camera::{CameraAngles, LookAt};
+use contract::camera::CameraAngles;
 use contract::context::Relief;
 use contract::grid::LonLatDeg;
 use contract::job::{Mode, RenderJob, View};
+use contract::look_at::LookAt;
 use contract::manifest::Manifest;
 use contract::picture::{PictureOptions, PictureRequest, PictureSources, shown_time};
 use contract::time::Period;

@@ -43,7 +43,9 @@ pub enum IngestError {
         file: PathBuf,
     },
     /// Other writers kept taking the next manifest number.
-    #[error("gave up on product {product} after {attempts} lost races for the next manifest number")]
+    #[error(
+        "gave up on product {product} after {attempts} lost races for the next manifest number"
+    )]
     Contended {
         /// Product.
         product: String,

@@ -17,13 +17,13 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use ::retry::Backoff;
 use contract::event::Event;
 use contract::key::ObjectKey;
 use contract::product::ProductId;
 use contract::time::TimeMs;
 use contract::topic::Topic;
 use futures::FutureExt as _;
-use ::retry::Backoff;
 use service::{Part, Readiness, Report};
 use storage::Store;
 use storage::log::{EventLog, Finished};
@@ -153,7 +153,11 @@ impl IngestService {
 
     async fn next_group(&self, progress: &dyn Progress) -> Result<Vec<Outcome>, IngestError> {
         let attempts = Some(MAX_ATTEMPTS);
-        let mut pauses = Backoff { attempts, ..Backoff::default() }.pauses();
+        let mut pauses = Backoff {
+            attempts,
+            ..Backoff::default()
+        }
+        .pauses();
         loop {
             match self.try_group(progress).await {
                 // Whoever frees the disk need not come back here to start again what was under way.

@@ -1,8 +1,9 @@
 //! Views of the globe and of the map in one line each.
 
-use contract::camera::{CameraAngles, LookAt};
+use contract::camera::CameraAngles;
 use contract::grid::LonLatDeg;
 use contract::job::View;
+use contract::look_at::LookAt;
 use contract::tile::Tile;
 
 /// A square picture of a globe from above a place, degrees; height in metres.

@@ -10,7 +10,6 @@ pub mod desk;
 mod encoding;
 pub mod error;
 pub mod fleet;
-mod gauges;
 pub mod pipeline;
 mod prefetch;
 pub mod server;

@@ -21,10 +21,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
         &["contract", "retry", "storage", "service", "render"],
     ),
     ("render-proof", &["contract", "render"]),
-    (
-        "tile-server",
-        &["contract", "retry", "storage", "service"],
-    ),
+    ("tile-server", &["contract", "retry", "storage", "service"]),
     (
         "fluxglobe",
         &[

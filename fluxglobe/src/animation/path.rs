@@ -3,9 +3,10 @@
 use std::path::Path;
 
 use anyhow::{Context as _, Result, bail, ensure};
-use contract::camera::{CameraAngles, FIELD_OF_VIEW_DEG, LookAt};
+use contract::camera::{CameraAngles, FIELD_OF_VIEW_DEG};
 use contract::grid::{LonLatDeg, wrap_lon_deg};
 use contract::job::View;
+use contract::look_at::LookAt;
 use serde::{Deserialize, Serialize};
 
 /// Most key frames of an animation.

@@ -2,6 +2,7 @@
 //! come in from many sides, each is drawn once, in turn, kept in the store and given to all who asked.
 
 mod drawing;
+mod gauges;
 mod order;
 mod queue;
 mod single_flight;
@@ -22,9 +23,9 @@ use tracing::Instrument as _;
 
 use crate::adapter_info::AdapterInfo;
 use crate::error::DrawError;
-use crate::gauges::Gauges;
 use crate::pipeline::{Limits, Pipeline};
 use drawing::picture_failed;
+use gauges::Gauges;
 use queue::Queue;
 use single_flight::SingleFlight;
 

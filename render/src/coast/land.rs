@@ -40,7 +40,9 @@ pub fn size(level: u32) -> [u32; 2] {
 
 /// The first word of a level.
 fn first_word(level: u32) -> u32 {
-    (0..level).map(|finer| size(finer).iter().product::<u32>() / 4).sum()
+    (0..level)
+        .map(|finer| size(finer).iter().product::<u32>() / 4)
+        .sum()
 }
 
 /// Cells of a level for each radian.
@@ -134,9 +136,8 @@ fn add_line(edges: &[Edge], lat: f64, shares: &mut [f64]) {
 }
 
 fn add_span(span: [f64; 2], shares: &mut [f64]) {
-    let [west, east] = span.map(|lon| {
-        ((lon + 180.0) * f64::from(FINEST_PER_DEG)).clamp(0.0, shares.len() as f64)
-    });
+    let [west, east] =
+        span.map(|lon| ((lon + 180.0) * f64::from(FINEST_PER_DEG)).clamp(0.0, shares.len() as f64));
     let (first, last) = (west.floor() as usize, east.floor() as usize);
     let end = shares.len() - 1;
     if first == last {
@@ -217,14 +218,19 @@ mod tests {
                 .zip(bytes.chunks_exact(cols as usize))
                 .map(|(row, cells)| {
                     let edge = |row: u32| {
-                        (90.0 - 180.0 * f64::from(row) / f64::from(rows)).to_radians().sin()
+                        (90.0 - 180.0 * f64::from(row) / f64::from(rows))
+                            .to_radians()
+                            .sin()
                     };
                     let band = (edge(row) - edge(row + 1)) / 2.0;
                     let land: f64 = cells.iter().map(|&cell| f64::from(cell) / 255.0).sum();
                     band * land / f64::from(cols) * sphere_m2
                 })
                 .sum();
-            assert!((area / 147.13e12 - 1.0).abs() < 2e-3, "level {level}: {area}");
+            assert!(
+                (area / 147.13e12 - 1.0).abs() < 2e-3,
+                "level {level}: {area}"
+            );
         }
     }
 

@@ -105,7 +105,10 @@ fn light_keeps_its_mass_from_a_hundred_thousand_particles_to_tens_of_millions() 
         light::cpu::deposit(&drawn.params, &thin, &mut light);
         let kept = light.iter().map(|&depth| f64::from(depth)).sum::<f64>();
         let kept = kept / f64::from(drawn.params.lighting.depth_one) / given;
-        println!("{particles:e} particles: {:.4} % of the light's depth kept", 100.0 * kept);
+        println!(
+            "{particles:e} particles: {:.4} % of the light's depth kept",
+            100.0 * kept
+        );
         assert!((kept - 1.0).abs() < 5e-3, "{particles:e}: {kept}");
     }
 }

@@ -9,8 +9,8 @@ use render::pyramid::coarser;
 use render::scene::{Frame, Interval, Scene};
 use render::stages::interpolate::cpu::interpolated;
 use render::stages::layout::{
-    Active, Col, Entry, KERNEL_CLOUD, MISSING, Particle, Row, SCREEN_TILE_PX, SUBPIXELS,
-    Splat, VIEW_GLOBE, is_missing,
+    Active, Col, Entry, KERNEL_CLOUD, MISSING, Particle, Row, SCREEN_TILE_PX, SUBPIXELS, Splat,
+    VIEW_GLOBE, is_missing,
 };
 use render::stages::light::params::LightParams;
 use render::stages::params::{Params, ViewParams};
@@ -231,8 +231,8 @@ fn a_uniform_slab_dims_light_as_exp_of_minus_its_depth() {
         .collect();
     let mut buffer = vec![0; texel_count(&params)];
     light::cpu::deposit(&params, &splats, &mut buffer);
-    let given: f64 =
-        buffer.iter().map(|&depth| f64::from(depth)).sum::<f64>() / f64::from(params.lighting.depth_one);
+    let given: f64 = buffer.iter().map(|&depth| f64::from(depth)).sum::<f64>()
+        / f64::from(params.lighting.depth_one);
     let had = splats.len() as f64 * f64::from(per_slice);
     assert!(
         (given / had - 1.0).abs() < 1e-3,

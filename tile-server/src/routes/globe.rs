@@ -3,9 +3,10 @@
 use axum::extract::State;
 use axum::http::HeaderMap;
 use axum::response::Response;
-use contract::camera::{CameraAngles, LookAt};
+use contract::camera::CameraAngles;
 use contract::grid::LonLatDeg;
 use contract::job::View;
+use contract::look_at::LookAt;
 use contract::picture::PictureRequest;
 use serde::Deserialize;
 use utoipa::IntoParams;

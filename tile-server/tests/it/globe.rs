@@ -1,9 +1,10 @@
 //! `/globe/{product}/{mode}.png`.
 
 use axum::http::StatusCode;
-use contract::camera::{CameraAngles, LookAt};
+use contract::camera::CameraAngles;
 use contract::grid::LonLatDeg;
 use contract::job::View;
+use contract::look_at::LookAt;
 
 use crate::app::TestApp;
 

@@ -1,8 +1,6 @@
 //! CPU twin of `reach.wgsl`, `bin.wgsl` and of the second half of the sort in `scatter.wgsl`.
 
-use crate::stages::layout::{
-    Entry, KERNEL_CLOUD, SCREEN_TILE_SHIFT, SUBPIXELS, Splat, nearest,
-};
+use crate::stages::layout::{Entry, KERNEL_CLOUD, SCREEN_TILE_SHIFT, SUBPIXELS, Splat, nearest};
 use crate::stages::params::Params;
 
 const MOST_DEPTH: f32 = 65_535.0;

@@ -133,12 +133,7 @@ fn lit_terrain(params: &Params, ground: &Ground, sun: Vec3) -> Vec3 {
     mix(WATER * sunlight(sun.z), floor_color, kept)
 }
 
-fn ground_color(
-    params: &Params,
-    around: &Surroundings<'_>,
-    spot: &Spot,
-    pixel: [u32; 2],
-) -> Vec4 {
+fn ground_color(params: &Params, around: &Surroundings<'_>, spot: &Spot, pixel: [u32; 2]) -> Vec4 {
     if params.context.surface == 0 {
         return Vec4::ZERO;
     }

@@ -2,9 +2,7 @@
 
 use glam::{Vec2, Vec4};
 
-use crate::stages::layout::{
-    Entry, KERNEL_BALL, KERNEL_CLOUD, SCREEN_TILE_PX, SUBPIXELS,
-};
+use crate::stages::layout::{Entry, KERNEL_BALL, KERNEL_CLOUD, SCREEN_TILE_PX, SUBPIXELS};
 use crate::stages::params::Params;
 
 const MOST_SUM: u32 = 0x7fff_ffff;

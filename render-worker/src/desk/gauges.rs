@@ -4,7 +4,7 @@ use prometheus::core::{Collector, Desc};
 use prometheus::proto::MetricFamily;
 use prometheus::{IntCounter, IntCounterVec, IntGauge, IntGaugeVec, Opts};
 
-use crate::desk::{Desk, METRICS};
+use super::{Desk, METRICS};
 
 /// Gauges of one desk.
 pub(crate) struct Gauges {
