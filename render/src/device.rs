@@ -6,7 +6,8 @@ use std::sync::{Mutex, PoisonError};
 use contract::grid::Grid;
 
 use crate::error::RenderError;
-use crate::frame::{SceneBuffers, Stages};
+use crate::frame::Stages;
+use crate::frame_context::SceneBuffers;
 use crate::gpu::{Gpu, Workspace};
 use crate::plan::{Part, Plan};
 use crate::resident::Resident;

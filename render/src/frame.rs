@@ -1,136 +1,29 @@
 //! One frame on the GPU: the stages in order. `frame_cpu.rs` lists the same stages in the same order.
 
-use bytemuck::Pod;
 use contract::job::Mode;
 
 use crate::error::RenderError;
-use crate::gpu::{Gpu, Recorder, Slot, Stamps, Workspace};
-use crate::passes::place::Place;
+use crate::frame_context::{FrameContext, SceneBuffers};
+use crate::gpu::{Gpu, Slot, Stamps, Workspace};
+use crate::passes::scatter::Scatter;
 use crate::passes::splat::Splats;
 use crate::passes::trails::Trails;
 use crate::plan::{Part, Plan};
-use crate::stages::bin::{Bin, list_count};
+use crate::stages::bin::Bin;
 use crate::stages::compose::Compose;
 use crate::stages::eye::Eye;
 use crate::stages::flow::Flow;
 use crate::stages::interpolate::Interpolate;
 use crate::stages::layout::{Entry, LIGHT_ALONE, LIGHT_OWN, Params};
-use crate::stages::light::{Light, light_bytes};
+use crate::stages::light::Light;
 use crate::stages::map::Map;
+use crate::stages::sizes::{light_bytes, list_count};
 use crate::stages::{bin, compose, flow, interpolate, map};
 
 /// Entries a list buffer starts with for each particle; a frame that needs more is drawn again with room for all.
 const FIRST_ENTRIES_PER_PARTICLE: u64 = 2;
 /// Entries it starts with at least.
 const FIRST_ENTRIES: u64 = 1 << 16;
-
-/// The frames of a scene on the device.
-#[derive(Clone)]
-pub struct SceneBuffers {
-    pub value: [wgpu::Buffer; 2],
-    pub accumulated: Option<[wgpu::Buffer; 2]>,
-    pub northward: Option<[wgpu::Buffer; 2]>,
-    pub domain: wgpu::Buffer,
-    /// Uncertainties of both frames of values; none where they are not drawn.
-    pub uncertainties: Option<[wgpu::Buffer; 2]>,
-    pub terrain: Option<wgpu::Buffer>,
-    /// Light that is shared between pictures; none where a picture makes its own.
-    pub light: Option<wgpu::Buffer>,
-}
-
-/// What the stages of one frame share while they are recorded.
-pub struct FrameContext<'a> {
-    pub gpu: &'a Gpu,
-    pub recorder: Recorder<'a>,
-    pub plan: &'a Plan,
-    pub params: Params,
-    pub params_buffer: wgpu::Buffer,
-    pub value_frames: [wgpu::Buffer; 2],
-    pub accumulated_frames: Option<[wgpu::Buffer; 2]>,
-    pub northward_frames: Option<[wgpu::Buffer; 2]>,
-    pub domain: wgpu::Buffer,
-    pub uncertainties: Option<[wgpu::Buffer; 2]>,
-    pub terrain: Option<wgpu::Buffer>,
-    /// Light that is shared between pictures; none where this frame makes its own.
-    pub shared_light: Option<wgpu::Buffer>,
-    workspace: &'a mut Workspace,
-}
-
-impl<'a> FrameContext<'a> {
-    /// A frame of one part of the plan's picture in the buffers of `workspace`.
-    pub fn new(
-        gpu: &'a Gpu,
-        workspace: &'a mut Workspace,
-        plan: &'a Plan,
-        mut params: Params,
-        scene: SceneBuffers,
-    ) -> Result<Self, RenderError> {
-        // Steps without a filled gap have no uncertainties to read.
-        params.uncertainty &= u32::from(scene.uncertainties.is_some());
-        let params_buffer = workspace.upload(gpu, Slot::Params, &[params])?;
-        let SceneBuffers {
-            value,
-            accumulated,
-            northward,
-            domain,
-            uncertainties,
-            terrain,
-            light,
-        } = scene;
-        Ok(Self {
-            gpu,
-            recorder: gpu.recorder(),
-            plan,
-            params,
-            params_buffer,
-            value_frames: value,
-            accumulated_frames: accumulated,
-            northward_frames: northward,
-            domain,
-            uncertainties,
-            terrain,
-            shared_light: light,
-            workspace,
-        })
-    }
-
-    /// The buffer of a slot with room for `bytes`.
-    pub fn room(&mut self, slot: Slot, bytes: u64) -> Result<wgpu::Buffer, RenderError> {
-        self.workspace.room(self.gpu, slot, bytes)
-    }
-
-    /// The light: the shared one, or room for the frame's own.
-    pub fn light(&mut self) -> Result<wgpu::Buffer, RenderError> {
-        match &self.shared_light {
-            Some(light) => Ok(light.clone()),
-            None => self.room(Slot::Light, light_bytes(&self.params)),
-        }
-    }
-
-    /// The buffer of a slot with this content.
-    pub fn upload<T: Pod>(
-        &mut self,
-        slot: Slot,
-        content: &[T],
-    ) -> Result<wgpu::Buffer, RenderError> {
-        self.workspace.upload(self.gpu, slot, content)
-    }
-
-    /// The buffer of a slot with this content of the plan; sent once for all frames of a plan in one workspace.
-    pub fn upload_of_plan<T: Pod>(
-        &mut self,
-        slot: Slot,
-        content: &[T],
-    ) -> Result<wgpu::Buffer, RenderError> {
-        let plan = self.plan.id;
-        self.workspace.upload_once(self.gpu, slot, plan, content)
-    }
-
-    /// Pixels of the part.
-    pub fn pixel_count(&self) -> u64 {
-        u64::from(self.params.width) * u64::from(self.params.height)
-    }
-}
 
 /// All compiled stages.
 pub struct Stages {
@@ -140,7 +33,7 @@ pub struct Stages {
     trails: Trails,
     light: Light,
     bin: Bin,
-    place: Place,
+    scatter: Scatter,
     eye: Eye,
     map: Map,
     compose: Compose,
@@ -156,7 +49,7 @@ impl Stages {
             trails: Trails::new(gpu),
             light: Light::new(gpu),
             bin: Bin::new(gpu, bin::SOURCE),
-            place: Place::new(gpu),
+            scatter: Scatter::new(gpu),
             eye: Eye::new(gpu),
             map: Map::new(gpu, map::SOURCE),
             compose: Compose::new(gpu, compose::SOURCE),
@@ -179,7 +72,7 @@ impl Stages {
                 self.light.record(frame)?;
             }
             self.bin.record(frame)?;
-            self.place.record(frame)?;
+            self.scatter.record(frame)?;
             self.eye.record(frame)
         }
     }

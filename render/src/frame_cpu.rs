@@ -6,11 +6,11 @@ use glam::Vec4;
 use crate::error::RenderError;
 use crate::plan::{Part, Plan};
 use crate::scene::{Interval, Scene, Terrain};
-use crate::stages::bin::list_count;
 use crate::stages::compose::in_context::{self, Surroundings};
 use crate::stages::flow::cpu::Field;
 use crate::stages::layout::{Entry, LIGHT_OFF, Params, Particle, Splat};
 use crate::stages::particles::cpu::Inputs;
+use crate::stages::sizes::{list_count, texel_count};
 use crate::stages::{
     bin, compose, eye, flow, interpolate, light, map, particles, project, uncertainty,
 };
@@ -79,7 +79,7 @@ pub fn draw(plan: &Plan, part: Part, scene: &Scene) -> Result<Vec<u8>, RenderErr
         let mut splats = vec![Splat::default(); particles.len()];
         project::cpu::project(&params, &plan.rows, &plan.cols, &particles, &mut splats);
         if params.light_on != LIGHT_OFF {
-            let mut buffer = vec![0u32; light::texel_count(&params)];
+            let mut buffer = vec![0u32; texel_count(&params)];
             light::cpu::deposit(&params, &splats, &mut buffer);
             light::cpu::prefix(&params, &mut buffer);
             light::cpu::shade(&params, &buffer, &mut splats);

@@ -19,6 +19,7 @@ pub mod coast;
 mod device;
 pub mod error;
 pub mod frame;
+pub mod frame_context;
 pub mod frame_cpu;
 pub mod gpu;
 pub mod image;

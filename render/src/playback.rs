@@ -3,7 +3,8 @@
 use contract::job::RenderJob;
 
 use crate::error::RenderError;
-use crate::frame::{SceneBuffers, Stages};
+use crate::frame::Stages;
+use crate::frame_context::SceneBuffers;
 use crate::gpu::{Gpu, Stamps, Workspace};
 use crate::plan::{Part, Plan};
 use crate::scene::{Interval, Scene};

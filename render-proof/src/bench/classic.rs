@@ -3,7 +3,7 @@
 
 use anyhow::{Context as _, Result, ensure};
 use contract::job::RenderJob;
-use render::frame::FrameContext;
+use render::frame_context::FrameContext;
 use render::gpu::{Gpu, Slot, Workspace};
 use render::passes::splat::Splats;
 use render::plan::Plan;

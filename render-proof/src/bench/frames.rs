@@ -9,7 +9,7 @@ use render::Scene;
 use render::frame::Stages;
 use render::gpu::{Gpu, Slot, Stamps};
 use render::playback::Playback;
-use render::stages::bin::list_count;
+use render::stages::sizes::list_count;
 use serde::Serialize;
 
 use crate::bench::stats::Times;

@@ -4,7 +4,7 @@
 //! All keep sums for a workgroup's neighbours in a small table (`tally.wgsl`) and store splats in one order (`order.wgsl`); first
 //! passes store alike (`store.wgsl`).
 
-pub mod place;
+pub mod scatter;
 pub mod splat;
 mod store;
 pub mod trails;

@@ -1,12 +1,10 @@
 //! The buffers that a pass over particles fills, and the tables of the plan that it reads: see `store.wgsl`.
 
 use crate::error::RenderError;
-use crate::frame::FrameContext;
+use crate::frame_context::FrameContext;
 use crate::gpu::Slot;
-use crate::passes::splat::HALF_BYTES;
-use crate::stages::bin::list_count;
 use crate::stages::layout::{LIGHT_ALONE, LIGHT_OWN};
-use crate::stages::light::light_bytes;
+use crate::stages::sizes::{HALF_BYTES, light_bytes, list_count};
 
 /// What `store.wgsl` binds.
 pub(super) struct Stored {

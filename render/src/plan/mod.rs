@@ -21,12 +21,12 @@ use contract::job::{Mode, RenderJob, View};
 use glam::Vec3;
 
 use crate::error::RenderError;
-use crate::passes::splat::{HALF_BYTES, workgroups};
 use crate::scene::{Interval, Scene};
 use crate::stages::layout::{
     Active, Axis, Col, GroundAxis, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, LIGHT_OFF, LIGHT_OWN,
     NEVER_LONG, Params, Row, SCREEN_TILE_PX, SQUARE, SUBPIXELS, VIEW_TILE,
 };
+use crate::stages::sizes::{HALF_BYTES, workgroups};
 use look::Look;
 
 /// 0 stands for no plan.

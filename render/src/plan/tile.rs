@@ -11,8 +11,7 @@ use contract::tile::{MAX_LAT_DEG, Tile, mercator_lat_deg, mercator_x, mercator_y
 use super::look::{self, Look};
 use super::{Plan, area_m2, cell_px, entry_shift, flow, height_range_m};
 use crate::scene::Scene;
-use crate::stages::layout::{Axis, Col, LIGHT_OFF, Row, SUBPIXELS, VIEW_TILE};
-use crate::stages::light::LOOK;
+use crate::stages::layout::{Axis, Col, LIGHT_OFF, LOOK, Row, SUBPIXELS, VIEW_TILE};
 
 /// Smallest light texel, pixels: finer than the screen is of no use.
 const LEAST_TEXEL_PX: f64 = 1.5;

@@ -22,6 +22,11 @@ pub const MOST_HOT_PARTS: u32 = 4096;
 pub const NO_LIST: u32 = u32::MAX;
 /// Counters that one workgroup of the scan sums up.
 pub const SCAN_BLOCK: u32 = GROUP * 8;
+/// Radii before and behind its centre, along the sight line, at which a cloud looks its light up: somewhat less than the
+/// root of the mean square distance of its mass there, 1 over the root of 6; what comes nearest to the reference. Gauss's
+/// three points (5/9 at the centre, 2/9 at the root of 3/8) are 1.4 dB nearer on a coast, 0.3 dB on the equator, and
+/// cost 0.05 ms of a frame of 4.5 M particles.
+pub const LOOK: f32 = 0.34;
 /// What stands for "no data" in grids: NaN is not reliable in shaders.
 pub const MISSING: f32 = -1.0e30;
 

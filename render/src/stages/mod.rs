@@ -6,6 +6,7 @@
 pub const PRELUDE: &str = include_str!("prelude.wgsl");
 
 pub mod layout;
+pub mod sizes;
 pub mod sphere;
 pub mod uncertainty;
 

@@ -4,7 +4,8 @@ use std::ops::Range;
 
 use contract::grid::Grid;
 use contract::job::{Mode, RenderJob};
-use render::frame::{SceneBuffers, Stages};
+use render::frame::Stages;
+use render::frame_context::SceneBuffers;
 use render::gpu::{Gpu, Workspace};
 use render::plan::Plan;
 use render::{Interval, Scene};

@@ -2,16 +2,17 @@
 
 use contract::grid::Grid;
 use contract::job::{Mode, RenderJob};
-use render::frame::{FrameContext, SceneBuffers};
+use render::frame_context::{FrameContext, SceneBuffers};
 use render::gpu::{Gpu, Slot, Workspace};
-use render::passes::place::Place;
+use render::passes::scatter::Scatter;
 use render::passes::splat::Splats;
 use render::plan::Plan;
 use render::playback::Playback;
-use render::stages::bin::{self, Bin, list_count};
+use render::stages::bin::{self, Bin};
 use render::stages::eye::{self, Eye};
 use render::stages::layout::{Entry, MOST_HOT_PARTS, NEVER_LONG, NO_LIST, PART_ENTRIES};
 use render::stages::light::Light;
+use render::stages::sizes::list_count;
 use render::{Frame, Interval, Scene};
 
 use crate::device::{checked_gpu, gpu};
@@ -81,7 +82,7 @@ fn draw(
         Light::new(gpu).record(&mut frame).unwrap();
     }
     Bin::new(gpu, sources[0]).record(&mut frame).unwrap();
-    Place::new(gpu).record(&mut frame).unwrap();
+    Scatter::new(gpu).record(&mut frame).unwrap();
     let eye = Eye::of(gpu, sources[1], eye::SOURCE_IN_CONTEXT, entry);
     eye.record(&mut frame).unwrap();
     let [image, counts, parts] =

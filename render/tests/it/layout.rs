@@ -1,6 +1,6 @@
 //! The structs and constants of Rust and WGSL, compared through naga.
 
-use render::passes::{place, splat, trails};
+use render::passes::{scatter, splat, trails};
 use render::stages::fill::level::{FillLevel, MOST_REACH_COLS};
 use render::stages::fill::{self, exact, window};
 use render::stages::layout::{
@@ -172,7 +172,7 @@ fn every_shader_is_valid_without_extensions() {
         exact::SOURCE,
         light::SOURCE,
         bin::SOURCE,
-        place::SOURCE,
+        scatter::SOURCE,
         eye::SOURCE,
         eye::SOURCE_IN_CONTEXT,
         map::SOURCE,

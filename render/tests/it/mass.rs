@@ -5,6 +5,7 @@ use contract::job::Mode;
 use render::plan::Plan;
 use render::stages::interpolate::cpu::interpolated;
 use render::stages::layout::{DEPTH_ONE, Params, Particle, Splat, is_missing};
+use render::stages::sizes::texel_count;
 use render::stages::{light, particles, project};
 use render::{Interval, Scene};
 
@@ -86,7 +87,7 @@ fn the_particles_of_a_picture_carry_the_carbon_of_its_cells_to_a_millionth() {
 fn the_light_buffer_holds_the_depth_of_every_particle_to_the_last_integer() {
     let scene = ocean(ONE_DEGREE);
     let drawn = drawn(globe(-150.0, 0.0, 4.0e6, 96), &scene);
-    let texels = light::texel_count(&drawn.params);
+    let texels = texel_count(&drawn.params);
     let held = |buffer: &[u32]| buffer.iter().map(|&depth| u64::from(depth)).sum::<u64>();
     let mut all = vec![0u32; texels];
     light::cpu::deposit(&drawn.params, &drawn.splats, &mut all);

@@ -74,7 +74,7 @@ fn both_frames_list_the_same_stages_in_the_same_order() {
         "splats",
         "light",
         "bin",
-        "place",
+        "scatter",
         "eye",
     ];
     let gpu = order(&read("frame.rs"), &passes, |stage| {

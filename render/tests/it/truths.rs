@@ -13,6 +13,7 @@ use render::stages::layout::{
     Splat, VIEW_GLOBE, is_missing,
 };
 use render::stages::particles::cpu::{Inputs, envelope, generate};
+use render::stages::sizes::{list_count, texel_count};
 use render::stages::{bin, eye, light, project};
 
 use crate::device::renderers;
@@ -222,7 +223,7 @@ fn a_uniform_slab_dims_light_as_exp_of_minus_its_depth() {
     let mut splats: Vec<Splat> = cells
         .flat_map(|(x, y)| (0..slices).map(move |slice| splat(x, y, slice as f32 + 0.5)))
         .collect();
-    let mut buffer = vec![0; light::texel_count(&params)];
+    let mut buffer = vec![0; texel_count(&params)];
     light::cpu::deposit(&params, &splats, &mut buffer);
     let given: f64 =
         buffer.iter().map(|&depth| f64::from(depth)).sum::<f64>() / f64::from(DEPTH_ONE);
@@ -250,7 +251,7 @@ fn seen(params: &mut Params, splats: &[Splat]) -> Vec<Vec4> {
         params.width.div_ceil(SCREEN_TILE_PX),
         params.height.div_ceil(SCREEN_TILE_PX),
     );
-    let mut ends = vec![0; bin::list_count(params) as usize];
+    let mut ends = vec![0; list_count(params) as usize];
     bin::cpu::count(params, splats, &mut ends);
     let mut entries = vec![Entry::default(); bin::cpu::scan(&mut ends) as usize];
     bin::cpu::scatter(params, splats, &mut ends, &mut entries);

@@ -6,10 +6,11 @@
 //! nothing is worth storing.
 
 use crate::error::RenderError;
-use crate::frame::FrameContext;
+use crate::frame_context::FrameContext;
 use crate::gpu::{Gpu, Kernel};
 use crate::passes::store::Stored;
-use crate::stages::layout::{DEPTH_ONE, Params, SQUARE, SUBPIXELS, Splat};
+use crate::stages::layout::{DEPTH_ONE, SUBPIXELS, Splat};
+use crate::stages::sizes::workgroups;
 
 /// The shader.
 pub const SOURCE: &str = concat!(
@@ -27,30 +28,9 @@ pub const SOURCE: &str = concat!(
     include_str!("splat.wgsl"),
 );
 
-/// Bytes of each half of a stored splat: what the eye sees, and where it lies in the light.
-pub const HALF_BYTES: u64 = 16;
-
 /// The compiled stage.
 pub struct Splats {
     splat: Kernel,
-}
-
-/// Workgroups over the cells of a picture: across, down, and through the particles of a cell.
-pub fn workgroups(params: &Params) -> [u32; 3] {
-    [
-        params.slot_count.div_ceil(SQUARE),
-        params.row_count.div_ceil(SQUARE),
-        params.particles_per_cell.div_ceil(params.particles_each),
-    ]
-}
-
-/// Where a particle's splat is stored: `down` rows below the first one drawn, in column `slot` of the table.
-pub fn stored_at(params: &Params, down: u32, slot: u32, particle: u32) -> usize {
-    let [across, along, _] = workgroups(params);
-    let each = params.particles_each;
-    let group = ((particle / each) * along + down / SQUARE) * across + slot / SQUARE;
-    let invocation = down % SQUARE * SQUARE + slot % SQUARE;
-    ((group * each + particle % each) * SQUARE * SQUARE + invocation) as usize
 }
 
 /// A splat as a device stores it: the words of both halves, as `splat.wgsl` writes them.

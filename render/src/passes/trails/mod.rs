@@ -4,10 +4,10 @@
 //! It runs the functions of [`flow`](crate::stages::flow) and of the stages behind it.
 
 use crate::error::RenderError;
-use crate::frame::FrameContext;
+use crate::frame_context::FrameContext;
 use crate::gpu::{Gpu, Kernel, Slot};
-use crate::passes::splat::workgroups;
 use crate::passes::store::Stored;
+use crate::stages::sizes::workgroups;
 
 /// The shader.
 pub const SOURCE: &str = concat!(

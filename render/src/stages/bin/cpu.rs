@@ -1,4 +1,4 @@
-//! CPU twin of `reach.wgsl`, `bin.wgsl` and of the placing in `place.wgsl`.
+//! CPU twin of `reach.wgsl`, `bin.wgsl` and of the second half of the sort in `scatter.wgsl`.
 
 use crate::stages::layout::{
     DEPTH_ONE, Entry, KERNEL_CLOUD, Params, SCREEN_TILE_SHIFT, SUBPIXELS, Splat, nearest,

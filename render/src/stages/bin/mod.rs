@@ -1,15 +1,16 @@
 //! Binning: the counting sort of splats into lists by screen tile and slice.
 //!
-//! Lists are counted in the pass that makes the splats and filled in the pass that places them; between the two, here,
+//! Lists are counted in the pass that makes the splats and filled in the pass that scatters them; between the two, here,
 //! lengths become starts. Lists that are long beyond the others are cut into parts for the eye.
 
 pub mod cpu;
 
 use crate::error::RenderError;
-use crate::frame::FrameContext;
+use crate::frame_context::FrameContext;
 use crate::gpu::{Gpu, Kernel, Slot};
 use crate::stages::eye;
-use crate::stages::layout::{NEVER_LONG, Params, SCAN_BLOCK};
+use crate::stages::layout::{NEVER_LONG, SCAN_BLOCK};
+use crate::stages::sizes::list_count;
 
 /// The functions that tell the lists of a splat.
 pub const FUNCTIONS: &str = include_str!("reach.wgsl");
@@ -23,11 +24,6 @@ pub struct Bin {
     blocks: Kernel,
     /// Adds to each block the sums of those before it.
     add: Kernel,
-}
-
-/// Lists of a picture: screen tiles times slices.
-pub fn list_count(params: &Params) -> u32 {
-    params.tiles_x * params.tiles_y * params.slices
 }
 
 impl Bin {

@@ -1,5 +1,5 @@
 // Which lists of (screen tile, slice) a splat belongs to. Whole numbers only, made once from the splat and stored, so
-// that those who count and those who place entries cannot disagree.
+// that those who count and those who scatter entries cannot disagree.
 
 // Depth of one splat at one pixel: a colour sum of the eye grows by less than 2^24 at once and cannot wrap.
 const MOST_DEPTH = 15.0;

@@ -8,7 +8,7 @@ pub mod terrain;
 use std::sync::OnceLock;
 
 use crate::error::RenderError;
-use crate::frame::FrameContext;
+use crate::frame_context::FrameContext;
 use crate::gpu::{Gpu, Kernel, Slot};
 use crate::stages::layout::GroundAxis;
 

@@ -5,11 +5,11 @@ pub mod cpu;
 use std::sync::OnceLock;
 
 use crate::error::RenderError;
-use crate::frame::FrameContext;
+use crate::frame_context::FrameContext;
 use crate::gpu::{Gpu, Kernel, Slot};
-use crate::stages::bin::list_count;
 use crate::stages::compose;
 use crate::stages::layout::{MOST_HOT_PARTS, NEVER_LONG, Params, SCREEN_TILE_PX};
+use crate::stages::sizes::list_count;
 
 /// The shader.
 pub const SOURCE: &str = concat!(

@@ -1,7 +1,6 @@
 //! CPU twin of `deposit.wgsl`, `light.wgsl` and `shade.wgsl`.
 
-use super::LOOK;
-use crate::stages::layout::{DEPTH_ONE, Params, Splat, nearest};
+use crate::stages::layout::{DEPTH_ONE, LOOK, Params, Splat, nearest};
 
 const MOST_GIVEN: f32 = 16.0;
 const DARK: u32 = 0x7fff_ffff;

@@ -1,30 +1,24 @@
 //! The light's side of half-angle slicing: splats give their optical depth to a slice-layered buffer, a sum along the
 //! slices turns it into twice the depth above each slice's middle, and every splat is dimmed by what lies between it and the sun.
 //!
-//! Depth is given in the pass that makes the splats and read in the pass that places them; here is the sum.
+//! Depth is given in the pass that makes the splats and read in the pass that scatters them; here is the sum.
 
 pub mod cpu;
 
 use crate::error::RenderError;
-use crate::frame::FrameContext;
+use crate::frame_context::FrameContext;
 use crate::gpu::{Gpu, Kernel};
-use crate::stages::layout::{GROUP, LIGHT_OFF, Params};
+use crate::stages::layout::GROUP;
 
 /// The entry point that cuts columns of texels into segments; for GPUs.
 pub const SEGMENTED: &str = "prefix";
 /// The one that sums a column up in one go, without waiting; for adapters that are programs.
 pub const STRAIGHT: &str = "straight";
 
-/// Radii before and behind its centre, along the sight line, at which a cloud looks its light up: somewhat less than the
-/// root of the mean square distance of its mass there, 1 over the root of 6; what comes nearest to the reference. Gauss's
-/// three points (5/9 at the centre, 2/9 at the root of 3/8) are 1.4 dB nearer on a coast, 0.3 dB on the equator, and
-/// cost 0.05 ms of a frame of 4.5 M particles.
-pub const LOOK: f32 = 0.34;
-
 /// The functions that give depth to the light; [`splat`](crate::passes::splat) runs them.
 pub const DEPOSIT_FUNCTIONS: &str =
     concat!(include_str!("texel.wgsl"), include_str!("deposit.wgsl"));
-/// The functions that dim a splat; [`place`](crate::passes::place) runs them.
+/// The functions that dim a splat; [`scatter`](crate::passes::scatter) runs them.
 pub const SHADE_FUNCTIONS: &str = concat!(include_str!("texel.wgsl"), include_str!("shade.wgsl"));
 
 /// The shader.
@@ -35,20 +29,6 @@ pub struct Light {
     prefix: Kernel,
     /// Columns of texels that one workgroup sums up.
     columns: u32,
-}
-
-/// Numbers in the light buffer: one layer for every slice and one for the whole.
-pub fn texel_count(params: &Params) -> usize {
-    params.light_width as usize * params.light_height as usize * (params.slices as usize + 1)
-}
-
-/// Bytes of the light buffer; of one that is bound but never read if particles are not lit.
-pub fn light_bytes(params: &Params) -> u64 {
-    if params.light_on == LIGHT_OFF {
-        4
-    } else {
-        texel_count(params) as u64 * 4
-    }
 }
 
 impl Light {

@@ -3,7 +3,7 @@
 pub mod cpu;
 
 use crate::error::RenderError;
-use crate::frame::FrameContext;
+use crate::frame_context::FrameContext;
 use crate::gpu::{Gpu, Kernel, Slot};
 use crate::stages::layout::Axis;
 

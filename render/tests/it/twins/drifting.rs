@@ -1,6 +1,6 @@
 //! Velocities, drifting particles and their twins.
 
-use render::frame::FrameContext;
+use render::frame_context::FrameContext;
 use render::gpu::Slot;
 use render::passes::trails::{self, Trails};
 use render::stages::flow::{self, Flow};

@@ -1,12 +1,13 @@
 //! The light and its twins.
 
 use contract::job::Mode;
-use render::frame::FrameContext;
+use render::frame_context::FrameContext;
 use render::gpu::Slot;
 use render::passes;
 use render::passes::splat::{self, Splats};
-use render::stages::bin::{self, list_count};
+use render::stages::bin;
 use render::stages::light::{self, Light};
+use render::stages::sizes::list_count;
 
 use super::{Twins, prove};
 use crate::compare::worst;

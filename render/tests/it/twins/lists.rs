@@ -1,12 +1,13 @@
-//! Counting, scanning, placing and their twins.
+//! Counting, scanning, scattering and their twins.
 
 use render::gpu::{Gpu, Slot};
 use render::passes;
-use render::passes::place::{self, Place};
+use render::passes::scatter::{self, Scatter};
 use render::passes::splat::{self, Splats};
-use render::stages::bin::{self, Bin, list_count};
+use render::stages::bin::{self, Bin};
 use render::stages::layout::Entry;
 use render::stages::light::{self, Light};
+use render::stages::sizes::list_count;
 
 use super::{Twins, prove};
 
@@ -44,11 +45,11 @@ fn same_lists(a: &[Vec<[u32; 3]>], b: &[Vec<[u32; 3]>]) -> bool {
 #[expect(clippy::too_many_lines, reason = "two passes and a scan in one chain")]
 fn the_lists_hold_every_stored_splat_once_and_in_its_light() {
     for twins in [Twins::tile(), Twins::globe()] {
-        let distance = |gpu: &Gpu, bin_source: &str, place_source: &str| {
+        let distance = |gpu: &Gpu, bin_source: &str, scatter_source: &str| {
             let splats = Splats::of(gpu, splat::SOURCE);
             let light = Light::new(gpu);
             let bin = Bin::new(gpu, bin_source);
-            let place = Place::of(gpu, place_source);
+            let scatter = Scatter::of(gpu, scatter_source);
             let mut params = twins.params;
             // Rounding may put a few more splats into a list than the twins have.
             params.entry_capacity += params.entry_capacity / 8 + 1024;
@@ -61,7 +62,7 @@ fn the_lists_hold_every_stored_splat_once_and_in_its_light() {
                     splats.record(f).unwrap();
                     light.record(f).unwrap();
                     bin.record(f).unwrap();
-                    place.record(f).unwrap();
+                    scatter.record(f).unwrap();
                 },
                 [
                     first,
@@ -96,9 +97,9 @@ fn the_lists_hold_every_stored_splat_once_and_in_its_light() {
             bin::SOURCE,
             "counts[at] += start",
             "counts[at] += start + 1u",
-            |gpu, source| distance(gpu, source, place::SOURCE),
+            |gpu, source| distance(gpu, source, scatter::SOURCE),
         );
-        let (shared, unshared) = (place::SOURCE, passes::unshared(place::SOURCE));
+        let (shared, unshared) = (scatter::SOURCE, passes::unshared(scatter::SOURCE));
         for (source, right, wrong) in [
             (shared, "vec2(exp(-depth), 1.0)", "vec2(exp(depth), 1.0)"),
             (
@@ -112,7 +113,7 @@ fn the_lists_hold_every_stored_splat_once_and_in_its_light() {
                 "return atomicAdd(&counts[list], 2u)",
             ),
         ] {
-            prove("place", source, right, wrong, |gpu, source| {
+            prove("scatter", source, right, wrong, |gpu, source| {
                 distance(gpu, bin::SOURCE, source)
             });
         }

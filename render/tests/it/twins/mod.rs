@@ -14,20 +14,21 @@ use bytemuck::Pod;
 use contract::job::{Mode, RenderJob, Style, View};
 use glam::Vec4;
 use render::Scene;
-use render::frame::{FrameContext, SceneBuffers};
+use render::frame_context::{FrameContext, SceneBuffers};
 use render::gpu::{Gpu, Slot, Workspace};
-use render::passes::splat::{HALF_BYTES, stored_at, unpacked};
+use render::passes::splat::unpacked;
 use render::plan::Plan;
-use render::stages::bin::{self, list_count};
+use render::stages::bin;
 use render::stages::compose::in_context::Surroundings;
 use render::stages::flow::cpu::Field;
 use render::stages::flow::{self};
 use render::stages::layout::{
     Active, Entry, KERNEL_CLOUD, LIGHT_OWN, Params, Particle, Splat, Velocity,
 };
-use render::stages::light::{self, texel_count};
+use render::stages::light;
 use render::stages::map::{self};
 use render::stages::particles::cpu::Inputs;
+use render::stages::sizes::{HALF_BYTES, list_count, stored_at, texel_count};
 use render::stages::{compose, eye, interpolate, particles, project, uncertainty};
 use render_proof::currents::{self, gyres};
 

@@ -2,7 +2,7 @@
 
 use contract::job::Mode;
 use glam::Vec4;
-use render::frame::FrameContext;
+use render::frame_context::FrameContext;
 use render::gpu::{Gpu, Slot};
 use render::stages::compose::{self, Compose};
 use render::stages::eye::{self, Eye};

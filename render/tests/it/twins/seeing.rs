@@ -1,7 +1,7 @@
 //! The eye and its twin.
 
 use contract::job::Mode;
-use render::frame::FrameContext;
+use render::frame_context::FrameContext;
 use render::gpu::{Gpu, Slot};
 use render::stages::compose;
 use render::stages::eye::{self, Eye};

@@ -2,7 +2,7 @@
 
 use contract::job::Mode;
 use render::passes::splat::{self, Splats};
-use render::passes::{place, trails};
+use render::passes::{scatter, trails};
 use render::stages::{
     bin, compose, eye, flow, interpolate, light, particles, project, uncertainty,
 };
@@ -81,7 +81,7 @@ fn every_function_of_a_particle_is_in_the_pass_that_is_tested() {
     for functions in [flow::FUNCTIONS, project::FUNCTIONS, bin::FUNCTIONS] {
         assert!(trails::SOURCE.contains(functions));
     }
-    assert!(place::SOURCE.contains(light::SHADE_FUNCTIONS));
+    assert!(scatter::SOURCE.contains(light::SHADE_FUNCTIONS));
     assert!(
         eye::SOURCE.contains(compose::FUNCTIONS) && compose::SOURCE.contains(compose::FUNCTIONS)
     );

@@ -1,4 +1,4 @@
-// Stored splats into the lists of (screen tile, slice), dimmed by what lies between them and the sun: the second half of
+// Stored splats scattered into the lists of (screen tile, slice), dimmed by what lies between them and the sun: the second half of
 // a counting sort. The order within a list is that of arrival; the eye sums inside a slice, so it cannot matter.
 @group(0) @binding(1) var<storage, read> seen: array<vec4<u32>>;
 @group(0) @binding(5) var<storage, read> lit: array<vec4<u32>>;
@@ -26,7 +26,7 @@ fn count_own(at: u32) {
     }
 }
 
-fn place_own(at: u32) {
+fn scatter_own(at: u32) {
     let near = seen[at];
     if (near.z == 0u) { return; }
     let far = lit[at];
@@ -53,7 +53,7 @@ fn place_own(at: u32) {
 }
 
 @compute @workgroup_size(SQUARE, SQUARE)
-fn place(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>,
+fn scatter(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>,
     @builtin(local_invocation_index) invocation: u32) {
     clear_table(invocation);
     workgroupBarrier();
@@ -65,5 +65,5 @@ fn place(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) w
         if (tag != 0u) { atomicStore(&sums[slot], atomicAdd(&counts[tag - 1u], atomicLoad(&sums[slot]))); }
     }
     workgroupBarrier();
-    for (var j = 0u; j < params.particles_each; j++) { place_own(first + j * SQUARE * SQUARE); }
+    for (var j = 0u; j < params.particles_each; j++) { scatter_own(first + j * SQUARE * SQUARE); }
 }

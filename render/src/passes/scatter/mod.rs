@@ -1,10 +1,10 @@
 //! The second pass over particles: stored splats, light and starts of lists in, lists of shaded entries out.
 
 use crate::error::RenderError;
-use crate::frame::FrameContext;
+use crate::frame_context::FrameContext;
 use crate::gpu::{Gpu, Kernel, Slot};
-use crate::passes::splat::workgroups;
 use crate::stages::layout::Entry;
+use crate::stages::sizes::workgroups;
 
 /// The shader.
 pub const SOURCE: &str = concat!(
@@ -14,15 +14,15 @@ pub const SOURCE: &str = concat!(
     include_str!("../../stages/bin/reach.wgsl"),
     include_str!("../tally.wgsl"),
     include_str!("../order.wgsl"),
-    include_str!("place.wgsl"),
+    include_str!("scatter.wgsl"),
 );
 
 /// The compiled stage.
-pub struct Place {
-    place: Kernel,
+pub struct Scatter {
+    scatter: Kernel,
 }
 
-impl Place {
+impl Scatter {
     /// Compiles the shader as it suits the device.
     pub fn new(gpu: &Gpu) -> Self {
         Self::of(gpu, &super::suited(gpu, SOURCE))
@@ -31,7 +31,7 @@ impl Place {
     /// Compiles `source`, [`SOURCE`] but for tests.
     pub fn of(gpu: &Gpu, source: &str) -> Self {
         Self {
-            place: gpu.kernel("place", source, "place"),
+            scatter: gpu.kernel("scatter", source, "scatter"),
         }
     }
 
@@ -52,7 +52,9 @@ impl Place {
             (5, &lit),
         ];
         let groups = workgroups(&frame.params);
-        frame.recorder.dispatch_deep(&self.place, &buffers, groups);
+        frame
+            .recorder
+            .dispatch_deep(&self.scatter, &buffers, groups);
         Ok(())
     }
 }

@@ -1,0 +1,117 @@
+//! What the stages of one frame share while they are recorded: the device, the plan and the frame's buffers.
+
+use bytemuck::Pod;
+
+use crate::error::RenderError;
+use crate::gpu::{Gpu, Recorder, Slot, Workspace};
+use crate::plan::Plan;
+use crate::stages::layout::Params;
+use crate::stages::sizes::light_bytes;
+
+/// The frames of a scene on the device.
+#[derive(Clone)]
+pub struct SceneBuffers {
+    pub value: [wgpu::Buffer; 2],
+    pub accumulated: Option<[wgpu::Buffer; 2]>,
+    pub northward: Option<[wgpu::Buffer; 2]>,
+    pub domain: wgpu::Buffer,
+    /// Uncertainties of both frames of values; none where they are not drawn.
+    pub uncertainties: Option<[wgpu::Buffer; 2]>,
+    pub terrain: Option<wgpu::Buffer>,
+    /// Light that is shared between pictures; none where a picture makes its own.
+    pub light: Option<wgpu::Buffer>,
+}
+
+/// What the stages of one frame share while they are recorded.
+pub struct FrameContext<'a> {
+    pub gpu: &'a Gpu,
+    pub recorder: Recorder<'a>,
+    pub plan: &'a Plan,
+    pub params: Params,
+    pub params_buffer: wgpu::Buffer,
+    pub value_frames: [wgpu::Buffer; 2],
+    pub accumulated_frames: Option<[wgpu::Buffer; 2]>,
+    pub northward_frames: Option<[wgpu::Buffer; 2]>,
+    pub domain: wgpu::Buffer,
+    pub uncertainties: Option<[wgpu::Buffer; 2]>,
+    pub terrain: Option<wgpu::Buffer>,
+    /// Light that is shared between pictures; none where this frame makes its own.
+    pub shared_light: Option<wgpu::Buffer>,
+    workspace: &'a mut Workspace,
+}
+
+impl<'a> FrameContext<'a> {
+    /// A frame of one part of the plan's picture in the buffers of `workspace`.
+    pub fn new(
+        gpu: &'a Gpu,
+        workspace: &'a mut Workspace,
+        plan: &'a Plan,
+        mut params: Params,
+        scene: SceneBuffers,
+    ) -> Result<Self, RenderError> {
+        // Steps without a filled gap have no uncertainties to read.
+        params.uncertainty &= u32::from(scene.uncertainties.is_some());
+        let params_buffer = workspace.upload(gpu, Slot::Params, &[params])?;
+        let SceneBuffers {
+            value,
+            accumulated,
+            northward,
+            domain,
+            uncertainties,
+            terrain,
+            light,
+        } = scene;
+        Ok(Self {
+            gpu,
+            recorder: gpu.recorder(),
+            plan,
+            params,
+            params_buffer,
+            value_frames: value,
+            accumulated_frames: accumulated,
+            northward_frames: northward,
+            domain,
+            uncertainties,
+            terrain,
+            shared_light: light,
+            workspace,
+        })
+    }
+
+    /// The buffer of a slot with room for `bytes`.
+    pub fn room(&mut self, slot: Slot, bytes: u64) -> Result<wgpu::Buffer, RenderError> {
+        self.workspace.room(self.gpu, slot, bytes)
+    }
+
+    /// The light: the shared one, or room for the frame's own.
+    pub fn light(&mut self) -> Result<wgpu::Buffer, RenderError> {
+        match &self.shared_light {
+            Some(light) => Ok(light.clone()),
+            None => self.room(Slot::Light, light_bytes(&self.params)),
+        }
+    }
+
+    /// The buffer of a slot with this content.
+    pub fn upload<T: Pod>(
+        &mut self,
+        slot: Slot,
+        content: &[T],
+    ) -> Result<wgpu::Buffer, RenderError> {
+        self.workspace.upload(self.gpu, slot, content)
+    }
+
+    /// The buffer of a slot with this content of the plan; sent once for all frames of a plan in one workspace.
+    pub fn upload_of_plan<T: Pod>(
+        &mut self,
+        slot: Slot,
+        content: &[T],
+    ) -> Result<wgpu::Buffer, RenderError> {
+        let plan = self.plan.id;
+        self.workspace.upload_once(self.gpu, slot, plan, content)
+    }
+
+    /// Pixels of the part.
+    pub fn pixel_count(&self) -> u64 {
+        u64::from(self.params.width) * u64::from(self.params.height)
+    }
+}
