@@ -292,11 +292,15 @@ impl Pipelines {
             (params.eye_x.powi(2) + params.eye_y.powi(2) + params.eye_z.powi(2)).sqrt() - 1.0;
         let scale = params.focal_px / height;
         let gain = params.light_depth_gain / (scale * scale);
-        let source = format!(
-            "{}\nconst LIGHT_RADIUS_TEXELS = {LIGHT_RADIUS_TEXELS:?};\nconst LIGHT_GAIN = {gain:?};\n{}",
-            render::stages::PRELUDE,
-            include_str!("classic.wgsl")
-        );
+        let constants = [
+            ("LIGHT_RADIUS_TEXELS", f64::from(LIGHT_RADIUS_TEXELS)),
+            ("LIGHT_GAIN", f64::from(gain)),
+        ];
+        let compilation_options = wgpu::PipelineCompilationOptions {
+            constants: &constants,
+            ..Default::default()
+        };
+        let source = [render::stages::PRELUDE, include_str!("classic.wgsl")].concat();
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some("classic"),
             source: wgpu::ShaderSource::Wgsl(source.into()),
@@ -307,7 +311,7 @@ impl Pipelines {
                 layout: None,
                 module: &module,
                 entry_point: Some(entry),
-                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                compilation_options: compilation_options.clone(),
                 cache: None,
             })
         };
@@ -318,7 +322,7 @@ impl Pipelines {
                 vertex: wgpu::VertexState {
                     module: &module,
                     entry_point: Some(vertex),
-                    compilation_options: wgpu::PipelineCompilationOptions::default(),
+                    compilation_options: compilation_options.clone(),
                     buffers: &[],
                 },
                 primitive: wgpu::PrimitiveState {
@@ -330,7 +334,7 @@ impl Pipelines {
                 fragment: Some(wgpu::FragmentState {
                     module: &module,
                     entry_point: Some(fragment),
-                    compilation_options: wgpu::PipelineCompilationOptions::default(),
+                    compilation_options: compilation_options.clone(),
                     targets: &[Some(wgpu::ColorTargetState {
                         format: FORMAT,
                         blend: Some(blend),

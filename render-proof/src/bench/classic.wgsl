@@ -1,4 +1,7 @@
 // Classic half-angle slicing by rasterising quads: what the compute renderer is held against. The prelude goes before.
+override LIGHT_RADIUS_TEXELS: f32;
+override LIGHT_GAIN: f32;
+
 @group(0) @binding(1) var<storage, read> seen: array<vec4<u32>>;
 @group(0) @binding(7) var<storage, read> lit: array<vec4<u32>>;
 @group(0) @binding(2) var<storage, read> order: array<u32>;

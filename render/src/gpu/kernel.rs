@@ -11,7 +11,13 @@ pub struct Kernel {
 }
 
 impl Kernel {
-    pub(super) fn new(gpu: &Gpu, label: &'static str, source: &str, entry: &str) -> Self {
+    pub(super) fn new(
+        gpu: &Gpu,
+        label: &'static str,
+        source: &str,
+        entry: &str,
+        constants: &[(&str, f64)],
+    ) -> Self {
         let device = &gpu.device;
         let descriptor = wgpu::ShaderModuleDescriptor {
             label: Some(label),
@@ -28,8 +34,8 @@ impl Kernel {
             entry_point: Some(entry),
             // Stages write shared memory before they read it; one invocation would do it alone otherwise.
             compilation_options: wgpu::PipelineCompilationOptions {
+                constants,
                 zero_initialize_workgroup_memory: false,
-                ..Default::default()
             },
             cache: gpu.pipelines.as_ref().map(Pipelines::cache),
         });

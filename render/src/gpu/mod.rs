@@ -178,7 +178,18 @@ impl Gpu {
 
     /// Compiles one entry point.
     pub fn kernel(&self, label: &'static str, source: &str, entry: &str) -> Kernel {
-        Kernel::new(self, label, source, entry)
+        self.variant(label, source, entry, &[])
+    }
+
+    /// The same with values of its override constants; one that is not named keeps the value in the source.
+    pub fn variant(
+        &self,
+        label: &'static str,
+        source: &str,
+        entry: &str,
+        constants: &[(&str, f64)],
+    ) -> Kernel {
+        Kernel::new(self, label, source, entry, constants)
     }
 
     /// Keeps what has been compiled for the next process.

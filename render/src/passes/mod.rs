@@ -9,18 +9,23 @@ pub mod splat;
 mod store;
 pub mod trails;
 
-use crate::gpu::Gpu;
+use crate::gpu::{Gpu, Kernel};
 
-/// The source of a pass in which nobody shares sums with neighbours, which pays on GPUs alone.
-pub fn unshared(source: &str) -> String {
-    source.replace("const PROBES = 12u;", "const PROBES = 0u;")
+/// Probes of the table of sums that are shared with neighbours: after so many a key has no slot.
+pub const SHARED_PROBES: u32 = 12;
+/// Nobody shares sums: that pays on GPUs alone.
+pub const NO_PROBES: u32 = 0;
+
+/// A pass that shares sums as it suits the device.
+fn suited(gpu: &Gpu) -> u32 {
+    if gpu.is_software() {
+        NO_PROBES
+    } else {
+        SHARED_PROBES
+    }
 }
 
-/// The source of a pass as it suits the device.
-fn suited(gpu: &Gpu, source: &str) -> String {
-    if gpu.is_software() {
-        unshared(source)
-    } else {
-        source.to_owned()
-    }
+/// Compiles a pass whose table is looked through so often.
+fn compiled(gpu: &Gpu, label: &'static str, source: &str, probes: u32) -> Kernel {
+    gpu.variant(label, source, label, &[("PROBES", f64::from(probes))])
 }

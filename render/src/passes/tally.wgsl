@@ -2,7 +2,7 @@
 // memory for all of them is cheaper than one for each. A key that finds no room after a few probes has no slot.
 const TABLE = 256u;
 const TABLE_SHIFT = 24u; // 32 - log2(TABLE)
-const PROBES = 12u; // 0: nobody finds a slot
+override PROBES: u32; // 0: nobody finds a slot
 const NO_SLOT = 0xffffffffu;
 
 // Key plus one; 0 where the slot is free.

@@ -83,7 +83,7 @@ fn draw(
     }
     Bin::new(gpu, sources[0]).record(&mut frame).unwrap();
     Scatter::new(gpu).record(&mut frame).unwrap();
-    let eye = Eye::of(gpu, sources[1], eye::SOURCE_IN_CONTEXT, entry);
+    let eye = Eye::of(gpu, sources[1], entry);
     eye.record(&mut frame).unwrap();
     let [image, counts, parts] =
         [Slot::Image, Slot::Counts, Slot::HotParts].map(|slot| frame.room(slot, 4).unwrap());
@@ -136,7 +136,7 @@ fn a_list_in_parts_is_a_list_as_a_whole() {
         let narrow = |source: &str| {
             source.replace("MOST_HOT_PARTS: u32 = 4096u", "MOST_HOT_PARTS: u32 = 5u")
         };
-        let [few, few_eye] = [narrow(bin::SOURCE), narrow(&eye::with_parts(eye::SOURCE))];
+        let [few, few_eye] = [narrow(bin::SOURCE), narrow(eye::SOURCE)];
         assert!(few != bin::SOURCE);
         let short = draw(LONG, [&few, &few_eye], eye::SHARED);
         assert!(short.parts[0] as usize >= taken && short.pixels == whole.pixels);
@@ -172,8 +172,8 @@ fn a_part_that_is_left_out_is_seen() {
     let buffers = Playback::upload(gpu, &scene).unwrap();
     let plan = Plan::for_device(&pole(Mode::Volume), &scene, gpu.most_buffer_bytes()).unwrap();
     let draw = |sources: [&str; 2]| draw(gpu, &plan, &buffers, LONG, sources, eye::SHARED);
-    let right = [bin::SOURCE.to_owned(), eye::with_parts(eye::SOURCE)];
-    let expected = draw([&right[0], &right[1]]);
+    let right = [bin::SOURCE, eye::SOURCE];
+    let expected = draw(right);
     for (stage, from, to) in [
         (1, "part < end; part++", "part + 1u < end; part++"),
         (
@@ -187,10 +187,11 @@ fn a_part_that_is_left_out_is_seen() {
             "select(0u, first + 2u, fits)",
         ),
     ] {
-        let mut sources = right.clone();
-        sources[stage] = sources[stage].replace(from, to);
-        assert!(sources[stage] != right[stage], "{from}");
-        let wrong = draw([&sources[0], &sources[1]]);
+        let faulty = right[stage].replace(from, to);
+        assert!(faulty != right[stage], "{from}");
+        let mut sources = right;
+        sources[stage] = &faulty;
+        let wrong = draw(sources);
         assert!(wrong.pixels != expected.pixels, "{to}");
     }
 }

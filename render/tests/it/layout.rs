@@ -174,10 +174,8 @@ fn every_shader_is_valid_without_extensions() {
         bin::SOURCE,
         scatter::SOURCE,
         eye::SOURCE,
-        eye::SOURCE_IN_CONTEXT,
         map::SOURCE,
         compose::SOURCE,
-        compose::SOURCE_IN_CONTEXT,
     ];
     for source in sources {
         let mut validator = naga::valid::Validator::new(

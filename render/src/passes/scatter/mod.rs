@@ -25,13 +25,13 @@ pub struct Scatter {
 impl Scatter {
     /// Compiles the shader as it suits the device.
     pub fn new(gpu: &Gpu) -> Self {
-        Self::of(gpu, &super::suited(gpu, SOURCE))
+        Self::of(gpu, SOURCE, super::suited(gpu))
     }
 
-    /// Compiles `source`, [`SOURCE`] but for tests.
-    pub fn of(gpu: &Gpu, source: &str) -> Self {
+    /// Compiles `source`, [`SOURCE`] but for tests, with a table of sums of so many probes.
+    pub fn of(gpu: &Gpu, source: &str, probes: u32) -> Self {
         Self {
-            scatter: gpu.kernel("scatter", source, "scatter"),
+            scatter: super::compiled(gpu, "scatter", source, probes),
         }
     }
 

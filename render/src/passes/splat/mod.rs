@@ -52,13 +52,13 @@ pub fn unpacked(seen: [u32; 4], lit: [u32; 4], entry_shift: u32) -> Splat {
 impl Splats {
     /// Compiles the shader as it suits the device.
     pub fn new(gpu: &Gpu) -> Self {
-        Self::of(gpu, &super::suited(gpu, SOURCE))
+        Self::of(gpu, SOURCE, super::suited(gpu))
     }
 
-    /// Compiles `source`, [`SOURCE`] but for tests.
-    pub fn of(gpu: &Gpu, source: &str) -> Self {
+    /// Compiles `source`, [`SOURCE`] but for tests, with a table of sums of so many probes.
+    pub fn of(gpu: &Gpu, source: &str, probes: u32) -> Self {
         Self {
-            splat: gpu.kernel("splat", source, "splat"),
+            splat: super::compiled(gpu, "splat", source, probes),
         }
     }
 

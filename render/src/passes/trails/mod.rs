@@ -32,13 +32,13 @@ pub struct Trails {
 impl Trails {
     /// Compiles the shader as it suits the device.
     pub fn new(gpu: &Gpu) -> Self {
-        Self::of(gpu, &super::suited(gpu, SOURCE))
+        Self::of(gpu, SOURCE, super::suited(gpu))
     }
 
-    /// Compiles `source`, [`SOURCE`] but for tests.
-    pub fn of(gpu: &Gpu, source: &str) -> Self {
+    /// Compiles `source`, [`SOURCE`] but for tests, with a table of sums of so many probes.
+    pub fn of(gpu: &Gpu, source: &str, probes: u32) -> Self {
         Self {
-            trails: gpu.kernel("trails", source, "trails"),
+            trails: super::compiled(gpu, "trails", source, probes),
         }
     }
 

@@ -1,4 +1,4 @@
-// Blended colour to bytes in its surroundings: coast lines, the terrain through the sea, the night. Bindings are beyond
+// A blended colour in its surroundings: coast lines, the terrain through the sea, the night. Bindings are beyond
 // those of the stages that compose.
 @group(0) @binding(5) var<storage, read> terrain: array<f32>;
 @group(0) @binding(6) var<storage, read> ground_axes: array<GroundAxis>;
@@ -94,7 +94,7 @@ fn coast_color(pixel: vec2<u32>) -> vec4<f32> {
     return vec4(vec3(params.coast_grey), 1.0) * cover;
 }
 
-fn composed(pixel: vec2<u32>, blended: vec4<f32>) -> u32 {
+fn in_context(pixel: vec2<u32>, blended: vec4<f32>) -> vec4<f32> {
     var spot: Spot;
     if (params.view == VIEW_TILE) { spot = spot_on_tile(pixel); } else { spot = spot_on_globe(pixel); }
     var color = blended;
@@ -108,5 +108,5 @@ fn composed(pixel: vec2<u32>, blended: vec4<f32>) -> u32 {
         color += line * (1.0 - color.w);
     }
     color += ground_color(spot) * (1.0 - color.w);
-    return bytes_of(color);
+    return color;
 }

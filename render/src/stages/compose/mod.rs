@@ -16,15 +16,9 @@ use crate::stages::layout::GroundAxis;
 pub const FUNCTIONS: &str = concat!(
     include_str!("../sphere.wgsl"),
     include_str!("globe.wgsl"),
-    include_str!("over_globe.wgsl")
-);
-
-/// The same function for pictures in their surroundings: kernels of their own, so that others pay nothing for it.
-pub const FUNCTIONS_IN_CONTEXT: &str = concat!(
-    include_str!("../sphere.wgsl"),
-    include_str!("globe.wgsl"),
     include_str!("terrain.wgsl"),
-    include_str!("in_context.wgsl")
+    include_str!("in_context.wgsl"),
+    include_str!("composed.wgsl")
 );
 
 /// The shader.
@@ -32,39 +26,31 @@ pub const SOURCE: &str = concat!(
     include_str!("../prelude.wgsl"),
     include_str!("../sphere.wgsl"),
     include_str!("globe.wgsl"),
-    include_str!("over_globe.wgsl"),
+    include_str!("terrain.wgsl"),
+    include_str!("in_context.wgsl"),
+    include_str!("composed.wgsl"),
     include_str!("compose.wgsl")
 );
 
-/// The shader for pictures in their surroundings.
-pub const SOURCE_IN_CONTEXT: &str = concat!(
-    include_str!("../prelude.wgsl"),
-    include_str!("../sphere.wgsl"),
-    include_str!("globe.wgsl"),
-    include_str!("terrain.wgsl"),
-    include_str!("in_context.wgsl"),
-    include_str!("compose.wgsl")
-);
+/// The constant of pictures in their surroundings.
+pub(crate) fn in_context(is_wanted: bool) -> (&'static str, f64) {
+    ("IN_CONTEXT", f64::from(u8::from(is_wanted)))
+}
 
 /// The compiled stage.
 pub struct Compose {
+    source: String,
     plain: Kernel,
-    source_in_context: String,
     /// Compiled when it is first wanted.
     in_context: OnceLock<Kernel>,
 }
 
 impl Compose {
-    /// Compiles `source`, [`SOURCE`] but for tests; [`SOURCE_IN_CONTEXT`] when it is wanted.
+    /// Compiles `source`, [`SOURCE`] but for tests.
     pub fn new(gpu: &Gpu, source: &str) -> Self {
-        Self::of(gpu, source, SOURCE_IN_CONTEXT)
-    }
-
-    /// The same with another shader for pictures in their surroundings.
-    pub fn of(gpu: &Gpu, source: &str, source_in_context: &str) -> Self {
         Self {
-            plain: gpu.kernel("compose", source, "compose"),
-            source_in_context: source_in_context.to_owned(),
+            source: source.to_owned(),
+            plain: compiled(gpu, source, false),
             in_context: OnceLock::new(),
         }
     }
@@ -73,34 +59,30 @@ impl Compose {
     pub fn record(&self, frame: &mut FrameContext<'_>) -> Result<(), RenderError> {
         let picture = frame.room(Slot::Picture, 16)?;
         let image = frame.room(Slot::Image, frame.pixel_count() * 4)?;
-        let groups = [frame.params.tiles_x, frame.params.tiles_y];
-        if frame.params.in_context == 1 {
-            let [terrain, axes, coast] = surroundings(frame)?;
-            let gpu = frame.gpu;
-            let kernel = self
-                .in_context
-                .get_or_init(|| gpu.kernel("compose", &self.source_in_context, "compose"));
-            let buffers = [
-                (0, &frame.params_buffer),
-                (1, &picture),
-                (2, &frame.domain),
-                (3, &image),
-                (5, &terrain),
-                (6, &axes),
-                (7, &coast),
-            ];
-            frame.recorder.dispatch(kernel, &buffers, groups);
-            return Ok(());
-        }
+        let [terrain, axes, coast] = surroundings(frame)?;
+        let kernel = if frame.params.in_context == 1 {
+            let compiled = || compiled(frame.gpu, &self.source, true);
+            self.in_context.get_or_init(compiled)
+        } else {
+            &self.plain
+        };
         let buffers = [
             (0, &frame.params_buffer),
             (1, &picture),
             (2, &frame.domain),
             (3, &image),
+            (5, &terrain),
+            (6, &axes),
+            (7, &coast),
         ];
-        frame.recorder.dispatch(&self.plain, &buffers, groups);
+        let groups = [frame.params.tiles_x, frame.params.tiles_y];
+        frame.recorder.dispatch(kernel, &buffers, groups);
         Ok(())
     }
+}
+
+fn compiled(gpu: &Gpu, source: &str, is_in_context: bool) -> Kernel {
+    gpu.variant("compose", source, "compose", &[in_context(is_in_context)])
 }
 
 /// What the functions for surroundings read: terrain, ground axes and coast mask, in the order of their bindings from 5 on.

@@ -20,7 +20,7 @@ fn given(near: Near, row: f32) -> vec4<u32> {
     let south = (row - near.south) * near.inverse_radius;
     let amount = u32(near.depth * weight_at(near.east * near.east + south * south, near.radius_px) + 0.5);
     var rgb = near.rgb;
-    if (params.kernel == KERNEL_BALL) { rgb = vec3<u32>(vec3<f32>(rgb) * ball_light(vec2(near.east, south)) + 0.5); }
+    if (KERNEL == KERNEL_BALL) { rgb = vec3<u32>(vec3<f32>(rgb) * ball_light(vec2(near.east, south)) + 0.5); }
     return vec4(rgb * amount, amount);
 }
 

@@ -6,6 +6,9 @@
 @group(0) @binding(3) var<storage, read> domain: array<u32>;
 @group(0) @binding(4) var<storage, read_write> image: array<u32>;
 
+// The kind of particle is tested for every pixel of every entry: there is a kernel for each.
+override KERNEL: u32;
+
 const PIXELS = 256u; // SCREEN_TILE_PX squared, and invocations
 // Entries of a slice whose sums, below 2^24 each, stay below 2^32.
 const SAFE = 256u;
@@ -27,7 +30,7 @@ var<workgroup> is_open: u32;
 
 // Share of a splat's depth at a squared distance of `q` squared radii from its centre.
 fn weight_at(q: f32, radius_px: f32) -> f32 {
-    if (params.kernel == KERNEL_CLOUD) {
+    if (KERNEL == KERNEL_CLOUD) {
         let inside = max(1.0 - q, 0.0);
         return inside * inside;
     }
@@ -58,7 +61,7 @@ fn add(entry: Entry, half: i32) {
             let amount = u32(depth * weight_at(east * east + south * south, radius_px) + 0.5);
             if (amount == 0u) { continue; }
             var own = rgb;
-            if (params.kernel == KERNEL_BALL) { own = vec3<u32>(vec3<f32>(rgb) * ball_light(vec2(east, south)) + 0.5); }
+            if (KERNEL == KERNEL_BALL) { own = vec3<u32>(vec3<f32>(rgb) * ball_light(vec2(east, south)) + 0.5); }
             let pixel = u32(y) * SCREEN_TILE_PX + u32(x);
             atomicAdd(&sums[pixel], own.x * amount);
             atomicAdd(&sums[PIXELS + pixel], own.y * amount);
@@ -93,9 +96,6 @@ fn summed(begin: u32, end: u32, pixel: u32) -> vec4<u32> {
     }
     return own;
 }
-
-// What a list that is summed up in parts adds to a pixel, if it is such a list.
-struct LongSum { is_there: bool, own: vec4<u32> }
 
 fn is_covered(picture: vec4<f32>) -> bool {
     return params.front_to_back == 1u && picture.w > OPAQUE;

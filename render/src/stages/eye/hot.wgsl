@@ -1,6 +1,9 @@
 // Lists that are long beyond the others, where cells crowd (round a pole, along a limb): cut into parts, each summed up
 // by a workgroup of its own before the eye looks. Sums of integers are the same however they are cut.
 
+// Is any list of the picture cut? Kernels of their own, so that others pay nothing for it.
+override HAS_PARTS: bool = false;
+
 // Of a long list: its first part and 1; 0 where there was no room for its parts.
 @group(0) @binding(8) var<storage, read_write> hot_lists: array<u32>;
 // How many parts there are, and of each the list.
@@ -10,8 +13,11 @@
 
 const PART_SUMS = 1024u; // 4 times PIXELS
 
-// What all parts of a list add to a pixel.
+// What a list that is summed up in parts adds to a pixel, if it is such a list.
+struct LongSum { is_there: bool, own: vec4<u32> }
+
 fn long_sum(list: u32, length: u32, pixel: u32) -> LongSum {
+    if (!HAS_PARTS) { return LongSum(false, vec4(0u)); }
     if (length <= params.long_list) { return LongSum(false, vec4(0u)); }
     let first = hot_lists[list];
     if (first == 0u) { return LongSum(false, vec4(0u)); }

@@ -2,6 +2,7 @@
 
 use render::frame_context::FrameContext;
 use render::gpu::Slot;
+use render::passes::SHARED_PROBES;
 use render::passes::trails::{self, Trails};
 use render::stages::flow::{self, Flow};
 use render::stages::layout::{MISSING, Velocity};
@@ -60,7 +61,7 @@ fn drifting_splats_match_their_twins_on_tiles_and_on_the_globe() {
         assert!(drawn > 1000, "{drawn} dots");
         for (right, wrong) in faults {
             prove("trails", trails::SOURCE, right, wrong, |gpu, source| {
-                let stage = Trails::of(gpu, source);
+                let stage = Trails::of(gpu, source, SHARED_PROBES);
                 let given = |f: &mut FrameContext<'_>| {
                     drop(f.upload(Slot::Velocity, &twins.velocity).unwrap());
                 };

@@ -3,8 +3,8 @@
 use contract::job::Mode;
 use render::frame_context::FrameContext;
 use render::gpu::Slot;
-use render::passes;
 use render::passes::splat::{self, Splats};
+use render::passes::{NO_PROBES, SHARED_PROBES};
 use render::stages::bin;
 use render::stages::light::{self, Light};
 use render::stages::sizes::list_count;
@@ -17,17 +17,20 @@ use crate::scenes::tile;
 fn light_is_given_and_lists_are_counted_as_the_twins_do() {
     for twins in [Twins::tile(), Twins::globe()] {
         let expected: Vec<f32> = twins.deposited.iter().map(|&depth| depth as f32).collect();
-        let (shared, unshared) = (splat::SOURCE, passes::unshared(splat::SOURCE));
-        for (source, right, wrong) in [
-            (shared, "splat.light_depth - behind", "splat.light_depth"),
+        for (probes, right, wrong) in [
             (
-                &unshared,
+                SHARED_PROBES,
+                "splat.light_depth - behind",
+                "splat.light_depth",
+            ),
+            (
+                NO_PROBES,
                 "atomicAdd(&counts[list], 1u)",
                 "atomicMax(&counts[list], 1u)",
             ),
         ] {
-            prove("splat", source, right, wrong, |gpu, source| {
-                let stage = Splats::of(gpu, source);
+            prove("splat", splat::SOURCE, right, wrong, |gpu, source| {
+                let stage = Splats::of(gpu, source, probes);
                 let lists = u64::from(list_count(&twins.params)) * 4;
                 let [first, second] = twins.stored();
                 let [seen, lit, light, counts] = twins.run_with(
@@ -67,7 +70,7 @@ fn neighbours_share_the_lengths_of_lists() {
         "atomicAdd(&counts[key & ~LIST_KEY], ",
         "atomicAdd(&counts[key & ~LIST_KEY], 1u + ",
         |gpu, source| {
-            let stage = Splats::of(gpu, source);
+            let stage = Splats::of(gpu, source, SHARED_PROBES);
             let [first, second] = twins.stored();
             let [seen, lit, counts] = twins.run_with(
                 gpu,

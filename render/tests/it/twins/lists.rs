@@ -1,9 +1,9 @@
 //! Counting, scanning, scattering and their twins.
 
 use render::gpu::{Gpu, Slot};
-use render::passes;
 use render::passes::scatter::{self, Scatter};
 use render::passes::splat::{self, Splats};
+use render::passes::{NO_PROBES, SHARED_PROBES};
 use render::stages::bin::{self, Bin};
 use render::stages::layout::Entry;
 use render::stages::light::{self, Light};
@@ -45,11 +45,11 @@ fn same_lists(a: &[Vec<[u32; 3]>], b: &[Vec<[u32; 3]>]) -> bool {
 #[expect(clippy::too_many_lines, reason = "two passes and a scan in one chain")]
 fn the_lists_hold_every_stored_splat_once_and_in_its_light() {
     for twins in [Twins::tile(), Twins::globe()] {
-        let distance = |gpu: &Gpu, bin_source: &str, scatter_source: &str| {
-            let splats = Splats::of(gpu, splat::SOURCE);
+        let distance = |gpu: &Gpu, bin_source: &str, (scatter_source, probes): (&str, u32)| {
+            let splats = Splats::of(gpu, splat::SOURCE, SHARED_PROBES);
             let light = Light::new(gpu);
             let bin = Bin::new(gpu, bin_source);
-            let scatter = Scatter::of(gpu, scatter_source);
+            let scatter = Scatter::of(gpu, scatter_source, probes);
             let mut params = twins.params;
             // Rounding may put a few more splats into a list than the twins have.
             params.entry_capacity += params.entry_capacity / 8 + 1024;
@@ -97,24 +97,27 @@ fn the_lists_hold_every_stored_splat_once_and_in_its_light() {
             bin::SOURCE,
             "counts[at] += start",
             "counts[at] += start + 1u",
-            |gpu, source| distance(gpu, source, scatter::SOURCE),
+            |gpu, source| distance(gpu, source, (scatter::SOURCE, SHARED_PROBES)),
         );
-        let (shared, unshared) = (scatter::SOURCE, passes::unshared(scatter::SOURCE));
-        for (source, right, wrong) in [
-            (shared, "vec2(exp(-depth), 1.0)", "vec2(exp(depth), 1.0)"),
+        for (probes, right, wrong) in [
             (
-                shared,
+                SHARED_PROBES,
+                "vec2(exp(-depth), 1.0)",
+                "vec2(exp(depth), 1.0)",
+            ),
+            (
+                SHARED_PROBES,
                 "atomicAdd(&counts[tag - 1u], atomicLoad",
                 "atomicAdd(&counts[tag - 1u], 1u + atomicLoad",
             ),
             (
-                &unshared,
+                NO_PROBES,
                 "return atomicAdd(&counts[list], 1u)",
                 "return atomicAdd(&counts[list], 2u)",
             ),
         ] {
-            prove("scatter", source, right, wrong, |gpu, source| {
-                distance(gpu, bin::SOURCE, source)
+            prove("scatter", scatter::SOURCE, right, wrong, |gpu, source| {
+                distance(gpu, bin::SOURCE, (source, probes))
             });
         }
     }

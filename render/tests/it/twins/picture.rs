@@ -91,7 +91,7 @@ fn surroundings_match_their_twin_on_tiles_and_on_the_globe() {
         let expected = bytes(twins.image.iter().copied());
         for (right, wrong) in faults {
             let distance = |gpu: &Gpu, source: &str| {
-                let stage = Compose::of(gpu, compose::SOURCE, source);
+                let stage = Compose::new(gpu, source);
                 let picture = |f: &mut FrameContext<'_>| {
                     drop(f.upload(Slot::Picture, &twins.picture).unwrap());
                 };
@@ -104,7 +104,7 @@ fn surroundings_match_their_twin_on_tiles_and_on_the_globe() {
                 );
                 far_apart(&bytes(drawn), &expected, 1.01)
             };
-            let source = compose::SOURCE_IN_CONTEXT;
+            let source = compose::SOURCE;
             prove("surroundings", source, right, wrong, distance);
         }
     }
@@ -116,7 +116,7 @@ fn the_eye_composes_in_surroundings_as_its_twin_does() {
         let twins = Twins::of_job(&everything(Mode::Volume, view), with_terrain(FIVE_DEGREES));
         let expected = bytes(twins.image.iter().copied());
         let distance = |gpu: &Gpu, source: &str, entry| {
-            let stage = Eye::of(gpu, eye::SOURCE, source, entry);
+            let stage = Eye::of(gpu, source, entry);
             let lists = |f: &mut FrameContext<'_>| {
                 f.upload(Slot::Counts, &twins.list_ends).unwrap();
                 f.upload(Slot::Entries, &twins.entries).unwrap();
@@ -132,13 +132,9 @@ fn the_eye_composes_in_surroundings_as_its_twin_does() {
         };
         let (right, wrong) = ("color += ground_color", "color -= ground_color");
         for entry in [eye::SHARED, eye::ALONE] {
-            prove(
-                "eye",
-                eye::SOURCE_IN_CONTEXT,
-                right,
-                wrong,
-                |gpu, source| distance(gpu, source, entry),
-            );
+            prove("eye", eye::SOURCE, right, wrong, |gpu, source| {
+                distance(gpu, source, entry)
+            });
         }
     }
 }

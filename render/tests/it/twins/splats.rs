@@ -2,7 +2,7 @@
 
 use contract::job::Mode;
 use render::passes::splat::{self, Splats};
-use render::passes::{scatter, trails};
+use render::passes::{SHARED_PROBES, scatter, trails};
 use render::stages::{
     bin, compose, eye, flow, interpolate, light, particles, project, uncertainty,
 };
@@ -42,7 +42,7 @@ fn splats_match_their_twins_on_tiles_and_on_the_globe() {
     for (twins, right, wrong) in faults {
         let expected = splat_numbers(twins.params.kernel, &twins.splats, &twins.splats);
         prove("splat", splat::SOURCE, right, wrong, |gpu, source| {
-            let stage = Splats::of(gpu, source);
+            let stage = Splats::of(gpu, source, SHARED_PROBES);
             let outputs = twins.stored();
             let [seen, lit] = twins.run_with(
                 gpu,
@@ -85,9 +85,6 @@ fn every_function_of_a_particle_is_in_the_pass_that_is_tested() {
     assert!(
         eye::SOURCE.contains(compose::FUNCTIONS) && compose::SOURCE.contains(compose::FUNCTIONS)
     );
-    for source in [eye::SOURCE_IN_CONTEXT, compose::SOURCE_IN_CONTEXT] {
-        assert!(source.contains(compose::FUNCTIONS_IN_CONTEXT));
-    }
 }
 
 #[test]
@@ -105,7 +102,7 @@ fn splats_in_the_sea_and_in_the_night_match_their_twins() {
         ),
     ] {
         prove("splat", splat::SOURCE, right, wrong, |gpu, source| {
-            let stage = Splats::of(gpu, source);
+            let stage = Splats::of(gpu, source, SHARED_PROBES);
             let [seen, lit] = twins.run_with(
                 gpu,
                 &twins.params,

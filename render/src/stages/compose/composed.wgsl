@@ -1,4 +1,7 @@
-// Blended colour to bytes: over the plain globe, where one is wanted.
+// Blended colour to bytes: over the plain globe, where one is wanted, or in its surroundings.
+// Kernels of their own for pictures in their surroundings: others pay nothing for it.
+override IN_CONTEXT: bool = false;
+
 fn surface_below(pixel: vec2<u32>) -> vec4<f32> {
     let ground = ground_below(pixel);
     let cover = clamp(ground.rim_px + 0.5, 0.0, 1.0);
@@ -11,6 +14,10 @@ fn surface_below(pixel: vec2<u32>) -> vec4<f32> {
 
 fn composed(pixel: vec2<u32>, blended: vec4<f32>) -> u32 {
     var color = blended;
-    if (params.surface == 1u) { color += surface_below(pixel) * (1.0 - color.w); }
+    if (IN_CONTEXT) {
+        color = in_context(pixel, blended);
+    } else if (params.surface == 1u) {
+        color += surface_below(pixel) * (1.0 - color.w);
+    }
     return bytes_of(color);
 }
