@@ -11,7 +11,7 @@ use crate::frame_context::SceneBuffers;
 use crate::gpu::{Gpu, Workspace};
 use crate::plan::{Part, Plan};
 use crate::resident::Resident;
-use crate::scene::{Frame, Interval, Scene};
+use crate::scene::{Cells, Scene};
 use crate::stages::fill::{self, Fill, Filled, Form};
 
 /// Everything that lives and dies with one device.
@@ -67,16 +67,22 @@ impl Device {
         scene: &Scene,
         light: Option<&wgpu::Buffer>,
     ) -> Result<Vec<u8>, RenderError> {
-        let mut buffers =
-            self.scene_buffers(scene, &plan.held_cells(), plan.params.uncertainty == 1)?;
+        let mut buffers = self.scene_buffers(
+            scene,
+            &plan.held_cells(),
+            plan.params.values.has_uncertainty == 1,
+        )?;
         buffers.light = light.cloned();
         self.in_workspace(|workspace| self.stages.draw(&self.gpu, workspace, plan, part, &buffers))
     }
 
     /// Makes the light that all parts of a picture lie in.
     pub(crate) fn light(&self, plan: &Plan, scene: &Scene) -> Result<wgpu::Buffer, RenderError> {
-        let buffers =
-            self.scene_buffers(scene, &plan.held_cells(), plan.params.uncertainty == 1)?;
+        let buffers = self.scene_buffers(
+            scene,
+            &plan.held_cells(),
+            plan.params.values.has_uncertainty == 1,
+        )?;
         self.in_workspace(|workspace| {
             self.stages
                 .shared_light(&self.gpu, workspace, plan, &buffers)
@@ -123,38 +129,10 @@ impl Device {
         held: &Range<usize>,
         has_uncertainty: bool,
     ) -> Result<SceneBuffers, RenderError> {
-        let frame = |frame: &Frame| self.resident.buffer(&self.gpu, &frame.cells, held.clone());
-        let pair = |interval: &Interval| -> Result<[wgpu::Buffer; 2], RenderError> {
-            Ok([frame(&interval.before)?, frame(&interval.after)?])
-        };
-        let uncertainty = |frame: &Frame| {
-            self.resident
-                .buffer(&self.gpu, frame.uncertainties(), held.clone())
-        };
-        let uncertainties = || -> Result<[wgpu::Buffer; 2], RenderError> {
-            Ok([
-                uncertainty(&scene.value.before)?,
-                uncertainty(&scene.value.after)?,
-            ])
-        };
-        Ok(SceneBuffers {
-            value: pair(&scene.value)?,
-            accumulated: scene.accumulated.as_ref().map(pair).transpose()?,
-            northward: scene.northward.as_ref().map(pair).transpose()?,
-            domain: self
-                .resident
-                .buffer(&self.gpu, &scene.domain, held.clone())?,
-            uncertainties: has_uncertainty.then(uncertainties).transpose()?,
-            terrain: scene
-                .terrain
-                .as_ref()
-                .map(|terrain| {
-                    let cells = &terrain.elevation.cells;
-                    self.resident
-                        .buffer(&self.gpu, cells, 0..cells.content().len())
-                })
-                .transpose()?,
-            light: None,
-        })
+        let send = |cells: &Cells<f32>, part| self.resident.buffer(&self.gpu, cells, part);
+        let domain = self
+            .resident
+            .buffer(&self.gpu, &scene.domain, held.clone())?;
+        SceneBuffers::of(scene, held, has_uncertainty, domain, send)
     }
 }

@@ -5,16 +5,17 @@ use contract::job::Mode;
 use crate::error::RenderError;
 use crate::frame_context::{FrameContext, SceneBuffers};
 use crate::gpu::{Gpu, Slot, Stamps, Workspace};
-use crate::passes::scatter::Scatter;
-use crate::passes::splat::Splats;
-use crate::passes::trails::Trails;
+use crate::passes;
+use crate::passes::scatter::{self, Scatter};
+use crate::passes::splat::{self, Splats};
+use crate::passes::trails::{self, Trails};
 use crate::plan::{Part, Plan};
 use crate::stages::bin::Bin;
 use crate::stages::compose::Compose;
 use crate::stages::eye::Eye;
 use crate::stages::flow::Flow;
 use crate::stages::interpolate::Interpolate;
-use crate::stages::layout::{Entry, LIGHT_ALONE, LIGHT_OWN, Params};
+use crate::stages::layout::{Entry, LIGHT_ALONE, LIGHT_OWN};
 use crate::stages::light::Light;
 use crate::stages::map::Map;
 use crate::stages::sizes::{light_bytes, list_count};
@@ -42,14 +43,15 @@ pub struct Stages {
 impl Stages {
     /// Compiles every stage.
     pub fn new(gpu: &Gpu) -> Self {
+        let probes = passes::probes(gpu);
         Self {
             interpolate: Interpolate::new(gpu, interpolate::SOURCE),
             flow: Flow::new(gpu, flow::SOURCE),
-            splats: Splats::new(gpu),
-            trails: Trails::new(gpu),
+            splats: Splats::new(gpu, splat::SOURCE, probes),
+            trails: Trails::new(gpu, trails::SOURCE, probes),
             light: Light::new(gpu),
             bin: Bin::new(gpu, bin::SOURCE),
-            scatter: Scatter::new(gpu),
+            scatter: Scatter::new(gpu, scatter::SOURCE, probes),
             eye: Eye::new(gpu),
             map: Map::new(gpu, map::SOURCE),
             compose: Compose::new(gpu, compose::SOURCE),
@@ -68,7 +70,7 @@ impl Stages {
             } else {
                 self.splats.record(frame)?;
             }
-            if frame.params.light_on == LIGHT_OWN {
+            if frame.params.lighting.mode == LIGHT_OWN {
                 self.light.record(frame)?;
             }
             self.bin.record(frame)?;
@@ -93,7 +95,7 @@ impl Stages {
         stamps: Option<&'a Stamps>,
     ) -> Result<FrameContext<'a>, RenderError> {
         let mut params = plan.params_of(part);
-        params.entry_capacity = capacity;
+        params.lists.entry_capacity = capacity;
         let mut frame = FrameContext::new(gpu, workspace, plan, params, scene.clone())?;
         if let Some(stamps) = stamps {
             frame.recorder.stamp(stamps);
@@ -111,10 +113,8 @@ impl Stages {
         plan: &Plan,
         scene: &SceneBuffers,
     ) -> Result<wgpu::Buffer, RenderError> {
-        let params = Params {
-            light_on: LIGHT_ALONE,
-            ..plan.params_of(Part::NONE)
-        };
+        let mut params = plan.params_of(Part::NONE);
+        params.lighting.mode = LIGHT_ALONE;
         let light = gpu.room("shared light", light_bytes(&params))?;
         let scene = SceneBuffers {
             light: Some(light.clone()),
@@ -138,10 +138,10 @@ impl Stages {
         scene: &SceneBuffers,
     ) -> Result<Vec<u8>, RenderError> {
         let params = plan.params_of(part);
-        if params.splat_count == 0
+        if params.cells.splat_count == 0
             && plan.mode != Mode::Map
-            && params.surface == 0
-            && params.in_context == 0
+            && params.context.surface == 0
+            && !params.in_context
         {
             return Ok(vec![
                 0;
@@ -149,7 +149,8 @@ impl Stages {
             ]);
         }
         let entry_bytes = size_of::<Entry>() as u64;
-        let first = (u64::from(params.splat_count) * FIRST_ENTRIES_PER_PARTICLE).max(FIRST_ENTRIES);
+        let first =
+            (u64::from(params.cells.splat_count) * FIRST_ENTRIES_PER_PARTICLE).max(FIRST_ENTRIES);
         let mut capacity = (workspace.room_bytes(Slot::Entries) / entry_bytes).max(first);
         loop {
             let room = capacity.min(gpu.most_buffer_bytes() / entry_bytes) as u32;

@@ -1,11 +1,14 @@
 //! What the stages of one frame share while they are recorded: the device, the plan and the frame's buffers.
 
+use std::ops::Range;
+
 use bytemuck::Pod;
 
 use crate::error::RenderError;
 use crate::gpu::{Gpu, Recorder, Slot, Workspace};
 use crate::plan::Plan;
-use crate::stages::layout::Params;
+use crate::scene::{Cells, Interval, Scene};
+use crate::stages::params::Params;
 use crate::stages::sizes::light_bytes;
 
 /// The frames of a scene on the device.
@@ -22,6 +25,37 @@ pub struct SceneBuffers {
     pub light: Option<wgpu::Buffer>,
 }
 
+impl SceneBuffers {
+    /// Those of a scene without shared light: `send` brings cells to the device, `held` of them those of frames.
+    pub fn of(
+        scene: &Scene,
+        held: &Range<usize>,
+        has_uncertainty: bool,
+        domain: wgpu::Buffer,
+        send: impl Fn(&Cells<f32>, Range<usize>) -> Result<wgpu::Buffer, RenderError>,
+    ) -> Result<Self, RenderError> {
+        let pair = |[before, after]: [&Cells<f32>; 2]| -> Result<[wgpu::Buffer; 2], RenderError> {
+            Ok([send(before, held.clone())?, send(after, held.clone())?])
+        };
+        let frames = |interval: &Interval| pair([&interval.before.cells, &interval.after.cells]);
+        let steps = [&scene.value.before, &scene.value.after];
+        let uncertainties = || pair(steps.map(|frame| frame.uncertainties()));
+        let terrain = scene.terrain.as_ref();
+        let terrain = terrain.map(|terrain| &terrain.elevation.cells);
+        Ok(Self {
+            value: frames(&scene.value)?,
+            accumulated: scene.accumulated.as_ref().map(frames).transpose()?,
+            northward: scene.northward.as_ref().map(frames).transpose()?,
+            domain,
+            uncertainties: has_uncertainty.then(uncertainties).transpose()?,
+            terrain: terrain
+                .map(|cells| send(cells, 0..cells.content().len()))
+                .transpose()?,
+            light: None,
+        })
+    }
+}
+
 /// What the stages of one frame share while they are recorded.
 pub struct FrameContext<'a> {
     pub gpu: &'a Gpu,
@@ -29,14 +63,7 @@ pub struct FrameContext<'a> {
     pub plan: &'a Plan,
     pub params: Params,
     pub params_buffer: wgpu::Buffer,
-    pub value_frames: [wgpu::Buffer; 2],
-    pub accumulated_frames: Option<[wgpu::Buffer; 2]>,
-    pub northward_frames: Option<[wgpu::Buffer; 2]>,
-    pub domain: wgpu::Buffer,
-    pub uncertainties: Option<[wgpu::Buffer; 2]>,
-    pub terrain: Option<wgpu::Buffer>,
-    /// Light that is shared between pictures; none where this frame makes its own.
-    pub shared_light: Option<wgpu::Buffer>,
+    pub scene: SceneBuffers,
     workspace: &'a mut Workspace,
 }
 
@@ -50,30 +77,17 @@ impl<'a> FrameContext<'a> {
         scene: SceneBuffers,
     ) -> Result<Self, RenderError> {
         // Steps without a filled gap have no uncertainties to read.
-        params.uncertainty &= u32::from(scene.uncertainties.is_some());
-        let params_buffer = workspace.upload(gpu, Slot::Params, &[params])?;
-        let SceneBuffers {
-            value,
-            accumulated,
-            northward,
-            domain,
-            uncertainties,
-            terrain,
-            light,
-        } = scene;
+        params.values.has_uncertainty &= u32::from(scene.uncertainties.is_some());
+        let params_buffer = workspace.upload(gpu, Slot::Params, &params.packed())?;
+        let mut recorder = gpu.recorder();
+        recorder.read_uniforms(params_buffer.clone());
         Ok(Self {
             gpu,
-            recorder: gpu.recorder(),
+            recorder,
             plan,
             params,
             params_buffer,
-            value_frames: value,
-            accumulated_frames: accumulated,
-            northward_frames: northward,
-            domain,
-            uncertainties,
-            terrain,
-            shared_light: light,
+            scene,
             workspace,
         })
     }
@@ -85,7 +99,7 @@ impl<'a> FrameContext<'a> {
 
     /// The light: the shared one, or room for the frame's own.
     pub fn light(&mut self) -> Result<wgpu::Buffer, RenderError> {
-        match &self.shared_light {
+        match &self.scene.light {
             Some(light) => Ok(light.clone()),
             None => self.room(Slot::Light, light_bytes(&self.params)),
         }
@@ -112,6 +126,6 @@ impl<'a> FrameContext<'a> {
 
     /// Pixels of the part.
     pub fn pixel_count(&self) -> u64 {
-        u64::from(self.params.width) * u64::from(self.params.height)
+        u64::from(self.params.view.size_px.element_product())
     }
 }

@@ -8,7 +8,8 @@ use crate::plan::{Part, Plan};
 use crate::scene::{Interval, Scene, Terrain};
 use crate::stages::compose::in_context::{self, Surroundings};
 use crate::stages::flow::cpu::Field;
-use crate::stages::layout::{Entry, LIGHT_OFF, Params, Particle, Splat};
+use crate::stages::layout::{Entry, LIGHT_OFF, Particle, Splat};
+use crate::stages::params::Params;
 use crate::stages::particles::cpu::Inputs;
 use crate::stages::sizes::{list_count, texel_count};
 use crate::stages::{
@@ -27,9 +28,9 @@ const MOST_ENTRY_BYTES: u64 = 4 << 30;
 )]
 pub fn draw(plan: &Plan, part: Part, scene: &Scene) -> Result<Vec<u8>, RenderError> {
     let params = plan.params_of(part);
-    let pixels = params.width as usize * params.height as usize;
+    let pixels = params.view.size_px.x as usize * params.view.size_px.y as usize;
     let mut picture = vec![Vec4::ZERO; pixels];
-    let value = interpolated(&params, params.value_weight, &scene.value);
+    let value = interpolated(&params, params.values.weight, &scene.value);
     let uncertainty = uncertainty::between(&params, &scene.value);
     if plan.mode == Mode::Map {
         let inputs = map::cpu::Inputs {
@@ -41,9 +42,9 @@ pub fn draw(plan: &Plan, part: Part, scene: &Scene) -> Result<Vec<u8>, RenderErr
         map::cpu::map(&params, &inputs, &mut picture);
     } else {
         let accumulated = scene.accumulated.as_ref();
-        let accumulated =
-            accumulated.map(|interval| interpolated(&params, params.accumulated_weight, interval));
-        let count = plan.active.len() * params.particles_per_cell as usize;
+        let accumulated = accumulated
+            .map(|interval| interpolated(&params, params.values.accumulated_weight, interval));
+        let count = plan.active.len() * params.cells.particles_per_cell as usize;
         if count > MOST_PARTICLES {
             return Err(RenderError::TooManyParticles {
                 count: count as u64,
@@ -52,7 +53,7 @@ pub fn draw(plan: &Plan, part: Part, scene: &Scene) -> Result<Vec<u8>, RenderErr
         }
         let mut particles = vec![Particle::default(); count];
         if let (Mode::Flow, Some(northward)) = (plan.mode, &scene.northward) {
-            let north = interpolated(&params, params.northward_weight, northward);
+            let north = interpolated(&params, params.values.northward_weight, northward);
             let velocity = flow::cpu::velocities(&value, &north);
             let field = Field {
                 params: &params,
@@ -78,7 +79,7 @@ pub fn draw(plan: &Plan, part: Part, scene: &Scene) -> Result<Vec<u8>, RenderErr
         }
         let mut splats = vec![Splat::default(); particles.len()];
         project::cpu::project(&params, &plan.rows, &plan.cols, &particles, &mut splats);
-        if params.light_on != LIGHT_OFF {
+        if params.lighting.mode != LIGHT_OFF {
             let mut buffer = vec![0u32; texel_count(&params)];
             light::cpu::deposit(&params, &splats, &mut buffer);
             light::cpu::prefix(&params, &mut buffer);
@@ -89,7 +90,7 @@ pub fn draw(plan: &Plan, part: Part, scene: &Scene) -> Result<Vec<u8>, RenderErr
     }
     let mut image = vec![0u32; pixels];
     let domain = scene.domain.content();
-    if params.in_context == 1 {
+    if params.in_context {
         let around = Surroundings {
             domain,
             terrain: scene

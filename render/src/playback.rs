@@ -7,7 +7,7 @@ use crate::frame::Stages;
 use crate::frame_context::SceneBuffers;
 use crate::gpu::{Gpu, Stamps, Workspace};
 use crate::plan::{Part, Plan};
-use crate::scene::{Interval, Scene};
+use crate::scene::{Cells, Scene};
 
 /// A view with its tables and buffers on the device.
 pub struct Playback<'a> {
@@ -52,38 +52,10 @@ impl<'a> Playback<'a> {
 
     /// The frames of a scene on the device.
     pub fn upload(gpu: &Gpu, scene: &Scene) -> Result<Steps, RenderError> {
-        let pair = |interval: &Interval| -> Result<[wgpu::Buffer; 2], RenderError> {
-            Ok([
-                gpu.storage("frame", interval.before.cells.content())?,
-                gpu.storage("frame", interval.after.cells.content())?,
-            ])
-        };
-        let uncertainties = || -> Result<[wgpu::Buffer; 2], RenderError> {
-            Ok([
-                gpu.storage(
-                    "uncertainties",
-                    scene.value.before.uncertainties().content(),
-                )?,
-                gpu.storage("uncertainties", scene.value.after.uncertainties().content())?,
-            ])
-        };
-        Ok(SceneBuffers {
-            value: pair(&scene.value)?,
-            accumulated: scene.accumulated.as_ref().map(pair).transpose()?,
-            northward: scene.northward.as_ref().map(pair).transpose()?,
-            domain: gpu.storage("domain", scene.domain.content())?,
-            uncertainties: scene
-                .value
-                .has_uncertainty()
-                .then(uncertainties)
-                .transpose()?,
-            terrain: scene
-                .terrain
-                .as_ref()
-                .map(|terrain| gpu.storage("terrain", terrain.elevation.cells.content()))
-                .transpose()?,
-            light: None,
-        })
+        let send = |cells: &Cells<f32>, part| gpu.storage("frame", &cells.content()[part]);
+        let domain = gpu.storage("domain", scene.domain.content())?;
+        let held = 0..scene.grid.cell_count();
+        SceneBuffers::of(scene, &held, scene.value.has_uncertainty(), domain, send)
     }
 
     /// The plan that is played.
@@ -98,8 +70,8 @@ impl<'a> Playback<'a> {
 
     /// Weights of the later step in values and in accumulated carbon, from the next frame on.
     pub fn seek(&mut self, value_weight: f32, accumulated_weight: f32) {
-        self.plan.params.value_weight = value_weight;
-        self.plan.params.accumulated_weight = accumulated_weight;
+        self.plan.params.values.weight = value_weight;
+        self.plan.params.values.accumulated_weight = accumulated_weight;
     }
 
     /// Draws an instant; the picture stays on the device. Does not wait, and so does not learn whether its lists outgrew

@@ -176,9 +176,9 @@ impl Renderer {
         let parts = plan.parts();
         let light = match &device {
             // Parts of one picture lie in one light.
-            Some(device) if parts.len() > 1 && plan.params.light_on == LIGHT_OWN => {
+            Some(device) if parts.len() > 1 && plan.params.lighting.mode == LIGHT_OWN => {
                 let light = device.light(&plan, scene)?;
-                plan.params.light_on = LIGHT_GIVEN;
+                plan.params.lighting.mode = LIGHT_GIVEN;
                 Some(light)
             }
             _ => None,

@@ -1,6 +1,9 @@
 //! The macro that declares what Rust and WGSL share, with a table to compare the two by.
 
-/// Declares a plain `#[repr(C)]` struct of 4-byte scalars together with the table of its field names and offsets.
+/// Name, offset and Rust type of every field of a struct.
+pub type Fields = &'static [(&'static str, usize, &'static str)];
+
+/// Declares a plain `#[repr(C)]` struct of 4-byte scalars and vectors of them together with the table of its field names and offsets.
 macro_rules! shared_struct {
     ($(#[$meta:meta])* pub struct $name:ident { $($(#[$field_meta:meta])* pub $field:ident: $kind:ty,)* }) => {
         $(#[$meta])*
@@ -10,7 +13,7 @@ macro_rules! shared_struct {
 
         impl $name {
             /// Name, offset and Rust type of every field.
-            pub const FIELDS: &'static [(&'static str, usize, &'static str)] =
+            pub const FIELDS: crate::shared_struct::Fields =
                 &[$((stringify!($field), std::mem::offset_of!($name, $field), stringify!($kind)),)*];
         }
     };

@@ -4,12 +4,14 @@
 use anyhow::{Context as _, Result, ensure};
 use contract::job::RenderJob;
 use render::frame_context::FrameContext;
-use render::gpu::{Gpu, Slot, Workspace};
-use render::passes::splat::Splats;
+use render::gpu::{Gpu, Slot, Workspace, uniform};
+use render::passes::splat::{self, Splats};
 use render::plan::Plan;
 use render::playback::{Playback, Steps};
-use render::stages::layout::{GROUP, Params};
-use render::{Image, Scene};
+use render::stages::layout::GROUP;
+use render::stages::params::{Params, Uniform};
+use render::stages::{bin, light};
+use render::{Image, Scene, passes, stages};
 use wgpu::util::DeviceExt as _;
 
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
@@ -46,7 +48,7 @@ impl<'a> Classic<'a> {
         let plan = Plan::holding(job, scene, gpu.most_buffer_bytes(), u64::MAX)?;
         let params = plan.params_of(plan.whole());
         ensure!(
-            params.front_to_back == 1 && params.light_on == 1,
+            params.view.front_to_back == 1 && params.lighting.mode == 1,
             "only drawn towards the light"
         );
         let features = gpu.device().features();
@@ -82,11 +84,11 @@ impl<'a> Classic<'a> {
         };
         Ok(Self {
             gpu,
-            splats: Splats::new(gpu),
+            splats: Splats::new(gpu, splat::SOURCE, passes::probes(gpu)),
             workspace: Workspace::default(),
             pipelines: Pipelines::new(gpu.device(), &params),
-            eye: target("eye", params.width, params.height),
-            light: target("light", params.light_width, params.light_height),
+            eye: target("eye", params.view.size_px.x, params.view.size_px.y),
+            light: target("light", params.lighting.size.x, params.lighting.size.y),
             slice_counts: buffer(
                 "slice counts",
                 u64::from(MOST_SLICES) * 4,
@@ -99,7 +101,7 @@ impl<'a> Classic<'a> {
             ),
             order: buffer(
                 "order",
-                u64::from(params.splat_count) * 4,
+                u64::from(params.cells.splat_count) * 4,
                 wgpu::BufferUsages::empty(),
             ),
             plan,
@@ -113,8 +115,8 @@ impl<'a> Classic<'a> {
     )]
     pub fn draw(&mut self, steps: &Steps, weights: (f32, f32)) -> Result<()> {
         (
-            self.plan.params.value_weight,
-            self.plan.params.accumulated_weight,
+            self.plan.params.values.weight,
+            self.plan.params.values.accumulated_weight,
         ) = weights;
         let params = self.plan.params_of(self.plan.whole());
         let mut frame = FrameContext::new(
@@ -126,7 +128,7 @@ impl<'a> Classic<'a> {
         )?;
         self.splats.record(&mut frame)?;
         let (seen, lit) = (frame.room(Slot::Seen, 4)?, frame.room(Slot::Lit, 4)?);
-        let uniform = frame.params_buffer.clone();
+        let params_buffer = frame.params_buffer.clone();
         let encoder = frame.recorder.encoder();
         encoder.clear_buffer(&self.slice_counts, 0, None);
         let device = self.gpu.device();
@@ -136,13 +138,14 @@ impl<'a> Classic<'a> {
         let eye_view = self
             .eye
             .create_view(&wgpu::TextureViewDescriptor::default());
-        let bind = |layout: &wgpu::BindGroupLayout, bindings: &[u32]| {
+        let bind = |layout: &wgpu::BindGroupLayout, uniforms: &[Uniform], bindings: &[u32]| {
+            let structs = uniforms.iter();
+            let structs = structs.map(|&number| uniform(&params_buffer, number.into()));
             let entries: Vec<_> = bindings
                 .iter()
                 .map(|&binding| wgpu::BindGroupEntry {
                     binding,
                     resource: match binding {
-                        0 => uniform.as_entire_binding(),
                         1 => seen.as_entire_binding(),
                         7 => lit.as_entire_binding(),
                         3 => wgpu::BindingResource::TextureView(&light_view),
@@ -151,6 +154,7 @@ impl<'a> Classic<'a> {
                         _ => self.order.as_entire_binding(),
                     },
                 })
+                .chain(structs)
                 .collect();
             device.create_bind_group(&wgpu::BindGroupDescriptor {
                 label: None,
@@ -158,16 +162,16 @@ impl<'a> Classic<'a> {
                 entries: &entries,
             })
         };
-        let groups = params.splat_count.div_ceil(GROUP);
+        let groups = params.cells.splat_count.div_ceil(GROUP);
         let across = groups.min(65_535);
         let lists = [across, groups.div_ceil(across.max(1))];
-        let sort: [(&wgpu::ComputePipeline, &[u32], [u32; 2]); 3] = [
-            (&self.pipelines.count, &[0, 1, 4, 7], lists),
-            (&self.pipelines.start, &[0, 4, 5], [1, 1]),
-            (&self.pipelines.order, &[0, 1, 4, 6, 7], lists),
+        let sort: [(&wgpu::ComputePipeline, Uniform, &[u32], [u32; 2]); 3] = [
+            (&self.pipelines.count, Uniform::Cells, &[1, 4, 7], lists),
+            (&self.pipelines.start, Uniform::View, &[4, 5], [1, 1]),
+            (&self.pipelines.order, Uniform::Cells, &[1, 4, 6, 7], lists),
         ];
-        for (pipeline, bindings, [x, y]) in sort {
-            let group = bind(&pipeline.get_bind_group_layout(0), bindings);
+        for (pipeline, uniform, bindings, [x, y]) in sort {
+            let group = bind(&pipeline.get_bind_group_layout(0), &[uniform], bindings);
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
             pass.set_pipeline(pipeline);
             pass.set_bind_group(0, &group, &[]);
@@ -175,13 +179,15 @@ impl<'a> Classic<'a> {
         }
         let eye_group = bind(
             &self.pipelines.eye.get_bind_group_layout(0),
-            &[0, 1, 2, 3, 7],
+            &[Uniform::View, Uniform::Lighting, Uniform::Lists],
+            &[1, 2, 3, 7],
         );
         let light_group = bind(
             &self.pipelines.light.get_bind_group_layout(0),
-            &[0, 1, 2, 7],
+            &[Uniform::Lighting, Uniform::Lists],
+            &[1, 2, 7],
         );
-        for slice in 0..params.slices {
+        for slice in 0..params.view.slices {
             let sides = [
                 (&eye_view, &self.pipelines.eye, &eye_group),
                 (&light_view, &self.pipelines.light, &light_group),
@@ -288,10 +294,9 @@ impl Pipelines {
     #[expect(clippy::too_many_lines, reason = "descriptors of five pipelines")]
     fn new(device: &wgpu::Device, params: &Params) -> Self {
         // Light depth of a splat from its depth on the screen, at the scale of what lies below the camera.
-        let height =
-            (params.eye_x.powi(2) + params.eye_y.powi(2) + params.eye_z.powi(2)).sqrt() - 1.0;
-        let scale = params.focal_px / height;
-        let gain = params.light_depth_gain / (scale * scale);
+        let height = params.view.eye.length() - 1.0;
+        let scale = params.view.focal_px / height;
+        let gain = params.projection.light_depth_gain / (scale * scale);
         let constants = [
             ("LIGHT_RADIUS_TEXELS", f64::from(LIGHT_RADIUS_TEXELS)),
             ("LIGHT_GAIN", f64::from(gain)),
@@ -300,7 +305,14 @@ impl Pipelines {
             constants: &constants,
             ..Default::default()
         };
-        let source = [render::stages::PRELUDE, include_str!("classic.wgsl")].concat();
+        let source = [
+            stages::PRELUDE,
+            light::TEXEL_FUNCTIONS,
+            bin::FUNCTIONS,
+            passes::CELLS,
+            include_str!("classic.wgsl"),
+        ]
+        .concat();
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some("classic"),
             source: wgpu::ShaderSource::Wgsl(source.into()),

@@ -26,18 +26,18 @@ fn eye_corner(@builtin(vertex_index) vertex: u32, @builtin(instance_index) insta
     let at = order[instance];
     let near = seen[at];
     let far = lit[at];
-    let radius = f32((near.z & 0xffffu) << params.entry_shift) / f32(SUBPIXELS);
+    let radius = f32((near.z & 0xffffu) << lists.entry_shift) / f32(SUBPIXELS);
     let center = vec2(f32(bitcast<i32>(near.x)), f32(bitcast<i32>(near.y))) / f32(SUBPIXELS);
     var shade = 1.0;
-    if (params.light_on == 1u) {
-        let texel = vec2(bitcast<i32>(far.x), bitcast<i32>(far.y)) / params.light_unit;
-        let depth = textureLoad(light, clamp(texel, vec2(0), vec2(i32(params.light_width), i32(params.light_height)) - 1), 0).x;
-        shade = params.ambient + params.direct * exp(-depth) * bitcast<f32>(far.w);
+    if (lighting.mode == 1u) {
+        let texel = vec2(bitcast<i32>(far.x), bitcast<i32>(far.y)) / lighting.unit;
+        let depth = textureLoad(light, clamp(texel, vec2(0), vec2<i32>(lighting.size) - 1), 0).x;
+        shade = lighting.ambient + lighting.direct * exp(-depth) * bitcast<f32>(far.w);
     }
     let rgb = vec3(f32(near.w & 255u), f32((near.w >> 8u) & 255u), f32((near.w >> 16u) & 255u)) / 255.0;
     var corner: Corner;
     corner.offset = corner_of(vertex);
-    corner.position = clip(center + corner.offset * radius, vec2(f32(params.width), f32(params.height)));
+    corner.position = clip(center + corner.offset * radius, vec2<f32>(view.size_px));
     corner.color = vec4(min(rgb * shade, vec3(1.0)), f32(near.z >> 16u) / DEPTH_ONE);
     return corner;
 }
@@ -58,13 +58,13 @@ fn light_corner(@builtin(vertex_index) vertex: u32, @builtin(instance_index) ins
     let at = order[instance];
     let near = seen[at];
     let far = lit[at];
-    let center = vec2(f32(bitcast<i32>(far.x)), f32(bitcast<i32>(far.y))) / f32(params.light_unit);
+    let center = vec2(f32(bitcast<i32>(far.x)), f32(bitcast<i32>(far.y))) / f32(lighting.unit);
     var corner: Corner;
     corner.offset = corner_of(vertex);
     // As wide as a particle is in light texels; the same depth over the same area as the compute renderer gives.
     let radius = LIGHT_RADIUS_TEXELS;
-    corner.position = clip(center + corner.offset * radius, vec2(f32(params.light_width), f32(params.light_height)));
-    let radius_px = f32((near.z & 0xffffu) << params.entry_shift) / f32(SUBPIXELS);
+    corner.position = clip(center + corner.offset * radius, vec2<f32>(lighting.size));
+    let radius_px = f32((near.z & 0xffffu) << lists.entry_shift) / f32(SUBPIXELS);
     let mass = f32(near.z >> 16u) / DEPTH_ONE * radius_px * radius_px * LIGHT_GAIN;
     corner.color = vec4(mass * 3.0 / (3.14159265 * radius * radius));
     return corner;
@@ -97,7 +97,7 @@ fn count_slices(@builtin(global_invocation_id) global: vec3<u32>, @builtin(num_w
     @builtin(local_invocation_index) invocation: u32) {
     clear_own(invocation);
     let at = list_index(global, workgroups);
-    if (at < params.splat_count) {
+    if (at < cells.splat_count) {
         if (seen[at].z != 0u) { atomicAdd(&own[slice_at(at)], 1u); }
     }
     workgroupBarrier();
@@ -111,7 +111,7 @@ fn count_slices(@builtin(global_invocation_id) global: vec3<u32>, @builtin(num_w
 @compute @workgroup_size(1)
 fn start_slices() {
     var first = 0u;
-    for (var slice = 0u; slice < params.slices; slice++) {
+    for (var slice = 0u; slice < view.slices; slice++) {
         let count = atomicLoad(&slice_counts[slice]);
         draws[4u * slice] = 4u;
         draws[4u * slice + 1u] = count;
@@ -128,7 +128,7 @@ fn order_slices(@builtin(global_invocation_id) global: vec3<u32>, @builtin(num_w
     clear_own(invocation);
     let at = list_index(global, workgroups);
     var is_drawn = false;
-    if (at < params.splat_count) { is_drawn = seen[at].z != 0u; }
+    if (at < cells.splat_count) { is_drawn = seen[at].z != 0u; }
     if (is_drawn) { atomicAdd(&own[slice_at(at)], 1u); }
     workgroupBarrier();
     for (var slice = invocation; slice < MOST_SLICES; slice += GROUP) {

@@ -99,7 +99,7 @@ pub fn measure(
         frame_wall_ms: wall_s / frames as f64 * 1e3,
         stages: stage_times,
         entries,
-        fullest_over_mean: fullest_over_mean(&ends, params.slices as usize),
+        fullest_over_mean: fullest_over_mean(&ends, params.view.slices as usize),
         longest_list: ends
             .windows(2)
             .map(|pair| pair[1] - pair[0])

@@ -6,7 +6,8 @@ use std::time::Instant;
 use anyhow::Result;
 use contract::job::RenderJob;
 use render::plan::Plan;
-use render::stages::layout::{Params, Particle, Splat};
+use render::stages::interpolate::params::InterpolateParams;
+use render::stages::layout::{Particle, Splat};
 use render::stages::particles::cpu::{Inputs, generate};
 use render::stages::{interpolate, project};
 use render::{Interval, Scene};
@@ -35,7 +36,7 @@ fn one(plan: &Plan, scene: &Scene, run: usize, cores: usize) {
         .as_ref()
         .map(|interval| between(plan, interval, carbon_weight, cores))
         .unwrap_or_default();
-    let each = plan.params.particles_per_cell as usize;
+    let each = plan.params.cells.particles_per_cell as usize;
     let cells = plan.active.len().div_ceil(cores).max(1);
     let mut splats = vec![Splat::default(); plan.active.len() * each];
     thread::scope(|scope| {
@@ -74,10 +75,10 @@ fn between(plan: &Plan, interval: &Interval, weight: f32, cores: usize) -> Vec<f
         for (between, (before, after)) in parts {
             scope.spawn(move || {
                 // A part is a grid of its own to the twin.
-                let params = Params {
+                let mut params = plan.params;
+                params.interpolation = InterpolateParams {
                     first_cell: 0,
                     end_cell: between.len() as u32,
-                    ..plan.params
                 };
                 interpolate::cpu::interpolate(&params, weight, before, after, between);
             });

@@ -79,7 +79,7 @@ fn between(interval: &Interval, cell: usize) -> Option<f64> {
 
 /// All clouds of a plan.
 pub(super) fn clouds(plan: &Plan, job: &RenderJob, scene: &Scene, space: &Space) -> Vec<Cloud> {
-    let numbers = 0..plan.params.particles_per_cell;
+    let numbers = 0..plan.params.cells.particles_per_cell;
     let cells = plan.active.iter();
     cells
         .flat_map(|cell| numbers.clone().map(move |k| (cell, k)))
@@ -107,8 +107,8 @@ fn cloud(
     let bits = scrambled(scrambled(active.cell) ^ k.wrapping_mul(0x9e37_79b9));
     // Places of one cell are spread evenly by two irrational steps and then jittered.
     let place = |step: u32, bits: u32| {
-        let jittered =
-            (bits >> params.jitter_shift).wrapping_sub(0x8000_0000 >> params.jitter_shift);
+        let jittered = (bits >> params.particles.jitter_shift)
+            .wrapping_sub(0x8000_0000 >> params.particles.jitter_shift);
         share(
             0x8000_0000u32
                 .wrapping_add(k.wrapping_mul(step))
@@ -122,11 +122,12 @@ fn cloud(
         .wrapping_mul(2_654_435_769)
         .wrapping_add(col.wrapping_mul(1_779_033_704))
         .wrapping_add(scrambled(bits ^ 0x85eb_ca6b) >> 3);
-    let phase = (share(first) + f64::from(params.turns_per_kg_m2) * carbon.abs()).fract();
+    let phase = (share(first) + f64::from(params.particles.turns_per_kg_m2) * carbon.abs()).fract();
 
-    let limit_m = f64::from(params.height_limit_m);
-    let column_m = (carbon * f64::from(params.height_m_per_kg_m2)).clamp(-limit_m, limit_m);
-    let height_m = column_m * phase + f64::from(params.sheet_m) * (phase - 0.5);
+    let limit_m = f64::from(params.particles.height_limit_m);
+    let column_m =
+        (carbon * f64::from(params.particles.height_m_per_kg_m2)).clamp(-limit_m, limit_m);
+    let height_m = column_m * phase + f64::from(params.particles.sheet_m) * (phase - 0.5);
     let transfer = &job.style.transfer;
     let strength = if transfer.low < 0.0 && transfer.high > 0.0 {
         value.abs() / transfer.low.abs().max(transfer.high.abs())
@@ -134,13 +135,13 @@ fn cloud(
         (value - transfer.low) / (transfer.high - transfer.low)
     }
     .clamp(0.0, 1.0);
-    let floor = f64::from(params.depth_floor);
+    let floor = f64::from(params.particles.depth_floor);
     let thin = (phase.min(1.0 - phase) * 12.0).min(1.0) * 12.0 / 11.0;
     let table = &plan.rows[row as usize];
     let full_radius = f64::from(table.radius);
     let size = transfer
         .size(value)
-        .unwrap_or_else(|| 1.0 - f64::from(params.size_spread) * (1.0 - strength));
+        .unwrap_or_else(|| 1.0 - f64::from(params.projection.size_spread) * (1.0 - strength));
     let radius = full_radius * size.max(LEAST_SIZE);
     let opacity = transfer
         .opacity(value)

@@ -38,8 +38,8 @@ pub(super) struct Shade {
 impl Shade {
     pub(super) fn of(plan: &Plan) -> Self {
         Self {
-            ambient: f64::from(plan.params.ambient),
-            direct: f64::from(plan.params.direct),
+            ambient: f64::from(plan.params.lighting.ambient),
+            direct: f64::from(plan.params.lighting.direct),
         }
     }
 }

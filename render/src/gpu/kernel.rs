@@ -8,6 +8,8 @@ pub struct Kernel {
     pub(super) pipeline: wgpu::ComputePipeline,
     pub(super) layout: wgpu::BindGroupLayout,
     pub(super) label: &'static str,
+    /// Numbers of the structs of parameters that it reads.
+    pub(super) uniforms: Vec<u32>,
 }
 
 impl Kernel {
@@ -44,7 +46,15 @@ impl Kernel {
             pipeline,
             layout,
             label,
+            uniforms: vec![],
         }
+    }
+
+    /// With the structs of parameters that it reads, which are bound at every dispatch.
+    #[must_use]
+    pub fn reading<U: Copy + Into<u32>>(mut self, uniforms: &[U]) -> Self {
+        self.uniforms = uniforms.iter().map(|&number| number.into()).collect();
+        self
     }
 }
 

@@ -6,11 +6,13 @@ mod memory;
 mod pipelines;
 mod recorder;
 mod stamps;
+mod uniforms;
 mod workspace;
 
 pub use kernel::Kernel;
 pub use recorder::Recorder;
 pub use stamps::{Stamped, Stamps};
+pub use uniforms::{FIRST_UNIFORM, packed, uniform};
 pub use workspace::{Slot, Workspace};
 
 use bytemuck::Pod;

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use bytemuck::Pod;
 
-use super::{Gpu, Kernel, Stamps};
+use super::{Gpu, Kernel, Stamps, uniform};
 use crate::error::RenderError;
 
 /// Most workgroups in one dimension of a dispatch (the least any device allows).
@@ -19,6 +19,8 @@ pub struct Recorder<'a> {
     gpu: &'a Gpu,
     pub(super) encoder: wgpu::CommandEncoder,
     stamps: Option<&'a Stamps>,
+    /// Structs of parameters.
+    uniforms: Option<wgpu::Buffer>,
 }
 
 impl<'a> Recorder<'a> {
@@ -29,7 +31,13 @@ impl<'a> Recorder<'a> {
                 .device
                 .create_command_encoder(&wgpu::CommandEncoderDescriptor::default()),
             stamps: None,
+            uniforms: None,
         }
+    }
+
+    /// Dispatches recorded from here on read their structs of parameters in this buffer.
+    pub fn read_uniforms(&mut self, buffer: wgpu::Buffer) {
+        self.uniforms = Some(buffer);
     }
 
     /// Passes recorded from here on tell when they begin and end.
@@ -67,13 +75,17 @@ impl<'a> Recorder<'a> {
         if groups.contains(&0) {
             return;
         }
-        let entries: Vec<_> = buffers
+        let whole = buffers
             .iter()
             .map(|(binding, buffer)| wgpu::BindGroupEntry {
                 binding: *binding,
                 resource: buffer.as_entire_binding(),
-            })
-            .collect();
+            });
+        let structs = self.uniforms.iter().flat_map(|buffer| {
+            let numbers = kernel.uniforms.iter();
+            numbers.map(move |&number| uniform(buffer, number))
+        });
+        let entries: Vec<_> = whole.chain(structs).collect();
         let bindings = self
             .gpu
             .device

@@ -4,6 +4,7 @@
 //! All keep sums for a workgroup's neighbours in a small table (`tally.wgsl`) and store splats in one order (`order.wgsl`); first
 //! passes store alike (`store.wgsl`).
 
+pub mod cells;
 pub mod scatter;
 pub mod splat;
 mod store;
@@ -11,13 +12,16 @@ pub mod trails;
 
 use crate::gpu::{Gpu, Kernel};
 
+/// Which cells the passes draw, and where they store their splats.
+pub const CELLS: &str = include_str!("order.wgsl");
+
 /// Probes of the table of sums that are shared with neighbours: after so many a key has no slot.
 pub const SHARED_PROBES: u32 = 12;
 /// Nobody shares sums: that pays on GPUs alone.
 pub const NO_PROBES: u32 = 0;
 
-/// A pass that shares sums as it suits the device.
-fn suited(gpu: &Gpu) -> u32 {
+/// What suits the device.
+pub fn probes(gpu: &Gpu) -> u32 {
     if gpu.is_software() {
         NO_PROBES
     } else {

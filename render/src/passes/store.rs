@@ -8,7 +8,7 @@ use crate::stages::sizes::{HALF_BYTES, light_bytes, list_count};
 
 /// What `store.wgsl` binds.
 pub(super) struct Stored {
-    buffers: [(u32, wgpu::Buffer); 8],
+    buffers: [(u32, wgpu::Buffer); 7],
 }
 
 impl Stored {
@@ -18,10 +18,10 @@ impl Stored {
         let rows = frame.upload_of_plan(Slot::Rows, &plan.rows)?;
         let cols = frame.upload_of_plan(Slot::Cols, &plan.cols)?;
         let palette = frame.upload_of_plan(Slot::Palette, &plan.palette)?;
-        let light_on = frame.params.light_on;
+        let light_on = frame.params.lighting.mode;
         // Light alone stores nothing else.
         let is_stored = u64::from(light_on != LIGHT_ALONE);
-        let half_bytes = is_stored * u64::from(frame.params.splat_count) * HALF_BYTES;
+        let half_bytes = is_stored * u64::from(frame.params.cells.splat_count) * HALF_BYTES;
         let seen = frame.room(Slot::Seen, half_bytes)?;
         let lit = frame.room(Slot::Lit, half_bytes)?;
         let light = frame.light()?;
@@ -32,7 +32,6 @@ impl Stored {
         }
         frame.recorder.clear(&counts, count_bytes);
         let buffers = [
-            (0, frame.params_buffer.clone()),
             (1, rows),
             (2, cols),
             (3, palette),

@@ -31,26 +31,26 @@ fn count_list(list: u32) {
 }
 
 fn is_in_cap(row: u32, slot: u32) -> bool {
-    if (params.view == VIEW_TILE) { return true; }
+    if (view.kind == VIEW_TILE) { return true; }
     let lat = rows[row];
     let lon = cols[slot];
     let center = vec3(lat.cos_lat * lon.sin_lon, lat.cos_lat * lon.cos_lon, lat.sin_lat);
-    return dot(center, vec3(params.eye_x, params.eye_y, params.eye_z)) >= params.cap_least;
+    return dot(center, view.eye) >= cells.cap_least;
 }
 
 fn store_nothing(at: u32) {
-    if (params.light_on != LIGHT_ALONE) { seen[at] = vec4(0u); }
+    if (lighting.mode != LIGHT_ALONE) { seen[at] = vec4(0u); }
 }
 
 fn store(at: u32, splat: Splat) {
-    if (params.light_on == LIGHT_ALONE) {
+    if (lighting.mode == LIGHT_ALONE) {
         if (splat.tau > 0.0) { deposit(splat); }
         return;
     }
     let size = size_word(splat);
     seen[at] = vec4(bitcast<u32>(splat.x_sub), bitcast<u32>(splat.y_sub), size, splat.color);
     if (splat.tau <= 0.0) { return; }
-    if (params.light_on == LIGHT_OWN) { deposit(splat); }
+    if (lighting.mode == LIGHT_OWN) { deposit(splat); }
     if (size == 0u) { return; }
     lit[at] = vec4(bitcast<u32>(splat.light_u), bitcast<u32>(splat.light_v),
         bitcast<u32>(splat.slice), bitcast<u32>(splat.day));

@@ -8,7 +8,7 @@ use contract::sun::{Subsolar, Sun};
 use glam::{DVec2, DVec3};
 
 use super::look;
-use crate::stages::layout::Params;
+use crate::stages::params::ViewParams;
 
 /// Vertical opening of the camera (of the shorter side), degrees.
 const OPENING_DEG: f64 = 45.0;
@@ -68,32 +68,12 @@ impl Camera {
     }
 
     /// Sets what the stages need of it.
-    pub(super) fn write(&self, params: &mut Params) {
-        params.focal_px = self.focal_px as f32;
-        write(
-            self.place,
-            [&mut params.eye_x, &mut params.eye_y, &mut params.eye_z],
-        );
-        write(
-            self.east,
-            [
-                &mut params.right_x,
-                &mut params.right_y,
-                &mut params.right_z,
-            ],
-        );
-        write(
-            self.north,
-            [&mut params.up_x, &mut params.up_y, &mut params.up_z],
-        );
-        write(
-            -self.up,
-            [
-                &mut params.forward_x,
-                &mut params.forward_y,
-                &mut params.forward_z,
-            ],
-        );
+    pub(super) fn write(&self, view: &mut ViewParams) {
+        view.focal_px = self.focal_px as f32;
+        view.eye = self.place.as_vec3();
+        view.right = self.east.as_vec3();
+        view.up = self.north.as_vec3();
+        view.forward = (-self.up).as_vec3();
     }
 
     /// Where a place in front of it is seen, pixels east and south of the picture's middle.
@@ -142,12 +122,5 @@ impl Camera {
         let shadow = (heights[1] - heights[0]) / elevation.tan();
         let seen = sine.asin() - corner + margin;
         [seen, seen + 2.0 * margin + shadow].map(|angle| angle.min(horizon).min(PI))
-    }
-}
-
-/// Sets three parameters from a vector.
-pub(super) fn write(vector: DVec3, fields: [&mut f32; 3]) {
-    for (field, value) in fields.into_iter().zip(vector.to_array()) {
-        *field = value as f32;
     }
 }

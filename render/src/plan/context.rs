@@ -6,11 +6,12 @@ use contract::job::{Mode, RenderJob, View};
 use contract::tile::{Tile, mercator_lat_deg};
 use glam::{DVec2, DVec3};
 
-use super::camera::{Camera, local_sun, overhead, write};
+use super::camera::{Camera, local_sun, overhead};
 use super::{Plan, tile};
 use crate::coast::{self, Corner, Mask};
 use crate::scene::Scene;
 use crate::stages::layout::GroundAxis;
+use crate::stages::params::GridParams;
 
 /// Coast lines over what is dark: a plain globe, or nothing.
 const LIGHT_LINE: [f32; 2] = [0.88, 0.6];
@@ -24,12 +25,14 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) {
     if job.style.context.coastlines {
         coast_lines(plan, job);
     }
-    let is_sea_seen = plan.params.surface == 1 && plan.params.sea_per_m > 0.0;
     let params = &mut plan.params;
-    let parts = [params.terrain_on, params.coast_on, params.night_on];
-    params.in_context = u32::from(is_sea_seen || parts.contains(&1));
+    let context = &mut params.context;
+    context.has_water = u32::from(params.particles.sea_per_m > 0.0);
+    let is_sea_seen = context.surface == 1 && context.has_water == 1;
+    let parts = [context.terrain_on, context.coast_on, context.night_on];
+    params.in_context = is_sea_seen || parts.contains(&1);
     if let View::Tile { tile, size_px } = job.view
-        && params.in_context == 1
+        && params.in_context
     {
         plan.ground_axes = ground_axes(scene, tile, size_px);
     }
@@ -40,15 +43,12 @@ fn sun(plan: &mut Plan, job: &RenderJob) {
     let params = &mut plan.params;
     let subsolar = job.style.sun.subsolar;
     let is_map = job.mode == Mode::Map;
-    params.night_on = u32::from(subsolar.is_some() && is_map);
+    params.context.night_on = u32::from(subsolar.is_some() && is_map);
     if let View::Tile { .. } = job.view {
-        params.sun_is_local = u32::from(subsolar.is_none());
-        params.day_on = u32::from(subsolar.is_some() && !is_map);
+        params.view.sun_is_local = u32::from(subsolar.is_none());
+        params.projection.day_on = u32::from(subsolar.is_some() && !is_map);
         let sun = subsolar.map_or_else(|| local_sun(&job.style.sun), overhead);
-        write(
-            sun,
-            [&mut params.sun_x, &mut params.sun_y, &mut params.sun_z],
-        );
+        params.view.sun = sun.as_vec3();
     }
 }
 
@@ -61,18 +61,13 @@ fn sea_and_terrain(plan: &mut Plan, job: &RenderJob, scene: &Scene) {
     if !is_tile && !job.style.globe_surface {
         return;
     }
-    params.surface = 1;
-    params.terrain_on = 1;
-    let grid = &terrain.grid;
-    (params.terrain_rows, params.terrain_cols) = (grid.rows, grid.cols);
-    params.terrain_periodic = u32::from(grid.is_periodic());
-    params.terrain_west_rad = grid.west_deg.to_radians() as f32;
-    params.terrain_north_rad = grid.north_deg.to_radians() as f32;
-    params.terrain_cols_per_rad = (1.0 / grid.dlon_deg.to_radians()) as f32;
-    params.terrain_rows_per_rad = (1.0 / grid.dlat_deg.to_radians()) as f32;
-    params.terrain_slope = (relief.exaggeration / (8.0 * SPHERE_RADIUS_M)) as f32;
+    params.terrain_grid = GridParams::whole(&terrain.grid);
+    let context = &mut params.context;
+    context.surface = 1;
+    context.terrain_on = 1;
+    context.terrain_slope = (relief.exaggeration / (8.0 * SPHERE_RADIUS_M)) as f32;
     let extinction_per_m = job.style.context.sea_extinction_per_m();
-    params.seabed_per_m = (extinction_per_m * relief.exaggeration) as f32;
+    context.seabed_per_m = (extinction_per_m * relief.exaggeration) as f32;
 }
 
 /// Where every pixel column and row of a tile lies: between cell centres of the terrain, and on the earth.
@@ -129,13 +124,13 @@ fn coast_lines(plan: &mut Plan, job: &RenderJob) {
         }
     };
     plan.coast = mask.into_words();
-    let params = &mut plan.params;
-    params.coast_on = 1;
+    let context = &mut plan.params.context;
+    context.coast_on = 1;
     // On a map the lines would vanish below the colours.
-    params.coast_above = u32::from(job.mode == Mode::Map);
-    params.coast_row_words = Mask::row_words(job.view.size_px()[0]);
-    let is_light = job.mode == Mode::Map || params.terrain_on == 1;
-    [params.coast_grey, params.coast_alpha] = if is_light { DARK_LINE } else { LIGHT_LINE };
+    context.coast_above = u32::from(job.mode == Mode::Map);
+    context.coast_row_words = Mask::row_words(job.view.size_px()[0]);
+    let is_light = job.mode == Mode::Map || context.terrain_on == 1;
+    [context.coast_grey, context.coast_alpha] = if is_light { DARK_LINE } else { LIGHT_LINE };
 }
 
 /// Lines in absolute pixels of the tile's level, on both sides of the date line.

@@ -11,6 +11,7 @@ use contract::job::RenderJob;
 use super::look::Look;
 use super::{Plan, cell_px};
 use crate::scene::Scene;
+use crate::stages::flow::params::FlowParams;
 
 /// Dots of a trail.
 pub(super) const TRAIL_DOTS: u32 = 32;
@@ -46,23 +47,21 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) -> f64 {
     let trails = look.particles_per_cell(cell_px, job.style.particles_per_cell);
     let share = (cell_px * cell_px / look.area_px_per_particle / f64::from(trails)).min(1.0);
     let params = &mut plan.params;
-    params.particles_per_cell = trails * TRAIL_DOTS;
+    params.cells.particles_per_cell = trails * TRAIL_DOTS;
     // Nothing times what is too large for a number is still nothing.
-    params.transfer_per_unit = params.transfer_per_unit.min(f32::MAX);
-    params.northward_weight = scene
-        .northward
-        .as_ref()
-        .map_or(0.0, |interval| interval.weight as f32);
-    params.flow_turn = (lives - lives.floor()) as f32;
-    params.flow_cycle = lives.floor().rem_euclid(4_294_967_296.0) as u32;
-    params.flow_share = (share * f64::from(u32::MAX)) as u32;
+    params.values.transfer_per_unit = params.values.transfer_per_unit.min(f32::MAX);
     let lead_steps = (0.5 * life_cells / STEP_CELLS).ceil();
-    params.flow_lead_steps = lead_steps.max(LEAST_LEAD_STEPS) as u32;
-    params.flow_cols_per_m_s = (life_s / SPHERE_RADIUS_M / dlon_rad) as f32;
-    params.flow_rows_per_m_s = (life_s / SPHERE_RADIUS_M / dlat_rad) as f32;
-    params.flow_most_cols = (TAU / dlon_rad) as f32;
-    params.flow_px_per_m_s = (life_cells * cell_px / top_m_s) as f32;
-    params.flow_most_m_s = (MOST_OVER_TOP * top_m_s) as f32;
+    params.flow = FlowParams {
+        turn: (lives - lives.floor()) as f32,
+        cycle: lives.floor().rem_euclid(4_294_967_296.0) as u32,
+        share: (share * f64::from(u32::MAX)) as u32,
+        lead_steps: lead_steps.max(LEAST_LEAD_STEPS) as u32,
+        cols_per_m_s: (life_s / SPHERE_RADIUS_M / dlon_rad) as f32,
+        rows_per_m_s: (life_s / SPHERE_RADIUS_M / dlat_rad) as f32,
+        most_cols: (TAU / dlon_rad) as f32,
+        most_m_s: (MOST_OVER_TOP * top_m_s) as f32,
+        px_per_m_s: (life_cells * cell_px / top_m_s) as f32,
+    };
     // Born in the middle of their lives.
     0.5 * MOST_OVER_TOP * life_rad
 }

@@ -5,14 +5,16 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use contract::earth::SPHERE_RADIUS_M;
 use contract::grid::Grid;
 use contract::job::{Mode, RenderJob, View};
-use glam::DVec3;
+use glam::{DVec3, UVec2};
 
-use super::camera::{Camera, write};
+use super::camera::Camera;
 use super::extent::Extent;
 use super::look::{self, Look};
 use super::{Plan, area_m2, cell_px, entry_shift, flow, height_range_m};
 use crate::scene::Scene;
+use crate::stages::interpolate::params::InterpolateParams;
 use crate::stages::layout::{Col, LIGHT_OFF, Row, VIEW_GLOBE};
+use crate::stages::params::Params;
 
 /// Light texels at most, the side of their square: 64 slices of them are 27 MB.
 const MOST_LIGHT_TEXELS: f64 = 320.0;
@@ -54,18 +56,14 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) {
     let grid = &scene.grid;
     let cell_px = cell_px(&job.view, grid);
     let params = &mut plan.params;
-    params.view = VIEW_GLOBE;
-    params.surface = u32::from(job.style.globe_surface);
-    params.edge_sharpness = cell_px.max(1.0) as f32;
-    params.per_earth_radius_m = (1.0 / SPHERE_RADIUS_M) as f32;
-    params.center_px_x = width_px as f32 / 2.0;
-    params.center_px_y = height_px as f32 / 2.0;
-    camera.write(params);
+    params.view.kind = VIEW_GLOBE;
+    params.context.surface = u32::from(job.style.globe_surface);
+    params.thematic.edge_sharpness = cell_px.max(1.0) as f32;
+    params.projection.per_earth_radius_m = (1.0 / SPHERE_RADIUS_M) as f32;
+    params.view.center_px = UVec2::new(width_px, height_px).as_vec2() / 2.0;
+    camera.write(&mut params.view);
     let sun = camera.sun(job);
-    write(
-        sun,
-        [&mut params.sun_x, &mut params.sun_y, &mut params.sun_z],
-    );
+    params.view.sun = sun.as_vec3();
     if job.mode == Mode::Map {
         let margin = 2.0 * grid.dlat_deg.to_radians();
         let [seen, _] = camera.cap_rad([width_px, height_px], job, [0.0; 2], margin);
@@ -74,12 +72,12 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) {
     }
     let look = Look::of(job.mode);
     let particles = look.particles_per_cell(cell_px, job.style.particles_per_cell);
-    params.particles_per_cell = particles;
+    params.cells.particles_per_cell = particles;
     let radius_px = look.radius_px(cell_px, particles);
     // Particles lifted close to the camera are left out rather than fill the picture.
     let widest_px = NEAREST_OVER_FARTHEST * radius_px + 16.0;
-    params.max_radius_px = widest_px as f32;
-    params.entry_shift = entry_shift(widest_px);
+    params.projection.max_radius_px = widest_px as f32;
+    params.lists.entry_shift = entry_shift(widest_px);
     plan.rows = rows(scene, &look, &camera, particles, job.style.optical_depth);
     let heights = height_range_m(job, scene).map(|height_m| height_m / SPHERE_RADIUS_M);
     let radius = radius_px / camera.focal_px * camera.height;
@@ -113,8 +111,8 @@ fn is_crowded(plan: &Plan, camera: &Camera, cap: &Cap<'_>) -> bool {
             .places()
             .any(|place| is_flat(place.normalize_or_zero()))
     });
-    let first = plan.params.first_row as usize;
-    let rows = &plan.rows[first..first + plan.params.row_count as usize];
+    let first = plan.params.cells.first_row as usize;
+    let rows = &plan.rows[first..first + plan.params.cells.row_count as usize];
     let is_pole_seen = rows
         .iter()
         .any(|row| f64::from(row.cos_lat) < CROWDED_COSINE);
@@ -129,8 +127,10 @@ fn interpolate_rows(plan: &mut Plan, grid: &Grid, camera: &Camera, angle: f64) {
     };
     let first = row(below_deg + angle.to_degrees()).floor() as u32;
     let end = row(below_deg - angle.to_degrees()).ceil() as u32;
-    plan.params.first_cell = first * grid.cols;
-    plan.params.end_cell = end.max(first) * grid.cols;
+    plan.params.interpolation = InterpolateParams {
+        first_cell: first * grid.cols,
+        end_cell: end.max(first) * grid.cols,
+    };
 }
 
 fn rows(scene: &Scene, look: &Look, camera: &Camera, particles: u32, style_depth: f64) -> Vec<Row> {
@@ -184,14 +184,13 @@ fn slice_planes(plan: &mut Plan, job: &RenderJob, up: DVec3, sun: DVec3, cap: &C
             (top, bottom) = (own_top, own_bottom);
         }
     }
-    let params = &mut plan.params;
-    params.front_to_back = u32::from(front_to_back);
-    params.slice_top = top as f32;
-    params.slices_per_unit = (f64::from(job.style.slices) / (top - bottom)) as f32;
-    write(
-        half,
-        [&mut params.half_x, &mut params.half_y, &mut params.half_z],
-    );
+    let Params {
+        view, projection, ..
+    } = &mut plan.params;
+    view.front_to_back = u32::from(front_to_back);
+    projection.half = half.as_vec3();
+    projection.slice_top = top as f32;
+    projection.slices_per_unit = (f64::from(job.style.slices) / (top - bottom)) as f32;
     half
 }
 
@@ -202,8 +201,12 @@ fn light_frame(plan: &mut Plan, camera: &Camera, sun: DVec3, half: DVec3, cap: &
         radius,
         ..
     } = *cap;
-    let params = &mut plan.params;
-    if params.light_on == LIGHT_OFF {
+    let Params {
+        projection,
+        lighting,
+        ..
+    } = &mut plan.params;
+    if lighting.mode == LIGHT_OFF {
         return;
     }
     let across = if sun.cross(half).length() > 1e-6 {
@@ -234,40 +237,29 @@ fn light_frame(plan: &mut Plan, camera: &Camera, sun: DVec3, half: DVec3, cap: &
         None => MOST_LIGHT_TEXELS,
     };
     let texel = (look::TEXEL_PER_RADIUS * radius).max(side / most_texels);
-    params.light_unit = LIGHT_UNIT;
-    [params.light_width, params.light_height] =
-        lengths.map(|length| (length / texel).ceil() as u32 + 2);
-    (params.light_u0, params.light_v0) = (span_u[0] as f32, span_v[0] as f32);
-    params.light_texels_per_unit = (1.0 / texel) as f32;
-    params.light_depth_gain = (look::LIGHT_DEPTH * PI / 3.0 / (texel * texel)) as f32;
+    lighting.unit = LIGHT_UNIT;
+    lighting.size = lengths
+        .map(|length| (length / texel).ceil() as u32 + 2)
+        .into();
+    (projection.light_u, projection.light_v) = (axis_u.as_vec3(), axis_v.as_vec3());
+    (projection.light_u0, projection.light_v0) = (span_u[0] as f32, span_v[0] as f32);
+    projection.light_texels_per_unit = (1.0 / texel) as f32;
+    projection.light_depth_gain = (look::LIGHT_DEPTH * PI / 3.0 / (texel * texel)) as f32;
     // The eye's own place in the light's axes and slices: what is as far from a place as a part of its distance lies
     // that part of the way there.
     let eye = camera.place;
     let to_light = f64::from(LIGHT_UNIT) / texel;
     let per_px = 1.0 / camera.focal_px;
-    params.toward_u = ((eye.dot(axis_u) - f64::from(params.light_u0)) * to_light * per_px) as f32;
-    params.toward_v = ((eye.dot(axis_v) - f64::from(params.light_v0)) * to_light * per_px) as f32;
-    let above_top = f64::from(params.slice_top) - eye.dot(half);
-    params.toward_slice = (above_top * f64::from(params.slices_per_unit) * per_px) as f32;
-    params.toward_pull = per_px as f32;
-    let radius_slices = radius * f64::from(params.slices_per_unit);
-    params.look_power = look::look_power(look::LOOK_POWER_GLOBE, radius_slices);
-    write(
-        axis_u,
-        [
-            &mut params.light_u_x,
-            &mut params.light_u_y,
-            &mut params.light_u_z,
-        ],
+    let above_top = f64::from(projection.slice_top) - eye.dot(half);
+    let toward = DVec3::new(
+        (eye.dot(axis_u) - f64::from(projection.light_u0)) * to_light * per_px,
+        (eye.dot(axis_v) - f64::from(projection.light_v0)) * to_light * per_px,
+        above_top * f64::from(projection.slices_per_unit) * per_px,
     );
-    write(
-        axis_v,
-        [
-            &mut params.light_v_x,
-            &mut params.light_v_y,
-            &mut params.light_v_z,
-        ],
-    );
+    lighting.toward = toward.as_vec3();
+    lighting.toward_pull = per_px as f32;
+    let radius_slices = radius * f64::from(projection.slices_per_unit);
+    lighting.look_power = look::look_power(look::LOOK_POWER_GLOBE, radius_slices);
 }
 
 /// Longitudes on either side of the camera's that a cap of this angle reaches; all of them round a pole.
@@ -300,8 +292,9 @@ fn choose_cells(plan: &mut Plan, scene: &Scene, camera: &Camera, horizon: f64) {
             ..Col::default()
         })
         .collect();
-    plan.params.cap_least = (horizon.cos() * camera.place.length()) as f32;
-    plan.params.slot_count = plan.cols.len() as u32;
+    let cells = &mut plan.params.cells;
+    cells.cap_least = (horizon.cos() * camera.place.length()) as f32;
+    cells.slot_count = plan.cols.len() as u32;
     // Rows with a middle in the cap, one more on either side: the cap itself is tested cell by cell.
     let below = camera.up.z.clamp(-1.0, 1.0).asin();
     let is_near = |row: u32| {
@@ -310,6 +303,6 @@ fn choose_cells(plan: &mut Plan, scene: &Scene, camera: &Camera, horizon: f64) {
     };
     let first = (0..grid.rows).find(|&row| is_near(row));
     let last = (0..grid.rows).rfind(|&row| is_near(row));
-    plan.params.first_row = first.unwrap_or(0);
-    plan.params.row_count = last.map_or(0, |row| row + 1) - plan.params.first_row;
+    cells.first_row = first.unwrap_or(0);
+    cells.row_count = last.map_or(0, |row| row + 1) - cells.first_row;
 }

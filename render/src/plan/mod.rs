@@ -18,14 +18,21 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use contract::earth::Earth;
 use contract::grid::Grid;
 use contract::job::{Mode, RenderJob, View};
-use glam::Vec3;
+use glam::{UVec2, Vec3};
 
 use crate::error::RenderError;
 use crate::scene::{Interval, Scene};
+use crate::stages::bin::params::ListParams;
+use crate::stages::interpolate::params::InterpolateParams;
 use crate::stages::layout::{
     Active, Axis, Col, GroundAxis, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, LIGHT_OFF, LIGHT_OWN,
-    NEVER_LONG, Params, Row, SCREEN_TILE_PX, SQUARE, SUBPIXELS, VIEW_TILE,
+    NEVER_LONG, Row, SCREEN_TILE_PX, SQUARE, SUBPIXELS, VIEW_TILE,
 };
+use crate::stages::light::params::LightParams;
+use crate::stages::map::params::MapParams;
+use crate::stages::params::{GridParams, Params, ValueParams, ViewParams};
+use crate::stages::particles::params::ParticleParams;
+use crate::stages::project::params::ProjectParams;
 use crate::stages::sizes::{HALF_BYTES, workgroups};
 use look::Look;
 
@@ -164,7 +171,7 @@ impl Plan {
 
     /// Cells of a frame that are on the device while this is drawn, whole rows of them.
     pub fn held_cells(&self) -> Range<usize> {
-        self.params.held_first_cell as usize..self.params.held_end_cell as usize
+        self.params.grid.held_first_cell as usize..self.params.grid.held_end_cell as usize
     }
 
     fn choose_band(
@@ -174,11 +181,11 @@ impl Plan {
     ) -> Result<(), RenderError> {
         const CELL_BYTES: u64 = size_of::<f32>() as u64;
         let params = &mut self.params;
-        let (rows, cols) = (params.rows, params.cols);
+        let (rows, cols) = (params.grid.rows, params.grid.cols);
         let shown = if self.mode == Mode::Map {
-            params.first_cell / cols..params.end_cell.div_ceil(cols)
+            params.interpolation.first_cell / cols..params.interpolation.end_cell.div_ceil(cols)
         } else {
-            params.first_row..params.first_row + params.row_count
+            params.cells.first_row..params.cells.first_row + params.cells.row_count
         };
         let row_bytes = u64::from(cols) * CELL_BYTES;
         // What drifts comes from other rows than it is seen in.
@@ -197,27 +204,27 @@ impl Plan {
                 limit: most_buffer_bytes,
             });
         }
-        params.held_first_cell = band.start * cols;
-        params.held_end_cell = band.end * cols;
+        params.grid.held_first_cell = band.start * cols;
+        params.grid.held_end_cell = band.end * cols;
         Ok(())
     }
 
     fn count_particles(&mut self, most_buffer_bytes: u64) -> Result<(), RenderError> {
         let params = &mut self.params;
-        params.particles_each = match self.mode {
+        params.cells.particles_each = match self.mode {
             // All dots of a trail, which lie along one way.
             Mode::Flow => flow::TRAIL_DOTS,
             Mode::Map | Mode::Points | Mode::Sprites | Mode::Volume => {
-                params.particles_per_cell.clamp(1, PARTICLES_EACH)
+                params.cells.particles_per_cell.clamp(1, PARTICLES_EACH)
             }
         };
         let groups: u64 = workgroups(params).into_iter().map(u64::from).product();
-        let count = groups * u64::from(SQUARE * SQUARE * params.particles_each);
+        let count = groups * u64::from(SQUARE * SQUARE * params.cells.particles_each);
         let limit = MOST_PARTICLES.min(most_buffer_bytes / HALF_BYTES);
         if count > limit {
             return Err(RenderError::TooManyParticles { count, limit });
         }
-        params.splat_count = count as u32;
+        params.cells.splat_count = count as u32;
         Ok(())
     }
 
@@ -225,10 +232,10 @@ impl Plan {
     fn list_cells(&mut self, scene: &Scene) {
         let params = &self.params;
         let domain = scene.domain.content();
-        let rows = params.first_row..params.first_row + params.row_count;
+        let rows = params.cells.first_row..params.cells.first_row + params.cells.row_count;
         for row in rows {
             for (slot, col) in (0..).zip(&self.cols) {
-                let cell = row * params.cols + col.index;
+                let cell = row * params.grid.cols + col.index;
                 if domain[cell as usize] != 0 && is_in_cap(params, &self.rows[row as usize], col) {
                     self.active.push(Active { cell, slot });
                 }
@@ -259,23 +266,18 @@ impl Plan {
 
     /// Parameters for drawing one part.
     pub fn params_of(&self, part: Part) -> Params {
-        let [width, height] = part.size_px;
-        let tiles = [width, height].map(|px| px.div_ceil(SCREEN_TILE_PX));
-        let fair_share = self.params.splat_count / (tiles[0] * tiles[1]).max(1);
-        Params {
-            origin_x_px: part.origin_px[0] as i32,
-            origin_y_px: part.origin_px[1] as i32,
-            width,
-            height,
-            tiles_x: tiles[0],
-            tiles_y: tiles[1],
-            long_list: if self.is_crowded {
-                LEAST_LONG_LIST.max(fair_share.saturating_mul(LONG_OVER_FAIR))
-            } else {
-                NEVER_LONG
-            },
-            ..self.params
-        }
+        let mut params = self.params;
+        let tiles = UVec2::from(part.size_px.map(|px| px.div_ceil(SCREEN_TILE_PX)));
+        params.view.size_px = part.size_px.into();
+        params.view.origin_px = UVec2::from(part.origin_px).as_ivec2();
+        params.view.tiles = tiles;
+        let fair_share = params.cells.splat_count / tiles.element_product().max(1);
+        params.lists.long_list = if self.is_crowded {
+            LEAST_LONG_LIST.max(fair_share.saturating_mul(LONG_OVER_FAIR))
+        } else {
+            NEVER_LONG
+        };
+        params
     }
 
     /// Whole picture, pixels.
@@ -306,54 +308,69 @@ fn common(job: &RenderJob, scene: &Scene) -> Params {
     let (style, grid) = (&job.style, &scene.grid);
     let transfer = &style.transfer;
     let look = Look::of(job.mode);
+    let weight = |interval: &Interval| interval.weight as f32;
     Params {
-        rows: grid.rows,
-        cols: grid.cols,
-        periodic: u32::from(grid.is_periodic()),
-        end_cell: grid.cell_count() as u32,
-        value_weight: scene.value.weight as f32,
-        accumulated_weight: scene
-            .accumulated
-            .as_ref()
-            .map_or(0.0, |interval| interval.weight as f32),
-        has_accumulated: u32::from(scene.accumulated.is_some()),
-        transfer_low: transfer.low as f32,
-        transfer_per_unit: (1.0 / (transfer.high - transfer.low)) as f32,
-        strength_per_unit: (1.0 / transfer.low.abs().max(transfer.high.abs())) as f32,
-        diverging: u32::from(shape::is_diverging(transfer)),
-        depth_floor: shape::depth_floor(transfer),
-        height_m_per_kg_m2: style.height_m_per_kg_m2 as f32,
-        height_limit_m: look::HEIGHT_LIMIT_M as f32,
-        sheet_m: look::SHEET_M as f32,
-        turns_per_kg_m2: look::TURNS_PER_KG_M2,
-        optical_depth: style.optical_depth as f32,
-        kernel: match job.mode {
-            Mode::Points | Mode::Flow => KERNEL_DOT,
-            Mode::Sprites => KERNEL_BALL,
-            Mode::Volume | Mode::Map => KERNEL_CLOUD,
+        view: ViewParams {
+            slices: style.slices,
+            front_to_back: 1,
+            ..ViewParams::default()
         },
-        front_to_back: 1,
-        slices: style.slices,
-        size_spread: shape::size_spread(transfer, &look),
-        jitter_shift: look.jitter_shift,
-        min_radius_px: look.min_radius_px,
-        max_radius_px: look::MAX_RADIUS_PX,
-        light_on: if job.mode == Mode::Volume {
-            LIGHT_OWN
-        } else {
-            LIGHT_OFF
+        grid: GridParams::whole(grid),
+        values: ValueParams {
+            weight: weight(&scene.value),
+            accumulated_weight: scene.accumulated.as_ref().map_or(0.0, weight),
+            northward_weight: scene.northward.as_ref().map_or(0.0, weight),
+            has_accumulated: u32::from(scene.accumulated.is_some()),
+            transfer_low: transfer.low as f32,
+            transfer_per_unit: (1.0 / (transfer.high - transfer.low)) as f32,
+            has_shape: u32::from(shape::is_given(transfer)),
+            has_uncertainty: u32::from(style.uncertainty && scene.value.has_uncertainty()),
         },
-        shape_table: u32::from(shape::is_given(transfer)),
-        uncertainty: u32::from(style.uncertainty && scene.value.has_uncertainty()),
-        ambient: look::AMBIENT,
-        direct: look::DIRECT,
-        map_alpha: look::MAP_ALPHA,
-        sea_per_m: style.context.sea_extinction_per_m() as f32,
-        grid_west_rad: grid.west_deg.to_radians() as f32,
-        grid_north_rad: grid.north_deg.to_radians() as f32,
-        cols_per_rad: (1.0 / grid.dlon_deg.to_radians()) as f32,
-        rows_per_rad: (1.0 / grid.dlat_deg.to_radians()) as f32,
-        lon_span_rad: grid.dlon_deg.to_radians() as f32,
+        particles: ParticleParams {
+            jitter_shift: look.jitter_shift,
+            diverging: u32::from(shape::is_diverging(transfer)),
+            strength_per_unit: (1.0 / transfer.low.abs().max(transfer.high.abs())) as f32,
+            depth_floor: shape::depth_floor(transfer),
+            optical_depth: style.optical_depth as f32,
+            height_m_per_kg_m2: style.height_m_per_kg_m2 as f32,
+            height_limit_m: look::HEIGHT_LIMIT_M as f32,
+            sheet_m: look::SHEET_M as f32,
+            turns_per_kg_m2: look::TURNS_PER_KG_M2,
+            sea_per_m: style.context.sea_extinction_per_m() as f32,
+        },
+        projection: ProjectParams {
+            size_spread: shape::size_spread(transfer, &look),
+            min_radius_px: look.min_radius_px,
+            max_radius_px: look::MAX_RADIUS_PX,
+            lon_span_rad: grid.dlon_deg.to_radians() as f32,
+            ..ProjectParams::default()
+        },
+        lighting: LightParams {
+            mode: if job.mode == Mode::Volume {
+                LIGHT_OWN
+            } else {
+                LIGHT_OFF
+            },
+            ambient: look::AMBIENT,
+            direct: look::DIRECT,
+            ..LightParams::default()
+        },
+        lists: ListParams {
+            kernel: match job.mode {
+                Mode::Points | Mode::Flow => KERNEL_DOT,
+                Mode::Sprites => KERNEL_BALL,
+                Mode::Volume | Mode::Map => KERNEL_CLOUD,
+            },
+            ..ListParams::default()
+        },
+        interpolation: InterpolateParams {
+            first_cell: 0,
+            end_cell: grid.cell_count() as u32,
+        },
+        thematic: MapParams {
+            alpha: look::MAP_ALPHA,
+            ..MapParams::default()
+        },
         ..Params::default()
     }
 }
@@ -395,8 +412,7 @@ fn is_in_cap(params: &Params, row: &Row, col: &Col) -> bool {
         row.cos_lat * col.cos_lon,
         row.sin_lat,
     );
-    params.view == VIEW_TILE
-        || center.dot(Vec3::new(params.eye_x, params.eye_y, params.eye_z)) >= params.cap_least
+    params.view.kind == VIEW_TILE || center.dot(params.view.eye) >= params.cells.cap_least
 }
 
 /// Area of the cells of every row, m².

@@ -7,11 +7,14 @@ use std::ops::Range;
 use contract::earth::WGS84_EQUATORIAL_RADIUS_M;
 use contract::job::{Mode, RenderJob};
 use contract::tile::{MAX_LAT_DEG, Tile, mercator_lat_deg, mercator_x, mercator_y};
+use glam::DVec2;
 
 use super::look::{self, Look};
 use super::{Plan, area_m2, cell_px, entry_shift, flow, height_range_m};
 use crate::scene::Scene;
+use crate::stages::interpolate::params::InterpolateParams;
 use crate::stages::layout::{Axis, Col, LIGHT_OFF, LOOK, Row, SUBPIXELS, VIEW_TILE};
+use crate::stages::params::Params;
 
 /// Smallest light texel, pixels: finer than the screen is of no use.
 const LEAST_TEXEL_PX: f64 = 1.5;
@@ -45,7 +48,7 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene, (tile, size_
         size_px: f64::from(size_px),
         px_per_m: world_px / (TAU * WGS84_EQUATORIAL_RADIUS_M),
     };
-    plan.params.view = VIEW_TILE;
+    plan.params.view.kind = VIEW_TILE;
     if job.mode == Mode::Map {
         map_axes(plan, scene, &level);
         return;
@@ -55,7 +58,7 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene, (tile, size_
     let col_px = grid.dlon_deg / 360.0 * world_px;
     let cell_px = cell_px(&job.view, grid);
     let particles = look.particles_per_cell(cell_px, job.style.particles_per_cell);
-    plan.params.particles_per_cell = particles;
+    plan.params.cells.particles_per_cell = particles;
     plan.rows = rows(
         scene,
         &level,
@@ -68,14 +71,19 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene, (tile, size_
     let highest_px = heights_m[1].max(-heights_m[0]) * level.px_per_m;
     let flattened = (look::MOST_LIFT_PX / highest_px).min(1.0);
     let heights_m = heights_m.map(|height_m| height_m * flattened);
-    plan.params.height_m_per_kg_m2 *= flattened as f32;
-    plan.params.height_limit_m *= flattened as f32;
+    let Params {
+        particles: own,
+        projection,
+        ..
+    } = &mut plan.params;
+    own.height_m_per_kg_m2 *= flattened as f32;
+    own.height_limit_m *= flattened as f32;
     // What lies as deep as before is drawn less deep.
-    plan.params.sea_per_m /= flattened as f32;
-    plan.params.sheet_m *= flattened as f32;
-    plan.params.height_px_per_m = (look::OBLIQUE * level.px_per_m) as f32;
-    plan.params.slice_top = heights_m[1] as f32;
-    plan.params.slices_per_unit =
+    own.sea_per_m /= flattened as f32;
+    own.sheet_m *= flattened as f32;
+    projection.height_px_per_m = (look::OBLIQUE * level.px_per_m) as f32;
+    projection.slice_top = heights_m[1] as f32;
+    projection.slices_per_unit =
         (f64::from(job.style.slices) / (heights_m[1] - heights_m[0])) as f32;
     let spans = light_and_reach(
         plan,
@@ -202,7 +210,7 @@ fn light_and_reach(
     let per_m = level.px_per_m * subpixels;
     let edge = level.size_px * subpixels;
     let margin = widest * subpixels;
-    plan.params.entry_shift = entry_shift(widest);
+    plan.params.lists.entry_shift = entry_shift(widest);
     let shift = |span: Span, per_m: f64| -> Span {
         let moves = heights_m.map(|h| h * per_m);
         [
@@ -215,7 +223,7 @@ fn light_and_reach(
         [-margin, edge + margin],
         shift([-margin, edge + margin], look::OBLIQUE * per_m),
     ];
-    if plan.params.light_on == LIGHT_OFF {
+    if plan.params.lighting.mode == LIGHT_OFF {
         return seen;
     }
     let Shadows {
@@ -238,19 +246,23 @@ fn light_and_reach(
         texels[axis] = (((absolute + lit[1]) / unit).floor() - first) as u32 + 3;
         reach[axis] = shift(lit, -shadow_per_m[axis]);
     }
-    let params = &mut plan.params;
-    params.light_unit = unit as i32;
-    [params.light_origin_x, params.light_origin_y] = origin;
-    [params.light_width, params.light_height] = texels;
-    [params.light_shift_x_per_m, params.light_shift_y_per_m] =
-        shadow_per_m.map(|shift| shift as f32);
-    let radius_slices = radius_px / level.px_per_m * f64::from(params.slices_per_unit);
-    params.look_power = look::look_power(look::LOOK_POWER_TILE, radius_slices);
-    params.toward_u = toward_eye[0] as f32;
-    params.toward_v = toward_eye[1] as f32;
-    params.toward_slice = (-f64::from(params.slices_per_unit) / level.px_per_m) as f32;
+    let Params {
+        projection,
+        lighting,
+        ..
+    } = &mut plan.params;
+    lighting.unit = unit as i32;
+    lighting.size = texels.into();
+    projection.light_origin = origin.into();
+    projection.light_shift_per_m = DVec2::from(shadow_per_m).as_vec2();
+    let slices_per_unit = f64::from(projection.slices_per_unit);
+    let radius_slices = radius_px / level.px_per_m * slices_per_unit;
+    lighting.look_power = look::look_power(look::LOOK_POWER_TILE, radius_slices);
+    let toward_slice = -slices_per_unit / level.px_per_m;
+    lighting.toward = DVec2::from(toward_eye).extend(toward_slice).as_vec3();
     let texel_px = unit / subpixels;
-    params.light_depth_gain = (look::LIGHT_DEPTH * PI / 3.0 / (texel_px * texel_px) / sine) as f32;
+    projection.light_depth_gain =
+        (look::LIGHT_DEPTH * PI / 3.0 / (texel_px * texel_px) / sine) as f32;
     reach
 }
 
@@ -286,20 +298,24 @@ fn choose_cells(plan: &mut Plan, scene: &Scene, level: &Level, spans: [Span; 2])
     let chosen: Vec<u32> = (0..grid.rows)
         .filter(|&row| near(&plan.rows[row as usize]))
         .collect();
-    plan.params.first_row = chosen.first().copied().unwrap_or(0);
-    plan.params.row_count = chosen.last().map_or(0, |row| row + 1) - plan.params.first_row;
-    plan.params.slot_count = plan.cols.len() as u32;
+    let cells = &mut plan.params.cells;
+    cells.first_row = chosen.first().copied().unwrap_or(0);
+    cells.row_count = chosen.last().map_or(0, |row| row + 1) - cells.first_row;
+    cells.slot_count = plan.cols.len() as u32;
 }
 
 fn interpolate_rows(plan: &mut Plan, rows: Range<u32>) {
-    plan.params.first_cell = rows.start * plan.params.cols;
-    plan.params.end_cell = rows.end * plan.params.cols;
+    let cols = plan.params.grid.cols;
+    plan.params.interpolation = InterpolateParams {
+        first_cell: rows.start * cols,
+        end_cell: rows.end * cols,
+    };
 }
 
 /// Where every pixel column and row of a thematic map falls on the grid.
 fn map_axes(plan: &mut Plan, scene: &Scene, level: &Level) {
     let grid = &scene.grid;
-    plan.params.edge_sharpness = (grid.dlon_deg / 360.0 * level.world_px).max(1.0) as f32;
+    plan.params.thematic.edge_sharpness = (grid.dlon_deg / 360.0 * level.world_px).max(1.0) as f32;
     let axis = |place: f64| Axis {
         index: place.floor() as i32,
         fraction: (place - place.floor()) as f32,

@@ -1,4 +1,5 @@
-//! The stages of a frame, a folder each: `mod.rs` records the shader, `<stage>.wgsl` is the shader, `cpu.rs` its twin.
+//! The stages of a frame, a folder each: `mod.rs` records the shader, `<stage>.wgsl` is the shader, `cpu.rs` its twin,
+//! `params.rs` what it reads of the parameters of a picture.
 //!
 //! Stages that see one particle at a time are functions; [`passes`](crate::passes) run them.
 
@@ -6,6 +7,7 @@
 pub const PRELUDE: &str = include_str!("prelude.wgsl");
 
 pub mod layout;
+pub mod params;
 pub mod sizes;
 pub mod sphere;
 pub mod uncertainty;

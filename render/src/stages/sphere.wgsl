@@ -20,16 +20,15 @@ struct Ground { on_ground: bool, lon: f32, lat: f32, normal: vec3<f32>, rim_px: 
 
 // Where the sight line of a pixel's centre meets the sea surface; `rim_px` is how far inside the globe's outline it runs.
 fn ground_below(pixel: vec2<u32>) -> Ground {
-    let x = (f32(i32(pixel.x) + params.origin_x_px) + 0.5 - params.center_px_x) / params.focal_px;
-    let y = (params.center_px_y - f32(i32(pixel.y) + params.origin_y_px) - 0.5) / params.focal_px;
-    let camera = vec3(params.eye_x, params.eye_y, params.eye_z);
-    let sight = normalize(vec3(params.forward_x, params.forward_y, params.forward_z)
-        + vec3(params.right_x, params.right_y, params.right_z) * x + vec3(params.up_x, params.up_y, params.up_z) * y);
+    let x = (f32(i32(pixel.x) + view.origin_px.x) + 0.5 - view.center_px.x) / view.focal_px;
+    let y = (view.center_px.y - f32(i32(pixel.y) + view.origin_px.y) - 0.5) / view.focal_px;
+    let camera = view.eye;
+    let sight = normalize(view.forward + view.right * x + view.up * y);
     let nearest_at = -dot(camera, sight);
     let foot = camera + sight * nearest_at;
     let miss_sq = dot(foot, foot);
     var ground: Ground;
-    ground.rim_px = (1.0 - sqrt(miss_sq)) * params.focal_px / max(nearest_at, 1.0e-6);
+    ground.rim_px = (1.0 - sqrt(miss_sq)) * view.focal_px / max(nearest_at, 1.0e-6);
     ground.on_ground = miss_sq < 1.0 && nearest_at > 0.0;
     if (!ground.on_ground) { return ground; }
     ground.normal = camera + sight * (nearest_at - sqrt(1.0 - miss_sq));

@@ -3,7 +3,8 @@
 use glam::Vec3;
 
 use crate::scene::Interval;
-use crate::stages::layout::{Params, Particle, nearest};
+use crate::stages::layout::{Particle, nearest};
+use crate::stages::params::Params;
 
 /// The functions of the shader; the passes over particles and the map run them.
 pub const FUNCTIONS: &str = include_str!("uncertainty.wgsl");
@@ -18,7 +19,7 @@ const HATCH_INK: f32 = 0.75;
 
 /// Uncertainty of every cell at the instant, 0 where it was measured; empty where uncertainty is not drawn.
 pub fn between(params: &Params, interval: &Interval) -> Vec<f32> {
-    if params.uncertainty == 0 {
+    if params.values.has_uncertainty == 0 {
         return vec![];
     }
     let (before, after) = (
@@ -27,7 +28,7 @@ pub fn between(params: &Params, interval: &Interval) -> Vec<f32> {
     );
     let pairs = before.content().iter().zip(after.content());
     pairs
-        .map(|(before, after)| before + (after - before) * params.value_weight)
+        .map(|(before, after)| before + (after - before) * params.values.weight)
         .collect()
 }
 
@@ -48,7 +49,7 @@ pub fn uncertain(particle: Particle, uncertainty: f32) -> Particle {
 }
 
 fn line_at(params: &Params, pixel: [u32; 2]) -> f32 {
-    let origin = (params.origin_x_px + params.origin_y_px) as u32;
+    let origin = (params.view.origin_px.x + params.view.origin_px.y) as u32;
     let along = pixel[0] + pixel[1] + origin;
     (1.0 - 0.5 * ((along % HATCH_PX) as f32 - 2.0).abs()).max(0.0)
 }

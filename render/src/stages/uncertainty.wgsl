@@ -12,9 +12,9 @@ const HATCH_PX = 8u;
 const HATCH_INK = 0.75;
 
 fn uncertainty_of(cell: u32) -> f32 {
-    if (params.uncertainty == 0u) { return 0.0; }
+    if (values.has_uncertainty == 0u) { return 0.0; }
     let before = uncertainty_before[cell];
-    return before + (uncertainty_after[cell] - before) * params.value_weight;
+    return before + (uncertainty_after[cell] - before) * values.weight;
 }
 
 fn paler(channel: u32, uncertainty: f32) -> u32 {
@@ -34,7 +34,7 @@ fn uncertain(particle: Particle, uncertainty: f32) -> Particle {
 
 // Share of a pixel that a line of the hatching covers: diagonals that go on in the next tile and part.
 fn line_at(pixel: vec2<u32>) -> f32 {
-    let along = pixel.x + pixel.y + u32(params.origin_x_px + params.origin_y_px);
+    let along = pixel.x + pixel.y + u32(view.origin_px.x + view.origin_px.y);
     return max(1.0 - 0.5 * abs(f32(along % HATCH_PX) - 2.0), 0.0);
 }
 

@@ -4,11 +4,12 @@ use std::ops::Range;
 
 use contract::grid::Grid;
 use contract::job::{Mode, RenderJob};
+use render::Scene;
 use render::frame::Stages;
 use render::frame_context::SceneBuffers;
 use render::gpu::{Gpu, Workspace};
 use render::plan::Plan;
-use render::{Interval, Scene};
+use render::scene::Cells;
 
 use crate::device::gpu;
 use crate::scenes::{globe, job, ocean, tile};
@@ -23,23 +24,10 @@ const TALL: Grid = Grid {
 };
 
 fn held(gpu: &Gpu, scene: &Scene, cells: Range<usize>) -> SceneBuffers {
-    let pair = |interval: &Interval| {
-        [&interval.before, &interval.after].map(|frame| {
-            gpu.storage("frame", &frame.cells.content()[cells.clone()])
-                .unwrap()
-        })
-    };
-    SceneBuffers {
-        value: pair(&scene.value),
-        accumulated: scene.accumulated.as_ref().map(pair),
-        uncertainties: None,
-        terrain: None,
-        light: None,
-        northward: None,
-        domain: gpu
-            .storage("domain", &scene.domain.content()[cells.clone()])
-            .unwrap(),
-    }
+    let send = |cells: &Cells<f32>, part| gpu.storage("frame", &cells.content()[part]);
+    let domain = &scene.domain.content()[cells.clone()];
+    let domain = gpu.storage("domain", domain).unwrap();
+    SceneBuffers::of(scene, &cells, false, domain, send).unwrap()
 }
 
 fn drawn(gpu: &Gpu, stages: &Stages, plan: &Plan, buffers: &SceneBuffers) -> Vec<u8> {

@@ -9,7 +9,8 @@ use contract::sun::Subsolar;
 use glam::Vec3;
 use render::scene::{Frame, Terrain};
 use render::stages::compose::terrain::tint;
-use render::stages::layout::{Params, WATER_BLUE, WATER_GREEN, WATER_RED};
+use render::stages::layout::{WATER_BLUE, WATER_GREEN, WATER_RED};
+use render::stages::params::Params;
 use render::stages::particles::cpu::through_water;
 use render::{Image, Scene};
 
@@ -255,10 +256,8 @@ fn the_sea_floor_is_seen_through_as_much_water_as_lies_above_it() {
 
 #[test]
 fn what_sinks_takes_the_colour_of_the_sea_by_its_depth() {
-    let params = Params {
-        sea_per_m: std::f32::consts::LN_2 / 100_000.0,
-        ..Params::default()
-    };
+    let mut params = Params::default();
+    params.particles.sea_per_m = std::f32::consts::LN_2 / 100_000.0;
     let white = 0x7fff_ffff;
     let water = [WATER_RED, WATER_GREEN, WATER_BLUE].map(|share| share * 255.0);
     for (depth_m, kept) in [(0.0, 1.0), (100_000.0, 0.5), (200_000.0, 0.25), (1e7, 0.0)] {

@@ -9,7 +9,8 @@ use glam::{DVec3, Vec2};
 use render::plan::Plan;
 use render::stages::flow::cpu::{self, Field, Inputs, Trail};
 use render::stages::interpolate::cpu::interpolate;
-use render::stages::layout::{Params, Particle, Splat, Velocity};
+use render::stages::layout::{Particle, Splat, Velocity};
+use render::stages::params::Params;
 use render::stages::project;
 use render::{Image, RenderError, Renderer, Scene};
 use render_proof::currents::{self, Vector, gyres};
@@ -43,14 +44,14 @@ impl Dots {
             );
             between
         };
-        let east = between(&scene.value, params.value_weight);
+        let east = between(&scene.value, params.values.weight);
         let northward = scene.northward.as_ref().unwrap();
-        let north = between(northward, params.northward_weight);
+        let north = between(northward, params.values.northward_weight);
         let mut dots = Self {
             velocity: cpu::velocities(&east, &north),
             particles: vec![
                 Particle::default();
-                plan.active.len() * params.particles_per_cell as usize
+                plan.active.len() * params.cells.particles_per_cell as usize
             ],
             grid: scene.grid,
             plan,
@@ -88,7 +89,7 @@ impl Dots {
 
     /// The foremost dot of every trail.
     fn heads(&self) -> impl Iterator<Item = &Particle> {
-        let each = self.params.particles_each as usize;
+        let each = self.params.cells.particles_each as usize;
         self.particles.iter().skip(each - 1).step_by(each)
     }
 
@@ -190,7 +191,7 @@ fn a_whole_turn_brings_a_particle_back_to_where_it_was() {
     let scene = currents::scene(ONE_DEGREE, field, field);
     let dots = Dots::of(&scene, &currents::job(VIEW(), 0.0));
     // The other way round: m/s and columns a life.
-    let life_s = f64::from(dots.params.flow_rows_per_m_s)
+    let life_s = f64::from(dots.params.flow.rows_per_m_s)
         * SPHERE_RADIUS_M
         * ONE_DEGREE.dlat_deg.to_radians();
     let start = Trail {
@@ -392,8 +393,13 @@ fn a_globe_from_near_has_room_for_the_cells_in_sight_alone_and_shows_them_all() 
         let in_cap = |row: u32, col: u32| {
             let place = ONE_DEGREE.cell_center(row, col);
             let [x, y, z] = on_sphere([place.lon, place.lat]).to_array();
-            let eye = [near.params.eye_y, near.params.eye_x, near.params.eye_z].map(f64::from);
-            x * eye[0] + y * eye[1] + z * eye[2] > f64::from(near.params.cap_least) + 1e-6
+            let eye = [
+                near.params.view.eye.y,
+                near.params.view.eye.x,
+                near.params.view.eye.z,
+            ]
+            .map(f64::from);
+            x * eye[0] + y * eye[1] + z * eye[2] > f64::from(near.params.cells.cap_least) + 1e-6
         };
         let listed = |col: u32| near.cols.iter().any(|own| own.index == col);
         let mut seen = 0;

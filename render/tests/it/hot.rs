@@ -4,8 +4,9 @@ use contract::grid::Grid;
 use contract::job::{Mode, RenderJob};
 use render::frame_context::{FrameContext, SceneBuffers};
 use render::gpu::{Gpu, Slot, Workspace};
-use render::passes::scatter::Scatter;
-use render::passes::splat::Splats;
+use render::passes;
+use render::passes::scatter::{self, Scatter};
+use render::passes::splat::{self, Splats};
 use render::plan::Plan;
 use render::playback::Playback;
 use render::stages::bin::{self, Bin};
@@ -70,19 +71,23 @@ fn draw(
 ) -> Drawn {
     let mut workspace = Workspace::default();
     let mut params = plan.params_of(plan.whole());
-    params.entry_capacity = params.splat_count * 8;
-    params.long_list = long_list;
+    params.lists.entry_capacity = params.cells.splat_count * 8;
+    params.lists.long_list = long_list;
     let mut frame = FrameContext::new(gpu, &mut workspace, plan, params, scene.clone()).unwrap();
-    let entry_bytes = u64::from(params.entry_capacity) * size_of::<Entry>() as u64;
+    let entry_bytes = u64::from(params.lists.entry_capacity) * size_of::<Entry>() as u64;
     frame.room(Slot::Entries, entry_bytes).unwrap();
     let part_bytes = u64::from(1 + MOST_HOT_PARTS) * 4;
     frame.room(Slot::HotParts, part_bytes).unwrap();
-    Splats::new(gpu).record(&mut frame).unwrap();
-    if params.light_on == 1 {
+    Splats::new(gpu, splat::SOURCE, passes::probes(gpu))
+        .record(&mut frame)
+        .unwrap();
+    if params.lighting.mode == 1 {
         Light::new(gpu).record(&mut frame).unwrap();
     }
     Bin::new(gpu, sources[0]).record(&mut frame).unwrap();
-    Scatter::new(gpu).record(&mut frame).unwrap();
+    Scatter::new(gpu, scatter::SOURCE, passes::probes(gpu))
+        .record(&mut frame)
+        .unwrap();
     let eye = Eye::of(gpu, sources[1], entry);
     eye.record(&mut frame).unwrap();
     let [image, counts, parts] =
@@ -152,7 +157,7 @@ fn only_views_of_poles_and_limbs_look_for_long_lists() {
     let is_crowded = |view| {
         let plan = Plan::for_device(&job(Mode::Volume, view), &scene, u64::MAX).unwrap();
         assert_eq!(
-            plan.params_of(plan.whole()).long_list == NEVER_LONG,
+            plan.params_of(plan.whole()).lists.long_list == NEVER_LONG,
             !plan.is_crowded
         );
         plan.is_crowded

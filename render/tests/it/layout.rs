@@ -1,17 +1,19 @@
 //! The structs and constants of Rust and WGSL, compared through naga.
 
+use std::collections::BTreeSet;
+
+use render::gpu::FIRST_UNIFORM;
 use render::passes::{scatter, splat, trails};
 use render::stages::fill::level::{FillLevel, MOST_REACH_COLS};
 use render::stages::fill::{self, exact, window};
 use render::stages::layout::{
     Axis, Col, DEPTH_ONE, Entry, GROUP, GroundAxis, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT,
-    LIGHT_ALONE, LIGHT_GIVEN, LIGHT_OFF, LIGHT_OWN, MISSING, MOST_HOT_PARTS, NO_LIST, PART_ENTRIES,
-    Params, Particle, Row, SCREEN_TILE_PX, SCREEN_TILE_SHIFT, SQUARE, SUBPIXELS, Splat, VIEW_GLOBE,
-    VIEW_TILE, Velocity, WATER_BLUE, WATER_GREEN, WATER_RED,
+    LIGHT_ALONE, LIGHT_GIVEN, LIGHT_OFF, LIGHT_OWN, LOOK, MISSING, MOST_HOT_PARTS, NO_LIST,
+    PART_ENTRIES, Particle, Row, SCREEN_TILE_PX, SCREEN_TILE_SHIFT, SQUARE, SUBPIXELS, Splat,
+    VIEW_GLOBE, VIEW_TILE, Velocity, WATER_BLUE, WATER_GREEN, WATER_RED,
 };
+use render::stages::params::{Fields, Params};
 use render::stages::{bin, compose, eye, flow, interpolate, light, map};
-
-type Fields = &'static [(&'static str, usize, &'static str)];
 
 fn module(source: &str) -> naga::Module {
     naga::front::wgsl::parse_str(source).unwrap()
@@ -34,15 +36,22 @@ fn difference(source: &str, name: &str, fields: Fields, size: usize) -> Option<S
     else {
         return Some(format!("no struct {name}"));
     };
-    let scalar = |kind: &str| match kind {
-        "u32" => naga::Scalar::U32,
-        "i32" => naga::Scalar::I32,
-        _ => naga::Scalar::F32,
+    let (u32, i32, f32) = (naga::Scalar::U32, naga::Scalar::I32, naga::Scalar::F32);
+    let vector = |size, scalar| naga::TypeInner::Vector { size, scalar };
+    let inner = |kind: &str| match kind {
+        "u32" => naga::TypeInner::Scalar(u32),
+        "i32" => naga::TypeInner::Scalar(i32),
+        "f32" => naga::TypeInner::Scalar(f32),
+        "UVec2" => vector(naga::VectorSize::Bi, u32),
+        "IVec2" => vector(naga::VectorSize::Bi, i32),
+        "Vec2" => vector(naga::VectorSize::Bi, f32),
+        "Vec3" => vector(naga::VectorSize::Tri, f32),
+        other => panic!("{other} in {name}"),
     };
     let same = |member: &naga::StructMember, (name, offset, kind): &(&str, usize, &str)| {
         member.name.as_deref() == Some(name)
             && member.offset as usize == *offset
-            && module.types[member.ty].inner == naga::TypeInner::Scalar(scalar(kind))
+            && module.types[member.ty].inner == inner(kind)
     };
     let wrong = members
         .iter()
@@ -51,7 +60,13 @@ fn difference(source: &str, name: &str, fields: Fields, size: usize) -> Option<S
     if let Some((member, field)) = wrong {
         return Some(format!("{name}: {member:?} against {field:?}"));
     }
-    let complete = members.len() == fields.len() && *span as usize == size;
+    // Vectors of three align to four.
+    let align = if fields.iter().any(|(_, _, kind)| *kind == "Vec3") {
+        16
+    } else {
+        4
+    };
+    let complete = members.len() == fields.len() && *span as usize == size.next_multiple_of(align);
     (!complete).then(|| {
         format!(
             "{name}: {} fields, {span} bytes against {}, {size}",
@@ -61,8 +76,23 @@ fn difference(source: &str, name: &str, fields: Fields, size: usize) -> Option<S
     })
 }
 
-const SHARED: [(&str, Fields, usize); 9] = [
-    ("Params", Params::FIELDS, size_of::<Params>()),
+/// The shaders of pictures.
+const SOURCES: [&str; 10] = [
+    interpolate::SOURCE,
+    splat::SOURCE,
+    flow::SOURCE,
+    trails::SOURCE,
+    light::SOURCE,
+    bin::SOURCE,
+    scatter::SOURCE,
+    eye::SOURCE,
+    map::SOURCE,
+    compose::SOURCE,
+];
+/// Those of gap filling.
+const FILLS: [&str; 3] = [fill::STENCIL_SOURCE, window::SOURCE, exact::SOURCE];
+
+const TABLES: [(&str, Fields, usize); 8] = [
     ("Row", Row::FIELDS, size_of::<Row>()),
     ("Col", Col::FIELDS, size_of::<Col>()),
     ("Particle", Particle::FIELDS, size_of::<Particle>()),
@@ -75,11 +105,10 @@ const SHARED: [(&str, Fields, usize); 9] = [
 
 #[test]
 fn structs_have_the_same_fields_in_rust_and_wgsl() {
-    for (name, fields, size) in SHARED {
+    for (name, fields, size) in TABLES {
         assert_eq!(difference(eye::SOURCE, name, fields, size), None);
     }
-    let fills = [fill::STENCIL_SOURCE, window::SOURCE, exact::SOURCE];
-    for source in fills {
+    for source in FILLS {
         let size = size_of::<FillLevel>();
         assert_eq!(
             difference(source, "FillLevel", FillLevel::FIELDS, size),
@@ -88,18 +117,67 @@ fn structs_have_the_same_fields_in_rust_and_wgsl() {
     }
 }
 
+/// The structs of parameters that a shader declares, each with what differs from the picture's, if anything does.
+fn params(source: &str) -> Vec<(String, Option<String>)> {
+    let module = module(source);
+    let uniforms = module.global_variables.iter().map(|(_, global)| global);
+    let uniforms = uniforms.filter(|global| global.space == naga::AddressSpace::Uniform);
+    let compared = uniforms.map(|global| {
+        let name = global.name.clone().unwrap();
+        let mut known = (FIRST_UNIFORM..).zip(Params::STRUCTS);
+        let Some((binding, (_, kind, fields, size))) = known.find(|(_, known)| known.0 == name)
+        else {
+            return (name, Some("not known".to_owned()));
+        };
+        let place = global.binding.as_ref().map(|at| (at.group, at.binding));
+        let is_there = place == Some((0, binding));
+        let is_of_kind = module.types[global.ty].name.as_deref() == Some(kind);
+        let difference = if is_there && is_of_kind {
+            difference(source, kind, fields, *size)
+        } else {
+            Some(format!("{place:?} is not {kind} at {binding}"))
+        };
+        (name, difference)
+    });
+    compared.collect()
+}
+
 #[test]
-fn a_swapped_or_missing_field_is_seen() {
+fn parameters_have_the_same_fields_and_bindings_in_rust_and_wgsl() {
+    let compared: Vec<_> = SOURCES.into_iter().flat_map(params).collect();
+    for (name, difference) in &compared {
+        assert_eq!(*difference, None, "{name}");
+    }
+    let names: BTreeSet<_> = compared.into_iter().map(|(name, _)| name).collect();
+    assert_eq!(names.len(), Params::STRUCTS.len(), "{names:?}");
+}
+
+#[test]
+fn a_swapped_missing_or_misplaced_field_is_seen() {
     for (right, wrong) in [
         ("rows: u32, cols: u32", "cols: u32, rows: u32"),
         ("rows: u32, ", ""),
         ("rows: u32", "rows: f32"),
+        (
+            "eye: vec3<f32>, focal_px: f32",
+            "focal_px: f32, eye: vec3<f32>",
+        ),
+        ("center_px: vec2<f32>", "center_px: vec2<i32>"),
+        (
+            "@binding(17) var<uniform> grid",
+            "@binding(18) var<uniform> grid",
+        ),
+        (
+            "var<uniform> values: ValueParams",
+            "var<uniform> values: GridParams",
+        ),
     ] {
         // A shader that does not read the field.
         let source = light::SOURCE.replacen(right, wrong, 1);
         assert_ne!(source, light::SOURCE);
+        let mut compared = params(&source).into_iter();
         assert!(
-            difference(&source, "Params", Params::FIELDS, size_of::<Params>()).is_some(),
+            compared.any(|(_, difference)| difference.is_some()),
             "{wrong}"
         );
     }
@@ -154,6 +232,8 @@ fn constants_have_the_same_value_in_rust_and_wgsl() {
             wgsl(name)
         );
     }
+    let look = constant(scatter::SOURCE, "LOOK");
+    assert!((look - f64::from(LOOK)).abs() < 1e-7);
     let width = constant(fill::STENCIL_SOURCE, "WIDTH");
     let segment = constant(fill::STENCIL_SOURCE, "SEGMENT");
     assert_eq!(segment as u32, width as u32 + 2 * MOST_REACH_COLS);
@@ -162,22 +242,7 @@ fn constants_have_the_same_value_in_rust_and_wgsl() {
 
 #[test]
 fn every_shader_is_valid_without_extensions() {
-    let sources = [
-        interpolate::SOURCE,
-        splat::SOURCE,
-        flow::SOURCE,
-        trails::SOURCE,
-        fill::STENCIL_SOURCE,
-        window::SOURCE,
-        exact::SOURCE,
-        light::SOURCE,
-        bin::SOURCE,
-        scatter::SOURCE,
-        eye::SOURCE,
-        map::SOURCE,
-        compose::SOURCE,
-    ];
-    for source in sources {
+    for source in SOURCES.into_iter().chain(FILLS) {
         let mut validator = naga::valid::Validator::new(
             naga::valid::ValidationFlags::all(),
             naga::valid::Capabilities::empty(),

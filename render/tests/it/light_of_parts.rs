@@ -71,9 +71,9 @@ fn light_that_is_not_the_pictures_is_seen() {
         .shared_light(gpu, &mut Workspace::default(), &plan, &buffers)
         .unwrap();
     let dark = gpu.room("no light", light.size()).unwrap();
-    plan.params.light_on = render::stages::layout::LIGHT_GIVEN;
+    plan.params.lighting.mode = render::stages::layout::LIGHT_GIVEN;
     assert!(draw(&plan, Some(&light)) == own);
     assert!(draw(&plan, Some(&dark)) != own, "no shadows at all");
-    plan.params.light_origin_x += plan.params.light_unit;
+    plan.params.projection.light_origin.x += plan.params.lighting.unit;
     assert!(draw(&plan, Some(&light)) != own, "a texel off");
 }

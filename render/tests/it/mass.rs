@@ -4,7 +4,8 @@ use contract::earth::Earth;
 use contract::job::Mode;
 use render::plan::Plan;
 use render::stages::interpolate::cpu::interpolated;
-use render::stages::layout::{DEPTH_ONE, Params, Particle, Splat, is_missing};
+use render::stages::layout::{DEPTH_ONE, Particle, Splat, is_missing};
+use render::stages::params::Params;
 use render::stages::sizes::texel_count;
 use render::stages::{light, particles, project};
 use render::{Interval, Scene};
@@ -34,7 +35,7 @@ fn drawn(view: contract::job::View, scene: &Scene) -> Drawn {
     let plan = Plan::new(&job(Mode::Volume, view), scene, u64::MAX).unwrap();
     let params = plan.params_of(plan.parts()[0]);
     let (value, carbon) = (at(&scene.value), at(scene.accumulated.as_ref().unwrap()));
-    let count = plan.active.len() * params.particles_per_cell as usize;
+    let count = plan.active.len() * params.cells.particles_per_cell as usize;
     let mut particles = vec![Particle::default(); count];
     let inputs = particles::cpu::Inputs {
         active: &plan.active,
@@ -116,7 +117,7 @@ fn the_light_buffer_holds_the_depth_of_every_particle_to_the_last_integer() {
     // The layer behind the last slice holds twice everything.
     let total = held(&all);
     light::cpu::prefix(&drawn.params, &mut all);
-    let layer = (drawn.params.light_width * drawn.params.light_height) as usize;
-    let last = &all[drawn.params.slices as usize * layer..];
+    let layer = (drawn.params.lighting.size.x * drawn.params.lighting.size.y) as usize;
+    let last = &all[drawn.params.view.slices as usize * layer..];
     assert_eq!(held(&last[..layer]), 2 * total);
 }

@@ -126,9 +126,18 @@ fn past_the_edge_of_a_region_slices_and_light_move_without_jumps() {
     for step in 0..400 {
         let (here, there) = (plan(step), plan(step + 1));
         for (a, b) in [
-            (here.slices_per_unit, there.slices_per_unit),
-            (here.light_texels_per_unit, there.light_texels_per_unit),
-            (1.0 + here.look_power, 1.0 + there.look_power),
+            (
+                here.projection.slices_per_unit,
+                there.projection.slices_per_unit,
+            ),
+            (
+                here.projection.light_texels_per_unit,
+                there.projection.light_texels_per_unit,
+            ),
+            (
+                1.0 + here.lighting.look_power,
+                1.0 + there.lighting.look_power,
+            ),
         ] {
             assert!((a / b - 1.0).abs() < 0.004, "step {step}: {a}, {b}");
         }

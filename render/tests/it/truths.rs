@@ -3,15 +3,17 @@
 use std::sync::Arc;
 
 use contract::job::{Mode, RenderJob};
-use glam::Vec4;
+use glam::{UVec2, Vec3, Vec4};
 use render::plan::Plan;
 use render::pyramid::coarser;
 use render::scene::{Frame, Interval, Scene};
 use render::stages::interpolate::cpu::interpolated;
 use render::stages::layout::{
-    Active, Col, DEPTH_ONE, Entry, MISSING, Params, Particle, Row, SCREEN_TILE_PX, SUBPIXELS,
+    Active, Col, DEPTH_ONE, Entry, KERNEL_CLOUD, MISSING, Particle, Row, SCREEN_TILE_PX, SUBPIXELS,
     Splat, VIEW_GLOBE, is_missing,
 };
+use render::stages::light::params::LightParams;
+use render::stages::params::{Params, ViewParams};
 use render::stages::particles::cpu::{Inputs, envelope, generate};
 use render::stages::sizes::{list_count, texel_count};
 use render::stages::{bin, eye, light, project};
@@ -29,19 +31,22 @@ fn a_quarter_of_the_way_from_two_to_six_is_three() {
 #[test]
 fn a_place_on_the_globe_is_seen_where_equation_4_puts_it() {
     // The camera stands two radii from the centre above 0 N 0 E and looks along -Y; 100 pixels of focal length.
-    let params = Params {
-        view: VIEW_GLOBE,
-        focal_px: 100.0,
-        eye_y: 2.0,
-        right_x: 1.0,
-        up_z: 1.0,
-        forward_y: -1.0,
-        slices: 64,
-        light_unit: 256,
-        max_radius_px: 1e4,
-        per_earth_radius_m: 1.0 / 6_371_000.0,
+    let mut params = Params {
+        view: ViewParams {
+            kind: VIEW_GLOBE,
+            focal_px: 100.0,
+            eye: Vec3::Y * 2.0,
+            right: Vec3::X,
+            up: Vec3::Z,
+            forward: -Vec3::Y,
+            slices: 64,
+            ..ViewParams::default()
+        },
         ..Params::default()
     };
+    params.lighting.unit = 256;
+    params.projection.max_radius_px = 1e4;
+    params.projection.per_earth_radius_m = 1.0 / 6_371_000.0;
     let (lon, lat, height_m) = (20f64.to_radians(), -35f64.to_radians(), 500_000.0);
     let row = Row {
         sin_lat: lat.sin() as f32,
@@ -96,7 +101,7 @@ fn all_particles(scene: &Scene, job: &RenderJob, carbon: &[f32]) -> (Plan, Vec<P
         .filter(|&cell| domain[cell as usize] != 0)
         .map(|cell| Active { cell, slot: 0 })
         .collect();
-    plan.params.particles_per_cell = 7;
+    plan.params.cells.particles_per_cell = 7;
     let mut particles = vec![Particle::default(); plan.active.len() * 7];
     let value: Vec<f32> = scene.value.before.cells.content().to_vec();
     let inputs = Inputs {
@@ -199,14 +204,14 @@ fn the_envelope_of_a_column_has_mean_one() {
 #[test]
 fn a_uniform_slab_dims_light_as_exp_of_minus_its_depth() {
     let (slices, depth) = (16, 2.0f32);
-    let params = Params {
-        slices,
-        light_width: 6,
-        light_height: 6,
-        light_unit: 16,
+    let mut params = Params::default();
+    params.view.slices = slices;
+    params.lighting = LightParams {
+        size: UVec2::splat(6),
+        unit: 16,
         ambient: 0.0,
         direct: 1.0,
-        ..Params::default()
+        ..LightParams::default()
     };
     let per_slice = depth / slices as f32;
     let splat = |x: i32, y: i32, slice: f32| Splat {
@@ -245,31 +250,31 @@ fn a_uniform_slab_dims_light_as_exp_of_minus_its_depth() {
     }
 }
 
+/// A picture of clouds, this many pixels a side, slices blended away from the eye.
+fn clouds(side_px: u32) -> Params {
+    let mut params = Params::default();
+    params.view.size_px = UVec2::splat(side_px);
+    params.view.slices = 4;
+    params.view.front_to_back = 1;
+    params.lists.kernel = KERNEL_CLOUD;
+    params
+}
+
 /// Binned and seen by the eye.
 fn seen(params: &mut Params, splats: &[Splat]) -> Vec<Vec4> {
-    (params.tiles_x, params.tiles_y) = (
-        params.width.div_ceil(SCREEN_TILE_PX),
-        params.height.div_ceil(SCREEN_TILE_PX),
-    );
+    params.view.tiles = (params.view.size_px + SCREEN_TILE_PX - 1) / SCREEN_TILE_PX;
     let mut ends = vec![0; list_count(params) as usize];
     bin::cpu::count(params, splats, &mut ends);
     let mut entries = vec![Entry::default(); bin::cpu::scan(&mut ends) as usize];
     bin::cpu::scatter(params, splats, &mut ends, &mut entries);
-    let mut picture = vec![Vec4::ZERO; (params.width * params.height) as usize];
+    let mut picture = vec![Vec4::ZERO; params.view.size_px.element_product() as usize];
     eye::cpu::eye(params, &ends, &entries, &mut picture);
     picture
 }
 
 #[test]
 fn one_cloud_is_an_analytic_disc() {
-    let mut params = Params {
-        width: 40,
-        height: 40,
-        slices: 4,
-        kernel: render::stages::layout::KERNEL_CLOUD,
-        front_to_back: 1,
-        ..Params::default()
-    };
+    let mut params = clouds(40);
     let splat = Splat {
         x_sub: 19 * 16,
         y_sub: 21 * 16 + 8,
@@ -298,14 +303,7 @@ fn one_cloud_is_an_analytic_disc() {
 
 #[test]
 fn the_order_of_slices_matters_and_the_order_within_one_does_not() {
-    let mut params = Params {
-        width: 8,
-        height: 8,
-        slices: 4,
-        kernel: render::stages::layout::KERNEL_CLOUD,
-        front_to_back: 1,
-        ..Params::default()
-    };
+    let mut params = clouds(8);
     let splat = |slice: f32, color: u32| Splat {
         x_sub: 64,
         y_sub: 64,
@@ -322,7 +320,7 @@ fn the_order_of_slices_matters_and_the_order_within_one_does_not() {
         red_first.x > 3.0 * red_first.z,
         "the first slice hides the second: {red_first}"
     );
-    params.front_to_back = 0;
+    params.view.front_to_back = 0;
     let red_last = center(&mut params, &[splat(0.5, red), splat(2.5, blue)]);
     assert!(red_last.z > 3.0 * red_last.x && (red_last.w - red_first.w).abs() < 1e-6);
     let mixed = center(&mut params, &[splat(1.2, red), splat(1.7, blue)]);

@@ -4,6 +4,7 @@ use crate::error::RenderError;
 use crate::frame_context::FrameContext;
 use crate::gpu::{Gpu, Kernel, Slot};
 use crate::stages::layout::Entry;
+use crate::stages::params::Uniform::{Cells, Lighting, Lists, View};
 use crate::stages::sizes::workgroups;
 
 /// The shader.
@@ -11,6 +12,7 @@ pub const SOURCE: &str = concat!(
     include_str!("../../stages/prelude.wgsl"),
     include_str!("../../stages/light/texel.wgsl"),
     include_str!("../../stages/light/shade.wgsl"),
+    include_str!("../../stages/bin/lists.wgsl"),
     include_str!("../../stages/bin/reach.wgsl"),
     include_str!("../tally.wgsl"),
     include_str!("../order.wgsl"),
@@ -23,15 +25,11 @@ pub struct Scatter {
 }
 
 impl Scatter {
-    /// Compiles the shader as it suits the device.
-    pub fn new(gpu: &Gpu) -> Self {
-        Self::of(gpu, SOURCE, super::suited(gpu))
-    }
-
     /// Compiles `source`, [`SOURCE`] but for tests, with a table of sums of so many probes.
-    pub fn of(gpu: &Gpu, source: &str, probes: u32) -> Self {
+    pub fn new(gpu: &Gpu, source: &str, probes: u32) -> Self {
         Self {
-            scatter: super::compiled(gpu, "scatter", source, probes),
+            scatter: super::compiled(gpu, "scatter", source, probes)
+                .reading(&[View, Cells, Lighting, Lists]),
         }
     }
 
@@ -41,10 +39,9 @@ impl Scatter {
         let lit = frame.room(Slot::Lit, 4)?;
         let light = frame.light()?;
         let counts = frame.room(Slot::Counts, 4)?;
-        let entry_bytes = u64::from(frame.params.entry_capacity) * size_of::<Entry>() as u64;
+        let entry_bytes = u64::from(frame.params.lists.entry_capacity) * size_of::<Entry>() as u64;
         let entries = frame.room(Slot::Entries, entry_bytes)?;
         let buffers = [
-            (0, &frame.params_buffer),
             (1, &seen),
             (2, &light),
             (3, &counts),

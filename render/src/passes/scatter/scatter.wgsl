@@ -35,8 +35,8 @@ fn scatter_own(at: u32) {
     let reach = reach_of(place, near.z);
     if (any(reach.low > reach.high)) { return; }
     var color = near.w;
-    if (params.light_on != LIGHT_OFF) {
-        let radius_px = f32((near.z & 0xffffu) << params.entry_shift) / f32(SUBPIXELS);
+    if (lighting.mode != LIGHT_OFF) {
+        let radius_px = f32((near.z & 0xffffu) << lists.entry_shift) / f32(SUBPIXELS);
         color = shaded(color, vec2(bitcast<i32>(far.x), bitcast<i32>(far.y)), slice, bitcast<f32>(far.w), radius_px);
     }
     color = (color & 0xffffffu) | (u32(slice) << 24u);
@@ -44,8 +44,8 @@ fn scatter_own(at: u32) {
         for (var x = reach.low.x; x <= reach.high.x; x++) {
             let to = next_place(list_of(x, y, u32(slice)));
             let corner = vec2(x, y) << vec2(SCREEN_TILE_SHIFT);
-            let from_corner = vec2<u32>((place - corner) >> vec2(params.entry_shift));
-            if (to < params.entry_capacity) {
+            let from_corner = vec2<u32>((place - corner) >> vec2(lists.entry_shift));
+            if (to < lists.entry_capacity) {
                 entries[to] = Entry((from_corner.x & 0xffffu) | (from_corner.y << 16u), near.z, color);
             }
         }
@@ -58,12 +58,12 @@ fn scatter(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups)
     clear_table(invocation);
     workgroupBarrier();
     let first = first_splat(workgroup, workgroups) + invocation;
-    for (var j = 0u; j < params.particles_each; j++) { count_own(first + j * SQUARE * SQUARE); }
+    for (var j = 0u; j < cells.particles_each; j++) { count_own(first + j * SQUARE * SQUARE); }
     workgroupBarrier();
     for (var slot = invocation; slot < TABLE; slot += SQUARE * SQUARE) {
         let tag = atomicLoad(&tags[slot]);
         if (tag != 0u) { atomicStore(&sums[slot], atomicAdd(&counts[tag - 1u], atomicLoad(&sums[slot]))); }
     }
     workgroupBarrier();
-    for (var j = 0u; j < params.particles_each; j++) { scatter_own(first + j * SQUARE * SQUARE); }
+    for (var j = 0u; j < cells.particles_each; j++) { scatter_own(first + j * SQUARE * SQUARE); }
 }

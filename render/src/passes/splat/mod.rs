@@ -10,6 +10,9 @@ use crate::frame_context::FrameContext;
 use crate::gpu::{Gpu, Kernel};
 use crate::passes::store::Stored;
 use crate::stages::layout::{DEPTH_ONE, SUBPIXELS, Splat};
+use crate::stages::params::Uniform::{
+    Cells, Grid, Lighting, Lists, Particles, Projection, Values, View,
+};
 use crate::stages::sizes::workgroups;
 
 /// The shader.
@@ -21,6 +24,7 @@ pub const SOURCE: &str = concat!(
     include_str!("../../stages/project/project.wgsl"),
     include_str!("../../stages/light/texel.wgsl"),
     include_str!("../../stages/light/deposit.wgsl"),
+    include_str!("../../stages/bin/lists.wgsl"),
     include_str!("../../stages/bin/reach.wgsl"),
     include_str!("../tally.wgsl"),
     include_str!("../order.wgsl"),
@@ -50,30 +54,25 @@ pub fn unpacked(seen: [u32; 4], lit: [u32; 4], entry_shift: u32) -> Splat {
 }
 
 impl Splats {
-    /// Compiles the shader as it suits the device.
-    pub fn new(gpu: &Gpu) -> Self {
-        Self::of(gpu, SOURCE, super::suited(gpu))
-    }
-
     /// Compiles `source`, [`SOURCE`] but for tests, with a table of sums of so many probes.
-    pub fn of(gpu: &Gpu, source: &str, probes: u32) -> Self {
+    pub fn new(gpu: &Gpu, source: &str, probes: u32) -> Self {
         Self {
-            splat: super::compiled(gpu, "splat", source, probes),
+            splat: super::compiled(gpu, "splat", source, probes).reading(&[
+                View, Grid, Values, Cells, Particles, Projection, Lighting, Lists,
+            ]),
         }
     }
 
     /// Fills the slots of splats, of light and of list lengths.
     pub fn record(&self, frame: &mut FrameContext<'_>) -> Result<(), RenderError> {
         let stored = Stored::room(frame)?;
-        let [before, after] = &frame.value_frames;
+        let scene = &frame.scene;
+        let [before, after] = &scene.value;
         // Bound but never read where nothing is accumulated.
-        let [carbon_before, carbon_after] = frame
-            .accumulated_frames
-            .as_ref()
-            .unwrap_or(&frame.value_frames);
+        let [carbon_before, carbon_after] = scene.accumulated.as_ref().unwrap_or(&scene.value);
         // Bound but never read where uncertainty is not drawn.
         let [uncertainty_before, uncertainty_after] =
-            frame.uncertainties.as_ref().unwrap_or(&frame.value_frames);
+            scene.uncertainties.as_ref().unwrap_or(&scene.value);
         let buffers = stored.with([
             (4, before),
             (5, after),

@@ -11,8 +11,8 @@
 
 // Carbon of a cell, counted from the first held; what is missing has accumulated nothing.
 fn carbon_of(cell: u32) -> f32 {
-    if (params.has_accumulated == 0u) { return 0.0; }
-    let carbon = interpolated(carbon_before[cell], carbon_after[cell], params.accumulated_weight);
+    if (values.has_accumulated == 0u) { return 0.0; }
+    let carbon = interpolated(carbon_before[cell], carbon_after[cell], values.accumulated_weight);
     if (is_missing(carbon)) { return 0.0; }
     return carbon;
 }
@@ -24,13 +24,13 @@ fn splat(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) w
     workgroupBarrier();
     let down = workgroup.y * SQUARE + local.y;
     let slot = workgroup.x * SQUARE + local.x;
-    let row = params.first_row + down;
+    let row = cells.first_row + down;
     var value = MISSING;
     var carbon = 0.0;
     var uncertainty = 0.0;
-    if (down < params.row_count && slot < params.slot_count) {
-        let cell = row * params.cols + cols[slot].index - params.held_first_cell;
-        value = interpolated(value_before[cell], value_after[cell], params.value_weight);
+    if (down < cells.row_count && slot < cells.slot_count) {
+        let cell = row * grid.cols + cols[slot].index - grid.held_first_cell;
+        value = interpolated(value_before[cell], value_after[cell], values.weight);
         if (!is_missing(value)) {
             carbon = carbon_of(cell);
             uncertainty = uncertainty_of(cell);
@@ -38,10 +38,10 @@ fn splat(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) w
         }
     }
     let first = first_splat(workgroup, workgroups) + invocation;
-    for (var j = 0u; j < params.particles_each; j++) {
-        let k = workgroup.z * params.particles_each + j;
+    for (var j = 0u; j < cells.particles_each; j++) {
+        let k = workgroup.z * cells.particles_each + j;
         let at = first + j * SQUARE * SQUARE;
-        if (is_missing(value) || k >= params.particles_per_cell) {
+        if (is_missing(value) || k >= cells.particles_per_cell) {
             store_nothing(at);
         } else {
             var particle = particle_of(row, slot, k, value, carbon);

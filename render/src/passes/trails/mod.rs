@@ -7,6 +7,9 @@ use crate::error::RenderError;
 use crate::frame_context::FrameContext;
 use crate::gpu::{Gpu, Kernel, Slot};
 use crate::passes::store::Stored;
+use crate::stages::params::Uniform::{
+    Cells, Flow, Grid, Lighting, Lists, Particles, Projection, Values, View,
+};
 use crate::stages::sizes::workgroups;
 
 /// The shader.
@@ -16,6 +19,7 @@ pub const SOURCE: &str = concat!(
     include_str!("../../stages/project/project.wgsl"),
     include_str!("../../stages/light/texel.wgsl"),
     include_str!("../../stages/light/deposit.wgsl"),
+    include_str!("../../stages/bin/lists.wgsl"),
     include_str!("../../stages/bin/reach.wgsl"),
     include_str!("../tally.wgsl"),
     include_str!("../order.wgsl"),
@@ -30,15 +34,12 @@ pub struct Trails {
 }
 
 impl Trails {
-    /// Compiles the shader as it suits the device.
-    pub fn new(gpu: &Gpu) -> Self {
-        Self::of(gpu, SOURCE, super::suited(gpu))
-    }
-
     /// Compiles `source`, [`SOURCE`] but for tests, with a table of sums of so many probes.
-    pub fn of(gpu: &Gpu, source: &str, probes: u32) -> Self {
+    pub fn new(gpu: &Gpu, source: &str, probes: u32) -> Self {
         Self {
-            trails: super::compiled(gpu, "trails", source, probes),
+            trails: super::compiled(gpu, "trails", source, probes).reading(&[
+                View, Grid, Values, Cells, Particles, Flow, Projection, Lighting, Lists,
+            ]),
         }
     }
 

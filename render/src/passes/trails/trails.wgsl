@@ -9,12 +9,12 @@ fn trails(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) 
     workgroupBarrier();
     let down = workgroup.y * SQUARE + local.y;
     let slot = workgroup.x * SQUARE + local.x;
-    let row = params.first_row + down;
+    let row = cells.first_row + down;
     var trail: Trail;
-    if (down < params.row_count && slot < params.slot_count && is_in_cap(row, slot)) { trail = trail_of(row, slot, workgroup.z); }
+    if (down < cells.row_count && slot < cells.slot_count && is_in_cap(row, slot)) { trail = trail_of(row, slot, workgroup.z); }
     let share = dot_share(trail.age);
     let first = first_splat(workgroup, workgroups) + invocation;
-    for (var number = 0u; number < params.particles_each; number++) {
+    for (var number = 0u; number < cells.particles_each; number++) {
         let at = first + number * SQUARE * SQUARE;
         if (trail.open <= 0.0) {
             store_nothing(at);

@@ -39,7 +39,7 @@ fn scan_blocks(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgro
     @builtin(local_invocation_index) invocation: u32) {
     let block = workgroup.x + workgroup.y * workgroups.x;
     let base = (block * GROUP + invocation) * PER_INVOCATION;
-    let length = params.tiles_x * params.tiles_y * params.slices;
+    let length = view.tiles.x * view.tiles.y * view.slices;
     var before: array<u32, PER_INVOCATION>;
     var sum = 0u;
     for (var j = 0u; j < PER_INVOCATION; j++) {
@@ -47,7 +47,7 @@ fn scan_blocks(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgro
         if (base + j < length) {
             let own = counts[base + j];
             sum += own;
-            if (own > params.long_list) { cut(base + j, own); }
+            if (own > lists.long_list) { cut(base + j, own); }
         }
     }
     let start = scan_workgroup(invocation, sum);
@@ -66,7 +66,7 @@ fn scan_add(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups
     for (var before = invocation; before < block; before += GROUP) { own += block_sums[before]; }
     scan_workgroup(invocation, own);
     let start = partial[GROUP - 1u];
-    let length = params.tiles_x * params.tiles_y * params.slices;
+    let length = view.tiles.x * view.tiles.y * view.slices;
     for (var j = 0u; j < PER_INVOCATION; j++) {
         let at = (block * PER_INVOCATION + j) * GROUP + invocation;
         if (at < length) { counts[at] += start; }

@@ -4,19 +4,25 @@
 //! lengths become starts. Lists that are long beyond the others are cut into parts for the eye.
 
 pub mod cpu;
+pub mod params;
 
 use crate::error::RenderError;
 use crate::frame_context::FrameContext;
 use crate::gpu::{Gpu, Kernel, Slot};
 use crate::stages::eye;
 use crate::stages::layout::{NEVER_LONG, SCAN_BLOCK};
+use crate::stages::params::Uniform::{Lists, View};
 use crate::stages::sizes::list_count;
 
 /// The functions that tell the lists of a splat.
-pub const FUNCTIONS: &str = include_str!("reach.wgsl");
+pub const FUNCTIONS: &str = concat!(include_str!("lists.wgsl"), include_str!("reach.wgsl"));
 
 /// The shader.
-pub const SOURCE: &str = concat!(include_str!("../prelude.wgsl"), include_str!("bin.wgsl"));
+pub const SOURCE: &str = concat!(
+    include_str!("../prelude.wgsl"),
+    include_str!("lists.wgsl"),
+    include_str!("bin.wgsl")
+);
 
 /// The compiled stage.
 pub struct Bin {
@@ -31,8 +37,8 @@ impl Bin {
     pub fn new(gpu: &Gpu, source: &str) -> Self {
         let kernel = |entry| gpu.kernel(entry, source, entry);
         Self {
-            blocks: kernel("scan_blocks"),
-            add: kernel("scan_add"),
+            blocks: kernel("scan_blocks").reading(&[View, Lists]),
+            add: kernel("scan_add").reading(&[View]),
         }
     }
 
@@ -42,12 +48,11 @@ impl Bin {
         let counts = frame.room(Slot::Counts, u64::from(lists) * 4)?;
         let sums = frame.room(Slot::BlockSums, u64::from(lists.div_ceil(SCAN_BLOCK)) * 4)?;
         let [hot_lists, hot_parts] = eye::hot_room(frame)?;
-        let params = &frame.params_buffer;
         let recorder = &mut frame.recorder;
-        if frame.params.long_list != NEVER_LONG {
+        if frame.params.lists.long_list != NEVER_LONG {
             recorder.clear(&hot_parts, 4);
         }
-        let scan = [(0, params), (1, &counts), (2, &sums)];
+        let scan = [(1, &counts), (2, &sums)];
         let hot = [(3, &hot_lists), (4, &hot_parts)];
         let blocks = [scan.as_slice(), &hot].concat();
         recorder.dispatch_list(&self.blocks, &blocks, lists, SCAN_BLOCK);

@@ -9,11 +9,11 @@ struct Reach { low: vec2<i32>, high: vec2<i32> }
 
 // Radius in the low and depth in the high 16 bits, as in an entry; 0 draws nothing.
 fn size_word(splat: Splat) -> u32 {
-    let radius = max(nearest(splat.radius_px * f32(SUBPIXELS)) >> params.entry_shift, 1);
+    let radius = max(nearest(splat.radius_px * f32(SUBPIXELS)) >> lists.entry_shift, 1);
     var tau = splat.tau;
-    if (params.kernel == KERNEL_CLOUD) {
+    if (lists.kernel == KERNEL_CLOUD) {
         // A cloud whose radius was rounded keeps its mass.
-        let wider = splat.radius_px / (f32(radius << params.entry_shift) / f32(SUBPIXELS));
+        let wider = splat.radius_px / (f32(radius << lists.entry_shift) / f32(SUBPIXELS));
         tau *= wider * wider;
     }
     let depth = u32(min(tau, MOST_DEPTH) * DEPTH_ONE + 0.5);
@@ -23,11 +23,11 @@ fn size_word(splat: Splat) -> u32 {
 
 fn reach_of(place: vec2<i32>, size: u32) -> Reach {
     if (size == 0u) { return Reach(vec2(0), vec2(-1)); }
-    let radius = i32(size & 0xffffu) << params.entry_shift;
-    let tiles = vec2(i32(params.tiles_x), i32(params.tiles_y));
+    let radius = i32(size & 0xffffu) << lists.entry_shift;
+    let tiles = vec2<i32>(view.tiles);
     return Reach(max((place - radius) >> vec2(SCREEN_TILE_SHIFT), vec2(0)), min((place + radius) >> vec2(SCREEN_TILE_SHIFT), tiles - 1));
 }
 
 fn list_of(x: i32, y: i32, slice: u32) -> u32 {
-    return (u32(y) * params.tiles_x + u32(x)) * params.slices + slice;
+    return (u32(y) * view.tiles.x + u32(x)) * view.slices + slice;
 }

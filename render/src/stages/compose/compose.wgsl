@@ -5,7 +5,7 @@
 
 @compute @workgroup_size(SCREEN_TILE_PX, SCREEN_TILE_PX)
 fn compose(@builtin(global_invocation_id) pixel: vec3<u32>) {
-    if (pixel.x >= params.width || pixel.y >= params.height) { return; }
-    let at = pixel.y * params.width + pixel.x;
+    if (any(pixel.xy >= view.size_px)) { return; }
+    let at = pixel.y * view.size_px.x + pixel.x;
     image[at] = composed(pixel.xy, picture[at]);
 }

@@ -8,7 +8,7 @@ fn surface_below(pixel: vec2<u32>) -> vec4<f32> {
     if (!ground.on_ground) { return vec4(AIR * 0.5, 1.0) * cover; }
     var color = SEA;
     if (is_land(ground.lon, ground.lat)) { color = LAND; }
-    let lit = color * sunlight(dot(ground.normal, vec3(params.sun_x, params.sun_y, params.sun_z)));
+    let lit = color * sunlight(dot(ground.normal, view.sun));
     return vec4(hazy(lit, ground.normal), 1.0) * cover;
 }
 
@@ -16,7 +16,7 @@ fn composed(pixel: vec2<u32>, blended: vec4<f32>) -> u32 {
     var color = blended;
     if (IN_CONTEXT) {
         color = in_context(pixel, blended);
-    } else if (params.surface == 1u) {
+    } else if (context.surface == 1u) {
         color += surface_below(pixel) * (1.0 - color.w);
     }
     return bytes_of(color);

@@ -1,10 +1,10 @@
-//! CPU twin of `compose.wgsl` over the plain globe (`globe.wgsl`, `over_globe.wgsl`).
+//! CPU twin of `compose.wgsl` over the plain globe (`globe.wgsl`, `composed.wgsl`).
 
 use std::f32::consts::TAU;
 
 use glam::{Vec3, Vec4};
 
-use crate::stages::layout::Params;
+use crate::stages::params::Params;
 use crate::stages::sphere::ground_below;
 
 pub(super) const LAND: Vec3 = Vec3::new(0.36, 0.38, 0.40);
@@ -12,11 +12,12 @@ pub(super) const SEA: Vec3 = Vec3::new(0.035, 0.075, 0.14);
 pub(super) const AIR: Vec3 = Vec3::new(0.30, 0.50, 0.80);
 
 pub(super) fn is_land(params: &Params, domain: &[u32], lon_rad: f32, lat_rad: f32) -> bool {
-    let east = lon_rad - params.grid_west_rad;
-    let col = ((east - (east / TAU).floor() * TAU) * params.cols_per_rad).floor() as i32;
-    let row = ((params.grid_north_rad - lat_rad) * params.rows_per_rad).floor() as i32;
-    let inside = row >= 0 && row < params.rows as i32 && col < params.cols as i32;
-    inside && domain[row as usize * params.cols as usize + col as usize] == 0
+    let grid = &params.grid;
+    let east = lon_rad - grid.west_rad;
+    let col = ((east - (east / TAU).floor() * TAU) * grid.cols_per_rad).floor() as i32;
+    let row = ((grid.north_rad - lat_rad) * grid.rows_per_rad).floor() as i32;
+    let inside = row >= 0 && row < grid.rows as i32 && col < grid.cols as i32;
+    inside && domain[row as usize * grid.cols as usize + col as usize] == 0
 }
 
 pub(super) fn sunlight(sun: f32) -> f32 {
@@ -24,7 +25,7 @@ pub(super) fn sunlight(sun: f32) -> f32 {
 }
 
 pub(super) fn hazy(params: &Params, color: Vec3, normal: Vec3) -> Vec3 {
-    let toward = Vec3::new(params.eye_x, params.eye_y, params.eye_z) - normal;
+    let toward = params.view.eye - normal;
     let facing = normal.dot(toward / toward.length()).clamp(0.0, 1.0);
     let haze = (1.0 - facing) * (1.0 - facing) * (1.0 - facing);
     color * (1.0 - 0.55 * haze) + AIR * (0.55 * haze)
@@ -41,19 +42,17 @@ fn surface_below(params: &Params, domain: &[u32], pixel: [u32; 2]) -> Vec4 {
     } else {
         SEA
     };
-    let sun = ground
-        .normal
-        .dot(Vec3::new(params.sun_x, params.sun_y, params.sun_z));
+    let sun = ground.normal.dot(params.view.sun);
     hazy(params, color * sunlight(sun), ground.normal).extend(1.0) * cover
 }
 
 /// Bytes of every pixel, red lowest, from the blended colours.
 pub fn compose(params: &Params, picture: &[Vec4], domain: &[u32], image: &mut [u32]) {
-    for y in 0..params.height {
-        for x in 0..params.width {
-            let at = (y * params.width + x) as usize;
+    for y in 0..params.view.size_px.y {
+        for x in 0..params.view.size_px.x {
+            let at = (y * params.view.size_px.x + x) as usize;
             let mut color = picture[at];
-            if params.surface == 1 {
+            if params.context.surface == 1 {
                 color += surface_below(params, domain, [x, y]) * (1.0 - color.w);
             }
             image[at] = bytes_of(color);

@@ -5,13 +5,13 @@ const AIR = vec3(0.30, 0.50, 0.80);
 
 // Sea where the product has data in some step and outside its grid, land elsewhere.
 fn is_land(lon: f32, lat: f32) -> bool {
-    let east = lon - params.grid_west_rad;
-    let col = i32(floor((east - floor(east / TURN) * TURN) * params.cols_per_rad));
-    let row = i32(floor((params.grid_north_rad - lat) * params.rows_per_rad));
-    if (row < 0 || row >= i32(params.rows) || col >= i32(params.cols)) { return false; }
-    let cell = u32(row) * params.cols + u32(col);
-    if (cell < params.held_first_cell || cell >= params.held_end_cell) { return false; }
-    return domain[cell - params.held_first_cell] == 0u;
+    let east = lon - grid.west_rad;
+    let col = i32(floor((east - floor(east / TURN) * TURN) * grid.cols_per_rad));
+    let row = i32(floor((grid.north_rad - lat) * grid.rows_per_rad));
+    if (row < 0 || row >= i32(grid.rows) || col >= i32(grid.cols)) { return false; }
+    let cell = u32(row) * grid.cols + u32(col);
+    if (cell < grid.held_first_cell || cell >= grid.held_end_cell) { return false; }
+    return domain[cell - grid.held_first_cell] == 0u;
 }
 
 // Light of the sun at a sine of its elevation, with what comes from all sides.
@@ -21,7 +21,7 @@ fn sunlight(sun: f32) -> f32 {
 
 // A colour of the ground through the air towards the globe's outline.
 fn hazy(color: vec3<f32>, normal: vec3<f32>) -> vec3<f32> {
-    let camera = vec3(params.eye_x, params.eye_y, params.eye_z);
+    let camera = view.eye;
     let facing = clamp(dot(normal, normalize(camera - normal)), 0.0, 1.0);
     let haze = (1.0 - facing) * (1.0 - facing) * (1.0 - facing);
     return mix(color, AIR, 0.55 * haze);

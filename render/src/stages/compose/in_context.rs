@@ -6,9 +6,8 @@ use glam::{Vec2, Vec3, Vec4};
 
 use super::cpu::{AIR, LAND, SEA, bytes_of, hazy, is_land, sunlight};
 use super::terrain::{Ground, ground_at, tint};
-use crate::stages::layout::{
-    Axis, GroundAxis, Params, VIEW_TILE, WATER_BLUE, WATER_GREEN, WATER_RED,
-};
+use crate::stages::layout::{Axis, GroundAxis, VIEW_TILE, WATER_BLUE, WATER_GREEN, WATER_RED};
+use crate::stages::params::Params;
 use crate::stages::project::cpu::smoothstep;
 use crate::stages::sphere::ground_below;
 
@@ -50,8 +49,8 @@ fn axis_at(place: f32) -> Axis {
 
 /// `lon` and `lat` are sines and cosines.
 fn sun_from(params: &Params, lon: Vec2, lat: Vec2) -> Vec3 {
-    let sun = Vec3::new(params.sun_x, params.sun_y, params.sun_z);
-    if params.sun_is_local == 1 {
+    let sun = params.view.sun;
+    if params.view.sun_is_local == 1 {
         return sun;
     }
     let outward = sun.x * lon.x + sun.y * lon.y;
@@ -64,7 +63,7 @@ fn sun_from(params: &Params, lon: Vec2, lat: Vec2) -> Vec3 {
 
 fn spot_on_tile(params: &Params, ground_axes: &[GroundAxis], pixel: [u32; 2]) -> Spot {
     let col = ground_axes[pixel[0] as usize];
-    let row = ground_axes[(params.width + pixel[1]) as usize];
+    let row = ground_axes[(params.view.size_px.x + pixel[1]) as usize];
     let axis = |ground: GroundAxis| Axis {
         index: ground.index,
         fraction: ground.fraction,
@@ -95,9 +94,10 @@ fn spot_on_globe(params: &Params, pixel: [u32; 2]) -> Spot {
     }
     let equatorial = ground.normal.truncate();
     let cos_lat = equatorial.length();
-    let east = ground.lon_rad - params.terrain_west_rad;
-    let x = (east - (east / TAU).floor() * TAU) * params.terrain_cols_per_rad - 0.5;
-    let y = (params.terrain_north_rad - ground.lat_rad) * params.terrain_rows_per_rad - 0.5;
+    let east = ground.lon_rad - params.terrain_grid.west_rad;
+    let x = (east - (east / TAU).floor() * TAU) * params.terrain_grid.cols_per_rad - 0.5;
+    let y =
+        (params.terrain_grid.north_rad - ground.lat_rad) * params.terrain_grid.rows_per_rad - 0.5;
     Spot {
         on_ground: true,
         x: axis_at(x),
@@ -126,26 +126,26 @@ fn lit_terrain(params: &Params, ground: &Ground, sun: Vec3) -> Vec3 {
     // Slopes that still look at a sun below the horizon lie in the shadow of the earth.
     let day = (sun.z * 10.0 + 0.5).clamp(0.0, 1.0);
     let floor_color = tint(ground.height_m) * sunlight(facing.dot(sun) * day);
-    if ground.height_m >= 0.0 || params.seabed_per_m <= 0.0 {
+    if ground.height_m >= 0.0 || params.context.seabed_per_m <= 0.0 {
         return floor_color;
     }
-    let kept = (params.seabed_per_m * ground.height_m).exp();
+    let kept = (params.context.seabed_per_m * ground.height_m).exp();
     mix(WATER * sunlight(sun.z), floor_color, kept)
 }
 
 fn ground_color(params: &Params, around: &Surroundings<'_>, spot: &Spot) -> Vec4 {
-    if params.surface == 0 {
+    if params.context.surface == 0 {
         return Vec4::ZERO;
     }
     if !spot.on_ground {
         return (AIR * 0.5).extend(1.0) * spot.cover;
     }
-    let ground = if params.terrain_on == 1 {
+    let ground = if params.context.terrain_on == 1 {
         ground_at(params, around.terrain, spot.x, spot.y, spot.cos_lat)
     } else {
         None
     };
-    if params.view == VIEW_TILE {
+    if params.view.kind == VIEW_TILE {
         let lit = ground.map(|ground| lit_terrain(params, &ground, spot.sun));
         return lit.map_or(Vec4::ZERO, |lit| lit.extend(1.0));
     }
@@ -154,7 +154,7 @@ fn ground_color(params: &Params, around: &Surroundings<'_>, spot: &Spot) -> Vec4
     } else {
         let color = if is_land(params, around.domain, spot.lon_rad, spot.lat_rad) {
             LAND
-        } else if params.sea_per_m > 0.0 {
+        } else if params.context.has_water == 1 {
             WATER
         } else {
             SEA
@@ -165,41 +165,42 @@ fn ground_color(params: &Params, around: &Surroundings<'_>, spot: &Spot) -> Vec4
 }
 
 fn coast_color(params: &Params, coast: &[u32], pixel: [u32; 2]) -> Vec4 {
-    if params.coast_on == 0 {
+    let (view, context) = (&params.view, &params.context);
+    if context.coast_on == 0 {
         return Vec4::ZERO;
     }
     let [x, y] = [
-        pixel[0] + params.origin_x_px as u32,
-        pixel[1] + params.origin_y_px as u32,
+        pixel[0] + view.origin_px.x as u32,
+        pixel[1] + view.origin_px.y as u32,
     ];
-    let word = coast[(y * params.coast_row_words + x / 4) as usize];
-    let cover = ((word >> (x % 4 * 8)) & 255) as f32 / 255.0 * params.coast_alpha;
-    Vec3::splat(params.coast_grey).extend(1.0) * cover
+    let word = coast[(y * context.coast_row_words + x / 4) as usize];
+    let cover = ((word >> (x % 4 * 8)) & 255) as f32 / 255.0 * context.coast_alpha;
+    Vec3::splat(context.coast_grey).extend(1.0) * cover
 }
 
 /// Bytes of every pixel, red lowest, from the blended colours.
 pub fn compose(params: &Params, picture: &[Vec4], around: &Surroundings<'_>, image: &mut [u32]) {
-    for y in 0..params.height {
-        for x in 0..params.width {
-            let at = (y * params.width + x) as usize;
+    for y in 0..params.view.size_px.y {
+        for x in 0..params.view.size_px.x {
+            let at = (y * params.view.size_px.x + x) as usize;
             image[at] = bytes_of(composed(params, picture[at], around, [x, y]));
         }
     }
 }
 
 fn composed(params: &Params, blended: Vec4, around: &Surroundings<'_>, pixel: [u32; 2]) -> Vec4 {
-    let spot = if params.view == VIEW_TILE {
+    let spot = if params.view.kind == VIEW_TILE {
         spot_on_tile(params, around.ground_axes, pixel)
     } else {
         spot_on_globe(params, pixel)
     };
     let mut color = blended;
-    if params.night_on == 1 {
+    if params.context.night_on == 1 {
         let day = smoothstep(-0.15, 0.35, spot.sun.z);
         color = (color.truncate() * (NIGHT * (1.0 - day) + day)).extend(color.w);
     }
     let line = coast_color(params, around.coast, pixel);
-    if params.coast_above == 1 {
+    if params.context.coast_above == 1 {
         color = line + color * (1.0 - line.w);
     } else {
         color += line * (1.0 - color.w);

@@ -3,14 +3,17 @@
 
 pub mod cpu;
 pub mod in_context;
+pub mod params;
 pub mod terrain;
 
 use std::sync::OnceLock;
 
 use crate::error::RenderError;
-use crate::frame_context::FrameContext;
+use crate::frame_context::{FrameContext, SceneBuffers};
 use crate::gpu::{Gpu, Kernel, Slot};
 use crate::stages::layout::GroundAxis;
+use crate::stages::params::Uniform;
+use crate::stages::params::Uniform::{Context, Grid, TerrainGrid, View};
 
 /// The function that the eye runs for its own pixels.
 pub const FUNCTIONS: &str = concat!(
@@ -31,6 +34,9 @@ pub const SOURCE: &str = concat!(
     include_str!("composed.wgsl"),
     include_str!("compose.wgsl")
 );
+
+/// What [`FUNCTIONS`] read.
+pub(crate) const READS: [Uniform; 4] = [View, Grid, Context, TerrainGrid];
 
 /// The constant of pictures in their surroundings.
 pub(crate) fn in_context(is_wanted: bool) -> (&'static str, f64) {
@@ -60,29 +66,30 @@ impl Compose {
         let picture = frame.room(Slot::Picture, 16)?;
         let image = frame.room(Slot::Image, frame.pixel_count() * 4)?;
         let [terrain, axes, coast] = surroundings(frame)?;
-        let kernel = if frame.params.in_context == 1 {
+        let kernel = if frame.params.in_context {
             let compiled = || compiled(frame.gpu, &self.source, true);
             self.in_context.get_or_init(compiled)
         } else {
             &self.plain
         };
         let buffers = [
-            (0, &frame.params_buffer),
             (1, &picture),
-            (2, &frame.domain),
+            (2, &frame.scene.domain),
             (3, &image),
             (5, &terrain),
             (6, &axes),
             (7, &coast),
         ];
-        let groups = [frame.params.tiles_x, frame.params.tiles_y];
+        let groups = frame.params.view.tiles.to_array();
         frame.recorder.dispatch(kernel, &buffers, groups);
         Ok(())
     }
 }
 
 fn compiled(gpu: &Gpu, source: &str, is_in_context: bool) -> Kernel {
-    gpu.variant("compose", source, "compose", &[in_context(is_in_context)])
+    let constants = [in_context(is_in_context)];
+    gpu.variant("compose", source, "compose", &constants)
+        .reading(&READS)
 }
 
 /// What the functions for surroundings read: terrain, ground axes and coast mask, in the order of their bindings from 5 on.
@@ -99,9 +106,9 @@ pub(crate) fn surroundings(frame: &mut FrameContext<'_>) -> Result<[wgpu::Buffer
     } else {
         frame.upload_of_plan(Slot::Coast, &plan.coast)?
     };
-    let terrain = frame
-        .terrain
-        .clone()
-        .unwrap_or_else(|| frame.domain.clone());
+    let SceneBuffers {
+        terrain, domain, ..
+    } = &frame.scene;
+    let terrain = terrain.as_ref().unwrap_or(domain).clone();
     Ok([terrain, axes, coast])
 }

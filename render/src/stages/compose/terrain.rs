@@ -2,7 +2,8 @@
 
 use glam::{Vec2, Vec3};
 
-use crate::stages::layout::{Axis, Params, is_missing};
+use crate::stages::layout::{Axis, is_missing};
+use crate::stages::params::Params;
 
 /// East and west of a place so near a pole no slope is told: meridians meet.
 const LEAST_COS_LAT: f32 = 0.02;
@@ -17,22 +18,23 @@ pub struct Ground {
 }
 
 fn cell(params: &Params, terrain: &[f32], row: i32, col: i32) -> f32 {
-    let cols = params.terrain_cols as i32;
-    let x = if params.terrain_periodic == 1 {
+    let terrain_grid = &params.terrain_grid;
+    let cols = terrain_grid.cols as i32;
+    let x = if terrain_grid.periodic == 1 {
         col.rem_euclid(cols)
     } else {
         col.clamp(0, cols - 1)
     };
-    let y = row.clamp(0, params.terrain_rows as i32 - 1);
-    terrain[y as usize * params.terrain_cols as usize + x as usize]
+    let y = row.clamp(0, terrain_grid.rows as i32 - 1);
+    terrain[y as usize * terrain_grid.cols as usize + x as usize]
 }
 
 fn is_inside(params: &Params, x: Axis, y: Axis) -> bool {
+    let terrain_grid = &params.terrain_grid;
     let east = x.index as f32 + x.fraction + 0.5;
     let south = y.index as f32 + y.fraction + 0.5;
-    let is_across =
-        params.terrain_periodic == 1 || (0.0..=params.terrain_cols as f32).contains(&east);
-    is_across && (0.0..=params.terrain_rows as f32).contains(&south)
+    let is_across = terrain_grid.periodic == 1 || (0.0..=terrain_grid.cols as f32).contains(&east);
+    is_across && (0.0..=terrain_grid.rows as f32).contains(&south)
 }
 
 /// Bilinear height, and the gradient of Horn (1981), doi:10.1109/PROC.1981.11918, bilinear between the four cells round
@@ -79,12 +81,12 @@ pub fn ground_at(
         rise += Vec2::new(east, north) * share;
     }
     let per_rad = Vec2::new(
-        params.terrain_cols_per_rad / cos_lat.max(LEAST_COS_LAT),
-        params.terrain_rows_per_rad,
+        params.terrain_grid.cols_per_rad / cos_lat.max(LEAST_COS_LAT),
+        params.terrain_grid.rows_per_rad,
     );
     Some(Ground {
         height_m,
-        slope: rise * per_rad * params.terrain_slope,
+        slope: rise * per_rad * params.context.terrain_slope,
     })
 }
 
@@ -123,16 +125,24 @@ pub fn tint(height_m: f32) -> Vec3 {
 #[expect(clippy::float_cmp, reason = "these values are exact")]
 mod tests {
     use super::*;
+    use crate::stages::compose::params::ContextParams;
     use crate::stages::layout::MISSING;
+    use crate::stages::params::GridParams;
 
     /// A grid of 8 x 8 cells of a tenth of a radian.
     fn params() -> Params {
         Params {
-            terrain_rows: 8,
-            terrain_cols: 8,
-            terrain_cols_per_rad: 10.0,
-            terrain_rows_per_rad: 10.0,
-            terrain_slope: 1.0 / 8.0 / 1000.0,
+            terrain_grid: GridParams {
+                rows: 8,
+                cols: 8,
+                cols_per_rad: 10.0,
+                rows_per_rad: 10.0,
+                ..GridParams::default()
+            },
+            context: ContextParams {
+                terrain_slope: 1.0 / 8.0 / 1000.0,
+                ..ContextParams::default()
+            },
             ..Params::default()
         }
     }
@@ -174,10 +184,8 @@ mod tests {
         // To the very edge of the outermost cells.
         let corner = ground_at(&params(), &flat, at(-1, 0.5), at(7, 0.5), 1.0);
         assert_eq!(corner.unwrap().height_m, 100.0);
-        let round = Params {
-            terrain_periodic: 1,
-            ..params()
-        };
+        let mut round = params();
+        round.terrain_grid.periodic = 1;
         assert!(ground_at(&round, &flat, at(-1, 0.2), at(7, 0.5), 1.0).is_some());
     }
 

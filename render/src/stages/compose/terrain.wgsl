@@ -1,22 +1,24 @@
 // Height and slope of the terrain at a place between cell centres. Reads `terrain`.
+@group(0) @binding(28) var<uniform> terrain_grid: GridParams;
+
 struct Terrain { is_known: bool, height_m: f32, slope: vec2<f32> }
 
 // East and west of a place so near a pole no slope is told: meridians meet.
 const LEAST_COS_LAT = 0.02;
 
 fn terrain_cell(row: i32, col: i32) -> f32 {
-    let cols = i32(params.terrain_cols);
+    let cols = i32(terrain_grid.cols);
     var x = clamp(col, 0, cols - 1);
-    if (params.terrain_periodic == 1u) { x = (col % cols + cols) % cols; }
-    let y = clamp(row, 0, i32(params.terrain_rows) - 1);
-    return terrain[u32(y) * params.terrain_cols + u32(x)];
+    if (terrain_grid.periodic == 1u) { x = (col % cols + cols) % cols; }
+    let y = clamp(row, 0, i32(terrain_grid.rows) - 1);
+    return terrain[u32(y) * terrain_grid.cols + u32(x)];
 }
 
 fn is_in_terrain(x: Axis, y: Axis) -> bool {
     let east = f32(x.index) + x.fraction + 0.5;
     let south = f32(y.index) + y.fraction + 0.5;
-    return south >= 0.0 && south <= f32(params.terrain_rows)
-        && (params.terrain_periodic == 1u || (east >= 0.0 && east <= f32(params.terrain_cols)));
+    return south >= 0.0 && south <= f32(terrain_grid.rows)
+        && (terrain_grid.periodic == 1u || (east >= 0.0 && east <= f32(terrain_grid.cols)));
 }
 
 // Bilinear height, and the gradient of Horn (1981), doi:10.1109/PROC.1981.11918, bilinear between the four cells round
@@ -47,8 +49,8 @@ fn terrain_at(x: Axis, y: Axis, cos_lat: f32) -> Terrain {
         let north = (z[at - 5] + 2.0 * z[at - 4] + z[at - 3]) - (z[at + 3] + 2.0 * z[at + 4] + z[at + 5]);
         rise += vec2(east, north) * corner_share(i, x.fraction, y.fraction);
     }
-    let per_rad = vec2(params.terrain_cols_per_rad / max(cos_lat, LEAST_COS_LAT), params.terrain_rows_per_rad);
-    found.slope = rise * per_rad * params.terrain_slope;
+    let per_rad = vec2(terrain_grid.cols_per_rad / max(cos_lat, LEAST_COS_LAT), terrain_grid.rows_per_rad);
+    found.slope = rise * per_rad * context.terrain_slope;
     return found;
 }
 

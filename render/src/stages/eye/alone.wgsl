@@ -7,7 +7,7 @@ const STRIDE = 4u; // rows between an invocation's pixels
 struct Near { radius_px: f32, inverse_radius: f32, south: f32, east: f32, depth: f32, rgb: vec3<u32> }
 
 fn near_of(entry: Entry, column: f32) -> Near {
-    let pixel_units = f32(SUBPIXELS) / f32(1u << params.entry_shift);
+    let pixel_units = f32(SUBPIXELS) / f32(1u << lists.entry_shift);
     let radius_px = f32(entry.size & 0xffffu) / pixel_units;
     let place = vec2(f32(i32(entry.place << 16u) >> 16u), f32(i32(entry.place) >> 16u)) / pixel_units;
     let inverse_radius = 1.0 / radius_px;
@@ -29,12 +29,12 @@ fn more(sums: vec4<u32>, given: vec4<u32>) -> vec4<u32> {
 }
 
 fn show(pixel: vec2<u32>, color: vec4<f32>) {
-    if (pixel.x < params.width && pixel.y < params.height) { image[pixel.y * params.width + pixel.x] = composed(pixel, color); }
+    if (all(pixel.xy < view.size_px)) { image[pixel.y * view.size_px.x + pixel.x] = composed(pixel, color); }
 }
 
 @compute @workgroup_size(SCREEN_TILE_PX, STRIDE)
 fn alone(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
-    let first_list = (workgroup.y * params.tiles_x + workgroup.x) * params.slices;
+    let first_list = (workgroup.y * view.tiles.x + workgroup.x) * view.slices;
     let center = vec2<f32>(local.xy) + 0.5;
     let stride = f32(STRIDE);
     var color_0 = vec4(0.0);
@@ -42,9 +42,9 @@ fn alone(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_
     var color_2 = vec4(0.0);
     var color_3 = vec4(0.0);
     var begin = 0u;
-    if (first_list > 0u) { begin = min(list_ends[first_list - 1u], params.entry_capacity); }
-    for (var slice = 0u; slice < params.slices; slice++) {
-        let end = min(list_ends[first_list + slice], params.entry_capacity);
+    if (first_list > 0u) { begin = min(list_ends[first_list - 1u], lists.entry_capacity); }
+    for (var slice = 0u; slice < view.slices; slice++) {
+        let end = min(list_ends[first_list + slice], lists.entry_capacity);
         if (end > begin) {
             var own_0 = vec4(0u);
             var own_1 = vec4(0u);

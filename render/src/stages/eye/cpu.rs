@@ -3,8 +3,9 @@
 use glam::{Vec2, Vec4};
 
 use crate::stages::layout::{
-    DEPTH_ONE, Entry, KERNEL_BALL, KERNEL_CLOUD, Params, SCREEN_TILE_PX, SUBPIXELS,
+    DEPTH_ONE, Entry, KERNEL_BALL, KERNEL_CLOUD, SCREEN_TILE_PX, SUBPIXELS,
 };
+use crate::stages::params::Params;
 
 const MOST_SUM: u32 = 0x7fff_ffff;
 /// Where this much is covered, what lies behind is left out: it would change a byte by a fifteenth at most.
@@ -51,20 +52,21 @@ pub fn blended(front_to_back: bool, picture: Vec4, sums: [u32; 4]) -> Vec4 {
 
 /// Every pixel from the lists that end where `list_ends` says.
 pub fn eye(params: &Params, list_ends: &[u32], entries: &[Entry], picture: &mut [Vec4]) {
-    for tile_y in 0..params.tiles_y {
-        for tile_x in 0..params.tiles_x {
-            let first_list = ((tile_y * params.tiles_x + tile_x) * params.slices) as usize;
+    for tile_y in 0..params.view.tiles.y {
+        for tile_x in 0..params.view.tiles.x {
+            let first_list =
+                ((tile_y * params.view.tiles.x + tile_x) * params.view.slices) as usize;
             let first = if first_list == 0 {
                 0
             } else {
                 list_ends[first_list - 1] as usize
             };
-            let end = list_ends[first_list + params.slices as usize - 1] as usize;
+            let end = list_ends[first_list + params.view.slices as usize - 1] as usize;
             let colors = screen_tile(params, &entries[first..end]);
             let [left, top] = [tile_x, tile_y].map(|tile| tile * SCREEN_TILE_PX);
-            for y in top..(top + SCREEN_TILE_PX).min(params.height) {
-                for x in left..(left + SCREEN_TILE_PX).min(params.width) {
-                    picture[(y * params.width + x) as usize] =
+            for y in top..(top + SCREEN_TILE_PX).min(params.view.size_px.y) {
+                for x in left..(left + SCREEN_TILE_PX).min(params.view.size_px.x) {
+                    picture[(y * params.view.size_px.x + x) as usize] =
                         colors[(y - top) as usize * TILE + (x - left) as usize];
                 }
             }
@@ -80,14 +82,14 @@ fn screen_tile(params: &Params, list: &[Entry]) -> [Vec4; TILE * TILE] {
             add(params, entry, &mut sums);
         }
         for (color, sums) in colors.iter_mut().zip(sums) {
-            *color = blended(params.front_to_back == 1, *color, sums);
+            *color = blended(params.view.front_to_back == 1, *color, sums);
         }
     }
     colors
 }
 
 fn add(params: &Params, entry: &Entry, sums: &mut Sums) {
-    let pixel_units = SUBPIXELS as f32 / (1u32 << params.entry_shift) as f32;
+    let pixel_units = SUBPIXELS as f32 / (1u32 << params.lists.entry_shift) as f32;
     let radius = (entry.size & 0xffff) as f32;
     let inverse_radius = 1.0 / radius;
     let depth = (entry.size >> 16) as f32;
@@ -105,10 +107,11 @@ fn add(params: &Params, entry: &Entry, sums: &mut Sums) {
             let center = Vec2::new(x as f32 + 0.5, y as f32 + 0.5) * pixel_units;
             let offset = (center - Vec2::new(east, south)) * inverse_radius;
             let q = offset.dot(offset);
-            let amount = (depth * weight_at(params.kernel, q, radius / pixel_units) + 0.5) as u32;
+            let amount =
+                (depth * weight_at(params.lists.kernel, q, radius / pixel_units) + 0.5) as u32;
             let sum = &mut sums[y * TILE + x];
             for (channel, plain) in rgb.into_iter().enumerate() {
-                let lit = if params.kernel == KERNEL_BALL {
+                let lit = if params.lists.kernel == KERNEL_BALL {
                     (plain as f32 * ball_light(offset) + 0.5) as u32
                 } else {
                     plain

@@ -45,7 +45,7 @@ fn ball_light(offset: vec2<f32>) -> f32 {
 
 // Adds an entry to every second row of pixels.
 fn add(entry: Entry, half: i32) {
-    let pixel_units = f32(SUBPIXELS) / f32(1u << params.entry_shift);
+    let pixel_units = f32(SUBPIXELS) / f32(1u << lists.entry_shift);
     let radius_px = f32(entry.size & 0xffffu) / pixel_units;
     let place = vec2(f32(i32(entry.place << 16u) >> 16u), f32(i32(entry.place) >> 16u)) / pixel_units;
     let depth = f32(entry.size >> 16u);
@@ -98,7 +98,7 @@ fn summed(begin: u32, end: u32, pixel: u32) -> vec4<u32> {
 }
 
 fn is_covered(picture: vec4<f32>) -> bool {
-    return params.front_to_back == 1u && picture.w > OPAQUE;
+    return view.front_to_back == 1u && picture.w > OPAQUE;
 }
 
 // Colour with alpha, premultiplied, once the slice with these sums is blended into it.
@@ -106,7 +106,7 @@ fn blended(picture: vec4<f32>, sums: vec4<u32>) -> vec4<f32> {
     if (sums.w == 0u || is_covered(picture)) { return picture; }
     let alpha = 1.0 - exp(-f32(sums.w) / DEPTH_ONE);
     let slice = vec4(vec3<f32>(sums.xyz) / (f32(sums.w) * 255.0), 1.0) * alpha;
-    if (params.front_to_back == 1u) { return picture + slice * (1.0 - picture.w); }
+    if (view.front_to_back == 1u) { return picture + slice * (1.0 - picture.w); }
     return picture * (1.0 - alpha) + slice;
 }
 
@@ -114,20 +114,20 @@ fn blended(picture: vec4<f32>, sums: vec4<u32>) -> vec4<f32> {
 fn eye(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(global_invocation_id) pixel: vec3<u32>,
     @builtin(local_invocation_index) invocation: u32) {
     for (var channel = 0u; channel < 4u; channel++) { atomicStore(&sums[channel * PIXELS + invocation], 0u); }
-    let first_list = (workgroup.y * params.tiles_x + workgroup.x) * params.slices;
+    let first_list = (workgroup.y * view.tiles.x + workgroup.x) * view.slices;
     var color = vec4(0.0);
-    for (var first = 0u; first < params.slices; first += LOOKED_UP) {
-        let looked_up = min(params.slices - first, LOOKED_UP);
+    for (var first = 0u; first < view.slices; first += LOOKED_UP) {
+        let looked_up = min(view.slices - first, LOOKED_UP);
         if (invocation <= looked_up) {
             // Ends of lists, from the one before on.
             let list = first_list + first + invocation;
             ends[invocation] = 0u;
-            if (list > 0u) { ends[invocation] = min(list_ends[list - 1u], params.entry_capacity); }
+            if (list > 0u) { ends[invocation] = min(list_ends[list - 1u], lists.entry_capacity); }
         }
         workgroupBarrier();
         // Nothing to look for where nothing is listed.
         let listed = select(looked_up, 0u, ends[0] == ends[looked_up]);
-        let is_worth_asking = params.front_to_back == 1u && ends[looked_up] - ends[0] > WORTH_ASKING;
+        let is_worth_asking = view.front_to_back == 1u && ends[looked_up] - ends[0] > WORTH_ASKING;
         for (var slice = 0u; slice < listed; slice++) {
             let begin = ends[slice];
             let end = ends[slice + 1u];
@@ -147,5 +147,5 @@ fn eye(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(global_invocation_i
         }
         workgroupBarrier();
     }
-    if (pixel.x < params.width && pixel.y < params.height) { image[pixel.y * params.width + pixel.x] = composed(pixel.xy, color); }
+    if (all(pixel.xy < view.size_px)) { image[pixel.y * view.size_px.x + pixel.x] = composed(pixel.xy, color); }
 }

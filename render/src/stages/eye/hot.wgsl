@@ -18,7 +18,7 @@ struct LongSum { is_there: bool, own: vec4<u32> }
 
 fn long_sum(list: u32, length: u32, pixel: u32) -> LongSum {
     if (!HAS_PARTS) { return LongSum(false, vec4(0u)); }
-    if (length <= params.long_list) { return LongSum(false, vec4(0u)); }
+    if (length <= lists.long_list) { return LongSum(false, vec4(0u)); }
     let first = hot_lists[list];
     if (first == 0u) { return LongSum(false, vec4(0u)); }
     var own = vec4(0u);
@@ -41,9 +41,9 @@ fn hot(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) wor
         let list = hot_parts[1u + part];
         if (list == NO_LIST) { continue; }
         var begin = 0u;
-        if (list > 0u) { begin = min(list_ends[list - 1u], params.entry_capacity); }
+        if (list > 0u) { begin = min(list_ends[list - 1u], lists.entry_capacity); }
         begin += (part + 1u - hot_lists[list]) * PART_ENTRIES;
-        let end = min(begin + PART_ENTRIES, min(list_ends[list], params.entry_capacity));
+        let end = min(begin + PART_ENTRIES, min(list_ends[list], lists.entry_capacity));
         var own = summed(begin, end, invocation);
         for (var channel = 0u; channel < 4u; channel++) { hot_sums[part * PART_SUMS + channel * PIXELS + invocation] = own[channel]; }
     }

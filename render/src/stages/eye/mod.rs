@@ -9,8 +9,9 @@ use crate::frame_context::FrameContext;
 use crate::gpu::{Gpu, Kernel, Slot};
 use crate::stages::compose;
 use crate::stages::layout::{
-    KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, MOST_HOT_PARTS, NEVER_LONG, Params, SCREEN_TILE_PX,
+    KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, MOST_HOT_PARTS, NEVER_LONG, SCREEN_TILE_PX,
 };
+use crate::stages::params::Uniform::Lists;
 use crate::stages::sizes::list_count;
 
 /// The shader.
@@ -21,6 +22,7 @@ pub const SOURCE: &str = concat!(
     include_str!("../compose/terrain.wgsl"),
     include_str!("../compose/in_context.wgsl"),
     include_str!("../compose/composed.wgsl"),
+    include_str!("../bin/lists.wgsl"),
     include_str!("eye.wgsl"),
     include_str!("hot.wgsl"),
     include_str!("alone.wgsl")
@@ -50,7 +52,7 @@ const HOT_GROUPS: u32 = 1024;
 /// The buffers of long lists and of their parts.
 pub fn hot_room(frame: &mut FrameContext<'_>) -> Result<[wgpu::Buffer; 2], RenderError> {
     // Bound but never written where no list is cut.
-    let is_cut = u64::from(frame.params.long_list != NEVER_LONG);
+    let is_cut = u64::from(frame.params.lists.long_list != NEVER_LONG);
     let lists = is_cut * u64::from(list_count(&frame.params));
     let parts = is_cut * u64::from(1 + MOST_HOT_PARTS);
     Ok([
@@ -85,13 +87,12 @@ impl Eye {
         let counts = frame.room(Slot::Counts, 4)?;
         let entries = frame.room(Slot::Entries, 4)?;
         let image = frame.room(Slot::Image, frame.pixel_count() * 4)?;
-        let groups = [frame.params.tiles_x, frame.params.tiles_y];
-        let has_parts = frame.params.long_list != NEVER_LONG && self.entry == SHARED;
+        let groups = frame.params.view.tiles.to_array();
+        let has_parts = frame.params.lists.long_list != NEVER_LONG && self.entry == SHARED;
         let mut buffers = vec![
-            (0, frame.params_buffer.clone()),
             (1, counts),
             (2, entries),
-            (3, frame.domain.clone()),
+            (3, frame.scene.domain.clone()),
             (4, image),
         ];
         buffers.extend((5..).zip(compose::surroundings(frame)?));
@@ -103,12 +104,8 @@ impl Eye {
             let [lists, _parts] = hot_room(frame)?;
             buffers.extend([(8, lists), (10, frame.room(Slot::HotSums, 4)?)]);
         }
-        let Params {
-            kernel: kind,
-            in_context,
-            ..
-        } = frame.params;
-        let kernel = self.kernel(frame.gpu, kind, in_context == 1, has_parts);
+        let (kind, in_context) = (frame.params.lists.kernel, frame.params.in_context);
+        let kernel = self.kernel(frame.gpu, kind, in_context, has_parts);
         let buffers: Vec<_> = buffers.iter().map(|(at, buffer)| (*at, buffer)).collect();
         frame.recorder.dispatch(kernel, &buffers, groups);
         Ok(())
@@ -123,24 +120,27 @@ impl Eye {
                 compose::in_context(in_context),
                 ("HAS_PARTS", f64::from(u8::from(has_parts))),
             ];
+            let [view, grid, context, terrain] = compose::READS;
             gpu.variant("eye", &self.source, self.entry, &constants)
+                .reading(&[view, grid, context, terrain, Lists])
         })
     }
 
     /// Sums up the parts of long lists.
     fn sum_up(&self, frame: &mut FrameContext<'_>) -> Result<(), RenderError> {
         let gpu = frame.gpu;
-        let kind = frame.params.kernel;
+        let kind = frame.params.lists.kernel;
         let constants = [("KERNEL", f64::from(kind))];
-        let kernel =
-            self.hot[kind as usize].get_or_init(|| gpu.variant(HOT, &self.source, HOT, &constants));
+        let kernel = self.hot[kind as usize].get_or_init(|| {
+            gpu.variant(HOT, &self.source, HOT, &constants)
+                .reading(&[Lists])
+        });
         let counts = frame.room(Slot::Counts, 4)?;
         let entries = frame.room(Slot::Entries, 4)?;
         let [lists, parts] = hot_room(frame)?;
         let pixels = u64::from(SCREEN_TILE_PX * SCREEN_TILE_PX);
         let sums = frame.room(Slot::HotSums, u64::from(MOST_HOT_PARTS) * pixels * 16)?;
         let buffers = [
-            (0, &frame.params_buffer),
             (1, &counts),
             (2, &entries),
             (8, &lists),

@@ -2,9 +2,8 @@
 
 use glam::{Vec2, Vec3};
 
-use crate::stages::layout::{
-    Active, MISSING, Params, Particle, Row, Velocity, is_missing, nearest,
-};
+use crate::stages::layout::{Active, MISSING, Particle, Row, Velocity, is_missing, nearest};
+use crate::stages::params::Params;
 use crate::stages::particles::cpu::{HALF_TURN, hash, jittered, unit};
 use crate::stages::project::cpu::turned;
 
@@ -79,8 +78,8 @@ pub fn velocities(east: &[f32], north: &[f32]) -> Vec<Velocity> {
 
 /// The dots of every trail of every active cell, from the trail's end on.
 pub fn trails(params: &Params, inputs: &Inputs<'_>, particles: &mut [Particle]) {
-    let each = params.particles_each;
-    let of_cell = (params.particles_per_cell / each) as usize;
+    let each = params.cells.particles_each;
+    let of_cell = (params.cells.particles_per_cell / each) as usize;
     for (i, dots) in particles.chunks_exact_mut(each as usize).enumerate() {
         let cell = inputs.active[i / of_cell];
         let mut trail = inputs.field.trail_of(cell.cell, (i % of_cell) as u32);
@@ -105,20 +104,22 @@ pub fn trails(params: &Params, inputs: &Inputs<'_>, particles: &mut [Particle]) 
 
 /// The share of a life between two dots of a trail.
 fn dot_share(params: &Params, age: f32) -> f32 {
-    age.min(TRAIL) / (params.particles_each - 1) as f32
+    age.min(TRAIL) / (params.cells.particles_each - 1) as f32
 }
 
 fn dot_of(params: &Params, palette: &[u32], trail: &Trail, number: u32, speed: f32) -> Particle {
     let row = trail.row as i32 + trail.place.y.floor() as i32;
-    let row = row.clamp(0, params.rows as i32 - 1);
-    let taper = (number + 1) as f32 / params.particles_each as f32;
-    let position = ((speed - params.transfer_low) * params.transfer_per_unit).clamp(0.0, 1.0);
+    let row = row.clamp(0, params.grid.rows as i32 - 1);
+    let taper = (number + 1) as f32 / params.cells.particles_each as f32;
+    let position =
+        ((speed - params.values.transfer_low) * params.values.transfer_per_unit).clamp(0.0, 1.0);
     let alive = (trail.age / TRAIL).min(1.0) * ((1.0 - trail.age) * FADING).clamp(0.0, 1.0);
     let spacing_px =
-        speed.min(params.flow_most_m_s) * params.flow_px_per_m_s * dot_share(params, trail.age);
+        speed.min(params.flow.most_m_s) * params.flow.px_per_m_s * dot_share(params, trail.age);
     let at_color = nearest(position * 255.0) as usize;
-    let mut opacity = params.depth_floor + (1.0 - params.depth_floor) * position.sqrt();
-    if params.shape_table == 1 {
+    let mut opacity =
+        params.particles.depth_floor + (1.0 - params.particles.depth_floor) * position.sqrt();
+    if params.values.has_shape == 1 {
         opacity = (palette[256 + at_color] & 0xffff) as f32 / 65535.0;
     }
     opacity *= (spacing_px / FULL_SPACING_PX).clamp(LEAST_SHARE, 1.0);
@@ -126,7 +127,7 @@ fn dot_of(params: &Params, palette: &[u32], trail: &Trail, number: u32, speed: f
         row: row as u32,
         east: trail.place.x,
         south: trail.place.y - (row - trail.row as i32) as f32,
-        depth: params.optical_depth * opacity * taper * taper * alive * trail.open,
+        depth: params.particles.optical_depth * opacity * taper * taper * alive * trail.open,
         color: palette[at_color] | ((nearest(taper * 255.0) as u32) << 24),
         ..Particle::default()
     }
@@ -134,8 +135,8 @@ fn dot_of(params: &Params, palette: &[u32], trail: &Trail, number: u32, speed: f
 
 impl Field<'_> {
     fn cell(&self, row: i32, col: i32) -> Vec3 {
-        let (rows, cols) = (self.params.rows as i32, self.params.cols as i32);
-        let col = if self.params.periodic == 1 {
+        let (rows, cols) = (self.params.grid.rows as i32, self.params.grid.cols as i32);
+        let col = if self.params.grid.periodic == 1 {
             col.rem_euclid(cols)
         } else {
             col
@@ -164,14 +165,14 @@ impl Field<'_> {
         let sum = mix(upper, lower, part.y);
         let found = sum.truncate() / sum.z.max(1.0e-6);
         let speed = found.length();
-        let drawn = found * (params.flow_most_m_s / speed.max(1.0e-6)).min(1.0);
+        let drawn = found * (params.flow.most_m_s / speed.max(1.0e-6)).min(1.0);
         let row = &self.rows[trail.row as usize];
         let north_of_middle = (0.5 - place.y) * row.lat_span_rad;
         let cos_lat = turned(row.sin_lat, row.cos_lat, north_of_middle).y;
-        let most = params.flow_most_cols;
-        let east = (drawn.x * params.flow_cols_per_m_s / cos_lat.max(1.0e-3)).clamp(-most, most);
+        let most = params.flow.most_cols;
+        let east = (drawn.x * params.flow.cols_per_m_s / cos_lat.max(1.0e-3)).clamp(-most, most);
         Drift {
-            rate: Vec2::new(east, -drawn.y * params.flow_rows_per_m_s),
+            rate: Vec2::new(east, -drawn.y * params.flow.rows_per_m_s),
             speed,
             open: (4.0 * sum.z - 2.0).clamp(0.0, 1.0),
         }
@@ -200,8 +201,8 @@ impl Field<'_> {
     pub fn trail_of(&self, cell: u32, number: u32) -> Trail {
         let params = self.params;
         let mut trail = Trail {
-            row: cell / params.cols,
-            col: cell % params.cols,
+            row: cell / params.grid.cols,
+            col: cell % params.grid.cols,
             place: Vec2::ZERO,
             age: 0.0,
             open: 0.0,
@@ -210,11 +211,11 @@ impl Field<'_> {
             return trail;
         }
         let bits = hash(hash(cell) ^ number.wrapping_mul(0x9e3779b9));
-        let turn = unit(bits) + params.flow_turn;
+        let turn = unit(bits) + params.flow.turn;
         trail.age = turn - turn.floor();
-        let cycle = params.flow_cycle.wrapping_add(turn as u32);
+        let cycle = params.flow.cycle.wrapping_add(turn as u32);
         let life = hash(bits ^ cycle.wrapping_mul(0x85ebca6b));
-        if hash(life ^ 0x68bc21eb) > params.flow_share {
+        if hash(life ^ 0x68bc21eb) > params.flow.share {
             return trail;
         }
         let along = |step: u32, bits: u32| {
@@ -224,7 +225,7 @@ impl Field<'_> {
         trail.place = Vec2::new(along(3242174889, life), along(2447445414, hash(life)));
         trail.open = 1.0;
         let share = (trail.age - TRAIL).max(0.0) - 0.5;
-        self.carried(trail, share, params.flow_lead_steps)
+        self.carried(trail, share, params.flow.lead_steps)
     }
 }
 

@@ -3,6 +3,11 @@
 //
 // A particle is at its birthplace in the middle of its life and comes from upstream, which halves how far particles
 // must be looked for beyond the edge of a picture.
+struct FlowParams {
+    turn: f32, cycle: u32, share: u32, lead_steps: u32, cols_per_m_s: f32, rows_per_m_s: f32, most_cols: f32,
+    most_m_s: f32, px_per_m_s: f32,
+}
+@group(0) @binding(21) var<uniform> flow: FlowParams;
 
 // Longest trail, lives.
 const TRAIL = 0.5;
@@ -15,10 +20,10 @@ const LEAST_SHARE = 0.12;
 // Velocity east and north and 1, or zeros where there is no data.
 fn cell_velocity(row: i32, col: i32) -> vec3<f32> {
     var x = col;
-    let cols = i32(params.cols);
-    if (params.periodic == 1u) { x = (x % cols + cols) % cols; }
-    if (x < 0 || x >= cols || row < 0 || row >= i32(params.rows)) { return vec3(0.0); }
-    let own = velocity[u32(row) * params.cols + u32(x)];
+    let cols = i32(grid.cols);
+    if (grid.periodic == 1u) { x = (x % cols + cols) % cols; }
+    if (x < 0 || x >= cols || row < 0 || row >= i32(grid.rows)) { return vec3(0.0); }
+    let own = velocity[u32(row) * grid.cols + u32(x)];
     if (is_missing(own.east)) { return vec3(0.0); }
     return vec3(own.east, own.north, 1.0);
 }
@@ -37,11 +42,11 @@ fn drift_at(row: u32, col: u32, place: vec2<f32>) -> Drift {
     let sum = mix(upper, lower, part.y);
     let found = sum.xy / max(sum.z, 1.0e-6);
     let speed = length(found);
-    let drawn = found * min(1.0, params.flow_most_m_s / max(speed, 1.0e-6));
+    let drawn = found * min(1.0, flow.most_m_s / max(speed, 1.0e-6));
     let cos_lat = turned(rows[row].sin_lat, rows[row].cos_lat, (0.5 - place.y) * rows[row].lat_span_rad).y;
     // Meridians meet at the poles.
-    let east = clamp(drawn.x * params.flow_cols_per_m_s / max(cos_lat, 1.0e-3), -params.flow_most_cols, params.flow_most_cols);
-    return Drift(vec2(east, -drawn.y * params.flow_rows_per_m_s), speed, clamp(4.0 * sum.z - 2.0, 0.0, 1.0));
+    let east = clamp(drawn.x * flow.cols_per_m_s / max(cos_lat, 1.0e-3), -flow.most_cols, flow.most_cols);
+    return Drift(vec2(east, -drawn.y * flow.rows_per_m_s), speed, clamp(4.0 * sum.z - 2.0, 0.0, 1.0));
 }
 
 // A particle on its way: `open` is the least that it met, 0 where it is not drawn.
@@ -57,19 +62,19 @@ fn stepped(row: u32, trail: Trail, here: Drift, share: f32) -> Trail {
 fn trail_of(row: u32, slot: u32, number: u32) -> Trail {
     var trail: Trail;
     trail.col = cols[slot].index;
-    let cell = row * params.cols + trail.col;
+    let cell = row * grid.cols + trail.col;
     if (is_missing(velocity[cell].east)) { return trail; }
     let bits = hash(hash(cell) ^ (number * 0x9e3779b9u));
-    let turn = unit(bits) + params.flow_turn;
+    let turn = unit(bits) + flow.turn;
     trail.age = turn - floor(turn);
     // Every life begins somewhere else.
-    let life = hash(bits ^ ((params.flow_cycle + u32(turn)) * 0x85ebca6bu));
-    if (hash(life ^ 0x68bc21ebu) > params.flow_share) { return trail; }
+    let life = hash(bits ^ ((flow.cycle + u32(turn)) * 0x85ebca6bu));
+    if (hash(life ^ 0x68bc21ebu) > flow.share) { return trail; }
     let start = vec2(HALF_TURN) + number * vec2(3242174889u, 2447445414u);
     trail.place = vec2(unit(start.x + jittered(life)), unit(start.y + jittered(hash(life))));
     trail.open = 1.0;
-    let share = (max(trail.age - TRAIL, 0.0) - 0.5) / f32(params.flow_lead_steps);
-    for (var step = 0u; step < params.flow_lead_steps; step++) {
+    let share = (max(trail.age - TRAIL, 0.0) - 0.5) / f32(flow.lead_steps);
+    for (var step = 0u; step < flow.lead_steps; step++) {
         trail = stepped(row, trail, drift_at(row, trail.col, trail.place), share);
     }
     return trail;
@@ -77,14 +82,14 @@ fn trail_of(row: u32, slot: u32, number: u32) -> Trail {
 
 // The share of a life between two dots of a trail.
 fn dot_share(age: f32) -> f32 {
-    return min(age, TRAIL) / f32(params.particles_each - 1u);
+    return min(age, TRAIL) / f32(cells.particles_each - 1u);
 }
 
 // Dot `number` of a trail, from its end on, at the trail's place.
 fn dot_of(row: u32, slot: u32, number: u32, trail: Trail, speed: f32) -> Particle {
-    let at = clamp(i32(row) + i32(floor(trail.place.y)), 0, i32(params.rows) - 1);
-    let taper = f32(number + 1u) / f32(params.particles_each);
-    let position = clamp((speed - params.transfer_low) * params.transfer_per_unit, 0.0, 1.0);
+    let at = clamp(i32(row) + i32(floor(trail.place.y)), 0, i32(grid.rows) - 1);
+    let taper = f32(number + 1u) / f32(cells.particles_each);
+    let position = clamp((speed - values.transfer_low) * values.transfer_per_unit, 0.0, 1.0);
     // A trail grows out of nothing, so that its dots are as dense at any age.
     let alive = min(trail.age / TRAIL, 1.0) * clamp((1.0 - trail.age) * FADING, 0.0, 1.0);
     var particle: Particle;
@@ -93,12 +98,12 @@ fn dot_of(row: u32, slot: u32, number: u32, trail: Trail, speed: f32) -> Particl
     particle.east = trail.place.x;
     particle.south = trail.place.y - f32(at - i32(row));
     // As much for each pixel of a trail, whatever its length.
-    let spacing_px = min(speed, params.flow_most_m_s) * params.flow_px_per_m_s * dot_share(trail.age);
+    let spacing_px = min(speed, flow.most_m_s) * flow.px_per_m_s * dot_share(trail.age);
     let at_color = u32(nearest(position * 255.0));
-    var opacity = params.depth_floor + (1.0 - params.depth_floor) * sqrt(position);
-    if (params.shape_table == 1u) { opacity = f32(palette[256u + at_color] & 0xffffu) / 65535.0; }
+    var opacity = particles.depth_floor + (1.0 - particles.depth_floor) * sqrt(position);
+    if (values.has_shape == 1u) { opacity = f32(palette[256u + at_color] & 0xffffu) / 65535.0; }
     opacity *= clamp(spacing_px / FULL_SPACING_PX, LEAST_SHARE, 1.0);
-    particle.depth = params.optical_depth * opacity * taper * taper * alive * trail.open;
+    particle.depth = particles.optical_depth * opacity * taper * taper * alive * trail.open;
     particle.color = palette[at_color] | (u32(nearest(taper * 255.0)) << 24u);
     return particle;
 }

@@ -4,11 +4,13 @@
 //! is at an instant follows from its number and the clock alone, so any worker draws it at the same place.
 
 pub mod cpu;
+pub mod params;
 
 use crate::error::RenderError;
 use crate::frame_context::FrameContext;
 use crate::gpu::{Gpu, Kernel, Slot};
 use crate::stages::layout::{GROUP, Velocity};
+use crate::stages::params::Uniform::{Grid, Values};
 
 /// The functions of a particle that drifts; [`trails`](crate::passes::trails) runs them.
 pub const FUNCTIONS: &str = include_str!("flow.wgsl");
@@ -29,20 +31,21 @@ impl Flow {
     /// Compiles `source`, [`SOURCE`] but for tests.
     pub fn new(gpu: &Gpu, source: &str) -> Self {
         Self {
-            velocities: gpu.kernel("velocities", source, "velocities"),
+            velocities: gpu
+                .kernel("velocities", source, "velocities")
+                .reading(&[Grid, Values]),
         }
     }
 
     /// Fills the slot of velocities.
     pub fn record(&self, frame: &mut FrameContext<'_>) -> Result<(), RenderError> {
-        let cells = frame.params.rows * frame.params.cols;
+        let cells = frame.params.grid.rows * frame.params.grid.cols;
         let bytes = u64::from(cells) * size_of::<Velocity>() as u64;
         let velocity = frame.room(Slot::Velocity, bytes)?;
-        let [east_before, east_after] = frame.value_frames.clone();
-        let northward = frame.northward_frames.clone();
+        let [east_before, east_after] = frame.scene.value.clone();
+        let northward = frame.scene.northward.clone();
         let [north_before, north_after] = northward.ok_or(RenderError::NoNorthward)?;
         let buffers = [
-            (0, &frame.params_buffer),
             (1, &east_before),
             (2, &east_after),
             (3, &north_before),

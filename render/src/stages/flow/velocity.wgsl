@@ -11,9 +11,9 @@ const MOST_SPEED = 1.0e6;
 @compute @workgroup_size(GROUP)
 fn velocities(@builtin(global_invocation_id) global: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>) {
     let cell = list_index(global, workgroups);
-    if (cell >= params.rows * params.cols) { return; }
-    let east = interpolated(east_before[cell], east_after[cell], params.value_weight);
-    let north = interpolated(north_before[cell], north_after[cell], params.northward_weight);
+    if (cell >= grid.rows * grid.cols) { return; }
+    let east = interpolated(east_before[cell], east_after[cell], values.weight);
+    let north = interpolated(north_before[cell], north_after[cell], values.northward_weight);
     if (is_missing(east) || is_missing(north)) {
         velocity[cell] = Velocity(MISSING, MISSING);
     } else {

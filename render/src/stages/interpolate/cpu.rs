@@ -1,6 +1,7 @@
 //! CPU twin of `interpolate.wgsl`.
 
-use crate::stages::layout::{MISSING, Params, is_missing};
+use crate::stages::layout::{MISSING, is_missing};
+use crate::stages::params::Params;
 
 /// Value between two adjacent frames, `weight` of the way from `v1` to `v2` (eq. 3 in docs/method.md); missing if either is, unless the
 /// instant is that of the first frame.
@@ -22,7 +23,7 @@ pub fn interpolate(
     after: &[f32],
     between: &mut [f32],
 ) {
-    for cell in params.first_cell as usize..params.end_cell as usize {
+    for cell in params.interpolation.first_cell as usize..params.interpolation.end_cell as usize {
         between[cell] = interpolated(before[cell], after[cell], weight);
     }
 }

@@ -1,6 +1,7 @@
 //! CPU twin of `deposit.wgsl`, `light.wgsl` and `shade.wgsl`.
 
-use crate::stages::layout::{DEPTH_ONE, LOOK, Params, Splat, nearest};
+use crate::stages::layout::{DEPTH_ONE, LOOK, Splat, nearest};
+use crate::stages::params::Params;
 
 const MOST_GIVEN: f32 = 16.0;
 const DARK: u32 = 0x7fff_ffff;
@@ -15,9 +16,9 @@ struct Texel {
 }
 
 fn texel_of(params: &Params, place: [i32; 2]) -> Texel {
-    let index = place.map(|p| p.div_euclid(params.light_unit));
+    let index = place.map(|p| p.div_euclid(params.lighting.unit));
     let part = [0, 1].map(|axis| {
-        (place[axis] - index[axis] * params.light_unit) as f32 / params.light_unit as f32
+        (place[axis] - index[axis] * params.lighting.unit) as f32 / params.lighting.unit as f32
     });
     Texel { index, part }
 }
@@ -25,9 +26,9 @@ fn texel_of(params: &Params, place: [i32; 2]) -> Texel {
 fn address(params: &Params, texel: [i32; 2], slice: u32) -> Option<usize> {
     let [x, y] = texel;
     let inside =
-        x >= 0 && y >= 0 && x < params.light_width as i32 && y < params.light_height as i32;
-    let layer = slice as usize * params.light_height as usize;
-    inside.then(|| (layer + y as usize) * params.light_width as usize + x as usize)
+        x >= 0 && y >= 0 && x < params.lighting.size.x as i32 && y < params.lighting.size.y as i32;
+    let layer = slice as usize * params.lighting.size.y as usize;
+    inside.then(|| (layer + y as usize) * params.lighting.size.x as usize + x as usize)
 }
 
 /// Adds every splat's depth to the four nearest texels of the two slices whose middles it lies between.
@@ -48,7 +49,7 @@ pub fn deposit(params: &Params, splats: &[Splat], light: &mut [u32]) {
 }
 
 fn give_slice(params: &Params, texel: &Texel, slice: i32, depth: f32, light: &mut [u32]) {
-    let at = slice.clamp(0, params.slices as i32 - 1) as u32;
+    let at = slice.clamp(0, params.view.slices as i32 - 1) as u32;
     let Texel {
         index: [x, y],
         part,
@@ -70,11 +71,11 @@ fn give_slice(params: &Params, texel: &Texel, slice: i32, depth: f32, light: &mu
 
 /// Turns the depth of each slice into twice the depth above its middle; one more layer holds twice the whole.
 pub fn prefix(params: &Params, light: &mut [u32]) {
-    let layer = params.light_width as usize * params.light_height as usize;
+    let layer = params.lighting.size.x as usize * params.lighting.size.y as usize;
     let mut above = vec![0u32; layer];
     for slice in light
         .chunks_exact_mut(layer)
-        .take(params.slices as usize + 1)
+        .take(params.view.slices as usize + 1)
     {
         for (own, above) in slice.iter_mut().zip(&mut above) {
             let below = (*above + (*own).min(DARK)).min(DARK);
@@ -121,19 +122,20 @@ fn depth_before(params: &Params, light: &[u32], place: [i32; 2], slice: f32) -> 
 
 /// Share of the direct light that what the eye sees of a splat gets.
 fn lit(params: &Params, light: &[u32], splat: &Splat) -> f32 {
+    let lighting = &params.lighting;
     let (u, v) = (splat.light_u as f32, splat.light_v as f32);
     let (mut sum, mut weights) = (0.0, 0.0);
     for t in LOOKUPS {
         let step = t * splat.radius_px;
         let place = [
-            splat.light_u + nearest(step * (params.toward_u - params.toward_pull * u)),
-            splat.light_v + nearest(step * (params.toward_v - params.toward_pull * v)),
+            splat.light_u + nearest(step * (lighting.toward.x - lighting.toward_pull * u)),
+            splat.light_v + nearest(step * (lighting.toward.y - lighting.toward_pull * v)),
         ];
-        let toward = params.toward_slice - params.toward_pull * splat.slice;
-        let slice = (splat.slice + step * toward).clamp(0.0, params.slices as f32 - 0.001);
+        let toward = lighting.toward.z - lighting.toward_pull * splat.slice;
+        let slice = (splat.slice + step * toward).clamp(0.0, params.view.slices as f32 - 0.001);
         // Where little light reaches, the eye sees little past what lies in front.
         let depth = depth_before(params, light, place, slice);
-        let seen = (-params.look_power * depth).exp();
+        let seen = (-lighting.look_power * depth).exp();
         sum += seen * (-depth).exp();
         weights += seen;
     }
@@ -143,7 +145,7 @@ fn lit(params: &Params, light: &[u32], splat: &Splat) -> f32 {
 /// Dims every splat's colour by what lies between it and the sun.
 pub fn shade(params: &Params, light: &[u32], splats: &mut [Splat]) {
     for splat in splats.iter_mut().filter(|splat| splat.tau > 0.0) {
-        let direct = params.direct * lit(params, light, splat) * splat.day;
-        splat.color = dimmed(splat.color, params.ambient + direct);
+        let direct = params.lighting.direct * lit(params, light, splat) * splat.day;
+        splat.color = dimmed(splat.color, params.lighting.ambient + direct);
     }
 }

@@ -9,7 +9,7 @@ fn give(texel: vec2<i32>, slice: u32, depth: f32) {
 }
 
 fn give_slice(texel: Texel, slice: i32, depth: f32) {
-    let at = u32(clamp(slice, 0, i32(params.slices) - 1));
+    let at = u32(clamp(slice, 0, i32(view.slices) - 1));
     let east = depth * texel.part.x;
     let west = depth - east;
     give(texel.index, at, west * (1.0 - texel.part.y));

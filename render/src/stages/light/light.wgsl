@@ -17,12 +17,12 @@ fn deeper(a: u32, b: u32) -> u32 {
 @compute @workgroup_size(COLUMNS, SEGMENTS)
 fn prefix(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>,
     @builtin(local_invocation_id) local: vec3<u32>) {
-    let layer = params.light_width * params.light_height;
+    let layer = lighting.size.x * lighting.size.y;
     let column = (workgroup.y * workgroups.x + workgroup.x) * COLUMNS + local.x;
     // One layer more than slices: it receives the whole.
-    let length = (params.slices + SEGMENTS) / SEGMENTS;
-    let begin = min(local.y * length, params.slices + 1u);
-    let end = select(begin, min(begin + length, params.slices + 1u), column < layer);
+    let length = (view.slices + SEGMENTS) / SEGMENTS;
+    let begin = min(local.y * length, view.slices + 1u);
+    let end = select(begin, min(begin + length, view.slices + 1u), column < layer);
     var sum = 0u;
     for (var base = begin; base < end; base += STEP) {
         var own: array<u32, 8>;
@@ -53,11 +53,11 @@ fn prefix(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) 
 // The same without segments and without waiting: see the eye's `alone`.
 @compute @workgroup_size(GROUP)
 fn straight(@builtin(global_invocation_id) global: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>) {
-    let layer = params.light_width * params.light_height;
+    let layer = lighting.size.x * lighting.size.y;
     let column = list_index(global, workgroups);
     if (column >= layer) { return; }
     var above = 0u;
-    for (var slice = 0u; slice <= params.slices; slice++) {
+    for (var slice = 0u; slice <= view.slices; slice++) {
         let at = slice * layer + column;
         let below = deeper(above, min(light[at], DARK));
         light[at] = above + below;

@@ -4,17 +4,21 @@
 //! Depth is given in the pass that makes the splats and read in the pass that scatters them; here is the sum.
 
 pub mod cpu;
+pub mod params;
 
 use crate::error::RenderError;
 use crate::frame_context::FrameContext;
 use crate::gpu::{Gpu, Kernel};
 use crate::stages::layout::GROUP;
+use crate::stages::params::Uniform::{Lighting, View};
 
 /// The entry point that cuts columns of texels into segments; for GPUs.
 pub const SEGMENTED: &str = "prefix";
 /// The one that sums a column up in one go, without waiting; for adapters that are programs.
 pub const STRAIGHT: &str = "straight";
 
+/// Places in the light buffer.
+pub const TEXEL_FUNCTIONS: &str = include_str!("texel.wgsl");
 /// The functions that give depth to the light; [`splat`](crate::passes::splat) runs them.
 pub const DEPOSIT_FUNCTIONS: &str =
     concat!(include_str!("texel.wgsl"), include_str!("deposit.wgsl"));
@@ -22,7 +26,11 @@ pub const DEPOSIT_FUNCTIONS: &str =
 pub const SHADE_FUNCTIONS: &str = concat!(include_str!("texel.wgsl"), include_str!("shade.wgsl"));
 
 /// The shader.
-pub const SOURCE: &str = concat!(include_str!("../prelude.wgsl"), include_str!("light.wgsl"));
+pub const SOURCE: &str = concat!(
+    include_str!("../prelude.wgsl"),
+    include_str!("texel.wgsl"),
+    include_str!("light.wgsl")
+);
 
 /// The compiled stage.
 pub struct Light {
@@ -45,7 +53,9 @@ impl Light {
     /// Compiles an entry point of `source`, [`SOURCE`] but for tests.
     pub fn of(gpu: &Gpu, source: &str, entry: &str) -> Self {
         Self {
-            prefix: gpu.kernel("light", source, entry),
+            prefix: gpu
+                .kernel("light", source, entry)
+                .reading(&[View, Lighting]),
             columns: if entry == STRAIGHT { GROUP } else { 32 },
         }
     }
@@ -53,8 +63,8 @@ impl Light {
     /// Turns the depth of each slice into twice the depth above its middle.
     pub fn record(&self, frame: &mut FrameContext<'_>) -> Result<(), RenderError> {
         let light = frame.light()?;
-        let columns = frame.params.light_width * frame.params.light_height;
-        let buffers = [(0, &frame.params_buffer), (1, &light)];
+        let columns = frame.params.lighting.size.element_product();
+        let buffers = [(1, &light)];
         frame
             .recorder
             .dispatch_list(&self.prefix, &buffers, columns, self.columns);

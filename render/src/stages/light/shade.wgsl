@@ -25,16 +25,16 @@ fn depth_before(place: vec2<i32>, slice: f32) -> f32 {
 }
 
 // How far from a cloud's centre its light is looked up, radii.
-const LOOK = 0.34;
+const LOOK: f32 = 0.34;
 
 // Share of light at a place a step towards the eye times the share of what is seen there, and the latter.
 fn look(place: vec2<i32>, slice: f32, step: f32) -> vec2<f32> {
-    let toward = vec2(params.toward_u, params.toward_v) - params.toward_pull * vec2<f32>(place);
+    let toward = lighting.toward.xy - lighting.toward_pull * vec2<f32>(place);
     let there = place + vec2(nearest(step * toward.x), nearest(step * toward.y));
-    let slice_there = slice + step * (params.toward_slice - params.toward_pull * slice);
+    let slice_there = slice + step * (lighting.toward.z - lighting.toward_pull * slice);
     // Where little light reaches, the eye sees little past what lies in front.
-    let depth = depth_before(there, clamp(slice_there, 0.0, f32(params.slices) - 0.001));
-    return exp(-params.look_power * depth) * vec2(exp(-depth), 1.0);
+    let depth = depth_before(there, clamp(slice_there, 0.0, f32(view.slices) - 0.001));
+    return exp(-lighting.look_power * depth) * vec2(exp(-depth), 1.0);
 }
 
 // A splat's colour in its light, looked up before and behind the centre: one look at the centre would draw clouds too
@@ -42,5 +42,5 @@ fn look(place: vec2<i32>, slice: f32, step: f32) -> vec2<f32> {
 fn shaded(color: u32, place: vec2<i32>, slice: f32, day: f32, radius_px: f32) -> u32 {
     let sum = look(place, slice, -LOOK * radius_px) + look(place, slice, LOOK * radius_px);
     let lit = sum.x / max(sum.y, 1.0e-30);
-    return dimmed(color, params.ambient + params.direct * lit * day);
+    return dimmed(color, lighting.ambient + lighting.direct * lit * day);
 }

@@ -4,7 +4,8 @@ use std::f32::consts::TAU;
 
 use glam::{Vec2, Vec3, Vec4};
 
-use crate::stages::layout::{Axis, Params, VIEW_TILE, is_missing, nearest};
+use crate::stages::layout::{Axis, VIEW_TILE, is_missing, nearest};
+use crate::stages::params::Params;
 use crate::stages::sphere::ground_below;
 use crate::stages::uncertainty::hatched;
 
@@ -20,11 +21,11 @@ pub struct Inputs<'a> {
 
 /// Every pixel of a thematic map.
 pub fn map(params: &Params, inputs: &Inputs<'_>, picture: &mut [Vec4]) {
-    for y in 0..params.height {
-        for x in 0..params.width {
-            let at = (y * params.width + x) as usize;
-            picture[at] = if params.view == VIEW_TILE {
-                let (col, row) = (x as usize, (params.width + y) as usize);
+    for y in 0..params.view.size_px.y {
+        for x in 0..params.view.size_px.x {
+            let at = (y * params.view.size_px.x + x) as usize;
+            picture[at] = if params.view.kind == VIEW_TILE {
+                let (col, row) = (x as usize, (params.view.size_px.x + y) as usize);
                 color_at(params, inputs, [inputs.axes[col], inputs.axes[row]], [x, y])
             } else {
                 on_globe(params, inputs, [x, y])
@@ -38,9 +39,9 @@ fn on_globe(params: &Params, inputs: &Inputs<'_>, pixel: [u32; 2]) -> Vec4 {
     if !hit.on_ground {
         return Vec4::ZERO;
     }
-    let east = hit.lon_rad - params.grid_west_rad;
-    let x = (east - (east / TAU).floor() * TAU) * params.cols_per_rad - 0.5;
-    let y = (params.grid_north_rad - hit.lat_rad) * params.rows_per_rad - 0.5;
+    let east = hit.lon_rad - params.grid.west_rad;
+    let x = (east - (east / TAU).floor() * TAU) * params.grid.cols_per_rad - 0.5;
+    let y = (params.grid.north_rad - hit.lat_rad) * params.grid.rows_per_rad - 0.5;
     color_at(params, inputs, [axis_at(x), axis_at(y)], pixel)
 }
 
@@ -52,8 +53,8 @@ fn axis_at(place: f32) -> Axis {
 }
 
 fn cell_at(params: &Params, row: i32, col: i32) -> Option<usize> {
-    let (rows, cols) = (params.rows as i32, params.cols as i32);
-    let col = if params.periodic == 1 {
+    let (rows, cols) = (params.grid.rows as i32, params.grid.cols as i32);
+    let col = if params.grid.periodic == 1 {
         col.rem_euclid(cols)
     } else {
         col
@@ -104,21 +105,22 @@ fn color_at(params: &Params, inputs: &Inputs<'_>, [x, y]: [Axis; 2], pixel: [u32
         x.fraction,
     );
     let value = mix(north, south, y.fraction);
-    let mut alpha =
-        params.map_alpha * ((value.y - 0.5) * params.edge_sharpness + 0.5).clamp(0.0, 1.0);
+    let mut alpha = params.thematic.alpha
+        * ((value.y - 0.5) * params.thematic.edge_sharpness + 0.5).clamp(0.0, 1.0);
     if alpha <= 0.0 {
         return Vec4::ZERO;
     }
-    let position =
-        ((value.x / value.y - params.transfer_low) * params.transfer_per_unit).clamp(0.0, 1.0);
+    let position = ((value.x / value.y - params.values.transfer_low)
+        * params.values.transfer_per_unit)
+        .clamp(0.0, 1.0);
     let at = nearest(position * 255.0) as usize;
-    if params.shape_table == 1 {
+    if params.values.has_shape == 1 {
         alpha *= (palette[256 + at] & 0xffff) as f32 / 65535.0;
     }
     let color = palette[at];
     let channel = |shift: u32| ((color >> shift) & 255) as f32 / 255.0;
     let mut rgb = Vec3::new(channel(0), channel(8), channel(16));
-    if params.uncertainty == 1 {
+    if params.values.has_uncertainty == 1 {
         let uncertainty = uncertainty_at(params, inputs.uncertainty, [x, y]);
         rgb = hatched(params, rgb, uncertainty, pixel);
     }

@@ -1,4 +1,6 @@
 // Thematic map: the interpolated grid, bilinear between cells with data, in the colours of the transfer function.
+struct MapParams { alpha: f32, edge_sharpness: f32 }
+@group(0) @binding(26) var<uniform> thematic: MapParams;
 @group(0) @binding(1) var<storage, read> value_grid: array<f32>;
 @group(0) @binding(2) var<storage, read> palette: array<u32>;
 @group(0) @binding(3) var<storage, read> axes: array<Axis>;
@@ -12,12 +14,12 @@ const NO_CELL = 0xffffffffu;
 
 fn cell_at(row: i32, col: i32) -> u32 {
     var x = col;
-    let cols = i32(params.cols);
-    if (params.periodic == 1u) { x = (x % cols + cols) % cols; }
-    if (x < 0 || x >= cols || row < 0 || row >= i32(params.rows)) { return NO_CELL; }
-    let cell = u32(row) * params.cols + u32(x);
-    if (cell < params.held_first_cell || cell >= params.held_end_cell) { return NO_CELL; }
-    return cell - params.held_first_cell;
+    let cols = i32(grid.cols);
+    if (grid.periodic == 1u) { x = (x % cols + cols) % cols; }
+    if (x < 0 || x >= cols || row < 0 || row >= i32(grid.rows)) { return NO_CELL; }
+    let cell = u32(row) * grid.cols + u32(x);
+    if (cell < grid.held_first_cell || cell >= grid.held_end_cell) { return NO_CELL; }
+    return cell - grid.held_first_cell;
 }
 
 // Value and 1, or zeros where there is no data.
@@ -46,14 +48,14 @@ fn color_at(x: Axis, y: Axis, pixel: vec2<u32>) -> vec4<f32> {
     let south = mix(cell_value(y.index + 1, x.index), cell_value(y.index + 1, x.index + 1), x.fraction);
     let value = mix(north, south, y.fraction);
     // Half the weight on data: the edge of the data runs between cell centres, one pixel soft.
-    var alpha = params.map_alpha * clamp((value.y - 0.5) * params.edge_sharpness + 0.5, 0.0, 1.0);
+    var alpha = thematic.alpha * clamp((value.y - 0.5) * thematic.edge_sharpness + 0.5, 0.0, 1.0);
     if (alpha <= 0.0) { return vec4(0.0); }
-    let position = clamp((value.x / value.y - params.transfer_low) * params.transfer_per_unit, 0.0, 1.0);
+    let position = clamp((value.x / value.y - values.transfer_low) * values.transfer_per_unit, 0.0, 1.0);
     let at = u32(nearest(position * 255.0));
-    if (params.shape_table == 1u) { alpha *= f32(palette[256u + at] & 0xffffu) / 65535.0; }
+    if (values.has_shape == 1u) { alpha *= f32(palette[256u + at] & 0xffffu) / 65535.0; }
     let color = palette[at];
     var rgb = vec3(f32(color & 255u), f32((color >> 8u) & 255u), f32((color >> 16u) & 255u)) / 255.0;
-    if (params.uncertainty == 1u) { rgb = hatched(rgb, uncertainty_at(x, y), pixel); }
+    if (values.has_uncertainty == 1u) { rgb = hatched(rgb, uncertainty_at(x, y), pixel); }
     return vec4(rgb, 1.0) * alpha;
 }
 
@@ -64,10 +66,10 @@ fn axis_at(place: f32) -> Axis {
 
 @compute @workgroup_size(SCREEN_TILE_PX, SCREEN_TILE_PX)
 fn map(@builtin(global_invocation_id) pixel: vec3<u32>) {
-    if (pixel.x >= params.width || pixel.y >= params.height) { return; }
-    let at = pixel.y * params.width + pixel.x;
-    if (params.view == VIEW_TILE) {
-        picture[at] = color_at(axes[pixel.x], axes[params.width + pixel.y], pixel.xy);
+    if (any(pixel.xy >= view.size_px)) { return; }
+    let at = pixel.y * view.size_px.x + pixel.x;
+    if (view.kind == VIEW_TILE) {
+        picture[at] = color_at(axes[pixel.x], axes[view.size_px.x + pixel.y], pixel.xy);
         return;
     }
     let hit = ground_below(pixel.xy);
@@ -75,8 +77,8 @@ fn map(@builtin(global_invocation_id) pixel: vec3<u32>) {
         picture[at] = vec4(0.0);
         return;
     }
-    let east = hit.lon - params.grid_west_rad;
-    let x = (east - floor(east / TURN) * TURN) * params.cols_per_rad - 0.5;
-    let y = (params.grid_north_rad - hit.lat) * params.rows_per_rad - 0.5;
+    let east = hit.lon - grid.west_rad;
+    let x = (east - floor(east / TURN) * TURN) * grid.cols_per_rad - 0.5;
+    let y = (grid.north_rad - hit.lat) * grid.rows_per_rad - 0.5;
     picture[at] = color_at(axis_at(x), axis_at(y), pixel.xy);
 }

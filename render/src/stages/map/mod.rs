@@ -1,11 +1,13 @@
 //! Thematic maps: the grid at an instant in, the colour of every pixel out. See `map.wgsl`.
 
 pub mod cpu;
+pub mod params;
 
 use crate::error::RenderError;
 use crate::frame_context::FrameContext;
 use crate::gpu::{Gpu, Kernel, Slot};
 use crate::stages::layout::Axis;
+use crate::stages::params::Uniform::{Grid, Thematic, Values, View};
 
 /// The shader.
 pub const SOURCE: &str = concat!(
@@ -24,7 +26,9 @@ impl Map {
     /// Compiles `source`, [`SOURCE`] but for tests.
     pub fn new(gpu: &Gpu, source: &str) -> Self {
         Self {
-            map: gpu.kernel("map", source, "map"),
+            map: gpu
+                .kernel("map", source, "map")
+                .reading(&[View, Grid, Values, Thematic]),
         }
     }
 
@@ -42,10 +46,10 @@ impl Map {
         }
         let picture = frame.room(Slot::Picture, frame.pixel_count() * 16)?;
         // Bound but never read where uncertainty is not drawn.
+        let scene = &frame.scene;
         let [uncertainty_before, uncertainty_after] =
-            frame.uncertainties.as_ref().unwrap_or(&frame.value_frames);
+            scene.uncertainties.as_ref().unwrap_or(&scene.value);
         let buffers = [
-            (0, &frame.params_buffer),
             (1, &value),
             (2, &palette),
             (3, &axes),
@@ -53,11 +57,8 @@ impl Map {
             (5, uncertainty_before),
             (6, uncertainty_after),
         ];
-        frame.recorder.dispatch(
-            &self.map,
-            &buffers,
-            [frame.params.tiles_x, frame.params.tiles_y],
-        );
+        let groups = frame.params.view.tiles.to_array();
+        frame.recorder.dispatch(&self.map, &buffers, groups);
         Ok(())
     }
 }

@@ -1,8 +1,9 @@
 //! CPU twin of `particles.wgsl`.
 
 use crate::stages::layout::{
-    Active, Params, Particle, Row, WATER_BLUE, WATER_GREEN, WATER_RED, is_missing, nearest,
+    Active, Particle, Row, WATER_BLUE, WATER_GREEN, WATER_RED, is_missing, nearest,
 };
+use crate::stages::params::Params;
 use crate::stages::uncertainty::uncertain;
 
 /// 0.5 in 32 bits.
@@ -33,7 +34,7 @@ pub fn unit(bits: u32) -> f32 {
 
 /// Random bits spread evenly round 0 over the mode's share of a cell.
 pub fn jittered(params: &Params, bits: u32) -> u32 {
-    (bits >> params.jitter_shift).wrapping_sub(HALF_TURN >> params.jitter_shift)
+    (bits >> params.particles.jitter_shift).wrapping_sub(HALF_TURN >> params.particles.jitter_shift)
 }
 
 /// Thin at both ends of a column, so that particles appear and vanish unseen; mean 1.
@@ -42,16 +43,16 @@ pub fn envelope(phase: f32) -> f32 {
 }
 
 fn strength_of(params: &Params, value: f32, position: f32) -> f32 {
-    if params.diverging == 0 {
+    if params.particles.diverging == 0 {
         position
     } else {
-        (value.abs() * params.strength_per_unit).clamp(0.0, 1.0)
+        (value.abs() * params.particles.strength_per_unit).clamp(0.0, 1.0)
     }
 }
 
 /// A colour seen through so much of the sea: what is lost of it is the water's own (Beer-Lambert).
 pub fn through_water(params: &Params, color: u32, depth_m: f32) -> u32 {
-    let kept = (-params.sea_per_m * depth_m).exp();
+    let kept = (-params.particles.sea_per_m * depth_m).exp();
     let channel = |water: f32, shift: u32| {
         let water = water * 255.0;
         let own = ((color >> shift) & 255) as f32;
@@ -66,14 +67,15 @@ pub fn through_water(params: &Params, color: u32, depth_m: f32) -> u32 {
 /// One particle for every active cell and `k` below `particles_per_cell`, cell by cell.
 pub fn generate(params: &Params, inputs: &Inputs<'_>, particles: &mut [Particle]) {
     for (i, particle) in particles.iter_mut().enumerate() {
-        let cell = inputs.active[i / params.particles_per_cell as usize];
-        let k = i as u32 % params.particles_per_cell;
+        let cell = inputs.active[i / params.cells.particles_per_cell as usize];
+        let k = i as u32 % params.cells.particles_per_cell;
         *particle = one(params, inputs, cell, k);
     }
 }
 
 fn one(params: &Params, inputs: &Inputs<'_>, cell: Active, k: u32) -> Particle {
-    let row = cell.cell / params.cols;
+    let (own, values) = (&params.particles, &params.values);
+    let row = cell.cell / params.grid.cols;
     let value = inputs.value[cell.cell as usize];
     let bits = hash(hash(cell.cell) ^ k.wrapping_mul(0x9e3779b9));
     let along = |step: u32, bits: u32| {
@@ -82,7 +84,7 @@ fn one(params: &Params, inputs: &Inputs<'_>, cell: Active, k: u32) -> Particle {
             .wrapping_add(jittered(params, bits))
     };
     let (east, south) = (along(3242174889, bits), along(2447445414, hash(bits)));
-    let across = (cell.cell % params.cols).wrapping_mul(1779033704);
+    let across = (cell.cell % params.grid.cols).wrapping_mul(1779033704);
     let start = row
         .wrapping_add(k)
         .wrapping_mul(2654435769)
@@ -98,33 +100,32 @@ fn one(params: &Params, inputs: &Inputs<'_>, cell: Active, k: u32) -> Particle {
         return particle;
     }
     let mut carbon = 0.0;
-    if params.has_accumulated == 1 {
+    if values.has_accumulated == 1 {
         carbon = inputs.accumulated[cell.cell as usize];
         if is_missing(carbon) {
             carbon = 0.0;
         }
     }
-    let turned = unit(start.wrapping_add(hash(bits ^ 0x85ebca6b) >> 3))
-        + params.turns_per_kg_m2 * carbon.abs();
+    let turned =
+        unit(start.wrapping_add(hash(bits ^ 0x85ebca6b) >> 3)) + own.turns_per_kg_m2 * carbon.abs();
     let phase = turned - turned.floor();
-    let column_m =
-        (carbon * params.height_m_per_kg_m2).clamp(-params.height_limit_m, params.height_limit_m);
-    let position = ((value - params.transfer_low) * params.transfer_per_unit).clamp(0.0, 1.0);
+    let column_m = (carbon * own.height_m_per_kg_m2).clamp(-own.height_limit_m, own.height_limit_m);
+    let position = ((value - values.transfer_low) * values.transfer_per_unit).clamp(0.0, 1.0);
     let strength = strength_of(params, value, position);
-    particle.height_m = column_m * phase + params.sheet_m * (phase - 0.5);
+    particle.height_m = column_m * phase + own.sheet_m * (phase - 0.5);
     particle.mass_kg =
-        carbon * inputs.rows[row as usize].area_m2 / params.particles_per_cell as f32;
+        carbon * inputs.rows[row as usize].area_m2 / params.cells.particles_per_cell as f32;
     let at = nearest(position * 255.0) as usize;
-    let mut opacity = params.depth_floor + (1.0 - params.depth_floor) * strength.sqrt();
+    let mut opacity = own.depth_floor + (1.0 - own.depth_floor) * strength.sqrt();
     let mut size = nearest(strength * 255.0) as u32;
-    if params.shape_table == 1 {
+    if values.has_shape == 1 {
         let shape = inputs.palette[256 + at];
         opacity = (shape & 0xffff) as f32 / 65535.0;
         size = shape >> 16;
     }
-    particle.depth = params.optical_depth * opacity * envelope(phase);
+    particle.depth = own.optical_depth * opacity * envelope(phase);
     particle.color = inputs.palette[at] | (size << 24);
-    if params.sea_per_m > 0.0 && particle.height_m < 0.0 {
+    if own.sea_per_m > 0.0 && particle.height_m < 0.0 {
         particle.color = through_water(params, particle.color, -particle.height_m);
     }
     match inputs.uncertainty.get(cell.cell as usize) {

@@ -4,6 +4,7 @@
 //! where carbon leaves the sea and down where it enters, and without a jump at any step of the product.
 
 pub mod cpu;
+pub mod params;
 
 /// The functions of the shader; [`splat`](crate::passes::splat) runs them.
 pub const FUNCTIONS: &str = include_str!("particles.wgsl");

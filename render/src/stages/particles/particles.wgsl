@@ -1,5 +1,11 @@
 // A particle of a cell: place, height, mass, optical depth and colour. Reads `rows` and `palette`, whose second half holds
 // opacity and size where users gave any.
+struct ParticleParams {
+    jitter_shift: u32, diverging: u32, strength_per_unit: f32, depth_floor: f32, optical_depth: f32,
+    height_m_per_kg_m2: f32, height_limit_m: f32, sheet_m: f32, turns_per_kg_m2: f32, sea_per_m: f32,
+}
+@group(0) @binding(20) var<uniform> particles: ParticleParams;
+
 const HALF_TURN = 0x80000000u; // 0.5 in 32 bits
 
 // Output permutation of a 32-bit linear congruential generator (PCG-RXS-M-XS, O'Neill 2014).
@@ -16,7 +22,7 @@ fn unit(bits: u32) -> f32 {
 
 // Random bits spread evenly round 0 over the mode's share of a cell.
 fn jittered(bits: u32) -> u32 {
-    return (bits >> params.jitter_shift) - (HALF_TURN >> params.jitter_shift);
+    return (bits >> particles.jitter_shift) - (HALF_TURN >> particles.jitter_shift);
 }
 
 // Thin at both ends of a column, so that particles appear and vanish unseen; mean 1.
@@ -25,13 +31,13 @@ fn envelope(phase: f32) -> f32 {
 }
 
 fn strength_of(value: f32, position: f32) -> f32 {
-    if (params.diverging == 0u) { return position; }
-    return clamp(abs(value) * params.strength_per_unit, 0.0, 1.0);
+    if (particles.diverging == 0u) { return position; }
+    return clamp(abs(value) * particles.strength_per_unit, 0.0, 1.0);
 }
 
 // A colour seen through so much of the sea: what is lost of it is the water's own (Beer-Lambert).
 fn through_water(color: u32, depth_m: f32) -> u32 {
-    let kept = exp(-params.sea_per_m * depth_m);
+    let kept = exp(-particles.sea_per_m * depth_m);
     let water = vec3(WATER_RED, WATER_GREEN, WATER_BLUE) * 255.0;
     let rgb = water + (vec3(f32(color & 255u), f32((color >> 8u) & 255u), f32((color >> 16u) & 255u)) - water) * kept;
     return u32(nearest(rgb.x)) | (u32(nearest(rgb.y)) << 8u) | (u32(nearest(rgb.z)) << 16u) | (color & 0xff000000u);
@@ -40,7 +46,7 @@ fn through_water(color: u32, depth_m: f32) -> u32 {
 // Particle `k` of a cell with data; `slot` is its column in the table, `carbon` what it has accumulated, kg m-2.
 fn particle_of(row: u32, slot: u32, k: u32, value: f32, carbon: f32) -> Particle {
     let col = cols[slot].index;
-    let cell = row * params.cols + col;
+    let cell = row * grid.cols + col;
     let bits = hash(hash(cell) ^ (k * 0x9e3779b9u));
     // An additive sequence (R2, Roberts 2018) round the cell's centre, jittered by random numbers: little for clouds,
     // which then cover the sea evenly, wholly for dots, which must not stand in rows. Golden sections up the column.
@@ -51,23 +57,23 @@ fn particle_of(row: u32, slot: u32, k: u32, value: f32, carbon: f32) -> Particle
     particle.slot = slot;
     particle.east = unit(place.x + jittered(bits));
     particle.south = unit(place.y + jittered(hash(bits)));
-    let phase = fract(unit(start + (hash(bits ^ 0x85ebca6bu) >> 3u)) + params.turns_per_kg_m2 * abs(carbon));
-    let column_m = clamp(carbon * params.height_m_per_kg_m2, -params.height_limit_m, params.height_limit_m);
-    let position = clamp((value - params.transfer_low) * params.transfer_per_unit, 0.0, 1.0);
+    let phase = fract(unit(start + (hash(bits ^ 0x85ebca6bu) >> 3u)) + particles.turns_per_kg_m2 * abs(carbon));
+    let column_m = clamp(carbon * particles.height_m_per_kg_m2, -particles.height_limit_m, particles.height_limit_m);
+    let position = clamp((value - values.transfer_low) * values.transfer_per_unit, 0.0, 1.0);
     let strength = strength_of(value, position);
-    particle.height_m = column_m * phase + params.sheet_m * (phase - 0.5);
-    particle.mass_kg = carbon * rows[row].area_m2 / f32(params.particles_per_cell);
+    particle.height_m = column_m * phase + particles.sheet_m * (phase - 0.5);
+    particle.mass_kg = carbon * rows[row].area_m2 / f32(cells.particles_per_cell);
     let at = u32(nearest(position * 255.0));
-    var opacity = params.depth_floor + (1.0 - params.depth_floor) * sqrt(strength);
+    var opacity = particles.depth_floor + (1.0 - particles.depth_floor) * sqrt(strength);
     var size = u32(nearest(strength * 255.0));
-    if (params.shape_table == 1u) {
+    if (values.has_shape == 1u) {
         let shape = palette[256u + at];
         opacity = f32(shape & 0xffffu) / 65535.0;
         size = shape >> 16u;
     }
-    particle.depth = params.optical_depth * opacity * envelope(phase);
+    particle.depth = particles.optical_depth * opacity * envelope(phase);
     particle.color = palette[at] | (size << 24u);
-    if (params.sea_per_m > 0.0 && particle.height_m < 0.0) {
+    if (particles.sea_per_m > 0.0 && particle.height_m < 0.0) {
         particle.color = through_water(particle.color, -particle.height_m);
     }
     return particle;

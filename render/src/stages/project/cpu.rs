@@ -2,7 +2,8 @@
 
 use glam::{Vec2, Vec3};
 
-use crate::stages::layout::{Col, Params, Particle, Row, SUBPIXELS, Splat, VIEW_TILE, nearest};
+use crate::stages::layout::{Col, Particle, Row, SUBPIXELS, Splat, VIEW_TILE, nearest};
+use crate::stages::params::Params;
 
 /// Half a cell beyond which the series for small angles is not good enough.
 const WIDE_CELL_RAD: f32 = 0.2;
@@ -17,7 +18,7 @@ pub fn project(
 ) {
     for (splat, particle) in splats.iter_mut().zip(particles) {
         let (row, col) = (&rows[particle.row as usize], &cols[particle.slot as usize]);
-        *splat = if params.view == VIEW_TILE {
+        *splat = if params.view.kind == VIEW_TILE {
             on_tile(params, row, col, particle)
         } else {
             on_globe(params, row, col, particle)
@@ -38,12 +39,12 @@ pub fn turned(sin_a: f32, cos_a: f32, delta: f32) -> Vec2 {
 }
 
 fn slice_of(params: &Params, coordinate: f32) -> f32 {
-    ((params.slice_top - coordinate) * params.slices_per_unit)
-        .clamp(0.0, params.slices as f32 - 0.001)
+    ((params.projection.slice_top - coordinate) * params.projection.slices_per_unit)
+        .clamp(0.0, params.view.slices as f32 - 0.001)
 }
 
 fn size_of(params: &Params, color: u32) -> f32 {
-    1.0 + params.size_spread * ((color >> 24) as f32 / 255.0 - 1.0)
+    1.0 + params.projection.size_spread * ((color >> 24) as f32 / 255.0 - 1.0)
 }
 
 /// Where a particle's place lies on the globe, length 1.
@@ -56,49 +57,46 @@ fn normal_of(params: &Params, row: &Row, col: &Col, particle: &Particle) -> Vec3
     let lon = turned(
         col.sin_lon,
         col.cos_lon,
-        (particle.east - 0.5) * params.lon_span_rad,
+        (particle.east - 0.5) * params.projection.lon_span_rad,
     );
     Vec3::new(lat.y * lon.x, lat.y * lon.y, lat.x)
 }
 
 /// Share of direct light at a place: 0 on the night side, with dusk between.
 fn day_at(params: &Params, normal: Vec3) -> f32 {
-    let sun = vector(params.sun_x, params.sun_y, params.sun_z);
+    let sun = params.view.sun;
     smoothstep(-0.15, 0.35, normal.dot(sun))
 }
 
 fn on_tile(params: &Params, row: &Row, col: &Col, particle: &Particle) -> Splat {
+    let projection = &params.projection;
     let subpixels = SUBPIXELS as f32;
     let ground_y = row.y_sub + nearest(particle.south * row.y_span_px * subpixels);
     let x_sub = col.x_sub + nearest(particle.east * col.x_span_px * subpixels);
     let radius = row.radius * size_of(params, particle.color);
-    let radius_px = radius.clamp(params.min_radius_px, params.max_radius_px);
+    let radius_px = radius.clamp(projection.min_radius_px, projection.max_radius_px);
     let thinned = row.radius / radius_px;
     let tau = particle.depth * row.depth_gain * thinned * thinned;
     Splat {
         x_sub,
-        y_sub: ground_y - nearest(particle.height_m * params.height_px_per_m * subpixels),
+        y_sub: ground_y - nearest(particle.height_m * projection.height_px_per_m * subpixels),
         radius_px,
         tau,
         slice: slice_of(params, particle.height_m),
         light_u: x_sub
-            + nearest(particle.height_m * params.light_shift_x_per_m)
-            + params.light_origin_x,
+            + nearest(particle.height_m * projection.light_shift_per_m.x)
+            + projection.light_origin.x,
         light_v: ground_y
-            + nearest(particle.height_m * params.light_shift_y_per_m)
-            + params.light_origin_y,
-        light_depth: tau * radius_px * radius_px * params.light_depth_gain,
-        day: if params.day_on == 1 {
+            + nearest(particle.height_m * projection.light_shift_per_m.y)
+            + projection.light_origin.y,
+        light_depth: tau * radius_px * radius_px * projection.light_depth_gain,
+        day: if projection.day_on == 1 {
             day_at(params, normal_of(params, row, col, particle))
         } else {
             1.0
         },
         color: particle.color,
     }
-}
-
-fn vector(x: f32, y: f32, z: f32) -> Vec3 {
-    Vec3::new(x, y, z)
 }
 
 /// Is a place beyond the horizon of the sea surface, or of its own sphere when below it?
@@ -111,48 +109,43 @@ fn is_hidden(normal: Vec3, distance: f32, camera: Vec3) -> bool {
 }
 
 fn on_globe(params: &Params, row: &Row, col: &Col, particle: &Particle) -> Splat {
+    let (view, projection) = (&params.view, &params.projection);
     let normal = normal_of(params, row, col, particle);
-    let distance = 1.0 + particle.height_m * params.per_earth_radius_m;
+    let distance = 1.0 + particle.height_m * projection.per_earth_radius_m;
     let place = normal * distance;
-    let camera = vector(params.eye_x, params.eye_y, params.eye_z);
+    let camera = view.eye;
     let sight = place - camera;
-    let ahead = sight.dot(vector(params.forward_x, params.forward_y, params.forward_z));
+    let ahead = sight.dot(view.forward);
     if ahead < 0.01 * (camera.dot(camera) - 1.0) || is_hidden(normal, distance, camera) {
         return Splat::default();
     }
-    let scale = params.focal_px / ahead;
-    let x = sight.dot(vector(params.right_x, params.right_y, params.right_z)) * scale
-        + params.center_px_x;
-    let y = params.center_px_y - sight.dot(vector(params.up_x, params.up_y, params.up_z)) * scale;
+    let scale = view.focal_px / ahead;
+    let x = sight.dot(view.right) * scale + view.center_px.x;
+    let y = view.center_px.y - sight.dot(view.up) * scale;
     let oblique = (sight.length() / ahead).sqrt();
     let full_px = row.radius * scale * oblique;
     let radius_px = full_px * size_of(params, particle.color);
-    if x.abs().max(y.abs()) > 1.0e5 || radius_px > params.max_radius_px {
+    if x.abs().max(y.abs()) > 1.0e5 || radius_px > projection.max_radius_px {
         return Splat::default();
     }
-    let radius_px = radius_px.max(params.min_radius_px);
+    let radius_px = radius_px.max(projection.min_radius_px);
     let thinned = full_px / radius_px;
-    let u =
-        place.dot(vector(params.light_u_x, params.light_u_y, params.light_u_z)) - params.light_u0;
-    let v =
-        place.dot(vector(params.light_v_x, params.light_v_y, params.light_v_z)) - params.light_v0;
-    let to_light = params.light_texels_per_unit * params.light_unit as f32;
+    let u = place.dot(projection.light_u) - projection.light_u0;
+    let v = place.dot(projection.light_v) - projection.light_v0;
+    let to_light = projection.light_texels_per_unit * params.lighting.unit as f32;
     Splat {
-        x_sub: nearest(x * SUBPIXELS as f32) - params.origin_x_px * SUBPIXELS,
-        y_sub: nearest(y * SUBPIXELS as f32) - params.origin_y_px * SUBPIXELS,
+        x_sub: nearest(x * SUBPIXELS as f32) - view.origin_px.x * SUBPIXELS,
+        y_sub: nearest(y * SUBPIXELS as f32) - view.origin_px.y * SUBPIXELS,
         radius_px,
         tau: particle.depth * row.depth_gain * thinned * thinned,
-        slice: slice_of(
-            params,
-            place.dot(vector(params.half_x, params.half_y, params.half_z)),
-        ),
+        slice: slice_of(params, place.dot(projection.half)),
         light_u: nearest(u * to_light),
         light_v: nearest(v * to_light),
         light_depth: particle.depth
             * row.depth_gain
             * row.radius
             * row.radius
-            * params.light_depth_gain,
+            * projection.light_depth_gain,
         day: day_at(params, normal),
         color: particle.color,
     }

@@ -4,6 +4,7 @@
 //! that they are the same for every tile. Globe views use eq. 4 (docs/method.md) and slices across the half-way vector.
 
 pub mod cpu;
+pub mod params;
 
 /// The functions of the shader; [`splat`](crate::passes::splat) runs them.
 pub const FUNCTIONS: &str = include_str!("project.wgsl");

@@ -22,12 +22,12 @@ fn velocities_match_their_twin() {
     assert!(expected.iter().any(|v| *v > 0.5) && expected.contains(&MISSING));
     for (right, wrong) in [
         (
-            "north_after[cell], params.northward_weight",
+            "north_after[cell], values.northward_weight",
             "north_after[cell], 0.0",
         ),
         (
             "is_missing(east) || is_missing(north)",
-            "is_missing(east) && params.rows == 0u",
+            "is_missing(east) && grid.rows == 0u",
         ),
     ] {
         prove("velocities", flow::SOURCE, right, wrong, |gpu, source| {
@@ -47,21 +47,21 @@ fn velocities_match_their_twin() {
 #[test]
 fn drifting_splats_match_their_twins_on_tiles_and_on_the_globe() {
     let faults = [
-        ("-drawn.y * params", "drawn.y * params"),
+        ("-drawn.y * flow", "drawn.y * flow"),
         ("0.5 * share * here.rate", "share * here.rate"),
-        ("params.flow_cycle + u32(turn)", "params.flow_cycle"),
+        ("flow.cycle + u32(turn)", "flow.cycle"),
         ("x = (x % cols + cols) % cols;", ""),
         ("min(trail.open, here.open)", "trail.open"),
     ];
     let views = [tile(2, 0, 1, 256), globe(-178.0, 10.0, 1.5e7, 160)];
     for view in views {
         let twins = Twins::of_flow(view);
-        let expected = splat_numbers(twins.params.kernel, &twins.splats, &twins.splats);
+        let expected = splat_numbers(twins.params.lists.kernel, &twins.splats, &twins.splats);
         let drawn = twins.splats.iter().filter(|splat| splat.tau > 0.05).count();
         assert!(drawn > 1000, "{drawn} dots");
         for (right, wrong) in faults {
             prove("trails", trails::SOURCE, right, wrong, |gpu, source| {
-                let stage = Trails::of(gpu, source, SHARED_PROBES);
+                let stage = Trails::new(gpu, source, SHARED_PROBES);
                 let given = |f: &mut FrameContext<'_>| {
                     drop(f.upload(Slot::Velocity, &twins.velocity).unwrap());
                 };
@@ -73,7 +73,7 @@ fn drifting_splats_match_their_twins_on_tiles_and_on_the_globe() {
                     twins.stored(),
                 );
                 let drawn = splat_numbers(
-                    twins.params.kernel,
+                    twins.params.lists.kernel,
                     &twins.in_order(&seen, &lit),
                     &twins.splats,
                 );

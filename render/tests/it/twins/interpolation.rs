@@ -1,8 +1,9 @@
 //! Interpolation and its twin.
 
 use render::gpu::Slot;
+use render::stages::interpolate::params::InterpolateParams;
 use render::stages::interpolate::{self, Interpolate};
-use render::stages::layout::{MISSING, Params};
+use render::stages::layout::MISSING;
 
 use super::{Twins, prove};
 use crate::compare::worst;
@@ -10,12 +11,12 @@ use crate::compare::worst;
 #[test]
 fn interpolate_matches_its_twin() {
     let twins = Twins::tile();
-    let params = Params {
+    let mut params = twins.params;
+    params.interpolation = InterpolateParams {
         first_cell: 40,
         end_cell: 2500,
-        ..twins.params
     };
-    let cells = params.first_cell as usize..params.end_cell as usize;
+    let cells = 40..2500;
     let expected = &twins.value[cells.clone()];
     // A device may round a product and its sum at once, the twin rounds twice: an error of the largest operand's last
     // bits, which is all there is where two frames cancel.
@@ -23,12 +24,12 @@ fn interpolate_matches_its_twin() {
         .iter()
         .filter(|v| **v > MISSING)
         .fold(0.0f32, |most, v| most.max(v.abs()));
-    let right = "value_weight);\n";
+    let right = "values.weight);\n";
     prove(
         "interpolate",
         interpolate::SOURCE,
         right,
-        "value_weight * 0.5);\n",
+        "values.weight * 0.5);\n",
         |gpu, source| {
             let stage = Interpolate::new(gpu, source);
             let [drawn] = twins.run_with(

@@ -30,7 +30,7 @@ fn light_is_given_and_lists_are_counted_as_the_twins_do() {
             ),
         ] {
             prove("splat", splat::SOURCE, right, wrong, |gpu, source| {
-                let stage = Splats::of(gpu, source, probes);
+                let stage = Splats::new(gpu, source, probes);
                 let lists = u64::from(list_count(&twins.params)) * 4;
                 let [first, second] = twins.stored();
                 let [seen, lit, light, counts] = twins.run_with(
@@ -70,7 +70,7 @@ fn neighbours_share_the_lengths_of_lists() {
         "atomicAdd(&counts[key & ~LIST_KEY], ",
         "atomicAdd(&counts[key & ~LIST_KEY], 1u + ",
         |gpu, source| {
-            let stage = Splats::of(gpu, source, SHARED_PROBES);
+            let stage = Splats::new(gpu, source, SHARED_PROBES);
             let [first, second] = twins.stored();
             let [seen, lit, counts] = twins.run_with(
                 gpu,

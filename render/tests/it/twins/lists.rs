@@ -46,13 +46,13 @@ fn same_lists(a: &[Vec<[u32; 3]>], b: &[Vec<[u32; 3]>]) -> bool {
 fn the_lists_hold_every_stored_splat_once_and_in_its_light() {
     for twins in [Twins::tile(), Twins::globe()] {
         let distance = |gpu: &Gpu, bin_source: &str, (scatter_source, probes): (&str, u32)| {
-            let splats = Splats::of(gpu, splat::SOURCE, SHARED_PROBES);
+            let splats = Splats::new(gpu, splat::SOURCE, SHARED_PROBES);
             let light = Light::new(gpu);
             let bin = Bin::new(gpu, bin_source);
-            let scatter = Scatter::of(gpu, scatter_source, probes);
+            let scatter = Scatter::new(gpu, scatter_source, probes);
             let mut params = twins.params;
             // Rounding may put a few more splats into a list than the twins have.
-            params.entry_capacity += params.entry_capacity / 8 + 1024;
+            params.lists.entry_capacity += params.lists.entry_capacity / 8 + 1024;
             let [first, second] = twins.stored();
             let [seen, lit, above, ends, entries] = twins.run_with(
                 gpu,
@@ -71,7 +71,7 @@ fn the_lists_hold_every_stored_splat_once_and_in_its_light() {
                     (Slot::Counts, u64::from(list_count(&params)) * 4),
                     (
                         Slot::Entries,
-                        u64::from(params.entry_capacity) * size_of::<Entry>() as u64,
+                        u64::from(params.lists.entry_capacity) * size_of::<Entry>() as u64,
                     ),
                 ],
             );

@@ -14,19 +14,19 @@ use bytemuck::Pod;
 use contract::job::{Mode, RenderJob, Style, View};
 use glam::Vec4;
 use render::Scene;
-use render::frame_context::{FrameContext, SceneBuffers};
+use render::frame_context::FrameContext;
 use render::gpu::{Gpu, Slot, Workspace};
 use render::passes::splat::unpacked;
 use render::plan::Plan;
+use render::playback::Playback;
 use render::stages::bin;
 use render::stages::compose::in_context::Surroundings;
 use render::stages::flow::cpu::Field;
 use render::stages::flow::{self};
-use render::stages::layout::{
-    Active, Entry, KERNEL_CLOUD, LIGHT_OWN, Params, Particle, Splat, Velocity,
-};
+use render::stages::layout::{Active, Entry, KERNEL_CLOUD, LIGHT_OWN, Particle, Splat, Velocity};
 use render::stages::light;
 use render::stages::map::{self};
+use render::stages::params::Params;
 use render::stages::particles::cpu::Inputs;
 use render::stages::sizes::{HALF_BYTES, list_count, stored_at, texel_count};
 use render::stages::{compose, eye, interpolate, particles, project, uncertainty};
@@ -85,13 +85,17 @@ impl Twins {
         let mode = job.mode;
         let plan = Plan::new(job, &scene, u64::MAX).unwrap();
         let mut params = plan.params_of(plan.parts()[0]);
-        let value = between(&params, Some(&scene.value), params.value_weight);
+        let value = between(&params, Some(&scene.value), params.values.weight);
         let carbon = scene.accumulated.as_ref();
-        let accumulated = between(&params, carbon, params.accumulated_weight);
-        let northward = between(&params, scene.northward.as_ref(), params.northward_weight);
+        let accumulated = between(&params, carbon, params.values.accumulated_weight);
+        let northward = between(
+            &params,
+            scene.northward.as_ref(),
+            params.values.northward_weight,
+        );
         let uncertainty = uncertainty::between(&params, &scene.value);
         let mut particles =
-            vec![Particle::default(); plan.active.len() * params.particles_per_cell as usize];
+            vec![Particle::default(); plan.active.len() * params.cells.particles_per_cell as usize];
         let inputs = Inputs {
             active: &plan.active,
             rows: &plan.rows,
@@ -100,7 +104,7 @@ impl Twins {
             palette: &plan.palette,
             uncertainty: &uncertainty,
         };
-        let mut picture = vec![Vec4::ZERO; (params.width * params.height) as usize];
+        let mut picture = vec![Vec4::ZERO; params.view.size_px.element_product() as usize];
         let (mut splats, mut deposited, mut light) =
             (vec![Splat::default(); particles.len()], vec![], vec![]);
         let (mut list_ends, mut entries, mut velocity) = (vec![], vec![], vec![]);
@@ -121,7 +125,7 @@ impl Twins {
             }
             project::cpu::project(&params, &plan.rows, &plan.cols, &particles, &mut splats);
             let mut shaded = splats.clone();
-            if params.light_on == LIGHT_OWN {
+            if params.lighting.mode == LIGHT_OWN {
                 light = vec![0; texel_count(&params)];
                 light::cpu::deposit(&params, &splats, &mut light);
                 deposited.clone_from(&light);
@@ -132,11 +136,11 @@ impl Twins {
             bin::cpu::count(&params, &shaded, &mut list_ends);
             entries = vec![Entry::default(); bin::cpu::scan(&mut list_ends) as usize];
             bin::cpu::scatter(&params, &shaded, &mut list_ends, &mut entries);
-            params.entry_capacity = entries.len() as u32;
+            params.lists.entry_capacity = entries.len() as u32;
             eye::cpu::eye(&params, &list_ends, &entries, &mut picture);
         }
         let mut image = vec![0; picture.len()];
-        if params.in_context == 1 {
+        if params.in_context {
             let around = Surroundings {
                 domain: scene.domain.content(),
                 terrain: scene.terrain.as_ref().unwrap().heights_m(),
@@ -202,29 +206,7 @@ impl Twins {
         outputs: [(Slot, u64); N],
     ) -> [Vec<u8>; N] {
         let mut workspace = Workspace::default();
-        let buffer = |cells: &[f32]| gpu.storage("frame", cells).unwrap();
-        let pair = |i: &render::Interval| {
-            [
-                buffer(i.before.cells.content()),
-                buffer(i.after.cells.content()),
-            ]
-        };
-        let scene = SceneBuffers {
-            value: pair(&self.scene.value),
-            accumulated: self.scene.accumulated.as_ref().map(pair),
-            northward: self.scene.northward.as_ref().map(pair),
-            domain: gpu.storage("domain", self.scene.domain.content()).unwrap(),
-            uncertainties: Some(
-                [&self.scene.value.before, &self.scene.value.after]
-                    .map(|frame| buffer(frame.uncertainties().content())),
-            ),
-            terrain: self
-                .scene
-                .terrain
-                .as_ref()
-                .map(|terrain| buffer(terrain.heights_m())),
-            light: None,
-        };
+        let scene = Playback::upload(gpu, &self.scene).unwrap();
         let mut frame = FrameContext::new(gpu, &mut workspace, &self.plan, *params, scene).unwrap();
         fill(&mut frame);
         record(&mut frame);
@@ -237,22 +219,22 @@ impl Twins {
     fn in_order(&self, seen: &[u8], lit: &[u8]) -> Vec<Splat> {
         let words = |half: &[u8]| bytemuck::pod_collect_to_vec::<u8, [u32; 4]>(half);
         let (seen, lit) = (words(seen), words(lit));
-        let each = self.params.particles_per_cell;
+        let each = self.params.cells.particles_per_cell;
         let at = |cell: &Active, k: u32| {
-            let down = cell.cell / self.params.cols - self.params.first_row;
+            let down = cell.cell / self.params.grid.cols - self.params.cells.first_row;
             stored_at(&self.params, down, cell.slot, k)
         };
         let active = self.plan.active.iter();
         active
             .flat_map(|cell| (0..each).map(move |k| (cell, k)))
             .map(|(cell, k)| at(cell, k))
-            .map(|at| unpacked(seen[at], lit[at], self.params.entry_shift))
+            .map(|at| unpacked(seen[at], lit[at], self.params.lists.entry_shift))
             .collect()
     }
 
     /// Both halves of the stored splats.
     fn stored(&self) -> [(Slot, u64); 2] {
-        let bytes = u64::from(self.params.splat_count) * HALF_BYTES;
+        let bytes = u64::from(self.params.cells.splat_count) * HALF_BYTES;
         [(Slot::Seen, bytes), (Slot::Lit, bytes)]
     }
 }

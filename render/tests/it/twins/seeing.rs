@@ -96,7 +96,7 @@ fn what_lies_behind_a_covered_tile_is_left_out_and_not_missed() {
 fn eye_blends_away_from_the_light_behind_as_its_twin_does() {
     let mut twins = Twins::of(Mode::Volume, globe(-120.0, 10.0, 1.5e7, 96));
     let front = twins.picture.clone();
-    twins.params.front_to_back = 0;
+    twins.params.view.front_to_back = 0;
     eye::cpu::eye(
         &twins.params,
         &twins.list_ends,
@@ -113,8 +113,8 @@ fn eye_blends_away_from_the_light_behind_as_its_twin_does() {
     prove(
         "eye",
         eye::SOURCE,
-        "params.front_to_back == 1u",
-        "params.front_to_back == 0u",
+        "view.front_to_back == 1u",
+        "view.front_to_back == 0u",
         |gpu, source| {
             let image = eye_image(&twins, gpu, source, eye::SHARED);
             far_apart(&image, &expected, 1.01)

@@ -40,9 +40,9 @@ fn splats_match_their_twins_on_tiles_and_on_the_globe() {
         ),
     ];
     for (twins, right, wrong) in faults {
-        let expected = splat_numbers(twins.params.kernel, &twins.splats, &twins.splats);
+        let expected = splat_numbers(twins.params.lists.kernel, &twins.splats, &twins.splats);
         prove("splat", splat::SOURCE, right, wrong, |gpu, source| {
-            let stage = Splats::of(gpu, source, SHARED_PROBES);
+            let stage = Splats::new(gpu, source, SHARED_PROBES);
             let outputs = twins.stored();
             let [seen, lit] = twins.run_with(
                 gpu,
@@ -54,7 +54,7 @@ fn splats_match_their_twins_on_tiles_and_on_the_globe() {
             // Colours are bytes and may round to a neighbour; a phase of a few turns loses a few bits.
             worst(
                 &splat_numbers(
-                    twins.params.kernel,
+                    twins.params.lists.kernel,
                     &twins.in_order(&seen, &lit),
                     &twins.splats,
                 ),
@@ -93,16 +93,16 @@ fn splats_in_the_sea_and_in_the_night_match_their_twins() {
         &everything(Mode::Volume, tile(1, 0, 0, 256)),
         with_terrain(FIVE_DEGREES),
     );
-    let expected = splat_numbers(twins.params.kernel, &twins.splats, &twins.splats);
+    let expected = splat_numbers(twins.params.lists.kernel, &twins.splats, &twins.splats);
     for (right, wrong) in [
-        ("exp(-params.sea_per_m", "exp(-0.5 * params.sea_per_m"),
+        ("exp(-particles.sea_per_m", "exp(-0.5 * particles.sea_per_m"),
         (
             "day_at(normal_of(particle))",
             "day_at(-normal_of(particle))",
         ),
     ] {
         prove("splat", splat::SOURCE, right, wrong, |gpu, source| {
-            let stage = Splats::of(gpu, source, SHARED_PROBES);
+            let stage = Splats::new(gpu, source, SHARED_PROBES);
             let [seen, lit] = twins.run_with(
                 gpu,
                 &twins.params,
@@ -112,7 +112,7 @@ fn splats_in_the_sea_and_in_the_night_match_their_twins() {
             );
             worst(
                 &splat_numbers(
-                    twins.params.kernel,
+                    twins.params.lists.kernel,
                     &twins.in_order(&seen, &lit),
                     &twins.splats,
                 ),

@@ -1,0 +1,25 @@
+//! What composition reads: mirrored in `in_context.wgsl`.
+
+shared_struct! {
+    /// What surrounds the particles.
+    pub struct ContextParams {
+        /// 1: the globe, or the terrain of a tile, is seen.
+        pub surface: u32,
+        /// 1: the sea has a colour of its own, into which what lies in it fades.
+        pub has_water: u32,
+        /// 1: thematic maps are dimmed where it is night.
+        pub night_on: u32,
+        pub terrain_on: u32,
+        /// Exaggeration over eight earth radii, m⁻¹: from sums of differences for each radian to slopes.
+        pub terrain_slope: f32,
+        /// Extinction of the sea for each metre below its level that the sea floor lies at.
+        pub seabed_per_m: f32,
+        pub coast_on: u32,
+        /// 1: coast lines lie over the picture, as on maps; else under it.
+        pub coast_above: u32,
+        pub coast_grey: f32,
+        pub coast_alpha: f32,
+        /// Words of the coast mask in a row of the whole picture.
+        pub coast_row_words: u32,
+    }
+}
