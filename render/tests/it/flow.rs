@@ -399,7 +399,7 @@ fn a_globe_from_near_has_room_for_the_cells_in_sight_alone_and_shows_them_all() 
                 near.params.view.eye.z,
             ]
             .map(f64::from);
-            x * eye[0] + y * eye[1] + z * eye[2] > f64::from(near.params.cells.cap_least) + 1e-6
+            x * eye[0] + y * eye[1] + z * eye[2] > f64::from(near.params.view.cap_least) + 1e-6
         };
         let listed = |col: u32| near.cols.iter().any(|own| own.index == col);
         let mut seen = 0;
