@@ -1,13 +1,8 @@
 //! Which cells the passes over particles draw: mirrored in `order.wgsl`.
 
-use glam::Vec3;
-
 shared_struct! {
     /// Which cells are drawn, and how their particles are spread over invocations.
     pub struct CellParams {
-        /// Towards the middle of the cap that is drawn, of any length, and what a cell's place times it is at least (globe).
-        pub cap: Vec3,
-        pub cap_least: f32,
         /// Rows of the grid from `first_row` on, and columns of the table, whose cells may be drawn.
         pub first_row: u32,
         pub row_count: u32,

@@ -1,6 +1,5 @@
 // Which cells are drawn, and how their particles are spread over invocations.
 struct CellParams {
-    cap: vec3<f32>, cap_least: f32,
     first_row: u32, row_count: u32, slot_count: u32, particles_per_cell: u32, particles_each: u32, splat_count: u32,
 }
 @group(0) @binding(19) var<uniform> cells: CellParams;

@@ -35,7 +35,7 @@ fn is_in_cap(row: u32, slot: u32) -> bool {
     let lat = rows[row];
     let lon = cols[slot];
     let center = vec3(lat.cos_lat * lon.sin_lon, lat.cos_lat * lon.cos_lon, lat.sin_lat);
-    return dot(center, cells.cap) >= cells.cap_least;
+    return dot(center, view.cap) >= view.cap_least;
 }
 
 fn store_nothing(at: u32) {

@@ -317,9 +317,10 @@ fn choose_cells(plan: &mut Plan, scene: &Scene, camera: &Camera, footprint: &Foo
         })
         .collect();
     let distance = camera.place.length();
+    let view = &mut plan.params.view;
+    view.cap = (center * distance).as_vec3();
+    view.cap_least = (drawn.cos() * distance) as f32;
     let cells = &mut plan.params.cells;
-    cells.cap = (center * distance).as_vec3();
-    cells.cap_least = (drawn.cos() * distance) as f32;
     cells.slot_count = plan.cols.len() as u32;
     // Rows with a middle in the cap, one more on either side: the cap itself is tested cell by cell.
     let below = center.z.clamp(-1.0, 1.0).asin();

@@ -423,7 +423,7 @@ fn is_in_cap(params: &Params, row: &Row, col: &Col) -> bool {
         row.cos_lat * col.cos_lon,
         row.sin_lat,
     );
-    params.view.kind == VIEW_TILE || center.dot(params.cells.cap) >= params.cells.cap_least
+    params.view.kind == VIEW_TILE || center.dot(params.view.cap) >= params.view.cap_least
 }
 
 /// Area of the cells of every row, m².

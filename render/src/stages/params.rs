@@ -34,6 +34,9 @@ shared_struct! {
         pub sun: Vec3,
         /// 1: the sun is given in east, north and up of every place; else in the axes of eq. 4 (docs/method.md).
         pub sun_is_local: u32,
+        /// Towards the middle of the cap that is drawn, of any length, and what a cell's place times it is at least (globe).
+        pub cap: Vec3,
+        pub cap_least: f32,
         /// Of the part drawn.
         pub size_px: UVec2,
         /// Left and top of the part drawn (globe views are drawn in parts).

@@ -6,7 +6,7 @@ struct ViewParams {
     right: vec3<f32>, kind: u32,
     up: vec3<f32>, slices: u32,
     forward: vec3<f32>, front_to_back: u32,
-    sun: vec3<f32>, sun_is_local: u32,
+    sun: vec3<f32>, sun_is_local: u32, cap: vec3<f32>, cap_least: f32,
     size_px: vec2<u32>, origin_px: vec2<i32>, center_px: vec2<f32>, tiles: vec2<u32>,
 }
 @group(0) @binding(16) var<uniform> view: ViewParams;
