@@ -3,6 +3,10 @@
 use super::pipelines::Pipelines;
 use super::{Checks, Gpu};
 
+/// Uniform buffers that one kernel may read. Mesa 22.3's software adapter (Debian 12) writes beyond an array of its own
+/// while it compiles a kernel that decides by a ninth (seen with valgrind).
+const MOST_UNIFORMS: usize = 8;
+
 /// A compute pipeline.
 pub struct Kernel {
     pub(super) pipeline: wgpu::ComputePipeline,
@@ -51,8 +55,17 @@ impl Kernel {
     }
 
     /// With the structs of parameters that it reads, which are bound at every dispatch.
+    ///
+    /// # Panics
+    /// More than eight of them: memory of the process would be overwritten at random on some adapters.
     #[must_use]
     pub fn reading<U: Copy + Into<u32>>(mut self, uniforms: &[U]) -> Self {
+        assert!(
+            uniforms.len() <= MOST_UNIFORMS,
+            "the kernel {} reads {} structs of parameters",
+            self.label,
+            uniforms.len()
+        );
         self.uniforms = uniforms.iter().map(|&number| number.into()).collect();
         self
     }

@@ -61,6 +61,9 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) -> f64 {
         most_cols: (TAU / dlon_rad) as f32,
         most_m_s: (MOST_OVER_TOP * top_m_s) as f32,
         px_per_m_s: (life_cells * cell_px / top_m_s) as f32,
+        transfer_low: params.values.transfer_low,
+        transfer_per_unit: params.values.transfer_per_unit,
+        has_shape: params.values.has_shape,
     };
     // Born in the middle of their lives.
     0.5 * MOST_OVER_TOP * life_rad

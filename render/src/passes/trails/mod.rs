@@ -8,7 +8,7 @@ use crate::frame_context::FrameContext;
 use crate::gpu::{Gpu, Kernel, Slot};
 use crate::passes::store::Stored;
 use crate::stages::params::Uniform::{
-    Cells, Flow, Grid, Lighting, Lists, Particles, Projection, Values, View,
+    Cells, Flow, Grid, Lighting, Lists, Particles, Projection, View,
 };
 use crate::stages::sizes::workgroups;
 
@@ -38,7 +38,7 @@ impl Trails {
     pub fn new(gpu: &Gpu, source: &str, probes: u32) -> Self {
         Self {
             trails: super::compiled(gpu, "trails", source, probes).reading(&[
-                View, Grid, Values, Cells, Particles, Flow, Projection, Lighting, Lists,
+                View, Grid, Cells, Particles, Flow, Projection, Lighting, Lists,
             ]),
         }
     }

@@ -5,7 +5,7 @@
 // must be looked for beyond the edge of a picture.
 struct FlowParams {
     turn: f32, cycle: u32, share: u32, lead_steps: u32, cols_per_m_s: f32, rows_per_m_s: f32, most_cols: f32,
-    most_m_s: f32, px_per_m_s: f32,
+    most_m_s: f32, px_per_m_s: f32, transfer_low: f32, transfer_per_unit: f32, has_shape: u32,
 }
 @group(0) @binding(21) var<uniform> flow: FlowParams;
 
@@ -89,7 +89,7 @@ fn dot_share(age: f32) -> f32 {
 fn dot_of(row: u32, slot: u32, number: u32, trail: Trail, speed: f32) -> Particle {
     let at = clamp(i32(row) + i32(floor(trail.place.y)), 0, i32(grid.rows) - 1);
     let taper = f32(number + 1u) / f32(cells.particles_each);
-    let position = clamp((speed - values.transfer_low) * values.transfer_per_unit, 0.0, 1.0);
+    let position = clamp((speed - flow.transfer_low) * flow.transfer_per_unit, 0.0, 1.0);
     // A trail grows out of nothing, so that its dots are as dense at any age.
     let alive = min(trail.age / TRAIL, 1.0) * clamp((1.0 - trail.age) * FADING, 0.0, 1.0);
     var particle: Particle;
@@ -101,7 +101,7 @@ fn dot_of(row: u32, slot: u32, number: u32, trail: Trail, speed: f32) -> Particl
     let spacing_px = min(speed, flow.most_m_s) * flow.px_per_m_s * dot_share(trail.age);
     let at_color = u32(nearest(position * 255.0));
     var opacity = particles.depth_floor + (1.0 - particles.depth_floor) * sqrt(position);
-    if (values.has_shape == 1u) { opacity = f32(palette[256u + at_color] & 0xffffu) / 65535.0; }
+    if (flow.has_shape == 1u) { opacity = f32(palette[256u + at_color] & 0xffffu) / 65535.0; }
     opacity *= clamp(spacing_px / FULL_SPACING_PX, LEAST_SHARE, 1.0);
     particle.depth = particles.optical_depth * opacity * taper * taper * alive * trail.open;
     particle.color = palette[at_color] | (u32(nearest(taper * 255.0)) << 24u);

@@ -20,5 +20,9 @@ shared_struct! {
         pub most_m_s: f32,
         /// Pixels on the equator, or below the camera, that 1 m/s drifts through in a life.
         pub px_per_m_s: f32,
+        /// Of `ValueParams`: a kernel may read few structs (see `Kernel::reading`).
+        pub transfer_low: f32,
+        pub transfer_per_unit: f32,
+        pub has_shape: u32,
     }
 }
