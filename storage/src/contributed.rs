@@ -18,9 +18,9 @@ use contract::kind::Vouched;
 use contract::product::ProductId;
 use contract::time::{Period, TimeMs};
 
-use crate::frames::shape_only;
+use crate::parquet_table::{self, shape_only};
 use crate::sound::damage;
-use crate::{StorageError, Store, parquet_table};
+use crate::{StorageError, Store};
 
 const CHUNKS_PER_GROUP: usize = 64;
 

@@ -22,9 +22,10 @@ use contract::kind::Vouched;
 use contract::product::ProductId;
 use contract::time::{Period, TimeMs};
 
-use crate::parquet_table::{self, Table};
+use crate::off_thread::off_thread;
+use crate::parquet_table::{self, Table, shape_only, value_field};
 use crate::row_check::RowCheck;
-use crate::sound::{self, damage, off_thread};
+use crate::sound::{self, damage};
 use crate::values::{ValuesDigest, no_data_alike};
 use crate::{Encoded, StorageError, Store};
 
@@ -53,11 +54,6 @@ pub static SCHEMA_1: LazyLock<SchemaRef> = LazyLock::new(|| {
         Field::new("values", DataType::List(value_field()), false),
     ]))
 });
-
-/// The item of a list of values: f32, never null; NaN is no data.
-pub(crate) fn value_field() -> Arc<Field> {
-    Arc::new(Field::new("item", DataType::Float32, false))
-}
 
 /// A frame of `values` (`[row, col]`, stored unit, NaN no data) as bytes.
 pub fn encode(grid: &Grid, values: &[f32], period: Period) -> Result<Encoded, StorageError> {
@@ -151,18 +147,6 @@ fn decode(
             Err(damaged("its values are not those of its name".to_owned()))
         }
         _ => Ok((values, period)),
-    }
-}
-
-/// A grid of which only the shape is known.
-pub(crate) fn shape_only(rows: u32, cols: u32) -> Grid {
-    Grid {
-        rows,
-        cols,
-        north_deg: 0.0,
-        west_deg: 0.0,
-        dlat_deg: 0.0,
-        dlon_deg: 0.0,
     }
 }
 

@@ -12,6 +12,7 @@ pub mod frames;
 pub mod gc;
 pub mod log;
 pub mod manifests;
+mod off_thread;
 mod parquet_table;
 pub mod row_check;
 pub mod series;

@@ -1,9 +1,12 @@
 //! One record batch to sealed Parquet bytes and back, with the same bytes for the same values.
 
+use std::sync::Arc;
+
 use arrow::array::{Array as _, ArrayRef, ListArray, PrimitiveArray, RecordBatch};
 use arrow::compute::concat_batches;
-use arrow::datatypes::{ArrowPrimitiveType, DataType, SchemaRef};
+use arrow::datatypes::{ArrowPrimitiveType, DataType, Field, SchemaRef};
 use bytes::Bytes;
+use contract::grid::Grid;
 use contract::key::ObjectKey;
 use parquet::arrow::ArrowWriter;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
@@ -60,6 +63,23 @@ pub(crate) fn encode_as(
 pub(crate) struct Table {
     pub(crate) batch: RecordBatch,
     pub(crate) shape: Vec<u32>,
+}
+
+/// The item of a list of values: f32, never null; NaN is no data.
+pub(crate) fn value_field() -> Arc<Field> {
+    Arc::new(Field::new("item", DataType::Float32, false))
+}
+
+/// A grid of which only the shape is known.
+pub(crate) fn shape_only(rows: u32, cols: u32) -> Grid {
+    Grid {
+        rows,
+        cols,
+        north_deg: 0.0,
+        west_deg: 0.0,
+        dlat_deg: 0.0,
+        dlon_deg: 0.0,
+    }
 }
 
 /// How tables are written.
@@ -150,10 +170,8 @@ pub(crate) fn row_values<T: ArrowPrimitiveType>(
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use arrow::array::{Float32Builder, ListBuilder, UInt32Array};
-    use arrow::datatypes::{Field, Schema};
+    use arrow::datatypes::Schema;
     use parquet::file::metadata::{PageIndexPolicy, ParquetMetaDataReader};
 
     use super::*;

@@ -12,11 +12,12 @@ use contract::key::ObjectKey;
 use contract::kind::Vouched;
 use contract::product::ProductId;
 
-use crate::frames::{shape_only, value_field};
+use crate::off_thread::off_thread;
+use crate::parquet_table::{self, shape_only, value_field};
 use crate::row_check::RowCheck;
-use crate::sound::{damage, off_thread};
+use crate::sound::damage;
 use crate::values::{ValuesDigest, no_data_alike};
-use crate::{Encoded, StorageError, Store, parquet_table};
+use crate::{Encoded, StorageError, Store};
 
 /// Rows and columns of a block: a point reads 64 cells, 94 KiB for a year of days.
 pub const BLOCK_CELLS: u32 = 8;

@@ -6,6 +6,7 @@
 //! what is read in parts is checked row by row ([`crate::row_check`]).
 
 pub mod damage;
+mod object;
 mod png;
 pub mod seal;
 
@@ -13,11 +14,24 @@ use bytes::Bytes;
 use contract::digest::Digest;
 use contract::key::ObjectKey;
 use contract::kind::{Kind, Vouched};
-use parquet::file::metadata::ParquetMetaDataReader;
 use serde::Deserialize;
 
-use crate::{StorageError, contributed, frames, series};
+use crate::StorageError;
+use crate::off_thread::off_thread;
 use seal::Seal;
+
+pub use object::of_object;
+
+/// Kinds that are JSON documents, sealed or of before that.
+const DOCUMENTS: [Kind; 7] = [
+    Kind::Manifest,
+    Kind::Sums,
+    Kind::ObservationIndex,
+    Kind::ObservationFile,
+    Kind::Reading,
+    Kind::Check,
+    Kind::Protocol,
+];
 
 /// Version of a document's schema from which it is sealed.
 const SEALED_SCHEMA: u32 = 2;
@@ -49,18 +63,9 @@ pub(crate) fn of_bytes(key: &ObjectKey, content: &[u8]) -> Result<Soundness, Sto
         (Vouched::Nothing, Some(Kind::Weights | Kind::Accumulating)) => {
             (seal::of_parquet(content), false)
         }
-        (
-            Vouched::Nothing,
-            Some(
-                Kind::Manifest
-                | Kind::Sums
-                | Kind::ObservationIndex
-                | Kind::ObservationFile
-                | Kind::Reading
-                | Kind::Check
-                | Kind::Protocol,
-            ),
-        ) => (seal::of_json(content), false),
+        (Vouched::Nothing, Some(kind)) if DOCUMENTS.contains(&kind) => {
+            (seal::of_json(content), false)
+        }
         (Vouched::Nothing, Some(Kind::Tile)) => {
             return png::check(content).map_or_else(damaged, |()| Ok(Soundness::Sound));
         }
@@ -83,53 +88,6 @@ pub(crate) async fn of_large(key: &ObjectKey, content: &Bytes) -> Result<Soundne
     off_thread(move || of_bytes(&key, &content)).await
 }
 
-/// All that can be known of an object from itself: its bytes, and its values where these name it.
-pub fn of_object(key: &ObjectKey, content: &Bytes) -> Result<Soundness, StorageError> {
-    let found = of_bytes(key, content)?;
-    match (key.vouches(), Kind::of(key)) {
-        (Vouched::Values(_), Some(Kind::Series)) => {
-            series::decode(key, content.clone())?;
-        }
-        (Vouched::Values(_), Some(Kind::Contributed)) => {
-            contributed::check(key, content.clone())?;
-        }
-        (Vouched::Values(_), _) => frames::check_values(key, content.clone())?,
-        (
-            Vouched::Nothing,
-            Some(
-                Kind::Manifest
-                | Kind::Sums
-                | Kind::ObservationIndex
-                | Kind::ObservationFile
-                | Kind::Reading
-                | Kind::Check
-                | Kind::Protocol,
-            ),
-        ) => {
-            check_document(key, content, found)?;
-        }
-        (Vouched::Nothing, Some(Kind::Weights | Kind::Accumulating)) => {
-            // Where the end of a file is damaged, no seal is found either.
-            ParquetMetaDataReader::new()
-                .parse_and_finish(content)
-                .map_err(|e| damage::found(key, e))?;
-        }
-        (Vouched::Nothing, Some(Kind::Landing)) => {
-            // The name of a note ends in the place that it holds.
-            let told = std::str::from_utf8(content)
-                .ok()
-                .and_then(|text| text.parse::<contract::topic::Origin>().ok())
-                .map(|origin| format!("-{}-{}", origin.partition, origin.offset));
-            if !told.is_some_and(|told| key.as_str().ends_with(&told)) {
-                return Err(damage::found(key, "it is not of the notice in its name"));
-            }
-            return Ok(Soundness::Sound);
-        }
-        _ => {}
-    }
-    Ok(found)
-}
-
 /// Is a document of a version that is sealed sealed?
 pub(crate) fn check_document(
     key: &ObjectKey,
@@ -146,22 +104,6 @@ pub(crate) fn check_document(
         return Err(damage::found(key, "its seal is gone"));
     }
     Ok(())
-}
-
-/// Work that takes long, where nobody waits for the thread.
-pub(crate) async fn off_thread<T: Send + 'static>(
-    work: impl FnOnce() -> Result<T, StorageError> + Send + 'static,
-) -> Result<T, StorageError> {
-    match tokio::task::spawn_blocking(work).await {
-        Ok(done) => done,
-        Err(ended) => match ended.try_into_panic() {
-            Ok(panic) => std::panic::resume_unwind(panic),
-            Err(cancelled) => Err(StorageError::Object {
-                key: "a thread".to_owned(),
-                source: cancelled.into(),
-            }),
-        },
-    }
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ use contract::product::ProductId;
 use futures::{StreamExt as _, TryStreamExt as _, stream};
 use serde::Serialize;
 
+use crate::off_thread::off_thread;
 use crate::sound::{self, Soundness};
 use crate::{StorageError, Store, document};
 
@@ -133,7 +134,7 @@ pub async fn run(
 /// `Damaged` if it is not.
 pub async fn sound(store: &Store, key: &ObjectKey) -> Result<(), StorageError> {
     let (own, content) = (key.clone(), store.fetch(key).await?);
-    sound::off_thread(move || sound::of_object(&own, &content).map(|_soundness| ())).await
+    off_thread(move || sound::of_object(&own, &content).map(|_soundness| ())).await
 }
 
 /// Those of these objects that are damaged, and may be made again.
@@ -177,7 +178,7 @@ async fn check(store: &Store, key: &ObjectKey) -> Result<Checked, StorageError> 
         Err(e) => return Err(e),
     };
     let (own, bytes) = (key.clone(), content.len() as u64);
-    match sound::off_thread(move || sound::of_object(&own, &content)).await {
+    match off_thread(move || sound::of_object(&own, &content)).await {
         Ok(soundness) => Ok(Checked::Sound(soundness, bytes)),
         Err(StorageError::Damaged { reason, .. }) => Ok(Checked::Damaged(reason)),
         Err(e) => Err(e),

@@ -1,7 +1,7 @@
 //! One bit of a stored object flipped, whichever object and whichever bit: it is found, named and counted.
 
 use super::*;
-use crate::{Store, document, domain, manifests, verify, weights};
+use crate::{Store, contributed, document, domain, frames, manifests, series, verify, weights};
 use contract::grid::Grid;
 use contract::manifest::{MANIFEST_SCHEMA, Manifest, SeriesSegment, Step};
 use contract::product::ProductId;

@@ -13,6 +13,7 @@ use super::settings::RetryLimits;
 use super::{
     MAX_OBJECT_BYTES, PART_BYTES, PARTS_AT_ONCE, Place, Store, failed, folder, hdfs, path,
 };
+use crate::off_thread::off_thread;
 use crate::{StorageError, sound};
 
 /// Above this size an object that is named by its content is sent to a cloud in parts.
@@ -81,7 +82,7 @@ impl Store {
         let theirs = self.fetch(key).await?;
         let of = |key: &ObjectKey, content: &Bytes| {
             let (key, content) = (key.clone(), content.clone());
-            sound::off_thread(move || sound::of_object(&key, &content))
+            off_thread(move || sound::of_object(&key, &content))
         };
         match of(key, &theirs).await {
             Ok(_sound) => Ok(false),
