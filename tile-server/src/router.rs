@@ -1,16 +1,21 @@
 //! Every address of the server, in one place.
 
-use axum::Router;
+use std::time::Duration;
+
+use axum::error_handling::HandleErrorLayer;
 use axum::http::Method;
 use axum::middleware::{from_fn, from_fn_with_state};
 use axum::routing::get;
+use axum::{BoxError, Router};
 use tower::ServiceBuilder;
+use tower::timeout::TimeoutLayer;
 use tower_http::catch_panic::CatchPanicLayer;
 use tower_http::compression::CompressionLayer;
 use tower_http::cors::{Any, CorsLayer};
+use tower_http::set_header::response::SetMultipleResponseHeadersLayer;
 
 use crate::error::ServerError;
-use crate::middleware::{limits, panics::CountPanics, security, track};
+use crate::middleware::{body, panics::CountPanics, security, track};
 use crate::routes::picture::{COVERED, SHOWN_TIME};
 use crate::routes::{
     area, budget, check, events, globe, health, legend, metrics, observations, openapi, palettes,
@@ -25,16 +30,22 @@ pub fn router(state: AppState) -> Router {
         .allow_origin(Any)
         .allow_methods([Method::GET, Method::HEAD])
         .expose_headers([SHOWN_TIME, COVERED]);
+    // What a request waited for goes on after its time only if somebody else waits for it too.
+    let limit_s = state.settings.request_limit_s;
+    let timed_out = move |_elapsed: BoxError| async move { ServerError::TimedOut { limit_s } };
     let layers = ServiceBuilder::new()
         .layer(from_fn_with_state(state.clone(), track::count))
-        .layer(from_fn(security::headers))
+        .layer(SetMultipleResponseHeadersLayer::overriding(
+            security::HEADERS.map(Into::into).into(),
+        ))
         .layer(other_origins)
         .layer(CompressionLayer::new())
         .layer(CatchPanicLayer::custom(CountPanics(
             state.metrics.panics.clone(),
         )))
-        .layer(from_fn_with_state(state.clone(), limits::time))
-        .layer(from_fn(limits::body));
+        .layer(HandleErrorLayer::new(timed_out))
+        .layer(TimeoutLayer::new(Duration::from_secs(limit_s)))
+        .layer(from_fn(body::limit));
     Router::new()
         .route("/tiles/{product}/{mode_json}", get(tilejson::get))
         .route("/tiles/{product}/{mode}/{z}/{x}/{y_png}", get(tiles::get))

@@ -1,16 +1,14 @@
 //! Headers that tell browsers what the viewer may do: load from here, and nowhere else.
 
-use axum::extract::Request;
 use axum::http::{HeaderName, HeaderValue, header};
-use axum::middleware::Next;
-use axum::response::Response;
 
 /// The globe library makes workers and pictures from `blob:`, and compiles machine code for the browser; its widgets set styles.
 const POLICY: &str = "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; worker-src 'self' blob:; \
     img-src 'self' data: blob:; connect-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; object-src 'none'; \
     base-uri 'self'; form-action 'none'; frame-ancestors 'self'";
 
-const HEADERS: [(HeaderName, HeaderValue); 5] = [
+/// Those of every answer.
+pub(crate) const HEADERS: [(HeaderName, HeaderValue); 5] = [
     (
         header::CONTENT_SECURITY_POLICY,
         HeaderValue::from_static(POLICY),
@@ -33,10 +31,3 @@ const HEADERS: [(HeaderName, HeaderValue); 5] = [
         HeaderValue::from_static("cross-origin"),
     ),
 ];
-
-/// Adds the headers to every answer.
-pub(crate) async fn headers(request: Request, next: Next) -> Response {
-    let mut response = next.run(request).await;
-    response.headers_mut().extend(HEADERS);
-    response
-}
