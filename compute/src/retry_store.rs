@@ -9,8 +9,6 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::time::Duration;
 
-use tokio::time::Instant;
-
 use async_trait::async_trait;
 use bytes::Bytes;
 use datafusion::error::DataFusionError;
@@ -21,6 +19,7 @@ use object_store::{
     CopyOptions, Error, GetOptions, GetResult, GetResultPayload, ListResult, MultipartUpload,
     ObjectMeta, ObjectStore, PutMultipartOptions, PutOptions, PutPayload, PutResult, Result,
 };
+use retry::{Backoff, Retryable as _};
 
 /// How long one read is tried here; stores behind a network have tried for long before.
 const RETRY_LIMIT: Duration = Duration::from_secs(5);
@@ -41,27 +40,17 @@ impl RetryStore {
         Self { inner, retry_limit }
     }
 
-    /// Tries until it succeeds, fails for good, or retry limit is at its end.
-    async fn steadily<T, F, Fut>(&self, what: &Path, attempt: F) -> Result<T>
+    /// Reads until it succeeds, fails for good, or was tried for long enough.
+    async fn read<T, F>(&self, what: &Path, attempt: impl FnMut() -> F) -> Result<T>
     where
-        F: Fn() -> Fut,
-        Fut: Future<Output = Result<T>>,
+        F: Future<Output = Result<T>>,
     {
-        let begun = Instant::now();
-        let mut pauses = ::service::pauses();
-        loop {
-            let error = match attempt().await {
-                Err(error) if may_pass(&error) => error,
-                ended => return ended,
-            };
-            match pauses.next() {
-                Some(pause) if begun.elapsed() + pause < self.retry_limit => {
-                    tracing::debug!(object = %what, %error, "reading again");
-                    tokio::time::sleep(pause).await;
-                }
-                _ => return Err(as_io(error)),
-            }
-        }
+        attempt
+            .retry(Backoff::within(self.retry_limit).pauses())
+            .when(may_pass)
+            .notify(|error, _pause| tracing::debug!(object = %what, %error, "reading again"))
+            .await
+            .map_err(as_io)
     }
 }
 
@@ -76,8 +65,11 @@ fn may_pass(error: &Error) -> bool {
     matches!(error, Error::Generic { .. } | Error::JoinError { .. })
 }
 
-/// The same failure, so that whoever looks for its root finds an I/O error.
+/// The same failure; whoever looks for the root of one that may pass finds an I/O error.
 fn as_io(error: Error) -> Error {
+    if !may_pass(&error) {
+        return error;
+    }
     let root = DataFusionError::IoError(std::io::Error::other(error));
     Error::Generic {
         store: "object store",
@@ -105,7 +97,7 @@ impl ObjectStore for RetryStore {
     }
 
     async fn get_opts(&self, location: &Path, options: GetOptions) -> Result<GetResult> {
-        self.steadily(location, || async {
+        self.read(location, || async {
             let found = self.inner.get_opts(location, options.clone()).await?;
             let length_bytes = found.range.end.saturating_sub(found.range.start);
             if length_bytes <= WHOLE_BYTES && !options.head {
@@ -118,7 +110,7 @@ impl ObjectStore for RetryStore {
     }
 
     async fn get_ranges(&self, location: &Path, ranges: &[Range<u64>]) -> Result<Vec<Bytes>> {
-        self.steadily(location, || self.inner.get_ranges(location, ranges))
+        self.read(location, || self.inner.get_ranges(location, ranges))
             .await
     }
 
@@ -135,7 +127,7 @@ impl ObjectStore for RetryStore {
 
     async fn list_with_delimiter(&self, prefix: Option<&Path>) -> Result<ListResult> {
         let what = prefix.cloned().unwrap_or_default();
-        self.steadily(&what, || self.inner.list_with_delimiter(prefix))
+        self.read(&what, || self.inner.list_with_delimiter(prefix))
             .await
     }
 
@@ -167,6 +159,7 @@ mod tests {
     use object_store::ObjectStoreExt as _;
     use object_store::memory::InMemory;
     use std::sync::atomic::{AtomicU32, Ordering};
+    use std::time::Instant;
 
     /// Fails the first reads.
     #[derive(Debug)]

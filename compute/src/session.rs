@@ -12,9 +12,9 @@ use datafusion::catalog::MemoryCatalogProviderList;
 use datafusion::error::DataFusionError;
 use datafusion::execution::context::SessionContext;
 use datafusion::execution::session_state::{SessionState, SessionStateBuilder};
+use retry::Backoff;
 use storage::Store;
 use tokio::sync::OnceCell;
-use tokio::time::Instant;
 
 use crate::cluster::{self, Cluster, SchedulerUrl};
 use crate::standalone::{self, WorkFolder, WorkLease};
@@ -220,7 +220,7 @@ impl Engine {
 
     /// Works on a question; `job` is the hash of all that its answer depends on.
     ///
-    /// On a cluster, `ask` is called again when it failed for a reason that passes, as long as there is retry limit.
+    /// On a cluster, `ask` is called again when it failed for a reason that passes, until the retry limit.
     pub(crate) async fn answer<T, F, Fut>(&self, job: Digest, ask: F) -> Result<T, ComputeError>
     where
         F: Fn(QueryContext) -> Fut,
@@ -230,8 +230,7 @@ impl Engine {
         let Kind::Cluster(cluster) = &self.inner.kind else {
             return ask(self.context(&name).await?).await;
         };
-        let begun = Instant::now();
-        let mut pauses = ::service::pauses();
+        let mut pauses = Backoff::within(cluster.retry_limit).pauses();
         loop {
             let asked = ask(self.context(&name).await?);
             let error = match tokio::time::timeout(QUERY_LIMIT, asked).await {
@@ -243,13 +242,11 @@ impl Engine {
                     });
                 }
             };
-            match pauses.next() {
-                Some(pause) if begun.elapsed() + pause < cluster.retry_limit => {
-                    tracing::warn!(job = name, %error, "the cluster lost a query; asking again");
-                    tokio::time::sleep(pause).await;
-                }
-                _ => return Err(error),
-            }
+            let Some(pause) = pauses.next() else {
+                return Err(error);
+            };
+            tracing::warn!(job = name, %error, "the cluster lost a query; asking again");
+            tokio::time::sleep(pause).await;
         }
     }
 
@@ -383,7 +380,7 @@ mod tests {
     }
 
     #[tokio::test(flavor = "multi_thread")]
-    async fn a_cluster_that_stays_away_is_told_of_when_patience_ends() {
+    async fn a_cluster_that_stays_away_is_told_of_at_the_retry_limit() {
         let nowhere = "http://127.0.0.1:1".parse().unwrap();
         let engine = Engine::cluster(Store::memory(), nowhere, NonZeroUsize::MIN)
             .with_retry_limit(Duration::from_millis(500));

@@ -9,13 +9,11 @@ mod merge;
 mod replace;
 mod segments;
 
-use std::time::Duration;
-
-use backon::{BackoffBuilder as _, ExponentialBuilder};
 use contract::manifest::{MANIFEST_SCHEMA, Manifest, ManifestId};
 use contract::notice::NoticeRun;
 use contract::product::ProductId;
 use contract::time::Period;
+use retry::{Backoff, Pauses};
 use storage::{StorageError, Store, manifests};
 
 use crate::error::IngestError;
@@ -31,10 +29,9 @@ pub(crate) use replace::replace;
 pub(crate) use segments::{MAX_SEGMENT_STEPS, MAX_SEGMENT_VALUES};
 
 /// Lost races for the next number before the caller is told; it may go on.
-const MAX_TRIES: u32 = 200;
-/// Pause after a lost race, with jitter: it doubles up to the longest, so that many writers of one product get apart.
-const FIRST_PAUSE: Duration = Duration::from_millis(5);
-const LONGEST_PAUSE: Duration = Duration::from_millis(640);
+const LOST_RACES: usize = 200;
+/// Attempts to publish, which many writers of one product may want at the same time.
+const ATTEMPTS: Backoff = Backoff::contended(LOST_RACES);
 
 /// What became of one file.
 #[derive(Debug, Clone, PartialEq)]
@@ -83,7 +80,8 @@ async fn publish(
     granules: &[StoredGranule],
 ) -> Result<Vec<Committed>, IngestError> {
     let mut notes = Notes::of(store, product, granules);
-    for pause in pauses().build() {
+    let mut pauses = ATTEMPTS.pauses();
+    loop {
         let newest = manifests::latest(store, product)
             .await
             .map_err(IngestError::storage("read the newest manifest"))?;
@@ -97,7 +95,7 @@ async fn publish(
                 match manifests::commit(store, &manifest).await {
                     Ok(()) => manifest,
                     Err(StorageError::Conflict { .. }) => {
-                        tokio::time::sleep(pause).await;
+                        race_lost(product, &mut pauses).await?;
                         continue;
                     }
                     Err(source) => {
@@ -111,19 +109,18 @@ async fn publish(
         };
         return outcomes(&merged, &notes, Some(&manifest.id())).await;
     }
-    Err(IngestError::Contended {
-        product: product.to_string(),
-        tries: MAX_TRIES,
-    })
 }
 
-/// Pauses between lost races.
-fn pauses() -> ExponentialBuilder {
-    ExponentialBuilder::default()
-        .with_min_delay(FIRST_PAUSE)
-        .with_max_delay(LONGEST_PAUSE)
-        .with_max_times(MAX_TRIES as usize)
-        .with_jitter()
+/// Waits before the next attempt, if one is left.
+async fn race_lost(product: &ProductId, pauses: &mut Pauses) -> Result<(), IngestError> {
+    let Some(pause) = pauses.next() else {
+        return Err(IngestError::Contended {
+            product: product.to_string(),
+            attempts: LOST_RACES,
+        });
+    };
+    tokio::time::sleep(pause).await;
+    Ok(())
 }
 
 /// The next manifest, with its series and domain durable.

@@ -43,12 +43,14 @@ pub enum IngestError {
         file: PathBuf,
     },
     /// Other writers kept taking the next manifest number.
-    #[error("gave up on product {product} after {tries} lost races for the next manifest number")]
+    #[error(
+        "gave up on product {product} after {attempts} lost races for the next manifest number"
+    )]
     Contended {
         /// Product.
         product: String,
-        /// Number of tries.
-        tries: u32,
+        /// How many.
+        attempts: usize,
     },
     /// A profile could not be read.
     #[error("profile {name:?}: {detail}")]

@@ -17,6 +17,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use ::retry::Backoff;
 use contract::event::Event;
 use contract::key::ObjectKey;
 use contract::product::ProductId;
@@ -44,9 +45,8 @@ pub use settings::ServiceSettings;
 
 const TOPIC: Topic = Topic::GranuleNotice;
 const GROUP: &str = "ingest";
-/// Tries of a command whose failure may pass, and the pause before the second; it doubles from try to try.
-const MAX_TRIES: u32 = 5;
-const FIRST_PAUSE: Duration = Duration::from_millis(100);
+/// Attempts of a command whose failure may pass.
+const MAX_ATTEMPTS: usize = 5;
 /// Between two looks at a disk that is full.
 const FULL_PAUSE: Duration = Duration::from_secs(2);
 /// A command has read all notices when none comes for so long.
@@ -152,23 +152,29 @@ impl IngestService {
     }
 
     async fn next_group(&self, progress: &dyn Progress) -> Result<Vec<Outcome>, IngestError> {
-        let mut pause = FIRST_PAUSE;
-        for attempt in 1.. {
+        let attempts = Some(MAX_ATTEMPTS);
+        let mut pauses = Backoff {
+            attempts,
+            ..Backoff::default()
+        }
+        .pauses();
+        loop {
             match self.try_group(progress).await {
                 // Whoever frees the disk need not come back here to start again what was under way.
                 Err(error) if error.is_disk_full() => {
                     tracing::warn!(%error, "the disk is full; ingest waits until there is room");
                     tokio::time::sleep(FULL_PAUSE).await;
                 }
-                Err(error) if error.is_retryable() && attempt < MAX_TRIES => {
-                    tracing::warn!(%error, attempt, "ingest will try again");
+                Err(error) if error.is_retryable() => {
+                    let Some(pause) = pauses.next() else {
+                        return Err(error);
+                    };
+                    tracing::warn!(%error, "ingest will try again");
                     tokio::time::sleep(pause).await;
-                    pause *= 2;
                 }
                 other => return other,
             }
         }
-        unreachable!("the last try returns")
     }
 
     async fn try_group(&self, progress: &dyn Progress) -> Result<Vec<Outcome>, IngestError> {
@@ -216,7 +222,7 @@ impl IngestService {
     ) -> Result<(), IngestError> {
         let stop = stop.shared();
         let work = async {
-            let mut pauses = service::pauses();
+            let mut pauses = Backoff::default().pauses();
             loop {
                 let begun = Instant::now();
                 let error = match shift::run(self, progress, stop.clone()).await {
@@ -227,7 +233,7 @@ impl IngestService {
                 let _held_up = self.health.held_up(&error);
                 tracing::warn!(%error, "the event log is away; joining it again");
                 if begun.elapsed() > SOUND_SESSION {
-                    pauses = service::pauses();
+                    pauses = Backoff::default().pauses();
                 }
                 tokio::select! {
                     () = stop.clone() => return Ok(()),

@@ -59,12 +59,12 @@ pub enum ObservationError {
         reason: String,
     },
     /// Other writers kept taking the next number of a dataset's index.
-    #[error("gave up on dataset {dataset} after {tries} lost races for its next index")]
+    #[error("gave up on dataset {dataset} after {attempts} lost races for its next index")]
     Contended {
         /// Dataset.
         dataset: ProductId,
-        /// Number of tries.
-        tries: usize,
+        /// How many.
+        attempts: usize,
     },
 }
 
@@ -157,7 +157,7 @@ mod tests {
     fn a_lost_race_may_be_won_later_and_a_bad_setting_may_not() {
         let contended = ObservationError::Contended {
             dataset: "buoys".parse().unwrap(),
-            tries: 9,
+            attempts: 9,
         };
         assert!(contended.is_retryable());
         assert_eq!(ObservationError::setup("no").class(), ErrorClass::Internal);

@@ -11,13 +11,13 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use async_trait::async_trait;
-use backon::{BackoffBuilder as _, ExponentialBuilder};
 use contract::digest::Digest;
 use contract::key::ObjectKey;
 use contract::observation::Observation;
 use contract::product::ProductId;
 use contract::time::TimeMs;
 use futures::{StreamExt as _, TryStreamExt as _, stream};
+use retry::Backoff;
 use storage::Store;
 
 use crate::error::ObservationError;
@@ -29,10 +29,8 @@ use crate::track::{TrackPoint, TrackQuery};
 use crate::{batch, key};
 use index::{Index, Month};
 
-/// Tries to commit before other writers are given the right of way.
-const TRIES: usize = 64;
-const FIRST_PAUSE: Duration = Duration::from_millis(5);
-const LONGEST_PAUSE: Duration = Duration::from_millis(500);
+/// Attempts to commit before other writers are given the right of way.
+const ATTEMPTS: usize = 64;
 /// Files read at the same time.
 const FILES_AT_ONCE: usize = 4;
 /// Longest wait of a question whether the store is there.
@@ -59,12 +57,7 @@ impl FileStore {
         dataset: &ProductId,
         rows: &[Observation],
     ) -> Result<Counts, ObservationError> {
-        let mut pauses = ExponentialBuilder::default()
-            .with_min_delay(FIRST_PAUSE)
-            .with_max_delay(LONGEST_PAUSE)
-            .with_max_times(TRIES)
-            .with_jitter()
-            .build();
+        let mut pauses = Backoff::contended(ATTEMPTS).pauses();
         loop {
             let before = index::latest(&self.store, dataset).await?;
             let (after, counts) = self.merged(dataset, before, rows).await?;
@@ -72,8 +65,8 @@ impl FileStore {
                 return Ok(counts);
             }
             let Some(pause) = pauses.next() else {
-                let (dataset, tries) = (dataset.clone(), TRIES);
-                return Err(ObservationError::Contended { dataset, tries });
+                let (dataset, attempts) = (dataset.clone(), ATTEMPTS);
+                return Err(ObservationError::Contended { dataset, attempts });
             };
             tokio::time::sleep(pause).await;
         }

@@ -11,7 +11,8 @@ use contract::event::{Body, Event, RejectReason};
 use contract::observation::Observation;
 use contract::topic::Topic;
 use futures::FutureExt as _;
-use service::{Outcome, Red, pauses};
+use retry::Backoff;
+use service::{Outcome, Red};
 use storage::StorageError;
 use storage::log::{EventLog, Finished, Message};
 
@@ -60,7 +61,7 @@ impl ObservationService {
     /// The log is not set up as it must be. Everything that may pass is waited for.
     pub async fn run(&self, stop: impl Future<Output = ()>) -> Result<(), StorageError> {
         let stop = stop.shared();
-        let mut pauses = pauses();
+        let mut pauses = Backoff::default().pauses();
         loop {
             let error = match self.read(stop.clone()).await {
                 Ok(()) => return Ok(()),
@@ -133,7 +134,7 @@ impl ObservationService {
     /// Stores rows, however long the store is away; or says why they cannot be stored.
     async fn upsert(&self, rows: &[Observation], taken: &[Taken]) -> Result<(), String> {
         let trace = taken.first().map_or("", |first| first.trace.as_str());
-        for pause in pauses() {
+        for pause in Backoff::default().pauses() {
             match self.store.upsert(rows).await {
                 Ok(counts) => {
                     let crate::Counts {

@@ -10,6 +10,7 @@ use contract::topic::Topic;
 use futures::FutureExt as _;
 use futures::stream::{FuturesUnordered, StreamExt as _};
 use render::RenderError;
+use retry::Backoff;
 use storage::StorageError;
 use storage::log::{EventLog, Finished, Message};
 use tracing::Instrument as _;
@@ -44,7 +45,7 @@ impl BatchService {
     /// # Errors
     /// The log is not set up as it must be.
     pub async fn run(self, stop: Stop) -> Result<(), StorageError> {
-        let mut pauses = ::service::pauses();
+        let mut pauses = Backoff::default().pauses();
         while !stop.is_said() {
             let begun = Instant::now();
             let error = match self.read(&stop).await {
@@ -54,7 +55,7 @@ impl BatchService {
             };
             tracing::warn!(%error, "render jobs cannot be read; trying again");
             if begun.elapsed() > Duration::from_mins(1) {
-                pauses = ::service::pauses();
+                pauses = Backoff::default().pauses();
             }
             let pause = pauses.next().unwrap_or(IDLE_WAIT);
             tokio::select! {
@@ -124,7 +125,7 @@ impl BatchService {
         let begun = Instant::now();
         let running = self.desk.red().start("job");
         let mut failure = None;
-        for pause in ::service::pauses() {
+        for pause in Backoff::default().pauses() {
             match self.draw_and_keep(job).await {
                 Ok(()) => break,
                 Err(error) if error.is_final() => {

@@ -9,8 +9,8 @@ mod logging;
 mod parts;
 mod readiness;
 mod red;
-mod retry;
 mod stop;
+mod wait;
 
 pub use board::Board;
 pub use error::ServiceError;
@@ -18,8 +18,8 @@ pub use logging::{LogFormat, start_logging};
 pub use parts::{PartEnded, Parts};
 pub use readiness::{Part, Readiness, Report};
 pub use red::{Outcome, Red, Running};
-pub use retry::{pauses, until_there};
 pub use stop::{Stop, when_asked_to_stop};
+pub use wait::until_there;
 
 /// Registry that a service's metrics go to.
 pub use prometheus::Registry;

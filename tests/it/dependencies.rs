@@ -8,19 +8,20 @@ use serde_json::Value;
 /// Workspace crates that each crate may depend on directly.
 const MAY_USE: &[(&str, &[&str])] = &[
     ("contract", &[]),
-    ("service", &[]),
-    ("storage", &["contract"]),
+    ("retry", &[]),
+    ("service", &["retry"]),
+    ("storage", &["contract", "retry"]),
     ("kafka-log", &["contract", "storage", "service"]),
-    ("observations", &["contract", "storage", "service"]),
-    ("ingest", &["contract", "storage", "service"]),
-    ("compute", &["contract", "storage", "service"]),
+    ("observations", &["contract", "retry", "storage", "service"]),
+    ("ingest", &["contract", "retry", "storage", "service"]),
+    ("compute", &["contract", "retry", "storage", "service"]),
     ("render", &["contract"]),
     (
         "render-worker",
-        &["contract", "storage", "service", "render"],
+        &["contract", "retry", "storage", "service", "render"],
     ),
     ("render-proof", &["contract", "render"]),
-    ("tile-server", &["contract", "storage", "service"]),
+    ("tile-server", &["contract", "retry", "storage", "service"]),
     (
         "fluxglobe",
         &[

@@ -32,6 +32,7 @@ use ballista_executor::metrics::LoggingMetricsCollector;
 use datafusion::execution::memory_pool::FairSpillPool;
 use datafusion::execution::runtime_env::RuntimeEnvBuilder;
 use prometheus::{IntGauge, Registry};
+use retry::Backoff;
 use storage::Store;
 use tokio::net::TcpListener;
 use tokio::sync::{Notify, Semaphore};
@@ -305,7 +306,7 @@ async fn reported(retry_channel: &RetryChannel, limit: Duration) {
 /// Tells the scheduler of executors that died here and left their folders, so that it need not wait for them.
 async fn tell_gone(retry_channel: RetryChannel, gone: Vec<String>) {
     for id in gone {
-        let mut pauses = ::service::pauses();
+        let mut pauses = Backoff::default().pauses();
         while let Err(error) = retry_channel.tell_gone(&id, "its process is gone").await {
             tracing::debug!(executor = id, %error, "the scheduler cannot be told yet");
             tokio::time::sleep(pauses.next().unwrap_or(AWAY)).await;

@@ -14,6 +14,7 @@ use axum::body::to_bytes;
 use ballista_core::serde::protobuf::ExecutorStoppedParams;
 use ballista_core::serde::protobuf::scheduler_grpc_client::SchedulerGrpcClient;
 use futures::future::BoxFuture;
+use retry::{Backoff, Retryable as _};
 use tokio::time::Instant;
 use tonic::body::Body;
 use tonic::codegen::{Service, StdError, http};
@@ -23,11 +24,14 @@ use tower::ServiceExt;
 use crate::state::MESSAGE_BYTES;
 
 /// How long one request is carried: longer than a scheduler may take to be started again.
-const CARRY_LIMIT: Duration = Duration::from_mins(1);
-/// One try.
-const TRY_LIMIT: Duration = Duration::from_secs(10);
-/// A rest after a request that could not be carried at all.
-const LONGEST_PAUSE: Duration = Duration::from_secs(1);
+const CARRY: Backoff = Backoff {
+    first_pause: Duration::from_millis(100),
+    longest_pause: Duration::from_millis(500),
+    attempts: None,
+    limit: Some(Duration::from_mins(1)),
+};
+/// One attempt.
+const ATTEMPT_LIMIT: Duration = Duration::from_secs(10);
 
 /// A way to a scheduler; clones share it.
 #[derive(Debug, Clone)]
@@ -99,7 +103,7 @@ impl RetryChannel {
             executor_id: executor_id.to_owned(),
             reason: reason.to_owned(),
         });
-        match tokio::time::timeout(TRY_LIMIT, told).await {
+        match tokio::time::timeout(ATTEMPT_LIMIT, told).await {
             Ok(answer) => answer.map(|_told| ()),
             Err(_elapsed) => Err(tonic::Status::deadline_exceeded("no answer")),
         }
@@ -108,23 +112,14 @@ impl RetryChannel {
     async fn carry(self, request: http::Request<Body>) -> Result<http::Response<Body>, StdError> {
         let (parts, body) = request.into_parts();
         let content = to_bytes(axum::body::Body::new(body), MESSAGE_BYTES).await?;
-        let begun = Instant::now();
-        let mut pauses = ::service::pauses();
-        loop {
+        let attempt = || {
             let again = Body::new(axum::body::Body::from(content.clone()));
-            let request = http::Request::from_parts(parts.clone(), again);
-            let error = match self.carry_once(request).await {
-                Ok(answer) => return Ok(answer),
-                Err(error) => error,
-            };
-            match pauses.next() {
-                Some(pause) if begun.elapsed() < CARRY_LIMIT => {
-                    tracing::debug!(%error, "the scheduler does not answer");
-                    tokio::time::sleep(pause.min(LONGEST_PAUSE)).await;
-                }
-                _ => return Err(error),
-            }
-        }
+            self.carry_once(http::Request::from_parts(parts.clone(), again))
+        };
+        attempt
+            .retry(CARRY.pauses())
+            .notify(|error, _pause| tracing::debug!(%error, "the scheduler does not answer"))
+            .await
     }
 
     async fn carry_once(
@@ -138,7 +133,7 @@ impl RetryChannel {
         }
         let mut channel = self.channel.clone();
         let channel = ServiceExt::<http::Request<Body>>::ready(&mut channel).await?;
-        let carried = tokio::time::timeout(TRY_LIMIT, channel.call(request)).await;
+        let carried = tokio::time::timeout(ATTEMPT_LIMIT, channel.call(request)).await;
         match carried {
             Ok(Ok(answer)) => {
                 self.is_there();

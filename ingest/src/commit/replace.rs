@@ -3,7 +3,6 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use backon::BackoffBuilder as _;
 use contract::digest::Digest;
 use contract::manifest::{MANIFEST_SCHEMA, Manifest, Step};
 use contract::notice::{NoticeOrder, NoticeRun};
@@ -12,7 +11,7 @@ use contract::time::Period;
 use storage::{StorageError, Store, manifests};
 
 use super::merge::{Merged, Taken, is_same_grid};
-use super::{MAX_TRIES, pauses, segments};
+use super::{ATTEMPTS, race_lost, segments};
 use crate::error::IngestError;
 use crate::gates::Gates;
 use crate::memory;
@@ -28,7 +27,8 @@ pub(crate) async fn replace(
     product: &ProductId,
     readings: &[Reading],
 ) -> Result<Option<Manifest>, IngestError> {
-    for pause in pauses().build() {
+    let mut pauses = ATTEMPTS.pauses();
+    loop {
         let newest = manifests::latest(store, product)
             .await
             .map_err(IngestError::storage("read the newest manifest"))?;
@@ -57,17 +57,13 @@ pub(crate) async fn replace(
         (next.series, next.domain) = (series, domain);
         match manifests::commit(store, &next).await {
             Ok(()) => return Ok(Some(next)),
-            Err(StorageError::Conflict { .. }) => tokio::time::sleep(pause).await,
+            Err(StorageError::Conflict { .. }) => race_lost(product, &mut pauses).await?,
             Err(source) => {
                 let action = "publish a manifest";
                 return Err(IngestError::Storage { action, source });
             }
         }
     }
-    Err(IngestError::Contended {
-        product: product.to_string(),
-        tries: MAX_TRIES,
-    })
 }
 
 /// What tells files apart: the same bytes under another name may be of another month.

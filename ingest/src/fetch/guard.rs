@@ -15,7 +15,7 @@ use super::location::Location;
 use super::object::{self, AllowedStore};
 use super::pace::Slowest;
 use super::raw::RawGranule;
-use super::retry::{Miss, RetryLimits, Tries, answered, given_up, limited};
+use super::retry::{Attempts, Miss, RetryLimits, answered, given_up, limited};
 use super::spool::Spool;
 use super::turns::Turns;
 use crate::error::{IngestError, Stop};
@@ -111,7 +111,7 @@ impl Sources {
 }
 
 impl Guarded {
-    /// Has a file, however often its source must be asked, within the retry limit that the settings give.
+    /// Has a file, however often its source must be asked, within the limits that the settings give.
     async fn fetch(
         self: &Arc<Self>,
         location: &Location,
@@ -119,14 +119,14 @@ impl Guarded {
         limits: Limits,
     ) -> Result<RawGranule, Stop> {
         let source = self.turns.source(location.source());
-        let retry_limits = self.retry_limits.away;
-        let mut tries = Tries::new(self.retry_limits);
+        let away_limit = self.retry_limits.away;
+        let mut attempts = Attempts::new(self.retry_limits);
         loop {
-            let turn = self.turns.take(&source, retry_limits).await;
-            let turn = turn.map_err(|why| given_up(retry_limits, &why))?;
+            let turn = self.turns.take(&source, away_limit).await;
+            let turn = turn.map_err(|why| given_up(away_limit, &why))?;
             // Waiting for room of our own is not the source's fault.
             let (begun, mut for_room) = (Instant::now(), Duration::ZERO);
-            let tried = self.try_once(location, expected, limits, &mut for_room);
+            let tried = self.attempt(location, expected, limits, &mut for_room);
             let tried = tried.await;
             match &tried {
                 Ok(_) | Err(Miss::Absent(_)) => source.answered(),
@@ -138,7 +138,7 @@ impl Guarded {
                 Err(miss) => {
                     drop(turn);
                     let spent = begun.elapsed().saturating_sub(for_room);
-                    tries.after(miss, spent, location).await?;
+                    attempts.after(miss, spent, location).await?;
                 }
             }
         }
@@ -151,7 +151,7 @@ impl Guarded {
 
     /// Tries to have a file; adds to `for_room` how long it waited for room in the spool. That is waited for once the
     /// source has answered: one that never does takes no room from others.
-    async fn try_once(
+    async fn attempt(
         self: &Arc<Self>,
         location: &Location,
         expected: &Expected,
@@ -159,7 +159,7 @@ impl Guarded {
         for_room: &mut Duration,
     ) -> Result<RawGranule, Miss> {
         let RetryLimits {
-            one_try,
+            one_attempt,
             silence,
             slowest_bytes_s,
             ..
@@ -172,17 +172,17 @@ impl Guarded {
                     let read = tokio::task::spawn_blocking(read).await;
                     read.map_err(Miss::task)?
                 };
-                return limited(one_try, read).await;
+                return limited(one_attempt, read).await;
             }
             Location::Web(url) => {
-                let response = answered(silence.min(one_try), self.web.get(url)).await?;
+                let response = answered(silence.min(one_attempt), self.web.get(url)).await?;
                 let length = response.content_length();
                 let chunks = response.bytes_stream();
                 let chunks = chunks.map(|chunk| chunk.map_err(http::away));
                 (chunks.boxed(), length)
             }
             Location::Object(url) => {
-                let found = limited(one_try, object::get(&self.stores, url)).await?;
+                let found = limited(one_attempt, object::get(&self.stores, url)).await?;
                 let length = Some(found.meta.size);
                 let chunks = found.into_stream();
                 let chunks = chunks.map(|chunk| chunk.map_err(object::miss));
@@ -203,6 +203,6 @@ impl Guarded {
         let waiting = Instant::now();
         let spooled = self.spool.file(keep.room(expected)).await?;
         *for_room += waiting.elapsed();
-        limited(one_try, keep.run(spooled, expected)).await
+        limited(one_attempt, keep.run(spooled, expected)).await
     }
 }

@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-use backon::{BackoffBuilder as _, ExponentialBackoff, ExponentialBuilder};
 use contract::event::RejectReason;
+use retry::{Backoff, Pauses};
 
 use super::location::Location;
 use crate::error::{IngestError, Stop};
@@ -12,16 +12,12 @@ use crate::rejection::Rejection;
 /// How often and how long a source is asked again.
 #[derive(Debug, Clone, Copy)]
 pub struct RetryLimits {
-    /// Tries of a source that answers that the file is not there, or not for us: an announced file can come late.
-    pub tries: u32,
+    /// Attempts at a source that answers that the file is not there, or not for us: an announced file can come late.
+    pub attempts: u32,
     /// How long a source that cannot be reached, or says that it is out of order, is asked again.
     pub away: Duration,
-    /// Pause before the second try; it doubles from try to try, with jitter.
-    pub first_pause: Duration,
-    /// Longest pause.
-    pub longest_pause: Duration,
-    /// Time limit of one try.
-    pub one_try: Duration,
+    /// Time limit of one attempt.
+    pub one_attempt: Duration,
     /// A source that sends nothing for so long, or less than `slowest_bytes_s` on average, is left and asked again.
     pub silence: Duration,
     /// The slowest that a source may be, bytes a second.
@@ -31,18 +27,24 @@ pub struct RetryLimits {
 impl Default for RetryLimits {
     fn default() -> Self {
         Self {
-            tries: 5,
+            attempts: 5,
             away: Duration::from_mins(5),
-            first_pause: Duration::from_millis(500),
-            longest_pause: Duration::from_secs(15),
-            one_try: Duration::from_mins(30),
+            one_attempt: Duration::from_mins(30),
             silence: Duration::from_secs(30),
             slowest_bytes_s: 4096,
         }
     }
 }
 
-/// How a try to have a file can end without it.
+/// Pauses between attempts. They end at no limit of their own: what counts is the time that a source took.
+const BACKOFF: Backoff = Backoff {
+    first_pause: Duration::from_millis(500),
+    longest_pause: Duration::from_secs(15),
+    attempts: None,
+    limit: None,
+};
+
+/// How an attempt to have a file can end without it.
 #[derive(Debug)]
 pub(super) enum Miss {
     /// The source says that it is not there, or not for us.
@@ -59,31 +61,26 @@ impl<E: Into<Stop>> From<E> for Miss {
     }
 }
 
-/// Tries one file.
-pub(super) struct Tries {
+/// Attempts to have one file.
+pub(super) struct Attempts {
     retry_limits: RetryLimits,
-    pauses: ExponentialBackoff,
-    /// Spent on tries and pauses; waiting for room of our own is not the source's fault.
+    pauses: Pauses,
+    /// Spent on attempts and pauses; waiting for room of our own is not the source's fault.
     spent: Duration,
     absent: u32,
 }
 
-impl Tries {
+impl Attempts {
     pub(super) fn new(retry_limits: RetryLimits) -> Self {
         Self {
             retry_limits,
-            pauses: ExponentialBuilder::default()
-                .with_min_delay(retry_limits.first_pause)
-                .with_max_delay(retry_limits.longest_pause)
-                .without_max_times()
-                .with_jitter()
-                .build(),
+            pauses: BACKOFF.pauses(),
             spent: Duration::ZERO,
             absent: 0,
         }
     }
 
-    /// Waits for the next try after one that took so long, or gives the file up.
+    /// Waits for the next attempt after one that took so long, or gives the file up.
     pub(super) async fn after(
         &mut self,
         miss: Miss,
@@ -95,7 +92,7 @@ impl Tries {
             Miss::Stop(stop) => return Err(stop),
             Miss::Absent(why) => {
                 self.absent += 1;
-                (why, self.absent >= self.retry_limits.tries)
+                (why, self.absent >= self.retry_limits.attempts)
             }
             Miss::Away(why) => (why, self.spent >= self.retry_limits.away),
         };
@@ -103,10 +100,7 @@ impl Tries {
             return Err(given_up(self.spent, &why));
         }
         tracing::info!(%location, why, "not had yet; trying again");
-        let pause = self
-            .pauses
-            .next()
-            .unwrap_or(self.retry_limits.longest_pause);
+        let pause = self.pauses.next().unwrap_or(BACKOFF.longest_pause);
         self.spent += pause;
         tokio::time::sleep(pause).await;
         Ok(())
@@ -120,7 +114,7 @@ pub(super) fn given_up(spent: Duration, why: &str) -> Stop {
     Rejection::new(RejectReason::Unavailable, "file", detail).into()
 }
 
-/// A try under its time limit.
+/// An attempt under its time limit.
 pub(super) async fn limited<T>(
     limit: Duration,
     work: impl Future<Output = Result<T, Miss>>,

@@ -61,19 +61,15 @@ impl Turns {
         Arc::clone(sources.entry(name).or_default())
     }
 
-    /// Waits for a turn. If the source is away for as long as `retry limit` meanwhile, why it is instead: whoever waits does
+    /// Waits for a turn. If the source is away for as long as `away_limit` meanwhile, why it is instead: whoever waits does
     /// not ask again what others have just been told.
-    pub(super) async fn take(
-        &self,
-        source: &Source,
-        retry_limits: Duration,
-    ) -> Result<Turn, String> {
+    pub(super) async fn take(&self, source: &Source, away_limit: Duration) -> Result<Turn, String> {
         let begun = Instant::now();
         let mut own = pin!(Arc::clone(&source.turns).acquire_owned());
         let of_source = loop {
             match tokio::time::timeout(LOOK, &mut own).await {
                 Ok(turn) => break turn.expect("turns are never closed"),
-                Err(_looking) => source.check(begun, retry_limits)?,
+                Err(_looking) => source.check(begun, away_limit)?,
             }
         };
         let of_all = Arc::clone(&self.all).acquire_owned().await;
@@ -112,10 +108,10 @@ impl Source {
     }
 
     /// Why it is away, if it was for so long while somebody waited who began at an instant.
-    fn check(&self, begun: Instant, retry_limits: Duration) -> Result<(), String> {
+    fn check(&self, begun: Instant, away_limit: Duration) -> Result<(), String> {
         let away = self.state().clone();
         match away {
-            Some(Away { since, why }) if since.max(begun).elapsed() >= retry_limits => Err(why),
+            Some(Away { since, why }) if since.max(begun).elapsed() >= away_limit => Err(why),
             _ => Ok(()),
         }
     }
@@ -126,11 +122,11 @@ mod tests {
     use super::*;
     use futures::FutureExt as _;
 
-    const RETRY_LIMIT: Duration = Duration::from_mins(5);
+    const AWAY_LIMIT: Duration = Duration::from_mins(5);
 
     fn taken(turns: &Turns, source: &Source) -> Option<Turn> {
         turns
-            .take(source, RETRY_LIMIT)
+            .take(source, AWAY_LIMIT)
             .now_or_never()
             .map(Result::unwrap)
     }

@@ -1,10 +1,12 @@
 //! Trying again: for ever where the file is not to blame, a few times where it may be.
 
+use retry::Backoff;
+
 use super::health::Health;
 use crate::error::{Cause, IngestError};
 
-/// Tries of a file that makes the program fail.
-const TRIES_OF_A_FILE: u32 = 3;
+/// Attempts at a file that makes the program fail.
+const ATTEMPTS_AT_A_FILE: u32 = 3;
 
 /// Tries until it succeeds, or until the file or what is stored of its product is to blame.
 pub(super) async fn retry<T, F>(
@@ -15,7 +17,7 @@ pub(super) async fn retry<T, F>(
 where
     F: Future<Output = Result<T, IngestError>>,
 {
-    let mut pauses = service::pauses();
+    let mut pauses = Backoff::default().pauses();
     let mut blamed = 0;
     let mut held_up = None;
     loop {
@@ -27,7 +29,7 @@ where
             Cause::Passing | Cause::Place => {}
             Cause::Stored | Cause::Granule => {
                 blamed += 1;
-                if blamed >= TRIES_OF_A_FILE {
+                if blamed >= ATTEMPTS_AT_A_FILE {
                     return Err(error);
                 }
             }

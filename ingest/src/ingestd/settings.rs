@@ -85,12 +85,12 @@ pub struct ServiceSettings {
     #[arg(long, env = "FLUXGLOBE_FETCH_RETRY_S", default_value_t = 300,
           value_parser = clap::value_parser!(u64).range(0..=604_800))]
     pub fetch_retry_s: u64,
-    /// Time limit of one try to fetch a file, seconds, 1 to 86400.
+    /// Time limit of one attempt to fetch a file, seconds, 1 to 86400.
     #[arg(long, env = "FLUXGLOBE_FETCH_LIMIT_S", default_value_t = 1800,
           value_parser = clap::value_parser!(u64).range(1..=86_400))]
     pub fetch_limit_s: u64,
     /// A source that does not answer for so long, or sends less than --fetch-slowest-bytes-s on average, is left and asked
-    /// again, within --fetch-retry limit-s; seconds, 1 to 3600.
+    /// again, within --fetch-retry-s; seconds, 1 to 3600.
     #[arg(long, env = "FLUXGLOBE_FETCH_SILENCE_S", default_value_t = 30,
           value_parser = clap::value_parser!(u64).range(1..=3600))]
     pub fetch_silence_s: u64,
@@ -121,12 +121,11 @@ impl ServiceSettings {
             spool: self.spool.clone(),
             spool_bytes: self.spool_bytes,
             retry_limits: RetryLimits {
-                tries: self.fetch_tries,
+                attempts: self.fetch_tries,
                 away: Duration::from_secs(self.fetch_retry_s),
-                one_try: Duration::from_secs(self.fetch_limit_s),
+                one_attempt: Duration::from_secs(self.fetch_limit_s),
                 silence: Duration::from_secs(self.fetch_silence_s),
                 slowest_bytes_s: self.fetch_slowest_bytes_s,
-                ..RetryLimits::default()
             },
         };
         Ok(Settings {

@@ -188,10 +188,11 @@ fn client_options(retry_limits: RetryLimits, is_plain: bool) -> [(ClientConfigKe
 }
 
 fn retries(retry_limits: RetryLimits) -> RetryConfig {
+    let backoff = retry_limits.backoff();
     RetryConfig {
         backoff: BackoffConfig {
-            init_backoff: RetryLimits::FIRST_PAUSE,
-            max_backoff: RetryLimits::LONGEST_PAUSE,
+            init_backoff: backoff.first_pause,
+            max_backoff: backoff.longest_pause,
             base: 2.0,
         },
         // Time is the limit: pauses only grow, so that this many are never reached.

@@ -1,15 +1,11 @@
 //! Creating an object once: conditionally, and read back whenever the answer leaves a doubt.
 
-use std::time::Instant;
-
-use backon::{BackoffBuilder as _, ExponentialBuilder};
 use bytes::Bytes;
 use contract::key::ObjectKey;
 use contract::kind::Vouched;
 use futures::{StreamExt as _, TryStreamExt as _, stream};
 use object_store::{Error, ObjectStoreExt as _, PutMode, PutOptions, PutPayload};
 
-use super::settings::RetryLimits;
 use super::{
     MAX_OBJECT_BYTES, PART_BYTES, PARTS_AT_ONCE, Place, Store, failed, folder, hdfs, path,
 };
@@ -45,13 +41,7 @@ impl Store {
             let reason = "names like .NAME.tmp.1 are those of half-written objects";
             return Err(StorageError::damaged(key.as_str(), reason));
         }
-        let begun = Instant::now();
-        let mut pauses = ExponentialBuilder::default()
-            .with_min_delay(RetryLimits::FIRST_PAUSE)
-            .with_max_delay(RetryLimits::LONGEST_PAUSE)
-            .with_jitter()
-            .without_max_times()
-            .build();
+        let mut pauses = self.retry_limits.backoff().pauses();
         loop {
             let error = match self.create(key, &content).await {
                 Ok(()) => return Ok(true),
@@ -63,14 +53,13 @@ impl Store {
             match self.holds(key, &content).await? {
                 Some(true) => return Ok(false),
                 Some(false) => return self.put_beside(key, content).await,
-                None if begun.elapsed() > self.retry_limits.retries => {
-                    return Err(failed(key, error));
-                }
-                None => {
-                    tracing::info!(%key, %error, "not there after a doubtful answer: sent again");
-                }
+                None => {}
             }
-            tokio::time::sleep(pauses.next().unwrap_or(RetryLimits::LONGEST_PAUSE)).await;
+            let Some(pause) = pauses.next() else {
+                return Err(failed(key, error));
+            };
+            tracing::info!(%key, %error, "not there after a doubtful answer: sent again");
+            tokio::time::sleep(pause).await;
         }
     }
 

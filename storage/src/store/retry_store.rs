@@ -3,10 +3,9 @@
 use std::fmt::{Debug, Display, Formatter};
 use std::future::Future;
 use std::sync::{Arc, PoisonError, RwLock};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use async_trait::async_trait;
-use backon::{ExponentialBuilder, Retryable as _};
 use futures::stream::{self, BoxStream, StreamExt as _, TryStreamExt as _};
 use object_store::path::Path;
 use object_store::{
@@ -14,6 +13,7 @@ use object_store::{
     ObjectMeta, ObjectStore, PutMultipartOptions, PutOptions, PutPayload, PutResult, RenameOptions,
     Result,
 };
+use retry::Retryable as _;
 
 use super::settings::RetryLimits;
 use crate::error::may_pass;
@@ -93,19 +93,13 @@ impl RetryStore {
     where
         F: Future<Output = Result<T>>,
     {
-        let begun = Instant::now();
-        let pauses = ExponentialBuilder::default()
-            .with_min_delay(RetryLimits::FIRST_PAUSE)
-            .with_max_delay(RetryLimits::LONGEST_PAUSE)
-            .with_jitter()
-            .without_max_times();
         let once = || {
             let client = self.client();
             let answer = call(Arc::clone(&client));
             async move { self.bounded(limit, &client, answer).await }
         };
-        once.retry(pauses)
-            .when(|error| is_worth_a_try(error) && begun.elapsed() < self.shared.retry_limits.retries)
+        once.retry(self.shared.retry_limits.backoff().pauses())
+            .when(is_worth_a_try)
             .notify(|error, pause| {
                 tracing::info!(%error, pause_ms = pause.as_millis() as u64, "trying the store again");
             })

@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 use std::fmt::{Debug, Formatter};
 use std::time::Duration;
 
+use retry::Backoff;
+
 /// How long a remote store is waited for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RetryLimits {
@@ -17,10 +19,10 @@ pub struct RetryLimits {
 }
 
 impl RetryLimits {
-    /// First pause before another try; later ones grow, each with its own jitter.
-    pub(super) const FIRST_PAUSE: Duration = Duration::from_millis(100);
-    /// Longest pause: how late an answering store is noticed.
-    pub(super) const LONGEST_PAUSE: Duration = Duration::from_secs(5);
+    /// When what may pass is tried again.
+    pub(super) fn backoff(self) -> Backoff {
+        Backoff::within(self.retries)
+    }
 
     /// For those whom somebody waits for: a store that is away is told of within seconds.
     pub fn interactive() -> Self {

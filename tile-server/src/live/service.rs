@@ -10,6 +10,7 @@ use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::time::Period;
 use contract::topic::Topic;
+use retry::Backoff;
 use service::Stop;
 use storage::StorageError;
 use storage::log::{EventLog, Follower, Message, Start};
@@ -51,7 +52,7 @@ impl LiveService {
     /// # Errors
     /// The log is not set up as it must be.
     pub async fn run(mut self, stop: Stop) -> Result<(), StorageError> {
-        let mut pauses = service::pauses();
+        let mut pauses = Backoff::default().pauses();
         while !stop.is_said() {
             let ended = tokio::select! {
                 () = stop.said() => break,
@@ -159,7 +160,7 @@ impl LiveService {
 
     /// Reads the list of products anew. A store that is away is waited for: what landed is told of later, not never.
     async fn renew(&self) {
-        for pause in service::pauses() {
+        for pause in Backoff::default().pauses() {
             match self.state.catalogue.renew().await {
                 Err(error) if error.is_retryable() => tokio::time::sleep(pause).await,
                 Ok(()) | Err(_) => return,

@@ -1,11 +1,12 @@
 //! Creating once, against stores that lose answers, tell untruths and fail.
 
 use super::*;
+use crate::store::RetryLimits;
 use crate::store::faulty::{Fault, Faulty, absent, broken, denied, exists};
 use contract::digest::Digest;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 fn store(faulty: &Arc<Faulty>) -> Store {
     Store {

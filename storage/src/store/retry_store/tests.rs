@@ -5,6 +5,7 @@ use crate::store::faulty::{Fault, Faulty, broken, denied, exists};
 use bytes::Bytes;
 use object_store::ObjectStoreExt as _;
 use std::sync::Mutex;
+use std::time::Instant;
 
 const SHORT: RetryLimits = RetryLimits {
     connect: Duration::from_millis(100),
@@ -39,7 +40,7 @@ async fn a_store_that_never_answers_is_given_up_in_bounded_time() {
         "{error}"
     );
     assert!(may_pass(&error));
-    // Retries, the pause that began just before their end, and one more try.
+    // Retries, and the attempt at their end.
     assert!(
         begun.elapsed() < Duration::from_secs(20),
         "{:?}",

@@ -2,24 +2,10 @@
 
 use std::fmt::Display;
 use std::future::Future;
-use std::time::Duration;
 
-use backon::{BackoffBuilder as _, ExponentialBuilder};
+use retry::Backoff;
 
 use crate::Stop;
-
-const FIRST_PAUSE: Duration = Duration::from_millis(100);
-const LONGEST_PAUSE: Duration = Duration::from_secs(5);
-
-/// Pauses between tries: doubling, with jitter, at most five seconds, for ever.
-pub fn pauses() -> impl Iterator<Item = Duration> + Send {
-    ExponentialBuilder::default()
-        .with_min_delay(FIRST_PAUSE)
-        .with_max_delay(LONGEST_PAUSE)
-        .without_max_times()
-        .with_jitter()
-        .build()
-}
 
 /// Tries until it succeeds, fails in a way that no waiting mends, or the service is asked to stop (then `None`).
 ///
@@ -35,7 +21,7 @@ where
     E: Display,
     F: Future<Output = Result<T, E>>,
 {
-    for pause in pauses() {
+    for pause in Backoff::default().pauses() {
         let error = tokio::select! {
             () = stop.said() => return Ok(None),
             tried = attempt() => match tried {
@@ -78,12 +64,5 @@ mod tests {
         stop.now();
         let away = || async { Err::<u8, _>("away") };
         assert_eq!(until_there("a part", &stop, |_| true, away).await, Ok(None));
-    }
-
-    #[test]
-    fn pauses_grow_to_five_seconds_and_never_end() {
-        let longest = pauses().take(1000).max().unwrap();
-        assert!(longest <= LONGEST_PAUSE * 2, "{longest:?}");
-        assert_eq!(pauses().take(1000).count(), 1000);
     }
 }
