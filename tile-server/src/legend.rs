@@ -1,6 +1,5 @@
 //! Legends: a transfer function in; its colours, opacities, sizes and round values to mark out, as JSON, SVG and PNG.
 
-mod font;
 mod png;
 mod svg;
 mod ticks;
@@ -155,7 +154,7 @@ impl Legend {
         match form {
             Form::Json => serde_json::to_vec(self).map_err(|error| failed(error.to_string())),
             Form::Svg => Ok(svg::drawn(self).into_bytes()),
-            Form::Png => png::drawn(self).map_err(|error| failed(error.to_string())),
+            Form::Png => png::drawn(&svg::drawn(self)).map_err(failed),
         }
     }
 
@@ -194,16 +193,6 @@ impl Legend {
     /// Stored value at a place.
     fn value_at(&self, place: f64) -> f64 {
         self.transfer.low + (self.transfer.high - self.transfer.low) * place
-    }
-
-    /// Colour at a place, sRGB bytes.
-    fn color_at(&self, place: f64) -> [u8; 3] {
-        bytes(self.transfer.color(self.value_at(place)))
-    }
-
-    /// Opacity at a place.
-    fn opacity_at(&self, place: f64) -> f64 {
-        self.transfer.opacity(self.value_at(place)).unwrap_or(1.0)
     }
 
     /// The row of particles: places and radii, pixels; none without sizes.
@@ -343,7 +332,6 @@ mod tests {
         assert_eq!(found, expected);
         assert_eq!(legend.opacity, [(0.0, 0.5), (0.25, 1.0), (1.0, 1.0)]);
         assert!(legend.size.is_empty() && legend.dots().is_empty());
-        assert_eq!(legend.color_at(0.5), [255, 0, 0]);
     }
 
     #[test]
