@@ -1,4 +1,7 @@
 //! `/api/observations/platforms`: buoys, ships, stations and profiles as GeoJSON: points, and the tracks of ships.
+//!
+//! The types are not those of the crate `geojson`, which regions are read with: `/api/openapi.json` describes these member
+//! by member.
 
 use axum::Json;
 use axum::extract::State;
