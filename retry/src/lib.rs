@@ -121,6 +121,11 @@ mod tests {
         let (last, before) = begun_at.split_last().unwrap();
         assert!(*last >= limit, "{last:?}");
         assert!(before.iter().all(|at| *at < limit), "{before:?}");
+        let long = Backoff {
+            first_pause: Duration::from_hours(1),
+            ..Backoff::within(limit)
+        };
+        assert!(long.pauses().next().is_some_and(|pause| pause <= limit));
     }
 
     #[tokio::test]

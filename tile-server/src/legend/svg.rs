@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 
 use super::{BAR_HEIGHT_PX, BAR_TOP_PX, CHECK_PX, HEIGHT_PX, Legend, MARGIN_PX};
 
-/// Half of what a digit takes of a line, pixels.
-const HALF_DIGIT_PX: f64 = 4.0;
+/// Half of what a sign of a number takes of a line, in wide fonts, pixels.
+const HALF_SIGN_PX: f64 = 4.8;
 /// What is drawn under transparent colours.
 const CHECKS: &str = "<pattern id=\"checks\" width=\"{2}\" height=\"{2}\" patternUnits=\"userSpaceOnUse\">\
 <rect width=\"{2}\" height=\"{2}\" fill=\"#fff\"/><path d=\"M0 0h{1}v{1}h-{1}zM{1} {1}h{1}v{1}h-{1}z\" fill=\"#ccc\"/></pattern>";
@@ -69,12 +69,12 @@ fn write(legend: &Legend, to: &mut String) -> std::fmt::Result {
     }
     let foot = BAR_TOP_PX + BAR_HEIGHT_PX;
     for (x, text) in legend.marks() {
-        // Long numbers at the ends of the bar stay in the drawing, whatever the font.
-        let half = text.chars().count() as f64 * HALF_DIGIT_PX;
+        // Long numbers at the ends of the bar stay in the drawing.
+        let half = text.chars().count() as f64 * HALF_SIGN_PX;
         let middle = x.clamp(half, f64::from(width) - half);
         write!(
             to,
-            "<path d=\"M{x:.2} {foot}v6\" stroke=\"#222\"/><text x=\"{middle:.2}\" y=\"{}\" text-anchor=\"middle\" font-size=\"13\">{text}</text>",
+            "<path d=\"M{x:.2} {foot}v6\" stroke=\"#222\" shape-rendering=\"crispEdges\"/><text x=\"{middle:.2}\" y=\"{}\" text-anchor=\"middle\" font-size=\"13\">{text}</text>",
             foot + 21
         )?;
     }
