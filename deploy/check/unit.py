@@ -8,8 +8,8 @@ from pathlib import Path
 
 # Settings that name a folder which is written.
 WRITTEN = {
-    "fluxglobe@": ("FLUXGLOBE_DATA", "FLUXGLOBE_SPOOL", "FLUXGLOBE_EXECUTOR_WORK"),
-    "fluxglobe": ("FLUXGLOBE_DATA",),
+    "fluxglobe@": ("FLUXGLOBE_DATA", "FLUXGLOBE_SPOOL", "FLUXGLOBE_EXECUTOR_WORK", "XDG_CACHE_HOME"),
+    "fluxglobe": ("FLUXGLOBE_DATA", "XDG_CACHE_HOME"),
 }
 # Files of secrets that a service reads.
 SECRETS = {"fluxglobe@": ("FLUXGLOBE_POSTGIS_PASSWORD_FILE", "FLUXGLOBE_KAFKA_PASSWORD_FILE"), "fluxglobe": ()}

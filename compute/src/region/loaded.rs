@@ -9,8 +9,9 @@ use quick_cache::sync::Cache;
 
 /// Weights held, bytes: those of the whole 1/60-degree China Sea take 35 MB. Larger ones are read anew by each task.
 const HELD_BYTES: u64 = 256 << 20;
-/// Regions held, a guess that sizes tables.
-const HELD_REGIONS: usize = 64;
+/// Regions held, a guess that sizes tables. For so few the cache is one shard: in several, each would have a part of the room
+/// that large weights do not fit into.
+const HELD_REGIONS: usize = 32;
 /// Runs of chunks that a predicate names at most.
 const MAX_RUNS: usize = 16;
 
@@ -152,5 +153,15 @@ mod tests {
         loaded.get("a", read).await.unwrap();
         let never = async { panic!("read again") };
         assert!(loaded.get("a", never).await.unwrap().areas_m2(1).is_some());
+    }
+
+    #[tokio::test]
+    async fn weights_that_take_most_of_the_room_are_held() {
+        let loaded = LoadedWeights::default();
+        let areas = vec![0.0; HELD_BYTES as usize * 9 / 10 / size_of::<f64>()];
+        let read = async { Ok(RegionWeights::new(vec![(1, areas)])) };
+        loaded.get("large", read).await.unwrap();
+        let never = async { panic!("read again") };
+        assert!(loaded.get("large", never).await.is_ok());
     }
 }
