@@ -11,6 +11,7 @@ pub const SECONDS_PER_YEAR: f64 = 365.25 * 86_400.0;
 /// A measured quantity. Values are stored in [`Quantity::unit`]; conversion to it happens once, at ingest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
+#[schema(description = "What the values of a product are.")]
 pub enum Quantity {
     /// Air-sea flux of CO2 as mass of carbon, kg m⁻² s⁻¹, positive out of the sea.
     CarbonFlux,

@@ -14,7 +14,7 @@ use crate::ContractError;
     Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, ToSchema,
 )]
 #[serde(try_from = "String", into = "String")]
-#[schema(value_type = String, format = DateTime)]
+#[schema(value_type = String, format = DateTime, description = "An instant, ISO 8601 UTC.")]
 pub struct TimeMs(i64);
 
 /// Years that an instant may lie in: what ISO 8601 writes with four digits.

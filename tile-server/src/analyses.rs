@@ -17,9 +17,9 @@ use crate::gate::Gate;
 use crate::metrics::Metrics;
 use crate::single_flight::SingleFlight;
 
-/// Budgets remembered; one of 16 years by month takes 8 KiB.
+/// Budgets remembered; one of 16 years by month takes 34 KiB.
 const BUDGETS: usize = 1000;
-/// Series over regions remembered; one of 16 years of days takes 280 KiB.
+/// Series over regions remembered; one of 16 years of days takes 320 KiB.
 const AREAS: usize = 100;
 
 /// The analyses of one server.

@@ -52,7 +52,7 @@ pub enum Measure {
 }
 
 /// A region on a grid, its weights read.
-pub(super) struct AskedRegion {
+pub(super) struct WeighedRegion {
     grid: Grid,
     weights: RegionAddress,
     /// Chunks that the region touches.
@@ -64,7 +64,7 @@ pub(super) struct AskedRegion {
     pub(super) sea_steps: [i128; BAND_COUNT],
 }
 
-impl AskedRegion {
+impl WeighedRegion {
     /// Reads the weights.
     pub(super) async fn read(
         engine: &Engine,
@@ -90,7 +90,7 @@ impl AskedRegion {
 }
 
 /// The question about all frames.
-fn sql(measure: Measure, region: &AskedRegion) -> String {
+fn sql(measure: Measure, region: &WeighedRegion) -> String {
     let seconds = match measure {
         Measure::Mass => "(CAST(period_end AS BIGINT) - CAST(period_start AS BIGINT)) / 1000.0",
         Measure::Mean => "CAST(1.0 AS DOUBLE)",
@@ -113,7 +113,7 @@ fn sql(measure: Measure, region: &AskedRegion) -> String {
 pub(super) async fn asked(
     engine: &Engine,
     steps: &[&Step],
-    region: &AskedRegion,
+    region: &WeighedRegion,
     measure: Measure,
 ) -> Result<Vec<StepSum>, ComputeError> {
     let frames: Vec<&ObjectKey> = steps.iter().map(|step| &step.frame).collect();
@@ -144,7 +144,7 @@ async fn ask(
     engine: &Engine,
     context: QueryContext,
     frames: &[&ObjectKey],
-    region: &AskedRegion,
+    region: &WeighedRegion,
     measure: Measure,
 ) -> Result<Answer, ComputeError> {
     let store = engine.store();

@@ -10,7 +10,7 @@ use contract::time::{Period, TimeMs};
 use serde::{Deserialize, Serialize};
 use storage::{StorageError, Store, document, manifests};
 
-use super::asked::{AskedRegion, Measure, asked};
+use super::asked::{WeighedRegion, Measure, asked};
 use super::bands::{BAND_COUNT, BandSum};
 use super::rows::StepSum;
 use crate::region::address::RegionAddress;
@@ -126,7 +126,7 @@ pub(crate) async fn of_steps(
     weights: &RegionAddress,
     measure: Measure,
 ) -> Result<RegionSums, ComputeError> {
-    let region = AskedRegion::read(engine, &manifest.grid, weights).await?;
+    let region = WeighedRegion::read(engine, &manifest.grid, weights).await?;
     let key = key(&manifest.id(), &weights.keys, measure);
     let stored = stored_rows(engine.store(), &key).await?.rows();
     let known: Option<Vec<StepSum>> = steps
@@ -173,7 +173,7 @@ pub async fn store(
     let computed_count = unknown.len();
     if computed_count > 0 {
         let stored = RegionAddress::stored(store, weights.clone());
-        let region = AskedRegion::read(engine, &manifest.grid, &stored).await?;
+        let region = WeighedRegion::read(engine, &manifest.grid, &stored).await?;
         let sums = asked(engine, &unknown, &region, measure).await?;
         known.extend(unknown.iter().zip(sums).map(|(step, sum)| {
             let row = row_of(&step.frame, &sum);
@@ -204,7 +204,7 @@ pub(crate) async fn verify(
 ) -> Result<(), ComputeError> {
     let steps: Vec<&Step> = manifest.steps.iter().collect();
     let stored = RegionAddress::stored(engine.store(), weights.clone());
-    let region = AskedRegion::read(engine, &manifest.grid, &stored).await?;
+    let region = WeighedRegion::read(engine, &manifest.grid, &stored).await?;
     let sums = asked(engine, &steps, &region, measure).await?;
     let rows = steps
         .iter()

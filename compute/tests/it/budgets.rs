@@ -237,7 +237,7 @@ async fn questions_without_an_answer_are_refused_with_the_reason() {
     assert!(unknown.to_string().contains("flux, sst"), "{unknown}");
     let no_flux = refusal(&engine, total(&product("sst"), "global")).await;
     let text = no_flux.to_string();
-    assert!(text.contains("need a carbon flux"), "{text}");
+    assert!(text.contains("only a carbon flux has a budget"), "{text}");
     let elsewhere = refusal(&engine, total(&product("flux"), "-60,0,-50,5")).await;
     let text = elsewhere.to_string();
     assert!(text.contains("does not touch"), "{text}");

@@ -50,7 +50,7 @@ export function installProbe(
       return shown();
     },
     get platforms() {
-      return platforms().map(({ id, properties: { lon, lat } }) => ({ id, lon, lat }));
+      return platforms().map(({ id, properties }) => ({ id, lon: properties.lon_deg, lat: properties.lat_deg }));
     },
     get state() {
       return store.state;

@@ -41,7 +41,7 @@ async fn plan(config: SessionConfig, region: &str) -> Arc<dyn ExecutionPlan> {
     let weights = RegionKeys::stored(&store, &GRID, &region, Earth::Wgs84).await;
     let engine = Engine::local(store.clone());
     let weights = RegionAddress::stored(&store, weights.unwrap().unwrap());
-    let region = AskedRegion::read(&engine, &GRID, &weights).await.unwrap();
+    let region = WeighedRegion::read(&engine, &GRID, &weights).await.unwrap();
     let objects = Objects::of(&store);
     let runtime = state::runtime(&objects, state::MEMORY_BYTES).unwrap();
     let state = state::session_state(config, runtime, &objects).unwrap();

@@ -317,62 +317,27 @@ export interface paths {
 export type webhooks = Record<string, never>;
 export interface components {
     schemas: {
-        /** @description The mean of a product over a region, step by step. */
-        AreaSeries: {
-            /** @description Figure of the earth for areas. */
-            earth: components["schemas"]["Earth"];
-            /** @description Version that was read, to be cited. */
-            manifest: string;
-            /** @description How the region was taken where that may surprise. */
-            notes: string[];
+        /** @description Ours against a printed value. */
+        AgainstPaper: {
             /**
              * Format: double
-             * @description Area of the sea in it, m².
+             * @description Ours less the printed value.
              */
-            ocean_area_m2: number;
-            /** @description What said how much of each cell is sea. */
-            ocean_source: string;
-            /** @description Name of the product. */
-            product: string;
-            /** @description The region by its name, or as `west,south,east,north`. */
-            region: string;
-            /**
-             * Format: double
-             * @description Area of the region, land included, m².
-             */
-            region_area_m2: number;
-            /** @description One value for each step in the period, in the order of time. */
-            series: components["schemas"]["AreaValue"][];
-            /** @description Unit of the means, the one that people read. */
-            unit: string;
+            difference: number;
+            /** @description As printed. */
+            stated: components["schemas"]["Stated"];
+            /** @description What the paper's uncertainty says of it. */
+            verdict: components["schemas"]["Verdict"];
         };
-        /** @description The mean of a step. */
-        AreaValue: components["schemas"]["StepTimes"] & {
-            /**
-             * Format: double
-             * @description Area with data, m².
-             */
-            area_m2: number;
-            /**
-             * Format: double
-             * @description Share of the region's sea with data, percent.
-             */
-            coverage_percent: number;
-            /**
-             * Format: double
-             * @description Over the cells with data, each by its area; none where no cell has any.
-             */
-            mean: number | null;
-        };
-        /** @description The carbon that a region gave off. */
-        Budget: {
+        /** @description The carbon that a region gave off, with all that is needed to cite it. */
+        BudgetAnswer: {
             /** @description How cells on the coast counted. */
             cells: components["schemas"]["Cells"];
             /** @description Figure of the earth for areas. */
             earth: components["schemas"]["Earth"];
             /** @description What estimates of gaps are made of. */
             gap_basis: string;
-            /** @description Version that was read, to be cited. */
+            /** @description The version of the product that was summed. */
             manifest: string;
             /** @description How the region was taken where that may surprise. */
             notes: string[];
@@ -381,10 +346,10 @@ export interface components {
              * @description Area of the sea in it, m².
              */
             ocean_area_m2: number;
-            /** @description What said how much of each cell is sea. */
+            /** @description What says which part of a cell is sea. */
             ocean_source: string;
-            /** @description Name of the product. */
-            product: string;
+            /** @description Product. */
+            product: components["schemas"]["ProductId"];
             /** @description The region by its name, or as `west,south,east,north`. */
             region: string;
             /**
@@ -392,66 +357,72 @@ export interface components {
              * @description Area of the region, land included, m².
              */
             region_area_m2: number;
-            /** @description In the order of time. */
+            /** @description Rows in the order of time. */
             rows: components["schemas"]["BudgetRow"][];
-            /** @description Unit of budgets and gaps, `Tg C`. */
+            /** @description Citation of the product. */
+            source: string;
+            /** @description Made up by a program rather than measured. */
+            synthetic: boolean;
+            /** @description Title of the product. */
+            title: string;
+            /** @description Unit of `budget_tg` and `gap_tg`, `Tg C`. */
             unit: string;
         };
         /** @description The budget of one period. */
         BudgetRow: {
             /**
              * Format: double
-             * @description Area that counted, averaged over the period, m²: with whole cells also land on the coast.
+             * @description Area that counted, mean over the time that steps cover, m²: with whole cells also land on the coast.
              */
             area_m2: number;
+            /** @description Carbon that left the sea, kg, exact, as decimal text; negative where the sea took it up. */
+            budget_kg: string;
             /**
              * Format: double
-             * @description Carbon given off by the sea, Tg, positive out of the sea.
+             * @description The same in Tg (10⁹ kg).
              */
-            budget: number;
+            budget_tg: number;
+            /** @description How complete the sums of accumulated carbon are; none for fluxes, and in versions that did not count it. */
+            completeness?: components["schemas"]["Completeness"];
             /**
              * Format: double
-             * @description Of accumulated carbon: area of cells with data in all of the period, m².
-             */
-            complete_m2?: number;
-            /**
-             * Format: double
-             * @description Share of the region's sea with data, averaged over the period, percent.
+             * @description Share of the region's sea and of the row's time that holds data, percent; 0 where the region holds no sea.
              */
             coverage_percent: number;
-            /**
-             * Format: date-time
-             * @description First instant after it.
-             */
-            end: string;
+            /** @description First instant after it. */
+            end: components["schemas"]["TimeMs"];
             /**
              * Format: double
-             * @description What the sea without data would add, Tg: an estimate, no part of the budget; none where nothing is known of it.
-             */
-            gap: number | null;
-            /**
-             * Format: double
-             * @description Area of the sea without data that the estimate stands for, m².
+             * @description Area of the sea without data that the estimate stands for, mean over the time that steps cover, m². What is
+             *     missing besides has no estimate: bands without any data, sea beyond the grid, time without steps.
              */
             gap_area_m2: number;
             /**
              * Format: double
-             * @description Of accumulated carbon: area of cells with data in some of the period only, m².
+             * @description What the sea without data would add to the budget at the mean of its band of latitude, Tg: an estimate, never
+             *     part of the budget. None where there are gaps and nothing to estimate any of them from.
              */
-            incomplete_m2?: number;
+            gap_tg: number | null;
             /**
              * Format: double
-             * @description Area of the sea with data, averaged over the period, m².
+             * @description Area of the sea in it, m².
+             */
+            ocean_area_m2: number;
+            /**
+             * Format: double
+             * @description Area of the sea in it that holds data, mean over the time that steps cover, m².
              */
             ocean_with_data_m2: number;
             /**
-             * Format: date-time
-             * @description First instant, ISO 8601 UTC.
+             * Format: double
+             * @description Area of the region, land included, m².
              */
-            start: string;
+            region_area_m2: number;
+            /** @description First instant. */
+            start: components["schemas"]["TimeMs"];
         };
         /**
-         * @description How a budget's period is cut into rows.
+         * @description What one row of a budget covers.
          * @enum {string}
          */
         BudgetStep: "month" | "year" | "total";
@@ -464,63 +435,22 @@ export interface components {
             col: number;
             /**
              * Format: double
-             * @description Latitude of its centre, degrees north.
+             * @description Latitude of its centre, degrees.
              */
-            lat: number;
+            lat_deg: number;
             /**
              * Format: double
-             * @description Longitude of its centre, degrees east.
+             * @description Longitude of its centre, degrees.
              */
-            lon: number;
+            lon_deg: number;
             /**
              * Format: int32
              * @description Row, 0 is the northernmost.
              */
             row: number;
         };
-        /**
-         * @description How cells on the coast count: all of their area in the region, or the share of it that is sea.
-         * @enum {string}
-         */
-        Cells: "whole" | "ocean-share";
-        /** @description Our numbers beside a paper's and another program's. */
-        Check: {
-            /** @description Where the other program's numbers come from. */
-            method: string;
-            /** @description Where the paper's numbers come from. */
-            note: string;
-            /** @description Comparisons in the order they are shown. */
-            rows: components["schemas"]["CheckRow"][];
-        };
-        /** @description One number of ours beside the others. */
-        CheckRow: {
-            /** @description Is that no more than rounding explains? */
-            agrees: boolean;
-            /**
-             * Format: double
-             * @description Ours less the other program's.
-             */
-            difference: number;
-            /**
-             * Format: double
-             * @description Another program's, from the same grid.
-             */
-            independent: number;
-            /**
-             * Format: double
-             * @description Ours.
-             */
-            ours: number;
-            paper: components["schemas"]["Paper"] | null;
-            /** @description Period, for people. */
-            period: string;
-            /** @description Unit of all of them. */
-            unit: string;
-            /** @description Region, for people. */
-            what: string;
-        };
-        /** @description What a sum of accumulated carbon holds. */
-        Contributed: {
+        /** @description What the sum of a cell after a step holds. */
+        CellCounts: {
             /**
              * Format: int32
              * @description Steps since accumulation started.
@@ -538,10 +468,64 @@ export interface components {
             time_percent: number;
         };
         /**
+         * @description How much of a cell with data counts.
+         * @enum {string}
+         */
+        Cells: "whole" | "ocean-share";
+        /** @description A comparison and where the values beside ours come from. */
+        Check: {
+            /** @description Where the other program's numbers come from. */
+            method: string;
+            /** @description Where the paper's numbers come from. */
+            note: string;
+            /** @description In the order they are shown. */
+            rows: components["schemas"]["CheckRow"][];
+        };
+        /** @description One line of the comparison: what a paper says, what an independent integration of its grid says, what we say. */
+        CheckRow: {
+            /** @description Is that no more than rounding explains? */
+            agrees: boolean;
+            /**
+             * Format: double
+             * @description Ours less the independent one.
+             */
+            difference: number;
+            /**
+             * Format: double
+             * @description Integral of the same grid by another program: what ours is held to.
+             */
+            independent: number;
+            /**
+             * Format: double
+             * @description Ours.
+             */
+            ours: number;
+            paper: components["schemas"]["AgainstPaper"] | null;
+            /** @description Year or month. */
+            period: string;
+            /** @description Unit of the values. */
+            unit: string;
+            /** @description Region, and the figure of the earth where it is not WGS84. */
+            what: string;
+        };
+        /** @description How complete a row of accumulated carbon is: a cell with one month of twelve is not a complete one. */
+        Completeness: {
+            /**
+             * Format: double
+             * @description Area of the cells that hold data in all of the row's time, m².
+             */
+            complete_m2: number;
+            /**
+             * Format: double
+             * @description Area of those that hold data in some of it only, m².
+             */
+            incomplete_m2: number;
+        };
+        /**
          * @description Figure of the earth for areas.
          * @enum {string}
          */
-        Earth: "wgs84" | "sphere";
+        Earth: "wgs84" | "sphere" | "local-radius";
         /** @description Places as longitude and latitude, degrees: the last one, or the track of a ship. */
         Geometry: {
             coordinates: [
@@ -597,56 +581,92 @@ export interface components {
          * @enum {string}
          */
         LegendForm: "json" | "svg" | "png";
-        /** @description One measurement. */
-        Measured: {
+        /** @description One product in its newest version. */
+        ListedProduct: {
+            /** @description West, south, east, north, degrees; east may pass 180. */
+            bounds_deg: [
+                number,
+                number,
+                number,
+                number
+            ];
             /**
-             * Format: double
-             * @description Below the sea surface, m; negative above it.
+             * Format: int32
+             * @description Columns of its grid.
              */
-            depth_m: number;
+            cols: number;
+            /** @description The version it was computed from; none where it was ingested. */
+            derived_from: string | null;
+            end: components["schemas"]["TimeMs"] | null;
+            /** @description Its newest version. */
+            manifest: string;
+            /** @description Cells that files gave a value for and that hold none. */
+            masked: components["schemas"]["MaskedSummary"];
+            /** @description Name. */
+            product: components["schemas"]["ProductId"];
+            /** @description What its values are. */
+            quantity: components["schemas"]["Quantity"];
             /**
-             * Format: double
-             * @description Latitude, degrees north.
+             * Format: int32
+             * @description Rows of its grid.
              */
-            lat: number;
-            /**
-             * Format: double
-             * @description Longitude, degrees east, -180 to 180.
-             */
-            lon: number;
-            /** @description What was measured: a CF standard name where there is one. */
-            property: string;
-            /** @description May it be trusted? */
-            quality: components["schemas"]["Quality"];
-            /**
-             * Format: date-time
-             * @description When, ISO 8601 UTC.
-             */
-            time: string;
-            /** @description In udunits spelling; `1` for plain numbers. */
+            rows: number;
+            /** @description Who made it, to be cited. */
+            source: string;
+            start: components["schemas"]["TimeMs"] | null;
+            /** @description Number of its steps. */
+            step_count: number;
+            /** @description Made up by a program rather than measured. */
+            synthetic: boolean;
+            /** @description For people. */
+            title: string;
+            /** @description Unit that people read: that of series, means and legends. */
             unit: string;
-            /**
-             * Format: double
-             * @description In `unit`.
-             */
-            value: number;
         };
-        /** @description What a platform measured. */
-        MeasuredSeries: {
-            /** @description Data set. */
-            dataset: string;
-            /** @description What to ask with (`after`) for those after them; none where these are the last. */
-            next: string | null;
-            /** @description Name in it. */
-            platform: string;
-            /** @description In the order of time. */
-            series: components["schemas"]["Measured"][];
+        /** @description Cells of a product that files gave a value for and that hold none. */
+        MaskedSummary: {
+            /**
+             * Format: int64
+             * @description Outside what the quantity can be.
+             */
+            implausible: number;
+            /** @description The step that lost most. */
+            most?: components["schemas"]["MostMasked"];
+            /**
+             * Format: int64
+             * @description Outside the valid range that the file or its profile states.
+             */
+            out_of_range: number;
+            /**
+             * Format: int64
+             * @description Not good enough, by the quality that the file states and its profile asks for.
+             */
+            poor_quality: number;
+            /** @description Steps that have any. */
+            steps: number;
+            /** @description Steps of files that landed before masked cells were counted. */
+            uncounted_steps: number;
         };
         /**
          * @description How a layer is drawn: a thematic map, particles as points, sprites or a volume with shadows, or trails of a flow.
          * @enum {string}
          */
         Mode: "map" | "points" | "sprites" | "volume" | "flow";
+        /** @description The step that lost most cells. */
+        MostMasked: {
+            /**
+             * Format: int64
+             * @description Cells that hold none.
+             */
+            cells: number;
+            /**
+             * Format: double
+             * @description Of the cells that the file gave a value for.
+             */
+            share: number;
+            /** @description First instant of the step. */
+            start: components["schemas"]["TimeMs"];
+        };
         /** @description A new version of a product. */
         News: {
             /** @description The new version. */
@@ -655,6 +675,50 @@ export interface components {
             product: string;
             /** @description Times whose pictures changed. */
             touched: components["schemas"]["Period"][];
+        };
+        /** @description One measured value. Platform, dataset, property, time and depth together name it: the same name again replaces it. */
+        Observation: {
+            /** @description The data set that it belongs to. */
+            dataset: components["schemas"]["ProductId"];
+            /**
+             * Format: double
+             * @description Below the sea surface, m; negative above it.
+             */
+            depth_m: number;
+            /** @description What the platform is. */
+            kind: components["schemas"]["PlatformKind"];
+            /**
+             * Format: double
+             * @description Latitude, degrees north.
+             */
+            lat_deg: number;
+            /**
+             * Format: double
+             * @description Longitude, degrees east, -180 to 180.
+             */
+            lon_deg: number;
+            /** @description Name of the buoy, ship, station or cast in its data set. */
+            platform: string;
+            /** @description What was measured: a CF standard name where there is one (`sea_surface_temperature`). */
+            property: string;
+            /** @description May it be trusted? */
+            quality: components["schemas"]["Quality"];
+            /** @description When. */
+            time: components["schemas"]["TimeMs"];
+            /** @description Unit in udunits spelling; `1` for plain numbers. */
+            unit: string;
+            /**
+             * Format: double
+             * @description The value in `unit`.
+             */
+            value: number;
+        };
+        /** @description Observations in the order of time, dataset, platform, property and depth. */
+        ObservationPage: {
+            /** @description What to ask with (`after`) for those after them; none where these are the last. */
+            next: string | null;
+            /** @description The rows. */
+            observations: components["schemas"]["Observation"][];
         };
         /**
          * @description A list of colours with a name.
@@ -674,28 +738,6 @@ export interface components {
         Palettes: {
             /** @description In the order they are offered. */
             palettes: components["schemas"]["PaletteColours"][];
-        };
-        /** @description A number as a paper prints it, and what it says of ours. */
-        Paper: {
-            /** @description Decimals that are printed. */
-            decimals: number;
-            /**
-             * Format: double
-             * @description Ours less the paper's.
-             */
-            difference: number;
-            /**
-             * Format: double
-             * @description Its uncertainty, where the paper states one.
-             */
-            uncertainty: number | null;
-            /**
-             * Format: double
-             * @description As printed.
-             */
-            value: number;
-            /** @description `within` or `outside` the paper's own uncertainty, or `no uncertainty stated`. */
-            verdict: string;
         };
         /** @description A part of the server. */
         Part: {
@@ -721,12 +763,50 @@ export interface components {
              */
             start: string;
         };
-        /** @description A platform. */
+        /** @description One platform of a dataset, over those of its observations that were asked for. */
         Platform: {
+            /** @description West, south, east, north of its places, degrees; east passes 180 where they lie on both sides of the date line. */
+            bounds_deg: [
+                number,
+                number,
+                number,
+                number
+            ];
+            /**
+             * Format: int64
+             * @description Number of observations.
+             */
+            count: number;
+            /** @description Its dataset. */
+            dataset: components["schemas"]["ProductId"];
+            /** @description Time of its first observation. */
+            first: components["schemas"]["TimeMs"];
+            /** @description What it is, as its last observation says. */
+            kind: components["schemas"]["PlatformKind"];
+            /** @description Time of its last observation. */
+            last: components["schemas"]["TimeMs"];
+            /**
+             * Format: double
+             * @description Latitude of its last observation, degrees north.
+             */
+            lat_deg: number;
+            /**
+             * Format: double
+             * @description Longitude of its last observation, degrees east.
+             */
+            lon_deg: number;
+            /** @description Its name in the dataset. */
+            platform: string;
+            /** @description What it measures, sorted. */
+            properties: string[];
+        };
+        /** @description A platform. */
+        PlatformFeature: {
             geometry: components["schemas"]["Geometry"];
             /** @description `dataset/platform`. */
             id: string;
-            properties: components["schemas"]["PlatformProperties"];
+            /** @description What there is of it. */
+            properties: components["schemas"]["Platform"];
             /** @enum {string} */
             type: "Feature";
         };
@@ -735,134 +815,92 @@ export interface components {
          * @enum {string}
          */
         PlatformKind: "buoy" | "ship" | "station" | "profile";
-        /** @description What there is of a platform. */
-        PlatformProperties: {
-            /**
-             * Format: int64
-             * @description Observations.
-             */
-            count: number;
-            /** @description Data set. */
-            dataset: string;
-            /**
-             * Format: date-time
-             * @description First observation, ISO 8601 UTC.
-             */
-            first: string;
-            /** @description What it is. */
-            kind: components["schemas"]["PlatformKind"];
-            /**
-             * Format: date-time
-             * @description Last observation.
-             */
-            last: string;
-            /**
-             * Format: double
-             * @description Last latitude, degrees north.
-             */
-            lat: number;
-            /**
-             * Format: double
-             * @description Last longitude, degrees east.
-             */
-            lon: number;
-            /** @description Name in it. */
-            platform: string;
-            /** @description What was measured. */
-            properties: string[];
-        };
         /** @description Platforms as GeoJSON (RFC 7946). */
         Platforms: {
             /** @description By data set and name. */
-            features: components["schemas"]["Platform"][];
+            features: components["schemas"]["PlatformFeature"][];
             /** @enum {string} */
             type: "FeatureCollection";
         };
-        /** @description The series of a cell. */
+        /** @description The series of a cell, with all that is needed to cite it. */
         PointSeries: {
-            /** @description The cell that the place lies in. */
+            /** @description The cell that holds the place: the values are its mean, not those of the very place. */
             cell: components["schemas"]["Cell"];
             /**
              * Format: double
-             * @description Latitude that was asked for, degrees north.
+             * @description Asked latitude, degrees.
              */
-            lat: number;
+            lat_deg: number;
             /**
              * Format: double
-             * @description Longitude that was asked for, degrees east.
+             * @description Asked longitude, degrees, in [-180, 180).
              */
-            lon: number;
-            /** @description Version that was read, to be cited. */
+            lon_deg: number;
+            /** @description The version of the product that was read. */
             manifest: string;
-            /** @description Name of the product. */
-            product: string;
+            /** @description Product. */
+            product: components["schemas"]["ProductId"];
+            /** @description What the values are. */
+            quantity: components["schemas"]["Quantity"];
             /** @description One value for each step, in the order of time. */
             series: components["schemas"]["PointValue"][];
+            /** @description Citation of the product. */
+            source: string;
+            /** @description Made up by a program rather than measured. */
+            synthetic: boolean;
+            /** @description Title of the product. */
+            title: string;
             /** @description Unit of the values, the one that people read. */
             unit: string;
         };
         /** @description The value of a step. */
-        PointValue: components["schemas"]["StepTimes"] & {
-            /** @description What a sum of accumulated carbon holds; only where it is known. */
-            contributed?: components["schemas"]["Contributed"];
+        PointValue: {
+            /** @description What a sum of accumulated carbon holds; none for other values, and where nobody can tell any more. */
+            contributed?: components["schemas"]["CellCounts"];
+            /** @description First instant after it. */
+            end: components["schemas"]["TimeMs"];
+            /** @description The middle. */
+            mid: components["schemas"]["TimeMs"];
+            /** @description First instant that it covers. */
+            start: components["schemas"]["TimeMs"];
             /**
              * Format: double
-             * @description None where there is no data.
+             * @description In the answer's unit; none where the cell holds no data.
              */
             value: number | null;
         };
-        /** @description One product. `shown = stored * display_factor + display_offset`. */
-        Product: {
-            /** @description West, south, east, north, degrees; east may pass 180. */
-            bounds: [
-                number,
-                number,
-                number,
-                number
-            ];
-            /** @description The version it was computed from; none where it was ingested. */
-            derived_from: string | null;
+        /** @description One product, with what it takes to show it: `shown = stored * display_factor + display_offset`. */
+        Product: components["schemas"]["ListedProduct"] & {
             /**
              * Format: double
-             * @description Display units in a stored unit.
+             * @description Shown units in a stored unit.
              */
             display_factor: number;
             /**
              * Format: double
-             * @description Display units, added after the factor.
+             * @description Shown units, added after the factor.
              */
             display_offset: number;
-            /** @description Unit that people read: that of series, means and legends. */
-            display_unit: string;
             /** @description That of the mode flow, where there is one: speeds. */
             flow_legend?: components["schemas"]["Legend"];
-            /** @description Name. */
-            id: string;
             /** @description What its own colours mean. */
             legend: components["schemas"]["Legend"];
-            /** @description Its newest version. */
-            manifest: string;
             /** @description Ways it can be drawn. */
             modes: components["schemas"]["Mode"][];
-            /** @description What its values are. */
-            quantity: components["schemas"]["Quantity"];
-            /** @description Who made it, to be cited. */
-            source: string;
             /** @description In the order of time. */
             steps: components["schemas"]["StepTimes"][];
-            /** @description Made up, not observed. */
-            synthetic: boolean;
-            /** @description For people. */
-            title: string;
             /** @description Unit of the stored values. */
-            unit: string;
+            stored_unit: string;
         };
+        /** @description The name of a product, such as `takahashi09-flux`: 1 to 64 of `a-z 0-9 -`, starting with a letter. */
+        ProductId: string;
         Products: {
             /** @description By name. */
             products: components["schemas"]["Product"][];
         };
         /**
-         * @description How far a value may be trusted, best first: the primary flags of IOC Manuals and Guides 54, volume 3 (2013).
+         * @description How far a value may be trusted: the primary flags of IOC Manuals and Guides 54, volume 3 (2013). Missing values are
+         *     no observations.
          * @enum {string}
          */
         Quality: "good" | "not_evaluated" | "questionable" | "bad";
@@ -886,7 +924,7 @@ export interface components {
         /** @description A region with a name. */
         Region: {
             /** @description West, south, east, north, degrees; west greater than east crosses the date line. */
-            bounds: [
+            bounds_deg: [
                 number,
                 number,
                 number,
@@ -897,27 +935,94 @@ export interface components {
             /** @description For people. */
             title: string;
         };
+        /** @description The mean of a product over a region, step by step, with all that is needed to cite it. */
+        RegionSeries: {
+            /** @description Figure of the earth for areas. */
+            earth: components["schemas"]["Earth"];
+            /** @description The version of the product that was read. */
+            manifest: string;
+            /** @description How the region was taken where that may surprise. */
+            notes: string[];
+            /**
+             * Format: double
+             * @description Area of the sea in it, m².
+             */
+            ocean_area_m2: number;
+            /** @description What says which part of a cell is sea. */
+            ocean_source: string;
+            /** @description Product. */
+            product: components["schemas"]["ProductId"];
+            /** @description What the values are. */
+            quantity: components["schemas"]["Quantity"];
+            /** @description The region by its name, or as `west,south,east,north`. */
+            region: string;
+            /**
+             * Format: double
+             * @description Area of the region, land included, m².
+             */
+            region_area_m2: number;
+            /** @description One mean for each step in the period, in the order of time. */
+            series: components["schemas"]["RegionValue"][];
+            /** @description Citation of the product. */
+            source: string;
+            /** @description Made up by a program rather than measured. */
+            synthetic: boolean;
+            /** @description Title of the product. */
+            title: string;
+            /** @description Unit of the means, the one that people read. */
+            unit: string;
+        };
+        /** @description The mean of a step over a region. */
+        RegionValue: {
+            /**
+             * Format: double
+             * @description Area that holds data, m².
+             */
+            area_m2: number;
+            /**
+             * Format: double
+             * @description Share of the region's sea that holds data, percent; 0 where it holds no sea.
+             */
+            coverage_percent: number;
+            /** @description First instant after it. */
+            end: components["schemas"]["TimeMs"];
+            /**
+             * Format: double
+             * @description Mean by area over the cells with data, in the answer's unit; none where no cell has any.
+             */
+            mean: number | null;
+            /** @description The middle. */
+            mid: components["schemas"]["TimeMs"];
+            /** @description First instant that it covers. */
+            start: components["schemas"]["TimeMs"];
+        };
         Regions: {
             /** @description In the order they are offered. */
             regions: components["schemas"]["Region"][];
         };
+        /** @description A value as a paper prints it. */
+        Stated: {
+            /** @description Decimals that are printed. */
+            decimals: number;
+            /**
+             * Format: double
+             * @description Its uncertainty, where the paper states one.
+             */
+            uncertainty: number | null;
+            /**
+             * Format: double
+             * @description The value.
+             */
+            value: number;
+        };
         /** @description When a step holds. */
         StepTimes: {
-            /**
-             * Format: date-time
-             * @description First instant after it.
-             */
-            end: string;
-            /**
-             * Format: date-time
-             * @description Middle.
-             */
-            mid: string;
-            /**
-             * Format: date-time
-             * @description First instant, ISO 8601 UTC.
-             */
-            start: string;
+            /** @description First instant after it. */
+            end: components["schemas"]["TimeMs"];
+            /** @description Middle. */
+            mid: components["schemas"]["TimeMs"];
+            /** @description First instant. */
+            start: components["schemas"]["TimeMs"];
         };
         /** @description TileJSON 3.0.0, and beyond it the version and the instants of the layer. */
         TileJson: {
@@ -957,6 +1062,16 @@ export interface components {
             /** @description Middles of the steps; every instant between the first and the last is valid as well. */
             times: string[];
         };
+        /**
+         * Format: date-time
+         * @description An instant, ISO 8601 UTC.
+         */
+        TimeMs: string;
+        /**
+         * @description What a paper's own uncertainty says of a difference.
+         * @enum {string}
+         */
+        Verdict: "within" | "outside" | "no_uncertainty_stated";
     };
     responses: never;
     parameters: never;
@@ -1075,7 +1190,7 @@ export interface operations {
         parameters: {
             query?: {
                 /** @description Where: a region as budgets take it, such as `west,south,east,north` in degrees; everywhere unless one is given. */
-                bbox?: string;
+                region?: string;
                 /** @description First instant, ISO 8601 UTC. */
                 from?: string;
                 /** @description First instant after the period. */
@@ -1184,7 +1299,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["MeasuredSeries"];
+                    "application/json": components["schemas"]["ObservationPage"];
                 };
             };
             /** @description A parameter is not valid, or missing; the reason says what would be */
@@ -1431,7 +1546,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["AreaSeries"];
+                    "application/json": components["schemas"]["RegionSeries"];
                 };
             };
             /** @description A parameter is not valid, or missing; the reason says what would be */
@@ -1497,7 +1612,7 @@ export interface operations {
                 from?: string;
                 /** @description First instant after the period; the product's own unless one is given. */
                 to?: string;
-                /** @description How the period is cut into rows; `month` unless told otherwise. */
+                /** @description What a row covers; `total` unless told otherwise. */
                 step?: components["schemas"]["BudgetStep"];
                 /** @description Figure of the earth for areas; `wgs84` unless one is given. */
                 earth?: components["schemas"]["Earth"];
@@ -1523,7 +1638,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["Budget"];
+                    "application/json": components["schemas"]["BudgetAnswer"];
                 };
             };
             /** @description A parameter is not valid, or missing; the reason says what would be */
@@ -2400,7 +2515,7 @@ type ReadonlyArray<T> = [
 ] ? Readonly<Exclude<T, undefined>> : Readonly<Exclude<T, undefined>[]>;
 export const budgetStepValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["BudgetStep"]> = ["month", "year", "total"];
 export const cellsValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Cells"]> = ["whole", "ocean-share"];
-export const earthValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Earth"]> = ["wgs84", "sphere"];
+export const earthValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Earth"]> = ["wgs84", "sphere", "local-radius"];
 export const geometryOneOf0TypeValues: ReadonlyArray<Extract<FlattenedDeepRequired<components>["schemas"]["Geometry"], {
     type: unknown;
 }>["type"]> = ["Point"];
@@ -2410,8 +2525,9 @@ export const geometryOneOf1TypeValues: ReadonlyArray<Extract<FlattenedDeepRequir
 export const legendFormValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["LegendForm"]> = ["json", "svg", "png"];
 export const modeValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Mode"]> = ["map", "points", "sprites", "volume", "flow"];
 export const paletteValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Palette"]> = ["balance", "curl", "delta", "thermal", "haline", "ice", "algae", "speed", "dense", "gray"];
-export const platformTypeValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Platform"]["type"]> = ["Feature"];
+export const platformFeatureTypeValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["PlatformFeature"]["type"]> = ["Feature"];
 export const platformKindValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["PlatformKind"]> = ["buoy", "ship", "station", "profile"];
 export const platformsTypeValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Platforms"]["type"]> = ["FeatureCollection"];
 export const qualityValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Quality"]> = ["good", "not_evaluated", "questionable", "bad"];
 export const quantityValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Quantity"]> = ["carbon_flux", "accumulated_carbon", "sea_surface_temperature", "chlorophyll", "wind_speed", "pco2", "salinity", "air_pressure", "ice_fraction", "wave_height", "precipitation", "current", "elevation", "sea_area_fraction", "land_area_fraction"];
+export const verdictValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Verdict"]> = ["within", "outside", "no_uncertainty_stated"];
