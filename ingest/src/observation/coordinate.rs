@@ -4,12 +4,11 @@ use contract::event::RejectReason;
 
 use super::epic;
 use super::sampling::Sampling;
-use crate::cf::coordinate::{Role, role_of};
-use crate::cf::packing::Packing;
-use crate::decoder::session::Session;
-use crate::error::Stop;
-use crate::file::description::{Description, Part, Variable};
-use crate::rejection::Rejection;
+use crate::plan::cf::coordinate::{Role, role_of};
+use crate::plan::cf::packing::Packing;
+use crate::inspect::reader::session::Session;
+use crate::error::{Rejection, Stop};
+use crate::inspect::file::description::{Description, Part, Variable};
 
 /// Most values of one coordinate variable.
 pub(crate) const MAX_VALUES: u64 = 1 << 24;

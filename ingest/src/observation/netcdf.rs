@@ -14,12 +14,11 @@ use super::quality::{Verdict, worse};
 use super::recognise::{Feature, recognise};
 use super::sampling::Sampling;
 use super::{Source, name};
-use crate::cf::packing::{Packing, Unpacked};
-use crate::cf::period;
-use crate::decoder::session::Session;
-use crate::error::Stop;
-use crate::file::description::Description;
-use crate::rejection::Rejection;
+use crate::plan::cf::packing::{Packing, Unpacked};
+use crate::plan::cf::period;
+use crate::inspect::reader::session::Session;
+use crate::error::{Rejection, Stop};
+use crate::inspect::file::description::Description;
 
 /// What all samples of a file share.
 struct Shared {
