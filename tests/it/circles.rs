@@ -38,10 +38,6 @@ const STILL_TIED: &[&[&str]] = &[
         "storage/src/sound.rs",
     ],
     &[
-        "ingest/src/observation/coordinate.rs",
-        "ingest/src/observation/sampling.rs",
-    ],
-    &[
         "compute/src/budget/accumulated.rs",
         "compute/src/budget/asked.rs",
         "compute/src/budget/named.rs",

@@ -29,6 +29,7 @@ mod station;
 mod table;
 mod table_columns;
 mod table_time;
+mod values;
 
 use contract::product::ProductId;
 
@@ -36,7 +37,6 @@ use crate::inspect::reader::session::Session;
 use crate::error::{Rejection, Stop};
 use crate::inspect::file::description::Description;
 
-pub(crate) use coordinate::MAX_VALUES;
 pub use gather::Found;
 pub(crate) use gather::{MAX_OBSERVATIONS, OBSERVATION_BYTES};
 pub(crate) use note::put as put_note;
@@ -44,6 +44,7 @@ pub use note::{FileNote, notes};
 pub use path::{Reading, read_path};
 pub(crate) use recognise::{TextFormat, recognise, recognise_text};
 pub use sink::{ObservationSink, SinkCause, SinkError, Stored};
+pub(crate) use values::MAX_VALUES;
 
 /// Largest text file of observations, bytes: a ship's year every second has half of it.
 pub(crate) const MAX_TEXT_BYTES: u64 = 256 << 20;

@@ -6,13 +6,14 @@ use contract::product::ProductId;
 use contract::time::TimeMs;
 
 use super::convert::Given;
-use super::coordinate::{self, Coordinate};
+use super::coordinate::Coordinate;
 use super::epic;
 use super::gather::{Found, Gathered};
 use super::measured::{self, Measured};
 use super::quality::{Verdict, worse};
 use super::recognise::{Feature, recognise};
 use super::sampling::Sampling;
+use super::values::read_stored;
 use super::{Source, name};
 use crate::plan::cf::packing::{Packing, Unpacked};
 use crate::plan::cf::period;
@@ -114,7 +115,7 @@ async fn take(
     shared: &Shared,
     gathered: &mut Gathered,
 ) -> Result<(), Stop> {
-    let stored = coordinate::read_stored(session, measured.variable).await?;
+    let stored = read_stored(session, measured.variable).await?;
     let packing = Packing::of(measured.variable);
     let lens: Vec<usize> = measured
         .variable

@@ -3,7 +3,7 @@
 
 use contract::event::RejectReason;
 
-use super::coordinate::{MAX_VALUES, read, read_stored};
+use super::values::{MAX_VALUES, read, read_stored};
 use super::{Source, name};
 use crate::inspect::reader::session::Session;
 use crate::error::{Rejection, Stop};
