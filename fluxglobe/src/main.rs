@@ -35,7 +35,7 @@ fn main() -> ExitCode {
     let Cli { settings, command } = cli;
     // The decoder of hostile files runs before anything else is started: no threads, no log, no open files.
     if let Command::DecodeFile { args } = &command {
-        return ingest::decoder::run_child(args.clone());
+        return ingest::reader::run_child(args.clone());
     }
     if command.prints_settings() {
         program.build();

@@ -6,7 +6,7 @@ use contract::quantity::Quantity;
 use contract::time::Period;
 
 use crate::decode::DecodedGrid;
-use crate::rejection::Rejection;
+use crate::error::Rejection;
 
 /// Share of the valid values that may be implausible (and is masked); more than that is a wrong unit or a wrong scale.
 pub(crate) const MAX_IMPLAUSIBLE_SHARE: f64 = 0.05;

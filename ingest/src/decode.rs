@@ -3,12 +3,12 @@
 use contract::masked::MaskedCells;
 use contract::time::Period;
 
-use crate::cf::axis::Mapping;
-use crate::cf::coordinate::{Axis, Role};
-use crate::cf::packing::Unpacked;
-use crate::decoder::session::Session;
+use crate::plan::cf::axis::Mapping;
+use crate::plan::cf::coordinate::{Axis, Role};
+use crate::plan::cf::packing::Unpacked;
+use crate::inspect::reader::session::Session;
 use crate::error::Stop;
-use crate::file::description::Part;
+use crate::inspect::file::description::Part;
 use crate::plan::{PlannedGranule, PlannedStep};
 
 /// One step as values, `[row, col]`, row 0 north, stored unit, NaN for no data.
@@ -134,7 +134,7 @@ fn turned(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cf::axis::Registration;
+    use crate::plan::cf::axis::Registration;
 
     #[test]
     fn south_first_and_longitude_first_files_give_the_same_map() {

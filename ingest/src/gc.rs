@@ -6,7 +6,7 @@ use contract::key::ObjectKey;
 use contract::kind::Kind;
 use storage::gc::Owner;
 
-use crate::reading;
+use crate::put::reading;
 
 /// What is known of the reading of raw files: in use as long as that file is.
 #[derive(Debug)]

@@ -10,22 +10,20 @@ use futures::{StreamExt as _, TryStreamExt as _};
 use storage::Store;
 use storage::log::EventLog;
 
-use crate::answer::{self, Answer, Asked, Ready};
-use crate::blame::blame;
-use crate::boundary;
-use crate::error::{Cause, IngestError};
+use crate::notice::answer::{self, Answer, Asked, Ready};
+use crate::error::{Cause, IngestError, blame, boundary};
 use crate::fetch::{Expected, Location};
-use crate::gates::Gates;
-use crate::memory;
-use crate::metrics::Metrics;
+use crate::limits::gates::Gates;
+use crate::limits::memory;
+use crate::pipeline::metrics::Metrics;
 use crate::notice::{Order, PendingNotice, notice_body};
-use crate::outcome::Outcome;
+use crate::notice::Outcome;
 use crate::pipeline::{Pipeline, Prepared};
-use crate::profile::Profile;
-use crate::progress::{Progress, Stage};
+use crate::plan::profile::Profile;
+use crate::pipeline::progress::{Progress, Stage};
 use crate::put::StoredGranule;
 use crate::settings::Settings;
-use crate::source_wait::SourceWait;
+use crate::fetch::source_wait::SourceWait;
 
 /// Files that are published together: bounds what a crash makes be done again.
 pub(crate) const COMMIT_FILES: usize = 64;

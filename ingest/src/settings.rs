@@ -5,14 +5,14 @@ use std::path::PathBuf;
 
 use crate::fetch::Sources;
 use crate::limits::Limits;
-use crate::profile::Profiles;
+use crate::plan::profile::Profiles;
 
 /// The sandboxed reader: a program and what comes before its own arguments.
 #[derive(Debug, Clone)]
 pub struct DecoderCommand {
     /// Program.
     pub program: PathBuf,
-    /// Arguments before those of [`crate::decoder::run_child`], such as the hidden subcommand.
+    /// Arguments before those of [`crate::reader::run_child`], such as the hidden subcommand.
     pub arguments: Vec<OsString>,
 }
 

@@ -8,15 +8,15 @@ use async_trait::async_trait;
 use contract::observation::Observation;
 use storage::Store;
 
-use crate::answer::{Asked, Ready};
+use crate::notice::answer::{Asked, Ready};
 use crate::error::IngestError;
-use crate::gates::Gates;
+use crate::limits::gates::Gates;
 use crate::land::{self, Batch};
-use crate::metrics::{Metrics, class};
+use crate::pipeline::metrics::{Metrics, class};
 use crate::observation::{ObservationSink, SinkError, Stored};
-use crate::outcome::Outcome;
+use crate::notice::Outcome;
 use crate::pipeline::Pipeline;
-use crate::progress::Quiet;
+use crate::pipeline::progress::Quiet;
 use crate::settings::Settings;
 
 /// Endings of files that may hold data; documentation beside them is passed over.
@@ -230,7 +230,7 @@ fn plain(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rejection::Rejection;
+    use crate::error::Rejection;
     use contract::event::RejectReason;
 
     #[test]

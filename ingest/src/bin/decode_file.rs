@@ -3,5 +3,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    ingest::decoder::run_child(std::env::args_os().skip(1))
+    ingest::reader::run_child(std::env::args_os().skip(1))
 }

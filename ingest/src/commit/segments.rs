@@ -11,7 +11,7 @@ use crate::error::IngestError;
 
 /// Most steps of a segment: a leap year of days.
 pub(crate) const MAX_SEGMENT_STEPS: usize = 366;
-/// Most values of a segment, 1 GiB: what is held in memory to turn maps into series ([`crate::memory::of_series`]).
+/// Most values of a segment, 1 GiB: what is held in memory to turn maps into series ([`crate::limits::memory::of_series`]).
 pub(crate) const MAX_SEGMENT_VALUES: usize = 1 << 28;
 
 /// What was written.

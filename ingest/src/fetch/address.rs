@@ -1,64 +1,37 @@
 //! Which network addresses are public: a notice must not make the service ask its own neighbours.
 
-use std::net::{IpAddr, Ipv4Addr, Ipv6Addr};
+use std::net::{IpAddr, Ipv4Addr};
+use std::sync::LazyLock;
 
-/// IPv4 blocks that are not public, as address and prefix length: RFC 6890 and its updates, multicast and reserved, and
-/// the address at which one cloud keeps its metadata outside of these.
-const NOT_PUBLIC_V4: [(Ipv4Addr, u32); 16] = [
-    (Ipv4Addr::UNSPECIFIED, 8),
-    (Ipv4Addr::new(10, 0, 0, 0), 8),
-    (Ipv4Addr::new(100, 64, 0, 0), 10),
-    (Ipv4Addr::new(127, 0, 0, 0), 8),
-    (Ipv4Addr::new(168, 63, 129, 16), 32),
-    (Ipv4Addr::new(169, 254, 0, 0), 16),
-    (Ipv4Addr::new(172, 16, 0, 0), 12),
-    (Ipv4Addr::new(192, 0, 0, 0), 24),
-    (Ipv4Addr::new(192, 0, 2, 0), 24),
-    (Ipv4Addr::new(192, 88, 99, 0), 24),
-    (Ipv4Addr::new(192, 168, 0, 0), 16),
-    (Ipv4Addr::new(198, 18, 0, 0), 15),
-    (Ipv4Addr::new(198, 51, 100, 0), 24),
-    (Ipv4Addr::new(203, 0, 113, 0), 24),
-    (Ipv4Addr::new(224, 0, 0, 0), 4),
-    (Ipv4Addr::new(240, 0, 0, 0), 4),
-];
+use ipnet::IpNet;
 
-/// Blocks inside `2000::/3` that are not public: protocol assignments (Teredo among them), documentation, 6to4.
-const NOT_PUBLIC_V6: [(Ipv6Addr, u32); 4] = [
-    (Ipv6Addr::new(0x2001, 0, 0, 0, 0, 0, 0, 0), 23),
-    (Ipv6Addr::new(0x2001, 0xdb8, 0, 0, 0, 0, 0, 0), 32),
-    (Ipv6Addr::new(0x2002, 0, 0, 0, 0, 0, 0, 0), 16),
-    (Ipv6Addr::new(0x3fff, 0, 0, 0, 0, 0, 0, 0), 20),
-];
-
+/// Networks that are not public. IPv4: RFC 6890 and its updates, multicast and reserved, and the address at which one cloud
+/// keeps its metadata outside of these. IPv6, inside [`GLOBAL_UNICAST`]: protocol assignments (Teredo among them),
+/// documentation, 6to4.
+static NOT_PUBLIC: LazyLock<Vec<IpNet>> = LazyLock::new(|| {
+    let all = "0.0.0.0/8 10.0.0.0/8 100.64.0.0/10 127.0.0.0/8 168.63.129.16/32 169.254.0.0/16 172.16.0.0/12 192.0.0.0/24 \
+               192.0.2.0/24 192.88.99.0/24 192.168.0.0/16 198.18.0.0/15 198.51.100.0/24 203.0.113.0/24 224.0.0.0/4 240.0.0.0/4 \
+               2001::/23 2001:db8::/32 2002::/16 3fff::/20";
+    all.split(' ').map(network).collect()
+});
 /// Where public IPv6 addresses are.
-const GLOBAL_UNICAST: (Ipv6Addr, u32) = (Ipv6Addr::new(0x2000, 0, 0, 0, 0, 0, 0, 0), 3);
+static GLOBAL_UNICAST: LazyLock<IpNet> = LazyLock::new(|| network("2000::/3"));
 /// IPv4 addresses behind a translator (RFC 6052), which a network without IPv4 reaches the world through.
-const TRANSLATED: (Ipv6Addr, u32) = (Ipv6Addr::new(0x64, 0xff9b, 0, 0, 0, 0, 0, 0), 96);
+static TRANSLATED: LazyLock<IpNet> = LazyLock::new(|| network("64:ff9b::/96"));
+
+fn network(text: &str) -> IpNet {
+    text.parse().expect("a network of this file, which a test reads")
+}
 
 /// Is it an address of the public network?
 pub(super) fn is_public(address: IpAddr) -> bool {
-    match address {
-        IpAddr::V4(v4) => !NOT_PUBLIC_V4.iter().any(|block| is_in_v4(v4, *block)),
-        IpAddr::V6(v6) => match v6.to_ipv4_mapped() {
-            Some(v4) => is_public(IpAddr::V4(v4)),
-            None if is_in_v6(v6, TRANSLATED) => {
-                is_public(IpAddr::V4(Ipv4Addr::from_bits(v6.to_bits() as u32)))
-            }
-            None => {
-                is_in_v6(v6, GLOBAL_UNICAST)
-                    && !NOT_PUBLIC_V6.iter().any(|block| is_in_v6(v6, *block))
-            }
-        },
+    match address.to_canonical() {
+        IpAddr::V6(v6) if TRANSLATED.contains(&address) => {
+            is_public(Ipv4Addr::from_bits(v6.to_bits() as u32).into())
+        }
+        IpAddr::V6(_) if !GLOBAL_UNICAST.contains(&address) => false,
+        plain => !NOT_PUBLIC.iter().any(|block| block.contains(&plain)),
     }
-}
-
-fn is_in_v4(address: Ipv4Addr, (block, length): (Ipv4Addr, u32)) -> bool {
-    (address.to_bits() ^ block.to_bits()) >> (32 - length) == 0
-}
-
-fn is_in_v6(address: Ipv6Addr, (block, length): (Ipv6Addr, u32)) -> bool {
-    (address.to_bits() ^ block.to_bits()) >> (128 - length) == 0
 }
 
 #[cfg(test)]

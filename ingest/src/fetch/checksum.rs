@@ -4,8 +4,7 @@ use contract::digest::Digest;
 use contract::event::RejectReason;
 use openssl::hash::{Hasher, MessageDigest};
 
-use crate::error::IngestError;
-use crate::rejection::Rejection;
+use crate::error::{IngestError, Rejection};
 
 /// What the sender says of a file.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]

@@ -18,9 +18,8 @@ use super::raw::RawGranule;
 use super::retry::{Attempts, Miss, RetryLimits, answered, given_up, limited};
 use super::spool::Spool;
 use super::turns::Turns;
-use crate::error::{IngestError, Stop};
+use crate::error::{IngestError, Rejection, Stop};
 use crate::limits::Limits;
-use crate::rejection::Rejection;
 
 /// What may be read. Clones share connections and spool.
 #[derive(Debug, Clone, Default)]

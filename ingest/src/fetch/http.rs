@@ -17,8 +17,7 @@ use url::{Host, Url};
 use super::address::is_public;
 use super::location::shown;
 use super::retry::Miss;
-use crate::error::{IngestError, Stop};
-use crate::rejection::Rejection;
+use crate::error::{IngestError, Rejection, Stop};
 
 /// Redirects that are followed.
 const MAX_REDIRECTS: usize = 5;

@@ -14,7 +14,7 @@ use super::pace::{Pace, Slowest};
 use super::raw::{Held, RawGranule, Stamp};
 use super::retry::Miss;
 use super::spool::{self, Spooled};
-use crate::rejection::Rejection;
+use crate::error::Rejection;
 
 /// Bytes gathered before they are written.
 const WRITE_BYTES: usize = 1 << 20;

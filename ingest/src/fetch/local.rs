@@ -12,9 +12,8 @@ use super::checksum::{Check, Expected, wrong_size};
 use super::location::file_name;
 use super::raw::{Held, RawGranule, Stamp};
 use super::retry::Miss;
-use crate::error::Stop;
+use crate::error::{Rejection, Stop};
 use crate::limits::Limits;
-use crate::rejection::Rejection;
 
 /// Bytes read at a time.
 const READ_BYTES: usize = 1 << 20;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use contract::event::RejectReason;
 use url::Url;
 
-use crate::rejection::Rejection;
+use crate::error::Rejection;
 
 /// Longest path or URL, bytes: the longest path of the system.
 const MAX_BYTES: usize = 4096;

@@ -9,8 +9,7 @@ use storage::Store;
 use url::Url;
 
 use super::retry::Miss;
-use crate::error::IngestError;
-use crate::rejection::Rejection;
+use crate::error::{IngestError, Rejection};
 
 /// A prefix that files may be read below.
 #[derive(Debug)]

@@ -6,8 +6,7 @@ use contract::event::RejectReason;
 use retry::{Backoff, Pauses};
 
 use super::location::Location;
-use crate::error::{IngestError, Stop};
-use crate::rejection::Rejection;
+use crate::error::{IngestError, Rejection, Stop};
 
 /// How often and how long a source is asked again.
 #[derive(Debug, Clone, Copy)]

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use tempfile::{NamedTempFile, TempDir};
 
 use crate::error::IngestError;
-use crate::room::{Room, Taken};
+use crate::limits::room::{Room, Taken};
 
 /// Folders of processes begin so; a lock file of the same name with this ending is held while the process lives.
 const PREFIX: &str = "ingest-";
@@ -154,7 +154,7 @@ fn remove_leftovers(parent: &Path) -> io::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::room::UNIT_BYTES;
+    use crate::limits::room::UNIT_BYTES;
     use std::time::Duration;
 
     fn names(folder: &Path) -> Vec<String> {

@@ -6,7 +6,7 @@ use std::time::Duration;
 use crate::error::IngestError;
 use crate::fetch::{Allowed, AllowedHost, RetryLimits, Sources};
 use crate::limits::Limits;
-use crate::profile::Profiles;
+use crate::plan::profile::Profiles;
 use crate::settings::{DecoderCommand, Settings};
 
 const MIB: u64 = 1 << 20;

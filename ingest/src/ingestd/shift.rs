@@ -17,12 +17,12 @@ use tracing::Instrument as _;
 use super::publish_queue::{Number, PublishQueue};
 use super::work::{self, Done, Work, alongside};
 use super::{GROUP, IngestService, TOPIC, now};
-use crate::answer::{Answer, Asked};
+use crate::notice::answer::{Answer, Asked};
 use crate::error::IngestError;
-use crate::metrics;
-use crate::outcome::Outcome;
+use crate::pipeline::metrics;
+use crate::notice::Outcome;
 use crate::pipeline::Pipeline;
-use crate::progress::Progress;
+use crate::pipeline::progress::Progress;
 use crate::put::StoredGranule;
 
 /// How long notices are waited for while nothing is under way: bounds how late a stop is heard.

@@ -9,8 +9,8 @@ use serde::Deserialize;
 
 use super::{Order, PendingNotice, bad, notice_body};
 use crate::fetch::{Expected, Location, Method};
-use crate::profile::Profiles;
-use crate::rejection::Rejection;
+use crate::plan::profile::Profiles;
+use crate::error::Rejection;
 
 /// Most files of one message.
 const MAX_FILES: usize = 256;

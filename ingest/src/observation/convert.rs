@@ -1,7 +1,7 @@
 //! A unit as a file spells it to the unit that a property is stored in.
 
 use super::property::{self, COMMON_UNITS, DEGREE, Property};
-use crate::unit::{self, Unit};
+use crate::plan::unit::{self, Unit};
 
 /// From here on numbers stand for no value: 1e35 and the like.
 const NO_NUMBER: f64 = 1e30;

@@ -1,6 +1,6 @@
 //! Moorings written with EPIC codes (PMEL): what a code measures, and which other codes flag it or say its depth.
 
-use crate::file::description::Variable;
+use crate::inspect::file::description::Variable;
 
 /// What a code means.
 #[derive(Debug, Clone, Copy, PartialEq)]

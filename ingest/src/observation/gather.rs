@@ -10,7 +10,7 @@ use contract::observation::Observation;
 
 use super::convert::Conversion;
 use crate::check::MAX_IMPLAUSIBLE_SHARE;
-use crate::rejection::Rejection;
+use crate::error::Rejection;
 
 /// Most observations of one file: about 300 MB.
 pub(crate) const MAX_OBSERVATIONS: usize = 1 << 20;

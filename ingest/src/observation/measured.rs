@@ -8,12 +8,11 @@ use super::epic;
 use super::property;
 use super::quality::Scheme;
 use super::sampling::Sampling;
-use crate::cf::calendar::{Calendar, TimeUnit};
-use crate::decoder::session::Session;
-use crate::error::Stop;
-use crate::file::description::{Description, Variable};
-use crate::rejection::Rejection;
-use crate::unit;
+use crate::plan::cf::calendar::{Calendar, TimeUnit};
+use crate::inspect::reader::session::Session;
+use crate::error::{Rejection, Stop};
+use crate::inspect::file::description::{Description, Variable};
+use crate::plan::unit;
 
 /// A measured variable with all that its samples need.
 pub(super) struct Measured<'a> {

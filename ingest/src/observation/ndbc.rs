@@ -10,7 +10,7 @@ use contract::time::TimeMs;
 use super::convert::{Conversion, Given};
 use super::gather::{Found, Gathered};
 use super::{MAX_TEXT_BYTES, Source, name, station};
-use crate::rejection::Rejection;
+use crate::error::Rejection;
 
 /// Longest line that is read, bytes.
 const MAX_LINE_BYTES: usize = 4096;

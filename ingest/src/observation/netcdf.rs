@@ -6,20 +6,20 @@ use contract::product::ProductId;
 use contract::time::TimeMs;
 
 use super::convert::Given;
-use super::coordinate::{self, Coordinate};
+use super::coordinate::Coordinate;
 use super::epic;
 use super::gather::{Found, Gathered};
 use super::measured::{self, Measured};
 use super::quality::{Verdict, worse};
 use super::recognise::{Feature, recognise};
 use super::sampling::Sampling;
+use super::values::read_stored;
 use super::{Source, name};
-use crate::cf::packing::{Packing, Unpacked};
-use crate::cf::period;
-use crate::decoder::session::Session;
-use crate::error::Stop;
-use crate::file::description::Description;
-use crate::rejection::Rejection;
+use crate::plan::cf::packing::{Packing, Unpacked};
+use crate::plan::cf::period;
+use crate::inspect::reader::session::Session;
+use crate::error::{Rejection, Stop};
+use crate::inspect::file::description::Description;
 
 /// What all samples of a file share.
 struct Shared {
@@ -115,7 +115,7 @@ async fn take(
     shared: &Shared,
     gathered: &mut Gathered,
 ) -> Result<(), Stop> {
-    let stored = coordinate::read_stored(session, measured.variable).await?;
+    let stored = read_stored(session, measured.variable).await?;
     let packing = Packing::of(measured.variable);
     let lens: Vec<usize> = measured
         .variable

@@ -7,10 +7,9 @@ use contract::event::RejectReason;
 use contract::product::ProductId;
 
 use super::{Found, MAX_TEXT_BYTES, Source, read, read_text, recognise, recognise_text};
-use crate::decoder::session::Session;
-use crate::error::{IngestError, Stop};
+use crate::inspect::reader::session::Session;
+use crate::error::{IngestError, Rejection, Stop};
 use crate::limits::Limits;
-use crate::rejection::Rejection;
 use crate::settings::Settings;
 
 /// Bytes that tell of which kind a text file is.

@@ -5,7 +5,7 @@
 
 use contract::observation::Quality;
 
-use crate::file::description::Variable;
+use crate::inspect::file::description::Variable;
 
 /// What a flag says: a quality, or that there is no value.
 pub(super) type Verdict = Option<Quality>;

@@ -3,12 +3,11 @@
 
 use contract::event::RejectReason;
 
-use super::coordinate::{MAX_VALUES, read, read_stored};
+use super::values::{MAX_VALUES, read, read_stored};
 use super::{Source, name};
-use crate::decoder::session::Session;
-use crate::error::Stop;
-use crate::file::description::{Description, Dimension, Kind, Part, Variable};
-use crate::rejection::Rejection;
+use crate::inspect::reader::session::Session;
+use crate::error::{Rejection, Stop};
+use crate::inspect::file::description::{Description, Dimension, Kind, Part, Variable};
 
 /// Most platforms of one file.
 const MAX_INSTANCES: u64 = 100_000;

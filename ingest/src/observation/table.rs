@@ -15,7 +15,7 @@ use super::gather::{Found, Gathered};
 use super::quality::Scheme;
 use super::table_columns::Columns;
 use super::{MAX_TEXT_BYTES, Source, name, table_time};
-use crate::rejection::Rejection;
+use crate::error::Rejection;
 
 /// Lines that may come before the column names.
 const MAX_COMMENT_LINES: usize = 10_000;

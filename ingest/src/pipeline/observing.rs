@@ -3,12 +3,11 @@
 use contract::event::RejectReason;
 
 use super::{Pipeline, Prepared};
-use crate::error::{IngestError, Stop};
+use crate::error::{IngestError, Rejection, Stop};
 use crate::fetch::RawGranule;
 use crate::inspect::InspectedGranule;
 use crate::observation::{self, Found, TextFormat};
 use crate::plan::Wish;
-use crate::rejection::Rejection;
 
 impl Pipeline<'_> {
     /// Observations of a text file.

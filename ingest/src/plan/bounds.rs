@@ -4,12 +4,11 @@ use contract::time::{Period, TimeMs};
 
 use super::refused::refused;
 use super::{Planning, stamps};
-use crate::cf::calendar::CalendarDate;
-use crate::cf::cell_methods::TimeMethod;
-use crate::cf::period;
-use crate::error::Stop;
-use crate::file::description::Part;
-use crate::rejection::Rejection;
+use crate::plan::cf::calendar::CalendarDate;
+use crate::plan::cf::cell_methods::TimeMethod;
+use crate::plan::cf::period;
+use crate::error::{Rejection, Stop};
+use crate::inspect::file::description::Part;
 
 /// What the bounds of a time axis say.
 pub(super) enum Bounds {
@@ -163,7 +162,7 @@ fn within_year([start, end]: [CalendarDate; 2], stamp: CalendarDate) -> Result<P
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cf::calendar::Calendar;
+    use crate::plan::cf::calendar::Calendar;
 
     fn date(year: i32, month: u32, day: u32) -> CalendarDate {
         CalendarDate {

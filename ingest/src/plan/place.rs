@@ -3,13 +3,12 @@
 use contract::event::RejectReason;
 
 use super::Planning;
-use crate::cf::axis::Mapping;
-use crate::cf::coordinate::{self, Axis, Evidence, Role};
-use crate::cf::projection;
-use crate::error::Stop;
-use crate::file::description::{Dimension, Variable};
-use crate::profile::{GridRules, StatedGrid, TimeSource};
-use crate::rejection::Rejection;
+use crate::plan::cf::axis::Mapping;
+use crate::plan::cf::coordinate::{self, Axis, Evidence, Role};
+use crate::plan::cf::projection;
+use crate::error::{Rejection, Stop};
+use crate::inspect::file::description::{Dimension, Variable};
+use crate::plan::profile::{GridRules, StatedGrid, TimeSource};
 
 /// Longitudes of axes that begin anywhere and go once around stay below.
 const MAX_LON_DEG: f64 = 540.0;

@@ -2,7 +2,7 @@
 
 use contract::event::RejectReason;
 
-use crate::rejection::Rejection;
+use crate::error::Rejection;
 
 pub(super) fn refused(object: &str, detail: impl AsRef<str>) -> Rejection {
     Rejection::new(RejectReason::Time, object, detail)

@@ -2,9 +2,8 @@
 
 use super::Planning;
 use super::refused::refused;
-use crate::cf::calendar::{Calendar, CalendarDate, TimeUnit};
-use crate::error::Stop;
-use crate::rejection::Rejection;
+use crate::plan::cf::calendar::{Calendar, CalendarDate, TimeUnit};
+use crate::error::{Rejection, Stop};
 
 /// The unit of a time variable; `unit` and `calendar` instead of those of the file.
 pub(super) fn unit(

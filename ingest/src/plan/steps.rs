@@ -6,16 +6,15 @@ use contract::time::Period;
 use super::bounds::{self, Bounds};
 use super::refused::refused;
 use super::{PlannedStep, Planning, coverage, date, stamps};
-use crate::cf::calendar::CalendarDate;
-use crate::cf::cell_methods::{self, TimeMethod};
-use crate::cf::coordinate::{Axis, Role};
-use crate::cf::quantity::Named;
-use crate::cf::{period, spacing};
-use crate::error::Stop;
-use crate::file::description::Variable;
-use crate::profile::{Profile, TimeRules, TimeSource};
-use crate::rejection::Rejection;
-use crate::unit;
+use crate::plan::cf::calendar::CalendarDate;
+use crate::plan::cf::cell_methods::{self, TimeMethod};
+use crate::plan::cf::coordinate::{Axis, Role};
+use crate::plan::cf::quantity::Named;
+use crate::plan::cf::{period, spacing};
+use crate::error::{Rejection, Stop};
+use crate::inspect::file::description::Variable;
+use crate::plan::profile::{Profile, TimeRules, TimeSource};
+use crate::plan::unit;
 
 /// The periods of all steps, in the order of the file, not overlapping.
 pub(super) async fn periods(

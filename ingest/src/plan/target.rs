@@ -5,14 +5,14 @@ use contract::product::ProductId;
 use contract::quantity::Quantity;
 
 use super::Target;
-use crate::cf::coordinate::{self, Role};
-use crate::cf::packing::Packing;
-use crate::cf::projection;
-use crate::cf::quantity::{Named, directions, has_direction, of_standard_name};
-use crate::file::description::{Description, Variable};
-use crate::profile::Profile;
-use crate::rejection::Rejection;
-use crate::unit::Substance;
+use crate::plan::cf::coordinate::{self, Role};
+use crate::plan::cf::packing::Packing;
+use crate::plan::cf::projection;
+use crate::plan::cf::quantity::{Named, directions, has_direction, of_standard_name};
+use crate::inspect::file::description::{Description, Variable};
+use crate::plan::profile::Profile;
+use crate::error::Rejection;
+use crate::plan::unit::Substance;
 
 /// Longest title and citation taken from a file, characters.
 const MAX_TITLE_CHARS: usize = 200;

@@ -10,9 +10,9 @@ use storage::{Store, manifests, verify};
 
 use super::{By, Item, Plan, Reason, Request};
 use crate::error::IngestError;
-use crate::profile::Profiles;
-use crate::reading::{self, Reading};
-use crate::recipe::{DECODER, Recipe};
+use crate::plan::profile::Profiles;
+use crate::put::reading::{self, Reading};
+use crate::plan::recipe::{DECODER, Recipe};
 
 /// Notes that are read at the same time.
 const NOTES_AT_ONCE: usize = 16;

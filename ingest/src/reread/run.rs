@@ -12,14 +12,14 @@ use super::{By, Item, Plan, Request, Workplace};
 use crate::commit;
 use crate::error::{IngestError, Stop};
 use crate::fetch::RawFiles;
-use crate::gates::Gates;
-use crate::metrics::Metrics;
+use crate::limits::gates::Gates;
+use crate::pipeline::metrics::Metrics;
 use crate::pipeline::Pipeline;
 use crate::plan::Wish;
-use crate::profile::Profile;
-use crate::progress::Quiet;
-use crate::reading::{self, Reading};
-use crate::recipe::Recipe;
+use crate::plan::profile::Profile;
+use crate::pipeline::progress::Quiet;
+use crate::put::reading::{self, Reading};
+use crate::plan::recipe::Recipe;
 
 /// Works a plan off; the new version, or none if everything came out as it was. `progress` is told how many files have
 /// been read.

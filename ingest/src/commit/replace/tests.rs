@@ -7,7 +7,7 @@ use contract::quantity::Quantity;
 
 use super::*;
 use crate::plan::Target;
-use crate::recipe::Recipe;
+use crate::plan::recipe::Recipe;
 use crate::settings::{DecoderCommand, Settings};
 
 const GRID: Grid = Grid {

@@ -59,11 +59,11 @@ fn reader(kind: Kind) -> Reader {
             "frozen_notes_of_files_of_observations_say_what_they_said",
         ),
         Kind::Reading => since_1(
-            "ingest/src/reading/tests.rs",
+            "ingest/src/put/reading/tests.rs",
             "frozen_notes_of_readings_say_what_they_said",
         ),
         Kind::Landing => since_1(
-            "ingest/src/landing_note.rs",
+            "ingest/src/commit/landing_note.rs",
             "frozen_notes_of_landings_are_known_again",
         ),
         Kind::Tile => since_1(

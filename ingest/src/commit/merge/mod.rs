@@ -1,0 +1,253 @@
+//! Steps of a manifest and new files in, the steps of the next manifest out; pure.
+
+use std::collections::BTreeMap;
+
+use contract::event::RejectReason;
+use contract::grid::Grid;
+use contract::manifest::{Manifest, Step};
+use contract::notice::NoticeOrder;
+use contract::time::{Period, TimeMs};
+
+use crate::put::StoredGranule;
+use crate::error::Rejection;
+
+/// Grids whose edges differ by less than this, in cells, are one grid.
+const SAME_GRID_CELLS: f64 = 1e-4;
+
+/// The steps of the next manifest and what became of each file.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Merged {
+    /// In the order of time, not overlapping.
+    pub(super) steps: Vec<Step>,
+    /// Of each step the place of its file in the order of notices.
+    pub(super) orders: Vec<Option<NoticeOrder>>,
+    /// One for each file.
+    pub(super) changes: Vec<Change>,
+    /// Was a step replaced, rather than only new ones added?
+    pub(super) is_revision: bool,
+    /// Index of the last file that was taken.
+    pub(super) last_taken: Option<usize>,
+}
+
+/// What became of one file.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Change {
+    Taken {
+        revised: bool,
+        /// What it brought or had brought before; not those that a file of a later notice has.
+        periods: Vec<Period>,
+    },
+    /// All of it was there.
+    Same,
+    /// Files of later notices have its time, or all of it that was not there.
+    Superseded,
+    Refused(Rejection),
+}
+
+impl Merged {
+    pub(super) fn is_changed(&self) -> bool {
+        self.last_taken.is_some()
+    }
+}
+
+/// How many files from the first on have no period in common.
+pub(super) fn disjoint_prefix(granules: &[StoredGranule]) -> usize {
+    let mut taken = Taken::default();
+    for (index, granule) in granules.iter().enumerate() {
+        let own = || granule.grids.iter().map(|g| g.step.period);
+        if own().any(|period| taken.overlaps(period)) {
+            return index;
+        }
+        own().for_each(|period| taken.insert(period));
+    }
+    granules.len()
+}
+
+/// Periods that do not overlap, by their starts: only the last that begins before the end of another can overlap it.
+#[derive(Default)]
+pub(super) struct Taken(BTreeMap<TimeMs, Period>);
+
+impl Taken {
+    pub(super) fn overlaps(&self, period: Period) -> bool {
+        let last = self.0.range(..period.end).next_back();
+        last.is_some_and(|(_, other)| other.overlaps(period))
+    }
+
+    pub(super) fn insert(&mut self, period: Period) {
+        self.0.insert(period.start, period);
+    }
+}
+
+/// Adds files to the newest manifest, in their order.
+pub(super) fn merge(newest: Option<&Manifest>, granules: &[StoredGranule]) -> Merged {
+    let steps = newest.map_or_else(Vec::new, |m| m.steps.clone());
+    let orders = newest.map_or_else(Vec::new, Manifest::notice_orders);
+    let mut placed: Vec<Placed> = steps.into_iter().zip(orders).collect();
+    let mut merged = Merged {
+        steps: vec![],
+        orders: vec![],
+        changes: Vec::with_capacity(granules.len()),
+        is_revision: false,
+        last_taken: None,
+    };
+    for (index, granule) in granules.iter().enumerate() {
+        let base = newest
+            .map(|m| (m.grid, m.quantity, m.synthetic))
+            .or_else(|| {
+                let first = granules.get(merged.last_taken?)?;
+                Some((first.grid, first.target.quantity, first.target.synthetic))
+            });
+        let change = match base.map_or(Ok(()), |base| check_fits(granule, base)) {
+            Ok(()) => add(&mut placed, granule),
+            Err(rejection) => Change::Refused(rejection),
+        };
+        if let Change::Taken { revised, .. } = &change {
+            merged.last_taken = Some(index);
+            merged.is_revision |= revised;
+        }
+        merged.changes.push(change);
+    }
+    (merged.steps, merged.orders) = placed.into_iter().unzip();
+    merged
+}
+
+fn conflict(detail: String) -> Rejection {
+    Rejection::new(RejectReason::Conflict, "product", detail)
+}
+
+/// Is the file of the grid and quantity of its product?
+fn check_fits(
+    granule: &StoredGranule,
+    (grid, quantity, synthetic): (Grid, contract::quantity::Quantity, bool),
+) -> Result<(), Rejection> {
+    let product = &granule.target.product;
+    let advice = "land it in a product of its own";
+    if !is_same_grid(&granule.grid, &grid) {
+        let shape = |g: &Grid| {
+            format!(
+                "{} x {} cells from {} N {} E",
+                g.rows, g.cols, g.north_deg, g.west_deg
+            )
+        };
+        return Err(conflict(format!(
+            "{product} has {}, the file {}; {advice}",
+            shape(&grid),
+            shape(&granule.grid)
+        )));
+    }
+    if granule.target.quantity != quantity {
+        return Err(conflict(format!(
+            "{product} holds {}, the file {}; {advice}",
+            quantity.title(),
+            granule.target.quantity.title()
+        )));
+    }
+    if granule.target.synthetic != synthetic {
+        let word = |synthetic| if synthetic { "synthetic" } else { "measured" };
+        return Err(conflict(format!(
+            "{product} is {}, the file {}; {advice}",
+            word(synthetic),
+            word(granule.target.synthetic)
+        )));
+    }
+    Ok(())
+}
+
+pub(super) fn is_same_grid(a: &Grid, b: &Grid) -> bool {
+    let near = |x: f64, y: f64, cell: f64| (x - y).abs() < SAME_GRID_CELLS * cell;
+    (a.rows, a.cols) == (b.rows, b.cols)
+        && near(a.north_deg, b.north_deg, a.dlat_deg)
+        && near(a.south_deg(), b.south_deg(), a.dlat_deg)
+        && near(a.west_deg, b.west_deg, a.dlon_deg)
+        && near(a.east_deg(), b.east_deg(), a.dlon_deg)
+}
+
+/// A step with the place of its file in the order of notices.
+pub(super) type Placed = (Step, Option<NoticeOrder>);
+
+/// What is to be done with one step of a file.
+enum Act {
+    Insert,
+    Replace(usize),
+    Keep,
+    /// A file of a later notice has its period.
+    Leave,
+}
+
+/// Adds the steps of one file that no file of a later notice has the time of; all or none.
+fn add(placed: &mut Vec<Placed>, granule: &StoredGranule) -> Change {
+    let mut acts = Vec::with_capacity(granule.grids.len());
+    for grid in &granule.grids {
+        match act(placed, &grid.step, granule.order) {
+            Ok(act) => acts.push(act),
+            Err(there) => {
+                let product = &granule.target.product;
+                let period = grid.step.period;
+                return Change::Refused(conflict(format!(
+                    "{product} has a step for {there}, which overlaps {period} of the file; land it in a product of its own"
+                )));
+            }
+        }
+    }
+    let is_left = acts.iter().any(|act| matches!(act, Act::Leave));
+    let is_changed = |act: &Act| matches!(act, Act::Insert | Act::Replace(_));
+    if !acts.iter().any(is_changed) {
+        return if is_left {
+            Change::Superseded
+        } else {
+            Change::Same
+        };
+    }
+    let (mut periods, mut revised) = (vec![], false);
+    for (grid, act) in granule.grids.iter().zip(acts) {
+        let step = || (grid.step.clone(), granule.order);
+        match act {
+            Act::Insert => placed.push(step()),
+            Act::Replace(index) => {
+                placed[index] = step();
+                revised = true;
+            }
+            Act::Keep => {}
+            Act::Leave => continue,
+        }
+        periods.push(grid.step.period);
+    }
+    // Two runs in order, which this sort merges in one pass.
+    placed.sort_by_key(|(step, _)| step.period);
+    Change::Taken { revised, periods }
+}
+
+/// What is to be done with a step; the period in the way if it overlaps others than its own.
+fn act(placed: &[Placed], new: &Step, order: Option<NoticeOrder>) -> Result<Act, Period> {
+    // Steps do not overlap, so those that overlap the new one lie together.
+    let first = placed.partition_point(|(s, _)| s.period.end <= new.period.start);
+    let mut overlapping = placed[first..]
+        .iter()
+        .take_while(|(s, _)| s.period.start < new.period.end);
+    let Some((there, there_order)) = overlapping.next() else {
+        return Ok(Act::Insert);
+    };
+    if there.period != new.period {
+        return Err(there.period);
+    }
+    Ok(if is_same_source(there, new) {
+        Act::Keep
+    } else if is_later_or_same(*there_order, order) {
+        Act::Leave
+    } else {
+        Act::Replace(first)
+    })
+}
+
+fn is_same_source(there: &Step, new: &Step) -> bool {
+    there.raw_sha256 == new.raw_sha256 && there.frame == new.frame
+}
+
+/// Was the file that is there offered with or after a new one? Not known of files that came without a notice, and of
+/// steps that were landed before orders were kept: then the new one is taken to be newer.
+pub(crate) fn is_later_or_same(there: Option<NoticeOrder>, new: Option<NoticeOrder>) -> bool {
+    there.zip(new).is_some_and(|(there, new)| new <= there)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,306 @@
+//! HDF5 files (NetCDF-4 is a use of HDF5): the datasets of the root group, with their dimension names.
+//!
+//! Only hard links inside the file are followed, so that a file cannot name another one; virtual and external storage
+//! is refused for the same reason. Filters are those of the library itself (deflate, shuffle, Fletcher-32, n-bit,
+//! scale-offset): the parent process starts this one with plugins switched off.
+
+use std::path::Path;
+
+use contract::event::RejectReason;
+use hdf5::dataset::Layout;
+use hdf5::filters::Filter;
+use hdf5::types::{TypeDescriptor, VarLenArray};
+use hdf5::{
+    Dataset, File, LinkType, ObjectReference as _, ObjectReference1, ReferencedObject, SliceOrIndex,
+};
+
+use super::corrupt;
+use super::description::{
+    Attributes, Description, Dimension, Kind, MAX_NAME_BYTES, MAX_VARIABLES, Part, Variable,
+};
+use super::{hdf5_attribute, hdf5_text};
+use crate::error::Rejection;
+
+/// Decompressed chunks kept while a variable is read map by map, so that a chunk over many maps is unpacked once.
+const CHUNK_CACHE_BYTES: usize = 256 << 20;
+/// Slots of that cache: a prime, about a hundred for each of the few hundred chunks of a usual map.
+const CHUNK_CACHE_SLOTS: usize = 12_421;
+/// Largest single chunk, bytes: the library holds a chunk in memory whole.
+const MAX_CHUNK_BYTES: u128 = 512 << 20;
+/// How a netCDF dimension without a coordinate variable is marked.
+const NO_VARIABLE: &str = "This is a netCDF dimension but not a netCDF variable";
+
+/// An open HDF5 file.
+pub(crate) struct Hdf5File {
+    file: File,
+    description: Description,
+}
+
+impl Hdf5File {
+    pub(super) fn open(path: &Path) -> Result<Self, Rejection> {
+        let file = File::with_options()
+            .with_fapl(|access| access.chunk_cache(CHUNK_CACHE_SLOTS, CHUNK_CACHE_BYTES, 1.0))
+            .open(path)
+            .map_err(|e| {
+                corrupt(
+                    "file",
+                    format!(
+                        "cannot be opened as HDF5 ({}); it is truncated or damaged, fetch it again",
+                        first_line(&e)
+                    ),
+                )
+            })?;
+        let description = describe(&file)?;
+        Ok(Self { file, description })
+    }
+
+    pub(super) fn description(&self) -> &Description {
+        &self.description
+    }
+
+    pub(super) fn read(&mut self, name: &str, part: &[Part]) -> Result<Vec<f64>, Rejection> {
+        let damaged = |e: hdf5::Error| {
+            corrupt(
+                name,
+                format!(
+                    "its values cannot be read ({}); the file is truncated or damaged, fetch it again",
+                    first_line(&e)
+                ),
+            )
+        };
+        let dataset = self.file.dataset(name).map_err(damaged)?;
+        check_storage(name, &dataset)?;
+        let shape = dataset.shape();
+        if part.len() != shape.len() {
+            return Err(corrupt(
+                name,
+                format!("{} parts for {} dimensions", part.len(), shape.len()),
+            ));
+        }
+        let kind = self.description.variable(name).map(|v| v.kind);
+        if let Some(Kind::Text(_)) = kind {
+            return if part.iter().all(|p| *p == Part::All) {
+                hdf5_text::read(name, &dataset)
+            } else {
+                Err(corrupt(name, "is text, which is read whole"))
+            };
+        }
+        if shape.is_empty() {
+            return dataset
+                .read_scalar::<f64>()
+                .map(|v| vec![v])
+                .map_err(damaged);
+        }
+        let selected: Vec<SliceOrIndex> = (part.iter().zip(&shape))
+            .map(|(part, len)| match part {
+                Part::All => SliceOrIndex::SliceCount {
+                    start: 0,
+                    step: 1,
+                    count: *len,
+                    block: 1,
+                },
+                Part::At(index) => SliceOrIndex::Index(*index as usize),
+            })
+            .collect();
+        let selection = hdf5::Hyperslab::from(selected);
+        let whole_count = part.iter().filter(|p| **p == Part::All).count();
+        let values = match whole_count {
+            1 => dataset
+                .read_slice_1d::<f64, _>(selection)
+                .map(|values| values.into_raw_vec_and_offset().0),
+            2 => dataset
+                .read_slice_2d::<f64, _>(selection)
+                .map(|values| values.into_raw_vec_and_offset().0),
+            _ => {
+                return Err(corrupt(
+                    name,
+                    format!("{whole_count} whole dimensions asked for, 1 or 2 can be read"),
+                ));
+            }
+        };
+        values.map_err(damaged)
+    }
+}
+
+fn first_line(error: &hdf5::Error) -> String {
+    error
+        .to_string()
+        .lines()
+        .next()
+        .unwrap_or_default()
+        .to_owned()
+}
+
+fn describe(file: &File) -> Result<Description, Rejection> {
+    let mut names = Vec::new();
+    file.iter_visit_default(|name, link| {
+        if link.link_type == LinkType::Hard
+            && name.len() <= MAX_NAME_BYTES
+            && names.len() < MAX_VARIABLES
+        {
+            names.push(name.to_owned());
+        }
+        Ok(())
+    })
+    .map_err(|e| {
+        corrupt(
+            "root group",
+            format!(
+                "cannot be listed ({}); the file is damaged, fetch it again",
+                first_line(&e)
+            ),
+        )
+    })?;
+    let mut variables = Vec::new();
+    let mut most_bytes = 0;
+    for name in names {
+        // A member that is no dataset (a group, a named type) or cannot be opened is passed over.
+        if let Ok(dataset) = file.dataset(&name)
+            && let Some(variable) = describe_dataset(file, &name, &dataset)?
+        {
+            most_bytes = most_bytes.max(library_bytes(&dataset, variable.cell_count()));
+            variables.push(variable);
+        }
+    }
+    let format = if file.attr("_NCProperties").is_ok() || variables.iter().any(is_scale) {
+        "NetCDF-4"
+    } else {
+        "HDF5"
+    };
+    Ok(Description {
+        format: format.to_owned(),
+        attributes: hdf5_attribute::read_all(file),
+        variables,
+        library_bytes: most_bytes,
+    })
+}
+
+/// Most memory that the library takes to unpack values of a dataset: its cache, as far as there are chunks to fill it,
+/// and one chunk as it lies in the file, as it comes out of a filter, and as the next filter leaves it.
+fn library_bytes(dataset: &Dataset, cells: u128) -> u64 {
+    const COPIES_OF_A_CHUNK: u128 = 3;
+    let cell_bytes = dataset.dtype().map_or(8, |t| t.size()) as u128;
+    let Some(chunk) = dataset.chunk() else {
+        return 0;
+    };
+    let chunk_cells = chunk
+        .iter()
+        .fold(1u128, |n, len| n.saturating_mul(*len as u128));
+    // A larger chunk is refused before it is read.
+    let chunk_bytes = chunk_cells.saturating_mul(cell_bytes).min(MAX_CHUNK_BYTES);
+    let all_bytes = cells.saturating_mul(cell_bytes).max(chunk_bytes);
+    let cache_bytes = all_bytes.min(CHUNK_CACHE_BYTES as u128);
+    u64::try_from(cache_bytes + COPIES_OF_A_CHUNK * chunk_bytes).unwrap_or(u64::MAX)
+}
+
+fn is_scale(variable: &Variable) -> bool {
+    variable.attributes.text("CLASS") == Some("DIMENSION_SCALE")
+}
+
+fn describe_dataset(
+    file: &File,
+    name: &str,
+    dataset: &Dataset,
+) -> Result<Option<Variable>, Rejection> {
+    let damaged = |e: hdf5::Error| {
+        corrupt(
+            name,
+            format!(
+                "its shape cannot be read ({}); the file is damaged",
+                first_line(&e)
+            ),
+        )
+    };
+    let shape = dataset.get_shape().map_err(damaged)?;
+    let attributes = hdf5_attribute::read_all(dataset);
+    if attributes
+        .text("NAME")
+        .is_some_and(|text| text.starts_with(NO_VARIABLE))
+    {
+        return Ok(None);
+    }
+    let kind = match dataset.dtype().and_then(|t| t.to_descriptor()) {
+        Ok(TypeDescriptor::Integer(size)) => Kind::Integer(size as u8),
+        Ok(TypeDescriptor::Unsigned(size)) => Kind::Unsigned(size as u8),
+        Ok(TypeDescriptor::Float(size)) => Kind::Float(size as u8),
+        Ok(other) => hdf5_text::kind(&other).unwrap_or(Kind::Other),
+        Err(_unknown) => Kind::Other,
+    };
+    let names = dimension_names(file, name, dataset, &attributes, shape.len());
+    let dimensions = names
+        .into_iter()
+        .zip(&shape)
+        .map(|(name, len)| Dimension {
+            name,
+            len: *len as u64,
+        })
+        .collect();
+    Ok(Some(Variable {
+        name: name.to_owned(),
+        dimensions,
+        kind,
+        attributes,
+    }))
+}
+
+/// Names of the dimension scales attached to a dataset; a scale names its own dimension.
+fn dimension_names(
+    file: &File,
+    name: &str,
+    dataset: &Dataset,
+    attributes: &Attributes,
+    rank: usize,
+) -> Vec<Option<String>> {
+    if attributes.text("CLASS") == Some("DIMENSION_SCALE") && rank == 1 {
+        return vec![Some(name.to_owned())];
+    }
+    let lists = dataset.attr("DIMENSION_LIST").and_then(|attribute| {
+        if attribute.size() == rank {
+            attribute.read_raw::<VarLenArray<ObjectReference1>>()
+        } else {
+            Ok(Vec::new())
+        }
+    });
+    let lists = lists.unwrap_or_default();
+    let scale_name =
+        |list: &VarLenArray<ObjectReference1>| match list.first()?.dereference(file).ok()? {
+            ReferencedObject::Dataset(scale) => {
+                Some(scale.name().trim_start_matches('/').to_owned())
+            }
+            ReferencedObject::Group(_) | ReferencedObject::Datatype(_) => None,
+        };
+    (0..rank)
+        .map(|i| lists.get(i).and_then(scale_name))
+        .collect()
+}
+
+/// Refuses storage outside the file, chunks too large for memory, and filters that are not built in.
+fn check_storage(name: &str, dataset: &Dataset) -> Result<(), Rejection> {
+    let properties = dataset.dcpl().map_err(|e| corrupt(name, first_line(&e)))?;
+    if dataset.layout() == Layout::Virtual || !properties.external().is_empty() {
+        return Err(corrupt(
+            name,
+            "keeps its values in other files; give a file that holds its own",
+        ));
+    }
+    let cell_bytes = dataset.dtype().map_or(1, |t| t.size().max(8)) as u128;
+    let chunk_cells = dataset.chunk().map_or(0, |c| {
+        c.iter()
+            .fold(1u128, |n, len| n.saturating_mul(*len as u128))
+    });
+    if chunk_cells.saturating_mul(cell_bytes) > MAX_CHUNK_BYTES {
+        let detail = format!(
+            "chunks of {chunk_cells} cells, at most {MAX_CHUNK_BYTES} bytes are read; repack it in smaller chunks"
+        );
+        return Err(Rejection::new(RejectReason::TooLarge, name, detail));
+    }
+    for filter in dataset.filters() {
+        if let Filter::User(id, _) = filter {
+            let detail = format!(
+                "is compressed with filter {id}, which is not built in; repack it with deflate"
+            );
+            return Err(Rejection::new(RejectReason::Unreadable, name, detail));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,222 @@
+//! The parent's side of one reader process: starts it, asks it, and turns its death into a refusal of the file.
+
+use std::path::Path;
+use std::process::Stdio;
+
+use contract::event::RejectReason;
+use serde::de::DeserializeOwned;
+use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
+use tokio::process::{Child, ChildStdin, ChildStdout, Command};
+use tokio::time::Instant;
+
+use super::protocol::{self, Answer, Opened, Request};
+use crate::error::{IngestError, Rejection, Stop};
+use crate::inspect::file::description::{Description, Part};
+use crate::limits::Limits;
+use crate::settings::Settings;
+
+/// Last words of a reader that are kept to tell why it died.
+const MAX_LAST_WORDS_BYTES: u64 = 4096;
+/// Values that are taken from the reader at a time.
+const BLOCK_VALUES: usize = 1 << 17;
+
+/// One reader process with its file open.
+pub(crate) struct Session {
+    child: Child,
+    input: ChildStdin,
+    output: ChildStdout,
+    limits: Limits,
+    deadline: Instant,
+    library_bytes: u64,
+}
+
+/// What became of waiting for the reader.
+enum Silence {
+    /// It died or closed its output.
+    Ended,
+    /// It took too long.
+    Late,
+}
+
+impl Session {
+    /// Starts a reader and has it describe the file.
+    pub(crate) async fn open(
+        path: &Path,
+        settings: &Settings,
+    ) -> Result<(Self, Description), Stop> {
+        let limits = settings.limits;
+        let spawn = |source| IngestError::Spawn {
+            program: settings.decoder.program.clone(),
+            source,
+        };
+        let mut child = Command::new(&settings.decoder.program)
+            .args(&settings.decoder.arguments)
+            .arg(path)
+            .args([limits.memory_bytes, limits.cpu_s, limits.plane_cells].map(|n| n.to_string()))
+            .env_clear()
+            // "::" switches dynamic plugins of the HDF5 library off altogether.
+            .env("HDF5_PLUGIN_PRELOAD", "::")
+            .env("HDF5_USE_FILE_LOCKING", "FALSE")
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .kill_on_drop(true)
+            .spawn()
+            .map_err(spawn)?;
+        let (Some(input), Some(output)) = (child.stdin.take(), child.stdout.take()) else {
+            return Err(spawn(std::io::Error::other("no pipes to it")).into());
+        };
+        let mut session = Self {
+            child,
+            input,
+            output,
+            limits,
+            deadline: Instant::now() + limits.wall,
+            library_bytes: 0,
+        };
+        match session.message::<Opened>().await? {
+            Opened::Described(description) => {
+                session.library_bytes = description.library_bytes.min(limits.memory_bytes);
+                Ok((session, description))
+            }
+            Opened::Rejected(rejection) => Err(rejection.cleaned().into()),
+        }
+    }
+
+    /// Memory of the reader beside the values that are asked for, bytes.
+    pub(crate) fn library_bytes(&self) -> u64 {
+        self.library_bytes
+    }
+
+    /// Values of a part of a variable, as many as `expected`.
+    pub(crate) async fn read(
+        &mut self,
+        variable: &str,
+        part: &[Part],
+        expected: u64,
+    ) -> Result<Vec<f64>, Stop> {
+        if expected > self.limits.plane_cells {
+            let detail = format!(
+                "{expected} values at once, at most {} are read",
+                self.limits.plane_cells
+            );
+            return Err(Rejection::new(RejectReason::TooLarge, variable, detail).into());
+        }
+        let request = Request {
+            variable: variable.to_owned(),
+            part: part.to_vec(),
+        };
+        let bytes = protocol::encode(&request).map_err(|source| IngestError::Pipe { source })?;
+        if self.input.write_all(&bytes).await.is_err() {
+            return Err(self.post_mortem(Silence::Ended).await);
+        }
+        match self.message::<Answer>().await? {
+            Answer::Values { count } if count == expected => self.values(count as usize).await,
+            Answer::Values { count } => {
+                let detail = format!(
+                    "the reader sent {count} values where {expected} belong; the file contradicts itself"
+                );
+                Err(Rejection::new(RejectReason::Corrupt, variable, detail).into())
+            }
+            Answer::Rejected(rejection) => Err(rejection.cleaned().into()),
+        }
+    }
+
+    /// Values block by block: as bytes and as numbers at the same time a map would take its place twice.
+    async fn values(&mut self, count: usize) -> Result<Vec<f64>, Stop> {
+        let mut values = Vec::with_capacity(count);
+        while values.len() < count {
+            let block = (count - values.len()).min(BLOCK_VALUES);
+            let bytes = self.bytes(block * 8).await?;
+            let number =
+                |b: &[u8]| f64::from_le_bytes([b[0], b[1], b[2], b[3], b[4], b[5], b[6], b[7]]);
+            values.extend(bytes.chunks_exact(8).map(number));
+        }
+        Ok(values)
+    }
+
+    async fn message<T: DeserializeOwned>(&mut self) -> Result<T, Stop> {
+        let prefix = self.bytes(4).await?;
+        let prefix = [prefix[0], prefix[1], prefix[2], prefix[3]];
+        // A reader that a file has taken over may say anything: what cannot be is a damaged file.
+        let strange = |e: String| {
+            Rejection::new(
+                RejectReason::Corrupt,
+                "file",
+                format!("made its reader talk nonsense ({e})"),
+            )
+        };
+        let len = protocol::message_bytes(prefix).map_err(|e| strange(e.to_string()))?;
+        let json = self.bytes(len).await?;
+        Ok(serde_json::from_slice(&json).map_err(|e| strange(e.to_string()))?)
+    }
+
+    async fn bytes(&mut self, count: usize) -> Result<Vec<u8>, Stop> {
+        let mut bytes = vec![0; count];
+        match tokio::time::timeout_at(self.deadline, self.output.read_exact(&mut bytes)).await {
+            Ok(Ok(_)) => Ok(bytes),
+            Ok(Err(_ended)) => Err(self.post_mortem(Silence::Ended).await),
+            Err(_late) => Err(self.post_mortem(Silence::Late).await),
+        }
+    }
+
+    /// Why a reader fell silent, as a refusal of its file.
+    async fn post_mortem(&mut self, silence: Silence) -> Stop {
+        let Limits {
+            memory_bytes,
+            cpu_s,
+            wall,
+            ..
+        } = self.limits;
+        let too_large =
+            |detail: String| Stop::from(Rejection::new(RejectReason::TooLarge, "file", detail));
+        if let Silence::Late = silence {
+            self.child
+                .start_kill()
+                .unwrap_or_else(|e| tracing::debug!(error = %e, "reader is gone already"));
+            return too_large(format!(
+                "was not read within {} s; give it in smaller pieces",
+                wall.as_secs()
+            ));
+        }
+        let mut last_words = Vec::new();
+        if let Some(stderr) = self.child.stderr.take() {
+            let read = stderr
+                .take(MAX_LAST_WORDS_BYTES)
+                .read_to_end(&mut last_words)
+                .await;
+            read.map_or_else(|e| tracing::debug!(error = %e, "no last words"), |_| ());
+        }
+        let status = match self.child.wait().await {
+            Ok(status) => status,
+            Err(source) => return IngestError::Pipe { source }.into(),
+        };
+        let last_words = String::from_utf8_lossy(&last_words);
+        let signal = std::os::unix::process::ExitStatusExt::signal(&status);
+        if last_words.contains("memory allocation") || last_words.contains("capacity overflow") {
+            return too_large(format!(
+                "needs more than {} MiB of memory to read; give it in smaller pieces",
+                memory_bytes >> 20
+            ));
+        }
+        // SIGKILL: the system had no memory left, or somebody stopped it.
+        if signal == Some(9) {
+            return IngestError::Killed.into();
+        }
+        // SIGXCPU.
+        if signal == Some(24) {
+            return too_large(format!(
+                "took more than {cpu_s} s of processor time to read; give it in smaller pieces"
+            ));
+        }
+        if status.code() == Some(i32::from(super::EXIT_USAGE)) {
+            let source = std::io::Error::other(
+                "it cannot set its limits, or is another version of this program",
+            );
+            return IngestError::Pipe { source }.into();
+        }
+        let cause = signal.map_or_else(|| status.to_string(), |n| format!("signal {n}"));
+        let detail = format!("made its reader stop ({cause}); it is damaged, fetch it again");
+        Rejection::new(RejectReason::Corrupt, "file", detail).into()
+    }
+}

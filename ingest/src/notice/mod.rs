@@ -1,0 +1,192 @@
+//! Message in, [`PendingNotice`]s out: which files there are to land, in our own words or in those of other systems.
+
+pub(crate) mod answer;
+mod cnm;
+mod outcome;
+
+use contract::event::{Body, Event, MAX_EVENT_BYTES, RejectReason};
+use contract::product::ProductId;
+use contract::time::TimeMs;
+use contract::{ContractError, digest::Digest};
+use storage::log::Message;
+
+use crate::error::{IngestError, Rejection, boundary};
+use crate::fetch::{Expected, Location};
+use crate::plan::Wish;
+use crate::plan::profile::Profile;
+use crate::settings::Settings;
+
+pub use outcome::Outcome;
+
+/// A file that there is to land.
+#[derive(Debug, Clone)]
+pub(crate) struct PendingNotice {
+    /// Where it is, as it is shown and told.
+    pub(crate) shown: String,
+    /// What is to be done, or why it cannot be.
+    pub(crate) order: Result<Order, Rejection>,
+    /// 1 for the first try.
+    pub(crate) attempt: u32,
+    /// What must keep its order is worked on in the order of its messages.
+    pub(crate) order_key: String,
+    /// What every event about it follows from.
+    pub(crate) cause: Event,
+    /// When it was given, by its sender's word but never later than its message came: the same however often it is
+    /// read, and when it is sent twice.
+    pub(crate) given: Option<TimeMs>,
+}
+
+/// How a file is to be landed.
+#[derive(Debug, Clone)]
+pub(crate) struct Order {
+    pub(crate) location: Location,
+    pub(crate) expected: Expected,
+    pub(crate) profile: Option<Profile>,
+    pub(crate) product: Option<ProductId>,
+}
+
+impl Order {
+    pub(crate) fn wish(&self) -> Wish<'_> {
+        Wish {
+            profile: self.profile.as_ref(),
+            product: self.product.as_ref(),
+        }
+    }
+}
+
+impl PendingNotice {
+    /// The notices of a message: at least one, so that every message is answered.
+    pub(crate) fn of(message: &Message, settings: &Settings, now: TimeMs) -> Vec<Self> {
+        let came = message.time.unwrap_or(now);
+        let notices = boundary::called(|| read(message, settings, came));
+        // What the panic says may quote the message, like the text of an error below.
+        let fault = "makes this program fail: report it with the message";
+        let mut notices = match notices.unwrap_or_else(|_panic| Err(bad(fault))) {
+            Ok(notices) => notices,
+            Err(rejection) => vec![Self::unreadable(message, rejection, came)],
+        };
+        for notice in &mut notices {
+            notice.given = notice.cause.noticed.min(Some(came));
+        }
+        notices
+    }
+
+    /// A message that says nothing is refused under its own place: its words are not to be trusted.
+    fn unreadable(message: &Message, rejection: Rejection, now: TimeMs) -> Self {
+        let shown = message.origin.to_string();
+        let digest = Digest::of(&message.content).short();
+        let mut cause = Event::new(
+            format!("message-{digest}"),
+            notice_body(&shown, None, None, 1),
+        );
+        cause.noticed = Some(now);
+        Self {
+            order_key: shown.clone(),
+            shown,
+            order: Err(rejection),
+            attempt: 1,
+            cause,
+            given: None,
+        }
+    }
+
+    fn of_event(mut cause: Event, settings: &Settings, now: TimeMs) -> Result<Self, Rejection> {
+        cause.noticed = cause.noticed.or(Some(now));
+        let order_key = cause.body.order_key();
+        let Body::GranuleNotice {
+            path,
+            profile,
+            product,
+            sha256,
+            size_bytes,
+            attempt,
+        } = &cause.body
+        else {
+            return Err(bad(&format!("is an event for {}", cause.body.topic())));
+        };
+        let location = Location::parse(path);
+        let profile = profile
+            .as_deref()
+            .map(|name| find(name, settings))
+            .transpose();
+        let order = || {
+            Ok(Order {
+                location: location.clone()?,
+                expected: Expected {
+                    sha256: *sha256,
+                    size_bytes: *size_bytes,
+                    other: None,
+                },
+                profile: profile?,
+                product: product.clone(),
+            })
+        };
+        Ok(Self {
+            shown: location.as_ref().map_or_else(
+                |_| "a path that cannot be read".to_owned(),
+                ToString::to_string,
+            ),
+            order: order(),
+            attempt: *attempt,
+            order_key,
+            cause,
+            given: None,
+        })
+    }
+}
+
+/// The event of a notice.
+pub(crate) fn notice_body(
+    path: &str,
+    profile: Option<&str>,
+    product: Option<&ProductId>,
+    attempt: u32,
+) -> Body {
+    Body::GranuleNotice {
+        path: path.to_owned(),
+        profile: profile.map(str::to_owned),
+        product: product.cloned(),
+        sha256: None,
+        size_bytes: None,
+        attempt,
+    }
+}
+
+fn read(
+    message: &Message,
+    settings: &Settings,
+    now: TimeMs,
+) -> Result<Vec<PendingNotice>, Rejection> {
+    if message.content.len() > MAX_EVENT_BYTES {
+        return Err(bad(&format!("is longer than {MAX_EVENT_BYTES} bytes")));
+    }
+    if cnm::is_one(&message.content) {
+        return cnm::notices(&message.content, &settings.profiles, now);
+    }
+    // The text of the error is left out where it quotes the message: there may be a signed address in it.
+    let event = message.event().map_err(|error| match error {
+        ContractError::Invalid { reason, .. } => bad(&reason),
+    })?;
+    Ok(vec![PendingNotice::of_event(event, settings, now)?])
+}
+
+/// A profile by its name; a file of one only where the user names it, and not whoever sends a message.
+fn find(name: &str, settings: &Settings) -> Result<Profile, Rejection> {
+    let Settings {
+        profiles, sources, ..
+    } = settings;
+    let found = match profiles.named(name) {
+        Err(_) if !sources.is_guarded() => Profile::find(name),
+        found => found,
+    };
+    let refused =
+        |e: IngestError| Rejection::new(RejectReason::NoVariable, "profile", e.to_string());
+    found.map_err(refused)
+}
+
+fn bad(detail: &str) -> Rejection {
+    Rejection::new(RejectReason::Message, "message", detail)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,472 @@
+//! One-dimensional latitudes and longitudes to the one grid of all products: row 0 north, columns eastwards from -180.
+
+use contract::event::RejectReason;
+use contract::grid::{Grid, wrap_lon_deg};
+use serde::Deserialize;
+
+use crate::error::Rejection;
+
+/// How far a label may stand from its place on a regular axis, in cells. Labels in float32 or rounded to two decimals
+/// stay well below; a Gaussian grid (up to a tenth of a cell) does not.
+const TOLERANCE_CELLS: f64 = 0.02;
+/// Edges and steps closer than this (in cells) to a round fraction of a degree are taken to be that.
+const SNAP_CELLS: f64 = 2e-3;
+/// A longitude axis that misses the whole turn by less than this (in cells) was meant to make one: labels of single
+/// precision that were summed up drift so far.
+const TURN_CELLS: f64 = 0.05;
+
+/// What the labels of a grid's axes name.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Registration {
+    /// The middle of a cell.
+    #[default]
+    Center,
+    /// The same; rows centred on the poles, half of which lies beyond, are left out.
+    CenterWithoutPoles,
+    /// Corners of a cell.
+    NorthWest,
+    NorthEast,
+    SouthWest,
+    SouthEast,
+}
+
+/// Where every cell of a stored grid is in the file.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Mapping {
+    pub(crate) grid: Grid,
+    /// Index along the file's latitude axis, for each row of the grid.
+    pub(crate) file_rows: Vec<u32>,
+    /// Index along the file's longitude axis, for each column of the grid.
+    pub(crate) file_cols: Vec<u32>,
+}
+
+/// A regular axis: first label, step (signed), count.
+#[derive(Debug, Clone, Copy)]
+struct Regular {
+    first: f64,
+    step: f64,
+    count: u32,
+}
+
+impl Mapping {
+    /// The grid of two axes. `names` are those of the variables, for refusals.
+    pub(crate) fn from_labels(
+        lat_deg: &[f64],
+        lon_deg: &[f64],
+        registration: Registration,
+        names: [&str; 2],
+    ) -> Result<Self, Rejection> {
+        let lat = regular(lat_deg, names[0])?;
+        let lon = regular(&unwrapped(lon_deg), names[1])?;
+        if lat_deg.iter().any(|v| v.abs() > 90.0 + lat.step.abs()) {
+            return Err(refused(
+                names[0],
+                "goes past the poles; latitudes are in degrees, -90 to 90",
+            ));
+        }
+        let (north_shift, west_shift) = registration.shifts();
+        let (dlat, dlon) = (snapped_step(lat), closed_step(lon));
+        let northernmost = if lat.step > 0.0 {
+            lat.last()
+        } else {
+            lat.first
+        };
+        let westernmost = if lon.step > 0.0 {
+            lon.first
+        } else {
+            lon.last()
+        };
+        let mut north = snapped_edge(northernmost + north_shift * dlat, dlat);
+        let west = snapped_edge(westernmost - west_shift * dlon, dlon);
+        let mut file_rows: Vec<u32> = if lat.step > 0.0 {
+            (0..lat.count).rev().collect()
+        } else {
+            (0..lat.count).collect()
+        };
+        if registration == Registration::CenterWithoutPoles {
+            let south = north - f64::from(lat.count) * dlat;
+            if south < -90.0 - SNAP_CELLS * dlat {
+                file_rows.pop();
+            }
+            if north > 90.0 + SNAP_CELLS * dlat {
+                file_rows.remove(0);
+                north -= dlat;
+            }
+        }
+        let file_cols: Vec<u32> = if lon.step > 0.0 {
+            (0..lon.count).collect()
+        } else {
+            (0..lon.count).rev().collect()
+        };
+        Self::turned(north, west, [dlat, dlon], file_rows, file_cols, names)
+    }
+
+    /// A grid that a profile states, for files that have no axes.
+    pub(crate) fn from_grid(grid: Grid, north_first: bool) -> Result<Self, Rejection> {
+        let file_rows = if north_first {
+            (0..grid.rows).collect()
+        } else {
+            (0..grid.rows).rev().collect()
+        };
+        let step = [grid.dlat_deg, grid.dlon_deg];
+        Self::turned(
+            grid.north_deg,
+            grid.west_deg,
+            step,
+            file_rows,
+            (0..grid.cols).collect(),
+            ["grid", "grid"],
+        )
+    }
+
+    /// Turns global grids so that they start at -180, and others so that their western edge is in [-180, 180).
+    fn turned(
+        north_deg: f64,
+        west_deg: f64,
+        [dlat, dlon]: [f64; 2],
+        file_rows: Vec<u32>,
+        mut file_cols: Vec<u32>,
+        names: [&str; 2],
+    ) -> Result<Self, Rejection> {
+        let around = f64::from(file_cols.len() as u32) * dlon;
+        // Some files repeat the first column at the end.
+        if (around - 360.0 - dlon).abs() < TOLERANCE_CELLS * dlon {
+            file_cols.pop();
+        }
+        let cols = file_cols.len() as u32;
+        let mut west_deg = snapped_edge(wrap_lon_deg(west_deg), dlon);
+        if west_deg >= 180.0 {
+            west_deg -= 360.0;
+        }
+        if (f64::from(cols) * dlon - 360.0).abs() < TOLERANCE_CELLS * dlon {
+            // The first column whose western edge is at or east of -180.
+            let skipped = ((180.0 - west_deg) / dlon - SNAP_CELLS).ceil().max(0.0) as u32 % cols;
+            file_cols.rotate_left(skipped as usize);
+            west_deg = snapped_edge(wrap_lon_deg(west_deg + f64::from(skipped) * dlon), dlon);
+        }
+        let grid = Grid {
+            rows: file_rows.len() as u32,
+            cols,
+            north_deg,
+            west_deg,
+            dlat_deg: dlat,
+            dlon_deg: dlon,
+        };
+        if north_deg > 90.0 + SNAP_CELLS * dlat || grid.south_deg() < -90.0 - SNAP_CELLS * dlat {
+            let detail = "has cells that reach past a pole; if its labels are corners, say so with registration in a profile, \
+                          and if rows are centred on the poles, leave them out with registration = \"center_without_poles\"";
+            return Err(refused(names[0], detail));
+        }
+        grid.validate()
+            .map_err(|e| refused(names[1], &format!("makes no grid ({e})")))?;
+        Ok(Self {
+            grid,
+            file_rows,
+            file_cols,
+        })
+    }
+}
+
+impl Registration {
+    /// From label to northern edge, and from western edge to label, in cells.
+    fn shifts(self) -> (f64, f64) {
+        match self {
+            Self::Center | Self::CenterWithoutPoles => (0.5, 0.5),
+            Self::NorthWest => (0.0, 0.0),
+            Self::NorthEast => (0.0, 1.0),
+            Self::SouthWest => (1.0, 0.0),
+            Self::SouthEast => (1.0, 1.0),
+        }
+    }
+}
+
+impl Regular {
+    fn last(self) -> f64 {
+        self.first + self.step * f64::from(self.count - 1)
+    }
+}
+
+fn refused(name: &str, detail: &str) -> Rejection {
+    Rejection::new(RejectReason::Grid, name, detail)
+}
+
+/// Longitudes without jumps: each within half a turn of the one before.
+fn unwrapped(lon_deg: &[f64]) -> Vec<f64> {
+    let mut last = None;
+    let step = |value: &f64| {
+        let value = match last {
+            Some(before) if f64::is_finite(before) => before + wrap_lon_deg(value - before),
+            _ => *value,
+        };
+        last = Some(value);
+        value
+    };
+    lon_deg.iter().map(step).collect()
+}
+
+fn regular(labels: &[f64], name: &str) -> Result<Regular, Rejection> {
+    let count = u32::try_from(labels.len()).ok().filter(|n| *n >= 2);
+    let Some(count) = count else {
+        return Err(refused(
+            name,
+            "has fewer than two labels, so the size of its cells is unknown; state the grid in a profile",
+        ));
+    };
+    if let Some(bad) = labels.iter().find(|v| !v.is_finite() || v.abs() > 1e4) {
+        return Err(refused(
+            name,
+            &format!(
+                "holds {bad}, which is no coordinate; the file is damaged, or state the grid in a profile"
+            ),
+        ));
+    }
+    let first = labels[0];
+    let step = (labels[labels.len() - 1] - first) / f64::from(count - 1);
+    let worst = labels
+        .iter()
+        .enumerate()
+        .map(|(i, v)| (v - (first + step * i as f64)).abs())
+        .fold(0.0, f64::max);
+    if step == 0.0 || worst > TOLERANCE_CELLS * step.abs() {
+        let detail = format!(
+            "is not evenly spaced (off by up to {worst:.3} degrees at a step of {:.3}); regrid it to regular latitudes and longitudes",
+            step.abs()
+        );
+        return Err(refused(name, &detail));
+    }
+    Ok(Regular { first, step, count })
+}
+
+/// A step as the round fraction (1/60) or multiple (2.5) of a degree it was meant to be, if it is close to one.
+fn snapped_step(axis: Regular) -> f64 {
+    let step = axis.step.abs();
+    for denominator in [
+        1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 20.0, 24.0, 60.0, 100.0, 120.0,
+    ] {
+        let numerator = (step * denominator).round();
+        let round = numerator / denominator;
+        // Over the whole axis the round step may not drift by more than this.
+        if numerator >= 1.0 && (step / round - 1.0).abs() * f64::from(axis.count) < SNAP_CELLS {
+            return round;
+        }
+    }
+    step
+}
+
+/// A step of longitudes: the part of a turn that it was meant to be, if it is close to one.
+fn closed_step(axis: Regular) -> f64 {
+    let step = axis.step.abs();
+    let missed = (step * f64::from(axis.count) - 360.0).abs();
+    if missed < TURN_CELLS * step {
+        return 360.0 / f64::from(axis.count);
+    }
+    snapped_step(axis)
+}
+
+/// An edge as the multiple of half a cell it was meant to be, if it is close to one.
+fn snapped_edge(edge: f64, step: f64) -> f64 {
+    let halves = (edge / step * 2.0).round();
+    if (edge / step * 2.0 - halves).abs() < 2.0 * SNAP_CELLS {
+        halves * step / 2.0
+    } else {
+        edge
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::float_cmp, reason = "these numbers are exact")]
+mod tests {
+    use super::*;
+
+    fn labels(first: f64, step: f64, count: u32) -> Vec<f64> {
+        (0..count).map(|i| first + step * f64::from(i)).collect()
+    }
+
+    fn map(lat: &[f64], lon: &[f64], registration: Registration) -> Result<Mapping, Rejection> {
+        Mapping::from_labels(lat, lon, registration, ["lat", "lon"])
+    }
+
+    const ONE_DEGREE: Grid = Grid {
+        rows: 180,
+        cols: 360,
+        north_deg: 90.0,
+        west_deg: -180.0,
+        dlat_deg: 1.0,
+        dlon_deg: 1.0,
+    };
+
+    #[test]
+    fn every_way_round_makes_the_same_global_grid() {
+        let south_first = labels(-89.5, 1.0, 180);
+        let north_first = labels(89.5, -1.0, 180);
+        let m = map(
+            &north_first,
+            &labels(-179.5, 1.0, 360),
+            Registration::Center,
+        )
+        .unwrap();
+        assert_eq!((m.grid, m.file_rows[0], m.file_cols[0]), (ONE_DEGREE, 0, 0));
+        let m = map(&south_first, &labels(0.5, 1.0, 360), Registration::Center).unwrap();
+        assert_eq!(
+            (m.grid, m.file_rows[0], m.file_cols[0], m.file_cols[180]),
+            (ONE_DEGREE, 179, 180, 0)
+        );
+        let m = map(&south_first, &labels(20.5, 1.0, 360), Registration::Center).unwrap();
+        assert_eq!((m.grid, m.file_cols[0]), (ONE_DEGREE, 160)); // 20.5 + 160 = 180.5 = -179.5
+        let m = map(
+            &north_first,
+            &labels(179.5, -1.0, 360),
+            Registration::Center,
+        )
+        .unwrap();
+        assert_eq!((m.grid, m.file_cols[0]), (ONE_DEGREE, 359));
+        let split: Vec<f64> = labels(0.5, 1.0, 180)
+            .into_iter()
+            .chain(labels(-179.5, 1.0, 180))
+            .collect();
+        let m = map(&north_first, &split, Registration::Center).unwrap();
+        assert_eq!((m.grid, m.file_cols[0]), (ONE_DEGREE, 180));
+    }
+
+    #[test]
+    fn corner_labels_move_the_grid_by_half_a_cell() {
+        let (lat, lon) = (labels(90.0, -1.0, 180), labels(-180.0, 1.0, 360));
+        assert_eq!(
+            map(&lat, &lon, Registration::NorthWest).unwrap().grid,
+            ONE_DEGREE
+        );
+        assert!(
+            map(&lat, &lon, Registration::Center)
+                .unwrap_err()
+                .detail
+                .contains("past a pole")
+        );
+        let (lat, lon) = (labels(-90.0, 1.0, 180), labels(-179.0, 1.0, 360));
+        assert_eq!(
+            map(&lat, &lon, Registration::SouthEast).unwrap().grid,
+            ONE_DEGREE
+        );
+    }
+
+    #[test]
+    fn longitudes_that_drift_past_the_turn_make_one() {
+        // 5 minutes of arc, summed up with an error of a millionth of a degree each.
+        let lon = labels(0.0, 359.92 / 4319.0, 4320);
+        let m = map(&labels(89.5, -1.0, 180), &lon, Registration::Center).unwrap();
+        assert_eq!((m.grid.cols, m.grid.dlon_deg), (4320, 1.0 / 12.0));
+        assert!(m.grid.is_periodic());
+    }
+
+    #[test]
+    fn rows_centred_on_the_poles_are_refused_or_left_out() {
+        let (lat, lon) = (labels(-90.0, 0.5, 361), labels(20.0, 0.5, 721));
+        let refused = map(&lat, &lon, Registration::Center).unwrap_err();
+        assert!(refused.detail.contains("center_without_poles"));
+        let m = map(&lat, &lon, Registration::CenterWithoutPoles).unwrap();
+        assert_eq!(
+            (m.grid.rows, m.grid.north_deg, m.grid.south_deg()),
+            (359, 89.75, -89.75)
+        );
+        assert_eq!((m.file_rows[0], m.file_rows[358]), (359, 1));
+        assert_eq!((m.grid.cols, m.grid.west_deg), (720, -179.75));
+        // A grid without such rows is what it is without the word.
+        let (lat, lon) = (labels(-89.5, 1.0, 180), labels(0.5, 1.0, 360));
+        assert_eq!(
+            map(&lat, &lon, Registration::CenterWithoutPoles).unwrap(),
+            map(&lat, &lon, Registration::Center).unwrap()
+        );
+    }
+
+    #[test]
+    fn labels_in_float32_give_round_edges() {
+        let float32 = |v: Vec<f64>| {
+            v.into_iter()
+                .map(|x| f64::from(x as f32))
+                .collect::<Vec<_>>()
+        };
+        let lat = float32(labels(0.5 / 60.0, 1.0 / 60.0, 2460));
+        let lon = float32(labels(100.0 + 0.5 / 60.0, 1.0 / 60.0, 1800));
+        let m = map(&lat, &lon, Registration::Center).unwrap();
+        let expected = Grid {
+            rows: 2460,
+            cols: 1800,
+            north_deg: 41.0,
+            west_deg: 100.0,
+            dlat_deg: 1.0 / 60.0,
+            dlon_deg: 1.0 / 60.0,
+        };
+        assert_eq!(m.grid.dlat_deg, expected.dlat_deg);
+        assert!(
+            (m.grid.north_deg - 41.0).abs() < 1e-12 && (m.grid.west_deg - 100.0).abs() < 1e-12,
+            "{:?}",
+            m.grid
+        );
+    }
+
+    #[test]
+    fn a_region_across_the_date_line_stays_whole() {
+        let m = map(
+            &labels(9.5, -1.0, 20),
+            &labels(170.5, 1.0, 20),
+            Registration::Center,
+        )
+        .unwrap();
+        assert_eq!(
+            (m.grid.west_deg, m.grid.east_deg(), m.file_cols[0]),
+            (170.0, 190.0, 0)
+        );
+        let m = map(
+            &labels(9.5, -1.0, 20),
+            &labels(190.5, 1.0, 20),
+            Registration::Center,
+        )
+        .unwrap();
+        assert_eq!(m.grid.west_deg, -170.0);
+    }
+
+    #[test]
+    fn a_repeated_last_column_is_dropped_and_odd_global_grids_start_near_the_date_line() {
+        let m = map(
+            &labels(89.5, -1.0, 180),
+            &labels(0.0, 1.0, 361),
+            Registration::Center,
+        )
+        .unwrap();
+        assert_eq!(
+            (m.grid.cols, m.grid.west_deg, m.file_cols[0]),
+            (360, -179.5, 181)
+        );
+    }
+
+    #[test]
+    fn what_is_no_regular_grid_is_refused() {
+        let lon = labels(0.5, 1.0, 360);
+        let mut gaussian = labels(89.5, -1.0, 180);
+        gaussian[3] += 0.1;
+        let mut broken = labels(89.5, -1.0, 180);
+        broken[7] = f64::NAN;
+        for lat in [
+            gaussian,
+            broken,
+            vec![],
+            vec![1.0],
+            vec![5.0; 10],
+            labels(1e36, 1.0, 10),
+            labels(-200.0, 1.0, 50),
+        ] {
+            assert_eq!(
+                map(&lat, &lon, Registration::Center).unwrap_err().reason,
+                RejectReason::Grid
+            );
+        }
+        assert!(
+            map(
+                &labels(89.5, -1.0, 180),
+                &labels(0.5, 1.0, 700),
+                Registration::Center
+            )
+            .is_err()
+        );
+    }
+}

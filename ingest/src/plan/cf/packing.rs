@@ -1,0 +1,364 @@
+//! Stored numbers to values: fill values, valid range, scale and offset.
+//!
+//! Fill values speak of stored numbers. A valid range speaks of stored numbers too, unless its type is the one that scale
+//! and offset unpack to and wider than the stored one; then of values (NetCDF Users Guide, attribute conventions;
+//! CF 1.11, 2.5.1 and 8.1).
+
+use crate::inspect::file::description::{Attributes, Kind, Variable};
+
+/// From here on floating-point numbers are NetCDF's default fill values (9.97e36), or the 1e35 of older programs.
+const DEFAULT_FILL_FLOAT: f64 = 1e34;
+const ANY: Range = (f64::NEG_INFINITY, f64::INFINITY);
+
+/// Lowest and highest number that is valid.
+type Range = (f64, f64);
+
+/// How stored numbers become values: `value = stored * scale + offset`, NaN where there is no data.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Packing {
+    pub(crate) scale: f64,
+    pub(crate) offset: f64,
+    /// Stored numbers that mean no data.
+    pub(crate) fills: Vec<f64>,
+    /// Stored numbers outside mean no data.
+    valid_stored: Range,
+    /// Values (unpacked, in the file's unit) outside mean no data.
+    valid_values: Range,
+    /// Stored signed integers that are meant unsigned: what to add to negative ones.
+    unsigned_wrap: Option<f64>,
+    is_float32: bool,
+    /// What was taken for granted, if the file leaves it open.
+    pub(crate) assumption: Option<String>,
+}
+
+/// What a stored number is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Unpacked {
+    /// A value, in the file's unit.
+    Value(f64),
+    /// No data.
+    Missing,
+    /// Outside the valid range of the file or of its profile.
+    OutOfRange,
+}
+
+/// Of which numbers an attribute speaks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Speaks {
+    OfStored,
+    OfValues,
+    /// Its type is neither that of stored numbers nor that of values; the convention then takes it for stored ones.
+    Unclear,
+}
+
+impl Packing {
+    /// The packing that the attributes of a variable state.
+    pub(crate) fn of(variable: &Variable) -> Self {
+        let attributes = &variable.attributes;
+        let mut fills: Vec<f64> = ["_FillValue", "missing_value"]
+            .into_iter()
+            .filter_map(|name| attributes.numbers(name))
+            .flatten()
+            .collect();
+        if fills.is_empty() {
+            fills.extend(default_fill(variable.kind));
+        }
+        let is_unsigned = attributes
+            .text("_Unsigned")
+            .is_some_and(|t| t.eq_ignore_ascii_case("true"));
+        let unsigned_wrap = match variable.kind {
+            Kind::Integer(bytes) if is_unsigned => Some(2f64.powi(8 * i32::from(bytes))),
+            _ => None,
+        };
+        let mut packing = Self {
+            scale: attributes.number("scale_factor").unwrap_or(1.0),
+            offset: attributes.number("add_offset").unwrap_or(0.0),
+            fills,
+            valid_stored: ANY,
+            valid_values: ANY,
+            unsigned_wrap,
+            is_float32: variable.kind == Kind::Float(4),
+            assumption: None,
+        };
+        let bounds = [("valid_min", 0, false), ("valid_max", 1, true)];
+        for (alone, place, is_upper) in bounds {
+            let pair = attributes.numbers("valid_range").filter(|r| r.len() == 2);
+            let (name, number) = match (pair, attributes.number(alone)) {
+                (Some(pair), _) => ("valid_range", pair[place]),
+                (None, Some(number)) => (alone, number),
+                (None, None) => continue,
+            };
+            if !number.is_nan() {
+                packing.bound(variable, name, number, is_upper);
+            }
+        }
+        packing
+    }
+
+    /// Only these values (unpacked, in the file's unit) are valid, whatever the file says.
+    pub(crate) fn with_valid_values(mut self, low: f64, high: f64) -> Self {
+        self.valid_stored = ANY;
+        self.valid_values = (low, high);
+        self.assumption = None;
+        self
+    }
+
+    /// Takes one bound of the valid range.
+    fn bound(&mut self, variable: &Variable, name: &str, number: f64, is_upper: bool) {
+        let speaks = speaks(variable, name, number);
+        if speaks == Speaks::Unclear {
+            let kind = variable.attributes.kind(name);
+            let kind = kind.map_or_else(String::new, |kind| format!(" is {}, which", kind.name()));
+            self.assumption = Some(format!(
+                "{}: {name}{kind} is neither the type of its stored numbers ({}) nor that of scale_factor; taken for stored numbers",
+                variable.name,
+                variable.kind.name()
+            ));
+        }
+        // Attributes are often float32: what is a bound in their precision lies within it.
+        let slack = f64::from(f32::EPSILON) * number.abs().max(self.offset.abs());
+        let stored = self.unsigned(number);
+        match (speaks, is_upper) {
+            (Speaks::OfValues, false) => self.valid_values.0 = number - slack,
+            (Speaks::OfValues, true) => self.valid_values.1 = number + slack,
+            (_, false) => self.valid_stored.0 = stored,
+            (_, true) => self.valid_stored.1 = stored,
+        }
+    }
+
+    /// The value of a stored number, in the file's unit; NaN for no data.
+    pub(crate) fn value(&self, stored: f64) -> f64 {
+        match self.unpacked(stored) {
+            Unpacked::Value(value) => value,
+            Unpacked::Missing | Unpacked::OutOfRange => f64::NAN,
+        }
+    }
+
+    /// What a stored number is.
+    pub(crate) fn unpacked(&self, stored: f64) -> Unpacked {
+        if self.is_missing(stored) {
+            return Unpacked::Missing;
+        }
+        let stored = self.unsigned(stored);
+        let value = stored * self.scale + self.offset;
+        let is_within = |(low, high): Range, number: f64| (low..=high).contains(&number);
+        if is_within(self.valid_stored, stored) && is_within(self.valid_values, value) {
+            Unpacked::Value(value)
+        } else {
+            Unpacked::OutOfRange
+        }
+    }
+
+    /// Does a stored number stand for no data, whatever the valid range is?
+    #[expect(clippy::float_cmp, reason = "a fill value is one exact number")]
+    fn is_missing(&self, stored: f64) -> bool {
+        let is_fill = |fill: &f64| {
+            *fill == stored
+                || self.unsigned(*fill) == self.unsigned(stored)
+                || self.is_float32 && f64::from(*fill as f32) == stored
+        };
+        stored.is_nan() || stored.abs() >= DEFAULT_FILL_FLOAT || self.fills.iter().any(is_fill)
+    }
+
+    /// A stored number, or what it means where integers are meant unsigned.
+    pub(crate) fn unsigned(&self, stored: f64) -> f64 {
+        match self.unsigned_wrap {
+            Some(wrap) if stored < 0.0 => stored + wrap,
+            _ => stored,
+        }
+    }
+}
+
+/// Of which numbers a bound of the valid range speaks.
+fn speaks(variable: &Variable, name: &str, number: f64) -> Speaks {
+    let attributes = &variable.attributes;
+    let (Some(kind), Some(unpacked)) = (attributes.kind(name), unpacked_kind(attributes)) else {
+        return Speaks::OfStored;
+    };
+    let is_float = |kind| matches!(kind, Kind::Float(_));
+    if kind == unpacked && width(unpacked) > width(variable.kind) {
+        return Speaks::OfValues;
+    }
+    if !is_float(kind) || is_float(variable.kind) {
+        return Speaks::OfStored;
+    }
+    // What no stored integer can be is a value.
+    let beyond = match variable.kind {
+        Kind::Integer(bytes) | Kind::Unsigned(bytes) => {
+            number.abs() >= 2f64.powi(8 * i32::from(bytes))
+        }
+        _ => false,
+    };
+    if number.fract() != 0.0 || beyond {
+        return Speaks::OfValues;
+    }
+    Speaks::Unclear
+}
+
+/// The type that scale and offset unpack to: the wider of theirs.
+fn unpacked_kind(attributes: &Attributes) -> Option<Kind> {
+    let kinds = ["scale_factor", "add_offset"].map(|name| attributes.kind(name));
+    kinds.into_iter().flatten().max_by_key(|kind| width(*kind))
+}
+
+/// Orders types by what they can hold: any floating-point number is wider than an integer.
+fn width(kind: Kind) -> (bool, u8) {
+    match kind {
+        Kind::Float(bytes) => (true, bytes),
+        Kind::Integer(bytes) | Kind::Unsigned(bytes) => (false, bytes),
+        Kind::Text(_) | Kind::Other => (false, 0),
+    }
+}
+
+/// What NetCDF fills a variable with that has no fill value of its own; of bytes every value may be meant.
+fn default_fill(kind: Kind) -> Option<f64> {
+    match kind {
+        Kind::Integer(2) => Some(-32_767.0),
+        Kind::Integer(4) => Some(-2_147_483_647.0),
+        Kind::Integer(8) => Some(-9_223_372_036_854_775_806.0),
+        Kind::Unsigned(2) => Some(65_535.0),
+        Kind::Unsigned(4) => Some(4_294_967_295.0),
+        Kind::Unsigned(8) => Some(18_446_744_073_709_551_614.0),
+        Kind::Integer(_) | Kind::Unsigned(_) | Kind::Float(_) | Kind::Text(_) | Kind::Other => None,
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::float_cmp, reason = "these numbers are exact")]
+mod tests {
+    use super::*;
+    use crate::inspect::file::description::AttributeValue;
+
+    const SHORT: Kind = Kind::Integer(2);
+    const FLOAT: Kind = Kind::Float(4);
+    const DOUBLE: Kind = Kind::Float(8);
+
+    fn variable(kind: Kind, numbers: &[(&str, Kind, &[f64])]) -> Variable {
+        let attribute = |(name, kind, values): &(&str, Kind, &[f64])| {
+            let value = AttributeValue::Numbers {
+                kind: *kind,
+                bits: values.iter().map(|v| (*v).into()).collect(),
+            };
+            ((*name).to_owned(), value)
+        };
+        Variable {
+            name: "v".into(),
+            dimensions: vec![],
+            kind,
+            attributes: numbers.iter().map(attribute).collect(),
+        }
+    }
+
+    /// Shorts that unpack to float32 degrees: 0.01 times the number, plus 20.
+    fn packed(range: &[(&str, Kind, &[f64])]) -> Packing {
+        let mut attributes: Vec<(&str, Kind, &[f64])> = vec![
+            ("scale_factor", FLOAT, &[0.01]),
+            ("add_offset", FLOAT, &[20.0]),
+            ("_FillValue", SHORT, &[-32_768.0]),
+        ];
+        attributes.extend_from_slice(range);
+        Packing::of(&variable(SHORT, &attributes))
+    }
+
+    #[test]
+    fn a_range_of_the_stored_type_speaks_of_stored_numbers() {
+        let packing = packed(&[("valid_range", SHORT, &[-300.0, 4500.0])]);
+        assert!((packing.value(2000.0) - 40.0).abs() < 1e-12);
+        assert!(packing.value(-32_768.0).is_nan() && packing.value(4501.0).is_nan());
+        assert_eq!(packing.value(4500.0), 65.0);
+        assert_eq!(packing.assumption, None);
+    }
+
+    #[test]
+    fn a_range_of_the_unpacked_type_speaks_of_values() {
+        for range in [
+            vec![("valid_range", FLOAT, &[-2.0, 45.0][..])],
+            vec![
+                ("valid_min", FLOAT, &[-2.0][..]),
+                ("valid_max", FLOAT, &[45.0][..]),
+            ],
+        ] {
+            let packing = packed(&range);
+            for stored in [-2200.0, 0.0, 2500.0] {
+                assert_eq!(packing.value(stored), stored * 0.01 + 20.0, "{stored}");
+            }
+            assert!(packing.value(-2201.0).is_nan() && packing.value(2501.0).is_nan());
+            assert_eq!(packing.assumption, None);
+        }
+    }
+
+    #[test]
+    fn a_bound_in_single_precision_is_within_the_range() {
+        let scale = f64::from(0.005f32);
+        let numbers: [(&str, Kind, &[f64]); 2] = [
+            ("scale_factor", FLOAT, &[scale]),
+            ("valid_max", FLOAT, &[45.0]),
+        ];
+        let packing = Packing::of(&variable(SHORT, &numbers));
+        assert_eq!(packing.value(9000.0), 9000.0 * scale);
+        assert!(packing.value(9001.0).is_nan());
+    }
+
+    #[test]
+    fn a_range_of_a_third_type_is_of_values_if_it_must_be_and_else_an_assumption() {
+        let packing = packed(&[("valid_range", DOUBLE, &[-2.5, 45.5])]);
+        assert!(packing.value(2600.0).is_nan() && !packing.value(0.0).is_nan());
+        assert_eq!(packing.assumption, None);
+        let packing = packed(&[("valid_range", DOUBLE, &[-200.0, 4500.0])]);
+        assert!(packing.value(-201.0).is_nan() && !packing.value(4500.0).is_nan());
+        let said = packing.assumption.unwrap();
+        assert!(
+            said.contains("valid_range") && said.contains("float64"),
+            "{said}"
+        );
+        let own =
+            packed(&[("valid_range", DOUBLE, &[-200.0, 4500.0])]).with_valid_values(0.0, 30.0);
+        assert_eq!((own.value(-1000.0), own.assumption), (10.0, None));
+    }
+
+    #[test]
+    fn unsigned_bytes_have_unsigned_fills_and_ranges() {
+        let byte = Kind::Integer(1);
+        let mut numbers = variable(
+            byte,
+            &[
+                ("_FillValue", byte, &[-1.0]),
+                ("valid_range", byte, &[0.0, -6.0]),
+                ("scale_factor", FLOAT, &[0.5]),
+            ],
+        );
+        let text = AttributeValue::Text("true".to_owned());
+        numbers.attributes.0.insert("_Unsigned".to_owned(), text);
+        let packing = Packing::of(&numbers);
+        assert_eq!(packing.value(-6.0), 125.0);
+        assert_eq!(packing.value(100.0), 50.0);
+        assert!(packing.value(-1.0).is_nan() && packing.value(-5.0).is_nan());
+    }
+
+    #[test]
+    fn every_kind_of_missing_is_missing() {
+        let float = Packing::of(&variable(
+            FLOAT,
+            &[
+                ("_FillValue", FLOAT, &[-999.9]),
+                ("missing_value", FLOAT, &[-5.0]),
+            ],
+        ));
+        for stored in [
+            f64::NAN,
+            f64::INFINITY,
+            f64::from(-999.9f32),
+            -999.9,
+            -5.0,
+            9.969209968386869e36,
+            1e35,
+            -1e35,
+        ] {
+            assert!(float.value(stored).is_nan(), "{stored}");
+        }
+        assert_eq!(float.value(-999.0), -999.0);
+        for (kind, fill) in [(SHORT, -32_767.0), (Kind::Unsigned(2), 65_535.0)] {
+            assert!(Packing::of(&variable(kind, &[])).value(fill).is_nan());
+        }
+    }
+}

@@ -1,0 +1,261 @@
+//! Which period a step covers, from a stated length and the place of the stamp in it.
+
+use contract::time::{Period, TimeMs};
+use serde::Deserialize;
+
+use super::calendar::CalendarDate;
+use crate::inspect::file::description::Attributes;
+
+const DAY_MS: i64 = 86_400_000;
+const HOUR_MS: i64 = 3_600_000;
+
+/// How long the steps of a product are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(try_from = "String")]
+pub(crate) enum Covers {
+    /// The calendar month that holds the stamp.
+    Month,
+    /// The calendar year that holds the stamp.
+    Year,
+    /// This many days from the start of the stamp's day.
+    Days(u32),
+    /// This many hours from the stamp.
+    Hours(u32),
+}
+
+impl TryFrom<String> for Covers {
+    type Error = String;
+
+    /// `month`, `year`, `day`, `8 days`, `6 hours`.
+    fn try_from(text: String) -> Result<Self, Self::Error> {
+        let bad = || {
+            format!(
+                "covers = {text:?} is not known; use month, year, day, or such as \"8 days\" or \"6 hours\""
+            )
+        };
+        let (count, word) = match text.split_once([' ', '-']) {
+            Some((count, word)) => (count.parse().map_err(|_no_number| bad())?, word),
+            None => (1, text.as_str()),
+        };
+        match (count, word.trim_end_matches('s')) {
+            (1, "month") => Ok(Self::Month),
+            (1, "year") => Ok(Self::Year),
+            (n @ 1..=366, "day") => Ok(Self::Days(n)),
+            (n @ 1..=8784, "hour") => Ok(Self::Hours(n)),
+            _ => Err(bad()),
+        }
+    }
+}
+
+/// Where in its period a stamp stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum StampAt {
+    Start,
+    Middle,
+    End,
+}
+
+impl Covers {
+    /// The period of this length that a stamp names: the month or year that holds it, else the one that starts with it
+    /// (days at its midnight).
+    pub(crate) fn period(self, stamp: CalendarDate) -> Result<Period, String> {
+        self.period_at(stamp, None)
+    }
+
+    /// The period of this length in which a stamp stands where it is said.
+    pub(crate) fn period_at(
+        self,
+        stamp: CalendarDate,
+        at: Option<StampAt>,
+    ) -> Result<Period, String> {
+        let after = |start_ms: i64, ms: i64| {
+            Period::new(time(start_ms)?, time(start_ms + ms)?).map_err(|e| e.to_string())
+        };
+        let named = match at {
+            // An end is the first instant that does not belong to the period.
+            Some(StampAt::End) => before(stamp)?,
+            _ => stamp,
+        };
+        let text = |e: contract::ContractError| e.to_string();
+        match (self, at) {
+            (Self::Month, _) => Period::month(named.year, named.month).map_err(text),
+            (Self::Year, _) => Period::year(named.year).map_err(text),
+            (Self::Days(count), at) => {
+                let first_ms = midnight(named)?.ms();
+                let days = match at {
+                    None | Some(StampAt::Start) => 0,
+                    // Of an even number the stamp is the midnight in the middle, of an odd one its middle day.
+                    Some(StampAt::Middle) => i64::from(count) / 2,
+                    Some(StampAt::End) => i64::from(count) - 1,
+                };
+                after(first_ms - days * DAY_MS, i64::from(count) * DAY_MS)
+            }
+            (Self::Hours(count), at) => {
+                let (stamp_ms, ms) = (instant(stamp)?.ms(), i64::from(count) * HOUR_MS);
+                let early_ms = match at {
+                    None | Some(StampAt::Start) => 0,
+                    Some(StampAt::Middle) => ms / 2,
+                    Some(StampAt::End) => ms,
+                };
+                after(stamp_ms - early_ms, ms)
+            }
+        }
+    }
+}
+
+fn time(ms: i64) -> Result<TimeMs, String> {
+    TimeMs::new(ms).map_err(|e| e.to_string())
+}
+
+/// The date just before: the day before for a midnight.
+fn before(date: CalendarDate) -> Result<CalendarDate, String> {
+    if date.second > 0.0 {
+        return Ok(date);
+    }
+    let (year, month) = (date.year, date.month);
+    // The day before the first of a month is some day of the month before, in every calendar.
+    let (year, month, day) = match (month, date.day) {
+        (1, 1) => (year - 1, 12, 0),
+        (_, 1) => (year, month - 1, 0),
+        (_, day) => (year, month, day - 1),
+    };
+    if day > 0 {
+        return Ok(CalendarDate {
+            year,
+            month,
+            day,
+            ..date
+        });
+    }
+    let end_ms = midnight(date)?.ms();
+    let start = Period::month(year, month).map_err(|e| e.to_string())?.start;
+    let day = ((end_ms - start.ms()) / DAY_MS) as u32;
+    Ok(CalendarDate {
+        year,
+        month,
+        day,
+        ..date
+    })
+}
+
+fn midnight(date: CalendarDate) -> Result<TimeMs, String> {
+    let missing = |_| {
+        format!(
+            "{}-{:02}-{:02} is no day of the real calendar; only monthly steps can be read from this one",
+            date.year, date.month, date.day
+        )
+    };
+    TimeMs::from_ymd(date.year, date.month, date.day).map_err(missing)
+}
+
+/// The instant of a date, to the millisecond.
+pub(crate) fn instant(date: CalendarDate) -> Result<TimeMs, String> {
+    TimeMs::new(midnight(date)?.ms() + (date.second * 1000.0).round() as i64)
+        .map_err(|e| e.to_string())
+}
+
+/// How long the one step of a file is, from the attributes that say so.
+pub(crate) fn of_attributes(attributes: &Attributes) -> Option<Covers> {
+    let names = ["time_coverage_resolution", "time_coverage_duration"];
+    let text = names
+        .into_iter()
+        .find_map(|name| attributes.text(name).filter(|t| t.starts_with('P')))?;
+    match text {
+        "P1M" => Some(Covers::Month),
+        "P1Y" => Some(Covers::Year),
+        _ => {
+            let days: u32 = text.strip_prefix('P')?.strip_suffix('D')?.parse().ok()?;
+            (1..=366).contains(&days).then_some(Covers::Days(days))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan::cf::calendar::Calendar;
+
+    fn stamp(year: i32, month: u32, day: u32) -> CalendarDate {
+        CalendarDate {
+            year,
+            month,
+            day,
+            second: 0.0,
+            calendar: Calendar::Standard,
+        }
+    }
+
+    #[test]
+    fn a_stamp_anywhere_in_a_month_names_the_month() {
+        for day in [1, 15, 29] {
+            assert_eq!(
+                Covers::Month.period(stamp(2000, 2, day)).unwrap(),
+                Period::month(2000, 2).unwrap()
+            );
+        }
+        let week = Covers::try_from("8 days".to_owned())
+            .unwrap()
+            .period(stamp(2000, 2, 26))
+            .unwrap();
+        assert_eq!(
+            week.to_string(),
+            "2000-02-26T00:00:00Z/2000-03-05T00:00:00Z"
+        );
+    }
+
+    #[test]
+    fn a_stamp_stands_where_it_is_said() {
+        let period =
+            |covers: Covers, stamp, at| covers.period_at(stamp, Some(at)).unwrap().to_string();
+        let noon = |year, month, day| CalendarDate {
+            second: 43_200.0,
+            ..stamp(year, month, day)
+        };
+        let month = "2010-01-01T00:00:00Z/2010-02-01T00:00:00Z";
+        assert_eq!(
+            period(Covers::Month, stamp(2010, 2, 1), StampAt::End),
+            month
+        );
+        assert_eq!(
+            period(Covers::Month, stamp(2010, 1, 31), StampAt::End),
+            month
+        );
+        assert_eq!(
+            period(Covers::Month, stamp(2010, 1, 1), StampAt::Start),
+            month
+        );
+        let year = "2009-01-01T00:00:00Z/2010-01-01T00:00:00Z";
+        assert_eq!(period(Covers::Year, stamp(2010, 1, 1), StampAt::End), year);
+        let eight = "2010-01-01T00:00:00Z/2010-01-09T00:00:00Z";
+        assert_eq!(
+            period(Covers::Days(8), stamp(2010, 1, 5), StampAt::Middle),
+            eight
+        );
+        assert_eq!(
+            period(Covers::Days(8), stamp(2010, 1, 9), StampAt::End),
+            eight
+        );
+        let five = "2010-01-01T00:00:00Z/2010-01-06T00:00:00Z";
+        assert_eq!(
+            period(Covers::Days(5), noon(2010, 1, 3), StampAt::Middle),
+            five
+        );
+        assert_eq!(
+            period(Covers::Days(5), stamp(2010, 1, 3), StampAt::Middle),
+            five
+        );
+        let six_hours = "2010-01-01T09:00:00Z/2010-01-01T15:00:00Z";
+        assert_eq!(
+            period(Covers::Hours(6), noon(2010, 1, 1), StampAt::Middle),
+            six_hours
+        );
+    }
+
+    #[test]
+    fn unknown_lengths_are_refused() {
+        for text in ["fortnight", "0 days", "-1 days", "2 months", "", "x days"] {
+            assert!(Covers::try_from(text.to_owned()).is_err(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,242 @@
+//! Stamps without bounds to periods: from their distances, and where in its period each is likely to stand.
+
+use contract::time::{Period, TimeMs};
+
+use super::calendar::CalendarDate;
+use super::period::{Covers, StampAt, instant};
+
+const DAY_MS: i64 = 86_400_000;
+const HOUR_MS: i64 = 3_600_000;
+
+/// How long steps are, and where their stamps stand in them.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Spacing {
+    pub(crate) covers: Covers,
+    /// None: a month or year holds its stamp.
+    pub(crate) at: Option<StampAt>,
+    /// What is taken for granted, where the stamps do not tell.
+    pub(crate) assumption: Option<&'static str>,
+}
+
+/// How long steps of intervals are, from the distance of their stamps; none if that does not tell.
+pub(crate) fn of(stamps: &[CalendarDate]) -> Option<Spacing> {
+    let times = times(stamps).ok()?;
+    let spacings = times.windows(2).map(|pair| pair[1] - pair[0]);
+    let (low, high) = (spacings.clone().min()?, spacings.max()?);
+    let months: Vec<i64> = stamps
+        .iter()
+        .map(|s| i64::from(s.year) * 12 + i64::from(s.month))
+        .collect();
+    let each_in_the_next_month = months.windows(2).all(|pair| pair[1] == pair[0] + 1);
+    let whole = |ms: i64, unit_ms: i64, most: u32| {
+        (ms % unit_ms == 0)
+            .then(|| u32::try_from(ms / unit_ms).ok())
+            .flatten()
+            .filter(|n| *n <= most)
+    };
+    if each_in_the_next_month && low >= 27 * DAY_MS {
+        return Some(holding(Covers::Month, stamps, |s| s.day == 1));
+    }
+    if low >= 364 * DAY_MS && high <= 367 * DAY_MS {
+        return Some(holding(Covers::Year, stamps, |s| {
+            (s.month, s.day) == (1, 1)
+        }));
+    }
+    if low != high || low <= 0 {
+        return None;
+    }
+    if let Some(days) = whole(low, DAY_MS, 366) {
+        return Some(of_days(days, stamps[0], times[0]));
+    }
+    let hours = whole(low, HOUR_MS, 8784)?;
+    let phase_ms = times[0].rem_euclid(low);
+    let (at, assumption) = if DAY_MS % low == 0 && phase_ms * 2 == low {
+        (StampAt::Middle, None)
+    } else {
+        (
+            StampAt::Start,
+            Some("stamps are taken for the starts of the steps"),
+        )
+    };
+    Some(Spacing {
+        covers: Covers::Hours(hours),
+        at: Some(at),
+        assumption,
+    })
+}
+
+/// Steps that hold their stamps, wherever in them these stand; on the first instant they could also be ends.
+fn holding(
+    covers: Covers,
+    stamps: &[CalendarDate],
+    is_first: impl Fn(&CalendarDate) -> bool,
+) -> Spacing {
+    let is_edge = stamps.iter().all(|s| is_first(s) && s.second == 0.0);
+    Spacing {
+        covers,
+        at: None,
+        assumption: is_edge
+            .then_some("stamps on first instants are taken for the starts of the steps"),
+    }
+}
+
+/// Steps of days. Those of several days are counted from the first of January, as the makers of such composites do.
+fn of_days(days: u32, first: CalendarDate, first_time: i64) -> Spacing {
+    let of_day_ms = first_time.rem_euclid(DAY_MS);
+    let day_of_year = Period::year(first.year)
+        .map_or(0, |year| (first_time - year.start.ms()).div_euclid(DAY_MS));
+    let place = day_of_year % i64::from(days);
+    let is_noon = of_day_ms * 2 == DAY_MS;
+    let (at, assumption) = match (days, of_day_ms) {
+        (1, _) if is_noon => (StampAt::Middle, None),
+        (1, 0) => (
+            StampAt::Start,
+            Some("stamps at midnight are taken for the starts of the days"),
+        ),
+        (1, _) => (
+            StampAt::Start,
+            Some("steps are taken for the days that hold their stamps"),
+        ),
+        // The middle of an odd number of days is a noon.
+        (n, _) if is_noon && n % 2 == 1 => (StampAt::Middle, None),
+        (n, 0) if place != 0 && place == i64::from(n) / 2 => (
+            StampAt::Middle,
+            Some("stamps are taken for the middles of steps that are counted from 1 January"),
+        ),
+        _ => (
+            StampAt::Start,
+            Some("stamps are taken for the starts of the steps"),
+        ),
+    };
+    Spacing {
+        covers: Covers::Days(days),
+        at: Some(at),
+        assumption,
+    }
+}
+
+/// The periods for which values at instants stand: half way to the neighbours. At least two instants, in order.
+pub(crate) fn around(stamps: &[CalendarDate]) -> Result<Vec<Period>, String> {
+    let times = times(stamps)?;
+    let is_ordered = times.windows(2).all(|pair| pair[0] < pair[1]);
+    let (Some(first), Some(last), true) =
+        (times.first(), times.last(), is_ordered && times.len() > 1)
+    else {
+        return Err("has fewer than two instants, or not in their order; say in a profile what a step covers".to_owned());
+    };
+    let mut edges = vec![first - (times[1] - first) / 2];
+    edges.extend(times.windows(2).map(|pair| i64::midpoint(pair[0], pair[1])));
+    edges.push(last + (last - times[times.len() - 2]) / 2);
+    let time = |ms: i64| TimeMs::new(ms).map_err(|e| e.to_string());
+    let period =
+        |pair: &[i64]| Period::new(time(pair[0])?, time(pair[1])?).map_err(|e| e.to_string());
+    edges.windows(2).map(period).collect()
+}
+
+fn times(stamps: &[CalendarDate]) -> Result<Vec<i64>, String> {
+    stamps.iter().map(|s| instant(*s).map(TimeMs::ms)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan::cf::calendar::Calendar;
+
+    fn stamp(year: i32, month: u32, day: u32, hour: f64) -> CalendarDate {
+        CalendarDate {
+            year,
+            month,
+            day,
+            second: hour * 3600.0,
+            calendar: Calendar::Standard,
+        }
+    }
+
+    /// First period of the steps, and whether something was assumed.
+    fn told(stamps: &[CalendarDate]) -> Option<(String, bool)> {
+        let Spacing {
+            covers,
+            at,
+            assumption,
+        } = of(stamps)?;
+        let period = covers.period_at(stamps[0], at).unwrap();
+        Some((period.to_string(), assumption.is_some()))
+    }
+
+    fn days(first: u32, step: usize, hour: f64) -> Vec<CalendarDate> {
+        (first..29)
+            .step_by(step)
+            .map(|day| stamp(2001, 1, day, hour))
+            .collect()
+    }
+
+    #[test]
+    fn months_and_years_hold_their_stamps() {
+        let months = |day| {
+            (1..=12)
+                .map(|m| stamp(2001, m, day, 0.0))
+                .collect::<Vec<_>>()
+        };
+        let january = "2001-01-01T00:00:00Z/2001-02-01T00:00:00Z".to_owned();
+        assert_eq!(told(&months(15)), Some((january.clone(), false)));
+        assert_eq!(told(&months(1)), Some((january, true)));
+        let years: Vec<_> = (1999..=2004).map(|y| stamp(y, 7, 1, 0.0)).collect();
+        let year = "1999-01-01T00:00:00Z/2000-01-01T00:00:00Z".to_owned();
+        assert_eq!(told(&years), Some((year, false)));
+    }
+
+    #[test]
+    fn centred_days_are_told_from_starts() {
+        let day = "2001-01-01T00:00:00Z/2001-01-02T00:00:00Z".to_owned();
+        assert_eq!(told(&days(1, 1, 12.0)), Some((day.clone(), false)));
+        assert_eq!(told(&days(1, 1, 0.0)), Some((day.clone(), true)));
+        assert_eq!(told(&days(1, 1, 9.0)), Some((day, true)));
+        let eight = "2001-01-01T00:00:00Z/2001-01-09T00:00:00Z".to_owned();
+        assert_eq!(told(&days(1, 8, 0.0)), Some((eight.clone(), true)));
+        assert_eq!(told(&days(5, 8, 0.0)), Some((eight, true)));
+        let five = "2001-01-01T00:00:00Z/2001-01-06T00:00:00Z".to_owned();
+        assert_eq!(told(&days(3, 5, 12.0)), Some((five, false)));
+    }
+
+    #[test]
+    fn hours_that_stand_in_the_middle_are_told() {
+        let hours = |first: f64, step: f64| {
+            (0..4)
+                .map(|i| stamp(2001, 1, 1, first + step * f64::from(i)))
+                .collect::<Vec<_>>()
+        };
+        let first = "2001-01-01T00:00:00Z/2001-01-01T06:00:00Z".to_owned();
+        assert_eq!(told(&hours(3.0, 6.0)), Some((first.clone(), false)));
+        assert_eq!(told(&hours(0.0, 6.0)), Some((first, true)));
+    }
+
+    #[test]
+    fn uneven_stamps_and_single_ones_do_not_tell() {
+        let uneven = [
+            stamp(2001, 1, 1, 0.0),
+            stamp(2001, 1, 4, 0.0),
+            stamp(2001, 1, 5, 0.0),
+        ];
+        assert_eq!((told(&uneven), told(&uneven[..1])), (None, None));
+    }
+
+    #[test]
+    fn instants_stand_for_the_time_around_them() {
+        let stamps: Vec<_> = [0.0, 6.0, 12.0].map(|h| stamp(2001, 1, 1, h)).to_vec();
+        let periods: Vec<String> = around(&stamps)
+            .unwrap()
+            .iter()
+            .map(Period::to_string)
+            .collect();
+        assert_eq!(
+            periods,
+            [
+                "2000-12-31T21:00:00Z/2001-01-01T03:00:00Z",
+                "2001-01-01T03:00:00Z/2001-01-01T09:00:00Z",
+                "2001-01-01T09:00:00Z/2001-01-01T15:00:00Z"
+            ]
+        );
+        let backwards: Vec<_> = stamps.iter().rev().copied().collect();
+        assert!(around(&stamps[..1]).is_err() && around(&backwards).is_err());
+    }
+}

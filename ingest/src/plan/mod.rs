@@ -1,0 +1,221 @@
+//! [`InspectedGranule`] in, [`PlannedGranule`] out: which variable, where its cells are, when its steps are, which unit.
+//!
+//! Nothing of the variable is read yet; only coordinates, which are small. A profile overrides what the file says.
+
+mod bounds;
+pub(crate) mod cf;
+mod coverage;
+mod date;
+mod place;
+pub(crate) mod profile;
+mod quality;
+pub(crate) mod recipe;
+mod refused;
+mod stamps;
+mod steps;
+mod target;
+pub(crate) mod unit;
+
+use contract::event::RejectReason;
+use contract::product::ProductId;
+use contract::quantity::Quantity;
+use contract::time::Period;
+
+use crate::plan::cf::axis::Mapping;
+use crate::plan::cf::coordinate::{self, Axis, Role};
+use crate::plan::cf::packing::Packing;
+use crate::inspect::reader::session::Session;
+use crate::error::{Rejection, Stop};
+use crate::fetch::RawGranule;
+use crate::inspect::file::description::{Description, Part, Variable};
+use crate::inspect::InspectedGranule;
+use crate::limits::Limits;
+use crate::plan::profile::Profile;
+use crate::plan::recipe::Recipe;
+use crate::settings::Settings;
+pub(crate) use quality::Quality;
+
+/// A file of which is known what will be read and what it will become.
+pub(crate) struct PlannedGranule {
+    pub(crate) raw: RawGranule,
+    pub(crate) session: Session,
+    pub(crate) target: Target,
+    pub(crate) variable: Variable,
+    pub(crate) axes: Vec<Axis>,
+    pub(crate) mapping: Mapping,
+    pub(crate) packing: Packing,
+    pub(crate) steps: Vec<PlannedStep>,
+    /// Which cells are good enough; all, if absent.
+    pub(crate) quality: Option<Quality>,
+    pub(crate) recipe: Recipe,
+    /// What was taken for granted, because nothing in the file says it. One line each.
+    pub(crate) assumptions: Vec<String>,
+}
+
+impl PlannedGranule {
+    /// Cells of one map as it lies in the file.
+    pub(crate) fn plane_cells(&self) -> u64 {
+        let is_plane = |axis: &&Axis| matches!(axis.role, Role::Latitude | Role::Longitude);
+        let plane = self.axes.iter().filter(is_plane);
+        plane.map(|axis| axis.len).fold(1, u64::saturating_mul)
+    }
+}
+
+/// What a file becomes.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Target {
+    pub(crate) product: ProductId,
+    pub(crate) title: String,
+    pub(crate) source: String,
+    pub(crate) quantity: Quantity,
+    pub(crate) synthetic: bool,
+    /// Name of the profile it was read with; none for a file that follows CF.
+    pub(crate) profile: Option<String>,
+}
+
+/// One step of the file: where it is and how its values become stored ones, `stored = value * factor + offset`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct PlannedStep {
+    pub(crate) period: Period,
+    pub(crate) time_index: u64,
+    pub(crate) factor: f64,
+    pub(crate) offset: f64,
+}
+
+/// What the caller wants, beyond what the file says.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Wish<'a> {
+    pub(crate) profile: Option<&'a Profile>,
+    pub(crate) product: Option<&'a ProductId>,
+}
+
+/// A file on its way through planning.
+struct Planning<'a> {
+    session: Session,
+    file: &'a Description,
+    file_name: &'a str,
+    profile: Option<&'a Profile>,
+    limits: Limits,
+    assumptions: Vec<String>,
+}
+
+pub(crate) async fn run(
+    granule: InspectedGranule,
+    wish: Wish<'_>,
+    settings: &Settings,
+) -> Result<PlannedGranule, Stop> {
+    let limits = settings.limits;
+    let InspectedGranule {
+        raw,
+        session,
+        description,
+    } = granule;
+    let fits = |profile: &&Profile| profile.is_for(&raw.file_name, &description);
+    let profile = wish.profile.or_else(|| settings.profiles.iter().find(fits));
+    let (variable, meaning) = target::choose(&description, profile)?;
+    let target = target::target(
+        &description,
+        variable,
+        profile,
+        meaning.quantity,
+        wish.product,
+    )?;
+    let mut planning = Planning {
+        session,
+        file: &description,
+        file_name: &raw.file_name,
+        profile,
+        limits,
+        assumptions: vec![],
+    };
+    let (axes, mapping) = place::mapping(&mut planning, variable).await?;
+    let periods = steps::periods(&mut planning, variable, &axes).await?;
+    let steps = steps::convert(variable, profile, meaning, &periods)?;
+    let packing = target::packing(variable, profile)?;
+    packing
+        .assumption
+        .iter()
+        .for_each(|text| planning.assume(text));
+    let quality = quality::plan(&mut planning, variable, &axes)?;
+    let Planning {
+        session,
+        assumptions,
+        ..
+    } = planning;
+    Ok(PlannedGranule {
+        session,
+        target,
+        variable: variable.clone(),
+        axes,
+        mapping,
+        packing,
+        steps,
+        quality,
+        recipe: Recipe::of(profile),
+        assumptions,
+        raw,
+    })
+}
+
+impl Planning<'_> {
+    /// Notes what is taken for granted; text of the file becomes one short line.
+    fn assume(&mut self, text: impl AsRef<str>) {
+        let line = Rejection::new(RejectReason::Values, "", text).detail;
+        if !self.assumptions.contains(&line) {
+            self.assumptions.push(line);
+        }
+    }
+
+    /// All values of a coordinate variable, unpacked; NaN for fill values.
+    async fn coordinate(&mut self, name: &str) -> Result<Vec<f64>, Stop> {
+        /// Longest coordinate axis.
+        const MAX_LABELS: u64 = 1 << 20;
+        let missing = || {
+            Rejection::new(
+                RejectReason::Grid,
+                name,
+                "is not in the file; name another coordinate in the profile",
+            )
+        };
+        let variable = self.file.variable(name).ok_or_else(missing)?;
+        let count = match variable.dimensions.as_slice() {
+            [] => 1,
+            [only] => only.len,
+            more => {
+                let detail = format!(
+                    "has {} dimensions where a coordinate has one: this is a swath; grid it first",
+                    more.len()
+                );
+                return Err(Rejection::new(RejectReason::Grid, name, detail).into());
+            }
+        };
+        if count > MAX_LABELS || !variable.is_numeric() {
+            let detail = format!(
+                "is no coordinate axis ({count} labels, at most {MAX_LABELS} numbers are read)"
+            );
+            return Err(Rejection::new(RejectReason::Grid, name, detail).into());
+        }
+        let parts = vec![Part::All; variable.dimensions.len()];
+        let packing = Packing::of(variable);
+        let stored = self.session.read(name, &parts, count).await?;
+        Ok(stored.into_iter().map(|v| packing.value(v)).collect())
+    }
+
+    /// The time axis, or a scalar time beside the axes.
+    fn time_variable(&self, axes: &[Axis]) -> Option<String> {
+        let on_axis = axes
+            .iter()
+            .find(|a| a.role == Role::Time)
+            .and_then(|a| a.coordinate.clone());
+        let is_scalar_time = |v: &&Variable| {
+            v.cell_count() == 1 && v.is_numeric() && coordinate::role_of(v) == Role::Time
+        };
+        on_axis.or_else(|| {
+            self.file
+                .variables
+                .iter()
+                .find(is_scalar_time)
+                .map(|v| v.name.clone())
+        })
+    }
+}
