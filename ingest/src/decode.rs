@@ -3,12 +3,12 @@
 use contract::masked::MaskedCells;
 use contract::time::Period;
 
+use crate::error::Stop;
+use crate::inspect::file::description::Part;
+use crate::inspect::reader::session::Session;
 use crate::plan::cf::axis::Mapping;
 use crate::plan::cf::coordinate::{Axis, Role};
 use crate::plan::cf::packing::Unpacked;
-use crate::inspect::reader::session::Session;
-use crate::error::Stop;
-use crate::inspect::file::description::Part;
 use crate::plan::{PlannedGranule, PlannedStep};
 
 /// One step as values, `[row, col]`, row 0 north, stored unit, NaN for no data.

@@ -3,19 +3,18 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use async_trait::async_trait;
 use contract::observation::Observation;
 use storage::Store;
+use storage::log::EmbeddedLog;
 
-use crate::notice::answer::{Asked, Ready};
 use crate::error::IngestError;
-use crate::limits::gates::Gates;
-use crate::land::{self, Batch};
-use crate::pipeline::metrics::{Metrics, class};
-use crate::observation::{ObservationSink, SinkError, Stored};
+use crate::ingestd::IngestService;
 use crate::notice::Outcome;
-use crate::pipeline::Pipeline;
+use crate::observation::{ObservationSink, SinkError, Stored};
+use crate::pipeline::metrics::class;
 use crate::pipeline::progress::Quiet;
 use crate::settings::Settings;
 
@@ -81,24 +80,29 @@ pub async fn survey(files: &[PathBuf], settings: &Settings) -> Result<Vec<Row>, 
     }
     let folders: Vec<&Path> = sets.keys().copied().collect();
     let mut rows = Vec::with_capacity(files.len());
-    for (folder, files) in sets {
+    for (folder, files) in &sets {
+        let log = Arc::new(EmbeddedLog::memory());
+        let service = IngestService::new(Store::memory(), log, settings.clone())
+            .with_observations(Arc::new(Passing));
+        service.notify(files, None, None).await?;
+        let outcomes = service.drain(&Quiet).await?;
         let set = set_name(folder, &folders);
-        for (asked, profile, outcome) in survey_set(files, settings).await? {
-            let file = asked
-                .path()
-                .file_name()
-                .unwrap_or_default()
-                .to_string_lossy()
-                .into_owned();
-            rows.push(Row {
-                set: set.clone(),
-                file,
-                profile,
-                outcome,
-            });
-        }
+        rows.extend(outcomes.into_iter().map(|outcome| Row {
+            set: set.clone(),
+            file: name_of(outcome.file()),
+            profile: match &outcome {
+                Outcome::Landed { profile, .. } => profile.clone(),
+                _ => None,
+            },
+            outcome,
+        }));
     }
     Ok(rows)
+}
+
+fn name_of(file: &Path) -> String {
+    let name = file.file_name().unwrap_or_default();
+    name.to_string_lossy().into_owned()
 }
 
 /// The last parts of a folder's path that tell it from the others; a year alone is no name.
@@ -114,48 +118,6 @@ fn set_name(folder: &Path, folders: &[&Path]) -> String {
         }
     }
     folder.display().to_string()
-}
-
-/// A file, the profile that it was read with, and what became of it.
-type Surveyed = (Asked, Option<String>, Outcome);
-
-async fn survey_set(
-    files: Vec<PathBuf>,
-    settings: &Settings,
-) -> Result<Vec<Surveyed>, IngestError> {
-    let (store, gates, metrics) = (Store::memory(), Gates::new(settings), Metrics::unseen());
-    let pipeline = Pipeline {
-        store: &store,
-        settings,
-        gates: &gates,
-        observations: Some(&Passing),
-        metrics: &metrics,
-        progress: &Quiet,
-    };
-    let mut rows = Vec::with_capacity(files.len());
-    for asked in land::asked_for(&Batch {
-        files,
-        ..Batch::default()
-    }) {
-        let (profile, outcome) = survey_file(&pipeline, &asked).await?;
-        rows.push((asked, profile, outcome));
-    }
-    Ok(rows)
-}
-
-async fn survey_file(
-    pipeline: &Pipeline<'_>,
-    asked: &Asked,
-) -> Result<(Option<String>, Outcome), IngestError> {
-    Ok(match land::prepare(pipeline, asked).await? {
-        Ready::Answered(answer) => (None, answer.outcome),
-        Ready::ToCommit(granule) => {
-            let answers = land::commit(pipeline, &[(asked, &granule)]).await?;
-            let outcome = answers.into_iter().next().map(|answer| answer.outcome);
-            let outcome = outcome.expect("one file has one answer");
-            (granule.target.profile, outcome)
-        }
-    })
 }
 
 /// Keeps no observations.

@@ -8,12 +8,15 @@
 //! Two processes that publish one file of two notices at the same moment have both noted it; the one that was slower is
 //! silent, unless it dies just then: then both tell. Nothing is ever left untold.
 
+use std::time::Duration;
+
 use bytes::Bytes;
 use contract::digest::Digest;
 use contract::key::ObjectKey;
 use contract::kind::Kind;
 use contract::product::ProductId;
 use contract::topic::Origin;
+use storage::gc::Owner;
 use storage::{StorageError, Store};
 
 use crate::error::IngestError;
@@ -57,6 +60,25 @@ pub(crate) async fn is_noted(
         .exists(&key(product, raw_sha256, origin)?)
         .await
         .map_err(IngestError::storage("look up a landing"))
+}
+
+/// Notes by which a notice that comes again is known.
+#[derive(Debug)]
+pub struct LandingNotes;
+
+impl Owner for LandingNotes {
+    fn kinds(&self) -> &'static [Kind] {
+        &[Kind::Landing]
+    }
+
+    /// Longer than any log keeps a notice (30 days).
+    fn least_age(&self) -> Duration {
+        Duration::from_hours(24 * 45)
+    }
+
+    fn is_made_again(&self) -> bool {
+        true
+    }
 }
 
 #[cfg(test)]

@@ -20,7 +20,8 @@ static GLOBAL_UNICAST: LazyLock<IpNet> = LazyLock::new(|| network("2000::/3"));
 static TRANSLATED: LazyLock<IpNet> = LazyLock::new(|| network("64:ff9b::/96"));
 
 fn network(text: &str) -> IpNet {
-    text.parse().expect("a network of this file, which a test reads")
+    text.parse()
+        .expect("a network of this file, which a test reads")
 }
 
 /// Is it an address of the public network?

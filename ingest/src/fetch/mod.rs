@@ -14,7 +14,7 @@ mod object;
 mod pace;
 mod raw;
 mod retry;
-pub(crate) mod source_wait;
+mod source_wait;
 mod spool;
 mod stored;
 mod turns;
@@ -26,6 +26,7 @@ pub use http::AllowedHost;
 pub(crate) use location::Location;
 pub(crate) use raw::RawGranule;
 pub use retry::RetryLimits;
+pub(crate) use source_wait::SourceWait;
 pub(crate) use stored::RawFiles;
 
 use crate::error::Stop;

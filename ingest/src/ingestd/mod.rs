@@ -1,4 +1,5 @@
-//! The ingest service: notices from the event log in, landed products and their events out.
+//! The ingest service: notices from the event log in, landed products and their events out; for as long as they come, or
+//! for a command until there are none left.
 //!
 //! The event of a notice is appended in the same step in which the notice's offset moves, after the file's objects are
 //! durable. After a crash unfinished notices come again; files that had landed are found in their manifests, and only what
@@ -18,39 +19,33 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use ::retry::Backoff;
+use contract::digest::Digest;
 use contract::event::Event;
 use contract::key::ObjectKey;
 use contract::product::ProductId;
 use contract::time::TimeMs;
 use contract::topic::Topic;
 use futures::FutureExt as _;
+use futures::future::Shared;
 use service::{Part, Readiness, Report};
 use storage::Store;
-use storage::log::{EventLog, Finished};
+use storage::log::EventLog;
 
-use crate::notice::answer::Asked;
 use crate::error::IngestError;
 use crate::limits::gates::Gates;
-use crate::land::{self, COMMIT_FILES};
-use crate::pipeline::metrics::Metrics;
-use crate::notice::notice_body;
+use crate::notice::{Outcome, notice_body};
 use crate::observation::ObservationSink;
-use crate::notice::Outcome;
 use crate::pipeline::Pipeline;
+use crate::pipeline::metrics::Metrics;
 use crate::pipeline::progress::Progress;
 use crate::settings::Settings;
 use health::Health;
+use retry::Caller;
 
 pub use settings::ServiceSettings;
 
 const TOPIC: Topic = Topic::GranuleNotice;
 const GROUP: &str = "ingest";
-/// Attempts of a command whose failure may pass.
-const MAX_ATTEMPTS: usize = 5;
-/// Between two looks at a disk that is full.
-const FULL_PAUSE: Duration = Duration::from_secs(2);
-/// A command has read all notices when none comes for so long.
-const END_WAIT: Duration = Duration::from_millis(10);
 /// A session that lasted so long was no failed start: the next one is begun soon.
 const SOUND_SESSION: Duration = Duration::from_secs(30);
 /// How often the lag is looked up.
@@ -85,7 +80,7 @@ impl IngestService {
             observations: None,
             metrics: Metrics::unseen(),
             health: Health::default(),
-            parallel_notices: COMMIT_FILES,
+            parallel_notices: shift::GROUP_MESSAGES,
             drain: Duration::from_secs(25),
         }
     }
@@ -141,74 +136,11 @@ impl IngestService {
     /// Lands every file that there is a notice for, and returns: for commands. The same notices give the same manifests,
     /// since files are published in groups that do not depend on how fast each was read.
     pub async fn drain(&self, progress: &dyn Progress) -> Result<Vec<Outcome>, IngestError> {
-        let mut all = Vec::new();
-        loop {
-            let group = self.next_group(progress).await?;
-            if group.is_empty() {
-                return Ok(all);
-            }
-            all.extend(group);
-        }
-    }
-
-    async fn next_group(&self, progress: &dyn Progress) -> Result<Vec<Outcome>, IngestError> {
-        let attempts = Some(MAX_ATTEMPTS);
-        let mut pauses = Backoff {
-            attempts,
-            ..Backoff::default()
-        }
-        .pauses();
-        loop {
-            match self.try_group(progress).await {
-                // Whoever frees the disk need not come back here to start again what was under way.
-                Err(error) if error.is_disk_full() => {
-                    tracing::warn!(%error, "the disk is full; ingest waits until there is room");
-                    tokio::time::sleep(FULL_PAUSE).await;
-                }
-                Err(error) if error.is_retryable() => {
-                    let Some(pause) = pauses.next() else {
-                        return Err(error);
-                    };
-                    tracing::warn!(%error, "ingest will try again");
-                    tokio::time::sleep(pause).await;
-                }
-                other => return other,
-            }
-        }
-    }
-
-    async fn try_group(&self, progress: &dyn Progress) -> Result<Vec<Outcome>, IngestError> {
-        let read = IngestError::storage("read notices");
-        let mut reader = self
-            .log
-            .join(TOPIC, GROUP)
-            .await
-            .map_err(IngestError::storage("join the readers of notices"))?;
-        let messages = reader.next(COMMIT_FILES, END_WAIT).await.map_err(read)?;
-        let mut asked = Vec::with_capacity(messages.len());
-        for message in &messages {
-            asked.extend(Asked::of(message, &self.settings, now()));
-        }
-        let answers = land::land_group(&self.pipeline(progress), &asked).await?;
-        let follows = |message: &storage::log::Message| {
-            let own = asked.iter().zip(&answers);
-            let own = own.filter(|(asked, _)| asked.origin == Some(message.origin));
-            own.filter_map(|(_, answer)| answer.event.clone()).collect()
-        };
-        let finished = messages.iter().map(|message| Finished {
-            origin: message.origin,
-            follows: follows(message),
-        });
-        reader
-            .finish(finished.collect())
-            .await
-            .map_err(IngestError::storage("finish notices"))?;
-        reader
-            .leave()
-            .await
-            .map_err(IngestError::storage("leave the readers of notices"))?;
-        let outcomes = answers.into_iter().map(|answer| answer.outcome);
-        Ok(outcomes.inspect(|outcome| progress.done(outcome)).collect())
+        let mut told = Vec::new();
+        let never = std::future::pending::<()>().shared();
+        self.work(Caller::Command, progress, never, &mut told)
+            .await?;
+        Ok(told)
     }
 
     /// Lands files as notices come, until `stop` is ready; then what is under way is finished, within the time to drain.
@@ -220,30 +152,45 @@ impl IngestService {
         progress: &dyn Progress,
         stop: impl Future<Output = ()> + Send,
     ) -> Result<(), IngestError> {
-        let stop = stop.shared();
-        let work = async {
-            let mut pauses = Backoff::default().pauses();
-            loop {
-                let begun = Instant::now();
-                let error = match shift::run(self, progress, stop.clone()).await {
-                    Ok(()) => return Ok(()),
-                    Err(error) if error.is_retryable() => error,
-                    Err(error) => return Err(error),
-                };
-                let _held_up = self.health.held_up(&error);
-                tracing::warn!(%error, "the event log is away; joining it again");
-                if begun.elapsed() > SOUND_SESSION {
-                    pauses = Backoff::default().pauses();
-                }
-                tokio::select! {
-                    () = stop.clone() => return Ok(()),
-                    () = tokio::time::sleep(pauses.next().unwrap_or(LAG_PAUSE)) => {}
-                }
-            }
-        };
+        let mut untold = Vec::new();
         tokio::select! {
-            ended = work => ended,
+            ended = self.work(Caller::Service, progress, stop.shared(), &mut untold) => ended,
             never = self.watch_lag() => match never {},
+        }
+    }
+
+    /// Works on notices, from the beginning again after what may pass; `told` takes what a command is told.
+    async fn work(
+        &self,
+        caller: Caller,
+        progress: &dyn Progress,
+        stop: Shared<impl Future<Output = ()> + Send>,
+        told: &mut Vec<Outcome>,
+    ) -> Result<(), IngestError> {
+        let (mut pauses, mut times) = (Backoff::default().pauses(), 0);
+        loop {
+            let (begun, told_before) = (Instant::now(), told.len());
+            let ended = shift::run(self, caller, progress, stop.clone(), told).await;
+            let Err(error) = ended else {
+                return Ok(());
+            };
+            if begun.elapsed() > SOUND_SESSION || told.len() > told_before {
+                (pauses, times) = (Backoff::default().pauses(), 0);
+            }
+            times += 1;
+            if !caller.begins_again(&error, times) {
+                return Err(error);
+            }
+            let _held_up = self.health.held_up(&error);
+            if error.is_disk_full() {
+                tracing::warn!(%error, "the disk is full; ingest waits until there is room");
+            } else {
+                tracing::warn!(%error, "ingest begins again with what is not finished");
+            }
+            tokio::select! {
+                () = stop.clone() => return Ok(()),
+                () = tokio::time::sleep(pauses.next().unwrap_or(LAG_PAUSE)) => {}
+            }
         }
     }
 
@@ -318,5 +265,6 @@ fn trace(file: &std::path::Path, noticed: TimeMs) -> String {
         .filter(char::is_ascii_graphic)
         .take(TRACE_NAME_BYTES)
         .collect();
-    format!("{name}-{}-{:x}", land::trace(file), noticed.ms())
+    let path = Digest::of(file.as_os_str().as_encoded_bytes());
+    format!("{name}-file-{}-{:x}", path.short(), noticed.ms())
 }

@@ -57,6 +57,12 @@ impl<T> PublishQueue<T> {
         self.files.remove(&number);
     }
 
+    /// Is any file not ready yet?
+    pub(super) fn is_preparing(&self) -> bool {
+        let mut files = self.files.values();
+        files.any(|file| matches!(file.state, State::Preparing))
+    }
+
     /// A product is no longer being published.
     pub(super) fn free(&mut self, product: &ProductId) {
         self.busy.remove(product);

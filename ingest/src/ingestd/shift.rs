@@ -1,5 +1,6 @@
-//! The service at work, from joining the readers of notices to leaving them: takes notices, works on a bounded number of
-//! them at the same time, publishes what is ready, and finishes each with what follows from it.
+//! The one driver of all files, those of a stream and those of a command, from joining the readers of notices to leaving
+//! them: takes notices, works on a bounded number of them at the same time, publishes what is ready, and finishes each
+//! with what follows from it.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::future::Future;
@@ -15,14 +16,14 @@ use tokio::time::Instant;
 use tracing::Instrument as _;
 
 use super::publish_queue::{Number, PublishQueue};
-use super::work::{self, Done, Work, alongside};
+use super::retry::Caller;
+use super::work::{self, Done, Ended, Work, alongside};
 use super::{GROUP, IngestService, TOPIC, now};
-use crate::notice::answer::{Answer, Asked};
 use crate::error::IngestError;
-use crate::pipeline::metrics;
-use crate::notice::Outcome;
-use crate::pipeline::Pipeline;
+use crate::notice::{Answer, Outcome, PendingNotice};
+use crate::pipeline::metrics::{Metrics, class};
 use crate::pipeline::progress::Progress;
+use crate::pipeline::{Pipeline, Prepared};
 use crate::put::StoredGranule;
 
 /// How long notices are waited for while nothing is under way: bounds how late a stop is heard.
@@ -30,12 +31,17 @@ const IDLE_WAIT: Duration = Duration::from_millis(250);
 /// And while something is: bounds how late what is done is finished.
 const BUSY_WAIT: Duration = Duration::from_millis(20);
 
+/// A command has read all notices when none comes for so long.
+const END_WAIT: Duration = Duration::from_millis(10);
+
 /// Messages that may wait for their sources for each that may be under way: what is kept of them is small.
 const WAITING_FOR_EACH: usize = 16;
+/// Messages of a group of a command: bounds what a crash makes be done again.
+pub(super) const GROUP_MESSAGES: usize = 64;
 
 /// A file that is under way.
 struct Job {
-    asked: Arc<Asked>,
+    notice: Arc<PendingNotice>,
     /// Number of its message.
     message: Number,
     /// Ends its preparation.
@@ -53,22 +59,28 @@ struct Open {
 
 struct Shift<'a> {
     service: &'a IngestService,
+    caller: Caller,
     pipeline: Pipeline<'a>,
     publish_queue: PublishQueue<StoredGranule>,
     jobs: BTreeMap<Number, Job>,
     open: BTreeMap<Number, Open>,
     next: Number,
     work: Work<'a>,
-    done: Vec<Done>,
+    ended: Vec<Ended>,
     /// Messages of which everything is answered.
-    finished: Vec<Open>,
+    finished: BTreeMap<Number, Open>,
+    /// What became of the files of a command, in the order of their notices.
+    told: &'a mut Vec<Outcome>,
 }
 
-/// Works until `stop`, or until the event log fails; what is not finished then comes again.
+/// Works until `stop`, or for a command until no notice is left, or until the event log fails; what is not finished then
+/// comes again.
 pub(super) async fn run(
     service: &IngestService,
+    caller: Caller,
     progress: &dyn Progress,
     stop: Shared<impl Future<Output = ()> + Send>,
+    told: &mut Vec<Outcome>,
 ) -> Result<(), IngestError> {
     let mut reader = service
         .log
@@ -77,18 +89,20 @@ pub(super) async fn run(
         .map_err(IngestError::storage("join the readers of notices"))?;
     let mut shift = Shift {
         service,
+        caller,
         pipeline: service.pipeline(progress),
         publish_queue: PublishQueue::default(),
         jobs: BTreeMap::new(),
         open: BTreeMap::new(),
         next: 0,
         work: Work::new(),
-        done: Vec::new(),
-        finished: Vec::new(),
+        ended: Vec::new(),
+        finished: BTreeMap::new(),
+        told,
     };
     let mut last_call = None;
     loop {
-        shift.settle();
+        shift.settle()?;
         shift.give_up(&reader.lost());
         shift.publish();
         shift.finish(reader.as_mut()).await?;
@@ -98,7 +112,7 @@ pub(super) async fn run(
         }
         if let Some(last_call) = last_call {
             let is_late = Instant::now() >= last_call;
-            if shift.open.is_empty() && shift.done.is_empty() || is_late {
+            if shift.open.is_empty() && shift.ended.is_empty() || is_late {
                 if is_late {
                     tracing::warn!(under_way = shift.open.len(), "out of time; it comes again");
                 }
@@ -109,7 +123,10 @@ pub(super) async fn run(
             }
         }
         if last_call.is_none() && shift.room() > 0 {
-            shift.take(reader.as_mut()).await?;
+            let has_come = shift.take(reader.as_mut()).await?;
+            if caller == Caller::Command && !has_come {
+                last_call = Some(Instant::now() + service.drain);
+            }
         } else {
             shift.wait(&stop, last_call).await;
         }
@@ -120,9 +137,13 @@ impl Shift<'_> {
     /// How many further messages may be taken. Those that wait for a source that is slow or away take no place from others,
     /// as long as they are not very many.
     fn room(&self) -> usize {
+        if self.caller == Caller::Command {
+            let is_between_groups = self.open.is_empty();
+            return if is_between_groups { GROUP_MESSAGES } else { 0 };
+        }
         let is_waited_for = |number: &Number| {
             let job = self.jobs.get(number);
-            job.is_some_and(|job| job.asked.source_wait.is_long())
+            job.is_some_and(|job| job.notice.source_wait.is_long())
         };
         let waits = |open: &&Open| open.answers.iter().any(|(number, _)| is_waited_for(number));
         let waiting = self.open.values().filter(waits).count();
@@ -131,46 +152,49 @@ impl Shift<'_> {
         places.saturating_sub(self.open.len())
     }
 
-    /// Takes further messages, as many as there is room for.
-    async fn take(&mut self, reader: &mut dyn Reader) -> Result<(), IngestError> {
+    /// Takes further messages, as many as there is room for. Were there any?
+    async fn take(&mut self, reader: &mut dyn Reader) -> Result<bool, IngestError> {
         let room = self.room();
-        let wait = if self.work.is_empty() {
-            IDLE_WAIT
-        } else {
-            BUSY_WAIT
+        let wait = match self.caller {
+            Caller::Command => END_WAIT,
+            Caller::Service if self.work.is_empty() => IDLE_WAIT,
+            Caller::Service => BUSY_WAIT,
         };
         let read = reader.next(room, wait);
-        let messages = alongside(&mut self.work, &mut self.done, read).await;
+        let messages = alongside(&mut self.work, &mut self.ended, read).await;
         let messages = messages.map_err(IngestError::storage("read notices"))?;
         // Before anything is begun: what was lost may have come back, to be begun anew.
         self.give_up(&reader.lost());
-        for message in messages {
-            self.begin(&message);
+        for message in &messages {
+            self.begin(message);
         }
-        Ok(())
+        Ok(!messages.is_empty())
     }
 
     fn begin(&mut self, message: &Message) {
         let number = self.count();
         let mut answers = Vec::new();
         let mut trace = String::new();
-        for asked in Asked::of(message, &self.service.settings, now()) {
-            trace.clone_from(&asked.notice.cause.trace);
+        for notice in PendingNotice::of(message, &self.service.settings, now()) {
+            trace.clone_from(&notice.cause.trace);
             let job = self.count();
             answers.push((job, None));
-            self.publish_queue.add(job, asked.notice.order_key.clone());
-            let asked = Arc::new(asked);
-            let span = tracing::info_span!("notice", trace = asked.notice.cause.trace, origin = %message.origin);
-            let work = work::prepare(self.pipeline, &self.service.health, job, Arc::clone(&asked));
+            self.publish_queue.add(job, notice.order_key());
+            let notice = Arc::new(notice);
+            let span =
+                tracing::info_span!("notice", trace = notice.cause.trace, origin = %message.origin);
+            let by = (self.caller, &self.service.health);
+            let work = work::prepare(self.pipeline, by, job, Arc::clone(&notice));
             let (prepare, registration) = AbortHandle::new_pair();
             let work = Abortable::new(work.instrument(span), registration);
-            let work = work.map(|ended| ended.unwrap_or(Done::GivenUp));
+            let work = work.map(|ended| ended.unwrap_or(Ok(Done::GivenUp)));
             self.work.push(Box::pin(work));
+            let message = number;
             self.jobs.insert(
                 job,
                 Job {
-                    asked,
-                    message: number,
+                    notice,
+                    message,
                     prepare,
                 },
             );
@@ -222,33 +246,36 @@ impl Shift<'_> {
     ) {
         let until = last_call.unwrap_or_else(|| Instant::now() + IDLE_WAIT);
         tokio::select! {
-            Some(done) = self.work.next() => self.done.push(done),
+            Some(ended) = self.work.next() => self.ended.push(ended),
             () = stop.clone(), if last_call.is_none() => {}
             () = tokio::time::sleep_until(until) => {}
         }
     }
 
     /// Notes what ended.
-    fn settle(&mut self) {
-        for done in std::mem::take(&mut self.done) {
-            match done {
-                Done::ToPublish(number, granule) => {
-                    let product = granule.target.product.clone();
-                    self.publish_queue.ready(number, product, *granule);
-                }
-                Done::Answered(number, answer) => self.answered(number, &answer),
+    fn settle(&mut self) -> Result<(), IngestError> {
+        for ended in std::mem::take(&mut self.ended) {
+            match ended? {
+                Done::Prepared(number, prepared) => match *prepared {
+                    Prepared::ToCommit(granule) => {
+                        let product = granule.product.clone();
+                        self.publish_queue.ready(number, product, granule);
+                    }
+                    Prepared::Answered(answer) => self.answered(number, answer),
+                },
                 Done::GivenUp => {}
                 Done::Published(product, answers) => {
                     self.publish_queue.free(&product);
                     for (number, answer) in answers {
-                        self.answered(number, &answer);
+                        self.answered(number, answer);
                     }
                 }
             }
         }
+        Ok(())
     }
 
-    fn answered(&mut self, number: Number, answer: &Answer) {
+    fn answered(&mut self, number: Number, answer: Answer) {
         self.publish_queue.remove(number);
         let Some(job) = self.jobs.remove(&number) else {
             return;
@@ -256,36 +283,32 @@ impl Shift<'_> {
         let Some(open) = self.open.get_mut(&job.message) else {
             return;
         };
-        for (own, place) in &mut open.answers {
-            if *own == number {
-                *place = Some(answer.clone());
-            }
+        if let Some((_, place)) = open.answers.iter_mut().find(|(own, _)| *own == number) {
+            *place = Some(answer);
         }
-        if open.answers.iter().all(|(_, answer)| answer.is_some()) {
-            self.finished.extend(self.open.remove(&job.message));
+        if open.answers.iter().all(|(_, answer)| answer.is_some())
+            && let Some(open) = self.open.remove(&job.message)
+        {
+            self.finished.insert(job.message, open);
         }
     }
 
-    /// Begins to publish what may be.
+    /// Begins to publish what may be: a group of a command once all of it is ready.
     fn publish(&mut self) {
+        if self.caller == Caller::Command && self.publish_queue.is_preparing() {
+            return;
+        }
         for (product, files) in self.publish_queue.take() {
-            let batch = files.into_iter().filter_map(|(number, granule)| {
-                let asked = Arc::clone(&self.jobs.get(&number)?.asked);
-                Some((number, asked, granule))
-            });
-            let work = work::publish(
-                self.pipeline,
-                &self.service.health,
-                product,
-                batch.collect(),
-            );
+            let by = (self.caller, &self.service.health);
+            let work = work::publish(self.pipeline, by, product, files);
             self.work.push(Box::pin(work));
         }
     }
 
-    /// Finishes what is answered.
+    /// Finishes what is answered: a group of a command once all of it is.
     async fn finish(&mut self, reader: &mut dyn Reader) -> Result<(), IngestError> {
-        if self.finished.is_empty() {
+        let is_in_group = self.caller == Caller::Command && !self.open.is_empty();
+        if self.finished.is_empty() || is_in_group {
             return Ok(());
         }
         let finished = std::mem::take(&mut self.finished);
@@ -295,65 +318,74 @@ impl Shift<'_> {
                 .filter_map(|(_, answer)| answer.as_ref()?.event.clone())
                 .collect()
         };
-        let messages = finished.iter().map(|open| Finished {
+        let messages = finished.values().map(|open| Finished {
             origin: open.origin,
             follows: events(open),
         });
-        let told = reader.finish(messages.collect());
-        alongside(&mut self.work, &mut self.done, told)
+        let finish = reader.finish(messages.collect());
+        alongside(&mut self.work, &mut self.ended, finish)
             .await
             .map_err(IngestError::storage("finish notices"))?;
-        for open in finished {
-            tell(open, self.pipeline);
+        for open in finished.into_values() {
+            self.tell(open);
         }
         Ok(())
     }
-}
 
-/// Counts and logs a message whose events are told.
-fn tell(open: Open, pipeline: Pipeline<'_>) {
-    let mut ended = service::Outcome::Ok;
-    for (_, answer) in open.answers {
-        let Some(Answer { outcome, event }) = answer else {
-            continue;
-        };
-        let trace = open.trace.as_str();
-        let noticed = event.as_ref().and_then(|event| event.noticed);
-        match &outcome {
-            Outcome::Rejected { reason, .. } => {
+    /// Tells of a message whose events are told: a service to its operators, a command to its caller.
+    fn tell(&mut self, open: Open) {
+        let mut ended = service::Outcome::Ok;
+        for answer in open.answers.into_iter().filter_map(|(_, answer)| answer) {
+            if answer.outcome.is_rejected() {
                 ended = service::Outcome::Refused;
-                pipeline.metrics.rejected(*reason);
-                let reason = metrics::class(*reason);
-                tracing::warn!(trace, origin = %open.origin, reason, "refused {outcome}");
             }
-            Outcome::Landed {
-                manifest, masked, ..
-            } => {
-                pipeline.metrics.landed(noticed, now());
-                pipeline.metrics.masked(&manifest.product, *masked);
-                tracing::info!(trace, origin = %open.origin, "{outcome}");
+            if self.caller == Caller::Service {
+                count(self.pipeline.metrics, (&open.trace, open.origin), &answer);
             }
-            Outcome::Superseded { .. } => {
-                pipeline.metrics.superseded();
-                tracing::warn!(trace, origin = %open.origin, told = event.is_some(), "{outcome}");
-            }
-            Outcome::Observed {
-                dataset,
-                stored,
-                masked,
-                ..
-            } => {
-                // A file that comes again brings nothing, and masks nothing.
-                if stored.new + stored.replaced > 0 {
-                    pipeline.metrics.masked(dataset, *masked);
-                }
-                tracing::info!(trace, origin = %open.origin, "{outcome}");
-            }
-            Outcome::AlreadyLanded { .. } => {
-                tracing::info!(trace, origin = %open.origin, told = event.is_some(), "{outcome}");
+            self.pipeline.progress.done(&answer.outcome);
+            if self.caller == Caller::Command {
+                self.told.push(answer.outcome);
             }
         }
-        pipeline.progress.done(&outcome);
+        open.running.done(ended);
     }
-    open.running.done(ended);
+}
+
+/// Counts and logs what became of a file.
+fn count(metrics: &Metrics, (trace, origin): (&str, Origin), answer: &Answer) {
+    let Answer { outcome, event } = answer;
+    match outcome {
+        Outcome::Rejected { reason, .. } => {
+            metrics.rejected(*reason);
+            let reason = class(*reason);
+            tracing::warn!(trace, %origin, reason, "refused {outcome}");
+        }
+        Outcome::Landed {
+            manifest, masked, ..
+        } => {
+            let noticed = event.as_ref().and_then(|event| event.noticed);
+            metrics.landed(noticed, now());
+            metrics.masked(&manifest.product, *masked);
+            tracing::info!(trace, %origin, "{outcome}");
+        }
+        Outcome::Superseded { .. } => {
+            metrics.superseded();
+            tracing::warn!(trace, %origin, told = event.is_some(), "{outcome}");
+        }
+        Outcome::Observed {
+            dataset,
+            stored,
+            masked,
+            ..
+        } => {
+            // A file that comes again brings nothing, and masks nothing.
+            if stored.new + stored.replaced > 0 {
+                metrics.masked(dataset, *masked);
+            }
+            tracing::info!(trace, %origin, "{outcome}");
+        }
+        Outcome::AlreadyLanded { .. } => {
+            tracing::info!(trace, %origin, told = event.is_some(), "{outcome}");
+        }
+    }
 }

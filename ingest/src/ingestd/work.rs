@@ -9,21 +9,20 @@ use futures::stream::{FuturesUnordered, StreamExt as _};
 
 use super::health::Health;
 use super::publish_queue::Number;
-use super::retry::retry;
-use crate::notice::answer::{Answer, Asked, Ready};
-use crate::error::blame;
-use crate::land;
-use crate::pipeline::Pipeline;
+use super::retry::{Caller, retry};
+use crate::error::IngestError;
+use crate::notice::{Answer, PendingNotice};
+use crate::pipeline::{Pipeline, Prepared};
 use crate::put::StoredGranule;
 
 /// What is under way.
-pub(super) type Work<'a> = FuturesUnordered<Pin<Box<dyn Future<Output = Done> + Send + 'a>>>;
+pub(super) type Work<'a> = FuturesUnordered<Pin<Box<dyn Future<Output = Ended> + Send + 'a>>>;
+/// A piece of work that ended; an error ends all of it.
+pub(super) type Ended = Result<Done, IngestError>;
 
-/// A piece of work that ended.
+/// What a piece of work comes to.
 pub(super) enum Done {
-    /// A file can be published.
-    ToPublish(Number, Box<StoredGranule>),
-    Answered(Number, Box<Answer>),
+    Prepared(Number, Box<Prepared>),
     Published(ProductId, Vec<(Number, Answer)>),
     /// Its message is somebody else's now.
     GivenUp,
@@ -32,7 +31,7 @@ pub(super) enum Done {
 /// Polls the work that is under way while something else is waited for, which is never cancelled.
 pub(super) async fn alongside<T>(
     work: &mut Work<'_>,
-    done: &mut Vec<Done>,
+    ended: &mut Vec<Ended>,
     main: impl Future<Output = T>,
 ) -> T {
     let mut main = pin!(main);
@@ -40,7 +39,7 @@ pub(super) async fn alongside<T>(
         tokio::select! {
             biased;
             result = &mut main => return result,
-            Some(one) = work.next() => done.push(one),
+            Some(one) = work.next() => ended.push(one),
         }
     }
 }
@@ -48,43 +47,42 @@ pub(super) async fn alongside<T>(
 /// Takes a file as far as to the manifest.
 pub(super) async fn prepare(
     pipeline: Pipeline<'_>,
-    health: &Health,
+    by: (Caller, &Health),
     number: Number,
-    asked: Arc<Asked>,
-) -> Done {
-    let ready = retry(health, "prepare", || land::prepare(&pipeline, &asked)).await;
-    match ready {
-        Ok(Ready::ToCommit(granule)) => Done::ToPublish(number, Box::new(granule)),
-        Ok(Ready::Answered(answer)) => Done::Answered(number, Box::new(answer)),
-        Err(error) => Done::Answered(number, Box::new(asked.refused(blame(&error)))),
-    }
+    notice: Arc<PendingNotice>,
+) -> Ended {
+    let prepared = retry(by, "prepare", || pipeline.prepare(&notice)).await;
+    let prepared = match prepared {
+        Ok(prepared) => prepared,
+        Err(error) => Prepared::Answered(by.0.refused(&notice, error)?),
+    };
+    Ok(Done::Prepared(number, Box::new(prepared)))
 }
 
 /// Publishes files of one product together; if that fails because of one of them, one by one.
 pub(super) async fn publish(
     pipeline: Pipeline<'_>,
-    health: &Health,
+    by: (Caller, &Health),
     product: ProductId,
-    batch: Vec<(Number, Arc<Asked>, StoredGranule)>,
-) -> Done {
-    let pairs: Vec<_> = batch
-        .iter()
-        .map(|(_, asked, granule)| (asked.as_ref(), granule))
-        .collect();
-    let together = retry(health, "publish", || land::commit(&pipeline, &pairs)).await;
+    files: Vec<(Number, StoredGranule)>,
+) -> Ended {
+    let (numbers, granules): (Vec<Number>, Vec<StoredGranule>) = files.into_iter().unzip();
+    let together = retry(by, "publish", || pipeline.commit(&granules)).await;
     let answers = match together {
         Ok(answers) => answers,
-        Err(error) if pairs.len() == 1 => vec![pairs[0].0.refused(blame(&error))],
-        Err(_) => {
-            let mut answers = Vec::with_capacity(pairs.len());
-            for pair in &pairs {
-                let own = std::slice::from_ref(pair);
-                let alone = retry(health, "publish", || land::commit(&pipeline, own)).await;
-                answers.extend(alone.unwrap_or_else(|error| vec![pair.0.refused(blame(&error))]));
+        Err(error) if granules.len() > 1 && by.0.refuses(&error) => {
+            tracing::error!(%error, "files of a product cannot be published together; one by one");
+            let mut answers = Vec::with_capacity(granules.len());
+            for own in granules.chunks(1) {
+                match retry(by, "publish", || pipeline.commit(own)).await {
+                    Ok(alone) => answers.extend(alone),
+                    Err(error) => answers.push(by.0.refused(&own[0].notice, error)?),
+                }
             }
             answers
         }
+        Err(error) => vec![by.0.refused(&granules[0].notice, error)?],
     };
-    let numbers = batch.iter().map(|(number, _, _)| *number);
-    Done::Published(product, numbers.zip(answers).collect())
+    let answers = numbers.into_iter().zip(answers).collect();
+    Ok(Done::Published(product, answers))
 }

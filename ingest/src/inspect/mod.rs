@@ -5,10 +5,10 @@ pub mod reader;
 
 use contract::event::RejectReason;
 
-use crate::inspect::reader::session::Session;
 use crate::error::{Rejection, Stop};
 use crate::fetch::RawGranule;
 use crate::inspect::file::description::Description;
+use crate::inspect::reader::session::Session;
 use crate::limits::Limits;
 use crate::settings::Settings;
 

@@ -54,12 +54,12 @@ pub(crate) fn of_text(file_bytes: u64) -> u64 {
 /// Files of one product that are published together: the series of a year, as maps and as runs of cells.
 ///
 /// How many steps a year has is taken from the files themselves: a product has steps of one length.
-pub(crate) fn of_series<'a>(granules: impl IntoIterator<Item = &'a StoredGranule>) -> u64 {
-    let values = granules.into_iter().map(|granule| {
-        let periods = granule.grids.iter().map(|grid| grid.step.period);
+pub(crate) fn of_series(granules: &[StoredGranule]) -> u64 {
+    let values = granules.iter().map(|granule| {
+        let periods = granule.reading.steps.iter().map(|step| step.period);
         let shortest_s = periods.map(Period::seconds).fold(YEAR_S, f64::min);
         let steps = (YEAR_S / shortest_s.max(1.0)).ceil() as usize;
-        let cells = granule.grid.cell_count();
+        let cells = granule.reading.grid.cell_count();
         let most = MAX_SEGMENT_VALUES.max(cells);
         cells.saturating_mul(steps.min(MAX_SEGMENT_STEPS)).min(most)
     });

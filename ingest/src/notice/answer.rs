@@ -1,26 +1,16 @@
 //! What a notice is answered with: what became of its file, and the event that tells of it, if one is due.
 
-use std::path::PathBuf;
-
 use contract::digest::Digest;
 use contract::event::{Body, Event};
 use contract::manifest::ManifestId;
-use contract::notice::NoticeOrder;
-use contract::time::{Period, TimeMs};
-use contract::topic::Origin;
-use storage::Store;
-use storage::log::Message;
+use contract::masked::MaskedCells;
+use contract::product::ProductId;
+use contract::time::Period;
 
-use crate::commit::{self, Committed};
-use crate::error::{IngestError, Rejection};
-use crate::commit::landing_note;
-use crate::notice::PendingNotice;
-use crate::notice::Outcome;
-use crate::pipeline::Prepared;
+use super::{Outcome, PendingNotice};
+use crate::error::Rejection;
+use crate::observation::Stored;
 use crate::put::StoredGranule;
-use crate::settings::Settings;
-use crate::fetch::source_wait::SourceWait;
-use crate::commit::superseded;
 
 /// What a notice is answered with.
 #[derive(Debug, Clone)]
@@ -30,203 +20,105 @@ pub(crate) struct Answer {
     pub(crate) event: Option<Event>,
 }
 
-/// A notice and the message it came with; none for files that no notice came for.
-#[derive(Debug, Clone)]
-pub(crate) struct Asked {
-    pub(crate) notice: PendingNotice,
-    pub(crate) origin: Option<Origin>,
-    /// Number of the file among those of the message.
-    pub(crate) file: u32,
-    pub(crate) source_wait: SourceWait,
+/// A file, and the version of its product by which its notice is answered.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Versioned {
+    pub(crate) manifest: ManifestId,
+    pub(crate) raw_sha256: Digest,
+    pub(crate) periods: Vec<Period>,
 }
 
-/// A file whose objects are durable, or its answer.
-#[derive(Debug)]
-pub(crate) enum Ready {
-    ToCommit(StoredGranule),
-    Answered(Answer),
+impl Versioned {
+    fn body(&self, shown: &str, revised: bool) -> Body {
+        let (shown, manifest) = (shown.to_owned(), self.manifest.clone());
+        Body::granule_landed(shown, self.raw_sha256, manifest, &self.periods, revised)
+    }
 }
 
-impl Asked {
-    /// The files of a message.
-    pub(crate) fn of(message: &Message, settings: &Settings, now: TimeMs) -> Vec<Self> {
-        let notices = PendingNotice::of(message, settings, now);
-        let asked = |(file, notice)| Self {
-            notice,
-            origin: Some(message.origin),
-            file,
-            source_wait: SourceWait::default(),
+impl StoredGranule {
+    /// The answer to a file that is in a version now.
+    pub(crate) fn landed(&self, version: Versioned, revised: bool) -> Answer {
+        let reading = &self.reading;
+        let body = version.body(&self.notice.shown, revised);
+        let body = body.assuming(&reading.assumptions).with_masked(self.masked);
+        let outcome = Outcome::Landed {
+            file: self.notice.path(),
+            manifest: version.manifest,
+            periods: version.periods,
+            revised,
+            profile: reading
+                .recipe
+                .profile
+                .as_ref()
+                .map(|used| used.name.clone()),
+            assumptions: reading.assumptions.clone(),
+            masked: self.masked,
         };
-        (0..).zip(notices).map(asked).collect()
-    }
-
-    /// Its place in the order of notices; none of a file that no notice came for, which is newer than all that is there.
-    pub(crate) fn order(&self) -> Option<NoticeOrder> {
-        let Origin {
-            partition, offset, ..
-        } = self.origin?;
-        Some(NoticeOrder {
-            given: self.notice.given?,
-            partition,
-            offset,
-            file: self.file,
-        })
-    }
-
-    /// The name that people know the file by.
-    pub(crate) fn path(&self) -> PathBuf {
-        PathBuf::from(&self.notice.shown)
-    }
-
-    pub(crate) fn refused(&self, rejection: Rejection) -> Answer {
-        self.answer(Outcome::rejected(self.path(), rejection), None, true)
-    }
-
-    /// The answer to a file of whose time files of later notices are. If it was in a version before and nobody told of
-    /// that yet, its notice tells of that version now.
-    fn superseded(
-        &self,
-        manifest: ManifestId,
-        raw_sha256: Digest,
-        periods: &[Period],
-        held_by: Option<ManifestId>,
-    ) -> Answer {
-        let (file, shown) = (self.path(), self.notice.shown.clone());
-        let event = held_by.map(|held_by| {
-            let body = Body::granule_landed(shown, raw_sha256, held_by, periods, false);
-            self.notice.cause.followed_by(body)
-        });
-        let outcome = Outcome::Superseded { file, manifest };
-        Answer { outcome, event }
-    }
-
-    fn answer(&self, outcome: Outcome, raw_sha256: Option<Digest>, is_due: bool) -> Answer {
-        let PendingNotice { attempt, cause, .. } = &self.notice;
-        let body = outcome.event(raw_sha256, *attempt, self.origin);
-        let event = body.filter(|_| is_due).map(|body| cause.followed_by(body));
-        Answer { outcome, event }
-    }
-
-    /// The answer to a file that needs no commit.
-    pub(crate) async fn settle(
-        &self,
-        store: &Store,
-        prepared: Prepared,
-    ) -> Result<Ready, IngestError> {
-        Ok(match prepared {
-            Prepared::Stored(granule) => Ready::ToCommit(StoredGranule {
-                asked_by: self.origin,
-                order: self.order(),
-                ..granule
-            }),
-            Prepared::Rejected(rejection) => Ready::Answered(self.refused(rejection)),
-            Prepared::Observed {
-                dataset,
-                stored,
-                masked,
-            } => {
-                let outcome = Outcome::Observed {
-                    file: self.path(),
-                    dataset,
-                    stored,
-                    masked,
-                };
-                Ready::Answered(self.answer(outcome, None, true))
-            }
-            Prepared::AlreadyLanded {
-                raw_sha256,
-                manifest,
-                periods,
-                masked,
-            } => {
-                let is_due = match self.origin {
-                    Some(origin) => {
-                        landing_note::is_noted(store, &manifest.product, raw_sha256, origin).await?
-                    }
-                    None => true,
-                };
-                let outcome = Outcome::AlreadyLanded {
-                    file: self.path(),
-                    manifest,
-                    periods,
-                    masked,
-                };
-                Ready::Answered(self.answer(outcome, Some(raw_sha256), is_due))
-            }
-            Prepared::Superseded {
-                raw_sha256,
-                manifest,
-                periods,
-            } => {
-                let product = &manifest.product;
-                let held_by = match self.origin {
-                    Some(origin) => {
-                        let is_noted =
-                            landing_note::is_noted(store, product, raw_sha256, origin).await?;
-                        superseded::untold(store, &manifest, raw_sha256, &periods, is_noted).await?
-                    }
-                    None => None,
-                };
-                Ready::Answered(self.superseded(manifest, raw_sha256, &periods, held_by))
-            }
-        })
+        self.notice.answer(outcome, Some(body))
     }
 }
 
-/// Publishes files of one product, in their order.
-pub(crate) async fn commit(
-    store: &Store,
-    batch: &[(&Asked, &StoredGranule)],
-) -> Result<Vec<Answer>, IngestError> {
-    let Some((_, first)) = batch.first() else {
-        return Ok(vec![]);
-    };
-    let product = &first.target.product;
-    let granules: Vec<StoredGranule> = batch
-        .iter()
-        .map(|(_, granule)| (*granule).clone())
-        .collect();
-    let committed = commit::run(store, product, &granules).await?;
-    let answer = |(committed, (asked, granule)): (Committed, &(&Asked, &StoredGranule))| {
-        if let Committed::Superseded {
-            manifest,
-            periods,
-            held_by,
-        } = committed
-        {
-            return asked.superseded(manifest, granule.raw_sha256, &periods, held_by);
+impl PendingNotice {
+    fn answer(&self, outcome: Outcome, body: Option<Body>) -> Answer {
+        Answer {
+            outcome,
+            event: body.map(|body| self.cause.followed_by(body)),
         }
-        let is_due = !matches!(committed, Committed::AlreadyLanded { is_due: false, .. });
-        let raw_sha256 = Some(granule.raw_sha256);
-        let outcome = outcome(asked.path(), committed, granule);
-        asked.answer(outcome, raw_sha256, is_due)
-    };
-    Ok(committed.into_iter().zip(batch).map(answer).collect())
-}
+    }
 
-fn outcome(file: PathBuf, committed: Committed, granule: &StoredGranule) -> Outcome {
-    match committed {
-        Committed::Landed {
-            manifest,
-            periods,
-            revised,
-        } => Outcome::Landed {
-            file,
-            manifest,
-            periods,
-            revised,
-            assumptions: granule.assumptions.clone(),
-            masked: granule.masked,
-        },
-        Committed::AlreadyLanded {
-            manifest, periods, ..
-        } => Outcome::AlreadyLanded {
-            file,
-            manifest,
-            periods,
-            masked: granule.masked,
-        },
-        Committed::Superseded { manifest, .. } => Outcome::Superseded { file, manifest },
-        Committed::Rejected(rejection) => Outcome::rejected(file, rejection),
+    /// The answer to a file that is refused.
+    pub(crate) fn refused(&self, rejection: Rejection) -> Answer {
+        let body = Body::GranuleRejected {
+            path: self.shown.clone(),
+            reason: rejection.reason,
+            detail: rejection.to_string(),
+            attempt: self.attempt,
+            origin: Some(self.origin),
+        };
+        self.answer(Outcome::rejected(self.path(), rejection), Some(body))
+    }
+
+    /// The answer to a file of observations.
+    pub(crate) fn observed(
+        &self,
+        dataset: ProductId,
+        stored: Stored,
+        masked: MaskedCells,
+    ) -> Answer {
+        let outcome = Outcome::Observed {
+            file: self.path(),
+            dataset,
+            stored,
+            masked,
+        };
+        self.answer(outcome, None)
+    }
+
+    /// The answer to a file whose content was there; its notice tells of it only if that is still to be told.
+    pub(crate) fn already_landed(
+        &self,
+        version: Versioned,
+        masked: MaskedCells,
+        is_due: bool,
+    ) -> Answer {
+        let body = is_due.then(|| version.body(&self.shown, false).with_masked(masked));
+        let outcome = Outcome::AlreadyLanded {
+            file: self.path(),
+            manifest: version.manifest,
+            periods: version.periods,
+            masked,
+        };
+        self.answer(outcome, body)
+    }
+
+    /// The answer to a file of whose time files of later notices are in the newest version. If it was in a version before
+    /// and nobody told of that yet, its notice tells of that version now.
+    pub(crate) fn superseded(&self, newest: ManifestId, untold: Option<&Versioned>) -> Answer {
+        let body = untold.map(|version| version.body(&self.shown, false));
+        let outcome = Outcome::Superseded {
+            file: self.path(),
+            manifest: newest,
+        };
+        self.answer(outcome, body)
     }
 }

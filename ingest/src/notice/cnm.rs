@@ -7,10 +7,10 @@ use contract::event::{Event, MAX_TRACE_BYTES};
 use contract::time::TimeMs;
 use serde::Deserialize;
 
-use super::{Order, PendingNotice, bad, notice_body};
+use super::{Order, Said, bad, notice_body};
+use crate::error::Rejection;
 use crate::fetch::{Expected, Location, Method};
 use crate::plan::profile::Profiles;
-use crate::error::Rejection;
 
 /// Most files of one message.
 const MAX_FILES: usize = 256;
@@ -78,8 +78,8 @@ pub(super) fn is_one(content: &[u8]) -> bool {
 pub(super) fn notices(
     content: &[u8],
     profiles: &Profiles,
-    now: TimeMs,
-) -> Result<Vec<PendingNotice>, Rejection> {
+    came: TimeMs,
+) -> Result<Vec<Said>, Rejection> {
     let message: Message = serde_json::from_slice(content)
         .map_err(|e| bad(&format!("is no cloud notification: {e}")))?;
     if !is_known(&message.version) {
@@ -120,7 +120,7 @@ pub(super) fn notices(
         .submission_time
         .as_deref()
         .and_then(time)
-        .or(Some(now));
+        .or(Some(came));
     let notice = |file: &&File| {
         let location = Location::parse(&file.uri);
         let shown = location.as_ref().map_or_else(
@@ -128,7 +128,6 @@ pub(super) fn notices(
             ToString::to_string,
         );
         let body = notice_body(&shown, profile.map(|p| p.name.as_str()), None, 1);
-        let order_key = body.order_key();
         let mut cause = Event::new(trace.clone(), body);
         cause.noticed = noticed;
         let order = || {
@@ -139,13 +138,11 @@ pub(super) fn notices(
                 product: None,
             })
         };
-        PendingNotice {
+        Said {
             shown,
             order: order(),
             attempt: 1,
-            order_key,
             cause,
-            given: None,
         }
     };
     Ok(data.iter().map(notice).collect())

@@ -1,25 +1,31 @@
-//! Message in, [`PendingNotice`]s out: which files there are to land, in our own words or in those of other systems.
+//! Message in, [`PendingNotice`]s out: which files there are to land, in our own words or in those of other systems; and
+//! what each is answered with.
 
-pub(crate) mod answer;
+mod answer;
 mod cnm;
 mod outcome;
 
+use std::path::PathBuf;
+
 use contract::event::{Body, Event, MAX_EVENT_BYTES, RejectReason};
+use contract::notice::NoticeOrder;
 use contract::product::ProductId;
 use contract::time::TimeMs;
+use contract::topic::Origin;
 use contract::{ContractError, digest::Digest};
 use storage::log::Message;
 
 use crate::error::{IngestError, Rejection, boundary};
-use crate::fetch::{Expected, Location};
+use crate::fetch::{Expected, Location, SourceWait};
 use crate::plan::Wish;
 use crate::plan::profile::Profile;
 use crate::settings::Settings;
 
+pub(crate) use answer::{Answer, Versioned};
 pub use outcome::Outcome;
 
-/// A file that there is to land.
-#[derive(Debug, Clone)]
+/// A file that there is to land, from the moment its message is read to its answer.
+#[derive(Debug)]
 pub(crate) struct PendingNotice {
     /// Where it is, as it is shown and told.
     pub(crate) shown: String,
@@ -27,13 +33,14 @@ pub(crate) struct PendingNotice {
     pub(crate) order: Result<Order, Rejection>,
     /// 1 for the first try.
     pub(crate) attempt: u32,
-    /// What must keep its order is worked on in the order of its messages.
-    pub(crate) order_key: String,
     /// What every event about it follows from.
     pub(crate) cause: Event,
-    /// When it was given, by its sender's word but never later than its message came: the same however often it is
-    /// read, and when it is sent twice.
-    pub(crate) given: Option<TimeMs>,
+    /// Its message.
+    pub(crate) origin: Origin,
+    /// Its place among all notices. It was given when its sender says, but never later than its message came: the same
+    /// however often it is read, and when it is sent twice.
+    pub(crate) place: NoticeOrder,
+    pub(crate) source_wait: SourceWait,
 }
 
 /// How a file is to be landed.
@@ -54,45 +61,70 @@ impl Order {
     }
 }
 
+/// What a message says of one file.
+struct Said {
+    shown: String,
+    order: Result<Order, Rejection>,
+    attempt: u32,
+    cause: Event,
+}
+
 impl PendingNotice {
     /// The notices of a message: at least one, so that every message is answered.
     pub(crate) fn of(message: &Message, settings: &Settings, now: TimeMs) -> Vec<Self> {
         let came = message.time.unwrap_or(now);
-        let notices = boundary::called(|| read(message, settings, came));
+        let said = boundary::called(|| read(message, settings, came));
         // What the panic says may quote the message, like the text of an error below.
         let fault = "makes this program fail: report it with the message";
-        let mut notices = match notices.unwrap_or_else(|_panic| Err(bad(fault))) {
-            Ok(notices) => notices,
-            Err(rejection) => vec![Self::unreadable(message, rejection, came)],
+        let said = match said.unwrap_or_else(|_panic| Err(bad(fault))) {
+            Ok(said) => said,
+            Err(rejection) => vec![Said::nothing(message, rejection, came)],
         };
-        for notice in &mut notices {
-            notice.given = notice.cause.noticed.min(Some(came));
-        }
-        notices
+        let notice = |(file, said): (u32, Said)| Self {
+            place: NoticeOrder {
+                given: said.cause.noticed.unwrap_or(came).min(came),
+                partition: message.origin.partition,
+                offset: message.origin.offset,
+                file,
+            },
+            shown: said.shown,
+            order: said.order,
+            attempt: said.attempt,
+            cause: said.cause,
+            origin: message.origin,
+            source_wait: SourceWait::default(),
+        };
+        (0..).zip(said).map(notice).collect()
     }
 
+    /// The name that people know the file by.
+    pub(crate) fn path(&self) -> PathBuf {
+        PathBuf::from(&self.shown)
+    }
+
+    /// What must keep its order is worked on in the order of its messages.
+    pub(crate) fn order_key(&self) -> String {
+        self.cause.body.order_key()
+    }
+}
+
+impl Said {
     /// A message that says nothing is refused under its own place: its words are not to be trusted.
-    fn unreadable(message: &Message, rejection: Rejection, now: TimeMs) -> Self {
+    fn nothing(message: &Message, rejection: Rejection, came: TimeMs) -> Self {
         let shown = message.origin.to_string();
-        let digest = Digest::of(&message.content).short();
-        let mut cause = Event::new(
-            format!("message-{digest}"),
-            notice_body(&shown, None, None, 1),
-        );
-        cause.noticed = Some(now);
+        let trace = format!("message-{}", Digest::of(&message.content).short());
+        let mut cause = Event::new(trace, notice_body(&shown, None, None, 1));
+        cause.noticed = Some(came);
         Self {
-            order_key: shown.clone(),
             shown,
             order: Err(rejection),
             attempt: 1,
             cause,
-            given: None,
         }
     }
 
-    fn of_event(mut cause: Event, settings: &Settings, now: TimeMs) -> Result<Self, Rejection> {
-        cause.noticed = cause.noticed.or(Some(now));
-        let order_key = cause.body.order_key();
+    fn of_event(mut cause: Event, settings: &Settings, came: TimeMs) -> Result<Self, Rejection> {
+        cause.noticed = cause.noticed.or(Some(came));
         let Body::GranuleNotice {
             path,
             profile,
@@ -128,9 +160,7 @@ impl PendingNotice {
             ),
             order: order(),
             attempt: *attempt,
-            order_key,
             cause,
-            given: None,
         })
     }
 }
@@ -152,22 +182,18 @@ pub(crate) fn notice_body(
     }
 }
 
-fn read(
-    message: &Message,
-    settings: &Settings,
-    now: TimeMs,
-) -> Result<Vec<PendingNotice>, Rejection> {
+fn read(message: &Message, settings: &Settings, came: TimeMs) -> Result<Vec<Said>, Rejection> {
     if message.content.len() > MAX_EVENT_BYTES {
         return Err(bad(&format!("is longer than {MAX_EVENT_BYTES} bytes")));
     }
     if cnm::is_one(&message.content) {
-        return cnm::notices(&message.content, &settings.profiles, now);
+        return cnm::notices(&message.content, &settings.profiles, came);
     }
     // The text of the error is left out where it quotes the message: there may be a signed address in it.
     let event = message.event().map_err(|error| match error {
         ContractError::Invalid { reason, .. } => bad(&reason),
     })?;
-    Ok(vec![PendingNotice::of_event(event, settings, now)?])
+    Ok(vec![Said::of_event(event, settings, came)?])
 }
 
 /// A profile by its name; a file of one only where the user names it, and not whoever sends a message.

@@ -3,15 +3,14 @@
 use std::fmt::{Display, Formatter};
 use std::path::PathBuf;
 
-use contract::event::{Body, RejectReason};
+use contract::event::RejectReason;
 use contract::manifest::ManifestId;
 use contract::masked::MaskedCells;
 use contract::product::ProductId;
 use contract::time::Period;
-use contract::topic::Origin;
 
-use crate::observation::Stored;
 use crate::error::Rejection;
+use crate::observation::Stored;
 
 /// What became of a file. Shown as one line.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,6 +25,8 @@ pub enum Outcome {
         periods: Vec<Period>,
         /// Did it replace values that were there?
         revised: bool,
+        /// Name of the profile that it was read with; none for a file that follows CF.
+        profile: Option<String>,
         /// What was taken for granted, because nothing in the file says it. One line each.
         assumptions: Vec<String>,
         /// Cells that it gave a value for and that hold none, steps without any value among them.
@@ -123,61 +124,6 @@ impl Outcome {
             | Self::Rejected { file, .. } => file,
         }
     }
-
-    /// The event that tells the others, if there is one; `origin` is where the refused message lies.
-    pub(crate) fn event(
-        &self,
-        raw_sha256: Option<contract::digest::Digest>,
-        attempt: u32,
-        origin: Option<Origin>,
-    ) -> Option<Body> {
-        let path = self.file().display().to_string();
-        Some(match (self, raw_sha256) {
-            (
-                Self::Landed {
-                    manifest,
-                    periods,
-                    revised,
-                    assumptions,
-                    masked,
-                    ..
-                },
-                Some(raw_sha256),
-            ) => Body::granule_landed(path, raw_sha256, manifest.clone(), periods, *revised)
-                .assuming(assumptions)
-                .with_masked(*masked),
-            (
-                Self::AlreadyLanded {
-                    manifest,
-                    periods,
-                    masked,
-                    ..
-                },
-                Some(raw_sha256),
-            ) => Body::granule_landed(path, raw_sha256, manifest.clone(), periods, false)
-                .with_masked(*masked),
-            (
-                Self::Rejected {
-                    reason,
-                    object,
-                    detail,
-                    ..
-                },
-                _,
-            ) => Body::GranuleRejected {
-                path,
-                reason: *reason,
-                detail: format!("{object}: {detail}"),
-                attempt,
-                origin,
-            },
-            // What has still to be told of a superseded file is not of the newest manifest: its answer has it.
-            (Self::Observed { .. } | Self::Superseded { .. }, _) => return None,
-            (Self::Landed { .. } | Self::AlreadyLanded { .. }, None) => {
-                unreachable!("a landed file has a digest")
-            }
-        })
-    }
 }
 
 impl Display for Outcome {
@@ -198,6 +144,7 @@ impl Display for Outcome {
                 revised,
                 assumptions,
                 masked,
+                ..
             } => {
                 let how = if *revised { "revised" } else { "landed" };
                 let gap = if masked.is_none() { "" } else { "; " };

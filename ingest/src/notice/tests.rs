@@ -55,7 +55,7 @@ fn cnm(change: impl FnOnce(&mut serde_json::Value)) -> Vec<u8> {
 fn our_own_notice_keeps_what_it_says() {
     let text = r#"{"schema":1,"trace":"t","body":{"kind":"granule.notice","path":"/a/b.nc","profile":"sst-2010","product":"p","size_bytes":9,"attempt":2}}"#;
     let notice = of(text).remove(0);
-    assert_eq!((notice.attempt, notice.order_key.as_str()), (2, "p"));
+    assert_eq!((notice.attempt, notice.order_key().as_str()), (2, "p"));
     assert_eq!(
         notice.cause.noticed,
         Some(NOW.parse().unwrap()),

@@ -3,10 +3,10 @@
 use super::epic;
 use super::sampling::Sampling;
 use super::values::read;
-use crate::plan::cf::coordinate::{Role, role_of};
-use crate::inspect::reader::session::Session;
 use crate::error::Stop;
 use crate::inspect::file::description::{Description, Variable};
+use crate::inspect::reader::session::Session;
+use crate::plan::cf::coordinate::{Role, role_of};
 
 /// What a coordinate says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -19,11 +19,11 @@ pub(crate) const OBSERVATION_BYTES: u64 = 300;
 
 /// What was found in a file.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Found {
+pub(crate) struct Found {
     /// At least one.
-    pub observations: Vec<Observation>,
+    pub(crate) observations: Vec<Observation>,
     /// Values that the file gave and that are no observations.
-    pub masked: MaskedCells,
+    pub(crate) masked: MaskedCells,
 }
 
 /// The observations of one file.

@@ -8,10 +8,10 @@ use super::epic;
 use super::property;
 use super::quality::Scheme;
 use super::sampling::Sampling;
-use crate::plan::cf::calendar::{Calendar, TimeUnit};
-use crate::inspect::reader::session::Session;
 use crate::error::{Rejection, Stop};
 use crate::inspect::file::description::{Description, Variable};
+use crate::inspect::reader::session::Session;
+use crate::plan::cf::calendar::{Calendar, TimeUnit};
 use crate::plan::unit;
 
 /// A measured variable with all that its samples need.

@@ -19,7 +19,6 @@ mod name;
 mod ndbc;
 mod netcdf;
 mod note;
-mod path;
 mod property;
 mod quality;
 mod recognise;
@@ -33,15 +32,13 @@ mod values;
 
 use contract::product::ProductId;
 
-use crate::inspect::reader::session::Session;
 use crate::error::{Rejection, Stop};
 use crate::inspect::file::description::Description;
+use crate::inspect::reader::session::Session;
 
-pub use gather::Found;
-pub(crate) use gather::{MAX_OBSERVATIONS, OBSERVATION_BYTES};
+pub(crate) use gather::{Found, MAX_OBSERVATIONS, OBSERVATION_BYTES};
 pub(crate) use note::put as put_note;
 pub use note::{FileNote, notes};
-pub use path::{Reading, read_path};
 pub(crate) use recognise::{TextFormat, recognise, recognise_text};
 pub use sink::{ObservationSink, SinkCause, SinkError, Stored};
 pub(crate) use values::MAX_VALUES;
@@ -67,7 +64,7 @@ pub(crate) async fn read(
     netcdf::read(session, description, source).await
 }
 
-/// What a text file holds that [`recognise_text`] knows.
+/// What a text file of at most [`MAX_TEXT_BYTES`] holds that [`recognise_text`] knows.
 pub(crate) fn read_text(
     format: TextFormat,
     content: &[u8],

@@ -9,7 +9,7 @@ use contract::time::TimeMs;
 
 use super::convert::{Conversion, Given};
 use super::gather::{Found, Gathered};
-use super::{MAX_TEXT_BYTES, Source, name, station};
+use super::{Source, name, station};
 use crate::error::Rejection;
 
 /// Longest line that is read, bytes.
@@ -158,10 +158,6 @@ impl Layout {
 
 /// Reads a file.
 pub(super) fn read(content: &[u8], source: Source<'_>) -> Result<Found, Rejection> {
-    if content.len() as u64 > MAX_TEXT_BYTES {
-        let detail = format!("has more than {MAX_TEXT_BYTES} bytes of text");
-        return Err(Rejection::new(RejectReason::TooLarge, "file", detail));
-    }
     let station = station::ndbc(source.file_name).ok_or_else(|| {
         let detail = "the file does not say where its station is, and its name names no station that is known; \
                       name it after a known station, such as 44005h2012.txt";

@@ -15,11 +15,11 @@ use super::recognise::{Feature, recognise};
 use super::sampling::Sampling;
 use super::values::read_stored;
 use super::{Source, name};
-use crate::plan::cf::packing::{Packing, Unpacked};
-use crate::plan::cf::period;
-use crate::inspect::reader::session::Session;
 use crate::error::{Rejection, Stop};
 use crate::inspect::file::description::Description;
+use crate::inspect::reader::session::Session;
+use crate::plan::cf::packing::{Packing, Unpacked};
+use crate::plan::cf::period;
 
 /// What all samples of a file share.
 struct Shared {

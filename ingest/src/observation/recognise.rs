@@ -1,7 +1,7 @@
 //! Is a file one of observations, and of which kind? From what is in it, never from its name.
 
-use crate::plan::cf::coordinate::{Role, role_of};
 use crate::inspect::file::description::{Description, Variable};
+use crate::plan::cf::coordinate::{Role, role_of};
 
 use super::{ndbc, table};
 

@@ -5,9 +5,9 @@ use contract::event::RejectReason;
 
 use super::values::{MAX_VALUES, read, read_stored};
 use super::{Source, name};
-use crate::inspect::reader::session::Session;
 use crate::error::{Rejection, Stop};
 use crate::inspect::file::description::{Description, Dimension, Kind, Part, Variable};
+use crate::inspect::reader::session::Session;
 
 /// Most platforms of one file.
 const MAX_INSTANCES: u64 = 100_000;

@@ -14,7 +14,7 @@ use super::convert::{Conversion, Given};
 use super::gather::{Found, Gathered};
 use super::quality::Scheme;
 use super::table_columns::Columns;
-use super::{MAX_TEXT_BYTES, Source, name, table_time};
+use super::{Source, name, table_time};
 use crate::error::Rejection;
 
 /// Lines that may come before the column names.
@@ -71,10 +71,6 @@ fn columns(content: &[u8]) -> Option<(Columns, usize)> {
 
 /// Reads a table.
 pub(super) fn read(content: &[u8], source: Source<'_>) -> Result<Found, Rejection> {
-    if content.len() as u64 > MAX_TEXT_BYTES {
-        let detail = format!("has more than {MAX_TEXT_BYTES} bytes of text");
-        return Err(Rejection::new(RejectReason::TooLarge, "file", detail));
-    }
     let none = || {
         Rejection::new(
             RejectReason::NoVariable,

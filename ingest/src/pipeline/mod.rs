@@ -1,35 +1,32 @@
-//! The whole way of one file, stage by stage, up to the manifest: its objects are durable when this returns.
+//! The whole way of one file, verb by verb: to where its objects are durable, and with others of its product into a manifest.
 
+mod grids;
 pub(crate) mod metrics;
 mod observing;
 pub(crate) mod progress;
 
 use std::path::Path;
+use std::sync::Arc;
 
-use contract::digest::Digest;
 use contract::event::RejectReason;
-use contract::key::ObjectKey;
-use contract::manifest::{Manifest, ManifestId};
+use contract::manifest::Manifest;
 use contract::masked::MaskedCells;
 use contract::notice::NoticeOrder;
-use contract::product::ProductId;
 use contract::time::Period;
 use storage::{StorageError, Store, manifests};
 
-use crate::commit::is_later_or_same;
+use crate::commit::{self, Unchanged, is_later_or_same};
 use crate::error::{IngestError, Rejection, Stop, blame, boundary};
-use crate::fetch::RawGranule;
-use crate::fetch::source_wait::SourceWait;
+use crate::fetch::{self, RawGranule};
+use crate::inspect;
 use crate::limits::gates::{Gates, Seat};
 use crate::limits::memory;
-use crate::notice::Order;
-use crate::observation::{ObservationSink, Stored};
-use crate::plan::{PlannedGranule, Wish};
-use crate::put::reading::Reading;
-use crate::put::{StoredGranule, StoredGrid};
+use crate::notice::{Answer, Order, PendingNotice, Versioned};
+use crate::observation::{self, ObservationSink};
+use crate::plan::{self, PlannedGranule, Wish};
+use crate::put::{self, StoredGranule};
 use crate::settings::Settings;
-use crate::{check, decode, encode, fetch, inspect, observation, plan, put};
-use metrics::{Metrics, ended};
+use metrics::Metrics;
 use progress::{Progress, Stage};
 
 /// Times a file that changes under our hands is read again.
@@ -37,32 +34,13 @@ const MAX_READS: u32 = 3;
 /// Bytes of the beginning of a file from which a text is recognised.
 const TEXT_HEAD_BYTES: usize = 256 << 10;
 
-/// What is left to do for a file.
+/// A file whose own way is done.
 #[derive(Debug)]
 pub(crate) enum Prepared {
-    /// To commit.
-    Stored(StoredGranule),
-    /// Nothing: the product holds it.
-    AlreadyLanded {
-        raw_sha256: Digest,
-        manifest: ManifestId,
-        periods: Vec<Period>,
-        masked: MaskedCells,
-    },
-    /// Nothing: files of later notices have its time.
-    Superseded {
-        raw_sha256: Digest,
-        manifest: ManifestId,
-        periods: Vec<Period>,
-    },
-    /// Nothing: it held observations, which are stored.
-    Observed {
-        dataset: ProductId,
-        stored: Stored,
-        masked: MaskedCells,
-    },
-    /// Nothing: it is refused.
-    Rejected(Rejection),
+    /// To publish, with others of its product.
+    ToCommit(StoredGranule),
+    /// Nothing is to be published: it is refused, was there, came too late, or held observations, which are stored.
+    Answered(Answer),
 }
 
 /// What every file's way needs.
@@ -77,23 +55,37 @@ pub(crate) struct Pipeline<'a> {
     pub(crate) progress: &'a dyn Progress,
 }
 
+/// A file on its way: its notice, what is to be done, and the name that people know it by.
+#[derive(Clone, Copy)]
+struct Way<'a> {
+    notice: &'a Arc<PendingNotice>,
+    order: &'a Order,
+    shown: &'a Path,
+}
+
 impl Pipeline<'_> {
-    /// Takes a file as far as to the manifest.
+    /// Takes the file of a notice as far as to the manifest.
     pub(crate) async fn prepare(
         &self,
-        shown: &Path,
-        order: &Order,
-        place: Option<NoticeOrder>,
-        source_wait: &SourceWait,
+        notice: &Arc<PendingNotice>,
     ) -> Result<Prepared, IngestError> {
+        let refused = |rejection| Ok(Prepared::Answered(notice.refused(rejection)));
+        let order = match &notice.order {
+            Ok(order) => order,
+            Err(rejection) => return refused(rejection.clone()),
+        };
+        let shown = &notice.path();
+        let way = Way {
+            notice,
+            order,
+            shown,
+        };
         let mut was_killed = false;
         for _ in 0..MAX_READS {
-            let stages =
-                boundary::contained(Box::pin(self.stages(shown, order, place, source_wait)));
-            let stages = stages.await;
+            let stages = boundary::contained(Box::pin(self.stages(way))).await;
             match stages.unwrap_or_else(|panic| Err(panic.into())) {
                 Ok(prepared) => return Ok(prepared),
-                Err(Stop::Rejected(rejection)) => return Ok(Prepared::Rejected(rejection)),
+                Err(Stop::Rejected(rejection)) => return refused(rejection),
                 Err(Stop::Failed(IngestError::Changed { .. })) => {
                     tracing::info!(file = %shown.display(), "changed while it was read");
                 }
@@ -103,7 +95,7 @@ impl Pipeline<'_> {
                 }
                 Err(Stop::Failed(error)) if error.is_panic() => {
                     tracing::error!(%error, file = %shown.display(), "a fault of the program");
-                    return Ok(Prepared::Rejected(blame(&error)));
+                    return refused(blame(&error));
                 }
                 Err(Stop::Failed(error)) => return Err(error),
             }
@@ -115,28 +107,29 @@ impl Pipeline<'_> {
             let detail = "kept changing while it was read; give it when it is complete";
             (RejectReason::Unreadable, detail)
         };
-        Ok(Prepared::Rejected(Rejection::new(reason, "file", detail)))
+        refused(Rejection::new(reason, "file", detail))
     }
 
-    async fn stages(
-        &self,
-        shown: &Path,
-        order: &Order,
-        place: Option<NoticeOrder>,
-        source_wait: &SourceWait,
-    ) -> Result<Prepared, Stop> {
+    async fn stages(&self, way: Way<'_>) -> Result<Prepared, Stop> {
         let Self {
             settings, metrics, ..
         } = self;
-        self.progress.stage(shown, Stage::Fetch, 0, 0);
-        let fetched = fetch::run(&order.location, &order.expected, settings);
-        let raw = metrics.timed("fetch", source_wait.during(fetched)).await?;
+        // Files that the user names are here: each is read while the system has at hand what its digest was taken of.
+        let seat = if settings.sources.is_guarded() {
+            None
+        } else {
+            Some(self.gates.seat().await)
+        };
+        self.progress.stage(way.shown, Stage::Fetch, 0, 0);
+        let fetched = fetch::run(&way.order.location, &way.order.expected, settings);
+        let fetched = way.notice.source_wait.during(fetched);
+        let raw = metrics.timed("fetch", fetched).await?;
         metrics.fetched(raw.size_bytes);
-        let seat = self.gates.seat().await;
-        let read = self
-            .read(shown, raw.clone(), order.wish(), (place, seat))
-            .await;
-        match read {
+        let seat = match seat {
+            Some(seat) => seat,
+            None => self.gates.seat().await,
+        };
+        match self.read(way, raw.clone(), seat).await {
             // Whatever is wrong with a file that changed meanwhile may be right the next time.
             Err(Stop::Rejected(rejection)) => {
                 raw.check_unchanged()?;
@@ -146,205 +139,92 @@ impl Pipeline<'_> {
         }
     }
 
-    async fn read(
-        &self,
-        path: &Path,
-        raw: RawGranule,
-        wish: Wish<'_>,
-        (place, seat): (Option<NoticeOrder>, Seat<'_>),
-    ) -> Result<Prepared, Stop> {
-        let metrics = self.metrics;
+    async fn read(&self, way: Way<'_>, raw: RawGranule, seat: Seat<'_>) -> Result<Prepared, Stop> {
+        let (metrics, wish) = (self.metrics, way.order.wish());
         if let Some(format) = observation::recognise_text(&raw.head(TEXT_HEAD_BYTES).await?) {
             let _pass = seat.with_memory(memory::of_text(raw.size_bytes)).await;
-            return self.observe_text(format, raw, wish).await;
+            return self.observe_text(format, raw, way).await;
         }
-        self.progress.stage(path, Stage::Inspect, 0, 0);
-        let inspected = metrics
-            .timed("inspect", inspect::run(raw, self.settings))
-            .await?;
+        self.progress.stage(way.shown, Stage::Inspect, 0, 0);
+        let inspected = inspect::run(raw, self.settings);
+        let inspected = metrics.timed("inspect", inspected).await?;
         if wish.profile.is_none() && observation::recognise(&inspected.description).is_some() {
             let needed = memory::of_observations(&inspected.description);
             let _pass = seat.with_memory(needed).await;
-            return self.observe(inspected, wish).await;
+            return self.observe(inspected, way).await;
         }
-        self.progress.stage(path, Stage::Plan, 0, 0);
+        self.progress.stage(way.shown, Stage::Plan, 0, 0);
         let planned = plan::run(inspected, wish, self.settings);
         let planned = metrics.timed("plan", planned).await?;
+        let product = planned.target.product.clone();
         let newest = self.newest(&planned).await?;
-        let nothing_to_do = newest
+        let unchanged = newest
             .as_ref()
-            .and_then(|newest| nothing_to_do(newest, &planned, wish, place));
+            .and_then(|newest| unchanged(newest, &planned, wish, way.notice.place));
         // Also of a file that is there: what is stored of it is compared, and replaced if it is damaged.
-        put::raw(self.store, &planned.target.product, &planned.raw).await?;
-        if let Some(landed) = nothing_to_do {
-            return Ok(landed);
+        put::raw(self.store, &product, &planned.raw).await?;
+        if let Some(unchanged) = unchanged {
+            let answer = commit::answer_unchanged(self.store, way.notice, unchanged, None);
+            return Ok(Prepared::Answered(answer.await?));
         }
         let _pass = seat.with_memory(memory::of_grids(&planned)).await;
-        let (granule, reading) = self.grids(path, planned, newest.as_ref()).await?;
-        match reading.put(self.store, &granule.target.product).await {
+        let (reading, masked) = self.grids(way.shown, planned, newest.as_ref()).await?;
+        match reading.put(self.store, &product).await {
             // A program that reads otherwise under the same version noted it: the file lands all the same.
             Err(error @ StorageError::Conflict { .. }) => {
-                tracing::warn!(%error, file = %path.display(), "was read as something else before");
+                tracing::warn!(%error, file = %way.shown.display(), "was read as something else before");
             }
             noted => noted.map_err(IngestError::storage("note a reading"))?,
         }
-        Ok(Prepared::Stored(granule))
-    }
-
-    /// Reads a file that landed before as it would be read now: its frames become durable, and are noted.
-    pub(crate) async fn reread(
-        &self,
-        shown: &Path,
-        raw: RawGranule,
-        wish: Wish<'_>,
-    ) -> Result<Reading, Stop> {
-        let reread = boundary::contained(Box::pin(self.reread_stages(shown, raw, wish))).await;
-        match reread.unwrap_or_else(|panic| Err(panic.into())) {
-            Err(Stop::Failed(error)) if error.is_panic() => Err(blame(&error).into()),
-            other => other,
-        }
-    }
-
-    async fn reread_stages(
-        &self,
-        shown: &Path,
-        raw: RawGranule,
-        wish: Wish<'_>,
-    ) -> Result<Reading, Stop> {
-        let seat = self.gates.seat().await;
-        self.progress.stage(shown, Stage::Inspect, 0, 0);
-        let inspected = inspect::run(raw, self.settings).await?;
-        let planned = plan::run(inspected, wish, self.settings).await?;
-        let newest = self.newest(&planned).await?;
-        let _pass = seat.with_memory(memory::of_grids(&planned)).await;
-        let (granule, reading) = self.grids(shown, planned, newest.as_ref()).await?;
-        reading
-            .put(self.store, &granule.target.product)
-            .await
-            .map_err(IngestError::storage("note a reading"))?;
-        Ok(reading)
-    }
-
-    /// All steps of a file that hold a value, and what is noted of them.
-    async fn grids(
-        &self,
-        path: &Path,
-        mut planned: PlannedGranule,
-        newest: Option<&Manifest>,
-    ) -> Result<(StoredGranule, Reading), Stop> {
-        let (mut grids, mut masked) = (Vec::new(), MaskedCells::default());
-        for index in 0..planned.steps.len() {
-            let (grid, own) = self.step(path, &mut planned, index, newest).await?;
-            grids.extend(grid);
-            masked = masked + own;
-        }
-        planned.raw.check_unchanged()?;
-        if grids.is_empty() {
-            let gap = if masked.is_none() { "" } else { " (" };
-            let end = if masked.is_none() { "" } else { ")" };
-            let detail = match &planned.quality {
-                None => format!(
-                    "holds no value in any step{gap}{masked}{end}; correct fill value or valid range in a profile"
-                ),
-                Some(quality) => format!(
-                    "holds no value in any step that is good enough by {:?}{gap}{masked}{end}; correct fill value, valid range or [quality] in a profile",
-                    quality.variable
-                ),
-            };
-            return Err(
-                Rejection::new(RejectReason::Values, &planned.variable.name, detail).into(),
-            );
-        }
-        grids.sort_by_key(|grid| grid.step.period);
-        let steps = grids.iter().map(|grid| grid.step.clone()).collect();
-        let PlannedGranule {
-            raw: RawGranule {
-                sha256: raw_sha256, ..
-            },
-            target,
-            mapping,
-            recipe,
-            assumptions,
-            ..
-        } = planned;
-        let mut reading = Reading::new(recipe, &target, mapping.grid, steps);
-        reading.assumptions.clone_from(&assumptions);
-        let granule = StoredGranule {
-            target,
-            grid: mapping.grid,
-            raw_sha256,
-            grids,
-            assumptions,
+        Ok(Prepared::ToCommit(StoredGranule {
+            notice: Arc::clone(way.notice),
+            product,
+            reading,
             masked,
-            asked_by: None,
-            order: None,
-        };
-        Ok((granule, reading))
-    }
-
-    /// One time step: decode, check, encode, put; and what was masked in it. None if it holds no value at all.
-    async fn step(
-        &self,
-        path: &Path,
-        planned: &mut PlannedGranule,
-        index: usize,
-        newest: Option<&Manifest>,
-    ) -> Result<(Option<StoredGrid>, MaskedCells), Stop> {
-        let (number, count) = (index + 1, planned.steps.len());
-        let tell = |stage| self.progress.stage(path, stage, number, count);
-        tell(Stage::Decode);
-        let step = planned.steps[index];
-        let decoded = self
-            .metrics
-            .timed("decode", decode::run(planned, step))
-            .await?;
-        tell(Stage::Check);
-        let (quantity, product, grid) = (
-            planned.target.quantity,
-            planned.target.product.clone(),
-            planned.mapping.grid,
-        );
-        let variable = planned.variable.name.clone();
-        let metrics = self.metrics.clone();
-        let (encoded, masked) = tokio::task::spawn_blocking(move || {
-            let running = metrics.start("check");
-            let checked = check::run(decoded, quantity, &variable).map_err(Stop::from);
-            running.done(ended(&checked));
-            let checked = checked?;
-            if checked.valid_cells == 0 {
-                return Ok::<_, Stop>((None, checked.masked));
-            }
-            let running = metrics.start("encode");
-            let encoded = encode::run(&checked, &product, &grid).map_err(Stop::from);
-            running.done(ended(&encoded));
-            encoded.map(|encoded| (Some(encoded), checked.masked))
-        })
-        .await??;
-        let Some(encoded) = encoded else {
-            return Ok((None, masked));
-        };
-        tell(Stage::Put);
-        let there = newest.and_then(|newest| frame_of(newest, encoded.period));
-        let put = async { Ok(put::run(self.store, encoded, &planned.raw, &grid, there).await?) };
-        let stored = self.metrics.timed("put", put).await?;
-        Ok((Some(stored), masked))
+        }))
     }
 
     /// The newest version of the product that a file is of.
-    async fn newest(&self, planned: &PlannedGranule) -> Result<Option<Manifest>, IngestError> {
+    pub(crate) async fn newest(
+        &self,
+        planned: &PlannedGranule,
+    ) -> Result<Option<Manifest>, IngestError> {
         let newest = manifests::latest(self.store, &planned.target.product).await;
         newest.map_err(IngestError::storage("read the newest manifest"))
+    }
+
+    /// Publishes files of one product, in their order.
+    pub(crate) async fn commit(
+        &self,
+        granules: &[StoredGranule],
+    ) -> Result<Vec<Answer>, IngestError> {
+        let running = self.metrics.start("commit");
+        let _memory = self.gates.memory(memory::of_series(granules)).await;
+        let work = async {
+            for granule in granules {
+                let shown = granule.notice.path();
+                self.progress.stage(&shown, Stage::Commit, 0, 0);
+            }
+            commit::run(self.store, granules).await
+        };
+        let committed = boundary::contained(work).await.flatten();
+        running.done(match &committed {
+            Ok(_) => service::Outcome::Ok,
+            Err(error) if error.is_retryable() => service::Outcome::Retryable,
+            Err(_) => service::Outcome::Failed,
+        });
+        committed
     }
 }
 
 /// Is this very file in the product, or are files of later notices in all of its places? With a profile of the caller's
 /// own it is decoded all the same, since the same bytes may mean other values by it.
-fn nothing_to_do(
+fn unchanged(
     newest: &Manifest,
     planned: &PlannedGranule,
     wish: Wish<'_>,
-    place: Option<NoticeOrder>,
-) -> Option<Prepared> {
+    place: NoticeOrder,
+) -> Option<(Versioned, Unchanged)> {
     if wish.profile.is_some()
         || planned.steps.is_empty()
         || newest.quantity != planned.target.quantity
@@ -365,25 +245,15 @@ fn nothing_to_do(
             _ => return None,
         }
     }
-    let manifest = newest.id();
-    Some(if is_superseded {
-        Prepared::Superseded {
-            raw_sha256,
-            manifest,
-            periods,
-        }
+    let why = if is_superseded {
+        Unchanged::Superseded
     } else {
-        Prepared::AlreadyLanded {
-            raw_sha256,
-            manifest,
-            periods,
-            masked,
-        }
-    })
-}
-
-/// The frame that a version has for a period.
-fn frame_of(manifest: &Manifest, period: Period) -> Option<&ObjectKey> {
-    let index = manifest.step_of(period)?;
-    Some(&manifest.steps[index].frame)
+        Unchanged::Same(masked)
+    };
+    let version = Versioned {
+        manifest: newest.id(),
+        raw_sha256,
+        periods,
+    };
+    Some((version, why))
 }

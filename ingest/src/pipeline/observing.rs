@@ -2,12 +2,11 @@
 
 use contract::event::RejectReason;
 
-use super::{Pipeline, Prepared};
+use super::{Pipeline, Prepared, Way};
 use crate::error::{IngestError, Rejection, Stop};
 use crate::fetch::RawGranule;
 use crate::inspect::InspectedGranule;
 use crate::observation::{self, Found, TextFormat};
-use crate::plan::Wish;
 
 impl Pipeline<'_> {
     /// Observations of a text file.
@@ -15,7 +14,7 @@ impl Pipeline<'_> {
         &self,
         format: TextFormat,
         raw: RawGranule,
-        wish: Wish<'_>,
+        way: Way<'_>,
     ) -> Result<Prepared, Stop> {
         if raw.size_bytes > observation::MAX_TEXT_BYTES {
             let detail = format!(
@@ -25,7 +24,7 @@ impl Pipeline<'_> {
             );
             return Err(Rejection::new(RejectReason::TooLarge, "file", detail).into());
         }
-        let (content, product) = (raw.content().await?, wish.product.cloned());
+        let (content, product) = (raw.content().await?, way.order.product.clone());
         let file_name = raw.file_name.clone();
         let read = move || {
             let source = observation::Source {
@@ -36,14 +35,14 @@ impl Pipeline<'_> {
         };
         let found = async { Ok(tokio::task::spawn_blocking(read).await??) };
         let found = self.metrics.timed("decode", found).await?;
-        self.store_observations(found, &raw).await
+        self.store_observations(found, &raw, way).await
     }
 
     /// Observations of a NetCDF file.
     pub(super) async fn observe(
         &self,
         inspected: InspectedGranule,
-        wish: Wish<'_>,
+        way: Way<'_>,
     ) -> Result<Prepared, Stop> {
         let InspectedGranule {
             raw,
@@ -52,16 +51,21 @@ impl Pipeline<'_> {
         } = inspected;
         let source = observation::Source {
             file_name: &raw.file_name,
-            dataset: wish.product,
+            dataset: way.order.product.as_ref(),
         };
         let read = observation::read(&mut session, &description, source);
         let found = self.metrics.timed("decode", read).await?;
         raw.check_unchanged()?;
-        self.store_observations(found, &raw).await
+        self.store_observations(found, &raw, way).await
     }
 
     /// Stores what was found in a file, and then notes the file.
-    async fn store_observations(&self, found: Found, raw: &RawGranule) -> Result<Prepared, Stop> {
+    async fn store_observations(
+        &self,
+        found: Found,
+        raw: &RawGranule,
+        way: Way<'_>,
+    ) -> Result<Prepared, Stop> {
         let Found {
             observations,
             masked,
@@ -82,10 +86,7 @@ impl Pipeline<'_> {
             Ok(stored)
         };
         let stored = self.metrics.timed("put", put).await?;
-        Ok(Prepared::Observed {
-            dataset,
-            stored,
-            masked,
-        })
+        let answer = way.notice.observed(dataset, stored, masked);
+        Ok(Prepared::Answered(answer))
     }
 }

@@ -4,11 +4,11 @@ use contract::time::{Period, TimeMs};
 
 use super::refused::refused;
 use super::{Planning, stamps};
+use crate::error::{Rejection, Stop};
+use crate::inspect::file::description::Part;
 use crate::plan::cf::calendar::CalendarDate;
 use crate::plan::cf::cell_methods::TimeMethod;
 use crate::plan::cf::period;
-use crate::error::{Rejection, Stop};
-use crate::inspect::file::description::Part;
 
 /// What the bounds of a time axis say.
 pub(super) enum Bounds {

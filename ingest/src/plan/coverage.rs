@@ -4,9 +4,9 @@ use contract::time::{Period, TimeMs};
 
 use super::refused::refused;
 use super::{Planning, date};
+use crate::error::Rejection;
 use crate::plan::cf::calendar::CalendarDate;
 use crate::plan::cf::period::{self, Covers, StampAt};
-use crate::error::Rejection;
 
 const DAY_MS: i64 = 86_400_000;
 const HOUR_MS: i64 = 3_600_000;

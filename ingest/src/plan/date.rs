@@ -4,9 +4,9 @@ use chrono::{DateTime, NaiveDate, NaiveDateTime, NaiveTime};
 use contract::event::RejectReason;
 use contract::time::{Period, TimeMs};
 
+use crate::error::Rejection;
 use crate::plan::cf::calendar::{Calendar, CalendarDate};
 use crate::plan::profile::pattern;
-use crate::error::Rejection;
 
 const DAY_MS: i64 = 86_400_000;
 /// Longest text that is read as a date.

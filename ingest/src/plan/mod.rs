@@ -21,15 +21,15 @@ use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::time::Period;
 
+use crate::error::{Rejection, Stop};
+use crate::fetch::RawGranule;
+use crate::inspect::InspectedGranule;
+use crate::inspect::file::description::{Description, Part, Variable};
+use crate::inspect::reader::session::Session;
+use crate::limits::Limits;
 use crate::plan::cf::axis::Mapping;
 use crate::plan::cf::coordinate::{self, Axis, Role};
 use crate::plan::cf::packing::Packing;
-use crate::inspect::reader::session::Session;
-use crate::error::{Rejection, Stop};
-use crate::fetch::RawGranule;
-use crate::inspect::file::description::{Description, Part, Variable};
-use crate::inspect::InspectedGranule;
-use crate::limits::Limits;
 use crate::plan::profile::Profile;
 use crate::plan::recipe::Recipe;
 use crate::settings::Settings;
@@ -69,8 +69,6 @@ pub(crate) struct Target {
     pub(crate) source: String,
     pub(crate) quantity: Quantity,
     pub(crate) synthetic: bool,
-    /// Name of the profile it was read with; none for a file that follows CF.
-    pub(crate) profile: Option<String>,
 }
 
 /// One step of the file: where it is and how its values become stored ones, `stored = value * factor + offset`.

@@ -3,11 +3,11 @@
 use contract::event::RejectReason;
 
 use super::Planning;
+use crate::error::{Rejection, Stop};
+use crate::inspect::file::description::{Dimension, Variable};
 use crate::plan::cf::axis::Mapping;
 use crate::plan::cf::coordinate::{self, Axis, Evidence, Role};
 use crate::plan::cf::projection;
-use crate::error::{Rejection, Stop};
-use crate::inspect::file::description::{Dimension, Variable};
 use crate::plan::profile::{GridRules, StatedGrid, TimeSource};
 
 /// Longitudes of axes that begin anywhere and go once around stay below.

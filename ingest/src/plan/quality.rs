@@ -3,11 +3,11 @@
 use contract::event::RejectReason;
 
 use super::Planning;
+use crate::error::Rejection;
+use crate::inspect::file::description::{Dimension, Variable};
 use crate::plan::cf::coordinate::{Axis, Role};
 use crate::plan::cf::flag::{self, Flag};
 use crate::plan::cf::packing::{Packing, Unpacked};
-use crate::inspect::file::description::{Dimension, Variable};
-use crate::error::Rejection;
 
 /// Which cells are good enough.
 #[derive(Debug, Clone, PartialEq)]

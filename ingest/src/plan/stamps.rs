@@ -2,8 +2,8 @@
 
 use super::Planning;
 use super::refused::refused;
-use crate::plan::cf::calendar::{Calendar, CalendarDate, TimeUnit};
 use crate::error::{Rejection, Stop};
+use crate::plan::cf::calendar::{Calendar, CalendarDate, TimeUnit};
 
 /// The unit of a time variable; `unit` and `calendar` instead of those of the file.
 pub(super) fn unit(

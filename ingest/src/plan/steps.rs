@@ -6,13 +6,13 @@ use contract::time::Period;
 use super::bounds::{self, Bounds};
 use super::refused::refused;
 use super::{PlannedStep, Planning, coverage, date, stamps};
+use crate::error::{Rejection, Stop};
+use crate::inspect::file::description::Variable;
 use crate::plan::cf::calendar::CalendarDate;
 use crate::plan::cf::cell_methods::{self, TimeMethod};
 use crate::plan::cf::coordinate::{Axis, Role};
 use crate::plan::cf::quantity::Named;
 use crate::plan::cf::{period, spacing};
-use crate::error::{Rejection, Stop};
-use crate::inspect::file::description::Variable;
 use crate::plan::profile::{Profile, TimeRules, TimeSource};
 use crate::plan::unit;
 

@@ -5,13 +5,13 @@ use contract::product::ProductId;
 use contract::quantity::Quantity;
 
 use super::Target;
+use crate::error::Rejection;
+use crate::inspect::file::description::{Description, Variable};
 use crate::plan::cf::coordinate::{self, Role};
 use crate::plan::cf::packing::Packing;
 use crate::plan::cf::projection;
 use crate::plan::cf::quantity::{Named, directions, has_direction, of_standard_name};
-use crate::inspect::file::description::{Description, Variable};
 use crate::plan::profile::Profile;
-use crate::error::Rejection;
 use crate::plan::unit::Substance;
 
 /// Longest title and citation taken from a file, characters.
@@ -177,7 +177,6 @@ pub(super) fn target(
             source: profile.source.clone(),
             quantity,
             synthetic: profile.synthetic || marked,
-            profile: Some(profile.name.clone()),
         });
     }
     let cut = |text: &str| {
@@ -212,7 +211,6 @@ pub(super) fn target(
         source: source.unwrap_or_else(|| "source not stated in the file".to_owned()),
         quantity,
         synthetic: marked,
-        profile: None,
     })
 }
 

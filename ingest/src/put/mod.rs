@@ -1,44 +1,32 @@
-//! [`EncodedGrid`] in, [`StoredGrid`] out: the frame is durable, under a name that only its content could have.
+//! [`EncodedGrid`] in, a [`Step`] of a manifest to come out: the frame is durable, under a name that only its content could
+//! have. All of a file's are a [`StoredGranule`].
 
 pub(crate) mod reading;
 
-use contract::digest::Digest;
+use std::sync::Arc;
+
 use contract::grid::Grid;
 use contract::key::ObjectKey;
 use contract::manifest::Step;
 use contract::masked::MaskedCells;
-use contract::notice::NoticeOrder;
 use contract::product::ProductId;
-use contract::topic::Origin;
 use storage::{Store, frames};
 
 use crate::encode::EncodedGrid;
 use crate::error::IngestError;
 use crate::fetch::RawGranule;
-use crate::plan::Target;
-
-/// A frame that is durable, as a step of a manifest to come.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct StoredGrid {
-    pub(crate) step: Step,
-}
+use crate::notice::PendingNotice;
+use reading::Reading;
 
 /// A file of which everything but the manifest is durable.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub(crate) struct StoredGranule {
-    pub(crate) target: Target,
-    pub(crate) grid: Grid,
-    pub(crate) raw_sha256: Digest,
-    /// In the order of time.
-    pub(crate) grids: Vec<StoredGrid>,
-    /// What was taken for granted when it was read. One line each.
-    pub(crate) assumptions: Vec<String>,
+    pub(crate) notice: Arc<PendingNotice>,
+    pub(crate) product: ProductId,
+    /// What it was read as: steps of a manifest to come.
+    pub(crate) reading: Reading,
     /// What was masked in all steps of the file: those without any value are in no manifest.
     pub(crate) masked: MaskedCells,
-    /// The notice that it came with; none for files that no notice came for.
-    pub(crate) asked_by: Option<Origin>,
-    /// Its place in the order of notices.
-    pub(crate) order: Option<NoticeOrder>,
 }
 
 /// Stores the file as it came.
@@ -62,7 +50,7 @@ pub(crate) async fn run(
     raw: &RawGranule,
     grid: &Grid,
     there: Option<&ObjectKey>,
-) -> Result<StoredGrid, IngestError> {
+) -> Result<Step, IngestError> {
     let EncodedGrid {
         period,
         key,
@@ -82,16 +70,13 @@ pub(crate) async fn run(
             .await
             .map_err(IngestError::storage("store a frame"))?;
     }
-    let (raw_sha256, origin) = (raw.sha256, raw.file_name.clone());
-    Ok(StoredGrid {
-        step: Step {
-            period,
-            frame: settled,
-            raw_sha256,
-            origin,
-            valid_cells,
-            contributed: None,
-            masked: Some(masked),
-        },
+    Ok(Step {
+        period,
+        frame: settled,
+        raw_sha256: raw.sha256,
+        origin: raw.file_name.clone(),
+        valid_cells,
+        contributed: None,
+        masked: Some(masked),
     })
 }

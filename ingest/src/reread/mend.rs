@@ -4,18 +4,25 @@ use contract::manifest::Manifest;
 use contract::product::ProductId;
 use storage::{Store, manifests};
 
+use super::Workplace;
 use crate::commit;
 use crate::error::IngestError;
 
 /// Writes the series and the domain of the newest version again where they are damaged or gone; its frames must be
 /// whole. The version that names them, a new one if they have other names now; none if nothing had to be done.
-pub async fn mend(store: &Store, product: &ProductId) -> Result<Option<Manifest>, IngestError> {
+pub async fn mend(
+    store: &Store,
+    product: &ProductId,
+    workplace: &Workplace,
+) -> Result<Option<Manifest>, IngestError> {
     let newest = manifests::latest(store, product)
         .await
         .map_err(IngestError::storage("read the newest manifest"))?;
     match newest {
         // What was computed is computed again.
-        Some(newest) if newest.derived_from.is_none() => commit::mend(store, &newest).await,
+        Some(newest) if newest.derived_from.is_none() => {
+            commit::mend(store, &workplace.gates, &newest).await
+        }
         _ => Ok(None),
     }
 }

@@ -11,6 +11,7 @@ mod run;
 mod told;
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use contract::digest::Digest;
 use contract::manifest::ManifestId;
@@ -18,6 +19,7 @@ use contract::product::ProductId;
 use contract::time::{Period, TimeMs};
 use serde::Serialize;
 
+use crate::limits::gates::Gates;
 use crate::plan::profile::Profile;
 use crate::settings::Settings;
 
@@ -43,15 +45,29 @@ pub struct Request {
     pub is_verified: bool,
 }
 
-/// What a run works with.
+/// What runs work with; clones share its limits.
 #[derive(Debug, Clone)]
 pub struct Workplace {
     /// How files are read.
     pub settings: Settings,
     /// Folder for files while they are read.
-    pub spool: PathBuf,
+    spool: PathBuf,
     /// Most bytes in it.
-    pub spool_bytes: u64,
+    spool_bytes: u64,
+    /// Bounds what is worked on at the same time.
+    gates: Arc<Gates>,
+}
+
+impl Workplace {
+    /// A place to work, with at most `spool_bytes` of files in the folder `spool` while they are read.
+    pub fn new(settings: Settings, spool: PathBuf, spool_bytes: u64) -> Self {
+        Self {
+            gates: Arc::new(Gates::new(&settings)),
+            settings,
+            spool,
+            spool_bytes,
+        }
+    }
 }
 
 /// Why a file is read.

@@ -11,8 +11,8 @@ use storage::{Store, manifests, verify};
 use super::{By, Item, Plan, Reason, Request};
 use crate::error::IngestError;
 use crate::plan::profile::Profiles;
-use crate::put::reading::{self, Reading};
 use crate::plan::recipe::{DECODER, Recipe};
+use crate::put::reading::{self, Reading};
 
 /// Notes that are read at the same time.
 const NOTES_AT_ONCE: usize = 16;

@@ -9,17 +9,17 @@ use storage::Store;
 
 use super::plan::listed;
 use super::{By, Item, Plan, Request, Workplace};
-use crate::commit;
-use crate::error::{IngestError, Stop};
-use crate::fetch::RawFiles;
-use crate::limits::gates::Gates;
-use crate::pipeline::metrics::Metrics;
+use crate::error::{IngestError, Stop, blame, boundary};
+use crate::fetch::{RawFiles, RawGranule};
+use crate::limits::memory;
 use crate::pipeline::Pipeline;
-use crate::plan::Wish;
+use crate::pipeline::metrics::Metrics;
+use crate::pipeline::progress::{Quiet, Stage};
 use crate::plan::profile::Profile;
-use crate::pipeline::progress::Quiet;
-use crate::put::reading::{self, Reading};
 use crate::plan::recipe::Recipe;
+use crate::plan::{self, Wish};
+use crate::put::reading::{self, Reading};
+use crate::{commit, inspect};
 
 /// Works a plan off; the new version, or none if everything came out as it was. `progress` is told how many files have
 /// been read.
@@ -39,12 +39,12 @@ pub async fn run(
         return Ok(None);
     }
     let settings = &workplace.settings;
-    let (gates, metrics) = (Gates::new(settings), Metrics::unseen());
+    let (gates, metrics) = (&*workplace.gates, Metrics::unseen());
     let work = Work {
         pipeline: Pipeline {
             store,
             settings,
-            gates: &gates,
+            gates,
             observations: None,
             metrics: &metrics,
             progress: &Quiet,
@@ -81,7 +81,7 @@ pub async fn run(
             ),
         });
     }
-    commit::replace(store, &gates, &request.product, &readings).await
+    commit::replace(store, gates, &request.product, &readings).await
 }
 
 /// What every file needs.
@@ -117,8 +117,35 @@ impl Work<'_> {
             profile,
             product: Some(self.product),
         };
-        self.pipeline
-            .reread(Path::new(&item.file), fetched.await?, wish)
+        let reread = self.reread(Path::new(&item.file), fetched.await?, wish);
+        match boundary::contained(Box::pin(reread))
             .await
+            .unwrap_or_else(|panic| Err(panic.into()))
+        {
+            Err(Stop::Failed(error)) if error.is_panic() => Err(blame(&error).into()),
+            other => other,
+        }
+    }
+    /// Reads a file that landed before as it would be read now: its frames become durable, and are noted.
+    async fn reread(&self, shown: &Path, raw: RawGranule, wish: Wish<'_>) -> Result<Reading, Stop> {
+        let Pipeline {
+            store,
+            settings,
+            gates,
+            progress,
+            ..
+        } = self.pipeline;
+        let seat = gates.seat().await;
+        progress.stage(shown, Stage::Inspect, 0, 0);
+        let inspected = inspect::run(raw, settings).await?;
+        let planned = plan::run(inspected, wish, settings).await?;
+        let newest = self.pipeline.newest(&planned).await?;
+        let _pass = seat.with_memory(memory::of_grids(&planned)).await;
+        let (reading, _masked) = self.pipeline.grids(shown, planned, newest.as_ref()).await?;
+        reading
+            .put(store, self.product)
+            .await
+            .map_err(IngestError::storage("note a reading"))?;
+        Ok(reading)
     }
 }

@@ -96,13 +96,8 @@ async fn a_map_or_a_chunk_too_large_for_memory_is_refused() {
     let mut limits = crate::fixture::settings();
     limits.limits.plane_cells = 16;
     SmallFile::new().write_classic(&place.path("a.nc"));
-    let batch = ingest::Batch {
-        files: vec![place.path("a.nc")],
-        ..Default::default()
-    };
-    let outcomes = ingest::land_files(&place.store, &place.log, &limits, batch, &ingest::Quiet)
-        .await
-        .unwrap();
+    let files = [place.path("a.nc")];
+    let outcomes = place.land_as(limits, &files, &ingest::Quiet).await.unwrap();
     let (reason, line) = refusal(&outcomes);
     assert_eq!(reason, RejectReason::TooLarge, "{line}");
     assert!(line.contains("4 x 8 cells"), "{line}");
@@ -114,13 +109,8 @@ async fn a_reader_without_memory_is_a_refusal_and_no_crash() {
     let mut limits = crate::fixture::settings();
     limits.limits.memory_bytes = 1 << 20; // less than the program itself
     SmallFile::new().write_hdf5(&place.path("a.h5"));
-    let batch = ingest::Batch {
-        files: vec![place.path("a.h5")],
-        ..Default::default()
-    };
-    let outcomes = ingest::land_files(&place.store, &place.log, &limits, batch, &ingest::Quiet)
-        .await
-        .unwrap();
+    let files = [place.path("a.h5")];
+    let outcomes = place.land_as(limits, &files, &ingest::Quiet).await.unwrap();
     assert!(outcomes[0].is_rejected(), "{}", outcomes[0]);
     eprintln!("{}", outcomes[0]);
 }

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use contract::event::{Body, Event, RejectReason};
 use contract::topic::Topic;
-use ingest::{Batch, IngestService, Outcome, Progress, Stage};
+use ingest::{IngestService, Outcome, Progress, Stage};
 use storage::log::{EmbeddedLog, EventLog};
 
 use crate::fixture::{Place, SmallFile, events, settings};
@@ -77,12 +77,8 @@ async fn a_panic_over_a_file_refuses_it_and_the_command_goes_on() {
     for stage in STAGES {
         let place = Place::new();
         let planted = Planted::at(stage);
-        let batch = Batch {
-            files: files(&place),
-            ..Batch::default()
-        };
-        let settings = settings();
-        let landed = ingest::land_files(&place.store, &place.log, &settings, batch, &planted);
+        let files = files(&place);
+        let landed = place.land_as(settings(), &files, &planted);
         let outcomes = landed.await.unwrap();
         assert!(planted.has_fired());
         let [

@@ -22,13 +22,13 @@ fn request(product: &str) -> Request {
     }
 }
 
+fn workplace(place: &Place) -> Workplace {
+    Workplace::new(settings(), place.path("spool"), 1 << 30)
+}
+
 /// What is planned for a request, and what its run publishes.
 async fn reread(place: &Place, request: &Request) -> (Vec<Reason>, Option<Manifest>) {
-    let workplace = Workplace {
-        settings: settings(),
-        spool: place.path("spool"),
-        spool_bytes: 1 << 30,
-    };
+    let workplace = workplace(place);
     let profiles = &workplace.settings.profiles;
     let plan = reread::plan(&place.store, profiles, request).await.unwrap();
     let reasons = plan.items.iter().map(|item| item.reason).collect();
@@ -71,7 +71,9 @@ async fn damaged_frames_series_and_domains_are_whole_again_under_their_names() {
         let whole = store.get(key).await.unwrap();
         flip(store, key).await;
         assert_eq!(reread(&place, &request).await, (reasons, None));
-        let mended = reread::mend(store, &request.product).await.unwrap();
+        let place_to_work = workplace(&place);
+        let mended = reread::mend(store, &request.product, &place_to_work);
+        let mended = mended.await.unwrap();
         assert_eq!(mended.is_none(), Kind::of(key) == Some(Kind::Frame));
         assert_eq!(store.get(key).await.unwrap(), whole);
         assert_eq!(place.newest(request.product.as_str()).await, manifest);

@@ -8,7 +8,7 @@ use async_trait::async_trait;
 use bytes::Bytes;
 use contract::event::Event;
 use contract::topic::{Origin, Topic};
-use ingest::{Batch, IngestService, Outcome, Quiet};
+use ingest::{IngestService, Outcome, Quiet};
 use storage::log::{EmbeddedLog, EventLog, Finished, Follower, Message, Reader, Start};
 use storage::{StorageError, Store};
 
@@ -55,11 +55,10 @@ async fn a_crash_between_put_and_commit_loses_nothing_and_doubles_nothing() {
     let blocked = folder.join("manifests");
     std::fs::create_dir_all(&folder).unwrap();
     std::fs::write(&blocked, "in the way").unwrap();
-    let batch = || Batch {
-        files: files.clone(),
-        ..Batch::default()
-    };
-    let failed = ingest::land_files(&store, &place.log, &settings(), batch(), &Quiet).await;
+    let log: Arc<dyn EventLog> = Arc::new(place.log.clone());
+    let service = IngestService::new(store.clone(), log, settings());
+    service.notify(&files, None, None).await.unwrap();
+    let failed = service.drain(&Quiet).await;
     assert!(failed.is_err(), "the fault fired");
     assert!(
         events(&place.log, Topic::GranuleLanded).await.is_empty(),
@@ -68,9 +67,7 @@ async fn a_crash_between_put_and_commit_loses_nothing_and_doubles_nothing() {
     std::fs::remove_file(&blocked).unwrap();
     let before = objects(&folder);
 
-    let outcomes = ingest::land_files(&store, &place.log, &settings(), batch(), &Quiet)
-        .await
-        .unwrap();
+    let outcomes = service.drain(&Quiet).await.unwrap();
     assert!(
         outcomes
             .iter()
@@ -389,7 +386,12 @@ async fn writers_that_race_for_a_number_all_land() {
         let mut file = SmallFile::new().first_month();
         file.time_unit = Some(unit);
         file.write_classic(&path);
-        place.land(&[path]).await.remove(0)
+        // Each with a log of its own, as processes without anything in common but the store have.
+        let writer = Place {
+            store: place.store.clone(),
+            ..Place::new()
+        };
+        writer.land(&[path]).await.remove(0)
     };
     let outcomes = futures::future::join_all(MONTHS.map(land)).await;
     assert!(

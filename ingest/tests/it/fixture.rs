@@ -1,6 +1,7 @@
 //! Small files written by other libraries than the readers under test, and a folder to land them in.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use contract::event::Event;
 use contract::grid::Grid;
@@ -8,7 +9,9 @@ use contract::manifest::Manifest;
 use contract::product::ProductId;
 use contract::topic::Topic;
 use hdf5::types::VarLenUnicode;
-use ingest::{Batch, DecoderCommand, Outcome, Profile, Quiet, Settings};
+use ingest::{
+    DecoderCommand, IngestError, IngestService, Outcome, Profile, Progress, Quiet, Settings,
+};
 use storage::Store;
 use storage::log::{EmbeddedLog, EventLog, Start};
 use tempfile::TempDir;
@@ -42,14 +45,31 @@ impl Place {
         files: &[PathBuf],
         profile: Option<&Profile>,
     ) -> Vec<Outcome> {
-        let batch = Batch {
-            files: files.to_vec(),
-            profile,
-            product: None,
-        };
-        ingest::land_files(&self.store, &self.log, &settings(), batch, &Quiet)
-            .await
-            .unwrap()
+        let mut settings = settings();
+        if let Some(profile) = profile {
+            settings.profiles = [profile.clone()].into_iter().collect();
+        }
+        let service = self.service(settings);
+        let name = profile.map(|profile| profile.name.as_str());
+        service.notify(files, name, None).await.unwrap();
+        service.drain(&Quiet).await.unwrap()
+    }
+
+    /// Lands files with settings of one's own, as a command does.
+    pub(crate) async fn land_as(
+        &self,
+        settings: Settings,
+        files: &[PathBuf],
+        progress: &dyn Progress,
+    ) -> Result<Vec<Outcome>, IngestError> {
+        let service = self.service(settings);
+        service.notify(files, None, None).await?;
+        service.drain(progress).await
+    }
+
+    fn service(&self, settings: Settings) -> IngestService {
+        let log: Arc<dyn EventLog> = Arc::new(self.log.clone());
+        IngestService::new(self.store.clone(), log, settings)
     }
 
     pub(crate) async fn newest(&self, product: &str) -> Manifest {

@@ -5,7 +5,7 @@
 use std::path::Path;
 use std::process::Stdio;
 
-use ingest::{Batch, Outcome, Quiet};
+use ingest::{Outcome, Quiet};
 
 use crate::fixture::{Place, SmallFile, settings};
 
@@ -60,13 +60,7 @@ async fn survives(bytes: &[u8], name: &str) {
     }
     let mut settings = settings();
     settings.limits.wall = std::time::Duration::from_secs(10);
-    let batch = Batch {
-        files: paths,
-        ..Batch::default()
-    };
-    let outcomes = ingest::land_files(&place.store, &place.log, &settings, batch, &Quiet)
-        .await
-        .unwrap();
+    let outcomes = place.land_as(settings, &paths, &Quiet).await.unwrap();
     for outcome in &outcomes {
         let line = outcome.to_string();
         assert!(!line.contains('\n') && line.len() < 1000, "{line}");

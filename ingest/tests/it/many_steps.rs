@@ -7,7 +7,7 @@ use std::sync::Arc;
 use contract::event::{Body, MAX_EVENT_BYTES, RejectReason};
 use contract::time::Period;
 use contract::topic::Topic;
-use ingest::{Batch, IngestService, Outcome, Quiet};
+use ingest::{IngestService, Outcome, Quiet};
 use storage::log::{EmbeddedLog, EventLog as _};
 
 use crate::fixture::{Place, SmallFile, events, refusal, settings};
@@ -115,11 +115,8 @@ async fn a_file_of_one_step_more_than_a_file_may_have_is_refused() {
     SmallFile::new().write_classic(&place.path("two.nc"));
     let mut settings = settings();
     settings.limits.steps = 1;
-    let batch = Batch {
-        files: vec![place.path("two.nc")],
-        ..Batch::default()
-    };
-    let landed = ingest::land_files(&place.store, &place.log, &settings, batch, &Quiet);
+    let files = [place.path("two.nc")];
+    let landed = place.land_as(settings, &files, &Quiet);
     let (reason, line) = refusal(&landed.await.unwrap());
     assert_eq!(reason, RejectReason::TooLarge, "{line}");
     assert!(line.contains("2 steps, 1 to 1"), "{line}");

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
-use ingest::{Batch, Outcome, Progress, Settings, Stage};
+use ingest::{Outcome, Progress, Settings, Stage};
 
 use crate::fixture::{Place, SmallFile, settings, text};
 
@@ -68,15 +68,8 @@ async fn go_side_by_side(place: &Place, parallel_bytes: u64) -> bool {
         parallel_bytes,
         ..settings()
     };
-    let (order, batch) = (
-        Order::default(),
-        Batch {
-            files,
-            ..Batch::default()
-        },
-    );
-    let landed = ingest::land_files(&place.store, &place.log, &settings, batch, &order).await;
-    let outcomes = landed.unwrap();
+    let order = Order::default();
+    let outcomes = place.land_as(settings, &files, &order).await.unwrap();
     assert!(
         outcomes.iter().all(|o| matches!(o, Outcome::Landed { .. })),
         "{outcomes:?}"

@@ -8,7 +8,7 @@ use contract::event::RejectReason;
 use contract::topic::Topic;
 use hdf5::Extent;
 use ingest::{
-    Batch, DecoderCommand, IngestError, IngestService, Outcome, Progress, Quiet, Settings, Stage,
+    DecoderCommand, IngestError, IngestService, Outcome, Progress, Quiet, Settings, Stage,
 };
 use storage::log::{EmbeddedLog, EventLog};
 
@@ -28,11 +28,8 @@ fn scripted(script: &str) -> Settings {
 }
 
 async fn land(place: &Place, settings: &Settings, name: &str) -> Result<Vec<Outcome>, IngestError> {
-    let batch = Batch {
-        files: vec![place.path(name)],
-        ..Batch::default()
-    };
-    ingest::land_files(&place.store, &place.log, settings, batch, &Quiet).await
+    let files = [place.path(name)];
+    place.land_as(settings.clone(), &files, &Quiet).await
 }
 
 async fn refused_by(script: &str) -> (RejectReason, String) {
@@ -163,10 +160,9 @@ fn nothing_but_the_reader_process_opens_data_files() {
     };
     let own = |path: &PathBuf| {
         let path = path.strip_prefix(&root).unwrap();
-        let folders = ["file", "generate"]
+        ["inspect/file", "inspect/reader/child.rs", "generate"]
             .iter()
-            .any(|folder| path.starts_with(folder));
-        folders || path == Path::new("file.rs") || path == Path::new("decoder/child.rs")
+            .any(|own| path.starts_with(own))
     };
     let (known, others): (Vec<_>, Vec<_>) = found.into_iter().filter(opens).partition(own);
     assert!(known.len() > 3, "{known:?}");

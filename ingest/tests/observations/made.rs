@@ -1,12 +1,17 @@
 //! Files made here: every layout of the conventions with one truth, and ones whose parts contradict each other.
 
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
 
+use async_trait::async_trait;
 use contract::event::RejectReason;
+use contract::masked::MaskedCells;
 use contract::observation::{Observation, PlatformKind, Quality};
-use ingest::observation::{Reading, read_path};
-use ingest::{DecoderCommand, Rejection, Settings};
+use ingest::observation::{ObservationSink, SinkError, Stored};
+use ingest::{DecoderCommand, IngestService, Outcome, Quiet, Rejection, Settings};
 use netcdf3::{DataSet, FileWriter, Version};
+use storage::Store;
+use storage::log::EmbeddedLog;
 
 pub(crate) fn settings() -> Settings {
     let program = PathBuf::from(env!("CARGO_BIN_EXE_decode-file"));
@@ -19,19 +24,57 @@ pub(crate) fn settings() -> Settings {
     settings
 }
 
-pub(crate) async fn observations(path: &Path) -> Vec<Observation> {
-    match read_path(path, None, &settings()).await.unwrap() {
-        Reading::Observations(found) => found.observations,
-        other => panic!("{}: {other:?}", path.display()),
+/// Keeps what it is given.
+#[derive(Default)]
+struct Kept(Mutex<Vec<Observation>>);
+
+#[async_trait]
+impl ObservationSink for Kept {
+    async fn put(&self, observations: Vec<Observation>) -> Result<Stored, SinkError> {
+        self.0.lock().unwrap().extend(observations);
+        Ok(Stored::default())
     }
 }
 
-pub(crate) async fn refusal(path: &Path) -> Rejection {
-    match read_path(path, None, &settings()).await.unwrap() {
-        Reading::Refused(rejection) => rejection,
-        Reading::Observations(found) => panic!("{found:?} of {}", path.display()),
-        Reading::Other => panic!("{} is told to hold no observations", path.display()),
+/// Observations of a file and what is masked of it, as `fluxglobe ingest` has them, or why there are none.
+pub(crate) async fn read(
+    path: &Path,
+    settings: &Settings,
+) -> Result<(Vec<Observation>, MaskedCells), Rejection> {
+    let (kept, log) = (Arc::new(Kept::default()), Arc::new(EmbeddedLog::memory()));
+    let service = IngestService::new(Store::memory(), log, settings.clone())
+        .with_observations(Arc::clone(&kept) as Arc<dyn ObservationSink>);
+    service
+        .notify(&[path.to_owned()], None, None)
+        .await
+        .unwrap();
+    match service.drain(&Quiet).await.unwrap().remove(0) {
+        Outcome::Observed { masked, .. } => {
+            Ok((std::mem::take(&mut kept.0.lock().unwrap()), masked))
+        }
+        Outcome::Rejected {
+            reason,
+            object,
+            detail,
+            ..
+        } => Err(Rejection {
+            reason,
+            object,
+            detail,
+        }),
+        other => panic!("{other}"),
     }
+}
+
+pub(crate) async fn observations(path: &Path) -> Vec<Observation> {
+    let read = read(path, &settings()).await;
+    read.unwrap_or_else(|refused| panic!("{}: {refused}", path.display()))
+        .0
+}
+
+pub(crate) async fn refusal(path: &Path) -> Rejection {
+    let read = read(path, &settings()).await;
+    read.expect_err("they are taken")
 }
 
 /// A NetCDF classic file in the making.
@@ -257,14 +300,9 @@ async fn values_outside_the_range_of_their_file_are_counted_and_fill_values_are_
         .add_var_attr_f64("sst", "valid_max", vec![20.0])
         .unwrap();
     let path = draft.write(folder.path());
-    let Reading::Observations(found) = read_path(&path, None, &settings()).await.unwrap() else {
-        panic!("refused")
-    };
-    assert_eq!(found.observations.len(), 2);
-    assert_eq!(
-        (found.masked.out_of_range, found.masked.implausible),
-        (2, 0)
-    );
+    let (found, masked) = read(&path, &settings()).await.unwrap();
+    assert_eq!(found.len(), 2);
+    assert_eq!((masked.out_of_range, masked.implausible), (2, 0));
 }
 
 #[tokio::test]
@@ -417,10 +455,8 @@ async fn grids_and_other_texts_are_no_observations() {
         )
         .variable("sst", &["lat", "lon"], SST, vec![1.0; 4])
         .write(folder.path());
-    assert_eq!(
-        read_path(&grid, None, &settings()).await.unwrap(),
-        Reading::Other
-    );
+    let planned = refusal(&grid).await;
+    assert_eq!(planned.reason, RejectReason::Time, "as a map: {planned}");
     let text = folder.path().join("text.csv");
     std::fs::write(&text, "lat,lon,flux\n1,2,3\n").unwrap();
     assert_eq!(refusal(&text).await.reason, RejectReason::Unreadable);
@@ -440,7 +476,7 @@ async fn mutated_texts_end_in_observations_or_a_refusal() {
     let folder = tempfile::tempdir().unwrap();
     let good = "Expocode\tyr\tmon\tday\thh\tmm\tss\tlongitude [dec.deg.E]\tlatitude [dec.deg.N]\tSST [deg.C]\tfCO2rec [uatm]\tfCO2rec_flag\n33HQ\t2015\t7\t14\t7\t14\t40\t181.5\t70.9\t-1.0\t271.4\t2\n";
     let path = folder.path().join("mutated.tsv");
-    let mut outcomes = [0; 3];
+    let mut outcomes = [0; 2];
     for at in 0..good.len() {
         for byte in [0u8, b'\t', b'\n', b'9', 0xff] {
             let mut bytes = good.as_bytes().to_vec();
@@ -450,14 +486,12 @@ async fn mutated_texts_end_in_observations_or_a_refusal() {
             if byte == 0 {
                 continue;
             }
-            match read_path(&path, None, &settings()).await.unwrap() {
-                Reading::Observations(found) => {
-                    let all = found.observations;
+            match read(&path, &settings()).await {
+                Ok((all, _masked)) => {
                     assert!(all.iter().all(|o| o.validate().is_ok()));
                     outcomes[0] += 1;
                 }
-                Reading::Refused(_) => outcomes[1] += 1,
-                Reading::Other => outcomes[2] += 1,
+                Err(_refusal) => outcomes[1] += 1,
             }
         }
     }

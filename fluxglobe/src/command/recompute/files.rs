@@ -42,11 +42,7 @@ impl Files {
             is_verified: options.verify,
         };
         let plan = reread::plan(store, &settings.profiles, &request).await?;
-        let workplace = Workplace {
-            settings,
-            spool: options.spool.clone(),
-            spool_bytes: SPOOL_BYTES,
-        };
+        let workplace = Workplace::new(settings, options.spool.clone(), SPOOL_BYTES);
         Ok(Self {
             request,
             workplace,
@@ -68,7 +64,8 @@ impl Files {
             }
         }
         if self.request.is_verified
-            && let Some(mended) = reread::mend(store, &self.request.product).await?
+            && let Some(mended) =
+                reread::mend(store, &self.request.product, &self.workplace).await?
         {
             progress::say(&format!(
                 "{}: series and domain are whole again",

@@ -8,8 +8,8 @@ use contract::manifest::{Manifest, Step};
 use contract::notice::NoticeOrder;
 use contract::time::{Period, TimeMs};
 
-use crate::put::StoredGranule;
 use crate::error::Rejection;
+use crate::put::StoredGranule;
 
 /// Grids whose edges differ by less than this, in cells, are one grid.
 const SAME_GRID_CELLS: f64 = 1e-4;
@@ -54,7 +54,7 @@ impl Merged {
 pub(super) fn disjoint_prefix(granules: &[StoredGranule]) -> usize {
     let mut taken = Taken::default();
     for (index, granule) in granules.iter().enumerate() {
-        let own = || granule.grids.iter().map(|g| g.step.period);
+        let own = || granule.reading.steps.iter().map(|step| step.period);
         if own().any(|period| taken.overlaps(period)) {
             return index;
         }
@@ -94,8 +94,8 @@ pub(super) fn merge(newest: Option<&Manifest>, granules: &[StoredGranule]) -> Me
         let base = newest
             .map(|m| (m.grid, m.quantity, m.synthetic))
             .or_else(|| {
-                let first = granules.get(merged.last_taken?)?;
-                Some((first.grid, first.target.quantity, first.target.synthetic))
+                let first = &granules.get(merged.last_taken?)?.reading;
+                Some((first.grid, first.quantity, first.synthetic))
             });
         let change = match base.map_or(Ok(()), |base| check_fits(granule, base)) {
             Ok(()) => add(&mut placed, granule),
@@ -120,9 +120,11 @@ fn check_fits(
     granule: &StoredGranule,
     (grid, quantity, synthetic): (Grid, contract::quantity::Quantity, bool),
 ) -> Result<(), Rejection> {
-    let product = &granule.target.product;
+    let StoredGranule {
+        product, reading, ..
+    } = granule;
     let advice = "land it in a product of its own";
-    if !is_same_grid(&granule.grid, &grid) {
+    if !is_same_grid(&reading.grid, &grid) {
         let shape = |g: &Grid| {
             format!(
                 "{} x {} cells from {} N {} E",
@@ -132,22 +134,22 @@ fn check_fits(
         return Err(conflict(format!(
             "{product} has {}, the file {}; {advice}",
             shape(&grid),
-            shape(&granule.grid)
+            shape(&reading.grid)
         )));
     }
-    if granule.target.quantity != quantity {
+    if reading.quantity != quantity {
         return Err(conflict(format!(
             "{product} holds {}, the file {}; {advice}",
             quantity.title(),
-            granule.target.quantity.title()
+            reading.quantity.title()
         )));
     }
-    if granule.target.synthetic != synthetic {
+    if reading.synthetic != synthetic {
         let word = |synthetic| if synthetic { "synthetic" } else { "measured" };
         return Err(conflict(format!(
             "{product} is {}, the file {}; {advice}",
             word(synthetic),
-            word(granule.target.synthetic)
+            word(reading.synthetic)
         )));
     }
     Ok(())
@@ -176,13 +178,13 @@ enum Act {
 
 /// Adds the steps of one file that no file of a later notice has the time of; all or none.
 fn add(placed: &mut Vec<Placed>, granule: &StoredGranule) -> Change {
-    let mut acts = Vec::with_capacity(granule.grids.len());
-    for grid in &granule.grids {
-        match act(placed, &grid.step, granule.order) {
+    let (steps, order) = (&granule.reading.steps, granule.notice.place);
+    let mut acts = Vec::with_capacity(steps.len());
+    for step in steps {
+        match act(placed, step, order) {
             Ok(act) => acts.push(act),
             Err(there) => {
-                let product = &granule.target.product;
-                let period = grid.step.period;
+                let (product, period) = (&granule.product, step.period);
                 return Change::Refused(conflict(format!(
                     "{product} has a step for {there}, which overlaps {period} of the file; land it in a product of its own"
                 )));
@@ -199,18 +201,18 @@ fn add(placed: &mut Vec<Placed>, granule: &StoredGranule) -> Change {
         };
     }
     let (mut periods, mut revised) = (vec![], false);
-    for (grid, act) in granule.grids.iter().zip(acts) {
-        let step = || (grid.step.clone(), granule.order);
+    for (step, act) in steps.iter().zip(acts) {
+        let new = || (step.clone(), Some(order));
         match act {
-            Act::Insert => placed.push(step()),
+            Act::Insert => placed.push(new()),
             Act::Replace(index) => {
-                placed[index] = step();
+                placed[index] = new();
                 revised = true;
             }
             Act::Keep => {}
             Act::Leave => continue,
         }
-        periods.push(grid.step.period);
+        periods.push(step.period);
     }
     // Two runs in order, which this sort merges in one pass.
     placed.sort_by_key(|(step, _)| step.period);
@@ -218,7 +220,7 @@ fn add(placed: &mut Vec<Placed>, granule: &StoredGranule) -> Change {
 }
 
 /// What is to be done with a step; the period in the way if it overlaps others than its own.
-fn act(placed: &[Placed], new: &Step, order: Option<NoticeOrder>) -> Result<Act, Period> {
+fn act(placed: &[Placed], new: &Step, order: NoticeOrder) -> Result<Act, Period> {
     // Steps do not overlap, so those that overlap the new one lie together.
     let first = placed.partition_point(|(s, _)| s.period.end <= new.period.start);
     let mut overlapping = placed[first..]
@@ -243,10 +245,10 @@ fn is_same_source(there: &Step, new: &Step) -> bool {
     there.raw_sha256 == new.raw_sha256 && there.frame == new.frame
 }
 
-/// Was the file that is there offered with or after a new one? Not known of files that came without a notice, and of
-/// steps that were landed before orders were kept: then the new one is taken to be newer.
-pub(crate) fn is_later_or_same(there: Option<NoticeOrder>, new: Option<NoticeOrder>) -> bool {
-    there.zip(new).is_some_and(|(there, new)| new <= there)
+/// Was the file that is there offered with or after a new one? Not known of steps that were landed before orders were
+/// kept: then the new one is taken to be newer.
+pub(crate) fn is_later_or_same(there: Option<NoticeOrder>, new: NoticeOrder) -> bool {
+    there.is_some_and(|there| new <= there)
 }
 
 #[cfg(test)]

@@ -1,14 +1,24 @@
 //! Merging by hand-made steps: new, same, revised, overlapping, other grid.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use bytes::Bytes;
 use contract::digest::Digest;
 use contract::key::ObjectKey;
 use contract::masked::MaskedCells;
+use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::time::Period;
+use contract::topic::{Origin, Topic};
+use storage::log::Message;
 
 use super::*;
+use crate::notice::PendingNotice;
 use crate::plan::Target;
-use crate::put::StoredGrid;
+use crate::plan::recipe::Recipe;
+use crate::put::reading::Reading;
+use crate::settings::{DecoderCommand, Settings};
 
 const GRID: Grid = Grid {
     rows: 2,
@@ -19,43 +29,63 @@ const GRID: Grid = Grid {
     dlon_deg: 90.0,
 };
 
-fn granule(content: &str, periods: &[Period]) -> StoredGranule {
-    let product: contract::product::ProductId = "p".parse().unwrap();
+/// A file that came with the notice of some second.
+fn noticed(content: &str, periods: &[Period], second: u32) -> StoredGranule {
+    let product: ProductId = "p".parse().unwrap();
     let raw_sha256 = Digest::of(content.as_bytes());
     let step = |period: &Period| {
         let frame = ObjectKey::frame(
             &product,
             &Digest::of(format!("{content}{period}").as_bytes()),
         );
-        StoredGrid {
-            step: Step {
-                masked: None,
-                period: *period,
-                frame,
-                raw_sha256,
-                origin: "f.nc".into(),
-                valid_cells: 1,
-                contributed: None,
-            },
+        Step {
+            masked: None,
+            period: *period,
+            frame,
+            raw_sha256,
+            origin: "f.nc".into(),
+            valid_cells: 1,
+            contributed: None,
         }
     };
+    let target = Target {
+        product: product.clone(),
+        title: "t".into(),
+        source: "s".into(),
+        quantity: Quantity::CarbonFlux,
+        synthetic: false,
+    };
+    let steps = periods.iter().map(step).collect();
     StoredGranule {
-        target: Target {
-            product: product.clone(),
-            title: "t".into(),
-            source: "s".into(),
-            quantity: Quantity::CarbonFlux,
-            synthetic: false,
-            profile: None,
-        },
-        grid: GRID,
-        raw_sha256,
-        assumptions: vec![],
-        asked_by: None,
-        order: None,
+        notice: Arc::new(notice(second)),
+        reading: Reading::new(Recipe::of(None), &target, GRID, steps),
+        product,
         masked: MaskedCells::default(),
-        grids: periods.iter().map(step).collect(),
     }
+}
+
+/// A notice of some second of a minute, or of the minutes after it.
+fn notice(second: u32) -> PendingNotice {
+    let minute: TimeMs = "2020-01-01T00:00:00Z".parse().unwrap();
+    let message = Message {
+        origin: Origin {
+            topic: Topic::GranuleNotice,
+            partition: 0,
+            offset: 0,
+        },
+        content: Bytes::new(),
+        time: Some(TimeMs::new(minute.ms() + i64::from(second) * 1000).unwrap()),
+    };
+    let program = "/nowhere".into();
+    let arguments = vec![];
+    let settings = Settings::with_decoder(DecoderCommand { program, arguments });
+    PendingNotice::of(&message, &settings, minute).remove(0)
+}
+
+/// A file of a later notice than all that were made before.
+fn granule(content: &str, periods: &[Period]) -> StoredGranule {
+    static NEXT: AtomicU32 = AtomicU32::new(60);
+    noticed(content, periods, NEXT.fetch_add(1, Ordering::Relaxed))
 }
 
 fn month(month: u32) -> Period {
@@ -65,15 +95,6 @@ fn month(month: u32) -> Period {
 fn placed(first: &StoredGranule) -> Vec<Placed> {
     let merged = merge(None, std::slice::from_ref(first));
     merged.steps.into_iter().zip(merged.orders).collect()
-}
-
-/// A file that came with the notice of some second.
-fn noticed(name: &str, periods: &[Period], second: u32) -> StoredGranule {
-    let order = format!("2020-01-01T00:00:{second:02}Z/0/0/0");
-    StoredGranule {
-        order: Some(order.parse().unwrap()),
-        ..granule(name, periods)
-    }
 }
 
 #[test]
@@ -125,11 +146,11 @@ fn a_step_across_others_is_refused_and_leaves_them_whole() {
 #[test]
 fn another_grid_or_quantity_is_a_conflict() {
     let mut other_grid = granule("b", &[month(2)]);
-    other_grid.grid.west_deg = -90.0;
+    other_grid.reading.grid.west_deg = -90.0;
     let mut other_quantity = granule("c", &[month(3)]);
-    other_quantity.target.quantity = Quantity::Pco2;
+    other_quantity.reading.quantity = Quantity::Pco2;
     let mut made_up = granule("d", &[month(4)]);
-    made_up.target.synthetic = true;
+    made_up.reading.synthetic = true;
     let merged = merge(
         None,
         &[
@@ -209,18 +230,14 @@ fn files_of_notices_in_any_order_end_as_the_same_steps() {
 }
 
 #[test]
-fn a_file_without_a_notice_is_newer_and_one_of_the_same_notice_is_not() {
+fn a_file_of_the_same_notice_or_an_earlier_one_is_no_revision() {
     let mut steps = placed(&noticed("a", &[month(1)], 5));
-    assert_eq!(
-        add(&mut steps, &noticed("b", &[month(1)], 5)),
-        Change::Superseded
-    );
-    assert_eq!(
-        add(&mut steps, &noticed("b", &[month(1)], 4)),
-        Change::Superseded
-    );
-    let taken = |change| matches!(change, Change::Taken { revised: true, .. });
-    assert!(taken(add(&mut steps, &granule("by hand", &[month(1)]))));
-    // Nothing is known of what is there now.
-    assert!(taken(add(&mut steps, &noticed("b", &[month(1)], 4))));
+    for second in [5, 4] {
+        let late = noticed("b", &[month(1)], second);
+        assert_eq!(add(&mut steps, &late), Change::Superseded);
+    }
+    // Nothing is known of when it was offered.
+    steps[0].1 = None;
+    let taken = add(&mut steps, &noticed("b", &[month(1)], 4));
+    assert!(matches!(taken, Change::Taken { revised: true, .. }));
 }

@@ -44,7 +44,6 @@ fn reading(steps: Vec<Step>) -> Reading {
         source: "s".into(),
         quantity: Quantity::CarbonFlux,
         synthetic: false,
-        profile: None,
     };
     Reading::new(Recipe::of(None), &target, GRID, steps)
 }

@@ -10,9 +10,9 @@ use rlimit::Resource;
 
 use super::EXIT_USAGE;
 use super::protocol::{self, Answer, Opened, Request};
+use crate::error::Rejection;
 use crate::inspect::file::DataFile;
 use crate::inspect::file::description::Part;
-use crate::error::Rejection;
 
 /// Open files a reader needs: the three streams, the file, and what the system opens meanwhile.
 const MAX_OPEN_FILES: u64 = 32;

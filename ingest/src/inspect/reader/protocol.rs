@@ -5,8 +5,8 @@ use std::io::{Error, ErrorKind, Read, Write};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use crate::inspect::file::description::{Description, Part};
 use crate::error::Rejection;
+use crate::inspect::file::description::{Description, Part};
 
 /// Longest message, bytes: a description of 4096 variables with twenty attributes each fits three times. What is read of
 /// it takes some times as much, beside the memory that files wait for.

@@ -3,8 +3,8 @@
 use contract::event::RejectReason;
 
 use super::projection;
-use crate::inspect::file::description::{Description, Variable};
 use crate::error::Rejection;
+use crate::inspect::file::description::{Description, Variable};
 
 /// What a dimension or a coordinate variable is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -2,8 +2,8 @@
 
 use contract::event::RejectReason;
 
-use crate::inspect::file::description::{Description, Variable};
 use crate::error::Rejection;
+use crate::inspect::file::description::{Description, Variable};
 
 const ADVICE: &str = "regrid it to regular latitudes and longitudes first (cdo remapbil,r360x180 IN OUT, or gdalwarp -t_srs EPSG:4326)";
 /// The one grid mapping whose axes are latitude and longitude.

@@ -13,10 +13,17 @@ const MAX_PROFILES: usize = 1000;
 #[derive(Debug, Clone)]
 pub struct Profiles(Arc<[Profile]>);
 
+impl FromIterator<Profile> for Profiles {
+    /// Those, in their order, and no others.
+    fn from_iter<I: IntoIterator<Item = Profile>>(profiles: I) -> Self {
+        Self(profiles.into_iter().collect())
+    }
+}
+
 impl Profiles {
     /// Those that come with the program.
     pub fn shipped() -> Self {
-        Self(shipped().to_vec().into())
+        shipped().iter().cloned().collect()
     }
 
     /// Those in a folder (`*.toml`, in the order of their names), then those that come with the program.
@@ -39,9 +46,8 @@ impl Profiles {
             return Err(bad(format!("has more than {MAX_PROFILES} profiles")));
         }
         let own = files.iter().map(|file| Profile::load(file));
-        let mut all = own.collect::<Result<Vec<_>, _>>()?;
-        all.extend_from_slice(shipped());
-        Ok(Self(all.into()))
+        let own = own.collect::<Result<Vec<_>, _>>()?;
+        Ok(own.into_iter().chain(shipped().iter().cloned()).collect())
     }
 
     pub(crate) fn iter(&self) -> impl Iterator<Item = &Profile> {

@@ -14,11 +14,11 @@ use contract::product::ProductId;
 use contract::quantity::Quantity;
 use serde::Deserialize;
 
+use crate::error::IngestError;
+use crate::inspect::file::description::{AttributeValue, Description};
 use crate::plan::cf::axis::Registration;
 use crate::plan::cf::period::{Covers, StampAt};
 use crate::plan::cf::quantity::has_direction;
-use crate::error::IngestError;
-use crate::inspect::file::description::{AttributeValue, Description};
 
 pub use catalogue::Profiles;
 pub use shipped::shipped;

@@ -19,7 +19,10 @@ const TEXTS: [(&str, &str); 27] = [
         "chlorophyll-2010",
         include_str!("../../../profiles/chlorophyll-2010.toml"),
     ),
-    ("wind-2010", include_str!("../../../profiles/wind-2010.toml")),
+    (
+        "wind-2010",
+        include_str!("../../../profiles/wind-2010.toml"),
+    ),
     (
         "socatv4-fco2-2010",
         include_str!("../../../profiles/socatv4-fco2-2010.toml"),
@@ -45,7 +48,10 @@ const TEXTS: [(&str, &str); 27] = [
         "reynolds-sst",
         include_str!("../../../profiles/reynolds-sst.toml"),
     ),
-    ("ccmp-wind", include_str!("../../../profiles/ccmp-wind.toml")),
+    (
+        "ccmp-wind",
+        include_str!("../../../profiles/ccmp-wind.toml"),
+    ),
     (
         "ostia-sst-climatology",
         include_str!("../../../profiles/ostia-sst-climatology.toml"),
@@ -76,7 +82,10 @@ const TEXTS: [(&str, &str); 27] = [
         "onedeg-land",
         include_str!("../../../profiles/onedeg-land.toml"),
     ),
-    ("ostia-sst", include_str!("../../../profiles/ostia-sst.toml")),
+    (
+        "ostia-sst",
+        include_str!("../../../profiles/ostia-sst.toml"),
+    ),
     (
         "modis-aqua-sst-month",
         include_str!("../../../profiles/modis-aqua-sst-month.toml"),

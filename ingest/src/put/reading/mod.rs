@@ -6,12 +6,12 @@
 use contract::digest::Digest;
 use contract::grid::Grid;
 use contract::key::ObjectKey;
-use contract::kind::Kind;
-use contract::kind::Vouched;
+use contract::kind::{Kind, Vouched};
 use contract::manifest::Step;
 use contract::product::ProductId;
 use contract::quantity::Quantity;
 use serde::{Deserialize, Serialize};
+use storage::gc::Owner;
 use storage::{StorageError, Store, document};
 
 use crate::error::IngestError;
@@ -53,6 +53,11 @@ impl Reading {
             steps,
             assumptions: vec![],
         }
+    }
+
+    /// The file that it is of.
+    pub(crate) fn raw_sha256(&self) -> Digest {
+        self.steps[0].raw_sha256
     }
 
     /// Notes it. An equal note may be there; one that is damaged, or of an older schema, is replaced.
@@ -101,6 +106,28 @@ impl Reading {
         alike == *self
             && there.steps.len() == self.steps.len()
             && steps.into_iter().all(|(old, new)| is_renamed(old, new))
+    }
+}
+
+/// What is known of the reading of raw files: in use as long as that file is.
+#[derive(Debug)]
+pub struct Readings;
+
+impl Owner for Readings {
+    fn kinds(&self) -> &'static [Kind] {
+        &[Kind::Reading]
+    }
+
+    fn is_made_again(&self) -> bool {
+        true
+    }
+
+    fn lives_with(&self, key: &ObjectKey) -> Option<ObjectKey> {
+        if Kind::of(key) != Some(Kind::Reading) {
+            return None;
+        }
+        let product = key.as_str().split('/').nth(1)?.parse().ok()?;
+        Some(ObjectKey::raw(&product, &raw_of(key)?))
     }
 }
 
