@@ -218,7 +218,7 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** The globe from straight above a place, as a PNG of any size. */
+        /** The globe from a camera over a place or looking at one, as a PNG of any size. */
         get: operations["globe_view"];
         put?: never;
         post?: never;
@@ -1941,12 +1941,28 @@ export interface operations {
     globe_view: {
         parameters: {
             query?: {
-                /** @description Longitude below the camera, degrees east; 0 unless one is given. */
+                /** @description Longitude below the camera, degrees east; 0 unless one is given. Not with `look_at`. */
                 lon?: number;
-                /** @description Latitude below the camera, degrees north; 0 unless one is given. */
+                /** @description Latitude below the camera, degrees north; 0 unless one is given. Not with `look_at`. */
                 lat?: number;
-                /** @description Height of the camera above the ground, km; 15000 unless one is given. */
+                /** @description Height of the camera above the ground, km; 15000 unless one is given. Not with `look_at`. */
                 height_km?: number;
+                /**
+                 * @description `LON,LAT`: the place in the middle of the picture, instead of the one below the camera; `tilt` is then that of the
+                 *     line of sight against the vertical there.
+                 * @example -95,0
+                 */
+                look_at?: string;
+                /** @description From the camera to the place that is looked at, km; 15000 unless one is given. Only with `look_at`. */
+                distance_km?: number;
+                /** @description Direction of view, clockwise from north, degrees; 0 unless one is given. */
+                heading?: number;
+                /** @description 0 looks straight down, 90 along the ground, degrees; 0 unless one is given. */
+                tilt?: number;
+                /** @description Lean of the camera to the right, degrees; 0 unless one is given. */
+                roll?: number;
+                /** @description Field of view across the shorter side of the picture, degrees; 45 unless one is given. */
+                fov?: number;
                 /**
                  * @description Instant, ISO 8601 UTC (a year, month or day means its start); the middle of the last step unless one is given.
                  * @example 2000-01-16T12:00:00Z
