@@ -10,7 +10,7 @@ use contract::time::{Period, TimeMs};
 use serde::{Deserialize, Serialize};
 use storage::{StorageError, Store, document, manifests};
 
-use super::asked::{WeighedRegion, Measure, asked};
+use super::asked::{Measure, WeighedRegion, asked};
 use super::bands::{BAND_COUNT, BandSum};
 use super::rows::StepSum;
 use crate::region::address::RegionAddress;
