@@ -52,8 +52,8 @@ pub(crate) struct RenderAnimation {
         requires = "look_at"
     )]
     pub(crate) orbit: Option<f64>,
-    /// Way of the camera: a JSON list of {"seconds", "look_at": [LON, LAT], "distance_km", "heading", "tilt", "roll", "fov",
-    /// "easing": "in-out" or "linear"}; the first is at 0 seconds.
+    /// Way of the camera: a JSON list of `{"seconds", "look_at": [LON, LAT], "distance_km", "heading", "tilt", "roll",
+    /// "fov", "easing": "in-out" or "linear"}`; the first is at 0 seconds.
     #[arg(
         long,
         value_name = "FILE.json",

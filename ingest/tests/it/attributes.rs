@@ -25,9 +25,12 @@ fn many_texts(owner: &Location) {
     }
 }
 
+/// Writes attributes of an owner.
+type Write = fn(&Location);
+
 #[tokio::test]
 async fn attributes_of_any_size_and_number_are_bounded_and_their_file_lands() {
-    let cases: [(&str, fn(&Location)); 3] = [
+    let cases: [(&str, Write); 3] = [
         ("long.h5", |owner| {
             text(owner, "history", &"x".repeat(HUGE_BYTES));
         }),

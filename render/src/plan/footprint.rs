@@ -93,7 +93,7 @@ impl Footprint {
                 span[0] = inner[0];
             }
         }
-        let middle = (span[0] + span[1]) / 2.0;
+        let middle = f64::midpoint(span[0], span[1]);
         let seen = reach(middle) * SLACK + margin;
         let (sin_m, cos_m) = middle.sin_cos();
         Self {
@@ -218,7 +218,7 @@ mod tests {
 
     #[test]
     fn the_nearest_ground_is_below_or_at_the_limb() {
-        assert_eq!(nearest_ground(0.1, 0.0), 0.1);
+        assert!((nearest_ground(0.1, 0.0) - 0.1).abs() < 1e-15);
         let limb = (1.0f64 / 1.1).asin();
         let tangent = (1.1f64 * 1.1 - 1.0).sqrt();
         assert!((nearest_ground(0.1, limb) - tangent).abs() < 1e-6);

@@ -135,14 +135,14 @@ pub(crate) async fn get(
 
 impl GlobeQuery {
     fn view(&self) -> Result<View, ServerError> {
-        let pixels = |name, text: &Option<String>| {
-            text.as_deref().map_or(Ok(SIZE_PX), |text| {
+        let pixels = |name, text: Option<&str>| {
+            text.map_or(Ok(SIZE_PX), |text| {
                 whole_number(name, text, "whole pixels, 1 to 4096")
             })
         };
         let size_px = [
-            pixels("width", &self.width)?,
-            pixels("height", &self.height)?,
+            pixels("width", self.width.as_deref())?,
+            pixels("height", self.height.as_deref())?,
         ];
         let angles = self.angles()?;
         let Some(target) = self.look_at.as_deref() else {
@@ -163,7 +163,7 @@ impl GlobeQuery {
             distance_m: 1000.0
                 * real(
                     "distance_km",
-                    &self.distance_km,
+                    self.distance_km.as_deref(),
                     HEIGHT_KM,
                     "kilometres from the place, 1 to 1e6",
                 )?,
@@ -177,20 +177,25 @@ impl GlobeQuery {
         Ok(CameraAngles {
             heading_deg: real(
                 "heading",
-                &self.heading,
+                self.heading.as_deref(),
                 usual.heading_deg,
                 "degrees clockwise from north, -360 to 360",
             )?,
             tilt_deg: real(
                 "tilt",
-                &self.tilt,
+                self.tilt.as_deref(),
                 usual.tilt_deg,
                 "degrees from straight down, 0 to 180",
             )?,
-            roll_deg: real("roll", &self.roll, usual.roll_deg, "degrees, -180 to 180")?,
+            roll_deg: real(
+                "roll",
+                self.roll.as_deref(),
+                usual.roll_deg,
+                "degrees, -180 to 180",
+            )?,
             field_of_view_deg: real(
                 "fov",
-                &self.fov,
+                self.fov.as_deref(),
                 usual.field_of_view_deg,
                 "degrees across the shorter side, 1 to 120",
             )?,
@@ -207,8 +212,8 @@ impl GlobeQuery {
             return Err(ServerError::invalid("distance_km", text, valid));
         }
         let place = LonLatDeg::new(
-            real("lon", &self.lon, 0.0, "degrees east")?,
-            real("lat", &self.lat, 0.0, "degrees north, -90 to 90")?,
+            real("lon", self.lon.as_deref(), 0.0, "degrees east")?,
+            real("lat", self.lat.as_deref(), 0.0, "degrees north, -90 to 90")?,
         )?;
         Ok(View::Globe {
             lon_deg: place.lon,
@@ -216,7 +221,7 @@ impl GlobeQuery {
             height_m: 1000.0
                 * real(
                     "height_km",
-                    &self.height_km,
+                    self.height_km.as_deref(),
                     HEIGHT_KM,
                     "kilometres above the ground, 1 to 1e6",
                 )?,
@@ -229,10 +234,9 @@ impl GlobeQuery {
 
 fn real(
     name: &'static str,
-    text: &Option<String>,
+    text: Option<&str>,
     default: f64,
     valid: &'static str,
 ) -> Result<f64, ServerError> {
-    text.as_deref()
-        .map_or(Ok(default), |text| number(name, text, valid))
+    text.map_or(Ok(default), |text| number(name, text, valid))
 }

@@ -14,7 +14,7 @@ const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
 
 /// The product asked about, as `/api/products` describes it.
 #[derive(Debug, Deserialize)]
-struct Product {
+struct Listed {
     product: String,
     /// West, south, east, north, degrees.
     bounds_deg: [f64; 4],
@@ -24,7 +24,7 @@ struct Product {
 
 #[derive(Debug, Deserialize)]
 struct Products {
-    products: Vec<Product>,
+    products: Vec<Listed>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -61,7 +61,7 @@ impl Questions {
         )
     }
 
-    fn about(product: &Product, options: &BenchServe, seed: u64) -> Result<Self> {
+    fn about(product: &Listed, options: &BenchServe, seed: u64) -> Result<Self> {
         let first = product.steps.first().context("the product has no steps")?;
         let last = product.steps.last().context("the product has no steps")?;
         let span_ms = last.end.ms() - first.start.ms();
@@ -94,7 +94,7 @@ impl Questions {
     }
 }
 
-fn chosen(products: Vec<Product>, options: &BenchServe) -> Result<Product> {
+fn chosen(products: Vec<Listed>, options: &BenchServe) -> Result<Listed> {
     let mode = &options.mode.to_string();
     let names: Vec<String> = products.iter().map(|one| one.product.clone()).collect();
     let mut those = products.into_iter().filter(|one| one.modes.contains(mode));
@@ -114,7 +114,7 @@ fn chosen(products: Vec<Product>, options: &BenchServe) -> Result<Product> {
     })
 }
 
-fn view(product: &Product, options: &BenchServe) -> String {
+fn view(product: &Listed, options: &BenchServe) -> String {
     format!(
         "{}/globe/{}/{}.png?lon={}&lat={}&height_km={}&tilt={}&width={}&height={}&",
         options.url,
@@ -130,7 +130,7 @@ fn view(product: &Product, options: &BenchServe) -> String {
 }
 
 /// The tiles of a zoom level that lie on the product.
-fn tiles(product: &Product, options: &BenchServe, zoom: u8) -> Result<Vec<String>> {
+fn tiles(product: &Listed, options: &BenchServe, zoom: u8) -> Result<Vec<String>> {
     let side = 1u32 << zoom;
     let mut places = vec![];
     for (y, x) in (0..side).flat_map(|y| (0..side).map(move |x| (y, x))) {
