@@ -171,7 +171,7 @@ mod tests {
         options: BenchServe,
     }
 
-    fn product() -> Product {
+    fn product() -> Listed {
         serde_json::from_str(
             r#"{"product": "p", "bounds_deg": [100, 0, 130, 40], "modes": ["map", "volume"],
                 "steps": [{"start": "2000-01-01T00:00:00Z", "end": "2000-02-01T00:00:00Z"},
