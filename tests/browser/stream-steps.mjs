@@ -36,13 +36,13 @@ export async function observationsOfPlatform(journey) {
   assert.ok(hit, `${name} must be one of the server's platforms`);
   const { dataset, platform } = hit.properties;
   const path = `api/observations/${encodeURIComponent(dataset)}/${encodeURIComponent(platform)}`;
-  const { series } = await journey.api(path);
+  const { observations } = await journey.api(path);
   const plot = page.locator("#platform-plot");
   await eventually(async () => {
     assert.ok(Number(await plot.getAttribute("data-points")) > 0);
     const unit = await plot.getAttribute("data-unit");
     assert.ok(
-      series.some((one) => one.unit === unit),
+      observations.some((one) => one.unit === unit),
       `${unit} must be a unit of the server's`,
     );
     const quality = await page.locator("#platform-quality").innerText();
