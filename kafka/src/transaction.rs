@@ -18,9 +18,8 @@ use crate::off_thread::OffThread;
 /// How long a transaction may take, and ending it when it failed.
 const LIMIT: Duration = Duration::from_secs(10);
 const ABORT_LIMIT: Duration = Duration::from_secs(5);
-/// How long the first word with the transactions' coordinator may take: it may have to end what a predecessor left, and a
-/// broker that has just started beside other work is slow.
-const FIRST_LIMIT: Duration = Duration::from_secs(30);
+/// How long the first word with the transactions' coordinator may take; it may have to end what a predecessor left.
+const FIRST_LIMIT: Duration = Duration::from_secs(10);
 /// Pause before a record is tried again that found the local queue full.
 const FULL_PAUSE: Duration = Duration::from_millis(10);
 /// How often, and after which pause, it is looked whether all reports are counted off.
