@@ -128,7 +128,8 @@ async fn as_many_are_drawn_at_once_as_were_asked_for_or_as_suit_the_drawer() {
 async fn an_answer_that_takes_too_long_ends_with_a_reason() {
     let app = TestApp::with(|settings| settings.request_limit_s = 1).await;
     app.drawer.is_slow.store(true, Ordering::SeqCst);
-    let answer = app.get(TILE).await;
+    let answer = tokio::time::timeout(Duration::from_mins(1), app.get(TILE)).await;
+    let answer = answer.expect("it ends");
     assert_eq!(answer.status, StatusCode::GATEWAY_TIMEOUT);
     assert!(answer.reason().contains("longer than 1 s"));
     assert!(!answer.header("retry-after").is_empty());
