@@ -89,3 +89,17 @@ async fn whoever_joins_a_job_under_way_has_its_picture_kept_as_he_ordered() {
     assert_eq!((given.origin, given.kept), (Origin::Stored, true));
     assert!(given.png == theirs && aside.png != theirs);
 }
+
+#[tokio::test]
+async fn whoever_joins_a_job_under_way_and_ordered_nothing_kept_leaves_the_store_as_it_is() {
+    let store = Store::memory();
+    let job = quick(&two_months_in(&store).await, 1);
+    let worker = Worker::start(&store, 1, 4);
+    let both = tokio::join!(
+        drawn(&worker, &job, Storing::Nothing),
+        drawn(&worker, &job, Storing::Nothing)
+    );
+    assert_eq!(pictures(&worker, "drawn"), 1, "both are one job");
+    assert!(!both.0.kept && !both.1.kept);
+    assert!(!store.exists(&job.key()).await.unwrap());
+}
