@@ -155,6 +155,10 @@ check_unit() {
     refused 'the look at a unit'"'"'s folders' 'cannot write FLUXGLOBE_EXECUTOR_WORK' "$tools/bin/python" -B check/unit.py "$work/fluxglobe@.service"
     sed '/KAFKA_PASSWORD_FILE/d' fluxglobe@.service >"$work/fluxglobe@.service"
     refused 'the look at a unit'"'"'s secrets' FLUXGLOBE_KAFKA_PASSWORD_FILE "$tools/bin/python" -B check/unit.py "$work/fluxglobe@.service"
+    sed '/^User=/d' fluxglobe@.service >"$work/fluxglobe@.service"
+    refused 'the look at a unit'"'"'s user' 'one user for all services' "$tools/bin/python" -B check/unit.py "$work/fluxglobe@.service"
+    sed '/^StartLimitIntervalSec=/d' fluxglobe@.service >"$work/fluxglobe@.service"
+    refused 'the look at a unit'"'"'s starts' 'gives up' "$tools/bin/python" -B check/unit.py "$work/fluxglobe@.service"
     if ! command -v systemd-analyze >/dev/null; then
         printf 'deploy: unit: systemd-analyze is not on this machine, left out\n'
         return

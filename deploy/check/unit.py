@@ -1,6 +1,7 @@
-"""Reads a systemd unit and says which folder of its settings the service could not write: python unit.py UNIT.
+"""Reads a systemd unit and says what its services could not do, or could do to each other: python unit.py UNIT.
 
-The root file system is read-only to it, so every folder must lie in its state directory.
+The root file system is read-only to a service, so every folder that it writes must lie in its state directory. Services
+of one machine are users of their own, and are started as often as they end.
 """
 
 import sys
@@ -42,6 +43,10 @@ def faults(unit: Path) -> list[str]:
     for name in SECRETS[kind]:
         if not variables.get(name, "").startswith("%d/"):
             found.append(f"{unit.name} does not hand over {name}")
+    if kind == "fluxglobe@" and not any("%i" in user for user in service.get("User", [])):
+        found.append(f"{unit.name} has one user for all services")
+    if kind == "fluxglobe@" and service.get("StartLimitIntervalSec") != ["0"]:
+        found.append(f"{unit.name} gives up a service that ended often")
     return found
 
 

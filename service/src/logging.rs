@@ -1,5 +1,7 @@
 //! Log lines on standard error: for people, or a JSON object a line for collectors.
 
+use std::io::{IsTerminal as _, stderr};
+
 use tracing_subscriber::EnvFilter;
 
 use crate::ServiceError;
@@ -19,9 +21,13 @@ pub fn start_logging(filter: &str, format: LogFormat) -> Result<(), ServiceError
         filter: filter.to_owned(),
         reason: e.to_string(),
     })?;
-    let lines = tracing_subscriber::fmt()
+    let mut lines = tracing_subscriber::fmt()
         .with_env_filter(parsed)
-        .with_writer(std::io::stderr);
+        .with_writer(stderr);
+    // Files and journals are searched as they are: colours are for a terminal alone, unless NO_COLOR forbids them.
+    if !stderr().is_terminal() {
+        lines = lines.with_ansi(false);
+    }
     match format {
         LogFormat::Text => lines.init(),
         LogFormat::Json => lines
