@@ -10,6 +10,7 @@ mod damaged;
 mod dependencies;
 mod end_to_end;
 mod harness_self;
+mod logged;
 mod reread;
 mod same_answers;
 mod sea;
