@@ -25,7 +25,6 @@ mod connections;
 pub mod error;
 mod extract;
 mod gate;
-pub mod legend;
 pub mod live;
 mod look;
 pub mod metrics;
