@@ -5,7 +5,7 @@
 
 pub mod raster;
 pub mod svg;
-mod ticks;
+pub mod ticks;
 
 use contract::colour::{AtStop, Rgb, Stops, TransferFunction};
 use contract::job::Mode;

@@ -11,7 +11,7 @@ use crate::LegendError;
 /// What other texts than names of seas are written in: every sign that units are written with is in it.
 pub const SANS: &str = "DejaVu Sans";
 /// What names of seas are written in, in italics as on maps.
-pub const SERIF: &str = "DejaVu Serif Condensed";
+pub const SERIF: &str = "DejaVu Serif";
 
 /// These fonts for texts of any family.
 static OPTIONS: LazyLock<Options<'static>> = LazyLock::new(|| {

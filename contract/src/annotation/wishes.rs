@@ -126,7 +126,8 @@ impl AnnotationWishes {
     }
 
     /// Is nothing asked for?
-    pub fn is_empty(self) -> bool {
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it so")]
+    pub fn is_empty(&self) -> bool {
         !self.all && self.named == 0
     }
 }

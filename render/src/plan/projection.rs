@@ -37,6 +37,12 @@ impl Projection {
         })
     }
 
+    /// The place below the camera, and how far it is from the globe's middle, earth radii.
+    pub fn stands(&self) -> (LonLatDeg, f64) {
+        let from_middle = self.camera.place.length();
+        (degrees(self.camera.place / from_middle), from_middle)
+    }
+
     /// Where a place at a height in metres above the sphere is seen; none behind the camera or closer to it than
     /// anything is drawn.
     pub fn seen(&self, place: LonLatDeg, height_m: f64) -> Option<Seen> {
@@ -106,10 +112,7 @@ impl Projection {
             return None;
         }
         let ground = place + sight * (along - under_root.sqrt());
-        Some(LonLatDeg {
-            lon: ground.x.atan2(ground.y).to_degrees(),
-            lat: ground.z.clamp(-1.0, 1.0).asin().to_degrees(),
-        })
+        Some(degrees(ground))
     }
 
     /// Pixels of a metre of ground at a place, across the picture (x to the right of it) and up the slope of the ground
@@ -180,6 +183,13 @@ impl Projection {
             }
         }
         at(near)
+    }
+}
+
+fn degrees(normal: DVec3) -> LonLatDeg {
+    LonLatDeg {
+        lon: normal.x.atan2(normal.y).to_degrees(),
+        lat: normal.z.clamp(-1.0, 1.0).asin().to_degrees(),
     }
 }
 
