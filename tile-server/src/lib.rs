@@ -18,6 +18,7 @@
 //! Left out on purpose: drawing and computing, which come in through the traits of [`backend`].
 
 mod analyses;
+mod annotations;
 pub mod backend;
 mod catalogue;
 pub mod config;

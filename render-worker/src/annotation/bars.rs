@@ -116,7 +116,7 @@ fn heights(
     words.push(format!("100 km drawn are {hundred_km} {unit}"));
     let marks = if top_px < least_px {
         let limit = figures(shown(HEIGHT_LIMIT_M));
-        words.push(format!("(none higher than for {limit})"));
+        words.push(format!("drawn up to {limit} {unit}"));
         vec![]
     } else {
         let mut values = ticks::of(0.0, shown(highest_m));

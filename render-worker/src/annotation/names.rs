@@ -14,34 +14,33 @@ const LEAST_FACING: f64 = 0.31;
 const MOST_OF_SEA: f64 = 1.15;
 /// Sizes of letters by rank.
 const SIZE_EM: [f64; 4] = [1.3, 1.1, 0.95, 0.85];
+/// From one line to the next, sizes of letters.
+const LINE: f64 = 1.25;
 /// Free room around a name.
 const ROOM_EM: f64 = 0.7;
 
-/// A name at one of its places.
-struct Written<'a> {
-    text: Text<'a>,
-    area: Area,
+/// A name as it is written, in one line or two.
+struct Name {
+    lines: Vec<String>,
+    /// Of the longest line, pixels.
+    length: f64,
+    size: f64,
+    ink: Ink,
 }
 
 pub(super) fn draw(page: &mut Page, projection: &Projection) -> Result<(), LegendError> {
     for sea in SEAS {
-        let (ink, name) = match sea.rank {
-            0 => (Ink::Ocean, sea.name.to_uppercase()),
-            _ => (Ink::Sea, sea.name.to_owned()),
-        };
-        let size = SIZE_EM[usize::from(sea.rank).min(SIZE_EM.len() - 1)] * page.em();
         let places = seen_places(sea, projection);
         if places.is_empty() {
             continue;
         }
-        let length = width(&name, size, ink)?;
-        for (place, px) in places {
-            if length > MOST_OF_SEA * width_px(sea, place, projection) {
-                continue;
-            }
-            let written = written(&name, px, size, length, ink);
-            if page.take(written.area.grown(ROOM_EM * page.em())) {
-                page.label(&written.text);
+        let names = Name::forms(sea, page.em())?;
+        let choices = names
+            .iter()
+            .flat_map(|name| places.iter().map(move |place| (name, place)));
+        for (name, (place, px)) in choices {
+            let has_room = name.length <= MOST_OF_SEA * width_px(sea, *place, projection);
+            if has_room && name.write(page, *px) {
                 break;
             }
         }
@@ -61,7 +60,8 @@ fn seen_places(sea: &Sea, projection: &Projection) -> Vec<(LonLatDeg, [f64; 2])>
         .collect();
     facing.sort_by(|a, b| b.0.total_cmp(&a.0));
     let seen = facing.into_iter().filter_map(|(_, place)| {
-        let seen = projection.seen(place, 0.0).filter(|seen| seen.is_visible)?;
+        let seen = projection.seen(place, 0.0);
+        let seen = seen.filter(|seen| seen.is_visible)?;
         Some((place, [seen.x_px, seen.y_px]))
     });
     seen.collect()
@@ -69,27 +69,61 @@ fn seen_places(sea: &Sea, projection: &Projection) -> Vec<(LonLatDeg, [f64; 2])>
 
 /// How wide a sea is in the picture.
 fn width_px(sea: &Sea, place: LonLatDeg, projection: &Projection) -> f64 {
-    let across = projection
-        .px_per_m(place)
-        .map_or(0.0, |[across, _away]| across);
-    sea.width_km * 1000.0 * across
+    let px_per_m = projection.px_per_m(place);
+    sea.width_km * 1000.0 * px_per_m.map_or(0.0, |[across, _away]| across)
 }
 
-fn written(name: &str, [x, y]: [f64; 2], size: f64, length: f64, ink: Ink) -> Written<'_> {
-    Written {
-        text: Text {
-            text: name,
-            x,
-            y: y + 0.35 * size,
-            size,
-            anchor: Anchor::Middle,
-            ink,
-        },
-        area: Area {
-            left: x - 0.5 * length,
-            top: y - 0.5 * size,
-            right: x + 0.5 * length,
-            bottom: y + 0.5 * size,
-        },
+impl Name {
+    /// In one line; in two where that is shorter.
+    fn forms(sea: &Sea, em: f64) -> Result<Vec<Self>, LegendError> {
+        let (ink, text) = match sea.rank {
+            0 => (Ink::Ocean, sea.name.to_uppercase()),
+            _ => (Ink::Sea, sea.name.to_owned()),
+        };
+        let size = SIZE_EM[usize::from(sea.rank).min(SIZE_EM.len() - 1)] * em;
+        let form = |lines: Vec<String>| -> Result<Self, LegendError> {
+            let mut length = 0.0f64;
+            for line in &lines {
+                length = length.max(width(line, size, ink)?);
+            }
+            Ok(Self {
+                lines,
+                length,
+                size,
+                ink,
+            })
+        };
+        let mut forms = vec![form(vec![text.clone()])?];
+        if let Some((first, last)) = text.rsplit_once(' ') {
+            forms.push(form(vec![first.to_owned(), last.to_owned()])?);
+        }
+        Ok(forms)
+    }
+
+    /// Writes it round a place if there is room.
+    fn write(&self, page: &mut Page, [x, y]: [f64; 2]) -> bool {
+        let line_px = LINE * self.size;
+        let half = 0.5 * self.lines.len() as f64 * line_px;
+        let area = Area {
+            left: x - 0.5 * self.length,
+            top: y - half,
+            right: x + 0.5 * self.length,
+            bottom: y + half,
+        };
+        let is_free = page.take(area.grown(ROOM_EM * page.em()));
+        if is_free {
+            for (i, line) in self.lines.iter().enumerate() {
+                let middle = y - half + (i as f64 + 0.5) * line_px;
+                page.label(&Text {
+                    text: line,
+                    x,
+                    y: middle + 0.35 * self.size,
+                    size: self.size,
+                    anchor: Anchor::Middle,
+                    ink: self.ink,
+                });
+            }
+        }
+        is_free
     }
 }

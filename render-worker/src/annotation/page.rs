@@ -8,8 +8,8 @@ const EM_PER_PX: f64 = 1.0 / 75.0;
 const EM_LIMITS_PX: [f64; 2] = [11.0, 60.0];
 /// Distance of panels from the edges, letters.
 const MARGIN_EM: f64 = 1.1;
-/// Share of the picture on either side of its middle that panels leave free.
-const MIDDLE: f64 = 0.2;
+/// Share of the picture on either side of its middle that panels leave free, across and down.
+const MIDDLE: f64 = 0.15;
 
 /// A rectangle, pixels.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -89,6 +89,11 @@ impl Page {
     /// Height of a letter of usual size, pixels.
     pub(super) fn em(&self) -> f64 {
         self.em
+    }
+
+    /// Width and height without what lies along the lower edge, pixels.
+    pub(super) fn free_size(&self) -> [f64; 2] {
+        [self.size[0], self.size[1] - self.foot]
     }
 
     pub(super) fn margin(&self) -> f64 {

@@ -4,7 +4,7 @@ use super::page::{Area, Page};
 use super::text::{Anchor, Ink, Text};
 
 /// Its colour: that of the night sky, and how much of the picture it hides.
-const GROUND: &str = "fill=\"#0b1421\" fill-opacity=\"0.66\"";
+const GROUND: &str = "fill=\"#0b1421\" fill-opacity=\"0.72\"";
 /// Radius of its corners, letters.
 const ROUND_EM: f64 = 0.4;
 

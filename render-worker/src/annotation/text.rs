@@ -78,7 +78,7 @@ impl Ink {
         match self {
             Self::Panel => format!(" fill=\"{LIGHT}\""),
             Self::Soft => format!(" fill=\"{SOFT}\""),
-            Self::Ground => format!(" fill=\"{LIGHT}\"{}", halo(0.28, 0.6)),
+            Self::Ground => format!(" fill=\"{LIGHT}\"{}", halo(0.26, 0.7)),
             Self::Ocean | Self::Sea => {
                 let spacing = self.spacing(size);
                 format!(

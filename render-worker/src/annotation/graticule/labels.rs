@@ -6,11 +6,11 @@ use render::plan::Projection;
 
 use super::super::page::{Area, Page};
 use super::super::text::{Anchor, Ink, Text, width};
-use super::{Kind, Line, Lines};
+use super::{Kind, Line, Lines, clip};
 
 const SIZE_EM: f64 = 0.74;
 /// From a line's end to its name.
-const GAP_EM: f64 = 0.45;
+const GAP_EM: f64 = 0.7;
 /// How near to the edge of the picture a line has left it, pixels.
 const NEAR_PX: f64 = 0.01;
 /// Ground that faces the camera less than this is at the horizon.
@@ -48,7 +48,7 @@ impl Lines {
             let name = line.name();
             let size = SIZE_EM * page.em();
             let across = width(&name, size, Ink::Ground)?;
-            let ends = line.ends(page.size(), projection);
+            let ends = line.ends(page.free_size(), projection);
             let places = order(line.kind).into_iter().flat_map(|end| {
                 let here = ends.iter().filter(move |(found, _)| *found == end);
                 here.map(|(end, px)| (*end, *px))
@@ -133,12 +133,12 @@ impl Line {
         format!("{size}°{side}")
     }
 
-    /// Its ends in the picture, and where those are.
-    fn ends(&self, [right, bottom]: [f64; 2], projection: &Projection) -> Vec<(End, [f64; 2])> {
-        let ends = self
-            .parts
-            .iter()
-            .flat_map(|part| [part[0], part[part.len() - 1]]);
+    /// Its ends in a picture of a size, from the left upper corner, and where those are.
+    fn ends(&self, size: [f64; 2], projection: &Projection) -> Vec<(End, [f64; 2])> {
+        let [right, bottom] = size;
+        let parts = self.parts.iter();
+        let parts = parts.flat_map(|part| clip::to_picture(part, size));
+        let ends = parts.flat_map(|part| [part[0], part[part.len() - 1]]);
         let named = ends.filter_map(|px| {
             let [x, y] = px;
             let end = if x <= NEAR_PX {
