@@ -16,6 +16,9 @@ const PADDING_EM: f64 = 0.8;
 const SCALE_EM: f64 = 11.0;
 /// Highest and lowest height bar; one that would be lower, because the camera looks down on it, is told in words.
 const HEIGHT_EM: [f64; 2] = [2.4, 8.5];
+/// From the left of the panel's inside to the bar and to what is written beside it.
+const BAR_EM: f64 = 0.5;
+const BAR_TEXT_EM: f64 = 1.3;
 /// Least distance of the numbers along it.
 const TICKS_EM: f64 = 1.2;
 const SMALL_EM: f64 = 0.8;
@@ -266,6 +269,10 @@ impl Rulers {
             for line in &heights.words {
                 across = across.max(width(line, small, Ink::Soft)?);
             }
+            for (i, (_, text)) in heights.marks.iter().enumerate() {
+                let told = width(&heights.told(i, text), small, Ink::Panel)?;
+                across = across.max(BAR_TEXT_EM * em + told);
+            }
             down += heights.words.len() as f64 * LINE_EM * em + heights.bar_px(em);
         }
         if let Some(scale) = &self.scale {
@@ -287,30 +294,38 @@ impl Heights {
         self.marks.last().map_or(0.0, |(top, _)| top + 1.6 * em)
     }
 
+    fn is_limit(&self, mark: usize) -> bool {
+        self.has_limit && mark + 1 == self.marks.len()
+    }
+
+    /// What is written beside a mark.
+    fn told(&self, mark: usize, text: &str) -> String {
+        match mark {
+            _ if self.is_limit(mark) => format!("{text} and more"),
+            0 => format!("{text} sea surface"),
+            _ => text.to_owned(),
+        }
+    }
+
     /// Upwards from the ground; where it ends below comes back.
     fn draw_bar(&self, panel: &mut Panel, y: f64, em: f64) -> f64 {
         let Some((top, _)) = self.marks.last() else {
             return y;
         };
         let small = SMALL_EM * em;
-        let x = (PADDING_EM + 0.4) * em;
+        let x = (PADDING_EM + BAR_EM) * em;
         let ground = y + top + 0.7 * em;
         panel.stroke([x, ground], [x, ground - top], 0.12 * em);
-        let last = self.marks.len() - 1;
         for (i, (above, text)) in self.marks.iter().enumerate() {
             let at = ground - above;
-            let is_limit = self.has_limit && i == last;
+            let is_limit = self.is_limit(i);
             let (reach, thick) = if is_limit { (0.5, 0.2) } else { (0.32, 0.09) };
             let from = if is_limit { x - reach * em } else { x };
             panel.stroke([from, at], [x + reach * em, at], thick * em);
-            let text = match (is_limit, i) {
-                (true, _) => format!("{text} and more: drawn no higher"),
-                (false, 0) => format!("{text}  sea surface"),
-                (false, _) => text.clone(),
-            };
+            let text = self.told(i, text);
             panel.write(
                 &text,
-                [x + 0.8 * em, at + 0.29 * em],
+                [(PADDING_EM + BAR_TEXT_EM) * em, at + 0.29 * em],
                 small,
                 Anchor::Start,
                 Ink::Panel,

@@ -29,7 +29,7 @@ const LEAST_SIDE_PX: u32 = 96;
 ///
 /// # Errors
 /// None that a valid job has; defects of the drawing.
-pub(crate) fn annotated(job: &RenderJob, image: Image) -> Result<Image, LegendError> {
+pub fn annotated(job: &RenderJob, image: Image) -> Result<Image, LegendError> {
     let Some(svg) = drawing(job)? else {
         return Ok(image);
     };
@@ -50,17 +50,17 @@ pub fn drawing(job: &RenderJob) -> Result<Option<String>, LegendError> {
         return Ok(None);
     }
     let mut page = Page::new(size_px);
-    // What has the fewest places to go comes first.
+    // What matters most comes first: what follows takes the room that is left.
     if let Some(source) = &annotations.source {
         caption::draw(&mut page, source)?;
     }
     if let Some(quantity) = annotations.legend {
         key::draw(&mut page, job, quantity)?;
     }
-    bars::draw(&mut page, job, annotations, &projection)?;
     if let Some(date) = &annotations.date {
         key::draw_date(&mut page, date)?;
     }
+    bars::draw(&mut page, job, annotations, &projection)?;
     let grid = annotations
         .graticule
         .map(|graticule| graticule::Lines::of(graticule, &projection, page.size()));

@@ -14,6 +14,8 @@ const LEAST_FACING: f64 = 0.31;
 const MOST_OF_SEA: f64 = 1.15;
 /// Sizes of letters by rank.
 const SIZE_EM: [f64; 4] = [1.3, 1.1, 0.95, 0.85];
+/// Largest letters for the picture's shorter side: small pictures have letters that are large for them.
+const MOST_OF_PICTURE: f64 = 0.03;
 /// From one line to the next, sizes of letters.
 const LINE: f64 = 1.25;
 /// Free room around a name.
@@ -34,7 +36,7 @@ pub(super) fn draw(page: &mut Page, projection: &Projection) -> Result<(), Legen
         if places.is_empty() {
             continue;
         }
-        let names = Name::forms(sea, page.em())?;
+        let names = Name::forms(sea, size(sea, page))?;
         let choices = names
             .iter()
             .flat_map(|name| places.iter().map(move |place| (name, place)));
@@ -67,6 +69,15 @@ fn seen_places(sea: &Sea, projection: &Projection) -> Vec<(LonLatDeg, [f64; 2])>
     seen.collect()
 }
 
+/// How large the letters of a name are, pixels.
+fn size(sea: &Sea, page: &Page) -> f64 {
+    let [.., smallest] = SIZE_EM;
+    let of_rank = SIZE_EM.get(usize::from(sea.rank)).unwrap_or(&smallest);
+    let [width, height] = page.size();
+    let most = (MOST_OF_PICTURE * width.min(height)).max(smallest * page.em());
+    (of_rank * page.em()).min(most)
+}
+
 /// How wide a sea is in the picture.
 fn width_px(sea: &Sea, place: LonLatDeg, projection: &Projection) -> f64 {
     let px_per_m = projection.px_per_m(place);
@@ -75,12 +86,11 @@ fn width_px(sea: &Sea, place: LonLatDeg, projection: &Projection) -> f64 {
 
 impl Name {
     /// In one line; in two where that is shorter.
-    fn forms(sea: &Sea, em: f64) -> Result<Vec<Self>, LegendError> {
+    fn forms(sea: &Sea, size: f64) -> Result<Vec<Self>, LegendError> {
         let (ink, text) = match sea.rank {
             0 => (Ink::Ocean, sea.name.to_uppercase()),
             _ => (Ink::Sea, sea.name.to_owned()),
         };
-        let size = SIZE_EM[usize::from(sea.rank).min(SIZE_EM.len() - 1)] * em;
         let form = |lines: Vec<String>| -> Result<Self, LegendError> {
             let mut length = 0.0f64;
             for line in &lines {
