@@ -105,8 +105,7 @@ impl Annotations {
                 "a picture without annotations has no list of them".to_owned(),
             );
         }
-        self.graticule
-            .map_or(Ok(()), |graticule| graticule.validate())
+        self.graticule.map_or(Ok(()), Graticule::validate)
     }
 }
 

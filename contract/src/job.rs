@@ -444,11 +444,7 @@ mod tests {
         |j| over(j, |a| a.legend = Some(Quantity::AccumulatedCarbon)),
         |j| over(j, |a| a.date = date("15 July 2000", None)),
         |j| over(j, |a| a.date = date("16 July 2000", None)),
-        |j| {
-            over(j, |a| {
-                a.date = date("16 July 2000", Label::cut("daily means"))
-            })
-        },
+        |j| over(j, |a| a.date = date("16 July 2000", Label::cut("daily"))),
         |j| over(j, |a| a.graticule = Graticule::every(10.0).ok()),
         |j| over(j, |a| a.graticule = Graticule::every(15.0).ok()),
         |j| over(j, |a| a.names = true),

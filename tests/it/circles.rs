@@ -16,7 +16,6 @@ use syn::{Attribute, Item, ItemMod, UseTree, Visibility};
 /// Crates whose sources are read, by folder and root file.
 const CRATES: &[&str] = &[
     "contract/src/lib.rs",
-    "legend/src/lib.rs",
     "storage/src/lib.rs",
     "kafka/src/lib.rs",
     "observations/src/lib.rs",

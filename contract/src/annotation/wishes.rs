@@ -126,7 +126,6 @@ impl AnnotationWishes {
     }
 
     /// Is nothing asked for?
-    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it so")]
     pub fn is_empty(&self) -> bool {
         !self.all && self.named == 0
     }
@@ -157,13 +156,13 @@ impl FromStr for AnnotationWishes {
 
 #[cfg(test)]
 mod tests {
+    use super::Wanted::{ByName, No, WhereItFits};
     use super::*;
 
     #[test]
     fn wishes_are_words_with_commas_between() {
         let wishes: AnnotationWishes = "legend, scale".parse().unwrap();
         let wanted = Annotation::ALL.map(|one| wishes.wanted(one));
-        use Wanted::{ByName, No, WhereItFits};
         assert_eq!(wanted, [ByName, No, No, No, ByName, No, No]);
         let all: AnnotationWishes = "all".parse().unwrap();
         assert_eq!(all, AnnotationWishes::all());

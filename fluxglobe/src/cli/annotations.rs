@@ -8,6 +8,10 @@ const HEADING: &str = "Annotations";
 
 /// What is drawn over the finished picture.
 #[derive(Debug, Args)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each is a word of the command line"
+)]
 pub(crate) struct Annotated {
     /// All annotations below that the picture has something to tell of.
     #[arg(long, help_heading = HEADING)]
@@ -21,6 +25,10 @@ pub(crate) struct Annotated {
     /// Meridians and parallels every so many degrees, 0.01 to 90, as in `--graticule 15`; what suits the view if no number
     /// is given. Lines that nobody could tell apart are fewer.
     #[arg(long, help_heading = HEADING, value_name = "DEGREES", allow_negative_numbers = true, value_parser = graticule)]
+    #[expect(
+        clippy::option_option,
+        reason = "clap's way to say: not there, or there without a number"
+    )]
     graticule: Option<Option<Graticule>>,
     /// Names of oceans and seas where there is room for them.
     #[arg(long, help_heading = HEADING)]

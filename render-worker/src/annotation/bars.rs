@@ -26,6 +26,9 @@ const LINE_EM: f64 = 1.25;
 /// Halvings of the search for the highest bar that fits.
 const HALVINGS: u32 = 40;
 
+/// Where a scale holds: perspective makes others elsewhere.
+const AT_CENTRE: &str = "at the centre";
+
 /// A length of ground.
 struct Scale {
     text: String,
@@ -193,7 +196,7 @@ impl Rulers {
             return Ok(());
         }
         let em = page.em();
-        let (padding, small) = (PADDING_EM * em, SMALL_EM * em);
+        let padding = PADDING_EM * em;
         let size = self.size(em)?;
         let corners = [
             Corner::BottomRight,
@@ -217,46 +220,10 @@ impl Rulers {
         let mut panel = Panel::over(area, em);
         let mut y = padding;
         if let Some(heights) = &self.heights {
-            let (above, below) = heights.words.split_at(2);
-            for (line, ink) in above.iter().zip([Ink::Panel, Ink::Soft]) {
-                panel.write(line, [padding, y + 0.85 * em], small, Anchor::Start, ink);
-                y += LINE_EM * em;
-            }
-            y = heights.draw_bar(&mut panel, y, em);
-            for line in below {
-                panel.write(
-                    line,
-                    [padding, y + 0.85 * em],
-                    small,
-                    Anchor::Start,
-                    Ink::Soft,
-                );
-                y += LINE_EM * em;
-            }
-            y += 0.5 * em;
+            y = heights.draw(&mut panel, y, em);
         }
         if let Some(scale) = &self.scale {
-            let (left, right) = (padding, padding + scale.px);
-            panel.write(
-                &scale.text,
-                [padding, y + 0.8 * em],
-                small,
-                Anchor::Start,
-                Ink::Panel,
-            );
-            panel.write(
-                "at the centre",
-                [size[0] - padding, y + 0.8 * em],
-                small,
-                Anchor::End,
-                Ink::Soft,
-            );
-            y += LINE_EM * em;
-            let (line, tick) = (0.12 * em, 0.32 * em);
-            panel.stroke([left, y + tick], [right, y + tick], line);
-            for x in [left, right] {
-                panel.stroke([x, y], [x, y + 2.0 * tick], line);
-            }
+            scale.draw(&mut panel, y, size[0] - padding, em);
         }
         panel.put(page);
         Ok(())
@@ -277,7 +244,7 @@ impl Rulers {
         }
         if let Some(scale) = &self.scale {
             let words =
-                width(&scale.text, small, Ink::Panel)? + width("at the centre", small, Ink::Soft)?;
+                width(&scale.text, small, Ink::Panel)? + width(AT_CENTRE, small, Ink::Soft)?;
             across = across.max(scale.px).max(words + em);
             down += (LINE_EM + 0.64) * em;
         }
@@ -285,6 +252,29 @@ impl Rulers {
             down += 0.5 * em;
         }
         Ok([across + 2.0 * PADDING_EM * em, down])
+    }
+}
+
+impl Scale {
+    /// The bar below its length; what it is of ends at `right`.
+    fn draw(&self, panel: &mut Panel, y: f64, right: f64, em: f64) {
+        let (padding, small) = (PADDING_EM * em, SMALL_EM * em);
+        let base = y + 0.8 * em;
+        panel.write(
+            &self.text,
+            [padding, base],
+            small,
+            Anchor::Start,
+            Ink::Panel,
+        );
+        panel.write(AT_CENTRE, [right, base], small, Anchor::End, Ink::Soft);
+        let top = y + LINE_EM * em;
+        let (line, tick) = (0.12 * em, 0.32 * em);
+        let ends = [padding, padding + self.px];
+        panel.stroke([ends[0], top + tick], [ends[1], top + tick], line);
+        for x in ends {
+            panel.stroke([x, top], [x, top + 2.0 * tick], line);
+        }
     }
 }
 
@@ -305,6 +295,24 @@ impl Heights {
             0 => format!("{text} sea surface"),
             _ => text.to_owned(),
         }
+    }
+
+    /// The bar and the words around it; where they end below comes back.
+    fn draw(&self, panel: &mut Panel, mut y: f64, em: f64) -> f64 {
+        let (padding, small) = (PADDING_EM * em, SMALL_EM * em);
+        let write = |panel: &mut Panel, y: f64, line: &str, ink: Ink| {
+            panel.write(line, [padding, y + 0.85 * em], small, Anchor::Start, ink);
+            y + LINE_EM * em
+        };
+        let (above, below) = self.words.split_at(2);
+        for (line, ink) in above.iter().zip([Ink::Panel, Ink::Soft]) {
+            y = write(panel, y, line, ink);
+        }
+        y = self.draw_bar(panel, y, em);
+        for line in below {
+            y = write(panel, y, line, Ink::Soft);
+        }
+        y + 0.5 * em
     }
 
     /// Upwards from the ground; where it ends below comes back.

@@ -1,6 +1,7 @@
 //! The panels that say what is shown and when: the legend's bar of colours, and the date.
 
 use contract::annotation::DateLabel;
+use contract::colour::TransferFunction;
 use contract::job::RenderJob;
 use contract::quantity::Quantity;
 use legend::svg::{Bar, write_bar};
@@ -71,12 +72,31 @@ pub(super) fn draw(
     let mut colors = String::new();
     write_bar(&legend, bar, &mut colors).expect("a string takes any text");
     panel.push(&colors);
+    write_marks(&mut panel, &legend, [padding, foot], across, em)?;
+    if let Some(ends) = ends {
+        let y = foot + 2.45 * em;
+        write_ends(&mut panel, transfer, ends, [padding, right], y, small);
+    }
+    panel.put(page);
+    Ok(())
+}
+
+/// Round values below a bar that begins at a place of the panel.
+fn write_marks(
+    panel: &mut Panel,
+    legend: &Legend,
+    [left, foot]: [f64; 2],
+    across: f64,
+    em: f64,
+) -> Result<(), LegendError> {
+    let small = SMALL_EM * em;
     for (place, text) in legend.marks() {
-        let x = padding + place * across;
+        let x = left + place * across;
         panel.stroke([x, foot], [x, foot + 0.3 * em], 0.07 * em);
         let half = 0.5 * width(&text, small, Ink::Panel)?;
         // Long numbers at the ends stay in the panel.
-        let middle = x.clamp(0.3 * em + half, across + 2.0 * padding - 0.3 * em - half);
+        let edge = 0.3 * em + half;
+        let middle = x.clamp(edge, (across + 2.0 * left - edge).max(edge));
         panel.write(
             &text,
             [middle, foot + 1.2 * em],
@@ -85,29 +105,36 @@ pub(super) fn draw(
             Ink::Panel,
         );
     }
-    if let Some([low, high]) = ends {
-        let y = foot + 2.45 * em;
-        if transfer.low < 0.0 {
-            panel.write(
-                &format!("◂ {low}"),
-                [padding, y],
-                small,
-                Anchor::Start,
-                Ink::Panel,
-            );
-        }
-        if transfer.high > 0.0 {
-            panel.write(
-                &format!("{high} ▸"),
-                [right, y],
-                small,
-                Anchor::End,
-                Ink::Panel,
-            );
-        }
-    }
-    panel.put(page);
     Ok(())
+}
+
+/// What values below and above zero mean, where the range has such.
+fn write_ends(
+    panel: &mut Panel,
+    transfer: &TransferFunction,
+    [low, high]: [&str; 2],
+    [left, right]: [f64; 2],
+    y: f64,
+    size: f64,
+) {
+    if transfer.low < 0.0 {
+        panel.write(
+            &format!("◂ {low}"),
+            [left, y],
+            size,
+            Anchor::Start,
+            Ink::Panel,
+        );
+    }
+    if transfer.high > 0.0 {
+        panel.write(
+            &format!("{high} ▸"),
+            [right, y],
+            size,
+            Anchor::End,
+            Ink::Panel,
+        );
+    }
 }
 
 /// The date.

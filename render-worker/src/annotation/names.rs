@@ -125,7 +125,7 @@ impl Name {
             for (i, line) in self.lines.iter().enumerate() {
                 let middle = y - half + (i as f64 + 0.5) * line_px;
                 page.label(&Text {
-                    text: line,
+                    words: line,
                     x,
                     y: middle + 0.35 * self.size,
                     size: self.size,

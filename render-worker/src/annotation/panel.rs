@@ -41,7 +41,7 @@ impl Panel {
         ink: Ink,
     ) {
         let line = Text {
-            text,
+            words: text,
             x: self.area.left + x,
             y: self.area.top + y,
             size,

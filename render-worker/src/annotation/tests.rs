@@ -7,6 +7,9 @@ use contract::job::{Mode, View};
 use contract::quantity::Quantity;
 use render_proof::ocean;
 
+/// Takes one annotation away.
+type Without = fn(&mut Annotations);
+
 fn view(width_px: u32, height_px: u32, height_m: f64, tilt_deg: f64) -> View {
     View::Globe {
         lon_deg: -150.0,
@@ -143,7 +146,7 @@ fn nothing_lies_over_anything_else_or_outside() {
 fn each_annotation_is_drawn_when_it_is_asked_for_and_not_else() {
     let view = view(1600, 900, 4e6, 25.0);
     let whole = drawn(view, |_all| ());
-    let parts: [(fn(&mut Annotations), &str); 7] = [
+    let parts: [(Without, &str); 7] = [
         (|a| a.legend = None, "sea gives off"),
         (|a| a.date = None, "15 July 2000"),
         (|a| a.graticule = None, "120°W"),
@@ -189,7 +192,7 @@ fn a_picture_without_annotations_or_room_keeps_its_bytes() {
 #[test]
 fn the_largest_picture_has_room_for_the_finest_lines() {
     let svg = drawn(view(4096, 4096, 1.5e7, 0.0), |a| {
-        a.graticule = Graticule::every(0.01).ok()
+        a.graticule = Graticule::every(0.01).ok();
     });
     assert!(svg.len() < 8 << 20, "{} bytes", svg.len());
     let pixels = raster::pixels(&svg).unwrap();

@@ -66,8 +66,9 @@ fn job(flux: &Manifest, carbon: &Manifest, mode: Mode, wishes: AnnotationWishes)
 async fn products() -> (Store, Manifest, Manifest) {
     let store = Store::memory();
     let (mut flux, carbon) = two_months(&store).await;
-    flux.title = "Made-up flux".to_owned();
-    flux.source = "Somebody & somebody else (2000), <Journal> 1, 1-2".to_owned();
+    "Made-up flux".clone_into(&mut flux.title);
+    let source = "Somebody & somebody else (2000), <Journal> 1, 1-2";
+    source.clone_into(&mut flux.source);
     (store, flux, carbon)
 }
 

@@ -10,6 +10,9 @@ use super::camera::{self, Camera};
 /// Halvings of the way between two corners of a line on which it goes out of sight: to a billionth of it.
 const HALVINGS: u32 = 30;
 
+/// Half of a length of ground that is measured, earth radii: metres are small for any camera, and large for the numbers.
+const STEP: f64 = 1e-6;
+
 /// From places to pixels of a globe view.
 pub struct Projection {
     camera: Camera,
@@ -121,8 +124,6 @@ impl Projection {
         if self.clearance(place) < 0.0 {
             return None;
         }
-        // A millionth of the radius is metres: small for any camera, large for the numbers.
-        const STEP: f64 = 1e-6;
         let up = normal(place);
         let level = self.camera.right - up * self.camera.right.dot(up);
         let across = level.try_normalize()?;

@@ -26,7 +26,7 @@ async fn an_address_says_what_is_drawn_over_its_picture() {
 async fn annotations_are_part_of_a_pictures_name_and_their_absence_is_not() {
     let app = TestApp::new().await;
     let tag = async |query: &str| {
-        let answer = app.get(&format!("/globe/flux/volume.png?{query}")).await;
+        let answer = app.get(&format!("/globe/flux/map.png?{query}")).await;
         assert_eq!(answer.status, StatusCode::OK, "{query}: {}", answer.text());
         answer.header("etag").to_owned()
     };

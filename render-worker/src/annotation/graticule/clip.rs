@@ -5,7 +5,7 @@ pub(super) fn to_picture(line: &[[f64; 2]], size: [f64; 2]) -> Vec<Vec<[f64; 2]>
     let mut parts: Vec<Vec<[f64; 2]>> = vec![];
     let mut is_open = false;
     for pair in line.windows(2) {
-        let Some([from, to]) = segment(pair[0], pair[1], size) else {
+        let Some(([from, to], is_whole)) = segment(pair[0], pair[1], size) else {
             is_open = false;
             continue;
         };
@@ -13,13 +13,14 @@ pub(super) fn to_picture(line: &[[f64; 2]], size: [f64; 2]) -> Vec<Vec<[f64; 2]>
             Some(part) => part.push(to),
             None => parts.push(vec![from, to]),
         }
-        is_open = to == pair[1];
+        is_open = is_whole;
     }
     parts
 }
 
-/// What of a straight line between two places lies in the picture: Liang and Barsky (1984).
-fn segment(a: [f64; 2], b: [f64; 2], size: [f64; 2]) -> Option<[[f64; 2]; 2]> {
+/// What of a straight line between two places lies in the picture, and whether it reaches the second: Liang and Barsky
+/// (1984).
+fn segment(a: [f64; 2], b: [f64; 2], size: [f64; 2]) -> Option<([[f64; 2]; 2], bool)> {
     let (mut first, mut last) = (0.0f64, 1.0f64);
     for axis in 0..2 {
         let along = b[axis] - a[axis];
@@ -37,8 +38,9 @@ fn segment(a: [f64; 2], b: [f64; 2], size: [f64; 2]) -> Option<[[f64; 2]; 2]> {
     }
     let at = |share: f64| [a[0] + (b[0] - a[0]) * share, a[1] + (b[1] - a[1]) * share];
     let from = if first > 0.0 { at(first) } else { a };
-    let to = if last < 1.0 { at(last) } else { b };
-    (first < last).then_some([from, to])
+    let is_whole = last >= 1.0;
+    let to = if is_whole { b } else { at(last) };
+    (first < last).then_some(([from, to], is_whole))
 }
 
 #[cfg(test)]

@@ -210,7 +210,7 @@ fn write(page: &mut Page, name: &str, [x, y]: [f64; 2], across: f64) -> bool {
     let is_free = page.take(area.grown(0.15 * page.em()));
     if is_free {
         page.label(&Text {
-            text: name,
+            words: name,
             x,
             y: y + 0.36 * size,
             size,
