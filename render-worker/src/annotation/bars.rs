@@ -390,6 +390,9 @@ mod tests {
         let kept = apart(marks(&[0.0, 10.0, 20.0, 30.0, 34.0]), 9.0);
         let at: Vec<f64> = kept.iter().map(|mark| mark.0).collect();
         assert_eq!(at, [0.0, 10.0, 20.0, 34.0]);
+        let kept = apart(marks(&[0.0, 5.0, 10.0, 25.0]), 9.0);
+        let at: Vec<f64> = kept.iter().map(|mark| mark.0).collect();
+        assert_eq!(at, [0.0, 10.0, 25.0]);
         assert!(apart(vec![], 9.0).is_empty());
         assert_eq!(apart(marks(&[5.0]), 9.0).len(), 1);
     }

@@ -149,9 +149,8 @@ impl Projection {
         self.px(normal(place)).to_array()
     }
 
-    /// Is nothing of the globe between the camera and a place? Below the ground, nothing of what lies deeper.
+    /// Is nothing of the globe between the camera and a place? Of one below the ground, nothing that lies deeper.
     fn is_clear(&self, place: DVec3) -> bool {
-        let radius_squared = place.length_squared().min(1.0);
         let sight = place - self.camera.place;
         let nearest = -self.camera.place.dot(sight) / sight.length_squared();
         // All of the way leads away from the globe, or towards it.
@@ -159,7 +158,7 @@ impl Projection {
             return true;
         }
         let from_middle = self.camera.place + sight * nearest;
-        place.length_squared() > radius_squared && from_middle.length_squared() >= radius_squared
+        from_middle.length_squared() >= 1.0
     }
 
     /// At least 0 where ground is before the horizon and ahead of the camera; lengths in earth radii.
