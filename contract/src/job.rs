@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::ContractError;
+use crate::annotation::Annotations;
 use crate::camera::{CameraAngles, MAX_CAMERA_HEIGHT_M, MIN_CAMERA_HEIGHT_M};
 use crate::colour::TransferFunction;
 use crate::context::{Context, Relief};
@@ -169,6 +170,9 @@ pub struct RenderJob {
     pub view: View,
     /// Style.
     pub style: Style,
+    /// What is drawn over the finished picture: on globe views.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub annotations: Option<Annotations>,
 }
 
 impl Style {
@@ -291,6 +295,7 @@ impl RenderJob {
             .map_or(Ok(()), TimeSample::validate)?;
         self.relief.as_ref().map_or(Ok(()), Relief::validate)?;
         self.validate_flow()?;
+        self.validate_annotations()?;
         self.style.validate()?;
         self.view.validate()
     }
@@ -311,6 +316,20 @@ impl RenderJob {
         }
     }
 
+    fn validate_annotations(&self) -> Result<(), ContractError> {
+        let Some(annotations) = &self.annotations else {
+            return Ok(());
+        };
+        if matches!(self.view, View::Tile { .. }) {
+            return Err(Annotations::refused_on_tiles());
+        }
+        if annotations.height.is_some() && self.accumulated.is_none() {
+            let reason = "nothing lifts the particles of this picture";
+            return Err(ContractError::invalid("annotations", "height", reason));
+        }
+        annotations.validate()
+    }
+
     /// The digest that names the picture.
     pub fn digest(&self) -> Digest {
         Digest::of_json(self)
@@ -325,6 +344,7 @@ impl RenderJob {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::annotation::{DateLabel, Graticule, HeightScale, Label};
     use crate::colour::{Palette, Share, Stops};
     use crate::quantity::Quantity;
     use crate::sun::Subsolar;
@@ -371,6 +391,7 @@ mod tests {
                 size_px: 256,
             },
             style: Style::with_transfer(TransferFunction::default_for(Quantity::CarbonFlux)),
+            annotations: None,
         }
     }
 
@@ -403,12 +424,84 @@ mod tests {
     #[test]
     fn a_job_of_an_older_program_keeps_its_name() {
         let text = serde_json::to_string(&job()).unwrap();
-        for later in ["relief", "context", "subsolar", "contributed"] {
+        for later in [
+            "relief",
+            "context",
+            "subsolar",
+            "contributed",
+            "annotations",
+        ] {
             assert!(!text.contains(later), "{text}");
         }
         assert!(text.contains(r#""sun":{"azimuth_deg":"315","elevation_deg":"40"}"#));
         let back: RenderJob = serde_json::from_str(&text).unwrap();
         assert_eq!(back.digest(), job().digest());
+    }
+
+    /// Each another picture; none of them a valid one of a tile.
+    const ANNOTATED: &[fn(&mut RenderJob)] = &[
+        |j| over(j, |a| a.legend = Some(Quantity::CarbonFlux)),
+        |j| over(j, |a| a.legend = Some(Quantity::AccumulatedCarbon)),
+        |j| over(j, |a| a.date = date("15 July 2000", None)),
+        |j| over(j, |a| a.date = date("16 July 2000", None)),
+        |j| over(j, |a| a.date = date("16 July 2000", Label::cut("daily"))),
+        |j| over(j, |a| a.graticule = Graticule::every(10.0).ok()),
+        |j| over(j, |a| a.graticule = Graticule::every(15.0).ok()),
+        |j| over(j, |a| a.names = true),
+        |j| over(j, |a| a.scale = true),
+        |j| over(j, |a| a.height = since("2000")),
+        |j| over(j, |a| a.height = since("2001")),
+        |j| over(j, |a| a.source = Label::cut("A")),
+        |j| over(j, |a| a.source = Label::cut("B")),
+        |j| over(j, |a| (a.version, a.names) = (a.version + 1, true)),
+    ];
+
+    fn over(job: &mut RenderJob, change: impl Fn(&mut Annotations)) {
+        let mut annotations = Annotations::none();
+        change(&mut annotations);
+        job.annotations = Some(annotations);
+    }
+
+    fn date(shown: &str, note: Option<Label>) -> Option<DateLabel> {
+        let shown = Label::cut(shown)?;
+        Some(DateLabel { shown, note })
+    }
+
+    fn since(time: &str) -> Option<HeightScale> {
+        let since = time.parse().ok()?;
+        Some(HeightScale { since })
+    }
+
+    #[test]
+    fn annotations_belong_to_views_of_the_globe_and_heights_to_what_is_lifted() {
+        let with = |job: &RenderJob, change: fn(&mut Annotations)| {
+            let mut job = job.clone();
+            over(&mut job, change);
+            job.validate().map_err(|error| error.to_string())
+        };
+        let tile = job();
+        let refused = with(&tile, |a| a.names = true).unwrap_err();
+        assert!(refused.contains("neighbours would cut"), "{refused}");
+        let globe = RenderJob {
+            view: View::Globe {
+                lon_deg: 0.0,
+                lat_deg: 0.0,
+                height_m: 1e6,
+                width_px: 10,
+                height_px: 10,
+                angles: crate::camera::CameraAngles::NADIR,
+            },
+            ..tile
+        };
+        with(&globe, |a| a.names = true).unwrap();
+        let refused = with(&globe, |a| a.height = since("2000")).unwrap_err();
+        assert!(refused.contains("nothing lifts"), "{refused}");
+        let lifted = RenderJob {
+            accumulated: Some(sample()),
+            ..globe
+        };
+        with(&lifted, |a| a.height = since("2000")).unwrap();
+        with(&lifted, |_nothing| ()).unwrap_err();
     }
 
     #[test]
@@ -453,6 +546,9 @@ mod tests {
         changed(|j| j.style.context.sea_opacity = 0.5);
         changed(|j| j.relief = Some(relief(15.0)));
         changed(|j| j.relief = Some(relief(30.0)));
+        for change in ANNOTATED {
+            changed(*change);
+        }
         changed(|j| j.renderer_version += 1);
         let count = names.len();
         names.sort();

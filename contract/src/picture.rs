@@ -1,7 +1,10 @@
 //! What a picture is asked to be, in the words that the command line, addresses and recomputations share. Together with
 //! the versions of the products that it shows it becomes a [`RenderJob`]: here and nowhere else.
 
+mod annotated;
+
 use crate::ContractError;
+use crate::annotation::AnnotationWishes;
 use crate::colour::{TransferFunction, TransferOptions};
 use crate::context::{Context, Relief};
 use crate::flow::{Flow, check_parts, steps_around};
@@ -35,6 +38,8 @@ pub struct PictureOptions {
     pub sun: Option<SunChoice>,
     /// Draw a plain globe behind the particles of a globe view.
     pub globe_surface: bool,
+    /// What is drawn over the finished picture.
+    pub annotations: AnnotationWishes,
 }
 
 /// A picture that somebody asks for, of whichever versions of its products there are.
@@ -126,7 +131,8 @@ impl PictureRequest {
         let style = self
             .options
             .style(sources.product.quantity, self.mode, time)?;
-        sources.job(self.mode, self.view, time, style)
+        let job = sources.job(self.mode, self.view, time, style)?;
+        sources.annotated(job, time, self.options.annotations)
     }
 }
 
@@ -204,6 +210,7 @@ impl RenderJob {
             mode,
             view,
             style,
+            annotations: None,
         };
         job.validate()?;
         Ok(job)
@@ -257,6 +264,7 @@ impl RenderJob {
             mode: Mode::Flow,
             view,
             style,
+            annotations: None,
         };
         job.validate()?;
         Ok(job)

@@ -147,6 +147,26 @@ impl Quantity {
         }
     }
 
+    /// What values below and above zero mean, for those who do not know the sign: of fluxes.
+    pub fn ends(self) -> Option<[&'static str; 2]> {
+        match self {
+            Self::CarbonFlux | Self::AccumulatedCarbon => Some(["sea takes up", "sea gives off"]),
+            Self::SeaSurfaceTemperature
+            | Self::Chlorophyll
+            | Self::WindSpeed
+            | Self::Pco2
+            | Self::Salinity
+            | Self::AirPressure
+            | Self::IceFraction
+            | Self::WaveHeight
+            | Self::Precipitation
+            | Self::Current
+            | Self::Elevation
+            | Self::SeaAreaFraction
+            | Self::LandAreaFraction => None,
+        }
+    }
+
     /// Values that can be true, stored unit; anything outside is refused or masked at ingest.
     pub fn plausible(self) -> std::ops::RangeInclusive<f64> {
         match self {

@@ -1,5 +1,7 @@
 //! Instants and the periods that product steps cover: UTC, milliseconds, ISO 8601 at the edge.
 
+mod words;
+
 use std::fmt::{Display, Formatter};
 use std::str::FromStr;
 

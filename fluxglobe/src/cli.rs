@@ -1,5 +1,6 @@
 //! The command line: words in, one plain `Command` out. Every value is parsed here, once, into its final type.
 
+mod annotations;
 mod fill;
 mod look;
 mod observations;
@@ -21,6 +22,7 @@ use contract::product::ProductId;
 use contract::region::Cells;
 use contract::time::TimeMs;
 
+pub(crate) use annotations::Annotated;
 pub(crate) use fill::{BenchFill, FillError, ProductsOf};
 pub(crate) use look::{Look, RenderLegend};
 pub(crate) use observations::{MatchTime, Matchup, Observations, ObservationsAsked};
@@ -428,6 +430,8 @@ pub(crate) struct RenderGlobe {
     /// Leave out the plain globe behind the particles.
     #[arg(long)]
     pub(crate) transparent: bool,
+    #[command(flatten)]
+    pub(crate) annotations: Annotated,
 }
 
 /// Where the camera of a globe's picture is and which way it looks: over a place, or at one.

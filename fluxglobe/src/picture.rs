@@ -1,6 +1,7 @@
 //! From the options of a picture to its render job: the same words and the same function as an address has.
 
 use anyhow::{Context as _, Result, bail};
+use contract::annotation::AnnotationWishes;
 use contract::camera::CameraAngles;
 use contract::context::Relief;
 use contract::grid::LonLatDeg;
@@ -13,6 +14,25 @@ use storage::Store;
 
 use crate::cli::{Camera, Picture, RenderGlobe, Settings};
 use crate::{deployment, progress};
+
+/// What pictures of the globe have and map tiles have not.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Extras {
+    /// A plain globe behind the particles.
+    pub(crate) surface: bool,
+    /// What is drawn over the finished picture.
+    pub(crate) annotations: AnnotationWishes,
+}
+
+impl Extras {
+    /// Those of a picture of the globe.
+    pub(crate) fn of(globe: &RenderGlobe) -> Self {
+        Self {
+            surface: !globe.transparent,
+            annotations: globe.annotations.wishes(),
+        }
+    }
+}
 
 /// The camera that looks at a place, where one is given.
 pub(crate) fn look_at(camera: &Camera) -> Option<LookAt> {
@@ -59,7 +79,7 @@ pub(crate) async fn job(
     settings: &Settings,
     picture: &Picture,
     view: View,
-    globe_surface: bool,
+    extras: Extras,
 ) -> Result<RenderJob> {
     let product = product(store, settings, picture).await?;
     let shown = shown_time(&product, picture.time)?;
@@ -84,13 +104,13 @@ pub(crate) async fn job(
         mode: picture.mode,
         view,
         time: picture.time,
-        options: options(picture, globe_surface),
+        options: options(picture, extras),
     };
     Ok(request.job(&sources)?)
 }
 
 /// What the options of a picture ask of its look.
-pub(crate) fn options(picture: &Picture, globe_surface: bool) -> PictureOptions {
+pub(crate) fn options(picture: &Picture, extras: Extras) -> PictureOptions {
     let surroundings = &picture.surroundings;
     PictureOptions {
         transfer: picture.look.options(),
@@ -101,7 +121,8 @@ pub(crate) fn options(picture: &Picture, globe_surface: bool) -> PictureOptions 
         sea_opacity: Some(surroundings.sea_opacity),
         coastlines: Some(surroundings.coastlines),
         sun: surroundings.sun,
-        globe_surface,
+        globe_surface: extras.surface,
+        annotations: extras.annotations,
     }
 }
 

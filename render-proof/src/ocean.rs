@@ -125,5 +125,6 @@ pub fn job(view: View) -> RenderJob {
         mode: Mode::Volume,
         view,
         style: Style::with_transfer(TransferFunction::default_for(Quantity::CarbonFlux)),
+        annotations: None,
     }
 }

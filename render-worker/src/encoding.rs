@@ -1,13 +1,15 @@
-//! Drawn pictures in, PNG bytes out, on as many cores as there are; who draws next waits for none of it.
+//! Drawn pictures in, with what a job has drawn over them as PNG bytes out, on as many cores as there are; who draws next waits for none of it.
 
 use std::num::NonZeroUsize;
 use std::sync::Arc;
 use std::thread;
 
 use bytes::Bytes;
+use contract::job::RenderJob;
 use render::Image;
 use tokio::sync::Semaphore;
 
+use crate::annotation;
 use crate::error::DrawError;
 
 /// The cores that encode pictures. Cheap to clone.
@@ -36,14 +38,24 @@ impl Encoders {
         self.count - self.cores.available_permits()
     }
 
-    /// The picture as PNG. `turn` is let go as soon as a core is free for it, before encoding begins: whoever holds it
+    /// The picture of a job, annotations and all, as PNG. `turn` is let go as soon as a core is free for it, before encoding begins: whoever holds it
     /// back until then draws no more pictures than the cores can take.
     pub(crate) async fn png(
         &self,
+        job: &RenderJob,
         image: Image,
         turn: impl Send + 'static,
     ) -> Result<Bytes, DrawError> {
-        Ok(self.run(turn, move || image.encode_png()).await??)
+        // Most pictures have none, and no reason to copy their job.
+        let annotated = job.annotations.as_ref().map(|_some| job.clone());
+        let finished = move || -> Result<Bytes, DrawError> {
+            let image = match annotated {
+                Some(job) => annotation::annotated(&job, image)?,
+                None => image,
+            };
+            Ok(image.encode_png()?)
+        };
+        self.run(turn, finished).await?
     }
 
     async fn run<T: Send + 'static>(

@@ -1,6 +1,7 @@
 //! What can go wrong between a render job and its stored picture.
 
 use contract::key::ObjectKey;
+use legend::LegendError;
 use render::RenderError;
 use storage::StorageError;
 
@@ -24,6 +25,9 @@ pub enum DrawError {
         key: ObjectKey,
         source: Box<StorageError>,
     },
+    /// What is drawn over the picture could not be: a defect.
+    #[error("cannot draw annotations")]
+    Annotations(#[from] LegendError),
     /// The thread that drew was lost.
     #[error("the drawing thread ended early")]
     Thread(#[source] tokio::task::JoinError),
@@ -36,6 +40,7 @@ impl DrawError {
             Self::Render(error) => error.is_retryable(),
             Self::Store { source, .. } | Self::Picture { source, .. } => source.is_retryable(),
             Self::Thread(_) => true,
+            Self::Annotations(_) => false,
         }
     }
 
@@ -55,7 +60,7 @@ impl DrawError {
             Self::Render(error) => error.is_device_fault(),
             // Drivers and the library over them give up by a panic where they have no error to return.
             Self::Thread(lost) => lost.is_panic(),
-            Self::Store { .. } | Self::Picture { .. } => false,
+            Self::Store { .. } | Self::Picture { .. } | Self::Annotations(_) => false,
         }
     }
 
@@ -64,7 +69,7 @@ impl DrawError {
     pub fn is_final(&self) -> bool {
         match self {
             Self::Render(error) => error.is_final(),
-            Self::Thread(_) => true,
+            Self::Thread(_) | Self::Annotations(_) => true,
             Self::Store { source, .. } => {
                 source.is_not_found() || matches!(**source, StorageError::Damaged { .. })
             }

@@ -5,6 +5,7 @@
 //! such servers is what others ask.
 
 mod adapter_info;
+pub mod annotation;
 pub mod batch;
 pub mod desk;
 mod encoding;

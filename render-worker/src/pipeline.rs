@@ -124,13 +124,14 @@ impl Pipeline {
         Ok(image)
     }
 
-    /// Writes a picture as PNG; `turn` is let go when that begins, which may have to wait for a core.
+    /// Draws the annotations of a job over its picture and writes it as PNG; `turn` is let go when that begins, which may have to wait for a core.
     pub async fn encode(
         &self,
+        job: &RenderJob,
         image: Image,
         turn: impl Send + 'static,
     ) -> Result<Bytes, DrawError> {
-        self.encoders.png(image, turn).await
+        self.encoders.png(job, image, turn).await
     }
 
     /// Tries, and if the device failed tries once more on a fresh one.

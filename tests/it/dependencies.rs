@@ -8,6 +8,7 @@ use serde_json::Value;
 /// Workspace crates that each crate may depend on directly.
 const MAY_USE: &[(&str, &[&str])] = &[
     ("contract", &[]),
+    ("legend", &["contract"]),
     ("retry", &[]),
     ("service", &["retry"]),
     ("storage", &["contract", "retry"]),
@@ -18,14 +19,20 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("render", &["contract"]),
     (
         "render-worker",
-        &["contract", "retry", "storage", "service", "render"],
+        &[
+            "contract", "legend", "retry", "storage", "service", "render",
+        ],
     ),
     ("render-proof", &["contract", "render"]),
-    ("tile-server", &["contract", "retry", "storage", "service"]),
+    (
+        "tile-server",
+        &["contract", "legend", "retry", "storage", "service"],
+    ),
     (
         "fluxglobe",
         &[
             "contract",
+            "legend",
             "storage",
             "service",
             "kafka-log",

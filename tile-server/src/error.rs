@@ -7,6 +7,7 @@ use axum::Json;
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use contract::ContractError;
+use legend::LegendError;
 use serde::Serialize;
 use storage::StorageError;
 use utoipa::ToSchema;
@@ -99,6 +100,14 @@ pub enum ServerError {
     /// A defect of this server or of a backend.
     #[error("{what}")]
     Defect { what: String },
+}
+
+impl From<LegendError> for ServerError {
+    fn from(error: LegendError) -> Self {
+        Self::Defect {
+            what: error.to_string(),
+        }
+    }
 }
 
 impl From<StorageError> for ServerError {

@@ -18,6 +18,7 @@
 //! Left out on purpose: drawing and computing, which come in through the traits of [`backend`].
 
 mod analyses;
+mod annotations;
 pub mod backend;
 mod catalogue;
 pub mod config;
@@ -25,7 +26,6 @@ mod connections;
 pub mod error;
 mod extract;
 mod gate;
-pub mod legend;
 pub mod live;
 mod look;
 pub mod metrics;

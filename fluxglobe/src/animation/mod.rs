@@ -24,6 +24,7 @@ use storage::Store;
 use tile_server::backend::{Draw, Keep, Turn};
 
 use crate::cli::{RenderAnimation, Settings};
+use crate::picture::Extras;
 use crate::ports::{Drawer, FleetDrawer};
 use crate::{deployment, picture, progress};
 use film::Film;
@@ -93,7 +94,7 @@ async fn shots(settings: &Settings, store: &Store, options: &RenderAnimation) ->
     let product = picture::product(store, settings, &globe.picture).await?;
     let (from, to) = span(&product, options.from, options.to)?;
     let sun_of_time = globe.picture.surroundings.sun == Some(SunChoice::OfTime);
-    let mut asked = picture::options(&globe.picture, !globe.transparent);
+    let mut asked = picture::options(&globe.picture, Extras::of(globe));
     if sun_of_time {
         // Each picture has its own.
         asked.sun = None;
@@ -109,6 +110,7 @@ async fn shots(settings: &Settings, store: &Store, options: &RenderAnimation) ->
         view,
         style,
         sun_of_time,
+        annotations: asked.annotations,
         relief: picture::relief(store, settings, &globe.picture).await?,
         fps: options.fps,
         count: Shots::count_of(seconds(options, path.as_ref()), options.fps)?,

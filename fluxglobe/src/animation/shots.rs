@@ -1,10 +1,11 @@
 //! The pictures of an animation: which job is the one of each number.
 
 use anyhow::{Result, bail};
+use contract::annotation::AnnotationWishes;
 use contract::context::Relief;
 use contract::job::{Mode, RenderJob, Style, View};
 use contract::manifest::Manifest;
-use contract::picture::PictureSources;
+use contract::picture::{PictureSources, shown_time};
 use contract::sun::SunChoice;
 use contract::time::TimeMs;
 use serde::{Deserialize, Serialize};
@@ -38,6 +39,9 @@ pub(super) struct Shots {
     /// Each picture has the sun of its own instant.
     #[serde(default)]
     pub(super) sun_of_time: bool,
+    /// What is drawn over each picture, with the date of its own instant.
+    #[serde(default, skip_serializing_if = "AnnotationWishes::is_empty")]
+    pub(super) annotations: AnnotationWishes,
     /// What lies below.
     #[serde(default)]
     pub(super) relief: Option<Relief>,
@@ -125,6 +129,9 @@ impl Shots {
             northward: self.northward.as_ref(),
             relief: self.relief.clone(),
         };
-        Ok(sources.job(self.mode, view, time, style)?)
+        let job = sources.job(self.mode, view, time, style)?;
+        // As the picture alone has it: the nearest instant that the product covers.
+        let shown = shown_time(&self.product, Some(time))?;
+        Ok(sources.annotated(job, shown, self.annotations)?)
     }
 }

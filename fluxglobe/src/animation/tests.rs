@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use contract::annotation::AnnotationWishes;
 use contract::colour::TransferFunction;
 use contract::digest::Digest;
 use contract::grid::Grid;
@@ -72,6 +73,7 @@ fn shots(count: u32) -> Shots {
         view,
         style: Style::with_transfer(TransferFunction::default_for(Quantity::CarbonFlux)),
         sun_of_time: false,
+        annotations: AnnotationWishes::default(),
         relief: None,
         to: "2001-01-01".parse().unwrap(),
         fps: 25,
@@ -121,6 +123,27 @@ fn every_picture_has_the_sun_of_its_own_instant_if_that_is_asked_for() {
     let [january, july] = [0, 182].map(|number| sun_of(&shots, number).unwrap());
     assert!(january.lon_deg.abs() > 175.0 && july.lon_deg.abs() > 175.0);
     assert!(january.lat_deg < -22.0 && july.lat_deg > 22.0);
+}
+
+#[test]
+fn every_picture_has_the_date_of_its_own_instant() {
+    let mut shots = shots(366);
+    assert_eq!(shots.job(3).unwrap().annotations, None);
+    shots.annotations = "date,graticule".parse().unwrap();
+    let date_of = |number| {
+        let annotations = shots.job(number).unwrap().annotations.unwrap();
+        String::from(annotations.date.unwrap().shown)
+    };
+    assert_eq!(date_of(0), "1 January 2000");
+    assert_eq!(date_of(182), "1 July 2000");
+    assert_eq!(date_of(365), "31 December 2000");
+    // What is read back from beside a folder of pictures goes on with the same.
+    let text = serde_json::to_string(&shots).unwrap();
+    let back: Shots = serde_json::from_str(&text).unwrap();
+    assert_eq!(back, shots);
+    shots.annotations = "height".parse().unwrap();
+    let refused = shots.validate().unwrap_err().to_string();
+    assert!(refused.contains("leave it out"), "{refused}");
 }
 
 #[test]

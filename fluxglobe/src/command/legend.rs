@@ -5,8 +5,8 @@ use std::path::Path;
 use anyhow::{Context as _, Result};
 use contract::colour::TransferOptions;
 use contract::quantity::Quantity;
+use legend::{Form, Legend};
 use storage::Store;
-use tile_server::legend::{Form, Legend};
 
 use crate::cli::{RenderLegend, Settings};
 use crate::{deployment, progress};

@@ -7,11 +7,12 @@ use render_worker::desk::{Order, Storing};
 
 use crate::cli::{Render, Settings};
 use crate::command::legend;
+use crate::picture::Extras;
 use crate::{animation, deployment, picture, progress};
 
 pub(crate) async fn run(settings: &Settings, options: Render) -> Result<()> {
     let store = deployment::store(settings)?;
-    let (asked, view, surface) = match options {
+    let (asked, view, extras) = match options {
         Render::Tile(tile) => {
             let address = Tile::new(tile.z, tile.x, tile.y)?;
             (
@@ -20,17 +21,18 @@ pub(crate) async fn run(settings: &Settings, options: Render) -> Result<()> {
                     tile: address,
                     size_px: tile.size,
                 },
-                false,
+                Extras::default(),
             )
         }
         Render::Globe(globe) => {
             let view = picture::view_of(&globe)?;
-            (globe.picture, view, !globe.transparent)
+            let extras = Extras::of(&globe);
+            (globe.picture, view, extras)
         }
         Render::Animation(animation) => return animation::run(settings, store, animation).await,
         Render::Legend(options) => return legend::run(settings, &store, &options).await,
     };
-    let job = picture::job(&store, settings, &asked, view, surface).await?;
+    let job = picture::job(&store, settings, &asked, view, extras).await?;
     let bar = progress::bar("draw", 1);
     let desk = deployment::single_desk(settings, store).await?;
     let order = Order::on_demand(Storing::Nothing);

@@ -199,6 +199,7 @@ pub fn job(size_px: [u32; 2], slices: u32) -> Result<RenderJob> {
             angles: CameraAngles::NADIR,
         },
         style,
+        annotations: None,
     })
 }
 

@@ -40,7 +40,7 @@ impl Inner {
         let image = drawn?;
         self.learn(begun.elapsed());
         // Another draws while this one is encoded and stored.
-        let encoding = self.pipeline.encode(image, permit);
+        let encoding = self.pipeline.encode(job, image, permit);
         let png = self.measured("encode", encoding).await?;
         Ok(self.kept(job, png, order.storing).await)
     }

@@ -5,6 +5,7 @@
     reason = "all of this binary is tests; clippy allows these in test functions only"
 )]
 
+mod annotated;
 mod batch;
 mod damaged;
 mod desk;

@@ -5,7 +5,7 @@ use contract::job::Mode;
 /// Thickness of the sheet that particles fill where they are not lifted or sunk, m.
 pub(super) const SHEET_M: f64 = 20_000.0;
 /// Farthest a particle is lifted or sunk, m: bounds how far beyond a tile particles must be looked for.
-pub(super) const HEIGHT_LIMIT_M: f64 = 1.2e6;
+pub const HEIGHT_LIMIT_M: f64 = 1.2e6;
 /// Turns of a particle through its column for each kg m⁻²: at 60 g m⁻² a year it rises three times a year.
 pub(super) const TURNS_PER_KG_M2: f32 = 50.0;
 /// Share of the optical depth that a cell without flux keeps.

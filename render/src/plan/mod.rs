@@ -10,6 +10,7 @@ mod flow;
 mod footprint;
 mod globe;
 mod look;
+mod projection;
 mod shape;
 mod tile;
 
@@ -36,6 +37,9 @@ use crate::stages::particles::params::ParticleParams;
 use crate::stages::project::params::ProjectParams;
 use crate::stages::sizes::{HALF_BYTES, workgroups};
 use look::Look;
+
+pub use look::HEIGHT_LIMIT_M;
+pub use projection::{Projection, Seen};
 
 /// 0 stands for no plan.
 static NEXT_ID: AtomicU64 = AtomicU64::new(1);

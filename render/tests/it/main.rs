@@ -20,6 +20,7 @@ mod light_of_parts;
 mod limits;
 mod look;
 mod mass;
+mod projection;
 mod scenes;
 mod seams;
 mod smooth;

@@ -37,7 +37,7 @@ words! {
     /// A list of colours with a name.
     Palette = contract::colour::Palette::ALL;
     /// What a legend is written as.
-    LegendForm = crate::legend::Form::ALL.map(crate::legend::Form::as_str);
+    LegendForm = legend::Form::ALL.map(legend::Form::as_str);
 }
 
 /// A half-open period `[start, end)`.

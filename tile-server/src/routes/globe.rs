@@ -11,6 +11,7 @@ use contract::picture::PictureRequest;
 use serde::Deserialize;
 use utoipa::IntoParams;
 
+use crate::annotations::AnnotationsQuery;
 use crate::error::ServerError;
 use crate::extract::{UrlPath, UrlQuery, number, time, whole_number};
 use crate::look::LookQuery;
@@ -76,6 +77,9 @@ pub(crate) struct GlobeQuery {
     #[serde(flatten)]
     #[param(ignore)]
     surroundings: SurroundingsQuery,
+    #[serde(flatten)]
+    #[param(ignore)]
+    annotations: AnnotationsQuery,
 }
 
 /// The globe from a camera over a place or looking at one, as a PNG of any size.
@@ -90,6 +94,7 @@ pub(crate) struct GlobeQuery {
         GlobeQuery,
         LookQuery,
         SurroundingsQuery,
+        AnnotationsQuery,
     ),
     responses(
         (status = 200, description = "The view", content(("image/png")),
@@ -121,6 +126,7 @@ pub(crate) async fn get(
         Some("false") => false,
         Some(text) => return Err(ServerError::invalid("surface", text, "true or false")),
     };
+    options.annotations = query.annotations.wishes()?;
     let request = PictureRequest {
         mode,
         view,

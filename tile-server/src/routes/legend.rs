@@ -10,12 +10,12 @@ use utoipa::IntoParams;
 
 use crate::error::ServerError;
 use crate::extract::{UrlPath, UrlQuery};
-use crate::legend::{Form, Legend};
 use crate::look::LookQuery;
 use crate::openapi::words;
 use crate::request;
 use crate::routes::picture::{CACHE_CONTROL, has_tag};
 use crate::state::AppState;
+use legend::{Form, Legend};
 
 #[derive(Debug, Deserialize, IntoParams)]
 #[into_params(parameter_in = Query)]

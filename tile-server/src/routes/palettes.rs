@@ -5,8 +5,8 @@ use contract::colour::Palette;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::legend::evenly_placed;
 use crate::openapi::words;
+use legend::evenly_placed;
 
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct Palettes {

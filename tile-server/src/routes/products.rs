@@ -14,10 +14,10 @@ use utoipa::ToSchema;
 
 use crate::catalogue::Layer;
 use crate::error::ServerError;
-use crate::legend::Legend;
 use crate::openapi::words;
 use crate::routes::picture::has_tag;
 use crate::state::AppState;
+use legend::Legend;
 
 #[derive(Debug, Serialize, ToSchema)]
 struct Products {

@@ -12,6 +12,7 @@ use contract::time::TimeMs;
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
 
+use crate::annotations::AnnotationsQuery;
 use crate::catalogue::Layer;
 use crate::error::ServerError;
 use crate::extract::{UrlPath, UrlQuery, time};
@@ -40,11 +41,16 @@ pub(crate) struct TileJsonQuery {
     #[serde(flatten)]
     #[param(ignore)]
     surroundings: SurroundingsQuery,
+    /// Told apart from what nobody ever understood.
+    #[serde(flatten)]
+    #[param(ignore)]
+    annotations: AnnotationsQuery,
 }
 
 impl TileJsonQuery {
     /// The same query as tiles take it, in its canonical form.
     fn of_tiles(&self, layer: &Layer, mode: Mode) -> Result<String, ServerError> {
+        self.annotations.refused_on_tiles()?;
         let time = time(self.time.as_deref())?.map(|time| format!("time={time}"));
         // Named as it was found, not as it was written.
         let manifest = self.manifest.as_ref();

@@ -9,6 +9,7 @@ use contract::tile::Tile;
 use serde::Deserialize;
 use utoipa::IntoParams;
 
+use crate::annotations::AnnotationsQuery;
 use crate::error::ServerError;
 use crate::extract::{UrlPath, UrlQuery, time, whole_number};
 use crate::look::LookQuery;
@@ -40,6 +41,10 @@ pub(crate) struct TileQuery {
     #[serde(flatten)]
     #[param(ignore)]
     surroundings: SurroundingsQuery,
+    /// Told apart from what nobody ever understood.
+    #[serde(flatten)]
+    #[param(ignore)]
+    annotations: AnnotationsQuery,
 }
 
 /// A map tile at any instant: Web Mercator (EPSG:3857), XYZ scheme, PNG with alpha.
@@ -74,6 +79,7 @@ pub(crate) async fn get(
     UrlQuery(query): UrlQuery<TileQuery>,
     headers: HeaderMap,
 ) -> Result<Response, ServerError> {
+    query.annotations.refused_on_tiles()?;
     let manifest = query.manifest.as_deref();
     let layer = state.catalogue.version(&product, manifest).await?;
     let mode = request::mode(&layer, &mode)?;

@@ -50,6 +50,7 @@ fn plain() -> RenderJob {
             size_px: 256,
         },
         style: Style::with_transfer(transfer),
+        annotations: None,
     }
 }
 

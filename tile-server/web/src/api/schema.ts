@@ -2017,6 +2017,15 @@ export interface operations {
                  * @example 315,40
                  */
                 sun?: string;
+                /**
+                 * @description What is drawn over the picture so that it explains itself: any of `legend`, `date`, `graticule`, `names`, `scale`,
+                 *     `height` and `source` with commas between, or `all` that the picture has something to tell of. By name, what it has
+                 *     nothing to tell of is refused.
+                 * @example legend,date,names
+                 */
+                annotate?: string;
+                /** @description Degrees between the lines of the graticule, which this asks for; what suits the view unless one is given. */
+                graticule?: number;
             };
             header?: never;
             path: {

@@ -1,42 +1,99 @@
-//! A legend as PNG: its SVG, drawn with a font that is part of this program, so that every machine draws the same.
+//! SVG in, pixels out, with fonts that are part of this program, so that every machine draws the same.
 
 use std::sync::{Arc, LazyLock};
 
 use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::fontdb::{Database, Source};
-use resvg::usvg::{Options, Tree};
+use resvg::usvg::{Node, Options, Rect, Tree};
 
-/// One font for texts of any family, which has every sign that units are written with.
+use crate::LegendError;
+
+/// What other texts than names of seas are written in: every sign that units are written with is in it.
+pub const SANS: &str = "DejaVu Sans";
+/// What names of seas are written in, in italics as on maps.
+pub const SERIF: &str = "DejaVu Serif";
+
+/// These fonts for texts of any family.
 static OPTIONS: LazyLock<Options<'static>> = LazyLock::new(|| {
     let mut fonts = Database::new();
-    fonts.load_font_source(Source::Binary(Arc::new(dejavu::sans::regular())));
-    fonts.set_sans_serif_family("DejaVu Sans");
+    for font in [dejavu::sans::regular(), dejavu::serif_condensed::italic()] {
+        fonts.load_font_source(Source::Binary(Arc::new(font)));
+    }
+    fonts.set_sans_serif_family(SANS);
+    fonts.set_serif_family(SERIF);
     Options {
+        font_family: SANS.to_owned(),
         fontdb: Arc::new(fonts),
         ..Options::default()
     }
 });
 
-/// The pixels of a drawing.
-pub(super) fn drawn(svg: &str) -> Result<Vec<u8>, String> {
-    pixels(svg)?.encode_png().map_err(|e| e.to_string())
+/// Pixels of a drawing.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Pixels {
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    /// Red, green and blue, each times alpha, and alpha; row by row from the top.
+    pub premultiplied_rgba8: Vec<u8>,
 }
 
-fn pixels(svg: &str) -> Result<Pixmap, String> {
-    let tree = Tree::from_str(svg, &OPTIONS).map_err(|e| e.to_string())?;
+/// The pixels of a drawing at its own size; the same drawing is always the same pixels.
+///
+/// # Errors
+/// A text that is no SVG.
+pub fn pixels(svg: &str) -> Result<Pixels, LegendError> {
+    let pixels = pixmap(svg)?;
+    Ok(Pixels {
+        width: pixels.width(),
+        height: pixels.height(),
+        premultiplied_rgba8: pixels.take(),
+    })
+}
+
+/// Where the texts of a drawing are that lie in no group: left, top, right and bottom of each, pixels.
+///
+/// # Errors
+/// A text that is no SVG.
+pub fn text_boxes(svg: &str) -> Result<Vec<[f64; 4]>, LegendError> {
+    let of = |text: &Rect| [text.left(), text.top(), text.right(), text.bottom()].map(f64::from);
+    Ok(texts(&tree(svg)?).iter().map(of).collect())
+}
+
+/// The pixels of a drawing as PNG.
+pub(crate) fn png(svg: &str) -> Result<Vec<u8>, LegendError> {
+    let encoded = pixmap(svg)?.encode_png();
+    encoded.map_err(|error| LegendError::Raster(error.to_string()))
+}
+
+fn pixmap(svg: &str) -> Result<Pixmap, LegendError> {
+    let tree = tree(svg)?;
     let size = tree.size().to_int_size();
-    let mut pixels = Pixmap::new(size.width(), size.height()).ok_or("it has no room")?;
+    let pixels = Pixmap::new(size.width(), size.height());
+    let mut pixels = pixels.ok_or_else(|| LegendError::Raster("it has no room".to_owned()))?;
     resvg::render(&tree, Transform::identity(), &mut pixels.as_mut());
     Ok(pixels)
+}
+
+fn tree(svg: &str) -> Result<Tree, LegendError> {
+    Tree::from_str(svg, &OPTIONS).map_err(|error| LegendError::Raster(error.to_string()))
+}
+
+fn texts(tree: &Tree) -> Vec<Rect> {
+    let of = |node: &Node| match node {
+        Node::Text(text) => Some(text.abs_bounding_box()),
+        _ => None,
+    };
+    tree.root().children().iter().filter_map(of).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::legend::{Legend, MARGIN_PX, svg};
+    use crate::{Legend, MARGIN_PX, svg};
     use contract::colour::TransferOptions;
     use contract::quantity::Quantity;
-    use resvg::usvg::{Node, Rect};
 
     const PAPER: [u8; 3] = [255; 3];
 
@@ -53,7 +110,7 @@ mod tests {
     #[test]
     fn the_bar_shows_the_colours_and_the_text_is_there() {
         let legend = svg(Quantity::CarbonFlux, &TransferOptions::default());
-        let file = drawn(&legend).unwrap();
+        let file = png(&legend).unwrap();
         let legend = Pixmap::decode_png(&file).unwrap();
         assert_eq!((legend.width(), legend.height()), (512, 84));
         let near = |a: [u8; 3], b: [u8; 3]| a.iter().zip(b).all(|(a, b)| a.abs_diff(b) <= 3);
@@ -81,7 +138,7 @@ mod tests {
             let svg = format!(
                 "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"30\" height=\"30\">{text}</svg>"
             );
-            pixels(&svg).unwrap().take()
+            pixmap(&svg).unwrap().take()
         };
         let unknown = drawn('\u{10fffd}');
         let titles =
@@ -94,21 +151,15 @@ mod tests {
         }
     }
 
-    /// Where the texts of a drawing are.
-    fn texts(svg: &str) -> Vec<Rect> {
-        let tree = Tree::from_str(svg, &OPTIONS).unwrap();
-        let of = |node: &Node| match node {
-            Node::Text(text) => Some(text.abs_bounding_box()),
-            _ => None,
-        };
-        tree.root().children().iter().filter_map(of).collect()
+    fn texts_of(svg: &str) -> Vec<Rect> {
+        texts(&tree(svg).unwrap())
     }
 
     #[test]
     fn texts_stay_within_the_drawing_and_apart() {
         let is_within = |text: &Rect| text.left() >= 0.0 && text.right() <= 512.0;
         for quantity in Quantity::ALL {
-            let texts = texts(&svg(quantity, &TransferOptions::default()));
+            let texts = texts_of(&svg(quantity, &TransferOptions::default()));
             assert!(texts.len() >= 4 && texts.iter().all(is_within), "{texts:?}");
             for (i, text) in texts.iter().enumerate() {
                 let is_apart = |other: &Rect| text.intersect(other).is_none();
@@ -120,7 +171,7 @@ mod tests {
                 range: Some(long.parse().unwrap()),
                 ..TransferOptions::default()
             };
-            let texts = texts(&svg(Quantity::WindSpeed, &options));
+            let texts = texts_of(&svg(Quantity::WindSpeed, &options));
             assert!(texts.iter().all(is_within), "{long}: {texts:?}");
         }
     }
@@ -132,7 +183,7 @@ mod tests {
             size: "0:0.2,15:1".parse().unwrap(),
             ..TransferOptions::default()
         };
-        let legend = pixels(&svg(Quantity::WindSpeed, &options)).unwrap();
+        let legend = pixmap(&svg(Quantity::WindSpeed, &options)).unwrap();
         let left: Vec<_> = (0..12).map(|i| at(&legend, MARGIN_PX + i, 40)).collect();
         assert!(left.iter().any(|c| c[0] > 240) && left.iter().any(|c| c[0] < 210));
         let dark = |xs: std::ops::Range<u32>| {

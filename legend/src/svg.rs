@@ -4,6 +4,19 @@ use std::fmt::Write as _;
 
 use super::{BAR_HEIGHT_PX, BAR_TOP_PX, CHECK_PX, HEIGHT_PX, Legend, MARGIN_PX};
 
+/// Where a bar of colours is drawn, pixels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bar {
+    /// Of its left edge.
+    pub x: f64,
+    /// Of its upper edge.
+    pub y: f64,
+    /// Width.
+    pub width: f64,
+    /// Height.
+    pub height: f64,
+}
+
 /// Half of what a sign of a number takes of a line, in wide fonts, pixels.
 const HALF_SIGN_PX: f64 = 4.8;
 /// What is drawn under transparent colours.
@@ -23,52 +36,24 @@ fn write(legend: &Legend, to: &mut String) -> std::fmt::Result {
         to,
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \
          font-family=\"sans-serif\" font-size=\"14\" fill=\"#222\">\
-         <title>{}</title><defs><linearGradient id=\"colors\">",
-        legend.title()
-    )?;
-    for (place, color) in &legend.stops {
-        write!(to, "<stop offset=\"{place:.6}\" stop-color=\"{color}\"/>")?;
-    }
-    to.push_str("</linearGradient>");
-    let bar = format!(
-        "x=\"{MARGIN_PX}\" y=\"{BAR_TOP_PX}\" width=\"{}\" height=\"{BAR_HEIGHT_PX}\"",
-        width - 2 * MARGIN_PX
-    );
-    let is_transparent = !legend.opacity.is_empty();
-    if is_transparent {
-        let checks = CHECKS.replace("{1}", &CHECK_PX.to_string());
-        to.push_str(&checks.replace("{2}", &(2 * CHECK_PX).to_string()));
-        to.push_str("<linearGradient id=\"shares\">");
-        for (place, share) in &legend.opacity {
-            write!(
-                to,
-                "<stop offset=\"{place:.6}\" stop-color=\"#fff\" stop-opacity=\"{share:.4}\"/>"
-            )?;
-        }
-        write!(
-            to,
-            "</linearGradient><mask id=\"seen\"><rect {bar} fill=\"url(#shares)\"/></mask>"
-        )?;
-    }
-    write!(
-        to,
-        "</defs><rect width=\"{width}\" height=\"{height}\" fill=\"#fff\"/>\
+         <title>{}</title>\
+         <rect width=\"{width}\" height=\"{height}\" fill=\"#fff\"/>\
          <text x=\"{MARGIN_PX}\" y=\"21\">{}</text><text x=\"{}\" y=\"21\" text-anchor=\"end\">{}</text>",
+        legend.title(),
         legend.label,
         width - MARGIN_PX,
         legend.unit
     )?;
-    if is_transparent {
-        write!(to, "<rect {bar} fill=\"url(#checks)\"/>")?;
-        write!(
-            to,
-            "<rect {bar} fill=\"url(#colors)\" mask=\"url(#seen)\"/>"
-        )?;
-    } else {
-        write!(to, "<rect {bar} fill=\"url(#colors)\"/>")?;
-    }
+    let bar = Bar {
+        x: f64::from(MARGIN_PX),
+        y: f64::from(BAR_TOP_PX),
+        width: f64::from(width - 2 * MARGIN_PX),
+        height: f64::from(BAR_HEIGHT_PX),
+    };
+    write_bar(legend, bar, to)?;
     let foot = BAR_TOP_PX + BAR_HEIGHT_PX;
-    for (x, text) in legend.marks() {
+    for (place, text) in legend.marks() {
+        let x = Legend::x_px(place);
         // Long numbers at the ends of the bar stay in the drawing.
         let half = text.chars().count() as f64 * HALF_SIGN_PX;
         let middle = x.clamp(half, f64::from(width) - half);
@@ -87,6 +72,52 @@ fn write(legend: &Legend, to: &mut String) -> std::fmt::Result {
         )?;
     }
     to.push_str("</svg>\n");
+    Ok(())
+}
+
+/// The colours of a legend from its low to its high end. A drawing has one such bar: it defines what it refers to.
+///
+/// # Errors
+/// Those of what is written to.
+pub fn write_bar(legend: &Legend, bar: Bar, to: &mut String) -> std::fmt::Result {
+    let Bar {
+        x,
+        y,
+        width,
+        height,
+    } = bar;
+    to.push_str("<defs><linearGradient id=\"colors\">");
+    for (place, color) in &legend.stops {
+        write!(to, "<stop offset=\"{place:.6}\" stop-color=\"{color}\"/>")?;
+    }
+    to.push_str("</linearGradient>");
+    let bar = format!("x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\"");
+    let is_transparent = !legend.opacity.is_empty();
+    if is_transparent {
+        let checks = CHECKS.replace("{1}", &CHECK_PX.to_string());
+        to.push_str(&checks.replace("{2}", &(2 * CHECK_PX).to_string()));
+        to.push_str("<linearGradient id=\"shares\">");
+        for (place, share) in &legend.opacity {
+            write!(
+                to,
+                "<stop offset=\"{place:.6}\" stop-color=\"#fff\" stop-opacity=\"{share:.4}\"/>"
+            )?;
+        }
+        write!(
+            to,
+            "</linearGradient><mask id=\"seen\"><rect {bar} fill=\"url(#shares)\"/></mask>"
+        )?;
+    }
+    to.push_str("</defs>");
+    if is_transparent {
+        write!(to, "<rect {bar} fill=\"url(#checks)\"/>")?;
+        write!(
+            to,
+            "<rect {bar} fill=\"url(#colors)\" mask=\"url(#seen)\"/>"
+        )?;
+    } else {
+        write!(to, "<rect {bar} fill=\"url(#colors)\"/>")?;
+    }
     Ok(())
 }
 

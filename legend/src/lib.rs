@@ -1,16 +1,17 @@
 //! Legends: a transfer function in; its colours, opacities, sizes and round values to mark out, as JSON, SVG and PNG.
+//!
+//! By themselves they are answers of the tile server and files of the command line; render workers draw the same bar over
+//! pictures that ask for it. [`raster`] turns either drawing into pixels, with fonts that are part of the program.
 
-mod png;
-mod svg;
-mod ticks;
+pub mod raster;
+pub mod svg;
+pub mod ticks;
 
 use contract::colour::{AtStop, Rgb, Stops, TransferFunction};
 use contract::job::Mode;
 use contract::quantity::{Display, Quantity};
 use serde::Serialize;
 use utoipa::ToSchema;
-
-use crate::error::ServerError;
 
 /// Width of a drawn legend, pixels.
 const WIDTH_PX: u32 = 512;
@@ -54,6 +55,17 @@ pub struct Legend {
     ticks: Vec<f64>,
     #[serde(skip)]
     transfer: TransferFunction,
+}
+
+/// A legend that cannot be written: a defect.
+#[derive(Debug, thiserror::Error)]
+pub enum LegendError {
+    /// As JSON.
+    #[error("a legend cannot be written as JSON")]
+    Json(#[from] serde_json::Error),
+    /// As pixels.
+    #[error("a drawing cannot be turned into pixels: {0}")]
+    Raster(String),
 }
 
 /// How a legend is written.
@@ -110,7 +122,7 @@ impl Legend {
     }
 
     /// Usual speeds of a vector whose parts are of a quantity.
-    pub(crate) fn of_speed(quantity: Quantity) -> Self {
+    pub fn of_speed(quantity: Quantity) -> Self {
         Self::of_mode(Mode::Flow, quantity, &TransferFunction::of_speed(quantity))
     }
 
@@ -147,15 +159,22 @@ impl Legend {
     ///
     /// # Errors
     /// None that a legend of a valid transfer function has; defects of the encoders.
-    pub fn encoded(&self, form: Form) -> Result<Vec<u8>, ServerError> {
-        let failed = |what: String| ServerError::Defect {
-            what: format!("a legend cannot be written: {what}"),
-        };
+    pub fn encoded(&self, form: Form) -> Result<Vec<u8>, LegendError> {
         match form {
-            Form::Json => serde_json::to_vec(self).map_err(|error| failed(error.to_string())),
+            Form::Json => Ok(serde_json::to_vec(self)?),
             Form::Svg => Ok(svg::drawn(self).into_bytes()),
-            Form::Png => png::drawn(&svg::drawn(self)).map_err(failed),
+            Form::Png => raster::png(&svg::drawn(self)),
         }
+    }
+
+    /// What the values are, for people.
+    pub fn label(&self) -> &'static str {
+        self.label
+    }
+
+    /// Unit of the values; empty where they have none.
+    pub fn unit(&self) -> &'static str {
+        self.unit
     }
 
     /// In one line.
@@ -182,12 +201,11 @@ impl Legend {
         f64::from(MARGIN_PX) + place * f64::from(WIDTH_PX - 2 * MARGIN_PX)
     }
 
-    /// Where the values to mark lie, pixels from the left, and their texts.
-    fn marks(&self) -> Vec<(f64, String)> {
-        let place = |tick: f64| (tick - self.low) / (self.high - self.low);
+    /// Where the values to mark lie, 0 to 1, and their texts.
+    pub fn marks(&self) -> Vec<(f64, String)> {
+        let place = |tick: &f64| (tick - self.low) / (self.high - self.low);
         let text = ticks::texts(&self.ticks);
-        let at = self.ticks.iter().map(|tick| Self::x_px(place(*tick)));
-        at.zip(text).collect()
+        self.ticks.iter().map(place).zip(text).collect()
     }
 
     /// Stored value at a place.
@@ -237,9 +255,7 @@ fn colors(transfer: &TransferFunction) -> Vec<(f64, String)> {
 }
 
 /// Two colours or more at equal distances from 0 to 1.
-pub(crate) fn evenly_placed<'a>(
-    colors: impl ExactSizeIterator<Item = &'a [u8; 3]>,
-) -> Vec<(f64, String)> {
+pub fn evenly_placed<'a>(colors: impl ExactSizeIterator<Item = &'a [u8; 3]>) -> Vec<(f64, String)> {
     let last = (colors.len() - 1) as f64;
     let stop = |(i, color): (usize, &[u8; 3])| (i as f64 / last, Rgb(*color).to_string());
     colors.enumerate().map(stop).collect()

@@ -10,7 +10,7 @@ const MOST_DECIMALS: usize = 5;
 const MOST_WRITTEN: f64 = 1e6;
 
 /// Round values from `low` to `high`, which rise; the lower end alone where the range is too narrow for its numbers.
-pub(super) fn of(low: f64, high: f64) -> Vec<f64> {
+pub fn of(low: f64, high: f64) -> Vec<f64> {
     let rough = (high - low) / (MOST - 1.0);
     let power = 10f64.powf(rough.log10().floor());
     let is_wide_enough = |factor: &&f64| **factor * power >= rough * 0.999;
@@ -35,7 +35,7 @@ pub(super) fn of(low: f64, high: f64) -> Vec<f64> {
 }
 
 /// The values with as many decimals as any of them needs, a minus sign for a minus sign.
-pub(super) fn texts(ticks: &[f64]) -> Vec<String> {
+pub fn texts(ticks: &[f64]) -> Vec<String> {
     let largest = ticks
         .iter()
         .fold(0.0, |most: f64, tick| most.max(tick.abs()));

@@ -1,0 +1,195 @@
+use super::*;
+use crate::camera::CameraAngles;
+use crate::digest::Digest;
+use crate::grid::Grid;
+use crate::job::Mode;
+use crate::key::ObjectKey;
+use crate::manifest::{MANIFEST_SCHEMA, Step};
+use crate::picture::{PictureOptions, PictureRequest};
+use crate::product::ProductId;
+use crate::quantity::Quantity;
+use crate::time::Period;
+
+const GLOBE: View = View::Globe {
+    lon_deg: 0.0,
+    lat_deg: 0.0,
+    height_m: 1.5e7,
+    width_px: 640,
+    height_px: 480,
+    angles: CameraAngles::NADIR,
+};
+
+fn product(name: &str, quantity: Quantity, periods: Vec<Period>) -> Manifest {
+    let product: ProductId = name.parse().unwrap();
+    let step = |period: Period| Step {
+        masked: None,
+        period,
+        frame: ObjectKey::frame(&product, &Digest::of(period.to_string().as_bytes())),
+        raw_sha256: Digest::of(b""),
+        origin: String::new(),
+        valid_cells: 1,
+        contributed: None,
+    };
+    Manifest {
+        schema: MANIFEST_SCHEMA,
+        number: 1,
+        title: "Sea-air flux".to_owned(),
+        quantity,
+        synthetic: false,
+        source: "Somebody et al. (2009)".to_owned(),
+        grid: Grid {
+            rows: 2,
+            cols: 4,
+            north_deg: 90.0,
+            west_deg: -180.0,
+            dlat_deg: 90.0,
+            dlon_deg: 90.0,
+        },
+        steps: periods.into_iter().map(step).collect(),
+        domain: ObjectKey::domain(&product, &Digest::of(b"d")),
+        series: vec![],
+        derived_from: None,
+        notices: vec![],
+        product,
+    }
+}
+
+fn months() -> Vec<Period> {
+    (1..=12)
+        .map(|month| Period::month(2000, month).unwrap())
+        .collect()
+}
+
+fn asked(
+    sources: &PictureSources<'_>,
+    view: View,
+    mode: Mode,
+    wishes: &str,
+) -> Result<Option<Annotations>, ContractError> {
+    let request = PictureRequest {
+        mode,
+        view,
+        time: "2000-07-15T18:00:00Z".parse().ok(),
+        options: PictureOptions {
+            annotations: wishes.parse()?,
+            ..PictureOptions::default()
+        },
+    };
+    Ok(request.job(sources)?.annotations)
+}
+
+#[test]
+fn what_is_asked_for_is_there_and_nothing_else() {
+    let flux = product("flux", Quantity::CarbonFlux, months());
+    let sources = PictureSources::of(&flux);
+    let date = asked(&sources, GLOBE, Mode::Map, "date").unwrap().unwrap();
+    let text = serde_json::to_string(&date).unwrap();
+    assert_eq!(
+        text,
+        r#"{"version":1,"date":{"shown":"15 July 2000","note":"monthly means"}}"#
+    );
+    let plain = PictureRequest {
+        mode: Mode::Map,
+        view: GLOBE,
+        time: None,
+        options: PictureOptions::default(),
+    };
+    assert_eq!(plain.job(&sources).unwrap().annotations, None);
+}
+
+#[test]
+fn all_is_all_that_the_picture_has_to_tell() {
+    let flux = product("flux", Quantity::CarbonFlux, months());
+    let carbon = product("flux-accumulated", Quantity::AccumulatedCarbon, months());
+    let alone = PictureSources::of(&flux);
+    let lifted = PictureSources {
+        accumulated: Some(&carbon),
+        ..alone.clone()
+    };
+    let all =
+        |sources: &PictureSources<'_>, mode| asked(sources, GLOBE, mode, "all").unwrap().unwrap();
+    let volume = all(&lifted, Mode::Volume);
+    assert_eq!(volume.legend, Some(Quantity::CarbonFlux));
+    assert_eq!(volume.graticule, Graticule::every(30.0).ok());
+    assert!(volume.names && volume.scale);
+    assert_eq!(volume.height.unwrap().since, "2000".parse().unwrap());
+    let source = volume.source.unwrap();
+    assert_eq!(source.as_str(), "Sea-air flux: Somebody et al. (2009)");
+    assert_eq!(all(&alone, Mode::Volume).height, None);
+    assert_eq!(all(&lifted, Mode::Map).height, None, "a map lifts nothing");
+}
+
+#[test]
+fn what_is_asked_for_by_name_and_has_nothing_to_tell_is_refused() {
+    let flux = product("flux", Quantity::CarbonFlux, months());
+    let sources = PictureSources::of(&flux);
+    let refused = asked(&sources, GLOBE, Mode::Volume, "legend,height").unwrap_err();
+    assert!(refused.to_string().contains("leave it out"), "{refused}");
+    let tile = View::Tile {
+        tile: crate::tile::Tile { z: 0, x: 0, y: 0 },
+        size_px: 256,
+    };
+    for wishes in ["all", "legend"] {
+        let refused = asked(&sources, tile, Mode::Map, wishes).unwrap_err();
+        assert!(
+            refused.to_string().contains("map tiles carry none"),
+            "{refused}"
+        );
+    }
+}
+
+#[test]
+fn a_product_of_one_step_is_named_by_it() {
+    let label = |quantity, periods: Vec<Period>| {
+        let product = product("p", quantity, periods);
+        let label = DateLabel::of(&product, "2000-07-15T18:00:00Z".parse().unwrap()).unwrap();
+        let note = label.note.map(String::from).unwrap_or_default();
+        format!("{} | {note}", label.shown.as_str())
+    };
+    let july = vec![Period::month(2000, 7).unwrap()];
+    assert_eq!(
+        label(Quantity::WindSpeed, july.clone()),
+        "July 2000 | monthly mean"
+    );
+    let year = vec![Period::year(2000).unwrap()];
+    assert_eq!(label(Quantity::WindSpeed, year), "2000 | yearly mean");
+    assert_eq!(
+        label(Quantity::AccumulatedCarbon, july),
+        "15 July 2000 | added up since 1 July 2000"
+    );
+    let hours =
+        |from: &str, to: &str| Period::new(from.parse().unwrap(), to.parse().unwrap()).unwrap();
+    let six = vec![
+        hours("2000-07-15T12:00:00Z", "2000-07-15T18:00:00Z"),
+        hours("2000-07-15T18:00:00Z", "2000-07-16T00:00:00Z"),
+    ];
+    assert_eq!(
+        label(Quantity::WindSpeed, six),
+        "15 July 2000, 18:00 UTC | 6-hour means"
+    );
+}
+
+#[test]
+fn hostile_words_of_a_product_become_one_short_line() {
+    let mut flux = product("flux", Quantity::CarbonFlux, months());
+    flux.title = "<script>\u{202e}\n".repeat(2_000);
+    flux.source = "&]]>\"'\0".repeat(2_000);
+    flux.synthetic = true;
+    let sources = PictureSources::of(&flux);
+    let source = asked(&sources, GLOBE, Mode::Map, "source")
+        .unwrap()
+        .unwrap()
+        .source;
+    let source = String::from(source.unwrap());
+    assert!(source.chars().count() <= crate::annotation::MAX_LABEL_CHARS);
+    assert!(
+        source.starts_with("<script> <script>") && source.ends_with('…'),
+        "{source}"
+    );
+    for empty in ["", " \n"] {
+        (flux.title, flux.source) = (empty.to_owned(), empty.to_owned());
+        flux.synthetic = false;
+        let sources = PictureSources::of(&flux);
+        assert_eq!(asked(&sources, GLOBE, Mode::Map, "source").unwrap(), None);
+    }
+}
