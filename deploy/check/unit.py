@@ -45,7 +45,7 @@ def faults(unit: Path) -> list[str]:
             found.append(f"{unit.name} does not hand over {name}")
     if kind == "fluxglobe@" and not any("%i" in user for user in service.get("User", [])):
         found.append(f"{unit.name} has one user for all services")
-    if kind == "fluxglobe@" and service.get("StartLimitIntervalSec") != ["0"]:
+    if service.get("StartLimitIntervalSec") != ["0"]:
         found.append(f"{unit.name} gives up a service that ended often")
     return found
 
