@@ -11,13 +11,15 @@ export CARGO_INCREMENTAL ?= 0
 export NODEVICE_SELECT := 1
 
 fluxglobe := $(CARGO_TARGET_DIR)/debug/fluxglobe
+# The checkout that was built last.
+built_from := $(CARGO_TARGET_DIR)/built-from
 # Tests that ended without having run say so in here.
 not_run := $(CARGO_TARGET_DIR)/tests-not-run
 viewer := tile-server/web/dist/index.html
 viewer_sources := $(shell git ls-files tile-server/web)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo build release viewer check test faults bless describe services services-down cluster cluster-down tools test-tools
+.PHONY: help checkout demo build release viewer check test faults bless describe services services-down cluster cluster-down tools test-tools
 
 help: ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 14
@@ -25,10 +27,16 @@ help: ## Show this list
 demo: build ## Ingest real data, compute budgets, serve the globe on http://localhost:8080 (ARGS="..." are passed on)
 	$(fluxglobe) demo $(ARGS)
 
-build: tools viewer ## Build the program and the viewer
+# Cargo goes by times: files of one checkout that are older than what another one built would pass for built.
+checkout:
+	@mkdir -p $(CARGO_TARGET_DIR)
+	@[ "$$(cat $(built_from) 2>/dev/null)" = "$(CURDIR)" ] || git ls-files -z '*.rs' | xargs -0 -r touch
+	@echo "$(CURDIR)" >$(built_from)
+
+build: checkout tools viewer ## Build the program and the viewer
 	cargo build --locked -p fluxglobe
 
-release: tools viewer ## Build the program as deployments run it: optimised, under target/release
+release: checkout tools viewer ## Build the program as deployments run it: optimised, under target/release
 	cargo build --locked --release -p fluxglobe
 	@echo 'install as root: install -m 755 $(CARGO_TARGET_DIR)/release/fluxglobe /usr/local/bin/'
 
@@ -59,11 +67,11 @@ tools:
 test-tools:
 	@deploy/install-tools.sh test
 
-check: tools ## The quick part of the tests: format, lints, types, spelling
+check: checkout tools ## The quick part of the tests: format, lints, types, spelling
 	cargo fmt --all --check
 	cargo clippy --locked --workspace --all-targets -- -D warnings
 
-test: test-tools $(viewer) ## Everything that CI runs
+test: checkout test-tools $(viewer) ## Everything that CI runs
 	cargo fmt --all --check
 	$(FLUXGLOBE_TOOLS)/bin/typos
 	cd tile-server/web && npm run check && npm test
@@ -75,7 +83,7 @@ test: test-tools $(viewer) ## Everything that CI runs
 	tests/data/report.sh $(not_run)
 	deploy/check.sh
 
-faults: test-tools $(viewer) ## kill -9 of every kind of process, 60 times, while granules land and tiles are drawn
+faults: checkout test-tools $(viewer) ## kill -9 of every kind of process, 60 times, while granules land and tiles are drawn
 	cargo build --locked --workspace --all-targets
 	deploy/services/services.sh install
 	FLUXGLOBE_KILLS=60 cargo test --locked -p tests --test cluster killed -- --nocapture
