@@ -19,7 +19,7 @@ viewer := tile-server/web/dist/index.html
 viewer_sources := $(shell git ls-files tile-server/web)
 
 .DEFAULT_GOAL := help
-.PHONY: help checkout demo build release viewer check test faults bless describe services services-down cluster cluster-down tools test-tools
+.PHONY: help checkout demo build release viewer check test faults bless gallery describe services services-down cluster cluster-down tools test-tools gallery-tools
 
 help: ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 14
@@ -67,6 +67,9 @@ tools:
 test-tools:
 	@deploy/install-tools.sh test
 
+gallery-tools:
+	@deploy/install-tools.sh gallery
+
 check: checkout tools ## The quick part of the tests: format, lints, types, spelling
 	cargo fmt --all --check
 	cargo clippy --locked --workspace --all-targets -- -D warnings
@@ -91,6 +94,9 @@ faults: checkout test-tools $(viewer) ## kill -9 of every kind of process, 60 ti
 bless: test-tools ## Draw the golden images anew, for a new RENDERER_VERSION, and list what changed
 	BLESS=1 cargo test --locked -p render --test it golden
 	git status --short -- render/tests/golden
+
+gallery: build gallery-tools ## Draw the pictures of docs/gallery.md that are missing or changed (ARGS=--all everything, ARGS=NAME one)
+	FLUXGLOBE_PROGRAM=$(fluxglobe) $(FLUXGLOBE_TOOLS)/bin/python -B gallery/make.py $(ARGS)
 
 describe: test-tools $(viewer) ## Write tile-server/openapi.json and the viewer's types anew, after a change of the HTTP API
 	BLESS=1 cargo test --locked -p tile-server --test it openapi

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Checks everything in deploy/, each kind of file with its own tool, and sees each check fail on a planted fault.
+# Checks everything in deploy/ and the gallery's page, each kind of file with its own tool, and sees each check fail on a planted fault.
 #   deploy/check.sh            everything
-#   deploy/check.sh NAME...    shell, node, image, compose, prometheus, grafana, chart, unit
+#   deploy/check.sh NAME...    shell, node, image, compose, prometheus, grafana, chart, unit, gallery
 # The tools are installed by check/install.sh and, for promtool, services/prometheus.sh.
 set -euo pipefail
 
@@ -179,8 +179,20 @@ unit_without_remarks() {
     ! [ -s "$work/remarks" ]
 }
 
+gallery() { python3 -B ../gallery/make.py --check --list "$1"; }
+
+check_gallery() {
+    checked 'docs/gallery.md and its pictures are what gallery/list.toml says' gallery ../gallery/list.toml
+    sed 's/--tilt /--tilt 1/' ../gallery/list.toml >"$work/list.toml"
+    refused 'the look at the gallery' 'drawn by another command' gallery "$work/list.toml"
+    sed 's/^title = "/title = "No /' ../gallery/list.toml >"$work/list.toml"
+    refused 'the look at the gallery' 'is not what the list gives' gallery "$work/list.toml"
+    sed 's/^text = /test = /' ../gallery/list.toml >"$work/list.toml"
+    refused 'the look at the gallery' 'text is missing' gallery "$work/list.toml"
+}
+
 check/install.sh
 if ! [ -x "$promtool" ]; then services/prometheus.sh install; fi
-if [ $# = 0 ]; then set -- shell node image compose prometheus grafana chart unit; fi
+if [ $# = 0 ]; then set -- shell node image compose prometheus grafana chart unit gallery; fi
 for name in "$@"; do "check_$name"; done
 printf '%d passed, 0 failed\n' "$ran"

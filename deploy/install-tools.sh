@@ -2,6 +2,7 @@
 # Installs what building, running and testing Fluxglobe needs on Debian 12 and is not there yet; says what.
 #   deploy/install-tools.sh run    what `make demo` needs
 #   deploy/install-tools.sh test   and what `make test` needs besides
+#   deploy/install-tools.sh gallery   and what `make gallery` needs besides
 # Root is asked for through apt only, with sudo when the caller is not root.
 set -euo pipefail
 
@@ -78,4 +79,9 @@ if [ "$purpose" = test ]; then
     pip_install pyproj 3.7.2
     pip_install shapely 2.2.0
     pip_install netCDF4 1.7.4
+fi
+if [ "$purpose" = gallery ]; then
+    pip_install pillow 13.0.0
+    # Carries an ffmpeg of its own, for machines without one.
+    pip_install imageio-ffmpeg 0.8.1
 fi

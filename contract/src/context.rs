@@ -1,8 +1,9 @@
-//! What surrounds the particles of a picture: coast lines, the sea they sink into, the relief of land and sea floor.
+//! What surrounds the particles of a picture: coast lines and borders, the sea they sink into, land and sea floor, sky.
 
 use serde::{Deserialize, Serialize};
 
 use crate::ContractError;
+use crate::base_map::{Background, BaseMap};
 use crate::grid::Grid;
 use crate::key::ObjectKey;
 use crate::manifest::Manifest;
@@ -33,9 +34,21 @@ pub struct Context {
         skip_serializing_if = "crate::context::is_zero"
     )]
     pub sea_opacity: f64,
-    /// Draw coast lines.
+    /// Draw coast lines, and on globe views shores of lakes.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub coastlines: bool,
+    /// Draw borders of countries (globe views).
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub borders: bool,
+    /// Shade the plain globe by a coarse relief of land and sea floor, where no relief of its own is drawn.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub sea_floor: bool,
+    /// Colours of the plain globe.
+    #[serde(default, skip_serializing_if = "BaseMap::is_usual")]
+    pub base_map: BaseMap,
+    /// What is seen beside the globe.
+    #[serde(default, skip_serializing_if = "Background::is_usual")]
+    pub background: Background,
 }
 
 /// The relief under a picture: one stored frame of elevation on a grid of its own.
@@ -78,6 +91,42 @@ impl Context {
             &self.sea_opacity.to_string(),
             format!("a share of 0 to {MAX_SEA_OPACITY}, such as 0.4"),
         ))
+    }
+
+    /// Refuses what a picture without a globe would have to leave out: on map tiles whatever belongs to globe views, and a
+    /// sky round a globe that is not drawn.
+    pub(crate) fn validate_on(
+        &self,
+        is_tile: bool,
+        globe_surface: bool,
+    ) -> Result<(), ContractError> {
+        let usual = Self::default();
+        let of_globes = [
+            (self.borders, "borders", "true"),
+            (self.sea_floor, "sea floor", "true"),
+            (
+                self.base_map != usual.base_map,
+                "base map",
+                self.base_map.as_str(),
+            ),
+        ];
+        if let Some((_, what, text)) = of_globes
+            .into_iter()
+            .find(|(is_set, ..)| is_tile && *is_set)
+        {
+            let reason =
+                "it belongs to views of the globe; map tiles lie over the map of their client";
+            return Err(ContractError::invalid(what, text, reason));
+        }
+        if self.background != usual.background && (is_tile || !globe_surface) {
+            let reason = "it lies behind a globe that is drawn; leave it out, or draw the globe";
+            return Err(ContractError::invalid(
+                "background",
+                self.background.as_str(),
+                reason,
+            ));
+        }
+        Ok(())
     }
 }
 
@@ -153,10 +202,45 @@ mod tests {
         let both = Context {
             sea_opacity: 0.25,
             coastlines: true,
+            ..Context::default()
         };
         let text = serde_json::to_string(&both).unwrap();
         assert_eq!(text, r#"{"sea_opacity":"0.25","coastlines":true}"#);
         assert_eq!(serde_json::from_str::<Context>(&text).unwrap(), both);
+        let all = Context {
+            borders: true,
+            sea_floor: true,
+            base_map: BaseMap::Light,
+            background: Background::Sky,
+            ..both
+        };
+        let text = serde_json::to_string(&all).unwrap();
+        let more = r#""borders":true,"sea_floor":true,"base_map":"light","background":"sky"}"#;
+        assert!(text.ends_with(more), "{text}");
+        assert_eq!(serde_json::from_str::<Context>(&text).unwrap(), all);
+    }
+
+    #[test]
+    fn what_belongs_to_globe_views_is_refused_where_no_globe_is_drawn() {
+        let changes: [fn(&mut Context); 4] = [
+            |c| c.borders = true,
+            |c| c.sea_floor = true,
+            |c| c.base_map = BaseMap::Light,
+            |c| c.background = Background::Sky,
+        ];
+        for change in changes {
+            let mut context = Context::default();
+            change(&mut context);
+            context.validate_on(false, true).unwrap();
+            context.validate_on(true, false).unwrap_err();
+            let is_sky = context.background == Background::Sky;
+            assert_eq!(context.validate_on(false, false).is_err(), is_sky);
+        }
+        let lines = Context {
+            coastlines: true,
+            ..Context::default()
+        };
+        lines.validate_on(true, false).unwrap();
     }
 
     #[test]

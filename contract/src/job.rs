@@ -17,7 +17,7 @@ use crate::time_sample::TimeSample;
 
 /// Raised whenever the renderer draws the same job differently or writes the same picture in other bytes, so that old
 /// pictures are not taken for new ones: a name has one content for ever. `make bless` asks for it.
-pub const RENDERER_VERSION: u32 = 6;
+pub const RENDERER_VERSION: u32 = 7;
 /// Largest width and height of a picture, pixels.
 pub const MAX_IMAGE_PX: u32 = 4096;
 /// Most slices of a half-angle volume.
@@ -176,6 +176,9 @@ pub struct RenderJob {
 }
 
 impl Style {
+    /// Slices of a globe view unless told otherwise: seen at a slant, clouds need thinner ones than on a map.
+    pub const GLOBE_SLICES: u32 = 128;
+
     /// What a picture looks like unless told otherwise.
     pub fn with_transfer(transfer: TransferFunction) -> Self {
         Self {
@@ -297,6 +300,13 @@ impl RenderJob {
         self.validate_flow()?;
         self.validate_annotations()?;
         self.style.validate()?;
+        let Style {
+            context,
+            globe_surface,
+            ..
+        } = &self.style;
+        let is_tile = matches!(self.view, View::Tile { .. });
+        context.validate_on(is_tile, *globe_surface)?;
         self.view.validate()
     }
 
@@ -345,6 +355,7 @@ impl RenderJob {
 mod tests {
     use super::*;
     use crate::annotation::{DateLabel, Graticule, HeightScale, Label};
+    use crate::base_map::{Background, BaseMap};
     use crate::colour::{Palette, Share, Stops};
     use crate::quantity::Quantity;
     use crate::sun::Subsolar;
@@ -544,6 +555,10 @@ mod tests {
         changed(|j| j.style.sun.subsolar = Some(subsolar(11.0)));
         changed(|j| j.style.context.coastlines = true);
         changed(|j| j.style.context.sea_opacity = 0.5);
+        changed(|j| j.style.context.borders = true);
+        changed(|j| j.style.context.sea_floor = true);
+        changed(|j| j.style.context.base_map = BaseMap::Light);
+        changed(|j| j.style.context.background = Background::Sky);
         changed(|j| j.relief = Some(relief(15.0)));
         changed(|j| j.relief = Some(relief(30.0)));
         for change in ANNOTATED {
@@ -598,11 +613,12 @@ mod tests {
             height_px: 10,
             angles: crate::camera::CameraAngles::NADIR,
         };
-        let broken: [fn(&mut RenderJob); 14] = [
+        let broken: [fn(&mut RenderJob); 15] = [
             |j| j.grid.rows = u32::MAX,
             |j| j.style.sun.subsolar = Some(subsolar(f64::NAN)),
             |j| j.style.sun.azimuth_deg = f64::INFINITY,
             |j| j.style.context.sea_opacity = 1.0,
+            |j| j.style.context.borders = true,
             |j| j.relief = Some(relief(-1.0)),
             |j| j.value.before = Some("raw/p/a".parse().unwrap()),
             |j| {

@@ -5,6 +5,7 @@
 #![warn(missing_docs, clippy::missing_errors_doc)]
 
 pub mod annotation;
+pub mod base_map;
 pub mod budget;
 pub mod camera;
 pub mod check;

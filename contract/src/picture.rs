@@ -5,6 +5,7 @@ mod annotated;
 
 use crate::ContractError;
 use crate::annotation::AnnotationWishes;
+use crate::base_map::{Background, BaseMap};
 use crate::colour::{TransferFunction, TransferOptions};
 use crate::context::{Context, Relief};
 use crate::flow::{Flow, check_parts, steps_around};
@@ -32,8 +33,16 @@ pub struct PictureOptions {
     pub height_m_per_kg_m2: Option<f64>,
     /// Share of what lies 100 km below the sea surface that the sea hides.
     pub sea_opacity: Option<f64>,
-    /// Draw coast lines.
+    /// Draw coast lines; on views that show the globe unless told otherwise.
     pub coastlines: Option<bool>,
+    /// Draw borders of countries; where coast lines are drawn on a globe unless told otherwise.
+    pub borders: Option<bool>,
+    /// Shade the plain globe by a coarse relief; wherever one is drawn unless told otherwise.
+    pub sea_floor: Option<bool>,
+    /// Colours of the plain globe.
+    pub base_map: Option<BaseMap>,
+    /// What is seen beside the globe.
+    pub background: Option<Background>,
     /// Light.
     pub sun: Option<SunChoice>,
     /// Draw a plain globe behind the particles of a globe view.
@@ -83,6 +92,24 @@ pub fn shown_time(product: &Manifest, time: Option<TimeMs>) -> Result<TimeMs, Co
 }
 
 impl PictureOptions {
+    /// The style of a quantity that looks so at an instant in a view.
+    ///
+    /// # Errors
+    /// Those of [`PictureOptions::style`].
+    pub fn style_in(
+        &self,
+        view: &View,
+        quantity: Quantity,
+        mode: Mode,
+        time: TimeMs,
+    ) -> Result<Style, ContractError> {
+        let mut style = self.style(quantity, mode, time)?;
+        if let (None, View::Globe { .. }) = (self.slices, view) {
+            style.slices = Style::GLOBE_SLICES;
+        }
+        Ok(style)
+    }
+
     /// The style of a quantity that looks so at an instant.
     ///
     /// # Errors
@@ -99,10 +126,6 @@ impl PictureOptions {
                 Style::with_transfer(self.transfer.over(quantity)?)
             }
         };
-        let Context {
-            sea_opacity,
-            coastlines,
-        } = usual.context;
         Ok(Style {
             slices: self.slices.unwrap_or(usual.slices),
             particles_per_cell: self.particles_per_cell.unwrap_or(usual.particles_per_cell),
@@ -112,12 +135,23 @@ impl PictureOptions {
                 .map_or(usual.sun, |choice| choice.instead_of(usual.sun, time)),
             globe_surface: self.globe_surface,
             uncertainty: self.uncertainty,
-            context: Context {
-                sea_opacity: self.sea_opacity.unwrap_or(sea_opacity),
-                coastlines: self.coastlines.unwrap_or(coastlines),
-            },
+            context: self.context(usual.context),
             ..usual
         })
+    }
+
+    /// What surrounds the particles: a globe has its map unless told otherwise, a map tile lies over that of its client.
+    fn context(&self, usual: Context) -> Context {
+        let is_globe = self.globe_surface;
+        let coastlines = self.coastlines.unwrap_or(is_globe);
+        Context {
+            sea_opacity: self.sea_opacity.unwrap_or(usual.sea_opacity),
+            coastlines,
+            borders: self.borders.unwrap_or(is_globe && coastlines),
+            sea_floor: self.sea_floor.unwrap_or(is_globe),
+            base_map: self.base_map.unwrap_or(usual.base_map),
+            background: self.background.unwrap_or(usual.background),
+        }
     }
 }
 
@@ -128,9 +162,10 @@ impl PictureRequest {
     /// A product without steps, products that do not belong together, or a limit that is broken.
     pub fn job(&self, sources: &PictureSources<'_>) -> Result<RenderJob, ContractError> {
         let time = shown_time(sources.product, self.time)?;
+        let quantity = sources.product.quantity;
         let style = self
             .options
-            .style(sources.product.quantity, self.mode, time)?;
+            .style_in(&self.view, quantity, self.mode, time)?;
         let job = sources.job(self.mode, self.view, time, style)?;
         sources.annotated(job, time, self.options.annotations)
     }
@@ -303,6 +338,48 @@ mod tests {
     }
 
     #[test]
+    fn a_globe_has_lines_and_a_sea_floor_unless_told_otherwise() {
+        let time = "2000-02-01".parse().unwrap();
+        let context = |options: PictureOptions| {
+            let style = options.style(Quantity::CarbonFlux, Mode::Volume, time);
+            style.unwrap().context
+        };
+        let globe = PictureOptions {
+            globe_surface: true,
+            ..PictureOptions::default()
+        };
+        let usual = context(globe);
+        assert!(usual.coastlines && usual.borders && usual.sea_floor);
+        assert_eq!(
+            (usual.base_map, usual.background),
+            (BaseMap::Dark, Background::None)
+        );
+        let without = context(PictureOptions {
+            coastlines: Some(false),
+            ..globe
+        });
+        assert!(!without.coastlines && !without.borders && without.sea_floor);
+        let borders = context(PictureOptions {
+            borders: Some(true),
+            coastlines: Some(false),
+            ..globe
+        });
+        assert!(!borders.coastlines && borders.borders);
+        assert!(
+            context(PictureOptions::default()).is_empty(),
+            "a tile has none of it"
+        );
+        let lines = context(PictureOptions {
+            coastlines: Some(true),
+            ..PictureOptions::default()
+        });
+        assert!(
+            lines.coastlines && !lines.borders,
+            "tiles have coasts alone"
+        );
+    }
+
+    #[test]
     fn every_option_reaches_the_style() {
         let time: TimeMs = "2000-06-21T12:00:00Z".parse().unwrap();
         let style = |options: PictureOptions| {
@@ -311,7 +388,7 @@ mod tests {
                 .unwrap()
         };
         let usual = style(PictureOptions::default());
-        let changes: [fn(&mut PictureOptions); 9] = [
+        let changes: [fn(&mut PictureOptions); 13] = [
             |o| o.transfer.reversed = true,
             |o| o.uncertainty = true,
             |o| o.slices = Some(7),
@@ -321,6 +398,10 @@ mod tests {
             |o| o.coastlines = Some(true),
             |o| o.sun = Some(SunChoice::OfTime),
             |o| o.globe_surface = true,
+            |o| o.borders = Some(true),
+            |o| o.sea_floor = Some(true),
+            |o| o.base_map = Some(BaseMap::Light),
+            |o| o.background = Some(Background::Sky),
         ];
         let mut seen = vec![usual];
         for change in changes {

@@ -2,6 +2,7 @@
 
 mod annotations;
 mod fill;
+mod ground;
 mod look;
 mod observations;
 mod pictures;
@@ -24,9 +25,12 @@ use contract::time::TimeMs;
 
 pub(crate) use annotations::Annotated;
 pub(crate) use fill::{BenchFill, FillError, ProductsOf};
+pub(crate) use ground::{Ground, GroundOptions};
 pub(crate) use look::{Look, RenderLegend};
 pub(crate) use observations::{MatchTime, Matchup, Observations, ObservationsAsked};
-pub(crate) use pictures::{BenchCompare, BenchQuality, BenchServe, RenderAnimation};
+pub(crate) use pictures::{
+    BenchCompare, BenchQuality, BenchRender, BenchServe, QualityScenes, RenderAnimation,
+};
 pub(crate) use services::{
     Bench, BenchBudget, BenchStream, Executor, Ingestd, Notice, Rejected, RenderWorker, Scheduler,
     TileServer, Topics,
@@ -427,9 +431,8 @@ pub(crate) struct RenderGlobe {
     /// Width and height of the picture, pixels.
     #[arg(long, default_value = "1280x960", value_parser = size)]
     pub(crate) size: (u32, u32),
-    /// Leave out the plain globe behind the particles.
-    #[arg(long)]
-    pub(crate) transparent: bool,
+    #[command(flatten)]
+    pub(crate) ground: Ground,
     #[command(flatten)]
     pub(crate) annotations: Annotated,
 }

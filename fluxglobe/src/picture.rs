@@ -12,14 +12,14 @@ use contract::picture::{PictureOptions, PictureRequest, PictureSources, shown_ti
 use contract::time::Period;
 use storage::Store;
 
-use crate::cli::{Camera, Picture, RenderGlobe, Settings};
+use crate::cli::{Camera, GroundOptions, Picture, RenderGlobe, Settings};
 use crate::{deployment, progress};
 
 /// What pictures of the globe have and map tiles have not.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Extras {
-    /// A plain globe behind the particles.
-    pub(crate) surface: bool,
+    /// What lies below and beside the particles.
+    pub(crate) ground: GroundOptions,
     /// What is drawn over the finished picture.
     pub(crate) annotations: AnnotationWishes,
 }
@@ -28,7 +28,7 @@ impl Extras {
     /// Those of a picture of the globe.
     pub(crate) fn of(globe: &RenderGlobe) -> Self {
         Self {
-            surface: !globe.transparent,
+            ground: globe.ground.options(),
             annotations: globe.annotations.wishes(),
         }
     }
@@ -119,9 +119,13 @@ pub(crate) fn options(picture: &Picture, extras: Extras) -> PictureOptions {
         particles_per_cell: picture.particles,
         height_m_per_kg_m2: surroundings.height_exaggeration,
         sea_opacity: Some(surroundings.sea_opacity),
-        coastlines: Some(surroundings.coastlines),
+        coastlines: surroundings.coastlines,
+        borders: extras.ground.borders,
+        sea_floor: extras.ground.sea_floor,
+        base_map: extras.ground.base_map,
+        background: extras.ground.background,
         sun: surroundings.sun,
-        globe_surface: extras.surface,
+        globe_surface: extras.ground.surface,
         annotations: extras.annotations,
     }
 }

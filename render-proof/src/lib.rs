@@ -14,9 +14,10 @@ pub mod flip;
 pub mod ocean;
 pub mod quality;
 pub mod reference;
+pub mod shown;
 pub mod views;
 
-pub use difference::{Difference, differing_bytes};
+pub use difference::{Covered, Difference, differing_bytes};
 pub use error::ProofError;
-pub use quality::{QualityRow, against_slices};
+pub use quality::{Quality, QualityRow, against_slices};
 pub use reference::{Fineness, Picture, reference, reference_of_cells};

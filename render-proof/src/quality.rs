@@ -1,4 +1,4 @@
-//! Error against the number of slices: a job and a scene in, a row a number of slices out.
+//! Error against the number of slices: a job and a scene in, a row a number of slices out, and the pictures.
 
 use contract::job::RenderJob;
 use render::{Renderer, Scene};
@@ -18,6 +18,17 @@ pub struct QualityRow {
     pub difference: Difference,
 }
 
+/// A scene in several numbers of slices.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Quality {
+    /// One a number of slices.
+    pub rows: Vec<QualityRow>,
+    /// The pictures of these rows.
+    pub drawn: Vec<Picture>,
+    /// What they are held against.
+    pub reference: Picture,
+}
+
 /// Draws a job with every number of slices and compares it with its reference. Blocks.
 ///
 /// # Errors
@@ -27,15 +38,20 @@ pub fn against_slices(
     job: &RenderJob,
     scene: &Scene,
     slices: &[u32],
-) -> Result<Vec<QualityRow>, ProofError> {
-    let truth = reference(job, scene, Fineness::default())?;
-    let row = |&slices: &u32| {
+) -> Result<Quality, ProofError> {
+    let mut quality = Quality {
+        rows: vec![],
+        drawn: vec![],
+        reference: reference(job, scene, Fineness::default())?,
+    };
+    for &slices in slices {
         let mut job = job.clone();
         job.style.slices = slices;
         let picture = Picture::from(&renderer.render(&job, scene)?);
-        let difference =
-            Difference::of(&picture, &truth).expect("both have the size that the job asks for");
-        Ok(QualityRow { slices, difference })
-    };
-    slices.iter().map(row).collect()
+        let difference = Difference::of(&picture, &quality.reference)
+            .expect("both have the size that the job asks for");
+        quality.rows.push(QualityRow { slices, difference });
+        quality.drawn.push(picture);
+    }
+    Ok(quality)
 }

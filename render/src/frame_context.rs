@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use bytemuck::Pod;
 
-use crate::coast::land;
+use crate::coast::sea_floor;
 use crate::error::RenderError;
 use crate::gpu::{Gpu, Recorder, Slot, Workspace};
 use crate::plan::Plan;
@@ -125,18 +125,12 @@ impl<'a> FrameContext<'a> {
         self.workspace.upload_once(self.gpu, slot, plan, content)
     }
 
-    /// How much of every place is land, at the plan's level; any buffer where no globe is seen.
-    pub fn land(&mut self) -> Result<wgpu::Buffer, RenderError> {
-        let cols = self.params.context.land_size.x;
-        if cols == 0 {
-            return Ok(self.scene.domain.clone());
-        }
-        let level = land::level_of(cols);
-        let words = &land::COVER[land::words(level)];
+    /// The coarse relief of the program, sent once for all frames of a workspace.
+    pub fn sea_floor(&mut self) -> Result<wgpu::Buffer, RenderError> {
         // Plans count from 1.
-        let owner = u64::MAX - u64::from(level);
+        let owner = u64::MAX;
         self.workspace
-            .upload_once(self.gpu, Slot::Land, owner, words)
+            .upload_once(self.gpu, Slot::SeaFloor, owner, &sea_floor::HEIGHTS_M)
     }
 
     /// Pixels of the part.

@@ -5,7 +5,7 @@ use glam::Vec4;
 
 use crate::error::RenderError;
 use crate::plan::{Part, Plan};
-use crate::scene::{Interval, Scene, Terrain};
+use crate::scene::{Interval, Scene};
 use crate::stages::compose::in_context::{self, Surroundings};
 use crate::stages::flow::cpu::Field;
 use crate::stages::layout::{Entry, LIGHT_OFF, Particle, Splat};
@@ -22,10 +22,6 @@ const MOST_PARTICLES: usize = 1 << 24;
 const MOST_ENTRY_BYTES: u64 = 4 << 30;
 
 /// Draws one part; its pixels as RGBA8, red lowest.
-#[expect(
-    clippy::too_many_lines,
-    reason = "the stages in order, read side by side with `frame.rs`"
-)]
 pub fn draw(plan: &Plan, part: Part, scene: &Scene) -> Result<Vec<u8>, RenderError> {
     let params = plan.params_of(part);
     let pixels = params.view.size_px.x as usize * params.view.size_px.y as usize;
@@ -38,6 +34,7 @@ pub fn draw(plan: &Plan, part: Part, scene: &Scene) -> Result<Vec<u8>, RenderErr
             palette: &plan.palette,
             axes: &plan.axes,
             uncertainty: &uncertainty,
+            domain: scene.domain.content(),
         };
         map::cpu::map(&params, &inputs, &mut picture);
     } else {
@@ -45,12 +42,7 @@ pub fn draw(plan: &Plan, part: Part, scene: &Scene) -> Result<Vec<u8>, RenderErr
         let accumulated = accumulated
             .map(|interval| interpolated(&params, params.values.accumulated_weight, interval));
         let count = plan.active.len() * params.cells.particles_per_cell as usize;
-        if count > MOST_PARTICLES {
-            return Err(RenderError::TooManyParticles {
-                count: count as u64,
-                limit: MOST_PARTICLES as u64,
-            });
-        }
+        check_count(count)?;
         let mut particles = vec![Particle::default(); count];
         if let (Mode::Flow, Some(northward)) = (plan.mode, &scene.northward) {
             let north = interpolated(&params, params.values.northward_weight, northward);
@@ -74,6 +66,7 @@ pub fn draw(plan: &Plan, part: Part, scene: &Scene) -> Result<Vec<u8>, RenderErr
                 accumulated: accumulated.as_deref().unwrap_or_default(),
                 palette: &plan.palette,
                 uncertainty: &uncertainty,
+                domain: scene.domain.content(),
             };
             particles::cpu::generate(&params, &inputs, &mut particles);
         }
@@ -89,23 +82,23 @@ pub fn draw(plan: &Plan, part: Part, scene: &Scene) -> Result<Vec<u8>, RenderErr
         eye::cpu::eye(&params, &list_ends, &entries, &mut picture);
     }
     let mut image = vec![0u32; pixels];
-    let domain = scene.domain.content();
     if params.in_context {
-        let around = Surroundings {
-            domain,
-            terrain: scene
-                .terrain
-                .as_ref()
-                .map(Terrain::heights_m)
-                .unwrap_or_default(),
-            ground_axes: &plan.ground_axes,
-            coast: &plan.coast,
-        };
+        let around = Surroundings::of(plan, scene);
         in_context::compose(&params, &picture, &around, &mut image);
     } else {
-        compose::cpu::compose(&params, &picture, domain, &mut image);
+        compose::cpu::compose(&params, &picture, &mut image);
     }
     Ok(image.into_iter().flat_map(u32::to_le_bytes).collect())
+}
+
+fn check_count(count: usize) -> Result<(), RenderError> {
+    if count > MOST_PARTICLES {
+        return Err(RenderError::TooManyParticles {
+            count: count as u64,
+            limit: MOST_PARTICLES as u64,
+        });
+    }
+    Ok(())
 }
 
 fn interpolated(params: &Params, weight: f32, interval: &Interval) -> Vec<f32> {

@@ -8,7 +8,7 @@ use contract::grid::Grid;
 
 use crate::error::RenderError;
 use crate::stages::fill::Filled;
-use crate::stages::layout::{MISSING, is_missing};
+use crate::stages::layout::{COVERED, MISSING, is_missing};
 
 static NEXT_ID: AtomicU64 = AtomicU64::new(0);
 
@@ -17,6 +17,8 @@ static NEXT_ID: AtomicU64 = AtomicU64::new(0);
 pub struct Cells<T> {
     id: u64,
     content: Vec<T>,
+    /// Blocks of cells, not cells of the product.
+    is_joined: bool,
     /// The same in blocks of four.
     coarser: OnceLock<Arc<Cells<T>>>,
 }
@@ -26,6 +28,7 @@ impl<T> Cells<T> {
         Self {
             id: NEXT_ID.fetch_add(1, Ordering::Relaxed),
             content,
+            is_joined: false,
             coarser: OnceLock::new(),
         }
     }
@@ -35,10 +38,21 @@ impl<T> Cells<T> {
         self.id
     }
 
-    /// The same in blocks of four, made by `make` the first time.
+    /// The same in blocks of four, made by `make` the first time. Who wants it meanwhile waits for it and for nothing
+    /// else.
     pub(crate) fn coarser(cells: &Arc<Self>, make: impl FnOnce(&[T]) -> Vec<T>) -> Arc<Self> {
-        let coarser = || Arc::new(Self::new(make(&cells.content)));
+        let coarser = || {
+            Arc::new(Self {
+                is_joined: true,
+                ..Self::new(make(&cells.content))
+            })
+        };
         Arc::clone(cells.coarser.get_or_init(coarser))
+    }
+
+    /// Are these blocks of cells, and not the cells of the product?
+    pub fn is_joined(&self) -> bool {
+        self.is_joined
     }
 
     /// The numbers.
@@ -237,7 +251,8 @@ impl Terrain {
 pub struct Scene {
     /// The grid of all frames.
     pub grid: Grid,
-    /// 1 for cells that hold data in some step, 0 for the others.
+    /// How much of every cell's area holds data in some step: 0 of none, [`COVERED`] of all, which cells of a product are;
+    /// blocks of cells may lie between.
     pub domain: Arc<Cells<u32>>,
     /// The product drawn.
     pub value: Interval,
@@ -252,7 +267,8 @@ pub struct Scene {
 impl Scene {
     /// A domain from one flag a cell.
     pub fn domain_of(cells: impl IntoIterator<Item = bool>) -> Arc<Cells<u32>> {
-        Arc::new(Cells::new(cells.into_iter().map(u32::from).collect()))
+        let covered = |holds_data: bool| u32::from(holds_data) * COVERED;
+        Arc::new(Cells::new(cells.into_iter().map(covered).collect()))
     }
 
     /// Checks that all parts have one number a cell.

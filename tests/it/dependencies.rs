@@ -10,11 +10,15 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("contract", &[]),
     ("legend", &["contract"]),
     ("retry", &[]),
+    ("china-sea", &[]),
     ("service", &["retry"]),
     ("storage", &["contract", "retry"]),
     ("kafka-log", &["contract", "storage", "service"]),
     ("observations", &["contract", "retry", "storage", "service"]),
-    ("ingest", &["contract", "retry", "storage", "service"]),
+    (
+        "ingest",
+        &["contract", "retry", "storage", "service", "china-sea"],
+    ),
     ("compute", &["contract", "retry", "storage", "service"]),
     ("render", &["contract"]),
     (
@@ -23,7 +27,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "contract", "legend", "retry", "storage", "service", "render",
         ],
     ),
-    ("render-proof", &["contract", "render"]),
+    ("render-proof", &["contract", "render", "china-sea"]),
     (
         "tile-server",
         &["contract", "legend", "retry", "storage", "service"],

@@ -26,6 +26,7 @@ mod connections;
 pub mod error;
 mod extract;
 mod gate;
+mod ground;
 pub mod live;
 mod look;
 pub mod metrics;

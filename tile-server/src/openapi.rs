@@ -58,6 +58,8 @@ const RETRY_AFTER: &str = "Seconds after which the same request may succeed";
         contract::earth::Earth,
         contract::observation::PlatformKind,
         contract::region::Cells,
+        words::Background,
+        words::BaseMap,
         words::LegendForm,
         words::Mode,
         words::Palette,

@@ -10,6 +10,7 @@ use utoipa::IntoParams;
 use crate::catalogue::Catalogue;
 use crate::error::ServerError;
 use crate::extract::number;
+use crate::ground::flag;
 
 /// The parameters of an address that say it, as they were written.
 #[derive(Debug, Default, Deserialize, IntoParams)]
@@ -23,7 +24,7 @@ pub(crate) struct SurroundingsQuery {
     /// Share of what lies deep below the sea surface that the sea hides.
     #[param(value_type = Option<f64>, minimum = 0, maximum = 0.99)]
     sea_opacity: Option<String>,
-    /// Coast lines are drawn.
+    /// Coast lines are drawn; unless told otherwise on views that show the globe, and not on tiles.
     #[param(value_type = Option<bool>)]
     coastlines: Option<String>,
     /// How far a kilogram of accumulated carbon a square metre lifts particles, m m² kg⁻¹.
@@ -66,12 +67,7 @@ impl SurroundingsQuery {
             let text = text.as_deref();
             text.map(|text| number(name, text, valid)).transpose()
         };
-        let coastlines = match self.coastlines.as_deref() {
-            None => None,
-            Some("true") => Some(true),
-            Some("false") => Some(false),
-            Some(text) => return Err(ServerError::invalid("coastlines", text, "true or false")),
-        };
+        let coastlines = flag("coastlines", self.coastlines.as_deref())?;
         Ok(ParsedSurroundings {
             relief_exaggeration: real(
                 "relief_exaggeration",

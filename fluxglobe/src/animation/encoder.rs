@@ -48,10 +48,11 @@ impl Container {
     /// Of this process's fixed words only: nothing of them comes from a file or a request.
     fn words(self) -> &'static [&'static str] {
         match self {
-            // H.264 halves its colours: sides are made even, with a black line where need be.
+            // H.264 knows no alpha, and ffmpeg would drop it and leave the colours, so that soft edges get hard and
+            // bright: pictures are laid over black. It halves its colours: sides are made even, with a black line.
             Self::Mp4 => &[
                 "-vf",
-                "pad=ceil(iw/2)*2:ceil(ih/2)*2",
+                "format=gbrap,premultiply=inplace=1,pad=ceil(iw/2)*2:ceil(ih/2)*2",
                 "-c:v",
                 "libx264",
                 "-preset",

@@ -99,7 +99,7 @@ async fn shots(settings: &Settings, store: &Store, options: &RenderAnimation) ->
         // Each picture has its own.
         asked.sun = None;
     }
-    let style = asked.style(product.quantity, globe.picture.mode, from)?;
+    let style = asked.style_in(&view, product.quantity, globe.picture.mode, from)?;
     let shots = Shots {
         accumulated: picture::accumulated(store, &product).await?,
         northward: picture::northward(store, &product, globe.picture.mode).await?,

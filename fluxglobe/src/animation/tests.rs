@@ -274,8 +274,7 @@ fn an_encoder_that_cannot_write_the_kind_of_film_is_told_of_before_anything_is_d
     let place = tempfile::tempdir().unwrap();
     let program = place.path().join("encoder");
     let lists = "#!/bin/sh\n[ \"$4\" = -encoders ] && echo ' V....D libvpx-vp9 VP9'\n";
-    std::fs::write(&program, lists).unwrap();
-    make_executable(&program);
+    script(&program, lists);
     encoder::check(&program, Container::Webm).unwrap();
     let refused = encoder::check(&program, Container::Mp4).unwrap_err();
     let text = refused.to_string();
@@ -289,12 +288,10 @@ fn an_encoder_that_cannot_write_the_kind_of_film_is_told_of_before_anything_is_d
 async fn what_an_encoder_complains_of_is_said_and_no_file_is_left() {
     let place = tempfile::tempdir().unwrap();
     let program = place.path().join("encoder");
-    std::fs::write(
+    script(
         &program,
         "#!/bin/sh\ncat > /dev/null\necho broken pipe organ >&2\nexit 3\n",
-    )
-    .unwrap();
-    make_executable(&program);
+    );
     let output = place.path().join("film.webm");
     let mut encoder = Encoder::start(&program, Container::Webm, &output, &shots(2)).unwrap();
     encoder
@@ -309,9 +306,16 @@ async fn what_an_encoder_complains_of_is_said_and_no_file_is_left() {
     assert!(!output.exists());
 }
 
-fn make_executable(path: &Path) {
-    use std::os::unix::fs::PermissionsExt as _;
-    std::fs::set_permissions(path, std::fs::Permissions::from_mode(0o755)).unwrap();
+/// A program that a shell runs. A shell writes it too: were it open here for writing while another test starts a process,
+/// that process would hold it open and nobody could run it.
+fn script(program: &Path, text: &str) {
+    let written = std::process::Command::new("sh")
+        .args(["-c", "printf %s \"$2\" >\"$1\" && chmod +x \"$1\"", "sh"])
+        .arg(program)
+        .arg(text)
+        .status()
+        .unwrap();
+    assert!(written.success());
 }
 
 #[test]

@@ -71,15 +71,25 @@ fn lines(comparison: &Comparison) -> String {
         mean_flip,
         most_levels,
         within_one_level_percent,
+        covered,
     } = comparison.difference;
-    let psnr = psnr_db.map_or_else(|| "equal".to_owned(), |db| format!("{db:.2} dB"));
+    let in_db = |db: Option<f64>| db.map_or_else(|| "equal".to_owned(), |db| format!("{db:.2} dB"));
+    let psnr = in_db(psnr_db);
+    let drawn = covered.map_or_else(String::new, |covered| {
+        format!(
+            "\nof drawn pixels         {:.2} % of all: PSNR {}, mean FLIP {:.5}",
+            covered.percent,
+            in_db(covered.psnr_db),
+            covered.mean_flip
+        )
+    });
     format!(
         "size                    {} x {} pixels\n\
          bytes that differ       {} of {}\n\
          within one level        {within_one_level_percent:.4} % of pixels\n\
          largest difference      {most_levels:.2} levels\n\
          PSNR                    {psnr}\n\
-         mean FLIP               {mean_flip:.5}",
+         mean FLIP               {mean_flip:.5}{drawn}",
         comparison.width_px,
         comparison.height_px,
         comparison.differing_bytes,

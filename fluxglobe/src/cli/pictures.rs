@@ -3,7 +3,8 @@
 use std::num::NonZeroU16;
 use std::path::PathBuf;
 
-use clap::{Args, value_parser};
+use clap::{Args, ValueEnum, value_parser};
+use contract::grid::LonLatDeg;
 use contract::job::Mode;
 use contract::product::ProductId;
 use contract::time::TimeMs;
@@ -81,6 +82,25 @@ pub(crate) struct RenderAnimation {
     pub(crate) ffmpeg: PathBuf,
 }
 
+/// `fluxglobe bench render`.
+#[derive(Debug, Args)]
+pub(crate) struct BenchRender {
+    #[command(flatten)]
+    pub(crate) bench: render_proof::bench::command::RenderBench,
+    /// A product that has landed, in place of made-up scenes: at the middle of its last step, as people see it.
+    #[arg(long, value_name = "PRODUCT", conflicts_with_all = ["millions", "pole", "tiles", "fill", "samples", "compare"])]
+    pub(crate) layer: Option<ProductId>,
+    /// The place of that product that is looked at, from 5300 km away.
+    #[arg(
+        long,
+        value_name = "LON,LAT",
+        default_value = "-150,0",
+        allow_hyphen_values = true,
+        requires = "layer"
+    )]
+    pub(crate) look_at: LonLatDeg,
+}
+
 /// `fluxglobe bench quality`.
 #[derive(Debug, Args)]
 pub(crate) struct BenchQuality {
@@ -98,12 +118,33 @@ pub(crate) struct BenchQuality {
     /// Width and height of the globe views, pixels, 16 to 512.
     #[arg(long, default_value_t = 160, value_parser = value_parser!(u32).range(16..=512))]
     pub(crate) size: u32,
-    /// Plot to write.
+    /// Which scenes.
+    #[arg(long, value_enum, default_value_t = QualityScenes::Usual)]
+    pub(crate) scenes: QualityScenes,
+    /// Only scenes that have this in their name.
+    #[arg(long, value_name = "TEXT")]
+    pub(crate) only: Option<String>,
+    /// Plot to write: both measures over what is drawn.
     #[arg(long, value_name = "FILE.svg")]
     pub(crate) plot: Option<PathBuf>,
+    /// Folder for the pictures: ours and the reference over a dark sea, and by how much ours is brighter (lighter than
+    /// grey, eight times) or darker.
+    #[arg(long, value_name = "FOLDER")]
+    pub(crate) pictures: Option<PathBuf>,
     /// JSON instead of a table.
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+/// A set of scenes to measure.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum QualityScenes {
+    /// Those that the method's constants were fitted to.
+    Usual,
+    /// Those that nothing was fitted to, most of them tilted.
+    HeldOut,
+    /// Both.
+    All,
 }
 
 /// `fluxglobe bench serve`.

@@ -9,7 +9,7 @@ use contract::digest::Digest;
 use contract::product::ProductId;
 use contract::topic::Origin;
 
-use super::{BenchCompare, BenchQuality, BenchServe};
+use super::{BenchCompare, BenchQuality, BenchRender, BenchServe};
 
 /// What every service is told besides its own settings.
 #[derive(Debug, Clone, Args)]
@@ -156,7 +156,7 @@ pub(crate) enum Bench {
     /// Budgets of a year of days, each a process of its own, beside a script on xarray if a Python is given.
     Budget(BenchBudget),
     /// How fast the renderer is on this machine, beside the classic raster renderer and the processor.
-    Render(render_proof::bench::command::RenderBench),
+    Render(BenchRender),
     /// How far volumes are from a reference in double precision, against the number of slices.
     Quality(BenchQuality),
     /// How far two pictures are apart: decibels, levels, bytes, FLIP.

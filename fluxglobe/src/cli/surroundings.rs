@@ -6,7 +6,7 @@ use contract::product::ProductId;
 use contract::sun::SunChoice;
 
 /// The heading of these words in help texts.
-const HEADING: &str = "Surroundings";
+pub(super) const HEADING: &str = "Surroundings";
 
 /// What is drawn besides the product.
 #[derive(Debug, Args)]
@@ -35,9 +35,15 @@ pub(crate) struct Surroundings {
         value_name = "SHARE"
     )]
     pub(crate) sea_opacity: f64,
-    /// Draw coast lines.
-    #[arg(long, help_heading = HEADING)]
-    pub(crate) coastlines: bool,
+    /// Draw coast lines and shores of lakes; on pictures of the globe true if absent, on map tiles false.
+    #[arg(
+        long,
+        help_heading = HEADING,
+        num_args = 0..=1,
+        default_missing_value = "true",
+        value_name = "true|false"
+    )]
+    pub(crate) coastlines: Option<bool>,
     /// Height of a kilogram of accumulated carbon per square metre, m: how far particles rise and sink, 0 to 1e9; 8e6 if
     /// absent.
     #[arg(long, help_heading = HEADING, allow_negative_numbers = true, value_name = "METRES")]

@@ -62,7 +62,7 @@ pub(crate) async fn run(settings: &Settings, command: Command) -> Result<ExitCod
             let log = deployment::needed_log(settings, &options.kafka).await?;
             bench::stream::run(log.as_ref(), &options).await?;
         }
-        Command::Bench(Bench::Render(options)) => render_proof::bench::command::run(&options)?,
+        Command::Bench(Bench::Render(options)) => bench::render::run(settings, options).await?,
         Command::Bench(Bench::Budget(options)) => bench::budget::run(&options)?,
         Command::Bench(Bench::Serve(options)) => bench::serve::run(&options).await?,
         Command::Bench(Bench::Quality(options)) => bench::quality::run(settings, options).await?,

@@ -3,16 +3,14 @@
 //! It has the shape of the product in the paper this project continues (1800 x 2460 cells of 1/60 degree, 12 months of
 //! 2009, or days of it), with a coast, clouds and seasons that look right on a globe. It is made up: every file says `synthetic = 1`.
 
-mod coast;
-mod flux;
-mod noise;
 mod text_type;
 mod writer;
 
 use std::path::Path;
 
+use china_sea::{Noise, coast, flux};
+
 use crate::error::IngestError;
-use noise::Noise;
 
 /// Cells at scale 1.
 const ROWS: u32 = 2460;

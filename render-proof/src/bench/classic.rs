@@ -1,22 +1,37 @@
 //! The classic half-angle renderer, kept as an honest baseline: particles sorted by slice, and for every slice one render
 //! pass for the eye, which looks its shadow up in the light's picture, and one into the light's picture.
+//!
+//! What a graphics programmer would do without thinking is done: quads come from an index buffer, many an instance, and
+//! the light's picture has the one channel that it needs.
 
 use anyhow::{Context as _, Result, ensure};
 use contract::job::RenderJob;
+use glam::Vec3;
 use render::frame_context::FrameContext;
-use render::gpu::{Gpu, Slot, Workspace, uniform};
+use render::gpu::{Gpu, Slot, Stamps, Workspace, uniform};
 use render::passes::splat::{self, Splats};
 use render::plan::Plan;
 use render::playback::{Playback, Steps};
+use render::stages::colour::srgb_of;
 use render::stages::layout::GROUP;
 use render::stages::params::{Params, Uniform};
 use render::stages::{bin, light};
 use render::{Image, Scene, passes, stages};
 use wgpu::util::DeviceExt as _;
 
-const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
+/// What is to be said beside every comparison.
+pub const NOTE: &str = "an H200 has 2 of its 66 clusters wired for graphics: there the ratio is no statement about a graphics card";
+
+/// Of the eye's picture.
+const EYE_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
+/// Quads of an instance: their corners can be named by 16 bits.
+const QUADS: u32 = 1024;
+/// Bytes of the arguments of an indexed draw.
+const DRAW_BYTES: u64 = 20;
 /// Particle radius over light texel, as in the compute renderer.
 const LIGHT_RADIUS_TEXELS: f32 = 1.0 / 0.612;
+/// Name of the pass that ends a frame, as stamps know it.
+pub const LAST_PASS: &str = "classic";
 /// Slices of the sorting shaders.
 const MOST_SLICES: u32 = 256;
 
@@ -32,6 +47,32 @@ pub struct Classic<'a> {
     slice_counts: wgpu::Buffer,
     draws: wgpu::Buffer,
     order: wgpu::Buffer,
+    corners: wgpu::Buffer,
+}
+
+/// Format of the light's picture, one channel: 32 bits where the adapter can add to them, else 16.
+fn light_format(device: &wgpu::Device) -> wgpu::TextureFormat {
+    if device
+        .features()
+        .contains(wgpu::Features::FLOAT32_BLENDABLE)
+    {
+        wgpu::TextureFormat::R32Float
+    } else {
+        wgpu::TextureFormat::R16Float
+    }
+}
+
+/// The corners of two triangles for each quad of an instance.
+fn corner_indices(device: &wgpu::Device) -> wgpu::Buffer {
+    let quads = 0..QUADS as u16;
+    let corners: Vec<u16> = quads
+        .flat_map(|quad| [0, 1, 2, 2, 1, 3].map(|corner| 4 * quad + corner))
+        .collect();
+    device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+        label: Some("corners"),
+        contents: bytemuck::cast_slice(&corners),
+        usage: wgpu::BufferUsages::INDEX,
+    })
 }
 
 struct Pipelines {
@@ -51,11 +92,6 @@ impl<'a> Classic<'a> {
             params.view.front_to_back == 1 && params.lighting.mode == 1,
             "only drawn towards the light"
         );
-        let features = gpu.device().features();
-        ensure!(
-            features.contains(wgpu::Features::INDIRECT_FIRST_INSTANCE),
-            "the adapter cannot start instances inside a list"
-        );
         let buffer = |label, bytes: u64, usage| {
             gpu.device().create_buffer(&wgpu::BufferDescriptor {
                 label: Some(label),
@@ -64,7 +100,7 @@ impl<'a> Classic<'a> {
                 mapped_at_creation: false,
             })
         };
-        let target = |label, width, height| {
+        let target = |label, width, height, format| {
             gpu.device().create_texture(&wgpu::TextureDescriptor {
                 label: Some(label),
                 size: wgpu::Extent3d {
@@ -75,7 +111,7 @@ impl<'a> Classic<'a> {
                 mip_level_count: 1,
                 sample_count: 1,
                 dimension: wgpu::TextureDimension::D2,
-                format: FORMAT,
+                format,
                 usage: wgpu::TextureUsages::RENDER_ATTACHMENT
                     | wgpu::TextureUsages::TEXTURE_BINDING
                     | wgpu::TextureUsages::COPY_SRC,
@@ -87,8 +123,18 @@ impl<'a> Classic<'a> {
             splats: Splats::new(gpu, splat::SOURCE, passes::probes(gpu)),
             workspace: Workspace::default(),
             pipelines: Pipelines::new(gpu.device(), &params),
-            eye: target("eye", params.view.size_px.x, params.view.size_px.y),
-            light: target("light", params.lighting.size.x, params.lighting.size.y),
+            eye: target(
+                "eye",
+                params.view.size_px.x,
+                params.view.size_px.y,
+                EYE_FORMAT,
+            ),
+            light: target(
+                "light",
+                params.lighting.size.x,
+                params.lighting.size.y,
+                light_format(gpu.device()),
+            ),
             slice_counts: buffer(
                 "slice counts",
                 u64::from(MOST_SLICES) * 4,
@@ -96,24 +142,36 @@ impl<'a> Classic<'a> {
             ),
             draws: buffer(
                 "draws",
-                u64::from(MOST_SLICES) * 16,
+                u64::from(MOST_SLICES) * DRAW_BYTES,
                 wgpu::BufferUsages::INDIRECT,
             ),
             order: buffer(
                 "order",
-                u64::from(params.cells.splat_count) * 4,
+                // Every slice begins at a whole instance.
+                (u64::from(params.cells.splat_count) + u64::from(MOST_SLICES * QUADS)) * 4,
                 wgpu::BufferUsages::empty(),
             ),
+            corners: corner_indices(gpu.device()),
             plan,
         })
     }
 
-    /// Draws an instant; the picture stays on the device. Does not wait.
+    /// Format of the light's picture.
+    pub fn light_format(&self) -> wgpu::TextureFormat {
+        self.light.format()
+    }
+
+    /// Draws an instant; the picture stays on the device. Does not wait. Its last pass is stamped as [`LAST_PASS`].
     #[expect(
         clippy::too_many_lines,
         reason = "one list of passes, read from top to bottom"
     )]
-    pub fn draw(&mut self, steps: &Steps, weights: (f32, f32)) -> Result<()> {
+    pub fn draw(
+        &mut self,
+        steps: &Steps,
+        weights: (f32, f32),
+        stamps: Option<&Stamps>,
+    ) -> Result<wgpu::SubmissionIndex> {
         (
             self.plan.params.values.weight,
             self.plan.params.values.accumulated_weight,
@@ -131,6 +189,7 @@ impl<'a> Classic<'a> {
         let params_buffer = frame.params_buffer.clone();
         let encoder = frame.recorder.encoder();
         encoder.clear_buffer(&self.slice_counts, 0, None);
+        encoder.clear_buffer(&self.order, 0, None);
         let device = self.gpu.device();
         let light_view = self
             .light
@@ -209,8 +268,18 @@ impl<'a> Classic<'a> {
                 } else {
                     wgpu::LoadOp::Load
                 };
+                let is_last = slice + 1 == params.view.slices && step > 0;
+                let stamp = stamps.filter(|_| is_last);
+                let stamp = stamp.and_then(|stamps| stamps.of_pass(LAST_PASS));
                 let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
                     label: None,
+                    timestamp_writes: stamp.map(|(query_set, first)| {
+                        wgpu::RenderPassTimestampWrites {
+                            query_set,
+                            beginning_of_pass_write_index: Some(first),
+                            end_of_pass_write_index: Some(first + 1),
+                        }
+                    }),
                     color_attachments: &[Some(wgpu::RenderPassColorAttachment {
                         view,
                         depth_slice: None,
@@ -227,11 +296,11 @@ impl<'a> Classic<'a> {
                 }
                 pass.set_pipeline(pipeline);
                 pass.set_bind_group(0, group, &[]);
-                pass.draw_indirect(&self.draws, u64::from(slice) * 16);
+                pass.set_index_buffer(self.corners.slice(..), wgpu::IndexFormat::Uint16);
+                pass.draw_indexed_indirect(&self.draws, u64::from(slice) * DRAW_BYTES);
             }
         }
-        frame.recorder.submit();
-        Ok(())
+        Ok(frame.recorder.submit())
     }
 
     /// The picture last drawn, straight alpha.
@@ -268,8 +337,10 @@ impl<'a> Classic<'a> {
                 let channel = |i: usize| half(u16::from_le_bytes([texel[2 * i], texel[2 * i + 1]]));
                 let alpha = channel(3);
                 let byte = |x: f32| (x.clamp(0.0, 1.0) * 255.0).round() as u8;
-                let color = |i| byte(if alpha > 0.0 { channel(i) / alpha } else { 0.0 });
-                [color(0), color(1), color(2), byte(alpha)]
+                // Blended as light, written as sRGB.
+                let light = Vec3::new(channel(0), channel(1), channel(2)) / alpha.max(1e-6);
+                let [r, g, b] = srgb_of(light).to_array().map(byte);
+                [r, g, b, byte(alpha)]
             })
             .collect();
         Ok(Image {
@@ -300,6 +371,7 @@ impl Pipelines {
         let constants = [
             ("LIGHT_RADIUS_TEXELS", f64::from(LIGHT_RADIUS_TEXELS)),
             ("LIGHT_GAIN", f64::from(gain)),
+            ("QUADS", f64::from(QUADS)),
         ];
         let compilation_options = wgpu::PipelineCompilationOptions {
             constants: &constants,
@@ -327,7 +399,7 @@ impl Pipelines {
                 cache: None,
             })
         };
-        let render = |vertex, fragment, blend| {
+        let render = |vertex, fragment, format, blend| {
             device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
                 label: Some(vertex),
                 layout: None,
@@ -338,7 +410,7 @@ impl Pipelines {
                     buffers: &[],
                 },
                 primitive: wgpu::PrimitiveState {
-                    topology: wgpu::PrimitiveTopology::TriangleStrip,
+                    topology: wgpu::PrimitiveTopology::TriangleList,
                     ..Default::default()
                 },
                 depth_stencil: None,
@@ -348,7 +420,7 @@ impl Pipelines {
                     entry_point: Some(fragment),
                     compilation_options: compilation_options.clone(),
                     targets: &[Some(wgpu::ColorTargetState {
-                        format: FORMAT,
+                        format,
                         blend: Some(blend),
                         write_mask: wgpu::ColorWrites::ALL,
                     })],
@@ -374,9 +446,15 @@ impl Pipelines {
             eye: render(
                 "eye_corner",
                 "eye_pixel",
+                EYE_FORMAT,
                 both(wgpu::BlendFactor::OneMinusDstAlpha),
             ),
-            light: render("light_corner", "light_pixel", both(wgpu::BlendFactor::One)),
+            light: render(
+                "light_corner",
+                "light_pixel",
+                light_format(device),
+                both(wgpu::BlendFactor::One),
+            ),
         }
     }
 }

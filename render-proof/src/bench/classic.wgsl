@@ -13,8 +13,24 @@ struct Corner {
     @location(1) @interpolate(flat) color: vec4<f32>,
 }
 
+// Quads of an instance: those of a slice are drawn as so many instances as hold them, of corners that an index buffer
+// names, so that a group of invocations shades corners of many quads and each corner once.
+override QUADS: u32;
+
 fn corner_of(vertex: u32) -> vec2<f32> {
-    return vec2(f32(vertex & 1u), f32(vertex >> 1u)) * 2.0 - 1.0;
+    return vec2(f32(vertex & 1u), f32((vertex >> 1u) & 1u)) * 2.0 - 1.0;
+}
+
+// The place in the order of a corner's quad: the first vertex of a draw is four times the first place of its slice.
+fn quad_of(vertex: u32, instance: u32) -> u32 {
+    return (vertex >> 2u) + instance * QUADS;
+}
+
+// A corner of a place that nobody takes: all four at one point.
+fn nowhere() -> Corner {
+    var corner: Corner;
+    corner.position = vec4(2.0, 2.0, 0.0, 1.0);
+    return corner;
 }
 
 fn clip(px: vec2<f32>, size: vec2<f32>) -> vec4<f32> {
@@ -23,7 +39,9 @@ fn clip(px: vec2<f32>, size: vec2<f32>) -> vec4<f32> {
 
 @vertex
 fn eye_corner(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance: u32) -> Corner {
-    let at = order[instance];
+    let place = order[quad_of(vertex, instance)];
+    if (place == 0u) { return nowhere(); }
+    let at = place - 1u;
     let near = seen[at];
     let far = lit[at];
     let radius = f32((near.z & 0xffffu) << lists.entry_shift) / f32(SUBPIXELS);
@@ -34,7 +52,8 @@ fn eye_corner(@builtin(vertex_index) vertex: u32, @builtin(instance_index) insta
         let depth = textureLoad(light, clamp(texel, vec2(0), vec2<i32>(lighting.size) - 1), 0).x;
         shade = lighting.ambient + lighting.direct * exp(-depth) * bitcast<f32>(far.w);
     }
-    let rgb = vec3(f32(near.w & 255u), f32((near.w >> 8u) & 255u), f32((near.w >> 16u) & 255u)) / 255.0;
+    let codes = codes_of(near.w) / 255.0;
+    let rgb = codes * codes;
     var corner: Corner;
     corner.offset = corner_of(vertex);
     corner.position = clip(center + corner.offset * radius, vec2<f32>(view.size_px));
@@ -55,7 +74,9 @@ fn eye_pixel(corner: Corner) -> @location(0) vec4<f32> {
 
 @vertex
 fn light_corner(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance: u32) -> Corner {
-    let at = order[instance];
+    let place = order[quad_of(vertex, instance)];
+    if (place == 0u) { return nowhere(); }
+    let at = place - 1u;
     let near = seen[at];
     let far = lit[at];
     let center = vec2(f32(bitcast<i32>(far.x)), f32(bitcast<i32>(far.y))) / f32(lighting.unit);
@@ -75,7 +96,7 @@ fn light_pixel(corner: Corner) -> @location(0) vec4<f32> {
     return vec4(corner.color.x * weight(corner.offset));
 }
 
-// Sorting by slice, once a frame: count, prefix, scatter.
+// Sorting by slice, once a frame: count, prefix, scatter. In the order splats count from 1; 0 is nobody.
 @group(0) @binding(4) var<storage, read_write> slice_counts: array<atomic<u32>>;
 @group(0) @binding(5) var<storage, read_write> draws: array<u32>;
 @group(0) @binding(6) var<storage, read_write> order_out: array<u32>;
@@ -107,18 +128,19 @@ fn count_slices(@builtin(global_invocation_id) global: vec3<u32>, @builtin(num_w
     }
 }
 
-// One instanced draw of four corners for every slice.
+// One indexed draw for every slice; slices begin at whole instances.
 @compute @workgroup_size(1)
 fn start_slices() {
     var first = 0u;
     for (var slice = 0u; slice < view.slices; slice++) {
-        let count = atomicLoad(&slice_counts[slice]);
-        draws[4u * slice] = 4u;
-        draws[4u * slice + 1u] = count;
-        draws[4u * slice + 2u] = 0u;
-        draws[4u * slice + 3u] = first;
+        let instances = (atomicLoad(&slice_counts[slice]) + QUADS - 1u) / QUADS;
+        draws[5u * slice] = 6u * QUADS;
+        draws[5u * slice + 1u] = instances;
+        draws[5u * slice + 2u] = 0u;
+        draws[5u * slice + 3u] = 4u * first;
+        draws[5u * slice + 4u] = 0u;
         atomicStore(&slice_counts[slice], first);
-        first += count;
+        first += instances * QUADS;
     }
 }
 
@@ -136,5 +158,5 @@ fn order_slices(@builtin(global_invocation_id) global: vec3<u32>, @builtin(num_w
         if (count > 0u) { atomicStore(&own[slice], atomicAdd(&slice_counts[slice], count)); }
     }
     workgroupBarrier();
-    if (is_drawn) { order_out[atomicAdd(&own[slice_at(at)], 1u)] = at; }
+    if (is_drawn) { order_out[atomicAdd(&own[slice_at(at)], 1u)] = at + 1u; }
 }

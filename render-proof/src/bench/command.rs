@@ -35,6 +35,9 @@ pub struct RenderBench {
     /// Half-angle slices.
     #[arg(long, value_delimiter = ',', default_value = "64")]
     slices: Vec<u32>,
+    /// Tilts of the camera, degrees from the vertical, 0 to 80.
+    #[arg(long, value_delimiter = ',', default_value = "0", value_parser = tilt_deg)]
+    tilts: Vec<f64>,
     /// Frames of each series.
     #[arg(long, default_value_t = 200)]
     frames: usize,
@@ -73,6 +76,14 @@ pub struct RenderBench {
     json: bool,
 }
 
+/// A tilt that shows the region.
+fn tilt_deg(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(tilt) if (0.0..=80.0).contains(&tilt) => Ok(tilt),
+        _ => Err("degrees from the vertical, 0 to 80".into()),
+    }
+}
+
 #[derive(Serialize)]
 struct Row {
     adapter: String,
@@ -80,6 +91,7 @@ struct Row {
     width: u32,
     height: u32,
     slices: u32,
+    tilt_deg: f64,
     measured: frames::Measured,
     classic: Option<Against>,
     twins: Option<(Times, usize)>,
@@ -87,11 +99,34 @@ struct Row {
     reference: Option<Difference>,
 }
 
+/// The classic renderer beside ours.
 #[derive(Serialize)]
 struct Against {
-    frame_ms: f64,
+    series: frames::Series,
+    clock: Clock,
     times_faster: f64,
+    /// Format of the light's picture.
+    light: String,
     difference: Option<Difference>,
+    note: &'static str,
+}
+
+/// What two series are compared by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+enum Clock {
+    Device,
+    Wall,
+}
+
+/// How many times faster we are, by the device's clock if both series have it, else by the wall clock.
+fn times_faster(ours: &frames::Measured, theirs: &frames::Series) -> (Clock, f64) {
+    if ours.frame.runs > 0 && theirs.frame.runs > 0 {
+        let ratio = theirs.frame.median_ms / ours.frame.median_ms.max(1e-9);
+        return (Clock::Device, ratio);
+    }
+    let ratio = theirs.frame_wall_ms / ours.frame_wall_ms.max(1e-9);
+    (Clock::Wall, ratio)
 }
 
 /// Measures what the options ask for, and prints it.
@@ -133,18 +168,15 @@ pub fn run(args: &RenderBench) -> Result<()> {
             grid.cols,
             start.elapsed().as_secs_f64()
         ));
-        for size in &args.sizes {
-            let (width, height) = size.split_once('x').context("a size is WIDTHxHEIGHT")?;
-            let size_px = [width.parse()?, height.parse()?];
-            for &slices in &args.slices {
-                let job = scenery::job(size_px, slices)?;
-                let row = row(args, &gpu, &stages, &job, &scene)?;
-                report(args, &job, &row);
-            }
-        }
+        series(
+            args,
+            (&gpu, &stages),
+            &scene,
+            &|size_px, slices, tilt_deg| scenery::job(size_px, slices, tilt_deg),
+        )?;
         if args.tiles > 0 {
             let renderer = Renderer::new(Backend::Gpu)?;
-            let job = scenery::job([256, 256], 64)?;
+            let job = scenery::job([256, 256], 64, 0.0)?;
             for z in [3, 4, 5, 6] {
                 // Round 115 E, 20 N.
                 let tile = Tile::new(
@@ -163,17 +195,51 @@ pub fn run(args: &RenderBench) -> Result<()> {
     Ok(())
 }
 
+/// What is drawn in a size, in slices and at a tilt, degrees.
+pub type Jobs<'a> = dyn Fn([u32; 2], u32, f64) -> Result<RenderJob> + 'a;
+
+/// Measures a scene of data in place of made-up ones: every size, number of slices and tilt.
+///
+/// # Errors
+/// Those of [`run`].
+pub fn run_on(args: &RenderBench, scene: &Scene, jobs: &Jobs<'_>) -> Result<()> {
+    let gpu = Gpu::open()?;
+    let stages = Stages::new(&gpu);
+    talk(gpu.adapter_name());
+    series(args, (&gpu, &stages), scene, jobs)
+}
+
+fn series(
+    args: &RenderBench,
+    (gpu, stages): (&Gpu, &Stages),
+    scene: &Scene,
+    jobs: &Jobs<'_>,
+) -> Result<()> {
+    for size in &args.sizes {
+        let (width, height) = size.split_once('x').context("a size is WIDTHxHEIGHT")?;
+        let size_px = [width.parse()?, height.parse()?];
+        for &slices in &args.slices {
+            for &tilt_deg in &args.tilts {
+                let job = jobs(size_px, slices, tilt_deg)?;
+                let row = row(args, gpu, stages, (&job, tilt_deg), scene)?;
+                report(args, &job, &row);
+            }
+        }
+    }
+    Ok(())
+}
+
 fn row(
     args: &RenderBench,
     gpu: &Gpu,
     stages: &Stages,
-    job: &RenderJob,
+    (job, tilt_deg): (&RenderJob, f64),
     scene: &Scene,
 ) -> Result<Row> {
     let [width, height] = job.view.size_px();
     let measured = frames::measure(gpu, stages, job, scene, args.frames)?;
     let classic = (args.classic > 0)
-        .then(|| against(args, job, scene, &measured))
+        .then(|| against(args, (job, tilt_deg), scene, &measured))
         .transpose()?;
     let twins = (args.twins > 0)
         .then(|| twins::measure(job, scene, args.twins))
@@ -188,10 +254,11 @@ fn row(
         .flatten();
     Ok(Row {
         adapter: gpu.adapter_name().to_owned(),
-        particles: scenery::particles(scene),
+        particles: scenery::particles(scene) * u64::from(job.style.particles_per_cell),
         width,
         height,
         slices: job.style.slices,
+        tilt_deg,
         measured,
         classic,
         twins,
@@ -224,8 +291,17 @@ fn in_words(d: &Difference) -> String {
     let psnr = d
         .psnr_db
         .map_or_else(|| "equal".to_owned(), |db| format!("PSNR {db:.1} dB"));
+    let covered = d.covered.map_or_else(String::new, |covered| {
+        let psnr = covered
+            .psnr_db
+            .map_or_else(|| "equal".to_owned(), |db| format!("PSNR {db:.1} dB"));
+        format!(
+            "; over the {:.1} % of pixels that are drawn {psnr}, mean FLIP {:.4}",
+            covered.percent, covered.mean_flip
+        )
+    });
     format!(
-        "{psnr}, mean FLIP {:.4}, {:.3} % of pixels within one level, at most {:.1} levels",
+        "{psnr}, mean FLIP {:.4}, {:.3} % of pixels within one level, at most {:.1} levels{covered}",
         d.mean_flip, d.within_one_level_percent, d.most_levels
     )
 }
@@ -234,7 +310,7 @@ fn in_words(d: &Difference) -> String {
 /// which nothing remains when ours are timed.
 fn against(
     args: &RenderBench,
-    job: &RenderJob,
+    (job, tilt_deg): (&RenderJob, f64),
     scene: &Scene,
     measured: &frames::Measured,
 ) -> Result<Against> {
@@ -242,7 +318,7 @@ fn against(
     let stages = &Stages::new(gpu);
     let [width, height] = job.view.size_px();
     let name = format!(
-        "{}-{width}x{height}-{}",
+        "{}-{width}x{height}-{}-tilt-{tilt_deg}",
         scenery::particles(scene),
         job.style.slices
     );
@@ -256,7 +332,7 @@ fn against(
         height,
         rgba8: playback.image(&steps)?,
     };
-    classic.draw(&steps, weights)?;
+    classic.draw(&steps, weights, None)?;
     let theirs = classic.image()?;
     if let Some(folder) = &args.pictures {
         std::fs::create_dir_all(folder)?;
@@ -266,16 +342,17 @@ fn against(
             theirs.encode_png()?,
         )?;
     }
-    let start = Instant::now();
-    for frame in 0..args.classic {
-        classic.draw(&steps, frames::weights(frame))?;
-    }
-    gpu.wait()?;
-    let frame_ms = start.elapsed().as_secs_f64() / args.classic as f64 * 1e3;
+    let series = frames::timed(gpu, classic::LAST_PASS, args.classic, |frame, stamps| {
+        classic.draw(&steps, frames::weights(frame), stamps)
+    })?;
+    let (clock, times_faster) = times_faster(measured, &series);
     Ok(Against {
-        frame_ms,
-        times_faster: frame_ms / measured.frame.median_ms.max(1e-9),
+        series,
+        clock,
+        times_faster,
+        light: format!("{:?}", classic.light_format()),
         difference: Difference::of(&Picture::from(&ours), &Picture::from(&theirs)),
+        note: classic::NOTE,
     })
 }
 
@@ -287,12 +364,20 @@ fn report(args: &RenderBench, job: &RenderJob, row: &Row) {
     let m = &row.measured;
     report_frames(job, row.particles, m);
     if let Some(c) = &row.classic {
+        let clock = match c.clock {
+            Clock::Device => "device",
+            Clock::Wall => "wall",
+        };
         say(&format!(
-            "  classic {:.2} ms, {:.1} times; {}",
-            c.frame_ms,
+            "  classic: median {:.3} ms, p99 {:.3} ms, wall {:.3} ms, light in {}; {:.1} times by the {clock} clock; {}",
+            c.series.frame.median_ms,
+            c.series.frame.p99_ms,
+            c.series.frame_wall_ms,
+            c.light,
             c.times_faster,
             c.difference.as_ref().map_or_else(String::new, in_words)
         ));
+        say(&format!("  ({})", c.note));
     }
     if let Some((times, cores)) = &row.twins {
         let splat = m
@@ -377,7 +462,7 @@ fn samples(folder: &PathBuf) -> Result<()> {
     std::fs::create_dir_all(folder)?;
     let renderer = Renderer::new(Backend::Gpu)?;
     let scene = scenery::scene(&scenery::grid(200_000));
-    let mut globe = scenery::job([640, 480], 64)?;
+    let mut globe = scenery::job([640, 480], 64, 0.0)?;
     globe.style.particles_per_cell = 4;
     let mut jobs = vec![("globe", globe)];
     for (name, z, x, y) in [
@@ -385,7 +470,7 @@ fn samples(folder: &PathBuf) -> Result<()> {
         ("tile-5", 5, 26, 14),
         ("tile-7", 7, 104, 56),
     ] {
-        let mut job = scenery::job([256, 256], 64)?;
+        let mut job = scenery::job([256, 256], 64, 0.0)?;
         job.style.particles_per_cell = 16;
         job.view = contract::job::View::Tile {
             tile: Tile::new(z, x, y)?,
@@ -443,4 +528,49 @@ fn say(line: &str) {
 #[expect(clippy::print_stderr, reason = "talk of a command")]
 fn talk(line: &str) {
     eprintln!("{line}");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn both_renderers_are_compared_by_one_clock() {
+        let series = |device_s: Vec<f64>, frame_wall_ms| frames::Series {
+            frame: Times::of(device_s),
+            frame_wall_ms,
+        };
+        let ours = |series: frames::Series| frames::Measured {
+            frame: series.frame,
+            frame_wall_ms: series.frame_wall_ms,
+            stages: vec![],
+            entries: 0,
+            fullest_over_mean: 0.0,
+            longest_list: 0,
+        };
+        let both = times_faster(
+            &ours(series(vec![0.001; 3], 5.0)),
+            &series(vec![0.01; 3], 7.0),
+        );
+        assert_eq!(both.0, Clock::Device);
+        assert!((both.1 - 10.0).abs() < 1e-9);
+        // A clock that one of them lacks says nothing about the other.
+        for (fast, slow) in [
+            (vec![0.001; 3], vec![]),
+            (vec![], vec![0.01; 3]),
+            (vec![], vec![]),
+        ] {
+            let (clock, ratio) = times_faster(&ours(series(fast, 5.0)), &series(slow, 15.0));
+            assert_eq!(clock, Clock::Wall);
+            assert!((ratio - 3.0).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn tilts_beyond_the_horizon_are_refused() {
+        assert_eq!(tilt_deg("60"), Ok(60.0));
+        for text in ["-1", "81", "NaN", "steep"] {
+            assert!(tilt_deg(text).is_err(), "{text}");
+        }
+    }
 }

@@ -42,24 +42,29 @@ pub fn weights(frame: usize) -> (f32, f32) {
     (share, share)
 }
 
-/// Draws `frames` frames.
-pub fn measure(
+/// Frames following one another.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct Series {
+    /// From the end of one to the end of the next by the device's clock; no runs where it has none.
+    pub frame: Times,
+    /// All over their number, by the wall clock.
+    pub frame_wall_ms: f64,
+}
+
+/// Times `frames` frames after a while of drawing, a few on their way at once. `draw` draws one without waiting; the pass
+/// that ends it is stamped under the name `last_pass`.
+pub fn timed(
     gpu: &Gpu,
-    stages: &Stages,
-    job: &RenderJob,
-    scene: &Scene,
+    last_pass: &'static str,
     frames: usize,
-) -> Result<Measured> {
-    let mut playback = Playback::new(gpu, stages, job, scene)?;
-    let steps = Playback::upload(gpu, scene)?;
-    let ends = Stamps::new(gpu, Some("eye"));
+    mut draw: impl FnMut(usize, Option<&Stamps>) -> Result<wgpu::SubmissionIndex>,
+) -> Result<Series> {
+    let ends = Stamps::new(gpu, Some(last_pass));
     let mut series = |count: usize, stamps: Option<&Stamps>| -> Result<f64> {
         let mut waiting = VecDeque::new();
         let start = Instant::now();
         for frame in 0..count {
-            let (value, carbon) = weights(frame);
-            playback.seek(value, carbon);
-            waiting.push_back(playback.draw(&steps, stamps)?);
+            waiting.push_back(draw(frame, stamps)?);
             if waiting.len() > IN_FLIGHT {
                 let oldest = waiting.pop_front();
                 let wait = wgpu::PollType::Wait {
@@ -82,6 +87,27 @@ pub fn measure(
         .transpose()?
         .unwrap_or_default();
     let periods = ended.windows(2).map(|pair| pair[1].end_s - pair[0].end_s);
+    Ok(Series {
+        frame: Times::of(periods.collect()),
+        frame_wall_ms: wall_s / frames.max(1) as f64 * 1e3,
+    })
+}
+
+/// Draws `frames` frames.
+pub fn measure(
+    gpu: &Gpu,
+    stages: &Stages,
+    job: &RenderJob,
+    scene: &Scene,
+    frames: usize,
+) -> Result<Measured> {
+    let mut playback = Playback::new(gpu, stages, job, scene)?;
+    let steps = Playback::upload(gpu, scene)?;
+    let series = timed(gpu, "eye", frames, |frame, stamps| {
+        let (value, carbon) = weights(frame);
+        playback.seek(value, carbon);
+        Ok(playback.draw(&steps, stamps)?)
+    })?;
     let stage_times = staged(gpu, &mut playback, &steps, frames.min(60))?;
     let params = playback.plan().params_of(playback.plan().whole());
     let counts = playback.workspace().room(gpu, Slot::Counts, 4)?;
@@ -95,8 +121,8 @@ pub fn measure(
         "{entries} entries in room for {room}: frames are not whole"
     );
     Ok(Measured {
-        frame: Times::of(periods.collect()),
-        frame_wall_ms: wall_s / frames as f64 * 1e3,
+        frame: series.frame,
+        frame_wall_ms: series.frame_wall_ms,
         stages: stage_times,
         entries,
         fullest_over_mean: fullest_over_mean(&ends, params.view.slices as usize),

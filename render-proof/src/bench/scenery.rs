@@ -1,32 +1,49 @@
-//! Made-up scenes of any size: the seas off eastern Asia, 0 to 41 N and 100 to 130 E, on as many cells as are wanted,
-//! with one particle a cell of sea.
+//! Made-up scenes of any size: the China Seas of the synthetic product, 0 to 41 N and 100 to 130 E, on as many cells as
+//! are wanted, with one particle a cell of sea. Fronts, river plumes, eddies down to a tenth of a degree, a ragged coast
+//! and clouds, under which a gap was filled and eddies are missing.
+//!
+//! What a picture costs follows from how particles lie on the screen and from how they hide one another, so a scene that
+//! looks like no data tells little of the time that data take.
 
 use std::sync::Arc;
 use std::thread;
 
 use anyhow::Result;
+use china_sea::{Noise, coast, flux};
 use contract::camera::CameraAngles;
 use contract::colour::TransferFunction;
-use contract::grid::Grid;
+use contract::grid::{Grid, LonLatDeg};
 use contract::job::{Mode, RENDERER_VERSION, RenderJob, Style, View};
+use contract::look_at::LookAt;
 use contract::quantity::Quantity;
 use contract::time_sample::TimeSample;
 use render::{Frame, Interval, Scene};
 
-/// Share of the region that is sea in these scenes.
-const SEA_SHARE: f64 = 0.605;
 const NORTH_DEG: f64 = 41.0;
 const WEST_DEG: f64 = 100.0;
 const WIDTH_DEG: f64 = 30.0;
-/// Kilograms of carbon per square metre and second in a gram a year.
-const GRAM_A_YEAR: f64 = 1e-3 / (365.25 * 86_400.0);
-const YEAR_S: f64 = 365.25 * 86_400.0;
+/// Carbon of a millimole of CO2, kg.
+const KG_MMOL: f64 = 12.011e-6;
+const DAY_S: f64 = 86_400.0;
+const YEAR_S: f64 = 365.25 * DAY_S;
 /// The camera sees the whole region in a picture that is wider than high.
 const CAMERA_HEIGHT_M: f64 = 5.3e6;
+/// Where a tilted camera looks: from the north, the sun behind it, over the East China Sea to the south.
+const HEADING_DEG: f64 = 200.0;
+/// The seed of all that is made up.
+const SEED: u64 = 1;
+/// The two months: January, of strong sinks in the north, and February.
+const MONTHS: [usize; 2] = [0, 1];
+/// Share of the sea under cloud.
+const CLOUD_SHARE: f64 = 0.2;
+/// Places that shares are measured at, down and across the region.
+const SAMPLES: [u32; 2] = [164, 120];
+/// Room for what a share measured at places is off.
+const MARGIN: f64 = 1.02;
 
 /// A grid of the region with at least so many cells of sea, square in degrees.
 pub fn grid(particles: u64) -> Grid {
-    let cells = particles as f64 / SEA_SHARE * 1.02;
+    let cells = particles as f64 / sea_share() * MARGIN;
     let cols = (cells * WIDTH_DEG / NORTH_DEG).sqrt().ceil();
     let rows = (cells / cols).ceil();
     Grid {
@@ -39,27 +56,36 @@ pub fn grid(particles: u64) -> Grid {
     }
 }
 
-/// Land in the north-west, as on the coast of a continent, and two islands.
-fn is_land(lon: f64, lat: f64) -> bool {
-    let coast =
-        105.5 + 6.0 * ((lat - 5.0) / 36.0) + 3.0 * (lat * 0.35).sin() + 0.7 * (lat * 2.9).sin();
-    let island = |x: f64, y: f64, rx: f64, ry: f64| {
-        ((lon - x) / rx).powi(2) + ((lat - y) / ry).powi(2) < 1.0
-    };
-    lon < coast + 1.5 || island(114.0, 2.0, 5.0, 4.0) || island(121.5, 14.0, 2.0, 5.5)
-}
-
-fn frame(grid: &Grid, value: impl Fn(f64, f64) -> f64 + Sync) -> Arc<Frame> {
-    everywhere(grid, |lon, lat| {
-        if is_land(lon, lat) {
-            f64::NAN
-        } else {
-            value(lon, lat)
-        }
+/// Places spread over the region.
+fn samples() -> impl Iterator<Item = (f64, f64)> {
+    let [down, across] = SAMPLES;
+    (0..down).flat_map(move |y| {
+        (0..across).map(move |x| {
+            let [south, east] = [(y, down), (x, across)]
+                .map(|(place, all)| (f64::from(place) + 0.5) / f64::from(all));
+            (WEST_DEG + WIDTH_DEG * east, NORTH_DEG * (1.0 - south))
+        })
     })
 }
 
-fn everywhere(grid: &Grid, value: impl Fn(f64, f64) -> f64 + Sync) -> Arc<Frame> {
+/// Share of the region that is sea.
+fn sea_share() -> f64 {
+    let noise = Noise::new(SEED);
+    let sea = samples().filter(|&(lon, lat)| !coast::is_land(lon, lat, noise));
+    sea.count() as f64 / samples().count() as f64
+}
+
+/// The cloudiness that a fifth of all places are above in a month.
+fn cloud_threshold(month: usize) -> f32 {
+    let noise = Noise::new(SEED);
+    let clouds = samples().map(|(lon, lat)| flux::cloudiness(lon, lat, month, noise));
+    let mut clouds: Vec<f32> = clouds.collect();
+    clouds.sort_unstable_by(f32::total_cmp);
+    clouds[((1.0 - CLOUD_SHARE) * clouds.len() as f64) as usize]
+}
+
+/// One number a cell from its number and its place, on all cores.
+fn everywhere(grid: &Grid, value: impl Fn(usize, f64, f64) -> f32 + Sync) -> Vec<f32> {
     let mut values = vec![f32::NAN; grid.cell_count()];
     let cores = thread::available_parallelism().map_or(1, usize::from);
     let rows_each = (grid.rows as usize).div_ceil(cores);
@@ -69,46 +95,63 @@ fn everywhere(grid: &Grid, value: impl Fn(f64, f64) -> f64 + Sync) -> Arc<Frame>
             let value = &value;
             scope.spawn(move || {
                 for (down, row) in rows.chunks_mut(cols).enumerate() {
-                    let lat =
-                        grid.north_deg - grid.dlat_deg * ((part * rows_each + down) as f64 + 0.5);
+                    let down = part * rows_each + down;
+                    let lat = grid.north_deg - grid.dlat_deg * (down as f64 + 0.5);
                     for (col, cell) in row.iter_mut().enumerate() {
                         let lon = grid.west_deg + grid.dlon_deg * (col as f64 + 0.5);
-                        *cell = value(lon, lat) as f32;
+                        *cell = value(down * cols + col, lon, lat);
                     }
                 }
             });
         }
     });
-    Arc::new(Frame::new(values))
+    values
 }
 
-/// Sinks in the north, sources near the equator, eddies of two degrees on top; `phase` is the season, radians.
-fn flux(lon: f64, lat: f64, phase: f64) -> f64 {
-    let belt = 35.0 - 2.4 * lat + 22.0 * (phase + lat * 0.05).cos();
-    let eddies = 14.0 * (lon * 3.1 + phase).sin() * (lat * 2.7 - 0.4 * phase).cos();
-    (belt + eddies) * GRAM_A_YEAR
+/// Flux of a month, kg m⁻² s⁻¹, in the cells that are sea; under clouds what is known from around them.
+fn month(grid: &Grid, is_sea: &[bool], month: usize) -> Vec<f32> {
+    let (noise, threshold) = (Noise::new(SEED), cloud_threshold(month));
+    everywhere(grid, |cell, lon, lat| {
+        if !is_sea[cell] {
+            return f32::NAN;
+        }
+        let mmol_m2_d = if flux::cloudiness(lon, lat, month, noise) < threshold {
+            flux::flux_mmol_m2_d(lon, lat, month, noise)
+        } else {
+            flux::smooth_flux_mmol_m2_d(lon, lat, month)
+        };
+        (mmol_m2_d * KG_MMOL / DAY_S) as f32
+    })
 }
 
 /// Two adjacent months and what has accumulated until each.
 pub fn scene(grid: &Grid) -> Scene {
-    let month = std::f64::consts::TAU / 12.0;
-    let value = Interval {
-        before: frame(grid, |lon, lat| flux(lon, lat, 0.0)),
-        after: frame(grid, |lon, lat| flux(lon, lat, month)),
-        weight: 0.3,
+    let noise = Noise::new(SEED);
+    let is_sea = everywhere(grid, |_, lon, lat| {
+        f32::from(u8::from(!coast::is_land(lon, lat, noise)))
+    });
+    let is_sea: Vec<bool> = is_sea.into_iter().map(|sea| sea > 0.5).collect();
+    let [before, after] = MONTHS.map(|number| month(grid, &is_sea, number));
+    // Some ten months of what the two let pass on average.
+    let accumulated = |share: f64| {
+        let months = before.iter().zip(&after);
+        let mean = months.map(|(before, after)| 0.5 * (f64::from(*before) + f64::from(*after)));
+        let frame = mean.map(|flux| (flux * share * YEAR_S) as f32).collect();
+        Arc::new(Frame::new(frame))
     };
-    let carbon =
-        |share: f64| move |lon: f64, lat: f64| flux(lon, lat, 0.5 * month) * share * YEAR_S;
     let accumulated = Interval {
-        before: frame(grid, carbon(0.8)),
-        after: frame(grid, carbon(0.88)),
+        before: accumulated(0.8),
+        after: accumulated(0.88),
         weight: 0.6,
     };
-    let domain = Scene::domain_of(value.before.cells.content().iter().map(|v| *v > -1.0));
     Scene {
         grid: *grid,
-        domain,
-        value,
+        domain: Scene::domain_of(is_sea),
+        value: Interval {
+            before: Arc::new(Frame::new(before)),
+            after: Arc::new(Frame::new(after)),
+            weight: 0.3,
+        },
         accumulated: Some(accumulated),
         terrain: None,
         northward: None,
@@ -130,7 +173,15 @@ pub fn pole(cells: u64, size_px: [u32; 2]) -> Result<(Scene, RenderJob)> {
         dlat_deg: 180.0 / rows,
         dlon_deg: 180.0 / rows,
     };
-    let water = |phase: f64| everywhere(&grid, move |lon, lat| flux(lon, lat, phase));
+    let noise = Noise::new(SEED);
+    let water = |z: f64| {
+        // A sink as strong as in the China Seas, with eddies as wide as they are there.
+        let flux = |_, lon: f64, lat: f64| {
+            let eddies = noise.fractal(lon / 1.6, lat / 1.6, z, 5);
+            ((4.0 * eddies - 5.0) * KG_MMOL / DAY_S) as f32
+        };
+        Arc::new(Frame::new(everywhere(&grid, flux)))
+    };
     let value = Interval {
         before: water(0.0),
         after: water(0.5),
@@ -145,7 +196,7 @@ pub fn pole(cells: u64, size_px: [u32; 2]) -> Result<(Scene, RenderJob)> {
         terrain: None,
         northward: None,
     };
-    let mut job = job(size_px, 64)?;
+    let mut job = job(size_px, 64, 0.0)?;
     job.accumulated = None;
     job.view = View::Globe {
         lon_deg: 10.0,
@@ -164,8 +215,8 @@ pub fn particles(scene: &Scene) -> u64 {
         .domain
         .content()
         .iter()
-        .map(|&is_sea| u64::from(is_sea))
-        .sum()
+        .filter(|&&covered| covered > 0)
+        .count() as u64
 }
 
 fn time_sample(product: &str) -> Result<TimeSample> {
@@ -177,8 +228,36 @@ fn time_sample(product: &str) -> Result<TimeSample> {
     })
 }
 
-/// The volume seen from above the region, in slices. What it is drawn from is given beside it.
-pub fn job(size_px: [u32; 2], slices: u32) -> Result<RenderJob> {
+/// The region from above, or from as far away with a tilt of so many degrees at its middle.
+fn view([width_px, height_px]: [u32; 2], tilt_deg: f64) -> Result<View> {
+    let (lon, lat) = (WEST_DEG + 0.5 * WIDTH_DEG, 0.5 * NORTH_DEG);
+    if tilt_deg > 0.0 {
+        let look_at = LookAt {
+            target: LonLatDeg { lon, lat },
+            distance_m: CAMERA_HEIGHT_M,
+            angles: CameraAngles {
+                heading_deg: HEADING_DEG,
+                tilt_deg,
+                ..CameraAngles::NADIR
+            },
+        };
+        return Ok(look_at.view([width_px, height_px])?);
+    }
+    Ok(View::Globe {
+        lon_deg: lon,
+        lat_deg: lat,
+        height_m: CAMERA_HEIGHT_M,
+        width_px,
+        height_px,
+        angles: CameraAngles::NADIR,
+    })
+}
+
+/// The volume of the region in slices, upright or tilted, degrees. What it is drawn from is given beside it.
+///
+/// # Errors
+/// A tilt that is none.
+pub fn job(size_px: [u32; 2], slices: u32, tilt_deg: f64) -> Result<RenderJob> {
     let mut style = Style::with_transfer(TransferFunction::default_for(Quantity::CarbonFlux));
     style.slices = slices;
     style.particles_per_cell = 1;
@@ -190,14 +269,7 @@ pub fn job(size_px: [u32; 2], slices: u32) -> Result<RenderJob> {
         relief: None,
         flow: None,
         mode: Mode::Volume,
-        view: View::Globe {
-            lon_deg: WEST_DEG + 0.5 * WIDTH_DEG,
-            lat_deg: 0.5 * NORTH_DEG,
-            height_m: CAMERA_HEIGHT_M,
-            width_px: size_px[0],
-            height_px: size_px[1],
-            angles: CameraAngles::NADIR,
-        },
+        view: view(size_px, tilt_deg)?,
         style,
         annotations: None,
     })
@@ -216,5 +288,35 @@ mod tests {
                 "{made} for {wanted}"
             );
         }
+    }
+
+    #[test]
+    fn the_sea_has_a_coast_sinks_sources_and_smooth_water_under_clouds() {
+        let grid = grid(60_000);
+        let scene = scene(&grid);
+        let flux = scene.value.before.cells.content();
+        let sea = flux.iter().filter(|flux| **flux > -1.0);
+        let [low, high] = scene.value.before.range;
+        assert!(low < -5e-10 && high > 1e-10, "{low} {high}");
+        let share = sea.count() as f64 / flux.len() as f64;
+        assert!((0.4..0.8).contains(&share), "{share}");
+        // Under a cloud neighbours are alike, beside it eddies make them differ.
+        let (noise, threshold) = (Noise::new(SEED), cloud_threshold(MONTHS[0]));
+        let [mut clear, mut cloudy] = [(0.0, 0), (0.0, 0)];
+        for cell in 1..flux.len() {
+            let (row, col) = (cell as u32 / grid.cols, cell as u32 % grid.cols);
+            let place = grid.cell_center(row, col);
+            let pair = [flux[cell - 1], flux[cell]];
+            if col == 0 || pair.iter().any(|flux| *flux < -1.0) {
+                continue;
+            }
+            let is_cloudy = flux::cloudiness(place.lon, place.lat, MONTHS[0], noise) >= threshold;
+            let side = if is_cloudy { &mut cloudy } else { &mut clear };
+            *side = (side.0 + (pair[0] - pair[1]).abs(), side.1 + 1);
+        }
+        let mean = |(sum, count): (f32, u32)| sum / count as f32;
+        let covered = f64::from(cloudy.1) / f64::from(cloudy.1 + clear.1);
+        assert!((covered - CLOUD_SHARE).abs() < 0.1, "{covered}");
+        assert!(mean(cloudy) < 0.5 * mean(clear));
     }
 }

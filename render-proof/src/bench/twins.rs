@@ -55,6 +55,7 @@ fn one(plan: &Plan, scene: &Scene, run: usize, cores: usize) {
                     accumulated: carbon,
                     palette: &plan.palette,
                     uncertainty: &[],
+                    domain: scene.domain.content(),
                 };
                 generate(&plan.params, &inputs, &mut particles);
                 project::cpu::project(&plan.params, &plan.rows, &plan.cols, &particles, splats);

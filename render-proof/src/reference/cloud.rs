@@ -9,9 +9,10 @@ use contract::job::RenderJob;
 use glam::DVec3;
 use render::plan::Plan;
 use render::scene::{Interval, Scene};
-use render::stages::layout::{Active, SUBPIXELS};
+use render::stages::layout::{Active, COVERED, SUBPIXELS};
 
 use super::space::Space;
+use super::srgb::linear_of;
 
 /// A smaller one of the 256 sizes is none.
 const LEAST_SIZE: f64 = 1.0 / 255.0;
@@ -24,6 +25,7 @@ pub(super) struct Cloud {
     pub(super) radius: f64,
     /// Optical depth straight through the middle.
     pub(super) depth: f64,
+    /// Linear light.
     pub(super) color: DVec3,
     /// The eye sees it; if not it still throws shadows.
     pub(super) is_seen: bool,
@@ -118,9 +120,9 @@ fn cloud(
     let east = place(3_242_174_889, bits);
     let south = place(2_447_445_414, scrambled(bits));
     let first = row
-        .wrapping_add(k)
-        .wrapping_mul(2_654_435_769)
-        .wrapping_add(col.wrapping_mul(1_779_033_704))
+        .wrapping_mul(3_242_174_889)
+        .wrapping_add(col.wrapping_mul(2_447_445_414))
+        .wrapping_add(k.wrapping_mul(2_654_435_769))
         .wrapping_add(scrambled(bits ^ 0x85eb_ca6b) >> 3);
     let phase = (share(first) + f64::from(params.particles.turns_per_kg_m2) * carbon.abs()).fract();
 
@@ -136,7 +138,7 @@ fn cloud(
     }
     .clamp(0.0, 1.0);
     let floor = f64::from(params.particles.depth_floor);
-    let thin = (phase.min(1.0 - phase) * 12.0).min(1.0) * 12.0 / 11.0;
+    let thin = (phase.min(1.0 - phase) * 24.0).min(1.0) * 24.0 / 23.0;
     let table = &plan.rows[row as usize];
     let full_radius = f64::from(table.radius);
     let size = transfer
@@ -146,7 +148,8 @@ fn cloud(
     let opacity = transfer
         .opacity(value)
         .unwrap_or_else(|| floor + (1.0 - floor) * strength.sqrt());
-    let column_depth = job.style.optical_depth * opacity * thin;
+    let covered = f64::from(scene.domain.content()[index]) / f64::from(COVERED);
+    let column_depth = job.style.optical_depth * opacity * thin * covered;
     let depth = column_depth * f64::from(table.depth_gain) * (full_radius / radius).powi(2);
     if depth <= 0.0 {
         return None;
@@ -160,7 +163,7 @@ fn cloud(
         center,
         radius,
         depth,
-        color: DVec3::from_array(transfer.color(value)),
+        color: linear_of(DVec3::from_array(transfer.color(value))),
         is_seen: !space.is_hidden(center),
     })
 }

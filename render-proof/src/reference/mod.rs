@@ -9,6 +9,7 @@ mod cloud;
 mod rays;
 mod sky;
 mod space;
+mod srgb;
 
 use contract::job::{Mode, RenderJob};
 use render::plan::Plan;
@@ -37,7 +38,7 @@ impl Default for Fineness {
     }
 }
 
-/// A picture of premultiplied red, green, blue and alpha, 0 to 1, row by row from the top.
+/// A picture of premultiplied sRGB red, green, blue and alpha, 0 to 1, row by row from the top.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Picture {
     /// Pixels across.
@@ -99,6 +100,6 @@ pub fn reference_of_cells(
     Ok(Picture {
         width,
         height,
-        rgba: rays.picture(),
+        rgba: rays.picture().into_iter().map(srgb::encoded).collect(),
     })
 }

@@ -4,7 +4,7 @@ use std::thread;
 
 use render::plan::Plan;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::Fineness;
 use super::cloud::Cloud;
@@ -13,6 +13,11 @@ use super::space::{Ray, Space};
 
 /// Screen tiles that clouds are sorted into, pixels a side.
 const TILE_PX: u32 = 8;
+/// Clouds with a smaller radius than this, pixels, are seen by several sight lines a pixel: one would meet some and miss
+/// others.
+const FINE_PX: f64 = 3.0;
+/// Most sight lines across a pixel.
+const MOST_SAMPLES: f64 = 3.0;
 /// What lies behind less light than this is not seen in any number of bits that pictures have.
 const DARK: f64 = 1e-7;
 
@@ -24,6 +29,8 @@ pub(super) struct Rays<'a> {
     size_px: [u32; 2],
     step: f64,
     tiles_x: u32,
+    /// Sight lines across a pixel.
+    samples: u32,
     /// Clouds seen in a screen tile, row by row.
     lists: Vec<Vec<u32>>,
 }
@@ -61,6 +68,7 @@ impl<'a> Rays<'a> {
         let (clouds, space) = (sky.clouds(), sky.space());
         let [tiles_x, tiles_y] = size_px.map(|px| px.div_ceil(TILE_PX));
         let mut lists = vec![vec![]; (tiles_x * tiles_y) as usize];
+        let mut least_px = f64::INFINITY;
         for (i, cloud) in (0u32..).zip(clouds) {
             let Some((place, reach)) = space
                 .seen(cloud.center, cloud.radius)
@@ -68,6 +76,7 @@ impl<'a> Rays<'a> {
             else {
                 continue;
             };
+            least_px = least_px.min(reach);
             let range = |place: f64, tiles: u32| {
                 let tile = |edge: f64| (edge / f64::from(TILE_PX)).clamp(0.0, f64::from(tiles));
                 tile(place - reach).floor() as u32..tile(place + reach).ceil() as u32
@@ -90,6 +99,7 @@ impl<'a> Rays<'a> {
             size_px,
             step: smallest / f64::from(fineness.steps_per_radius.max(1)),
             tiles_x,
+            samples: (FINE_PX / least_px).ceil().clamp(1.0, MOST_SAMPLES) as u32,
             lists,
         }
     }
@@ -124,9 +134,21 @@ impl<'a> Rays<'a> {
         picture
     }
 
+    /// The mean over the sight lines of a pixel.
     fn pixel(&self, x: u32, y: u32) -> [f64; 4] {
         let list = &self.lists[(y / TILE_PX * self.tiles_x + x / TILE_PX) as usize];
-        let ray = self.space.ray(x, y);
+        let corner = DVec2::new(f64::from(x), f64::from(y));
+        let share = |i: u32| (f64::from(i) + 0.5) / f64::from(self.samples);
+        let offsets = (0..self.samples * self.samples)
+            .map(|i| DVec2::new(share(i % self.samples), share(i / self.samples)));
+        let seen = offsets.map(|offset| self.seen(list, self.space.ray(corner + offset)));
+        let sum = seen.fold([0.0; 4], |sum, color| {
+            [0, 1, 2, 3].map(|i| sum[i] + color[i])
+        });
+        sum.map(|channel| channel / f64::from(self.samples * self.samples))
+    }
+
+    fn seen(&self, list: &[u32], ray: Ray) -> [f64; 4] {
         let mut met = vec![];
         let (mut start, mut end) = (f64::INFINITY, f64::NEG_INFINITY);
         for cloud in list.iter().map(|&i| &self.clouds[i as usize]) {
@@ -223,7 +245,9 @@ mod tests {
             ambient: 0.5,
             direct: 0.25,
         };
-        Rays::new(&sky, shade, [9, 9], Fineness { steps_per_radius }).pixel(4, 4)
+        let rays = Rays::new(&sky, shade, [9, 9], Fineness { steps_per_radius });
+        let all: Vec<u32> = (0..).zip(clouds).map(|(i, _)| i).collect();
+        rays.seen(&all, space.ray(DVec2::splat(4.5)))
     }
 
     #[test]

@@ -158,9 +158,8 @@ impl Space {
         nearest < 1.0 && foot.length() < place.length().min(1.0)
     }
 
-    /// The sight line through the middle of a pixel.
-    pub(super) fn ray(&self, x: u32, y: u32) -> Ray {
-        let pixel = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
+    /// The sight line through a place of the picture, pixels from its upper left corner.
+    pub(super) fn ray(&self, pixel: DVec2) -> Ray {
         match self.eye {
             Eye::Globe {
                 place,

@@ -4,5 +4,7 @@
     reason = "all of this binary is tests; clippy allows it in test functions only"
 )]
 
+mod bench;
 mod fill;
+mod optics;
 mod reference;

@@ -90,8 +90,10 @@ fn more_slices_come_nearer_to_the_reference_on_a_globe_and_on_a_tile() {
         ("tile", tile(3, 1, 3, 256), 49.0),
     ];
     for (name, view, least_db) in views {
-        let rows =
-            against_slices(&renderer, &job(Mode::Volume, view), &scene, &[8, 64, 256]).unwrap();
+        let job = job(Mode::Volume, view);
+        let rows = against_slices(&renderer, &job, &scene, &[8, 64, 256])
+            .unwrap()
+            .rows;
         for row in &rows {
             println!("{name}: {} slices, {:?}", row.slices, row.difference);
         }

@@ -116,6 +116,7 @@ fn heights(
     let unit = display.unit;
     let mut words = vec![
         "Height: carbon given off".to_owned(),
+        "depth: carbon taken up".to_owned(),
         format!("since {since}, {unit}"),
     ];
     let hundred_km = figures(shown(1e5));
@@ -304,8 +305,8 @@ impl Heights {
             panel.write(line, [padding, y + 0.85 * em], small, Anchor::Start, ink);
             y + LINE_EM * em
         };
-        let (above, below) = self.words.split_at(2);
-        for (line, ink) in above.iter().zip([Ink::Panel, Ink::Soft]) {
+        let (above, below) = self.words.split_at(3);
+        for (line, ink) in above.iter().zip([Ink::Panel, Ink::Panel, Ink::Soft]) {
             y = write(panel, y, line, ink);
         }
         y = self.draw_bar(panel, y, em);

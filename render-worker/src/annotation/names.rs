@@ -42,7 +42,7 @@ pub(super) fn draw(page: &mut Page, projection: &Projection) -> Result<(), Legen
             .flat_map(|name| places.iter().map(move |place| (name, place)));
         for (name, (place, px)) in choices {
             let has_room = name.length <= MOST_OF_SEA * width_px(sea, *place, projection);
-            if has_room && name.write(page, *px) {
+            if has_room && name.is_on_globe(*px, projection) && name.write(page, *px) {
                 break;
             }
         }
@@ -108,6 +108,14 @@ impl Name {
             forms.push(form(vec![first.to_owned(), last.to_owned()])?);
         }
         Ok(forms)
+    }
+
+    /// Is there ground below both ends of it? A name that runs over the limb would be that of the sky.
+    fn is_on_globe(&self, [x, y]: [f64; 2], projection: &Projection) -> bool {
+        let half = 0.5 * self.length;
+        [x - half, x + half]
+            .into_iter()
+            .all(|x| projection.ground_at([x, y]).is_some())
     }
 
     /// Writes it round a place if there is room.

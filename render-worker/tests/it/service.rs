@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use contract::context::Relief;
+use contract::earth::Earth;
 use contract::grid::Grid;
 use contract::job::{Mode, RenderJob};
 use contract::quantity::Quantity;
@@ -257,7 +258,10 @@ async fn frames_of_a_product_come_filled_with_the_errors_beside_them() {
     // Blocks of four cells: rows 20 and 21, the first four columns; half of their cells were measured.
     let coarser = pyramid::coarser(&scene).unwrap();
     let error = coarser.value.after.errors.as_ref().unwrap().content()[10 * 36];
-    let expected = 0.25 * (errors[20 * 72] + errors[20 * 72 + 1]);
+    let [north_m2, south_m2] =
+        [20, 21].map(|row| scene.grid.cell_area_m2(row, Earth::Wgs84) as f32);
+    let expected =
+        (errors[20 * 72] + errors[20 * 72 + 1]) * north_m2 / (2.0 * (north_m2 + south_m2));
     assert!((error / expected - 1.0).abs() < 1e-5, "{error} {expected}");
     assert!(coarser.value.before.errors.is_none());
 }

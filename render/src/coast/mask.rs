@@ -5,10 +5,28 @@
 
 use glam::DVec2;
 
-/// Half the width of a line, pixels.
-const HALF_WIDTH_PX: f64 = 0.6;
-/// Farthest from a line that a pixel's centre is touched by it.
-const REACH_PX: f64 = HALF_WIDTH_PX + 0.5;
+/// How a line is drawn.
+#[derive(Debug, Clone, Copy)]
+pub struct Pen {
+    /// Half its width, pixels.
+    pub half_width_px: f64,
+    /// Coverage of what it covers whole, 0 to 1.
+    pub strength: f64,
+}
+
+impl Pen {
+    /// That of coast lines.
+    pub const COAST: Self = Self {
+        half_width_px: 0.6,
+        strength: 1.0,
+    };
+
+    /// Farthest from a line that a pixel's centre is touched by it.
+    fn reach_px(self) -> f64 {
+        self.half_width_px + 0.5
+    }
+}
+
 /// Looked at beyond that, so that rounding leaves out nothing.
 const SLACK_PX: f64 = 1e-3;
 
@@ -42,6 +60,20 @@ impl Mask {
         self.words
     }
 
+    /// Writes the coverage of every pixel into the bits of its word, of one word for each, from `shift` on, which are 0.
+    pub fn write(&self, words: &mut [u32], shift: u32) {
+        let row_words = Self::row_words(self.size_px[0]) as usize;
+        let rows = words.chunks_exact_mut(self.size_px[0] as usize);
+        for (words, own) in rows.zip(self.words.chunks_exact(row_words)) {
+            let lined = words.chunks_mut(4).zip(own).filter(|(_, own)| **own != 0);
+            for (words, own) in lined {
+                for (word, byte) in words.iter_mut().zip(own.to_le_bytes()) {
+                    *word |= u32::from(byte) << shift;
+                }
+            }
+        }
+    }
+
     /// Coverage of a pixel of the picture.
     pub fn at(words: &[u32], width_px: u32, pixel: [u32; 2]) -> u32 {
         let word = words[(pixel[1] * Self::row_words(width_px) + pixel[0] / 4) as usize];
@@ -49,10 +81,10 @@ impl Mask {
     }
 
     /// Covers what a straight line between two absolute places does.
-    pub fn draw(&mut self, a: DVec2, b: DVec2) {
+    pub fn draw(&mut self, pen: Pen, a: DVec2, b: DVec2) {
         let [width, height] = self.size_px.map(f64::from);
         let (low, high) = (a.min(b) - self.origin_px, a.max(b) - self.origin_px);
-        let reach = REACH_PX + SLACK_PX;
+        let reach = pen.reach_px() + SLACK_PX;
         let is_near =
             high.x > -reach && low.x < width + reach && high.y > -reach && low.y < height + reach;
         if !is_near {
@@ -70,7 +102,8 @@ impl Mask {
             let left = self.origin_px.x;
             for x in span(west - left, east - left, width) {
                 let center = DVec2::new(left + f64::from(x) + 0.5, middle);
-                let cover = (REACH_PX - distance(center, a, b)).clamp(0.0, 1.0);
+                let cover = (pen.reach_px() - distance(center, a, b)).clamp(0.0, 1.0);
+                let cover = cover * pen.strength;
                 self.cover([x, y], (cover * 255.0).round() as u32);
             }
         }
@@ -123,7 +156,7 @@ mod tests {
     fn drawn(origin_px: [f64; 2], size_px: [u32; 2], lines: &[[[f64; 2]; 2]]) -> Vec<u32> {
         let mut mask = Mask::new(origin_px, size_px);
         for [a, b] in lines {
-            mask.draw((*a).into(), (*b).into());
+            mask.draw(Pen::COAST, (*a).into(), (*b).into());
         }
         mask.into_words()
     }

@@ -1,17 +1,21 @@
 //! The coast lines of the earth: packed in the program, unpacked once, at the scale that suits a picture.
 //!
-//! Natural Earth (public domain), 1:110 million and 1:50 million. `tests/it/coast.rs` packs them and tells how.
+//! Natural Earth (public domain), 1:110 million and 1:50 million. `tests/it/coast.rs` packs them and tells how. Globe
+//! views draw the outlines that land is filled by (`ring`), so that line and land agree.
 
-pub mod land;
+mod cover;
 mod mask;
 mod packed;
+pub mod ring;
+pub mod sea_floor;
 
 use std::sync::LazyLock;
 
 use contract::tile::{mercator_x, mercator_y};
 use glam::DVec3;
 
-pub use mask::Mask;
+pub use cover::Cover;
+pub use mask::{Mask, Pen};
 pub use packed::{Place, pack, unpack};
 
 /// Both scales, the coarse one first.
@@ -43,14 +47,12 @@ static SCALES: LazyLock<[Lines; 2]> = LazyLock::new(|| {
 
 fn corner(place: Place) -> Corner {
     let [lon_deg, lat_deg] = place.degrees();
-    let (sin_lon, cos_lon) = lon_deg.to_radians().sin_cos();
-    let (sin_lat, cos_lat) = lat_deg.to_radians().sin_cos();
     Corner {
         share: [
             mercator_x(lon_deg),
             mercator_y(lat_deg.clamp(-POLE_DEG, POLE_DEG)),
         ],
-        normal: DVec3::new(cos_lat * sin_lon, cos_lat * cos_lon, sin_lat),
+        normal: ring::normal([lon_deg, lat_deg]),
     }
 }
 

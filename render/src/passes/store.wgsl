@@ -44,13 +44,12 @@ fn store_nothing(at: u32) {
 
 fn store(at: u32, splat: Splat) {
     if (lighting.mode == LIGHT_ALONE) {
-        if (splat.tau > 0.0) { deposit(splat); }
+        if (splat.light_depth > 0.0) { deposit(splat); }
         return;
     }
     let size = size_word(splat);
     seen[at] = vec4(bitcast<u32>(splat.x_sub), bitcast<u32>(splat.y_sub), size, splat.color);
-    if (splat.tau <= 0.0) { return; }
-    if (lighting.mode == LIGHT_OWN) { deposit(splat); }
+    if (lighting.mode == LIGHT_OWN && splat.light_depth > 0.0) { deposit(splat); }
     if (size == 0u) { return; }
     lit[at] = vec4(bitcast<u32>(splat.light_u), bitcast<u32>(splat.light_v),
         bitcast<u32>(splat.slice), bitcast<u32>(splat.day));

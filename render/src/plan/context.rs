@@ -1,36 +1,45 @@
-//! What surrounds the particles, for the stages: sun, sea, terrain, coast lines, day and night.
+//! What surrounds the particles, for the stages: sun, sea, terrain, coast lines, the plain globe, day and night.
+
+use std::sync::Arc;
 
 use contract::earth::SPHERE_RADIUS_M;
 use contract::grid::Grid;
 use contract::job::{Mode, RenderJob, View};
 use contract::tile::{Tile, mercator_lat_deg};
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 
 use super::camera::{Camera, local_sun, overhead};
-use super::{Plan, tile};
-use crate::coast::{self, Corner, Mask};
+use super::{Plan, ground, masks, tile};
+use crate::coast::{self, Corner, Mask, Pen, sea_floor};
 use crate::scene::Scene;
+use crate::stages::compose::base_map::{self, BaseMapParams};
 use crate::stages::layout::GroundAxis;
 use crate::stages::params::GridParams;
 
-/// Coast lines over what is dark: a plain globe, or nothing.
+/// Coast lines of tiles over what is dark, or over nothing.
 const LIGHT_LINE: [f32; 2] = [0.88, 0.6];
-/// Coast lines over what is light: terrain, or a thematic map.
+/// Coast lines of tiles over what is light: terrain, or a thematic map.
 const DARK_LINE: [f32; 2] = [0.06, 0.75];
+/// How much larger heights of the coarse relief are taken than they are, where slopes are shaded: means of half a degree
+/// are flat.
+const FLOOR_EXAGGERATION: f64 = 25.0;
 
 /// Completes the plan of a view.
 pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) {
     sun(plan, job);
     sea_and_terrain(plan, job, scene);
-    if job.style.context.coastlines {
-        coast_lines(plan, job);
+    match (job.view, Camera::of(&job.view)) {
+        (View::Tile { tile, size_px }, _) if job.style.context.coastlines => {
+            coast_on_tile(plan, job, tile, size_px);
+        }
+        (View::Globe { .. }, Some(camera)) => plain_globe(plan, job, &camera),
+        _ => (),
     }
     let params = &mut plan.params;
     let context = &mut params.context;
     context.has_water = u32::from(params.particles.sea_per_m > 0.0);
-    let is_sea_seen = context.surface == 1 && context.has_water == 1;
-    let parts = [context.terrain_on, context.coast_on, context.night_on];
-    params.in_context = is_sea_seen || parts.contains(&1);
+    let parts = [context.surface, context.coast_on, context.night_on];
+    params.in_context = parts.contains(&1);
     if let View::Tile { tile, size_px } = job.view
         && params.in_context
     {
@@ -109,20 +118,44 @@ fn ground_axis(cells: f64, angle_deg: f64) -> GroundAxis {
     }
 }
 
-fn coast_lines(plan: &mut Plan, job: &RenderJob) {
-    let mask = match (job.view, Camera::of(&job.view)) {
-        (View::Tile { tile, size_px }, _) => on_tile(tile, size_px),
-        (view, Some(camera)) => on_globe(&camera, view.size_px()),
-        (View::Globe { .. }, None) => return,
-    };
-    plan.coast = mask.into_words();
+fn coast_on_tile(plan: &mut Plan, job: &RenderJob, tile: Tile, size_px: u32) {
+    plan.coast = Arc::new(on_tile(tile, size_px).into_words());
     let context = &mut plan.params.context;
     context.coast_on = 1;
     // On a map the lines would vanish below the colours.
     context.coast_above = u32::from(job.mode == Mode::Map);
-    context.coast_row_words = Mask::row_words(job.view.size_px()[0]);
+    context.coast_row_words = Mask::row_words(size_px);
     let is_light = job.mode == Mode::Map || context.terrain_on == 1;
-    [context.coast_grey, context.coast_alpha] = if is_light { DARK_LINE } else { LIGHT_LINE };
+    let [grey, alpha] = if is_light { DARK_LINE } else { LIGHT_LINE };
+    (context.coast_grey, context.coast_alpha) = (base_map::composed_grey(grey), alpha);
+}
+
+/// Land and lakes of the globe, its lines, its colours and its relief.
+fn plain_globe(plan: &mut Plan, job: &RenderJob, camera: &Camera) {
+    let size_px = job.view.size_px();
+    let (style, around) = (&job.style, &job.style.context);
+    let wanted = ground::Wanted {
+        land: style.globe_surface,
+        coasts: around.coastlines,
+        borders: around.borders,
+    };
+    let params = &mut plan.params;
+    params.base_map = BaseMapParams::of(around.base_map, around.background);
+    let context = &mut params.context;
+    if around.sea_floor && style.globe_surface && context.terrain_on == 0 {
+        context.sea_floor_on = 1;
+        context.terrain_slope = (FLOOR_EXAGGERATION / (8.0 * SPHERE_RADIUS_M)) as f32;
+        params.terrain_grid = GridParams::whole(&sea_floor::GRID);
+    }
+    if wanted.land || wanted.coasts || wanted.borders {
+        plan.coast = masks::of(&job.view, wanted, || ground::mask(camera, size_px, wanted));
+        context.coast_row_words = size_px[0];
+    }
+    context.coast_on = u32::from(wanted.coasts || wanted.borders);
+    // On a map the lines would vanish below the colours.
+    context.coast_above = u32::from(job.mode == Mode::Map);
+    let coast = base_map::coast(around.base_map);
+    (context.coast_grey, context.coast_alpha) = (base_map::composed_grey(coast.grey), coast.alpha);
 }
 
 /// Lines in absolute pixels of the tile's level, on both sides of the date line.
@@ -135,41 +168,9 @@ fn on_tile(tile: Tile, size_px: u32) -> Mask {
             let place =
                 |corner: &Corner| DVec2::new(corner.share[0] + turn, corner.share[1]) * world_px;
             for pair in line.windows(2) {
-                mask.draw(place(&pair[0]), place(&pair[1]));
+                mask.draw(Pen::COAST, place(&pair[0]), place(&pair[1]));
             }
         }
     }
     mask
-}
-
-/// Lines in front of the horizon.
-fn on_globe(camera: &Camera, size_px: [u32; 2]) -> Mask {
-    let mut mask = Mask::new([0.0; 2], size_px);
-    let px_per_deg = camera.focal_px / camera.nearest * 1f64.to_radians();
-    let middle_px = DVec2::new(f64::from(size_px[0]), f64::from(size_px[1])) / 2.0;
-    // Places of the unit sphere are seen where the camera is above their horizon.
-    let above = |place: DVec3| place.dot(camera.place) - 1.0;
-    for line in coast::lines(px_per_deg) {
-        for pair in line.windows(2) {
-            let seen = clipped([pair[0].normal, pair[1].normal], above)
-                .and_then(|pair| clipped(pair, |place| camera.ahead(place)));
-            if let Some([a, b]) = seen {
-                let at = |place| camera.seen_px(place) + middle_px;
-                mask.draw(at(a), at(b));
-            }
-        }
-    }
-    mask
-}
-
-/// The part of a line whose coordinate, which changes evenly along it, is not negative.
-fn clipped([a, b]: [DVec3; 2], coordinate: impl Fn(DVec3) -> f64) -> Option<[DVec3; 2]> {
-    let [at_a, at_b] = [a, b].map(coordinate);
-    let crossing = || a + (b - a) * (at_a / (at_a - at_b));
-    match (at_a >= 0.0, at_b >= 0.0) {
-        (true, true) => Some([a, b]),
-        (true, false) => Some([a, crossing()]),
-        (false, true) => Some([crossing(), b]),
-        (false, false) => None,
-    }
 }

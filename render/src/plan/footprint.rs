@@ -1,11 +1,16 @@
-//! The part of the globe that a camera sees: a cap round a place. Lengths in earth radii, angles in radians.
+//! The part of the globe that a camera sees: a cap round a place, and places all over it. Lengths in earth radii, angles
+//! in radians.
 
 use std::f64::consts::{PI, TAU};
 
 use glam::DVec3;
 
-/// Sight lines round the edge of what a tilted camera sees.
+/// Sight lines round the edge of what a tilted camera sees, and round each circle within it.
 const EDGE_RAYS: u32 = 64;
+/// Circles of sight lines from the middle of what it sees to the edge.
+const CIRCLES: u32 = 8;
+/// How suddenly what is seen last rises from the lowest to the highest as the limb comes near.
+const LIMB_POWER: i32 = 8;
 /// What lies between two of them reaches no farther than this beyond them.
 const SLACK: f64 = 1.02;
 /// Halvings of the search for the cap's middle.
@@ -17,6 +22,9 @@ pub(super) struct Footprint {
     pub center: DVec3,
     pub seen: f64,
     pub drawn: f64,
+    /// Where sight lines all over the picture enter and leave what is drawn; empty for a camera that looks straight down,
+    /// whose cap says as much.
+    pub places: Vec<DVec3>,
 }
 
 /// A place over the globe, seen from the point below the camera: angle from there, and direction against the heading.
@@ -52,15 +60,17 @@ impl Footprint {
         let horizon = (1.0 / distance).acos() + (1.0 / (1.0 + heights[1])).acos() + margin;
         let sine = distance * corner.sin() / deepest;
         let [seen, drawn] = if sine >= 1.0 {
-            [horizon.min(PI); 2]
+            // What is behind the horizon shadows what is on it.
+            [horizon, horizon + shadow].map(|angle| angle.min(PI))
         } else {
-            let seen = sine.asin() - corner + margin;
-            [seen, seen + 2.0 * margin + shadow].map(|angle| angle.min(horizon).min(PI))
+            let seen = (sine.asin() - corner + margin).min(horizon);
+            [seen, seen + 2.0 * margin + shadow].map(|angle| angle.min(PI))
         };
         Self {
             center: up,
             seen,
             drawn,
+            places: vec![],
         }
     }
 
@@ -73,10 +83,10 @@ impl Footprint {
         heights: [f64; 2],
         [margin, shadow]: [f64; 2],
     ) -> Self {
-        let spots = edge(height, [tilt, corner], heights);
+        let spots = circle(height, [tilt, corner], heights);
         let reach = |middle: f64| {
             let (sin_m, cos_m) = middle.sin_cos();
-            let cosines = spots.iter().map(|spot| {
+            let cosines = spots.iter().flatten().map(|spot| {
                 let (sin_a, cos_a) = spot.away.sin_cos();
                 cos_m * cos_a + sin_m * sin_a * spot.azimuth.cos()
             });
@@ -96,21 +106,55 @@ impl Footprint {
         let middle = f64::midpoint(span[0], span[1]);
         let seen = reach(middle) * SLACK + margin;
         let (sin_m, cos_m) = middle.sin_cos();
+        let side = ahead.cross(up);
+        let place = |spot: Spot, height: f64| {
+            let (sin_a, cos_a) = spot.away.sin_cos();
+            let (sin_z, cos_z) = spot.azimuth.sin_cos();
+            (up * cos_a + (ahead * cos_z + side * sin_z) * sin_a) * (1.0 + height)
+        };
+        let corners = (0..=CIRCLES).map(|step| corner * f64::from(step) / f64::from(CIRCLES));
+        // A sight line that passes the limb leaves at the top; the nearer one comes to that, the higher is what it sees last.
+        let farthest = farthest(height, heights);
+        let last = |away: f64| {
+            let share = (away / farthest).clamp(0.0, 1.0).powi(LIMB_POWER);
+            heights[0] + (heights[1] - heights[0]) * share
+        };
+        let places = corners
+            .flat_map(|corner| circle(height, [tilt, corner], heights))
+            .flat_map(|[left, entered]| {
+                let first = heights[1].min(height);
+                [place(left, last(left.away)), place(entered, first)]
+            });
         Self {
             center: up * cos_m + ahead * sin_m,
             seen: seen.min(PI),
             drawn: (seen + 2.0 * margin + shadow).min(PI),
+            places: places.collect(),
         }
+    }
+
+    /// Least and largest coordinate of the places along a direction.
+    pub(super) fn along(&self, direction: DVec3) -> Option<[f64; 2]> {
+        let reach = self.places.iter().map(|place| place.dot(direction));
+        reach.fold(None, |range: Option<[f64; 2]>, at| {
+            let [low, high] = range.unwrap_or([at; 2]);
+            Some([low.min(at), high.max(at)])
+        })
     }
 }
 
-/// Where sight lines round the edge of the cone come to what is drawn and leave it.
-fn edge(height: f64, [tilt, corner]: [f64; 2], heights: [f64; 2]) -> Vec<Spot> {
+/// How far from below the camera what is highest is seen behind the limb.
+fn farthest(height: f64, heights: [f64; 2]) -> f64 {
+    let (inner, outer) = (1.0 + heights[0], 1.0 + heights[1]);
+    (inner / (1.0 + height)).min(1.0).acos() + (inner / outer).acos()
+}
+
+/// Where sight lines round a cone leave what is drawn and where they come to it.
+fn circle(height: f64, [tilt, corner]: [f64; 2], heights: [f64; 2]) -> Vec<[Spot; 2]> {
     let distance = 1.0 + height;
     let (inner, outer) = (1.0 + heights[0], 1.0 + heights[1]);
     let limb = (inner / distance).min(1.0).acos();
-    // Behind the limb what is high is seen as far as this.
-    let farthest = limb + (inner / outer).acos();
+    let farthest = farthest(height, heights);
     let ground = |off_nadir: f64| {
         let sine = distance * off_nadir.sin() / inner;
         if off_nadir >= PI / 2.0 || sine >= 1.0 {
@@ -130,7 +174,7 @@ fn edge(height: f64, [tilt, corner]: [f64; 2], heights: [f64; 2]) -> Vec<Spot> {
     };
     let (sin_t, cos_t) = tilt.sin_cos();
     let (sin_c, cos_c) = corner.sin_cos();
-    let spots = (0..EDGE_RAYS).flat_map(|ray| {
+    let spots = (0..EDGE_RAYS).map(|ray| {
         let (sin_r, cos_r) = (f64::from(ray) / f64::from(EDGE_RAYS) * TAU).sin_cos();
         // A sight line's parts down, ahead and sideways.
         let down = cos_t * cos_c - sin_t * sin_c * cos_r;

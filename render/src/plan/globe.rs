@@ -12,7 +12,6 @@ use super::extent::Extent;
 use super::footprint::Footprint;
 use super::look::{self, Look};
 use super::{Plan, area_m2, cell_px, entry_shift, flow, height_range_m};
-use crate::coast::land;
 use crate::scene::Scene;
 use crate::stages::interpolate::params::InterpolateParams;
 use crate::stages::layout::{Col, LIGHT_OFF, Row, VIEW_GLOBE};
@@ -43,6 +42,7 @@ struct Cap<'a> {
     radius: f64,
     /// Where particles can be, of a regional product.
     extent: Option<&'a Extent>,
+    footprint: &'a Footprint,
 }
 
 pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) {
@@ -59,11 +59,6 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) {
     params.projection.per_earth_radius_m = (1.0 / SPHERE_RADIUS_M) as f32;
     params.view.center_px = UVec2::new(width_px, height_px).as_vec2() / 2.0;
     camera.write(&mut params.view);
-    if job.style.globe_surface {
-        let level = land::level(camera.focal_px / camera.nearest * 1f64.to_radians());
-        params.context.land_size = land::size(level).into();
-        params.context.land_per_rad = land::per_rad(level) as f32;
-    }
     let sun = camera.sun(job);
     params.view.sun = sun.as_vec3();
     if job.mode == Mode::Map {
@@ -93,10 +88,11 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) {
         angle,
         radius,
         extent: extent.as_ref(),
+        footprint: &footprint,
     };
     // What lies beyond the seen cap falls into the first or last slice, from where it shadows as it should.
     let half = slice_planes(plan, job, &camera, sun, &cap(footprint.seen));
-    light_frame(plan, &camera, sun, half, &cap(footprint.drawn));
+    light_frame(plan, &camera, sun, half, &cap(footprint.seen));
     choose_cells(plan, scene, &camera, &footprint);
     plan.is_crowded = is_crowded(plan, &camera, &cap(footprint.seen));
 }
@@ -186,6 +182,13 @@ fn slice_planes(
     let near = (tilt - angle).max(0.0).cos();
     let far = (tilt + angle).min(PI).cos();
     let (mut top, mut bottom) = (reach(near)[1] * near + 1e-4, reach(far)[0] * far - 1e-4);
+    if let Some([low, high]) = cap.footprint.along(half) {
+        // Clouds reach into the picture from half a radius beyond its edge.
+        (top, bottom) = (
+            high + 0.5 * cap.radius + 1e-4,
+            low - 0.5 * cap.radius - 1e-4,
+        );
+    }
     if let Some(extent) = cap.extent {
         let [low, high] = extent.along(half);
         // A region that is not in sight leaves nothing to cut.
@@ -247,11 +250,14 @@ fn light_frame(plan: &mut Plan, camera: &Camera, sun: DVec3, half: DVec3, cap: &
     };
     let reach = chord + heights[1].max(-heights[0]);
     let [span_u, span_v] = [axis_u, axis_v].map(|axis| {
+        // What shadows a place has its place in the light, however far it is towards the sun.
         let middle = cap.center.dot(axis);
+        let seen = cap.footprint.along(axis);
+        let [from, to] = seen.unwrap_or([middle - reach, middle + reach]);
         let [low, high] = cap.extent.map_or([-2.0, 2.0], |e| e.along(axis));
-        // Clouds look their light up within their radius.
-        let low = (middle - reach).max(low - radius);
-        [low, (middle + reach).min(high + radius).max(low)]
+        // Clouds look their light up within their radius, and are seen from a radius beyond the edge.
+        let low = (from - 2.0 * radius).max(low - radius);
+        [low, (to + 2.0 * radius).min(high + radius).max(low)]
     });
     let lengths = [span_u, span_v].map(|[low, high]| high - low);
     let side = (lengths[0] * lengths[1]).sqrt();

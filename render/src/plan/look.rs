@@ -9,13 +9,15 @@ pub const HEIGHT_LIMIT_M: f64 = 1.2e6;
 /// Turns of a particle through its column for each kg m⁻²: at 60 g m⁻² a year it rises three times a year.
 pub(super) const TURNS_PER_KG_M2: f32 = 50.0;
 /// Share of the optical depth that a cell without flux keeps.
-pub(super) const FLOOR_DIVERGING: f32 = 0.3;
+pub(super) const FLOOR_DIVERGING: f32 = 0.5;
 /// The same for quantities without a sign.
 pub(super) const FLOOR_SEQUENTIAL: f32 = 0.45;
-/// Light that reaches everything.
-pub(super) const AMBIENT: f32 = 0.5;
-/// Direct light at full strength: above 1 together with the ambient, so that lit slopes stand out.
-pub(super) const DIRECT: f32 = 0.65;
+/// Light that reaches everything: in full shadow a colour keeps 0.8 of its place in sRGB, so that it still says the value.
+pub(super) const AMBIENT: f32 = 0.62;
+/// Direct light at full strength: above 1 together with the ambient, 1.05 in sRGB, so that lit slopes stand out.
+pub(super) const DIRECT: f32 = 0.5;
+/// Share of all light on the night side, where the sun is the real one: half as bright in sRGB.
+pub(super) const NIGHT: f32 = 0.25;
 /// Share of the eye's optical depth that dims light; the rest is scattered forwards.
 pub(super) const LIGHT_DEPTH: f64 = 0.6;
 /// Opacity of a thematic map: the base map shines through a little.
@@ -53,7 +55,7 @@ pub(super) fn look_power(thin: f64, radius_slices: f64) -> f32 {
 /// Clouds that overlap at a place: the fewer, the grainier; the more, the slower.
 const CLOUDS_OVER_A_POINT: f64 = 50.0;
 /// Radius of the largest clouds over the side of a cell: larger ones would blur what the grid resolves.
-const WIDEST_CELLS: f64 = 1.6;
+const WIDEST_CELLS: f64 = 2.1;
 
 /// Whole numbers that sums of the light and the eye may reach.
 const MOST_SUM: f64 = 2_147_483_648.0;
@@ -137,7 +139,7 @@ impl Look {
                 min_radius_px: 1.8,
                 max_radius_px: f64::INFINITY,
                 size_spread: 0.1,
-                jitter_shift: 3,
+                jitter_shift: 5,
                 area_px_per_particle: 1.8,
                 center_depth: None,
             },

@@ -9,12 +9,15 @@ mod extent;
 mod flow;
 mod footprint;
 mod globe;
+mod ground;
 mod look;
+mod masks;
 mod projection;
 mod shape;
 mod tile;
 
 use std::ops::Range;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use contract::earth::Earth;
@@ -25,6 +28,7 @@ use glam::{UVec2, Vec3};
 use crate::error::RenderError;
 use crate::scene::{Interval, Scene};
 use crate::stages::bin::params::ListParams;
+use crate::stages::colour::{code_of, linear_of};
 use crate::stages::interpolate::params::InterpolateParams;
 use crate::stages::layout::{
     Active, Axis, Col, GroundAxis, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, LIGHT_OFF, LIGHT_OWN,
@@ -54,11 +58,11 @@ const MOST_HELD_BYTES: u64 = 256 << 20;
 /// Bands begin and end at multiples of so many rows, so that neighbouring pictures share them.
 const BAND_ROWS: u32 = 256;
 /// Shorter lists are not cut into parts: the parts of 1024 entries would be few.
-const LEAST_LONG_LIST: u32 = 2048;
+const LEAST_LONG_LIST: u32 = 1024;
 /// A list is long that holds so many times the particles that all screen tiles would have if they had the same.
-const LONG_OVER_FAIR: u32 = 4;
+const LONG_OVER_FAIR: u32 = 1;
 /// Largest share of its depth that a particle has at a place in its column.
-const MOST_ENVELOPE: f64 = 12.0 / 11.0;
+const MOST_ENVELOPE: f64 = 24.0 / 23.0;
 /// Particles that one invocation makes, unless cells hold fewer: neighbours share sums, more of them share better.
 const PARTICLES_EACH: u32 = 4;
 
@@ -77,8 +81,9 @@ pub struct Plan {
     pub palette: Vec<u32>,
     /// Columns, then rows of a tile in its surroundings; empty otherwise.
     pub ground_axes: Vec<GroundAxis>,
-    /// Words of the coast mask of the whole picture; empty without coast lines.
-    pub coast: Vec<u32>,
+    /// Words of the mask of the whole picture: coast lines of a tile, four pixels each; of a globe view land, lakes, shores
+    /// and borders of one pixel. Empty without any.
+    pub coast: Arc<Vec<u32>>,
     /// Some screen tiles may hold many times the particles of others: a pole or the limb is in view.
     pub is_crowded: bool,
     size_px: [u32; 2],
@@ -159,7 +164,7 @@ impl Plan {
             axes: vec![],
             palette: palette(job),
             ground_axes: vec![],
-            coast: vec![],
+            coast: Arc::default(),
             is_crowded: false,
             size_px,
         };
@@ -340,6 +345,7 @@ fn common(job: &RenderJob, scene: &Scene) -> Params {
             transfer_per_unit: (1.0 / (transfer.high - transfer.low)) as f32,
             has_shape: u32::from(shape::is_given(transfer)),
             has_uncertainty: u32::from(style.uncertainty && scene.value.has_uncertainty()),
+            has_coverage: u32::from(scene.domain.is_joined()),
         },
         particles: ParticleParams {
             jitter_shift: look.jitter_shift,
@@ -360,16 +366,7 @@ fn common(job: &RenderJob, scene: &Scene) -> Params {
             lon_span_rad: grid.dlon_deg.to_radians() as f32,
             ..ProjectParams::default()
         },
-        lighting: LightParams {
-            mode: if job.mode == Mode::Volume {
-                LIGHT_OWN
-            } else {
-                LIGHT_OFF
-            },
-            ambient: look::AMBIENT,
-            direct: look::DIRECT,
-            ..LightParams::default()
-        },
+        lighting: lighting(job),
         lists: ListParams {
             kernel: match job.mode {
                 Mode::Points | Mode::Flow => KERNEL_DOT,
@@ -390,10 +387,34 @@ fn common(job: &RenderJob, scene: &Scene) -> Params {
     }
 }
 
-/// 256 colours of the transfer function, red lowest; behind them its opacity and size where users gave any.
+fn lighting(job: &RenderJob) -> LightParams {
+    LightParams {
+        mode: if job.mode == Mode::Volume {
+            LIGHT_OWN
+        } else {
+            LIGHT_OFF
+        },
+        ambient: look::AMBIENT,
+        direct: look::DIRECT,
+        night: if job.style.sun.subsolar.is_some() {
+            look::NIGHT
+        } else {
+            1.0
+        },
+        ..LightParams::default()
+    }
+}
+
+/// 256 colours of the transfer function, red lowest: sRGB for maps, linear light by its codes for particles. Behind them
+/// its opacity and size where users gave any.
 fn palette(job: &RenderJob) -> Vec<u32> {
     let transfer = &job.style.transfer;
-    let byte = |share: f64| (share * 255.0).round() as u32;
+    let byte = |share: f64| match job.mode {
+        Mode::Map => (share * 255.0).round() as u32,
+        Mode::Points | Mode::Sprites | Mode::Volume | Mode::Flow => {
+            code_of(linear_of(Vec3::splat(share as f32)).x)
+        }
+    };
     let colors = (0..256).map(|i| {
         let value = transfer.low + (transfer.high - transfer.low) * f64::from(i) / 255.0;
         let [r, g, b] = transfer.color(value);

@@ -112,7 +112,8 @@ mod tests {
         near(entry(Mode::Volume, &opacity, 255), (0.75, 1.0));
         let size = with("", "-1:0.5,1:0.75");
         near(entry(Mode::Volume, &size, 0), (1.0, 0.5));
-        let middle = 0.3 + 0.7 * (1.0f64 / 255.0).sqrt();
+        let floor = f64::from(look::FLOOR_DIVERGING);
+        let middle = floor + (1.0 - floor) * (1.0f64 / 255.0).sqrt();
         near(
             entry(Mode::Volume, &size, 128),
             (middle, 0.625 + 0.125 / 255.0),

@@ -28,12 +28,16 @@ pub const LOOK: f32 = 0.34;
 /// What stands for "no data" in grids: NaN is not reliable in shaders.
 pub const MISSING: f32 = -1.0e30;
 
-/// Colour of deep water in daylight, red, green and blue, 0 to 1.
-pub const WATER_RED: f32 = 0.04;
+/// A cell that holds data all over, in the whole numbers that domains are kept in: a power of two, so that its share is
+/// exactly 1.
+pub const COVERED: u32 = 1 << 24;
+
+/// Colour of deep water in daylight, red, green and blue, linear light 0 to 1: in sRGB 0.04, 0.14, 0.24.
+pub const WATER_RED: f32 = 0.0031;
 /// See [`WATER_RED`].
-pub const WATER_GREEN: f32 = 0.14;
+pub const WATER_GREEN: f32 = 0.0174;
 /// See [`WATER_RED`].
-pub const WATER_BLUE: f32 = 0.24;
+pub const WATER_BLUE: f32 = 0.047;
 
 /// `ViewParams::kind`: a map tile.
 pub const VIEW_TILE: u32 = 0;

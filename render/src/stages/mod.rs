@@ -6,6 +6,7 @@
 /// What every shader of a stage begins with: structs, constants and small functions.
 pub const PRELUDE: &str = include_str!("prelude.wgsl");
 
+pub mod colour;
 pub mod layout;
 pub mod params;
 pub mod sizes;

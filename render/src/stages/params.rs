@@ -8,6 +8,7 @@ use crate::gpu::packed;
 use crate::passes::cells::CellParams;
 pub use crate::shared_struct::Fields;
 use crate::stages::bin::params::ListParams;
+use crate::stages::compose::base_map::BaseMapParams;
 use crate::stages::compose::params::ContextParams;
 use crate::stages::flow::params::FlowParams;
 use crate::stages::interpolate::params::InterpolateParams;
@@ -97,6 +98,8 @@ shared_struct! {
         pub has_shape: u32,
         /// 1: cells whose gap was filled are drawn differently.
         pub has_uncertainty: u32,
+        /// 1: cells may hold data in a part of their area, as the domain says.
+        pub has_coverage: u32,
     }
 }
 
@@ -142,6 +145,7 @@ params! {
     Thematic thematic: MapParams,
     Context context: ContextParams,
     TerrainGrid terrain_grid: GridParams,
+    BaseMap base_map: BaseMapParams,
 }
 
 impl From<Uniform> for u32 {

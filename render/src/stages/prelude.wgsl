@@ -20,7 +20,7 @@ struct GridParams {
 // How stored values are read: between which of their steps, and as which colour.
 struct ValueParams {
     weight: f32, accumulated_weight: f32, northward_weight: f32, has_accumulated: u32, transfer_low: f32,
-    transfer_per_unit: f32, has_shape: u32, has_uncertainty: u32,
+    transfer_per_unit: f32, has_shape: u32, has_uncertainty: u32, has_coverage: u32,
 }
 @group(0) @binding(18) var<uniform> values: ValueParams;
 
@@ -59,10 +59,11 @@ const SUBPIXELS: i32 = 16;
 const PART_ENTRIES: u32 = 1024u;
 const MOST_HOT_PARTS: u32 = 4096u;
 const NO_LIST: u32 = 0xffffffffu;
+const COVERED: u32 = 16777216u;
 const MISSING: f32 = -1.0e30;
-const WATER_RED: f32 = 0.04;
-const WATER_GREEN: f32 = 0.14;
-const WATER_BLUE: f32 = 0.24;
+const WATER_RED: f32 = 0.0031;
+const WATER_GREEN: f32 = 0.0174;
+const WATER_BLUE: f32 = 0.047;
 const VIEW_TILE: u32 = 0u;
 const VIEW_GLOBE: u32 = 1u;
 const LIGHT_OFF: u32 = 0u;
@@ -80,6 +81,28 @@ fn is_missing(value: f32) -> bool {
 // Index of an invocation in a list, of any length that two dimensions of workgroups reach.
 fn list_index(global: vec3<u32>, workgroups: vec3<u32>) -> u32 {
     return global.x + global.y * workgroups.x * GROUP;
+}
+
+// A particle's colour is linear light, each channel coded by its square root in 8 bits: steps about as even to the eye as
+// those of sRGB, and a multiplication decodes them.
+fn codes_of(color: u32) -> vec3<f32> {
+    return vec3(f32(color & 255u), f32((color >> 8u) & 255u), f32((color >> 16u) & 255u));
+}
+
+// A colour with other codes; what its last byte says stays.
+fn with_codes(color: u32, codes: vec3<f32>) -> u32 {
+    let rounded = vec3<u32>(clamp(codes, vec3(0.0), vec3(255.0)) + 0.5);
+    return rounded.x | (rounded.y << 8u) | (rounded.z << 16u) | (color & 0xff000000u);
+}
+
+// IEC 61966-2-1, sRGB.
+fn linear_of(srgb: vec3<f32>) -> vec3<f32> {
+    return select(pow((srgb + 0.055) / 1.055, vec3(2.4)), srgb / 12.92, srgb <= vec3(0.04045));
+}
+
+fn srgb_of(linear: vec3<f32>) -> vec3<f32> {
+    let light = max(linear, vec3(0.0));
+    return select(1.055 * pow(light, vec3(1.0 / 2.4)) - 0.055, light * 12.92, light <= vec3(0.0031308));
 }
 
 // Nearest whole number, halves upwards: `round` may differ between devices.

@@ -15,6 +15,10 @@ pub struct Ground {
     pub normal: Vec3,
     /// How far inside the globe's outline it runs, pixels.
     pub rim_px: f32,
+    /// Its place nearest to the globe's centre, earth radii.
+    pub foot: Vec3,
+    /// The way from the eye there, earth radii; negative behind the eye.
+    pub nearest_at: f32,
 }
 
 /// What the centre of a pixel of a globe view shows.
@@ -32,6 +36,8 @@ pub fn ground_below(params: &Params, pixel: [u32; 2]) -> Ground {
     if miss_sq >= 1.0 || nearest_at <= 0.0 {
         return Ground {
             rim_px,
+            foot,
+            nearest_at,
             ..Ground::default()
         };
     }
@@ -42,6 +48,8 @@ pub fn ground_below(params: &Params, pixel: [u32; 2]) -> Ground {
         lat_rad: angle_of(normal.z, normal.truncate().length()),
         normal,
         rim_px,
+        foot,
+        nearest_at,
     }
 }
 

@@ -16,9 +16,10 @@ fn angle_of(y: f32, x: f32) -> f32 {
     return angle;
 }
 
-struct Ground { on_ground: bool, lon: f32, lat: f32, normal: vec3<f32>, rim_px: f32 }
+struct Ground { on_ground: bool, lon: f32, lat: f32, normal: vec3<f32>, rim_px: f32, foot: vec3<f32>, nearest_at: f32 }
 
-// Where the sight line of a pixel's centre meets the sea surface; `rim_px` is how far inside the globe's outline it runs.
+// Where the sight line of a pixel's centre meets the sea surface; `rim_px` is how far inside the globe's outline it runs,
+// `foot` its place nearest to the globe's centre, `nearest_at` the way from the eye there: negative behind the eye.
 fn ground_below(pixel: vec2<u32>) -> Ground {
     let x = (f32(i32(pixel.x) + view.origin_px.x) + 0.5 - view.center_px.x) / view.focal_px;
     let y = (view.center_px.y - f32(i32(pixel.y) + view.origin_px.y) - 0.5) / view.focal_px;
@@ -28,6 +29,8 @@ fn ground_below(pixel: vec2<u32>) -> Ground {
     let foot = camera + sight * nearest_at;
     let miss_sq = dot(foot, foot);
     var ground: Ground;
+    ground.foot = foot;
+    ground.nearest_at = nearest_at;
     ground.rim_px = (1.0 - sqrt(miss_sq)) * view.focal_px / max(nearest_at, 1.0e-6);
     ground.on_ground = miss_sq < 1.0 && nearest_at > 0.0;
     if (!ground.on_ground) { return ground; }

@@ -136,7 +136,7 @@ fn lines_beyond_the_horizon_are_hidden() {
     let plan = Plan::for_device(&job, &scene, u64::MAX).unwrap();
     let places = || (0..400).flat_map(|y| (0..400).map(move |x| [x, y]));
     let covered: Vec<_> = places()
-        .filter(|place| Mask::at(&plan.coast, 400, *place) > 0)
+        .filter(|[x, y]| plan.coast[(y * 400 + x) as usize] >> 16 & 255 > 0)
         .collect();
     // The disc's radius: focal length times the tangent of the angle to the horizon.
     let distance: f64 = 1.0 + 1.5e7 / 6.371e6;

@@ -13,12 +13,16 @@ use render::{Image, Scene};
 use render_proof::currents::{self, gyres};
 
 use crate::compare::distance;
+use crate::context::{everything, with_terrain};
 use crate::device::renderers;
-use crate::scenes::{FIVE_DEGREES, globe, job, looking_at, ocean, tile};
+use crate::scenes::{FIVE_DEGREES, ONE_DEGREE, globe, job, looking_at, ocean, tile};
 use record::{Record, digest};
 
-/// Largest file.
+/// Largest file, of a small picture and of one that is as large as people look at.
 const MOST_BYTES: u64 = 64 << 10;
+const MOST_WIDE_BYTES: u64 = 320 << 10;
+/// The least that shows grain, thin lines and edges as people see them.
+const WIDE_PX: [u32; 2] = [640, 360];
 /// Largest difference of a channel between two back ends, and share of pixels that differ by more than one.
 const MAX_DIFF: u8 = 6;
 const DIFF_PIXELS_PER_MILLE: usize = 5;
@@ -105,8 +109,13 @@ fn matches_golden_of(name: &str, scene: &Scene, mut job: RenderJob) {
         }
         let bytes = std::fs::read(&path)
             .unwrap_or_else(|e| panic!("{}: {e}; BLESS=1 draws it", path.display()));
+        let most_bytes = if drawn.width < WIDE_PX[0] {
+            MOST_BYTES
+        } else {
+            MOST_WIDE_BYTES
+        };
         assert!(
-            bytes.len() as u64 <= MOST_BYTES,
+            bytes.len() as u64 <= most_bytes,
             "{} is too large",
             path.display()
         );
@@ -169,6 +178,53 @@ fn tilted_volumes_maps_and_coasts_match_their_golden_pictures() {
     let mut job = job(Mode::Volume, limb);
     job.style.context.coastlines = true;
     matches_golden_of("volume_limb", &ocean(FIVE_DEGREES), job);
+}
+
+/// The same camera with a wide picture.
+fn wide(view: View) -> View {
+    let View::Globe {
+        lon_deg,
+        lat_deg,
+        height_m,
+        angles,
+        ..
+    } = view
+    else {
+        panic!("a globe");
+    };
+    View::Globe {
+        lon_deg,
+        lat_deg,
+        height_m,
+        width_px: WIDE_PX[0],
+        height_px: WIDE_PX[1],
+        angles,
+    }
+}
+
+#[test]
+fn wide_tilted_volumes_match_their_golden_picture() {
+    let view = looking_at([-112.0, 8.0], 5.0e6, [30.0, 50.0], 0);
+    let mut job = job(Mode::Volume, wide(view));
+    job.style.height_m_per_kg_m2 = 2e7;
+    job.style.context.coastlines = true;
+    matches_golden_of("volume_wide", &ocean(ONE_DEGREE), job);
+}
+
+#[test]
+fn wide_looks_at_sinks_below_the_sea_match_their_golden_picture() {
+    let view = looking_at([-128.0, 36.0], 3.5e6, [50.0, 48.0], 0);
+    let mut job = everything(Mode::Volume, wide(view));
+    job.style.height_m_per_kg_m2 = 2e7;
+    matches_golden_of("below_wide", &with_terrain(ONE_DEGREE), job);
+}
+
+#[test]
+fn wide_maps_match_their_golden_picture() {
+    let view = looking_at([-100.0, 10.0], 1.0e7, [0.0, 20.0], 0);
+    let mut job = job(Mode::Map, wide(view));
+    job.style.context.coastlines = true;
+    matches_golden_of("map_wide", &ocean(ONE_DEGREE), job);
 }
 
 #[test]

@@ -7,10 +7,10 @@ use render::passes::{scatter, splat, trails};
 use render::stages::fill::level::{FillLevel, MOST_REACH_COLS};
 use render::stages::fill::{self, exact, window};
 use render::stages::layout::{
-    Axis, Col, Entry, GROUP, GroundAxis, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, LIGHT_ALONE,
-    LIGHT_GIVEN, LIGHT_OFF, LIGHT_OWN, LOOK, MISSING, MOST_HOT_PARTS, NO_LIST, PART_ENTRIES,
-    Particle, Row, SCREEN_TILE_PX, SCREEN_TILE_SHIFT, SQUARE, SUBPIXELS, Splat, VIEW_GLOBE,
-    VIEW_TILE, Velocity, WATER_BLUE, WATER_GREEN, WATER_RED,
+    Axis, COVERED, Col, Entry, GROUP, GroundAxis, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT,
+    LIGHT_ALONE, LIGHT_GIVEN, LIGHT_OFF, LIGHT_OWN, LOOK, MISSING, MOST_HOT_PARTS, NO_LIST,
+    PART_ENTRIES, Particle, Row, SCREEN_TILE_PX, SCREEN_TILE_SHIFT, SQUARE, SUBPIXELS, Splat,
+    VIEW_GLOBE, VIEW_TILE, Velocity, WATER_BLUE, WATER_GREEN, WATER_RED,
 };
 use render::stages::params::{Fields, Params};
 use render::stages::{bin, compose, eye, flow, interpolate, light, map};
@@ -211,6 +211,7 @@ fn constants_have_the_same_value_in_rust_and_wgsl() {
         ("PART_ENTRIES", f64::from(PART_ENTRIES)),
         ("MOST_HOT_PARTS", f64::from(MOST_HOT_PARTS)),
         ("NO_LIST", f64::from(NO_LIST)),
+        ("COVERED", f64::from(COVERED)),
         ("MISSING", f64::from(MISSING)),
         ("WATER_RED", f64::from(WATER_RED)),
         ("WATER_GREEN", f64::from(WATER_GREEN)),

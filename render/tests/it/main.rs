@@ -14,6 +14,7 @@ mod device;
 mod fill;
 mod flow;
 mod golden;
+mod ground;
 mod hot;
 mod layout;
 mod light_of_parts;

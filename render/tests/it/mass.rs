@@ -44,6 +44,7 @@ fn drawn(view: contract::job::View, scene: &Scene) -> Drawn {
         accumulated: &carbon,
         palette: &plan.palette,
         uncertainty: &[],
+        domain: scene.domain.content(),
     };
     particles::cpu::generate(&params, &inputs, &mut particles);
     let mut splats = vec![Splat::default(); particles.len()];

@@ -14,7 +14,7 @@ macro_rules! words {
 
         impl PartialSchema for $name {
             fn schema() -> RefOr<Schema> {
-                let words = $all.map(|word| json!(word));
+                let words: Vec<_> = $all.iter().map(|word| json!(word)).collect();
                 ObjectBuilder::new()
                     .schema_type(Type::String)
                     .description(Some($doc.trim()))
@@ -36,6 +36,10 @@ words! {
     Mode = contract::job::Mode::ALL;
     /// A list of colours with a name.
     Palette = contract::colour::Palette::ALL;
+    /// Colours of the ground of a globe view.
+    BaseMap = contract::base_map::BaseMap::ALL;
+    /// What is seen beside the globe.
+    Background = contract::base_map::Background::ALL;
     /// What a legend is written as.
     LegendForm = legend::Form::ALL.map(legend::Form::as_str);
 }

@@ -14,6 +14,7 @@ use utoipa::IntoParams;
 use crate::annotations::AnnotationsQuery;
 use crate::error::ServerError;
 use crate::extract::{UrlPath, UrlQuery, number, time, whole_number};
+use crate::ground::GroundQuery;
 use crate::look::LookQuery;
 use crate::openapi::words;
 use crate::request;
@@ -66,9 +67,6 @@ pub(crate) struct GlobeQuery {
     /// Height of the picture, pixels; 512 unless one is given.
     #[param(value_type = Option<u32>, minimum = 1, maximum = 4096)]
     height: Option<String>,
-    /// The ground is drawn below the particles; yes unless told otherwise.
-    #[param(value_type = Option<bool>)]
-    surface: Option<String>,
     /// Version, as answers name it; the newest unless one is given.
     manifest: Option<String>,
     #[serde(flatten)]
@@ -77,6 +75,9 @@ pub(crate) struct GlobeQuery {
     #[serde(flatten)]
     #[param(ignore)]
     surroundings: SurroundingsQuery,
+    #[serde(flatten)]
+    #[param(ignore)]
+    ground: GroundQuery,
     #[serde(flatten)]
     #[param(ignore)]
     annotations: AnnotationsQuery,
@@ -94,6 +95,7 @@ pub(crate) struct GlobeQuery {
         GlobeQuery,
         LookQuery,
         SurroundingsQuery,
+        GroundQuery,
         AnnotationsQuery,
     ),
     responses(
@@ -121,11 +123,7 @@ pub(crate) async fn get(
     let view = query.view()?;
     let time = time(query.time.as_deref())?;
     let mut options = query.surroundings.around(&query.look.parse()?.options())?;
-    options.globe_surface = match query.surface.as_deref() {
-        None | Some("true") => true,
-        Some("false") => false,
-        Some(text) => return Err(ServerError::invalid("surface", text, "true or false")),
-    };
+    options = query.ground.below(&options)?;
     options.annotations = query.annotations.wishes()?;
     let request = PictureRequest {
         mode,

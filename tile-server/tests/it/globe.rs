@@ -1,10 +1,13 @@
 //! `/globe/{product}/{mode}.png`.
 
 use axum::http::StatusCode;
+use contract::base_map::{Background, BaseMap};
 use contract::camera::CameraAngles;
 use contract::grid::LonLatDeg;
-use contract::job::View;
+use contract::job::{Mode, View};
 use contract::look_at::LookAt;
+use contract::picture::PictureOptions;
+use contract::quantity::Quantity;
 
 use crate::app::TestApp;
 
@@ -50,6 +53,58 @@ async fn particles_can_be_drawn_without_a_globe_behind_them() {
     let app = TestApp::new().await;
     app.get("/globe/flux/volume.png?surface=false").await;
     assert!(!app.drawer.last_job().style.globe_surface);
+}
+
+#[tokio::test]
+async fn a_globe_has_its_map_unless_told_otherwise_and_a_tile_has_none() {
+    let app = TestApp::new().await;
+    let context = async |path: &str| {
+        let answer = app.get(path).await;
+        assert_eq!(answer.status, StatusCode::OK, "{path}: {}", answer.text());
+        app.drawer.last_job().style.context
+    };
+    // What the command line asks for is the same function of the same words.
+    let usual = PictureOptions {
+        globe_surface: true,
+        ..PictureOptions::default()
+    };
+    let time = "2000-02-03".parse().unwrap();
+    let usual = usual.style(Quantity::CarbonFlux, Mode::Volume, time);
+    let globe = context("/globe/flux/volume.png").await;
+    assert_eq!(globe, usual.unwrap().context);
+    assert!(globe.coastlines && globe.borders && globe.sea_floor);
+    assert!(context("/tiles/flux/volume/0/0/0.png").await.is_empty());
+    assert!(
+        context("/globe/flux/volume.png?surface=false")
+            .await
+            .is_empty()
+    );
+    let bare = "/globe/flux/volume.png?coastlines=false&borders=true&sea_floor=false";
+    let bare = context(bare).await;
+    assert!(!bare.coastlines && bare.borders && !bare.sea_floor);
+    for name in ["base_map", "base-map"] {
+        let light = format!("/globe/flux/volume.png?{name}=light&background=sky");
+        let light = context(&light).await;
+        assert_eq!(
+            (light.base_map, light.background),
+            (BaseMap::Light, Background::Sky)
+        );
+    }
+    for (query, reason) in [
+        ("borders=1", "true or false"),
+        ("sea_floor=", "true or false"),
+        ("base_map=grey", "dark or light"),
+        ("background=stars", "none or sky"),
+        ("background=sky&surface=false", "draw the globe"),
+    ] {
+        let answer = app.get(&format!("/globe/flux/volume.png?{query}")).await;
+        assert_eq!(answer.status, StatusCode::BAD_REQUEST, "{query}");
+        assert!(
+            answer.reason().contains(reason),
+            "{query}: {}",
+            answer.reason()
+        );
+    }
 }
 
 #[tokio::test]

@@ -1,4 +1,5 @@
-//! Error against the number of slices as a picture: decibels on the left, mean FLIP on the right, a line a scene, SVG.
+//! Error against the number of slices as a picture: decibels on the left, mean FLIP on the right, both over what is drawn, a
+//! line a scene, SVG.
 
 use anyhow::{Result, anyhow};
 use plotters::coord::Shift;
@@ -45,11 +46,11 @@ fn draw(scenes: &[Measured], text: &mut String) -> Result<(), Box<dyn std::error
     let area = SVGBackend::with_string(text, SIZE).into_drawing_area();
     area.fill(&WHITE)?;
     let (left, right) = area.split_horizontally(SIZE.0 / 2);
-    let lines = |value: fn(&render_proof::Difference) -> Option<f64>| {
+    let lines = |value: fn(&render_proof::Covered) -> Option<f64>| {
         let line = |scene: &Measured| {
             let points = scene.rows.iter();
             points
-                .filter_map(|row| Some((f64::from(row.slices), value(&row.difference)?)))
+                .filter_map(|row| Some((f64::from(row.slices), value(&row.difference.covered?)?)))
                 .collect()
         };
         scenes
@@ -60,7 +61,7 @@ fn draw(scenes: &[Measured], text: &mut String) -> Result<(), Box<dyn std::error
     panel(
         &left,
         &Panel {
-            title: "PSNR against the reference, dB",
+            title: "PSNR of what is drawn, dB",
             wanted: WANTED_DB,
             lines: lines(|d| d.psnr_db),
         },
@@ -69,7 +70,7 @@ fn draw(scenes: &[Measured], text: &mut String) -> Result<(), Box<dyn std::error
     panel(
         &right,
         &Panel {
-            title: "mean FLIP",
+            title: "mean FLIP of what is drawn",
             wanted: WANTED_FLIP,
             lines: lines(|d| Some(d.mean_flip)),
         },
@@ -152,6 +153,11 @@ mod tests {
                 mean_flip: 1.0 / f64::from(slices),
                 most_levels: 3.0,
                 within_one_level_percent: 90.0,
+                covered: Some(render_proof::Covered {
+                    percent: 80.0,
+                    psnr_db: Some(f64::from(slices).log2() * 5.0),
+                    mean_flip: 2.0 / f64::from(slices),
+                }),
             },
         };
         let scene = |name: &str| Measured {

@@ -22,6 +22,7 @@ pub const SOURCE: &str = concat!(
     include_str!("../../stages/interpolate/between.wgsl"),
     include_str!("../../stages/particles/particles.wgsl"),
     include_str!("../../stages/uncertainty.wgsl"),
+    include_str!("../../stages/coverage.wgsl"),
     include_str!("../../stages/project/project.wgsl"),
     include_str!("../../stages/light/texel.wgsl"),
     include_str!("../../stages/light/deposit.wgsl"),
@@ -81,6 +82,7 @@ impl Splats {
             (7, carbon_after),
             (12, uncertainty_before),
             (13, uncertainty_after),
+            (14, &scene.domain),
         ]);
         let groups = workgroups(&frame.params);
         frame.recorder.dispatch_deep(&self.splat, &buffers, groups);

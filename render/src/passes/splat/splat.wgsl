@@ -8,6 +8,8 @@
 // Bound but never read where uncertainty is not drawn.
 @group(0) @binding(12) var<storage, read> uncertainty_before: array<f32>;
 @group(0) @binding(13) var<storage, read> uncertainty_after: array<f32>;
+// Bound but never read where every cell with data is covered all over.
+@group(0) @binding(14) var<storage, read> domain: array<u32>;
 
 // Carbon of a cell, counted from the first held; what is missing has accumulated nothing.
 fn carbon_of(cell: u32) -> f32 {
@@ -28,12 +30,14 @@ fn splat(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) w
     var value = MISSING;
     var carbon = 0.0;
     var uncertainty = 0.0;
+    var share = 1.0;
     if (down < cells.row_count && slot < cells.slot_count) {
         let cell = row * grid.cols + cols[slot].index - grid.held_first_cell;
         value = interpolated(value_before[cell], value_after[cell], values.weight);
         if (!is_missing(value)) {
             carbon = carbon_of(cell);
             uncertainty = uncertainty_of(cell);
+            share = share_of(cell);
             if (!is_in_cap(row, slot)) { value = MISSING; }
         }
     }
@@ -44,7 +48,7 @@ fn splat(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) w
         if (is_missing(value) || k >= cells.particles_per_cell) {
             store_nothing(at);
         } else {
-            var particle = particle_of(row, slot, k, value, carbon);
+            var particle = covering(particle_of(row, slot, k, value, carbon), share);
             if (uncertainty > 0.0) { particle = uncertain(particle, uncertainty); }
             store(at, splat_of(particle));
         }

@@ -4,16 +4,20 @@ use std::f32::consts::TAU;
 
 use glam::{Vec2, Vec3, Vec4};
 
-use super::cpu::{AIR, SEA, bytes_of, hazy, plain, sunlight};
+use super::cpu::bytes_of;
+use super::globe::{WATER, beside, daylight, hazy, mix, plain, rim, sunlight};
 use super::terrain::{Ground, ground_at, tint};
-use crate::stages::layout::{Axis, GroundAxis, VIEW_TILE, WATER_BLUE, WATER_GREEN, WATER_RED};
+use crate::coast::sea_floor;
+use crate::plan::Plan;
+use crate::scene::{Scene, Terrain};
+use crate::stages::colour::linear_of;
+use crate::stages::layout::{Axis, GroundAxis, VIEW_GLOBE, VIEW_TILE};
 use crate::stages::params::Params;
 use crate::stages::project::cpu::smoothstep;
-use crate::stages::sphere::ground_below;
+use crate::stages::sphere::{self, ground_below};
 
 /// Light on a thematic map where it is night.
-const NIGHT: f32 = 0.4;
-const WATER: Vec3 = Vec3::new(WATER_RED, WATER_GREEN, WATER_BLUE);
+const NIGHT: f32 = 0.14;
 
 /// What lies around the particles.
 pub struct Surroundings<'a> {
@@ -22,8 +26,26 @@ pub struct Surroundings<'a> {
     pub terrain: &'a [f32],
     /// Columns, then rows of a tile.
     pub ground_axes: &'a [GroundAxis],
-    /// Words of the coast mask of the whole picture.
+    /// Words of the mask of the whole picture.
     pub coast: &'a [u32],
+}
+
+impl<'a> Surroundings<'a> {
+    /// Those of a planned picture.
+    pub fn of(plan: &'a Plan, scene: &'a Scene) -> Self {
+        let landed = scene.terrain.as_ref().map(Terrain::heights_m);
+        let terrain = if plan.params.context.sea_floor_on == 1 {
+            &sea_floor::HEIGHTS_M
+        } else {
+            landed.unwrap_or_default()
+        };
+        Self {
+            domain: scene.domain.content(),
+            terrain,
+            ground_axes: &plan.ground_axes,
+            coast: &plan.coast,
+        }
+    }
 }
 
 /// What a pixel shows of the earth: its place in the terrain, and the sun from there in east, north and up.
@@ -34,10 +56,8 @@ struct Spot {
     y: Axis,
     cos_lat: f32,
     sun: Vec3,
-    lon_rad: f32,
-    lat_rad: f32,
-    normal: Vec3,
     cover: f32,
+    ground: sphere::Ground,
 }
 
 fn axis_at(place: f32) -> Axis {
@@ -89,6 +109,7 @@ fn spot_on_globe(params: &Params, pixel: [u32; 2]) -> Spot {
     if !ground.on_ground {
         return Spot {
             cover,
+            ground,
             ..Spot::default()
         };
     }
@@ -108,15 +129,9 @@ fn spot_on_globe(params: &Params, pixel: [u32; 2]) -> Spot {
             equatorial / cos_lat.max(1.0e-6),
             Vec2::new(ground.normal.z, cos_lat),
         ),
-        lon_rad: ground.lon_rad,
-        lat_rad: ground.lat_rad,
-        normal: ground.normal,
         cover,
+        ground,
     }
-}
-
-fn mix(a: Vec3, b: Vec3, t: f32) -> Vec3 {
-    a * (1.0 - t) + b * t
 }
 
 /// Terrain in the light of the sun, what lies below the sea through its water.
@@ -125,7 +140,7 @@ fn lit_terrain(params: &Params, ground: &Ground, sun: Vec3) -> Vec3 {
     let facing = facing / facing.length();
     // Slopes that still look at a sun below the horizon lie in the shadow of the earth.
     let day = (sun.z * 10.0 + 0.5).clamp(0.0, 1.0);
-    let floor_color = tint(ground.height_m) * sunlight(facing.dot(sun) * day);
+    let floor_color = linear_of(tint(ground.height_m)) * sunlight(facing.dot(sun) * day);
     if ground.height_m >= 0.0 || params.context.seabed_per_m <= 0.0 {
         return floor_color;
     }
@@ -133,14 +148,33 @@ fn lit_terrain(params: &Params, ground: &Ground, sun: Vec3) -> Vec3 {
     mix(WATER * sunlight(sun.z), floor_color, kept)
 }
 
+fn lit_plain(
+    params: &Params,
+    around: &Surroundings<'_>,
+    spot: &Spot,
+    floor: Option<&Ground>,
+    pixel: [u32; 2],
+) -> Vec3 {
+    let [land, lake, ..] = ground_mask(params, around.coast, pixel);
+    let place = [spot.ground.lon_rad, spot.ground.lat_rad];
+    let color = plain(params, around.domain, place, [land, lake], floor, pixel);
+    let color = color * daylight(params, spot.sun.z);
+    let Some(floor) = floor else {
+        return color;
+    };
+    let facing = Vec3::new(-floor.slope.x, -floor.slope.y, 1.0);
+    let facing = facing / facing.length();
+    let day = (spot.sun.z * 10.0 + 0.5).clamp(0.0, 1.0);
+    let slanted = sunlight(facing.dot(spot.sun) * day) / sunlight(spot.sun.z * day);
+    color * (1.0 + params.base_map.shading * (slanted - 1.0))
+}
+
 fn ground_color(params: &Params, around: &Surroundings<'_>, spot: &Spot, pixel: [u32; 2]) -> Vec4 {
-    if params.context.surface == 0 {
+    let context = &params.context;
+    if context.surface == 0 {
         return Vec4::ZERO;
     }
-    if !spot.on_ground {
-        return (AIR * 0.5).extend(1.0) * spot.cover;
-    }
-    let ground = if params.context.terrain_on == 1 {
+    let ground = if spot.on_ground && context.terrain_on + context.sea_floor_on > 0 {
         ground_at(params, around.terrain, spot.x, spot.y, spot.cos_lat)
     } else {
         None
@@ -149,32 +183,58 @@ fn ground_color(params: &Params, around: &Surroundings<'_>, spot: &Spot, pixel: 
         let lit = ground.map(|ground| lit_terrain(params, &ground, spot.sun));
         return lit.map_or(Vec4::ZERO, |lit| lit.extend(1.0));
     }
-    let lit = if let Some(ground) = ground {
-        lit_terrain(params, &ground, spot.sun)
-    } else {
-        let water = if params.context.has_water == 1 {
-            WATER
-        } else {
-            SEA
-        };
-        let place = [spot.lon_rad, spot.lat_rad];
-        plain(params, around.domain, place, water, pixel) * sunlight(spot.sun.z)
+    let mut seen = Vec4::ZERO;
+    if spot.cover < 1.0 {
+        seen = beside(params, &spot.ground) * (1.0 - spot.cover);
+    }
+    if spot.cover <= 0.0 {
+        return seen;
+    }
+    let lit = match &ground {
+        _ if !spot.on_ground => rim(params, &spot.ground),
+        Some(ground) if context.terrain_on == 1 => {
+            hazy(params, lit_terrain(params, ground, spot.sun), &spot.ground)
+        }
+        floor => {
+            let lit = lit_plain(params, around, spot, floor.as_ref(), pixel);
+            hazy(params, lit, &spot.ground)
+        }
     };
-    hazy(params, lit, spot.normal).extend(1.0) * spot.cover
+    seen + lit.extend(1.0) * spot.cover
 }
 
-fn coast_color(params: &Params, coast: &[u32], pixel: [u32; 2]) -> Vec4 {
-    let (view, context) = (&params.view, &params.context);
+/// What lies in a pixel of a globe view: shares of land, lakes, shores and borders.
+fn ground_mask(params: &Params, mask: &[u32], pixel: [u32; 2]) -> [f32; 4] {
+    let [x, y] = in_picture(params, pixel);
+    let word = mask[(y * params.context.coast_row_words + x) as usize];
+    word.to_le_bytes().map(|byte| f32::from(byte) / 255.0)
+}
+
+/// Place of a pixel of the part in the whole picture.
+fn in_picture(params: &Params, pixel: [u32; 2]) -> [u32; 2] {
+    let origin = params.view.origin_px;
+    [pixel[0] + origin.x as u32, pixel[1] + origin.y as u32]
+}
+
+fn coast_color(params: &Params, coast: &[u32], pixel: [u32; 2], covered: f32) -> Vec4 {
+    let context = &params.context;
     if context.coast_on == 0 {
         return Vec4::ZERO;
     }
-    let [x, y] = [
-        pixel[0] + view.origin_px.x as u32,
-        pixel[1] + view.origin_px.y as u32,
-    ];
+    let grey = |grey: f32| Vec3::splat(grey).extend(1.0);
+    if params.view.kind == VIEW_GLOBE {
+        let map = &params.base_map;
+        let [.., shore, border] = ground_mask(params, coast, pixel);
+        let mix = |a: f32, b: f32| a * (1.0 - covered) + b * covered;
+        let shore = shore * mix(context.coast_alpha, map.over_coast_alpha);
+        let border = border * mix(map.border_alpha, map.over_border_alpha);
+        return grey(mix(context.coast_grey, map.over_grey)) * shore
+            + grey(mix(map.border_grey, map.over_grey)) * (border * (1.0 - shore));
+    }
+    let [x, y] = in_picture(params, pixel);
     let word = coast[(y * context.coast_row_words + x / 4) as usize];
     let cover = ((word >> (x % 4 * 8)) & 255) as f32 / 255.0 * context.coast_alpha;
-    Vec3::splat(context.coast_grey).extend(1.0) * cover
+    grey(context.coast_grey) * cover
 }
 
 /// Bytes of every pixel, red lowest, from the blended colours.
@@ -182,12 +242,19 @@ pub fn compose(params: &Params, picture: &[Vec4], around: &Surroundings<'_>, ima
     for y in 0..params.view.size_px.y {
         for x in 0..params.view.size_px.x {
             let at = (y * params.view.size_px.x + x) as usize;
-            image[at] = bytes_of(composed(params, picture[at], around, [x, y]));
+            let (color, is_beside) = composed(params, picture[at], around, [x, y]);
+            image[at] = bytes_of(params, color, [x, y], is_beside);
         }
     }
 }
 
-fn composed(params: &Params, blended: Vec4, around: &Surroundings<'_>, pixel: [u32; 2]) -> Vec4 {
+/// A blended colour in its surroundings, and whether it is seen beside the globe.
+fn composed(
+    params: &Params,
+    blended: Vec4,
+    around: &Surroundings<'_>,
+    pixel: [u32; 2],
+) -> (Vec4, bool) {
     let spot = if params.view.kind == VIEW_TILE {
         spot_on_tile(params, around.ground_axes, pixel)
     } else {
@@ -198,11 +265,16 @@ fn composed(params: &Params, blended: Vec4, around: &Surroundings<'_>, pixel: [u
         let day = smoothstep(-0.15, 0.35, spot.sun.z);
         color = (color.truncate() * (NIGHT * (1.0 - day) + day)).extend(color.w);
     }
-    let line = coast_color(params, around.coast, pixel);
+    let mut covered = params.context.terrain_on as f32;
+    if params.context.coast_above == 1 {
+        covered = covered.max(color.w);
+    }
+    let line = coast_color(params, around.coast, pixel, covered);
     if params.context.coast_above == 1 {
         color = line + color * (1.0 - line.w);
     } else {
         color += line * (1.0 - color.w);
     }
-    color + ground_color(params, around, &spot, pixel) * (1.0 - color.w)
+    color += ground_color(params, around, &spot, pixel) * (1.0 - color.w);
+    (color, spot.cover < 1.0)
 }

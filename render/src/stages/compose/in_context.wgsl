@@ -1,7 +1,7 @@
-// A blended colour in its surroundings: coast lines, the terrain through the sea, the night. Bindings are beyond
+// A blended colour in its surroundings: the plain globe, coast lines, the terrain through the sea, the night. Bindings are beyond
 // those of the stages that compose.
 struct ContextParams {
-    land_size: vec2<u32>, land_per_rad: f32, surface: u32, has_water: u32, night_on: u32, terrain_on: u32, terrain_slope: f32, seabed_per_m: f32, coast_on: u32,
+    surface: u32, has_water: u32, night_on: u32, terrain_on: u32, sea_floor_on: u32, terrain_slope: f32, seabed_per_m: f32, coast_on: u32,
     coast_above: u32, coast_grey: f32, coast_alpha: f32, coast_row_words: u32,
 }
 @group(0) @binding(27) var<uniform> context: ContextParams;
@@ -10,11 +10,11 @@ struct ContextParams {
 @group(0) @binding(7) var<storage, read> coast: array<u32>;
 
 // Light on a thematic map where it is night.
-const NIGHT = 0.4;
+const NIGHT = 0.14;
 
 // What a pixel shows of the earth: its place in the terrain, and the sun from there in east, north and up.
 struct Spot {
-    on_ground: bool, x: Axis, y: Axis, cos_lat: f32, sun: vec3<f32>, lon: f32, lat: f32, normal: vec3<f32>, cover: f32,
+    on_ground: bool, x: Axis, y: Axis, cos_lat: f32, sun: vec3<f32>, cover: f32, ground: Ground,
 }
 
 fn axis_at(place: f32) -> Axis {
@@ -47,10 +47,8 @@ fn spot_on_globe(pixel: vec2<u32>) -> Spot {
     var spot: Spot;
     spot.cover = clamp(ground.rim_px + 0.5, 0.0, 1.0);
     spot.on_ground = ground.on_ground;
+    spot.ground = ground;
     if (!ground.on_ground) { return spot; }
-    spot.lon = ground.lon;
-    spot.lat = ground.lat;
-    spot.normal = ground.normal;
     spot.cos_lat = length(ground.normal.xy);
     let east = ground.lon - terrain_grid.west_rad;
     spot.x = axis_at((east - floor(east / TURN) * TURN) * terrain_grid.cols_per_rad - 0.5);
@@ -64,53 +62,87 @@ fn lit_terrain(ground: Terrain, sun: vec3<f32>) -> vec3<f32> {
     let facing = normalize(vec3(-ground.slope, 1.0));
     // Slopes that still look at a sun below the horizon lie in the shadow of the earth.
     let day = clamp(sun.z * 10.0 + 0.5, 0.0, 1.0);
-    let floor_color = tint(ground.height_m) * sunlight(dot(facing, sun) * day);
+    let floor_color = linear_of(tint(ground.height_m)) * sunlight(dot(facing, sun) * day);
     if (ground.height_m >= 0.0 || context.seabed_per_m <= 0.0) { return floor_color; }
     let water = vec3(WATER_RED, WATER_GREEN, WATER_BLUE) * sunlight(sun.z);
     return mix(water, floor_color, exp(context.seabed_per_m * ground.height_m));
 }
 
+// The plain globe in the light of the sun; a coarse relief is a part lighter or darker where it slopes.
+fn lit_plain(spot: Spot, floor: Terrain, pixel: vec2<u32>) -> vec3<f32> {
+    let shares = ground_mask(pixel).xy;
+    let color = plain(spot.ground.lon, spot.ground.lat, shares, floor, pixel) * daylight(spot.sun.z);
+    if (!floor.is_known) { return color; }
+    let facing = normalize(vec3(-floor.slope, 1.0));
+    let day = clamp(spot.sun.z * 10.0 + 0.5, 0.0, 1.0);
+    let slanted = sunlight(dot(facing, spot.sun) * day) / sunlight(spot.sun.z * day);
+    return color * (1.0 + base_map.shading * (slanted - 1.0));
+}
+
 fn ground_color(spot: Spot, pixel: vec2<u32>) -> vec4<f32> {
     if (context.surface == 0u) { return vec4(0.0); }
-    if (!spot.on_ground) { return vec4(AIR * 0.5, 1.0) * spot.cover; }
     var ground: Terrain;
-    if (context.terrain_on == 1u) { ground = terrain_at(spot.x, spot.y, spot.cos_lat); }
+    if (spot.on_ground && context.terrain_on + context.sea_floor_on > 0u) {
+        ground = terrain_at(spot.x, spot.y, spot.cos_lat);
+    }
     if (view.kind == VIEW_TILE) {
         if (!ground.is_known) { return vec4(0.0); }
         return vec4(lit_terrain(ground, spot.sun), 1.0);
     }
+    var seen = vec4(0.0);
+    if (spot.cover < 1.0) { seen = beside(spot.ground) * (1.0 - spot.cover); }
+    if (spot.cover <= 0.0) { return seen; }
     var lit: vec3<f32>;
-    if (ground.is_known) {
-        lit = lit_terrain(ground, spot.sun);
+    if (!spot.on_ground) {
+        lit = rim(spot.ground);
+    } else if (ground.is_known && context.terrain_on == 1u) {
+        lit = hazy(lit_terrain(ground, spot.sun), spot.ground);
     } else {
-        var water = SEA;
-        if (context.has_water == 1u) { water = vec3(WATER_RED, WATER_GREEN, WATER_BLUE); }
-        lit = plain(spot.lon, spot.lat, water, pixel) * sunlight(spot.sun.z);
+        lit = hazy(lit_plain(spot, ground, pixel), spot.ground);
     }
-    return vec4(hazy(lit, spot.normal), 1.0) * spot.cover;
+    return seen + vec4(lit, 1.0) * spot.cover;
 }
 
-fn coast_color(pixel: vec2<u32>) -> vec4<f32> {
+// What lies in a pixel of a globe view: shares of land, lakes, shores and borders.
+fn ground_mask(pixel: vec2<u32>) -> vec4<f32> {
+    let place = pixel + vec2<u32>(view.origin_px);
+    let word = coast[place.y * context.coast_row_words + place.x];
+    return vec4(f32(word & 255u), f32((word >> 8u) & 255u), f32((word >> 16u) & 255u), f32(word >> 24u)) / 255.0;
+}
+
+// Coast lines, below them borders; `covered` is how much of what lies below has colours of its own.
+fn coast_color(pixel: vec2<u32>, covered: f32) -> vec4<f32> {
     if (context.coast_on == 0u) { return vec4(0.0); }
+    if (view.kind == VIEW_GLOBE) {
+        let mask = ground_mask(pixel);
+        let shore = mask.z * mix(context.coast_alpha, base_map.over_coast_alpha, covered);
+        let border = mask.w * mix(base_map.border_alpha, base_map.over_border_alpha, covered);
+        let greys = mix(vec2(context.coast_grey, base_map.border_grey), vec2(base_map.over_grey), covered);
+        return vec4(vec3(greys.x), 1.0) * shore + vec4(vec3(greys.y), 1.0) * (border * (1.0 - shore));
+    }
     let place = pixel + vec2<u32>(view.origin_px);
     let word = coast[place.y * context.coast_row_words + place.x / 4u];
     let cover = f32((word >> (place.x % 4u * 8u)) & 255u) / 255.0 * context.coast_alpha;
     return vec4(vec3(context.coast_grey), 1.0) * cover;
 }
 
-fn in_context(pixel: vec2<u32>, blended: vec4<f32>) -> vec4<f32> {
+struct InContext { color: vec4<f32>, is_beside: bool }
+
+fn in_context(pixel: vec2<u32>, blended: vec4<f32>) -> InContext {
     var spot: Spot;
     if (view.kind == VIEW_TILE) { spot = spot_on_tile(pixel); } else { spot = spot_on_globe(pixel); }
     var color = blended;
     if (context.night_on == 1u) {
         color = vec4(color.xyz * mix(NIGHT, 1.0, smoothstep(-0.15, 0.35, spot.sun.z)), color.w);
     }
-    let line = coast_color(pixel);
+    var covered = f32(context.terrain_on);
+    if (context.coast_above == 1u) { covered = max(covered, color.w); }
+    let line = coast_color(pixel, covered);
     if (context.coast_above == 1u) {
         color = line + color * (1.0 - line.w);
     } else {
         color += line * (1.0 - color.w);
     }
     color += ground_color(spot, pixel) * (1.0 - color.w);
-    return color;
+    return InContext(color, spot.cover < 1.0);
 }

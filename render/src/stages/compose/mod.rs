@@ -1,7 +1,9 @@
-//! Composition: blended colours in, straight-alpha bytes over the plain globe, where one is wanted, out; or in their
-//! surroundings: coast lines, terrain, sea and night.
+//! Composition: blended colours in, straight-alpha bytes out, alone or in their surroundings: the plain globe, coast
+//! lines, terrain, sea, air and night.
 
+pub mod base_map;
 pub mod cpu;
+pub mod globe;
 pub mod in_context;
 pub mod params;
 pub mod terrain;
@@ -13,10 +15,7 @@ use crate::frame_context::{FrameContext, SceneBuffers};
 use crate::gpu::{Gpu, Kernel, Slot};
 use crate::stages::layout::GroundAxis;
 use crate::stages::params::Uniform;
-use crate::stages::params::Uniform::{Context, Grid, TerrainGrid, View};
-
-/// Where the share of land is bound.
-pub(crate) const LAND_BINDING: u32 = 11;
+use crate::stages::params::Uniform::{BaseMap, Context, Grid, TerrainGrid, View};
 
 /// The function that the eye runs for its own pixels.
 pub const FUNCTIONS: &str = concat!(
@@ -39,7 +38,7 @@ pub const SOURCE: &str = concat!(
 );
 
 /// What [`FUNCTIONS`] read.
-pub(crate) const READS: [Uniform; 4] = [View, Grid, Context, TerrainGrid];
+pub(crate) const READS: [Uniform; 5] = [View, Grid, Context, TerrainGrid, BaseMap];
 
 /// The constant of pictures in their surroundings.
 pub(crate) fn in_context(is_wanted: bool) -> (&'static str, f64) {
@@ -69,7 +68,6 @@ impl Compose {
         let picture = frame.room(Slot::Picture, 16)?;
         let image = frame.room(Slot::Image, frame.pixel_count() * 4)?;
         let [terrain, axes, coast] = surroundings(frame)?;
-        let land = frame.land()?;
         let kernel = if frame.params.in_context {
             let compiled = || compiled(frame.gpu, &self.source, true);
             self.in_context.get_or_init(compiled)
@@ -83,7 +81,6 @@ impl Compose {
             (5, &terrain),
             (6, &axes),
             (7, &coast),
-            (LAND_BINDING, &land),
         ];
         let groups = frame.params.view.tiles.to_array();
         frame.recorder.dispatch(kernel, &buffers, groups);
@@ -97,7 +94,7 @@ fn compiled(gpu: &Gpu, source: &str, is_in_context: bool) -> Kernel {
         .reading(&READS)
 }
 
-/// What the functions for surroundings read: terrain, ground axes and coast mask, in the order of their bindings from 5 on.
+/// What the functions for surroundings read: terrain, ground axes and mask, in the order of their bindings from 5 on.
 pub(crate) fn surroundings(frame: &mut FrameContext<'_>) -> Result<[wgpu::Buffer; 3], RenderError> {
     let plan = frame.plan;
     // Buffers of what is not drawn are bound but never read.
@@ -109,11 +106,15 @@ pub(crate) fn surroundings(frame: &mut FrameContext<'_>) -> Result<[wgpu::Buffer
     let coast = if plan.coast.is_empty() {
         frame.room(Slot::Coast, 4)?
     } else {
-        frame.upload_of_plan(Slot::Coast, &plan.coast)?
+        frame.upload_of_plan(Slot::Coast, &plan.coast[..])?
     };
-    let SceneBuffers {
-        terrain, domain, ..
-    } = &frame.scene;
-    let terrain = terrain.as_ref().unwrap_or(domain).clone();
+    let terrain = if frame.params.context.sea_floor_on == 1 {
+        frame.sea_floor()?
+    } else {
+        let SceneBuffers {
+            terrain, domain, ..
+        } = &frame.scene;
+        terrain.as_ref().unwrap_or(domain).clone()
+    };
     Ok([terrain, axes, coast])
 }

@@ -1,13 +1,8 @@
 //! What composition reads: mirrored in `in_context.wgsl`.
 
-use glam::UVec2;
-
 shared_struct! {
     /// What surrounds the particles.
     pub struct ContextParams {
-        /// Columns and rows of the grid that says how much of a place is land.
-        pub land_size: UVec2,
-        pub land_per_rad: f32,
         /// 1: the globe, or the terrain of a tile, is seen.
         pub surface: u32,
         /// 1: the sea has a colour of its own, into which what lies in it fades.
@@ -15,6 +10,8 @@ shared_struct! {
         /// 1: thematic maps are dimmed where it is night.
         pub night_on: u32,
         pub terrain_on: u32,
+        /// 1: the terrain is the coarse relief of the program, which shades the plain globe.
+        pub sea_floor_on: u32,
         /// Exaggeration over eight earth radii, m⁻¹: from sums of differences for each radian to slopes.
         pub terrain_slope: f32,
         /// Extinction of the sea for each metre below its level that the sea floor lies at.
@@ -24,7 +21,7 @@ shared_struct! {
         pub coast_above: u32,
         pub coast_grey: f32,
         pub coast_alpha: f32,
-        /// Words of the coast mask in a row of the whole picture.
+        /// Words of the mask in a row of the whole picture.
         pub coast_row_words: u32,
     }
 }

@@ -11,7 +11,7 @@ fn near_of(entry: Entry, column: f32) -> Near {
     let radius_px = f32(entry.size & 0xffffu) / pixel_units;
     let place = vec2(f32(i32(entry.place << 16u) >> 16u), f32(i32(entry.place) >> 16u)) / pixel_units;
     let inverse_radius = 1.0 / radius_px;
-    let rgb = vec3(entry.color & 255u, (entry.color >> 8u) & 255u, (entry.color >> 16u) & 255u);
+    let rgb = light_of(entry.color);
     return Near(radius_px, inverse_radius, place.y, (column - place.x) * inverse_radius, f32(entry.size >> 16u), rgb);
 }
 
@@ -21,7 +21,7 @@ fn given(near: Near, row: f32) -> vec4<u32> {
     let amount = u32(near.depth * weight_at(near.east * near.east + south * south, near.radius_px) + 0.5);
     var rgb = near.rgb;
     if (KERNEL == KERNEL_BALL) { rgb = vec3<u32>(vec3<f32>(rgb) * ball_light(vec2(near.east, south)) + 0.5); }
-    return vec4(rgb * amount, amount);
+    return vec4(sixteenth(rgb * amount), amount);
 }
 
 fn more(sums: vec4<u32>, given: vec4<u32>) -> vec4<u32> {

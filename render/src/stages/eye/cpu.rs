@@ -8,6 +8,8 @@ use crate::stages::params::Params;
 const MOST_SUM: u32 = 0x7fff_ffff;
 /// Where this much is covered, what lies behind is left out: it would change a byte by a fifteenth at most.
 const OPAQUE: f32 = 1.0 - 1.0 / 4096.0;
+/// Light 1 of a channel in the whole numbers that [`light_of`] gives: 255 squared over 16.
+const LIGHT_ONE: f32 = 4064.0625;
 const TILE: usize = SCREEN_TILE_PX as usize;
 
 /// Sums of red, green, blue and optical depth of every pixel of a screen tile.
@@ -22,12 +24,17 @@ pub fn weight_at(kernel: u32, q: f32, radius_px: f32) -> f32 {
     ((1.0 - q.sqrt()) * radius_px).clamp(0.0, 1.0)
 }
 
-fn ball_light(offset: Vec2) -> f32 {
-    let toward = (1.0 - offset.dot(offset)).max(0.0).sqrt();
-    0.55 + 0.45 * (-0.45 * offset.x - 0.55 * offset.y + 0.70 * toward).clamp(0.0, 1.0)
+/// Linear light of a channel's code in 12 bits.
+fn light_of(code: u32) -> u32 {
+    (code * code + 8) >> 4
 }
 
-/// Colour with alpha, premultiplied, once the slice with these sums is blended into it.
+fn ball_light(offset: Vec2) -> f32 {
+    let toward = (1.0 - offset.dot(offset)).max(0.0).sqrt();
+    0.4 + 0.6 * (-0.45 * offset.x - 0.55 * offset.y + 0.70 * toward).clamp(0.0, 1.0)
+}
+
+/// Linear light with alpha, premultiplied, once the slice with these sums is blended into it.
 pub fn blended(params: &Params, picture: Vec4, sums: [u32; 4]) -> Vec4 {
     let front_to_back = params.view.front_to_back == 1;
     if sums[3] == 0 || (front_to_back && picture.w > OPAQUE) {
@@ -39,8 +46,8 @@ pub fn blended(params: &Params, picture: Vec4, sums: [u32; 4]) -> Vec4 {
         sums[0] as f32,
         sums[1] as f32,
         sums[2] as f32,
-        depth * 255.0,
-    ) / (depth * 255.0);
+        depth * (LIGHT_ONE / 16.0),
+    ) / (depth * (LIGHT_ONE / 16.0));
     let slice = rgb * alpha;
     if front_to_back {
         picture + slice * (1.0 - picture.w)
@@ -92,7 +99,7 @@ fn add(params: &Params, entry: &Entry, sums: &mut Sums) {
     let radius = (entry.size & 0xffff) as f32;
     let inverse_radius = 1.0 / radius;
     let depth = (entry.size >> 16) as f32;
-    let rgb = [0, 8, 16].map(|shift| (entry.color >> shift) & 255);
+    let rgb = [0, 8, 16].map(|shift| light_of((entry.color >> shift) & 255));
     let [east, south] =
         [(entry.place << 16) as i32 >> 16, entry.place as i32 >> 16].map(|place| place as f32);
     // A pixel more on either side: what lies outside the radius adds nothing.
@@ -115,7 +122,7 @@ fn add(params: &Params, entry: &Entry, sums: &mut Sums) {
                 } else {
                     plain
                 };
-                sum[channel] = (sum[channel] + lit * amount).min(MOST_SUM);
+                sum[channel] = (sum[channel] + ((lit * amount + 8) >> 4)).min(MOST_SUM);
             }
             sum[3] = (sum[3] + amount).min(MOST_SUM);
         }

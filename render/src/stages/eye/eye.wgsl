@@ -37,10 +37,24 @@ fn weight_at(q: f32, radius_px: f32) -> f32 {
     return clamp((1.0 - sqrt(q)) * radius_px, 0.0, 1.0);
 }
 
+// Light 1 of a channel in the whole numbers that `light_of` gives: 255 squared over 16.
+const LIGHT_ONE = 4064.0625;
+
+// Linear light of a colour in 12 bits.
+fn light_of(color: u32) -> vec3<u32> {
+    let codes = vec3(color & 255u, (color >> 8u) & 255u, (color >> 16u) & 255u);
+    return (codes * codes + 8u) >> vec3(4u);
+}
+
+// What light in 12 bits adds with a depth to sums of 24.
+fn sixteenth(product: vec3<u32>) -> vec3<u32> {
+    return (product + 8u) >> vec3(4u);
+}
+
 // Light on a ball seen from the front, lit from the upper left.
 fn ball_light(offset: vec2<f32>) -> f32 {
     let toward = sqrt(max(1.0 - dot(offset, offset), 0.0));
-    return 0.55 + 0.45 * clamp(-0.45 * offset.x - 0.55 * offset.y + 0.70 * toward, 0.0, 1.0);
+    return 0.4 + 0.6 * clamp(-0.45 * offset.x - 0.55 * offset.y + 0.70 * toward, 0.0, 1.0);
 }
 
 // Adds an entry to every second row of pixels.
@@ -49,7 +63,7 @@ fn add(entry: Entry, half: i32) {
     let radius_px = f32(entry.size & 0xffffu) / pixel_units;
     let place = vec2(f32(i32(entry.place << 16u) >> 16u), f32(i32(entry.place) >> 16u)) / pixel_units;
     let depth = f32(entry.size >> 16u);
-    let rgb = vec3(entry.color & 255u, (entry.color >> 8u) & 255u, (entry.color >> 16u) & 255u);
+    let rgb = light_of(entry.color);
     // Pixels with their centre within the radius.
     let low = max(vec2<i32>(ceil(place - radius_px - 0.5)), vec2(0));
     let high = min(vec2<i32>(floor(place + radius_px - 0.5)), vec2(i32(SCREEN_TILE_PX) - 1));
@@ -63,9 +77,10 @@ fn add(entry: Entry, half: i32) {
             var own = rgb;
             if (KERNEL == KERNEL_BALL) { own = vec3<u32>(vec3<f32>(rgb) * ball_light(vec2(east, south)) + 0.5); }
             let pixel = u32(y) * SCREEN_TILE_PX + u32(x);
-            atomicAdd(&sums[pixel], own.x * amount);
-            atomicAdd(&sums[PIXELS + pixel], own.y * amount);
-            atomicAdd(&sums[2u * PIXELS + pixel], own.z * amount);
+            let given = sixteenth(own * amount);
+            atomicAdd(&sums[pixel], given.x);
+            atomicAdd(&sums[PIXELS + pixel], given.y);
+            atomicAdd(&sums[2u * PIXELS + pixel], given.z);
             atomicAdd(&sums[3u * PIXELS + pixel], amount);
         }
     }
@@ -101,11 +116,11 @@ fn is_covered(picture: vec4<f32>) -> bool {
     return view.front_to_back == 1u && picture.w > OPAQUE;
 }
 
-// Colour with alpha, premultiplied, once the slice with these sums is blended into it.
+// Linear light with alpha, premultiplied, once the slice with these sums is blended into it.
 fn blended(picture: vec4<f32>, sums: vec4<u32>) -> vec4<f32> {
     if (sums.w == 0u || is_covered(picture)) { return picture; }
     let alpha = 1.0 - exp(-f32(sums.w) / lists.depth_one);
-    let slice = vec4(vec3<f32>(sums.xyz) / (f32(sums.w) * 255.0), 1.0) * alpha;
+    let slice = vec4(vec3<f32>(sums.xyz) / (f32(sums.w) * (LIGHT_ONE / 16.0)), 1.0) * alpha;
     if (view.front_to_back == 1u) { return picture + slice * (1.0 - picture.w); }
     return picture * (1.0 - alpha) + slice;
 }

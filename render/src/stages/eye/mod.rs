@@ -96,7 +96,6 @@ impl Eye {
             (4, image),
         ];
         buffers.extend((5..).zip(compose::surroundings(frame)?));
-        buffers.push((compose::LAND_BINDING, frame.land()?));
         if has_parts {
             self.sum_up(frame)?;
         }
@@ -121,9 +120,9 @@ impl Eye {
                 compose::in_context(in_context),
                 ("HAS_PARTS", f64::from(u8::from(has_parts))),
             ];
-            let [view, grid, context, terrain] = compose::READS;
+            let reads: Vec<_> = compose::READS.into_iter().chain([Lists]).collect();
             gpu.variant("eye", &self.source, self.entry, &constants)
-                .reading(&[view, grid, context, terrain, Lists])
+                .reading(&reads)
         })
     }
 

@@ -1,5 +1,6 @@
 //! CPU twin of `deposit.wgsl`, `light.wgsl` and `shade.wgsl`.
 
+use crate::stages::colour::{codes_of, with_codes};
 use crate::stages::layout::{LOOK, Splat, nearest};
 use crate::stages::params::Params;
 
@@ -33,7 +34,7 @@ fn address(params: &Params, texel: [i32; 2], slice: u32) -> Option<usize> {
 
 /// Adds every splat's depth to the four nearest texels of the two slices whose middles it lies between.
 pub fn deposit(params: &Params, splats: &[Splat], light: &mut [u32]) {
-    for splat in splats.iter().filter(|splat| splat.tau > 0.0) {
+    for splat in splats.iter().filter(|splat| splat.light_depth > 0.0) {
         let texel = texel_of(params, [splat.light_u, splat.light_v]);
         let middle = (splat.slice - 0.5).floor();
         let behind = splat.light_depth * (splat.slice - 0.5 - middle);
@@ -97,10 +98,7 @@ fn depth_above(params: &Params, light: &[u32], texel: [i32; 2], middle: i32, par
 }
 
 fn dimmed(color: u32, shade: f32) -> u32 {
-    let channel = |shift: u32| {
-        (nearest((((color >> shift) & 255) as f32 * shade).min(255.0)) as u32) << shift
-    };
-    channel(0) | channel(8) | channel(16) | (color & 0xff00_0000)
+    with_codes(color, codes_of(color) * shade.sqrt())
 }
 
 fn mix(a: f32, b: f32, t: f32) -> f32 {
@@ -147,6 +145,7 @@ fn lit(params: &Params, light: &[u32], splat: &Splat) -> f32 {
 pub fn shade(params: &Params, light: &[u32], splats: &mut [Splat]) {
     for splat in splats.iter_mut().filter(|splat| splat.tau > 0.0) {
         let direct = params.lighting.direct * lit(params, light, splat) * splat.day;
-        splat.color = dimmed(splat.color, params.lighting.ambient + direct);
+        let night = mix(params.lighting.night, 1.0, splat.day);
+        splat.color = dimmed(splat.color, (params.lighting.ambient + direct) * night);
     }
 }

@@ -21,5 +21,7 @@ shared_struct! {
         pub direct: f32,
         /// Optical depth 1 in the integers that the light sums up.
         pub depth_one: f32,
+        /// Share of all light that is left at night: 1 where the sun has its place in the picture.
+        pub night: f32,
     }
 }

@@ -10,8 +10,7 @@ fn depth_above(texel: vec2<i32>, middle: i32, part: f32) -> f32 {
 }
 
 fn dimmed(color: u32, shade: f32) -> u32 {
-    let rgb = min(vec3(f32(color & 255u), f32((color >> 8u) & 255u), f32((color >> 16u) & 255u)) * shade, vec3(255.0));
-    return u32(nearest(rgb.x)) | (u32(nearest(rgb.y)) << 8u) | (u32(nearest(rgb.z)) << 16u) | (color & 0xff000000u);
+    return with_codes(color, codes_of(color) * sqrt(shade));
 }
 
 // Optical depth between a place and the sun.
@@ -42,5 +41,5 @@ fn look(place: vec2<i32>, slice: f32, step: f32) -> vec2<f32> {
 fn shaded(color: u32, place: vec2<i32>, slice: f32, day: f32, radius_px: f32) -> u32 {
     let sum = look(place, slice, -LOOK * radius_px) + look(place, slice, LOOK * radius_px);
     let lit = sum.x / max(sum.y, 1.0e-30);
-    return dimmed(color, lighting.ambient + lighting.direct * lit * day);
+    return dimmed(color, (lighting.ambient + lighting.direct * lit * day) * mix(lighting.night, 1.0, day));
 }

@@ -1,7 +1,7 @@
 // Places in the light buffer: one layer of texels for every slice and one for the whole.
 struct LightParams {
     toward: vec3<f32>, toward_pull: f32, size: vec2<u32>, unit: i32, mode: u32, look_power: f32, ambient: f32, direct: f32,
-    depth_one: f32,
+    depth_one: f32, night: f32,
 }
 @group(0) @binding(23) var<uniform> lighting: LightParams;
 

@@ -2,10 +2,12 @@
 
 use std::f32::consts::TAU;
 
-use glam::{Vec2, Vec3, Vec4};
+use glam::{Vec3, Vec4};
 
+use crate::stages::colour::linear_of;
 use crate::stages::layout::{Axis, VIEW_TILE, is_missing, nearest};
 use crate::stages::params::Params;
+use crate::stages::particles::cpu::share_of;
 use crate::stages::sphere::ground_below;
 use crate::stages::uncertainty::hatched;
 
@@ -17,6 +19,8 @@ pub struct Inputs<'a> {
     pub axes: &'a [Axis],
     /// Uncertainty of every cell; empty where it is not drawn.
     pub uncertainty: &'a [f32],
+    /// How much of every cell holds data; not read where no cell is covered in part.
+    pub domain: &'a [u32],
 }
 
 /// Every pixel of a thematic map.
@@ -65,11 +69,15 @@ fn cell_at(params: &Params, row: i32, col: i32) -> Option<usize> {
     Some(row as usize * cols as usize + col as usize)
 }
 
-fn cell_value(params: &Params, value: &[f32], row: i32, col: i32) -> Vec2 {
-    let value = cell_at(params, row, col).map(|cell| value[cell]);
-    match value.filter(|value| !is_missing(*value)) {
-        Some(value) => Vec2::new(value, 1.0),
-        None => Vec2::ZERO,
+/// Value times the share of the cell that holds data, 1, and that share; or zeros where there is no data.
+fn cell_value(params: &Params, inputs: &Inputs<'_>, row: i32, col: i32) -> Vec3 {
+    let cell = cell_at(params, row, col);
+    match cell.filter(|cell| !is_missing(inputs.value[*cell])) {
+        Some(cell) => {
+            let share = share_of(params, inputs.domain, cell);
+            Vec3::new(inputs.value[cell] * share, 1.0, share)
+        }
+        None => Vec3::ZERO,
     }
 }
 
@@ -87,13 +95,13 @@ fn uncertainty_at(params: &Params, uncertainty: &[f32], [x, y]: [Axis; 2]) -> f3
     mix(along(y.index), along(y.index + 1), y.fraction)
 }
 
-fn mix(a: Vec2, b: Vec2, t: f32) -> Vec2 {
+fn mix(a: Vec3, b: Vec3, t: f32) -> Vec3 {
     a * (1.0 - t) + b * t
 }
 
 fn color_at(params: &Params, inputs: &Inputs<'_>, [x, y]: [Axis; 2], pixel: [u32; 2]) -> Vec4 {
     let palette = inputs.palette;
-    let cell = |row, col| cell_value(params, inputs.value, row, col);
+    let cell = |row, col| cell_value(params, inputs, row, col);
     let north = mix(
         cell(y.index, x.index),
         cell(y.index, x.index + 1),
@@ -107,10 +115,13 @@ fn color_at(params: &Params, inputs: &Inputs<'_>, [x, y]: [Axis; 2], pixel: [u32
     let value = mix(north, south, y.fraction);
     let mut alpha = params.thematic.alpha
         * ((value.y - 0.5) * params.thematic.edge_sharpness + 0.5).clamp(0.0, 1.0);
-    if alpha <= 0.0 {
+    if alpha <= 0.0 || value.z <= 0.0 {
         return Vec4::ZERO;
     }
-    let position = ((value.x / value.y - params.values.transfer_low)
+    if params.values.has_coverage == 1 {
+        alpha *= value.z / value.y;
+    }
+    let position = ((value.x / value.z - params.values.transfer_low)
         * params.values.transfer_per_unit)
         .clamp(0.0, 1.0);
     let at = nearest(position * 255.0) as usize;
@@ -124,5 +135,5 @@ fn color_at(params: &Params, inputs: &Inputs<'_>, [x, y]: [Axis; 2], pixel: [u32
         let uncertainty = uncertainty_at(params, inputs.uncertainty, [x, y]);
         rgb = hatched(params, rgb, uncertainty, pixel);
     }
-    rgb.extend(1.0) * alpha
+    linear_of(rgb).extend(1.0) * alpha
 }

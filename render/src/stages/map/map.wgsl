@@ -8,6 +8,8 @@ struct MapParams { alpha: f32, edge_sharpness: f32 }
 // Bound but never read where uncertainty is not drawn.
 @group(0) @binding(5) var<storage, read> uncertainty_before: array<f32>;
 @group(0) @binding(6) var<storage, read> uncertainty_after: array<f32>;
+// Bound but never read where every cell with data is covered all over.
+@group(0) @binding(7) var<storage, read> domain: array<u32>;
 
 // Cells that are not there.
 const NO_CELL = 0xffffffffu;
@@ -22,13 +24,14 @@ fn cell_at(row: i32, col: i32) -> u32 {
     return cell - grid.held_first_cell;
 }
 
-// Value and 1, or zeros where there is no data.
-fn cell_value(row: i32, col: i32) -> vec2<f32> {
+// Value times the share of the cell that holds data, 1, and that share; or zeros where there is no data.
+fn cell_value(row: i32, col: i32) -> vec3<f32> {
     let cell = cell_at(row, col);
-    if (cell == NO_CELL) { return vec2(0.0); }
+    if (cell == NO_CELL) { return vec3(0.0); }
     let value = value_grid[cell];
-    if (is_missing(value)) { return vec2(0.0); }
-    return vec2(value, 1.0);
+    if (is_missing(value)) { return vec3(0.0); }
+    let share = share_of(cell);
+    return vec3(value * share, 1.0, share);
 }
 
 fn cell_uncertainty(row: i32, col: i32) -> f32 {
@@ -49,14 +52,15 @@ fn color_at(x: Axis, y: Axis, pixel: vec2<u32>) -> vec4<f32> {
     let value = mix(north, south, y.fraction);
     // Half the weight on data: the edge of the data runs between cell centres, one pixel soft.
     var alpha = thematic.alpha * clamp((value.y - 0.5) * thematic.edge_sharpness + 0.5, 0.0, 1.0);
-    if (alpha <= 0.0) { return vec4(0.0); }
-    let position = clamp((value.x / value.y - values.transfer_low) * values.transfer_per_unit, 0.0, 1.0);
+    if (alpha <= 0.0 || value.z <= 0.0) { return vec4(0.0); }
+    if (values.has_coverage == 1u) { alpha *= value.z / value.y; }
+    let position = clamp((value.x / value.z - values.transfer_low) * values.transfer_per_unit, 0.0, 1.0);
     let at = u32(nearest(position * 255.0));
     if (values.has_shape == 1u) { alpha *= f32(palette[256u + at] & 0xffffu) / 65535.0; }
     let color = palette[at];
     var rgb = vec3(f32(color & 255u), f32((color >> 8u) & 255u), f32((color >> 16u) & 255u)) / 255.0;
     if (values.has_uncertainty == 1u) { rgb = hatched(rgb, uncertainty_at(x, y), pixel); }
-    return vec4(rgb, 1.0) * alpha;
+    return vec4(linear_of(rgb), 1.0) * alpha;
 }
 
 fn axis_at(place: f32) -> Axis {

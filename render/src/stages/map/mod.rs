@@ -14,6 +14,7 @@ pub const SOURCE: &str = concat!(
     include_str!("../prelude.wgsl"),
     include_str!("../sphere.wgsl"),
     include_str!("../uncertainty.wgsl"),
+    include_str!("../coverage.wgsl"),
     include_str!("map.wgsl")
 );
 
@@ -56,6 +57,7 @@ impl Map {
             (4, &picture),
             (5, uncertainty_before),
             (6, uncertainty_after),
+            (7, &scene.domain),
         ];
         let groups = frame.params.view.tiles.to_array();
         frame.recorder.dispatch(&self.map, &buffers, groups);

@@ -1,7 +1,10 @@
 //! CPU twin of `particles.wgsl`.
 
+use glam::Vec3;
+
+use crate::stages::colour::{codes_of, with_codes};
 use crate::stages::layout::{
-    Active, Particle, Row, WATER_BLUE, WATER_GREEN, WATER_RED, is_missing, nearest,
+    Active, COVERED, Particle, Row, WATER_BLUE, WATER_GREEN, WATER_RED, is_missing, nearest,
 };
 use crate::stages::params::Params;
 use crate::stages::uncertainty::uncertain;
@@ -18,6 +21,8 @@ pub struct Inputs<'a> {
     pub palette: &'a [u32],
     /// Uncertainty of every cell; empty where it is not drawn.
     pub uncertainty: &'a [f32],
+    /// How much of every cell holds data, [`COVERED`] where all of it does; not read where no cell is covered in part.
+    pub domain: &'a [u32],
 }
 
 /// Output permutation of a 32-bit linear congruential generator (PCG-RXS-M-XS, O'Neill 2014).
@@ -39,7 +44,7 @@ pub fn jittered(params: &Params, bits: u32) -> u32 {
 
 /// Thin at both ends of a column, so that particles appear and vanish unseen; mean 1.
 pub fn envelope(phase: f32) -> f32 {
-    (phase.min(1.0 - phase) * 12.0).clamp(0.0, 1.0) * (12.0 / 11.0)
+    (phase.min(1.0 - phase) * 24.0).clamp(0.0, 1.0) * (24.0 / 23.0)
 }
 
 fn strength_of(params: &Params, value: f32, position: f32) -> f32 {
@@ -53,15 +58,10 @@ fn strength_of(params: &Params, value: f32, position: f32) -> f32 {
 /// A colour seen through so much of the sea: what is lost of it is the water's own (Beer-Lambert).
 pub fn through_water(params: &Params, color: u32, depth_m: f32) -> u32 {
     let kept = (-params.particles.sea_per_m * depth_m).exp();
-    let channel = |water: f32, shift: u32| {
-        let water = water * 255.0;
-        let own = ((color >> shift) & 255) as f32;
-        (nearest(water + (own - water) * kept) as u32) << shift
-    };
-    channel(WATER_RED, 0)
-        | channel(WATER_GREEN, 8)
-        | channel(WATER_BLUE, 16)
-        | (color & 0xff00_0000)
+    let water = Vec3::new(WATER_RED, WATER_GREEN, WATER_BLUE) * 65025.0;
+    let codes = codes_of(color);
+    let light = water + (codes * codes - water) * kept;
+    with_codes(color, light.map(f32::sqrt))
 }
 
 /// One particle for every active cell and `k` below `particles_per_cell`, cell by cell.
@@ -84,10 +84,10 @@ fn one(params: &Params, inputs: &Inputs<'_>, cell: Active, k: u32) -> Particle {
             .wrapping_add(jittered(params, bits))
     };
     let (east, south) = (along(3242174889, bits), along(2447445414, hash(bits)));
-    let across = (cell.cell % params.grid.cols).wrapping_mul(1779033704);
+    let across = (cell.cell % params.grid.cols).wrapping_mul(2447445414);
     let start = row
-        .wrapping_add(k)
-        .wrapping_mul(2654435769)
+        .wrapping_mul(3242174889)
+        .wrapping_add(k.wrapping_mul(2654435769))
         .wrapping_add(across);
     let mut particle = Particle {
         row,
@@ -128,8 +128,27 @@ fn one(params: &Params, inputs: &Inputs<'_>, cell: Active, k: u32) -> Particle {
     if own.sea_per_m > 0.0 && particle.height_m < 0.0 {
         particle.color = through_water(params, particle.color, -particle.height_m);
     }
+    let share = share_of(params, inputs.domain, cell.cell as usize);
+    let particle = covering(particle, share);
     match inputs.uncertainty.get(cell.cell as usize) {
         Some(&uncertainty) if uncertainty > 0.0 => uncertain(particle, uncertainty),
         Some(_) | None => particle,
+    }
+}
+
+/// Share of a cell that holds data.
+pub fn share_of(params: &Params, domain: &[u32], cell: usize) -> f32 {
+    if params.values.has_coverage == 0 {
+        return 1.0;
+    }
+    domain[cell] as f32 / COVERED as f32
+}
+
+/// What a cell sends out that holds data in a part of its area: as many particles, each with that share of depth and mass.
+fn covering(particle: Particle, share: f32) -> Particle {
+    Particle {
+        depth: particle.depth * share,
+        mass_kg: particle.mass_kg * share,
+        ..particle
     }
 }

@@ -27,7 +27,7 @@ fn jittered(bits: u32) -> u32 {
 
 // Thin at both ends of a column, so that particles appear and vanish unseen; mean 1.
 fn envelope(phase: f32) -> f32 {
-    return clamp(min(phase, 1.0 - phase) * 12.0, 0.0, 1.0) * (12.0 / 11.0);
+    return clamp(min(phase, 1.0 - phase) * 24.0, 0.0, 1.0) * (24.0 / 23.0);
 }
 
 fn strength_of(value: f32, position: f32) -> f32 {
@@ -38,9 +38,9 @@ fn strength_of(value: f32, position: f32) -> f32 {
 // A colour seen through so much of the sea: what is lost of it is the water's own (Beer-Lambert).
 fn through_water(color: u32, depth_m: f32) -> u32 {
     let kept = exp(-particles.sea_per_m * depth_m);
-    let water = vec3(WATER_RED, WATER_GREEN, WATER_BLUE) * 255.0;
-    let rgb = water + (vec3(f32(color & 255u), f32((color >> 8u) & 255u), f32((color >> 16u) & 255u)) - water) * kept;
-    return u32(nearest(rgb.x)) | (u32(nearest(rgb.y)) << 8u) | (u32(nearest(rgb.z)) << 16u) | (color & 0xff000000u);
+    let water = vec3(WATER_RED, WATER_GREEN, WATER_BLUE) * 65025.0;
+    let codes = codes_of(color);
+    return with_codes(color, sqrt(water + (codes * codes - water) * kept));
 }
 
 // Particle `k` of a cell with data; `slot` is its column in the table, `carbon` what it has accumulated, kg m-2.
@@ -49,9 +49,10 @@ fn particle_of(row: u32, slot: u32, k: u32, value: f32, carbon: f32) -> Particle
     let cell = row * grid.cols + col;
     let bits = hash(hash(cell) ^ (k * 0x9e3779b9u));
     // An additive sequence (R2, Roberts 2018) round the cell's centre, jittered by random numbers: little for clouds,
-    // which then cover the sea evenly, wholly for dots, which must not stand in rows. Golden sections up the column.
+    // which then cover the sea evenly, wholly for dots, which must not stand in rows. Golden sections up the column; from
+    // cell to cell the same sequence again, so that those that are thin at an instant lie apart.
     let place = vec2(HALF_TURN) + k * vec2(3242174889u, 2447445414u);
-    let start = row * 2654435769u + col * 1779033704u + k * 2654435769u;
+    let start = row * 3242174889u + col * 2447445414u + k * 2654435769u;
     var particle: Particle;
     particle.row = row;
     particle.slot = slot;
@@ -77,4 +78,12 @@ fn particle_of(row: u32, slot: u32, k: u32, value: f32, carbon: f32) -> Particle
         particle.color = through_water(particle.color, -particle.height_m);
     }
     return particle;
+}
+
+// What a cell sends out that holds data in a part of its area: as many particles, each with that share of depth and mass.
+fn covering(particle: Particle, share: f32) -> Particle {
+    var thinner = particle;
+    thinner.depth = particle.depth * share;
+    thinner.mass_kg = particle.mass_kg * share;
+    return thinner;
 }

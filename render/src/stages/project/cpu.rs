@@ -116,28 +116,11 @@ fn on_globe(params: &Params, row: &Row, col: &Col, particle: &Particle) -> Splat
     let camera = view.eye;
     let sight = place - camera;
     let ahead = sight.dot(view.forward);
-    if ahead < 0.01 * (camera.dot(camera) - 1.0) || is_hidden(normal, distance, camera) {
-        return Splat::default();
-    }
-    let scale = view.focal_px / ahead;
-    let x = sight.dot(view.right) * scale + view.center_px.x;
-    let y = view.center_px.y - sight.dot(view.up) * scale;
-    let oblique = (sight.length() / ahead).sqrt();
-    let full_px = row.radius * scale * oblique;
-    let radius_px = full_px * size_of(params, particle.color);
-    if x.abs().max(y.abs()) > 1.0e5 || radius_px > projection.max_radius_px {
-        return Splat::default();
-    }
-    let radius_px = radius_px.max(projection.min_radius_px);
-    let thinned = full_px / radius_px;
     let u = place.dot(projection.light_u) - projection.light_u0;
     let v = place.dot(projection.light_v) - projection.light_v0;
     let to_light = projection.light_texels_per_unit * params.lighting.unit as f32;
-    Splat {
-        x_sub: nearest(x * SUBPIXELS as f32) - view.origin_px.x * SUBPIXELS,
-        y_sub: nearest(y * SUBPIXELS as f32) - view.origin_px.y * SUBPIXELS,
-        radius_px,
-        tau: particle.depth * row.depth_gain * thinned * thinned,
+    // What is not seen still casts its shadow.
+    let unseen = Splat {
         slice: slice_of(params, place.dot(projection.half)),
         light_u: nearest(u * to_light),
         light_v: nearest(v * to_light),
@@ -148,6 +131,28 @@ fn on_globe(params: &Params, row: &Row, col: &Col, particle: &Particle) -> Splat
             * projection.light_depth_gain,
         day: day_at(params, normal),
         color: particle.color,
+        ..Splat::default()
+    };
+    if ahead < 0.01 * (camera.dot(camera) - 1.0) || is_hidden(normal, distance, camera) {
+        return unseen;
+    }
+    let scale = view.focal_px / ahead;
+    let x = sight.dot(view.right) * scale + view.center_px.x;
+    let y = view.center_px.y - sight.dot(view.up) * scale;
+    let oblique = (sight.length() / ahead).sqrt();
+    let full_px = row.radius * scale * oblique;
+    let radius_px = full_px * size_of(params, particle.color);
+    if x.abs().max(y.abs()) > 1.0e5 || radius_px > projection.max_radius_px {
+        return unseen;
+    }
+    let radius_px = radius_px.max(projection.min_radius_px);
+    let thinned = full_px / radius_px;
+    Splat {
+        x_sub: nearest(x * SUBPIXELS as f32) - view.origin_px.x * SUBPIXELS,
+        y_sub: nearest(y * SUBPIXELS as f32) - view.origin_px.y * SUBPIXELS,
+        radius_px,
+        tau: particle.depth * row.depth_gain * thinned * thinned,
+        ..unseen
     }
 }
 

@@ -81,7 +81,16 @@ fn on_globe(particle: Particle) -> Splat {
     let horizon = min(distance, 1.0);
     let camera_sq = dot(camera, camera);
     let grazing = sqrt(max(camera_sq - horizon * horizon, 0.0)) * sqrt(max(distance * distance - horizon * horizon, 0.0));
+    // What is not seen still casts its shadow.
     var splat: Splat;
+    splat.light_depth = particle.depth * row.depth_gain * row.radius * row.radius * projection.light_depth_gain;
+    splat.slice = slice_of(dot(place, projection.half));
+    let u = dot(place, projection.light_u) - projection.light_u0;
+    let v = dot(place, projection.light_v) - projection.light_v0;
+    splat.light_u = nearest(u * projection.light_texels_per_unit * f32(lighting.unit));
+    splat.light_v = nearest(v * projection.light_texels_per_unit * f32(lighting.unit));
+    splat.day = day_at(normal);
+    splat.color = particle.color;
     if (ahead < 0.01 * (camera_sq - 1.0) || beyond * distance < horizon * horizon - grazing) { return splat; }
     let scale = view.focal_px / ahead;
     let x = dot(sight, view.right) * scale + view.center_px.x;
@@ -96,14 +105,6 @@ fn on_globe(particle: Particle) -> Splat {
     splat.radius_px = max(radius_px, projection.min_radius_px);
     let thinned = full_px / splat.radius_px;
     splat.tau = particle.depth * row.depth_gain * thinned * thinned;
-    splat.light_depth = particle.depth * row.depth_gain * row.radius * row.radius * projection.light_depth_gain;
-    splat.slice = slice_of(dot(place, projection.half));
-    let u = dot(place, projection.light_u) - projection.light_u0;
-    let v = dot(place, projection.light_v) - projection.light_v0;
-    splat.light_u = nearest(u * projection.light_texels_per_unit * f32(lighting.unit));
-    splat.light_v = nearest(v * projection.light_texels_per_unit * f32(lighting.unit));
-    splat.day = day_at(normal);
-    splat.color = particle.color;
     return splat;
 }
 

@@ -11,6 +11,7 @@ mod splats;
 use std::sync::OnceLock;
 
 use bytemuck::Pod;
+use contract::base_map::Background;
 use contract::job::{Mode, RenderJob, Style, View};
 use glam::Vec4;
 use render::Scene;
@@ -23,7 +24,9 @@ use render::stages::bin;
 use render::stages::compose::in_context::Surroundings;
 use render::stages::flow::cpu::Field;
 use render::stages::flow::{self};
-use render::stages::layout::{Active, Entry, KERNEL_CLOUD, LIGHT_OWN, Particle, Splat, Velocity};
+use render::stages::layout::{
+    Active, COVERED, Entry, KERNEL_CLOUD, LIGHT_OWN, Particle, Splat, Velocity,
+};
 use render::stages::light;
 use render::stages::map::{self};
 use render::stages::params::Params;
@@ -66,6 +69,15 @@ impl Twins {
         })
     }
 
+    /// Of blocks of four cells, those at coasts covered in part.
+    fn joined(mode: Mode, view: View) -> Self {
+        let blocks = render::pyramid::coarser(&ocean(FIVE_DEGREES)).unwrap();
+        let twins = Self::of_job(&job(mode, view), blocks);
+        let domain = twins.scene.domain.content();
+        assert!(domain.iter().any(|covered| (1..COVERED).contains(covered)));
+        twins
+    }
+
     /// Currents in trails.
     fn of_flow(view: View) -> Self {
         let mut job = currents::job(view, 1e7);
@@ -103,6 +115,7 @@ impl Twins {
             accumulated: &accumulated,
             palette: &plan.palette,
             uncertainty: &uncertainty,
+            domain: scene.domain.content(),
         };
         let mut picture = vec![Vec4::ZERO; params.view.size_px.element_product() as usize];
         let (mut splats, mut deposited, mut light) =
@@ -114,6 +127,7 @@ impl Twins {
                 palette: &plan.palette,
                 axes: &plan.axes,
                 uncertainty: &uncertainty,
+                domain: scene.domain.content(),
             };
             map::cpu::map(&params, &inputs, &mut picture);
         } else {
@@ -141,15 +155,10 @@ impl Twins {
         }
         let mut image = vec![0; picture.len()];
         if params.in_context {
-            let around = Surroundings {
-                domain: scene.domain.content(),
-                terrain: scene.terrain.as_ref().unwrap().heights_m(),
-                ground_axes: &plan.ground_axes,
-                coast: &plan.coast,
-            };
+            let around = Surroundings::of(&plan, &scene);
             compose::in_context::compose(&params, &picture, &around, &mut image);
         } else {
-            compose::cpu::compose(&params, &picture, scene.domain.content(), &mut image);
+            compose::cpu::compose(&params, &picture, &mut image);
         }
         Self {
             scene,
@@ -180,6 +189,16 @@ impl Twins {
     fn globe() -> &'static Self {
         static TWINS: OnceLock<Twins> = OnceLock::new();
         TWINS.get_or_init(|| Self::of(Mode::Volume, globe(-120.0, 10.0, 1.5e7, 160)))
+    }
+
+    /// A globe with all that lies below and beside its particles.
+    fn on_base_map() -> Self {
+        let mut job = job(Mode::Volume, globe(-95.0, 35.0, 1.5e7, 160));
+        job.style.globe_surface = true;
+        let context = &mut job.style.context;
+        (context.coastlines, context.borders, context.sea_floor) = (true, true, true);
+        context.background = Background::Sky;
+        Self::of_job(&job, ocean(FIVE_DEGREES))
     }
 
     /// Runs one stage on the GPU on the twins' inputs; what a slot then holds comes back.

@@ -31,7 +31,14 @@ fn map_matches_its_twin_on_tiles_and_on_the_globe() {
             "palette[256u + at] & 0x7fffu",
         ),
     ];
-    for (twins, right, wrong) in plain.into_iter().chain(uncertain) {
+    let joined = views.map(|view| {
+        (
+            Twins::joined(Mode::Map, view),
+            "alpha *= value.z / value.y",
+            "alpha *= value.z",
+        )
+    });
+    for (twins, right, wrong) in plain.into_iter().chain(uncertain).chain(joined) {
         let expected = channels(&twins.picture);
         prove("map", map::SOURCE, right, wrong, |gpu, source| {
             let stage = Map::new(gpu, source);
@@ -52,11 +59,26 @@ fn map_matches_its_twin_on_tiles_and_on_the_globe() {
 
 #[test]
 fn compose_matches_its_twin() {
-    let twins = Twins::globe();
+    let twins = Twins::on_base_map();
     let expected = bytes(twins.image.iter().copied());
     for (right, wrong) in [
         ("rgb.y << 8u", "rgb.z << 8u"),
-        ("0.55 * haze", "0.05 * haze"),
+        // The air past the globe and before its ground, the share of land, the sea floor, lakes, shores and borders.
+        ("2.0 * air_above", "1.0 * air_above"),
+        ("air_above(0.0,", "air_above(0.02,"),
+        ("mix(sea, land, shares.x)", "mix(land, sea, shares.x)"),
+        (
+            "-floor.height_m / base_map.deep_m",
+            "floor.height_m / base_map.deep_m",
+        ),
+        (
+            "base_map.shading * (slanted",
+            "-base_map.shading * (slanted",
+        ),
+        ("base_map.lake, shares.y)", "base_map.deep, shares.x)"),
+        ("mask.z * mix", "mask.y * mix"),
+        ("mask.w * mix", "mask.x * mix"),
+        ("base_map.sky_alpha *", "0.5 * base_map.sky_alpha *"),
     ] {
         prove("compose", compose::SOURCE, right, wrong, |gpu, source| {
             let stage = Compose::new(gpu, source);
@@ -77,19 +99,25 @@ fn compose_matches_its_twin() {
 #[test]
 fn surroundings_match_their_twin_on_tiles_and_on_the_globe() {
     let views = [tile(1, 0, 0, 256), globe(-120.0, 10.0, 1.5e7, 160)];
+    let line_of = [
+        ("place.x % 4u * 8u", "(3u - place.x % 4u) * 8u"),
+        (
+            "covered = max(covered, color.w)",
+            "covered = 0.0 * max(covered, color.w)",
+        ),
+    ];
     let faults = [
-        // The slope of the terrain, its height, the night, the coast, the sea above the floor.
+        // The slope of the terrain, its height, the night, the sea above the floor; the coast.
         ("2.0 * z[at + 4]", "2.0 * z[at - 4]"),
         ("if (height_m < 0.0)", "if (height_m < 1000.0)"),
         ("mix(NIGHT, 1.0,", "mix(1.0, NIGHT,"),
-        ("place.x % 4u * 8u", "(3u - place.x % 4u) * 8u"),
         ("exp(context.seabed_per_m", "exp(-context.seabed_per_m"),
     ];
-    for view in views {
+    for (view, line) in views.into_iter().zip(line_of) {
         let twins = Twins::of_job(&everything(Mode::Map, view), with_terrain(FIVE_DEGREES));
         assert!(twins.params.in_context);
         let expected = bytes(twins.image.iter().copied());
-        for (right, wrong) in faults {
+        for (right, wrong) in faults.into_iter().chain([line]) {
             let distance = |gpu: &Gpu, source: &str| {
                 let stage = Compose::new(gpu, source);
                 let picture = |f: &mut FrameContext<'_>| {

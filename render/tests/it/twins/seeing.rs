@@ -4,6 +4,7 @@ use contract::job::Mode;
 use render::frame_context::FrameContext;
 use render::gpu::{Gpu, Slot};
 use render::stages::compose;
+use render::stages::compose::in_context::Surroundings;
 use render::stages::eye::{self, Eye};
 
 use super::{Twins, bytes, channels, far_apart, prove};
@@ -53,8 +54,8 @@ fn pixels_that_work_alone_and_pixels_that_share_come_to_the_same_picture() {
         prove(
             "eye",
             eye::SOURCE,
-            "rgb * amount, amount)",
-            "rgb * amount, amount + 1u)",
+            "sixteenth(rgb * amount), amount)",
+            "sixteenth(rgb * amount), amount + 1u)",
             |gpu, source| {
                 let [shared, alone] =
                     [eye::SHARED, eye::ALONE].map(|entry| eye_image(&twins, gpu, source, entry));
@@ -107,8 +108,8 @@ fn eye_blends_away_from_the_light_behind_as_its_twin_does() {
         worst(&channels(&front), &channels(&twins.picture), 0.01, 0.0) > 1.0,
         "the order is seen"
     );
-    let domain = twins.scene.domain.content();
-    compose::cpu::compose(&twins.params, &twins.picture, domain, &mut twins.image);
+    let around = Surroundings::of(&twins.plan, &twins.scene);
+    compose::in_context::compose(&twins.params, &twins.picture, &around, &mut twins.image);
     let expected = bytes(twins.image.iter().copied());
     prove(
         "eye",

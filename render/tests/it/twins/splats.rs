@@ -14,7 +14,14 @@ use crate::scenes::{FIVE_DEGREES, tile};
 
 #[test]
 fn splats_match_their_twins_on_tiles_and_on_the_globe() {
+    let joined = Twins::joined(Mode::Volume, tile(2, 0, 1, 256));
     let faults = [
+        (&joined, "particle.depth * share", "particle.depth"),
+        (
+            &joined,
+            "share = share_of(cell)",
+            "share = share_of(cell + 1u)",
+        ),
         (Twins::tile(), "place.x + jittered", "place.y + jittered"),
         (Twins::tile(), "ground_y - nearest(", "ground_y + nearest("),
         (

@@ -98,6 +98,7 @@ pub(super) fn full() -> RenderJob {
     style.context = Context {
         sea_opacity: 0.4,
         coastlines: true,
+        ..Context::default()
     };
     job
 }

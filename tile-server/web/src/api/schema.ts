@@ -329,6 +329,16 @@ export interface components {
             /** @description What the paper's uncertainty says of it. */
             verdict: components["schemas"]["Verdict"];
         };
+        /**
+         * @description What is seen beside the globe.
+         * @enum {string}
+         */
+        Background: "none" | "sky";
+        /**
+         * @description Colours of the ground of a globe view.
+         * @enum {string}
+         */
+        BaseMap: "dark" | "light";
         /** @description The carbon that a region gave off, with all that is needed to cite it. */
         BudgetAnswer: {
             /** @description How cells on the coast counted. */
@@ -1972,8 +1982,6 @@ export interface operations {
                 width?: number;
                 /** @description Height of the picture, pixels; 512 unless one is given. */
                 height?: number;
-                /** @description The ground is drawn below the particles; yes unless told otherwise. */
-                surface?: boolean;
                 /** @description Version, as answers name it; the newest unless one is given. */
                 manifest?: string;
                 /** @description Colours; the quantity's own unless one is named. Not together with `stops`. */
@@ -2008,7 +2016,7 @@ export interface operations {
                 relief_exaggeration?: number;
                 /** @description Share of what lies deep below the sea surface that the sea hides. */
                 sea_opacity?: number;
-                /** @description Coast lines are drawn. */
+                /** @description Coast lines are drawn; unless told otherwise on views that show the globe, and not on tiles. */
                 coastlines?: boolean;
                 /** @description How far a kilogram of accumulated carbon a square metre lifts particles, m m² kg⁻¹. */
                 height_exaggeration?: number;
@@ -2017,6 +2025,19 @@ export interface operations {
                  * @example 315,40
                  */
                 sun?: string;
+                /** @description The ground is drawn below the particles; yes unless told otherwise. */
+                surface?: boolean;
+                /** @description Borders of countries are drawn; wherever coast lines are unless told otherwise. */
+                borders?: boolean;
+                /**
+                 * @description The plain globe is shaded by a coarse relief of land and sea floor; yes unless told otherwise. One named by `relief`
+                 *     takes its place.
+                 */
+                sea_floor?: boolean;
+                /** @description Colours of the plain globe; dark unless told otherwise. */
+                base_map?: components["schemas"]["BaseMap"];
+                /** @description What is seen beside the globe; none unless told otherwise, which leaves it transparent. */
+                background?: components["schemas"]["Background"];
                 /**
                  * @description What is drawn over the picture so that it explains itself: any of `legend`, `date`, `graticule`, `names`, `scale`,
                  *     `height` and `source` with commas between, or `all` that the picture has something to tell of. By name, what it has
@@ -2304,7 +2325,7 @@ export interface operations {
                 relief_exaggeration?: number;
                 /** @description Share of what lies deep below the sea surface that the sea hides. */
                 sea_opacity?: number;
-                /** @description Coast lines are drawn. */
+                /** @description Coast lines are drawn; unless told otherwise on views that show the globe, and not on tiles. */
                 coastlines?: boolean;
                 /** @description How far a kilogram of accumulated carbon a square metre lifts particles, m m² kg⁻¹. */
                 height_exaggeration?: number;
@@ -2429,7 +2450,7 @@ export interface operations {
                 relief_exaggeration?: number;
                 /** @description Share of what lies deep below the sea surface that the sea hides. */
                 sea_opacity?: number;
-                /** @description Coast lines are drawn. */
+                /** @description Coast lines are drawn; unless told otherwise on views that show the globe, and not on tiles. */
                 coastlines?: boolean;
                 /** @description How far a kilogram of accumulated carbon a square metre lifts particles, m m² kg⁻¹. */
                 height_exaggeration?: number;
@@ -2538,6 +2559,8 @@ type ReadonlyArray<T> = [
 ] extends [
     unknown[]
 ] ? Readonly<Exclude<T, undefined>> : Readonly<Exclude<T, undefined>[]>;
+export const backgroundValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Background"]> = ["none", "sky"];
+export const baseMapValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["BaseMap"]> = ["dark", "light"];
 export const budgetStepValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["BudgetStep"]> = ["month", "year", "total"];
 export const cellsValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Cells"]> = ["whole", "ocean-share"];
 export const earthValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Earth"]> = ["wgs84", "sphere", "local-radius"];

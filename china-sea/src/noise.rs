@@ -2,12 +2,13 @@
 
 /// Noise of one seed.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Noise {
+pub struct Noise {
     seed: u64,
 }
 
 impl Noise {
-    pub(super) fn new(seed: u64) -> Self {
+    /// Noise that another seed does not give.
+    pub fn new(seed: u64) -> Self {
         Self { seed }
     }
 
@@ -43,7 +44,7 @@ impl Noise {
     }
 
     /// Noise of several wavelengths, each half as long and half as strong as the one before; about -1 to 1.
-    pub(super) fn fractal(self, x: f64, y: f64, z: f64, octaves: u32) -> f64 {
+    pub fn fractal(self, x: f64, y: f64, z: f64, octaves: u32) -> f64 {
         let mut sum = 0.0;
         let (mut strength, mut total, mut scale) = (1.0, 0.0, 1.0);
         for octave in 0..octaves {

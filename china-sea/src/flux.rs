@@ -4,7 +4,7 @@
 //! rivers, sources in their mouths and in upwelling, a winter sink along the Kuroshio, and eddies. Magnitudes are of the
 //! order that is published for these seas (a few mmol m⁻² d⁻¹); no value here is a measurement.
 
-use super::noise::Noise;
+use crate::noise::Noise;
 
 /// A patch of flux around a place.
 struct Patch {
@@ -104,12 +104,24 @@ fn winterness(month: usize) -> f64 {
     (2.0 * std::f64::consts::PI * (month as f64 - 1.0) / 12.0).cos()
 }
 
-/// Flux of CO2, mmol m⁻² d⁻¹, positive out of the sea.
-pub(super) fn flux_mmol_m2_d(lon: f64, lat: f64, month: usize, noise: Noise) -> f64 {
+/// Flux of CO2 at a place, degrees, in a month (0 to 11), mmol m⁻² d⁻¹, positive out of the sea.
+pub fn flux_mmol_m2_d(lon: f64, lat: f64, month: usize, noise: Noise) -> f64 {
+    let winter = 0.5 * (1.0 + winterness(month));
+    // Eddies live for weeks: from month to month half of each is left.
+    let eddies = noise.fractal(lon / 1.6, lat / 1.6, month as f64 * 0.5, 5);
+    smooth_flux_mmol_m2_d(lon, lat, month) + (3.0 + 2.0 * winter * north_of(lat)) * eddies
+}
+
+/// 0 in the tropics, 1 north of the Changjiang.
+fn north_of(lat: f64) -> f64 {
+    1.0 / (1.0 + (-(lat - 25.5) / 2.2).exp())
+}
+
+/// The same without eddies: what is known of a place from far around it, as where a gap under a cloud is filled.
+pub fn smooth_flux_mmol_m2_d(lon: f64, lat: f64, month: usize) -> f64 {
     let winter = 0.5 * (1.0 + winterness(month));
     let summer = 1.0 - winter;
-    // 0 in the tropics, 1 north of the Changjiang.
-    let north = 1.0 / (1.0 + (-(lat - 25.5) / 2.2).exp());
+    let north = north_of(lat);
     let shelf = -7.5 * winter + 1.2 * summer;
     let basin = 0.4 * winter + 2.4 * summer + 0.6;
     let mut flux = north * shelf + (1.0 - north) * basin;
@@ -121,14 +133,11 @@ pub(super) fn flux_mmol_m2_d(lon: f64, lat: f64, month: usize, noise: Noise) -> 
         }
     }
     let stream = distance_deg(lon, lat, &KUROSHIO) / 0.8;
-    flux += (-4.5 * winter + 0.8 * summer) * (-stream * stream).exp();
-    // Eddies live for weeks: from month to month half of each is left.
-    let eddies = noise.fractal(lon / 1.6, lat / 1.6, month as f64 * 0.5, 5);
-    flux + (3.0 + 2.0 * winter * north) * eddies
+    flux + (-4.5 * winter + 0.8 * summer) * (-stream * stream).exp()
 }
 
 /// How cloudy a place is, without unit; only its order matters. Each month has clouds of its own.
-pub(super) fn cloudiness(lon: f64, lat: f64, month: usize, noise: Noise) -> f32 {
+pub fn cloudiness(lon: f64, lat: f64, month: usize, noise: Noise) -> f32 {
     // Cloud bands lie from west-south-west to east-north-east.
     let (along, across) = (0.94 * lon + 0.34 * lat, -0.34 * lon + 0.94 * lat);
     noise.fractal(

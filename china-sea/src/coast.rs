@@ -2,7 +2,7 @@
 //!
 //! Corners are tens of kilometres apart; smooth noise bends the lines between them so that they look like a coast.
 
-use super::noise::Noise;
+use crate::noise::Noise;
 
 /// How far the noise moves the coast, degrees, and the length of its longest bends.
 const BEND_DEG: f64 = 0.16;
@@ -116,7 +116,7 @@ const AMAMI: Outline = &[(129.1, 28.2), (129.4, 28.5), (129.75, 28.4), (129.35, 
 const BANGKA: Outline = &[(103.5, 1.2), (104.0, 1.1), (104.6, 1.2), (104.6, 0.9), (104.0, 0.85), (103.5, 1.0)];
 
 /// Is a place on land?
-pub(super) fn is_land(lon: f64, lat: f64, noise: Noise) -> bool {
+pub fn is_land(lon: f64, lat: f64, noise: Noise) -> bool {
     let bend =
         |z: f64| BEND_DEG * noise.fractal(lon / BEND_LENGTH_DEG, lat / BEND_LENGTH_DEG, z, 4);
     let (lon, lat) = (lon + bend(5000.0), lat + bend(6000.0));

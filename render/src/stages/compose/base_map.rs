@@ -1,0 +1,182 @@
+//! Colours of the plain globe: the only place where they stand. The device reads them as parameters, mirrored in
+//! `globe.wgsl`.
+
+use contract::base_map::{Background, BaseMap};
+use glam::Vec3;
+
+use crate::stages::colour::linear_of;
+
+/// Optical depth of all air straight up; what makes the globe's outline soft without a veil over its middle.
+const AIR_DEPTH: f32 = 0.045;
+/// Height over which the air thins by the factor e, earth radii: 64 km, some eight times that of the earth's air, which
+/// would be a line of a pixel or two.
+const AIR_HEIGHT: f32 = 0.01;
+/// Depth from which on the sea has the colour of the deep, m.
+const DEEP_M: f32 = 6000.0;
+/// Height from which on land has the colour of mountains, m.
+const HIGH_M: f32 = 4500.0;
+
+shared_struct! {
+    /// The plain globe as it is drawn; colours are red, green and blue of linear light, 0 to 1.
+    pub struct BaseMapParams {
+        pub land: Vec3,
+        /// How much of the light on slopes is shown, 0 to 1.
+        pub shading: f32,
+        pub land_high: Vec3,
+        pub high_m: f32,
+        /// The sea where no floor is drawn.
+        pub sea: Vec3,
+        pub border_grey: f32,
+        /// Shallow sea.
+        pub shelf: Vec3,
+        pub border_alpha: f32,
+        pub deep: Vec3,
+        pub deep_m: f32,
+        /// What is added to the sea where the product has no data.
+        pub hatch: Vec3,
+        /// Optical depth of the air straight up.
+        pub air_depth: f32,
+        pub air: Vec3,
+        /// Height over which the air thins by the factor e, earth radii.
+        pub air_height: f32,
+        pub sky: Vec3,
+        /// 1: a sky is drawn behind the globe.
+        pub sky_alpha: f32,
+        pub lake: Vec3,
+        /// How much of the difference between day and night is shown, 0 to 1.
+        pub sun_share: f32,
+        /// Grey and opacities of coasts and borders over what has colours of its own.
+        pub over_grey: f32,
+        pub over_coast_alpha: f32,
+        pub over_border_alpha: f32,
+    }
+}
+
+/// Grey and opacity of lines.
+#[derive(Debug, Clone, Copy)]
+pub struct Line {
+    pub grey: f32,
+    pub alpha: f32,
+}
+
+/// Colours in sRGB, as they are named everywhere else.
+struct Colors {
+    land: [f32; 3],
+    land_high: [f32; 3],
+    sea: [f32; 3],
+    shelf: [f32; 3],
+    deep: [f32; 3],
+    hatch: [f32; 3],
+    air: [f32; 3],
+    sky: [f32; 3],
+    lake: [f32; 3],
+    shading: f32,
+    sun_share: f32,
+    coast: Line,
+    border: Line,
+}
+
+const DARK: Colors = Colors {
+    land: [0.25, 0.265, 0.28],
+    land_high: [0.37, 0.38, 0.39],
+    sea: [0.035, 0.075, 0.14],
+    shelf: [0.08, 0.15, 0.235],
+    deep: [0.018, 0.042, 0.09],
+    hatch: [0.05, 0.06, 0.07],
+    air: [0.30, 0.50, 0.80],
+    sky: [0.012, 0.016, 0.028],
+    lake: [0.06, 0.115, 0.19],
+    shading: 0.9,
+    sun_share: 1.0,
+    coast: Line {
+        grey: 0.80,
+        alpha: 0.50,
+    },
+    border: Line {
+        grey: 0.70,
+        alpha: 0.28,
+    },
+};
+
+const LIGHT: Colors = Colors {
+    land: [0.80, 0.79, 0.765],
+    land_high: [0.87, 0.865, 0.85],
+    sea: [0.62, 0.695, 0.755],
+    shelf: [0.69, 0.755, 0.80],
+    deep: [0.52, 0.61, 0.685],
+    hatch: [-0.06, -0.055, -0.05],
+    air: [0.62, 0.74, 0.87],
+    sky: [0.945, 0.955, 0.965],
+    lake: [0.66, 0.735, 0.79],
+    shading: 0.35,
+    sun_share: 0.45,
+    coast: Line {
+        grey: 0.20,
+        alpha: 0.60,
+    },
+    border: Line {
+        grey: 0.35,
+        alpha: 0.40,
+    },
+};
+
+/// Lines over a thematic map or a relief with colours of its own: their grey, opacities of coasts and of borders.
+const OVER_COLORS: [f32; 3] = [0.06, 0.75, 0.35];
+
+fn colors(base_map: BaseMap) -> &'static Colors {
+    match base_map {
+        BaseMap::Dark => &DARK,
+        BaseMap::Light => &LIGHT,
+    }
+}
+
+/// Coasts over the plain globe.
+pub fn coast(base_map: BaseMap) -> Line {
+    colors(base_map).coast
+}
+
+/// A colour as composition computes with it: linear light.
+fn composed(srgb: [f32; 3]) -> Vec3 {
+    linear_of(srgb.into())
+}
+
+/// The same of a grey.
+pub fn composed_grey(srgb: f32) -> f32 {
+    composed([srgb; 3]).x
+}
+
+fn sum(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+}
+
+impl BaseMapParams {
+    /// The plain globe in the colours of a base map, before a background.
+    pub fn of(base_map: BaseMap, background: Background) -> Self {
+        let colors = colors(base_map);
+        let [over_grey, over_coast_alpha, over_border_alpha] = OVER_COLORS;
+        Self {
+            land: composed(colors.land),
+            shading: colors.shading,
+            land_high: composed(colors.land_high),
+            high_m: HIGH_M,
+            sea: composed(colors.sea),
+            border_grey: composed_grey(colors.border.grey),
+            shelf: composed(colors.shelf),
+            border_alpha: colors.border.alpha,
+            deep: composed(colors.deep),
+            deep_m: DEEP_M,
+            // A difference of composed colours, so that sea of any depth is hatched alike.
+            hatch: composed(sum(colors.sea, colors.hatch)) - composed(colors.sea),
+            air_depth: AIR_DEPTH,
+            air: composed(colors.air),
+            air_height: AIR_HEIGHT,
+            sky: composed(colors.sky),
+            sky_alpha: f32::from(u8::from(background == Background::Sky)),
+            lake: composed(colors.lake),
+            sun_share: colors.sun_share,
+            over_grey: composed_grey(over_grey),
+            over_coast_alpha,
+            over_border_alpha,
+        }
+    }
+}
