@@ -3,7 +3,6 @@
 use std::io::{BufRead as _, BufReader};
 use std::os::unix::process::ExitStatusExt as _;
 use std::process::{Command, Stdio};
-use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use kafka_log::KafkaLog;
@@ -15,15 +14,20 @@ use crate::own_topics::{end, open, own_settings, servers};
 /// Says to this program, started again, that it is a reader to be killed: `PREFIX,GROUP`.
 const READER: &str = "FLUXGLOBE_TEST_READER";
 const SEED: &str = "FLUXGLOBE_TEST_SEED";
-/// What a reader prints when it begins to work.
+/// What a reader prints when it has got a batch, before it finishes it.
 const AT_WORK: &str = "at work";
 const SIGKILL: i32 = 9;
 const MESSAGES: usize = 1500;
-const KILLS: u32 = 24;
+/// Messages that a reader takes at once.
+const BATCH: usize = 8;
 /// Groups that are read at the same time: each waits some seconds until a killed member is missed.
 const GROUPS: u32 = 6;
-/// A reader is killed at most so long after it began to work, milliseconds.
-const LONGEST_LIFE_MS: u64 = 400;
+const KILLS_PER_GROUP: usize = 4;
+/// A reader that is not killed by then waits for it: something is left to do, however fast a machine is.
+const LONGEST_LIFE_BATCHES: usize = 40;
+const _: () = assert!(KILLS_PER_GROUP * LONGEST_LIFE_BATCHES * BATCH < MESSAGES);
+/// A reader is killed at most so long after it got a batch, microseconds: while it finishes it, or later.
+const LONGEST_DELAY_US: u64 = 10_000;
 
 /// Numbers that look random and follow from a seed (xorshift).
 struct Random(u64);
@@ -69,16 +73,16 @@ fn what_follows_is_there_once_however_often_a_reader_is_killed() {
     runtime
         .block_on(own.log.append(&notices("a", MESSAGES)))
         .unwrap();
-    let killed = AtomicU32::new(0);
     std::thread::scope(|scope| {
         for number in 0..GROUPS {
-            let (killed, prefix) = (&killed, &own.settings.kafka_topic_prefix);
+            let prefix = &own.settings.kafka_topic_prefix;
             scope.spawn(move || {
                 let mut random = Random(seed.wrapping_add(u64::from(number)).max(1));
                 let mut waits = vec![];
-                while killed.fetch_add(1, Ordering::Relaxed) < KILLS {
-                    let life_ms = random.below(LONGEST_LIFE_MS);
-                    waits.push(live_and_die(prefix, &group_name(number), life_ms));
+                for _ in 0..KILLS_PER_GROUP {
+                    let batches = 1 + random.below(LONGEST_LIFE_BATCHES as u64) as usize;
+                    let delay = Duration::from_micros(random.below(LONGEST_DELAY_US));
+                    waits.push(live_and_die(prefix, &group_name(number), batches, delay));
                 }
                 println!("group {number}: readers at work after {waits:.1?}");
             });
@@ -87,10 +91,8 @@ fn what_follows_is_there_once_however_often_a_reader_is_killed() {
     runtime.block_on(async {
         for group in (0..GROUPS).map(group_name) {
             let left = lag(&own.log, &group).await;
-            println!(
-                "{group}: at most {left} of {MESSAGES} left after {KILLS} kills of {GROUPS} groups"
-            );
-            assert!(left > 0, "done before it was killed: make more messages");
+            println!("{group}: at most {left} of {MESSAGES} left after {KILLS_PER_GROUP} kills");
+            assert!(left > 0, "readers did more than they may");
             work_off(&own.log, &group).await;
         }
         assert_one_each(&own.log, MESSAGES * GROUPS as usize).await;
@@ -98,9 +100,9 @@ fn what_follows_is_there_once_however_often_a_reader_is_killed() {
     });
 }
 
-/// Starts a reader in a process of its own, waits until it works, and kills it. Says how long it was until it worked: its
-/// predecessor's death must be noticed first.
-fn live_and_die(prefix: &str, group: &str, life_ms: u64) -> Duration {
+/// Starts a reader in a process of its own and kills it `delay` after it got its batch number `batches`. Says how long it
+/// was until it worked: its predecessor's death must be noticed first.
+fn live_and_die(prefix: &str, group: &str, batches: usize, delay: Duration) -> Duration {
     let start = Instant::now();
     let mut reader = Command::new(std::env::current_exe().unwrap())
         .args(["--exact", "--nocapture"])
@@ -109,23 +111,26 @@ fn live_and_die(prefix: &str, group: &str, life_ms: u64) -> Duration {
         .stdout(Stdio::piped())
         .spawn()
         .unwrap();
-    let mut lines = BufReader::new(reader.stdout.take().unwrap()).lines();
-    let is_at_work = lines
-        .by_ref()
-        .map_while(Result::ok)
-        .any(|line| line.contains(AT_WORK));
-    assert!(is_at_work, "the reader ended before it was killed");
+    let lines = BufReader::new(reader.stdout.take().unwrap()).lines();
+    let lines = lines.map_while(Result::ok);
+    let mut got = lines.filter(|line| line.contains(AT_WORK));
+    assert!(got.next().is_some(), "the reader ended before it worked");
     let until_at_work = start.elapsed();
-    std::thread::sleep(Duration::from_millis(life_ms));
+    if batches > 1 {
+        let last = got.nth(batches - 2);
+        assert!(last.is_some(), "the reader ended before it was killed");
+    }
+    std::thread::sleep(delay);
     // SIGKILL: it says good-bye to nobody. One that ended by itself before proves nothing.
     reader.kill().unwrap();
     let status = reader.wait().unwrap();
     assert_eq!(status.signal(), Some(SIGKILL));
-    drop(lines);
+    // Until now, or printing to nobody would have ended it.
+    drop(got);
     until_at_work
 }
 
-/// Reads and finishes out of order until it is killed.
+/// Reads and finishes out of order until it is killed, `LONGEST_LIFE_BATCHES` batches at most.
 async fn be_a_reader(prefix_and_group: &str) {
     let (prefix, group) = prefix_and_group.split_once(',').unwrap();
     let mut settings = own_settings(&servers());
@@ -133,16 +138,19 @@ async fn be_a_reader(prefix_and_group: &str) {
     settings.kafka_instance = Some(format!("reader-{group}"));
     let log = KafkaLog::connect(&settings).await.unwrap();
     let mut reader = log.join(FROM, group).await.unwrap();
-    let mut is_at_work = false;
-    loop {
-        let messages = reader.next(8, MOMENT).await.unwrap();
-        if !messages.is_empty() && !std::mem::replace(&mut is_at_work, true) {
-            println!("{AT_WORK}");
+    let mut batches = 0;
+    while batches < LONGEST_LIFE_BATCHES {
+        let messages = reader.next(BATCH, MOMENT).await.unwrap();
+        if messages.is_empty() {
+            continue;
         }
+        batches += 1;
+        println!("{AT_WORK}");
         let (even, odd): (Vec<_>, Vec<_>) = messages.iter().partition(|m| m.origin.offset % 2 == 0);
         for part in [odd, even] {
             let done = part.into_iter().map(|m| finished_by(group, m)).collect();
             reader.finish(done).await.unwrap();
         }
     }
+    std::future::pending().await
 }
