@@ -118,6 +118,9 @@ pub(crate) struct BenchQuality {
     /// Width and height of the globe views, pixels, 16 to 512.
     #[arg(long, default_value_t = 160, value_parser = value_parser!(u32).range(16..=512))]
     pub(crate) size: u32,
+    /// Particles of a cell at most, 1 to 256, on grids of coarse cells; as the product draws them if absent.
+    #[arg(long, value_parser = value_parser!(u32).range(1..=256))]
+    pub(crate) particles_per_cell: Option<u32>,
     /// Which scenes.
     #[arg(long, value_enum, default_value_t = QualityScenes::Usual)]
     pub(crate) scenes: QualityScenes,

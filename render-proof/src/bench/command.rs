@@ -15,6 +15,7 @@ use render::{Backend, Image, Renderer, Scene};
 use serde::Serialize;
 
 use crate::bench::classic::{self, Classic};
+use crate::bench::served::{Joined, Served};
 use crate::bench::stats::Times;
 use crate::bench::{encode, frames, scenery, tiles, twins};
 use crate::fill::timing;
@@ -53,6 +54,10 @@ pub struct RenderBench {
     /// Compare each picture with the same one in double precision, which takes minutes.
     #[arg(long)]
     reference: bool,
+    /// Draw what the product draws: cells joined where they are under half a pixel, over the globe with coasts, sea, sea floor
+    /// and air; the particles are compared with those of all cells before anything is timed.
+    #[arg(long)]
+    as_served: bool,
     /// Volume tiles; 0 leaves them out.
     #[arg(long, default_value_t = 0)]
     tiles: usize,
@@ -92,6 +97,7 @@ struct Row {
     height: u32,
     slices: u32,
     tilt_deg: f64,
+    joined: Option<Joined>,
     measured: frames::Measured,
     classic: Option<Against>,
     twins: Option<(Times, usize)>,
@@ -221,7 +227,16 @@ fn series(
         for &slices in &args.slices {
             for &tilt_deg in &args.tilts {
                 let job = jobs(size_px, slices, tilt_deg)?;
-                let row = row(args, gpu, stages, (&job, tilt_deg), scene)?;
+                if !args.as_served {
+                    let row = row(args, gpu, stages, (&job, tilt_deg), scene)?;
+                    report(args, &job, &row);
+                    continue;
+                }
+                let served = Served::of(gpu, stages, &job, scene)?;
+                let (job, scene) = (served.job, served.scene);
+                let mut row = row(args, gpu, stages, (&job, tilt_deg), &scene)?;
+                row.particles = served.joined.particles;
+                row.joined = Some(served.joined);
                 report(args, &job, &row);
             }
         }
@@ -259,6 +274,7 @@ fn row(
         height,
         slices: job.style.slices,
         tilt_deg,
+        joined: None,
         measured,
         classic,
         twins,
@@ -363,6 +379,18 @@ fn report(args: &RenderBench, job: &RenderJob, row: &Row) {
     }
     let m = &row.measured;
     report_frames(job, row.particles, m);
+    if let Some(joined) = &row.joined {
+        say(&format!(
+            "  as served, tilt {}: from {} cells, joined in {:.0} ms; from the picture of all cells: {}",
+            row.tilt_deg,
+            joined.cells,
+            joined.once_ms,
+            joined
+                .from_all_cells
+                .as_ref()
+                .map_or_else(|| "none joined".to_owned(), in_words)
+        ));
+    }
     if let Some(c) = &row.classic {
         let clock = match c.clock {
             Clock::Device => "device",

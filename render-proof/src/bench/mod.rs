@@ -6,6 +6,7 @@ pub mod command;
 pub mod encode;
 pub mod frames;
 pub mod scenery;
+pub mod served;
 pub mod stats;
 pub mod tiles;
 pub mod twins;

@@ -161,6 +161,50 @@ fn past_the_edge_of_a_region_slices_and_light_move_without_jumps() {
     }
 }
 
+/// Steps on either side of one that say what a step of the camera changes.
+const NEIGHBOURS: usize = 4;
+/// A step over a change of detail may change the picture by so many levels in the mean more than those beside it.
+const MOST_MORE_LEVELS: f64 = 0.35;
+
+/// The steps of a series that change a picture by more than those beside them, with how much more, levels in the mean.
+fn jumps(changes: &[f64]) -> Vec<(usize, f64)> {
+    let beside = |step: usize| {
+        let around = step.saturating_sub(NEIGHBOURS)..changes.len().min(step + NEIGHBOURS + 1);
+        let mut beside: Vec<f64> = around
+            .filter(|at| *at != step)
+            .map(|at| changes[at])
+            .collect();
+        beside.sort_unstable_by(f64::total_cmp);
+        beside[beside.len() / 2]
+    };
+    (0..changes.len())
+        .map(|step| (step, changes[step] - beside(step)))
+        .filter(|(_, more)| *more > MOST_MORE_LEVELS)
+        .collect()
+}
+
+#[test]
+fn fewer_particles_and_joined_cells_come_without_a_jump() {
+    let renderer = Renderer::new(Backend::Cpu).unwrap();
+    let scene = ocean(REGION);
+    // From nine particles a cell to one, then over two joinings of cells.
+    let picture = |step: usize| {
+        let height_m = 4.0e5 * 1.02_f64.powi(step as i32);
+        let job = job(Mode::Volume, globe(-135.0, 20.5, height_m, 128));
+        renderer.render(&job, &scene).unwrap()
+    };
+    let mut before = picture(0);
+    let changes: Vec<f64> = (1..150)
+        .map(|step| {
+            let after = picture(step);
+            change(&std::mem::replace(&mut before, after), &before).0
+        })
+        .collect();
+    println!("{changes:.2?}");
+    let found = jumps(&changes);
+    assert!(found.is_empty(), "{found:.2?}");
+}
+
 #[test]
 fn a_jump_is_told_from_a_move() {
     let renderer = Renderer::new(Backend::Cpu).unwrap();

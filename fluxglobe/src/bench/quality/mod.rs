@@ -50,10 +50,16 @@ pub(crate) async fn run(settings: &Settings, options: BenchQuality) -> Result<()
     let mut scenes = vec![];
     for outline in outlines {
         let made = scenes::subject(outline, &desk, &store, product.as_ref(), options.size).await?;
-        let Some(subject) = made else {
+        let Some(mut subject) = made else {
             bar.inc(1);
             continue;
         };
+        // Cells of a region are drawn with one particle, as fine cells are.
+        if let Some(most) = options.particles_per_cell
+            && subject.job.style.particles_per_cell > 1
+        {
+            subject.job.style.particles_per_cell = most;
+        }
         bar.set_message(subject.name.clone());
         let (desk, slices) = (desk.clone(), options.slices.clone());
         let measure = move || -> Result<(String, Quality)> {
