@@ -79,7 +79,7 @@ pub fn draw(plan: &Plan, part: Part, scene: &Scene) -> Result<Vec<u8>, RenderErr
             light::cpu::shade(&params, &buffer, &mut splats);
         }
         let (list_ends, entries) = binned(&params, &splats)?;
-        eye::cpu::eye(&params, &list_ends, &entries, &mut picture);
+        eye::cpu::eye(&params, &list_ends, &entries, &plan.coast, &mut picture);
     }
     let mut image = vec![0u32; pixels];
     if params.in_context {

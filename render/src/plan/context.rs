@@ -151,6 +151,7 @@ fn plain_globe(plan: &mut Plan, job: &RenderJob, camera: &Camera) {
         plan.coast = masks::of(&job.view, wanted, || ground::mask(camera, size_px, wanted));
         context.coast_row_words = size_px[0];
     }
+    context.land_hides = u32::from(wanted.land);
     context.coast_on = u32::from(wanted.coasts || wanted.borders);
     // On a map the lines would vanish below the colours.
     context.coast_above = u32::from(job.mode == Mode::Map);

@@ -10,6 +10,12 @@ pub const SCREEN_TILE_PX: u32 = 16;
 pub const SCREEN_TILE_SHIFT: u32 = 8;
 /// Positions on the screen are whole multiples of this part of a pixel, so that no two tiles round them differently.
 pub const SUBPIXELS: i32 = 16;
+/// What lies deeper than this below the sea surface is sunk, m: out of the sheet, whose lower half it is.
+pub const SUNK_M: f32 = 10_000.0;
+/// In the size of an entry: it is sunk, and land hides it.
+pub const SUNK_BIT: u32 = 0x8000;
+/// In the size of an entry: its radius.
+pub const RADIUS_BITS: u32 = 0x7fff;
 /// `ListParams::long_list`: no list is cut into parts.
 pub const NEVER_LONG: u32 = u32::MAX;
 /// Entries of a part of a long list.
@@ -142,6 +148,8 @@ shared_struct! {
         pub day: f32,
         /// Red, green, blue, strength; 8 bits each, red lowest.
         pub color: u32,
+        /// 1: deeper than [`SUNK_M`] below the sea surface of a globe view.
+        pub is_sunk: u32,
     }
 }
 
@@ -151,7 +159,7 @@ shared_struct! {
         /// Centre from the screen tile's corner, east in the low and south in the high 16 bits, both signed, in
         /// subpixels shifted right by `ListParams::entry_shift`.
         pub place: u32,
-        /// Radius in the same unit in the low 16 bits, optical depth at the centre times `depth_one` of the lists in the high.
+        /// Radius in the same unit in the low 15 bits, then [`SUNK_BIT`], optical depth at the centre times `depth_one` of the lists in the high.
         pub size: u32,
         /// Red, green, blue, slice; 8 bits each, red lowest.
         pub color: u32,

@@ -36,7 +36,7 @@ struct Particle {
 }
 struct Splat {
     x_sub: i32, y_sub: i32, radius_px: f32, tau: f32, slice: f32, light_u: i32, light_v: i32, light_depth: f32,
-    day: f32, color: u32,
+    day: f32, color: u32, is_sunk: u32,
 }
 struct Entry {
     place: u32, size: u32, color: u32,
@@ -56,6 +56,9 @@ const SQUARE: u32 = 16u;
 const SCREEN_TILE_PX: u32 = 16u;
 const SCREEN_TILE_SHIFT: u32 = 8u;
 const SUBPIXELS: i32 = 16;
+const SUNK_M: f32 = 10000.0;
+const SUNK_BIT: u32 = 0x8000u;
+const RADIUS_BITS: u32 = 0x7fffu;
 const PART_ENTRIES: u32 = 1024u;
 const MOST_HOT_PARTS: u32 = 4096u;
 const NO_LIST: u32 = 0xffffffffu;

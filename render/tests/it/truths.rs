@@ -267,13 +267,18 @@ fn clouds(side_px: u32) -> Params {
 
 /// Binned and seen by the eye.
 fn seen(params: &mut Params, splats: &[Splat]) -> Vec<Vec4> {
+    seen_over(params, splats, &[])
+}
+
+/// The same over a ground with this mask.
+fn seen_over(params: &mut Params, splats: &[Splat], coast: &[u32]) -> Vec<Vec4> {
     params.view.tiles = (params.view.size_px + SCREEN_TILE_PX - 1) / SCREEN_TILE_PX;
     let mut ends = vec![0; list_count(params) as usize];
     bin::cpu::count(params, splats, &mut ends);
     let mut entries = vec![Entry::default(); bin::cpu::scan(&mut ends) as usize];
     bin::cpu::scatter(params, splats, &mut ends, &mut entries);
     let mut picture = vec![Vec4::ZERO; params.view.size_px.element_product() as usize];
-    eye::cpu::eye(params, &ends, &entries, &mut picture);
+    eye::cpu::eye(params, &ends, &entries, coast, &mut picture);
     picture
 }
 
@@ -304,6 +309,36 @@ fn one_cloud_is_an_analytic_disc() {
             assert!((f64::from(color.x) - expected).abs() < 5e-4 && color.z <= color.w);
         }
     }
+}
+
+#[test]
+fn land_hides_what_is_sunk_behind_it_and_nothing_else() {
+    let mut params = clouds(40);
+    params.in_context = true;
+    params.context.land_hides = 1;
+    params.context.coast_row_words = 40;
+    // Sea, half land, land.
+    let share = |x: usize| [0u32, 128, 255][x / 14];
+    let coast: Vec<u32> = (0..1600).map(|at| share(at % 40)).collect();
+    let cloud = |is_sunk: u32| Splat {
+        x_sub: 20 * 16,
+        y_sub: 20 * 16,
+        radius_px: 25.0,
+        tau: 1.0,
+        slice: 2.5,
+        color: 0x00ff_ffff,
+        is_sunk,
+        ..Splat::default()
+    };
+    let risen = seen_over(&mut params, &[cloud(0)], &coast);
+    let sunk = seen_over(&mut params, &[cloud(1)], &coast);
+    let depth = |picture: &[Vec4], x: usize| -(1.0 - picture[20 * 40 + x].w).ln();
+    for (x, kept) in [(10, 1.0), (16, 127.0 / 255.0), (30, 0.0)] {
+        let of_all = depth(&sunk, x) / depth(&risen, x);
+        assert!((of_all - kept).abs() < 2e-3, "{x}: {of_all}");
+    }
+    params.context.land_hides = 0;
+    assert_eq!(seen_over(&mut params, &[cloud(1)], &coast), risen);
 }
 
 #[test]

@@ -36,7 +36,7 @@ fn scatter_own(at: u32) {
     if (any(reach.low > reach.high)) { return; }
     var color = near.w;
     if (lighting.mode != LIGHT_OFF) {
-        let radius_px = f32((near.z & 0xffffu) << lists.entry_shift) / f32(SUBPIXELS);
+        let radius_px = f32((near.z & RADIUS_BITS) << lists.entry_shift) / f32(SUBPIXELS);
         color = shaded(color, vec2(bitcast<i32>(far.x), bitcast<i32>(far.y)), slice, bitcast<f32>(far.w), radius_px);
     }
     color = (color & 0xffffffu) | (u32(slice) << 24u);

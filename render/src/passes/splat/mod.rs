@@ -10,7 +10,7 @@ use crate::frame_context::FrameContext;
 use crate::gpu::{Gpu, Kernel};
 use crate::passes::store::Stored;
 use crate::stages::bin::params::ListParams;
-use crate::stages::layout::{SUBPIXELS, Splat};
+use crate::stages::layout::{RADIUS_BITS, SUBPIXELS, SUNK_BIT, Splat};
 use crate::stages::params::Uniform::{
     Cells, Grid, Lighting, Lists, Particles, Projection, Values, View,
 };
@@ -44,7 +44,7 @@ pub fn unpacked(seen: [u32; 4], lit: [u32; 4], lists: &ListParams) -> Splat {
     Splat {
         x_sub: seen[0] as i32,
         y_sub: seen[1] as i32,
-        radius_px: ((seen[2] & 0xffff) << lists.entry_shift) as f32 / SUBPIXELS as f32,
+        radius_px: ((seen[2] & RADIUS_BITS) << lists.entry_shift) as f32 / SUBPIXELS as f32,
         tau: (seen[2] >> 16) as f32 / lists.depth_one,
         slice: f32::from_bits(lit[2]),
         light_u: lit[0] as i32,
@@ -52,6 +52,7 @@ pub fn unpacked(seen: [u32; 4], lit: [u32; 4], lists: &ListParams) -> Splat {
         light_depth: 0.0,
         day: f32::from_bits(lit[3]),
         color: seen[3],
+        is_sunk: u32::from(seen[2] & SUNK_BIT != 0),
     }
 }
 

@@ -1,6 +1,8 @@
 //! CPU twin of `reach.wgsl`, `bin.wgsl` and of the second half of the sort in `scatter.wgsl`.
 
-use crate::stages::layout::{Entry, KERNEL_CLOUD, SCREEN_TILE_SHIFT, SUBPIXELS, Splat, nearest};
+use crate::stages::layout::{
+    Entry, KERNEL_CLOUD, SCREEN_TILE_SHIFT, SUBPIXELS, SUNK_BIT, Splat, nearest,
+};
 use crate::stages::params::Params;
 
 const MOST_DEPTH: f32 = 65_535.0;
@@ -68,7 +70,8 @@ pub fn scan(counts: &mut [u32]) -> u32 {
 /// Writes every entry and moves each list's start to its end.
 pub fn scatter(params: &Params, splats: &[Splat], counts: &mut [u32], entries: &mut [Entry]) {
     for splat in splats {
-        let size = radius_of(params, splat) as u32 | (depth_of(params, splat) << 16);
+        let radius = radius_of(params, splat) as u32;
+        let size = radius | (splat.is_sunk * SUNK_BIT) | (depth_of(params, splat) << 16);
         let color = (splat.color & 0x00ff_ffff) | ((splat.slice as u32) << 24);
         for list in lists_of(params, splat) {
             let tile = list as u32 / params.view.slices;

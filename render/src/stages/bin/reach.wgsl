@@ -7,7 +7,7 @@ const MOST_DEPTH = 65535.0;
 // First and last screen tile that a splat touches, x and y; empty if it touches none.
 struct Reach { low: vec2<i32>, high: vec2<i32> }
 
-// Radius in the low and depth in the high 16 bits, as in an entry; 0 draws nothing.
+// Radius, whether it is sunk, and depth, as in an entry; 0 draws nothing.
 fn size_word(splat: Splat) -> u32 {
     let radius = max(nearest(splat.radius_px * f32(SUBPIXELS)) >> lists.entry_shift, 1);
     var tau = splat.tau;
@@ -18,12 +18,12 @@ fn size_word(splat: Splat) -> u32 {
     }
     let depth = u32(min(tau * lists.depth_one, MOST_DEPTH) + 0.5);
     if (splat.tau <= 0.0 || depth == 0u) { return 0u; }
-    return u32(radius) | (depth << 16u);
+    return u32(radius) | (splat.is_sunk * SUNK_BIT) | (depth << 16u);
 }
 
 fn reach_of(place: vec2<i32>, size: u32) -> Reach {
     if (size == 0u) { return Reach(vec2(0), vec2(-1)); }
-    let radius = i32(size & 0xffffu) << lists.entry_shift;
+    let radius = i32(size & RADIUS_BITS) << lists.entry_shift;
     let tiles = vec2<i32>(view.tiles);
     return Reach(max((place - radius) >> vec2(SCREEN_TILE_SHIFT), vec2(0)), min((place + radius) >> vec2(SCREEN_TILE_SHIFT), tiles - 1));
 }

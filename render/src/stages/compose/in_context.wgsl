@@ -2,7 +2,7 @@
 // those of the stages that compose.
 struct ContextParams {
     surface: u32, has_water: u32, night_on: u32, terrain_on: u32, sea_floor_on: u32, terrain_slope: f32, seabed_per_m: f32, coast_on: u32,
-    coast_above: u32, coast_grey: f32, coast_alpha: f32, coast_row_words: u32,
+    coast_above: u32, coast_grey: f32, coast_alpha: f32, coast_row_words: u32, land_hides: u32,
 }
 @group(0) @binding(27) var<uniform> context: ContextParams;
 @group(0) @binding(5) var<storage, read> terrain: array<f32>;
@@ -101,6 +101,12 @@ fn ground_color(spot: Spot, pixel: vec2<u32>) -> vec4<f32> {
         lit = hazy(lit_plain(spot, ground, pixel), spot.ground);
     }
     return seen + vec4(lit, 1.0) * spot.cover;
+}
+
+// Share of land in a pixel of a globe view, 255ths.
+fn land_share(pixel: vec2<u32>) -> u32 {
+    let place = pixel + vec2<u32>(view.origin_px);
+    return coast[place.y * context.coast_row_words + place.x] & 255u;
 }
 
 // What lies in a pixel of a globe view: shares of land, lakes, shores and borders.

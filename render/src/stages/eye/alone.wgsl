@@ -4,21 +4,23 @@
 const STRIDE = 4u; // rows between an invocation's pixels
 
 // An entry as the pixels of one column see it.
-struct Near { radius_px: f32, inverse_radius: f32, south: f32, east: f32, depth: f32, rgb: vec3<u32> }
+struct Near { radius_px: f32, inverse_radius: f32, south: f32, east: f32, depth: f32, rgb: vec3<u32>, is_hidden: bool }
 
 fn near_of(entry: Entry, column: f32) -> Near {
     let pixel_units = f32(SUBPIXELS) / f32(1u << lists.entry_shift);
-    let radius_px = f32(entry.size & 0xffffu) / pixel_units;
+    let radius_px = f32(entry.size & RADIUS_BITS) / pixel_units;
     let place = vec2(f32(i32(entry.place << 16u) >> 16u), f32(i32(entry.place) >> 16u)) / pixel_units;
     let inverse_radius = 1.0 / radius_px;
     let rgb = light_of(entry.color);
-    return Near(radius_px, inverse_radius, place.y, (column - place.x) * inverse_radius, f32(entry.size >> 16u), rgb);
+    return Near(radius_px, inverse_radius, place.y, (column - place.x) * inverse_radius, f32(entry.size >> 16u), rgb,
+        is_hidden_by_land(entry));
 }
 
-// What an entry gives to the pixel of a row; nothing beyond its radius.
-fn given(near: Near, row: f32) -> vec4<u32> {
+// What an entry gives to the pixel of a row, where so much of what is sunk is kept; nothing beyond its radius.
+fn given(near: Near, row: f32, kept: f32) -> vec4<u32> {
     let south = (row - near.south) * near.inverse_radius;
-    let amount = u32(near.depth * weight_at(near.east * near.east + south * south, near.radius_px) + 0.5);
+    let amount = u32(near.depth * weight_at(near.east * near.east + south * south, near.radius_px)
+        * select(1.0, kept, near.is_hidden) + 0.5);
     var rgb = near.rgb;
     if (KERNEL == KERNEL_BALL) { rgb = vec3<u32>(vec3<f32>(rgb) * ball_light(vec2(near.east, south)) + 0.5); }
     return vec4(sixteenth(rgb * amount), amount);
@@ -26,6 +28,12 @@ fn given(near: Near, row: f32) -> vec4<u32> {
 
 fn more(sums: vec4<u32>, given: vec4<u32>) -> vec4<u32> {
     return sums + min(given, vec4(MOST_SUM) - sums);
+}
+
+// What a pixel keeps of something sunk.
+fn kept_at(pixel: vec2<u32>) -> f32 {
+    if (!IN_CONTEXT || context.land_hides == 0u || any(pixel >= view.size_px)) { return 1.0; }
+    return kept_by_land(land_share(pixel));
 }
 
 fn show(pixel: vec2<u32>, color: vec4<f32>) {
@@ -41,6 +49,8 @@ fn alone(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_
     var color_1 = vec4(0.0);
     var color_2 = vec4(0.0);
     var color_3 = vec4(0.0);
+    let pixel = workgroup.xy * SCREEN_TILE_PX + local.xy;
+    let kept = vec4(kept_at(pixel), kept_at(pixel + vec2(0u, STRIDE)), kept_at(pixel + vec2(0u, 2u * STRIDE)), kept_at(pixel + vec2(0u, 3u * STRIDE)));
     var begin = 0u;
     if (first_list > 0u) { begin = min(list_ends[first_list - 1u], lists.entry_capacity); }
     for (var slice = 0u; slice < view.slices; slice++) {
@@ -52,10 +62,10 @@ fn alone(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_
             var own_3 = vec4(0u);
             for (var at = begin; at < end; at++) {
                 let near = near_of(entries[at], center.x);
-                own_0 = more(own_0, given(near, center.y));
-                own_1 = more(own_1, given(near, center.y + stride));
-                own_2 = more(own_2, given(near, center.y + 2.0 * stride));
-                own_3 = more(own_3, given(near, center.y + 3.0 * stride));
+                own_0 = more(own_0, given(near, center.y, kept.x));
+                own_1 = more(own_1, given(near, center.y + stride, kept.y));
+                own_2 = more(own_2, given(near, center.y + 2.0 * stride, kept.z));
+                own_3 = more(own_3, given(near, center.y + 3.0 * stride, kept.w));
             }
             color_0 = blended(color_0, own_0);
             color_1 = blended(color_1, own_1);
@@ -64,7 +74,6 @@ fn alone(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_
         }
         begin = end;
     }
-    let pixel = workgroup.xy * SCREEN_TILE_PX + local.xy;
     show(pixel, color_0);
     show(pixel + vec2(0u, STRIDE), color_1);
     show(pixel + vec2(0u, 2u * STRIDE), color_2);

@@ -1,8 +1,10 @@
 //! CPU twin of `eye.wgsl`. Every entry visits only the pixels it can reach: the order inside a slice cannot matter.
 
-use glam::{Vec2, Vec4};
+use glam::{UVec2, Vec2, Vec4};
 
-use crate::stages::layout::{Entry, KERNEL_BALL, KERNEL_CLOUD, SCREEN_TILE_PX, SUBPIXELS};
+use crate::stages::layout::{
+    Entry, KERNEL_BALL, KERNEL_CLOUD, RADIUS_BITS, SCREEN_TILE_PX, SUBPIXELS, SUNK_BIT,
+};
 use crate::stages::params::Params;
 
 const MOST_SUM: u32 = 0x7fff_ffff;
@@ -56,8 +58,34 @@ pub fn blended(params: &Params, picture: Vec4, sums: [u32; 4]) -> Vec4 {
     }
 }
 
-/// Every pixel from the lists that end where `list_ends` says.
-pub fn eye(params: &Params, list_ends: &[u32], entries: &[Entry], picture: &mut [Vec4]) {
+/// What pixels of a screen tile keep of something that is sunk: all where no land hides it.
+type Kept = [f32; TILE * TILE];
+
+/// `coast` is the mask of the whole picture.
+fn kept_by_land(params: &Params, coast: &[u32], corner: [u32; 2]) -> Kept {
+    let mut kept = [1.0; TILE * TILE];
+    if params.in_context && params.context.land_hides == 1 {
+        let (size, origin) = (params.view.size_px, params.view.origin_px.as_uvec2());
+        for (at, kept) in (0..).zip(&mut kept) {
+            let pixel = UVec2::from(corner) + UVec2::new(at % SCREEN_TILE_PX, at / SCREEN_TILE_PX);
+            if pixel.cmplt(size).all() {
+                let place = pixel + origin;
+                let word = coast[(place.y * params.context.coast_row_words + place.x) as usize];
+                *kept = (255 - (word & 255)) as f32 * 0.003_921_569;
+            }
+        }
+    }
+    kept
+}
+
+/// Every pixel from the lists that end where `list_ends` says; `coast` is the mask of the whole picture, if it has one.
+pub fn eye(
+    params: &Params,
+    list_ends: &[u32],
+    entries: &[Entry],
+    coast: &[u32],
+    picture: &mut [Vec4],
+) {
     for tile_y in 0..params.view.tiles.y {
         for tile_x in 0..params.view.tiles.x {
             let first_list =
@@ -68,8 +96,9 @@ pub fn eye(params: &Params, list_ends: &[u32], entries: &[Entry], picture: &mut 
                 list_ends[first_list - 1] as usize
             };
             let end = list_ends[first_list + params.view.slices as usize - 1] as usize;
-            let colors = screen_tile(params, &entries[first..end]);
             let [left, top] = [tile_x, tile_y].map(|tile| tile * SCREEN_TILE_PX);
+            let kept = kept_by_land(params, coast, [left, top]);
+            let colors = screen_tile(params, &entries[first..end], &kept);
             for y in top..(top + SCREEN_TILE_PX).min(params.view.size_px.y) {
                 for x in left..(left + SCREEN_TILE_PX).min(params.view.size_px.x) {
                     picture[(y * params.view.size_px.x + x) as usize] =
@@ -80,12 +109,12 @@ pub fn eye(params: &Params, list_ends: &[u32], entries: &[Entry], picture: &mut 
     }
 }
 
-fn screen_tile(params: &Params, list: &[Entry]) -> [Vec4; TILE * TILE] {
+fn screen_tile(params: &Params, list: &[Entry], kept: &Kept) -> [Vec4; TILE * TILE] {
     let mut colors = [Vec4::ZERO; TILE * TILE];
     for slice in list.chunk_by(|a, b| a.color >> 24 == b.color >> 24) {
         let mut sums = [[0u32; 4]; TILE * TILE];
         for entry in slice {
-            add(params, entry, &mut sums);
+            add(params, entry, kept, &mut sums);
         }
         for (color, sums) in colors.iter_mut().zip(sums) {
             *color = blended(params, *color, sums);
@@ -94,11 +123,12 @@ fn screen_tile(params: &Params, list: &[Entry]) -> [Vec4; TILE * TILE] {
     colors
 }
 
-fn add(params: &Params, entry: &Entry, sums: &mut Sums) {
+fn add(params: &Params, entry: &Entry, kept: &Kept, sums: &mut Sums) {
     let pixel_units = SUBPIXELS as f32 / (1u32 << params.lists.entry_shift) as f32;
-    let radius = (entry.size & 0xffff) as f32;
+    let radius = (entry.size & RADIUS_BITS) as f32;
     let inverse_radius = 1.0 / radius;
     let depth = (entry.size >> 16) as f32;
+    let is_sunk = entry.size & SUNK_BIT != 0;
     let rgb = [0, 8, 16].map(|shift| light_of((entry.color >> shift) & 255));
     let [east, south] =
         [(entry.place << 16) as i32 >> 16, entry.place as i32 >> 16].map(|place| place as f32);
@@ -113,8 +143,9 @@ fn add(params: &Params, entry: &Entry, sums: &mut Sums) {
             let center = Vec2::new(x as f32 + 0.5, y as f32 + 0.5) * pixel_units;
             let offset = (center - Vec2::new(east, south)) * inverse_radius;
             let q = offset.dot(offset);
-            let amount =
-                (depth * weight_at(params.lists.kernel, q, radius / pixel_units) + 0.5) as u32;
+            let weight = weight_at(params.lists.kernel, q, radius / pixel_units);
+            let kept = if is_sunk { kept[y * TILE + x] } else { 1.0 };
+            let amount = (depth * weight * kept + 0.5) as u32;
             let sum = &mut sums[y * TILE + x];
             for (channel, plain) in rgb.into_iter().enumerate() {
                 let lit = if params.lists.kernel == KERNEL_BALL {

@@ -27,6 +27,32 @@ var<workgroup> sums: array<atomic<u32>, 1024>;
 // Where the list before these slices ends, and theirs.
 var<workgroup> ends: array<u32, 65>;
 var<workgroup> is_open: u32;
+// Shares of land of the pixels, 255ths, four in a word.
+var<workgroup> land: array<u32, 64>;
+
+// What is sunk lies behind the land that a sight line meets first.
+fn is_hidden_by_land(entry: Entry) -> bool {
+    return IN_CONTEXT && context.land_hides == 1u && (entry.size & SUNK_BIT) != 0u;
+}
+
+// What is seen of something sunk where so much is land.
+fn kept_by_land(share: u32) -> f32 {
+    return f32(255u - share) * 0.003921569;
+}
+
+// Sets `land`; to be waited for.
+fn look_up_land(tile: vec2<u32>, invocation: u32) {
+    if (!IN_CONTEXT || invocation >= PIXELS / 4u) { return; }
+    var word = 0u;
+    if (context.land_hides == 1u) {
+        for (var part = 0u; part < 4u; part++) {
+            let at = invocation * 4u + part;
+            let pixel = tile * SCREEN_TILE_PX + vec2(at % SCREEN_TILE_PX, at / SCREEN_TILE_PX);
+            if (all(pixel < view.size_px)) { word |= land_share(pixel) << (8u * part); }
+        }
+    }
+    land[invocation] = word;
+}
 
 // Share of a splat's depth at a squared distance of `q` squared radii from its centre.
 fn weight_at(q: f32, radius_px: f32) -> f32 {
@@ -60,7 +86,7 @@ fn ball_light(offset: vec2<f32>) -> f32 {
 // Adds an entry to every second row of pixels.
 fn add(entry: Entry, half: i32) {
     let pixel_units = f32(SUBPIXELS) / f32(1u << lists.entry_shift);
-    let radius_px = f32(entry.size & 0xffffu) / pixel_units;
+    let radius_px = f32(entry.size & RADIUS_BITS) / pixel_units;
     let place = vec2(f32(i32(entry.place << 16u) >> 16u), f32(i32(entry.place) >> 16u)) / pixel_units;
     let depth = f32(entry.size >> 16u);
     let rgb = light_of(entry.color);
@@ -68,15 +94,18 @@ fn add(entry: Entry, half: i32) {
     let low = max(vec2<i32>(ceil(place - radius_px - 0.5)), vec2(0));
     let high = min(vec2<i32>(floor(place + radius_px - 0.5)), vec2(i32(SCREEN_TILE_PX) - 1));
     let inverse_radius = 1.0 / radius_px;
+    let is_hidden = is_hidden_by_land(entry);
     for (var y = low.y + ((low.y ^ half) & 1); y <= high.y; y += 2) {
         let south = (f32(y) + 0.5 - place.y) * inverse_radius;
         for (var x = low.x; x <= high.x; x++) {
             let east = (f32(x) + 0.5 - place.x) * inverse_radius;
-            let amount = u32(depth * weight_at(east * east + south * south, radius_px) + 0.5);
+            let pixel = u32(y) * SCREEN_TILE_PX + u32(x);
+            var kept = 1.0;
+            if (is_hidden) { kept = kept_by_land((land[pixel >> 2u] >> ((pixel & 3u) * 8u)) & 255u); }
+            let amount = u32(depth * weight_at(east * east + south * south, radius_px) * kept + 0.5);
             if (amount == 0u) { continue; }
             var own = rgb;
             if (KERNEL == KERNEL_BALL) { own = vec3<u32>(vec3<f32>(rgb) * ball_light(vec2(east, south)) + 0.5); }
-            let pixel = u32(y) * SCREEN_TILE_PX + u32(x);
             let given = sixteenth(own * amount);
             atomicAdd(&sums[pixel], given.x);
             atomicAdd(&sums[PIXELS + pixel], given.y);
@@ -129,6 +158,7 @@ fn blended(picture: vec4<f32>, sums: vec4<u32>) -> vec4<f32> {
 fn eye(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(global_invocation_id) pixel: vec3<u32>,
     @builtin(local_invocation_index) invocation: u32) {
     for (var channel = 0u; channel < 4u; channel++) { atomicStore(&sums[channel * PIXELS + invocation], 0u); }
+    look_up_land(workgroup.xy, invocation);
     let first_list = (workgroup.y * view.tiles.x + workgroup.x) * view.slices;
     var color = vec4(0.0);
     for (var first = 0u; first < view.slices; first += LOOKED_UP) {

@@ -11,7 +11,7 @@ use crate::stages::compose;
 use crate::stages::layout::{
     KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, MOST_HOT_PARTS, NEVER_LONG, SCREEN_TILE_PX,
 };
-use crate::stages::params::Uniform::Lists;
+use crate::stages::params::Uniform::{Context, Lists, View};
 use crate::stages::sizes::list_count;
 
 /// The shader.
@@ -42,8 +42,8 @@ pub struct Eye {
     /// By kind of particle, surroundings and long lists. Those of plain pictures are compiled at once, the others when
     /// they are first wanted.
     kernels: [[[OnceLock<Kernel>; 2]; 2]; 3],
-    /// Sum up the parts of long lists.
-    hot: [OnceLock<Kernel>; 3],
+    /// Sum up the parts of long lists: by kind of particle and surroundings.
+    hot: [[OnceLock<Kernel>; 2]; 3],
 }
 
 /// Workgroups that take the parts of long lists in turn: as many as a large device runs at once.
@@ -129,12 +129,16 @@ impl Eye {
     /// Sums up the parts of long lists.
     fn sum_up(&self, frame: &mut FrameContext<'_>) -> Result<(), RenderError> {
         let gpu = frame.gpu;
-        let kind = frame.params.lists.kernel;
-        let constants = [("KERNEL", f64::from(kind))];
-        let kernel = self.hot[kind as usize].get_or_init(|| {
+        let (kind, in_context) = (frame.params.lists.kernel, frame.params.in_context);
+        let constants = [
+            ("KERNEL", f64::from(kind)),
+            compose::in_context(in_context),
+        ];
+        let kernel = self.hot[kind as usize][usize::from(in_context)].get_or_init(|| {
             gpu.variant(HOT, &self.source, HOT, &constants)
-                .reading(&[Lists])
+                .reading(&[View, Context, Lists])
         });
+        let [_terrain, _axes, coast] = compose::surroundings(frame)?;
         let counts = frame.room(Slot::Counts, 4)?;
         let entries = frame.room(Slot::Entries, 4)?;
         let [lists, parts] = hot_room(frame)?;
@@ -143,6 +147,7 @@ impl Eye {
         let buffers = [
             (1, &counts),
             (2, &entries),
+            (7, &coast),
             (8, &lists),
             (9, &parts),
             (10, &sums),

@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
-use crate::stages::layout::{Col, Particle, Row, SUBPIXELS, Splat, VIEW_TILE, nearest};
+use crate::stages::layout::{Col, Particle, Row, SUBPIXELS, SUNK_M, Splat, VIEW_TILE, nearest};
 use crate::stages::params::Params;
 
 /// Half a cell beyond which the series for small angles is not good enough.
@@ -96,6 +96,7 @@ fn on_tile(params: &Params, row: &Row, col: &Col, particle: &Particle) -> Splat 
             1.0
         },
         color: particle.color,
+        is_sunk: 0,
     }
 }
 
@@ -152,6 +153,7 @@ fn on_globe(params: &Params, row: &Row, col: &Col, particle: &Particle) -> Splat
         y_sub: nearest(y * SUBPIXELS as f32) - view.origin_px.y * SUBPIXELS,
         radius_px,
         tau: particle.depth * row.depth_gain * thinned * thinned,
+        is_sunk: u32::from(particle.height_m < -SUNK_M),
         ..unseen
     }
 }

@@ -105,6 +105,7 @@ fn on_globe(particle: Particle) -> Splat {
     splat.radius_px = max(radius_px, projection.min_radius_px);
     let thinned = full_px / splat.radius_px;
     splat.tau = particle.depth * row.depth_gain * thinned * thinned;
+    splat.is_sunk = u32(particle.height_m < -SUNK_M);
     return splat;
 }
 

@@ -151,7 +151,7 @@ impl Twins {
             entries = vec![Entry::default(); bin::cpu::scan(&mut list_ends) as usize];
             bin::cpu::scatter(&params, &shaded, &mut list_ends, &mut entries);
             params.lists.entry_capacity = entries.len() as u32;
-            eye::cpu::eye(&params, &list_ends, &entries, &mut picture);
+            eye::cpu::eye(&params, &list_ends, &entries, &plan.coast, &mut picture);
         }
         let mut image = vec![0; picture.len()];
         if params.in_context {

@@ -102,6 +102,7 @@ fn eye_blends_away_from_the_light_behind_as_its_twin_does() {
         &twins.params,
         &twins.list_ends,
         &twins.entries,
+        &twins.plan.coast,
         &mut twins.picture,
     );
     assert!(
