@@ -150,7 +150,8 @@ fn cloud(
         .unwrap_or_else(|| floor + (1.0 - floor) * strength.sqrt());
     let covered = f64::from(scene.domain.content()[index]) / f64::from(COVERED);
     let column_depth = job.style.optical_depth * opacity * thin * covered;
-    let depth = column_depth * f64::from(table.depth_gain) * (full_radius / radius).powi(2);
+    let share = (f64::from(params.cells.particle_shares) - f64::from(k)).clamp(0.0, 1.0);
+    let depth = share * column_depth * f64::from(table.depth_gain) * (full_radius / radius).powi(2);
     if depth <= 0.0 {
         return None;
     }

@@ -8,9 +8,19 @@ shared_struct! {
         pub row_count: u32,
         pub slot_count: u32,
         pub particles_per_cell: u32,
+        /// The same by their shares: all are whole but the last, which comes and goes gradually as cells grow and shrink.
+        pub particle_shares: f32,
         /// Particles of its cell that one invocation makes.
         pub particles_each: u32,
         /// Places for splats, those of cells without data included.
         pub splat_count: u32,
+    }
+}
+
+impl CellParams {
+    /// Sets how many particles a cell has, the last of them in part.
+    pub(crate) fn set_particles(&mut self, particles: f64) {
+        self.particles_per_cell = particles.ceil() as u32;
+        self.particle_shares = particles as f32;
     }
 }

@@ -44,10 +44,11 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) -> f64 {
     let life_s = life_rad * SPHERE_RADIUS_M / top_m_s;
     let lives = flow.clock_s / life_s;
     let look = Look::of(job.mode);
-    let trails = look.particles_per_cell(cell_px, job.style.particles_per_cell);
-    let share = (cell_px * cell_px / look.area_px_per_particle / f64::from(trails)).min(1.0);
+    let wanted = look.particles_per_cell(cell_px, job.style.particles_per_cell);
+    let trails = wanted.ceil();
+    let share = (cell_px * cell_px / look.area_px_per_particle / trails).min(1.0);
     let params = &mut plan.params;
-    params.cells.particles_per_cell = trails * TRAIL_DOTS;
+    params.cells.set_particles(trails * f64::from(TRAIL_DOTS));
     // Nothing times what is too large for a number is still nothing.
     params.values.transfer_per_unit = params.values.transfer_per_unit.min(f32::MAX);
     let lead_steps = (0.5 * life_cells / STEP_CELLS).ceil();

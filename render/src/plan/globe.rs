@@ -68,7 +68,7 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) {
     }
     let look = Look::of(job.mode);
     let particles = look.particles_per_cell(cell_px, job.style.particles_per_cell);
-    params.cells.particles_per_cell = particles;
+    params.cells.set_particles(particles);
     let radius_px = look.radius_px(cell_px, particles);
     // Particles lifted close to the camera are left out rather than fill the picture.
     let widest_px = NEAREST_OVER_FARTHEST * radius_px + 16.0;
@@ -132,7 +132,7 @@ fn interpolate_rows(plan: &mut Plan, grid: &Grid, footprint: &Footprint) {
     };
 }
 
-fn rows(scene: &Scene, look: &Look, camera: &Camera, particles: u32, style_depth: f64) -> Vec<Row> {
+fn rows(scene: &Scene, look: &Look, camera: &Camera, particles: f64, style_depth: f64) -> Vec<Row> {
     let grid = &scene.grid;
     (0..grid.rows)
         .map(|row| {

@@ -146,20 +146,21 @@ impl Look {
         }
     }
 
-    /// Particles drawn in a cell of this side, at most what the style allows; never fewer than one.
-    pub(super) fn particles_per_cell(&self, cell_px: f64, style: u32) -> u32 {
-        let wanted = (cell_px * cell_px / self.area_px_per_particle).ceil();
-        (wanted.min(f64::from(style)) as u32).max(1)
+    /// Particles drawn in a cell of this side, at most what the style allows; never fewer than one. Not a whole number:
+    /// the last one comes gradually.
+    pub(super) fn particles_per_cell(&self, cell_px: f64, style: u32) -> f64 {
+        let wanted = cell_px * cell_px / self.area_px_per_particle;
+        wanted.min(f64::from(style)).max(1.0)
     }
 
     /// Radius of a full-size particle in a cell of this side, pixels. Clouds are larger where fewer share a cell, so
     /// that about as many overlap everywhere.
-    pub(super) fn radius_px(&self, cell_px: f64, particles: u32) -> f64 {
+    pub(super) fn radius_px(&self, cell_px: f64, particles: f64) -> f64 {
         let least = f64::from(self.min_radius_px);
         let cells = if self.center_depth.is_some() {
             self.radius_cells
         } else {
-            (CLOUDS_OVER_A_POINT / (std::f64::consts::PI * f64::from(particles)))
+            (CLOUDS_OVER_A_POINT / (std::f64::consts::PI * particles))
                 .sqrt()
                 .clamp(self.radius_cells, WIDEST_CELLS)
         };
@@ -178,13 +179,13 @@ impl Look {
         &self,
         cell_area: f64,
         radius: f64,
-        particles: u32,
+        particles: f64,
         style_depth: f64,
     ) -> f64 {
         match self.center_depth {
             Some(depth) => depth / style_depth.max(1e-6),
             None => {
-                cell_area * 3.0 / (f64::from(particles) * std::f64::consts::PI * radius * radius)
+                cell_area * 3.0 / (particles * std::f64::consts::PI * radius * radius)
             }
         }
     }

@@ -58,7 +58,7 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene, (tile, size_
     let col_px = grid.dlon_deg / 360.0 * world_px;
     let cell_px = cell_px(&job.view, grid);
     let particles = look.particles_per_cell(cell_px, job.style.particles_per_cell);
-    plan.params.cells.particles_per_cell = particles;
+    plan.params.cells.set_particles(particles);
     plan.rows = rows(
         scene,
         &level,
@@ -126,7 +126,7 @@ fn rows(
     level: &Level,
     look: &Look,
     col_px: f64,
-    particles: u32,
+    particles: f64,
     style_depth: f64,
 ) -> Vec<Row> {
     let subpixels = f64::from(SUBPIXELS);

@@ -163,10 +163,10 @@ fn past_the_edge_of_a_region_slices_and_light_move_without_jumps() {
 
 /// Steps on either side of one that say what a step of the camera changes.
 const NEIGHBOURS: usize = 4;
-/// A step over a change of detail may change the picture by so many levels in the mean more than those beside it.
-const MOST_MORE_LEVELS: f64 = 0.35;
+/// A step over a change of detail may change the picture by at most so many times what those beside it do.
+const MOST_OVER_BESIDE: f64 = 1.3;
 
-/// The steps of a series that change a picture by more than those beside them, with how much more, levels in the mean.
+/// The steps of a series that change a picture by more than those beside them, with how many times as much.
 fn jumps(changes: &[f64]) -> Vec<(usize, f64)> {
     let beside = |step: usize| {
         let around = step.saturating_sub(NEIGHBOURS)..changes.len().min(step + NEIGHBOURS + 1);
@@ -178,8 +178,8 @@ fn jumps(changes: &[f64]) -> Vec<(usize, f64)> {
         beside[beside.len() / 2]
     };
     (0..changes.len())
-        .map(|step| (step, changes[step] - beside(step)))
-        .filter(|(_, more)| *more > MOST_MORE_LEVELS)
+        .map(|step| (step, changes[step] / beside(step)))
+        .filter(|(_, times)| *times > MOST_OVER_BESIDE)
         .collect()
 }
 

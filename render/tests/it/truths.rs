@@ -102,6 +102,7 @@ fn all_particles(scene: &Scene, job: &RenderJob, carbon: &[f32]) -> (Plan, Vec<P
         .map(|cell| Active { cell, slot: 0 })
         .collect();
     plan.params.cells.particles_per_cell = 7;
+    plan.params.cells.particle_shares = 7.0;
     let mut particles = vec![Particle::default(); plan.active.len() * 7];
     let value: Vec<f32> = scene.value.before.cells.content().to_vec();
     let inputs = Inputs {

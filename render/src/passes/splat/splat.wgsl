@@ -48,7 +48,7 @@ fn splat(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) w
         if (is_missing(value) || k >= cells.particles_per_cell) {
             store_nothing(at);
         } else {
-            var particle = covering(particle_of(row, slot, k, value, carbon), share);
+            var particle = covering(particle_of(row, slot, k, value, carbon), share * particle_share(k));
             if (uncertainty > 0.0) { particle = uncertain(particle, uncertainty); }
             store(at, splat_of(particle));
         }

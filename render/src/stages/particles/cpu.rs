@@ -64,6 +64,11 @@ pub fn through_water(params: &Params, color: u32, depth_m: f32) -> u32 {
     with_codes(color, light.map(f32::sqrt))
 }
 
+/// Share of particle `k` of a cell: the last one may be there in part.
+fn particle_share(params: &Params, k: u32) -> f32 {
+    (params.cells.particle_shares - k as f32).clamp(0.0, 1.0)
+}
+
 /// One particle for every active cell and `k` below `particles_per_cell`, cell by cell.
 pub fn generate(params: &Params, inputs: &Inputs<'_>, particles: &mut [Particle]) {
     for (i, particle) in particles.iter_mut().enumerate() {
@@ -114,7 +119,7 @@ fn one(params: &Params, inputs: &Inputs<'_>, cell: Active, k: u32) -> Particle {
     let strength = strength_of(params, value, position);
     particle.height_m = column_m * phase + own.sheet_m * (phase - 0.5);
     particle.mass_kg =
-        carbon * inputs.rows[row as usize].area_m2 / params.cells.particles_per_cell as f32;
+        carbon * inputs.rows[row as usize].area_m2 / params.cells.particle_shares;
     let at = nearest(position * 255.0) as usize;
     let mut opacity = own.depth_floor + (1.0 - own.depth_floor) * strength.sqrt();
     let mut size = nearest(strength * 255.0) as u32;
@@ -129,7 +134,7 @@ fn one(params: &Params, inputs: &Inputs<'_>, cell: Active, k: u32) -> Particle {
         particle.color = through_water(params, particle.color, -particle.height_m);
     }
     let share = share_of(params, inputs.domain, cell.cell as usize);
-    let particle = covering(particle, share);
+    let particle = covering(particle, share * particle_share(params, k));
     match inputs.uncertainty.get(cell.cell as usize) {
         Some(&uncertainty) if uncertainty > 0.0 => uncertain(particle, uncertainty),
         Some(_) | None => particle,

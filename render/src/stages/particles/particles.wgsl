@@ -63,7 +63,7 @@ fn particle_of(row: u32, slot: u32, k: u32, value: f32, carbon: f32) -> Particle
     let position = clamp((value - values.transfer_low) * values.transfer_per_unit, 0.0, 1.0);
     let strength = strength_of(value, position);
     particle.height_m = column_m * phase + particles.sheet_m * (phase - 0.5);
-    particle.mass_kg = carbon * rows[row].area_m2 / f32(cells.particles_per_cell);
+    particle.mass_kg = carbon * rows[row].area_m2 / cells.particle_shares;
     let at = u32(nearest(position * 255.0));
     var opacity = particles.depth_floor + (1.0 - particles.depth_floor) * sqrt(strength);
     var size = u32(nearest(strength * 255.0));
