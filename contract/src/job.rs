@@ -17,7 +17,7 @@ use crate::time_sample::TimeSample;
 
 /// Raised whenever the renderer draws the same job differently or writes the same picture in other bytes, so that old
 /// pictures are not taken for new ones: a name has one content for ever. `make bless` asks for it.
-pub const RENDERER_VERSION: u32 = 7;
+pub const RENDERER_VERSION: u32 = 8;
 /// Largest width and height of a picture, pixels.
 pub const MAX_IMAGE_PX: u32 = 4096;
 /// Most slices of a half-angle volume.
@@ -178,6 +178,9 @@ pub struct RenderJob {
 impl Style {
     /// Slices of a globe view unless told otherwise: seen at a slant, clouds need thinner ones than on a map.
     pub const GLOBE_SLICES: u32 = 128;
+    /// Clouds of a cell of a globe view at most, unless told otherwise: where cells are wide, smaller clouds show how light
+    /// falls within them. No more than on a map are drawn on a pixel.
+    pub const GLOBE_PARTICLES_PER_CELL: u32 = 64;
 
     /// What a picture looks like unless told otherwise.
     pub fn with_transfer(transfer: TransferFunction) -> Self {

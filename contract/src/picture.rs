@@ -107,6 +107,9 @@ impl PictureOptions {
         if let (None, View::Globe { .. }) = (self.slices, view) {
             style.slices = Style::GLOBE_SLICES;
         }
+        if let (None, View::Globe { .. }, Mode::Volume) = (self.particles_per_cell, view, mode) {
+            style.particles_per_cell = Style::GLOBE_PARTICLES_PER_CELL;
+        }
         Ok(style)
     }
 

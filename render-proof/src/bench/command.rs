@@ -381,10 +381,12 @@ fn report(args: &RenderBench, job: &RenderJob, row: &Row) {
     report_frames(job, row.particles, m);
     if let Some(joined) = &row.joined {
         say(&format!(
-            "  as served, tilt {}: from {} cells, joined in {:.0} ms; from the picture of all cells: {}",
+            "  as served, tilt {}: from {} cells, joined in {:.0} ms; mean levels of the sea {:.1?} in all cells, {:.1?} as served; from the picture of all cells: {}",
             row.tilt_deg,
             joined.cells,
             joined.once_ms,
+            joined.mean_levels[0],
+            joined.mean_levels[1],
             joined
                 .from_all_cells
                 .as_ref()

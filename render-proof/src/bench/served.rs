@@ -39,6 +39,9 @@ pub struct Joined {
     pub once_ms: f64,
     /// The particles alone from the picture of all cells; none where none were joined.
     pub from_all_cells: Option<Difference>,
+    /// Red, green, blue and alpha of the sea in the picture of all cells and in the one that is drawn: means over the pixels
+    /// that are more than half covered in both, levels.
+    pub mean_levels: [[f64; 4]; 2],
 }
 
 impl Served {
@@ -52,11 +55,12 @@ impl Served {
         let once_ms = start.elapsed().as_secs_f64() * 1e3;
         let mut particles_alone = job.clone();
         particles_alone.style.particles_per_cell = 16;
-        let from_all_cells = match &coarser {
-            None => None,
+        let all = picture(gpu, stages, &particles_alone, all_cells)?;
+        let (from_all_cells, mean_levels) = match &coarser {
+            None => (None, mean_levels([&all, &all])),
             Some(scene) => {
-                let all = picture(gpu, stages, &particles_alone, all_cells)?;
-                Difference::of(&picture(gpu, stages, &particles_alone, scene)?, &all)
+                let joined = picture(gpu, stages, &particles_alone, scene)?;
+                (Difference::of(&joined, &all), mean_levels([&all, &joined]))
             }
         };
         let scene = coarser.unwrap_or_else(|| all_cells.clone());
@@ -78,11 +82,23 @@ impl Served {
                 particles: super::scenery::particles(&scene) * each,
                 once_ms,
                 from_all_cells,
+                mean_levels,
             },
             job,
             scene,
         })
     }
+}
+
+fn mean_levels(pictures: [&Picture; 2]) -> [[f64; 4]; 2] {
+    let is_sea = |at: &usize| pictures.iter().all(|picture| picture.rgba[*at][3] > 0.5);
+    let sea: Vec<usize> = (0..pictures[0].rgba.len()).filter(is_sea).collect();
+    pictures.map(|picture| {
+        [0, 1, 2, 3].map(|channel| {
+            let sum: f64 = sea.iter().map(|at| picture.rgba[*at][channel]).sum();
+            255.0 * sum / sea.len().max(1) as f64
+        })
+    })
 }
 
 fn picture(gpu: &Gpu, stages: &Stages, job: &RenderJob, scene: &Scene) -> Result<Picture> {

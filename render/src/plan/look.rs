@@ -135,7 +135,7 @@ impl Look {
                 center_depth: Some(0.8),
             },
             Mode::Volume | Mode::Map => Self {
-                radius_cells: 0.7,
+                radius_cells: 0.85,
                 min_radius_px: 1.8,
                 max_radius_px: f64::INFINITY,
                 size_spread: 0.1,
@@ -184,9 +184,7 @@ impl Look {
     ) -> f64 {
         match self.center_depth {
             Some(depth) => depth / style_depth.max(1e-6),
-            None => {
-                cell_area * 3.0 / (particles * std::f64::consts::PI * radius * radius)
-            }
+            None => cell_area * 3.0 / (particles * std::f64::consts::PI * radius * radius),
         }
     }
 }

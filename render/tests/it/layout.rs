@@ -9,8 +9,8 @@ use render::stages::fill::{self, exact, window};
 use render::stages::layout::{
     Axis, COVERED, Col, Entry, GROUP, GroundAxis, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT,
     LIGHT_ALONE, LIGHT_GIVEN, LIGHT_OFF, LIGHT_OWN, LOOK, MISSING, MOST_HOT_PARTS, NO_LIST,
-    PART_ENTRIES, Particle, RADIUS_BITS, Row, SCREEN_TILE_PX, SCREEN_TILE_SHIFT, SQUARE, SUBPIXELS, SUNK_BIT, SUNK_M, Splat,
-    VIEW_GLOBE, VIEW_TILE, Velocity, WATER_BLUE, WATER_GREEN, WATER_RED,
+    PART_ENTRIES, Particle, RADIUS_BITS, Row, SCREEN_TILE_PX, SCREEN_TILE_SHIFT, SQUARE, SUBPIXELS,
+    SUNK_BIT, SUNK_M, Splat, VIEW_GLOBE, VIEW_TILE, Velocity, WATER_BLUE, WATER_GREEN, WATER_RED,
 };
 use render::stages::params::{Fields, Params};
 use render::stages::{bin, compose, eye, flow, interpolate, light, map};

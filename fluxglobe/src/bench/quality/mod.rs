@@ -9,6 +9,7 @@ use std::path::Path;
 use anyhow::{Context as _, Result};
 use comfy_table::presets::NOTHING;
 use comfy_table::{CellAlignment, Table};
+use contract::job::{Style, View};
 use render_proof::{Quality, QualityRow, against_slices, shown};
 use serde::Serialize;
 
@@ -54,11 +55,14 @@ pub(crate) async fn run(settings: &Settings, options: BenchQuality) -> Result<()
             bar.inc(1);
             continue;
         };
+        let own = &mut subject.job.style.particles_per_cell;
         // Cells of a region are drawn with one particle, as fine cells are.
-        if let Some(most) = options.particles_per_cell
-            && subject.job.style.particles_per_cell > 1
-        {
-            subject.job.style.particles_per_cell = most;
+        if *own > 1 {
+            let usual = match subject.job.view {
+                View::Globe { .. } => Style::GLOBE_PARTICLES_PER_CELL,
+                View::Tile { .. } => *own,
+            };
+            *own = options.particles_per_cell.unwrap_or(usual);
         }
         bar.set_message(subject.name.clone());
         let (desk, slices) = (desk.clone(), options.slices.clone());

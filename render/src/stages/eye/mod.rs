@@ -130,10 +130,7 @@ impl Eye {
     fn sum_up(&self, frame: &mut FrameContext<'_>) -> Result<(), RenderError> {
         let gpu = frame.gpu;
         let (kind, in_context) = (frame.params.lists.kernel, frame.params.in_context);
-        let constants = [
-            ("KERNEL", f64::from(kind)),
-            compose::in_context(in_context),
-        ];
+        let constants = [("KERNEL", f64::from(kind)), compose::in_context(in_context)];
         let kernel = self.hot[kind as usize][usize::from(in_context)].get_or_init(|| {
             gpu.variant(HOT, &self.source, HOT, &constants)
                 .reading(&[View, Context, Lists])

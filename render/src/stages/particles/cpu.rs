@@ -118,8 +118,7 @@ fn one(params: &Params, inputs: &Inputs<'_>, cell: Active, k: u32) -> Particle {
     let position = ((value - values.transfer_low) * values.transfer_per_unit).clamp(0.0, 1.0);
     let strength = strength_of(params, value, position);
     particle.height_m = column_m * phase + own.sheet_m * (phase - 0.5);
-    particle.mass_kg =
-        carbon * inputs.rows[row as usize].area_m2 / params.cells.particle_shares;
+    particle.mass_kg = carbon * inputs.rows[row as usize].area_m2 / params.cells.particle_shares;
     let at = nearest(position * 255.0) as usize;
     let mut opacity = own.depth_floor + (1.0 - own.depth_floor) * strength.sqrt();
     let mut size = nearest(strength * 255.0) as u32;
