@@ -140,7 +140,8 @@ shared_struct! {
         pub light_depth: f32,
         /// Share of direct light the ground below would get, 0 on the night side.
         pub day: f32,
-        /// Red, green, blue, strength; 8 bits each, red lowest.
+        /// Red, green, blue, and how much of them is the particle's own light rather than that of water before it; 8 bits
+        /// each, red lowest.
         pub color: u32,
     }
 }

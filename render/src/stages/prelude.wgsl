@@ -7,7 +7,8 @@ struct ViewParams {
     up: vec3<f32>, slices: u32,
     forward: vec3<f32>, front_to_back: u32,
     sun: vec3<f32>, sun_is_local: u32, cap: vec3<f32>, cap_least: f32,
-    size_px: vec2<u32>, origin_px: vec2<i32>, center_px: vec2<f32>, tiles: vec2<u32>,
+    water: vec3<f32>, water_per_unit: f32, deep: vec3<f32>, hides: f32, ceiling: vec3<f32>, ceiling_kept: f32,
+    size_px: vec2<u32>, origin_px: vec2<i32>, center_px: vec2<f32>, tiles: vec2<u32>, sun_share: f32,
 }
 @group(0) @binding(16) var<uniform> view: ViewParams;
 

@@ -23,6 +23,7 @@ pub const SOURCE: &str = concat!(
     include_str!("../../stages/particles/particles.wgsl"),
     include_str!("../../stages/uncertainty.wgsl"),
     include_str!("../../stages/coverage.wgsl"),
+    include_str!("../../stages/water.wgsl"),
     include_str!("../../stages/project/project.wgsl"),
     include_str!("../../stages/light/texel.wgsl"),
     include_str!("../../stages/light/deposit.wgsl"),
