@@ -17,6 +17,8 @@ const CIRCLES: u32 = 8;
 const LIMB_POWER: i32 = 8;
 /// What lies between two of them reaches no farther than this beyond them.
 const SLACK: f64 = 1.02;
+/// The same from below the sea surface, where what is farthest is seen along one line that touches the core.
+const SLACK_BELOW: f64 = 1.05;
 /// Halvings of the search for the cap's middle.
 const SEARCH_STEPS: u32 = 40;
 
@@ -125,7 +127,8 @@ impl Footprint {
             }
         }
         let middle = f64::midpoint(span[0], span[1]);
-        let seen = reach(middle) * SLACK + margin;
+        let slack = if height < 0.0 { SLACK_BELOW } else { SLACK };
+        let seen = reach(middle) * slack + margin;
         let (sin_m, cos_m) = middle.sin_cos();
         let side = ahead.cross(up);
         let place = |spot: Spot| {

@@ -41,7 +41,7 @@ pub fn ground_below(params: &Params, pixel: [u32; 2]) -> Ground {
         let rim_px = if nearest_at > 0.0 {
             (miss_sq.sqrt() - view.hides) * view.focal_px / nearest_at.max(1.0e-6)
         } else {
-            1.0
+            1.0e6
         };
         (rim_px, rim_px > -0.5, nearest_at + half_chord)
     } else {

@@ -40,6 +40,7 @@ fn a_place_on_the_globe_is_seen_where_equation_4_puts_it() {
             up: Vec3::Z,
             forward: -Vec3::Y,
             slices: 64,
+            hides: 1.0,
             ..ViewParams::default()
         },
         ..Params::default()
@@ -224,7 +225,7 @@ fn a_uniform_slab_dims_light_as_exp_of_minus_its_depth() {
         light_v: y * 16,
         light_depth: per_slice,
         day: 1.0,
-        color: 0x00ff_ffff,
+        color: 0xffff_ffff,
         ..Splat::default()
     };
     let cells = (0..6).flat_map(|y| (0..6).map(move |x| (x, y)));

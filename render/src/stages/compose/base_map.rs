@@ -132,11 +132,11 @@ struct Below {
 }
 
 const BELOW_DARK: Below = Below {
-    ceiling: [0.42, 0.66, 0.74],
-    water: [0.07, 0.20, 0.31],
+    ceiling: [0.60, 0.83, 0.88],
+    water: [0.08, 0.22, 0.33],
     deep: [0.008, 0.022, 0.05],
-    land: [0.10, 0.15, 0.18],
-    lake: [0.27, 0.43, 0.50],
+    land: [0.12, 0.17, 0.20],
+    lake: [0.36, 0.53, 0.58],
     line: Line {
         grey: 0.03,
         alpha: 0.75,
