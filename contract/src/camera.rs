@@ -9,12 +9,36 @@ use crate::earth::SPHERE_RADIUS_M;
 pub const FIELD_OF_VIEW_DEG: f64 = 45.0;
 /// Narrowest and widest field of view, degrees.
 pub const FIELD_OF_VIEW_LIMITS_DEG: [f64; 2] = [1.0, 120.0];
-/// Nearest camera to the ground, m.
+/// Nearest camera to the ground or, from below, to the sea surface, m.
 pub const MIN_CAMERA_HEIGHT_M: f64 = 1e3;
 /// Farthest camera above the ground, m.
 pub const MAX_CAMERA_HEIGHT_M: f64 = 1e9;
+/// Deepest camera below the sea surface, m: amid what sinks, whose depth is exaggerated.
+pub const MAX_CAMERA_DEPTH_M: f64 = 1e6;
+/// Depth of the core, a sphere below all particles that hides what lies beyond it from a camera below the sea surface, m.
+pub const CORE_DEPTH_M: f64 = 1.3e6;
 /// Height above the ground within which there may be particles, m.
 const HIGHEST_PARTICLE_M: f64 = 1.25e6;
+
+/// Checks the height of a camera above the sea surface, or its depth below as a negative one, m.
+///
+/// # Errors
+/// A height out of both ranges.
+pub(crate) fn check_height(height_m: f64) -> Result<(), ContractError> {
+    let is_above = (MIN_CAMERA_HEIGHT_M..=MAX_CAMERA_HEIGHT_M).contains(&height_m);
+    let is_below = (-MAX_CAMERA_DEPTH_M..=-MIN_CAMERA_HEIGHT_M).contains(&height_m);
+    if is_above || is_below {
+        return Ok(());
+    }
+    let text = format!("{} km", height_m / 1e3);
+    let reason = "the camera stands 1 km to 1 million km above the ground, or 1 km to 1000 km below the sea surface \
+                  (-1 to -1000)";
+    Err(ContractError::invalid(
+        "height of the camera",
+        &text,
+        reason,
+    ))
+}
 
 /// Which way a camera looks and how much it takes in; nothing of it is in the name of a picture taken straight down with
 /// north up.
@@ -24,7 +48,7 @@ pub struct CameraAngles {
     /// Direction of view, and what is up in a picture taken straight down: clockwise from north, degrees.
     #[serde(with = "crate::exact")]
     pub heading_deg: f64,
-    /// 0 looks straight down, 90 along the ground below the camera; degrees, 0 to 180.
+    /// 0 looks straight down, 90 along the ground below the camera or the sea surface above it, 180 straight up; degrees.
     #[serde(with = "crate::exact")]
     pub tilt_deg: f64,
     /// Lean to the right about the line of sight, degrees: the horizon turns to the left.
@@ -117,6 +141,24 @@ mod tests {
             tilt_deg,
             ..CameraAngles::default()
         }
+    }
+
+    #[test]
+    fn cameras_stand_above_or_below_the_sea_surface_and_never_at_it() {
+        for height_m in [1e3, 1e9, -1e3, -4e5, -1e6] {
+            check_height(height_m).unwrap();
+        }
+        for height_m in [0.0, 999.0, -999.0, 1.1e9, -1.001e6, -1e9, f64::NAN] {
+            let text = check_height(height_m).unwrap_err().to_string();
+            assert!(
+                text.contains("1 km to 1 million km above") && text.contains("1000 km below"),
+                "{text}"
+            );
+        }
+        // The core lies below the deepest camera, which may look any way.
+        const { assert!(CORE_DEPTH_M > MAX_CAMERA_DEPTH_M) };
+        angles(0.0, 180.0).validate(-1e6, [640, 480]).unwrap();
+        angles(0.0, 0.0).validate(-1e3, [640, 480]).unwrap();
     }
 
     #[test]

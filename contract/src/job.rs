@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::ContractError;
 use crate::annotation::Annotations;
-use crate::camera::{CameraAngles, MAX_CAMERA_HEIGHT_M, MIN_CAMERA_HEIGHT_M};
+use crate::camera::{CameraAngles, check_height};
 use crate::colour::TransferFunction;
 use crate::context::{Context, Relief};
 use crate::digest::Digest;
@@ -95,13 +95,13 @@ pub enum View {
     },
     /// The globe in perspective.
     Globe {
-        /// Longitude below the camera, degrees.
+        /// Longitude below the camera (above it where it stands below the sea), degrees.
         #[serde(with = "crate::exact")]
         lon_deg: f64,
         /// Latitude below the camera, degrees.
         #[serde(with = "crate::exact")]
         lat_deg: f64,
-        /// Height of the camera above the ground, m.
+        /// Height of the camera above the ground, m; negative below the sea surface.
         #[serde(with = "crate::exact")]
         height_m: f64,
         /// Picture width, pixels.
@@ -271,9 +271,7 @@ impl View {
                 ..
             } => {
                 crate::grid::LonLatDeg::new(lon_deg, lat_deg)?;
-                if !(MIN_CAMERA_HEIGHT_M..=MAX_CAMERA_HEIGHT_M).contains(&height_m) {
-                    return bad("the camera stands 1 km to 1 million km above the ground");
-                }
+                check_height(height_m)?;
                 angles.validate(height_m, self.size_px())
             }
         }

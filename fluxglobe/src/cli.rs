@@ -440,14 +440,15 @@ pub(crate) struct RenderGlobe {
 /// Where the camera of a globe's picture is and which way it looks: over a place, or at one.
 #[derive(Debug, Args)]
 pub(crate) struct Camera {
-    /// Longitude below the camera, degrees east.
+    /// Longitude below the camera, or above one in the sea, degrees east.
     #[arg(long, allow_negative_numbers = true)]
     pub(crate) lon: Option<f64>,
-    /// Latitude below the camera, degrees north.
+    /// Latitude below the camera, or above one in the sea, degrees north.
     #[arg(long, allow_negative_numbers = true)]
     pub(crate) lat: Option<f64>,
-    /// Height of the camera above the ground, km.
-    #[arg(long, default_value_t = 15_000.0)]
+    /// Height of the camera above the ground, km, 1 to 1e6; -1 to -1000 below the sea surface, among what sank as deep as
+    /// it is drawn.
+    #[arg(long, default_value_t = 15_000.0, allow_negative_numbers = true)]
     pub(crate) height: f64,
     /// Place in the middle of the picture, degrees east and north: instead of the one below the camera.
     #[arg(
@@ -473,8 +474,8 @@ pub(crate) struct Camera {
         allow_negative_numbers = true
     )]
     pub(crate) heading: f64,
-    /// 0 looks straight down, 90 along the ground below the camera; with --look-at, at the place that is looked at, 0 to
-    /// 90; degrees.
+    /// 0 looks straight down, 90 along the ground below the camera, 180 straight up; with --look-at, at the place that is
+    /// looked at: 0 to 90, or up to 180 from below the sea surface; degrees.
     #[arg(long, value_name = "DEGREES", default_value_t = 0.0)]
     pub(crate) tilt: f64,
     /// Lean of the camera to the right, degrees.

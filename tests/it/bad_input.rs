@@ -223,7 +223,7 @@ fn bad_requests_get_their_status_and_a_reason() {
         ("/api/products/takahashi09-flux/budget?from=never", 400),
         ("/api/products/sst-2010/budget", 400),
         (
-            "/globe/takahashi09-flux/volume.png?lon=0&lat=0&height_km=-5",
+            "/globe/takahashi09-flux/volume.png?lon=0&lat=0&height_km=-0.5",
             400,
         ),
         (

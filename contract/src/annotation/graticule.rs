@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::ContractError;
-use crate::camera::CameraAngles;
+use crate::camera::{CORE_DEPTH_M, CameraAngles};
 use crate::earth::SPHERE_RADIUS_M;
 
 /// Least and largest distance of lines, degrees.
@@ -36,16 +36,22 @@ impl Graticule {
     /// the middle of the picture.
     pub fn suited(height_m: f64, angles: &CameraAngles) -> Self {
         let from_center = 1.0 + height_m / SPHERE_RADIUS_M;
-        let to_horizon_squared = from_center * from_center - 1.0;
         let down = from_center * angles.tilt_deg.to_radians().cos();
-        // To the ground in the middle of the picture; to the horizon where the middle is above it.
-        let distance = if down > 0.0 && down * down >= to_horizon_squared {
-            down - (down * down - to_horizon_squared).sqrt()
+        // Below the sea surface, to where the line of sight leaves through it.
+        let to_horizon_squared = from_center * from_center - 1.0;
+        let (distance, seen_at_most) = if to_horizon_squared < 0.0 {
+            let core = 1.0 - CORE_DEPTH_M / SPHERE_RADIUS_M;
+            let seen = (core / from_center).acos() + core.acos();
+            (down + (down * down - to_horizon_squared).sqrt(), 2.0 * seen)
+        } else if down > 0.0 && down * down >= to_horizon_squared {
+            // To the ground in the middle of the picture; to the horizon where the middle is above it.
+            let near = down - (down * down - to_horizon_squared).sqrt();
+            (near, 2.0 * (1.0 / from_center).acos())
         } else {
-            to_horizon_squared.sqrt()
+            let far = to_horizon_squared.sqrt();
+            (far, 2.0 * (1.0 / from_center).acos())
         };
         let across = 2.0 * distance * (angles.field_of_view_deg / 2.0).to_radians().tan();
-        let seen_at_most = 2.0 * (1.0 / from_center).acos();
         let wanted_deg = across.min(seen_at_most).to_degrees() / LINES;
         let found = ROUND_DEG.into_iter().find(|step| *step <= wanted_deg);
         let [finest, _] = GRATICULE_LIMITS_DEG;

@@ -34,7 +34,7 @@ struct KeyFrame {
     /// Clockwise from north, degrees; followed as a number, so that 350 to 370 turns by 20.
     #[serde(default)]
     heading: f64,
-    /// Of the line of sight against the vertical at the place, degrees, 0 to 90.
+    /// Of the line of sight against the vertical at the place, degrees: 0 to 90, or more from below the sea surface.
     #[serde(default)]
     tilt: f64,
     /// Degrees, followed as a number.
@@ -140,7 +140,9 @@ impl CameraPath {
             (_, None) => last.look_at(),
             (Some(before), Some(after)) => {
                 let share = (seconds - before.seconds) / (after.seconds - before.seconds);
-                before.between(after, before.easing.of(share)).look_at()
+                let between = before.between(after, before.easing.of(share));
+                // A way from above to below the sea, or back, leads through its surface.
+                between.look_at().clear_of_surface()
             }
         };
         Ok(look_at.view(size_px)?)
@@ -331,6 +333,28 @@ mod tests {
     }
 
     #[test]
+    fn a_way_from_above_to_below_the_sea_leads_through_its_surface() {
+        let path = path(
+            r#"[{"seconds": 0, "look_at": [-35, 48], "distance_km": 900, "tilt": 60},
+                {"seconds": 4, "look_at": [-35, 50], "distance_km": 600, "tilt": 130}]"#,
+        )
+        .unwrap();
+        let heights_m = (0..=400).map(|i| {
+            let view = path.view(f64::from(i) * 0.01, [16, 9]).unwrap();
+            view.validate().unwrap();
+            match view {
+                View::Globe { height_m, .. } => height_m,
+                View::Tile { .. } => panic!("a globe"),
+            }
+        });
+        let heights_m: Vec<f64> = heights_m.collect();
+        assert!(heights_m[0] > 4e5 && heights_m[400] < -3e5);
+        let crossings = heights_m.windows(2).filter(|w| w[0] > 0.0 && w[1] < 0.0);
+        assert_eq!(crossings.count(), 1);
+        assert!(heights_m.windows(2).all(|w| w[1] <= w[0] + 1e-3));
+    }
+
+    #[test]
     fn key_frames_that_make_no_way_are_refused_by_number() {
         assert!(said("[]").contains("0 key frames"));
         let frame = |seconds: f64, more: &str| {
@@ -345,7 +369,7 @@ mod tests {
             "{order}"
         );
         for (broken, part) in [
-            (r#", "tilt": 95"#, "0 to 90"),
+            (r#", "tilt": 93"#, "0 to 90 from above"),
             (r#", "fov": 0"#, "1 to 120"),
             (r#", "heading": 1e9"#, "36000"),
             (r#", "speed": 3"#, "speed"),

@@ -6,6 +6,7 @@
 
 use std::f64::consts::TAU;
 
+use contract::camera::CORE_DEPTH_M;
 use contract::earth::{SPHERE_RADIUS_M, WGS84_EQUATORIAL_RADIUS_M};
 use contract::job::{RenderJob, View};
 use contract::tile::{mercator_x, mercator_y};
@@ -29,6 +30,8 @@ pub(super) struct Space {
 enum Eye {
     Globe {
         place: DVec3,
+        /// Radius of what hides: the sea surface, or the core from below it.
+        hides: f64,
         /// Right and up in the picture, and from it towards the camera.
         axes: [DVec3; 3],
         focal_px: f64,
@@ -86,6 +89,11 @@ impl Space {
                 Self {
                     eye: Eye::Globe {
                         place: up * (1.0 + height_m / SPHERE_RADIUS_M),
+                        hides: if height_m < 0.0 {
+                            1.0 - CORE_DEPTH_M / SPHERE_RADIUS_M
+                        } else {
+                            1.0
+                        },
                         axes: [right, top, back],
                         focal_px: size_px.min_element() / 2.0 / half_opening.tan(),
                         center_px: size_px / 2.0,
@@ -147,15 +155,20 @@ impl Space {
         }
     }
 
-    /// Is a place hidden by the sea surface, or by its own depth beyond the horizon when it is below it?
+    /// Is a place hidden by the sea surface (from below it, by the core), or by its own depth beyond the horizon when it is below it?
     pub(super) fn is_hidden(&self, place: DVec3) -> bool {
-        let Eye::Globe { place: camera, .. } = self.eye else {
+        let Eye::Globe {
+            place: camera,
+            hides,
+            ..
+        } = self.eye
+        else {
             return false;
         };
         let sight = place - camera;
         let nearest = -camera.dot(sight) / sight.length_squared();
         let foot = camera + sight * nearest.clamp(0.0, 1.0);
-        nearest < 1.0 && foot.length() < place.length().min(1.0)
+        nearest < 1.0 && foot.length() < place.length().min(hides)
     }
 
     /// The sight line through a place of the picture, pixels from its upper left corner.
@@ -166,6 +179,7 @@ impl Space {
                 axes: [right, top, back],
                 focal_px,
                 center_px,
+                ..
             } => {
                 let off = (pixel - center_px) / focal_px;
                 let sight = right * off.x - top * off.y - back;
@@ -190,6 +204,7 @@ impl Space {
                 axes: [right, top, back],
                 focal_px,
                 center_px,
+                ..
             } => {
                 let sight = center - place;
                 let ahead = -sight.dot(back);

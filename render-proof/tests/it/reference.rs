@@ -1,5 +1,6 @@
 //! The half-angle volume against pictures made another way, in double precision (`render_proof::reference`).
 
+use contract::camera::CameraAngles;
 use contract::colour::Stops;
 use contract::job::{Mode, RenderJob, View};
 use render::{Backend, Renderer, Scene};
@@ -132,6 +133,39 @@ fn from_any_side_the_volume_is_near_the_reference() {
             difference.psnr_db.unwrap() >= least_db,
             "{target:?} {angles:?}: {difference:?}"
         );
+    }
+}
+
+#[test]
+fn from_below_the_sea_the_volume_is_near_the_reference() {
+    let scene = ocean(ONE_DEGREE);
+    // From under sources of the tropics, at the sinks of middle latitudes and at what stands on the surface.
+    for (place, depth_m, [heading_deg, tilt_deg], least_db) in [
+        ([-128.0, 8.0], 3e5, [0.0, 95.0], 35.0),
+        ([-150.0, 2.0], 6e5, [200.0, 105.0], 35.0),
+        ([-128.0, 8.0], 4e5, [20.0, 60.0], 35.0),
+    ] {
+        let [lon_deg, lat_deg] = place;
+        let view = View::Globe {
+            lon_deg,
+            lat_deg,
+            height_m: -depth_m,
+            width_px: 96,
+            height_px: 64,
+            angles: CameraAngles {
+                heading_deg,
+                tilt_deg,
+                ..CameraAngles::NADIR
+            },
+        };
+        let mut job = job(Mode::Volume, view);
+        job.style.slices = 128;
+        let truth = reference(&job, &scene, Fineness::default()).unwrap();
+        let covered = truth.rgba.iter().filter(|pixel| pixel[3] > 0.1).count();
+        let difference = Difference::of(&drawn(&job, &scene), &truth).unwrap();
+        println!("{place:?}, {depth_m} m deep, tilt {tilt_deg}: {covered} px, {difference:?}");
+        assert!(covered > 500, "{covered} pixels of 6144");
+        assert!(difference.psnr_db.unwrap() >= least_db, "{difference:?}");
     }
 }
 

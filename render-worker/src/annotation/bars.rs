@@ -37,6 +37,8 @@ struct Scale {
 
 /// Drawn heights, and the accumulated carbon that they stand for.
 struct Heights {
+    /// The bar leads down from the sea surface, as it is seen from below.
+    hangs: bool,
     /// Above the ground, pixels, and what is written there; none where a bar has no length.
     marks: Vec<(f64, String)>,
     /// Does it reach the height that nothing is lifted beyond?
@@ -99,8 +101,10 @@ fn heights(
     }
     let display = Quantity::AccumulatedCarbon.display();
     let shown = |height_m: f64| display.shown(height_m / m_per_kg_m2);
+    // What hangs is measured from below, what stands from above.
+    let way = if projection.is_below() { -1.0 } else { 1.0 };
     let above_px = |height_m: f64| {
-        let [foot, top] = [0.0, height_m].map(|height| projection.seen(ground, height));
+        let [foot, top] = [0.0, height_m * way].map(|height| projection.seen(ground, height));
         let (foot, top) = (foot?, top?);
         Some((top.x_px - foot.x_px).hypot(top.y_px - foot.y_px))
     };
@@ -123,7 +127,7 @@ fn heights(
     words.push(format!("100 km drawn are {hundred_km} {unit}"));
     let marks = if top_px < least_px {
         let limit = figures(shown(HEIGHT_LIMIT_M));
-        words.push(format!("drawn up to {limit} {unit}"));
+        words.push(format!("more than {limit} is cut off"));
         vec![]
     } else {
         let mut values = ticks::of(0.0, shown(highest_m));
@@ -136,6 +140,7 @@ fn heights(
         apart(places.into_iter().zip(texts).collect(), TICKS_EM * em)
     };
     Some(Heights {
+        hangs: projection.is_below(),
         has_limit: has_limit && !marks.is_empty(),
         marks,
         words,
@@ -292,7 +297,7 @@ impl Heights {
     /// What is written beside a mark.
     fn told(&self, mark: usize, text: &str) -> String {
         match mark {
-            _ if self.is_limit(mark) => format!("{text} and more"),
+            _ if self.is_limit(mark) => format!("{text} and more, cut off"),
             0 => format!("{text} sea surface"),
             _ => text.to_owned(),
         }
@@ -316,17 +321,21 @@ impl Heights {
         y + 0.5 * em
     }
 
-    /// Upwards from the ground; where it ends below comes back.
+    /// Upwards from the ground, or down from the sea surface; where it ends below comes back.
     fn draw_bar(&self, panel: &mut Panel, y: f64, em: f64) -> f64 {
         let Some((top, _)) = self.marks.last() else {
             return y;
         };
         let small = SMALL_EM * em;
         let x = (PADDING_EM + BAR_EM) * em;
-        let ground = y + top + 0.7 * em;
-        panel.stroke([x, ground], [x, ground - top], 0.12 * em);
-        for (i, (above, text)) in self.marks.iter().enumerate() {
-            let at = ground - above;
+        let (ends, way) = (
+            [y + 0.7 * em, y + top + 0.7 * em],
+            if self.hangs { 1.0 } else { -1.0 },
+        );
+        let ground = if self.hangs { ends[0] } else { ends[1] };
+        panel.stroke([x, ends[0]], [x, ends[1]], 0.12 * em);
+        for (i, (away, text)) in self.marks.iter().enumerate() {
+            let at = ground + way * away;
             let is_limit = self.is_limit(i);
             let (reach, thick) = if is_limit { (0.5, 0.2) } else { (0.32, 0.09) };
             let from = if is_limit { x - reach * em } else { x };
@@ -340,7 +349,7 @@ impl Heights {
                 Ink::Panel,
             );
         }
-        ground + 0.9 * em
+        ends[1] + 0.9 * em
     }
 }
 

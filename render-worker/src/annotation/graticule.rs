@@ -110,11 +110,11 @@ impl Lines {
 
 impl Cap {
     fn of(projection: &Projection) -> Self {
-        let (below, from_middle) = projection.stands();
+        let (below, _from_middle) = projection.stands();
         Self {
             lon: below.lon,
             lat: below.lat,
-            angle: (1.0 / from_middle).acos().to_degrees(),
+            angle: projection.horizon().to_degrees(),
         }
     }
 

@@ -244,7 +244,7 @@ fn the_height_bar_is_as_high_as_the_plumes_in_the_middle() {
     // Seen from above it has no length, and nothing of that height is drawn where nothing lifts.
     let above = self::view(1600, 900, 6e6, 0.0);
     assert!(!drawn_of(above, 8e6).contains("sea surface"));
-    assert!(drawn_of(above, 8e6).contains("drawn up to 150 g C"));
+    assert!(drawn_of(above, 8e6).contains("more than 150 is cut off"));
     assert!(!drawn_of(above, 0.0).contains("Height"));
     // Where it fits as a whole, its end is marked.
     assert!(!drawn_of(view, 8e6).contains("150 and more"));

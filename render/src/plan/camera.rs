@@ -6,7 +6,7 @@ use contract::job::{RenderJob, View};
 use contract::sun::{Subsolar, Sun};
 use glam::{DVec2, DVec3};
 
-use super::footprint::{self, Footprint};
+use super::footprint::{self, CORE, Footprint};
 use super::look;
 use crate::stages::params::ViewParams;
 
@@ -16,7 +16,7 @@ const NEAR_SHARE: f64 = 0.01;
 /// Flattest angle between a sight line and the normal of slices, radians.
 const MOST_SLANT_RAD: f64 = 1.48;
 
-/// A camera over a place; lengths in earth radii.
+/// A camera over a place, or below it in the sea; lengths in earth radii.
 pub(super) struct Camera {
     pub place: DVec3,
     /// East, north and up at the place below it.
@@ -27,7 +27,7 @@ pub(super) struct Camera {
     pub forward: DVec3,
     pub focal_px: f64,
     pub height: f64,
-    /// To the nearest ground in the picture.
+    /// To the nearest ground in the picture; from below to the sea surface, or to the core.
     pub nearest: f64,
     /// Between the line of sight and straight down, and between it and a corner of the picture, radians.
     tilt: f64,
@@ -108,7 +108,11 @@ impl Camera {
             forward: ahead * sin_tilt - up * cos_tilt,
             focal_px,
             height,
-            nearest: footprint::nearest_ground(height, (tilt - corner).max(0.0)),
+            nearest: if height < 0.0 {
+                footprint::nearest_from_below(height, [tilt - corner, tilt + corner])
+            } else {
+                footprint::nearest_ground(height, (tilt - corner).max(0.0))
+            },
             tilt,
             corner,
         }
@@ -125,7 +129,7 @@ impl Camera {
 
     /// Places with a coordinate of at least 0 are far enough ahead to be drawn.
     pub(super) fn ahead(&self, place: DVec3) -> f64 {
-        let least = NEAR_SHARE * (self.place.length_squared() - 1.0);
+        let least = NEAR_SHARE * (self.place.length_squared() - 1.0).abs();
         (place - self.place).dot(self.forward) - least
     }
 
@@ -160,7 +164,7 @@ impl Camera {
         };
         let elevation = elevation_deg.max(look::LOWEST_SUN_DEG).to_radians();
         let shadow = (heights[1] - heights[0]) / elevation.tan();
-        if self.tilt == 0.0 {
+        if self.is_upright() {
             return Footprint::below(up, self.height, self.corner, heights, [margin, shadow]);
         }
         let level = self.forward - up * self.forward.dot(up);
@@ -175,8 +179,24 @@ impl Camera {
         MOST_SLANT_RAD - self.corner
     }
 
-    /// Looks straight down?
+    /// Looks straight down from above?
     pub(super) fn is_upright(&self) -> bool {
-        self.tilt == 0.0
+        self.tilt == 0.0 && !self.is_below()
+    }
+
+    /// Stands below the sea surface?
+    pub(super) fn is_below(&self) -> bool {
+        self.height < 0.0
+    }
+
+    /// Radius of the sphere that hides what lies beyond it: the ground, or from below the core.
+    pub(super) fn hides(&self) -> f64 {
+        if self.is_below() { CORE } else { 1.0 }
+    }
+
+    /// From the place below or above it to the farthest ground that it sees, radians.
+    pub(super) fn horizon(&self) -> f64 {
+        let hides = self.hides();
+        (hides / self.place.length()).clamp(-1.0, 1.0).acos() + hides.acos()
     }
 }

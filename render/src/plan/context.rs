@@ -14,7 +14,7 @@ use crate::coast::{self, Corner, Mask, Pen, sea_floor};
 use crate::scene::Scene;
 use crate::stages::compose::base_map::{self, BaseMapParams};
 use crate::stages::layout::GroundAxis;
-use crate::stages::params::GridParams;
+use crate::stages::params::{GridParams, Params};
 
 /// Coast lines of tiles over what is dark, or over nothing.
 const LIGHT_LINE: [f32; 2] = [0.88, 0.6];
@@ -24,11 +24,20 @@ const DARK_LINE: [f32; 2] = [0.06, 0.75];
 /// are flat.
 const FLOOR_EXAGGERATION: f64 = 25.0;
 
+/// Extinction of the water that a camera below the sea surface looks through where no sea is asked for, m⁻¹: plumes of the
+/// sea around stand out, and what is half round the globe is lost.
+const PLAIN_WATER_PER_M: f64 = 1.0 / 4.0e6;
+/// Share of what lies above the sea surface that is seen through it from below.
+const CEILING_KEPT: f32 = 0.35;
+
 /// Completes the plan of a view.
 pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) {
     sun(plan, job);
-    sea_and_terrain(plan, job, scene);
-    match (job.view, Camera::of(&job.view)) {
+    let camera = Camera::of(&job.view);
+    if !camera.as_ref().is_some_and(Camera::is_below) {
+        sea_and_terrain(plan, job, scene);
+    }
+    match (job.view, camera) {
         (View::Tile { tile, size_px }, _) if job.style.context.coastlines => {
             coast_on_tile(plan, job, tile, size_px);
         }
@@ -141,8 +150,13 @@ fn plain_globe(plan: &mut Plan, job: &RenderJob, camera: &Camera) {
     };
     let params = &mut plan.params;
     params.base_map = BaseMapParams::of(around.base_map, around.background);
+    if camera.is_below() {
+        below_the_sea(params, job, camera);
+    }
     let context = &mut params.context;
-    if around.sea_floor && style.globe_surface && context.terrain_on == 0 {
+    // The sea floor is nowhere in a picture from below: plumes hang where it would be.
+    let has_floor = around.sea_floor && !camera.is_below();
+    if has_floor && style.globe_surface && context.terrain_on == 0 {
         context.sea_floor_on = 1;
         context.terrain_slope = (FLOOR_EXAGGERATION / (8.0 * SPHERE_RADIUS_M)) as f32;
         params.terrain_grid = GridParams::whole(&sea_floor::GRID);
@@ -155,8 +169,42 @@ fn plain_globe(plan: &mut Plan, job: &RenderJob, camera: &Camera) {
     context.coast_on = u32::from(wanted.coasts || wanted.borders);
     // On a map the lines would vanish below the colours.
     context.coast_above = u32::from(job.mode == Mode::Map);
-    let coast = base_map::coast(around.base_map);
+    let coast = if camera.is_below() {
+        base_map::coast_from_below(around.base_map)
+    } else {
+        base_map::coast(around.base_map)
+    };
     (context.coast_grey, context.coast_alpha) = (base_map::composed_grey(coast.grey), coast.alpha);
+}
+
+/// The water that a camera below the sea surface looks through, and the surface from underneath.
+fn below_the_sea(params: &mut Params, job: &RenderJob, camera: &Camera) {
+    let (style, around) = (&job.style, &job.style.context);
+    // Seen along the whole way to the camera, not as deep as it lies.
+    params.particles.sea_per_m = 0.0;
+    let per_m = if around.sea_opacity > 0.0 {
+        around.sea_extinction_per_m()
+    } else if style.globe_surface {
+        PLAIN_WATER_PER_M
+    } else {
+        0.0
+    };
+    params.base_map = BaseMapParams::from_below(around.base_map, around.background);
+    let sun_share = params.base_map.sun_share;
+    let [_east, _north, up] = camera.ground;
+    let sun = up.dot(params.view.sun.as_dvec3()).clamp(0.0, 1.0) as f32;
+    let day = 1.0 + sun_share * (sun - 0.75);
+    let [water, deep] = base_map::water(around.base_map).map(|color| color * day);
+    let view = &mut params.view;
+    (view.water, view.deep) = (water, deep);
+    view.water_per_unit = (per_m * SPHERE_RADIUS_M) as f32;
+    view.ceiling = params.base_map.sea;
+    view.ceiling_kept = if style.globe_surface {
+        CEILING_KEPT
+    } else {
+        1.0
+    };
+    view.sun_share = sun_share;
 }
 
 /// Lines in absolute pixels of the tile's level, on both sides of the date line.

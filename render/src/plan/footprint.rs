@@ -3,8 +3,12 @@
 
 use std::f64::consts::{PI, TAU};
 
+use contract::camera::CORE_DEPTH_M;
+use contract::earth::SPHERE_RADIUS_M;
 use glam::DVec3;
 
+/// Radius of the sphere below all particles that hides what lies beyond it from a camera below the sea surface.
+pub(super) const CORE: f64 = 1.0 - CORE_DEPTH_M / SPHERE_RADIUS_M;
 /// Sight lines round the edge of what a tilted camera sees, and round each circle within it.
 const EDGE_RAYS: u32 = 64;
 /// Circles of sight lines from the middle of what it sees to the edge.
@@ -13,6 +17,8 @@ const CIRCLES: u32 = 8;
 const LIMB_POWER: i32 = 8;
 /// What lies between two of them reaches no farther than this beyond them.
 const SLACK: f64 = 1.02;
+/// The same from below the sea surface, where what is farthest is seen along one line that touches the core.
+const SLACK_BELOW: f64 = 1.05;
 /// Halvings of the search for the cap's middle.
 const SEARCH_STEPS: u32 = 40;
 
@@ -32,6 +38,8 @@ pub(super) struct Footprint {
 struct Spot {
     away: f64,
     azimuth: f64,
+    /// Above the sea surface.
+    height: f64,
 }
 
 /// From a camera at a height to the nearest ground with sight lines of at least this angle from straight down.
@@ -44,6 +52,21 @@ pub(super) fn nearest_ground(height: f64, angle: f64) -> f64 {
     }
     let along = distance * angle.cos();
     along - (1.0 - (distance * angle.sin()).powi(2)).max(0.0).sqrt()
+}
+
+/// From a camera below the sea surface to the nearest of the surface and of the core, with sight lines between two
+/// angles from straight down. The core's outline counts in sight or not, so that nothing jumps when it comes into sight.
+pub(super) fn nearest_from_below(height: f64, [lowest, highest]: [f64; 2]) -> f64 {
+    let distance = 1.0 + height;
+    let (sin_up, cos_up) = (PI - highest).max(0.0).sin_cos();
+    let ceiling = (1.0 - (distance * sin_up).powi(2)).max(0.0).sqrt() - distance * cos_up;
+    let limb = (CORE / distance).min(1.0).asin();
+    let (sin_down, cos_down) = lowest.clamp(0.0, limb).sin_cos();
+    let core = distance * cos_down
+        - (CORE * CORE - (distance * sin_down).powi(2))
+            .max(0.0)
+            .sqrt();
+    ceiling.min(core)
 }
 
 impl Footprint {
@@ -104,27 +127,20 @@ impl Footprint {
             }
         }
         let middle = f64::midpoint(span[0], span[1]);
-        let seen = reach(middle) * SLACK + margin;
+        let slack = if height < 0.0 { SLACK_BELOW } else { SLACK };
+        let seen = reach(middle) * slack + margin;
         let (sin_m, cos_m) = middle.sin_cos();
         let side = ahead.cross(up);
-        let place = |spot: Spot, height: f64| {
+        let place = |spot: Spot| {
             let (sin_a, cos_a) = spot.away.sin_cos();
             let (sin_z, cos_z) = spot.azimuth.sin_cos();
-            (up * cos_a + (ahead * cos_z + side * sin_z) * sin_a) * (1.0 + height)
+            (up * cos_a + (ahead * cos_z + side * sin_z) * sin_a) * (1.0 + spot.height)
         };
         let corners = (0..=CIRCLES).map(|step| corner * f64::from(step) / f64::from(CIRCLES));
-        // A sight line that passes the limb leaves at the top; the nearer one comes to that, the higher is what it sees last.
-        let farthest = farthest(height, heights);
-        let last = |away: f64| {
-            let share = (away / farthest).clamp(0.0, 1.0).powi(LIMB_POWER);
-            heights[0] + (heights[1] - heights[0]) * share
-        };
         let places = corners
             .flat_map(|corner| circle(height, [tilt, corner], heights))
-            .flat_map(|[left, entered]| {
-                let first = heights[1].min(height);
-                [place(left, last(left.away)), place(entered, first)]
-            });
+            .flatten()
+            .map(place);
         Self {
             center: up * cos_m + ahead * sin_m,
             seen: seen.min(PI),
@@ -143,35 +159,13 @@ impl Footprint {
     }
 }
 
-/// How far from below the camera what is highest is seen behind the limb.
-fn farthest(height: f64, heights: [f64; 2]) -> f64 {
-    let (inner, outer) = (1.0 + heights[0], 1.0 + heights[1]);
+/// How far from below the camera what is highest is seen behind the limb of a sphere.
+fn farthest(height: f64, inner: f64, outer: f64) -> f64 {
     (inner / (1.0 + height)).min(1.0).acos() + (inner / outer).acos()
 }
 
 /// Where sight lines round a cone leave what is drawn and where they come to it.
 fn circle(height: f64, [tilt, corner]: [f64; 2], heights: [f64; 2]) -> Vec<[Spot; 2]> {
-    let distance = 1.0 + height;
-    let (inner, outer) = (1.0 + heights[0], 1.0 + heights[1]);
-    let limb = (inner / distance).min(1.0).acos();
-    let farthest = farthest(height, heights);
-    let ground = |off_nadir: f64| {
-        let sine = distance * off_nadir.sin() / inner;
-        if off_nadir >= PI / 2.0 || sine >= 1.0 {
-            return farthest;
-        }
-        (sine.asin() - off_nadir) * farthest / limb
-    };
-    let entry = |off_nadir: f64| {
-        let sine = distance * off_nadir.sin() / outer;
-        if distance <= outer {
-            0.0
-        } else if off_nadir >= PI / 2.0 || sine >= 1.0 {
-            farthest
-        } else {
-            sine.asin() - off_nadir
-        }
-    };
     let (sin_t, cos_t) = tilt.sin_cos();
     let (sin_c, cos_c) = corner.sin_cos();
     let spots = (0..EDGE_RAYS).map(|ray| {
@@ -181,9 +175,66 @@ fn circle(height: f64, [tilt, corner]: [f64; 2], heights: [f64; 2]) -> Vec<[Spot
         let forth = sin_t * cos_c + cos_t * sin_c * cos_r;
         let off_nadir = down.clamp(-1.0, 1.0).acos();
         let azimuth = (sin_c * sin_r).atan2(forth);
-        [ground(off_nadir), entry(off_nadir)].map(|away| Spot { away, azimuth })
+        let ends = if height < 0.0 {
+            ends_from_below(height, off_nadir, heights)
+        } else {
+            ends_from_above(height, off_nadir, heights)
+        };
+        ends.map(|[away, height]| Spot {
+            away,
+            azimuth,
+            height,
+        })
     });
     spots.collect()
+}
+
+/// Where a sight line at an angle from straight down leaves what is drawn and where it comes to it: how far from below the
+/// camera, and the height.
+fn ends_from_above(height: f64, off_nadir: f64, heights: [f64; 2]) -> [[f64; 2]; 2] {
+    let distance = 1.0 + height;
+    let (inner, outer) = (1.0 + heights[0], 1.0 + heights[1]);
+    let limb = (inner / distance).min(1.0).acos();
+    let farthest = farthest(height, inner, outer);
+    let sine = distance * off_nadir.sin() / inner;
+    let left = if off_nadir >= PI / 2.0 || sine >= 1.0 {
+        farthest
+    } else {
+        (sine.asin() - off_nadir) * farthest / limb
+    };
+    let sine = distance * off_nadir.sin() / outer;
+    let entered = if distance <= outer {
+        0.0
+    } else if off_nadir >= PI / 2.0 || sine >= 1.0 {
+        farthest
+    } else {
+        sine.asin() - off_nadir
+    };
+    [
+        [left, last_height(left / farthest, heights)],
+        [entered, heights[1].min(height)],
+    ]
+}
+
+/// The same from below the sea surface: a sight line ends at the core or leaves at the top, farther round the globe.
+fn ends_from_below(height: f64, off_nadir: f64, heights: [f64; 2]) -> [[f64; 2]; 2] {
+    let (distance, outer) = (1.0 + height, 1.0 + heights[1]);
+    let miss = distance * off_nadir.sin();
+    let left = if off_nadir < PI / 2.0 && miss < CORE {
+        let limb = (CORE / distance).acos();
+        let share = ((miss / CORE).asin() - off_nadir) / limb;
+        let farthest = farthest(height, CORE, outer);
+        [share * farthest, last_height(share, heights)]
+    } else {
+        [PI - (miss / outer).asin() - off_nadir, heights[1]]
+    };
+    [left, [0.0, height]]
+}
+
+/// A sight line that passes the limb leaves at the top; the nearer one comes to that, the higher is what it sees last.
+fn last_height(share_of_farthest: f64, heights: [f64; 2]) -> f64 {
+    let share = share_of_farthest.clamp(0.0, 1.0).powi(LIMB_POWER);
+    heights[0] + (heights[1] - heights[0]) * share
 }
 
 #[cfg(test)]
@@ -208,10 +259,11 @@ mod tests {
                 for step in 1..4000 {
                     let place = camera + sight * (f64::from(step) * 1e-3 * (1.0 + height));
                     let far = place.length();
-                    if far < 1.0 + HEIGHTS[0] {
+                    let deepest = if height < 0.0 { CORE } else { 1.0 + HEIGHTS[0] };
+                    if far < deepest {
                         break;
                     }
-                    if far > 1.0 + HEIGHTS[1] {
+                    if far > 1.0 + HEIGHTS[1] || far < 1.0 + HEIGHTS[0] {
                         continue;
                     }
                     seen += 1;
@@ -238,6 +290,51 @@ mod tests {
                     }
                 }
             }
+        }
+    }
+
+    #[test]
+    fn what_a_camera_below_the_sea_sees_lies_in_its_footprint() {
+        for height in [-0.001, -0.01, -0.06, -0.15] {
+            for tilt_deg in [45.0f64, 70.0, 90.0, 110.0, 150.0, 180.0] {
+                for corner_deg in [5.0f64, 30.0, 60.0] {
+                    // What looks at the core alone sees no particles.
+                    if (tilt_deg + corner_deg).to_radians() > (CORE / (1.0 + height)).asin() + 0.1 {
+                        holds(height, tilt_deg.to_radians(), corner_deg.to_radians());
+                    }
+                }
+            }
+        }
+        // All of it moves without a jump, over the limb of the core too, and looking up is seeing little of it.
+        let at = |tilt_deg: f64| {
+            let cone = [tilt_deg.to_radians(), 0.5];
+            Footprint::ahead([DVec3::Z, DVec3::X], -0.06, cone, HEIGHTS, [0.0, 0.0])
+        };
+        assert!(at(180.0).seen < 0.35 * at(80.0).seen, "{}", at(180.0).seen);
+        let mut before = at(0.0);
+        for step in 1..1800 {
+            let now = at(f64::from(step) * 0.1);
+            let moved = now.center.distance(before.center) + (now.seen - before.seen).abs();
+            assert!(moved < 0.08, "{step}: {moved}");
+            before = now;
+        }
+    }
+
+    #[test]
+    fn from_below_the_nearest_is_the_surface_above_or_the_core() {
+        let near =
+            |tilt: f64, corner: f64| nearest_from_below(-0.06, [tilt - corner, tilt + corner]);
+        assert!((near(PI, 0.3) - 0.06).abs() < 1e-12);
+        assert!((near(0.0, 0.3) - (0.94 - CORE)).abs() < 1e-12);
+        // Level: 1 - 0.94² is the square of half a chord; the limb of the core is as far away as Pythagoras has it.
+        assert!((near(PI / 2.0, 0.0) - (1.0f64 - 0.94 * 0.94).sqrt()).abs() < 1e-12);
+        let limb = (CORE / 0.94).asin();
+        assert!((near(limb, 0.0) - (0.94f64 * 0.94 - CORE * CORE).sqrt()).abs() < 1e-12);
+        let mut before = near(0.0, 0.1);
+        for step in 1..3142 {
+            let now = near(f64::from(step) * 1e-3, 0.1);
+            assert!((now - before).abs() < 0.05, "{step}: {before} {now}");
+            before = now;
         }
     }
 

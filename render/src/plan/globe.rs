@@ -2,6 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
+use contract::camera::CORE_DEPTH_M;
 use contract::earth::SPHERE_RADIUS_M;
 use contract::grid::Grid;
 use contract::job::{Mode, RenderJob};
@@ -30,6 +31,9 @@ const CROWDED_COSINE: f64 = 0.25;
 /// Largest particle on the screen over one on the ground below the camera.
 const NEAREST_OVER_FARTHEST: f64 = 4.0;
 
+// The core hides nothing that is drawn.
+const _: () = assert!(CORE_DEPTH_M > look::HEIGHT_LIMIT_M + look::SHEET_M);
+
 /// The part of the shell that is drawn; lengths in earth radii.
 struct Cap<'a> {
     /// Lowest and highest particle, from the sea surface.
@@ -55,6 +59,7 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) {
     let params = &mut plan.params;
     params.view.kind = VIEW_GLOBE;
     params.context.surface = u32::from(job.style.globe_surface);
+    params.view.hides = camera.hides() as f32;
     params.thematic.edge_sharpness = cell_px.max(1.0) as f32;
     params.projection.per_earth_radius_m = (1.0 / SPHERE_RADIUS_M) as f32;
     params.view.center_px = UVec2::new(width_px, height_px).as_vec2() / 2.0;
@@ -99,6 +104,10 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) {
 
 /// Is there ground seen so flat, or so near a pole, that cells are many times narrower than elsewhere?
 fn is_crowded(plan: &Plan, camera: &Camera, cap: &Cap<'_>) -> bool {
+    if camera.is_below() {
+        // All round, the sea surface is seen flatter the farther away it is.
+        return true;
+    }
     let is_flat = |normal: DVec3| {
         let sight = camera.place - normal;
         sight.dot(normal) < CROWDED_COSINE * sight.length()

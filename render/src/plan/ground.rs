@@ -24,6 +24,9 @@ const BEYOND_RAD: f64 = 0.05;
 /// Longest step of that, radians: straight lines between them pass the globe.
 const STEP_RAD: f64 = 0.35;
 
+/// How far outside corners behind a camera in the globe are led round the picture, half diagonals.
+const OUTSIDE: f64 = 4.0;
+
 /// What is wanted of the mask.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Wanted {
@@ -53,7 +56,7 @@ pub(super) fn mask(camera: &Camera, size_px: [u32; 2], wanted: Wanted) -> Vec<u3
     words
 }
 
-/// The globe from a camera.
+/// The ground from a camera: the globe from outside or, below the sea surface, from inside.
 struct Sight<'a> {
     camera: &'a Camera,
     size_px: [u32; 2],
@@ -64,6 +67,8 @@ struct Sight<'a> {
     horizon: f64,
     /// How far beyond the horizon, along its normals, hidden corners are led round the globe.
     beyond: f64,
+    /// Where the line of sight backwards leaves the globe, from inside.
+    behind: Option<DVec3>,
 }
 
 impl<'a> Sight<'a> {
@@ -81,12 +86,16 @@ impl<'a> Sight<'a> {
             up: camera.place / distance,
             horizon,
             beyond: angle.tan() * (distance * distance - 1.0).max(0.0).sqrt(),
+            behind: camera.is_below().then(|| behind(camera)),
         }
     }
 
-    /// How far a place is above its horizon; changes evenly along a straight line.
+    /// How far a place is above its horizon, from inside how far ahead; changes evenly along a straight line.
     fn above(&self, place: DVec3) -> f64 {
-        place.dot(self.camera.place) - 1.0
+        match self.behind {
+            Some(_) => self.camera.ahead(place),
+            None => place.dot(self.camera.place) - 1.0,
+        }
     }
 
     fn seen_px(&self, place: DVec3) -> DVec2 {
@@ -95,7 +104,7 @@ impl<'a> Sight<'a> {
 
     /// Is all of it beyond the horizon?
     fn is_hidden(&self, cap: &Cap) -> bool {
-        cap.angle_to(self.up) - cap.radius > self.horizon
+        self.behind.is_none() && cap.angle_to(self.up) - cap.radius > self.horizon
     }
 
     /// May it reach the place opposite the camera?
@@ -104,6 +113,12 @@ impl<'a> Sight<'a> {
     }
 
     fn cover(&self, cover: &mut Cover, rings: &[Ring]) {
+        if let Some(behind) = self.behind {
+            for ring in rings {
+                self.cover_from_inside(cover, ring, behind);
+            }
+            return;
+        }
         for ring in rings {
             let may_be_opposite = self.may_be_opposite(&ring.cap);
             if self.is_hidden(&ring.cap) && !may_be_opposite {
@@ -114,6 +129,61 @@ impl<'a> Sight<'a> {
                 cover.add_everywhere(ring.sign);
             }
             cover.add(&self.outline(ring));
+        }
+    }
+
+    /// The same seen from inside: all of the globe is round the camera, and what holds the place behind it covers all but
+    /// what it leaves out.
+    fn cover_from_inside(&self, cover: &mut Cover, ring: &Ring, behind: DVec3) {
+        if ring.cap.angle_to(behind) <= ring.cap.radius + 1e-6
+            && turns_round(behind, ring) == ring.sign
+        {
+            cover.add_everywhere(ring.sign);
+        }
+        cover.add(&self.outline_from_inside(ring));
+    }
+
+    /// An outline as it is seen from inside, where left and right are the other way round: what lies behind the camera is
+    /// led round the picture.
+    fn outline_from_inside(&self, ring: &Ring) -> Vec<DVec2> {
+        let mut path = Vec::with_capacity(ring.corners.len() + 16);
+        let corners = || ring.corners.iter().rev();
+        for (&a, &b) in corners().zip(corners().cycle().skip(1)) {
+            let (from, to) = (self.above(a), self.above(b));
+            let crossing = || a + (b - a) * (from / (from - to));
+            match (from >= 0.0, to >= 0.0) {
+                (true, true) => path.push(self.seen_px(b)),
+                (true, false) => {
+                    let edge = crossing();
+                    path.push(self.seen_px(edge));
+                    self.lead_round_picture(&mut path, edge, b);
+                }
+                (false, true) => {
+                    let edge = crossing();
+                    self.lead_round_picture(&mut path, a, edge);
+                    path.extend([edge, b].map(|place| self.seen_px(place)));
+                }
+                (false, false) => self.lead_round_picture(&mut path, a, b),
+            }
+        }
+        path
+    }
+
+    /// Goes on round the picture, far outside, from the azimuth of one place about the line of sight to that of another.
+    fn lead_round_picture(&self, path: &mut Vec<DVec2>, from: DVec3, to: DVec3) {
+        let azimuth = |place: DVec3| {
+            let sight = place - self.camera.place;
+            sight
+                .dot(self.camera.top)
+                .atan2(sight.dot(self.camera.right))
+        };
+        let first = azimuth(from);
+        let way = short_way(azimuth(to) - first);
+        let steps = (way.abs() / STEP_RAD).ceil().max(1.0) as u32;
+        let radius_px = OUTSIDE * self.middle_px.length();
+        for step in 0..=steps {
+            let (sin, cos) = (first + way * f64::from(step) / f64::from(steps)).sin_cos();
+            path.push(self.middle_px + DVec2::new(cos, -sin) * radius_px);
         }
     }
 
@@ -221,6 +291,26 @@ impl<'a> Sight<'a> {
             mask.draw(pen, self.seen_px(a), self.seen_px(b));
         }
     }
+}
+
+/// Where the line of sight of a camera in the globe leaves it backwards.
+fn behind(camera: &Camera) -> DVec3 {
+    let backwards = -camera.forward;
+    let nearest = -camera.place.dot(backwards);
+    let half_chord = (1.0 - camera.place.length_squared() + nearest * nearest)
+        .max(0.0)
+        .sqrt();
+    (camera.place + backwards * (nearest + half_chord)).normalize_or(DVec3::Z)
+}
+
+/// How often an outline goes round a place, anticlockwise seen from above; it does not hold the place opposite as well.
+fn turns_round(place: DVec3, ring: &Ring) -> i32 {
+    // The axes of eq. 4 are left-handed: their pair goes round clockwise.
+    let (along, across) = place.any_orthonormal_pair();
+    let azimuth = |corner: DVec3| corner.dot(along).atan2(corner.dot(across));
+    let ends = ring.corners.iter().zip(ring.corners.iter().cycle().skip(1));
+    let steps = ends.map(|(a, b)| short_way(azimuth(*b) - azimuth(*a)));
+    (steps.sum::<f64>() / TAU).round() as i32
 }
 
 /// A difference of angles the short way round, -pi to pi.

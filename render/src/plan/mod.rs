@@ -333,6 +333,7 @@ fn common(job: &RenderJob, scene: &Scene) -> Params {
         view: ViewParams {
             slices: style.slices,
             front_to_back: 1,
+            hides: 1.0,
             ..ViewParams::default()
         },
         grid: GridParams::whole(grid),

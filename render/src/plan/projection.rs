@@ -62,10 +62,25 @@ impl Projection {
     }
 
     /// How much the ground at a place faces the camera: the cosine between the vertical there and the way to the camera,
-    /// 1 below it, 0 at the horizon, negative behind.
+    /// 1 below it, 0 at the horizon, negative behind. From below the sea surface the same of its underside.
     pub fn facing(&self, place: LonLatDeg) -> f64 {
         let up = normal(place);
-        (self.camera.place - up).normalize_or_zero().dot(up)
+        let facing = (self.camera.place - up).normalize_or_zero().dot(up);
+        if self.camera.is_below() {
+            -facing
+        } else {
+            facing
+        }
+    }
+
+    /// Does the camera stand below the sea surface?
+    pub fn is_below(&self) -> bool {
+        self.camera.is_below()
+    }
+
+    /// From the place below or above the camera to the farthest ground that it sees, radians.
+    pub fn horizon(&self) -> f64 {
+        self.camera.horizon()
     }
 
     /// The parts of a line on the ground that are seen, pixels; a line is straight in degrees from corner to corner.
@@ -110,11 +125,16 @@ impl Projection {
         let sight = forward * focal_px + right * from_middle.x - top * from_middle.y;
         let sight = sight.normalize_or_zero();
         let along = -place.dot(sight);
-        let under_root = along * along - (place.length_squared() - 1.0);
-        if along <= 0.0 || under_root < 0.0 {
-            return None;
-        }
-        let ground = place + sight * (along - under_root.sqrt());
+        let miss_sq = place.length_squared() - along * along;
+        let half_chord = (1.0 - miss_sq).max(0.0).sqrt();
+        let hides = self.camera.hides();
+        let way = match (self.camera.is_below(), along > 0.0, miss_sq < hides * hides) {
+            // The core, or the sky.
+            (true, true, true) | (false, false, _) | (false, true, false) => return None,
+            (true, _, _) => along + half_chord,
+            (false, true, true) => along - half_chord,
+        };
+        let ground = place + sight * way;
         Some(degrees(ground))
     }
 
@@ -149,7 +169,8 @@ impl Projection {
         self.px(normal(place)).to_array()
     }
 
-    /// Is nothing of the globe between the camera and a place? Of one below the ground, nothing that lies deeper.
+    /// Is nothing of the globe between the camera and a place? Of one below the ground, nothing that lies deeper; for a
+    /// camera below the sea surface, nothing of the core.
     fn is_clear(&self, place: DVec3) -> bool {
         let sight = place - self.camera.place;
         let nearest = -self.camera.place.dot(sight) / sight.length_squared();
@@ -158,13 +179,19 @@ impl Projection {
             return true;
         }
         let from_middle = self.camera.place + sight * nearest;
-        from_middle.length_squared() >= 1.0
+        let hides = self.camera.hides();
+        from_middle.length_squared() >= hides * hides
     }
 
     /// At least 0 where ground is before the horizon and ahead of the camera; lengths in earth radii.
     fn clearance(&self, place: LonLatDeg) -> f64 {
         let ground = normal(place);
-        (self.camera.place.dot(ground) - 1.0).min(self.camera.ahead(ground))
+        let least = if self.camera.is_below() {
+            self.camera.place.length() * self.camera.horizon().cos()
+        } else {
+            1.0
+        };
+        (self.camera.place.dot(ground) - least).min(self.camera.ahead(ground))
     }
 
     /// The last place that is seen on the way from one that is to one that is not.

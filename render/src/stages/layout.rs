@@ -10,10 +10,11 @@ pub const SCREEN_TILE_PX: u32 = 16;
 pub const SCREEN_TILE_SHIFT: u32 = 8;
 /// Positions on the screen are whole multiples of this part of a pixel, so that no two tiles round them differently.
 pub const SUBPIXELS: i32 = 16;
-/// What lies deeper than this below the sea surface is sunk, m: out of the sheet, whose lower half it is.
-pub const SUNK_M: f32 = 10_000.0;
-/// In the size of an entry: it is sunk, and land hides it.
-pub const SUNK_BIT: u32 = 0x8000;
+/// What lies farther than this beyond the sea surface, seen from the eye, lies beyond it, m: below it, or above it for an eye
+/// in the sea. It is half the sheet, which lies on both sides.
+pub const BEYOND_M: f32 = 10_000.0;
+/// In the size of an entry: it lies beyond the sea surface, and land hides it.
+pub const BEYOND_BIT: u32 = 0x8000;
 /// In the size of an entry: its radius.
 pub const RADIUS_BITS: u32 = 0x7fff;
 /// `ListParams::long_list`: no list is cut into parts.
@@ -146,10 +147,11 @@ shared_struct! {
         pub light_depth: f32,
         /// Share of direct light the ground below would get, 0 on the night side.
         pub day: f32,
-        /// Red, green, blue, strength; 8 bits each, red lowest.
+        /// Red, green, blue, and how much of them is the particle's own light rather than that of water before it; 8 bits
+        /// each, red lowest.
         pub color: u32,
-        /// 1: deeper than [`SUNK_M`] below the sea surface of a globe view.
-        pub is_sunk: u32,
+        /// 1: farther than [`BEYOND_M`] beyond the sea surface of a globe view.
+        pub is_beyond: u32,
     }
 }
 
@@ -159,7 +161,7 @@ shared_struct! {
         /// Centre from the screen tile's corner, east in the low and south in the high 16 bits, both signed, in
         /// subpixels shifted right by `ListParams::entry_shift`.
         pub place: u32,
-        /// Radius in the same unit in the low 15 bits, then [`SUNK_BIT`], optical depth at the centre times `depth_one` of the lists in the high.
+        /// Radius in the same unit in the low 15 bits, then [`BEYOND_BIT`], optical depth at the centre times `depth_one` of the lists in the high.
         pub size: u32,
         /// Red, green, blue, slice; 8 bits each, red lowest.
         pub color: u32,

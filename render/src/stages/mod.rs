@@ -12,6 +12,7 @@ pub mod params;
 pub mod sizes;
 pub mod sphere;
 pub mod uncertainty;
+pub mod water;
 
 pub mod bin;
 pub mod compose;

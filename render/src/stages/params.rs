@@ -38,6 +38,18 @@ shared_struct! {
         /// Towards the middle of the cap that is drawn, of any length, and what a cell's place times it is at least (globe).
         pub cap: Vec3,
         pub cap_least: f32,
+        /// Light of the water round an eye below the sea surface, level or above (globe; day at the eye is in it).
+        pub water: Vec3,
+        /// Extinction of that water for each earth radius; 0 where there is none to look through.
+        pub water_per_unit: f32,
+        /// The same downwards, and of the core.
+        pub deep: Vec3,
+        /// Radius of the sphere that hides what lies beyond it, earth radii: 1, or that of the core from below the sea surface.
+        pub hides: f32,
+        /// Light of the sea surface from underneath, with the sun where a base map has no day or night.
+        pub ceiling: Vec3,
+        /// Share of what lies above the sea surface that is seen through it from underneath.
+        pub ceiling_kept: f32,
         /// Of the part drawn.
         pub size_px: UVec2,
         /// Left and top of the part drawn (globe views are drawn in parts).
@@ -46,6 +58,8 @@ shared_struct! {
         pub center_px: Vec2,
         /// Screen tiles across and down the part drawn.
         pub tiles: UVec2,
+        /// How much of the difference between day and night is shown of the sea surface from underneath, 0 to 1.
+        pub sun_share: f32,
     }
 }
 

@@ -7,7 +7,8 @@ struct ViewParams {
     up: vec3<f32>, slices: u32,
     forward: vec3<f32>, front_to_back: u32,
     sun: vec3<f32>, sun_is_local: u32, cap: vec3<f32>, cap_least: f32,
-    size_px: vec2<u32>, origin_px: vec2<i32>, center_px: vec2<f32>, tiles: vec2<u32>,
+    water: vec3<f32>, water_per_unit: f32, deep: vec3<f32>, hides: f32, ceiling: vec3<f32>, ceiling_kept: f32,
+    size_px: vec2<u32>, origin_px: vec2<i32>, center_px: vec2<f32>, tiles: vec2<u32>, sun_share: f32,
 }
 @group(0) @binding(16) var<uniform> view: ViewParams;
 
@@ -36,7 +37,7 @@ struct Particle {
 }
 struct Splat {
     x_sub: i32, y_sub: i32, radius_px: f32, tau: f32, slice: f32, light_u: i32, light_v: i32, light_depth: f32,
-    day: f32, color: u32, is_sunk: u32,
+    day: f32, color: u32, is_beyond: u32,
 }
 struct Entry {
     place: u32, size: u32, color: u32,
@@ -56,8 +57,8 @@ const SQUARE: u32 = 16u;
 const SCREEN_TILE_PX: u32 = 16u;
 const SCREEN_TILE_SHIFT: u32 = 8u;
 const SUBPIXELS: i32 = 16;
-const SUNK_M: f32 = 10000.0;
-const SUNK_BIT: u32 = 0x8000u;
+const BEYOND_M: f32 = 10000.0;
+const BEYOND_BIT: u32 = 0x8000u;
 const RADIUS_BITS: u32 = 0x7fffu;
 const PART_ENTRIES: u32 = 1024u;
 const MOST_HOT_PARTS: u32 = 4096u;

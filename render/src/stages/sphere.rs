@@ -13,12 +13,16 @@ pub struct Ground {
     pub lon_rad: f32,
     pub lat_rad: f32,
     pub normal: Vec3,
-    /// How far inside the globe's outline it runs, pixels.
+    /// How far inside the globe's outline it runs, pixels; from below the sea surface outside that of the core.
     pub rim_px: f32,
     /// Its place nearest to the globe's centre, earth radii.
     pub foot: Vec3,
     /// The way from the eye there, earth radii; negative behind the eye.
     pub nearest_at: f32,
+    /// Its direction, length 1.
+    pub sight: Vec3,
+    /// The way from the eye to the sea surface, earth radii.
+    pub way: f32,
 }
 
 /// What the centre of a pixel of a globe view shows.
@@ -32,24 +36,37 @@ pub fn ground_below(params: &Params, pixel: [u32; 2]) -> Ground {
     let nearest_at = -camera.dot(sight);
     let foot = camera + sight * nearest_at;
     let miss_sq = foot.dot(foot);
-    let rim_px = (1.0 - miss_sq.sqrt()) * view.focal_px / nearest_at.max(1.0e-6);
-    if miss_sq >= 1.0 || nearest_at <= 0.0 {
-        return Ground {
-            rim_px,
-            foot,
-            nearest_at,
-            ..Ground::default()
+    let half_chord = (1.0 - miss_sq).max(0.0).sqrt();
+    let (rim_px, on_ground, way) = if view.hides < 1.0 {
+        let rim_px = if nearest_at > 0.0 {
+            (miss_sq.sqrt() - view.hides) * view.focal_px / nearest_at.max(1.0e-6)
+        } else {
+            1.0e6
         };
-    }
-    let normal = camera + sight * (nearest_at - (1.0 - miss_sq).sqrt());
-    Ground {
-        on_ground: true,
-        lon_rad: angle_of(normal.x, normal.y),
-        lat_rad: angle_of(normal.z, normal.truncate().length()),
-        normal,
+        (rim_px, rim_px > -0.5, nearest_at + half_chord)
+    } else {
+        let rim_px = (1.0 - miss_sq.sqrt()) * view.focal_px / nearest_at.max(1.0e-6);
+        let is_met = miss_sq < 1.0 && nearest_at > 0.0;
+        (rim_px, is_met, nearest_at - half_chord)
+    };
+    let met = Ground {
+        on_ground,
         rim_px,
         foot,
         nearest_at,
+        sight,
+        way,
+        ..Ground::default()
+    };
+    if !on_ground {
+        return met;
+    }
+    let normal = camera + sight * way;
+    Ground {
+        lon_rad: angle_of(normal.x, normal.y),
+        lat_rad: angle_of(normal.z, normal.truncate().length()),
+        normal,
+        ..met
     }
 }
 

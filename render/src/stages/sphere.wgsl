@@ -16,10 +16,13 @@ fn angle_of(y: f32, x: f32) -> f32 {
     return angle;
 }
 
-struct Ground { on_ground: bool, lon: f32, lat: f32, normal: vec3<f32>, rim_px: f32, foot: vec3<f32>, nearest_at: f32 }
+struct Ground {
+    on_ground: bool, lon: f32, lat: f32, normal: vec3<f32>, rim_px: f32, foot: vec3<f32>, nearest_at: f32, sight: vec3<f32>, way: f32,
+}
 
-// Where the sight line of a pixel's centre meets the sea surface; `rim_px` is how far inside the globe's outline it runs,
-// `foot` its place nearest to the globe's centre, `nearest_at` the way from the eye there: negative behind the eye.
+// Where the sight line of a pixel's centre, `sight`, meets the sea surface and how far away; `rim_px` is how far inside the
+// globe's outline it runs, `foot` its place nearest to the globe's centre, `nearest_at` the way from the eye there: negative
+// behind the eye. From below the surface that is met from underneath, and `rim_px` is how far outside the core's outline.
 fn ground_below(pixel: vec2<u32>) -> Ground {
     let x = (f32(i32(pixel.x) + view.origin_px.x) + 0.5 - view.center_px.x) / view.focal_px;
     let y = (view.center_px.y - f32(i32(pixel.y) + view.origin_px.y) - 0.5) / view.focal_px;
@@ -31,10 +34,20 @@ fn ground_below(pixel: vec2<u32>) -> Ground {
     var ground: Ground;
     ground.foot = foot;
     ground.nearest_at = nearest_at;
-    ground.rim_px = (1.0 - sqrt(miss_sq)) * view.focal_px / max(nearest_at, 1.0e-6);
-    ground.on_ground = miss_sq < 1.0 && nearest_at > 0.0;
+    ground.sight = sight;
+    let half_chord = sqrt(max(1.0 - miss_sq, 0.0));
+    if (view.hides < 1.0) {
+        ground.rim_px = 1.0e6;
+        if (nearest_at > 0.0) { ground.rim_px = (sqrt(miss_sq) - view.hides) * view.focal_px / max(nearest_at, 1.0e-6); }
+        ground.on_ground = ground.rim_px > -0.5;
+        ground.way = nearest_at + half_chord;
+    } else {
+        ground.rim_px = (1.0 - sqrt(miss_sq)) * view.focal_px / max(nearest_at, 1.0e-6);
+        ground.on_ground = miss_sq < 1.0 && nearest_at > 0.0;
+        ground.way = nearest_at - half_chord;
+    }
     if (!ground.on_ground) { return ground; }
-    ground.normal = camera + sight * (nearest_at - sqrt(1.0 - miss_sq));
+    ground.normal = camera + sight * ground.way;
     ground.lat = angle_of(ground.normal.z, length(ground.normal.xy));
     ground.lon = angle_of(ground.normal.x, ground.normal.y);
     return ground;

@@ -12,6 +12,7 @@ use contract::job::{Mode, RENDERER_VERSION, RenderJob, View};
 use render::{Image, Scene};
 use render_proof::currents::{self, gyres};
 
+use crate::below::below;
 use crate::compare::distance;
 use crate::context::{everything, with_terrain};
 use crate::device::renderers;
@@ -217,6 +218,19 @@ fn wide_looks_at_sinks_below_the_sea_match_their_golden_picture() {
     let mut job = everything(Mode::Volume, wide(view));
     job.style.height_m_per_kg_m2 = 2e7;
     matches_golden_of("below_wide", &with_terrain(ONE_DEGREE), job);
+}
+
+#[test]
+fn wide_looks_from_below_the_sea_match_their_golden_picture() {
+    let view = below([-128.0, 14.0], 5.0e5, [10.0, 84.0], WIDE_PX);
+    let mut job = job(Mode::Volume, view);
+    job.style.height_m_per_kg_m2 = 1e7;
+    job.style.transfer.opacity = "-1.4e-9:0.9,-0.9e-9:0.3,-0.5e-9:0,0:0,0.5e-9:0,1.4e-9:0.9"
+        .parse()
+        .unwrap();
+    job.style.context.coastlines = true;
+    job.style.context.sea_opacity = 0.03;
+    matches_golden_of("under_wide", &ocean(ONE_DEGREE), job);
 }
 
 #[test]

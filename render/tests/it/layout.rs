@@ -7,10 +7,10 @@ use render::passes::{scatter, splat, trails};
 use render::stages::fill::level::{FillLevel, MOST_REACH_COLS};
 use render::stages::fill::{self, exact, window};
 use render::stages::layout::{
-    Axis, COVERED, Col, Entry, GROUP, GroundAxis, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT,
-    LIGHT_ALONE, LIGHT_GIVEN, LIGHT_OFF, LIGHT_OWN, LOOK, MISSING, MOST_HOT_PARTS, NO_LIST,
-    PART_ENTRIES, Particle, RADIUS_BITS, Row, SCREEN_TILE_PX, SCREEN_TILE_SHIFT, SQUARE, SUBPIXELS,
-    SUNK_BIT, SUNK_M, Splat, VIEW_GLOBE, VIEW_TILE, Velocity, WATER_BLUE, WATER_GREEN, WATER_RED,
+    Axis, BEYOND_BIT, BEYOND_M, COVERED, Col, Entry, GROUP, GroundAxis, KERNEL_BALL, KERNEL_CLOUD,
+    KERNEL_DOT, LIGHT_ALONE, LIGHT_GIVEN, LIGHT_OFF, LIGHT_OWN, LOOK, MISSING, MOST_HOT_PARTS,
+    NO_LIST, PART_ENTRIES, Particle, RADIUS_BITS, Row, SCREEN_TILE_PX, SCREEN_TILE_SHIFT, SQUARE,
+    SUBPIXELS, Splat, VIEW_GLOBE, VIEW_TILE, Velocity, WATER_BLUE, WATER_GREEN, WATER_RED,
 };
 use render::stages::params::{Fields, Params};
 use render::stages::{bin, compose, eye, flow, interpolate, light, map};
@@ -208,8 +208,8 @@ fn constants_have_the_same_value_in_rust_and_wgsl() {
         ("SCREEN_TILE_PX", f64::from(SCREEN_TILE_PX)),
         ("SCREEN_TILE_SHIFT", f64::from(SCREEN_TILE_SHIFT)),
         ("SUBPIXELS", f64::from(SUBPIXELS)),
-        ("SUNK_M", f64::from(SUNK_M)),
-        ("SUNK_BIT", f64::from(SUNK_BIT)),
+        ("BEYOND_M", f64::from(BEYOND_M)),
+        ("BEYOND_BIT", f64::from(BEYOND_BIT)),
         ("RADIUS_BITS", f64::from(RADIUS_BITS)),
         ("PART_ENTRIES", f64::from(PART_ENTRIES)),
         ("MOST_HOT_PARTS", f64::from(MOST_HOT_PARTS)),

@@ -7,6 +7,7 @@
 
 mod adapters;
 mod bands;
+mod below;
 mod coast;
 mod compare;
 mod context;

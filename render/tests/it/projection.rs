@@ -42,6 +42,8 @@ fn a_lone_cell_is_drawn_where_the_projection_has_it() {
             angles(-160.0, 40.0, 25.0),
             [-157.5, -42.5],
         ),
+        // From below the sea surface.
+        (-27.0, 46.0, -1e6, angles(20.0, 176.0, 10.0), [-27.5, 47.5]),
     ] {
         let [lon, lat]: [f64; 2] = place;
         let view = View::Globe {

@@ -40,6 +40,7 @@ fn a_place_on_the_globe_is_seen_where_equation_4_puts_it() {
             up: Vec3::Z,
             forward: -Vec3::Y,
             slices: 64,
+            hides: 1.0,
             ..ViewParams::default()
         },
         ..Params::default()
@@ -225,7 +226,7 @@ fn a_uniform_slab_dims_light_as_exp_of_minus_its_depth() {
         light_v: y * 16,
         light_depth: per_slice,
         day: 1.0,
-        color: 0x00ff_ffff,
+        color: 0xffff_ffff,
         ..Splat::default()
     };
     let cells = (0..6).flat_map(|y| (0..6).map(move |x| (x, y)));
@@ -313,7 +314,7 @@ fn one_cloud_is_an_analytic_disc() {
 }
 
 #[test]
-fn land_hides_what_is_sunk_behind_it_and_nothing_else() {
+fn land_hides_what_is_beyond_behind_it_and_nothing_else() {
     let mut params = clouds(40);
     params.in_context = true;
     params.context.land_hides = 1;
@@ -321,14 +322,14 @@ fn land_hides_what_is_sunk_behind_it_and_nothing_else() {
     // Sea, half land, land.
     let share = |x: usize| [0u32, 128, 255][x / 14];
     let coast: Vec<u32> = (0..1600).map(|at| share(at % 40)).collect();
-    let cloud = |is_sunk: u32| Splat {
+    let cloud = |is_beyond: u32| Splat {
         x_sub: 20 * 16,
         y_sub: 20 * 16,
         radius_px: 25.0,
         tau: 1.0,
         slice: 2.5,
         color: 0x00ff_ffff,
-        is_sunk,
+        is_beyond,
         ..Splat::default()
     };
     let risen = seen_over(&mut params, &[cloud(0)], &coast);

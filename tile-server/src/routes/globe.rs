@@ -1,4 +1,4 @@
-//! `/globe/{product}/{mode}.png`: the globe from somewhere above, as a picture of any size.
+//! `/globe/{product}/{mode}.png`: the globe from somewhere above, or from below the sea, as a picture of any size.
 
 use axum::extract::State;
 use axum::http::HeaderMap;
@@ -36,11 +36,12 @@ pub(crate) struct GlobeQuery {
     /// Latitude below the camera, degrees north; 0 unless one is given. Not with `look_at`.
     #[param(value_type = Option<f64>, minimum = -90, maximum = 90)]
     lat: Option<String>,
-    /// Height of the camera above the ground, km; 15000 unless one is given. Not with `look_at`.
-    #[param(value_type = Option<f64>, minimum = 1, maximum = 1e6)]
+    /// Height of the camera above the ground, km, 1 to 1e6, or below the sea surface, -1 to -1000, among what sank as deep
+    /// as it is drawn; 15000 unless one is given. Not with `look_at`.
+    #[param(value_type = Option<f64>, minimum = -1000, maximum = 1e6)]
     height_km: Option<String>,
     /// `LON,LAT`: the place in the middle of the picture, instead of the one below the camera; `tilt` is then that of the
-    /// line of sight against the vertical there.
+    /// line of sight against the vertical there: 0 from straight above, 180 from straight below through the sea.
     #[param(example = "-95,0")]
     look_at: Option<String>,
     /// From the camera to the place that is looked at, km; 15000 unless one is given. Only with `look_at`.
@@ -49,7 +50,8 @@ pub(crate) struct GlobeQuery {
     /// Direction of view, clockwise from north, degrees; 0 unless one is given.
     #[param(value_type = Option<f64>, minimum = -360, maximum = 360)]
     heading: Option<String>,
-    /// 0 looks straight down, 90 along the ground, degrees; 0 unless one is given.
+    /// 0 looks straight down, 90 along the ground, 180 straight up, degrees; 0 unless one is given. With `look_at` 0 to 90,
+    /// or more from below the sea surface.
     #[param(value_type = Option<f64>, minimum = 0, maximum = 180)]
     tilt: Option<String>,
     /// Lean of the camera to the right, degrees; 0 unless one is given.
@@ -227,7 +229,7 @@ impl GlobeQuery {
                     "height_km",
                     self.height_km.as_deref(),
                     HEIGHT_KM,
-                    "kilometres above the ground, 1 to 1e6",
+                    "kilometres above the ground, 1 to 1e6, or below the sea surface, -1 to -1000",
                 )?,
             width_px,
             height_px,

@@ -78,7 +78,20 @@ const BAD_ADDRESSES: &[(&str, &str)] = &[
     ("/globe/flux/map.png?width=1000000000", "1 to 4096"),
     ("/globe/flux/map.png?width=1e9", "1 to 4096"),
     ("/globe/flux/map.png?height=0", "1 to 4096"),
-    ("/globe/flux/map.png?height_km=-5", "1 km to 1 million km"),
+    (
+        "/globe/flux/map.png?height_km=-0.5",
+        "1 km to 1 million km above the ground, or 1 km to 1000 km below the sea surface",
+    ),
+    ("/globe/flux/map.png?height_km=-1001", "-1 to -1000"),
+    ("/globe/flux/map.png?height_km=deep", "-1 to -1000"),
+    (
+        "/globe/flux/map.png?look_at=0,0&distance_km=600&tilt=92",
+        "0 to 90 from above; from below the sea surface, 600 km away, 92.8 to",
+    ),
+    (
+        "/globe/flux/map.png?look_at=0,0&distance_km=9000&tilt=120",
+        "no camera below the sea surface",
+    ),
     ("/globe/flux/map.png?height_km=inf", "kilometres"),
     ("/globe/flux/map.png?surface=maybe", "true or false"),
     ("/api/products/flux/point?lon=nan&lat=0", "degrees east"),

@@ -171,11 +171,12 @@ impl Line {
     }
 }
 
-/// Away from the middle of the globe.
+/// From the ground to where there is none: away from the middle of the globe, from below the sea towards the core.
 fn outward([x, y]: [f64; 2], projection: &Projection) -> Option<[f64; 2]> {
     let [middle_x, middle_y] = projection.middle_of_globe()?;
-    let length = (x - middle_x).hypot(y - middle_y);
-    (length > 0.0).then(|| [(x - middle_x) / length, (y - middle_y) / length])
+    let away = (x - middle_x).hypot(y - middle_y);
+    let length = if projection.is_below() { -away } else { away };
+    (away > 0.0).then(|| [(x - middle_x) / length, (y - middle_y) / length])
 }
 
 /// The middle of a name of a width and height beside the end of a line: inside the picture, outside the globe.

@@ -10,7 +10,7 @@ use crate::frame_context::FrameContext;
 use crate::gpu::{Gpu, Kernel};
 use crate::passes::store::Stored;
 use crate::stages::bin::params::ListParams;
-use crate::stages::layout::{RADIUS_BITS, SUBPIXELS, SUNK_BIT, Splat};
+use crate::stages::layout::{BEYOND_BIT, RADIUS_BITS, SUBPIXELS, Splat};
 use crate::stages::params::Uniform::{
     Cells, Grid, Lighting, Lists, Particles, Projection, Values, View,
 };
@@ -23,6 +23,7 @@ pub const SOURCE: &str = concat!(
     include_str!("../../stages/particles/particles.wgsl"),
     include_str!("../../stages/uncertainty.wgsl"),
     include_str!("../../stages/coverage.wgsl"),
+    include_str!("../../stages/water.wgsl"),
     include_str!("../../stages/project/project.wgsl"),
     include_str!("../../stages/light/texel.wgsl"),
     include_str!("../../stages/light/deposit.wgsl"),
@@ -52,7 +53,7 @@ pub fn unpacked(seen: [u32; 4], lit: [u32; 4], lists: &ListParams) -> Splat {
         light_depth: 0.0,
         day: f32::from_bits(lit[3]),
         color: seen[3],
-        is_sunk: u32::from(seen[2] & SUNK_BIT != 0),
+        is_beyond: u32::from(seen[2] & BEYOND_BIT != 0),
     }
 }
 

@@ -16,6 +16,7 @@ use crate::stages::sizes::workgroups;
 pub const SOURCE: &str = concat!(
     include_str!("../../stages/prelude.wgsl"),
     include_str!("../../stages/particles/particles.wgsl"),
+    include_str!("../../stages/water.wgsl"),
     include_str!("../../stages/project/project.wgsl"),
     include_str!("../../stages/light/texel.wgsl"),
     include_str!("../../stages/light/deposit.wgsl"),

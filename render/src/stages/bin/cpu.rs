@@ -1,7 +1,7 @@
 //! CPU twin of `reach.wgsl`, `bin.wgsl` and of the second half of the sort in `scatter.wgsl`.
 
 use crate::stages::layout::{
-    Entry, KERNEL_CLOUD, SCREEN_TILE_SHIFT, SUBPIXELS, SUNK_BIT, Splat, nearest,
+    BEYOND_BIT, Entry, KERNEL_CLOUD, SCREEN_TILE_SHIFT, SUBPIXELS, Splat, nearest,
 };
 use crate::stages::params::Params;
 
@@ -71,7 +71,7 @@ pub fn scan(counts: &mut [u32]) -> u32 {
 pub fn scatter(params: &Params, splats: &[Splat], counts: &mut [u32], entries: &mut [Entry]) {
     for splat in splats {
         let radius = radius_of(params, splat) as u32;
-        let size = radius | (splat.is_sunk * SUNK_BIT) | (depth_of(params, splat) << 16);
+        let size = radius | (splat.is_beyond * BEYOND_BIT) | (depth_of(params, splat) << 16);
         let color = (splat.color & 0x00ff_ffff) | ((splat.slice as u32) << 24);
         for list in lists_of(params, splat) {
             let tile = list as u32 / params.view.slices;

@@ -7,7 +7,7 @@ const MOST_DEPTH = 65535.0;
 // First and last screen tile that a splat touches, x and y; empty if it touches none.
 struct Reach { low: vec2<i32>, high: vec2<i32> }
 
-// Radius, whether it is sunk, and depth, as in an entry; 0 draws nothing.
+// Radius, whether it lies beyond the sea surface, and depth, as in an entry; 0 draws nothing.
 fn size_word(splat: Splat) -> u32 {
     let radius = max(nearest(splat.radius_px * f32(SUBPIXELS)) >> lists.entry_shift, 1);
     var tau = splat.tau;
@@ -18,7 +18,7 @@ fn size_word(splat: Splat) -> u32 {
     }
     let depth = u32(min(tau * lists.depth_one, MOST_DEPTH) + 0.5);
     if (splat.tau <= 0.0 || depth == 0u) { return 0u; }
-    return u32(radius) | (splat.is_sunk * SUNK_BIT) | (depth << 16u);
+    return u32(radius) | (splat.is_beyond * BEYOND_BIT) | (depth << 16u);
 }
 
 fn reach_of(place: vec2<i32>, size: u32) -> Reach {

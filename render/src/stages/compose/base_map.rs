@@ -120,6 +120,46 @@ const LIGHT: Colors = Colors {
     },
 };
 
+/// What an eye below the sea surface sees, in sRGB: the surface from underneath, water level and above, water downwards.
+struct Below {
+    ceiling: [f32; 3],
+    water: [f32; 3],
+    deep: [f32; 3],
+    /// Land and lakes on the surface, and coasts and borders.
+    land: [f32; 3],
+    lake: [f32; 3],
+    line: Line,
+}
+
+const BELOW_DARK: Below = Below {
+    ceiling: [0.60, 0.83, 0.88],
+    water: [0.08, 0.22, 0.33],
+    deep: [0.008, 0.022, 0.05],
+    land: [0.12, 0.17, 0.20],
+    lake: [0.36, 0.53, 0.58],
+    line: Line {
+        grey: 0.03,
+        alpha: 0.75,
+    },
+};
+
+const BELOW_LIGHT: Below = Below {
+    ceiling: [0.86, 0.94, 0.96],
+    water: [0.50, 0.67, 0.76],
+    deep: [0.16, 0.29, 0.40],
+    land: [0.42, 0.49, 0.53],
+    lake: [0.66, 0.75, 0.79],
+    line: Line {
+        grey: 0.12,
+        alpha: 0.75,
+    },
+};
+
+/// How much darker the surface is from below where the product has no data, sRGB.
+const HATCH_BELOW: [f32; 3] = [-0.05; 3];
+/// Opacity of borders on it over that of coasts.
+const BORDER_BELOW: f32 = 0.5;
+
 /// Lines over a thematic map or a relief with colours of its own: their grey, opacities of coasts and of borders.
 const OVER_COLORS: [f32; 3] = [0.06, 0.75, 0.35];
 
@@ -133,6 +173,24 @@ fn colors(base_map: BaseMap) -> &'static Colors {
 /// Coasts over the plain globe.
 pub fn coast(base_map: BaseMap) -> Line {
     colors(base_map).coast
+}
+
+fn below(base_map: BaseMap) -> &'static Below {
+    match base_map {
+        BaseMap::Dark => &BELOW_DARK,
+        BaseMap::Light => &BELOW_LIGHT,
+    }
+}
+
+/// Coasts on the sea surface seen from underneath.
+pub fn coast_from_below(base_map: BaseMap) -> Line {
+    below(base_map).line
+}
+
+/// Light of the water round an eye below the sea surface: level and above, and downwards.
+pub fn water(base_map: BaseMap) -> [Vec3; 2] {
+    let below = below(base_map);
+    [below.water, below.deep].map(composed)
 }
 
 /// A colour as composition computes with it: linear light.
@@ -150,6 +208,21 @@ fn sum(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
 }
 
 impl BaseMapParams {
+    /// The sea surface seen from underneath.
+    pub fn from_below(base_map: BaseMap, background: Background) -> Self {
+        let below = below(base_map);
+        let grey = composed_grey(below.line.grey);
+        Self {
+            land: composed(below.land),
+            sea: composed(below.ceiling),
+            lake: composed(below.lake),
+            hatch: composed(sum(below.ceiling, HATCH_BELOW)) - composed(below.ceiling),
+            border_grey: grey,
+            border_alpha: below.line.alpha * BORDER_BELOW,
+            ..Self::of(base_map, background)
+        }
+    }
+
     /// The plain globe in the colours of a base map, before a background.
     pub fn of(base_map: BaseMap, background: Background) -> Self {
         let colors = colors(base_map);

@@ -8,16 +8,13 @@ use super::terrain;
 use crate::stages::layout::{WATER_BLUE, WATER_GREEN, WATER_RED};
 use crate::stages::params::Params;
 use crate::stages::sphere::Ground;
+use crate::stages::water::mix;
 
 const HATCH_PX: i32 = 8;
 const HATCH_LINE_PX: i32 = 2;
 /// 8 / pi: along a level line the depth is that of an exponential atmosphere.
 const LEVEL: f32 = 4.0 * FRAC_2_PI;
 pub(super) const WATER: Vec3 = Vec3::new(WATER_RED, WATER_GREEN, WATER_BLUE);
-
-pub(super) fn mix(a: Vec3, b: Vec3, t: f32) -> Vec3 {
-    a * (1.0 - t) + b * t
-}
 
 fn sea_color(params: &Params, floor: Option<&terrain::Ground>) -> Vec3 {
     let map = &params.base_map;

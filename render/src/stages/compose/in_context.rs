@@ -1,11 +1,13 @@
 //! CPU twin of `compose.wgsl` in its surroundings (`in_context.wgsl`).
 
+mod ceiling;
+
 use std::f32::consts::TAU;
 
 use glam::{Vec2, Vec3, Vec4};
 
 use super::cpu::bytes_of;
-use super::globe::{WATER, beside, daylight, hazy, mix, plain, rim, sunlight};
+use super::globe::{WATER, beside, daylight, hazy, plain, rim, sunlight};
 use super::terrain::{Ground, ground_at, tint};
 use crate::coast::sea_floor;
 use crate::plan::Plan;
@@ -15,6 +17,8 @@ use crate::stages::layout::{Axis, GroundAxis, VIEW_GLOBE, VIEW_TILE};
 use crate::stages::params::Params;
 use crate::stages::project::cpu::smoothstep;
 use crate::stages::sphere::{self, ground_below};
+use crate::stages::water::{is_submerged, mix};
+use ceiling::from_below;
 
 /// Light on a thematic map where it is night.
 const NIGHT: f32 = 0.14;
@@ -248,7 +252,7 @@ pub fn compose(params: &Params, picture: &[Vec4], around: &Surroundings<'_>, ima
     }
 }
 
-/// A blended colour in its surroundings, and whether it is seen beside the globe.
+/// A blended colour in its surroundings, and whether it is smoother than bytes: seen beside the globe, or through water.
 fn composed(
     params: &Params,
     blended: Vec4,
@@ -264,6 +268,9 @@ fn composed(
     if params.context.night_on == 1 {
         let day = smoothstep(-0.15, 0.35, spot.sun.z);
         color = (color.truncate() * (NIGHT * (1.0 - day) + day)).extend(color.w);
+    }
+    if is_submerged(params) {
+        return (from_below(params, around, &spot, pixel, color), true);
     }
     let mut covered = params.context.terrain_on as f32;
     if params.context.coast_above == 1 {

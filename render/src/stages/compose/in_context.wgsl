@@ -132,6 +132,7 @@ fn coast_color(pixel: vec2<u32>, covered: f32) -> vec4<f32> {
     return vec4(vec3(context.coast_grey), 1.0) * cover;
 }
 
+// `is_beside`: it is smoother than bytes, see `bytes_of`.
 struct InContext { color: vec4<f32>, is_beside: bool }
 
 fn in_context(pixel: vec2<u32>, blended: vec4<f32>) -> InContext {
@@ -141,6 +142,7 @@ fn in_context(pixel: vec2<u32>, blended: vec4<f32>) -> InContext {
     if (context.night_on == 1u) {
         color = vec4(color.xyz * mix(NIGHT, 1.0, smoothstep(-0.15, 0.35, spot.sun.z)), color.w);
     }
+    if (is_submerged()) { return InContext(from_below(spot, pixel, color), true); }
     var covered = f32(context.terrain_on);
     if (context.coast_above == 1u) { covered = max(covered, color.w); }
     let line = coast_color(pixel, covered);

@@ -20,8 +20,10 @@ use crate::stages::params::Uniform::{BaseMap, Context, Grid, TerrainGrid, View};
 /// The function that the eye runs for its own pixels.
 pub const FUNCTIONS: &str = concat!(
     include_str!("../sphere.wgsl"),
+    include_str!("../water.wgsl"),
     include_str!("globe.wgsl"),
     include_str!("terrain.wgsl"),
+    include_str!("in_context/ceiling.wgsl"),
     include_str!("in_context.wgsl"),
     include_str!("composed.wgsl")
 );
@@ -30,8 +32,10 @@ pub const FUNCTIONS: &str = concat!(
 pub const SOURCE: &str = concat!(
     include_str!("../prelude.wgsl"),
     include_str!("../sphere.wgsl"),
+    include_str!("../water.wgsl"),
     include_str!("globe.wgsl"),
     include_str!("terrain.wgsl"),
+    include_str!("in_context/ceiling.wgsl"),
     include_str!("in_context.wgsl"),
     include_str!("composed.wgsl"),
     include_str!("compose.wgsl")

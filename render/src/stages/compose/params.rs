@@ -23,7 +23,7 @@ shared_struct! {
         pub coast_alpha: f32,
         /// Words of the mask in a row of the whole picture.
         pub coast_row_words: u32,
-        /// 1: land of a globe view hides what is sunk in the sea behind it.
+        /// 1: land of a globe view hides what lies beyond the sea surface behind it.
         pub land_hides: u32,
     }
 }

@@ -16,7 +16,7 @@ fn near_of(entry: Entry, column: f32) -> Near {
         is_hidden_by_land(entry));
 }
 
-// What an entry gives to the pixel of a row, where so much of what is sunk is kept; nothing beyond its radius.
+// What an entry gives to the pixel of a row, where so much of what lies beyond the sea surface is kept; nothing beyond its radius.
 fn given(near: Near, row: f32, kept: f32) -> vec4<u32> {
     let south = (row - near.south) * near.inverse_radius;
     let amount = u32(near.depth * weight_at(near.east * near.east + south * south, near.radius_px)
@@ -30,7 +30,7 @@ fn more(sums: vec4<u32>, given: vec4<u32>) -> vec4<u32> {
     return sums + min(given, vec4(MOST_SUM) - sums);
 }
 
-// What a pixel keeps of something sunk.
+// What a pixel keeps of something beyond the sea surface.
 fn kept_at(pixel: vec2<u32>) -> f32 {
     if (!IN_CONTEXT || context.land_hides == 0u || any(pixel >= view.size_px)) { return 1.0; }
     return kept_by_land(land_share(pixel));

@@ -3,7 +3,7 @@
 use glam::{UVec2, Vec2, Vec4};
 
 use crate::stages::layout::{
-    Entry, KERNEL_BALL, KERNEL_CLOUD, RADIUS_BITS, SCREEN_TILE_PX, SUBPIXELS, SUNK_BIT,
+    BEYOND_BIT, Entry, KERNEL_BALL, KERNEL_CLOUD, RADIUS_BITS, SCREEN_TILE_PX, SUBPIXELS,
 };
 use crate::stages::params::Params;
 
@@ -58,7 +58,7 @@ pub fn blended(params: &Params, picture: Vec4, sums: [u32; 4]) -> Vec4 {
     }
 }
 
-/// What pixels of a screen tile keep of something that is sunk: all where no land hides it.
+/// What pixels of a screen tile keep of something beyond the sea surface: all where no land hides it.
 type Kept = [f32; TILE * TILE];
 
 /// `coast` is the mask of the whole picture.
@@ -128,7 +128,7 @@ fn add(params: &Params, entry: &Entry, kept: &Kept, sums: &mut Sums) {
     let radius = (entry.size & RADIUS_BITS) as f32;
     let inverse_radius = 1.0 / radius;
     let depth = (entry.size >> 16) as f32;
-    let is_sunk = entry.size & SUNK_BIT != 0;
+    let is_beyond = entry.size & BEYOND_BIT != 0;
     let rgb = [0, 8, 16].map(|shift| light_of((entry.color >> shift) & 255));
     let [east, south] =
         [(entry.place << 16) as i32 >> 16, entry.place as i32 >> 16].map(|place| place as f32);
@@ -144,7 +144,7 @@ fn add(params: &Params, entry: &Entry, kept: &Kept, sums: &mut Sums) {
             let offset = (center - Vec2::new(east, south)) * inverse_radius;
             let q = offset.dot(offset);
             let weight = weight_at(params.lists.kernel, q, radius / pixel_units);
-            let kept = if is_sunk { kept[y * TILE + x] } else { 1.0 };
+            let kept = if is_beyond { kept[y * TILE + x] } else { 1.0 };
             let amount = (depth * weight * kept + 0.5) as u32;
             let sum = &mut sums[y * TILE + x];
             for (channel, plain) in rgb.into_iter().enumerate() {

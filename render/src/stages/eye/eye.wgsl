@@ -30,12 +30,12 @@ var<workgroup> is_open: u32;
 // Shares of land of the pixels, 255ths, four in a word.
 var<workgroup> land: array<u32, 64>;
 
-// What is sunk lies behind the land that a sight line meets first.
+// What lies beyond the sea surface lies behind the land that a sight line meets first.
 fn is_hidden_by_land(entry: Entry) -> bool {
-    return IN_CONTEXT && context.land_hides == 1u && (entry.size & SUNK_BIT) != 0u;
+    return IN_CONTEXT && context.land_hides == 1u && (entry.size & BEYOND_BIT) != 0u;
 }
 
-// What is seen of something sunk where so much is land.
+// What is seen of something beyond the sea surface where so much is land.
 fn kept_by_land(share: u32) -> f32 {
     return f32(255u - share) * 0.003921569;
 }

@@ -18,8 +18,10 @@ use crate::stages::sizes::list_count;
 pub const SOURCE: &str = concat!(
     include_str!("../prelude.wgsl"),
     include_str!("../sphere.wgsl"),
+    include_str!("../water.wgsl"),
     include_str!("../compose/globe.wgsl"),
     include_str!("../compose/terrain.wgsl"),
+    include_str!("../compose/in_context/ceiling.wgsl"),
     include_str!("../compose/in_context.wgsl"),
     include_str!("../compose/composed.wgsl"),
     include_str!("../bin/lists.wgsl"),

@@ -146,6 +146,9 @@ pub fn shade(params: &Params, light: &[u32], splats: &mut [Splat]) {
     for splat in splats.iter_mut().filter(|splat| splat.tau > 0.0) {
         let direct = params.lighting.direct * lit(params, light, splat) * splat.day;
         let night = mix(params.lighting.night, 1.0, splat.day);
-        splat.color = dimmed(splat.color, (params.lighting.ambient + direct) * night);
+        let shade = (params.lighting.ambient + direct) * night;
+        // Water in between has its own light.
+        let own = (splat.color >> 24) as f32 / 255.0;
+        splat.color = dimmed(splat.color, mix(1.0, shade, own));
     }
 }

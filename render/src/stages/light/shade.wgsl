@@ -41,5 +41,7 @@ fn look(place: vec2<i32>, slice: f32, step: f32) -> vec2<f32> {
 fn shaded(color: u32, place: vec2<i32>, slice: f32, day: f32, radius_px: f32) -> u32 {
     let sum = look(place, slice, -LOOK * radius_px) + look(place, slice, LOOK * radius_px);
     let lit = sum.x / max(sum.y, 1.0e-30);
-    return dimmed(color, (lighting.ambient + lighting.direct * lit * day) * mix(lighting.night, 1.0, day));
+    let shade = (lighting.ambient + lighting.direct * lit * day) * mix(lighting.night, 1.0, day);
+    // Water in between has its own light.
+    return dimmed(color, mix(1.0, shade, f32(color >> 24u) / 255.0));
 }

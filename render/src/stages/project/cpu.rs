@@ -2,8 +2,13 @@
 
 use glam::{Vec2, Vec3};
 
-use crate::stages::layout::{Col, Particle, Row, SUBPIXELS, SUNK_M, Splat, VIEW_TILE, nearest};
+use crate::stages::colour::{codes_of, with_codes};
+use crate::stages::layout::{BEYOND_M, Col, Particle, Row, SUBPIXELS, Splat, VIEW_TILE, nearest};
 use crate::stages::params::Params;
+use crate::stages::water::{ceiling_light, is_submerged, kept_over, mix, water_light};
+
+/// All of a colour is the particle's own: see [`Splat`].
+const UNDIMMED: u32 = 0xff00_0000;
 
 /// Half a cell beyond which the series for small angles is not good enough.
 const WIDE_CELL_RAD: f32 = 0.2;
@@ -95,18 +100,39 @@ fn on_tile(params: &Params, row: &Row, col: &Col, particle: &Particle) -> Splat 
         } else {
             1.0
         },
-        color: particle.color,
-        is_sunk: 0,
+        color: particle.color | UNDIMMED,
+        is_beyond: 0,
     }
 }
 
-/// Is a place beyond the horizon of the sea surface, or of its own sphere when below it?
-fn is_hidden(normal: Vec3, distance: f32, camera: Vec3) -> bool {
-    let horizon = distance.min(1.0);
+/// Is a place beyond the horizon of what hides (the sea surface; from below, the core), or of its own sphere when below it?
+fn is_hidden(normal: Vec3, distance: f32, camera: Vec3, hides: f32) -> bool {
+    let horizon = distance.min(hides);
     let camera_sq = camera.dot(camera);
     let grazing = (camera_sq - horizon * horizon).max(0.0).sqrt()
         * (distance * distance - horizon * horizon).max(0.0).sqrt();
     normal.dot(camera) * distance < horizon * horizon - grazing
+}
+
+/// A particle's colour as an eye below the sea surface sees it: through the surface from underneath where the particle lies
+/// above it, and through the water. In the last byte is what is left of its own light.
+fn through_sea(params: &Params, particle: &Particle, sight: Vec3, normal: Vec3) -> u32 {
+    let view = &params.view;
+    let way = sight.length();
+    let toward = sight / way.max(1.0e-9);
+    let nearest_at = -view.eye.dot(toward);
+    let foot = view.eye + toward * nearest_at;
+    let to_ceiling = nearest_at + (1.0 - foot.dot(foot)).max(0.0).sqrt();
+    let codes = codes_of(particle.color) / 255.0;
+    let above = (particle.height_m / params.particles.sheet_m + 0.5).clamp(0.0, 1.0);
+    let through = 1.0 - above + view.ceiling_kept * above;
+    let ceiling = ceiling_light(params, normal.dot(view.sun));
+    let seen = mix(ceiling, codes * codes, through);
+    let left = kept_over(params, way.min(to_ceiling));
+    let water = water_light(params, toward.dot(view.eye) / view.eye.length());
+    let seen = mix(water, seen, left);
+    let color = with_codes(0, seen.map(f32::sqrt) * 255.0);
+    color | (nearest(through * left * 255.0) as u32) << 24
 }
 
 fn on_globe(params: &Params, row: &Row, col: &Col, particle: &Particle) -> Splat {
@@ -131,10 +157,15 @@ fn on_globe(params: &Params, row: &Row, col: &Col, particle: &Particle) -> Splat
             * row.radius
             * projection.light_depth_gain,
         day: day_at(params, normal),
-        color: particle.color,
+        color: if is_submerged(params) {
+            through_sea(params, particle, sight, normal)
+        } else {
+            particle.color | UNDIMMED
+        },
         ..Splat::default()
     };
-    if ahead < 0.01 * (camera.dot(camera) - 1.0) || is_hidden(normal, distance, camera) {
+    let least = 0.01 * (camera.dot(camera) - 1.0).abs();
+    if ahead < least || is_hidden(normal, distance, camera, view.hides) {
         return unseen;
     }
     let scale = view.focal_px / ahead;
@@ -153,7 +184,11 @@ fn on_globe(params: &Params, row: &Row, col: &Col, particle: &Particle) -> Splat
         y_sub: nearest(y * SUBPIXELS as f32) - view.origin_px.y * SUBPIXELS,
         radius_px,
         tau: particle.depth * row.depth_gain * thinned * thinned,
-        is_sunk: u32::from(particle.height_m < -SUNK_M),
+        is_beyond: u32::from(if view.hides < 1.0 {
+            particle.height_m > BEYOND_M
+        } else {
+            particle.height_m < -BEYOND_M
+        }),
         ..unseen
     }
 }

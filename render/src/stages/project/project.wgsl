@@ -46,6 +46,28 @@ fn day_at(normal: vec3<f32>) -> f32 {
     return smoothstep(-0.15, 0.35, dot(normal, view.sun));
 }
 
+// All of a colour is the particle's own: see `Splat`.
+const UNDIMMED = 0xff000000u;
+
+// A particle's colour as an eye below the sea surface sees it: through the surface from underneath where the particle lies
+// above it, and through the water. In the last byte is what is left of its own light.
+fn through_sea(particle: Particle, sight: vec3<f32>, normal: vec3<f32>) -> u32 {
+    let way = length(sight);
+    let toward = sight / max(way, 1.0e-9);
+    let nearest_at = -dot(view.eye, toward);
+    let foot = view.eye + toward * nearest_at;
+    let to_ceiling = nearest_at + sqrt(max(1.0 - dot(foot, foot), 0.0));
+    let codes = codes_of(particle.color) / 255.0;
+    // The sheet of particles at the surface lies on both sides of it.
+    let above = clamp(particle.height_m / particles.sheet_m + 0.5, 0.0, 1.0);
+    let through = mix(1.0, view.ceiling_kept, above);
+    let seen = mix(ceiling_light(dot(normal, view.sun)), codes * codes, through);
+    let left = kept_over(min(way, to_ceiling));
+    let water = water_light(dot(toward, view.eye) / length(view.eye));
+    let color = with_codes(0u, sqrt(mix(water, seen, left)) * 255.0);
+    return color | (u32(nearest(through * left * 255.0)) << 24u);
+}
+
 fn on_tile(particle: Particle) -> Splat {
     let row = rows[particle.row];
     let col = cols[particle.slot];
@@ -64,7 +86,7 @@ fn on_tile(particle: Particle) -> Splat {
     splat.slice = slice_of(particle.height_m);
     splat.day = 1.0;
     if (projection.day_on == 1u) { splat.day = day_at(normal_of(particle)); }
-    splat.color = particle.color;
+    splat.color = particle.color | UNDIMMED;
     return splat;
 }
 
@@ -76,9 +98,9 @@ fn on_globe(particle: Particle) -> Splat {
     let camera = view.eye;
     let sight = place - camera;
     let ahead = dot(sight, view.forward);
-    // Hidden if beyond the horizon of the sea surface, or of its own sphere when below it.
+    // Hidden if beyond the horizon of the sea surface, or of its own sphere when below it; from below, beyond that of the core.
     let beyond = dot(normal, camera);
-    let horizon = min(distance, 1.0);
+    let horizon = min(distance, view.hides);
     let camera_sq = dot(camera, camera);
     let grazing = sqrt(max(camera_sq - horizon * horizon, 0.0)) * sqrt(max(distance * distance - horizon * horizon, 0.0));
     // What is not seen still casts its shadow.
@@ -90,8 +112,9 @@ fn on_globe(particle: Particle) -> Splat {
     splat.light_u = nearest(u * projection.light_texels_per_unit * f32(lighting.unit));
     splat.light_v = nearest(v * projection.light_texels_per_unit * f32(lighting.unit));
     splat.day = day_at(normal);
-    splat.color = particle.color;
-    if (ahead < 0.01 * (camera_sq - 1.0) || beyond * distance < horizon * horizon - grazing) { return splat; }
+    splat.color = particle.color | UNDIMMED;
+    if (is_submerged()) { splat.color = through_sea(particle, sight, normal); }
+    if (ahead < 0.01 * abs(camera_sq - 1.0) || beyond * distance < horizon * horizon - grazing) { return splat; }
     let scale = view.focal_px / ahead;
     let x = dot(sight, view.right) * scale + view.center_px.x;
     let y = view.center_px.y - dot(sight, view.up) * scale;
@@ -105,7 +128,7 @@ fn on_globe(particle: Particle) -> Splat {
     splat.radius_px = max(radius_px, projection.min_radius_px);
     let thinned = full_px / splat.radius_px;
     splat.tau = particle.depth * row.depth_gain * thinned * thinned;
-    splat.is_sunk = u32(particle.height_m < -SUNK_M);
+    splat.is_beyond = u32(select(particle.height_m < -BEYOND_M, particle.height_m > BEYOND_M, view.hides < 1.0));
     return splat;
 }
 

@@ -9,8 +9,9 @@ use render::stages::eye::{self, Eye};
 use render::stages::map::{self, Map};
 
 use super::{Twins, bytes, channels, far_apart, prove};
+use crate::below::below;
 use crate::context::{everything, with_terrain};
-use crate::scenes::{FIVE_DEGREES, globe, tile};
+use crate::scenes::{FIVE_DEGREES, globe, ocean, tile};
 
 #[test]
 fn map_matches_its_twin_on_tiles_and_on_the_globe() {
@@ -93,6 +94,45 @@ fn compose_matches_its_twin() {
             );
             far_apart(&bytes(drawn), &expected, 1.01)
         });
+    }
+}
+
+#[test]
+fn what_is_seen_from_below_the_sea_matches_its_twin() {
+    let view = below([-100.0, 20.0], 4e5, [20.0, 80.0], [160, 120]);
+    for mode in [Mode::Volume, Mode::Map] {
+        let twins = Twins::styled(mode, view, ocean(FIVE_DEGREES), |style| {
+            (style.context.coastlines, style.context.borders) = (true, true);
+        });
+        let expected = bytes(twins.image.iter().copied());
+        for (right, wrong) in [
+            ("spot.cover < 1.0) { around", "spot.cover < 0.0) { around"),
+            (
+                "kept_over(spot.ground.way)",
+                "kept_over(0.5 * spot.ground.way)",
+            ),
+            (
+                "plain(spot.ground.lon, spot",
+                "plain(0.3 + spot.ground.lon, spot",
+            ),
+            ("nearest_at + half_chord", "nearest_at - half_chord"),
+            ("line + seen * (1.0 - line.w)", "seen * (1.0 - line.w)"),
+        ] {
+            prove("compose", compose::SOURCE, right, wrong, |gpu, source| {
+                let stage = Compose::new(gpu, source);
+                let picture = |f: &mut FrameContext<'_>| {
+                    drop(f.upload(Slot::Picture, &twins.picture).unwrap());
+                };
+                let drawn: Vec<u32> = twins.run(
+                    gpu,
+                    picture,
+                    |f| stage.record(f).unwrap(),
+                    Slot::Image,
+                    twins.image.len(),
+                );
+                far_apart(&bytes(drawn), &expected, 1.01)
+            });
+        }
     }
 }
 

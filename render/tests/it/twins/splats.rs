@@ -8,9 +8,10 @@ use render::stages::{
 };
 
 use super::{Twins, prove, splat_numbers};
+use crate::below::below;
 use crate::compare::worst;
 use crate::context::{everything, with_terrain};
-use crate::scenes::{FIVE_DEGREES, tile};
+use crate::scenes::{FIVE_DEGREES, ocean, tile};
 
 #[test]
 fn splats_match_their_twins_on_tiles_and_on_the_globe() {
@@ -59,6 +60,41 @@ fn splats_match_their_twins_on_tiles_and_on_the_globe() {
                 outputs,
             );
             // Colours are bytes and may round to a neighbour; a phase of a few turns loses a few bits.
+            worst(
+                &splat_numbers(
+                    twins.params.lists.kernel,
+                    &twins.in_order(&seen, &lit),
+                    &twins.splats,
+                ),
+                &expected,
+                0.0201,
+                1e-4,
+            )
+        });
+    }
+}
+
+#[test]
+fn splats_seen_from_below_the_sea_match_their_twins() {
+    let view = below([-128.0, 30.0], 3e5, [20.0, 105.0], [160, 120]);
+    let twins = Twins::styled(Mode::Volume, view, ocean(FIVE_DEGREES), |_| ());
+    let expected = splat_numbers(twins.params.lists.kernel, &twins.splats, &twins.splats);
+    for (right, wrong) in [
+        ("min(distance, view.hides)", "min(distance, 1.0)"),
+        ("kept_over(min(way, to_ceiling))", "kept_over(way * 2.0)"),
+        ("mix(1.0, view.ceiling_kept, above)", "1.0"),
+        ("mix(view.deep, view.water,", "mix(view.water, view.deep,"),
+        ("through * left * 255.0", "left * 255.0"),
+    ] {
+        prove("splat", splat::SOURCE, right, wrong, |gpu, source| {
+            let stage = Splats::new(gpu, source, SHARED_PROBES);
+            let [seen, lit] = twins.run_with(
+                gpu,
+                &twins.params,
+                |_| (),
+                |f| stage.record(f).unwrap(),
+                twins.stored(),
+            );
             worst(
                 &splat_numbers(
                     twins.params.lists.kernel,

@@ -1,0 +1,36 @@
+// What an eye below the sea surface sees behind the particles: the surface from underneath, land and coasts dark on it, and
+// the core, all through the water.
+
+fn water_before(spot: Spot) -> vec3<f32> {
+    return water_light(dot(spot.ground.sight, view.eye) / length(view.eye));
+}
+
+// The surface; a map lies on it, and coast lines on that.
+fn ceiling_color(spot: Spot, pixel: vec2<u32>, blended: vec4<f32>) -> vec4<f32> {
+    var seen = vec4(0.0);
+    if (context.surface == 1u) {
+        var no_floor: Terrain;
+        let shares = ground_mask(pixel).xy;
+        seen = vec4(plain(spot.ground.lon, spot.ground.lat, shares, no_floor, pixel) * daylight(spot.sun.z), 1.0);
+    }
+    if (context.coast_above == 1u) { seen = blended + seen * (1.0 - blended.w); }
+    let line = coast_color(pixel, 0.0);
+    seen = line + seen * (1.0 - line.w);
+    return vec4(mix(water_before(spot) * seen.w, seen.xyz, kept_over(spot.ground.way)), seen.w);
+}
+
+// The core, where a globe is drawn.
+fn deep_color(spot: Spot) -> vec4<f32> {
+    if (context.surface == 0u) { return vec4(0.0); }
+    let foot = spot.ground.foot;
+    let way = spot.ground.nearest_at - sqrt(max(view.hides * view.hides - dot(foot, foot), 0.0));
+    return vec4(mix(water_before(spot), view.deep, kept_over(way)), 1.0);
+}
+
+fn from_below(spot: Spot, pixel: vec2<u32>, blended: vec4<f32>) -> vec4<f32> {
+    var around = vec4(0.0);
+    if (spot.cover > 0.0) { around = ceiling_color(spot, pixel, blended) * spot.cover; }
+    if (spot.cover < 1.0) { around += deep_color(spot) * (1.0 - spot.cover); }
+    if (context.coast_above == 1u) { return around; }
+    return blended + around * (1.0 - blended.w);
+}
