@@ -6,7 +6,7 @@ const SOURCES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/src");
 
 #[test]
 fn every_stage_and_every_form_of_filling_has_a_shader_and_a_twin() {
-    assert_eq!(check("stages"), 10);
+    assert_eq!(check("stages"), 11);
     assert_eq!(check("stages/fill"), 2);
 }
 
@@ -45,6 +45,7 @@ fn order<'a>(text: &str, stages: &[&'a str], call: impl Fn(&str) -> String) -> V
 fn both_frames_list_the_same_stages_in_the_same_order() {
     let read = |file: &str| std::fs::read_to_string(Path::new(SOURCES).join(file)).unwrap();
     let stages = [
+        "isolines",
         "interpolate",
         "map",
         "flow",
@@ -66,6 +67,7 @@ fn both_frames_list_the_same_stages_in_the_same_order() {
     assert_eq!(cpu, stages);
     // On the device two passes stand for the stages that see one particle at a time, and the eye composes.
     let passes = [
+        "isolines",
         "interpolate",
         "map",
         "compose",

@@ -28,11 +28,13 @@ pub struct Surroundings<'a> {
     pub ground_axes: &'a [GroundAxis],
     /// Words of the mask of the whole picture.
     pub coast: &'a [u32],
+    /// Isolines of the part that is drawn; not read where there are none.
+    pub lines: &'a [u32],
 }
 
 impl<'a> Surroundings<'a> {
-    /// Those of a planned picture.
-    pub fn of(plan: &'a Plan, scene: &'a Scene) -> Self {
+    /// Those of a planned picture with these isolines.
+    pub fn of(plan: &'a Plan, scene: &'a Scene, lines: &'a [u32]) -> Self {
         let landed = scene.terrain.as_ref().map(Terrain::heights_m);
         let terrain = if plan.params.context.sea_floor_on == 1 {
             &sea_floor::HEIGHTS_M
@@ -44,6 +46,7 @@ impl<'a> Surroundings<'a> {
             terrain,
             ground_axes: &plan.ground_axes,
             coast: &plan.coast,
+            lines,
         }
     }
 }
@@ -237,6 +240,15 @@ fn coast_color(params: &Params, coast: &[u32], pixel: [u32; 2], covered: f32) ->
     grey(context.coast_grey) * cover
 }
 
+fn isoline_color(params: &Params, lines: &[u32], [x, y]: [u32; 2]) -> Vec4 {
+    if params.context.isolines_on == 0 {
+        return Vec4::ZERO;
+    }
+    let word = lines[(y * params.view.size_px.x + x) as usize];
+    let share = |half: u32| half as f32 / 65535.0;
+    Vec3::splat(share(word >> 16)).extend(1.0) * share(word & 0xffff)
+}
+
 /// Bytes of every pixel, red lowest, from the blended colours.
 pub fn compose(params: &Params, picture: &[Vec4], around: &Surroundings<'_>, image: &mut [u32]) {
     for y in 0..params.view.size_px.y {
@@ -265,6 +277,10 @@ fn composed(
         let day = smoothstep(-0.15, 0.35, spot.sun.z);
         color = (color.truncate() * (NIGHT * (1.0 - day) + day)).extend(color.w);
     }
+    let isoline = isoline_color(params, around.lines, pixel);
+    let through = isoline * params.context.isolines_through;
+    color = through + color * (1.0 - through.w);
+    color += isoline * (1.0 - color.w);
     let mut covered = params.context.terrain_on as f32;
     if params.context.coast_above == 1 {
         covered = covered.max(color.w);

@@ -2,12 +2,14 @@
 // those of the stages that compose.
 struct ContextParams {
     surface: u32, has_water: u32, night_on: u32, terrain_on: u32, sea_floor_on: u32, terrain_slope: f32, seabed_per_m: f32, coast_on: u32,
-    coast_above: u32, coast_grey: f32, coast_alpha: f32, coast_row_words: u32,
+    coast_above: u32, coast_grey: f32, coast_alpha: f32, coast_row_words: u32, isolines_on: u32, isolines_through: f32,
 }
 @group(0) @binding(27) var<uniform> context: ContextParams;
 @group(0) @binding(5) var<storage, read> terrain: array<f32>;
 @group(0) @binding(6) var<storage, read> ground_axes: array<GroundAxis>;
 @group(0) @binding(7) var<storage, read> coast: array<u32>;
+// Of the part that is drawn; see `isolines.wgsl`.
+@group(0) @binding(11) var<storage, read> lines: array<u32>;
 
 // Light on a thematic map where it is night.
 const NIGHT = 0.14;
@@ -126,6 +128,13 @@ fn coast_color(pixel: vec2<u32>, covered: f32) -> vec4<f32> {
     return vec4(vec3(context.coast_grey), 1.0) * cover;
 }
 
+// Isolines in a pixel.
+fn isoline_color(pixel: vec2<u32>) -> vec4<f32> {
+    if (context.isolines_on == 0u) { return vec4(0.0); }
+    let word = lines[pixel.y * view.size_px.x + pixel.x];
+    return vec4(vec3(f32(word >> 16u) / 65535.0), 1.0) * (f32(word & 0xffffu) / 65535.0);
+}
+
 struct InContext { color: vec4<f32>, is_beside: bool }
 
 fn in_context(pixel: vec2<u32>, blended: vec4<f32>) -> InContext {
@@ -135,6 +144,11 @@ fn in_context(pixel: vec2<u32>, blended: vec4<f32>) -> InContext {
     if (context.night_on == 1u) {
         color = vec4(color.xyz * mix(NIGHT, 1.0, smoothstep(-0.15, 0.35, spot.sun.z)), color.w);
     }
+    // On the sea surface: a part of a line shines through the particles, all of it where there are none.
+    let isoline = isoline_color(pixel);
+    let through = isoline * context.isolines_through;
+    color = through + color * (1.0 - through.w);
+    color += isoline * (1.0 - color.w);
     var covered = f32(context.terrain_on);
     if (context.coast_above == 1u) { covered = max(covered, color.w); }
     let line = coast_color(pixel, covered);

@@ -23,5 +23,8 @@ shared_struct! {
         pub coast_alpha: f32,
         /// Words of the mask in a row of the whole picture.
         pub coast_row_words: u32,
+        pub isolines_on: u32,
+        /// How much of isolines is seen through particles; all of them lies over maps.
+        pub isolines_through: f32,
     }
 }

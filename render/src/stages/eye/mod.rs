@@ -95,7 +95,7 @@ impl Eye {
             (3, frame.scene.domain.clone()),
             (4, image),
         ];
-        buffers.extend((5..).zip(compose::surroundings(frame)?));
+        buffers.extend(compose::surroundings(frame)?);
         if has_parts {
             self.sum_up(frame)?;
         }
