@@ -62,11 +62,14 @@ impl Stages {
     }
 
     fn record(&self, frame: &mut FrameContext<'_>) -> Result<(), RenderError> {
-        if frame.params.context.isolines_on == 1 {
+        let is_map = frame.plan.mode == Mode::Map;
+        if is_map {
+            self.interpolate.record(frame)?;
+        }
+        if frame.params.context.lines_on == 1 {
             self.isolines.record(frame)?;
         }
-        if frame.plan.mode == Mode::Map {
-            self.interpolate.record(frame)?;
+        if is_map {
             self.map.record(frame)?;
             self.compose.record(frame)
         } else {

@@ -29,7 +29,7 @@ pub fn draw(plan: &Plan, part: Part, scene: &Scene) -> Result<Vec<u8>, RenderErr
     let value = interpolated(&params, params.values.weight, &scene.value);
     let uncertainty = uncertainty::between(&params, &scene.value);
     let mut lines = vec![];
-    if params.context.isolines_on == 1 {
+    if params.context.lines_on == 1 {
         lines.resize(pixels, 0);
         let inputs = isolines::cpu::Inputs::of(plan, scene, &value);
         isolines::cpu::draw_lines(&params, &inputs, &mut lines);

@@ -42,7 +42,7 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) {
         context.surface,
         context.coast_on,
         context.night_on,
-        context.isolines_on,
+        context.lines_on,
     ];
     params.in_context = parts.contains(&1);
     if let View::Tile { tile, size_px } = job.view

@@ -34,8 +34,8 @@ use crate::stages::colour::{code_of, linear_of};
 use crate::stages::interpolate::params::InterpolateParams;
 use crate::stages::isolines::params::Isoline;
 use crate::stages::layout::{
-    Active, Axis, Col, GroundAxis, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, LIGHT_OFF, LIGHT_OWN,
-    NEVER_LONG, Row, SCREEN_TILE_PX, SQUARE, SUBPIXELS, VIEW_TILE,
+    Active, Axis, Col, GroundAxis, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, KERNEL_RIMMED, LIGHT_OFF,
+    LIGHT_OWN, NEVER_LONG, Row, SCREEN_TILE_PX, SQUARE, SUBPIXELS, VIEW_TILE,
 };
 use crate::stages::light::params::LightParams;
 use crate::stages::map::params::MapParams;
@@ -45,6 +45,7 @@ use crate::stages::project::params::ProjectParams;
 use crate::stages::sizes::{HALF_BYTES, workgroups};
 use look::Look;
 
+pub use isolines::graticule_step_deg;
 pub use look::HEIGHT_LIMIT_M;
 pub use projection::{Projection, Seen};
 
@@ -378,7 +379,8 @@ fn common(job: &RenderJob, scene: &Scene) -> Params {
         lighting: lighting(job),
         lists: ListParams {
             kernel: match job.mode {
-                Mode::Points | Mode::Flow => KERNEL_DOT,
+                Mode::Points => KERNEL_RIMMED,
+                Mode::Flow => KERNEL_DOT,
                 Mode::Sprites => KERNEL_BALL,
                 Mode::Volume | Mode::Map => KERNEL_CLOUD,
             },

@@ -73,6 +73,7 @@ const LIGHT_ALONE: u32 = 3u;
 const KERNEL_DOT: u32 = 0u;
 const KERNEL_BALL: u32 = 1u;
 const KERNEL_CLOUD: u32 = 2u;
+const KERNEL_RIMMED: u32 = 3u;
 
 fn is_missing(value: f32) -> bool {
     return value < 0.5 * MISSING;

@@ -9,9 +9,9 @@ use render::stages::fill::{self, exact, window};
 use render::stages::isolines::params::Isoline;
 use render::stages::layout::{
     Axis, COVERED, Col, Entry, GROUP, GroundAxis, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT,
-    LIGHT_ALONE, LIGHT_GIVEN, LIGHT_OFF, LIGHT_OWN, LOOK, MISSING, MOST_HOT_PARTS, NO_LIST,
-    PART_ENTRIES, Particle, Row, SCREEN_TILE_PX, SCREEN_TILE_SHIFT, SQUARE, SUBPIXELS, Splat,
-    VIEW_GLOBE, VIEW_TILE, Velocity, WATER_BLUE, WATER_GREEN, WATER_RED,
+    KERNEL_RIMMED, LIGHT_ALONE, LIGHT_GIVEN, LIGHT_OFF, LIGHT_OWN, LOOK, MISSING, MOST_HOT_PARTS,
+    NO_LIST, PART_ENTRIES, Particle, Row, SCREEN_TILE_PX, SCREEN_TILE_SHIFT, SQUARE, SUBPIXELS,
+    Splat, VIEW_GLOBE, VIEW_TILE, Velocity, WATER_BLUE, WATER_GREEN, WATER_RED,
 };
 use render::stages::params::{Fields, Params};
 use render::stages::{bin, compose, eye, flow, interpolate, isolines, light, map};
@@ -230,6 +230,7 @@ fn constants_have_the_same_value_in_rust_and_wgsl() {
         ("KERNEL_DOT", f64::from(KERNEL_DOT)),
         ("KERNEL_BALL", f64::from(KERNEL_BALL)),
         ("KERNEL_CLOUD", f64::from(KERNEL_CLOUD)),
+        ("KERNEL_RIMMED", f64::from(KERNEL_RIMMED)),
     ] {
         assert!(
             (wgsl(name) - value).abs() <= value.abs() * 1e-7,

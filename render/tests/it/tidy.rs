@@ -45,8 +45,8 @@ fn order<'a>(text: &str, stages: &[&'a str], call: impl Fn(&str) -> String) -> V
 fn both_frames_list_the_same_stages_in_the_same_order() {
     let read = |file: &str| std::fs::read_to_string(Path::new(SOURCES).join(file)).unwrap();
     let stages = [
-        "isolines",
         "interpolate",
+        "isolines",
         "map",
         "flow",
         "particles",
@@ -67,8 +67,8 @@ fn both_frames_list_the_same_stages_in_the_same_order() {
     assert_eq!(cpu, stages);
     // On the device two passes stand for the stages that see one particle at a time, and the eye composes.
     let passes = [
-        "isolines",
         "interpolate",
+        "isolines",
         "map",
         "compose",
         "flow",

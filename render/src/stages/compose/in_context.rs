@@ -240,13 +240,27 @@ fn coast_color(params: &Params, coast: &[u32], pixel: [u32; 2], covered: f32) ->
     grey(context.coast_grey) * cover
 }
 
-fn isoline_color(params: &Params, lines: &[u32], [x, y]: [u32; 2]) -> Vec4 {
-    if params.context.isolines_on == 0 {
-        return Vec4::ZERO;
+fn over(line: Vec4, color: Vec4, is_above: bool) -> Vec4 {
+    if is_above {
+        line + color * (1.0 - line.w)
+    } else {
+        color + line * (1.0 - color.w)
+    }
+}
+
+fn with_lines(params: &Params, lines: &[u32], [x, y]: [u32; 2], color: Vec4, covered: f32) -> Vec4 {
+    let context = &params.context;
+    if context.lines_on == 0 {
+        return color;
     }
     let word = lines[(y * params.view.size_px.x + x) as usize];
-    let share = |half: u32| half as f32 / 65535.0;
-    Vec3::splat(share(word >> 16)).extend(1.0) * share(word & 0xffff)
+    let grey = |grey: f32| Vec3::splat(grey).extend(1.0);
+    let isoline = grey((word >> 12 & 255) as f32 / 255.0) * ((word & 4095) as f32 / 4095.0);
+    let own = context.graticule_grey * (1.0 - covered) + params.base_map.over_grey * covered;
+    let graticule = grey(own) * ((word >> 20) as f32 / 4095.0 * context.graticule_alpha);
+    let through = over(isoline * context.isolines_through, color, true);
+    let shown = over(isoline, through, false);
+    over(graticule, shown, context.coast_above == 1)
 }
 
 /// Bytes of every pixel, red lowest, from the blended colours.
@@ -277,20 +291,13 @@ fn composed(
         let day = smoothstep(-0.15, 0.35, spot.sun.z);
         color = (color.truncate() * (NIGHT * (1.0 - day) + day)).extend(color.w);
     }
-    let isoline = isoline_color(params, around.lines, pixel);
-    let through = isoline * params.context.isolines_through;
-    color = through + color * (1.0 - through.w);
-    color += isoline * (1.0 - color.w);
     let mut covered = params.context.terrain_on as f32;
     if params.context.coast_above == 1 {
         covered = covered.max(color.w);
     }
+    color = with_lines(params, around.lines, pixel, color, covered);
     let line = coast_color(params, around.coast, pixel, covered);
-    if params.context.coast_above == 1 {
-        color = line + color * (1.0 - line.w);
-    } else {
-        color += line * (1.0 - color.w);
-    }
+    color = over(line, color, params.context.coast_above == 1);
     color += ground_color(params, around, &spot, pixel) * (1.0 - color.w);
     (color, spot.cover < 1.0)
 }

@@ -2,7 +2,8 @@
 // those of the stages that compose.
 struct ContextParams {
     surface: u32, has_water: u32, night_on: u32, terrain_on: u32, sea_floor_on: u32, terrain_slope: f32, seabed_per_m: f32, coast_on: u32,
-    coast_above: u32, coast_grey: f32, coast_alpha: f32, coast_row_words: u32, isolines_on: u32, isolines_through: f32,
+    coast_above: u32, coast_grey: f32, coast_alpha: f32, coast_row_words: u32, lines_on: u32, isolines_through: f32,
+    graticule_grey: f32, graticule_alpha: f32,
 }
 @group(0) @binding(27) var<uniform> context: ContextParams;
 @group(0) @binding(5) var<storage, read> terrain: array<f32>;
@@ -128,11 +129,22 @@ fn coast_color(pixel: vec2<u32>, covered: f32) -> vec4<f32> {
     return vec4(vec3(context.coast_grey), 1.0) * cover;
 }
 
-// Isolines in a pixel.
-fn isoline_color(pixel: vec2<u32>) -> vec4<f32> {
-    if (context.isolines_on == 0u) { return vec4(0.0); }
+// A line over what lies below it, or where that leaves it seen.
+fn over(line: vec4<f32>, color: vec4<f32>, is_above: bool) -> vec4<f32> {
+    if (is_above) { return line + color * (1.0 - line.w); }
+    return color + line * (1.0 - color.w);
+}
+
+// Lines on the sea surface: the graticule, which particles hide, and isolines, a part of which shines through them.
+// `covered` is how much of what lies below has colours of its own.
+fn with_lines(pixel: vec2<u32>, color: vec4<f32>, covered: f32) -> vec4<f32> {
+    if (context.lines_on == 0u) { return color; }
     let word = lines[pixel.y * view.size_px.x + pixel.x];
-    return vec4(vec3(f32(word >> 16u) / 65535.0), 1.0) * (f32(word & 0xffffu) / 65535.0);
+    let isoline = vec4(vec3(f32((word >> 12u) & 255u) / 255.0), 1.0) * (f32(word & 4095u) / 4095.0);
+    let grey = mix(context.graticule_grey, base_map.over_grey, covered);
+    let graticule = vec4(vec3(grey), 1.0) * (f32(word >> 20u) / 4095.0 * context.graticule_alpha);
+    let shown = over(isoline, over(isoline * context.isolines_through, color, true), false);
+    return over(graticule, shown, context.coast_above == 1u);
 }
 
 struct InContext { color: vec4<f32>, is_beside: bool }
@@ -144,19 +156,11 @@ fn in_context(pixel: vec2<u32>, blended: vec4<f32>) -> InContext {
     if (context.night_on == 1u) {
         color = vec4(color.xyz * mix(NIGHT, 1.0, smoothstep(-0.15, 0.35, spot.sun.z)), color.w);
     }
-    // On the sea surface: a part of a line shines through the particles, all of it where there are none.
-    let isoline = isoline_color(pixel);
-    let through = isoline * context.isolines_through;
-    color = through + color * (1.0 - through.w);
-    color += isoline * (1.0 - color.w);
     var covered = f32(context.terrain_on);
     if (context.coast_above == 1u) { covered = max(covered, color.w); }
+    color = with_lines(pixel, color, covered);
     let line = coast_color(pixel, covered);
-    if (context.coast_above == 1u) {
-        color = line + color * (1.0 - line.w);
-    } else {
-        color += line * (1.0 - color.w);
-    }
+    color = over(line, color, context.coast_above == 1u);
     color += ground_color(spot, pixel) * (1.0 - color.w);
     return InContext(color, spot.cover < 1.0);
 }

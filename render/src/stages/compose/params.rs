@@ -23,8 +23,11 @@ shared_struct! {
         pub coast_alpha: f32,
         /// Words of the mask in a row of the whole picture.
         pub coast_row_words: u32,
-        pub isolines_on: u32,
+        /// 1: isolines or a graticule lie on the sea surface.
+        pub lines_on: u32,
         /// How much of isolines is seen through particles; all of them lies over maps.
         pub isolines_through: f32,
+        pub graticule_grey: f32,
+        pub graticule_alpha: f32,
     }
 }

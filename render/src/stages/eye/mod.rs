@@ -9,7 +9,8 @@ use crate::frame_context::FrameContext;
 use crate::gpu::{Gpu, Kernel, Slot};
 use crate::stages::compose;
 use crate::stages::layout::{
-    KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, MOST_HOT_PARTS, NEVER_LONG, SCREEN_TILE_PX,
+    KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, KERNEL_RIMMED, MOST_HOT_PARTS, NEVER_LONG,
+    SCREEN_TILE_PX,
 };
 use crate::stages::params::Uniform::Lists;
 use crate::stages::sizes::list_count;
@@ -41,9 +42,9 @@ pub struct Eye {
     entry: &'static str,
     /// By kind of particle, surroundings and long lists. Those of plain pictures are compiled at once, the others when
     /// they are first wanted.
-    kernels: [[[OnceLock<Kernel>; 2]; 2]; 3],
+    kernels: [[[OnceLock<Kernel>; 2]; 2]; 4],
     /// Sum up the parts of long lists.
-    hot: [OnceLock<Kernel>; 3],
+    hot: [OnceLock<Kernel>; 4],
 }
 
 /// Workgroups that take the parts of long lists in turn: as many as a large device runs at once.
@@ -76,7 +77,7 @@ impl Eye {
             kernels: Default::default(),
             hot: Default::default(),
         };
-        for kind in [KERNEL_DOT, KERNEL_BALL, KERNEL_CLOUD] {
+        for kind in [KERNEL_DOT, KERNEL_BALL, KERNEL_CLOUD, KERNEL_RIMMED] {
             eye.kernel(gpu, kind, false, false);
         }
         eye

@@ -13,6 +13,7 @@ use crate::stages::sphere::ground_below;
 
 const CROWDED: f32 = 0.2;
 const TOO_CROWDED: f32 = 0.5;
+const RIM_PER_PX: f32 = 0.3;
 const FLAT_PX: f32 = 10000.0;
 
 /// What the stage reads.
@@ -63,19 +64,36 @@ fn one(params: &Params, inputs: &Inputs<'_>, [x, y]: [u32; 2]) -> u32 {
         let (col, row) = (x as usize, (params.view.size_px.x + y) as usize);
         let field = field_at(params, inputs, [inputs.axes[col], inputs.axes[row]]);
         return field.map_or(0, |field| {
-            let slope = slope_on_tile(params, field, inputs.ground_axes[row].cos);
-            line_of(inputs.levels, field, slope.length())
+            let per_rad = per_rad_of(params, field);
+            let slope = slope_on_tile(params, per_rad, inputs.ground_axes[row].cos);
+            line_of(inputs.levels, field, slope, 1.0)
         });
     }
     let hit = ground_below(params, [x, y]);
     if !hit.on_ground {
         return 0;
     }
-    let place = [col_of(params, hit.lon_rad), row_of(params, hit.lat_rad)];
-    field_at(params, inputs, place).map_or(0, |field| {
-        let slope = slope_on_globe(params, field, hit.normal);
-        line_of(inputs.levels, field, slope.length())
-    })
+    let slope = |per_rad: Vec2| slope_on_globe(params, per_rad, hit.normal);
+    let inside = (hit.rim_px * RIM_PER_PX - 0.5).clamp(0.0, 1.0);
+    let mut word = 0;
+    if params.isolines.count > 0 {
+        let place = [col_of(params, hit.lon_rad), row_of(params, hit.lat_rad)];
+        let field = field_at(params, inputs, place);
+        word = field.map_or(0, |field| {
+            line_of(
+                inputs.levels,
+                field,
+                slope(per_rad_of(params, field)),
+                inside,
+            )
+        });
+    }
+    if params.isolines.graticule_per_rad > 0.0 {
+        let meridian = graticule_of(params, hit.lon_rad, slope(Vec2::X));
+        let parallel = graticule_of(params, hit.lat_rad, slope(Vec2::Y));
+        word |= (nearest(meridian.max(parallel) * inside * 4095.0) as u32) << 20;
+    }
+    word
 }
 
 /// Value times the share of the cell that holds data, 1, and that share; or zeros where there is no data.
@@ -116,16 +134,20 @@ fn field_at(params: &Params, inputs: &Inputs<'_>, [x, y]: [Axis; 2]) -> Option<F
     })
 }
 
-fn slope_on_tile(params: &Params, field: Field, cos_lat: f32) -> Vec2 {
+fn per_rad_of(params: &Params, field: Field) -> Vec2 {
     let grid = &params.grid;
     Vec2::new(
         field.per_col * grid.cols_per_rad,
-        field.per_row * grid.rows_per_rad * cos_lat,
-    ) * params.isolines.rad_per_px
+        -field.per_row * grid.rows_per_rad,
+    )
 }
 
-fn slope_on_globe(params: &Params, field: Field, normal: Vec3) -> Vec2 {
-    let (view, grid) = (&params.view, &params.grid);
+fn slope_on_tile(params: &Params, per_rad: Vec2, cos_lat: f32) -> f32 {
+    Vec2::new(per_rad.x, per_rad.y * cos_lat).length() * params.isolines.rad_per_px
+}
+
+fn slope_on_globe(params: &Params, per_rad: Vec2, normal: Vec3) -> f32 {
+    let view = &params.view;
     let toward = normal - view.eye;
     let sight = toward / toward.length();
     let along = 1.0 / sight.dot(normal);
@@ -135,22 +157,33 @@ fn slope_on_globe(params: &Params, field: Field, normal: Vec3) -> Vec2 {
     let cos_lat = normal.truncate().length().max(1.0e-6);
     let east = Vec3::new(normal.y, -normal.x, 0.0) / cos_lat;
     let north = (-normal.truncate() * (normal.z / cos_lat)).extend(cos_lat);
-    let rise = east * (field.per_col * grid.cols_per_rad / cos_lat)
-        - north * (field.per_row * grid.rows_per_rad);
-    Vec2::new(rise.dot(right), rise.dot(down))
+    let rise = east * (per_rad.x / cos_lat) + north * per_rad.y;
+    Vec2::new(rise.dot(right), rise.dot(down)).length()
 }
 
-fn line_of(levels: &[Isoline], field: Field, slope: f32) -> u32 {
+fn crowd(per_px: f32) -> f32 {
+    ((TOO_CROWDED - per_px) / (TOO_CROWDED - CROWDED)).clamp(0.0, 1.0)
+}
+
+fn graticule_of(params: &Params, angle: f32, slope: f32) -> f32 {
+    let own = &params.isolines;
+    let place = angle * own.graticule_per_rad;
+    let per_px = (slope * own.graticule_per_rad).max(1.0e-20);
+    let off_px = (place - (place + 0.5).floor()).abs() / per_px;
+    (own.graticule_half_px + 0.5 - off_px).clamp(0.0, 1.0) * crowd(per_px)
+}
+
+fn line_of(levels: &[Isoline], field: Field, slope: f32, inside: f32) -> u32 {
     let (mut cover, mut grey) = (0.0, 0.0);
     for level in levels {
         let off_px = (field.value - level.value).abs() / slope.max(1.0e-20);
         let per_px = slope / level.gap;
-        let crowd = ((TOO_CROWDED - per_px) / (TOO_CROWDED - CROWDED)).clamp(0.0, 1.0);
         let steep = (per_px * (2.0 * FLAT_PX) - 1.0).clamp(0.0, 1.0);
-        let own = (level.half_px + 0.5 - off_px).clamp(0.0, 1.0) * level.alpha * crowd * steep;
+        let own =
+            (level.half_px + 0.5 - off_px).clamp(0.0, 1.0) * level.alpha * crowd(per_px) * steep;
         if own > cover {
             (cover, grey) = (own, level.grey);
         }
     }
-    nearest(cover * 65535.0) as u32 | (nearest(grey * 65535.0) as u32) << 16
+    nearest(cover * inside * 4095.0) as u32 | (nearest(grey * 255.0) as u32) << 12
 }

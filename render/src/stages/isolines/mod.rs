@@ -1,5 +1,5 @@
-//! Isolines: the frames around an instant in; how much of every pixel lines cover, and their grey, out. See
-//! `isolines.wgsl`; composition lays them into the picture.
+//! Isolines and the graticule: the frames around an instant in; how much of every pixel lines on the sea surface cover out.
+//! See `isolines.wgsl`; composition lays them into the picture.
 
 pub mod cpu;
 pub mod params;

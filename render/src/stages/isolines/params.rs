@@ -1,7 +1,7 @@
 //! What isolines read: mirrored in `isolines.wgsl`.
 
 shared_struct! {
-    /// Which isolines a picture has. None of them: the stage does not run.
+    /// Which lines a picture has on its sea surface. None of them: the stage does not run.
     pub struct IsolineParams {
         /// Lines in the table.
         pub count: u32,
@@ -10,6 +10,10 @@ shared_struct! {
         /// Values are counted over the range of colours, 0 at its low end: so that numbers are of the size of 1.
         pub low: f32,
         pub per_unit: f32,
+        /// Meridians in a radian, and parallels; 0 without a graticule.
+        pub graticule_per_rad: f32,
+        /// Half the width of one, pixels.
+        pub graticule_half_px: f32,
     }
 }
 

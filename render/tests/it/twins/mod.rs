@@ -156,7 +156,7 @@ impl Twins {
             eye::cpu::eye(&params, &list_ends, &entries, &mut picture);
         }
         let mut lines = vec![];
-        if params.context.isolines_on == 1 {
+        if params.context.lines_on == 1 {
             lines.resize(picture.len(), 0);
             let inputs = isolines::cpu::Inputs::of(&plan, &scene, &value);
             isolines::cpu::draw_lines(&params, &inputs, &mut lines);
