@@ -2,6 +2,7 @@
 
 mod options;
 mod palette;
+mod scale;
 mod stops;
 
 use serde::{Deserialize, Serialize};
@@ -11,13 +12,16 @@ use crate::quantity::Quantity;
 
 pub use options::{ShownRange, TransferOptions};
 pub use palette::Palette;
+pub use scale::Scale;
 pub use stops::{AtStop, MAX_STOPS, MAX_VALUE, Rgb, Share, Stop, Stops};
 
 /// Least distance from the first to the last value: its inverse is far from the limits of the numbers that pictures are
 /// computed with.
 const MIN_SPAN: f64 = 1e-30;
+/// Least ratio of the last to the first value of a logarithmic range.
+const MIN_RATIO: f64 = 1.0 + 1e-6;
 
-/// What a value looks like, over a range of stored values: linear in a palette unless there are stops.
+/// What a value looks like, over a range of stored values: spread over a palette unless there are stops.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TransferFunction {
     /// Colours.
@@ -28,6 +32,9 @@ pub struct TransferFunction {
     /// Stored value of the last colour, above `low`.
     #[serde(with = "crate::exact")]
     pub high: f64,
+    /// How values are spread between the two.
+    #[serde(default, skip_serializing_if = "Scale::is_usual")]
+    pub scale: Scale,
     /// The palette's last colour first.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub reversed: bool,
@@ -49,6 +56,7 @@ impl TransferFunction {
             palette,
             low,
             high,
+            scale: Scale::Linear,
             reversed: false,
             colors: Stops::default(),
             opacity: Stops::default(),
@@ -63,7 +71,7 @@ impl TransferFunction {
             Quantity::CarbonFlux => (Palette::Balance, -40.0, 40.0),
             Quantity::AccumulatedCarbon => (Palette::Balance, -50.0, 50.0),
             Quantity::SeaSurfaceTemperature => (Palette::Thermal, -2.0, 32.0),
-            Quantity::Chlorophyll => (Palette::Algae, 0.0, 2.0),
+            Quantity::Chlorophyll => (Palette::Algae, 0.03, 10.0),
             Quantity::WindSpeed | Quantity::Precipitation => (Palette::Speed, 0.0, 15.0),
             Quantity::Pco2 => (Palette::Thermal, 280.0, 440.0),
             Quantity::Salinity => (Palette::Thermal, 30.0, 38.0),
@@ -75,12 +83,25 @@ impl TransferFunction {
             Quantity::Current => (Palette::Balance, -1.5, 1.5),
             Quantity::Elevation => (Palette::Balance, -6000.0, 6000.0),
         };
-        Self::linear(palette, display.stored(low), display.stored(high))
+        Self {
+            scale: match quantity {
+                // From the clearest gyres to blooms at a coast it is a few hundred times as much.
+                Quantity::Chlorophyll => Scale::Log,
+                _ => Scale::Linear,
+            },
+            ..Self::linear(palette, display.stored(low), display.stored(high))
+        }
     }
 
     /// Place of a stored value between `low` (0) and `high` (1), clamped; NaN stays NaN.
     pub fn position(&self, value: f64) -> f64 {
-        ((value - self.low) / (self.high - self.low)).clamp(0.0, 1.0)
+        let [value, low, high] = [value, self.low, self.high].map(|v| self.scale.spread(v));
+        ((value - low) / (high - low)).clamp(0.0, 1.0)
+    }
+
+    /// The stored value at a place between `low` (0) and `high` (1).
+    pub fn value_at(&self, place: f64) -> f64 {
+        self.scale.between(self.low, self.high, place)
     }
 
     /// The nearest value of the range, which is not taken to rise.
@@ -88,13 +109,13 @@ impl TransferFunction {
         value.max(self.low).min(self.high)
     }
 
-    /// Colour of a stored value, sRGB 0 to 1, linear between stops; black for NaN.
+    /// Colour of a stored value, sRGB 0 to 1, straight between stops; black for NaN.
     pub fn color(&self, value: f64) -> [f64; 3] {
         let position = self.position(value);
         if position.is_nan() {
             return [0.0; 3];
         }
-        let Some((below, above, share)) = self.colors.around(self.within(value)) else {
+        let Some((below, above, share)) = self.colors.around(self.within(value), self.scale) else {
             let place = if self.reversed {
                 1.0 - position
             } else {
@@ -118,7 +139,7 @@ impl TransferFunction {
     }
 
     fn share(&self, stops: &Stops<Share>, value: f64) -> Option<f64> {
-        let (below, above, share) = stops.around(self.within(value))?;
+        let (below, above, share) = stops.around(self.within(value), self.scale)?;
         Some(below.get() * (1.0 - share) + above.get() * share)
     }
 
@@ -143,7 +164,25 @@ impl TransferFunction {
         }
         self.colors.validate()?;
         self.opacity.validate()?;
-        self.size.validate()
+        self.size.validate()?;
+        self.validate_scale()
+    }
+
+    /// Refuses what a logarithm has no place for.
+    fn validate_scale(&self) -> Result<(), ContractError> {
+        let firsts = [self.colors.span(), self.opacity.span(), self.size.span()];
+        let firsts = firsts.into_iter().flatten().map(|(first, _)| first);
+        let lowest = firsts.fold(self.low, f64::min);
+        if self.scale == Scale::Linear || (lowest > 0.0 && self.high / self.low >= MIN_RATIO) {
+            return Ok(());
+        }
+        let text = format!("{lowest} to {}", self.high);
+        Err(ContractError::invalid(
+            "range of colours",
+            &text,
+            "a logarithmic scale has no place for 0 or less, in the range or in stops, nor for a range without width; give \
+             a range above 0, or a linear scale",
+        ))
     }
 }
 
@@ -195,6 +234,56 @@ mod tests {
             [Some(0.0), Some(0.5), Some(1.0)]
         );
         assert_eq!(tf.size(2.0), None);
+    }
+
+    #[test]
+    fn a_logarithmic_range_has_its_powers_of_ten_at_equal_distances() {
+        let tf = TransferFunction {
+            scale: Scale::Log,
+            ..TransferFunction::linear(Palette::Gray, 0.01, 100.0)
+        };
+        tf.validate().unwrap();
+        for (value, place) in [
+            (0.01, 0.0),
+            (0.1, 0.25),
+            (1.0, 0.5),
+            (10.0, 0.75),
+            (100.0, 1.0),
+        ] {
+            assert!((tf.position(value) - place).abs() < 1e-12, "{value}");
+            assert!((tf.color(value)[0] - place).abs() < 1e-12, "{value}");
+            assert!((tf.value_at(place) / value - 1.0).abs() < 1e-12, "{place}");
+        }
+        assert_eq!([-1.0, 0.0, 1e9].map(|v| tf.position(v)), [0.0, 0.0, 1.0]);
+        assert!(tf.position(f64::NAN).is_nan());
+        let stops = TransferFunction {
+            colors: "0.01:#000000,1:#ffffff,100:#ffffff".parse().unwrap(),
+            opacity: "0.1:0,10:1".parse().unwrap(),
+            ..tf
+        };
+        assert!((stops.color(0.1)[0] - 0.5).abs() < 1e-12);
+        assert!((stops.opacity(1.0).unwrap() - 0.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_a_logarithm_has_no_place_for_is_refused() {
+        let with = |low, high| TransferFunction {
+            scale: Scale::Log,
+            ..TransferFunction::linear(Palette::Ice, low, high)
+        };
+        for (low, high) in [(0.0, 1.0), (-1.0, 1.0), (-2.0, -1.0), (1.0, 1.0 + 1e-9)] {
+            let refused = with(low, high).validate().unwrap_err().to_string();
+            assert!(
+                refused.contains("a linear scale"),
+                "{low} to {high}: {refused}"
+            );
+        }
+        let stops = TransferFunction {
+            opacity: "0:1,2:0.5".parse().unwrap(),
+            ..with(1.0, 2.0)
+        };
+        stops.validate().unwrap_err();
+        with(1.0, 2.0).validate().unwrap();
     }
 
     #[test]

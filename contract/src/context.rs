@@ -1,10 +1,12 @@
-//! What surrounds the particles of a picture: coast lines and borders, the sea they sink into, land and sea floor, sky.
+//! What surrounds the particles of a picture: coast lines and borders, isolines, the sea they sink into, land and sea
+//! floor, sky.
 
 use serde::{Deserialize, Serialize};
 
 use crate::ContractError;
 use crate::base_map::{Background, BaseMap};
 use crate::grid::Grid;
+use crate::isolines::Isolines;
 use crate::key::ObjectKey;
 use crate::manifest::Manifest;
 use crate::quantity::Quantity;
@@ -22,7 +24,7 @@ pub const MAX_SEA_OPACITY: f64 = 0.99;
 /// the sea hides the share that a style states, m.
 pub const SEA_OPACITY_DEPTH_M: f64 = 100_000.0;
 
-/// What is drawn besides the product, without data of its own. Nothing of it is in the name of a picture without it.
+/// What is drawn besides the particles, without data of its own. Nothing of it is in the name of a picture without it.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Context {
@@ -49,6 +51,9 @@ pub struct Context {
     /// What is seen beside the globe.
     #[serde(default, skip_serializing_if = "Background::is_usual")]
     pub background: Background,
+    /// Isolines of the quantity that is drawn, on the sea surface.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub isolines: Option<Isolines>,
 }
 
 /// The relief under a picture: one stored frame of elevation on a grid of its own.
@@ -212,10 +217,11 @@ mod tests {
             sea_floor: true,
             base_map: BaseMap::Light,
             background: Background::Sky,
+            isolines: Some(Isolines::Decades { one: 1.0 }),
             ..both
         };
         let text = serde_json::to_string(&all).unwrap();
-        let more = r#""borders":true,"sea_floor":true,"base_map":"light","background":"sky"}"#;
+        let more = r#""borders":true,"sea_floor":true,"base_map":"light","background":"sky","isolines":{"decades":{"one":"1"}}}"#;
         assert!(text.ends_with(more), "{text}");
         assert_eq!(serde_json::from_str::<Context>(&text).unwrap(), all);
     }

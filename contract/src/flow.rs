@@ -37,6 +37,20 @@ pub fn northward_of(eastward: &Manifest) -> Option<ProductId> {
     eastward.product.northward().filter(|_| is_part)
 }
 
+/// The title of a vector from that of its eastward part: without the word that tells the parts apart.
+pub fn title_of_vector(eastward: &str) -> String {
+    let is_direction = |word: &str| word.eq_ignore_ascii_case("eastward");
+    let words = eastward
+        .split_whitespace()
+        .filter(|word| !is_direction(word));
+    let title = words.collect::<Vec<_>>().join(" ");
+    let mut signs = title.trim_end_matches([',', ';', ':']).chars();
+    match signs.next() {
+        Some(first) => first.to_uppercase().chain(signs).collect(),
+        None => eastward.to_owned(),
+    }
+}
+
 /// Checks that two versions of products are the parts of one vector.
 ///
 /// # Errors
@@ -107,6 +121,23 @@ mod tests {
     use crate::job::{Mode, RenderJob, Style, View};
     use crate::key::ObjectKey;
     use crate::manifest::{MANIFEST_SCHEMA, Step};
+
+    #[test]
+    fn a_vector_is_not_named_by_one_of_its_parts() {
+        for (part, vector) in [
+            ("Eastward surface current", "Surface current"),
+            ("Current, eastward", "Current"),
+            (
+                "surface eastward current of a model",
+                "Surface current of a model",
+            ),
+            ("GlobCurrent", "GlobCurrent"),
+            ("Eastward", "Eastward"),
+            ("", ""),
+        ] {
+            assert_eq!(title_of_vector(part), vector);
+        }
+    }
 
     const VIEW: View = View::Globe {
         lon_deg: 0.0,

@@ -226,7 +226,9 @@ impl Style {
             return bad("optical depth is 0 to 100, height 0 to 1e9 m per kg m-2");
         }
         self.sun.validate()?;
-        self.context.validate()
+        self.context.validate()?;
+        let isolines = self.context.isolines;
+        isolines.map_or(Ok(()), |isolines| isolines.lines(&self.transfer).map(drop))
     }
 }
 
@@ -323,6 +325,9 @@ impl RenderJob {
             Some(_) if self.mode != Mode::Flow || self.accumulated.is_some() => {
                 bad("only the mode flow has a northward part, and nothing lifts its particles")
             }
+            Some(_) if self.style.context.isolines.is_some() => bad(
+                "isolines are those of one quantity; leave them out, or draw a part of the vector as a map",
+            ),
             flow => flow.as_ref().map_or(Ok(()), Flow::validate),
         }
     }
@@ -357,7 +362,8 @@ mod tests {
     use super::*;
     use crate::annotation::{DateLabel, Graticule, HeightScale, Label};
     use crate::base_map::{Background, BaseMap};
-    use crate::colour::{Palette, Share, Stops};
+    use crate::colour::{Palette, Scale, Share, Stops};
+    use crate::isolines::Isolines;
     use crate::quantity::Quantity;
     use crate::sun::Subsolar;
     use crate::time_sample::{After, Counts};
@@ -415,7 +421,9 @@ mod tests {
     #[test]
     fn a_job_in_the_usual_style_names_nothing_that_it_does_not_use() {
         let json = serde_json::to_string(&job()).unwrap();
-        for unused in ["reversed", "colors", "opacity", "\"size\"", "doubt"] {
+        for unused in [
+            "reversed", "colors", "opacity", "\"size\"", "doubt", "scale", "isolines",
+        ] {
             assert!(!json.contains(unused), "{unused}: {json}");
         }
     }
@@ -423,6 +431,10 @@ mod tests {
     fn subsolar(lon_deg: f64) -> Subsolar {
         let lat_deg = 20.0;
         Subsolar { lon_deg, lat_deg }
+    }
+
+    fn every(step: f64) -> Option<Isolines> {
+        Some(Isolines::Every { zero: 0.0, step })
     }
 
     fn relief(exaggeration: f64) -> Relief {
@@ -560,6 +572,9 @@ mod tests {
         changed(|j| j.style.context.sea_floor = true);
         changed(|j| j.style.context.base_map = BaseMap::Light);
         changed(|j| j.style.context.background = Background::Sky);
+        changed(|j| j.style.context.isolines = every(1e-10));
+        changed(|j| j.style.context.isolines = every(2e-10));
+        changed(|j| j.style.transfer.scale = Scale::Log);
         changed(|j| j.relief = Some(relief(15.0)));
         changed(|j| j.relief = Some(relief(30.0)));
         for change in ANNOTATED {
@@ -614,7 +629,7 @@ mod tests {
             height_px: 10,
             angles: crate::camera::CameraAngles::NADIR,
         };
-        let broken: [fn(&mut RenderJob); 15] = [
+        let broken: [fn(&mut RenderJob); 18] = [
             |j| j.grid.rows = u32::MAX,
             |j| j.style.sun.subsolar = Some(subsolar(f64::NAN)),
             |j| j.style.sun.azimuth_deg = f64::INFINITY,
@@ -631,6 +646,9 @@ mod tests {
             |j| j.style.slices = 1_000_000_000,
             |j| j.style.slices = 0,
             |j| j.style.transfer.high = f64::NAN,
+            |j| j.style.transfer.scale = Scale::Log,
+            |j| j.style.context.isolines = every(0.0),
+            |j| j.style.context.isolines = every(1e-12),
             |j| j.style.transfer.low = -1e300,
             |j| j.style.transfer.size = shares_beyond_one(),
             |j| j.style.sun.elevation_deg = -1.0,

@@ -19,6 +19,7 @@ pub mod event;
 mod exact;
 pub mod flow;
 pub mod grid;
+pub mod isolines;
 pub mod job;
 pub mod key;
 pub mod kind;

@@ -9,6 +9,7 @@ use crate::base_map::{Background, BaseMap};
 use crate::colour::{TransferFunction, TransferOptions};
 use crate::context::{Context, Relief};
 use crate::flow::{Flow, check_parts, steps_around};
+use crate::isolines::IsolineWish;
 use crate::job::{Mode, RENDERER_VERSION, RenderJob, Style, View};
 use crate::manifest::Manifest;
 use crate::quantity::Quantity;
@@ -43,6 +44,8 @@ pub struct PictureOptions {
     pub base_map: Option<BaseMap>,
     /// What is seen beside the globe.
     pub background: Option<Background>,
+    /// Isolines of the quantity that is drawn.
+    pub isolines: Option<IsolineWish>,
     /// Light.
     pub sun: Option<SunChoice>,
     /// Draw a plain globe behind the particles of a globe view.
@@ -116,7 +119,8 @@ impl PictureOptions {
     /// The style of a quantity that looks so at an instant.
     ///
     /// # Errors
-    /// Options of colours that contradict each other or do not fit the quantity.
+    /// Options of colours that contradict each other or do not fit the quantity; isolines that the range of colours has
+    /// too many of, or none.
     pub fn style(
         &self,
         quantity: Quantity,
@@ -129,6 +133,12 @@ impl PictureOptions {
                 Style::with_transfer(self.transfer.over(quantity)?)
             }
         };
+        let isolines = self.isolines;
+        let isolines = isolines.map(|wish| wish.within(quantity, &usual.transfer));
+        let context = Context {
+            isolines: isolines.transpose()?,
+            ..self.context(usual.context)
+        };
         Ok(Style {
             slices: self.slices.unwrap_or(usual.slices),
             particles_per_cell: self.particles_per_cell.unwrap_or(usual.particles_per_cell),
@@ -138,7 +148,7 @@ impl PictureOptions {
                 .map_or(usual.sun, |choice| choice.instead_of(usual.sun, time)),
             globe_surface: self.globe_surface,
             uncertainty: self.uncertainty,
-            context: self.context(usual.context),
+            context,
             ..usual
         })
     }
@@ -154,6 +164,7 @@ impl PictureOptions {
             sea_floor: self.sea_floor.unwrap_or(is_globe),
             base_map: self.base_map.unwrap_or(usual.base_map),
             background: self.background.unwrap_or(usual.background),
+            isolines: usual.isolines,
         }
     }
 }
@@ -391,8 +402,10 @@ mod tests {
                 .unwrap()
         };
         let usual = style(PictureOptions::default());
-        let changes: [fn(&mut PictureOptions); 13] = [
+        let changes: [fn(&mut PictureOptions); 15] = [
             |o| o.transfer.reversed = true,
+            |o| o.isolines = Some(IsolineWish::Auto),
+            |o| o.isolines = Some(IsolineWish::Every(20.0)),
             |o| o.uncertainty = true,
             |o| o.slices = Some(7),
             |o| o.particles_per_cell = Some(3),

@@ -124,6 +124,7 @@ pub(crate) fn options(picture: &Picture, extras: Extras) -> PictureOptions {
         sea_floor: extras.ground.sea_floor,
         base_map: extras.ground.base_map,
         background: extras.ground.background,
+        isolines: surroundings.isolines,
         sun: surroundings.sun,
         globe_surface: extras.ground.surface,
         annotations: extras.annotations,

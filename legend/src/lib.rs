@@ -7,7 +7,10 @@ pub mod raster;
 pub mod svg;
 pub mod ticks;
 
-use contract::colour::{AtStop, Rgb, Stops, TransferFunction};
+#[cfg(test)]
+mod palettes;
+
+use contract::colour::{AtStop, Rgb, Scale, Stops, TransferFunction};
 use contract::job::Mode;
 use contract::quantity::{Display, Quantity};
 use serde::Serialize;
@@ -41,6 +44,10 @@ pub struct Legend {
     high: f64,
     /// Unit of the values.
     unit: &'static str,
+    /// How values are spread between the two: `linear` where it is not said; `log`: equal ratios are equally far apart.
+    #[serde(skip_serializing_if = "is_linear")]
+    #[schema(value_type = Option<String>)]
+    scale: Scale,
     /// What the values are, for people.
     label: &'static str,
     /// Place and colour (`#rrggbb`), straight in between.
@@ -136,6 +143,7 @@ impl Legend {
             low,
             high,
             unit: display.unit,
+            scale: transfer.scale,
             label,
             stops: colors(transfer),
             opacity: places(
@@ -150,7 +158,10 @@ impl Legend {
                 contract::colour::Share::get,
                 |value| transfer.size(value),
             ),
-            ticks: ticks::of(low, high),
+            ticks: match transfer.scale {
+                Scale::Linear => ticks::of(low, high),
+                Scale::Log => ticks::of_decades(low, high),
+            },
             transfer: *transfer,
         }
     }
@@ -203,20 +214,31 @@ impl Legend {
 
     /// Where the values to mark lie, 0 to 1, and their texts.
     pub fn marks(&self) -> Vec<(f64, String)> {
-        let place = |tick: &f64| (tick - self.low) / (self.high - self.low);
-        let text = ticks::texts(&self.ticks);
+        let place = |tick: &f64| {
+            let [at, low, high] = [*tick, self.low, self.high].map(|v| self.scale.spread(v));
+            (at - low) / (high - low)
+        };
+        let text = match self.scale {
+            Scale::Linear => ticks::texts(&self.ticks),
+            // Each as short as it is: 0.03 and 10.
+            Scale::Log => self
+                .ticks
+                .iter()
+                .flat_map(|tick| ticks::texts(&[*tick]))
+                .collect(),
+        };
         self.ticks.iter().map(place).zip(text).collect()
-    }
-
-    /// Stored value at a place.
-    fn value_at(&self, place: f64) -> f64 {
-        self.transfer.low + (self.transfer.high - self.transfer.low) * place
     }
 
     /// The row of particles: places and radii, pixels; none without sizes.
     fn dots(&self) -> Vec<(f64, f64)> {
         let place = |i: u32| (f64::from(i) + 0.5) / f64::from(DOTS);
-        let dot = |place: f64| Some((place, DOT_PX * self.transfer.size(self.value_at(place))?));
+        let dot = |place: f64| {
+            Some((
+                place,
+                DOT_PX * self.transfer.size(self.transfer.value_at(place))?,
+            ))
+        };
         (0..DOTS).filter_map(|i| dot(place(i))).collect()
     }
 }
@@ -225,11 +247,19 @@ impl Legend {
 fn rounded(shown: f64, display: Display, transfer: &TransferFunction) -> f64 {
     let span = (transfer.high - transfer.low) * display.factor;
     // The noise is that of the numbers, which may be far larger than their range.
-    let noise = (span * 1e-9).max(shown.abs() * 1e-14);
+    let noise = match transfer.scale {
+        Scale::Linear => (span * 1e-9).max(shown.abs() * 1e-14),
+        Scale::Log => shown.abs() * 1e-9,
+    };
     let digits = -noise.log10().floor();
     let scale = 10f64.powf(digits.clamp(-20.0, 30.0));
     let rounded = (shown * scale).round() / scale;
     if rounded.is_finite() { rounded } else { shown }
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it so")]
+fn is_linear(scale: &Scale) -> bool {
+    *scale == Scale::Linear
 }
 
 fn bytes(color: [f64; 3]) -> [u8; 3] {
@@ -309,20 +339,31 @@ mod tests {
     fn every_quantity_has_round_ends_and_ticks_between_them() {
         for quantity in Quantity::ALL {
             let legend = usual(quantity);
-            assert!(
-                (legend.low * 10.0).fract().abs() < 1e-9,
-                "{quantity:?} {}",
-                legend.low
-            );
-            assert!(
-                (legend.high * 10.0).fract().abs() < 1e-9,
-                "{quantity:?} {}",
-                legend.high
-            );
+            for end in [legend.low, legend.high] {
+                let is_round = ((end * 100.0).round() - end * 100.0).abs() < 1e-9;
+                assert!(is_round, "{quantity:?} {end}");
+            }
             assert!((2..=7).contains(&legend.ticks.len()), "{quantity:?}");
             let inside = |tick: &f64| (legend.low - 1e-9..=legend.high + 1e-9).contains(tick);
             assert!(legend.ticks.iter().all(inside), "{quantity:?}");
         }
+    }
+
+    #[test]
+    fn a_logarithmic_legend_has_ticks_at_equal_ratios() {
+        let legend = usual(Quantity::Chlorophyll);
+        let marks = legend.marks();
+        let texts: Vec<_> = marks.iter().map(|(_, text)| text.as_str()).collect();
+        assert_eq!(texts, ["0.03", "0.1", "0.3", "1", "3", "10"]);
+        let places: Vec<_> = marks.iter().map(|(place, _)| *place).collect();
+        assert!(places[0].abs() < 1e-9 && (places[5] - 1.0).abs() < 1e-9);
+        assert!(((places[3] - places[1]) - (places[5] - places[3])).abs() < 1e-9);
+        let json = legend.encoded(Form::Json).unwrap();
+        assert!(
+            String::from_utf8(json)
+                .unwrap()
+                .contains("\"scale\":\"log\"")
+        );
     }
 
     #[test]
@@ -370,6 +411,7 @@ mod tests {
         let text = String::from_utf8(usual(Quantity::WindSpeed).encoded(Form::Json).unwrap());
         let text = text.unwrap();
         assert!(!text.contains("opacity") && !text.contains("size") && !text.contains("transfer"));
+        assert!(!text.contains("scale"));
         assert!(
             text.contains("\"ticks\":[0.0,") && text.contains("m s⁻¹"),
             "{text}"

@@ -4,6 +4,8 @@
 const MOST: f64 = 6.0;
 /// Steps that are round, times a power of ten.
 const ROUND: [f64; 5] = [1.0, 2.0, 2.5, 5.0, 10.0];
+/// What is marked between powers of ten on a logarithmic scale.
+const IN_A_DECADE: [f64; 2] = [1.0, 3.0];
 /// Decimals that are written out; what needs more is written with an exponent.
 const MOST_DECIMALS: usize = 5;
 /// Numbers below this are written out.
@@ -32,6 +34,32 @@ pub fn of(low: f64, high: f64) -> Vec<f64> {
     (0..=count)
         .map(|i| value(first + f64::from(i)) + 0.0)
         .collect()
+}
+
+/// 1 and 3 of every power of ten from `low` to `high`, which are above 0; powers alone, or every second or further one,
+/// where there would be many; round values as on any other scale where there would be one.
+pub fn of_decades(low: f64, high: f64) -> Vec<f64> {
+    let (first, last) = (low.log10().floor() as i32, high.log10().floor() as i32);
+    let inside = low * (1.0 - 1e-9)..=high * (1.0 + 1e-9);
+    // Divided where it is a fraction: 3 * 0.1 is not 0.3, 3 / 10 is.
+    let value = |figure: f64, power: i32| {
+        if power < 0 {
+            figure / 10f64.powi(-power)
+        } else {
+            figure * 10f64.powi(power)
+        }
+    };
+    let marks = |figures: &[f64], every: usize| -> Vec<f64> {
+        let powers = (first..=last).filter(|power| power.rem_euclid(every as i32) == 0);
+        let all = powers.flat_map(|power| figures.iter().map(move |figure| value(*figure, power)));
+        all.filter(|mark| inside.contains(mark)).collect()
+    };
+    let choices = (1..=64).map(|every| marks(&IN_A_DECADE[..1], every));
+    let mut choices = std::iter::once(marks(&IN_A_DECADE, 1)).chain(choices);
+    match choices.find(|marks| marks.len() as f64 <= MOST + 1.0) {
+        Some(marks) if marks.len() > 1 => marks,
+        _ => of(low, high),
+    }
 }
 
 /// The values with as many decimals as any of them needs, a minus sign for a minus sign.
@@ -86,6 +114,17 @@ mod tests {
         assert_eq!(of(0.0, 0.5), [0.0, 0.1, 0.2, 0.3, 0.4, 0.5]);
         for (low, high) in [(3.0, 1e9), (1e-12, 5e-12), (-7.77, -7.76), (1e19, 1e20)] {
             let ticks = of(low, high);
+            assert!((2..=7).contains(&ticks.len()), "{low} to {high}: {ticks:?}");
+        }
+    }
+
+    #[test]
+    fn logarithmic_ticks_are_round_and_few() {
+        assert_eq!(of_decades(0.03, 10.0), [0.03, 0.1, 0.3, 1.0, 3.0, 10.0]);
+        assert_eq!(of_decades(1.0, 1e5), [1.0, 10.0, 100.0, 1e3, 1e4, 1e5]);
+        assert_eq!(of_decades(2.0, 6.0), of(2.0, 6.0));
+        for (low, high) in [(1e-20, 1e20), (1.0, 1.001), (0.5, 70.0), (3e-7, 4e-2)] {
+            let ticks = of_decades(low, high);
             assert!((2..=7).contains(&ticks.len()), "{low} to {high}: {ticks:?}");
         }
     }

@@ -15,11 +15,12 @@ use crate::stages::compose::Compose;
 use crate::stages::eye::Eye;
 use crate::stages::flow::Flow;
 use crate::stages::interpolate::Interpolate;
+use crate::stages::isolines::Isolines;
 use crate::stages::layout::{Entry, LIGHT_ALONE, LIGHT_OWN};
 use crate::stages::light::Light;
 use crate::stages::map::Map;
 use crate::stages::sizes::{light_bytes, list_count};
-use crate::stages::{bin, compose, flow, interpolate, map};
+use crate::stages::{bin, compose, flow, interpolate, isolines, map};
 
 /// Entries a list buffer starts with for each particle; a frame that needs more is drawn again with room for all.
 const FIRST_ENTRIES_PER_PARTICLE: u64 = 2;
@@ -28,6 +29,7 @@ const FIRST_ENTRIES: u64 = 1 << 16;
 
 /// All compiled stages.
 pub struct Stages {
+    isolines: Isolines,
     interpolate: Interpolate,
     flow: Flow,
     splats: Splats,
@@ -45,6 +47,7 @@ impl Stages {
     pub fn new(gpu: &Gpu) -> Self {
         let probes = passes::probes(gpu);
         Self {
+            isolines: Isolines::new(isolines::SOURCE),
             interpolate: Interpolate::new(gpu, interpolate::SOURCE),
             flow: Flow::new(gpu, flow::SOURCE),
             splats: Splats::new(gpu, splat::SOURCE, probes),
@@ -59,8 +62,14 @@ impl Stages {
     }
 
     fn record(&self, frame: &mut FrameContext<'_>) -> Result<(), RenderError> {
-        if frame.plan.mode == Mode::Map {
+        let is_map = frame.plan.mode == Mode::Map;
+        if is_map {
             self.interpolate.record(frame)?;
+        }
+        if frame.params.context.lines_on == 1 {
+            self.isolines.record(frame)?;
+        }
+        if is_map {
             self.map.record(frame)?;
             self.compose.record(frame)
         } else {

@@ -13,7 +13,7 @@ use crate::stages::params::Params;
 use crate::stages::particles::cpu::Inputs;
 use crate::stages::sizes::{list_count, texel_count};
 use crate::stages::{
-    bin, compose, eye, flow, interpolate, light, map, particles, project, uncertainty,
+    bin, compose, eye, flow, interpolate, isolines, light, map, particles, project, uncertainty,
 };
 
 /// Most particles of one picture.
@@ -28,6 +28,12 @@ pub fn draw(plan: &Plan, part: Part, scene: &Scene) -> Result<Vec<u8>, RenderErr
     let mut picture = vec![Vec4::ZERO; pixels];
     let value = interpolated(&params, params.values.weight, &scene.value);
     let uncertainty = uncertainty::between(&params, &scene.value);
+    let mut lines = vec![];
+    if params.context.lines_on == 1 {
+        lines.resize(pixels, 0);
+        let inputs = isolines::cpu::Inputs::of(plan, scene, &value);
+        isolines::cpu::draw_lines(&params, &inputs, &mut lines);
+    }
     if plan.mode == Mode::Map {
         let inputs = map::cpu::Inputs {
             value: &value,
@@ -83,7 +89,7 @@ pub fn draw(plan: &Plan, part: Part, scene: &Scene) -> Result<Vec<u8>, RenderErr
     }
     let mut image = vec![0u32; pixels];
     if params.in_context {
-        let around = Surroundings::of(plan, scene);
+        let around = Surroundings::of(plan, scene, &lines);
         in_context::compose(&params, &picture, &around, &mut image);
     } else {
         compose::cpu::compose(&params, &picture, &mut image);

@@ -19,6 +19,9 @@ pub(crate) struct LookQuery {
     /// Values of the first and the last colour, `LOW:HIGH`, in the unit of the legend.
     #[param(example = "-40:40")]
     range: Option<String>,
+    /// How values are spread over the colours: `linear`, or `log` for ranges above 0; the quantity's own unless one is named.
+    #[param(value_type = Option<words::Scale>)]
+    scale: Option<String>,
     /// Colours at values, `VALUE:rrggbb` with commas between, 2 to 16 in rising order, in the unit of the legend.
     #[param(example = "-10:0a0b0c,25:ffffff")]
     stops: Option<String>,
@@ -57,6 +60,7 @@ impl LookQuery {
             options: TransferOptions {
                 palette: parsed(self.palette.as_deref())?,
                 range: parsed(self.range.as_deref())?,
+                scale: parsed(self.scale.as_deref())?,
                 colors: parsed(self.stops.as_deref())?.unwrap_or_default(),
                 opacity: parsed(self.opacity.as_deref())?.unwrap_or_default(),
                 size: parsed(self.particle_size.as_deref())?.unwrap_or_default(),
@@ -95,11 +99,13 @@ impl Look {
         let options = &self.options;
         let range = options.range.map(|range| format!("range={range}"));
         let palette = options.palette.map(|palette| format!("palette={palette}"));
+        let scale = options.scale.map(|scale| format!("scale={scale}"));
         let stops = |name: &str, list: String| (!list.is_empty()).then(|| format!("{name}={list}"));
         let flag = |name: &str, is_set: bool| is_set.then(|| format!("{name}=true"));
         [
             palette,
             range,
+            scale,
             stops("stops", options.colors.to_string()),
             stops("opacity", options.opacity.to_string()),
             stops("particle_size", options.size.to_string()),
@@ -124,13 +130,14 @@ mod tests {
             opacity: Some("0:0.5".to_owned()),
             particle_size: Some("0:0.25,1:1".to_owned()),
             uncertainty: Some("1".to_owned()),
+            scale: Some("linear".to_owned()),
             ..LookQuery::default()
         };
         let look = query.parse().unwrap();
         let parameters = look.parameters().join("&");
         assert_eq!(
             parameters,
-            "range=-10:25&stops=-10:0a0b0c,25:ffffff&opacity=0:0.5&particle_size=0:0.25,1:1&uncertainty=true"
+            "range=-10:25&scale=linear&stops=-10:0a0b0c,25:ffffff&opacity=0:0.5&particle_size=0:0.25,1:1&uncertainty=true"
         );
         let again = LookQuery {
             range: Some("-10:25".to_owned()),

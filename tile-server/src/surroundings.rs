@@ -2,6 +2,7 @@
 //! far particles rise.
 
 use contract::context::{RELIEF_EXAGGERATION, Relief};
+use contract::isolines::IsolineWish;
 use contract::picture::PictureOptions;
 use contract::sun::SunChoice;
 use serde::Deserialize;
@@ -27,6 +28,10 @@ pub(crate) struct SurroundingsQuery {
     /// Coast lines are drawn; unless told otherwise on views that show the globe, and not on tiles.
     #[param(value_type = Option<bool>)]
     coastlines: Option<String>,
+    /// Isolines of the layer are drawn on the sea surface: at multiples of this number in the unit of the legend, at most 50
+    /// over the range of colours; `auto` chooses a round one.
+    #[param(example = "10")]
+    isolines: Option<String>,
     /// How far a kilogram of accumulated carbon a square metre lifts particles, m m² kg⁻¹.
     #[param(value_type = Option<f64>, minimum = 0, maximum = 1e9)]
     height_exaggeration: Option<String>,
@@ -41,6 +46,7 @@ struct ParsedSurroundings {
     relief_exaggeration: Option<f64>,
     sea_opacity: Option<f64>,
     coastlines: Option<bool>,
+    isolines: Option<IsolineWish>,
     height_exaggeration: Option<f64>,
     sun: Option<SunChoice>,
 }
@@ -51,12 +57,13 @@ impl SurroundingsQuery {
         self.fields().into_iter().all(|(_, text)| text.is_none())
     }
 
-    fn fields(&self) -> [(&'static str, Option<&str>); 6] {
+    fn fields(&self) -> [(&'static str, Option<&str>); 7] {
         [
             ("relief", self.relief.as_deref()),
             ("relief_exaggeration", self.relief_exaggeration.as_deref()),
             ("sea_opacity", self.sea_opacity.as_deref()),
             ("coastlines", self.coastlines.as_deref()),
+            ("isolines", self.isolines.as_deref()),
             ("height_exaggeration", self.height_exaggeration.as_deref()),
             ("sun", self.sun.as_deref()),
         ]
@@ -76,6 +83,7 @@ impl SurroundingsQuery {
             )?,
             sea_opacity: real("sea_opacity", &self.sea_opacity, "a share, 0 to 0.99")?,
             coastlines,
+            isolines: self.isolines.as_deref().map(str::parse).transpose()?,
             height_exaggeration: real(
                 "height_exaggeration",
                 &self.height_exaggeration,
@@ -91,6 +99,7 @@ impl SurroundingsQuery {
         Ok(PictureOptions {
             sea_opacity: asked.sea_opacity,
             coastlines: asked.coastlines,
+            isolines: asked.isolines,
             height_m_per_kg_m2: asked.height_exaggeration,
             sun: asked.sun,
             ..*options
@@ -125,6 +134,7 @@ impl SurroundingsQuery {
             real(asked.relief_exaggeration),
             real(asked.sea_opacity),
             asked.coastlines.map(|drawn| drawn.to_string()),
+            asked.isolines.map(|isolines| isolines.to_string()),
             real(asked.height_exaggeration),
             asked.sun.map(|sun| sun.to_string()),
         ];
@@ -150,9 +160,10 @@ mod tests {
 
     #[test]
     fn words_that_mean_nothing_are_refused_with_what_would_be_valid() {
-        let refused: [(SurroundingsQuery, &str); 5] = [
+        let refused: [(SurroundingsQuery, &str); 6] = [
             (query(|q| &mut q.sea_opacity, "half"), "a share"),
             (query(|q| &mut q.coastlines, "yes"), "true or false"),
+            (query(|q| &mut q.isolines, "-1"), "such as 10"),
             (query(|q| &mut q.sun, "noon"), "such as 315,40"),
             (query(|q| &mut q.height_exaggeration, "inf"), "metres"),
             (query(|q| &mut q.relief_exaggeration, ""), "0 to 1000"),
@@ -168,9 +179,15 @@ mod tests {
         let mut query = query(|q| &mut q.sun, "time");
         query.relief = Some("etopo20".to_owned());
         query.sea_opacity = Some("0.50".to_owned());
+        query.isolines = Some("2.50".to_owned());
         assert_eq!(
             query.of_tiles().unwrap(),
-            ["relief=etopo20", "sea_opacity=0.5", "sun=time"]
+            [
+                "relief=etopo20",
+                "sea_opacity=0.5",
+                "isolines=2.5",
+                "sun=time"
+            ]
         );
         query.relief = Some("a&b".to_owned());
         assert!(query.of_tiles().is_err());

@@ -4,7 +4,7 @@
 use std::fmt::{Display, Formatter};
 use std::str::FromStr;
 
-use super::{Palette, Rgb, Share, Stops, TransferFunction};
+use super::{Palette, Rgb, Scale, Share, Stops, TransferFunction};
 use crate::ContractError;
 use crate::quantity::Quantity;
 
@@ -24,6 +24,8 @@ pub struct TransferOptions {
     pub palette: Option<Palette>,
     /// Another range; that of colour stops without it.
     pub range: Option<ShownRange>,
+    /// Another way to spread values over it.
+    pub scale: Option<Scale>,
     /// Colours in place of a palette's.
     pub colors: Stops<Rgb>,
     /// Opacity in place of the usual.
@@ -78,6 +80,7 @@ impl TransferOptions {
             palette: self.palette.unwrap_or(usual.palette),
             low,
             high,
+            scale: self.scale(quantity, usual)?,
             reversed: self.reversed,
             colors: self.colors.map_values(stored)?,
             opacity: self.opacity.map_values(stored)?,
@@ -85,6 +88,19 @@ impl TransferOptions {
         };
         transfer.validate()?;
         Ok(transfer)
+    }
+
+    fn scale(&self, quantity: Quantity, usual: &TransferFunction) -> Result<Scale, ContractError> {
+        let scale = self.scale.unwrap_or(usual.scale);
+        let display = quantity.display();
+        if scale == Scale::Log && display.offset != 0.0 {
+            let reason = format!(
+                "{} has a zero that was agreed upon, and so no logarithm; leave it linear",
+                display.unit
+            );
+            return Err(ContractError::invalid("scale", scale.as_str(), reason));
+        }
+        Ok(scale)
     }
 }
 
@@ -151,6 +167,40 @@ mod tests {
             ..stops
         };
         assert_eq!((of(&narrow).low, of(&narrow).high), (10.0, 20.0));
+    }
+
+    #[test]
+    fn a_scale_is_the_quantitys_own_unless_one_is_named() {
+        let of = |options: TransferOptions, quantity| options.over(quantity);
+        let log = TransferOptions {
+            scale: Some(Scale::Log),
+            range: Some("0.5:20".parse().unwrap()),
+            ..options()
+        };
+        assert_eq!(of(log, Quantity::WindSpeed).unwrap().scale, Scale::Log);
+        let usual = of(options(), Quantity::Chlorophyll).unwrap();
+        assert_eq!(usual.scale, Scale::Log);
+        let zero = TransferOptions {
+            range: Some("0:2".parse().unwrap()),
+            ..options()
+        };
+        let refused = of(zero, Quantity::Chlorophyll).unwrap_err().to_string();
+        assert!(refused.contains("a linear scale"), "{refused}");
+        let linear = TransferOptions {
+            scale: Some(Scale::Linear),
+            ..zero
+        };
+        assert_eq!(
+            of(linear, Quantity::Chlorophyll).unwrap().scale,
+            Scale::Linear
+        );
+        let warm = TransferOptions {
+            range: Some("1:30".parse().unwrap()),
+            ..log
+        };
+        let refused = of(warm, Quantity::SeaSurfaceTemperature).unwrap_err();
+        assert!(refused.to_string().contains("leave it linear"), "{refused}");
+        assert!(!log.is_default());
     }
 
     #[test]

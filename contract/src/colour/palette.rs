@@ -1,7 +1,8 @@
 //! Named lists of colours: even in lightness, and told apart by colour-blind readers.
 //!
 //! The manner is that of Thyng et al. (2016), True Colors of Oceanography, doi:10.5670/oceanog.2016.66: lightness rises
-//! or falls all the way, or peaks at no difference; `Haline`, `Ice`, `Dense` and `Delta` follow the figures published there.
+//! or falls all the way, or peaks at no difference; `Haline`, `Ice`, `Dense` and the blue arm of `Delta`
+//! follow the figures published there. How each is seen is measured in docs/palettes.md.
 
 use serde::{Deserialize, Serialize};
 
@@ -15,7 +16,7 @@ pub enum Palette {
     Balance,
     /// Diverging blue-green - pale - purple-red: rotation, northward against southward.
     Curl,
-    /// Diverging blue - pale yellow - green: differences and anomalies.
+    /// Diverging blue - pale yellow - olive: differences and anomalies.
     Delta,
     /// Sequential dark blue to pale yellow for temperature.
     Thermal,
@@ -140,10 +141,10 @@ const DELTA: [[u8; 3]; 11] = [
     [160, 199, 205],
     [254, 253, 213],
     [203, 197, 80],
-    [146, 158, 8],
-    [81, 120, 12],
-    [24, 79, 36],
-    [21, 35, 19],
+    [150, 156, 10],
+    [104, 116, 2],
+    [68, 76, 4],
+    [40, 34, 6],
 ];
 
 const THERMAL: [[u8; 3]; 8] = [

@@ -6,6 +6,7 @@ use std::str::FromStr;
 use serde::de::{Error as _, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
+use super::Scale;
 use crate::ContractError;
 
 /// Most stops of one list.
@@ -100,16 +101,17 @@ impl<T: AtStop> Stops<T> {
         Ok(mapped)
     }
 
-    /// What holds on either side of a value and how far it lies from the first to the second; the outermost beyond the
-    /// ends, the later one at a jump. None without stops.
-    pub fn around(&self, value: f64) -> Option<(T, T, f64)> {
+    /// What holds on either side of a value and how far it lies from the first to the second on a scale; the outermost
+    /// beyond the ends, the later one at a jump. None without stops.
+    pub fn around(&self, value: f64, scale: Scale) -> Option<(T, T, f64)> {
         let stops = self.as_slice();
         let (first, last) = (stops.first()?, stops.last()?);
         Some(match stops.iter().position(|stop| stop.0 > value) {
             Some(0) => (first.1, first.1, 0.0),
             Some(above) => {
                 let (low, high) = (&stops[above - 1], &stops[above]);
-                (low.1, high.1, (value - low.0) / (high.0 - low.0))
+                let [at, from, to] = [value, low.0, high.0].map(|v| scale.spread(v));
+                (low.1, high.1, (at - from) / (to - from))
             }
             None => (last.1, last.1, 0.0),
         })
@@ -326,7 +328,7 @@ mod tests {
     }
 
     fn at(stops: &Stops<Share>, value: f64) -> f64 {
-        let (low, high, share) = stops.around(value).unwrap();
+        let (low, high, share) = stops.around(value, Scale::Linear).unwrap();
         low.get() + (high.get() - low.get()) * share
     }
 
@@ -342,7 +344,11 @@ mod tests {
         ] {
             assert_eq!(at(&stops, value), expected, "{value}");
         }
-        assert!(Stops::<Share>::default().around(0.0).is_none());
+        assert!(
+            Stops::<Share>::default()
+                .around(0.0, Scale::Linear)
+                .is_none()
+        );
     }
 
     #[test]

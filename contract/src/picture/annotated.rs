@@ -5,6 +5,7 @@ use crate::ContractError;
 use crate::annotation::{
     Annotation, AnnotationWishes, Annotations, DateLabel, Graticule, HeightScale, Label, Wanted,
 };
+use crate::flow::title_of_vector;
 use crate::job::{RenderJob, View};
 use crate::manifest::Manifest;
 use crate::time::TimeMs;
@@ -45,7 +46,7 @@ impl PictureSources<'_> {
             scale: has(Annotation::Scale),
             height: since.map(|since| HeightScale { since }),
             source: has(Annotation::Source)
-                .then(|| source(self.product))
+                .then(|| source(self.product, &self.title(&job)))
                 .flatten(),
             ..Annotations::none()
         };
@@ -55,6 +56,14 @@ impl PictureSources<'_> {
         };
         job.validate()?;
         Ok(job)
+    }
+
+    /// What is drawn: a product, or the vector of which it is a part.
+    fn title(&self, job: &RenderJob) -> String {
+        match job.flow {
+            Some(_) => title_of_vector(&self.product.title),
+            None => self.product.title.clone(),
+        }
     }
 
     /// From when on the carbon was added up that lifts the particles of a job, where a height bar is wanted.
@@ -80,9 +89,9 @@ impl PictureSources<'_> {
     }
 }
 
-/// Title and citation of a product; the title once where the citation begins with it.
-fn source(product: &Manifest) -> Option<Label> {
-    let (title, source) = (product.title.trim(), product.source.trim());
+/// Title and citation of what is drawn of a product; the title once where the citation begins with it.
+fn source(product: &Manifest, title: &str) -> Option<Label> {
+    let (title, source) = (title.trim(), product.source.trim());
     let made = if product.synthetic {
         " (made up, not measured)"
     } else {

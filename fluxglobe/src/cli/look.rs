@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use contract::colour::{Palette, Rgb, Share, ShownRange, Stops, TransferOptions};
+use contract::colour::{Palette, Rgb, Scale, Share, ShownRange, Stops, TransferOptions};
 use contract::product::ProductId;
 
 /// Where help lists them: apart from what says which picture.
@@ -23,6 +23,10 @@ pub(crate) struct Look {
     /// Values of the first and the last colour, in the legend's unit, such as -40:40.
     #[arg(long, value_name = "LOW:HIGH", allow_hyphen_values = true, help_heading = HEADING)]
     pub(crate) range: Option<ShownRange>,
+    /// How values are spread over the colours: linear, or log for ranges above 0 over several powers of ten; the quantity's
+    /// own if absent, which is log for chlorophyll.
+    #[arg(long, value_name = "linear|log", help_heading = HEADING)]
+    pub(crate) scale: Option<Scale>,
     /// Colours in place of a palette's, 2 to 16 stops such as '-40:#11387f,0:#f0f0ee,40:#760e24'; two at one value jump.
     #[arg(long, value_name = "VALUE:#rrggbb,...", allow_hyphen_values = true, help_heading = HEADING)]
     pub(crate) stops: Option<Stops<Rgb>>,
@@ -43,6 +47,7 @@ impl Look {
         TransferOptions {
             palette: self.palette,
             range: self.range,
+            scale: self.scale,
             colors: self.stops.unwrap_or_default(),
             opacity: self.opacity.unwrap_or_default(),
             size: self.particle_size.unwrap_or_default(),
@@ -69,8 +74,10 @@ pub(crate) struct RenderLegend {
 
 #[cfg(test)]
 mod tests {
+    use super::Scale;
     use crate::cli::{Cli, Command, Render};
     use clap::Parser as _;
+    use contract::isolines::IsolineWish;
 
     fn parsed(words: &[&str]) -> Result<Cli, String> {
         let start = ["fluxglobe", "render", "tile", "--layer", "p", "-o", "a.png"];
@@ -88,6 +95,9 @@ mod tests {
             "-40:1,0:0.1,40:1",
             "--particle-size=-40:1",
             "--uncertainty",
+            "--scale=log",
+            "--isolines",
+            "auto",
         ];
         let Command::Render(Render::Tile(tile)) = parsed(&words).unwrap().command else {
             panic!("it is a tile");
@@ -96,6 +106,8 @@ mod tests {
         assert_eq!(options.opacity.as_slice().len(), 3);
         assert_eq!(options.range.unwrap().to_string(), "-40:40");
         assert!(tile.picture.uncertainty && !options.is_default());
+        assert_eq!(options.scale, Some(Scale::Log));
+        assert_eq!(tile.picture.surroundings.isolines, Some(IsolineWish::Auto));
     }
 
     #[test]
@@ -105,6 +117,8 @@ mod tests {
             (["--range", "40:-40"], "LOW:HIGH"),
             (["--stops", "0:red,1:blue"], "#rrggbb"),
             (["--opacity", "0:7"], "from 0 to 1"),
+            (["--scale", "ln"], "linear or log"),
+            (["--isolines", "0"], "such as 10"),
         ] {
             let refused = parsed(&words).unwrap_err();
             assert!(refused.contains(reason), "{refused}");

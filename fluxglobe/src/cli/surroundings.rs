@@ -2,6 +2,7 @@
 
 use clap::Args;
 use contract::context::RELIEF_EXAGGERATION;
+use contract::isolines::IsolineWish;
 use contract::product::ProductId;
 use contract::sun::SunChoice;
 
@@ -44,6 +45,10 @@ pub(crate) struct Surroundings {
         value_name = "true|false"
     )]
     pub(crate) coastlines: Option<bool>,
+    /// Draw isolines of the layer on the sea surface: at multiples of STEP in the legend's unit, at most 50 over the range
+    /// of colours, zero stronger; `auto` chooses a round step, and 1 and 3 of every power of ten on a logarithmic scale.
+    #[arg(long, help_heading = HEADING, allow_negative_numbers = true, value_name = "STEP|auto")]
+    pub(crate) isolines: Option<IsolineWish>,
     /// Height of a kilogram of accumulated carbon per square metre, m: how far particles rise and sink, 0 to 1e9; 8e6 if
     /// absent.
     #[arg(long, help_heading = HEADING, allow_negative_numbers = true, value_name = "METRES")]

@@ -134,7 +134,7 @@ fn cloud(
     let strength = if transfer.low < 0.0 && transfer.high > 0.0 {
         value.abs() / transfer.low.abs().max(transfer.high.abs())
     } else {
-        (value - transfer.low) / (transfer.high - transfer.low)
+        transfer.position(value)
     }
     .clamp(0.0, 1.0);
     let floor = f64::from(params.particles.depth_floor);

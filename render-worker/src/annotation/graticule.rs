@@ -1,18 +1,13 @@
-//! Meridians and parallels, cut where they go behind the globe or leave the picture, and their names at the ends.
+//! Names of meridians and parallels at their ends: where they go behind the globe or leave the picture. The lines themselves
+//! lie on the globe, below its particles: the engine draws them (`render/src/plan/isolines.rs`).
 
 mod clip;
 mod labels;
 
-use std::fmt::Write as _;
-
 use contract::annotation::Graticule;
 use contract::grid::LonLatDeg;
-use render::plan::Projection;
+use render::plan::{Projection, graticule_step_deg};
 
-use super::page::Page;
-
-/// Most lines of one kind in a picture; where there would be more, every second or fifth is drawn.
-const MOST_LINES: f64 = 120.0;
 /// Corners of a line.
 const CORNERS: u32 = 360;
 /// Where meridians end, degrees from the poles: they would run into one another. Four go on to the pole.
@@ -46,7 +41,8 @@ struct Cap {
 impl Lines {
     pub(super) fn of(graticule: Graticule, projection: &Projection, size: [f64; 2]) -> Self {
         let cap = Cap::of(projection);
-        let step = cap.step(graticule.step_deg);
+        let (_below, from_middle) = projection.stands();
+        let step = graticule_step_deg(graticule, from_middle - 1.0);
         let parallels = multiples(step, cap.lat - cap.angle, cap.lat + cap.angle);
         let parallels = parallels.filter(|lat| lat.abs() < 90.0 - 1e-9);
         let half = cap.half_width();
@@ -88,24 +84,6 @@ impl Lines {
         }
         Self(lines)
     }
-
-    /// Draws the lines.
-    pub(super) fn draw(&self, page: &mut Page) {
-        let width = (0.07 * page.em()).max(0.9);
-        let mut path = String::new();
-        for part in self.0.iter().flat_map(|line| &line.parts) {
-            for (i, [x, y]) in part.iter().enumerate() {
-                let word = if i == 0 { 'M' } else { 'L' };
-                write!(path, "{word}{x:.2} {y:.2}").expect("a string takes any text");
-            }
-        }
-        // Dark below light: one of them is seen on any ground.
-        for (color, opacity, width) in [("#0a121e", 0.14, 2.2 * width), ("#fff", 0.26, width)] {
-            page.line(&format!(
-                "<path d=\"{path}\" fill=\"none\" stroke=\"{color}\" stroke-opacity=\"{opacity}\" stroke-width=\"{width:.2}\"/>"
-            ));
-        }
-    }
 }
 
 impl Cap {
@@ -125,19 +103,6 @@ impl Cap {
         }
         let sine = self.angle.to_radians().sin() / self.lat.to_radians().cos();
         sine.min(1.0).asin().to_degrees()
-    }
-
-    /// The distance of lines asked for, or a round number of times that, so that they can be told apart.
-    fn step(&self, asked: f64) -> f64 {
-        let least = 2.0 * self.angle / MOST_LINES;
-        let mut step = asked;
-        for factor in [2.0, 2.5, 2.0].into_iter().cycle() {
-            if step >= least {
-                return step;
-            }
-            step *= factor;
-        }
-        step
     }
 }
 

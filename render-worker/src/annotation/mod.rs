@@ -66,7 +66,6 @@ pub fn drawing(job: &RenderJob) -> Result<Option<String>, LegendError> {
         .map(|graticule| graticule::Lines::of(graticule, &projection, page.size()));
     let mut unnamed = vec![];
     if let Some(grid) = &grid {
-        grid.draw(&mut page);
         unnamed = grid.label_ends(&mut page, &projection)?;
     }
     if annotations.names {

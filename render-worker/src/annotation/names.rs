@@ -18,8 +18,8 @@ const SIZE_EM: [f64; 4] = [1.3, 1.1, 0.95, 0.85];
 const MOST_OF_PICTURE: f64 = 0.03;
 /// From one line to the next, sizes of letters.
 const LINE: f64 = 1.25;
-/// Free room around a name.
-const ROOM_EM: f64 = 0.7;
+/// Free room around a name, by rank: small seas that lie close together are left out one by one.
+const ROOM_EM: [f64; 4] = [0.7, 0.9, 1.6, 2.0];
 
 /// A name as it is written, in one line or two.
 struct Name {
@@ -42,7 +42,7 @@ pub(super) fn draw(page: &mut Page, projection: &Projection) -> Result<(), Legen
             .flat_map(|name| places.iter().map(move |place| (name, place)));
         for (name, (place, px)) in choices {
             let has_room = name.length <= MOST_OF_SEA * width_px(sea, *place, projection);
-            if has_room && name.is_on_globe(*px, projection) && name.write(page, *px) {
+            if has_room && name.is_on_globe(*px, projection) && name.write(page, *px, room(sea)) {
                 break;
             }
         }
@@ -67,6 +67,12 @@ fn seen_places(sea: &Sea, projection: &Projection) -> Vec<(LonLatDeg, [f64; 2])>
         Some((place, [seen.x_px, seen.y_px]))
     });
     seen.collect()
+}
+
+/// The free room around the name of a sea, letters.
+fn room(sea: &Sea) -> f64 {
+    let [.., most] = ROOM_EM;
+    *ROOM_EM.get(usize::from(sea.rank)).unwrap_or(&most)
 }
 
 /// How large the letters of a name are, pixels.
@@ -119,7 +125,7 @@ impl Name {
     }
 
     /// Writes it round a place if there is room.
-    fn write(&self, page: &mut Page, [x, y]: [f64; 2]) -> bool {
+    fn write(&self, page: &mut Page, [x, y]: [f64; 2], room_em: f64) -> bool {
         let line_px = LINE * self.size;
         let half = 0.5 * self.lines.len() as f64 * line_px;
         let area = Area {
@@ -128,7 +134,7 @@ impl Name {
             right: x + 0.5 * self.length,
             bottom: y + half,
         };
-        let is_free = page.take(area.grown(ROOM_EM * page.em()));
+        let is_free = page.take(area.grown(room_em * page.em()));
         if is_free {
             for (i, line) in self.lines.iter().enumerate() {
                 let middle = y - half + (i as f64 + 0.5) * line_px;

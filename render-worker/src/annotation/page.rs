@@ -61,7 +61,6 @@ pub(super) struct Page {
     taken: Vec<Area>,
     /// Height of what lies along the lower edge.
     foot: f64,
-    lines: String,
     labels: String,
     panels: String,
 }
@@ -75,7 +74,6 @@ impl Page {
             em: ((size[0] * size[1]).sqrt() * EM_PER_PX).clamp(least, most),
             taken: vec![],
             foot: 0.0,
-            lines: String::new(),
             labels: String::new(),
             panels: String::new(),
         }
@@ -173,11 +171,6 @@ impl Page {
         Some(area)
     }
 
-    /// Draws below all labels.
-    pub(super) fn line(&mut self, svg: &str) {
-        self.lines.push_str(svg);
-    }
-
     /// Writes over the picture.
     pub(super) fn label(&mut self, text: &Text<'_>) {
         self.labels.push_str(&text.svg());
@@ -190,6 +183,6 @@ impl Page {
 
     pub(super) fn into_svg(self) -> String {
         let opening = text::opening(self.size);
-        [&opening, &self.lines, &self.labels, &self.panels, "</svg>"].concat()
+        [&opening, &self.labels, &self.panels, "</svg>"].concat()
     }
 }

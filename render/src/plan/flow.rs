@@ -65,6 +65,7 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) -> f64 {
         transfer_low: params.values.transfer_low,
         transfer_per_unit: params.values.transfer_per_unit,
         has_shape: params.values.has_shape,
+        is_log: params.values.is_log,
     };
     // Born in the middle of their lives.
     0.5 * MOST_OVER_TOP * life_rad

@@ -107,12 +107,13 @@ impl Look {
     pub(super) fn of(mode: Mode) -> Self {
         match mode {
             Mode::Points => Self {
-                radius_cells: 0.06,
-                min_radius_px: 1.2,
-                max_radius_px: 3.5,
-                size_spread: 0.3,
+                // With a rim, so that they stand apart from a ground of any tone.
+                radius_cells: 0.09,
+                min_radius_px: 2.0,
+                max_radius_px: 4.2,
+                size_spread: 0.15,
                 jitter_shift: 0,
-                area_px_per_particle: 7.0,
+                area_px_per_particle: 16.0,
                 center_depth: Some(3.0),
             },
             Mode::Sprites => Self {

@@ -10,6 +10,7 @@ mod flow;
 mod footprint;
 mod globe;
 mod ground;
+mod isolines;
 mod look;
 mod masks;
 mod projection;
@@ -20,6 +21,7 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use contract::colour::Scale;
 use contract::earth::Earth;
 use contract::grid::Grid;
 use contract::job::{Mode, RenderJob, View};
@@ -30,9 +32,10 @@ use crate::scene::{Interval, Scene};
 use crate::stages::bin::params::ListParams;
 use crate::stages::colour::{code_of, linear_of};
 use crate::stages::interpolate::params::InterpolateParams;
+use crate::stages::isolines::params::Isoline;
 use crate::stages::layout::{
-    Active, Axis, Col, GroundAxis, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, LIGHT_OFF, LIGHT_OWN,
-    NEVER_LONG, Row, SCREEN_TILE_PX, SQUARE, SUBPIXELS, VIEW_TILE,
+    Active, Axis, Col, GroundAxis, KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, KERNEL_RIMMED, LIGHT_OFF,
+    LIGHT_OWN, NEVER_LONG, Row, SCREEN_TILE_PX, SQUARE, SUBPIXELS, VIEW_TILE,
 };
 use crate::stages::light::params::LightParams;
 use crate::stages::map::params::MapParams;
@@ -42,6 +45,7 @@ use crate::stages::project::params::ProjectParams;
 use crate::stages::sizes::{HALF_BYTES, workgroups};
 use look::Look;
 
+pub use isolines::graticule_step_deg;
 pub use look::HEIGHT_LIMIT_M;
 pub use projection::{Projection, Seen};
 
@@ -79,6 +83,8 @@ pub struct Plan {
     pub active: Vec<Active>,
     pub axes: Vec<Axis>,
     pub palette: Vec<u32>,
+    /// The table of isolines; empty without any.
+    pub isolines: Vec<Isoline>,
     /// Columns, then rows of a tile in its surroundings; empty otherwise.
     pub ground_axes: Vec<GroundAxis>,
     /// Words of the mask of the whole picture: coast lines of a tile, four pixels each; of a globe view land, lakes, shores
@@ -135,6 +141,7 @@ impl Plan {
     ) -> Result<Self, RenderError> {
         Self::check(job, scene)?;
         let mut plan = Self::viewed(job, scene);
+        isolines::plan(&mut plan, job, scene);
         context::plan(&mut plan, job, scene);
         plan.choose_units(job);
         plan.count_particles(most_buffer_bytes)?;
@@ -163,6 +170,7 @@ impl Plan {
             active: vec![],
             axes: vec![],
             palette: palette(job),
+            isolines: vec![],
             ground_axes: vec![],
             coast: Arc::default(),
             is_crowded: false,
@@ -329,6 +337,7 @@ fn common(job: &RenderJob, scene: &Scene) -> Params {
     let transfer = &style.transfer;
     let look = Look::of(job.mode);
     let weight = |interval: &Interval| interval.weight as f32;
+    let (transfer_low, transfer_per_unit) = shape::place_params(transfer);
     Params {
         view: ViewParams {
             slices: style.slices,
@@ -342,8 +351,9 @@ fn common(job: &RenderJob, scene: &Scene) -> Params {
             accumulated_weight: scene.accumulated.as_ref().map_or(0.0, weight),
             northward_weight: scene.northward.as_ref().map_or(0.0, weight),
             has_accumulated: u32::from(scene.accumulated.is_some()),
-            transfer_low: transfer.low as f32,
-            transfer_per_unit: (1.0 / (transfer.high - transfer.low)) as f32,
+            transfer_low,
+            transfer_per_unit,
+            is_log: u32::from(transfer.scale == Scale::Log),
             has_shape: u32::from(shape::is_given(transfer)),
             has_uncertainty: u32::from(style.uncertainty && scene.value.has_uncertainty()),
             has_coverage: u32::from(scene.domain.is_joined()),
@@ -370,7 +380,8 @@ fn common(job: &RenderJob, scene: &Scene) -> Params {
         lighting: lighting(job),
         lists: ListParams {
             kernel: match job.mode {
-                Mode::Points | Mode::Flow => KERNEL_DOT,
+                Mode::Points => KERNEL_RIMMED,
+                Mode::Flow => KERNEL_DOT,
                 Mode::Sprites => KERNEL_BALL,
                 Mode::Volume | Mode::Map => KERNEL_CLOUD,
             },
@@ -417,7 +428,7 @@ fn palette(job: &RenderJob) -> Vec<u32> {
         }
     };
     let colors = (0..256).map(|i| {
-        let value = transfer.low + (transfer.high - transfer.low) * f64::from(i) / 255.0;
+        let value = transfer.value_at(f64::from(i) / 255.0);
         let [r, g, b] = transfer.color(value);
         byte(r) | byte(g) << 8 | byte(b) << 16
     });

@@ -1,6 +1,6 @@
 //! Opacity and size over the range of a transfer function, as a table for the stages where users gave stops of either.
 
-use contract::colour::TransferFunction;
+use contract::colour::{Scale, TransferFunction};
 use contract::job::Mode;
 
 use super::look::{self, Look};
@@ -24,6 +24,17 @@ pub(super) fn is_diverging(transfer: &TransferFunction) -> bool {
     transfer.low < 0.0 && transfer.high > 0.0
 }
 
+/// The low end of a range and the places for each unit, in the numbers that the stages place values by: binary
+/// logarithms on a logarithmic scale.
+pub(super) fn place_params(transfer: &TransferFunction) -> (f32, f32) {
+    let TransferFunction { low, high, .. } = *transfer;
+    let [low, high] = match transfer.scale {
+        Scale::Linear => [low, high],
+        Scale::Log => [low.log2(), high.log2()],
+    };
+    (low as f32, (1.0 / (high - low)) as f32)
+}
+
 /// Share of the optical depth that a value without strength keeps.
 pub(super) fn depth_floor(transfer: &TransferFunction) -> f32 {
     if is_diverging(transfer) {
@@ -39,7 +50,7 @@ pub(super) fn table(mode: Mode, transfer: &TransferFunction) -> Vec<u32> {
         return vec![];
     }
     let word = |i: u32| {
-        let value = transfer.low + (transfer.high - transfer.low) * f64::from(i) / 255.0;
+        let value = transfer.value_at(f64::from(i) / 255.0);
         let strength = strength(transfer, value);
         let usual = match mode {
             // Maps are as opaque everywhere unless told otherwise.

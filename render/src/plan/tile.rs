@@ -5,6 +5,7 @@ use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 
 use contract::earth::WGS84_EQUATORIAL_RADIUS_M;
+use contract::grid::Grid;
 use contract::job::{Mode, RenderJob};
 use contract::tile::{MAX_LAT_DEG, Tile, mercator_lat_deg, mercator_x, mercator_y};
 use glam::DVec2;
@@ -50,7 +51,7 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene, (tile, size_
     };
     plan.params.view.kind = VIEW_TILE;
     if job.mode == Mode::Map {
-        map_axes(plan, scene, &level);
+        map_axes(plan, scene, tile, size_px);
         return;
     }
     let grid = &scene.grid;
@@ -313,31 +314,36 @@ fn interpolate_rows(plan: &mut Plan, rows: Range<u32>) {
 }
 
 /// Where every pixel column and row of a thematic map falls on the grid.
-fn map_axes(plan: &mut Plan, scene: &Scene, level: &Level) {
+fn map_axes(plan: &mut Plan, scene: &Scene, tile: Tile, size_px: u32) {
     let grid = &scene.grid;
-    plan.params.thematic.edge_sharpness = (grid.dlon_deg / 360.0 * level.world_px).max(1.0) as f32;
+    plan.params.thematic.edge_sharpness =
+        (grid.dlon_deg / 360.0 * world_px(tile, size_px)).max(1.0) as f32;
+    plan.axes = axes(grid, tile, size_px);
+    let rows = &plan.axes[size_px as usize..];
+    let [north, south] = [rows.first(), rows.last()].map(|axis| axis.map_or(0, |axis| axis.index));
+    let first = north.clamp(0, grid.rows as i32) as u32;
+    let last = (south + 2).clamp(0, grid.rows as i32) as u32;
+    interpolate_rows(plan, first..last.max(first));
+}
+
+/// Where every pixel column, then every row of a tile falls between centres of cells.
+pub(super) fn axes(grid: &Grid, tile: Tile, size_px: u32) -> Vec<Axis> {
+    let world_px = world_px(tile, size_px);
     let axis = |place: f64| Axis {
         index: place.floor() as i32,
         fraction: (place - place.floor()) as f32,
     };
-    let pixels = 0..level.size_px as u32;
-    let share = |pixel: u32, origin_px: f64| (origin_px + f64::from(pixel) + 0.5) / level.world_px;
+    let share = |pixel: u32, tile_index: u32| {
+        (f64::from(tile_index) * f64::from(size_px) + f64::from(pixel) + 0.5) / world_px
+    };
     let col = |pixel: u32| {
-        let lon = share(pixel, level.origin_px[0]) * 360.0 - 180.0;
+        let lon = share(pixel, tile.x) * 360.0 - 180.0;
         axis((lon - grid.west_deg).rem_euclid(360.0) / grid.dlon_deg - 0.5)
     };
     let row = |pixel: u32| {
-        axis(
-            (grid.north_deg - mercator_lat_deg(share(pixel, level.origin_px[1]))) / grid.dlat_deg
-                - 0.5,
-        )
+        let lat = mercator_lat_deg(share(pixel, tile.y));
+        axis((grid.north_deg - lat) / grid.dlat_deg - 0.5)
     };
-    plan.axes = pixels
-        .clone()
-        .map(col)
-        .chain(pixels.clone().map(row))
-        .collect();
-    let first = row(0).index.clamp(0, grid.rows as i32) as u32;
-    let last = (row(pixels.end - 1).index + 2).clamp(0, grid.rows as i32) as u32;
-    interpolate_rows(plan, first..last.max(first));
+    let pixels = 0..size_px;
+    pixels.clone().map(col).chain(pixels.map(row)).collect()
 }

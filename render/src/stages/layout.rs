@@ -64,6 +64,8 @@ pub const KERNEL_DOT: u32 = 0;
 pub const KERNEL_BALL: u32 = 1;
 /// `ListParams::kernel`: soft clouds, the projection of a round cloud of density `(1 - r²)^1.5`.
 pub const KERNEL_CLOUD: u32 = 2;
+/// `ListParams::kernel`: hard dots with a rim of the other tone, which are told from any ground.
+pub const KERNEL_RIMMED: u32 = 3;
 
 shared_struct! {
     /// One row of the grid as the view sees it.

@@ -12,6 +12,7 @@ use crate::stages::compose::base_map::BaseMapParams;
 use crate::stages::compose::params::ContextParams;
 use crate::stages::flow::params::FlowParams;
 use crate::stages::interpolate::params::InterpolateParams;
+use crate::stages::isolines::params::IsolineParams;
 use crate::stages::light::params::LightParams;
 use crate::stages::map::params::MapParams;
 use crate::stages::particles::params::ParticleParams;
@@ -114,6 +115,8 @@ shared_struct! {
         pub has_uncertainty: u32,
         /// 1: cells may hold data in a part of their area, as the domain says.
         pub has_coverage: u32,
+        /// 1: the two numbers of the transfer function are those of binary logarithms.
+        pub is_log: u32,
     }
 }
 
@@ -160,6 +163,7 @@ params! {
     Context context: ContextParams,
     TerrainGrid terrain_grid: GridParams,
     BaseMap base_map: BaseMapParams,
+    Isolines isolines: IsolineParams,
 }
 
 impl From<Uniform> for u32 {

@@ -21,7 +21,7 @@ struct GridParams {
 // How stored values are read: between which of their steps, and as which colour.
 struct ValueParams {
     weight: f32, accumulated_weight: f32, northward_weight: f32, has_accumulated: u32, transfer_low: f32,
-    transfer_per_unit: f32, has_shape: u32, has_uncertainty: u32, has_coverage: u32,
+    transfer_per_unit: f32, has_shape: u32, has_uncertainty: u32, has_coverage: u32, is_log: u32,
 }
 @group(0) @binding(18) var<uniform> values: ValueParams;
 
@@ -77,6 +77,7 @@ const LIGHT_ALONE: u32 = 3u;
 const KERNEL_DOT: u32 = 0u;
 const KERNEL_BALL: u32 = 1u;
 const KERNEL_CLOUD: u32 = 2u;
+const KERNEL_RIMMED: u32 = 3u;
 
 fn is_missing(value: f32) -> bool {
     return value < 0.5 * MISSING;
@@ -112,4 +113,23 @@ fn srgb_of(linear: vec3<f32>) -> vec3<f32> {
 // Nearest whole number, halves upwards: `round` may differ between devices.
 fn nearest(x: f32) -> i32 {
     return i32(floor(x + 0.5));
+}
+
+// Binary logarithm of a positive number, good to 1e-7 on every device, unlike the function of some: the exponent, and the
+// series of the area tangent for what is left, between the roots of 1/2 and 2.
+fn binary_log(x: f32) -> f32 {
+    let bits = bitcast<u32>(x);
+    let exponent = bitcast<i32>(bits - 0x3f3504f3u) >> 23u;
+    let left = bitcast<f32>(bits - (bitcast<u32>(exponent) << 23u));
+    let z = (left - 1.0) / (left + 1.0);
+    let w = z * z;
+    let series = 1.0 + w * (0.33333333 + w * (0.2 + w * (0.14285714 + w * 0.11111111)));
+    return f32(exponent) + 2.8853901 * z * series;
+}
+
+// Place of a value between the ends of the range of colours, 0 to 1.
+fn place_in_range(value: f32, low: f32, per_unit: f32, is_log: u32) -> f32 {
+    var at = value;
+    if (is_log == 1u) { at = binary_log(max(value, 1.0e-37)); }
+    return clamp((at - low) * per_unit, 0.0, 1.0);
 }

@@ -7,7 +7,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
+use contract::annotation::{Annotations, Graticule};
 use contract::digest::Digest;
+use contract::isolines::Isolines;
 use contract::job::{Mode, RENDERER_VERSION, RenderJob, View};
 use render::{Image, Scene};
 use render_proof::currents::{self, gyres};
@@ -16,7 +18,7 @@ use crate::below::below;
 use crate::compare::distance;
 use crate::context::{everything, with_terrain};
 use crate::device::renderers;
-use crate::scenes::{FIVE_DEGREES, ONE_DEGREE, globe, job, looking_at, ocean, tile};
+use crate::scenes::{FIVE_DEGREES, GRAM_A_YEAR, ONE_DEGREE, globe, job, looking_at, ocean, tile};
 use record::{Record, digest};
 
 /// Largest file, of a small picture and of one that is as large as people look at.
@@ -239,6 +241,31 @@ fn wide_maps_match_their_golden_picture() {
     let mut job = job(Mode::Map, wide(view));
     job.style.context.coastlines = true;
     matches_golden_of("map_wide", &ocean(ONE_DEGREE), job);
+}
+
+#[test]
+fn isolines_in_volumes_and_maps_match_their_golden_pictures() {
+    for (name, mode, view) in [
+        (
+            "isolines_volume",
+            Mode::Volume,
+            globe(-120.0, 10.0, 1.5e7, 160),
+        ),
+        ("isolines_tile", Mode::Map, tile(2, 0, 1, 256)),
+    ] {
+        let mut job = job(mode, view);
+        job.style.context.isolines = Some(Isolines::Every {
+            zero: 0.0,
+            step: 10.0 * GRAM_A_YEAR,
+        });
+        if let View::Globe { .. } = view {
+            job.annotations = Some(Annotations {
+                graticule: Graticule::every(15.0).ok(),
+                ..Annotations::none()
+            });
+        }
+        matches_golden_of(name, &ocean(FIVE_DEGREES), job);
+    }
 }
 
 #[test]

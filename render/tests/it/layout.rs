@@ -6,14 +6,16 @@ use render::gpu::FIRST_UNIFORM;
 use render::passes::{scatter, splat, trails};
 use render::stages::fill::level::{FillLevel, MOST_REACH_COLS};
 use render::stages::fill::{self, exact, window};
+use render::stages::isolines::params::Isoline;
 use render::stages::layout::{
     Axis, BEYOND_BIT, BEYOND_M, COVERED, Col, Entry, GROUP, GroundAxis, KERNEL_BALL, KERNEL_CLOUD,
-    KERNEL_DOT, LIGHT_ALONE, LIGHT_GIVEN, LIGHT_OFF, LIGHT_OWN, LOOK, MISSING, MOST_HOT_PARTS,
-    NO_LIST, PART_ENTRIES, Particle, RADIUS_BITS, Row, SCREEN_TILE_PX, SCREEN_TILE_SHIFT, SQUARE,
-    SUBPIXELS, Splat, VIEW_GLOBE, VIEW_TILE, Velocity, WATER_BLUE, WATER_GREEN, WATER_RED,
+    KERNEL_DOT, KERNEL_RIMMED, LIGHT_ALONE, LIGHT_GIVEN, LIGHT_OFF, LIGHT_OWN, LOOK, MISSING,
+    MOST_HOT_PARTS, NO_LIST, PART_ENTRIES, Particle, RADIUS_BITS, Row, SCREEN_TILE_PX,
+    SCREEN_TILE_SHIFT, SQUARE, SUBPIXELS, Splat, VIEW_GLOBE, VIEW_TILE, Velocity, WATER_BLUE,
+    WATER_GREEN, WATER_RED,
 };
 use render::stages::params::{Fields, Params};
-use render::stages::{bin, compose, eye, flow, interpolate, light, map};
+use render::stages::{bin, compose, eye, flow, interpolate, isolines, light, map};
 
 fn module(source: &str) -> naga::Module {
     naga::front::wgsl::parse_str(source).unwrap()
@@ -77,7 +79,8 @@ fn difference(source: &str, name: &str, fields: Fields, size: usize) -> Option<S
 }
 
 /// The shaders of pictures.
-const SOURCES: [&str; 10] = [
+const SOURCES: [&str; 11] = [
+    isolines::SOURCE,
     interpolate::SOURCE,
     splat::SOURCE,
     flow::SOURCE,
@@ -108,6 +111,9 @@ fn structs_have_the_same_fields_in_rust_and_wgsl() {
     for (name, fields, size) in TABLES {
         assert_eq!(difference(eye::SOURCE, name, fields, size), None);
     }
+    let size = size_of::<Isoline>();
+    let found = difference(isolines::SOURCE, "Isoline", Isoline::FIELDS, size);
+    assert_eq!(found, None);
     for source in FILLS {
         let size = size_of::<FillLevel>();
         assert_eq!(
@@ -228,6 +234,7 @@ fn constants_have_the_same_value_in_rust_and_wgsl() {
         ("KERNEL_DOT", f64::from(KERNEL_DOT)),
         ("KERNEL_BALL", f64::from(KERNEL_BALL)),
         ("KERNEL_CLOUD", f64::from(KERNEL_CLOUD)),
+        ("KERNEL_RIMMED", f64::from(KERNEL_RIMMED)),
     ] {
         assert!(
             (wgsl(name) - value).abs() <= value.abs() * 1e-7,

@@ -17,6 +17,7 @@ mod flow;
 mod golden;
 mod ground;
 mod hot;
+mod isolines;
 mod layout;
 mod light_of_parts;
 mod limits;

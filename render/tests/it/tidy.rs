@@ -6,7 +6,7 @@ const SOURCES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/src");
 
 #[test]
 fn every_stage_and_every_form_of_filling_has_a_shader_and_a_twin() {
-    assert_eq!(check("stages"), 10);
+    assert_eq!(check("stages"), 11);
     assert_eq!(check("stages/fill"), 2);
 }
 
@@ -46,6 +46,7 @@ fn both_frames_list_the_same_stages_in_the_same_order() {
     let read = |file: &str| std::fs::read_to_string(Path::new(SOURCES).join(file)).unwrap();
     let stages = [
         "interpolate",
+        "isolines",
         "map",
         "flow",
         "particles",
@@ -67,6 +68,7 @@ fn both_frames_list_the_same_stages_in_the_same_order() {
     // On the device two passes stand for the stages that see one particle at a time, and the eye composes.
     let passes = [
         "interpolate",
+        "isolines",
         "map",
         "compose",
         "flow",

@@ -36,6 +36,8 @@ words! {
     Mode = contract::job::Mode::ALL;
     /// A list of colours with a name.
     Palette = contract::colour::Palette::ALL;
+    /// How values are spread over the colours.
+    Scale = contract::colour::Scale::ALL;
     /// Colours of the ground of a globe view.
     BaseMap = contract::base_map::BaseMap::ALL;
     /// What is seen beside the globe.

@@ -57,8 +57,11 @@ impl TileJsonQuery {
         let manifest = manifest.map(|_named| format!("manifest={}", layer.id));
         let look = self.look.parse()?;
         // What cannot be drawn is refused here, not by every tile.
-        look.options()
-            .style(layer.manifest.quantity, mode, layer.extent.end)?;
+        self.surroundings.around(&look.options())?.style(
+            layer.manifest.quantity,
+            mode,
+            layer.extent.end,
+        )?;
         let around = self.surroundings.of_tiles()?;
         let parts = time
             .into_iter()

@@ -3,7 +3,7 @@ import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
 import { globeUrl, queryOf, tileTemplate } from "../src/api/pictures";
 import type { Palette, Product } from "../src/api/types";
 import { isSameLayer, layerKey, type LayerSpec } from "../src/globe/layer";
-import { changeOf, colourParameters, parameters, parseRange } from "../src/look/address";
+import { changeOf, colourParameters, parameters, parseRange, viewParameters } from "../src/look/address";
 import { effective, type Look, possible, USUAL, withoutColours } from "../src/look/look";
 import { offerOf } from "../src/look/offer";
 import { Catalogue } from "../src/state/catalogue";
@@ -17,16 +17,18 @@ const FULL: Look = {
   palette: "ice",
   reversed: true,
   range: { low: -10, high: 2.5 },
+  scale: "linear",
   uncertainty: true,
   relief: "etopo20",
   reliefExaggeration: 40,
   seaOpacity: 0.35,
   coastlines: true,
+  isolines: true,
   heightMPerKgM2: 4_000_000,
   sunOfTime: true,
 };
 const FULL_QUERY =
-  "palette=ice&range=-10:2.5&reverse=true&uncertainty=true&relief=etopo20&relief_exaggeration=40&sea_opacity=0.35&coastlines=true&height_exaggeration=4000000&sun=time";
+  "palette=ice&range=-10:2.5&scale=linear&reverse=true&uncertainty=true&relief=etopo20&relief_exaggeration=40&sea_opacity=0.35&coastlines=true&isolines=auto&height_exaggeration=4000000&sun=time";
 
 const BALANCE: Palette = { name: "balance", stops: [[0, "#11387f"], [0.5, "#f0f0ee"], [1, "#760e24"]] };
 const ICE: Palette = { name: "ice", stops: [[0, "#030512"], [1, "#eafcfd"]] };
@@ -79,6 +81,11 @@ describe("a look in an address", () => {
     expect(parameters(USUAL)).toEqual([]);
   });
 
+  it("says of a view of the globe that it has no coast lines, which it would have", () => {
+    expect(viewParameters(USUAL)).toEqual([["coastlines", "false"]]);
+    expect(viewParameters(FULL)).toEqual(parameters(FULL));
+  });
+
   it("comes back as it was", () => {
     const there = state({ look: FULL, mode: "volume", tab: "look" });
     expect({ ...INITIAL, ...decodeHash(encodeHash(there)) }).toEqual(there);
@@ -105,6 +112,8 @@ describe("a look in an address", () => {
       ["reverse", "1"],
       ["uncertainty", ""],
       ["coastlines", "false"],
+      ["isolines", "10"],
+      ["scale", "ln"],
       ["relief", "../etopo"],
       ["relief_exaggeration", ""],
       ["relief_exaggeration", "-1"],

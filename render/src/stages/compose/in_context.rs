@@ -32,11 +32,13 @@ pub struct Surroundings<'a> {
     pub ground_axes: &'a [GroundAxis],
     /// Words of the mask of the whole picture.
     pub coast: &'a [u32],
+    /// Isolines of the part that is drawn; not read where there are none.
+    pub lines: &'a [u32],
 }
 
 impl<'a> Surroundings<'a> {
-    /// Those of a planned picture.
-    pub fn of(plan: &'a Plan, scene: &'a Scene) -> Self {
+    /// Those of a planned picture with these isolines.
+    pub fn of(plan: &'a Plan, scene: &'a Scene, lines: &'a [u32]) -> Self {
         let landed = scene.terrain.as_ref().map(Terrain::heights_m);
         let terrain = if plan.params.context.sea_floor_on == 1 {
             &sea_floor::HEIGHTS_M
@@ -48,6 +50,7 @@ impl<'a> Surroundings<'a> {
             terrain,
             ground_axes: &plan.ground_axes,
             coast: &plan.coast,
+            lines,
         }
     }
 }
@@ -241,6 +244,35 @@ fn coast_color(params: &Params, coast: &[u32], pixel: [u32; 2], covered: f32) ->
     grey(context.coast_grey) * cover
 }
 
+fn over(line: Vec4, color: Vec4, is_above: bool) -> Vec4 {
+    if is_above {
+        line + color * (1.0 - line.w)
+    } else {
+        color + line * (1.0 - color.w)
+    }
+}
+
+/// Isoline and graticule of a pixel on the sea surface.
+fn surface_lines(params: &Params, lines: &[u32], [x, y]: [u32; 2], covered: f32) -> [Vec4; 2] {
+    let context = &params.context;
+    if context.lines_on == 0 {
+        return [Vec4::ZERO; 2];
+    }
+    let word = lines[(y * params.view.size_px.x + x) as usize];
+    let grey = |grey: f32| Vec3::splat(grey).extend(1.0);
+    let isoline = grey((word >> 12 & 255) as f32 / 255.0) * ((word & 4095) as f32 / 4095.0);
+    let own = context.graticule_grey * (1.0 - covered) + params.base_map.over_grey * covered;
+    let graticule = grey(own) * ((word >> 20) as f32 / 4095.0 * context.graticule_alpha);
+    [isoline, graticule]
+}
+
+fn with_lines(params: &Params, lines: &[u32], pixel: [u32; 2], color: Vec4, covered: f32) -> Vec4 {
+    let [isoline, graticule] = surface_lines(params, lines, pixel, covered);
+    let through = over(isoline * params.context.isolines_through, color, true);
+    let shown = over(isoline, through, false);
+    over(graticule, shown, params.context.coast_above == 1)
+}
+
 /// Bytes of every pixel, red lowest, from the blended colours.
 pub fn compose(params: &Params, picture: &[Vec4], around: &Surroundings<'_>, image: &mut [u32]) {
     for y in 0..params.view.size_px.y {
@@ -276,12 +308,9 @@ fn composed(
     if params.context.coast_above == 1 {
         covered = covered.max(color.w);
     }
+    color = with_lines(params, around.lines, pixel, color, covered);
     let line = coast_color(params, around.coast, pixel, covered);
-    if params.context.coast_above == 1 {
-        color = line + color * (1.0 - line.w);
-    } else {
-        color += line * (1.0 - color.w);
-    }
+    color = over(line, color, params.context.coast_above == 1);
     color += ground_color(params, around, &spot, pixel) * (1.0 - color.w);
     (color, spot.cover < 1.0)
 }

@@ -2,12 +2,15 @@
 // those of the stages that compose.
 struct ContextParams {
     surface: u32, has_water: u32, night_on: u32, terrain_on: u32, sea_floor_on: u32, terrain_slope: f32, seabed_per_m: f32, coast_on: u32,
-    coast_above: u32, coast_grey: f32, coast_alpha: f32, coast_row_words: u32, land_hides: u32,
+    coast_above: u32, coast_grey: f32, coast_alpha: f32, coast_row_words: u32, land_hides: u32, lines_on: u32, isolines_through: f32,
+    graticule_grey: f32, graticule_alpha: f32,
 }
 @group(0) @binding(27) var<uniform> context: ContextParams;
 @group(0) @binding(5) var<storage, read> terrain: array<f32>;
 @group(0) @binding(6) var<storage, read> ground_axes: array<GroundAxis>;
 @group(0) @binding(7) var<storage, read> coast: array<u32>;
+// Of the part that is drawn; see `isolines.wgsl`.
+@group(0) @binding(11) var<storage, read> lines: array<u32>;
 
 // Light on a thematic map where it is night.
 const NIGHT = 0.14;
@@ -132,6 +135,30 @@ fn coast_color(pixel: vec2<u32>, covered: f32) -> vec4<f32> {
     return vec4(vec3(context.coast_grey), 1.0) * cover;
 }
 
+// A line over what lies below it, or where that leaves it seen.
+fn over(line: vec4<f32>, color: vec4<f32>, is_above: bool) -> vec4<f32> {
+    if (is_above) { return line + color * (1.0 - line.w); }
+    return color + line * (1.0 - color.w);
+}
+
+// Lines of a pixel on the sea surface; `covered` is how much of what lies below has colours of its own.
+struct SurfaceLines { isoline: vec4<f32>, graticule: vec4<f32> }
+
+fn surface_lines(pixel: vec2<u32>, covered: f32) -> SurfaceLines {
+    if (context.lines_on == 0u) { return SurfaceLines(vec4(0.0), vec4(0.0)); }
+    let word = lines[pixel.y * view.size_px.x + pixel.x];
+    let isoline = vec4(vec3(f32((word >> 12u) & 255u) / 255.0), 1.0) * (f32(word & 4095u) / 4095.0);
+    let grey = mix(context.graticule_grey, base_map.over_grey, covered);
+    return SurfaceLines(isoline, vec4(vec3(grey), 1.0) * (f32(word >> 20u) / 4095.0 * context.graticule_alpha));
+}
+
+// Particles with the lines below them: they hide the graticule, and isolines but for a part.
+fn with_lines(pixel: vec2<u32>, color: vec4<f32>, covered: f32) -> vec4<f32> {
+    let own = surface_lines(pixel, covered);
+    let shown = over(own.isoline, over(own.isoline * context.isolines_through, color, true), false);
+    return over(own.graticule, shown, context.coast_above == 1u);
+}
+
 // `is_beside`: it is smoother than bytes, see `bytes_of`.
 struct InContext { color: vec4<f32>, is_beside: bool }
 
@@ -145,12 +172,9 @@ fn in_context(pixel: vec2<u32>, blended: vec4<f32>) -> InContext {
     if (is_submerged()) { return InContext(from_below(spot, pixel, color), true); }
     var covered = f32(context.terrain_on);
     if (context.coast_above == 1u) { covered = max(covered, color.w); }
+    color = with_lines(pixel, color, covered);
     let line = coast_color(pixel, covered);
-    if (context.coast_above == 1u) {
-        color = line + color * (1.0 - line.w);
-    } else {
-        color += line * (1.0 - color.w);
-    }
+    color = over(line, color, context.coast_above == 1u);
     color += ground_color(spot, pixel) * (1.0 - color.w);
     return InContext(color, spot.cover < 1.0);
 }

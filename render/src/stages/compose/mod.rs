@@ -71,21 +71,15 @@ impl Compose {
     pub fn record(&self, frame: &mut FrameContext<'_>) -> Result<(), RenderError> {
         let picture = frame.room(Slot::Picture, 16)?;
         let image = frame.room(Slot::Image, frame.pixel_count() * 4)?;
-        let [terrain, axes, coast] = surroundings(frame)?;
+        let surroundings = surroundings(frame)?;
         let kernel = if frame.params.in_context {
             let compiled = || compiled(frame.gpu, &self.source, true);
             self.in_context.get_or_init(compiled)
         } else {
             &self.plain
         };
-        let buffers = [
-            (1, &picture),
-            (2, &frame.scene.domain),
-            (3, &image),
-            (5, &terrain),
-            (6, &axes),
-            (7, &coast),
-        ];
+        let mut buffers = vec![(1, &picture), (2, &frame.scene.domain), (3, &image)];
+        buffers.extend(surroundings.iter().map(|(at, buffer)| (*at, buffer)));
         let groups = frame.params.view.tiles.to_array();
         frame.recorder.dispatch(kernel, &buffers, groups);
         Ok(())
@@ -98,8 +92,10 @@ fn compiled(gpu: &Gpu, source: &str, is_in_context: bool) -> Kernel {
         .reading(&READS)
 }
 
-/// What the functions for surroundings read: terrain, ground axes and mask, in the order of their bindings from 5 on.
-pub(crate) fn surroundings(frame: &mut FrameContext<'_>) -> Result<[wgpu::Buffer; 3], RenderError> {
+/// What the functions for surroundings read, by their bindings: terrain, ground axes, mask and isolines.
+pub(crate) fn surroundings(
+    frame: &mut FrameContext<'_>,
+) -> Result<[(u32, wgpu::Buffer); 4], RenderError> {
     let plan = frame.plan;
     // Buffers of what is not drawn are bound but never read.
     let axes = if plan.ground_axes.is_empty() {
@@ -120,5 +116,6 @@ pub(crate) fn surroundings(frame: &mut FrameContext<'_>) -> Result<[wgpu::Buffer
         } = &frame.scene;
         terrain.as_ref().unwrap_or(domain).clone()
     };
-    Ok([terrain, axes, coast])
+    let lines = frame.room(Slot::Isolines, 4)?;
+    Ok([(5, terrain), (6, axes), (7, coast), (11, lines)])
 }

@@ -25,5 +25,11 @@ shared_struct! {
         pub coast_row_words: u32,
         /// 1: land of a globe view hides what lies beyond the sea surface behind it.
         pub land_hides: u32,
+        /// 1: isolines or a graticule lie on the sea surface.
+        pub lines_on: u32,
+        /// How much of isolines is seen through particles; all of them lies over maps.
+        pub isolines_through: f32,
+        pub graticule_grey: f32,
+        pub graticule_alpha: f32,
     }
 }

@@ -23,6 +23,7 @@ fn given(near: Near, row: f32, kept: f32) -> vec4<u32> {
         * select(1.0, kept, near.is_hidden) + 0.5);
     var rgb = near.rgb;
     if (KERNEL == KERNEL_BALL) { rgb = vec3<u32>(vec3<f32>(rgb) * ball_light(vec2(near.east, south)) + 0.5); }
+    if (KERNEL == KERNEL_RIMMED) { rgb = rimmed(rgb, near.east * near.east + south * south, near.radius_px); }
     return vec4(sixteenth(rgb * amount), amount);
 }
 

@@ -1,9 +1,10 @@
 //! CPU twin of `eye.wgsl`. Every entry visits only the pixels it can reach: the order inside a slice cannot matter.
 
-use glam::{UVec2, Vec2, Vec4};
+use glam::{UVec2, Vec2, Vec3, Vec4};
 
 use crate::stages::layout::{
-    BEYOND_BIT, Entry, KERNEL_BALL, KERNEL_CLOUD, RADIUS_BITS, SCREEN_TILE_PX, SUBPIXELS,
+    BEYOND_BIT, Entry, KERNEL_BALL, KERNEL_CLOUD, KERNEL_RIMMED, RADIUS_BITS, SCREEN_TILE_PX,
+    SUBPIXELS,
 };
 use crate::stages::params::Params;
 
@@ -34,6 +35,24 @@ fn light_of(code: u32) -> u32 {
 fn ball_light(offset: Vec2) -> f32 {
     let toward = (1.0 - offset.dot(offset)).max(0.0).sqrt();
     0.4 + 0.6 * (-0.45 * offset.x - 0.55 * offset.y + 0.70 * toward).clamp(0.0, 1.0)
+}
+
+const RIM_PX: f32 = 0.7;
+const LIGHT_FROM: f32 = 0.179;
+
+/// Colour of a dot with a rim: dark round what is light, light round what is dark.
+fn rimmed(rgb: [u32; 3], q: f32, radius_px: f32) -> [u32; 3] {
+    let color = Vec3::from(rgb.map(|channel| channel as f32));
+    let inside = ((1.0 - q.sqrt()) * radius_px - RIM_PX).clamp(0.0, 1.0);
+    let luminance = color.dot(Vec3::new(0.2126, 0.7152, 0.0722));
+    let rim = if luminance > LIGHT_FROM * LIGHT_ONE {
+        color * 0.2
+    } else {
+        color * 0.5 + Vec3::splat(LIGHT_ONE) * 0.5
+    };
+    (rim * (1.0 - inside) + color * inside + 0.5)
+        .to_array()
+        .map(|channel| channel as u32)
 }
 
 /// Linear light with alpha, premultiplied, once the slice with these sums is blended into it.
@@ -147,7 +166,12 @@ fn add(params: &Params, entry: &Entry, kept: &Kept, sums: &mut Sums) {
             let kept = if is_beyond { kept[y * TILE + x] } else { 1.0 };
             let amount = (depth * weight * kept + 0.5) as u32;
             let sum = &mut sums[y * TILE + x];
-            for (channel, plain) in rgb.into_iter().enumerate() {
+            let own = if params.lists.kernel == KERNEL_RIMMED {
+                rimmed(rgb, q, radius / pixel_units)
+            } else {
+                rgb
+            };
+            for (channel, plain) in own.into_iter().enumerate() {
                 let lit = if params.lists.kernel == KERNEL_BALL {
                     (plain as f32 * ball_light(offset) + 0.5) as u32
                 } else {

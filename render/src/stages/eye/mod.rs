@@ -9,7 +9,8 @@ use crate::frame_context::FrameContext;
 use crate::gpu::{Gpu, Kernel, Slot};
 use crate::stages::compose;
 use crate::stages::layout::{
-    KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, MOST_HOT_PARTS, NEVER_LONG, SCREEN_TILE_PX,
+    KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, KERNEL_RIMMED, MOST_HOT_PARTS, NEVER_LONG,
+    SCREEN_TILE_PX,
 };
 use crate::stages::params::Uniform::{Context, Lists, View};
 use crate::stages::sizes::list_count;
@@ -43,9 +44,9 @@ pub struct Eye {
     entry: &'static str,
     /// By kind of particle, surroundings and long lists. Those of plain pictures are compiled at once, the others when
     /// they are first wanted.
-    kernels: [[[OnceLock<Kernel>; 2]; 2]; 3],
+    kernels: [[[OnceLock<Kernel>; 2]; 2]; 4],
     /// Sum up the parts of long lists: by kind of particle and surroundings.
-    hot: [[OnceLock<Kernel>; 2]; 3],
+    hot: [[OnceLock<Kernel>; 2]; 4],
 }
 
 /// Workgroups that take the parts of long lists in turn: as many as a large device runs at once.
@@ -78,7 +79,7 @@ impl Eye {
             kernels: Default::default(),
             hot: Default::default(),
         };
-        for kind in [KERNEL_DOT, KERNEL_BALL, KERNEL_CLOUD] {
+        for kind in [KERNEL_DOT, KERNEL_BALL, KERNEL_CLOUD, KERNEL_RIMMED] {
             eye.kernel(gpu, kind, false, false);
         }
         eye
@@ -97,7 +98,7 @@ impl Eye {
             (3, frame.scene.domain.clone()),
             (4, image),
         ];
-        buffers.extend((5..).zip(compose::surroundings(frame)?));
+        buffers.extend(compose::surroundings(frame)?);
         if has_parts {
             self.sum_up(frame)?;
         }
@@ -137,7 +138,7 @@ impl Eye {
             gpu.variant(HOT, &self.source, HOT, &constants)
                 .reading(&[View, Context, Lists])
         });
-        let [_terrain, _axes, coast] = compose::surroundings(frame)?;
+        let [_terrain, _axes, (coast_at, coast), _lines] = compose::surroundings(frame)?;
         let counts = frame.room(Slot::Counts, 4)?;
         let entries = frame.room(Slot::Entries, 4)?;
         let [lists, parts] = hot_room(frame)?;
@@ -146,7 +147,7 @@ impl Eye {
         let buffers = [
             (1, &counts),
             (2, &entries),
-            (7, &coast),
+            (coast_at, &coast),
             (8, &lists),
             (9, &parts),
             (10, &sums),

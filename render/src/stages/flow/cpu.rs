@@ -5,6 +5,7 @@ use glam::{Vec2, Vec3};
 use crate::stages::layout::{Active, MISSING, Particle, Row, Velocity, is_missing, nearest};
 use crate::stages::params::Params;
 use crate::stages::particles::cpu::{HALF_TURN, hash, jittered, unit};
+use crate::stages::place::place_in_range;
 use crate::stages::project::cpu::turned;
 
 /// Longest trail, lives.
@@ -111,8 +112,7 @@ fn dot_of(params: &Params, palette: &[u32], trail: &Trail, number: u32, speed: f
     let row = trail.row as i32 + trail.place.y.floor() as i32;
     let row = row.clamp(0, params.grid.rows as i32 - 1);
     let taper = (number + 1) as f32 / params.cells.particles_each as f32;
-    let position =
-        ((speed - params.values.transfer_low) * params.values.transfer_per_unit).clamp(0.0, 1.0);
+    let position = place_in_range(params, speed);
     let alive = (trail.age / TRAIL).min(1.0) * ((1.0 - trail.age) * FADING).clamp(0.0, 1.0);
     let spacing_px =
         speed.min(params.flow.most_m_s) * params.flow.px_per_m_s * dot_share(params, trail.age);

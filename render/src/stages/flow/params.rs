@@ -24,5 +24,6 @@ shared_struct! {
         pub transfer_low: f32,
         pub transfer_per_unit: f32,
         pub has_shape: u32,
+        pub is_log: u32,
     }
 }

@@ -8,6 +8,7 @@ use crate::stages::colour::linear_of;
 use crate::stages::layout::{Axis, VIEW_TILE, is_missing, nearest};
 use crate::stages::params::Params;
 use crate::stages::particles::cpu::share_of;
+use crate::stages::place::place_in_range;
 use crate::stages::sphere::ground_below;
 use crate::stages::uncertainty::hatched;
 
@@ -43,10 +44,19 @@ fn on_globe(params: &Params, inputs: &Inputs<'_>, pixel: [u32; 2]) -> Vec4 {
     if !hit.on_ground {
         return Vec4::ZERO;
     }
-    let east = hit.lon_rad - params.grid.west_rad;
-    let x = (east - (east / TAU).floor() * TAU) * params.grid.cols_per_rad - 0.5;
-    let y = (params.grid.north_rad - hit.lat_rad) * params.grid.rows_per_rad - 0.5;
-    color_at(params, inputs, [axis_at(x), axis_at(y)], pixel)
+    let place = [col_of(params, hit.lon_rad), row_of(params, hit.lat_rad)];
+    color_at(params, inputs, place, pixel)
+}
+
+/// Where a longitude falls between centres of cells.
+pub(crate) fn col_of(params: &Params, lon_rad: f32) -> Axis {
+    let east = lon_rad - params.grid.west_rad;
+    axis_at((east - (east / TAU).floor() * TAU) * params.grid.cols_per_rad - 0.5)
+}
+
+/// The same of a latitude.
+pub(crate) fn row_of(params: &Params, lat_rad: f32) -> Axis {
+    axis_at((params.grid.north_rad - lat_rad) * params.grid.rows_per_rad - 0.5)
 }
 
 fn axis_at(place: f32) -> Axis {
@@ -56,7 +66,8 @@ fn axis_at(place: f32) -> Axis {
     }
 }
 
-fn cell_at(params: &Params, row: i32, col: i32) -> Option<usize> {
+/// The cell of a row and a column, if there is one.
+pub(crate) fn cell_at(params: &Params, row: i32, col: i32) -> Option<usize> {
     let (rows, cols) = (params.grid.rows as i32, params.grid.cols as i32);
     let col = if params.grid.periodic == 1 {
         col.rem_euclid(cols)
@@ -121,9 +132,7 @@ fn color_at(params: &Params, inputs: &Inputs<'_>, [x, y]: [Axis; 2], pixel: [u32
     if params.values.has_coverage == 1 {
         alpha *= value.z / value.y;
     }
-    let position = ((value.x / value.z - params.values.transfer_low)
-        * params.values.transfer_per_unit)
-        .clamp(0.0, 1.0);
+    let position = place_in_range(params, value.x / value.z);
     let at = nearest(position * 255.0) as usize;
     if params.values.has_shape == 1 {
         alpha *= (palette[256 + at] & 0xffff) as f32 / 65535.0;

@@ -11,19 +11,6 @@ struct MapParams { alpha: f32, edge_sharpness: f32 }
 // Bound but never read where every cell with data is covered all over.
 @group(0) @binding(7) var<storage, read> domain: array<u32>;
 
-// Cells that are not there.
-const NO_CELL = 0xffffffffu;
-
-fn cell_at(row: i32, col: i32) -> u32 {
-    var x = col;
-    let cols = i32(grid.cols);
-    if (grid.periodic == 1u) { x = (x % cols + cols) % cols; }
-    if (x < 0 || x >= cols || row < 0 || row >= i32(grid.rows)) { return NO_CELL; }
-    let cell = u32(row) * grid.cols + u32(x);
-    if (cell < grid.held_first_cell || cell >= grid.held_end_cell) { return NO_CELL; }
-    return cell - grid.held_first_cell;
-}
-
 // Value times the share of the cell that holds data, 1, and that share; or zeros where there is no data.
 fn cell_value(row: i32, col: i32) -> vec3<f32> {
     let cell = cell_at(row, col);
@@ -54,18 +41,13 @@ fn color_at(x: Axis, y: Axis, pixel: vec2<u32>) -> vec4<f32> {
     var alpha = thematic.alpha * clamp((value.y - 0.5) * thematic.edge_sharpness + 0.5, 0.0, 1.0);
     if (alpha <= 0.0 || value.z <= 0.0) { return vec4(0.0); }
     if (values.has_coverage == 1u) { alpha *= value.z / value.y; }
-    let position = clamp((value.x / value.z - values.transfer_low) * values.transfer_per_unit, 0.0, 1.0);
+    let position = place_in_range(value.x / value.z, values.transfer_low, values.transfer_per_unit, values.is_log);
     let at = u32(nearest(position * 255.0));
     if (values.has_shape == 1u) { alpha *= f32(palette[256u + at] & 0xffffu) / 65535.0; }
     let color = palette[at];
     var rgb = vec3(f32(color & 255u), f32((color >> 8u) & 255u), f32((color >> 16u) & 255u)) / 255.0;
     if (values.has_uncertainty == 1u) { rgb = hatched(rgb, uncertainty_at(x, y), pixel); }
     return vec4(linear_of(rgb), 1.0) * alpha;
-}
-
-fn axis_at(place: f32) -> Axis {
-    let index = floor(place);
-    return Axis(i32(index), place - index);
 }
 
 @compute @workgroup_size(SCREEN_TILE_PX, SCREEN_TILE_PX)
@@ -81,8 +63,5 @@ fn map(@builtin(global_invocation_id) pixel: vec3<u32>) {
         picture[at] = vec4(0.0);
         return;
     }
-    let east = hit.lon - grid.west_rad;
-    let x = (east - floor(east / TURN) * TURN) * grid.cols_per_rad - 0.5;
-    let y = (grid.north_rad - hit.lat) * grid.rows_per_rad - 0.5;
-    picture[at] = color_at(axis_at(x), axis_at(y), pixel.xy);
+    picture[at] = color_at(col_of(hit.lon), row_of(hit.lat), pixel.xy);
 }

@@ -15,6 +15,7 @@ pub const SOURCE: &str = concat!(
     include_str!("../sphere.wgsl"),
     include_str!("../uncertainty.wgsl"),
     include_str!("../coverage.wgsl"),
+    include_str!("../grid_cells.wgsl"),
     include_str!("map.wgsl")
 );
 

@@ -7,6 +7,7 @@ use crate::stages::layout::{
     Active, COVERED, Particle, Row, WATER_BLUE, WATER_GREEN, WATER_RED, is_missing, nearest,
 };
 use crate::stages::params::Params;
+use crate::stages::place::place_in_range;
 use crate::stages::uncertainty::uncertain;
 
 /// 0.5 in 32 bits.
@@ -115,7 +116,7 @@ fn one(params: &Params, inputs: &Inputs<'_>, cell: Active, k: u32) -> Particle {
         unit(start.wrapping_add(hash(bits ^ 0x85ebca6b) >> 3)) + own.turns_per_kg_m2 * carbon.abs();
     let phase = turned - turned.floor();
     let column_m = (carbon * own.height_m_per_kg_m2).clamp(-own.height_limit_m, own.height_limit_m);
-    let position = ((value - values.transfer_low) * values.transfer_per_unit).clamp(0.0, 1.0);
+    let position = place_in_range(params, value);
     let strength = strength_of(params, value, position);
     particle.height_m = column_m * phase + own.sheet_m * (phase - 0.5);
     particle.mass_kg = carbon * inputs.rows[row as usize].area_m2 / params.cells.particle_shares;

@@ -60,7 +60,7 @@ fn particle_of(row: u32, slot: u32, k: u32, value: f32, carbon: f32) -> Particle
     particle.south = unit(place.y + jittered(hash(bits)));
     let phase = fract(unit(start + (hash(bits ^ 0x85ebca6bu) >> 3u)) + particles.turns_per_kg_m2 * abs(carbon));
     let column_m = clamp(carbon * particles.height_m_per_kg_m2, -particles.height_limit_m, particles.height_limit_m);
-    let position = clamp((value - values.transfer_low) * values.transfer_per_unit, 0.0, 1.0);
+    let position = place_in_range(value, values.transfer_low, values.transfer_per_unit, values.is_log);
     let strength = strength_of(value, position);
     particle.height_m = column_m * phase + particles.sheet_m * (phase - 0.5);
     particle.mass_kg = carbon * rows[row].area_m2 / cells.particle_shares;

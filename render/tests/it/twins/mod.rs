@@ -2,6 +2,7 @@
 
 mod drifting;
 mod interpolation;
+mod isolines_drawn;
 mod lighting;
 mod lists;
 mod picture;
@@ -32,7 +33,7 @@ use render::stages::map::{self};
 use render::stages::params::Params;
 use render::stages::particles::cpu::Inputs;
 use render::stages::sizes::{HALF_BYTES, list_count, stored_at, texel_count};
-use render::stages::{compose, eye, interpolate, particles, project, uncertainty};
+use render::stages::{compose, eye, interpolate, isolines, particles, project, uncertainty};
 use render_proof::currents::{self, gyres};
 
 use crate::compare::worst;
@@ -51,6 +52,7 @@ struct Twins {
     light: Vec<u32>,
     list_ends: Vec<u32>,
     entries: Vec<Entry>,
+    lines: Vec<u32>,
     picture: Vec<Vec4>,
     image: Vec<u32>,
 }
@@ -153,9 +155,15 @@ impl Twins {
             params.lists.entry_capacity = entries.len() as u32;
             eye::cpu::eye(&params, &list_ends, &entries, &plan.coast, &mut picture);
         }
+        let mut lines = vec![];
+        if params.context.lines_on == 1 {
+            lines.resize(picture.len(), 0);
+            let inputs = isolines::cpu::Inputs::of(&plan, &scene, &value);
+            isolines::cpu::draw_lines(&params, &inputs, &mut lines);
+        }
         let mut image = vec![0; picture.len()];
         if params.in_context {
-            let around = Surroundings::of(&plan, &scene);
+            let around = Surroundings::of(&plan, &scene, &lines);
             compose::in_context::compose(&params, &picture, &around, &mut image);
         } else {
             compose::cpu::compose(&params, &picture, &mut image);
@@ -171,6 +179,7 @@ impl Twins {
             light,
             list_ends,
             entries,
+            lines,
             picture,
             image,
         }

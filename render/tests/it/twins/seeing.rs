@@ -109,7 +109,7 @@ fn eye_blends_away_from_the_light_behind_as_its_twin_does() {
         worst(&channels(&front), &channels(&twins.picture), 0.01, 0.0) > 1.0,
         "the order is seen"
     );
-    let around = Surroundings::of(&twins.plan, &twins.scene);
+    let around = Surroundings::of(&twins.plan, &twins.scene, &twins.lines);
     compose::in_context::compose(&twins.params, &twins.picture, &around, &mut twins.image);
     let expected = bytes(twins.image.iter().copied());
     prove(

@@ -13,10 +13,11 @@ import {
 const MOST_VALUE = 1e20;
 
 /** Parameters of an address that a legend goes by. */
-export function colourParameters({ palette, range, reversed }: Look): Parameter[] {
+export function colourParameters({ palette, range, scale, reversed }: Look): Parameter[] {
   const all: (Parameter | null)[] = [
     palette === null ? null : ["palette", palette],
     range === null ? null : ["range", `${range.low}:${range.high}`],
+    scale === null ? null : ["scale", scale],
     reversed ? ["reverse", "true"] : null,
   ];
   return all.filter((one) => one !== null);
@@ -33,10 +34,17 @@ export function parameters(look: Look): Parameter[] {
     isExaggerated ? ["relief_exaggeration", String(reliefExaggeration)] : null,
     seaOpacity === USUAL.seaOpacity ? null : ["sea_opacity", String(seaOpacity)],
     look.coastlines ? ["coastlines", "true"] : null,
+    look.isolines ? ["isolines", "auto"] : null,
     heightMPerKgM2 === USUAL.heightMPerKgM2 ? null : ["height_exaggeration", String(heightMPerKgM2)],
     look.sunOfTime ? ["sun", "time"] : null,
   ];
   return all.filter((one) => one !== null);
+}
+
+/** The same for a view of the globe, which has coast lines unless told otherwise. */
+export function viewParameters(look: Look): Parameter[] {
+  const all = parameters(look);
+  return look.coastlines ? all : [...all, ["coastlines", "false"]];
 }
 
 /** What one parameter of an address changes; undefined where it says nothing valid. */
@@ -47,12 +55,14 @@ export function changeOf(name: string, value: string): Partial<Look> | undefined
 const READERS = new Map<string, (text: string) => Partial<Look> | undefined>([
   ["palette", (text) => (/^[a-z]{1,40}$/.test(text) ? { palette: text } : undefined)],
   ["range", rangeOf],
+  ["scale", (text) => (text === "linear" || text === "log" ? { scale: text } : undefined)],
   ["reverse", (text) => (text === "true" ? { reversed: true } : undefined)],
   ["uncertainty", (text) => (text === "true" ? { uncertainty: true } : undefined)],
   ["relief", (text) => (/^[a-z][a-z0-9-]{0,63}$/.test(text) ? { relief: text } : undefined)],
   ["relief_exaggeration", (text) => upTo(MOST_RELIEF_EXAGGERATION, text, (reliefExaggeration) => ({ reliefExaggeration }))],
   ["sea_opacity", (text) => upTo(MOST_SEA_OPACITY, text, (seaOpacity) => ({ seaOpacity }))],
   ["coastlines", (text) => (text === "true" ? { coastlines: true } : undefined)],
+  ["isolines", (text) => (text === "auto" ? { isolines: true } : undefined)],
   ["height_exaggeration", (text) => upTo(MOST_HEIGHT_M_PER_KG_M2, text, (heightMPerKgM2) => ({ heightMPerKgM2 }))],
   ["sun", (text) => (text === "time" ? { sunOfTime: true } : undefined)],
 ]);

@@ -22,16 +22,25 @@ export function gradientOf({ stops }: Pick<Legend, "stops">): string {
   return `linear-gradient(to right, ${stops.map(([at, colour]) => `${colour} ${(at * 100).toFixed(2)}%`).join(", ")})`;
 }
 
+/** Where a value lies on the bar, 0 to 1. */
+export function placeOf({ low, high, scale }: Pick<Legend, "low" | "high" | "scale">, value: number): number {
+  const at = scale === "log" ? Math.log10 : (each: number) => each;
+  return (at(value) - at(low)) / (at(high) - at(low));
+}
+
 export function legendView(legend: Legend): HTMLElement {
   // Older servers do not say.
   const ticks = legend.ticks ?? ticksOf(legend.low, legend.high);
+  const isLog = legend.scale === "log";
   const digits = Math.max(...ticks.map((tick) => fractionDigits(tick, legend.high - legend.low)));
+  // On a logarithmic scale each number is as short as it is: 0.03 and 10.
+  const digitsOf = (tick: number) => (isLog ? fractionDigits(tick, tick) : digits);
   const bar = el("div", { class: "legend-bar", "aria-hidden": "true" });
   bar.style.background = gradientOf(legend);
   const axis = el("div", { class: "legend-axis" });
   for (const tick of ticks) {
-    const mark = el("span", { class: "legend-tick" }, numberText(tick, digits));
-    mark.style.left = `${(((tick - legend.low) / (legend.high - legend.low)) * 100).toFixed(3)}%`;
+    const mark = el("span", { class: "legend-tick" }, numberText(tick, digitsOf(tick)));
+    mark.style.left = `${(placeOf(legend, tick) * 100).toFixed(3)}%`;
     axis.append(mark);
   }
   const unit = unitText(legend.unit);
@@ -41,7 +50,7 @@ export function legendView(legend: Legend): HTMLElement {
       class: "legend",
       id: "legend",
       role: "group",
-      "aria-label": `Colours from ${numberText(legend.low, digits)} to ${numberText(legend.high, digits)} ${unit}`,
+      "aria-label": `Colours from ${numberText(legend.low, digitsOf(legend.low))} to ${numberText(legend.high, digitsOf(legend.high))} ${unit}`,
     },
     el(
       "figcaption",

@@ -7,12 +7,17 @@ export interface Range {
   readonly high: number;
 }
 
+/** How values are spread over the colours. */
+export type Scale = "linear" | "log";
+
 export interface Look {
   /** Null is the product's own. */
   readonly palette: string | null;
   readonly reversed: boolean;
   /** Null is the product's own. */
   readonly range: Range | null;
+  /** Null is the product's own. */
+  readonly scale: Scale | null;
   /** Cells whose gap was filled are marked. */
   readonly uncertainty: boolean;
   /** An elevation product below the layer. */
@@ -22,6 +27,8 @@ export interface Look {
   /** Share of what lies deep below the sea surface that the sea hides. */
   readonly seaOpacity: number;
   readonly coastlines: boolean;
+  /** Lines of equal values, at round ones. */
+  readonly isolines: boolean;
   /** How far a kilogram of accumulated carbon a square metre lifts particles, m. */
   readonly heightMPerKgM2: number;
   /** The sun stands where it stood at the instant shown, not in the north-west. */
@@ -33,11 +40,13 @@ export const USUAL: Look = {
   palette: null,
   reversed: false,
   range: null,
+  scale: null,
   uncertainty: false,
   relief: null,
   reliefExaggeration: 15,
   seaOpacity: 0,
   coastlines: false,
+  isolines: false,
   heightMPerKgM2: 8_000_000,
   sunOfTime: false,
 };
@@ -51,17 +60,19 @@ const LIFTED: readonly Mode[] = ["points", "sprites", "volume"];
 
 /** The same in the product's own colours: another product's values and unit are others. */
 export function withoutColours(look: Look): Look {
-  const { palette, reversed, range } = USUAL;
-  const hasNone = look.palette === palette && look.reversed === reversed && look.range === range;
-  return hasNone ? look : { ...look, palette, reversed, range };
+  const { palette, reversed, range, scale } = USUAL;
+  const hasNone =
+    look.palette === palette && look.reversed === reversed && look.range === range && look.scale === scale;
+  return hasNone ? look : { ...look, palette, reversed, range, scale };
 }
 
 /** The part of a look that makes a difference: what would change no pixel must not change the address. */
 export function effective(look: Look, mode: Mode, isLifted: boolean): Look {
-  const { uncertainty, seaOpacity, heightMPerKgM2 } = USUAL;
+  const { uncertainty, seaOpacity, heightMPerKgM2, isolines } = USUAL;
   return {
     ...look,
     ...(canUncertainty(mode) ? {} : { uncertainty }),
+    ...(hasIsolines(mode) ? {} : { isolines }),
     ...(hasSea(look, mode, isLifted) ? {} : { seaOpacity }),
     ...(hasHeight(mode, isLifted) ? {} : { heightMPerKgM2 }),
   };
@@ -76,6 +87,11 @@ export function possible(look: Look, palettes: readonly string[], reliefs: reado
 
 /** Trails of a flow do not show which cells were filled. */
 export function canUncertainty(mode: Mode): boolean {
+  return mode !== "flow";
+}
+
+/** Isolines are those of one quantity; a flow is drawn from two. */
+export function hasIsolines(mode: Mode): boolean {
   return mode !== "flow";
 }
 

@@ -3,7 +3,7 @@ import type { Palette } from "../api/types";
 import { titleText } from "../page/format";
 import type { Catalogue } from "../state/catalogue";
 import type { State } from "../state/store";
-import { canUncertainty, hasHeight, hasSea, type Range } from "./look";
+import { canUncertainty, hasHeight, hasIsolines, hasSea, type Range } from "./look";
 
 export interface PaletteChoice extends Palette {
   title: string;
@@ -18,6 +18,7 @@ export interface LookOffer {
   unit: string;
   reliefs: { id: string; title: string }[];
   canUncertainty: boolean;
+  hasIsolines: boolean;
   hasRelief: boolean;
   hasSea: boolean;
   hasHeight: boolean;
@@ -42,6 +43,7 @@ export function offerOf(
     unit: legend.unit,
     reliefs: catalogue.reliefs.map((each) => ({ id: each.product, title: titleText(each) })),
     canUncertainty: canUncertainty(mode),
+    hasIsolines: hasIsolines(mode),
     hasRelief: look.relief !== null,
     hasSea: hasSea(look, mode, isLifted),
     hasHeight: hasHeight(mode, isLifted),

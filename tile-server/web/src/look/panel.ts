@@ -2,7 +2,7 @@
 import { el } from "../page/dom";
 import { toggle } from "../page/toggle";
 import type { Store } from "../state/store";
-import { type Look, USUAL } from "./look";
+import { type Look, type Scale, USUAL } from "./look";
 import type { LookOffer } from "./offer";
 import { PaletteList } from "./palette-list";
 import { RangeForm } from "./range-form";
@@ -14,15 +14,30 @@ export class LookPanel {
   readonly #palettes = new PaletteList((palette) => this.#change({ palette }));
   readonly #reversed = toggle("reversed", "Reversed", (reversed) => this.#change({ reversed }));
   readonly #range = new RangeForm((range) => this.#change({ range }));
+  readonly #scale = el(
+    "select",
+    { id: "scale" },
+    el("option", { value: "" }, "As usual"),
+    el("option", { value: "linear" }, "Linear"),
+    el("option", { value: "log" }, "Logarithmic"),
+  );
   readonly #uncertainty = toggle("uncertainty", "Mark cells that were filled", (uncertainty) => this.#change({ uncertainty }));
   readonly #surroundings = new SurroundingsForm((change) => this.#change(change));
 
   constructor(body: HTMLElement, store: Store, offer: () => LookOffer | undefined) {
     this.#store = store;
     this.#offer = offer;
+    this.#scale.addEventListener("change", () => this.#change({ scale: (this.#scale.value || null) as Scale | null }));
     body.append(
       this.#palettes.element,
-      el("div", { class: "look-group" }, this.#reversed.element, this.#range.element, this.#uncertainty.element),
+      el(
+        "div",
+        { class: "look-group" },
+        this.#reversed.element,
+        this.#range.element,
+        el("label", { class: "field" }, el("span", {}, "Scale"), this.#scale),
+        this.#uncertainty.element,
+      ),
       this.#surroundings.element,
       el("button", { type: "button", class: "wide", id: "look-reset", onclick: () => this.#reset() }, "Reset the look"),
     );
@@ -37,6 +52,7 @@ export class LookPanel {
     this.#palettes.show(offer.palettes, look.palette, look.reversed);
     this.#reversed.show(look.reversed);
     this.#range.show(look.range, offer.range, offer.unit);
+    this.#scale.value = look.scale ?? "";
     this.#uncertainty.show(look.uncertainty);
     this.#uncertainty.element.hidden = !offer.canUncertainty;
     this.#surroundings.show(look, offer);

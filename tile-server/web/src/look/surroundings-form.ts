@@ -1,4 +1,4 @@
-//! What surrounds the layer: coast lines, relief, sea, height of particles and sun; a look in, changes of it out.
+//! What surrounds the layer: coast lines, isolines, relief, sea, height of particles and sun; a look in, changes of it out.
 import { el } from "../page/dom";
 import { numberText } from "../page/format";
 import { Slider } from "../page/slider";
@@ -14,6 +14,7 @@ const SLIDER_HEIGHT_KM = 40_000;
 export class SurroundingsForm {
   readonly element: HTMLElement;
   readonly #coastlines: ReturnType<typeof toggle>;
+  readonly #isolines: ReturnType<typeof toggle>;
   readonly #relief = el("select", { id: "relief", "aria-describedby": "relief-hint" });
   readonly #hint = el("p", { class: "muted", id: "relief-hint" }, "No elevation product has been landed here yet.");
   readonly #exaggeration: Slider;
@@ -30,6 +31,7 @@ export class SurroundingsForm {
 
   constructor(onChange: (change: Partial<Look>) => void) {
     this.#coastlines = toggle("coastlines", "Coast lines", (coastlines) => onChange({ coastlines }));
+    this.#isolines = toggle("isolines", "Isolines", (isolines) => onChange({ isolines }));
     this.#relief.addEventListener("change", () => onChange({ relief: this.#relief.value || null }));
     this.#exaggeration = new Slider({
       id: "relief-exaggeration",
@@ -60,6 +62,7 @@ export class SurroundingsForm {
       "div",
       { class: "look-group" },
       this.#coastlines.element,
+      this.#isolines.element,
       el("label", { class: "field" }, el("span", {}, "Relief"), this.#relief),
       this.#hint,
       this.#exaggeration.element,
@@ -71,6 +74,8 @@ export class SurroundingsForm {
 
   show(look: Look, offer: LookOffer): void {
     this.#coastlines.show(look.coastlines);
+    this.#isolines.element.hidden = !offer.hasIsolines;
+    this.#isolines.show(look.isolines);
     this.#list(offer.reliefs);
     this.#relief.value = look.relief ?? "";
     this.#relief.disabled = offer.reliefs.length === 0;

@@ -3,7 +3,7 @@ import { getPicture } from "../api/client";
 import { globeUrl } from "../api/pictures";
 import type { Mode } from "../api/types";
 import { MODES } from "../api/words";
-import { parameters } from "../look/address";
+import { viewParameters } from "../look/address";
 import type { Look } from "../look/look";
 import { byId, el, icon } from "../page/dom";
 import { latText, lonText } from "../page/format";
@@ -78,7 +78,7 @@ export class ViewDialog {
       headingDeg: camera.headingDeg,
       pitchDeg: camera.pitchDeg,
       timeIso: toIso(timeMs),
-      look: parameters(this.#lookIn(mode)),
+      look: viewParameters(this.#lookIn(mode)),
       ...imageSize(),
     });
     try {

@@ -2,7 +2,7 @@
 
 use glam::{Vec3, Vec4};
 
-use super::{Spot, Surroundings, coast_color, ground_mask};
+use super::{Spot, Surroundings, coast_color, ground_mask, over, surface_lines};
 use crate::stages::compose::globe::{daylight, plain};
 use crate::stages::params::Params;
 use crate::stages::water::{kept_over, mix, water_light};
@@ -12,7 +12,7 @@ fn water_before(params: &Params, spot: &Spot) -> Vec3 {
     water_light(params, spot.ground.sight.dot(eye) / eye.length())
 }
 
-/// The surface; a map lies on it, and coast lines on that.
+/// The surface; a map lies on it, and lines on that.
 fn ceiling_color(
     params: &Params,
     around: &Surroundings<'_>,
@@ -31,8 +31,9 @@ fn ceiling_color(
     if params.context.coast_above == 1 {
         seen = blended + seen * (1.0 - blended.w);
     }
-    let line = coast_color(params, around.coast, pixel, 0.0);
-    seen = line + seen * (1.0 - line.w);
+    let [isoline, graticule] = surface_lines(params, around.lines, pixel, 0.0);
+    seen = over(isoline, over(graticule, seen, true), true);
+    seen = over(coast_color(params, around.coast, pixel, 0.0), seen, true);
     let water = water_before(params, spot) * seen.w;
     mix(water, seen.truncate(), kept_over(params, ground.way)).extend(seen.w)
 }

@@ -5,7 +5,7 @@ fn water_before(spot: Spot) -> vec3<f32> {
     return water_light(dot(spot.ground.sight, view.eye) / length(view.eye));
 }
 
-// The surface; a map lies on it, and coast lines on that.
+// The surface; a map lies on it, and lines on that.
 fn ceiling_color(spot: Spot, pixel: vec2<u32>, blended: vec4<f32>) -> vec4<f32> {
     var seen = vec4(0.0);
     if (context.surface == 1u) {
@@ -14,8 +14,9 @@ fn ceiling_color(spot: Spot, pixel: vec2<u32>, blended: vec4<f32>) -> vec4<f32> 
         seen = vec4(plain(spot.ground.lon, spot.ground.lat, shares, no_floor, pixel) * daylight(spot.sun.z), 1.0);
     }
     if (context.coast_above == 1u) { seen = blended + seen * (1.0 - blended.w); }
-    let line = coast_color(pixel, 0.0);
-    seen = line + seen * (1.0 - line.w);
+    let own = surface_lines(pixel, 0.0);
+    seen = over(own.isoline, over(own.graticule, seen, true), true);
+    seen = over(coast_color(pixel, 0.0), seen, true);
     return vec4(mix(water_before(spot) * seen.w, seen.xyz, kept_over(spot.ground.way)), seen.w);
 }
 

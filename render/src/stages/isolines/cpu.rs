@@ -1,0 +1,189 @@
+//! CPU twin of `isolines.wgsl`.
+
+use glam::{Vec2, Vec3};
+
+use super::params::Isoline;
+use crate::plan::Plan;
+use crate::scene::Scene;
+use crate::stages::layout::{Axis, GroundAxis, VIEW_TILE, is_missing, nearest};
+use crate::stages::map::cpu::{cell_at, col_of, row_of};
+use crate::stages::params::Params;
+use crate::stages::particles::cpu::share_of;
+use crate::stages::sphere::ground_below;
+
+const CROWDED: f32 = 0.2;
+const TOO_CROWDED: f32 = 0.5;
+const RIM_PER_PX: f32 = 0.3;
+const FLAT_PX: f32 = 10000.0;
+
+/// What the stage reads.
+pub struct Inputs<'a> {
+    /// The grid at the instant.
+    pub value: &'a [f32],
+    /// How much of every cell holds data; not read where no cell is covered in part.
+    pub domain: &'a [u32],
+    /// Columns, then rows of a tile.
+    pub axes: &'a [Axis],
+    pub ground_axes: &'a [GroundAxis],
+    pub levels: &'a [Isoline],
+}
+
+impl<'a> Inputs<'a> {
+    /// Those of a planned picture with this grid at its instant.
+    pub fn of(plan: &'a Plan, scene: &'a Scene, value: &'a [f32]) -> Self {
+        Self {
+            value,
+            domain: scene.domain.content(),
+            axes: &plan.axes,
+            ground_axes: &plan.ground_axes,
+            levels: &plan.isolines,
+        }
+    }
+}
+
+/// The value at a place over the range of colours, and its change for each column and row.
+#[derive(Debug, Clone, Copy)]
+struct Field {
+    value: f32,
+    per_col: f32,
+    per_row: f32,
+}
+
+/// The lines of every pixel.
+pub fn draw_lines(params: &Params, inputs: &Inputs<'_>, lines: &mut [u32]) {
+    let size_px = params.view.size_px;
+    for y in 0..size_px.y {
+        for x in 0..size_px.x {
+            lines[(y * size_px.x + x) as usize] = one(params, inputs, [x, y]);
+        }
+    }
+}
+
+fn one(params: &Params, inputs: &Inputs<'_>, [x, y]: [u32; 2]) -> u32 {
+    if params.view.kind == VIEW_TILE {
+        let (col, row) = (x as usize, (params.view.size_px.x + y) as usize);
+        let field = field_at(params, inputs, [inputs.axes[col], inputs.axes[row]]);
+        return field.map_or(0, |field| {
+            let per_rad = per_rad_of(params, field);
+            let slope = slope_on_tile(params, per_rad, inputs.ground_axes[row].cos);
+            line_of(inputs.levels, field, slope, 1.0)
+        });
+    }
+    let hit = ground_below(params, [x, y]);
+    if !hit.on_ground {
+        return 0;
+    }
+    let slope = |per_rad: Vec2| slope_on_globe(params, per_rad, hit.normal);
+    let inside = (hit.rim_px * RIM_PER_PX - 0.5).clamp(0.0, 1.0);
+    let mut word = 0;
+    if params.isolines.count > 0 {
+        let place = [col_of(params, hit.lon_rad), row_of(params, hit.lat_rad)];
+        let field = field_at(params, inputs, place);
+        word = field.map_or(0, |field| {
+            line_of(
+                inputs.levels,
+                field,
+                slope(per_rad_of(params, field)),
+                inside,
+            )
+        });
+    }
+    if params.isolines.graticule_per_rad > 0.0 {
+        let meridian = graticule_of(params, hit.lon_rad, slope(Vec2::X));
+        let parallel = graticule_of(params, hit.lat_rad, slope(Vec2::Y));
+        word |= (nearest(meridian.max(parallel) * inside * 4095.0) as u32) << 20;
+    }
+    word
+}
+
+/// Value times the share of the cell that holds data, 1, and that share; or zeros where there is no data.
+fn cell_value(params: &Params, inputs: &Inputs<'_>, row: i32, col: i32) -> Vec3 {
+    let cell = cell_at(params, row, col);
+    match cell.filter(|cell| !is_missing(inputs.value[*cell])) {
+        Some(cell) => {
+            let share = share_of(params, inputs.domain, cell);
+            let own = &params.isolines;
+            let value = (inputs.value[cell] - own.low) * own.per_unit;
+            Vec3::new(value * share, 1.0, share)
+        }
+        None => Vec3::ZERO,
+    }
+}
+
+fn mix(a: Vec3, b: Vec3, t: f32) -> Vec3 {
+    a * (1.0 - t) + b * t
+}
+
+fn field_at(params: &Params, inputs: &Inputs<'_>, [x, y]: [Axis; 2]) -> Option<Field> {
+    let cell = |row, col| cell_value(params, inputs, row, col);
+    let [north_west, north_east] = [x.index, x.index + 1].map(|col| cell(y.index, col));
+    let [south_west, south_east] = [x.index, x.index + 1].map(|col| cell(y.index + 1, col));
+    let north = mix(north_west, north_east, x.fraction);
+    let south = mix(south_west, south_east, x.fraction);
+    let sum = mix(north, south, y.fraction);
+    if sum.y < 0.5 || sum.z <= 0.0 {
+        return None;
+    }
+    let east = mix(north_east - north_west, south_east - south_west, y.fraction);
+    let down = south - north;
+    let value = sum.x / sum.z;
+    Some(Field {
+        value,
+        per_col: (east.x - value * east.z) / sum.z,
+        per_row: (down.x - value * down.z) / sum.z,
+    })
+}
+
+fn per_rad_of(params: &Params, field: Field) -> Vec2 {
+    let grid = &params.grid;
+    Vec2::new(
+        field.per_col * grid.cols_per_rad,
+        -field.per_row * grid.rows_per_rad,
+    )
+}
+
+fn slope_on_tile(params: &Params, per_rad: Vec2, cos_lat: f32) -> f32 {
+    Vec2::new(per_rad.x, per_rad.y * cos_lat).length() * params.isolines.rad_per_px
+}
+
+fn slope_on_globe(params: &Params, per_rad: Vec2, normal: Vec3) -> f32 {
+    let view = &params.view;
+    let toward = normal - view.eye;
+    let sight = toward / toward.length();
+    let along = 1.0 / sight.dot(normal);
+    let way = toward.dot(view.forward) / view.focal_px;
+    let right = (view.right - sight * (view.right.dot(normal) * along)) * way;
+    let down = (view.up - sight * (view.up.dot(normal) * along)) * -way;
+    let cos_lat = normal.truncate().length().max(1.0e-6);
+    let east = Vec3::new(normal.y, -normal.x, 0.0) / cos_lat;
+    let north = (-normal.truncate() * (normal.z / cos_lat)).extend(cos_lat);
+    let rise = east * (per_rad.x / cos_lat) + north * per_rad.y;
+    Vec2::new(rise.dot(right), rise.dot(down)).length()
+}
+
+fn crowd(per_px: f32) -> f32 {
+    ((TOO_CROWDED - per_px) / (TOO_CROWDED - CROWDED)).clamp(0.0, 1.0)
+}
+
+fn graticule_of(params: &Params, angle: f32, slope: f32) -> f32 {
+    let own = &params.isolines;
+    let place = angle * own.graticule_per_rad;
+    let per_px = (slope * own.graticule_per_rad).max(1.0e-20);
+    let off_px = (place - (place + 0.5).floor()).abs() / per_px;
+    (own.graticule_half_px + 0.5 - off_px).clamp(0.0, 1.0) * crowd(per_px)
+}
+
+fn line_of(levels: &[Isoline], field: Field, slope: f32, inside: f32) -> u32 {
+    let (mut cover, mut grey) = (0.0, 0.0);
+    for level in levels {
+        let off_px = (field.value - level.value).abs() / slope.max(1.0e-20);
+        let per_px = slope / level.gap;
+        let steep = (per_px * (2.0 * FLAT_PX) - 1.0).clamp(0.0, 1.0);
+        let own =
+            (level.half_px + 0.5 - off_px).clamp(0.0, 1.0) * level.alpha * crowd(per_px) * steep;
+        if own > cover {
+            (cover, grey) = (own, level.grey);
+        }
+    }
+    nearest(cover * inside * 4095.0) as u32 | (nearest(grey * 255.0) as u32) << 12
+}

@@ -1,0 +1,138 @@
+// Lines on the sea surface: isolines of the interpolated grid, bilinear between cells with data, and the graticule; how much
+// of every pixel they cover.
+struct IsolineParams { count: u32, rad_per_px: f32, low: f32, per_unit: f32, graticule_per_rad: f32, graticule_half_px: f32 }
+@group(0) @binding(30) var<uniform> isolines: IsolineParams;
+// A line: its value and how far the next ones are from it, over the range of colours; half its width; its look.
+struct Isoline { value: f32, gap: f32, half_px: f32, grey: f32, alpha: f32 }
+@group(0) @binding(1) var<storage, read> before: array<f32>;
+@group(0) @binding(2) var<storage, read> after: array<f32>;
+@group(0) @binding(3) var<storage, read> domain: array<u32>;
+@group(0) @binding(4) var<storage, read> axes: array<Axis>;
+@group(0) @binding(5) var<storage, read> ground_axes: array<GroundAxis>;
+@group(0) @binding(6) var<storage, read> levels: array<Isoline>;
+@group(0) @binding(7) var<storage, read_write> lines: array<u32>;
+
+// Lines of one step for each pixel from which on they fade, and at which they are gone: they would be a grey.
+const CROWDED = 0.2;
+const TOO_CROWDED = 0.5;
+// Lines fade so much for each pixel towards the limb.
+const RIM_PER_PX = 0.3;
+// Pixels between lines beyond which they fade, and are gone at twice as many: on a level plain any place is on the line.
+const FLAT_PX = 10000.0;
+
+// The value at a place over the range of colours, and its change for each column and row; without weight where there is no data.
+struct Field { weight: f32, value: f32, per_col: f32, per_row: f32 }
+
+// Value times the share of the cell that holds data, 1, and that share; or zeros where there is no data.
+fn cell_value(row: i32, col: i32) -> vec3<f32> {
+    let cell = cell_at(row, col);
+    if (cell == NO_CELL) { return vec3(0.0); }
+    let value = interpolated(before[cell], after[cell], values.weight);
+    if (is_missing(value)) { return vec3(0.0); }
+    let share = share_of(cell);
+    return vec3((value - isolines.low) * isolines.per_unit * share, 1.0, share);
+}
+
+fn field_at(x: Axis, y: Axis) -> Field {
+    let north_west = cell_value(y.index, x.index);
+    let north_east = cell_value(y.index, x.index + 1);
+    let south_west = cell_value(y.index + 1, x.index);
+    let south_east = cell_value(y.index + 1, x.index + 1);
+    let north = mix(north_west, north_east, x.fraction);
+    let south = mix(south_west, south_east, x.fraction);
+    let sum = mix(north, south, y.fraction);
+    var field: Field;
+    if (sum.y < 0.5 || sum.z <= 0.0) { return field; }
+    let east = mix(north_east - north_west, south_east - south_west, y.fraction);
+    let down = south - north;
+    field.weight = sum.y;
+    field.value = sum.x / sum.z;
+    field.per_col = (east.x - field.value * east.z) / sum.z;
+    field.per_row = (down.x - field.value * down.z) / sum.z;
+    return field;
+}
+
+// What changes so much for each radian east and north changes so much over a pixel of a tile.
+fn slope_on_tile(per_rad: vec2<f32>, cos_lat: f32) -> f32 {
+    return length(vec2(per_rad.x, per_rad.y * cos_lat)) * isolines.rad_per_px;
+}
+
+// The same of a globe view: a step on the screen, to the right and down, is one along the ground.
+fn slope_on_globe(per_rad: vec2<f32>, normal: vec3<f32>) -> f32 {
+    let toward = normal - view.eye;
+    let sight = normalize(toward);
+    let along = 1.0 / dot(sight, normal);
+    let way = dot(toward, view.forward) / view.focal_px;
+    let right = (view.right - sight * (dot(view.right, normal) * along)) * way;
+    let down = (view.up - sight * (dot(view.up, normal) * along)) * -way;
+    let cos_lat = max(length(normal.xy), 1.0e-6);
+    let east = vec3(normal.y, -normal.x, 0.0) / cos_lat;
+    let north = vec3(-normal.xy * (normal.z / cos_lat), cos_lat);
+    let rise = east * (per_rad.x / cos_lat) + north * per_rad.y;
+    return length(vec2(dot(rise, right), dot(rise, down)));
+}
+
+// Lines that crowd fade: so many of a step for each pixel.
+fn crowd(per_px: f32) -> f32 {
+    return clamp((TOO_CROWDED - per_px) / (TOO_CROWDED - CROWDED), 0.0, 1.0);
+}
+
+// Share of a pixel that meridians or parallels cover, by its angle and what that changes by over a pixel.
+fn graticule_of(angle: f32, slope: f32) -> f32 {
+    let place = angle * isolines.graticule_per_rad;
+    let per_px = max(slope * isolines.graticule_per_rad, 1.0e-20);
+    let off_px = abs(place - floor(place + 0.5)) / per_px;
+    return clamp(isolines.graticule_half_px + 0.5 - off_px, 0.0, 1.0) * crowd(per_px);
+}
+
+// Share of a pixel that isolines cover, in the low 12 bits, and their grey in the next 8.
+fn line_of(field: Field, slope: f32, inside: f32) -> u32 {
+    var cover = 0.0;
+    var grey = 0.0;
+    for (var i = 0u; i < isolines.count; i++) {
+        let level = levels[i];
+        let off_px = abs(field.value - level.value) / max(slope, 1.0e-20);
+        let per_px = slope / level.gap;
+        let steep = clamp(per_px * (2.0 * FLAT_PX) - 1.0, 0.0, 1.0);
+        let own = clamp(level.half_px + 0.5 - off_px, 0.0, 1.0) * level.alpha * crowd(per_px) * steep;
+        if (own > cover) {
+            cover = own;
+            grey = level.grey;
+        }
+    }
+    return u32(nearest(cover * inside * 4095.0)) | (u32(nearest(grey * 255.0)) << 12u);
+}
+
+// Change of the value for each radian east and north.
+fn per_rad_of(field: Field) -> vec2<f32> {
+    return vec2(field.per_col * grid.cols_per_rad, -field.per_row * grid.rows_per_rad);
+}
+
+@compute @workgroup_size(SCREEN_TILE_PX, SCREEN_TILE_PX)
+fn draw_lines(@builtin(global_invocation_id) pixel: vec3<u32>) {
+    if (any(pixel.xy >= view.size_px)) { return; }
+    let at = pixel.y * view.size_px.x + pixel.x;
+    lines[at] = 0u;
+    if (view.kind == VIEW_TILE) {
+        let field = field_at(axes[pixel.x], axes[view.size_px.x + pixel.y]);
+        let slope = slope_on_tile(per_rad_of(field), ground_axes[view.size_px.x + pixel.y].cos);
+        if (field.weight > 0.0) { lines[at] = line_of(field, slope, 1.0); }
+        return;
+    }
+    let hit = ground_below(pixel.xy);
+    if (!hit.on_ground) { return; }
+    var word = 0u;
+    // At the limb a pixel reaches far.
+    let inside = clamp(hit.rim_px * RIM_PER_PX - 0.5, 0.0, 1.0);
+    if (isolines.count > 0u) {
+        let field = field_at(col_of(hit.lon), row_of(hit.lat));
+        if (field.weight > 0.0) { word = line_of(field, slope_on_globe(per_rad_of(field), hit.normal), inside); }
+    }
+    if (isolines.graticule_per_rad > 0.0) {
+        let meridian = graticule_of(hit.lon, slope_on_globe(vec2(1.0, 0.0), hit.normal));
+        let parallel = graticule_of(hit.lat, slope_on_globe(vec2(0.0, 1.0), hit.normal));
+        // The high 12 bits.
+        word |= u32(nearest(max(meridian, parallel) * inside * 4095.0)) << 20u;
+    }
+    lines[at] = word;
+}
