@@ -8,7 +8,7 @@ use render_worker::desk::{Order, Storing};
 use crate::cli::{Render, Settings};
 use crate::command::legend;
 use crate::picture::Extras;
-use crate::{animation, deployment, picture, progress};
+use crate::{animation, deployment, heights, picture, progress};
 
 pub(crate) async fn run(settings: &Settings, options: Render) -> Result<()> {
     let store = deployment::store(settings)?;
@@ -33,6 +33,9 @@ pub(crate) async fn run(settings: &Settings, options: Render) -> Result<()> {
         Render::Legend(options) => return legend::run(settings, &store, &options).await,
     };
     let job = picture::job(&store, settings, &asked, view, extras).await?;
+    if let Some(note) = heights::note(&store, &job).await? {
+        progress::say(&note);
+    }
     let bar = progress::bar("draw", 1);
     let desk = deployment::single_desk(settings, store).await?;
     let order = Order::on_demand(Storing::Nothing);

@@ -1955,11 +1955,14 @@ export interface operations {
                 lon?: number;
                 /** @description Latitude below the camera, degrees north; 0 unless one is given. Not with `look_at`. */
                 lat?: number;
-                /** @description Height of the camera above the ground, km; 15000 unless one is given. Not with `look_at`. */
+                /**
+                 * @description Height of the camera above the ground, km, 1 to 1e6, or below the sea surface, -1 to -1000, among what sank as deep
+                 *     as it is drawn; 15000 unless one is given. Not with `look_at`.
+                 */
                 height_km?: number;
                 /**
                  * @description `LON,LAT`: the place in the middle of the picture, instead of the one below the camera; `tilt` is then that of the
-                 *     line of sight against the vertical there.
+                 *     line of sight against the vertical there: 0 from straight above, 180 from straight below through the sea.
                  * @example -95,0
                  */
                 look_at?: string;
@@ -1967,7 +1970,10 @@ export interface operations {
                 distance_km?: number;
                 /** @description Direction of view, clockwise from north, degrees; 0 unless one is given. */
                 heading?: number;
-                /** @description 0 looks straight down, 90 along the ground, degrees; 0 unless one is given. */
+                /**
+                 * @description 0 looks straight down, 90 along the ground, 180 straight up, degrees; 0 unless one is given. With `look_at` 0 to 90,
+                 *     or more from below the sea surface.
+                 */
                 tilt?: number;
                 /** @description Lean of the camera to the right, degrees; 0 unless one is given. */
                 roll?: number;
