@@ -144,7 +144,7 @@ fn a_tiny_grid_and_one_across_the_date_line_are_drawn() {
 fn jobs_beyond_a_limit_are_refused_with_the_reason() {
     let scene = ocean(FIVE_DEGREES);
     let renderer = Renderer::new(Backend::Cpu).unwrap();
-    let inside_the_earth = globe(0.0, 0.0, -1e6, 64);
+    let inside_the_earth = globe(0.0, 0.0, -2e6, 64);
     for view in [
         inside_the_earth,
         globe(0.0, 0.0, 1e7, 5000),

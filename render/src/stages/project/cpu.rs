@@ -179,16 +179,17 @@ fn on_globe(params: &Params, row: &Row, col: &Col, particle: &Particle) -> Splat
     }
     let radius_px = radius_px.max(projection.min_radius_px);
     let thinned = full_px / radius_px;
+    let beyond_m = if view.hides < 1.0 {
+        particle.height_m
+    } else {
+        -particle.height_m
+    };
     Splat {
         x_sub: nearest(x * SUBPIXELS as f32) - view.origin_px.x * SUBPIXELS,
         y_sub: nearest(y * SUBPIXELS as f32) - view.origin_px.y * SUBPIXELS,
         radius_px,
         tau: particle.depth * row.depth_gain * thinned * thinned,
-        is_beyond: u32::from(if view.hides < 1.0 {
-            particle.height_m > BEYOND_M
-        } else {
-            particle.height_m < -BEYOND_M
-        }),
+        is_beyond: u32::from(beyond_m > BEYOND_M),
         ..unseen
     }
 }

@@ -128,7 +128,7 @@ fn on_globe(particle: Particle) -> Splat {
     splat.radius_px = max(radius_px, projection.min_radius_px);
     let thinned = full_px / splat.radius_px;
     splat.tau = particle.depth * row.depth_gain * thinned * thinned;
-    splat.is_beyond = u32(select(particle.height_m < -BEYOND_M, particle.height_m > BEYOND_M, view.hides < 1.0));
+    splat.is_beyond = u32(select(-particle.height_m, particle.height_m, view.hides < 1.0) > BEYOND_M);
     return splat;
 }
 

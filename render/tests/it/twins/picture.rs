@@ -116,7 +116,7 @@ fn what_is_seen_from_below_the_sea_matches_its_twin() {
                 "plain(0.3 + spot.ground.lon, spot",
             ),
             ("nearest_at + half_chord", "nearest_at - half_chord"),
-            ("line + seen * (1.0 - line.w)", "seen * (1.0 - line.w)"),
+            ("over(coast_color(pixel, 0.0), seen, true)", "seen"),
         ] {
             prove("compose", compose::SOURCE, right, wrong, |gpu, source| {
                 let stage = Compose::new(gpu, source);
