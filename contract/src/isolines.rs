@@ -20,8 +20,8 @@ const ROUND: [f64; 4] = [1.0, 2.0, 5.0, 10.0];
 const NEAR: f64 = 1e-9;
 /// Largest multiple of a step that is a line: beyond, multiples and their sums would be rounded.
 const MOST_MULTIPLE: f64 = 1e9;
-/// Where lines lie between powers of ten on a logarithmic scale: at 1 and 3.
-const IN_A_DECADE: [f64; 2] = [1.0, 3.0];
+/// Where lines lie between powers of ten on a logarithmic scale, and which of them are wider.
+const IN_A_DECADE: [(f64, bool); 2] = [(1.0, true), (3.0, false)];
 
 /// Which isolines somebody asks for, in the unit people read.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -151,7 +151,7 @@ fn multiples(
         let number = first + f64::from(i);
         Isoline {
             value: zero + number * step,
-            is_main: number == 0.0,
+            is_main: number.abs() < 0.5,
         }
     };
     Ok((0..count.max(0.0) as u32).map(line).collect())
@@ -172,9 +172,9 @@ fn decades(one: f64, transfer: &TransferFunction) -> Result<Vec<Isoline>, Contra
     }
     let powers = (0..=(last - first) as u32).map(|i| 10f64.powf(first + f64::from(i)));
     let lines = powers.flat_map(|power| {
-        IN_A_DECADE.map(|figure| Isoline {
+        IN_A_DECADE.map(|(figure, is_main)| Isoline {
             value: one * figure * power,
-            is_main: figure == IN_A_DECADE[0],
+            is_main,
         })
     });
     let inside = transfer.low * (1.0 - NEAR)..=transfer.high * (1.0 + NEAR);

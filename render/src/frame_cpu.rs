@@ -28,12 +28,7 @@ pub fn draw(plan: &Plan, part: Part, scene: &Scene) -> Result<Vec<u8>, RenderErr
     let mut picture = vec![Vec4::ZERO; pixels];
     let value = interpolated(&params, params.values.weight, &scene.value);
     let uncertainty = uncertainty::between(&params, &scene.value);
-    let mut lines = vec![];
-    if params.context.lines_on == 1 {
-        lines.resize(pixels, 0);
-        let inputs = isolines::cpu::Inputs::of(plan, scene, &value);
-        isolines::cpu::draw_lines(&params, &inputs, &mut lines);
-    }
+    let lines = lined(plan, &params, scene, &value);
     if plan.mode == Mode::Map {
         let inputs = map::cpu::Inputs {
             value: &value,
@@ -95,6 +90,17 @@ pub fn draw(plan: &Plan, part: Part, scene: &Scene) -> Result<Vec<u8>, RenderErr
         compose::cpu::compose(&params, &picture, &mut image);
     }
     Ok(image.into_iter().flat_map(u32::to_le_bytes).collect())
+}
+
+/// Lines on the sea surface; none where a picture has none.
+fn lined(plan: &Plan, params: &Params, scene: &Scene, value: &[f32]) -> Vec<u32> {
+    let mut lines = vec![];
+    if params.context.lines_on == 1 {
+        lines.resize(params.view.size_px.element_product() as usize, 0);
+        let inputs = isolines::cpu::Inputs::of(plan, scene, value);
+        isolines::cpu::draw_lines(params, &inputs, &mut lines);
+    }
+    lines
 }
 
 fn check_count(count: usize) -> Result<(), RenderError> {

@@ -1,6 +1,7 @@
 //! The numbers behind the look of a picture that no job sets: sizes, numbers and thickness of particles.
 
-use contract::job::Mode;
+use contract::base_map::BaseMap;
+use contract::job::{Mode, RenderJob, View};
 
 /// Thickness of the sheet that particles fill where they are not lifted or sunk, m.
 pub(super) const SHEET_M: f64 = 20_000.0;
@@ -56,6 +57,17 @@ pub(super) fn look_power(thin: f64, radius_slices: f64) -> f32 {
 const CLOUDS_OVER_A_POINT: f64 = 50.0;
 /// Radius of the largest clouds over the side of a cell: larger ones would blur what the grid resolves.
 const WIDEST_CELLS: f64 = 2.1;
+
+/// How much of its light the rim of a dot keeps, and what is added to it: over a dark ground, and over a light one.
+const RIM_ON_DARK: [f32; 2] = [0.6, 0.22];
+const RIM_ON_LIGHT: [f32; 2] = [0.2, 0.0];
+
+/// The rims of a job's dots. Map tiles lie over the map of their client, which pale dots would vanish on where it is light.
+pub(super) fn rim(job: &RenderJob) -> [f32; 2] {
+    let is_dark =
+        matches!(job.view, View::Globe { .. }) && job.style.context.base_map == BaseMap::Dark;
+    if is_dark { RIM_ON_DARK } else { RIM_ON_LIGHT }
+}
 
 /// Whole numbers that sums of the light and the eye may reach.
 const MOST_SUM: f64 = 2_147_483_648.0;

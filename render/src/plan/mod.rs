@@ -338,6 +338,7 @@ fn common(job: &RenderJob, scene: &Scene) -> Params {
     let look = Look::of(job.mode);
     let weight = |interval: &Interval| interval.weight as f32;
     let (transfer_low, transfer_per_unit) = shape::place_params(transfer);
+    let [rim_kept, rim_added] = look::rim(job);
     Params {
         view: ViewParams {
             slices: style.slices,
@@ -385,6 +386,8 @@ fn common(job: &RenderJob, scene: &Scene) -> Params {
                 Mode::Sprites => KERNEL_BALL,
                 Mode::Volume | Mode::Map => KERNEL_CLOUD,
             },
+            rim_kept,
+            rim_added,
             ..ListParams::default()
         },
         interpolation: InterpolateParams {

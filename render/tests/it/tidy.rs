@@ -59,9 +59,10 @@ fn both_frames_list_the_same_stages_in_the_same_order() {
     let cpu = read("frame_cpu.rs");
     let (_, draw) = cpu.split_once("pub fn draw(").unwrap();
     let (draw, _) = draw.split_once("\n}\n").unwrap();
-    // Two stages are called through a function that also makes their buffers.
+    // Three stages are called through a function that also makes their buffers.
     let draw = draw
         .replacen("interpolated(", "interpolate::cpu::(", 1)
+        .replacen("lined(", "isolines::cpu::(", 1)
         .replacen("binned(", "bin::cpu::(", 1);
     let cpu = order(&draw, &stages, |stage| format!("{stage}::cpu::"));
     assert_eq!(cpu, stages);

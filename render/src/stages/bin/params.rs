@@ -12,5 +12,8 @@ shared_struct! {
         pub long_list: u32,
         /// Optical depth 1 in the integers that the eye sums up.
         pub depth_one: f32,
+        /// How much of its light the rim of a dot keeps, and what is added to it.
+        pub rim_kept: f32,
+        pub rim_added: f32,
     }
 }

@@ -38,18 +38,13 @@ fn ball_light(offset: Vec2) -> f32 {
 }
 
 const RIM_PX: f32 = 0.7;
-const LIGHT_FROM: f32 = 0.179;
 
-/// Colour of a dot with a rim: dark round what is light, light round what is dark.
-fn rimmed(rgb: [u32; 3], q: f32, radius_px: f32) -> [u32; 3] {
+/// Colour of a dot whose rim stands out from the ground.
+fn rimmed(params: &Params, rgb: [u32; 3], q: f32, radius_px: f32) -> [u32; 3] {
     let color = Vec3::from(rgb.map(|channel| channel as f32));
     let inside = ((1.0 - q.sqrt()) * radius_px - RIM_PX).clamp(0.0, 1.0);
-    let luminance = color.dot(Vec3::new(0.2126, 0.7152, 0.0722));
-    let rim = if luminance > LIGHT_FROM * LIGHT_ONE {
-        color * 0.2
-    } else {
-        color * 0.5 + Vec3::splat(LIGHT_ONE) * 0.5
-    };
+    let lists = &params.lists;
+    let rim = color * lists.rim_kept + LIGHT_ONE * lists.rim_added;
     (rim * (1.0 - inside) + color * inside + 0.5)
         .to_array()
         .map(|channel| channel as u32)
@@ -167,7 +162,7 @@ fn add(params: &Params, entry: &Entry, kept: &Kept, sums: &mut Sums) {
             let amount = (depth * weight * kept + 0.5) as u32;
             let sum = &mut sums[y * TILE + x];
             let own = if params.lists.kernel == KERNEL_RIMMED {
-                rimmed(rgb, q, radius / pixel_units)
+                rimmed(params, rgb, q, radius / pixel_units)
             } else {
                 rgb
             };

@@ -83,17 +83,15 @@ fn ball_light(offset: vec2<f32>) -> f32 {
     return 0.4 + 0.6 * clamp(-0.45 * offset.x - 0.55 * offset.y + 0.70 * toward, 0.0, 1.0);
 }
 
-// Colour of a dot with a rim: dark round what is light, light round what is dark. `q` squared radii from its middle.
+// Colour of a dot whose rim stands out from the ground: darker over a light one, lighter over a dark one, so that values
+// that lie close together look so. `q` squared radii from its middle.
 fn rimmed(rgb: vec3<u32>, q: f32, radius_px: f32) -> vec3<u32> {
     let color = vec3<f32>(rgb);
     let inside = clamp((1.0 - sqrt(q)) * radius_px - RIM_PX, 0.0, 1.0);
-    let is_light = dot(color, vec3(0.2126, 0.7152, 0.0722)) > LIGHT_FROM * LIGHT_ONE;
-    let rim = select(mix(color, vec3(LIGHT_ONE), 0.5), color * 0.2, is_light);
+    let rim = color * lists.rim_kept + LIGHT_ONE * lists.rim_added;
     return vec3<u32>(mix(rim, color, inside) + 0.5);
 }
 const RIM_PX = 0.7;
-// Luminance from which on black has more contrast than white (WCAG 2.1, 1.4.3).
-const LIGHT_FROM = 0.179;
 
 // Adds an entry to every second row of pixels.
 fn add(entry: Entry, half: i32) {
