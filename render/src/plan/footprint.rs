@@ -263,7 +263,7 @@ mod tests {
                     if far < deepest {
                         break;
                     }
-                    if far > 1.0 + HEIGHTS[1] || far < 1.0 + HEIGHTS[0] {
+                    if !(1.0 + HEIGHTS[0]..=1.0 + HEIGHTS[1]).contains(&far) {
                         continue;
                     }
                     seen += 1;
