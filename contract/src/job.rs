@@ -433,8 +433,8 @@ mod tests {
         Subsolar { lon_deg, lat_deg }
     }
 
-    fn every(step: f64) -> Option<Isolines> {
-        Some(Isolines::Every { zero: 0.0, step })
+    fn every(step: f64) -> Isolines {
+        Isolines::Every { zero: 0.0, step }
     }
 
     fn relief(exaggeration: f64) -> Relief {
@@ -572,8 +572,8 @@ mod tests {
         changed(|j| j.style.context.sea_floor = true);
         changed(|j| j.style.context.base_map = BaseMap::Light);
         changed(|j| j.style.context.background = Background::Sky);
-        changed(|j| j.style.context.isolines = every(1e-10));
-        changed(|j| j.style.context.isolines = every(2e-10));
+        changed(|j| j.style.context.isolines = Some(every(1e-10)));
+        changed(|j| j.style.context.isolines = Some(every(2e-10)));
         changed(|j| j.style.transfer.scale = Scale::Log);
         changed(|j| j.relief = Some(relief(15.0)));
         changed(|j| j.relief = Some(relief(30.0)));
@@ -647,8 +647,8 @@ mod tests {
             |j| j.style.slices = 0,
             |j| j.style.transfer.high = f64::NAN,
             |j| j.style.transfer.scale = Scale::Log,
-            |j| j.style.context.isolines = every(0.0),
-            |j| j.style.context.isolines = every(1e-12),
+            |j| j.style.context.isolines = Some(every(0.0)),
+            |j| j.style.context.isolines = Some(every(1e-12)),
             |j| j.style.transfer.low = -1e300,
             |j| j.style.transfer.size = shares_beyond_one(),
             |j| j.style.sun.elevation_deg = -1.0,

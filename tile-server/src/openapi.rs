@@ -63,6 +63,7 @@ const RETRY_AFTER: &str = "Seconds after which the same request may succeed";
         words::LegendForm,
         words::Mode,
         words::Palette,
+        words::Scale,
     )),
     tags(
         (name = "pictures", description = "Tiles and views of the globe"),

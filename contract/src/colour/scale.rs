@@ -27,6 +27,7 @@ impl Scale {
         }
     }
 
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it so")]
     pub(super) fn is_usual(&self) -> bool {
         *self == Self::default()
     }

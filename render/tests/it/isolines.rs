@@ -95,7 +95,7 @@ fn lines_of_a_ramp_are_where_its_values_are_to_half_a_pixel() {
         let lat = mercator_lat_deg((256.0 + at) / 1024.0);
         let nearest = (lat / 10.0).round() * 10.0;
         let px_per_deg = 1024.0 / 360.0 / lat.to_radians().cos();
-        if at < 2.0 || at > 254.0 {
+        if !(2.0..=254.0).contains(&at) {
             continue;
         }
         assert!((lat - nearest).abs() * px_per_deg < 0.5, "{lat}");

@@ -152,7 +152,7 @@ describe("a look in an address", () => {
   });
 
   it("has for its legend the colours alone", () => {
-    expect(queryOf(colourParameters(FULL))).toBe("palette=ice&range=-10:2.5&reverse=true");
+    expect(queryOf(colourParameters(FULL))).toBe("palette=ice&range=-10:2.5&scale=linear&reverse=true");
   });
 });
 
@@ -185,7 +185,7 @@ describe("of a look", () => {
   });
 
   it("colours stay behind with the product they were chosen for", () => {
-    expect(withoutColours(FULL)).toEqual({ ...FULL, palette: null, reversed: false, range: null });
+    expect(withoutColours(FULL)).toEqual({ ...FULL, palette: null, reversed: false, range: null, scale: null });
     const plain = { ...USUAL, coastlines: true };
     expect(withoutColours(plain)).toBe(plain);
   });

@@ -571,6 +571,8 @@ export interface components {
                 number,
                 number
             ][];
+            /** @description How values are spread between the two: `linear` where it is not said; `log`: equal ratios are equally far apart. */
+            scale?: string | null;
             /** @description Place and share of the full radius of a particle, where users gave any. */
             size?: [
                 number,
@@ -1010,6 +1012,11 @@ export interface components {
             /** @description In the order they are offered. */
             regions: components["schemas"]["Region"][];
         };
+        /**
+         * @description How values are spread over the colours.
+         * @enum {string}
+         */
+        Scale: "linear" | "log";
         /** @description A value as a paper prints it. */
         Stated: {
             /** @description Decimals that are printed. */
@@ -1716,6 +1723,8 @@ export interface operations {
                  * @example -40:40
                  */
                 range?: string;
+                /** @description How values are spread over the colours: `linear`, or `log` for ranges above 0; the quantity's own unless one is named. */
+                scale?: components["schemas"]["Scale"];
                 /**
                  * @description Colours at values, `VALUE:rrggbb` with commas between, 2 to 16 in rising order, in the unit of the legend.
                  * @example -10:0a0b0c,25:ffffff
@@ -1997,6 +2006,8 @@ export interface operations {
                  * @example -40:40
                  */
                 range?: string;
+                /** @description How values are spread over the colours: `linear`, or `log` for ranges above 0; the quantity's own unless one is named. */
+                scale?: components["schemas"]["Scale"];
                 /**
                  * @description Colours at values, `VALUE:rrggbb` with commas between, 2 to 16 in rising order, in the unit of the legend.
                  * @example -10:0a0b0c,25:ffffff
@@ -2024,6 +2035,12 @@ export interface operations {
                 sea_opacity?: number;
                 /** @description Coast lines are drawn; unless told otherwise on views that show the globe, and not on tiles. */
                 coastlines?: boolean;
+                /**
+                 * @description Isolines of the layer are drawn on the sea surface: at multiples of this number in the unit of the legend, at most 50
+                 *     over the range of colours; `auto` chooses a round one.
+                 * @example 10
+                 */
+                isolines?: string;
                 /** @description How far a kilogram of accumulated carbon a square metre lifts particles, m m² kg⁻¹. */
                 height_exaggeration?: number;
                 /**
@@ -2306,6 +2323,8 @@ export interface operations {
                  * @example -40:40
                  */
                 range?: string;
+                /** @description How values are spread over the colours: `linear`, or `log` for ranges above 0; the quantity's own unless one is named. */
+                scale?: components["schemas"]["Scale"];
                 /**
                  * @description Colours at values, `VALUE:rrggbb` with commas between, 2 to 16 in rising order, in the unit of the legend.
                  * @example -10:0a0b0c,25:ffffff
@@ -2333,6 +2352,12 @@ export interface operations {
                 sea_opacity?: number;
                 /** @description Coast lines are drawn; unless told otherwise on views that show the globe, and not on tiles. */
                 coastlines?: boolean;
+                /**
+                 * @description Isolines of the layer are drawn on the sea surface: at multiples of this number in the unit of the legend, at most 50
+                 *     over the range of colours; `auto` chooses a round one.
+                 * @example 10
+                 */
+                isolines?: string;
                 /** @description How far a kilogram of accumulated carbon a square metre lifts particles, m m² kg⁻¹. */
                 height_exaggeration?: number;
                 /**
@@ -2431,6 +2456,8 @@ export interface operations {
                  * @example -40:40
                  */
                 range?: string;
+                /** @description How values are spread over the colours: `linear`, or `log` for ranges above 0; the quantity's own unless one is named. */
+                scale?: components["schemas"]["Scale"];
                 /**
                  * @description Colours at values, `VALUE:rrggbb` with commas between, 2 to 16 in rising order, in the unit of the legend.
                  * @example -10:0a0b0c,25:ffffff
@@ -2458,6 +2485,12 @@ export interface operations {
                 sea_opacity?: number;
                 /** @description Coast lines are drawn; unless told otherwise on views that show the globe, and not on tiles. */
                 coastlines?: boolean;
+                /**
+                 * @description Isolines of the layer are drawn on the sea surface: at multiples of this number in the unit of the legend, at most 50
+                 *     over the range of colours; `auto` chooses a round one.
+                 * @example 10
+                 */
+                isolines?: string;
                 /** @description How far a kilogram of accumulated carbon a square metre lifts particles, m m² kg⁻¹. */
                 height_exaggeration?: number;
                 /**
@@ -2584,4 +2617,5 @@ export const platformKindValues: ReadonlyArray<FlattenedDeepRequired<components>
 export const platformsTypeValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Platforms"]["type"]> = ["FeatureCollection"];
 export const qualityValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Quality"]> = ["good", "not_evaluated", "questionable", "bad"];
 export const quantityValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Quantity"]> = ["carbon_flux", "accumulated_carbon", "sea_surface_temperature", "chlorophyll", "wind_speed", "pco2", "salinity", "air_pressure", "ice_fraction", "wave_height", "precipitation", "current", "elevation", "sea_area_fraction", "land_area_fraction"];
+export const scaleValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Scale"]> = ["linear", "log"];
 export const verdictValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Verdict"]> = ["within", "outside", "no_uncertainty_stated"];
