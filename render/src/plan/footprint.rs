@@ -106,7 +106,10 @@ impl Footprint {
         heights: [f64; 2],
         [margin, shadow]: [f64; 2],
     ) -> Self {
-        let spots = circle(height, [tilt, corner], heights);
+        let mut spots = circle(height, [tilt, corner], heights);
+        if height < 0.0 {
+            spots.extend(limb_on_edge(height, [tilt, corner], heights));
+        }
         let reach = |middle: f64| {
             let (sin_m, cos_m) = middle.sin_cos();
             let cosines = spots.iter().flatten().map(|spot| {
@@ -187,6 +190,29 @@ fn circle(height: f64, [tilt, corner]: [f64; 2], heights: [f64; 2]) -> Vec<[Spot
         })
     });
     spots.collect()
+}
+
+/// The sight lines round the edge of a cone that touch the core: what is farthest from below the sea surface is seen along
+/// these, if there are any.
+fn limb_on_edge(height: f64, [tilt, corner]: [f64; 2], heights: [f64; 2]) -> Vec<[Spot; 2]> {
+    let limb = (CORE / (1.0 + height)).min(1.0).asin();
+    let (sin_t, cos_t) = tilt.sin_cos();
+    let (sin_c, cos_c) = corner.sin_cos();
+    let cos_r = (cos_t * cos_c - limb.cos()) / (sin_t * sin_c);
+    if !(-1.0..=1.0).contains(&cos_r) {
+        return vec![];
+    }
+    let forth = sin_t * cos_c + cos_t * sin_c * cos_r;
+    let azimuth = (sin_c * cos_r.acos().sin()).atan2(forth);
+    let ends = ends_from_below(height, limb, heights);
+    let at = |azimuth: f64| {
+        ends.map(|[away, height]| Spot {
+            away,
+            azimuth,
+            height,
+        })
+    };
+    [azimuth, -azimuth].map(at).to_vec()
 }
 
 /// Where a sight line at an angle from straight down leaves what is drawn and where it comes to it: how far from below the
