@@ -106,7 +106,7 @@ fn ground_color(spot: Spot, pixel: vec2<u32>) -> vec4<f32> {
     return seen + vec4(lit, 1.0) * spot.cover;
 }
 
-// Share of land in a pixel of a globe view, 255ths.
+// Share of land in a pixel of a globe view in 255 parts.
 fn land_share(pixel: vec2<u32>) -> u32 {
     let place = pixel + vec2<u32>(view.origin_px);
     return coast[place.y * context.coast_row_words + place.x] & 255u;

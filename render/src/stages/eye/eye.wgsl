@@ -27,7 +27,7 @@ var<workgroup> sums: array<atomic<u32>, 1024>;
 // Where the list before these slices ends, and theirs.
 var<workgroup> ends: array<u32, 65>;
 var<workgroup> is_open: u32;
-// Shares of land of the pixels, 255ths, four in a word.
+// Shares of land of the pixels in 255 parts, four in a word.
 var<workgroup> land: array<u32, 64>;
 
 // What lies beyond the sea surface lies behind the land that a sight line meets first.
