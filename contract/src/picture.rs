@@ -110,7 +110,11 @@ impl PictureOptions {
         if let (None, View::Globe { .. }) = (self.slices, view) {
             style.slices = Style::GLOBE_SLICES;
         }
-        if let (None, View::Globe { .. }, Mode::Volume) = (self.particles_per_cell, view, mode) {
+        // From below the sea surface clouds stand right before the eye: many large ones would take long and show no more.
+        if let (None, View::Globe { height_m, .. }, Mode::Volume) =
+            (self.particles_per_cell, view, mode)
+            && *height_m > 0.0
+        {
             style.particles_per_cell = Style::GLOBE_PARTICLES_PER_CELL;
         }
         Ok(style)

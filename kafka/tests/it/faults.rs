@@ -14,6 +14,7 @@ use crate::broker::Broker;
 use crate::events::{
     FROM, MOMENT, assert_one_each, finished_with_one, notice, notices, read, work_off,
 };
+use crate::kills::variable;
 use crate::own_topics::open_on;
 
 /// No call may take longer, whatever Kafka does.
@@ -42,9 +43,9 @@ fn resident_bytes() -> u64 {
 fn while_no_broker_answers_calls_fail_in_time_and_afterwards_work_goes_on() {
     let mut runtime = tokio::runtime::Builder::new_multi_thread();
     let runtime = runtime.worker_threads(2).enable_all().build().unwrap();
-    match std::env::var(APPENDER) {
-        Ok(appender) => runtime.block_on(be_an_appender(&appender)),
-        Err(_) => runtime.block_on(while_no_broker_answers()),
+    match variable(APPENDER) {
+        Some(servers) => runtime.block_on(be_an_appender(&servers)),
+        None => runtime.block_on(while_no_broker_answers()),
     }
 }
 

@@ -41,7 +41,7 @@ impl Random {
     }
 }
 
-fn variable(name: &str) -> Option<String> {
+pub(crate) fn variable(name: &str) -> Option<String> {
     std::env::var_os(name)?.into_string().ok()
 }
 
@@ -152,5 +152,5 @@ async fn be_a_reader(prefix_and_group: &str) {
             reader.finish(done).await.unwrap();
         }
     }
-    std::future::pending().await
+    std::future::pending::<()>().await;
 }

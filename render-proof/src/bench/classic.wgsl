@@ -44,7 +44,7 @@ fn eye_corner(@builtin(vertex_index) vertex: u32, @builtin(instance_index) insta
     let at = place - 1u;
     let near = seen[at];
     let far = lit[at];
-    let radius = f32((near.z & 0xffffu) << lists.entry_shift) / f32(SUBPIXELS);
+    let radius = f32((near.z & RADIUS_BITS) << lists.entry_shift) / f32(SUBPIXELS);
     let center = vec2(f32(bitcast<i32>(near.x)), f32(bitcast<i32>(near.y))) / f32(SUBPIXELS);
     var shade = 1.0;
     if (lighting.mode == 1u) {
@@ -85,7 +85,7 @@ fn light_corner(@builtin(vertex_index) vertex: u32, @builtin(instance_index) ins
     // As wide as a particle is in light texels; the same depth over the same area as the compute renderer gives.
     let radius = LIGHT_RADIUS_TEXELS;
     corner.position = clip(center + corner.offset * radius, vec2<f32>(lighting.size));
-    let radius_px = f32((near.z & 0xffffu) << lists.entry_shift) / f32(SUBPIXELS);
+    let radius_px = f32((near.z & RADIUS_BITS) << lists.entry_shift) / f32(SUBPIXELS);
     let mass = f32(near.z >> 16u) / lists.depth_one * radius_px * radius_px * LIGHT_GAIN;
     corner.color = vec4(mass * 3.0 / (3.14159265 * radius * radius));
     return corner;

@@ -153,7 +153,7 @@ async fn a_camera_that_cannot_be_is_refused_with_what_can() {
         ("tilt=80", "the earth is seen with a tilt of 0 to"),
         ("tilt=-1", "0 to 180"),
         ("height_km=0.5", "1 km"),
-        ("height_km=-10", "1 km"),
+        ("height_km=-1500", "1000 km below"),
         ("heading=nan", "-360 to 360"),
         ("look_at=5", "LON,LAT"),
         ("look_at=0,91", "-90 to 90"),
