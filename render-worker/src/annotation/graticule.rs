@@ -41,8 +41,7 @@ struct Cap {
 impl Lines {
     pub(super) fn of(graticule: Graticule, projection: &Projection, size: [f64; 2]) -> Self {
         let cap = Cap::of(projection);
-        let (_below, from_middle) = projection.stands();
-        let step = graticule_step_deg(graticule, from_middle - 1.0);
+        let step = graticule_step_deg(graticule, projection.horizon());
         let parallels = multiples(step, cap.lat - cap.angle, cap.lat + cap.angle);
         let parallels = parallels.filter(|lat| lat.abs() < 90.0 - 1e-9);
         let half = cap.half_width();

@@ -82,7 +82,7 @@ fn graticule(plan: &mut Plan, job: &RenderJob) {
     };
     let [width, height] = job.view.size_px().map(f64::from);
     let params = &mut plan.params;
-    let step_rad = graticule_step_deg(wanted, camera.height).to_radians();
+    let step_rad = graticule_step_deg(wanted, camera.horizon()).to_radians();
     params.isolines.graticule_per_rad = (1.0 / step_rad) as f32;
     params.isolines.graticule_half_px =
         (0.5 * (width * height).sqrt() * GRATICULE_PER_PX).max(LEAST_GRATICULE_HALF_PX) as f32;
@@ -95,13 +95,14 @@ fn graticule(plan: &mut Plan, job: &RenderJob) {
     (context.graticule_grey, context.graticule_alpha) = (composed_grey(grey), alpha);
 }
 
-/// The distance of lines asked for, or a round number of times that, so that they can be told apart: by a camera so many
-/// earth radii above the ground.
-pub fn graticule_step_deg(asked: Graticule, height: f64) -> f64 {
-    let seen_deg = 2.0 * (1.0 / (1.0 + height)).acos().to_degrees();
+/// The distance of lines asked for, or a round number of times that, so that they can be told apart: by a camera with
+/// its horizon so far from the place below or above it, radians.
+pub fn graticule_step_deg(asked: Graticule, horizon: f64) -> f64 {
+    let least_deg = 2.0 * horizon.to_degrees() / MOST_LINES;
     let mut step = asked.step_deg;
     for factor in [2.0, 2.5, 2.0].into_iter().cycle() {
-        if step >= seen_deg / MOST_LINES {
+        // It ends, even for a camera that has no horizon.
+        if step >= least_deg || !least_deg.is_finite() {
             break;
         }
         step *= factor;
@@ -134,14 +135,36 @@ fn tone(job: &RenderJob, transfer: &TransferFunction, value: f64) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use contract::camera::CameraAngles;
+    use contract::earth::SPHERE_RADIUS_M;
 
     #[test]
     fn a_graticule_that_nobody_could_tell_apart_has_fewer_lines() {
-        let step = |asked, height| graticule_step_deg(Graticule::every(asked).unwrap(), height);
+        let step = |asked, height_m: f64| {
+            let view = View::Globe {
+                lon_deg: 0.0,
+                lat_deg: 0.0,
+                height_m,
+                width_px: 64,
+                height_px: 64,
+                angles: CameraAngles::NADIR,
+            };
+            let horizon = Camera::of(&view).unwrap().horizon();
+            graticule_step_deg(Graticule::every(asked).unwrap(), horizon)
+        };
         // From two earth radii up 141 degrees are seen.
-        assert!((step(10.0, 2.0) - 10.0).abs() < 1e-9);
-        assert!((step(0.01, 2.0) - 2.0).abs() < 1e-9);
-        assert!((step(0.01, 5e-5) - 0.01).abs() < 1e-9);
+        assert!((step(10.0, 2.0 * SPHERE_RADIUS_M) - 10.0).abs() < 1e-9);
+        assert!((step(0.01, 2.0 * SPHERE_RADIUS_M) - 2.0).abs() < 1e-9);
+        assert!((step(0.01, 5e-5 * SPHERE_RADIUS_M) - 0.01).abs() < 1e-9);
+        // From below the sea too.
+        for height_m in [-1e3, -4.5e5, -1e6] {
+            let step_deg = step(0.01, height_m);
+            assert!((0.5..5.0).contains(&step_deg), "{height_m}: {step_deg}");
+        }
+        assert_eq!(
+            graticule_step_deg(Graticule::every(1.0).unwrap(), f64::NAN),
+            1.0
+        );
     }
 
     #[test]
