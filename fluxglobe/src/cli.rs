@@ -384,7 +384,7 @@ pub(crate) struct Picture {
     /// Half-angle slices, 1 to 256.
     #[arg(long)]
     pub(crate) slices: Option<u32>,
-    /// Particles a cell, 1 to 256.
+    /// Particles a cell at most, 1 to 256; if absent 64 for volumes of the globe seen from above the sea, 64 trails of a flow, else 16.
     #[arg(long)]
     pub(crate) particles: Option<u32>,
     #[command(flatten)]

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use anyhow::Result;
 use contract::base_map::Background;
-use contract::job::RenderJob;
+use contract::job::{RenderJob, Style};
 use contract::picture::PictureOptions;
 use contract::quantity::Quantity;
 use contract::time::TimeMs;
@@ -54,7 +54,7 @@ impl Served {
         let coarser = pyramid::suited(job, all_cells);
         let once_ms = start.elapsed().as_secs_f64() * 1e3;
         let mut particles_alone = job.clone();
-        particles_alone.style.particles_per_cell = 16;
+        particles_alone.style.particles_per_cell = Style::GLOBE_PARTICLES_PER_CELL;
         let all = picture(gpu, stages, &particles_alone, all_cells)?;
         let (from_all_cells, mean_levels) = match &coarser {
             None => (None, mean_levels([&all, &all])),
@@ -90,6 +90,7 @@ impl Served {
     }
 }
 
+/// Means over the pixels that are more than half covered in both, levels.
 fn mean_levels(pictures: [&Picture; 2]) -> [[f64; 4]; 2] {
     let is_sea = |at: &usize| pictures.iter().all(|picture| picture.rgba[*at][3] > 0.5);
     let sea: Vec<usize> = (0..pictures[0].rgba.len()).filter(is_sea).collect();
@@ -101,6 +102,7 @@ fn mean_levels(pictures: [&Picture; 2]) -> [[f64; 4]; 2] {
     })
 }
 
+/// The particles alone, at the instant of the scene.
 fn picture(gpu: &Gpu, stages: &Stages, job: &RenderJob, scene: &Scene) -> Result<Picture> {
     let mut playback = Playback::new(gpu, stages, job, scene)?;
     let steps = Playback::upload(gpu, scene)?;
