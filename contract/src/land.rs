@@ -3,47 +3,24 @@
 //! `land/pack.py` packs it from the npm package `world-atlas` and checks it. Waters that land encloses are land here: lakes,
 //! and the Caspian Sea. Ice shelves are sea: the coast is that of the ground below.
 
+pub mod packed;
+
 use std::sync::LazyLock;
 
-/// The packed rings: their number; for each the number of its places and their longitudes and latitudes in thousandths
-/// of a degree, each less that of the place before. Numbers are LEB128, those with a sign zigzag.
+/// The packed rings.
 const PACKED: &[u8] = include_bytes!("land/land.bin");
-/// Parts of a degree that places are rounded to: 111 m, a tenth of what the scale resolves.
-const PARTS_PER_DEG: f64 = 1000.0;
 
 /// Outlines of all land, `[lon, lat]` in degrees, longitudes -180 to 180; what they go round at all is land.
 pub static LAND: LazyLock<Vec<Vec<[f64; 2]>>> =
     LazyLock::new(|| unpacked(PACKED).expect("the packed land is whole; a test reads it"));
 
 fn unpacked(mut bytes: &[u8]) -> Option<Vec<Vec<[f64; 2]>>> {
-    let mut rings = vec![];
-    for _ in 0..number(&mut bytes)? {
-        let mut ring = vec![];
-        let mut place = [0i64; 2];
-        for _ in 0..number(&mut bytes)? {
-            for parts in &mut place {
-                let step = number(&mut bytes)?;
-                *parts += (step >> 1) as i64 ^ -((step & 1) as i64);
-            }
-            ring.push(place.map(|parts| parts as f64 / PARTS_PER_DEG));
-        }
-        rings.push(ring);
-    }
-    bytes.is_empty().then_some(rings)
-}
-
-fn number(bytes: &mut &[u8]) -> Option<u64> {
-    let mut number = 0;
-    // Five bytes hold every difference of two longitudes.
-    for shift in (0..35).step_by(7) {
-        let (byte, rest) = bytes.split_first()?;
-        *bytes = rest;
-        number |= u64::from(byte & 0x7f) << shift;
-        if byte & 0x80 == 0 {
-            return Some(number);
-        }
-    }
-    None
+    let rings = packed::take_lines(&mut bytes)?;
+    let degrees = |place: [i64; 2]| place.map(|parts| parts as f64 / packed::PARTS_PER_DEG);
+    let in_degrees = |ring: Vec<[i64; 2]>| ring.into_iter().map(degrees).collect();
+    bytes
+        .is_empty()
+        .then(|| rings.into_iter().map(in_degrees).collect())
 }
 
 #[cfg(test)]

@@ -14,6 +14,7 @@ pub mod colour;
 pub mod context;
 pub mod digest;
 pub mod earth;
+pub mod encoding;
 pub mod error;
 pub mod event;
 mod exact;

@@ -10,6 +10,7 @@ use bytes::Bytes;
 use compute::{ComputeError, Engine, ErrorClass};
 use contract::budget::{BudgetAnswer, BudgetQuery};
 use contract::check::Check;
+use contract::encoding::Encoding;
 use contract::grid::LonLatDeg;
 use contract::job::RenderJob;
 use contract::manifest::{Manifest, ManifestId};
@@ -66,15 +67,21 @@ impl Analyst {
 
 #[async_trait]
 impl Draw for Drawer {
-    async fn draw(&self, job: &RenderJob, keep: Keep, turn: Turn) -> Result<Bytes, BackendError> {
-        let order = Order::on_demand(storing(keep));
+    async fn draw(
+        &self,
+        job: &RenderJob,
+        keep: Keep,
+        encoding: Encoding,
+        turn: Turn,
+    ) -> Result<Bytes, BackendError> {
+        let order = Order::on_demand(storing(keep)).encoded(encoding);
         let drawn = self.desk.draw_in_turn(job, order, turn).await;
         *self.trouble() = match &drawn {
             Err(DeskError::Render(error)) if error.is_retryable() => Some(error.to_string()),
             // A queue that is full is no trouble.
             _ => None,
         };
-        drawn.map(|drawn| drawn.png).map_err(desk_failed)
+        drawn.map(|drawn| drawn.bytes).map_err(desk_failed)
     }
 
     fn draws_at_once(&self) -> NonZeroU32 {
@@ -130,12 +137,19 @@ pub(crate) struct FleetDrawer(pub(crate) Fleet);
 
 #[async_trait]
 impl Draw for FleetDrawer {
-    async fn draw(&self, job: &RenderJob, keep: Keep, turn: Turn) -> Result<Bytes, BackendError> {
+    async fn draw(
+        &self,
+        job: &RenderJob,
+        keep: Keep,
+        encoding: Encoding,
+        turn: Turn,
+    ) -> Result<Bytes, BackendError> {
+        let order = Order::on_demand(storing(keep)).encoded(encoding);
         let trace = job.digest().short();
-        let picture = self.0.draw(job, storing(keep), &trace).await;
+        let picture = self.0.draw(job, order, &trace).await;
         drop(turn);
         picture
-            .map(|picture| picture.png)
+            .map(|picture| picture.bytes)
             .map_err(|error| fleet_failed(&error))
     }
 

@@ -94,11 +94,23 @@ impl Appender {
     async fn append_one(&self, record: &Record) -> Result<(), KafkaFailure> {
         let single = self.single().clone();
         let appended = single.append(record).await;
-        if appended.is_err() && single.producer.client().fatal_error().is_some() {
-            // It lost count of what brokers have of it and refuses everything from here on.
-            *self.single() = Single::open(&self.cluster)?;
+        if let Err(failure) = &appended {
+            // It lost count of what brokers have of it and refuses everything from here on; or it may have lost all brokers.
+            let is_fatal = single.producer.client().fatal_error().is_some();
+            if is_fatal || failure.is_out_of_time() {
+                self.replace(&single)?;
+            }
         }
         appended
+    }
+
+    /// Puts another producer in the place of one, unless somebody has.
+    fn replace(&self, single: &Single) -> Result<(), KafkaFailure> {
+        let mut current = self.single();
+        if current.producer.is_same(&single.producer) {
+            *current = Single::open(&self.cluster)?;
+        }
+        Ok(())
     }
 
     async fn append_all(&self, records: Vec<Record>) -> Result<(), KafkaFailure> {

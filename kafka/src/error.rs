@@ -24,6 +24,9 @@ pub enum KafkaFailure {
         limit_ms: u128,
         noted: Option<String>,
     },
+    /// The client no longer knows any broker.
+    #[error("the client has lost all brokers: another one is needed")]
+    Lost,
     /// A call follows one that failed or was given up.
     #[error("this reader failed before: join again")]
     Spent,
@@ -50,7 +53,7 @@ impl KafkaFailure {
     pub fn is_retryable(&self) -> bool {
         match self {
             Self::Client { source, .. } => !is_lasting(source),
-            Self::Slow { .. } | Self::Spent | Self::Ending { .. } => true,
+            Self::Slow { .. } | Self::Lost | Self::Spent | Self::Ending { .. } => true,
             Self::File { .. } | Self::Settings(_) | Self::Topic(_) => false,
         }
     }
@@ -68,6 +71,27 @@ impl KafkaFailure {
                     | RDKafkaErrorCode::RebalanceInProgress
             )
         )
+    }
+
+    /// Was there no answer for as long as the client waits? It may have nobody left to ask.
+    pub(crate) fn is_out_of_time(&self) -> bool {
+        match self {
+            Self::Slow { .. } | Self::Lost => true,
+            Self::Client { source, .. } => matches!(
+                source.rdkafka_error_code(),
+                Some(
+                    RDKafkaErrorCode::MessageTimedOut
+                        | RDKafkaErrorCode::OperationTimedOut
+                        | RDKafkaErrorCode::BrokerTransportFailure
+                        | RDKafkaErrorCode::AllBrokersDown
+                )
+            ),
+            Self::Spent
+            | Self::Ending { .. }
+            | Self::File { .. }
+            | Self::Settings(_)
+            | Self::Topic(_) => false,
+        }
     }
 
     /// The same in the words of the event log's trait.

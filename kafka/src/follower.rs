@@ -1,10 +1,10 @@
 //! Somebody who only looks at a topic: all its partitions, no offsets kept.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use async_trait::async_trait;
-use contract::topic::Topic;
+use contract::topic::{Origin, Topic};
 use rdkafka::consumer::{Consumer as _, StreamConsumer};
 use rdkafka::error::{KafkaError, KafkaResult};
 use rdkafka::{Offset, TopicPartitionList};
@@ -19,6 +19,7 @@ use crate::context::Context;
 use crate::off_thread::OffThread;
 use crate::poll::of_topic;
 use crate::probe::{Probe, are_brokers_there, ends};
+use crate::watch::Watch;
 
 /// The name that clients go by which are no members of any group; nothing is kept under it.
 pub(crate) const LOOKERS: &str = "lookers";
@@ -35,6 +36,9 @@ pub(crate) struct KafkaFollower {
     topic: Topic,
     consumer: OffThread<StreamConsumer<Context>>,
     context: Context,
+    watch: Watch,
+    /// The offset that is read next in each partition.
+    next: BTreeMap<i32, i64>,
     /// Partitions whose end, as of the beginning, is not reached: until then "nothing came" means "not yet".
     behind: BTreeSet<i32>,
 }
@@ -46,17 +50,13 @@ impl KafkaFollower {
         topic: Topic,
         start: Start,
     ) -> Result<Self, KafkaFailure> {
-        const STEP: &str = "following a topic";
         // Asked for now and not when fetching begins: what is appended after this call is seen. So is what is in an open
         // transaction; one that was committed a moment ago may still count as open.
         let bounds = match start {
             Start::Now => probe.bounds(topic).await?,
             Start::Oldest => settled_bounds(cluster, probe, topic).await?,
         };
-        let name = cluster.topic(topic);
-        let context = Context::default();
-        let failed = |error: KafkaError| context.failure(STEP, error);
-        let mut list = TopicPartitionList::with_capacity(bounds.len());
+        let mut next = BTreeMap::new();
         let mut behind = BTreeSet::new();
         for (partition, (first, end)) in (0..).zip(bounds) {
             let from = match start {
@@ -66,25 +66,31 @@ impl KafkaFollower {
             if from < end {
                 behind.insert(partition);
             }
-            list.add_partition_offset(&name, partition, Offset::Offset(from as i64))
-                .map_err(failed)?;
+            next.insert(partition, from as i64);
         }
-        let mut config = cluster.reading(LOOKERS);
-        config.set("enable.partition.eof", "true");
-        let consumer: StreamConsumer<Context> = config
-            .create_with_context(context.clone())
-            .map_err(failed)?;
-        consumer.assign(&list).map_err(failed)?;
+        let (consumer, context) = open(cluster, topic, &next)?;
         Ok(Self {
             cluster: cluster.clone(),
             topic,
-            consumer: OffThread::new(consumer),
+            watch: Watch::start(&consumer, cluster.topic(topic)),
+            consumer,
             context,
+            next,
             behind,
         })
     }
 
+    /// Reads on with another client.
+    fn replace(&mut self) -> Result<(), KafkaFailure> {
+        (self.consumer, self.context) = open(&self.cluster, self.topic, &self.next)?;
+        self.watch = Watch::start(&self.consumer, self.cluster.topic(self.topic));
+        Ok(())
+    }
+
     async fn collect(&mut self, max: usize, wait: Duration) -> Result<Vec<Message>, KafkaFailure> {
+        if self.watch.is_lost() {
+            self.replace()?;
+        }
         let now = Instant::now();
         let mut found = vec![];
         while found.len() < max {
@@ -116,7 +122,13 @@ impl KafkaFollower {
 
     fn sort(&mut self, received: KafkaResult<Message>) -> Result<Option<Message>, KafkaFailure> {
         match received {
-            Ok(message) => Ok(Some(message)),
+            Ok(message) => {
+                let Origin {
+                    partition, offset, ..
+                } = message.origin;
+                self.next.insert(partition as i32, offset as i64 + 1);
+                Ok(Some(message))
+            }
             Err(KafkaError::PartitionEOF(partition)) => {
                 self.behind.remove(&partition);
                 Ok(None)
@@ -143,6 +155,30 @@ impl KafkaFollower {
         })
         .await
     }
+}
+
+/// A client that reads on from some offsets.
+fn open(
+    cluster: &Cluster,
+    topic: Topic,
+    next: &BTreeMap<i32, i64>,
+) -> Result<(OffThread<StreamConsumer<Context>>, Context), KafkaFailure> {
+    const STEP: &str = "following a topic";
+    let name = cluster.topic(topic);
+    let context = Context::default();
+    let failed = |error: KafkaError| context.failure(STEP, error);
+    let mut list = TopicPartitionList::with_capacity(next.len());
+    for (&partition, &offset) in next {
+        list.add_partition_offset(&name, partition, Offset::Offset(offset))
+            .map_err(failed)?;
+    }
+    let mut config = cluster.reading(LOOKERS);
+    config.set("enable.partition.eof", "true");
+    let consumer: StreamConsumer<Context> = config
+        .create_with_context(context.clone())
+        .map_err(failed)?;
+    consumer.assign(&list).map_err(failed)?;
+    Ok((OffThread::new(consumer), context))
 }
 
 /// Where partitions begin and end, once every transaction that is open now has ended: whoever wants all that is there must

@@ -27,6 +27,7 @@ mod settings;
 mod slots;
 mod topics;
 mod transaction;
+mod watch;
 
 pub use error::KafkaFailure;
 pub use log::KafkaLog;

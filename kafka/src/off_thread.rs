@@ -11,6 +11,14 @@ impl<T: Send + Sync + 'static> OffThread<T> {
         Self(Some(Arc::new(client)))
     }
 
+    /// Is it the same client?
+    pub(crate) fn is_same(&self, other: &Self) -> bool {
+        match (&self.0, &other.0) {
+            (Some(one), Some(other)) => Arc::ptr_eq(one, other),
+            _ => false,
+        }
+    }
+
     /// The client itself, if this is the last holder.
     pub(crate) fn into_last(mut self) -> Option<T> {
         self.0.take().and_then(Arc::into_inner)

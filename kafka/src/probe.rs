@@ -1,5 +1,6 @@
 //! Asking brokers what is there: topics, their partitions, and where partitions begin and end.
 
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use contract::topic::Topic;
@@ -37,17 +38,22 @@ pub(crate) enum Found {
     Leaderless,
 }
 
-/// A client that only asks. Consumers never make topics by asking for them, as producers may.
+/// Asks by one client for as long as it gets answers. Consumers never make topics by asking for them, as producers may.
 pub(crate) struct Probe {
+    cluster: Cluster,
+    asking: Mutex<Arc<Asking>>,
+}
+
+/// A client that only asks.
+struct Asking {
     client: OffThread<StreamConsumer<Context>>,
     context: Context,
-    cluster: Cluster,
     /// Takes the client's own messages off its queue, which would grow for ever.
     drain: JoinHandle<()>,
 }
 
-impl Probe {
-    pub(crate) fn open(cluster: &Cluster) -> Result<Self, KafkaFailure> {
+impl Asking {
+    fn open(cluster: &Cluster) -> Result<Arc<Self>, KafkaFailure> {
         let context = Context::default();
         let client: StreamConsumer<Context> = cluster
             .asking()
@@ -62,12 +68,43 @@ impl Probe {
                 .for_each(|_trouble| std::future::ready(()))
                 .await;
         });
-        Ok(Self {
+        Ok(Arc::new(Self {
             client,
             context,
-            cluster: cluster.clone(),
             drain,
+        }))
+    }
+}
+
+impl Probe {
+    pub(crate) fn open(cluster: &Cluster) -> Result<Self, KafkaFailure> {
+        Ok(Self {
+            asking: Mutex::new(Asking::open(cluster)?),
+            cluster: cluster.clone(),
         })
+    }
+
+    /// Asks; a client without an answer may have nobody left to ask, and is asked no more.
+    async fn ask<T: Send + 'static>(
+        &self,
+        step: &'static str,
+        question: impl FnOnce(&Asking) -> Result<T, KafkaFailure> + Send + 'static,
+    ) -> Result<T, KafkaFailure> {
+        let asking = Arc::clone(&self.asking());
+        let of_call = Arc::clone(&asking);
+        let answer = blocking(step, move || question(&of_call)).await;
+        if answer.as_ref().is_err_and(KafkaFailure::is_out_of_time) {
+            let mut current = self.asking();
+            if Arc::ptr_eq(&current, &asking) {
+                *current = Asking::open(&self.cluster)?;
+            }
+        }
+        answer
+    }
+
+    fn asking(&self) -> MutexGuard<'_, Arc<Asking>> {
+        // Replaced whole: a panic elsewhere cannot leave it half done.
+        self.asking.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// How topics are there.
@@ -76,33 +113,39 @@ impl Probe {
         topics: &'static [Topic],
         limit: Duration,
     ) -> Result<Vec<(Topic, Found)>, KafkaFailure> {
-        let (client, context, cluster) = (
-            self.client.clone(),
-            self.context.clone(),
-            self.cluster.clone(),
-        );
-        blocking("looking for topics", move || {
-            let until = Instant::now() + limit;
-            let found = |&topic: &Topic| {
-                let left = until.saturating_duration_since(Instant::now());
-                find(client.client(), &context, &cluster.topic(topic), left)
-                    .map(|found| (topic, found))
-            };
-            topics.iter().map(found).collect()
-        })
+        let cluster = self.cluster.clone();
+        self.ask(
+            "looking for topics",
+            move |Asking {
+                      client, context, ..
+                  }| {
+                let until = Instant::now() + limit;
+                let found = |&topic: &Topic| {
+                    let left = until.saturating_duration_since(Instant::now());
+                    find(client.client(), context, &cluster.topic(topic), left)
+                        .map(|found| (topic, found))
+                };
+                topics.iter().map(found).collect()
+            },
+        )
         .await
     }
 
     /// Where the messages of each partition begin and end; the end of what can be read, open transactions left out.
     pub(crate) async fn bounds(&self, topic: Topic) -> Result<Vec<(u64, u64)>, KafkaFailure> {
-        let (client, context) = (self.client.clone(), self.context.clone());
+        const STEP: &str = "looking for the ends of a topic";
         let name = self.cluster.topic(topic);
         let partitions = self.cluster.partitions();
-        blocking("looking for the ends of a topic", move || {
-            let until = Instant::now() + ASK_LIMIT;
-            let bounds = |partition| bounds(client.client(), &context, &name, partition, until);
-            (0..partitions).map(bounds).collect()
-        })
+        self.ask(
+            STEP,
+            move |Asking {
+                      client, context, ..
+                  }| {
+                let until = Instant::now() + ASK_LIMIT;
+                let bounds = |partition| bounds(client.client(), context, &name, partition, until);
+                (0..partitions).map(bounds).collect()
+            },
+        )
         .await
     }
 }
@@ -127,7 +170,7 @@ pub(crate) async fn ends(cluster: &Cluster, topic: Topic) -> Result<Vec<u64>, Ka
     .await
 }
 
-impl Drop for Probe {
+impl Drop for Asking {
     fn drop(&mut self) {
         self.drain.abort();
     }

@@ -23,6 +23,7 @@ use crate::poll::Polling;
 use crate::probe::are_brokers_there;
 use crate::slots::{Slot, Slots};
 use crate::transaction::{Offsets, Record, Transactions};
+use crate::watch::Watch;
 
 /// How long a member that the group left behind waits to be part of it again, so that it can move its offsets.
 const AGAIN_LIMIT: Duration = Duration::from_secs(20);
@@ -39,6 +40,7 @@ pub(crate) struct KafkaReader {
     context: Context,
     queue: Arc<ConsumerQueue>,
     polling: Polling,
+    watch: Watch,
     transactions: Transactions,
     /// Keeps the name of the transactions from the next reader of this process.
     _slot: Slot,
@@ -74,6 +76,7 @@ impl KafkaReader {
             .subscribe(&[&cluster.topic(topic)])
             .map_err(|e| context.failure(STEP, e))?;
         let polling = Polling::start(consumer.clone(), Arc::clone(&queue));
+        let watch = Watch::start(&consumer, cluster.topic(topic));
         Ok(Self {
             cluster: cluster.clone(),
             topic,
@@ -81,6 +84,7 @@ impl KafkaReader {
             context,
             queue,
             polling,
+            watch,
             transactions,
             _slot: slot,
             is_spent: false,
@@ -94,6 +98,9 @@ impl KafkaReader {
 
     /// Nothing came: is that because nobody is there?
     async fn check_brokers(&self) -> Result<(), KafkaFailure> {
+        if self.watch.is_lost() {
+            return Err(KafkaFailure::Lost);
+        }
         if !self.context.is_troubled() {
             return Ok(());
         }
@@ -228,7 +235,7 @@ impl Reader for KafkaReader {
         const STEP: &str = "leaving a group";
         let this = *self;
         let ended = tokio::time::timeout(LEAVE_LIMIT, async move {
-            this.polling.end().await;
+            tokio::join!(this.polling.end(), this.watch.end());
             // Its end says good-bye to the group.
             blocking(STEP, move || {
                 drop(this.consumer.into_last());

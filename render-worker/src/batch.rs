@@ -152,7 +152,7 @@ impl BatchService {
     }
 
     async fn draw_and_keep(&self, job: &RenderJob) -> Result<(), Arc<DrawError>> {
-        let Drawn { png, kept, .. } = match self.desk.draw(job, Order::batch()).await {
+        let Drawn { bytes, kept, .. } = match self.desk.draw(job, Order::batch()).await {
             Ok(drawn) => drawn,
             Err(DeskError::Render(error)) => return Err(error),
             // The batch is not counted, and it stops by itself: both are passing.
@@ -161,7 +161,7 @@ impl BatchService {
             }
         };
         if !kept {
-            self.desk.keep(job, png).await?;
+            self.desk.keep(job, bytes).await?;
         }
         Ok(())
     }

@@ -1,10 +1,12 @@
-//! Drawn pictures in, with what a job has drawn over them as PNG bytes out, on as many cores as there are; who draws next waits for none of it.
+//! Drawn pictures in, with what a job has drawn over them as bytes out, on as many cores as there are; who draws next waits
+//! for none of it.
 
 use std::num::NonZeroUsize;
 use std::sync::Arc;
 use std::thread;
 
 use bytes::Bytes;
+use contract::encoding::Encoding;
 use contract::job::RenderJob;
 use render::Image;
 use tokio::sync::Semaphore;
@@ -38,12 +40,13 @@ impl Encoders {
         self.count - self.cores.available_permits()
     }
 
-    /// The picture of a job, annotations and all, as PNG. `turn` is let go as soon as a core is free for it, before encoding begins: whoever holds it
-    /// back until then draws no more pictures than the cores can take.
-    pub(crate) async fn png(
+    /// The picture of a job, annotations and all. `turn` is let go as soon as a core is free for it, before encoding
+    /// begins: whoever holds it back until then draws no more pictures than the cores can take.
+    pub(crate) async fn encode(
         &self,
         job: &RenderJob,
         image: Image,
+        encoding: Encoding,
         turn: impl Send + 'static,
     ) -> Result<Bytes, DrawError> {
         // Most pictures have none, and no reason to copy their job.
@@ -53,7 +56,10 @@ impl Encoders {
                 Some(job) => annotation::annotated(&job, image)?,
                 None => image,
             };
-            Ok(image.encode_png()?)
+            Ok(match encoding {
+                Encoding::Png => image.encode_png()?,
+                Encoding::Jpeg { quality } => image.encode_jpeg(quality)?,
+            })
         };
         self.run(turn, finished).await?
     }

@@ -6,6 +6,7 @@ use std::num::NonZeroUsize;
 use std::sync::Arc;
 
 use bytes::Bytes;
+use contract::encoding::Encoding;
 use contract::job::RenderJob;
 use render::scene::Scene;
 use render::{Backend, Image, Renderer};
@@ -124,14 +125,16 @@ impl Pipeline {
         Ok(image)
     }
 
-    /// Draws the annotations of a job over its picture and writes it as PNG; `turn` is let go when that begins, which may have to wait for a core.
+    /// Draws the annotations of a job over its picture and encodes it; `turn` is let go when that begins, which may have to
+    /// wait for a core.
     pub async fn encode(
         &self,
         job: &RenderJob,
         image: Image,
+        encoding: Encoding,
         turn: impl Send + 'static,
     ) -> Result<Bytes, DrawError> {
-        self.encoders.png(job, image, turn).await
+        self.encoders.encode(job, image, encoding, turn).await
     }
 
     /// Tries, and if the device failed tries once more on a fresh one.

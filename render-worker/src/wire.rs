@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use contract::ContractError;
+use contract::encoding::Encoding;
 use contract::job::RENDERER_VERSION;
 use tonic::metadata::MetadataMap;
 
@@ -95,6 +97,22 @@ impl From<proto::Storing> for Storing {
             proto::Storing::Keep => Self::Keep,
             proto::Storing::Nothing => Self::Nothing,
         }
+    }
+}
+
+/// An encoding as a number: 0 or the quality of a JPEG.
+pub(crate) fn jpeg_quality(encoding: Encoding) -> u32 {
+    match encoding {
+        Encoding::Png => 0,
+        Encoding::Jpeg { quality } => quality.into(),
+    }
+}
+
+/// The encoding of such a number.
+pub(crate) fn read_encoding(jpeg_quality: u32) -> Result<Encoding, ContractError> {
+    match jpeg_quality {
+        0 => Ok(Encoding::Png),
+        quality => Encoding::jpeg(quality.try_into().unwrap_or(u8::MAX)),
     }
 }
 

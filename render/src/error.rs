@@ -59,12 +59,12 @@ pub enum RenderError {
     /// A flow was to be drawn from one part of its vector.
     #[error("a flow needs both parts of a vector, the scene has the eastward one only")]
     NoNorthward,
-    /// The picture could not be written as PNG.
+    /// The picture could not be encoded.
     #[error("cannot encode a picture of {width} x {height} pixels")]
     Encode {
         width: u32,
         height: u32,
-        source: image::ImageError,
+        source: Box<dyn std::error::Error + Send + Sync>,
     },
     /// Whoever wanted the picture has gone.
     #[error("nobody waits for the picture any more")]

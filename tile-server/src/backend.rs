@@ -11,6 +11,7 @@ use async_trait::async_trait;
 use bytes::Bytes;
 use contract::budget::{BudgetAnswer, BudgetQuery};
 use contract::check::Check;
+use contract::encoding::Encoding;
 use contract::grid::LonLatDeg;
 use contract::job::RenderJob;
 use contract::manifest::{Manifest, ManifestId};
@@ -48,9 +49,15 @@ pub enum Keep {
 /// Draws pictures, and stores them: whoever draws one is the one who writes it.
 #[async_trait]
 pub trait Draw: Send + Sync + 'static {
-    /// The picture of a valid job as the bytes of a PNG with alpha; a job without data is a transparent picture. If
-    /// another one is in the store under its name, that one is given: it was served before.
-    async fn draw(&self, job: &RenderJob, keep: Keep, turn: Turn) -> Result<Bytes, BackendError>;
+    /// The picture of a valid job as the bytes of an encoding; a job without data is a transparent picture. A PNG is
+    /// kept, if it is to be; if another one is in the store under its name, that one is given: it was served before.
+    async fn draw(
+        &self,
+        job: &RenderJob,
+        keep: Keep,
+        encoding: Encoding,
+        turn: Turn,
+    ) -> Result<Bytes, BackendError>;
 
     /// How many pictures it should be given to draw at the same time, where nobody says how many.
     fn draws_at_once(&self) -> NonZeroU32;

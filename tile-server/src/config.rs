@@ -16,6 +16,7 @@ const CATALOGUE_AGE_MS: u64 = 1000;
 const CONNECTIONS: u32 = 4096;
 const HEAD_LIMIT_S: u64 = 10;
 const IDLE_LIMIT_S: u64 = 75;
+const STREAMS: u32 = 512;
 
 /// What the tile server can be told.
 #[derive(Debug, Clone, PartialEq, Eq, clap::Args)]
@@ -60,6 +61,9 @@ pub struct Settings {
     /// Time after which a connection that nothing moves on is ended, seconds, 1 to 3600; never before --request-limit-s
     #[arg(long, env = "FLUXGLOBE_IDLE_LIMIT_S", default_value_t = IDLE_LIMIT_S, value_parser = clap::value_parser!(u64).range(1..=3600))]
     pub idle_limit_s: u64,
+    /// Cameras followed at the same time over /stream, 0 to 65536; each may have three pictures drawn at once
+    #[arg(long, env = "FLUXGLOBE_STREAMS", default_value_t = STREAMS, value_parser = clap::value_parser!(u32).range(0..=65_536))]
+    pub streams: u32,
 }
 
 impl Default for Settings {
@@ -78,6 +82,7 @@ impl Default for Settings {
             connections: CONNECTIONS,
             head_limit_s: HEAD_LIMIT_S,
             idle_limit_s: IDLE_LIMIT_S,
+            streams: STREAMS,
         }
     }
 }

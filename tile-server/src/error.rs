@@ -73,6 +73,12 @@ pub enum ServerError {
     /// More viewers wait for news than are served.
     #[error("too many viewers wait for news; please try again later")]
     TooManyListeners,
+    /// More streams are open than are served.
+    #[error("too many cameras are followed at the moment; please try again in a moment")]
+    TooManyStreams,
+    /// The address speaks WebSocket alone.
+    #[error("this address is a WebSocket (RFC 6455): {reason}")]
+    NoWebSocket { reason: String },
     /// This server ends.
     #[error("this server is stopping; please ask again in a moment")]
     Stopping,
@@ -137,9 +143,12 @@ impl ServerError {
             | Self::NoObservations => StatusCode::NOT_FOUND,
             Self::ReadOnly => StatusCode::METHOD_NOT_ALLOWED,
             Self::BodyTooLarge { .. } => StatusCode::PAYLOAD_TOO_LARGE,
-            Self::Busy | Self::TooManyListeners | Self::Stopping | Self::StoreAway { .. } => {
-                StatusCode::SERVICE_UNAVAILABLE
-            }
+            Self::Busy
+            | Self::TooManyListeners
+            | Self::TooManyStreams
+            | Self::Stopping
+            | Self::StoreAway { .. } => StatusCode::SERVICE_UNAVAILABLE,
+            Self::NoWebSocket { .. } => StatusCode::UPGRADE_REQUIRED,
             Self::TimedOut { .. } => StatusCode::GATEWAY_TIMEOUT,
             Self::Storage(error) if error.is_retryable() => StatusCode::SERVICE_UNAVAILABLE,
             Self::Storage(_) | Self::Defect { .. } => StatusCode::INTERNAL_SERVER_ERROR,
@@ -172,7 +181,7 @@ impl ServerError {
     }
 
     /// The text for users: never that of a low-level error.
-    fn text(&self) -> String {
+    pub(crate) fn text(&self) -> String {
         match self {
             Self::Storage(error) if error.is_retryable() => {
                 "the store does not answer at the moment".to_owned()
@@ -197,6 +206,9 @@ impl IntoResponse for ServerError {
         headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
         if let Some(seconds) = self.retry_after_s() {
             headers.insert(header::RETRY_AFTER, seconds.into());
+        }
+        if status == StatusCode::UPGRADE_REQUIRED {
+            headers.insert(header::UPGRADE, HeaderValue::from_static("websocket"));
         }
         if status == StatusCode::METHOD_NOT_ALLOWED {
             headers.insert(header::ALLOW, HeaderValue::from_static("GET, HEAD"));

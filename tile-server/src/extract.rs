@@ -3,6 +3,7 @@
 use std::str::FromStr;
 
 use axum::extract::{FromRequestParts, Path, Query};
+use axum::http::Uri;
 use axum::http::request::Parts;
 use contract::ContractError;
 use contract::time::TimeMs;
@@ -37,9 +38,15 @@ pub(crate) struct UrlQuery<T>(pub T);
 impl<T: DeserializeOwned, S: Send + Sync> FromRequestParts<S> for UrlQuery<T> {
     type Rejection = ServerError;
 
-    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ServerError> {
-        if parts
-            .uri
+    async fn from_request_parts(parts: &mut Parts, _state: &S) -> Result<Self, ServerError> {
+        Self::of(&parts.uri)
+    }
+}
+
+impl<T: DeserializeOwned> UrlQuery<T> {
+    /// Those of an address.
+    pub(crate) fn of(uri: &Uri) -> Result<Self, ServerError> {
+        if uri
             .query()
             .is_some_and(|query| query.len() > MAX_QUERY_BYTES)
         {
@@ -47,7 +54,7 @@ impl<T: DeserializeOwned, S: Send + Sync> FromRequestParts<S> for UrlQuery<T> {
                 reason: format!("the query is longer than {MAX_QUERY_BYTES} bytes"),
             });
         }
-        match Query::from_request_parts(parts, state).await {
+        match Query::try_from_uri(uri) {
             Ok(Query(value)) => Ok(Self(value)),
             Err(rejection) => Err(ServerError::Address {
                 reason: rejection.body_text(),

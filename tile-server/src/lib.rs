@@ -39,6 +39,7 @@ mod routes;
 mod serve;
 mod single_flight;
 mod state;
+mod stream;
 mod surroundings;
 mod versions;
 

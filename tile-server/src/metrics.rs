@@ -10,6 +10,7 @@ use prometheus::{
 pub use prometheus::Registry;
 
 use crate::connections::counts::Counts;
+use crate::stream::StreamMetrics;
 
 /// Bounds of request times, seconds: a cached tile is under a millisecond, a budget some seconds.
 const REQUEST_BOUNDS_S: [f64; 12] = [
@@ -74,6 +75,8 @@ pub struct Metrics {
     pub products: IntGauge,
     /// Connections.
     pub(crate) connections: Counts,
+    /// Streams of pictures.
+    pub(crate) streams: StreamMetrics,
 }
 
 impl Metrics {
@@ -139,6 +142,7 @@ impl Metrics {
             panics: counter("panics_total", "Panics that were caught.")?,
             products: gauge("products_count", "Products known.")?,
             connections: Counts::register(registry)?,
+            streams: StreamMetrics::register(registry)?,
         })
     }
 

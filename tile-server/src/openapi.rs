@@ -15,7 +15,7 @@ use utoipa::{Modify, OpenApi};
 use crate::error::Refusal;
 use crate::routes::{
     area, budget, check, events, globe, health, legend, metrics, observations, openapi, palettes,
-    platforms, point, products, regions, tilejson, tiles,
+    platforms, point, products, regions, stream, tilejson, tiles,
 };
 
 /// What an operation that takes long or needs others answers when it cannot.
@@ -36,6 +36,7 @@ const RETRY_AFTER: &str = "Seconds after which the same request may succeed";
         tiles::get,
         tilejson::get,
         globe::get,
+        stream::get,
         products::list,
         legend::get,
         regions::list,

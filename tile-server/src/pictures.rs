@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use contract::digest::Digest;
+use contract::encoding::Encoding;
 use contract::job::RenderJob;
 use contract::key::ObjectKey;
 use quick_cache::Weighter;
@@ -18,8 +19,9 @@ use crate::gate::{Gate, Pass};
 use crate::metrics::{Metrics, Source};
 use crate::single_flight::SingleFlight;
 
-/// What every PNG begins with (ISO/IEC 15948, 5.2).
-const PNG_SIGNATURE: [u8; 8] = [0x89, b'P', b'N', b'G', 0x0d, 0x0a, 0x1a, 0x0a];
+/// What every PNG begins with (ISO/IEC 15948, 5.2), and every JPEG (ISO/IEC 10918-1, B.1.1.3).
+const PNG_SIGNATURE: &[u8] = &[0x89, b'P', b'N', b'G', 0x0d, 0x0a, 0x1a, 0x0a];
+const JPEG_SIGNATURE: &[u8] = &[0xff, 0xd8, 0xff];
 /// How long a stored picture is waited for before it is drawn again.
 const STORE_LIMIT: Duration = Duration::from_secs(3);
 /// How long drawing may take while the store does not answer. Whoever has the frames in memory draws as ever; whoever
@@ -83,6 +85,30 @@ impl Pictures {
         }
     }
 
+    /// The picture of a job for one who looks at it for a moment: not stored, and given up when this is dropped.
+    pub async fn in_passing(
+        &self,
+        job: &RenderJob,
+        encoding: Encoding,
+    ) -> Result<Bytes, ServerError> {
+        let maker = &self.maker;
+        let digest = job.digest();
+        if encoding.is_stored()
+            && let Some(picture) = maker.memory.get(&digest)
+        {
+            maker.metrics.hit(Source::Memory);
+            return Ok(picture);
+        }
+        let refused = |_busy: &ServerError| maker.metrics.refused.inc();
+        let Pass { place, turn } = maker.gate.enter().await.inspect_err(refused)?;
+        let picture = maker.draw(job, Keep::No, encoding, turn).await?;
+        drop(place);
+        if encoding.is_stored() {
+            maker.remember(digest, picture.clone());
+        }
+        Ok(picture)
+    }
+
     /// The picture of a job, as a PNG.
     pub async fn get(&self, job: RenderJob) -> Result<Bytes, ServerError> {
         let digest = job.digest();
@@ -92,6 +118,13 @@ impl Pictures {
         }
         let maker = Arc::clone(&self.maker);
         self.flights.join(digest, || maker.make(digest, job)).await
+    }
+}
+
+fn signature(encoding: Encoding) -> &'static [u8] {
+    match encoding {
+        Encoding::Png => PNG_SIGNATURE,
+        Encoding::Jpeg { .. } => JPEG_SIGNATURE,
     }
 }
 
@@ -160,10 +193,11 @@ impl Maker {
         turn: Turn,
     ) -> Result<Bytes, ServerError> {
         let Some(limit) = limit else {
-            return self.draw(job, Keep::Yes, turn).await;
+            return self.draw(job, Keep::Yes, Encoding::Png, turn).await;
         };
         // It could not be asked for a moment ago; it is stored when it is drawn for the one who asks next.
-        let drawn = tokio::time::timeout(limit, self.draw(job, Keep::No, turn)).await;
+        let drawn =
+            tokio::time::timeout(limit, self.draw(job, Keep::No, Encoding::Png, turn)).await;
         drawn.unwrap_or_else(|_elapsed| {
             Err(ServerError::StoreAway {
                 limit_s: limit.as_secs(),
@@ -171,20 +205,26 @@ impl Maker {
         })
     }
 
-    async fn draw(&self, job: &RenderJob, keep: Keep, turn: Turn) -> Result<Bytes, ServerError> {
+    async fn draw(
+        &self,
+        job: &RenderJob,
+        keep: Keep,
+        encoding: Encoding,
+        turn: Turn,
+    ) -> Result<Bytes, ServerError> {
         let started_at = Instant::now();
-        let drawn = self.drawer.draw(job, keep, turn).await;
+        let drawn = self.drawer.draw(job, keep, encoding, turn).await;
         let mode = job.mode.as_str();
         self.metrics
             .draw_duration_s
             .with_label_values(&[mode])
             .observe(started_at.elapsed().as_secs_f64());
         let drawn = drawn.map_err(ServerError::from).and_then(|picture| {
-            if picture.starts_with(&PNG_SIGNATURE) {
+            if picture.starts_with(signature(encoding)) {
                 Ok(picture)
             } else {
                 Err(ServerError::Defect {
-                    what: "the renderer's answer is no PNG".to_owned(),
+                    what: format!("the renderer's answer is no {}", encoding.media_type()),
                 })
             }
         });

@@ -19,7 +19,7 @@ use crate::middleware::{body, panics::CountPanics, security, track};
 use crate::routes::picture::{COVERED, SHOWN_TIME};
 use crate::routes::{
     area, budget, check, events, globe, health, legend, metrics, observations, openapi, palettes,
-    platforms, point, products, regions, tilejson, tiles, viewer,
+    platforms, point, products, regions, stream, tilejson, tiles, viewer,
 };
 use crate::state::AppState;
 
@@ -50,6 +50,7 @@ pub fn router(state: AppState) -> Router {
         .route("/tiles/{product}/{mode_json}", get(tilejson::get))
         .route("/tiles/{product}/{mode}/{z}/{x}/{y_png}", get(tiles::get))
         .route("/globe/{product}/{mode_png}", get(globe::get))
+        .route("/stream", get(stream::get))
         .route("/api/products", get(products::list))
         .route("/api/products/{product}/point", get(point::get))
         .route("/api/products/{product}/area", get(area::get))

@@ -16,6 +16,7 @@ pub(crate) mod platforms;
 pub(crate) mod point;
 pub(crate) mod products;
 pub(crate) mod regions;
+pub(crate) mod stream;
 pub(crate) mod tilejson;
 pub(crate) mod tiles;
 pub(crate) mod viewer;

@@ -68,6 +68,7 @@ impl Server {
         let until_told = async move {
             shutdown.await;
             ending.news.close();
+            ending.streams.close();
             stop.send_replace(true);
         };
         let serving = axum::serve(door, router(self.state)).with_graceful_shutdown(until_told);

@@ -16,6 +16,7 @@ use crate::gate::Gate;
 use crate::live::{Freshness, HotTiles, News};
 use crate::metrics::{Metrics, Registry};
 use crate::pictures::Pictures;
+use crate::stream;
 
 /// Shared by all requests; clones are handles on the same thing.
 #[derive(Clone)]
@@ -39,6 +40,8 @@ pub struct Parts {
     pub hot: HotTiles,
     /// What viewers are told.
     pub news: News,
+    /// Who follows a camera.
+    pub(crate) streams: stream::Places,
     /// How long it takes from a notice to a picture.
     pub freshness: Freshness,
     /// Counters of this server.
@@ -81,6 +84,7 @@ impl AppState {
             log: OnceLock::new(),
             hot: HotTiles::default(),
             news: News::new(start_ms()),
+            streams: stream::Places::new(settings.streams),
             freshness: Freshness::register(&registry)?,
             metrics,
             registry,

@@ -39,7 +39,7 @@ pub(crate) async fn run(settings: &Settings, options: Render) -> Result<()> {
     let bar = progress::bar("draw", 1);
     let desk = deployment::single_desk(settings, store).await?;
     let order = Order::on_demand(Storing::Nothing);
-    let png = desk.draw(&job, order).await?.png;
+    let png = desk.draw(&job, order).await?.bytes;
     std::fs::write(&asked.output, &png)
         .with_context(|| format!("cannot write {}", asked.output.display()))?;
     progress::done(&bar, &format!("{} bytes", png.len()));

@@ -10,6 +10,7 @@ mod broker;
 mod embedded;
 mod events;
 mod faults;
+mod forgotten;
 mod kafka;
 mod kills;
 mod own_topics;

@@ -40,18 +40,25 @@ impl Inner {
         let image = drawn?;
         self.learn(begun.elapsed());
         // Another draws while this one is encoded and stored.
-        let encoding = self.pipeline.encode(job, image, permit);
-        let png = self.measured("encode", encoding).await?;
-        Ok(self.kept(job, png, order.storing).await)
+        let encoding = self.pipeline.encode(job, image, order.encoding, permit);
+        let bytes = self.measured("encode", encoding).await?;
+        Ok(self.kept(job, bytes, order.storing).await)
     }
 
     /// A picture after what the store has to do with it.
-    async fn kept(&self, job: &RenderJob, png: Bytes, storing: Storing) -> Drawn {
+    async fn kept(&self, job: &RenderJob, bytes: Bytes, storing: Storing) -> Drawn {
         let (count, drawn) = match storing {
-            Storing::LookUpAndKeep | Storing::Keep => self.put(job, png).await,
+            Storing::LookUpAndKeep | Storing::Keep => self.put(job, bytes).await,
             Storing::Nothing => {
                 let (origin, kept) = (Origin::Drawn, false);
-                ("drawn", Drawn { png, origin, kept })
+                (
+                    "drawn",
+                    Drawn {
+                        bytes,
+                        origin,
+                        kept,
+                    },
+                )
             }
         };
         self.pictures.with_label_values(&[count]).inc();
@@ -60,31 +67,38 @@ impl Inner {
 
     /// A picture that was not kept, given to somebody who ordered it to be.
     pub(super) async fn kept_after_all(&self, job: &RenderJob, drawn: Drawn) -> Drawn {
-        self.put(job, drawn.png).await.1
+        self.put(job, drawn.bytes).await.1
     }
 
     /// What is given out of a picture that is to be kept, and the name of how that went.
-    async fn put(&self, job: &RenderJob, png: Bytes) -> (&'static str, Drawn) {
-        let (name, png, origin, kept) = match self.keep(job, png.clone()).await {
-            Ok(None) => ("drawn", png, Origin::Drawn, true),
+    async fn put(&self, job: &RenderJob, drawn: Bytes) -> (&'static str, Drawn) {
+        let (name, bytes, origin, kept) = match self.keep(job, drawn.clone()).await {
+            Ok(None) => ("drawn", drawn, Origin::Drawn, true),
             Ok(Some(theirs)) => ("conflict", theirs, Origin::Stored, true),
             Err(error) => {
                 let error = error.in_full();
                 tracing::warn!(error, "a picture is given out but not kept");
-                ("not_kept", png, Origin::Drawn, false)
+                ("not_kept", drawn, Origin::Drawn, false)
             }
         };
-        (name, Drawn { png, origin, kept })
+        (
+            name,
+            Drawn {
+                bytes,
+                origin,
+                kept,
+            },
+        )
     }
 
     /// The picture, if it was drawn before. A store that cannot be asked is one more reason to draw.
     async fn stored(&self, job: &RenderJob) -> Result<Option<Drawn>, DrawError> {
         match self.store.get(&job.key()).await {
-            Ok(png) => {
+            Ok(bytes) => {
                 self.pictures.with_label_values(&["stored"]).inc();
                 let origin = Origin::Stored;
                 Ok(Some(Drawn {
-                    png,
+                    bytes,
                     origin,
                     kept: true,
                 }))

@@ -61,8 +61,8 @@ struct Inner {
 /// A picture.
 #[derive(Debug, Clone)]
 pub struct Drawn {
-    /// PNG bytes.
-    pub png: Bytes,
+    /// In the encoding that was ordered.
+    pub bytes: Bytes,
     /// Where it comes from.
     pub origin: Origin,
     /// Is it in the store?
@@ -206,7 +206,9 @@ impl Desk {
         let valid = job.validate().map_err(RenderError::from);
         valid.map_err(DrawError::from)?;
         let digest = job.digest();
-        let (waiter, begun) = inner.flights.join(digest, order.class);
+        let order = order.encoded(order.encoding);
+        let flown = (digest, order.encoding);
+        let (waiter, begun) = inner.flights.join(flown, order.class);
         let has_joined = begun.is_none();
         if let Some(flight) = begun {
             let (desk, job, turn) = (Arc::clone(inner), job.clone(), Box::new(turn) as Turn);
@@ -218,7 +220,7 @@ impl Desk {
                     tokio::spawn(make.in_current_span()).await
                 };
                 let outcome = drawn.unwrap_or_else(|lost| Err(DrawError::Thread(lost).into()));
-                desk.flights.complete(&digest, &flight, outcome);
+                desk.flights.complete(&flown, &flight, outcome);
             };
             tokio::spawn(flying.in_current_span());
         }

@@ -1,5 +1,7 @@
 //! How a picture is wanted.
 
+use contract::encoding::Encoding;
+
 use super::Class;
 
 /// Who wants a picture, and what the store has to do with it.
@@ -9,6 +11,8 @@ pub struct Order {
     pub class: Class,
     /// What the store has to do with it.
     pub storing: Storing,
+    /// As which bytes it travels. In another than the stored one the store has nothing to do with it.
+    pub encoding: Encoding,
 }
 
 /// What the store has to do with a picture.
@@ -25,8 +29,26 @@ pub enum Storing {
 impl Order {
     /// For somebody who waits.
     pub fn on_demand(storing: Storing) -> Self {
-        let class = Class::OnDemand;
-        Self { class, storing }
+        Self {
+            class: Class::OnDemand,
+            storing,
+            encoding: Encoding::Png,
+        }
+    }
+
+    /// The same as other bytes.
+    #[must_use]
+    pub fn encoded(self, encoding: Encoding) -> Self {
+        let storing = if encoding.is_stored() {
+            self.storing
+        } else {
+            Storing::Nothing
+        };
+        Self {
+            storing,
+            encoding,
+            ..self
+        }
     }
 
     /// For later; looked for and kept, for nobody waits for its bytes.
@@ -34,6 +56,7 @@ impl Order {
         Self {
             class: Class::Batch,
             storing: Storing::LookUpAndKeep,
+            encoding: Encoding::Png,
         }
     }
 }

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use contract::digest::Digest;
+use contract::encoding::Encoding;
 use render::RenderError;
 use tokio::sync::watch;
 
@@ -22,10 +23,13 @@ pub(super) struct Flight {
     urgent: watch::Sender<bool>,
 }
 
-/// All jobs under way by their digest.
+/// A job by its digest, and the bytes that are made of its picture.
+pub(super) type Flown = (Digest, Encoding);
+
+/// All jobs under way.
 #[derive(Default)]
 pub(super) struct SingleFlight {
-    by_job: Mutex<BTreeMap<Digest, Arc<Flight>>>,
+    by_job: Mutex<BTreeMap<Flown, Arc<Flight>>>,
 }
 
 /// One who waits for a job under way; dropping it is giving up.
@@ -35,7 +39,7 @@ pub(super) struct Waiter {
 
 impl SingleFlight {
     /// Waits for a job under way, or begins it, which the caller must then draw and [`complete`](Self::complete).
-    pub(super) fn join(&self, job: Digest, class: Class) -> (Waiter, Option<Arc<Flight>>) {
+    pub(super) fn join(&self, job: Flown, class: Class) -> (Waiter, Option<Arc<Flight>>) {
         let urgent = class == Class::OnDemand;
         let mut under_way = self.lock();
         let known = under_way.get(&job);
@@ -55,7 +59,7 @@ impl SingleFlight {
     }
 
     /// Ends a job with its outcome.
-    pub(super) fn complete(&self, job: &Digest, flight: &Arc<Flight>, outcome: Outcome) {
+    pub(super) fn complete(&self, job: &Flown, flight: &Arc<Flight>, outcome: Outcome) {
         let mut under_way = self.lock();
         if under_way
             .get(job)
@@ -67,7 +71,7 @@ impl SingleFlight {
         flight.outcome.send_replace(Some(outcome));
     }
 
-    fn lock(&self) -> MutexGuard<'_, BTreeMap<Digest, Arc<Flight>>> {
+    fn lock(&self) -> MutexGuard<'_, BTreeMap<Flown, Arc<Flight>>> {
         // Changed by single inserts and removals, so a poisoned lock still guards a whole map.
         self.by_job.lock().unwrap_or_else(PoisonError::into_inner)
     }

@@ -20,9 +20,9 @@ use futures::stream::{FuturesUnordered, StreamExt as _};
 use prometheus::{IntCounterVec, IntGaugeVec, Opts, Registry};
 use tokio::time::Instant;
 
-use crate::desk::{Origin, Storing};
-use crate::wire::Version;
+use crate::desk::{Order, Origin};
 use crate::wire::proto::{DrawReply, DrawRequest, Origin as OriginCode, Storing as StoringCode};
+use crate::wire::{self, Version};
 use member::Member;
 use refusals::Refusals;
 
@@ -54,8 +54,8 @@ struct Inner {
 /// A picture from a worker.
 #[derive(Debug, Clone)]
 pub struct Picture {
-    /// PNG bytes.
-    pub png: Bytes,
+    /// In the encoding that was ordered.
+    pub bytes: Bytes,
     /// Where it comes from.
     pub origin: Origin,
     /// Name of the worker.
@@ -116,11 +116,11 @@ impl Fleet {
     pub async fn draw(
         &self,
         job: &RenderJob,
-        storing: Storing,
+        order: Order,
         trace: &str,
     ) -> Result<Picture, FleetError> {
         let running = self.inner.red.start("draw");
-        let drawn = self.inner.draw(job, storing, trace).await;
+        let drawn = self.inner.draw(job, order, trace).await;
         running.done(drawn.as_ref().map_or_else(ended, |_picture| Ended::Ok));
         drawn
     }
@@ -151,7 +151,7 @@ impl Inner {
     async fn draw(
         &self,
         job: &RenderJob,
-        storing: Storing,
+        order: Order,
         trace: &str,
     ) -> Result<Picture, FleetError> {
         job.validate()
@@ -164,7 +164,8 @@ impl Inner {
             job_json: serde_json::to_string(job)
                 .map_err(|e| FleetError::BadRequest(e.to_string()))?,
             trace: trace.to_owned(),
-            storing: StoringCode::from(storing).into(),
+            storing: StoringCode::from(order.storing).into(),
+            jpeg_quality: wire::jpeg_quality(order.encoding),
         };
         let asking = self.ask(place::of(job), &request, deadline);
         let asked = tokio::time::timeout_at(deadline, asking).await;
@@ -262,7 +263,7 @@ fn picture(member: &Member, reply: DrawReply) -> Picture {
         OriginCode::Drawn | OriginCode::Unspecified => Origin::Drawn,
     };
     Picture {
-        png: reply.png,
+        bytes: reply.picture,
         origin,
         worker: member.name.clone(),
     }

@@ -38,7 +38,7 @@ impl Renderer for Answers {
             Origin::Stored => OriginCode::Stored,
         };
         Ok(Response::new(DrawReply {
-            png: drawn.png,
+            picture: drawn.bytes,
             origin: origin.into(),
             duration_ms: begun.elapsed().as_millis() as u64,
         }))
@@ -72,7 +72,9 @@ impl Answers {
             let text = format!("the caller does not fit this render worker: {quarrel}");
             return Err(Status::failed_precondition(text));
         }
-        let order = Order::on_demand(request.storing().into());
+        let encoding = wire::read_encoding(request.jpeg_quality)
+            .map_err(|e| Status::invalid_argument(e.to_string()))?;
+        let order = Order::on_demand(request.storing().into()).encoded(encoding);
         let trace = request.trace;
         if trace.len() > MAX_TRACE_BYTES || trace.chars().any(char::is_control) {
             return Err(Status::invalid_argument(

@@ -177,7 +177,10 @@ async fn whoever_waits_for_a_picture_comes_before_the_batch() {
     let worker = Worker::start(&store, 1, 8);
     let draw = |job: RenderJob, class| {
         let (desk, storing) = (worker.desk.clone(), USUAL);
-        let order = Order { class, storing };
+        let order = Order {
+            class,
+            ..Order::on_demand(storing)
+        };
         tokio::spawn(async move { desk.draw(&job, order).await.unwrap() })
     };
     let first = draw(slow(&job, 1), Class::Batch);

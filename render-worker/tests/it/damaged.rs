@@ -51,11 +51,11 @@ async fn a_flipped_bit_of_a_picture_is_drawn_over() {
     let worker = Worker::start(&store, 1, 4);
     let order = Order::on_demand(USUAL);
     let drawn = worker.desk.draw(&job, order).await.unwrap();
-    assert_eq!(store.get(&job.key()).await.unwrap(), drawn.png);
-    flip(&store, &job.key(), drawn.png.len() / 2).await;
+    assert_eq!(store.get(&job.key()).await.unwrap(), drawn.bytes);
+    flip(&store, &job.key(), drawn.bytes.len() / 2).await;
     let before = damage::count(Kind::Tile);
     let again = worker.desk.draw(&job, order).await.unwrap();
-    assert!(again.origin == Origin::Drawn && again.png == drawn.png);
+    assert!(again.origin == Origin::Drawn && again.bytes == drawn.bytes);
     assert!(damage::count(Kind::Tile) > before);
-    assert_eq!(store.get(&job.key()).await.unwrap(), drawn.png);
+    assert_eq!(store.get(&job.key()).await.unwrap(), drawn.bytes);
 }

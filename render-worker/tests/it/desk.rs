@@ -29,14 +29,14 @@ async fn a_picture_is_looked_for_and_kept_as_it_was_ordered() {
     assert!(!store.exists(&job.key()).await.unwrap());
     let kept = drawn(&worker, &job, Storing::Keep).await;
     assert_eq!((kept.origin, kept.kept), (Origin::Drawn, true));
-    assert_eq!(store.get(&job.key()).await.unwrap(), kept.png);
-    assert_eq!(kept.png, aside.png);
+    assert_eq!(store.get(&job.key()).await.unwrap(), kept.bytes);
+    assert_eq!(kept.bytes, aside.bytes);
     // It is there now: whoever looks finds it, whoever does not draws it again.
     let found = drawn(&worker, &job, Storing::LookUpAndKeep).await;
     assert_eq!((found.origin, found.kept), (Origin::Stored, true));
     let again = drawn(&worker, &job, Storing::Keep).await;
     assert_eq!((again.origin, again.kept), (Origin::Drawn, true));
-    assert_eq!((found.png, again.png), (kept.png.clone(), kept.png));
+    assert_eq!((found.bytes, again.bytes), (kept.bytes.clone(), kept.bytes));
     assert_eq!(
         (pictures(&worker, "drawn"), pictures(&worker, "stored")),
         (3, 1)
@@ -50,14 +50,14 @@ async fn a_picture_that_contradicts_the_store_is_counted_and_the_stored_one_is_g
     let (job, other) = (quick(&job, 1), quick(&job, 2));
     let worker = Worker::start(&store, 1, 4);
     // What another adapter drew under the same name.
-    let theirs = drawn(&worker, &other, Storing::Nothing).await.png;
+    let theirs = drawn(&worker, &other, Storing::Nothing).await.bytes;
     store.put_new(&job.key(), theirs.clone()).await.unwrap();
     let given = drawn(&worker, &job, Storing::Keep).await;
     assert_eq!((given.origin, given.kept), (Origin::Stored, true));
-    assert_eq!(given.png, theirs);
+    assert_eq!(given.bytes, theirs);
     assert_eq!(pictures(&worker, "conflict"), 1);
     let aside = drawn(&worker, &job, Storing::Nothing).await;
-    assert_ne!(aside.png, theirs);
+    assert_ne!(aside.bytes, theirs);
 }
 
 #[tokio::test]
@@ -75,7 +75,7 @@ async fn whoever_joins_a_job_under_way_has_its_picture_kept_as_he_ordered() {
         assert_eq!(count, u64::from(number), "both are one job: {storing:?}");
         assert_eq!((aside.origin, aside.kept), (Origin::Drawn, false));
         assert_eq!((kept.origin, kept.kept), (Origin::Drawn, true));
-        assert_eq!(store.get(&job.key()).await.unwrap(), kept.png);
+        assert_eq!(store.get(&job.key()).await.unwrap(), kept.bytes);
     }
     // Another one is there meanwhile: it is given to whoever asks for what is kept, and to nobody else.
     let [job, other] = [3, 1].map(|number| quick(&job, number));
@@ -87,7 +87,7 @@ async fn whoever_joins_a_job_under_way_has_its_picture_kept_as_he_ordered() {
     );
     assert_eq!(pictures(&worker, "drawn"), 3);
     assert_eq!((given.origin, given.kept), (Origin::Stored, true));
-    assert!(given.png == theirs && aside.png != theirs);
+    assert!(given.bytes == theirs && aside.bytes != theirs);
 }
 
 #[tokio::test]

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use contract::job::RenderJob;
 use prometheus::Registry;
+use render_worker::desk::Order;
 use render_worker::fleet::{FleetError, Health, ranked};
 use render_worker::wire::proto::StatusRequest;
 use render_worker::wire::proto::renderer_client::RendererClient;
@@ -49,7 +50,10 @@ async fn pictures_between_the_same_frames_are_drawn_on_one_worker() {
         for (number, time) in (0..).zip(times) {
             let job = quick(&at(&flux, &carbon, time), number);
             let first = first_asked(&job, &names);
-            let picture = fleet.draw(&job, USUAL, "t").await.unwrap();
+            let picture = fleet
+                .draw(&job, Order::on_demand(USUAL), "t")
+                .await
+                .unwrap();
             assert_eq!(picture.worker, first, "{interval}");
             by_interval
                 .entry(interval)
@@ -110,10 +114,13 @@ async fn a_worker_killed_in_the_middle_of_a_tile_has_it_drawn_elsewhere_with_equ
     );
     let alone = Store::memory();
     two_months_in(&alone).await;
-    assert_eq!(picture.png, drawn_here(&alone, &job).await);
+    assert_eq!(picture.bytes, drawn_here(&alone, &job).await);
     // The next picture does not ask the lost one first.
     let tries = metric(&registry, TRIES, &[]);
-    fleet.draw(&quick(&job, 1), USUAL, "t").await.unwrap();
+    fleet
+        .draw(&quick(&job, 1), Order::on_demand(USUAL), "t")
+        .await
+        .unwrap();
     assert_eq!(metric(&registry, TRIES, &[]), tries + 1);
 }
 
@@ -131,7 +138,10 @@ async fn a_frozen_worker_is_not_waited_for() {
     let job = quick(&job, 1);
     let first = first_asked(&job, &names);
     processes.iter().find(|p| p.name == first).unwrap().freeze();
-    let picture = fleet.draw(&job, USUAL, "t").await.unwrap();
+    let picture = fleet
+        .draw(&job, Order::on_demand(USUAL), "t")
+        .await
+        .unwrap();
     assert_ne!(picture.worker, first);
     assert_eq!(
         metric(&registry, TRIES, &[("outcome", "hedged")]),
@@ -157,7 +167,10 @@ async fn a_full_worker_is_passed_over() {
     let drawing = ask(&fleet, &slow(&job, 1));
     full.until("it is full", |w| w.desk.condition().in_flight == 1)
         .await;
-    let picture = fleet.draw(&quick(&job, 1), USUAL, "t").await.unwrap();
+    let picture = fleet
+        .draw(&quick(&job, 1), Order::on_demand(USUAL), "t")
+        .await
+        .unwrap();
     assert_ne!(picture.worker, first);
     assert_eq!(metric(&registry, TRIES, &[("outcome", "busy")]), 1);
     drawing.await.unwrap().unwrap();
@@ -178,14 +191,20 @@ async fn workers_may_come_later_than_those_who_ask() {
         fleet.ready().await,
         Err(FleetError::Unavailable(_))
     ));
-    let refused = fleet.draw(&quick(&job, 1), USUAL, "t").await.unwrap_err();
+    let refused = fleet
+        .draw(&quick(&job, 1), Order::on_demand(USUAL), "t")
+        .await
+        .unwrap_err();
     assert!(matches!(refused, FleetError::Unavailable(_)), "{refused}");
     let own = render_worker::wire::Version::own();
     let backend = render::Backend::Cpu;
     let _worker = Worker::start_with(&store, &worker_settings, backend, own);
     until("it is found", || fleet.health()[&name] == Health::Up).await;
     assert_eq!(fleet.ready().await.unwrap(), "1 of 1 render workers");
-    fleet.draw(&quick(&job, 1), USUAL, "t").await.unwrap();
+    fleet
+        .draw(&quick(&job, 1), Order::on_demand(USUAL), "t")
+        .await
+        .unwrap();
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -200,7 +219,10 @@ async fn a_name_brings_the_workers_at_its_addresses() {
         fleet.health().values().any(|health| *health == Health::Up)
     })
     .await;
-    let picture = fleet.draw(&quick(&job, 1), USUAL, "t").await.unwrap();
+    let picture = fleet
+        .draw(&quick(&job, 1), Order::on_demand(USUAL), "t")
+        .await
+        .unwrap();
     assert_eq!(picture.worker, worker.name);
 }
 
@@ -213,7 +235,10 @@ async fn no_answer_within_the_time_is_an_error_within_the_time() {
     let fleet = fleet_with(&settings, &Registry::new()).await;
     process.freeze();
     let begun = Instant::now();
-    let late = fleet.draw(&quick(&job, 1), USUAL, "t").await.unwrap_err();
+    let late = fleet
+        .draw(&quick(&job, 1), Order::on_demand(USUAL), "t")
+        .await
+        .unwrap_err();
     let took = begun.elapsed();
     let limit = Duration::from_millis(400);
     assert_eq!(late, FleetError::Late { deadline: limit });
@@ -229,11 +254,17 @@ async fn a_job_that_no_worker_would_draw_is_asked_of_none() {
     let fleet = fleet_with(&fleet_settings(&[&worker.name]), &registry).await;
     let mut beyond = job.clone();
     beyond.style.slices = 0;
-    let refused = fleet.draw(&beyond, USUAL, "t").await.unwrap_err();
+    let refused = fleet
+        .draw(&beyond, Order::on_demand(USUAL), "t")
+        .await
+        .unwrap_err();
     assert!(matches!(refused, FleetError::BadRequest(_)), "{refused}");
     let mut unknown = job;
     unknown.value.domain = "domain/nothing/0".parse().unwrap();
     assert_eq!(metric(&registry, TRIES, &[]), 0);
-    let refused = fleet.draw(&unknown, USUAL, "t").await.unwrap_err();
+    let refused = fleet
+        .draw(&unknown, Order::on_demand(USUAL), "t")
+        .await
+        .unwrap_err();
     assert!(matches!(refused, FleetError::NotFound(_)), "{refused}");
 }

@@ -73,7 +73,7 @@ async fn a_frozen_picture_is_found_under_the_name_of_its_job() {
             .draw(&of_now, Order::on_demand(USUAL))
             .await
             .unwrap();
-        assert!(found.origin == Origin::Stored && found.png == png);
+        assert!(found.origin == Origin::Stored && found.bytes == png);
     }
     let (_folder, old) = store(1);
     for key in old.list("tiles").await.unwrap() {

@@ -39,7 +39,7 @@ impl Here {
     ) -> Result<Bytes, Arc<DrawError>> {
         let order = Order::on_demand(Storing::Nothing);
         match self.desk.draw_in_turn(job, order, turn).await {
-            Ok(drawn) => Ok(drawn.png),
+            Ok(drawn) => Ok(drawn.bytes),
             Err(DeskError::Render(error)) => Err(error),
             Err(other) => panic!("{other}"),
         }

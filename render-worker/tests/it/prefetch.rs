@@ -9,6 +9,7 @@ use contract::manifest::Manifest;
 use contract::quantity::Quantity;
 use render::Backend;
 use render_worker::Limits;
+use render_worker::desk::Order;
 use storage::Store;
 
 use crate::device;
@@ -105,7 +106,10 @@ async fn what_is_read_ahead_and_used_is_in_the_metrics() {
     };
     for (time, read, used) in [("2000-04-20", 2, 0), ("2000-05-20", 3, 1)] {
         let job = map_at(&flux, time, small());
-        fleet.draw(&job, USUAL, "t").await.unwrap();
+        fleet
+            .draw(&job, Order::on_demand(USUAL), "t")
+            .await
+            .unwrap();
         worker
             .until(time, |worker| count(worker, "read") == read)
             .await;

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use contract::job::{Mode, RenderJob};
 use render::Backend;
-use render_worker::desk::Origin;
+use render_worker::desk::{Order, Origin};
 use render_worker::fleet::FleetError;
 use render_worker::wire::Version;
 use render_worker::wire::proto::{DrawRequest, StatusRequest};
@@ -20,6 +20,7 @@ use crate::worker::{
 
 fn request(job: &RenderJob) -> DrawRequest {
     DrawRequest {
+        jpeg_quality: 0,
         version: Some(Version::own().into()),
         job_json: serde_json::to_string(job).unwrap(),
         trace: "test".into(),
@@ -48,12 +49,18 @@ async fn a_picture_is_the_same_bytes_by_grpc_as_in_process() {
                 ..job.clone()
             };
             let here = local.draw(&job).await.unwrap();
-            let there = fleet.draw(&job, USUAL, "t").await.unwrap();
+            let there = fleet
+                .draw(&job, Order::on_demand(USUAL), "t")
+                .await
+                .unwrap();
             assert_eq!(there.origin, Origin::Drawn);
-            assert_eq!(there.png, here, "{mode}");
+            assert_eq!(there.bytes, here, "{mode}");
             assert_eq!(own.get(&job.key()).await.unwrap(), here, "it is kept");
-            let again = fleet.draw(&job, USUAL, "t").await.unwrap();
-            assert_eq!((again.origin, again.png), (Origin::Stored, here));
+            let again = fleet
+                .draw(&job, Order::on_demand(USUAL), "t")
+                .await
+                .unwrap();
+            assert_eq!((again.origin, again.bytes), (Origin::Stored, here));
         }
     }
 }
@@ -85,7 +92,7 @@ async fn thirty_two_equal_calls_are_one_drawing() {
     );
     let here = drawn_here(&store, &wanted).await;
     for call in calls {
-        assert_eq!(call.await.unwrap().unwrap().png, here);
+        assert_eq!(call.await.unwrap().unwrap().bytes, here);
     }
     first.await.unwrap().unwrap();
     let pictures = |origin| {
@@ -111,14 +118,20 @@ async fn a_full_worker_says_when_to_ask_again_and_draws_what_it_took() {
     worker
         .until("one waits", |w| w.desk.condition().waiting_on_demand == 1)
         .await;
-    let refused = fleet.draw(&quick(&job, 2), USUAL, "t").await.unwrap_err();
+    let refused = fleet
+        .draw(&quick(&job, 2), Order::on_demand(USUAL), "t")
+        .await
+        .unwrap_err();
     let FleetError::Busy { retry_after } = refused else {
         panic!("not busy: {refused}");
     };
     assert!(retry_after >= Duration::from_millis(100), "{retry_after:?}");
     drawing.await.unwrap().unwrap();
     waiting.await.unwrap().unwrap();
-    fleet.draw(&quick(&job, 2), USUAL, "t").await.unwrap();
+    fleet
+        .draw(&quick(&job, 2), Order::on_demand(USUAL), "t")
+        .await
+        .unwrap();
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -231,7 +244,10 @@ async fn versions_that_differ_are_told_on_both_sides_before_anything_is_drawn() 
     let fleet = fleet(&[&worker.name]).await;
     let not_ready = fleet.ready().await.unwrap_err().to_string();
     assert!(not_ready.contains("0.0.0-older"), "{not_ready}");
-    let refused = fleet.draw(&job, USUAL, "t").await.unwrap_err();
+    let refused = fleet
+        .draw(&job, Order::on_demand(USUAL), "t")
+        .await
+        .unwrap_err();
     assert!(
         matches!(&refused, FleetError::Unavailable(text) if text.contains("0.0.0-older")),
         "{refused}"
@@ -260,7 +276,10 @@ async fn a_stopping_worker_sends_others_away_and_finishes_what_it_took() {
     worker
         .until("it stops", |w| w.desk.condition().stopping)
         .await;
-    let refused = fleet.draw(&quick(&job, 2), USUAL, "t").await.unwrap_err();
+    let refused = fleet
+        .draw(&quick(&job, 2), Order::on_demand(USUAL), "t")
+        .await
+        .unwrap_err();
     assert!(matches!(refused, FleetError::Unavailable(_)), "{refused}");
     assert!(!drawing.is_finished());
     drawing.await.unwrap().unwrap();
@@ -388,7 +407,10 @@ async fn a_caller_asks_one_worker_for_no_more_than_it_may() {
     worker
         .until("one is drawn", |w| w.desk.condition().in_flight == 1)
         .await;
-    let refused = fleet.draw(&quick(&job, 1), USUAL, "t").await.unwrap_err();
+    let refused = fleet
+        .draw(&quick(&job, 1), Order::on_demand(USUAL), "t")
+        .await
+        .unwrap_err();
     assert!(matches!(refused, FleetError::Busy { .. }), "{refused}");
     assert_eq!(
         worker.desk.condition().waiting_on_demand,

@@ -6,7 +6,7 @@ use std::time::Duration;
 use ::service::Stop;
 use prometheus::Registry;
 use render::Backend;
-use render_worker::desk::{Desk, Storing};
+use render_worker::desk::{Desk, Order, Storing};
 use render_worker::fleet::{Fleet, FleetSettings};
 use render_worker::server::{Server, ServerError, Settings};
 use render_worker::wire::Version;
@@ -166,5 +166,5 @@ pub(crate) fn ask(
     job: &contract::job::RenderJob,
 ) -> JoinHandle<Result<render_worker::fleet::Picture, render_worker::fleet::FleetError>> {
     let (fleet, job) = (Arc::clone(fleet), job.clone());
-    tokio::spawn(async move { fleet.draw(&job, USUAL, "test").await })
+    tokio::spawn(async move { fleet.draw(&job, Order::on_demand(USUAL), "test").await })
 }

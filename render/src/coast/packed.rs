@@ -1,12 +1,6 @@
-//! Lines as bytes: differences of whole thousandths of a degree, in as few bytes as they need.
-//!
-//! For each of two scales: the number of lines; for each line the number of its places and their longitudes and
-//! latitudes, each less that of the place before. Numbers are LEB128, those with a sign zigzag.
+//! The lines of two scales as bytes, one scale after the other.
 
-/// Parts of a degree that places are rounded to: 111 m, a tenth of what the finer scale resolves.
-const PARTS_PER_DEG: f64 = 1000.0;
-/// Most places of one line, and most lines of one scale.
-const MOST: u64 = 1 << 20;
+use contract::land::packed::{PARTS_PER_DEG, take_lines};
 
 /// A place in thousandths of a degree: longitude and latitude.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -46,21 +40,15 @@ pub fn pack(scales: &[Vec<Vec<Place>>; 2]) -> Vec<u8> {
 
 /// The lines of both scales; none if the bytes are not whole.
 pub fn unpack(mut bytes: &[u8]) -> Option<[Vec<Vec<Place>>; 2]> {
-    let mut scales = [vec![], vec![]];
-    for lines in &mut scales {
-        for _ in 0..take(&mut bytes)? {
-            let mut line = vec![];
-            let mut place = Place::default();
-            for _ in 0..take(&mut bytes)? {
-                for parts in &mut place.0 {
-                    let step = take_number(&mut bytes)?;
-                    *parts += (step >> 1) as i64 ^ -((step & 1) as i64);
-                }
-                line.push(place);
-            }
-            lines.push(line);
-        }
-    }
+    let mut scale = || {
+        let lines = take_lines(&mut bytes)?.into_iter();
+        Some(
+            lines
+                .map(|line| line.into_iter().map(Place).collect())
+                .collect(),
+        )
+    };
+    let scales = [scale()?, scale()?];
     bytes.is_empty().then_some(scales)
 }
 
@@ -70,25 +58,6 @@ fn put(bytes: &mut Vec<u8>, mut number: u64) {
         number >>= 7;
     }
     bytes.push(number as u8);
-}
-
-/// A count.
-fn take(bytes: &mut &[u8]) -> Option<u64> {
-    take_number(bytes).filter(|count| *count <= MOST)
-}
-
-fn take_number(bytes: &mut &[u8]) -> Option<u64> {
-    let mut number = 0;
-    // Five bytes hold every difference of two longitudes.
-    for shift in (0..35).step_by(7) {
-        let (byte, rest) = bytes.split_first()?;
-        *bytes = rest;
-        number |= u64::from(byte & 0x7f) << shift;
-        if byte & 0x80 == 0 {
-            return Some(number);
-        }
-    }
-    None
 }
 
 #[cfg(test)]

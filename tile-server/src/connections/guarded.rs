@@ -69,11 +69,12 @@ impl Guarded {
     fn wrote<T>(
         &mut self,
         cx: &mut Context<'_>,
+        begin: &[u8],
         written: Poll<io::Result<T>>,
     ) -> Poll<io::Result<T>> {
         match written {
             Poll::Ready(written) => {
-                self.progress.wrote(Instant::now());
+                self.progress.wrote(begin, Instant::now());
                 Poll::Ready(written)
             }
             Poll::Pending => self.wait(cx),
@@ -110,7 +111,7 @@ impl AsyncWrite for Guarded {
         bytes: &[u8],
     ) -> Poll<io::Result<usize>> {
         let written = Pin::new(&mut self.stream).poll_write(cx, bytes);
-        self.wrote(cx, written)
+        self.wrote(cx, bytes, written)
     }
 
     fn poll_write_vectored(
@@ -119,7 +120,8 @@ impl AsyncWrite for Guarded {
         parts: &[io::IoSlice<'_>],
     ) -> Poll<io::Result<usize>> {
         let written = Pin::new(&mut self.stream).poll_write_vectored(cx, parts);
-        self.wrote(cx, written)
+        let begin = parts.first().map_or(&[][..], |part| part);
+        self.wrote(cx, begin, written)
     }
 
     fn is_write_vectored(&self) -> bool {

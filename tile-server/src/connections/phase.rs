@@ -1,4 +1,4 @@
-//! How far a connection is, from its bytes alone: waiting for a request's head, or for an answer.
+//! How far a connection is, from its bytes alone: waiting for a request's head, or for an answer, or no more HTTP.
 //!
 //! Left out on purpose: what the bytes mean. A head ends with an empty line, which is all that is looked for.
 
@@ -15,6 +15,8 @@ enum Phase {
     Head { since: Instant },
     /// A head has ended and no answer begun. With `more`, bytes came behind it: of a body, or of the next request.
     Asked { more: bool },
+    /// The answer was that both speak another protocol from here on (RFC 9110, 15.2.2).
+    Switched,
 }
 
 /// Follows the bytes of one connection.
@@ -55,6 +57,8 @@ impl End {
 /// How every HTTP/2 connection begins (RFC 9113, 3.4).
 const HTTP2: &[u8] = b"PRI * HTTP/2.0\r\n";
 const END_OF_HEAD: &[u8] = b"\r\n\r\n";
+/// How an answer begins after which both speak another protocol.
+const SWITCHING: &[u8] = b"HTTP/1.1 101";
 
 impl Progress {
     /// A connection that was just opened: its first request is due.
@@ -92,6 +96,9 @@ impl Progress {
     }
 
     fn advance(&mut self, bytes: &[u8], now: Instant) {
+        if self.phase == Phase::Switched {
+            return;
+        }
         if self.phase == Phase::Between {
             self.phase = Phase::Head { since: now };
         }
@@ -129,8 +136,12 @@ impl Progress {
     }
 
     /// Bytes went to the client.
-    pub(super) fn wrote(&mut self, now: Instant) {
+    pub(super) fn wrote(&mut self, bytes: &[u8], now: Instant) {
         self.moved = now;
+        if matches!(self.phase, Phase::Asked { .. }) && bytes.starts_with(SWITCHING) {
+            self.phase = Phase::Switched;
+            return;
+        }
         if let Phase::Asked { more } = self.phase {
             // What came behind the head may be the next one's beginning: it is due like any other.
             self.phase = if more {
@@ -176,8 +187,12 @@ mod tests {
         }
 
         fn wrote(&mut self, second: u64) {
-            self.progress
-                .wrote(self.start + Duration::from_secs(second));
+            self.wrote_text(second, "HTTP/1.1 200 OK");
+        }
+
+        fn wrote_text(&mut self, second: u64, text: &str) {
+            let now = self.start + Duration::from_secs(second);
+            self.progress.wrote(text.as_bytes(), now);
         }
 
         fn due(&self) -> (u64, End) {
@@ -218,6 +233,18 @@ mod tests {
         assert_eq!(clock.due(), (101, End::Idle));
         clock.wrote(30);
         assert_eq!(clock.due(), (40, End::Slow));
+    }
+
+    #[test]
+    fn what_comes_after_a_switch_is_no_head() {
+        let mut clock = Clock::new();
+        clock.read(1, "GET /stream HTTP/1.1\r\nupgrade: websocket\r\n\r\n");
+        clock.wrote_text(2, "HTTP/1.1 101 Switching Protocols\r\n\r\n");
+        clock.read(50, "a frame");
+        assert_eq!(clock.due(), (150, End::Idle));
+        clock.wrote_text(60, "another");
+        clock.read(61, "and more");
+        assert_eq!(clock.due(), (161, End::Idle));
     }
 
     #[test]

@@ -5,7 +5,7 @@ use axum::http::HeaderMap;
 use axum::response::Response;
 use contract::camera::CameraAngles;
 use contract::grid::LonLatDeg;
-use contract::job::View;
+use contract::job::{RenderJob, View};
 use contract::look_at::LookAt;
 use contract::picture::PictureRequest;
 use serde::Deserialize;
@@ -116,11 +116,22 @@ pub(crate) async fn get(
     UrlQuery(query): UrlQuery<GlobeQuery>,
     headers: HeaderMap,
 ) -> Result<Response, ServerError> {
+    let (job, shown) = job(&state, &product, &file, &query).await?;
+    picture::respond(&state, &headers, job, shown).await
+}
+
+/// The job of a view, and the instant that it shows.
+pub(crate) async fn job(
+    state: &AppState,
+    product: &str,
+    file: &str,
+    query: &GlobeQuery,
+) -> Result<(RenderJob, Shown), ServerError> {
     let name = file
         .strip_suffix(".png")
         .ok_or(ServerError::UnknownAddress)?;
     let manifest = query.manifest.as_deref();
-    let layer = state.catalogue.version(&product, manifest).await?;
+    let layer = state.catalogue.version(product, manifest).await?;
     let mode = request::mode(&layer, name)?;
     let view = query.view()?;
     let time = time(query.time.as_deref())?;
@@ -135,8 +146,7 @@ pub(crate) async fn get(
     };
     let relief = query.surroundings.relief(&state.catalogue).await?;
     let job = request::job_of(&layer, &request, relief)?;
-    let shown = Shown::of(&layer, time);
-    picture::respond(&state, &headers, job, shown).await
+    Ok((job, Shown::of(&layer, time)))
 }
 
 impl GlobeQuery {

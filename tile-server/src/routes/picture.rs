@@ -39,6 +39,11 @@ impl Shown {
         }
     }
 
+    /// Is another instant shown than was asked for?
+    pub(crate) fn is_another(&self) -> bool {
+        self.covered.is_some()
+    }
+
     fn headers(&self) -> HeaderMap {
         let value = |text: String| text.parse().expect("times are printable");
         let mut headers = HeaderMap::new();

@@ -105,8 +105,8 @@ pub(super) async fn draw(
     } else {
         let desk = deployment::single_desk(settings, store).await?;
         let order = Order {
-            class: Class::Batch,
             storing: Storing::Keep,
+            ..Order::batch()
         };
         for job in &tiles.missing {
             let drawn = desk.draw(job, order).await?;
@@ -115,7 +115,7 @@ pub(super) async fn draw(
             }
             if !drawn.kept {
                 // Whoever asks for tiles wants them stored: the reason ends the command.
-                desk.keep(job, drawn.png).await?;
+                desk.keep(job, drawn.bytes).await?;
             }
             bar.inc(1);
         }
