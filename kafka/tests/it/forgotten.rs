@@ -16,15 +16,21 @@ use tokio::time::Instant;
 use crate::events::{FROM, MOMENT, WAIT_LIMIT, finished, notice, paths};
 use crate::own_topics::{end, open_on, servers};
 
-/// Kafka's number of the request for metadata, and its first version whose numbers of things are of variable length.
+/// Kafka's number of the request for metadata, and its first version with identities of topics; its lengths are variable.
 const METADATA: u16 = 3;
-const FIRST_COMPACT: u16 = 9;
+const FIRST_COMPACT: u16 = 10;
+/// Topics that nobody asked for, in an answer.
+const UNKNOWN_TOPICS: u32 = 20_000;
 /// How long nobody answers, and how long brokers are left out then: longer than a client takes to ask for them.
 const AWAY: Duration = Duration::from_secs(3);
 const LEFT_OUT: Duration = Duration::from_secs(6);
 
+/// How much of an answer is searched, bytes.
+const MOST_SEARCHED: usize = 4096;
+
 /// Between clients and a broker. Clients take it for the broker.
 struct Between {
+    broker: String,
     port: u16,
     is_away: AtomicBool,
     leaves_out: AtomicBool,
@@ -40,6 +46,7 @@ impl Between {
     async fn start(broker: String) -> Arc<Self> {
         let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
         let this = Arc::new(Self {
+            broker,
             port: listener.local_addr().unwrap().port(),
             is_away: AtomicBool::new(false),
             leaves_out: AtomicBool::new(false),
@@ -49,8 +56,8 @@ impl Between {
         let between = Arc::clone(&this);
         tokio::spawn(async move {
             while let Ok((client, _)) = listener.accept().await {
-                let (between, broker) = (Arc::clone(&between), broker.clone());
-                tokio::spawn(async move { between.carry(client, &broker).await });
+                let between = Arc::clone(&between);
+                tokio::spawn(async move { between.carry(client).await });
             }
         });
         this
@@ -70,12 +77,12 @@ impl Between {
         assert!(count > 0, "nobody asked");
     }
 
-    async fn carry(self: Arc<Self>, client: TcpStream, broker: &str) {
+    async fn carry(self: Arc<Self>, client: TcpStream) {
         let mut cut = self.cut.subscribe();
         if self.is_away.load(Ordering::SeqCst) {
             return;
         }
-        let broker = TcpStream::connect(broker).await.unwrap();
+        let broker = TcpStream::connect(&self.broker).await.unwrap();
         let (from_client, to_client) = client.into_split();
         let (from_broker, to_broker) = broker.into_split();
         let asked = Asked::default();
@@ -89,8 +96,12 @@ impl Between {
     async fn answers(&self, mut from: OwnedReadHalf, mut to: OwnedWriteHalf, asked: &Asked) {
         while let Some(mut frame) = read_frame(&mut from).await {
             let number = u32::from_be_bytes(frame[..4].try_into().unwrap());
-            if asked.lock().unwrap().remove(&number).is_some() {
-                self.rewrite(&mut frame);
+            let is_metadata = asked.lock().unwrap().remove(&number).is_some();
+            if is_metadata && self.leaves_out.load(Ordering::SeqCst) {
+                leave_out(&mut frame);
+                self.left_out.fetch_add(1, Ordering::SeqCst);
+            } else {
+                self.stand_in(&mut frame);
             }
             if write_frame(&mut to, &frame).await.is_none() {
                 return;
@@ -98,23 +109,65 @@ impl Between {
         }
     }
 
-    /// The only broker is found here, or not at all.
-    fn rewrite(&self, frame: &mut Vec<u8>) {
-        // Number of the request, no tags, throttle; then one more than the count of brokers.
-        const COUNT_AT: usize = 4 + 1 + 4;
-        assert_eq!(frame[COUNT_AT], 2, "one broker");
-        let host_at = COUNT_AT + 1 + 4;
-        let port_at = host_at + usize::from(frame[host_at]);
-        let rack_at = port_at + 4;
-        let end = rack_at + usize::from(frame[rack_at]).max(1) + 1;
-        if self.leaves_out.load(Ordering::SeqCst) {
-            frame[COUNT_AT] = 1;
-            frame.drain(COUNT_AT + 1..end);
-            self.left_out.fetch_add(1, Ordering::SeqCst);
-        } else {
-            frame[port_at..rack_at].copy_from_slice(&u32::from(self.port).to_be_bytes());
+    /// Wherever an answer says where the broker is, it is here.
+    fn stand_in(&self, frame: &mut [u8]) {
+        let (host, port) = self.broker.split_once(':').unwrap();
+        let port: u32 = port.parse().unwrap();
+        let address = [host.as_bytes(), &port.to_be_bytes()].concat();
+        // An answer with messages in it says nothing of brokers.
+        let last = frame.len().min(MOST_SEARCHED).saturating_sub(address.len());
+        for at in 0..=last {
+            if frame[at..].starts_with(&address) {
+                let port_at = at + host.len();
+                frame[port_at..port_at + 4].copy_from_slice(&u32::from(self.port).to_be_bytes());
+            }
         }
     }
+}
+
+/// Takes the only broker out of an answer.
+fn leave_out(frame: &mut Vec<u8>) {
+    // Number of the request, no tags, throttle; then one more than the count of brokers.
+    const COUNT_AT: usize = 4 + 1 + 4;
+    assert_eq!(frame[COUNT_AT], 2, "one broker");
+    let host_at = COUNT_AT + 1 + 4;
+    let rack_at = host_at + usize::from(frame[host_at]) + 4;
+    let end = rack_at + usize::from(frame[rack_at]).max(1) + 1;
+    frame[COUNT_AT] = 1;
+    frame.drain(COUNT_AT + 1..end);
+    make_slow(frame, COUNT_AT + 1);
+}
+
+/// Puts unknown topics into an answer, so that its reader is still busy with it when the last broker has gone. The
+/// library then takes back that it wanted to begin anew.
+fn make_slow(frame: &mut Vec<u8>, cluster_at: usize) {
+    let count_at = cluster_at + usize::from(frame[cluster_at]).max(1) + 4;
+    let count = u32::from(frame[count_at]) - 1;
+    assert!(count < 64, "one byte");
+    // An error, a name, an identity, not internal, no partitions, no rights, no tags.
+    let mut topics = compact_length(count + UNKNOWN_TOPICS);
+    for number in 0..UNKNOWN_TOPICS {
+        let name = format!("unknown-{number}");
+        topics.extend(3_u16.to_be_bytes());
+        topics.extend(compact_length(name.len() as u32));
+        topics.extend(name.as_bytes());
+        topics.extend(u128::from(number + 1).to_be_bytes());
+        topics.extend([0, 1]);
+        topics.extend(i32::MIN.to_be_bytes());
+        topics.push(0);
+    }
+    frame.splice(count_at..=count_at, topics);
+}
+
+/// One more than a length, as a number of variable length.
+fn compact_length(length: u32) -> Vec<u8> {
+    let (mut rest, mut bytes) = (length + 1, vec![]);
+    while rest >= 0x80 {
+        bytes.push(rest as u8 | 0x80);
+        rest >>= 7;
+    }
+    bytes.push(rest as u8);
+    bytes
 }
 
 async fn requests(mut from: OwnedReadHalf, mut to: OwnedWriteHalf, asked: &Asked) {
