@@ -1,47 +1,78 @@
-//! Of which size and quality a picture can be had in time: what the last ones took in, the next one's share of its full
-//! size out.
+//! How good a picture can be had in time: what the last ones took in, the detail of the next one out.
 
 use std::time::Duration;
 
+use contract::job::{RenderJob, View};
+
 /// From a state to its picture on the screen.
-const AIM: Duration = Duration::from_millis(50);
-/// Shares of the full width and height, largest first.
-const SHARES: [f64; 6] = [1.0, 0.75, 0.5, 0.375, 0.25, 0.1875];
-/// Where a stream begins, among the shares.
-const FIRST: usize = 2;
+const AIM: Duration = Duration::from_millis(60);
+/// All there is, best first.
+const DETAILS: [Detail; 7] = [
+    Detail::of(1.0, u32::MAX, u32::MAX),
+    Detail::of(0.75, 64, 128),
+    Detail::of(0.5, 16, 64),
+    Detail::of(0.375, 8, 32),
+    Detail::of(0.25, 4, 24),
+    Detail::of(0.25, 2, 16),
+    Detail::of(0.1875, 1, 12),
+];
+/// With which one a stream begins.
+const FIRST: usize = 3;
 /// Fewest pixels of the shorter side.
 const FEWEST_PX: u32 = 96;
-/// Pictures after a change of size that say nothing of the new one: they were under way already.
+/// Pictures after a change that say nothing of the new detail: they were under way already.
 const SETTLING: u32 = 3;
+/// Pictures before a better detail is tried that was too slow: the first time, and at last.
+const FIRST_HOLD: u32 = 60;
+const LAST_HOLD: u32 = 2000;
 /// Quality of a JPEG, and where the link is what takes long.
 const QUALITY: u8 = 82;
 const QUALITY_ON_A_SLOW_LINK: u8 = 55;
 
+/// How much of a picture is drawn while it moves.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Detail {
+    /// Of width and height.
+    share: f64,
+    /// At most so many particles of a cell, in so many slices.
+    particles_per_cell: u32,
+    slices: u32,
+}
+
 /// How one stream goes.
 #[derive(Debug)]
 pub(super) struct Pace {
-    share: usize,
+    detail: usize,
     /// Running means, seconds.
     drawing_s: f64,
     link_s: f64,
     /// The shortest time from sending to a receipt: what the way itself takes.
     way: Option<Duration>,
     settling: u32,
+    /// Pictures until a better detail is tried, and for how many after the next one that is too slow.
+    hold: u32,
+    next_hold: u32,
 }
 
 impl Pace {
     pub(super) fn new() -> Self {
         Self {
-            share: FIRST,
+            detail: FIRST,
             drawing_s: AIM.as_secs_f64(),
             link_s: 0.0,
             way: None,
             settling: 0,
+            hold: 0,
+            next_hold: FIRST_HOLD,
         }
     }
 
     /// A picture in motion took so long from its state until it was ready.
     pub(super) fn drawn(&mut self, took: Duration) {
+        if self.settling > 0 {
+            self.settling -= 1;
+            return;
+        }
         mix(&mut self.drawing_s, took);
         self.choose();
     }
@@ -54,30 +85,30 @@ impl Pace {
     }
 
     fn choose(&mut self) {
-        if self.settling > 0 {
-            self.settling -= 1;
-            return;
+        let share_of_aim = (self.drawing_s + self.link_s) / AIM.as_secs_f64();
+        self.hold = self.hold.saturating_sub(1);
+        if share_of_aim > 1.3 && self.detail + 1 < DETAILS.len() {
+            let steps = if share_of_aim > 3.0 { 2 } else { 1 };
+            self.turn_to((self.detail + steps).min(DETAILS.len() - 1));
+            // What was tried and was too slow is tried more and more seldom.
+            self.hold = self.next_hold;
+            self.next_hold = (self.next_hold * 2).min(LAST_HOLD);
+        } else if share_of_aim < 0.5 && self.hold == 0 && self.detail > 0 {
+            self.turn_to(self.detail - 1);
         }
-        let (aim_s, now_s) = (AIM.as_secs_f64(), self.drawing_s + self.link_s);
-        let larger = |share: usize| (SHARES[share - 1] / SHARES[share]).powi(2);
-        let next = if now_s > 1.3 * aim_s && self.share + 1 < SHARES.len() {
-            self.share + 1
-        } else if self.share > 0 && now_s * larger(self.share) < 0.9 * aim_s {
-            self.share - 1
-        } else {
-            return;
-        };
-        // As it would be if time went by pixels: the next pictures say how it is.
-        let factor = (SHARES[next] / SHARES[self.share]).powi(2);
-        self.drawing_s *= factor;
-        self.link_s *= factor;
-        self.share = next;
-        self.settling = SETTLING;
     }
 
-    /// The share of the full size that the next picture in motion has.
-    pub(super) fn share(&self) -> Share {
-        Share(SHARES[self.share])
+    fn turn_to(&mut self, detail: usize) {
+        self.detail = detail;
+        self.settling = SETTLING;
+        // Nothing is known of it.
+        self.drawing_s = 0.8 * AIM.as_secs_f64();
+        self.link_s = self.link_s.min(0.2 * AIM.as_secs_f64());
+    }
+
+    /// That of the next picture in motion.
+    pub(super) fn detail(&self) -> Detail {
+        DETAILS[self.detail]
     }
 
     /// Its quality.
@@ -90,58 +121,94 @@ impl Pace {
     }
 }
 
-/// A share of a picture's width and height.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Share(f64);
+impl Detail {
+    const fn of(share: f64, particles_per_cell: u32, slices: u32) -> Self {
+        Self {
+            share,
+            particles_per_cell,
+            slices,
+        }
+    }
 
-impl Share {
-    /// The pixels of it, enough to be seen.
-    pub(super) fn of(self, full_px: [u32; 2]) -> [u32; 2] {
+    /// The same view in less detail. Text that is made anew for each picture takes longer than the picture, and could not
+    /// be read: there is none.
+    pub(super) fn reduce(self, job: RenderJob) -> RenderJob {
+        let mut job = RenderJob {
+            annotations: None,
+            view: of_size(job.view, self.size_px(job.view.size_px())),
+            ..job
+        };
+        let style = &mut job.style;
+        style.particles_per_cell = style.particles_per_cell.min(self.particles_per_cell);
+        style.slices = style.slices.min(self.slices);
+        job
+    }
+
+    /// Its share of a size, enough to be seen.
+    fn size_px(self, full_px: [u32; 2]) -> [u32; 2] {
         let shorter = f64::from(full_px[0].min(full_px[1]));
-        let share = self.0.max((f64::from(FEWEST_PX) / shorter).min(1.0));
+        let share = self.share.max((f64::from(FEWEST_PX) / shorter).min(1.0));
         full_px.map(|px| ((f64::from(px) * share).round() as u32).max(1))
     }
 }
 
-/// An eighth of the news.
+/// The same camera on other pixels.
+fn of_size(view: View, [width, height]: [u32; 2]) -> View {
+    match view {
+        View::Globe {
+            lon_deg,
+            lat_deg,
+            height_m,
+            angles,
+            ..
+        } => View::Globe {
+            lon_deg,
+            lat_deg,
+            height_m,
+            width_px: width,
+            height_px: height,
+            angles,
+        },
+        tile @ View::Tile { .. } => tile,
+    }
+}
+
+/// A quarter of the news.
 fn mix(mean_s: &mut f64, took: Duration) {
-    *mean_s += (took.as_secs_f64() - *mean_s) / 8.0;
+    *mean_s += (took.as_secs_f64() - *mean_s) / 4.0;
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const FULL_PX: [u32; 2] = [1920, 1080];
-
-    /// After many pictures that take `pixel_ns` a pixel and `least_ms` besides.
-    fn settled(pixel_ns: f64, least_ms: f64) -> [u32; 2] {
+    /// The details of many pictures, where each takes what `cost_ms` says of it.
+    fn run(cost_ms: impl Fn(Detail) -> f64) -> Vec<usize> {
         let mut pace = Pace::new();
-        let mut last = vec![];
-        for _ in 0..400 {
-            let [width, height] = pace.share().of(FULL_PX);
-            let pixels = f64::from(width) * f64::from(height);
-            pace.drawn(Duration::from_secs_f64(
-                least_ms * 1e-3 + pixels * pixel_ns * 1e-9,
-            ));
-            last.push([width, height]);
+        let mut all = vec![];
+        for _ in 0..4000 {
+            all.push(pace.detail);
+            let took_s = cost_ms(pace.detail()) * 1e-3;
+            pace.drawn(Duration::from_secs_f64(took_s));
         }
-        last.reverse();
-        // It has settled: nothing goes to and fro.
-        assert!(
-            last[..100].iter().all(|size| *size == last[0]),
-            "{:?}",
-            &last[..20]
-        );
-        last[0]
+        all
     }
 
     #[test]
-    fn a_quick_device_draws_in_full_and_a_slow_one_as_large_as_it_can_in_time() {
-        assert_eq!(settled(5.0, 1.0), FULL_PX);
-        let [width, _] = settled(100.0, 5.0);
-        assert!((480..=960).contains(&width), "{width}");
-        assert_eq!(settled(1000.0, 100.0)[0], 360);
+    fn a_quick_device_draws_in_full_and_soon() {
+        let all = run(|_any| 10.0);
+        assert_eq!(all.iter().position(|&detail| detail == 0), Some(16));
+        assert!(all[100..].iter().all(|&detail| detail == 0));
+    }
+
+    #[test]
+    fn a_slow_device_draws_what_it_can_and_seldom_tries_more() {
+        let all = run(|detail| if detail.slices > 24 { 250.0 } else { 25.0 });
+        let slow = all[400..].iter().filter(|&&detail| detail < 4).count();
+        assert!(slow * 20 < all.len(), "{slow}");
+        assert!(all[400..].iter().all(|&detail| detail <= 5), "{all:?}");
+        let all = run(|_any| 900.0);
+        assert!(all[50..].iter().all(|&detail| detail == DETAILS.len() - 1));
     }
 
     #[test]
@@ -154,17 +221,17 @@ mod tests {
             clogged.seen(Duration::from_millis(if i == 0 { 20 } else { 400 }));
             clogged.drawn(Duration::from_millis(8));
         }
-        assert_eq!(far.share().of(FULL_PX), FULL_PX);
-        assert_eq!(far.quality(), QUALITY);
-        assert!(clogged.share().of(FULL_PX)[0] < 960);
+        assert_eq!((far.detail, far.quality()), (0, QUALITY));
+        assert!(clogged.detail > FIRST);
         assert_eq!(clogged.quality(), QUALITY_ON_A_SLOW_LINK);
     }
 
     #[test]
     fn small_pictures_are_never_made_smaller_than_can_be_seen() {
-        let share = Pace::new().share();
-        assert_eq!(share.of([64, 48]), [64, 48]);
-        assert_eq!(share.of([120, 96]), [120, 96]);
-        assert_eq!(share.of([4096, 1]), [4096, 1]);
+        let size = |full_px| Pace::new().detail().size_px(full_px);
+        assert_eq!(size([64, 48]), [64, 48]);
+        assert_eq!(size([120, 96]), [120, 96]);
+        assert_eq!(size([4096, 1]), [4096, 1]);
+        assert_eq!(size([1600, 800]), [600, 300]);
     }
 }

@@ -4,21 +4,15 @@ use std::time::Instant;
 
 use axum::http::Uri;
 use contract::encoding::Encoding;
-use contract::job::{RenderJob, View};
+use contract::job::RenderJob;
 
 use super::message::{Header, Kind, Picture, State};
+use super::pace::Detail;
 use crate::error::ServerError;
 use crate::extract::UrlQuery;
 use crate::routes::globe::{self, GlobeQuery};
 use crate::routes::picture::Shown;
 use crate::state::AppState;
-
-/// Of what size and quality a picture in motion is drawn.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Size {
-    pub(super) size_px: [u32; 2],
-    pub(super) quality: u8,
-}
 
 /// A state that is being drawn.
 #[derive(Debug, Clone)]
@@ -35,18 +29,16 @@ impl Wish {
         Ok(self.picture(&job, job.view.size_px(), shown, Encoding::Png, bytes))
     }
 
-    /// The same for a moment: of the size that `choose` makes of the full one.
+    /// The same for a moment, in less detail.
     pub(super) async fn moving(
         self,
         server: AppState,
-        choose: impl FnOnce([u32; 2]) -> Size + Send,
+        detail: Detail,
+        quality: u8,
     ) -> Result<Picture, ServerError> {
-        let (mut job, shown) = job(&server, &self.state.view).await?;
+        let (job, shown) = job(&server, &self.state.view).await?;
         let full_px = job.view.size_px();
-        let Size { size_px, quality } = choose(full_px);
-        job.view = of_size(job.view, size_px);
-        // Text that is made anew for each picture takes longer than the picture, and could not be read.
-        job.annotations = None;
+        let job = detail.reduce(job);
         let encoding = Encoding::jpeg(quality)?;
         let bytes = server.pictures.in_passing(&job, encoding).await?;
         Ok(self.picture(&job, full_px, shown, encoding, bytes))
@@ -96,25 +88,4 @@ async fn job(server: &AppState, address: &str) -> Result<(RenderJob, Shown), Ser
         })?;
     let query: UrlQuery<GlobeQuery> = UrlQuery::of(&uri)?;
     globe::job(server, product, file, &query.0).await
-}
-
-/// The same camera on fewer pixels.
-fn of_size(view: View, [width, height]: [u32; 2]) -> View {
-    match view {
-        View::Globe {
-            lon_deg,
-            lat_deg,
-            height_m,
-            angles,
-            ..
-        } => View::Globe {
-            lon_deg,
-            lat_deg,
-            height_m,
-            width_px: width,
-            height_px: height,
-            angles,
-        },
-        tile @ View::Tile { .. } => tile,
-    }
 }

@@ -14,7 +14,7 @@ use super::message::{Kind, Picture, Said, refusal};
 use super::metrics::StreamMetrics;
 use super::outbox::Outbox;
 use super::pace::Pace;
-use super::picture::{Size, Wish};
+use super::picture::Wish;
 use super::places::Place;
 use crate::error::ServerError;
 use crate::state::AppState;
@@ -264,14 +264,10 @@ impl Session {
         let Some(wish) = self.newest.take() else {
             return;
         };
-        let (share, quality) = (self.pace.share(), self.pace.quality());
-        let choose = move |full_px| Size {
-            size_px: share.of(full_px),
-            quality,
-        };
+        let (detail, quality) = (self.pace.detail(), self.pace.quality());
         let server = self.server.clone();
         let drawing = async move {
-            let drawn = wish.clone().moving(server, choose).await;
+            let drawn = wish.clone().moving(server, detail, quality).await;
             (wish, drawn)
         };
         self.moving.push(drawing.boxed());
