@@ -29,7 +29,7 @@ pub(crate) use ground::{Ground, GroundOptions};
 pub(crate) use look::{Look, RenderLegend};
 pub(crate) use observations::{MatchTime, Matchup, Observations, ObservationsAsked};
 pub(crate) use pictures::{
-    BenchCompare, BenchQuality, BenchRender, BenchServe, QualityScenes, RenderAnimation,
+    BenchCompare, BenchFly, BenchQuality, BenchRender, BenchServe, QualityScenes, RenderAnimation,
 };
 pub(crate) use services::{
     Bench, BenchBudget, BenchStream, Executor, Ingestd, Notice, Rejected, RenderWorker, Scheduler,

@@ -3,6 +3,7 @@
 pub(crate) mod budget;
 pub(crate) mod compare;
 pub(crate) mod fill;
+pub(crate) mod fly;
 pub(crate) mod quality;
 pub(crate) mod render;
 pub(crate) mod serve;

@@ -197,6 +197,53 @@ pub(crate) struct BenchServe {
     pub(crate) json: bool,
 }
 
+/// `fluxglobe bench fly`.
+#[derive(Debug, Args)]
+pub(crate) struct BenchFly {
+    /// Address of the server.
+    #[arg(long, default_value = "http://127.0.0.1:8080")]
+    pub(crate) url: String,
+    /// Product to fly over; the first one that is drawn in the mode if absent.
+    #[arg(long, value_name = "PRODUCT")]
+    pub(crate) layer: Option<ProductId>,
+    /// How it is drawn.
+    #[arg(long, default_value = "volume")]
+    pub(crate) mode: Mode,
+    /// Viewers at the same time, 1 to 1024, each over a place of its own.
+    #[arg(long, default_value = "1", value_parser = clients)]
+    pub(crate) clients: NonZeroU16,
+    /// How often a viewer says what its camera sees, each second.
+    #[arg(long, default_value = "240", value_name = "RATE")]
+    pub(crate) states_per_second: NonZeroU16,
+    /// How long pictures are counted.
+    #[arg(long, default_value = "20")]
+    pub(crate) seconds: NonZeroU16,
+    /// How long is flown before that, so that frames are read, kernels compiled and sizes chosen.
+    #[arg(long, default_value_t = 5)]
+    pub(crate) warm_up_seconds: u16,
+    /// Width of the full picture, pixels.
+    #[arg(long, default_value_t = 1920, value_parser = value_parser!(u32).range(1..=4096))]
+    pub(crate) width: u32,
+    /// Height of the full picture, pixels.
+    #[arg(long, default_value_t = 1080, value_parser = value_parser!(u32).range(1..=4096))]
+    pub(crate) height: u32,
+    /// Longitude of the first viewer at the start, degrees.
+    #[arg(long, default_value_t = -150.0, allow_hyphen_values = true)]
+    pub(crate) lon: f64,
+    /// Latitude below the cameras, degrees.
+    #[arg(long, default_value_t = 0.0, allow_hyphen_values = true)]
+    pub(crate) lat: f64,
+    /// Height of the cameras above the ground, km.
+    #[arg(long, default_value_t = 1500.0)]
+    pub(crate) height_km: f64,
+    /// Tilt of the cameras, degrees; 0 looks straight down.
+    #[arg(long, default_value_t = 60.0)]
+    pub(crate) tilt: f64,
+    /// JSON instead of a table.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
 /// A number of clients.
 fn clients(text: &str) -> Result<NonZeroU16, String> {
     let count: Option<NonZeroU16> = text.parse().ok();

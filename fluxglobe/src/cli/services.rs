@@ -9,7 +9,7 @@ use contract::digest::Digest;
 use contract::product::ProductId;
 use contract::topic::Origin;
 
-use super::{BenchCompare, BenchQuality, BenchRender, BenchServe};
+use super::{BenchCompare, BenchFly, BenchQuality, BenchRender, BenchServe};
 
 /// What every service is told besides its own settings.
 #[derive(Debug, Clone, Args)]
@@ -153,6 +153,8 @@ pub(crate) enum Bench {
     Stream(BenchStream),
     /// How many new pictures a running server gives to so many clients, and how long each waits.
     Serve(BenchServe),
+    /// How a running server is to fly through: pictures a second, camera to picture, rest to full picture
+    Fly(BenchFly),
     /// Budgets of a year of days, each a process of its own, beside a script on xarray if a Python is given.
     Budget(BenchBudget),
     /// How fast the renderer is on this machine, beside the classic raster renderer and the processor.

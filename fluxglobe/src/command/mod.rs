@@ -65,6 +65,7 @@ pub(crate) async fn run(settings: &Settings, command: Command) -> Result<ExitCod
         Command::Bench(Bench::Render(options)) => bench::render::run(settings, options).await?,
         Command::Bench(Bench::Budget(options)) => bench::budget::run(&options)?,
         Command::Bench(Bench::Serve(options)) => bench::serve::run(&options).await?,
+        Command::Bench(Bench::Fly(options)) => bench::fly::run(&options).await?,
         Command::Bench(Bench::Quality(options)) => bench::quality::run(settings, options).await?,
         Command::Bench(Bench::Compare(options)) => bench::compare::run(&options)?,
         Command::Bench(Bench::Fill(options)) => bench::fill::run(settings, &options)?,

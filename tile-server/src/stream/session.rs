@@ -13,7 +13,7 @@ use tokio::time::{Instant as At, Interval, MissedTickBehavior};
 use super::message::{Kind, Picture, Said, refusal};
 use super::metrics::StreamMetrics;
 use super::outbox::Outbox;
-use super::pace::Pace;
+use super::pace::{Detail, Pace};
 use super::picture::Wish;
 use super::places::Place;
 use crate::error::ServerError;
@@ -31,7 +31,8 @@ const AGAIN: Duration = Duration::from_millis(250);
 const PING: Duration = Duration::from_secs(10);
 const SILENCE: Duration = Duration::from_secs(30);
 
-type Drawing = BoxFuture<'static, (Wish, Result<Picture, ServerError>)>;
+/// A picture on its way, with the detail that it is drawn in if it is one in motion.
+type Drawing = BoxFuture<'static, (Wish, Option<Detail>, Result<Picture, ServerError>)>;
 
 /// Why a stream ends.
 struct End {
@@ -149,12 +150,12 @@ impl Session {
                     }
                     None => Err(End::told("slow", close_code::POLICY, "nothing was taken for 10 s")),
                 },
-                Some((wish, drawn)) = self.moving.next(), if !self.moving.is_empty() => {
-                    self.drawn(outbox, wish, drawn)
+                Some((wish, detail, drawn)) = self.moving.next(), if !self.moving.is_empty() => {
+                    self.drawn(outbox, wish, detail, drawn)
                 }
-                (wish, drawn) = now(self.full.as_mut()), if self.full.is_some() => {
+                (wish, detail, drawn) = now(self.full.as_mut()), if self.full.is_some() => {
                     self.full = None;
-                    self.drawn(outbox, wish, drawn)
+                    self.drawn(outbox, wish, detail, drawn)
                 }
                 () = at(rest_at), if rest_at.is_some() => {
                     self.draw_in_full();
@@ -268,7 +269,7 @@ impl Session {
         let server = self.server.clone();
         let drawing = async move {
             let drawn = wish.clone().moving(server, detail, quality).await;
-            (wish, drawn)
+            (wish, Some(detail), drawn)
         };
         self.moving.push(drawing.boxed());
     }
@@ -280,7 +281,7 @@ impl Session {
         let server = self.server.clone();
         let drawing = async move {
             let drawn = wish.clone().full(server).await;
-            (wish, drawn)
+            (wish, None, drawn)
         };
         self.full = Some(drawing.boxed());
     }
@@ -290,6 +291,7 @@ impl Session {
         &mut self,
         outbox: &Outbox,
         wish: Wish,
+        detail: Option<Detail>,
         drawn: Result<Picture, ServerError>,
     ) -> Result<(), End> {
         let picture = match drawn {
@@ -297,9 +299,8 @@ impl Session {
             Err(error) => return self.failed(outbox, wish, &error),
         };
         let (id, kind) = (picture.header.id, picture.header.kind);
-        let took = wish.arrived.elapsed();
-        if kind == Kind::Moving {
-            self.pace.drawn(took);
+        if let Some(detail) = detail {
+            self.pace.drawn(detail, wish.arrived.elapsed());
         }
         // A full one takes the place of the moving one of the same state, and never the other way round.
         let newest = self.ready.as_ref().map(|ready| ready.header.id);
