@@ -1,9 +1,12 @@
-//! A finished picture and its PNG bytes.
+//! A finished picture and its bytes.
+
+mod jpeg;
+
+use std::num::NonZeroUsize;
 
 use bytes::Bytes;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder as _};
-use jpeg_encoder::{ColorType, Encoder, SamplingFactor};
 
 use crate::error::RenderError;
 
@@ -38,24 +41,6 @@ impl Image {
         Ok(png.into())
     }
 
-    /// The picture over black as JPEG, colours at half the resolution.
-    pub fn encode_jpeg(&self, quality: u8) -> Result<Bytes, RenderError> {
-        // A picture is at most 16384 pixels wide and high.
-        let side = |px: u32| u16::try_from(px).unwrap_or(u16::MAX);
-        let mut jpeg = Vec::with_capacity(self.rgba8.len() / 24 + 1024);
-        let mut encoder = Encoder::new(&mut jpeg, quality);
-        encoder.set_sampling_factor(SamplingFactor::F_2_2);
-        encoder
-            .encode(
-                &self.over_black(),
-                side(self.width),
-                side(self.height),
-                ColorType::Rgba,
-            )
-            .map_err(|source| self.not_encoded(source))?;
-        Ok(jpeg.into())
-    }
-
     fn not_encoded(&self, source: impl std::error::Error + Send + Sync + 'static) -> RenderError {
         RenderError::Encode {
             width: self.width,
@@ -64,14 +49,11 @@ impl Image {
         }
     }
 
-    fn over_black(&self) -> Vec<u8> {
-        let over = |pixel: &[u8; 4]| {
-            let [red, green, blue, alpha] = pixel.map(u16::from);
-            let part = |colour: u16| ((colour * alpha + 127) / 255) as u8;
-            [part(red), part(green), part(blue), u8::MAX]
-        };
-        let (pixels, _rest) = self.rgba8.as_chunks::<4>();
-        pixels.iter().flat_map(over).collect()
+    /// The picture over black as JPEG, colours at half the resolution: the same bytes with any number of threads.
+    ///
+    /// Measured on 1920 x 1080 views of a volume: see [`jpeg`].
+    pub fn encode_jpeg(&self, quality: u8, threads: NonZeroUsize) -> Result<Bytes, RenderError> {
+        jpeg::encode(self, quality, threads).map_err(|source| self.not_encoded(source))
     }
 
     /// Alpha of every pixel.

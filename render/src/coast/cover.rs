@@ -29,17 +29,6 @@ impl Cover {
         }
     }
 
-    /// Nothing covered again.
-    pub fn clear(&mut self) {
-        self.base = 0.0;
-        let rows = self.sums.chunks_exact_mut(self.size_px[0] as usize + 2);
-        for (row, is_touched) in rows.zip(&mut self.is_touched) {
-            if std::mem::take(is_touched) {
-                row.fill(0.0);
-            }
-        }
-    }
-
     /// Covers every pixel so many times more.
     pub fn add_everywhere(&mut self, times: i32) {
         self.base += times as f32;
@@ -110,14 +99,13 @@ impl Cover {
         }
     }
 
-    /// Writes the coverage of every pixel, 0 to 255, into the bits of its word from `shift` on, which are 0.
-    pub fn write(&self, words: &mut [u32], shift: u32) {
+    /// Writes the coverage of every pixel of some rows, 0 to 255, into the bits of its word from `shift` on, which are 0.
+    pub fn write(&self, first_row: usize, words: &mut [u32], shift: u32) {
         let width = self.size_px[0] as usize;
         let all = (self.base.clamp(0.0, 1.0) * 255.0 + 0.5) as u32;
-        let rows = words
-            .chunks_exact_mut(width)
-            .zip(self.sums.chunks_exact(width + 2));
-        for ((words, sums), is_touched) in rows.zip(&self.is_touched) {
+        let sums = self.sums.chunks_exact(width + 2).skip(first_row);
+        let rows = words.chunks_exact_mut(width).zip(sums);
+        for ((words, sums), is_touched) in rows.zip(&self.is_touched[first_row..]) {
             if !is_touched && all == 0 {
                 continue;
             }
@@ -140,7 +128,7 @@ mod tests {
             cover.add(outline);
         }
         let mut words = vec![0; size_px[0] as usize * size_px[1] as usize];
-        cover.write(&mut words, 8);
+        cover.write(0, &mut words, 8);
         words.into_iter().map(|word| (word >> 8) as u8).collect()
     }
 
@@ -219,21 +207,6 @@ mod tests {
             let of_whole = whole[(at / 32 + 8) * 64 + at % 32 + 16];
             assert!(byte.abs_diff(of_whole) <= 1, "{at}: {byte} {of_whole}");
         }
-    }
-
-    #[test]
-    fn what_is_cleared_is_as_new() {
-        let first = rectangle([-3.0, 2.2], [7.7, 30.0]);
-        let second = rectangle([3.3, 1.0], [9.0, 5.5]);
-        let mut cover = Cover::new([12, 9]);
-        cover.add(&first);
-        cover.add_everywhere(1);
-        cover.clear();
-        cover.add(&second);
-        let mut words = vec![0; 12 * 9];
-        cover.write(&mut words, 0);
-        let words: Vec<u8> = words.into_iter().map(|word| word as u8).collect();
-        assert_eq!(words, covered([12, 9], &[second]));
     }
 
     #[test]

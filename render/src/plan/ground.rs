@@ -1,6 +1,9 @@
 //! What lies in every pixel of a globe view, by the outlines of land, lakes and borders: exact shares of areas, and lines.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread;
 
 use glam::{DVec2, DVec3};
 
@@ -8,6 +11,8 @@ use super::camera::Camera;
 use crate::coast::ring::{BORDERS, Cap, LAKE_RINGS, LAND_RINGS, Ring};
 use crate::coast::{Cover, Mask, Pen};
 
+/// Cores that a mask is made on at most: more gain little, and others want some.
+const MOST_CORES: usize = 8;
 /// Shores of lakes, fainter than those of the sea.
 const LAKE_PEN: Pen = Pen {
     half_width_px: 0.5,
@@ -35,25 +40,60 @@ pub(super) struct Wanted {
     pub(super) borders: bool,
 }
 
-/// A word for every pixel: shares of land, lakes, shores and borders, 0 to 255, the first in the lowest bits.
+/// A word for every pixel: shares of land, lakes, shores and borders, 0 to 255, the first in the lowest bits. Made on as
+/// many cores as are of use: a camera that moves needs one for every picture.
 pub(super) fn mask(camera: &Camera, size_px: [u32; 2], wanted: Wanted) -> Vec<u32> {
-    let sight = Sight::new(camera, size_px);
+    let sight = &Sight::new(camera, size_px);
+    let (land, lakes, shores, borders) = thread::scope(|scope| {
+        let cover = |rings: &'static [Ring]| scope.spawn(move || sight.cover(rings));
+        let land = wanted
+            .land
+            .then(|| [&**LAND_RINGS, &**LAKE_RINGS].map(cover));
+        let shores = wanted.coasts.then(|| scope.spawn(|| sight.shores()));
+        let borders = wanted.borders.then(|| scope.spawn(|| sight.borders()));
+        let [land, lakes] = land.map_or([None, None], |both| both.map(|one| Some(ended(one))));
+        (land, lakes, shores.map(ended), borders.map(ended))
+    });
     let mut words = vec![0; size_px[0] as usize * size_px[1] as usize];
-    if wanted.land {
-        let mut cover = Cover::new(size_px);
-        for (rings, shift) in [(&*LAND_RINGS, 0), (&*LAKE_RINGS, 8)] {
-            cover.clear();
-            sight.cover(&mut cover, rings);
-            cover.write(&mut words, shift);
+    let rows = (size_px[1] as usize).div_ceil(cores());
+    thread::scope(|scope| {
+        for (number, words) in words.chunks_mut(rows * size_px[0] as usize).enumerate() {
+            let first_row = number * rows;
+            let (covers, lines) = ([(&land, 0), (&lakes, 8)], [(&shores, 16), (&borders, 24)]);
+            scope.spawn(move || {
+                for (cover, shift) in covers {
+                    if let Some(cover) = cover {
+                        cover.write(first_row, words, shift);
+                    }
+                }
+                for (mask, shift) in lines {
+                    if let Some(mask) = mask {
+                        mask.write(first_row, words, shift);
+                    }
+                }
+            });
         }
-    }
-    if wanted.coasts {
-        sight.shores().write(&mut words, 16);
-    }
-    if wanted.borders {
-        sight.borders().write(&mut words, 24);
-    }
+    });
     words
+}
+
+/// Cores that one mask is made on at most.
+fn cores() -> usize {
+    thread::available_parallelism().map_or(1, |count| count.get().min(MOST_CORES))
+}
+
+fn ended<T>(thread: thread::ScopedJoinHandle<'_, T>) -> T {
+    match thread.join() {
+        Ok(value) => value,
+        Err(panic) => std::panic::resume_unwind(panic),
+    }
+}
+
+/// What one ring covers.
+struct Covered {
+    /// All of the picture, so many times.
+    everywhere: i32,
+    outline: Vec<DVec2>,
 }
 
 /// The ground from a camera: the globe from outside or, below the sea surface, from inside.
@@ -112,35 +152,57 @@ impl<'a> Sight<'a> {
         PI - cap.angle_to(self.up) <= cap.radius + 1e-6
     }
 
-    fn cover(&self, cover: &mut Cover, rings: &[Ring]) {
-        if let Some(behind) = self.behind {
-            for ring in rings {
-                self.cover_from_inside(cover, ring, behind);
+    /// What rings cover, added up in their order however many cores there are.
+    fn cover(&self, rings: &[Ring]) -> Cover {
+        let next = AtomicUsize::new(0);
+        let all: Vec<OnceLock<Covered>> = rings.iter().map(|_ring| OnceLock::new()).collect();
+        let work = || {
+            loop {
+                let number = next.fetch_add(1, Ordering::Relaxed);
+                let Some(ring) = rings.get(number) else {
+                    return;
+                };
+                if let Some(covered) = self.covered(ring) {
+                    // Set once: a number is taken by one thread.
+                    drop(all[number].set(covered));
+                }
             }
-            return;
+        };
+        thread::scope(|scope| {
+            for _other in 1..cores() {
+                scope.spawn(work);
+            }
+            work();
+        });
+        let mut cover = Cover::new(self.size_px);
+        for covered in all.iter().filter_map(OnceLock::get) {
+            cover.add_everywhere(covered.everywhere);
+            cover.add(&covered.outline);
         }
-        for ring in rings {
-            let may_be_opposite = self.may_be_opposite(&ring.cap);
-            if self.is_hidden(&ring.cap) && !may_be_opposite {
-                continue;
-            }
-            // What holds the place opposite goes round the globe the other way: it covers all but its hole.
-            if may_be_opposite && self.turns(ring) == -ring.sign {
-                cover.add_everywhere(ring.sign);
-            }
-            cover.add(&self.outline(ring));
-        }
+        cover
     }
 
-    /// The same seen from inside: all of the globe is round the camera, and what holds the place behind it covers all but
-    /// what it leaves out.
-    fn cover_from_inside(&self, cover: &mut Cover, ring: &Ring, behind: DVec3) {
-        if ring.cap.angle_to(behind) <= ring.cap.radius + 1e-6
-            && turns_round(behind, ring) == ring.sign
-        {
-            cover.add_everywhere(ring.sign);
+    /// What one ring covers; none if it cannot be seen.
+    fn covered(&self, ring: &Ring) -> Option<Covered> {
+        if let Some(behind) = self.behind {
+            // All of the globe is round the camera, and what holds the place behind it covers all but what it leaves out.
+            let is_all_round = ring.cap.angle_to(behind) <= ring.cap.radius + 1e-6
+                && turns_round(behind, ring) == ring.sign;
+            return Some(Covered {
+                everywhere: if is_all_round { ring.sign } else { 0 },
+                outline: self.outline_from_inside(ring),
+            });
         }
-        cover.add(&self.outline_from_inside(ring));
+        let may_be_opposite = self.may_be_opposite(&ring.cap);
+        if self.is_hidden(&ring.cap) && !may_be_opposite {
+            return None;
+        }
+        // What holds the place opposite goes round the globe the other way: it covers all but its hole.
+        let is_all_round = may_be_opposite && self.turns(ring) == -ring.sign;
+        Some(Covered {
+            everywhere: if is_all_round { ring.sign } else { 0 },
+            outline: self.outline(ring),
+        })
     }
 
     /// An outline as it is seen from inside, where left and right are the other way round: what lies behind the camera is
