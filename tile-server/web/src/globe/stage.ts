@@ -44,6 +44,10 @@ export class LayerStage {
     scene.preRender.addEventListener(() => this.#advanceFade());
   }
 
+  get shown(): LayerSpec | undefined {
+    return (this.#fade?.to ?? this.#shown)?.spec;
+  }
+
   /** What the eye sees, or is about to see. */
   get shownKey(): string | undefined {
     return (this.#fade?.to ?? this.#shown)?.key;
