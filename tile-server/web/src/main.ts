@@ -82,8 +82,14 @@ const live = new Live({
   presenter,
   overlay: new Overlay(byId("overlay")),
   marks: () => [marks.drawn, observed.drawn],
-  onShow: (spec) => void legend.show(spec),
-  onHide: () => stage.shown && void legend.show(stage.shown),
+  onShow: (spec) => {
+    stage.isCovered = true;
+    void legend.show(spec);
+  },
+  onHide: () => {
+    stage.isCovered = false;
+    if (stage.shown) void legend.show(stage.shown);
+  },
 });
 const isFollowed = () => live.isCarried && live.isShown;
 

@@ -15,7 +15,6 @@ export interface DrawnLine {
 }
 
 export interface Drawn {
-  readonly heightM: number;
   readonly lines: readonly DrawnLine[];
   readonly points: readonly DrawnPoint[];
 }

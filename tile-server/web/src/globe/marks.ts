@@ -11,7 +11,7 @@ const REGION_COLOUR = "#7fe7ff";
 const LINE_HEIGHT_M = 9_000;
 
 export class Marks {
-  #drawn: Drawn = { heightM: LINE_HEIGHT_M, lines: [], points: [] };
+  #drawn: Drawn = { lines: [], points: [] };
   readonly #points: PointPrimitiveCollection;
   readonly #lines: PolylineCollection;
   readonly #scene: Scene;

@@ -13,7 +13,7 @@ const STEP_DEG = 4;
 const PICK_PX = 9;
 
 export class PlatformLayer {
-  #drawn: Drawn = { heightM: HEIGHT_M, lines: [], points: [] };
+  #drawn: Drawn = { lines: [], points: [] };
   readonly #scene: Scene;
   readonly #points: PointPrimitiveCollection;
   readonly #lines: PolylineCollection;
@@ -33,7 +33,7 @@ export class PlatformLayer {
     this.#points.removeAll();
     this.#lines.removeAll();
     const drawn = platforms.map((platform) => this.#draw(platform, platform.id === chosen?.id));
-    this.#drawn = { heightM: HEIGHT_M, lines: drawn.flatMap(({ lines }) => lines), points: drawn.map(({ point }) => point) };
+    this.#drawn = { lines: drawn.flatMap(({ lines }) => lines), points: drawn.map(({ point }) => point) };
     this.#scene.requestRender();
   }
 

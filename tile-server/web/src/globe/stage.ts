@@ -27,6 +27,7 @@ export class LayerStage {
   #shown: Prepared | undefined;
   #fade: { to: Prepared; startedMs: number; lengthMs: number } | undefined;
   #opacity: number;
+  #isCovered = false;
   readonly #scene: Scene;
   readonly #counts: TileCounts;
   readonly #onFailure: (status: number | undefined, url: string) => void;
@@ -62,6 +63,14 @@ export class LayerStage {
   set opacity(opacity: number) {
     this.#opacity = opacity;
     if (!this.#fade && this.#shown) this.#shown.layer.alpha = opacity;
+    this.#scene.requestRender();
+  }
+
+  /** Something lies over the whole globe: for what nobody sees no tiles are asked for, wherever the camera goes. */
+  set isCovered(isCovered: boolean) {
+    if (this.#isCovered === isCovered) return;
+    this.#isCovered = isCovered;
+    if (this.#shown) this.#shown.layer.show = !isCovered;
     this.#scene.requestRender();
   }
 
@@ -140,6 +149,7 @@ export class LayerStage {
     fade.to.layer.alpha = this.#opacity;
     if (this.#shown) this.#remove(this.#shown);
     this.#shown = fade.to;
+    this.#shown.layer.show = !this.#isCovered;
     this.#scene.requestRender();
   }
 

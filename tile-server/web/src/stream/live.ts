@@ -16,8 +16,8 @@ import { isAlike, isRaised, isSameCamera, type Scene, viewAddress } from "./view
 import { cssMatrix, warp } from "./warp";
 
 /** A picture moved to another camera is good enough while the ground is off by this share of the window, and it covers this much. */
-const MOST_MISS = 0.025;
-const LEAST_COVER = 0.6;
+const MOST_MISS = 0.05;
+const LEAST_COVER = 0.45;
 /** Younger than this a picture may lie where it was taken although the camera went on. */
 const FRESH_MS = 300;
 /** A server that draws this long has no stream worth waiting for: tiles come in its place. */

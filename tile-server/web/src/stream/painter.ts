@@ -4,9 +4,10 @@ import { isHidden, onGround, type Point, type Pose, seen } from "./pose";
 
 export function paint(paper: CanvasRenderingContext2D, pose: Pose, all: readonly Drawn[]): void {
   paper.lineJoin = "round";
-  for (const { heightM, lines, points } of all) {
+  for (const { lines, points } of all) {
     const at = ({ lon, lat }: { lon: number; lat: number }): Point | undefined => {
-      const place = onGround(lon, lat, heightM);
+      // No facets of a globe can cut into them here: they lie where they belong.
+      const place = onGround(lon, lat);
       return isHidden(pose, place) ? undefined : seen(pose, place);
     };
     for (const line of lines) {
