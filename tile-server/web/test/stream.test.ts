@@ -191,9 +191,11 @@ describe("pictures", () => {
     expect(desk.client.isAnswered).toBe(false);
   });
 
-  it("that the server refuses are told of", () => {
-    const desk = asked(1);
+  it("that the server refuses are told of, unless something else is asked for by now", () => {
+    const desk = asked(2);
     desk.socket.hear('{"id":1,"error":"no such tilt","status":400}');
+    expect(desk.refused).toEqual([]);
+    desk.socket.hear('{"id":2,"error":"no such tilt","status":400}');
     expect(desk.refused).toEqual([400]);
   });
 });

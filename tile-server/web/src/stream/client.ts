@@ -164,7 +164,8 @@ export class StreamClient<Scene, Image> {
   #hear(data: unknown): void {
     if (typeof data === "string") {
       const refused = parseRefused(data);
-      if (refused) this.#hearer.onRefused(refused);
+      // A newer state is under way.
+      if (refused?.id === this.#id) this.#hearer.onRefused(refused);
       return;
     }
     const picture = data instanceof ArrayBuffer ? parsePicture(data) : undefined;
