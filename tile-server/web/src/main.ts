@@ -118,8 +118,11 @@ const budgetPanel = new BudgetPanel(panels.bodies.budget, {
   markRegion: (box) => marks.region(box),
   onError: report,
 });
-const lookPanel = new LookPanel(panels.bodies.look, store, () =>
-  offerOf(inventory.catalogue, inventory.palettes, store.state),
+const lookPanel = new LookPanel(
+  panels.bodies.look,
+  store,
+  () => offerOf(inventory.catalogue, inventory.palettes, store.state),
+  isFollowed,
 );
 new CameraButtons(byId("camera"), globe);
 new Playback(
