@@ -12,6 +12,8 @@ const NEAR_DEG = 0.01;
 async function flown(journey, hash, act, prepare = async () => {}) {
   const page = await journey.page.context().newPage();
   page.setDefaultTimeout(LIMIT_MS);
+  // A processor draws full pictures of this size in seconds.
+  await page.setViewportSize({ width: 800, height: 500 });
   try {
     await prepare(page);
     await page.goto(new URL(hash, journey.base).href);
@@ -105,7 +107,7 @@ export async function pictureFollowsCamera(journey) {
     await rests(flight);
     const before = { camera: (await flight.state()).camera, shown: await page.evaluate(() => window.fluxglobe.pictures.shown) };
     const box = await page.locator("#globe").boundingBox();
-    const [x, y] = [box.width * 0.55, box.height * 0.8];
+    const [x, y] = [box.width * 0.55, box.height * 0.7];
     await page.mouse.move(x, y);
     await page.mouse.down({ button: "middle" });
     await page.mouse.move(x + 60, y + 40, { steps: 12 });

@@ -1,6 +1,6 @@
 //! What the page shows: what the server has and what the reader chose in; the layer, its legend and the cards of it out.
 import * as api from "./api/requests";
-import type { News } from "./api/types";
+import type { News, Product } from "./api/types";
 import { touches } from "./api/updates";
 import { contains, isWhole } from "./globe/box";
 import type { Globe } from "./globe/globe";
@@ -120,7 +120,7 @@ export class Viewer {
       notices.show("product", `The server has no product “${wanted}”; showing “${first.title}” instead.`);
     const chosen = catalogue.find(wanted) ?? first;
     const isFlight = (await offered) && chosen.modes.includes("volume") && isWhole(chosen.bounds_deg);
-    if (this.#isFree && isFlight) this.#takeOff();
+    if (this.#isFree && isFlight) this.#takeOff(chosen);
     this.#isFree = false;
     const look = inventory.drawable(store.state.look);
     if (store.state.product === chosen.product) {
@@ -189,12 +189,15 @@ export class Viewer {
   }
 
   /** Where pictures follow the camera the page begins low over the sea, so that what stands above it is seen to stand. */
-  #takeOff(): void {
-    const { store, globe } = this.#parts;
+  #takeOff({ product }: Product): void {
+    const { store, inventory, globe } = this.#parts;
     globe.start = COAST;
     globe.view = COAST;
     // The picture's own ground has no land colours by which one would know where one is.
     store.set({ mode: "volume", camera: COAST, look: { ...store.state.look, coastlines: true } });
+    // What accumulates stands highest at the end.
+    const last = inventory.catalogue.stepsOf(product).at(-1);
+    if (last) this.#askedMs ??= last.midMs;
   }
 
   /** Regions and the check table: the globe does not wait for them. */

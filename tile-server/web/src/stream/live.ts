@@ -20,7 +20,7 @@ const MOST_MISS = 0.05;
 const LEAST_COVER = 0.45;
 /** Younger than this a picture may lie where it was taken although the camera went on. */
 const FRESH_MS = 300;
-/** A server that draws this long has no stream worth waiting for: tiles come in its place. */
+/** With nothing in sight a reader waits this long for a picture: then tiles come in its place. */
 const PATIENCE_MS = 8_000;
 /** The page does not wait longer than this to learn whether there is a stream. */
 const OFFER_MS = 1_500;
@@ -142,7 +142,7 @@ export class Live {
   }
 
   get #isStarved(): boolean {
-    return this.#waitingSinceMs !== undefined && performance.now() - this.#waitingSinceMs > PATIENCE_MS;
+    return !this.#isShown && this.#waitingSinceMs !== undefined && performance.now() - this.#waitingSinceMs > PATIENCE_MS;
   }
 
   #follow(): void {
