@@ -91,7 +91,7 @@ const live = new Live({
     if (stage.shown) void legend.show(stage.shown);
   },
 });
-const isFollowed = () => live.isCarried && live.isShown;
+const isFollowed = () => live.isFollowing;
 
 const view = new ViewDialog(
   store,
@@ -130,7 +130,7 @@ new Playback(
   presenter,
   () => inventory.steps,
   (timeMs) => inventory.layerAt(timeMs),
-  isFollowed,
+  live,
 );
 new LiveSwitch(controls.live, store, live);
 new Readout(byId("app"), live.rate, () => live.picture);

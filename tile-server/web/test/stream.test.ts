@@ -178,6 +178,18 @@ describe("pictures", () => {
     expect(desk.client.isAnswered).toBe(true);
   });
 
+  it("are behind by as long as the oldest state is waited for that no newer one's picture was shown for", async () => {
+    const desk = asked(3);
+    desk.nowMs = 100;
+    expect(desk.client.lagMs).toBe(90);
+    desk.socket.hear(message(header(2)));
+    await settled();
+    expect(desk.client.lagMs).toBe(70);
+    desk.socket.hear(message(header(3)));
+    await settled();
+    expect(desk.client.lagMs).toBe(0);
+  });
+
   it("that are decoded after a newer one was are dropped", async () => {
     const desk = asked(2);
     desk.isSlow = true;

@@ -69,6 +69,12 @@ export class StreamClient<Scene, Image> {
     return this.#given.id === this.#id && this.#given.isFull;
   }
 
+  /** How long the oldest state that no picture has come for, nor for a newer one, is waited for. */
+  get lagMs(): number {
+    for (const [id, { askedMs }] of this.#asked) if (id > this.#given.id) return this.#means.nowMs() - askedMs;
+    return 0;
+  }
+
   start(): void {
     if (this.#socket || this.#timer !== undefined) return;
     this.#connect();

@@ -113,6 +113,16 @@ export class Live {
     return this.#isAbsent;
   }
 
+  /** Pictures of any instant and look come by themselves, in sight or about to be. */
+  get isFollowing(): boolean {
+    return this.isCarried;
+  }
+
+  /** How far what is in sight is behind what is asked for. */
+  get lagMs(): number {
+    return this.#client.lagMs;
+  }
+
   get isShown(): boolean {
     return this.#isShown;
   }
