@@ -124,6 +124,54 @@ export async function pictureFollowsCamera(journey) {
   });
 }
 
+/** The legend is that of the picture in sight; sliders move the picture while they are moved. */
+export async function pictureFollowsLook(journey) {
+  if (!(await hasStream(journey.base))) return NO_STREAM;
+  await flown(journey, ".", async (flight) => {
+    const { page } = flight;
+    await rests(flight);
+    const bar = () => page.locator("#legend .legend-bar").evaluate((element) => element.style.background);
+    const before = await bar();
+    await page.locator("#tab-look").click();
+    await page.locator('input[name="palette"]:checked').press("ArrowDown");
+    const { palette } = (await flight.state()).look;
+    await flight.until((name) => window.fluxglobe.picture?.view.includes(`palette=${name}`), palette);
+    await eventually(async () => assert.notEqual(await bar(), before));
+    const height = page.locator("#height-exaggeration");
+    if (await height.isVisible()) {
+      await height.evaluate((input) => {
+        input.value = "12000";
+        // As a thumb that is not let go yet.
+        input.dispatchEvent(new Event("input"));
+      });
+      await flight.until(() => window.fluxglobe.picture?.view.includes("height_exaggeration=12000000"));
+    }
+    await page.locator("#sun").selectOption("time");
+    await flight.until(() => window.fluxglobe.picture?.view.includes("sun=time"));
+    await rests(flight);
+    await flight.shot("flight-look");
+  });
+}
+
+/** Without a pointer: arrow keys with Shift tilt the camera where it is. */
+export async function keysTilt(journey) {
+  if (!(await hasStream(journey.base))) return NO_STREAM;
+  await flown(journey, ".", async (flight) => {
+    const { page } = flight;
+    await rests(flight);
+    const before = (await flight.state()).camera;
+    await page.locator("#globe canvas").focus();
+    for (const key of ["Shift+ArrowUp", "Shift+ArrowUp", "Shift+ArrowRight"]) await page.keyboard.press(key);
+    await eventually(async () => {
+      const { camera } = await flight.state();
+      assert.ok(Math.abs(camera.pitchDeg - before.pitchDeg - 6) < NEAR_DEG && Math.abs(camera.lon - before.lon) < NEAR_DEG);
+      const shown = await picture(flight);
+      assert.equal(shown?.kind, "full");
+      assertSameCamera(query(shown), camera);
+    });
+  });
+}
+
 /** Time runs through the stream alone: tiles that nobody sees are not asked for. Where it stops the full picture comes. */
 export async function pictureFollowsTime(journey) {
   if (!(await hasStream(journey.base))) return NO_STREAM;
@@ -183,14 +231,18 @@ export async function globesAgree(journey) {
           return 12;
         };
         const inside = seen.filter(({ at: [, { x, y }] }) => x > 0 && y > 0 && x < without.width && y < without.height);
-        return { apart: Math.max(...apart), seen: seen.length, lines: inside.map(({ at: [, point] }) => nearest(point)) };
+        const lines = inside.map(({ at: [, point] }) => nearest(point));
+        // A camera that is a degree or so off must be noticed.
+        const planted = inside.map(({ at: [, { x, y }] }) => nearest({ x: x + 11, y: y + 6 }));
+        return { apart: Math.max(...apart), seen: seen.length, lines, planted };
       },
       { view, base: base.href },
     );
     assert.ok(far.seen > 10 && far.lines.length > 5, JSON.stringify(far));
     assert.ok(far.apart < 0.5, `globe and renderer must agree to half a pixel, they are ${far.apart} apart`);
-    const hit = far.lines.filter((px) => px <= 2).length;
-    assert.ok(hit >= far.lines.length * 0.9, `lines must lie where they are reckoned: ${far.lines}`);
+    const hit = (distances) => distances.filter((px) => px <= 2).length / distances.length;
+    assert.ok(hit(far.lines) >= 0.9, `lines must lie where they are reckoned: ${far.lines}`);
+    assert.ok(hit(far.planted) < 0.6, `planted: lines a little off must be noticed: ${far.planted}`);
   });
 }
 
@@ -231,7 +283,7 @@ export async function staysWithTiles(journey) {
       await page.locator('button[data-mode="volume"]').click();
       await flight.until(() => window.fluxglobe.shown?.includes("/volume") && window.fluxglobe.tilesPending === 0);
       assert.equal(await picture(flight), undefined);
-      await page.locator("#live-status", { hasText: /now/ }).waitFor();
+      await page.locator("#live-status", { hasText: /not available/ }).waitFor();
       assert.equal(await page.locator(".notice").count(), 0, "nobody is told");
     },
     refuse,

@@ -4,9 +4,11 @@ import test from "node:test";
 import { budgetTotal, checkTable, landHasNoData, seriesOfSea } from "./analysis-steps.mjs";
 import {
   globesAgree,
+  keysTilt,
   liveIsSwitchedOff,
   opensInFlight,
   pictureFollowsCamera,
+  pictureFollowsLook,
   pictureFollowsTime,
   staysWithTiles,
 } from "./fly-steps.mjs";
@@ -81,6 +83,8 @@ test("the viewer", async (t) => {
     await step("passes over what an address asks of the look and is not there", wrongLookIsIgnored);
     await step("opens in flight: over a coast, with the live picture over the globe", opensInFlight);
     await step("shows the picture that the camera sees, and the full one when it rests", pictureFollowsCamera);
+    await step("tilts and turns the camera by keys", keysTilt);
+    await step("moves the picture with the look, and the legend with the picture", pictureFollowsLook);
     await step("runs time through the stream", pictureFollowsTime);
     await step("puts places where the picture has them", globesAgree);
     await step("goes back to tiles when the live picture is switched off", liveIsSwitchedOff);

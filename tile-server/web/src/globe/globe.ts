@@ -24,6 +24,8 @@ const BASE_LOOK = { brightness: 0.62, saturation: 0.55, contrast: 1.08, gamma: 1
 const MIN_HEIGHT_M = 50_000;
 const MAX_HEIGHT_M = 60_000_000;
 const ZOOM_STEP = 0.35;
+/** Of the camera by one arrow key. */
+const LOOK_STEP_DEG = 3;
 
 export interface GlobeOptions {
   /** Larger is coarser and asks for fewer tiles; 2 is Cesium's own. */
@@ -182,7 +184,7 @@ export class Globe {
   /** The globe takes the focus and turns by arrow keys, so that it can be used without a pointer. */
   #keys(): void {
     this.canvas.tabIndex = 0;
-    this.canvas.setAttribute("aria-label", "Globe. Arrow keys turn it, plus and minus zoom.");
+    this.canvas.setAttribute("aria-label", "Globe. Arrow keys turn it, with Shift they tilt and turn the camera, plus and minus zoom.");
     this.canvas.addEventListener("keydown", (event) => {
       const view = this.view;
       const turnDeg = Math.min(15, view.heightKm / 1200);
@@ -193,13 +195,24 @@ export class Globe {
         ArrowDown: [0, -turnDeg],
       };
       const turn = turns[event.key];
-      if (turn) this.view = { ...view, lon: view.lon + turn[0], lat: Math.max(-89, Math.min(89, view.lat + turn[1])) };
+      if (turn && event.shiftKey) this.view = turned(view, turn);
+      else if (turn) this.view = { ...view, lon: view.lon + turn[0], lat: Math.max(-89, Math.min(89, view.lat + turn[1])) };
       else if (event.key === "+" || event.key === "=") this.zoom(1);
       else if (event.key === "-") this.zoom(-1);
       else return;
       event.preventDefault();
     });
   }
+}
+
+/** The camera stays where it is and looks elsewhere. */
+function turned(view: CameraView, [right, up]: readonly [number, number]): CameraView {
+  const pitchDeg = view.pitchDeg + Math.sign(up) * LOOK_STEP_DEG;
+  return {
+    ...view,
+    headingDeg: view.headingDeg + Math.sign(right) * LOOK_STEP_DEG,
+    pitchDeg: Math.min(Math.max(pitchDeg, -90), 0),
+  };
 }
 
 function destinationOf(view: CameraView): Cartesian3 {

@@ -199,16 +199,15 @@ export class Live {
     const { overlay, inventory, store } = this.#parts;
     this.#waitingSinceMs = undefined;
     this.#isRefused = false;
-    requestAnimationFrame(() => {
-      this.#client.seen(picture.id);
-      this.rate.add(askedMs, performance.now());
-    });
+    // Told of one that is not shown too: the server waits for no other answer.
+    requestAnimationFrame(() => this.#client.seen(picture.id));
     const now = inventory.layerAt(store.state.timeMs);
     if (!this.#isWanted || !now || !isAlike(now, scene.spec)) {
       image.close();
       return;
     }
     overlay.draw(image, scene.width, scene.height);
+    requestAnimationFrame(() => this.rate.add(askedMs, performance.now()));
     this.#shown = { picture, scene, askedMs, pose: poseOf(scene.camera, scene.width, scene.height) };
     const current = this.#scene();
     if (current) this.#place(current);

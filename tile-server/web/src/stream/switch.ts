@@ -16,7 +16,7 @@ export class LiveSwitch {
       const { live: isOn, mode } = store.state;
       box.show(isOn);
       container.hidden = !isRaised(mode);
-      word.textContent = isOn && live.isAbsent ? "not to be had here now" : "";
+      word.textContent = isOn && live.isAbsent ? "not available right now" : "";
       // The picture has a ground of its own: there is nothing for it to be seen through.
       document.body.classList.toggle("is-live", isCarried);
     };
