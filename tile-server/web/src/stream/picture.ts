@@ -10,7 +10,7 @@ export interface Picture {
   readonly height: number;
   /** The address of what it shows. */
   readonly view: string;
-  /** The instant that is shown. */
+  /** The instant that is shown where the one asked for lies outside of what there is, else nothing. */
   readonly timeIso: string;
   /** The server's share of the way, ms. */
   readonly tookMs: number;
