@@ -182,8 +182,8 @@ export class Viewer {
     }
     if (change.camera) globe.view = change.camera;
     this.#askedMs = change.timeMs;
-    const { region, opacity, observations } = INITIAL;
-    store.set({ place: null, tab: null, region, opacity, observations, ...change, look });
+    const { region, opacity, observations, live } = INITIAL;
+    store.set({ place: null, tab: null, region, opacity, observations, live, ...change, look });
     // A change of product has looked at the instant already.
     if (this.#askedMs !== undefined) this.#useProduct();
   }
