@@ -82,6 +82,7 @@ const live = new Live({
   presenter,
   overlay: new Overlay(byId("overlay")),
   marks: () => [marks.drawn, observed.drawn],
+  isBare: () => stage.shown === undefined,
   onShow: (spec) => {
     stage.isCovered = true;
     void legend.show(spec);

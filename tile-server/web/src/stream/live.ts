@@ -15,9 +15,14 @@ import { Rate } from "./rate";
 import { isAlike, isRaised, isSameCamera, type Scene, viewAddress } from "./view";
 import { cssMatrix, warp } from "./warp";
 
-/** A picture moved to another camera is good enough while the ground is off by this share of the window, and it covers this much. */
-const MOST_MISS = 0.05;
-const LEAST_COVER = 0.45;
+/**
+ * A picture moved to another camera is good enough while the ground is off by this share of the window, and it covers this
+ * much. Where the globe below has no tiles a worse one is still better than none.
+ */
+const FITS = {
+  overTiles: { mostMiss: 0.05, leastCover: 0.45 },
+  overNothing: { mostMiss: 0.15, leastCover: 0.2 },
+};
 /** Younger than this a picture may lie where it was taken although the camera went on. */
 const FRESH_MS = 300;
 /** With nothing in sight a reader waits this long for a picture: then tiles come in its place. */
@@ -32,6 +37,8 @@ export interface Surroundings {
   presenter: Presenter;
   overlay: Overlay;
   marks: () => readonly Drawn[];
+  /** The globe below has no tiles of the layer. */
+  isBare: () => boolean;
   /** A picture came into sight over the globe. */
   onShow: (spec: LayerSpec) => void;
   /** The globe itself is in sight again. */
@@ -226,7 +233,8 @@ export class Live {
       this.#turnTo(this.#client.isOpen || shown.scene.spec.timeIso === scene.spec.timeIso);
     } else {
       const moved = warp(shown.pose, pose);
-      const fits = moved !== undefined && moved.miss < MOST_MISS && moved.cover > LEAST_COVER;
+      const { mostMiss, leastCover } = this.#parts.isBare() ? FITS.overNothing : FITS.overTiles;
+      const fits = moved !== undefined && moved.miss < mostMiss && moved.cover > leastCover;
       overlay.lay(fits ? cssMatrix(moved.matrix) : null);
       this.#turnTo(this.#client.isOpen && (fits || performance.now() - shown.askedMs < FRESH_MS));
     }
