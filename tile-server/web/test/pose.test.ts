@@ -3,9 +3,9 @@ import { describe, expect, it } from "vitest";
 import type { LayerSpec } from "../src/globe/layer";
 import { USUAL } from "../src/look/look";
 import { type CameraView, SPHERE_RADIUS_M } from "../src/state/camera";
+import { ACROSS, DOWN, meshOf, placeIn } from "../src/stream/mesh";
 import { groundAlong, isHidden, onGround, poseOf, seen, sight } from "../src/stream/pose";
 import { isSameCamera, type Scene, viewAddress } from "../src/stream/view";
-import { cssMatrix, moved, warp } from "../src/stream/warp";
 
 const [WIDTH, HEIGHT] = [1280, 800];
 const RADIUS_KM = SPHERE_RADIUS_M / 1000;
@@ -62,33 +62,43 @@ describe("a camera", () => {
 });
 
 describe("a picture of another camera", () => {
-  it("of the same camera stays where it is", () => {
-    const same = warp(poseIn(LOW), poseIn(LOW));
-    expect([same?.cover, same?.miss]).toEqual([1, expect.closeTo(0, 6)]);
-    expect(moved(same?.matrix ?? [], { x: 17, y: 700 }).x).toBeCloseTo(17, 4);
-    expect(cssMatrix([1, 0, 0, 0, 1, 0, 0, 0, 1])).toBe("matrix3d(1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1)");
-    expect(cssMatrix([1, 2, 3, 4, 5, 6, 7, 8, 9])).toBe("matrix3d(1,4,0,7,2,5,0,8,0,0,1,0,3,6,0,9)");
-  });
+  const low = poseIn(LOW);
 
-  it("that only turned is brought over exactly", () => {
-    const now = poseIn({ ...LOW, headingDeg: LOW.headingDeg + 6, pitchDeg: LOW.pitchDeg - 3, rollDeg: 4 });
-    const turned = warp(poseIn(LOW), now);
-    expect(turned?.miss).toBeLessThan(1e-6);
-    for (const place of [onGround(-90, -4), onGround(-95, 0, 4e5)]) {
-      const from = seen(poseIn(LOW), place) ?? { x: 0, y: 0 };
-      const to = seen(now, place) ?? { x: 0, y: 0 };
-      const at = moved(turned?.matrix ?? [], from);
-      expect(Math.hypot(at.x - to.x, at.y - to.y)).toBeLessThan(1e-3);
+  it("of the same camera stays where it is", () => {
+    const { places, cover, lean } = meshOf(low, low);
+    expect([cover, lean, places.length]).toEqual([1, 0, 3 * (ACROSS + 1) * (DOWN + 1)]);
+    for (let at = 0, knot = 0; at < places.length; at += 3, knot++) {
+      expect(places[at]).toBeCloseTo((knot % (ACROSS + 1)) / ACROSS, 5);
+      expect(places[at + 1]).toBeCloseTo(Math.floor(knot / (ACROSS + 1)) / DOWN, 5);
+      expect(places[at + 2]).toBe(1);
     }
   });
 
-  it("that moved a little fits nearly, and one that went far does not", () => {
-    const near = warp(poseIn(LOW), poseIn({ ...LOW, lon: LOW.lon + 0.5, heightKm: 1280 }));
-    expect(near?.miss).toBeLessThan(0.01);
-    expect(near?.cover).toBeGreaterThan(0.8);
-    const far = warp(poseIn(LOW), poseIn({ ...LOW, lon: LOW.lon + 60 }));
-    expect(far === undefined || far.miss > 0.03 || far.cover < 0.5).toBe(true);
-    expect(warp(poseIn(LOW), poseIn({ ...LOW, headingDeg: LOW.headingDeg + 180 }))?.cover ?? 0).toBeLessThan(0.5);
+  it("shows the ground where the other camera sees it, wherever that went", () => {
+    const now = poseIn({ lon: -98, lat: -2, heightKm: 1700, headingDeg: 60, pitchDeg: -40, rollDeg: 5 });
+    for (const place of [onGround(-90, 3), onGround(-94, 0), onGround(-95, 5)]) {
+      const at = placeIn(low, now, seen(now, place) ?? { x: 0, y: 0 });
+      const was = seen(low, place);
+      expect(at?.x).toBeCloseTo(was?.x ?? Number.NaN, 6);
+      expect(at?.y).toBeCloseTo(was?.y ?? Number.NaN, 6);
+    }
+  });
+
+  it("does not tear at the horizon", () => {
+    const now = poseIn({ ...LOW, lon: LOW.lon + 4, pitchDeg: -30 });
+    const isGround = (y: number) => groundAlong(now, sight(now, { x: 640, y })) !== undefined;
+    let y = 0;
+    while (!isGround(y)) y += 0.25;
+    expect(y).toBeGreaterThan(0);
+    const [above, below] = [placeIn(low, now, { x: 640, y: y - 0.25 }), placeIn(low, now, { x: 640, y: y + 0.25 })];
+    expect(Math.hypot((above?.x ?? 0) - (below?.x ?? 999), (above?.y ?? 0) - (below?.y ?? 999))).toBeLessThan(12);
+  });
+
+  it("leans with the way, and covers nothing of what its camera could not see", () => {
+    const near = meshOf(low, poseIn({ ...LOW, lon: LOW.lon + 0.5 }));
+    expect([near.lean < 0.1, near.cover > 0.8]).toEqual([true, true]);
+    expect(meshOf(low, poseIn({ ...LOW, lon: LOW.lon + 60 })).lean).toBeGreaterThan(2);
+    expect(meshOf(low, poseIn({ ...LOW, headingDeg: LOW.headingDeg + 180 })).cover).toBeLessThan(0.2);
   });
 });
 

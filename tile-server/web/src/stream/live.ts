@@ -7,21 +7,21 @@ import type { Presenter } from "../globe/presenter";
 import type { Inventory } from "../state/inventory";
 import type { Store } from "../state/store";
 import { type Shot, StreamClient } from "./client";
+import { meshOf } from "./mesh";
 import type { Overlay } from "./overlay";
 import { paint } from "./painter";
 import { decode, type Picture } from "./picture";
 import { type Pose, poseOf } from "./pose";
 import { Rate } from "./rate";
 import { isAlike, isRaised, isSameCamera, type Scene, viewAddress } from "./view";
-import { cssMatrix, warp } from "./warp";
 
 /**
- * A picture moved to another camera is good enough while the ground is off by this share of the window, and it covers this
- * much. Where the globe below has no tiles a worse one is still better than none.
+ * A picture moved to another camera is good enough while what stands up leans by no more than this, and it covers this share
+ * of the window. Where the globe below has no tiles a worse one is still better than none.
  */
 const FITS = {
-  overTiles: { mostMiss: 0.05, leastCover: 0.45 },
-  overNothing: { mostMiss: 0.15, leastCover: 0.2 },
+  overTiles: { mostLean: 0.4, leastCover: 0.45 },
+  overNothing: { mostLean: 2, leastCover: 0.2 },
 };
 /** Younger than this a picture may lie where it was taken although the camera went on. */
 const FRESH_MS = 300;
@@ -229,13 +229,13 @@ export class Live {
     if (!shown) return;
     const pose = poseOf(scene.camera, scene.width, scene.height);
     if (isSameCamera(shown.scene, scene)) {
-      overlay.lay(null);
+      overlay.rest();
       this.#turnTo(this.#client.isOpen || shown.scene.spec.timeIso === scene.spec.timeIso);
     } else {
-      const moved = warp(shown.pose, pose);
-      const { mostMiss, leastCover } = this.#parts.isBare() ? FITS.overNothing : FITS.overTiles;
-      const fits = moved !== undefined && moved.miss < mostMiss && moved.cover > leastCover;
-      overlay.lay(fits ? cssMatrix(moved.matrix) : null);
+      const mesh = meshOf(shown.pose, pose);
+      const { mostLean, leastCover } = this.#parts.isBare() ? FITS.overNothing : FITS.overTiles;
+      const fits = mesh.lean < mostLean && mesh.cover > leastCover;
+      overlay.move(mesh, Math.round(scene.width * scene.density), Math.round(scene.height * scene.density));
       this.#turnTo(this.#client.isOpen && (fits || performance.now() - shown.askedMs < FRESH_MS));
     }
     this.#paint(scene, pose);

@@ -1,4 +1,7 @@
-//! Pictures over the globe: the newest picture and where it lies in, what the eye sees out. The last one stays until the next is there.
+//! Pictures over the globe: the newest picture and for which camera in, what the eye sees out. The last one stays until the next is there.
+
+import type { Mesh } from "./mesh";
+import { Mover } from "./mover";
 
 /** What it costs to look from the globe to the picture and back without a jerk. */
 const SHOWN = "shown";
@@ -6,10 +9,13 @@ const SHOWN = "shown";
 export class Overlay {
   readonly #root: HTMLElement;
   readonly #picture = document.createElement("canvas");
+  readonly #mover = new Mover();
   readonly #marks = document.createElement("canvas");
   readonly #pixels: CanvasRenderingContext2D | null;
   readonly #ink: CanvasRenderingContext2D | null;
   #isEmpty = true;
+  /** The mover has not seen the picture yet. */
+  #isNew = true;
 
   constructor(root: HTMLElement) {
     this.#root = root;
@@ -17,7 +23,7 @@ export class Overlay {
     this.#pixels = this.#picture.getContext("2d", { alpha: false });
     this.#ink = this.#marks.getContext("2d");
     this.#picture.className = "picture";
-    root.append(this.#picture, this.#marks);
+    root.append(this.#picture, this.#mover.canvas, this.#marks);
   }
 
   get isShown(): boolean {
@@ -37,11 +43,22 @@ export class Overlay {
     style.width = `${width}px`;
     style.height = `${height}px`;
     this.#isEmpty = false;
+    this.#isNew = true;
   }
 
-  /** Lays the picture where `transform` says; null is where it was taken. */
-  lay(transform: string | null): void {
-    this.#picture.style.transform = transform ?? "none";
+  /** The picture as it is, for the camera that it was taken by. */
+  rest(): void {
+    this.#picture.hidden = false;
+    this.#mover.canvas.hidden = true;
+  }
+
+  /** The picture through a mesh, for another camera. */
+  move(mesh: Mesh, width: number, height: number): void {
+    if (this.#isNew) this.#mover.take(this.#picture);
+    this.#isNew = false;
+    this.#mover.draw(mesh, width, height);
+    this.#picture.hidden = true;
+    this.#mover.canvas.hidden = false;
   }
 
   fade(isIn: boolean): void {

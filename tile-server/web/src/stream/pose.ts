@@ -21,8 +21,12 @@ export interface Pose {
   readonly height: number;
 }
 
+/** What is beside the globe and nearest to a camera that looks away from it is taken to be this far ahead, earth radii. */
+const LEAST_AHEAD = 0.2;
 /** Nearer to the plane of the camera than this nothing is seen. */
 const LEAST_DEPTH = 1e-6;
+/** A sight line this little below the ground touches it. */
+const GRAZING = 1e-9;
 
 export function poseOf(camera: CameraView, width: number, height: number): Pose {
   const [east, north, up] = axesAt(camera.lon, camera.lat);
@@ -53,11 +57,6 @@ export function seen(pose: Pose, place: Vector): Point | undefined {
   return onWindow(pose, sum(place, 1, pose.place, -1));
 }
 
-/** Where things infinitely far away in a direction are seen. */
-export function seenFar(pose: Pose, direction: Vector): Point | undefined {
-  return onWindow(pose, direction);
-}
-
 /** The direction in which a point of the window is seen. */
 export function sight(pose: Pose, { x, y }: Point): Vector {
   const [east, south] = [(x - pose.width / 2) / pose.focalPx, (y - pose.height / 2) / pose.focalPx];
@@ -73,13 +72,18 @@ export function groundAlong({ place }: Pose, direction: Vector): Vector | undefi
   return sum(place, 1, direction, -along - Math.sqrt(below));
 }
 
+/** The place on a sight line beside the globe that is nearest to it, or some way ahead where that lies behind. */
+export function nearestAlong({ place }: Pose, direction: Vector): Vector {
+  return sum(place, 1, direction, Math.max(LEAST_AHEAD, -dot(place, direction)));
+}
+
 /** Does the globe hide a place on or above the ground? */
 export function isHidden({ place: eye }: Pose, place: Vector): boolean {
   const line = sum(place, 1, eye, -1);
   const nearest = -dot(eye, line) / dot(line, line);
   if (nearest <= 0 || nearest >= 1) return false;
   const at = sum(eye, 1, line, nearest);
-  return dot(at, at) < 1;
+  return dot(at, at) < 1 - GRAZING;
 }
 
 function onWindow(pose: Pose, line: Vector): Point | undefined {
