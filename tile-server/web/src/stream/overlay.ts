@@ -1,9 +1,8 @@
 //! Pictures over the globe: the newest picture and for which camera in, what the eye sees out. The last one stays until the next is there.
-
 import type { Mesh } from "./mesh";
 import { Mover } from "./mover";
 
-/** What it costs to look from the globe to the picture and back without a jerk. */
+/** The style sheet fades between the globe and what has this class. */
 const SHOWN = "shown";
 
 export class Overlay {
