@@ -2,6 +2,16 @@
 import assert from "node:assert/strict";
 import test from "node:test";
 import { budgetTotal, checkTable, landHasNoData, seriesOfSea } from "./analysis-steps.mjs";
+import {
+  globesAgree,
+  keysTilt,
+  liveIsSwitchedOff,
+  opensInFlight,
+  pictureFollowsCamera,
+  pictureFollowsLook,
+  pictureFollowsTime,
+  staysWithTiles,
+} from "./fly-steps.mjs";
 import { testHarness } from "./harness-self.mjs";
 import { openBrowser, Watch } from "./harness.mjs";
 import { Journey, LIMIT_MS } from "./journey.mjs";
@@ -71,6 +81,14 @@ test("the viewer", async (t) => {
     await step("plays and renders views in the look", playbackAndViewFollowLook);
     await step("goes back to the usual look", lookIsReset);
     await step("passes over what an address asks of the look and is not there", wrongLookIsIgnored);
+    await step("opens in flight: over a coast, with the live picture over the globe", opensInFlight);
+    await step("shows the picture that the camera sees, and the full one when it rests", pictureFollowsCamera);
+    await step("tilts and turns the camera by keys", keysTilt);
+    await step("moves the picture with the look, and the legend with the picture", pictureFollowsLook);
+    await step("runs time through the stream", pictureFollowsTime);
+    await step("puts places where the picture has them", globesAgree);
+    await step("goes back to tiles when the live picture is switched off", liveIsSwitchedOff);
+    await step("stays with tiles where there is no stream", staysWithTiles);
     await step("shows data that lands while it is open", newDataLands);
     await step("says so when its address asks for a time that there is nothing of", timeOutside);
     await step("has nothing to complain about at the end", async () => {});

@@ -27,8 +27,15 @@ module.exports = {
       name: "panels-on-top",
       severity: "error",
       comment: "Panels use the other rooms and are joined to them by main.ts alone.",
-      from: { path: "^src/(api|page|state|time|look|globe)/" },
+      from: { path: "^src/(api|page|state|time|look|globe|stream)/" },
       to: { path: "^src/(panels/|[^/]+[.]ts$)" },
+    },
+    {
+      name: "stream-over-globe",
+      severity: "error",
+      comment: "The globe does not know what lies over it.",
+      from: { path: "^src/(api|page|state|time|look|globe)/" },
+      to: { path: "^src/stream/" },
     },
     {
       name: "cesium-in-globe",

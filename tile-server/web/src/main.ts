@@ -5,6 +5,7 @@ import "./style/fields.css";
 import "./style/layer.css";
 import "./style/analysis.css";
 import "./style/look.css";
+import "./style/stream.css";
 import "./style/time.css";
 import "./style/messages.css";
 import "./style/phone.css";
@@ -35,6 +36,10 @@ import { FLUX } from "./state/catalogue";
 import { decodeHash } from "./state/hash";
 import { Inventory } from "./state/inventory";
 import { INITIAL, Store } from "./state/store";
+import { Live } from "./stream/live";
+import { Overlay } from "./stream/overlay";
+import { Readout } from "./stream/readout";
+import { LiveSwitch } from "./stream/switch";
 import { Playback } from "./time/playback";
 import { Timeline } from "./time/timeline";
 import { Viewer } from "./viewer";
@@ -70,15 +75,34 @@ const pointer = new Pointer(
   (position) => observed.choose(position),
 );
 
+const live = new Live({
+  store,
+  inventory,
+  globe,
+  presenter,
+  overlay: new Overlay(byId("overlay")),
+  marks: () => [marks.drawn, observed.drawn],
+  isBare: () => stage.shown === undefined,
+  onShow: (spec) => {
+    stage.isCovered = true;
+    void legend.show(spec);
+  },
+  onHide: () => {
+    stage.isCovered = false;
+    if (stage.shown) void legend.show(stage.shown);
+  },
+});
+const isFollowed = () => live.isFollowing;
+
 const view = new ViewDialog(
   store,
   () => inventory.product?.modes ?? [],
   () => inventory.product?.synthetic ?? false,
-  (mode) => inventory.lookIn(mode),
+  (mode) => inventory.viewIn(mode),
 );
 const controls = new Controls(byId("controls"), store, () => view.open());
 const legend = new LegendCard(controls.legend, (id, mode) => inventory.catalogue.usualLegend(id, mode), report);
-const timeline = new Timeline(byId("timeline"), store);
+const timeline = new Timeline(byId("timeline"), store, isFollowed);
 const panels = new Panels(byId("panels"), store);
 const observed = new ObservationLayer(controls.observations, globe, store, panels, report);
 const placePanel = new PlacePanel(panels.bodies.place, {
@@ -95,8 +119,11 @@ const budgetPanel = new BudgetPanel(panels.bodies.budget, {
   markRegion: (box) => marks.region(box),
   onError: report,
 });
-const lookPanel = new LookPanel(panels.bodies.look, store, () =>
-  offerOf(inventory.catalogue, inventory.palettes, store.state),
+const lookPanel = new LookPanel(
+  panels.bodies.look,
+  store,
+  () => offerOf(inventory.catalogue, inventory.palettes, store.state),
+  isFollowed,
 );
 new CameraButtons(byId("camera"), globe);
 new Playback(
@@ -104,17 +131,22 @@ new Playback(
   presenter,
   () => inventory.steps,
   (timeMs) => inventory.layerAt(timeMs),
+  live,
 );
+new LiveSwitch(controls.live, store, live);
+new Readout(byId("app"), live.rate, () => live.picture);
 const probe = installProbe(
   store,
   counts,
   globe,
   () => stage.shownKey,
   () => observed.platforms,
+  live,
 );
 
 controls.watch(counts);
-stage.onReveal = (spec) => void legend.show(spec);
+// Below a live picture tiles change unseen.
+stage.onReveal = (spec) => !live.isShown && void legend.show(spec);
 globe
   .addBaseImagery()
   .catch(() => notices.show("base", "The base map is missing from this server; data is drawn on plain water."));
@@ -131,6 +163,7 @@ const viewer = new Viewer(
     globe,
     stage,
     presenter,
+    live,
     marks,
     controls,
     legend,

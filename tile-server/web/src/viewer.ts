@@ -1,8 +1,8 @@
 //! What the page shows: what the server has and what the reader chose in; the layer, its legend and the cards of it out.
 import * as api from "./api/requests";
-import type { News } from "./api/types";
+import type { News, Product } from "./api/types";
 import { touches } from "./api/updates";
-import { contains } from "./globe/box";
+import { contains, isWhole } from "./globe/box";
 import type { Globe } from "./globe/globe";
 import type { Marks } from "./globe/marks";
 import type { Presenter } from "./globe/presenter";
@@ -13,6 +13,8 @@ import type { LookPanel } from "./look/panel";
 import { byId } from "./page/dom";
 import { titleText } from "./page/format";
 import type { Notices } from "./page/notices";
+import { COAST } from "./state/camera";
+import type { Live } from "./stream/live";
 import type { BudgetPanel } from "./panels/budget";
 import { drawCheck } from "./panels/check";
 import type { Controls } from "./panels/controls";
@@ -31,6 +33,7 @@ export interface Parts {
   globe: Globe;
   stage: LayerStage;
   presenter: Presenter;
+  live: Live;
   marks: Marks;
   controls: Controls;
   legend: LegendCard;
@@ -50,13 +53,16 @@ export class Viewer {
   #askedMs: number | undefined;
   /** The page was opened over a place of its reader's choice. */
   readonly #isPlaced: boolean;
+  /** Nothing was said of how the page shall open. */
+  #isFree: boolean;
 
   /** `asked` is what the page's address said when it was opened. */
   constructor(parts: Parts, asked: Partial<State>) {
     this.#parts = parts;
     this.#askedMs = asked.timeMs;
     this.#isPlaced = asked.camera !== undefined;
-    const { store, inventory, notices, stage, presenter, marks, report } = parts;
+    this.#isFree = asked.camera === undefined && asked.mode === undefined;
+    const { store, inventory, notices, stage, presenter, live, marks, report } = parts;
     store.on(["opacity"], (state) => {
       stage.opacity = state.opacity;
     });
@@ -64,6 +70,7 @@ export class Viewer {
     store.on(["product"], () => {
       // One product's picture must not stay under another one's legend, not even while the other loads.
       presenter.reset();
+      live.clear();
       this.#useProduct();
       this.#bringIntoSight();
     });
@@ -91,7 +98,9 @@ export class Viewer {
 
   /** Loads what the page needs; again when a lost server is back, where a whole picture in sight is kept. */
   async begin(): Promise<void> {
-    const { store, inventory, notices, controls, presenter, report, onReady } = this.#parts;
+    const { store, inventory, notices, controls, presenter, live, report, onReady } = this.#parts;
+    // Asked at the same time as the products, not after them.
+    const offered = this.#isFree ? live.offered() : Promise.resolve(false);
     try {
       await inventory.load();
     } catch (error) {
@@ -110,6 +119,9 @@ export class Viewer {
     if (wanted !== null && !catalogue.find(wanted))
       notices.show("product", `The server has no product “${wanted}”; showing “${first.title}” instead.`);
     const chosen = catalogue.find(wanted) ?? first;
+    const isFlight = (await offered) && chosen.modes.includes("volume") && isWhole(chosen.bounds_deg);
+    if (this.#isFree && isFlight) this.#takeOff(chosen);
+    this.#isFree = false;
     const look = inventory.drawable(store.state.look);
     if (store.state.product === chosen.product) {
       store.set({ look });
@@ -117,8 +129,9 @@ export class Viewer {
       this.#bringIntoSight();
     } else store.set({ product: chosen.product, look: wanted === null ? look : withoutColours(look) });
     await catalogue.learn(chosen.product, store.state.mode).catch((error: unknown) => report("layer", error));
+    live.opened();
     this.#showLayer();
-    void presenter.idle().then(onReady);
+    void Promise.all([presenter.idle(), live.settled()]).then(onReady);
     await this.#loadAside();
   }
 
@@ -169,10 +182,22 @@ export class Viewer {
     }
     if (change.camera) globe.view = change.camera;
     this.#askedMs = change.timeMs;
-    const { region, opacity, observations } = INITIAL;
-    store.set({ place: null, tab: null, region, opacity, observations, ...change, look });
+    const { region, opacity, observations, live } = INITIAL;
+    store.set({ place: null, tab: null, region, opacity, observations, live, ...change, look });
     // A change of product has looked at the instant already.
     if (this.#askedMs !== undefined) this.#useProduct();
+  }
+
+  /** Where pictures follow the camera the page begins low over the sea, so that what stands above it is seen to stand. */
+  #takeOff({ product }: Product): void {
+    const { store, inventory, globe } = this.#parts;
+    globe.start = COAST;
+    globe.view = COAST;
+    // The picture's own ground has no land colours by which one would know where one is.
+    store.set({ mode: "volume", camera: COAST, look: { ...store.state.look, coastlines: true } });
+    // What accumulates stands highest at the end.
+    const last = inventory.catalogue.stepsOf(product).at(-1);
+    if (last) this.#askedMs ??= last.midMs;
   }
 
   /** Regions and the check table: the globe does not wait for them. */
@@ -241,11 +266,11 @@ export class Viewer {
 
   /** A picture that is still to come brings its legend with it; until there is any, the legend is that of what is waited for. */
   #readyLegend(): void {
-    const { store, inventory, stage, legend } = this.#parts;
+    const { store, inventory, stage, live, legend } = this.#parts;
     const { product: id, mode } = store.state;
     if (!inventory.product || id === null) return;
     const layer = { product: id, mode, look: inventory.lookIn(mode) };
-    if (stage.shownKey === undefined) void legend.show(layer);
+    if (stage.shownKey === undefined && !live.isShown) void legend.show(layer);
     else legend.learn(layer);
   }
 }

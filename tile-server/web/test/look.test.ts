@@ -137,9 +137,9 @@ describe("a look in an address", () => {
     const spec = CATALOGUE.layerAt(state({ look: FULL, mode: "volume" }), 0) as LayerSpec;
     const tile = new URL(tileTemplate("flux", "volume", spec.timeIso, spec, parameters(spec.look)));
     expect(tile.href.endsWith(`&${FULL_QUERY}`)).toBe(true);
-    const size = { lon: 0, lat: 0, heightKm: 1, headingDeg: 12.5, pitchDeg: -30, width: 2, height: 2 };
+    const size = { lon: 0, lat: 0, heightKm: 1, headingDeg: 12.5, pitchDeg: -30, rollDeg: 0, openingDeg: 45, width: 2, height: 2 };
     const view = new URL(globeUrl("flux", "volume", { ...size, timeIso: spec.timeIso, look: parameters(spec.look) }));
-    expect([view.searchParams.get("heading"), view.searchParams.get("tilt")]).toEqual(["12.50", "60.00"]);
+    expect([view.searchParams.get("heading"), view.searchParams.get("tilt")]).toEqual(["12.5", "60"]);
     for (const [name, value] of parameters(FULL)) {
       expect(tile.searchParams.get(name)).toBe(value);
       expect(view.searchParams.get(name)).toBe(value);

@@ -1,6 +1,7 @@
 //! Time maths against hand values: months of unequal length, holes between steps, the raster and the loop of playback.
 import { describe, expect, it } from "vitest";
 import {
+  advanced,
   clampToRange,
   formatInstant,
   instantAt,
@@ -167,5 +168,13 @@ describe("labels of a time axis", () => {
       "18:00",
       "00:00\n2 Jan 2000",
     ]);
+  });
+});
+
+describe("time that runs with the screen", () => {
+  it("goes on by parts of steps, whatever their length, and begins anew at the end", () => {
+    expect(advanced(STEPS, 0.5, 0.25)).toEqual({ position: 0.75, timeMs: instantAt(STEPS, 0.75) });
+    expect(advanced(STEPS, 2.9, 0.25)).toEqual({ position: 0, timeMs: at(JAN.start) });
+    expect(advanced([], 0, 1)).toBeUndefined();
   });
 });

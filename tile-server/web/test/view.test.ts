@@ -18,7 +18,7 @@ describe("the address", () => {
     place: { lon: -150.25, lat: 3.5 },
     tab: "budget",
     region: "170,-10,-170,10",
-    camera: { lon: 12.5, lat: -40, heightKm: 5000, headingDeg: 20, pitchDeg: -60 },
+    camera: { lon: 12.5, lat: -40, heightKm: 5000, headingDeg: 20, pitchDeg: -60, rollDeg: 0 },
   };
 
   it("carries a view there and back", () => {
@@ -28,6 +28,13 @@ describe("the address", () => {
   it("knows every mode", () => {
     for (const mode of MODES) expect(decodeHash(`#mode=${mode}`)).toEqual({ mode });
     expect(MODES).toContain("flow");
+  });
+
+  it("says that the live picture is off, and where the camera leans", () => {
+    const leaning = { ...state, live: false, camera: { ...state.camera, rollDeg: -7.5 } };
+    expect(encodeHash(leaning)).toMatch(/camera=12.5,-40,5000,20,-60,-7.5&.*&live=off$/);
+    expect({ ...INITIAL, ...decodeHash(encodeHash(leaning)) }).toEqual(leaning);
+    expect(decodeHash("#live=on&live=maybe")).toEqual({ live: true });
   });
 
   it("leaves out what is as it is at first", () => {

@@ -35,6 +35,7 @@ export function tileTemplate(
   return `${folder}{z}/{x}/{y}.png?${queryOf([...drawn, ...revision, ...look])}`;
 }
 
+/** A picture of the globe from a camera. */
 export interface GlobeView {
   lon: number;
   lat: number;
@@ -42,22 +43,49 @@ export interface GlobeView {
   headingDeg: number;
   /** -90 looks straight down. */
   pitchDeg: number;
+  rollDeg: number;
+  /** Across the shorter side. */
+  openingDeg: number;
   timeIso: string;
   width: number;
   height: number;
+  /** The newest unless one is named. */
+  manifest?: string;
   look: readonly Parameter[];
 }
 
-export function globeUrl(product: string, mode: Mode, view: GlobeView): string {
+/** Longest side of a picture, pixels: the server's limit. */
+export const MOST_SIDE_PX = 4096;
+
+/** Below the page's own address, so that it is the same to a server behind a path prefix. Steps are finer than a pixel from the lowest camera. */
+export function globePath(product: string, mode: Mode, view: GlobeView): string {
   const query = {
-    lon: view.lon.toFixed(4),
-    lat: view.lat.toFixed(4),
-    height_km: view.heightKm.toFixed(1),
-    heading: view.headingDeg.toFixed(2),
-    tilt: (90 + view.pitchDeg).toFixed(2),
-    time: view.timeIso,
+    lon: numberText(view.lon, 5),
+    lat: numberText(view.lat, 5),
+    height_km: numberText(view.heightKm, 3),
+    heading: numberText(view.headingDeg, 3),
+    tilt: numberText(90 + view.pitchDeg, 3),
+    roll: numberText(view.rollDeg, 3),
+    fov: numberText(view.openingDeg, 3),
+    time: encodeURIComponent(view.timeIso),
     width: String(view.width),
     height: String(view.height),
+    ...(view.manifest === undefined ? {} : { manifest: encodeURIComponent(view.manifest) }),
   } satisfies QueryTexts<"globe_view">;
-  return address(`globe/${encodeURIComponent(product)}/${mode}.png`, { ...query, ...Object.fromEntries(view.look) });
+  return `globe/${encodeURIComponent(product)}/${mode}.png?${queryOf([...Object.entries(query), ...view.look])}`;
+}
+
+export function globeUrl(product: string, mode: Mode, view: GlobeView): string {
+  return address(globePath(product, mode, view));
+}
+
+/** A size of the same shape whose longer side is at most `longest`. */
+export function within(longest: number, width: number, height: number): { width: number; height: number } {
+  const part = Math.min(1, longest / Math.max(width, height));
+  return { width: Math.max(1, Math.round(width * part)), height: Math.max(1, Math.round(height * part)) };
+}
+
+function numberText(value: number, digits: number): string {
+  // A rounded -0 has no sign.
+  return String(Number(value.toFixed(digits)) + 0);
 }

@@ -5,6 +5,7 @@ import {
   CesiumWidget,
   Color,
   Credit,
+  Ellipsoid,
   EllipsoidTerrainProvider,
   ImageryLayer,
   Ion,
@@ -15,7 +16,7 @@ import {
   buildModuleUrl,
   type Scene,
 } from "cesium";
-import { type CameraView, HOME, type Place } from "../state/camera";
+import { type CameraView, HOME, OPENING_DEG, type Place, SPHERE_RADIUS_M } from "../state/camera";
 import type { Bounds } from "./box";
 
 /** The base picture is dimmed: the data's colours are what is to be read. */
@@ -23,8 +24,8 @@ const BASE_LOOK = { brightness: 0.62, saturation: 0.55, contrast: 1.08, gamma: 1
 const MIN_HEIGHT_M = 50_000;
 const MAX_HEIGHT_M = 60_000_000;
 const ZOOM_STEP = 0.35;
-/** Opening of the shorter side, the same as the server's camera has, so that a rendered view shows what the globe shows. */
-const OPENING_DEG = 45;
+/** Of the camera by one arrow key. */
+const LOOK_STEP_DEG = 3;
 
 export interface GlobeOptions {
   /** Larger is coarser and asks for fewer tiles; 2 is Cesium's own. */
@@ -37,10 +38,14 @@ export interface GlobeOptions {
 
 export class Globe {
   readonly widget: CesiumWidget;
+  /** Where the page began. */
+  start: CameraView = HOME;
 
   constructor(container: HTMLElement, credits: HTMLElement, options: GlobeOptions) {
     // No token, so that nothing in the library could reach its maker's service even by mistake.
     Ion.defaultAccessToken = "";
+    // The server draws a sphere: on an ellipsoid its coasts would lie up to 20 km beside these.
+    Ellipsoid.default = new Ellipsoid(SPHERE_RADIUS_M, SPHERE_RADIUS_M, SPHERE_RADIUS_M);
     this.widget = new CesiumWidget(container, {
       baseLayer: false,
       terrainProvider: new EllipsoidTerrainProvider(),
@@ -107,6 +112,7 @@ export class Globe {
       // At the zenith heading and roll are one and the same turn; what is read back must not wander between 0 and 360.
       headingDeg: CesiumMath.toDegrees(CesiumMath.negativePiToPi(camera.heading)),
       pitchDeg: CesiumMath.toDegrees(camera.pitch),
+      rollDeg: CesiumMath.toDegrees(CesiumMath.negativePiToPi(camera.roll)),
     };
   }
 
@@ -120,13 +126,13 @@ export class Globe {
   }
 
   home(): void {
-    this.fly(HOME, 1.2);
+    this.fly(this.start, 1.2);
   }
 
   /** Turns north up over the place that is in sight now. */
   northUp(): void {
     const { lon, lat, heightKm } = this.view;
-    this.fly({ lon, lat, heightKm, headingDeg: 0, pitchDeg: -90 }, 0.6);
+    this.fly({ lon, lat, heightKm, headingDeg: 0, pitchDeg: -90, rollDeg: 0 }, 0.6);
   }
 
   zoom(direction: 1 | -1): void {
@@ -143,7 +149,7 @@ export class Globe {
     const lon = west + ((((east - west) % 360) + 360) % 360) / 2;
     // A box of 40 degrees fills the window from about 4800 km; nearer or further in proportion.
     const heightKm = Math.min(HOME.heightKm, Math.max(800, span * 120));
-    this.fly({ lon, lat: (south + north) / 2, heightKm, headingDeg: 0, pitchDeg: -90 }, 1.2);
+    this.fly({ lon, lat: (south + north) / 2, heightKm, headingDeg: 0, pitchDeg: -90, rollDeg: 0 }, 1.2);
   }
 
   #dress(options: GlobeOptions): void {
@@ -178,7 +184,7 @@ export class Globe {
   /** The globe takes the focus and turns by arrow keys, so that it can be used without a pointer. */
   #keys(): void {
     this.canvas.tabIndex = 0;
-    this.canvas.setAttribute("aria-label", "Globe. Arrow keys turn it, plus and minus zoom.");
+    this.canvas.setAttribute("aria-label", "Globe. Arrow keys turn it, with Shift they tilt and turn the camera, plus and minus zoom.");
     this.canvas.addEventListener("keydown", (event) => {
       const view = this.view;
       const turnDeg = Math.min(15, view.heightKm / 1200);
@@ -189,7 +195,8 @@ export class Globe {
         ArrowDown: [0, -turnDeg],
       };
       const turn = turns[event.key];
-      if (turn) this.view = { ...view, lon: view.lon + turn[0], lat: Math.max(-89, Math.min(89, view.lat + turn[1])) };
+      if (turn && event.shiftKey) this.view = turned(view, turn);
+      else if (turn) this.view = { ...view, lon: view.lon + turn[0], lat: Math.max(-89, Math.min(89, view.lat + turn[1])) };
       else if (event.key === "+" || event.key === "=") this.zoom(1);
       else if (event.key === "-") this.zoom(-1);
       else return;
@@ -198,10 +205,21 @@ export class Globe {
   }
 }
 
+/** The camera stays where it is and looks elsewhere. */
+function turned(view: CameraView, [right, up]: readonly [number, number]): CameraView {
+  const pitchDeg = view.pitchDeg + Math.sign(up) * LOOK_STEP_DEG;
+  return {
+    ...view,
+    headingDeg: view.headingDeg + Math.sign(right) * LOOK_STEP_DEG,
+    pitchDeg: Math.min(Math.max(pitchDeg, -90), 0),
+  };
+}
+
 function destinationOf(view: CameraView): Cartesian3 {
   return Cartesian3.fromDegrees(view.lon, view.lat, view.heightKm * 1000);
 }
 
 function orientationOf(view: CameraView): { heading: number; pitch: number; roll: number } {
-  return { heading: CesiumMath.toRadians(view.headingDeg), pitch: CesiumMath.toRadians(view.pitchDeg), roll: 0 };
+  const [heading, pitch, roll] = [view.headingDeg, view.pitchDeg, view.rollDeg].map(CesiumMath.toRadians) as [number, number, number];
+  return { heading, pitch, roll };
 }

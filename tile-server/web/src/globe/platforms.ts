@@ -2,6 +2,7 @@
 import { Cartesian3, Color, Material, PointPrimitiveCollection, PolylineCollection, type Scene } from "cesium";
 import type { Kind, Platform } from "../api/types";
 import { denseLine } from "./box";
+import type { Drawn, DrawnLine, DrawnPoint } from "./drawn";
 
 const COLOURS: Record<Kind, string> = { buoy: "#ffe08a", ship: "#ff9bd2", station: "#b7f28f", profile: "#c9b6ff" };
 /** A little above the ellipsoid, and below the mark of a chosen place. */
@@ -12,6 +13,7 @@ const STEP_DEG = 4;
 const PICK_PX = 9;
 
 export class PlatformLayer {
+  #drawn: Drawn = { lines: [], points: [] };
   readonly #scene: Scene;
   readonly #points: PointPrimitiveCollection;
   readonly #lines: PolylineCollection;
@@ -22,10 +24,16 @@ export class PlatformLayer {
     this.#points = scene.primitives.add(new PointPrimitiveCollection()) as PointPrimitiveCollection;
   }
 
+  /** Another one after every change. */
+  get drawn(): Drawn {
+    return this.#drawn;
+  }
+
   show(platforms: readonly Platform[], chosen: Platform | null): void {
     this.#points.removeAll();
     this.#lines.removeAll();
-    for (const platform of platforms) this.#draw(platform, platform.id === chosen?.id);
+    const drawn = platforms.map((platform) => this.#draw(platform, platform.id === chosen?.id));
+    this.#drawn = { lines: drawn.flatMap(({ lines }) => lines), points: drawn.map(({ point }) => point) };
     this.#scene.requestRender();
   }
 
@@ -36,27 +44,33 @@ export class PlatformLayer {
     return isPlatform(picked?.id) ? picked.id : undefined;
   }
 
-  #draw(platform: Platform, isChosen: boolean): void {
+  #draw(platform: Platform, isChosen: boolean): { lines: DrawnLine[]; point: DrawnPoint } {
     const { lon_deg, lat_deg, kind } = platform.properties;
-    const colour = Color.fromCssColorString(COLOURS[kind]);
-    if (platform.geometry.type === "MultiLineString") {
-      for (const line of platform.geometry.coordinates) {
-        this.#lines.add({
-          id: platform,
-          positions: denseLine(line, STEP_DEG).map(([x, y]) => Cartesian3.fromDegrees(x, y, HEIGHT_M)),
-          width: isChosen ? 4 : 2,
-          material: Material.fromType("Color", { color: colour }),
-        });
-      }
+    const colour = COLOURS[kind];
+    const tracks = platform.geometry.type === "MultiLineString" ? platform.geometry.coordinates : [];
+    const lines = tracks.map((track) => {
+      const points = denseLine(track, STEP_DEG).map(([lon, lat]) => ({ lon, lat }));
+      return { points, colour, widthPx: isChosen ? 4 : 2 };
+    });
+    const edge = isChosen ? "#ffffff" : "#0b1a26";
+    const point = { lon: lon_deg, lat: lat_deg, colour, edge, edgePx: 2, sizePx: isChosen ? 13 : 9 };
+    for (const line of lines) {
+      this.#lines.add({
+        id: platform,
+        positions: line.points.map(({ lon, lat }) => Cartesian3.fromDegrees(lon, lat, HEIGHT_M)),
+        width: line.widthPx,
+        material: Material.fromType("Color", { color: Color.fromCssColorString(colour) }),
+      });
     }
     this.#points.add({
       id: platform,
       position: Cartesian3.fromDegrees(lon_deg, lat_deg, HEIGHT_M),
-      color: colour,
-      outlineColor: Color.fromCssColorString(isChosen ? "#ffffff" : "#0b1a26"),
-      outlineWidth: 2,
-      pixelSize: isChosen ? 13 : 9,
+      color: Color.fromCssColorString(colour),
+      outlineColor: Color.fromCssColorString(edge),
+      outlineWidth: point.edgePx,
+      pixelSize: point.sizePx,
     });
+    return { lines, point };
   }
 }
 

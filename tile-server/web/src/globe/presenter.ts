@@ -9,9 +9,20 @@ export class Presenter {
   #loading: { spec: LayerSpec; abort: AbortController } | undefined;
   #next: LayerSpec | undefined;
   #waiting: ((isIdle: true) => void)[] = [];
+  #isHeld = false;
+  #kept: LayerSpec | undefined;
 
   constructor(stage: LayerStage) {
     this.#stage = stage;
+  }
+
+  /** While pictures lie over the globe nobody sees tiles: the newest wish is kept and loaded when that ends. */
+  set isHeld(isHeld: boolean) {
+    this.#isHeld = isHeld;
+    const kept = this.#kept;
+    if (isHeld || !kept) return;
+    this.#kept = undefined;
+    this.want(kept);
   }
 
   /**
@@ -19,6 +30,10 @@ export class Presenter {
    * that the globe keeps moving, and of those that came meanwhile only the last is loaded.
    */
   want(spec: LayerSpec): void {
+    if (this.#isHeld) {
+      this.#kept = spec;
+      return;
+    }
     if (this.#loading && isSameLayer(this.#loading.spec, spec)) {
       this.#next = layerKey(this.#loading.spec) === layerKey(spec) ? undefined : spec;
       return;
@@ -64,6 +79,7 @@ export class Presenter {
 
   /** Forgets everything, for a change of product. */
   reset(): void {
+    this.#kept = undefined;
     this.abandon();
     this.#stage.clear();
   }

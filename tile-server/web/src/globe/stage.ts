@@ -27,6 +27,7 @@ export class LayerStage {
   #shown: Prepared | undefined;
   #fade: { to: Prepared; startedMs: number; lengthMs: number } | undefined;
   #opacity: number;
+  #isCovered = false;
   readonly #scene: Scene;
   readonly #counts: TileCounts;
   readonly #onFailure: (status: number | undefined, url: string) => void;
@@ -44,6 +45,10 @@ export class LayerStage {
     scene.preRender.addEventListener(() => this.#advanceFade());
   }
 
+  get shown(): LayerSpec | undefined {
+    return (this.#fade?.to ?? this.#shown)?.spec;
+  }
+
   /** What the eye sees, or is about to see. */
   get shownKey(): string | undefined {
     return (this.#fade?.to ?? this.#shown)?.key;
@@ -58,6 +63,14 @@ export class LayerStage {
   set opacity(opacity: number) {
     this.#opacity = opacity;
     if (!this.#fade && this.#shown) this.#shown.layer.alpha = opacity;
+    this.#scene.requestRender();
+  }
+
+  /** Something lies over the whole globe: for what nobody sees no tiles are asked for, wherever the camera goes. */
+  set isCovered(isCovered: boolean) {
+    if (this.#isCovered === isCovered) return;
+    this.#isCovered = isCovered;
+    if (this.#shown) this.#shown.layer.show = !isCovered;
     this.#scene.requestRender();
   }
 
@@ -136,6 +149,7 @@ export class LayerStage {
     fade.to.layer.alpha = this.#opacity;
     if (this.#shown) this.#remove(this.#shown);
     this.#shown = fade.to;
+    this.#shown.layer.show = !this.#isCovered;
     this.#scene.requestRender();
   }
 

@@ -22,11 +22,13 @@ export class LookPanel {
     el("option", { value: "log" }, "Logarithmic"),
   );
   readonly #uncertainty = toggle("uncertainty", "Mark cells that were filled", (uncertainty) => this.#change({ uncertainty }));
-  readonly #surroundings = new SurroundingsForm((change) => this.#change(change));
+  readonly #surroundings: SurroundingsForm;
 
-  constructor(body: HTMLElement, store: Store, offer: () => LookOffer | undefined) {
+  /** `isFollowed`: pictures of any look come by themselves. */
+  constructor(body: HTMLElement, store: Store, offer: () => LookOffer | undefined, isFollowed: () => boolean) {
     this.#store = store;
     this.#offer = offer;
+    this.#surroundings = new SurroundingsForm((change) => this.#change(change), isFollowed);
     this.#scale.addEventListener("change", () => this.#change({ scale: (this.#scale.value || null) as Scale | null }));
     body.append(
       this.#palettes.element,

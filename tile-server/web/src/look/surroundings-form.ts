@@ -29,7 +29,7 @@ export class SurroundingsForm {
 
   #listed = "";
 
-  constructor(onChange: (change: Partial<Look>) => void) {
+  constructor(onChange: (change: Partial<Look>) => void, isFollowed: () => boolean) {
     this.#coastlines = toggle("coastlines", "Coast lines", (coastlines) => onChange({ coastlines }));
     this.#isolines = toggle("isolines", "Isolines", (isolines) => onChange({ isolines }));
     this.#relief.addEventListener("change", () => onChange({ relief: this.#relief.value || null }));
@@ -39,6 +39,7 @@ export class SurroundingsForm {
       max: SLIDER_RELIEF,
       step: 1,
       text: (value) => `${numberText(value, 0)}×`,
+      isFollowed,
       onChoose: (reliefExaggeration) => onChange({ reliefExaggeration }),
     });
     this.#sea = new Slider({
@@ -47,6 +48,7 @@ export class SurroundingsForm {
       max: 0.95,
       step: 0.05,
       text: (value) => `${numberText(value * 100, 0)} %`,
+      isFollowed,
       onChoose: (seaOpacity) => onChange({ seaOpacity }),
     });
     this.#height = new Slider({
@@ -55,6 +57,7 @@ export class SurroundingsForm {
       max: SLIDER_HEIGHT_KM,
       step: 500,
       text: (value) => `${numberText(value, 0)} km`,
+      isFollowed,
       onChoose: (km) => onChange({ heightMPerKgM2: km * 1000 }),
     });
     this.#sun.addEventListener("change", () => onChange({ sunOfTime: this.#sun.value === "time" }));

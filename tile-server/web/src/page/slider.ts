@@ -1,4 +1,4 @@
-//! A labelled slider: a number in, the number it is left at out. While the thumb moves only its own reading follows.
+//! A labelled slider: a number in, the number it is left at out. While the thumb moves its own reading follows, and pictures where they can.
 import { el } from "./dom";
 
 export interface SliderOptions {
@@ -7,7 +7,8 @@ export interface SliderOptions {
   max: number;
   step: number;
   text: (value: number) => string;
-  /** A picture of every place that the thumb passes would be drawn for nobody. */
+  /** Pictures follow the thumb; else one of every place that it passes would be drawn for nobody. */
+  isFollowed: () => boolean;
   onChoose: (value: number) => void;
 }
 
@@ -17,11 +18,14 @@ export class Slider {
   readonly #output: HTMLOutputElement;
   readonly #text: (value: number) => string;
 
-  constructor({ id, label, max, step, text, onChoose }: SliderOptions) {
+  constructor({ id, label, max, step, text, isFollowed, onChoose }: SliderOptions) {
     this.#text = text;
     this.#input = el("input", { type: "range", id, min: "0", max: String(max), step: String(step) });
     this.#output = el("output", { for: id });
-    this.#input.addEventListener("input", () => this.#read(Number(this.#input.value)));
+    this.#input.addEventListener("input", () => {
+      this.#read(Number(this.#input.value));
+      if (isFollowed()) onChoose(Number(this.#input.value));
+    });
     this.#input.addEventListener("change", () => onChoose(Number(this.#input.value)));
     const head = el("span", { class: "slider-head" }, el("span", {}, label), this.#output);
     this.element = el("label", { class: "field slider" }, head, this.#input);

@@ -20,6 +20,8 @@ const MODE_HINTS: Record<Mode, string> = {
 export class Controls {
   /** Room for the legend. */
   readonly legend = el("div", { class: "legend-slot" });
+  /** Room for the toggle of the live picture. */
+  readonly live = el("div", { class: "live" });
   /** Room for the toggle of observations. */
   readonly observations = el("div");
   readonly #store: Store;
@@ -52,6 +54,7 @@ export class Controls {
       ),
       el("label", { class: "field" }, el("span", { class: "visually-hidden" }, "Product"), this.#product),
       this.#modes,
+      this.live,
       this.legend,
       this.observations,
       el("label", { class: "field row opacity" }, el("span", {}, "Opacity"), opacity),

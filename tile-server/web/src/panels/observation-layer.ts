@@ -1,6 +1,7 @@
 //! Observations switched on and off: the toggle in the state in, platforms on the globe and the chosen one's panel out.
 import * as observations from "../api/observations";
 import type { Platform } from "../api/types";
+import type { Drawn } from "../globe/drawn";
 import type { Globe } from "../globe/globe";
 import { PlatformLayer } from "../globe/platforms";
 import { el } from "../page/dom";
@@ -46,6 +47,10 @@ export class ObservationLayer {
 
   get platforms(): readonly Platform[] {
     return this.#platforms;
+  }
+
+  get drawn(): Drawn {
+    return this.#layer.drawn;
   }
 
   /** Chooses the platform at a canvas point, if there is one. */

@@ -8,7 +8,7 @@ const PAUSE_MS = 300;
 /** A hash that is typed or pasted into an open page is meant as a whole new view: `onTyped` gets all that it says. */
 export function keepAddress(store: Store, onTyped: (change: Partial<State>) => void): void {
   let timer: ReturnType<typeof setTimeout> | undefined;
-  store.on(["product", "mode", "timeMs", "camera", "opacity", "look", "place", "tab", "region", "observations"], () => {
+  store.on(["product", "mode", "timeMs", "camera", "opacity", "look", "place", "tab", "region", "observations", "live"], () => {
     timer ??= setTimeout(() => {
       timer = undefined;
       history.replaceState(null, "", encodeHash(store.state));

@@ -22,6 +22,7 @@ export function encodeHash(state: Readonly<State>): string {
   if (state.tab && TABS.includes(state.tab)) parts.push(`tab=${state.tab}`);
   if (state.region !== "global") parts.push(`region=${encodeURIComponent(state.region)}`);
   if (state.observations) parts.push("observations=on");
+  if (!state.live) parts.push("live=off");
   return `#${parts.join("&")}`;
 }
 
@@ -46,6 +47,7 @@ function read(key: string, value: string, found: Partial<State>): void {
   else if (key === "place") assign(found, "place", placeOf(value));
   else if (key === "tab" && TABS.includes(value as Tab)) found.tab = value as Tab;
   else if (key === "observations" && value === "on") found.observations = true;
+  else if (key === "live" && (value === "on" || value === "off")) found.live = value === "on";
   else if (key === "region" && value !== "") found.region = value;
   else {
     const change = changeOf(key, value);
@@ -59,17 +61,19 @@ function assign<K extends keyof State>(found: Partial<State>, key: K, value: Sta
 
 function cameraText(camera: CameraView): string {
   const fields = [round(camera.lon, 3), round(camera.lat, 3), round(camera.heightKm, 1)];
-  const isStraightDown = round(camera.headingDeg, 1) % 360 === 0 && round(camera.pitchDeg, 1) === -90;
-  return (isStraightDown ? fields : [...fields, round(camera.headingDeg, 1), round(camera.pitchDeg, 1)]).join(",");
+  const [headingDeg, pitchDeg, rollDeg] = [camera.headingDeg, camera.pitchDeg, camera.rollDeg].map((angle) => round(angle, 1));
+  if (rollDeg !== 0) return [...fields, headingDeg, pitchDeg, rollDeg].join(",");
+  const isStraightDown = (headingDeg ?? 0) % 360 === 0 && pitchDeg === -90;
+  return (isStraightDown ? fields : [...fields, headingDeg, pitchDeg]).join(",");
 }
 
 function cameraOf(text: string): CameraView | undefined {
   const numbers = text.split(",").map(Number);
-  const [lon, lat, heightKm, headingDeg = 0, pitchDeg = -90] = numbers;
+  const [lon, lat, heightKm, headingDeg = 0, pitchDeg = -90, rollDeg = 0] = numbers;
   if (numbers.length < 3 || numbers.some((number) => !Number.isFinite(number))) return undefined;
   if (lon === undefined || lat === undefined || heightKm === undefined) return undefined;
   if (Math.abs(lat) > 90 || heightKm <= 0 || heightKm > 200_000) return undefined;
-  return { lon: wrapLon(lon), lat, heightKm, headingDeg, pitchDeg };
+  return { lon: wrapLon(lon), lat, heightKm, headingDeg, pitchDeg, rollDeg };
 }
 
 function placeOf(text: string): Place | undefined {

@@ -46,6 +46,12 @@ export class Inventory {
     return this.catalogue.lookIn(mode, this.#store.state);
   }
 
+  /** The picture at the instant shown, in any of the product's modes. */
+  viewIn(mode: Mode): LayerSpec | undefined {
+    const { state } = this.#store;
+    return this.catalogue.layerAt({ ...state, mode }, state.timeMs);
+  }
+
   /** An address may name a palette or a relief that is not here. */
   drawable(look: Look): Look {
     const palettes = this.palettes.map((palette) => palette.name);

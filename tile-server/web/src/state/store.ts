@@ -25,6 +25,8 @@ export interface State {
   region: string;
   /** Buoys, ships, stations and casts are shown. */
   observations: boolean;
+  /** Pictures that follow the camera lie over the globe, where the server has them. */
+  live: boolean;
   camera: CameraView;
 }
 
@@ -40,6 +42,7 @@ export const INITIAL: State = {
   tab: null,
   region: "global",
   observations: false,
+  live: true,
   camera: HOME,
 };
 

@@ -1,8 +1,21 @@
 //! Playback: loads the next instant out of sight, waits until it is due, shows it, and so on; a slow server stretches time, it never flashes.
+//! Where pictures follow the state by themselves time runs with the screen, as fast as they come.
 import { isSameLayer, type LayerSpec } from "../globe/layer";
 import type { Presenter } from "../globe/presenter";
 import type { Store } from "../state/store";
-import { nextInstant, PARTS_PER_STEP, quantise, type Step, strideFor } from "./steps";
+import { advanced, nextInstant, PARTS_PER_STEP, positionOf, quantise, type Step, strideFor } from "./steps";
+
+/** A page that was out of sight goes on where it was, not where it would be. */
+const MOST_FRAME_MS = 250;
+
+/** Time does not run further ahead of the picture than this: where pictures come slowly so does time. */
+const MOST_LAG_MS = 700;
+
+/** What shows the picture of the state by itself. */
+export interface Follower {
+  readonly isFollowing: boolean;
+  readonly lagMs: number;
+}
 
 export class Playback {
   #run: { isOver: boolean } | undefined;
@@ -10,18 +23,24 @@ export class Playback {
   readonly #presenter: Presenter;
   readonly #steps: () => readonly Step[];
   readonly #specAt: (timeMs: number) => LayerSpec | undefined;
+  readonly #follower: Follower;
 
   constructor(
     store: Store,
     presenter: Presenter,
     steps: () => readonly Step[],
     specAt: (timeMs: number) => LayerSpec | undefined,
+    follower: Follower,
   ) {
     this.#store = store;
     this.#presenter = presenter;
     this.#steps = steps;
     this.#specAt = specAt;
-    store.on(["playing"], (state) => (state.playing ? this.#start() : this.#stop()));
+    this.#follower = follower;
+    store.on(["playing"], (state) => {
+      if (state.playing) this.#start();
+      else this.#stop();
+    });
   }
 
   #start(): void {
@@ -32,14 +51,22 @@ export class Playback {
   }
 
   #stop(): void {
-    if (this.#run) this.#run.isOver = true;
+    if (!this.#run) return;
+    this.#run.isOver = true;
     this.#run = undefined;
+    // Where it stops it stops on the raster, on which pictures are kept.
+    const { timeMs } = this.#store.state;
+    if (this.#follower.isFollowing && Number.isFinite(timeMs)) this.#store.set({ timeMs: quantise(this.#steps(), timeMs) });
   }
 
   async #loop(run: { isOver: boolean }): Promise<void> {
     let loadMs = 0;
     let shownAtMs = performance.now();
     while (!run.isOver) {
+      if (this.#follower.isFollowing) {
+        await this.#follow(run);
+        continue;
+      }
       const frameMs = 1000 / (this.#store.state.stepsPerSecond * PARTS_PER_STEP);
       const stride = strideFor(loadMs, frameMs);
       const fromMs = quantise(this.#steps(), this.#store.state.timeMs);
@@ -64,6 +91,31 @@ export class Playback {
       this.#store.set({ timeMs });
     }
   }
+
+  /** Time runs as long as pictures follow; a hand on the slider sets from where. */
+  async #follow(run: { isOver: boolean }): Promise<void> {
+    let beforeMs = await frame();
+    let position = positionOf(this.#steps(), this.#store.state.timeMs);
+    while (!run.isOver && this.#follower.isFollowing) {
+      const nowMs = await frame();
+      const { timeMs, stepsPerSecond } = this.#store.state;
+      const steps = this.#steps();
+      // What was set is to the second, what is counted is not: only who moved the slider made a difference.
+      const at = positionOf(steps, timeMs);
+      if (Math.abs(at - position) > 1 / PARTS_PER_STEP) position = at;
+      const isAhead = this.#follower.lagMs > MOST_LAG_MS;
+      const next = advanced(steps, position, (Math.min(nowMs - beforeMs, MOST_FRAME_MS) / 1000) * stepsPerSecond);
+      beforeMs = nowMs;
+      if (run.isOver || next === undefined) return;
+      if (isAhead) continue;
+      position = next.position;
+      this.#store.set({ timeMs: next.timeMs });
+    }
+  }
+}
+
+function frame(): Promise<number> {
+  return new Promise((resolve) => requestAnimationFrame(resolve));
 }
 
 function until(dueMs: number): Promise<void> {

@@ -90,6 +90,17 @@ export function nextInstant(steps: readonly Step[], timeMs: number, strideParts:
   return wholeSecond(instantAt(steps, next >= steps.length * PARTS_PER_STEP ? 0 : next / PARTS_PER_STEP));
 }
 
+/** Some steps or parts of one further on, and from the end to the start; undefined without steps. */
+export function advanced(
+  steps: readonly Step[],
+  position: number,
+  by: number,
+): { position: number; timeMs: number } | undefined {
+  if (steps.length === 0) return undefined;
+  const next = position + by < steps.length ? position + by : 0;
+  return { position: next, timeMs: wholeSecond(instantAt(steps, next)) };
+}
+
 /**
  * How many parts of a step playback advances at once, a power of two up to a whole step: a server that needs longer
  * for a frame than the speed allows gets fewer frames to draw, and the pace stays nearer to what was asked.

@@ -19,6 +19,7 @@ const LABEL_WIDTH_PX = 64;
 
 export class Timeline {
   readonly #store: Store;
+  readonly #isFollowed: () => boolean;
   #steps: readonly Step[] = [];
   readonly #slider = el("input", {
     type: "range",
@@ -33,8 +34,10 @@ export class Timeline {
   readonly #play = el("button", { type: "button", class: "round play", id: "play" });
   readonly #ticks = el("div", { class: "ticks", "aria-hidden": "true" });
 
-  constructor(container: HTMLElement, store: Store) {
+  /** `isFollowed`: pictures of any instant come by themselves. */
+  constructor(container: HTMLElement, store: Store, isFollowed: () => boolean) {
     this.#store = store;
+    this.#isFollowed = isFollowed;
     const speed = el("select", { id: "speed", "aria-label": "Playback speed in steps per second" });
     for (const pace of SPEEDS)
       speed.append(el("option", { value: String(pace), selected: pace === store.state.stepsPerSecond }, `${pace}×`));
@@ -77,8 +80,11 @@ export class Timeline {
     );
     this.#play.addEventListener("click", () => store.set({ playing: !store.state.playing }));
     // While the thumb moves, instants are taken on the cached raster; where it is let go, exactly what was chosen.
-    this.#slider.addEventListener("input", () => store.set({ timeMs: quantise(this.#steps, this.#chosenMs()) }));
-    this.#slider.addEventListener("change", () => store.set({ timeMs: Math.round(this.#chosenMs() / 1000) * 1000 }));
+    const exactMs = () => Math.round(this.#chosenMs() / 1000) * 1000;
+    this.#slider.addEventListener("input", () =>
+      store.set({ timeMs: this.#isFollowed() ? exactMs() : quantise(this.#steps, this.#chosenMs()) }),
+    );
+    this.#slider.addEventListener("change", () => store.set({ timeMs: exactMs() }));
     this.#slider.addEventListener("keydown", (event) => this.#key(event));
     new ResizeObserver(() => this.#drawTicks()).observe(this.#ticks);
     new ResizeObserver(() =>
@@ -133,7 +139,8 @@ export class Timeline {
     if (!Number.isFinite(timeMs)) return;
     const position = positionOf(this.#steps, timeMs);
     // The thumb under the reader's finger is left where it is, unless it is elsewhere altogether.
-    if (Math.abs(Number(this.#slider.value) - position) > 0.5 / PARTS_PER_STEP) this.#slider.value = String(position);
+    const isElsewhere = Math.abs(Number(this.#slider.value) - position) > 0.5 / PARTS_PER_STEP;
+    if (isElsewhere || (this.#isFollowed() && !this.#slider.matches(":active"))) this.#slider.value = String(position);
     this.#slider.style.setProperty("--part", String(position / Math.max(1, this.#steps.length)));
     const text = formatInstant(timeMs);
     this.#readout.textContent = text;
