@@ -42,6 +42,7 @@ pub fn scene(
         accumulated: None,
         terrain: None,
         northward: Some(part(1)),
+        trails: None,
     }
 }
 
@@ -64,7 +65,11 @@ pub fn job(view: View, clock_s: f64) -> RenderJob {
     let northward = plain.value.clone();
     RenderJob {
         accumulated: None,
-        flow: Some(Flow { northward, clock_s }),
+        flow: Some(Flow {
+            northward,
+            clock_s,
+            look: None,
+        }),
         mode: Mode::Flow,
         style: Style::of_flow(TransferFunction::of_speed(Quantity::Current)),
         ..plain

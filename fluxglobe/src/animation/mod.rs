@@ -13,6 +13,7 @@ use std::sync::Arc;
 
 use anyhow::{Context as _, Result, bail};
 use bytes::Bytes;
+use contract::encoding::Encoding;
 use contract::manifest::Manifest;
 use contract::sun::SunChoice;
 use contract::time::TimeMs;
@@ -54,7 +55,9 @@ pub(crate) async fn run(settings: &Settings, store: Store, options: RenderAnimat
             let (drawer, shots) = (Arc::clone(&drawer), Arc::clone(&shots));
             async move {
                 let job = shots.job(number)?;
-                let png = drawer.draw(&job, Keep::No, Turn::default()).await;
+                let png = drawer
+                    .draw(&job, Keep::No, Encoding::Png, Turn::default())
+                    .await;
                 let time = shots.time(number)?;
                 let png = png.with_context(|| format!("picture {number}, {time}"))?;
                 anyhow::Ok((number, png))
@@ -111,6 +114,7 @@ async fn shots(settings: &Settings, store: &Store, options: &RenderAnimation) ->
         style,
         sun_of_time,
         annotations: asked.annotations,
+        vector: picture::vector(store, &globe.picture).await?,
         relief: picture::relief(store, settings, &globe.picture).await?,
         fps: options.fps,
         count: Shots::count_of(seconds(options, path.as_ref()), options.fps)?,

@@ -116,6 +116,21 @@ pub(super) struct Look {
 }
 
 impl Look {
+    /// How the particles of a job look.
+    pub(super) fn of_job(job: &RenderJob) -> Self {
+        let usual = Self::of(job.mode);
+        let Some(own) = job.flow.as_ref().and_then(|flow| flow.look) else {
+            return usual;
+        };
+        Self {
+            min_radius_px: usual.min_radius_px.min(own.radius_px as f32),
+            max_radius_px: own.radius_px,
+            area_px_per_particle: own.area_px,
+            center_depth: Some(own.depth),
+            ..usual
+        }
+    }
+
     pub(super) fn of(mode: Mode) -> Self {
         match mode {
             Mode::Points => Self {

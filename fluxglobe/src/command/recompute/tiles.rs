@@ -9,7 +9,7 @@ use contract::job::{Mode, RenderJob, View};
 use contract::key::ObjectKey;
 use contract::tile::Tile;
 use contract::topic::Topic;
-use render_worker::desk::{Class, Order, Origin, Storing};
+use render_worker::desk::{Order, Origin, Storing};
 use storage::log::{EventLog, Start};
 use storage::{Store, manifests, verify};
 use tile_server::{Accumulated, Layer, picture_job};

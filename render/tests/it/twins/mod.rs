@@ -23,6 +23,7 @@ use render::plan::Plan;
 use render::playback::Playback;
 use render::stages::bin;
 use render::stages::compose::in_context::Surroundings;
+use render::stages::eye::cpu::Hiding;
 use render::stages::flow::cpu::Field;
 use render::stages::flow::{self};
 use render::stages::layout::{
@@ -153,7 +154,8 @@ impl Twins {
             entries = vec![Entry::default(); bin::cpu::scan(&mut list_ends) as usize];
             bin::cpu::scatter(&params, &shaded, &mut list_ends, &mut entries);
             params.lists.entry_capacity = entries.len() as u32;
-            eye::cpu::eye(&params, &list_ends, &entries, &plan.coast, &mut picture);
+            let hiding = Hiding::of(&plan);
+            eye::cpu::eye(&params, &list_ends, &entries, hiding, &mut picture);
         }
         let mut lines = vec![];
         if params.context.lines_on == 1 {

@@ -5,6 +5,7 @@ use render::frame_context::FrameContext;
 use render::gpu::{Gpu, Slot};
 use render::stages::compose;
 use render::stages::compose::in_context::Surroundings;
+use render::stages::eye::cpu::Hiding;
 use render::stages::eye::{self, Eye};
 
 use super::{Twins, bytes, channels, far_apart, prove};
@@ -102,7 +103,7 @@ fn eye_blends_away_from_the_light_behind_as_its_twin_does() {
         &twins.params,
         &twins.list_ends,
         &twins.entries,
-        &twins.plan.coast,
+        Hiding::of(&twins.plan),
         &mut twins.picture,
     );
     assert!(
