@@ -498,6 +498,8 @@ mod tests {
             "subsolar",
             "contributed",
             "annotations",
+            "trails",
+            "look",
         ] {
             assert!(!text.contains(later), "{text}");
         }

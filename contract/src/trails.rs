@@ -91,15 +91,7 @@ impl TrailSources<'_> {
             return Err(ContractError::invalid("trails", name, reason));
         }
         let (eastward, flow) = drift(self.eastward, self.northward, time)?;
-        Ok(Trails {
-            grid: self.eastward.grid,
-            eastward,
-            flow: Flow {
-                look: Some(LOOK),
-                ..flow
-            },
-            transfer: light(self.eastward.quantity)?,
-        })
+        Trails::of(self.eastward.grid, eastward, flow, self.eastward.quantity)
     }
 
     /// What a caption says of them: the vector, its instant if that is not the picture's, and whose data it is.
@@ -133,3 +125,29 @@ fn light(quantity: Quantity) -> Result<TransferFunction, ContractError> {
         ..speed
     })
 }
+
+impl Trails {
+    /// Trails in their usual look over whichever layer: along a vector whose parts are of a quantity.
+    ///
+    /// # Errors
+    /// A quantity whose speeds have no range.
+    pub fn of(
+        grid: Grid,
+        eastward: TimeSample,
+        flow: Flow,
+        quantity: Quantity,
+    ) -> Result<Self, ContractError> {
+        Ok(Self {
+            grid,
+            eastward,
+            flow: Flow {
+                look: Some(LOOK),
+                ..flow
+            },
+            transfer: light(quantity)?,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests;

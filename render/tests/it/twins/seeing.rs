@@ -13,7 +13,7 @@ use crate::compare::worst;
 use crate::scenes::{FIVE_DEGREES, globe, ocean, tile};
 
 /// The image that the eye makes of the twins' lists on the GPU, as bytes.
-fn eye_image(twins: &Twins, gpu: &Gpu, source: &str, entry: &'static str) -> Vec<f32> {
+pub(super) fn eye_image(twins: &Twins, gpu: &Gpu, source: &str, entry: &'static str) -> Vec<f32> {
     let stage = Eye::of(gpu, source, entry);
     let lists = |f: &mut FrameContext<'_>| {
         f.upload(Slot::Counts, &twins.list_ends).unwrap();
