@@ -21,10 +21,13 @@ pub(crate) const TRAILS_PER_CELL: u32 = 64;
 const COLOR: Rgb = Rgb([250, 252, 255]);
 /// Opacity by speed, as shares of the fastest: slow water is left to the layer below.
 const OPACITY: [[f64; 2]; 3] = [[0.0, 0.06], [0.25, 0.6], [0.6, 1.0]];
+/// Speed at which trails are longest over the top of the range of a flow's colours: with no colours to tell speeds by, their
+/// length does, and the bulk of currents is far below that top.
+const TOP: f64 = 0.6;
 /// Fewer and no wider trails than of a flow alone, so that the layer below is seen between them.
 const LOOK: TrailLook = TrailLook {
     radius_px: 1.5,
-    area_px: 300.0,
+    area_px: 200.0,
     depth: 2.0,
 };
 
@@ -117,7 +120,11 @@ impl TrailSources<'_> {
 
 /// What trails over the speeds of a quantity look like.
 fn light(quantity: Quantity) -> Result<TransferFunction, ContractError> {
-    let speed = TransferFunction::of_speed(quantity);
+    let usual = TransferFunction::of_speed(quantity);
+    let speed = TransferFunction {
+        high: TOP * usual.high,
+        ..usual
+    };
     let opacity = OPACITY.map(|[place, share]| format!("{}:{share}", speed.value_at(place)));
     Ok(TransferFunction {
         colors: format!("{}:{COLOR},{}:{COLOR}", speed.low, speed.high).parse()?,

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use contract::job::{Mode, RenderJob, View};
 use render::plan::Plan;
+use render::stages::sphere::ground_below;
 use render::{Backend, Image, RenderError, Renderer, Scene};
 use render_proof::currents::{self, gyres};
 
@@ -87,6 +88,7 @@ fn every_renderer_draws_the_same_trails_in_every_mode_and_they_are_seen() {
 fn trails_lie_on_the_sea_and_neither_over_land_nor_beside_the_globe() {
     let (scene, job) = with_trails_everywhere(on_globe(Mode::Map));
     let plan = Plan::new(&job, &scene, u64::MAX).unwrap();
+    let params = plan.params_of(plan.whole());
     let renderer = twins();
     let plain = renderer.render(&without(&job), &scene).unwrap();
     let drawn = renderer.render(&job, &scene).unwrap();
@@ -97,7 +99,7 @@ fn trails_lie_on_the_sea_and_neither_over_land_nor_beside_the_globe() {
         for x in 0..drawn.width {
             let at = (y * drawn.width + x) as usize;
             let is_changed = drawn.pixel(x, y) != plain.pixel(x, y);
-            let is_beside = plain.pixel(x, y)[3] < 255;
+            let is_beside = ground_below(&params, [x, y]).rim_px < -0.5;
             let is_land = plan.coast[at] & 255 == 255;
             let has_trail = alone.pixel(x, y)[3] > 60;
             if is_land || is_beside {
@@ -163,22 +165,22 @@ fn trails_go_on_where_a_picture_is_drawn_in_parts() {
     let view = View::Globe {
         lon_deg: -30.0,
         lat_deg: 25.0,
-        height_m: 9e5,
-        width_px: 2200,
-        height_px: 40,
+        height_m: 3e5,
+        width_px: 2100,
+        height_px: 600,
         angles,
     };
     let (scene, job) = with_trails_everywhere(job(Mode::Map, view));
     for renderer in renderers("trails") {
         let light = lightened(renderer, &scene, &job);
         let seen = |first: usize| {
-            let rows = light.chunks_exact(2200);
-            rows.flat_map(|row| &row[first..first + 100])
+            let rows = light.chunks_exact(2100);
+            rows.flat_map(|row| &row[first..first + 48])
                 .filter(|light| light.abs() > 9)
                 .count()
         };
         // As much of the second part as of the first.
-        let [before, after] = [1948, 2048].map(seen);
+        let [before, after] = [2000, 2048].map(seen);
         assert!(after > 100 && before > 100, "{before}, {after}");
         let alone = job.trails_alone().unwrap();
         let alone = renderer.render(&alone, scene.trails.as_ref().unwrap());

@@ -101,7 +101,7 @@ fn on_tile(params: &Params, row: &Row, col: &Col, particle: &Particle) -> Splat 
             1.0
         },
         color: particle.color | UNDIMMED,
-        is_beyond: 0,
+        is_beyond: u32::from(-particle.height_m > projection.beyond_m),
     }
 }
 
