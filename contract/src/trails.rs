@@ -23,10 +23,10 @@ const COLOR: Rgb = Rgb([250, 252, 255]);
 const OPACITY: [[f64; 2]; 3] = [[0.0, 0.06], [0.25, 0.6], [0.6, 1.0]];
 /// Speed at which trails are longest over the top of the range of a flow's colours: with no colours to tell speeds by, their
 /// length does, and the bulk of currents is far below that top.
-const TOP: f64 = 0.6;
+const TOP: f64 = 0.7;
 /// Fewer and no wider trails than of a flow alone, so that the layer below is seen between them.
 const LOOK: TrailLook = TrailLook {
-    radius_px: 1.5,
+    radius_px: 1.6,
     area_px: 200.0,
     depth: 2.0,
 };
