@@ -178,11 +178,12 @@ impl Source {
     }
 
     async fn scene_for(&self, job: &RenderJob, wanted: Wanted) -> Result<Scene, DrawError> {
-        let scene = self.scene_alone(job, wanted).await?;
-        let Some(alone) = job.trails_alone() else {
+        // Boxed, as are its parts: a job is large, and whoever waits for a scene would carry it.
+        let scene = Box::pin(self.scene_alone(job, wanted)).await?;
+        let Some(alone) = job.trails_alone().map(Box::new) else {
             return Ok(scene);
         };
-        let vector = self.scene_alone(&alone, wanted).await?;
+        let vector = Box::pin(self.scene_alone(&alone, wanted)).await?;
         Ok(Scene {
             trails: Some(Arc::new(vector)),
             ..scene
