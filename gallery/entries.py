@@ -144,7 +144,7 @@ def read_entry(table: dict, heading: str, data: tuple[Data, ...]) -> Entry:
 def data_of(name: str, words: tuple[str, ...], data: tuple[Data, ...]) -> list[Data]:
     """The sets that the products of a command come from."""
     found = []
-    for word in ("--layer", "--relief"):
+    for word in ("--layer", "--relief", "--trails"):
         product = option(words, word)
         if product is None:
             continue

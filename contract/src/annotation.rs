@@ -50,6 +50,9 @@ pub struct Annotations {
     /// Whose data these are.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub source: Option<Label>,
+    /// Which vector the trails over the picture are of.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub trails: Option<Label>,
 }
 
 /// What a height bar cannot know from the style of a picture.
@@ -72,6 +75,7 @@ impl Annotations {
             scale: false,
             height: None,
             source: None,
+            trails: None,
         }
     }
 

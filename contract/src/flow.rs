@@ -24,6 +24,24 @@ pub struct Flow {
     /// How long particles have drifted, s: since 1970, so that between two instants they move as far as the water does.
     #[serde(with = "crate::exact")]
     pub clock_s: f64,
+    /// How wide, how many and how dense trails are where they are not as usual.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub look: Option<TrailLook>,
+}
+
+/// What trails look like beside their colours.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TrailLook {
+    /// Radius of a trail's head, pixels, 0.5 to 16.
+    #[serde(with = "crate::exact")]
+    pub radius_px: f64,
+    /// Pixels for each trail, 4 to 1e6.
+    #[serde(with = "crate::exact")]
+    pub area_px: f64,
+    /// Optical depth of a head where its opacity is 1, above 0 to 16.
+    #[serde(with = "crate::exact")]
+    pub depth: f64,
 }
 
 /// Is it a part of a vector, positive and negative?
@@ -71,11 +89,38 @@ pub fn check_parts(eastward: &Manifest, northward: &Manifest) -> Result<(), Cont
     Ok(())
 }
 
-/// Periods of the steps around an instant, the second only where it has weight.
-pub(crate) fn steps_around(
-    manifest: &Manifest,
+/// The eastward part of a vector at an instant, and what makes it a flow.
+///
+/// # Errors
+/// Products that are no parts of one vector, an instant around which they have different steps.
+pub(crate) fn drift(
+    eastward: &Manifest,
+    northward: &Manifest,
     time: TimeMs,
-) -> Option<(Option<Period>, Option<Period>)> {
+) -> Result<(TimeSample, Flow), ContractError> {
+    check_parts(eastward, northward)?;
+    let empty = || {
+        let name = eastward.product.as_str();
+        ContractError::invalid("product", name, "it has no steps")
+    };
+    if steps_around(eastward, time) != steps_around(northward, time) {
+        let reason = format!(
+            "{} and {} have different steps there; land both parts of every file",
+            eastward.product, northward.product
+        );
+        let text = time.to_string();
+        return Err(ContractError::invalid("instant of a flow", &text, reason));
+    }
+    let flow = Flow {
+        northward: northward.time_sample(time).ok_or_else(empty)?,
+        clock_s: time.ms() as f64 / 1000.0,
+        look: None,
+    };
+    Ok((eastward.time_sample(time).ok_or_else(empty)?, flow))
+}
+
+/// Periods of the steps around an instant, the second only where it has weight.
+fn steps_around(manifest: &Manifest, time: TimeMs) -> Option<(Option<Period>, Option<Period>)> {
     let Bracket {
         before,
         after,
@@ -109,7 +154,30 @@ impl Flow {
             let reason = "its clock lies within 1e12 s of 1970";
             return Err(ContractError::invalid("flow", &text, reason));
         }
+        self.look.map_or(Ok(()), TrailLook::validate)?;
         self.northward.validate()
+    }
+}
+
+impl TrailLook {
+    fn validate(self) -> Result<(), ContractError> {
+        let limits = [
+            (self.radius_px, 0.5..=16.0),
+            (self.area_px, 4.0..=1e6),
+            (self.depth, 1e-3..=16.0),
+        ];
+        if limits
+            .iter()
+            .all(|(number, limits)| limits.contains(number))
+        {
+            return Ok(());
+        }
+        let reason = "radii are 0.5 to 16 pixels, areas 4 to 1e6, depths above 0 to 16";
+        Err(ContractError::invalid(
+            "trails",
+            &format!("{self:?}"),
+            reason,
+        ))
     }
 }
 

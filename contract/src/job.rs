@@ -14,6 +14,7 @@ use crate::key::ObjectKey;
 use crate::sun::Sun;
 use crate::tile::Tile;
 use crate::time_sample::TimeSample;
+use crate::trails::{TRAILS_PER_CELL, Trails};
 
 /// Raised whenever the renderer draws the same job differently or writes the same picture in other bytes, so that old
 /// pictures are not taken for new ones: a name has one content for ever. `make bless` asks for it.
@@ -164,6 +165,10 @@ pub struct RenderJob {
     /// What makes the product drawn the eastward part of a vector; there if and only if the mode is [`Mode::Flow`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub flow: Option<Flow>,
+    /// A vector whose trails lie on the sea surface: under particles that rise above it, over those that lie on it or sink,
+    /// and over the colours of a map.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub trails: Option<Box<Trails>>,
     /// Mode.
     pub mode: Mode,
     /// View.
@@ -301,6 +306,7 @@ impl RenderJob {
             .map_or(Ok(()), TimeSample::validate)?;
         self.relief.as_ref().map_or(Ok(()), Relief::validate)?;
         self.validate_flow()?;
+        self.validate_trails()?;
         self.validate_annotations()?;
         self.style.validate()?;
         let Style {
@@ -332,6 +338,22 @@ impl RenderJob {
         }
     }
 
+    fn validate_trails(&self) -> Result<(), ContractError> {
+        let (Some(trails), Some(alone)) = (&self.trails, self.trails_alone()) else {
+            return Ok(());
+        };
+        if self.mode == Mode::Flow && self.value.product() == trails.eastward.product() {
+            let reason = "it is what is drawn as a flow; leave its trails out, or draw another layer or mode";
+            return Err(ContractError::invalid(
+                "trails",
+                trails.eastward.product(),
+                reason,
+            ));
+        }
+        // What they are drawn by has the limits of any job.
+        alone.validate()
+    }
+
     fn validate_annotations(&self) -> Result<(), ContractError> {
         let Some(annotations) = &self.annotations else {
             return Ok(());
@@ -344,6 +366,27 @@ impl RenderJob {
             return Err(ContractError::invalid("annotations", "height", reason));
         }
         annotations.validate()
+    }
+
+    /// The job that draws the trails alone in the same view, on nothing.
+    pub fn trails_alone(&self) -> Option<Self> {
+        let trails = self.trails.as_ref()?;
+        Some(Self {
+            renderer_version: self.renderer_version,
+            grid: trails.grid,
+            value: trails.eastward.clone(),
+            accumulated: None,
+            relief: None,
+            flow: Some(trails.flow.clone()),
+            trails: None,
+            mode: Mode::Flow,
+            view: self.view,
+            style: Style {
+                particles_per_cell: TRAILS_PER_CELL,
+                ..Style::with_transfer(trails.transfer)
+            },
+            annotations: None,
+        })
     }
 
     /// The digest that names the picture.
@@ -403,6 +446,7 @@ mod tests {
             accumulated: None,
             relief: None,
             flow: None,
+            trails: None,
             mode: Mode::Volume,
             view: View::Tile {
                 tile: Tile { z: 1, x: 0, y: 0 },
@@ -454,6 +498,8 @@ mod tests {
             "subsolar",
             "contributed",
             "annotations",
+            "trails",
+            "look",
         ] {
             assert!(!text.contains(later), "{text}");
         }

@@ -41,5 +41,6 @@ pub mod tile;
 pub mod time;
 pub mod time_sample;
 pub mod topic;
+pub mod trails;
 
 pub use error::ContractError;

@@ -8,16 +8,14 @@ use crate::annotation::AnnotationWishes;
 use crate::base_map::{Background, BaseMap};
 use crate::colour::{TransferFunction, TransferOptions};
 use crate::context::{Context, Relief};
-use crate::flow::{Flow, check_parts, steps_around};
+use crate::flow::drift;
 use crate::isolines::IsolineWish;
 use crate::job::{Mode, RENDERER_VERSION, RenderJob, Style, View};
 use crate::manifest::Manifest;
 use crate::quantity::Quantity;
 use crate::sun::SunChoice;
 use crate::time::TimeMs;
-
-/// Trails of every cell at most, where cells are large on the screen.
-const TRAILS_PER_CELL: u32 = 64;
+use crate::trails::{TRAILS_PER_CELL, TrailSources, Trails};
 
 /// What somebody asks of the look of a picture; all of it the usual where nothing was asked.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -76,6 +74,8 @@ pub struct PictureSources<'a> {
     pub accumulated: Option<&'a Manifest>,
     /// The northward part of the vector whose eastward part the product is; [`Mode::Flow`] needs it.
     pub northward: Option<&'a Manifest>,
+    /// The vector whose trails lie on the sea surface.
+    pub trails: Option<TrailSources<'a>>,
     /// Land and sea floor below the particles.
     pub relief: Option<Relief>,
 }
@@ -196,6 +196,7 @@ impl<'a> PictureSources<'a> {
             product,
             accumulated: None,
             northward: None,
+            trails: None,
             relief: None,
         }
     }
@@ -217,7 +218,11 @@ impl<'a> PictureSources<'a> {
             }
             (mode, _) => RenderJob::of(self.product, self.accumulated, time, mode, view, style)?,
         };
-        job.over(self.relief.clone())
+        let job = job.over(self.relief.clone())?;
+        match self.trails {
+            Some(trails) => job.under_trails(trails.trails(time)?),
+            None => Ok(job),
+        }
     }
 }
 
@@ -260,6 +265,7 @@ impl RenderJob {
                 .transpose()?,
             relief: None,
             flow: None,
+            trails: None,
             mode,
             view,
             style,
@@ -279,6 +285,19 @@ impl RenderJob {
         Ok(job)
     }
 
+    /// The same picture with trails on its sea surface.
+    ///
+    /// # Errors
+    /// Trails of the very vector that is drawn as a flow, or a limit that is broken.
+    pub fn under_trails(self, trails: Trails) -> Result<Self, ContractError> {
+        let job = Self {
+            trails: Some(Box::new(trails)),
+            ..self
+        };
+        job.validate()?;
+        Ok(job)
+    }
+
     /// The job that draws particles drifting with a vector, by its parts' versions.
     ///
     /// # Errors
@@ -291,29 +310,15 @@ impl RenderJob {
         view: View,
         style: Style,
     ) -> Result<Self, ContractError> {
-        check_parts(eastward, northward)?;
-        let empty = || {
-            let name = eastward.product.as_str();
-            ContractError::invalid("product", name, "it has no steps")
-        };
-        if steps_around(eastward, time) != steps_around(northward, time) {
-            let reason = format!(
-                "{} and {} have different steps there; land both parts of every file",
-                eastward.product, northward.product
-            );
-            let text = time.to_string();
-            return Err(ContractError::invalid("instant of a flow", &text, reason));
-        }
+        let (value, flow) = drift(eastward, northward, time)?;
         let job = Self {
             renderer_version: RENDERER_VERSION,
             grid: eastward.grid,
-            value: eastward.time_sample(time).ok_or_else(empty)?,
+            value,
             accumulated: None,
             relief: None,
-            flow: Some(Flow {
-                northward: northward.time_sample(time).ok_or_else(empty)?,
-                clock_s: time.ms() as f64 / 1000.0,
-            }),
+            flow: Some(flow),
+            trails: None,
             mode: Mode::Flow,
             view,
             style,

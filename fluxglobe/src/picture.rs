@@ -4,12 +4,15 @@ use anyhow::{Context as _, Result, bail};
 use contract::annotation::AnnotationWishes;
 use contract::camera::CameraAngles;
 use contract::context::Relief;
+use contract::flow::northward_of;
 use contract::grid::LonLatDeg;
 use contract::job::{Mode, RenderJob, View};
 use contract::look_at::LookAt;
 use contract::manifest::Manifest;
 use contract::picture::{PictureOptions, PictureRequest, PictureSources, shown_time};
-use contract::time::Period;
+use contract::time::{Period, TimeMs};
+use contract::trails::{TrailSources, eastward_part, no_vector};
+use serde::{Deserialize, Serialize};
 use storage::Store;
 
 use crate::cli::{Camera, GroundOptions, Picture, RenderGlobe, Settings};
@@ -94,10 +97,12 @@ pub(crate) async fn job(
     }
     let northward = northward(store, &product, picture.mode).await?;
     let accumulated = accumulated(store, &product).await?;
+    let vector = vector(store, picture).await?;
     let sources = PictureSources {
         product: &product,
         accumulated: accumulated.as_ref(),
         northward: northward.as_ref(),
+        trails: vector.as_ref().map(Vector::trails),
         relief: relief(store, settings, picture).await?,
     };
     let request = PictureRequest {
@@ -143,6 +148,48 @@ pub(crate) async fn relief(
     };
     let elevation = deployment::manifest(store, product, &settings.data).await?;
     Ok(Some(Relief::of(&elevation, options.relief_exaggeration)?))
+}
+
+/// The versions of both parts of a vector whose trails are drawn, and the instant if it is not the picture's.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Vector {
+    eastward: Manifest,
+    northward: Manifest,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    time: Option<TimeMs>,
+}
+
+impl Vector {
+    pub(crate) fn trails(&self) -> TrailSources<'_> {
+        TrailSources {
+            eastward: &self.eastward,
+            northward: &self.northward,
+            time: self.time,
+        }
+    }
+}
+
+/// The newest versions of the vector whose trails a picture asks for.
+pub(crate) async fn vector(store: &Store, picture: &Picture) -> Result<Option<Vector>> {
+    let options = &picture.surroundings;
+    let Some(named) = &options.trails else {
+        return Ok(None);
+    };
+    let part = eastward_part(named)?;
+    let eastward = storage::manifests::latest(store, &part).await?;
+    let northward = match eastward.as_ref().and_then(northward_of) {
+        Some(part) => storage::manifests::latest(store, &part).await?,
+        None => None,
+    };
+    let (Some(eastward), Some(northward)) = (eastward, northward) else {
+        return Err(no_vector(named).into());
+    };
+    Ok(Some(Vector {
+        eastward,
+        northward,
+        time: options.trails_time,
+    }))
 }
 
 /// The newest version of a picture's product.

@@ -7,6 +7,7 @@ use contract::flow::Flow;
 use contract::grid::Grid;
 use contract::job::{Mode, RenderJob, Style, View};
 use contract::quantity::Quantity;
+use contract::trails::Trails;
 use render::scene::{Frame, Interval, Scene};
 
 use super::ocean;
@@ -42,6 +43,7 @@ pub fn scene(
         accumulated: None,
         terrain: None,
         northward: Some(part(1)),
+        trails: None,
     }
 }
 
@@ -58,13 +60,32 @@ pub fn gyres(grid: Grid) -> Scene {
     scene(grid, at(0.0), at(0.5))
 }
 
+/// A job with trails of currents that lie on a grid, after a time of drifting.
+pub fn under_trails(job: RenderJob, grid: Grid, clock_s: f64) -> RenderJob {
+    let sample = || job.value.clone();
+    let flow = Flow {
+        northward: sample(),
+        clock_s,
+        look: None,
+    };
+    let trails = Trails::of(grid, sample(), flow, Quantity::Current);
+    RenderJob {
+        trails: trails.map(Box::new).ok(),
+        ..job
+    }
+}
+
 /// A job that draws currents in their default style after a time of drifting.
 pub fn job(view: View, clock_s: f64) -> RenderJob {
     let plain = ocean::job(view);
     let northward = plain.value.clone();
     RenderJob {
         accumulated: None,
-        flow: Some(Flow { northward, clock_s }),
+        flow: Some(Flow {
+            northward,
+            clock_s,
+            look: None,
+        }),
         mode: Mode::Flow,
         style: Style::of_flow(TransferFunction::of_speed(Quantity::Current)),
         ..plain

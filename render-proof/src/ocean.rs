@@ -100,6 +100,7 @@ pub fn scene(grid: Grid) -> Scene {
         accumulated: Some(accumulated),
         terrain: None,
         northward: None,
+        trails: None,
     }
 }
 
@@ -122,6 +123,7 @@ pub fn job(view: View) -> RenderJob {
         accumulated: Some(sample("domain/made-up-carbon/0", "frames/made-up-carbon/0")),
         relief: None,
         flow: None,
+        trails: None,
         mode: Mode::Volume,
         view,
         style: Style::with_transfer(TransferFunction::default_for(Quantity::CarbonFlux)),

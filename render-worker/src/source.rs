@@ -178,6 +178,20 @@ impl Source {
     }
 
     async fn scene_for(&self, job: &RenderJob, wanted: Wanted) -> Result<Scene, DrawError> {
+        // Boxed, as are its parts: a job is large, and whoever waits for a scene would carry it.
+        let scene = Box::pin(self.scene_alone(job, wanted)).await?;
+        let Some(alone) = job.trails_alone().map(Box::new) else {
+            return Ok(scene);
+        };
+        let vector = Box::pin(self.scene_alone(&alone, wanted)).await?;
+        Ok(Scene {
+            trails: Some(Arc::new(vector)),
+            ..scene
+        })
+    }
+
+    /// The scene of a job without its trails.
+    async fn scene_alone(&self, job: &RenderJob, wanted: Wanted) -> Result<Scene, DrawError> {
         let grid = &job.grid;
         let (domain, value) = self.interval(grid, &job.value, wanted).await?;
         let accumulated = match &job.accumulated {
@@ -199,6 +213,7 @@ impl Source {
             accumulated,
             terrain,
             northward,
+            trails: None,
         })
     }
 

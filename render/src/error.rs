@@ -56,6 +56,9 @@ pub enum RenderError {
         product: String,
         accumulated: String,
     },
+    /// Trails were to be drawn, of which the scene has no vector.
+    #[error("the picture has trails, the scene has no vector that they are drawn from")]
+    NoTrails,
     /// A flow was to be drawn from one part of its vector.
     #[error("a flow needs both parts of a vector, the scene has the eastward one only")]
     NoNorthward,
@@ -84,6 +87,7 @@ impl RenderError {
             | Self::TooLarge { .. }
             | Self::NoExactFill
             | Self::GridMismatch { .. }
+            | Self::NoTrails
             | Self::NoNorthward
             | Self::Encode { .. } => false,
         }
@@ -98,6 +102,7 @@ impl RenderError {
                 | Self::TooLarge { .. }
                 | Self::NoExactFill
                 | Self::GridMismatch { .. }
+                | Self::NoTrails
                 | Self::NoNorthward
         )
     }
@@ -118,6 +123,7 @@ impl RenderError {
             | Self::TooLarge { .. }
             | Self::NoExactFill
             | Self::GridMismatch { .. }
+            | Self::NoTrails
             | Self::NoNorthward
             | Self::Encode { .. } => true,
             Self::NoAdapter(_)

@@ -7,6 +7,7 @@ use crate::error::RenderError;
 use crate::plan::{Part, Plan};
 use crate::scene::{Interval, Scene};
 use crate::stages::compose::in_context::{self, Surroundings};
+use crate::stages::eye::cpu::Hiding;
 use crate::stages::flow::cpu::Field;
 use crate::stages::layout::{Entry, LIGHT_OFF, Particle, Splat};
 use crate::stages::params::Params;
@@ -80,7 +81,8 @@ pub fn draw(plan: &Plan, part: Part, scene: &Scene) -> Result<Vec<u8>, RenderErr
             light::cpu::shade(&params, &buffer, &mut splats);
         }
         let (list_ends, entries) = binned(&params, &splats)?;
-        eye::cpu::eye(&params, &list_ends, &entries, &plan.coast, &mut picture);
+        let hiding = Hiding::of(plan);
+        eye::cpu::eye(&params, &list_ends, &entries, hiding, &mut picture);
     }
     let mut image = vec![0u32; pixels];
     if params.in_context {

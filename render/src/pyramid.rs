@@ -122,6 +122,7 @@ pub fn coarser(scene: &Scene) -> Option<Scene> {
             .northward
             .as_ref()
             .map(|interval| both(interval, &mean)),
+        trails: scene.trails.clone(),
     })
 }
 

@@ -139,6 +139,9 @@ impl Renderer {
     /// Brings to the device what a scene is drawn from in a job's view, so that its picture need not wait for that.
     pub fn prepare(&self, job: &RenderJob, scene: &Scene) -> Result<(), RenderError> {
         scene.validate()?;
+        if let (Some(alone), Some(vector)) = (job.trails_alone(), &scene.trails) {
+            self.prepare(&alone, vector)?;
+        }
         let coarser = pyramid::suited(job, scene);
         match self.device() {
             Some(device) => device.prepare(coarser.as_ref().unwrap_or(scene)),
@@ -173,6 +176,11 @@ impl Renderer {
             None => Plan::new(job, scene, most_buffer_bytes)?,
             Some(_device) => Plan::for_device(job, scene, most_buffer_bytes)?,
         };
+        if let (Some(alone), Some(vector)) = (job.trails_alone(), &scene.trails) {
+            // A picture of its own, which the stages of this one lay on the sea.
+            let drawn = self.render_while(&alone, vector, is_wanted)?;
+            plan.lay_trails(&drawn);
+        }
         let parts = plan.parts();
         let light = match &device {
             // Parts of one picture lie in one light.

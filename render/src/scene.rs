@@ -262,6 +262,8 @@ pub struct Scene {
     pub terrain: Option<Terrain>,
     /// Northward part of the vector of which `value` is the eastward part, m s⁻¹.
     pub northward: Option<Interval>,
+    /// What the trails on the sea surface are drawn from: a flow on a grid of its own.
+    pub trails: Option<Arc<Scene>>,
 }
 
 impl Scene {
@@ -278,6 +280,9 @@ impl Scene {
             self.accumulated.as_ref(),
             self.northward.as_ref(),
         ];
+        if let Some(trails) = &self.trails {
+            trails.validate()?;
+        }
         let fits = frames
             .into_iter()
             .flatten()

@@ -126,3 +126,46 @@ fn what_there_is_has_one_name_for_each_of_its_parts() {
     let served = json(&format!("/api/observations/ndbc/{platform}"));
     assert_eq!(served["observations"], Value::from(measured));
 }
+
+#[test]
+fn trails_asked_on_the_command_line_and_over_http_are_one_picture() {
+    let Some(currents) = test_data::set("currents_globcurrent_agulhas_2002_daily") else {
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let data = folder.path();
+    let flux = granule::write(data, 0, 0).unwrap();
+    let words = ["ingest", flux.to_str().unwrap(), "--product", "flux"];
+    program::succeed(data, &words).unwrap();
+    let day = "20020101000000-GLOBCURRENT-L4-CUReul_hs-ALT_SUM-v02.0-fv01.0.nc";
+    let day = currents.join(day);
+    for profile in ["globcurrent-east", "globcurrent-north"] {
+        let words = ["ingest", day.to_str().unwrap(), "--profile", profile];
+        program::succeed(data, &words).unwrap();
+    }
+    let server = Server::start(data, &["serve"]).unwrap();
+    for (words, path) in [
+        (
+            "tile --z 4 --x 9 --y 9 --mode map",
+            "tiles/flux/map/4/9/9.png?",
+        ),
+        (
+            "globe --lon 24 --lat -36 --height 2000 --size 256x192 --annotate",
+            "globe/flux/volume.png?lon=24&lat=-36&height_km=2000&width=256&height=192&annotate=all&",
+        ),
+    ] {
+        let picture = |more: &str| {
+            let file = data.join("picture.png");
+            let words = format!("render {words} --layer flux {more} -o {}", file.display());
+            let words: Vec<&str> = words.split_whitespace().collect();
+            program::succeed(data, &words).unwrap();
+            std::fs::read(&file).unwrap()
+        };
+        let drawn = picture("--trails globcurrent --trails-time 2002-01-01T12:00:00Z");
+        let asked = format!("/{path}trails=globcurrent&trails_time=2002-01-01T12:00:00Z");
+        let served = server.get(&asked).unwrap();
+        assert_eq!(served.status, 200, "{path}: {}", served.text());
+        assert!(served.body == drawn, "{path}");
+        assert!(picture("") != drawn, "{path}: trails are seen");
+    }
+}

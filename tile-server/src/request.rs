@@ -1,9 +1,12 @@
 //! From an address to a render job: a layer, a mode, an instant and a view in, everything that shapes the picture out.
 
+use std::sync::Arc;
+
 use contract::context::Relief;
 use contract::job::{Mode, RenderJob, View};
 use contract::picture::{self, PictureOptions, PictureRequest, PictureSources};
 use contract::time::TimeMs;
+use contract::trails::TrailSources;
 
 use crate::catalogue::Layer;
 use crate::error::ServerError;
@@ -47,14 +50,41 @@ pub fn job(
         time,
         options: PictureOptions::default(),
     };
-    job_of(layer, &request, None)
+    job_of(layer, &request, Beside::default())
 }
 
-/// The job of a picture of a layer, over a relief if there is one.
+/// Newest versions of products that are drawn with a layer.
+#[derive(Debug, Default)]
+pub(crate) struct Beside {
+    /// Land and sea floor below.
+    pub(crate) relief: Option<Relief>,
+    /// The vector whose trails lie on the sea surface.
+    pub(crate) trails: Option<VectorAt>,
+}
+
+/// The eastward part of a vector, with its northward one, and its instant if that is not the picture's.
+#[derive(Debug)]
+pub(crate) struct VectorAt {
+    pub(crate) layer: Arc<Layer>,
+    pub(crate) time: Option<TimeMs>,
+}
+
+impl VectorAt {
+    fn sources(&self) -> Option<TrailSources<'_>> {
+        let northward = self.layer.northward.as_ref()?;
+        Some(TrailSources {
+            eastward: &self.layer.manifest,
+            northward: &northward.manifest,
+            time: self.time,
+        })
+    }
+}
+
+/// The job of a picture of a layer with what is drawn beside it.
 pub(crate) fn job_of(
     layer: &Layer,
     request: &PictureRequest,
-    relief: Option<Relief>,
+    beside: Beside,
 ) -> Result<RenderJob, ServerError> {
     let time = shown_time(layer, request.time);
     let accumulated = layer.accumulated.as_ref();
@@ -63,7 +93,8 @@ pub(crate) fn job_of(
         product: &layer.manifest,
         accumulated: accumulated.map(|lift| &*lift.manifest),
         northward: layer.northward.as_ref().map(|part| &*part.manifest),
-        relief,
+        trails: beside.trails.as_ref().and_then(VectorAt::sources),
+        relief: beside.relief,
     };
     Ok(request.job(&sources)?)
 }

@@ -1,10 +1,13 @@
-//! What an address asks for besides a product, a mode, an instant and a view: relief, sea, coast lines, the sun, and how
-//! far particles rise.
+//! What an address asks for besides a product, a mode, an instant and a view: relief, sea, coast lines, trails, the sun, and
+//! how far particles rise.
 
 use contract::context::{RELIEF_EXAGGERATION, Relief};
 use contract::isolines::IsolineWish;
 use contract::picture::PictureOptions;
+use contract::product::ProductId;
 use contract::sun::SunChoice;
+use contract::time::TimeMs;
+use contract::trails::{eastward_part, no_vector};
 use serde::Deserialize;
 use utoipa::IntoParams;
 
@@ -12,6 +15,7 @@ use crate::catalogue::Catalogue;
 use crate::error::ServerError;
 use crate::extract::number;
 use crate::ground::flag;
+use crate::request::{Beside, VectorAt};
 
 /// The parameters of an address that say it, as they were written.
 #[derive(Debug, Default, Deserialize, IntoParams)]
@@ -32,6 +36,13 @@ pub(crate) struct SurroundingsQuery {
     /// over the range of colours; `auto` chooses a round one.
     #[param(example = "10")]
     isolines: Option<String>,
+    /// A vector whose trails are drawn on the sea surface, over the layer and below what rises from it: currents `NAME`, of
+    /// which `NAME-east` and `NAME-north` have landed.
+    #[param(example = "globcurrent")]
+    trails: Option<String>,
+    /// Another instant of the vector than the one that is shown.
+    #[param(example = "2002-01-15")]
+    trails_time: Option<String>,
     /// How far a kilogram of accumulated carbon a square metre lifts particles, m m² kg⁻¹.
     #[param(value_type = Option<f64>, minimum = 0, maximum = 1e9)]
     height_exaggeration: Option<String>,
@@ -47,6 +58,8 @@ struct ParsedSurroundings {
     sea_opacity: Option<f64>,
     coastlines: Option<bool>,
     isolines: Option<IsolineWish>,
+    trails: Option<ProductId>,
+    trails_time: Option<TimeMs>,
     height_exaggeration: Option<f64>,
     sun: Option<SunChoice>,
 }
@@ -57,13 +70,15 @@ impl SurroundingsQuery {
         self.fields().into_iter().all(|(_, text)| text.is_none())
     }
 
-    fn fields(&self) -> [(&'static str, Option<&str>); 7] {
+    fn fields(&self) -> [(&'static str, Option<&str>); 9] {
         [
             ("relief", self.relief.as_deref()),
             ("relief_exaggeration", self.relief_exaggeration.as_deref()),
             ("sea_opacity", self.sea_opacity.as_deref()),
             ("coastlines", self.coastlines.as_deref()),
             ("isolines", self.isolines.as_deref()),
+            ("trails", self.trails.as_deref()),
+            ("trails_time", self.trails_time.as_deref()),
             ("height_exaggeration", self.height_exaggeration.as_deref()),
             ("sun", self.sun.as_deref()),
         ]
@@ -84,6 +99,8 @@ impl SurroundingsQuery {
             sea_opacity: real("sea_opacity", &self.sea_opacity, "a share, 0 to 0.99")?,
             coastlines,
             isolines: self.isolines.as_deref().map(str::parse).transpose()?,
+            trails: self.trails.as_deref().map(str::parse).transpose()?,
+            trails_time: self.trails_time.as_deref().map(str::parse).transpose()?,
             height_exaggeration: real(
                 "height_exaggeration",
                 &self.height_exaggeration,
@@ -106,11 +123,36 @@ impl SurroundingsQuery {
         })
     }
 
-    /// The newest version of the relief that is asked for.
-    pub(crate) async fn relief(
-        &self,
-        catalogue: &Catalogue,
-    ) -> Result<Option<Relief>, ServerError> {
+    /// The newest versions of the products that are asked for beside the layer.
+    pub(crate) async fn beside(&self, catalogue: &Catalogue) -> Result<Beside, ServerError> {
+        Ok(Beside {
+            relief: self.relief(catalogue).await?,
+            trails: self.trails(catalogue).await?,
+        })
+    }
+
+    async fn trails(&self, catalogue: &Catalogue) -> Result<Option<VectorAt>, ServerError> {
+        let asked = self.parsed()?;
+        let Some(named) = asked.trails else {
+            if let Some(text) = &self.trails_time {
+                let valid = "it is an instant of trails, which are not asked for";
+                return Err(ServerError::invalid("trails_time", text, valid));
+            }
+            return Ok(None);
+        };
+        let part = eastward_part(&named)?;
+        let layer = match catalogue.layer(part.as_str()).await {
+            Err(ServerError::UnknownProduct { .. }) => return Err(no_vector(&named).into()),
+            layer => layer?,
+        };
+        if layer.northward.is_none() {
+            return Err(no_vector(&named).into());
+        }
+        let time = asked.trails_time;
+        Ok(Some(VectorAt { layer, time }))
+    }
+
+    async fn relief(&self, catalogue: &Catalogue) -> Result<Option<Relief>, ServerError> {
         let Some(product) = &self.relief else {
             return Ok(None);
         };
@@ -125,9 +167,7 @@ impl SurroundingsQuery {
         let asked = self.parsed()?;
         let relief = self.relief.as_ref();
         // A name of letters, digits and hyphens, whatever else was written.
-        let relief = relief
-            .map(|name| name.parse::<contract::product::ProductId>())
-            .transpose()?;
+        let relief = relief.map(|name| name.parse::<ProductId>()).transpose()?;
         let real = |number: Option<f64>| number.map(|number| number.to_string());
         let values = [
             relief.map(|name| name.to_string()),
@@ -135,6 +175,8 @@ impl SurroundingsQuery {
             real(asked.sea_opacity),
             asked.coastlines.map(|drawn| drawn.to_string()),
             asked.isolines.map(|isolines| isolines.to_string()),
+            asked.trails.map(|trails| trails.to_string()),
+            asked.trails_time.map(|time| time.to_string()),
             real(asked.height_exaggeration),
             asked.sun.map(|sun| sun.to_string()),
         ];
@@ -160,7 +202,9 @@ mod tests {
 
     #[test]
     fn words_that_mean_nothing_are_refused_with_what_would_be_valid() {
-        let refused: [(SurroundingsQuery, &str); 6] = [
+        let refused: [(SurroundingsQuery, &str); 8] = [
+            (query(|q| &mut q.trails, "Sea&"), "starting with a letter"),
+            (query(|q| &mut q.trails_time, "noon"), "2000"),
             (query(|q| &mut q.sea_opacity, "half"), "a share"),
             (query(|q| &mut q.coastlines, "yes"), "true or false"),
             (query(|q| &mut q.isolines, "-1"), "such as 10"),
@@ -180,12 +224,16 @@ mod tests {
         query.relief = Some("etopo20".to_owned());
         query.sea_opacity = Some("0.50".to_owned());
         query.isolines = Some("2.50".to_owned());
+        query.trails = Some("sea".to_owned());
+        query.trails_time = Some("2002-01-15".to_owned());
         assert_eq!(
             query.of_tiles().unwrap(),
             [
                 "relief=etopo20",
                 "sea_opacity=0.5",
                 "isolines=2.5",
+                "trails=sea",
+                "trails_time=2002-01-15T00:00:00Z",
                 "sun=time"
             ]
         );

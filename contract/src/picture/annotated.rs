@@ -48,6 +48,7 @@ impl PictureSources<'_> {
             source: has(Annotation::Source)
                 .then(|| source(self.product, &self.title(&job)))
                 .flatten(),
+            trails: self.trails.and_then(|trails| Label::cut(&trails.caption())),
             ..Annotations::none()
         };
         let job = RenderJob {

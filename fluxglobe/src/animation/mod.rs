@@ -114,6 +114,7 @@ async fn shots(settings: &Settings, store: &Store, options: &RenderAnimation) ->
         style,
         sun_of_time,
         annotations: asked.annotations,
+        vector: picture::vector(store, &globe.picture).await?,
         relief: picture::relief(store, settings, &globe.picture).await?,
         fps: options.fps,
         count: Shots::count_of(seconds(options, path.as_ref()), options.fps)?,

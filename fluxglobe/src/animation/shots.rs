@@ -11,6 +11,7 @@ use contract::time::TimeMs;
 use serde::{Deserialize, Serialize};
 
 use super::path::CameraPath;
+use crate::picture::Vector;
 
 /// Most pictures: ten minutes at 60 a second.
 const MOST_SHOTS: u32 = 36_000;
@@ -28,6 +29,9 @@ pub(super) struct Shots {
     /// The northward part of its vector, in the mode flow.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) northward: Option<Manifest>,
+    /// The vector whose trails lie on the sea surface.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) vector: Option<Vector>,
     /// Instant of picture 0.
     pub(super) from: TimeMs,
     /// First instant after the animation.
@@ -127,6 +131,7 @@ impl Shots {
             product: &self.product,
             accumulated: self.accumulated.as_ref(),
             northward: self.northward.as_ref(),
+            trails: self.vector.as_ref().map(Vector::trails),
             relief: self.relief.clone(),
         };
         let job = sources.job(self.mode, view, time, style)?;

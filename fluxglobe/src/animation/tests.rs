@@ -68,6 +68,7 @@ fn shots(count: u32) -> Shots {
         product: product(),
         accumulated: None,
         northward: None,
+        vector: None,
         from: "2000-01-01".parse().unwrap(),
         mode: Mode::Volume,
         view,

@@ -5,6 +5,7 @@ use contract::context::RELIEF_EXAGGERATION;
 use contract::isolines::IsolineWish;
 use contract::product::ProductId;
 use contract::sun::SunChoice;
+use contract::time::TimeMs;
 
 /// The heading of these words in help texts.
 pub(super) const HEADING: &str = "Surroundings";
@@ -49,6 +50,13 @@ pub(crate) struct Surroundings {
     /// of colours, zero stronger; `auto` chooses a round step, and 1 and 3 of every power of ten on a logarithmic scale.
     #[arg(long, help_heading = HEADING, allow_negative_numbers = true, value_name = "STEP|auto")]
     pub(crate) isolines: Option<IsolineWish>,
+    /// Draw trails along this vector on the sea surface, over the layer and below what rises from it: currents NAME, of
+    /// which NAME-east and NAME-north have landed. They must cover the instant that is shown.
+    #[arg(long, help_heading = HEADING, value_name = "PRODUCT")]
+    pub(crate) trails: Option<ProductId>,
+    /// Another instant of the vector than the one that is shown; the caption of an annotated picture says which.
+    #[arg(long, help_heading = HEADING, requires = "trails", value_name = "TIME")]
+    pub(crate) trails_time: Option<TimeMs>,
     /// Height of a kilogram of accumulated carbon per square metre, m: how far particles rise and sink, 0 to 1e9; 8e6 if
     /// absent.
     #[arg(long, help_heading = HEADING, allow_negative_numbers = true, value_name = "METRES")]

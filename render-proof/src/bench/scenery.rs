@@ -155,6 +155,7 @@ pub fn scene(grid: &Grid) -> Scene {
         accumulated: Some(accumulated),
         terrain: None,
         northward: None,
+        trails: None,
     }
 }
 
@@ -195,6 +196,7 @@ pub fn pole(cells: u64, size_px: [u32; 2]) -> Result<(Scene, RenderJob)> {
         accumulated: None,
         terrain: None,
         northward: None,
+        trails: None,
     };
     let mut job = job(size_px, 64, 0.0)?;
     job.accumulated = None;
@@ -268,6 +270,7 @@ pub fn job(size_px: [u32; 2], slices: u32, tilt_deg: f64) -> Result<RenderJob> {
         accumulated: Some(time_sample("made-up-carbon")?),
         relief: None,
         flow: None,
+        trails: None,
         mode: Mode::Volume,
         view: view(size_px, tilt_deg)?,
         style,

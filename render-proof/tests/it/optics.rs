@@ -40,6 +40,7 @@ fn even_sea() -> Scene {
         accumulated: None,
         terrain: None,
         northward: None,
+        trails: None,
     }
 }
 

@@ -1,4 +1,4 @@
-//! The line of source along the lower edge.
+//! Lines along the lower edge, the lowest first: the source, and what trails are of.
 
 use contract::annotation::Label;
 use legend::LegendError;
@@ -15,7 +15,7 @@ const GAP_EM: f64 = 0.45;
 /// In pictures of a shorter side, pixels, the room is left to the panels.
 const LEAST_SIDE_PX: f64 = 320.0;
 
-pub(super) fn draw(page: &mut Page, source: &Label) -> Result<(), LegendError> {
+pub(super) fn draw(page: &mut Page, label: &Label) -> Result<(), LegendError> {
     let (em, margin) = (page.em(), page.margin());
     let [across, down] = page.size();
     let (size, padding) = (SIZE_EM * em, 0.5 * em);
@@ -23,7 +23,7 @@ pub(super) fn draw(page: &mut Page, source: &Label) -> Result<(), LegendError> {
     if across.min(down) < LEAST_SIDE_PX {
         return Ok(());
     }
-    let Some(line) = text::fitted(source.as_str(), size, Ink::Soft, room)? else {
+    let Some(line) = text::fitted(label.as_str(), size, Ink::Soft, room)? else {
         return Ok(());
     };
     let top = page.take_foot((LINE_EM + 2.0 * GAP_EM) * em) + GAP_EM * em;

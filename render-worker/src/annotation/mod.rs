@@ -51,8 +51,9 @@ pub fn drawing(job: &RenderJob) -> Result<Option<String>, LegendError> {
     }
     let mut page = Page::new(size_px);
     // What matters most comes first: what follows takes the room that is left.
-    if let Some(source) = &annotations.source {
-        caption::draw(&mut page, source)?;
+    let lines = [&annotations.source, &annotations.trails];
+    for line in lines.into_iter().flatten() {
+        caption::draw(&mut page, line)?;
     }
     if let Some(quantity) = annotations.legend {
         key::draw(&mut page, job, quantity)?;

@@ -109,10 +109,10 @@ impl Page {
         }
     }
 
-    /// Keeps the lower edge free, so many pixels high, and tells where that begins.
+    /// Keeps so many pixels more along the lower edge free, and tells where that begins.
     pub(super) fn take_foot(&mut self, height: f64) -> f64 {
-        self.foot = height;
-        self.size[1] - height
+        self.foot += height;
+        self.size[1] - self.foot
     }
 
     /// Keeps an area if it lies inside the picture and nothing is there yet.

@@ -122,7 +122,11 @@ async fn run(reader: Arc<Reader>, mut ear: watch::Receiver<Wish>) {
 
 /// Are they of other products?
 fn is_other(a: &RenderJob, b: &RenderJob) -> bool {
-    a.value.domain != b.value.domain
+    let vector = |job: &RenderJob| {
+        let trails = job.trails.as_ref();
+        trails.map(|trails| trails.eastward.domain.clone())
+    };
+    a.value.domain != b.value.domain || vector(a) != vector(b)
 }
 
 impl Reader {
@@ -131,15 +135,18 @@ impl Reader {
             Some(&job.value),
             job.accumulated.as_ref(),
             job.flow.as_ref().map(|flow| &flow.northward),
+            job.trails.as_ref().map(|trails| &trails.eastward),
+            job.trails.as_ref().map(|trails| &trails.flow.northward),
         ];
-        let part_count = parts.iter().flatten().count() as u64;
-        let frames = part_count * (FRAMES_IN_USE + self.frames_ahead as u64);
-        let frame_bytes = job.grid.cell_count() as u64 * CELL_BYTES;
-        if frames * frame_bytes > self.source.most_bytes() {
+        let layer = parts[..3].iter().flatten().count() * job.grid.cell_count();
+        let vector = job.trails.as_ref();
+        let vector = vector.map_or(0, |trails| 2 * trails.grid.cell_count());
+        let cells = (layer + vector) as u64 * (FRAMES_IN_USE + self.frames_ahead as u64);
+        if cells * CELL_BYTES > self.source.most_bytes() {
             return Ok(());
         }
         let heading = self.heading(&job.value, learnt).await;
-        let mut ahead: [Vec<TimeSample>; 3] = [vec![], vec![], vec![]];
+        let mut ahead: [Vec<TimeSample>; 5] = std::array::from_fn(|_| vec![]);
         for (part, ahead) in parts.into_iter().zip(&mut ahead) {
             if let Some(sample) = part
                 && let Some(manifest) = self.manifest(sample, learnt).await
@@ -151,12 +158,16 @@ impl Reader {
         for number in 0..longest {
             let at =
                 |part: &[TimeSample], own: &TimeSample| part.get(number).unwrap_or(own).clone();
-            let [value, accumulated, northward] = &ahead;
+            let [value, accumulated, northward, trails_east, trails_north] = &ahead;
             let mut early = job.clone();
             early.value = at(value, &job.value);
             early.accumulated = job.accumulated.as_ref().map(|own| at(accumulated, own));
             if let Some(flow) = &mut early.flow {
                 flow.northward = at(northward, &flow.northward);
+            }
+            if let Some(trails) = &mut early.trails {
+                trails.eastward = at(trails_east, &trails.eastward);
+                trails.flow.northward = at(trails_north, &trails.flow.northward);
             }
             let scene = self.source.scene_ahead(&early).await?;
             let renderer = Arc::clone(&self.renderer);

@@ -47,11 +47,13 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) {
     let params = &mut plan.params;
     let context = &mut params.context;
     context.has_water = u32::from(params.particles.sea_per_m > 0.0);
+    context.trails_on = u32::from(job.trails.is_some());
     let parts = [
         context.surface,
         context.coast_on,
         context.night_on,
         context.lines_on,
+        context.trails_on,
     ];
     params.in_context = parts.contains(&1);
     if let View::Tile { tile, size_px } = job.view

@@ -43,7 +43,7 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) -> f64 {
     let top_m_s = top_m_s.clamp(*TOPS_M_S.start(), *TOPS_M_S.end());
     let life_s = life_rad * SPHERE_RADIUS_M / top_m_s;
     let lives = flow.clock_s / life_s;
-    let look = Look::of(job.mode);
+    let look = Look::of_job(job);
     let wanted = look.particles_per_cell(cell_px, job.style.particles_per_cell);
     let trails = wanted.ceil();
     let share = (cell_px * cell_px / look.area_px_per_particle / trails).min(1.0);

@@ -71,7 +71,7 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) {
         interpolate_rows(plan, grid, &camera.footprint(job, [0.0; 2], margin));
         return;
     }
-    let look = Look::of(job.mode);
+    let look = Look::of_job(job);
     let particles = look.particles_per_cell(cell_px, job.style.particles_per_cell);
     params.cells.set_particles(particles);
     let radius_px = look.radius_px(cell_px, particles);

@@ -97,6 +97,9 @@ fn power_of_two(most: f64) -> f32 {
     most.log2().floor().exp2() as f32
 }
 
+/// Radius of a trail's end is smaller by this share where it lies over another layer.
+const TRAIL_TAPER: f32 = 0.15;
+
 /// How particles of one mode look.
 pub(super) struct Look {
     /// Radius over the side of a cell; for clouds the least.
@@ -116,6 +119,23 @@ pub(super) struct Look {
 }
 
 impl Look {
+    /// How the particles of a job look.
+    pub(super) fn of_job(job: &RenderJob) -> Self {
+        let usual = Self::of(job.mode);
+        let Some(own) = job.flow.as_ref().and_then(|flow| flow.look) else {
+            return usual;
+        };
+        Self {
+            min_radius_px: usual.min_radius_px.min(own.radius_px as f32),
+            max_radius_px: own.radius_px,
+            area_px_per_particle: own.area_px,
+            // Tails as wide as heads, almost: dots of fast water would part.
+            size_spread: TRAIL_TAPER,
+            center_depth: Some(own.depth),
+            ..usual
+        }
+    }
+
     pub(super) fn of(mode: Mode) -> Self {
         match mode {
             Mode::Points => Self {

@@ -16,6 +16,7 @@ mod masks;
 mod projection;
 mod shape;
 mod tile;
+mod trails;
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -90,6 +91,8 @@ pub struct Plan {
     /// Words of the mask of the whole picture: coast lines of a tile, four pixels each; of a globe view land, lakes, shores
     /// and borders of one pixel. Empty without any.
     pub coast: Arc<Vec<u32>>,
+    /// Trails on the sea surface as pixels of the whole picture, red lowest; empty without any.
+    pub trails: Vec<u32>,
     /// Some screen tiles may hold many times the particles of others: a pole or the limb is in view.
     pub is_crowded: bool,
     size_px: [u32; 2],
@@ -143,6 +146,7 @@ impl Plan {
         let mut plan = Self::viewed(job, scene);
         isolines::plan(&mut plan, job, scene);
         context::plan(&mut plan, job, scene);
+        trails::plan(&mut plan, job);
         plan.choose_units(job);
         plan.count_particles(most_buffer_bytes)?;
         plan.choose_band(most_buffer_bytes, most_held_bytes)?;
@@ -154,6 +158,9 @@ impl Plan {
         scene.validate()?;
         if job.mode == Mode::Flow && scene.northward.is_none() {
             return Err(RenderError::NoNorthward);
+        }
+        if job.trails.is_some() && scene.trails.is_none() {
+            return Err(RenderError::NoTrails);
         }
         Ok(())
     }
@@ -173,6 +180,7 @@ impl Plan {
             isolines: vec![],
             ground_axes: vec![],
             coast: Arc::default(),
+            trails: vec![],
             is_crowded: false,
             size_px,
         };
@@ -335,7 +343,7 @@ pub fn cell_px(view: &View, grid: &Grid) -> f64 {
 fn common(job: &RenderJob, scene: &Scene) -> Params {
     let (style, grid) = (&job.style, &scene.grid);
     let transfer = &style.transfer;
-    let look = Look::of(job.mode);
+    let look = Look::of_job(job);
     let weight = |interval: &Interval| interval.weight as f32;
     let (transfer_low, transfer_per_unit) = shape::place_params(transfer);
     let [rim_kept, rim_added] = look::rim(job);
@@ -376,6 +384,7 @@ fn common(job: &RenderJob, scene: &Scene) -> Params {
             min_radius_px: look.min_radius_px,
             max_radius_px: look::MAX_RADIUS_PX,
             lon_span_rad: grid.dlon_deg.to_radians() as f32,
+            beyond_m: trails::beyond_m(job),
             ..ProjectParams::default()
         },
         lighting: lighting(job),

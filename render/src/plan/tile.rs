@@ -55,7 +55,7 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene, (tile, size_
         return;
     }
     let grid = &scene.grid;
-    let look = Look::of(job.mode);
+    let look = Look::of_job(job);
     let col_px = grid.dlon_deg / 360.0 * world_px;
     let cell_px = cell_px(&job.view, grid);
     let particles = look.particles_per_cell(cell_px, job.style.particles_per_cell);
@@ -82,6 +82,7 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene, (tile, size_
     // What lies as deep as before is drawn less deep.
     own.sea_per_m /= flattened as f32;
     own.sheet_m *= flattened as f32;
+    projection.beyond_m *= flattened as f32;
     projection.height_px_per_m = (look::OBLIQUE * level.px_per_m) as f32;
     projection.slice_top = heights_m[1] as f32;
     projection.slices_per_unit =

@@ -11,9 +11,9 @@ pub const SCREEN_TILE_SHIFT: u32 = 8;
 /// Positions on the screen are whole multiples of this part of a pixel, so that no two tiles round them differently.
 pub const SUBPIXELS: i32 = 16;
 /// What lies farther than this beyond the sea surface, seen from the eye, lies beyond it, m: below it, or above it for an eye
-/// in the sea. It is half the sheet, which lies on both sides.
+/// in the sea. It is half the sheet, which lies on both sides; trails lie on the sheet, which is then beyond the surface too.
 pub const BEYOND_M: f32 = 10_000.0;
-/// In the size of an entry: it lies beyond the sea surface, and land hides it.
+/// In the size of an entry: it lies beyond the sea surface, and land and trails hide it.
 pub const BEYOND_BIT: u32 = 0x8000;
 /// In the size of an entry: its radius.
 pub const RADIUS_BITS: u32 = 0x7fff;
@@ -152,7 +152,7 @@ shared_struct! {
         /// Red, green, blue, and how much of them is the particle's own light rather than that of water before it; 8 bits
         /// each, red lowest.
         pub color: u32,
-        /// 1: farther than [`BEYOND_M`] beyond the sea surface of a globe view.
+        /// 1: farther than `ProjectParams::beyond_m` beyond the sea surface.
         pub is_beyond: u32,
     }
 }

@@ -57,7 +57,6 @@ const SQUARE: u32 = 16u;
 const SCREEN_TILE_PX: u32 = 16u;
 const SCREEN_TILE_SHIFT: u32 = 8u;
 const SUBPIXELS: i32 = 16;
-const BEYOND_M: f32 = 10000.0;
 const BEYOND_BIT: u32 = 0x8000u;
 const RADIUS_BITS: u32 = 0x7fffu;
 const PART_ENTRIES: u32 = 1024u;

@@ -19,6 +19,7 @@ use crate::compare::distance;
 use crate::context::{everything, with_terrain};
 use crate::device::renderers;
 use crate::scenes::{FIVE_DEGREES, GRAM_A_YEAR, ONE_DEGREE, globe, job, looking_at, ocean, tile};
+use crate::trails::with_trails;
 use record::{Record, digest};
 
 /// Largest file, of a small picture and of one that is as large as people look at.
@@ -310,4 +311,10 @@ fn a_golden_picture_of_something_else_is_seen() {
         &cropped(&drawn(Mode::Sprites)),
     );
     assert!(most > MAX_DIFF && pixels > 128 * 128 * DIFF_PIXELS_PER_MILLE / 1000);
+}
+
+#[test]
+fn trails_over_a_volume_on_the_globe() {
+    let (scene, job) = with_trails(job(Mode::Volume, globe(-30.0, 25.0, 9e6, 160)));
+    matches_golden_of("trails_globe", &scene, job);
 }

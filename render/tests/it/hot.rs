@@ -52,6 +52,7 @@ fn world(grid: &Grid) -> Scene {
         accumulated: None,
         terrain: None,
         northward: None,
+        trails: None,
     }
 }
 

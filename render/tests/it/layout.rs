@@ -8,7 +8,7 @@ use render::stages::fill::level::{FillLevel, MOST_REACH_COLS};
 use render::stages::fill::{self, exact, window};
 use render::stages::isolines::params::Isoline;
 use render::stages::layout::{
-    Axis, BEYOND_BIT, BEYOND_M, COVERED, Col, Entry, GROUP, GroundAxis, KERNEL_BALL, KERNEL_CLOUD,
+    Axis, BEYOND_BIT, COVERED, Col, Entry, GROUP, GroundAxis, KERNEL_BALL, KERNEL_CLOUD,
     KERNEL_DOT, KERNEL_RIMMED, LIGHT_ALONE, LIGHT_GIVEN, LIGHT_OFF, LIGHT_OWN, LOOK, MISSING,
     MOST_HOT_PARTS, NO_LIST, PART_ENTRIES, Particle, RADIUS_BITS, Row, SCREEN_TILE_PX,
     SCREEN_TILE_SHIFT, SQUARE, SUBPIXELS, Splat, VIEW_GLOBE, VIEW_TILE, Velocity, WATER_BLUE,
@@ -214,7 +214,6 @@ fn constants_have_the_same_value_in_rust_and_wgsl() {
         ("SCREEN_TILE_PX", f64::from(SCREEN_TILE_PX)),
         ("SCREEN_TILE_SHIFT", f64::from(SCREEN_TILE_SHIFT)),
         ("SUBPIXELS", f64::from(SUBPIXELS)),
-        ("BEYOND_M", f64::from(BEYOND_M)),
         ("BEYOND_BIT", f64::from(BEYOND_BIT)),
         ("RADIUS_BITS", f64::from(RADIUS_BITS)),
         ("PART_ENTRIES", f64::from(PART_ENTRIES)),

@@ -27,6 +27,7 @@ fn constant(grid: Grid, value: f32) -> Scene {
         accumulated: Some(value),
         terrain: None,
         northward: None,
+        trails: None,
     }
 }
 

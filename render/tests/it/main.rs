@@ -28,5 +28,6 @@ mod scenes;
 mod seams;
 mod smooth;
 mod tidy;
+mod trails;
 mod truths;
 mod twins;

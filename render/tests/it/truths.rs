@@ -7,6 +7,7 @@ use glam::{UVec2, Vec3, Vec4};
 use render::plan::Plan;
 use render::pyramid::coarser;
 use render::scene::{Frame, Interval, Scene};
+use render::stages::eye::cpu::Hiding;
 use render::stages::interpolate::cpu::interpolated;
 use render::stages::layout::{
     Active, COVERED, Col, Entry, KERNEL_CLOUD, MISSING, Particle, Row, SCREEN_TILE_PX, SUBPIXELS,
@@ -280,7 +281,8 @@ fn seen_over(params: &mut Params, splats: &[Splat], coast: &[u32]) -> Vec<Vec4> 
     let mut entries = vec![Entry::default(); bin::cpu::scan(&mut ends) as usize];
     bin::cpu::scatter(params, splats, &mut ends, &mut entries);
     let mut picture = vec![Vec4::ZERO; params.view.size_px.element_product() as usize];
-    eye::cpu::eye(params, &ends, &entries, coast, &mut picture);
+    let hiding = Hiding { coast, trails: &[] };
+    eye::cpu::eye(params, &ends, &entries, hiding, &mut picture);
     picture
 }
 
@@ -393,6 +395,7 @@ fn a_sea_of_full_flux_has_the_optical_depth_of_the_style() {
         accumulated: None,
         terrain: None,
         northward: None,
+        trails: None,
     };
     for renderer in renderers("optical depth") {
         for (z, x, y) in [(3, 1, 3), (5, 7, 12), (6, 12, 28)] {
@@ -439,6 +442,7 @@ fn quarter_sea() -> [Scene; 2] {
         accumulated: None,
         terrain: None,
         northward: None,
+        trails: None,
     };
     let blocks = coarser(&scene).unwrap();
     [scene, blocks]

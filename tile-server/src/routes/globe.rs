@@ -144,8 +144,8 @@ pub(crate) async fn job(
         time,
         options,
     };
-    let relief = query.surroundings.relief(&state.catalogue).await?;
-    let job = request::job_of(&layer, &request, relief)?;
+    let beside = query.surroundings.beside(&state.catalogue).await?;
+    let job = request::job_of(&layer, &request, beside)?;
     Ok((job, Shown::of(&layer, time)))
 }
 

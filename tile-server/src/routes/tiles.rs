@@ -97,8 +97,8 @@ pub(crate) async fn get(
         time,
         options: around.around(&look.options())?,
     };
-    let relief = around.relief(&state.catalogue).await?;
-    let job = request::job_of(&layer, &request, relief)?;
+    let beside = around.beside(&state.catalogue).await?;
+    let job = request::job_of(&layer, &request, beside)?;
     let shown = Shown::of(&layer, time);
     // Who looks at an old version, in colours of their own or at what is not drawn ahead, is no reason to draw a new one.
     if look.is_usual() && around.is_empty() && state.catalogue.is_newest(&layer) {

@@ -174,3 +174,63 @@ async fn without_a_log_a_new_northward_part_is_news_of_the_flow_too() {
     app.state.news.close();
     watching.await.unwrap();
 }
+
+#[tokio::test]
+async fn trails_of_a_vector_lie_over_another_layer_on_tiles_and_globes() {
+    let app = app().await;
+    let time = "2000-02-10T06:00:00Z";
+    for (view, mode) in [
+        ("/tiles/flux/map/1/0/1.png", Mode::Map),
+        ("/globe/flux/volume.png", Mode::Volume),
+    ] {
+        for name in ["sea", "sea-east", "sea-north"] {
+            let answer = app.get(&format!("{view}?time={time}&trails={name}")).await;
+            assert_eq!(answer.status, StatusCode::OK, "{}", answer.text());
+            let job = app.drawer.last_job();
+            let trails = job.trails.as_ref().unwrap();
+            assert_eq!((job.mode, &job.flow), (mode, &None));
+            assert_eq!(trails.eastward, app.time_sample("sea-east", time).await);
+            let northward = app.time_sample("sea-north", time).await;
+            assert_eq!(trails.flow.northward, northward);
+        }
+        let plain = app.get(&format!("{view}?time={time}")).await;
+        assert!(app.drawer.last_job().trails.is_none());
+        let other = format!("{view}?time={time}&trails=sea&trails_time=2000-03-10");
+        let other = app.get(&other).await;
+        assert_eq!(other.status, StatusCode::OK, "{}", other.text());
+        let job = app.drawer.last_job();
+        let sample = app.time_sample("sea-east", "2000-03-10").await;
+        assert_eq!(job.trails.unwrap().eastward, sample);
+        assert_ne!(plain.header("etag"), other.header("etag"));
+    }
+}
+
+#[tokio::test]
+async fn trails_of_what_is_no_vector_are_refused() {
+    let app = app().await;
+    app.land("lone-east", Quantity::Current, 1).await;
+    for (layer, query, reason) in [
+        ("flux/volume", "trails=flux", "NAME-east"),
+        ("flux/volume", "trails=lone", "NAME-east"),
+        ("flux/volume", "trails=Sea", "starting with a letter"),
+        (
+            "flux/volume",
+            "trails=sea&trails_time=2010-01-01",
+            "it covers",
+        ),
+        ("flux/volume", "trails_time=2000-02-10", "not asked for"),
+        ("sea-east/flow", "trails=sea", "drawn as a flow"),
+    ] {
+        for path in [
+            format!("/tiles/{layer}/0/0/0.png"),
+            format!("/globe/{layer}.png"),
+        ] {
+            let answer = app.get(&format!("{path}?{query}")).await;
+            assert_eq!(answer.status, StatusCode::BAD_REQUEST, "{query}");
+            assert!(answer.reason().contains(reason), "{}", answer.reason());
+        }
+    }
+    assert_eq!(app.drawer.drawn_count(), 0);
+    let map = app.get("/tiles/sea-east/map/0/0/0.png?trails=sea").await;
+    assert_eq!(map.status, StatusCode::OK, "{}", map.text());
+}

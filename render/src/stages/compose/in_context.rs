@@ -34,6 +34,8 @@ pub struct Surroundings<'a> {
     pub coast: &'a [u32],
     /// Isolines of the part that is drawn; not read where there are none.
     pub lines: &'a [u32],
+    /// Trails of the whole picture; not read where there are none.
+    pub trails: &'a [u32],
 }
 
 impl<'a> Surroundings<'a> {
@@ -51,6 +53,7 @@ impl<'a> Surroundings<'a> {
             ground_axes: &plan.ground_axes,
             coast: &plan.coast,
             lines,
+            trails: &plan.trails,
         }
     }
 }
@@ -210,6 +213,34 @@ fn ground_color(params: &Params, around: &Surroundings<'_>, spot: &Spot, pixel: 
     seen + lit.extend(1.0) * spot.cover
 }
 
+fn trail_word(params: &Params, trails: &[u32], pixel: [u32; 2]) -> u32 {
+    let [x, y] = in_picture(params, pixel);
+    trails[(y * params.context.trails_row_px + x) as usize]
+}
+
+fn trail_color(params: &Params, trails: &[u32], pixel: [u32; 2]) -> Vec4 {
+    if params.context.trails_on == 0 {
+        return Vec4::ZERO;
+    }
+    let [red, green, blue, alpha] = trail_word(params, trails, pixel).to_le_bytes();
+    let srgb = Vec3::from([red, green, blue].map(f32::from)) / 255.0;
+    linear_of(srgb).extend(1.0) * (f32::from(alpha) / 255.0)
+}
+
+/// Share of what lies beyond the sea surface that land and trails hide in a pixel, in 255 parts.
+pub fn hidden_share(params: &Params, coast: &[u32], trails: &[u32], pixel: [u32; 2]) -> u32 {
+    let mut kept = 255;
+    if params.context.land_hides == 1 {
+        let [x, y] = in_picture(params, pixel);
+        kept -= coast[(y * params.context.coast_row_words + x) as usize] & 255;
+    }
+    if params.context.trails_on == 1 {
+        let clear = 255 - (trail_word(params, trails, pixel) >> 24);
+        kept = (kept * clear * clear + 32512) / 65025;
+    }
+    255 - kept
+}
+
 /// What lies in a pixel of a globe view: shares of land, lakes, shores and borders.
 fn ground_mask(params: &Params, mask: &[u32], pixel: [u32; 2]) -> [f32; 4] {
     let [x, y] = in_picture(params, pixel);
@@ -308,9 +339,16 @@ fn composed(
     if params.context.coast_above == 1 {
         covered = covered.max(color.w);
     }
+    let trail = trail_color(params, around.trails, pixel);
+    if params.context.coast_above == 1 {
+        color = over(trail, color, true);
+    }
     color = with_lines(params, around.lines, pixel, color, covered);
     let line = coast_color(params, around.coast, pixel, covered);
     color = over(line, color, params.context.coast_above == 1);
+    if params.context.coast_above == 0 {
+        color = over(trail, color, false);
+    }
     color += ground_color(params, around, &spot, pixel) * (1.0 - color.w);
     (color, spot.cover < 1.0)
 }

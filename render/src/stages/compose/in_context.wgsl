@@ -3,7 +3,7 @@
 struct ContextParams {
     surface: u32, has_water: u32, night_on: u32, terrain_on: u32, sea_floor_on: u32, terrain_slope: f32, seabed_per_m: f32, coast_on: u32,
     coast_above: u32, coast_grey: f32, coast_alpha: f32, coast_row_words: u32, land_hides: u32, lines_on: u32, isolines_through: f32,
-    graticule_grey: f32, graticule_alpha: f32,
+    graticule_grey: f32, graticule_alpha: f32, trails_on: u32, trails_row_px: u32,
 }
 @group(0) @binding(27) var<uniform> context: ContextParams;
 @group(0) @binding(5) var<storage, read> terrain: array<f32>;
@@ -11,6 +11,8 @@ struct ContextParams {
 @group(0) @binding(7) var<storage, read> coast: array<u32>;
 // Of the part that is drawn; see `isolines.wgsl`.
 @group(0) @binding(11) var<storage, read> lines: array<u32>;
+// Of the whole picture: red lowest, sRGB with straight alpha.
+@group(0) @binding(12) var<storage, read> trails_below: array<u32>;
 
 // Light on a thematic map where it is night.
 const NIGHT = 0.14;
@@ -112,6 +114,30 @@ fn land_share(pixel: vec2<u32>) -> u32 {
     return coast[place.y * context.coast_row_words + place.x] & 255u;
 }
 
+fn trail_word(pixel: vec2<u32>) -> u32 {
+    let place = pixel + vec2<u32>(view.origin_px);
+    return trails_below[place.y * context.trails_row_px + place.x];
+}
+
+// The trail of a pixel on the sea surface.
+fn trail_color(pixel: vec2<u32>) -> vec4<f32> {
+    if (context.trails_on == 0u) { return vec4(0.0); }
+    let word = trail_word(pixel);
+    return vec4(linear_of(codes_of(word) / 255.0), 1.0) * (f32(word >> 24u) / 255.0);
+}
+
+// Share of what lies beyond the sea surface that land and trails hide in a pixel, in 255 parts. Trails count twice: depth that
+// is scaled hides more of them than it should where it is large.
+fn hidden_share(pixel: vec2<u32>) -> u32 {
+    var kept = 255u;
+    if (context.land_hides == 1u) { kept -= land_share(pixel); }
+    if (context.trails_on == 1u) {
+        let clear = 255u - (trail_word(pixel) >> 24u);
+        kept = (kept * clear * clear + 32512u) / 65025u;
+    }
+    return 255u - kept;
+}
+
 // What lies in a pixel of a globe view: shares of land, lakes, shores and borders.
 fn ground_mask(pixel: vec2<u32>) -> vec4<f32> {
     let place = pixel + vec2<u32>(view.origin_px);
@@ -172,9 +198,12 @@ fn in_context(pixel: vec2<u32>, blended: vec4<f32>) -> InContext {
     if (is_submerged()) { return InContext(from_below(spot, pixel, color), true); }
     var covered = f32(context.terrain_on);
     if (context.coast_above == 1u) { covered = max(covered, color.w); }
+    let trail = trail_color(pixel);
+    if (context.coast_above == 1u) { color = over(trail, color, true); }
     color = with_lines(pixel, color, covered);
     let line = coast_color(pixel, covered);
     color = over(line, color, context.coast_above == 1u);
+    if (context.coast_above == 0u) { color = over(trail, color, false); }
     color += ground_color(spot, pixel) * (1.0 - color.w);
     return InContext(color, spot.cover < 1.0);
 }

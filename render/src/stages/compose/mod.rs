@@ -92,10 +92,10 @@ fn compiled(gpu: &Gpu, source: &str, is_in_context: bool) -> Kernel {
         .reading(&READS)
 }
 
-/// What the functions for surroundings read, by their bindings: terrain, ground axes, mask and isolines.
+/// What the functions for surroundings read, by their bindings: terrain, ground axes, mask, isolines and trails.
 pub(crate) fn surroundings(
     frame: &mut FrameContext<'_>,
-) -> Result<[(u32, wgpu::Buffer); 4], RenderError> {
+) -> Result<[(u32, wgpu::Buffer); 5], RenderError> {
     let plan = frame.plan;
     // Buffers of what is not drawn are bound but never read.
     let axes = if plan.ground_axes.is_empty() {
@@ -117,5 +117,16 @@ pub(crate) fn surroundings(
         terrain.as_ref().unwrap_or(domain).clone()
     };
     let lines = frame.room(Slot::Isolines, 4)?;
-    Ok([(5, terrain), (6, axes), (7, coast), (11, lines)])
+    let trails = if plan.trails.is_empty() {
+        frame.room(Slot::Trails, 4)?
+    } else {
+        frame.upload_of_plan(Slot::Trails, &plan.trails)?
+    };
+    Ok([
+        (5, terrain),
+        (6, axes),
+        (7, coast),
+        (11, lines),
+        (12, trails),
+    ])
 }

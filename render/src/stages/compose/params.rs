@@ -31,5 +31,9 @@ shared_struct! {
         pub isolines_through: f32,
         pub graticule_grey: f32,
         pub graticule_alpha: f32,
+        /// 1: trails lie on the sea surface.
+        pub trails_on: u32,
+        /// Pixels in a row of the whole picture.
+        pub trails_row_px: u32,
     }
 }

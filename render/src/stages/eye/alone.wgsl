@@ -13,7 +13,7 @@ fn near_of(entry: Entry, column: f32) -> Near {
     let inverse_radius = 1.0 / radius_px;
     let rgb = light_of(entry.color);
     return Near(radius_px, inverse_radius, place.y, (column - place.x) * inverse_radius, f32(entry.size >> 16u), rgb,
-        is_hidden_by_land(entry));
+        is_behind(entry));
 }
 
 // What an entry gives to the pixel of a row, where so much of what lies beyond the sea surface is kept; nothing beyond its radius.
@@ -33,8 +33,8 @@ fn more(sums: vec4<u32>, given: vec4<u32>) -> vec4<u32> {
 
 // What a pixel keeps of something beyond the sea surface.
 fn kept_at(pixel: vec2<u32>) -> f32 {
-    if (!IN_CONTEXT || context.land_hides == 0u || any(pixel >= view.size_px)) { return 1.0; }
-    return kept_by_land(land_share(pixel));
+    if (!hides_beyond() || any(pixel >= view.size_px)) { return 1.0; }
+    return kept_of(hidden_share(pixel));
 }
 
 fn show(pixel: vec2<u32>, color: vec4<f32>) {

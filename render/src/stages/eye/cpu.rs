@@ -2,6 +2,8 @@
 
 use glam::{UVec2, Vec2, Vec3, Vec4};
 
+use crate::plan::Plan;
+use crate::stages::compose::in_context::hidden_share;
 use crate::stages::layout::{
     BEYOND_BIT, Entry, KERNEL_BALL, KERNEL_CLOUD, KERNEL_RIMMED, RADIUS_BITS, SCREEN_TILE_PX,
     SUBPIXELS,
@@ -72,32 +74,46 @@ pub fn blended(params: &Params, picture: Vec4, sums: [u32; 4]) -> Vec4 {
     }
 }
 
-/// What pixels of a screen tile keep of something beyond the sea surface: all where no land hides it.
+/// What hides something beyond the sea surface, of the whole picture: its mask of land, and its trails, where it has them.
+#[derive(Clone, Copy, Default)]
+pub struct Hiding<'a> {
+    pub coast: &'a [u32],
+    pub trails: &'a [u32],
+}
+
+impl<'a> Hiding<'a> {
+    /// What hides it in a planned picture.
+    pub fn of(plan: &'a Plan) -> Self {
+        Self {
+            coast: &plan.coast,
+            trails: &plan.trails,
+        }
+    }
+}
+
+/// What pixels of a screen tile keep of something beyond the sea surface: all where nothing hides it.
 type Kept = [f32; TILE * TILE];
 
-/// `coast` is the mask of the whole picture.
-fn kept_by_land(params: &Params, coast: &[u32], corner: [u32; 2]) -> Kept {
+fn kept_beyond(params: &Params, hiding: Hiding<'_>, corner: [u32; 2]) -> Kept {
     let mut kept = [1.0; TILE * TILE];
-    if params.in_context && params.context.land_hides == 1 {
-        let (size, origin) = (params.view.size_px, params.view.origin_px.as_uvec2());
+    if params.in_context && params.context.land_hides + params.context.trails_on > 0 {
         for (at, kept) in (0..).zip(&mut kept) {
             let pixel = UVec2::from(corner) + UVec2::new(at % SCREEN_TILE_PX, at / SCREEN_TILE_PX);
-            if pixel.cmplt(size).all() {
-                let place = pixel + origin;
-                let word = coast[(place.y * params.context.coast_row_words + place.x) as usize];
-                *kept = (255 - (word & 255)) as f32 * 0.003_921_569;
+            if pixel.cmplt(params.view.size_px).all() {
+                let share = hidden_share(params, hiding.coast, hiding.trails, pixel.into());
+                *kept = (255 - share) as f32 * 0.003_921_569;
             }
         }
     }
     kept
 }
 
-/// Every pixel from the lists that end where `list_ends` says; `coast` is the mask of the whole picture, if it has one.
+/// Every pixel from the lists that end where `list_ends` says.
 pub fn eye(
     params: &Params,
     list_ends: &[u32],
     entries: &[Entry],
-    coast: &[u32],
+    hiding: Hiding<'_>,
     picture: &mut [Vec4],
 ) {
     for tile_y in 0..params.view.tiles.y {
@@ -111,7 +127,7 @@ pub fn eye(
             };
             let end = list_ends[first_list + params.view.slices as usize - 1] as usize;
             let [left, top] = [tile_x, tile_y].map(|tile| tile * SCREEN_TILE_PX);
-            let kept = kept_by_land(params, coast, [left, top]);
+            let kept = kept_beyond(params, hiding, [left, top]);
             let colors = screen_tile(params, &entries[first..end], &kept);
             for y in top..(top + SCREEN_TILE_PX).min(params.view.size_px.y) {
                 for x in left..(left + SCREEN_TILE_PX).min(params.view.size_px.x) {

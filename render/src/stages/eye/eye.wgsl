@@ -27,31 +27,36 @@ var<workgroup> sums: array<atomic<u32>, 1024>;
 // Where the list before these slices ends, and theirs.
 var<workgroup> ends: array<u32, 65>;
 var<workgroup> is_open: u32;
-// Shares of land of the pixels in 255 parts, four in a word.
-var<workgroup> land: array<u32, 64>;
+// Shares of what lies beyond the sea surface that are hidden in the pixels, in 255 parts, four in a word.
+var<workgroup> hidden: array<u32, 64>;
 
-// What lies beyond the sea surface lies behind the land that a sight line meets first.
-fn is_hidden_by_land(entry: Entry) -> bool {
-    return IN_CONTEXT && context.land_hides == 1u && (entry.size & BEYOND_BIT) != 0u;
+// Is anything that lies beyond the sea surface hidden?
+fn hides_beyond() -> bool {
+    return IN_CONTEXT && context.land_hides + context.trails_on > 0u;
 }
 
-// What is seen of something beyond the sea surface where so much is land.
-fn kept_by_land(share: u32) -> f32 {
+// What lies beyond the sea surface lies behind the land, or the trail, that a sight line meets first.
+fn is_behind(entry: Entry) -> bool {
+    return hides_beyond() && (entry.size & BEYOND_BIT) != 0u;
+}
+
+// What is seen of something beyond the sea surface where so much is hidden.
+fn kept_of(share: u32) -> f32 {
     return f32(255u - share) * 0.003921569;
 }
 
-// Sets `land`; to be waited for.
-fn look_up_land(tile: vec2<u32>, invocation: u32) {
+// Sets `hidden`; to be waited for.
+fn look_up_hidden(tile: vec2<u32>, invocation: u32) {
     if (!IN_CONTEXT || invocation >= PIXELS / 4u) { return; }
     var word = 0u;
-    if (context.land_hides == 1u) {
+    if (hides_beyond()) {
         for (var part = 0u; part < 4u; part++) {
             let at = invocation * 4u + part;
             let pixel = tile * SCREEN_TILE_PX + vec2(at % SCREEN_TILE_PX, at / SCREEN_TILE_PX);
-            if (all(pixel < view.size_px)) { word |= land_share(pixel) << (8u * part); }
+            if (all(pixel < view.size_px)) { word |= hidden_share(pixel) << (8u * part); }
         }
     }
-    land[invocation] = word;
+    hidden[invocation] = word;
 }
 
 // Share of a splat's depth at a squared distance of `q` squared radii from its centre.
@@ -104,14 +109,14 @@ fn add(entry: Entry, half: i32) {
     let low = max(vec2<i32>(ceil(place - radius_px - 0.5)), vec2(0));
     let high = min(vec2<i32>(floor(place + radius_px - 0.5)), vec2(i32(SCREEN_TILE_PX) - 1));
     let inverse_radius = 1.0 / radius_px;
-    let is_hidden = is_hidden_by_land(entry);
+    let is_hidden = is_behind(entry);
     for (var y = low.y + ((low.y ^ half) & 1); y <= high.y; y += 2) {
         let south = (f32(y) + 0.5 - place.y) * inverse_radius;
         for (var x = low.x; x <= high.x; x++) {
             let east = (f32(x) + 0.5 - place.x) * inverse_radius;
             let pixel = u32(y) * SCREEN_TILE_PX + u32(x);
             var kept = 1.0;
-            if (is_hidden) { kept = kept_by_land((land[pixel >> 2u] >> ((pixel & 3u) * 8u)) & 255u); }
+            if (is_hidden) { kept = kept_of((hidden[pixel >> 2u] >> ((pixel & 3u) * 8u)) & 255u); }
             let amount = u32(depth * weight_at(east * east + south * south, radius_px) * kept + 0.5);
             if (amount == 0u) { continue; }
             var own = rgb;
@@ -169,7 +174,7 @@ fn blended(picture: vec4<f32>, sums: vec4<u32>) -> vec4<f32> {
 fn eye(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(global_invocation_id) pixel: vec3<u32>,
     @builtin(local_invocation_index) invocation: u32) {
     for (var channel = 0u; channel < 4u; channel++) { atomicStore(&sums[channel * PIXELS + invocation], 0u); }
-    look_up_land(workgroup.xy, invocation);
+    look_up_hidden(workgroup.xy, invocation);
     let first_list = (workgroup.y * view.tiles.x + workgroup.x) * view.slices;
     var color = vec4(0.0);
     for (var first = 0u; first < view.slices; first += LOOKED_UP) {

@@ -41,7 +41,7 @@ fn hot(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) wor
         let list = hot_parts[1u + part];
         if (list == NO_LIST) { continue; }
         let tile = list / view.slices;
-        look_up_land(vec2(tile % view.tiles.x, tile / view.tiles.x), invocation);
+        look_up_hidden(vec2(tile % view.tiles.x, tile / view.tiles.x), invocation);
         workgroupBarrier();
         var begin = 0u;
         if (list > 0u) { begin = min(list_ends[list - 1u], lists.entry_capacity); }

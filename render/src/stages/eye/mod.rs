@@ -138,7 +138,13 @@ impl Eye {
             gpu.variant(HOT, &self.source, HOT, &constants)
                 .reading(&[View, Context, Lists])
         });
-        let [_terrain, _axes, (coast_at, coast), _lines] = compose::surroundings(frame)?;
+        let [
+            _terrain,
+            _axes,
+            (coast_at, coast),
+            _lines,
+            (trails_at, trails),
+        ] = compose::surroundings(frame)?;
         let counts = frame.room(Slot::Counts, 4)?;
         let entries = frame.room(Slot::Entries, 4)?;
         let [lists, parts] = hot_room(frame)?;
@@ -148,6 +154,7 @@ impl Eye {
             (1, &counts),
             (2, &entries),
             (coast_at, &coast),
+            (trails_at, &trails),
             (8, &lists),
             (9, &parts),
             (10, &sums),

@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3};
 
 use crate::stages::colour::{codes_of, with_codes};
-use crate::stages::layout::{BEYOND_M, Col, Particle, Row, SUBPIXELS, Splat, VIEW_TILE, nearest};
+use crate::stages::layout::{Col, Particle, Row, SUBPIXELS, Splat, VIEW_TILE, nearest};
 use crate::stages::params::Params;
 use crate::stages::water::{ceiling_light, is_submerged, kept_over, mix, water_light};
 
@@ -101,7 +101,7 @@ fn on_tile(params: &Params, row: &Row, col: &Col, particle: &Particle) -> Splat 
             1.0
         },
         color: particle.color | UNDIMMED,
-        is_beyond: 0,
+        is_beyond: u32::from(-particle.height_m > projection.beyond_m),
     }
 }
 
@@ -189,7 +189,7 @@ fn on_globe(params: &Params, row: &Row, col: &Col, particle: &Particle) -> Splat
         y_sub: nearest(y * SUBPIXELS as f32) - view.origin_px.y * SUBPIXELS,
         radius_px,
         tau: particle.depth * row.depth_gain * thinned * thinned,
-        is_beyond: u32::from(beyond_m > BEYOND_M),
+        is_beyond: u32::from(beyond_m > projection.beyond_m),
         ..unseen
     }
 }

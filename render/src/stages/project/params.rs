@@ -31,5 +31,7 @@ shared_struct! {
         pub per_earth_radius_m: f32,
         /// 1: particles of tiles are dimmed where it is night.
         pub day_on: u32,
+        /// What lies farther than this beyond the sea surface, seen from the eye, lies beyond it, m.
+        pub beyond_m: f32,
     }
 }

@@ -7,7 +7,7 @@ struct ProjectParams {
     slices_per_unit: f32, size_spread: f32, lon_span_rad: f32, height_px_per_m: f32,
     light_shift_per_m: vec2<f32>, light_origin: vec2<i32>,
     min_radius_px: f32, max_radius_px: f32, light_depth_gain: f32, light_texels_per_unit: f32,
-    per_earth_radius_m: f32, day_on: u32,
+    per_earth_radius_m: f32, day_on: u32, beyond_m: f32,
 }
 @group(0) @binding(22) var<uniform> projection: ProjectParams;
 
@@ -87,6 +87,7 @@ fn on_tile(particle: Particle) -> Splat {
     splat.day = 1.0;
     if (projection.day_on == 1u) { splat.day = day_at(normal_of(particle)); }
     splat.color = particle.color | UNDIMMED;
+    splat.is_beyond = u32(-particle.height_m > projection.beyond_m);
     return splat;
 }
 
@@ -128,7 +129,7 @@ fn on_globe(particle: Particle) -> Splat {
     splat.radius_px = max(radius_px, projection.min_radius_px);
     let thinned = full_px / splat.radius_px;
     splat.tau = particle.depth * row.depth_gain * thinned * thinned;
-    splat.is_beyond = u32(select(-particle.height_m, particle.height_m, view.hides < 1.0) > BEYOND_M);
+    splat.is_beyond = u32(select(-particle.height_m, particle.height_m, view.hides < 1.0) > projection.beyond_m);
     return splat;
 }
 

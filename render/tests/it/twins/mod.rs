@@ -15,7 +15,6 @@ use bytemuck::Pod;
 use contract::base_map::Background;
 use contract::job::{Mode, RenderJob, Style, View};
 use glam::Vec4;
-use render::Scene;
 use render::frame_context::FrameContext;
 use render::gpu::{Gpu, Slot, Workspace};
 use render::passes::splat::unpacked;
@@ -23,6 +22,7 @@ use render::plan::Plan;
 use render::playback::Playback;
 use render::stages::bin;
 use render::stages::compose::in_context::Surroundings;
+use render::stages::eye::cpu::Hiding;
 use render::stages::flow::cpu::Field;
 use render::stages::flow::{self};
 use render::stages::layout::{
@@ -34,6 +34,7 @@ use render::stages::params::Params;
 use render::stages::particles::cpu::Inputs;
 use render::stages::sizes::{HALF_BYTES, list_count, stored_at, texel_count};
 use render::stages::{compose, eye, interpolate, isolines, particles, project, uncertainty};
+use render::{Backend, Renderer, Scene};
 use render_proof::currents::{self, gyres};
 
 use crate::compare::worst;
@@ -97,7 +98,11 @@ impl Twins {
     #[expect(clippy::too_many_lines, reason = "the stages in order")]
     fn of_job(job: &RenderJob, scene: Scene) -> Self {
         let mode = job.mode;
-        let plan = Plan::new(job, &scene, u64::MAX).unwrap();
+        let mut plan = Plan::new(job, &scene, u64::MAX).unwrap();
+        if let (Some(alone), Some(vector)) = (job.trails_alone(), &scene.trails) {
+            let renderer = Renderer::new(Backend::Cpu).unwrap();
+            plan.lay_trails(&renderer.render(&alone, vector).unwrap());
+        }
         let mut params = plan.params_of(plan.parts()[0]);
         let value = between(&params, Some(&scene.value), params.values.weight);
         let carbon = scene.accumulated.as_ref();
@@ -153,7 +158,8 @@ impl Twins {
             entries = vec![Entry::default(); bin::cpu::scan(&mut list_ends) as usize];
             bin::cpu::scatter(&params, &shaded, &mut list_ends, &mut entries);
             params.lists.entry_capacity = entries.len() as u32;
-            eye::cpu::eye(&params, &list_ends, &entries, &plan.coast, &mut picture);
+            let hiding = Hiding::of(&plan);
+            eye::cpu::eye(&params, &list_ends, &entries, hiding, &mut picture);
         }
         let mut lines = vec![];
         if params.context.lines_on == 1 {

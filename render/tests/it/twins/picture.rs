@@ -8,10 +8,12 @@ use render::stages::compose::{self, Compose};
 use render::stages::eye::{self, Eye};
 use render::stages::map::{self, Map};
 
+use super::seeing::eye_image;
 use super::{Twins, bytes, channels, far_apart, prove};
 use crate::below::below;
 use crate::context::{everything, with_terrain};
-use crate::scenes::{FIVE_DEGREES, globe, ocean, tile};
+use crate::scenes::{FIVE_DEGREES, globe, job, ocean, tile};
+use crate::trails::with_trails;
 
 #[test]
 fn map_matches_its_twin_on_tiles_and_on_the_globe() {
@@ -94,6 +96,56 @@ fn compose_matches_its_twin() {
             );
             far_apart(&bytes(drawn), &expected, 1.01)
         });
+    }
+}
+
+#[test]
+fn trails_on_the_sea_match_their_twin() {
+    for (mode, right, wrong) in [
+        (
+            Mode::Map,
+            "over(trail, color, true)",
+            "over(trail, color, false)",
+        ),
+        (
+            Mode::Map,
+            "linear_of(codes_of(word) / 255.0)",
+            "codes_of(word) / 255.0",
+        ),
+        (
+            Mode::Volume,
+            "{ color = over(trail, color, false); }",
+            "{ }",
+        ),
+        (
+            Mode::Volume,
+            "kept * clear * clear + 32512u",
+            "65025u * 255u + 0u * clear",
+        ),
+    ] {
+        let mut job = job(mode, globe(-30.0, 25.0, 9e6, 160));
+        job.style.globe_surface = true;
+        let (scene, job) = with_trails(job);
+        let twins = Twins::of_job(&job, scene);
+        let expected = bytes(twins.image.iter().copied());
+        if mode == Mode::Map {
+            prove("trails", compose::SOURCE, right, wrong, |gpu, source| {
+                let stage = Compose::new(gpu, source);
+                let picture = |f: &mut FrameContext<'_>| {
+                    drop(f.upload(Slot::Picture, &twins.picture).unwrap());
+                };
+                let record = |f: &mut FrameContext<'_>| stage.record(f).unwrap();
+                let len = twins.image.len();
+                let drawn: Vec<u32> = twins.run(gpu, picture, record, Slot::Image, len);
+                far_apart(&bytes(drawn), &expected, 1.01)
+            });
+            continue;
+        }
+        for entry in [eye::SHARED, eye::ALONE] {
+            prove("trails", eye::SOURCE, right, wrong, |gpu, source| {
+                far_apart(&eye_image(&twins, gpu, source, entry), &expected, 1.01)
+            });
+        }
     }
 }
 

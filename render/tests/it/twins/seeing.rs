@@ -5,6 +5,7 @@ use render::frame_context::FrameContext;
 use render::gpu::{Gpu, Slot};
 use render::stages::compose;
 use render::stages::compose::in_context::Surroundings;
+use render::stages::eye::cpu::Hiding;
 use render::stages::eye::{self, Eye};
 
 use super::{Twins, bytes, channels, far_apart, prove};
@@ -12,7 +13,7 @@ use crate::compare::worst;
 use crate::scenes::{FIVE_DEGREES, globe, ocean, tile};
 
 /// The image that the eye makes of the twins' lists on the GPU, as bytes.
-fn eye_image(twins: &Twins, gpu: &Gpu, source: &str, entry: &'static str) -> Vec<f32> {
+pub(super) fn eye_image(twins: &Twins, gpu: &Gpu, source: &str, entry: &'static str) -> Vec<f32> {
     let stage = Eye::of(gpu, source, entry);
     let lists = |f: &mut FrameContext<'_>| {
         f.upload(Slot::Counts, &twins.list_ends).unwrap();
@@ -102,7 +103,7 @@ fn eye_blends_away_from_the_light_behind_as_its_twin_does() {
         &twins.params,
         &twins.list_ends,
         &twins.entries,
-        &twins.plan.coast,
+        Hiding::of(&twins.plan),
         &mut twins.picture,
     );
     assert!(

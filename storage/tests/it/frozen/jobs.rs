@@ -44,6 +44,7 @@ fn plain() -> RenderJob {
         accumulated: None,
         relief: None,
         flow: None,
+        trails: None,
         mode: Mode::Map,
         view: View::Tile {
             tile: Tile { z: 2, x: 3, y: 1 },
@@ -110,6 +111,7 @@ fn flow() -> RenderJob {
         flow: Some(Flow {
             northward: time_sample("current-north", None),
             clock_s: 978_350_400.125,
+            look: None,
         }),
         mode: Mode::Flow,
         ..plain()

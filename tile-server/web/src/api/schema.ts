@@ -279,6 +279,27 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/stream": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * A WebSocket: states of a camera in, pictures of what it sees out.
+         * @description Messages are described in docs/stream.md. A state names a view by its address below `/globe`; the picture of a camera at
+         *     rest is that view, byte for byte.
+         */
+        get: operations["stream"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/tiles/{product}/{mode}.json": {
         parameters: {
             query?: never;
@@ -2041,6 +2062,17 @@ export interface operations {
                  * @example 10
                  */
                 isolines?: string;
+                /**
+                 * @description A vector whose trails are drawn on the sea surface, over the layer and below what rises from it: currents `NAME`, of
+                 *     which `NAME-east` and `NAME-north` have landed.
+                 * @example globcurrent
+                 */
+                trails?: string;
+                /**
+                 * @description Another instant of the vector than the one that is shown.
+                 * @example 2002-01-15
+                 */
+                trails_time?: string;
                 /** @description How far a kilogram of accumulated carbon a square metre lifts particles, m m² kg⁻¹. */
                 height_exaggeration?: number;
                 /**
@@ -2306,6 +2338,62 @@ export interface operations {
             };
         };
     };
+    stream: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description A WebSocket for as long as both want it */
+            101: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description The request asks for no WebSocket */
+            426: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description A defect of this server */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description Too much to do, or a part that is needed does not answer */
+            503: {
+                headers: {
+                    /** @description Seconds after which the same request may succeed */
+                    "retry-after"?: number;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description The answer took too long */
+            504: {
+                headers: {
+                    /** @description Seconds after which the same request may succeed */
+                    "retry-after"?: number;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+        };
+    };
     tilejson: {
         parameters: {
             query?: {
@@ -2358,6 +2446,17 @@ export interface operations {
                  * @example 10
                  */
                 isolines?: string;
+                /**
+                 * @description A vector whose trails are drawn on the sea surface, over the layer and below what rises from it: currents `NAME`, of
+                 *     which `NAME-east` and `NAME-north` have landed.
+                 * @example globcurrent
+                 */
+                trails?: string;
+                /**
+                 * @description Another instant of the vector than the one that is shown.
+                 * @example 2002-01-15
+                 */
+                trails_time?: string;
                 /** @description How far a kilogram of accumulated carbon a square metre lifts particles, m m² kg⁻¹. */
                 height_exaggeration?: number;
                 /**
@@ -2491,6 +2590,17 @@ export interface operations {
                  * @example 10
                  */
                 isolines?: string;
+                /**
+                 * @description A vector whose trails are drawn on the sea surface, over the layer and below what rises from it: currents `NAME`, of
+                 *     which `NAME-east` and `NAME-north` have landed.
+                 * @example globcurrent
+                 */
+                trails?: string;
+                /**
+                 * @description Another instant of the vector than the one that is shown.
+                 * @example 2002-01-15
+                 */
+                trails_time?: string;
                 /** @description How far a kilogram of accumulated carbon a square metre lifts particles, m m² kg⁻¹. */
                 height_exaggeration?: number;
                 /**

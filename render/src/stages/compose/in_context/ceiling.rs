@@ -2,7 +2,7 @@
 
 use glam::{Vec3, Vec4};
 
-use super::{Spot, Surroundings, coast_color, ground_mask, over, surface_lines};
+use super::{Spot, Surroundings, coast_color, ground_mask, over, surface_lines, trail_color};
 use crate::stages::compose::globe::{daylight, plain};
 use crate::stages::params::Params;
 use crate::stages::water::{kept_over, mix, water_light};
@@ -31,6 +31,7 @@ fn ceiling_color(
     if params.context.coast_above == 1 {
         seen = blended + seen * (1.0 - blended.w);
     }
+    seen = over(trail_color(params, around.trails, pixel), seen, true);
     let [isoline, graticule] = surface_lines(params, around.lines, pixel, 0.0);
     seen = over(isoline, over(graticule, seen, true), true);
     seen = over(coast_color(params, around.coast, pixel, 0.0), seen, true);

@@ -14,6 +14,7 @@ fn ceiling_color(spot: Spot, pixel: vec2<u32>, blended: vec4<f32>) -> vec4<f32> 
         seen = vec4(plain(spot.ground.lon, spot.ground.lat, shares, no_floor, pixel) * daylight(spot.sun.z), 1.0);
     }
     if (context.coast_above == 1u) { seen = blended + seen * (1.0 - blended.w); }
+    seen = over(trail_color(pixel), seen, true);
     let own = surface_lines(pixel, 0.0);
     seen = over(own.isoline, over(own.graticule, seen, true), true);
     seen = over(coast_color(pixel, 0.0), seen, true);
