@@ -77,7 +77,7 @@ impl Pace {
     pub(super) fn seen(&mut self, after: Duration) {
         let way = self.way.map_or(after, |way| way.min(after));
         self.way = Some(way);
-        mix(&mut self.link_s, after - way);
+        mix(&mut self.link_s, after.saturating_sub(way));
     }
 
     fn choose(&mut self) {

@@ -26,7 +26,7 @@ impl Wish {
     pub(super) async fn full(self, server: AppState) -> Result<Picture, ServerError> {
         let (job, shown) = job(&server, &self.state.view).await?;
         let bytes = server.pictures.in_passing(&job, Encoding::Png).await?;
-        Ok(self.picture(&job, job.view.size_px(), shown, Encoding::Png, bytes))
+        Ok(self.picture(&job, job.view.size_px(), &shown, Encoding::Png, bytes))
     }
 
     /// The same for a moment, in less detail.
@@ -41,14 +41,14 @@ impl Wish {
         let job = detail.reduce(job);
         let encoding = Encoding::jpeg(quality)?;
         let bytes = server.pictures.in_passing(&job, encoding).await?;
-        Ok(self.picture(&job, full_px, shown, encoding, bytes))
+        Ok(self.picture(&job, full_px, &shown, encoding, bytes))
     }
 
     fn picture(
         self,
         job: &RenderJob,
         [full_width, full_height]: [u32; 2],
-        shown: Shown,
+        shown: &Shown,
         encoding: Encoding,
         bytes: bytes::Bytes,
     ) -> Picture {
