@@ -9,6 +9,7 @@ mod granules;
 mod outages;
 mod refusals;
 mod restarts;
+mod streams;
 mod watched;
 
 use std::sync::{PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};

@@ -1,7 +1,9 @@
 //! One question has one answer, field by field: on the command line with `--json`, and over HTTP.
 
 use std::path::Path;
+use std::time::{Duration, Instant};
 
+use harness::camera::{Came, Camera};
 use harness::server::Server;
 use harness::{granule, program};
 use serde_json::Value;
@@ -168,4 +170,36 @@ fn trails_asked_on_the_command_line_and_over_http_are_one_picture() {
         assert!(served.body == drawn, "{path}");
         assert!(picture("") != drawn, "{path}: trails are seen");
     }
+}
+
+#[test]
+fn a_view_has_the_same_bytes_by_stream_over_http_and_on_the_command_line() {
+    let folder = landed();
+    let data = folder.path();
+    let server = Server::start(data, &["serve"]).unwrap();
+    let view = "/globe/flux/map.png?lon=20&lat=10&height_km=6000&width=300&height=200&tilt=20";
+    let mut camera = Camera::connect(&server.url).unwrap();
+    let id = camera.look(view).unwrap();
+    let until = Instant::now() + Duration::from_mins(2);
+    let by_stream = loop {
+        assert!(Instant::now() < until, "no picture in full");
+        match camera.hear().unwrap() {
+            Came::Picture(header, bytes) if header["kind"] == "full" => {
+                assert_eq!(header["id"], id);
+                break bytes;
+            }
+            Came::Picture(header, _jpeg) => assert_eq!(header["format"], "image/jpeg"),
+            Came::Refused(why) => panic!("{why}"),
+            Came::Nothing => {}
+        }
+    };
+    let by_http = server.get(view).unwrap();
+    assert_eq!(by_http.status, 200);
+    assert!(by_stream == by_http.body, "stream and HTTP differ");
+    let file = data.join("view.png");
+    let words = "render globe --layer flux --mode map --lon 20 --lat 10 --height 6000 --size 300x200 --tilt 20 --background none -o";
+    let words: Vec<&str> = words.split(' ').chain(file.to_str()).collect();
+    program::succeed(data, &words).unwrap();
+    let by_command = std::fs::read(file).unwrap();
+    assert!(by_stream == by_command, "stream and command line differ");
 }

@@ -1,5 +1,6 @@
 //! The harness of the end-to-end tests: runs the built program as people do, and knows where the real files are.
 
+pub mod camera;
 pub mod cluster;
 pub mod granule;
 pub mod http;

@@ -16,6 +16,8 @@ const DETAILS: [Detail; 7] = [
     Detail::of(0.25, 2, 16),
     Detail::of(0.1875, 1, 12),
 ];
+/// Pictures of one stream that are drawn at once at most.
+const MOST_AT_ONCE: usize = 3;
 /// With which one a stream begins: quick nearly everywhere, and better ones follow soon.
 const FIRST: usize = 5;
 /// Fewest pixels of the shorter side.
@@ -108,6 +110,15 @@ impl Pace {
     /// That of the next picture in motion.
     pub(super) fn detail(&self) -> Detail {
         DETAILS[self.detail]
+    }
+
+    /// Pictures that are drawn at once: what is drawn side by side on a slow device is only later.
+    pub(super) fn at_once(&self) -> usize {
+        match self.drawing_s {
+            ..=0.1 => MOST_AT_ONCE,
+            ..=0.4 => 2,
+            _ => 1,
+        }
     }
 
     /// Its quality.
@@ -207,6 +218,12 @@ mod tests {
         let slow = all[400..].iter().filter(|&&detail| detail < 4).count();
         assert!(slow * 20 < all.len(), "{slow}");
         assert!(all[400..].iter().all(|&detail| detail >= 2), "{all:?}");
+        let mut slow = Pace::new();
+        assert_eq!(slow.at_once(), MOST_AT_ONCE);
+        for _ in 0..20 {
+            slow.drawn(slow.detail(), Duration::from_millis(900));
+        }
+        assert_eq!(slow.at_once(), 1);
         let all = run(|_any| 900.0);
         assert!(all[50..].iter().all(|&detail| detail == DETAILS.len() - 1));
     }

@@ -19,8 +19,8 @@ use super::places::Place;
 use crate::error::ServerError;
 use crate::state::AppState;
 
-/// Pictures of one stream that are drawn at once, and that its client has not seen.
-const AT_ONCE: usize = 3;
+/// Pictures that a client has not seen, at most.
+const MOST_UNSEEN: usize = 3;
 /// A camera that does not move for so long rests.
 const REST: Duration = Duration::from_millis(150);
 /// A picture that is not seen within this time does not hold back others: its client may have stopped telling.
@@ -249,7 +249,7 @@ impl Session {
     }
 
     fn is_held_back(&self) -> bool {
-        self.tells_seen && self.unseen.len() >= AT_ONCE
+        self.tells_seen && self.unseen.len() >= MOST_UNSEEN
     }
 
     fn unseen_until(&self) -> Option<At> {
@@ -259,7 +259,7 @@ impl Session {
 
     /// Begins to draw the newest state, if there is room.
     fn begin(&mut self) {
-        if self.moving.len() >= AT_ONCE || self.again.is_some() || self.is_held_back() {
+        if self.moving.len() >= self.pace.at_once() || self.again.is_some() || self.is_held_back() {
             return;
         }
         let Some(wish) = self.newest.take() else {
@@ -332,7 +332,7 @@ impl Session {
         if kind == Kind::Moving {
             self.unseen.push_back((picture.header.id, Instant::now()));
             // Of a client that does not tell, none is waited for.
-            if self.unseen.len() > AT_ONCE && !self.tells_seen {
+            if self.unseen.len() > MOST_UNSEEN && !self.tells_seen {
                 self.unseen.pop_front();
             }
         }
