@@ -324,6 +324,8 @@ async fn while_nobody_draws_the_last_picture_stays_and_the_stream_goes_on_by_its
     camera.look(2, &turned).await;
     let error = camera.error().await;
     assert_eq!((&error["id"], &error["status"]), (&json!(2), &json!(503)));
+    // Longer than until it is tried in full because it rests.
+    tokio::time::sleep(Duration::from_millis(700)).await;
     running.app.drawer.set(Mood::Well);
     let (header, _png) = camera.full().await;
     assert_eq!(header["id"], 2, "tried again without being asked");
