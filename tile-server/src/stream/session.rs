@@ -73,6 +73,8 @@ struct Session {
     pace: Pace,
     /// The highest number that came.
     last_id: Option<u64>,
+    /// The last one whose refusal was told.
+    refused_id: Option<u64>,
     /// What is to be drawn next.
     newest: Option<Wish>,
     /// What is drawn in full if nothing comes before the time.
@@ -112,6 +114,7 @@ impl Session {
             server,
             pace: Pace::new(),
             last_id: None,
+            refused_id: None,
             newest: None,
             rest: None,
             again: None,
@@ -346,7 +349,8 @@ impl Session {
             return Err(End::told("removed", close_code::POLICY, text));
         }
         let is_newest = self.last_id == Some(wish.state.id);
-        if is_newest {
+        // Once, however often it is tried again.
+        if is_newest && self.refused_id.replace(wish.state.id) != Some(wish.state.id) {
             outbox.offer(refusal(wish.state.id, error));
         }
         if error.is_retryable() {
