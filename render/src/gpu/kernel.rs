@@ -1,5 +1,7 @@
 //! One compiled entry point and the layout of its bindings.
 
+use std::borrow::Cow;
+
 use super::pipelines::Pipelines;
 use super::{Checks, Gpu};
 
@@ -25,6 +27,7 @@ impl Kernel {
         constants: &[(&str, f64)],
     ) -> Self {
         let device = &gpu.device;
+        let source = &*for_adapter(source, gpu.is_software());
         let descriptor = wgpu::ShaderModuleDescriptor {
             label: Some(label),
             source: wgpu::ShaderSource::Wgsl(source.into()),
@@ -68,6 +71,17 @@ impl Kernel {
         );
         self.uniforms = uniforms.iter().map(|&number| number.into()).collect();
         self
+    }
+}
+
+/// The source as an adapter is given it. Mesa's software adapter compiles a kernel anew for all values of uniform buffers
+/// that it decides by, which a camera that moves changes with every picture: seconds of compilation for each. It reads the
+/// same numbers from storage buffers, by whose values it compiles nothing.
+fn for_adapter(source: &str, is_software: bool) -> Cow<'_, str> {
+    if is_software {
+        source.replace("var<uniform>", "var<storage, read>").into()
+    } else {
+        source.into()
     }
 }
 

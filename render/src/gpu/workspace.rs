@@ -85,7 +85,7 @@ impl Workspace {
             return Ok(buffer.clone());
         }
         let kind = if slot == Slot::Params {
-            wgpu::BufferUsages::UNIFORM
+            wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::STORAGE
         } else {
             wgpu::BufferUsages::STORAGE
         };
