@@ -9,6 +9,7 @@ use crate::error::RenderError;
 use crate::gpu::{Gpu, Recorder, Slot, Workspace};
 use crate::plan::Plan;
 use crate::scene::{Cells, Interval, Scene};
+use crate::stages::features::Features;
 use crate::stages::params::Params;
 use crate::stages::sizes::light_bytes;
 
@@ -63,6 +64,8 @@ pub struct FrameContext<'a> {
     pub recorder: Recorder<'a>,
     pub plan: &'a Plan,
     pub params: Params,
+    /// What kernels may be compiled for.
+    pub features: Features,
     pub params_buffer: wgpu::Buffer,
     pub scene: SceneBuffers,
     workspace: &'a mut Workspace,
@@ -87,6 +90,7 @@ impl<'a> FrameContext<'a> {
             recorder,
             plan,
             params,
+            features: Features::of(&params),
             params_buffer,
             scene,
             workspace,

@@ -164,6 +164,11 @@ impl Gpu {
         self.adapter.is_software()
     }
 
+    /// Does it run both sides of a condition, on vectors, so that what a picture has not is better not compiled?
+    pub fn runs_both_sides(&self) -> bool {
+        self.is_software() && self.checks == Checks::Trusted
+    }
+
     /// Bytes of memory that are the device's own; none where that is the computer's, or where nobody says.
     pub fn own_bytes(&self) -> Option<u64> {
         self.own_bytes.filter(|_| !self.is_software())

@@ -10,7 +10,11 @@ pub mod splat;
 mod store;
 pub mod trails;
 
-use crate::gpu::{Gpu, Kernel};
+use crate::frame_context::FrameContext;
+use crate::gpu::Gpu;
+use crate::stages::params::Uniform;
+use crate::stages::sizes::workgroups;
+use crate::stages::variants::Variants;
 
 /// Which cells the passes draw, and where they store their splats.
 pub const CELLS: &str = include_str!("order.wgsl");
@@ -29,7 +33,32 @@ pub fn probes(gpu: &Gpu) -> u32 {
     }
 }
 
-/// Compiles a pass whose table is looked through so often.
-fn compiled(gpu: &Gpu, label: &'static str, source: &str, probes: u32) -> Kernel {
-    gpu.variant(label, source, label, &[("PROBES", f64::from(probes))])
+/// A pass whose table of sums is looked through so often.
+struct Pass {
+    kernels: Variants,
+    probes: u32,
+}
+
+impl Pass {
+    fn new(
+        gpu: &Gpu,
+        label: &'static str,
+        source: &str,
+        probes: u32,
+        uniforms: &[Uniform],
+    ) -> Self {
+        let kernels = Variants::new(label, source, label, uniforms);
+        Self {
+            kernels: kernels.compiled(gpu, &[("PROBES", probes)]),
+            probes,
+        }
+    }
+
+    /// Records it for every cell that is drawn.
+    fn record(&self, frame: &mut FrameContext<'_>, buffers: &[(u32, &wgpu::Buffer)]) {
+        let constants = [("PROBES", self.probes)];
+        let kernel = self.kernels.of(frame.gpu, &constants, frame.features);
+        let groups = workgroups(&frame.params);
+        frame.recorder.dispatch_deep(&kernel, buffers, groups);
+    }
 }

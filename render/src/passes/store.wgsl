@@ -9,6 +9,8 @@
 @group(0) @binding(9) var<storage, read_write> light: array<atomic<u32>>;
 @group(0) @binding(10) var<storage, read_write> counts: array<atomic<u32>>;
 
+fn is_light_alone() -> bool { return feature(IS_LIGHT_ALONE, lighting.mode == LIGHT_ALONE); }
+
 // Keys of lists; those of light texels are below.
 const LIST_KEY = 0x80000000u;
 
@@ -31,7 +33,7 @@ fn count_list(list: u32) {
 }
 
 fn is_in_cap(row: u32, slot: u32) -> bool {
-    if (view.kind == VIEW_TILE) { return true; }
+    if (is_tile()) { return true; }
     let lat = rows[row];
     let lon = cols[slot];
     let center = vec3(lat.cos_lat * lon.sin_lon, lat.cos_lat * lon.cos_lon, lat.sin_lat);
@@ -39,17 +41,17 @@ fn is_in_cap(row: u32, slot: u32) -> bool {
 }
 
 fn store_nothing(at: u32) {
-    if (lighting.mode != LIGHT_ALONE) { seen[at] = vec4(0u); }
+    if (!is_light_alone()) { seen[at] = vec4(0u); }
 }
 
 fn store(at: u32, splat: Splat) {
-    if (lighting.mode == LIGHT_ALONE) {
+    if (is_light_alone()) {
         if (splat.light_depth > 0.0) { deposit(splat); }
         return;
     }
     let size = size_word(splat);
     seen[at] = vec4(bitcast<u32>(splat.x_sub), bitcast<u32>(splat.y_sub), size, splat.color);
-    if (lighting.mode == LIGHT_OWN && splat.light_depth > 0.0) { deposit(splat); }
+    if (feature(MAKES_LIGHT, lighting.mode == LIGHT_OWN) && splat.light_depth > 0.0) { deposit(splat); }
     if (size == 0u) { return; }
     lit[at] = vec4(bitcast<u32>(splat.light_u), bitcast<u32>(splat.light_v),
         bitcast<u32>(splat.slice), bitcast<u32>(splat.day));

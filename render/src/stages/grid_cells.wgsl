@@ -6,7 +6,7 @@ const NO_CELL = 0xffffffffu;
 fn cell_at(row: i32, col: i32) -> u32 {
     var x = col;
     let cols = i32(grid.cols);
-    if (grid.periodic == 1u) { x = (x % cols + cols) % cols; }
+    if (feature(IS_PERIODIC, grid.periodic == 1u)) { x = wrapped(x, cols); }
     if (x < 0 || x >= cols || row < 0 || row >= i32(grid.rows)) { return NO_CELL; }
     let cell = u32(row) * grid.cols + u32(x);
     if (cell < grid.held_first_cell || cell >= grid.held_end_cell) { return NO_CELL; }

@@ -7,12 +7,14 @@
 pub const PRELUDE: &str = include_str!("prelude.wgsl");
 
 pub mod colour;
+pub mod features;
 pub mod layout;
 pub mod params;
 pub mod place;
 pub mod sizes;
 pub mod sphere;
 pub mod uncertainty;
+pub mod variants;
 pub mod water;
 
 pub mod bin;

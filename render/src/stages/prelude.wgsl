@@ -77,6 +77,55 @@ const KERNEL_DOT: u32 = 0u;
 const KERNEL_BALL: u32 = 1u;
 const KERNEL_CLOUD: u32 = 2u;
 const KERNEL_RIMMED: u32 = 3u;
+const ASKED: u32 = 0xffffffffu;
+const IS_TILE: u32 = 1u;
+const IS_SUBMERGED: u32 = 2u;
+const HAS_SURFACE: u32 = 4u;
+const HAS_TERRAIN: u32 = 8u;
+const HAS_SEA_FLOOR: u32 = 16u;
+const HAS_WATER: u32 = 32u;
+const HAS_NIGHT: u32 = 64u;
+const HAS_DAY: u32 = 128u;
+const HAS_LOCAL_SUN: u32 = 256u;
+const HAS_COAST: u32 = 512u;
+const HAS_COAST_ABOVE: u32 = 1024u;
+const HAS_LINES: u32 = 2048u;
+const HAS_TRAILS: u32 = 4096u;
+const LAND_HIDES: u32 = 8192u;
+const HAS_COVERAGE: u32 = 16384u;
+const HAS_SHAPE: u32 = 32768u;
+const HAS_UNCERTAINTY: u32 = 65536u;
+const HAS_ACCUMULATED: u32 = 131072u;
+const IS_LOG: u32 = 262144u;
+const IS_DIVERGING: u32 = 524288u;
+const IS_LIT: u32 = 1048576u;
+const MAKES_LIGHT: u32 = 2097152u;
+const IS_LIGHT_ALONE: u32 = 4194304u;
+const IS_FRONT_TO_BACK: u32 = 8388608u;
+const HAS_CLOUDS: u32 = 16777216u;
+const HAS_SEA_DEPTH: u32 = 33554432u;
+const IS_PERIODIC: u32 = 67108864u;
+
+// What a kernel is compiled for; see `features.rs`.
+override FEATURES: u32 = ASKED;
+
+// Does the picture have a feature? `asked` is what its parameters say.
+fn feature(bit: u32, asked: bool) -> bool {
+    if (FEATURES == ASKED) { return asked; }
+    return (FEATURES & bit) != 0u;
+}
+
+fn is_tile() -> bool { return feature(IS_TILE, view.kind == VIEW_TILE); }
+
+// Does the eye stand below the sea surface? The core hides then, in the place of the ground.
+fn is_submerged() -> bool { return feature(IS_SUBMERGED, view.hides < 1.0); }
+
+fn is_front_to_back() -> bool { return feature(IS_FRONT_TO_BACK, view.front_to_back == 1u); }
+
+// Index of a column or row of a grid that goes round, at most so many beyond its ends.
+fn wrapped(index: i32, count: i32) -> i32 {
+    return index + select(0, count, index < 0) - select(0, count, index >= count);
+}
 
 fn is_missing(value: f32) -> bool {
     return value < 0.5 * MISSING;
@@ -127,8 +176,8 @@ fn binary_log(x: f32) -> f32 {
 }
 
 // Place of a value between the ends of the range of colours, 0 to 1.
-fn place_in_range(value: f32, low: f32, per_unit: f32, is_log: u32) -> f32 {
+fn place_in_range(value: f32, low: f32, per_unit: f32, is_log: bool) -> f32 {
     var at = value;
-    if (is_log == 1u) { at = binary_log(max(value, 1.0e-37)); }
+    if (is_log) { at = binary_log(max(value, 1.0e-37)); }
     return clamp((at - low) * per_unit, 0.0, 1.0);
 }

@@ -36,7 +36,7 @@ fn ground_below(pixel: vec2<u32>) -> Ground {
     ground.nearest_at = nearest_at;
     ground.sight = sight;
     let half_chord = sqrt(max(1.0 - miss_sq, 0.0));
-    if (view.hides < 1.0) {
+    if (is_submerged()) {
         ground.rim_px = 1.0e6;
         if (nearest_at > 0.0) { ground.rim_px = (sqrt(miss_sq) - view.hides) * view.focal_px / max(nearest_at, 1.0e-6); }
         ground.on_ground = ground.rim_px > -0.5;

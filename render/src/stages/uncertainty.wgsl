@@ -12,7 +12,7 @@ const HATCH_PX = 8u;
 const HATCH_INK = 0.75;
 
 fn uncertainty_of(cell: u32) -> f32 {
-    if (values.has_uncertainty == 0u) { return 0.0; }
+    if (!feature(HAS_UNCERTAINTY, values.has_uncertainty == 1u)) { return 0.0; }
     let before = uncertainty_before[cell];
     return before + (uncertainty_after[cell] - before) * values.weight;
 }

@@ -1,10 +1,5 @@
 // What an eye below the sea surface looks through: water, and the surface from underneath.
 
-// Does the eye stand below the sea surface? The core hides then, in the place of the ground.
-fn is_submerged() -> bool {
-    return view.hides < 1.0;
-}
-
 // Light of the water itself where nothing else is seen: dark towards the deep. `up` is the cosine of the way against the
 // vertical at the eye.
 fn water_light(up: f32) -> vec3<f32> {

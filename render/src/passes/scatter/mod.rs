@@ -2,10 +2,10 @@
 
 use crate::error::RenderError;
 use crate::frame_context::FrameContext;
-use crate::gpu::{Gpu, Kernel, Slot};
+use crate::gpu::{Gpu, Slot};
+use crate::passes::Pass;
 use crate::stages::layout::Entry;
 use crate::stages::params::Uniform::{Cells, Lighting, Lists, View};
-use crate::stages::sizes::workgroups;
 
 /// The shader.
 pub const SOURCE: &str = concat!(
@@ -21,15 +21,20 @@ pub const SOURCE: &str = concat!(
 
 /// The compiled stage.
 pub struct Scatter {
-    scatter: Kernel,
+    scatter: Pass,
 }
 
 impl Scatter {
     /// Compiles `source`, [`SOURCE`] but for tests, with a table of sums of so many probes.
     pub fn new(gpu: &Gpu, source: &str, probes: u32) -> Self {
         Self {
-            scatter: super::compiled(gpu, "scatter", source, probes)
-                .reading(&[View, Cells, Lighting, Lists]),
+            scatter: Pass::new(
+                gpu,
+                "scatter",
+                source,
+                probes,
+                &[View, Cells, Lighting, Lists],
+            ),
         }
     }
 
@@ -48,10 +53,7 @@ impl Scatter {
             (4, &entries),
             (5, &lit),
         ];
-        let groups = workgroups(&frame.params);
-        frame
-            .recorder
-            .dispatch_deep(&self.scatter, &buffers, groups);
+        self.scatter.record(frame, &buffers);
         Ok(())
     }
 }

@@ -35,7 +35,7 @@ fn scatter_own(at: u32) {
     let reach = reach_of(place, near.z);
     if (any(reach.low > reach.high)) { return; }
     var color = near.w;
-    if (lighting.mode != LIGHT_OFF) {
+    if (feature(IS_LIT, lighting.mode != LIGHT_OFF)) {
         let radius_px = f32((near.z & RADIUS_BITS) << lists.entry_shift) / f32(SUBPIXELS);
         color = shaded(color, vec2(bitcast<i32>(far.x), bitcast<i32>(far.y)), slice, bitcast<f32>(far.w), radius_px);
     }

@@ -7,14 +7,14 @@
 
 use crate::error::RenderError;
 use crate::frame_context::FrameContext;
-use crate::gpu::{Gpu, Kernel};
+use crate::gpu::Gpu;
+use crate::passes::Pass;
 use crate::passes::store::Stored;
 use crate::stages::bin::params::ListParams;
 use crate::stages::layout::{BEYOND_BIT, RADIUS_BITS, SUBPIXELS, Splat};
 use crate::stages::params::Uniform::{
     Cells, Grid, Lighting, Lists, Particles, Projection, Values, View,
 };
-use crate::stages::sizes::workgroups;
 
 /// The shader.
 pub const SOURCE: &str = concat!(
@@ -37,7 +37,7 @@ pub const SOURCE: &str = concat!(
 
 /// The compiled stage.
 pub struct Splats {
-    splat: Kernel,
+    splat: Pass,
 }
 
 /// A splat as a device stores it: the words of both halves, as `splat.wgsl` writes them.
@@ -61,16 +61,22 @@ impl Splats {
     /// Compiles `source`, [`SOURCE`] but for tests, with a table of sums of so many probes.
     pub fn new(gpu: &Gpu, source: &str, probes: u32) -> Self {
         Self {
-            splat: super::compiled(gpu, "splat", source, probes).reading(&[
-                View, Grid, Values, Cells, Particles, Projection, Lighting, Lists,
-            ]),
+            splat: Pass::new(
+                gpu,
+                "splat",
+                source,
+                probes,
+                &[
+                    View, Grid, Values, Cells, Particles, Projection, Lighting, Lists,
+                ],
+            ),
         }
     }
 
     /// Fills the slots of splats, of light and of list lengths.
     pub fn record(&self, frame: &mut FrameContext<'_>) -> Result<(), RenderError> {
         let stored = Stored::room(frame)?;
-        let scene = &frame.scene;
+        let scene = frame.scene.clone();
         let [before, after] = &scene.value;
         // Bound but never read where nothing is accumulated.
         let [carbon_before, carbon_after] = scene.accumulated.as_ref().unwrap_or(&scene.value);
@@ -86,8 +92,7 @@ impl Splats {
             (13, uncertainty_after),
             (14, &scene.domain),
         ]);
-        let groups = workgroups(&frame.params);
-        frame.recorder.dispatch_deep(&self.splat, &buffers, groups);
+        self.splat.record(frame, &buffers);
         Ok(())
     }
 }

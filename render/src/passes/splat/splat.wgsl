@@ -13,7 +13,7 @@
 
 // Carbon of a cell, counted from the first held; what is missing has accumulated nothing.
 fn carbon_of(cell: u32) -> f32 {
-    if (values.has_accumulated == 0u) { return 0.0; }
+    if (!feature(HAS_ACCUMULATED, values.has_accumulated == 1u)) { return 0.0; }
     let carbon = interpolated(carbon_before[cell], carbon_after[cell], values.accumulated_weight);
     if (is_missing(carbon)) { return 0.0; }
     return carbon;

@@ -5,12 +5,12 @@
 
 use crate::error::RenderError;
 use crate::frame_context::FrameContext;
-use crate::gpu::{Gpu, Kernel, Slot};
+use crate::gpu::{Gpu, Slot};
+use crate::passes::Pass;
 use crate::passes::store::Stored;
 use crate::stages::params::Uniform::{
     Cells, Flow, Grid, Lighting, Lists, Particles, Projection, View,
 };
-use crate::stages::sizes::workgroups;
 
 /// The shader.
 pub const SOURCE: &str = concat!(
@@ -31,16 +31,22 @@ pub const SOURCE: &str = concat!(
 
 /// The compiled pass.
 pub struct Trails {
-    trails: Kernel,
+    trails: Pass,
 }
 
 impl Trails {
     /// Compiles `source`, [`SOURCE`] but for tests, with a table of sums of so many probes.
     pub fn new(gpu: &Gpu, source: &str, probes: u32) -> Self {
         Self {
-            trails: super::compiled(gpu, "trails", source, probes).reading(&[
-                View, Grid, Cells, Particles, Flow, Projection, Lighting, Lists,
-            ]),
+            trails: Pass::new(
+                gpu,
+                "trails",
+                source,
+                probes,
+                &[
+                    View, Grid, Cells, Particles, Flow, Projection, Lighting, Lists,
+                ],
+            ),
         }
     }
 
@@ -49,8 +55,7 @@ impl Trails {
         let velocity = frame.room(Slot::Velocity, 8)?;
         let stored = Stored::room(frame)?;
         let buffers = stored.with([(4, &velocity)]);
-        let groups = workgroups(&frame.params);
-        frame.recorder.dispatch_deep(&self.trails, &buffers, groups);
+        self.trails.record(frame, &buffers);
         Ok(())
     }
 }

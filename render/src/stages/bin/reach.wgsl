@@ -11,7 +11,7 @@ struct Reach { low: vec2<i32>, high: vec2<i32> }
 fn size_word(splat: Splat) -> u32 {
     let radius = max(nearest(splat.radius_px * f32(SUBPIXELS)) >> lists.entry_shift, 1);
     var tau = splat.tau;
-    if (lists.kernel == KERNEL_CLOUD) {
+    if (feature(HAS_CLOUDS, lists.kernel == KERNEL_CLOUD)) {
         // A cloud whose radius was rounded keeps its mass.
         let wider = splat.radius_px / (f32(radius << lists.entry_shift) / f32(SUBPIXELS));
         tau *= wider * wider;

@@ -11,7 +11,7 @@ const HATCH_LINE_PX = 2;
 
 // Colour of water over a sea floor, or over one that is not known.
 fn sea_color(floor: Terrain) -> vec3<f32> {
-    if (context.has_water == 1u) { return vec3(WATER_RED, WATER_GREEN, WATER_BLUE); }
+    if (feature(HAS_WATER, context.has_water == 1u)) { return vec3(WATER_RED, WATER_GREEN, WATER_BLUE); }
     if (!floor.is_known) { return base_map.sea; }
     return mix(base_map.shelf, base_map.deep, clamp(-floor.height_m / base_map.deep_m, 0.0, 1.0));
 }

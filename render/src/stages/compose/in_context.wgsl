@@ -14,6 +14,12 @@ struct ContextParams {
 // Of the whole picture: red lowest, sRGB with straight alpha.
 @group(0) @binding(12) var<storage, read> trails_below: array<u32>;
 
+fn has_surface() -> bool { return feature(HAS_SURFACE, context.surface == 1u); }
+fn has_terrain() -> bool { return feature(HAS_TERRAIN, context.terrain_on == 1u); }
+fn has_coast_above() -> bool { return feature(HAS_COAST_ABOVE, context.coast_above == 1u); }
+fn has_trails() -> bool { return feature(HAS_TRAILS, context.trails_on == 1u); }
+fn land_hides() -> bool { return feature(LAND_HIDES, context.land_hides == 1u); }
+
 // Light on a thematic map where it is night.
 const NIGHT = 0.14;
 
@@ -29,7 +35,7 @@ fn axis_at(place: f32) -> Axis {
 
 fn sun_from(lon: vec2<f32>, lat: vec2<f32>) -> vec3<f32> {
     let sun = view.sun;
-    if (view.sun_is_local == 1u) { return sun; }
+    if (feature(HAS_LOCAL_SUN, view.sun_is_local == 1u)) { return sun; }
     let outward = sun.x * lon.x + sun.y * lon.y;
     return vec3(sun.x * lon.y - sun.y * lon.x, sun.z * lat.y - outward * lat.x, sun.z * lat.x + outward * lat.y);
 }
@@ -85,12 +91,12 @@ fn lit_plain(spot: Spot, floor: Terrain, pixel: vec2<u32>) -> vec3<f32> {
 }
 
 fn ground_color(spot: Spot, pixel: vec2<u32>) -> vec4<f32> {
-    if (context.surface == 0u) { return vec4(0.0); }
+    if (!has_surface()) { return vec4(0.0); }
     var ground: Terrain;
-    if (spot.on_ground && context.terrain_on + context.sea_floor_on > 0u) {
+    if (spot.on_ground && (has_terrain() || feature(HAS_SEA_FLOOR, context.sea_floor_on == 1u))) {
         ground = terrain_at(spot.x, spot.y, spot.cos_lat);
     }
-    if (view.kind == VIEW_TILE) {
+    if (is_tile()) {
         if (!ground.is_known) { return vec4(0.0); }
         return vec4(lit_terrain(ground, spot.sun), 1.0);
     }
@@ -100,7 +106,7 @@ fn ground_color(spot: Spot, pixel: vec2<u32>) -> vec4<f32> {
     var lit: vec3<f32>;
     if (!spot.on_ground) {
         lit = rim(spot.ground);
-    } else if (ground.is_known && context.terrain_on == 1u) {
+    } else if (ground.is_known && has_terrain()) {
         lit = hazy(lit_terrain(ground, spot.sun), spot.ground);
     } else {
         lit = hazy(lit_plain(spot, ground, pixel), spot.ground);
@@ -121,7 +127,7 @@ fn trail_word(pixel: vec2<u32>) -> u32 {
 
 // The trail of a pixel on the sea surface.
 fn trail_color(pixel: vec2<u32>) -> vec4<f32> {
-    if (context.trails_on == 0u) { return vec4(0.0); }
+    if (!has_trails()) { return vec4(0.0); }
     let word = trail_word(pixel);
     return vec4(linear_of(codes_of(word) / 255.0), 1.0) * (f32(word >> 24u) / 255.0);
 }
@@ -130,8 +136,8 @@ fn trail_color(pixel: vec2<u32>) -> vec4<f32> {
 // is scaled hides more of them than it should where it is large.
 fn hidden_share(pixel: vec2<u32>) -> u32 {
     var kept = 255u;
-    if (context.land_hides == 1u) { kept -= land_share(pixel); }
-    if (context.trails_on == 1u) {
+    if (land_hides()) { kept -= land_share(pixel); }
+    if (has_trails()) {
         let clear = 255u - (trail_word(pixel) >> 24u);
         kept = (kept * clear * clear + 32512u) / 65025u;
     }
@@ -147,8 +153,8 @@ fn ground_mask(pixel: vec2<u32>) -> vec4<f32> {
 
 // Coast lines, below them borders; `covered` is how much of what lies below has colours of its own.
 fn coast_color(pixel: vec2<u32>, covered: f32) -> vec4<f32> {
-    if (context.coast_on == 0u) { return vec4(0.0); }
-    if (view.kind == VIEW_GLOBE) {
+    if (!feature(HAS_COAST, context.coast_on == 1u)) { return vec4(0.0); }
+    if (!is_tile()) {
         let mask = ground_mask(pixel);
         let shore = mask.z * mix(context.coast_alpha, base_map.over_coast_alpha, covered);
         let border = mask.w * mix(base_map.border_alpha, base_map.over_border_alpha, covered);
@@ -171,7 +177,7 @@ fn over(line: vec4<f32>, color: vec4<f32>, is_above: bool) -> vec4<f32> {
 struct SurfaceLines { isoline: vec4<f32>, graticule: vec4<f32> }
 
 fn surface_lines(pixel: vec2<u32>, covered: f32) -> SurfaceLines {
-    if (context.lines_on == 0u) { return SurfaceLines(vec4(0.0), vec4(0.0)); }
+    if (!feature(HAS_LINES, context.lines_on == 1u)) { return SurfaceLines(vec4(0.0), vec4(0.0)); }
     let word = lines[pixel.y * view.size_px.x + pixel.x];
     let isoline = vec4(vec3(f32((word >> 12u) & 255u) / 255.0), 1.0) * (f32(word & 4095u) / 4095.0);
     let grey = mix(context.graticule_grey, base_map.over_grey, covered);
@@ -182,7 +188,7 @@ fn surface_lines(pixel: vec2<u32>, covered: f32) -> SurfaceLines {
 fn with_lines(pixel: vec2<u32>, color: vec4<f32>, covered: f32) -> vec4<f32> {
     let own = surface_lines(pixel, covered);
     let shown = over(own.isoline, over(own.isoline * context.isolines_through, color, true), false);
-    return over(own.graticule, shown, context.coast_above == 1u);
+    return over(own.graticule, shown, has_coast_above());
 }
 
 // `is_beside`: it is smoother than bytes, see `bytes_of`.
@@ -190,20 +196,20 @@ struct InContext { color: vec4<f32>, is_beside: bool }
 
 fn in_context(pixel: vec2<u32>, blended: vec4<f32>) -> InContext {
     var spot: Spot;
-    if (view.kind == VIEW_TILE) { spot = spot_on_tile(pixel); } else { spot = spot_on_globe(pixel); }
+    if (is_tile()) { spot = spot_on_tile(pixel); } else { spot = spot_on_globe(pixel); }
     var color = blended;
-    if (context.night_on == 1u) {
+    if (feature(HAS_NIGHT, context.night_on == 1u)) {
         color = vec4(color.xyz * mix(NIGHT, 1.0, smoothstep(-0.15, 0.35, spot.sun.z)), color.w);
     }
     if (is_submerged()) { return InContext(from_below(spot, pixel, color), true); }
-    var covered = f32(context.terrain_on);
-    if (context.coast_above == 1u) { covered = max(covered, color.w); }
+    var covered = f32(has_terrain());
+    if (has_coast_above()) { covered = max(covered, color.w); }
     let trail = trail_color(pixel);
-    if (context.coast_above == 1u) { color = over(trail, color, true); }
+    if (has_coast_above()) { color = over(trail, color, true); }
     color = with_lines(pixel, color, covered);
     let line = coast_color(pixel, covered);
-    color = over(line, color, context.coast_above == 1u);
-    if (context.coast_above == 0u) { color = over(trail, color, false); }
+    color = over(line, color, has_coast_above());
+    if (!has_coast_above()) { color = over(trail, color, false); }
     color += ground_color(spot, pixel) * (1.0 - color.w);
     return InContext(color, spot.cover < 1.0);
 }

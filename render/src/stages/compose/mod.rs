@@ -8,14 +8,13 @@ pub mod in_context;
 pub mod params;
 pub mod terrain;
 
-use std::sync::OnceLock;
-
 use crate::error::RenderError;
 use crate::frame_context::{FrameContext, SceneBuffers};
-use crate::gpu::{Gpu, Kernel, Slot};
+use crate::gpu::{Gpu, Slot};
 use crate::stages::layout::GroundAxis;
 use crate::stages::params::Uniform;
 use crate::stages::params::Uniform::{BaseMap, Context, Grid, TerrainGrid, View};
+use crate::stages::variants::Variants;
 
 /// The function that the eye runs for its own pixels.
 pub const FUNCTIONS: &str = concat!(
@@ -45,25 +44,21 @@ pub const SOURCE: &str = concat!(
 pub(crate) const READS: [Uniform; 5] = [View, Grid, Context, TerrainGrid, BaseMap];
 
 /// The constant of pictures in their surroundings.
-pub(crate) fn in_context(is_wanted: bool) -> (&'static str, f64) {
-    ("IN_CONTEXT", f64::from(u8::from(is_wanted)))
+pub(crate) fn in_context(is_wanted: bool) -> (&'static str, u32) {
+    ("IN_CONTEXT", u32::from(is_wanted))
 }
 
 /// The compiled stage.
 pub struct Compose {
-    source: String,
-    plain: Kernel,
-    /// Compiled when it is first wanted.
-    in_context: OnceLock<Kernel>,
+    compose: Variants,
 }
 
 impl Compose {
     /// Compiles `source`, [`SOURCE`] but for tests.
     pub fn new(gpu: &Gpu, source: &str) -> Self {
         Self {
-            source: source.to_owned(),
-            plain: compiled(gpu, source, false),
-            in_context: OnceLock::new(),
+            compose: Variants::new("compose", source, "compose", &READS)
+                .compiled(gpu, &[in_context(false)]),
         }
     }
 
@@ -72,24 +67,14 @@ impl Compose {
         let picture = frame.room(Slot::Picture, 16)?;
         let image = frame.room(Slot::Image, frame.pixel_count() * 4)?;
         let surroundings = surroundings(frame)?;
-        let kernel = if frame.params.in_context {
-            let compiled = || compiled(frame.gpu, &self.source, true);
-            self.in_context.get_or_init(compiled)
-        } else {
-            &self.plain
-        };
+        let constants = [in_context(frame.params.in_context)];
+        let kernel = self.compose.of(frame.gpu, &constants, frame.features);
         let mut buffers = vec![(1, &picture), (2, &frame.scene.domain), (3, &image)];
         buffers.extend(surroundings.iter().map(|(at, buffer)| (*at, buffer)));
         let groups = frame.params.view.tiles.to_array();
-        frame.recorder.dispatch(kernel, &buffers, groups);
+        frame.recorder.dispatch(&kernel, &buffers, groups);
         Ok(())
     }
-}
-
-fn compiled(gpu: &Gpu, source: &str, is_in_context: bool) -> Kernel {
-    let constants = [in_context(is_in_context)];
-    gpu.variant("compose", source, "compose", &constants)
-        .reading(&READS)
 }
 
 /// What the functions for surroundings read, by their bindings: terrain, ground axes, mask, isolines and trails.

@@ -8,8 +8,9 @@ const LEAST_COS_LAT = 0.02;
 
 fn terrain_cell(row: i32, col: i32) -> f32 {
     let cols = i32(terrain_grid.cols);
-    var x = clamp(col, 0, cols - 1);
-    if (terrain_grid.periodic == 1u) { x = (col % cols + cols) % cols; }
+    var x = col;
+    if (terrain_grid.periodic == 1u) { x = wrapped(col, cols); }
+    x = clamp(x, 0, cols - 1);
     let y = clamp(row, 0, i32(terrain_grid.rows) - 1);
     return terrain[u32(y) * terrain_grid.cols + u32(x)];
 }

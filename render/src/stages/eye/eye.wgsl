@@ -32,7 +32,7 @@ var<workgroup> hidden: array<u32, 64>;
 
 // Is anything that lies beyond the sea surface hidden?
 fn hides_beyond() -> bool {
-    return IN_CONTEXT && context.land_hides + context.trails_on > 0u;
+    return IN_CONTEXT && (land_hides() || has_trails());
 }
 
 // What lies beyond the sea surface lies behind the land, or the trail, that a sight line meets first.
@@ -158,7 +158,7 @@ fn summed(begin: u32, end: u32, pixel: u32) -> vec4<u32> {
 }
 
 fn is_covered(picture: vec4<f32>) -> bool {
-    return view.front_to_back == 1u && picture.w > OPAQUE;
+    return is_front_to_back() && picture.w > OPAQUE;
 }
 
 // Linear light with alpha, premultiplied, once the slice with these sums is blended into it.
@@ -166,7 +166,7 @@ fn blended(picture: vec4<f32>, sums: vec4<u32>) -> vec4<f32> {
     if (sums.w == 0u || is_covered(picture)) { return picture; }
     let alpha = 1.0 - exp(-f32(sums.w) / lists.depth_one);
     let slice = vec4(vec3<f32>(sums.xyz) / (f32(sums.w) * (LIGHT_ONE / 16.0)), 1.0) * alpha;
-    if (view.front_to_back == 1u) { return picture + slice * (1.0 - picture.w); }
+    if (is_front_to_back()) { return picture + slice * (1.0 - picture.w); }
     return picture * (1.0 - alpha) + slice;
 }
 
@@ -188,7 +188,7 @@ fn eye(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(global_invocation_i
         workgroupBarrier();
         // Nothing to look for where nothing is listed.
         let listed = select(looked_up, 0u, ends[0] == ends[looked_up]);
-        let is_worth_asking = view.front_to_back == 1u && ends[looked_up] - ends[0] > WORTH_ASKING;
+        let is_worth_asking = is_front_to_back() && ends[looked_up] - ends[0] > WORTH_ASKING;
         for (var slice = 0u; slice < listed; slice++) {
             let begin = ends[slice];
             let end = ends[slice + 1u];

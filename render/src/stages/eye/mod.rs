@@ -2,11 +2,9 @@
 
 pub mod cpu;
 
-use std::sync::OnceLock;
-
 use crate::error::RenderError;
 use crate::frame_context::FrameContext;
-use crate::gpu::{Gpu, Kernel, Slot};
+use crate::gpu::{Gpu, Slot};
 use crate::stages::compose;
 use crate::stages::layout::{
     KERNEL_BALL, KERNEL_CLOUD, KERNEL_DOT, KERNEL_RIMMED, MOST_HOT_PARTS, NEVER_LONG,
@@ -14,6 +12,7 @@ use crate::stages::layout::{
 };
 use crate::stages::params::Uniform::{Context, Lists, View};
 use crate::stages::sizes::list_count;
+use crate::stages::variants::{Variant, Variants};
 
 /// The shader.
 pub const SOURCE: &str = concat!(
@@ -37,16 +36,18 @@ pub const SHARED: &str = "eye";
 const HOT: &str = "hot";
 /// The one whose pixels work alone; for adapters that are programs.
 pub const ALONE: &str = "alone";
+/// Composes what that has seen.
+const FINISH: &str = "finish";
 
 /// The compiled stage.
 pub struct Eye {
-    source: String,
     entry: &'static str,
-    /// By kind of particle, surroundings and long lists. Those of plain pictures are compiled at once, the others when
-    /// they are first wanted.
-    kernels: [[[OnceLock<Kernel>; 2]; 2]; 4],
-    /// Sum up the parts of long lists: by kind of particle and surroundings.
-    hot: [[OnceLock<Kernel>; 2]; 4],
+    /// Kernels of plain pictures are compiled at once, the others when they are first wanted.
+    eye: Variants,
+    /// Sums up the parts of long lists.
+    hot: Variants,
+    /// Composes what [`ALONE`] has seen.
+    finish: Variants,
 }
 
 /// Workgroups that take the parts of long lists in turn: as many as a large device runs at once.
@@ -73,71 +74,100 @@ impl Eye {
 
     /// Compiles an entry point of `source`, [`SOURCE`] but for tests.
     pub fn of(gpu: &Gpu, source: &str, entry: &'static str) -> Self {
-        let eye = Self {
-            source: source.to_owned(),
+        let composed: Vec<_> = compose::READS.into_iter().chain([Lists]).collect();
+        let hiding = [View, Context, Lists];
+        let reads: &[_] = if entry == ALONE { &hiding } else { &composed };
+        let kinds = [KERNEL_DOT, KERNEL_BALL, KERNEL_CLOUD, KERNEL_RIMMED];
+        let eye = Variants::new("eye", source, entry, reads);
+        Self {
             entry,
-            kernels: Default::default(),
-            hot: Default::default(),
-        };
-        for kind in [KERNEL_DOT, KERNEL_BALL, KERNEL_CLOUD, KERNEL_RIMMED] {
-            eye.kernel(gpu, kind, false, false);
+            eye: kinds.into_iter().fold(eye, |eye, kind| {
+                eye.compiled(gpu, &constants(kind, false, false))
+            }),
+            hot: Variants::new(HOT, source, HOT, &hiding),
+            finish: Variants::new(FINISH, source, FINISH, &compose::READS),
         }
-        eye
     }
 
     /// Fills the slot of the image.
     pub fn record(&self, frame: &mut FrameContext<'_>) -> Result<(), RenderError> {
+        if self.entry == ALONE {
+            self.see(frame)?;
+            return self.finish(frame);
+        }
         let counts = frame.room(Slot::Counts, 4)?;
         let entries = frame.room(Slot::Entries, 4)?;
         let image = frame.room(Slot::Image, frame.pixel_count() * 4)?;
-        let groups = frame.params.view.tiles.to_array();
-        let has_parts = frame.params.lists.long_list != NEVER_LONG && self.entry == SHARED;
-        let mut buffers = vec![
-            (1, counts),
-            (2, entries),
-            (3, frame.scene.domain.clone()),
-            (4, image),
-        ];
-        buffers.extend(compose::surroundings(frame)?);
+        let has_parts = frame.params.lists.long_list != NEVER_LONG;
         if has_parts {
             self.sum_up(frame)?;
         }
-        if self.entry == SHARED {
-            // Bound but never read where no list is cut.
-            let [lists, _parts] = hot_room(frame)?;
-            buffers.extend([(8, lists), (10, frame.room(Slot::HotSums, 4)?)]);
-        }
-        let (kind, in_context) = (frame.params.lists.kernel, frame.params.in_context);
-        let kernel = self.kernel(frame.gpu, kind, in_context, has_parts);
-        let buffers: Vec<_> = buffers.iter().map(|(at, buffer)| (*at, buffer)).collect();
-        frame.recorder.dispatch(kernel, &buffers, groups);
+        // Bound but never read where no list is cut.
+        let [hot_lists, _parts] = hot_room(frame)?;
+        let hot_sums = frame.room(Slot::HotSums, 4)?;
+        let surroundings = compose::surroundings(frame)?;
+        let mut buffers = vec![
+            (1, &counts),
+            (2, &entries),
+            (3, &frame.scene.domain),
+            (4, &image),
+            (8, &hot_lists),
+            (10, &hot_sums),
+        ];
+        buffers.extend(surroundings.iter().map(|(at, buffer)| (*at, buffer)));
+        let kernel = self.kernel(frame, has_parts);
+        let groups = frame.params.view.tiles.to_array();
+        frame.recorder.dispatch(&kernel, &buffers, groups);
         Ok(())
     }
 
-    /// The kernel of a picture, compiled if it is the first of its kind.
-    fn kernel(&self, gpu: &Gpu, kind: u32, in_context: bool, has_parts: bool) -> &Kernel {
-        let of_kind = &self.kernels[kind as usize];
-        of_kind[usize::from(in_context)][usize::from(has_parts)].get_or_init(|| {
-            let constants = [
-                ("KERNEL", f64::from(kind)),
-                compose::in_context(in_context),
-                ("HAS_PARTS", f64::from(u8::from(has_parts))),
-            ];
-            let reads: Vec<_> = compose::READS.into_iter().chain([Lists]).collect();
-            gpu.variant("eye", &self.source, self.entry, &constants)
-                .reading(&reads)
-        })
+    /// Fills the slot of the picture.
+    fn see(&self, frame: &mut FrameContext<'_>) -> Result<(), RenderError> {
+        let counts = frame.room(Slot::Counts, 4)?;
+        let entries = frame.room(Slot::Entries, 4)?;
+        let picture = frame.room(Slot::Picture, frame.pixel_count() * 16)?;
+        let [_, _, (coast_at, coast), _, (trails_at, trails)] = compose::surroundings(frame)?;
+        let buffers = [
+            (1, &counts),
+            (2, &entries),
+            (coast_at, &coast),
+            (trails_at, &trails),
+            (13, &picture),
+        ];
+        let kernel = self.kernel(frame, false);
+        let groups = frame.params.view.tiles.to_array();
+        frame.recorder.dispatch(&kernel, &buffers, groups);
+        Ok(())
+    }
+
+    /// Fills the slot of the image from that of the picture.
+    fn finish(&self, frame: &mut FrameContext<'_>) -> Result<(), RenderError> {
+        let picture = frame.room(Slot::Picture, 16)?;
+        let image = frame.room(Slot::Image, frame.pixel_count() * 4)?;
+        let surroundings = compose::surroundings(frame)?;
+        let mut buffers = vec![(3, &frame.scene.domain), (4, &image), (13, &picture)];
+        buffers.extend(surroundings.iter().map(|(at, buffer)| (*at, buffer)));
+        let constants = [compose::in_context(frame.params.in_context)];
+        let kernel = self.finish.of(frame.gpu, &constants, frame.features);
+        let groups = frame.params.view.tiles.to_array();
+        frame.recorder.dispatch(&kernel, &buffers, groups);
+        Ok(())
+    }
+
+    fn kernel(&self, frame: &FrameContext<'_>, has_parts: bool) -> Variant {
+        let params = &frame.params;
+        let constants = constants(params.lists.kernel, params.in_context, has_parts);
+        self.eye.of(frame.gpu, &constants, frame.features)
     }
 
     /// Sums up the parts of long lists.
     fn sum_up(&self, frame: &mut FrameContext<'_>) -> Result<(), RenderError> {
-        let gpu = frame.gpu;
-        let (kind, in_context) = (frame.params.lists.kernel, frame.params.in_context);
-        let constants = [("KERNEL", f64::from(kind)), compose::in_context(in_context)];
-        let kernel = self.hot[kind as usize][usize::from(in_context)].get_or_init(|| {
-            gpu.variant(HOT, &self.source, HOT, &constants)
-                .reading(&[View, Context, Lists])
-        });
+        let params = &frame.params;
+        let constants = [
+            ("KERNEL", params.lists.kernel),
+            compose::in_context(params.in_context),
+        ];
+        let kernel = self.hot.of(frame.gpu, &constants, frame.features);
         let [
             _terrain,
             _axes,
@@ -159,7 +189,16 @@ impl Eye {
             (9, &parts),
             (10, &sums),
         ];
-        frame.recorder.dispatch(kernel, &buffers, [HOT_GROUPS, 1]);
+        frame.recorder.dispatch(&kernel, &buffers, [HOT_GROUPS, 1]);
         Ok(())
     }
+}
+
+/// Values of the override constants: the kind of particle, surroundings, long lists.
+fn constants(kind: u32, in_context: bool, has_parts: bool) -> [(&'static str, u32); 3] {
+    [
+        ("KERNEL", kind),
+        compose::in_context(in_context),
+        ("HAS_PARTS", u32::from(has_parts)),
+    ]
 }

@@ -89,7 +89,7 @@ fn dot_share(age: f32) -> f32 {
 fn dot_of(row: u32, slot: u32, number: u32, trail: Trail, speed: f32) -> Particle {
     let at = clamp(i32(row) + i32(floor(trail.place.y)), 0, i32(grid.rows) - 1);
     let taper = f32(number + 1u) / f32(cells.particles_each);
-    let position = place_in_range(speed, flow.transfer_low, flow.transfer_per_unit, flow.is_log);
+    let position = place_in_range(speed, flow.transfer_low, flow.transfer_per_unit, flow.is_log == 1u);
     // A trail grows out of nothing, so that its dots are as dense at any age.
     let alive = min(trail.age / TRAIL, 1.0) * clamp((1.0 - trail.age) * FADING, 0.0, 1.0);
     var particle: Particle;

@@ -113,7 +113,7 @@ fn draw_lines(@builtin(global_invocation_id) pixel: vec3<u32>) {
     if (any(pixel.xy >= view.size_px)) { return; }
     let at = pixel.y * view.size_px.x + pixel.x;
     lines[at] = 0u;
-    if (view.kind == VIEW_TILE) {
+    if (is_tile()) {
         let field = field_at(axes[pixel.x], axes[view.size_px.x + pixel.y]);
         let slope = slope_on_tile(per_rad_of(field), ground_axes[view.size_px.x + pixel.y].cos);
         if (field.weight > 0.0) { lines[at] = line_of(field, slope, 1.0); }

@@ -4,12 +4,11 @@
 pub mod cpu;
 pub mod params;
 
-use std::sync::OnceLock;
-
 use crate::error::RenderError;
 use crate::frame_context::FrameContext;
-use crate::gpu::{Gpu, Kernel, Slot};
+use crate::gpu::Slot;
 use crate::stages::params::Uniform::{Grid, Isolines as Own, Values, View};
+use crate::stages::variants::Variants;
 
 /// The shader.
 pub const SOURCE: &str = concat!(
@@ -23,16 +22,14 @@ pub const SOURCE: &str = concat!(
 
 /// The stage, compiled when it is first wanted.
 pub struct Isolines {
-    source: String,
-    kernel: OnceLock<Kernel>,
+    lines: Variants,
 }
 
 impl Isolines {
     /// Of `source`, [`SOURCE`] but for tests.
     pub fn new(source: &str) -> Self {
         Self {
-            source: source.to_owned(),
-            kernel: OnceLock::new(),
+            lines: Variants::new("isolines", source, "draw_lines", &[View, Grid, Values, Own]),
         }
     }
 
@@ -54,11 +51,7 @@ impl Isolines {
         };
         let levels = frame.upload(Slot::IsolineLevels, &plan.isolines)?;
         let lines = frame.room(Slot::Isolines, frame.pixel_count() * 4)?;
-        let gpu: &Gpu = frame.gpu;
-        let kernel = self.kernel.get_or_init(|| {
-            gpu.kernel("isolines", &self.source, "draw_lines")
-                .reading(&[View, Grid, Values, Own])
-        });
+        let kernel = self.lines.of(frame.gpu, &[], frame.features);
         let buffers = [
             (1, &before),
             (2, &after),
@@ -69,7 +62,7 @@ impl Isolines {
             (7, &lines),
         ];
         let groups = frame.params.view.tiles.to_array();
-        frame.recorder.dispatch(kernel, &buffers, groups);
+        frame.recorder.dispatch(&kernel, &buffers, groups);
         Ok(())
     }
 }

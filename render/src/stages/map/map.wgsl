@@ -40,13 +40,13 @@ fn color_at(x: Axis, y: Axis, pixel: vec2<u32>) -> vec4<f32> {
     // Half the weight on data: the edge of the data runs between cell centres, one pixel soft.
     var alpha = thematic.alpha * clamp((value.y - 0.5) * thematic.edge_sharpness + 0.5, 0.0, 1.0);
     if (alpha <= 0.0 || value.z <= 0.0) { return vec4(0.0); }
-    if (values.has_coverage == 1u) { alpha *= value.z / value.y; }
-    let position = place_in_range(value.x / value.z, values.transfer_low, values.transfer_per_unit, values.is_log);
+    if (feature(HAS_COVERAGE, values.has_coverage == 1u)) { alpha *= value.z / value.y; }
+    let position = place_in_range(value.x / value.z, values.transfer_low, values.transfer_per_unit, feature(IS_LOG, values.is_log == 1u));
     let at = u32(nearest(position * 255.0));
-    if (values.has_shape == 1u) { alpha *= f32(palette[256u + at] & 0xffffu) / 65535.0; }
+    if (feature(HAS_SHAPE, values.has_shape == 1u)) { alpha *= f32(palette[256u + at] & 0xffffu) / 65535.0; }
     let color = palette[at];
     var rgb = vec3(f32(color & 255u), f32((color >> 8u) & 255u), f32((color >> 16u) & 255u)) / 255.0;
-    if (values.has_uncertainty == 1u) { rgb = hatched(rgb, uncertainty_at(x, y), pixel); }
+    if (feature(HAS_UNCERTAINTY, values.has_uncertainty == 1u)) { rgb = hatched(rgb, uncertainty_at(x, y), pixel); }
     return vec4(linear_of(rgb), 1.0) * alpha;
 }
 
@@ -54,7 +54,7 @@ fn color_at(x: Axis, y: Axis, pixel: vec2<u32>) -> vec4<f32> {
 fn map(@builtin(global_invocation_id) pixel: vec3<u32>) {
     if (any(pixel.xy >= view.size_px)) { return; }
     let at = pixel.y * view.size_px.x + pixel.x;
-    if (view.kind == VIEW_TILE) {
+    if (is_tile()) {
         picture[at] = color_at(axes[pixel.x], axes[view.size_px.x + pixel.y], pixel.xy);
         return;
     }

@@ -5,9 +5,10 @@ pub mod params;
 
 use crate::error::RenderError;
 use crate::frame_context::FrameContext;
-use crate::gpu::{Gpu, Kernel, Slot};
+use crate::gpu::{Gpu, Slot};
 use crate::stages::layout::Axis;
 use crate::stages::params::Uniform::{Grid, Thematic, Values, View};
+use crate::stages::variants::Variants;
 
 /// The shader.
 pub const SOURCE: &str = concat!(
@@ -21,16 +22,15 @@ pub const SOURCE: &str = concat!(
 
 /// The compiled stage.
 pub struct Map {
-    map: Kernel,
+    map: Variants,
 }
 
 impl Map {
     /// Compiles `source`, [`SOURCE`] but for tests.
     pub fn new(gpu: &Gpu, source: &str) -> Self {
         Self {
-            map: gpu
-                .kernel("map", source, "map")
-                .reading(&[View, Grid, Values, Thematic]),
+            map: Variants::new("map", source, "map", &[View, Grid, Values, Thematic])
+                .compiled(gpu, &[]),
         }
     }
 
@@ -61,7 +61,8 @@ impl Map {
             (7, &scene.domain),
         ];
         let groups = frame.params.view.tiles.to_array();
-        frame.recorder.dispatch(&self.map, &buffers, groups);
+        let map = self.map.of(frame.gpu, &[], frame.features);
+        frame.recorder.dispatch(&map, &buffers, groups);
         Ok(())
     }
 }

@@ -31,7 +31,7 @@ fn envelope(phase: f32) -> f32 {
 }
 
 fn strength_of(value: f32, position: f32) -> f32 {
-    if (particles.diverging == 0u) { return position; }
+    if (!feature(IS_DIVERGING, particles.diverging == 1u)) { return position; }
     return clamp(abs(value) * particles.strength_per_unit, 0.0, 1.0);
 }
 
@@ -60,21 +60,21 @@ fn particle_of(row: u32, slot: u32, k: u32, value: f32, carbon: f32) -> Particle
     particle.south = unit(place.y + jittered(hash(bits)));
     let phase = fract(unit(start + (hash(bits ^ 0x85ebca6bu) >> 3u)) + particles.turns_per_kg_m2 * abs(carbon));
     let column_m = clamp(carbon * particles.height_m_per_kg_m2, -particles.height_limit_m, particles.height_limit_m);
-    let position = place_in_range(value, values.transfer_low, values.transfer_per_unit, values.is_log);
+    let position = place_in_range(value, values.transfer_low, values.transfer_per_unit, feature(IS_LOG, values.is_log == 1u));
     let strength = strength_of(value, position);
     particle.height_m = column_m * phase + particles.sheet_m * (phase - 0.5);
     particle.mass_kg = carbon * rows[row].area_m2 / cells.particle_shares;
     let at = u32(nearest(position * 255.0));
     var opacity = particles.depth_floor + (1.0 - particles.depth_floor) * sqrt(strength);
     var size = u32(nearest(strength * 255.0));
-    if (values.has_shape == 1u) {
+    if (feature(HAS_SHAPE, values.has_shape == 1u)) {
         let shape = palette[256u + at];
         opacity = f32(shape & 0xffffu) / 65535.0;
         size = shape >> 16u;
     }
     particle.depth = particles.optical_depth * opacity * envelope(phase);
     particle.color = palette[at] | (size << 24u);
-    if (particles.sea_per_m > 0.0 && particle.height_m < 0.0) {
+    if (feature(HAS_SEA_DEPTH, particles.sea_per_m > 0.0) && particle.height_m < 0.0) {
         particle.color = through_water(particle.color, -particle.height_m);
     }
     return particle;

@@ -85,7 +85,7 @@ fn on_tile(particle: Particle) -> Splat {
     splat.light_depth = splat.tau * splat.radius_px * splat.radius_px * projection.light_depth_gain;
     splat.slice = slice_of(particle.height_m);
     splat.day = 1.0;
-    if (projection.day_on == 1u) { splat.day = day_at(normal_of(particle)); }
+    if (feature(HAS_DAY, projection.day_on == 1u)) { splat.day = day_at(normal_of(particle)); }
     splat.color = particle.color | UNDIMMED;
     splat.is_beyond = u32(-particle.height_m > projection.beyond_m);
     return splat;
@@ -129,11 +129,11 @@ fn on_globe(particle: Particle) -> Splat {
     splat.radius_px = max(radius_px, projection.min_radius_px);
     let thinned = full_px / splat.radius_px;
     splat.tau = particle.depth * row.depth_gain * thinned * thinned;
-    splat.is_beyond = u32(select(-particle.height_m, particle.height_m, view.hides < 1.0) > projection.beyond_m);
+    splat.is_beyond = u32(select(-particle.height_m, particle.height_m, is_submerged()) > projection.beyond_m);
     return splat;
 }
 
 fn splat_of(particle: Particle) -> Splat {
-    if (view.kind == VIEW_TILE) { return on_tile(particle); }
+    if (is_tile()) { return on_tile(particle); }
     return on_globe(particle);
 }
