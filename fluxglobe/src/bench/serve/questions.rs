@@ -1,37 +1,15 @@
 //! What is asked: globe views or tiles of one product, each at an instant of its own.
 
-use anyhow::{Context as _, Result, ensure};
+use anyhow::{Result, ensure};
 use contract::tile::Tile;
-use contract::time::TimeMs;
-use serde::Deserialize;
 
+use crate::bench::listed::{Listed, Span, listed};
 use crate::cli::BenchServe;
 
 /// Pixels a side of a tile.
 const TILE_PX: u32 = 256;
 /// Fraction of the golden section, in units of 2^-64: its multiples fill an interval evenly, none twice.
 const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
-
-/// The product asked about, as `/api/products` describes it.
-#[derive(Debug, Deserialize)]
-struct Listed {
-    product: String,
-    /// West, south, east, north, degrees.
-    bounds_deg: [f64; 4],
-    steps: Vec<Step>,
-    modes: Vec<String>,
-}
-
-#[derive(Debug, Deserialize)]
-struct Products {
-    products: Vec<Listed>,
-}
-
-#[derive(Debug, Deserialize)]
-struct Step {
-    start: TimeMs,
-    end: TimeMs,
-}
 
 /// Addresses by number.
 pub(super) struct Questions {
@@ -40,8 +18,7 @@ pub(super) struct Questions {
     pub(super) size_px: [u32; 2],
     /// Addresses without their instant.
     places: Vec<String>,
-    first_ms: i64,
-    span_ms: u64,
+    span: Span,
     /// Where in the span the first instant lies, in units of 2^-64: another place in every run.
     seed: u64,
 }
@@ -49,10 +26,8 @@ pub(super) struct Questions {
 impl Questions {
     /// Reads what the server has.
     pub(super) async fn of(client: &reqwest::Client, options: &BenchServe) -> Result<Self> {
-        let address = format!("{}/api/products", options.url);
-        let answer = client.get(&address).send().await?.error_for_status()?;
-        let Products { products } = serde_json::from_slice(&answer.bytes().await?)?;
-        let product = chosen(products, options)?;
+        let mode = options.mode;
+        let product = listed(client, &options.url, options.layer.as_ref(), mode).await?;
         let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH)?;
         Self::about(
             &product,
@@ -62,10 +37,6 @@ impl Questions {
     }
 
     fn about(product: &Listed, options: &BenchServe, seed: u64) -> Result<Self> {
-        let first = product.steps.first().context("the product has no steps")?;
-        let last = product.steps.last().context("the product has no steps")?;
-        let span_ms = last.end.ms() - first.start.ms();
-        let span_ms = u64::try_from(span_ms).context("the product ends before it begins")?;
         let places = match options.tiles {
             Some(zoom) => tiles(product, options, zoom)?,
             None => vec![view(product, options)],
@@ -77,8 +48,7 @@ impl Questions {
                 None => [options.width, options.height],
             },
             places,
-            first_ms: first.start.ms(),
-            span_ms,
+            span: product.span()?,
             seed,
         })
     }
@@ -86,32 +56,10 @@ impl Questions {
     /// The address of a picture that nobody asked for before.
     pub(super) fn address(&self, number: u64) -> String {
         let place = &self.places[(number % self.places.len() as u64) as usize];
-        let share = u128::from(number.wrapping_mul(GOLDEN).wrapping_add(self.seed));
-        let after_ms = (share * u128::from(self.span_ms)) >> 64;
-        let time = TimeMs::new(self.first_ms + after_ms as i64);
-        let time = time.map_or_else(|_beyond| String::new(), |time| time.to_string());
+        let share = number.wrapping_mul(GOLDEN).wrapping_add(self.seed);
+        let time = self.span.at_share(share);
         format!("{place}time={time}")
     }
-}
-
-fn chosen(products: Vec<Listed>, options: &BenchServe) -> Result<Listed> {
-    let mode = &options.mode.to_string();
-    let names: Vec<String> = products.iter().map(|one| one.product.clone()).collect();
-    let mut those = products.into_iter().filter(|one| one.modes.contains(mode));
-    let found = match &options.layer {
-        Some(layer) => those.find(|one| one.product == layer.to_string()),
-        None => those.next(),
-    };
-    found.with_context(|| {
-        let wanted = options.layer.as_ref();
-        let wanted = wanted.map_or("no product".to_owned(), |layer| {
-            format!("no product {layer}")
-        });
-        format!(
-            "{wanted} is there in the mode {mode}; there are {}",
-            names.join(", ")
-        )
-    })
 }
 
 fn view(product: &Listed, options: &BenchServe) -> String {
@@ -164,20 +112,12 @@ mod tests {
     use clap::Parser as _;
 
     use super::*;
+    use crate::bench::listed::tests::product;
 
     #[derive(clap::Parser)]
     struct Program {
         #[command(flatten)]
         options: BenchServe,
-    }
-
-    fn product() -> Listed {
-        serde_json::from_str(
-            r#"{"product": "p", "bounds_deg": [100, 0, 130, 40], "modes": ["map", "volume"],
-                "steps": [{"start": "2000-01-01T00:00:00Z", "end": "2000-02-01T00:00:00Z"},
-                          {"start": "2000-02-01T00:00:00Z", "end": "2000-03-01T00:00:00Z"}]}"#,
-        )
-        .unwrap()
     }
 
     fn options(words: &[&str]) -> BenchServe {
@@ -224,18 +164,5 @@ mod tests {
         // 90 to 135 E is column 6; the equator to 40.98 N is row 3.
         assert_eq!(tiles.places.len(), 1);
         assert!(tiles.address(7).contains("/tiles/p/volume/3/6/3.png?time="));
-    }
-
-    #[test]
-    fn a_product_that_is_not_there_is_told_with_those_that_are() {
-        let words = ["--layer", "q"];
-        let error = chosen(vec![product()], &options(&words)).unwrap_err();
-        assert!(
-            error.to_string().contains("no product q is there"),
-            "{error}"
-        );
-        assert!(error.to_string().contains("there are p"), "{error}");
-        assert!(chosen(vec![product()], &options(&["--mode", "flow"])).is_err());
-        assert_eq!(chosen(vec![product()], &options(&[])).unwrap().product, "p");
     }
 }
