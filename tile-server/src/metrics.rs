@@ -65,6 +65,10 @@ pub struct Metrics {
     pub draw_duration_s: HistogramVec,
     /// Time a picture waited for its turn.
     pub draw_wait_s: Histogram,
+    /// Time to look for a picture in the store.
+    pub look_up_s: Histogram,
+    /// Time from the beginning of an answer until its last byte was taken by the connection, by route.
+    pub send_duration_s: HistogramVec,
     /// Requests sent away because too many waited.
     pub refused: IntCounter,
     /// Failed reads of the store.
@@ -112,6 +116,16 @@ impl Metrics {
             "Time a picture waited for its turn.",
             &DRAW_BOUNDS_S,
         );
+        let look_ups_s = timed(
+            "look_up_seconds",
+            "Time to look for a picture in the store.",
+            &DRAW_BOUNDS_S,
+        );
+        let sends_s = timed(
+            "send_seconds",
+            "Time from the beginning of an answer until its connection took the last byte.",
+            &REQUEST_BOUNDS_S,
+        );
         Ok(Self {
             requests: counters(
                 "requests_total",
@@ -134,6 +148,8 @@ impl Metrics {
             drawn: counters("drawn_total", "Pictures drawn.", &["mode", "outcome"])?,
             draw_duration_s: registered(registry, HistogramVec::new(draws_s, &["mode"])?)?,
             draw_wait_s: registered(registry, Histogram::with_opts(waits_s)?)?,
+            look_up_s: registered(registry, Histogram::with_opts(look_ups_s)?)?,
+            send_duration_s: registered(registry, HistogramVec::new(sends_s, &["operation"])?)?,
             refused: counter(
                 "refused_total",
                 "Requests sent away because too many waited.",

@@ -169,7 +169,10 @@ impl Maker {
     }
 
     async fn stored(&self, key: &ObjectKey) -> Result<Option<Bytes>, StoreAway> {
+        let asked_at = Instant::now();
         let looked = tokio::time::timeout(STORE_LIMIT, self.store.get(key)).await;
+        let took_s = asked_at.elapsed().as_secs_f64();
+        self.metrics.look_up_s.observe(took_s);
         let error = match looked {
             Ok(Ok(picture)) => return Ok(Some(picture)),
             Ok(Err(error)) if error.is_not_found() => return Ok(None),

@@ -11,6 +11,7 @@ use contract::time::TimeMs;
 use render_worker::fleet::WorkerAddress;
 
 use super::RenderGlobe;
+use crate::bench::serve::WindowSize;
 
 /// `fluxglobe render animation`.
 #[derive(Debug, Args)]
@@ -152,6 +153,23 @@ pub(crate) enum QualityScenes {
 
 /// `fluxglobe bench serve`.
 #[derive(Debug, Args)]
+#[command(after_long_help = "\
+Three kinds of clients:
+  new pictures (the usual)  each asks for an instant that nobody asked about, so that every answer is drawn
+  --warm                    each asks for pictures of a set that was drawn before; answers must be the bytes of the first one
+  --playback                each watches a window of map tiles and asks for the next instant when it has the last one whole
+                            and its period has passed; six requests of a viewer at once, as browsers do
+
+A client that is told to come again (503 with Retry-After) waits for so long and asks again; that is counted, and its time is
+in the time of the answer. Anything else that is no whole picture of the size makes this fail.
+
+Shares of stages, memory and processor time are what the server's /metrics grew by while answers were counted, of those
+stages that it measures. Of a cluster name the render workers too: --figures http://HOST:9104,http://HOST2:9104
+
+  fluxglobe bench serve --clients 16 --seconds 12                            views of the globe
+  fluxglobe bench serve --tiles 3 --clients 8                                volume tiles of new instants
+  fluxglobe bench serve --warm --tiles 3 --clients 64                        tiles that are drawn already
+  fluxglobe bench serve --playback --seconds 600 --warm-up-seconds 30        two hundred viewers for ten minutes")]
 pub(crate) struct BenchServe {
     /// Address of the server.
     #[arg(long, default_value = "http://127.0.0.1:8080")]
@@ -162,18 +180,43 @@ pub(crate) struct BenchServe {
     /// How it is drawn.
     #[arg(long, default_value = "volume")]
     pub(crate) mode: Mode,
-    /// Clients that ask at the same time, each for the next picture as soon as it has the last, 1 to 1024.
-    #[arg(long, default_value = "16", value_parser = clients)]
-    pub(crate) clients: NonZeroU16,
+    /// Ask for pictures that are drawn already.
+    #[arg(long, conflicts_with = "playback")]
+    pub(crate) warm: bool,
+    /// Pictures of that set, which must fit into the server's memory for pictures.
+    #[arg(long, default_value = "64", value_name = "COUNT")]
+    pub(crate) set: NonZeroU16,
+    /// Watch windows of map tiles while time runs.
+    #[arg(long)]
+    pub(crate) playback: bool,
+    /// Size of a viewer's window, tiles; every fourth viewer looks at the window of the one before him.
+    #[arg(long, default_value = "4x3", value_name = "COLUMNSxROWS")]
+    pub(crate) window: WindowSize,
+    /// How long a viewer looks at an instant at least, seconds.
+    #[arg(long, default_value_t = 1.0, value_name = "SECONDS")]
+    pub(crate) period_s: f64,
+    /// From one instant to the next, days of the product's time.
+    #[arg(long, default_value_t = 1.0, value_name = "DAYS")]
+    pub(crate) days_per_period: f64,
+    /// The viewers' first instants are spread over so many days; with 0 all look at the same ones.
+    #[arg(long, default_value_t = 0.0, value_name = "DAYS")]
+    pub(crate) apart_days: f64,
+    /// Clients that ask at the same time, each for the next picture when it has the last, 1 to 1024; 200 viewers, else 16
+    /// clients, if absent.
+    #[arg(long, value_name = "COUNT", value_parser = clients)]
+    clients: Option<NonZeroU16>,
     /// How long answers are counted.
     #[arg(long, default_value = "20")]
     pub(crate) seconds: NonZeroU16,
     /// How long is asked before that, so that frames are read and kernels compiled.
     #[arg(long, default_value_t = 3)]
     pub(crate) warm_up_seconds: u16,
-    /// Tiles of this zoom level instead of views of the globe, 0 to 8.
+    /// Tiles of this zoom level instead of views of the globe, 0 to 8; 4 for --playback if absent.
     #[arg(long, value_name = "ZOOM", value_parser = value_parser!(u8).range(0..=8))]
     pub(crate) tiles: Option<u8>,
+    /// More processes to watch, those of render workers: where their /metrics are.
+    #[arg(long, value_delimiter = ',', value_name = "URLS")]
+    pub(crate) figures: Vec<String>,
     /// Width of a view, pixels.
     #[arg(long, default_value_t = 1920, value_parser = value_parser!(u32).range(1..=4096))]
     pub(crate) width: u32,
@@ -195,6 +238,21 @@ pub(crate) struct BenchServe {
     /// JSON instead of a table.
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+impl BenchServe {
+    /// How many clients there are.
+    pub(crate) fn clients(&self) -> NonZeroU16 {
+        let usual = if self.playback { 200 } else { 16 };
+        self.clients
+            .or(NonZeroU16::new(usual))
+            .unwrap_or(NonZeroU16::MIN)
+    }
+
+    /// Zoom level of viewers' tiles.
+    pub(crate) fn zoom(&self) -> u8 {
+        self.tiles.unwrap_or(4)
+    }
 }
 
 /// `fluxglobe bench fly`.

@@ -10,7 +10,7 @@ use axum::http::{Method, StatusCode};
 use axum::middleware::Next;
 use axum::response::Response;
 use http_body::{Frame, SizeHint};
-use prometheus::{IntCounter, IntGauge};
+use prometheus::{Histogram, IntCounter, IntGauge};
 
 use crate::state::AppState;
 
@@ -66,19 +66,37 @@ pub(crate) async fn count(State(state): State<AppState>, request: Request, next:
         "{method} {status}"
     );
     let bytes = metrics.sent_bytes.with_label_values(&[&route]);
+    let sending = Sending {
+        begun: Instant::now(),
+        duration_s: metrics.send_duration_s.with_label_values(&[&route]),
+    };
     response.map(|body| {
         Body::new(Sent {
             body,
             bytes,
+            _sending: sending,
             _under_way: under_way,
         })
     })
+}
+
+/// An answer on its way; timed until its body is dropped, which is when its connection has taken the last byte or is gone.
+struct Sending {
+    begun: Instant,
+    duration_s: Histogram,
+}
+
+impl Drop for Sending {
+    fn drop(&mut self) {
+        self.duration_s.observe(self.begun.elapsed().as_secs_f64());
+    }
 }
 
 /// A body that counts its bytes as they go; the request is under way until the last one is gone.
 struct Sent {
     body: Body,
     bytes: IntCounter,
+    _sending: Sending,
     _under_way: UnderWay,
 }
 

@@ -3,17 +3,16 @@
 use anyhow::{Result, ensure};
 use contract::tile::Tile;
 
-use crate::bench::listed::{Listed, Span, listed};
+use crate::bench::listed::{Listed, Span};
 use crate::cli::BenchServe;
 
 /// Pixels a side of a tile.
-const TILE_PX: u32 = 256;
+pub(super) const TILE_PX: u32 = 256;
 /// Fraction of the golden section, in units of 2^-64: its multiples fill an interval evenly, none twice.
-const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
+pub(super) const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
 
 /// Addresses by number.
 pub(super) struct Questions {
-    pub(super) product: String,
     /// What the answers must measure, pixels.
     pub(super) size_px: [u32; 2],
     /// Addresses without their instant.
@@ -24,25 +23,16 @@ pub(super) struct Questions {
 }
 
 impl Questions {
-    /// Reads what the server has.
-    pub(super) async fn of(client: &reqwest::Client, options: &BenchServe) -> Result<Self> {
-        let mode = options.mode;
-        let product = listed(client, &options.url, options.layer.as_ref(), mode).await?;
-        let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH)?;
-        Self::about(
-            &product,
-            options,
-            (now.as_nanos() as u64).wrapping_mul(GOLDEN),
-        )
-    }
-
-    fn about(product: &Listed, options: &BenchServe, seed: u64) -> Result<Self> {
+    /// `seed` is another one in every run.
+    pub(super) fn about(product: &Listed, options: &BenchServe, seed: u64) -> Result<Self> {
         let places = match options.tiles {
-            Some(zoom) => tiles(product, options, zoom)?,
+            Some(zoom) => tiles_on(product, zoom)?
+                .into_iter()
+                .map(|tile| tile_address(product, options, tile))
+                .collect(),
             None => vec![view(product, options)],
         };
         Ok(Self {
-            product: product.product.clone(),
             size_px: match options.tiles {
                 Some(_zoom) => [TILE_PX, TILE_PX],
                 None => [options.width, options.height],
@@ -78,24 +68,30 @@ fn view(product: &Listed, options: &BenchServe) -> String {
 }
 
 /// The tiles of a zoom level that lie on the product.
-fn tiles(product: &Listed, options: &BenchServe, zoom: u8) -> Result<Vec<String>> {
+pub(super) fn tiles_on(product: &Listed, zoom: u8) -> Result<Vec<Tile>> {
     let side = 1u32 << zoom;
-    let mut places = vec![];
+    let mut tiles = vec![];
     for (y, x) in (0..side).flat_map(|y| (0..side).map(move |x| (y, x))) {
         let tile = Tile::new(zoom, x, y)?;
         if overlap(tile.bounds_deg(), product.bounds_deg) {
-            places.push(format!(
-                "{}/tiles/{}/{}/{zoom}/{x}/{y}.png?",
-                options.url, product.product, options.mode
-            ));
+            tiles.push(tile);
         }
     }
     ensure!(
-        !places.is_empty(),
+        !tiles.is_empty(),
         "no tile of zoom {zoom} lies on {}",
         product.product
     );
-    Ok(places)
+    Ok(tiles)
+}
+
+/// The address of a tile without its instant.
+pub(super) fn tile_address(product: &Listed, options: &BenchServe, tile: Tile) -> String {
+    let (Tile { z, x, y }, mode) = (tile, options.mode);
+    format!(
+        "{}/tiles/{}/{mode}/{z}/{x}/{y}.png?",
+        options.url, product.product
+    )
 }
 
 /// Do two boxes of west, south, east and north share an area, one of them perhaps a turn further east?
