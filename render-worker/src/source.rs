@@ -193,19 +193,15 @@ impl Source {
     /// The scene of a job without its trails.
     async fn scene_alone(&self, job: &RenderJob, wanted: Wanted) -> Result<Scene, DrawError> {
         let grid = &job.grid;
-        let (domain, value) = self.interval(grid, &job.value, wanted).await?;
-        let accumulated = match &job.accumulated {
-            Some(carbon) => Some(self.interval(grid, carbon, wanted).await?.1),
-            None => None,
-        };
-        let northward = match &job.flow {
-            Some(flow) => Some(self.interval(grid, &flow.northward, wanted).await?.1),
-            None => None,
-        };
-        let terrain = match &job.relief {
-            Some(relief) => Some(self.terrain(relief).await?),
-            None => None,
-        };
+        let other = |sample| self.other_interval(grid, sample, wanted);
+        let northward = job.flow.as_ref().map(|flow| &flow.northward);
+        // All at once: a store that is far away is waited for once.
+        let ((domain, value), accumulated, northward, terrain) = tokio::try_join!(
+            self.interval(grid, &job.value, wanted),
+            other(job.accumulated.as_ref()),
+            other(northward),
+            self.any_terrain(job.relief.as_ref()),
+        )?;
         Ok(Scene {
             grid: *grid,
             domain,
@@ -215,6 +211,27 @@ impl Source {
             northward,
             trails: None,
         })
+    }
+
+    /// The frames around a sample, if there is one.
+    async fn other_interval(
+        &self,
+        grid: &Grid,
+        sample: Option<&TimeSample>,
+        wanted: Wanted,
+    ) -> Result<Option<Interval>, DrawError> {
+        let Some(sample) = sample else {
+            return Ok(None);
+        };
+        let (_domain, interval) = self.interval(grid, sample, wanted).await?;
+        Ok(Some(interval))
+    }
+
+    async fn any_terrain(&self, relief: Option<&Relief>) -> Result<Option<Terrain>, DrawError> {
+        match relief {
+            Some(relief) => self.terrain(relief).await.map(Some),
+            None => Ok(None),
+        }
     }
 
     /// The frame of a relief, as it is stored: what is missing stays so.
@@ -254,29 +271,35 @@ impl Source {
         sample: &TimeSample,
         wanted: Wanted,
     ) -> Result<(Arc<Cells<u32>>, Interval), DrawError> {
-        let domain = self.domain(grid, sample).await?;
         let counts = sample.contributed.clone().unwrap_or_default();
         let part = |frame: &ObjectKey, counts: &Option<ObjectKey>| {
             (frame.clone(), sample.domain.clone(), counts.clone())
         };
-        let before = match &sample.before {
-            Some(frame) => {
-                let key = part(frame, &counts.before);
-                self.frame(grid, &domain, key, wanted).await?
-            }
-            // All that is accumulated until the end of the first step is of that step.
-            None => {
-                self.nothing(grid, &domain, part(&sample.domain, &counts.after))
-                    .await?
+        let before = async {
+            match &sample.before {
+                Some(frame) => {
+                    let key = part(frame, &counts.before);
+                    self.frame(grid, key, wanted).await
+                }
+                // All that is accumulated until the end of the first step is of that step.
+                None => {
+                    let key = part(&sample.domain, &counts.after);
+                    self.nothing(grid, key).await
+                }
             }
         };
-        let (after, weight) = match &sample.after {
-            Some(After { frame, weight }) => {
-                let key = part(frame, &counts.after);
-                (self.frame(grid, &domain, key, wanted).await?, *weight)
+        let after = async {
+            match &sample.after {
+                Some(After { frame, weight }) => {
+                    let key = part(frame, &counts.after);
+                    Ok(Some((self.frame(grid, key, wanted).await?, *weight)))
+                }
+                None => Ok(None),
             }
-            None => (Arc::clone(&before), 0.0),
         };
+        let domain = self.domain(grid, &sample.domain);
+        let (domain, before, after) = tokio::try_join!(domain, before, after)?;
+        let (after, weight) = after.unwrap_or_else(|| (Arc::clone(&before), 0.0));
         let interval = Interval {
             before,
             after,
@@ -286,56 +309,53 @@ impl Source {
     }
 
     /// Where accumulation starts: zero in every cell of the domain, which stands for the frame in the key.
-    async fn nothing(
-        &self,
-        grid: &Grid,
-        domain: &Cells<u32>,
-        key: FrameKey,
-    ) -> Result<Arc<Frame>, DrawError> {
+    async fn nothing(&self, grid: &Grid, key: FrameKey) -> Result<Arc<Frame>, DrawError> {
         if let Some(held) = self.frames.get(&key) {
             return Ok(held.frame);
         }
+        let (_, of_domain, counts) = &key;
+        let domain = self.domain(grid, of_domain);
+        let (domain, lacking) = tokio::try_join!(domain, self.lacking(grid, of_domain, counts))?;
         let zero = |cell: &u32| if *cell == 0 { f32::NAN } else { 0.0 };
         let frame = Frame::new(domain.content().iter().map(zero).collect());
-        let held = Held::new(self.uncertain(frame, grid, &key).await?, Wanted::Now);
+        let held = Held::new(uncertain(frame, lacking), Wanted::Now);
         self.frames.insert(key, held.clone());
         Ok(held.frame)
     }
 
-    /// A frame with what its sums lack, if its key names counts.
-    async fn uncertain(
+    /// What sums lack, if counts say so.
+    async fn lacking(
         &self,
-        frame: Frame,
         grid: &Grid,
-        (_, domain, counts): &FrameKey,
-    ) -> Result<Frame, DrawError> {
+        domain: &ObjectKey,
+        counts: &Option<ObjectKey>,
+    ) -> Result<Option<Vec<f32>>, DrawError> {
         let Some(counts) = counts else {
-            return Ok(frame);
+            return Ok(None);
         };
         let read = storage::contributed::read(&self.store, counts, grid).await;
         let counts = read.map_err(|e| failed("the counts of steps", domain, e))?;
-        Ok(frame.with_lacking(counts.lacking()))
+        Ok(Some(counts.lacking()))
     }
 
-    async fn domain(&self, grid: &Grid, sample: &TimeSample) -> Result<Arc<Cells<u32>>, DrawError> {
+    async fn domain(&self, grid: &Grid, key: &ObjectKey) -> Result<Arc<Cells<u32>>, DrawError> {
         let reading = async {
-            let read = storage::domain::read(&self.store, &sample.domain).await;
-            let flags = read.map_err(|e| failed("the domain", &sample.domain, e))?;
+            let read = storage::domain::read(&self.store, key).await;
+            let flags = read.map_err(|e| failed("the domain", key, e))?;
             Ok::<_, DrawError>(Scene::domain_of(flags))
         };
-        let kept = self.domains.get_or_insert_async(&sample.domain, reading);
+        let kept = self.domains.get_or_insert_async(key, reading);
         let domain = kept.await?;
         // Before anything as large as the grid claims to be is laid out.
         if domain.content().len() == grid.cell_count() {
             return Ok(domain);
         }
-        Err(mismatch(&sample.domain))
+        Err(mismatch(key))
     }
 
     async fn frame(
         &self,
         grid: &Grid,
-        domain: &Arc<Cells<u32>>,
         key: FrameKey,
         wanted: Wanted,
     ) -> Result<Arc<Frame>, DrawError> {
@@ -354,7 +374,7 @@ impl Source {
         if wanted == Wanted::Now {
             self.frame_misses.fetch_add(1, Ordering::Relaxed);
         }
-        let held = Held::new(self.read(grid, domain, &key).await?, wanted);
+        let held = Held::new(self.read(grid, &key).await?, wanted);
         if wanted == Wanted::Ahead {
             self.early_reads.fetch_add(1, Ordering::Relaxed);
         }
@@ -365,20 +385,30 @@ impl Source {
     }
 
     /// A frame from the store, gaps filled.
-    async fn read(
-        &self,
-        grid: &Grid,
-        domain: &Arc<Cells<u32>>,
-        key: &FrameKey,
-    ) -> Result<Frame, DrawError> {
-        let (frame, of_domain, _) = key;
-        let read = storage::frames::read(&self.store, frame, grid).await;
-        let values = read.map_err(|e| failed("a frame", of_domain, e))?;
-        let (renderer, of_grid, domain) = (Arc::clone(&self.renderer), *grid, Arc::clone(domain));
+    async fn read(&self, grid: &Grid, key: &FrameKey) -> Result<Frame, DrawError> {
+        let (frame, of_domain, counts) = key;
+        let reading = async {
+            let read = storage::frames::read(&self.store, frame, grid).await;
+            read.map_err(|e| failed("a frame", of_domain, e))
+        };
+        let (values, domain, lacking) = tokio::try_join!(
+            reading,
+            self.domain(grid, of_domain),
+            self.lacking(grid, of_domain, counts),
+        )?;
+        let (renderer, of_grid) = (Arc::clone(&self.renderer), *grid);
         let fill = move || fill(&renderer, &of_grid, values, &domain);
         let filled = tokio::task::spawn_blocking(fill).await;
         let filled = filled.map_err(DrawError::Thread)??;
-        self.uncertain(filled, grid, key).await
+        Ok(uncertain(filled, lacking))
+    }
+}
+
+/// A frame with what its sums lack, if that is known.
+fn uncertain(frame: Frame, lacking: Option<Vec<f32>>) -> Frame {
+    match lacking {
+        Some(lacking) => frame.with_lacking(lacking),
+        None => frame,
     }
 }
 

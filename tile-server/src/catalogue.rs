@@ -3,6 +3,7 @@
 mod layer;
 mod snapshot;
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -37,6 +38,8 @@ pub(crate) struct Probe {
 pub struct Catalogue {
     reader: Arc<Reader>,
     max_age: Duration,
+    /// Is this told of whatever lands?
+    is_told: AtomicBool,
     state: Arc<Mutex<State>>,
 }
 
@@ -66,8 +69,14 @@ impl Catalogue {
                 versions,
             }),
             max_age,
+            is_told: AtomicBool::new(false),
             state: Arc::default(),
         }
+    }
+
+    /// From now on this is told of whatever lands: nobody waits for a look that only makes sure.
+    pub(crate) fn is_told(&self) {
+        self.is_told.store(true, Ordering::Release);
     }
 
     /// The newest version of a product by its name in an address.
@@ -179,6 +188,10 @@ impl Catalogue {
             let reading = under_way.unwrap_or_else(|| self.read(&mut state));
             (before, reading)
         };
+        // It was not outdated by anything that landed, only by time.
+        if before.read_at.is_some() && self.is_told.load(Ordering::Acquire) {
+            return Ok(before);
+        }
         if before.is_first() {
             return reading.answer.await;
         }

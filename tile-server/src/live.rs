@@ -30,6 +30,7 @@ impl AppState {
     /// What keeps this server up with the event log.
     pub fn live(&self, log: Arc<dyn EventLog>) -> LiveService {
         self.log.get_or_init(|| Arc::clone(&log));
+        self.catalogue.is_told();
         LiveService::new(self.clone(), log)
     }
 

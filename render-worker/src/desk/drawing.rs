@@ -10,6 +10,7 @@ use contract::job::RenderJob;
 use contract::key::ObjectKey;
 use render::{Image, RenderError};
 use storage::StorageError;
+use tracing::Instrument as _;
 
 use super::queue::{Full, Permit};
 use super::single_flight::{Flight, Outcome};
@@ -22,7 +23,7 @@ const RETRY_HINT: [Duration; 2] = [Duration::from_millis(100), Duration::from_se
 impl Inner {
     /// One job from the store or from the device.
     pub(super) async fn make(
-        &self,
+        self: &Arc<Self>,
         job: &RenderJob,
         flight: &Arc<Flight>,
         order: Order,
@@ -33,7 +34,9 @@ impl Inner {
         {
             return Ok(drawn);
         }
+        let waiting = Instant::now();
         let permit = Arc::new((self.turn(flight, order.class).await?, turn));
+        self.wait_s.observe(waiting.elapsed().as_secs_f64());
         let begun = Instant::now();
         let drawn = self.drawn(job, flight, &permit).await;
         self.note(&drawn);
@@ -42,37 +45,71 @@ impl Inner {
         // Another draws while this one is encoded and stored.
         let encoding = self.pipeline.encode(job, image, order.encoding, permit);
         let bytes = self.measured("encode", encoding).await?;
-        Ok(self.kept(job, bytes, order.storing).await)
+        Ok(self.kept(job, bytes, order).await)
     }
 
     /// A picture after what the store has to do with it.
-    async fn kept(&self, job: &RenderJob, bytes: Bytes, storing: Storing) -> Drawn {
-        let (count, drawn) = match storing {
-            Storing::LookUpAndKeep | Storing::Keep => self.put(job, bytes).await,
-            Storing::Nothing => {
-                let (origin, kept) = (Origin::Drawn, false);
-                (
-                    "drawn",
-                    Drawn {
-                        bytes,
-                        origin,
-                        kept,
-                    },
-                )
-            }
+    async fn kept(self: &Arc<Self>, job: &RenderJob, bytes: Bytes, order: Order) -> Drawn {
+        let drawn = Drawn {
+            bytes,
+            origin: Origin::Drawn,
+            kept: false,
         };
-        self.pictures.with_label_values(&[count]).inc();
+        if order.storing == Storing::Nothing {
+            self.pictures.with_label_values(&["drawn"]).inc();
+            return drawn;
+        }
+        let count = |desk: &Self, name: &str| desk.pictures.with_label_values(&[name]).inc();
+        if self.stores_behind(job, &drawn.bytes, order, count) {
+            return drawn;
+        }
+        let (name, drawn) = self.put(job, drawn.bytes).await;
+        count(self, name);
         drawn
     }
 
     /// A picture that was not kept, given to somebody who ordered it to be.
-    pub(super) async fn kept_after_all(&self, job: &RenderJob, drawn: Drawn) -> Drawn {
+    pub(super) async fn kept_after_all(
+        self: &Arc<Self>,
+        job: &RenderJob,
+        drawn: Drawn,
+        order: Order,
+    ) -> Drawn {
+        if self.stores_behind(job, &drawn.bytes, order, |_counted, _before| ()) {
+            return drawn;
+        }
         self.put(job, drawn.bytes).await.1
+    }
+
+    /// Begins to store a picture that somebody waits for, who need not wait for the store; false if it must be stored first.
+    fn stores_behind(
+        self: &Arc<Self>,
+        job: &RenderJob,
+        bytes: &Bytes,
+        order: Order,
+        count: impl Fn(&Self, &str) + Send + 'static,
+    ) -> bool {
+        // Whoever looks in the store himself is told what is there.
+        if order.class != Class::OnDemand || order.storing != Storing::Keep {
+            return false;
+        }
+        let Some(room) = self.writes.room(bytes.len()) else {
+            return false;
+        };
+        let (desk, job, picture) = (Arc::clone(self), job.clone(), bytes.clone());
+        let writing = async move {
+            let (name, _given_already) = desk.put(&job, picture).await;
+            count(&desk, name);
+            drop(room);
+        };
+        tokio::spawn(writing.in_current_span());
+        true
     }
 
     /// What is given out of a picture that is to be kept, and the name of how that went.
     async fn put(&self, job: &RenderJob, drawn: Bytes) -> (&'static str, Drawn) {
-        let (name, bytes, origin, kept) = match self.keep(job, drawn.clone()).await {
+        let kept = self.writes.timed(self.keep(job, drawn.clone())).await;
+        let (name, bytes, origin, kept) = match kept {
             Ok(None) => ("drawn", drawn, Origin::Drawn, true),
             Ok(Some(theirs)) => ("conflict", theirs, Origin::Stored, true),
             Err(error) => {

@@ -6,6 +6,7 @@ mod gauges;
 mod order;
 mod queue;
 mod single_flight;
+mod write_behind;
 
 use std::any::Any;
 use std::num::NonZeroUsize;
@@ -16,7 +17,7 @@ use std::time::Duration;
 use ::service::Red;
 use bytes::Bytes;
 use contract::job::RenderJob;
-use prometheus::{IntCounterVec, Opts, Registry};
+use prometheus::{Histogram, HistogramOpts, IntCounterVec, Opts, Registry};
 use render::{Backend, RenderError};
 use storage::Store;
 use tracing::Instrument as _;
@@ -28,6 +29,7 @@ use drawing::picture_failed;
 use gauges::Gauges;
 use queue::Queue;
 use single_flight::SingleFlight;
+use write_behind::WriteBehind;
 
 pub use order::{Order, Storing};
 pub use queue::Class;
@@ -36,6 +38,11 @@ pub use queue::Class;
 pub const METRICS: &str = "render_worker";
 /// What a picture is thought to take before one was drawn.
 const FIRST_GUESS: Duration = Duration::from_millis(200);
+
+/// Bounds of times that jobs wait or are stored, seconds: from nothing to a store that is nearly away.
+const BOUNDS_S: [f64; 12] = [
+    0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 10.0,
+];
 
 /// Draws jobs for many. Cheap to clone.
 #[derive(Clone)]
@@ -51,6 +58,9 @@ struct Inner {
     flights: SingleFlight,
     red: Red,
     pictures: IntCounterVec,
+    /// How long jobs wait for a permit to draw.
+    wait_s: Histogram,
+    writes: WriteBehind,
     /// Running mean of what a picture takes, microseconds.
     mean_us: AtomicU64,
     stopping: AtomicBool,
@@ -65,7 +75,7 @@ pub struct Drawn {
     pub bytes: Bytes,
     /// Where it comes from.
     pub origin: Origin,
-    /// Is it in the store?
+    /// Is it in the store? One that somebody waits for and that is stored behind his back is not, yet.
     pub kept: bool,
 }
 
@@ -147,6 +157,12 @@ impl OpenError {
     }
 }
 
+/// A time of jobs, seconds.
+fn timed(what: &str, help: &str) -> Result<Histogram, prometheus::Error> {
+    let name = format!("fluxglobe_{METRICS}_{what}");
+    Histogram::with_opts(HistogramOpts::new(name, help).buckets(BOUNDS_S.to_vec()))
+}
+
 /// What a caller holds who gives out turns to draw as well.
 type Turn = Box<dyn Any + Send + Sync>;
 
@@ -166,6 +182,10 @@ impl Desk {
         let pictures = IntCounterVec::new(Opts::new(name, help), &["origin"])?;
         registry.register(Box::new(pictures.clone()))?;
         registry.register(Box::new(AdapterInfo::of(&pipeline)?))?;
+        let wait_s = timed("wait_seconds", "Time that jobs wait for a permit to draw.")?;
+        registry.register(Box::new(wait_s.clone()))?;
+        let store_s = timed("store_seconds", "Time to put a picture into the store.")?;
+        registry.register(Box::new(store_s.clone()))?;
         let inner = Inner {
             store,
             queue: Queue::new(draws_at_once.get(), limits.draw_queue),
@@ -174,6 +194,8 @@ impl Desk {
             flights: SingleFlight::default(),
             red: Red::register(registry, METRICS)?,
             pictures,
+            wait_s,
+            writes: WriteBehind::new(store_s),
             mean_us: AtomicU64::new(FIRST_GUESS.as_micros() as u64),
             stopping: AtomicBool::new(false),
             is_without_device: AtomicBool::new(false),
@@ -226,7 +248,7 @@ impl Desk {
         }
         let drawn = waiter.outcome().await?;
         if has_joined && !drawn.kept && order.storing != Storing::Nothing {
-            return Ok(inner.kept_after_all(job, drawn).await);
+            return Ok(inner.kept_after_all(job, drawn, order).await);
         }
         Ok(drawn)
     }
@@ -255,6 +277,11 @@ impl Desk {
         let asked = self.inner.store.exists(&probe).await;
         asked.map_err(|source| picture_failed("look for", &probe, source))?;
         Ok(format!("draws on {}", self.pipeline().name()))
+    }
+
+    /// Returns when pictures that were given out before they were stored are stored.
+    pub async fn settled(&self) {
+        self.inner.writes.settled().await;
     }
 
     /// How it is.

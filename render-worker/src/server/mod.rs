@@ -86,7 +86,7 @@ impl Server {
     /// Answers until asked to stop. Then it refuses what is new, so that callers go elsewhere, and ends with what is
     /// under way, at the latest after the time that the settings give.
     pub async fn run(self, stop: Stop) -> Result<(), ServerError> {
-        let desk = self.desk.clone();
+        let (desk, given_out) = (self.desk.clone(), self.desk.clone());
         let answers = Answers {
             desk: self.desk,
             version: self.version,
@@ -110,8 +110,14 @@ impl Server {
             stop.said().await;
             tokio::time::sleep(self.drain).await;
         };
+        let served = async {
+            let served = serving.await;
+            // What was given out is stored too.
+            given_out.settled().await;
+            served
+        };
         tokio::select! {
-            served = serving => served.map_err(ServerError::Stopped),
+            served = served => served.map_err(ServerError::Stopped),
             () = given_up => {
                 tracing::warn!("some callers are left without an answer");
                 Ok(())

@@ -12,6 +12,15 @@ async fn drawn(worker: &Worker, job: &RenderJob, storing: Storing) -> Drawn {
     worker.desk.draw(job, order).await.unwrap()
 }
 
+/// For nobody who waits: it is stored before it is given out.
+async fn drawn_ahead(worker: &Worker, job: &RenderJob) -> Drawn {
+    let order = Order {
+        storing: Storing::Keep,
+        ..Order::batch()
+    };
+    worker.desk.draw(job, order).await.unwrap()
+}
+
 fn pictures(worker: &Worker, origin: &str) -> u64 {
     worker.metric(
         "fluxglobe_render_worker_pictures_total",
@@ -28,13 +37,14 @@ async fn a_picture_is_looked_for_and_kept_as_it_was_ordered() {
     assert_eq!((aside.origin, aside.kept), (Origin::Drawn, false));
     assert!(!store.exists(&job.key()).await.unwrap());
     let kept = drawn(&worker, &job, Storing::Keep).await;
-    assert_eq!((kept.origin, kept.kept), (Origin::Drawn, true));
+    assert_eq!((kept.origin, kept.kept), (Origin::Drawn, false));
+    worker.desk.settled().await;
     assert_eq!(store.get(&job.key()).await.unwrap(), kept.bytes);
     assert_eq!(kept.bytes, aside.bytes);
     // It is there now: whoever looks finds it, whoever does not draws it again.
     let found = drawn(&worker, &job, Storing::LookUpAndKeep).await;
     assert_eq!((found.origin, found.kept), (Origin::Stored, true));
-    let again = drawn(&worker, &job, Storing::Keep).await;
+    let again = drawn_ahead(&worker, &job).await;
     assert_eq!((again.origin, again.kept), (Origin::Drawn, true));
     assert_eq!((found.bytes, again.bytes), (kept.bytes.clone(), kept.bytes));
     assert_eq!(
@@ -44,7 +54,8 @@ async fn a_picture_is_looked_for_and_kept_as_it_was_ordered() {
 }
 
 #[tokio::test]
-async fn a_picture_that_contradicts_the_store_is_counted_and_the_stored_one_is_given() {
+async fn a_picture_that_contradicts_the_store_is_counted_and_the_stored_one_is_given_to_who_does_not_wait()
+ {
     let store = Store::memory();
     let job = two_months_in(&store).await;
     let (job, other) = (quick(&job, 1), quick(&job, 2));
@@ -52,10 +63,16 @@ async fn a_picture_that_contradicts_the_store_is_counted_and_the_stored_one_is_g
     // What another adapter drew under the same name.
     let theirs = drawn(&worker, &other, Storing::Nothing).await.bytes;
     store.put_new(&job.key(), theirs.clone()).await.unwrap();
-    let given = drawn(&worker, &job, Storing::Keep).await;
+    let given = drawn_ahead(&worker, &job).await;
     assert_eq!((given.origin, given.kept), (Origin::Stored, true));
     assert_eq!(given.bytes, theirs);
     assert_eq!(pictures(&worker, "conflict"), 1);
+    // Who waits has it before the store is asked.
+    let given = drawn(&worker, &job, Storing::Keep).await;
+    assert_eq!((given.origin, given.kept), (Origin::Drawn, false));
+    worker.desk.settled().await;
+    assert_eq!(pictures(&worker, "conflict"), 2);
+    assert_eq!(store.get(&job.key()).await.unwrap(), theirs);
     let aside = drawn(&worker, &job, Storing::Nothing).await;
     assert_ne!(aside.bytes, theirs);
 }
@@ -74,16 +91,17 @@ async fn whoever_joins_a_job_under_way_has_its_picture_kept_as_he_ordered() {
         let count = pictures(&worker, "drawn");
         assert_eq!(count, u64::from(number), "both are one job: {storing:?}");
         assert_eq!((aside.origin, aside.kept), (Origin::Drawn, false));
-        assert_eq!((kept.origin, kept.kept), (Origin::Drawn, true));
+        assert_eq!(kept.origin, Origin::Drawn);
+        worker.desk.settled().await;
         assert_eq!(store.get(&job.key()).await.unwrap(), kept.bytes);
     }
-    // Another one is there meanwhile: it is given to whoever asks for what is kept, and to nobody else.
+    // Another one is there meanwhile: it is given to whoever has it kept before he has it, and to nobody else.
     let [job, other] = [3, 1].map(|number| quick(&job, number));
     let theirs = store.get(&other.key()).await.unwrap();
     store.put_new(&job.key(), theirs.clone()).await.unwrap();
     let (aside, given) = tokio::join!(
         drawn(&worker, &job, Storing::Nothing),
-        drawn(&worker, &job, Storing::Keep)
+        drawn_ahead(&worker, &job)
     );
     assert_eq!(pictures(&worker, "drawn"), 3);
     assert_eq!((given.origin, given.kept), (Origin::Stored, true));
