@@ -207,6 +207,10 @@ impl IntoResponse for ServerError {
         if let Some(seconds) = self.retry_after_s() {
             headers.insert(header::RETRY_AFTER, seconds.into());
         }
+        if matches!(self, Self::TooManyStreams) {
+            // Who has no stream keeps no connection from others either.
+            headers.insert(header::CONNECTION, HeaderValue::from_static("close"));
+        }
         if status == StatusCode::UPGRADE_REQUIRED {
             headers.insert(header::UPGRADE, HeaderValue::from_static("websocket"));
         }

@@ -9,12 +9,11 @@ use contract::check::Check;
 use observations::FileStore;
 use render_worker::Limits;
 use storage::Store;
-use tile_server::metrics::Registry;
 use tile_server::{AppState, Server};
 
 use crate::cli::Settings;
 use crate::ports::{Analyst, Drawer, Observer};
-use crate::{deployment, progress, viewer};
+use crate::{deployment, file_handles, progress, protocol, viewer};
 
 pub(crate) async fn run(settings: &Settings, options: tile_server::config::Settings) -> Result<()> {
     let store = deployment::interactive_store(settings)?;
@@ -32,7 +31,8 @@ pub(crate) async fn bind(
     check: Option<Check>,
 ) -> Result<Server> {
     options.viewer = options.viewer.or_else(viewer::built);
-    let registry = Registry::new();
+    file_handles::fit(&mut options);
+    let registry = service::admin::registry("serve", protocol::PROGRAM)?;
     let limits = Limits {
         draws_at_once: options
             .draws_at_once

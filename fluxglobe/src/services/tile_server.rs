@@ -11,7 +11,7 @@ use tile_server::{AppState, Server};
 use crate::cli::{Settings, TileServer};
 use crate::ports::{Analyst, FleetDrawer, Observer};
 use crate::services::ServiceContext;
-use crate::{deployment, viewer};
+use crate::{deployment, file_handles, viewer};
 
 pub(crate) async fn run(settings: &Settings, options: TileServer) -> Result<()> {
     // Settings and secrets are looked at before anything is waited for.
@@ -26,6 +26,7 @@ pub(crate) async fn run(settings: &Settings, options: TileServer) -> Result<()> 
     let analyst = Analyst::new(Engine::local(store.clone()), &regions, None);
     let mut serve = options.serve;
     serve.viewer = serve.viewer.or_else(viewer::built);
+    file_handles::fit(&mut serve);
     let state = AppState::new(
         &serve,
         store,
