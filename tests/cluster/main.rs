@@ -9,6 +9,7 @@ mod granules;
 mod outages;
 mod refusals;
 mod restarts;
+mod round_trips;
 mod streams;
 mod watched;
 

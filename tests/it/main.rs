@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a test ends where it cannot go on")]
 
 mod animation;
+mod bad_clients;
 mod bad_input;
 mod browser;
 mod circles;

@@ -7,6 +7,7 @@ pub mod http;
 pub mod node;
 pub mod program;
 pub mod proxy;
+pub mod raw_stream;
 pub mod server;
 pub mod servers;
 pub mod small_disk;

@@ -165,12 +165,7 @@ impl Node {
     /// Resident memory, bytes.
     pub fn memory_bytes(&self) -> Result<u64> {
         let child = self.child.as_ref().context("it does not run")?;
-        let status = std::fs::read_to_string(format!("/proc/{}/status", child.id()))?;
-        let kib = status
-            .lines()
-            .find_map(|line| line.strip_prefix("VmRSS:"))
-            .and_then(|rest| rest.trim().trim_end_matches(" kB").parse::<u64>().ok());
-        kib.map(|kib| kib << 10).context("no memory figure")
+        program::memory_bytes(child.id())
     }
 }
 

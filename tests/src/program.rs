@@ -81,3 +81,13 @@ pub fn fail(data: &Path, words: &[&str]) -> Result<String> {
     );
     Ok(talk)
 }
+
+/// Resident memory of a process, bytes.
+pub fn memory_bytes(id: u32) -> Result<u64> {
+    let status = std::fs::read_to_string(format!("/proc/{id}/status"))?;
+    let kib = status
+        .lines()
+        .find_map(|line| line.strip_prefix("VmRSS:"))
+        .and_then(|rest| rest.trim().trim_end_matches(" kB").parse::<u64>().ok());
+    kib.map(|kib| kib << 10).context("no memory figure")
+}

@@ -1,10 +1,12 @@
-//! A proxy before a server: hands bytes through, or answers every request with 500, as told.
+//! A proxy before a server: hands bytes through, or answers every request with 500, or keeps them waiting, as told; and notes
+//! which requests passed, and when.
 
 use std::collections::BTreeMap;
 use std::io::{Read as _, Write as _};
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
 
 use anyhow::Result;
 
@@ -18,6 +20,66 @@ pub struct Proxy {
     is_failing: Arc<AtomicBool>,
     refused: Arc<AtomicU64>,
     open: Arc<Mutex<BTreeMap<u64, TcpStream>>>,
+    passing: Arc<Passing>,
+}
+
+/// A request that passed, of a client that waits for one answer before it asks again.
+#[derive(Debug, Clone)]
+pub struct Passed {
+    /// Its first line.
+    pub line: String,
+    /// When its first bytes came.
+    pub begun: Instant,
+    /// When the first bytes of its answer went out; none yet.
+    pub answered: Option<Instant>,
+}
+
+/// What all connections share.
+#[derive(Default)]
+struct Passing {
+    delay_ms: AtomicU64,
+    passed: Mutex<Vec<Passed>>,
+}
+
+impl Passing {
+    fn passed(&self) -> MutexGuard<'_, Vec<Passed>> {
+        // Changed by single steps: a poisoned list is whole.
+        self.passed.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Notes a request and keeps it waiting; its place among all.
+    fn begin(&self, bytes: &[u8]) -> usize {
+        let line = bytes.split(|byte| *byte == b'\r').next();
+        let line = String::from_utf8_lossy(line.unwrap_or_default()).into_owned();
+        let mut passed = self.passed();
+        passed.push(Passed {
+            line,
+            begun: Instant::now(),
+            answered: None,
+        });
+        let place = passed.len() - 1;
+        drop(passed);
+        let delay = Duration::from_millis(self.delay_ms.load(Ordering::SeqCst));
+        std::thread::sleep(delay);
+        place
+    }
+}
+
+/// Requests that waited for one another, at least: the most of them of which none began before the one before it was answered.
+pub fn rounds(passed: &[Passed]) -> usize {
+    let spans = passed
+        .iter()
+        .filter_map(|one| Some((one.answered?, one.begun)));
+    let mut spans: Vec<(Instant, Instant)> = spans.collect();
+    spans.sort();
+    let (mut count, mut last) = (0, None);
+    for (answered, begun) in spans {
+        if last.is_none_or(|last| begun >= last) {
+            count += 1;
+            last = Some(answered);
+        }
+    }
+    count
 }
 
 impl Proxy {
@@ -29,7 +91,9 @@ impl Proxy {
             is_failing: Arc::default(),
             refused: Arc::default(),
             open: Arc::default(),
+            passing: Arc::default(),
         };
+        let passing = Arc::clone(&proxy.passing);
         let (is_failing, refused, open) = (
             Arc::clone(&proxy.is_failing),
             Arc::clone(&proxy.refused),
@@ -46,8 +110,9 @@ impl Proxy {
                     if let Ok(client) = client.try_clone() {
                         lock(&open).insert(number, client);
                     }
+                    let passing = Arc::clone(&passing);
                     std::thread::spawn(move || {
-                        join(client, server);
+                        join(client, server, passing);
                         lock(&open).remove(&number);
                     });
                 }
@@ -65,6 +130,17 @@ impl Proxy {
                 drop(stream.shutdown(Shutdown::Both));
             }
         }
+    }
+
+    /// Keeps every request waiting for so long from now on.
+    pub fn delay(&self, delay: Duration) {
+        let delay_ms = delay.as_millis() as u64;
+        self.passing.delay_ms.store(delay_ms, Ordering::SeqCst);
+    }
+
+    /// Requests that have passed so far.
+    pub fn passed(&self) -> Vec<Passed> {
+        self.passing.passed().clone()
     }
 
     /// Requests answered with 500.
@@ -92,19 +168,77 @@ fn refuse(mut client: TcpStream) {
 }
 
 /// Hands bytes through both ways until either side closes.
-fn join(client: TcpStream, server: TcpStream) {
+fn join(client: TcpStream, server: TcpStream, passing: Arc<Passing>) {
     let (Ok(client_too), Ok(server_too)) = (client.try_clone(), server.try_clone()) else {
         return;
     };
-    let back = std::thread::spawn(move || pump(server, client_too));
-    pump(client, server_too);
+    for stream in [&client, &server] {
+        // What is kept waiting is kept so by this proxy alone.
+        drop(stream.set_nodelay(true));
+    }
+    // The request that waits for its answer.
+    let open: Arc<Mutex<Option<usize>>> = Arc::default();
+    let (open_too, passing_too) = (Arc::clone(&open), Arc::clone(&passing));
+    let now =
+        |open: &Mutex<Option<usize>>| open.lock().unwrap_or_else(PoisonError::into_inner).take();
+    let back = std::thread::spawn(move || {
+        pump(server, client_too, |_bytes| {
+            if let Some(place) = now(&open_too) {
+                passing_too.passed()[place].answered = Some(Instant::now());
+            }
+        });
+    });
+    pump(client, server_too, |bytes| {
+        if bytes.is_empty() {
+            return;
+        }
+        let mut open = open.lock().unwrap_or_else(PoisonError::into_inner);
+        if open.is_none() {
+            *open = Some(passing.begin(bytes));
+        }
+    });
     // A pump that panicked has closed its streams too.
     drop(back.join());
 }
 
-fn pump(mut from: TcpStream, mut to: TcpStream) {
+fn pump(mut from: TcpStream, mut to: TcpStream, mut look: impl FnMut(&[u8])) {
+    let mut bytes = vec![0; 256 << 10];
     // Either side closing ends both.
-    drop(std::io::copy(&mut from, &mut to));
+    while let Ok(read) = from.read(&mut bytes) {
+        look(&bytes[..read]);
+        if read == 0 || to.write_all(&bytes[..read]).is_err() {
+            break;
+        }
+    }
     drop(to.shutdown(Shutdown::Both));
     drop(from.shutdown(Shutdown::Both));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rounds_are_what_one_waits_for_after_the_other() {
+        let start = Instant::now();
+        let at = |ms| start + Duration::from_millis(ms);
+        let passed = |begun, answered| Passed {
+            line: String::new(),
+            begun: at(begun),
+            answered: Some(at(answered)),
+        };
+        assert_eq!(rounds(&[]), 0);
+        // Two at once, then three at once, beside one that takes long.
+        let all = [
+            passed(0, 25),
+            passed(1, 26),
+            passed(30, 55),
+            passed(30, 56),
+            passed(31, 57),
+            passed(2, 58),
+        ];
+        assert_eq!(rounds(&all), 2);
+        let last = passed(60, 85);
+        assert_eq!(rounds(&[&all[..], &[last]].concat()), 3);
+    }
 }

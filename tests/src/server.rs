@@ -68,6 +68,11 @@ impl Server {
         bail!("{} was not ready within {START_LIMIT:?}", self.url)
     }
 
+    /// Resident memory, bytes.
+    pub fn memory_bytes(&self) -> Result<u64> {
+        program::memory_bytes(self.child.id())
+    }
+
     /// Fetches a path; every status is an answer.
     pub fn get(&self, path: &str) -> Result<Answer> {
         http::get(&format!("{}{path}", self.url))

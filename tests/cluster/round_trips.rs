@@ -1,0 +1,99 @@
+//! A store that is far away: how often it is waited for between a question and its picture, and that its writes are not.
+
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use harness::cluster::{Cluster, Shape};
+use harness::granule;
+use harness::proxy::{Passed, rounds};
+
+use crate::alone;
+use crate::faults::{PRODUCT, notice, say, until_whole};
+
+/// How long the store takes to answer.
+const DELAY: Duration = Duration::from_millis(25);
+/// Waits for the store that a picture may take: a look whether it was drawn before, and all of its frames at once.
+const MOST_ROUNDS: usize = 2;
+const MONTHS: usize = 6;
+const LIMIT: Duration = Duration::from_mins(1);
+
+/// A question with what passed to the store before its answer, and when that came.
+struct Asked {
+    before: Vec<Passed>,
+    answered: Instant,
+}
+
+fn ask(cluster: &Cluster, tile: &str, time: &str) -> Asked {
+    // Longer than a list of products is taken for new.
+    std::thread::sleep(Duration::from_millis(1500));
+    let begun = Instant::now();
+    let path = format!("/tiles/{PRODUCT}/volume/{tile}.png?time={time}");
+    let answer = cluster.get(&path).unwrap();
+    let answered = Instant::now();
+    assert_eq!(answer.status, 200, "{}", answer.text());
+    let during = |one: &Passed| one.begun >= begun && one.answered.is_some_and(|at| at <= answered);
+    let passed = cluster.s3.passed().into_iter();
+    Asked {
+        before: passed.filter(during).collect(),
+        answered,
+    }
+}
+
+impl Asked {
+    fn lines(&self) -> Vec<&str> {
+        self.before.iter().map(|one| one.line.as_str()).collect()
+    }
+
+    /// The picture is stored, and was so after its answer.
+    fn assert_stored_behind(&self, cluster: &Cluster) {
+        let is_write = |one: &&Passed| one.line.starts_with("PUT") && one.line.contains("/tiles/");
+        assert!(
+            !self.before.iter().any(|one| is_write(&one)),
+            "stored before the answer: {:?}",
+            self.lines()
+        );
+        let written = |cluster: &Cluster| {
+            let passed = cluster.s3.passed();
+            let written = passed
+                .iter()
+                .filter(is_write)
+                .filter_map(|one| one.answered);
+            Ok(written.max().filter(|at| *at > self.answered))
+        };
+        cluster.wait_for("stored picture", LIMIT, written).unwrap();
+    }
+}
+
+#[test]
+fn a_new_tile_waits_for_a_store_far_away_twice_at_most_and_for_no_write() {
+    let _alone = alone();
+    let inbox = tempfile::tempdir().unwrap();
+    let shape = Shape {
+        executors: 1,
+        ingestds: 1,
+        render_workers: 2,
+        tile_servers: 1,
+    };
+    let cluster = Cluster::start(shape, inbox.path()).unwrap();
+    let files: Vec<PathBuf> = (0..MONTHS)
+        .map(|month| granule::write(inbox.path(), month, 0).unwrap())
+        .collect();
+    notice(&cluster, &files);
+    until_whole(&cluster, files.len());
+    // Kernels are compiled, and connections to the store stand.
+    ask(&cluster, "0/0/0", "2000-01-20");
+    cluster.s3.delay(DELAY);
+    for (tile, time, most, what) in [
+        ("1/0/1", "2000-03-20", MOST_ROUNDS, "frames that nobody has"),
+        ("1/1/0", "2000-03-21", 1, "frames in memory"),
+        ("2/1/1", "2000-05-20", MOST_ROUNDS, "other frames"),
+    ] {
+        let asked = ask(&cluster, tile, time);
+        let count = rounds(&asked.before);
+        say(&format!("{what}: {count} rounds, {:?}", asked.lines()));
+        // It was slow, and it was asked: else this measures nothing.
+        assert!(count >= 1, "{what}: {:?}", asked.lines());
+        assert!(count <= most, "{what}: {count} rounds: {:?}", asked.lines());
+        asked.assert_stored_behind(&cluster);
+    }
+}
