@@ -6,6 +6,18 @@ from panels import AMBER, GREEN, RED, dashboard, lines, number, p95, quantiles, 
 TILES = "fluxglobe_tile_server"
 WORKER = "fluxglobe_render_worker"
 
+# What a picture goes through, in this order; storing is behind the answer.
+STAGES = (
+    ("look in the store", f"{TILES}_look_up_seconds", ""),
+    ("wait for a turn", f"{TILES}_draw_wait_seconds", ""),
+    ("wait at the worker", f"{WORKER}_wait_seconds", ""),
+    ("load", f"{WORKER}_request_seconds", '{operation="load"}'),
+    ("draw", f"{WORKER}_request_seconds", '{operation="draw"}'),
+    ("encode", f"{WORKER}_request_seconds", '{operation="encode"}'),
+    ("send", f"{TILES}_send_seconds", '{operation=~".*_png}"}'),
+    ("store", f"{WORKER}_store_seconds", ""),
+)
+
 
 def board() -> Dashboard:
     """The dashboard."""
@@ -90,6 +102,18 @@ def board() -> Dashboard:
                 "Median and 95th percentile of the time a picture waits for its turn.",
                 "s",
                 *quantiles(f"{TILES}_draw_wait_seconds", "wait"),
+            )
+        )
+        .with_panel(
+            lines(
+                "Time by stage",
+                "Seconds a second that all pictures together spend in each stage. Worry about the widest one first.",
+                "none",
+                *(
+                    (f"sum(rate({metric}_sum{label}[$__rate_interval]))", name)
+                    for name, metric, label in STAGES
+                ),
+                stacked=True,
             )
         )
         .with_panel(

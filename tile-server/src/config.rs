@@ -34,7 +34,7 @@ pub struct Settings {
     /// there are cores with --cpu, and 32 where render workers draw. Pictures that are encoded do not count
     #[arg(long, env = "FLUXGLOBE_DRAWS_AT_ONCE", value_parser = draws_at_once)]
     pub draws_at_once: Option<NonZeroU32>,
-    /// Pictures that may wait to be drawn, or are drawn and not yet stored, before clients are sent away, 0 to 65536
+    /// Pictures that may wait to be drawn, or are drawn and not yet encoded, before clients are sent away, 0 to 65536
     #[arg(long, env = "FLUXGLOBE_DRAW_QUEUE", default_value_t = DRAW_QUEUE, value_parser = clap::value_parser!(u32).range(0..=65_536))]
     pub draw_queue: u32,
     /// Series and budgets computed at the same time, 1 to 1024

@@ -157,7 +157,7 @@ impl Maker {
         let drawing = tokio::spawn(async move {
             let picture = self.draw_within(limit, &job, turn).await?;
             self.remember(digest, picture.clone());
-            // The turn went to the next one when this was drawn; pictures that are encoded or stored count until here.
+            // The turn went to the next one when this was drawn; pictures that are encoded count until here.
             drop(place);
             Ok(picture)
         });
