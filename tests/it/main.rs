@@ -5,6 +5,7 @@
 mod animation;
 mod bad_clients;
 mod bad_input;
+mod bench_serve;
 mod browser;
 mod circles;
 mod damaged;
