@@ -15,6 +15,7 @@ const DELAY: Duration = Duration::from_millis(25);
 /// Waits for the store that a picture may take: a look whether it was drawn before, and all of its frames at once.
 const MOST_ROUNDS: usize = 2;
 const MONTHS: usize = 6;
+const QUIET: Duration = Duration::from_secs(2);
 const LIMIT: Duration = Duration::from_mins(1);
 
 /// A question with what passed to the store before its answer, and when that came.
@@ -23,9 +24,23 @@ struct Asked {
     answered: Instant,
 }
 
+/// Waits until nobody reads or writes any more: sums of regions go on after all has landed. That is longer, too, than a list
+/// of products is taken for new.
+fn until_quiet(cluster: &Cluster) {
+    let is_work = |one: &Passed| !one.line.contains("list-type") && !one.line.starts_with("HEAD");
+    let quiet = |cluster: &Cluster| {
+        let passed = cluster.s3.passed();
+        let last = passed
+            .iter()
+            .filter(|one| is_work(one))
+            .map(|one| one.begun);
+        Ok(last.max().filter(|last| last.elapsed() > QUIET))
+    };
+    cluster.wait_for("rest", LIMIT, quiet).unwrap();
+}
+
 fn ask(cluster: &Cluster, tile: &str, time: &str) -> Asked {
-    // Longer than a list of products is taken for new.
-    std::thread::sleep(Duration::from_millis(1500));
+    until_quiet(cluster);
     let begun = Instant::now();
     let path = format!("/tiles/{PRODUCT}/volume/{tile}.png?time={time}");
     let answer = cluster.get(&path).unwrap();

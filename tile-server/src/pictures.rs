@@ -104,7 +104,7 @@ impl Pictures {
         let picture = maker.draw(job, Keep::No, encoding, turn).await?;
         drop(place);
         if encoding.is_stored() {
-            maker.remember(digest, picture.clone());
+            maker.remember(digest, &picture);
         }
         Ok(picture)
     }
@@ -139,7 +139,7 @@ impl Maker {
         let stored = self.stored(&key).await;
         if let Ok(Some(picture)) = stored {
             self.metrics.hit(Source::Store);
-            self.remember(digest, picture.clone());
+            self.remember(digest, &picture);
             return Ok(picture);
         }
         let limit = stored.err().map(|StoreAway| AWAY_LIMIT);
@@ -156,7 +156,7 @@ impl Maker {
         // Drawing goes on if those who asked go away: the work is half done, and the next one finds it in the store.
         let drawing = tokio::spawn(async move {
             let picture = self.draw_within(limit, &job, turn).await?;
-            self.remember(digest, picture.clone());
+            self.remember(digest, &picture);
             // The turn went to the next one when this was drawn; pictures that are encoded count until here.
             drop(place);
             Ok(picture)
@@ -236,8 +236,9 @@ impl Maker {
         drawn
     }
 
-    fn remember(&self, digest: Digest, picture: Bytes) {
-        self.memory.insert(digest, picture);
+    fn remember(&self, digest: Digest, picture: &Bytes) {
+        // A copy: what came over a connection is a part of its buffer, which would be kept as a whole and counted as this part.
+        self.memory.insert(digest, Bytes::copy_from_slice(picture));
         self.metrics.cache_bytes.set(self.memory.weight() as i64);
     }
 }

@@ -208,7 +208,9 @@ fn bad(answers: &[Answered]) -> Vec<String> {
 /// Answers of the time that counts.
 fn counted(answers: &[Answered], time: Time) -> Counted {
     let mut all = Counted::default();
-    for answered in answers.iter().filter(|one| time.has(one.ended_at())) {
+    // Who was sent away until the end has no answer that ended in time, and was sent away all the same.
+    let is_counted = |one: &&Answered| time.has(one.ended_at()) || matches!(one.got, Got::Nothing);
+    for answered in answers.iter().filter(is_counted) {
         all.sent_away += u64::from(answered.sent_away);
         match answered.got {
             Got::Picture(bytes) => all.add(answered.took, bytes),
