@@ -89,14 +89,25 @@ fn a_new_tile_waits_for_a_store_far_away_twice_at_most_and_for_no_write() {
         render_workers: 2,
         tile_servers: 1,
     };
-    let cluster = Cluster::start(shape, inbox.path()).unwrap();
+    let mut cluster = Cluster::start(shape, inbox.path()).unwrap();
     let files: Vec<PathBuf> = (0..MONTHS)
         .map(|month| granule::write(inbox.path(), month, 0).unwrap())
         .collect();
     notice(&cluster, &files);
     until_whole(&cluster, files.len());
-    // Kernels are compiled, and connections to the store stand.
-    ask(&cluster, "0/0/0", "2000-01-20");
+    // Nobody who draws has anything in memory.
+    for worker in ["render-1", "render-2"] {
+        let node = cluster.node(worker).unwrap();
+        node.stop().unwrap();
+        node.restart().unwrap();
+        node.wait_until_ready().unwrap();
+    }
+    let up = |cluster: &Cluster| {
+        let workers = r#"fluxglobe_render_fleet_workers{health="up"}"#;
+        let up = cluster.nodes["tile-server"].metric(workers)?;
+        Ok((up >= 2.0).then_some(()))
+    };
+    cluster.wait_for("both workers", LIMIT, up).unwrap();
     cluster.s3.delay(DELAY);
     for (tile, time, most, what) in [
         ("1/0/1", "2000-03-20", MOST_ROUNDS, "frames that nobody has"),

@@ -1,6 +1,6 @@
 //! The products that a running server lists: an address in, the product to measure with out.
 
-use anyhow::{Context as _, Result};
+use anyhow::{Context as _, Result, bail};
 use contract::job::Mode;
 use contract::product::ProductId;
 use contract::time::TimeMs;
@@ -27,7 +27,8 @@ struct Step {
     end: TimeMs,
 }
 
-/// The time of a product, from the start of its first step to the end of its last.
+/// The time in which every instant of a product is a picture of its own: from the middle of its first step to that of its last.
+/// All of its time, if there is one step alone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Span {
     first_ms: i64,
@@ -69,14 +70,18 @@ fn chosen(products: Vec<Listed>, layer: Option<&ProductId>, mode: Mode) -> Resul
 }
 
 impl Listed {
-    /// All of its time.
+    /// The time in which it changes.
     pub(super) fn span(&self) -> Result<Span> {
-        let first = self.steps.first().context("the product has no steps")?;
-        let last = self.steps.last().context("the product has no steps")?;
-        let length_ms = last.end.ms() - first.start.ms();
-        let length_ms = u64::try_from(length_ms).ok().filter(|length| *length > 0);
+        let middle_ms = |step: &Step| i64::midpoint(step.start.ms(), step.end.ms());
+        let (first_ms, end_ms) = match &self.steps[..] {
+            [] => bail!("the product has no steps"),
+            [only] => (only.start.ms(), only.end.ms()),
+            [first, .., last] => (middle_ms(first), middle_ms(last)),
+        };
+        let length_ms = u64::try_from(end_ms - first_ms).ok();
+        let length_ms = length_ms.filter(|length| *length > 0);
         Ok(Span {
-            first_ms: first.start.ms(),
+            first_ms,
             length_ms: length_ms.context("the product ends before it begins")?,
         })
     }
@@ -127,10 +132,10 @@ pub(super) mod tests {
     #[test]
     fn instants_lie_in_the_span_and_begin_anew_after_its_end() {
         let span = product().span().unwrap();
-        assert_eq!(span.at_share(0), "2000-01-01T00:00:00Z");
-        assert!(span.at_share(u64::MAX).starts_with("2000-02-29T23:59:59"));
+        assert_eq!(span.at_share(0), "2000-01-16T12:00:00Z");
+        assert!(span.at_share(u64::MAX).starts_with("2000-02-15T11:59:59"));
         let day_ms = 86_400_000;
-        assert_eq!(span.at_ms(31 * day_ms), "2000-02-01T00:00:00Z");
-        assert_eq!(span.at_ms(61 * day_ms), "2000-01-02T00:00:00Z");
+        assert_eq!(span.at_ms(10 * day_ms), "2000-01-26T12:00:00Z");
+        assert_eq!(span.at_ms(31 * day_ms), "2000-01-17T12:00:00Z");
     }
 }

@@ -30,6 +30,21 @@ async fn the_same_tile_is_drawn_once() {
 }
 
 #[tokio::test]
+async fn what_is_kept_in_memory_keeps_no_more_than_itself() {
+    let app = TestApp::new().await;
+    app.drawer.stores_nothing.store(true, Ordering::SeqCst);
+    drop(app.get(TILE).await);
+    // A picture that came over a connection is a part of its buffer: whoever holds on to it holds all of that.
+    let given = app.drawer.given.lock().unwrap().remove(0);
+    assert!(
+        given.is_unique(),
+        "the memory holds on to what it was given"
+    );
+    assert_eq!(app.get(TILE).await.body, given);
+    assert_eq!(app.drawer.drawn_count(), 1);
+}
+
+#[tokio::test]
 async fn another_time_or_size_is_another_picture() {
     let app = TestApp::new().await;
     app.get(TILE).await;

@@ -61,6 +61,8 @@ pub(crate) struct Drawer {
     /// While true, pictures that are drawn are slow to be encoded: they wait for a permit of `turns` after they let go
     /// of their turn.
     pub(crate) encodes_slowly: AtomicBool,
+    /// Every picture that was given out.
+    pub(crate) given: Mutex<Vec<Bytes>>,
     /// While true, what is to be stored is not.
     pub(crate) stores_nothing: AtomicBool,
 }
@@ -78,6 +80,7 @@ impl Drawer {
         Self {
             store: store.clone(),
             jobs: Mutex::default(),
+            given: Mutex::default(),
             keeps: Mutex::default(),
             mood: Mutex::default(),
             is_slow: AtomicBool::new(false),
@@ -159,6 +162,7 @@ impl Draw for Drawer {
             return Ok(Self::jpeg_of(job));
         }
         let picture = Self::picture_of(job);
+        self.given.lock().unwrap().push(picture.clone());
         if keep == Keep::Yes {
             self.keep(job, &picture).await;
         }

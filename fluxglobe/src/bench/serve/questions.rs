@@ -154,7 +154,7 @@ mod tests {
         assert!(
             views
                 .address(0)
-                .contains("&width=1920&height=1080&time=2000-01-01")
+                .contains("&width=1920&height=1080&time=2000-01-16")
         );
         let tiles = Questions::about(&product(), &options(&["--tiles", "3"]), 0).unwrap();
         // 90 to 135 E is column 6; the equator to 40.98 N is row 3.
