@@ -9,6 +9,9 @@ use reqwest::header::RETRY_AFTER;
 
 /// Longest wait for one answer.
 const ANSWER_LIMIT: Duration = Duration::from_mins(2);
+/// A connection that nothing moved on for so long is not used again: servers end those on which nothing was asked after 10 s and
+/// others after 75 s, and a question that meets that end has no answer. Browsers ask again then.
+const IDLE_LIMIT: Duration = Duration::from_secs(5);
 /// Pause after a bad answer: whoever is treated badly does not storm the server.
 const PAUSE: Duration = Duration::from_millis(100);
 /// Longest pause that a server may ask for.
@@ -44,7 +47,10 @@ impl Answered {
 
 /// A client with connections of its own that stay open.
 pub(super) fn client() -> Result<reqwest::Client> {
-    Ok(reqwest::Client::builder().timeout(ANSWER_LIMIT).build()?)
+    let client = reqwest::Client::builder()
+        .timeout(ANSWER_LIMIT)
+        .pool_idle_timeout(IDLE_LIMIT);
+    Ok(client.build()?)
 }
 
 /// Asks until there is a picture, or something that `check` takes for none, or the time is over.
