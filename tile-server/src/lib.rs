@@ -23,6 +23,7 @@ pub mod backend;
 mod catalogue;
 pub mod config;
 mod connections;
+mod edition;
 pub mod error;
 mod extract;
 mod gate;

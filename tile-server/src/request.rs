@@ -50,7 +50,7 @@ pub fn job(
         time,
         options: PictureOptions::default(),
     };
-    job_of(layer, &request, Beside::default())
+    job_of(layer, &request, &Beside::default())
 }
 
 /// Newest versions of products that are drawn with a layer.
@@ -84,7 +84,7 @@ impl VectorAt {
 pub(crate) fn job_of(
     layer: &Layer,
     request: &PictureRequest,
-    beside: Beside,
+    beside: &Beside,
 ) -> Result<RenderJob, ServerError> {
     let time = shown_time(layer, request.time);
     let accumulated = layer.accumulated.as_ref();
@@ -94,7 +94,7 @@ pub(crate) fn job_of(
         accumulated: accumulated.map(|lift| &*lift.manifest),
         northward: layer.northward.as_ref().map(|part| &*part.manifest),
         trails: beside.trails.as_ref().and_then(VectorAt::sources),
-        relief: beside.relief,
+        relief: beside.relief.clone(),
     };
     Ok(request.job(&sources)?)
 }

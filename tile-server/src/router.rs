@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use axum::error_handling::HandleErrorLayer;
-use axum::http::Method;
+use axum::http::{Method, header};
 use axum::middleware::{from_fn, from_fn_with_state};
 use axum::routing::get;
 use axum::{BoxError, Router};
@@ -29,7 +29,9 @@ pub fn router(state: AppState) -> Router {
     let other_origins = CorsLayer::new()
         .allow_origin(Any)
         .allow_methods([Method::GET, Method::HEAD])
-        .expose_headers([SHOWN_TIME, COVERED]);
+        // Everybody gets the same headers: caches on the way need one copy for all pages.
+        .vary([])
+        .expose_headers([SHOWN_TIME, COVERED, header::CONTENT_LOCATION]);
     // What a request waited for goes on after its time only if somebody else waits for it too.
     let limit_s = state.settings.request_limit_s;
     let timed_out = move |_elapsed: BoxError| async move { ServerError::TimedOut { limit_s } };

@@ -1,23 +1,27 @@
 //! `/globe/{product}/{mode}.png`: the globe from somewhere above, or from below the sea, as a picture of any size.
 
+use std::sync::Arc;
+
 use axum::extract::State;
-use axum::http::HeaderMap;
+use axum::http::{HeaderMap, HeaderValue, Uri, header};
 use axum::response::Response;
 use contract::camera::CameraAngles;
 use contract::grid::LonLatDeg;
 use contract::job::{RenderJob, View};
 use contract::look_at::LookAt;
-use contract::picture::PictureRequest;
+use contract::picture::{PictureOptions, PictureRequest};
 use serde::Deserialize;
 use utoipa::IntoParams;
 
 use crate::annotations::AnnotationsQuery;
+use crate::catalogue::Layer;
+use crate::edition::{Edition, Named};
 use crate::error::ServerError;
 use crate::extract::{UrlPath, UrlQuery, number, time, whole_number};
 use crate::ground::GroundQuery;
 use crate::look::LookQuery;
 use crate::openapi::words;
-use crate::request;
+use crate::request::{self, Beside};
 use crate::routes::picture::{self, Shown};
 use crate::state::AppState;
 use crate::surroundings::SurroundingsQuery;
@@ -27,7 +31,7 @@ const HEIGHT_KM: f64 = 15_000.0;
 /// Width and height unless told otherwise, pixels.
 const SIZE_PX: u32 = 512;
 
-#[derive(Debug, Deserialize, IntoParams)]
+#[derive(Debug, Default, Deserialize, IntoParams)]
 #[into_params(parameter_in = Query)]
 pub(crate) struct GlobeQuery {
     /// Longitude below the camera, degrees east; 0 unless one is given. Not with `look_at`.
@@ -71,6 +75,10 @@ pub(crate) struct GlobeQuery {
     height: Option<String>,
     /// Version, as answers name it; the newest unless one is given.
     manifest: Option<String>,
+    /// Everything else that shapes the picture, as `content-location` and the list of products name it: with `time`,
+    /// `manifest` and the edition of now the answer may be kept for ever.
+    #[param(example = "0123456789abcdef")]
+    edition: Option<String>,
     #[serde(flatten)]
     #[param(ignore)]
     look: LookQuery,
@@ -104,6 +112,8 @@ pub(crate) struct GlobeQuery {
         (status = 200, description = "The view", content(("image/png")),
             headers(
                 ("etag" = String, description = "Names the job: the same tag is the same picture, byte for byte"),
+                ("cache-control" = String, description = "`immutable` where the address names `time`, `manifest` and the edition of now"),
+                ("content-location" = String, description = "The address that names everything which shapes this picture, where the one asked does not"),
                 ("fluxglobe-time" = String, description = "The instant that is shown, ISO 8601"),
                 ("fluxglobe-time-covered" = String, description = "`start/end` of what there is, where another instant is shown than was asked for"),
             )),
@@ -114,10 +124,29 @@ pub(crate) async fn get(
     State(state): State<AppState>,
     UrlPath((product, file)): UrlPath<(String, String)>,
     UrlQuery(query): UrlQuery<GlobeQuery>,
+    uri: Uri,
     headers: HeaderMap,
 ) -> Result<Response, ServerError> {
-    let (job, shown) = job(&state, &product, &file, &query).await?;
-    picture::respond(&state, &headers, job, shown).await
+    let asked = asked(&state, &product, &file, &query).await?;
+    let named = Named {
+        time: asked.request.time,
+        manifest: query.manifest.as_deref(),
+        edition: query.edition.as_deref(),
+    };
+    let is_pinned = named.is_everything(|| asked.edition())?;
+    let pinned = if is_pinned {
+        None
+    } else {
+        asked.pinned_address(&uri)
+    };
+    let (job, shown) = (asked.job, asked.shown);
+    let mut response = picture::respond(&state, &headers, job, shown, is_pinned).await?;
+    if let Some(address) = pinned {
+        response
+            .headers_mut()
+            .insert(header::CONTENT_LOCATION, address);
+    }
+    Ok(response)
 }
 
 /// The job of a view, and the instant that it shows.
@@ -127,6 +156,72 @@ pub(crate) async fn job(
     file: &str,
     query: &GlobeQuery,
 ) -> Result<(RenderJob, Shown), ServerError> {
+    let asked = asked(state, product, file, query).await?;
+    Ok((asked.job, asked.shown))
+}
+
+/// What an address asks for, of which versions.
+struct Asked {
+    layer: Arc<Layer>,
+    request: PictureRequest,
+    beside: Beside,
+    job: RenderJob,
+    shown: Shown,
+}
+
+impl Asked {
+    fn edition(&self) -> Result<Edition, ServerError> {
+        let mut views = reference_views()?;
+        // What is drawn over a picture depends on its camera.
+        if !self.request.options.annotations.is_empty() {
+            views.push(self.request.view);
+        }
+        Edition::of(&self.layer, &self.request, &self.beside, &views)
+    }
+
+    /// The address of the same picture for ever.
+    fn pinned_address(&self, uri: &Uri) -> Option<HeaderValue> {
+        let edition = self.edition().ok()?;
+        let names = ["time=", "manifest=", "edition="];
+        let query = uri.query().unwrap_or_default().split('&');
+        let others = query.filter(|part| {
+            !part.is_empty() && !names.into_iter().any(|name| part.starts_with(name))
+        });
+        let pins = edition.parameters(&self.shown.time.to_string(), &self.layer);
+        let parts: Vec<_> = others.chain(pins.iter().map(String::as_str)).collect();
+        format!("{}?{}", uri.path(), parts.join("&")).parse().ok()
+    }
+}
+
+/// The views that editions go by: what is seen where an address says nothing of its camera, looks at a place, or looks
+/// from below the sea.
+pub(crate) fn reference_views() -> Result<Vec<View>, ServerError> {
+    let looking = GlobeQuery {
+        look_at: Some("10,20".to_owned()),
+        tilt: Some("50".to_owned()),
+        heading: Some("30".to_owned()),
+        ..GlobeQuery::default()
+    };
+    let below = GlobeQuery {
+        height_km: Some("-100".to_owned()),
+        tilt: Some("180".to_owned()),
+        ..GlobeQuery::default()
+    };
+    let all = [GlobeQuery::default(), looking, below];
+    all.iter().map(GlobeQuery::view).collect()
+}
+
+/// The options of a picture at an address that says nothing of its look.
+pub(crate) fn usual_options() -> Result<PictureOptions, ServerError> {
+    GlobeQuery::default().options()
+}
+
+async fn asked(
+    state: &AppState,
+    product: &str,
+    file: &str,
+    query: &GlobeQuery,
+) -> Result<Asked, ServerError> {
     let name = file
         .strip_suffix(".png")
         .ok_or(ServerError::UnknownAddress)?;
@@ -135,21 +230,33 @@ pub(crate) async fn job(
     let mode = request::mode(&layer, name)?;
     let view = query.view()?;
     let time = time(query.time.as_deref())?;
-    let mut options = query.surroundings.around(&query.look.parse()?.options())?;
-    options = query.ground.below(&options)?;
-    options.annotations = query.annotations.wishes()?;
     let request = PictureRequest {
         mode,
         view,
         time,
-        options,
+        options: query.options()?,
     };
     let beside = query.surroundings.beside(&state.catalogue).await?;
-    let job = request::job_of(&layer, &request, beside)?;
-    Ok((job, Shown::of(&layer, time)))
+    let job = request::job_of(&layer, &request, &beside)?;
+    let shown = Shown::of(&layer, time);
+    Ok(Asked {
+        layer,
+        request,
+        beside,
+        job,
+        shown,
+    })
 }
 
 impl GlobeQuery {
+    fn options(&self) -> Result<PictureOptions, ServerError> {
+        let around = self.surroundings.around(&self.look.parse()?.options())?;
+        Ok(PictureOptions {
+            annotations: self.annotations.wishes()?,
+            ..self.ground.below(&around)?
+        })
+    }
+
     fn view(&self) -> Result<View, ServerError> {
         let pixels = |name, text: Option<&str>| {
             text.map_or(Ok(SIZE_PX), |text| {

@@ -14,6 +14,8 @@ use crate::state::AppState;
 
 /// An address means "the newest version", so a copy may be used unasked only as long as nobody minds a late change.
 pub(crate) const CACHE_CONTROL: &str = "public, max-age=60";
+/// An address that names everything that shapes its answer has one answer for ever.
+const CACHE_CONTROL_PINNED: &str = "public, max-age=31536000, immutable";
 
 /// The instant that a picture shows.
 pub(crate) const SHOWN_TIME: HeaderName = HeaderName::from_static("fluxglobe-time");
@@ -62,11 +64,17 @@ pub(crate) async fn respond(
     asked: &HeaderMap,
     job: RenderJob,
     shown: Shown,
+    is_pinned: bool,
 ) -> Result<Response, ServerError> {
     let tag = format!("\"{}\"", job.digest());
+    let cache_control = if is_pinned {
+        CACHE_CONTROL_PINNED
+    } else {
+        CACHE_CONTROL
+    };
     let headers = [
         (header::ETAG, tag.clone()),
-        (header::CACHE_CONTROL, CACHE_CONTROL.to_owned()),
+        (header::CACHE_CONTROL, cache_control.to_owned()),
     ];
     if has_tag(asked, &tag) {
         state.metrics.hit(Source::Client);

@@ -6,16 +6,20 @@ use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse as _, Response};
 use contract::colour::TransferFunction;
 use contract::digest::Digest;
-use contract::job::Mode;
+use contract::job::{Mode, View};
 use contract::listing::ListedProduct;
+use contract::picture::{PictureOptions, PictureRequest};
 use contract::time::{Period, TimeMs};
 use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::catalogue::Layer;
+use crate::edition::Edition;
 use crate::error::ServerError;
 use crate::openapi::words;
+use crate::request::Beside;
 use crate::routes::picture::has_tag;
+use crate::routes::{globe, tiles};
 use crate::state::AppState;
 use legend::Legend;
 
@@ -41,12 +45,54 @@ struct Product {
     /// Ways it can be drawn.
     #[schema(value_type = Vec<words::Mode>)]
     modes: &'static [Mode],
+    /// Addresses of its pictures in the usual look, one entry a mode; what they answer may be kept for ever.
+    pinned: Vec<PinnedAddresses>,
     /// What its own colours mean.
     legend: Legend,
     /// That of the mode flow, where there is one: speeds.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     flow_legend: Option<Legend>,
+}
+
+/// Addresses of one mode's pictures that name version and edition, relative to this server. `{time}` is any instant, ISO 8601
+/// UTC. TileJSON has those of tiles in any look, `content-location` of a globe view that of the view.
+#[derive(Debug, Serialize, ToSchema)]
+struct PinnedAddresses {
+    /// The mode.
+    #[schema(value_type = words::Mode)]
+    mode: Mode,
+    /// Map tiles, with `{z}`, `{x}` and `{y}`.
+    tiles: String,
+    /// The globe; parameters of the camera may follow.
+    globe: String,
+}
+
+impl PinnedAddresses {
+    /// None where the parts of a vector do not fit together.
+    fn of(layer: &Layer, mode: Mode) -> Option<Self> {
+        let product = &layer.manifest.product;
+        let query = |options: PictureOptions, views: &[View]| {
+            let request = PictureRequest {
+                mode,
+                view: *views.first()?,
+                time: None,
+                options,
+            };
+            let edition = Edition::of(layer, &request, &Beside::default(), views).ok()?;
+            Some(edition.parameters("{time}", layer).join("&"))
+        };
+        let of_tiles = query(PictureOptions::default(), &tiles::reference_views())?;
+        let of_globe = query(
+            globe::usual_options().ok()?,
+            &globe::reference_views().ok()?,
+        )?;
+        Some(Self {
+            mode,
+            tiles: format!("/tiles/{product}/{mode}/{{z}}/{{x}}/{{y}}.png?{of_tiles}"),
+            globe: format!("/globe/{product}/{mode}.png?{of_globe}"),
+        })
+    }
 }
 
 /// When a step holds.
@@ -86,9 +132,17 @@ pub(crate) async fn list(
     asked: HeaderMap,
 ) -> Result<Response, ServerError> {
     let layers = state.catalogue.layers().await?;
+    let pinned = |layer: &Layer| {
+        let modes = layer.modes().iter();
+        let pinned = modes.filter_map(|&mode| PinnedAddresses::of(layer, mode));
+        pinned.collect::<Vec<_>>()
+    };
+    let addresses: Vec<_> = layers.iter().map(|layer| pinned(layer)).collect();
+    // Versions of all that a product is drawn from are in its editions.
     let names: Vec<_> = layers
         .iter()
-        .map(|layer| (&layer.id, layer.accumulated.as_ref().map(|lift| &lift.id)))
+        .map(|layer| &layer.id)
+        .zip(&addresses)
         .collect();
     // Weak: the same list may be sent compressed or not.
     let tag = format!("W/\"{}\"", Digest::of_json(&names));
@@ -99,11 +153,14 @@ pub(crate) async fn list(
     if has_tag(&asked, &tag) {
         return Ok((StatusCode::NOT_MODIFIED, headers).into_response());
     }
-    let products = layers.iter().map(|layer| product(layer)).collect();
+    let listed = layers.iter().zip(addresses);
+    let products = listed
+        .map(|(layer, pinned)| product(layer, pinned))
+        .collect();
     Ok((headers, Json(Products { products })).into_response())
 }
 
-fn product(layer: &Layer) -> Product {
+fn product(layer: &Layer, pinned: Vec<PinnedAddresses>) -> Product {
     let manifest = &layer.manifest;
     let display = manifest.quantity.display();
     Product {
@@ -117,6 +174,7 @@ fn product(layer: &Layer) -> Product {
             .map(|step| step.period.into())
             .collect(),
         modes: layer.modes(),
+        pinned,
         legend: Legend::of(
             manifest.quantity,
             &TransferFunction::default_for(manifest.quantity),

@@ -7,18 +7,21 @@ use axum::response::{IntoResponse as _, Response};
 use contract::grid::Grid;
 use contract::job::Mode;
 use contract::manifest::ManifestId;
+use contract::picture::PictureRequest;
 use contract::tile::{MAX_LAT_DEG, MAX_ZOOM};
 use contract::time::TimeMs;
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
 
 use crate::annotations::AnnotationsQuery;
-use crate::catalogue::Layer;
+use crate::catalogue::{Catalogue, Layer};
+use crate::edition::Edition;
 use crate::error::ServerError;
 use crate::extract::{UrlPath, UrlQuery, time};
 use crate::look::LookQuery;
 use crate::openapi::words;
 use crate::request;
+use crate::routes::tiles;
 use crate::state::AppState;
 use crate::surroundings::SurroundingsQuery;
 
@@ -47,28 +50,56 @@ pub(crate) struct TileJsonQuery {
     annotations: AnnotationsQuery,
 }
 
+/// The queries of tiles, in their canonical form.
+struct TileQueries {
+    /// What was asked for.
+    asked: String,
+    /// The same with version and edition, and `{time}` for the instant.
+    pinned: Option<String>,
+}
+
 impl TileJsonQuery {
-    /// The same query as tiles take it, in its canonical form.
-    fn of_tiles(&self, layer: &Layer, mode: Mode) -> Result<String, ServerError> {
+    /// The same query as tiles take it.
+    async fn of_tiles(
+        &self,
+        catalogue: &Catalogue,
+        layer: &Layer,
+        mode: Mode,
+    ) -> Result<TileQueries, ServerError> {
         self.annotations.refused_on_tiles()?;
-        let time = time(self.time.as_deref())?.map(|time| format!("time={time}"));
-        // Named as it was found, not as it was written.
-        let manifest = self.manifest.as_ref();
-        let manifest = manifest.map(|_named| format!("manifest={}", layer.id));
+        let time = time(self.time.as_deref())?;
         let look = self.look.parse()?;
+        let options = self.surroundings.around(&look.options())?;
         // What cannot be drawn is refused here, not by every tile.
-        self.surroundings.around(&look.options())?.style(
-            layer.manifest.quantity,
+        options.style(layer.manifest.quantity, mode, layer.extent.end)?;
+        let beside = self.surroundings.beside(catalogue).await?;
+        let views = tiles::reference_views();
+        let request = PictureRequest {
             mode,
-            layer.extent.end,
-        )?;
+            view: views[0],
+            time,
+            options,
+        };
+        let edition = Edition::of(layer, &request, &beside, &views).ok();
         let around = self.surroundings.of_tiles()?;
-        let parts = time
-            .into_iter()
-            .chain(manifest)
-            .chain(look.parameters())
-            .chain(around);
-        Ok(query_of(&parts.collect::<Vec<_>>()))
+        let look: Vec<_> = look.parameters().into_iter().chain(around).collect();
+        let query = |pins: Vec<String>| query_of(&[pins, look.clone()].concat());
+        let named = self.manifest.as_ref().map(|_named| {
+            // Named as it was found, not as it was written.
+            let manifest = format!("manifest={}", layer.id);
+            let edition = edition.as_ref().map(Edition::parameter);
+            [Some(manifest), edition].into_iter().flatten()
+        });
+        let time = time.map(|time| format!("time={time}"));
+        let asked = time.into_iter().chain(named.into_iter().flatten());
+        let pinned = edition.as_ref().map(|edition| {
+            let pins = edition.parameters("{time}", layer);
+            query(pins.into())
+        });
+        Ok(TileQueries {
+            asked: query(asked.collect()),
+            pinned,
+        })
     }
 
     /// The drawing of the colours as HTML, which is one of the two things clients take a legend for.
@@ -107,6 +138,11 @@ struct TileJson<'a> {
     scheme: &'static str,
     /// Address of the tiles with `{z}`, `{x}` and `{y}`, everything that was asked for in it.
     tiles: [String; 1],
+    /// The same of this version and look at any instant, with `{time}` (ISO 8601 UTC) as well: what it answers may be kept for
+    /// ever. Absent where the parts of a vector do not fit together.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pinned_tiles: Option<[String; 1]>,
     /// Least zoom.
     minzoom: u8,
     /// Zoom beyond which tiles would only be magnified.
@@ -151,19 +187,21 @@ pub(crate) async fn get(
     let named = query.manifest.as_deref();
     let layer = state.catalogue.version(&product, named).await?;
     let mode = request::mode(&layer, name)?;
-    let at = query.of_tiles(&layer, mode)?;
+    let queries = query.of_tiles(&state.catalogue, &layer, mode).await?;
     let manifest = &layer.manifest;
     let origin = origin(&headers);
+    let tiles = format!(
+        "{origin}/tiles/{}/{mode}/{{z}}/{{x}}/{{y}}.png",
+        manifest.product
+    );
     let answer = TileJson {
         tilejson: "3.0.0",
         name: format!("{}, {mode}", manifest.title),
         description: manifest.quantity.title(),
         attribution: attribution(manifest.synthetic, &manifest.source),
         scheme: "xyz",
-        tiles: [format!(
-            "{origin}/tiles/{}/{mode}/{{z}}/{{x}}/{{y}}.png{at}",
-            manifest.product
-        )],
+        tiles: [format!("{tiles}{}", queries.asked)],
+        pinned_tiles: queries.pinned.map(|query| [format!("{tiles}{query}")]),
         minzoom: 0,
         maxzoom: max_zoom(&manifest.grid),
         bounds: bounds(&manifest.grid),

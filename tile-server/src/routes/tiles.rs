@@ -10,6 +10,7 @@ use serde::Deserialize;
 use utoipa::IntoParams;
 
 use crate::annotations::AnnotationsQuery;
+use crate::edition::{Edition, Named};
 use crate::error::ServerError;
 use crate::extract::{UrlPath, UrlQuery, time, whole_number};
 use crate::look::LookQuery;
@@ -35,6 +36,10 @@ pub(crate) struct TileQuery {
     size: Option<String>,
     /// Version, as answers name it; the newest unless one is given.
     manifest: Option<String>,
+    /// Everything else that shapes the picture, as TileJSON and the list of products name it: with `time`, `manifest` and the
+    /// edition of now the answer may be kept for ever.
+    #[param(example = "0123456789abcdef")]
+    edition: Option<String>,
     #[serde(flatten)]
     #[param(ignore)]
     look: LookQuery,
@@ -67,6 +72,7 @@ pub(crate) struct TileQuery {
         (status = 200, description = "The tile; transparent where there is no data", content(("image/png")),
             headers(
                 ("etag" = String, description = "Names the job: the same tag is the same picture, byte for byte"),
+                ("cache-control" = String, description = "`immutable` where the address names `time`, `manifest` and the edition of now"),
                 ("fluxglobe-time" = String, description = "The instant that is shown, ISO 8601"),
                 ("fluxglobe-time-covered" = String, description = "`start/end` of what there is, where another instant is shown than was asked for"),
             )),
@@ -98,7 +104,14 @@ pub(crate) async fn get(
         options: around.around(&look.options())?,
     };
     let beside = around.beside(&state.catalogue).await?;
-    let job = request::job_of(&layer, &request, beside)?;
+    let job = request::job_of(&layer, &request, &beside)?;
+    let named = Named {
+        time,
+        manifest,
+        edition: query.edition.as_deref(),
+    };
+    let is_pinned =
+        named.is_everything(|| Edition::of(&layer, &request, &beside, &reference_views()))?;
     let shown = Shown::of(&layer, time);
     // Who looks at an old version, in colours of their own or at what is not drawn ahead, is no reason to draw a new one.
     if look.is_usual() && around.is_empty() && state.catalogue.is_newest(&layer) {
@@ -106,11 +119,17 @@ pub(crate) async fn get(
         let at = time.map(|_asked| shown.time);
         state.hot.asked(product, mode, &job.view, at);
     }
-    let response = picture::respond(&state, &headers, job, shown).await?;
+    let response = picture::respond(&state, &headers, job, shown, is_pinned).await?;
     if mode == Mode::Volume {
         state.freshness.served(&layer.id);
     }
     Ok(response)
+}
+
+/// The views that editions go by: a tile of every size.
+pub(crate) fn reference_views() -> [View; 2] {
+    let tile = Tile { z: 0, x: 0, y: 0 };
+    [SIZE_PX, SIZE_2X_PX].map(|size_px| View::Tile { tile, size_px })
 }
 
 fn parse_size(text: &str) -> Result<u32, ServerError> {

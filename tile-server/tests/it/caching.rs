@@ -10,6 +10,8 @@ use tile_server::backend::Keep;
 
 use crate::app::TestApp;
 
+const PINNED: &str = "public, max-age=31536000, immutable";
+const NEWEST: &str = "public, max-age=60";
 const TILE: &str = "/tiles/flux/volume/1/0/0.png?time=2000-02-01";
 
 #[tokio::test]
@@ -242,4 +244,252 @@ async fn a_budget_of_one_version_is_computed_once() {
     app.land("flux", Quantity::CarbonFlux, 2).await;
     app.get(path).await;
     assert_eq!(app.analyst.budgets.lock().unwrap().len(), 3);
+}
+
+/// The address of a tile that TileJSON hands out, complete.
+async fn pinned_tile(app: &TestApp, tilejson: &str) -> String {
+    let body = app.get(tilejson).await.json();
+    let template = body["pinned_tiles"][0].as_str().unwrap();
+    template
+        .replace("{z}/{x}/{y}", "1/0/0")
+        .replace("{time}", "2000-02-01T00:00:00Z")
+}
+
+/// An address without one of its parameters.
+fn without(address: &str, name: &str) -> String {
+    let (path, query) = address.split_once('?').unwrap();
+    let parts = query.split('&');
+    let kept: Vec<_> = parts.filter(|part| !part.starts_with(name)).collect();
+    assert_ne!(kept.join("&"), query, "{name}");
+    format!("{path}?{}", kept.join("&"))
+}
+
+#[tokio::test]
+async fn an_address_that_names_everything_may_be_kept_for_ever() {
+    let app = TestApp::new().await;
+    let pinned = pinned_tile(&app, "/tiles/flux/volume.json").await;
+    let answer = app.get(&pinned).await;
+    assert_eq!(answer.status, StatusCode::OK, "{}", answer.text());
+    assert_eq!(answer.header("cache-control"), PINNED);
+    assert_eq!(answer.header("vary"), "", "one copy for all pages");
+    let newest = app.get(TILE).await;
+    assert_eq!(newest.header("cache-control"), NEWEST);
+    assert_eq!(
+        (newest.body, newest.headers["etag"].clone()),
+        (answer.body, answer.headers["etag"].clone())
+    );
+    let tag = answer.headers["etag"].to_str().unwrap();
+    for (address, lasts) in [(&*pinned, PINNED), (TILE, NEWEST)] {
+        let again = app.get_with(address, &[("if-none-match", tag)]).await;
+        assert_eq!(again.status, StatusCode::NOT_MODIFIED);
+        assert_eq!(again.header("cache-control"), lasts);
+    }
+    for size in ["&size=512", "&size=256"] {
+        let answer = app.get(&format!("{pinned}{size}")).await;
+        assert_eq!(answer.header("cache-control"), PINNED, "{size}");
+    }
+}
+
+#[tokio::test]
+async fn an_address_that_leaves_something_open_is_asked_again() {
+    let app = TestApp::new().await;
+    for pinned in [
+        pinned_tile(&app, "/tiles/flux/volume.json").await,
+        pinned_tile(&app, "/tiles/flux/map.json?palette=haline&range=-40:40").await,
+    ] {
+        assert_eq!(app.get(&pinned).await.header("cache-control"), PINNED);
+        for name in ["time=", "manifest=", "edition="] {
+            let answer = app.get(&without(&pinned, name)).await;
+            assert_eq!(answer.status, StatusCode::OK);
+            assert_eq!(answer.header("cache-control"), NEWEST, "{name}");
+        }
+        // Another look, or one that nobody named this edition for.
+        for other in ["&coastlines=true", "&reverse=true", "&isolines=auto"] {
+            let answer = app.get(&format!("{pinned}{other}")).await;
+            assert_eq!(answer.status, StatusCode::OK, "{}", answer.text());
+            assert_eq!(answer.header("cache-control"), NEWEST, "{other}");
+        }
+        let edition = pinned.split_once("edition=").unwrap().1[..16].to_owned();
+        let other = pinned.replace(&edition, "0123456789abcdef");
+        assert_eq!(app.get(&other).await.header("cache-control"), NEWEST);
+        for none in ["", "newest", "0123456789ABCDEF", "0123"] {
+            let answer = app.get(&pinned.replace(&edition, none)).await;
+            assert_eq!(answer.status, StatusCode::BAD_REQUEST, "{none:?}");
+            assert_eq!(answer.header("cache-control"), "no-store");
+        }
+    }
+}
+
+#[tokio::test]
+async fn an_address_of_an_old_version_keeps_its_bytes_for_ever() {
+    let app = TestApp::with(|settings| settings.tile_memory_bytes = 0).await;
+    let [lifted, flat] = [
+        pinned_tile(&app, "/tiles/flux/volume.json").await,
+        pinned_tile(&app, "/tiles/flux/map.json").await,
+    ];
+    let before = [app.get(&lifted).await, app.get(&flat).await];
+    let flux = app.land("flux", Quantity::CarbonFlux, 2).await;
+    let check = async || {
+        for (address, before) in [&lifted, &flat].into_iter().zip(&before) {
+            let now = app.get(address).await;
+            assert_eq!(now.header("cache-control"), PINNED, "{address}");
+            assert_eq!(now.body, before.body, "{address}");
+        }
+    };
+    check().await;
+    app.land_derived(
+        "flux-accumulated",
+        Quantity::AccumulatedCarbon,
+        2,
+        Some(flux),
+    )
+    .await;
+    check().await;
+    let new = pinned_tile(&app, "/tiles/flux/volume.json").await;
+    assert_ne!(new, lifted);
+    let answer = app.get(&new).await;
+    assert_eq!(answer.header("cache-control"), PINNED);
+    assert_ne!(answer.body, before[0].body);
+    // Asked for by its version, a layer names the same addresses as it did.
+    let (_, query) = lifted.split_once("manifest=").unwrap();
+    let manifest = query.split('&').next().unwrap();
+    let named = format!("/tiles/flux/volume.json?manifest={manifest}");
+    assert_eq!(pinned_tile(&app, &named).await, lifted);
+    let tiles = app.get(&format!("{named}&time=2000-02-01")).await.json();
+    let tiles = tiles["tiles"][0].as_str().unwrap();
+    assert_eq!(tiles.replace("{z}/{x}/{y}", "1/0/0"), lifted);
+}
+
+#[tokio::test]
+async fn an_edition_ends_with_what_its_picture_was_drawn_from() {
+    let app = TestApp::empty(|_settings| {});
+    let flux = app.land("flux", Quantity::CarbonFlux, 1).await;
+    let [lifted, flat] = [
+        pinned_tile(&app, "/tiles/flux/volume.json").await,
+        pinned_tile(&app, "/tiles/flux/map.json").await,
+    ];
+    let before = app.get(&lifted).await;
+    assert_eq!(before.header("cache-control"), PINNED);
+    app.land_derived(
+        "flux-accumulated",
+        Quantity::AccumulatedCarbon,
+        1,
+        Some(flux),
+    )
+    .await;
+    let after = app.get(&lifted).await;
+    assert_ne!(after.body, before.body, "it is lifted now");
+    assert_eq!(after.header("cache-control"), NEWEST);
+    assert_eq!(app.get(&flat).await.header("cache-control"), PINNED);
+}
+
+#[tokio::test]
+async fn an_edition_ends_with_a_new_version_of_what_is_drawn_beside_the_layer() {
+    let app = TestApp::new().await;
+    for part in ["sea-east", "sea-north"] {
+        app.land(part, Quantity::Current, 1).await;
+    }
+    let trails = pinned_tile(&app, "/tiles/flux/map.json?trails=sea").await;
+    let plain = pinned_tile(&app, "/tiles/flux/map.json").await;
+    let flow = pinned_tile(&app, "/tiles/sea-east/flow.json").await;
+    let lasts = async |address: &str| app.get(address).await.header("cache-control").to_owned();
+    for address in [&trails, &plain, &flow] {
+        assert_eq!(lasts(address).await, PINNED);
+    }
+    app.land("sea-north", Quantity::Current, 2).await;
+    assert_eq!(lasts(&trails).await, NEWEST);
+    assert_eq!(
+        lasts(&flow).await,
+        NEWEST,
+        "the northward part has no version in the address"
+    );
+    assert_eq!(lasts(&plain).await, PINNED);
+}
+
+#[tokio::test]
+async fn a_view_names_the_address_that_may_be_kept_for_ever() {
+    let app = TestApp::new().await;
+    for query in [
+        "",
+        "?",
+        "?time=2000-02-20&lon=-30&height_km=4000&palette=haline",
+        "?annotate=all&look_at=10,20&tilt=60&edition=0123456789abcdef",
+    ] {
+        let path = format!("/globe/flux/volume.png{query}");
+        let first = app.get(&path).await;
+        assert_eq!(first.status, StatusCode::OK, "{}", first.text());
+        assert_eq!(first.header("cache-control"), NEWEST);
+        let pinned = first.header("content-location").to_owned();
+        let second = app.get(&pinned).await;
+        assert_eq!(second.header("cache-control"), PINNED, "{pinned}");
+        assert_eq!(
+            (second.header("etag"), &second.body),
+            (first.header("etag"), &first.body)
+        );
+        assert_eq!(second.header("content-location"), "", "it is there already");
+        for name in ["time=", "manifest=", "edition="] {
+            let answer = app.get(&without(&pinned, name)).await;
+            assert_eq!(answer.header("cache-control"), NEWEST, "{name}");
+        }
+        // What is drawn over a picture goes by its camera.
+        let turned = app.get(&format!("{pinned}&roll=5")).await;
+        let lasts = if query.contains("annotate") {
+            NEWEST
+        } else {
+            PINNED
+        };
+        assert_eq!(turned.header("cache-control"), lasts, "{query}");
+    }
+}
+
+#[tokio::test]
+async fn the_list_of_products_names_addresses_that_may_be_kept_for_ever() {
+    let app = TestApp::new().await;
+    for part in ["sea-east", "sea-north"] {
+        app.land(part, Quantity::Current, 1).await;
+    }
+    let list = app.get("/api/products").await;
+    let mut count = 0;
+    for product in list.json()["products"].as_array().unwrap() {
+        let modes: Vec<_> = product["pinned"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|one| &one["mode"])
+            .collect();
+        assert_eq!(
+            modes,
+            product["modes"]
+                .as_array()
+                .unwrap()
+                .iter()
+                .collect::<Vec<_>>()
+        );
+        for one in product["pinned"].as_array().unwrap() {
+            let [tile, globe] = ["tiles", "globe"].map(|of| {
+                let template = one[of].as_str().unwrap();
+                let time = product["steps"][1]["mid"].as_str().unwrap();
+                template
+                    .replace("{z}/{x}/{y}", "1/0/0")
+                    .replace("{time}", time)
+            });
+            for address in [
+                tile,
+                format!("{globe}&lon=30&height_km=-50&tilt=180"),
+                globe,
+            ] {
+                let answer = app.get(&address).await;
+                assert_eq!(answer.status, StatusCode::OK, "{}", answer.text());
+                assert_eq!(answer.header("cache-control"), PINNED, "{address}");
+                count += 1;
+            }
+        }
+    }
+    assert!(count >= 3 * (4 + 1 + 4 + 5 + 4), "{count}");
+    // Where only what a layer is drawn from changes, the list changes too.
+    app.land("sea-north", Quantity::Current, 2).await;
+    let again = app
+        .get_with("/api/products", &[("if-none-match", list.header("etag"))])
+        .await;
+    assert_eq!(again.status, StatusCode::OK);
 }
