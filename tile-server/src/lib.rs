@@ -9,9 +9,10 @@
 //! everything else.
 //!
 //! Times are ISO 8601 and any instant is valid; a missing one is the middle of the last step. `from` and `to` bound the
-//! half-open period `[from, to)`. `manifest` names a version, as answers do; without it the newest one answers. An instant
-//! outside what a product covers shows the nearest one inside; pictures say so in `fluxglobe-time` and
-//! `fluxglobe-time-covered`. Every refusal is one JSON body, `error::Refusal`.
+//! half-open period `[from, to)`. `manifest` names a version, as answers do; without it the newest one answers. `edition`
+//! names what shapes a picture besides (`edition.rs`): an address with `time`, `manifest` and the edition of now is
+//! answered as one that never changes. An instant outside what a product covers shows the nearest one inside; pictures
+//! say so in `fluxglobe-time` and `fluxglobe-time-covered`. Every refusal is one JSON body, `error::Refusal`.
 //!
 //! Tiles, views, TileJSON and legends take how a picture is to look, in the unit people read (`look.rs`).
 //!

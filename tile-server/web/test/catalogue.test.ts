@@ -25,6 +25,7 @@ function product(id: string, title: string, derived_from: string | null = null):
     masked: { out_of_range: 0, poor_quality: 0, implausible: 0, steps: 0, uncounted_steps: 0 },
     steps: [],
     modes: ["map"],
+    pinned: [],
     legend: { low: 0, high: 1, unit: "", label: "", stops: [], ticks: [] },
   };
 }

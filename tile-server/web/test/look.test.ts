@@ -56,6 +56,7 @@ function product(id: string, change: Partial<Product> = {}): Product {
     masked: { out_of_range: 0, poor_quality: 0, implausible: 0, steps: 0, uncounted_steps: 0 },
     steps,
     modes: ["map", "volume"],
+    pinned: [],
     legend: { low: -40, high: 40, unit: "g C m⁻² yr⁻¹", label: "", stops: BALANCE.stops, ticks: [] },
     ...change,
   };

@@ -796,6 +796,18 @@ export interface components {
              */
             start: string;
         };
+        /**
+         * @description Addresses of one mode's pictures that name version and edition, relative to this server. `{time}` is any instant, ISO 8601
+         *     UTC. TileJSON has those of tiles in any look, `content-location` of a globe view that of the view.
+         */
+        PinnedAddresses: {
+            /** @description The globe; parameters of the camera may follow. */
+            globe: string;
+            /** @description The mode. */
+            mode: components["schemas"]["Mode"];
+            /** @description Map tiles, with `{z}`, `{x}` and `{y}`. */
+            tiles: string;
+        };
         /** @description One platform of a dataset, over those of its observations that were asked for. */
         Platform: {
             /** @description West, south, east, north of its places, degrees; east passes 180 where they lie on both sides of the date line. */
@@ -920,6 +932,8 @@ export interface components {
             legend: components["schemas"]["Legend"];
             /** @description Ways it can be drawn. */
             modes: components["schemas"]["Mode"][];
+            /** @description Addresses of its pictures in the usual look, one entry a mode; what they answer may be kept for ever. */
+            pinned: components["schemas"]["PinnedAddresses"][];
             /** @description In the order of time. */
             steps: components["schemas"]["StepTimes"][];
             /** @description Unit of the stored values. */
@@ -1091,6 +1105,11 @@ export interface components {
             minzoom: number;
             /** @description For people. */
             name: string;
+            /**
+             * @description The same of this version and look at any instant, with `{time}` (ISO 8601 UTC) as well: what it answers may be kept for
+             *     ever. Absent where the parts of a vector do not fit together.
+             */
+            pinned_tiles?: string[];
             /** @description `xyz`. */
             scheme: string;
             /** @description Version of the format, `3.0.0`. */
@@ -2020,6 +2039,12 @@ export interface operations {
                 height?: number;
                 /** @description Version, as answers name it; the newest unless one is given. */
                 manifest?: string;
+                /**
+                 * @description Everything else that shapes the picture, as `content-location` and the list of products name it: with `time`,
+                 *     `manifest` and the edition of now the answer may be kept for ever.
+                 * @example 0123456789abcdef
+                 */
+                edition?: string;
                 /** @description Colours; the quantity's own unless one is named. Not together with `stops`. */
                 palette?: components["schemas"]["Palette"];
                 /**
@@ -2117,6 +2142,10 @@ export interface operations {
             /** @description The view */
             200: {
                 headers: {
+                    /** @description `immutable` where the address names `time`, `manifest` and the edition of now */
+                    "cache-control"?: string;
+                    /** @description The address that names everything which shapes this picture, where the one asked does not */
+                    "content-location"?: string;
                     /** @description Names the job: the same tag is the same picture, byte for byte */
                     etag?: string;
                     /** @description The instant that is shown, ISO 8601 */
@@ -2548,6 +2577,12 @@ export interface operations {
                 size?: number;
                 /** @description Version, as answers name it; the newest unless one is given. */
                 manifest?: string;
+                /**
+                 * @description Everything else that shapes the picture, as TileJSON and the list of products name it: with `time`, `manifest` and the
+                 *     edition of now the answer may be kept for ever.
+                 * @example 0123456789abcdef
+                 */
+                edition?: string;
                 /** @description Colours; the quantity's own unless one is named. Not together with `stops`. */
                 palette?: components["schemas"]["Palette"];
                 /**
@@ -2629,6 +2664,8 @@ export interface operations {
             /** @description The tile; transparent where there is no data */
             200: {
                 headers: {
+                    /** @description `immutable` where the address names `time`, `manifest` and the edition of now */
+                    "cache-control"?: string;
                     /** @description Names the job: the same tag is the same picture, byte for byte */
                     etag?: string;
                     /** @description The instant that is shown, ISO 8601 */
