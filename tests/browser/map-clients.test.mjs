@@ -21,7 +21,7 @@ for (const client of ["maplibre", "openlayers", "leaflet"]) {
     const pages = await servePages();
     const way = await throughTo(SERVER);
     // A browser of its own: what another page asked for is in its cache.
-    const browser = await openBrowser({ width: 1000, height: 640 });
+    const browser = await openBrowser({ width: 720, height: 480 });
     const page = browser.context.pages()[0] ?? (await browser.context.newPage());
     page.setDefaultTimeout(LIMIT_MS);
     const film = await Film.of(page);

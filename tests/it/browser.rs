@@ -1,5 +1,6 @@
 //! The viewer in a real headless browser, over a server with the real data, observations, and data that land meanwhile.
 
+use std::ffi::OsStr;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -10,6 +11,8 @@ use harness::server::Server;
 use crate::end_to_end::demo_data;
 
 const BROWSER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/browser");
+/// What `package.json` asks for.
+const PACKAGES: [&str; 4] = ["playwright-core", "maplibre-gl", "ol", "leaflet"];
 const PROFILE: &str = concat!(
     env!("CARGO_MANIFEST_DIR"),
     "/../ingest/profiles/takahashi09-flux.toml"
@@ -79,8 +82,38 @@ fn the_page_shows_tiles_series_budgets_observations_and_news_without_an_error() 
     let february = test_data::fluxengine("takahashi09")
         .join("M2001032.1200.a7.all_products.BIN.01feb011200.v1.20132321228.data.nc");
     let server = Server::start(data, &["serve"]).unwrap();
+    let correction = land_a_correction(data, &february);
+    run(
+        "viewer.test.mjs",
+        &[
+            ("FLUXGLOBE_URL", server.url.as_ref()),
+            ("FLUXGLOBE_LAND", correction.as_ref()),
+            // Nothing may be passed over here: all that the page can show is there.
+            ("FLUXGLOBE_LOOK_AT_ALL", "1".as_ref()),
+            ("FLUXGLOBE_SCREENSHOTS", demo.join("screenshots").as_ref()),
+        ],
+    );
+}
+
+#[test]
+fn example_pages_of_map_libraries_play_a_year_and_ask_for_nothing_twice() {
+    let demo = demo_data();
+    let server = Server::start(demo, &["serve"]).unwrap();
+    run(
+        "map-clients.test.mjs",
+        &[
+            ("FLUXGLOBE_URL", server.url.as_ref()),
+            ("FLUXGLOBE_SCREENSHOTS", demo.join("screenshots").as_ref()),
+        ],
+    );
+}
+
+/// Runs a file of tests in a browser, with the packages it needs.
+fn run(file: &str, variables: &[(&str, &OsStr)]) {
     let folder = Path::new(BROWSER);
-    if !folder.join("node_modules").exists() {
+    // What is there may be of before a package was added.
+    let is_there = |package| folder.join("node_modules").join(package).exists();
+    if !PACKAGES.into_iter().all(is_there) {
         let install = Command::new("npm")
             .args(["install", "--no-save", "--no-audit", "--no-fund"])
             .current_dir(folder)
@@ -93,13 +126,9 @@ fn the_page_shows_tiles_series_budgets_observations_and_news_without_an_error() 
         );
     }
     let output = Command::new("node")
-        .args(["--test", "viewer.test.mjs"])
+        .args(["--test", file])
         .current_dir(folder)
-        .env("FLUXGLOBE_URL", &server.url)
-        .env("FLUXGLOBE_LAND", land_a_correction(data, &february))
-        // Nothing may be passed over here: all that the page can show is there.
-        .env("FLUXGLOBE_LOOK_AT_ALL", "1")
-        .env("FLUXGLOBE_SCREENSHOTS", demo.join("screenshots"))
+        .envs(variables.iter().copied())
         .output()
         .unwrap();
     let text = String::from_utf8_lossy(&output.stdout);
