@@ -20,7 +20,9 @@ use crate::trails::{TRAILS_PER_CELL, Trails};
 /// pictures are not taken for new ones: a name has one content for ever. `make bless` asks for it.
 pub const RENDERER_VERSION: u32 = 8;
 /// Largest width and height of a picture, pixels.
-pub const MAX_IMAGE_PX: u32 = 4096;
+pub const MAX_IMAGE_PX: u32 = 7680;
+/// Most pixels of a picture: as many as 8K has (7680 x 4320).
+pub const MAX_PIXELS: u64 = 7680 * 4320;
 /// Most slices of a half-angle volume.
 pub const MAX_SLICES: u32 = 256;
 /// Most particles a cell may carry.
@@ -261,7 +263,11 @@ impl View {
             .iter()
             .any(|px| !(1..=MAX_IMAGE_PX).contains(px))
         {
-            return bad("pictures are 1 to 4096 pixels wide and high");
+            return bad("pictures are 1 to 7680 pixels wide and high");
+        }
+        let [width, height] = self.size_px().map(u64::from);
+        if width * height > MAX_PIXELS {
+            return bad("pictures have at most as many pixels as 7680 x 4320");
         }
         match *self {
             Self::Tile { tile, size_px } => {

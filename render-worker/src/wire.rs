@@ -21,8 +21,8 @@ pub mod proto {
 
 /// Largest request; a job's JSON takes about a kilobyte.
 pub const MOST_REQUEST_BYTES: usize = 64 << 10;
-/// Largest reply: a picture of 4096 x 4096 pixels that does not compress at all.
-pub const MOST_REPLY_BYTES: usize = 80 << 20;
+/// Largest reply: a picture of 7680 x 4320 pixels that does not compress at all.
+pub const MOST_REPLY_BYTES: usize = 160 << 20;
 /// Metadata of a refusal: when to ask again, milliseconds.
 const RETRY_AFTER: &str = "retry-after-ms";
 /// A hint that is longer than this is a mistake or a trick.

@@ -2,6 +2,7 @@
 import assert from "node:assert/strict";
 import test from "node:test";
 import { budgetTotal, checkTable, landHasNoData, seriesOfSea } from "./analysis-steps.mjs";
+import { filmIsRefused, filmIsSaved, largePictureIsCancelled } from "./film-steps.mjs";
 import {
   globesAgree,
   keysTilt,
@@ -74,6 +75,9 @@ test("the viewer", async (t) => {
     await step("plots what a platform that is clicked measured", observationsOfPlatform);
     await step("fetches volume tiles in volume mode", volumeMode);
     await step("shows the rendered view in a dialog", renderedView);
+    await step("saves a film of the view that plays", filmIsSaved);
+    await step("stops a film that is cancelled, and says what is wrong with one that cannot be", filmIsRefused);
+    await step("shows that a large picture is on its way, and lets it be cancelled", largePictureIsCancelled);
     await step("offers palettes and reliefs", palettesAndReliefsAreOffered);
     await step("draws tiles and legend in a palette and a range that are chosen", lookIsAsked);
     await step("keeps the legend of the picture in sight until the next one is there", legendWaitsForPicture);

@@ -27,7 +27,7 @@ module.exports = {
       name: "panels-on-top",
       severity: "error",
       comment: "Panels use the other rooms and are joined to them by main.ts alone.",
-      from: { path: "^src/(api|page|state|time|look|globe|stream)/" },
+      from: { path: "^src/(api|page|state|time|look|globe|stream|film)/" },
       to: { path: "^src/(panels/|[^/]+[.]ts$)" },
     },
     {
@@ -50,6 +50,13 @@ module.exports = {
       comment: "One room knows the chart library.",
       from: { path: "^src/", pathNot: "^src/panels/" },
       to: { path: "node_modules/uplot/" },
+    },
+    {
+      name: "films-in-film",
+      severity: "error",
+      comment: "One room knows the film library, and nothing of the page.",
+      from: { path: "^src/", pathNot: "^src/film/" },
+      to: { path: "node_modules/mediabunny/" },
     },
     {
       name: "nothing-unresolved",

@@ -218,10 +218,10 @@ pub(crate) struct BenchServe {
     #[arg(long, value_delimiter = ',', value_name = "URLS")]
     pub(crate) figures: Vec<String>,
     /// Width of a view, pixels.
-    #[arg(long, default_value_t = 1920, value_parser = value_parser!(u32).range(1..=4096))]
+    #[arg(long, default_value_t = 1920, value_parser = value_parser!(u32).range(1..=7680))]
     pub(crate) width: u32,
     /// Height of a view, pixels.
-    #[arg(long, default_value_t = 1080, value_parser = value_parser!(u32).range(1..=4096))]
+    #[arg(long, default_value_t = 1080, value_parser = value_parser!(u32).range(1..=7680))]
     pub(crate) height: u32,
     /// Longitude below the camera, degrees.
     #[arg(long, default_value_t = 0.0, allow_hyphen_values = true)]
@@ -280,10 +280,10 @@ pub(crate) struct BenchFly {
     #[arg(long, default_value_t = 5)]
     pub(crate) warm_up_seconds: u16,
     /// Width of the full picture, pixels.
-    #[arg(long, default_value_t = 1920, value_parser = value_parser!(u32).range(1..=4096))]
+    #[arg(long, default_value_t = 1920, value_parser = value_parser!(u32).range(1..=7680))]
     pub(crate) width: u32,
     /// Height of the full picture, pixels.
-    #[arg(long, default_value_t = 1080, value_parser = value_parser!(u32).range(1..=4096))]
+    #[arg(long, default_value_t = 1080, value_parser = value_parser!(u32).range(1..=7680))]
     pub(crate) height: u32,
     /// Longitude of the first viewer at the start, degrees.
     #[arg(long, default_value_t = -150.0, allow_hyphen_values = true)]

@@ -68,10 +68,10 @@ pub(crate) struct GlobeQuery {
     #[param(example = "2000-01-16T12:00:00Z")]
     time: Option<String>,
     /// Width of the picture, pixels; 512 unless one is given.
-    #[param(value_type = Option<u32>, minimum = 1, maximum = 4096)]
+    #[param(value_type = Option<u32>, minimum = 1, maximum = 7680)]
     width: Option<String>,
     /// Height of the picture, pixels; 512 unless one is given.
-    #[param(value_type = Option<u32>, minimum = 1, maximum = 4096)]
+    #[param(value_type = Option<u32>, minimum = 1, maximum = 7680)]
     height: Option<String>,
     /// Version, as answers name it; the newest unless one is given.
     manifest: Option<String>,
@@ -260,7 +260,7 @@ impl GlobeQuery {
     fn view(&self) -> Result<View, ServerError> {
         let pixels = |name, text: Option<&str>| {
             text.map_or(Ok(SIZE_PX), |text| {
-                whole_number(name, text, "whole pixels, 1 to 4096")
+                whole_number(name, text, "whole pixels, 1 to 7680")
             })
         };
         let size_px = [

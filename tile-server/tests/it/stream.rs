@@ -242,7 +242,7 @@ async fn a_wrong_address_is_answered_and_the_stream_goes_on() {
     let mut camera = running.connect().await;
     for (id, view, status, word) in [
         (1, "/globe/flux/volume.png?lat=95", 400, "latitude"),
-        (2, "/globe/flux/volume.png?width=9000", 400, "4096"),
+        (2, "/globe/flux/volume.png?width=9000", 400, "7680"),
         (3, "/globe/nothing/volume.png", 404, "nothing"),
         (4, "/globe/flux/volume.jpg", 404, "address"),
         (5, "/tiles/flux/map/0/0/0.png", 400, "/globe/"),

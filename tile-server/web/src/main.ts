@@ -41,6 +41,7 @@ import { Overlay } from "./stream/overlay";
 import { Readout } from "./stream/readout";
 import { LiveSwitch } from "./stream/switch";
 import { Playback } from "./time/playback";
+import { rangeOf } from "./time/steps";
 import { Timeline } from "./time/timeline";
 import { Viewer } from "./viewer";
 
@@ -98,7 +99,8 @@ const view = new ViewDialog(
   store,
   () => inventory.product?.modes ?? [],
   () => inventory.product?.synthetic ?? false,
-  (mode) => inventory.viewIn(mode),
+  (mode, timeMs) => inventory.viewIn(mode, timeMs),
+  () => rangeOf(inventory.steps),
 );
 const controls = new Controls(byId("controls"), store, () => view.open());
 const legend = new LegendCard(controls.legend, (id, mode) => inventory.catalogue.usualLegend(id, mode), report);

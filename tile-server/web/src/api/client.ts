@@ -39,8 +39,11 @@ export async function getJson<T>(url: string, signal?: AbortSignal): Promise<T> 
   return (await response.json()) as T;
 }
 
-/** A picture; it may take as long as the server gives it. */
-export async function getPicture(url: string, signal: AbortSignal): Promise<Blob> {
+/**
+ * A picture; it may take as long as the server gives it.
+ * @param onPart the share that has come, once the server has begun to send
+ */
+export async function getPicture(url: string, signal: AbortSignal, onPart?: (share: number) => void): Promise<Blob> {
   let response: Response;
   try {
     response = await fetch(url, { signal });
@@ -49,7 +52,18 @@ export async function getPicture(url: string, signal: AbortSignal): Promise<Blob
     throw new ApiError("unreachable", 0, "The server does not answer.");
   }
   if (!response.ok) throw new ApiError("refused", response.status, await reasonOf(response));
-  return response.blob();
+  const bytes = Number(response.headers.get("content-length") ?? 0);
+  if (!onPart || !response.body || bytes === 0) return response.blob();
+  const parts: Uint8Array<ArrayBuffer>[] = [];
+  let come = 0;
+  for (const reader = response.body.getReader(); ; ) {
+    const { done, value } = await reader.read();
+    if (done) break;
+    parts.push(value);
+    come += value.length;
+    onPart(come / bytes);
+  }
+  return new Blob(parts, { type: response.headers.get("content-type") ?? "" });
 }
 
 async function reasonOf(response: Response): Promise<string> {

@@ -54,8 +54,11 @@ export interface GlobeView {
   look: readonly Parameter[];
 }
 
-/** Longest side of a picture, pixels: the server's limit. */
-export const MOST_SIDE_PX = 4096;
+/** Longest side of a picture, pixels, and most pixels of one: the server's limits. */
+export const MOST_SIDE_PX = 7680;
+export const MOST_PIXELS = 7680 * 4320;
+/** Longest side of a picture that follows a camera: a screen's. */
+export const MOST_SCREEN_PX = 4096;
 
 /** Below the page's own address, so that it is the same to a server behind a path prefix. Steps are finer than a pixel from the lowest camera. */
 export function globePath(product: string, mode: Mode, view: GlobeView): string {
@@ -79,10 +82,13 @@ export function globeUrl(product: string, mode: Mode, view: GlobeView): string {
   return address(globePath(product, mode, view));
 }
 
-/** A size of the same shape whose longer side is at most `longest`. */
+/** A size of the same shape whose longer side is at most `longest`, and which the server draws. */
 export function within(longest: number, width: number, height: number): { width: number; height: number } {
-  const part = Math.min(1, longest / Math.max(width, height));
-  return { width: Math.max(1, Math.round(width * part)), height: Math.max(1, Math.round(height * part)) };
+  const part = Math.min(1, longest / Math.max(width, height), Math.sqrt(MOST_PIXELS / (width * height)));
+  const wide = Math.max(1, Math.round(width * part));
+  // Rounded to the nearest, both sides may come to a few pixels more than there may be.
+  const high = Math.min(Math.round(height * part), Math.floor(MOST_PIXELS / wide));
+  return { width: wide, height: Math.max(1, high) };
 }
 
 function numberText(value: number, digits: number): string {

@@ -7,19 +7,29 @@ import type { LayerSpec } from "../globe/layer";
 import { byId, el, icon } from "../page/dom";
 import { latText, lonText } from "../page/format";
 import { CLOSE, DOWNLOAD } from "../page/icons";
+import { FilmForm, type FilmView } from "./film-form";
 import type { CameraView } from "../state/camera";
 import type { Store } from "../state/store";
 import { viewOf } from "../stream/view";
 import { formatInstant } from "../time/steps";
 
+type SpecIn = (mode: Mode, timeMs?: number) => LayerSpec | undefined;
+interface Range {
+  readonly startMs: number;
+  readonly endMs: number;
+}
+
 /** The longer side. The first is enough for a slide, and a few seconds' work where the server has no graphics chip. */
-const LONG_SIDES_PX = [1024, 1920, 2560, MOST_SIDE_PX];
+const LONG_SIDES_PX = [1024, 1920, 2560, 3840, MOST_SIDE_PX];
 
 export class ViewDialog {
   readonly #store: Store;
   readonly #offered: () => readonly Mode[];
   readonly #isSynthetic: () => boolean;
-  readonly #specIn: (mode: Mode) => LayerSpec | undefined;
+  readonly #specIn: SpecIn;
+  readonly #range: () => Range | undefined;
+  readonly #film = new FilmForm(() => this.#filmView());
+  readonly #cancel = el("button", { type: "button", id: "view-cancel" }, "Cancel");
   readonly #dialog = el("dialog", { class: "view-dialog", "aria-labelledby": "view-title" });
   readonly #mode = el("select", { id: "view-mode", "aria-label": "Mode of the image" });
   readonly #size = el("select", { id: "view-size", "aria-label": "Size of the image" });
@@ -33,12 +43,15 @@ export class ViewDialog {
     store: Store,
     offered: () => readonly Mode[],
     isSynthetic: () => boolean,
-    specIn: (mode: Mode) => LayerSpec | undefined,
+    specIn: SpecIn,
+    range: () => Range | undefined,
   ) {
     this.#store = store;
     this.#offered = offered;
     this.#isSynthetic = isSynthetic;
     this.#specIn = specIn;
+    this.#range = range;
+    this.#cancel.addEventListener("click", () => this.#asked?.abort());
     const close = el(
       "button",
       { type: "button", class: "quiet", "aria-label": "Close", onclick: () => this.#dialog.close() },
@@ -46,11 +59,15 @@ export class ViewDialog {
     );
     this.#mode.addEventListener("change", () => void this.#render());
     this.#size.addEventListener("change", () => void this.#render());
-    this.#dialog.addEventListener("close", () => this.#asked?.abort());
+    this.#dialog.addEventListener("close", () => {
+      this.#asked?.abort();
+      this.#film.stop();
+    });
     this.#dialog.append(
       el("div", { class: "dialog-head" }, el("h2", { id: "view-title" }, "Rendered view"), this.#size, this.#mode, close),
       this.#frame,
       el("div", { class: "dialog-foot" }, this.#caption, this.#save),
+      this.#film.element,
     );
     byId("dialogs").append(this.#dialog);
   }
@@ -61,6 +78,7 @@ export class ViewDialog {
     // The image is there for the volume; another mode is a choice away.
     this.#mode.value = offered.includes("volume") ? "volume" : (offered[0] ?? "map");
     this.#offerSizes();
+    this.#film.offer(this.#range());
     this.#dialog.showModal();
     void this.#render();
   }
@@ -75,18 +93,44 @@ export class ViewDialog {
     this.#asked = asked;
     this.#save.hidden = true;
     this.#caption.textContent = captionOf(spec.timeIso, camera, this.#isSynthetic());
-    this.#frame.replaceChildren(el("p", { class: "muted busy-line" }, "The server is drawing …"));
+    const bar = el("progress", { id: "view-progress", "aria-label": "Progress of the image" });
+    const says = el("p", { class: "muted busy-line" }, "The server is drawing …");
+    this.#frame.replaceChildren(el("div", { class: "view-busy" }, says, bar, this.#cancel));
+    const startedMs = performance.now();
+    // How far a picture is drawn nobody knows before it is there; that it is being drawn one sees.
+    const clock = setInterval(() => {
+      says.textContent = `The server is drawing … ${Math.round((performance.now() - startedMs) / 1000)} s`;
+    }, 1000);
     const url = globeUrl(spec.product, mode, viewOf(spec, camera, imageSize(Number(this.#size.value))));
     try {
-      const blob = await getPicture(url, asked.signal);
+      const blob = await getPicture(url, asked.signal, (share) => {
+        clearInterval(clock);
+        says.textContent = `The picture is coming … ${Math.round(100 * share)} %`;
+        bar.value = share;
+      });
       if (asked.signal.aborted) return;
       this.#show(blob, `${spec.product}-${mode}-${spec.timeIso.replace(/:/g, "")}.png`);
     } catch (error) {
-      if (!asked.signal.aborted)
-        this.#frame.replaceChildren(
-          el("p", { class: "problem" }, error instanceof Error ? error.message : String(error)),
-        );
+      if (this.#asked !== asked) return;
+      const text = asked.signal.aborted ? "Cancelled." : error instanceof Error ? error.message : String(error);
+      this.#frame.replaceChildren(el("p", { class: asked.signal.aborted ? "muted" : "problem" }, text));
+    } finally {
+      clearInterval(clock);
     }
+  }
+
+  /** What the dialog shows, at any instant. */
+  #filmView(): FilmView | undefined {
+    const { camera } = this.#store.state;
+    const mode = this.#mode.value as Mode;
+    const first = this.#specIn(mode);
+    if (!first) return undefined;
+    // Encoders halve the colours' resolution.
+    const size = imageSize(Number(this.#size.value));
+    const even = { width: size.width & ~1, height: size.height & ~1 };
+    const addressAt = (timeMs: number) =>
+      globeUrl(first.product, mode, viewOf(this.#specIn(mode, timeMs) ?? first, camera, even));
+    return { ...even, name: `${first.product}-${mode}`, addressAt };
   }
 
   /** The size that was chosen stays, in the shape that the window has now. */

@@ -1,5 +1,5 @@
 //! What the stream is asked for: the state of the page in, the address of the picture of it out, the same as of "Render this view".
-import { globePath, type GlobeView, MOST_SIDE_PX, within } from "../api/pictures";
+import { globePath, type GlobeView, MOST_SCREEN_PX, within } from "../api/pictures";
 import type { Mode } from "../api/types";
 import type { LayerSpec } from "../globe/layer";
 import { viewParameters } from "../look/address";
@@ -30,7 +30,7 @@ export function viewOf(spec: LayerSpec, camera: CameraView, size: { width: numbe
 
 /** From the server's own root, whatever path the page is found under. */
 export function viewAddress({ spec, camera, width, height, density }: Scene): string {
-  const size = within(MOST_SIDE_PX, width * density, height * density);
+  const size = within(MOST_SCREEN_PX, width * density, height * density);
   return `/${globePath(spec.product, spec.mode, viewOf(spec, camera, size))}`;
 }
 
