@@ -719,7 +719,7 @@ mod tests {
         for view in [
             globe(-100.0, 10),
             globe(1e6, 0),
-            globe(1e6, 5000),
+            globe(1e6, 7681),
             globe(f64::NAN, 10),
         ] {
             assert!(RenderJob { view, ..job() }.validate().is_err());

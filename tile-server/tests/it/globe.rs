@@ -160,7 +160,8 @@ async fn a_camera_that_cannot_be_is_refused_with_what_can() {
         ("look_at=0,0&lon=3", "either"),
         ("look_at=0,0&tilt=95", "0 to 90"),
         ("distance_km=5", "only with look_at"),
-        ("width=100000&height=1000", "4096"),
+        ("width=100000&height=1000", "1 to 7680"),
+        ("width=7680&height=4321", "as many pixels as 7680 x 4320"),
     ] {
         let answer = app.get(&format!("/globe/flux/volume.png?{query}")).await;
         assert_eq!(answer.status, StatusCode::BAD_REQUEST, "{query}");

@@ -75,9 +75,9 @@ const BAD_ADDRESSES: &[(&str, &str)] = &[
     ("/globe/flux/map.png?lon=nan", "degrees east"),
     ("/globe/flux/map.png?lat=91", "-90 to 90"),
     ("/globe/flux/map.png?lon=1e300", "longitude"),
-    ("/globe/flux/map.png?width=1000000000", "1 to 4096"),
-    ("/globe/flux/map.png?width=1e9", "1 to 4096"),
-    ("/globe/flux/map.png?height=0", "1 to 4096"),
+    ("/globe/flux/map.png?width=1000000000", "1 to 7680"),
+    ("/globe/flux/map.png?width=1e9", "1 to 7680"),
+    ("/globe/flux/map.png?height=0", "1 to 7680"),
     (
         "/globe/flux/map.png?height_km=-0.5",
         "1 km to 1 million km above the ground, or 1 km to 1000 km below the sea surface",
