@@ -51,7 +51,6 @@ impl Encoders {
     ) -> Result<Bytes, DrawError> {
         // Most pictures have none, and no reason to copy their job.
         let annotated = job.annotations.as_ref().map(|_some| job.clone());
-        let cores = Arc::clone(&self.cores);
         let finished = move || -> Result<Bytes, DrawError> {
             let image = match annotated {
                 Some(job) => annotation::annotated(&job, image)?,
@@ -59,11 +58,7 @@ impl Encoders {
             };
             Ok(match encoding {
                 Encoding::Png => image.encode_png()?,
-                Encoding::Jpeg { quality } => {
-                    // Its own core, and half of those that nobody needs now.
-                    let threads = NonZeroUsize::MIN.saturating_add(cores.available_permits() / 2);
-                    image.encode_jpeg(quality, threads)?
-                }
+                Encoding::Jpeg { quality } => image.encode_jpeg(quality)?,
             })
         };
         self.run(turn, finished).await?

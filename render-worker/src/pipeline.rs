@@ -4,12 +4,13 @@
 
 use std::num::NonZeroUsize;
 use std::sync::Arc;
+use std::time::Duration;
 
 use bytes::Bytes;
 use contract::encoding::Encoding;
 use contract::job::RenderJob;
 use render::scene::Scene;
-use render::{Backend, Image, Renderer};
+use render::{Backend, Image, Renderer, laps};
 use storage::Store;
 
 use crate::encoding::Encoders;
@@ -56,6 +57,9 @@ pub struct Pipeline {
     prefetch: Arc<Prefetch>,
     encoders: Encoders,
 }
+
+/// Steps of drawing by name, and how long each took.
+type Laps = [(&'static str, Duration); 4];
 
 impl Pipeline {
     /// Opens the backend. Blocks while shaders compile.
@@ -105,24 +109,26 @@ impl Pipeline {
         self.source.scene(job).await
     }
 
-    /// Draws a loaded scene; `held` is let go when the drawing thread has ended, also if nobody waits for it.
+    /// Draws a loaded scene and tells how long the steps took; `held` is let go when the drawing thread has ended, also if nobody waits for it.
     pub async fn picture(
         &self,
         job: &RenderJob,
         scene: Scene,
         is_wanted: IsWanted,
         held: impl Send + 'static,
-    ) -> Result<Image, DrawError> {
+    ) -> Result<(Image, Laps), DrawError> {
         let (renderer, own) = (Arc::clone(&self.renderer), job.clone());
         let drawing = tokio::task::spawn_blocking(move || {
             let image = renderer.render_while(&own, &scene, &*is_wanted);
             drop(held);
-            image
+            // Also what a picture took that was not wanted any more: it is not the next one's.
+            let laps = laps::taken();
+            image.map(|image| (image, laps))
         });
-        let image = drawing.await.map_err(DrawError::Thread)??;
+        let drawn = drawing.await.map_err(DrawError::Thread)??;
         // Not before: what is wanted now goes first.
         self.prefetch.drawn(job);
-        Ok(image)
+        Ok(drawn)
     }
 
     /// Draws the annotations of a job over its picture and encodes it; `turn` is let go when that begins, which may have to

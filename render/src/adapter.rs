@@ -3,8 +3,9 @@
 use std::num::NonZeroUsize;
 use std::thread;
 
-/// Pictures at once on a graphics card: one is drawn while others are planned, sent and read back.
-const ON_A_CARD: NonZeroUsize = NonZeroUsize::new(4).expect("4 is not 0");
+/// Pictures at once on a graphics card: one is drawn while others are planned, sent and read back, which takes ten times as
+/// long; more than these gain a few in a hundred and want memory of the card.
+const ON_A_CARD: NonZeroUsize = NonZeroUsize::new(8).expect("8 is not 0");
 /// Pictures at once on a software adapter, which draws each with all cores: one is planned while another is drawn.
 const IN_SOFTWARE: NonZeroUsize = NonZeroUsize::new(2).expect("2 is not 0");
 

@@ -5,6 +5,7 @@ use contract::job::Mode;
 use crate::error::RenderError;
 use crate::frame_context::{FrameContext, SceneBuffers};
 use crate::gpu::{Gpu, Slot, Stamps, Workspace};
+use crate::laps::{self, Step};
 use crate::passes;
 use crate::passes::scatter::{self, Scatter};
 use crate::passes::splat::{self, Splats};
@@ -163,7 +164,9 @@ impl Stages {
         let mut capacity = (workspace.room_bytes(Slot::Entries) / entry_bytes).max(first);
         loop {
             let room = capacity.min(gpu.most_buffer_bytes() / entry_bytes) as u32;
-            let mut frame = self.recorded(gpu, workspace, plan, part, scene, room, None)?;
+            let mut frame = laps::timed(Step::Upload, || {
+                self.recorded(gpu, &mut *workspace, plan, part, scene, room, None)
+            })?;
             let image = frame.room(Slot::Image, 4)?;
             let image_bytes = frame.pixel_count() * 4;
             if plan.mode == Mode::Map {

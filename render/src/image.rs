@@ -2,8 +2,6 @@
 
 mod jpeg;
 
-use std::num::NonZeroUsize;
-
 use bytes::Bytes;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder as _};
@@ -52,8 +50,8 @@ impl Image {
     /// The picture over black as JPEG, colours at half the resolution: the same bytes with any number of threads.
     ///
     /// Measured on 1920 x 1080 views of a volume: see [`jpeg`].
-    pub fn encode_jpeg(&self, quality: u8, threads: NonZeroUsize) -> Result<Bytes, RenderError> {
-        jpeg::encode(self, quality, threads).map_err(|source| self.not_encoded(source))
+    pub fn encode_jpeg(&self, quality: u8) -> Result<Bytes, RenderError> {
+        jpeg::encode(self, quality).map_err(|source| self.not_encoded(source))
     }
 
     /// Alpha of every pixel.

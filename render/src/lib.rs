@@ -23,6 +23,7 @@ pub mod frame_context;
 pub mod frame_cpu;
 pub mod gpu;
 pub mod image;
+pub mod laps;
 pub mod passes;
 pub mod plan;
 pub mod playback;

@@ -8,11 +8,11 @@
 //! versions of its own, means by area.
 
 use std::sync::Arc;
-use std::thread;
 
 use contract::earth::Earth;
 use contract::grid::Grid;
 use contract::job::{Mode, RenderJob};
+use rayon::prelude::*;
 
 use crate::plan::cell_px;
 use crate::scene::{Cells, Frame, Interval, Scene, Terrain};
@@ -27,8 +27,6 @@ const LEAST_TERRAIN_CELL_PX: f64 = 1.0;
 
 /// The earth whose areas pictures go by.
 const EARTH: Earth = Earth::Wgs84;
-/// Blocks fewer than these are made by one thread: starting others takes longer.
-const LEAST_SHARED_BLOCKS: usize = 1 << 14;
 
 /// The version of a scene that a job is drawn from; none if it is the scene itself.
 pub fn suited(job: &RenderJob, scene: &Scene) -> Option<Scene> {
@@ -159,29 +157,10 @@ impl<'a> Blocks<'a> {
     ) -> Vec<T> {
         let cols = self.grid.cols as usize;
         let mut blocks = vec![T::default(); self.grid.cell_count()];
-        let row_of = |row: usize, blocks: &mut [T]| {
+        let rows = blocks.par_chunks_mut(cols).enumerate();
+        rows.for_each(|(row, blocks)| {
             for (col, own) in blocks.iter_mut().enumerate() {
                 *own = block(row, &mut self.cells(row, col));
-            }
-        };
-        let threads = if blocks.len() < LEAST_SHARED_BLOCKS {
-            1
-        } else {
-            thread::available_parallelism().map_or(1, usize::from)
-        };
-        let rows_each = (self.grid.rows as usize).div_ceil(threads);
-        thread::scope(|scope| {
-            for (part, rows) in blocks.chunks_mut(rows_each * cols).enumerate() {
-                let mut part = move || {
-                    for (down, row) in rows.chunks_mut(cols).enumerate() {
-                        row_of(part * rows_each + down, row);
-                    }
-                };
-                if threads == 1 {
-                    part();
-                } else {
-                    scope.spawn(part);
-                }
             }
         });
         blocks
@@ -415,10 +394,9 @@ mod tests {
     }
 
     #[test]
-    fn many_threads_make_the_same_blocks_as_one() {
+    fn all_cores_make_the_same_blocks_as_one() {
         let level = sea(grid(700, 500, [60.0, -120.0], 0.1));
         let coarse = halved(&level.grid).unwrap();
-        assert!(coarse.cell_count() > LEAST_SHARED_BLOCKS);
         let blocks = Blocks::new(&level.grid, &coarse, Earth::Wgs84, Some(&level.domain));
         let alone: Vec<f32> = (0..350)
             .flat_map(|row| (0..250).map(move |col| (row, col)))

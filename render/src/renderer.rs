@@ -11,6 +11,7 @@ use crate::error::RenderError;
 use crate::frame_cpu;
 use crate::gpu::Gpu;
 use crate::image::Image;
+use crate::laps::{self, Step};
 use crate::plan::{Part, Plan};
 use crate::pyramid;
 use crate::scene::Scene;
@@ -172,10 +173,10 @@ impl Renderer {
         if !is_wanted() {
             return Err(RenderError::NotWanted);
         }
-        let mut plan = match &device {
-            None => Plan::new(job, scene, most_buffer_bytes)?,
-            Some(_device) => Plan::for_device(job, scene, most_buffer_bytes)?,
-        };
+        let mut plan = laps::timed(Step::Plan, || match &device {
+            None => Plan::new(job, scene, most_buffer_bytes),
+            Some(_device) => Plan::for_device(job, scene, most_buffer_bytes),
+        })?;
         if let (Some(alone), Some(vector)) = (job.trails_alone(), &scene.trails) {
             // A picture of its own, which the stages of this one lay on the sea.
             let drawn = self.render_while(&alone, vector, is_wanted)?;

@@ -30,7 +30,7 @@ pub struct Settings {
     /// Memory for drawn pictures, bytes, 0 to 64 GiB
     #[arg(long, env = "FLUXGLOBE_TILE_MEMORY_BYTES", default_value_t = TILE_MEMORY_BYTES, value_parser = clap::value_parser!(u64).range(0..=64 << 30))]
     pub tile_memory_bytes: u64,
-    /// Pictures drawn at the same time, 1 to 1024; if absent 4 on a graphics card, 2 on a software adapter, as many as
+    /// Pictures drawn at the same time, 1 to 1024; if absent 8 on a graphics card, 2 on a software adapter, as many as
     /// there are cores with --cpu, and 32 where render workers draw. Pictures that are encoded do not count
     #[arg(long, env = "FLUXGLOBE_DRAWS_AT_ONCE", value_parser = draws_at_once)]
     pub draws_at_once: Option<NonZeroU32>,

@@ -2,18 +2,22 @@
 
 use std::num::NonZeroUsize;
 use std::sync::Arc;
+use std::time::Duration;
 
 use anyhow::{Context as _, Result};
 use compute::Engine;
 use contract::check::Check;
 use observations::FileStore;
-use render_worker::Limits;
+use render_worker::{Desk, Limits};
 use storage::Store;
 use tile_server::{AppState, Server};
 
 use crate::cli::Settings;
 use crate::ports::{Analyst, Drawer, Observer};
 use crate::{deployment, file_handles, progress, protocol, viewer};
+
+/// How long a server that was asked to stop waits for its store.
+const STORE_LIMIT: Duration = Duration::from_secs(10);
 
 pub(crate) async fn run(settings: &Settings, options: tile_server::config::Settings) -> Result<()> {
     let store = deployment::interactive_store(settings)?;
@@ -29,7 +33,7 @@ pub(crate) async fn bind(
     store: Store,
     mut options: tile_server::config::Settings,
     check: Option<Check>,
-) -> Result<Server> {
+) -> Result<Serving> {
     options.viewer = options.viewer.or_else(viewer::built);
     file_handles::fit(&mut options);
     let registry = service::admin::registry("serve", protocol::PROGRAM)?;
@@ -47,7 +51,7 @@ pub(crate) async fn bind(
     let state = AppState::new(
         &options,
         store.clone(),
-        Arc::new(Drawer::new(desk)),
+        Arc::new(Drawer::new(desk.clone())),
         Arc::new(analyst),
         registry,
     )?
@@ -55,16 +59,23 @@ pub(crate) async fn bind(
     let server = Server::bind(&options, state.clone()).await?;
     // The event log belongs to whoever lands: `fluxglobe ingest` beside this server. Ends with the server.
     tokio::spawn(state.watch().run());
-    Ok(server)
+    Ok(Serving { server, desk })
+}
+
+/// A server and the desk that draws for it.
+pub(crate) struct Serving {
+    pub(crate) server: Server,
+    desk: Desk,
 }
 
 /// Says where to look.
-pub(crate) fn announce(server: &Server) {
-    progress::say(&format!("{:>24} http://{}/", "open", server.address()));
+pub(crate) fn announce(serving: &Serving) {
+    let address = serving.server.address();
+    progress::say(&format!("{:>24} http://{address}/", "open"));
 }
 
 /// Serves until Ctrl-C or a termination signal, then lets requests under way end.
-pub(crate) async fn until_asked_to_stop(server: Server) -> Result<()> {
+pub(crate) async fn until_asked_to_stop(serving: Serving) -> Result<()> {
     use tokio::signal::unix::{SignalKind, signal};
     let mut terminate = signal(SignalKind::terminate()).context("cannot listen for signals")?;
     let stop = async move {
@@ -74,5 +85,13 @@ pub(crate) async fn until_asked_to_stop(server: Server) -> Result<()> {
         }
         progress::say("stopping");
     };
-    Ok(server.run(stop).await?)
+    let served = serving.server.run(stop).await;
+    // Pictures that were given out are stored too, by a store that answers.
+    if tokio::time::timeout(STORE_LIMIT, serving.desk.settled())
+        .await
+        .is_err()
+    {
+        tracing::warn!("some pictures that were given out are not stored");
+    }
+    Ok(served?)
 }

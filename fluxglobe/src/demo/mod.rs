@@ -50,14 +50,14 @@ pub(crate) async fn run(settings: &Settings, options: Demo) -> Result<ExitCode> 
             &table::synthetic(&deployment::engine(settings, store.clone())?, &flux).await?,
         )?,
     }
-    let server = serve::bind(settings, store.clone(), options.serve, check.clone()).await?;
+    let serving = serve::bind(settings, store.clone(), options.serve, check.clone()).await?;
     if !options.exit_after_check {
-        serve::announce(&server);
+        serve::announce(&serving);
         progress::say(&format!("{:>24} Ctrl-C", "stop with"));
-        serve::until_asked_to_stop(server).await?;
+        serve::until_asked_to_stop(serving).await?;
         return Ok(ExitCode::SUCCESS);
     }
-    let failures = verify::all(settings, &store, server, &flux, check.as_ref()).await?;
+    let failures = verify::all(settings, &store, serving.server, &flux, check.as_ref()).await?;
     for failure in &failures {
         progress::say(&format!("FAILED: {failure}"));
     }

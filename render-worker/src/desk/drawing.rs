@@ -180,7 +180,12 @@ impl Inner {
             let scene = self.measured("load", loading).await?;
             let held = Arc::clone(permit);
             let drawing = self.pipeline.picture(job, scene, flight.is_wanted(), held);
-            self.measured("draw", drawing).await
+            let (image, laps) = self.measured("draw", drawing).await?;
+            for (step, took) in laps {
+                let histogram = self.step_s.with_label_values(&[step]);
+                histogram.observe(took.as_secs_f64());
+            }
+            Ok(image)
         };
         self.pipeline.on_a_sound_device(attempt).await
     }

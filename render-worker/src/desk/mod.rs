@@ -17,7 +17,7 @@ use std::time::Duration;
 use ::service::Red;
 use bytes::Bytes;
 use contract::job::RenderJob;
-use prometheus::{Histogram, HistogramOpts, IntCounterVec, Opts, Registry};
+use prometheus::{Histogram, HistogramOpts, HistogramVec, IntCounterVec, Opts, Registry};
 use render::{Backend, RenderError};
 use storage::Store;
 use tracing::Instrument as _;
@@ -60,6 +60,8 @@ struct Inner {
     pictures: IntCounterVec,
     /// How long jobs wait for a permit to draw.
     wait_s: Histogram,
+    /// How long the steps of drawing take.
+    step_s: HistogramVec,
     writes: WriteBehind,
     /// Running mean of what a picture takes, microseconds.
     mean_us: AtomicU64,
@@ -159,8 +161,12 @@ impl OpenError {
 
 /// A time of jobs, seconds.
 fn timed(what: &str, help: &str) -> Result<Histogram, prometheus::Error> {
+    Histogram::with_opts(timed_as(what, help))
+}
+
+fn timed_as(what: &str, help: &str) -> HistogramOpts {
     let name = format!("fluxglobe_{METRICS}_{what}");
-    Histogram::with_opts(HistogramOpts::new(name, help).buckets(BOUNDS_S.to_vec()))
+    HistogramOpts::new(name, help).buckets(BOUNDS_S.to_vec())
 }
 
 /// What a caller holds who gives out turns to draw as well.
@@ -184,6 +190,14 @@ impl Desk {
         registry.register(Box::new(AdapterInfo::of(&pipeline)?))?;
         let wait_s = timed("wait_seconds", "Time that jobs wait for a permit to draw.")?;
         registry.register(Box::new(wait_s.clone()))?;
+        let step_s = HistogramVec::new(
+            timed_as(
+                "draw_step_seconds",
+                "Time of the steps of drawing: plan, upload, device, read_back.",
+            ),
+            &["step"],
+        )?;
+        registry.register(Box::new(step_s.clone()))?;
         let store_s = timed("store_seconds", "Time to put a picture into the store.")?;
         registry.register(Box::new(store_s.clone()))?;
         let inner = Inner {
@@ -195,6 +209,7 @@ impl Desk {
             red: Red::register(registry, METRICS)?,
             pictures,
             wait_s,
+            step_s,
             writes: WriteBehind::new(store_s),
             mean_us: AtomicU64::new(FIRST_GUESS.as_micros() as u64),
             stopping: AtomicBool::new(false),

@@ -19,7 +19,7 @@ pub struct Settings {
         value_name = "ADDRESS"
     )]
     pub render_listen: SocketAddr,
-    /// Pictures drawn at the same time, 1 to 64; 4 on a graphics card and 2 on a software adapter if absent, and with
+    /// Pictures drawn at the same time, 1 to 64; 8 on a graphics card and 2 on a software adapter if absent, and with
     /// --cpu as many as there are cores. Pictures that are encoded do not count.
     #[arg(long, env = "FLUXGLOBE_DRAWS_AT_ONCE",
           value_parser = value_parser!(u8).range(1..=64), value_name = "COUNT")]

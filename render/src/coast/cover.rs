@@ -6,8 +6,9 @@
 
 use glam::DVec2;
 
-/// The sums of all rows of a picture.
+/// The sums of some rows of a picture.
 pub struct Cover {
+    first_row: u32,
     size_px: [u32; 2],
     sums: Vec<f32>,
     /// Of every row: anything was added to it.
@@ -18,10 +19,11 @@ pub struct Cover {
 
 impl Cover {
     /// Nothing covered yet.
-    pub fn new(size_px: [u32; 2]) -> Self {
+    pub fn new(first_row: u32, size_px: [u32; 2]) -> Self {
         // A pixel more at the end of each row takes what falls beyond.
         let sums = (size_px[0] as usize + 2) * size_px[1] as usize;
         Self {
+            first_row,
             size_px,
             sums: vec![0.0; sums],
             is_touched: vec![false; size_px[1] as usize],
@@ -34,24 +36,18 @@ impl Cover {
         self.base += times as f32;
     }
 
-    /// Adds a closed outline, its interior on the left of its way as it is seen.
-    pub fn add(&mut self, outline: &[DVec2]) {
-        let ends = outline.iter().zip(outline.iter().cycle().skip(1));
-        for (&a, &b) in ends {
-            self.add_edge(a, b);
-        }
-    }
-
-    /// Adds one edge; y runs down.
-    fn add_edge(&mut self, a: DVec2, b: DVec2) {
-        let height = f64::from(self.size_px[1]);
+    /// Adds an edge of a closed outline, its interior on the left of its way as it is seen; y runs down. What is outside
+    /// the rows covers nothing of them.
+    pub fn add_edge(&mut self, a: DVec2, b: DVec2) {
+        // Rows of the whole picture: what is added to one is the same whatever rows these are.
+        let rows = [self.first_row, self.first_row + self.size_px[1]].map(f64::from);
         // Downwards, the interior lies on the right on the screen.
         let (sign, top, bottom) = if a.y <= b.y {
             (1.0, a, b)
         } else {
             (-1.0, b, a)
         };
-        let (first, last) = (top.y.max(0.0), bottom.y.min(height));
+        let (first, last) = (top.y.max(rows[0]), bottom.y.min(rows[1]));
         if first >= last || !a.is_finite() || !b.is_finite() {
             return;
         }
@@ -60,7 +56,8 @@ impl Cover {
         let mut y = first;
         for row in first as usize..(last.ceil() as usize) {
             let end = last.min(row as f64 + 1.0);
-            self.add_in_row(row, [x_at(y), x_at(end)], sign * (end - y));
+            let own = row - self.first_row as usize;
+            self.add_in_row(own, [x_at(y), x_at(end)], sign * (end - y));
             y = end;
         }
     }
@@ -99,13 +96,13 @@ impl Cover {
         }
     }
 
-    /// Writes the coverage of every pixel of some rows, 0 to 255, into the bits of its word from `shift` on, which are 0.
-    pub fn write(&self, first_row: usize, words: &mut [u32], shift: u32) {
+    /// Writes the coverage of every pixel, 0 to 255, into the bits of its word from `shift` on, which are 0.
+    pub fn write(&self, words: &mut [u32], shift: u32) {
         let width = self.size_px[0] as usize;
         let all = (self.base.clamp(0.0, 1.0) * 255.0 + 0.5) as u32;
-        let sums = self.sums.chunks_exact(width + 2).skip(first_row);
+        let sums = self.sums.chunks_exact(width + 2);
         let rows = words.chunks_exact_mut(width).zip(sums);
-        for ((words, sums), is_touched) in rows.zip(&self.is_touched[first_row..]) {
+        for ((words, sums), is_touched) in rows.zip(&self.is_touched) {
             if !is_touched && all == 0 {
                 continue;
             }
@@ -123,12 +120,15 @@ mod tests {
     use super::*;
 
     fn covered(size_px: [u32; 2], outlines: &[Vec<DVec2>]) -> Vec<u8> {
-        let mut cover = Cover::new(size_px);
+        let mut cover = Cover::new(0, size_px);
         for outline in outlines {
-            cover.add(outline);
+            let ends = outline.iter().zip(outline.iter().cycle().skip(1));
+            for (&a, &b) in ends {
+                cover.add_edge(a, b);
+            }
         }
         let mut words = vec![0; size_px[0] as usize * size_px[1] as usize];
-        cover.write(0, &mut words, 8);
+        cover.write(&mut words, 8);
         words.into_iter().map(|word| (word >> 8) as u8).collect()
     }
 

@@ -60,12 +60,11 @@ impl Mask {
         self.words
     }
 
-    /// Writes the coverage of every pixel of some rows into the bits of its word, of one word for each, from `shift` on,
-    /// which are 0.
-    pub fn write(&self, first_row: usize, words: &mut [u32], shift: u32) {
+    /// Writes the coverage of every pixel into the bits of its word, of one word for each, from `shift` on, which are 0.
+    pub fn write(&self, words: &mut [u32], shift: u32) {
         let row_words = Self::row_words(self.size_px[0]) as usize;
         let rows = words.chunks_exact_mut(self.size_px[0] as usize);
-        for (words, own) in rows.zip(self.words.chunks_exact(row_words).skip(first_row)) {
+        for (words, own) in rows.zip(self.words.chunks_exact(row_words)) {
             let lined = words.chunks_mut(4).zip(own).filter(|(_, own)| **own != 0);
             for (words, own) in lined {
                 for (word, byte) in words.iter_mut().zip(own.to_le_bytes()) {

@@ -7,6 +7,7 @@ use bytemuck::Pod;
 
 use super::{Gpu, Kernel, Stamps, uniform};
 use crate::error::RenderError;
+use crate::laps::{self, Step};
 
 /// Most workgroups in one dimension of a dispatch (the least any device allows).
 const MOST_GROUPS: u32 = 65_535;
@@ -165,32 +166,35 @@ impl<'a> Recorder<'a> {
                 .copy_buffer_to_buffer(buffer, first, &staging, at, bytes);
             at += bytes;
         }
-        let submission = self.gpu.queue.submit([self.encoder.finish()]);
-        // A refused submission never ends: it must not be waited for.
-        self.gpu.check_fault("drawing")?;
-        let (done_tx, done_rx) = sync_channel(1);
-        staging.map_async(wgpu::MapMode::Read, .., move |result| {
-            // The receiver is gone only if this function has returned with an error.
-            drop(done_tx.send(result));
-        });
-        let wait = wgpu::PollType::Wait {
-            submission_index: Some(submission),
-            timeout: Some(HUNG),
-        };
-        self.gpu.device.poll(wait).map_err(|_stopped| stopped())?;
-        done_rx
-            .recv()
-            .map_err(|_gone| stopped())?
-            .map_err(|_unmapped| stopped())?;
-        self.gpu.check_fault("drawing")?;
-        let mapped = staging
-            .get_mapped_range(..)
-            .map_err(|_unmapped| stopped())?;
+        let (gpu, commands) = (self.gpu, self.encoder.finish());
+        let mapped = laps::timed(Step::Device, || {
+            let submission = gpu.queue.submit([commands]);
+            // A refused submission never ends: it must not be waited for.
+            gpu.check_fault("drawing")?;
+            let (done_tx, done_rx) = sync_channel(1);
+            staging.map_async(wgpu::MapMode::Read, .., move |result| {
+                // The receiver is gone only if this function has returned with an error.
+                drop(done_tx.send(result));
+            });
+            let wait = wgpu::PollType::Wait {
+                submission_index: Some(submission),
+                timeout: Some(HUNG),
+            };
+            gpu.device.poll(wait).map_err(|_stopped| stopped())?;
+            done_rx
+                .recv()
+                .map_err(|_gone| stopped())?
+                .map_err(|_unmapped| stopped())?;
+            gpu.check_fault("drawing")?;
+            staging.get_mapped_range(..).map_err(|_unmapped| stopped())
+        })?;
         let mut rest: &[u8] = &mapped;
-        Ok(parts.map(|(_, _, bytes)| {
-            let (content, after) = rest.split_at(bytes as usize);
-            rest = after;
-            content.to_vec()
+        Ok(laps::timed(Step::ReadBack, || {
+            parts.map(|(_, _, bytes)| {
+                let (content, after) = rest.split_at(bytes as usize);
+                rest = after;
+                content.to_vec()
+            })
         }))
     }
 }

@@ -1,11 +1,9 @@
-//! A picture as JPEG in strips: each is encoded for itself, on a core of its own if there is one, and they are put together
+//! A picture as JPEG in strips: each is encoded for itself, on any core that is free, and they are put together
 //! with restart markers (ITU-T T.81, B.2.1 and E.1.4), after which a decoder begins anew anyway.
-
-use std::num::NonZeroUsize;
-use std::thread;
 
 use bytes::Bytes;
 use jpeg_encoder::{ColorType, Encoder, EncodingError, SamplingFactor};
+use rayon::prelude::*;
 
 use super::Image;
 
@@ -29,34 +27,11 @@ struct Strip {
     scan: usize,
 }
 
-pub(super) fn encode(
-    image: &Image,
-    quality: u8,
-    threads: NonZeroUsize,
-) -> Result<Bytes, EncodingError> {
+pub(super) fn encode(image: &Image, quality: u8) -> Result<Bytes, EncodingError> {
     let (width, height) = (image.width as usize, image.height as usize);
-    let strips: Vec<&[u8]> = image.rgba8.chunks(width * STRIP_PX * 4).collect();
-    let share = strips.len().div_ceil(threads.get());
-    let encoded = thread::scope(|scope| {
-        let parts: Vec<_> = strips
-            .chunks(share)
-            .map(|part| {
-                let strips = move || {
-                    let encoded = part
-                        .iter()
-                        .map(|rgba8| Strip::encode(rgba8, width, quality));
-                    encoded.collect::<Result<Vec<_>, _>>()
-                };
-                scope.spawn(strips)
-            })
-            .collect();
-        let joined = parts.into_iter().map(|part| match part.join() {
-            Ok(strips) => strips,
-            Err(panic) => std::panic::resume_unwind(panic),
-        });
-        joined.collect::<Result<Vec<_>, _>>()
-    })?;
-    let encoded: Vec<Strip> = encoded.into_iter().flatten().collect();
+    let strips = image.rgba8.par_chunks(width * STRIP_PX * 4);
+    let encoded = strips.map(|rgba8| Strip::encode(rgba8, width, quality));
+    let encoded = encoded.collect::<Result<Vec<_>, _>>()?;
     Ok(put_together(&encoded, width, height))
 }
 
@@ -160,7 +135,9 @@ mod tests {
     }
 
     fn encoded(image: &Image, threads: usize) -> Bytes {
-        encode(image, 90, NonZeroUsize::new(threads).unwrap()).unwrap()
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+        let pool = pool.build().unwrap();
+        pool.install(|| encode(image, 90)).unwrap()
     }
 
     #[test]
@@ -194,6 +171,6 @@ mod tests {
     #[test]
     fn what_is_too_large_for_a_jpeg_is_refused() {
         let image = image(70_000, 1);
-        assert!(encode(&image, 90, NonZeroUsize::MIN).is_err());
+        assert!(encode(&image, 90).is_err());
     }
 }

@@ -1,18 +1,18 @@
 //! What lies in every pixel of a globe view, by the outlines of land, lakes and borders: exact shares of areas, and lines.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
-use std::sync::OnceLock;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::thread;
 
 use glam::{DVec2, DVec3};
+use rayon::prelude::*;
 
 use super::camera::Camera;
 use crate::coast::ring::{BORDERS, Cap, LAKE_RINGS, LAND_RINGS, Ring};
 use crate::coast::{Cover, Mask, Pen};
 
-/// Cores that a mask is made on at most: more gain little, and others want some.
-const MOST_CORES: usize = 8;
+/// Rows of a mask that are made as one, in memory that stays near a core.
+const BAND_PX: usize = 64;
+/// Edges of an outline that one core goes along at once.
+const EDGES_AT_ONCE: usize = 1024;
 /// Shores of lakes, fainter than those of the sea.
 const LAKE_PEN: Pen = Pen {
     half_width_px: 0.5,
@@ -40,66 +40,92 @@ pub(super) struct Wanted {
     pub(super) borders: bool,
 }
 
-/// A word for every pixel: shares of land, lakes, shores and borders, 0 to 255, the first in the lowest bits. Made on as
-/// many cores as are of use: a camera that moves needs one for every picture.
+/// A word for every pixel: shares of land, lakes, shores and borders, 0 to 255, the first in the lowest bits. Made on all
+/// cores, band by band: a camera that moves needs one for every picture. The same words however many cores there are.
 pub(super) fn mask(camera: &Camera, size_px: [u32; 2], wanted: Wanted) -> Vec<u32> {
     let sight = &Sight::new(camera, size_px);
-    let (land, lakes, shores, borders) = thread::scope(|scope| {
-        let cover = |rings: &'static [Ring]| scope.spawn(move || sight.cover(rings));
-        let land = wanted
-            .land
-            .then(|| [&**LAND_RINGS, &**LAKE_RINGS].map(cover));
-        let shores = wanted.coasts.then(|| scope.spawn(|| sight.shores()));
-        let borders = wanted.borders.then(|| scope.spawn(|| sight.borders()));
-        let [land, lakes] = land.map_or([None, None], |both| both.map(|one| Some(ended(one))));
-        (land, lakes, shores.map(ended), borders.map(ended))
-    });
-    let mut words = vec![0; size_px[0] as usize * size_px[1] as usize];
-    let rows = (size_px[1] as usize).div_ceil(cores());
-    thread::scope(|scope| {
-        for (number, words) in words.chunks_mut(rows * size_px[0] as usize).enumerate() {
-            let first_row = number * rows;
-            let (covers, lines) = ([(&land, 0), (&lakes, 8)], [(&shores, 16), (&borders, 24)]);
-            scope.spawn(move || {
-                for (cover, shift) in covers {
-                    if let Some(cover) = cover {
-                        cover.write(first_row, words, shift);
-                    }
+    let (areas, lines) = rayon::join(
+        || {
+            if wanted.land {
+                let (land, lakes) = rayon::join(
+                    || sight.outlines(&LAND_RINGS),
+                    || sight.outlines(&LAKE_RINGS),
+                );
+                vec![(land, 0), (lakes, 8)]
+            } else {
+                vec![]
+            }
+        },
+        || {
+            let (shores, borders) = rayon::join(
+                || wanted.coasts.then(|| (sight.shores(), 16)),
+                || wanted.borders.then(|| (sight.borders(), 24)),
+            );
+            [shores, borders]
+        },
+    );
+    let [width, height] = size_px.map(|px| px as usize);
+    let mut words = vec![0; width * height];
+    let bands = words.par_chunks_mut(BAND_PX * width).enumerate();
+    bands.for_each(|(number, words)| {
+        let first_row = (number * BAND_PX) as u32;
+        let size_px = [size_px[0], (words.len() / width) as u32];
+        for (outlines, shift) in &areas {
+            let mut cover = Cover::new(first_row, size_px);
+            for covered in outlines {
+                cover.add_everywhere(covered.everywhere);
+                for [a, b] in &covered.edges {
+                    cover.add_edge(*a, *b);
                 }
-                for (mask, shift) in lines {
-                    if let Some(mask) = mask {
-                        mask.write(first_row, words, shift);
-                    }
-                }
-            });
+            }
+            cover.write(words, *shift);
+        }
+        for (lines, shift) in lines.iter().flatten() {
+            let mut mask = Mask::new([0.0, f64::from(first_row)], size_px);
+            for (pen, [a, b]) in lines {
+                mask.draw(*pen, *a, *b);
+            }
+            mask.write(words, *shift);
         }
     });
     words
 }
 
-/// Cores that one mask is made on at most.
-fn cores() -> usize {
-    thread::available_parallelism().map_or(1, |count| count.get().min(MOST_CORES))
-}
-
-fn ended<T>(thread: thread::ScopedJoinHandle<'_, T>) -> T {
-    match thread.join() {
-        Ok(value) => value,
-        Err(panic) => std::panic::resume_unwind(panic),
-    }
-}
+/// A line as it is seen, pixels.
+type Line = (Pen, [DVec2; 2]);
 
 /// What one ring covers.
 struct Covered {
     /// All of the picture, so many times.
     everywhere: i32,
-    outline: Vec<DVec2>,
+    /// Of its outline, those that reach rows of the picture, in their order.
+    edges: Vec<[DVec2; 2]>,
+}
+
+/// What becomes of every edge of a closed outline, in order; long outlines are shared among cores.
+fn along<A: Copy + Sync, B: Send>(closed: &[A], each: impl Fn(A, A, &mut Vec<B>) + Sync) -> Vec<B> {
+    let part = |first: usize| {
+        let mut made = Vec::with_capacity(EDGES_AT_ONCE + 16);
+        for at in first..(first + EDGES_AT_ONCE).min(closed.len()) {
+            let next = if at + 1 == closed.len() { 0 } else { at + 1 };
+            each(closed[at], closed[next], &mut made);
+        }
+        made
+    };
+    if closed.len() <= EDGES_AT_ONCE {
+        return part(0);
+    }
+    let parts = 0..closed.len().div_ceil(EDGES_AT_ONCE);
+    let parts = parts
+        .into_par_iter()
+        .map(|number| part(number * EDGES_AT_ONCE));
+    let parts: Vec<_> = parts.collect();
+    parts.into_iter().flatten().collect()
 }
 
 /// The ground from a camera: the globe from outside or, below the sea surface, from inside.
 struct Sight<'a> {
     camera: &'a Camera,
-    size_px: [u32; 2],
     middle_px: DVec2,
     /// Towards the camera from the globe's middle.
     up: DVec3,
@@ -121,7 +147,6 @@ impl<'a> Sight<'a> {
         let angle = BEYOND_RAD.min((FRAC_PI_2 - outline) / 2.0);
         Self {
             camera,
-            size_px,
             middle_px: DVec2::new(f64::from(size_px[0]), f64::from(size_px[1])) / 2.0,
             up: camera.place / distance,
             horizon,
@@ -152,34 +177,10 @@ impl<'a> Sight<'a> {
         PI - cap.angle_to(self.up) <= cap.radius + 1e-6
     }
 
-    /// What rings cover, added up in their order however many cores there are.
-    fn cover(&self, rings: &[Ring]) -> Cover {
-        let next = AtomicUsize::new(0);
-        let all: Vec<OnceLock<Covered>> = rings.iter().map(|_ring| OnceLock::new()).collect();
-        let work = || {
-            loop {
-                let number = next.fetch_add(1, Ordering::Relaxed);
-                let Some(ring) = rings.get(number) else {
-                    return;
-                };
-                if let Some(covered) = self.covered(ring) {
-                    // Set once: a number is taken by one thread.
-                    drop(all[number].set(covered));
-                }
-            }
-        };
-        thread::scope(|scope| {
-            for _other in 1..cores() {
-                scope.spawn(work);
-            }
-            work();
-        });
-        let mut cover = Cover::new(self.size_px);
-        for covered in all.iter().filter_map(OnceLock::get) {
-            cover.add_everywhere(covered.everywhere);
-            cover.add(&covered.outline);
-        }
-        cover
+    /// What rings cover, in their order.
+    fn outlines(&self, rings: &[Ring]) -> Vec<Covered> {
+        let covered: Vec<_> = rings.par_iter().map(|ring| self.covered(ring)).collect();
+        covered.into_iter().flatten().collect()
     }
 
     /// What one ring covers; none if it cannot be seen.
@@ -190,7 +191,7 @@ impl<'a> Sight<'a> {
                 && turns_round(behind, ring) == ring.sign;
             return Some(Covered {
                 everywhere: if is_all_round { ring.sign } else { 0 },
-                outline: self.outline_from_inside(ring),
+                edges: self.edges(&self.outline_from_inside(ring)),
             });
         }
         let may_be_opposite = self.may_be_opposite(&ring.cap);
@@ -201,7 +202,18 @@ impl<'a> Sight<'a> {
         let is_all_round = may_be_opposite && self.turns(ring) == -ring.sign;
         Some(Covered {
             everywhere: if is_all_round { ring.sign } else { 0 },
-            outline: self.outline(ring),
+            edges: self.edges(&self.outline(ring)),
+        })
+    }
+
+    /// The edges of an outline in pixels that reach rows of the picture: the others cover nothing of it.
+    fn edges(&self, outline: &[DVec2]) -> Vec<[DVec2; 2]> {
+        let height_px = 2.0 * self.middle_px.y;
+        along(outline, |a, b, edges| {
+            let (top, bottom) = (a.y.min(b.y), a.y.max(b.y));
+            if bottom > 0.0 && top < height_px {
+                edges.push([a, b]);
+            }
         })
     }
 
@@ -264,9 +276,7 @@ impl<'a> Sight<'a> {
 
     /// An outline as it is seen, hidden parts led round the globe, what lies behind the camera cut off.
     fn outline(&self, ring: &Ring) -> Vec<DVec2> {
-        let mut path = Vec::with_capacity(ring.corners.len() + 16);
-        let ends = ring.corners.iter().zip(ring.corners.iter().cycle().skip(1));
-        for (&a, &b) in ends {
+        let path = along(&ring.corners, |a, b, path| {
             let (from, to) = (self.above(a), self.above(b));
             let crossing = || a + (b - a) * (from / (from - to));
             match (from >= 0.0, to >= 0.0) {
@@ -274,16 +284,16 @@ impl<'a> Sight<'a> {
                 (true, false) => {
                     let edge = crossing();
                     path.push(edge);
-                    self.lead_round(&mut path, edge, b);
+                    self.lead_round(path, edge, b);
                 }
                 (false, true) => {
                     let edge = crossing();
-                    self.lead_round(&mut path, a, edge);
+                    self.lead_round(path, a, edge);
                     path.extend([edge, b]);
                 }
-                (false, false) => self.lead_round(&mut path, a, b),
+                (false, false) => self.lead_round(path, a, b),
             }
-        }
+        });
         self.ahead(&path)
     }
 
@@ -304,9 +314,7 @@ impl<'a> Sight<'a> {
 
     /// The part of a closed path before the camera (Sutherland and Hodgman 1974), in pixels.
     fn ahead(&self, path: &[DVec3]) -> Vec<DVec2> {
-        let mut seen = Vec::with_capacity(path.len() + 4);
-        let ends = path.iter().zip(path.iter().cycle().skip(1));
-        for (&a, &b) in ends {
+        along(path, |a, b, seen| {
             let (from, to) = (self.camera.ahead(a), self.camera.ahead(b));
             if (from >= 0.0) != (to >= 0.0) {
                 seen.push(self.seen_px(a + (b - a) * (from / (from - to))));
@@ -314,44 +322,40 @@ impl<'a> Sight<'a> {
             if to >= 0.0 {
                 seen.push(self.seen_px(b));
             }
-        }
-        seen
+        })
     }
 
-    fn shores(&self) -> Mask {
-        let mut mask = Mask::new([0.0; 2], self.size_px);
+    fn shores(&self) -> Vec<Line> {
         let per_rad = self.camera.focal_px / self.camera.nearest;
-        for (rings, pen) in [(&*LAND_RINGS, Pen::COAST), (&*LAKE_RINGS, LAKE_PEN)] {
-            for ring in rings {
-                if self.is_hidden(&ring.cap) || ring.cap.radius * per_rad < LEAST_OUTLINE_PX {
-                    continue;
-                }
+        let rings = |rings: &'static [Ring], pen: Pen| {
+            let seen = rings.par_iter().filter(move |ring| {
+                !self.is_hidden(&ring.cap) && ring.cap.radius * per_rad >= LEAST_OUTLINE_PX
+            });
+            seen.flat_map_iter(move |ring| {
                 let ends = ring.corners.iter().zip(ring.corners.iter().cycle().skip(1));
-                for ((a, b), _) in ends.zip(&ring.is_shore).filter(|(_, is_shore)| **is_shore) {
-                    self.draw(&mut mask, pen, [*a, *b]);
-                }
-            }
-        }
-        mask
+                let shores = ends.zip(&ring.is_shore).filter(|(_, is_shore)| **is_shore);
+                shores.filter_map(move |((a, b), _)| self.line(pen, [*a, *b]))
+            })
+        };
+        let land = rings(&LAND_RINGS, Pen::COAST);
+        land.chain(rings(&LAKE_RINGS, LAKE_PEN)).collect()
     }
 
-    fn borders(&self) -> Mask {
-        let mut mask = Mask::new([0.0; 2], self.size_px);
-        for border in BORDERS.iter().filter(|border| !self.is_hidden(&border.cap)) {
-            for pair in border.corners.windows(2) {
-                self.draw(&mut mask, BORDER_PEN, [pair[0], pair[1]]);
-            }
-        }
-        mask
+    fn borders(&self) -> Vec<Line> {
+        let seen = BORDERS.par_iter();
+        let seen = seen.filter(|border| !self.is_hidden(&border.cap));
+        let lines = seen.flat_map_iter(|border| {
+            let pairs = border.corners.windows(2);
+            pairs.filter_map(|pair| self.line(BORDER_PEN, [pair[0], pair[1]]))
+        });
+        lines.collect()
     }
 
-    /// Draws the part of a line that is seen.
-    fn draw(&self, mask: &mut Mask, pen: Pen, ends: [DVec3; 2]) {
-        let seen = clipped(ends, |place| self.above(place))
-            .and_then(|ends| clipped(ends, |place| self.camera.ahead(place)));
-        if let Some([a, b]) = seen {
-            mask.draw(pen, self.seen_px(a), self.seen_px(b));
-        }
+    /// The part of a line that is seen.
+    fn line(&self, pen: Pen, ends: [DVec3; 2]) -> Option<Line> {
+        let seen = clipped(ends, |place| self.above(place))?;
+        let [a, b] = clipped(seen, |place| self.camera.ahead(place))?;
+        Some((pen, [self.seen_px(a), self.seen_px(b)]))
     }
 }
 

@@ -14,8 +14,10 @@ use super::figures::Figures;
 const GPU_PAUSE: Duration = Duration::from_secs(2);
 /// What a desk does, by operation.
 const WORK: &str = "fluxglobe_render_worker_request_seconds";
+/// The steps of drawing.
+const STEPS: &str = "fluxglobe_render_worker_draw_step_seconds";
 /// The way of a picture through a tile server and who draws for it: name, histogram, label.
-const STAGES: [(&str, &str, &str); 8] = [
+const STAGES: [(&str, &str, &str); 11] = [
     (
         "look in the store",
         "fluxglobe_tile_server_look_up_seconds",
@@ -32,7 +34,10 @@ const STAGES: [(&str, &str, &str); 8] = [
         "",
     ),
     ("load", WORK, "operation=\"load\""),
-    ("upload, draw, read back", WORK, "operation=\"draw\""),
+    ("plan", STEPS, "step=\"plan\""),
+    ("upload", STEPS, "step=\"upload\""),
+    ("draw", STEPS, "step=\"device\""),
+    ("read back", STEPS, "step=\"read_back\""),
     ("encode", WORK, "operation=\"encode\""),
     (
         "send",

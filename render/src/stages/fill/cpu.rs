@@ -1,8 +1,7 @@
 //! CPU twins of `fill.wgsl` and `stencil.wgsl`: the same operations on single numbers in the same order, so that both
 //! give the same bits.
 
-use std::num::NonZeroUsize;
-use std::thread;
+use rayon::prelude::*;
 
 use super::level::{FillLevel, Table};
 
@@ -48,32 +47,20 @@ pub fn stencil(
         .map(|plane| Rimmed::new(level, plane))
         .collect();
     let mut sums = vec![0.0f32; 3 * cells];
-    let threads = thread::available_parallelism().map_or(1, NonZeroUsize::get);
-    let band_rows = (level.rows as usize).div_ceil(threads).max(1);
-    let band = band_rows * level.cols as usize;
+    let cols = level.cols as usize;
     let (counts, rest) = sums.split_at_mut(cells);
     let (values, squares) = rest.split_at_mut(cells);
-    let bands = counts
-        .chunks_mut(band)
-        .zip(values.chunks_mut(band))
-        .zip(squares.chunks_mut(band));
-    thread::scope(|scope| {
-        for (number, ((counts, values), squares)) in bands.enumerate() {
-            let rims = &rims;
-            scope.spawn(move || {
-                let planes = [counts, values, squares];
-                for (rim, sums) in rims.iter().zip(planes) {
-                    for (row, sums) in
-                        (number * band_rows..).zip(sums.chunks_exact_mut(level.cols as usize))
-                    {
-                        let first = row * level.cols as usize;
-                        let wanted = wanted.map(|wanted| &wanted[first..first + sums.len()]);
-                        row_sums(level, table, rim, row, wanted, sums);
-                    }
-                }
-            });
-        }
-    });
+    let rows = counts
+        .par_chunks_mut(cols)
+        .zip(values.par_chunks_mut(cols))
+        .zip(squares.par_chunks_mut(cols));
+    rows.enumerate()
+        .for_each(|(row, ((counts, values), squares))| {
+            let wanted = wanted.map(|wanted| &wanted[row * cols..(row + 1) * cols]);
+            for (rim, sums) in rims.iter().zip([counts, values, squares]) {
+                row_sums(level, table, rim, row, wanted, sums);
+            }
+        });
     sums
 }
 
