@@ -276,16 +276,13 @@ impl Source {
             (frame.clone(), sample.domain.clone(), counts.clone())
         };
         let before = async {
-            match &sample.before {
-                Some(frame) => {
-                    let key = part(frame, &counts.before);
-                    self.frame(grid, key, wanted).await
-                }
+            if let Some(frame) = &sample.before {
+                let key = part(frame, &counts.before);
+                self.frame(grid, key, wanted).await
+            } else {
                 // All that is accumulated until the end of the first step is of that step.
-                None => {
-                    let key = part(&sample.domain, &counts.after);
-                    self.nothing(grid, key).await
-                }
+                let key = part(&sample.domain, &counts.after);
+                self.nothing(grid, key).await
             }
         };
         let after = async {
@@ -315,7 +312,8 @@ impl Source {
         }
         let (_, of_domain, counts) = &key;
         let domain = self.domain(grid, of_domain);
-        let (domain, lacking) = tokio::try_join!(domain, self.lacking(grid, of_domain, counts))?;
+        let (domain, lacking) =
+            tokio::try_join!(domain, self.lacking(grid, of_domain, counts.as_ref()))?;
         let zero = |cell: &u32| if *cell == 0 { f32::NAN } else { 0.0 };
         let frame = Frame::new(domain.content().iter().map(zero).collect());
         let held = Held::new(uncertain(frame, lacking), Wanted::Now);
@@ -328,7 +326,7 @@ impl Source {
         &self,
         grid: &Grid,
         domain: &ObjectKey,
-        counts: &Option<ObjectKey>,
+        counts: Option<&ObjectKey>,
     ) -> Result<Option<Vec<f32>>, DrawError> {
         let Some(counts) = counts else {
             return Ok(None);
@@ -394,7 +392,7 @@ impl Source {
         let (values, domain, lacking) = tokio::try_join!(
             reading,
             self.domain(grid, of_domain),
-            self.lacking(grid, of_domain, counts),
+            self.lacking(grid, of_domain, counts.as_ref()),
         )?;
         let (renderer, of_grid) = (Arc::clone(&self.renderer), *grid);
         let fill = move || fill(&renderer, &of_grid, values, &domain);

@@ -112,7 +112,7 @@ impl Proxy {
                     }
                     let passing = Arc::clone(&passing);
                     std::thread::spawn(move || {
-                        join(client, server, passing);
+                        join(client, server, &passing);
                         lock(&open).remove(&number);
                     });
                 }
@@ -168,7 +168,7 @@ fn refuse(mut client: TcpStream) {
 }
 
 /// Hands bytes through both ways until either side closes.
-fn join(client: TcpStream, server: TcpStream, passing: Arc<Passing>) {
+fn join(client: TcpStream, server: TcpStream, passing: &Arc<Passing>) {
     let (Ok(client_too), Ok(server_too)) = (client.try_clone(), server.try_clone()) else {
         return;
     };
@@ -178,7 +178,7 @@ fn join(client: TcpStream, server: TcpStream, passing: Arc<Passing>) {
     }
     // The request that waits for its answer.
     let open: Arc<Mutex<Option<usize>>> = Arc::default();
-    let (open_too, passing_too) = (Arc::clone(&open), Arc::clone(&passing));
+    let (open_too, passing_too) = (Arc::clone(&open), Arc::clone(passing));
     let now =
         |open: &Mutex<Option<usize>>| open.lock().unwrap_or_else(PoisonError::into_inner).take();
     let back = std::thread::spawn(move || {

@@ -77,7 +77,7 @@ pub fn opened(mut socket: TcpStream, limit: Duration) -> Result<Opened> {
 
 /// Some bytes more; 0 at the end, none if nothing comes.
 fn read(socket: &mut TcpStream, came: &mut Vec<u8>) -> Result<Option<usize>> {
-    let mut some = [0; 65_536];
+    let mut some = [0; 16_384];
     match socket.read(&mut some) {
         Ok(count) => {
             came.extend_from_slice(&some[..count]);
@@ -96,7 +96,7 @@ pub fn frame(text: &str) -> Vec<u8> {
     match u8::try_from(text.len()) {
         Ok(short) if short < 126 => frame.push(0x80 | short),
         _ => {
-            frame.push(0x80 | 126);
+            frame.push(0xfe);
             frame.extend((text.len() as u16).to_be_bytes());
         }
     }

@@ -83,6 +83,31 @@ pub struct Metrics {
     pub(crate) streams: StreamMetrics,
 }
 
+/// What is timed: its name, what it is, its bounds.
+const TIMES: [(&str, &str, &[f64]); 5] = [
+    (
+        "request_seconds",
+        "Time until an answer begins.",
+        &REQUEST_BOUNDS_S,
+    ),
+    ("draw_seconds", "Time to draw a picture.", &DRAW_BOUNDS_S),
+    (
+        "draw_wait_seconds",
+        "Time a picture waited for its turn.",
+        &DRAW_BOUNDS_S,
+    ),
+    (
+        "look_up_seconds",
+        "Time to look for a picture in the store.",
+        &DRAW_BOUNDS_S,
+    ),
+    (
+        "send_seconds",
+        "Time from the beginning of an answer until its connection took the last byte.",
+        &REQUEST_BOUNDS_S,
+    ),
+];
+
 impl Metrics {
     /// Makes the metrics and registers them.
     pub fn register(registry: &Registry) -> Result<Self, prometheus::Error> {
@@ -102,30 +127,10 @@ impl Metrics {
                 IntGaugeVec::new(Opts::new(name(what), help), labels)?,
             )
         };
-        let timed = |what: &str, help: &str, bounds: &[f64]| {
-            HistogramOpts::new(name(what), help).buckets(bounds.to_vec())
-        };
-        let requests_s = timed(
-            "request_seconds",
-            "Time until an answer begins.",
-            &REQUEST_BOUNDS_S,
-        );
-        let draws_s = timed("draw_seconds", "Time to draw a picture.", &DRAW_BOUNDS_S);
-        let waits_s = timed(
-            "draw_wait_seconds",
-            "Time a picture waited for its turn.",
-            &DRAW_BOUNDS_S,
-        );
-        let look_ups_s = timed(
-            "look_up_seconds",
-            "Time to look for a picture in the store.",
-            &DRAW_BOUNDS_S,
-        );
-        let sends_s = timed(
-            "send_seconds",
-            "Time from the beginning of an answer until its connection took the last byte.",
-            &REQUEST_BOUNDS_S,
-        );
+        let [requests_s, draws_s, waits_s, look_ups_s, sends_s] =
+            TIMES.map(|(what, help, bounds)| {
+                HistogramOpts::new(name(what), help).buckets(bounds.to_vec())
+            });
         Ok(Self {
             requests: counters(
                 "requests_total",

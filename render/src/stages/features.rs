@@ -14,7 +14,7 @@ macro_rules! features {
     ($params:ident; $($(#[$doc:meta])+ $name:ident: $has:expr,)*) => {
         /// The name of each in the shaders and its bit.
         pub const NAMES: &[(&str, u32)] = {
-            #[expect(clippy::upper_case_acronyms, non_camel_case_types, reason = "as the shaders spell them")]
+            #[expect(non_camel_case_types, reason = "as the shaders spell them")]
             #[derive(Clone, Copy)]
             enum Bit { $($(#[$doc])+ $name,)* }
             &[$((stringify!($name), 1 << Bit::$name as u32),)*]

@@ -190,6 +190,7 @@ mod tests {
     use super::*;
 
     #[test]
+    #[expect(clippy::float_cmp, reason = "these numbers are exact")]
     fn the_slowest_and_the_quickest_viewer_are_told_beside_the_median() {
         let viewers = Viewers::of(&[4, 1, 2], &[40, 12, 30], 2.0);
         assert_eq!(viewers.instants_per_s_and_viewer, [0.5, 1.0, 2.0]);

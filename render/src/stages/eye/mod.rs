@@ -43,7 +43,7 @@ const FINISH: &str = "finish";
 pub struct Eye {
     entry: &'static str,
     /// Kernels of plain pictures are compiled at once, the others when they are first wanted.
-    eye: Variants,
+    kernels: Variants,
     /// Sums up the parts of long lists.
     hot: Variants,
     /// Composes what [`ALONE`] has seen.
@@ -81,7 +81,7 @@ impl Eye {
         let eye = Variants::new("eye", source, entry, reads);
         Self {
             entry,
-            eye: kinds.into_iter().fold(eye, |eye, kind| {
+            kernels: kinds.into_iter().fold(eye, |eye, kind| {
                 eye.compiled(gpu, &constants(kind, false, false))
             }),
             hot: Variants::new(HOT, source, HOT, &hiding),
@@ -157,7 +157,7 @@ impl Eye {
     fn kernel(&self, frame: &FrameContext<'_>, has_parts: bool) -> Variant {
         let params = &frame.params;
         let constants = constants(params.lists.kernel, params.in_context, has_parts);
-        self.eye.of(frame.gpu, &constants, frame.features)
+        self.kernels.of(frame.gpu, &constants, frame.features)
     }
 
     /// Sums up the parts of long lists.
