@@ -298,7 +298,10 @@ fn half_a_head(server: &Server) {
 }
 
 #[test]
-#[expect(clippy::too_many_lines, reason = "one server, what its clients do in turn")]
+#[expect(
+    clippy::too_many_lines,
+    reason = "one server, what its clients do in turn"
+)]
 fn whatever_clients_do_they_are_told_so_and_others_have_their_pictures() {
     let data = tempfile::tempdir().unwrap();
     landed(data.path());
