@@ -2,6 +2,8 @@
 
 mod jpeg;
 
+use std::fmt;
+
 use bytes::Bytes;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder as _};
@@ -9,7 +11,7 @@ use image::{ExtendedColorType, ImageEncoder as _};
 use crate::error::RenderError;
 
 /// A picture with straight alpha.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Clone, PartialEq, Eq)]
 pub struct Image {
     /// Pixels across.
     pub width: u32,
@@ -17,6 +19,13 @@ pub struct Image {
     pub height: u32,
     /// Red, green, blue, alpha; row by row from the top.
     pub rgba8: Vec<u8>,
+}
+
+impl fmt::Debug for Image {
+    /// Without its pixels, of which there are millions.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Image of {} x {} pixels", self.width, self.height)
+    }
 }
 
 impl Image {

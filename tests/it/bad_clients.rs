@@ -155,7 +155,7 @@ fn hundred_million_pixels(server: &Server) {
     assert!(tile.text().contains("256 or 512"), "{}", tile.text());
     let whole = server.get(globe).unwrap();
     assert_eq!(whole.status, 400, "{}", whole.text());
-    assert!(whole.text().contains("4096"), "{}", whole.text());
+    assert!(whole.text().contains("7680"), "{}", whole.text());
     let mut camera = Camera::connect(&server.url).unwrap();
     let id = camera.look(globe).unwrap();
     let begun = Instant::now();

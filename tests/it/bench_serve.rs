@@ -56,7 +56,10 @@ fn all_kinds_of_clients_are_measured_on_a_real_server() {
         "look in the store",
         "wait for a turn",
         "load",
-        "upload, draw, read back",
+        "plan",
+        "upload",
+        "draw",
+        "read back",
         "encode",
         "send",
     ] {

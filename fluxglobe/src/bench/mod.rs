@@ -9,6 +9,7 @@ pub(crate) mod quality;
 pub(crate) mod render;
 pub(crate) mod serve;
 pub(crate) mod stream;
+pub(crate) mod window_size;
 
 /// The smallest value that a share of all values does not exceed; `values` are sorted and there is one.
 fn quantile(values: &[f64], share: f64) -> f64 {

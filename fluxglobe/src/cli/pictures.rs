@@ -11,7 +11,7 @@ use contract::time::TimeMs;
 use render_worker::fleet::WorkerAddress;
 
 use super::RenderGlobe;
-use crate::bench::serve::WindowSize;
+use crate::bench::window_size::WindowSize;
 
 /// `fluxglobe render animation`.
 #[derive(Debug, Args)]

@@ -105,3 +105,40 @@ impl Features {
         self.0
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    impl Features {
+        /// Made up: so many.
+        pub(crate) fn with(self, bits: u32) -> Self {
+            Self(self.0 ^ bits)
+        }
+    }
+
+    fn bit(name: &str) -> u32 {
+        let (_, bit) = NAMES.iter().find(|(own, _)| *own == name).unwrap();
+        *bit
+    }
+
+    #[test]
+    fn a_kernel_is_the_same_for_pictures_that_differ_in_what_it_does_not_ask() {
+        let source = "if (feature(IS_LOG, values.is_log == 1u)) { }";
+        let mut params = Params::default();
+        let plain = Features::of(&params).asked_by(source);
+        params.view.kind = u32::MAX;
+        assert_eq!(Features::of(&params).asked_by(source), plain);
+        params.values.is_log = 1;
+        assert_eq!(Features::of(&params).asked_by(source).bits(), bit("IS_LOG"));
+    }
+
+    #[test]
+    fn no_picture_has_all_features() {
+        let all: u32 = NAMES.iter().map(|(_, bit)| bit).sum();
+        assert!(
+            all < Features::ASKED.bits(),
+            "it would be taken for one that asks"
+        );
+    }
+}

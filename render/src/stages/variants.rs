@@ -94,3 +94,30 @@ impl Variants {
         (key, place)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stages::params::{Params, Uniform};
+
+    #[test]
+    fn what_users_ask_for_fills_no_memory_with_variants() {
+        let variants = Variants::new::<Uniform>("a", "", "b", &[]);
+        let features = |kind: u32| Features::of(&Params::default()).with(kind);
+        let key = |kind: u32| variants.place(&[("KERNEL", 1)], features(kind)).0;
+        for kind in 0..MOST_VARIANTS as u32 {
+            assert_eq!(
+                key(kind),
+                [("KERNEL", 1), ("FEATURES", features(kind).bits())]
+            );
+        }
+        let asked = [("KERNEL", 1), ("FEATURES", Features::ASKED.bits())];
+        assert_eq!(key(1000), asked, "a further one is compiled");
+        assert_eq!(key(1001), asked);
+        assert_eq!(
+            key(3),
+            [("KERNEL", 1), ("FEATURES", features(3).bits())],
+            "one that was there is lost"
+        );
+    }
+}

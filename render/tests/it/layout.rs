@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use render::gpu::FIRST_UNIFORM;
 use render::passes::{scatter, splat, trails};
+use render::stages::features::{self, Features};
 use render::stages::fill::level::{FillLevel, MOST_REACH_COLS};
 use render::stages::fill::{self, exact, window};
 use render::stages::isolines::params::Isoline;
@@ -241,6 +242,12 @@ fn constants_have_the_same_value_in_rust_and_wgsl() {
             wgsl(name)
         );
     }
+    for (name, bit) in features::NAMES {
+        assert!((wgsl(name) - f64::from(*bit)).abs() < 0.5, "{name}");
+        let asks = |source: &&str| source.contains(&format!("feature({name}, "));
+        assert!(SOURCES.iter().any(asks), "no shader asks for {name}");
+    }
+    assert!((wgsl("ASKED") - f64::from(Features::ASKED.bits())).abs() < 0.5);
     let look = constant(scatter::SOURCE, "LOOK");
     assert!((look - f64::from(LOOK)).abs() < 1e-7);
     let width = constant(fill::STENCIL_SOURCE, "WIDTH");

@@ -148,7 +148,9 @@ fn jobs_beyond_a_limit_are_refused_with_the_reason() {
     let inside_the_earth = globe(0.0, 0.0, -2e6, 64);
     for view in [
         inside_the_earth,
-        globe(0.0, 0.0, 1e7, 5000),
+        globe(0.0, 0.0, 1e7, 7681),
+        // More pixels than 8K has.
+        globe(0.0, 0.0, 1e7, 6000),
         tile(0, 0, 0, 300),
     ] {
         let refused = renderer

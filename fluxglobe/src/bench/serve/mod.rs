@@ -18,6 +18,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context as _, Result, bail, ensure};
 
 use crate::bench::listed::{Listed, listed};
+use crate::bench::window_size::WindowSize;
 use crate::cli::BenchServe;
 use crate::progress;
 use ask::{Answered, Got};
@@ -26,8 +27,6 @@ use playback::{Playback, Watched};
 use questions::{GOLDEN, Questions, TILE_PX};
 use summary::{Counted, Summary, Viewers};
 use watch::{Readings, Watch};
-
-pub(crate) use window::WindowSize;
 
 /// Different reasons of bad answers that are told.
 const MOST_REASONS: usize = 5;
