@@ -103,9 +103,14 @@ async function round({ page, film }) {
   return { frames, dates: await page.evaluate(() => window.dates) };
 }
 
+/** Playing stops some instants after January, the more the busier the machine is. */
+async function backToJanuary({ page }) {
+  await page.locator("#slider").fill("0");
+  await until(page, () => document.querySelector("#date").textContent === "16 January 2000");
+}
+
 async function plays(seen) {
-  await seen.page.locator("#slider").fill("0");
-  await until(seen.page, () => document.querySelector("#date").textContent === "16 January 2000");
+  await backToJanuary(seen);
   const { frames, dates } = await round(seen);
   const months = dates.slice(0, LAST).map((text) => text.split(" ")[1]);
   assert.deepEqual(months.join(" "), "February March April May June July August September October November December");
@@ -114,6 +119,7 @@ async function plays(seen) {
 }
 
 async function playsAgain(seen) {
+  await backToJanuary(seen);
   const before = seen.way.tiles().length;
   const { dates } = await round(seen);
   assert.ok(dates.length >= LAST, `${dates.length} instants`);
