@@ -10,7 +10,7 @@ use bytes::Bytes;
 use contract::encoding::Encoding;
 use contract::job::RenderJob;
 use render::scene::Scene;
-use render::{Backend, Image, Renderer, laps};
+use render::{Backend, Image, Renderer, timings};
 use storage::Store;
 
 use crate::encoding::Encoders;
@@ -59,7 +59,7 @@ pub struct Pipeline {
 }
 
 /// Steps of drawing by name, and how long each took.
-type Laps = [(&'static str, Duration); 4];
+type Timings = [(&'static str, Duration); 4];
 
 impl Pipeline {
     /// Opens the backend. Blocks while shaders compile.
@@ -116,14 +116,14 @@ impl Pipeline {
         scene: Scene,
         is_wanted: IsWanted,
         held: impl Send + 'static,
-    ) -> Result<(Image, Laps), DrawError> {
+    ) -> Result<(Image, Timings), DrawError> {
         let (renderer, own) = (Arc::clone(&self.renderer), job.clone());
         let drawing = tokio::task::spawn_blocking(move || {
             let image = renderer.render_while(&own, &scene, &*is_wanted);
             drop(held);
             // Also what a picture took that was not wanted any more: it is not the next one's.
-            let laps = laps::taken();
-            image.map(|image| (image, laps))
+            let timings = timings::taken();
+            image.map(|image| (image, timings))
         });
         let drawn = drawing.await.map_err(DrawError::Thread)??;
         // Not before: what is wanted now goes first.

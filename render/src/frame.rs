@@ -5,7 +5,6 @@ use contract::job::Mode;
 use crate::error::RenderError;
 use crate::frame_context::{FrameContext, SceneBuffers};
 use crate::gpu::{Gpu, Slot, Stamps, Workspace};
-use crate::laps::{self, Step};
 use crate::passes;
 use crate::passes::scatter::{self, Scatter};
 use crate::passes::splat::{self, Splats};
@@ -22,6 +21,7 @@ use crate::stages::light::Light;
 use crate::stages::map::Map;
 use crate::stages::sizes::{light_bytes, list_count};
 use crate::stages::{bin, compose, flow, interpolate, isolines, map};
+use crate::timings::{self, Step};
 
 /// Entries a list buffer starts with for each particle; a frame that needs more is drawn again with room for all.
 const FIRST_ENTRIES_PER_PARTICLE: u64 = 2;
@@ -164,7 +164,7 @@ impl Stages {
         let mut capacity = (workspace.room_bytes(Slot::Entries) / entry_bytes).max(first);
         loop {
             let room = capacity.min(gpu.most_buffer_bytes() / entry_bytes) as u32;
-            let mut frame = laps::timed(Step::Upload, || {
+            let mut frame = timings::timed(Step::Upload, || {
                 self.recorded(gpu, &mut *workspace, plan, part, scene, room, None)
             })?;
             let image = frame.room(Slot::Image, 4)?;

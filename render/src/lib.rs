@@ -23,7 +23,6 @@ pub mod frame_context;
 pub mod frame_cpu;
 pub mod gpu;
 pub mod image;
-pub mod laps;
 pub mod passes;
 pub mod plan;
 pub mod playback;
@@ -32,6 +31,7 @@ pub mod renderer;
 mod resident;
 pub mod scene;
 pub mod stages;
+pub mod timings;
 
 pub use adapter::Adapter;
 pub use error::RenderError;

@@ -11,12 +11,12 @@ use crate::error::RenderError;
 use crate::frame_cpu;
 use crate::gpu::Gpu;
 use crate::image::Image;
-use crate::laps::{self, Step};
 use crate::plan::{Part, Plan};
 use crate::pyramid;
 use crate::scene::Scene;
 use crate::stages::fill::{self, Filled, Form};
 use crate::stages::layout::{LIGHT_GIVEN, LIGHT_OWN};
+use crate::timings::{self, Step};
 
 /// What draws.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -173,7 +173,7 @@ impl Renderer {
         if !is_wanted() {
             return Err(RenderError::NotWanted);
         }
-        let mut plan = laps::timed(Step::Plan, || match &device {
+        let mut plan = timings::timed(Step::Plan, || match &device {
             None => Plan::new(job, scene, most_buffer_bytes),
             Some(_device) => Plan::for_device(job, scene, most_buffer_bytes),
         })?;

@@ -180,8 +180,8 @@ impl Inner {
             let scene = self.measured("load", loading).await?;
             let held = Arc::clone(permit);
             let drawing = self.pipeline.picture(job, scene, flight.is_wanted(), held);
-            let (image, laps) = self.measured("draw", drawing).await?;
-            for (step, took) in laps {
+            let (image, timings) = self.measured("draw", drawing).await?;
+            for (step, took) in timings {
                 let histogram = self.step_s.with_label_values(&[step]);
                 histogram.observe(took.as_secs_f64());
             }

@@ -7,7 +7,7 @@ use bytemuck::Pod;
 
 use super::{Gpu, Kernel, Stamps, uniform};
 use crate::error::RenderError;
-use crate::laps::{self, Step};
+use crate::timings::{self, Step};
 
 /// Most workgroups in one dimension of a dispatch (the least any device allows).
 const MOST_GROUPS: u32 = 65_535;
@@ -167,7 +167,7 @@ impl<'a> Recorder<'a> {
             at += bytes;
         }
         let (gpu, commands) = (self.gpu, self.encoder.finish());
-        let mapped = laps::timed(Step::Device, || {
+        let mapped = timings::timed(Step::Device, || {
             let submission = gpu.queue.submit([commands]);
             // A refused submission never ends: it must not be waited for.
             gpu.check_fault("drawing")?;
@@ -189,7 +189,7 @@ impl<'a> Recorder<'a> {
             staging.get_mapped_range(..).map_err(|_unmapped| stopped())
         })?;
         let mut rest: &[u8] = &mapped;
-        Ok(laps::timed(Step::ReadBack, || {
+        Ok(timings::timed(Step::ReadBack, || {
             parts.map(|(_, _, bytes)| {
                 let (content, after) = rest.split_at(bytes as usize);
                 rest = after;
