@@ -19,7 +19,7 @@ viewer := tile-server/web/dist/index.html
 viewer_sources := $(shell git ls-files tile-server/web)
 
 .DEFAULT_GOAL := help
-.PHONY: help checkout demo build release viewer check test faults bless gallery describe services services-down cluster cluster-down tools test-tools gallery-tools
+.PHONY: help checkout demo build release viewer check test faults bench bless gallery describe services services-down cluster cluster-down tools test-tools gallery-tools
 
 help: ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 14
@@ -90,6 +90,10 @@ faults: checkout test-tools $(viewer) ## kill -9 of every kind of process, 60 ti
 	cargo build --locked --workspace --all-targets
 	deploy/services/services.sh install
 	FLUXGLOBE_KILLS=60 cargo test --locked -p tests --test cluster killed -- --nocapture
+
+bench: build ## Measure beside peers (ARGS=tiles: thematic tiles beside titiler-xarray; more options after the name)
+	deploy/install-tools.sh bench
+	$(FLUXGLOBE_TOOLS)/peers/bin/python -B tests/bench/$(firstword $(ARGS) tiles).py --program $(fluxglobe) $(wordlist 2,99,$(ARGS))
 
 bless: test-tools ## Draw the golden images anew, for a new RENDERER_VERSION, and list what changed
 	BLESS=1 cargo test --locked -p render --test it golden

@@ -3,6 +3,7 @@
 #   deploy/install-tools.sh run    what `make demo` needs
 #   deploy/install-tools.sh test   and what `make test` needs besides
 #   deploy/install-tools.sh gallery   and what `make gallery` needs besides
+#   deploy/install-tools.sh bench   and what `make bench` needs besides: the peers, in a Python environment of their own
 # Root is asked for through apt only, with sudo when the caller is not root.
 set -euo pipefail
 
@@ -25,6 +26,7 @@ packages_run=(
     'libvulkan1 /usr/lib/*/libvulkan.so.1'
     'mesa-vulkan-drivers /usr/share/vulkan/icd.d/lvp_icd.*.json'
 )
+packages_bench=('wrk /usr/bin/wrk')
 packages_test=('chromium /usr/bin/chromium' 'fonts-dejavu-core /usr/share/fonts/truetype/dejavu/DejaVuSans.ttf')
 
 missing=()
@@ -39,6 +41,7 @@ need() {
 }
 need "${packages_run[@]}"
 if [ "$purpose" = test ]; then need "${packages_test[@]}"; fi
+if [ "$purpose" = bench ]; then need "${packages_bench[@]}"; fi
 
 if [ ${#missing[@]} -gt 0 ]; then
     say "installing Debian packages: ${missing[*]}"
@@ -79,9 +82,21 @@ if [ "$purpose" = test ]; then
     pip_install pyproj 3.7.2
     pip_install shapely 2.2.0
     pip_install netCDF4 1.7.4
+    pip_install zarr 3.1.6
+    pip_install xarray 2026.9.0
 fi
 if [ "$purpose" = gallery ]; then
     pip_install pillow 13.0.0
     # Carries an ffmpeg of its own, for machines without one.
     pip_install imageio-ffmpeg 0.8.1
+fi
+if [ "$purpose" = bench ]; then
+    peers=$tools/peers
+    wanted=$(dirname "$0")/../tests/bench/requirements.txt
+    [ -x "$peers/bin/python" ] || python3 -m venv "$peers"
+    if ! cmp -s "$wanted" "$peers/installed"; then
+        say "installing the peers in $peers"
+        "$peers/bin/pip" install --quiet --disable-pip-version-check --requirement "$wanted"
+        cp "$wanted" "$peers/installed"
+    fi
 fi

@@ -23,6 +23,11 @@ impl Digest {
         Self(sha256)
     }
 
+    /// Its 32 bytes.
+    pub fn as_bytes(&self) -> &[u8; 32] {
+        &self.0
+    }
+
     /// Digest of a value's canonical JSON: fields in declaration order, no white space.
     ///
     /// # Panics

@@ -1,6 +1,7 @@
 //! The command line: words in, one plain `Command` out. Every value is parsed here, once, into its final type.
 
 mod annotations;
+mod export;
 mod fill;
 mod ground;
 mod look;
@@ -24,6 +25,7 @@ use contract::region::Cells;
 use contract::time::TimeMs;
 
 pub(crate) use annotations::Annotated;
+pub(crate) use export::{Export, ExportFormat, ExportedProduct};
 pub(crate) use fill::{BenchFill, FillError, ProductsOf};
 pub(crate) use ground::{Ground, GroundOptions};
 pub(crate) use look::{Look, RenderLegend};
@@ -94,6 +96,16 @@ pub(crate) struct Settings {
     /// Refuse to draw where there is no graphics card, instead of drawing in software.
     #[arg(long, env = "FLUXGLOBE_REQUIRE_GPU", global = true)]
     pub(crate) require_gpu: bool,
+    /// Vulkan adapters to draw on, separated by commas: numbers or PCI addresses as `fluxglobe adapters` lists them, or parts
+    /// of names. All graphics cards of this machine if absent, a software adapter if it has none.
+    #[arg(
+        long,
+        env = "FLUXGLOBE_ADAPTER",
+        global = true,
+        value_delimiter = ',',
+        value_name = "ADAPTERS"
+    )]
+    pub(crate) adapter: Vec<String>,
     /// Parts that a query is cut into, on a cluster at least; as many as this machine has processors, or as the cluster's
     /// executors have room for, if absent. Answers are the same bits for any number.
     #[arg(
@@ -118,6 +130,8 @@ pub(crate) enum Command {
     Ingest(Ingest),
     /// List what has landed.
     Products(Products),
+    /// Write a product as a cube that xarray and other programs open: Zarr, or an Icechunk repository.
+    Export(Export),
     /// Series at a place or over a region.
     #[command(subcommand)]
     Stats(Stats),
@@ -160,6 +174,8 @@ pub(crate) enum Command {
     Gc(Gc),
     /// Show what would become of files: landed with which profile, or refused and why. Nothing is stored.
     Survey(Survey),
+    /// List the Vulkan adapters of this machine, and which of them are drawn on.
+    Adapters(Adapters),
     /// Measure.
     #[command(subcommand)]
     Bench(Bench),
@@ -185,6 +201,7 @@ impl Command {
                 | Self::Serve(_)
                 | Self::RenderWorker(_)
                 | Self::Recompute(_)
+                | Self::Adapters(_)
         )
     }
 
@@ -200,6 +217,14 @@ impl Command {
         };
         common.print_settings
     }
+}
+
+/// `fluxglobe adapters`.
+#[derive(Debug, Args)]
+pub(crate) struct Adapters {
+    /// JSON instead of a table.
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 /// `fluxglobe demo`.

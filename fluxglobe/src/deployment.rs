@@ -123,15 +123,23 @@ fn parts_in_process(settings: &Settings, is_remote: bool) -> NonZeroUsize {
     settings.partitions.map_or(parts, NonZeroUsize::from)
 }
 
-/// What to draw with: this machine's Vulkan device, or its processor when asked to.
+/// What to draw with: this machine's Vulkan devices, those that are named, or its processor when asked to.
 pub(crate) fn backend(settings: &Settings) -> Result<Backend> {
-    match (settings.cpu, settings.require_gpu) {
-        (true, true) => bail!(
+    let named = &settings.adapter;
+    match (settings.cpu, settings.require_gpu, named.is_empty()) {
+        (true, true, _) => bail!(
             "--cpu draws with the processor and --require-gpu with nothing but a graphics card: give one of them"
         ),
-        (true, false) => Ok(Backend::Cpu),
-        (false, true) => Ok(Backend::HardwareGpu),
-        (false, false) => Ok(Backend::Gpu),
+        (true, false, false) => {
+            bail!("--cpu draws with the processor and --adapter names others: give one of them")
+        }
+        (false, true, false) => bail!(
+            "--adapter says what is drawn on, in software or not: leave --require-gpu, which chooses by itself, out"
+        ),
+        (true, false, true) => Ok(Backend::Cpu),
+        (false, true, true) => Ok(Backend::HardwareGpu),
+        (false, false, true) => Ok(Backend::Gpu),
+        (false, false, false) => Ok(Backend::Adapters(named.clone())),
     }
 }
 

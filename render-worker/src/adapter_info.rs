@@ -14,7 +14,7 @@ pub(crate) struct AdapterInfo {
 
 impl AdapterInfo {
     pub(crate) fn of(pipeline: &Pipeline) -> Result<Self, prometheus::Error> {
-        let help = "1, with what pictures are drawn on: its name, how it is reached, what kind of adapter it is.";
+        let help = "Adapters that pictures are drawn on, by name, how they are reached and what kind they are.";
         let name = "fluxglobe_render_adapter_info";
         Ok(Self {
             pipeline: pipeline.clone(),
@@ -29,11 +29,12 @@ impl Collector for AdapterInfo {
     }
 
     fn collect(&self) -> Vec<MetricFamily> {
-        let adapter = self.pipeline.renderer().adapter();
         // After a fault it may be another one.
         self.info.reset();
-        let labels = [adapter.name(), adapter.backend(), adapter.kind()];
-        self.info.with_label_values(&labels).set(1);
+        for adapter in self.pipeline.renderer().adapters() {
+            let labels = [adapter.name(), adapter.backend(), adapter.kind()];
+            self.info.with_label_values(&labels).inc();
+        }
         self.info.collect()
     }
 }

@@ -59,7 +59,7 @@ pub struct Pipeline {
 }
 
 /// Steps of drawing by name, and how long each took.
-type Timings = [(&'static str, Duration); 4];
+type Timings = [(&'static str, Duration); 5];
 
 impl Pipeline {
     /// Opens the backend. Blocks while shaders compile.
@@ -148,21 +148,20 @@ impl Pipeline {
     where
         F: Future<Output = Result<T, DrawError>>,
     {
-        let number = self.renderer.device_number();
         match attempt().await {
             Err(error) if error.is_device_fault() => {
                 tracing::warn!(error = error.in_full(), "drawing again on a fresh device");
-                self.renew(number).await?;
+                self.renew().await?;
                 attempt().await
             }
             done => done,
         }
     }
 
-    /// Opens a fresh device in place of the one of this number; see [`Renderer::renew`].
-    pub async fn renew(&self, failed_number: u64) -> Result<(), DrawError> {
+    /// Opens fresh devices in place of those that failed; see [`Renderer::renew`].
+    pub async fn renew(&self) -> Result<(), DrawError> {
         let renderer = Arc::clone(&self.renderer);
-        let renewing = tokio::task::spawn_blocking(move || renderer.renew(failed_number));
+        let renewing = tokio::task::spawn_blocking(move || renderer.renew());
         Ok(renewing.await.map_err(DrawError::Thread)??)
     }
 }

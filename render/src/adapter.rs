@@ -15,6 +15,9 @@ pub struct Adapter {
     name: String,
     backend: &'static str,
     kind: Kind,
+    driver: String,
+    pci_address: Option<String>,
+    own_bytes: Option<u64>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,12 +27,18 @@ enum Kind {
 }
 
 impl Adapter {
-    /// One that the driver tells of.
-    pub(crate) fn of(info: &wgpu::AdapterInfo) -> Self {
+    /// One that the driver tells of, with the bytes of memory that are its own, if the driver says.
+    pub(crate) fn of(info: &wgpu::AdapterInfo, own_bytes: Option<u64>) -> Self {
+        let driver = format!("{} {}", info.driver, info.driver_info);
+        let kind = Kind::Device(info.device_type);
         Self {
             name: info.name.clone(),
             backend: info.backend.to_str(),
-            kind: Kind::Device(info.device_type),
+            kind,
+            driver: driver.trim().to_owned(),
+            pci_address: Some(info.device_pci_bus_id.clone()).filter(|id| !id.is_empty()),
+            // A program on the processor has the computer's memory.
+            own_bytes: own_bytes.filter(|_| !kind.is_software()),
         }
     }
 
@@ -39,6 +48,9 @@ impl Adapter {
             name: "CPU twins".to_owned(),
             backend: "none",
             kind: Kind::Twins,
+            driver: String::new(),
+            pci_address: None,
+            own_bytes: None,
         }
     }
 
@@ -63,9 +75,35 @@ impl Adapter {
         }
     }
 
+    /// Its driver with the version; empty for the twins.
+    pub fn driver(&self) -> &str {
+        &self.driver
+    }
+
+    /// Where it is plugged in, `DOMAIN:BUS:DEVICE.FUNCTION`, which tells equal cards of one host apart.
+    pub fn pci_address(&self) -> Option<&str> {
+        self.pci_address.as_deref()
+    }
+
+    /// Bytes of memory that are its own; none where that is the computer's, or where nobody says.
+    pub fn own_bytes(&self) -> Option<u64> {
+        self.own_bytes
+    }
+
+    /// Place in the order of what is taken first: 0 is a card of its own.
+    pub(crate) fn rank(&self) -> u8 {
+        match self.kind {
+            Kind::Device(wgpu::DeviceType::DiscreteGpu) => 0,
+            Kind::Device(wgpu::DeviceType::IntegratedGpu) => 1,
+            Kind::Device(wgpu::DeviceType::VirtualGpu) => 2,
+            Kind::Device(wgpu::DeviceType::Other) => 3,
+            Kind::Device(wgpu::DeviceType::Cpu) | Kind::Twins => 4,
+        }
+    }
+
     /// Is it a program on the processor, such as lavapipe?
     pub fn is_software(&self) -> bool {
-        matches!(self.kind, Kind::Device(wgpu::DeviceType::Cpu) | Kind::Twins)
+        self.kind.is_software()
     }
 
     /// How many pictures should be drawn on it at the same time.
@@ -80,6 +118,31 @@ impl Adapter {
                 | wgpu::DeviceType::VirtualGpu
                 | wgpu::DeviceType::Other,
             ) => ON_A_CARD,
+        }
+    }
+}
+
+impl Kind {
+    fn is_software(self) -> bool {
+        matches!(self, Self::Device(wgpu::DeviceType::Cpu) | Self::Twins)
+    }
+}
+
+#[cfg(test)]
+impl Adapter {
+    /// One as a driver would tell of it, for tests of what is chosen.
+    pub(crate) fn told(
+        name: &str,
+        device_type: wgpu::DeviceType,
+        pci_address: Option<&str>,
+    ) -> Self {
+        Self {
+            name: name.to_owned(),
+            backend: "vulkan",
+            kind: Kind::Device(device_type),
+            driver: String::new(),
+            pci_address: pci_address.map(str::to_owned),
+            own_bytes: None,
         }
     }
 }

@@ -9,13 +9,19 @@ pub enum RenderError {
     #[error(
         "no Vulkan adapter found; install the package mesa-vulkan-drivers for a software one, or draw with the CPU backend"
     )]
-    NoAdapter(#[source] Box<wgpu::RequestAdapterError>),
+    NoAdapter,
     /// There is a software adapter alone, where a graphics card is required.
     #[error(
         "a graphics card is required and there is none: the only Vulkan adapter is {adapter}, a program on the processor; \
          give this machine or container a card and its driver, or start without --require-gpu"
     )]
     SoftwareAdapter { adapter: String },
+    /// No adapter of this number, address or name.
+    #[error("no adapter {wanted:?} here; there are: {there} (`fluxglobe adapters` lists them)")]
+    UnknownAdapter { wanted: String, there: String },
+    /// An adapter that was drawn on is not there any more.
+    #[error("the adapter {adapter} is not there any more")]
+    AdapterGone { adapter: String },
     /// The adapter refused a device.
     #[error("adapter {adapter:?} gave no device")]
     NoDevice {
@@ -79,7 +85,9 @@ impl RenderError {
     pub fn is_retryable(&self) -> bool {
         match self {
             Self::DeviceStopped { .. } | Self::OutOfMemory { .. } | Self::NotWanted => true,
-            Self::NoAdapter(_)
+            Self::NoAdapter
+            | Self::UnknownAdapter { .. }
+            | Self::AdapterGone { .. }
             | Self::SoftwareAdapter { .. }
             | Self::NoDevice { .. }
             | Self::Job(_)
@@ -126,7 +134,9 @@ impl RenderError {
             | Self::NoTrails
             | Self::NoNorthward
             | Self::Encode { .. } => true,
-            Self::NoAdapter(_)
+            Self::NoAdapter
+            | Self::UnknownAdapter { .. }
+            | Self::AdapterGone { .. }
             | Self::SoftwareAdapter { .. }
             | Self::NoDevice { .. }
             | Self::NotWanted => false,

@@ -15,8 +15,10 @@
 mod shared_struct;
 
 mod adapter;
+mod backend;
 pub mod coast;
 mod device;
+mod device_slot;
 pub mod error;
 pub mod frame;
 pub mod frame_context;
@@ -34,7 +36,9 @@ pub mod stages;
 pub mod timings;
 
 pub use adapter::Adapter;
+pub use backend::{Backend, chosen};
 pub use error::RenderError;
+pub use gpu::adapters;
 pub use image::Image;
-pub use renderer::{Backend, Renderer};
+pub use renderer::Renderer;
 pub use scene::{Frame, Interval, Scene};

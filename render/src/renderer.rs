@@ -1,15 +1,16 @@
-//! Jobs and scenes in, pictures out, on the GPU or with the CPU twins; one renderer serves many threads.
+//! Jobs and scenes in, pictures out, on the adapters of a host or with the CPU twins; one renderer serves many threads.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::num::NonZeroUsize;
 
 use contract::grid::Grid;
 use contract::job::RenderJob;
 
 use crate::adapter::Adapter;
-use crate::device::Device;
+use crate::backend::Backend;
+use crate::device_slot::{self, DeviceSlot};
 use crate::error::RenderError;
 use crate::frame_cpu;
-use crate::gpu::Gpu;
+use crate::gpu::Checks;
 use crate::image::Image;
 use crate::plan::{Part, Plan};
 use crate::pyramid;
@@ -18,122 +19,112 @@ use crate::stages::fill::{self, Filled, Form};
 use crate::stages::layout::{LIGHT_GIVEN, LIGHT_OWN};
 use crate::timings::{self, Step};
 
-/// What draws.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Backend {
-    /// Compute shaders on the most able Vulkan adapter, in software where there is no graphics card.
-    Gpu,
-    /// The same, but never in software.
-    HardwareGpu,
-    /// The stages' CPU twins.
-    Cpu,
-}
-
 /// Draws pictures.
 pub struct Renderer {
-    /// The one at the start.
-    adapter: Adapter,
+    /// Names of the adapters at the start.
+    name: String,
     /// None for the CPU twins.
-    device: Option<DeviceSlot>,
-}
-
-/// The device in use; another takes its place after a fault, while pictures under way keep the old one.
-struct DeviceSlot {
-    open: fn() -> Result<Gpu, RenderError>,
-    most_frame_bytes: Option<u64>,
-    current: Mutex<Arc<Device>>,
-    /// Held while a fresh device is opened, so that only one is.
-    opening: Mutex<()>,
+    devices: Vec<DeviceSlot>,
 }
 
 impl Renderer {
-    /// Opens the device and compiles the stages.
+    /// Opens the devices and compiles the stages.
     pub fn new(backend: Backend) -> Result<Self, RenderError> {
         Self::keeping(backend, None)
     }
 
-    /// The same with a limit of frames that stay on the device between pictures, bytes: a share of what the device has
+    /// The same with a limit of frames that stay on each device between pictures, bytes: a share of what the device has
     /// if none is named.
     pub fn keeping(backend: Backend, most_frame_bytes: Option<u64>) -> Result<Self, RenderError> {
-        match backend {
-            Backend::Cpu => Ok(Self {
-                adapter: Adapter::twins(),
-                device: None,
-            }),
-            Backend::Gpu => Self::on(Gpu::open, most_frame_bytes),
-            Backend::HardwareGpu => Self::on(Gpu::open_hardware, most_frame_bytes),
-        }
+        let devices = DeviceSlot::all_of(backend, Checks::Trusted, most_frame_bytes)?;
+        Ok(Self::over(devices))
     }
 
     /// Opens the device with shaders that check every index and loop; slow, for tests.
     pub fn checked() -> Result<Self, RenderError> {
-        Self::on(Gpu::open_checked, None)
+        Ok(Self::over(DeviceSlot::all_of(
+            Backend::Gpu,
+            Checks::Full,
+            None,
+        )?))
     }
 
-    fn on(
-        open: fn() -> Result<Gpu, RenderError>,
-        most_frame_bytes: Option<u64>,
-    ) -> Result<Self, RenderError> {
-        let device = Device::new(open()?, 0, most_frame_bytes)?;
-        Ok(Self {
-            adapter: device.gpu().adapter().clone(),
-            device: Some(DeviceSlot {
-                open,
-                most_frame_bytes,
-                current: Mutex::new(Arc::new(device)),
-                opening: Mutex::default(),
-            }),
-        })
+    /// Opens two devices on the first adapter, for tests of how several are used on hosts that have one.
+    pub fn doubled() -> Result<Self, RenderError> {
+        Ok(Self::over(DeviceSlot::two_on_one(Checks::Trusted)?))
     }
 
-    /// Name of the adapter, or of the CPU twins.
+    fn over(devices: Vec<DeviceSlot>) -> Self {
+        let name = together(&adapters_of(&devices));
+        Self { name, devices }
+    }
+
+    /// Names of the adapters at the start (`2 x` and the name for two equal ones), or of the CPU twins.
     pub fn name(&self) -> &str {
-        self.adapter.name()
+        &self.name
     }
 
-    /// What draws now: after a fault it may be another adapter than at the start.
-    pub fn adapter(&self) -> Adapter {
-        self.device().map_or_else(
-            || self.adapter.clone(),
-            |device| device.gpu().adapter().clone(),
-        )
+    /// What draws now, one or more: after a fault it may be another adapter than at the start.
+    pub fn adapters(&self) -> Vec<Adapter> {
+        adapters_of(&self.devices)
     }
 
-    /// The device to draw on now.
-    fn device(&self) -> Option<Arc<Device>> {
-        self.device.as_ref().map(|slot| Arc::clone(&slot.lock()))
+    /// How many pictures should be drawn at the same time.
+    pub fn draws_at_once(&self) -> NonZeroUsize {
+        let of_each = self.adapters().into_iter().map(|a| a.draws_at_once().get());
+        NonZeroUsize::new(of_each.sum()).unwrap_or(NonZeroUsize::MIN)
     }
 
     /// How many devices were given up so far.
-    pub fn device_number(&self) -> u64 {
-        self.device().map_or(0, |device| device.number)
+    pub fn device_restarts(&self) -> u64 {
+        self.devices.iter().map(|slot| slot.device().number).sum()
     }
 
-    /// Bytes of frames that stay on the device between pictures.
+    /// Bytes of frames that stay on the devices between pictures.
     pub fn resident_bytes(&self) -> u64 {
-        self.device().map_or(0, |device| device.resident_bytes())
+        let bytes = |slot: &DeviceSlot| slot.device().resident_bytes();
+        self.devices.iter().map(bytes).sum()
     }
 
-    /// Opens a fresh device in place of the one of this number; does nothing if that one is gone already. Blocks while
-    /// the shaders compile.
-    pub fn renew(&self, failed_number: u64) -> Result<(), RenderError> {
-        let Some(slot) = &self.device else {
-            return Ok(());
-        };
-        let _one_at_a_time = slot.opening.lock().unwrap_or_else(PoisonError::into_inner);
-        if slot.lock().number == failed_number {
-            let adapter = self.name();
-            tracing::warn!(adapter, "the graphics device failed, opening it again");
-            let fresh = Device::new((slot.open)()?, failed_number + 1, slot.most_frame_bytes)?;
-            *slot.lock() = Arc::new(fresh);
+    /// Pictures that are drawn on each device, in the order of [`Renderer::adapters`].
+    pub fn in_flight(&self) -> Vec<usize> {
+        self.devices.iter().map(DeviceSlot::in_flight).collect()
+    }
+
+    /// Opens a fresh device in place of every one that had a fault. Blocks while the shaders compile.
+    ///
+    /// # Errors
+    /// Why the last of them could not be opened, if there is none to draw on; as long as there is one, the others are
+    /// tried again the next time.
+    pub fn renew(&self) -> Result<(), RenderError> {
+        let mut failed = None;
+        for slot in &self.devices {
+            if let Err(error) = slot.renew() {
+                tracing::warn!(%error, "a graphics device cannot be opened again");
+                failed = Some(error);
+            }
         }
-        Ok(())
+        match failed {
+            Some(error) if !self.has_sound_device() => Err(error),
+            _ => Ok(()),
+        }
     }
 
-    /// Loses the device as a driver would, for tests of what happens then.
+    /// Has any device had a fault, and is not opened again yet?
+    pub fn has_fault(&self) -> bool {
+        let mut slots = self.devices.iter();
+        slots.any(|slot| slot.device().gpu().has_fault())
+    }
+
+    fn has_sound_device(&self) -> bool {
+        let mut slots = self.devices.iter();
+        slots.any(|slot| !slot.device().gpu().has_fault())
+    }
+
+    /// Loses the first device as a driver would, for tests of what happens then.
     pub fn lose_device(&self) {
-        if let Some(device) = self.device() {
-            device.gpu().lose();
+        if let Some(slot) = self.devices.first() {
+            slot.device().gpu().lose();
         }
     }
 
@@ -144,7 +135,7 @@ impl Renderer {
             self.prepare(&alone, vector)?;
         }
         let coarser = pyramid::suited(job, scene);
-        match self.device() {
+        match device_slot::home(&self.devices, frames_of(scene)) {
             Some(device) => device.prepare(coarser.as_ref().unwrap_or(scene)),
             None => Ok(()),
         }
@@ -162,12 +153,11 @@ impl Renderer {
         scene: &Scene,
         is_wanted: &dyn Fn() -> bool,
     ) -> Result<Image, RenderError> {
-        let device = self.device();
-        let most_buffer_bytes = device
-            .as_ref()
-            .map_or(u64::MAX, |device| device.gpu().most_buffer_bytes());
         job.validate()?;
         scene.validate()?;
+        let taken = device_slot::least_busy(&self.devices, frames_of(scene));
+        let device = taken.as_ref().map(|taken| &taken.device);
+        let most_buffer_bytes = device.map_or(u64::MAX, |device| device.gpu().most_buffer_bytes());
         let coarser = pyramid::suited(job, scene);
         let scene = coarser.as_ref().unwrap_or(scene);
         if !is_wanted() {
@@ -226,17 +216,39 @@ impl Renderer {
         values: &[f32],
         domain: &[u32],
     ) -> Result<Filled, RenderError> {
-        let device = self.device();
-        let on_device = device.and_then(|device| device.fill(form, grid, values, domain));
+        let taken = device_slot::least_busy(&self.devices, 0);
+        let on_device = taken.and_then(|taken| taken.device.fill(form, grid, values, domain));
         on_device.unwrap_or_else(|| fill::on_cpu(form, grid, values, domain))
     }
 }
 
-impl DeviceSlot {
-    fn lock(&self) -> std::sync::MutexGuard<'_, Arc<Device>> {
-        // The slot is changed by one assignment, so a poisoned lock still guards a whole device.
-        self.current.lock().unwrap_or_else(PoisonError::into_inner)
+fn adapters_of(devices: &[DeviceSlot]) -> Vec<Adapter> {
+    if devices.is_empty() {
+        return vec![Adapter::twins()];
     }
+    let adapter = |slot: &DeviceSlot| slot.device().gpu().adapter().clone();
+    devices.iter().map(adapter).collect()
+}
+
+/// Names of adapters for people, equal ones once with their number.
+fn together(adapters: &[Adapter]) -> String {
+    let mut counts: Vec<(&str, usize)> = Vec::new();
+    for adapter in adapters {
+        match counts.iter_mut().find(|(name, _)| *name == adapter.name()) {
+            Some((_, count)) => *count += 1,
+            None => counts.push((adapter.name(), 1)),
+        }
+    }
+    let shown = counts.into_iter().map(|(name, count)| match count {
+        1 => name.to_owned(),
+        _ => format!("{count} x {name}"),
+    });
+    shown.collect::<Vec<_>>().join(", ")
+}
+
+/// The frame that a scene begins with, which says where pictures of it are drawn when nothing else does.
+fn frames_of(scene: &Scene) -> u64 {
+    scene.value.before.cells.id()
 }
 
 fn paste(image: &mut Image, part: Part, pixels: &[u8]) {

@@ -6,8 +6,10 @@ use std::time::{Duration, Instant};
 /// A step of drawing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Step {
-    /// What the view makes of the job: tables, masks of the ground.
+    /// What the view makes of the job: tables, lists.
     Plan,
+    /// Waiting for the mask of the ground, which is made on other cores while the device begins.
+    Mask,
     /// Recording commands and sending what they read.
     Upload,
     /// From the submission until the picture can be read.
@@ -17,18 +19,20 @@ pub enum Step {
 }
 
 /// Steps in the order of [`Step`], each with its name in metrics.
-const NAMES: [&str; 4] = ["plan", "upload", "device", "read_back"];
+const NAMES: [&str; 5] = ["plan", "mask", "upload", "device", "read_back"];
 
 thread_local! {
     static TAKEN: Cell<[Duration; NAMES.len()]> = const { Cell::new([Duration::ZERO; NAMES.len()]) };
 }
 
-/// Does something and adds its time to that of a step.
+/// Does something and adds its time to that of a step, less the time of steps within it.
 pub(crate) fn timed<T>(step: Step, work: impl FnOnce() -> T) -> T {
+    let before: Duration = TAKEN.get().iter().sum();
     let begun = Instant::now();
     let done = work();
     let mut taken = TAKEN.get();
-    taken[step as usize] += begun.elapsed();
+    let within = taken.iter().sum::<Duration>().saturating_sub(before);
+    taken[step as usize] += begun.elapsed().saturating_sub(within);
     TAKEN.set(taken);
     done
 }
@@ -55,12 +59,27 @@ mod tests {
                 5
             );
         }
-        let [plan, upload, device, read_back] = taken();
+        let [plan, mask, upload, device, read_back] = taken();
         assert_eq!(
-            [plan, upload, read_back].map(|(_, took)| took),
-            [Duration::ZERO; 3]
+            [plan, mask, upload, read_back].map(|(_, took)| took),
+            [Duration::ZERO; 4]
         );
         assert!(device.0 == "device" && device.1 >= 2 * pause);
         assert!(taken().iter().all(|(_, took)| took.is_zero()));
+    }
+
+    #[test]
+    fn a_step_within_another_counts_once() {
+        let pause = Duration::from_millis(20);
+        let begun = Instant::now();
+        timed(Step::Upload, || {
+            timed(Step::Mask, || std::thread::sleep(pause));
+        });
+        let whole = begun.elapsed();
+        let [_, mask, upload, ..] = taken().map(|(_, took)| took);
+        assert!(
+            mask >= pause && mask + upload <= whole,
+            "{mask:?} {upload:?}"
+        );
     }
 }

@@ -66,7 +66,7 @@ pub fn encode(grid: &Grid, values: &[f32], period: Period) -> Result<Encoded, St
 
 /// What a frame is: the shape of its grid, its period, its values row by row. Where the grid lies is not in it: axes of
 /// two files of one product may differ in their last digits.
-fn digest_of(grid: &Grid, values: &[f32], period: Period) -> Digest {
+pub fn digest_of(grid: &Grid, values: &[f32], period: Period) -> Digest {
     ValuesDigest::new("fluxglobe frame 2\n")
         .number(grid.rows.into())
         .number(grid.cols.into())

@@ -1,4 +1,4 @@
-//! The object store: keys in, bytes out; objects are created once and never change.
+//! The object store: keys in, bytes out; objects are created once and never change, but for the one kind of `swap`.
 //!
 //! One handle for a folder, memory, and the buckets and file systems of other machines. What differs between them is
 //! how an object is created once (`create`), who tries again after a failure that may pass (the clouds' clients
@@ -17,6 +17,7 @@ mod location;
 mod read;
 mod retry_store;
 mod settings;
+mod swap;
 
 use std::fmt::{Debug, Formatter};
 use std::path::{Path as FilePath, PathBuf};
@@ -36,6 +37,7 @@ use crate::StorageError;
 
 pub use self::leftovers::Leftover;
 pub use self::settings::{RetryLimits, Settings};
+pub use self::swap::Seen;
 
 /// Largest object: a frame of the largest grid is 1 GiB uncompressed.
 const MAX_OBJECT_BYTES: u64 = 2 << 30;

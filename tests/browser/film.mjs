@@ -1,4 +1,4 @@
-//! What a page shows while something happens: every picture that the browser puts on the screen in, the share of the map that tiles cover out.
+//! What a page shows while something happens: every picture that the browser puts on the screen in, what is read from its pixels out.
 
 /** The ground of the example pages, red, green, blue. */
 const GROUND = [0x7d, 0x85, 0x8c];
@@ -33,10 +33,34 @@ export class Film {
 
   /** The share that is covered in every picture since the start. */
   async stop() {
-    await this.#session.send("Page.stopScreencast");
     const shares = [];
-    for (const frame of this.#frames) shares.push(await this.#coveredIn(frame));
+    for (const frame of await this.end()) shares.push(await this.#coveredIn(frame));
     return shares;
+  }
+
+  /** The newest picture since the start. */
+  get last() {
+    return this.#frames.at(-1);
+  }
+
+  /** Every picture since the start. */
+  async end() {
+    await this.#session.send("Page.stopScreencast");
+    return this.#frames;
+  }
+
+  /** What `measure` makes of the pixels of each picture, given those of other ones as well; it runs in the browser. */
+  async read(pictures, measure, others = []) {
+    const all = [];
+    for (const picture of pictures) {
+      const [source, texts] = [measure.toString(), [picture, ...others]];
+      all.push(await this.#reader.evaluate(readPictures, { source, texts }));
+    }
+    return all;
+  }
+
+  async close() {
+    await this.#reader.close();
   }
 
   async picture() {
@@ -79,4 +103,16 @@ export class Film {
       [pictures, ground, TOP_PX, BOTTOM_PX],
     );
   }
+}
+
+async function readPictures({ source, texts }) {
+  const all = await Promise.all(
+    texts.map(async (png) => {
+      const bitmap = await createImageBitmap(await (await fetch(`data:image/png;base64,${png}`)).blob());
+      const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext("2d");
+      context.drawImage(bitmap, 0, 0);
+      return context.getImageData(0, 0, bitmap.width, bitmap.height);
+    }),
+  );
+  return new Function(`return (${source})`)()(...all);
 }

@@ -40,9 +40,9 @@ async function local(page) {
   return page.replace(CDN, "/library/$1/");
 }
 
-/** Passes everything on to `target`, unless told otherwise. */
+/** Passes everything on to `target`, unless told otherwise; answers may be as old as a cache on the way would say. */
 export async function throughTo(target) {
-  const way = { asked: [], delayMs: 0, isCut: false };
+  const way = { asked: [], delayMs: 0, isCut: false, ageS: 0 };
   const server = createServer((asked, answer) => {
     if (way.isCut) return asked.socket.destroy();
     way.asked.push(asked.url);
@@ -52,10 +52,12 @@ export async function throughTo(target) {
     const { hostname, port } = new URL(target);
     // The host is this one's, so that addresses in answers lead here again.
     const onward = request({ hostname, port, path: asked.url, method: asked.method, headers: asked.headers }, (got) => {
-      answer.writeHead(got.statusCode, got.headers);
+      answer.writeHead(got.statusCode, way.ageS > 0 ? { ...got.headers, age: String(way.ageS) } : got.headers);
       got.pipe(answer);
     });
     onward.on("error", () => asked.socket.destroy());
+    // What never ends, such as news, ends with whoever listens.
+    answer.on("close", () => onward.destroy());
     asked.pipe(onward);
   };
   way.tiles = () => way.asked.filter((url) => /\/\d+\/\d+\/\d+\.png/.test(url));

@@ -2,6 +2,7 @@
 import assert from "node:assert/strict";
 import test from "node:test";
 import { budgetTotal, checkTable, landHasNoData, seriesOfSea } from "./analysis-steps.mjs";
+import { keepsTiles } from "./cache-steps.mjs";
 import { filmIsRefused, filmIsSaved, largePictureIsCancelled } from "./film-steps.mjs";
 import {
   globesAgree,
@@ -26,6 +27,7 @@ import {
   playbackAndViewFollowLook,
   wrongLookIsIgnored,
 } from "./look-steps.mjs";
+import { pausesOnSteps, scrubsStream, scrubsTiles } from "./scrub-steps.mjs";
 import { newDataIsShown, newDataLands, observationsOfPlatform } from "./stream-steps.mjs";
 import { lostServer, refusedTiles, sharedAddress, timeOutside } from "./trouble-steps.mjs";
 
@@ -90,6 +92,10 @@ test("the viewer", async (t) => {
     await step("tilts and turns the camera by keys", keysTilt);
     await step("moves the picture with the look, and the legend with the picture", pictureFollowsLook);
     await step("runs time through the stream", pictureFollowsTime);
+    await step("asks for no tile twice", keepsTiles);
+    await step("pauses on stored steps, and steps from one to the next", pausesOnSteps);
+    await step("shows tiles of one instant after the other while time is dragged", scrubsTiles);
+    await step("shows live pictures without a hole while time is dragged", scrubsStream);
     await step("puts places where the picture has them", globesAgree);
     await step("goes back to tiles when the live picture is switched off", liveIsSwitchedOff);
     await step("stays with tiles where there is no stream", staysWithTiles);

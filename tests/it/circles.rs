@@ -17,6 +17,7 @@ use syn::{Attribute, Item, ItemMod, UseTree, Visibility};
 const CRATES: &[&str] = &[
     "contract/src/lib.rs",
     "storage/src/lib.rs",
+    "cube/src/lib.rs",
     "kafka/src/lib.rs",
     "observations/src/lib.rs",
     "service/src/lib.rs",

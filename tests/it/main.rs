@@ -11,6 +11,7 @@ mod circles;
 mod damaged;
 mod dependencies;
 mod end_to_end;
+mod exported;
 mod harness_self;
 mod logged;
 mod reread;

@@ -1,7 +1,9 @@
 //! One file a command; this one only sends each command to its file.
 
+mod adapters;
 mod budget;
 pub(crate) mod derive;
+mod export;
 mod fill_error;
 mod gc;
 pub(crate) mod generate;
@@ -35,6 +37,7 @@ pub(crate) async fn run(settings: &Settings, command: Command) -> Result<ExitCod
             Some(ProductsOf::FillError(options)) => fill_error::run(settings, options).await?,
             None => products::run(settings, &options).await?,
         },
+        Command::Export(options) => export::run(settings, &options).await?,
         Command::Stats(Stats::Point(options)) => stats::point(settings, &options).await?,
         Command::Stats(Stats::Polygon(options)) => stats::polygon(settings, &options).await?,
         Command::Budget(options) => budget::run(settings, &options).await?,
@@ -69,6 +72,7 @@ pub(crate) async fn run(settings: &Settings, command: Command) -> Result<ExitCod
         Command::Bench(Bench::Quality(options)) => bench::quality::run(settings, options).await?,
         Command::Bench(Bench::Compare(options)) => bench::compare::run(&options)?,
         Command::Bench(Bench::Fill(options)) => bench::fill::run(settings, &options)?,
+        Command::Adapters(options) => adapters::run(settings, &options)?,
         Command::Generate(options) => generate::run(options)?,
         Command::DecodeFile { .. } => unreachable!("main runs the decoder before anything else"),
     }

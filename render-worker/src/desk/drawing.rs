@@ -233,7 +233,9 @@ impl Inner {
         match drawn {
             Ok(_image) => away.store(false, Ordering::Release),
             Err(DrawError::Render(
-                RenderError::NoAdapter(_)
+                RenderError::NoAdapter
+                | RenderError::UnknownAdapter { .. }
+                | RenderError::AdapterGone { .. }
                 | RenderError::SoftwareAdapter { .. }
                 | RenderError::NoDevice { .. },
             )) => {

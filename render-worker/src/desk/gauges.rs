@@ -107,7 +107,7 @@ impl Collector for Gauges {
         early("read", kept.early_reads);
         early("used", kept.early_hits);
         early("cancelled", kept.early_cancelled);
-        raise(&self.device_restarts, pipeline.renderer().device_number());
+        raise(&self.device_restarts, pipeline.renderer().device_restarts());
         [
             self.queue_length.collect(),
             self.drawing.collect(),

@@ -181,7 +181,7 @@ impl Desk {
         registry: &Registry,
     ) -> Result<Self, OpenError> {
         let pipeline = Pipeline::open(store.clone(), backend, limits)?;
-        let suited = || pipeline.renderer().adapter().draws_at_once();
+        let suited = || pipeline.renderer().draws_at_once();
         let draws_at_once = limits.draws_at_once.unwrap_or_else(suited);
         let name = format!("fluxglobe_{METRICS}_pictures_total");
         let help = "Pictures given out, by where they came from.";
@@ -193,7 +193,7 @@ impl Desk {
         let step_s = HistogramVec::new(
             timed_as(
                 "draw_step_seconds",
-                "Time of the steps of drawing: plan, upload, device, read_back.",
+                "Time of the steps of drawing: plan, mask, upload, device, read_back.",
             ),
             &["step"],
         )?;
@@ -281,10 +281,10 @@ impl Desk {
     /// Can pictures be drawn now? What there is, for operators.
     pub async fn ready(&self) -> Result<String, DrawError> {
         // Nobody brings jobs to a worker that is not ready, so it tries by itself to become so.
-        if self.inner.is_without_device.load(Ordering::Acquire) {
-            let pipeline = &self.inner.pipeline;
-            let failed = pipeline.renderer().device_number();
-            pipeline.renew(failed).await?;
+        let pipeline = &self.inner.pipeline;
+        let is_without = self.inner.is_without_device.load(Ordering::Acquire);
+        if is_without || pipeline.renderer().has_fault() {
+            pipeline.renew().await?;
             self.inner.is_without_device.store(false, Ordering::Release);
         }
         // Any answer about any key is a store that can be read.

@@ -9,8 +9,9 @@ use tonic::transport::{Channel, Endpoint};
 use tonic::{Code, Request, Status};
 
 use super::FleetError;
+use super::load::Load;
 use crate::wire::proto::renderer_client::RendererClient;
-use crate::wire::proto::{DrawReply, DrawRequest, StatusRequest};
+use crate::wire::proto::{DrawReply, DrawRequest, StatusReply, StatusRequest};
 use crate::wire::{self, MOST_REPLY_BYTES, Version};
 
 /// A worker that takes no connection within this time is away.
@@ -42,6 +43,10 @@ pub(super) struct Member {
     channel: Channel,
     in_flight: AtomicUsize,
     most_in_flight: usize,
+    /// What others had it do when it was last asked.
+    of_others: AtomicUsize,
+    /// Pictures that it draws at the same time, as it says; at least one.
+    draws_at_once: AtomicUsize,
     health: Mutex<Health>,
 }
 
@@ -81,6 +86,8 @@ impl Member {
             channel: endpoint.connect_lazy(),
             in_flight: AtomicUsize::new(0),
             most_in_flight,
+            of_others: AtomicUsize::new(0),
+            draws_at_once: AtomicUsize::new(1),
             health: Mutex::new(Health::Unknown),
         })
     }
@@ -91,6 +98,24 @@ impl Member {
 
     pub(super) fn is_hopeful(&self) -> bool {
         matches!(*self.lock(), Health::Unknown | Health::Up)
+    }
+
+    /// What it has to do.
+    pub(super) fn load(&self) -> Load {
+        let own = self.in_flight.load(Ordering::Acquire);
+        Load {
+            pictures: own + self.of_others.load(Ordering::Acquire),
+            draws_at_once: self.draws_at_once.load(Ordering::Acquire),
+        }
+    }
+
+    fn learn(&self, reply: &StatusReply) {
+        let said = reply.queue_length as usize + reply.in_flight as usize;
+        let own = self.in_flight.load(Ordering::Acquire);
+        let of_others = said.saturating_sub(own);
+        self.of_others.store(of_others, Ordering::Release);
+        let at_once = (reply.draws_at_once as usize).max(1);
+        self.draws_at_once.store(at_once, Ordering::Release);
     }
 
     fn lock(&self) -> MutexGuard<'_, Health> {
@@ -120,6 +145,7 @@ impl Member {
             Ok(Err(status)) => Health::Down(short(&status)),
             Ok(Ok(reply)) => {
                 let reply = reply.into_inner();
+                self.learn(&reply);
                 match own.quarrel(reply.version.as_ref()) {
                     Some(quarrel) => Health::Mismatch(quarrel),
                     None if reply.stopping => Health::Down("it is stopping".to_owned()),

@@ -1,8 +1,9 @@
-//! All render workers as one: each picture is asked of the worker that has its frames, and of the next one if that is
-//! full, slow or lost.
+//! All render workers as one: each picture is asked of the worker that has its frames, and of another one if that has much
+//! to do, is full, slow or lost.
 
 mod address;
 mod error;
+mod load;
 mod member;
 mod place;
 mod refusals;
@@ -231,13 +232,15 @@ impl Inner {
         self.tries.with_label_values(&[outcome]).inc();
     }
 
-    /// Workers in the order of the rendezvous, those that are thought to be away last.
+    /// Workers in the order of the rendezvous, those that have much to do behind the others, those that are thought to be
+    /// away last.
     fn in_order(&self, place: &str) -> Vec<Arc<Member>> {
         let members: Vec<Arc<Member>> = self.members().values().cloned().collect();
         let names: Vec<&str> = members.iter().map(|member| member.name.as_str()).collect();
         let ranked = ranked(place, &names).into_iter();
         let in_order = ranked.map(|index| Arc::clone(&members[index]));
         let (hopeful, other): (Vec<_>, Vec<_>) = in_order.partition(|m| m.is_hopeful());
+        let hopeful = load::in_order(hopeful, |member| member.load());
         hopeful.into_iter().chain(other).collect()
     }
 

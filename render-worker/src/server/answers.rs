@@ -56,6 +56,7 @@ impl Renderer for Answers {
             queue_length: condition.waiting_on_demand as u32,
             in_flight: condition.in_flight as u32,
             stopping: condition.stopping,
+            draws_at_once: self.desk.draws_at_once().get() as u32,
             resident_products: kept.products.into_iter().collect(),
         }))
     }

@@ -177,6 +177,38 @@ async fn a_full_worker_is_passed_over() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn an_instant_that_many_want_is_drawn_by_all_workers() {
+    let store = Store::memory();
+    let job = two_months_in(&store).await;
+    let workers: Vec<Worker> = (0..3).map(|_| Worker::start(&store, 1, 64)).collect();
+    let names: Vec<&str> = workers.iter().map(|w| w.name.as_str()).collect();
+    let fleet = Arc::new(fleet(&names).await);
+    // One at a time stays where its frames are.
+    let mut drawn: BTreeMap<String, usize> = BTreeMap::new();
+    for number in 0..3 {
+        let picture = fleet
+            .draw(&quick(&job, number), Order::on_demand(USUAL), "t")
+            .await
+            .unwrap();
+        *drawn.entry(picture.worker).or_default() += 1;
+    }
+    assert_eq!(drawn, [(first_asked(&job, &names).to_owned(), 3)].into());
+    let calls: Vec<_> = (1..=12)
+        .map(|number| ask(&fleet, &slow(&job, number)))
+        .collect();
+    drawn.clear();
+    for call in calls {
+        *drawn
+            .entry(call.await.unwrap().unwrap().worker)
+            .or_default() += 1;
+    }
+    assert!(
+        drawn.len() == 3 && drawn.values().all(|&of_one| of_one >= 3),
+        "{drawn:?}"
+    );
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn workers_may_come_later_than_those_who_ask() {
     let store = Store::memory();
     let job = two_months_in(&store).await;

@@ -25,11 +25,11 @@ async fn a_job_is_drawn_on_a_fresh_device_when_its_own_is_lost() {
             ..job.clone()
         };
         let before = service.draw(&job).await.unwrap();
-        assert_eq!(service.renderer().device_number(), lost);
+        assert_eq!(service.renderer().device_restarts(), lost);
         service.renderer().lose_device();
         assert_eq!(service.draw(&job).await.unwrap(), before, "{mode}");
         assert_eq!(
-            service.renderer().device_number(),
+            service.renderer().device_restarts(),
             lost + 1,
             "the fault fired"
         );
@@ -52,17 +52,14 @@ async fn a_job_that_loses_every_device_fails_and_the_next_one_is_drawn() {
     };
     let failed = service.on_a_sound_device(poison).await.unwrap_err();
     assert!(failed.is_device_fault() && failed.is_final(), "{failed}");
-    assert!(!matches!(
-        failed,
-        DrawError::Render(RenderError::NoAdapter(_))
-    ));
+    assert!(!matches!(failed, DrawError::Render(RenderError::NoAdapter)));
     assert_eq!(
-        service.renderer().device_number(),
+        service.renderer().device_restarts(),
         1,
         "tried on a second device"
     );
     service.draw(&job).await.unwrap();
-    assert_eq!(service.renderer().device_number(), 2);
+    assert_eq!(service.renderer().device_restarts(), 2);
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -88,5 +85,5 @@ async fn many_that_draw_on_a_device_that_is_lost_share_one_fresh_one() {
     for (task, before) in tasks.into_iter().zip(before) {
         assert_eq!(task.await.unwrap(), before);
     }
-    assert_eq!(service.renderer().device_number(), 1);
+    assert_eq!(service.renderer().device_restarts(), 1);
 }

@@ -189,7 +189,7 @@ async fn the_first_picture_of_a_step_waits_for_its_drawing_alone() {
     };
     for (frames_ahead, misses) in [(0, 1), (1, 0)] {
         let limits = limits(frames_ahead);
-        let service = Here::with_limits(store.clone(), backend, limits);
+        let service = Here::with_limits(store.clone(), backend.clone(), limits);
         let timed = async |time: &str| -> Duration {
             let job = map_at(&flux, time, tile(3, 1, 3, 256));
             let begun = Instant::now();

@@ -40,7 +40,7 @@ async fn a_picture_is_the_same_bytes_by_grpc_as_in_process() {
         // Each backend its own copy, so that none finds what the other drew.
         let own = Store::memory();
         assert_eq!(two_months_in(&own).await, job);
-        let worker = Worker::start_with(&own, &settings(2, 8), backend, Version::own());
+        let worker = Worker::start_with(&own, &settings(2, 8), backend.clone(), Version::own());
         let fleet = fleet(&[&worker.name]).await;
         let local = Here::new(store.clone(), backend);
         for mode in Mode::SCALAR {

@@ -206,7 +206,7 @@ fn as_many_pictures_are_drawn_at_once_as_suit_what_draws_unless_it_is_said() {
     let service = Here::new(Store::memory(), Backend::Cpu);
     assert_eq!(
         service.desk.draws_at_once(),
-        service.renderer().adapter().draws_at_once()
+        service.renderer().draws_at_once()
     );
 }
 

@@ -20,15 +20,27 @@ pub struct Cover {
 impl Cover {
     /// Nothing covered yet.
     pub fn new(first_row: u32, size_px: [u32; 2]) -> Self {
+        Self::within(Vec::new(), first_row, size_px)
+    }
+
+    /// The same in memory that was used before, whatever is in it.
+    pub fn within(mut memory: Vec<f32>, first_row: u32, size_px: [u32; 2]) -> Self {
         // A pixel more at the end of each row takes what falls beyond.
         let sums = (size_px[0] as usize + 2) * size_px[1] as usize;
+        memory.clear();
+        memory.resize(sums, 0.0);
         Self {
             first_row,
             size_px,
-            sums: vec![0.0; sums],
+            sums: memory,
             is_touched: vec![false; size_px[1] as usize],
             base: 0.0,
         }
+    }
+
+    /// The memory, for the next one.
+    pub fn into_memory(self) -> Vec<f32> {
+        self.sums
     }
 
     /// Covers every pixel so many times more.

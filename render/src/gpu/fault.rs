@@ -38,6 +38,16 @@ impl FaultNote {
         self.keep(fault, error.to_string());
     }
 
+    /// A device that does not answer, of which the driver has told nothing.
+    pub(super) fn note_stopped(&self, text: String) {
+        self.keep(Fault::Stopped, text);
+    }
+
+    /// Was there one?
+    pub(super) fn is_there(&self) -> bool {
+        self.first.get().is_some()
+    }
+
     fn keep(&self, fault: Fault, text: String) {
         if self.first.set(fault).is_ok() {
             tracing::debug!(?fault, text, "the graphics device has a fault");

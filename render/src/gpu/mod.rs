@@ -1,6 +1,7 @@
 //! The graphics device behind plain verbs: make buffers and kernels, record dispatches, read results back.
 
 mod fault;
+mod found;
 mod kernel;
 mod memory;
 mod pipelines;
@@ -9,6 +10,7 @@ mod stamps;
 mod uniforms;
 mod workspace;
 
+pub use found::adapters;
 pub use kernel::Kernel;
 pub use recorder::Recorder;
 pub use stamps::{Stamped, Stamps};
@@ -19,8 +21,10 @@ use bytemuck::Pod;
 use wgpu::util::DeviceExt as _;
 
 use crate::adapter::Adapter;
+use crate::backend::{self, Backend};
 use crate::error::RenderError;
 use fault::FaultNote;
+pub(crate) use found::{Found, found};
 use pipelines::Pipelines;
 
 /// Largest buffer asked for, also on devices that would give more: bounds what one job can take.
@@ -38,18 +42,8 @@ pub struct Gpu {
     adapter: Adapter,
     most_buffer_bytes: u64,
     checks: Checks,
-    own_bytes: Option<u64>,
     fault: FaultNote,
     pipelines: Option<Pipelines>,
-}
-
-/// Which adapters will do.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Wanted {
-    /// The most able one, a software one if there is no other.
-    Any,
-    /// A graphics card or nothing.
-    Hardware,
 }
 
 /// What shaders check while they run.
@@ -62,42 +56,32 @@ pub enum Checks {
 }
 
 impl Gpu {
-    /// Opens the most able Vulkan adapter, a software one if there is no other.
+    /// Opens the most able Vulkan adapter, a software one if there is no other; the first of several.
     pub fn open() -> Result<Self, RenderError> {
-        pollster::block_on(Self::request(Wanted::Any, Checks::Trusted))
-    }
-
-    /// The same, but no software adapter.
-    pub fn open_hardware() -> Result<Self, RenderError> {
-        pollster::block_on(Self::request(Wanted::Hardware, Checks::Trusted))
+        Self::first_of(&Backend::Gpu, Checks::Trusted)
     }
 
     /// The same with shaders that check themselves.
     pub fn open_checked() -> Result<Self, RenderError> {
-        pollster::block_on(Self::request(Wanted::Any, Checks::Full))
+        Self::first_of(&Backend::Gpu, Checks::Full)
     }
 
-    async fn request(wanted: Wanted, checks: Checks) -> Result<Self, RenderError> {
-        let mut wanted_instance = wgpu::InstanceDescriptor::new_without_display_handle();
-        // Draws whose counts a shader wrote would be checked by another shader each. Only the classic renderer has such
-        // draws, and is to be measured without.
-        wanted_instance
-            .flags
-            .remove(wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL);
-        let instance = wgpu::Instance::new(wanted_instance);
-        let options = wgpu::RequestAdapterOptions {
-            power_preference: wgpu::PowerPreference::HighPerformance,
-            ..Default::default()
-        };
-        let found = instance.request_adapter(&options).await;
-        let adapter = found.map_err(|e| RenderError::NoAdapter(Box::new(e)))?;
-        let info = adapter.get_info();
-        let known = Adapter::of(&info);
-        if wanted == Wanted::Hardware && known.is_software() {
-            let adapter = known.name().to_owned();
-            return Err(RenderError::SoftwareAdapter { adapter });
-        }
-        let own_bytes = memory::own_bytes(&adapter);
+    /// The first adapter that a backend means.
+    pub(crate) fn first_of(backend: &Backend, checks: Checks) -> Result<Self, RenderError> {
+        let found = found::found();
+        let there: Vec<Adapter> = found.iter().map(|found| found.known.clone()).collect();
+        let chosen = backend::chosen(backend, &there)?;
+        let &first = chosen.first().ok_or(RenderError::NoAdapter)?;
+        Self::on(&found[first], checks)
+    }
+
+    /// Opens a device on an adapter.
+    pub(crate) fn on(found: &Found, checks: Checks) -> Result<Self, RenderError> {
+        let Found {
+            adapter,
+            info,
+            known,
+        } = found;
         let limits = adapter.limits();
         let most_buffer_bytes = limits
             .max_buffer_size
@@ -109,24 +93,21 @@ impl Gpu {
             required_features: adapter.features() & WELCOME,
             ..Default::default()
         };
-        let (device, queue) = adapter
-            .request_device(&descriptor)
-            .await
-            .map_err(|source| RenderError::NoDevice {
-                adapter: known.name().to_owned(),
-                source: Box::new(source),
-            })?;
+        let asked = pollster::block_on(adapter.request_device(&descriptor));
+        let (device, queue) = asked.map_err(|source| RenderError::NoDevice {
+            adapter: known.name().to_owned(),
+            source: Box::new(source),
+        })?;
         let fault = FaultNote::default();
         fault.listen(&device);
         let pipelines =
-            pipelines::folder().and_then(|folder| Pipelines::open(&device, &info, &folder));
+            pipelines::folder().and_then(|folder| Pipelines::open(&device, info, &folder));
         Ok(Self {
             device,
             queue,
-            adapter: known,
+            adapter: known.clone(),
             most_buffer_bytes,
             checks,
-            own_bytes,
             fault,
             pipelines,
         })
@@ -145,7 +126,7 @@ impl Gpu {
     /// Waits until everything submitted has run.
     pub fn wait(&self) -> Result<(), RenderError> {
         let waited = self.device.poll(wgpu::PollType::wait_indefinitely());
-        waited.map_err(|_stopped| RenderError::DeviceStopped { what: "drawing" })?;
+        waited.map_err(|error| self.stopped("drawing", &error))?;
         self.check_fault("drawing")
     }
 
@@ -171,7 +152,7 @@ impl Gpu {
 
     /// Bytes of memory that are the device's own; none where that is the computer's, or where nobody says.
     pub fn own_bytes(&self) -> Option<u64> {
-        self.own_bytes.filter(|_| !self.is_software())
+        self.adapter.own_bytes()
     }
 
     /// Largest storage buffer of this device.
@@ -182,6 +163,21 @@ impl Gpu {
     /// An error if the device had a fault at any time; `what` was being done.
     pub fn check_fault(&self, what: &'static str) -> Result<(), RenderError> {
         self.fault.check(what)
+    }
+
+    /// Has the device had a fault?
+    pub(crate) fn has_fault(&self) -> bool {
+        self.fault.is_there()
+    }
+
+    /// Notes that the device does not answer any more, which is a fault of its own.
+    pub(crate) fn stopped(
+        &self,
+        what: &'static str,
+        reason: &dyn std::fmt::Display,
+    ) -> RenderError {
+        self.fault.note_stopped(reason.to_string());
+        RenderError::DeviceStopped { what }
     }
 
     /// Loses the device as a driver would, for tests of what happens then.
@@ -210,6 +206,11 @@ impl Gpu {
         if let Some(pipelines) = &self.pipelines {
             pipelines.keep();
         }
+    }
+
+    fn encoder(&self) -> wgpu::CommandEncoder {
+        let of_recorder = wgpu::CommandEncoderDescriptor::default();
+        self.device.create_command_encoder(&of_recorder)
     }
 
     /// A list of commands to fill.

@@ -28,9 +28,7 @@ impl<'a> Recorder<'a> {
     pub(super) fn new(gpu: &'a Gpu) -> Self {
         Self {
             gpu,
-            encoder: gpu
-                .device
-                .create_command_encoder(&wgpu::CommandEncoderDescriptor::default()),
+            encoder: gpu.encoder(),
             stamps: None,
             uniforms: None,
         }
@@ -49,6 +47,13 @@ impl<'a> Recorder<'a> {
     /// The list itself, for what has no verb here.
     pub fn encoder(&mut self) -> &mut wgpu::CommandEncoder {
         &mut self.encoder
+    }
+
+    /// Runs everything recorded so far, without waiting for it; what is recorded from here on runs after that.
+    pub fn flush(&mut self) {
+        let fresh = self.gpu.encoder();
+        let recorded = std::mem::replace(&mut self.encoder, fresh);
+        self.gpu.queue.submit([recorded.finish()]);
     }
 
     /// Runs everything recorded, without waiting for it.
@@ -152,7 +157,6 @@ impl<'a> Recorder<'a> {
         mut self,
         parts: [(&wgpu::Buffer, u64, u64); N],
     ) -> Result<[Vec<u8>; N], RenderError> {
-        let stopped = || RenderError::DeviceStopped { what: "drawing" };
         let size = parts.iter().map(|part| part.2).sum();
         let staging = self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("download"),
@@ -180,13 +184,16 @@ impl<'a> Recorder<'a> {
                 submission_index: Some(submission),
                 timeout: Some(HUNG),
             };
-            gpu.device.poll(wait).map_err(|_stopped| stopped())?;
+            let stopped = |reason: &dyn std::fmt::Display| gpu.stopped("drawing", reason);
+            gpu.device.poll(wait).map_err(|error| stopped(&error))?;
             done_rx
                 .recv()
-                .map_err(|_gone| stopped())?
-                .map_err(|_unmapped| stopped())?;
+                .map_err(|error| stopped(&error))?
+                .map_err(|error| stopped(&error))?;
             gpu.check_fault("drawing")?;
-            staging.get_mapped_range(..).map_err(|_unmapped| stopped())
+            staging
+                .get_mapped_range(..)
+                .map_err(|error| stopped(&error))
         })?;
         let mut rest: &[u8] = &mapped;
         Ok(timings::timed(Step::ReadBack, || {

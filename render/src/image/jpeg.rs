@@ -10,7 +10,7 @@ use super::Image;
 /// Pixels a side of what is encoded as one: 8 of colour, which has half the resolution.
 const UNIT_PX: usize = 16;
 /// Rows of a strip. Fewer cost more bytes, more leave cores without work.
-const STRIP_PX: usize = 8 * UNIT_PX;
+const STRIP_PX: usize = 4 * UNIT_PX;
 
 const MARKER: u8 = 0xff;
 const START_OF_SCAN: u8 = 0xda;

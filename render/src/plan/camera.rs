@@ -17,6 +17,7 @@ const NEAR_SHARE: f64 = 0.01;
 const MOST_SLANT_RAD: f64 = 1.48;
 
 /// A camera over a place, or below it in the sea; lengths in earth radii.
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Camera {
     pub place: DVec3,
     /// East, north and up at the place below it.

@@ -9,7 +9,7 @@ use contract::tile::{Tile, mercator_lat_deg};
 use glam::DVec2;
 
 use super::camera::{Camera, local_sun, overhead};
-use super::{Plan, ground, masks, tile};
+use super::{Later, Plan, ground, masks, tile};
 use crate::coast::{self, Corner, Mask, Pen, sea_floor};
 use crate::scene::Scene;
 use crate::stages::compose::base_map::{self, BaseMapParams};
@@ -135,7 +135,7 @@ fn ground_axis(cells: f64, angle_deg: f64) -> GroundAxis {
 }
 
 fn coast_on_tile(plan: &mut Plan, job: &RenderJob, tile: Tile, size_px: u32) {
-    plan.coast = Arc::new(on_tile(tile, size_px).into_words());
+    plan.coast = Later::ready(Arc::new(on_tile(tile, size_px).into_words()));
     let context = &mut plan.params.context;
     context.coast_on = 1;
     // On a map the lines would vanish below the colours.
@@ -169,7 +169,10 @@ fn plain_globe(plan: &mut Plan, job: &RenderJob, camera: &Camera) {
         params.terrain_grid = GridParams::whole(&sea_floor::GRID);
     }
     if wanted.land || wanted.coasts || wanted.borders {
-        plan.coast = masks::of(&job.view, wanted, || ground::mask(camera, size_px, wanted));
+        let camera = *camera;
+        plan.coast = masks::of(&job.view, wanted, move |memory| {
+            ground::mask(&camera, size_px, wanted, memory)
+        });
         context.coast_row_words = size_px[0];
     }
     context.land_hides = u32::from(wanted.land);

@@ -1,5 +1,6 @@
 //! What lies in every pixel of a globe view, by the outlines of land, lakes and borders: exact shares of areas, and lines.
 
+use std::cell::RefCell;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::{DVec2, DVec3};
@@ -9,8 +10,8 @@ use super::camera::Camera;
 use crate::coast::ring::{BORDERS, Cap, LAKE_RINGS, LAND_RINGS, Ring};
 use crate::coast::{Cover, Mask, Pen};
 
-/// Rows of a mask that are made as one, in memory that stays near a core.
-const BAND_PX: usize = 64;
+/// Rows of a mask that are made as one, in memory that stays near a core; so few that cores end together.
+const BAND_PX: usize = 16;
 /// Edges of an outline that one core goes along at once.
 const EDGES_AT_ONCE: usize = 1024;
 /// Shores of lakes, fainter than those of the sea.
@@ -41,8 +42,14 @@ pub(super) struct Wanted {
 }
 
 /// A word for every pixel: shares of land, lakes, shores and borders, 0 to 255, the first in the lowest bits. Made on all
-/// cores, band by band: a camera that moves needs one for every picture. The same words however many cores there are.
-pub(super) fn mask(camera: &Camera, size_px: [u32; 2], wanted: Wanted) -> Vec<u32> {
+/// cores, band by band: a camera that moves needs one for every picture. The same words however many cores there are,
+/// whatever was in the memory that is given for them.
+pub(super) fn mask(
+    camera: &Camera,
+    size_px: [u32; 2],
+    wanted: Wanted,
+    mut words: Vec<u32>,
+) -> Vec<u32> {
     let sight = &Sight::new(camera, size_px);
     let (areas, lines) = rayon::join(
         || {
@@ -65,21 +72,25 @@ pub(super) fn mask(camera: &Camera, size_px: [u32; 2], wanted: Wanted) -> Vec<u3
         },
     );
     let [width, height] = size_px.map(|px| px as usize);
-    let mut words = vec![0; width * height];
+    words.resize(width * height, 0);
     let bands = words.par_chunks_mut(BAND_PX * width).enumerate();
     bands.for_each(|(number, words)| {
+        words.fill(0);
         let first_row = (number * BAND_PX) as u32;
         let size_px = [size_px[0], (words.len() / width) as u32];
-        for (outlines, shift) in &areas {
-            let mut cover = Cover::new(first_row, size_px);
-            for covered in outlines {
-                cover.add_everywhere(covered.everywhere);
-                for [a, b] in &covered.edges {
-                    cover.add_edge(*a, *b);
+        SUMS.with_borrow_mut(|sums| {
+            for (outlines, shift) in &areas {
+                let mut cover = Cover::within(std::mem::take(sums), first_row, size_px);
+                for covered in outlines {
+                    cover.add_everywhere(covered.everywhere);
+                    for [a, b] in &covered.edges {
+                        cover.add_edge(*a, *b);
+                    }
                 }
+                cover.write(words, *shift);
+                *sums = cover.into_memory();
             }
-            cover.write(words, *shift);
-        }
+        });
         for (lines, shift) in lines.iter().flatten() {
             let mut mask = Mask::new([0.0, f64::from(first_row)], size_px);
             for (pen, [a, b]) in lines {
@@ -89,6 +100,11 @@ pub(super) fn mask(camera: &Camera, size_px: [u32; 2], wanted: Wanted) -> Vec<u3
         }
     });
     words
+}
+
+thread_local! {
+    /// Memory for the sums of one band: fresh memory costs more than what is done in it.
+    static SUMS: RefCell<Vec<f32>> = const { RefCell::new(Vec::new()) };
 }
 
 /// A line as it is seen, pixels.
@@ -393,5 +409,37 @@ fn clipped([a, b]: [DVec3; 2], coordinate: impl Fn(DVec3) -> f64) -> Option<[DVe
         (true, false) => Some([a, crossing()]),
         (false, true) => Some([crossing(), b]),
         (false, false) => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use contract::camera::CameraAngles;
+    use contract::job::View;
+
+    use super::*;
+
+    #[test]
+    fn what_was_in_the_memory_of_a_mask_does_not_show() {
+        let view = View::Globe {
+            lon_deg: 10.0,
+            lat_deg: 45.0,
+            height_m: 4e6,
+            width_px: 90,
+            height_px: 50,
+            angles: CameraAngles::NADIR,
+        };
+        let camera = Camera::of(&view).unwrap();
+        let wanted = Wanted {
+            land: true,
+            coasts: true,
+            borders: true,
+        };
+        let of = |memory: Vec<u32>| mask(&camera, [90, 50], wanted, memory);
+        let fresh = of(vec![]);
+        assert!(fresh.iter().any(|word| *word != 0));
+        for memory in [vec![u32::MAX; 4500], vec![7; 10], vec![7; 9999]] {
+            assert!(of(memory) == fresh);
+        }
     }
 }

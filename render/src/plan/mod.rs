@@ -11,6 +11,7 @@ mod footprint;
 mod globe;
 mod ground;
 mod isolines;
+mod later;
 mod look;
 mod masks;
 mod projection;
@@ -47,6 +48,7 @@ use crate::stages::sizes::{HALF_BYTES, workgroups};
 use look::Look;
 
 pub use isolines::graticule_step_deg;
+pub use later::Later;
 pub use look::HEIGHT_LIMIT_M;
 pub use projection::{Projection, Seen};
 
@@ -89,8 +91,8 @@ pub struct Plan {
     /// Columns, then rows of a tile in its surroundings; empty otherwise.
     pub ground_axes: Vec<GroundAxis>,
     /// Words of the mask of the whole picture: coast lines of a tile, four pixels each; of a globe view land, lakes, shores
-    /// and borders of one pixel. Empty without any.
-    pub coast: Arc<Vec<u32>>,
+    /// and borders of one pixel. Empty without any; made while the particles are drawn.
+    pub coast: Later<Arc<Vec<u32>>>,
     /// Trails on the sea surface as pixels of the whole picture, red lowest; empty without any.
     pub trails: Vec<u32>,
     /// Some screen tiles may hold many times the particles of others: a pole or the limb is in view.
@@ -179,7 +181,7 @@ impl Plan {
             palette: palette(job),
             isolines: vec![],
             ground_axes: vec![],
-            coast: Arc::default(),
+            coast: Later::default(),
             trails: vec![],
             is_crowded: false,
             size_px,

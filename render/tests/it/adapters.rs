@@ -1,7 +1,11 @@
 //! What is drawn on: which adapter, how much at once, how much memory.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Barrier, Mutex};
+use std::thread;
+
 use contract::job::Mode;
-use render::{Backend, Renderer};
+use render::{Adapter, Backend, Renderer};
 
 use crate::device::{gpu, gpu_renderer, renderers};
 use crate::scenes::{FIVE_DEGREES, job, ocean, tile};
@@ -9,16 +13,21 @@ use crate::scenes::{FIVE_DEGREES, job, ocean, tile};
 #[test]
 fn as_many_pictures_are_drawn_at_once_as_suit_an_adapter() {
     for renderer in renderers("draws at once") {
-        let adapter = renderer.adapter();
+        let adapters = renderer.adapters();
+        let adapter = &adapters[0];
         let suited = adapter.draws_at_once().get();
-        let cores = std::thread::available_parallelism().unwrap().get();
+        let cores = thread::available_parallelism().unwrap().get();
         let expected = match (adapter.backend(), adapter.is_software()) {
             ("none", true) => cores,
             (_, true) => 2,
-            (_, false) => 4,
+            (_, false) => 8,
         };
         assert_eq!(suited, expected, "{adapter:?}");
     }
+}
+
+fn is_software(renderer: &Renderer) -> bool {
+    renderer.adapters().iter().any(Adapter::is_software)
 }
 
 #[test]
@@ -27,9 +36,9 @@ fn where_a_graphics_card_is_required_a_software_adapter_is_refused_by_name() {
         return;
     };
     match Renderer::new(Backend::HardwareGpu) {
-        Ok(renderer) => assert!(!renderer.adapter().is_software() && !any.adapter().is_software()),
+        Ok(renderer) => assert!(!is_software(&renderer) && !is_software(any)),
         Err(error) => {
-            assert!(any.adapter().is_software(), "{error}");
+            assert!(is_software(any), "{error}");
             let text = error.to_string();
             assert!(
                 text.contains(any.name()) && text.contains("--require-gpu"),
@@ -63,4 +72,73 @@ fn frames_on_the_device_stay_within_their_limit() {
         renderer.render(&job, &scene).unwrap();
         assert_eq!(renderer.resident_bytes(), held * frame_bytes, "{limit}");
     }
+}
+
+/// Two devices on the adapter of this machine; none if it is switched off.
+fn doubled(test: &str) -> Option<Renderer> {
+    gpu_renderer(test).map(|_one| Renderer::doubled().unwrap())
+}
+
+#[test]
+fn several_devices_share_the_work_and_draw_the_same_bytes() {
+    let Some(two) = doubled("several devices") else {
+        return;
+    };
+    let one = gpu_renderer("several devices").unwrap();
+    assert_eq!(two.draws_at_once().get(), 2 * one.draws_at_once().get());
+    assert_eq!(two.name(), format!("2 x {}", one.name()));
+    let scene = ocean(FIVE_DEGREES);
+    // Each waits in the middle of its picture until the other one has begun.
+    let both = Barrier::new(2);
+    thread::scope(|scope| {
+        for x in 0..2 {
+            let (two, scene, both) = (&two, &scene, &both);
+            let job = job(Mode::Volume, tile(2, x, 1, 256));
+            let expected = one.render(&job, scene).unwrap();
+            scope.spawn(move || {
+                let (met, asked) = (Mutex::new(vec![]), AtomicBool::new(false));
+                let seen = || {
+                    if !asked.swap(true, Ordering::AcqRel) {
+                        both.wait();
+                        *met.lock().unwrap() = two.in_flight();
+                        both.wait();
+                    }
+                    true
+                };
+                let picture = two.render_while(&job, scene, &seen).unwrap();
+                assert_eq!(*met.lock().unwrap(), [1, 1], "one picture on each");
+                assert!(picture == expected, "another picture");
+            });
+        }
+    });
+    assert_eq!(two.in_flight(), [0, 0]);
+}
+
+#[test]
+fn while_one_device_is_lost_the_other_draws() {
+    let Some(two) = doubled("one lost device") else {
+        return;
+    };
+    // Frames whose numbers follow each other have their places on different devices.
+    let scenes = [ocean(FIVE_DEGREES), ocean(FIVE_DEGREES)];
+    let job = job(Mode::Map, tile(1, 0, 0, 256));
+    let draw = |scene| two.render(&job, scene);
+    let before = scenes.each_ref().map(|scene| draw(scene).unwrap());
+    two.lose_device();
+    let drawn = [0, 1, 0, 1].map(|at| (at, draw(&scenes[at])));
+    let mut failures = 0;
+    for (at, picture) in drawn {
+        match picture {
+            Ok(picture) => assert!(picture == before[at], "another picture"),
+            // The first that meets the loss finds it.
+            Err(error) => {
+                assert!(error.is_device_fault(), "{error}");
+                failures += 1;
+            }
+        }
+    }
+    assert!(failures <= 1, "{failures} pictures failed");
+    two.renew().unwrap();
+    assert!(!two.has_fault());
+    assert_eq!(two.device_restarts(), 1, "the one that was lost");
 }

@@ -34,6 +34,12 @@ pub(super) async fn replace(
     put(root, key, content, |from, to| fs::rename(from, to)).await
 }
 
+/// The same at once, for who is on a thread that may wait.
+pub(super) fn replace_now(root: &Path, path: &Path, content: &[u8]) -> io::Result<()> {
+    write(path, content, |from, to| fs::rename(from, to))?;
+    flush_folders(root, path)
+}
+
 /// How a file that is written gets its name.
 type Naming = fn(&Path, &Path) -> io::Result<()>;
 
@@ -120,7 +126,7 @@ fn flush_folders(root: &Path, path: &Path) -> io::Result<()> {
     Ok(())
 }
 
-fn failed(key: &ObjectKey, source: io::Error) -> object_store::Error {
+pub(super) fn failed(key: &ObjectKey, source: io::Error) -> object_store::Error {
     let path = key.to_string();
     match source.kind() {
         ErrorKind::AlreadyExists => object_store::Error::AlreadyExists {

@@ -26,6 +26,7 @@ on_every_store!(
     one_of_many_writers_creates_an_object,
     writers_of_equal_content_agree,
     two_writers_race_for_one_manifest_number,
+    no_exchange_of_many_writers_is_lost,
     a_listing_of_2500_keys_is_whole_and_sorted,
     parts_of_an_object_are_read,
     large_objects_come_back_as_they_went,

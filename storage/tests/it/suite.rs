@@ -58,6 +58,48 @@ pub(crate) async fn one_of_many_writers_creates_an_object(store: &Store) {
     assert_eq!(store.get(&key).await.unwrap(), content(winners[0]));
 }
 
+/// Each writer adds one to a number, over and over: one that replaced what it had not seen would take one away.
+pub(crate) async fn no_exchange_of_many_writers_is_lost(store: &Store) {
+    const WRITERS: u32 = 4;
+    const EACH: u32 = 8;
+    let key = key("exchange/repo");
+    let created = store.swap(&key, None, Bytes::from("0")).await.unwrap();
+    assert!(created.is_some());
+    assert_eq!(
+        store.swap(&key, None, Bytes::from("1")).await.unwrap(),
+        None
+    );
+    let number = |content: &[u8]| -> u32 {
+        let text = std::str::from_utf8(content).unwrap();
+        text.split(' ').next().unwrap().parse().unwrap()
+    };
+    let write = |writer| {
+        let (store, key) = (store.clone(), key.clone());
+        tokio::spawn(async move {
+            for time in 0..EACH {
+                loop {
+                    let (content, seen) = store.read_changing(&key).await.unwrap().unwrap();
+                    let next = format!("{} by {writer}, {time}", number(&content) + 1);
+                    let swapped = store.swap(&key, Some(&seen), next.into()).await;
+                    if swapped.unwrap().is_some() {
+                        break;
+                    }
+                }
+            }
+        })
+    };
+    let writers: Vec<_> = (0..WRITERS).map(write).collect();
+    for writer in writers {
+        writer.await.unwrap();
+    }
+    let (content, _) = store.read_changing(&key).await.unwrap().unwrap();
+    assert_eq!(number(&content), WRITERS * EACH);
+    let late = store
+        .swap(&key, created.as_ref(), Bytes::from("late"))
+        .await;
+    assert_eq!(late.unwrap(), None);
+}
+
 pub(crate) async fn writers_of_equal_content_agree(store: &Store) {
     let key = key("race/equal");
     let content = noise(100_000, 1);

@@ -12,10 +12,12 @@ import "./style/phone.css";
 import { Updates } from "./api/updates";
 import { CameraButtons } from "./globe/camera-buttons";
 import { Globe } from "./globe/globe";
+import { layerKey } from "./globe/layer";
 import { Marks } from "./globe/marks";
 import { Pointer } from "./globe/pointer";
 import { Presenter } from "./globe/presenter";
 import { chooseQuality } from "./globe/quality";
+import { TileSources } from "./globe/sources";
 import { LayerStage } from "./globe/stage";
 import { TileCounts } from "./globe/tiles";
 import { LegendCard } from "./look/legend-card";
@@ -62,12 +64,11 @@ const connection = new Connection(
   },
 );
 const report = (key: string, error: unknown) => connection.report(key, error);
-const stage = new LayerStage(
-  globe.scene,
-  counts,
-  store.state.opacity,
-  (status, url) => void connection.tileFailed(status, url),
-);
+const sources = new TileSources();
+const stage = new LayerStage(globe.scene, sources, counts, store.state.opacity, {
+  onRefused: (error) => report("layer", error),
+  onFailed: (status, url) => void connection.tileFailed(status, url),
+});
 const presenter = new Presenter(stage);
 const marks = new Marks(globe.scene);
 const pointer = new Pointer(
@@ -83,14 +84,11 @@ const live = new Live({
   presenter,
   overlay: new Overlay(byId("overlay")),
   marks: () => [marks.drawn, observed.drawn],
-  isBare: () => stage.shown === undefined,
-  onShow: (spec) => {
-    stage.isCovered = true;
-    void legend.show(spec);
-  },
-  onHide: () => {
-    stage.isCovered = false;
-    if (stage.shown) void legend.show(stage.shown);
+  hasTiles: (spec) => stage.shownKey === layerKey(spec),
+  onShow: (spec) => void legend.show(spec),
+  onCover: (isCovered) => {
+    stage.isCovered = isCovered;
+    if (!isCovered && stage.shown) void legend.show(stage.shown);
   },
 });
 const isFollowed = () => live.isFollowing;
@@ -136,7 +134,7 @@ new Playback(
   live,
 );
 new LiveSwitch(controls.live, store, live);
-new Readout(byId("app"), live.rate, () => live.picture);
+new Readout(byId("app"), { rate: live.rate, picture: () => live.picture, tiles: () => stage.load });
 const probe = installProbe(
   store,
   counts,
@@ -163,6 +161,7 @@ const viewer = new Viewer(
     inventory,
     notices,
     globe,
+    sources,
     stage,
     presenter,
     live,

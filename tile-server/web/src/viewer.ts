@@ -6,6 +6,7 @@ import { contains, isWhole } from "./globe/box";
 import type { Globe } from "./globe/globe";
 import type { Marks } from "./globe/marks";
 import type { Presenter } from "./globe/presenter";
+import type { TileSources } from "./globe/sources";
 import type { LayerStage } from "./globe/stage";
 import type { LegendCard } from "./look/legend-card";
 import { withoutColours } from "./look/look";
@@ -31,6 +32,7 @@ export interface Parts {
   inventory: Inventory;
   notices: Notices;
   globe: Globe;
+  sources: TileSources;
   stage: LayerStage;
   presenter: Presenter;
   live: Live;
@@ -62,7 +64,7 @@ export class Viewer {
     this.#askedMs = asked.timeMs;
     this.#isPlaced = asked.camera !== undefined;
     this.#isFree = asked.camera === undefined && asked.mode === undefined;
-    const { store, inventory, notices, stage, presenter, live, marks, report } = parts;
+    const { store, notices, stage, presenter, live, marks } = parts;
     store.on(["opacity"], (state) => {
       stage.opacity = state.opacity;
     });
@@ -74,31 +76,18 @@ export class Viewer {
       this.#useProduct();
       this.#bringIntoSight();
     });
-    store.on(["mode", "product"], (state) => {
-      if (state.product === null) return;
-      const learnt = inventory.catalogue.learn(state.product, state.mode);
-      learnt.then(
-        () => this.#showLayer(),
-        (error: unknown) => report("layer", error),
-      );
-    });
-    store.on(["timeMs"], () => this.#showLayer());
-    store.on(["look"], (state, before) => {
-      // Another product or mode is shown when its zoom limits are known.
-      if (state.product === before.product && state.mode === before.mode) this.#showLayer();
-    });
+    store.on(["product", "mode", "timeMs", "look"], () => this.#showLayer());
     store.on(["look", "mode"], () => this.#readyLegend());
     // A new wish is a new chance: an old complaint about pictures would only confuse.
     store.on(["mode", "product", "timeMs", "look"], () => {
-      notices.clear("tiles");
-      notices.clear("legend");
+      for (const key of ["layer", "tiles", "legend"]) notices.clear(key);
     });
     store.on(["product", "timeMs"], () => notices.clear("outside"));
   }
 
   /** Loads what the page needs; again when a lost server is back, where a whole picture in sight is kept. */
   async begin(): Promise<void> {
-    const { store, inventory, notices, controls, presenter, live, report, onReady } = this.#parts;
+    const { store, inventory, notices, controls, sources, presenter, live, report, onReady } = this.#parts;
     // Asked at the same time as the products, not after them.
     const offered = this.#isFree ? live.offered() : Promise.resolve(false);
     try {
@@ -107,6 +96,8 @@ export class Viewer {
       report("products", error);
       return;
     }
+    // A server that is back may be another one.
+    sources.forget();
     const { catalogue } = inventory;
     notices.clear("products");
     const first = catalogue.first;
@@ -128,7 +119,6 @@ export class Viewer {
       this.#useProduct();
       this.#bringIntoSight();
     } else store.set({ product: chosen.product, look: wanted === null ? look : withoutColours(look) });
-    await catalogue.learn(chosen.product, store.state.mode).catch((error: unknown) => report("layer", error));
     live.opened();
     this.#showLayer();
     void Promise.all([presenter.idle(), live.settled()]).then(onReady);
@@ -137,7 +127,7 @@ export class Viewer {
 
   /** Shows what is new in the page that is open: what did not change stays as it is. */
   async renew(all: News[]): Promise<void> {
-    const { store, inventory, notices, controls, placePanel, budgetPanel, lookPanel, report } = this.#parts;
+    const { store, inventory, notices, controls, sources, placePanel, budgetPanel, lookPanel, report } = this.#parts;
     const before = inventory.product;
     for (const news of all) {
       // Told again of a version that is known: what lifts its particles is there now.
@@ -153,6 +143,7 @@ export class Viewer {
       report("products", error);
       return;
     }
+    sources.forget();
     const { catalogue } = inventory;
     notices.tell("news", `New data: ${catalogue.titlesOf(all.map((news) => news.product)).join(", ")}`);
     controls.setProducts(catalogue.products);

@@ -111,7 +111,6 @@ describe("a view's address", () => {
     look: { ...USUAL, sunOfTime: true },
     timeIso: "2000-07-01T00:00:00Z",
     bounds: [-180, -90, 180, 90],
-    maxZoom: 6,
   };
   const scene: Scene = { spec, camera: { ...LOW, lon: -104.1234567, rollDeg: -0.0001 }, width: WIDTH, height: HEIGHT, density: 2 };
 

@@ -13,6 +13,8 @@ import {
   quantise,
   rangeOf,
   type Step,
+  stepAhead,
+  stepBeside,
   stepLabel,
   strideFor,
   timeNames,
@@ -112,6 +114,31 @@ describe("playback", () => {
     expect(strideFor(100, 125)).toBe(1);
     expect(strideFor(200, 125)).toBe(2);
     expect(strideFor(1e6, 125)).toBe(8);
+  });
+});
+
+describe("stored steps", () => {
+  const middles = STEPS.map((step) => step.midMs);
+  const [january, february, may] = middles as [number, number, number];
+
+  it("are where play that pauses goes on to, never back, and at the end of the record the last one is", () => {
+    expect(["2000-01-01T00:00:00Z", "2000-01-16T12:00:00Z"].map((iso) => stepAhead(STEPS, at(iso)))).toEqual([january, january]);
+    expect(["2000-01-16T12:00:02Z", "2000-02-03T00:00:00Z"].map((iso) => stepAhead(STEPS, at(iso)))).toEqual([february, february]);
+    expect([FEB.end, MAY.end].map((iso) => stepAhead(STEPS, at(iso)))).toEqual([may, may]);
+    expect(stepAhead([], 5)).toBe(5);
+  });
+
+  it("hold where an address, which has whole seconds, names one", () => {
+    const odd = parseSteps([{ start: "2000-01-01T00:00:00Z", mid: "2000-01-01T00:00:01.500Z", end: "2000-01-01T00:00:03Z" }]);
+    expect(stepAhead([...odd, ...STEPS], at("2000-01-01T00:00:02Z"))).toBe(at("2000-01-01T00:00:01.500Z"));
+  });
+
+  it("follow each other from wherever one is between them", () => {
+    expect(stepBeside(STEPS, january, 1)).toBe(february);
+    expect(stepBeside(STEPS, at("2000-01-30T00:00:00Z"), 1)).toBe(february);
+    expect(stepBeside(STEPS, at("2000-01-30T00:00:00Z"), -1)).toBe(january);
+    expect(stepBeside(STEPS, february, -1)).toBe(january);
+    expect([stepBeside(STEPS, may, 1), stepBeside(STEPS, january, -1)]).toEqual([undefined, undefined]);
   });
 });
 

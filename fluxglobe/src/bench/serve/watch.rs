@@ -17,7 +17,7 @@ const WORK: &str = "fluxglobe_render_worker_request_seconds";
 /// The steps of drawing.
 const STEPS: &str = "fluxglobe_render_worker_draw_step_seconds";
 /// The way of a picture through a tile server and who draws for it: name, histogram, label.
-const STAGES: [(&str, &str, &str); 11] = [
+const STAGES: [(&str, &str, &str); 12] = [
     (
         "look in the store",
         "fluxglobe_tile_server_look_up_seconds",
@@ -35,6 +35,7 @@ const STAGES: [(&str, &str, &str); 11] = [
     ),
     ("load", WORK, "operation=\"load\""),
     ("plan", STEPS, "step=\"plan\""),
+    ("mask", STEPS, "step=\"mask\""),
     ("upload", STEPS, "step=\"upload\""),
     ("draw", STEPS, "step=\"device\""),
     ("read back", STEPS, "step=\"read_back\""),

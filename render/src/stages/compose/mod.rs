@@ -15,6 +15,7 @@ use crate::stages::layout::GroundAxis;
 use crate::stages::params::Uniform;
 use crate::stages::params::Uniform::{BaseMap, Context, Grid, TerrainGrid, View};
 use crate::stages::variants::Variants;
+use crate::timings::{self, Step};
 
 /// The function that the eye runs for its own pixels.
 pub const FUNCTIONS: &str = concat!(
@@ -88,10 +89,15 @@ pub(crate) fn surroundings(
     } else {
         frame.upload_of_plan(Slot::GroundAxes, &plan.ground_axes)?
     };
-    let coast = if plan.coast.is_empty() {
+    let coast = if frame.params.context.coast_row_words == 0 {
         frame.room(Slot::Coast, 4)?
     } else {
-        frame.upload_of_plan(Slot::Coast, &plan.coast[..])?
+        if !plan.coast.is_ready() {
+            // The device makes and sorts the particles meanwhile.
+            frame.recorder.flush();
+        }
+        let mask = timings::timed(Step::Mask, || &plan.coast[..]);
+        frame.upload_of_plan(Slot::Coast, mask)?
     };
     let terrain = if frame.params.context.sea_floor_on == 1 {
         frame.sea_floor()?

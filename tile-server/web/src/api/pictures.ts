@@ -10,6 +10,8 @@ export interface Version {
   readonly manifest: string;
   /** Rises when the same version looks different: what lifts its particles comes later than it. */
   readonly revision: number;
+  /** The server's name of all that shapes a picture besides: at an address that has it browsers keep what they were answered. */
+  readonly edition?: string;
 }
 
 /** `name=value&…`; of the values' letters only those of numbers, names and ranges occur, which addresses carry as they are. */
@@ -30,9 +32,13 @@ export function tileTemplate(
     ["time", encodeURIComponent(timeIso)],
     ["manifest", encodeURIComponent(version.manifest)],
   ];
-  // The server does not read it: it tells the pictures of two moments apart for caches on the way.
-  const revision = version.revision > 0 ? [["revision", String(version.revision)] as const] : [];
-  return `${folder}{z}/{x}/{y}.png?${queryOf([...drawn, ...revision, ...look])}`;
+  return `${folder}{z}/{x}/{y}.png?${queryOf([...drawn, ...momentOf(version), ...look])}`;
+}
+
+/** What tells the pictures of two moments apart. Without an edition it is a number that the server does not read: for caches on the way. */
+function momentOf({ edition, revision }: Version): (readonly [name: string, value: string])[] {
+  if (edition !== undefined) return [["edition", edition]];
+  return revision > 0 ? [["revision", String(revision)]] : [];
 }
 
 /** A picture of the globe from a camera. */

@@ -1,14 +1,18 @@
 //! What the page asks for as JSON, one function a question.
 import { address, getJson } from "./client";
 import type { Parameter } from "./pictures";
-import type { Answer, Budget, BudgetQuery, Check, Legend, Mode, PointSeries, QueryTexts } from "./types";
+import type { Answer, Budget, BudgetQuery, Check, Legend, Mode, PointSeries, QueryTexts, TileJson } from "./types";
 
 export const products = () => getJson<Answer<"products">>(address("api/products")).then((body) => body.products);
 export const regions = () => getJson<Answer<"regions">>(address("api/regions")).then((body) => body.regions);
 export const palettes = () => getJson<Answer<"palettes">>(address("api/palettes")).then((body) => body.palettes);
-export const layerInfo = (product: string, mode: Mode) =>
-  getJson<Answer<"tilejson">>(address(`tiles/${encodeURIComponent(product)}/${mode}.json`));
 export const healthUrl = () => address("healthz");
+
+/** How the tiles of a version in a look are asked for. */
+export function layerInfo(product: string, mode: Mode, manifest: string, look: readonly Parameter[]): Promise<TileJson> {
+  const query: QueryTexts<"tilejson"> = { manifest, ...Object.fromEntries(look) };
+  return getJson<TileJson>(address(`tiles/${encodeURIComponent(product)}/${mode}.json`, { ...query }));
+}
 
 /** What the colours of a look mean; `colours` are the parameters of it that a legend goes by. Only a flow's are of another value. */
 export function legend(product: string, mode: Mode, colours: readonly Parameter[]): Promise<Legend> {

@@ -7,6 +7,7 @@ export type Mode = Schemas["Mode"];
 export type Legend = Schemas["Legend"];
 export type Palette = Schemas["PaletteColours"];
 export type Product = Schemas["Product"];
+export type TileJson = Schemas["TileJson"];
 export type StepTimes = Schemas["StepTimes"];
 export type PointSeries = Schemas["PointSeries"];
 export type Cells = Schemas["Cells"];

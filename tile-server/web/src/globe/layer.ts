@@ -13,7 +13,6 @@ export interface LayerSpec extends Version {
   readonly look: Look;
   readonly timeIso: string;
   readonly bounds: Bounds;
-  readonly maxZoom: number;
 }
 
 export function layerKey(spec: LayerSpec): string {
@@ -26,7 +25,8 @@ export function isSameLayer(a: LayerSpec, b: LayerSpec): boolean {
   return a.product === b.product && kindOf(a) === kindOf(b);
 }
 
-function kindOf({ mode, look }: LayerSpec): string {
+/** Mode and look. */
+export function kindOf({ mode, look }: LayerSpec): string {
   const query = queryOf(parameters(look));
   return query === "" ? mode : `${mode}?${query}`;
 }

@@ -2,6 +2,7 @@
 import { ImageryLayer, type Scene } from "cesium";
 import { underOpacity } from "./fade";
 import { layerKey, type LayerSpec } from "./layer";
+import type { TileSources } from "./sources";
 import { LayerTiles, type TileCounts } from "./tiles";
 
 /** A layer that has loaded what the present view needs and waits for its turn. */
@@ -10,6 +11,16 @@ export interface Prepared {
   readonly key: string;
   readonly layer: ImageryLayer;
   readonly tiles: LayerTiles;
+  /** From the wish to its last tile, ms. */
+  readonly tookMs: number;
+}
+
+/** Who is told of what goes wrong. */
+export interface Trouble {
+  /** The server does not say where a layer's tiles are. */
+  readonly onRefused: (error: unknown) => void;
+  /** A tile did not come. */
+  readonly onFailed: (status: number | undefined, url: string) => void;
 }
 
 /**
@@ -29,19 +40,16 @@ export class LayerStage {
   #opacity: number;
   #isCovered = false;
   readonly #scene: Scene;
+  readonly #sources: TileSources;
   readonly #counts: TileCounts;
-  readonly #onFailure: (status: number | undefined, url: string) => void;
+  readonly #trouble: Trouble;
 
-  constructor(
-    scene: Scene,
-    counts: TileCounts,
-    opacity: number,
-    onFailure: (status: number | undefined, url: string) => void,
-  ) {
+  constructor(scene: Scene, sources: TileSources, counts: TileCounts, opacity: number, trouble: Trouble) {
     this.#scene = scene;
+    this.#sources = sources;
     this.#counts = counts;
     this.#opacity = opacity;
-    this.#onFailure = onFailure;
+    this.#trouble = trouble;
     scene.preRender.addEventListener(() => this.#advanceFade());
   }
 
@@ -52,6 +60,12 @@ export class LayerStage {
   /** What the eye sees, or is about to see. */
   get shownKey(): string | undefined {
     return (this.#fade?.to ?? this.#shown)?.key;
+  }
+
+  /** How many tiles the layer in sight has, and how long they took. */
+  get load(): { tiles: number; tookMs: number } | undefined {
+    const shown = this.#fade?.to ?? this.#shown;
+    return shown && { tiles: shown.tiles.requested, tookMs: shown.tookMs };
   }
 
   /** `key` is in sight, and no tile of it is missing. */
@@ -76,12 +90,17 @@ export class LayerStage {
 
   /** Loads a layer invisibly; null when `signal` ended it first or none of its tiles came, so that the old picture stays. */
   async prepare(spec: LayerSpec, signal: AbortSignal): Promise<Prepared | null> {
-    const tiles = new LayerTiles(spec, this.#counts, this.#onFailure);
+    const startedMs = performance.now();
+    const source = await this.#sources.of(spec).catch((error: unknown) => {
+      if (!signal.aborted) this.#trouble.onRefused(error);
+    });
+    if (!source || signal.aborted) return null;
+    const tiles = new LayerTiles(spec, source, this.#counts, this.#trouble.onFailed);
     const layer = new ImageryLayer(tiles.provider, { alpha: 0 });
     this.#scene.imageryLayers.add(layer);
-    const prepared = { spec, key: layerKey(spec), layer, tiles };
     const isLoaded = await this.#settled(tiles, signal);
-    if (isLoaded && !tiles.isLost) return prepared;
+    const prepared = { spec, key: layerKey(spec), layer, tiles, tookMs: performance.now() - startedMs };
+    if (isLoaded && !tiles.isLost && !signal.aborted) return prepared;
     this.#remove(prepared);
     return null;
   }
@@ -154,6 +173,7 @@ export class LayerStage {
   }
 
   #remove(prepared: Prepared): void {
+    prepared.tiles.cancel();
     this.#scene.imageryLayers.remove(prepared.layer, true);
     this.#scene.requestRender();
   }

@@ -1,16 +1,16 @@
 //! One product layer's tiles: an imagery provider per instant, and counts of what is on its way for the progress line and the tests.
 import {
   Rectangle,
+  type Request,
   RequestErrorEvent,
   RequestState,
   TileProviderError,
   UrlTemplateImageryProvider,
   WebMercatorTilingScheme,
 } from "cesium";
-import { tileTemplate } from "../api/pictures";
-import { parameters } from "../look/address";
 import { type Bounds, isWhole } from "./box";
 import type { LayerSpec } from "./layer";
+import type { TileSource } from "./sources";
 
 /** Totals over all layers since the page was loaded. */
 export class TileCounts {
@@ -41,20 +41,21 @@ export class LayerTiles {
   pending = 0;
   requested = 0;
   failed = 0;
+  readonly #requests = new Set<Request>();
 
   constructor(
-    readonly spec: LayerSpec,
+    { bounds }: LayerSpec,
+    { template, maxZoom }: TileSource,
     counts: TileCounts,
     onFailure: (status: number | undefined, url: string) => void,
   ) {
-    const template = tileTemplate(spec.product, spec.mode, spec.timeIso, spec, parameters(spec.look));
     const provider = new UrlTemplateImageryProvider({
       url: template,
       tilingScheme: new WebMercatorTilingScheme(),
       tileWidth: TILE_PX,
       tileHeight: TILE_PX,
-      maximumLevel: spec.maxZoom,
-      rectangle: rectangleOf(spec.bounds),
+      maximumLevel: maxZoom,
+      rectangle: rectangleOf(bounds),
       enablePickFeatures: false,
     });
     this.provider = provider;
@@ -74,16 +75,24 @@ export class LayerTiles {
     return this.requested > 0 && this.failed === this.requested;
   }
 
+  /** Nobody looks at this layer any more: Cesium itself would wait for what it asked for. */
+  cancel(): void {
+    // The library's declarations leave this one out.
+    for (const request of this.#requests) (request as Request & { cancel(): void }).cancel();
+  }
+
   /** The provider's own method is kept and only watched: Cesium decides what to ask for and when. */
   #countRequests(provider: UrlTemplateImageryProvider, counts: TileCounts): void {
     const request = provider.requestImage.bind(provider);
     provider.requestImage = (x, y, level, req) => {
       const promise = request(x, y, level, req);
       if (!promise) return promise;
+      if (req) this.#requests.add(req);
       this.pending += 1;
       this.requested += 1;
       counts.add({ pending: 1 });
       const end = (outcome: { loaded?: number; failed?: number }): void => {
+        if (req) this.#requests.delete(req);
         this.pending -= 1;
         this.failed += outcome.failed ?? 0;
         counts.add({ pending: -1, ...outcome });

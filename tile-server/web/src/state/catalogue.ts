@@ -1,14 +1,10 @@
-//! The products as the page uses them: steps parsed, zoom limits fetched once, and the layer that a state describes.
-import * as api from "../api/requests";
+//! The products as the page uses them: steps parsed, and the layer that a state describes.
 import type { Legend, Mode, Product } from "../api/types";
 import type { LayerSpec } from "../globe/layer";
 import { effective, type Look } from "../look/look";
 import { titleText } from "../page/format";
 import { clampToRange, parseSteps, type Step, toIso } from "../time/steps";
 import type { State } from "./store";
-
-/** Where the server does not say how deep its tiles go; Cesium stretches the deepest ones beyond. */
-const DEFAULT_MAX_ZOOM = 6;
 
 /** The quantity budgets are made of. */
 export const FLUX = "carbon_flux";
@@ -20,12 +16,10 @@ const ELEVATION = "elevation";
 export class Catalogue {
   readonly products: readonly Product[];
   readonly #steps = new Map<string, readonly Step[]>();
-  readonly #maxZoom: Map<string, number>;
   readonly #revisions: Map<string, number>;
 
   constructor(products: readonly Product[], before?: Catalogue) {
     this.products = products;
-    this.#maxZoom = new Map(before ? before.#maxZoom : []);
     this.#revisions = new Map(before ? before.#revisions : []);
     for (const product of products) this.#steps.set(product.product, parseSteps(product.steps));
   }
@@ -82,14 +76,6 @@ export class Catalogue {
     return (id !== null && this.#steps.get(id)) || [];
   }
 
-  /** Asks for a layer's zoom limits unless they are known. */
-  async learn(product: string, mode: Mode): Promise<void> {
-    const key = `${product}/${mode}`;
-    if (this.#maxZoom.has(key)) return;
-    const info = await api.layerInfo(product, mode);
-    this.#maxZoom.set(key, Number.isInteger(info.maxzoom) ? info.maxzoom : DEFAULT_MAX_ZOOM);
-  }
-
   /** The same version looks different now: its pictures are asked for again. */
   revise(product: string): void {
     this.#revisions.set(product, (this.#revisions.get(product) ?? 0) + 1);
@@ -108,7 +94,6 @@ export class Catalogue {
       look: this.lookIn(state.mode, state),
       timeIso: toIso(clampedMs),
       bounds: product.bounds_deg,
-      maxZoom: this.#maxZoom.get(`${product.product}/${state.mode}`) ?? DEFAULT_MAX_ZOOM,
     };
   }
 }

@@ -8,7 +8,7 @@ import type { Inventory } from "../state/inventory";
 import type { Store } from "../state/store";
 import { type Shot, StreamClient } from "./client";
 import { meshOf } from "./mesh";
-import type { Overlay } from "./overlay";
+import { FADE_MS, type Overlay } from "./overlay";
 import { paint } from "./painter";
 import { decode, type Picture } from "./picture";
 import { type Pose, poseOf } from "./pose";
@@ -37,12 +37,12 @@ export interface Surroundings {
   presenter: Presenter;
   overlay: Overlay;
   marks: () => readonly Drawn[];
-  /** The globe below has no tiles of the layer. */
-  isBare: () => boolean;
-  /** A picture came into sight over the globe. */
+  /** The globe below has tiles of just that. */
+  hasTiles: (spec: LayerSpec) => boolean;
+  /** Another picture came into sight over the globe. */
   onShow: (spec: LayerSpec) => void;
-  /** The globe itself is in sight again. */
-  onHide: () => void;
+  /** Nothing of the globe is in sight any more, or it is in sight again. */
+  onCover: (isCovered: boolean) => void;
 }
 
 export class Live {
@@ -59,6 +59,7 @@ export class Live {
   #isAbsent = false;
   #revision = 0;
   #painted = "";
+  #cover: ReturnType<typeof setTimeout> | undefined;
   #paintedMarks: readonly Drawn[] = [];
   readonly #turns: ((isOpen: boolean) => void)[] = [];
   readonly #firsts: (() => void)[] = [];
@@ -222,21 +223,23 @@ export class Live {
     this.#judge();
   }
 
-  /** Lays the picture under the eye where it fits, else fades to the globe. */
+  /** Lays the picture under the eye where it fits, else fades to the globe. After a break it stays until tiles take its place. */
   #place(scene: Scene): void {
-    const { overlay } = this.#parts;
+    const { overlay, hasTiles } = this.#parts;
     const shown = this.#shown;
     if (!shown) return;
     const pose = poseOf(scene.camera, scene.width, scene.height);
+    const isBare = !hasTiles(scene.spec);
+    const isNeeded = this.#client.isOpen || isBare;
     if (isSameCamera(shown.scene, scene)) {
       overlay.rest();
-      this.#turnTo(this.#client.isOpen || shown.scene.spec.timeIso === scene.spec.timeIso);
+      this.#turnTo(isNeeded || shown.scene.spec.timeIso === scene.spec.timeIso);
     } else {
       const mesh = meshOf(shown.pose, pose);
-      const { mostLean, leastCover } = this.#parts.isBare() ? FITS.overNothing : FITS.overTiles;
+      const { mostLean, leastCover } = isBare ? FITS.overNothing : FITS.overTiles;
       const fits = mesh.lean < mostLean && mesh.cover > leastCover;
       overlay.move(mesh, Math.round(scene.width * scene.density), Math.round(scene.height * scene.density));
-      this.#turnTo(this.#client.isOpen && (fits || performance.now() - shown.askedMs < FRESH_MS));
+      this.#turnTo(isNeeded && (fits || performance.now() - shown.askedMs < FRESH_MS));
     }
     this.#paint(scene, pose);
   }
@@ -255,9 +258,13 @@ export class Live {
   #turnTo(isShown: boolean): void {
     if (this.#isShown === isShown) return;
     this.#isShown = isShown;
-    this.#parts.overlay.fade(isShown);
-    if (isShown && this.#shown) this.#parts.onShow(this.#shown.scene.spec);
-    else this.#parts.onHide();
+    const { overlay, onCover, onShow } = this.#parts;
+    overlay.fade(isShown);
+    clearTimeout(this.#cover);
+    // As long as the picture fades in, what lies below is seen through it.
+    if (isShown) this.#cover = setTimeout(() => onCover(true), FADE_MS);
+    else onCover(false);
+    if (isShown && this.#shown) onShow(this.#shown.scene.spec);
     if (isShown) for (const tell of this.#firsts.splice(0)) tell();
   }
 

@@ -2,8 +2,9 @@
 import type { Mesh } from "./mesh";
 import { Mover } from "./mover";
 
-/** The style sheet fades between the globe and what has this class. */
+/** The style sheet fades between the globe and what has this class, for so long. */
 const SHOWN = "shown";
+export const FADE_MS = 160;
 
 export class Overlay {
   readonly #root: HTMLElement;

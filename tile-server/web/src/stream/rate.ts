@@ -25,7 +25,12 @@ export class Rate {
 
   /** NaN before the first picture. */
   get latencyMs(): number {
-    const sorted = [...this.#latenciesMs].sort((a, b) => a - b);
-    return sorted[sorted.length >> 1] ?? Number.NaN;
+    return median(this.#latenciesMs);
   }
+}
+
+/** NaN of nothing. */
+export function median(values: readonly number[]): number {
+  const sorted = [...values].sort((a, b) => a - b);
+  return sorted[sorted.length >> 1] ?? Number.NaN;
 }

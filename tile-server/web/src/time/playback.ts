@@ -3,7 +3,7 @@
 import { isSameLayer, type LayerSpec } from "../globe/layer";
 import type { Presenter } from "../globe/presenter";
 import type { Store } from "../state/store";
-import { advanced, nextInstant, PARTS_PER_STEP, positionOf, quantise, type Step, strideFor } from "./steps";
+import { advanced, nextInstant, PARTS_PER_STEP, positionOf, quantise, stepAhead, type Step, strideFor } from "./steps";
 
 /** A page that was out of sight goes on where it was, not where it would be. */
 const MOST_FRAME_MS = 250;
@@ -54,9 +54,9 @@ export class Playback {
     if (!this.#run) return;
     this.#run.isOver = true;
     this.#run = undefined;
-    // Where it stops it stops on the raster, on which pictures are kept.
+    // It stops on what was measured, not between two of it, and never runs back.
     const { timeMs } = this.#store.state;
-    if (this.#follower.isFollowing && Number.isFinite(timeMs)) this.#store.set({ timeMs: quantise(this.#steps(), timeMs) });
+    if (Number.isFinite(timeMs)) this.#store.set({ timeMs: stepAhead(this.#steps(), timeMs) });
   }
 
   async #loop(run: { isOver: boolean }): Promise<void> {

@@ -1,6 +1,6 @@
 //! Pure time maths: product steps and instants in, positions on the time axis, quantised instants and readable labels out. All times are UTC.
 
-/** One stored period of a product. Instants in milliseconds since 1970-01-01T00:00:00Z; `endMs` is exclusive. */
+/** One stored period of a product, whose values are those of its middle. Instants in milliseconds since 1970-01-01T00:00:00Z; `endMs` is exclusive. */
 export interface Step {
   readonly startMs: number;
   readonly endMs: number;
@@ -10,6 +10,8 @@ export interface Step {
 /** Playback and dragging ask for instants on this raster only, so that a second pass finds its tiles cached. */
 export const PARTS_PER_STEP = 8;
 
+/** Addresses tell instants apart that are so far apart. */
+const SECOND_MS = 1000;
 const DAY_MS = 86_400_000;
 const DAY_S = DAY_MS / 1000;
 const MONTHS = ["Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec"];
@@ -90,6 +92,18 @@ export function nextInstant(steps: readonly Step[], timeMs: number, strideParts:
   return wholeSecond(instantAt(steps, next >= steps.length * PARTS_PER_STEP ? 0 : next / PARTS_PER_STEP));
 }
 
+/** The stored step that play comes to next, or is at; beyond the last one, the last. */
+export function stepAhead(steps: readonly Step[], timeMs: number): number {
+  return (steps.find(({ midMs }) => midMs > timeMs - SECOND_MS) ?? steps.at(-1))?.midMs ?? timeMs;
+}
+
+/** The stored step next to an instant; undefined where there is none. */
+export function stepBeside(steps: readonly Step[], timeMs: number, direction: 1 | -1): number | undefined {
+  return direction > 0
+    ? steps.find(({ midMs }) => midMs >= timeMs + SECOND_MS)?.midMs
+    : steps.filter(({ midMs }) => midMs <= timeMs - SECOND_MS).at(-1)?.midMs;
+}
+
 /** Some steps or parts of one further on, and from the end to the start; undefined without steps. */
 export function advanced(
   steps: readonly Step[],
@@ -158,5 +172,5 @@ export function timeNames(
 }
 
 function wholeSecond(timeMs: number): number {
-  return Math.round(timeMs / 1000) * 1000;
+  return Math.round(timeMs / SECOND_MS) * SECOND_MS;
 }

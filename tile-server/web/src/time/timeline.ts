@@ -10,6 +10,7 @@ import {
   positionOf,
   quantise,
   type Step,
+  stepBeside,
   stepLabel,
 } from "./steps";
 
@@ -107,10 +108,16 @@ export class Timeline {
     return instantAt(this.#steps, Number(this.#slider.value));
   }
 
-  #jump(steps: number): void {
-    const position = positionOf(this.#steps, this.#store.state.timeMs) + steps;
-    const range = this.#steps.length;
-    this.#store.set({ timeMs: instantAt(this.#steps, ((position % range) + range) % range) });
+  /** To the stored step beside the instant, and from the last one to the first; who steps looks at it, so playback pauses. */
+  #jump(direction: 1 | -1): void {
+    const [first, last] = [this.#steps[0], this.#steps.at(-1)];
+    if (!first || !last) return;
+    const beyond = direction > 0 ? first.midMs : last.midMs;
+    this.#stepTo(stepBeside(this.#steps, this.#store.state.timeMs, direction) ?? beyond);
+  }
+
+  #stepTo(timeMs: number): void {
+    this.#store.set({ timeMs, playing: false });
   }
 
   #key(event: KeyboardEvent): void {
@@ -119,16 +126,18 @@ export class Timeline {
       ArrowDown: -1 / PARTS_PER_STEP,
       ArrowRight: 1 / PARTS_PER_STEP,
       ArrowUp: 1 / PARTS_PER_STEP,
-      PageDown: -1,
-      PageUp: 1,
       Home: -Infinity,
       End: Infinity,
     };
-    const move = moves[event.key];
-    if (move === undefined) return;
+    const steps: Record<string, 1 | -1> = { PageDown: -1, PageUp: 1 };
+    const [move, step] = [moves[event.key], steps[event.key]];
+    if (move === undefined && step === undefined) return;
     event.preventDefault();
+    const { timeMs } = this.#store.state;
+    if (step !== undefined) this.#stepTo(stepBeside(this.#steps, timeMs, step) ?? timeMs);
+    if (move === undefined) return;
     const position = Math.min(
-      Math.max(positionOf(this.#steps, this.#store.state.timeMs) + move, 0),
+      Math.max(positionOf(this.#steps, timeMs) + move, 0),
       this.#steps.length,
     );
     this.#store.set({ timeMs: clampToRange(this.#steps, quantise(this.#steps, instantAt(this.#steps, position))) });

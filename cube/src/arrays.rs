@@ -1,0 +1,268 @@
+//! The arrays of a cube: shape, chunks, codecs and attributes of each, and nothing of what is in them.
+
+use std::sync::Arc;
+
+use contract::quantity::Quantity;
+use serde_json::{Map, Value, json};
+use zarrs::array::codec::{BytesCodec, Crc32cCodec, ZstdCodec};
+use zarrs::array::data_type::{float32, float64, int32, int64, uint8};
+use zarrs::array::{
+    Array, ArrayBuilder, ArrayMetadata, ArrayMetadataOptions, ArrayMetadataV3,
+    BytesToBytesCodecTraits, CodecChain, DataType, FillValue,
+};
+
+use crate::{CubeError, Description, Layout, cf};
+
+/// Steps in a chunk of the time coordinate.
+pub(crate) const TIME_CHUNK: u64 = 1024;
+/// Steps in a chunk of digests, which do not compress.
+pub(crate) const DIGEST_CHUNK: u64 = 256;
+/// Bytes of a digest.
+pub(crate) const DIGEST_BYTES: u64 = 32;
+/// What compresses values; higher levels cost several times as long for a few percent.
+const ZSTD_LEVEL: i32 = 3;
+
+/// An array without a store: what it is like.
+pub(crate) type Definition = Array<()>;
+
+/// Of one array, what the ways to define them have in common.
+struct Shape {
+    name: String,
+    cells: Vec<u64>,
+    chunk: Vec<u64>,
+    dimensions: &'static [&'static str],
+}
+
+/// Values, `[time, lat, lon]`, stored unit, NaN no data.
+pub(crate) fn values(description: &Description, steps: u64) -> Result<Definition, CubeError> {
+    let (grid, layout) = (&description.grid, Layout::of(&description.grid));
+    let shape = Shape {
+        name: cf::variable(description.quantity),
+        cells: vec![steps, grid.rows.into(), grid.cols.into()],
+        chunk: vec![1, layout.object[0].into(), layout.object[1].into()],
+        dimensions: &["time", "lat", "lon"],
+    };
+    let inner = layout
+        .is_sharded()
+        .then(|| vec![1, layout.chunk[0].into(), layout.chunk[1].into()]);
+    define(
+        &shape,
+        float32(),
+        f32::NAN.into(),
+        cf::of_values(description),
+        inner,
+    )
+}
+
+/// Codecs of one chunk of values, which in a shard is a part of an object.
+pub(crate) fn chunk_codecs() -> CodecChain {
+    CodecChain::new(vec![], Arc::new(BytesCodec::little()), checked())
+}
+
+/// Compressed, and with a checksum of what is stored.
+fn checked() -> Vec<Arc<dyn BytesToBytesCodecTraits>> {
+    vec![
+        Arc::new(ZstdCodec::new(ZSTD_LEVEL, false)),
+        Arc::new(Crc32cCodec::new()),
+    ]
+}
+
+/// Arrays along time, besides the values.
+pub(crate) struct Axis {
+    /// Where a step's value holds, `[time]`.
+    pub(crate) time: Definition,
+    /// What it is a mean or a sum over, `[time, 2]`.
+    pub(crate) bounds: Definition,
+    /// First instant of the step itself where the bounds are those of a sum, `[time]`.
+    pub(crate) step_start: Option<Definition>,
+    /// Digest of its values, `[time, byte]`.
+    pub(crate) digests: Definition,
+}
+
+/// The arrays along time for a number of steps.
+pub(crate) fn axis(quantity: Quantity, steps: u64) -> Result<Axis, CubeError> {
+    let instants = |name: &str, attributes| {
+        let shape = Shape {
+            name: name.to_owned(),
+            cells: vec![steps],
+            chunk: vec![TIME_CHUNK],
+            dimensions: &["time"],
+        };
+        define(&shape, int64(), 0i64.into(), attributes, None)
+    };
+    let bounds = Shape {
+        name: "time_bnds".to_owned(),
+        cells: vec![steps, 2],
+        chunk: vec![TIME_CHUNK, 2],
+        dimensions: &["time", "bnds"],
+    };
+    let digests = Shape {
+        name: "values_sha256".to_owned(),
+        cells: vec![steps, DIGEST_BYTES],
+        chunk: vec![DIGEST_CHUNK, DIGEST_BYTES],
+        dimensions: &["time", "sha256_byte"],
+    };
+    let is_sum = quantity == Quantity::AccumulatedCarbon;
+    Ok(Axis {
+        time: instants("time", cf::of_time())?,
+        bounds: define(&bounds, int64(), 0i64.into(), Map::new(), None)?,
+        step_start: is_sum
+            .then(|| instants("step_start", cf::of_step_start()))
+            .transpose()?,
+        digests: define(&digests, uint8(), 0u8.into(), cf::of_digests(), None)?,
+    })
+}
+
+/// An array that never changes, and its values.
+pub(crate) enum Fixed {
+    Floats(Definition, Vec<f64>),
+    Number(Definition, i32),
+}
+
+/// Latitudes, longitudes, their bounds and the grid mapping.
+pub(crate) fn fixed(description: &Description) -> Result<Vec<Fixed>, CubeError> {
+    let (lat, lon) = places(description);
+    let crs = Shape {
+        name: "crs".to_owned(),
+        cells: vec![],
+        chunk: vec![],
+        dimensions: &[],
+    };
+    Ok(vec![
+        floats("lat", &["lat"], cf::of_lat(), lat.centres)?,
+        floats("lat_bnds", &["lat", "bnds"], Map::new(), lat.bounds)?,
+        floats("lon", &["lon"], cf::of_lon(), lon.centres)?,
+        floats("lon_bnds", &["lon", "bnds"], Map::new(), lon.bounds)?,
+        Fixed::Number(define(&crs, int32(), 0i32.into(), cf::of_crs(), None)?, 0),
+    ])
+}
+
+struct Places {
+    /// Degrees.
+    centres: Vec<f64>,
+    /// Two a cell, in the order of the centres: degrees.
+    bounds: Vec<f64>,
+}
+
+/// Latitudes north to south and longitudes eastwards, past 180 where the grid crosses the date line.
+fn places(description: &Description) -> (Places, Places) {
+    let grid = &description.grid;
+    let of = |count: u32, edge: &dyn Fn(u32) -> f64| {
+        let edges = |cell: u32| [edge(cell), edge(cell + 1)];
+        let centre = |[from, to]: [f64; 2]| contract::grid::rounded_deg(0.5 * (from + to));
+        Places {
+            centres: (0..count).map(|cell| centre(edges(cell))).collect(),
+            bounds: (0..count)
+                .flat_map(edges)
+                .map(contract::grid::rounded_deg)
+                .collect(),
+        }
+    };
+    (
+        of(grid.rows, &|row| grid.row_north_deg(row)),
+        of(grid.cols, &|col| grid.col_west_deg(col)),
+    )
+}
+
+fn floats(
+    name: &str,
+    dimensions: &'static [&'static str],
+    attributes: Map<String, Value>,
+    values: Vec<f64>,
+) -> Result<Fixed, CubeError> {
+    let cells = match dimensions.len() {
+        1 => vec![values.len() as u64],
+        _ => vec![values.len() as u64 / 2, 2],
+    };
+    let shape = Shape {
+        name: name.to_owned(),
+        chunk: cells.clone(),
+        cells,
+        dimensions,
+    };
+    let definition = define(&shape, float64(), f64::NAN.into(), attributes, None)?;
+    Ok(Fixed::Floats(definition, values))
+}
+
+fn define(
+    shape: &Shape,
+    data_type: DataType,
+    fill: FillValue,
+    attributes: Map<String, Value>,
+    inner_chunk: Option<Vec<u64>>,
+) -> Result<Definition, CubeError> {
+    let mut builder = ArrayBuilder::new(shape.cells.clone(), shape.chunk.clone(), data_type, fill);
+    builder
+        .bytes_to_bytes_codecs(checked())
+        .dimension_names(Some(shape.dimensions.iter().copied()))
+        .attributes(attributes)
+        .subchunk_shape(inner_chunk);
+    let path = format!("/{}", shape.name);
+    // Attributes are the conventions' and ours, not the library's.
+    let options = ArrayMetadataOptions::default().with_include_zarrs_metadata(false);
+    builder
+        .build(Arc::new(()), &path)
+        .map(|array| array.with_metadata_options(options))
+        .map_err(|e| CubeError::library(&path, "defining the array", e))
+}
+
+/// Name of an array, without the slash of its path.
+pub(crate) fn name<S: ?Sized>(array: &Array<S>) -> String {
+    array.path().as_str().trim_start_matches('/').to_owned()
+}
+
+/// Is an array that was found what it is defined to be, but for its length along time?
+///
+/// # Errors
+/// `Foreign` with the first thing that differs.
+pub(crate) fn check<S: ?Sized>(
+    found: &Array<S>,
+    defined: &Definition,
+    place: &str,
+) -> Result<(), CubeError> {
+    let foreign = |reason: String| CubeError::Foreign {
+        place: place.to_owned(),
+        array: name(defined),
+        reason,
+    };
+    let (ArrayMetadata::V3(found), ArrayMetadata::V3(defined)) =
+        (found.metadata(), defined.metadata())
+    else {
+        return Err(foreign("it is not of Zarr version 3".to_owned()));
+    };
+    let same_places = found.shape.len() == defined.shape.len()
+        && found.shape.iter().skip(1).eq(defined.shape.iter().skip(1));
+    if !same_places {
+        return Err(foreign(format!(
+            "its shape is {:?}, not {:?} along any time",
+            found.shape, defined.shape
+        )));
+    }
+    let facts = |array: &ArrayMetadataV3| {
+        [
+            ("data type", written_out(json!(array.data_type))),
+            ("chunks", written_out(json!(array.chunk_grid))),
+            ("codecs", written_out(json!(array.codecs))),
+            ("fill value", json!(array.fill_value)),
+            (
+                "names of chunks",
+                written_out(json!(array.chunk_key_encoding)),
+            ),
+        ]
+    };
+    for ((what, found), (_, defined)) in facts(found).into_iter().zip(facts(defined)) {
+        if found != defined {
+            return Err(foreign(format!("its {what} are {found}, not {defined}")));
+        }
+    }
+    Ok(())
+}
+
+/// A thing by its name and settings: the format lets one without settings be its name alone.
+fn written_out(thing: Value) -> Value {
+    match thing {
+        Value::String(name) => json!({ "name": name }),
+        Value::Array(things) => things.into_iter().map(written_out).collect(),
+        thing => thing,
+    }
+}

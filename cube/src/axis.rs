@@ -1,0 +1,228 @@
+//! Steps in the order of time: their periods as the conventions write them, and the digest of each step's values.
+
+use std::sync::Arc;
+
+use contract::digest::Digest;
+use contract::quantity::Quantity;
+use contract::time::{Period, TimeMs};
+use zarrs::array::{Array, ElementOwned};
+use zarrs::storage::{AsyncReadableStorageTraits, AsyncWritableStorageTraits};
+
+use crate::arrays::{self, DIGEST_BYTES, Definition};
+use crate::error::first_lines;
+use crate::{CubeError, Description};
+
+/// Most steps that are read: every quarter of an hour of 280 years.
+const MOST_STEPS: u64 = 10_000_000;
+
+/// One step of a cube.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Step {
+    /// What its values are a mean over; of accumulated carbon, what was added last.
+    pub period: Period,
+    /// Digest of its values and period: [`storage::frames::digest_of`].
+    pub values_sha256: Digest,
+}
+
+impl Step {
+    /// The instant where its values hold: the middle of a mean, the end of a sum.
+    fn time(&self, quantity: Quantity) -> TimeMs {
+        match quantity {
+            Quantity::AccumulatedCarbon => self.period.end,
+            _ => self.period.mid(),
+        }
+    }
+}
+
+/// Writes what has changed from step `first` on, and how many there are.
+pub(crate) async fn write<S>(
+    store: &Arc<S>,
+    description: &Description,
+    steps: &[Step],
+    first: usize,
+) -> Result<(), CubeError>
+where
+    S: AsyncWritableStorageTraits + 'static,
+{
+    let quantity = description.quantity;
+    let axis = arrays::axis(quantity, steps.len() as u64)?;
+    let origin = steps.first().map(|step| step.period.start);
+    let bounds_start = |step: &Step| match quantity {
+        // A sum is one since the first step, and so are its bounds.
+        Quantity::AccumulatedCarbon => origin.unwrap_or(step.period.start),
+        _ => step.period.start,
+    };
+    let writer = Writer {
+        store,
+        steps,
+        first,
+    };
+    writer
+        .write(&axis.time, |step| [step.time(quantity).ms()])
+        .await?;
+    writer
+        .write(&axis.bounds, |step| {
+            [bounds_start(step).ms(), step.period.end.ms()]
+        })
+        .await?;
+    if let Some(step_start) = &axis.step_start {
+        writer
+            .write(step_start, |step| [step.period.start.ms()])
+            .await?;
+    }
+    writer
+        .write(&axis.digests, |step| *step.values_sha256.as_bytes())
+        .await
+}
+
+struct Writer<'a, S> {
+    store: &'a Arc<S>,
+    steps: &'a [Step],
+    first: usize,
+}
+
+impl<S: AsyncWritableStorageTraits + 'static> Writer<'_, S> {
+    /// Writes one array of `N` numbers a step.
+    async fn write<T, const N: usize>(
+        &self,
+        definition: &Definition,
+        of: impl Fn(&Step) -> [T; N],
+    ) -> Result<(), CubeError>
+    where
+        T: zarrs::array::Element + Default + Copy + Send + Sync + 'static,
+    {
+        let array = definition.with_storage(Arc::clone(self.store));
+        let failed = |e: String| CubeError::library(&arrays::name(&array), "writing", e);
+        let stored = array.async_store_metadata().await;
+        stored.map_err(|e| failed(e.to_string()))?;
+        let chunk_steps = chunk_steps(definition)?;
+        for chunk in self.first / chunk_steps..self.steps.len().div_ceil(chunk_steps) {
+            let start = chunk * chunk_steps;
+            let end = self.steps.len().min(start + chunk_steps);
+            let mut numbers: Vec<T> = self.steps[start..end].iter().flat_map(&of).collect();
+            numbers.resize(chunk_steps * N, T::default());
+            let mut index = vec![0; definition.dimensionality()];
+            index[0] = chunk as u64;
+            let stored = array.async_store_chunk(&index, numbers).await;
+            stored.map_err(|e| failed(e.to_string()))?;
+        }
+        Ok(())
+    }
+}
+
+/// Reads all steps.
+///
+/// # Errors
+/// `Foreign` if the arrays are not those of a cube, or their times are no steps in the order of time.
+pub(crate) async fn read<S>(
+    store: &Arc<S>,
+    description: &Description,
+    place: &str,
+) -> Result<Vec<Step>, CubeError>
+where
+    S: AsyncReadableStorageTraits + 'static,
+{
+    let axis = arrays::axis(description.quantity, 1)?;
+    let bounds: Vec<i64> = read_array(store, &axis.bounds, place).await?;
+    let starts: Vec<i64> = match &axis.step_start {
+        Some(step_start) => read_array(store, step_start, place).await?,
+        None => bounds.iter().copied().step_by(2).collect(),
+    };
+    let digests: Vec<u8> = read_array(store, &axis.digests, place).await?;
+    let foreign = |reason: String| CubeError::Foreign {
+        place: place.to_owned(),
+        array: "time".to_owned(),
+        reason,
+    };
+    let ends = bounds.iter().copied().skip(1).step_by(2);
+    let digests = digests.chunks_exact(DIGEST_BYTES as usize);
+    if starts.len() * 2 != bounds.len() || digests.len() != starts.len() {
+        return Err(foreign("its arrays differ in length".to_owned()));
+    }
+    let mut steps: Vec<Step> = Vec::with_capacity(starts.len());
+    for ((start, end), digest) in starts.into_iter().zip(ends).zip(digests) {
+        let period = TimeMs::new(start)
+            .and_then(|start| Period::new(start, TimeMs::new(end)?))
+            .map_err(|e| foreign(e.to_string()))?;
+        if let Some(before) = steps.last()
+            && period.start < before.period.end
+        {
+            let reason = format!("{period} follows {}", before.period);
+            return Err(foreign(reason));
+        }
+        let digest: [u8; DIGEST_BYTES as usize] = digest.try_into().unwrap_or_default();
+        steps.push(Step {
+            period,
+            values_sha256: Digest::from_bytes(digest),
+        });
+    }
+    Ok(steps)
+}
+
+async fn read_array<S, T>(
+    store: &Arc<S>,
+    definition: &Definition,
+    place: &str,
+) -> Result<Vec<T>, CubeError>
+where
+    S: AsyncReadableStorageTraits + 'static,
+    T: ElementOwned + Send + Sync,
+{
+    let array = open(store, definition, place).await?;
+    let steps = array.shape()[0];
+    if steps > MOST_STEPS {
+        return Err(CubeError::Foreign {
+            place: place.to_owned(),
+            array: arrays::name(definition),
+            reason: format!("{steps} steps are more than {MOST_STEPS}"),
+        });
+    }
+    let chunk_steps = chunk_steps(definition)? as u64;
+    let a_step: u64 = array.shape()[1..].iter().product();
+    let mut all = vec![];
+    // Each chunk as a whole, for then its checksum is compared.
+    for chunk in 0..steps.div_ceil(chunk_steps) {
+        let mut index = vec![0; array.dimensionality()];
+        index[0] = chunk;
+        let damaged = |reason: String| CubeError::Chunk {
+            array: arrays::name(definition),
+            chunk: index.clone(),
+            reason,
+        };
+        let found = array.async_retrieve_chunk_if_exists::<Vec<T>>(&index).await;
+        let mut numbers = found
+            .map_err(|e| damaged(first_lines(&e)))?
+            .ok_or_else(|| damaged("it is not there".to_owned()))?;
+        numbers.truncate(((steps - chunk * chunk_steps) * a_step) as usize);
+        all.append(&mut numbers);
+    }
+    Ok(all)
+}
+
+/// Opens an array that must be what it is defined to be.
+pub(crate) async fn open<S>(
+    store: &Arc<S>,
+    definition: &Definition,
+    place: &str,
+) -> Result<Array<S>, CubeError>
+where
+    S: AsyncReadableStorageTraits + 'static,
+{
+    let path = definition.path().as_str();
+    let opened = Array::async_open(Arc::clone(store), path).await;
+    let array = opened.map_err(|e| CubeError::Foreign {
+        place: place.to_owned(),
+        array: arrays::name(definition),
+        reason: first_lines(&e),
+    })?;
+    arrays::check(&array, definition, place)?;
+    Ok(array)
+}
+
+fn chunk_steps(definition: &Definition) -> Result<usize, CubeError> {
+    let index = vec![0; definition.dimensionality()];
+    let shape = definition.chunk_shape(&index);
+    let shape =
+        shape.map_err(|e| CubeError::library(&arrays::name(definition), "its chunks", e))?;
+    Ok(shape[0].get() as usize)
+}

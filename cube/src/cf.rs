@@ -1,0 +1,132 @@
+//! What the CF conventions call things: names and attributes of variables and coordinates.
+
+use contract::earth::{WGS84_EQUATORIAL_RADIUS_M, WGS84_POLAR_RADIUS_M};
+use contract::quantity::Quantity;
+use serde_json::{Map, Value, json};
+
+use crate::Description;
+
+/// Unit of the time coordinate; instants are whole milliseconds, so that no time is rounded.
+pub(crate) const TIME_UNITS: &str = "milliseconds since 1970-01-01 00:00:00";
+
+/// Attributes from a JSON object.
+pub(crate) fn attributes(object: Value) -> Map<String, Value> {
+    match object {
+        Value::Object(map) => map,
+        _ => Map::new(),
+    }
+}
+
+/// Name of the variable that holds the values: that of the quantity.
+pub(crate) fn variable(quantity: Quantity) -> String {
+    let name = serde_json::to_value(quantity).unwrap_or_default();
+    name.as_str().unwrap_or("values").to_owned()
+}
+
+/// Standard name, if the conventions' table (version 93) has one that says what the values are and no more.
+///
+/// It has none for the upward flux of CO2 as mass of carbon, nor for what that adds up to, and fugacity is not told from
+/// partial pressure here.
+fn standard_name(description: &Description) -> Option<&'static str> {
+    match description.quantity {
+        Quantity::Current if description.product.northward().is_some() => {
+            Some("eastward_sea_water_velocity")
+        }
+        Quantity::Current if description.product.eastward().is_some() => {
+            Some("northward_sea_water_velocity")
+        }
+        Quantity::CarbonFlux | Quantity::AccumulatedCarbon | Quantity::Pco2 | Quantity::Current => {
+            None
+        }
+        Quantity::SeaSurfaceTemperature => Some("sea_surface_temperature"),
+        Quantity::Chlorophyll => Some("mass_concentration_of_chlorophyll_a_in_sea_water"),
+        Quantity::WindSpeed => Some("wind_speed"),
+        Quantity::Salinity => Some("sea_water_practical_salinity"),
+        Quantity::AirPressure => Some("air_pressure_at_mean_sea_level"),
+        Quantity::IceFraction => Some("sea_ice_area_fraction"),
+        Quantity::WaveHeight => Some("sea_surface_wave_significant_height"),
+        Quantity::Precipitation => Some("precipitation_flux"),
+        Quantity::Elevation => Some("height_above_mean_sea_level"),
+        Quantity::SeaAreaFraction => Some("sea_area_fraction"),
+        Quantity::LandAreaFraction => Some("land_area_fraction"),
+    }
+}
+
+/// What is said of the values.
+pub(crate) fn of_values(description: &Description) -> Map<String, Value> {
+    let quantity = description.quantity;
+    let is_sum = quantity == Quantity::AccumulatedCarbon;
+    let mut attributes = attributes(json!({
+        "long_name": quantity.title(),
+        "units": quantity.unit(),
+        "cell_methods": if is_sum { "area: mean time: sum" } else { "area: mean time: mean" },
+        "grid_mapping": "crs",
+    }));
+    if let Some(name) = standard_name(description) {
+        attributes.insert("standard_name".to_owned(), name.into());
+    }
+    if let Some([below, above]) = quantity.ends() {
+        let comment = format!("below zero the {below}, above it the {above}");
+        attributes.insert("comment".to_owned(), comment.into());
+    }
+    attributes
+}
+
+/// Of the time coordinate.
+pub(crate) fn of_time() -> Map<String, Value> {
+    attributes(
+        json!({ "standard_name": "time", "long_name": "time", "axis": "T", "units": TIME_UNITS,
+        "calendar": "proleptic_gregorian", "bounds": "time_bnds" }),
+    )
+}
+
+/// Of the first instants of steps, where the bounds of time are those of a sum.
+pub(crate) fn of_step_start() -> Map<String, Value> {
+    attributes(
+        json!({ "long_name": "start of the step that was added last", "units": TIME_UNITS,
+        "calendar": "proleptic_gregorian" }),
+    )
+}
+
+/// Of the digests of values.
+pub(crate) fn of_digests() -> Map<String, Value> {
+    attributes(json!({ "long_name": "SHA-256 of the values of a step" }))
+}
+
+/// Of latitudes.
+pub(crate) fn of_lat() -> Map<String, Value> {
+    attributes(
+        json!({ "standard_name": "latitude", "long_name": "latitude", "axis": "Y", "units": "degrees_north",
+        "bounds": "lat_bnds" }),
+    )
+}
+
+/// Of longitudes.
+pub(crate) fn of_lon() -> Map<String, Value> {
+    attributes(
+        json!({ "standard_name": "longitude", "long_name": "longitude", "axis": "X", "units": "degrees_east",
+        "bounds": "lon_bnds" }),
+    )
+}
+
+/// Of the grid mapping: the ellipsoid that latitudes are on.
+pub(crate) fn of_crs() -> Map<String, Value> {
+    attributes(
+        json!({ "grid_mapping_name": "latitude_longitude", "long_name": "WGS 84",
+        "semi_major_axis": WGS84_EQUATORIAL_RADIUS_M, "semi_minor_axis": WGS84_POLAR_RADIUS_M,
+        "longitude_of_prime_meridian": 0.0 }),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn every_quantity_has_a_variable_of_its_own() {
+        let names: BTreeSet<_> = Quantity::ALL.map(variable).into();
+        assert_eq!(names.len(), Quantity::ALL.len());
+        assert_eq!(variable(Quantity::CarbonFlux), "carbon_flux");
+    }
+}

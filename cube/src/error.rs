@@ -1,0 +1,94 @@
+//! What can go wrong with a cube: which array, which chunk, and what to do.
+
+use contract::time::Period;
+use storage::StorageError;
+
+/// A cube that cannot be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum CubeError {
+    /// The store refused or lost a request.
+    #[error(transparent)]
+    Storage(#[from] StorageError),
+    /// Something is where a new cube was to be.
+    #[error("{place} is not empty: give another place, or remove what is there")]
+    Exists { place: String },
+    /// There is no cube.
+    #[error("there is no repository of a product in {place}")]
+    Missing { place: String },
+    /// The cube has no such version.
+    #[error("{place} has no version {version:?}; it has {there}")]
+    NoVersion {
+        place: String,
+        version: String,
+        there: String,
+    },
+    /// What is there was not written by this crate, or is not whole.
+    #[error("{array} in {place} is not as this program writes it: {reason}")]
+    Foreign {
+        place: String,
+        array: String,
+        reason: String,
+    },
+    /// A chunk cannot be read, or does not hold what was written.
+    #[error(
+        "chunk {chunk:?} of {array} cannot be read: {reason}; if its object is damaged, land the file of this step again, \
+         or restore the object from a copy"
+    )]
+    Chunk {
+        array: String,
+        /// Index of the chunk along time, rows and columns.
+        chunk: Vec<u64>,
+        reason: String,
+    },
+    /// A step does not hold the values that its digest names.
+    #[error(
+        "step {period} of {array} does not hold the values of its digest: land its file again, or restore it from a copy"
+    )]
+    Step { array: String, period: Period },
+    /// A step would cover a part of the period of another one.
+    #[error("the step {step} overlaps {there}, which is there: one period has one step")]
+    Overlap { step: Period, there: Period },
+    /// Values and grid do not belong together.
+    #[error("{found} values for a window of {expected} cells")]
+    Shape { expected: usize, found: usize },
+    /// There is no such step or window.
+    #[error("{what} is outside the cube of {steps} steps, {rows} x {cols} cells")]
+    Outside {
+        what: String,
+        steps: usize,
+        rows: u32,
+        cols: u32,
+    },
+    /// Others were faster every time.
+    #[error("{place} was changed by others in each of {attempts} attempts to commit: try again")]
+    Contended { place: String, attempts: u32 },
+    /// The library of the repository or of the arrays failed.
+    #[error("{place}: {doing}: {reason}")]
+    Library {
+        place: String,
+        doing: &'static str,
+        reason: String,
+    },
+}
+
+impl CubeError {
+    /// A failure of the libraries, without the trace of spans that Icechunk's errors carry behind their first lines.
+    pub(crate) fn library(
+        place: &str,
+        doing: &'static str,
+        reason: impl std::fmt::Display,
+    ) -> Self {
+        Self::Library {
+            place: place.to_owned(),
+            doing,
+            reason: first_lines(&reason),
+        }
+    }
+}
+
+/// An error's text up to the trace that Icechunk adds.
+pub(crate) fn first_lines(error: &dyn std::fmt::Display) -> String {
+    let text = error.to_string();
+    let end = text.find("\n\ncontext:").unwrap_or(text.len());
+    text[..end].trim().to_owned()
+}

@@ -1,0 +1,127 @@
+//! One step's values as encoded objects, and one encoded chunk as values.
+
+use std::borrow::Cow;
+use std::num::NonZeroU64;
+
+use bytes::Bytes;
+use contract::grid::Grid;
+use zarrs::array::{
+    ArrayToBytesCodecTraits as _, CodecChain, CodecOptions, FromArrayBytes as _,
+    IntoArrayBytes as _,
+};
+
+use crate::arrays::{self, Definition};
+use crate::{CubeError, Description, Layout};
+
+/// Writes frames of one grid as objects of the layout.
+pub(crate) struct Encoder {
+    definition: Definition,
+    grid: Grid,
+    layout: Layout,
+}
+
+/// An object of a frame: a chunk, or a shard of chunks.
+pub(crate) struct EncodedObject {
+    /// Row and column of objects.
+    pub(crate) index: [u32; 2],
+    /// None where no cell has data: it is not stored, and read as the fill value.
+    pub(crate) content: Option<Bytes>,
+}
+
+impl Encoder {
+    pub(crate) fn new(description: &Description) -> Result<Self, CubeError> {
+        Ok(Self {
+            definition: arrays::values(description, 1)?,
+            grid: description.grid,
+            layout: Layout::of(&description.grid),
+        })
+    }
+
+    /// Rows and columns of all objects of a frame.
+    pub(crate) fn indices(&self) -> Vec<[u32; 2]> {
+        let [rows, cols] = self.layout.objects(&self.grid);
+        (0..rows)
+            .flat_map(|row| (0..cols).map(move |col| [row, col]))
+            .collect()
+    }
+
+    /// Encodes one object of a frame of `values`, `[row, col]`.
+    pub(crate) fn encode(
+        &self,
+        values: &[f32],
+        index: [u32; 2],
+    ) -> Result<EncodedObject, CubeError> {
+        let [rows, cols] = self.layout.object.map(|cells| cells as usize);
+        let (grid_rows, grid_cols) = (self.grid.rows as usize, self.grid.cols as usize);
+        let (row, col) = (index[0] as usize * rows, index[1] as usize * cols);
+        let width = cols.min(grid_cols - col);
+        let mut cells = vec![f32::NAN; rows * cols];
+        for (to, from) in cells.chunks_exact_mut(cols).zip(row..grid_rows) {
+            let from = &values[from * grid_cols + col..][..width];
+            for (to, value) in to.iter_mut().zip(from) {
+                // "No data" is one bit pattern, the fill value's.
+                *to = if value.is_nan() { f32::NAN } else { *value };
+            }
+        }
+        if cells.iter().all(|value| value.is_nan()) {
+            return Ok(EncodedObject {
+                index,
+                content: None,
+            });
+        }
+        let failed = |e: String| CubeError::library(&arrays::name(&self.definition), "encoding", e);
+        let array = &self.definition;
+        let bytes = cells.into_array_bytes(array.data_type());
+        let bytes = bytes.map_err(|e| failed(e.to_string()))?;
+        let shape = array.chunk_shape(&[0, 0, 0]);
+        let shape = shape.map_err(|e| failed(e.to_string()))?;
+        let encoded = array.codecs().encode(
+            bytes,
+            &shape,
+            array.data_type(),
+            array.fill_value(),
+            &CodecOptions::default(),
+        );
+        let encoded = encoded.map_err(|e| failed(e.to_string()))?;
+        Ok(EncodedObject {
+            index,
+            content: Some(Bytes::from(encoded.into_owned())),
+        })
+    }
+}
+
+/// Reads chunks of one grid.
+pub(crate) struct Decoder {
+    definition: Definition,
+    codecs: CodecChain,
+    shape: Vec<NonZeroU64>,
+}
+
+impl Decoder {
+    pub(crate) fn new(description: &Description) -> Result<Self, CubeError> {
+        let chunk = Layout::of(&description.grid).chunk;
+        let side = |cells: u32| NonZeroU64::new(cells.into()).unwrap_or(NonZeroU64::MIN);
+        Ok(Self {
+            definition: arrays::values(description, 1)?,
+            codecs: arrays::chunk_codecs(),
+            shape: vec![NonZeroU64::MIN, side(chunk[0]), side(chunk[1])],
+        })
+    }
+
+    /// Values of a whole chunk, `[row, col]`. Its checksum is compared with its bytes before anything else: the library
+    /// does not do that where it decodes a part of a chunk.
+    pub(crate) fn decode(&self, content: Vec<u8>) -> Result<Vec<f32>, String> {
+        let array = &self.definition;
+        let options = CodecOptions::default().with_validate_checksums(true);
+        let decoded = self.codecs.decode(
+            Cow::Owned(content),
+            &self.shape,
+            array.data_type(),
+            array.fill_value(),
+            &options,
+        );
+        let shape: Vec<u64> = self.shape.iter().map(|side| side.get()).collect();
+        let decoded = decoded.map_err(|e| e.to_string())?.into_owned();
+        Vec::<f32>::from_array_bytes(decoded, &shape, array.data_type()).map_err(|e| e.to_string())
+    }
+}

@@ -1,0 +1,107 @@
+//! How a frame is cut: into chunks that are read and checked each by itself, and where there are many, shards of chunks
+//! that are an object each.
+
+use contract::chunk::Window;
+use contract::grid::Grid;
+
+/// Longest side of a chunk, cells: 1 MiB of values at most.
+const CHUNK_SIDE: u32 = 512;
+/// Above so many chunks a frame's objects hold several each.
+const MOST_OBJECTS: u32 = 64;
+/// Chunks along each side of a shard: 64 MiB of values at most.
+const SHARD_SIDE: u32 = 8;
+
+/// How the frames of a grid are cut.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Layout {
+    /// Rows and columns of a chunk, cells.
+    pub chunk: [u32; 2],
+    /// Rows and columns of an object, cells: a chunk's, or many times that.
+    pub object: [u32; 2],
+}
+
+impl Layout {
+    /// The layout of a grid: a small one is one chunk; others are cut evenly, so that little of the last ones is empty.
+    pub fn of(grid: &Grid) -> Self {
+        if grid.cell_count() <= (CHUNK_SIDE * CHUNK_SIDE) as usize {
+            let whole = [grid.rows, grid.cols];
+            return Self {
+                chunk: whole,
+                object: whole,
+            };
+        }
+        let chunk = [grid.rows, grid.cols].map(|cells| cells.div_ceil(cells.div_ceil(CHUNK_SIDE)));
+        let chunks = grid.rows.div_ceil(chunk[0]) * grid.cols.div_ceil(chunk[1]);
+        let object = if chunks > MOST_OBJECTS {
+            chunk.map(|cells| cells * SHARD_SIDE)
+        } else {
+            chunk
+        };
+        Self { chunk, object }
+    }
+
+    /// Is an object more than one chunk?
+    pub fn is_sharded(&self) -> bool {
+        self.object != self.chunk
+    }
+
+    /// Objects of a frame of a grid: rows and columns of them.
+    pub fn objects(&self, grid: &Grid) -> [u32; 2] {
+        [
+            grid.rows.div_ceil(self.object[0]),
+            grid.cols.div_ceil(self.object[1]),
+        ]
+    }
+
+    /// Chunks that a window of cells touches, by row and column of chunks.
+    pub(crate) fn chunks_of(&self, window: Window) -> impl Iterator<Item = [u32; 2]> + use<> {
+        let [rows, cols] = self.chunk;
+        let along = |from: u32, count: u32, side: u32| from / side..(from + count).div_ceil(side);
+        let columns = along(window.col, window.cols, cols);
+        along(window.row, window.rows, rows)
+            .flat_map(move |row| columns.clone().map(move |col| [row, col]))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn grid(rows: u32, cols: u32) -> Grid {
+        Grid {
+            rows,
+            cols,
+            north_deg: 90.0,
+            west_deg: -180.0,
+            dlat_deg: 180.0 / f64::from(rows),
+            dlon_deg: 360.0 / f64::from(cols),
+        }
+    }
+
+    #[test]
+    fn small_grids_are_whole_and_large_ones_are_cut_evenly() {
+        let of = |rows, cols| Layout::of(&grid(rows, cols));
+        assert_eq!(of(180, 360).chunk, [180, 360]);
+        assert_eq!(of(720, 1440).chunk, [360, 480]);
+        assert!(!of(720, 1440).is_sharded());
+        let large = of(18_000, 36_000);
+        assert_eq!((large.chunk, large.object), ([500, 508], [4000, 4064]));
+        assert_eq!(large.objects(&grid(18_000, 36_000)), [5, 9]);
+    }
+
+    #[test]
+    fn a_window_touches_the_chunks_that_hold_its_cells() {
+        let layout = Layout {
+            chunk: [10, 20],
+            object: [10, 20],
+        };
+        let window = Window {
+            row: 9,
+            col: 20,
+            rows: 2,
+            cols: 20,
+        };
+        let touched: Vec<_> = layout.chunks_of(window).collect();
+        assert_eq!(touched, [[0, 1], [1, 1]]);
+    }
+}

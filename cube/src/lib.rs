@@ -1,0 +1,28 @@
+//! A product as a cube of time, latitude and longitude: Zarr v3 by the CF conventions, in an Icechunk repository whose
+//! versions are whole or not there, or as plain Zarr for those who want files.
+//!
+//! What is written opens in xarray with right values, times and places and nothing else. Values come back bit for bit, or
+//! as an error that names the array and the chunk. Left out on purpose: what the values mean (contract), how objects are
+//! kept (storage), and what is done with them (the services).
+
+mod arrays;
+mod axis;
+mod cf;
+mod description;
+mod edit;
+mod error;
+mod frame;
+mod layout;
+mod object_storage;
+mod plain;
+mod reader;
+mod repository;
+
+pub use axis::Step;
+pub use description::Description;
+pub use edit::{Committed, Edit};
+pub use error::CubeError;
+pub use layout::Layout;
+pub use plain::PlainZarr;
+pub use reader::Cube;
+pub use repository::{At, Repository};

@@ -1,0 +1,321 @@
+//! A cube as plain Zarr v3 in a folder of a store: written once, with the metadata of all arrays in that of the group.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use async_trait::async_trait;
+use bytes::Bytes;
+use contract::key::ObjectKey;
+use contract::time::Period;
+use futures::stream::{self, StreamExt as _, TryStreamExt as _};
+use serde_json::{Value, json};
+use storage::Store;
+use zarrs::array::ArrayBytes;
+use zarrs::group::{Group, GroupBuilder};
+use zarrs::storage::{
+    AsyncWritableStorageTraits, OffsetBytesIterator, StorageError, StoreKey, StorePrefix,
+};
+
+use crate::arrays::{self, Fixed};
+use crate::frame::{EncodedObject, Encoder};
+use crate::{CubeError, Description, Step, axis};
+
+/// Objects of a frame that are encoded and sent at a time.
+pub(crate) const OBJECTS_AT_ONCE: usize = 4;
+
+/// Writes the group, the values' array without steps, the coordinates of space, and an empty time.
+pub(crate) async fn write_frame_of_reference<S>(
+    store: &Arc<S>,
+    description: &Description,
+) -> Result<(), CubeError>
+where
+    S: AsyncWritableStorageTraits + 'static,
+{
+    let group = group(store, description)?;
+    let stored = group.async_store_metadata().await;
+    stored.map_err(|e| CubeError::library("the group", "writing", e))?;
+    for fixed in arrays::fixed(description)? {
+        let (definition, bytes) = match fixed {
+            Fixed::Floats(definition, numbers) => {
+                let bytes = numbers.iter().flat_map(|it| it.to_ne_bytes()).collect();
+                (definition, bytes)
+            }
+            Fixed::Number(definition, number) => (definition, number.to_ne_bytes().to_vec()),
+        };
+        let array = definition.with_storage(Arc::clone(store));
+        let failed = |e: String| CubeError::library(&arrays::name(&array), "writing", e);
+        let stored = array.async_store_metadata().await;
+        stored.map_err(|e| failed(e.to_string()))?;
+        let index = vec![0; array.dimensionality()];
+        let bytes: Vec<u8> = bytes;
+        let stored = array.async_store_chunk(&index, ArrayBytes::new_flen(bytes));
+        stored.await.map_err(|e| failed(e.to_string()))?;
+    }
+    write_length(store, description, 0).await?;
+    axis::write(store, description, &[], 0).await
+}
+
+/// Writes of how many steps the values are.
+pub(crate) async fn write_length<S>(
+    store: &Arc<S>,
+    description: &Description,
+    steps: usize,
+) -> Result<(), CubeError>
+where
+    S: AsyncWritableStorageTraits + 'static,
+{
+    let values = arrays::values(description, steps as u64)?;
+    let array = values.with_storage(Arc::clone(store));
+    let stored = array.async_store_metadata().await;
+    stored.map_err(|e| CubeError::library(&arrays::name(&array), "writing", e))
+}
+
+fn group<S>(store: &Arc<S>, description: &Description) -> Result<Group<S>, CubeError> {
+    let mut builder = GroupBuilder::new();
+    builder.attributes(description.attributes());
+    let built = builder.build(Arc::clone(store), "/");
+    built.map_err(|e| CubeError::library("the group", "defining it", e))
+}
+
+/// Plain Zarr as it is being written.
+pub struct PlainZarr {
+    folder: Arc<Folder>,
+    description: Description,
+    encoder: Arc<Encoder>,
+    steps: Vec<Step>,
+}
+
+impl PlainZarr {
+    /// Begins in a folder of a store; `""` is the whole store. Without [`PlainZarr::finish`] it cannot be opened.
+    ///
+    /// # Errors
+    /// `Exists` if the folder is not empty.
+    pub async fn create(
+        store: &Store,
+        folder: &str,
+        description: &Description,
+    ) -> Result<Self, CubeError> {
+        if !store.list(folder).await?.is_empty() {
+            return Err(CubeError::Exists {
+                place: format!("{}{folder}", store.url()),
+            });
+        }
+        Ok(Self {
+            folder: Arc::new(Folder {
+                store: store.clone(),
+                name: folder.trim_matches('/').to_owned(),
+            }),
+            description: description.clone(),
+            encoder: Arc::new(Encoder::new(description)?),
+            steps: vec![],
+        })
+    }
+
+    /// Writes the next step: `values` of its frame, `[row, col]`, stored unit, NaN no data.
+    ///
+    /// # Errors
+    /// `Overlap` if it does not come after the last one.
+    pub async fn append(&mut self, period: Period, values: Arc<[f32]>) -> Result<Step, CubeError> {
+        if let Some(last) = self.steps.last()
+            && period.start < last.period.end
+        {
+            return Err(CubeError::Overlap {
+                step: period,
+                there: last.period,
+            });
+        }
+        let grid = self.description.grid;
+        check_length(&values, grid.cell_count())?;
+        let at = self.steps.len() as u64;
+        let values_array = arrays::values(&self.description, at + 1)?;
+        let sent: Vec<_> = encoded(&self.encoder, &values)
+            .map(|object| {
+                let (folder, array) = (&self.folder, &values_array);
+                async move {
+                    let EncodedObject { index, content } = object?;
+                    let Some(content) = content else {
+                        return Ok(());
+                    };
+                    let [row, col] = index.map(u64::from);
+                    let key = array.chunk_key(&[at, row, col]);
+                    let set = folder.set(&key, content).await;
+                    set.map_err(|e| CubeError::library(key.as_str(), "writing", e))
+                }
+            })
+            .buffer_unordered(OBJECTS_AT_ONCE)
+            .try_collect()
+            .await?;
+        drop::<Vec<()>>(sent);
+        let step = Step {
+            period,
+            values_sha256: storage::frames::digest_of(&grid, &values, period),
+        };
+        self.steps.push(step);
+        Ok(step)
+    }
+
+    /// Writes coordinates and metadata, the group's last: now it can be opened.
+    pub async fn finish(self) -> Result<(), CubeError> {
+        let (folder, description) = (&self.folder, &self.description);
+        let held = Arc::new(Held {
+            folder: Arc::clone(folder),
+            metadata: std::sync::Mutex::default(),
+        });
+        write_frame_of_reference(&held, description).await?;
+        write_length(&held, description, self.steps.len()).await?;
+        axis::write(&held, description, &self.steps, 0).await?;
+        let arrays = held.take();
+        for (name, metadata) in &arrays {
+            folder.set_metadata(name, metadata).await?;
+        }
+        let mut metadata = serde_json::to_value(group(folder, description)?.metadata())
+            .map_err(|e| CubeError::library("the group", "describing it", e))?;
+        metadata["consolidated_metadata"] =
+            json!({ "kind": "inline", "must_understand": false, "metadata": arrays });
+        folder.set_metadata("", &metadata).await
+    }
+}
+
+pub(crate) fn check_length(values: &[f32], expected: usize) -> Result<(), CubeError> {
+    if values.len() == expected {
+        return Ok(());
+    }
+    Err(CubeError::Shape {
+        expected,
+        found: values.len(),
+    })
+}
+
+/// The objects of a frame, encoded on other threads a few at a time.
+pub(crate) fn encoded(
+    encoder: &Arc<Encoder>,
+    values: &Arc<[f32]>,
+) -> impl stream::Stream<Item = Result<EncodedObject, CubeError>> + use<> {
+    let (encoder, values) = (Arc::clone(encoder), Arc::clone(values));
+    stream::iter(encoder.indices())
+        .map(move |index| {
+            let (encoder, values) = (Arc::clone(&encoder), Arc::clone(&values));
+            async move {
+                let encoded = tokio::task::spawn_blocking(move || encoder.encode(&values, index));
+                encoded
+                    .await
+                    .map_err(|e| CubeError::library("a thread", "encoding", e))?
+            }
+        })
+        .buffered(OBJECTS_AT_ONCE)
+}
+
+/// A folder of a store, to write Zarr into.
+struct Folder {
+    store: Store,
+    name: String,
+}
+
+impl Folder {
+    async fn set_named(&self, name: &str, content: Bytes) -> Result<(), String> {
+        let text = match self.name.as_str() {
+            "" => name.to_owned(),
+            folder => format!("{folder}/{name}"),
+        };
+        let key: ObjectKey = text
+            .parse()
+            .map_err(|e: contract::ContractError| e.to_string())?;
+        let put = self.store.put_new(&key, content).await;
+        put.map(|_new| ()).map_err(|e| e.to_string())
+    }
+}
+
+impl Folder {
+    /// Writes the metadata of an array, or of the group, whose name is empty.
+    async fn set_metadata(&self, name: &str, metadata: &Value) -> Result<(), CubeError> {
+        let key = match name {
+            "" => "zarr.json".to_owned(),
+            name => format!("{name}/zarr.json"),
+        };
+        let set = self.set_named(&key, metadata.to_string().into()).await;
+        set.map_err(|e| CubeError::library(&key, "writing", e))
+    }
+}
+
+#[async_trait]
+impl AsyncWritableStorageTraits for Folder {
+    async fn set(&self, key: &StoreKey, value: Bytes) -> Result<(), StorageError> {
+        let set = self.set_named(key.as_str(), value).await;
+        set.map_err(StorageError::Other)
+    }
+
+    async fn set_partial_many<'a>(
+        &'a self,
+        _key: &StoreKey,
+        _offset_values: OffsetBytesIterator<'a>,
+    ) -> Result<(), StorageError> {
+        Err(StorageError::Unsupported(
+            "objects are written whole".to_owned(),
+        ))
+    }
+
+    async fn erase(&self, _key: &StoreKey) -> Result<(), StorageError> {
+        // An object without data is not stored, and nothing is written twice.
+        Ok(())
+    }
+
+    async fn erase_prefix(&self, _prefix: &StorePrefix) -> Result<(), StorageError> {
+        Err(StorageError::Unsupported("nothing is removed".to_owned()))
+    }
+
+    fn supports_set_partial(&self) -> bool {
+        false
+    }
+}
+
+/// The same folder, but metadata is held back until it is all known.
+struct Held {
+    folder: Arc<Folder>,
+    /// Of arrays by their names, as the library wrote it: it would shorten what it has read (a codec without settings to its
+    /// name), which zarr-python does not understand.
+    metadata: std::sync::Mutex<BTreeMap<String, Value>>,
+}
+
+impl Held {
+    fn take(&self) -> BTreeMap<String, Value> {
+        let metadata = self.metadata.lock();
+        std::mem::take(&mut *metadata.unwrap_or_else(std::sync::PoisonError::into_inner))
+    }
+}
+
+#[async_trait]
+impl AsyncWritableStorageTraits for Held {
+    async fn set(&self, key: &StoreKey, value: Bytes) -> Result<(), StorageError> {
+        let Some(name) = key.as_str().strip_suffix("zarr.json") else {
+            return self.folder.set(key, value).await;
+        };
+        let node =
+            serde_json::from_slice(&value).map_err(|e| StorageError::Other(e.to_string()))?;
+        let metadata = self.metadata.lock();
+        let mut metadata = metadata.unwrap_or_else(std::sync::PoisonError::into_inner);
+        if !name.is_empty() {
+            metadata.insert(name.trim_end_matches('/').to_owned(), node);
+        }
+        Ok(())
+    }
+
+    async fn set_partial_many<'a>(
+        &'a self,
+        key: &StoreKey,
+        offset_values: OffsetBytesIterator<'a>,
+    ) -> Result<(), StorageError> {
+        self.folder.set_partial_many(key, offset_values).await
+    }
+
+    async fn erase(&self, key: &StoreKey) -> Result<(), StorageError> {
+        self.folder.erase(key).await
+    }
+
+    async fn erase_prefix(&self, prefix: &StorePrefix) -> Result<(), StorageError> {
+        self.folder.erase_prefix(prefix).await
+    }
+
+    fn supports_set_partial(&self) -> bool {
+        false
+    }
+}

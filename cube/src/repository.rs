@@ -1,0 +1,194 @@
+//! A product's repository: made, opened, its versions.
+
+use std::sync::Arc;
+
+use icechunk::RepositoryConfig;
+use icechunk::config::{
+    ManifestConfig, ManifestSplitCondition, ManifestSplitDim, ManifestSplitDimCondition,
+    ManifestSplittingConfig,
+};
+use icechunk::format::SnapshotId;
+use icechunk::format::format_constants::SpecVersionBin;
+use icechunk::repository::{RepositoryErrorKind, VersionInfo};
+use storage::Store;
+use tokio::sync::RwLock;
+use zarrs_icechunk::AsyncIcechunkStore;
+
+use crate::object_storage::ObjectStorage;
+use crate::{Cube, CubeError, Description, Layout, plain};
+
+/// The branch that commits go to.
+pub(crate) const BRANCH: &str = "main";
+/// References of chunks in one manifest: what a commit writes again of those that are there, 40 bytes each.
+const MANIFEST_CHUNKS: u32 = 1024;
+
+/// The repository of one product.
+pub struct Repository {
+    pub(crate) inner: icechunk::Repository,
+    pub(crate) description: Description,
+    /// For messages.
+    pub(crate) place: String,
+}
+
+/// Which state of a cube to read.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum At {
+    /// What was committed last.
+    Newest,
+    /// What was tagged with this name.
+    Version(String),
+}
+
+impl Repository {
+    /// Makes a repository without steps in a folder of a store; `""` is the whole store.
+    ///
+    /// # Errors
+    /// `Exists` if the folder is not empty.
+    pub async fn create(
+        store: &Store,
+        folder: &str,
+        description: &Description,
+    ) -> Result<Self, CubeError> {
+        let storage = ObjectStorage::new(store.clone(), folder);
+        let place = storage.to_string();
+        let made = icechunk::Repository::create(Arc::new(storage))
+            .config(config(description))
+            .spec_version(SpecVersionBin::V2)
+            .execute();
+        let inner = made.await.map_err(|e| match e.kind {
+            RepositoryErrorKind::ParentDirectoryNotClean => CubeError::Exists {
+                place: place.clone(),
+            },
+            _ => CubeError::library(&place, "making a repository", e),
+        })?;
+        let repository = Self {
+            inner,
+            description: description.clone(),
+            place,
+        };
+        let session = repository.session().await?;
+        let arrays = Arc::new(AsyncIcechunkStore::from(Arc::clone(&session)));
+        plain::write_frame_of_reference(&arrays, description).await?;
+        let mut session = session.write().await;
+        let made = session.commit("an empty cube").execute().await;
+        made.map_err(|e| repository.failed("committing an empty cube", &e))?;
+        Ok(repository)
+    }
+
+    /// Opens the repository in a folder of a store.
+    ///
+    /// # Errors
+    /// `Missing` if there is none, `Foreign` if it is not of a product.
+    pub async fn open(store: &Store, folder: &str) -> Result<Self, CubeError> {
+        let storage = ObjectStorage::new(store.clone(), folder);
+        let place = storage.to_string();
+        let opened = icechunk::Repository::open(Arc::new(storage)).execute();
+        let inner = opened.await.map_err(|e| match e.kind {
+            RepositoryErrorKind::RepositoryDoesntExist => CubeError::Missing {
+                place: place.clone(),
+            },
+            _ => CubeError::library(&place, "opening the repository", e),
+        })?;
+        let version = VersionInfo::BranchTipRef(BRANCH.to_owned());
+        let session = inner.readonly_session(&version).await;
+        let session =
+            session.map_err(|e| CubeError::library(&place, "reading the newest state", e))?;
+        let arrays = Arc::new(AsyncIcechunkStore::new(session));
+        let description = Description::of_group(&arrays, &place).await?;
+        Ok(Self {
+            inner,
+            description,
+            place,
+        })
+    }
+
+    /// What it is of.
+    pub fn description(&self) -> &Description {
+        &self.description
+    }
+
+    /// Where it is, for people.
+    pub fn place(&self) -> &str {
+        &self.place
+    }
+
+    /// Opens a state to read.
+    ///
+    /// # Errors
+    /// `NoVersion` with the versions there are.
+    pub async fn at(&self, at: &At) -> Result<Cube, CubeError> {
+        let version = match at {
+            At::Newest => VersionInfo::BranchTipRef(BRANCH.to_owned()),
+            At::Version(tag) => VersionInfo::TagRef(tag.clone()),
+        };
+        let session = match (self.inner.readonly_session(&version).await, at) {
+            (Ok(session), _) => session,
+            (Err(error), At::Newest) => {
+                return Err(self.failed("reading the newest state", &error));
+            }
+            (Err(error), At::Version(version)) => {
+                let there = self.versions().await?;
+                if there.contains(version) {
+                    return Err(self.failed("reading a version", &error));
+                }
+                return Err(CubeError::NoVersion {
+                    place: self.place.clone(),
+                    version: version.clone(),
+                    there: if there.is_empty() {
+                        "none".to_owned()
+                    } else {
+                        there.join(", ")
+                    },
+                });
+            }
+        };
+        Cube::open(session, &self.place).await
+    }
+
+    /// Names a state for good: what cites it is answered the same ever after.
+    pub async fn tag(&self, version: &str, snapshot: &str) -> Result<(), CubeError> {
+        let id = SnapshotId::try_from(snapshot)
+            .map_err(|e| CubeError::library(&self.place, "naming a version", e))?;
+        let tagged = self.inner.create_tag(version, &id).await;
+        tagged.map_err(|e| self.failed("naming a version", &e))
+    }
+
+    /// Names of versions, sorted.
+    pub async fn versions(&self) -> Result<Vec<String>, CubeError> {
+        let tags = self.inner.list_tags().await;
+        let tags = tags.map_err(|e| self.failed("listing versions", &e))?;
+        Ok(tags.into_iter().collect())
+    }
+
+    /// A session that changes the newest state.
+    pub(crate) async fn session(
+        &self,
+    ) -> Result<Arc<RwLock<icechunk::session::Session>>, CubeError> {
+        let session = self.inner.writable_session(BRANCH).await;
+        let session = session.map_err(|e| self.failed("beginning a change", &e))?;
+        Ok(Arc::new(RwLock::new(session)))
+    }
+
+    pub(crate) fn failed(&self, doing: &'static str, error: &dyn std::fmt::Display) -> CubeError {
+        CubeError::library(&self.place, doing, error)
+    }
+}
+
+/// Manifests end at so many steps: a commit writes the last one again, however many steps there are.
+fn config(description: &Description) -> RepositoryConfig {
+    let [rows, cols] = Layout::of(&description.grid).objects(&description.grid);
+    let split = ManifestSplitDim {
+        condition: ManifestSplitDimCondition::DimensionName("^time$".to_owned()),
+        num_chunks: (MANIFEST_CHUNKS / (rows * cols)).max(1),
+    };
+    let splitting = ManifestSplittingConfig {
+        split_sizes: Some(vec![(ManifestSplitCondition::AnyArray, vec![split])]),
+    };
+    RepositoryConfig {
+        manifest: Some(ManifestConfig {
+            splitting: Some(splitting),
+            ..ManifestConfig::default()
+        }),
+        ..RepositoryConfig::default()
+    }
+}

@@ -1,0 +1,9 @@
+//! Cubes as their users meet them: written, read, changed by two, damaged.
+
+#![expect(clippy::unwrap_used, reason = "a test ends where it cannot go on")]
+
+mod damage;
+mod plain;
+mod product;
+mod rivals;
+mod round_trip;

@@ -1,0 +1,116 @@
+//! Words of `fluxglobe export`.
+
+use std::str::FromStr;
+
+use clap::{Args, ValueEnum};
+use contract::product::ProductId;
+
+/// `fluxglobe export`.
+#[derive(Debug, Args)]
+#[command(after_long_help = "\
+Examples:
+  fluxglobe export takahashi09-flux --to zarr flux.zarr
+  fluxglobe export takahashi09-flux@3 --to icechunk s3://BUCKET/takahashi09-flux
+
+Then, in Python:
+  import xarray
+  xarray.open_zarr(\"flux.zarr\").carbon_flux.sel(time=\"2000-07\").plot()
+
+docs/open-data.md shows more.")]
+pub(crate) struct Export {
+    /// Product, and which of its versions: NAME, NAME@12 or NAME@12-0a1b2c3d. The newest version if none is given.
+    #[arg(value_name = "PRODUCT[@VERSION]")]
+    pub(crate) product: ExportedProduct,
+    /// What to write: plain Zarr version 3, which is files, or an Icechunk repository, which keeps versions and is never
+    /// seen half written.
+    #[arg(long, value_enum)]
+    pub(crate) to: ExportFormat,
+    /// A folder that is empty or not there yet, or such a place in a bucket: `s3://BUCKET/PREFIX`, `gs://`, `az://`,
+    /// `hdfs://HOST:PORT/PATH`.
+    #[arg(value_name = "DEST")]
+    pub(crate) destination: String,
+    /// What was written as JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// What an export is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ExportFormat {
+    /// Zarr version 3, metadata consolidated.
+    Zarr,
+    /// Icechunk, format 2.
+    Icechunk,
+}
+
+impl ExportFormat {
+    /// The word of the command line.
+    pub(crate) fn as_str(self) -> &'static str {
+        match self {
+            Self::Zarr => "zarr",
+            Self::Icechunk => "icechunk",
+        }
+    }
+}
+
+/// A product, and perhaps one of its versions.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct ExportedProduct {
+    pub(crate) product: ProductId,
+    /// The number of a version.
+    pub(crate) number: Option<u64>,
+    /// The digest that the version must have, eight digits, if one was given.
+    pub(crate) digest: Option<String>,
+}
+
+impl FromStr for ExportedProduct {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (product, version) = match text.split_once('@') {
+            Some((product, version)) => (product, Some(version)),
+            None => (text, None),
+        };
+        let product = product.parse().map_err(|e| format!("{e}"))?;
+        let Some(version) = version else {
+            return Ok(Self {
+                product,
+                number: None,
+                digest: None,
+            });
+        };
+        let (number, digest) = match version.split_once('-') {
+            Some((number, digest)) => (number, Some(digest.to_owned())),
+            None => (version, None),
+        };
+        let number = number.parse().map_err(|_not_a_number| {
+            format!("{version:?} is no version: give NAME@12 or NAME@12-0a1b2c3d")
+        })?;
+        Ok(Self {
+            product,
+            number: Some(number),
+            digest,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_version_is_a_number_with_or_without_its_digest() {
+        let parse = |text: &str| text.parse::<ExportedProduct>();
+        let of = |number, digest: Option<&str>| ExportedProduct {
+            product: "p".parse().unwrap(),
+            number,
+            digest: digest.map(str::to_owned),
+        };
+        assert_eq!(parse("p"), Ok(of(None, None)));
+        assert_eq!(parse("p@12"), Ok(of(Some(12), None)));
+        assert_eq!(parse("p@12-0a1b2c3d"), Ok(of(Some(12), Some("0a1b2c3d"))));
+        for wrong in ["P", "p@", "p@x", "@1", "p@-1"] {
+            assert!(parse(wrong).is_err(), "{wrong}");
+        }
+    }
+}

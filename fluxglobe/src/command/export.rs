@@ -1,0 +1,173 @@
+//! `fluxglobe export`: a version of a product in, a cube in a folder or bucket out that others' programs open.
+
+use std::sync::Arc;
+
+use anyhow::{Context as _, Result, bail};
+use contract::key::ObjectKey;
+use contract::manifest::Manifest;
+use contract::time::Period;
+use cube::{Description, Edit, PlainZarr, Repository};
+use futures::stream::{self, StreamExt as _, TryStreamExt as _};
+use indicatif::ProgressBar;
+use serde::Serialize;
+use storage::Store;
+
+use crate::cli::{Export, ExportFormat, ExportedProduct, Settings};
+use crate::{deployment, progress};
+
+/// Frames that are read while one is written.
+const FRAMES_AHEAD: usize = 2;
+
+/// What was written.
+#[derive(Serialize)]
+struct Exported {
+    version: String,
+    format: &'static str,
+    destination: String,
+    /// Of the Icechunk repository: the name of the version in it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    tag: Option<String>,
+    steps: usize,
+    rows: u32,
+    cols: u32,
+}
+
+pub(crate) async fn run(settings: &Settings, options: &Export) -> Result<()> {
+    let store = deployment::store(settings)?;
+    let manifest = version(&store, &options.product, settings).await?;
+    let destination = destination(&options.destination)?;
+    let bar = progress::bar("export", manifest.steps.len() as u64);
+    let description = Description::of(&manifest);
+    let tag = match options.to {
+        ExportFormat::Zarr => {
+            let mut zarr = PlainZarr::create(&destination, "", &description).await?;
+            let mut frames = std::pin::pin!(frames(&store, &manifest, &bar));
+            while let Some((period, values)) = frames.try_next().await? {
+                zarr.append(period, values).await?;
+                bar.inc(1);
+            }
+            zarr.finish().await?;
+            None
+        }
+        ExportFormat::Icechunk => {
+            let repository = Repository::create(&destination, "", &description).await?;
+            let mut edit = Edit::begin(&repository).await?;
+            let mut frames = std::pin::pin!(frames(&store, &manifest, &bar));
+            while let Some((period, values)) = frames.try_next().await? {
+                edit.put(period, values).await?;
+                bar.inc(1);
+            }
+            let committed = edit.commit(&format!("export of {}", manifest.id())).await?;
+            let tag = manifest.number.to_string();
+            if let Some(snapshot) = &committed.snapshot {
+                repository.tag(&tag, snapshot).await?;
+            }
+            committed.snapshot.map(|_named| tag)
+        }
+    };
+    let exported = Exported {
+        version: manifest.id().to_string(),
+        format: options.to.as_str(),
+        destination: destination.url().to_owned(),
+        tag,
+        steps: manifest.steps.len(),
+        rows: manifest.grid.rows,
+        cols: manifest.grid.cols,
+    };
+    progress::done(&bar, &summary(&exported));
+    if options.json {
+        progress::result(&serde_json::to_string_pretty(&exported)?)?;
+    } else {
+        progress::result(&exported.destination)?;
+    }
+    Ok(())
+}
+
+fn summary(exported: &Exported) -> String {
+    format!(
+        "{}: {} steps of {} x {} cells as {} in {}",
+        exported.version,
+        exported.steps,
+        exported.rows,
+        exported.cols,
+        exported.format,
+        exported.destination
+    )
+}
+
+/// The version that was asked for.
+async fn version(store: &Store, asked: &ExportedProduct, settings: &Settings) -> Result<Manifest> {
+    let ExportedProduct {
+        product,
+        number,
+        digest,
+    } = asked;
+    let newest = deployment::manifest(store, product, &settings.data).await?;
+    let Some(number) = *number else {
+        return Ok(newest);
+    };
+    let Some(manifest) = storage::manifests::numbered(store, product, number).await? else {
+        bail!(
+            "{product} has no version {number} (any more); its newest is {}",
+            newest.id()
+        );
+    };
+    let id = manifest.id().to_string();
+    if let Some(digest) = digest
+        && !id.ends_with(&format!("-{digest}"))
+    {
+        bail!("version {number} of {product} is {id}, not {product}@{number}-{digest}");
+    }
+    Ok(manifest)
+}
+
+/// Opens the place to write to, and makes sure that it is empty.
+fn destination(text: &str) -> Result<Store> {
+    let is_url = text.contains("://");
+    if !is_url
+        && let Ok(mut there) = std::fs::read_dir(text)
+        && there.next().is_some()
+    {
+        bail!("{text} is not empty: give another folder, or remove it");
+    }
+    if !is_url && std::path::Path::new(text).is_file() {
+        bail!("{text} is a file: give a folder");
+    }
+    Store::open(text).with_context(|| format!("cannot write to {text}"))
+}
+
+/// Frames in the order of time, a few read ahead.
+fn frames<'a>(
+    store: &'a Store,
+    manifest: &'a Manifest,
+    bar: &'a ProgressBar,
+) -> impl stream::Stream<Item = Result<(Period, Arc<[f32]>)>> + 'a {
+    let read = move |key: &'a ObjectKey, period: Period| async move {
+        bar.set_message(progress::day(period.start));
+        let values = storage::frames::read(store, key, &manifest.grid).await?;
+        Ok((period, Arc::from(values)))
+    };
+    stream::iter(&manifest.steps)
+        .map(move |step| read(&step.frame, step.period))
+        .buffered(FRAMES_AHEAD)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_destination_that_holds_something_is_refused_and_an_empty_one_taken() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("new");
+        let text = path.to_str().unwrap();
+        destination(text).unwrap();
+        destination(text).unwrap();
+        std::fs::write(path.join("a"), "x").unwrap();
+        let refused = destination(text).unwrap_err().to_string();
+        assert!(refused.contains("not empty"), "{refused}");
+        let file = path.join("a");
+        let refused = destination(file.to_str().unwrap()).unwrap_err().to_string();
+        assert!(refused.contains("is a file"), "{refused}");
+    }
+}

@@ -1,0 +1,107 @@
+//! The exchange in a folder of this machine: under a lock of the object's folder, which the system gives back when its
+//! holder ends, however it ends. The file gets its name by a rename, so that readers need no lock.
+
+use std::fs::{self, File, TryLockError};
+use std::io::{self, ErrorKind};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use bytes::Bytes;
+use contract::key::ObjectKey;
+
+use super::Seen;
+use crate::store::folder;
+
+/// Between two looks at a lock that another process holds; an exchange takes milliseconds.
+const PAUSE: Duration = Duration::from_millis(2);
+
+/// See [`super::Store::swap`].
+pub(super) async fn swap(
+    root: PathBuf,
+    key: ObjectKey,
+    seen: Option<&Seen>,
+    content: Bytes,
+    patience: Duration,
+) -> Result<Option<Seen>, object_store::Error> {
+    let seen = seen.cloned();
+    blocking(key.clone(), move || {
+        let path = root.join(key.as_str());
+        let _lock = lock(&path, patience)?;
+        if held(&path)? != seen {
+            return Ok(None);
+        }
+        folder::replace_now(&root, &path, &content)?;
+        Ok(Some(Seen::of_digest(&content)))
+    })
+    .await
+}
+
+/// A second name for what an object holds. No bytes are copied: an exchange gives the first name to another file.
+pub(super) async fn link(
+    root: PathBuf,
+    from: ObjectKey,
+    seen: &Seen,
+    to: ObjectKey,
+) -> Result<bool, object_store::Error> {
+    let seen = seen.clone();
+    blocking(to.clone(), move || {
+        let path = root.join(to.as_str());
+        fs::create_dir_all(path.parent().ok_or(ErrorKind::InvalidInput)?)?;
+        match fs::hard_link(root.join(from.as_str()), &path) {
+            Err(e) if e.kind() != ErrorKind::AlreadyExists => return Err(e),
+            _linked_now_or_before => {}
+        }
+        // Of the two names this one is nobody else's: what it stands for does not change any more.
+        if held(&path)? == Some(seen) {
+            return Ok(true);
+        }
+        fs::remove_file(&path)?;
+        Ok(false)
+    })
+    .await
+}
+
+fn held(path: &Path) -> io::Result<Option<Seen>> {
+    match fs::read(path) {
+        Ok(content) => Ok(Some(Seen::of_digest(&content))),
+        Err(e) if e.kind() == ErrorKind::NotFound => Ok(None),
+        Err(e) => Err(e),
+    }
+}
+
+/// Locks the folder of an object until the answer is dropped.
+fn lock(path: &Path, patience: Duration) -> io::Result<File> {
+    let folder = path.parent().ok_or(ErrorKind::InvalidInput)?;
+    fs::create_dir_all(folder)?;
+    let file = File::open(folder)?;
+    let start = Instant::now();
+    loop {
+        match file.try_lock() {
+            Ok(()) => return Ok(file),
+            Err(TryLockError::WouldBlock) if start.elapsed() < patience => {
+                std::thread::sleep(PAUSE);
+            }
+            Err(TryLockError::WouldBlock) => {
+                return Err(io::Error::new(
+                    ErrorKind::TimedOut,
+                    format!(
+                        "another process has held the lock of {} for {} s",
+                        folder.display(),
+                        patience.as_secs()
+                    ),
+                ));
+            }
+            Err(TryLockError::Error(e)) => return Err(e),
+        }
+    }
+}
+
+async fn blocking<T: Send + 'static>(
+    key: ObjectKey,
+    work: impl FnOnce() -> io::Result<T> + Send + 'static,
+) -> Result<T, object_store::Error> {
+    match tokio::task::spawn_blocking(work).await {
+        Ok(done) => done.map_err(|e| folder::failed(&key, e)),
+        Err(e) => Err(e.into()),
+    }
+}

@@ -1,0 +1,94 @@
+//! Products that were exported, opened by others: xarray finds the values, times and places of the files they came from.
+
+use std::path::Path;
+use std::process::Command;
+
+use harness::program;
+use serde_json::Value;
+
+use crate::end_to_end::demo_data;
+
+/// What xarray finds in an exported product: what it compared, or what it found otherwise.
+fn compared(cube: &Path) -> Result<Value, String> {
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/reference/exported_cube.py");
+    let run = Command::new(test_data::python())
+        .arg(script)
+        .arg(cube)
+        .arg(test_data::fluxengine("takahashi09"))
+        .output()
+        .unwrap();
+    if run.status.success() {
+        Ok(serde_json::from_slice(&run.stdout).unwrap())
+    } else {
+        Err(String::from_utf8_lossy(&run.stderr).into_owned())
+    }
+}
+
+#[test]
+fn xarray_finds_the_values_times_and_places_of_the_source_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let cube = folder.path().join("flux.zarr");
+    let words = ["export", "takahashi09-flux", "--to", "zarr", "--json"];
+    let told = program::json(
+        demo_data(),
+        &[&words[..], &[cube.to_str().unwrap()]].concat(),
+    );
+    let told = told.unwrap();
+    assert_eq!((&told["steps"], &told["rows"]), (&12.into(), &180.into()));
+    let found = compared(&cube).unwrap();
+    assert_eq!(found["steps"], 12);
+    assert!(found["values"].as_u64().unwrap() > 400_000, "{found}");
+
+    // The comparison sees one step in the place of another.
+    let chunk = |step: u32| cube.join(format!("carbon_flux/c/{step}/0/0"));
+    std::fs::copy(chunk(3), chunk(4)).unwrap();
+    let error = compared(&cube).unwrap_err();
+    assert!(
+        error.contains("other values") || error.contains("other cells"),
+        "{error}"
+    );
+    // And a bit that flipped is an error of the library, by its checksum, and no value.
+    let mut flipped = std::fs::read(chunk(3)).unwrap();
+    let middle = flipped.len() / 2;
+    flipped[middle] ^= 1;
+    std::fs::write(chunk(3), flipped).unwrap();
+    let error = compared(&cube).unwrap_err();
+    assert!(error.to_lowercase().contains("checksum"), "{error}");
+}
+
+#[test]
+fn an_export_is_a_repository_of_that_version_and_never_replaces_anything() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = folder.path().join("flux");
+    let text = place.to_str().unwrap();
+    let asked = "takahashi09-flux@1";
+    let told = program::json(
+        demo_data(),
+        &["export", asked, "--to", "icechunk", text, "--json"],
+    );
+    assert_eq!(told.unwrap()["tag"], "1");
+    assert!(place.join("repo").is_file());
+    for to in ["icechunk", "zarr"] {
+        let again = program::run(demo_data(), &["export", asked, "--to", to, text]).unwrap();
+        let talk = String::from_utf8_lossy(&again.stderr).into_owned();
+        assert!(
+            !again.status.success() && talk.contains("not empty"),
+            "{talk}"
+        );
+    }
+    let other = folder.path().join("other");
+    for (asked, words) in [
+        ("takahashi09-flux@999", "no version 999"),
+        ("nothing", "there is no product nothing"),
+        (
+            "takahashi09-flux@1-00000000",
+            "not takahashi09-flux@1-00000000",
+        ),
+    ] {
+        let words_of = ["export", asked, "--to", "zarr", other.to_str().unwrap()];
+        let refused = program::run(demo_data(), &words_of).unwrap();
+        let talk = String::from_utf8_lossy(&refused.stderr).into_owned();
+        assert!(!refused.status.success() && talk.contains(words), "{talk}");
+        assert!(!other.exists(), "{asked} left something");
+    }
+}

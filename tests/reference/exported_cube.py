@@ -1,0 +1,86 @@
+#!/usr/bin/env python3
+"""Opens an exported product with xarray and compares it with the files that it was landed from, exactly.
+
+    exported_cube.py CUBE FOLDER    CUBE is plain Zarr, or a folder with an Icechunk repository where the package `icechunk`
+                                    is there to read it; FOLDER holds the twelve files of Takahashi et al. (2009) that
+                                    come with the FluxEngine package
+
+Shares nothing with Fluxglobe: what a cell, a month and a unit are is said here once more, as the files' README has it.
+Values must be equal to the last bit of 32, times and places to the last digit. Prints JSON: how much was compared.
+"""
+
+import json
+import sys
+from pathlib import Path
+
+import netCDF4
+import numpy as np
+import xarray as xr
+
+KG_PER_G = 1e-3
+
+
+def opened(cube):
+    if (Path(cube) / "zarr.json").exists():
+        # What the group's metadata say of all arrays is all that is read.
+        return xr.open_zarr(cube, consolidated=True)
+    import icechunk
+
+    repository = icechunk.Repository.open(icechunk.local_filesystem_storage(cube))
+    return xr.open_zarr(repository.readonly_session("main").store, consolidated=False)
+
+
+def source(file):
+    """Flux of a file, g C m-2 a month, north to south, and the northern and western edges of its cells."""
+    with netCDF4.Dataset(file) as data:
+        data.set_auto_maskandscale(False)
+        variable = data["CO2flux"]
+        grams = np.squeeze(variable[:]).astype(np.float64)
+        grams[grams == np.float64(variable.getncattr("_FillValue"))] = np.nan
+        grams[grams == -999.0] = np.nan
+        # Whole degrees, some of them with the noise of 32 bits.
+        north, west = (np.rint(data[name][:].astype(np.float64)) for name in ("latitude", "longitude"))
+        assert np.abs(north - data["latitude"][:]).max() < 1e-5 and np.abs(west - data["longitude"][:]).max() < 1e-5
+    rows, cols = np.argsort(-north), np.argsort((west + 180) % 360)
+    return grams[np.ix_(rows, cols)], north[rows], np.sort((west + 180) % 360 - 180)
+
+
+def main(cube, folder):
+    data = opened(cube)
+    flux = data["carbon_flux"]
+    files = sorted(Path(folder).glob("*.nc"))
+    assert len(files) == 12 and flux.sizes["time"] == 12, (len(files), flux.sizes)
+    assert flux.dims == ("time", "lat", "lon"), flux.dims
+    assert flux.attrs["units"] == "kg m-2 s-1", flux.attrs
+    assert flux.attrs["cell_methods"] == "area: mean time: mean", flux.attrs
+    assert data["crs"].attrs["grid_mapping_name"] == "latitude_longitude"
+    compared = 0
+    for month, file in enumerate(files, start=1):
+        start = np.datetime64(f"2000-{month:02}-01", "ms")
+        end = np.datetime64(f"2000-{month + 1:02}-01" if month < 12 else "2001-01-01", "ms")
+        step = data.isel(time=month - 1)
+        bounds = step["time_bnds"].values
+        assert bounds[0] == start and bounds[1] == end, (file, bounds)
+        assert step["time"].values == start + (end - start) / 2, (file, step["time"].values)
+        grams, north, west = source(file)
+        seconds = (end - start) / np.timedelta64(1, "s")
+        expected = (grams * (KG_PER_G / seconds)).astype(np.float32)
+        found = step["carbon_flux"].values
+        assert found.dtype == np.float32
+        assert np.array_equal(np.isnan(found), np.isnan(expected)), f"{file}: other cells have data"
+        valid = ~np.isnan(expected)
+        off = np.flatnonzero(found[valid].view(np.int32) != expected[valid].view(np.int32))
+        assert off.size == 0, f"{file}: {off.size} other values"
+        compared += int(valid.sum())
+    assert np.array_equal(data["lat"].values, north - 0.5), data["lat"].values
+    assert np.array_equal(data["lon"].values, west + 0.5), data["lon"].values
+    assert np.array_equal(data["lat_bnds"].values, np.stack([north, north - 1], axis=1))
+    assert np.array_equal(data["lon_bnds"].values, np.stack([west, west + 1], axis=1))
+    # Chosen by names alone.
+    one = flux.sel(time="2000-07", lat=0.5, lon=-150.5, method=None).values
+    assert one.size == 1 and np.isfinite(one).all(), one
+    print(json.dumps({"steps": len(files), "values": compared}))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
