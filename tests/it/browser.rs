@@ -4,6 +4,7 @@ use std::ffi::OsStr;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::{Mutex, PoisonError};
 
 use harness::program;
 use harness::server::Server;
@@ -108,23 +109,35 @@ fn example_pages_of_map_libraries_play_a_year_and_ask_for_nothing_twice() {
     );
 }
 
+/// Installs what a browser test imports, once for all tests of this process: one that came second would find the first
+/// packages, take them for all of them, and start while the rest is still written.
+fn install_packages(folder: &Path) {
+    static INSTALLING: Mutex<()> = Mutex::new(());
+    let _one_at_a_time = INSTALLING.lock().unwrap_or_else(PoisonError::into_inner);
+    // What is there may be of before a package was added.
+    let is_there = |package| {
+        let package = folder.join("node_modules").join(package);
+        package.join("package.json").exists()
+    };
+    if PACKAGES.into_iter().all(is_there) {
+        return;
+    }
+    let install = Command::new("npm")
+        .args(["install", "--no-save", "--no-audit", "--no-fund"])
+        .current_dir(folder)
+        .output()
+        .unwrap();
+    assert!(
+        install.status.success(),
+        "{}",
+        String::from_utf8_lossy(&install.stderr)
+    );
+}
+
 /// Runs a file of tests in a browser, with the packages it needs.
 fn run(file: &str, variables: &[(&str, &OsStr)]) {
     let folder = Path::new(BROWSER);
-    // What is there may be of before a package was added.
-    let is_there = |package| folder.join("node_modules").join(package).exists();
-    if !PACKAGES.into_iter().all(is_there) {
-        let install = Command::new("npm")
-            .args(["install", "--no-save", "--no-audit", "--no-fund"])
-            .current_dir(folder)
-            .output()
-            .unwrap();
-        assert!(
-            install.status.success(),
-            "{}",
-            String::from_utf8_lossy(&install.stderr)
-        );
-    }
+    install_packages(folder);
     let output = Command::new("node")
         .args(["--test", file])
         .current_dir(folder)
