@@ -17,6 +17,7 @@ use crate::pyramid;
 use crate::scene::Scene;
 use crate::stages::fill::{self, Filled, Form};
 use crate::stages::layout::{LIGHT_GIVEN, LIGHT_OWN};
+use crate::stages::map::plain;
 use crate::timings::{self, Step};
 
 /// Draws pictures.
@@ -136,6 +137,7 @@ impl Renderer {
         }
         let coarser = pyramid::suited(job, scene);
         match device_slot::home(&self.devices, frames_of(scene)) {
+            Some(device) if device.gpu().spares_kernels() && plain::may_suit(job) => Ok(()),
             Some(device) => device.prepare(coarser.as_ref().unwrap_or(scene)),
             None => Ok(()),
         }
@@ -172,6 +174,16 @@ impl Renderer {
             let drawn = self.render_while(&alone, vector, is_wanted)?;
             plan.lay_trails(&drawn);
         }
+        let [width, height] = plan.size_px();
+        let is_on_processor = device.is_none_or(|device| device.gpu().spares_kernels());
+        if is_on_processor && plain::suits(&plan) {
+            let rgba8 = timings::timed(Step::Device, || plain::draw(&plan, scene));
+            return Ok(Image {
+                width,
+                height,
+                rgba8,
+            });
+        }
         let parts = plan.parts();
         let light = match &device {
             // Parts of one picture lie in one light.
@@ -182,7 +194,6 @@ impl Renderer {
             }
             _ => None,
         };
-        let [width, height] = plan.size_px();
         let draw = |part: Part| match &device {
             _ if !is_wanted() => Err(RenderError::NotWanted),
             None => frame_cpu::draw(&plan, part, scene),

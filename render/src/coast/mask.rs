@@ -22,7 +22,7 @@ impl Pen {
     };
 
     /// Farthest from a line that a pixel's centre is touched by it.
-    fn reach_px(self) -> f64 {
+    pub fn reach_px(self) -> f64 {
         self.half_width_px + 0.5
     }
 }

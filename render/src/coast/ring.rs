@@ -1,5 +1,6 @@
 //! Outlines of land and of lakes on the sphere, and borders: unpacked once.
 
+use std::ops::Range;
 use std::sync::LazyLock;
 
 use contract::land::LAND;
@@ -12,6 +13,8 @@ const INLAND: &[u8] = include_bytes!("inland.bin");
 /// Edges of the map that outlines are cut along, degrees: its sides, and what leads to the south pole.
 const SIDE_DEG: f64 = 180.0;
 const POLE_DEG: f64 = -89.0;
+/// Edges of a run: longer ones are looked at more seldom, shorter ones are more often not seen.
+const RUN_EDGES: usize = 64;
 
 /// A closed outline.
 #[derive(Debug)]
@@ -24,6 +27,42 @@ pub struct Ring {
     pub sign: i32,
     /// All of it lies round here.
     pub cap: Cap,
+    /// All of its edges, in order.
+    pub runs: Vec<Run>,
+}
+
+/// Edges that follow one another and lie near one another: one look tells of most whether any of them is seen.
+#[derive(Debug)]
+pub struct Run {
+    /// Numbers of the edges, which are those of the corners that they begin at.
+    pub edges: Range<usize>,
+    /// All of them lie in a ball round this place; it need not be on the sphere.
+    pub center: DVec3,
+    /// Radius of the ball, earth radii.
+    pub radius: f64,
+}
+
+impl Run {
+    /// All edges of a line, closed or not, in runs of so many.
+    fn all(corners: &[DVec3], is_closed: bool, length: usize) -> Vec<Self> {
+        let edges = if is_closed {
+            corners.len()
+        } else {
+            corners.len().saturating_sub(1)
+        };
+        let run = |first: usize| {
+            let edges = first..(first + length).min(edges);
+            let own = || (edges.start..=edges.end).map(|at| corners[at % corners.len()]);
+            let center = own().sum::<DVec3>() / (edges.len() + 1) as f64;
+            let radius = own().map(|corner| corner.distance(center));
+            Self {
+                radius: radius.fold(0.0, f64::max),
+                center,
+                edges,
+            }
+        };
+        (0..edges).step_by(length).map(run).collect()
+    }
 }
 
 /// A part of the sphere round a place.
@@ -39,6 +78,8 @@ pub struct Cap {
 pub struct Border {
     pub corners: Vec<DVec3>,
     pub cap: Cap,
+    /// All of its edges, in order.
+    pub runs: Vec<Run>,
 }
 
 /// Land, its interior on the left.
@@ -63,7 +104,8 @@ pub static BORDERS: LazyLock<Vec<Border>> = LazyLock::new(|| {
     let lines = lines.into_iter().map(|places| {
         let corners: Vec<_> = places.into_iter().map(normal).collect();
         let cap = Cap::round(&corners);
-        Border { corners, cap }
+        let runs = Run::all(&corners, false, RUN_EDGES);
+        Border { corners, cap, runs }
     });
     lines.collect()
 });
@@ -110,6 +152,19 @@ fn angle(a: DVec3, b: DVec3) -> f64 {
 }
 
 impl Ring {
+    /// Where a run of its edges begins and ends.
+    pub fn ends(&self, run: &Run) -> [DVec3; 2] {
+        [run.edges.start, run.edges.end].map(|at| self.corners[at % self.corners.len()])
+    }
+
+    /// The edges of a run, each with its ends.
+    pub fn edges(&self, run: &Run) -> impl Iterator<Item = (DVec3, DVec3)> {
+        let [_, last] = self.ends(run);
+        let own = &self.corners[run.edges.clone()];
+        let ends = own.iter().skip(1).copied().chain([last]);
+        own.iter().copied().zip(ends)
+    }
+
     fn of(places: &[[f64; 2]]) -> Self {
         let ends = places.iter().zip(places.iter().cycle().skip(1));
         let is_cut = |a: &[f64; 2], b: &[f64; 2]| {
@@ -121,7 +176,34 @@ impl Ring {
             is_shore: ends.map(|(a, b)| !is_cut(a, b)).collect(),
             sign: if area(places) < 0.0 { -1 } else { 1 },
             cap: Cap::round(&corners),
+            runs: Run::all(&corners, true, RUN_EDGES),
             corners,
+        }
+    }
+}
+
+#[cfg(test)]
+impl Ring {
+    /// The same with every edge a run, so that each is looked at by itself.
+    pub(crate) fn in_single_edges(&self) -> Self {
+        Self {
+            corners: self.corners.clone(),
+            is_shore: self.is_shore.clone(),
+            sign: self.sign,
+            cap: self.cap,
+            runs: Run::all(&self.corners, true, 1),
+        }
+    }
+}
+
+#[cfg(test)]
+impl Border {
+    /// The same with every edge a run.
+    pub(crate) fn in_single_edges(&self) -> Self {
+        Self {
+            corners: self.corners.clone(),
+            cap: self.cap,
+            runs: Run::all(&self.corners, false, 1),
         }
     }
 }
@@ -141,6 +223,23 @@ mod tests {
             assert_eq!(ring.corners.len(), ring.is_shore.len());
             let farthest = ring.corners.iter().map(|corner| ring.cap.angle_to(*corner));
             assert!(farthest.fold(0.0, f64::max) <= ring.cap.radius + 1e-12);
+        }
+    }
+
+    #[test]
+    fn runs_hold_every_edge_once() {
+        let rings = LAND_RINGS.iter().chain(LAKE_RINGS.iter());
+        let closed = rings.map(|ring| (&ring.corners, &ring.runs, ring.corners.len()));
+        let open = BORDERS.iter();
+        let open = open.map(|line| (&line.corners, &line.runs, line.corners.len() - 1));
+        for (corners, runs, edges) in closed.chain(open) {
+            let numbers = runs.iter().flat_map(|run| run.edges.clone());
+            assert!(numbers.eq(0..edges));
+            for run in runs {
+                let own = (run.edges.start..=run.edges.end).map(|at| corners[at % corners.len()]);
+                let farthest = own.map(|corner| corner.distance(run.center));
+                assert!(farthest.fold(0.0, f64::max) <= run.radius + 1e-12);
+            }
         }
     }
 

@@ -150,6 +150,12 @@ impl Gpu {
         self.is_software() && self.checks == Checks::Trusted
     }
 
+    /// Is what needs no kernels left to plain code? On a processor both have the same cores, and plain code need not ask at
+    /// every pixel what a whole row shares; kernels on trial are run.
+    pub fn spares_kernels(&self) -> bool {
+        self.is_software() && self.checks == Checks::Trusted
+    }
+
     /// Bytes of memory that are the device's own; none where that is the computer's, or where nobody says.
     pub fn own_bytes(&self) -> Option<u64> {
         self.adapter.own_bytes()

@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::camera::Camera;
-use crate::coast::ring::{BORDERS, Cap, LAKE_RINGS, LAND_RINGS, Ring};
+use crate::coast::ring::{BORDERS, Border, Cap, LAKE_RINGS, LAND_RINGS, Ring, Run};
 use crate::coast::{Cover, Mask, Pen};
 
 /// Rows of a mask that are made as one, in memory that stays near a core; so few that cores end together.
@@ -30,6 +30,11 @@ const BEYOND_RAD: f64 = 0.05;
 /// Longest step of that, radians: straight lines between them pass the globe.
 const STEP_RAD: f64 = 0.35;
 
+/// Runs of an outline that one core goes along at once.
+const RUNS_AT_ONCE: usize = 16;
+/// What is farther outside the picture than this is not seen, nor is any of a line there, pixels.
+const ASIDE_PX: f64 = 4.0;
+
 /// How far outside corners behind a camera in the globe are led round the picture, half diagonals.
 const OUTSIDE: f64 = 4.0;
 
@@ -48,58 +53,163 @@ pub(super) fn mask(
     camera: &Camera,
     size_px: [u32; 2],
     wanted: Wanted,
-    mut words: Vec<u32>,
+    words: Vec<u32>,
 ) -> Vec<u32> {
-    let sight = &Sight::new(camera, size_px);
-    let (areas, lines) = rayon::join(
-        || {
-            if wanted.land {
-                let (land, lakes) = rayon::join(
-                    || sight.outlines(&LAND_RINGS),
-                    || sight.outlines(&LAKE_RINGS),
-                );
-                vec![(land, 0), (lakes, 8)]
-            } else {
-                vec![]
-            }
-        },
-        || {
-            let (shores, borders) = rayon::join(
-                || wanted.coasts.then(|| (sight.shores(), 16)),
-                || wanted.borders.then(|| (sight.borders(), 24)),
-            );
-            [shores, borders]
-        },
-    );
-    let [width, height] = size_px.map(|px| px as usize);
-    words.resize(width * height, 0);
-    let bands = words.par_chunks_mut(BAND_PX * width).enumerate();
-    bands.for_each(|(number, words)| {
-        words.fill(0);
-        let first_row = (number * BAND_PX) as u32;
-        let size_px = [size_px[0], (words.len() / width) as u32];
-        SUMS.with_borrow_mut(|sums| {
-            for (outlines, shift) in &areas {
-                let mut cover = Cover::within(std::mem::take(sums), first_row, size_px);
-                for covered in outlines {
-                    cover.add_everywhere(covered.everywhere);
-                    for [a, b] in &covered.edges {
+    let all = Ground {
+        land: &LAND_RINGS,
+        lakes: &LAKE_RINGS,
+        borders: &BORDERS,
+    };
+    all.mask(camera, size_px, wanted, words)
+}
+
+/// What is on the ground.
+struct Ground<'a> {
+    land: &'a [Ring],
+    lakes: &'a [Ring],
+    borders: &'a [Border],
+}
+
+impl Ground<'_> {
+    fn mask(
+        &self,
+        camera: &Camera,
+        size_px: [u32; 2],
+        wanted: Wanted,
+        mut words: Vec<u32>,
+    ) -> Vec<u32> {
+        let sight = &Sight::new(camera, size_px);
+        let outlines = |rings| {
+            wanted
+                .land
+                .then(|| Outlines::of(sight.outlines(rings), size_px[1]))
+        };
+        let lines = |lines: Vec<Line>| ByBand::of(&lines, size_px[1], reached_px);
+        let ((land, lakes), (shores, borders)) = rayon::join(
+            || rayon::join(|| outlines(self.land), || outlines(self.lakes)),
+            || {
+                rayon::join(
+                    || wanted.coasts.then(|| lines(sight.shores(self))),
+                    || wanted.borders.then(|| lines(sight.borders(self.borders))),
+                )
+            },
+        );
+        let areas = [(land, 0), (lakes, 8)];
+        let lines = [(shores, 16), (borders, 24)];
+        let [width, height] = size_px.map(|px| px as usize);
+        words.resize(width * height, 0);
+        let bands = words.par_chunks_mut(BAND_PX * width).enumerate();
+        bands.for_each(|(number, words)| {
+            words.fill(0);
+            let first_row = (number * BAND_PX) as u32;
+            let size_px = [size_px[0], (words.len() / width) as u32];
+            SUMS.with_borrow_mut(|sums| {
+                for (outlines, shift) in &areas {
+                    let Some(outlines) = outlines else {
+                        continue;
+                    };
+                    let mut cover = Cover::within(std::mem::take(sums), first_row, size_px);
+                    cover.add_everywhere(outlines.everywhere);
+                    for [a, b] in outlines.edges.of_band(number) {
                         cover.add_edge(*a, *b);
                     }
+                    cover.write(words, *shift);
+                    *sums = cover.into_memory();
                 }
-                cover.write(words, *shift);
-                *sums = cover.into_memory();
+            });
+            for (lines, shift) in &lines {
+                let lines = lines
+                    .as_ref()
+                    .map_or(&[][..], |lines| lines.of_band(number));
+                if lines.is_empty() {
+                    continue;
+                }
+                let mut mask = Mask::new([0.0, f64::from(first_row)], size_px);
+                for (pen, [a, b]) in lines {
+                    mask.draw(*pen, *a, *b);
+                }
+                mask.write(words, *shift);
             }
         });
-        for (lines, shift) in lines.iter().flatten() {
-            let mut mask = Mask::new([0.0, f64::from(first_row)], size_px);
-            for (pen, [a, b]) in lines {
-                mask.draw(*pen, *a, *b);
-            }
-            mask.write(words, *shift);
+        words
+    }
+}
+
+/// What outlines cover together.
+struct Outlines {
+    /// All of the picture, so many times.
+    everywhere: i32,
+    edges: ByBand<[DVec2; 2]>,
+}
+
+impl Outlines {
+    fn of(covered: Vec<Covered>, height_px: u32) -> Self {
+        let edges: Vec<_> = covered
+            .iter()
+            .flat_map(|one| one.edges.iter().copied())
+            .collect();
+        Self {
+            everywhere: covered.iter().map(|one| one.everywhere).sum(),
+            edges: ByBand::of(&edges, height_px, |[a, b]| [a.y.min(b.y), a.y.max(b.y)]),
         }
-    });
-    words
+    }
+}
+
+/// Rows that a line reaches, pixels.
+fn reached_px((pen, [a, b]): &Line) -> [f64; 2] {
+    let reach_px = pen.reach_px() + 1.0;
+    [a.y.min(b.y) - reach_px, a.y.max(b.y) + reach_px]
+}
+
+/// What is drawn, by the bands of rows that it reaches; in each in the order it was given in, since sums of numbers round.
+struct ByBand<T> {
+    /// For each band the end of its items.
+    ends: Vec<usize>,
+    items: Vec<T>,
+}
+
+impl<T: Copy> ByBand<T> {
+    /// `reached`: the first and the last row that an item reaches, pixels; what is no number reaches none.
+    fn of(given: &[T], height_px: u32, reached: impl Fn(&T) -> [f64; 2]) -> Self {
+        let count = (height_px as usize).div_ceil(BAND_PX);
+        let bands = |item: &T| {
+            let [first, last] = reached(item).map(|row| row / BAND_PX as f64);
+            let is_seen = last >= 0.0 && first < count as f64;
+            let end = if is_seen { last as usize + 1 } else { 0 };
+            (first.max(0.0) as usize)..end.min(count)
+        };
+        // Where the items of each band begin, and then, as they are laid there, end.
+        let mut ends = vec![0; count + 1];
+        for item in given {
+            for band in bands(item) {
+                ends[band + 1] += 1;
+            }
+        }
+        for band in 1..=count {
+            ends[band] += ends[band - 1];
+        }
+        let mut items = match given.first() {
+            Some(any) => vec![*any; ends[count]],
+            None => vec![],
+        };
+        for item in given {
+            for band in bands(item) {
+                items[ends[band]] = *item;
+                ends[band] += 1;
+            }
+        }
+        ends.truncate(count);
+        Self { ends, items }
+    }
+
+    fn of_band(&self, number: usize) -> &[T] {
+        let first = if number == 0 {
+            0
+        } else {
+            self.ends[number - 1]
+        };
+        &self.items[first..self.ends[number]]
+    }
 }
 
 thread_local! {
@@ -139,9 +249,37 @@ fn along<A: Copy + Sync, B: Send>(closed: &[A], each: impl Fn(A, A, &mut Vec<B>)
     parts.into_iter().flatten().collect()
 }
 
+/// Where all edges of a run lie.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Lie {
+    /// Beyond the horizon.
+    Hidden,
+    /// Before the camera and this side of the horizon, on one side of what the picture shows.
+    Aside,
+    /// Some may be seen.
+    Near,
+}
+
+/// A side of what a picture shows: places on or beyond it have a coordinate below 0.
+struct Side {
+    gradient: DVec3,
+    length: f64,
+}
+
+impl Side {
+    fn new(gradient: DVec3) -> Self {
+        Self {
+            length: gradient.length(),
+            gradient,
+        }
+    }
+}
+
 /// The ground from a camera: the globe from outside or, below the sea surface, from inside.
 struct Sight<'a> {
     camera: &'a Camera,
+    /// Left, right, upper and lower edge of the picture and a little beyond, as planes through the camera.
+    sides: [Side; 4],
     middle_px: DVec2,
     /// Towards the camera from the globe's middle.
     up: DVec3,
@@ -161,9 +299,20 @@ impl<'a> Sight<'a> {
         // the circle is convex.
         let outline = FRAC_PI_2 - horizon;
         let angle = BEYOND_RAD.min((FRAC_PI_2 - outline) / 2.0);
+        let middle_px = DVec2::new(f64::from(size_px[0]), f64::from(size_px[1])) / 2.0;
+        let [across, down] = [camera.right, -camera.top].map(|axis| axis * camera.focal_px);
+        let [half_width, half_height] =
+            [middle_px.x, middle_px.y].map(|half| camera.forward * (half + ASIDE_PX));
         Self {
             camera,
-            middle_px: DVec2::new(f64::from(size_px[0]), f64::from(size_px[1])) / 2.0,
+            sides: [
+                half_width + across,
+                half_width - across,
+                half_height + down,
+                half_height - down,
+            ]
+            .map(Side::new),
+            middle_px,
             up: camera.place / distance,
             horizon,
             beyond: angle.tan() * (distance * distance - 1.0).max(0.0).sqrt(),
@@ -181,6 +330,38 @@ impl<'a> Sight<'a> {
 
     fn seen_px(&self, place: DVec3) -> DVec2 {
         self.camera.seen_px(place) + self.middle_px
+    }
+
+    /// Is all of a run on one side of what the picture shows, as far as it is before the camera?
+    fn is_aside(&self, run: &Run) -> bool {
+        let sight = run.center - self.camera.place;
+        let beyond = |side: &Side| sight.dot(side.gradient) + run.radius * side.length < 0.0;
+        self.sides.iter().any(beyond)
+    }
+
+    /// Where a run lies, from outside the globe.
+    fn lie(&self, run: &Run) -> Lie {
+        let above = self.above(run.center);
+        let reach = run.radius * self.camera.place.length();
+        if above < -reach {
+            Lie::Hidden
+        } else if above > reach && self.camera.ahead(run.center) > run.radius && self.is_aside(run)
+        {
+            Lie::Aside
+        } else {
+            Lie::Near
+        }
+    }
+
+    /// May any of a line be seen?
+    fn is_near(&self, run: &Run) -> bool {
+        let is_hidden = self.behind.is_none() && self.lie(run) == Lie::Hidden;
+        !is_hidden && !self.is_aside(run)
+    }
+
+    /// Does it keep so far from the axis through the camera that it is not led round it?
+    fn is_off_axis(&self, run: &Run) -> bool {
+        run.center.reject_from_normalized(self.up).length() > run.radius
     }
 
     /// Is all of it beyond the horizon?
@@ -285,32 +466,60 @@ impl<'a> Sight<'a> {
 
     /// How often an outline goes round that axis, anticlockwise seen from the camera.
     fn turns(&self, ring: &Ring) -> i32 {
-        let ends = ring.corners.iter().zip(ring.corners.iter().cycle().skip(1));
-        let steps = ends.map(|(a, b)| short_way(self.azimuth(*b) - self.azimuth(*a)));
-        (steps.sum::<f64>() / TAU).round() as i32
+        let step = |a, b| short_way(self.azimuth(b) - self.azimuth(a));
+        let turned = |run: &Run| {
+            if self.is_off_axis(run) {
+                let [a, b] = ring.ends(run);
+                return step(a, b);
+            }
+            ring.edges(run).map(|(a, b)| step(a, b)).sum()
+        };
+        (ring.runs.iter().map(turned).sum::<f64>() / TAU).round() as i32
     }
 
     /// An outline as it is seen, hidden parts led round the globe, what lies behind the camera cut off.
     fn outline(&self, ring: &Ring) -> Vec<DVec2> {
-        let path = along(&ring.corners, |a, b, path| {
-            let (from, to) = (self.above(a), self.above(b));
-            let crossing = || a + (b - a) * (from / (from - to));
-            match (from >= 0.0, to >= 0.0) {
-                (true, true) => path.push(b),
-                (true, false) => {
-                    let edge = crossing();
-                    path.push(edge);
-                    self.lead_round(path, edge, b);
+        let part = |runs: &[Run]| {
+            let mut path = vec![];
+            for run in runs {
+                let [first, last] = ring.ends(run);
+                match self.lie(run) {
+                    Lie::Hidden if self.is_off_axis(run) => {
+                        self.lead_round(&mut path, first, last);
+                    }
+                    // The straight way covers the same of the picture: between the two there is nothing of it.
+                    Lie::Aside => path.push(last),
+                    Lie::Hidden | Lie::Near => {
+                        for (a, b) in ring.edges(run) {
+                            self.go_along(&mut path, a, b);
+                        }
+                    }
                 }
-                (false, true) => {
-                    let edge = crossing();
-                    self.lead_round(path, a, edge);
-                    path.extend([edge, b]);
-                }
-                (false, false) => self.lead_round(path, a, b),
             }
-        });
-        self.ahead(&path)
+            path
+        };
+        let parts: Vec<_> = ring.runs.par_chunks(RUNS_AT_ONCE).map(part).collect();
+        self.ahead(&parts.concat())
+    }
+
+    /// Goes on along an edge, as far as it is this side of the horizon, and round the globe for the rest.
+    fn go_along(&self, path: &mut Vec<DVec3>, a: DVec3, b: DVec3) {
+        let (from, to) = (self.above(a), self.above(b));
+        let crossing = || a + (b - a) * (from / (from - to));
+        match (from >= 0.0, to >= 0.0) {
+            (true, true) => path.push(b),
+            (true, false) => {
+                let edge = crossing();
+                path.push(edge);
+                self.lead_round(path, edge, b);
+            }
+            (false, true) => {
+                let edge = crossing();
+                self.lead_round(path, a, edge);
+                path.extend([edge, b]);
+            }
+            (false, false) => self.lead_round(path, a, b),
+        }
     }
 
     /// Goes on round the globe, beyond its outline, from the azimuth of one place to that of another.
@@ -341,27 +550,36 @@ impl<'a> Sight<'a> {
         })
     }
 
-    fn shores(&self) -> Vec<Line> {
+    fn shores(&self, ground: &Ground<'_>) -> Vec<Line> {
         let per_rad = self.camera.focal_px / self.camera.nearest;
-        let rings = |rings: &'static [Ring], pen: Pen| {
+        let rings = |rings: &[Ring], pen: Pen| -> Vec<Line> {
             let seen = rings.par_iter().filter(move |ring| {
                 !self.is_hidden(&ring.cap) && ring.cap.radius * per_rad >= LEAST_OUTLINE_PX
             });
-            seen.flat_map_iter(move |ring| {
-                let ends = ring.corners.iter().zip(ring.corners.iter().cycle().skip(1));
-                let shores = ends.zip(&ring.is_shore).filter(|(_, is_shore)| **is_shore);
-                shores.filter_map(move |((a, b), _)| self.line(pen, [*a, *b]))
-            })
+            let lines = seen.flat_map_iter(|ring| {
+                let runs = ring.runs.iter().filter(|run| self.is_near(run));
+                runs.flat_map(move |run| {
+                    let edges = ring.edges(run).zip(&ring.is_shore[run.edges.clone()]);
+                    let shores = edges.filter(|(_, is_shore)| **is_shore);
+                    shores.filter_map(move |((a, b), _)| self.line(pen, [a, b]))
+                })
+            });
+            lines.collect()
         };
-        let land = rings(&LAND_RINGS, Pen::COAST);
-        land.chain(rings(&LAKE_RINGS, LAKE_PEN)).collect()
+        let (land, lakes) = rayon::join(
+            || rings(ground.land, Pen::COAST),
+            || rings(ground.lakes, LAKE_PEN),
+        );
+        [land, lakes].concat()
     }
 
-    fn borders(&self) -> Vec<Line> {
-        let seen = BORDERS.par_iter();
+    fn borders(&self, borders: &[Border]) -> Vec<Line> {
+        let seen = borders.par_iter();
         let seen = seen.filter(|border| !self.is_hidden(&border.cap));
         let lines = seen.flat_map_iter(|border| {
-            let pairs = border.corners.windows(2);
+            let runs = border.runs.iter().filter(|run| self.is_near(run));
+            let corners = runs.map(|run| &border.corners[run.edges.start..=run.edges.end]);
+            let pairs = corners.flat_map(|corners| corners.windows(2));
             pairs.filter_map(|pair| self.line(BORDER_PEN, [pair[0], pair[1]]))
         });
         lines.collect()
@@ -418,6 +636,81 @@ mod tests {
     use contract::job::View;
 
     use super::*;
+
+    /// Is the middle of a pixel on the globe?
+    fn is_on_globe(camera: &Camera, size_px: [u32; 2], at: usize) -> bool {
+        let place = DVec2::new(
+            (at as u32 % size_px[0]) as f64 + 0.5,
+            (at as u32 / size_px[0]) as f64 + 0.5,
+        );
+        let [east, south] = (place - DVec2::from(size_px.map(f64::from)) / 2.0).to_array();
+        let ray = camera.forward * camera.focal_px + camera.right * east - camera.top * south;
+        let along = camera.place.dot(ray.normalize());
+        along < 0.0 && along * along > camera.place.length_squared() - 1.0
+    }
+
+    #[test]
+    fn where_a_run_lies_decides_as_all_of_its_edges_do() {
+        let single = |rings: &[Ring]| rings.iter().map(Ring::in_single_edges).collect::<Vec<_>>();
+        let (land, lakes) = (single(&LAND_RINGS), single(&LAKE_RINGS));
+        let borders: Vec<_> = BORDERS.iter().map(Border::in_single_edges).collect();
+        let edge_by_edge = Ground {
+            land: &land,
+            lakes: &lakes,
+            borders: &borders,
+        };
+        let wanted = Wanted {
+            land: true,
+            coasts: true,
+            borders: true,
+        };
+        let size_px = [240, 135];
+        // From afar, tilted low over coasts, at the pole, with Jamaica and with Eurasia opposite, and from below the sea.
+        for (lon_deg, lat_deg, height_m, tilt_deg, heading_deg) in [
+            (120.0, -10.0, 2e7, 0.0, 0.0),
+            (-70.0, 20.0, 9e5, 60.0, 90.0),
+            (170.0, 60.0, 3e5, 75.0, 200.0),
+            (5.0, 52.0, 1e5, 70.0, 30.0),
+            (0.0, 89.0, 3e6, 30.0, 10.0),
+            (102.7, -18.1, 2e7, 0.0, 0.0),
+            (-95.0, -50.0, 5e7, 0.0, 0.0),
+            (-30.0, 10.0, -4e5, 60.0, 45.0),
+        ] {
+            let view = View::Globe {
+                lon_deg,
+                lat_deg,
+                height_m,
+                width_px: size_px[0],
+                height_px: size_px[1],
+                angles: CameraAngles {
+                    tilt_deg,
+                    heading_deg,
+                    ..CameraAngles::NADIR
+                },
+            };
+            let camera = Camera::of(&view).unwrap();
+            let by_runs = mask(&camera, size_px, wanted, vec![]);
+            let expected = edge_by_edge.mask(&camera, size_px, wanted, vec![]);
+            // Beside the globe it says nothing: hidden outlines are led round there.
+            let is_seen = |at: &usize| camera.is_below() || is_on_globe(&camera, size_px, *at);
+            let seen: Vec<usize> = (0..expected.len()).filter(is_seen).collect();
+            assert!(
+                seen.iter().any(|at| expected[*at] != 0),
+                "{view:?} has no land"
+            );
+            // Sums of other parts of the same whole round in another way.
+            let share = |word: u32, shift: u32| (word >> shift) & 255;
+            let is_apart = |at: usize| {
+                [0, 8, 16, 24]
+                    .map(|shift| share(by_runs[at], shift).abs_diff(share(expected[at], shift)))
+                    .into_iter()
+                    .max()
+                    > Some(1)
+            };
+            let apart = seen.iter().filter(|at| is_apart(**at)).count();
+            assert_eq!(apart, 0, "{view:?}");
+        }
+    }
 
     #[test]
     fn what_was_in_the_memory_of_a_mask_does_not_show() {

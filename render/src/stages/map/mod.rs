@@ -2,6 +2,7 @@
 
 pub mod cpu;
 pub mod params;
+pub mod plain;
 
 use crate::error::RenderError;
 use crate::frame_context::FrameContext;

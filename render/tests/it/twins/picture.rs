@@ -1,12 +1,13 @@
 //! Thematic maps, composition and their twins.
 
+use contract::colour::Scale;
 use contract::job::Mode;
 use glam::Vec4;
 use render::frame_context::FrameContext;
 use render::gpu::{Gpu, Slot};
 use render::stages::compose::{self, Compose};
 use render::stages::eye::{self, Eye};
-use render::stages::map::{self, Map};
+use render::stages::map::{self, Map, plain};
 
 use super::seeing::eye_image;
 use super::{Twins, bytes, channels, far_apart, prove};
@@ -58,6 +59,56 @@ fn map_matches_its_twin_on_tiles_and_on_the_globe() {
             far_apart(&channels(&drawn), &expected, 0.02)
         });
     }
+}
+
+#[test]
+fn a_tile_drawn_in_one_has_the_bytes_of_its_stages() {
+    let shaped = |view| {
+        Twins::styled(Mode::Map, view, ocean(FIVE_DEGREES), |style| {
+            style.transfer.opacity = "-1e-9:0.9,0:0.1,1e-9:0.7".parse().unwrap();
+        })
+    };
+    let logarithmic = |view| {
+        Twins::styled(Mode::Map, view, ocean(FIVE_DEGREES), |style| {
+            (style.transfer.low, style.transfer.high) = (1e-11, 1e-8);
+            style.transfer.scale = Scale::Log;
+        })
+    };
+    // The whole world, across the date line, a coast, and fewer cells than pixels; of other sizes too.
+    let views = [
+        tile(0, 0, 0, 256),
+        tile(3, 7, 3, 256),
+        tile(2, 0, 1, 512),
+        tile(7, 5, 60, 256),
+    ];
+    for view in views {
+        let plain = Twins::of(Mode::Map, view);
+        for twins in [
+            plain,
+            Twins::joined(Mode::Map, view),
+            shaped(view),
+            logarithmic(view),
+        ] {
+            assert!(plain::suits(&twins.plan));
+            let drawn = plain::draw(&twins.plan, &twins.scene);
+            let expected = twins.image.iter().flat_map(|word| word.to_le_bytes());
+            assert!(drawn.iter().copied().eq(expected), "{view:?}");
+            assert!(
+                drawn.chunks_exact(4).any(|pixel| pixel[3] > 0),
+                "{view:?} is empty"
+            );
+        }
+        // Every other kind of picture needs stages.
+        assert!(plain::may_suit(&job(Mode::Map, view)));
+        let others = [
+            Twins::uncertain(Mode::Map, view).plan,
+            Twins::of(Mode::Points, view).plan,
+        ];
+        assert!(others.iter().all(|plan| !plain::suits(plan)));
+    }
+    assert!(!plain::suits(
+        &Twins::of(Mode::Map, globe(-120.0, 10.0, 1.5e7, 160)).plan
+    ));
 }
 
 #[test]
