@@ -1,6 +1,8 @@
 //! A picture as JPEG in strips: each is encoded for itself, on any core that is free, and they are put together
 //! with restart markers (ITU-T T.81, B.2.1 and E.1.4), after which a decoder begins anew anyway.
 
+use std::borrow::Cow;
+
 use bytes::Bytes;
 use jpeg_encoder::{ColorType, Encoder, EncodingError, SamplingFactor};
 use rayon::prelude::*;
@@ -10,7 +12,7 @@ use super::Image;
 /// Pixels a side of what is encoded as one: 8 of colour, which has half the resolution.
 const UNIT_PX: usize = 16;
 /// Rows of a strip. Fewer cost more bytes, more leave cores without work.
-const STRIP_PX: usize = 4 * UNIT_PX;
+const STRIP_PX: usize = 2 * UNIT_PX;
 
 const MARKER: u8 = 0xff;
 const START_OF_SCAN: u8 = 0xda;
@@ -43,7 +45,7 @@ impl Strip {
         encoder.set_sampling_factor(SamplingFactor::F_2_2);
         // A side that is too long for a JPEG is refused by the encoder.
         let side = |px: usize| u16::try_from(px).unwrap_or(0);
-        encoder.encode(&over_black(rgba8), side(width), side(rows), ColorType::Rgb)?;
+        encoder.encode(&over_black(rgba8), side(width), side(rows), ColorType::Rgba)?;
         let (header_end, scan) = scan_of(&jpeg);
         Ok(Self {
             jpeg,
@@ -53,19 +55,23 @@ impl Strip {
     }
 }
 
-fn over_black(rgba8: &[u8]) -> Vec<u8> {
-    let mut rgb8 = vec![0; rgba8.len() / 4 * 3];
-    let (from, _rest) = rgba8.as_chunks::<4>();
-    let (to, _rest) = rgb8.as_chunks_mut::<3>();
-    for (to, [red, green, blue, alpha]) in to.iter_mut().zip(from) {
-        let part = |colour: u8| {
-            // Divided by 255 and rounded.
-            let product = u32::from(colour) * u32::from(*alpha) + 128;
-            ((product + (product >> 8)) >> 8) as u8
-        };
-        *to = [part(*red), part(*green), part(*blue)];
+/// The colours over black, each pixel in four bytes of which encoders pass over the last.
+fn over_black(rgba8: &[u8]) -> Cow<'_, [u8]> {
+    let (pixels, _rest) = rgba8.as_chunks::<4>();
+    if pixels.iter().all(|pixel| pixel[3] == 255) {
+        return Cow::Borrowed(rgba8);
     }
-    rgb8
+    let mut black = rgba8.to_vec();
+    let (pixels, _rest) = black.as_chunks_mut::<4>();
+    for pixel in pixels {
+        let alpha = u16::from(pixel[3]);
+        for colour in pixel {
+            // Divided by 255 and rounded.
+            let product = u16::from(*colour) * alpha + 128;
+            *colour = ((product + (product >> 8)) >> 8) as u8;
+        }
+    }
+    Cow::Owned(black)
 }
 
 /// Where the segment that begins the scan lies, and where the scan itself.
@@ -152,6 +158,10 @@ mod tests {
                 Some((width as usize, height as usize))
             );
             let black = over_black(&image.rgba8);
+            let black: Vec<u8> = black
+                .chunks_exact(4)
+                .flat_map(|pixel| pixel[..3].to_vec())
+                .collect();
             let apart = rgb8.iter().zip(&black).map(|(a, b)| a.abs_diff(*b));
             let most = apart.clone().max().unwrap();
             let mean = apart.map(f64::from).sum::<f64>() / black.len() as f64;

@@ -115,7 +115,7 @@ impl Pace {
     /// Pictures that are drawn at once: what is drawn side by side on a slow device is only later.
     pub(super) fn at_once(&self) -> usize {
         match self.drawing_s {
-            ..=0.1 => std::env::var("FG_AT").ok().and_then(|v| v.parse().ok()).unwrap_or(MOST_AT_ONCE),
+            ..=0.1 => MOST_AT_ONCE,
             ..=0.4 => 2,
             _ => 1,
         }

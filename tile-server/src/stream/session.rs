@@ -252,7 +252,7 @@ impl Session {
     }
 
     fn is_held_back(&self) -> bool {
-        self.tells_seen && self.unseen.len() >= std::env::var("FG_UN").ok().and_then(|v| v.parse().ok()).unwrap_or(MOST_UNSEEN)
+        self.tells_seen && self.unseen.len() >= MOST_UNSEEN
     }
 
     fn unseen_until(&self) -> Option<At> {

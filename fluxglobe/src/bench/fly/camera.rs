@@ -7,7 +7,7 @@ use anyhow::{Context as _, Result, bail, ensure};
 use futures::{SinkExt as _, StreamExt as _};
 use serde::Deserialize;
 use serde_json::json;
-use tokio_tungstenite::connect_async;
+use tokio_tungstenite::connect_async_with_config;
 use tokio_tungstenite::tungstenite::Message;
 
 use super::path::Path;
@@ -50,7 +50,8 @@ pub(super) async fn fly(
     counted_from: Instant,
     end: Instant,
 ) -> Result<Flight> {
-    let (socket, _answer) = connect_async(address)
+    // Browsers send at once what a page says, however little it is.
+    let (socket, _answer) = connect_async_with_config(address, None, true)
         .await
         .with_context(|| format!("cannot follow {address}"))?;
     let (mut say, mut hear) = socket.split();
