@@ -55,6 +55,8 @@ pub async fn derive_accumulated(
         .filter(|latest| is_up_to_date(latest, &source, &steps))
     {
         progress(of_all(steps.len(), &steps));
+        // Whoever published it may have been killed before the cube followed.
+        cube::keep_up(engine.store(), latest).await;
         return Ok(latest.clone());
     }
     derive(engine, &source, &steps, latest.as_ref(), progress).await
@@ -165,7 +167,7 @@ fn of_all(done_steps: usize, steps: &[SourceStep<'_>]) -> DeriveProgress {
     }
 }
 
-/// Publishes the manifest under the next free number, unless another writer published the same derivation meanwhile, or
+/// Publishes the manifest under the next free number, and brings its cube there, unless another writer published the same derivation meanwhile, or
 /// one of a newer version of the source.
 async fn commit(
     engine: &Engine,
@@ -180,6 +182,7 @@ async fn commit(
         }
         let number = latest.as_ref().map_or(1, |latest| latest.number + 1);
         if let Some(latest) = latest.filter(|latest| is_no_older(latest, source, &derived)) {
+            cube::keep_up(engine.store(), &latest).await;
             return Ok(latest);
         }
         let manifest = Manifest {
@@ -187,7 +190,10 @@ async fn commit(
             ..derived.clone()
         };
         match manifests::commit(engine.store(), &manifest).await {
-            Ok(()) => return Ok(manifest),
+            Ok(()) => {
+                cube::keep_up(engine.store(), &manifest).await;
+                return Ok(manifest);
+            }
             Err(StorageError::Conflict { .. }) if attempt < COMMIT_ATTEMPTS => attempt += 1,
             Err(e) => return Err(e.into()),
         }

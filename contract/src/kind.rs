@@ -22,6 +22,8 @@ pub enum Kind {
     Weights,
     /// Sums over a region, of every step of a version.
     Sums,
+    /// A part of the cube of a product: an Icechunk repository in a folder of the product's name.
+    Cube,
     /// Exact sums that accumulation has come to.
     Accumulating,
     /// Measurements of one dataset and month.
@@ -55,7 +57,7 @@ pub enum Vouched {
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 18] = [
         Self::Raw,
         Self::Frame,
         Self::Contributed,
@@ -64,6 +66,7 @@ impl Kind {
         Self::Manifest,
         Self::Weights,
         Self::Sums,
+        Self::Cube,
         Self::Accumulating,
         Self::Observations,
         Self::ObservationIndex,
@@ -86,6 +89,7 @@ impl Kind {
             Self::Manifest => "manifests",
             Self::Weights => "weights",
             Self::Sums => "sums",
+            Self::Cube => "cubes",
             Self::Accumulating => "accumulating",
             Self::Observations => "observations",
             Self::ObservationIndex => "observation-indexes",
@@ -138,7 +142,8 @@ mod tests {
             Kind::Domain => Some(Kind::Manifest),
             Kind::Manifest => Some(Kind::Weights),
             Kind::Weights => Some(Kind::Sums),
-            Kind::Sums => Some(Kind::Accumulating),
+            Kind::Sums => Some(Kind::Cube),
+            Kind::Cube => Some(Kind::Accumulating),
             Kind::Accumulating => Some(Kind::Observations),
             Kind::Observations => Some(Kind::ObservationIndex),
             Kind::ObservationIndex => Some(Kind::ObservationFile),

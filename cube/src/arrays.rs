@@ -79,6 +79,14 @@ pub(crate) struct Axis {
     pub(crate) digests: Definition,
 }
 
+impl Axis {
+    /// All of them.
+    pub(crate) fn arrays(&self) -> impl Iterator<Item = &Definition> {
+        let start = self.step_start.iter();
+        [&self.time, &self.bounds, &self.digests].into_iter().chain(start)
+    }
+}
+
 /// The arrays along time for a number of steps.
 pub(crate) fn axis(quantity: Quantity, steps: u64) -> Result<Axis, CubeError> {
     let instants = |name: &str, attributes| {

@@ -5,6 +5,8 @@ use std::sync::Arc;
 use contract::digest::Digest;
 use contract::quantity::Quantity;
 use contract::time::{Period, TimeMs};
+use futures::FutureExt as _;
+use futures::stream::{self, StreamExt as _, TryStreamExt as _};
 use zarrs::array::{Array, ElementOwned};
 use zarrs::storage::{AsyncReadableStorageTraits, AsyncWritableStorageTraits};
 
@@ -12,6 +14,8 @@ use crate::arrays::{self, DIGEST_BYTES, Definition};
 use crate::error::first_lines;
 use crate::{CubeError, Description};
 
+/// Chunks that are read at a time.
+const CHUNKS_AT_ONCE: usize = 8;
 /// Most steps that are read: every quarter of an hour of 280 years.
 const MOST_STEPS: u64 = 10_000_000;
 
@@ -179,24 +183,34 @@ where
     }
     let chunk_steps = chunk_steps(definition)? as u64;
     let a_step: u64 = array.shape()[1..].iter().product();
+    let mut chunks = stream::iter(0..steps.div_ceil(chunk_steps))
+        .map(|chunk| read_chunk::<S, T>(&array, chunk).boxed())
+        .buffered(CHUNKS_AT_ONCE);
     let mut all = vec![];
-    // Each chunk as a whole, for then its checksum is compared.
-    for chunk in 0..steps.div_ceil(chunk_steps) {
-        let mut index = vec![0; array.dimensionality()];
-        index[0] = chunk;
-        let damaged = |reason: String| CubeError::Chunk {
-            array: arrays::name(definition),
-            chunk: index.clone(),
-            reason,
-        };
-        let found = array.async_retrieve_chunk_if_exists::<Vec<T>>(&index).await;
-        let mut numbers = found
-            .map_err(|e| damaged(first_lines(&e)))?
-            .ok_or_else(|| damaged("it is not there".to_owned()))?;
-        numbers.truncate(((steps - chunk * chunk_steps) * a_step) as usize);
+    while let Some(mut numbers) = chunks.try_next().await? {
         all.append(&mut numbers);
     }
+    all.truncate((steps * a_step) as usize);
     Ok(all)
+}
+
+/// Reads a chunk along time as a whole, for then its checksum is compared.
+async fn read_chunk<S, T>(array: &Array<S>, chunk: u64) -> Result<Vec<T>, CubeError>
+where
+    S: AsyncReadableStorageTraits + 'static,
+    T: ElementOwned + Send + Sync,
+{
+    let mut index = vec![0; array.dimensionality()];
+    index[0] = chunk;
+    let found = array.async_retrieve_chunk_if_exists::<Vec<T>>(&index).await;
+    let damaged = |reason: String| CubeError::Chunk {
+        array: arrays::name(array),
+        chunk: index.clone(),
+        reason,
+    };
+    found
+        .map_err(|e| damaged(first_lines(&e)))?
+        .ok_or_else(|| damaged("it is not there".to_owned()))
 }
 
 /// Opens an array that must be what it is defined to be.
@@ -219,7 +233,8 @@ where
     Ok(array)
 }
 
-fn chunk_steps(definition: &Definition) -> Result<usize, CubeError> {
+/// Steps in a chunk of an array along time.
+pub(crate) fn chunk_steps(definition: &Definition) -> Result<usize, CubeError> {
     let index = vec![0; definition.dimensionality()];
     let shape = definition.chunk_shape(&index);
     let shape =

@@ -8,20 +8,28 @@
 mod arrays;
 mod axis;
 mod cf;
+pub mod clean_up;
 mod description;
 mod edit;
 mod error;
+mod follow;
 mod frame;
+mod layer;
 mod layout;
 mod object_storage;
 mod plain;
+mod plan;
 mod reader;
 mod repository;
+mod staged;
+mod state;
+pub mod verify;
 
 pub use axis::Step;
 pub use description::Description;
 pub use edit::{Committed, Edit};
 pub use error::CubeError;
+pub use follow::{Followed, Follower, folder, follow, keep_up};
 pub use layout::Layout;
 pub use plain::PlainZarr;
 pub use reader::Cube;

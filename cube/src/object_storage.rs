@@ -1,7 +1,11 @@
 //! Icechunk's objects in our store: one layer of requests, retries and metrics for all that is stored.
 //!
 //! All objects are created once but `repo`, which says what the newest state is; it goes through the store's exchange
-//! ([`storage::Store::swap`]), which two processes cannot both win.
+//! ([`storage::Store::swap`]), which two processes cannot both win. Icechunk asks to keep every `repo` that was replaced;
+//! that is not done: nobody reads them, and they would come to grow with the square of the commits.
+//!
+//! All but chunks are sealed when they are written and compared with their seal when they are read: chunks have checksums,
+//! and what names them would be taken for whole with any bit flipped.
 
 use std::fmt::{Debug, Display, Formatter};
 use std::ops::Range;
@@ -12,6 +16,7 @@ use bytes::Bytes;
 use chrono::{DateTime, Utc};
 use contract::key::ObjectKey;
 use futures::stream::{self, BoxStream, Stream, StreamExt as _, TryStreamExt as _};
+use icechunk::format::snapshot::Snapshot;
 use icechunk::format::{CONFIG_FILE_PATH, REPO_INFO_FILE_PATH};
 use icechunk::storage::{
     DeleteObjectsResult, ETag, Generation, GetModifiedResult, ListInfo, RetriesSettings, Settings,
@@ -22,7 +27,7 @@ use icechunk_storage::sealed::Sealed;
 use object_store::path::Path;
 use object_store::{GetOptions, GetRange, ObjectStoreExt as _};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
-use storage::Store;
+use storage::{Store, sound};
 use storage::store::Seen;
 
 type Pieces = Pin<Box<dyn Stream<Item = Result<Bytes, StorageError>> + Send>>;
@@ -71,17 +76,13 @@ impl ObjectStorage {
     ) -> StorageResult<(Bytes, VersionInfo)> {
         if changes(name) {
             let (content, version) = self.read_changing(name).await?;
-            let part = match range {
-                None => content,
-                Some(range) => {
-                    let end = range.end.min(content.len() as u64);
-                    content.slice(range.start.min(end) as usize..end as usize)
-                }
-            };
-            return Ok((part, version));
+            self.check(name, &content)?;
+            return Ok((part(&content, range), version));
         }
+        // A seal is one of the whole.
+        let is_sealed = sound::cube::sealed(name, &[]).is_some();
         let options = GetOptions {
-            range: range.cloned().map(GetRange::Bounded),
+            range: range.filter(|_| !is_sealed).cloned().map(GetRange::Bounded),
             ..GetOptions::default()
         };
         let path = Path::from(self.path(name));
@@ -92,13 +93,38 @@ impl ObjectStorage {
             generation: found.meta.version.clone().map(Generation),
         };
         let content = found.bytes().await.map_err(answered)?;
+        if is_sealed {
+            self.check(name, &content)?;
+            return Ok((part(&content, range), version));
+        }
         Ok((content, version))
     }
+
+    fn check(&self, name: &str, content: &[u8]) -> StorageResult<()> {
+        match sound::cube::check(name, content) {
+            Ok(_soundness) => Ok(()),
+            Err(reason) => {
+                let error = sound::damage::found(&self.key(name)?, reason);
+                Err(other(&error))
+            }
+        }
+    }
+}
+
+fn part(content: &Bytes, range: Option<&Range<u64>>) -> Bytes {
+    let length = content.len() as u64;
+    let (start, end) = range.map_or((0, length), |it| (it.start, it.end.min(length)));
+    content.slice(start.min(end) as usize..end as usize)
 }
 
 /// Is this the name of an object that is replaced?
 fn changes(name: &str) -> bool {
     name == REPO_INFO_FILE_PATH || name == CONFIG_FILE_PATH
+}
+
+/// Is this the name of a part of the empty state that each repository begins with?
+fn is_initial(name: &str) -> bool {
+    name.ends_with(&Snapshot::INITIAL_SNAPSHOT_ID.to_string())
 }
 
 fn version(seen: Seen) -> VersionInfo {
@@ -214,11 +240,13 @@ impl Storage for ObjectStorage {
         previous_version: Option<&VersionInfo>,
     ) -> StorageResult<VersionedUpdateResult> {
         let key = self.key(path)?;
+        let bytes = sound::cube::sealed(path, &bytes).map_or(bytes, Bytes::from);
         let Some(previous) = previous_version else {
-            self.store
-                .put_new(&key, bytes)
-                .await
-                .map_err(|e| failed(&e))?;
+            match self.store.put_new(&key, bytes).await {
+                // Two that make a repository at once both write its empty state, with a time in it.
+                Err(storage::StorageError::Conflict { .. }) if is_initial(path) => {}
+                put => drop(put.map_err(|e| failed(&e))?),
+            }
             return Ok(VersionedUpdateResult::Updated {
                 new_version: VersionInfo::for_creation(),
             });
@@ -235,22 +263,14 @@ impl Storage for ObjectStorage {
     async fn copy_object(
         &self,
         _ctx: &StorageContext<'_>,
-        from: &str,
-        to: &str,
+        _from: &str,
+        _to: &str,
         _content_type: Option<&str>,
         version: &VersionInfo,
     ) -> StorageResult<VersionedUpdateResult> {
-        let (from, to) = (self.key(from)?, self.key(to)?);
-        let kept = self
-            .store
-            .keep_copy(&from, seen(version).as_ref(), &to)
-            .await;
-        Ok(if kept.map_err(|e| failed(&e))? {
-            VersionedUpdateResult::Updated {
-                new_version: version.clone(),
-            }
-        } else {
-            VersionedUpdateResult::NotOnLatestVersion
+        // Asked for only to keep what is about to be replaced, and the exchange compares what it replaces.
+        Ok(VersionedUpdateResult::Updated {
+            new_version: version.clone(),
         })
     }
 

@@ -31,9 +31,7 @@ pub(crate) async fn write_frame_of_reference<S>(
 where
     S: AsyncWritableStorageTraits + 'static,
 {
-    let group = group(store, description)?;
-    let stored = group.async_store_metadata().await;
-    stored.map_err(|e| CubeError::library("the group", "writing", e))?;
+    write_group(store, description).await?;
     for fixed in arrays::fixed(description)? {
         let (definition, bytes) = match fixed {
             Fixed::Floats(definition, numbers) => {
@@ -53,6 +51,18 @@ where
     }
     write_length(store, description, 0).await?;
     axis::write(store, description, &[], 0).await
+}
+
+/// Writes the group, which says what the arrays are of.
+pub(crate) async fn write_group<S>(
+    store: &Arc<S>,
+    description: &Description,
+) -> Result<(), CubeError>
+where
+    S: AsyncWritableStorageTraits + 'static,
+{
+    let stored = group(store, description)?.async_store_metadata().await;
+    stored.map_err(|e| CubeError::library("the group", "writing", e))
 }
 
 /// Writes of how many steps the values are.

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use contract::chunk::Window;
 use futures::stream::{self, StreamExt as _, TryStreamExt as _};
 use icechunk::session::Session;
+use tokio::sync::RwLock;
 use zarrs::array::{Array, AsyncArrayShardedReadableExt as _, AsyncArrayShardedReadableExtCache};
 use zarrs_icechunk::AsyncIcechunkStore;
 
@@ -135,6 +136,16 @@ impl Cube {
             .buffered(CHUNKS_AT_ONCE)
             .try_collect()
             .await
+    }
+
+    /// What reads its parts.
+    pub(crate) fn session(&self) -> Arc<RwLock<Session>> {
+        self.0.array.storage().session()
+    }
+
+    /// Name of the values' array.
+    pub(crate) fn array_name(&self) -> String {
+        arrays::name(&self.0.array)
     }
 
     /// Values of a whole chunk, `[row, col]`; none where it is not stored, since no cell has data.

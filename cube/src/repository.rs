@@ -22,6 +22,9 @@ pub(crate) const BRANCH: &str = "main";
 /// References of chunks in one manifest: what a commit writes again of those that are there, 40 bytes each.
 const MANIFEST_CHUNKS: u32 = 1024;
 
+/// Changes that `repo` tells of, for people; what came before is not kept.
+const LOGGED_UPDATES: u16 = 100;
+
 /// The repository of one product.
 pub struct Repository {
     pub(crate) inner: icechunk::Repository,
@@ -75,20 +78,66 @@ impl Repository {
         Ok(repository)
     }
 
+    /// Opens the repository in a folder of a store, or makes one, for a change that gives it this description: it may have
+    /// been made by somebody who was killed before it was of anything.
+    pub(crate) async fn for_change(
+        store: &Store,
+        folder: &str,
+        description: &Description,
+    ) -> Result<Self, CubeError> {
+        let inner = match Self::open_inner(store, folder, Some(config(description))).await {
+            Err(CubeError::Missing { place }) => {
+                let storage = ObjectStorage::new(store.clone(), folder);
+                let made = icechunk::Repository::create(Arc::new(storage))
+                    .config(config(description))
+                    .spec_version(SpecVersionBin::V2)
+                    // What somebody left who was killed over this is no reason to stop.
+                    .check_clean_root(false)
+                    .execute();
+                match made.await {
+                    Ok(inner) => inner,
+                    Err(error) => {
+                        // Others made it meanwhile, or it cannot be made.
+                        let there = Self::open_inner(store, folder, Some(config(description)));
+                        there.await.map_err(|_missing| {
+                            CubeError::library(&place, "making a repository", error)
+                        })?
+                    }
+                }
+            }
+            opened => opened?,
+        };
+        Ok(Self {
+            inner,
+            description: description.clone(),
+            place: ObjectStorage::new(store.clone(), folder).to_string(),
+        })
+    }
+
+    async fn open_inner(
+        store: &Store,
+        folder: &str,
+        config: Option<RepositoryConfig>,
+    ) -> Result<icechunk::Repository, CubeError> {
+        let storage = ObjectStorage::new(store.clone(), folder);
+        let place = storage.to_string();
+        let mut opened = icechunk::Repository::open(Arc::new(storage));
+        if let Some(config) = config {
+            opened = opened.config(config);
+        }
+        opened.execute().await.map_err(|e| match e.kind {
+            RepositoryErrorKind::RepositoryDoesntExist => CubeError::Missing { place },
+            _ => CubeError::library(&place, "opening the repository", e),
+        })
+    }
+
     /// Opens the repository in a folder of a store.
     ///
     /// # Errors
     /// `Missing` if there is none, `Foreign` if it is not of a product.
     pub async fn open(store: &Store, folder: &str) -> Result<Self, CubeError> {
-        let storage = ObjectStorage::new(store.clone(), folder);
-        let place = storage.to_string();
-        let opened = icechunk::Repository::open(Arc::new(storage)).execute();
-        let inner = opened.await.map_err(|e| match e.kind {
-            RepositoryErrorKind::RepositoryDoesntExist => CubeError::Missing {
-                place: place.clone(),
-            },
-            _ => CubeError::library(&place, "opening the repository", e),
-        })?;
+        let inner = Self::open_inner(store, folder, None).await?;
+        let place = ObjectStorage::new(store.clone(), folder).to_string();
         let version = VersionInfo::BranchTipRef(BRANCH.to_owned());
         let session = inner.readonly_session(&version).await;
         let session =
@@ -145,12 +194,25 @@ impl Repository {
         Cube::open(session, &self.place).await
     }
 
-    /// Names a state for good: what cites it is answered the same ever after.
+    /// Names a state for good: what cites it is answered the same ever after. Nothing is done if it has that name.
     pub async fn tag(&self, version: &str, snapshot: &str) -> Result<(), CubeError> {
         let id = SnapshotId::try_from(snapshot)
             .map_err(|e| CubeError::library(&self.place, "naming a version", e))?;
-        let tagged = self.inner.create_tag(version, &id).await;
-        tagged.map_err(|e| self.failed("naming a version", &e))
+        let Err(error) = self.inner.create_tag(version, &id).await else {
+            return Ok(());
+        };
+        // Named before, by somebody else.
+        if self.is_tagged(version, snapshot).await {
+            Ok(())
+        } else {
+            Err(self.failed("naming a version", &error))
+        }
+    }
+
+    /// Has a state this name?
+    pub(crate) async fn is_tagged(&self, version: &str, snapshot: &str) -> bool {
+        let there = self.inner.lookup_tag(version).await;
+        there.is_ok_and(|there| there.to_string() == snapshot)
     }
 
     /// Names of versions, sorted.
@@ -189,6 +251,7 @@ fn config(description: &Description) -> RepositoryConfig {
             splitting: Some(splitting),
             ..ManifestConfig::default()
         }),
+        num_updates_per_repo_info_file: Some(LOGGED_UPDATES),
         ..RepositoryConfig::default()
     }
 }

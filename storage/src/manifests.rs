@@ -27,6 +27,18 @@ pub async fn latest(store: &Store, product: &ProductId) -> Result<Option<Manifes
     }
 }
 
+/// Numbers of the manifests that a product has, ascending.
+pub async fn numbers(store: &Store, product: &ProductId) -> Result<Vec<u64>, StorageError> {
+    let keys = store
+        .list(&format!("{}/{product}", Kind::Manifest.folder()))
+        .await?;
+    let number = |key: &ObjectKey| {
+        let name = key.as_str().rsplit('/').next()?;
+        name.strip_suffix(".json")?.parse().ok()
+    };
+    Ok(keys.iter().filter_map(number).collect())
+}
+
 /// The manifest of a product with a number; none if there is none (any more).
 pub async fn numbered(
     store: &Store,

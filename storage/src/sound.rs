@@ -2,9 +2,10 @@
 //!
 //! Input files, domains and observations are named by the digest of their bytes. Frames and series are named by the
 //! digest of their values and hold a seal over their bytes; so do documents, weights and exact sums, whose names say what
-//! they were made from. Pictures hold a check of every part, as PNG has it. Whatever is read whole is checked each time;
+//! they were made from, and what names the parts of a cube; its chunks end in a checksum. Pictures hold a check of every part, as PNG has it. Whatever is read whole is checked each time;
 //! what is read in parts is checked row by row ([`crate::row_check`]).
 
+pub mod cube;
 pub mod damage;
 mod object;
 mod png;
@@ -68,6 +69,9 @@ pub(crate) fn of_bytes(key: &ObjectKey, content: &[u8]) -> Result<Soundness, Sto
         }
         (Vouched::Nothing, Some(Kind::Tile)) => {
             return png::check(content).map_or_else(damaged, |()| Ok(Soundness::Sound));
+        }
+        (Vouched::Nothing, Some(Kind::Cube)) => {
+            return cube::check(cube::name_of(key), content).or_else(damaged);
         }
         (Vouched::Nothing, _) => (Seal::Absent, false),
     };

@@ -24,6 +24,8 @@ pub enum Fault {
     Damaged,
     /// A version names it, and it is not there.
     Missing,
+    /// It is sound, and made from another version than the newest.
+    Behind,
 }
 
 /// An object that is not as it must be.

@@ -18,9 +18,19 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("observations", &["contract", "retry", "storage", "service"]),
     (
         "ingest",
-        &["contract", "retry", "storage", "service", "china-sea"],
+        &[
+            "contract",
+            "retry",
+            "storage",
+            "cube",
+            "service",
+            "china-sea",
+        ],
     ),
-    ("compute", &["contract", "retry", "storage", "service"]),
+    (
+        "compute",
+        &["contract", "retry", "storage", "cube", "service"],
+    ),
     ("render", &["contract"]),
     (
         "render-worker",

@@ -3,6 +3,8 @@
 #![expect(clippy::unwrap_used, reason = "a test ends where it cannot go on")]
 
 mod damage;
+mod follow;
+mod frozen;
 mod plain;
 mod product;
 mod rivals;

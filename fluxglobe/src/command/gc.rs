@@ -1,5 +1,5 @@
-//! `fluxglobe gc`: objects that no kept version needs and files of killed writers; listed, and removed unless only asked
-//! about.
+//! `fluxglobe gc`: objects that no kept version needs, versions of cubes, and files of killed writers; listed, and removed
+//! unless only asked about.
 
 use std::time::Duration;
 
@@ -7,13 +7,14 @@ use anyhow::Result;
 use compute::gc::Computed;
 use ingest::{LandingNotes, Readings};
 use observations::Datasets;
+use storage::Store;
 use storage::gc::{self, Keep, Owner, Pictures, Versions};
 
 use crate::cli::{Gc, Settings};
 use crate::command::notice;
 use crate::{deployment, progress};
 
-/// Everybody who lays out objects that clean-up may remove. Never removed are weights (what they were made from is in
+/// Everybody who lays out objects that clean-up may remove, but for cubes, whose library knows what is in use. Never removed are weights (what they were made from is in
 /// their name alone), notes of files of observations, and what all services agree on.
 const OWNERS: [&dyn Owner; 6] = [
     &Versions,
@@ -46,12 +47,33 @@ pub(crate) async fn run(settings: &Settings, options: &Gc) -> Result<()> {
     );
     if options.dry_run {
         progress::say(&format!("would remove {summary}"));
-        return Ok(());
+        return cubes(&store, keep, true).await;
     }
     let bar = progress::bar("remove", plan.count() as u64);
     let progress = |done| bar.set_position(done as u64);
     gc::run(&store, &OWNERS, &plan, keep, &progress).await?;
     progress::done(&bar, &summary);
+    cubes(&store, keep, false).await
+}
+
+/// Cleans cubes, after the manifests that they follow; a line for each that had something to remove.
+async fn cubes(store: &Store, keep: Keep, is_dry_run: bool) -> Result<()> {
+    for cleaned in cube::clean_up::run(store, keep, notice::now()?, is_dry_run).await? {
+        if !cleaned.is_nothing() {
+            progress::result(&format!(
+                "{} {}",
+                cube::folder(&cleaned.product),
+                cleaned.size_bytes
+            ))?;
+            progress::say(&format!(
+                "{}: {} versions and {} objects of the cube{}",
+                cleaned.product,
+                cleaned.versions.len(),
+                cleaned.objects_count,
+                if is_dry_run { " would go" } else { " are gone" }
+            ));
+        }
+    }
     Ok(())
 }
 
@@ -66,7 +88,8 @@ mod tests {
             let owners = OWNERS.iter().filter(|owner| owner.kinds().contains(&kind));
             let is_kept_for_ever =
                 matches!(kind, Kind::Weights | Kind::ObservationFile | Kind::Protocol);
-            assert_eq!(owners.count(), usize::from(!is_kept_for_ever), "{kind:?}");
+            let is_owned = !is_kept_for_ever && kind != Kind::Cube;
+            assert_eq!(owners.count(), usize::from(is_owned), "{kind:?}");
         }
     }
 }

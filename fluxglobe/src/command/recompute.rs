@@ -10,6 +10,7 @@ use comfy_table::Table;
 use comfy_table::presets::NOTHING;
 use compute::recompute::{Plan, Reason, Request, What};
 use contract::event::Event;
+use contract::product::ProductId;
 use contract::quantity::Quantity;
 use serde::Serialize;
 use storage::Store;
@@ -70,11 +71,25 @@ pub(crate) async fn run(settings: &Settings, options: Recompute) -> Result<()> {
             progress::result(&manifest.id().to_string())?;
         }
     }
+    if with_frames && options.verify {
+        cubes(&store, &options.product).await?;
+    }
     if with_tiles {
         // Planned anew: what was derived just now gives pictures other names.
         let wanted = tiles::plan(&store, &options).await?;
         let kafka = options.kafka.kafka.is_some();
         tiles::draw(settings, store, log.as_deref().filter(|_| kafka), &wanted).await?;
+    }
+    Ok(())
+}
+
+/// Brings the cubes of a product and of what is derived from it to their newest versions, made again if they are damaged.
+async fn cubes(store: &Store, product: &ProductId) -> Result<()> {
+    for product in [Some(product.clone()), product.accumulated().ok()] {
+        let Some(product) = product else { continue };
+        if cube::verify::mend(store, &product).await? {
+            progress::say(&format!("{product}: its cube was made again"));
+        }
     }
     Ok(())
 }

@@ -1,14 +1,15 @@
-//! `fluxglobe verify`: every stored object read and compared with its name or seal, and the journal of the event log in the
-//! data folder; a line for each that is not sound.
+//! `fluxglobe verify`: every stored object read and compared with its name or seal, every step of cubes with its digest, and
+//! the journal of the event log in the data folder; a line for each that is not sound.
 
 use std::path::Path;
 use std::process::ExitCode;
 
 use anyhow::Result;
 use contract::kind::Kind;
-use storage::StorageError;
+use contract::product::ProductId;
 use storage::log::EmbeddedLog;
 use storage::verify::{self, Fault, Finding, Report};
+use storage::{StorageError, Store};
 
 use crate::cli::{Settings, Verify};
 use crate::{deployment, progress};
@@ -23,16 +24,25 @@ pub(crate) async fn run(settings: &Settings, options: &Verify) -> Result<ExitCod
     let bar = progress::bar("verify", keys.len() as u64);
     let tell = |done: usize, finding: Option<&Finding>| {
         bar.set_position(done as u64);
-        if let (Some(finding), false) = (finding, options.json) {
+        // Of a damaged part of a cube there is more to say.
+        let is_of_cube = finding.is_some_and(|it| Kind::of(&it.key) == Some(Kind::Cube));
+        if let (Some(finding), false) = (finding, options.json || is_of_cube) {
             bar.suspend(|| progress::result(&line(finding)).ok());
         }
     };
     let mut report = verify::run(&store, &keys, &tell).await?;
+    cubes(&store, product, &mut report).await?;
     if product.is_none()
         && let Some(finding) = journal(&deployment::events(settings))?
     {
         tell(keys.len(), Some(&finding));
         report.findings.push(finding);
+    }
+    let is_of_cube = |it: &&Finding| Kind::of(&it.key) == Some(Kind::Cube);
+    for finding in report.findings.iter().filter(is_of_cube) {
+        if !options.json {
+            bar.suspend(|| progress::result(&line(finding)))?;
+        }
     }
     progress::done(&bar, &summary(&report));
     if options.json {
@@ -45,6 +55,23 @@ pub(crate) async fn run(settings: &Settings, options: &Verify) -> Result<ExitCod
         progress::say(&advice);
     }
     Ok(ExitCode::FAILURE)
+}
+
+/// Adds what is wrong with cubes as wholes, and of damaged parts of them which arrays and steps those are of.
+async fn cubes(store: &Store, product: Option<&ProductId>, report: &mut Report) -> Result<()> {
+    let mut products = cube::verify::products(store).await?;
+    products.retain(|one| product.is_none_or(|product| product == one));
+    let findings = report.findings.iter();
+    let damaged = findings.map(|finding| finding.key.clone()).collect();
+    for product in products {
+        let checked = cube::verify::check(store, &product, &damaged).await?;
+        for finding in &mut report.findings {
+            checked.explain(finding);
+        }
+        report.findings.extend(checked.findings);
+    }
+    report.findings.sort_by(|a, b| a.key.cmp(&b.key));
+    Ok(())
 }
 
 /// What is wrong with the journal of the event log in a folder. It is no object: its key is where it lies in the data.
@@ -65,6 +92,7 @@ fn line(finding: &Finding) -> String {
     match fault {
         Fault::Damaged => format!("{key} is damaged: {reason}"),
         Fault::Missing => format!("{key} is missing: {reason}"),
+        Fault::Behind => format!("{key} is behind: {reason}"),
     }
 }
 
@@ -100,12 +128,13 @@ fn advice(report: &Report) -> Vec<String> {
         Kind::Contributed,
         Kind::Series,
         Kind::Domain,
+        Kind::Cube,
         Kind::Sums,
         Kind::Tile,
     ];
     if found(&made_again).is_some() {
         advice.push(
-            "frames, counts, series, domains, sums and tiles are made again by: fluxglobe recompute --product PRODUCT --verify"
+            "frames, counts, series, domains, cubes, sums and tiles are made again by: fluxglobe recompute --product PRODUCT --verify"
                 .to_owned(),
         );
     }
@@ -185,6 +214,7 @@ mod tests {
         };
         for (key, what_to_do) in [
             ("frames/p/a.parquet", "recompute"),
+            ("cubes/p/repo", "recompute"),
             ("raw/p/a", "ingest it again"),
             ("manifests/p/1.json", "restore"),
             ("weights/a.parquet", "when they are next needed"),

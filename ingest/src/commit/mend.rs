@@ -55,6 +55,7 @@ pub(crate) async fn mend(
     manifests::commit(store, &next)
         .await
         .map_err(IngestError::storage("publish a manifest"))?;
+    cube::keep_up(store, &next).await;
     Ok(Some(next))
 }
 

@@ -2,7 +2,7 @@
 //!
 //! The manifest is built on the newest one and published under the next number; if another writer took that number the
 //! newest is read again. Everything it names is durable before. A crash before the publication leaves objects that
-//! nothing names; the same files make the same objects again and land once.
+//! nothing names; the same files make the same objects again and land once. The product's cube follows the manifest.
 
 pub(crate) mod landing_note;
 mod mend;
@@ -64,7 +64,10 @@ async fn publish(store: &Store, granules: &[StoredGranule]) -> Result<Vec<Answer
             note(store, granules, &merged, &mut noted).await?;
             let manifest = build(store, newest.as_ref(), &merged, granules).await?;
             match manifests::commit(store, &manifest).await {
-                Ok(()) => Some(manifest.id()),
+                Ok(()) => {
+                    cube::keep_up(store, &manifest).await;
+                    Some(manifest.id())
+                }
                 Err(StorageError::Conflict { .. }) => {
                     race_lost(product, &mut pauses).await?;
                     continue;

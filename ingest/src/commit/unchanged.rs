@@ -39,6 +39,9 @@ pub(crate) async fn answer(
         let product = &newest.manifest.product;
         landing_note::is_noted(store, product, newest.raw_sha256, notice.origin).await?
     };
+    if is_noted {
+        bring_cube_up(store, &newest.manifest).await?;
+    }
     Ok(match why {
         Unchanged::Same(masked) => notice.already_landed(newest, masked, is_noted),
         Unchanged::Superseded => {
@@ -50,6 +53,17 @@ pub(crate) async fn answer(
             notice.superseded(newest.manifest, untold.as_ref())
         }
     })
+}
+
+/// Whoever published the file may have been killed before the cube followed.
+async fn bring_cube_up(store: &Store, version: &ManifestId) -> Result<(), IngestError> {
+    match manifests::load(store, version).await {
+        Ok(manifest) => cube::keep_up(store, &manifest).await,
+        // Cleaned up since it was looked for: there are newer ones.
+        Err(e) if e.is_not_found() => {}
+        Err(e) => return Err(IngestError::storage("read a manifest")(e)),
+    }
+    Ok(())
 }
 
 /// The newest version that holds a file which was replaced since. None if that version is gone or too long ago: then there

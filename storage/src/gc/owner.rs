@@ -57,8 +57,8 @@ pub struct Kept {
 }
 
 impl Kept {
-    /// The newest versions of all products.
-    pub(super) async fn read(store: &Store, versions: usize) -> Result<Self, StorageError> {
+    /// The newest versions of all products, so many of each.
+    pub async fn read(store: &Store, versions: usize) -> Result<Self, StorageError> {
         let mut kept = vec![];
         // A list that cannot be read names things that nobody knows: nothing may be removed.
         for product in manifests::products(store).await? {

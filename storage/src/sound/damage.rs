@@ -39,7 +39,7 @@ pub fn count(kind: Kind) -> u64 {
 }
 
 /// A stored object that is not what it must be.
-pub(crate) fn found(key: &ObjectKey, reason: impl std::fmt::Display) -> StorageError {
+pub fn found(key: &ObjectKey, reason: impl std::fmt::Display) -> StorageError {
     let kind = Kind::of(key).map_or("other", Kind::folder);
     FOUND.with_label_values(&[kind]).inc();
     StorageError::damaged(key.as_str(), reason)

@@ -1,8 +1,8 @@
 //! Seals: the digest of an object's bytes, kept inside it where readers of its format pass over it.
 //!
 //! A JSON document ends in a member `sha256`, the digest of the text without that member. A Parquet file has a mark and
-//! the digest of all its other bytes between its last page and its footer, where no address in it points to. One flipped
-//! bit breaks a seal or what it seals, never both: what had a seal is then broken, or no file of its format any more.
+//! the digest of all its other bytes between its last page and its footer, where no address in it points to. What is
+//! compressed with zstd to its end has both in a frame of its own there, of the kind that decoders skip. One flipped bit breaks a seal or what it seals, never both: what had a seal is then broken, or no file of its format any more.
 
 use contract::digest::Digest;
 use sha2::{Digest as _, Sha256};
@@ -14,6 +14,9 @@ const SEAL_BYTES: usize = MARK.len() + DIGEST_BYTES;
 /// Length of the footer and the format's name, the last bytes of a Parquet file.
 const END_BYTES: usize = 8;
 const PARQUET: &[u8; 4] = b"PAR1";
+/// Begins a frame that decoders of zstd skip (RFC 8878, section 3.1.2), and the length of what follows in it.
+const SKIPPED: [u8; 4] = 0x184D_2A50_u32.to_le_bytes();
+const SKIPPED_BYTES: [u8; 4] = (SEAL_BYTES as u32).to_le_bytes();
 /// Before the digest in a document.
 const MEMBER: &[u8] = b",\"sha256\":\"";
 /// After it.
@@ -96,6 +99,30 @@ pub(crate) fn of_parquet(content: &[u8]) -> Seal {
     }
 }
 
+/// Seals content that is compressed with zstd to its end.
+pub fn zstd(content: &[u8]) -> Vec<u8> {
+    let digest: [u8; DIGEST_BYTES] = Sha256::digest(content).into();
+    [content, &SKIPPED, &SKIPPED_BYTES, MARK, &digest].concat()
+}
+
+/// The seal of such content.
+pub(crate) fn of_zstd(content: &[u8]) -> Seal {
+    let begin = [&SKIPPED[..], &SKIPPED_BYTES, MARK].concat();
+    let at = content.len().checked_sub(begin.len() + DIGEST_BYTES);
+    let Some((data, seal)) = at.and_then(|at| content.split_at_checked(at)) else {
+        return Seal::Absent;
+    };
+    let (found, told) = seal.split_at(begin.len());
+    let told: Result<[u8; DIGEST_BYTES], _> = told.try_into();
+    let is_right = told.is_ok_and(|told| Digest::of(data) == Digest::from_bytes(told));
+    match (found == begin, is_right) {
+        (true, true) => Seal::Whole,
+        // Its beginning or a digest alone: the other one was there.
+        (true, false) | (false, true) => Seal::Broken,
+        (false, false) => Seal::Absent,
+    }
+}
+
 /// Where the footer of a Parquet file begins.
 fn footer_of(content: &[u8]) -> Option<usize> {
     let (before, end) = content.split_at_checked(content.len().checked_sub(END_BYTES)?)?;
@@ -144,6 +171,19 @@ mod tests {
             let mut flipped = sealed.clone();
             flipped[at / 8] ^= 1 << (at % 8);
             assert_ne!(of_json(&flipped), Seal::Whole, "bit {at}");
+        }
+    }
+
+    #[test]
+    fn no_bit_of_sealed_zstd_can_change_unseen() {
+        let content = b"a header and frames";
+        assert_eq!((of_zstd(content), of_zstd(b"")), (Seal::Absent, Seal::Absent));
+        let sealed = zstd(content);
+        assert_eq!(of_zstd(&sealed), Seal::Whole);
+        for at in 0..sealed.len() * 8 {
+            let mut flipped = sealed.clone();
+            flipped[at / 8] ^= 1 << (at % 8);
+            assert_eq!(of_zstd(&flipped), Seal::Broken, "bit {at}");
         }
     }
 

@@ -96,6 +96,12 @@ async fn put_others(store: &Store, product: &ProductId, raw_sha256: Digest, peri
             .await
             .unwrap();
     }
+    let chunk = [b"values".as_slice(), &crc32c::crc32c(b"values").to_le_bytes()].concat();
+    let metadata = super::cube::sealed("repo", b"compressed").unwrap();
+    for (name, content) in [("chunks/A", chunk), ("repo", metadata)] {
+        let key = format!("cubes/p/{name}").parse().unwrap();
+        store.put_new(&key, content.into()).await.unwrap();
+    }
     let note = format!("landings/p/{raw_sha256}-0-17");
     let origin = Bytes::from("granule.notice/0/17");
     store.put_new(&note.parse().unwrap(), origin).await.unwrap();

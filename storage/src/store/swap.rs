@@ -83,26 +83,6 @@ impl Store {
         }
     }
 
-    /// Keeps what an object that changes holds now under another name; false if it does not hold what was seen any more.
-    pub async fn keep_copy(
-        &self,
-        from: &ObjectKey,
-        seen: Option<&Seen>,
-        to: &ObjectKey,
-    ) -> Result<bool, StorageError> {
-        if let (Place::Folder(root), Some(seen)) = (&self.place, seen) {
-            let linked = locked::link(root.clone(), from.clone(), seen, to.clone());
-            return linked.await.map_err(|e| failed(to, e));
-        }
-        let Some((content, now)) = self.read_changing(from).await? else {
-            return Ok(false);
-        };
-        if seen.is_some_and(|seen| *seen != now) {
-            return Ok(false);
-        }
-        self.put_new(to, content).await.map(|_new| true)
-    }
-
     async fn swap_by_request(
         &self,
         key: &ObjectKey,

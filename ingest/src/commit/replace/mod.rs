@@ -56,7 +56,10 @@ pub(crate) async fn replace(
         (next.schema, next.number) = (MANIFEST_SCHEMA, newest.number + 1);
         (next.series, next.domain) = (series, domain);
         match manifests::commit(store, &next).await {
-            Ok(()) => return Ok(Some(next)),
+            Ok(()) => {
+                cube::keep_up(store, &next).await;
+                return Ok(Some(next));
+            }
             Err(StorageError::Conflict { .. }) => race_lost(product, &mut pauses).await?,
             Err(source) => {
                 let action = "publish a manifest";

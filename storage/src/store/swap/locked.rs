@@ -36,31 +36,6 @@ pub(super) async fn swap(
     .await
 }
 
-/// A second name for what an object holds. No bytes are copied: an exchange gives the first name to another file.
-pub(super) async fn link(
-    root: PathBuf,
-    from: ObjectKey,
-    seen: &Seen,
-    to: ObjectKey,
-) -> Result<bool, object_store::Error> {
-    let seen = seen.clone();
-    blocking(to.clone(), move || {
-        let path = root.join(to.as_str());
-        fs::create_dir_all(path.parent().ok_or(ErrorKind::InvalidInput)?)?;
-        match fs::hard_link(root.join(from.as_str()), &path) {
-            Err(e) if e.kind() != ErrorKind::AlreadyExists => return Err(e),
-            _linked_now_or_before => {}
-        }
-        // Of the two names this one is nobody else's: what it stands for does not change any more.
-        if held(&path)? == Some(seen) {
-            return Ok(true);
-        }
-        fs::remove_file(&path)?;
-        Ok(false)
-    })
-    .await
-}
-
 fn held(path: &Path) -> io::Result<Option<Seen>> {
     match fs::read(path) {
         Ok(content) => Ok(Some(Seen::of_digest(&content))),

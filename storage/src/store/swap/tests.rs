@@ -89,32 +89,6 @@ fn count(content: &[u8]) -> u32 {
     text.split_once(' ').unwrap().0.parse().unwrap()
 }
 
-#[tokio::test]
-async fn a_copy_holds_what_was_seen_and_keeps_it() {
-    let (_folder, stores) = stores();
-    for (kind, store) in stores {
-        let first = store.swap(&key(), None, Bytes::from("one")).await.unwrap();
-        let copy: ObjectKey = "cubes/p/overwritten/repo.1".parse().unwrap();
-        assert!(
-            store
-                .keep_copy(&key(), first.as_ref(), &copy)
-                .await
-                .unwrap()
-        );
-        let second = store.swap(&key(), first.as_ref(), Bytes::from("two")).await;
-        assert!(second.unwrap().is_some());
-        assert_eq!(store.fetch(&copy).await.unwrap(), "one", "{kind}");
-        let late: ObjectKey = "cubes/p/overwritten/repo.2".parse().unwrap();
-        assert!(
-            !store
-                .keep_copy(&key(), first.as_ref(), &late)
-                .await
-                .unwrap()
-        );
-        assert!(!store.exists(&late).await.unwrap(), "{kind}");
-    }
-}
-
 /// A process that ends with its test.
 struct Killed(std::process::Child);
 

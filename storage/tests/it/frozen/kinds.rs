@@ -45,6 +45,11 @@ fn reader(kind: Kind) -> Reader {
             "compute/tests/it/frozen.rs",
             "frozen_sums_answer_where_no_frame_can",
         ),
+        // Cubes were exported only, never in a store, before.
+        Kind::Cube => since_2(
+            "cube/tests/it/frozen.rs",
+            "a_frozen_cube_holds_the_values_of_its_versions",
+        ),
         Kind::Accumulating => since_1(
             "compute/tests/it/frozen.rs",
             "frozen_exact_sums_are_gone_on_from",

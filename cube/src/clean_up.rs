@@ -1,0 +1,178 @@
+//! Clean-up of cubes: versions that are not kept lose their names, and what no name leads to any more is removed. What is
+//! in use is known to the repository's library, which does all of that.
+
+use std::collections::BTreeSet;
+use std::num::{NonZeroU16, NonZeroUsize};
+use std::sync::Arc;
+use std::time::Duration;
+
+use chrono::{DateTime, TimeDelta, Utc};
+use contract::product::ProductId;
+use contract::time::TimeMs;
+use icechunk::format::SnapshotId;
+use icechunk::ops::gc::{ExpiredRefAction, GCConfig, expire, garbage_collect};
+use serde::Serialize;
+use storage::Store;
+use storage::gc::{Keep, Kept, LEAST_AGE};
+
+use crate::{CubeError, Repository, folder, verify};
+
+/// Snapshots that are read at a time.
+const SNAPSHOTS_AT_ONCE: NonZeroU16 = NonZeroU16::new(4).expect("it is not zero");
+/// Manifests, each of 1,024 references, that are held at a time, bytes.
+const MANIFEST_BYTES: NonZeroUsize = NonZeroUsize::new(16 << 20).expect("it is not zero");
+/// Requests of one kind under way at a time.
+const REQUESTS: NonZeroU16 = NonZeroU16::new(8).expect("it is not zero");
+/// Requests to remove objects that fail one after the other before the rest is left for the next time.
+const FAILURES: NonZeroU16 = NonZeroU16::new(3).expect("it is not zero");
+
+/// What was removed of a cube, or would be.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Cleaned {
+    /// Whose cube.
+    pub product: ProductId,
+    /// Versions that lost their names.
+    pub versions: Vec<String>,
+    /// Objects that were removed; where nothing is changed, those that no name leads to now.
+    pub objects_count: u64,
+    /// Their size.
+    pub size_bytes: u64,
+}
+
+impl Cleaned {
+    /// Was there anything to do?
+    pub fn is_nothing(&self) -> bool {
+        self.versions.is_empty() && self.objects_count == 0
+    }
+}
+
+/// Cleans all cubes of a store: versions whose manifests are not kept and that are old enough go, and objects that are old
+/// enough and that no kept version needs. With `is_dry_run` nothing is changed.
+///
+/// Who lands meanwhile is in no danger: what is young stays, and the newest state with it.
+///
+/// # Errors
+/// A store that does not answer; a cube that cannot be read, of which nothing is removed.
+pub async fn run(
+    store: &Store,
+    keep: Keep,
+    now: TimeMs,
+    is_dry_run: bool,
+) -> Result<Vec<Cleaned>, CubeError> {
+    let kept = Kept::read(store, keep.versions.max(1)).await?;
+    let age = keep.age.max(LEAST_AGE);
+    let mut all = vec![];
+    for product in verify::products(store).await? {
+        let numbers: BTreeSet<String> = kept
+            .manifests
+            .iter()
+            .filter(|manifest| manifest.product == product)
+            .map(|manifest| manifest.number.to_string())
+            .collect();
+        // A product that is there no more: somebody removed it by hand, and decides about its cube, too.
+        if numbers.is_empty() {
+            continue;
+        }
+        let repository = Repository::open(store, &folder(&product)).await?;
+        let cutoff = older_than(now, age, &repository)?;
+        let versions = repository.cut_names(&numbers, cutoff, is_dry_run).await?;
+        let (objects_count, size_bytes) = repository.remove_unused(cutoff, is_dry_run).await?;
+        all.push(Cleaned {
+            product,
+            versions,
+            objects_count,
+            size_bytes,
+        });
+    }
+    Ok(all)
+}
+
+fn older_than(
+    now: TimeMs,
+    age: Duration,
+    repository: &Repository,
+) -> Result<DateTime<Utc>, CubeError> {
+    let now = DateTime::from_timestamp_millis(now.ms());
+    let cutoff = now.zip(TimeDelta::from_std(age).ok());
+    let cutoff = cutoff.and_then(|(now, age)| now.checked_sub_signed(age));
+    cutoff.ok_or_else(|| repository.failed("cleaning up", &"its age is out of range"))
+}
+
+impl Repository {
+    /// Takes the names of versions that are not kept and are older than an instant, and forgets the states that have none.
+    async fn cut_names(
+        &self,
+        kept: &BTreeSet<String>,
+        older_than: DateTime<Utc>,
+        is_dry_run: bool,
+    ) -> Result<Vec<String>, CubeError> {
+        let failed = |e: &dyn std::fmt::Display| self.failed("cleaning up", e);
+        let newest: SnapshotId = self.inner.lookup_branch(crate::repository::BRANCH).await.map_err(|e| failed(&e))?;
+        let mut cut = vec![];
+        for version in self.versions().await? {
+            if kept.contains(&version) {
+                continue;
+            }
+            let id = self.inner.lookup_tag(&version).await.map_err(|e| failed(&e))?;
+            let info = self.inner.lookup_snapshot(&id).await.map_err(|e| failed(&e))?;
+            if id == newest || info.flushed_at >= older_than {
+                continue;
+            }
+            if !is_dry_run {
+                self.inner.delete_tag(&version).await.map_err(|e| failed(&e))?;
+            }
+            cut.push(version);
+        }
+        if !is_dry_run {
+            let config = self.inner.config();
+            let expired = expire(
+                Arc::clone(self.inner.asset_manager()),
+                older_than,
+                ExpiredRefAction::Ignore,
+                ExpiredRefAction::Ignore,
+                Some(config.repo_update_retries()),
+                config.num_updates_per_repo_info_file(),
+            );
+            expired.await.map_err(|e| failed(&e))?;
+        }
+        Ok(cut)
+    }
+
+    /// Removes objects older than an instant that no state needs: how many, and their bytes.
+    async fn remove_unused(
+        &self,
+        older_than: DateTime<Utc>,
+        is_dry_run: bool,
+    ) -> Result<(u64, u64), CubeError> {
+        let config = GCConfig::clean_all(
+            older_than,
+            older_than,
+            None,
+            SNAPSHOTS_AT_ONCE,
+            MANIFEST_BYTES,
+            MANIFEST_BYTES,
+            REQUESTS,
+            REQUESTS,
+            FAILURES,
+            Some(REQUESTS),
+            is_dry_run,
+        );
+        let own = self.inner.config();
+        let removed = garbage_collect(
+            Arc::clone(self.inner.asset_manager()),
+            &config,
+            Some(own.repo_update_retries()),
+            own.num_updates_per_repo_info_file(),
+        );
+        let removed = removed.await.map_err(|e| self.failed("cleaning up", &e))?;
+        if let Some(error) = removed.delete_errors.first() {
+            return Err(self.failed("cleaning up", error));
+        }
+        let count = removed.chunks_deleted
+            + removed.manifests_deleted
+            + removed.snapshots_deleted
+            + removed.attributes_deleted
+            + removed.transaction_logs_deleted;
+        Ok((count, removed.bytes_deleted))
+    }
+}

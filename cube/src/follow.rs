@@ -1,0 +1,225 @@
+//! A version of a product in, its cube with that version's steps and name out: exactly what differs is put.
+//!
+//! A manifest comes first and its cube follows, so that a cube may be behind: whoever was killed in between left it so. The
+//! next who follows makes good whatever is missing, from the manifest that it has alone. A version that was never followed
+//! has no name in the cube.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use contract::digest::Digest;
+use contract::key::ObjectKey;
+use contract::kind::{Kind, Vouched};
+use contract::manifest::{Manifest, ManifestId};
+use contract::product::ProductId;
+use contract::time::Period;
+use futures::stream::{self, StreamExt as _, TryStreamExt as _};
+use storage::{Store, frames, manifests};
+
+use crate::edit::ATTEMPTS;
+use crate::plan::Plan;
+use crate::state::State;
+use crate::{CubeError, Description, Edit, Repository, Step};
+
+/// Frames that are read while one is written.
+const FRAMES_AHEAD: usize = 2;
+
+/// Where the cube of a product lies in a store.
+pub fn folder(product: &ProductId) -> String {
+    format!("{}/{product}", Kind::Cube.folder())
+}
+
+/// Brings the cube of a product in its store to a version; see [`Follower::run`].
+pub async fn follow(store: &Store, manifest: &Manifest) -> Result<Followed, CubeError> {
+    let follower = Follower {
+        store,
+        folder: &folder(&manifest.product),
+        frames: store,
+        told: &|_period| (),
+    };
+    follower.run(manifest).await
+}
+
+/// The same for whoever has just published a version, or found that it was published before and not told of.
+///
+/// Versions are what is true, and a cube is made from them: one that cannot follow is said in the log and left behind, and
+/// is no reason to fail a landing. The next version brings it up, and so does `fluxglobe recompute --verify`.
+pub async fn keep_up(store: &Store, manifest: &Manifest) {
+    let (own, version) = (store.clone(), manifest.clone());
+    // A task of its own: a panic over a damaged cube ends there.
+    let followed = tokio::spawn(async move { follow(&own, &version).await });
+    let error = match followed.await {
+        Ok(Ok(_followed)) => return,
+        Ok(Err(error)) => error.to_string(),
+        Err(error) => error.to_string(),
+    };
+    tracing::warn!(version = %manifest.id(), %error, "the cube stays behind; its next version, or `fluxglobe recompute --product PRODUCT --verify`, brings it up");
+}
+
+/// Brings a cube to versions of a product.
+pub struct Follower<'a> {
+    /// Where the cube is, or is made.
+    pub store: &'a Store,
+    /// Its folder there; `""` is the whole store.
+    pub folder: &'a str,
+    /// Where the frames are that versions name.
+    pub frames: &'a Store,
+    /// Is told of each step that is put.
+    pub told: &'a (dyn Fn(Period) + Send + Sync),
+}
+
+/// What became of a cube.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Followed {
+    /// The version that it is of now; a newer one than was asked for if it was there already.
+    pub version: ManifestId,
+    /// Steps whose values were stored.
+    pub put_count: usize,
+}
+
+impl Follower<'_> {
+    /// Puts the steps whose period or values differ, drops those that the version does not have, commits, and names the
+    /// state by the version's number. An older version than the cube is of changes nothing.
+    ///
+    /// # Errors
+    /// `Foreign` if the cube is of another version of this number, or of another product. A frame that cannot be read.
+    pub async fn run(&self, manifest: &Manifest) -> Result<Followed, CubeError> {
+        let version = manifest.id();
+        let description = Description::of(manifest);
+        let repository = Repository::for_change(self.store, self.folder, &description).await?;
+        let mut edit = Edit::describing(&repository, description.clone()).await?;
+        for _attempt in 0..ATTEMPTS {
+            let state = State::newest(&repository).await?;
+            if let Some(there) = self.settled(&repository, &state, &version).await? {
+                return Ok(Followed {
+                    version: there,
+                    put_count: edit.staged().len(),
+                });
+            }
+            let before: &[Step] = match state.describes_same_cells(&description) {
+                true => &state.steps,
+                false => &[],
+            };
+            let wanted = self.wanted(manifest, &state, before, &mut edit).await?;
+            let plan = Plan::exactly(&wanted, before, edit.staged());
+            let plan = plan.map_err(|missing| CubeError::Foreign {
+                place: repository.place.clone(),
+                array: "time".to_owned(),
+                reason: format!("steps of {missing:?} are neither there nor put"),
+            })?;
+            let committed = edit.lay(&state, &plan, &version.to_string()).await?;
+            if let Some(snapshot) = committed {
+                let tag = version.number.to_string();
+                repository.tag(&tag, &snapshot).await?;
+                return Ok(Followed {
+                    version,
+                    put_count: edit.staged().len(),
+                });
+            }
+        }
+        Err(edit.contended())
+    }
+
+    /// Names the state that is there, in case somebody was killed before that. The version it is of, if there is nothing
+    /// more to do.
+    async fn settled(
+        &self,
+        repository: &Repository,
+        state: &State,
+        version: &ManifestId,
+    ) -> Result<Option<ManifestId>, CubeError> {
+        let there = state.description.as_ref();
+        let Some(there) = there.and_then(|it| it.version.as_ref()) else {
+            return Ok(None);
+        };
+        let is_other = there.number == version.number && there != version;
+        if there.product != version.product || is_other {
+            return Err(CubeError::Foreign {
+                place: repository.place.clone(),
+                array: "the group".to_owned(),
+                reason: format!("it is of {there}, not of {version}"),
+            });
+        }
+        let tag = there.number.to_string();
+        if !repository.is_tagged(&tag, &state.snapshot).await {
+            repository.tag(&tag, &state.snapshot).await?;
+        }
+        Ok((there.number >= version.number).then(|| there.clone()))
+    }
+
+    /// The steps of a version as the cube names them; those that are not in it are put.
+    async fn wanted(
+        &self,
+        manifest: &Manifest,
+        state: &State,
+        before: &[Step],
+        edit: &mut Edit<'_>,
+    ) -> Result<Vec<Step>, CubeError> {
+        let there: BTreeMap<Period, Digest> = before
+            .iter()
+            .map(|step| (step.period, step.values_sha256))
+            .collect();
+        let known = self.known_frames(manifest, state).await?;
+        let mut wanted: Vec<Option<Step>> = Vec::with_capacity(manifest.steps.len());
+        let mut absent = vec![];
+        for (place, step) in manifest.steps.iter().enumerate() {
+            let period = step.period;
+            let named = match step.frame.vouches() {
+                Vouched::Values(digest) => Some(digest),
+                // Named by its bytes: its values are known if the version before named the same.
+                Vouched::Bytes(_) | Vouched::Nothing => (known.get(&period) == Some(&step.frame))
+                    .then(|| there.get(&period).copied())
+                    .flatten(),
+            };
+            let is_there = named.is_some() && there.get(&period).copied() == named;
+            let put = edit.staged().get(&period.start).map(|put| put.step);
+            let put = put.filter(|put| {
+                put.period == period && named.is_none_or(|named| named == put.values_sha256)
+            });
+            match (named, put) {
+                (Some(values_sha256), _) if is_there => wanted.push(Some(Step {
+                    period,
+                    values_sha256,
+                })),
+                (_, Some(put)) => wanted.push(Some(put)),
+                _ => {
+                    wanted.push(None);
+                    absent.push((place, period, &step.frame));
+                }
+            }
+        }
+        let read = |(place, period, frame): (usize, Period, &ObjectKey)| {
+            let (store, frame, grid) = (self.frames.clone(), frame.clone(), manifest.grid);
+            async move {
+                let values = frames::read(&store, &frame, &grid).await?;
+                Ok::<_, CubeError>((place, period, Arc::<[f32]>::from(values)))
+            }
+        };
+        let mut frames = stream::iter(absent).map(read).buffered(FRAMES_AHEAD);
+        while let Some((place, period, values)) = frames.try_next().await? {
+            wanted[place] = Some(edit.put(period, values).await?);
+            (self.told)(period);
+        }
+        Ok(wanted.into_iter().flatten().collect())
+    }
+
+    /// Frames of the version that the cube is of, by their periods: none if that version is gone, or not needed.
+    async fn known_frames(
+        &self,
+        manifest: &Manifest,
+        state: &State,
+    ) -> Result<BTreeMap<Period, ObjectKey>, CubeError> {
+        let is_named = |frame: &ObjectKey| matches!(frame.vouches(), Vouched::Values(_));
+        let version = state.description.as_ref().and_then(|it| it.version.clone());
+        let (Some(version), false) = (
+            version,
+            manifest.steps.iter().all(|step| is_named(&step.frame)),
+        ) else {
+            return Ok(BTreeMap::new());
+        };
+        let before = manifests::numbered(self.frames, &version.product, version.number).await?;
+        let before = before.filter(|before| before.id() == version);
+        let steps = before.into_iter().flat_map(|before| before.steps);
+        Ok(steps.map(|step| (step.period, step.frame)).collect())
+    }
+}

@@ -1,0 +1,154 @@
+//! One commit: a plan laid over the state that is there, unless others changed that meanwhile.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use icechunk::format::manifest::ChunkPayload;
+use icechunk::format::{ChunkIndices, Path};
+use icechunk::session::{SessionError, SessionErrorKind};
+use serde_json::Value;
+use zarrs_icechunk::AsyncIcechunkStore;
+
+use crate::staged::AllStaged;
+use crate::plan::Plan;
+use crate::state::State;
+use crate::{CubeError, Description, Repository, arrays, axis, plain};
+
+/// Where a chunk comes to lie, and what it refers to; none where no cell has data.
+type Placed = (ChunkIndices, Option<ChunkPayload>);
+
+pub(crate) struct Layer<'a> {
+    pub(crate) repository: &'a Repository,
+    /// What the cube is of afterwards.
+    pub(crate) description: &'a Description,
+    /// Rows and columns of all objects of a frame.
+    pub(crate) indices: Vec<[u32; 2]>,
+    /// Of the values' array.
+    pub(crate) path: &'a Path,
+    pub(crate) state: &'a State,
+    pub(crate) plan: &'a Plan,
+    pub(crate) staged: &'a AllStaged,
+}
+
+impl Layer<'_> {
+    /// The snapshot that was made; none if others committed before.
+    pub(crate) async fn commit(&self, message: &str) -> Result<Option<String>, CubeError> {
+        let Self {
+            description,
+            state,
+            plan,
+            ..
+        } = self;
+        let arrays = Arc::new(AsyncIcechunkStore::from(Arc::clone(&state.session)));
+        let is_anew = !state.describes_same_cells(description);
+        let (before, placed) = if is_anew {
+            self.clear().await?;
+            plain::write_frame_of_reference(&arrays, description).await?;
+            (0, vec![])
+        } else {
+            (state.steps.len(), self.moved().await?)
+        };
+        if !is_anew && state.description.as_ref() != Some(description) {
+            plain::write_group(&arrays, description).await?;
+        }
+        if plan.steps.len() < before {
+            self.cut_off().await?;
+        }
+        if plan.steps.len() != before {
+            plain::write_length(&arrays, description, plan.steps.len()).await?;
+        }
+        self.place(placed).await?;
+        let compared = if is_anew { &[] } else { &state.steps[..] };
+        if let Some(first) = plan.first_change(compared) {
+            axis::write(&arrays, description, &plan.steps, first).await?;
+        }
+        let mut session = state.session.write().await;
+        let properties = description.version.as_ref().map(|version| {
+            BTreeMap::from([("version".to_owned(), Value::from(version.to_string()))])
+        });
+        let committed = session
+            .commit(message)
+            .properties(properties.unwrap_or_default())
+            .execute();
+        match committed.await {
+            Ok(snapshot) => Ok(Some(snapshot.to_string())),
+            Err(error) if matches!(error.kind, SessionErrorKind::Conflict { .. }) => {
+                tracing::debug!(place = %self.repository.place, "others committed before");
+                Ok(None)
+            }
+            Err(error) => Err(self.repository.failed("committing", &error)),
+        }
+    }
+
+    /// Removes all that is there: cells of another grid or quantity have no place in what comes.
+    async fn clear(&self) -> Result<(), CubeError> {
+        let mut session = self.state.session.write().await;
+        let cleared = session.clear().await;
+        cleared.map_err(|e| self.failed(&e))
+    }
+
+    /// Steps that are there and come to lie elsewhere: by reference.
+    async fn moved(&self) -> Result<Vec<Placed>, CubeError> {
+        let session = self.state.session.read().await;
+        let mut moved = vec![];
+        for (new, old) in self.plan.moves() {
+            for [row, col] in &self.indices {
+                let there = ChunkIndices(vec![old as u32, *row, *col]);
+                let payload = session.get_chunk_ref(self.path, &there).await;
+                let here = ChunkIndices(vec![new as u32, *row, *col]);
+                moved.push((here, payload.map_err(|e| self.failed(&e))?));
+            }
+        }
+        Ok(moved)
+    }
+
+    /// Removes the references of what lies behind the last step to come.
+    async fn cut_off(&self) -> Result<(), CubeError> {
+        let (before, after) = (self.state.steps.len(), self.plan.steps.len());
+        let mut behind = vec![];
+        for place in after..before {
+            for [row, col] in &self.indices {
+                behind.push(ChunkIndices(vec![place as u32, *row, *col]));
+            }
+        }
+        let mut session = self.state.session.write().await;
+        let cut = session.delete_chunks(self.path, behind).await;
+        cut.map_err(|e| self.failed(&e))?;
+        let axis = arrays::axis(self.description.quantity, before as u64)?;
+        for array in axis.arrays() {
+            let steps = axis::chunk_steps(array)?;
+            let path = Path::new(array.path().as_str());
+            let path = path.map_err(|e| self.repository.failed("placing values", &e))?;
+            let mut behind = vec![];
+            for chunk in after.div_ceil(steps)..before.div_ceil(steps) {
+                let mut index = vec![0; array.dimensionality()];
+                index[0] = chunk as u32;
+                behind.push(ChunkIndices(index));
+            }
+            let cut = session.delete_chunks(&path, behind).await;
+            cut.map_err(|e| self.failed(&e))?;
+        }
+        Ok(())
+    }
+
+    /// Gives the values their places in time: those that are there move by reference, those that were put are named.
+    async fn place(&self, moved: Vec<Placed>) -> Result<(), CubeError> {
+        let mut placed = moved;
+        for (place, start) in &self.plan.staged {
+            for ([row, col], payload) in &self.staged[start].objects {
+                let here = ChunkIndices(vec![*place as u32, *row, *col]);
+                placed.push((here, payload.clone()));
+            }
+        }
+        let mut session = self.state.session.write().await;
+        for (here, payload) in placed {
+            let set = session.set_chunk_ref(self.path.clone(), here, payload);
+            set.await.map_err(|e| self.failed(&e))?;
+        }
+        Ok(())
+    }
+
+    fn failed(&self, error: &SessionError) -> CubeError {
+        self.repository.failed("placing values", error)
+    }
+}

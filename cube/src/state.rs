@@ -1,0 +1,53 @@
+//! The newest state of a cube, as a change builds on it.
+
+use std::sync::Arc;
+
+use icechunk::format::Path;
+use icechunk::session::{Session, SessionErrorKind};
+use tokio::sync::RwLock;
+use zarrs_icechunk::AsyncIcechunkStore;
+
+use crate::{CubeError, Description, Repository, Step, axis};
+
+/// What is there, and a session that changes it.
+pub(crate) struct State {
+    pub(crate) session: Arc<RwLock<Session>>,
+    /// Names it.
+    pub(crate) snapshot: String,
+    /// None of a repository that was made and never committed to.
+    pub(crate) description: Option<Description>,
+    pub(crate) steps: Vec<Step>,
+}
+
+impl State {
+    pub(crate) async fn newest(repository: &Repository) -> Result<Self, CubeError> {
+        let session = repository.session().await?;
+        let root = session.read().await.get_group(&Path::root()).await;
+        let is_empty = match root {
+            Ok(_group) => false,
+            Err(e) if matches!(e.kind, SessionErrorKind::NodeNotFound { .. }) => true,
+            Err(e) => return Err(repository.failed("reading the newest state", &e)),
+        };
+        let snapshot = session.read().await.snapshot_id().to_string();
+        let (description, steps) = if is_empty {
+            (None, vec![])
+        } else {
+            let arrays = Arc::new(AsyncIcechunkStore::from(Arc::clone(&session)));
+            let description = Description::of_group(&arrays, &repository.place).await?;
+            let steps = axis::read(&arrays, &description, &repository.place).await?;
+            (Some(description), steps)
+        };
+        Ok(Self {
+            session,
+            snapshot,
+            description,
+            steps,
+        })
+    }
+
+    /// Do its chunks hold the same cells of the same quantity?
+    pub(crate) fn describes_same_cells(&self, other: &Description) -> bool {
+        let own = self.description.as_ref();
+        own.is_some_and(|own| (own.grid, own.quantity) == (other.grid, other.quantity))
+    }
+}

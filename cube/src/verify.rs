@@ -1,0 +1,239 @@
+//! The cube of a product in, what is wrong with it out: every version opened, every step compared with its digest, every
+//! chunk that is damaged or gone told by the array and the place it has there.
+//!
+//! Objects themselves are compared with their checksums and seals by `storage::verify`, as those of all kinds are.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use contract::key::ObjectKey;
+use contract::kind::Kind;
+use contract::product::ProductId;
+use futures::TryStreamExt as _;
+use icechunk::format::manifest::ChunkPayload;
+use storage::verify::{Fault, Finding};
+use storage::{Store, manifests};
+
+use crate::follow::folder;
+use crate::{At, Cube, CubeError, Repository, Step};
+
+/// What a cube was found to be.
+#[derive(Debug, Clone, Default)]
+pub struct Checked {
+    /// What is wrong besides objects that are damaged in themselves.
+    pub findings: Vec<Finding>,
+    /// Of chunks that are damaged or gone: array and place.
+    pub places: BTreeMap<ObjectKey, String>,
+}
+
+impl Checked {
+    /// Adds to a finding which part of which array its object is.
+    pub fn explain(&self, finding: &mut Finding) {
+        if let Some(place) = self.places.get(&finding.key) {
+            finding.reason = format!("{}; it is {place}", finding.reason);
+        }
+    }
+}
+
+/// Products that have a cube in a store, sorted.
+pub async fn products(store: &Store) -> Result<Vec<ProductId>, CubeError> {
+    let names = store.folders(Kind::Cube.folder()).await?;
+    Ok(names.iter().filter_map(|name| name.parse().ok()).collect())
+}
+
+/// Checks the cube of a product. `damaged` are objects that are known to be: they are told by their places, no more.
+///
+/// # Errors
+/// The store does not answer. Whatever is wrong with the cube is a finding.
+pub async fn check(
+    store: &Store,
+    product: &ProductId,
+    damaged: &BTreeSet<ObjectKey>,
+) -> Result<Checked, CubeError> {
+    let folder = folder(product);
+    let check = Check {
+        store,
+        entry: format!("{folder}/repo").parse().map_err(|e| named(&folder, &e))?,
+        there: store.list(&folder).await?.into_iter().collect(),
+        is_damaged: damaged.iter().any(|key| key.is_in(&folder)),
+        folder,
+        damaged,
+    };
+    let mut checked = Checked::default();
+    match check.versions(product, &mut checked).await {
+        Ok(()) => {}
+        // What it needs is damaged, and told of already.
+        Err(error) if check.is_damaged => {
+            tracing::debug!(%error, "what is left of a cube cannot be read");
+        }
+        Err(CubeError::Storage(error)) => return Err(error.into()),
+        Err(error) => checked.findings.push(check.finding(&error)),
+    }
+    Ok(checked)
+}
+
+fn named(place: &str, error: &dyn std::fmt::Display) -> CubeError {
+    CubeError::library(place, "naming an object", error)
+}
+
+struct Check<'a> {
+    store: &'a Store,
+    folder: String,
+    /// The object that all is found by.
+    entry: ObjectKey,
+    there: BTreeSet<ObjectKey>,
+    damaged: &'a BTreeSet<ObjectKey>,
+    /// Is one of these of this cube?
+    is_damaged: bool,
+}
+
+impl Check<'_> {
+    fn finding(&self, error: &CubeError) -> Finding {
+        Finding {
+            key: self.entry.clone(),
+            fault: Fault::Damaged,
+            reason: error.to_string(),
+        }
+    }
+
+    async fn versions(&self, product: &ProductId, checked: &mut Checked) -> Result<(), CubeError> {
+        let repository = Repository::open(self.store, &self.folder).await?;
+        let mut seen = BTreeSet::new();
+        let newest = repository.at(&At::Newest).await?;
+        self.version(&newest, "the newest state", &mut seen, checked)
+            .await?;
+        for version in repository.versions().await? {
+            let cube = repository.at(&At::Version(version.clone())).await?;
+            let shown = format!("version {version}");
+            self.version(&cube, &shown, &mut seen, checked).await?;
+        }
+        let (own, latest) = (
+            newest.description().version.as_ref(),
+            manifests::latest(self.store, product).await?,
+        );
+        if let Some(latest) = latest.map(|latest| latest.id())
+            && own != Some(&latest)
+        {
+            let own = own.map_or_else(|| "none".to_owned(), ToString::to_string);
+            checked.findings.push(Finding {
+                key: self.entry.clone(),
+                fault: Fault::Behind,
+                reason: format!("its newest version is {own}, that of the product {latest}"),
+            });
+        }
+        Ok(())
+    }
+
+    /// One version: where its damaged chunks are, and its steps that no version before it had.
+    async fn version(
+        &self,
+        cube: &Cube,
+        shown: &str,
+        seen: &mut BTreeSet<[u8; 32]>,
+        checked: &mut Checked,
+    ) -> Result<(), CubeError> {
+        let fresh: Vec<(usize, &Step)> = cube
+            .steps()
+            .iter()
+            .enumerate()
+            .filter(|(_, step)| seen.insert(*step.values_sha256.as_bytes()))
+            .collect();
+        let unplaced = self.damaged.iter();
+        let mut unplaced = unplaced.filter(|key| !checked.places.contains_key(key));
+        if fresh.is_empty() && unplaced.next().is_none() {
+            return Ok(());
+        }
+        let broken = self.broken_chunks(cube, shown, checked).await?;
+        for (place, step) in fresh {
+            // Told of already, by its object.
+            if broken.contains(&(place as u32)) {
+                continue;
+            }
+            match cube.frame(place).await {
+                Ok(_values) => {}
+                Err(error @ (CubeError::Chunk { .. } | CubeError::Step { .. })) => {
+                    let mut finding = self.finding(&error);
+                    finding.reason = format!("{error} (step {} of {shown})", step.period);
+                    checked.findings.push(finding);
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(())
+    }
+
+    /// Notes where chunks are that are damaged or gone, and returns the steps whose values those are of.
+    async fn broken_chunks(
+        &self,
+        cube: &Cube,
+        shown: &str,
+        checked: &mut Checked,
+    ) -> Result<BTreeSet<u32>, CubeError> {
+        let session = cube.session();
+        let session = session.read().await;
+        let failed = |e| CubeError::library(&self.folder, "listing chunks", e);
+        let mut chunks = std::pin::pin!(session.all_chunks().await.map_err(failed)?);
+        let mut broken = BTreeSet::new();
+        while let Some((path, chunk)) = chunks.try_next().await.map_err(failed)? {
+            let ChunkPayload::Ref(reference) = &chunk.payload else {
+                continue;
+            };
+            let key = format!("{}/chunks/{}", self.folder, reference.id);
+            let key: ObjectKey = key.parse().map_err(|e| named(&self.folder, &e))?;
+            let (array, index) = (path.to_string(), &chunk.coord.0);
+            let array = array.trim_start_matches('/');
+            let is_gone = !self.there.contains(&key);
+            if !is_gone && !self.damaged.contains(&key) {
+                continue;
+            }
+            if array == cube.array_name() {
+                broken.extend(index.first());
+            }
+            let place = format!("chunk {index:?} of {array} in {shown}");
+            if is_gone && !checked.places.contains_key(&key) {
+                checked.findings.push(Finding {
+                    key: key.clone(),
+                    fault: Fault::Missing,
+                    reason: format!("a cube names it as {place}"),
+                });
+            }
+            checked.places.entry(key).or_insert(place);
+        }
+        Ok(broken)
+    }
+}
+
+/// Brings the cube of a product to its newest version, whatever became of it: one that is damaged is made again from the
+/// versions that are there. True if it was made again.
+///
+/// # Errors
+/// The store does not answer; a frame that the cube is made of is damaged or gone.
+pub async fn mend(store: &Store, product: &ProductId) -> Result<bool, CubeError> {
+    let folder = folder(product);
+    let keys = store.list(&folder).await?;
+    let damaged = storage::verify::damaged(store, keys.iter().cloned()).await?;
+    let mut is_whole = damaged.is_empty();
+    if is_whole && !keys.is_empty() {
+        let checked = check(store, product, &damaged).await?;
+        let mut faults = checked.findings.iter().map(|finding| finding.fault);
+        is_whole = faults.all(|fault| fault == Fault::Behind);
+    }
+    let versions = manifests::numbers(store, product).await?;
+    let Some(newest) = manifests::latest(store, product).await? else {
+        return Ok(false);
+    };
+    if is_whole && let Ok(_followed) = crate::follow(store, &newest).await {
+        return Ok(false);
+    }
+    // What says where all else is goes last: until then others find a damaged cube, and none that they may add to.
+    let entry = format!("{folder}/repo");
+    let (last, first): (Vec<_>, Vec<_>) = keys.iter().partition(|key| key.is_in(&entry));
+    for key in first.into_iter().chain(last) {
+        store.remove(key).await?;
+    }
+    for number in versions {
+        if let Some(manifest) = manifests::numbered(store, product, number).await? {
+            crate::follow(store, &manifest).await?;
+        }
+    }
+    Ok(true)
+}

@@ -1,0 +1,138 @@
+//! Objects of a cube, that is of an Icechunk repository: chunks of arrays, which end in a checksum of their own, and what
+//! names them (snapshots, manifests, logs of transactions, `repo`), which its library compresses and does not check. That
+//! is sealed here, where decoders pass over it.
+
+use contract::key::ObjectKey;
+
+use super::Soundness;
+use super::seal::{self, Seal};
+
+/// Folder of chunks.
+const CHUNKS: &str = "chunks";
+/// Chunks of a shard: as many entries has the index at its end.
+pub const SHARD_CHUNKS: usize = 64;
+/// Place and length of a chunk in a shard, bytes.
+const ENTRY_BYTES: usize = 16;
+const CRC_BYTES: usize = 4;
+
+/// The name of an object in its repository, which is a folder of a product in the folder of all cubes.
+pub(super) fn name_of(key: &ObjectKey) -> &str {
+    key.as_str().splitn(3, '/').nth(2).unwrap_or_default()
+}
+
+/// Is this the name of a chunk? Its content is an array's, and its checksum the array's own.
+fn is_chunk(name: &str) -> bool {
+    name.split('/').next() == Some(CHUNKS)
+}
+
+/// The content of an object as it is stored: sealed, unless it is a chunk.
+pub fn sealed(name: &str, content: &[u8]) -> Option<Vec<u8>> {
+    (!is_chunk(name)).then(|| seal::zstd(content))
+}
+
+/// Compares the content of an object with its checksums or its seal; what another program wrote has no seal.
+///
+/// # Errors
+/// Why it is not what was stored.
+pub fn check(name: &str, content: &[u8]) -> Result<Soundness, &'static str> {
+    if is_chunk(name) {
+        return if is_right(content) || is_right_shard(content) {
+            Ok(Soundness::Sound)
+        } else {
+            Err("its bytes are not those of its checksum (crc32c)")
+        };
+    }
+    match seal::of_zstd(content) {
+        Seal::Whole => Ok(Soundness::Sound),
+        Seal::Broken => Err("its bytes are not those that were sealed"),
+        Seal::Absent => Ok(Soundness::Unsealed),
+    }
+}
+
+/// Does this end in its own checksum?
+fn is_right(content: &[u8]) -> bool {
+    content
+        .split_last_chunk::<CRC_BYTES>()
+        .is_some_and(|(data, told)| crc32c::crc32c(data) == u32::from_le_bytes(*told))
+}
+
+/// Is this a shard: chunks that end in their checksums, and an index of them that does, too, and nothing besides?
+fn is_right_shard(content: &[u8]) -> bool {
+    let index_bytes = SHARD_CHUNKS * ENTRY_BYTES + CRC_BYTES;
+    let at = content.len().checked_sub(index_bytes);
+    let Some((chunks, index)) = at.map(|at| content.split_at(at)) else {
+        return false;
+    };
+    if !is_right(index) {
+        return false;
+    }
+    let number = |bytes: &[u8]| bytes.try_into().map_or(u64::MAX, u64::from_le_bytes);
+    let mut checked_bytes = 0;
+    for entry in index[..index_bytes - CRC_BYTES].chunks_exact(ENTRY_BYTES) {
+        let (offset, length) = entry.split_at(ENTRY_BYTES / 2);
+        let (offset, length) = (number(offset), number(length));
+        // A chunk without data is not stored.
+        if (offset, length) == (u64::MAX, u64::MAX) {
+            continue;
+        }
+        let end = offset.saturating_add(length).min(chunks.len() as u64);
+        let chunk = chunks.get(offset as usize..end as usize);
+        if !chunk.is_some_and(is_right) {
+            return false;
+        }
+        checked_bytes += length;
+    }
+    checked_bytes == chunks.len() as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn with_crc(data: &[u8]) -> Vec<u8> {
+        [data, &crc32c::crc32c(data).to_le_bytes()].concat()
+    }
+
+    /// A shard of two chunks.
+    fn shard() -> Vec<u8> {
+        let (one, two) = (with_crc(b"some values"), with_crc(b"others"));
+        let mut index = vec![u64::MAX; SHARD_CHUNKS * 2];
+        (index[4], index[5]) = (0, one.len() as u64);
+        (index[6], index[7]) = (one.len() as u64, two.len() as u64);
+        let index: Vec<u8> = index.iter().flat_map(|it| it.to_le_bytes()).collect();
+        [one, two, with_crc(&index)].concat()
+    }
+
+    #[test]
+    fn no_bit_of_a_chunk_or_a_shard_or_of_what_names_them_can_change_unseen() {
+        let metadata = sealed("snapshots/A", b"compressed").unwrap();
+        for (name, content) in [
+            ("chunks/A", with_crc(b"values")),
+            ("chunks/B", shard()),
+            ("snapshots/A", metadata),
+        ] {
+            assert_eq!(check(name, &content), Ok(Soundness::Sound), "{name}");
+            for at in 0..content.len() * 8 {
+                let mut flipped = content.clone();
+                flipped[at / 8] ^= 1 << (at % 8);
+                assert!(check(name, &flipped).is_err(), "{name}: bit {at}");
+            }
+        }
+        assert_eq!(sealed("chunks/A", b""), None);
+        assert_eq!(check("repo", b"of others"), Ok(Soundness::Unsealed));
+        assert!(check("chunks/A", b"").is_err());
+    }
+
+    #[test]
+    fn a_shard_with_bytes_that_no_chunk_holds_is_none() {
+        let mut longer = shard();
+        longer.insert(0, 7);
+        assert!(check("chunks/A", &longer).is_err());
+    }
+
+    #[test]
+    fn the_name_in_its_repository_is_what_follows_the_product() {
+        let key: ObjectKey = "cubes/p/chunks/A".parse().unwrap();
+        assert_eq!(name_of(&key), "chunks/A");
+    }
+}
