@@ -83,7 +83,9 @@ impl Axis {
     /// All of them.
     pub(crate) fn arrays(&self) -> impl Iterator<Item = &Definition> {
         let start = self.step_start.iter();
-        [&self.time, &self.bounds, &self.digests].into_iter().chain(start)
+        [&self.time, &self.bounds, &self.digests]
+            .into_iter()
+            .chain(start)
     }
 }
 

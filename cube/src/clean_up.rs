@@ -76,7 +76,8 @@ pub async fn run(
         let repository = Repository::open(store, &folder(&product)).await?;
         let cutoff = older_than(now, age, &repository)?;
         let versions = repository.cut_names(&numbers, cutoff, is_dry_run).await?;
-        let (objects_count, size_bytes) = repository.remove_unused(cutoff, is_dry_run).await?;
+        let (objects_count, size_bytes) =
+            Box::pin(repository.remove_unused(cutoff, is_dry_run)).await?;
         all.push(Cleaned {
             product,
             versions,
@@ -107,19 +108,34 @@ impl Repository {
         is_dry_run: bool,
     ) -> Result<Vec<String>, CubeError> {
         let failed = |e: &dyn std::fmt::Display| self.failed("cleaning up", e);
-        let newest: SnapshotId = self.inner.lookup_branch(crate::repository::BRANCH).await.map_err(|e| failed(&e))?;
+        let newest: SnapshotId = self
+            .inner
+            .lookup_branch(crate::repository::BRANCH)
+            .await
+            .map_err(|e| failed(&e))?;
         let mut cut = vec![];
         for version in self.versions().await? {
             if kept.contains(&version) {
                 continue;
             }
-            let id = self.inner.lookup_tag(&version).await.map_err(|e| failed(&e))?;
-            let info = self.inner.lookup_snapshot(&id).await.map_err(|e| failed(&e))?;
+            let id = self
+                .inner
+                .lookup_tag(&version)
+                .await
+                .map_err(|e| failed(&e))?;
+            let info = self
+                .inner
+                .lookup_snapshot(&id)
+                .await
+                .map_err(|e| failed(&e))?;
             if id == newest || info.flushed_at >= older_than {
                 continue;
             }
             if !is_dry_run {
-                self.inner.delete_tag(&version).await.map_err(|e| failed(&e))?;
+                self.inner
+                    .delete_tag(&version)
+                    .await
+                    .map_err(|e| failed(&e))?;
             }
             cut.push(version);
         }
@@ -164,7 +180,9 @@ impl Repository {
             Some(own.repo_update_retries()),
             own.num_updates_per_repo_info_file(),
         );
-        let removed = removed.await.map_err(|e| self.failed("cleaning up", &e))?;
+        let removed = Box::pin(removed)
+            .await
+            .map_err(|e| self.failed("cleaning up", &e))?;
         if let Some(error) = removed.delete_errors.first() {
             return Err(self.failed("cleaning up", error));
         }

@@ -96,9 +96,10 @@ impl Follower<'_> {
                     put_count: edit.staged().len(),
                 });
             }
-            let before: &[Step] = match state.describes_same_cells(&description) {
-                true => &state.steps,
-                false => &[],
+            let before: &[Step] = if state.describes_same_cells(&description) {
+                &state.steps
+            } else {
+                &[]
             };
             let wanted = self.wanted(manifest, &state, before, &mut edit).await?;
             let plan = Plan::exactly(&wanted, before, edit.staged());

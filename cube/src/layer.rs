@@ -9,8 +9,8 @@ use icechunk::session::{SessionError, SessionErrorKind};
 use serde_json::Value;
 use zarrs_icechunk::AsyncIcechunkStore;
 
-use crate::staged::AllStaged;
 use crate::plan::Plan;
+use crate::staged::AllStaged;
 use crate::state::State;
 use crate::{CubeError, Description, Repository, arrays, axis, plain};
 

@@ -27,8 +27,8 @@ use icechunk_storage::sealed::Sealed;
 use object_store::path::Path;
 use object_store::{GetOptions, GetRange, ObjectStoreExt as _};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
-use storage::{Store, sound};
 use storage::store::Seen;
+use storage::{Store, sound};
 
 type Pieces = Pin<Box<dyn Stream<Item = Result<Bytes, StorageError>> + Send>>;
 

@@ -52,7 +52,9 @@ pub async fn check(
     let folder = folder(product);
     let check = Check {
         store,
-        entry: format!("{folder}/repo").parse().map_err(|e| named(&folder, &e))?,
+        entry: format!("{folder}/repo")
+            .parse()
+            .map_err(|e| named(&folder, &e))?,
         there: store.list(&folder).await?.into_iter().collect(),
         is_damaged: damaged.iter().any(|key| key.is_in(&folder)),
         folder,
@@ -99,12 +101,18 @@ impl Check<'_> {
         let repository = Repository::open(self.store, &self.folder).await?;
         let mut seen = BTreeSet::new();
         let newest = repository.at(&At::Newest).await?;
-        self.version(&newest, "the newest state", &mut seen, checked)
-            .await?;
+        let mut states = vec![("the newest state".to_owned(), At::Newest)];
         for version in repository.versions().await? {
-            let cube = repository.at(&At::Version(version.clone())).await?;
-            let shown = format!("version {version}");
-            self.version(&cube, &shown, &mut seen, checked).await?;
+            states.push((format!("version {version}"), At::Version(version)));
+        }
+        for (shown, at) in states {
+            let cube = repository.at(&at).await?;
+            if self
+                .has_manifests(&repository, &cube, &shown, checked)
+                .await?
+            {
+                self.version(&cube, &shown, &mut seen, checked).await?;
+            }
         }
         let (own, latest) = (
             newest.description().version.as_ref(),
@@ -121,6 +129,34 @@ impl Check<'_> {
             });
         }
         Ok(())
+    }
+
+    /// Is everything there that says where a version's chunks are? What of it is damaged is told of already.
+    async fn has_manifests(
+        &self,
+        repository: &Repository,
+        cube: &Cube,
+        shown: &str,
+        checked: &mut Checked,
+    ) -> Result<bool, CubeError> {
+        let snapshot = cube.session().read().await.snapshot_id().clone();
+        let files = repository.inner.lookup_manifest_files(&snapshot).await;
+        let files = files.map_err(|e| repository.failed("listing manifests", &e))?;
+        let mut has_all = true;
+        for file in files {
+            let key = format!("{}/manifests/{}", self.folder, file.id);
+            let key: ObjectKey = key.parse().map_err(|e| named(&self.folder, &e))?;
+            let is_told = checked.findings.iter().any(|finding| finding.key == key);
+            has_all &= self.there.contains(&key);
+            if !self.there.contains(&key) && !is_told {
+                checked.findings.push(Finding {
+                    key,
+                    fault: Fault::Missing,
+                    reason: format!("{shown} of a cube names it"),
+                });
+            }
+        }
+        Ok(has_all)
     }
 
     /// One version: where its damaged chunks are, and its steps that no version before it had.
@@ -221,7 +257,11 @@ pub async fn mend(store: &Store, product: &ProductId) -> Result<bool, CubeError>
     let Some(newest) = manifests::latest(store, product).await? else {
         return Ok(false);
     };
-    if is_whole && let Ok(_followed) = crate::follow(store, &newest).await {
+    // Of a newer version than there is: somebody took the newest manifest away.
+    if is_whole
+        && let Ok(followed) = crate::follow(store, &newest).await
+        && followed.version == newest.id()
+    {
         return Ok(false);
     }
     // What says where all else is goes last: until then others find a damaged cube, and none that they may add to.

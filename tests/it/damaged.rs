@@ -71,6 +71,36 @@ fn a_flipped_bit_of_any_object_or_of_the_journal_is_named_by_verify() {
     assert_eq!(named(data), [""; 0]);
 }
 
+/// Of each part of a cube, chunks among them, one: an array's chunk is told by its place in it.
+#[test]
+fn a_flipped_bit_of_a_cube_is_named_with_product_array_and_chunk() {
+    let data = data();
+    let data = data.path();
+    let cube = data.join("objects/cubes/fgco2");
+    let mut parts = BTreeSet::new();
+    for path in files(&cube) {
+        let part = path.strip_prefix(&cube).unwrap().iter().next().unwrap();
+        if !parts.insert(part.to_owned()) {
+            continue;
+        }
+        let whole = std::fs::read(&path).unwrap();
+        flip(&path);
+        let output = program::run(data, &["verify", "--product", "fgco2"]).unwrap();
+        assert!(!output.status.success());
+        let told = String::from_utf8_lossy(&output.stdout).into_owned();
+        let key = path.strip_prefix(data.join("objects")).unwrap();
+        assert!(told.starts_with(key.to_str().unwrap()), "{told}");
+        let is_chunk = part == "chunks";
+        assert_eq!(
+            told.contains("of carbon_flux in the newest state"),
+            is_chunk,
+            "{told}"
+        );
+        std::fs::write(&path, whole).unwrap();
+    }
+    assert_eq!(parts.len(), 5, "{parts:?}");
+}
+
 #[test]
 fn a_damaged_journal_ends_a_command_with_its_entry_and_stays_as_it_is() {
     let data = data();

@@ -31,6 +31,34 @@ async fn frame(store: &Store, manifest: &Manifest, step: usize) -> Vec<f32> {
         .unwrap()
 }
 
+/// Whoever derived it may have been killed before the cube followed.
+#[tokio::test(flavor = "multi_thread")]
+async fn what_is_derived_is_a_cube_too_and_one_that_is_behind_is_brought_up() {
+    let (_folder, store) = folder_store();
+    let (id, year) = (product("wavy"), wavy_year(&ONE_DEGREE));
+    land(&store, &id, Quantity::CarbonFlux, ONE_DEGREE, &year, 12).await;
+    let engine = Engine::local(store.clone());
+    let derived = derive(&engine, "wavy", None).await;
+    for is_again in [false, true] {
+        if is_again {
+            for key in store.list("cubes").await.unwrap() {
+                store.remove(&key).await.unwrap();
+            }
+            assert_eq!(derive(&engine, "wavy", None).await, derived);
+        }
+        let repository = cube::Repository::open(&store, "cubes/wavy-accumulated").await;
+        let cube = repository.unwrap().at(&cube::At::Newest).await.unwrap();
+        assert_eq!(cube.description().version, Some(derived.id()));
+        assert_eq!(cube.steps().len(), 12);
+        let (there, here) = (
+            cube.frame(11).await.unwrap(),
+            frame(&store, &derived, 11).await,
+        );
+        let same = |(a, b): (&f32, &f32)| a == b || (a.is_nan() && b.is_nan());
+        assert!(there.iter().zip(&here).all(same));
+    }
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn the_last_frame_holds_the_printed_budget() {
     let (_folder, store) = folder_store();

@@ -6,6 +6,8 @@ use contract::manifest::{MANIFEST_SCHEMA, Manifest};
 use cube::{At, Repository, folder, follow};
 use storage::{Store, frames, manifests};
 
+use crate::product::bits;
+
 fn frozen(version: u32) -> PathBuf {
     let frozen = Path::new(env!("CARGO_MANIFEST_DIR")).join("../storage/tests/frozen");
     frozen.join(version.to_string()).join("objects")
@@ -44,9 +46,11 @@ async fn holds(store: &Store, manifest: &Manifest, at: At) {
     assert_eq!(cube.steps().len(), manifest.steps.len());
     for (place, step) in manifest.steps.iter().enumerate() {
         assert_eq!(cube.steps()[place].period, step.period);
-        let frame = frames::read(store, &step.frame, &manifest.grid).await.unwrap();
+        let frame = frames::read(store, &step.frame, &manifest.grid)
+            .await
+            .unwrap();
         let found = cube.frame(place).await.unwrap();
-        assert!(found.iter().zip(&frame).all(|(a, b)| a == b || (a.is_nan() && b.is_nan())));
+        assert_eq!(bits(&found), bits(&frame), "step {place}");
     }
 }
 

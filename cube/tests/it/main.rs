@@ -5,6 +5,7 @@
 mod damage;
 mod follow;
 mod frozen;
+mod kept;
 mod plain;
 mod product;
 mod rivals;

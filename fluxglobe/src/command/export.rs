@@ -3,10 +3,9 @@
 use std::sync::Arc;
 
 use anyhow::{Context as _, Result, bail};
-use contract::key::ObjectKey;
-use contract::manifest::Manifest;
+use contract::manifest::{Manifest, Step};
 use contract::time::Period;
-use cube::{Description, Edit, PlainZarr, Repository};
+use cube::{At, Cube, Description, Follower, PlainZarr, Repository};
 use futures::stream::{self, StreamExt as _, TryStreamExt as _};
 use indicatif::ProgressBar;
 use serde::Serialize;
@@ -41,7 +40,8 @@ pub(crate) async fn run(settings: &Settings, options: &Export) -> Result<()> {
     let tag = match options.to {
         ExportFormat::Zarr => {
             let mut zarr = PlainZarr::create(&destination, "", &description).await?;
-            let mut frames = std::pin::pin!(frames(&store, &manifest, &bar));
+            let cube = own_cube(&store, &manifest).await;
+            let mut frames = std::pin::pin!(frames(&store, cube.as_ref(), &manifest, &bar));
             while let Some((period, values)) = frames.try_next().await? {
                 zarr.append(period, values).await?;
                 bar.inc(1);
@@ -50,19 +50,18 @@ pub(crate) async fn run(settings: &Settings, options: &Export) -> Result<()> {
             None
         }
         ExportFormat::Icechunk => {
-            let repository = Repository::create(&destination, "", &description).await?;
-            let mut edit = Edit::begin(&repository).await?;
-            let mut frames = std::pin::pin!(frames(&store, &manifest, &bar));
-            while let Some((period, values)) = frames.try_next().await? {
-                edit.put(period, values).await?;
-                bar.inc(1);
+            if !destination.list("").await?.is_empty() {
+                bail!("{} is not empty: give another place", destination.url());
             }
-            let committed = edit.commit(&format!("export of {}", manifest.id())).await?;
-            let tag = manifest.number.to_string();
-            if let Some(snapshot) = &committed.snapshot {
-                repository.tag(&tag, snapshot).await?;
-            }
-            committed.snapshot.map(|_named| tag)
+            // A cube of one version, made as the store's own is.
+            let follower = Follower {
+                store: &destination,
+                folder: "",
+                frames: &store,
+                told: &|_period| bar.inc(1),
+            };
+            follower.run(&manifest).await?;
+            Some(manifest.number.to_string())
         }
     };
     let exported = Exported {
@@ -136,19 +135,41 @@ fn destination(text: &str) -> Result<Store> {
     Store::open(text).with_context(|| format!("cannot write to {text}"))
 }
 
-/// Frames in the order of time, a few read ahead.
+/// The version as the store's own cube has it; none if it does not, of which the frames are read then.
+async fn own_cube(store: &Store, manifest: &Manifest) -> Option<Cube> {
+    let opened = async {
+        let folder = cube::folder(&manifest.product);
+        let repository = Repository::open(store, &folder).await?;
+        let version = At::Version(manifest.number.to_string());
+        repository.at(&version).await
+    };
+    match opened.await {
+        Ok(cube) if cube.description().version == Some(manifest.id()) => Some(cube),
+        Ok(_other) => None,
+        Err(error) => {
+            tracing::debug!(%error, "frames are read, for there is no cube of the version");
+            None
+        }
+    }
+}
+
+/// Values of the steps in the order of time, a few read ahead: from the cube of the version, or from its frames.
 fn frames<'a>(
     store: &'a Store,
+    cube: Option<&'a Cube>,
     manifest: &'a Manifest,
     bar: &'a ProgressBar,
 ) -> impl stream::Stream<Item = Result<(Period, Arc<[f32]>)>> + 'a {
-    let read = move |key: &'a ObjectKey, period: Period| async move {
-        bar.set_message(progress::day(period.start));
-        let values = storage::frames::read(store, key, &manifest.grid).await?;
-        Ok((period, Arc::from(values)))
+    let read = move |place: usize, step: &'a Step| async move {
+        bar.set_message(progress::day(step.period.start));
+        let values = match cube {
+            Some(cube) => cube.frame(place).await?,
+            None => storage::frames::read(store, &step.frame, &manifest.grid).await?,
+        };
+        Ok((step.period, Arc::from(values)))
     };
-    stream::iter(&manifest.steps)
-        .map(move |step| read(&step.frame, step.period))
+    stream::iter(manifest.steps.iter().enumerate())
+        .map(move |(place, step)| read(place, step))
         .buffered(FRAMES_AHEAD)
 }
 

@@ -9,6 +9,7 @@ mod bad_input;
 mod cf_files;
 mod cleaned;
 mod contained;
+mod cubes;
 mod damaged;
 mod faults;
 mod fixture;

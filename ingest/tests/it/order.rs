@@ -81,6 +81,20 @@ async fn a_notice_that_comes_again_after_a_kill_reverts_nothing_and_tells_what_i
     assert_eq!(told, [&landed], "the version that held it");
 }
 
+/// The process that published a file dies before the cube follows; then the notice comes again.
+#[tokio::test]
+async fn a_notice_that_comes_again_after_a_kill_brings_the_cube_up() {
+    let (place, [first, _]) = editions();
+    through(&place, &[given(&first, 1)]).await;
+    let newest = place.newest("fgco2").await;
+    for key in place.store.list("cubes").await.unwrap() {
+        place.store.remove(&key).await.unwrap();
+    }
+    through(&place, &[given(&first, 1)]).await;
+    assert_eq!(place.newest("fgco2").await, newest);
+    crate::cubes::holds(&place.store, &newest).await;
+}
+
 #[tokio::test]
 async fn a_message_that_is_sent_twice_reverts_nothing_and_is_finished_in_silence() {
     let (place, [first, second]) = editions();

@@ -177,7 +177,10 @@ mod tests {
     #[test]
     fn no_bit_of_sealed_zstd_can_change_unseen() {
         let content = b"a header and frames";
-        assert_eq!((of_zstd(content), of_zstd(b"")), (Seal::Absent, Seal::Absent));
+        assert_eq!(
+            (of_zstd(content), of_zstd(b"")),
+            (Seal::Absent, Seal::Absent)
+        );
         let sealed = zstd(content);
         assert_eq!(of_zstd(&sealed), Seal::Whole);
         for at in 0..sealed.len() * 8 {

@@ -96,7 +96,11 @@ async fn put_others(store: &Store, product: &ProductId, raw_sha256: Digest, peri
             .await
             .unwrap();
     }
-    let chunk = [b"values".as_slice(), &crc32c::crc32c(b"values").to_le_bytes()].concat();
+    let chunk = [
+        b"values".as_slice(),
+        &crc32c::crc32c(b"values").to_le_bytes(),
+    ]
+    .concat();
     let metadata = super::cube::sealed("repo", b"compressed").unwrap();
     for (name, content) in [("chunks/A", chunk), ("repo", metadata)] {
         let key = format!("cubes/p/{name}").parse().unwrap();

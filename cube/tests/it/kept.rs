@@ -1,0 +1,163 @@
+//! What is kept of a cube, and what is found wrong with one.
+
+use std::collections::BTreeSet;
+use std::time::Duration;
+
+use contract::key::ObjectKey;
+use contract::time::TimeMs;
+use cube::{At, Repository, clean_up, follow, verify};
+use storage::gc::Keep;
+use storage::verify::Fault;
+use storage::{Store, manifests};
+
+use crate::follow::{holds, version};
+use crate::product::{grid, stores};
+
+/// A product of three versions, the last without the first's step, and its cube.
+async fn three_versions(store: &Store) -> Vec<contract::manifest::Manifest> {
+    let steps: [&[(u32, u32)]; 3] = [&[(1, 1)], &[(1, 10), (2, 2)], &[(1, 10), (2, 2), (3, 3)]];
+    let mut all = vec![];
+    for (at, steps) in steps.iter().enumerate() {
+        let manifest = version(store, grid(40, 60), at as u64 + 1, steps).await;
+        manifests::commit(store, &manifest).await.unwrap();
+        follow(store, &manifest).await.unwrap();
+        all.push(manifest);
+    }
+    all
+}
+
+fn in_hours(hours: i64) -> TimeMs {
+    let since = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
+    TimeMs::new(since.unwrap().as_millis() as i64 + hours * 3_600_000).unwrap()
+}
+
+async fn keys(store: &Store) -> BTreeSet<ObjectKey> {
+    store.list("cubes").await.unwrap().into_iter().collect()
+}
+
+#[tokio::test]
+async fn versions_that_are_not_kept_go_with_what_they_alone_need_and_the_others_stay() {
+    let (_folder, stores) = stores();
+    for store in stores {
+        let versions = three_versions(&store).await;
+        let all = keys(&store).await;
+        let keep = |hours| Keep {
+            versions: 2,
+            age: Duration::from_hours(hours),
+        };
+        // Nothing is old enough; and where it is only looked, nothing goes.
+        let young = clean_up::run(&store, keep(2), in_hours(1), false).await;
+        assert!(young.unwrap().iter().all(clean_up::Cleaned::is_nothing));
+        let looked = clean_up::run(&store, keep(1), in_hours(2), true).await;
+        assert_eq!(looked.unwrap()[0].versions, ["1"]);
+        assert_eq!(keys(&store).await, all);
+        let cleaned = clean_up::run(&store, keep(1), in_hours(2), false).await;
+        let cleaned = cleaned.unwrap().remove(0);
+        assert_eq!(cleaned.versions, ["1"]);
+        let gone = all.difference(&keys(&store).await).count() as u64;
+        assert!(
+            gone == cleaned.objects_count && gone >= 3,
+            "{gone} {cleaned:?}"
+        );
+        assert!(cleaned.size_bytes > 0);
+        let repository = Repository::open(&store, "cubes/p").await.unwrap();
+        assert_eq!(repository.versions().await.unwrap(), ["2", "3"]);
+        holds(
+            &store,
+            At::Version("2".to_owned()),
+            &versions[1],
+            &[(1, 10), (2, 2)],
+        )
+        .await;
+        holds(&store, At::Newest, &versions[2], &[(1, 10), (2, 2), (3, 3)]).await;
+        // What is left is whole, and goes on.
+        let product = "p".parse().unwrap();
+        let checked = verify::check(&store, &product, &BTreeSet::new())
+            .await
+            .unwrap();
+        assert_eq!(checked.findings, []);
+        let next = version(&store, grid(40, 60), 4, &[(1, 10)]).await;
+        assert_eq!(follow(&store, &next).await.unwrap().put_count, 0);
+        // An old one that comes late changes nothing.
+        assert_eq!(
+            follow(&store, &versions[0]).await.unwrap().version,
+            next.id()
+        );
+        let again = clean_up::run(&store, keep(1), in_hours(0), false).await;
+        assert!(again.unwrap()[0].is_nothing());
+    }
+}
+
+#[tokio::test]
+async fn each_part_that_is_gone_or_damaged_is_told_and_the_cube_made_again() {
+    let product = "p".parse().unwrap();
+    let names = keys(&{
+        let store = Store::memory();
+        three_versions(&store).await;
+        store
+    })
+    .await
+    .len();
+    let mut parts = BTreeSet::new();
+    for (at, is_gone) in (0..names).flat_map(|at| [(at, false), (at, true)]) {
+        let store = Store::memory();
+        let versions = three_versions(&store).await;
+        let Some(key) = keys(&store).await.into_iter().nth(at) else {
+            continue;
+        };
+        let part = key.as_str().split('/').nth(2).unwrap().to_owned();
+        let mut damaged = BTreeSet::new();
+        if is_gone {
+            store.remove(&key).await.unwrap();
+        } else {
+            let mut flipped = store.get(&key).await.unwrap().to_vec();
+            let middle = flipped.len() / 2;
+            flipped[middle] ^= 1;
+            store.put_over(&key, flipped.into()).await.unwrap();
+            damaged.insert(key.clone());
+            let found = storage::verify::damaged(&store, keys(&store).await).await;
+            assert_eq!(found.unwrap(), damaged);
+        }
+        let checked = verify::check(&store, &product, &damaged).await.unwrap();
+        if part == "chunks" {
+            let place = &checked.places[&key];
+            assert!(place.contains("of carbon_flux in "), "{place}");
+            let missing = checked.findings.iter().map(|it| (&it.key, it.fault));
+            let expected = is_gone.then_some((&key, Fault::Missing));
+            assert_eq!(missing.collect::<Vec<_>>(), Vec::from_iter(expected));
+        }
+        // Logs of transactions are for people, and so is the state before the first commit.
+        let is_found = !damaged.is_empty() || !checked.findings.is_empty();
+        let is_needed = matches!(part.as_str(), "chunks" | "manifests" | "repo");
+        assert!(is_found || !is_needed, "{key} gone: {checked:?}");
+        let is_made = verify::mend(&store, &product).await.unwrap();
+        assert_eq!(is_made, is_found, "{key}");
+        let newest = [(1, 10), (2, 2), (3, 3)];
+        holds(&store, At::Newest, &versions[2], &newest).await;
+        if is_made {
+            holds(&store, At::Version("1".to_owned()), &versions[0], &[(1, 1)]).await;
+            parts.insert(part);
+        }
+    }
+    let all = ["chunks", "manifests", "repo", "snapshots", "transactions"];
+    assert_eq!(parts, all.map(str::to_owned).into());
+}
+
+#[tokio::test]
+async fn a_cube_that_is_behind_is_told_and_brought_up() {
+    let store = Store::memory();
+    three_versions(&store).await;
+    let next = version(&store, grid(40, 60), 4, &[(1, 10)]).await;
+    manifests::commit(&store, &next).await.unwrap();
+    let product = "p".parse().unwrap();
+    let checked = verify::check(&store, &product, &BTreeSet::new())
+        .await
+        .unwrap();
+    let [finding] = &checked.findings[..] else {
+        panic!("{checked:?}");
+    };
+    assert_eq!(finding.fault, Fault::Behind);
+    assert!(finding.reason.contains("p@4-"), "{}", finding.reason);
+    assert!(!verify::mend(&store, &product).await.unwrap());
+    holds(&store, At::Newest, &next, &[(1, 10)]).await;
+}
