@@ -41,7 +41,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("render-proof", &["contract", "render", "china-sea"]),
     (
         "tile-server",
-        &["contract", "legend", "retry", "storage", "service"],
+        &["contract", "legend", "retry", "storage", "cube", "service"],
     ),
     (
         "fluxglobe",

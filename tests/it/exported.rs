@@ -1,19 +1,20 @@
 //! Products that were exported, opened by others: xarray finds the values, times and places of the files they came from.
 
-use std::path::Path;
+use std::ffi::OsStr;
 use std::process::Command;
 
 use harness::program;
+use harness::server::Server;
 use serde_json::Value;
 
 use crate::end_to_end::demo_data;
 
 /// What xarray finds in an exported product: what it compared, or what it found otherwise.
-fn compared(cube: &Path) -> Result<Value, String> {
+fn compared(cube: impl AsRef<OsStr>) -> Result<Value, String> {
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/reference/exported_cube.py");
     let run = Command::new(test_data::python())
         .arg(script)
-        .arg(cube)
+        .arg(cube.as_ref())
         .arg(test_data::fluxengine("takahashi09"))
         .output()
         .unwrap();
@@ -54,6 +55,20 @@ fn xarray_finds_the_values_times_and_places_of_the_source_files() {
     std::fs::write(chunk(3), flipped).unwrap();
     let error = compared(&cube).unwrap_err();
     assert!(error.to_lowercase().contains("checksum"), "{error}");
+}
+
+#[test]
+fn xarray_finds_the_same_over_http() {
+    let server = Server::start(demo_data(), &["serve"]).unwrap();
+    for product in ["takahashi09-flux", "takahashi09-flux@1"] {
+        let address = format!("{}/zarr/{product}", server.url);
+        let found = compared(address).unwrap();
+        assert_eq!(found["steps"], 12);
+        assert!(found["values"].as_u64().unwrap() > 400_000, "{found}");
+    }
+    // The comparison sees another product.
+    let error = compared(format!("{}/zarr/takahashi09-flux-accumulated", server.url)).unwrap_err();
+    assert!(error.contains("carbon_flux"), "{error}");
 }
 
 #[test]

@@ -67,6 +67,9 @@ pub enum ServerError {
     /// Nothing at the address.
     #[error("there is nothing at this address")]
     UnknownAddress,
+    /// The value has none of the bytes that are asked for.
+    #[error("there are {length} bytes here, and none of those in the header Range")]
+    NoRange { length: u64 },
     /// This server has no observations.
     #[error("there are no observations here")]
     NoObservations,
@@ -143,6 +146,7 @@ impl ServerError {
             | Self::NoObservations => StatusCode::NOT_FOUND,
             Self::ReadOnly => StatusCode::METHOD_NOT_ALLOWED,
             Self::BodyTooLarge { .. } => StatusCode::PAYLOAD_TOO_LARGE,
+            Self::NoRange { .. } => StatusCode::RANGE_NOT_SATISFIABLE,
             Self::Busy
             | Self::TooManyListeners
             | Self::TooManyStreams

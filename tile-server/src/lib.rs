@@ -16,6 +16,8 @@
 //!
 //! Tiles, views, TileJSON and legends take how a picture is to look, in the unit people read (`look.rs`).
 //!
+//! `/zarr/PRODUCT` is the product's cube by keys of Zarr, as it lies in the store (`cubes.rs`).
+//!
 //! Left out on purpose: drawing and computing, which come in through the traits of [`backend`].
 
 mod analyses;
@@ -24,6 +26,7 @@ pub mod backend;
 mod catalogue;
 pub mod config;
 mod connections;
+mod cubes;
 mod edition;
 pub mod error;
 mod extract;

@@ -15,7 +15,7 @@ use utoipa::{Modify, OpenApi};
 use crate::error::Refusal;
 use crate::routes::{
     area, budget, check, events, globe, health, legend, metrics, observations, openapi, palettes,
-    platforms, point, products, regions, stream, tilejson, tiles,
+    platforms, point, products, regions, stream, tilejson, tiles, zarr,
 };
 
 /// What an operation that takes long or needs others answers when it cannot.
@@ -47,6 +47,7 @@ const RETRY_AFTER: &str = "Seconds after which the same request may succeed";
         area::get,
         budget::get,
         check::get,
+        zarr::get,
         platforms::get,
         observations::get,
         health::live,

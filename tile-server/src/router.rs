@@ -11,6 +11,7 @@ use tower::ServiceBuilder;
 use tower::timeout::TimeoutLayer;
 use tower_http::catch_panic::CatchPanicLayer;
 use tower_http::compression::CompressionLayer;
+use tower_http::compression::predicate::{DefaultPredicate, NotForContentType, Predicate};
 use tower_http::cors::{Any, CorsLayer};
 use tower_http::set_header::response::SetMultipleResponseHeadersLayer;
 
@@ -19,9 +20,15 @@ use crate::middleware::{body, panics::CountPanics, security, track};
 use crate::routes::picture::{COVERED, SHOWN_TIME};
 use crate::routes::{
     area, budget, check, events, globe, health, legend, metrics, observations, openapi, palettes,
-    platforms, point, products, regions, stream, tilejson, tiles, viewer,
+    platforms, point, products, regions, stream, tilejson, tiles, viewer, zarr,
 };
 use crate::state::AppState;
+
+/// Chunks of arrays are compressed as they are, and parts of them are what was asked for.
+fn compressible() -> impl Predicate {
+    let is_no_chunk = NotForContentType::const_new("application/octet-stream");
+    DefaultPredicate::new().and(is_no_chunk)
+}
 
 /// The whole server as one service.
 pub fn router(state: AppState) -> Router {
@@ -41,7 +48,7 @@ pub fn router(state: AppState) -> Router {
             security::HEADERS.map(Into::into).into(),
         ))
         .layer(other_origins)
-        .layer(CompressionLayer::new())
+        .layer(CompressionLayer::new().compress_when(compressible()))
         .layer(CatchPanicLayer::custom(CountPanics(
             state.metrics.panics.clone(),
         )))
@@ -68,6 +75,7 @@ pub fn router(state: AppState) -> Router {
             "/api/observations/{dataset}/{platform}",
             get(observations::get),
         )
+        .route("/zarr/{product}/{*key}", get(zarr::get))
         .route("/healthz", get(health::live))
         .route("/readyz", get(health::ready))
         .route("/metrics", get(metrics::get))

@@ -20,3 +20,4 @@ pub(crate) mod stream;
 pub(crate) mod tilejson;
 pub(crate) mod tiles;
 pub(crate) mod viewer;
+pub(crate) mod zarr;

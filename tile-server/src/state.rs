@@ -11,6 +11,7 @@ use crate::analyses::Analyses;
 use crate::backend::{Analyse, Draw, Observe};
 use crate::catalogue::Catalogue;
 use crate::config::Settings;
+use crate::cubes::Cubes;
 use crate::error::ServeError;
 use crate::gate::Gate;
 use crate::live::{Freshness, HotTiles, News};
@@ -26,6 +27,8 @@ pub struct AppState(Arc<Parts>);
 pub struct Parts {
     /// Products.
     pub catalogue: Catalogue,
+    /// Products by keys of Zarr.
+    pub(crate) cubes: Cubes,
     /// Drawn pictures.
     pub pictures: Pictures,
     /// Series and budgets.
@@ -71,6 +74,7 @@ impl AppState {
         let memory_bytes = settings.tile_memory_bytes;
         Ok(Self(Arc::new(Parts {
             catalogue: Catalogue::new(store.clone(), max_age, metrics.clone()),
+            cubes: Cubes::new(store.clone()),
             pictures: Pictures::new(
                 store,
                 Arc::clone(&drawer),

@@ -89,6 +89,38 @@ async fn versions_that_are_not_kept_go_with_what_they_alone_need_and_the_others_
 }
 
 #[tokio::test]
+async fn what_a_step_held_that_was_dropped_goes_with_the_last_version_that_has_it() {
+    let store = Store::memory();
+    let chunks = async || store.list("cubes/p/chunks").await.unwrap().len();
+    let all: Vec<(u32, u32)> = (1..=5).map(|of| (of, of)).collect();
+    for (number, steps) in [(1, &all[..]), (2, &all[..2])] {
+        let manifest = version(&store, grid(40, 60), number, steps).await;
+        manifests::commit(&store, &manifest).await.unwrap();
+        follow(&store, &manifest).await.unwrap();
+    }
+    let before = chunks().await;
+    let keep = Keep {
+        versions: 1,
+        age: Duration::ZERO,
+    };
+    clean_up::run(&store, keep, in_hours(2), false)
+        .await
+        .unwrap();
+    assert_eq!(before - chunks().await, 3);
+}
+
+#[tokio::test]
+async fn a_cube_of_a_version_that_is_gone_is_made_again() {
+    let store = Store::memory();
+    let versions = three_versions(&store).await;
+    let newest = ObjectKey::manifest(&"p".parse().unwrap(), 3);
+    store.remove(&newest).await.unwrap();
+    let product = "p".parse().unwrap();
+    assert!(verify::mend(&store, &product).await.unwrap());
+    holds(&store, At::Newest, &versions[1], &[(1, 10), (2, 2)]).await;
+}
+
+#[tokio::test]
 async fn each_part_that_is_gone_or_damaged_is_told_and_the_cube_made_again() {
     let product = "p".parse().unwrap();
     let names = keys(&{

@@ -15,7 +15,7 @@ use crate::state::AppState;
 /// An address means "the newest version", so a copy may be used unasked only as long as nobody minds a late change.
 pub(crate) const CACHE_CONTROL: &str = "public, max-age=60";
 /// An address that names everything that shapes its answer has one answer for ever.
-const CACHE_CONTROL_PINNED: &str = "public, max-age=31536000, immutable";
+pub(crate) const CACHE_CONTROL_PINNED: &str = "public, max-age=31536000, immutable";
 
 /// The instant that a picture shows.
 pub(crate) const SHOWN_TIME: HeaderName = HeaderName::from_static("fluxglobe-time");

@@ -223,6 +223,7 @@ impl TestApp {
             product,
         };
         manifests::commit(&self.store, &manifest).await.unwrap();
+        cube::keep_up(&self.store, &manifest).await;
         manifest.id()
     }
 

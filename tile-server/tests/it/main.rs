@@ -38,3 +38,4 @@ mod tilejson;
 mod tiles;
 mod versions;
 mod viewer;
+mod zarr;

@@ -20,7 +20,7 @@ const COMMITTED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/openapi.json");
 const ROUTER: &str = include_str!("../../src/router.rs");
 
 /// One address of every operation, and what is sent along.
-const ASKED: [(&str, &str); 20] = [
+const ASKED: [(&str, &str); 21] = [
     (
         "/tiles/{product}/{mode}/{z}/{x}/{y}.png",
         "/tiles/flux/volume/1/0/1@2x.png",
@@ -65,6 +65,7 @@ const ASKED: [(&str, &str); 20] = [
         "/api/observations/{dataset}/{platform}",
         "/api/observations/buoys/51001",
     ),
+    ("/zarr/{product}/{key}", "/zarr/flux/zarr.json"),
     ("/healthz", "/healthz"),
     ("/readyz", "/readyz"),
     ("/metrics", "/metrics"),

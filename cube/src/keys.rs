@@ -1,0 +1,171 @@
+//! One state of a cube as Zarr's keys: metadata and encoded chunks, as whoever reads Zarr asks for them.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use bytes::Bytes;
+use icechunk::Store as ZarrStore;
+use icechunk::format::{ByteRange, ChunkIndices, Path};
+use icechunk::session::Session;
+use icechunk::store::StoreErrorKind;
+use serde_json::{Map, Value, json};
+use tokio::sync::RwLock;
+
+use crate::{At, CubeError, Description, Repository};
+
+/// Metadata of the group, or of an array in its folder.
+const METADATA: &str = "zarr.json";
+
+/// One state of a cube, by keys. It does not change.
+pub struct Keys {
+    description: Description,
+    session: Arc<RwLock<Session>>,
+    store: ZarrStore,
+    snapshot: String,
+    /// Of the group, with those of all arrays in it: who reads over HTTP can list nothing.
+    consolidated: Bytes,
+    place: String,
+}
+
+impl Repository {
+    /// Opens a state by its keys.
+    ///
+    /// # Errors
+    /// As [`Repository::at`].
+    pub async fn keys(&self, at: &At) -> Result<Keys, CubeError> {
+        let cube = self.at(at).await?;
+        let session = cube.session();
+        let failed = |e: &dyn std::fmt::Display| self.failed("describing the arrays", e);
+        let own = session.read().await;
+        let nodes = own
+            .list_nodes(&Path::root())
+            .await
+            .map_err(|e| failed(&e))?;
+        let nodes: Result<Vec<_>, _> = nodes.collect();
+        let nodes = nodes.map_err(|e| failed(&e))?;
+        let (mut group, mut arrays) = (Value::Null, Map::new());
+        for node in nodes {
+            let metadata: Value =
+                serde_json::from_slice(&node.user_data).map_err(|e| failed(&e))?;
+            match node.path.to_string().trim_start_matches('/') {
+                "" => group = metadata,
+                name => drop(arrays.insert(name.to_owned(), metadata)),
+            }
+        }
+        let snapshot = own.snapshot_id().to_string();
+        drop(own);
+        group["consolidated_metadata"] =
+            json!({ "kind": "inline", "must_understand": false, "metadata": arrays });
+        Ok(Keys {
+            description: cube.description().clone(),
+            store: ZarrStore::from_session(Arc::clone(&session)).await,
+            session,
+            snapshot,
+            consolidated: group.to_string().into(),
+            place: self.place().to_owned(),
+        })
+    }
+}
+
+impl Keys {
+    /// What it is of.
+    pub fn description(&self) -> &Description {
+        &self.description
+    }
+
+    /// Names the state: the same name, the same values of all keys.
+    pub fn snapshot(&self) -> &str {
+        &self.snapshot
+    }
+
+    /// Length of the value of a key; none if there is no such key, or a chunk without data.
+    pub async fn length(&self, key: &str) -> Result<Option<u64>, CubeError> {
+        let Some((path, index)) = chunk_of(key) else {
+            let whole = self.read(key, &ByteRange::ALL).await?;
+            return Ok(whole.map(|whole| whole.len() as u64));
+        };
+        let session = self.session.read().await;
+        // An array that is not there, or has no such chunk.
+        let Ok(payload) = session.get_chunk_ref(&path, &index).await else {
+            return Ok(None);
+        };
+        Ok(payload.map(|payload| payload.length()))
+    }
+
+    /// The value of a key, or those bytes of it; none if there is no such key, or a chunk without data.
+    ///
+    /// Chunks are as they are stored, with their checksums: who decodes them compares those.
+    pub async fn get(
+        &self,
+        key: &str,
+        range: Option<Range<u64>>,
+    ) -> Result<Option<Bytes>, CubeError> {
+        let range = range.map_or(ByteRange::ALL, ByteRange::Bounded);
+        self.read(key, &range).await
+    }
+
+    async fn read(&self, key: &str, range: &ByteRange) -> Result<Option<Bytes>, CubeError> {
+        if key == METADATA {
+            let whole = &self.consolidated;
+            return Ok(Some(match range {
+                ByteRange::Bounded(range) => {
+                    let end = range.end.min(whole.len() as u64) as usize;
+                    whole.slice((range.start as usize).min(end)..end)
+                }
+                _ => whole.clone(),
+            }));
+        }
+        match self.store.get(key, range).await {
+            Ok(content) => Ok(Some(content)),
+            Err(e) if is_absent(&e.kind) => Ok(None),
+            Err(e) => Err(CubeError::library(&self.place, "reading a key", e)),
+        }
+    }
+}
+
+/// Is there no such key, or none that could be?
+fn is_absent(error: &StoreErrorKind) -> bool {
+    matches!(
+        error,
+        StoreErrorKind::NotFound(_) | StoreErrorKind::InvalidKey { .. }
+    )
+}
+
+/// The array and the place of a chunk, if that is what a key names.
+fn chunk_of(key: &str) -> Option<(Path, ChunkIndices)> {
+    let (array, index) = match key.strip_suffix("/c") {
+        // The one chunk of a number.
+        Some(array) => (array, ""),
+        None => key.split_once("/c/")?,
+    };
+    let index: Result<Vec<u32>, _> = match index {
+        "" => Ok(vec![]),
+        index => index.split('/').map(str::parse).collect(),
+    };
+    let path = Path::new(&format!("/{array}")).ok()?;
+    Some((path, ChunkIndices(index.ok()?)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_of_chunks_name_array_and_place() {
+        let of = |key| chunk_of(key).map(|(path, index)| (path.to_string(), index.0));
+        assert_eq!(
+            of("flux/c/3/0/1"),
+            Some(("/flux".to_owned(), vec![3, 0, 1]))
+        );
+        assert_eq!(of("crs/c"), Some(("/crs".to_owned(), vec![])));
+        for none in [
+            "zarr.json",
+            "flux/zarr.json",
+            "flux/c/a",
+            "flux/c/1/-1",
+            ".zgroup",
+        ] {
+            assert_eq!(of(none), None, "{none}");
+        }
+    }
+}

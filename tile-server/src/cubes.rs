@@ -1,0 +1,97 @@
+//! Cubes of products, opened once a version.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use bytes::Bytes;
+use contract::product::ProductId;
+use cube::{At, CubeError, Keys, Repository};
+use quick_cache::sync::Cache;
+use storage::Store;
+
+use crate::error::ServerError;
+use crate::gate::Gate;
+
+/// Versions that are held open: each is its metadata, and references of chunks that were asked for.
+const HELD_OPEN: usize = 32;
+/// Values that are read at the same time: a large one is 64 MiB.
+const READS_AT_ONCE: u32 = 16;
+/// Reads that may wait: xarray asks for many chunks at once.
+const READ_QUEUE: u32 = 1024;
+
+/// Cubes in a store, to be read by their keys.
+pub(crate) struct Cubes {
+    store: Store,
+    open: Cache<String, Arc<Keys>>,
+    pub(crate) reads: Gate,
+}
+
+impl Cubes {
+    /// None opened yet.
+    pub(crate) fn new(store: Store) -> Self {
+        Self {
+            store,
+            open: Cache::new(HELD_OPEN),
+            reads: Gate::new(READS_AT_ONCE, READ_QUEUE),
+        }
+    }
+
+    /// A version of a product.
+    ///
+    /// # Errors
+    /// `UnknownVersion` if the cube has no such version (any more, or yet).
+    pub(crate) async fn version(
+        &self,
+        product: &ProductId,
+        number: u64,
+    ) -> Result<Arc<Keys>, ServerError> {
+        let name = format!("{product}@{number}");
+        let opening = async {
+            let repository = Repository::open(&self.store, &cube::folder(product)).await?;
+            let keys = repository.keys(&At::Version(number.to_string())).await;
+            keys.map(Arc::new)
+        };
+        match self.open.get_or_insert_async(&name, opening).await {
+            Ok(keys) => Ok(keys),
+            Err(CubeError::Missing { .. } | CubeError::NoVersion { .. }) => {
+                Err(ServerError::UnknownVersion { manifest: name })
+            }
+            Err(error) => Err(failed(error)),
+        }
+    }
+
+    /// The value of a key of a version that is open, or a part of it; none if there is no such key.
+    pub(crate) async fn get(
+        &self,
+        keys: &Keys,
+        key: &str,
+        range: Option<Range<u64>>,
+    ) -> Result<Option<Bytes>, ServerError> {
+        self.answered(keys, keys.get(key, range).await)
+    }
+
+    /// Its length.
+    pub(crate) async fn length(&self, keys: &Keys, key: &str) -> Result<Option<u64>, ServerError> {
+        self.answered(keys, keys.length(key).await)
+    }
+
+    fn answered<T>(&self, keys: &Keys, answer: Result<T, CubeError>) -> Result<T, ServerError> {
+        answer.map_err(|error| {
+            // It may have been made again since, of other chunks.
+            if let Some(id) = &keys.description().version {
+                self.open.remove(&format!("{}@{}", id.product, id.number));
+            }
+            failed(error)
+        })
+    }
+}
+
+/// What a cube's failure means for who asked.
+fn failed(error: CubeError) -> ServerError {
+    match error {
+        CubeError::Storage(error) => error.into(),
+        error => ServerError::Defect {
+            what: error.to_string(),
+        },
+    }
+}

@@ -1,0 +1,157 @@
+//! `/zarr/{product}/{key}`: a product as Zarr version 3, for xarray and whoever else reads it over HTTP. Chunks are sent as
+//! they are stored: who asked decodes them and compares their checksums.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use axum::body::Body;
+use axum::extract::State;
+use axum::http::{HeaderMap, StatusCode, header};
+use axum::response::{IntoResponse as _, Response};
+use cube::Keys;
+
+use crate::error::ServerError;
+use crate::extract::UrlPath;
+use crate::routes::picture::{CACHE_CONTROL, CACHE_CONTROL_PINNED, has_tag};
+use crate::state::AppState;
+
+/// A product's cube by keys of Zarr: `zarr.json` of the group describes all arrays.
+///
+/// `PRODUCT@NUMBER` is a version and never changes; `PRODUCT` is the newest, which may become another one between two
+/// requests: who reads for long names a version.
+#[utoipa::path(
+    get,
+    path = "/zarr/{product}/{key}",
+    operation_id = "zarr",
+    tag = "statistics",
+    params(
+        ("product" = String, Path, description = "Product, or a version of it, `PRODUCT@NUMBER`"),
+        ("key" = String, Path, description = "Key of Zarr version 3, such as `zarr.json` or `time/c/0`"),
+    ),
+    responses(
+        (status = 200, description = "The value of the key", content(("application/octet-stream"))),
+        (status = 206, description = "The bytes of it that `Range` asked for", content(("application/octet-stream"))),
+        (status = 304, description = "The copy that the client has is right"),
+        (status = 404, description = "No such product, version or key, or a chunk without data", body = crate::error::Refusal),
+        (status = 416, description = "It has no such bytes", body = crate::error::Refusal),
+    ),
+)]
+pub(crate) async fn get(
+    State(state): State<AppState>,
+    UrlPath((product, key)): UrlPath<(String, String)>,
+    asked: HeaderMap,
+) -> Result<Response, ServerError> {
+    let (keys, is_pinned) = opened(&state, &product).await?;
+    let tag = format!("\"{}\"", keys.snapshot());
+    let cache_control = if is_pinned {
+        CACHE_CONTROL_PINNED
+    } else {
+        CACHE_CONTROL
+    };
+    let headers = [
+        (header::ETAG, tag.clone()),
+        (header::CACHE_CONTROL, cache_control.to_owned()),
+        (header::ACCEPT_RANGES, "bytes".to_owned()),
+    ];
+    let _pass = state.cubes.reads.enter().await?;
+    let length = state.cubes.length(&keys, &key).await?;
+    let length = length.ok_or(ServerError::UnknownAddress)?;
+    if has_tag(&asked, &tag) {
+        return Ok((StatusCode::NOT_MODIFIED, headers).into_response());
+    }
+    let range = part(&asked, length)?;
+    let content = state.cubes.get(&keys, &key, range.clone()).await?;
+    let content = content.ok_or(ServerError::UnknownAddress)?;
+    let described = [(header::CONTENT_TYPE, "application/octet-stream")];
+    let Some(Range { start, end }) = range else {
+        return Ok((headers, described, Body::from(content)).into_response());
+    };
+    let place = format!("bytes {start}-{}/{length}", end - 1);
+    let place = [(header::CONTENT_RANGE, place)];
+    let status = StatusCode::PARTIAL_CONTENT;
+    Ok((status, headers, described, place, Body::from(content)).into_response())
+}
+
+/// The cube that an address names, and whether it names a version.
+async fn opened(state: &AppState, product: &str) -> Result<(Arc<Keys>, bool), ServerError> {
+    let unknown = || ServerError::UnknownVersion {
+        manifest: product.chars().take(80).collect(),
+    };
+    let (id, is_pinned) = match product.split_once('@') {
+        None => (
+            Some(state.catalogue.layer(product).await?.id.clone()),
+            false,
+        ),
+        Some((_, version)) if version.contains('-') => (Some(product.parse()?), true),
+        Some(_) => (None, true),
+    };
+    let (name, number) = match (&id, product.split_once('@')) {
+        (Some(id), _) => (id.product.clone(), id.number),
+        (None, Some((name, number))) => {
+            let number = number.parse().map_err(|_no_number| unknown())?;
+            (name.parse()?, number)
+        }
+        (None, None) => return Err(unknown()),
+    };
+    let keys = state.cubes.version(&name, number).await?;
+    if id.is_some() && keys.description().version != id {
+        return Err(unknown());
+    }
+    Ok((keys, is_pinned))
+}
+
+/// The one range of bytes that is asked for; none where all are, or several, which may be answered so (RFC 9110, 14.2).
+fn part(asked: &HeaderMap, length: u64) -> Result<Option<Range<u64>>, ServerError> {
+    let range = asked.get(header::RANGE).and_then(|it| it.to_str().ok());
+    let Some((from, to)) = range
+        .and_then(|range| range.strip_prefix("bytes="))
+        .filter(|range| !range.contains(','))
+        .and_then(|range| range.split_once('-'))
+    else {
+        return Ok(None);
+    };
+    let (start, end) = match (from.parse::<u64>(), to.parse::<u64>()) {
+        (Ok(from), Ok(to)) if from <= to => (from, to.saturating_add(1).min(length)),
+        (Ok(from), Err(_)) if to.is_empty() => (from, length),
+        (Err(_), Ok(last)) if from.is_empty() => (length.saturating_sub(last), length),
+        // No range of the standard's: as if there were none.
+        _ => return Ok(None),
+    };
+    if start < end {
+        Ok(Some(start..end))
+    } else {
+        Err(ServerError::NoRange { length })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(range: &str) -> Option<Option<Range<u64>>> {
+        let mut asked = HeaderMap::new();
+        asked.insert(header::RANGE, range.parse().unwrap());
+        part(&asked, 100).ok()
+    }
+
+    #[test]
+    fn ranges_are_those_of_the_standard() {
+        assert_eq!(of("bytes=0-9"), Some(Some(0..10)));
+        assert_eq!(of("bytes=90-"), Some(Some(90..100)));
+        assert_eq!(of("bytes=90-1000"), Some(Some(90..100)));
+        assert_eq!(of("bytes=-20"), Some(Some(80..100)));
+        assert_eq!(of("bytes=-200"), Some(Some(0..100)));
+        for all in [
+            "bytes=0-1,5-6",
+            "bytes=a-b",
+            "lines=1-2",
+            "bytes=9-1",
+            "bytes=-",
+        ] {
+            assert_eq!(of(all), Some(None), "{all}");
+        }
+        for none in ["bytes=100-", "bytes=-0", "bytes=200-300"] {
+            assert_eq!(of(none), None, "{none}");
+        }
+    }
+}

@@ -1,0 +1,128 @@
+//! Products by keys of Zarr: as they lie in the store, each version for itself, whole or in parts.
+
+use axum::http::{StatusCode, header};
+use contract::quantity::Quantity;
+use serde_json::Value;
+
+use crate::app::TestApp;
+
+#[tokio::test]
+async fn the_group_describes_all_arrays_and_their_chunks_are_there() {
+    let app = TestApp::new().await;
+    let answer = app.get("/zarr/flux/zarr.json").await;
+    assert_eq!(answer.status, StatusCode::OK);
+    let group: Value = serde_json::from_slice(&answer.body).unwrap();
+    let id = group["attributes"]["id"].as_str().unwrap();
+    let arrays = group["consolidated_metadata"]["metadata"]
+        .as_object()
+        .unwrap();
+    assert!(arrays.len() > 7, "{arrays:?}");
+    for (name, metadata) in arrays {
+        let own = app.get(&format!("/zarr/flux/{name}/zarr.json")).await;
+        assert_eq!(own.json(), *metadata, "{name}");
+    }
+    for key in [
+        "carbon_flux/c/0/0/0",
+        "time/c/0",
+        "time_bnds/c/0/0",
+        "lat/c/0",
+    ] {
+        let whole = app.get(&format!("/zarr/flux/{key}")).await;
+        assert_eq!(whole.status, StatusCode::OK, "{key}");
+        let sum = crc32c(&whole.body[..whole.body.len() - 4]);
+        assert_eq!(
+            whole.body[whole.body.len() - 4..],
+            sum.to_le_bytes(),
+            "{key}"
+        );
+        let pinned = app.get(&format!("/zarr/{id}/{key}")).await;
+        assert_eq!(pinned.body, whole.body);
+    }
+}
+
+/// The checksum that chunks end in, bit by bit (RFC 3720, B.4).
+fn crc32c(bytes: &[u8]) -> u32 {
+    let step = |sum: u32, byte: &u8| {
+        (0..8).fold(sum ^ u32::from(*byte), |sum, _bit| {
+            (sum >> 1) ^ if sum & 1 == 1 { 0x82F6_3B78 } else { 0 }
+        })
+    };
+    !bytes.iter().fold(!0, step)
+}
+
+#[tokio::test]
+async fn what_there_is_not_is_not_found() {
+    let app = TestApp::new().await;
+    for (key, said) in [
+        ("flux/.zgroup", "nothing at this address"),
+        ("flux/.zmetadata", "nothing at this address"),
+        ("flux/nothing/zarr.json", "nothing at this address"),
+        ("flux/carbon_flux/c/999/0/0", "nothing at this address"),
+        ("flux/carbon_flux/c/0/0", "nothing at this address"),
+        ("flux/carbon_flux/c/x/0/0", "nothing at this address"),
+        ("flux/../repo", "nothing at this address"),
+        ("flux/carbon_flux", "nothing at this address"),
+        ("nothing/zarr.json", "no product"),
+        ("flux@99/zarr.json", "no version"),
+        ("flux@x/zarr.json", "no version"),
+        ("flux@1-00000000/zarr.json", "no version"),
+    ] {
+        let answer = app.get(&format!("/zarr/{key}")).await;
+        assert_eq!(answer.status, StatusCode::NOT_FOUND, "{key}");
+        let text = String::from_utf8_lossy(&answer.body).into_owned();
+        assert!(text.contains(said), "{key}: {text}");
+    }
+}
+
+#[tokio::test]
+async fn parts_are_those_of_the_whole_and_copies_are_known_again() {
+    let app = TestApp::new().await;
+    let path = "/zarr/flux@1/carbon_flux/c/0/0/0";
+    let whole = app.get_with(path, &[("accept-encoding", "gzip")]).await;
+    assert_eq!(whole.headers.get(header::CONTENT_ENCODING), None);
+    let length = whole.body.len();
+    for (range, part) in [
+        ("bytes=0-9", 0..10),
+        ("bytes=5-", 5..length),
+        ("bytes=-4", length - 4..length),
+    ] {
+        let answer = app.get_with(path, &[("range", range)]).await;
+        assert_eq!(answer.status, StatusCode::PARTIAL_CONTENT);
+        assert_eq!(answer.body, whole.body[part.clone()], "{range}");
+        let place = format!("bytes {}-{}/{length}", part.start, part.end - 1);
+        assert_eq!(answer.headers[header::CONTENT_RANGE], place.as_str());
+    }
+    let metadata = app.get("/zarr/flux/zarr.json").await;
+    let answer = app
+        .get_with("/zarr/flux/zarr.json", &[("range", "bytes=2-7")])
+        .await;
+    assert_eq!(answer.body, metadata.body[2..8]);
+    let beyond = format!("bytes={length}-");
+    let beyond = app.get_with(path, &[("range", &beyond)]).await;
+    assert_eq!(beyond.status, StatusCode::RANGE_NOT_SATISFIABLE);
+    let tag = whole.headers[header::ETAG].to_str().unwrap();
+    let again = app.get_with(path, &[("if-none-match", tag)]).await;
+    assert_eq!(
+        (again.status, again.body.len()),
+        (StatusCode::NOT_MODIFIED, 0)
+    );
+    let cached = |answer: &crate::app::Answer| answer.headers[header::CACHE_CONTROL].clone();
+    assert!(cached(&whole).to_str().unwrap().contains("immutable"));
+    assert!(!cached(&metadata).to_str().unwrap().contains("immutable"));
+}
+
+#[tokio::test]
+async fn a_version_stays_what_it_is_and_the_newest_becomes_another() {
+    let app = TestApp::new().await;
+    let path = |version: &str| format!("/zarr/flux{version}/carbon_flux/c/0/0/0");
+    let first = app.get(&path("")).await;
+    let id = app.land("flux", Quantity::CarbonFlux, 2).await;
+    let second = app.get(&path("")).await;
+    assert_ne!(second.body, first.body);
+    assert_ne!(second.headers[header::ETAG], first.headers[header::ETAG]);
+    assert_eq!(app.get(&path("@1")).await.body, first.body);
+    assert_eq!(app.get(&path("@2")).await.body, second.body);
+    let digest = id.to_string();
+    let digest = digest.strip_prefix("flux").unwrap();
+    assert_eq!(app.get(&path(digest)).await.body, second.body);
+}
