@@ -176,7 +176,12 @@ async fn a_follower_killed_anywhere_leaves_what_the_next_one_makes_good() {
             let newest = repository.at(&At::Newest).await.unwrap();
             let versions = repository.versions().await.unwrap();
             let of = newest.description().version.clone().unwrap();
-            untagged += usize::from(!versions.contains(&of.number.to_string()));
+            if !versions.contains(&of.number.to_string()) {
+                untagged += 1;
+                // Named by the next one who comes with the same version, or with an older one.
+                follow(&store, &one).await.unwrap();
+                holds(&store, At::Version("1".to_owned()), &one, first).await;
+            }
         }
         // Killed again over the same version, and then over the next one.
         killed_after(answers / 2, &store, &one).await;

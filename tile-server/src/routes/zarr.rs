@@ -128,19 +128,19 @@ fn part(asked: &HeaderMap, length: u64) -> Result<Option<Range<u64>>, ServerErro
 mod tests {
     use super::*;
 
-    fn of(range: &str) -> Option<Option<Range<u64>>> {
+    fn of(range: &str) -> Result<Option<Range<u64>>, StatusCode> {
         let mut asked = HeaderMap::new();
         asked.insert(header::RANGE, range.parse().unwrap());
-        part(&asked, 100).ok()
+        part(&asked, 100).map_err(|error| error.status())
     }
 
     #[test]
     fn ranges_are_those_of_the_standard() {
-        assert_eq!(of("bytes=0-9"), Some(Some(0..10)));
-        assert_eq!(of("bytes=90-"), Some(Some(90..100)));
-        assert_eq!(of("bytes=90-1000"), Some(Some(90..100)));
-        assert_eq!(of("bytes=-20"), Some(Some(80..100)));
-        assert_eq!(of("bytes=-200"), Some(Some(0..100)));
+        assert_eq!(of("bytes=0-9"), Ok(Some(0..10)));
+        assert_eq!(of("bytes=90-"), Ok(Some(90..100)));
+        assert_eq!(of("bytes=90-1000"), Ok(Some(90..100)));
+        assert_eq!(of("bytes=-20"), Ok(Some(80..100)));
+        assert_eq!(of("bytes=-200"), Ok(Some(0..100)));
         for all in [
             "bytes=0-1,5-6",
             "bytes=a-b",
@@ -148,10 +148,10 @@ mod tests {
             "bytes=9-1",
             "bytes=-",
         ] {
-            assert_eq!(of(all), Some(None), "{all}");
+            assert_eq!(of(all), Ok(None), "{all}");
         }
         for none in ["bytes=100-", "bytes=-0", "bytes=200-300"] {
-            assert_eq!(of(none), None, "{none}");
+            assert_eq!(of(none), Err(StatusCode::RANGE_NOT_SATISFIABLE), "{none}");
         }
     }
 }
