@@ -40,17 +40,15 @@ impl Encoders {
         self.count - self.cores.available_permits()
     }
 
-    /// The picture of a job, annotations and all. `turn` is let go as soon as a core is free for it, before encoding
+    /// The bytes of a picture, with the annotations of a job over it if one is given. `turn` is let go as soon as a core is free for it, before encoding
     /// begins: whoever holds it back until then draws no more pictures than the cores can take.
     pub(crate) async fn encode(
         &self,
-        job: &RenderJob,
+        annotated: Option<RenderJob>,
         image: Image,
         encoding: Encoding,
         turn: impl Send + 'static,
     ) -> Result<Bytes, DrawError> {
-        // Most pictures have none, and no reason to copy their job.
-        let annotated = job.annotations.as_ref().map(|_some| job.clone());
         let finished = move || -> Result<Bytes, DrawError> {
             let image = match annotated {
                 Some(job) => annotation::annotated(&job, image)?,
@@ -64,7 +62,8 @@ impl Encoders {
         self.run(turn, finished).await?
     }
 
-    async fn run<T: Send + 'static>(
+    /// Does some work when a core is free for it.
+    pub(crate) async fn run<T: Send + 'static>(
         &self,
         turn: impl Send + 'static,
         work: impl FnOnce() -> T + Send + 'static,

@@ -9,6 +9,7 @@ use std::time::Duration;
 use bytes::Bytes;
 use contract::encoding::Encoding;
 use contract::job::RenderJob;
+use render::plan::Part;
 use render::scene::Scene;
 use render::{Backend, Image, Renderer, timings};
 use storage::Store;
@@ -109,17 +110,19 @@ impl Pipeline {
         self.source.scene(job).await
     }
 
-    /// Draws a loaded scene and tells how long the steps took; `held` is let go when the drawing thread has ended, also if nobody waits for it.
+    /// Draws a loaded scene, or a part of its picture, and tells how long the steps took; `held` is let go when the drawing
+    /// thread has ended, also if nobody waits for it.
     pub async fn picture(
         &self,
         job: &RenderJob,
+        part: Option<Part>,
         scene: Scene,
         is_wanted: IsWanted,
         held: impl Send + 'static,
     ) -> Result<(Image, Timings), DrawError> {
         let (renderer, own) = (Arc::clone(&self.renderer), job.clone());
         let drawing = tokio::task::spawn_blocking(move || {
-            let image = renderer.render_while(&own, &scene, &*is_wanted);
+            let image = renderer.render_part(&own, &scene, part, &*is_wanted);
             drop(held);
             // Also what a picture took that was not wanted any more: it is not the next one's.
             let timings = timings::taken();
@@ -131,16 +134,16 @@ impl Pipeline {
         Ok(drawn)
     }
 
-    /// Draws the annotations of a job over its picture and encodes it; `turn` is let go when that begins, which may have to
-    /// wait for a core.
+    /// Encodes a picture, with the annotations of a job over it if one is given; `turn` is let go when that begins, which
+    /// may have to wait for a core.
     pub async fn encode(
         &self,
-        job: &RenderJob,
+        annotated: Option<RenderJob>,
         image: Image,
         encoding: Encoding,
         turn: impl Send + 'static,
     ) -> Result<Bytes, DrawError> {
-        self.encoders.encode(job, image, encoding, turn).await
+        self.encoders.encode(annotated, image, encoding, turn).await
     }
 
     /// Tries, and if the device failed tries once more on a fresh one.

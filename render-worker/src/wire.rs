@@ -5,6 +5,7 @@ use std::time::Duration;
 use contract::ContractError;
 use contract::encoding::Encoding;
 use contract::job::RENDERER_VERSION;
+use render::plan::Part;
 use tonic::metadata::MetadataMap;
 
 use crate::desk::Storing;
@@ -96,6 +97,27 @@ impl From<proto::Storing> for Storing {
             proto::Storing::Unspecified => Self::LookUpAndKeep,
             proto::Storing::Keep => Self::Keep,
             proto::Storing::Nothing => Self::Nothing,
+        }
+    }
+}
+
+impl From<Part> for proto::Part {
+    fn from(part: Part) -> Self {
+        let ([left, top], [width, height]) = (part.origin_px, part.size_px);
+        Self {
+            left,
+            top,
+            width,
+            height,
+        }
+    }
+}
+
+impl From<proto::Part> for Part {
+    fn from(part: proto::Part) -> Self {
+        Self {
+            origin_px: [part.left, part.top],
+            size_px: [part.width, part.height],
         }
     }
 }

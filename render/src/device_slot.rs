@@ -161,6 +161,13 @@ pub(crate) fn least_busy(slots: &[DeviceSlot], frames: u64) -> Option<Taken<'_>>
     slots.get(place(&states, frames)?).map(DeviceSlot::take)
 }
 
+/// Devices without a fault that nothing is drawn on, at most so many of them.
+pub(crate) fn idle(slots: &[DeviceSlot], most: usize) -> Vec<Taken<'_>> {
+    let is_idle = |slot: &&DeviceSlot| slot.in_flight() == 0 && !slot.device().gpu().has_fault();
+    let idle = slots.iter().filter(is_idle);
+    idle.take(most).map(DeviceSlot::take).collect()
+}
+
 /// The slot of these frames when all are idle: where they are brought before anybody wants them.
 pub(crate) fn home(slots: &[DeviceSlot], frames: u64) -> Option<Arc<Device>> {
     let idle: Vec<(bool, usize)> = slots

@@ -29,6 +29,27 @@ impl fmt::Debug for Image {
 }
 
 impl Image {
+    /// A picture of nothing.
+    pub fn transparent([width, height]: [u32; 2]) -> Self {
+        Self {
+            width,
+            height,
+            rgba8: vec![0; width as usize * height as usize * 4],
+        }
+    }
+
+    /// Lays pixels (RGBA8, row by row) of a rectangle of `size_px` over these, its upper left corner at a place.
+    ///
+    /// # Panics
+    /// If it does not lie in the picture.
+    pub fn paste(&mut self, [left, top]: [u32; 2], size_px: [u32; 2], rgba8: &[u8]) {
+        let row_bytes = size_px[0] as usize * 4;
+        for (y, row) in rgba8.chunks_exact(row_bytes).enumerate() {
+            let at = ((top as usize + y) * self.width as usize + left as usize) * 4;
+            self.rgba8[at..at + row_bytes].copy_from_slice(row);
+        }
+    }
+
     /// The picture as PNG; the same picture is always the same bytes. They are part of what a picture's name stands for:
     /// other settings here, or another encoder, are another version of the renderer.
     ///

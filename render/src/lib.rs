@@ -19,6 +19,7 @@ mod backend;
 pub mod coast;
 mod device;
 mod device_slot;
+mod drawing;
 pub mod error;
 pub mod frame;
 pub mod frame_context;

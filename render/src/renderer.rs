@@ -2,21 +2,21 @@
 
 use std::num::NonZeroUsize;
 
+use contract::ContractError;
 use contract::grid::Grid;
-use contract::job::RenderJob;
+use contract::job::{RenderJob, View};
 
 use crate::adapter::Adapter;
 use crate::backend::Backend;
 use crate::device_slot::{self, DeviceSlot};
+use crate::drawing::Drawing;
 use crate::error::RenderError;
-use crate::frame_cpu;
 use crate::gpu::Checks;
 use crate::image::Image;
 use crate::plan::{Part, Plan};
 use crate::pyramid;
 use crate::scene::Scene;
 use crate::stages::fill::{self, Filled, Form};
-use crate::stages::layout::{LIGHT_GIVEN, LIGHT_OWN};
 use crate::stages::map::plain;
 use crate::timings::{self, Step};
 
@@ -153,10 +153,25 @@ impl Renderer {
         &self,
         job: &RenderJob,
         scene: &Scene,
-        is_wanted: &dyn Fn() -> bool,
+        is_wanted: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Image, RenderError> {
+        self.render_part(job, scene, None, is_wanted)
+    }
+
+    /// Draws a part of a globe view, or all of a picture. A pixel is the same in whichever part it is drawn, so that several
+    /// renderers can share a large picture.
+    pub fn render_part(
+        &self,
+        job: &RenderJob,
+        scene: &Scene,
+        part: Option<Part>,
+        is_wanted: &(dyn Fn() -> bool + Sync),
     ) -> Result<Image, RenderError> {
         job.validate()?;
         scene.validate()?;
+        if let Some(part) = part {
+            check_part(part, job)?;
+        }
         let taken = device_slot::least_busy(&self.devices, frames_of(scene));
         let device = taken.as_ref().map(|taken| &taken.device);
         let most_buffer_bytes = device.map_or(u64::MAX, |device| device.gpu().most_buffer_bytes());
@@ -171,12 +186,12 @@ impl Renderer {
         })?;
         if let (Some(alone), Some(vector)) = (job.trails_alone(), &scene.trails) {
             // A picture of its own, which the stages of this one lay on the sea.
-            let drawn = self.render_while(&alone, vector, is_wanted)?;
+            let drawn = self.render_part(&alone, vector, None, is_wanted)?;
             plan.lay_trails(&drawn);
         }
-        let [width, height] = plan.size_px();
         let is_on_processor = device.is_none_or(|device| device.gpu().spares_kernels());
-        if is_on_processor && plain::suits(&plan) {
+        if is_on_processor && part.is_none() && plain::suits(&plan) {
+            let [width, height] = plan.size_px();
             let rgba8 = timings::timed(Step::Device, || plain::draw(&plan, scene));
             return Ok(Image {
                 width,
@@ -184,38 +199,12 @@ impl Renderer {
                 rgba8,
             });
         }
-        let parts = plan.parts();
-        let light = match &device {
-            // Parts of one picture lie in one light.
-            Some(device) if parts.len() > 1 && plan.params.lighting.mode == LIGHT_OWN => {
-                let light = device.light(&plan, scene)?;
-                plan.params.lighting.mode = LIGHT_GIVEN;
-                Some(light)
-            }
-            _ => None,
+        let drawing = Drawing {
+            plan: &plan,
+            scene,
+            is_wanted,
         };
-        let draw = |part: Part| match &device {
-            _ if !is_wanted() => Err(RenderError::NotWanted),
-            None => frame_cpu::draw(&plan, part, scene),
-            Some(device) => device.draw(&plan, part, scene, light.as_ref()),
-        };
-        if let [whole] = parts[..] {
-            let rgba8 = draw(whole)?;
-            return Ok(Image {
-                width,
-                height,
-                rgba8,
-            });
-        }
-        let mut image = Image {
-            width,
-            height,
-            rgba8: vec![0; width as usize * height as usize * 4],
-        };
-        for part in parts {
-            paste(&mut image, part, &draw(part)?);
-        }
-        Ok(image)
+        drawing.draw(part.unwrap_or_else(|| plan.whole()), taken, &self.devices)
     }
 
     /// Fills the gaps of one frame (`[row, col]`, [`MISSING`](crate::stages::layout::MISSING) or NaN where there is no
@@ -262,12 +251,16 @@ fn frames_of(scene: &Scene) -> u64 {
     scene.value.before.cells.id()
 }
 
-fn paste(image: &mut Image, part: Part, pixels: &[u8]) {
-    let row_bytes = part.size_px[0] as usize * 4;
-    for (y, row) in pixels.chunks_exact(row_bytes).enumerate() {
-        let at = ((part.origin_px[1] as usize + y) * image.width as usize
-            + part.origin_px[0] as usize)
-            * 4;
-        image.rgba8[at..at + row_bytes].copy_from_slice(row);
+fn check_part(part: Part, job: &RenderJob) -> Result<(), RenderError> {
+    let [width, height] = job.view.size_px();
+    let is_tile = matches!(job.view, View::Tile { .. });
+    if !is_tile && part.is_within([width, height]) {
+        return Ok(());
     }
+    let valid = if is_tile {
+        "map tiles are drawn whole".to_owned()
+    } else {
+        format!("a part of a picture of {width} x {height} pixels lies in it")
+    };
+    Err(ContractError::invalid("part", &format!("{part:?}"), valid).into())
 }

@@ -38,6 +38,13 @@ fn contents(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     all
 }
 
+/// Stored objects but those of cubes, which their library names by chance.
+fn objects(data: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut all = contents(&data.join("objects"));
+    all.retain(|path, _content| !path.starts_with("cubes"));
+    all
+}
+
 /// How many readings are noted.
 fn noted(data: &Path) -> usize {
     std::fs::read_dir(data.join("objects/readings").join(PRODUCT)).map_or(0, |files| {
@@ -149,10 +156,9 @@ fn a_rereading_that_is_killed_again_and_again_comes_to_the_bytes_of_an_undisturb
     let after = version(&killed);
     assert_ne!(after, before);
     assert_eq!(after, version(&calm));
-    assert_eq!(
-        contents(&calm.join("objects")),
-        contents(&killed.join("objects"))
-    );
+    assert_eq!(objects(&calm), objects(&killed));
+    // What is in the cube is compared with its frames.
+    program::succeed(&killed, &["verify", "--product", PRODUCT]).unwrap();
     let events = told(&killed);
     assert_eq!(events, told(&calm));
     assert_eq!(events.len(), 2 * MONTHS, "landed, and read anew, each once");

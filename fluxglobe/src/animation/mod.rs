@@ -20,7 +20,7 @@ use contract::time::TimeMs;
 use futures::stream::{self, StreamExt as _, TryStreamExt as _};
 use prometheus::Registry;
 use render_worker::Limits;
-use render_worker::fleet::{Fleet, FleetSettings};
+use render_worker::fleet::{Fleet, FleetSettings, LARGE_PIXELS};
 use storage::Store;
 use tile_server::backend::{Draw, Keep, Turn};
 
@@ -181,8 +181,9 @@ async fn drawer(
         render_deadline_ms: DEADLINE_MS,
         render_hedge_ms: HEDGE_MS,
         render_in_flight: options.at_once,
+        render_parts_above: LARGE_PIXELS,
     };
-    let fleet = Fleet::start(&fleet, &Registry::new())?;
+    let fleet = Fleet::start(&fleet, store, &Registry::new())?;
     Ok(Arc::new(FleetDrawer(fleet)))
 }
 

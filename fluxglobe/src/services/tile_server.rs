@@ -20,7 +20,7 @@ pub(crate) async fn run(settings: &Settings, options: TileServer) -> Result<()> 
     let context = ServiceContext::take(settings, "tile-server", None, &[]).await?;
     // Opening asks nobody: /healthz is answered while the store is waited for, and /readyz says so.
     let store = deployment::open_interactive(context.store_url())?;
-    let fleet = Fleet::start(&options.fleet, &context.registry)?;
+    let fleet = Fleet::start(&options.fleet, store.clone(), &context.registry)?;
     let measured = observations::open(&options.observations, &store)?;
     let regions = deployment::region_engine(settings, store.clone())?;
     let analyst = Analyst::new(Engine::local(store.clone()), &regions, None);

@@ -8,8 +8,9 @@ use ::service::Outcome as Ended;
 use bytes::Bytes;
 use contract::job::RenderJob;
 use contract::key::ObjectKey;
+use render::plan::Part;
 use render::{Image, RenderError};
-use storage::StorageError;
+use storage::{StorageError, Store};
 use tracing::Instrument as _;
 
 use super::queue::{Full, Permit};
@@ -38,12 +39,17 @@ impl Inner {
         let permit = Arc::new((self.turn(flight, order.class).await?, turn));
         self.wait_s.observe(waiting.elapsed().as_secs_f64());
         let begun = Instant::now();
-        let drawn = self.drawn(job, flight, &permit).await;
+        let drawn = self.drawn(job, order.part, flight, &permit).await;
         self.note(&drawn);
         let image = drawn?;
         self.learn(begun.elapsed());
         // Another draws while this one is encoded and stored.
-        let encoding = self.pipeline.encode(job, image, order.encoding, permit);
+        // Annotations go over the whole picture, by whoever puts parts together.
+        let annotated = job.annotations.as_ref().filter(|_| order.part.is_none());
+        let annotated = annotated.map(|_some| job.clone());
+        let encoding = self
+            .pipeline
+            .encode(annotated, image, order.encoding, permit);
         let bytes = self.measured("encode", encoding).await?;
         Ok(self.kept(job, bytes, order).await)
     }
@@ -172,6 +178,7 @@ impl Inner {
     async fn drawn(
         &self,
         job: &RenderJob,
+        part: Option<Part>,
         flight: &Arc<Flight>,
         permit: &Arc<(Permit, Turn)>,
     ) -> Result<Image, DrawError> {
@@ -179,7 +186,8 @@ impl Inner {
             let loading = flight.while_wanted(self.pipeline.scene(job));
             let scene = self.measured("load", loading).await?;
             let held = Arc::clone(permit);
-            let drawing = self.pipeline.picture(job, scene, flight.is_wanted(), held);
+            let wanted = flight.is_wanted();
+            let drawing = self.pipeline.picture(job, part, scene, wanted, held);
             let (image, timings) = self.measured("draw", drawing).await?;
             for (step, took) in timings {
                 let histogram = self.step_s.with_label_values(&[step]);
@@ -201,31 +209,13 @@ impl Inner {
         done
     }
 
-    /// Stores a picture. None: it is there now. Some: another one was there, and a key has one content for ever.
+    /// Stores a picture; see [`keep`].
     pub(super) async fn keep(
         &self,
         job: &RenderJob,
         png: Bytes,
     ) -> Result<Option<Bytes>, DrawError> {
-        let key = job.key();
-        match self.store.put_new(&key, png.clone()).await {
-            Ok(_new) => Ok(None),
-            Err(StorageError::Conflict { .. }) => match self.store.get(&key).await {
-                Ok(theirs) => {
-                    let adapter = self.pipeline.name();
-                    tracing::error!(%key, adapter, "another adapter drew this job differently");
-                    Ok(Some(theirs))
-                }
-                Err(error @ StorageError::Damaged { .. }) => {
-                    tracing::warn!(%error, "a damaged picture is drawn again");
-                    let put = self.store.put_over(&key, png).await;
-                    put.map(|()| None)
-                        .map_err(|e| picture_failed("store", &key, e))
-                }
-                Err(e) => Err(picture_failed("read", &key, e)),
-            },
-            Err(source) => Err(picture_failed("store", &key, source)),
-        }
+        keep(&self.store, job, png, self.pipeline.name()).await
     }
 
     fn note(&self, drawn: &Result<Image, DrawError>) {
@@ -268,6 +258,34 @@ fn ended(error: &DrawError) -> Ended {
         error if error.is_bad_request() || error.is_not_found() => Ended::Refused,
         error if error.is_retryable() => Ended::Retryable,
         _ => Ended::Failed,
+    }
+}
+
+/// Stores a picture drawn by an adapter, or by several workers. None: it is there now. Some: another one was there, and a
+/// key has one content for ever.
+pub(crate) async fn keep(
+    store: &Store,
+    job: &RenderJob,
+    png: Bytes,
+    drawn_by: &str,
+) -> Result<Option<Bytes>, DrawError> {
+    let key = job.key();
+    match store.put_new(&key, png.clone()).await {
+        Ok(_new) => Ok(None),
+        Err(StorageError::Conflict { .. }) => match store.get(&key).await {
+            Ok(theirs) => {
+                tracing::error!(%key, drawn_by, "another adapter drew this job differently");
+                Ok(Some(theirs))
+            }
+            Err(error @ StorageError::Damaged { .. }) => {
+                tracing::warn!(%error, "a damaged picture is drawn again");
+                let put = store.put_over(&key, png).await;
+                put.map(|()| None)
+                    .map_err(|e| picture_failed("store", &key, e))
+            }
+            Err(e) => Err(picture_failed("read", &key, e)),
+        },
+        Err(source) => Err(picture_failed("store", &key, source)),
     }
 }
 

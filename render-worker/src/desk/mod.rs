@@ -25,6 +25,7 @@ use tracing::Instrument as _;
 use crate::adapter_info::AdapterInfo;
 use crate::error::DrawError;
 use crate::pipeline::{Limits, Pipeline};
+pub(crate) use drawing::keep;
 use drawing::picture_failed;
 use gauges::Gauges;
 use queue::Queue;
@@ -244,7 +245,7 @@ impl Desk {
         valid.map_err(DrawError::from)?;
         let digest = job.digest();
         let order = order.encoded(order.encoding);
-        let flown = (digest, order.encoding);
+        let flown = (digest, order.encoding, order.part);
         let (waiter, begun) = inner.flights.join(flown, order.class);
         let has_joined = begun.is_none();
         if let Some(flight) = begun {

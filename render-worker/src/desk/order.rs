@@ -2,6 +2,8 @@
 
 use contract::encoding::Encoding;
 
+use render::plan::Part;
+
 use super::Class;
 
 /// Who wants a picture, and what the store has to do with it.
@@ -13,6 +15,8 @@ pub struct Order {
     pub storing: Storing,
     /// As which bytes it travels. In another than the stored one the store has nothing to do with it.
     pub encoding: Encoding,
+    /// The part of it that is wanted, without annotations; all of it with None. The store has nothing to do with a part.
+    pub part: Option<Part>,
 }
 
 /// What the store has to do with a picture.
@@ -33,6 +37,21 @@ impl Order {
             class: Class::OnDemand,
             storing,
             encoding: Encoding::Png,
+            part: None,
+        }
+    }
+
+    /// A part of the picture, or all of it with None.
+    #[must_use]
+    pub fn of_part(self, part: Option<Part>) -> Self {
+        let storing = match part {
+            None => self.storing,
+            Some(_) => Storing::Nothing,
+        };
+        Self {
+            storing,
+            part,
+            ..self
         }
     }
 
@@ -57,6 +76,7 @@ impl Order {
             class: Class::Batch,
             storing: Storing::LookUpAndKeep,
             encoding: Encoding::Png,
+            part: None,
         }
     }
 }

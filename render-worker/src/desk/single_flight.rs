@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use contract::digest::Digest;
 use contract::encoding::Encoding;
 use render::RenderError;
+use render::plan::Part;
 use tokio::sync::watch;
 
 use super::{DeskError, Drawn};
@@ -23,8 +24,8 @@ pub(super) struct Flight {
     urgent: watch::Sender<bool>,
 }
 
-/// A job by its digest, and the bytes that are made of its picture.
-pub(super) type Flown = (Digest, Encoding);
+/// A job by its digest, the bytes that are made of its picture, and of which part of it.
+pub(super) type Flown = (Digest, Encoding, Option<Part>);
 
 /// All jobs under way.
 #[derive(Default)]

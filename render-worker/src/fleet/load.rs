@@ -19,6 +19,11 @@ impl Load {
         self.pictures < self.draws_at_once * (1 + WAITING_TURNS)
     }
 
+    /// Would one more picture be begun at once?
+    pub(super) fn has_turn(self) -> bool {
+        self.pictures < self.draws_at_once
+    }
+
     /// Turns before one more picture is drawn, in thousandths.
     fn turns(self) -> usize {
         self.pictures * 1000 / self.draws_at_once.max(1)

@@ -109,6 +109,11 @@ impl Member {
         }
     }
 
+    /// Would it begin a picture at once?
+    pub(super) fn is_ready(&self) -> bool {
+        *self.lock() == Health::Up && self.load().has_turn()
+    }
+
     fn learn(&self, reply: &StatusReply) {
         let said = reply.queue_length as usize + reply.in_flight as usize;
         let own = self.in_flight.load(Ordering::Acquire);

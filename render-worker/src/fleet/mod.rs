@@ -1,10 +1,11 @@
 //! All render workers as one: each picture is asked of the worker that has its frames, and of another one if that has much
-//! to do, is full, slow or lost.
+//! to do, is full, slow or lost. A large one is asked of several, a part of each.
 
 mod address;
 mod error;
 mod load;
 mod member;
+mod parts;
 mod place;
 mod refusals;
 mod rendezvous;
@@ -19,19 +20,21 @@ use bytes::Bytes;
 use contract::job::RenderJob;
 use futures::stream::{FuturesUnordered, StreamExt as _};
 use prometheus::{IntCounterVec, IntGaugeVec, Opts, Registry};
+use storage::Store;
 use tokio::time::Instant;
 
 use crate::desk::{Order, Origin};
 use crate::wire::proto::{DrawReply, DrawRequest, Origin as OriginCode, Storing as StoringCode};
 use crate::wire::{self, Version};
 use member::Member;
+use parts::Parts;
 use refusals::Refusals;
 
 pub use address::{AddressError, HostPort, WorkerAddress};
 pub use error::FleetError;
 pub use member::Health;
 pub use rendezvous::ranked;
-pub use settings::FleetSettings;
+pub use settings::{FleetSettings, LARGE_PIXELS};
 
 /// Workers that one picture is asked of at most.
 const MOST_TRIES: usize = 4;
@@ -50,6 +53,7 @@ struct Inner {
     red: Red,
     tries: IntCounterVec,
     workers: IntGaugeVec,
+    parts: Parts,
 }
 
 /// A picture from a worker.
@@ -59,20 +63,26 @@ pub struct Picture {
     pub bytes: Bytes,
     /// Where it comes from.
     pub origin: Origin,
-    /// Name of the worker.
+    /// Name of the worker; of all that drew a part of it, with commas.
     pub worker: String,
 }
 
 impl Fleet {
-    /// A fleet with the workers of the settings, watched from now on. Needs a runtime.
-    pub fn start(settings: &FleetSettings, registry: &Registry) -> Result<Self, FleetError> {
-        Self::start_as(Version::own(), settings, registry)
+    /// A fleet with the workers of the settings, watched from now on. Workers store what they draw; pictures that are put
+    /// together here from parts are kept in `store`. Needs a runtime.
+    pub fn start(
+        settings: &FleetSettings,
+        store: Store,
+        registry: &Registry,
+    ) -> Result<Self, FleetError> {
+        Self::start_as(Version::own(), settings, store, registry)
     }
 
     /// The same as if it were another version, for tests of how versions meet.
     pub fn start_as(
         version: Version,
         settings: &FleetSettings,
+        store: Store,
         registry: &Registry,
     ) -> Result<Self, FleetError> {
         let setup = |e: prometheus::Error| FleetError::Setup(e.to_string());
@@ -103,6 +113,7 @@ impl Fleet {
             red: Red::register(registry, "render_fleet").map_err(setup)?,
             tries,
             workers,
+            parts: Parts::new(store, registry).map_err(setup)?,
         });
         for address in &settings.render_workers {
             if let WorkerAddress::Fixed(at) = address {
@@ -140,6 +151,13 @@ impl Fleet {
         }
     }
 
+    /// Every worker and the pictures that it draws or has waiting, of this fleet and of others.
+    pub fn loads(&self) -> BTreeMap<String, usize> {
+        let members = self.inner.members();
+        let load = |(name, member): (&String, &Arc<Member>)| (name.clone(), member.load().pictures);
+        members.iter().map(load).collect()
+    }
+
     /// Every worker and how it is.
     pub fn health(&self) -> BTreeMap<String, Health> {
         let members = self.inner.members();
@@ -167,8 +185,17 @@ impl Inner {
             trace: trace.to_owned(),
             storing: StoringCode::from(order.storing).into(),
             jpeg_quality: wire::jpeg_quality(order.encoding),
+            part: order.part.map(Into::into),
         };
-        let asking = self.ask(place::of(job), &request, deadline);
+        let asking = async {
+            let members = self.in_order(place::of(job));
+            if let Some(sharing) = self.sharing(job, order, &members) {
+                return self
+                    .put_together(job, order, &sharing, &request, deadline)
+                    .await;
+            }
+            self.ask(members, &request, deadline).await
+        };
         let asked = tokio::time::timeout_at(deadline, asking).await;
         match asked {
             // The connection's own clock may run out a moment before this one.
@@ -181,11 +208,11 @@ impl Inner {
     /// Asks the workers in their order: the next one when one refuses, or when one takes long.
     async fn ask(
         &self,
-        place: &str,
+        members: Vec<Arc<Member>>,
         request: &DrawRequest,
         deadline: Instant,
     ) -> Result<Picture, FleetError> {
-        let mut candidates = self.in_order(place).into_iter().take(MOST_TRIES);
+        let mut candidates = members.into_iter().take(MOST_TRIES);
         let mut tries = FuturesUnordered::new();
         let mut refusals = Refusals::default();
         let ask = |member: Arc<Member>| async move {

@@ -6,6 +6,9 @@ use clap::value_parser;
 
 use super::WorkerAddress;
 
+/// Larger pictures are drawn in several passes wherever they are drawn: 2048 x 2048.
+pub const LARGE_PIXELS: u32 = 2048 * 2048;
+
 /// Which render workers there are and how long they may take. A flag and a variable have the same name.
 #[derive(Debug, Clone, clap::Args)]
 pub struct FleetSettings {
@@ -31,6 +34,10 @@ pub struct FleetSettings {
     #[arg(long, env = "FLUXGLOBE_RENDER_IN_FLIGHT", default_value_t = 64,
           value_parser = value_parser!(u16).range(1..=256), value_name = "COUNT")]
     pub render_in_flight: u16,
+    /// Pictures of more pixels than this are drawn in parts, one by every render worker that has a turn free.
+    #[arg(long, env = "FLUXGLOBE_RENDER_PARTS_ABOVE", default_value_t = LARGE_PIXELS,
+          value_parser = value_parser!(u32).range(1..), value_name = "PIXELS")]
+    pub render_parts_above: u32,
 }
 
 impl FleetSettings {

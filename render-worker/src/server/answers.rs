@@ -75,7 +75,9 @@ impl Answers {
         }
         let encoding = wire::read_encoding(request.jpeg_quality)
             .map_err(|e| Status::invalid_argument(e.to_string()))?;
-        let order = Order::on_demand(request.storing().into()).encoded(encoding);
+        let order = Order::on_demand(request.storing().into())
+            .encoded(encoding)
+            .of_part(request.part.map(Into::into));
         let trace = request.trace;
         if trace.len() > MAX_TRACE_BYTES || trace.chars().any(char::is_control) {
             return Err(Status::invalid_argument(

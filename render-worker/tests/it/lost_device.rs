@@ -19,7 +19,7 @@ async fn a_job_is_drawn_on_a_fresh_device_when_its_own_is_lost() {
     let store = Store::memory();
     let job = two_months_in(&store).await;
     let service = Here::new(store, Backend::Gpu);
-    for (lost, mode) in (0..).zip([Mode::Volume, Mode::Map, Mode::Sprites]) {
+    for (lost, mode) in (0..).zip([Mode::Volume, Mode::Points, Mode::Sprites]) {
         let job = RenderJob {
             mode,
             ..job.clone()
@@ -42,13 +42,14 @@ async fn a_job_that_loses_every_device_fails_and_the_next_one_is_drawn() {
         return;
     }
     let store = Store::memory();
-    let job = two_months_in(&store).await;
+    // A plain map tile would need no device on a processor.
+    let job = quick(&two_months_in(&store).await, 1);
     let service = Here::new(store, Backend::Gpu);
     let poison = || async {
         let scene = service.scene(&job).await?;
         service.renderer().lose_device();
         let wanted: IsWanted = std::sync::Arc::new(|| true);
-        service.picture(&job, scene, wanted, ()).await
+        service.picture(&job, None, scene, wanted, ()).await
     };
     let failed = service.on_a_sound_device(poison).await.unwrap_err();
     assert!(failed.is_device_fault() && failed.is_final(), "{failed}");

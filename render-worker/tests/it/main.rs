@@ -16,6 +16,7 @@ mod gallery;
 mod here;
 mod incomplete;
 mod lost_device;
+mod parts;
 mod prefetch;
 mod process;
 mod scenes;

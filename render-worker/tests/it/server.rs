@@ -8,7 +8,7 @@ use render::Backend;
 use render_worker::desk::{Order, Origin};
 use render_worker::fleet::FleetError;
 use render_worker::wire::Version;
-use render_worker::wire::proto::{DrawRequest, StatusRequest};
+use render_worker::wire::proto::{DrawRequest, Part, StatusRequest};
 use storage::Store;
 use tonic::{Code, Request};
 
@@ -25,6 +25,7 @@ fn request(job: &RenderJob) -> DrawRequest {
         job_json: serde_json::to_string(job).unwrap(),
         trace: "test".into(),
         storing: 0,
+        part: None,
     }
 }
 
@@ -314,6 +315,27 @@ async fn what_is_no_job_is_refused_with_a_reason_and_without_work() {
         ),
         (request(&beyond), Code::InvalidArgument, "slices"),
         (request(&unknown), Code::NotFound, "nothing"),
+        (
+            DrawRequest {
+                part: Some(Part {
+                    left: 200,
+                    top: 0,
+                    width: 57,
+                    height: 1,
+                }),
+                ..good.clone()
+            },
+            Code::InvalidArgument,
+            "map tiles are drawn whole",
+        ),
+        (
+            DrawRequest {
+                part: Some(Part::default()),
+                ..request(&quick(&job, 1))
+            },
+            Code::InvalidArgument,
+            "a part of a picture of 64 x 64 pixels lies in it",
+        ),
         (
             DrawRequest {
                 trace: "a\nb".into(),

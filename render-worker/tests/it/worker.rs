@@ -135,6 +135,7 @@ pub(crate) fn fleet_settings(workers: &[&str]) -> FleetSettings {
         render_deadline_ms: 120_000,
         render_hedge_ms: 600_000,
         render_in_flight: 256,
+        render_parts_above: render_worker::fleet::LARGE_PIXELS,
     }
 }
 
@@ -144,7 +145,16 @@ pub(crate) async fn fleet(workers: &[&str]) -> Fleet {
 }
 
 pub(crate) async fn fleet_with(settings: &FleetSettings, registry: &Registry) -> Fleet {
-    let fleet = Fleet::start(settings, registry).unwrap();
+    fleet_over(&Store::memory(), settings, registry).await
+}
+
+/// The same where large pictures that are put together are kept in a store.
+pub(crate) async fn fleet_over(
+    store: &Store,
+    settings: &FleetSettings,
+    registry: &Registry,
+) -> Fleet {
+    let fleet = Fleet::start(settings, store.clone(), registry).unwrap();
     let unknown = render_worker::fleet::Health::Unknown;
     until("every worker was asked", || {
         let health = fleet.health();

@@ -82,7 +82,7 @@ impl Ground<'_> {
         let outlines = |rings| {
             wanted
                 .land
-                .then(|| Outlines::of(sight.outlines(rings), size_px[1]))
+                .then(|| Outlines::of(&sight.outlines(rings), size_px[1]))
         };
         let lines = |lines: Vec<Line>| ByBand::of(&lines, size_px[1], reached_px);
         let ((land, lakes), (shores, borders)) = rayon::join(
@@ -143,7 +143,7 @@ struct Outlines {
 }
 
 impl Outlines {
-    fn of(covered: Vec<Covered>, height_px: u32) -> Self {
+    fn of(covered: &[Covered], height_px: u32) -> Self {
         let edges: Vec<_> = covered
             .iter()
             .flat_map(|one| one.edges.iter().copied())
@@ -640,12 +640,12 @@ mod tests {
     /// Is the middle of a pixel on the globe?
     fn is_on_globe(camera: &Camera, size_px: [u32; 2], at: usize) -> bool {
         let place = DVec2::new(
-            (at as u32 % size_px[0]) as f64 + 0.5,
-            (at as u32 / size_px[0]) as f64 + 0.5,
+            f64::from(at as u32 % size_px[0]) + 0.5,
+            f64::from(at as u32 / size_px[0]) + 0.5,
         );
         let [east, south] = (place - DVec2::from(size_px.map(f64::from)) / 2.0).to_array();
         let ray = camera.forward * camera.focal_px + camera.right * east - camera.top * south;
-        let along = camera.place.dot(ray.normalize());
+        let along = camera.place.dot(ray / ray.length());
         along < 0.0 && along * along > camera.place.length_squared() - 1.0
     }
 

@@ -100,8 +100,8 @@ pub struct Plan {
     size_px: [u32; 2],
 }
 
-/// A rectangle of the picture that is drawn at once.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// A rectangle of the picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Part {
     pub origin_px: [u32; 2],
     pub size_px: [u32; 2],
@@ -113,6 +113,27 @@ impl Part {
         origin_px: [0, 0],
         size_px: [1, 1],
     };
+
+    /// Is it a part of a picture of this size, and not empty?
+    pub fn is_within(self, size_px: [u32; 2]) -> bool {
+        (0..2).all(|axis| {
+            let end = self.origin_px[axis].checked_add(self.size_px[axis]);
+            self.size_px[axis] > 0 && end.is_some_and(|end| end <= size_px[axis])
+        })
+    }
+
+    /// Cut into those that are drawn at once, in reading order.
+    pub(crate) fn pieces(self) -> Vec<Self> {
+        let ([left, top], [width, height]) = (self.origin_px, self.size_px);
+        let starts = |length: u32| (0..length).step_by(PART_PX as usize);
+        let piece = |x: u32, y: u32| Self {
+            origin_px: [left + x, top + y],
+            size_px: [PART_PX.min(width - x), PART_PX.min(height - y)],
+        };
+        starts(height)
+            .flat_map(|y| starts(width).map(move |x| piece(x, y)))
+            .collect()
+    }
 }
 
 impl Plan {
@@ -289,15 +310,7 @@ impl Plan {
 
     /// The picture cut into parts that are drawn at once, in reading order.
     pub fn parts(&self) -> Vec<Part> {
-        let [width, height] = self.size_px;
-        let starts = |length: u32| (0..length).step_by(PART_PX as usize);
-        let part = |x: u32, y: u32| Part {
-            origin_px: [x, y],
-            size_px: [PART_PX.min(width - x), PART_PX.min(height - y)],
-        };
-        starts(height)
-            .flat_map(|y| starts(width).map(move |x| part(x, y)))
-            .collect()
+        self.whole().pieces()
     }
 
     /// The whole picture as one part.

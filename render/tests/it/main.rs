@@ -23,6 +23,7 @@ mod light_of_parts;
 mod limits;
 mod look;
 mod mass;
+mod parts;
 mod projection;
 mod scenes;
 mod seams;
