@@ -293,6 +293,34 @@ async fn a_stopping_worker_sends_others_away_and_finishes_what_it_took() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn what_is_no_part_of_a_picture_is_refused() {
+    let store = Store::memory();
+    let job = two_months_in(&store).await;
+    let worker = Worker::start(&store, 1, 4);
+    let mut client = worker.client().await;
+    let part = |left, width| Part {
+        left,
+        top: 0,
+        width,
+        height: 1,
+    };
+    for (job, part, text) in [
+        (job.clone(), part(0, 16), "map tiles are drawn whole"),
+        (quick(&job, 1), part(60, 5), "64 x 64 pixels lies in it"),
+        (quick(&job, 1), part(0, 0), "64 x 64 pixels lies in it"),
+    ] {
+        let part = Some(part);
+        let asked = DrawRequest {
+            part,
+            ..request(&job)
+        };
+        let refused = client.draw(asked).await.unwrap_err();
+        assert_eq!(refused.code(), Code::InvalidArgument);
+        assert!(refused.message().contains(text), "{}", refused.message());
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn what_is_no_job_is_refused_with_a_reason_and_without_work() {
     let store = Store::memory();
     let job = two_months_in(&store).await;
@@ -315,27 +343,6 @@ async fn what_is_no_job_is_refused_with_a_reason_and_without_work() {
         ),
         (request(&beyond), Code::InvalidArgument, "slices"),
         (request(&unknown), Code::NotFound, "nothing"),
-        (
-            DrawRequest {
-                part: Some(Part {
-                    left: 200,
-                    top: 0,
-                    width: 57,
-                    height: 1,
-                }),
-                ..good.clone()
-            },
-            Code::InvalidArgument,
-            "map tiles are drawn whole",
-        ),
-        (
-            DrawRequest {
-                part: Some(Part::default()),
-                ..request(&quick(&job, 1))
-            },
-            Code::InvalidArgument,
-            "a part of a picture of 64 x 64 pixels lies in it",
-        ),
         (
             DrawRequest {
                 trace: "a\nb".into(),
