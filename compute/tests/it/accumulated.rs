@@ -54,7 +54,7 @@ async fn what_is_derived_is_a_cube_too_and_one_that_is_behind_is_brought_up() {
             cube.frame(11).await.unwrap(),
             frame(&store, &derived, 11).await,
         );
-        let same = |(a, b): (&f32, &f32)| a == b || (a.is_nan() && b.is_nan());
+        let same = |(a, b): (&f32, &f32)| a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan());
         assert!(there.iter().zip(&here).all(same));
     }
 }
