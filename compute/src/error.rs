@@ -45,7 +45,7 @@ pub enum ComputeError {
     /// A product that cannot say what of a cell is sea, or not for the cells that are summed.
     #[error("{product} cannot say what is sea: {reason}")]
     OceanShares {
-        /// Its name, or that of its frame.
+        /// Its name, or that of its field.
         product: String,
         /// What is wrong and what to do.
         reason: String,

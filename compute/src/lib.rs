@@ -1,6 +1,6 @@
 //! Statistics and carbon budgets over stored products, on Ballista and DataFusion.
 //!
-//! Questions are SQL over the stored frames and series, a row a chunk; the array work happens in the SQL functions of
+//! Questions are SQL over the stored fields and series, a row a chunk; the array work happens in the SQL functions of
 //! [`functions`], which call the pure kernels of [`budget`] and [`stats`]. Sums are integers, so that an answer has the
 //! same bits however many parts it was computed in.
 

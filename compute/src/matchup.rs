@@ -14,7 +14,7 @@ use contract::observation::Observation;
 use contract::product::ProductId;
 use contract::time::TimeMs;
 use serde::{Deserialize, Serialize};
-use storage::{Store, frames};
+use storage::{Store, fields};
 
 use crate::ComputeError;
 use pair::{Pair, Pairing};
@@ -95,7 +95,7 @@ pub struct Matchup {
     pub left_out: LeftOut,
 }
 
-/// Compares observations of one property with a version of a product. Frames are read one at a time.
+/// Compares observations of one property with a version of a product. Fields are read one at a time.
 ///
 /// # Errors
 /// Observations of several properties, or in another unit than the product's; a store that does not answer.
@@ -110,13 +110,13 @@ pub async fn matchup(
         mut pairs,
         left_out: mut out,
     } = pair::all(manifest, observations, time_match);
-    // Each frame is read once, however many observations fall into it.
+    // Each field is read once, however many observations fall into it.
     for (step, step_of_manifest) in manifest.steps.iter().enumerate() {
         let is_needed = |pair: &Pair| pair.shares.iter().any(|share| share.step == step);
         if !pairs.iter().any(is_needed) {
             continue;
         }
-        let values = frames::read(store, &step_of_manifest.frame, &manifest.grid).await?;
+        let values = fields::read(store, &step_of_manifest.field, &manifest.grid).await?;
         for pair in &mut pairs {
             pair.add(step, &values);
         }

@@ -74,7 +74,7 @@ impl Objects {
         let shares = match (question.surface.shares(), &question.shares_at) {
             (Some(shares), Some(address)) => {
                 let content = self.content(address).await?;
-                let values = storage::frames::of_bytes(&shares.frame, content, &question.grid);
+                let values = storage::fields::of_bytes(&shares.field, content, &question.grid);
                 Some(values.map_err(|e| DataFusionError::External(e.into()))?)
             }
             _ => None,

@@ -21,8 +21,10 @@ pub use run::{Outcome, run};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum What {
-    /// Accumulated frames, what they lack, and their series.
-    Frames,
+    /// Accumulated fields, what they lack, and their series.
+    #[serde(rename = "frames")]
+    #[value(name = "frames")]
+    Fields,
     /// Sums that means over named regions are made of.
     Statistics,
     /// Sums that budgets of named regions are made of.
@@ -90,7 +92,7 @@ pub struct Plan {
     /// Start of accumulation, if somebody chose one.
     #[serde(skip)]
     start: Option<TimeMs>,
-    /// From when on frames are computed anew although they are there.
+    /// From when on fields are computed anew although they are there.
     #[serde(skip)]
     anew_from: Option<TimeMs>,
     #[serde(skip)]

@@ -1,4 +1,4 @@
-//! Stored objects as tables: frames and series under the names that SQL uses, each row checked as it is read.
+//! Stored objects as tables: fields and series under the names that SQL uses, each row checked as it is read.
 
 use std::panic::AssertUnwindSafe;
 use std::sync::Arc;
@@ -21,14 +21,14 @@ use crate::tail_store::TAIL_BYTES;
 /// What rows of stored objects hold.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Layout {
-    Frames,
+    Fields,
     Series,
 }
 
 impl Layout {
     fn schema(self) -> &'static SchemaRef {
         match self {
-            Self::Frames => &storage::frames::SCHEMA,
+            Self::Fields => &storage::fields::SCHEMA,
             Self::Series => &storage::series::SCHEMA,
         }
     }
@@ -36,7 +36,7 @@ impl Layout {
     /// The schema of objects that are named by their bytes; they have no checks in their rows.
     fn schema_1(self) -> &'static SchemaRef {
         match self {
-            Self::Frames => &storage::frames::SCHEMA_1,
+            Self::Fields => &storage::fields::SCHEMA_1,
             Self::Series => &storage::series::SCHEMA_1,
         }
     }
@@ -44,7 +44,7 @@ impl Layout {
     /// What says which row it is.
     fn keys(self) -> &'static str {
         match self {
-            Self::Frames => "chunk, period_start, period_end",
+            Self::Fields => "chunk, period_start, period_end",
             Self::Series => "block",
         }
     }

@@ -14,7 +14,7 @@ use datafusion::prelude::SessionConfig;
 use crate::functions;
 use crate::objects::Objects;
 
-/// Largest message between client, scheduler and executor: a plan that names the frames of 100 years of days fits well.
+/// Largest message between client, scheduler and executor: a plan that names the fields of 100 years of days fits well.
 /// Geometry never travels in one, it goes through the object store.
 pub(crate) const MESSAGE_BYTES: usize = 64 << 20;
 /// A connection that takes longer than this is as good as none.

@@ -21,7 +21,7 @@ use object_store::{
 use quick_cache::Weighter;
 use quick_cache::sync::Cache;
 
-/// What is read of a file's end at once: the footer of a frame of up to 16 groups of chunks, and of a few groups also
+/// What is read of a file's end at once: the footer of a field of up to 16 groups of chunks, and of a few groups also
 /// the index of their pages.
 pub(crate) const TAIL_BYTES: u64 = 16 << 10;
 /// Ends remembered: a thousand. Who reads more files than that at the same time reads the index of some twice.

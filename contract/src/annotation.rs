@@ -1,6 +1,6 @@
 //! What is written over a picture so that it explains itself: legend, date, graticule, names, bars, source.
 //!
-//! A job says which of them are drawn, and holds the words that cannot be known from its frames. Where they go and how
+//! A job says which of them are drawn, and holds the words that cannot be known from its fields. Where they go and how
 //! large they are follows from the picture alone (`render-worker/src/annotation/`).
 
 mod date;

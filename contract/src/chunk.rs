@@ -1,10 +1,10 @@
-//! How a grid is cut into chunks: the rows of stored frames and the unit of every array kernel.
+//! How a grid is cut into chunks: the rows of stored fields and the unit of every array kernel.
 
 use crate::grid::Grid;
 
-/// Chunk rows of a frame. 1-degree grids make 3 x 3 chunks, the 1/60-degree China Sea 41 x 15.
+/// Chunk rows of a field. 1-degree grids make 3 x 3 chunks, the 1/60-degree China Sea 41 x 15.
 pub const CHUNK_ROWS: u32 = 60;
-/// Chunk columns of a frame.
+/// Chunk columns of a field.
 pub const CHUNK_COLS: u32 = 120;
 
 /// A rectangle of cells of a grid, row 0 north.
@@ -52,8 +52,8 @@ pub fn windows(grid: &Grid, rows: u32, cols: u32) -> Vec<Window> {
         .collect()
 }
 
-/// The chunks of a frame of `grid`; a chunk's number is its place in this list.
-pub fn frame_chunks(grid: &Grid) -> Vec<Window> {
+/// The chunks of a field of `grid`; a chunk's number is its place in this list.
+pub fn field_chunks(grid: &Grid) -> Vec<Window> {
     windows(grid, CHUNK_ROWS, CHUNK_COLS)
 }
 
@@ -72,7 +72,7 @@ mod tests {
             dlon_deg: 0.1,
         };
         let mut seen = vec![0u8; grid.cell_count()];
-        for window in frame_chunks(&grid) {
+        for window in field_chunks(&grid) {
             window.cell_indices(&grid).for_each(|i| seen[i] += 1);
         }
         assert!(seen.iter().all(|&n| n == 1));

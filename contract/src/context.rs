@@ -56,15 +56,16 @@ pub struct Context {
     pub isolines: Option<Isolines>,
 }
 
-/// The relief under a picture: one stored frame of elevation on a grid of its own.
+/// The relief under a picture: one stored field of elevation on a grid of its own.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Relief {
-    /// The grid of the frame.
+    /// The grid of the field.
     #[serde(with = "crate::exact::grid")]
     pub grid: Grid,
-    /// The frame.
-    pub frame: ObjectKey,
+    /// The field.
+    #[serde(rename = "frame")]
+    pub field: ObjectKey,
     /// How much larger heights are taken than they are where slopes are shaded and the sea floor is seen through the
     /// sea, 0 to [`MAX_RELIEF_EXAGGERATION`].
     #[serde(with = "crate::exact")]
@@ -156,7 +157,7 @@ impl Relief {
         };
         let relief = Self {
             grid: elevation.grid,
-            frame: step.frame.clone(),
+            field: step.field.clone(),
             exaggeration,
         };
         relief.validate()?;
@@ -169,10 +170,10 @@ impl Relief {
         let cells = u64::from(self.grid.rows) * u64::from(self.grid.cols);
         if cells > MAX_RELIEF_CELLS {
             let reason = format!("it has {cells} cells, at most {MAX_RELIEF_CELLS} are drawn");
-            return bad(self.frame.as_str(), reason);
+            return bad(self.field.as_str(), reason);
         }
-        if !self.frame.is_in("frames") {
-            return bad(self.frame.as_str(), "a frame is wanted".to_owned());
+        if !self.field.is_in("frames") {
+            return bad(self.field.as_str(), "a field is wanted".to_owned());
         }
         if !(0.0..=MAX_RELIEF_EXAGGERATION).contains(&self.exaggeration) {
             let reason = format!("heights are exaggerated 0 to {MAX_RELIEF_EXAGGERATION} times");
@@ -196,7 +197,7 @@ mod tests {
                 dlat_deg: 1.0,
                 dlon_deg: 1.0,
             },
-            frame: "frames/etopo/a".parse().unwrap(),
+            field: "frames/etopo/a".parse().unwrap(),
             exaggeration: 15.0,
         }
     }
@@ -274,7 +275,7 @@ mod tests {
         let broken: [fn(&mut Relief); 4] = [
             |r| r.exaggeration = f64::NAN,
             |r| r.exaggeration = 1e9,
-            |r| r.frame = "domain/etopo/a".parse().unwrap(),
+            |r| r.field = "domain/etopo/a".parse().unwrap(),
             |r| {
                 (r.grid.rows, r.grid.cols) = (10_800, 21_600);
                 (r.grid.dlat_deg, r.grid.dlon_deg) = (1.0 / 60.0, 1.0 / 60.0);

@@ -225,7 +225,7 @@ mod tests {
                 start: TimeMs::from_ymd(2002, 1, day).unwrap(),
                 end: TimeMs::from_ymd(2002, 1, day + 1).unwrap(),
             },
-            frame: ObjectKey::frame(&product, &Digest::of(format!("{name}{day}").as_bytes())),
+            field: ObjectKey::field(&product, &Digest::of(format!("{name}{day}").as_bytes())),
             raw_sha256: Digest::of(b""),
             origin: String::new(),
             valid_cells: 1,

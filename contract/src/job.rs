@@ -147,13 +147,13 @@ pub struct Style {
 }
 
 /// Everything that shapes a picture and nothing else. Two jobs with the same digest are the same picture, byte for
-/// byte; versions and instants that come to the same frames come to the same job.
+/// byte; versions and instants that come to the same fields come to the same job.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RenderJob {
     /// [`RENDERER_VERSION`].
     pub renderer_version: u32,
-    /// The grid of all frames.
+    /// The grid of all fields.
     #[serde(with = "crate::exact::grid")]
     pub grid: Grid,
     /// The product drawn.
@@ -426,9 +426,9 @@ mod tests {
         }
     }
 
-    fn after(frame: &str, weight: f64) -> After {
-        let frame = frame.parse().unwrap();
-        After { frame, weight }
+    fn after(field: &str, weight: f64) -> After {
+        let field = field.parse().unwrap();
+        After { field, weight }
     }
 
     fn counts(before: &str) -> Counts {
@@ -490,7 +490,7 @@ mod tests {
     fn relief(exaggeration: f64) -> Relief {
         Relief {
             grid: job().grid,
-            frame: "frames/etopo/a".parse().unwrap(),
+            field: "frames/etopo/a".parse().unwrap(),
             exaggeration,
         }
     }

@@ -23,8 +23,8 @@ impl ObjectKey {
     /// by the digest of their bytes alone.
     pub(crate) const OF_VALUES: &str = "v2-";
 
-    /// One time step as map-major chunks, named by its values: other bytes for the same values are the same frame.
-    pub fn frame(product: &ProductId, values_sha256: &Digest) -> Self {
+    /// One time step as map-major chunks, named by its values: other bytes for the same values are the same field.
+    pub fn field(product: &ProductId, values_sha256: &Digest) -> Self {
         let of_values = Self::OF_VALUES;
         Self(format!(
             "frames/{product}/{of_values}{values_sha256}.parquet"
@@ -138,7 +138,7 @@ mod tests {
         let (product, digest) = ("a-b".parse().unwrap(), Digest::of(b"x"));
         for key in [
             ObjectKey::raw(&product, &digest),
-            ObjectKey::frame(&product, &digest),
+            ObjectKey::field(&product, &digest),
             ObjectKey::series(&product, &digest),
             ObjectKey::contributed(&product, &digest),
             ObjectKey::domain(&product, &digest),

@@ -9,7 +9,7 @@ pub enum Kind {
     /// An input file as it came.
     Raw,
     /// One time step, map-major.
-    Frame,
+    Field,
     /// Steps and time that each sum of accumulated carbon holds, map-major.
     Contributed,
     /// A run of steps, time-major.
@@ -59,7 +59,7 @@ impl Kind {
     /// All of them.
     pub const ALL: [Self; 18] = [
         Self::Raw,
-        Self::Frame,
+        Self::Field,
         Self::Contributed,
         Self::Series,
         Self::Domain,
@@ -82,7 +82,7 @@ impl Kind {
     pub fn folder(self) -> &'static str {
         match self {
             Self::Raw => "raw",
-            Self::Frame => "frames",
+            Self::Field => "frames",
             Self::Contributed => "contributed",
             Self::Series => "series",
             Self::Domain => "domain",
@@ -115,7 +115,7 @@ impl ObjectKey {
         let stem = name.strip_suffix(".parquet").unwrap_or(name);
         let digest = |text: &str| text.parse::<Digest>().ok();
         match Kind::of(self) {
-            Some(Kind::Frame | Kind::Series) => match stem.strip_prefix(Self::OF_VALUES) {
+            Some(Kind::Field | Kind::Series) => match stem.strip_prefix(Self::OF_VALUES) {
                 Some(values) => digest(values).map_or(Vouched::Nothing, Vouched::Values),
                 None => digest(stem).map_or(Vouched::Nothing, Vouched::Bytes),
             },
@@ -135,8 +135,8 @@ mod tests {
     /// A new kind has no arm here; it must be in the list of all, too.
     fn next(kind: Kind) -> Option<Kind> {
         match kind {
-            Kind::Raw => Some(Kind::Frame),
-            Kind::Frame => Some(Kind::Contributed),
+            Kind::Raw => Some(Kind::Field),
+            Kind::Field => Some(Kind::Contributed),
             Kind::Contributed => Some(Kind::Series),
             Kind::Series => Some(Kind::Domain),
             Kind::Domain => Some(Kind::Manifest),
@@ -169,11 +169,11 @@ mod tests {
     fn every_key_is_of_its_kind_and_vouches_for_what_it_names() {
         let (product, digest) = ("p".parse().unwrap(), Digest::of(b"x"));
         let (bytes, values) = (Vouched::Bytes(digest), Vouched::Values(digest));
-        let old_frame: ObjectKey = format!("frames/p/{digest}.parquet").parse().unwrap();
+        let old_field: ObjectKey = format!("frames/p/{digest}.parquet").parse().unwrap();
         for (key, kind, vouched) in [
             (ObjectKey::raw(&product, &digest), Kind::Raw, bytes),
-            (ObjectKey::frame(&product, &digest), Kind::Frame, values),
-            (old_frame, Kind::Frame, bytes),
+            (ObjectKey::field(&product, &digest), Kind::Field, values),
+            (old_field, Kind::Field, bytes),
             (ObjectKey::series(&product, &digest), Kind::Series, values),
             (
                 ObjectKey::contributed(&product, &digest),

@@ -64,7 +64,8 @@ pub struct Step {
     /// What the values are a mean over (or, for accumulated carbon, what `end` they have reached).
     pub period: Period,
     /// Map-major chunks.
-    pub frame: ObjectKey,
+    #[serde(rename = "frame")]
+    pub field: ObjectKey,
     /// Digest of the input file; of the job for derived steps.
     pub raw_sha256: Digest,
     /// Name of the input file, for people.
@@ -271,7 +272,7 @@ mod tests {
         let step = |month| Step {
             masked: None,
             period: Period::month(2000, month).unwrap(),
-            frame: ObjectKey::frame(&product, &digest),
+            field: ObjectKey::field(&product, &digest),
             raw_sha256: digest,
             origin: "f.nc".into(),
             valid_cells: 1,

@@ -1,4 +1,4 @@
-//! A product at one instant: the stored frames that its values come from, and nothing else of the product.
+//! A product at one instant: the stored fields that its values come from, and nothing else of the product.
 
 use serde::{Deserialize, Serialize};
 
@@ -14,10 +14,10 @@ use crate::time::TimeMs;
 pub struct TimeSample {
     /// Cells that hold data in some step: gaps in them are filled.
     pub domain: ObjectKey,
-    /// Frame at the instant or before it; none where accumulation starts, that is zero in every cell of the domain.
+    /// Field at the instant or before it; none where accumulation starts, that is zero in every cell of the domain.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub before: Option<ObjectKey>,
-    /// Frame after the instant; none where the one before holds alone.
+    /// Field after the instant; none where the one before holds alone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub after: Option<After>,
     /// How complete the sums of accumulated carbon are, where uncertainty is drawn and some are not complete.
@@ -25,24 +25,25 @@ pub struct TimeSample {
     pub contributed: Option<Counts>,
 }
 
-/// Stored steps and time that contributed to sums, beside the frames of these sums.
+/// Stored steps and time that contributed to sums, beside the fields of these sums.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Counts {
-    /// To the frame at the instant or before it.
+    /// To the field at the instant or before it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub before: Option<ObjectKey>,
-    /// To the frame after it.
+    /// To the field after it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub after: Option<ObjectKey>,
 }
 
-/// A frame that the values move towards.
+/// A field that the values move towards.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct After {
-    /// The frame.
-    pub frame: ObjectKey,
+    /// The field.
+    #[serde(rename = "frame")]
+    pub field: ObjectKey,
     /// Its weight (eq. 3 in docs/method.md), above 0 and below 1.
     #[serde(with = "crate::exact")]
     pub weight: f64,
@@ -56,13 +57,13 @@ impl Manifest {
             after,
             weight,
         } = self.bracket(time)?;
-        let frame = |step: usize| self.steps[step].frame.clone();
+        let field = |step: usize| self.steps[step].field.clone();
         Some(TimeSample {
             domain: self.domain.clone(),
-            before: before.map(frame),
-            // A frame without weight shows nowhere: it may come and go without a trace.
+            before: before.map(field),
+            // A field without weight shows nowhere: it may come and go without a trace.
             after: (weight > 0.0).then(|| After {
-                frame: frame(after),
+                field: field(after),
                 weight,
             }),
             contributed: None,
@@ -95,7 +96,7 @@ impl TimeSample {
     /// Checks a sample that came from outside.
     ///
     /// # Errors
-    /// Objects of other kinds than frames and a domain, or a weight that is none.
+    /// Objects of other kinds than fields and a domain, or a weight that is none.
     pub fn validate(&self) -> Result<(), ContractError> {
         let bad = |key: &ObjectKey, reason: &str| {
             Err(ContractError::invalid("sample", key.as_str(), reason))
@@ -104,10 +105,10 @@ impl TimeSample {
             return bad(&self.domain, "a domain is wanted");
         }
         let after = self.after.as_ref();
-        let frames = self.before.iter().chain(after.map(|after| &after.frame));
-        for frame in frames {
-            if !frame.is_in("frames") {
-                return bad(frame, "a frame is wanted");
+        let fields = self.before.iter().chain(after.map(|after| &after.field));
+        for field in fields {
+            if !field.is_in("frames") {
+                return bad(field, "a field is wanted");
             }
         }
         let counts = self.contributed.iter();
@@ -117,8 +118,8 @@ impl TimeSample {
             }
         }
         match after {
-            Some(After { frame, weight }) if !(*weight > 0.0 && *weight < 1.0) => {
-                bad(frame, "weights lie between 0 and 1")
+            Some(After { field, weight }) if !(*weight > 0.0 && *weight < 1.0) => {
+                bad(field, "weights lie between 0 and 1")
             }
             _ => Ok(()),
         }
@@ -140,17 +141,17 @@ mod tests {
     use crate::quantity::Quantity;
     use crate::time::Period;
 
-    fn frame(content: &str) -> ObjectKey {
-        ObjectKey::frame(&"p".parse().unwrap(), &Digest::of(content.as_bytes()))
+    fn field(content: &str) -> ObjectKey {
+        ObjectKey::field(&"p".parse().unwrap(), &Digest::of(content.as_bytes()))
     }
 
-    /// Months from January 2000 on, with a frame each.
-    fn manifest(quantity: Quantity, frames: &[&str]) -> Manifest {
+    /// Months from January 2000 on, with a field each.
+    fn manifest(quantity: Quantity, fields: &[&str]) -> Manifest {
         let product: ProductId = "p".parse().unwrap();
         let step = |(month, content): (u32, &&str)| Step {
             masked: None,
             period: Period::month(2000, month).unwrap(),
-            frame: frame(content),
+            field: field(content),
             raw_sha256: Digest::of(b""),
             origin: String::new(),
             valid_cells: 1,
@@ -158,7 +159,7 @@ mod tests {
         };
         Manifest {
             schema: MANIFEST_SCHEMA,
-            number: frames.len() as u64,
+            number: fields.len() as u64,
             title: String::new(),
             quantity,
             synthetic: false,
@@ -171,7 +172,7 @@ mod tests {
                 dlat_deg: 1.0,
                 dlon_deg: 1.0,
             },
-            steps: (1..).zip(frames).map(step).collect(),
+            steps: (1..).zip(fields).map(step).collect(),
             domain: ObjectKey::domain(&product, &Digest::of(b"d")),
             series: vec![],
             derived_from: None,
@@ -186,13 +187,13 @@ mod tests {
 
     #[test]
     fn a_landing_changes_the_moments_that_it_touches_and_no_others() {
-        let flux = |frames: &[&str]| manifest(Quantity::CarbonFlux, frames);
+        let flux = |fields: &[&str]| manifest(Quantity::CarbonFlux, fields);
         let (old, new) = (flux(&["a", "b"]), flux(&["a", "b", "c"]));
         assert_ne!(old.id(), new.id());
         for time in ["1999-01-01", "2000-01-20", "2000-02-10"] {
             assert_eq!(at(&old, time), at(&new, time), "{time}");
         }
-        // The middle of what was the last step: the frame after it has no weight yet.
+        // The middle of what was the last step: the field after it has no weight yet.
         let middle = Period::month(2000, 2).unwrap().mid();
         assert_eq!(old.time_sample(middle), new.time_sample(middle));
         assert_ne!(at(&old, "2000-02-20"), at(&new, "2000-02-20"));
@@ -218,11 +219,11 @@ mod tests {
         assert_eq!(moving.before, None);
         let after = moving.after.unwrap();
         assert_eq!(
-            (after.frame, after.weight.to_bits()),
-            (frame("a"), 0.5_f64.to_bits())
+            (after.field, after.weight.to_bits()),
+            (field("a"), 0.5_f64.to_bits())
         );
         let end = at(&carbon, "2000-02-01");
-        assert_eq!((end.before, end.after), (Some(frame("a")), None));
+        assert_eq!((end.before, end.after), (Some(field("a")), None));
     }
 
     #[test]
@@ -271,7 +272,7 @@ mod tests {
         assert_eq!(old.unwrap().contributed, None);
         let strange = TimeSample {
             contributed: Some(Counts {
-                before: Some(frame("a")),
+                before: Some(field("a")),
                 after: None,
             }),
             ..at(&carbon, "2000-02-10")
@@ -283,16 +284,16 @@ mod tests {
     fn moments_of_other_objects_are_refused() {
         let good = at(&manifest(Quantity::CarbonFlux, &["a", "b"]), "2000-01-20");
         good.validate().unwrap();
-        let after = |frame: &str, weight| {
-            let frame = frame.parse().unwrap();
-            Some(After { frame, weight })
+        let after = |field: &str, weight| {
+            let field = field.parse().unwrap();
+            Some(After { field, weight })
         };
         let is_refused = |change: &dyn Fn(&mut TimeSample)| {
             let mut sample = good.clone();
             change(&mut sample);
             sample.validate().is_err()
         };
-        assert!(is_refused(&|m| m.domain = frame("a")));
+        assert!(is_refused(&|m| m.domain = field("a")));
         assert!(is_refused(&|m| m.before = Some("raw/p/x".parse().unwrap())));
         assert!(is_refused(&|m| m.before = Some("frames".parse().unwrap())));
         assert!(is_refused(&|m| m.after = after("tiles/x", 0.5)));

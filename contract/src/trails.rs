@@ -35,7 +35,7 @@ const LOOK: TrailLook = TrailLook {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Trails {
-    /// The grid of the vector's frames.
+    /// The grid of the vector's fields.
     #[serde(with = "crate::exact::grid")]
     pub grid: Grid,
     /// The eastward part.

@@ -61,7 +61,7 @@ async fn open(folder: &str) -> Result<Repository, Box<dyn Error>> {
 }
 
 /// Noise in a third of the mantissa, a third of cells without data: it compresses as real fields do, to about a half.
-fn frame(seed: u32) -> Arc<[f32]> {
+fn field(seed: u32) -> Arc<[f32]> {
     let value = |cell: u32| {
         let noise = (cell ^ seed.wrapping_mul(0x9E37_79B9)).wrapping_mul(0x85EB_CA6B) >> 16;
         match cell / 90 % 3 {
@@ -92,7 +92,7 @@ async fn measure(folder: &str, steps: u32) -> Outcome {
         };
         let begun = Instant::now();
         let mut edit = Edit::begin(&repository).await?;
-        edit.put(day(step)?, frame(step)).await?;
+        edit.put(day(step)?, field(step)).await?;
         edit.commit("a step").await?;
         if !is_shown {
             continue;
@@ -160,7 +160,7 @@ async fn append(folder: &str) -> Outcome {
         seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
         let mut edit = Edit::begin(&repository).await?;
         let day = day(seed >> 20)?;
-        edit.put(day, frame(seed)).await?;
+        edit.put(day, field(seed)).await?;
         edit.commit("a step").await?;
         println!("{}", day.start);
     }
@@ -171,7 +171,7 @@ async fn check(folder: &str) -> Outcome {
     let repository = open(folder).await?;
     let cube = repository.at(&At::Newest).await?;
     for (place, step) in cube.steps().iter().enumerate() {
-        cube.frame(place).await?;
+        cube.field(place).await?;
         println!("{}", step.period.start);
     }
     Ok(())

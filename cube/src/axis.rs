@@ -24,7 +24,7 @@ const MOST_STEPS: u64 = 10_000_000;
 pub struct Step {
     /// What its values are a mean over; of accumulated carbon, what was added last.
     pub period: Period,
-    /// Digest of its values and period: [`storage::frames::digest_of`].
+    /// Digest of its values and period: [`storage::fields::digest_of`].
     pub values_sha256: Digest,
 }
 

@@ -13,7 +13,7 @@ use icechunk::format::{ChunkIndices, Path};
 use icechunk::session::{Session, SessionError};
 use tokio::sync::RwLock;
 
-use crate::frame::{EncodedObject, Encoder};
+use crate::field::{EncodedObject, Encoder};
 use crate::layer::Layer;
 use crate::plain::{self, OBJECTS_AT_ONCE};
 use crate::plan::Plan;
@@ -81,7 +81,7 @@ impl<'a> Edit<'a> {
             .try_collect()
             .await?;
         let digested =
-            tokio::task::spawn_blocking(move || storage::frames::digest_of(&grid, &values, period));
+            tokio::task::spawn_blocking(move || storage::fields::digest_of(&grid, &values, period));
         let step = Step {
             period,
             values_sha256: digested

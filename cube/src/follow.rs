@@ -14,15 +14,15 @@ use contract::manifest::{Manifest, ManifestId};
 use contract::product::ProductId;
 use contract::time::Period;
 use futures::stream::{self, StreamExt as _, TryStreamExt as _};
-use storage::{Store, frames, manifests};
+use storage::{Store, fields, manifests};
 
 use crate::edit::ATTEMPTS;
 use crate::plan::Plan;
 use crate::state::State;
 use crate::{CubeError, Description, Edit, Repository, Step};
 
-/// Frames that are read while one is written.
-const FRAMES_AHEAD: usize = 2;
+/// Fields that are read while one is written.
+const FIELDS_AHEAD: usize = 2;
 
 /// Where the cube of a product lies in a store.
 pub fn folder(product: &ProductId) -> String {
@@ -34,7 +34,7 @@ pub async fn follow(store: &Store, manifest: &Manifest) -> Result<Followed, Cube
     let follower = Follower {
         store,
         folder: &folder(&manifest.product),
-        frames: store,
+        fields: store,
         told: &|_period| (),
     };
     follower.run(manifest).await
@@ -62,8 +62,8 @@ pub struct Follower<'a> {
     pub store: &'a Store,
     /// Its folder there; `""` is the whole store.
     pub folder: &'a str,
-    /// Where the frames are that versions name.
-    pub frames: &'a Store,
+    /// Where the fields are that versions name.
+    pub fields: &'a Store,
     /// Is told of each step that is put.
     pub told: &'a (dyn Fn(Period) + Send + Sync),
 }
@@ -82,7 +82,7 @@ impl Follower<'_> {
     /// state by the version's number. An older version than the cube is of changes nothing.
     ///
     /// # Errors
-    /// `Foreign` if the cube is of another version of this number, or of another product. A frame that cannot be read.
+    /// `Foreign` if the cube is of another version of this number, or of another product. A field that cannot be read.
     pub async fn run(&self, manifest: &Manifest) -> Result<Followed, CubeError> {
         let version = manifest.id();
         let description = Description::of(manifest);
@@ -160,15 +160,15 @@ impl Follower<'_> {
             .iter()
             .map(|step| (step.period, step.values_sha256))
             .collect();
-        let known = self.known_frames(manifest, state).await?;
+        let known = self.known_fields(manifest, state).await?;
         let mut wanted: Vec<Option<Step>> = Vec::with_capacity(manifest.steps.len());
         let mut absent = vec![];
         for (place, step) in manifest.steps.iter().enumerate() {
             let period = step.period;
-            let named = match step.frame.vouches() {
+            let named = match step.field.vouches() {
                 Vouched::Values(digest) => Some(digest),
                 // Named by its bytes: its values are known if the version before named the same.
-                Vouched::Bytes(_) | Vouched::Nothing => (known.get(&period) == Some(&step.frame))
+                Vouched::Bytes(_) | Vouched::Nothing => (known.get(&period) == Some(&step.field))
                     .then(|| there.get(&period).copied())
                     .flatten(),
             };
@@ -185,42 +185,42 @@ impl Follower<'_> {
                 (_, Some(put)) => wanted.push(Some(put)),
                 _ => {
                     wanted.push(None);
-                    absent.push((place, period, &step.frame));
+                    absent.push((place, period, &step.field));
                 }
             }
         }
-        let read = |(place, period, frame): (usize, Period, &ObjectKey)| {
-            let (store, frame, grid) = (self.frames.clone(), frame.clone(), manifest.grid);
+        let read = |(place, period, field): (usize, Period, &ObjectKey)| {
+            let (store, field, grid) = (self.fields.clone(), field.clone(), manifest.grid);
             async move {
-                let values = frames::read(&store, &frame, &grid).await?;
+                let values = fields::read(&store, &field, &grid).await?;
                 Ok::<_, CubeError>((place, period, Arc::<[f32]>::from(values)))
             }
         };
-        let mut frames = stream::iter(absent).map(read).buffered(FRAMES_AHEAD);
-        while let Some((place, period, values)) = frames.try_next().await? {
+        let mut fields = stream::iter(absent).map(read).buffered(FIELDS_AHEAD);
+        while let Some((place, period, values)) = fields.try_next().await? {
             wanted[place] = Some(edit.put(period, values).await?);
             (self.told)(period);
         }
         Ok(wanted.into_iter().flatten().collect())
     }
 
-    /// Frames of the version that the cube is of, by their periods: none if that version is gone, or not needed.
-    async fn known_frames(
+    /// Fields of the version that the cube is of, by their periods: none if that version is gone, or not needed.
+    async fn known_fields(
         &self,
         manifest: &Manifest,
         state: &State,
     ) -> Result<BTreeMap<Period, ObjectKey>, CubeError> {
-        let is_named = |frame: &ObjectKey| matches!(frame.vouches(), Vouched::Values(_));
+        let is_named = |field: &ObjectKey| matches!(field.vouches(), Vouched::Values(_));
         let version = state.description.as_ref().and_then(|it| it.version.clone());
         let (Some(version), false) = (
             version,
-            manifest.steps.iter().all(|step| is_named(&step.frame)),
+            manifest.steps.iter().all(|step| is_named(&step.field)),
         ) else {
             return Ok(BTreeMap::new());
         };
-        let before = manifests::numbered(self.frames, &version.product, version.number).await?;
+        let before = manifests::numbered(self.fields, &version.product, version.number).await?;
         let before = before.filter(|before| before.id() == version);
         let steps = before.into_iter().flat_map(|before| before.steps);
-        Ok(steps.map(|step| (step.period, step.frame)).collect())
+        Ok(steps.map(|step| (step.period, step.field)).collect())
     }
 }

@@ -21,7 +21,7 @@ pub(crate) struct Layer<'a> {
     pub(crate) repository: &'a Repository,
     /// What the cube is of afterwards.
     pub(crate) description: &'a Description,
-    /// Rows and columns of all objects of a frame.
+    /// Rows and columns of all objects of a field.
     pub(crate) indices: Vec<[u32; 2]>,
     /// Of the values' array.
     pub(crate) path: &'a Path,

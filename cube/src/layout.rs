@@ -1,4 +1,4 @@
-//! How a frame is cut: into chunks that are read and checked each by itself, and where there are many, shards of chunks
+//! How a field is cut: into chunks that are read and checked each by itself, and where there are many, shards of chunks
 //! that are an object each.
 
 use contract::chunk::Window;
@@ -6,12 +6,12 @@ use contract::grid::Grid;
 
 /// Longest side of a chunk, cells: 1 MiB of values at most.
 const CHUNK_SIDE: u32 = 512;
-/// Above so many chunks a frame's objects hold several each.
+/// Above so many chunks a field's objects hold several each.
 const MOST_OBJECTS: u32 = 64;
 /// Chunks along each side of a shard: 64 MiB of values at most.
 const SHARD_SIDE: u32 = 8;
 
-/// How the frames of a grid are cut.
+/// How the fields of a grid are cut.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Layout {
     /// Rows and columns of a chunk, cells.
@@ -45,7 +45,7 @@ impl Layout {
         self.object != self.chunk
     }
 
-    /// Objects of a frame of a grid: rows and columns of them.
+    /// Objects of a field of a grid: rows and columns of them.
     pub fn objects(&self, grid: &Grid) -> [u32; 2] {
         [
             grid.rows.div_ceil(self.object[0]),

@@ -17,10 +17,10 @@ use zarrs::storage::{
 };
 
 use crate::arrays::{self, Fixed};
-use crate::frame::{EncodedObject, Encoder};
+use crate::field::{EncodedObject, Encoder};
 use crate::{CubeError, Description, Step, axis};
 
-/// Objects of a frame that are encoded and sent at a time.
+/// Objects of a field that are encoded and sent at a time.
 pub(crate) const OBJECTS_AT_ONCE: usize = 4;
 
 /// Writes the group, the values' array without steps, the coordinates of space, and an empty time.
@@ -121,7 +121,7 @@ impl PlainZarr {
         })
     }
 
-    /// Writes the next step: `values` of its frame, `[row, col]`, stored unit, NaN no data.
+    /// Writes the next step: `values` of its field, `[row, col]`, stored unit, NaN no data.
     ///
     /// # Errors
     /// `Overlap` if it does not come after the last one.
@@ -158,7 +158,7 @@ impl PlainZarr {
         drop::<Vec<()>>(sent);
         let step = Step {
             period,
-            values_sha256: storage::frames::digest_of(&grid, &values, period),
+            values_sha256: storage::fields::digest_of(&grid, &values, period),
         };
         self.steps.push(step);
         Ok(step)
@@ -196,7 +196,7 @@ pub(crate) fn check_length(values: &[f32], expected: usize) -> Result<(), CubeEr
     })
 }
 
-/// The objects of a frame, encoded on other threads a few at a time.
+/// The objects of a field, encoded on other threads a few at a time.
 pub(crate) fn encoded(
     encoder: &Arc<Encoder>,
     values: &Arc<[f32]>,

@@ -1,4 +1,4 @@
-//! One state of a cube, to read: windows of cells of a step, whole frames, the series of a cell.
+//! One state of a cube, to read: windows of cells of a step, whole fields, the series of a cell.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use zarrs::array::{Array, AsyncArrayShardedReadableExt as _, AsyncArrayShardedRe
 use zarrs_icechunk::AsyncIcechunkStore;
 
 use crate::error::first_lines;
-use crate::frame::Decoder;
+use crate::field::Decoder;
 use crate::{CubeError, Description, Layout, Step, arrays, axis};
 
 /// Chunks that are read and decoded at a time.
@@ -84,7 +84,7 @@ impl Cube {
     }
 
     /// Values of a whole step, `[row, col]`, compared with their digest.
-    pub async fn frame(&self, step: usize) -> Result<Vec<f32>, CubeError> {
+    pub async fn field(&self, step: usize) -> Result<Vec<f32>, CubeError> {
         let grid = self.0.description.grid;
         let whole = Window {
             row: 0,
@@ -98,7 +98,7 @@ impl Cube {
             values_sha256,
         } = self.0.steps[step];
         let digested = tokio::task::spawn_blocking(move || {
-            let digest = storage::frames::digest_of(&grid, &values, period);
+            let digest = storage::fields::digest_of(&grid, &values, period);
             (digest, values)
         });
         let array = || arrays::name(&self.0.array);

@@ -184,7 +184,7 @@ impl Check<'_> {
             if broken.contains(&(place as u32)) {
                 continue;
             }
-            match cube.frame(place).await {
+            match cube.field(place).await {
                 Ok(_values) => {}
                 Err(error @ (CubeError::Chunk { .. } | CubeError::Step { .. })) => {
                     let mut finding = self.finding(&error);
@@ -242,7 +242,7 @@ impl Check<'_> {
 /// versions that are there. True if it was made again.
 ///
 /// # Errors
-/// The store does not answer; a frame that the cube is made of is damaged or gone.
+/// The store does not answer; a field that the cube is made of is damaged or gone.
 pub async fn mend(store: &Store, product: &ProductId) -> Result<bool, CubeError> {
     let folder = folder(product);
     let keys = store.list(&folder).await?;

@@ -143,8 +143,8 @@ def board() -> Dashboard:
         )
         .with_panel(
             lines(
-                "Frames kept",
-                "Bytes of frames by where they are; a full memory means frames are read again and again.",
+                "Fields kept",
+                "Bytes of fields by where they are; a full memory means fields are read again and again.",
                 "bytes",
                 ("sum by (instance, place) (fluxglobe_render_worker_resident_bytes)", "{{instance}} {{place}}"),
             )

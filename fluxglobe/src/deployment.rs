@@ -158,7 +158,7 @@ pub(crate) async fn desk(
 /// The same for single pictures of a command: nothing is read ahead for a next one.
 pub(crate) async fn single_desk(settings: &Settings, store: Store) -> Result<Desk> {
     let limits = Limits {
-        frames_ahead: 0,
+        fields_ahead: 0,
         ..Limits::default()
     };
     desk(settings, store, limits, &Registry::new()).await

@@ -4,7 +4,7 @@ use anyhow::Result;
 use contract::job::RenderJob;
 use contract::quantity::Quantity;
 use render::plan::HEIGHT_LIMIT_M;
-use storage::{Store, frames};
+use storage::{Store, fields};
 
 /// What to tell of a job some of whose columns end at the limit; nothing where all are to scale.
 pub(crate) async fn note(store: &Store, job: &RenderJob) -> Result<Option<String>> {
@@ -13,12 +13,12 @@ pub(crate) async fn note(store: &Store, job: &RenderJob) -> Result<Option<String
     };
     let zero = vec![0.0; job.grid.cell_count()];
     let before = match &sample.before {
-        Some(frame) => frames::read(store, frame, &job.grid).await?,
+        Some(field) => fields::read(store, field, &job.grid).await?,
         None => zero,
     };
     let (after, weight) = match &sample.after {
         Some(after) => (
-            frames::read(store, &after.frame, &job.grid).await?,
+            fields::read(store, &after.field, &job.grid).await?,
             after.weight,
         ),
         None => (before.clone(), 0.0),

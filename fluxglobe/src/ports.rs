@@ -227,7 +227,7 @@ mod tests {
     use contract::quantity::Quantity;
     use contract::region::Cells;
     use contract::time::Period;
-    use storage::{Store, domain, frames, manifests};
+    use storage::{Store, domain, fields, manifests};
 
     use super::*;
 
@@ -244,7 +244,7 @@ mod tests {
         let product: ProductId = name.parse().unwrap();
         let period = Period::month(2000, 1).unwrap();
         let values = vec![value; GRID.cell_count()];
-        let frame = frames::write(store, &product, &GRID, &values, period).await;
+        let field = fields::write(store, &product, &GRID, &values, period).await;
         let cells = vec![true; GRID.cell_count()];
         let manifest = Manifest {
             schema: MANIFEST_SCHEMA,
@@ -257,7 +257,7 @@ mod tests {
             steps: vec![Step {
                 masked: None,
                 period,
-                frame: frame.unwrap(),
+                field: field.unwrap(),
                 raw_sha256: Digest::of(name.as_bytes()),
                 origin: "made".to_owned(),
                 valid_cells: GRID.cell_count() as u64,

@@ -1,4 +1,4 @@
-//! [`CheckedGrid`] in, [`EncodedGrid`] out: the bytes of a frame and the key that the digest of its values gives it.
+//! [`CheckedGrid`] in, [`EncodedGrid`] out: the bytes of a field and the key that the digest of its values gives it.
 
 use bytes::Bytes;
 use contract::grid::Grid;
@@ -10,12 +10,12 @@ use contract::time::Period;
 use crate::check::CheckedGrid;
 use crate::error::IngestError;
 
-/// One step as the bytes of a frame.
+/// One step as the bytes of a field.
 #[derive(Debug, Clone)]
 pub(crate) struct EncodedGrid {
     pub(crate) period: Period,
     pub(crate) key: ObjectKey,
-    pub(crate) frame: Bytes,
+    pub(crate) field: Bytes,
     pub(crate) valid_cells: u64,
     pub(crate) masked: MaskedCells,
 }
@@ -25,12 +25,12 @@ pub(crate) fn run(
     product: &ProductId,
     grid: &Grid,
 ) -> Result<EncodedGrid, IngestError> {
-    let frame = storage::frames::encode(grid, &checked.values, checked.period)
-        .map_err(IngestError::storage("encode a frame"))?;
+    let field = storage::fields::encode(grid, &checked.values, checked.period)
+        .map_err(IngestError::storage("encode a field"))?;
     Ok(EncodedGrid {
         period: checked.period,
-        key: ObjectKey::frame(product, &frame.values_sha256),
-        frame: frame.content,
+        key: ObjectKey::field(product, &field.values_sha256),
+        field: field.content,
         valid_cells: checked.valid_cells,
         masked: checked.masked,
     })

@@ -7,8 +7,8 @@
 //!   plan     PlannedGranule    what of it is read, and what that becomes
 //!   decode   DecodedGrid       values of one step
 //!   check    CheckedGrid       those of them that can be true
-//!   encode   EncodedGrid       bytes of a frame
-//!   put      StoredGranule     all frames are durable
+//!   encode   EncodedGrid       bytes of a field
+//!   put      StoredGranule     all fields are durable
 //!   commit   Answer            a manifest names them
 //! ```
 //! Files are parsed in a process of their own ([`reader`]); all else here sees only checked descriptions and numbers.

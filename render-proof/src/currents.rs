@@ -8,7 +8,7 @@ use contract::grid::Grid;
 use contract::job::{Mode, RenderJob, Style, View};
 use contract::quantity::Quantity;
 use contract::trails::Trails;
-use render::scene::{Frame, Interval, Scene};
+use render::scene::{Field, Interval, Scene};
 
 use super::ocean;
 
@@ -21,17 +21,17 @@ pub fn scene(
     before: impl Fn(f64, f64) -> Option<Vector>,
     after: impl Fn(f64, f64) -> Option<Vector>,
 ) -> Scene {
-    let frame = |vector: &dyn Fn(f64, f64) -> Option<Vector>, part: usize| {
+    let field = |vector: &dyn Fn(f64, f64) -> Option<Vector>, part: usize| {
         let cells = (0..grid.rows).flat_map(|row| (0..grid.cols).map(move |col| (row, col)));
         let values = cells.map(|(row, col)| {
             let place = grid.cell_center(row, col);
             vector(place.lon, place.lat).map_or(f32::NAN, |vector| vector[part] as f32)
         });
-        Arc::new(Frame::new(values.collect()))
+        Arc::new(Field::new(values.collect()))
     };
     let part = |part| Interval {
-        before: frame(&before, part),
-        after: frame(&after, part),
+        before: field(&before, part),
+        after: field(&after, part),
         weight: 0.5,
     };
     let value = part(0);

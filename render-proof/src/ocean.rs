@@ -8,7 +8,7 @@ use contract::grid::Grid;
 use contract::job::{Mode, RENDERER_VERSION, RenderJob, Style, View};
 use contract::quantity::Quantity;
 use contract::time_sample::TimeSample;
-use render::scene::{Frame, Interval, Scene};
+use render::scene::{Field, Interval, Scene};
 
 /// The grid of the 1-degree climatology.
 pub const ONE_DEGREE: Grid = Grid {
@@ -66,7 +66,7 @@ fn flux(lon: f64, lat: f64, phase: f64) -> f64 {
         * GRAM_A_YEAR
 }
 
-fn frame(grid: &Grid, value: impl Fn(f64, f64) -> f64) -> Arc<Frame> {
+fn field(grid: &Grid, value: impl Fn(f64, f64) -> f64) -> Arc<Field> {
     let cells = (0..grid.rows).flat_map(|row| (0..grid.cols).map(move |col| (row, col)));
     let values = cells.map(|(row, col)| {
         let place = grid.cell_center(row, col);
@@ -76,20 +76,20 @@ fn frame(grid: &Grid, value: impl Fn(f64, f64) -> f64) -> Arc<Frame> {
             value(place.lon, place.lat) as f32
         }
     });
-    Arc::new(Frame::new(values.collect()))
+    Arc::new(Field::new(values.collect()))
 }
 
 /// Two months of flux with ten months of carbon accumulated.
 pub fn scene(grid: Grid) -> Scene {
     let year_s = 365.25 * 86_400.0;
     let value = Interval {
-        before: frame(&grid, |lon, lat| flux(lon, lat, 0.0)),
-        after: frame(&grid, |lon, lat| flux(lon, lat, TAU / 12.0)),
+        before: field(&grid, |lon, lat| flux(lon, lat, 0.0)),
+        after: field(&grid, |lon, lat| flux(lon, lat, TAU / 12.0)),
         weight: 0.3,
     };
     let accumulated = Interval {
-        before: frame(&grid, |lon, lat| flux(lon, lat, 0.0) * 0.8 * year_s),
-        after: frame(&grid, |lon, lat| flux(lon, lat, TAU / 24.0) * 0.9 * year_s),
+        before: field(&grid, |lon, lat| flux(lon, lat, 0.0) * 0.8 * year_s),
+        after: field(&grid, |lon, lat| flux(lon, lat, TAU / 24.0) * 0.9 * year_s),
         weight: 0.6,
     };
     let domain = Scene::domain_of(value.before.cells.content().iter().map(|v| *v > -1.0));
@@ -110,9 +110,9 @@ pub fn scene(grid: Grid) -> Scene {
 /// Never: its fixed words are valid.
 pub fn job(view: View) -> RenderJob {
     let key = |text: &str| text.parse().expect("the name is constant");
-    let sample = |domain: &str, frame: &str| TimeSample {
+    let sample = |domain: &str, field: &str| TimeSample {
         domain: key(domain),
-        before: Some(key(frame)),
+        before: Some(key(field)),
         after: None,
         contributed: None,
     };

@@ -11,7 +11,7 @@ pub enum DrawError {
     /// The engine could not draw it.
     #[error(transparent)]
     Render(#[from] RenderError),
-    /// Reading frames failed.
+    /// Reading fields failed.
     #[error("cannot read {what} of {product}")]
     Store {
         what: &'static str,

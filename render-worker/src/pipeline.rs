@@ -1,4 +1,4 @@
-//! The steps of one picture: frames loaded and filled, drawn on a sound device, encoded.
+//! The steps of one picture: fields loaded and filled, drawn on a sound device, encoded.
 //!
 //! A step knows nothing of who asks, in which order, or what is stored: that is the business of the [`desk`](crate::desk).
 
@@ -26,23 +26,23 @@ pub struct Limits {
     pub draws_at_once: Option<NonZeroUsize>,
     /// Jobs that somebody waits for and that are not begun; more are sent away.
     pub draw_queue: usize,
-    /// Bytes of frames kept in memory; see [`Source::new`] for frames larger than half of them.
-    pub frame_bytes: u64,
-    /// Bytes of frames kept on the device; none named is a share of what the device has.
-    pub device_frame_bytes: Option<u64>,
-    /// Frames of every product read ahead of the one drawn; none with 0.
-    pub frames_ahead: usize,
+    /// Bytes of fields kept in memory; see [`Source::new`] for fields larger than half of them.
+    pub field_bytes: u64,
+    /// Bytes of fields kept on the device; none named is a share of what the device has.
+    pub device_field_bytes: Option<u64>,
+    /// Fields of every product read ahead of the one drawn; none with 0.
+    pub fields_ahead: usize,
 }
 
 impl Default for Limits {
-    /// As many pictures as suit the adapter; half a GiB of frames, the next one of them.
+    /// As many pictures as suit the adapter; half a GiB of fields, the next one of them.
     fn default() -> Self {
         Self {
             draws_at_once: None,
             draw_queue: 256,
-            frame_bytes: 512 << 20,
-            device_frame_bytes: None,
-            frames_ahead: 1,
+            field_bytes: 512 << 20,
+            device_field_bytes: None,
+            fields_ahead: 1,
         }
     }
 }
@@ -65,17 +65,17 @@ type Timings = [(&'static str, Duration); 5];
 impl Pipeline {
     /// Opens the backend. Blocks while shaders compile.
     pub fn open(store: Store, backend: Backend, limits: &Limits) -> Result<Self, DrawError> {
-        let renderer = Arc::new(Renderer::keeping(backend, limits.device_frame_bytes)?);
+        let renderer = Arc::new(Renderer::keeping(backend, limits.device_field_bytes)?);
         let source = Arc::new(Source::new(
             store.clone(),
             Arc::clone(&renderer),
-            limits.frame_bytes,
+            limits.field_bytes,
         ));
         let prefetch = Arc::new(Prefetch::new(
             store,
             Arc::clone(&source),
             Arc::clone(&renderer),
-            limits.frames_ahead,
+            limits.fields_ahead,
         ));
         Ok(Self {
             renderer,
@@ -100,7 +100,7 @@ impl Pipeline {
         &self.renderer
     }
 
-    /// Frames in memory.
+    /// Fields in memory.
     pub fn kept(&self) -> Kept {
         self.source.kept()
     }

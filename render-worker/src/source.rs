@@ -1,4 +1,4 @@
-//! Where scenes come from: the frames that a job names, gaps filled once, kept while there is room.
+//! Where scenes come from: the fields that a job names, gaps filled once, kept while there is room.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -11,7 +11,7 @@ use contract::key::ObjectKey;
 use contract::time_sample::{After, TimeSample};
 use quick_cache::sync::{Cache, DefaultLifecycle};
 use quick_cache::{DefaultHashBuilder, OptionsBuilder, Weighter};
-use render::scene::{Cells, Frame, Interval, Scene, Terrain};
+use render::scene::{Cells, Field, Interval, Scene, Terrain};
 use render::stages::fill::Form;
 use render::stages::fill::scaled::holds;
 use render::{RenderError, Renderer};
@@ -21,9 +21,9 @@ use crate::error::DrawError;
 
 /// Domains kept; each has four bytes a cell.
 const MOST_DOMAINS: usize = 64;
-/// About as many frames are kept: of a degree they are many more, of a sixtieth of one fewer.
-const TYPICAL_FRAMES: usize = 256;
-/// Share of the memory for frames that were wanted again: the rest is for those that have just come, of which a picture
+/// About as many fields are kept: of a degree they are many more, of a sixtieth of one fewer.
+const TYPICAL_FIELDS: usize = 256;
+/// Share of the memory for fields that were wanted again: the rest is for those that have just come, of which a picture
 /// needs several.
 const PROVEN_SHARE: f64 = 0.5;
 
@@ -34,37 +34,37 @@ pub struct Source {
     renderer: Arc<Renderer>,
     most_bytes: u64,
     domains: Cache<ObjectKey, Arc<Cells<u32>>>,
-    /// One reads a frame, others who want it wait; if he gives up, the next one reads.
-    frames: Cache<FrameKey, Held, ByBytes>,
-    frame_hits: AtomicU64,
-    frame_misses: AtomicU64,
+    /// One reads a field, others who want it wait; if he gives up, the next one reads.
+    fields: Cache<FieldKey, Held, ByBytes>,
+    field_hits: AtomicU64,
+    field_misses: AtomicU64,
     early_reads: AtomicU64,
     early_hits: AtomicU64,
     early_cancelled: AtomicU64,
 }
 
-/// A frame, the domain that its gaps were filled for, and the counts that say what its sums lack, if that is drawn.
-type FrameKey = (ObjectKey, ObjectKey, Option<ObjectKey>);
+/// A field, the domain that its gaps were filled for, and the counts that say what its sums lack, if that is drawn.
+type FieldKey = (ObjectKey, ObjectKey, Option<ObjectKey>);
 
-/// A frame in memory.
+/// A field in memory.
 #[derive(Clone)]
 struct Held {
-    frame: Arc<Frame>,
+    field: Arc<Field>,
     /// Its size, which must not change while it is here.
     bytes: u64,
     /// Nobody has wanted it yet.
     is_early: Arc<AtomicBool>,
 }
 
-/// The weight of a frame is its size. One of more than half of all room weighs a half: the cache would turn it away, and a
+/// The weight of a field is its size. One of more than half of all room weighs a half: the cache would turn it away, and a
 /// picture lies between two.
 #[derive(Clone)]
 struct ByBytes {
     most_bytes: u64,
 }
 
-impl Weighter<FrameKey, Held> for ByBytes {
-    fn weight(&self, _key: &FrameKey, held: &Held) -> u64 {
+impl Weighter<FieldKey, Held> for ByBytes {
+    fn weight(&self, _key: &FieldKey, held: &Held) -> u64 {
         if held.bytes <= self.most_bytes {
             held.bytes.min(self.most_bytes / 2)
         } else {
@@ -73,7 +73,7 @@ impl Weighter<FrameKey, Held> for ByBytes {
     }
 }
 
-/// Why a frame is read.
+/// Why a field is read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Wanted {
     /// A picture waits for it.
@@ -85,15 +85,15 @@ enum Wanted {
 /// What a source keeps, and how often that helped.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Kept {
-    /// Products of which frames are kept.
+    /// Products of which fields are kept.
     pub products: BTreeSet<String>,
-    /// Bytes of frames.
-    pub frame_bytes: u64,
-    /// Frames that were there when they were wanted.
-    pub frame_hits: u64,
-    /// Frames that had to be read.
-    pub frame_misses: u64,
-    /// Frames that were read before anybody wanted them.
+    /// Bytes of fields.
+    pub field_bytes: u64,
+    /// Fields that were there when they were wanted.
+    pub field_hits: u64,
+    /// Fields that had to be read.
+    pub field_misses: u64,
+    /// Fields that were read before anybody wanted them.
     pub early_reads: u64,
     /// Those of them that were wanted then.
     pub early_hits: u64,
@@ -102,25 +102,25 @@ pub struct Kept {
 }
 
 impl Held {
-    fn new(frame: Frame, wanted: Wanted) -> Self {
+    fn new(field: Field, wanted: Wanted) -> Self {
         Self {
-            bytes: frame.size_bytes(),
-            frame: Arc::new(frame),
+            bytes: field.size_bytes(),
+            field: Arc::new(field),
             is_early: Arc::new(AtomicBool::new(wanted == Wanted::Ahead)),
         }
     }
 }
 
 impl Source {
-    /// A source that keeps frames up to `most_bytes`, or two that are each larger than half of that and not larger than it.
+    /// A source that keeps fields up to `most_bytes`, or two that are each larger than half of that and not larger than it.
     ///
     /// # Panics
     /// Never: its options are complete.
     pub fn new(store: Store, renderer: Arc<Renderer>, most_bytes: u64) -> Self {
-        // One shard: in several, each would have a part of the memory that a frame may not fit into.
+        // One shard: in several, each would have a part of the memory that a field may not fit into.
         let options = OptionsBuilder::new()
             .shards(1)
-            .estimated_items_capacity(TYPICAL_FRAMES)
+            .estimated_items_capacity(TYPICAL_FIELDS)
             .weight_capacity(most_bytes)
             .hot_allocation(PROVEN_SHARE)
             .build()
@@ -131,16 +131,16 @@ impl Source {
             renderer,
             most_bytes,
             domains: Cache::new(MOST_DOMAINS),
-            frames: Cache::with_options(options, ByBytes { most_bytes }, hasher, lifecycle),
-            frame_hits: AtomicU64::new(0),
-            frame_misses: AtomicU64::new(0),
+            fields: Cache::with_options(options, ByBytes { most_bytes }, hasher, lifecycle),
+            field_hits: AtomicU64::new(0),
+            field_misses: AtomicU64::new(0),
             early_reads: AtomicU64::new(0),
             early_hits: AtomicU64::new(0),
             early_cancelled: AtomicU64::new(0),
         }
     }
 
-    /// Bytes of frames that are kept at most.
+    /// Bytes of fields that are kept at most.
     pub(crate) fn most_bytes(&self) -> u64 {
         self.most_bytes
     }
@@ -152,15 +152,15 @@ impl Source {
 
     /// What is kept now.
     pub fn kept(&self) -> Kept {
-        // A frame's key is `frames/PRODUCT/DIGEST`, or the domain's where accumulation starts.
-        let product = |((frame, ..), _): (FrameKey, Held)| {
-            frame.as_str().split('/').nth(1).map(str::to_owned)
+        // A field's key is `frames/PRODUCT/DIGEST`, or the domain's where accumulation starts.
+        let product = |((field, ..), _): (FieldKey, Held)| {
+            field.as_str().split('/').nth(1).map(str::to_owned)
         };
         Kept {
-            products: self.frames.iter().filter_map(product).collect(),
-            frame_bytes: self.frames.iter().map(|(_, held)| held.bytes).sum(),
-            frame_hits: self.frame_hits.load(Ordering::Relaxed),
-            frame_misses: self.frame_misses.load(Ordering::Relaxed),
+            products: self.fields.iter().filter_map(product).collect(),
+            field_bytes: self.fields.iter().map(|(_, held)| held.bytes).sum(),
+            field_hits: self.field_hits.load(Ordering::Relaxed),
+            field_misses: self.field_misses.load(Ordering::Relaxed),
             early_reads: self.early_reads.load(Ordering::Relaxed),
             early_hits: self.early_hits.load(Ordering::Relaxed),
             early_cancelled: self.early_cancelled.load(Ordering::Relaxed),
@@ -213,7 +213,7 @@ impl Source {
         })
     }
 
-    /// The frames around a sample, if there is one.
+    /// The fields around a sample, if there is one.
     async fn other_interval(
         &self,
         grid: &Grid,
@@ -234,37 +234,37 @@ impl Source {
         }
     }
 
-    /// The frame of a relief, as it is stored: what is missing stays so.
+    /// The field of a relief, as it is stored: what is missing stays so.
     async fn terrain(&self, relief: &Relief) -> Result<Terrain, DrawError> {
         let grid = relief.grid;
         // No domain: its gaps are not filled.
-        let key = (relief.frame.clone(), relief.frame.clone(), None);
-        if let Some(held) = self.frames.get(&key) {
-            let elevation = held.frame;
-            self.frame_hits.fetch_add(1, Ordering::Relaxed);
+        let key = (relief.field.clone(), relief.field.clone(), None);
+        if let Some(held) = self.fields.get(&key) {
+            let elevation = held.field;
+            self.field_hits.fetch_add(1, Ordering::Relaxed);
             // Found under its content, which says nothing of the grid of another job.
             let fits = elevation.cells.content().len() == grid.cell_count();
-            let mismatch = || mismatch(&relief.frame);
+            let mismatch = || mismatch(&relief.field);
             return fits
                 .then_some(Terrain { grid, elevation })
                 .ok_or_else(mismatch);
         }
-        self.frame_misses.fetch_add(1, Ordering::Relaxed);
-        let read = storage::frames::read(&self.store, &relief.frame, &grid).await;
+        self.field_misses.fetch_add(1, Ordering::Relaxed);
+        let read = storage::fields::read(&self.store, &relief.field, &grid).await;
         let values = read.map_err(|source| DrawError::Store {
             what: "the relief",
-            product: relief.frame.to_string(),
+            product: relief.field.to_string(),
             source: Box::new(source),
         })?;
-        let held = Held::new(Frame::new(values), Wanted::Now);
-        self.frames.insert(key, held.clone());
+        let held = Held::new(Field::new(values), Wanted::Now);
+        self.fields.insert(key, held.clone());
         Ok(Terrain {
             grid,
-            elevation: held.frame,
+            elevation: held.field,
         })
     }
 
-    /// The domain of a sample and the frames around it.
+    /// The domain of a sample and the fields around it.
     async fn interval(
         &self,
         grid: &Grid,
@@ -272,13 +272,13 @@ impl Source {
         wanted: Wanted,
     ) -> Result<(Arc<Cells<u32>>, Interval), DrawError> {
         let counts = sample.contributed.clone().unwrap_or_default();
-        let part = |frame: &ObjectKey, counts: &Option<ObjectKey>| {
-            (frame.clone(), sample.domain.clone(), counts.clone())
+        let part = |field: &ObjectKey, counts: &Option<ObjectKey>| {
+            (field.clone(), sample.domain.clone(), counts.clone())
         };
         let before = async {
-            if let Some(frame) = &sample.before {
-                let key = part(frame, &counts.before);
-                self.frame(grid, key, wanted).await
+            if let Some(field) = &sample.before {
+                let key = part(field, &counts.before);
+                self.field(grid, key, wanted).await
             } else {
                 // All that is accumulated until the end of the first step is of that step.
                 let key = part(&sample.domain, &counts.after);
@@ -287,9 +287,9 @@ impl Source {
         };
         let after = async {
             match &sample.after {
-                Some(After { frame, weight }) => {
-                    let key = part(frame, &counts.after);
-                    Ok(Some((self.frame(grid, key, wanted).await?, *weight)))
+                Some(After { field, weight }) => {
+                    let key = part(field, &counts.after);
+                    Ok(Some((self.field(grid, key, wanted).await?, *weight)))
                 }
                 None => Ok(None),
             }
@@ -305,20 +305,20 @@ impl Source {
         Ok((domain, interval))
     }
 
-    /// Where accumulation starts: zero in every cell of the domain, which stands for the frame in the key.
-    async fn nothing(&self, grid: &Grid, key: FrameKey) -> Result<Arc<Frame>, DrawError> {
-        if let Some(held) = self.frames.get(&key) {
-            return Ok(held.frame);
+    /// Where accumulation starts: zero in every cell of the domain, which stands for the field in the key.
+    async fn nothing(&self, grid: &Grid, key: FieldKey) -> Result<Arc<Field>, DrawError> {
+        if let Some(held) = self.fields.get(&key) {
+            return Ok(held.field);
         }
         let (_, of_domain, counts) = &key;
         let domain = self.domain(grid, of_domain);
         let (domain, lacking) =
             tokio::try_join!(domain, self.lacking(grid, of_domain, counts.as_ref()))?;
         let zero = |cell: &u32| if *cell == 0 { f32::NAN } else { 0.0 };
-        let frame = Frame::new(domain.content().iter().map(zero).collect());
-        let held = Held::new(uncertain(frame, lacking), Wanted::Now);
-        self.frames.insert(key, held.clone());
-        Ok(held.frame)
+        let field = Field::new(domain.content().iter().map(zero).collect());
+        let held = Held::new(uncertain(field, lacking), Wanted::Now);
+        self.fields.insert(key, held.clone());
+        Ok(held.field)
     }
 
     /// What sums lack, if counts say so.
@@ -351,43 +351,43 @@ impl Source {
         Err(mismatch(key))
     }
 
-    async fn frame(
+    async fn field(
         &self,
         grid: &Grid,
-        key: FrameKey,
+        key: FieldKey,
         wanted: Wanted,
-    ) -> Result<Arc<Frame>, DrawError> {
-        let place = match self.frames.get_value_or_guard_async(&key).await {
+    ) -> Result<Arc<Field>, DrawError> {
+        let place = match self.fields.get_value_or_guard_async(&key).await {
             Ok(held) => {
                 if wanted == Wanted::Now {
-                    self.frame_hits.fetch_add(1, Ordering::Relaxed);
+                    self.field_hits.fetch_add(1, Ordering::Relaxed);
                     let was_early = held.is_early.swap(false, Ordering::Relaxed);
                     self.early_hits
                         .fetch_add(u64::from(was_early), Ordering::Relaxed);
                 }
-                return Ok(held.frame);
+                return Ok(held.field);
             }
             Err(place) => place,
         };
         if wanted == Wanted::Now {
-            self.frame_misses.fetch_add(1, Ordering::Relaxed);
+            self.field_misses.fetch_add(1, Ordering::Relaxed);
         }
         let held = Held::new(self.read(grid, &key).await?, wanted);
         if wanted == Wanted::Ahead {
             self.early_reads.fetch_add(1, Ordering::Relaxed);
         }
-        let frame = Arc::clone(&held.frame);
-        // A frame that is too large to be kept is drawn all the same.
+        let field = Arc::clone(&held.field);
+        // A field that is too large to be kept is drawn all the same.
         drop(place.insert(held));
-        Ok(frame)
+        Ok(field)
     }
 
-    /// A frame from the store, gaps filled.
-    async fn read(&self, grid: &Grid, key: &FrameKey) -> Result<Frame, DrawError> {
-        let (frame, of_domain, counts) = key;
+    /// A field from the store, gaps filled.
+    async fn read(&self, grid: &Grid, key: &FieldKey) -> Result<Field, DrawError> {
+        let (field, of_domain, counts) = key;
         let reading = async {
-            let read = storage::frames::read(&self.store, frame, grid).await;
-            read.map_err(|e| failed("a frame", of_domain, e))
+            let read = storage::fields::read(&self.store, field, grid).await;
+            read.map_err(|e| failed("a field", of_domain, e))
         };
         let (values, domain, lacking) = tokio::try_join!(
             reading,
@@ -402,11 +402,11 @@ impl Source {
     }
 }
 
-/// A frame with what its sums lack, if that is known.
-fn uncertain(frame: Frame, lacking: Option<Vec<f32>>) -> Frame {
+/// A field with what its sums lack, if that is known.
+fn uncertain(field: Field, lacking: Option<Vec<f32>>) -> Field {
     match lacking {
-        Some(lacking) => frame.with_lacking(lacking),
-        None => frame,
+        Some(lacking) => field.with_lacking(lacking),
+        None => field,
     }
 }
 
@@ -415,15 +415,15 @@ fn fill(
     grid: &Grid,
     values: Vec<f32>,
     domain: &Cells<u32>,
-) -> Result<Frame, DrawError> {
+) -> Result<Field, DrawError> {
     let domain = domain.content();
     let mut gaps = values.iter().zip(domain);
     let has_gaps = gaps.any(|(value, domain)| *domain != 0 && !holds(*value));
     if !has_gaps || domain.len() != values.len() {
-        return Ok(Frame::new(values));
+        return Ok(Field::new(values));
     }
     let filled = renderer.fill(Form::Window, grid, &values, domain)?;
-    Ok(Frame::filled(filled))
+    Ok(Field::filled(filled))
 }
 
 /// What is stored does not lie on the grid of the job.

@@ -1,4 +1,4 @@
-//! A device with its compiled stages, the buffers that frames are drawn in and the frames that stay on it.
+//! A device with its compiled stages, the buffers that frames are drawn in and the fields that stay on it.
 
 use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
@@ -21,25 +21,25 @@ pub(crate) struct Device {
     fill: Fill,
     /// Buffers of frames that are not in flight; as many as ever were in flight at once.
     idle: Mutex<Vec<Workspace>>,
-    /// Frames of products that were drawn lately.
+    /// Fields of products that were drawn lately.
     resident: Resident,
     /// How many devices this process had before.
     pub(crate) number: u64,
 }
 
 impl Device {
-    /// Compiles the stages. Frames of `most_frame_bytes` stay between pictures, of a share of the device if none are named.
+    /// Compiles the stages. Fields of `most_field_bytes` stay between pictures, of a share of the device if none are named.
     pub(crate) fn new(
         gpu: Gpu,
         number: u64,
-        most_frame_bytes: Option<u64>,
+        most_field_bytes: Option<u64>,
     ) -> Result<Self, RenderError> {
         let stages = Stages::new(&gpu);
         let fill = Fill::new(&gpu, fill::Sources::default());
         gpu.check_fault("compiling shaders")?;
         gpu.keep_pipelines();
         tracing::info!(adapter = gpu.adapter_name(), number, "renderer is ready");
-        let resident = Resident::new(&gpu, most_frame_bytes);
+        let resident = Resident::new(&gpu, most_field_bytes);
         Ok(Self {
             gpu,
             stages,
@@ -54,7 +54,7 @@ impl Device {
         &self.gpu
     }
 
-    /// Bytes of frames that stay on the device.
+    /// Bytes of fields that stay on the device.
     pub(crate) fn resident_bytes(&self) -> u64 {
         self.resident.bytes()
     }
@@ -101,7 +101,7 @@ impl Device {
         done
     }
 
-    /// Fills the gaps of one frame, if the device does that faster than the twin.
+    /// Fills the gaps of one field, if the device does that faster than the twin.
     pub(crate) fn fill(
         &self,
         form: Form,
@@ -114,7 +114,7 @@ impl Device {
         pays.then(|| self.fill.run(&self.gpu, form, grid, values, domain))
     }
 
-    /// Brings the frames of a scene to the device before anybody wants them, if they are held whole.
+    /// Brings the fields of a scene to the device before anybody wants them, if they are held whole.
     pub(crate) fn prepare(&self, scene: &Scene) -> Result<(), RenderError> {
         if !Plan::holds_whole(&scene.grid) {
             return Ok(());

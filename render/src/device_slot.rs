@@ -14,7 +14,7 @@ use crate::gpu::{self, Checks, Found, Gpu};
 /// A place for a device: another one takes it after a fault, while pictures under way keep the old one.
 pub(crate) struct DeviceSlot {
     opener: Opener,
-    most_frame_bytes: Option<u64>,
+    most_field_bytes: Option<u64>,
     current: Mutex<Arc<Device>>,
     /// Held while a fresh device is opened, so that only one is.
     opening: Mutex<()>,
@@ -52,12 +52,12 @@ impl DeviceSlot {
     pub(crate) fn all_of(
         backend: Backend,
         checks: Checks,
-        most_frame_bytes: Option<u64>,
+        most_field_bytes: Option<u64>,
     ) -> Result<Vec<Self>, RenderError> {
         let found = gpu::found();
         let there: Vec<Adapter> = found.iter().map(|found| found.known().clone()).collect();
         let chosen = backend::chosen(&backend, &there)?;
-        let open = |opener, at: usize| Self::new(opener, &found[at], checks, most_frame_bytes);
+        let open = |opener, at: usize| Self::new(opener, &found[at], checks, most_field_bytes);
         if let [only] = chosen[..] {
             return Ok(vec![open(Opener::FirstOf(backend, checks), only)?]);
         }
@@ -84,12 +84,12 @@ impl DeviceSlot {
         opener: Opener,
         found: &Found,
         checks: Checks,
-        most_frame_bytes: Option<u64>,
+        most_field_bytes: Option<u64>,
     ) -> Result<Self, RenderError> {
-        let device = Device::new(Gpu::on(found, checks)?, 0, most_frame_bytes)?;
+        let device = Device::new(Gpu::on(found, checks)?, 0, most_field_bytes)?;
         Ok(Self {
             opener,
-            most_frame_bytes,
+            most_field_bytes,
             current: Mutex::new(Arc::new(device)),
             opening: Mutex::default(),
             in_flight: AtomicUsize::new(0),
@@ -124,7 +124,7 @@ impl DeviceSlot {
         let adapter = failed.gpu().adapter_name();
         tracing::warn!(adapter, "the graphics device failed, opening it again");
         let gpu = self.opener.open()?;
-        let fresh = Device::new(gpu, failed.number + 1, self.most_frame_bytes)?;
+        let fresh = Device::new(gpu, failed.number + 1, self.most_field_bytes)?;
         *self.lock() = Arc::new(fresh);
         Ok(())
     }
@@ -151,14 +151,14 @@ impl Opener {
     }
 }
 
-/// The device for a picture from these frames: of those without a fault the one with the least to do; of equal ones the
-/// one where pictures from the same frames were drawn before.
-pub(crate) fn least_busy(slots: &[DeviceSlot], frames: u64) -> Option<Taken<'_>> {
+/// The device for a picture from these fields: of those without a fault the one with the least to do; of equal ones the
+/// one where pictures from the same fields were drawn before.
+pub(crate) fn least_busy(slots: &[DeviceSlot], fields: u64) -> Option<Taken<'_>> {
     let states: Vec<(bool, usize)> = slots
         .iter()
         .map(|slot| (slot.device().gpu().has_fault(), slot.in_flight()))
         .collect();
-    slots.get(place(&states, frames)?).map(DeviceSlot::take)
+    slots.get(place(&states, fields)?).map(DeviceSlot::take)
 }
 
 /// Devices without a fault that nothing is drawn on, at most so many of them.
@@ -168,19 +168,19 @@ pub(crate) fn idle(slots: &[DeviceSlot], most: usize) -> Vec<Taken<'_>> {
     idle.take(most).map(DeviceSlot::take).collect()
 }
 
-/// The slot of these frames when all are idle: where they are brought before anybody wants them.
-pub(crate) fn home(slots: &[DeviceSlot], frames: u64) -> Option<Arc<Device>> {
+/// The slot of these fields when all are idle: where they are brought before anybody wants them.
+pub(crate) fn home(slots: &[DeviceSlot], fields: u64) -> Option<Arc<Device>> {
     let idle: Vec<(bool, usize)> = slots
         .iter()
         .map(|slot| (slot.device().gpu().has_fault(), 0))
         .collect();
-    slots.get(place(&idle, frames)?).map(DeviceSlot::device)
+    slots.get(place(&idle, fields)?).map(DeviceSlot::device)
 }
 
 /// `states`: has it a fault, and how many pictures are drawn on it.
-fn place(states: &[(bool, usize)], frames: u64) -> Option<usize> {
+fn place(states: &[(bool, usize)], fields: u64) -> Option<usize> {
     let count = states.len();
-    let first = (frames % count.max(1) as u64) as usize;
+    let first = (fields % count.max(1) as u64) as usize;
     let in_turn = (0..count).map(|step| (first + step) % count);
     in_turn.min_by_key(|&at| states[at])
 }
@@ -190,12 +190,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_picture_goes_where_least_is_to_do_and_else_where_its_frames_are() {
+    fn a_picture_goes_where_least_is_to_do_and_else_where_its_fields_are() {
         assert_eq!(place(&[], 7), None);
         assert_eq!(place(&[(true, 9)], 7), Some(0), "there is no other");
         let idle = [(false, 0); 3];
         assert_eq!(
-            [3, 4, 5, 6].map(|frames| place(&idle, frames)),
+            [3, 4, 5, 6].map(|fields| place(&idle, fields)),
             [0, 1, 2, 0].map(Some)
         );
         assert_eq!(place(&[(false, 1), (false, 2), (false, 1)], 1), Some(2));

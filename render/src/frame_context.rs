@@ -13,14 +13,14 @@ use crate::stages::features::Features;
 use crate::stages::params::Params;
 use crate::stages::sizes::light_bytes;
 
-/// The frames of a scene on the device.
+/// The fields of a scene on the device.
 #[derive(Clone)]
 pub struct SceneBuffers {
     pub value: [wgpu::Buffer; 2],
     pub accumulated: Option<[wgpu::Buffer; 2]>,
     pub northward: Option<[wgpu::Buffer; 2]>,
     pub domain: wgpu::Buffer,
-    /// Uncertainties of both frames of values; none where they are not drawn.
+    /// Uncertainties of both fields of values; none where they are not drawn.
     pub uncertainties: Option<[wgpu::Buffer; 2]>,
     pub terrain: Option<wgpu::Buffer>,
     /// Light that is shared between pictures; none where a picture makes its own.
@@ -28,7 +28,7 @@ pub struct SceneBuffers {
 }
 
 impl SceneBuffers {
-    /// Those of a scene without shared light: `send` brings cells to the device, `held` of them those of frames.
+    /// Those of a scene without shared light: `send` brings cells to the device, `held` of them those of fields.
     pub fn of(
         scene: &Scene,
         held: &Range<usize>,
@@ -39,15 +39,15 @@ impl SceneBuffers {
         let pair = |[before, after]: [&Cells<f32>; 2]| -> Result<[wgpu::Buffer; 2], RenderError> {
             Ok([send(before, held.clone())?, send(after, held.clone())?])
         };
-        let frames = |interval: &Interval| pair([&interval.before.cells, &interval.after.cells]);
+        let fields = |interval: &Interval| pair([&interval.before.cells, &interval.after.cells]);
         let steps = [&scene.value.before, &scene.value.after];
-        let uncertainties = || pair(steps.map(|frame| frame.uncertainties()));
+        let uncertainties = || pair(steps.map(|field| field.uncertainties()));
         let terrain = scene.terrain.as_ref();
         let terrain = terrain.map(|terrain| &terrain.elevation.cells);
         Ok(Self {
-            value: frames(&scene.value)?,
-            accumulated: scene.accumulated.as_ref().map(frames).transpose()?,
-            northward: scene.northward.as_ref().map(frames).transpose()?,
+            value: fields(&scene.value)?,
+            accumulated: scene.accumulated.as_ref().map(fields).transpose()?,
+            northward: scene.northward.as_ref().map(fields).transpose()?,
             domain,
             uncertainties: has_uncertainty.then(uncertainties).transpose()?,
             terrain: terrain

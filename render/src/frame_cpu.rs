@@ -8,7 +8,7 @@ use crate::plan::{Part, Plan};
 use crate::scene::{Interval, Scene};
 use crate::stages::compose::in_context::{self, Surroundings};
 use crate::stages::eye::cpu::Hiding;
-use crate::stages::flow::cpu::Field;
+use crate::stages::flow::cpu::VectorField;
 use crate::stages::layout::{Entry, LIGHT_OFF, Particle, Splat};
 use crate::stages::params::Params;
 use crate::stages::particles::cpu::Inputs;
@@ -49,7 +49,7 @@ pub fn draw(plan: &Plan, part: Part, scene: &Scene) -> Result<Vec<u8>, RenderErr
         if let (Mode::Flow, Some(northward)) = (plan.mode, &scene.northward) {
             let north = interpolated(&params, params.values.northward_weight, northward);
             let velocity = flow::cpu::velocities(&value, &north);
-            let field = Field {
+            let field = VectorField {
                 params: &params,
                 rows: &plan.rows,
                 velocity: &velocity,

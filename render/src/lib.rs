@@ -1,14 +1,14 @@
 //! Jobs and scenes in, pictures out: the whole method in compute shaders, every stage with its CPU twin.
 //!
 //! ```text
-//! frames -> interpolate -> particles -> project -> light -> bin -> eye -> compose -> image
+//! fields -> interpolate -> particles -> project -> light -> bin -> eye -> compose -> image
 //!                     \-> map ------------------------------------------/
 //! ```
 //! Nothing is rasterised: data-centre GPUs are wired for compute. Sums whose order is not fixed are sums of integers,
 //! and everything that a tile shares with its neighbours is absolute, so pictures have no seams and equal jobs give
 //! equal bytes.
 //!
-//! Left out on purpose: where frames come from, who asks, in which order, and where pictures go (`render-worker`); what
+//! Left out on purpose: where fields come from, who asks, in which order, and where pictures go (`render-worker`); what
 //! proves and measures all this (`render-proof`).
 
 #[macro_use]
@@ -42,4 +42,4 @@ pub use error::RenderError;
 pub use gpu::adapters;
 pub use image::Image;
 pub use renderer::Renderer;
-pub use scene::{Frame, Interval, Scene};
+pub use scene::{Field, Interval, Scene};

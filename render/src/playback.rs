@@ -24,7 +24,7 @@ pub struct Playback<'a> {
 pub type Steps = SceneBuffers;
 
 impl<'a> Playback<'a> {
-    /// A playback of a job's view. The scene tells the range of all instants to be drawn: its frames must reach as high
+    /// A playback of a job's view. The scene tells the range of all instants to be drawn: its fields must reach as high
     /// and as low as any of them. The picture must fit one part.
     pub fn new(
         gpu: &'a Gpu,
@@ -32,7 +32,7 @@ impl<'a> Playback<'a> {
         job: &RenderJob,
         scene: &Scene,
     ) -> Result<Self, RenderError> {
-        // Frames are held whole: what is played is looked at for long.
+        // Fields are held whole: what is played is looked at for long.
         let plan = Plan::holding(job, scene, gpu.most_buffer_bytes(), u64::MAX)?;
         let part = plan.whole();
         let mut playback = Self {
@@ -50,9 +50,9 @@ impl<'a> Playback<'a> {
         Ok(playback)
     }
 
-    /// The frames of a scene on the device.
+    /// The fields of a scene on the device.
     pub fn upload(gpu: &Gpu, scene: &Scene) -> Result<Steps, RenderError> {
-        let send = |cells: &Cells<f32>, part| gpu.storage("frame", &cells.content()[part]);
+        let send = |cells: &Cells<f32>, part| gpu.storage("field", &cells.content()[part]);
         let domain = gpu.storage("domain", scene.domain.content())?;
         let held = 0..scene.grid.cell_count();
         SceneBuffers::of(scene, &held, scene.value.has_uncertainty(), domain, send)

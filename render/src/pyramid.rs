@@ -15,7 +15,7 @@ use contract::job::{Mode, RenderJob};
 use rayon::prelude::*;
 
 use crate::plan::cell_px;
-use crate::scene::{Cells, Frame, Interval, Scene, Terrain};
+use crate::scene::{Cells, Field, Interval, Scene, Terrain};
 use crate::stages::layout::{COVERED, is_missing};
 
 /// Cells smaller than this are joined, pixels: blocks then measure half a pixel to one.
@@ -100,9 +100,9 @@ pub fn coarser(scene: &Scene) -> Option<Scene> {
     let fine = &scene.grid;
     let grid = halved(fine)?;
     let blocks = Blocks::new(fine, &grid, EARTH, Some(scene.domain.content()));
-    let mean = |frame: &Arc<Frame>| frame.coarser_mean(|cells| blocks.mean(cells));
-    let mass = |frame: &Arc<Frame>| frame.coarser_mass(|cells| blocks.mass(cells));
-    let both = |interval: &Interval, coarser: &dyn Fn(&Arc<Frame>) -> Arc<Frame>| Interval {
+    let mean = |field: &Arc<Field>| field.coarser_mean(|cells| blocks.mean(cells));
+    let mass = |field: &Arc<Field>| field.coarser_mass(|cells| blocks.mass(cells));
+    let both = |interval: &Interval, coarser: &dyn Fn(&Arc<Field>) -> Arc<Field>| Interval {
         before: coarser(&interval.before),
         after: coarser(&interval.after),
         weight: interval.weight,
@@ -255,8 +255,8 @@ mod tests {
                     number(place.lon, place.lat) as f32
                 }
             });
-            let frame = Frame::new(numbers.collect());
-            frame.cells.content().to_vec()
+            let field = Field::new(numbers.collect());
+            field.cells.content().to_vec()
         };
         let flux = value(&|lon, lat| 1e-9 * ((lon * 0.05).sin() + 0.4 * (lat * 0.2).cos()));
         let carbon = value(&|lon, lat| {
@@ -284,8 +284,8 @@ mod tests {
             let blocks = Blocks::new(&self.grid, &grid, earth, Some(&self.domain));
             Some(Self {
                 domain: blocks.coverage(),
-                flux: Frame::new(blocks.mean(&self.flux)).cells.content().to_vec(),
-                carbon: Frame::new(blocks.mass(&self.carbon))
+                flux: Field::new(blocks.mean(&self.flux)).cells.content().to_vec(),
+                carbon: Field::new(blocks.mass(&self.carbon))
                     .cells
                     .content()
                     .to_vec(),
@@ -365,11 +365,11 @@ mod tests {
         let fine = grid(2, 2, [1.0, 10.0], 1.0);
         let coarse = halved(&fine).unwrap();
         let values = [7.0, f32::NAN, f32::NAN, f32::NAN];
-        let frame = Frame::new(values.to_vec());
+        let field = Field::new(values.to_vec());
         let domain = [COVERED, 0, 0, 0];
         let blocks = Blocks::new(&fine, &coarse, Earth::Wgs84, Some(&domain));
-        assert_eq!(blocks.mean(frame.cells.content()), [7.0]);
-        assert_eq!(blocks.mass(frame.cells.content()), [7.0]);
+        assert_eq!(blocks.mean(field.cells.content()), [7.0]);
+        assert_eq!(blocks.mass(field.cells.content()), [7.0]);
         assert_eq!(blocks.coverage(), [COVERED / 4]);
         // Wholly covered to the last digit, whatever areas round to.
         let open = [COVERED; 4];

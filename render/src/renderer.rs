@@ -34,10 +34,10 @@ impl Renderer {
         Self::keeping(backend, None)
     }
 
-    /// The same with a limit of frames that stay on each device between pictures, bytes: a share of what the device has
+    /// The same with a limit of fields that stay on each device between pictures, bytes: a share of what the device has
     /// if none is named.
-    pub fn keeping(backend: Backend, most_frame_bytes: Option<u64>) -> Result<Self, RenderError> {
-        let devices = DeviceSlot::all_of(backend, Checks::Trusted, most_frame_bytes)?;
+    pub fn keeping(backend: Backend, most_field_bytes: Option<u64>) -> Result<Self, RenderError> {
+        let devices = DeviceSlot::all_of(backend, Checks::Trusted, most_field_bytes)?;
         Ok(Self::over(devices))
     }
 
@@ -81,7 +81,7 @@ impl Renderer {
         self.devices.iter().map(|slot| slot.device().number).sum()
     }
 
-    /// Bytes of frames that stay on the devices between pictures.
+    /// Bytes of fields that stay on the devices between pictures.
     pub fn resident_bytes(&self) -> u64 {
         let bytes = |slot: &DeviceSlot| slot.device().resident_bytes();
         self.devices.iter().map(bytes).sum()
@@ -136,7 +136,7 @@ impl Renderer {
             self.prepare(&alone, vector)?;
         }
         let coarser = pyramid::suited(job, scene);
-        match device_slot::home(&self.devices, frames_of(scene)) {
+        match device_slot::home(&self.devices, fields_of(scene)) {
             Some(device) if device.gpu().spares_kernels() && plain::may_suit(job) => Ok(()),
             Some(device) => device.prepare(coarser.as_ref().unwrap_or(scene)),
             None => Ok(()),
@@ -172,7 +172,7 @@ impl Renderer {
         if let Some(part) = part {
             check_part(part, job)?;
         }
-        let taken = device_slot::least_busy(&self.devices, frames_of(scene));
+        let taken = device_slot::least_busy(&self.devices, fields_of(scene));
         let device = taken.as_ref().map(|taken| &taken.device);
         let most_buffer_bytes = device.map_or(u64::MAX, |device| device.gpu().most_buffer_bytes());
         let coarser = pyramid::suited(job, scene);
@@ -207,7 +207,7 @@ impl Renderer {
         drawing.draw(part.unwrap_or_else(|| plan.whole()), taken, &self.devices)
     }
 
-    /// Fills the gaps of one frame (`[row, col]`, [`MISSING`](crate::stages::layout::MISSING) or NaN where there is no
+    /// Fills the gaps of one field (`[row, col]`, [`MISSING`](crate::stages::layout::MISSING) or NaN where there is no
     /// data); the same bits on every device. Blocks until it is done.
     pub fn fill(
         &self,
@@ -246,8 +246,8 @@ fn together(adapters: &[Adapter]) -> String {
     shown.collect::<Vec<_>>().join(", ")
 }
 
-/// The frame that a scene begins with, which says where pictures of it are drawn when nothing else does.
-fn frames_of(scene: &Scene) -> u64 {
+/// The field that a scene begins with, which says where pictures of it are drawn when nothing else does.
+fn fields_of(scene: &Scene) -> u64 {
     scene.value.before.cells.id()
 }
 

@@ -1,4 +1,4 @@
-//! Frames that stay on the device between pictures.
+//! Fields that stay on the device between pictures.
 
 use std::ops::Range;
 
@@ -10,17 +10,17 @@ use crate::error::RenderError;
 use crate::gpu::Gpu;
 use crate::scene::Cells;
 
-/// Share of a device's own memory for frames: the rest is for pictures in flight and for others.
+/// Share of a device's own memory for fields: the rest is for pictures in flight and for others.
 const SHARE: u64 = 8;
 /// Bytes kept where nobody knows what the device has.
 const UNKNOWN_BYTES: u64 = 512 << 20;
-/// About as many frames are kept.
-const TYPICAL_FRAMES: usize = 256;
-/// Share of the memory for frames that were drawn again: the rest is for those that have just come, of which a picture
+/// About as many fields are kept.
+const TYPICAL_FIELDS: usize = 256;
+/// Share of the memory for fields that were drawn again: the rest is for those that have just come, of which a picture
 /// needs several.
 const PROVEN_SHARE: f64 = 0.5;
 
-/// The cells of a frame, and the part of them that is held.
+/// The cells of a field, and the part of them that is held.
 type Id = (u64, usize, usize);
 
 /// Buffers by what they hold. One that is being sent is waited for by those who want the same, and by nobody else.
@@ -59,17 +59,17 @@ impl Resident {
     ) -> Result<wgpu::Buffer, RenderError> {
         let id = (cells.id(), part.start, part.end);
         self.kept(id, wgpu::Buffer::size, || {
-            gpu.storage("frame", &cells.content()[part])
+            gpu.storage("field", &cells.content()[part])
         })
     }
 }
 
 impl<B: Clone> Resident<B> {
     fn holding(most_bytes: u64) -> Self {
-        // One shard: in several, each would have a part of the memory that a frame may not fit into.
+        // One shard: in several, each would have a part of the memory that a field may not fit into.
         let options = OptionsBuilder::new()
             .shards(1)
-            .estimated_items_capacity(TYPICAL_FRAMES)
+            .estimated_items_capacity(TYPICAL_FIELDS)
             .weight_capacity(most_bytes)
             .hot_allocation(PROVEN_SHARE)
             .build()
@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_that_is_there_is_had_while_another_is_sent() {
+    fn a_field_that_is_there_is_had_while_another_is_sent() {
         let resident = Resident::<u64>::holding(100);
         let had = |number: u64| {
             resident

@@ -1,4 +1,4 @@
-//! What there is to see at one instant: two adjacent frames of a product, of its accumulated carbon, its domain, and the
+//! What there is to see at one instant: two adjacent fields of a product, of its accumulated carbon, its domain, and the
 //! terrain below.
 
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -63,7 +63,7 @@ impl<T> Cells<T> {
 
 /// One time step, gaps filled.
 #[derive(Debug)]
-pub struct Frame {
+pub struct Field {
     /// Values; [`MISSING`] where there is no data.
     pub cells: Cells<f32>,
     /// Estimated error (1σ) of every value in its unit: 0 where it was measured, above where a gap was filled; none if
@@ -74,9 +74,9 @@ pub struct Frame {
     /// Smallest and largest value, 0 and 0 without data.
     pub range: [f32; 2],
     /// Means over blocks of four.
-    coarser_mean: OnceLock<Arc<Frame>>,
+    coarser_mean: OnceLock<Arc<Field>>,
     /// What keeps the mass of blocks of four.
-    coarser_mass: OnceLock<Arc<Frame>>,
+    coarser_mass: OnceLock<Arc<Field>>,
     /// Share of the accumulated time that every sum lacks, 0 to 1; none where all sums are complete, where values are
     /// no sums, and where nobody asked.
     lacking: Option<Vec<f32>>,
@@ -88,8 +88,8 @@ pub struct Frame {
 /// one was not measured and the other is not complete.
 const LEAST_UNCERTAINTY: f32 = 0.4;
 
-impl Frame {
-    /// A frame from values with NaN (or anything not finite) where there is no data.
+impl Field {
+    /// A field from values with NaN (or anything not finite) where there is no data.
     pub fn new(mut values: Vec<f32>) -> Self {
         let mut range: Option<[f32; 2]> = None;
         for value in &mut values {
@@ -128,7 +128,7 @@ impl Frame {
         self
     }
 
-    /// A frame of filled values and their estimated errors.
+    /// A field of filled values and their estimated errors.
     pub fn filled(filled: Filled) -> Self {
         Self::new(filled.values).with_errors(filled.errors)
     }
@@ -208,9 +208,9 @@ impl Frame {
 #[derive(Debug, Clone)]
 pub struct Interval {
     /// The step before the instant.
-    pub before: Arc<Frame>,
+    pub before: Arc<Field>,
     /// The step after it.
-    pub after: Arc<Frame>,
+    pub after: Arc<Field>,
     /// 0 at `before`, 1 at `after`.
     pub weight: f64,
 }
@@ -220,7 +220,7 @@ impl Interval {
     pub fn has_uncertainty(&self) -> bool {
         [&self.before, &self.after]
             .iter()
-            .any(|frame| frame.has_uncertainty())
+            .any(|field| field.has_uncertainty())
     }
 
     /// Smallest and largest value that any instant between the two steps can have.
@@ -236,7 +236,7 @@ pub struct Terrain {
     /// The grid.
     pub grid: Grid,
     /// Height above the level of the sea, m; [`MISSING`] where it is not known.
-    pub elevation: Arc<Frame>,
+    pub elevation: Arc<Field>,
 }
 
 impl Terrain {
@@ -249,7 +249,7 @@ impl Terrain {
 /// Everything a picture is drawn from, apart from its job.
 #[derive(Debug, Clone)]
 pub struct Scene {
-    /// The grid of all frames.
+    /// The grid of all fields.
     pub grid: Grid,
     /// How much of every cell's area holds data in some step: 0 of none, [`COVERED`] of all, which cells of a product are;
     /// blocks of cells may lie between.
@@ -275,7 +275,7 @@ impl Scene {
 
     /// Checks that all parts have one number a cell.
     pub fn validate(&self) -> Result<(), RenderError> {
-        let frames = [
+        let fields = [
             Some(&self.value),
             self.accumulated.as_ref(),
             self.northward.as_ref(),
@@ -283,17 +283,17 @@ impl Scene {
         if let Some(trails) = &self.trails {
             trails.validate()?;
         }
-        let fits = frames
+        let fits = fields
             .into_iter()
             .flatten()
             .flat_map(|interval| [&interval.before, &interval.after])
-            .all(|frame| frame.cells.content.len() == self.grid.cell_count());
+            .all(|field| field.cells.content.len() == self.grid.cell_count());
         if let Some(Terrain { grid, elevation }) = &self.terrain {
             grid.validate()?;
             if elevation.cells.content.len() != grid.cell_count() {
                 return Err(RenderError::GridMismatch {
                     product: "the relief".into(),
-                    accumulated: "its frame".into(),
+                    accumulated: "its field".into(),
                 });
             }
         }
@@ -303,7 +303,7 @@ impl Scene {
         }
         Err(RenderError::GridMismatch {
             product: "the product".into(),
-            accumulated: "a frame or the domain".into(),
+            accumulated: "a field or the domain".into(),
         })
     }
 }

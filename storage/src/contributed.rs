@@ -1,5 +1,5 @@
 //! How complete the sums of accumulated carbon are: steps and time that contributed to every cell, map-major, a row a
-//! chunk, stored beside the frame of the sums.
+//! chunk, stored beside the field of the sums.
 
 use std::sync::{Arc, LazyLock};
 
@@ -10,7 +10,7 @@ use arrow::datatypes::{
     DataType, Field, Int64Type, Schema, SchemaRef, TimeUnit, TimestampMillisecondType, UInt32Type,
 };
 use bytes::Bytes;
-use contract::chunk::{Window, frame_chunks};
+use contract::chunk::{Window, field_chunks};
 use contract::digest::Digest;
 use contract::grid::Grid;
 use contract::key::ObjectKey;
@@ -114,7 +114,7 @@ impl Contributed {
 }
 
 fn encode(grid: &Grid, counts: &Contributed) -> Result<Bytes, StorageError> {
-    let windows = frame_chunks(grid);
+    let windows = field_chunks(grid);
     let mut steps = ListBuilder::new(UInt32Builder::new()).with_field(item(DataType::UInt32));
     let mut milliseconds = ListBuilder::new(Int64Builder::new()).with_field(item(DataType::Int64));
     for window in &windows {
@@ -160,7 +160,7 @@ fn decode(
         return Err(damaged("it is of another grid than its product"));
     }
     let (batch, grid) = (&table.batch, shape_only(rows, cols));
-    let windows = frame_chunks(&grid);
+    let windows = field_chunks(&grid);
     let row_count = batch.num_rows();
     if row_count != windows.len() || row_count == 0 {
         return Err(damaged("it has other chunks than its grid"));
@@ -290,7 +290,7 @@ mod tests {
     fn counts_that_lack_a_chunk_or_have_one_twice_are_damaged() {
         // The last chunk holds nothing: without it the numbers are the same.
         let january = Period::month(2001, 1).unwrap();
-        let last = frame_chunks(&GRID).pop().unwrap();
+        let last = field_chunks(&GRID).pop().unwrap();
         let mut has_data = vec![true; GRID.cell_count()];
         for cell in last.cell_indices(&GRID) {
             has_data[cell] = false;

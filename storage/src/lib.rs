@@ -1,4 +1,4 @@
-//! What lies durable between services: objects, manifests, frames, series, weights and the event log.
+//! What lies durable between services: objects, manifests, fields, series, weights and the event log.
 //! What is read is checked: a damaged object is an error that names it, never a value.
 //!
 //! Every service reads and writes through this crate, so that a layout has one writer and one reader. Left out on
@@ -8,7 +8,7 @@ pub mod contributed;
 pub mod document;
 pub mod domain;
 pub mod error;
-pub mod frames;
+pub mod fields;
 pub mod gc;
 pub mod log;
 pub mod manifests;

@@ -8,7 +8,7 @@ use contract::manifest::{
 use contract::product::ProductId;
 
 use crate::sound::damage;
-use crate::{StorageError, Store, document, frames};
+use crate::{StorageError, Store, document, fields};
 
 /// Products that have a manifest, sorted by name.
 pub async fn products(store: &Store) -> Result<Vec<ProductId>, StorageError> {
@@ -100,20 +100,20 @@ pub async fn settle(
             .steps
             .binary_search_by_key(&start, |it| it.period.start);
         let there = there.ok().map(|at| &newest.steps[at]);
-        let is_renamed = |there: &&Step| there.period == step.period && there.frame != step.frame;
+        let is_renamed = |there: &&Step| there.period == step.period && there.field != step.field;
         if let Some(there) = there.filter(is_renamed) {
-            step.frame = frames::settle(store, &there.frame, &step.frame, &next.grid).await?;
+            step.field = fields::settle(store, &there.field, &step.field, &next.grid).await?;
         }
     }
-    let frames = |manifest: &Manifest, segment: &SeriesSegment| {
+    let fields = |manifest: &Manifest, segment: &SeriesSegment| {
         let first = segment.first_step as usize;
         let steps = manifest.steps.get(first..first + segment.steps as usize);
-        steps.map(|steps| steps.iter().map(|it| it.frame.clone()).collect::<Vec<_>>())
+        steps.map(|steps| steps.iter().map(|it| it.field.clone()).collect::<Vec<_>>())
     };
     let mut series = next.series.clone();
     for segment in &mut series {
-        let own = frames(next, segment);
-        let same = |there: &&SeriesSegment| own.is_some() && frames(newest, there) == own;
+        let own = fields(next, segment);
+        let same = |there: &&SeriesSegment| own.is_some() && fields(newest, there) == own;
         if let Some(there) = newest.series.iter().find(same) {
             segment.series = there.series.clone();
         }

@@ -1,6 +1,6 @@
 //! Is a stored object what its name and its own seal say?
 //!
-//! Input files, domains and observations are named by the digest of their bytes. Frames and series are named by the
+//! Input files, domains and observations are named by the digest of their bytes. Fields and series are named by the
 //! digest of their values and hold a seal over their bytes; so do documents, weights and exact sums, whose names say what
 //! they were made from, and what names the parts of a cube; its chunks end in a checksum. Pictures hold a check of every part, as PNG has it. Whatever is read whole is checked each time;
 //! what is read in parts is checked row by row ([`crate::row_check`]).

@@ -39,7 +39,7 @@ pub use self::leftovers::Leftover;
 pub use self::settings::{RetryLimits, Settings};
 pub use self::swap::Seen;
 
-/// Largest object: a frame of the largest grid is 1 GiB uncompressed.
+/// Largest object: a field of the largest grid is 1 GiB uncompressed.
 const MAX_OBJECT_BYTES: u64 = 2 << 30;
 /// Large objects are read and sent in parts of this size.
 const PART_BYTES: u64 = 16 << 20;

@@ -195,7 +195,7 @@ async fn names_of(store: &Store, key: &ObjectKey) -> Result<Vec<ObjectKey>, Stor
     let mut names = vec![manifest.domain.clone()];
     names.extend(manifest.series.iter().map(|segment| segment.series.clone()));
     for step in &manifest.steps {
-        names.push(step.frame.clone());
+        names.push(step.field.clone());
         names.extend(step.contributed.as_ref().map(|of| of.counts.clone()));
         if manifest.derived_from.is_none() {
             names.push(ObjectKey::raw(&manifest.product, &step.raw_sha256));

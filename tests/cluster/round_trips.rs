@@ -12,7 +12,7 @@ use crate::faults::{PRODUCT, notice, say, until_whole};
 
 /// How long the store takes to answer.
 const DELAY: Duration = Duration::from_millis(25);
-/// Waits for the store that a picture may take: a look whether it was drawn before, and all of its frames at once.
+/// Waits for the store that a picture may take: a look whether it was drawn before, and all of its fields at once.
 const MOST_ROUNDS: usize = 2;
 const MONTHS: usize = 6;
 const QUIET: Duration = Duration::from_secs(2);
@@ -110,9 +110,9 @@ fn a_new_tile_waits_for_a_store_far_away_twice_at_most_and_for_no_write() {
     cluster.wait_for("both workers", LIMIT, up).unwrap();
     cluster.s3.delay(DELAY);
     for (tile, time, most, what) in [
-        ("1/0/1", "2000-03-20", MOST_ROUNDS, "frames that nobody has"),
-        ("1/1/0", "2000-03-21", 1, "frames in memory"),
-        ("2/1/1", "2000-05-20", MOST_ROUNDS, "other frames"),
+        ("1/0/1", "2000-03-20", MOST_ROUNDS, "fields that nobody has"),
+        ("1/1/0", "2000-03-21", 1, "fields in memory"),
+        ("2/1/1", "2000-05-20", MOST_ROUNDS, "other fields"),
     ] {
         let asked = ask(&cluster, tile, time);
         let count = rounds(&asked.before);

@@ -319,7 +319,7 @@ fn whatever_clients_do_they_are_told_so_and_others_have_their_pictures() {
         pictures: AtomicUsize::new(0),
         is_over: AtomicBool::new(false),
     };
-    // Kernels are compiled and frames are in memory.
+    // Kernels are compiled and fields are in memory.
     server.get(&view(0, "2000-02-10")).unwrap();
     let small = server.memory_bytes().unwrap();
     let (most, longest) = std::thread::scope(|scope| {

@@ -157,7 +157,7 @@ fn a_rereading_that_is_killed_again_and_again_comes_to_the_bytes_of_an_undisturb
     assert_ne!(after, before);
     assert_eq!(after, version(&calm));
     assert_eq!(objects(&calm), objects(&killed));
-    // What is in the cube is compared with its frames.
+    // What is in the cube is compared with its fields.
     program::succeed(&killed, &["verify", "--product", PRODUCT]).unwrap();
     let events = told(&killed);
     assert_eq!(events, told(&calm));

@@ -36,7 +36,7 @@ struct Shaped<'a> {
     northward: Option<&'a ManifestId>,
     /// Both parts of the vector.
     trails: Option<[&'a ManifestId; 2]>,
-    // A relief is a frame, which its jobs name.
+    // A relief is a field, which its jobs name.
     jobs: Vec<RenderJob>,
 }
 

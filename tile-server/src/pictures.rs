@@ -24,7 +24,7 @@ const PNG_SIGNATURE: &[u8] = &[0x89, b'P', b'N', b'G', 0x0d, 0x0a, 0x1a, 0x0a];
 const JPEG_SIGNATURE: &[u8] = &[0xff, 0xd8, 0xff];
 /// How long a stored picture is waited for before it is drawn again.
 const STORE_LIMIT: Duration = Duration::from_secs(3);
-/// How long drawing may take while the store does not answer. Whoever has the frames in memory draws as ever; whoever
+/// How long drawing may take while the store does not answer. Whoever has the fields in memory draws as ever; whoever
 /// has not would wait for the store in turn.
 const AWAY_LIMIT: Duration = Duration::from_secs(8);
 /// Size of a picture the memory is laid out for, bytes: between an empty tile (0.3 KiB) and a busy one (100 KiB).

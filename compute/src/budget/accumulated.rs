@@ -1,7 +1,7 @@
 //! A budget of accumulated carbon: that of the flux which it was accumulated from, exact, and how complete it is.
 
 use contract::budget::{BudgetAnswer, BudgetQuery, Completeness};
-use contract::chunk::frame_chunks;
+use contract::chunk::field_chunks;
 use contract::key::ObjectKey;
 use contract::manifest::{Manifest, Step};
 use contract::time::TimeMs;
@@ -51,7 +51,7 @@ fn completeness(
     with_data_ms: &[i64],
     all_ms: i64,
 ) -> Completeness {
-    let windows = frame_chunks(&manifest.grid);
+    let windows = field_chunks(&manifest.grid);
     let (mut complete_m2, mut incomplete_m2) = (0.0, 0.0);
     for (chunk, areas) in areas.chunks() {
         let cells = windows[chunk as usize].cell_indices(&manifest.grid);

@@ -23,7 +23,7 @@ use crate::{ComputeError, Engine};
 /// One row a step: the seconds are those of the whole step; parts of steps are shared out afterwards, exactly.
 ///
 /// Weights are no table: a join would hold them beside every chunk, and under Ballista it would send every value to
-/// another part of the query. What is asked of the frames is which chunks to read.
+/// another part of the query. What is asked of the fields is which chunks to read.
 ///
 /// Chunks are counted: one that a damaged footer hides from the engine must not be missing from a sum in silence.
 const STEP_SUMS: &str = "
@@ -37,7 +37,7 @@ const STEP_SUMS: &str = "
                  period_end,
                  region_sums(\"values\", chunk, $seconds, '$weights') AS sums,
                  band_sums(\"values\", chunk, $seconds, '$ocean', '$grid') AS bands
-          FROM frames
+          FROM fields
           WHERE $chunks)
     GROUP BY period_start, period_end";
 
@@ -89,7 +89,7 @@ impl WeighedRegion {
     }
 }
 
-/// The question about all frames.
+/// The question about all fields.
 fn sql(measure: Measure, region: &WeighedRegion) -> String {
     let seconds = match measure {
         Measure::Mass => "(CAST(period_end AS BIGINT) - CAST(period_start AS BIGINT)) / 1000.0",
@@ -116,15 +116,15 @@ pub(super) async fn asked(
     region: &WeighedRegion,
     measure: Measure,
 ) -> Result<Vec<StepSum>, ComputeError> {
-    let frames: Vec<&ObjectKey> = steps.iter().map(|step| &step.frame).collect();
+    let fields: Vec<&ObjectKey> = steps.iter().map(|step| &step.field).collect();
     let keys = &region.weights.keys;
-    let job = Digest::of_json(&("sums", measure, &frames, keys));
-    let ask = |context| ask(engine, context, &frames, region, measure);
+    let job = Digest::of_json(&("sums", measure, &fields, keys));
+    let ask = |context| ask(engine, context, &fields, region, measure);
     let answered = async {
         let answer = engine.answer(job, ask).await?;
         in_order(steps, &answer)
     };
-    let mut read = frames.clone();
+    let mut read = fields.clone();
     read.extend([&keys.all, &keys.ocean]);
     scan::or_damaged(
         engine.store(),
@@ -143,12 +143,12 @@ struct Answer {
 async fn ask(
     engine: &Engine,
     context: QueryContext,
-    frames: &[&ObjectKey],
+    fields: &[&ObjectKey],
     region: &WeighedRegion,
     measure: Measure,
 ) -> Result<Answer, ComputeError> {
     let store = engine.store();
-    scan::register(&context, "frames", store, frames, Layout::Frames).await?;
+    scan::register(&context, "fields", store, fields, Layout::Fields).await?;
     let failed = || ComputeError::engine("summing over a region");
     let query = context.sql(&sql(measure, region)).await.map_err(failed())?;
     Ok(Answer {

@@ -120,7 +120,7 @@ pub fn band_areas<'a>(
 
 #[cfg(test)]
 mod tests {
-    use contract::chunk::frame_chunks;
+    use contract::chunk::field_chunks;
 
     use super::*;
 
@@ -146,7 +146,7 @@ mod tests {
         let area = |i: usize| 1e9 + i as f64;
         let mut sums = [ChunkSums::default(); BAND_COUNT];
         let mut areas = [0; BAND_COUNT];
-        for (chunk, window) in frame_chunks(&GRID).into_iter().enumerate() {
+        for (chunk, window) in field_chunks(&GRID).into_iter().enumerate() {
             let cells: Vec<usize> = window.cell_indices(&GRID).collect();
             let values: Vec<f32> = cells.iter().map(|&i| value(i)).collect();
             let area_m2: Vec<f64> = cells.iter().map(|&i| area(i)).collect();

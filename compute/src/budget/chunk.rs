@@ -1,4 +1,4 @@
-//! Array kernels of budgets: one chunk of a frame and the region's areas in, exact sums out.
+//! Array kernels of budgets: one chunk of a field and the region's areas in, exact sums out.
 
 use super::fixed::{AREA_DECIMALS, MASS_DECIMALS, OutOfRange, to_steps};
 

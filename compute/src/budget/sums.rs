@@ -37,7 +37,8 @@ struct Table {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Row {
-    frame: ObjectKey,
+    #[serde(rename = "frame")]
+    field: ObjectKey,
     start: TimeMs,
     end: TimeMs,
     mass_steps: String,
@@ -131,7 +132,7 @@ pub(crate) async fn of_steps(
     let stored = stored_rows(engine.store(), &key).await?.rows();
     let known: Option<Vec<StepSum>> = steps
         .iter()
-        .map(|step| stored.get(&step.frame)?.sum())
+        .map(|step| stored.get(&step.field)?.sum())
         .collect();
     Ok(RegionSums {
         steps: match known {
@@ -143,7 +144,7 @@ pub(crate) async fn of_steps(
     })
 }
 
-/// Stores the sums of all steps of a version, unless they are there. Those of frames that an earlier version had too
+/// Stores the sums of all steps of a version, unless they are there. Those of fields that an earlier version had too
 /// are taken over from it.
 pub async fn store(
     engine: &Engine,
@@ -168,7 +169,7 @@ pub async fn store(
     let unknown: Vec<&Step> = manifest
         .steps
         .iter()
-        .filter(|step| known.get(&step.frame).and_then(Row::sum).is_none())
+        .filter(|step| known.get(&step.field).and_then(Row::sum).is_none())
         .collect();
     let computed_count = unknown.len();
     if computed_count > 0 {
@@ -176,14 +177,14 @@ pub async fn store(
         let region = WeighedRegion::read(engine, &manifest.grid, &stored).await?;
         let sums = asked(engine, &unknown, &region, measure).await?;
         known.extend(unknown.iter().zip(sums).map(|(step, sum)| {
-            let row = row_of(&step.frame, &sum);
-            (step.frame.clone(), row)
+            let row = row_of(&step.field, &sum);
+            (step.field.clone(), row)
         }));
     }
     let rows = manifest
         .steps
         .iter()
-        .filter_map(|step| known.get(&step.frame).cloned());
+        .filter_map(|step| known.get(&step.field).cloned());
     put(store, manifest, weights, measure, rows.collect()).await?;
     Ok(StoredSums {
         key,
@@ -209,7 +210,7 @@ pub(crate) async fn verify(
     let rows = steps
         .iter()
         .zip(&sums)
-        .map(|(step, sum)| row_of(&step.frame, sum));
+        .map(|(step, sum)| row_of(&step.field, sum));
     put(engine.store(), manifest, weights, measure, rows.collect()).await
 }
 
@@ -242,9 +243,9 @@ async fn put(
     Ok(())
 }
 
-fn row_of(frame: &ObjectKey, sum: &StepSum) -> Row {
+fn row_of(field: &ObjectKey, sum: &StepSum) -> Row {
     Row {
-        frame: frame.clone(),
+        field: field.clone(),
         start: sum.period.start,
         end: sum.period.end,
         mass_steps: sum.mass_steps.to_string(),
@@ -255,7 +256,7 @@ fn row_of(frame: &ObjectKey, sum: &StepSum) -> Row {
 
 /// What is stored under the key of a table.
 enum Stored {
-    /// The rows by frame.
+    /// The rows by field.
     Rows(BTreeMap<ObjectKey, Row>),
     Nothing,
     /// Something that is no table, or no longer the one that was stored: sums can always be computed again.
@@ -276,7 +277,7 @@ async fn stored_rows(store: &Store, key: &ObjectKey) -> Result<Stored, StorageEr
         Ok(Some(table)) => {
             let rows = table.rows.into_iter();
             Ok(Stored::Rows(
-                rows.map(|row| (row.frame.clone(), row)).collect(),
+                rows.map(|row| (row.field.clone(), row)).collect(),
             ))
         }
         Ok(None) => Ok(Stored::Nothing),

@@ -4,7 +4,7 @@ use contract::manifest::{Contributed, MANIFEST_SCHEMA, Manifest, SeriesSegment, 
 use contract::product::ProductId;
 use contract::quantity::Quantity;
 use storage::contributed::{self, Contributed as Counts};
-use storage::{Store, domain, frames, series};
+use storage::{Store, domain, fields, series};
 
 use super::prior::Prior;
 use super::source::SourceStep;
@@ -203,7 +203,7 @@ impl<'a> Derivation<'a> {
         Ok(Step {
             masked: None,
             period: step.period,
-            frame: frames::write(store, self.target, grid, values, step.period).await?,
+            field: fields::write(store, self.target, grid, values, step.period).await?,
             raw_sha256: step.made_of,
             origin: format!("accumulated up to {}", step.step.origin),
             valid_cells: values.iter().filter(|value| !value.is_nan()).count() as u64,

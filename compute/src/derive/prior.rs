@@ -4,7 +4,7 @@ use contract::grid::Grid;
 use contract::key::ObjectKey;
 use contract::manifest::{self, Manifest, SeriesSegment, Step};
 use storage::contributed::{self, Contributed};
-use storage::{Store, domain, frames};
+use storage::{Store, domain, fields};
 
 use super::source::SourceStep;
 use crate::ComputeError;
@@ -115,7 +115,7 @@ impl<'a> Prior<'a> {
         domain_now: &[bool],
     ) -> Result<Vec<f32>, ComputeError> {
         let manifest = self.manifest.expect("kept steps have a manifest");
-        let mut values = frames::read(store, &manifest.steps[index].frame, &manifest.grid).await?;
+        let mut values = fields::read(store, &manifest.steps[index].field, &manifest.grid).await?;
         if let Some(before) = &self.other_domain {
             for ((value, &now), &before) in values.iter_mut().zip(domain_now).zip(before) {
                 if !now {

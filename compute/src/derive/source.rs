@@ -19,7 +19,7 @@ pub(super) struct SourceStep<'a> {
     pub(super) step: &'a Step,
     /// From the start on; the whole period except perhaps in the first step.
     pub(super) period: Period,
-    /// Hash of this step's and all earlier steps' frames and periods: equal hashes, equal accumulated values.
+    /// Hash of this step's and all earlier steps' fields and periods: equal hashes, equal accumulated values.
     pub(super) made_of: Digest,
 }
 
@@ -30,7 +30,8 @@ struct MadeOf<'a> {
     method: u32,
     before: Option<Digest>,
     period: Period,
-    frame: &'a ObjectKey,
+    #[serde(rename = "frame")]
+    field: &'a ObjectKey,
 }
 
 /// The steps that end after the start, the first cut at it.
@@ -48,7 +49,7 @@ pub(super) fn steps_since(
             method: METHOD,
             before: steps.last().map(|step| step.made_of),
             period,
-            frame: &step.frame,
+            field: &step.field,
         });
         steps.push(SourceStep {
             step,

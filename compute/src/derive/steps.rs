@@ -1,8 +1,8 @@
-//! One run of steps accumulated on the engine: frames in, exact running sums of every chunk after every step out.
+//! One run of steps accumulated on the engine: fields in, exact running sums of every chunk after every step out.
 
 use std::collections::BTreeMap;
 
-use contract::chunk::{Window, frame_chunks};
+use contract::chunk::{Window, field_chunks};
 use contract::digest::Digest;
 use contract::grid::Grid;
 use contract::key::ObjectKey;
@@ -31,7 +31,7 @@ const RUNNING_SUMS: &str = "
         SELECT chunk, period_start, \"values\",
                (CAST(period_end AS BIGINT) - GREATEST(CAST(period_start AS BIGINT), CAST($start AS BIGINT))) / 1000.0
                    AS seconds
-        FROM frames
+        FROM fields
     )";
 
 /// One row a chunk: the same sums after the last step only.
@@ -41,7 +41,7 @@ const FINAL_SUMS: &str = "
         SELECT chunk, \"values\",
                (CAST(period_end AS BIGINT) - GREATEST(CAST(period_start AS BIGINT), CAST($start AS BIGINT))) / 1000.0
                    AS seconds
-        FROM frames
+        FROM fields
     )
     GROUP BY chunk";
 
@@ -75,7 +75,7 @@ pub(super) async fn accumulate_segment(
         segment.finish()
     };
     let answered = scan::caught(Box::pin(engine.answer(job, columns))).await;
-    scan::or_damaged(engine.store(), &frames_of(run), answered).await
+    scan::or_damaged(engine.store(), &fields_of(run), answered).await
 }
 
 /// The exact sums after the last step of a run, `[row, col]`, kg m⁻² in steps of 10⁻¹⁵.
@@ -87,7 +87,7 @@ pub(super) async fn sums_after(
     let job = job("final sums", run);
     let sums = |context: QueryContext| async move {
         let mut batches = query(engine, &context, FINAL_SUMS, run).await?;
-        let windows = frame_chunks(grid);
+        let windows = field_chunks(grid);
         let (mut sums, mut taken) = (vec![0; grid.cell_count()], 0);
         while let Some(batch) = batches.try_next().await.map_err(failed())? {
             let chunks = batch.column(0).as_primitive::<UInt32Type>();
@@ -105,11 +105,11 @@ pub(super) async fn sums_after(
         all_chunks(taken, windows.len()).map(|()| sums)
     };
     let answered = scan::caught(Box::pin(engine.answer(job, sums))).await;
-    scan::or_damaged(engine.store(), &frames_of(run), answered).await
+    scan::or_damaged(engine.store(), &fields_of(run), answered).await
 }
 
-fn frames_of<'a>(run: &[SourceStep<'a>]) -> Vec<&'a ObjectKey> {
-    run.iter().map(|step| &step.step.frame).collect()
+fn fields_of<'a>(run: &[SourceStep<'a>]) -> Vec<&'a ObjectKey> {
+    run.iter().map(|step| &step.step.field).collect()
 }
 
 fn failed() -> impl FnOnce(DataFusionError) -> ComputeError {
@@ -128,8 +128,8 @@ async fn query(
     sql: &str,
     run: &[SourceStep<'_>],
 ) -> Result<SendableRecordBatchStream, ComputeError> {
-    let (store, frames) = (engine.store(), frames_of(run));
-    scan::register(context, "frames", store, &frames, Layout::Frames).await?;
+    let (store, fields) = (engine.store(), fields_of(run));
+    scan::register(context, "fields", store, &fields, Layout::Fields).await?;
     let sql = sql.replace("$start", &run[0].period.start.ms().to_string());
     let query = context.sql(&sql).await.map_err(failed())?;
     query.execute_stream().await.map_err(failed())
@@ -175,7 +175,7 @@ impl<'a> Segment<'a> {
         let starts = run.iter().enumerate();
         Self {
             grid,
-            windows: frame_chunks(grid),
+            windows: field_chunks(grid),
             domain,
             index_of: starts
                 .map(|(index, step)| (step.step.period.start.ms(), index))

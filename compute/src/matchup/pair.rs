@@ -148,7 +148,7 @@ mod tests {
         let step = |month: &u32| Step {
             masked: None,
             period: Period::month(2010, *month).unwrap(),
-            frame: ObjectKey::frame(&product, &digest),
+            field: ObjectKey::field(&product, &digest),
             raw_sha256: digest,
             origin: "f.nc".into(),
             valid_cells: 1,

@@ -31,11 +31,11 @@ async fn product(store: &Store) -> Manifest {
     let mut steps = vec![];
     for (month, values) in months {
         let period = Period::month(2010, month).unwrap();
-        let frame = frames::write(store, &product, &GRID, &values, period);
+        let field = fields::write(store, &product, &GRID, &values, period);
         steps.push(Step {
             masked: None,
             period,
-            frame: frame.await.unwrap(),
+            field: field.await.unwrap(),
             raw_sha256: Digest::of(b""),
             origin: "f.nc".into(),
             valid_cells: 4,

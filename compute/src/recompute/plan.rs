@@ -31,7 +31,7 @@ pub async fn plan(store: &Store, request: &Request) -> Result<Plan, ComputeError
     let kinds: BTreeSet<What> = request.what.iter().copied().collect();
     for what in kinds {
         match what {
-            What::Frames => frames(store, &manifest, window, request, &mut plan).await?,
+            What::Fields => fields(store, &manifest, window, request, &mut plan).await?,
             What::Statistics => tables(store, &manifest, what, request, &mut plan).await?,
             What::Budget if manifest.quantity == Quantity::CarbonFlux => {
                 tables(store, &manifest, what, request, &mut plan).await?;
@@ -47,8 +47,8 @@ pub async fn plan(store: &Store, request: &Request) -> Result<Plan, ComputeError
     Ok(plan)
 }
 
-/// Accumulated frames of the period and, as they follow from these, all after it.
-async fn frames(
+/// Accumulated fields of the period and, as they follow from these, all after it.
+async fn fields(
     store: &Store,
     source: &Manifest,
     window: Period,
@@ -64,7 +64,7 @@ async fn frames(
     plan.start = chosen_start(store, &source.product).await?;
     let target = source.product.accumulated()?;
     let latest = manifests::latest(store, &target).await?;
-    let there = frames_there(store, latest.as_ref(), &target, request).await?;
+    let there = fields_there(store, latest.as_ref(), &target, request).await?;
     let mut is_broken = false;
     for (index, (period, input)) in made_of(source, plan.start)?.into_iter().enumerate() {
         let stored = latest.as_ref().and_then(|latest| latest.steps.get(index));
@@ -84,7 +84,7 @@ async fn frames(
                     plan.anew_from.get_or_insert(period.start);
                 }
                 plan.items.push(Item {
-                    what: What::Frames,
+                    what: What::Fields,
                     product: target.clone(),
                     region: None,
                     period,
@@ -102,12 +102,12 @@ async fn frames(
 /// Are the objects of an accumulated step there?
 fn is_whole(step: &Step, there: &BTreeSet<ObjectKey>) -> bool {
     let counts = step.contributed.as_ref();
-    there.contains(&step.frame) && counts.is_some_and(|counts| there.contains(&counts.counts))
+    there.contains(&step.field) && counts.is_some_and(|counts| there.contains(&counts.counts))
 }
 
-/// Frames, and counts of what contributed to them, that are there, and whole as far as that is asked for. A frame without
+/// Fields, and counts of what contributed to them, that are there, and whole as far as that is asked for. A field without
 /// its series or domain counts as gone: these are made with it.
-async fn frames_there(
+async fn fields_there(
     store: &Store,
     latest: Option<&Manifest>,
     target: &ProductId,
@@ -121,21 +121,21 @@ async fn frames_there(
         return Ok(there);
     };
     let series = latest.series.iter().map(|segment| &segment.series);
-    let frames = latest.steps.iter().map(|step| &step.frame);
+    let fields = latest.steps.iter().map(|step| &step.field);
     let counts = latest
         .steps
         .iter()
         .filter_map(|step| step.contributed.as_ref());
     let counts = counts.map(|contributed| &contributed.counts);
-    let named = series.chain(frames).chain(counts).chain([&latest.domain]);
+    let named = series.chain(fields).chain(counts).chain([&latest.domain]);
     let damaged = verify::damaged(store, named.cloned()).await?;
-    there.retain(|frame| !damaged.contains(frame));
+    there.retain(|field| !damaged.contains(field));
     for segment in &latest.series {
         let first = segment.first_step as usize;
         let steps = latest.steps.get(first..first + segment.steps as usize);
         if damaged.contains(&segment.series) || damaged.contains(&latest.domain) {
             for step in steps.unwrap_or_default() {
-                there.remove(&step.frame);
+                there.remove(&step.field);
             }
         }
     }

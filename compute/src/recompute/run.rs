@@ -11,7 +11,7 @@ use crate::{ComputeError, DeriveProgress, Engine};
 /// What a run came to.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Outcome {
-    /// The version that accumulated frames are in, if any were asked for.
+    /// The version that accumulated fields are in, if any were asked for.
     pub derived: Option<Manifest>,
     /// Tables of sums that are stored now.
     pub tables_count: usize,
@@ -26,35 +26,35 @@ pub async fn run(
     progress: &(dyn Fn(usize) + Send + Sync),
 ) -> Result<Outcome, ComputeError> {
     let mut outcome = Outcome::default();
-    let frames_count = plan
+    let fields_count = plan
         .items
         .iter()
-        .filter(|item| item.what == What::Frames)
+        .filter(|item| item.what == What::Fields)
         .count();
-    if frames_count > 0 {
-        outcome.derived = Some(frames(engine, plan, frames_count, progress).await?);
-        progress(frames_count);
+    if fields_count > 0 {
+        outcome.derived = Some(fields(engine, plan, fields_count, progress).await?);
+        progress(fields_count);
     }
     let manifest = manifests::load(engine.store(), &plan.manifest).await?;
-    let tables = plan.items.iter().filter(|item| item.what != What::Frames);
+    let tables = plan.items.iter().filter(|item| item.what != What::Fields);
     for item in tables {
         table(engine, &manifest, item, plan.is_forced).await?;
         outcome.tables_count += 1;
-        progress(frames_count + outcome.tables_count);
+        progress(fields_count + outcome.tables_count);
     }
     Ok(outcome)
 }
 
-async fn frames(
+async fn fields(
     engine: &Engine,
     plan: &Plan,
-    frames_count: usize,
+    fields_count: usize,
     progress: &(dyn Fn(usize) + Send + Sync),
 ) -> Result<Manifest, ComputeError> {
     let product = &plan.manifest.product;
     // Steps that are kept are told of too, before those of the plan.
     let on_step = |now: DeriveProgress| {
-        progress((now.done_steps + frames_count).saturating_sub(now.all_steps));
+        progress((now.done_steps + fields_count).saturating_sub(now.all_steps));
     };
     match plan.anew_from {
         Some(from) => derive_anew(engine, product, plan.start, from, &on_step).await,

@@ -83,7 +83,7 @@ async fn found_or_asked(
         surface: surface.clone(),
         shares_at: surface
             .shares()
-            .map(|shares| store.sql_url(&shares.frame).to_string()),
+            .map(|shares| store.sql_url(&shares.field).to_string()),
     };
     question.check_size()?;
     Ok(question.text())

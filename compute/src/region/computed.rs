@@ -23,7 +23,7 @@ pub(crate) struct ComputedWeights {
     pub(crate) region: Region,
     pub(crate) earth: Earth,
     pub(crate) surface: Surface,
-    /// Address of the frame that the surface takes its shares from.
+    /// Address of the field that the surface takes its shares from.
     pub(crate) shares_at: Option<String>,
 }
 

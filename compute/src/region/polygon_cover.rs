@@ -26,7 +26,7 @@ pub(super) struct Band {
 }
 
 impl Band {
-    /// The rows of a frame's chunks that start at `first_row`.
+    /// The rows of a field's chunks that start at `first_row`.
     pub(super) fn new(
         rings: &[Ring],
         grid: &Grid,

@@ -1,6 +1,6 @@
 //! Shares of sea that a landed product says: how much of every cell is land, or sea, on the grid of what is summed.
 
-use contract::chunk::frame_chunks;
+use contract::chunk::field_chunks;
 use contract::grid::Grid;
 use contract::key::ObjectKey;
 use contract::manifest::Manifest;
@@ -15,11 +15,12 @@ const SLACK_CELLS: f64 = 1e-3;
 /// Where sea comes from that no product says.
 pub const NATURAL_EARTH: &str = "Natural Earth, land 1:50 million: exact, whatever the grid";
 
-/// A stored frame of shares.
+/// A stored field of shares.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Shares {
     /// Its values, `[row, col]`, 0 to 1.
-    pub(crate) frame: ObjectKey,
+    #[serde(rename = "frame")]
+    pub(crate) field: ObjectKey,
     /// What they are shares of.
     pub(crate) of: Of,
 }
@@ -68,7 +69,7 @@ impl Shares {
             ));
         }
         Ok(Self {
-            frame: step.frame.clone(),
+            field: step.field.clone(),
             of,
         })
     }
@@ -83,7 +84,7 @@ impl Shares {
         mut chunks: Vec<(u32, Vec<f64>)>,
         values: &[f32],
     ) -> Result<Vec<(u32, Vec<f64>)>, ComputeError> {
-        let windows = frame_chunks(grid);
+        let windows = field_chunks(grid);
         let mut unknown = 0u64;
         for (chunk, areas_m2) in &mut chunks {
             let cells = windows[*chunk as usize].cell_indices(grid);
@@ -98,7 +99,7 @@ impl Shares {
         }
         if unknown > 0 {
             return Err(ComputeError::OceanShares {
-                product: self.frame.to_string(),
+                product: self.field.to_string(),
                 reason: format!(
                     "{unknown} cells of the region have no value there; fill them with 0 or 1, or ask without it"
                 ),
@@ -175,12 +176,12 @@ mod tests {
 
     #[test]
     fn land_and_sea_are_the_two_parts_of_a_cell() {
-        let frame: ObjectKey = "frames/mask/a".parse().unwrap();
+        let field: ObjectKey = "frames/mask/a".parse().unwrap();
         let mut values = vec![0.25; 32];
         let areas = vec![(0, [vec![100.0; 31], vec![0.0]].concat())];
         values[31] = f32::NAN; // outside of the region
         let shares = |of| Shares {
-            frame: frame.clone(),
+            field: field.clone(),
             of,
         };
         let weigh = |of, values: &[f32]| shares(of).weigh(&GRID, areas.clone(), values);

@@ -1,6 +1,6 @@
 //! Weights of a region on a grid: computed once, stored under the hash of what they depend on, reused ever after.
 
-use contract::chunk::{CHUNK_ROWS, frame_chunks};
+use contract::chunk::{CHUNK_ROWS, field_chunks};
 use contract::digest::Digest;
 use contract::earth::Earth;
 use contract::grid::Grid;
@@ -135,7 +135,7 @@ pub fn compute(
     compute_of(grid, region, earth, &Surface::All, None)
 }
 
-/// The same of a surface; `shares` is the frame `[row, col]` that it takes its shares from, where it does.
+/// The same of a surface; `shares` is the field `[row, col]` that it takes its shares from, where it does.
 pub fn compute_of(
     grid: &Grid,
     region: &Region,
@@ -146,7 +146,7 @@ pub fn compute_of(
     if let Surface::Shares(own) = surface {
         let values = shares.filter(|values| values.len() == grid.cell_count());
         let values = values.ok_or_else(|| {
-            ComputeError::inconsistent(own.frame.as_str(), "it was not read, or is of another grid")
+            ComputeError::inconsistent(own.field.as_str(), "it was not read, or is of another grid")
         })?;
         let mut chunks = own.weigh(grid, compute(grid, region, earth)?, values)?;
         chunks.retain(any_area);
@@ -171,7 +171,7 @@ pub fn compute_of(
         },
     };
     let areas = |window| box_cover::areas_m2(bounds, grid, window, earth);
-    let windows = frame_chunks(grid).into_iter().enumerate();
+    let windows = field_chunks(grid).into_iter().enumerate();
     Ok(windows
         .map(|(chunk, window)| (chunk as u32, areas(window)))
         .filter(any_area)
@@ -190,7 +190,7 @@ fn ring_chunks(
 ) -> Result<Vec<(u32, Vec<f64>)>, ComputeError> {
     let mut chunks = vec![];
     let mut band = None;
-    for (chunk, window) in frame_chunks(grid).into_iter().enumerate() {
+    for (chunk, window) in field_chunks(grid).into_iter().enumerate() {
         debug_assert_eq!(window.row % CHUNK_ROWS, 0, "chunks start at band rows");
         let current = match band.take() {
             Some((row, current)) if row == window.row => current,
@@ -256,7 +256,7 @@ pub async fn stored_of(
         Err(e) => return Err(e.into()),
     };
     let values = match surface.shares() {
-        Some(shares) => Some(storage::frames::read(store, &shares.frame, grid).await?),
+        Some(shares) => Some(storage::fields::read(store, &shares.field, grid).await?),
         None => None,
     };
     let (grid, region, own) = (*grid, region.clone(), surface.clone());

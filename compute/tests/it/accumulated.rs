@@ -1,4 +1,4 @@
-//! Accumulated carbon: its frames against hand sums and the printed budget, its manifest and its event.
+//! Accumulated carbon: its fields against hand sums and the printed budget, its manifest and its event.
 
 use std::sync::Mutex;
 
@@ -25,8 +25,8 @@ async fn derive(engine: &Engine, name: &str, start: Option<TimeMs>) -> Manifest 
         .unwrap()
 }
 
-async fn frame(store: &Store, manifest: &Manifest, step: usize) -> Vec<f32> {
-    storage::frames::read(store, &manifest.steps[step].frame, &manifest.grid)
+async fn field(store: &Store, manifest: &Manifest, step: usize) -> Vec<f32> {
+    storage::fields::read(store, &manifest.steps[step].field, &manifest.grid)
         .await
         .unwrap()
 }
@@ -51,8 +51,8 @@ async fn what_is_derived_is_a_cube_too_and_one_that_is_behind_is_brought_up() {
         assert_eq!(cube.description().version, Some(derived.id()));
         assert_eq!(cube.steps().len(), 12);
         let (there, here) = (
-            cube.frame(11).await.unwrap(),
-            frame(&store, &derived, 11).await,
+            cube.field(11).await.unwrap(),
+            field(&store, &derived, 11).await,
         );
         let same = |(a, b): (&f32, &f32)| a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan());
         assert!(there.iter().zip(&here).all(same));
@@ -60,7 +60,7 @@ async fn what_is_derived_is_a_cube_too_and_one_that_is_behind_is_brought_up() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn the_last_frame_holds_the_printed_budget() {
+async fn the_last_field_holds_the_printed_budget() {
     let (_folder, store) = folder_store();
     let id = product("wavy");
     land(
@@ -80,7 +80,7 @@ async fn the_last_frame_holds_the_printed_budget() {
         .unwrap();
     assert_eq!(*seen.lock().unwrap(), (1..=12).collect::<Vec<_>>());
 
-    let last = frame(&store, &derived, 11).await;
+    let last = field(&store, &derived, 11).await;
     let mass_kg: f64 = last
         .iter()
         .enumerate()
@@ -153,7 +153,7 @@ async fn a_gap_adds_nothing_and_land_stays_empty() {
         let grown = 1e-9 * (i as f64 - 1.2) * days * 86_400.0;
         whole += grown;
         gapped += if i == 1 { 0.0 } else { grown };
-        let values = frame(&store, &derived, i).await;
+        let values = field(&store, &derived, i).await;
         assert!(
             (f64::from(values[0]) / whole - 1.0).abs() < 1e-6,
             "{i} {values:?}"
@@ -359,7 +359,7 @@ async fn a_start_inside_a_step_counts_the_rest_of_it() {
         derived.steps[0].period,
         Period::new(start, "2001-03-01".parse().unwrap()).unwrap()
     );
-    let values = frame(&store, &derived, 0).await;
+    let values = field(&store, &derived, 0).await;
     let expected = -0.2e-9 * 18.0 * 86_400.0;
     assert!(
         (f64::from(values[0]) / expected - 1.0).abs() < 1e-6,
@@ -410,14 +410,14 @@ async fn deriving_again_changes_nothing_until_the_source_does() {
     .await;
     let third = derive(&engine, "tiny", None).await;
     assert_eq!(third.number, 2);
-    assert_ne!(third.steps[0].frame, first.steps[0].frame);
+    assert_ne!(third.steps[0].field, first.steps[0].field);
 
     let later = derive(&engine, "tiny", "2001-02-01".parse().ok()).await;
     assert_eq!((later.number, later.steps.len()), (3, 3));
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn frames_have_the_same_bytes_at_any_parallelism() {
+async fn fields_have_the_same_bytes_at_any_parallelism() {
     let year = wavy_year(&ONE_DEGREE);
     let mut keys = vec![];
     for partitions in [1, 5] {

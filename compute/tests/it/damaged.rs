@@ -18,7 +18,7 @@ use contract::series::RegionSeriesQuery;
 use contract::time::Period;
 use storage::sound::damage;
 use storage::verify::{self, Fault};
-use storage::{Store, frames, manifests};
+use storage::{Store, fields, manifests};
 
 use crate::fixture::{folder_store, land, product, total, wavy_year};
 use crate::frozen;
@@ -95,12 +95,12 @@ async fn budget_of_box(store: &Store) -> Result<BudgetAnswer, String> {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_flipped_bit_of_a_frame_is_no_other_budget() {
+async fn a_flipped_bit_of_a_field_is_no_other_budget() {
     let (_folder, store) = landed().await;
     let right = budget_of_box(&store).await.unwrap();
-    let frame = first(&store, Kind::Frame).await;
-    let before = damage::count(Kind::Frame);
-    let errors = flipped(&store, &frame, || async {
+    let field = first(&store, Kind::Field).await;
+    let before = damage::count(Kind::Field);
+    let errors = flipped(&store, &field, || async {
         budget_of_box(&store).await.map(|answer| answer == right)
     });
     let errors = errors.await;
@@ -108,28 +108,28 @@ async fn a_flipped_bit_of_a_frame_is_no_other_budget() {
         errors > 90,
         "{errors} errors only: what was read is not looked at"
     );
-    assert!(damage::count(Kind::Frame) >= before + errors as u64);
+    assert!(damage::count(Kind::Field) >= before + errors as u64);
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_flipped_bit_of_a_frame_is_no_other_accumulated_carbon() {
+async fn a_flipped_bit_of_a_field_is_no_other_accumulated_carbon() {
     let (_folder, store) = landed().await;
-    let frame = first(&store, Kind::Frame).await;
-    let mut flip = store.get(&frame).await.unwrap().to_vec();
+    let field = first(&store, Kind::Field).await;
+    let mut flip = store.get(&field).await.unwrap().to_vec();
     let middle = flip.len() / 3;
     flip[middle] ^= 8;
-    store.put_over(&frame, flip.into()).await.unwrap();
+    store.put_over(&field, flip.into()).await.unwrap();
     let engine = Engine::local(store.clone());
     let derived = derive_accumulated(&engine, &product("wavy"), None, &|_| ()).await;
     let error = derived.unwrap_err().to_string();
-    assert!(error.contains(frame.as_str()), "{error}");
+    assert!(error.contains(field.as_str()), "{error}");
 }
 
 /// A damaged footer can make the Parquet library panic: the object is named all the same, whichever bit it was.
 #[tokio::test(flavor = "multi_thread")]
-async fn a_damaged_end_of_a_frame_is_named_where_carbon_is_accumulated() {
+async fn a_damaged_end_of_a_field_is_named_where_carbon_is_accumulated() {
     let (_folder, landed) = landed().await;
-    let frame = first(&landed, Kind::Frame).await;
+    let field = first(&landed, Kind::Field).await;
     let mut objects = vec![];
     for key in landed.list("").await.unwrap() {
         let content = landed.get(&key).await.unwrap();
@@ -141,12 +141,12 @@ async fn a_damaged_end_of_a_frame_is_named_where_carbon_is_accumulated() {
         for (key, content) in &objects {
             store.put_over(key, content.clone()).await.unwrap();
         }
-        store.put_over(&frame, content).await.unwrap();
+        store.put_over(&field, content).await.unwrap();
         let engine = Engine::local(store);
         let derived = derive_accumulated(&engine, &product("wavy"), None, &|_| ()).await;
         derived.map_err(|e| e.to_string())
     };
-    let whole = landed.get(&frame).await.unwrap();
+    let whole = landed.get(&field).await.unwrap();
     let right = derived(whole.clone()).await.unwrap();
     let mut errors = 0;
     for (at, bit) in bits(&whole) {
@@ -155,7 +155,7 @@ async fn a_damaged_end_of_a_frame_is_named_where_carbon_is_accumulated() {
         match derived(flipped.into()).await {
             Ok(manifest) => assert_eq!(manifest, right, "byte {at}"),
             Err(error) => {
-                assert!(error.contains(frame.as_str()), "byte {at}: {error}");
+                assert!(error.contains(field.as_str()), "byte {at}: {error}");
                 errors += 1;
             }
         }
@@ -252,7 +252,7 @@ async fn a_damaged_domain_or_manifest_is_named() {
     }
 }
 
-/// The derived product with a bit flipped in a frame, its series or its domain: made again under the same names.
+/// The derived product with a bit flipped in a field, its series or its domain: made again under the same names.
 #[tokio::test(flavor = "multi_thread")]
 async fn damaged_derived_objects_are_made_again_when_they_are_looked_at() {
     use compute::recompute::{Request, What, plan, run};
@@ -264,12 +264,12 @@ async fn damaged_derived_objects_are_made_again_when_they_are_looked_at() {
         product: product("wavy"),
         from: None,
         to: None,
-        what: vec![What::Frames],
+        what: vec![What::Fields],
         is_forced: false,
         is_verified,
     };
     for key in [
-        &derived.steps[1].frame,
+        &derived.steps[1].field,
         &derived.series[0].series,
         &derived.domain,
     ] {
@@ -336,7 +336,7 @@ async fn store_of_all_kinds() -> (tempfile::TempDir, Store) {
     let source = manifests::latest(&store, &id).await.unwrap().unwrap();
     let mut months = vec![];
     for step in &source.steps {
-        let values = frames::read(&store, &step.frame, &source.grid).await;
+        let values = fields::read(&store, &step.field, &source.grid).await;
         months.push((step.period, values.unwrap()));
     }
     let march = months[1].1.iter().map(|value| value * 0.3).collect();
@@ -383,7 +383,7 @@ async fn a_flipped_bit_of_any_object_of_a_store_is_no_other_number() {
         }
     }
     let needed = [
-        Kind::Frame,
+        Kind::Field,
         Kind::Contributed,
         Kind::Series,
         Kind::Domain,

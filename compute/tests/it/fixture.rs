@@ -13,7 +13,7 @@ use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::region::Cells;
 use contract::time::Period;
-use storage::{Store, domain, frames, manifests, series};
+use storage::{Store, domain, fields, manifests, series};
 
 pub(crate) const ONE_DEGREE: Grid = Grid {
     rows: 180,
@@ -65,7 +65,7 @@ pub(crate) async fn land(
         listed.push(Step {
             masked: None,
             period: *period,
-            frame: frames::write(store, id, &grid, values, *period)
+            field: fields::write(store, id, &grid, values, *period)
                 .await
                 .unwrap(),
             raw_sha256: Digest::of(&index.to_le_bytes()),

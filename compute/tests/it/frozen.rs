@@ -12,7 +12,7 @@ use contract::manifest::{MANIFEST_SCHEMA, Manifest, OLDEST_MANIFEST_SCHEMA};
 use contract::region::Region;
 use contract::series::RegionSeriesQuery;
 use contract::time::Period;
-use storage::{Store, frames, manifests};
+use storage::{Store, fields, manifests};
 use test_data::frozen;
 
 use crate::fixture::{folder_store, land, product, total};
@@ -86,28 +86,28 @@ fn is_near(a: &serde_json::Value, b: &serde_json::Value) -> bool {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_flipped_bit_of_an_old_frame_is_an_error_though_its_rows_have_no_checks() {
+async fn a_flipped_bit_of_an_old_field_is_an_error_though_its_rows_have_no_checks() {
     let (_folder, store) = store(1);
-    let frame = newest(&store, "fgco2").await.steps[0].frame.clone();
-    let whole = store.get(&frame).await.unwrap();
+    let field = newest(&store, "fgco2").await.steps[0].field.clone();
+    let whole = store.get(&field).await.unwrap();
     for at in (0..whole.len()).step_by(97) {
         let mut flip = whole.to_vec();
         flip[at] ^= 1 << (at % 8);
-        store.put_over(&frame, flip.into()).await.unwrap();
+        store.put_over(&field, flip.into()).await.unwrap();
         // A handle that has not seen it whole.
         let store = Store::open(store.url()).unwrap();
         let engine = Engine::local(store);
         let asked = budget(&engine, &total(&product("fgco2"), "1,-50,15,50")).await;
         let error = asked.unwrap_err().to_string();
-        assert!(error.contains(frame.as_str()), "{error}");
+        assert!(error.contains(field.as_str()), "{error}");
     }
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn what_was_derived_then_is_kept_now() {
-    let frames = |manifest: &Manifest| {
+    let fields = |manifest: &Manifest| {
         let steps = manifest.steps.iter();
-        steps.map(|step| step.frame.clone()).collect::<Vec<_>>()
+        steps.map(|step| step.field.clone()).collect::<Vec<_>>()
     };
     for version in OLDEST_MANIFEST_SCHEMA..=MANIFEST_SCHEMA {
         let (_folder, store) = store(version);
@@ -116,8 +116,8 @@ async fn what_was_derived_then_is_kept_now() {
         let now = derive_accumulated(&engine, &product("fgco2"), None, &|_| ()).await;
         let now = now.unwrap();
         assert_eq!(
-            frames(&now),
-            frames(&then),
+            fields(&now),
+            fields(&then),
             "{version}: the same values are no revision"
         );
         if version == MANIFEST_SCHEMA {
@@ -186,17 +186,17 @@ async fn what_is_derived_now_is_named_as_in_the_newest_frozen_store() {
     }
 }
 
-async fn without_frames(store: &Store, source: &Manifest) {
+async fn without_fields(store: &Store, source: &Manifest) {
     for step in &source.steps {
-        store.remove(&step.frame).await.unwrap();
+        store.remove(&step.field).await.unwrap();
     }
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn frozen_sums_answer_where_no_frame_can() {
+async fn frozen_sums_answer_where_no_field_can() {
     let (_folder, kept) = store(2);
     let source = newest(&kept, "fgco2").await;
-    without_frames(&kept, &source).await;
+    without_fields(&kept, &source).await;
     let engine = Engine::local(kept);
     let global = total(&product("fgco2"), "global");
     let now = budget(&engine, &global).await.unwrap();
@@ -220,21 +220,21 @@ async fn frozen_sums_answer_where_no_frame_can() {
     let january = &means.series[0];
     assert!(january.mean.is_some() && january.start == source.steps[0].period.start);
     let elsewhere = budget(&engine, &total(&product("fgco2"), "1,-50,15,55")).await;
-    assert!(elsewhere.is_err(), "there are frames: this tests nothing");
+    assert!(elsewhere.is_err(), "there are fields: this tests nothing");
     // Sums of version 1 had other bits: they have other names, and nobody asks for them.
     let (_folder, old) = store(1);
-    without_frames(&old, &newest(&old, "fgco2").await).await;
+    without_fields(&old, &newest(&old, "fgco2").await).await;
     assert!(budget(&Engine::local(old), &global).await.is_err());
 }
 
-/// A month more: what it follows from is kept exactly, and its frames are gone.
+/// A month more: what it follows from is kept exactly, and its fields are gone.
 #[tokio::test(flavor = "multi_thread")]
 async fn frozen_exact_sums_are_gone_on_from() {
     let (_folder, kept) = store(2);
     let source = newest(&kept, "fgco2").await;
     let mut months = vec![];
     for step in &source.steps {
-        let values = frames::read(&kept, &step.frame, &source.grid)
+        let values = fields::read(&kept, &step.field, &source.grid)
             .await
             .unwrap();
         months.push((step.period, values));
@@ -243,7 +243,7 @@ async fn frozen_exact_sums_are_gone_on_from() {
     months.push((Period::month(2001, 3).unwrap(), march));
     let (id, grid, quantity) = (product("fgco2"), source.grid, source.quantity);
     land(&kept, &id, quantity, grid, &months, 12).await;
-    without_frames(&kept, &source).await;
+    without_fields(&kept, &source).await;
     let gone_on = derive_accumulated(&Engine::local(kept), &id, None, &|_| ()).await;
     let gone_on = gone_on.unwrap();
     let (_folder, fresh) = folder_store();
@@ -252,8 +252,8 @@ async fn frozen_exact_sums_are_gone_on_from() {
     assert_eq!(gone_on.steps.len(), 3);
     for (now, expected) in gone_on.steps.iter().zip(from_nothing.unwrap().steps) {
         assert_eq!(
-            (&now.frame, &now.contributed),
-            (&expected.frame, &expected.contributed)
+            (&now.field, &now.contributed),
+            (&expected.field, &expected.contributed)
         );
     }
 }

@@ -74,7 +74,7 @@ async fn months_that_are_accumulated_are_not_read_again() {
     derive(&store).await;
     put(&store, &year).await;
     for step in &early.steps {
-        std::fs::remove_file(folder.path().join(step.frame.as_str())).unwrap();
+        std::fs::remove_file(folder.path().join(step.field.as_str())).unwrap();
     }
     let derived = derive(&store).await;
     assert_eq!(seen(&derived), seen(&from_nothing(&year).await));
@@ -93,14 +93,14 @@ async fn a_revised_month_redoes_itself_and_what_follows_and_nothing_before() {
     put(&store, &revised).await;
     let after = derive(&store).await;
     for month in 0..12 {
-        let is_same = before.steps[month].frame == after.steps[month].frame;
+        let is_same = before.steps[month].field == after.steps[month].field;
         assert_eq!(is_same, month < 7, "month {month}");
     }
     assert_eq!(seen(&after), seen(&from_nothing(&revised).await));
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn cells_that_come_and_go_change_the_earlier_frames_as_they_must() {
+async fn cells_that_come_and_go_change_the_earlier_fields_as_they_must() {
     let year = wavy_year(&FIVE_DEGREES);
     let land_cell = (0..FIVE_DEGREES.cell_count())
         .find(|&index| year.iter().all(|(_, values)| values[index].is_nan()))
@@ -181,8 +181,8 @@ async fn what_is_computed_anew_and_comes_out_the_same_makes_no_version() {
     let (folder, store) = folder_store();
     put(&store, &year).await;
     let first = derive(&store).await;
-    // A frame that was lost: its key is in the manifest, its object is gone.
-    let lost = &first.steps[5].frame;
+    // A field that was lost: its key is in the manifest, its object is gone.
+    let lost = &first.steps[5].field;
     std::fs::remove_file(folder.path().join(lost.as_str())).unwrap();
     let seen = Mutex::new(0);
     let count = |now: DeriveProgress| *seen.lock().unwrap() = now.done_steps;

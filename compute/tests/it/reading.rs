@@ -12,7 +12,7 @@ use compute::budget::fixed::{MASS_DECIMALS, decimal_text};
 use compute::region::weights;
 use compute::{Engine, Objects};
 use contract::budget::{BudgetQuery, BudgetStep};
-use contract::chunk::frame_chunks;
+use contract::chunk::field_chunks;
 use contract::earth::Earth;
 use contract::grid::Grid;
 use contract::manifest::Manifest;
@@ -29,7 +29,7 @@ use object_store::{
     CopyOptions, GetOptions, GetResult, ListResult, MultipartUpload, ObjectMeta, ObjectStore,
     PutMultipartOptions, PutOptions, PutPayload, PutResult, Result,
 };
-use storage::{Store, frames, manifests};
+use storage::{Store, fields, manifests};
 
 use crate::fixture::{ask, folder_store, land, months, parts, product, total};
 
@@ -43,19 +43,19 @@ const GRID: Grid = Grid {
     dlon_deg: 30.0 / 615.0,
 };
 
-/// A store that counts the requests for frames, and the bytes that it hands out of them.
+/// A store that counts the requests for fields, and the bytes that it hands out of them.
 #[derive(Debug)]
 struct Counting {
     inner: Arc<dyn ObjectStore>,
-    frame_bytes: AtomicU64,
-    frame_requests: AtomicU64,
+    field_bytes: AtomicU64,
+    field_requests: AtomicU64,
 }
 
 impl Counting {
     fn count(&self, at: &Path, bytes: u64) {
         if at.as_ref().contains("frames/") {
-            self.frame_bytes.fetch_add(bytes, Ordering::Relaxed);
-            self.frame_requests.fetch_add(1, Ordering::Relaxed);
+            self.field_bytes.fetch_add(bytes, Ordering::Relaxed);
+            self.field_requests.fetch_add(1, Ordering::Relaxed);
         }
     }
 }
@@ -133,23 +133,23 @@ fn noise() -> Vec<(Period, Vec<f32>)> {
     months.into_iter().map(step).collect()
 }
 
-/// Most requests that a sum over a region of one chunk may need of a frame.
+/// Most requests that a sum over a region of one chunk may need of a field.
 const MOST_REQUESTS: f64 = 4.0;
 
-async fn frame_bytes(store: &Store, manifest: &Manifest) -> u64 {
+async fn field_bytes(store: &Store, manifest: &Manifest) -> u64 {
     let mut bytes = 0;
     for step in &manifest.steps {
-        bytes += store.size_bytes(&step.frame).await.unwrap();
+        bytes += store.size_bytes(&step.field).await.unwrap();
     }
     bytes
 }
 
-/// What a budget of a region asks of the frames.
+/// What a budget of a region asks of the fields.
 #[derive(Debug)]
 struct Read {
     /// Share of their bytes.
     share: f64,
-    /// Requests a frame.
+    /// Requests a field.
     requests: f64,
 }
 
@@ -157,8 +157,8 @@ async fn read(store: &Store, manifest: &Manifest, region: &str) -> Read {
     let (root, inner) = store.sql_root();
     let counting = Arc::new(Counting {
         inner,
-        frame_bytes: AtomicU64::new(0),
-        frame_requests: AtomicU64::new(0),
+        field_bytes: AtomicU64::new(0),
+        field_requests: AtomicU64::new(0),
     });
     let objects = Objects::new(root, Arc::clone(&counting) as Arc<dyn ObjectStore>);
     // One task: the end of a file that two tasks share is read by both when they start at once.
@@ -166,8 +166,8 @@ async fn read(store: &Store, manifest: &Manifest, region: &str) -> Read {
     ask(&engine, &total(&manifest.product, region)).await;
     let count = |of: &AtomicU64| of.load(Ordering::Relaxed) as f64;
     Read {
-        share: count(&counting.frame_bytes) / frame_bytes(store, manifest).await as f64,
-        requests: count(&counting.frame_requests) / manifest.steps.len() as f64,
+        share: count(&counting.field_bytes) / field_bytes(store, manifest).await as f64,
+        requests: count(&counting.field_requests) / manifest.steps.len() as f64,
     }
 }
 
@@ -176,7 +176,7 @@ async fn a_small_box_reads_its_chunks_and_no_others() {
     let (_folder, store) = folder_store();
     let flux = Quantity::CarbonFlux;
     let manifest = land(&store, &product("noise"), flux, GRID, &noise(), 4).await;
-    assert_eq!(frame_chunks(&GRID).len(), 48);
+    assert_eq!(field_chunks(&GRID).len(), 48);
     let share = |cells: f64| cells / GRID.cell_count() as f64;
     // One chunk, and the end of each file.
     let end = 0.03;
@@ -195,26 +195,26 @@ async fn a_small_box_reads_its_chunks_and_no_others() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn what_is_remembered_of_the_end_of_a_frame_is_not_believed_of_another_one_in_its_place() {
+async fn what_is_remembered_of_the_end_of_a_field_is_not_believed_of_another_one_in_its_place() {
     let (_folder, store) = folder_store();
     let flux = Quantity::CarbonFlux;
     let manifest = land(&store, &product("noise"), flux, GRID, &noise()[..1], 1).await;
-    let frame = &manifest.steps[0].frame;
+    let field = &manifest.steps[0].field;
     let engine = Engine::in_process(store.clone(), parts(2));
     let question = total(&manifest.product, "110,20,111,21");
     let right = ask(&engine, &question).await;
-    let whole = store.get(frame).await.unwrap();
+    let whole = store.get(field).await.unwrap();
     // The last bytes are the name of the format.
     let mut damaged = whole.to_vec();
     *damaged.last_mut().unwrap() ^= 1;
-    store.put_over(frame, damaged.into()).await.unwrap();
+    store.put_over(field, damaged.into()).await.unwrap();
     let error = compute::budget(&engine, &question).await.unwrap_err();
-    assert!(error.to_string().contains(frame.as_str()), "{error}");
-    store.put_over(frame, whole).await.unwrap();
+    assert!(error.to_string().contains(field.as_str()), "{error}");
+    store.put_over(field, whole).await.unwrap();
     assert_eq!(ask(&engine, &question).await, right);
 }
 
-/// A frame as it was written before a row of values was a page: pages of a megabyte, and no index of pages.
+/// A field as it was written before a row of values was a page: pages of a megabyte, and no index of pages.
 fn old_layout(content: Bytes) -> Bytes {
     let reader = ParquetRecordBatchReaderBuilder::try_new(content).unwrap();
     let batches: Vec<RecordBatch> = reader.build().unwrap().map(Result::unwrap).collect();
@@ -235,17 +235,17 @@ fn old_layout(content: Bytes) -> Bytes {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn frames_of_the_layout_before_have_the_same_sums() {
+async fn fields_of_the_layout_before_have_the_same_sums() {
     let (_folder, store) = folder_store();
     let (id, flux) = (product("noise"), Quantity::CarbonFlux);
     let manifest = land(&store, &id, flux, GRID, &noise(), 4).await;
     let mut old = manifest.clone();
     old.product = product("old");
     for step in &mut old.steps {
-        let content = old_layout(store.get(&step.frame).await.unwrap());
+        let content = old_layout(store.get(&step.field).await.unwrap());
         let digest = contract::digest::Digest::of(&content);
-        step.frame = contract::key::ObjectKey::frame(&old.product, &digest);
-        store.put_new(&step.frame, content).await.unwrap();
+        step.field = contract::key::ObjectKey::field(&old.product, &digest);
+        store.put_new(&step.field, content).await.unwrap();
     }
     manifests::commit(&store, &old).await.unwrap();
     let monthly = |id, region| BudgetQuery {
@@ -269,8 +269,8 @@ async fn the_sums_are_those_of_the_kernels_chunk_by_chunk() {
     let region = "105.3,3.1,127.7,38.2";
     let weights = weights::compute(&GRID, &region.parse().unwrap(), Earth::Wgs84).unwrap();
     let step = &manifest.steps[0];
-    let values = frames::read(&store, &step.frame, &GRID).await.unwrap();
-    let windows = frame_chunks(&GRID);
+    let values = fields::read(&store, &step.field, &GRID).await.unwrap();
+    let windows = field_chunks(&GRID);
     let (mut mass, mut area) = (0, 0);
     for (chunk, areas) in &weights {
         let cells = windows[*chunk as usize].cell_indices(&GRID);

@@ -49,10 +49,10 @@ async fn a_plan_names_what_is_missing_and_stale_and_a_run_leaves_nothing_of_it()
     let (_folder, store) = folder_store();
     put(&store, &year).await;
     let engine = Engine::local(store.clone());
-    let all = request(&[What::Budget, What::Frames, What::Statistics]);
+    let all = request(&[What::Budget, What::Fields, What::Statistics]);
     let first = plan(&store, &all).await.unwrap();
     let count = |kind: What| first.items.iter().filter(|item| item.what == kind).count();
-    assert_eq!(count(What::Frames), 12);
+    assert_eq!(count(What::Fields), 12);
     assert!(count(What::Budget) >= 8 && count(What::Budget) == count(What::Statistics));
     assert!(
         first
@@ -71,19 +71,19 @@ async fn a_plan_names_what_is_missing_and_stale_and_a_run_leaves_nothing_of_it()
     year[10].1[300] = 4e-9;
     put(&store, &year).await;
     let third = plan(&store, &all).await.unwrap();
-    let frames: Vec<_> = third
+    let fields: Vec<_> = third
         .items
         .iter()
-        .filter(|item| item.what == What::Frames)
+        .filter(|item| item.what == What::Fields)
         .collect();
-    assert_eq!(frames.len(), 2, "November and what follows from it");
+    assert_eq!(fields.len(), 2, "November and what follows from it");
     assert!(third.items.iter().all(|item| item.reason == Reason::Stale));
     run(&engine, &third, &|_done| ()).await.unwrap();
     assert!(plan(&store, &all).await.unwrap().items.is_empty());
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_lost_frame_is_planned_and_made_again_without_a_new_version() {
+async fn a_lost_field_is_planned_and_made_again_without_a_new_version() {
     let year = wavy_year(&TEN_DEGREES);
     let (folder, store) = folder_store();
     put(&store, &year).await;
@@ -92,10 +92,10 @@ async fn a_lost_frame_is_planned_and_made_again_without_a_new_version() {
     let derived = derived.unwrap();
     let step = &derived.steps[8];
     let counts = &step.contributed.as_ref().unwrap().counts;
-    for lost in [&step.frame, counts] {
+    for lost in [&step.field, counts] {
         std::fs::remove_file(folder.path().join(lost.as_str())).unwrap();
-        let frames = request(&[What::Frames]);
-        let mend = plan(&store, &frames).await.unwrap();
+        let fields = request(&[What::Fields]);
+        let mend = plan(&store, &fields).await.unwrap();
         assert_eq!(mend.items.len(), 4, "{lost}");
         assert_eq!(mend.items[0].reason, Reason::Missing);
         let outcome = run(&engine, &mend, &|_done| ()).await.unwrap();
@@ -153,9 +153,9 @@ async fn stored_sums_answer_with_the_same_bits_and_without_the_engine() {
     let computed = ask(&engine, &question).await;
     let budgets = plan(&store, &request(&[What::Budget])).await.unwrap();
     run(&engine, &budgets, &|_| ()).await.unwrap();
-    // Without frames no engine could answer.
+    // Without fields no engine could answer.
     for step in &manifest.steps {
-        std::fs::remove_file(folder.path().join(step.frame.as_str())).unwrap();
+        std::fs::remove_file(folder.path().join(step.field.as_str())).unwrap();
     }
     assert_eq!(ask(&engine, &question).await, computed);
 }
@@ -243,11 +243,11 @@ async fn clean_up_takes_what_no_kept_version_names_and_nothing_young() {
         versions[2]
     );
     for step in &versions[2].steps {
-        assert!(store.exists(&step.frame).await.unwrap());
+        assert!(store.exists(&step.field).await.unwrap());
         let counts = &step.contributed.as_ref().unwrap().counts;
         assert!(store.exists(counts).await.unwrap());
     }
-    assert!(!store.exists(&versions[0].steps[4].frame).await.unwrap());
+    assert!(!store.exists(&versions[0].steps[4].field).await.unwrap());
     let old_counts = &versions[0].steps[4].contributed.as_ref().unwrap().counts;
     assert!(!store.exists(old_counts).await.unwrap());
     assert!(manifests::load(&store, &versions[0].id()).await.is_err());

@@ -47,7 +47,7 @@ async fn the_real_grids_have_the_published_budgets() {
     let derived = derive_accumulated(&engine, &id, None, &|_progress| ())
         .await
         .unwrap();
-    let last = storage::frames::read(&store, &derived.steps[11].frame, &ONE_DEGREE)
+    let last = storage::fields::read(&store, &derived.steps[11].field, &ONE_DEGREE)
         .await
         .unwrap();
     let mass_kg: f64 = last

@@ -24,7 +24,7 @@ fn product(name: &str, quantity: Quantity, days: std::ops::RangeInclusive<u32>) 
             start: TimeMs::from_ymd(2002, 1, day).unwrap(),
             end: TimeMs::from_ymd(2002, 1, day + 1).unwrap(),
         },
-        frame: ObjectKey::frame(&product, &Digest::of(format!("{name}{day}").as_bytes())),
+        field: ObjectKey::field(&product, &Digest::of(format!("{name}{day}").as_bytes())),
         raw_sha256: Digest::of(b""),
         origin: String::new(),
         valid_cells: 1,

@@ -97,7 +97,7 @@ async fn no_flipped_bit_of_what_names_chunks_is_read() {
             objects.put(&path, flipped.into()).await.unwrap();
             let read = async {
                 let repository = Repository::open(&store, "p").await?;
-                repository.at(&At::Newest).await?.frame(0).await
+                repository.at(&At::Newest).await?.field(0).await
             };
             if let Err(error) = read.await {
                 let text = error.to_string();
@@ -131,7 +131,7 @@ async fn no_flipped_bit_of_a_shard_gives_a_number() {
             flipped[at] ^= 1;
             objects.put(&path, flipped.into()).await.unwrap();
             let grid = cube.description().grid;
-            let read = open(&store).await.frame(0).await;
+            let read = open(&store).await.field(0).await;
             assert!(
                 matches!(read, Err(CubeError::Chunk { .. })),
                 "byte {at} of {}: {:?}",
@@ -143,12 +143,12 @@ async fn no_flipped_bit_of_a_shard_gives_a_number() {
         objects.put(&path, whole.into()).await.unwrap();
     }
     assert_eq!(errors, 8);
-    open(&store).await.frame(0).await.unwrap();
+    open(&store).await.field(0).await.unwrap();
 }
 
-/// Whole and sound objects in each other's place: their checksums are right, the frame is not.
+/// Whole and sound objects in each other's place: their checksums are right, the field is not.
 #[tokio::test]
-async fn chunks_that_changed_places_are_no_frame() {
+async fn chunks_that_changed_places_are_no_field() {
     let grid = grid(700, 1500);
     // Noise in all bits is stored as it is, so that all chunks are of one length.
     let noise = |cell: u32| {
@@ -159,7 +159,7 @@ async fn chunks_that_changed_places_are_no_frame() {
     let noise: Vec<f32> = (0..grid.cell_count() as u32).map(noise).collect();
     let (store, keys) = cube_with(grid, noise.into()).await;
     assert_eq!(keys.len(), 6);
-    open(&store).await.frame(0).await.unwrap();
+    open(&store).await.field(0).await.unwrap();
     let objects = store.object_store();
     let path = |at: usize| object_store::path::Path::from(keys[at].as_str());
     let one = objects.get(&path(0)).await.unwrap().bytes().await.unwrap();
@@ -167,6 +167,6 @@ async fn chunks_that_changed_places_are_no_frame() {
     assert_eq!(one.len(), two.len());
     objects.put(&path(0), two.into()).await.unwrap();
     objects.put(&path(1), one.into()).await.unwrap();
-    let error = open(&store).await.frame(0).await.unwrap_err();
+    let error = open(&store).await.field(0).await.unwrap_err();
     assert!(matches!(error, CubeError::Step { .. }), "{error}");
 }

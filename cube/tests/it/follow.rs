@@ -12,23 +12,23 @@ use contract::key::ObjectKey;
 use contract::manifest::{MANIFEST_SCHEMA, Manifest, Step};
 use contract::quantity::Quantity;
 use cube::{At, Cube, CubeError, Repository, follow};
-use storage::{Store, frames};
+use storage::{Store, fields};
 
 use crate::product::{bits, grid, month, stores, values};
 
 /// Months and the seeds of their values.
 type Steps<'a> = &'a [(u32, u32)];
 
-/// A version of a product whose frames are stored.
+/// A version of a product whose fields are stored.
 pub(crate) async fn version(store: &Store, grid: Grid, number: u64, steps: Steps<'_>) -> Manifest {
     let product = "p".parse().unwrap();
     let mut all = vec![];
     for (of, seed) in steps {
         let values = values(&grid, *seed);
-        let frame = frames::write(store, &product, &grid, &values, month(*of)).await;
+        let field = fields::write(store, &product, &grid, &values, month(*of)).await;
         all.push(Step {
             period: month(*of),
-            frame: frame.unwrap(),
+            field: field.unwrap(),
             raw_sha256: Digest::of(b""),
             origin: "f.nc".to_owned(),
             valid_cells: 1,
@@ -66,8 +66,8 @@ pub(crate) async fn holds(store: &Store, at: At, manifest: &Manifest, steps: Ste
     assert_eq!(cube.steps().len(), steps.len());
     for (place, (of, seed)) in steps.iter().enumerate() {
         assert_eq!(cube.steps()[place].period, month(*of));
-        let frame = cube.frame(place).await.unwrap();
-        assert_eq!(bits(&frame), bits(&values(&manifest.grid, *seed)), "{of}");
+        let field = cube.field(place).await.unwrap();
+        assert_eq!(bits(&field), bits(&values(&manifest.grid, *seed)), "{of}");
     }
 }
 

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use contract::manifest::{MANIFEST_SCHEMA, Manifest};
 use cube::{At, Repository, folder, follow};
-use storage::{Store, frames, manifests};
+use storage::{Store, fields, manifests};
 
 use crate::product::bits;
 
@@ -38,7 +38,7 @@ async fn newest(store: &Store) -> Manifest {
     found.unwrap().unwrap()
 }
 
-/// Does a cube hold the frames of a version, by this name?
+/// Does a cube hold the fields of a version, by this name?
 async fn holds(store: &Store, manifest: &Manifest, at: At) {
     let repository = Repository::open(store, &folder(&manifest.product)).await;
     let cube = repository.unwrap().at(&at).await.unwrap();
@@ -46,11 +46,11 @@ async fn holds(store: &Store, manifest: &Manifest, at: At) {
     assert_eq!(cube.steps().len(), manifest.steps.len());
     for (place, step) in manifest.steps.iter().enumerate() {
         assert_eq!(cube.steps()[place].period, step.period);
-        let frame = frames::read(store, &step.frame, &manifest.grid)
+        let field = fields::read(store, &step.field, &manifest.grid)
             .await
             .unwrap();
-        let found = cube.frame(place).await.unwrap();
-        assert_eq!(bits(&found), bits(&frame), "step {place}");
+        let found = cube.field(place).await.unwrap();
+        assert_eq!(bits(&found), bits(&field), "step {place}");
     }
 }
 
@@ -72,9 +72,9 @@ async fn a_frozen_cube_holds_the_values_of_its_versions() {
     }
 }
 
-/// Frames that are named by their bytes say nothing of their values; the version before says whether they changed.
+/// Fields that are named by their bytes say nothing of their values; the version before says whether they changed.
 #[tokio::test]
-async fn frames_under_names_of_before_are_put_once() {
+async fn fields_under_names_of_before_are_put_once() {
     let (_folder, store) = copy(1);
     let mut manifest = newest(&store).await;
     let followed = follow(&store, &manifest).await.unwrap();

@@ -31,12 +31,12 @@ async fn the_second_of_two_writers_is_laid_on_top_and_sends_no_values_anew() {
         let cube = repository.at(&At::Newest).await.unwrap();
         for (place, number) in [(0, 1), (1, 2)] {
             assert_eq!(cube.steps()[place].period, month(number));
-            let frame = cube.frame(place).await.unwrap();
-            assert_eq!(bits(&frame), bits(&values(&grid, number)));
+            let field = cube.field(place).await.unwrap();
+            assert_eq!(bits(&field), bits(&values(&grid, number)));
         }
         // Digests and times of few steps are so small that they lie in the manifests.
         let made = chunks(&store).await - before;
-        assert_eq!(made, 2, "a frame of each");
+        assert_eq!(made, 2, "a field of each");
     }
 }
 
@@ -77,8 +77,8 @@ async fn four_writers_at_once_lose_no_step() {
         for place in 0..cube.steps().len() {
             let number = place as u32 + 1;
             assert_eq!(cube.steps()[place].period, month(number));
-            let frame = cube.frame(place).await.unwrap();
-            assert_eq!(bits(&frame), bits(&values(&grid, number)), "{number}");
+            let field = cube.field(place).await.unwrap();
+            assert_eq!(bits(&field), bits(&values(&grid, number)), "{number}");
         }
     }
 }

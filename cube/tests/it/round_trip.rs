@@ -8,7 +8,7 @@ use storage::Store;
 use crate::product::{bits, description, grid, month, stores, values};
 
 #[tokio::test]
-async fn frames_windows_and_series_are_those_that_were_put() {
+async fn fields_windows_and_series_are_those_that_were_put() {
     let (_folder, stores) = stores();
     for store in stores {
         let description = description(Quantity::CarbonFlux, grid(60, 90));
@@ -31,9 +31,9 @@ async fn frames_windows_and_series_are_those_that_were_put() {
         let periods: Vec<_> = cube.steps().iter().map(|step| step.period).collect();
         assert_eq!(periods, [month(1), month(2), month(3)]);
         for step in 0..3 {
-            let frame = cube.frame(step).await.unwrap();
+            let field = cube.field(step).await.unwrap();
             let put = values(&description.grid, step as u32 + 1);
-            assert_eq!(bits(&frame), bits(&put), "step {step}");
+            assert_eq!(bits(&field), bits(&put), "step {step}");
         }
         let series = cube.series(7, 13, 0..3).await.unwrap();
         let put: Vec<f32> = (1..=3)
@@ -44,7 +44,7 @@ async fn frames_windows_and_series_are_those_that_were_put() {
 }
 
 #[tokio::test]
-async fn a_window_across_chunks_holds_the_cells_of_the_frame() {
+async fn a_window_across_chunks_holds_the_cells_of_the_field() {
     let grid = grid(700, 1500);
     let layout = Layout::of(&grid);
     assert_eq!((layout.chunk, layout.is_sharded()), ([350, 500], false));
@@ -52,7 +52,7 @@ async fn a_window_across_chunks_holds_the_cells_of_the_frame() {
 }
 
 #[tokio::test]
-async fn a_window_across_shards_holds_the_cells_of_the_frame() {
+async fn a_window_across_shards_holds_the_cells_of_the_field() {
     let grid = grid(4200, 4300);
     let layout = Layout::of(&grid);
     assert!(
@@ -89,7 +89,7 @@ async fn windows_agree(grid: contract::grid::Grid) {
         let read = cube.window(0, window).await.unwrap();
         assert_eq!(bits(&read), bits(&put), "{window:?}");
     }
-    assert_eq!(bits(&cube.frame(0).await.unwrap()), bits(&all));
+    assert_eq!(bits(&cube.field(0).await.unwrap()), bits(&all));
     let outside = Window {
         row: grid.rows - 1,
         col: 0,
@@ -131,9 +131,9 @@ async fn a_step_is_replaced_inserted_and_left_alone_by_its_period() {
             assert_eq!(cube.steps().len(), steps.len(), "{at:?}");
             for (place, (number, seed)) in steps.iter().enumerate() {
                 assert_eq!(cube.steps()[place].period, month(*number), "{at:?}");
-                let frame = cube.frame(place).await.unwrap();
+                let field = cube.field(place).await.unwrap();
                 assert_eq!(
-                    bits(&frame),
+                    bits(&field),
                     bits(&values(&grid, *seed)),
                     "{at:?}, {number}"
                 );
@@ -179,7 +179,7 @@ async fn a_step_without_any_data_is_no_object_and_reads_as_none() {
         edit.put(month(1), values).await.unwrap();
         edit.commit("one").await.unwrap();
         let cube = repository.at(&At::Newest).await.unwrap();
-        cube.frame(0).await.unwrap()
+        cube.field(0).await.unwrap()
     };
     let some = put(values(&description.grid, 1)).await;
     assert!(some.iter().any(|value| !value.is_nan()));

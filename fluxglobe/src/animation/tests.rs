@@ -25,7 +25,7 @@ fn product() -> Manifest {
     let step = |month| Step {
         masked: None,
         period: Period::month(2000, month).unwrap(),
-        frame: ObjectKey::frame(&product, &Digest::of(&[month as u8])),
+        field: ObjectKey::field(&product, &Digest::of(&[month as u8])),
         raw_sha256: Digest::of(b"file"),
         origin: "file.nc".into(),
         valid_cells: 1,

@@ -45,7 +45,7 @@ pub(crate) fn run(settings: &Settings, options: &BenchFill) -> Result<()> {
     let limit = Duration::from_secs(options.limit_s);
     let runs = options.runs.get() as usize;
     progress::say(&format!(
-        "gap filling on {adapter}; a whole frame, without upload and read-back"
+        "gap filling on {adapter}; a whole field, without upload and read-back"
     ));
     if !options.json {
         progress::result(HEADER)?;

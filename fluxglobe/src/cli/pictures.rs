@@ -208,7 +208,7 @@ pub(crate) struct BenchServe {
     /// How long answers are counted.
     #[arg(long, default_value = "20")]
     pub(crate) seconds: NonZeroU16,
-    /// How long is asked before that, so that frames are read and kernels compiled.
+    /// How long is asked before that, so that fields are read and kernels compiled.
     #[arg(long, default_value_t = 3)]
     pub(crate) warm_up_seconds: u16,
     /// Tiles of this zoom level instead of views of the globe, 0 to 8; 4 for --playback if absent.
@@ -276,7 +276,7 @@ pub(crate) struct BenchFly {
     /// How long pictures are counted.
     #[arg(long, default_value = "20")]
     pub(crate) seconds: NonZeroU16,
-    /// How long is flown before that, so that frames are read, kernels compiled and sizes chosen.
+    /// How long is flown before that, so that fields are read, kernels compiled and sizes chosen.
     #[arg(long, default_value_t = 5)]
     pub(crate) warm_up_seconds: u16,
     /// Width of the full picture, pixels.

@@ -15,9 +15,10 @@ pub(crate) enum RecomputeWhat {
     Statistics,
     /// Sums that budgets of named regions are made of.
     Budget,
-    /// Frames and series of the files themselves, read anew from the store where decoder or profile have changed since;
+    /// Fields and series of the files themselves, read anew from the store where decoder or profile have changed since;
     /// and the accumulated ones that follow from them.
-    Frames,
+    #[value(name = "frames", alias = "fields")]
+    Fields,
     /// Volume tiles.
     Tiles,
 }
@@ -28,7 +29,7 @@ impl RecomputeWhat {
         match self {
             Self::Statistics => Some(What::Statistics),
             Self::Budget => Some(What::Budget),
-            Self::Frames => Some(What::Frames),
+            Self::Fields => Some(What::Fields),
             Self::Tiles => None,
         }
     }
@@ -84,7 +85,7 @@ pub(crate) struct Recompute {
     /// Also what is there and right by its name: made again and compared.
     #[arg(long)]
     pub(crate) force: bool,
-    /// Read what is there first, and make again what is damaged: frames, series and domain from raw/, sums and tiles from
+    /// Read what is there first, and make again what is damaged: fields, series and domain from raw/, sums and tiles from
     /// those.
     #[arg(long)]
     pub(crate) verify: bool,

@@ -49,7 +49,7 @@ pub(crate) async fn accumulated(
     }
     progress::done(
         &bar,
-        &format!("{} frames of {}", manifest.steps.len(), manifest.product),
+        &format!("{} fields of {}", manifest.steps.len(), manifest.product),
     );
     Ok(manifest)
 }

@@ -14,8 +14,8 @@ use storage::Store;
 use crate::cli::{Export, ExportFormat, ExportedProduct, Settings};
 use crate::{deployment, progress};
 
-/// Frames that are read while one is written.
-const FRAMES_AHEAD: usize = 2;
+/// Fields that are read while one is written.
+const FIELDS_AHEAD: usize = 2;
 
 /// What was written.
 #[derive(Serialize)]
@@ -41,8 +41,8 @@ pub(crate) async fn run(settings: &Settings, options: &Export) -> Result<()> {
         ExportFormat::Zarr => {
             let mut zarr = PlainZarr::create(&destination, "", &description).await?;
             let cube = own_cube(&store, &manifest).await;
-            let mut frames = std::pin::pin!(frames(&store, cube.as_ref(), &manifest, &bar));
-            while let Some((period, values)) = frames.try_next().await? {
+            let mut fields = std::pin::pin!(fields(&store, cube.as_ref(), &manifest, &bar));
+            while let Some((period, values)) = fields.try_next().await? {
                 zarr.append(period, values).await?;
                 bar.inc(1);
             }
@@ -57,7 +57,7 @@ pub(crate) async fn run(settings: &Settings, options: &Export) -> Result<()> {
             let follower = Follower {
                 store: &destination,
                 folder: "",
-                frames: &store,
+                fields: &store,
                 told: &|_period| bar.inc(1),
             };
             follower.run(&manifest).await?;
@@ -135,7 +135,7 @@ fn destination(text: &str) -> Result<Store> {
     Store::open(text).with_context(|| format!("cannot write to {text}"))
 }
 
-/// The version as the store's own cube has it; none if it does not, of which the frames are read then.
+/// The version as the store's own cube has it; none if it does not, of which the fields are read then.
 async fn own_cube(store: &Store, manifest: &Manifest) -> Option<Cube> {
     let opened = async {
         let folder = cube::folder(&manifest.product);
@@ -147,14 +147,14 @@ async fn own_cube(store: &Store, manifest: &Manifest) -> Option<Cube> {
         Ok(cube) if cube.description().version == Some(manifest.id()) => Some(cube),
         Ok(_other) => None,
         Err(error) => {
-            tracing::debug!(%error, "frames are read, for there is no cube of the version");
+            tracing::debug!(%error, "fields are read, for there is no cube of the version");
             None
         }
     }
 }
 
-/// Values of the steps in the order of time, a few read ahead: from the cube of the version, or from its frames.
-fn frames<'a>(
+/// Values of the steps in the order of time, a few read ahead: from the cube of the version, or from its fields.
+fn fields<'a>(
     store: &'a Store,
     cube: Option<&'a Cube>,
     manifest: &'a Manifest,
@@ -163,14 +163,14 @@ fn frames<'a>(
     let read = move |place: usize, step: &'a Step| async move {
         bar.set_message(progress::day(step.period.start));
         let values = match cube {
-            Some(cube) => cube.frame(place).await?,
-            None => storage::frames::read(store, &step.frame, &manifest.grid).await?,
+            Some(cube) => cube.field(place).await?,
+            None => storage::fields::read(store, &step.field, &manifest.grid).await?,
         };
         Ok((step.period, Arc::from(values)))
     };
     stream::iter(manifest.steps.iter().enumerate())
         .map(move |(place, step)| read(place, step))
-        .buffered(FRAMES_AHEAD)
+        .buffered(FIELDS_AHEAD)
 }
 
 #[cfg(test)]

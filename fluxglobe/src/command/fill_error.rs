@@ -66,7 +66,7 @@ impl Row {
     }
 }
 
-/// A frame with part of it hidden and filled again.
+/// A field with part of it hidden and filled again.
 struct Trial {
     truth: Vec<f32>,
     filled: Vec<f32>,
@@ -91,7 +91,7 @@ pub(crate) async fn run(settings: &Settings, options: &FillError) -> Result<()> 
     let mut last = None;
     for step in steps {
         let step = &manifest.steps[step];
-        let truth = storage::frames::read(&store, &step.frame, &manifest.grid).await?;
+        let truth = storage::fields::read(&store, &step.field, &manifest.grid).await?;
         for (side, all) in options.gap_cells.iter().zip(&mut all) {
             let hold_out = HoldOut {
                 share: options.share,
@@ -115,7 +115,7 @@ pub(crate) async fn run(settings: &Settings, options: &FillError) -> Result<()> 
             bar.inc(1);
         }
     }
-    progress::done(&bar, &format!("{} frames", rows.len()));
+    progress::done(&bar, &format!("{} fields", rows.len()));
     if let (Some(path), Some(trial)) = (&options.picture, &last) {
         draw(path, &manifest, &domain, trial)?;
         progress::say(&format!("picture in {}", path.display()));

@@ -1,6 +1,6 @@
 //! `fluxglobe recompute`: what of a product is stale or missing in a period; shown, then made, once.
 //!
-//! In the order in which one follows from the other: files read anew, what is computed from their frames, tiles.
+//! In the order in which one follows from the other: files read anew, what is computed from their fields, tiles.
 
 mod files;
 mod tiles;
@@ -31,8 +31,8 @@ struct Shown<'a> {
 pub(crate) async fn run(settings: &Settings, options: Recompute) -> Result<()> {
     let store = deployment::store(settings)?;
     deployment::manifest(&store, &options.product, &settings.data).await?;
-    let with_frames = options.what.contains(&RecomputeWhat::Frames);
-    let files = if with_frames {
+    let with_fields = options.what.contains(&RecomputeWhat::Fields);
+    let files = if with_fields {
         Some(files::Files::plan(&store, &options).await?)
     } else {
         None
@@ -71,7 +71,7 @@ pub(crate) async fn run(settings: &Settings, options: Recompute) -> Result<()> {
             progress::result(&manifest.id().to_string())?;
         }
     }
-    if with_frames && options.verify {
+    if with_fields && options.verify {
         cubes(&store, &options.product).await?;
     }
     if with_tiles {
@@ -94,7 +94,7 @@ async fn cubes(store: &Store, product: &ProductId) -> Result<()> {
     Ok(())
 }
 
-/// What is to be computed. Only carbon fluxes accumulate; frames of other quantities are those of their files alone.
+/// What is to be computed. Only carbon fluxes accumulate; fields of other quantities are those of their files alone.
 async fn plan(settings: &Settings, store: &Store, options: &Recompute) -> Result<Plan> {
     let manifest = deployment::manifest(store, &options.product, &settings.data).await?;
     let is_flux = manifest.quantity == Quantity::CarbonFlux;
@@ -104,7 +104,7 @@ async fn plan(settings: &Settings, store: &Store, options: &Recompute) -> Result
         from: options.from,
         to: options.to,
         what: computed
-            .filter(|what| is_flux || *what != What::Frames)
+            .filter(|what| is_flux || *what != What::Fields)
             .collect(),
         is_forced: options.force,
         is_verified: options.verify,
@@ -134,7 +134,7 @@ fn show(
         table.add_row(files::row(files));
     }
     for (name, what) in [
-        ("frames", What::Frames),
+        ("frames", What::Fields),
         ("statistics", What::Statistics),
         ("budget", What::Budget),
     ] {
@@ -166,7 +166,7 @@ fn show(
     ));
     if let Some(files) = files.filter(|files| !files.items.is_empty()) {
         progress::say(&format!(
-            "{} files are read anew ({} of them have been, and wait for the others); what follows from their frames is \
+            "{} files are read anew ({} of them have been, and wait for the others); what follows from their fields is \
              planned after that",
             files.items.len(),
             files.items.len() - files.unread_count()

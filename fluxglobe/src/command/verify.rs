@@ -124,7 +124,7 @@ fn advice(report: &Report) -> Vec<String> {
         report.findings.iter().find(is_of)
     };
     let made_again = [
-        Kind::Frame,
+        Kind::Field,
         Kind::Contributed,
         Kind::Series,
         Kind::Domain,
@@ -134,7 +134,7 @@ fn advice(report: &Report) -> Vec<String> {
     ];
     if found(&made_again).is_some() {
         advice.push(
-            "frames, counts, series, domains, cubes, sums and tiles are made again by: fluxglobe recompute --product PRODUCT --verify"
+            "fields, counts, series, domains, cubes, sums and tiles are made again by: fluxglobe recompute --product PRODUCT --verify"
                 .to_owned(),
         );
     }

@@ -13,7 +13,7 @@ use tile_server::Server;
 use crate::cli::Settings;
 use crate::{deployment, progress};
 
-/// Largest relative difference between the accumulated frames' sum and the printed budget.
+/// Largest relative difference between the accumulated fields' sum and the printed budget.
 const MASS_TOLERANCE: f64 = 1e-6;
 /// Paths that must answer 200.
 const PAGES: [&str; 5] = ["/", "/healthz", "/readyz", "/metrics", "/api/products"];
@@ -120,7 +120,7 @@ fn fetch(base: &str, path: &str) -> Result<()> {
     Ok(())
 }
 
-/// The accumulated frames must hold the mass that the budget says left the sea.
+/// The accumulated fields must hold the mass that the budget says left the sea.
 async fn mass(settings: &Settings, store: &Store, flux: &Manifest) -> Result<Option<String>> {
     let accumulated =
         deployment::manifest(store, &flux.product.accumulated()?, &settings.data).await?;
@@ -128,7 +128,7 @@ async fn mass(settings: &Settings, store: &Store, flux: &Manifest) -> Result<Opt
         .steps
         .last()
         .context("the accumulated product has no step")?;
-    let values = storage::frames::read(store, &last.frame, &accumulated.grid).await?;
+    let values = storage::fields::read(store, &last.field, &accumulated.grid).await?;
     let cols = accumulated.grid.cols as usize;
     let area_m2 = |index: usize| {
         accumulated
@@ -139,7 +139,7 @@ async fn mass(settings: &Settings, store: &Store, flux: &Manifest) -> Result<Opt
         .iter()
         .enumerate()
         .filter(|(_, value)| !value.is_nan());
-    let in_frames_tg: f64 = cells
+    let in_fields_tg: f64 = cells
         .map(|(index, value)| f64::from(*value) * area_m2(index) / 1e9)
         .sum();
     let query = BudgetQuery::new(flux.product.clone(), "global".parse()?);
@@ -147,12 +147,12 @@ async fn mass(settings: &Settings, store: &Store, flux: &Manifest) -> Result<Opt
         compute::budget::budget_of(&deployment::engine(settings, store.clone())?, &query, flux)
             .await?;
     let budget_tg: f64 = answer.rows.iter().map(|row| row.budget_tg).sum();
-    let difference = (in_frames_tg / budget_tg - 1.0).abs();
+    let difference = (in_fields_tg / budget_tg - 1.0).abs();
     progress::say(&format!(
-        "{:>24} {in_frames_tg:.6} Tg C in frames, {budget_tg:.6} in the budget, relative difference {difference:.1e}",
+        "{:>24} {in_fields_tg:.6} Tg C in fields, {budget_tg:.6} in the budget, relative difference {difference:.1e}",
         "conservation"
     ));
     let is_kept = difference <= MASS_TOLERANCE;
     Ok((!is_kept)
-        .then(|| format!("accumulated frames hold {in_frames_tg} Tg C, the budget is {budget_tg}")))
+        .then(|| format!("accumulated fields hold {in_fields_tg} Tg C, the budget is {budget_tg}")))
 }

@@ -8,7 +8,7 @@ use crate::error::IngestError;
 use crate::limits::gates::Gates;
 use crate::limits::memory;
 
-/// Writes them again from the version's frames. Objects that are named by their values come to be what they were, and the
+/// Writes them again from the version's fields. Objects that are named by their values come to be what they were, and the
 /// version stands; a series that was named by its bytes gets another name, and a version to name it.
 ///
 /// None if everything was whole.
@@ -80,7 +80,7 @@ mod tests {
     use contract::product::ProductId;
     use contract::quantity::Quantity;
     use contract::time::Period;
-    use storage::frames;
+    use storage::fields;
 
     use super::*;
     use crate::commit::merge::Merged;
@@ -99,17 +99,17 @@ mod tests {
     async fn landed(store: &Store) -> Manifest {
         let product: ProductId = "p".parse().unwrap();
         let period = Period::month(2000, 1).unwrap();
-        let frame = frames::encode(&GRID, &[1.0; 8], period).unwrap();
+        let field = fields::encode(&GRID, &[1.0; 8], period).unwrap();
         let step = Step {
             period,
-            frame: ObjectKey::frame(&product, &frame.values_sha256),
+            field: ObjectKey::field(&product, &field.values_sha256),
             raw_sha256: Digest::of(b""),
             origin: "f.nc".into(),
             valid_cells: 8,
             masked: None,
             contributed: None,
         };
-        store.put_new(&step.frame, frame.content).await.unwrap();
+        store.put_new(&step.field, field.content).await.unwrap();
         let merged = Merged {
             steps: vec![step],
             orders: vec![],

@@ -4,7 +4,7 @@ use contract::grid::Grid;
 use contract::key::ObjectKey;
 use contract::manifest::{Manifest, SeriesSegment, Step};
 use contract::product::ProductId;
-use storage::{Store, domain, frames, series};
+use storage::{Store, domain, fields, series};
 
 use super::merge::Merged;
 use crate::error::IngestError;
@@ -101,7 +101,7 @@ fn year(step: &Step) -> i32 {
     step.period.start.year_month().0
 }
 
-/// The series of a manifest that holds exactly these frames.
+/// The series of a manifest that holds exactly these fields.
 fn same_segment(manifest: &Manifest, steps: &[Step]) -> Option<ObjectKey> {
     let holds = |segment: &&SeriesSegment| {
         let first = segment.first_step as usize;
@@ -109,7 +109,7 @@ fn same_segment(manifest: &Manifest, steps: &[Step]) -> Option<ObjectKey> {
             .steps
             .get(first..first + segment.steps as usize)
             .unwrap_or_default();
-        own.len() == steps.len() && own.iter().zip(steps).all(|(a, b)| a.frame == b.frame)
+        own.len() == steps.len() && own.iter().zip(steps).all(|(a, b)| a.field == b.field)
     };
     manifest
         .series
@@ -126,9 +126,9 @@ pub(super) async fn read_all(
     let mut all = Vec::with_capacity(steps.len());
     for step in steps {
         all.push(
-            frames::read(store, &step.frame, grid)
+            fields::read(store, &step.field, grid)
                 .await
-                .map_err(IngestError::storage("read a frame"))?,
+                .map_err(IngestError::storage("read a field"))?,
         );
     }
     Ok(all)
@@ -174,7 +174,7 @@ mod tests {
         let step = |(year, month)| Step {
             masked: None,
             period: Period::month(year, month).unwrap(),
-            frame: ObjectKey::frame(&"p".parse().unwrap(), &Digest::of(b"")),
+            field: ObjectKey::field(&"p".parse().unwrap(), &Digest::of(b"")),
             raw_sha256: Digest::of(b""),
             origin: String::new(),
             valid_cells: 1,

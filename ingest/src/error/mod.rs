@@ -254,7 +254,7 @@ mod tests {
             key,
             source: object,
         };
-        let store = IngestError::storage("store a frame")(store);
+        let store = IngestError::storage("store a field")(store);
         assert!(store.is_disk_full() && store.is_retryable(), "{store}");
     }
 }

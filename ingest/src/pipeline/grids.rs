@@ -89,7 +89,7 @@ impl Pipeline<'_> {
             return Ok((None, masked));
         };
         tell(Stage::Put);
-        let there = newest.and_then(|newest| frame_of(newest, encoded.period));
+        let there = newest.and_then(|newest| field_of(newest, encoded.period));
         let put = async { Ok(put::run(self.store, encoded, &planned.raw, &grid, there).await?) };
         let stored = self.metrics.timed("put", put).await?;
         Ok((Some(stored), masked))
@@ -112,8 +112,8 @@ fn without_values(planned: &PlannedGranule, masked: MaskedCells) -> Rejection {
     Rejection::new(RejectReason::Values, &planned.variable.name, detail)
 }
 
-/// The frame that a version has for a period.
-fn frame_of(manifest: &Manifest, period: Period) -> Option<&ObjectKey> {
+/// The field that a version has for a period.
+fn field_of(manifest: &Manifest, period: Period) -> Option<&ObjectKey> {
     let index = manifest.step_of(period)?;
-    Some(&manifest.steps[index].frame)
+    Some(&manifest.steps[index].field)
 }

@@ -17,9 +17,9 @@ pub enum Stage {
     Decode,
     /// Its values are checked.
     Check,
-    /// Its frame is made.
+    /// Its field is made.
     Encode,
-    /// Its frame is stored.
+    /// Its field is stored.
     Put,
     /// The manifest is published.
     Commit,

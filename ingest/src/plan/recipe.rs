@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::plan::profile::Profile;
 
-/// Version of the way from a file's bytes to a frame's. It is raised with every change that gives other values or other
-/// frames for some file; what was read by an older one is then stale. A test compares the bytes of a known file.
+/// Version of the way from a file's bytes to a field's. It is raised with every change that gives other values or other
+/// fields for some file; what was read by an older one is then stale. A test compares the bytes of a known file.
 ///
 /// 2: masked cells are counted, valid ranges are read as CF says.
 pub(crate) const DECODER: u32 = 2;

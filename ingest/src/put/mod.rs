@@ -1,4 +1,4 @@
-//! [`EncodedGrid`] in, a [`Step`] of a manifest to come out: the frame is durable, under a name that only its content could
+//! [`EncodedGrid`] in, a [`Step`] of a manifest to come out: the field is durable, under a name that only its content could
 //! have. All of a file's are a [`StoredGranule`].
 
 pub(crate) mod reading;
@@ -10,7 +10,7 @@ use contract::key::ObjectKey;
 use contract::manifest::Step;
 use contract::masked::MaskedCells;
 use contract::product::ProductId;
-use storage::{Store, frames};
+use storage::{Store, fields};
 
 use crate::encode::EncodedGrid;
 use crate::error::IngestError;
@@ -43,7 +43,7 @@ pub(crate) async fn raw(
     Ok(())
 }
 
-/// Stores one frame, unless the frame that its product has for the period, if it has one, holds the same values.
+/// Stores one field, unless the field that its product has for the period, if it has one, holds the same values.
 pub(crate) async fn run(
     store: &Store,
     encoded: EncodedGrid,
@@ -54,25 +54,25 @@ pub(crate) async fn run(
     let EncodedGrid {
         period,
         key,
-        frame,
+        field,
         valid_cells,
         masked,
     } = encoded;
     let settled = match there {
-        Some(there) => frames::settle(store, there, &key, grid)
+        Some(there) => fields::settle(store, there, &key, grid)
             .await
-            .map_err(IngestError::storage("compare a frame with the one before"))?,
+            .map_err(IngestError::storage("compare a field with the one before"))?,
         None => key.clone(),
     };
     if settled == key {
         store
-            .put_new(&key, frame)
+            .put_new(&key, field)
             .await
-            .map_err(IngestError::storage("store a frame"))?;
+            .map_err(IngestError::storage("store a field"))?;
     }
     Ok(Step {
         period,
-        frame: settled,
+        field: settled,
         raw_sha256: raw.sha256,
         origin: raw.file_name.clone(),
         valid_cells,

@@ -130,7 +130,7 @@ fn files<'a>(manifest: &'a Manifest, request: &Request) -> Vec<File<'a>> {
 struct Known<'a> {
     manifest: &'a Manifest,
     notes: BTreeMap<Digest, Vec<ObjectKey>>,
-    frames: BTreeSet<ObjectKey>,
+    fields: BTreeSet<ObjectKey>,
     raw: BTreeSet<Digest>,
 }
 
@@ -151,19 +151,19 @@ impl<'a> Known<'a> {
                 notes.entry(raw).or_default().push(key);
             }
         }
-        let mut frames: BTreeSet<ObjectKey> = list("frames").await?.into_iter().collect();
+        let mut fields: BTreeSet<ObjectKey> = list("frames").await?.into_iter().collect();
         if request.is_verified {
-            let named = manifest.steps.iter().map(|step| step.frame.clone());
+            let named = manifest.steps.iter().map(|step| step.field.clone());
             let damaged = verify::damaged(store, named)
                 .await
                 .map_err(IngestError::storage("check what is stored"))?;
-            frames.retain(|frame| !damaged.contains(frame));
+            fields.retain(|field| !damaged.contains(field));
         }
         let digest = |key: ObjectKey| key.as_str().rsplit('/').next()?.parse().ok();
         Ok(Self {
             manifest,
             notes,
-            frames,
+            fields,
             raw: list("raw").await?.into_iter().filter_map(digest).collect(),
         })
     }
@@ -203,7 +203,7 @@ impl<'a> Known<'a> {
         if request.is_forced {
             return Ok(Some(item(by, Reason::Forced, false)));
         }
-        let is_whole = |r: &&Reading| r.steps.iter().all(|step| self.frames.contains(&step.frame));
+        let is_whole = |r: &&Reading| r.steps.iter().all(|step| self.fields.contains(&step.field));
         let mut alike = readings
             .iter()
             .filter(|r| input(&r.recipe) == input(&wanted));

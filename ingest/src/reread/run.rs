@@ -126,7 +126,7 @@ impl Work<'_> {
             other => other,
         }
     }
-    /// Reads a file that landed before as it would be read now: its frames become durable, and are noted.
+    /// Reads a file that landed before as it would be read now: its fields become durable, and are noted.
     async fn reread(&self, shown: &Path, raw: RawGranule, wish: Wish<'_>) -> Result<Reading, Stop> {
         let Pipeline {
             store,

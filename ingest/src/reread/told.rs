@@ -30,7 +30,7 @@ pub async fn events(store: &Store, product: &ProductId) -> Result<Vec<Event>, In
 
 /// A step may be other than it was in what is said of it alone.
 fn have_same_values(before: &[&Step], now: &[&Step]) -> bool {
-    let values = |step: &&Step| (step.period, step.frame.clone());
+    let values = |step: &&Step| (step.period, step.field.clone());
     before.iter().map(values).eq(now.iter().map(values))
 }
 

@@ -3,7 +3,7 @@
 use contract::manifest::Manifest;
 use cube::{At, Repository};
 use ingest::Outcome;
-use storage::{Store, frames};
+use storage::{Store, fields};
 
 use crate::fixture::{Place, SmallFile, settings};
 
@@ -17,10 +17,10 @@ pub(crate) async fn holds(store: &Store, manifest: &Manifest) {
         assert_eq!(cube.steps().len(), manifest.steps.len());
         for (place, step) in manifest.steps.iter().enumerate() {
             assert_eq!(cube.steps()[place].period, step.period);
-            let frame = frames::read(store, &step.frame, &manifest.grid).await;
-            let (frame, found) = (frame.unwrap(), cube.frame(place).await.unwrap());
+            let field = fields::read(store, &step.field, &manifest.grid).await;
+            let (field, found) = (field.unwrap(), cube.field(place).await.unwrap());
             let same = |(a, b): (&f32, &f32)| a == b || (a.is_nan() && b.is_nan());
-            assert!(frame.iter().zip(&found).all(same), "step {place}");
+            assert!(field.iter().zip(&found).all(same), "step {place}");
         }
     }
 }

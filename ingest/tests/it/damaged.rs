@@ -1,5 +1,5 @@
 //! Stored objects with a flipped bit: found when files are read anew, and made whole again from `raw/`; and a store of an
-//! earlier version, whose frames are named otherwise and are no others for that.
+//! earlier version, whose fields are named otherwise and are no others for that.
 
 use std::path::PathBuf;
 
@@ -59,12 +59,12 @@ async fn landed() -> (Place, PathBuf, Manifest) {
 }
 
 #[tokio::test]
-async fn damaged_frames_series_and_domains_are_whole_again_under_their_names() {
+async fn damaged_fields_series_and_domains_are_whole_again_under_their_names() {
     let (place, _path, manifest) = landed().await;
     let request = request(manifest.product.as_str());
     let store = &place.store;
     for (key, reasons) in [
-        (&manifest.steps[1].frame, vec![Reason::Missing]),
+        (&manifest.steps[1].field, vec![Reason::Missing]),
         (&manifest.series[0].series, vec![]),
         (&manifest.domain, vec![]),
     ] {
@@ -74,7 +74,7 @@ async fn damaged_frames_series_and_domains_are_whole_again_under_their_names() {
         let place_to_work = workplace(&place);
         let mended = reread::mend(store, &request.product, &place_to_work);
         let mended = mended.await.unwrap();
-        assert_eq!(mended.is_none(), Kind::of(key) == Some(Kind::Frame));
+        assert_eq!(mended.is_none(), Kind::of(key) == Some(Kind::Field));
         assert_eq!(store.get(key).await.unwrap(), whole);
         assert_eq!(place.newest(request.product.as_str()).await, manifest);
     }
@@ -125,11 +125,11 @@ async fn the_same_values_under_names_of_before_are_no_revision() {
     assert_eq!(reasons, [Reason::Forced]);
     // What was masked is counted now, and was not then: a new version, of the same objects.
     let after = published.unwrap();
-    let frames = |manifest: &Manifest| {
-        let frames = manifest.steps.iter().map(|step| step.frame.clone());
-        frames.collect::<Vec<_>>()
+    let fields = |manifest: &Manifest| {
+        let fields = manifest.steps.iter().map(|step| step.field.clone());
+        fields.collect::<Vec<_>>()
     };
-    assert_eq!(frames(&after), frames(&before));
+    assert_eq!(fields(&after), fields(&before));
     assert_eq!(
         (&after.series, &after.domain),
         (&before.series, &before.domain)
@@ -143,16 +143,16 @@ async fn the_same_values_under_names_of_before_are_no_revision() {
 }
 
 #[tokio::test]
-async fn a_damaged_frame_of_before_is_replaced_by_one_that_is_named_by_its_values() {
+async fn a_damaged_field_of_before_is_replaced_by_one_that_is_named_by_its_values() {
     let place = frozen();
     let before = place.newest("fgco2").await;
     let right = place.values(&before, 0).await;
-    flip(&place.store, &before.steps[0].frame).await;
+    flip(&place.store, &before.steps[0].field).await;
     let (reasons, published) = reread(&place, &request("fgco2")).await;
     assert_eq!(reasons, [Reason::Stale]);
     let after = published.unwrap();
-    assert!(matches!(after.steps[0].frame.vouches(), Vouched::Values(_)));
-    assert_eq!(after.steps[1].frame, before.steps[1].frame);
+    assert!(matches!(after.steps[0].field.vouches(), Vouched::Values(_)));
+    assert_eq!(after.steps[1].field, before.steps[1].field);
     let now = place.values(&after, 0).await;
     assert!(
         now.iter()

@@ -82,7 +82,7 @@ impl Place {
 
     /// Values of a step, `[row, col]`.
     pub(crate) async fn values(&self, manifest: &Manifest, step: usize) -> Vec<f32> {
-        storage::frames::read(&self.store, &manifest.steps[step].frame, &manifest.grid)
+        storage::fields::read(&self.store, &manifest.steps[step].field, &manifest.grid)
             .await
             .unwrap()
     }

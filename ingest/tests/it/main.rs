@@ -1,4 +1,4 @@
-//! Integration tests of ingest, one binary: whole files in, manifests and frames out.
+//! Integration tests of ingest, one binary: whole files in, manifests and fields out.
 #![expect(clippy::print_stderr, reason = "a test that skips says so")]
 #![expect(clippy::float_cmp, reason = "these numbers are exact")]
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]

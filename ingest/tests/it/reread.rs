@@ -159,7 +159,7 @@ async fn a_part_of_the_time_is_read_anew_alone() {
     };
     let after = run(&place, &work, &february).await.unwrap().unwrap();
     assert_eq!(after.steps[0], before.steps[0]);
-    assert_ne!(after.steps[1].frame, before.steps[1].frame);
+    assert_ne!(after.steps[1].field, before.steps[1].field);
     assert_eq!(after.steps[2], before.steps[2]);
     let backwards = Request {
         from: february.to,
@@ -231,16 +231,16 @@ async fn what_an_unfinished_run_read_is_not_read_again() {
 }
 
 #[tokio::test]
-async fn a_lost_frame_comes_back_and_an_unknown_reading_is_made_known() {
+async fn a_lost_field_comes_back_and_an_unknown_reading_is_made_known() {
     let place = landed().await;
     let before = place.newest(PRODUCT).await;
     let work = workplace(&place, &profile(1.0, 1e9));
-    place.store.remove(&before.steps[2].frame).await.unwrap();
+    place.store.remove(&before.steps[2].field).await.unwrap();
     let planned = plan(&place, &work, &request()).await;
     assert_eq!(planned.items.len(), 1);
     assert_eq!(planned.items[0].reason, Reason::Missing);
     assert!(run(&place, &work, &request()).await.unwrap().is_none());
-    assert!(place.store.exists(&before.steps[2].frame).await.unwrap());
+    assert!(place.store.exists(&before.steps[2].field).await.unwrap());
     // As an older program left it, which noted nothing.
     for key in place.store.list("readings").await.unwrap() {
         place.store.remove(&key).await.unwrap();
@@ -273,7 +273,7 @@ async fn a_profile_that_is_not_known_here_is_asked_for_only_when_it_matters() {
 }
 
 #[tokio::test]
-async fn a_forced_reading_finds_a_frame_that_is_not_what_it_should_be() {
+async fn a_forced_reading_finds_a_field_that_is_not_what_it_should_be() {
     let place = landed().await;
     let work = workplace(&place, &profile(1.0, 1e9));
     let forced = Request {
@@ -326,9 +326,9 @@ async fn what_is_told_is_what_was_read_anew_and_nothing_of_a_landing() {
 }
 
 /// The bytes that this decoder makes of a known file. If they change, values change for somebody, or readers of stored
-/// frames see other bytes for the same file: raise `DECODER` (ingest/src/recipe.rs) and state the new digest here.
+/// fields see other bytes for the same file: raise `DECODER` (ingest/src/plan/recipe.rs) and state the new digest here.
 #[tokio::test]
-async fn a_known_file_is_read_as_the_frames_of_this_decoders_version() {
+async fn a_known_file_is_read_as_the_fields_of_this_decoders_version() {
     let place = Place::new();
     let files: Vec<PathBuf> = vec![place.path("known.nc")];
     SmallFile::new().write_classic(&files[0]);

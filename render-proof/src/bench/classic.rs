@@ -459,7 +459,7 @@ impl Pipelines {
     }
 }
 
-/// The frames of a scene on the device.
+/// The fields of a scene on the device.
 pub fn steps(gpu: &Gpu, scene: &Scene) -> Result<Steps> {
-    Playback::upload(gpu, scene).context("uploading the frames")
+    Playback::upload(gpu, scene).context("uploading the fields")
 }

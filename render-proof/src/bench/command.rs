@@ -451,7 +451,7 @@ fn report_frames(job: &RenderJob, particles: u64, m: &frames::Measured) {
     say(&format!("  {}", stages.join(", ")));
 }
 
-/// Fills the gaps of made-up frames, a fifth of them missing, with every form.
+/// Fills the gaps of made-up fields, a fifth of them missing, with every form.
 fn fills(gpu: &Gpu, size: &str) -> Result<()> {
     let (rows, cols) = size.split_once('x').context("a size is ROWSxCOLUMNS")?;
     let fill = Fill::new(gpu, Sources::default());

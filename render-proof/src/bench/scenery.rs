@@ -17,7 +17,7 @@ use contract::job::{Mode, RENDERER_VERSION, RenderJob, Style, View};
 use contract::look_at::LookAt;
 use contract::quantity::Quantity;
 use contract::time_sample::TimeSample;
-use render::{Frame, Interval, Scene};
+use render::{Field, Interval, Scene};
 
 const NORTH_DEG: f64 = 41.0;
 const WEST_DEG: f64 = 100.0;
@@ -136,8 +136,8 @@ pub fn scene(grid: &Grid) -> Scene {
     let accumulated = |share: f64| {
         let months = before.iter().zip(&after);
         let mean = months.map(|(before, after)| 0.5 * (f64::from(*before) + f64::from(*after)));
-        let frame = mean.map(|flux| (flux * share * YEAR_S) as f32).collect();
-        Arc::new(Frame::new(frame))
+        let field = mean.map(|flux| (flux * share * YEAR_S) as f32).collect();
+        Arc::new(Field::new(field))
     };
     let accumulated = Interval {
         before: accumulated(0.8),
@@ -148,8 +148,8 @@ pub fn scene(grid: &Grid) -> Scene {
         grid: *grid,
         domain: Scene::domain_of(is_sea),
         value: Interval {
-            before: Arc::new(Frame::new(before)),
-            after: Arc::new(Frame::new(after)),
+            before: Arc::new(Field::new(before)),
+            after: Arc::new(Field::new(after)),
             weight: 0.3,
         },
         accumulated: Some(accumulated),
@@ -181,7 +181,7 @@ pub fn pole(cells: u64, size_px: [u32; 2]) -> Result<(Scene, RenderJob)> {
             let eddies = noise.fractal(lon / 1.6, lat / 1.6, z, 5);
             ((4.0 * eddies - 5.0) * KG_MMOL / DAY_S) as f32
         };
-        Arc::new(Frame::new(everywhere(&grid, flux)))
+        Arc::new(Field::new(everywhere(&grid, flux)))
     };
     let value = Interval {
         before: water(0.0),

@@ -66,13 +66,13 @@ fn one(plan: &Plan, scene: &Scene, run: usize, cores: usize) {
 }
 
 fn between(plan: &Plan, interval: &Interval, weight: f32, cores: usize) -> Vec<f32> {
-    let frames = [&interval.before, &interval.after].map(|frame| frame.cells.content());
-    let mut between = vec![0.0; frames[0].len()];
+    let fields = [&interval.before, &interval.after].map(|field| field.cells.content());
+    let mut between = vec![0.0; fields[0].len()];
     let each = between.len().div_ceil(cores).max(1);
     thread::scope(|scope| {
         let parts = between
             .chunks_mut(each)
-            .zip(frames[0].chunks(each).zip(frames[1].chunks(each)));
+            .zip(fields[0].chunks(each).zip(fields[1].chunks(each)));
         for (between, (before, after)) in parts {
             scope.spawn(move || {
                 // A part is a grid of its own to the twin.

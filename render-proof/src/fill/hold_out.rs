@@ -1,4 +1,4 @@
-//! Cross-validation: a frame in, part of its data hidden, and how far what it was filled with lies from the truth, out.
+//! Cross-validation: a field in, part of its data hidden, and how far what it was filled with lies from the truth, out.
 
 use render::stages::fill::scaled::holds;
 use render::stages::layout::MISSING;
@@ -16,7 +16,7 @@ pub struct HoldOut {
 }
 
 impl HoldOut {
-    /// The frame with blocks of data hidden (`cols` a row), and the cells hidden. The same for every run: blocks are
+    /// The field with blocks of data hidden (`cols` a row), and the cells hidden. The same for every run: blocks are
     /// chosen by a hash of their place.
     pub fn hide(&self, values: &[f32], cols: u32) -> (Vec<f32>, Vec<usize>) {
         let threshold = (self.share.clamp(0.0, 1.0) * f64::from(u32::MAX)) as u32;
@@ -53,7 +53,7 @@ pub struct Score {
 }
 
 impl Score {
-    /// The score of one frame: `filled` and `errors` against the values that were hidden in `cells`.
+    /// The score of one field: `filled` and `errors` against the values that were hidden in `cells`.
     pub fn of(truth: &[f32], filled: &[f32], errors: &[f32], cells: &[usize]) -> Self {
         let mut score = Self::default();
         for &cell in cells.iter().filter(|cell| holds(filled[**cell])) {

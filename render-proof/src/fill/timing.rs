@@ -35,7 +35,7 @@ pub struct Timing {
     pub case: Case,
     /// Cells missing.
     pub gaps: usize,
-    /// Seconds of each run of the whole frame, shortest first: on the device, without upload and read-back.
+    /// Seconds of each run of the whole field, shortest first: on the device, without upload and read-back.
     pub seconds: Vec<f64>,
     /// Largest difference from all pairs in float64 among some gaps, as a share of the values' range; none without gaps.
     pub from_all_pairs: Option<f64>,
@@ -80,7 +80,7 @@ impl Case {
     }
 }
 
-/// A case's frame, and what was hidden of it.
+/// A case's field, and what was hidden of it.
 struct Made {
     grid: Grid,
     truth: Vec<f32>,

@@ -66,8 +66,8 @@ fn share(bits: u32) -> f64 {
 
 /// What a cell holds at the instant; none without data.
 fn between(interval: &Interval, cell: usize) -> Option<f64> {
-    let of = |frame: &render::scene::Frame| {
-        let value = f64::from(frame.cells.content()[cell]);
+    let of = |field: &render::scene::Field| {
+        let value = f64::from(field.cells.content()[cell]);
         // Stored values stand for "no data" far below any real one.
         (value > -1e20).then_some(value)
     };

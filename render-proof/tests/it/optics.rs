@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use contract::camera::CameraAngles;
 use contract::job::{RenderJob, View};
-use render::scene::{Frame, Interval};
+use render::scene::{Field, Interval};
 use render::{Backend, Renderer, Scene};
 use render_proof::ocean::ONE_DEGREE;
 use render_proof::{Fineness, Picture, reference};
@@ -27,10 +27,10 @@ const RENDERER_TOLERANCE: f64 = 0.04;
 const MOST_SPECKLE_LEVELS: f64 = 4.5;
 
 fn even_sea() -> Scene {
-    let frame = || Arc::new(Frame::new(vec![1e-10; ONE_DEGREE.cell_count()]));
+    let field = || Arc::new(Field::new(vec![1e-10; ONE_DEGREE.cell_count()]));
     let value = Interval {
-        before: frame(),
-        after: frame(),
+        before: field(),
+        after: field(),
         weight: 0.5,
     };
     Scene {

@@ -13,7 +13,7 @@ pub(crate) struct Gauges {
     drawing: IntGauge,
     encoding: IntGauge,
     resident_bytes: IntGaugeVec,
-    frame_reads: IntCounterVec,
+    field_reads: IntCounterVec,
     prefetch: IntCounterVec,
     device_restarts: IntCounter,
 }
@@ -38,21 +38,21 @@ impl Gauges {
             resident_bytes: IntGaugeVec::new(
                 named(
                     "resident_bytes",
-                    "Bytes of frames kept, in memory and on the device.",
+                    "Bytes of fields kept, in memory and on the device.",
                 ),
                 &["place"],
             )?,
-            frame_reads: IntCounterVec::new(
+            field_reads: IntCounterVec::new(
                 named(
                     "frame_reads_total",
-                    "Frames wanted, by whether they were there.",
+                    "Fields wanted, by whether they were there.",
                 ),
                 &["outcome"],
             )?,
             prefetch: IntCounterVec::new(
                 named(
                     "prefetch_frames_total",
-                    "Frames read ahead, those of them that were wanted then, and times that it was given up.",
+                    "Fields read ahead, those of them that were wanted then, and times that it was given up.",
                 ),
                 &["outcome"],
             )?,
@@ -71,7 +71,7 @@ impl Collector for Gauges {
             self.drawing.desc(),
             self.encoding.desc(),
             self.resident_bytes.desc(),
-            self.frame_reads.desc(),
+            self.field_reads.desc(),
             self.prefetch.desc(),
             self.device_restarts.desc(),
         ]
@@ -94,13 +94,13 @@ impl Collector for Gauges {
             let gauge = self.resident_bytes.with_label_values(&[place]);
             gauge.set(bytes as i64);
         };
-        bytes("memory", kept.frame_bytes);
+        bytes("memory", kept.field_bytes);
         bytes("device", pipeline.renderer().resident_bytes());
         let reads = |outcome: &str, total: u64| {
-            raise(&self.frame_reads.with_label_values(&[outcome]), total);
+            raise(&self.field_reads.with_label_values(&[outcome]), total);
         };
-        reads("hit", kept.frame_hits);
-        reads("miss", kept.frame_misses);
+        reads("hit", kept.field_hits);
+        reads("miss", kept.field_misses);
         let early = |outcome: &str, total: u64| {
             raise(&self.prefetch.with_label_values(&[outcome]), total);
         };
@@ -113,7 +113,7 @@ impl Collector for Gauges {
             self.drawing.collect(),
             self.encoding.collect(),
             self.resident_bytes.collect(),
-            self.frame_reads.collect(),
+            self.field_reads.collect(),
             self.prefetch.collect(),
             self.device_restarts.collect(),
         ]

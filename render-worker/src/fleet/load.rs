@@ -31,7 +31,7 @@ impl Load {
 }
 
 /// Workers in the order in which a picture is asked of them. They come in the order of the rendezvous, which keeps pictures
-/// from the same frames together; those with room stay so, and the others follow, the one with the fewest turns first: a
+/// from the same fields together; those with room stay so, and the others follow, the one with the fewest turns first: a
 /// popular instant is drawn by all.
 pub(super) fn in_order<T>(ranked: Vec<T>, load: impl Fn(&T) -> Load) -> Vec<T> {
     let with_load = ranked.into_iter().map(|worker| (load(&worker), worker));

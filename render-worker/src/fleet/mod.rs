@@ -1,4 +1,4 @@
-//! All render workers as one: each picture is asked of the worker that has its frames, and of another one if that has much
+//! All render workers as one: each picture is asked of the worker that has its fields, and of another one if that has much
 //! to do, is full, slow or lost. A large one is asked of several, a part of each.
 
 mod address;

@@ -1,7 +1,7 @@
-//! Frames read before they are wanted: the job drawn last in; the frames around it in time read, their gaps filled and
+//! Fields read before they are wanted: the job drawn last in; the fields around it in time read, their gaps filled and
 //! brought to the device, one after the other, out.
 //!
-//! A job names frames, not steps. Which ones come next is read from the newest manifest of its product, and which way
+//! A job names fields, not steps. Which ones come next is read from the newest manifest of its product, and which way
 //! time runs is seen from one job to the next, so nobody who asks for pictures needs to say.
 
 mod neighbours;
@@ -24,10 +24,10 @@ use neighbours::{Heading, next, place_of};
 
 /// Manifests remembered.
 const MOST_MANIFESTS: usize = 32;
-/// A manifest younger than this is not read again for frames that it does not have: old versions are drawn, too.
+/// A manifest younger than this is not read again for fields that it does not have: old versions are drawn, too.
 const LEAST_AGE: Duration = Duration::from_secs(5);
-/// Frames of one product that must fit into memory besides those ahead: two of the instant, two of the one before.
-const FRAMES_IN_USE: u64 = 4;
+/// Fields of one product that must fit into memory besides those ahead: two of the instant, two of the one before.
+const FIELDS_IN_USE: u64 = 4;
 /// Bytes of a cell: its value and the estimated error of a filled one.
 const CELL_BYTES: u64 = 8;
 
@@ -45,7 +45,7 @@ struct Reader {
     store: Store,
     source: Arc<Source>,
     renderer: Arc<Renderer>,
-    frames_ahead: usize,
+    fields_ahead: usize,
 }
 
 /// A manifest, and when it was the newest.
@@ -59,19 +59,19 @@ struct Learnt {
 }
 
 impl Prefetch {
-    /// Reads up to so many frames ahead of every product of a job; none with 0.
+    /// Reads up to so many fields ahead of every product of a job; none with 0.
     pub(crate) fn new(
         store: Store,
         source: Arc<Source>,
         renderer: Arc<Renderer>,
-        frames_ahead: usize,
+        fields_ahead: usize,
     ) -> Self {
         Self {
             reader: Arc::new(Reader {
                 store,
                 source,
                 renderer,
-                frames_ahead,
+                fields_ahead,
             }),
             wish: OnceLock::new(),
         }
@@ -79,7 +79,7 @@ impl Prefetch {
 
     /// Tells of a job that was drawn. Needs a runtime.
     pub(crate) fn drawn(&self, job: &RenderJob) {
-        if self.reader.frames_ahead == 0 {
+        if self.reader.fields_ahead == 0 {
             return;
         }
         let wish = self.wish.get_or_init(|| {
@@ -111,8 +111,8 @@ async fn run(reader: Arc<Reader>, mut ear: watch::Receiver<Wish>) {
         tokio::select! {
             read = reader.read_ahead(&job, &mut learnt) => {
                 if let Err(error) = read {
-                    // Whoever draws the frame meets the same and says so.
-                    tracing::debug!(error = error.in_full(), "no frame is read ahead");
+                    // Whoever draws the field meets the same and says so.
+                    tracing::debug!(error = error.in_full(), "no field is read ahead");
                 }
             }
             _is_away = left => reader.source.count_cancelled(),
@@ -141,7 +141,7 @@ impl Reader {
         let layer = parts[..3].iter().flatten().count() * job.grid.cell_count();
         let vector = job.trails.as_ref();
         let vector = vector.map_or(0, |trails| 2 * trails.grid.cell_count());
-        let cells = (layer + vector) as u64 * (FRAMES_IN_USE + self.frames_ahead as u64);
+        let cells = (layer + vector) as u64 * (FIELDS_IN_USE + self.fields_ahead as u64);
         if cells * CELL_BYTES > self.source.most_bytes() {
             return Ok(());
         }
@@ -151,7 +151,7 @@ impl Reader {
             if let Some(sample) = part
                 && let Some(manifest) = self.manifest(sample, learnt).await
             {
-                *ahead = next(&manifest, sample, heading, self.frames_ahead);
+                *ahead = next(&manifest, sample, heading, self.fields_ahead);
             }
         }
         let longest = ahead.iter().map(Vec::len).max().unwrap_or(0);
@@ -196,7 +196,7 @@ impl Reader {
         heading
     }
 
-    /// The newest manifest of a sample's product, read again when the one known does not have the sample's frames.
+    /// The newest manifest of a sample's product, read again when the one known does not have the sample's fields.
     async fn manifest(&self, sample: &TimeSample, learnt: &mut Learnt) -> Option<Arc<Manifest>> {
         let product = sample.product().to_owned();
         if let Some((manifest, read_at)) = learnt.manifests.get(&product).cloned() {
@@ -209,7 +209,7 @@ impl Reader {
         let newest = match newest {
             Ok(newest) => Arc::new(newest?),
             Err(error) => {
-                tracing::debug!(%error, product, "no frame is read ahead");
+                tracing::debug!(%error, product, "no field is read ahead");
                 return None;
             }
         };

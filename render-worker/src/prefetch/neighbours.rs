@@ -1,4 +1,4 @@
-//! A product, an instant and a direction of time in; the frames that are wanted next out.
+//! A product, an instant and a direction of time in; the fields that are wanted next out.
 
 use contract::key::ObjectKey;
 use contract::manifest::Manifest;
@@ -26,32 +26,32 @@ impl Heading {
     }
 }
 
-/// Steps of a sample's frames, first and last; -1 stands before the first step, where accumulation starts.
+/// Steps of a sample's fields, first and last; -1 stands before the first step, where accumulation starts.
 fn steps_of(manifest: &Manifest, sample: &TimeSample) -> Option<[i64; 2]> {
-    let index = |frame: &ObjectKey| {
-        let found = manifest.steps.iter().position(|step| step.frame == *frame);
+    let index = |field: &ObjectKey| {
+        let found = manifest.steps.iter().position(|step| step.field == *field);
         found.map(|index| index as i64)
     };
     let before = match &sample.before {
-        Some(frame) => index(frame)?,
+        Some(field) => index(field)?,
         None => -1,
     };
     let after = match &sample.after {
-        Some(after) => index(&after.frame)?,
+        Some(after) => index(&after.field)?,
         None => before,
     };
     Some([before, after])
 }
 
 /// Where in a product a sample lies: 2.25 is a quarter of the way from the third step to the fourth. None if the
-/// product does not have its frames.
+/// product does not have its fields.
 pub(super) fn place_of(manifest: &Manifest, sample: &TimeSample) -> Option<f64> {
     let [before, _] = steps_of(manifest, sample)?;
     let weight = sample.after.as_ref().map_or(0.0, |after| after.weight);
     Some(before as f64 + weight)
 }
 
-/// The samples of single frames that are wanted next, nearest first: `most` of them in the direction of time, in both
+/// The samples of single fields that are wanted next, nearest first: `most` of them in the direction of time, in both
 /// if that is not known. Who plays a product to its end goes on at its start.
 pub(super) fn next(
     manifest: &Manifest,
@@ -89,7 +89,7 @@ pub(super) fn next(
     };
     let single = |step: i64| TimeSample {
         domain: sample.domain.clone(),
-        before: Some(manifest.steps[step as usize].frame.clone()),
+        before: Some(manifest.steps[step as usize].field.clone()),
         after: None,
         contributed: counts(step as usize),
     };
@@ -106,8 +106,8 @@ mod tests {
     use contract::quantity::Quantity;
     use contract::time::Period;
 
-    fn frame(month: u32) -> ObjectKey {
-        ObjectKey::frame(&"p".parse().unwrap(), &Digest::of(&[month as u8]))
+    fn field(month: u32) -> ObjectKey {
+        ObjectKey::field(&"p".parse().unwrap(), &Digest::of(&[month as u8]))
     }
 
     /// The months of 2000 up to one.
@@ -116,7 +116,7 @@ mod tests {
         let step = |month| Step {
             masked: None,
             period: Period::month(2000, month).unwrap(),
-            frame: frame(month),
+            field: field(month),
             raw_sha256: Digest::of(b""),
             origin: String::new(),
             valid_cells: 1,
@@ -150,12 +150,12 @@ mod tests {
         let sample = manifest.time_sample(time.parse().unwrap()).unwrap();
         let next = next(manifest, &sample, heading, most).into_iter();
         let month =
-            |sample: TimeSample| (1..=12).find(|month| sample.before == Some(frame(*month)));
+            |sample: TimeSample| (1..=12).find(|month| sample.before == Some(field(*month)));
         next.map(|sample| month(sample).unwrap()).collect()
     }
 
     #[test]
-    fn the_frame_ahead_is_wanted_and_behind_the_end_the_first_one() {
+    fn the_field_ahead_is_wanted_and_behind_the_end_the_first_one() {
         let flux = manifest(Quantity::CarbonFlux, 12);
         let of = |time, heading, most| wanted(&flux, time, heading, most);
         assert_eq!(of("2000-05-01", Heading::Forward, 1), [6]);
@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn accumulation_starts_before_its_first_frame() {
+    fn accumulation_starts_before_its_first_field() {
         let carbon = manifest(Quantity::AccumulatedCarbon, 12);
         assert_eq!(wanted(&carbon, "2000-01-10", Heading::Forward, 1), [2]);
         let at = |time: &str| {

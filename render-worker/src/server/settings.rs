@@ -28,20 +28,20 @@ pub struct Settings {
     #[arg(long, env = "FLUXGLOBE_DRAW_QUEUE", default_value_t = 64,
           value_parser = value_parser!(u16).range(0..=4096), value_name = "COUNT")]
     pub draw_queue: u16,
-    /// Memory for frames of products drawn lately, MiB, 16 to 1048576. A frame of more than half of it counts as half:
+    /// Memory for fields of products drawn lately, MiB, 16 to 1048576. A field of more than half of it counts as half:
     /// two such ones are kept, between which a picture lies; one of more than all of it is read anew for every picture.
-    #[arg(long, env = "FLUXGLOBE_FRAME_MEMORY_MIB", default_value_t = 512,
+    #[arg(long = "frame-memory-mib", env = "FLUXGLOBE_FRAME_MEMORY_MIB", default_value_t = 512,
           value_parser = value_parser!(u32).range(16..=1_048_576), value_name = "MIB")]
-    pub frame_memory_mib: u32,
-    /// Memory of the graphics device for frames that stay on it between pictures, MiB, 16 to 1048576; an eighth of what
+    pub field_memory_mib: u32,
+    /// Memory of the graphics device for fields that stay on it between pictures, MiB, 16 to 1048576; an eighth of what
     /// the device has if absent, 512 where that is not known.
-    #[arg(long, env = "FLUXGLOBE_DEVICE_FRAME_MEMORY_MIB",
+    #[arg(long = "device-frame-memory-mib", env = "FLUXGLOBE_DEVICE_FRAME_MEMORY_MIB",
           value_parser = value_parser!(u32).range(16..=1_048_576), value_name = "MIB")]
-    pub device_frame_memory_mib: Option<u32>,
-    /// Frames of every product read ahead of the one drawn, in the direction in which time runs, 0 to 8; with 0 none.
-    #[arg(long, env = "FLUXGLOBE_FRAMES_AHEAD", default_value_t = 1,
+    pub device_field_memory_mib: Option<u32>,
+    /// Fields of every product read ahead of the one drawn, in the direction in which time runs, 0 to 8; with 0 none.
+    #[arg(long = "frames-ahead", env = "FLUXGLOBE_FRAMES_AHEAD", default_value_t = 1,
           value_parser = value_parser!(u8).range(0..=8), value_name = "COUNT")]
-    pub frames_ahead: u8,
+    pub fields_ahead: u8,
     /// How long jobs under way may take to end when the worker is asked to stop, seconds, 0 to 600.
     #[arg(long, env = "FLUXGLOBE_RENDER_DRAIN_S", default_value_t = 25,
           value_parser = value_parser!(u16).range(0..=600), value_name = "SECONDS")]
@@ -56,9 +56,9 @@ impl Settings {
                 .draws_at_once
                 .and_then(|count| NonZeroUsize::new(usize::from(count))),
             draw_queue: usize::from(self.draw_queue),
-            frame_bytes: u64::from(self.frame_memory_mib) << 20,
-            device_frame_bytes: self.device_frame_memory_mib.map(|mib| u64::from(mib) << 20),
-            frames_ahead: usize::from(self.frames_ahead),
+            field_bytes: u64::from(self.field_memory_mib) << 20,
+            device_field_bytes: self.device_field_memory_mib.map(|mib| u64::from(mib) << 20),
+            fields_ahead: usize::from(self.fields_ahead),
         }
     }
 

@@ -20,13 +20,13 @@ async fn flip(store: &Store, key: &ObjectKey, byte: usize) {
 }
 
 #[tokio::test]
-async fn a_flipped_bit_of_a_frame_or_a_domain_is_no_picture() {
+async fn a_flipped_bit_of_a_field_or_a_domain_is_no_picture() {
     let store = Store::memory();
     let job = quick(&two_months_in(&store).await, 1);
     let after = job.value.after.as_ref().unwrap();
     let named = [
         job.value.before.as_ref().unwrap(),
-        &after.frame,
+        &after.field,
         &job.value.domain,
     ];
     for key in named {

@@ -28,14 +28,14 @@ async fn shared_store() -> (tempfile::TempDir, Store, RenderJob) {
     (folder, store, job)
 }
 
-/// The worker that is asked for a picture first: the one of the frame that it begins with.
+/// The worker that is asked for a picture first: the one of the field that it begins with.
 fn first_asked<'a>(job: &RenderJob, names: &[&'a str]) -> &'a str {
-    let frame = job.value.before.as_ref().unwrap();
-    names[ranked(frame.as_str(), names)[0]]
+    let field = job.value.before.as_ref().unwrap();
+    names[ranked(field.as_str(), names)[0]]
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn pictures_between_the_same_frames_are_drawn_on_one_worker() {
+async fn pictures_between_the_same_fields_are_drawn_on_one_worker() {
     let store = Store::memory();
     let (flux, carbon) = two_months(&store).await;
     let workers: Vec<Worker> = (0..3).map(|_| Worker::start(&store, 1, 64)).collect();
@@ -183,7 +183,7 @@ async fn an_instant_that_many_want_is_drawn_by_all_workers() {
     let workers: Vec<Worker> = (0..3).map(|_| Worker::start(&store, 1, 64)).collect();
     let names: Vec<&str> = workers.iter().map(|w| w.name.as_str()).collect();
     let fleet = Arc::new(fleet(&names).await);
-    // One at a time stays where its frames are.
+    // One at a time stays where its fields are.
     let mut drawn: BTreeMap<String, usize> = BTreeMap::new();
     for number in 0..3 {
         let picture = fleet

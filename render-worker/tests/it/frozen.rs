@@ -129,6 +129,6 @@ async fn a_flipped_bit_of_any_object_of_a_store_is_no_other_picture() {
             }
         }
     }
-    let needed = [Kind::Frame, Kind::Contributed, Kind::Domain, Kind::Manifest];
+    let needed = [Kind::Field, Kind::Contributed, Kind::Domain, Kind::Manifest];
     assert_eq!(refused, needed.into(), "what is not drawn tests nothing");
 }

@@ -118,7 +118,7 @@ async fn the_name_of_a_picture_depends_on_counts_only_where_they_show() {
         carbon(&store, "carbon", 1).await,
         carbon(&store, "carbon-2", COMPLETE_FROM_COL).await,
     );
-    // The same frames under the counts of both.
+    // The same fields under the counts of both.
     let mut same = less.clone();
     for (step, other) in same.steps.iter_mut().zip(&more.steps) {
         step.contributed.clone_from(&other.contributed);

@@ -1,4 +1,4 @@
-//! Frames read before they are wanted: which, how many, when not, and what that is worth.
+//! Fields read before they are wanted: which, how many, when not, and what that is worth.
 
 use std::num::NonZeroUsize;
 use std::time::{Duration, Instant};
@@ -46,10 +46,10 @@ async fn months(store: &Store, name: &str, grid: Grid) -> Manifest {
     product(store, name, Quantity::CarbonFlux, grid, &values).await
 }
 
-fn limits(frames_ahead: usize) -> Limits {
+fn limits(fields_ahead: usize) -> Limits {
     Limits {
         draws_at_once: Some(NonZeroUsize::MIN),
-        frames_ahead,
+        fields_ahead,
         ..Limits::default()
     }
 }
@@ -64,7 +64,7 @@ fn small() -> View {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn the_frames_around_are_read_ahead_and_the_next_picture_finds_its_own() {
+async fn the_fields_around_are_read_ahead_and_the_next_picture_finds_its_own() {
     let store = Store::memory();
     let flux = months(&store, "flux", FIVE_DEGREES).await;
     let service = Here::with_limits(store, Backend::Cpu, limits(1));
@@ -73,25 +73,25 @@ async fn the_frames_around_are_read_ahead_and_the_next_picture_finds_its_own() {
         service.draw(&job).await.unwrap();
     };
     draw("2000-04-20").await;
-    assert_eq!(service.kept().frame_misses, 2);
+    assert_eq!(service.kept().field_misses, 2);
     // Nobody knows yet which way time runs: one on either side.
     until("both neighbours", || service.kept().early_reads == 2).await;
     draw("2000-05-20").await;
     let kept = service.kept();
-    assert_eq!((kept.frame_misses, kept.early_hits), (2, 1));
+    assert_eq!((kept.field_misses, kept.early_hits), (2, 1));
     // Forward: July, and nothing behind.
     until("the next month", || service.kept().early_reads == 3).await;
     draw("2000-06-20").await;
     until("the month after", || service.kept().early_reads == 4).await;
     let kept = service.kept();
-    assert_eq!((kept.frame_misses, kept.early_hits), (2, 2));
+    assert_eq!((kept.field_misses, kept.early_hits), (2, 2));
     // Backward: what lies behind was drawn or read before, but February.
     draw("2000-05-20").await;
     draw("2000-04-20").await;
     draw("2000-03-20").await;
     until("February", || service.kept().early_reads == 5).await;
     let kept = service.kept();
-    assert_eq!((kept.frame_misses, kept.early_hits), (2, 3));
+    assert_eq!((kept.field_misses, kept.early_hits), (2, 3));
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -118,12 +118,12 @@ async fn what_is_read_ahead_and_used_is_in_the_metrics() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn nothing_is_read_ahead_where_that_is_off_or_frames_would_push_one_another_out() {
+async fn nothing_is_read_ahead_where_that_is_off_or_fields_would_push_one_another_out() {
     let store = Store::memory();
     let flux = months(&store, "flux", FIVE_DEGREES).await;
-    let frame_bytes = FIVE_DEGREES.cell_count() as u64 * 8;
+    let field_bytes = FIVE_DEGREES.cell_count() as u64 * 8;
     let tight = Limits {
-        frame_bytes: 4 * frame_bytes,
+        field_bytes: 4 * field_bytes,
         ..limits(1)
     };
     for limits in [limits(0), tight] {
@@ -132,7 +132,7 @@ async fn nothing_is_read_ahead_where_that_is_off_or_frames_would_push_one_anothe
             let job = map_at(&flux, time, small());
             service.draw(&job).await.unwrap();
             let kept = service.kept();
-            assert_eq!((kept.frame_misses, kept.early_reads), (misses, 0), "{time}");
+            assert_eq!((kept.field_misses, kept.early_reads), (misses, 0), "{time}");
         }
     }
 }
@@ -147,17 +147,17 @@ async fn reading_ahead_ends_when_the_view_moves_to_another_product() {
     service.draw(&job).await.unwrap();
     let job = map_at(&other, "2000-04-20", small());
     service.draw(&job).await.unwrap();
-    // Six frames of a million cells are not read in the time that a small map takes.
+    // Six fields of a million cells are not read in the time that a small map takes.
     until("the end", || service.kept().early_cancelled == 1).await;
-    until("frames of the other", || service.kept().early_reads >= 6).await;
+    until("fields of the other", || service.kept().early_reads >= 6).await;
     let job = map_at(&other, "2000-05-20", small());
     service.draw(&job).await.unwrap();
     assert_eq!(service.kept().early_hits, 1);
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn frames_read_ahead_lie_on_the_device_before_they_are_drawn() {
-    if !device::is_wanted("frames on the device") {
+async fn fields_read_ahead_lie_on_the_device_before_they_are_drawn() {
+    if !device::is_wanted("fields on the device") {
         return;
     }
     let store = Store::memory();
@@ -169,12 +169,12 @@ async fn frames_read_ahead_lie_on_the_device_before_they_are_drawn() {
         service.draw(&job).await.unwrap()
     };
     let bytes = || service.renderer().resident_bytes();
-    let frame_bytes = FIVE_DEGREES.cell_count() as u64 * 4;
+    let field_bytes = FIVE_DEGREES.cell_count() as u64 * 4;
     draw("2000-04-20").await;
-    // The domain, the frames of the instant and those on either side.
-    until("four frames", || bytes() == 5 * frame_bytes).await;
+    // The domain, the fields of the instant and those on either side.
+    until("four fields", || bytes() == 5 * field_bytes).await;
     draw("2000-05-20").await;
-    until("one more", || bytes() == 6 * frame_bytes).await;
+    until("one more", || bytes() == 6 * field_bytes).await;
 }
 
 /// Prints what docs/performance.md tells.
@@ -188,8 +188,8 @@ async fn the_first_picture_of_a_step_waits_for_its_drawing_alone() {
     } else {
         Backend::Cpu
     };
-    for (frames_ahead, misses) in [(0, 1), (1, 0)] {
-        let limits = limits(frames_ahead);
+    for (fields_ahead, misses) in [(0, 1), (1, 0)] {
+        let limits = limits(fields_ahead);
         let service = Here::with_limits(store.clone(), backend.clone(), limits);
         let timed = async |time: &str| -> Duration {
             let job = map_at(&flux, time, tile(3, 1, 3, 256));
@@ -200,12 +200,12 @@ async fn the_first_picture_of_a_step_waits_for_its_drawing_alone() {
         timed("2000-02-20").await;
         let (mut first, mut second) = (vec![], vec![]);
         for (month, early) in (3..8).zip(2..) {
-            if frames_ahead > 0 {
-                until("the frame ahead", || service.kept().early_reads >= early).await;
+            if fields_ahead > 0 {
+                until("the field ahead", || service.kept().early_reads >= early).await;
             }
-            let before = service.kept().frame_misses;
+            let before = service.kept().field_misses;
             first.push(timed(&format!("2000-{month:02}-20")).await);
-            assert_eq!(service.kept().frame_misses - before, misses, "{month}");
+            assert_eq!(service.kept().field_misses - before, misses, "{month}");
             second.push(timed(&format!("2000-{month:02}-21")).await);
         }
         let median_ms = |times: &mut Vec<Duration>| {
@@ -213,7 +213,7 @@ async fn the_first_picture_of_a_step_waits_for_its_drawing_alone() {
             times[times.len() / 2].as_secs_f64() * 1e3
         };
         println!(
-            "{frames_ahead} ahead on {}: first picture of a step {:.1} ms, second {:.1} ms",
+            "{fields_ahead} ahead on {}: first picture of a step {:.1} ms, second {:.1} ms",
             service.name(),
             median_ms(&mut first),
             median_ms(&mut second)

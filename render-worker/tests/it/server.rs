@@ -413,7 +413,7 @@ async fn the_status_tells_what_is_resident_and_the_metrics_what_was_read() {
             &[("outcome", outcome)],
         )
     };
-    // Two frames of the flux and one that carbon grows to from nothing, then twice from memory.
+    // Two fields of the flux and one that carbon grows to from nothing, then twice from memory.
     assert_eq!((reads("miss"), reads("hit")), (3, 6));
     assert!(
         worker.metric(

@@ -1,4 +1,4 @@
-//! The service over a store in memory: manifests and frames in, PNG out.
+//! The service over a store in memory: manifests and fields in, PNG out.
 
 use std::num::NonZeroUsize;
 use std::sync::Arc;
@@ -90,12 +90,12 @@ async fn a_stored_relief_on_a_grid_of_its_own_lies_below_the_picture() {
     let png = service.draw(&job).await.unwrap();
     assert!(alpha(&png).iter().all(|alpha| *alpha == 255));
     assert!(alpha(&service.draw(&plain).await.unwrap()).contains(&0));
-    // Of the grid of a relief nobody is believed either, whether its frame is in memory or not.
+    // Of the grid of a relief nobody is believed either, whether its field is in memory or not.
     let mut wrong = relief.clone();
     (wrong.grid.rows, wrong.grid.cols) = (90, 180);
     (wrong.grid.dlat_deg, wrong.grid.dlon_deg) = (2.0, 2.0);
     let mut unknown = relief;
-    unknown.frame = "frames/relief/nothing".parse().unwrap();
+    unknown.field = "frames/relief/nothing".parse().unwrap();
     for (relief, is_unknown) in [(wrong, false), (unknown, true)] {
         let job = plain.clone().over(Some(relief)).unwrap();
         let refused = service.draw(&job).await.unwrap_err();
@@ -238,7 +238,7 @@ async fn a_landing_leaves_pictures_that_it_does_not_touch_their_name_and_their_b
 }
 
 #[tokio::test]
-async fn frames_of_a_product_come_filled_with_the_errors_beside_them() {
+async fn fields_of_a_product_come_filled_with_the_errors_beside_them() {
     let store = Store::memory();
     // The second month has a cloud over row 20, columns 0 to 5.
     let job = two_months_in(&store).await;
@@ -267,7 +267,7 @@ async fn frames_of_a_product_come_filled_with_the_errors_beside_them() {
 }
 
 #[tokio::test]
-async fn two_frames_that_each_fill_more_than_half_of_the_room_are_kept() {
+async fn two_fields_that_each_fill_more_than_half_of_the_room_are_kept() {
     let store = Store::memory();
     // The second month has gaps: its errors make it twice as large as the first.
     let job = RenderJob {
@@ -286,7 +286,7 @@ async fn two_frames_that_each_fill_more_than_half_of_the_room_are_kept() {
         }
         let kept = source.kept();
         assert_eq!(
-            (kept.frame_misses, kept.frame_bytes),
+            (kept.field_misses, kept.field_bytes),
             (misses, kept_bytes),
             "{most_bytes}"
         );

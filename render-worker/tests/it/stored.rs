@@ -24,7 +24,7 @@ pub(crate) async fn product(
     let mut domain = vec![false; grid.cell_count()];
     for (month, values) in (1..).zip(months) {
         let period = Period::month(2000, month).unwrap();
-        let frame = storage::frames::write(store, &product, &grid, values, period)
+        let field = storage::fields::write(store, &product, &grid, values, period)
             .await
             .unwrap();
         for (cell, value) in domain.iter_mut().zip(values) {
@@ -33,7 +33,7 @@ pub(crate) async fn product(
         steps.push(Step {
             masked: None,
             period,
-            frame,
+            field,
             raw_sha256: Digest::of(b""),
             origin: "made up".into(),
             valid_cells: 1,
@@ -62,8 +62,8 @@ pub(crate) async fn product(
     manifest
 }
 
-fn values(frame: &render::Frame) -> Vec<f32> {
-    frame
+fn values(field: &render::Field) -> Vec<f32> {
+    field
         .cells
         .content()
         .iter()

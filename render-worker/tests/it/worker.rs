@@ -38,9 +38,9 @@ pub(crate) fn settings(draws_at_once: u8, draw_queue: u16) -> Settings {
         render_listen: "127.0.0.1:0".parse().unwrap(),
         draws_at_once: Some(draws_at_once),
         draw_queue,
-        frame_memory_mib: 64,
-        device_frame_memory_mib: None,
-        frames_ahead: 1,
+        field_memory_mib: 64,
+        device_field_memory_mib: None,
+        fields_ahead: 1,
         render_drain_s: 60,
     }
 }

@@ -59,7 +59,7 @@ static NEXT_ID: AtomicU64 = AtomicU64::new(1);
 const MOST_PARTICLES: u64 = 1 << 27;
 /// Largest part of a picture drawn at once, pixels a side; a multiple of the screen tile.
 const PART_PX: u32 = 2048;
-/// Frames of more bytes are not held whole but in bands of the rows that a picture shows: four frames and a domain of
+/// Fields of more bytes are not held whole but in bands of the rows that a picture shows: four fields and a domain of
 /// this size leave room for the rest on a device of 2 GiB.
 const MOST_HELD_BYTES: u64 = 256 << 20;
 /// Bands begin and end at multiples of so many rows, so that neighbouring pictures share them.
@@ -143,7 +143,7 @@ impl Plan {
         scene: &Scene,
         most_buffer_bytes: u64,
     ) -> Result<Self, RenderError> {
-        // The twins read frames where they are, whole.
+        // The twins read fields where they are, whole.
         let mut plan = Self::holding(job, scene, most_buffer_bytes, u64::MAX)?;
         plan.list_cells(scene);
         Ok(plan)
@@ -158,7 +158,7 @@ impl Plan {
         Self::holding(job, scene, most_buffer_bytes, MOST_HELD_BYTES)
     }
 
-    /// The same with frames of more than `most_held_bytes` held in bands of rows.
+    /// The same with fields of more than `most_held_bytes` held in bands of rows.
     pub fn holding(
         job: &RenderJob,
         scene: &Scene,
@@ -216,12 +216,12 @@ impl Plan {
         plan
     }
 
-    /// Are frames on this grid held whole, whatever is drawn of them?
+    /// Are fields on this grid held whole, whatever is drawn of them?
     pub(crate) fn holds_whole(grid: &Grid) -> bool {
         (grid.cell_count() * size_of::<f32>()) as u64 <= MOST_HELD_BYTES
     }
 
-    /// Cells of a frame that are on the device while this is drawn, whole rows of them.
+    /// Cells of a field that are on the device while this is drawn, whole rows of them.
     pub fn held_cells(&self) -> Range<usize> {
         self.params.grid.held_first_cell as usize..self.params.grid.held_end_cell as usize
     }
@@ -264,7 +264,7 @@ impl Plan {
         let bytes = u64::from(band.end - band.start) * row_bytes;
         if bytes > most_buffer_bytes {
             return Err(RenderError::TooLarge {
-                what: "rows of a frame that the picture shows",
+                what: "rows of a field that the picture shows",
                 bytes,
                 limit: most_buffer_bytes,
             });
@@ -462,7 +462,7 @@ fn palette(job: &RenderJob) -> Vec<u32> {
     colors.chain(shape::table(job.mode, transfer)).collect()
 }
 
-/// Lowest and highest particle, m: from the frames, so that every tile of an instant has the same slice planes.
+/// Lowest and highest particle, m: from the fields, so that every tile of an instant has the same slice planes.
 fn height_range_m(job: &RenderJob, scene: &Scene) -> [f64; 2] {
     let [low, high] = scene.accumulated.as_ref().map_or([0.0; 2], Interval::range);
     let scaled = |kg_m2: f32| {

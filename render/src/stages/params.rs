@@ -74,14 +74,14 @@ shared_struct! {
         pub north_rad: f32,
         pub cols_per_rad: f32,
         pub rows_per_rad: f32,
-        /// Cells that the buffers of frames hold, the first and the end: all unless a frame is too large to be held whole.
+        /// Cells that the buffers of fields hold, the first and the end: all unless a field is too large to be held whole.
         pub held_first_cell: u32,
         pub held_end_cell: u32,
     }
 }
 
 impl GridParams {
-    /// A grid whose frames are held whole.
+    /// A grid whose fields are held whole.
     pub fn whole(grid: &Grid) -> Self {
         Self {
             rows: grid.rows,

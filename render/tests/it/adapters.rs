@@ -60,17 +60,17 @@ fn a_device_says_what_memory_is_its_own_and_a_program_has_none() {
 }
 
 #[test]
-fn frames_on_the_device_stay_within_their_limit() {
+fn fields_on_the_device_stay_within_their_limit() {
     if gpu_renderer("limit of the device").is_none() {
         return;
     }
     let scene = ocean(FIVE_DEGREES);
-    let frame_bytes = FIVE_DEGREES.cell_count() as u64 * 4;
-    for (limit, held) in [(3 * frame_bytes, 3), (1, 0), (64 << 20, 5)] {
+    let field_bytes = FIVE_DEGREES.cell_count() as u64 * 4;
+    for (limit, held) in [(3 * field_bytes, 3), (1, 0), (64 << 20, 5)] {
         let renderer = Renderer::keeping(Backend::Gpu, Some(limit)).unwrap();
         let job = job(Mode::Volume, tile(1, 0, 0, 256));
         renderer.render(&job, &scene).unwrap();
-        assert_eq!(renderer.resident_bytes(), held * frame_bytes, "{limit}");
+        assert_eq!(renderer.resident_bytes(), held * field_bytes, "{limit}");
     }
 }
 
@@ -119,7 +119,7 @@ fn while_one_device_is_lost_the_other_draws() {
     let Some(two) = doubled("one lost device") else {
         return;
     };
-    // Frames whose numbers follow each other have their places on different devices.
+    // Fields whose numbers follow each other have their places on different devices.
     let scenes = [ocean(FIVE_DEGREES), ocean(FIVE_DEGREES)];
     // A plain map tile would need no device on a processor.
     let job = job(Mode::Sprites, tile(1, 0, 0, 256));

@@ -1,4 +1,4 @@
-//! Frames that are too large to be held whole: the device holds the rows that a picture shows, and draws the same bytes.
+//! Fields that are too large to be held whole: the device holds the rows that a picture shows, and draws the same bytes.
 
 use std::ops::Range;
 
@@ -24,7 +24,7 @@ const TALL: Grid = Grid {
 };
 
 fn held(gpu: &Gpu, scene: &Scene, cells: Range<usize>) -> SceneBuffers {
-    let send = |cells: &Cells<f32>, part| gpu.storage("frame", &cells.content()[part]);
+    let send = |cells: &Cells<f32>, part| gpu.storage("field", &cells.content()[part]);
     let domain = &scene.domain.content()[cells.clone()];
     let domain = gpu.storage("domain", domain).unwrap();
     SceneBuffers::of(scene, &cells, false, domain, send).unwrap()
@@ -38,8 +38,8 @@ fn drawn(gpu: &Gpu, stages: &Stages, plan: &Plan, buffers: &SceneBuffers) -> Vec
 }
 
 #[test]
-fn a_frame_that_is_not_held_whole_is_drawn_from_the_rows_that_are_shown() {
-    let Some(gpu) = gpu("frames in bands") else {
+fn a_field_that_is_not_held_whole_is_drawn_from_the_rows_that_are_shown() {
+    let Some(gpu) = gpu("fields in bands") else {
         return;
     };
     let stages = Stages::new(gpu);
@@ -81,5 +81,5 @@ fn a_band_that_no_buffer_holds_is_refused_with_the_reason() {
     let scene = ocean(TALL);
     let job = job(Mode::Map, tile(5, 3, 15, 256));
     let refused = Plan::holding(&job, &scene, 1 << 16, 0).unwrap_err();
-    assert!(refused.to_string().contains("rows of a frame"), "{refused}");
+    assert!(refused.to_string().contains("rows of a field"), "{refused}");
 }

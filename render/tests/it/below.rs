@@ -6,7 +6,7 @@ use contract::camera::{CORE_DEPTH_M, CameraAngles};
 use contract::earth::SPHERE_RADIUS_M;
 use contract::job::{Mode, RenderJob, View};
 use glam::Vec3;
-use render::scene::{Frame, Interval};
+use render::scene::{Field, Interval};
 use render::stages::colour::{linear_of, srgb_of};
 use render::stages::layout::{Col, Particle, Row, Splat, VIEW_GLOBE};
 use render::stages::params::{Params, ViewParams};
@@ -44,10 +44,10 @@ fn column(lon: f64, lat: f64, kg_m2: f32) -> Scene {
     let alone = |value: f32| {
         let mut cells = vec![f32::NAN; FIVE_DEGREES.cell_count()];
         cells[cell as usize] = value;
-        let frame = Arc::new(Frame::new(cells));
+        let field = Arc::new(Field::new(cells));
         Interval {
-            before: Arc::clone(&frame),
-            after: frame,
+            before: Arc::clone(&field),
+            after: field,
             weight: 0.5,
         }
     };

@@ -7,7 +7,7 @@ use contract::grid::Grid;
 use contract::job::{Mode, RenderJob, View};
 use contract::sun::Subsolar;
 use glam::Vec3;
-use render::scene::{Frame, Terrain};
+use render::scene::{Field, Terrain};
 use render::stages::colour::{linear_of, srgb_of};
 use render::stages::compose::terrain::tint;
 use render::stages::layout::{WATER_BLUE, WATER_GREEN, WATER_RED};
@@ -28,7 +28,7 @@ fn terrain(grid: Grid, height_m: impl Fn(f64, f64) -> f64) -> Terrain {
     });
     Terrain {
         grid,
-        elevation: Arc::new(Frame::new(heights.collect())),
+        elevation: Arc::new(Field::new(heights.collect())),
     }
 }
 
@@ -52,7 +52,7 @@ pub(crate) fn with_terrain(grid: Grid) -> Scene {
 fn over_relief(mut job: RenderJob, exaggeration: f64) -> RenderJob {
     job.relief = Some(Relief {
         grid: ONE_DEGREE,
-        frame: "frames/made-up-relief/0".parse().unwrap(),
+        field: "frames/made-up-relief/0".parse().unwrap(),
         exaggeration,
     });
     job.style.globe_surface = true;
@@ -195,9 +195,9 @@ fn color(image: &Image, [x, y]: [u32; 2]) -> Vec3 {
 /// A tile of land alone: no particle covers the ground.
 fn bare(height_m: impl Fn(f64, f64) -> f64) -> Scene {
     let nothing = vec![f32::NAN; FIVE_DEGREES.cell_count()];
-    let frame = Arc::new(Frame::new(nothing));
+    let field = Arc::new(Field::new(nothing));
     let mut scene = ocean(FIVE_DEGREES);
-    (scene.value.before, scene.value.after) = (Arc::clone(&frame), frame);
+    (scene.value.before, scene.value.after) = (Arc::clone(&field), field);
     scene.terrain = Some(terrain(ONE_DEGREE, height_m));
     scene
 }

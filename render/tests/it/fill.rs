@@ -1,5 +1,5 @@
 //! Gap filling: every form against all pairs in float64, the device against the twins bit for bit, and what must hold
-//! of filled frames.
+//! of filled fields.
 
 use std::borrow::Cow;
 
@@ -24,7 +24,7 @@ const SEA: Grid = Grid {
 };
 
 /// A smooth field with a wide gap, small gaps and land, in tiny numbers round a large mean; and the domain.
-fn frame(grid: &Grid) -> (Vec<f32>, Vec<u32>) {
+fn field(grid: &Grid) -> (Vec<f32>, Vec<u32>) {
     let cell = |index: usize| {
         let (row, col) = (index / grid.cols as usize, index % grid.cols as usize);
         let (y, x) = (
@@ -75,7 +75,7 @@ fn multilevel_summation_gives_the_answer_of_all_pairs_within_its_tolerance() {
         dlon_deg: 1.5,
     };
     for grid in [SEA, all_round, FIVE_DEGREES, ONE_DEGREE] {
-        let (values, domain) = frame(&grid);
+        let (values, domain) = field(&grid);
         let filled = fill::on_cpu(Form::Exact, &grid, &values, &domain).unwrap();
         let apart = from_all_pairs(&grid, &values, &domain, &filled);
         assert!(apart < f64::from(exact::TOLERANCE), "{apart}");
@@ -110,7 +110,7 @@ fn every_form_has_the_same_bits_on_the_device_and_on_the_processor() {
         dlon_deg: 2.0,
     };
     for grid in [SEA, all_round, FIVE_DEGREES] {
-        let (values, domain) = frame(&grid);
+        let (values, domain) = field(&grid);
         for form in Form::ALL {
             let drawn = fill.run(gpu, form, &grid, &values, &domain).unwrap();
             let twin = fill::on_cpu(form, &grid, &values, &domain).unwrap();
@@ -132,7 +132,7 @@ fn a_wrong_shader_of_any_form_is_seen() {
     let Some(gpu) = checked_gpu("fill faults") else {
         return;
     };
-    let (values, domain) = frame(&SEA);
+    let (values, domain) = field(&SEA);
     let (window, exact): (Shader, Shader) = (|all| &mut all.window, |all| &mut all.exact);
     let stencil: Shader = |all| &mut all.stencil;
     let faults = [
@@ -276,7 +276,7 @@ fn distance_is_measured_on_the_sphere() {
 }
 
 #[test]
-fn frames_without_data_or_without_gaps_are_left_alone() {
+fn fields_without_data_or_without_gaps_are_left_alone() {
     let grid = Grid {
         rows: 2,
         cols: 2,
@@ -306,7 +306,7 @@ fn frames_without_data_or_without_gaps_are_left_alone() {
         assert_eq!((alike.values[1], alike.errors[1]), (7.25, 0.0));
     }
     // Rows without a domain change nothing, wherever they lie: a climatology has data nowhere near the poles.
-    let (values, domain) = frame(&FIVE_DEGREES);
+    let (values, domain) = field(&FIVE_DEGREES);
     let polar = |cell: usize| !(3..32).contains(&(cell / 72));
     let domain: Vec<u32> = domain
         .iter()
@@ -330,7 +330,7 @@ fn hidden_cells_are_filled_better_than_with_their_mean_and_the_error_is_known() 
         cols: 160,
         ..SEA
     };
-    let (values, domain) = frame(&grid);
+    let (values, domain) = field(&grid);
     let hold_out = HoldOut {
         share: 0.1,
         side_cells: 4,

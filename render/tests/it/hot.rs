@@ -14,7 +14,7 @@ use render::stages::eye::{self, Eye};
 use render::stages::layout::{Entry, MOST_HOT_PARTS, NEVER_LONG, NO_LIST, PART_ENTRIES};
 use render::stages::light::Light;
 use render::stages::sizes::list_count;
-use render::{Frame, Interval, Scene};
+use render::{Field, Interval, Scene};
 
 use crate::device::{checked_gpu, gpu};
 use crate::scenes::{GRAM_A_YEAR, globe, job, tile};
@@ -34,10 +34,10 @@ const QUARTER_DEGREE: Grid = Grid {
 
 /// A sea without land.
 fn world(grid: &Grid) -> Scene {
-    let frame = |shift: usize| {
+    let field = |shift: usize| {
         let cells = 0..grid.cell_count();
         let value = |cell: usize| ((cell * 7 + shift) % 61) as f32 - 30.0;
-        std::sync::Arc::new(Frame::new(
+        std::sync::Arc::new(Field::new(
             cells.map(|cell| value(cell) * GRAM_A_YEAR as f32).collect(),
         ))
     };
@@ -45,8 +45,8 @@ fn world(grid: &Grid) -> Scene {
         grid: *grid,
         domain: Scene::domain_of(std::iter::repeat_n(true, grid.cell_count())),
         value: Interval {
-            before: frame(0),
-            after: frame(9),
+            before: field(0),
+            after: field(9),
             weight: 0.4,
         },
         accumulated: None,

@@ -4,7 +4,7 @@ use contract::isolines::Isolines;
 use contract::job::{Mode, RenderJob, View};
 use contract::tile::mercator_lat_deg;
 use render::plan::Plan;
-use render::scene::{Frame, Interval};
+use render::scene::{Field, Interval};
 use render::stages::isolines::cpu::{Inputs, draw_lines};
 use render::stages::sphere::ground_below;
 use render::{Image, Scene};
@@ -22,12 +22,12 @@ fn field(value: impl Fn(f64, f64) -> f64) -> Scene {
         let place = grid.cell_center(row, col);
         value(place.lon, place.lat) as f32
     });
-    let frame = std::sync::Arc::new(Frame::new(values.collect()));
+    let field = std::sync::Arc::new(Field::new(values.collect()));
     Scene {
         domain: Scene::domain_of((0..grid.cell_count()).map(|_| true)),
         value: Interval {
-            before: std::sync::Arc::clone(&frame),
-            after: frame,
+            before: std::sync::Arc::clone(&field),
+            after: field,
             weight: 0.0,
         },
         accumulated: None,

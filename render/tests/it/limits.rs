@@ -6,17 +6,17 @@ use contract::grid::Grid;
 use contract::job::{Mode, View};
 use render::gpu::Gpu;
 use render::plan::Plan;
-use render::scene::{Frame, Interval, Scene};
+use render::scene::{Field, Interval, Scene};
 use render::{Backend, RenderError, Renderer};
 
 use crate::device::renderers;
 use crate::scenes::{FIVE_DEGREES, globe, job, ocean, tile};
 
 fn constant(grid: Grid, value: f32) -> Scene {
-    let frame = Arc::new(Frame::new(vec![value; grid.cell_count()]));
+    let field = Arc::new(Field::new(vec![value; grid.cell_count()]));
     let value = Interval {
-        before: Arc::clone(&frame),
-        after: frame,
+        before: Arc::clone(&field),
+        after: field,
         weight: 0.4,
     };
     let domain = Scene::domain_of((0..grid.cell_count()).map(|_| true));
@@ -168,7 +168,7 @@ fn jobs_beyond_a_limit_are_refused_with_the_reason() {
         "{small_device}"
     );
     assert!(small_device.is_bad_request());
-    let other = Frame::new(vec![0.0; 7]);
+    let other = Field::new(vec![0.0; 7]);
     let mut broken = scene.clone();
     broken.value.after = Arc::new(other);
     small_device = renderer

@@ -140,10 +140,10 @@ fn what_users_make_transparent_is_not_there_and_what_they_make_small_covers_less
 
 #[test]
 fn uncertainty_rises_with_the_estimated_error_and_is_none_where_a_cell_was_measured() {
-    let frame = clouded(FIVE_DEGREES).value.before;
+    let field = clouded(FIVE_DEGREES).value.before;
     let (errors, uncertainties) = (
-        frame.errors.as_ref().unwrap().content(),
-        frame.uncertainties().content(),
+        field.errors.as_ref().unwrap().content(),
+        field.uncertainties().content(),
     );
     let mut cells: Vec<_> = errors.iter().zip(uncertainties).collect();
     assert!(
@@ -188,7 +188,7 @@ fn uncertainty_is_seen_where_gaps_were_filled_and_nowhere_else() {
             .render(&styled(Mode::Map, view, uncertainty), &scene)
             .unwrap();
         let uncertainties =
-            [&scene.value.before, &scene.value.after].map(|frame| frame.uncertainties().content());
+            [&scene.value.before, &scene.value.after].map(|field| field.uncertainties().content());
         let (mut changed, mut checked) = (0, 0);
         for x in 0..256 {
             // The last row of pixels lies at the equator, between rows 89 and 90.

@@ -6,7 +6,7 @@ use contract::camera::CameraAngles;
 use contract::grid::LonLatDeg;
 use contract::job::{Mode, View};
 use render::plan::Projection;
-use render::{Backend, Frame, Image, Renderer};
+use render::{Backend, Field, Image, Renderer};
 
 use crate::scenes::{FIVE_DEGREES, job, ocean};
 
@@ -58,8 +58,8 @@ fn a_lone_cell_is_drawn_where_the_projection_has_it() {
         let cell = ((90.0 - lat) / 5.0).floor() * 72.0 + ((lon + 180.0) / 5.0).floor();
         let mut values = vec![-1e-9f32; FIVE_DEGREES.cell_count()];
         values[cell as usize] = 1e-9;
-        let frame = Arc::new(Frame::new(values));
-        (scene.value.before, scene.value.after) = (Arc::clone(&frame), frame);
+        let field = Arc::new(Field::new(values));
+        (scene.value.before, scene.value.after) = (Arc::clone(&field), field);
         let image = renderer.render(&job(Mode::Map, view), &scene).unwrap();
         let [x, y] = middle_of_red(&image);
         let projection = Projection::of(&view).unwrap();

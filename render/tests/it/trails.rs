@@ -115,10 +115,10 @@ fn trails_lie_on_the_sea_and_neither_over_land_nor_beside_the_globe() {
 /// Every cell of the ocean has given off, or taken up, as much carbon.
 fn lifted(scene: Scene, kg_m2: f32) -> Scene {
     let carbon = vec![kg_m2; scene.grid.cell_count()];
-    let frame = Arc::new(render::Frame::new(carbon));
+    let field = Arc::new(render::Field::new(carbon));
     let accumulated = Some(render::Interval {
-        before: Arc::clone(&frame),
-        after: frame,
+        before: Arc::clone(&field),
+        after: field,
         weight: 0.0,
     });
     Scene {

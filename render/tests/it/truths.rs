@@ -6,7 +6,7 @@ use contract::job::{Mode, RenderJob};
 use glam::{UVec2, Vec3, Vec4};
 use render::plan::Plan;
 use render::pyramid::coarser;
-use render::scene::{Frame, Interval, Scene};
+use render::scene::{Field, Interval, Scene};
 use render::stages::eye::cpu::Hiding;
 use render::stages::interpolate::cpu::interpolated;
 use render::stages::layout::{
@@ -378,7 +378,7 @@ fn the_order_of_slices_matters_and_the_order_within_one_does_not() {
 #[test]
 fn a_sea_of_full_flux_has_the_optical_depth_of_the_style() {
     let grid = ONE_DEGREE;
-    let full = Arc::new(Frame::new(vec![
+    let full = Arc::new(Field::new(vec![
         (60.0 * GRAM_A_YEAR) as f32;
         grid.cell_count()
     ]));
@@ -430,13 +430,13 @@ fn quarter_sea() -> [Scene; 2] {
         }
     };
     let cells = 0..grid.cell_count();
-    let frame = Arc::new(Frame::new(cells.map(|cell| flux(cell) as f32).collect()));
+    let field = Arc::new(Field::new(cells.map(|cell| flux(cell) as f32).collect()));
     let scene = Scene {
         grid,
         domain: Scene::domain_of((0..grid.cell_count()).map(is_sea)),
         value: Interval {
-            before: Arc::clone(&frame),
-            after: frame,
+            before: Arc::clone(&field),
+            after: field,
             weight: 0.5,
         },
         accumulated: None,

@@ -20,7 +20,7 @@ impl Owner for Versions {
             Kind::Manifest,
             Kind::Contributed,
             Kind::Domain,
-            Kind::Frame,
+            Kind::Field,
             Kind::Raw,
             Kind::Series,
         ]
@@ -38,7 +38,7 @@ impl Owner for Versions {
             keys.insert(manifest.domain.clone());
             keys.extend(manifest.series.iter().map(|segment| segment.series.clone()));
             for step in &manifest.steps {
-                keys.insert(step.frame.clone());
+                keys.insert(step.field.clone());
                 keys.extend(step.contributed.iter().map(|step| step.counts.clone()));
                 keys.insert(ObjectKey::raw(product, &step.raw_sha256));
             }

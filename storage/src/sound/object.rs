@@ -7,7 +7,7 @@ use contract::topic::Origin;
 use parquet::file::metadata::ParquetMetaDataReader;
 
 use super::{DOCUMENTS, Soundness, check_document, damage, of_bytes};
-use crate::{StorageError, contributed, frames, series};
+use crate::{StorageError, contributed, fields, series};
 
 /// All that can be known of an object from itself: its bytes, and its values where these name it.
 pub fn of_object(key: &ObjectKey, content: &Bytes) -> Result<Soundness, StorageError> {
@@ -19,7 +19,7 @@ pub fn of_object(key: &ObjectKey, content: &Bytes) -> Result<Soundness, StorageE
         (Vouched::Values(_), Some(Kind::Contributed)) => {
             contributed::check(key, content.clone())?;
         }
-        (Vouched::Values(_), _) => frames::check_values(key, content.clone())?,
+        (Vouched::Values(_), _) => fields::check_values(key, content.clone())?,
         (Vouched::Nothing, Some(kind)) if DOCUMENTS.contains(&kind) => {
             check_document(key, content, found)?;
         }

@@ -1,7 +1,7 @@
 //! One bit of a stored object flipped, whichever object and whichever bit: it is found, named and counted.
 
 use super::*;
-use crate::{Store, contributed, document, domain, frames, manifests, series, verify, weights};
+use crate::{Store, contributed, document, domain, fields, manifests, series, verify, weights};
 use contract::grid::Grid;
 use contract::manifest::{MANIFEST_SCHEMA, Manifest, SeriesSegment, Step};
 use contract::product::ProductId;
@@ -29,7 +29,7 @@ async fn store() -> Store {
     let raw_sha256 = Digest::of(&raw);
     let key = ObjectKey::raw(&product, &raw_sha256);
     store.put_new(&key, raw).await.unwrap();
-    let frame = frames::write(&store, &product, &GRID, &values, period).await;
+    let field = fields::write(&store, &product, &GRID, &values, period).await;
     let series = series::write(&store, &product, &GRID, &[&values]).await;
     let manifest = Manifest {
         schema: MANIFEST_SCHEMA,
@@ -42,7 +42,7 @@ async fn store() -> Store {
         grid: GRID,
         steps: vec![Step {
             period,
-            frame: frame.unwrap(),
+            field: field.unwrap(),
             raw_sha256,
             origin: "a.nc".to_owned(),
             valid_cells: 14,
@@ -142,12 +142,12 @@ async fn a_damaged_and_a_missing_object_are_findings_of_a_whole_store() {
     let store = store().await;
     let keys = verify::keys(&store, None).await.unwrap();
     let of = |kind| keys.iter().find(|key| Kind::of(key) == Some(kind)).unwrap();
-    let (series, frame) = (of(Kind::Series), of(Kind::Frame));
+    let (series, field) = (of(Kind::Series), of(Kind::Field));
     let mut flipped = store.get(series).await.unwrap().to_vec();
     flipped[9] ^= 1;
     let before = damage::count(Kind::Series);
     store.put_over(series, flipped.into()).await.unwrap();
-    store.remove(frame).await.unwrap();
+    store.remove(field).await.unwrap();
     let keys = verify::keys(&store, Some(&"p".parse().unwrap()))
         .await
         .unwrap();
@@ -158,7 +158,7 @@ async fn a_damaged_and_a_missing_object_are_findings_of_a_whole_store() {
     assert_eq!(
         found,
         [
-            (frame, verify::Fault::Missing),
+            (field, verify::Fault::Missing),
             (series, verify::Fault::Damaged)
         ]
     );

@@ -19,7 +19,7 @@ use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::time::Period;
 use storage::contributed::{self, Contributed};
-use storage::{Store, domain, frames, manifests, series, verify, weights};
+use storage::{Store, domain, fields, manifests, series, verify, weights};
 
 const ROWS: u32 = 61;
 const COLS: u32 = 20;
@@ -123,9 +123,9 @@ async fn frozen_products_hold_the_values_that_were_put_in() {
         for (month, step) in (1..).zip(&manifest.steps) {
             let (period, expected) = values(month);
             assert_eq!(step.period, period);
-            let is_of_bytes = matches!(step.frame.vouches(), Vouched::Bytes(_));
+            let is_of_bytes = matches!(step.field.vouches(), Vouched::Bytes(_));
             assert_eq!(is_of_bytes, version == 1);
-            let found = frames::read(&store, &step.frame, &GRID).await.unwrap();
+            let found = fields::read(&store, &step.field, &GRID).await.unwrap();
             for (index, (found, expected)) in found.iter().zip(&expected).enumerate() {
                 assert!(
                     is_near(*found, *expected),
@@ -141,19 +141,19 @@ async fn frozen_products_hold_the_values_that_were_put_in() {
 }
 
 #[tokio::test]
-async fn version_1_keeps_the_names_that_were_cited_and_its_frames_keep_theirs() {
+async fn version_1_keeps_the_names_that_were_cited_and_its_fields_keep_theirs() {
     let (_folder, store) = copy(1);
     let id = "fgco2@1-72149538".parse().unwrap();
     let manifest = manifests::load(&store, &id).await.unwrap();
     for step in &manifest.steps {
-        let values = frames::read(&store, &step.frame, &GRID).await.unwrap();
-        let named_now = frames::write(&store, &product(), &GRID, &values, step.period).await;
+        let values = fields::read(&store, &step.field, &GRID).await.unwrap();
+        let named_now = fields::write(&store, &product(), &GRID, &values, step.period).await;
         let named_now = named_now.unwrap();
-        assert_ne!(named_now, step.frame);
-        let settled = frames::settle(&store, &step.frame, &named_now, &GRID).await;
+        assert_ne!(named_now, step.field);
+        let settled = fields::settle(&store, &step.field, &named_now, &GRID).await;
         assert_eq!(
             settled.unwrap(),
-            step.frame,
+            step.field,
             "the same values are no revision"
         );
     }
@@ -172,10 +172,10 @@ async fn write(store: &Store) -> Manifest {
         for (cell, value) in cells.iter_mut().zip(values) {
             *cell |= !value.is_nan();
         }
-        let frame = frames::write(store, &product(), &GRID, values, *period).await;
+        let field = fields::write(store, &product(), &GRID, values, *period).await;
         steps.push(Step {
             period: *period,
-            frame: frame.unwrap(),
+            field: field.unwrap(),
             raw_sha256,
             origin: "frozen-flux.nc".to_owned(),
             valid_cells: values.iter().filter(|value| !value.is_nan()).count() as u64,
@@ -250,7 +250,7 @@ async fn own(store: &Store) -> Vec<ObjectKey> {
     let mut keys = vec![];
     for kind in [
         Kind::Raw,
-        Kind::Frame,
+        Kind::Field,
         Kind::Series,
         Kind::Domain,
         Kind::Contributed,

@@ -11,7 +11,7 @@ use contract::time::Period;
 use futures::{StreamExt as _, TryStreamExt as _, stream};
 use object_store::ObjectStoreExt as _;
 use object_store::path::Path;
-use storage::{StorageError, Store, domain, frames, manifests, series, weights};
+use storage::{StorageError, Store, domain, fields, manifests, series, weights};
 
 fn key(text: &str) -> ObjectKey {
     text.parse().unwrap()
@@ -276,10 +276,10 @@ pub(crate) async fn grids_and_manifests_round_trip(store: &Store) {
     };
     let values: Vec<f32> = (0..GRID.cell_count()).map(value).collect();
     let period = Period::month(2000, 1).unwrap();
-    let frame = frames::write(store, &product, &GRID, &values, period)
+    let field = fields::write(store, &product, &GRID, &values, period)
         .await
         .unwrap();
-    let back = frames::read(store, &frame, &GRID).await.unwrap();
+    let back = fields::read(store, &field, &GRID).await.unwrap();
     assert!(
         back.iter()
             .zip(&values)
@@ -301,8 +301,8 @@ pub(crate) async fn grids_and_manifests_round_trip(store: &Store) {
     let domain_key = domain::write(store, &product, &cells).await.unwrap();
     assert_eq!(domain::read(store, &domain_key).await.unwrap(), cells);
     // Written a second time, everything is found to be there.
-    let again = frames::write(store, &product, &GRID, &values, period).await;
-    assert_eq!(again.unwrap(), frame);
+    let again = fields::write(store, &product, &GRID, &values, period).await;
+    assert_eq!(again.unwrap(), field);
     for number in 1..=11 {
         let next = manifest(&product, number, "t");
         manifests::commit(store, &next).await.unwrap();

@@ -81,6 +81,6 @@ pub(super) fn equal_until(before: &Manifest, now: &Manifest) -> Option<TimeMs> {
         return None;
     }
     let pairs = before.steps.iter().zip(&now.steps);
-    let equal = pairs.take_while(|(old, new)| old.period == new.period && old.frame == new.frame);
+    let equal = pairs.take_while(|(old, new)| old.period == new.period && old.field == new.field);
     equal.last().map(|(_, new)| new.period.end)
 }

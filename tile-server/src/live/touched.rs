@@ -19,7 +19,7 @@ pub fn touched(before: Option<&Manifest>, now: &Manifest) -> Vec<Period> {
     let is_same = |i: usize| {
         let new = &now.steps[i];
         let old = before.step_of(new.period).map(|old| &before.steps[old]);
-        old.is_some_and(|old| old.frame == new.frame)
+        old.is_some_and(|old| old.field == new.field)
     };
     let is_gone = |old: &Step| now.step_of(old.period).is_none();
     if before.steps.iter().any(is_gone) {
@@ -61,12 +61,12 @@ mod tests {
         }
     }
 
-    /// A version with a frame a month, named by its content.
+    /// A version with a field a month, named by its content.
     fn manifest(contents: &[&str], domain: &str) -> Manifest {
         let step = |(i, content): (usize, &&str)| Step {
             masked: None,
             period: month(i + 1),
-            frame: ObjectKey::frame(&product(), &Digest::of(content.as_bytes())),
+            field: ObjectKey::field(&product(), &Digest::of(content.as_bytes())),
             raw_sha256: Digest::of(b""),
             origin: String::new(),
             valid_cells: 1,

@@ -14,7 +14,7 @@ use contract::quantity::Quantity;
 use contract::time::Period;
 use contract::time_sample::TimeSample;
 use serde_json::Value;
-use storage::{Store, domain, frames, manifests, series};
+use storage::{Store, domain, fields, manifests, series};
 use tile_server::metrics::Registry;
 use tile_server::{AppState, Settings, router};
 use tower::ServiceExt as _;
@@ -190,7 +190,7 @@ impl TestApp {
             steps.push(Step {
                 masked: None,
                 period,
-                frame: frames::write(&self.store, &product, &GRID, values, period)
+                field: fields::write(&self.store, &product, &GRID, values, period)
                     .await
                     .unwrap(),
                 raw_sha256: Digest::of(format!("{product}{number}{month}").as_bytes()),

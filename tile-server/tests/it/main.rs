@@ -1,4 +1,4 @@
-//! The tile server as its clients see it: the real router in process, over a memory store with real frames.
+//! The tile server as its clients see it: the real router in process, over a memory store with real fields.
 #![expect(
     clippy::unwrap_used,
     reason = "a test that cannot go on fails, in its helpers as in itself"

@@ -346,7 +346,7 @@ async fn a_product_that_is_removed_ends_its_streams_by_name() {
     let mut camera = running.connect().await;
     camera.look(1, VIEW).await;
     camera.full().await;
-    let gone = Mood::fails(Class::NotFound, "there is no frame of flux any more");
+    let gone = Mood::fails(Class::NotFound, "there is no field of flux any more");
     running.app.drawer.set(gone);
     camera.look(2, &format!("{VIEW}&roll=1")).await;
     let (code, reason) = camera.closed().await;

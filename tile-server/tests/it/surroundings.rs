@@ -15,7 +15,7 @@ async fn an_address_says_what_surrounds_the_particles() {
     assert_eq!(app.get(path).await.status, StatusCode::OK);
     let job = app.drawer.last_job();
     let relief = job.relief.unwrap();
-    assert_eq!(relief.frame.as_str().split('/').nth(1), Some("etopo"));
+    assert_eq!(relief.field.as_str().split('/').nth(1), Some("etopo"));
     assert_eq!(relief.exaggeration.to_bits(), 30f64.to_bits());
     assert!(job.style.context.coastlines && job.style.context.sea_opacity > 0.39);
     assert!((job.style.height_m_per_kg_m2 - 1e6).abs() < 1e-6);

@@ -9,7 +9,7 @@ use datafusion::arrow::datatypes::DataType;
 use datafusion::execution::context::SessionContext;
 use datafusion::physical_plan::{ExecutionPlan, displayable};
 use datafusion::prelude::SessionConfig;
-use storage::{Store, frames};
+use storage::{Store, fields};
 
 use super::*;
 use crate::objects::Objects;
@@ -34,7 +34,7 @@ async fn plan(config: SessionConfig, region: &str) -> Arc<dyn ExecutionPlan> {
     for month in 1..=12 {
         let period = Period::month(2000, month).unwrap();
         let values = vec![1e-9; GRID.cell_count()];
-        let key = frames::write(&store, &product, &GRID, &values, period).await;
+        let key = fields::write(&store, &product, &GRID, &values, period).await;
         keys.push(key.unwrap());
     }
     let region: Region = region.parse().unwrap();
@@ -47,7 +47,7 @@ async fn plan(config: SessionConfig, region: &str) -> Arc<dyn ExecutionPlan> {
     let state = state::session_state(config, runtime, &objects).unwrap();
     let context = SessionContext::new_with_state(state);
     let keys: Vec<&ObjectKey> = keys.iter().collect();
-    let registered = scan::register(&context, "frames", &store, &keys, Layout::Frames);
+    let registered = scan::register(&context, "fields", &store, &keys, Layout::Fields);
     registered.await.unwrap();
     let query = context.sql(&sql(Measure::Mass, &region)).await;
     query.unwrap().create_physical_plan().await.unwrap()

@@ -33,7 +33,7 @@ fn polygon(outer: &[[f64; 2]], holes: Vec<Vec<[f64; 2]>>) -> Region {
 
 /// Weights as one field, `[row, col]`.
 fn field(grid: &Grid, region: &Region) -> Vec<f64> {
-    let windows = frame_chunks(grid);
+    let windows = field_chunks(grid);
     let mut field = vec![0.0; grid.cell_count()];
     for (chunk, areas) in compute(grid, region, Earth::Wgs84).unwrap() {
         for (index, area) in windows[chunk as usize].cell_indices(grid).zip(areas) {
@@ -212,7 +212,7 @@ fn the_sea_of_a_region_has_a_key_of_its_own() {
 #[test]
 fn the_sea_of_a_cell_is_all_of_it_in_the_open_and_none_inland() {
     let ocean = |region: &str| -> Vec<f64> {
-        let windows = frame_chunks(&ONE_DEGREE);
+        let windows = field_chunks(&ONE_DEGREE);
         let mut field = vec![0.0; ONE_DEGREE.cell_count()];
         let region = region.parse().unwrap();
         for (chunk, areas) in

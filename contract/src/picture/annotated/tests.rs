@@ -24,7 +24,7 @@ fn product(name: &str, quantity: Quantity, periods: Vec<Period>) -> Manifest {
     let step = |period: Period| Step {
         masked: None,
         period,
-        frame: ObjectKey::frame(&product, &Digest::of(period.to_string().as_bytes())),
+        field: ObjectKey::field(&product, &Digest::of(period.to_string().as_bytes())),
         raw_sha256: Digest::of(b""),
         origin: String::new(),
         valid_cells: 1,

@@ -242,7 +242,7 @@ fn act(placed: &[Placed], new: &Step, order: NoticeOrder) -> Result<Act, Period>
 }
 
 fn is_same_source(there: &Step, new: &Step) -> bool {
-    there.raw_sha256 == new.raw_sha256 && there.frame == new.frame
+    there.raw_sha256 == new.raw_sha256 && there.field == new.field
 }
 
 /// Was the file that is there offered with or after a new one? Not known of steps that were landed before orders were

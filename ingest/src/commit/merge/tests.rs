@@ -34,14 +34,14 @@ fn noticed(content: &str, periods: &[Period], second: u32) -> StoredGranule {
     let product: ProductId = "p".parse().unwrap();
     let raw_sha256 = Digest::of(content.as_bytes());
     let step = |period: &Period| {
-        let frame = ObjectKey::frame(
+        let field = ObjectKey::field(
             &product,
             &Digest::of(format!("{content}{period}").as_bytes()),
         );
         Step {
             masked: None,
             period: *period,
-            frame,
+            field,
             raw_sha256,
             origin: "f.nc".into(),
             valid_cells: 1,

@@ -25,11 +25,11 @@ fn product() -> ProductId {
 
 /// A step of a file in some edition of its values.
 fn step(file: &str, month: u32, edition: u32) -> Step {
-    let frame = Digest::of(format!("{file} {month} {edition}").as_bytes());
+    let field = Digest::of(format!("{file} {month} {edition}").as_bytes());
     Step {
         masked: None,
         period: Period::month(2000, month).unwrap(),
-        frame: ObjectKey::frame(&product(), &frame),
+        field: ObjectKey::field(&product(), &field),
         raw_sha256: Digest::of(file.as_bytes()),
         origin: format!("{file}.nc"),
         valid_cells: 1,
@@ -171,18 +171,18 @@ fn a_file_that_is_read_anew_keeps_its_place_in_the_order_of_notices() {
 #[tokio::test]
 async fn series_are_made_anew_once_there_is_memory_for_them() {
     let store = Store::memory();
-    let frame = async |month: u32, value: f32| {
+    let field = async |month: u32, value: f32| {
         let period = Period::month(2000, month).unwrap();
-        let written = storage::frames::write(&store, &product(), &GRID, &[value; 8], period).await;
+        let written = storage::fields::write(&store, &product(), &GRID, &[value; 8], period).await;
         Step {
-            frame: written.unwrap(),
+            field: written.unwrap(),
             ..step("a", month, 0)
         }
     };
-    let mut newest = manifest(vec![frame(1, 1.0).await, frame(2, 2.0).await]);
+    let mut newest = manifest(vec![field(1, 1.0).await, field(2, 2.0).await]);
     newest.number = 1;
     manifests::commit(&store, &newest).await.unwrap();
-    let anew = [reading(vec![frame(1, 3.0).await, frame(2, 2.0).await])];
+    let anew = [reading(vec![field(1, 3.0).await, field(2, 2.0).await])];
     let decoder = DecoderCommand {
         program: "/nowhere".into(),
         arguments: vec![],

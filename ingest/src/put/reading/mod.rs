@@ -21,7 +21,7 @@ use crate::plan::recipe::Recipe;
 /// Version of the note's JSON as it is written. Those of version 1 are not sealed and are read as well.
 const SCHEMA: u32 = 2;
 
-/// What one file was read as; its frames are durable.
+/// What one file was read as; its fields are durable.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Reading {
@@ -89,14 +89,14 @@ impl Reading {
 }
 
 impl Reading {
-    /// Is it another reading but for the names of frames that were named by their bytes there? Those may be gone.
+    /// Is it another reading but for the names of fields that were named by their bytes there? Those may be gone.
     fn renames(&self, there: &Self) -> bool {
         let is_renamed = |old: &Step, new: &Step| {
             let named_alike = Step {
-                frame: new.frame.clone(),
+                field: new.field.clone(),
                 ..old.clone()
             };
-            old == new || (named_alike == *new && matches!(old.frame.vouches(), Vouched::Bytes(_)))
+            old == new || (named_alike == *new && matches!(old.field.vouches(), Vouched::Bytes(_)))
         };
         let steps = there.steps.iter().zip(&self.steps);
         let alike = Self {

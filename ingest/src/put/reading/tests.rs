@@ -32,7 +32,7 @@ fn store(version: u32) -> (tempfile::TempDir, Store) {
 fn noted() -> Reading {
     let step = |month, valid_cells, masked| Step {
         period: Period::month(2001, month).unwrap(),
-        frame: ObjectKey::frame(&product(), &Digest::of(&[month as u8])),
+        field: ObjectKey::field(&product(), &Digest::of(&[month as u8])),
         raw_sha256: Digest::of(b"a file that nobody keeps"),
         origin: "frozen-flux.nc".to_owned(),
         valid_cells,

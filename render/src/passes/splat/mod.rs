@@ -1,4 +1,4 @@
-//! The first pass over particles: cells of four frames in; stored splats, the depth given to the light and the lengths of
+//! The first pass over particles: cells of four fields in; stored splats, the depth given to the light and the lengths of
 //! the lists out. See `splat.wgsl`.
 //!
 //! It runs the functions of [`interpolate`](crate::stages::interpolate), [`particles`](crate::stages::particles),

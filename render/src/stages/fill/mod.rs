@@ -1,5 +1,5 @@
-//! Gap filling: one frame in, the same frame with the missing cells of the product's domain filled in and an estimate
-//! of the error of each, out. Done once when a frame is loaded, because it depends on the product only.
+//! Gap filling: one field in, the same field with the missing cells of the product's domain filled in and an estimate
+//! of the error of each, out. Done once when a field is loaded, because it depends on the product only.
 //!
 //! All forms are inverse distance weighting of power 2 (Shepard 1968, doi:10.1145/800186.810616) with the distance on
 //! the sphere: [`window`] is what products are drawn with, [`exact`] gives the answer of all pairs of cells. Every product of two numbers is rounded before it is added, on every device, so that a
@@ -58,10 +58,10 @@ impl Form {
     }
 }
 
-/// A frame without gaps.
+/// A field without gaps.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Filled {
-    /// Values; [`MISSING`] outside the domain, and everywhere if the frame had no data at all.
+    /// Values; [`MISSING`] outside the domain, and everywhere if the field had no data at all.
     pub values: Vec<f32>,
     /// Estimated error (1σ) of each value in its unit: 0 where it was measured, the weighted spread of what it was
     /// filled from elsewhere, [`MISSING`] where there is no value.
@@ -89,7 +89,7 @@ impl Task {
         })
     }
 
-    /// The frame with the answers of a device or a twin in its gaps.
+    /// The field with the answers of a device or a twin in its gaps.
     pub fn filled(&self, values: &[f32], answers: &[f32]) -> Filled {
         let mut filled = unfilled(values);
         let (means, squares) = answers.split_at(values.len());
@@ -102,7 +102,7 @@ impl Task {
     }
 }
 
-/// The frame as it is.
+/// The field as it is.
 fn unfilled(values: &[f32]) -> Filled {
     let value = |value: &f32| if holds(*value) { *value } else { MISSING };
     let error = |value: &f32| if holds(*value) { 0.0 } else { MISSING };
@@ -116,7 +116,7 @@ fn exact_ladder(grid: &Grid) -> Result<Ladder, RenderError> {
     exact::ladder(grid).ok_or(RenderError::NoExactFill)
 }
 
-/// Fills one frame with the twins; the same bits as on a device.
+/// Fills one field with the twins; the same bits as on a device.
 ///
 /// `values`, `domain`: `[row, col]`, one number a cell; values NaN or [`MISSING`] where there is no data.
 pub fn on_cpu(
@@ -160,7 +160,7 @@ pub struct Fill {
     sources: Sources,
     window: Window,
     exact: OnceLock<Exact>,
-    /// Tables of the last grid of the window's form: products have many frames of one grid.
+    /// Tables of the last grid of the window's form: products have many fields of one grid.
     tables: Mutex<Option<Arc<DeviceLadder>>>,
 }
 
@@ -180,7 +180,7 @@ impl Fill {
         grid.rows <= MOST_ROWS && 12 * grid.cell_count() as u64 <= gpu.most_buffer_bytes()
     }
 
-    /// Fills one frame on the device; see [`on_cpu`].
+    /// Fills one field on the device; see [`on_cpu`].
     pub fn run(
         &self,
         gpu: &Gpu,

@@ -12,7 +12,7 @@ const WIDTH: u32 = 128;
 /// Rows that it takes.
 const ROWS: u32 = 4;
 
-/// The tables of a grid's levels; they depend on the grid alone and are kept between frames.
+/// The tables of a grid's levels; they depend on the grid alone and are kept between fields.
 pub struct DeviceLadder {
     /// What the tables were made for.
     pub grid: Grid,

@@ -1,8 +1,8 @@
-//! Values of a frame about their mean in units of a power of two, so that sums of them lose nothing to their size.
+//! Values of a field about their mean in units of a power of two, so that sums of them lose nothing to their size.
 
 use crate::stages::layout::{MISSING, is_missing};
 
-/// A frame's values between -1 and 1 and how to get back.
+/// A field's values between -1 and 1 and how to get back.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scaled {
     /// `[row, col]`; [`MISSING`] where there is no data.

@@ -73,7 +73,7 @@ fn stencil(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_in
     if (lane == 0u) { any_wanted = 0u; }
     workgroupBarrier();
     if (any(wants)) { any_wanted = 1u; }
-    // Most of an open or a land-locked frame has no gap.
+    // Most of an open or a land-locked field has no gap.
     if (workgroupUniformLoad(&any_wanted) == 0u) { return; }
     var total_0 = vec3<f32>(0.0);
     var total_1 = vec3<f32>(0.0);

@@ -22,13 +22,13 @@ const MOST_SPEED: f32 = 1.0e6;
 /// What the stage reads.
 pub struct Inputs<'a> {
     pub active: &'a [Active],
-    pub field: Field<'a>,
+    pub field: VectorField<'a>,
     pub palette: &'a [u32],
 }
 
 /// A vector field on a grid.
 #[derive(Clone, Copy)]
-pub struct Field<'a> {
+pub struct VectorField<'a> {
     pub params: &'a Params,
     pub rows: &'a [Row],
     pub velocity: &'a [Velocity],
@@ -133,7 +133,7 @@ fn dot_of(params: &Params, palette: &[u32], trail: &Trail, number: u32, speed: f
     }
 }
 
-impl Field<'_> {
+impl VectorField<'_> {
     fn cell(&self, row: i32, col: i32) -> Vec3 {
         let (rows, cols) = (self.params.grid.rows as i32, self.params.grid.cols as i32);
         let col = if self.params.grid.periodic == 1 {

@@ -1,4 +1,4 @@
-//! Flows: the frames of both parts of a vector in, the velocity of every cell out, and from it particles that drift.
+//! Flows: the fields of both parts of a vector in, the velocity of every cell out, and from it particles that drift.
 //!
 //! A particle's life is a cycle: born somewhere in its cell, it drifts for a while, fades and is born elsewhere. Where it
 //! is at an instant follows from its number and the clock alone, so any worker draws it at the same place.

@@ -3,8 +3,8 @@
 use crate::stages::layout::{MISSING, is_missing};
 use crate::stages::params::Params;
 
-/// Value between two adjacent frames, `weight` of the way from `v1` to `v2` (eq. 3 in docs/method.md); missing if either is, unless the
-/// instant is that of the first frame.
+/// Value between two adjacent fields, `weight` of the way from `v1` to `v2` (eq. 3 in docs/method.md); missing if either is, unless the
+/// instant is that of the first field.
 pub fn interpolated(v1: f32, v2: f32, weight: f32) -> f32 {
     if weight <= 0.0 {
         return v1;

@@ -1,4 +1,4 @@
-//! Interpolation in time (eq. 3 in docs/method.md): the frames before and after an instant in, the grid at the instant out.
+//! Interpolation in time (eq. 3 in docs/method.md): the fields before and after an instant in, the grid at the instant out.
 
 pub mod cpu;
 pub mod params;

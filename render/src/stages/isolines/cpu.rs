@@ -43,7 +43,7 @@ impl<'a> Inputs<'a> {
 
 /// The value at a place over the range of colours, and its change for each column and row.
 #[derive(Debug, Clone, Copy)]
-struct Field {
+struct FieldAt {
     value: f32,
     per_col: f32,
     per_row: f32,
@@ -114,7 +114,7 @@ fn mix(a: Vec3, b: Vec3, t: f32) -> Vec3 {
     a * (1.0 - t) + b * t
 }
 
-fn field_at(params: &Params, inputs: &Inputs<'_>, [x, y]: [Axis; 2]) -> Option<Field> {
+fn field_at(params: &Params, inputs: &Inputs<'_>, [x, y]: [Axis; 2]) -> Option<FieldAt> {
     let cell = |row, col| cell_value(params, inputs, row, col);
     let [north_west, north_east] = [x.index, x.index + 1].map(|col| cell(y.index, col));
     let [south_west, south_east] = [x.index, x.index + 1].map(|col| cell(y.index + 1, col));
@@ -127,14 +127,14 @@ fn field_at(params: &Params, inputs: &Inputs<'_>, [x, y]: [Axis; 2]) -> Option<F
     let east = mix(north_east - north_west, south_east - south_west, y.fraction);
     let down = south - north;
     let value = sum.x / sum.z;
-    Some(Field {
+    Some(FieldAt {
         value,
         per_col: (east.x - value * east.z) / sum.z,
         per_row: (down.x - value * down.z) / sum.z,
     })
 }
 
-fn per_rad_of(params: &Params, field: Field) -> Vec2 {
+fn per_rad_of(params: &Params, field: FieldAt) -> Vec2 {
     let grid = &params.grid;
     Vec2::new(
         field.per_col * grid.cols_per_rad,
@@ -173,7 +173,7 @@ fn graticule_of(params: &Params, angle: f32, slope: f32) -> f32 {
     (own.graticule_half_px + 0.5 - off_px).clamp(0.0, 1.0) * crowd(per_px)
 }
 
-fn line_of(levels: &[Isoline], field: Field, slope: f32, inside: f32) -> u32 {
+fn line_of(levels: &[Isoline], field: FieldAt, slope: f32, inside: f32) -> u32 {
     let (mut cover, mut grey) = (0.0, 0.0);
     for level in levels {
         let off_px = (field.value - level.value).abs() / slope.max(1.0e-20);

@@ -21,7 +21,7 @@ const RIM_PER_PX = 0.3;
 const FLAT_PX = 10000.0;
 
 // The value at a place over the range of colours, and its change for each column and row; without weight where there is no data.
-struct Field { weight: f32, value: f32, per_col: f32, per_row: f32 }
+struct FieldAt { weight: f32, value: f32, per_col: f32, per_row: f32 }
 
 // Value times the share of the cell that holds data, 1, and that share; or zeros where there is no data.
 fn cell_value(row: i32, col: i32) -> vec3<f32> {
@@ -33,7 +33,7 @@ fn cell_value(row: i32, col: i32) -> vec3<f32> {
     return vec3((value - isolines.low) * isolines.per_unit * share, 1.0, share);
 }
 
-fn field_at(x: Axis, y: Axis) -> Field {
+fn field_at(x: Axis, y: Axis) -> FieldAt {
     let north_west = cell_value(y.index, x.index);
     let north_east = cell_value(y.index, x.index + 1);
     let south_west = cell_value(y.index + 1, x.index);
@@ -41,7 +41,7 @@ fn field_at(x: Axis, y: Axis) -> Field {
     let north = mix(north_west, north_east, x.fraction);
     let south = mix(south_west, south_east, x.fraction);
     let sum = mix(north, south, y.fraction);
-    var field: Field;
+    var field: FieldAt;
     if (sum.y < 0.5 || sum.z <= 0.0) { return field; }
     let east = mix(north_east - north_west, south_east - south_west, y.fraction);
     let down = south - north;
@@ -86,7 +86,7 @@ fn graticule_of(angle: f32, slope: f32) -> f32 {
 }
 
 // Share of a pixel that isolines cover, in the low 12 bits, and their grey in the next 8.
-fn line_of(field: Field, slope: f32, inside: f32) -> u32 {
+fn line_of(field: FieldAt, slope: f32, inside: f32) -> u32 {
     var cover = 0.0;
     var grey = 0.0;
     for (var i = 0u; i < isolines.count; i++) {
@@ -104,7 +104,7 @@ fn line_of(field: Field, slope: f32, inside: f32) -> u32 {
 }
 
 // Change of the value for each radian east and north.
-fn per_rad_of(field: Field) -> vec2<f32> {
+fn per_rad_of(field: FieldAt) -> vec2<f32> {
     return vec2(field.per_col * grid.cols_per_rad, -field.per_row * grid.rows_per_rad);
 }
 

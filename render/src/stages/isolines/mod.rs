@@ -1,4 +1,4 @@
-//! Isolines and the graticule: the frames around an instant in; how much of every pixel lines on the sea surface cover out.
+//! Isolines and the graticule: the fields around an instant in; how much of every pixel lines on the sea surface cover out.
 //! See `isolines.wgsl`; composition lays them into the picture.
 
 pub mod cpu;

@@ -1,4 +1,4 @@
-//! A thematic tile with nothing around it, from frames to bytes on a processor: what the twins of `interpolate.wgsl`,
+//! A thematic tile with nothing around it, from fields to bytes on a processor: what the twins of `interpolate.wgsl`,
 //! `map.wgsl` and `compose.wgsl` make of it one after the other, bit for bit.
 //!
 //! A tile lies along the axes of its grid, so that what a row of cells gives a row of pixels is worked out once and serves
@@ -114,7 +114,7 @@ impl Colors {
 /// What a tile is drawn from.
 struct Tile<'a> {
     params: &'a Params,
-    /// Frames, `[row, col]`.
+    /// Fields, `[row, col]`.
     before: &'a [f32],
     after: &'a [f32],
     domain: &'a [u32],

@@ -19,7 +19,7 @@ fn interpolate_matches_its_twin() {
     let cells = 40..2500;
     let expected = &twins.value[cells.clone()];
     // A device may round a product and its sum at once, the twin rounds twice: an error of the largest operand's last
-    // bits, which is all there is where two frames cancel.
+    // bits, which is all there is where two fields cancel.
     let largest = expected
         .iter()
         .filter(|v| **v > MISSING)

@@ -25,9 +25,9 @@ fn time_sample(product: &str, weight: Option<f64>) -> TimeSample {
     });
     TimeSample {
         domain: ObjectKey::domain(&id, &of("domain")),
-        before: Some(ObjectKey::frame(&id, &of("before"))),
+        before: Some(ObjectKey::field(&id, &of("before"))),
         after: weight.map(|weight| After {
-            frame: ObjectKey::frame(&id, &of("after")),
+            field: ObjectKey::field(&id, &of("after")),
             weight,
         }),
         contributed: None,
@@ -63,7 +63,7 @@ pub(super) fn full() -> RenderJob {
             ..time_sample("flux-accumulated", Some(1.0 / 3.0))
         }),
         relief: Some(Relief {
-            frame: ObjectKey::frame(&"etopo".parse().unwrap(), &Digest::of(b"relief")),
+            field: ObjectKey::field(&"etopo".parse().unwrap(), &Digest::of(b"relief")),
             grid: GRID,
             exaggeration: 15.0,
         }),
@@ -173,7 +173,7 @@ fn frozen_words_stand_for_what_they_stood_for() {
     assert_eq!(then, now);
 }
 
-/// How stored numbers are to be understood: a unit that changes makes other values of every frame.
+/// How stored numbers are to be understood: a unit that changes makes other values of every field.
 #[test]
 fn units_of_stored_values_are_what_they_were() {
     let units = Quantity::ALL.map(|quantity| format!("{quantity:?} {}\n", quantity.unit()));

@@ -29,7 +29,7 @@ fn reader(kind: Kind) -> Reader {
             "ingest/tests/it/damaged.rs",
             "the_same_values_under_names_of_before_are_no_revision",
         ),
-        Kind::Frame | Kind::Series | Kind::Domain | Kind::Manifest => since_1(
+        Kind::Field | Kind::Series | Kind::Domain | Kind::Manifest => since_1(
             "storage/tests/it/frozen.rs",
             "frozen_products_hold_the_values_that_were_put_in",
         ),
@@ -43,7 +43,7 @@ fn reader(kind: Kind) -> Reader {
         ),
         Kind::Sums => since_1(
             "compute/tests/it/frozen.rs",
-            "frozen_sums_answer_where_no_frame_can",
+            "frozen_sums_answer_where_no_field_can",
         ),
         // Cubes were exported only, never in a store, before.
         Kind::Cube => since_2(

@@ -1,4 +1,4 @@
-//! Frames in memory: what is written is what is read, and nothing else is.
+//! Fields in memory: what is written is what is read, and nothing else is.
 
 use super::*;
 use arrow::compute::concat_batches;
@@ -33,9 +33,9 @@ fn product() -> ProductId {
     "p".parse().unwrap()
 }
 
-fn frame(values: &[f32]) -> (ObjectKey, Bytes) {
+fn field(values: &[f32]) -> (ObjectKey, Bytes) {
     let encoded = encode(&GRID, values, january()).unwrap();
-    let key = ObjectKey::frame(&product(), &encoded.values_sha256);
+    let key = ObjectKey::field(&product(), &encoded.values_sha256);
     (key, encoded.content)
 }
 
@@ -49,8 +49,8 @@ fn otherwise(values: &[f32]) -> Bytes {
 }
 
 #[test]
-fn a_frame_round_trips_with_its_gaps() {
-    let (key, content) = frame(&values());
+fn a_field_round_trips_with_its_gaps() {
+    let (key, content) = field(&values());
     let (back, period) = decode(&key, content, Some(&GRID)).unwrap();
     let bits = |v: &[f32]| v.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
     assert_eq!(bits(&back), bits(&values()));
@@ -61,8 +61,8 @@ fn a_frame_round_trips_with_its_gaps() {
 fn equal_values_have_one_name_whatever_their_nan_and_their_bytes() {
     let mut other = values();
     other[0] = -f32::NAN;
-    assert_eq!(frame(&other), frame(&values()));
-    let (key, content) = frame(&values());
+    assert_eq!(field(&other), field(&values()));
+    let (key, content) = field(&values());
     let otherwise = otherwise(&values());
     assert_ne!(
         otherwise, content,
@@ -70,15 +70,15 @@ fn equal_values_have_one_name_whatever_their_nan_and_their_bytes() {
     );
     assert!(decode(&key, otherwise, Some(&GRID)).is_ok());
     other[1] = 2.0;
-    assert_ne!(frame(&other).0, key);
+    assert_ne!(field(&other).0, key);
     let february = Period::month(2000, 2).unwrap();
     let later = encode(&GRID, &values(), february).unwrap();
-    assert_ne!(ObjectKey::frame(&product(), &later.values_sha256), key);
+    assert_ne!(ObjectKey::field(&product(), &later.values_sha256), key);
 }
 
 #[test]
-fn bytes_that_are_not_the_frame_of_their_name_are_damaged() {
-    let (key, content) = frame(&values());
+fn bytes_that_are_not_the_field_of_their_name_are_damaged() {
+    let (key, content) = field(&values());
     let other_grid = Grid { rows: 69, ..GRID };
     let half = content.slice(..content.len() / 2);
     let mut other = values();
@@ -87,7 +87,7 @@ fn bytes_that_are_not_the_frame_of_their_name_are_damaged() {
         (content, &other_grid),
         (half, &GRID),
         (Bytes::from("text"), &GRID),
-        (frame(&other).1, &GRID),
+        (field(&other).1, &GRID),
     ] {
         let error = decode(&key, content, Some(grid)).unwrap_err();
         assert!(matches!(error, StorageError::Damaged { .. }), "{error}");
@@ -96,14 +96,14 @@ fn bytes_that_are_not_the_frame_of_their_name_are_damaged() {
 }
 
 #[test]
-fn a_frame_that_lacks_a_chunk_or_has_one_twice_is_damaged_though_its_values_are_those_of_its_name()
+fn a_field_that_lacks_a_chunk_or_has_one_twice_is_damaged_though_its_values_are_those_of_its_name()
 {
     let mut values = values();
-    let last = frame_chunks(&GRID).pop().unwrap();
+    let last = field_chunks(&GRID).pop().unwrap();
     for cell in last.cell_indices(&GRID) {
         values[cell] = f32::NAN;
     }
-    let (key, content) = frame(&values);
+    let (key, content) = field(&values);
     assert!(decode(&key, content, Some(&GRID)).is_ok());
     let whole = batch(&GRID, &values, january()).unwrap();
     let without = whole.slice(0, whole.num_rows() - 1);
@@ -119,7 +119,7 @@ fn a_frame_that_lacks_a_chunk_or_has_one_twice_is_damaged_though_its_values_are_
 #[tokio::test]
 async fn the_same_values_in_other_bytes_are_no_conflict() {
     let store = Store::memory();
-    let (key, content) = frame(&values());
+    let (key, content) = field(&values());
     assert!(store.put_new(&key, otherwise(&values())).await.unwrap());
     assert!(!store.put_new(&key, content).await.unwrap());
     let back = read(&store, &key, &GRID).await.unwrap();
@@ -127,9 +127,9 @@ async fn the_same_values_in_other_bytes_are_no_conflict() {
 }
 
 #[tokio::test]
-async fn a_damaged_frame_is_an_error_until_it_is_written_again() {
+async fn a_damaged_field_is_an_error_until_it_is_written_again() {
     let store = Store::memory();
-    let (key, content) = frame(&values());
+    let (key, content) = field(&values());
     let mut damaged = content.to_vec();
     damaged[content.len() / 2] ^= 1;
     store.put_over(&key, damaged.into()).await.unwrap();
@@ -139,7 +139,7 @@ async fn a_damaged_frame_is_an_error_until_it_is_written_again() {
     assert_eq!(store.get(&key).await.unwrap(), content);
 }
 
-/// A frame as it was written when frames were named by their bytes.
+/// A field as it was written when fields were named by their bytes.
 fn of_bytes(values: &[f32]) -> (ObjectKey, Bytes) {
     let batch = batch(&GRID, values, january()).unwrap();
     let batch = batch.project(&[0, 1, 2, 3]).unwrap();
@@ -152,11 +152,11 @@ fn of_bytes(values: &[f32]) -> (ObjectKey, Bytes) {
 }
 
 #[tokio::test]
-async fn a_frame_named_by_its_bytes_keeps_its_name_as_long_as_it_holds_its_values() {
+async fn a_field_named_by_its_bytes_keeps_its_name_as_long_as_it_holds_its_values() {
     let store = Store::memory();
     let (old, content) = of_bytes(&values());
     store.put_new(&old, content).await.unwrap();
-    let (new, _) = frame(&values());
+    let (new, _) = field(&values());
     assert_eq!(
         read(&store, &old, &GRID).await.unwrap().len(),
         values().len()
@@ -164,7 +164,7 @@ async fn a_frame_named_by_its_bytes_keeps_its_name_as_long_as_it_holds_its_value
     assert_eq!(settle(&store, &old, &new, &GRID).await.unwrap(), old);
     let mut other = values();
     other[1] += 1.0;
-    let (other, _) = frame(&other);
+    let (other, _) = field(&other);
     assert_eq!(settle(&store, &old, &other, &GRID).await.unwrap(), other);
     let (lost, content) = of_bytes(&vec![1.0; GRID.cell_count()]);
     let mut damaged = content.to_vec();

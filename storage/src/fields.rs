@@ -1,6 +1,6 @@
-//! Frames: one time step map-major, a row a chunk with the chunk's values as one array.
+//! Fields: one time step map-major, a row a chunk with the chunk's values as one array.
 //!
-//! A frame is named by the digest of its values: other bytes for the same values are the same frame. Frames stored
+//! A field is named by the digest of its values: other bytes for the same values are the same field. Fields stored
 //! before that was so are named by the digest of their bytes and have no check in their rows; they are read as they are.
 
 mod names;
@@ -14,7 +14,7 @@ use arrow::datatypes::{
     DataType, Field, Float32Type, Schema, SchemaRef, TimeUnit, TimestampMillisecondType, UInt32Type,
 };
 use bytes::Bytes;
-use contract::chunk::frame_chunks;
+use contract::chunk::field_chunks;
 use contract::digest::Digest;
 use contract::grid::Grid;
 use contract::key::ObjectKey;
@@ -31,12 +31,12 @@ use crate::{Encoded, StorageError, Store};
 
 pub use names::settle;
 
-/// Chunks a reader takes at once: small enough to spread a large frame over partitions.
+/// Chunks a reader takes at once: small enough to spread a large field over partitions.
 const CHUNKS_PER_GROUP: usize = 64;
 /// Column of the values.
 const VALUES: usize = 3;
 
-/// Columns of a frame: `chunk`, `period_start`, `period_end`, `values`, and `check`, the [`RowCheck`] of the others in
+/// Columns of a field: `chunk`, `period_start`, `period_end`, `values`, and `check`, the [`RowCheck`] of the others in
 /// their order.
 pub static SCHEMA: LazyLock<SchemaRef> = LazyLock::new(|| {
     let mut fields = SCHEMA_1.fields().to_vec();
@@ -44,7 +44,7 @@ pub static SCHEMA: LazyLock<SchemaRef> = LazyLock::new(|| {
     Arc::new(Schema::new(fields))
 });
 
-/// The same of frames that are named by their bytes.
+/// The same of fields that are named by their bytes.
 pub static SCHEMA_1: LazyLock<SchemaRef> = LazyLock::new(|| {
     let time = || DataType::Timestamp(TimeUnit::Millisecond, Some("UTC".into()));
     Arc::new(Schema::new(vec![
@@ -55,7 +55,7 @@ pub static SCHEMA_1: LazyLock<SchemaRef> = LazyLock::new(|| {
     ]))
 });
 
-/// A frame of `values` (`[row, col]`, stored unit, NaN no data) as bytes.
+/// A field of `values` (`[row, col]`, stored unit, NaN no data) as bytes.
 pub fn encode(grid: &Grid, values: &[f32], period: Period) -> Result<Encoded, StorageError> {
     let batch = batch(grid, values, period)?;
     Ok(Encoded {
@@ -64,7 +64,7 @@ pub fn encode(grid: &Grid, values: &[f32], period: Period) -> Result<Encoded, St
     })
 }
 
-/// What a frame is: the shape of its grid, its period, its values row by row. Where the grid lies is not in it: axes of
+/// What a field is: the shape of its grid, its period, its values row by row. Where the grid lies is not in it: axes of
 /// two files of one product may differ in their last digits.
 pub fn digest_of(grid: &Grid, values: &[f32], period: Period) -> Digest {
     ValuesDigest::new("fluxglobe frame 2\n")
@@ -79,9 +79,9 @@ pub fn digest_of(grid: &Grid, values: &[f32], period: Period) -> Digest {
 fn batch(grid: &Grid, values: &[f32], period: Period) -> Result<RecordBatch, StorageError> {
     if values.len() != grid.cell_count() {
         let reason = format!("{} values for {} cells", values.len(), grid.cell_count());
-        return Err(StorageError::damaged("frame to write", reason));
+        return Err(StorageError::damaged("field to write", reason));
     }
-    let windows = frame_chunks(grid);
+    let windows = field_chunks(grid);
     let mut lists = ListBuilder::new(Float32Builder::new()).with_field(value_field());
     let mut checks = Vec::with_capacity(windows.len());
     let mut chunk_values = vec![];
@@ -105,7 +105,7 @@ fn batch(grid: &Grid, values: &[f32], period: Period) -> Result<RecordBatch, Sto
             Arc::new(UInt32Array::from(checks)),
         ],
     )
-    .map_err(|e| StorageError::damaged("frame to write", e))
+    .map_err(|e| StorageError::damaged("field to write", e))
 }
 
 fn check_of_row(chunk: u32, period: Period, values: &[f32]) -> u32 {
@@ -117,7 +117,7 @@ fn check_of_row(chunk: u32, period: Period, values: &[f32]) -> u32 {
         .finish()
 }
 
-/// Values of a frame, `[row, col]`, and its period.
+/// Values of a field, `[row, col]`, and its period.
 fn decode(
     key: &ObjectKey,
     content: Bytes,
@@ -152,7 +152,7 @@ fn decode(
 
 fn values_of(table: &Table, grid: &Grid) -> Result<(Vec<f32>, Period), String> {
     let batch = &table.batch;
-    let windows = frame_chunks(grid);
+    let windows = field_chunks(grid);
     if batch.num_rows() != windows.len() || windows.is_empty() {
         return Err(format!(
             "{} chunks, its grid has {}",
@@ -184,12 +184,12 @@ fn values_of(table: &Table, grid: &Grid) -> Result<(Vec<f32>, Period), String> {
     Ok((values, period))
 }
 
-/// Has a frame that is named by its values these values?
+/// Has a field that is named by its values these values?
 pub(crate) fn check_values(key: &ObjectKey, content: Bytes) -> Result<(), StorageError> {
     decode(key, content, None).map(|_values| ())
 }
 
-/// Reads a stored frame, `[row, col]`. Its bytes and its values are compared with its name.
+/// Reads a stored field, `[row, col]`. Its bytes and its values are compared with its name.
 pub async fn read(store: &Store, key: &ObjectKey, grid: &Grid) -> Result<Vec<f32>, StorageError> {
     read_with_period(store, key, grid)
         .await
@@ -212,7 +212,7 @@ async fn read_with_period(
     off_thread(move || decode(&key, content, Some(&grid))).await
 }
 
-/// Stores a frame under the digest of its values.
+/// Stores a field under the digest of its values.
 pub async fn write(
     store: &Store,
     product: &ProductId,
@@ -221,7 +221,7 @@ pub async fn write(
     period: Period,
 ) -> Result<ObjectKey, StorageError> {
     let encoded = encode(grid, values, period)?;
-    let key = ObjectKey::frame(product, &encoded.values_sha256);
+    let key = ObjectKey::field(product, &encoded.values_sha256);
     store.put_new(&key, encoded.content).await?;
     Ok(key)
 }

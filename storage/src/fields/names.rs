@@ -1,4 +1,4 @@
-//! Which of two names of frames stays: a frame that was named by its bytes is no other one for being named by its values.
+//! Which of two names of fields stays: a field that was named by its bytes is no other one for being named by its values.
 
 use contract::grid::Grid;
 use contract::key::ObjectKey;
@@ -7,10 +7,10 @@ use contract::kind::Vouched;
 use super::{digest_of, read_with_period};
 use crate::{StorageError, Store};
 
-/// The name of a frame that is to stand in the place of another: that one's name if both hold the same values of the
+/// The name of a field that is to stand in the place of another: that one's name if both hold the same values of the
 /// same period.
 ///
-/// Only a frame that is named by its bytes has to be read for it. One that is gone or damaged stays nobody's name.
+/// Only a field that is named by its bytes has to be read for it. One that is gone or damaged stays nobody's name.
 pub async fn settle(
     store: &Store,
     there: &ObjectKey,
@@ -25,7 +25,7 @@ pub async fn settle(
         Ok(_other) => Ok(new.clone()),
         Err(e) if e.is_not_found() => Ok(new.clone()),
         Err(error @ StorageError::Damaged { .. }) => {
-            tracing::warn!(%error, "a damaged frame is replaced");
+            tracing::warn!(%error, "a damaged field is replaced");
             Ok(new.clone())
         }
         Err(e) => Err(e),

@@ -13,14 +13,14 @@ use zarrs::array::{
 use crate::arrays::{self, Definition};
 use crate::{CubeError, Description, Layout};
 
-/// Writes frames of one grid as objects of the layout.
+/// Writes fields of one grid as objects of the layout.
 pub(crate) struct Encoder {
     definition: Definition,
     grid: Grid,
     layout: Layout,
 }
 
-/// An object of a frame: a chunk, or a shard of chunks.
+/// An object of a field: a chunk, or a shard of chunks.
 pub(crate) struct EncodedObject {
     /// Row and column of objects.
     pub(crate) index: [u32; 2],
@@ -37,7 +37,7 @@ impl Encoder {
         })
     }
 
-    /// Rows and columns of all objects of a frame.
+    /// Rows and columns of all objects of a field.
     pub(crate) fn indices(&self) -> Vec<[u32; 2]> {
         let [rows, cols] = self.layout.objects(&self.grid);
         (0..rows)
@@ -45,7 +45,7 @@ impl Encoder {
             .collect()
     }
 
-    /// Encodes one object of a frame of `values`, `[row, col]`.
+    /// Encodes one object of a field of `values`, `[row, col]`.
     pub(crate) fn encode(
         &self,
         values: &[f32],
