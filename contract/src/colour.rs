@@ -39,8 +39,8 @@ pub struct TransferFunction {
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub reversed: bool,
     /// Colours in place of the palette's, by stored value.
-    #[serde(default, skip_serializing_if = "Stops::is_empty")]
-    pub colors: Stops<Rgb>,
+    #[serde(rename = "colors", default, skip_serializing_if = "Stops::is_empty")]
+    pub colours: Stops<Rgb>,
     /// Share of the style's optical depth, and of a map's opacity, in place of the usual one, by stored value.
     #[serde(default, skip_serializing_if = "Stops::is_empty")]
     pub opacity: Stops<Share>,
@@ -58,7 +58,7 @@ impl TransferFunction {
             high,
             scale: Scale::Linear,
             reversed: false,
-            colors: Stops::default(),
+            colours: Stops::default(),
             opacity: Stops::default(),
             size: Stops::default(),
         }
@@ -110,18 +110,19 @@ impl TransferFunction {
     }
 
     /// Colour of a stored value, sRGB 0 to 1, straight between stops; black for NaN.
-    pub fn color(&self, value: f64) -> [f64; 3] {
+    pub fn colour(&self, value: f64) -> [f64; 3] {
         let position = self.position(value);
         if position.is_nan() {
             return [0.0; 3];
         }
-        let Some((below, above, share)) = self.colors.around(self.within(value), self.scale) else {
+        let Some((below, above, share)) = self.colours.around(self.within(value), self.scale)
+        else {
             let place = if self.reversed {
                 1.0 - position
             } else {
                 position
             };
-            return self.palette.color_at(place);
+            return self.palette.colour_at(place);
         };
         std::array::from_fn(|c| {
             (f64::from(below.0[c]) * (1.0 - share) + f64::from(above.0[c]) * share) / 255.0
@@ -159,10 +160,10 @@ impl TransferFunction {
         if self.high - self.low < MIN_SPAN {
             return bad("the two values are too close to each other");
         }
-        if self.reversed && !self.colors.is_empty() {
+        if self.reversed && !self.colours.is_empty() {
             return bad("a palette is turned round, colour stops are written the other way round");
         }
-        self.colors.validate()?;
+        self.colours.validate()?;
         self.opacity.validate()?;
         self.size.validate()?;
         self.validate_scale()
@@ -170,7 +171,7 @@ impl TransferFunction {
 
     /// Refuses what a logarithm has no place for.
     fn validate_scale(&self) -> Result<(), ContractError> {
-        let firsts = [self.colors.span(), self.opacity.span(), self.size.span()];
+        let firsts = [self.colours.span(), self.opacity.span(), self.size.span()];
         let firsts = firsts.into_iter().flatten().map(|(first, _)| first);
         let lowest = firsts.fold(self.low, f64::min);
         if self.scale == Scale::Linear || (lowest > 0.0 && self.high / self.low >= MIN_RATIO) {
@@ -194,8 +195,11 @@ mod tests {
     #[test]
     fn the_middle_of_a_diverging_palette_is_no_flux() {
         let tf = TransferFunction::default_for(Quantity::CarbonFlux);
-        assert_eq!(tf.color(0.0), [240.0 / 255.0, 240.0 / 255.0, 238.0 / 255.0]);
-        assert_eq!(tf.color(-1.0), [17.0 / 255.0, 56.0 / 255.0, 127.0 / 255.0]);
+        assert_eq!(
+            tf.colour(0.0),
+            [240.0 / 255.0, 240.0 / 255.0, 238.0 / 255.0]
+        );
+        assert_eq!(tf.colour(-1.0), [17.0 / 255.0, 56.0 / 255.0, 127.0 / 255.0]);
     }
 
     #[test]
@@ -214,21 +218,21 @@ mod tests {
             reversed: true,
             ..plain
         };
-        assert_eq!(plain.color(0.0), reversed.color(1.0));
-        assert_eq!(plain.color(0.25), reversed.color(0.75));
-        assert_ne!(plain.color(0.25), reversed.color(0.25));
+        assert_eq!(plain.colour(0.0), reversed.colour(1.0));
+        assert_eq!(plain.colour(0.25), reversed.colour(0.75));
+        assert_ne!(plain.colour(0.25), reversed.colour(0.25));
     }
 
     #[test]
     fn stops_take_the_place_of_the_palette() {
         let tf = TransferFunction {
-            colors: "0:#000000,4:#ffffff".parse().unwrap(),
+            colours: "0:#000000,4:#ffffff".parse().unwrap(),
             opacity: "1:0,3:1".parse().unwrap(),
             ..TransferFunction::linear(Palette::Ice, 1.0, 4.0)
         };
-        assert_eq!(tf.color(2.0), [0.5; 3]);
-        assert_eq!(tf.color(-9.0), [0.25; 3], "as at the range's end");
-        assert_eq!(tf.color(f64::NAN), [0.0; 3]);
+        assert_eq!(tf.colour(2.0), [0.5; 3]);
+        assert_eq!(tf.colour(-9.0), [0.25; 3], "as at the range's end");
+        assert_eq!(tf.colour(f64::NAN), [0.0; 3]);
         assert_eq!(
             [1.0, 2.0, 9.0].map(|v| tf.opacity(v)),
             [Some(0.0), Some(0.5), Some(1.0)]
@@ -251,17 +255,17 @@ mod tests {
             (100.0, 1.0),
         ] {
             assert!((tf.position(value) - place).abs() < 1e-12, "{value}");
-            assert!((tf.color(value)[0] - place).abs() < 1e-12, "{value}");
+            assert!((tf.colour(value)[0] - place).abs() < 1e-12, "{value}");
             assert!((tf.value_at(place) / value - 1.0).abs() < 1e-12, "{place}");
         }
         assert_eq!([-1.0, 0.0, 1e9].map(|v| tf.position(v)), [0.0, 0.0, 1.0]);
         assert!(tf.position(f64::NAN).is_nan());
         let stops = TransferFunction {
-            colors: "0.01:#000000,1:#ffffff,100:#ffffff".parse().unwrap(),
+            colours: "0.01:#000000,1:#ffffff,100:#ffffff".parse().unwrap(),
             opacity: "0.1:0,10:1".parse().unwrap(),
             ..tf
         };
-        assert!((stops.color(0.1)[0] - 0.5).abs() < 1e-12);
+        assert!((stops.colour(0.1)[0] - 0.5).abs() < 1e-12);
         assert!((stops.opacity(1.0).unwrap() - 0.5).abs() < 1e-12);
     }
 
@@ -320,7 +324,7 @@ mod tests {
         }
         let both = TransferFunction {
             reversed: true,
-            colors: "0:#000000,4:#ffffff".parse().unwrap(),
+            colours: "0:#000000,4:#ffffff".parse().unwrap(),
             ..with(0.0, 1.0)
         };
         assert!(

@@ -612,7 +612,7 @@ mod tests {
         changed(|j| j.style.transfer.palette = Palette::Ice);
         changed(|j| j.style.transfer.reversed = true);
         changed(|j| j.style.transfer.high *= 2.0);
-        changed(|j| j.style.transfer.colors = "0:#000000,1:#ffffff".parse().unwrap());
+        changed(|j| j.style.transfer.colours = "0:#000000,1:#ffffff".parse().unwrap());
         changed(|j| j.style.transfer.opacity = "0:0.5".parse().unwrap());
         changed(|j| j.style.transfer.opacity = "0:0.25".parse().unwrap());
         changed(|j| j.style.transfer.size = "0:0.5".parse().unwrap());

@@ -18,7 +18,7 @@ use crate::time_sample::TimeSample;
 /// Trails of every cell at most, where cells are large on the screen.
 pub(crate) const TRAILS_PER_CELL: u32 = 64;
 /// One light colour without a hue: it stands for no value, and is told from the colours of any palette by its tone.
-const COLOR: Rgb = Rgb([250, 252, 255]);
+const COLOUR: Rgb = Rgb([250, 252, 255]);
 /// Opacity by speed, as shares of the fastest: slow water is left to the layer below.
 const OPACITY: [[f64; 2]; 3] = [[0.0, 0.06], [0.25, 0.6], [0.6, 1.0]];
 /// Speed at which trails are longest over the top of the range of a flow's colours: with no colours to tell speeds by, their
@@ -127,7 +127,7 @@ fn light(quantity: Quantity) -> Result<TransferFunction, ContractError> {
     };
     let opacity = OPACITY.map(|[place, share]| format!("{}:{share}", speed.value_at(place)));
     Ok(TransferFunction {
-        colors: format!("{}:{COLOR},{}:{COLOR}", speed.low, speed.high).parse()?,
+        colours: format!("{}:{COLOUR},{}:{COLOUR}", speed.low, speed.high).parse()?,
         opacity: opacity.join(",").parse()?,
         ..speed
     })

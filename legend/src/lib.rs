@@ -145,7 +145,7 @@ impl Legend {
             unit: display.unit,
             scale: transfer.scale,
             label,
-            stops: colors(transfer),
+            stops: colours(transfer),
             opacity: places(
                 transfer,
                 &transfer.opacity,
@@ -262,17 +262,17 @@ fn is_linear(scale: &Scale) -> bool {
     *scale == Scale::Linear
 }
 
-fn bytes(color: [f64; 3]) -> [u8; 3] {
-    color.map(|share| (share * 255.0).round() as u8)
+fn bytes(colour: [f64; 3]) -> [u8; 3] {
+    colour.map(|share| (share * 255.0).round() as u8)
 }
 
-fn colors(transfer: &TransferFunction) -> Vec<(f64, String)> {
-    let at = |value: f64| Rgb(bytes(transfer.color(value))).to_string();
-    if !transfer.colors.is_empty() {
+fn colours(transfer: &TransferFunction) -> Vec<(f64, String)> {
+    let at = |value: f64| Rgb(bytes(transfer.colour(value))).to_string();
+    if !transfer.colours.is_empty() {
         return places(
             transfer,
-            &transfer.colors,
-            |color: Rgb| color.to_string(),
+            &transfer.colours,
+            |colour: Rgb| colour.to_string(),
             |value| Some(at(value)),
         );
     }
@@ -285,10 +285,12 @@ fn colors(transfer: &TransferFunction) -> Vec<(f64, String)> {
 }
 
 /// Two colours or more at equal distances from 0 to 1.
-pub fn evenly_placed<'a>(colors: impl ExactSizeIterator<Item = &'a [u8; 3]>) -> Vec<(f64, String)> {
-    let last = (colors.len() - 1) as f64;
-    let stop = |(i, color): (usize, &[u8; 3])| (i as f64 / last, Rgb(*color).to_string());
-    colors.enumerate().map(stop).collect()
+pub fn evenly_placed<'a>(
+    colours: impl ExactSizeIterator<Item = &'a [u8; 3]>,
+) -> Vec<(f64, String)> {
+    let last = (colours.len() - 1) as f64;
+    let stop = |(i, colour): (usize, &[u8; 3])| (i as f64 / last, Rgb(*colour).to_string());
+    colours.enumerate().map(stop).collect()
 }
 
 /// Stops as places of the range and what holds there, its ends included; none without stops.
@@ -370,7 +372,7 @@ mod tests {
     fn stops_are_shown_within_the_range_with_what_holds_at_its_ends() {
         let options = TransferOptions {
             range: Some("2:6".parse().unwrap()),
-            colors: "0:#000000,4:#808080,4:#ff0000,8:#ffffff".parse().unwrap(),
+            colours: "0:#000000,4:#808080,4:#ff0000,8:#ffffff".parse().unwrap(),
             opacity: "2:0.5,3:1,9:1".parse().unwrap(),
             ..TransferOptions::default()
         };
@@ -401,8 +403,8 @@ mod tests {
             usual(Quantity::WindSpeed).stops,
             legend(Quantity::WindSpeed, &reversed).stops,
         );
-        let colors = there.iter().map(|(_, color)| color);
-        assert!(colors.eq(back.iter().rev().map(|(_, color)| color)));
+        let colours = there.iter().map(|(_, colour)| colour);
+        assert!(colours.eq(back.iter().rev().map(|(_, colour)| colour)));
         assert_ne!(there, back);
     }
 

@@ -102,9 +102,9 @@ mod tests {
     }
 
     fn at(pixels: &Pixmap, x: u32, y: u32) -> [u8; 3] {
-        let color = pixels.pixel(x, y).unwrap();
-        assert!(color.is_opaque());
-        [color.red(), color.green(), color.blue()]
+        let colour = pixels.pixel(x, y).unwrap();
+        assert!(colour.is_opaque());
+        [colour.red(), colour.green(), colour.blue()]
     }
 
     #[test]

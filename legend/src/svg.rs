@@ -87,8 +87,8 @@ pub fn write_bar(legend: &Legend, bar: Bar, to: &mut String) -> std::fmt::Result
         height,
     } = bar;
     to.push_str("<defs><linearGradient id=\"colors\">");
-    for (place, color) in &legend.stops {
-        write!(to, "<stop offset=\"{place:.6}\" stop-color=\"{color}\"/>")?;
+    for (place, colour) in &legend.stops {
+        write!(to, "<stop offset=\"{place:.6}\" stop-color=\"{colour}\"/>")?;
     }
     to.push_str("</linearGradient>");
     let bar = format!("x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\"");

@@ -134,11 +134,11 @@ mod tests {
     use super::*;
 
     /// A picture whose left quarter is drawn, in one premultiplied colour.
-    fn quarter(color: [f64; 4]) -> Picture {
+    fn quarter(colour: [f64; 4]) -> Picture {
         let (width, height) = (32u32, 16u32);
         let pixel = |at: u32| {
             if at % width < width / 4 {
-                color
+                colour
             } else {
                 [0.0; 4]
             }

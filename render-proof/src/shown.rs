@@ -12,8 +12,8 @@ const AGREED: f64 = 128.0;
 
 /// A picture over the dark sea, as FLIP sees it.
 pub fn seen(picture: &Picture) -> Image {
-    let colors = over_the_sea(picture);
-    let levels = colors.iter().map(|color| (*color * 255.0).to_array());
+    let colours = over_the_sea(picture);
+    let levels = colours.iter().map(|colour| (*colour * 255.0).to_array());
     opaque(picture, levels)
 }
 

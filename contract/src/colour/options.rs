@@ -27,7 +27,7 @@ pub struct TransferOptions {
     /// Another way to spread values over it.
     pub scale: Option<Scale>,
     /// Colours in place of a palette's.
-    pub colors: Stops<Rgb>,
+    pub colours: Stops<Rgb>,
     /// Opacity in place of the usual.
     pub opacity: Stops<Share>,
     /// Sizes in place of the usual.
@@ -64,7 +64,7 @@ impl TransferOptions {
         usual: &TransferFunction,
     ) -> Result<TransferFunction, ContractError> {
         if let Some(palette) = self.palette
-            && !self.colors.is_empty()
+            && !self.colours.is_empty()
         {
             let reason = "colour stops take a palette's place: give one of the two";
             return Err(ContractError::invalid("palette", palette.as_str(), reason));
@@ -72,7 +72,7 @@ impl TransferOptions {
         let display = quantity.display();
         let stored = |shown: f64| display.stored(shown);
         let range = self.range.map(|range| (range.low, range.high));
-        let (low, high) = match range.or(self.colors.span()) {
+        let (low, high) = match range.or(self.colours.span()) {
             Some((low, high)) => (stored(low), stored(high)),
             None => (usual.low, usual.high),
         };
@@ -82,7 +82,7 @@ impl TransferOptions {
             high,
             scale: self.scale(quantity, usual)?,
             reversed: self.reversed,
-            colors: self.colors.map_values(stored)?,
+            colours: self.colours.map_values(stored)?,
             opacity: self.opacity.map_values(stored)?,
             size: self.size.map_values(stored)?,
         };
@@ -157,7 +157,7 @@ mod tests {
     #[test]
     fn colour_stops_bring_their_own_range_unless_one_is_given() {
         let stops = TransferOptions {
-            colors: "5:#000000,25:#ffffff".parse().unwrap(),
+            colours: "5:#000000,25:#ffffff".parse().unwrap(),
             ..options()
         };
         let of = |options: &TransferOptions| options.over(Quantity::WindSpeed).unwrap();
@@ -207,7 +207,7 @@ mod tests {
     fn options_that_exclude_each_other_are_refused() {
         let both = TransferOptions {
             palette: Some(Palette::Ice),
-            colors: "5:#000000,25:#ffffff".parse().unwrap(),
+            colours: "5:#000000,25:#ffffff".parse().unwrap(),
             ..options()
         };
         let refused = both.over(Quantity::WindSpeed).unwrap_err().to_string();
@@ -220,7 +220,7 @@ mod tests {
         assert!(reversed.over(Quantity::WindSpeed).is_err());
         // A jump alone has no range of its own.
         let jump = TransferOptions {
-            colors: "5:#000000,5:#ffffff".parse().unwrap(),
+            colours: "5:#000000,5:#ffffff".parse().unwrap(),
             ..options()
         };
         assert!(jump.over(Quantity::WindSpeed).is_err());

@@ -96,7 +96,7 @@ impl Palette {
     }
 
     /// Colour at a place from 0 to 1, sRGB 0 to 1, linear between stops.
-    pub(super) fn color_at(self, place: f64) -> [f64; 3] {
+    pub(super) fn colour_at(self, place: f64) -> [f64; 3] {
         let stops = self.stops();
         let x = place * (stops.len() - 1) as f64;
         let i = (x as usize).min(stops.len() - 2);
@@ -322,7 +322,7 @@ mod tests {
     }
 
     fn lightness(palette: Palette, at: f64) -> f64 {
-        lab(linear(palette.color_at(at)))[0]
+        lab(linear(palette.colour_at(at)))[0]
     }
 
     /// Do the lightnesses from one place to another rise, or fall, at every step?
@@ -361,7 +361,7 @@ mod tests {
             for eye in [Eye::Usual, Eye::Protanope, Eye::Deuteranope] {
                 for i in 2..=10 {
                     let off = f64::from(i) / 20.0;
-                    let [low, high] = [0.5 - off, 0.5 + off].map(|at| palette.color_at(at));
+                    let [low, high] = [0.5 - off, 0.5 + off].map(|at| palette.colour_at(at));
                     let apart = apart(low, high, eye);
                     assert!(
                         apart > TOLD_APART,

@@ -232,8 +232,8 @@ impl TryFrom<String> for Rgb {
 }
 
 impl From<Rgb> for String {
-    fn from(color: Rgb) -> Self {
-        color.to_string()
+    fn from(colour: Rgb) -> Self {
+        colour.to_string()
     }
 }
 
@@ -376,15 +376,15 @@ mod tests {
         assert!(refused("1:0,1:1,1:0").contains("third"));
         let many = vec!["0:1"; 17].join(",");
         assert!(refused(&many).contains("at most 16"));
-        let colors = |text: &str| text.parse::<Stops<Rgb>>().unwrap_err().to_string();
-        assert!(colors("0:#ffffff").contains("at least 2"));
+        let colours = |text: &str| text.parse::<Stops<Rgb>>().unwrap_err().to_string();
+        assert!(colours("0:#ffffff").contains("at least 2"));
         for text in [
             "0:red,1:#000000",
             "0:#fff,1:#000000",
             "0:#gggggg,1:#000000",
             "0:#ffffff1,1:#000000",
         ] {
-            assert!(colors(text).contains("#rrggbb"), "{text}");
+            assert!(colours(text).contains("#rrggbb"), "{text}");
         }
     }
 

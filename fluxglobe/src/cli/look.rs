@@ -48,7 +48,7 @@ impl Look {
             palette: self.palette,
             range: self.range,
             scale: self.scale,
-            colors: self.stops.unwrap_or_default(),
+            colours: self.stops.unwrap_or_default(),
             opacity: self.opacity.unwrap_or_default(),
             size: self.particle_size.unwrap_or_default(),
             reversed: self.reverse,

@@ -249,12 +249,12 @@ fn draw(path: &Path, manifest: &Manifest, domain: &[u32], trial: &Trial) -> Resu
         }
     }
     let full = 2.0 * trial.score.rmse().filter(|rmse| *rmse > 0.0).unwrap_or(1.0);
-    let color = |(ground, worst): (&[u8; 3], &Option<f64>)| {
+    let colour = |(ground, worst): (&[u8; 3], &Option<f64>)| {
         let [red, green, blue] =
             worst.map_or(*ground, |apart| diverging((apart / full).clamp(-1.0, 1.0)));
         [red, green, blue, 255]
     };
-    let rgba8 = ground.iter().zip(&worst).flat_map(color).collect();
+    let rgba8 = ground.iter().zip(&worst).flat_map(colour).collect();
     let png = Image {
         width,
         height,

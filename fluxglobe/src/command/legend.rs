@@ -56,7 +56,7 @@ mod tests {
     fn looks_that_cannot_be_drawn_have_no_legend() {
         let options = TransferOptions {
             palette: "ice".parse().ok(),
-            colors: "0:#000000,1:#ffffff".parse().unwrap(),
+            colours: "0:#000000,1:#ffffff".parse().unwrap(),
             ..TransferOptions::default()
         };
         assert!(legend(Quantity::WindSpeed, &options, Form::Json).is_err());

@@ -36,8 +36,8 @@ struct Measured {
 }
 
 fn seen(palette: Palette, place: f64, reader: Reader) -> [f64; 3] {
-    let color = TransferFunction::linear(palette, 0.0, 1.0).color(place);
-    lab(reader.sees(linear(color)))
+    let colour = TransferFunction::linear(palette, 0.0, 1.0).colour(place);
+    lab(reader.sees(linear(colour)))
 }
 
 fn measured(palette: Palette, reader: Reader) -> Measured {
@@ -110,11 +110,11 @@ fn colours_that_are_not_ordered_are_seen() {
         [255, 0, 0],
         [128, 0, 0],
     ];
-    let lightness = jet.map(|color: [u8; 3]| lab(linear(color.map(|c| f64::from(c) / 255.0)))[0]);
+    let lightness = jet.map(|colour: [u8; 3]| lab(linear(colour.map(|c| f64::from(c) / 255.0)))[0]);
     assert!(!lightness.is_sorted() && !lightness.iter().rev().is_sorted());
     // The dark arms of a published blue and green palette, which tritanopes take for one another.
     let arms = [[27, 62, 130], [24, 79, 36]];
-    let [blue, green] = arms.map(|color: [u8; 3]| linear(color.map(|c| f64::from(c) / 255.0)));
+    let [blue, green] = arms.map(|colour: [u8; 3]| linear(colour.map(|c| f64::from(c) / 255.0)));
     let apart = |reader: Reader| difference(lab(reader.sees(blue)), lab(reader.sees(green)));
     assert!(
         apart(Reader::Tritanope) < LEAST_OF_ARMS,
@@ -184,8 +184,8 @@ fn drawing() -> String {
             push(format!("<linearGradient id=\"{id}\">"));
             for i in 0..=32 {
                 let place = f64::from(i) / 32.0;
-                let color = TransferFunction::linear(palette, 0.0, 1.0).color(place);
-                let [r, g, b] = bytes(reader.sees(linear(color)));
+                let colour = TransferFunction::linear(palette, 0.0, 1.0).colour(place);
+                let [r, g, b] = bytes(reader.sees(linear(colour)));
                 push(format!(
                     "<stop offset=\"{place:.5}\" stop-color=\"#{r:02x}{g:02x}{b:02x}\"/>"
                 ));

@@ -10,7 +10,7 @@ override LIGHT_GAIN: f32;
 struct Corner {
     @builtin(position) position: vec4<f32>,
     @location(0) offset: vec2<f32>,
-    @location(1) @interpolate(flat) color: vec4<f32>,
+    @location(1) @interpolate(flat) colour: vec4<f32>,
 }
 
 // Quads of an instance: those of a slice are drawn as so many instances as hold them, of corners that an index buffer
@@ -57,7 +57,7 @@ fn eye_corner(@builtin(vertex_index) vertex: u32, @builtin(instance_index) insta
     var corner: Corner;
     corner.offset = corner_of(vertex);
     corner.position = clip(center + corner.offset * radius, vec2<f32>(view.size_px));
-    corner.color = vec4(min(rgb * shade, vec3(1.0)), f32(near.z >> 16u) / lists.depth_one);
+    corner.colour = vec4(min(rgb * shade, vec3(1.0)), f32(near.z >> 16u) / lists.depth_one);
     return corner;
 }
 
@@ -68,8 +68,8 @@ fn weight(offset: vec2<f32>) -> f32 {
 
 @fragment
 fn eye_pixel(corner: Corner) -> @location(0) vec4<f32> {
-    let alpha = 1.0 - exp(-corner.color.w * weight(corner.offset));
-    return vec4(corner.color.xyz * alpha, alpha);
+    let alpha = 1.0 - exp(-corner.colour.w * weight(corner.offset));
+    return vec4(corner.colour.xyz * alpha, alpha);
 }
 
 @vertex
@@ -87,13 +87,13 @@ fn light_corner(@builtin(vertex_index) vertex: u32, @builtin(instance_index) ins
     corner.position = clip(center + corner.offset * radius, vec2<f32>(lighting.size));
     let radius_px = f32((near.z & RADIUS_BITS) << lists.entry_shift) / f32(SUBPIXELS);
     let mass = f32(near.z >> 16u) / lists.depth_one * radius_px * radius_px * LIGHT_GAIN;
-    corner.color = vec4(mass * 3.0 / (3.14159265 * radius * radius));
+    corner.colour = vec4(mass * 3.0 / (3.14159265 * radius * radius));
     return corner;
 }
 
 @fragment
 fn light_pixel(corner: Corner) -> @location(0) vec4<f32> {
-    return vec4(corner.color.x * weight(corner.offset));
+    return vec4(corner.colour.x * weight(corner.offset));
 }
 
 // Sorting by slice, once a frame: count, prefix, scatter. In the order splats count from 1; 0 is nobody.

@@ -3,19 +3,19 @@
 //! Source: Andersson, Nilsson, Akenine-Möller, Oskarsson, Åström, Fairchild (2020), FLIP: A Difference Evaluator for
 //! Alternating Images, doi:10.1145/3406183, with its erratum (luminance is divided by 116). Pictures are opaque sRGB.
 
-mod color;
+mod colour;
 mod features;
 mod window;
 
 use glam::DVec3;
 
-use color::Opponents;
+use colour::Opponents;
 
 /// Pixels in a degree of the eye's view: 0.7 m before a screen of 3840 pixels on 0.7 m.
 pub const PIXELS_PER_DEGREE: f64 = 3840.0 / 0.7 * 0.7 * std::f64::consts::PI / 180.0;
 
 /// Exponent that compresses distances of colours.
-const COLOR_EXPONENT: f64 = 0.7;
+const COLOUR_EXPONENT: f64 = 0.7;
 /// Distances below this share of the largest ...
 const LOW_SHARE: f64 = 0.4;
 /// ... take up this share of the scale: large differences are all alike.
@@ -44,11 +44,11 @@ pub fn flip(a: &Screen<'_>, b: &Screen<'_>) -> Vec<f64> {
     let [one, other] = [a, b].map(|screen| Opponents::of(screen.width, screen.srgb));
     let features = features::difference(&one.lightness(), &other.lightness());
     let [one, other] = [one, other].map(|opponents| opponents.as_seen());
-    let largest = color::largest_distance().powf(COLOR_EXPONENT);
+    let largest = colour::largest_distance().powf(COLOUR_EXPONENT);
     let pixels = one.iter().zip(&other).zip(features);
     pixels
         .map(|((one, other), feature)| {
-            let power = color::distance(*one, *other).powf(COLOR_EXPONENT);
+            let power = colour::distance(*one, *other).powf(COLOUR_EXPONENT);
             scaled(power, largest).powf(1.0 - feature.powf(FEATURE_EXPONENT))
         })
         .collect()
@@ -70,11 +70,11 @@ mod tests {
 
     const SIZE: [u32; 2] = [96, 64];
 
-    fn screen(color: impl Fn(u32, u32) -> [u32; 3]) -> Vec<DVec3> {
+    fn screen(colour: impl Fn(u32, u32) -> [u32; 3]) -> Vec<DVec3> {
         let [width, height] = SIZE;
         let places = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
         places
-            .map(|(x, y)| DVec3::from_array(color(x, y).map(|byte| f64::from(byte) / 255.0)))
+            .map(|(x, y)| DVec3::from_array(colour(x, y).map(|byte| f64::from(byte) / 255.0)))
             .collect()
     }
 

@@ -26,7 +26,7 @@ pub(super) struct Cloud {
     /// Optical depth straight through the middle.
     pub(super) depth: f64,
     /// Linear light.
-    pub(super) color: DVec3,
+    pub(super) colour: DVec3,
     /// The eye sees it; if not it still throws shadows.
     pub(super) is_seen: bool,
 }
@@ -164,7 +164,7 @@ fn cloud(
         center,
         radius,
         depth,
-        color: linear_of(DVec3::from_array(transfer.color(value))),
+        colour: linear_of(DVec3::from_array(transfer.colour(value))),
         is_seen: !space.is_hidden(center),
     })
 }
@@ -179,7 +179,7 @@ mod tests {
             center: DVec3::ZERO,
             radius: 2.5,
             depth: 0.7,
-            color: DVec3::ONE,
+            colour: DVec3::ONE,
             is_seen: true,
         };
         let density = |along: f64, miss_sq: f64| {

@@ -55,7 +55,7 @@ impl Shade {
 struct Piece {
     step: usize,
     depth: f64,
-    color: DVec3,
+    colour: DVec3,
 }
 
 impl<'a> Rays<'a> {
@@ -142,8 +142,8 @@ impl<'a> Rays<'a> {
         let offsets = (0..self.samples * self.samples)
             .map(|i| DVec2::new(share(i % self.samples), share(i / self.samples)));
         let seen = offsets.map(|offset| self.seen(list, self.space.ray(corner + offset)));
-        let sum = seen.fold([0.0; 4], |sum, color| {
-            [0, 1, 2, 3].map(|i| sum[i] + color[i])
+        let sum = seen.fold([0.0; 4], |sum, colour| {
+            [0, 1, 2, 3].map(|i| sum[i] + colour[i])
         });
         sum.map(|channel| channel / f64::from(self.samples * self.samples))
     }
@@ -172,7 +172,7 @@ impl<'a> Rays<'a> {
                 pieces.push(Piece {
                     step,
                     depth,
-                    color: cloud.color,
+                    colour: cloud.colour,
                 });
             }
         }
@@ -182,7 +182,7 @@ impl<'a> Rays<'a> {
 
     /// Light scattered towards the eye by the pieces of a sight line, in order from the eye.
     fn along(&self, ray: Ray, start: f64, pieces: &[Piece]) -> [f64; 4] {
-        let (mut color, mut through) = (DVec3::ZERO, 1.0);
+        let (mut colour, mut through) = (DVec3::ZERO, 1.0);
         for pieces in pieces.chunk_by(|a, b| a.step == b.step) {
             let depth: f64 = pieces.iter().map(|piece| piece.depth).sum();
             if depth <= 0.0 {
@@ -199,13 +199,13 @@ impl<'a> Rays<'a> {
             // A cloud saturates in the light by itself: white does not become whiter.
             let lit: DVec3 = pieces
                 .iter()
-                .map(|piece| (piece.color * shade).min(DVec3::ONE) * piece.depth)
+                .map(|piece| (piece.colour * shade).min(DVec3::ONE) * piece.depth)
                 .sum();
             let passing = (-depth).exp();
-            color += lit / depth * (through * (1.0 - passing));
+            colour += lit / depth * (through * (1.0 - passing));
             through *= passing;
         }
-        [color.x, color.y, color.z, 1.0 - through]
+        [colour.x, colour.y, colour.z, 1.0 - through]
     }
 }
 
@@ -229,12 +229,12 @@ mod tests {
         Space::of(&job)
     }
 
-    fn cloud(space: &Space, height_m: f64, depth: f64, color: DVec3) -> Cloud {
+    fn cloud(space: &Space, height_m: f64, depth: f64, colour: DVec3) -> Cloud {
         Cloud {
             center: space.place(0.0, 0.0, 0.0, height_m),
             radius: 0.01,
             depth,
-            color,
+            colour,
             is_seen: true,
         }
     }

@@ -61,7 +61,7 @@ fn sheet(depth: f64, elevation_deg: f64, particles: u32) -> RenderJob {
     style.optical_depth = depth;
     style.sun.elevation_deg = elevation_deg;
     style.particles_per_cell = particles;
-    style.transfer.colors = "-1e-9:#808080,1e-9:#808080".parse().unwrap();
+    style.transfer.colours = "-1e-9:#808080,1e-9:#808080".parse().unwrap();
     style.transfer.opacity = "-1e-9:1,1e-9:1".parse().unwrap();
     job
 }
@@ -134,7 +134,7 @@ fn spread(picture: &Picture) -> [f64; 2] {
 fn an_even_sheet_without_flux_has_little_speckle() {
     let renderer = Renderer::new(Backend::Cpu).unwrap();
     let mut job = sheet(0.75, 40.0, 16);
-    job.style.transfer.colors = "-1e-9:#ffffff,1e-9:#ffffff".parse().unwrap();
+    job.style.transfer.colours = "-1e-9:#ffffff,1e-9:#ffffff".parse().unwrap();
     let drawn = Picture::from(&renderer.render(&job, &even_sea()).unwrap());
     let [mean, levels] = spread(&drawn);
     println!("a white sheet of {mean:.1}: {levels:.2} levels");

@@ -65,7 +65,7 @@ fn stops_of_colour_opacity_and_size_mean_to_the_reference_what_they_mean_to_the_
     let scene = ocean(ONE_DEGREE);
     let mut job = job(Mode::Volume, globe(-122.0, 27.0, 2.2e6, 80));
     let transfer = &mut job.style.transfer;
-    transfer.colors = "-1e-9:#2d004b,0:#f7f7f7,1e-9:#7f3b08".parse().unwrap();
+    transfer.colours = "-1e-9:#2d004b,0:#f7f7f7,1e-9:#7f3b08".parse().unwrap();
     transfer.opacity = "-1e-9:1,0:0.2,1e-9:1".parse().unwrap();
     transfer.size = "-1e-9:1,0:0.7,1e-9:0.9".parse().unwrap();
     let truth = reference(&job, &scene, Fineness::default()).unwrap();
@@ -75,11 +75,11 @@ fn stops_of_colour_opacity_and_size_mean_to_the_reference_what_they_mean_to_the_
         change(&mut job);
         psnr_db(&drawn(&job, &scene), &truth)
     };
-    let colors = far(|job| job.style.transfer.colors = Stops::default());
+    let colours = far(|job| job.style.transfer.colours = Stops::default());
     let opacity = far(|job| job.style.transfer.opacity = Stops::default());
-    println!("{near:.2} dB, {colors:.2} dB in a palette, {opacity:.2} dB as opaque as usual");
+    println!("{near:.2} dB, {colours:.2} dB in a palette, {opacity:.2} dB as opaque as usual");
     assert!(near >= 42.0, "{near} dB");
-    assert!(colors < near - 10.0 && opacity < near - 10.0);
+    assert!(colours < near - 10.0 && opacity < near - 10.0);
 }
 
 #[test]

@@ -69,9 +69,9 @@ pub(super) fn draw(
         width: across,
         height: bar_height,
     };
-    let mut colors = String::new();
-    write_bar(&legend, bar, &mut colors).expect("a string takes any text");
-    panel.push(&colors);
+    let mut colours = String::new();
+    write_bar(&legend, bar, &mut colours).expect("a string takes any text");
+    panel.push(&colours);
     write_marks(&mut panel, &legend, [padding, foot], across, em)?;
     if let Some(ends) = ends {
         let y = foot + 2.45 * em;

@@ -50,7 +50,7 @@ fn store(at: u32, splat: Splat) {
         return;
     }
     let size = size_word(splat);
-    seen[at] = vec4(bitcast<u32>(splat.x_sub), bitcast<u32>(splat.y_sub), size, splat.color);
+    seen[at] = vec4(bitcast<u32>(splat.x_sub), bitcast<u32>(splat.y_sub), size, splat.colour);
     if (feature(MAKES_LIGHT, lighting.mode == LIGHT_OWN) && splat.light_depth > 0.0) { deposit(splat); }
     if (size == 0u) { return; }
     lit[at] = vec4(bitcast<u32>(splat.light_u), bitcast<u32>(splat.light_v),

@@ -204,7 +204,7 @@ fn below_the_sea(params: &mut Params, job: &RenderJob, camera: &Camera) {
     let [_east, _north, up] = camera.ground;
     let sun = up.dot(params.view.sun.as_dvec3()).clamp(0.0, 1.0) as f32;
     let day = 1.0 + sun_share * (sun - 0.75);
-    let [water, deep] = base_map::water(around.base_map).map(|color| color * day);
+    let [water, deep] = base_map::water(around.base_map).map(|colour| colour * day);
     let view = &mut params.view;
     (view.water, view.deep) = (water, deep);
     view.water_per_unit = (per_m * SPHERE_RADIUS_M) as f32;

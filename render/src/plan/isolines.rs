@@ -125,8 +125,8 @@ fn tone(job: &RenderJob, transfer: &TransferFunction, value: f64) -> f32 {
         (Mode::Points, View::Tile { .. }) => false,
         (Mode::Points, View::Globe { .. }) => job.style.context.base_map == BaseMap::Light,
         _ => {
-            let color = Vec3::from(transfer.color(value).map(|share| share as f32));
-            linear_of(color).dot(Vec3::new(0.2126, 0.7152, 0.0722)) > LIGHT_FROM
+            let colour = Vec3::from(transfer.colour(value).map(|share| share as f32));
+            linear_of(colour).dot(Vec3::new(0.2126, 0.7152, 0.0722)) > LIGHT_FROM
         }
     };
     if is_light { DARK } else { LIGHT }

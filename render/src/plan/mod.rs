@@ -454,12 +454,12 @@ fn palette(job: &RenderJob) -> Vec<u32> {
             code_of(linear_of(Vec3::splat(share as f32)).x)
         }
     };
-    let colors = (0..256).map(|i| {
+    let colours = (0..256).map(|i| {
         let value = transfer.value_at(f64::from(i) / 255.0);
-        let [r, g, b] = transfer.color(value);
+        let [r, g, b] = transfer.colour(value);
         byte(r) | byte(g) << 8 | byte(b) << 16
     });
-    colors.chain(shape::table(job.mode, transfer)).collect()
+    colours.chain(shape::table(job.mode, transfer)).collect()
 }
 
 /// Lowest and highest particle, m: from the fields, so that every tile of an instant has the same slice planes.

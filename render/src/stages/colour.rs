@@ -6,14 +6,14 @@
 use glam::Vec3;
 
 /// Red, green and blue of a particle's colour: square roots of linear light, times 255.
-pub fn codes_of(color: u32) -> Vec3 {
-    Vec3::from_array([0, 8, 16].map(|shift| ((color >> shift) & 255) as f32))
+pub fn codes_of(colour: u32) -> Vec3 {
+    Vec3::from_array([0, 8, 16].map(|shift| ((colour >> shift) & 255) as f32))
 }
 
 /// A colour with other codes; what its last byte says stays.
-pub fn with_codes(color: u32, codes: Vec3) -> u32 {
+pub fn with_codes(colour: u32, codes: Vec3) -> u32 {
     let rounded = codes.clamp(Vec3::ZERO, Vec3::splat(255.0)) + 0.5;
-    rounded.x as u32 | (rounded.y as u32) << 8 | (rounded.z as u32) << 16 | (color & 0xff00_0000)
+    rounded.x as u32 | (rounded.y as u32) << 8 | (rounded.z as u32) << 16 | (colour & 0xff00_0000)
 }
 
 /// Linear light of sRGB, both 0 to 1 (IEC 61966-2-1).
@@ -68,8 +68,8 @@ mod tests {
 
     #[test]
     fn codes_keep_the_last_byte_and_stop_at_their_ends() {
-        let color = with_codes(0x7f01_0203, Vec3::new(300.0, -4.0, 12.4));
-        assert_eq!(color, 0x7f0c_00ff);
-        assert_eq!(codes_of(color), Vec3::new(255.0, 0.0, 12.0));
+        let colour = with_codes(0x7f01_0203, Vec3::new(300.0, -4.0, 12.4));
+        assert_eq!(colour, 0x7f0c_00ff);
+        assert_eq!(codes_of(colour), Vec3::new(255.0, 0.0, 12.0));
     }
 }

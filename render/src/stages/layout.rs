@@ -126,7 +126,7 @@ shared_struct! {
         /// Optical depth that it gives its column, before sharing.
         pub depth: f32,
         /// Red, green, blue, strength; 8 bits each, red lowest.
-        pub color: u32,
+        pub colour: u32,
     }
 }
 
@@ -151,7 +151,7 @@ shared_struct! {
         pub day: f32,
         /// Red, green, blue, and how much of them is the particle's own light rather than that of water before it; 8 bits
         /// each, red lowest.
-        pub color: u32,
+        pub colour: u32,
         /// 1: farther than `ProjectParams::beyond_m` beyond the sea surface.
         pub is_beyond: u32,
     }
@@ -166,7 +166,7 @@ shared_struct! {
         /// Radius in the same unit in the low 15 bits, then [`BEYOND_BIT`], optical depth at the centre times `depth_one` of the lists in the high.
         pub size: u32,
         /// Red, green, blue, slice; 8 bits each, red lowest.
-        pub color: u32,
+        pub colour: u32,
     }
 }
 

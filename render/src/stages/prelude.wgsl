@@ -33,14 +33,14 @@ struct Col {
     x_sub: i32, x_span_px: f32, sin_lon: f32, cos_lon: f32, index: u32,
 }
 struct Particle {
-    row: u32, slot: u32, east: f32, south: f32, height_m: f32, mass_kg: f32, depth: f32, color: u32,
+    row: u32, slot: u32, east: f32, south: f32, height_m: f32, mass_kg: f32, depth: f32, colour: u32,
 }
 struct Splat {
     x_sub: i32, y_sub: i32, radius_px: f32, tau: f32, slice: f32, light_u: i32, light_v: i32, light_depth: f32,
-    day: f32, color: u32, is_beyond: u32,
+    day: f32, colour: u32, is_beyond: u32,
 }
 struct Entry {
-    place: u32, size: u32, color: u32,
+    place: u32, size: u32, colour: u32,
 }
 struct Velocity {
     east: f32, north: f32,
@@ -138,14 +138,14 @@ fn list_index(global: vec3<u32>, workgroups: vec3<u32>) -> u32 {
 
 // A particle's colour is linear light, each channel coded by its square root in 8 bits: steps about as even to the eye as
 // those of sRGB, and a multiplication decodes them.
-fn codes_of(color: u32) -> vec3<f32> {
-    return vec3(f32(color & 255u), f32((color >> 8u) & 255u), f32((color >> 16u) & 255u));
+fn codes_of(colour: u32) -> vec3<f32> {
+    return vec3(f32(colour & 255u), f32((colour >> 8u) & 255u), f32((colour >> 16u) & 255u));
 }
 
 // A colour with other codes; what its last byte says stays.
-fn with_codes(color: u32, codes: vec3<f32>) -> u32 {
+fn with_codes(colour: u32, codes: vec3<f32>) -> u32 {
     let rounded = vec3<u32>(clamp(codes, vec3(0.0), vec3(255.0)) + 0.5);
-    return rounded.x | (rounded.y << 8u) | (rounded.z << 16u) | (color & 0xff000000u);
+    return rounded.x | (rounded.y << 8u) | (rounded.z << 16u) | (colour & 0xff000000u);
 }
 
 // IEC 61966-2-1, sRGB.

@@ -39,11 +39,11 @@ fn paler(channel: u32, uncertainty: f32) -> u32 {
 
 /// Paler and more transparent.
 pub fn uncertain(particle: Particle, uncertainty: f32) -> Particle {
-    let color = particle.color;
-    let [r, g, b] = [0, 8, 16].map(|shift| paler(color >> shift, uncertainty) << shift);
+    let colour = particle.colour;
+    let [r, g, b] = [0, 8, 16].map(|shift| paler(colour >> shift, uncertainty) << shift);
     Particle {
         depth: particle.depth * (1.0 - (1.0 - DEPTH_LEFT) * uncertainty),
-        color: r | g | b | (color & 0xff00_0000),
+        colour: r | g | b | (colour & 0xff00_0000),
         ..particle
     }
 }
@@ -69,13 +69,13 @@ mod tests {
     fn a_particle_without_uncertainty_is_as_it_was_and_full_uncertainty_leaves_something() {
         let particle = Particle {
             depth: 2.0,
-            color: 0x80ff_0a00,
+            colour: 0x80ff_0a00,
             ..Particle::default()
         };
         assert_eq!(uncertain(particle, 0.0), particle);
         let faded = uncertain(particle, 1.0);
         assert!((faded.depth - 2.0 * DEPTH_LEFT).abs() < 1e-6);
-        let [r, g, b, strength] = faded.color.to_le_bytes();
+        let [r, g, b, strength] = faded.colour.to_le_bytes();
         assert_eq!(strength, 0x80, "its size stays");
         assert!(r > 100 && g > 100 && b < 255 && b > 200);
     }

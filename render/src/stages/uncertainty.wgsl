@@ -26,9 +26,9 @@ fn paler(channel: u32, uncertainty: f32) -> u32 {
 fn uncertain(particle: Particle, uncertainty: f32) -> Particle {
     var faded = particle;
     faded.depth = particle.depth * (1.0 - (1.0 - DEPTH_LEFT) * uncertainty);
-    let color = particle.color;
-    faded.color = paler(color, uncertainty) | (paler(color >> 8u, uncertainty) << 8u) | (paler(color >> 16u, uncertainty) << 16u)
-        | (color & 0xff000000u);
+    let colour = particle.colour;
+    faded.colour = paler(colour, uncertainty) | (paler(colour >> 8u, uncertainty) << 8u) | (paler(colour >> 16u, uncertainty) << 16u)
+        | (colour & 0xff000000u);
     return faded;
 }
 

@@ -175,7 +175,7 @@ fn the_core_and_nothing_else_hides_what_lies_beyond_it() {
     assert!(seen(1.1, at(24.0, 1.0), 1.0) && !seen(1.1, at(25.0, 1.0), 1.0));
 }
 
-fn color(image: &Image, [x, y]: [u32; 2]) -> Vec3 {
+fn colour(image: &Image, [x, y]: [u32; 2]) -> Vec3 {
     let [r, g, b, a] = image.pixel(x, y);
     assert_eq!(a, 255, "water is all round");
     Vec3::new(f32::from(r), f32::from(g), f32::from(b)) / 255.0
@@ -190,7 +190,7 @@ fn the_surface_is_seen_through_as_much_water_as_lies_before_it() {
         let mut job = job(Mode::Volume, view);
         job.style.globe_surface = true;
         job.style.context.sea_opacity = sea_opacity;
-        (color(&renderer.render(&job, &scene).unwrap(), [8, 8]), job)
+        (colour(&renderer.render(&job, &scene).unwrap(), [8, 8]), job)
     };
     for renderer in renderers("water") {
         let (near, job) = drawn(renderer, 1e3, 180.0, 0.0);

@@ -186,7 +186,7 @@ fn every_part_of_the_surroundings_is_seen_and_drawn_alike_by_both_back_ends() {
 }
 
 /// Red, green and blue of a pixel, 0 to 1.
-fn color(image: &Image, [x, y]: [u32; 2]) -> Vec3 {
+fn colour(image: &Image, [x, y]: [u32; 2]) -> Vec3 {
     let [r, g, b, a] = image.pixel(x, y);
     assert_eq!(a, 255, "the ground is opaque");
     Vec3::new(f32::from(r), f32::from(g), f32::from(b)) / 255.0
@@ -229,7 +229,7 @@ fn slopes_are_as_light_as_their_angle_to_the_sun_makes_them() {
             let height_m = (2000.0 + 50.0 * lon) as f32;
             let lit = linear_of(tint(height_m)) * sunlight(facing.dot(default_sun()));
             let expected = srgb_of(lit);
-            let found = color(&image, pixel);
+            let found = colour(&image, pixel);
             assert!(
                 (found - expected).abs().max_element() < 0.006,
                 "{found} {expected}"
@@ -250,7 +250,7 @@ fn the_sea_floor_is_seen_through_as_much_water_as_lies_above_it() {
     let expected = srgb_of(lit);
     for renderer in renderers("sea floor") {
         let image = renderer.render(&job, &scene).unwrap();
-        let found = color(&image, [100, 100]);
+        let found = colour(&image, [100, 100]);
         assert!(
             (found - expected).abs().max_element() < 0.005,
             "{found} {expected}"
@@ -386,9 +386,9 @@ fn a_large_terrain_is_drawn_in_cells_as_large_as_pixels() {
     let job = over_relief(job(Mode::Volume, tile(0, 0, 0, 256)), 15.0);
     for renderer in renderers("fine terrain") {
         let image = renderer.render(&job, &scene).unwrap();
-        let expected = color(&image, [10, 128]);
+        let expected = colour(&image, [10, 128]);
         for x in 0..256 {
-            let found = color(&image, [x, 128]);
+            let found = colour(&image, [x, 128]);
             assert!(
                 (found - expected).abs().max_element() < 0.01,
                 "{x}: {found} {expected}"

@@ -17,7 +17,7 @@ fn styled(mode: Mode, view: View, change: impl Fn(&mut Style)) -> RenderJob {
 
 /// Everything at once that this file is about.
 fn full(style: &mut Style) {
-    style.transfer.colors = "-1e-9:#440154,0:#21918c,1e-9:#fde725".parse().unwrap();
+    style.transfer.colours = "-1e-9:#440154,0:#21918c,1e-9:#fde725".parse().unwrap();
     style.transfer.opacity = "-1e-9:1,0:0.2,1e-9:1".parse().unwrap();
     style.transfer.size = "-1e-9:1,0:0.5,1e-9:1".parse().unwrap();
     style.uncertainty = true;
@@ -74,15 +74,15 @@ fn a_palette_written_as_stops_is_the_palette() {
             let plain = renderer.render(&job(mode, view), &scene).unwrap();
             let as_stops = styled(mode, view, |style| {
                 let transfer = &mut style.transfer;
-                let colors = transfer.palette.stops();
-                let last = (colors.len() - 1) as f64;
-                let stop = |(i, color): (usize, &[u8; 3])| {
+                let colours = transfer.palette.stops();
+                let last = (colours.len() - 1) as f64;
+                let stop = |(i, colour): (usize, &[u8; 3])| {
                     let place = i as f64 / last;
                     let value = transfer.low * (1.0 - place) + transfer.high * place;
-                    Stop(value, Rgb(*color))
+                    Stop(value, Rgb(*colour))
                 };
-                let stops: Vec<_> = colors.iter().enumerate().map(stop).collect();
-                transfer.colors = Stops::new(&stops).unwrap();
+                let stops: Vec<_> = colours.iter().enumerate().map(stop).collect();
+                transfer.colours = Stops::new(&stops).unwrap();
             });
             let (most, _) = distance(&plain, &renderer.render(&as_stops, &scene).unwrap());
             assert!(most <= 1, "{mode}: {most}");

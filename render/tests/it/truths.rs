@@ -227,7 +227,7 @@ fn a_uniform_slab_dims_light_as_exp_of_minus_its_depth() {
         light_v: y * 16,
         light_depth: per_slice,
         day: 1.0,
-        color: 0xffff_ffff,
+        colour: 0xffff_ffff,
         ..Splat::default()
     };
     let cells = (0..6).flat_map(|y| (0..6).map(move |x| (x, y)));
@@ -248,7 +248,7 @@ fn a_uniform_slab_dims_light_as_exp_of_minus_its_depth() {
     for splat in &splats {
         let expected = (-depth * splat.slice / slices as f32).exp();
         // Colours are coded by the square root of their light.
-        let drawn = ((splat.color & 255) as f32 / 255.0).powi(2);
+        let drawn = ((splat.colour & 255) as f32 / 255.0).powi(2);
         assert!(
             (drawn - expected).abs() <= 1.1 / 255.0 + 1e-3,
             "{drawn} against {expected}"
@@ -295,7 +295,7 @@ fn one_cloud_is_an_analytic_disc() {
         radius_px: 12.5,
         tau: 1.75,
         slice: 2.5,
-        color: 0x0040_80ff,
+        colour: 0x0040_80ff,
         ..Splat::default()
     };
     let picture = seen(&mut params, &[splat]);
@@ -304,13 +304,13 @@ fn one_cloud_is_an_analytic_disc() {
             let (dx, dy) = (f64::from(x) + 0.5 - 19.0, f64::from(y) + 0.5 - 21.5);
             let q = (dx * dx + dy * dy) / (12.5 * 12.5);
             let expected = 1.0 - (-1.75 * (1.0 - q).max(0.0).powi(2)).exp();
-            let color = picture[(y * 40 + x) as usize];
+            let colour = picture[(y * 40 + x) as usize];
             assert!(
-                (f64::from(color.w) - expected).abs() < 3e-4,
+                (f64::from(colour.w) - expected).abs() < 3e-4,
                 "{x} {y}: {} against {expected}",
-                color.w
+                colour.w
             );
-            assert!((f64::from(color.x) - expected).abs() < 5e-4 && color.z <= color.w);
+            assert!((f64::from(colour.x) - expected).abs() < 5e-4 && colour.z <= colour.w);
         }
     }
 }
@@ -330,7 +330,7 @@ fn land_hides_what_is_beyond_behind_it_and_nothing_else() {
         radius_px: 25.0,
         tau: 1.0,
         slice: 2.5,
-        color: 0x00ff_ffff,
+        colour: 0x00ff_ffff,
         is_beyond,
         ..Splat::default()
     };
@@ -348,13 +348,13 @@ fn land_hides_what_is_beyond_behind_it_and_nothing_else() {
 #[test]
 fn the_order_of_slices_matters_and_the_order_within_one_does_not() {
     let mut params = clouds(8);
-    let splat = |slice: f32, color: u32| Splat {
+    let splat = |slice: f32, colour: u32| Splat {
         x_sub: 64,
         y_sub: 64,
         radius_px: 20.0,
         tau: 2.0,
         slice,
-        color,
+        colour,
         ..Splat::default()
     };
     let (red, blue) = (0x0000_00ff, 0x00ff_0000);

@@ -17,7 +17,7 @@ const WANTED_DB: f64 = 40.0;
 /// What is aimed at.
 const WANTED_FLIP: f64 = 0.02;
 /// Colours that are told apart by all (Okabe and Ito 2008).
-const COLORS: [RGBColor; 6] = [
+const COLOURS: [RGBColor; 6] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),
@@ -117,15 +117,17 @@ fn panel(
         (slices[1] * 1.1, panel.wanted),
     ];
     chart.draw_series(DashedLineSeries::new(wanted, 6, 4, BLACK.stroke_width(1)))?;
-    for ((name, line), color) in panel.lines.iter().zip(COLORS.iter().cycle()) {
-        let drawn =
-            chart.draw_series(LineSeries::new(line.iter().copied(), color.stroke_width(2)))?;
+    for ((name, line), colour) in panel.lines.iter().zip(COLOURS.iter().cycle()) {
+        let drawn = chart.draw_series(LineSeries::new(
+            line.iter().copied(),
+            colour.stroke_width(2),
+        ))?;
         if has_legend {
             drawn.label(*name).legend(move |(x, y)| {
-                PathElement::new(vec![(x, y), (x + 18, y)], color.stroke_width(2))
+                PathElement::new(vec![(x, y), (x + 18, y)], colour.stroke_width(2))
             });
         }
-        chart.draw_series(line.iter().map(|&at| Circle::new(at, 3, color.filled())))?;
+        chart.draw_series(line.iter().map(|&at| Circle::new(at, 3, colour.filled())))?;
     }
     if has_legend {
         chart

@@ -34,19 +34,19 @@ fn scatter_own(at: u32) {
     let place = vec2(bitcast<i32>(near.x), bitcast<i32>(near.y));
     let reach = reach_of(place, near.z);
     if (any(reach.low > reach.high)) { return; }
-    var color = near.w;
+    var colour = near.w;
     if (feature(IS_LIT, lighting.mode != LIGHT_OFF)) {
         let radius_px = f32((near.z & RADIUS_BITS) << lists.entry_shift) / f32(SUBPIXELS);
-        color = shaded(color, vec2(bitcast<i32>(far.x), bitcast<i32>(far.y)), slice, bitcast<f32>(far.w), radius_px);
+        colour = shaded(colour, vec2(bitcast<i32>(far.x), bitcast<i32>(far.y)), slice, bitcast<f32>(far.w), radius_px);
     }
-    color = (color & 0xffffffu) | (u32(slice) << 24u);
+    colour = (colour & 0xffffffu) | (u32(slice) << 24u);
     for (var y = reach.low.y; y <= reach.high.y; y++) {
         for (var x = reach.low.x; x <= reach.high.x; x++) {
             let to = next_place(list_of(x, y, u32(slice)));
             let corner = vec2(x, y) << vec2(SCREEN_TILE_SHIFT);
             let from_corner = vec2<u32>((place - corner) >> vec2(lists.entry_shift));
             if (to < lists.entry_capacity) {
-                entries[to] = Entry((from_corner.x & 0xffffu) | (from_corner.y << 16u), near.z, color);
+                entries[to] = Entry((from_corner.x & 0xffffu) | (from_corner.y << 16u), near.z, colour);
             }
         }
     }

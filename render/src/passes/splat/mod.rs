@@ -52,7 +52,7 @@ pub fn unpacked(seen: [u32; 4], lit: [u32; 4], lists: &ListParams) -> Splat {
         light_v: lit[1] as i32,
         light_depth: 0.0,
         day: f32::from_bits(lit[3]),
-        color: seen[3],
+        colour: seen[3],
         is_beyond: u32::from(seen[2] & BEYOND_BIT != 0),
     }
 }

@@ -72,7 +72,7 @@ pub fn scatter(params: &Params, splats: &[Splat], counts: &mut [u32], entries: &
     for splat in splats {
         let radius = radius_of(params, splat) as u32;
         let size = radius | (splat.is_beyond * BEYOND_BIT) | (depth_of(params, splat) << 16);
-        let color = (splat.color & 0x00ff_ffff) | ((splat.slice as u32) << 24);
+        let colour = (splat.colour & 0x00ff_ffff) | ((splat.slice as u32) << 24);
         for list in lists_of(params, splat) {
             let tile = list as u32 / params.view.slices;
             let corner = [tile % params.view.tiles.x, tile / params.view.tiles.x]
@@ -81,7 +81,11 @@ pub fn scatter(params: &Params, splats: &[Splat], counts: &mut [u32], entries: &
                 |place: i32, corner: i32| ((place - corner) >> params.lists.entry_shift) as u32;
             let place =
                 (offset(splat.x_sub, corner[0]) & 0xffff) | (offset(splat.y_sub, corner[1]) << 16);
-            entries[counts[list] as usize] = Entry { place, size, color };
+            entries[counts[list] as usize] = Entry {
+                place,
+                size,
+                colour,
+            };
             counts[list] += 1;
         }
     }

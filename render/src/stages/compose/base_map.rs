@@ -60,7 +60,7 @@ pub struct Line {
 }
 
 /// Colours in sRGB, as they are named everywhere else.
-struct Colors {
+struct Colours {
     land: [f32; 3],
     land_high: [f32; 3],
     sea: [f32; 3],
@@ -76,7 +76,7 @@ struct Colors {
     border: Line,
 }
 
-const DARK: Colors = Colors {
+const DARK: Colours = Colours {
     land: [0.25, 0.265, 0.28],
     land_high: [0.37, 0.38, 0.39],
     sea: [0.035, 0.075, 0.14],
@@ -98,7 +98,7 @@ const DARK: Colors = Colors {
     },
 };
 
-const LIGHT: Colors = Colors {
+const LIGHT: Colours = Colours {
     land: [0.80, 0.79, 0.765],
     land_high: [0.87, 0.865, 0.85],
     sea: [0.62, 0.695, 0.755],
@@ -161,9 +161,9 @@ const HATCH_BELOW: [f32; 3] = [-0.05; 3];
 const BORDER_BELOW: f32 = 0.5;
 
 /// Lines over a thematic map or a relief with colours of its own: their grey, opacities of coasts and of borders.
-const OVER_COLORS: [f32; 3] = [0.06, 0.75, 0.35];
+const OVER_COLOURS: [f32; 3] = [0.06, 0.75, 0.35];
 
-fn colors(base_map: BaseMap) -> &'static Colors {
+fn colours(base_map: BaseMap) -> &'static Colours {
     match base_map {
         BaseMap::Dark => &DARK,
         BaseMap::Light => &LIGHT,
@@ -172,7 +172,7 @@ fn colors(base_map: BaseMap) -> &'static Colors {
 
 /// Coasts over the plain globe.
 pub fn coast(base_map: BaseMap) -> Line {
-    colors(base_map).coast
+    colours(base_map).coast
 }
 
 fn below(base_map: BaseMap) -> &'static Below {
@@ -225,28 +225,28 @@ impl BaseMapParams {
 
     /// The plain globe in the colours of a base map, before a background.
     pub fn of(base_map: BaseMap, background: Background) -> Self {
-        let colors = colors(base_map);
-        let [over_grey, over_coast_alpha, over_border_alpha] = OVER_COLORS;
+        let colours = colours(base_map);
+        let [over_grey, over_coast_alpha, over_border_alpha] = OVER_COLOURS;
         Self {
-            land: composed(colors.land),
-            shading: colors.shading,
-            land_high: composed(colors.land_high),
+            land: composed(colours.land),
+            shading: colours.shading,
+            land_high: composed(colours.land_high),
             high_m: HIGH_M,
-            sea: composed(colors.sea),
-            border_grey: composed_grey(colors.border.grey),
-            shelf: composed(colors.shelf),
-            border_alpha: colors.border.alpha,
-            deep: composed(colors.deep),
+            sea: composed(colours.sea),
+            border_grey: composed_grey(colours.border.grey),
+            shelf: composed(colours.shelf),
+            border_alpha: colours.border.alpha,
+            deep: composed(colours.deep),
             deep_m: DEEP_M,
             // A difference of composed colours, so that sea of any depth is hatched alike.
-            hatch: composed(sum(colors.sea, colors.hatch)) - composed(colors.sea),
+            hatch: composed(sum(colours.sea, colours.hatch)) - composed(colours.sea),
             air_depth: AIR_DEPTH,
-            air: composed(colors.air),
+            air: composed(colours.air),
             air_height: AIR_HEIGHT,
-            sky: composed(colors.sky),
+            sky: composed(colours.sky),
             sky_alpha: f32::from(u8::from(background == Background::Sky)),
-            lake: composed(colors.lake),
-            sun_share: colors.sun_share,
+            lake: composed(colours.lake),
+            sun_share: colours.sun_share,
             over_grey: composed_grey(over_grey),
             over_coast_alpha,
             over_border_alpha,

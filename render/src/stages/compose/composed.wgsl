@@ -5,5 +5,5 @@ override IN_CONTEXT: bool = false;
 fn composed(pixel: vec2<u32>, blended: vec4<f32>) -> u32 {
     if (!IN_CONTEXT) { return bytes_of(blended, pixel, false); }
     let seen = in_context(pixel, blended);
-    return bytes_of(seen.color, pixel, seen.is_beside);
+    return bytes_of(seen.colour, pixel, seen.is_beside);
 }

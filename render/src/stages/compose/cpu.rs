@@ -27,8 +27,8 @@ fn threshold([x, y]: [u32; 2]) -> u32 {
 }
 
 /// Straight-alpha sRGB in RGBA8, red lowest, of premultiplied linear light; what is seen beside a globe is dithered.
-pub(super) fn bytes_of(params: &Params, color: Vec4, [x, y]: [u32; 2], is_dithered: bool) -> u32 {
-    let alpha = (color.w.clamp(0.0, 1.0) * 255.0 + 0.5) as u32;
+pub(super) fn bytes_of(params: &Params, colour: Vec4, [x, y]: [u32; 2], is_dithered: bool) -> u32 {
+    let alpha = (colour.w.clamp(0.0, 1.0) * 255.0 + 0.5) as u32;
     if alpha == 0 {
         return 0;
     }
@@ -39,7 +39,7 @@ pub(super) fn bytes_of(params: &Params, color: Vec4, [x, y]: [u32; 2], is_dither
     } else {
         0.5
     };
-    let srgb = srgb_of(color.truncate() / color.w);
+    let srgb = srgb_of(colour.truncate() / colour.w);
     let rgb = srgb.clamp(Vec3::ZERO, Vec3::ONE) * 255.0 + rounding;
     rgb.x as u32 | (rgb.y as u32) << 8 | (rgb.z as u32) << 16 | alpha << 24
 }

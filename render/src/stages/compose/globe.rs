@@ -16,7 +16,7 @@ const HATCH_LINE_PX: i32 = 2;
 const LEVEL: f32 = 4.0 * FRAC_2_PI;
 pub(super) const WATER: Vec3 = Vec3::new(WATER_RED, WATER_GREEN, WATER_BLUE);
 
-fn sea_color(params: &Params, floor: Option<&terrain::Ground>) -> Vec3 {
+fn sea_colour(params: &Params, floor: Option<&terrain::Ground>) -> Vec3 {
     let map = &params.base_map;
     match floor {
         _ if params.context.has_water == 1 => WATER,
@@ -39,7 +39,7 @@ pub(super) fn plain(
     pixel: [u32; 2],
 ) -> Vec3 {
     let map = &params.base_map;
-    let mut sea = sea_color(params, floor);
+    let mut sea = sea_colour(params, floor);
     let place = pixel[0] as i32 + pixel[1] as i32 + params.view.origin_px.element_sum();
     if place % HATCH_PX < HATCH_LINE_PX && is_unsampled(params, domain, lon_rad, lat_rad) {
         sea += map.hatch;
@@ -108,9 +108,9 @@ pub(super) fn rim(params: &Params, ground: &Ground) -> Vec3 {
     mix(map.sea, map.air, share) * daylight(params, sun)
 }
 
-pub(super) fn hazy(params: &Params, color: Vec3, ground: &Ground) -> Vec3 {
+pub(super) fn hazy(params: &Params, colour: Vec3, ground: &Ground) -> Vec3 {
     let lit = params.base_map.air * daylight(params, ground.normal.dot(params.view.sun));
-    mix(color, lit, 1.0 - (-air_along(params, ground)).exp())
+    mix(colour, lit, 1.0 - (-air_along(params, ground)).exp())
 }
 
 #[cfg(test)]

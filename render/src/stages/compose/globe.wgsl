@@ -10,7 +10,7 @@ const HATCH_PX = 8;
 const HATCH_LINE_PX = 2;
 
 // Colour of water over a sea floor, or over one that is not known.
-fn sea_color(floor: Terrain) -> vec3<f32> {
+fn sea_colour(floor: Terrain) -> vec3<f32> {
     if (feature(HAS_WATER, context.has_water == 1u)) { return vec3(WATER_RED, WATER_GREEN, WATER_BLUE); }
     if (!floor.is_known) { return base_map.sea; }
     return mix(base_map.shelf, base_map.deep, clamp(-floor.height_m / base_map.deep_m, 0.0, 1.0));
@@ -19,7 +19,7 @@ fn sea_color(floor: Terrain) -> vec3<f32> {
 // The plain globe in even light: land where land is, lakes in it, sea, hatched where the product has no data. `shares` of
 // the pixel are land and lake, as `ground_mask` says.
 fn plain(lon: f32, lat: f32, shares: vec2<f32>, floor: Terrain, pixel: vec2<u32>) -> vec3<f32> {
-    var sea = sea_color(floor);
+    var sea = sea_colour(floor);
     let place = vec2<i32>(pixel) + view.origin_px;
     if ((place.x + place.y) % HATCH_PX < HATCH_LINE_PX && is_unsampled(lon, lat)) { sea += base_map.hatch; }
     var land = base_map.land;
@@ -83,9 +83,9 @@ fn rim(ground: Ground) -> vec3<f32> {
 }
 
 // A colour of the ground through its air.
-fn hazy(color: vec3<f32>, ground: Ground) -> vec3<f32> {
+fn hazy(colour: vec3<f32>, ground: Ground) -> vec3<f32> {
     let lit = base_map.air * daylight(dot(ground.normal, view.sun));
-    return mix(color, lit, 1.0 - exp(-air_along(ground)));
+    return mix(colour, lit, 1.0 - exp(-air_along(ground)));
 }
 
 // Threshold of ordered dithering at a place (Bayer 1973), 0 to 63: three bits of x ^ y and y in turn, lowest first.
@@ -97,13 +97,13 @@ fn threshold(place: vec2<u32>) -> u32 {
 
 // Straight-alpha sRGB in RGBA8, red lowest, of premultiplied linear light. What is seen beside a globe is dithered: air and sky
 // are smoother than bytes. Elsewhere colours are as they come, which files pack better.
-fn bytes_of(color: vec4<f32>, pixel: vec2<u32>, is_dithered: bool) -> u32 {
-    let alpha = u32(clamp(color.w, 0.0, 1.0) * 255.0 + 0.5);
+fn bytes_of(colour: vec4<f32>, pixel: vec2<u32>, is_dithered: bool) -> u32 {
+    let alpha = u32(clamp(colour.w, 0.0, 1.0) * 255.0 + 0.5);
     if (alpha == 0u) { return 0u; }
     var rounding = 0.5;
     if (is_dithered) {
         rounding = (f32(threshold(pixel + vec2<u32>(view.origin_px))) + 0.5) / 64.0;
     }
-    let rgb = vec3<u32>(clamp(srgb_of(color.xyz / color.w), vec3(0.0), vec3(1.0)) * 255.0 + rounding);
+    let rgb = vec3<u32>(clamp(srgb_of(colour.xyz / colour.w), vec3(0.0), vec3(1.0)) * 255.0 + rounding);
     return rgb.x | (rgb.y << 8u) | (rgb.z << 16u) | (alpha << 24u);
 }

@@ -150,12 +150,12 @@ fn lit_terrain(params: &Params, ground: &Ground, sun: Vec3) -> Vec3 {
     let facing = facing / facing.length();
     // Slopes that still look at a sun below the horizon lie in the shadow of the earth.
     let day = (sun.z * 10.0 + 0.5).clamp(0.0, 1.0);
-    let floor_color = linear_of(tint(ground.height_m)) * sunlight(facing.dot(sun) * day);
+    let floor_colour = linear_of(tint(ground.height_m)) * sunlight(facing.dot(sun) * day);
     if ground.height_m >= 0.0 || params.context.seabed_per_m <= 0.0 {
-        return floor_color;
+        return floor_colour;
     }
     let kept = (params.context.seabed_per_m * ground.height_m).exp();
-    mix(WATER * sunlight(sun.z), floor_color, kept)
+    mix(WATER * sunlight(sun.z), floor_colour, kept)
 }
 
 fn lit_plain(
@@ -167,19 +167,19 @@ fn lit_plain(
 ) -> Vec3 {
     let [land, lake, ..] = ground_mask(params, around.coast, pixel);
     let place = [spot.ground.lon_rad, spot.ground.lat_rad];
-    let color = plain(params, around.domain, place, [land, lake], floor, pixel);
-    let color = color * daylight(params, spot.sun.z);
+    let colour = plain(params, around.domain, place, [land, lake], floor, pixel);
+    let colour = colour * daylight(params, spot.sun.z);
     let Some(floor) = floor else {
-        return color;
+        return colour;
     };
     let facing = Vec3::new(-floor.slope.x, -floor.slope.y, 1.0);
     let facing = facing / facing.length();
     let day = (spot.sun.z * 10.0 + 0.5).clamp(0.0, 1.0);
     let slanted = sunlight(facing.dot(spot.sun) * day) / sunlight(spot.sun.z * day);
-    color * (1.0 + params.base_map.shading * (slanted - 1.0))
+    colour * (1.0 + params.base_map.shading * (slanted - 1.0))
 }
 
-fn ground_color(params: &Params, around: &Surroundings<'_>, spot: &Spot, pixel: [u32; 2]) -> Vec4 {
+fn ground_colour(params: &Params, around: &Surroundings<'_>, spot: &Spot, pixel: [u32; 2]) -> Vec4 {
     let context = &params.context;
     if context.surface == 0 {
         return Vec4::ZERO;
@@ -218,7 +218,7 @@ fn trail_word(params: &Params, trails: &[u32], pixel: [u32; 2]) -> u32 {
     trails[(y * params.context.trails_row_px + x) as usize]
 }
 
-fn trail_color(params: &Params, trails: &[u32], pixel: [u32; 2]) -> Vec4 {
+fn trail_colour(params: &Params, trails: &[u32], pixel: [u32; 2]) -> Vec4 {
     if params.context.trails_on == 0 {
         return Vec4::ZERO;
     }
@@ -254,7 +254,7 @@ fn in_picture(params: &Params, pixel: [u32; 2]) -> [u32; 2] {
     [pixel[0] + origin.x as u32, pixel[1] + origin.y as u32]
 }
 
-fn coast_color(params: &Params, coast: &[u32], pixel: [u32; 2], covered: f32) -> Vec4 {
+fn coast_colour(params: &Params, coast: &[u32], pixel: [u32; 2], covered: f32) -> Vec4 {
     let context = &params.context;
     if context.coast_on == 0 {
         return Vec4::ZERO;
@@ -275,11 +275,11 @@ fn coast_color(params: &Params, coast: &[u32], pixel: [u32; 2], covered: f32) ->
     grey(context.coast_grey) * cover
 }
 
-fn over(line: Vec4, color: Vec4, is_above: bool) -> Vec4 {
+fn over(line: Vec4, colour: Vec4, is_above: bool) -> Vec4 {
     if is_above {
-        line + color * (1.0 - line.w)
+        line + colour * (1.0 - line.w)
     } else {
-        color + line * (1.0 - color.w)
+        colour + line * (1.0 - colour.w)
     }
 }
 
@@ -297,9 +297,9 @@ fn surface_lines(params: &Params, lines: &[u32], [x, y]: [u32; 2], covered: f32)
     [isoline, graticule]
 }
 
-fn with_lines(params: &Params, lines: &[u32], pixel: [u32; 2], color: Vec4, covered: f32) -> Vec4 {
+fn with_lines(params: &Params, lines: &[u32], pixel: [u32; 2], colour: Vec4, covered: f32) -> Vec4 {
     let [isoline, graticule] = surface_lines(params, lines, pixel, covered);
-    let through = over(isoline * params.context.isolines_through, color, true);
+    let through = over(isoline * params.context.isolines_through, colour, true);
     let shown = over(isoline, through, false);
     over(graticule, shown, params.context.coast_above == 1)
 }
@@ -309,8 +309,8 @@ pub fn compose(params: &Params, picture: &[Vec4], around: &Surroundings<'_>, ima
     for y in 0..params.view.size_px.y {
         for x in 0..params.view.size_px.x {
             let at = (y * params.view.size_px.x + x) as usize;
-            let (color, is_beside) = composed(params, picture[at], around, [x, y]);
-            image[at] = bytes_of(params, color, [x, y], is_beside);
+            let (colour, is_beside) = composed(params, picture[at], around, [x, y]);
+            image[at] = bytes_of(params, colour, [x, y], is_beside);
         }
     }
 }
@@ -327,28 +327,28 @@ fn composed(
     } else {
         spot_on_globe(params, pixel)
     };
-    let mut color = blended;
+    let mut colour = blended;
     if params.context.night_on == 1 {
         let day = smoothstep(-0.15, 0.35, spot.sun.z);
-        color = (color.truncate() * (NIGHT * (1.0 - day) + day)).extend(color.w);
+        colour = (colour.truncate() * (NIGHT * (1.0 - day) + day)).extend(colour.w);
     }
     if is_submerged(params) {
-        return (from_below(params, around, &spot, pixel, color), true);
+        return (from_below(params, around, &spot, pixel, colour), true);
     }
     let mut covered = params.context.terrain_on as f32;
     if params.context.coast_above == 1 {
-        covered = covered.max(color.w);
+        covered = covered.max(colour.w);
     }
-    let trail = trail_color(params, around.trails, pixel);
+    let trail = trail_colour(params, around.trails, pixel);
     if params.context.coast_above == 1 {
-        color = over(trail, color, true);
+        colour = over(trail, colour, true);
     }
-    color = with_lines(params, around.lines, pixel, color, covered);
-    let line = coast_color(params, around.coast, pixel, covered);
-    color = over(line, color, params.context.coast_above == 1);
+    colour = with_lines(params, around.lines, pixel, colour, covered);
+    let line = coast_colour(params, around.coast, pixel, covered);
+    colour = over(line, colour, params.context.coast_above == 1);
     if params.context.coast_above == 0 {
-        color = over(trail, color, false);
+        colour = over(trail, colour, false);
     }
-    color += ground_color(params, around, &spot, pixel) * (1.0 - color.w);
-    (color, spot.cover < 1.0)
+    colour += ground_colour(params, around, &spot, pixel) * (1.0 - colour.w);
+    (colour, spot.cover < 1.0)
 }

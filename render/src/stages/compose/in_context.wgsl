@@ -73,24 +73,24 @@ fn lit_terrain(ground: Terrain, sun: vec3<f32>) -> vec3<f32> {
     let facing = normalize(vec3(-ground.slope, 1.0));
     // Slopes that still look at a sun below the horizon lie in the shadow of the earth.
     let day = clamp(sun.z * 10.0 + 0.5, 0.0, 1.0);
-    let floor_color = linear_of(tint(ground.height_m)) * sunlight(dot(facing, sun) * day);
-    if (ground.height_m >= 0.0 || context.seabed_per_m <= 0.0) { return floor_color; }
+    let floor_colour = linear_of(tint(ground.height_m)) * sunlight(dot(facing, sun) * day);
+    if (ground.height_m >= 0.0 || context.seabed_per_m <= 0.0) { return floor_colour; }
     let water = vec3(WATER_RED, WATER_GREEN, WATER_BLUE) * sunlight(sun.z);
-    return mix(water, floor_color, exp(context.seabed_per_m * ground.height_m));
+    return mix(water, floor_colour, exp(context.seabed_per_m * ground.height_m));
 }
 
 // The plain globe in the light of the sun; a coarse relief is a part lighter or darker where it slopes.
 fn lit_plain(spot: Spot, floor: Terrain, pixel: vec2<u32>) -> vec3<f32> {
     let shares = ground_mask(pixel).xy;
-    let color = plain(spot.ground.lon, spot.ground.lat, shares, floor, pixel) * daylight(spot.sun.z);
-    if (!floor.is_known) { return color; }
+    let colour = plain(spot.ground.lon, spot.ground.lat, shares, floor, pixel) * daylight(spot.sun.z);
+    if (!floor.is_known) { return colour; }
     let facing = normalize(vec3(-floor.slope, 1.0));
     let day = clamp(spot.sun.z * 10.0 + 0.5, 0.0, 1.0);
     let slanted = sunlight(dot(facing, spot.sun) * day) / sunlight(spot.sun.z * day);
-    return color * (1.0 + base_map.shading * (slanted - 1.0));
+    return colour * (1.0 + base_map.shading * (slanted - 1.0));
 }
 
-fn ground_color(spot: Spot, pixel: vec2<u32>) -> vec4<f32> {
+fn ground_colour(spot: Spot, pixel: vec2<u32>) -> vec4<f32> {
     if (!has_surface()) { return vec4(0.0); }
     var ground: Terrain;
     if (spot.on_ground && (has_terrain() || feature(HAS_SEA_FLOOR, context.sea_floor_on == 1u))) {
@@ -126,7 +126,7 @@ fn trail_word(pixel: vec2<u32>) -> u32 {
 }
 
 // The trail of a pixel on the sea surface.
-fn trail_color(pixel: vec2<u32>) -> vec4<f32> {
+fn trail_colour(pixel: vec2<u32>) -> vec4<f32> {
     if (!has_trails()) { return vec4(0.0); }
     let word = trail_word(pixel);
     return vec4(linear_of(codes_of(word) / 255.0), 1.0) * (f32(word >> 24u) / 255.0);
@@ -152,7 +152,7 @@ fn ground_mask(pixel: vec2<u32>) -> vec4<f32> {
 }
 
 // Coast lines, below them borders; `covered` is how much of what lies below has colours of its own.
-fn coast_color(pixel: vec2<u32>, covered: f32) -> vec4<f32> {
+fn coast_colour(pixel: vec2<u32>, covered: f32) -> vec4<f32> {
     if (!feature(HAS_COAST, context.coast_on == 1u)) { return vec4(0.0); }
     if (!is_tile()) {
         let mask = ground_mask(pixel);
@@ -168,9 +168,9 @@ fn coast_color(pixel: vec2<u32>, covered: f32) -> vec4<f32> {
 }
 
 // A line over what lies below it, or where that leaves it seen.
-fn over(line: vec4<f32>, color: vec4<f32>, is_above: bool) -> vec4<f32> {
-    if (is_above) { return line + color * (1.0 - line.w); }
-    return color + line * (1.0 - color.w);
+fn over(line: vec4<f32>, colour: vec4<f32>, is_above: bool) -> vec4<f32> {
+    if (is_above) { return line + colour * (1.0 - line.w); }
+    return colour + line * (1.0 - colour.w);
 }
 
 // Lines of a pixel on the sea surface; `covered` is how much of what lies below has colours of its own.
@@ -185,31 +185,31 @@ fn surface_lines(pixel: vec2<u32>, covered: f32) -> SurfaceLines {
 }
 
 // Particles with the lines below them: they hide the graticule, and isolines but for a part.
-fn with_lines(pixel: vec2<u32>, color: vec4<f32>, covered: f32) -> vec4<f32> {
+fn with_lines(pixel: vec2<u32>, colour: vec4<f32>, covered: f32) -> vec4<f32> {
     let own = surface_lines(pixel, covered);
-    let shown = over(own.isoline, over(own.isoline * context.isolines_through, color, true), false);
+    let shown = over(own.isoline, over(own.isoline * context.isolines_through, colour, true), false);
     return over(own.graticule, shown, has_coast_above());
 }
 
 // `is_beside`: it is smoother than bytes, see `bytes_of`.
-struct InContext { color: vec4<f32>, is_beside: bool }
+struct InContext { colour: vec4<f32>, is_beside: bool }
 
 fn in_context(pixel: vec2<u32>, blended: vec4<f32>) -> InContext {
     var spot: Spot;
     if (is_tile()) { spot = spot_on_tile(pixel); } else { spot = spot_on_globe(pixel); }
-    var color = blended;
+    var colour = blended;
     if (feature(HAS_NIGHT, context.night_on == 1u)) {
-        color = vec4(color.xyz * mix(NIGHT, 1.0, smoothstep(-0.15, 0.35, spot.sun.z)), color.w);
+        colour = vec4(colour.xyz * mix(NIGHT, 1.0, smoothstep(-0.15, 0.35, spot.sun.z)), colour.w);
     }
-    if (is_submerged()) { return InContext(from_below(spot, pixel, color), true); }
+    if (is_submerged()) { return InContext(from_below(spot, pixel, colour), true); }
     var covered = f32(has_terrain());
-    if (has_coast_above()) { covered = max(covered, color.w); }
-    let trail = trail_color(pixel);
-    if (has_coast_above()) { color = over(trail, color, true); }
-    color = with_lines(pixel, color, covered);
-    let line = coast_color(pixel, covered);
-    color = over(line, color, has_coast_above());
-    if (!has_coast_above()) { color = over(trail, color, false); }
-    color += ground_color(spot, pixel) * (1.0 - color.w);
-    return InContext(color, spot.cover < 1.0);
+    if (has_coast_above()) { covered = max(covered, colour.w); }
+    let trail = trail_colour(pixel);
+    if (has_coast_above()) { colour = over(trail, colour, true); }
+    colour = with_lines(pixel, colour, covered);
+    let line = coast_colour(pixel, covered);
+    colour = over(line, colour, has_coast_above());
+    if (!has_coast_above()) { colour = over(trail, colour, false); }
+    colour += ground_colour(spot, pixel) * (1.0 - colour.w);
+    return InContext(colour, spot.cover < 1.0);
 }

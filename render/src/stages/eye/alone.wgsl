@@ -14,7 +14,7 @@ fn near_of(entry: Entry, column: f32, pixel_units: f32) -> Near {
     let radius_px = f32(i32(entry.size & RADIUS_BITS)) / pixel_units;
     let place = vec2(f32(i32(entry.place << 16u) >> 16u), f32(i32(entry.place) >> 16u)) / pixel_units;
     let inverse_radius = 1.0 / radius_px;
-    let rgb = light_of(entry.color);
+    let rgb = light_of(entry.colour);
     return Near(radius_px, inverse_radius, place.y, (column - place.x) * inverse_radius, f32(i32(entry.size >> 16u)), rgb,
         is_behind(entry));
 }
@@ -45,8 +45,8 @@ fn kept_at(pixel: vec2<u32>) -> f32 {
     return kept_of(hidden_share(pixel));
 }
 
-fn show(pixel: vec2<u32>, color: vec4<f32>) {
-    if (all(pixel.xy < view.size_px)) { picture[pixel.y * view.size_px.x + pixel.x] = color; }
+fn show(pixel: vec2<u32>, colour: vec4<f32>) {
+    if (all(pixel.xy < view.size_px)) { picture[pixel.y * view.size_px.x + pixel.x] = colour; }
 }
 
 @compute @workgroup_size(SCREEN_TILE_PX, STRIDE)
@@ -55,10 +55,10 @@ fn alone(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_
     let center = vec2<f32>(local.xy) + 0.5;
     let pixel_units = f32(SUBPIXELS) / f32(1u << lists.entry_shift);
     let pixel = workgroup.xy * SCREEN_TILE_PX + local.xy;
-    var colors: array<vec4<f32>, COLUMN>;
+    var colours: array<vec4<f32>, COLUMN>;
     var kept: array<f32, COLUMN>;
     for (var i = 0u; i < COLUMN; i++) {
-        colors[i] = vec4(0.0);
+        colours[i] = vec4(0.0);
         kept[i] = kept_at(pixel + vec2(0u, i * STRIDE));
     }
     var begin = 0u;
@@ -79,11 +79,11 @@ fn alone(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_
                 }
                 for (var i = 0u; i < COLUMN; i++) { sums[i] = more(sums[i], own[i]); }
             }
-            for (var i = 0u; i < COLUMN; i++) { colors[i] = blended(colors[i], sums[i]); }
+            for (var i = 0u; i < COLUMN; i++) { colours[i] = blended(colours[i], sums[i]); }
         }
         begin = end;
     }
-    for (var i = 0u; i < COLUMN; i++) { show(pixel + vec2(0u, i * STRIDE), colors[i]); }
+    for (var i = 0u; i < COLUMN; i++) { show(pixel + vec2(0u, i * STRIDE), colours[i]); }
 }
 
 // What was seen as bytes.

@@ -43,11 +43,11 @@ const RIM_PX: f32 = 0.7;
 
 /// Colour of a dot whose rim stands out from the ground.
 fn rimmed(params: &Params, rgb: [u32; 3], q: f32, radius_px: f32) -> [u32; 3] {
-    let color = Vec3::from(rgb.map(|channel| channel as f32));
+    let colour = Vec3::from(rgb.map(|channel| channel as f32));
     let inside = ((1.0 - q.sqrt()) * radius_px - RIM_PX).clamp(0.0, 1.0);
     let lists = &params.lists;
-    let rim = color * lists.rim_kept + LIGHT_ONE * lists.rim_added;
-    (rim * (1.0 - inside) + color * inside + 0.5)
+    let rim = colour * lists.rim_kept + LIGHT_ONE * lists.rim_added;
+    (rim * (1.0 - inside) + colour * inside + 0.5)
         .to_array()
         .map(|channel| channel as u32)
 }
@@ -128,11 +128,11 @@ pub fn eye(
             let end = list_ends[first_list + params.view.slices as usize - 1] as usize;
             let [left, top] = [tile_x, tile_y].map(|tile| tile * SCREEN_TILE_PX);
             let kept = kept_beyond(params, hiding, [left, top]);
-            let colors = screen_tile(params, &entries[first..end], &kept);
+            let colours = screen_tile(params, &entries[first..end], &kept);
             for y in top..(top + SCREEN_TILE_PX).min(params.view.size_px.y) {
                 for x in left..(left + SCREEN_TILE_PX).min(params.view.size_px.x) {
                     picture[(y * params.view.size_px.x + x) as usize] =
-                        colors[(y - top) as usize * TILE + (x - left) as usize];
+                        colours[(y - top) as usize * TILE + (x - left) as usize];
                 }
             }
         }
@@ -140,17 +140,17 @@ pub fn eye(
 }
 
 fn screen_tile(params: &Params, list: &[Entry], kept: &Kept) -> [Vec4; TILE * TILE] {
-    let mut colors = [Vec4::ZERO; TILE * TILE];
-    for slice in list.chunk_by(|a, b| a.color >> 24 == b.color >> 24) {
+    let mut colours = [Vec4::ZERO; TILE * TILE];
+    for slice in list.chunk_by(|a, b| a.colour >> 24 == b.colour >> 24) {
         let mut sums = [[0u32; 4]; TILE * TILE];
         for entry in slice {
             add(params, entry, kept, &mut sums);
         }
-        for (color, sums) in colors.iter_mut().zip(sums) {
-            *color = blended(params, *color, sums);
+        for (colour, sums) in colours.iter_mut().zip(sums) {
+            *colour = blended(params, *colour, sums);
         }
     }
-    colors
+    colours
 }
 
 fn add(params: &Params, entry: &Entry, kept: &Kept, sums: &mut Sums) {
@@ -159,7 +159,7 @@ fn add(params: &Params, entry: &Entry, kept: &Kept, sums: &mut Sums) {
     let inverse_radius = 1.0 / radius;
     let depth = (entry.size >> 16) as f32;
     let is_beyond = entry.size & BEYOND_BIT != 0;
-    let rgb = [0, 8, 16].map(|shift| light_of((entry.color >> shift) & 255));
+    let rgb = [0, 8, 16].map(|shift| light_of((entry.colour >> shift) & 255));
     let [east, south] =
         [(entry.place << 16) as i32 >> 16, entry.place as i32 >> 16].map(|place| place as f32);
     // A pixel more on either side: what lies outside the radius adds nothing.

@@ -72,8 +72,8 @@ fn weight_at(q: f32, radius_px: f32) -> f32 {
 const LIGHT_ONE = 4064.0625;
 
 // Linear light of a colour in 12 bits.
-fn light_of(color: u32) -> vec3<u32> {
-    let codes = vec3(color & 255u, (color >> 8u) & 255u, (color >> 16u) & 255u);
+fn light_of(colour: u32) -> vec3<u32> {
+    let codes = vec3(colour & 255u, (colour >> 8u) & 255u, (colour >> 16u) & 255u);
     return (codes * codes + 8u) >> vec3(4u);
 }
 
@@ -91,10 +91,10 @@ fn ball_light(offset: vec2<f32>) -> f32 {
 // Colour of a dot whose rim stands out from the ground: darker over a light one, lighter over a dark one, so that values
 // that lie close together look so. `q` squared radii from its middle.
 fn rimmed(rgb: vec3<u32>, q: f32, radius_px: f32) -> vec3<u32> {
-    let color = vec3<f32>(rgb);
+    let colour = vec3<f32>(rgb);
     let inside = clamp((1.0 - sqrt(q)) * radius_px - RIM_PX, 0.0, 1.0);
-    let rim = color * lists.rim_kept + LIGHT_ONE * lists.rim_added;
-    return vec3<u32>(mix(rim, color, inside) + 0.5);
+    let rim = colour * lists.rim_kept + LIGHT_ONE * lists.rim_added;
+    return vec3<u32>(mix(rim, colour, inside) + 0.5);
 }
 const RIM_PX = 0.7;
 
@@ -104,7 +104,7 @@ fn add(entry: Entry, half: i32) {
     let radius_px = f32(entry.size & RADIUS_BITS) / pixel_units;
     let place = vec2(f32(i32(entry.place << 16u) >> 16u), f32(i32(entry.place) >> 16u)) / pixel_units;
     let depth = f32(entry.size >> 16u);
-    let rgb = light_of(entry.color);
+    let rgb = light_of(entry.colour);
     // Pixels with their centre within the radius.
     let low = max(vec2<i32>(ceil(place - radius_px - 0.5)), vec2(0));
     let high = min(vec2<i32>(floor(place + radius_px - 0.5)), vec2(i32(SCREEN_TILE_PX) - 1));
@@ -176,7 +176,7 @@ fn eye(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(global_invocation_i
     for (var channel = 0u; channel < 4u; channel++) { atomicStore(&sums[channel * PIXELS + invocation], 0u); }
     look_up_hidden(workgroup.xy, invocation);
     let first_list = (workgroup.y * view.tiles.x + workgroup.x) * view.slices;
-    var color = vec4(0.0);
+    var colour = vec4(0.0);
     for (var first = 0u; first < view.slices; first += LOOKED_UP) {
         let looked_up = min(view.slices - first, LOOKED_UP);
         if (invocation <= looked_up) {
@@ -195,18 +195,18 @@ fn eye(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(global_invocation_i
             if (end <= begin) { continue; }
             let long = long_sum(first_list + first + slice, end - begin, invocation);
             if (long.is_there) {
-                color = blended(color, long.own);
+                colour = blended(colour, long.own);
                 continue;
             }
-            color = blended(color, summed(begin, end, invocation));
+            colour = blended(colour, summed(begin, end, invocation));
             if (is_worth_asking && slice % ASKED_EVERY == 0u) {
                 if (invocation == 0u) { is_open = 0u; }
                 workgroupBarrier();
-                if (!is_covered(color)) { is_open = 1u; }
+                if (!is_covered(colour)) { is_open = 1u; }
                 if (workgroupUniformLoad(&is_open) == 0u) { break; }
             }
         }
         workgroupBarrier();
     }
-    if (all(pixel.xy < view.size_px)) { image[pixel.y * view.size_px.x + pixel.x] = composed(pixel.xy, color); }
+    if (all(pixel.xy < view.size_px)) { image[pixel.y * view.size_px.x + pixel.x] = composed(pixel.xy, colour); }
 }

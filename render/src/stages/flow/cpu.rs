@@ -116,11 +116,11 @@ fn dot_of(params: &Params, palette: &[u32], trail: &Trail, number: u32, speed: f
     let alive = (trail.age / TRAIL).min(1.0) * ((1.0 - trail.age) * FADING).clamp(0.0, 1.0);
     let spacing_px =
         speed.min(params.flow.most_m_s) * params.flow.px_per_m_s * dot_share(params, trail.age);
-    let at_color = nearest(position * 255.0) as usize;
+    let at_colour = nearest(position * 255.0) as usize;
     let mut opacity =
         params.particles.depth_floor + (1.0 - params.particles.depth_floor) * position.sqrt();
     if params.values.has_shape == 1 {
-        opacity = (palette[256 + at_color] & 0xffff) as f32 / 65535.0;
+        opacity = (palette[256 + at_colour] & 0xffff) as f32 / 65535.0;
     }
     opacity *= (spacing_px / FULL_SPACING_PX).clamp(LEAST_SHARE, 1.0);
     Particle {
@@ -128,7 +128,7 @@ fn dot_of(params: &Params, palette: &[u32], trail: &Trail, number: u32, speed: f
         east: trail.place.x,
         south: trail.place.y - (row - trail.row as i32) as f32,
         depth: params.particles.optical_depth * opacity * taper * taper * alive * trail.open,
-        color: palette[at_color] | ((nearest(taper * 255.0) as u32) << 24),
+        colour: palette[at_colour] | ((nearest(taper * 255.0) as u32) << 24),
         ..Particle::default()
     }
 }

@@ -99,11 +99,11 @@ fn dot_of(row: u32, slot: u32, number: u32, trail: Trail, speed: f32) -> Particl
     particle.south = trail.place.y - f32(at - i32(row));
     // As much for each pixel of a trail, whatever its length.
     let spacing_px = min(speed, flow.most_m_s) * flow.px_per_m_s * dot_share(trail.age);
-    let at_color = u32(nearest(position * 255.0));
+    let at_colour = u32(nearest(position * 255.0));
     var opacity = particles.depth_floor + (1.0 - particles.depth_floor) * sqrt(position);
-    if (flow.has_shape == 1u) { opacity = f32(palette[256u + at_color] & 0xffffu) / 65535.0; }
+    if (flow.has_shape == 1u) { opacity = f32(palette[256u + at_colour] & 0xffffu) / 65535.0; }
     opacity *= clamp(spacing_px / FULL_SPACING_PX, LEAST_SHARE, 1.0);
     particle.depth = particles.optical_depth * opacity * taper * taper * alive * trail.open;
-    particle.color = palette[at_color] | (u32(nearest(taper * 255.0)) << 24u);
+    particle.colour = palette[at_colour] | (u32(nearest(taper * 255.0)) << 24u);
     return particle;
 }

@@ -97,8 +97,8 @@ fn depth_above(params: &Params, light: &[u32], texel: [i32; 2], middle: i32, par
     0.5 * mix(depth_at(middle), depth_at(middle + 1), part) / params.lighting.depth_one
 }
 
-fn dimmed(color: u32, shade: f32) -> u32 {
-    with_codes(color, codes_of(color) * shade.sqrt())
+fn dimmed(colour: u32, shade: f32) -> u32 {
+    with_codes(colour, codes_of(colour) * shade.sqrt())
 }
 
 fn mix(a: f32, b: f32, t: f32) -> f32 {
@@ -148,7 +148,7 @@ pub fn shade(params: &Params, light: &[u32], splats: &mut [Splat]) {
         let night = mix(params.lighting.night, 1.0, splat.day);
         let shade = (params.lighting.ambient + direct) * night;
         // Water in between has its own light.
-        let own = (splat.color >> 24) as f32 / 255.0;
-        splat.color = dimmed(splat.color, mix(1.0, shade, own));
+        let own = (splat.colour >> 24) as f32 / 255.0;
+        splat.colour = dimmed(splat.colour, mix(1.0, shade, own));
     }
 }

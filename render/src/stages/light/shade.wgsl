@@ -9,8 +9,8 @@ fn depth_above(texel: vec2<i32>, middle: i32, part: f32) -> f32 {
     return 0.5 * mix(before, f32(light[address(texel, u32(middle + 1))]), part) / lighting.depth_one;
 }
 
-fn dimmed(color: u32, shade: f32) -> u32 {
-    return with_codes(color, codes_of(color) * sqrt(shade));
+fn dimmed(colour: u32, shade: f32) -> u32 {
+    return with_codes(colour, codes_of(colour) * sqrt(shade));
 }
 
 // Optical depth between a place and the sun.
@@ -38,10 +38,10 @@ fn look(place: vec2<i32>, slice: f32, step: f32) -> vec2<f32> {
 
 // A splat's colour in its light, looked up before and behind the centre: one look at the centre would draw clouds too
 // dark, because the eye sees their near sides.
-fn shaded(color: u32, place: vec2<i32>, slice: f32, day: f32, radius_px: f32) -> u32 {
+fn shaded(colour: u32, place: vec2<i32>, slice: f32, day: f32, radius_px: f32) -> u32 {
     let sum = look(place, slice, -LOOK * radius_px) + look(place, slice, LOOK * radius_px);
     let lit = sum.x / max(sum.y, 1.0e-30);
     let shade = (lighting.ambient + lighting.direct * lit * day) * mix(lighting.night, 1.0, day);
     // Water in between has its own light.
-    return dimmed(color, mix(1.0, shade, f32(color >> 24u) / 255.0));
+    return dimmed(colour, mix(1.0, shade, f32(colour >> 24u) / 255.0));
 }

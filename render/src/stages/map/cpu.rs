@@ -31,7 +31,7 @@ pub fn map(params: &Params, inputs: &Inputs<'_>, picture: &mut [Vec4]) {
             let at = (y * params.view.size_px.x + x) as usize;
             picture[at] = if params.view.kind == VIEW_TILE {
                 let (col, row) = (x as usize, (params.view.size_px.x + y) as usize);
-                color_at(params, inputs, [inputs.axes[col], inputs.axes[row]], [x, y])
+                colour_at(params, inputs, [inputs.axes[col], inputs.axes[row]], [x, y])
             } else {
                 on_globe(params, inputs, [x, y])
             };
@@ -45,7 +45,7 @@ fn on_globe(params: &Params, inputs: &Inputs<'_>, pixel: [u32; 2]) -> Vec4 {
         return Vec4::ZERO;
     }
     let place = [col_of(params, hit.lon_rad), row_of(params, hit.lat_rad)];
-    color_at(params, inputs, place, pixel)
+    colour_at(params, inputs, place, pixel)
 }
 
 /// Where a longitude falls between centres of cells.
@@ -110,7 +110,7 @@ fn mix(a: Vec3, b: Vec3, t: f32) -> Vec3 {
     a * (1.0 - t) + b * t
 }
 
-fn color_at(params: &Params, inputs: &Inputs<'_>, [x, y]: [Axis; 2], pixel: [u32; 2]) -> Vec4 {
+fn colour_at(params: &Params, inputs: &Inputs<'_>, [x, y]: [Axis; 2], pixel: [u32; 2]) -> Vec4 {
     let palette = inputs.palette;
     let cell = |row, col| cell_value(params, inputs, row, col);
     let north = mix(
@@ -137,8 +137,8 @@ fn color_at(params: &Params, inputs: &Inputs<'_>, [x, y]: [Axis; 2], pixel: [u32
     if params.values.has_shape == 1 {
         alpha *= (palette[256 + at] & 0xffff) as f32 / 65535.0;
     }
-    let color = palette[at];
-    let channel = |shift: u32| ((color >> shift) & 255) as f32 / 255.0;
+    let colour = palette[at];
+    let channel = |shift: u32| ((colour >> shift) & 255) as f32 / 255.0;
     let mut rgb = Vec3::new(channel(0), channel(8), channel(16));
     if params.values.has_uncertainty == 1 {
         let uncertainty = uncertainty_at(params, inputs.uncertainty, [x, y]);

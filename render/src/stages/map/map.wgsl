@@ -33,7 +33,7 @@ fn uncertainty_at(x: Axis, y: Axis) -> f32 {
     return mix(north, south, y.fraction);
 }
 
-fn color_at(x: Axis, y: Axis, pixel: vec2<u32>) -> vec4<f32> {
+fn colour_at(x: Axis, y: Axis, pixel: vec2<u32>) -> vec4<f32> {
     let north = mix(cell_value(y.index, x.index), cell_value(y.index, x.index + 1), x.fraction);
     let south = mix(cell_value(y.index + 1, x.index), cell_value(y.index + 1, x.index + 1), x.fraction);
     let value = mix(north, south, y.fraction);
@@ -44,8 +44,8 @@ fn color_at(x: Axis, y: Axis, pixel: vec2<u32>) -> vec4<f32> {
     let position = place_in_range(value.x / value.z, values.transfer_low, values.transfer_per_unit, feature(IS_LOG, values.is_log == 1u));
     let at = u32(nearest(position * 255.0));
     if (feature(HAS_SHAPE, values.has_shape == 1u)) { alpha *= f32(palette[256u + at] & 0xffffu) / 65535.0; }
-    let color = palette[at];
-    var rgb = vec3(f32(color & 255u), f32((color >> 8u) & 255u), f32((color >> 16u) & 255u)) / 255.0;
+    let colour = palette[at];
+    var rgb = vec3(f32(colour & 255u), f32((colour >> 8u) & 255u), f32((colour >> 16u) & 255u)) / 255.0;
     if (feature(HAS_UNCERTAINTY, values.has_uncertainty == 1u)) { rgb = hatched(rgb, uncertainty_at(x, y), pixel); }
     return vec4(linear_of(rgb), 1.0) * alpha;
 }
@@ -55,7 +55,7 @@ fn map(@builtin(global_invocation_id) pixel: vec3<u32>) {
     if (any(pixel.xy >= view.size_px)) { return; }
     let at = pixel.y * view.size_px.x + pixel.x;
     if (is_tile()) {
-        picture[at] = color_at(axes[pixel.x], axes[view.size_px.x + pixel.y], pixel.xy);
+        picture[at] = colour_at(axes[pixel.x], axes[view.size_px.x + pixel.y], pixel.xy);
         return;
     }
     let hit = ground_below(pixel.xy);
@@ -63,5 +63,5 @@ fn map(@builtin(global_invocation_id) pixel: vec3<u32>) {
         picture[at] = vec4(0.0);
         return;
     }
-    picture[at] = color_at(col_of(hit.lon), row_of(hit.lat), pixel.xy);
+    picture[at] = colour_at(col_of(hit.lon), row_of(hit.lat), pixel.xy);
 }

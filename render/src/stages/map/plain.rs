@@ -47,7 +47,7 @@ pub fn draw(plan: &Plan, scene: &Scene) -> Vec<u8> {
     };
     let [width, height] = plan.size_px().map(|px| px as usize);
     let (cols, rows) = plan.axes.split_at(width);
-    let colors = Colors::of(plan);
+    let colours = Colours::of(plan);
     let mut image = Vec::with_capacity(width * height * 4);
     let mut sides = [Along::of(width), Along::of(width)];
     for axis in &rows[..height] {
@@ -60,7 +60,7 @@ pub fn draw(plan: &Plan, scene: &Scene) -> Vec<u8> {
                 tile.fill(side, row, cols);
             }
         }
-        tile.draw_row(&sides, axis.fraction, &colors, &mut image);
+        tile.draw_row(&sides, axis.fraction, &colours, &mut image);
     }
     image
 }
@@ -89,19 +89,19 @@ impl Along {
 }
 
 /// The palette, as pixels have it.
-struct Colors {
+struct Colours {
     /// Red, green and blue, red lowest; no alpha.
     rgb: Vec<u32>,
     /// What the look's own opacity leaves of alpha, for each colour; empty without any.
     opacity: Vec<f32>,
 }
 
-impl Colors {
+impl Colours {
     fn of(plan: &Plan) -> Self {
-        let (colors, shape) = plan.palette.split_at(256);
+        let (colours, shape) = plan.palette.split_at(256);
         let opacity = |word: &u32| (word & 0xffff) as f32 / 65535.0;
         Self {
-            rgb: colors.iter().map(|color| color & 0x00ff_ffff).collect(),
+            rgb: colours.iter().map(|colour| colour & 0x00ff_ffff).collect(),
             opacity: if plan.params.values.has_shape == 1 {
                 shape[..256].iter().map(opacity).collect()
             } else {
@@ -152,7 +152,7 @@ impl Tile<'_> {
         }
     }
 
-    fn draw_row(&self, sides: &[Along; 2], south: f32, colors: &Colors, image: &mut Vec<u8>) {
+    fn draw_row(&self, sides: &[Along; 2], south: f32, colours: &Colours, image: &mut Vec<u8>) {
         let params = self.params;
         let [north, below] = sides;
         for at in 0..north.value.len() {
@@ -167,13 +167,13 @@ impl Tile<'_> {
                     alpha *= share / weight;
                 }
                 let value = mixed(|along| &along.value) / share;
-                let color = nearest(place_in_range(params, value) * 255.0) as usize;
-                if let Some(opacity) = colors.opacity.get(color) {
+                let colour = nearest(place_in_range(params, value) * 255.0) as usize;
+                if let Some(opacity) = colours.opacity.get(colour) {
                     alpha *= opacity;
                 }
                 let alpha = (alpha.clamp(0.0, 1.0) * 255.0 + 0.5) as u32;
                 if alpha > 0 {
-                    pixel = colors.rgb[color] | alpha << 24;
+                    pixel = colours.rgb[colour] | alpha << 24;
                 }
             }
             image.extend_from_slice(&pixel.to_le_bytes());

@@ -57,12 +57,12 @@ fn strength_of(params: &Params, value: f32, position: f32) -> f32 {
 }
 
 /// A colour seen through so much of the sea: what is lost of it is the water's own (Beer-Lambert).
-pub fn through_water(params: &Params, color: u32, depth_m: f32) -> u32 {
+pub fn through_water(params: &Params, colour: u32, depth_m: f32) -> u32 {
     let kept = (-params.particles.sea_per_m * depth_m).exp();
     let water = Vec3::new(WATER_RED, WATER_GREEN, WATER_BLUE) * 65025.0;
-    let codes = codes_of(color);
+    let codes = codes_of(colour);
     let light = water + (codes * codes - water) * kept;
-    with_codes(color, light.map(f32::sqrt))
+    with_codes(colour, light.map(f32::sqrt))
 }
 
 /// Share of particle `k` of a cell: the last one may be there in part.
@@ -129,9 +129,9 @@ fn one(params: &Params, inputs: &Inputs<'_>, cell: Active, k: u32) -> Particle {
         size = shape >> 16;
     }
     particle.depth = own.optical_depth * opacity * envelope(phase);
-    particle.color = inputs.palette[at] | (size << 24);
+    particle.colour = inputs.palette[at] | (size << 24);
     if own.sea_per_m > 0.0 && particle.height_m < 0.0 {
-        particle.color = through_water(params, particle.color, -particle.height_m);
+        particle.colour = through_water(params, particle.colour, -particle.height_m);
     }
     let share = share_of(params, inputs.domain, cell.cell as usize);
     let particle = covering(particle, share * particle_share(params, k));

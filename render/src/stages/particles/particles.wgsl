@@ -36,11 +36,11 @@ fn strength_of(value: f32, position: f32) -> f32 {
 }
 
 // A colour seen through so much of the sea: what is lost of it is the water's own (Beer-Lambert).
-fn through_water(color: u32, depth_m: f32) -> u32 {
+fn through_water(colour: u32, depth_m: f32) -> u32 {
     let kept = exp(-particles.sea_per_m * depth_m);
     let water = vec3(WATER_RED, WATER_GREEN, WATER_BLUE) * 65025.0;
-    let codes = codes_of(color);
-    return with_codes(color, sqrt(water + (codes * codes - water) * kept));
+    let codes = codes_of(colour);
+    return with_codes(colour, sqrt(water + (codes * codes - water) * kept));
 }
 
 // Particle `k` of a cell with data; `slot` is its column in the table, `carbon` what it has accumulated, kg m-2.
@@ -73,9 +73,9 @@ fn particle_of(row: u32, slot: u32, k: u32, value: f32, carbon: f32) -> Particle
         size = shape >> 16u;
     }
     particle.depth = particles.optical_depth * opacity * envelope(phase);
-    particle.color = palette[at] | (size << 24u);
+    particle.colour = palette[at] | (size << 24u);
     if (feature(HAS_SEA_DEPTH, particles.sea_per_m > 0.0) && particle.height_m < 0.0) {
-        particle.color = through_water(particle.color, -particle.height_m);
+        particle.colour = through_water(particle.colour, -particle.height_m);
     }
     return particle;
 }

@@ -48,8 +48,8 @@ fn slice_of(params: &Params, coordinate: f32) -> f32 {
         .clamp(0.0, params.view.slices as f32 - 0.001)
 }
 
-fn size_of(params: &Params, color: u32) -> f32 {
-    1.0 + params.projection.size_spread * ((color >> 24) as f32 / 255.0 - 1.0)
+fn size_of(params: &Params, colour: u32) -> f32 {
+    1.0 + params.projection.size_spread * ((colour >> 24) as f32 / 255.0 - 1.0)
 }
 
 /// Where a particle's place lies on the globe, length 1.
@@ -78,7 +78,7 @@ fn on_tile(params: &Params, row: &Row, col: &Col, particle: &Particle) -> Splat 
     let subpixels = SUBPIXELS as f32;
     let ground_y = row.y_sub + nearest(particle.south * row.y_span_px * subpixels);
     let x_sub = col.x_sub + nearest(particle.east * col.x_span_px * subpixels);
-    let radius = row.radius * size_of(params, particle.color);
+    let radius = row.radius * size_of(params, particle.colour);
     let radius_px = radius.clamp(projection.min_radius_px, projection.max_radius_px);
     let thinned = row.radius / radius_px;
     let tau = particle.depth * row.depth_gain * thinned * thinned;
@@ -100,7 +100,7 @@ fn on_tile(params: &Params, row: &Row, col: &Col, particle: &Particle) -> Splat 
         } else {
             1.0
         },
-        color: particle.color | UNDIMMED,
+        colour: particle.colour | UNDIMMED,
         is_beyond: u32::from(-particle.height_m > projection.beyond_m),
     }
 }
@@ -123,7 +123,7 @@ fn through_sea(params: &Params, particle: &Particle, sight: Vec3, normal: Vec3) 
     let nearest_at = -view.eye.dot(toward);
     let foot = view.eye + toward * nearest_at;
     let to_ceiling = nearest_at + (1.0 - foot.dot(foot)).max(0.0).sqrt();
-    let codes = codes_of(particle.color) / 255.0;
+    let codes = codes_of(particle.colour) / 255.0;
     let above = (particle.height_m / params.particles.sheet_m + 0.5).clamp(0.0, 1.0);
     let through = 1.0 - above + view.ceiling_kept * above;
     let ceiling = ceiling_light(params, normal.dot(view.sun));
@@ -131,8 +131,8 @@ fn through_sea(params: &Params, particle: &Particle, sight: Vec3, normal: Vec3) 
     let left = kept_over(params, way.min(to_ceiling));
     let water = water_light(params, toward.dot(view.eye) / view.eye.length());
     let seen = mix(water, seen, left);
-    let color = with_codes(0, seen.map(f32::sqrt) * 255.0);
-    color | (nearest(through * left * 255.0) as u32) << 24
+    let colour = with_codes(0, seen.map(f32::sqrt) * 255.0);
+    colour | (nearest(through * left * 255.0) as u32) << 24
 }
 
 fn on_globe(params: &Params, row: &Row, col: &Col, particle: &Particle) -> Splat {
@@ -157,10 +157,10 @@ fn on_globe(params: &Params, row: &Row, col: &Col, particle: &Particle) -> Splat
             * row.radius
             * projection.light_depth_gain,
         day: day_at(params, normal),
-        color: if is_submerged(params) {
+        colour: if is_submerged(params) {
             through_sea(params, particle, sight, normal)
         } else {
-            particle.color | UNDIMMED
+            particle.colour | UNDIMMED
         },
         ..Splat::default()
     };
@@ -173,7 +173,7 @@ fn on_globe(params: &Params, row: &Row, col: &Col, particle: &Particle) -> Splat
     let y = view.center_px.y - sight.dot(view.up) * scale;
     let oblique = (sight.length() / ahead).sqrt();
     let full_px = row.radius * scale * oblique;
-    let radius_px = full_px * size_of(params, particle.color);
+    let radius_px = full_px * size_of(params, particle.colour);
     if x.abs().max(y.abs()) > 1.0e5 || radius_px > projection.max_radius_px {
         return unseen;
     }

@@ -28,8 +28,8 @@ fn slice_of(coordinate: f32) -> f32 {
     return clamp((projection.slice_top - coordinate) * projection.slices_per_unit, 0.0, f32(view.slices) - 0.001);
 }
 
-fn size_of(color: u32) -> f32 {
-    return 1.0 + projection.size_spread * (f32(color >> 24u) / 255.0 - 1.0);
+fn size_of(colour: u32) -> f32 {
+    return 1.0 + projection.size_spread * (f32(colour >> 24u) / 255.0 - 1.0);
 }
 
 // Where a particle's place lies on the globe, length 1.
@@ -57,15 +57,15 @@ fn through_sea(particle: Particle, sight: vec3<f32>, normal: vec3<f32>) -> u32 {
     let nearest_at = -dot(view.eye, toward);
     let foot = view.eye + toward * nearest_at;
     let to_ceiling = nearest_at + sqrt(max(1.0 - dot(foot, foot), 0.0));
-    let codes = codes_of(particle.color) / 255.0;
+    let codes = codes_of(particle.colour) / 255.0;
     // The sheet of particles at the surface lies on both sides of it.
     let above = clamp(particle.height_m / particles.sheet_m + 0.5, 0.0, 1.0);
     let through = mix(1.0, view.ceiling_kept, above);
     let seen = mix(ceiling_light(dot(normal, view.sun)), codes * codes, through);
     let left = kept_over(min(way, to_ceiling));
     let water = water_light(dot(toward, view.eye) / length(view.eye));
-    let color = with_codes(0u, sqrt(mix(water, seen, left)) * 255.0);
-    return color | (u32(nearest(through * left * 255.0)) << 24u);
+    let colour = with_codes(0u, sqrt(mix(water, seen, left)) * 255.0);
+    return colour | (u32(nearest(through * left * 255.0)) << 24u);
 }
 
 fn on_tile(particle: Particle) -> Splat {
@@ -78,7 +78,7 @@ fn on_tile(particle: Particle) -> Splat {
     splat.y_sub = ground_y - nearest(particle.height_m * projection.height_px_per_m * subpixels);
     splat.light_u = splat.x_sub + nearest(particle.height_m * projection.light_shift_per_m.x) + projection.light_origin.x;
     splat.light_v = ground_y + nearest(particle.height_m * projection.light_shift_per_m.y) + projection.light_origin.y;
-    let radius = row.radius * size_of(particle.color);
+    let radius = row.radius * size_of(particle.colour);
     splat.radius_px = clamp(radius, projection.min_radius_px, projection.max_radius_px);
     let thinned = row.radius / splat.radius_px;
     splat.tau = particle.depth * row.depth_gain * thinned * thinned;
@@ -86,7 +86,7 @@ fn on_tile(particle: Particle) -> Splat {
     splat.slice = slice_of(particle.height_m);
     splat.day = 1.0;
     if (feature(HAS_DAY, projection.day_on == 1u)) { splat.day = day_at(normal_of(particle)); }
-    splat.color = particle.color | UNDIMMED;
+    splat.colour = particle.colour | UNDIMMED;
     splat.is_beyond = u32(-particle.height_m > projection.beyond_m);
     return splat;
 }
@@ -113,8 +113,8 @@ fn on_globe(particle: Particle) -> Splat {
     splat.light_u = nearest(u * projection.light_texels_per_unit * f32(lighting.unit));
     splat.light_v = nearest(v * projection.light_texels_per_unit * f32(lighting.unit));
     splat.day = day_at(normal);
-    splat.color = particle.color | UNDIMMED;
-    if (is_submerged()) { splat.color = through_sea(particle, sight, normal); }
+    splat.colour = particle.colour | UNDIMMED;
+    if (is_submerged()) { splat.colour = through_sea(particle, sight, normal); }
     if (ahead < 0.01 * abs(camera_sq - 1.0) || beyond * distance < horizon * horizon - grazing) { return splat; }
     let scale = view.focal_px / ahead;
     let x = dot(sight, view.right) * scale + view.center_px.x;
@@ -122,7 +122,7 @@ fn on_globe(particle: Particle) -> Splat {
     // A ball away from the middle of the picture is drawn as an ellipse, longer by 1 / cos; the disc has its area.
     let oblique = sqrt(length(sight) / ahead);
     let full_px = row.radius * scale * oblique;
-    let radius_px = full_px * size_of(particle.color);
+    let radius_px = full_px * size_of(particle.colour);
     if (max(abs(x), abs(y)) > 1.0e5 || radius_px > projection.max_radius_px) { return splat; }
     splat.x_sub = nearest(x * f32(SUBPIXELS)) - view.origin_px.x * SUBPIXELS;
     splat.y_sub = nearest(y * f32(SUBPIXELS)) - view.origin_px.y * SUBPIXELS;

@@ -20,7 +20,7 @@ fn sorted_lists(list_ends: &[u32], entries: &[Entry]) -> Vec<Vec<[u32; 3]>> {
             .unwrap_or_default();
         let mut list: Vec<_> = list
             .iter()
-            .map(|entry| [entry.place, entry.size, entry.color])
+            .map(|entry| [entry.place, entry.size, entry.colour])
             .collect();
         list.sort_unstable();
         list
@@ -30,11 +30,11 @@ fn sorted_lists(list_ends: &[u32], entries: &[Entry]) -> Vec<Vec<[u32; 3]>> {
 
 /// Do two sets of lists hold the same entries, their colours but for the last bit?
 fn same_lists(a: &[Vec<[u32; 3]>], b: &[Vec<[u32; 3]>]) -> bool {
-    let same_color = |a: u32, b: u32| {
+    let same_colour = |a: u32, b: u32| {
         let channels = a.to_le_bytes().into_iter().zip(b.to_le_bytes());
         channels.into_iter().all(|(a, b)| a.abs_diff(b) <= 1) && a >> 24 == b >> 24
     };
-    let same = |a: &[u32; 3], b: &[u32; 3]| a[..2] == b[..2] && same_color(a[2], b[2]);
+    let same = |a: &[u32; 3], b: &[u32; 3]| a[..2] == b[..2] && same_colour(a[2], b[2]);
     a.len() == b.len()
         && a.iter()
             .zip(b)

@@ -318,8 +318,8 @@ fn prove(test: &str, source: &str, right: &str, wrong: &str, distance: impl Fn(&
     );
 }
 
-fn channels(colors: &[Vec4]) -> Vec<f32> {
-    colors.iter().flat_map(Vec4::to_array).collect()
+fn channels(colours: &[Vec4]) -> Vec<f32> {
+    colours.iter().flat_map(Vec4::to_array).collect()
 }
 
 fn bytes(words: impl IntoIterator<Item = u32>) -> Vec<f32> {
@@ -338,7 +338,7 @@ fn splat_numbers(kernel: u32, splats: &[Splat], expected: &[Splat]) -> Vec<f32> 
         }
         // Whole numbers may round to a neighbour: a unit of each is the tolerance, 1e-2.
         let [x, y, u, v] = [s.x_sub, s.y_sub, s.light_u, s.light_v].map(|n| n as f32 * 1e-2);
-        let [r, g, b, a] = s.color.to_le_bytes().map(|byte| f32::from(byte) * 1e-2);
+        let [r, g, b, a] = s.colour.to_le_bytes().map(|byte| f32::from(byte) * 1e-2);
         let radius = s.radius_px * 1e-2 * 16.0;
         // A cloud keeps its mass when its radius is rounded.
         let wider = if kernel == KERNEL_CLOUD {

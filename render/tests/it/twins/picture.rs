@@ -155,8 +155,8 @@ fn trails_on_the_sea_match_their_twin() {
     for (mode, right, wrong) in [
         (
             Mode::Map,
-            "over(trail, color, true)",
-            "over(trail, color, false)",
+            "over(trail, colour, true)",
+            "over(trail, colour, false)",
         ),
         (
             Mode::Map,
@@ -165,7 +165,7 @@ fn trails_on_the_sea_match_their_twin() {
         ),
         (
             Mode::Volume,
-            "{ color = over(trail, color, false); }",
+            "{ colour = over(trail, colour, false); }",
             "{ }",
         ),
         (
@@ -219,7 +219,7 @@ fn what_is_seen_from_below_the_sea_matches_its_twin() {
                 "plain(0.3 + spot.ground.lon, spot",
             ),
             ("nearest_at + half_chord", "nearest_at - half_chord"),
-            ("over(coast_color(pixel, 0.0), seen, true)", "seen"),
+            ("over(coast_colour(pixel, 0.0), seen, true)", "seen"),
         ] {
             prove("compose", compose::SOURCE, right, wrong, |gpu, source| {
                 let stage = Compose::new(gpu, source);
@@ -245,8 +245,8 @@ fn surroundings_match_their_twin_on_tiles_and_on_the_globe() {
     let line_of = [
         ("place.x % 4u * 8u", "(3u - place.x % 4u) * 8u"),
         (
-            "covered = max(covered, color.w)",
-            "covered = 0.0 * max(covered, color.w)",
+            "covered = max(covered, colour.w)",
+            "covered = 0.0 * max(covered, colour.w)",
         ),
     ];
     let faults = [
@@ -301,7 +301,7 @@ fn the_eye_composes_in_surroundings_as_its_twin_does() {
             );
             far_apart(&bytes(drawn), &expected, 1.01)
         };
-        let (right, wrong) = ("color += ground_color", "color -= ground_color");
+        let (right, wrong) = ("colour += ground_colour", "colour -= ground_colour");
         for entry in [eye::SHARED, eye::ALONE] {
             prove("eye", eye::SOURCE, right, wrong, |gpu, source| {
                 distance(gpu, source, entry)

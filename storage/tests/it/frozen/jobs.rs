@@ -85,7 +85,7 @@ pub(super) fn full() -> RenderJob {
         after: counts(b"after"),
     });
     let style = &mut job.style;
-    style.transfer.colors = "-1e-9:#102030,1e-9:#ffeedd".parse().unwrap();
+    style.transfer.colours = "-1e-9:#102030,1e-9:#ffeedd".parse().unwrap();
     style.transfer.opacity = "0:0.5".parse().unwrap();
     style.transfer.size = "0:0.25".parse().unwrap();
     (style.height_m_per_kg_m2, style.optical_depth) = (4.5e6, 0.7);

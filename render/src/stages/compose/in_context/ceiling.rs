@@ -2,7 +2,7 @@
 
 use glam::{Vec3, Vec4};
 
-use super::{Spot, Surroundings, coast_color, ground_mask, over, surface_lines, trail_color};
+use super::{Spot, Surroundings, coast_colour, ground_mask, over, surface_lines, trail_colour};
 use crate::stages::compose::globe::{daylight, plain};
 use crate::stages::params::Params;
 use crate::stages::water::{kept_over, mix, water_light};
@@ -13,7 +13,7 @@ fn water_before(params: &Params, spot: &Spot) -> Vec3 {
 }
 
 /// The surface; a map lies on it, and lines on that.
-fn ceiling_color(
+fn ceiling_colour(
     params: &Params,
     around: &Surroundings<'_>,
     spot: &Spot,
@@ -25,22 +25,22 @@ fn ceiling_color(
     if params.context.surface == 1 {
         let [land, lake, ..] = ground_mask(params, around.coast, pixel);
         let place = [ground.lon_rad, ground.lat_rad];
-        let color = plain(params, around.domain, place, [land, lake], None, pixel);
-        seen = (color * daylight(params, spot.sun.z)).extend(1.0);
+        let colour = plain(params, around.domain, place, [land, lake], None, pixel);
+        seen = (colour * daylight(params, spot.sun.z)).extend(1.0);
     }
     if params.context.coast_above == 1 {
         seen = blended + seen * (1.0 - blended.w);
     }
-    seen = over(trail_color(params, around.trails, pixel), seen, true);
+    seen = over(trail_colour(params, around.trails, pixel), seen, true);
     let [isoline, graticule] = surface_lines(params, around.lines, pixel, 0.0);
     seen = over(isoline, over(graticule, seen, true), true);
-    seen = over(coast_color(params, around.coast, pixel, 0.0), seen, true);
+    seen = over(coast_colour(params, around.coast, pixel, 0.0), seen, true);
     let water = water_before(params, spot) * seen.w;
     mix(water, seen.truncate(), kept_over(params, ground.way)).extend(seen.w)
 }
 
 /// The core, where a globe is drawn.
-fn deep_color(params: &Params, spot: &Spot) -> Vec4 {
+fn deep_colour(params: &Params, spot: &Spot) -> Vec4 {
     if params.context.surface == 0 {
         return Vec4::ZERO;
     }
@@ -59,10 +59,10 @@ pub(super) fn from_below(
 ) -> Vec4 {
     let mut around = Vec4::ZERO;
     if spot.cover > 0.0 {
-        around = ceiling_color(params, surroundings, spot, pixel, blended) * spot.cover;
+        around = ceiling_colour(params, surroundings, spot, pixel, blended) * spot.cover;
     }
     if spot.cover < 1.0 {
-        around += deep_color(params, spot) * (1.0 - spot.cover);
+        around += deep_colour(params, spot) * (1.0 - spot.cover);
     }
     if params.context.coast_above == 1 {
         return around;

@@ -6,7 +6,7 @@ fn water_before(spot: Spot) -> vec3<f32> {
 }
 
 // The surface; a map lies on it, and lines on that.
-fn ceiling_color(spot: Spot, pixel: vec2<u32>, blended: vec4<f32>) -> vec4<f32> {
+fn ceiling_colour(spot: Spot, pixel: vec2<u32>, blended: vec4<f32>) -> vec4<f32> {
     var seen = vec4(0.0);
     if (has_surface()) {
         var no_floor: Terrain;
@@ -14,15 +14,15 @@ fn ceiling_color(spot: Spot, pixel: vec2<u32>, blended: vec4<f32>) -> vec4<f32> 
         seen = vec4(plain(spot.ground.lon, spot.ground.lat, shares, no_floor, pixel) * daylight(spot.sun.z), 1.0);
     }
     if (has_coast_above()) { seen = blended + seen * (1.0 - blended.w); }
-    seen = over(trail_color(pixel), seen, true);
+    seen = over(trail_colour(pixel), seen, true);
     let own = surface_lines(pixel, 0.0);
     seen = over(own.isoline, over(own.graticule, seen, true), true);
-    seen = over(coast_color(pixel, 0.0), seen, true);
+    seen = over(coast_colour(pixel, 0.0), seen, true);
     return vec4(mix(water_before(spot) * seen.w, seen.xyz, kept_over(spot.ground.way)), seen.w);
 }
 
 // The core, where a globe is drawn.
-fn deep_color(spot: Spot) -> vec4<f32> {
+fn deep_colour(spot: Spot) -> vec4<f32> {
     if (!has_surface()) { return vec4(0.0); }
     let foot = spot.ground.foot;
     let way = spot.ground.nearest_at - sqrt(max(view.hides * view.hides - dot(foot, foot), 0.0));
@@ -31,8 +31,8 @@ fn deep_color(spot: Spot) -> vec4<f32> {
 
 fn from_below(spot: Spot, pixel: vec2<u32>, blended: vec4<f32>) -> vec4<f32> {
     var around = vec4(0.0);
-    if (spot.cover > 0.0) { around = ceiling_color(spot, pixel, blended) * spot.cover; }
-    if (spot.cover < 1.0) { around += deep_color(spot) * (1.0 - spot.cover); }
+    if (spot.cover > 0.0) { around = ceiling_colour(spot, pixel, blended) * spot.cover; }
+    if (spot.cover < 1.0) { around += deep_colour(spot) * (1.0 - spot.cover); }
     if (has_coast_above()) { return around; }
     return blended + around * (1.0 - blended.w);
 }

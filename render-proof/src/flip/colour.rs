@@ -57,8 +57,8 @@ impl Opponents {
         let white = xyz_from_rgb * DVec3::ONE;
         let pixels: Vec<DVec3> = srgb
             .iter()
-            .map(|color| {
-                let xyz = xyz_from_rgb * DVec3::from_array(color.to_array().map(linear)) / white;
+            .map(|colour| {
+                let xyz = xyz_from_rgb * DVec3::from_array(colour.to_array().map(linear)) / white;
                 DVec3::new(
                     116.0 * xyz.y - 16.0,
                     500.0 * (xyz.x - xyz.y),
