@@ -156,7 +156,7 @@ mod tests {
 
     /// A part that ends when asked, and tells whether the service called itself ready then. To fail by itself would be of
     /// no use: of parts that end after the first only the log is told.
-    async fn patient(
+    async fn lasting(
         stop: Stop,
         board: Arc<Board>,
         was_ready: oneshot::Sender<bool>,
@@ -171,7 +171,7 @@ mod tests {
         let (stop, board) = ready();
         let mut parts = Parts::new(&stop, &board);
         let (tell, was_ready) = oneshot::channel();
-        parts.start("patient", patient(stop.clone(), Arc::clone(&board), tell));
+        parts.start("lasting", lasting(stop.clone(), Arc::clone(&board), tell));
         assert!(is_ready(&board).await);
         parts.start("ingest", async { Err::<(), _>("topic is gone") });
         let error = ended(parts).await.unwrap_err();
@@ -202,7 +202,7 @@ mod tests {
         let mut parts = Parts::new(&stop, &board);
         parts.start("hasty", async { Ok::<_, String>(()) });
         let (tell, was_ready) = oneshot::channel();
-        parts.start("patient", patient(stop.clone(), Arc::clone(&board), tell));
+        parts.start("lasting", lasting(stop.clone(), Arc::clone(&board), tell));
         assert_eq!(ended(parts).await.unwrap_err().part, "hasty");
         assert!(!was_ready.await.unwrap(), "ready over a dead part");
     }

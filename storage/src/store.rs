@@ -2,7 +2,7 @@
 //!
 //! One handle for a folder, memory, and the buckets and file systems of other machines. What differs between them is
 //! how an object is created once (`create`), who tries again after a failure that may pass (the clouds' clients
-//! themselves, [`patient`] for HDFS), and nothing else.
+//! themselves, `retry_store` for HDFS), and nothing else.
 
 mod check;
 mod checked;

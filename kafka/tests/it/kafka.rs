@@ -185,7 +185,7 @@ async fn members_at_work_while_others_come_and_go_finish_each_message_once() {
         own.log.append(some).await.unwrap();
     }
     let is_over = AtomicBool::new(false);
-    let steady = async || {
+    let lasting = async || {
         let mut finishes = 0;
         let mut life = async || {
             let mut reader = own.log.join(FROM, "g").await?;
@@ -218,7 +218,7 @@ async fn members_at_work_while_others_come_and_go_finish_each_message_once() {
         }
         is_over.store(true, Ordering::Relaxed);
     };
-    let (first, second, ()) = tokio::join!(steady(), steady(), restless());
+    let (first, second, ()) = tokio::join!(lasting(), lasting(), restless());
     println!("{} finishes while members came and went", first + second);
     assert!(first + second > 0, "nobody was at work");
     assert!(

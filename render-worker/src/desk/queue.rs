@@ -201,13 +201,13 @@ mod tests {
         let queue = Queue::new(1, 2);
         let held = queue.permit(Class::OnDemand).await.unwrap();
         let mut gone = Box::pin(queue.permit(Class::OnDemand));
-        let mut patient = Box::pin(queue.permit(Class::OnDemand));
+        let mut next = Box::pin(queue.permit(Class::OnDemand));
         assert!(gone.as_mut().now_or_never().is_none());
-        assert!(patient.as_mut().now_or_never().is_none());
+        assert!(next.as_mut().now_or_never().is_none());
         drop(gone);
         assert_eq!(queue.waiting(Class::OnDemand), 1);
         drop(held);
-        drop(patient.as_mut().now_or_never().unwrap());
+        drop(next.as_mut().now_or_never().unwrap());
         assert_eq!(queue.lock().free, 1);
         // Given up after the call and before it was heard.
         let held = queue.permit(Class::OnDemand).await.unwrap();

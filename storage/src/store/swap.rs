@@ -74,8 +74,8 @@ impl Store {
     ) -> Result<Option<Seen>, StorageError> {
         match &self.place {
             Place::Folder(root) => {
-                let patience = self.retry_limits.retries;
-                let swapped = locked::swap(root.clone(), key.clone(), seen, content, patience);
+                let limit = self.retry_limits.retries;
+                let swapped = locked::swap(root.clone(), key.clone(), seen, content, limit);
                 swapped.await.map_err(|e| failed(key, e))
             }
             Place::Hdfs => numbered::swap(self, key, seen, content).await,

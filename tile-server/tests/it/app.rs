@@ -230,8 +230,8 @@ impl TestApp {
     /// What the newest version of a product is made of at an instant.
     pub(crate) async fn time_sample(&self, product: &str, time: &str) -> TimeSample {
         let newest = manifests::latest(&self.store, &product.parse().unwrap()).await;
-        let moment = newest.unwrap().unwrap().time_sample(time.parse().unwrap());
-        moment.unwrap()
+        let sample = newest.unwrap().unwrap().time_sample(time.parse().unwrap());
+        sample.unwrap()
     }
 
     pub(crate) async fn get(&self, path: &str) -> Answer {

@@ -21,12 +21,12 @@ pub(super) async fn swap(
     key: ObjectKey,
     seen: Option<&Seen>,
     content: Bytes,
-    patience: Duration,
+    lock_limit: Duration,
 ) -> Result<Option<Seen>, object_store::Error> {
     let seen = seen.cloned();
     blocking(key.clone(), move || {
         let path = root.join(key.as_str());
-        let _lock = lock(&path, patience)?;
+        let _lock = lock(&path, lock_limit)?;
         if held(&path)? != seen {
             return Ok(None);
         }
@@ -45,7 +45,7 @@ fn held(path: &Path) -> io::Result<Option<Seen>> {
 }
 
 /// Locks the folder of an object until the answer is dropped.
-fn lock(path: &Path, patience: Duration) -> io::Result<File> {
+fn lock(path: &Path, lock_limit: Duration) -> io::Result<File> {
     let folder = path.parent().ok_or(ErrorKind::InvalidInput)?;
     fs::create_dir_all(folder)?;
     let file = File::open(folder)?;
@@ -53,7 +53,7 @@ fn lock(path: &Path, patience: Duration) -> io::Result<File> {
     loop {
         match file.try_lock() {
             Ok(()) => return Ok(file),
-            Err(TryLockError::WouldBlock) if start.elapsed() < patience => {
+            Err(TryLockError::WouldBlock) if start.elapsed() < lock_limit => {
                 std::thread::sleep(PAUSE);
             }
             Err(TryLockError::WouldBlock) => {
@@ -62,7 +62,7 @@ fn lock(path: &Path, patience: Duration) -> io::Result<File> {
                     format!(
                         "another process has held the lock of {} for {} s",
                         folder.display(),
-                        patience.as_secs()
+                        lock_limit.as_secs()
                     ),
                 ));
             }

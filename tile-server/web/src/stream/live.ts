@@ -26,7 +26,7 @@ const FITS = {
 /** Younger than this a picture may lie where it was taken although the camera went on. */
 const FRESH_MS = 300;
 /** With nothing in sight a reader waits this long for a picture: then tiles come in its place. */
-const PATIENCE_MS = 8_000;
+const WAIT_LIMIT_MS = 8_000;
 /** The page does not wait longer than this to learn whether there is a stream. */
 const OFFER_MS = 1_500;
 
@@ -160,7 +160,7 @@ export class Live {
   }
 
   get #isStarved(): boolean {
-    return !this.#isShown && this.#waitingSinceMs !== undefined && performance.now() - this.#waitingSinceMs > PATIENCE_MS;
+    return !this.#isShown && this.#waitingSinceMs !== undefined && performance.now() - this.#waitingSinceMs > WAIT_LIMIT_MS;
   }
 
   #follow(): void {
