@@ -1,6 +1,7 @@
 //! Series and budgets from the analyst, within limits; those of regions are remembered, since their question names a
 //! version.
 
+use std::future::Future;
 use std::sync::Arc;
 
 use contract::budget::{BudgetAnswer, BudgetQuery};
@@ -10,7 +11,7 @@ use contract::grid::LonLatDeg;
 use contract::series::{PointSeries, RegionSeries, RegionSeriesQuery};
 use quick_cache::sync::Cache;
 
-use crate::backend::Analyse;
+use crate::backend::{Analyse, BackendError};
 use crate::catalogue::Layer;
 use crate::error::ServerError;
 use crate::gate::Gate;
@@ -27,10 +28,47 @@ pub struct Analyses {
     analyst: Arc<dyn Analyse>,
     gate: Gate,
     metrics: Metrics,
-    budgets: Cache<Digest, Arc<BudgetAnswer>>,
-    flights: SingleFlight<Arc<BudgetAnswer>>,
-    areas: Cache<Digest, Arc<RegionSeries>>,
-    area_flights: SingleFlight<Arc<RegionSeries>>,
+    budgets: Answers<BudgetAnswer>,
+    areas: Answers<RegionSeries>,
+}
+
+/// Answers of one kind, by the digest of what was asked: those remembered and those under way.
+struct Answers<T: Send + Sync + 'static> {
+    remembered: Cache<Digest, Arc<T>>,
+    under_way: SingleFlight<Arc<T>>,
+}
+
+impl<T: Send + Sync + 'static> Answers<T> {
+    fn new(most: usize) -> Self {
+        Self {
+            remembered: Cache::new(most),
+            under_way: SingleFlight::default(),
+        }
+    }
+
+    /// The answer to a question: one that is remembered, or `computed` behind the gate, once for all who ask meanwhile.
+    async fn answer(
+        &self,
+        key: Digest,
+        gate: &Gate,
+        metrics: &Metrics,
+        computed: impl Future<Output = Result<T, BackendError>> + Send + 'static,
+    ) -> Result<Arc<T>, ServerError> {
+        if let Some(answer) = self.remembered.get(&key) {
+            return Ok(answer);
+        }
+        let (gate, metrics) = (gate.clone(), metrics.clone());
+        let behind_the_gate = || async move {
+            let _pass = gate
+                .enter()
+                .await
+                .inspect_err(|_busy| metrics.refused.inc())?;
+            Ok(Arc::new(computed.await?))
+        };
+        let answer = self.under_way.join(key, behind_the_gate).await?;
+        self.remembered.insert(key, Arc::clone(&answer));
+        Ok(answer)
+    }
 }
 
 impl Analyses {
@@ -40,10 +78,8 @@ impl Analyses {
             analyst,
             gate,
             metrics,
-            budgets: Cache::new(BUDGETS),
-            flights: SingleFlight::default(),
-            areas: Cache::new(AREAS),
-            area_flights: SingleFlight::default(),
+            budgets: Answers::new(BUDGETS),
+            areas: Answers::new(AREAS),
         }
     }
 
@@ -78,25 +114,11 @@ impl Analyses {
             (query.earth, query.cells),
             query.ocean.as_ref().map(|ocean| ocean.id()),
         ));
-        if let Some(answer) = self.budgets.get(&key) {
-            return Ok(answer);
-        }
-        let (analyst, gate, metrics) = (
-            Arc::clone(&self.analyst),
-            self.gate.clone(),
-            self.metrics.clone(),
-        );
-        let manifest = Arc::clone(&layer.manifest);
-        let compute = || async move {
-            let _pass = gate
-                .enter()
-                .await
-                .inspect_err(|_busy| metrics.refused.inc())?;
-            Ok(Arc::new(analyst.budget(&manifest, &query).await?))
-        };
-        let answer = self.flights.join(key, compute).await?;
-        self.budgets.insert(key, Arc::clone(&answer));
-        Ok(answer)
+        let (analyst, manifest) = (Arc::clone(&self.analyst), Arc::clone(&layer.manifest));
+        let computed = async move { analyst.budget(&manifest, &query).await };
+        self.budgets
+            .answer(key, &self.gate, &self.metrics, computed)
+            .await
     }
 
     /// A series of `layer` over a region.
@@ -109,25 +131,11 @@ impl Analyses {
         let region = (&query.region, &query.region_name);
         let asked = (region, query.from, query.to, query.earth, ocean);
         let key = Digest::of_json(&("area", &layer.id, asked));
-        if let Some(series) = self.areas.get(&key) {
-            return Ok(series);
-        }
-        let (analyst, gate, metrics) = (
-            Arc::clone(&self.analyst),
-            self.gate.clone(),
-            self.metrics.clone(),
-        );
-        let manifest = Arc::clone(&layer.manifest);
-        let compute = || async move {
-            let _pass = gate
-                .enter()
-                .await
-                .inspect_err(|_busy| metrics.refused.inc())?;
-            Ok(Arc::new(analyst.area(&manifest, &query).await?))
-        };
-        let series = self.area_flights.join(key, compute).await?;
-        self.areas.insert(key, Arc::clone(&series));
-        Ok(series)
+        let (analyst, manifest) = (Arc::clone(&self.analyst), Arc::clone(&layer.manifest));
+        let computed = async move { analyst.area(&manifest, &query).await };
+        self.areas
+            .answer(key, &self.gate, &self.metrics, computed)
+            .await
     }
 
     /// Our budgets beside published ones.
