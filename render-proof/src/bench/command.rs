@@ -12,14 +12,13 @@ use render::gpu::Gpu;
 use render::playback::Playback;
 use render::stages::fill::{Fill, Form, Sources};
 use render::{Backend, Image, Renderer, Scene};
-use serde::Serialize;
 
 use crate::bench::classic::{self, Classic};
-use crate::bench::served::{Joined, Served};
-use crate::bench::stats::Times;
-use crate::bench::{encode, frames, scenery, tiles, twins};
+use crate::bench::report::{Against, Row, report, report_frames, say, talk, times_faster};
+use crate::bench::served::Served;
+use crate::bench::{encode, frames, samples, scenery, tiles, twins};
 use crate::fill::timing;
-use crate::{Difference, Fineness, Picture, differing_bytes, reference_of_cells};
+use crate::{Difference, Fineness, Picture, reference_of_cells};
 
 /// Longest time for one form on one grid.
 const MOST_FILLING: Duration = Duration::from_secs(4);
@@ -89,62 +88,16 @@ fn tilt_deg(text: &str) -> Result<f64, String> {
     }
 }
 
-#[derive(Serialize)]
-struct Row {
-    adapter: String,
-    particles: u64,
-    width: u32,
-    height: u32,
-    slices: u32,
-    tilt_deg: f64,
-    joined: Option<Joined>,
-    measured: frames::Measured,
-    classic: Option<Against>,
-    twins: Option<(Times, usize)>,
-    encoded: Option<encode::Encoded>,
-    reference: Option<Difference>,
-}
-
-/// The classic renderer beside ours.
-#[derive(Serialize)]
-struct Against {
-    series: frames::Series,
-    clock: Clock,
-    times_faster: f64,
-    /// Format of the light's picture.
-    light: String,
-    difference: Option<Difference>,
-    note: &'static str,
-}
-
-/// What two series are compared by.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-enum Clock {
-    Device,
-    Wall,
-}
-
-/// How many times faster we are, by the device's clock if both series have it, else by the wall clock.
-fn times_faster(ours: &frames::Measured, theirs: &frames::Series) -> (Clock, f64) {
-    if ours.frame.runs > 0 && theirs.frame.runs > 0 {
-        let ratio = theirs.frame.median_ms / ours.frame.median_ms.max(1e-9);
-        return (Clock::Device, ratio);
-    }
-    let ratio = theirs.frame_wall_ms / ours.frame_wall_ms.max(1e-9);
-    (Clock::Wall, ratio)
-}
-
 /// Measures what the options ask for, and prints it.
 ///
 /// # Errors
 /// No device, a size that is none, a scene that is too large, a file that cannot be written.
 pub fn run(args: &RenderBench) -> Result<()> {
     if let Some(folders) = &args.compare {
-        return compare_folders(&folders[0], &folders[1]);
+        return samples::compare(&folders[0], &folders[1]);
     }
     if let Some(folder) = &args.samples {
-        return samples(folder);
+        return samples::draw(folder);
     }
     let gpu = Gpu::open()?;
     if let Some(size) = &args.fill {
@@ -229,7 +182,7 @@ fn series(
                 let job = jobs(size_px, slices, tilt_deg)?;
                 if !args.as_served {
                     let row = row(args, gpu, stages, (&job, tilt_deg), scene)?;
-                    report(args, &job, &row);
+                    report(args.json, &job, &row);
                     continue;
                 }
                 let served = Served::of(gpu, stages, &job, scene)?;
@@ -237,7 +190,7 @@ fn series(
                 let mut row = row(args, gpu, stages, (&job, tilt_deg), &scene)?;
                 row.particles = served.joined.particles;
                 row.joined = Some(served.joined);
-                report(args, &job, &row);
+                report(args.json, &job, &row);
             }
         }
     }
@@ -303,25 +256,6 @@ fn from_reference(
     Ok(Difference::of(&Picture::from(&image), &truth))
 }
 
-fn in_words(d: &Difference) -> String {
-    let psnr = d
-        .psnr_db
-        .map_or_else(|| "equal".to_owned(), |db| format!("PSNR {db:.1} dB"));
-    let covered = d.covered.map_or_else(String::new, |covered| {
-        let psnr = covered
-            .psnr_db
-            .map_or_else(|| "equal".to_owned(), |db| format!("PSNR {db:.1} dB"));
-        format!(
-            "; over the {:.1} % of pixels that are drawn {psnr}, mean FLIP {:.4}",
-            covered.percent, covered.mean_flip
-        )
-    });
-    format!(
-        "{psnr}, mean FLIP {:.4}, {:.3} % of pixels within one level, at most {:.1} levels{covered}",
-        d.mean_flip, d.within_one_level_percent, d.most_levels
-    )
-}
-
 /// The classic renderer on the same frame: first the pictures, then the times. On a device of its own, of
 /// which nothing remains when ours are timed.
 fn against(
@@ -372,85 +306,6 @@ fn against(
     })
 }
 
-fn report(args: &RenderBench, job: &RenderJob, row: &Row) {
-    if args.json {
-        say(&serde_json::to_string(row).unwrap_or_default());
-        return;
-    }
-    let m = &row.measured;
-    report_frames(job, row.particles, m);
-    if let Some(joined) = &row.joined {
-        say(&format!(
-            "  as served, tilt {}: from {} cells, joined in {:.0} ms; mean levels of the sea {:.1?} in all cells, {:.1?} as served; from the picture of all cells: {}",
-            row.tilt_deg,
-            joined.cells,
-            joined.once_ms,
-            joined.mean_levels[0],
-            joined.mean_levels[1],
-            joined
-                .from_all_cells
-                .as_ref()
-                .map_or_else(|| "none joined".to_owned(), in_words)
-        ));
-    }
-    if let Some(c) = &row.classic {
-        let clock = match c.clock {
-            Clock::Device => "device",
-            Clock::Wall => "wall",
-        };
-        say(&format!(
-            "  classic: median {:.3} ms, p99 {:.3} ms, wall {:.3} ms, light in {}; {:.1} times by the {clock} clock; {}",
-            c.series.frame.median_ms,
-            c.series.frame.p99_ms,
-            c.series.frame_wall_ms,
-            c.light,
-            c.times_faster,
-            c.difference.as_ref().map_or_else(String::new, in_words)
-        ));
-        say(&format!("  ({})", c.note));
-    }
-    if let Some((times, cores)) = &row.twins {
-        let splat = m
-            .stages
-            .iter()
-            .find(|(name, _)| name == "splat")
-            .map_or(0.0, |(_, t)| t.median_ms);
-        say(&format!(
-            "  interpolation and particles on {cores} cores {:.1} ms, {:.0} times the pass that also lights and counts",
-            times.median_ms,
-            times.median_ms / splat.max(1e-9)
-        ));
-    }
-    if let Some(d) = &row.reference {
-        say(&format!("  from the reference: {}", in_words(d)));
-    }
-    if let Some(e) = &row.encoded {
-        say(&format!(
-            "  read back and encoded on {} cores: {:.1} frames/s, PNG {} bytes",
-            e.cores, e.frames_per_s, e.png_bytes
-        ));
-    }
-}
-
-fn report_frames(job: &RenderJob, particles: u64, m: &frames::Measured) {
-    let [width, height] = job.view.size_px();
-    say(&format!(
-        "{particles:>9} particles {width}x{height} {:>3} slices: frame median {:.3} ms, p99 {:.3} ms, wall {:.3} ms; {} entries, {:.1} times the mean in the fullest tile, {} in the longest list",
-        job.style.slices,
-        m.frame.median_ms,
-        m.frame.p99_ms,
-        m.frame_wall_ms,
-        m.entries,
-        m.fullest_over_mean,
-        m.longest_list
-    ));
-    let stages = m.stages.iter();
-    let stages: Vec<_> = stages
-        .map(|(name, t)| format!("{name} {:.3}", t.median_ms))
-        .collect();
-    say(&format!("  {}", stages.join(", ")));
-}
-
 /// Fills the gaps of made-up fields, a fifth of them missing, with every form.
 fn fills(gpu: &Gpu, size: &str) -> Result<()> {
     let (rows, cols) = size.split_once('x').context("a size is ROWSxCOLUMNS")?;
@@ -487,114 +342,9 @@ fn fills(gpu: &Gpu, size: &str) -> Result<()> {
     Ok(())
 }
 
-/// Draws the same pictures on every machine.
-fn samples(folder: &PathBuf) -> Result<()> {
-    std::fs::create_dir_all(folder)?;
-    let renderer = Renderer::new(Backend::Gpu)?;
-    let scene = scenery::scene(&scenery::grid(200_000));
-    let mut globe = scenery::job([640, 480], 64, 0.0)?;
-    globe.style.particles_per_cell = 4;
-    let mut jobs = vec![("globe", globe)];
-    for (name, z, x, y) in [
-        ("tile-4", 4, 13, 7),
-        ("tile-5", 5, 26, 14),
-        ("tile-7", 7, 104, 56),
-    ] {
-        let mut job = scenery::job([256, 256], 64, 0.0)?;
-        job.style.particles_per_cell = 16;
-        job.view = contract::job::View::Tile {
-            tile: Tile::new(z, x, y)?,
-            size_px: 256,
-        };
-        jobs.push((name, job));
-    }
-    for (name, job) in jobs {
-        let image = renderer.render(&job, &scene)?;
-        std::fs::write(folder.join(format!("{name}.png")), image.encode_png()?)?;
-    }
-    say(&format!(
-        "{}: pictures in {}",
-        renderer.name(),
-        folder.display()
-    ));
-    Ok(())
-}
-
-fn compare_folders(a: &PathBuf, b: &PathBuf) -> Result<()> {
-    let mut names: Vec<_> = std::fs::read_dir(a)?
-        .map(|entry| entry.map(|e| e.file_name()))
-        .collect::<Result<_, _>>()?;
-    names.sort();
-    for name in names {
-        let read = |folder: &PathBuf| -> Result<Image> {
-            let path = folder.join(&name);
-            let picture = image::open(&path)
-                .with_context(|| path.display().to_string())?
-                .into_rgba8();
-            Ok(Image {
-                width: picture.width(),
-                height: picture.height(),
-                rgba8: picture.into_raw(),
-            })
-        };
-        let pair = [read(a)?, read(b)?];
-        let [one, other] = [0, 1].map(|i: usize| Picture::from(&pair[i]));
-        let d = Difference::of(&one, &other).context("the sizes differ")?;
-        say(&format!(
-            "{}: {}, {} bytes differ",
-            name.display(),
-            in_words(&d),
-            differing_bytes(&pair[0], &pair[1])
-        ));
-    }
-    Ok(())
-}
-
-#[expect(clippy::print_stdout, reason = "results of a command")]
-fn say(line: &str) {
-    println!("{line}");
-}
-
-#[expect(clippy::print_stderr, reason = "talk of a command")]
-fn talk(line: &str) {
-    eprintln!("{line}");
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn both_renderers_are_compared_by_one_clock() {
-        let series = |device_s: Vec<f64>, frame_wall_ms| frames::Series {
-            frame: Times::of(device_s),
-            frame_wall_ms,
-        };
-        let ours = |series: frames::Series| frames::Measured {
-            frame: series.frame,
-            frame_wall_ms: series.frame_wall_ms,
-            stages: vec![],
-            entries: 0,
-            fullest_over_mean: 0.0,
-            longest_list: 0,
-        };
-        let both = times_faster(
-            &ours(series(vec![0.001; 3], 5.0)),
-            &series(vec![0.01; 3], 7.0),
-        );
-        assert_eq!(both.0, Clock::Device);
-        assert!((both.1 - 10.0).abs() < 1e-9);
-        // A clock that one of them lacks says nothing about the other.
-        for (fast, slow) in [
-            (vec![0.001; 3], vec![]),
-            (vec![], vec![0.01; 3]),
-            (vec![], vec![]),
-        ] {
-            let (clock, ratio) = times_faster(&ours(series(fast, 5.0)), &series(slow, 15.0));
-            assert_eq!(clock, Clock::Wall);
-            assert!((ratio - 3.0).abs() < 1e-9);
-        }
-    }
 
     #[test]
     fn tilts_beyond_the_horizon_are_refused() {

@@ -5,6 +5,8 @@ pub mod classic;
 pub mod command;
 pub mod encode;
 pub mod frames;
+mod report;
+mod samples;
 pub mod scenery;
 pub mod served;
 pub mod stats;
