@@ -4,6 +4,8 @@
 //! What a graphics programmer would do without thinking is done: quads come from an index buffer, many an instance, and
 //! the light's picture has the one channel that it needs.
 
+mod pipelines;
+
 use anyhow::{Context as _, Result, ensure};
 use contract::job::RenderJob;
 use glam::Vec3;
@@ -14,22 +16,19 @@ use render::plan::Plan;
 use render::playback::{Playback, Steps};
 use render::stages::colour::srgb_of;
 use render::stages::layout::GROUP;
-use render::stages::params::{Params, Uniform};
-use render::stages::{bin, light};
-use render::{Image, Scene, passes, stages};
+use render::stages::params::Uniform;
+use render::{Image, Scene, passes};
 use wgpu::util::DeviceExt as _;
+
+use pipelines::{EYE_FORMAT, Pipelines, light_format};
 
 /// What is to be said beside every comparison.
 pub const NOTE: &str = "an H200 has 2 of its 66 clusters wired for graphics: there the ratio is no statement about a graphics card";
 
-/// Of the eye's picture.
-const EYE_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
 /// Quads of an instance: their corners can be named by 16 bits.
 const QUADS: u32 = 1024;
 /// Bytes of the arguments of an indexed draw.
 const DRAW_BYTES: u64 = 20;
-/// Particle radius over light texel, as in the compute renderer.
-const LIGHT_RADIUS_TEXELS: f32 = 1.0 / 0.612;
 /// Name of the pass that ends a frame, as stamps know it.
 pub const LAST_PASS: &str = "classic";
 /// Slices of the sorting shaders.
@@ -50,18 +49,6 @@ pub struct Classic<'a> {
     corners: wgpu::Buffer,
 }
 
-/// Format of the light's picture, one channel: 32 bits where the adapter can add to them, else 16.
-fn light_format(device: &wgpu::Device) -> wgpu::TextureFormat {
-    if device
-        .features()
-        .contains(wgpu::Features::FLOAT32_BLENDABLE)
-    {
-        wgpu::TextureFormat::R32Float
-    } else {
-        wgpu::TextureFormat::R16Float
-    }
-}
-
 /// The corners of two triangles for each quad of an instance.
 fn corner_indices(device: &wgpu::Device) -> wgpu::Buffer {
     let quads = 0..QUADS as u16;
@@ -73,14 +60,6 @@ fn corner_indices(device: &wgpu::Device) -> wgpu::Buffer {
         contents: bytemuck::cast_slice(&corners),
         usage: wgpu::BufferUsages::INDEX,
     })
-}
-
-struct Pipelines {
-    count: wgpu::ComputePipeline,
-    start: wgpu::ComputePipeline,
-    order: wgpu::ComputePipeline,
-    eye: wgpu::RenderPipeline,
-    light: wgpu::RenderPipeline,
 }
 
 impl<'a> Classic<'a> {
@@ -358,104 +337,6 @@ fn half(bits: u16) -> f32 {
         mantissa * 2f32.powi(-24)
     } else {
         (1.0 + mantissa / 1024.0) * 2f32.powi(exponent - 15)
-    }
-}
-
-impl Pipelines {
-    #[expect(clippy::too_many_lines, reason = "descriptors of five pipelines")]
-    fn new(device: &wgpu::Device, params: &Params) -> Self {
-        // Light depth of a splat from its depth on the screen, at the scale of what lies below the camera.
-        let height = params.view.eye.length() - 1.0;
-        let scale = params.view.focal_px / height;
-        let gain = params.projection.light_depth_gain / (scale * scale);
-        let constants = [
-            ("LIGHT_RADIUS_TEXELS", f64::from(LIGHT_RADIUS_TEXELS)),
-            ("LIGHT_GAIN", f64::from(gain)),
-            ("QUADS", f64::from(QUADS)),
-        ];
-        let compilation_options = wgpu::PipelineCompilationOptions {
-            constants: &constants,
-            ..Default::default()
-        };
-        let source = [
-            stages::PRELUDE,
-            light::TEXEL_FUNCTIONS,
-            bin::FUNCTIONS,
-            passes::CELLS,
-            include_str!("classic.wgsl"),
-        ]
-        .concat();
-        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some("classic"),
-            source: wgpu::ShaderSource::Wgsl(source.into()),
-        });
-        let compute = |entry| {
-            device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-                label: Some(entry),
-                layout: None,
-                module: &module,
-                entry_point: Some(entry),
-                compilation_options: compilation_options.clone(),
-                cache: None,
-            })
-        };
-        let render = |vertex, fragment, format, blend| {
-            device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-                label: Some(vertex),
-                layout: None,
-                vertex: wgpu::VertexState {
-                    module: &module,
-                    entry_point: Some(vertex),
-                    compilation_options: compilation_options.clone(),
-                    buffers: &[],
-                },
-                primitive: wgpu::PrimitiveState {
-                    topology: wgpu::PrimitiveTopology::TriangleList,
-                    ..Default::default()
-                },
-                depth_stencil: None,
-                multisample: wgpu::MultisampleState::default(),
-                fragment: Some(wgpu::FragmentState {
-                    module: &module,
-                    entry_point: Some(fragment),
-                    compilation_options: compilation_options.clone(),
-                    targets: &[Some(wgpu::ColorTargetState {
-                        format,
-                        blend: Some(blend),
-                        write_mask: wgpu::ColorWrites::ALL,
-                    })],
-                }),
-                multiview_mask: None,
-                cache: None,
-            })
-        };
-        let component = |src_factor| wgpu::BlendComponent {
-            src_factor,
-            dst_factor: wgpu::BlendFactor::One,
-            operation: wgpu::BlendOperation::Add,
-        };
-        let both = |factor| wgpu::BlendState {
-            color: component(factor),
-            alpha: component(factor),
-        };
-        Self {
-            count: compute("count_slices"),
-            start: compute("start_slices"),
-            order: compute("order_slices"),
-            // What is nearer was drawn before.
-            eye: render(
-                "eye_corner",
-                "eye_pixel",
-                EYE_FORMAT,
-                both(wgpu::BlendFactor::OneMinusDstAlpha),
-            ),
-            light: render(
-                "light_corner",
-                "light_pixel",
-                light_format(device),
-                both(wgpu::BlendFactor::One),
-            ),
-        }
     }
 }
 

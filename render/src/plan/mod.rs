@@ -10,6 +10,7 @@ mod flow;
 mod footprint;
 mod globe;
 mod ground;
+mod held;
 mod isolines;
 mod later;
 mod look;
@@ -19,7 +20,6 @@ mod shape;
 mod tile;
 mod trails;
 
-use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -45,6 +45,7 @@ use crate::stages::params::{GridParams, Params, ValueParams, ViewParams};
 use crate::stages::particles::params::ParticleParams;
 use crate::stages::project::params::ProjectParams;
 use crate::stages::sizes::{HALF_BYTES, workgroups};
+use held::MOST_HELD_BYTES;
 use look::Look;
 
 pub use isolines::graticule_step_deg;
@@ -59,11 +60,6 @@ static NEXT_ID: AtomicU64 = AtomicU64::new(1);
 const MOST_PARTICLES: u64 = 1 << 27;
 /// Largest part of a picture drawn at once, pixels a side; a multiple of the screen tile.
 const PART_PX: u32 = 2048;
-/// Fields of more bytes are not held whole but in bands of the rows that a picture shows: four fields and a domain of
-/// this size leave room for the rest on a device of 2 GiB.
-const MOST_HELD_BYTES: u64 = 256 << 20;
-/// Bands begin and end at multiples of so many rows, so that neighbouring pictures share them.
-const BAND_ROWS: u32 = 256;
 /// Shorter lists are not cut into parts: the parts of 1024 entries would be few.
 const LEAST_LONG_LIST: u32 = 1024;
 /// A list is long that holds so many times the particles that all screen tiles would have if they had the same.
@@ -216,16 +212,6 @@ impl Plan {
         plan
     }
 
-    /// Are fields on this grid held whole, whatever is drawn of them?
-    pub(crate) fn holds_whole(grid: &Grid) -> bool {
-        (grid.cell_count() * size_of::<f32>()) as u64 <= MOST_HELD_BYTES
-    }
-
-    /// Cells of a field that are on the device while this is drawn, whole rows of them.
-    pub fn held_cells(&self) -> Range<usize> {
-        self.params.grid.held_first_cell as usize..self.params.grid.held_end_cell as usize
-    }
-
     /// Whole numbers that depths are summed up in: by what all pictures of a style or of a zoom level share, so that
     /// neighbours round alike.
     fn choose_units(&mut self, job: &RenderJob) {
@@ -237,41 +223,6 @@ impl Plan {
         params.lighting.depth_one = look::light_one(style_depth);
         params.lists.depth_one =
             look::eye_one(style_depth * gain * MOST_ENVELOPE / (thinnest * thinnest).max(1e-3));
-    }
-
-    fn choose_band(
-        &mut self,
-        most_buffer_bytes: u64,
-        most_held_bytes: u64,
-    ) -> Result<(), RenderError> {
-        const CELL_BYTES: u64 = size_of::<f32>() as u64;
-        let params = &mut self.params;
-        let (rows, cols) = (params.grid.rows, params.grid.cols);
-        let shown = if self.mode == Mode::Map {
-            params.interpolation.first_cell / cols..params.interpolation.end_cell.div_ceil(cols)
-        } else {
-            params.cells.first_row..params.cells.first_row + params.cells.row_count
-        };
-        let row_bytes = u64::from(cols) * CELL_BYTES;
-        // What drifts comes from other rows than it is seen in.
-        let is_whole = self.mode == Mode::Flow;
-        let band = if is_whole || u64::from(rows) * row_bytes <= most_held_bytes {
-            0..rows
-        } else {
-            let first = shown.start / BAND_ROWS * BAND_ROWS;
-            first..shown.end.next_multiple_of(BAND_ROWS).min(rows)
-        };
-        let bytes = u64::from(band.end - band.start) * row_bytes;
-        if bytes > most_buffer_bytes {
-            return Err(RenderError::TooLarge {
-                what: "rows of a field that the picture shows",
-                bytes,
-                limit: most_buffer_bytes,
-            });
-        }
-        params.grid.held_first_cell = band.start * cols;
-        params.grid.held_end_cell = band.end * cols;
-        Ok(())
     }
 
     fn count_particles(&mut self, most_buffer_bytes: u64) -> Result<(), RenderError> {
