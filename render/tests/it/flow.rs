@@ -7,7 +7,7 @@ use contract::grid::Grid;
 use contract::job::{RenderJob, View};
 use glam::{DVec3, Vec2};
 use render::plan::Plan;
-use render::stages::flow::cpu::{self, Field, Inputs, Trail};
+use render::stages::flow::cpu::{self, Inputs, Trail, VectorField};
 use render::stages::interpolate::cpu::interpolate;
 use render::stages::layout::{Particle, Splat, Velocity};
 use render::stages::params::Params;
@@ -68,8 +68,8 @@ impl Dots {
         dots
     }
 
-    fn field(&self) -> Field<'_> {
-        Field {
+    fn field(&self) -> VectorField<'_> {
+        VectorField {
             params: &self.params,
             rows: &self.plan.rows,
             velocity: &self.velocity,

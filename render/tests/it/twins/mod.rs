@@ -23,7 +23,7 @@ use render::playback::Playback;
 use render::stages::bin;
 use render::stages::compose::in_context::Surroundings;
 use render::stages::eye::cpu::Hiding;
-use render::stages::flow::cpu::Field;
+use render::stages::flow::cpu::VectorField;
 use render::stages::flow::{self};
 use render::stages::layout::{
     Active, COVERED, Entry, KERNEL_CLOUD, LIGHT_OWN, Particle, Splat, Velocity,
@@ -288,7 +288,7 @@ fn between(params: &Params, interval: Option<&render::Interval>, weight: f32) ->
 }
 
 fn drift(params: &Params, plan: &Plan, velocity: &[Velocity], particles: &mut [Particle]) {
-    let field = Field {
+    let field = VectorField {
         params,
         rows: &plan.rows,
         velocity,
