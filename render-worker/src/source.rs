@@ -9,8 +9,9 @@ use contract::grid::Grid;
 use contract::job::RenderJob;
 use contract::key::ObjectKey;
 use contract::time_sample::{After, TimeSample};
-use quick_cache::sync::{Cache, DefaultLifecycle};
-use quick_cache::{DefaultHashBuilder, OptionsBuilder, Weighter};
+use quick_cache::Weighter;
+use quick_cache::sync::Cache;
+use render::field_cache::field_cache;
 use render::scene::{Cells, Field, Interval, Scene, Terrain};
 use render::stages::fill::Form;
 use render::stages::fill::scaled::holds;
@@ -21,11 +22,6 @@ use crate::error::DrawError;
 
 /// Domains kept; each has four bytes a cell.
 const MOST_DOMAINS: usize = 64;
-/// About as many fields are kept: of a degree they are many more, of a sixtieth of one fewer.
-const TYPICAL_FIELDS: usize = 256;
-/// Share of the memory for fields that were wanted again: the rest is for those that have just come, of which a picture
-/// needs several.
-const PROVEN_SHARE: f64 = 0.5;
 
 /// Loads scenes from a store.
 pub struct Source {
@@ -113,25 +109,13 @@ impl Held {
 
 impl Source {
     /// A source that keeps fields up to `most_bytes`, or two that are each larger than half of that and not larger than it.
-    ///
-    /// # Panics
-    /// Never: its options are complete.
     pub fn new(store: Store, renderer: Arc<Renderer>, most_bytes: u64) -> Self {
-        // One shard: in several, each would have a part of the memory that a field may not fit into.
-        let options = OptionsBuilder::new()
-            .shards(1)
-            .estimated_items_capacity(TYPICAL_FIELDS)
-            .weight_capacity(most_bytes)
-            .hot_allocation(PROVEN_SHARE)
-            .build()
-            .expect("both capacities are given");
-        let (hasher, lifecycle) = (DefaultHashBuilder::default(), DefaultLifecycle::default());
         Self {
             store,
             renderer,
             most_bytes,
             domains: Cache::new(MOST_DOMAINS),
-            fields: Cache::with_options(options, ByBytes { most_bytes }, hasher, lifecycle),
+            fields: field_cache(most_bytes, ByBytes { most_bytes }),
             field_hits: AtomicU64::new(0),
             field_misses: AtomicU64::new(0),
             early_reads: AtomicU64::new(0),

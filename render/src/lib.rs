@@ -21,6 +21,7 @@ mod device;
 mod device_slot;
 mod drawing;
 pub mod error;
+pub mod field_cache;
 pub mod frame;
 pub mod frame_context;
 pub mod frame_cpu;

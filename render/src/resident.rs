@@ -3,10 +3,11 @@
 use std::ops::Range;
 
 use bytemuck::Pod;
-use quick_cache::sync::{Cache, DefaultLifecycle};
-use quick_cache::{DefaultHashBuilder, OptionsBuilder, Weighter};
+use quick_cache::Weighter;
+use quick_cache::sync::Cache;
 
 use crate::error::RenderError;
+use crate::field_cache::field_cache;
 use crate::gpu::Gpu;
 use crate::scene::Cells;
 
@@ -14,11 +15,6 @@ use crate::scene::Cells;
 const SHARE: u64 = 8;
 /// Bytes kept where nobody knows what the device has.
 const UNKNOWN_BYTES: u64 = 512 << 20;
-/// About as many fields are kept.
-const TYPICAL_FIELDS: usize = 256;
-/// Share of the memory for fields that were drawn again: the rest is for those that have just come, of which a picture
-/// needs several.
-const PROVEN_SHARE: f64 = 0.5;
 
 /// The cells of a field, and the part of them that is held.
 type Id = (u64, usize, usize);
@@ -66,17 +62,8 @@ impl Resident {
 
 impl<B: Clone> Resident<B> {
     fn holding(most_bytes: u64) -> Self {
-        // One shard: in several, each would have a part of the memory that a field may not fit into.
-        let options = OptionsBuilder::new()
-            .shards(1)
-            .estimated_items_capacity(TYPICAL_FIELDS)
-            .weight_capacity(most_bytes)
-            .hot_allocation(PROVEN_SHARE)
-            .build()
-            .expect("both capacities are given");
-        let (hasher, lifecycle) = (DefaultHashBuilder::default(), DefaultLifecycle::default());
         Self {
-            held: Cache::with_options(options, ByBytes, hasher, lifecycle),
+            held: field_cache(most_bytes, ByBytes),
         }
     }
 
