@@ -84,6 +84,9 @@ if [ "$purpose" = test ]; then
     pip_install netCDF4 1.7.4
     pip_install zarr 3.1.6
     pip_install xarray 2026.9.0
+    # And exported GeoTIFFs and Parquet.
+    pip_install rasterio 1.4.4
+    pip_install pyarrow 26.0.1
 fi
 if [ "$purpose" = gallery ]; then
     pip_install pillow 13.0.0

@@ -12,6 +12,7 @@ pub mod extent;
 pub mod file;
 mod lattice;
 pub(crate) mod loaded;
+pub mod mask;
 mod polygon_cover;
 mod ring;
 mod rings;

@@ -70,10 +70,13 @@ impl TransferFunction {
         let (palette, low, high) = match quantity {
             Quantity::CarbonFlux => (Palette::Balance, -40.0, 40.0),
             Quantity::AccumulatedCarbon => (Palette::Balance, -50.0, 50.0),
-            Quantity::SeaSurfaceTemperature => (Palette::Thermal, -2.0, 32.0),
+            Quantity::SeaSurfaceTemperature
+            | Quantity::SeaSurfaceSkinTemperature
+            | Quantity::SeaSurfaceSubskinTemperature
+            | Quantity::SeaSurfaceFoundationTemperature => (Palette::Thermal, -2.0, 32.0),
             Quantity::Chlorophyll => (Palette::Algae, 0.03, 10.0),
             Quantity::WindSpeed | Quantity::Precipitation => (Palette::Speed, 0.0, 15.0),
-            Quantity::Pco2 => (Palette::Thermal, 280.0, 440.0),
+            Quantity::Pco2 | Quantity::Fco2 => (Palette::Thermal, 280.0, 440.0),
             Quantity::Salinity => (Palette::Thermal, 30.0, 38.0),
             Quantity::AirPressure => (Palette::Thermal, 980.0, 1035.0),
             Quantity::IceFraction | Quantity::SeaAreaFraction | Quantity::LandAreaFraction => {
@@ -82,6 +85,10 @@ impl TransferFunction {
             Quantity::WaveHeight => (Palette::Speed, 0.0, 6.0),
             Quantity::Current => (Palette::Balance, -1.5, 1.5),
             Quantity::Elevation => (Palette::Balance, -6000.0, 6000.0),
+            Quantity::Open(open) => {
+                let [low, high] = open.words().range.map_or([0.0, 1.0], with_width);
+                (Palette::Thermal, low, high)
+            }
         };
         Self {
             scale: match quantity {
@@ -187,10 +194,41 @@ impl TransferFunction {
     }
 }
 
+/// A range that rises: of a single value as far to both sides as half of it, of hardly anything 0 to 1.
+fn with_width([low, high]: [f64; 2]) -> [f64; 2] {
+    /// Below, ranges come near the least that can be drawn.
+    const LEAST: f64 = 1e-25;
+    let size = low.abs().max(high.abs());
+    if high - low > LEAST.max(1e-9 * size) {
+        return [low, high];
+    }
+    if size < LEAST {
+        return [0.0, 1.0];
+    }
+    [low - 0.5 * size, high + 0.5 * size]
+}
+
 #[cfg(test)]
 #[expect(clippy::float_cmp, reason = "these values are exact")]
 mod tests {
     use super::*;
+
+    #[test]
+    fn open_quantities_are_drawn_over_the_range_of_their_values() {
+        let plain = Quantity::open("river_flux", "m", "River flux").unwrap();
+        let drawn = |range| TransferFunction::default_for(plain.over(range).unwrap());
+        assert_eq!((drawn([2.0, 8.0]).low, drawn([2.0, 8.0]).high), (2.0, 8.0));
+        for range in [
+            [0.0, 0.0],
+            [5.0, 5.0],
+            [-1e20, 1e20],
+            [-7e-25, 1e-30],
+            [1e-30, 1e-30],
+        ] {
+            drawn(range).validate().unwrap();
+        }
+        TransferFunction::default_for(plain).validate().unwrap();
+    }
 
     #[test]
     fn the_middle_of_a_diverging_palette_is_no_flux() {

@@ -56,6 +56,9 @@ pub enum Body {
         profile: Option<String>,
         /// The product to land it in; named by the profile if absent.
         product: Option<ProductId>,
+        /// The variable to land, of a file that no profile is for; the one that the file is about, if absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        variable: Option<String>,
         /// What the file's digest must be, if the sender knows.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         sha256: Option<Digest>,

@@ -1,7 +1,11 @@
 //! What a product measures, in which unit it is stored, and in which unit people read it.
 
-use serde::{Deserialize, Serialize};
-use utoipa::ToSchema;
+mod open;
+mod words;
+
+use crate::ContractError;
+
+pub use open::{MAX_NAME_BYTES, MAX_TITLE_BYTES, MAX_UNIT_BYTES, OpenQuantity, OpenWords};
 
 /// Mass of carbon in one mole of CO2, kg (IUPAC 2021 standard atomic weight of carbon, conventional value 12.011).
 pub const CARBON_KG_PER_MOL: f64 = 0.012_011;
@@ -9,22 +13,28 @@ pub const CARBON_KG_PER_MOL: f64 = 0.012_011;
 pub const SECONDS_PER_YEAR: f64 = 365.25 * 86_400.0;
 
 /// A measured quantity. Values are stored in [`Quantity::unit`]; conversion to it happens once, at ingest.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-#[schema(description = "What the values of a product are.")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Quantity {
     /// Air-sea flux of CO2 as mass of carbon, kg m⁻² s⁻¹, positive out of the sea.
     CarbonFlux,
     /// Carbon given off since a chosen start, kg m⁻², positive out of the sea.
     AccumulatedCarbon,
-    /// Sea-surface temperature, K.
+    /// Sea-surface temperature, K, at whatever depth.
     SeaSurfaceTemperature,
+    /// Temperature of the upper 10 to 20 µm of the sea, which infrared radiometers see, K.
+    SeaSurfaceSkinTemperature,
+    /// Temperature about 1 mm below, which microwave radiometers see, K.
+    SeaSurfaceSubskinTemperature,
+    /// Temperature below the warming of the day, K.
+    SeaSurfaceFoundationTemperature,
     /// Chlorophyll-a concentration, kg m⁻³.
     Chlorophyll,
     /// Wind speed at 10 m, m s⁻¹.
     WindSpeed,
-    /// Partial pressure or fugacity of CO2, Pa.
+    /// Partial pressure of CO2, Pa; in products that landed before fugacity was told apart also that.
     Pco2,
+    /// Fugacity of CO2, Pa.
+    Fco2,
     /// Practical salinity, 1.
     Salinity,
     /// Sea-level air pressure, Pa.
@@ -43,6 +53,8 @@ pub enum Quantity {
     SeaAreaFraction,
     /// Share of a cell that is land, 1.
     LandAreaFraction,
+    /// Anything else, by its own words: no sign has a meaning, and nothing is computed from it but statistics.
+    Open(OpenQuantity),
 }
 
 /// How a quantity is shown: `shown = stored * factor + offset`.
@@ -69,14 +81,18 @@ impl Display {
 }
 
 impl Quantity {
-    /// Every quantity.
-    pub const ALL: [Self; 15] = [
+    /// Every quantity that is built in.
+    pub const ALL: [Self; 19] = [
         Self::CarbonFlux,
         Self::AccumulatedCarbon,
         Self::SeaSurfaceTemperature,
+        Self::SeaSurfaceSkinTemperature,
+        Self::SeaSurfaceSubskinTemperature,
+        Self::SeaSurfaceFoundationTemperature,
         Self::Chlorophyll,
         Self::WindSpeed,
         Self::Pco2,
+        Self::Fco2,
         Self::Salinity,
         Self::AirPressure,
         Self::IceFraction,
@@ -93,14 +109,18 @@ impl Quantity {
         match self {
             Self::CarbonFlux | Self::Precipitation => "kg m-2 s-1",
             Self::AccumulatedCarbon => "kg m-2",
-            Self::SeaSurfaceTemperature => "K",
+            Self::SeaSurfaceTemperature
+            | Self::SeaSurfaceSkinTemperature
+            | Self::SeaSurfaceSubskinTemperature
+            | Self::SeaSurfaceFoundationTemperature => "K",
             Self::Chlorophyll => "kg m-3",
             Self::WindSpeed | Self::Current => "m s-1",
-            Self::Pco2 | Self::AirPressure => "Pa",
+            Self::Pco2 | Self::Fco2 | Self::AirPressure => "Pa",
             Self::Salinity | Self::IceFraction | Self::SeaAreaFraction | Self::LandAreaFraction => {
                 "1"
             }
             Self::WaveHeight | Self::Elevation => "m",
+            Self::Open(open) => &open.words().unit,
         }
     }
 
@@ -109,15 +129,19 @@ impl Quantity {
         let (unit, factor, offset) = match self {
             Self::CarbonFlux => ("g C m⁻² yr⁻¹", 1000.0 * SECONDS_PER_YEAR, 0.0),
             Self::AccumulatedCarbon => ("g C m⁻²", 1000.0, 0.0),
-            Self::SeaSurfaceTemperature => ("°C", 1.0, -273.15),
+            Self::SeaSurfaceTemperature
+            | Self::SeaSurfaceSkinTemperature
+            | Self::SeaSurfaceSubskinTemperature
+            | Self::SeaSurfaceFoundationTemperature => ("°C", 1.0, -273.15),
             Self::Chlorophyll => ("mg m⁻³", 1e6, 0.0),
             Self::WindSpeed | Self::Current => ("m s⁻¹", 1.0, 0.0),
-            Self::Pco2 => ("µatm", 1.0 / 0.101_325, 0.0),
+            Self::Pco2 | Self::Fco2 => ("µatm", 1.0 / 0.101_325, 0.0),
             Self::Salinity => ("", 1.0, 0.0),
             Self::AirPressure => ("hPa", 0.01, 0.0),
             Self::IceFraction | Self::SeaAreaFraction | Self::LandAreaFraction => ("%", 100.0, 0.0),
             Self::WaveHeight | Self::Elevation => ("m", 1.0, 0.0),
             Self::Precipitation => ("mm d⁻¹", 86_400.0, 0.0),
+            Self::Open(open) => (open.shown_unit(), 1.0, 0.0),
         };
         Display {
             unit,
@@ -132,9 +156,13 @@ impl Quantity {
             Self::CarbonFlux => "Air-sea CO₂ flux",
             Self::AccumulatedCarbon => "Accumulated air-sea carbon",
             Self::SeaSurfaceTemperature => "Sea-surface temperature",
+            Self::SeaSurfaceSkinTemperature => "Sea-surface skin temperature",
+            Self::SeaSurfaceSubskinTemperature => "Sea-surface subskin temperature",
+            Self::SeaSurfaceFoundationTemperature => "Sea-surface foundation temperature",
             Self::Chlorophyll => "Chlorophyll-a",
             Self::WindSpeed => "Wind speed at 10 m",
             Self::Pco2 => "CO₂ partial pressure",
+            Self::Fco2 => "CO₂ fugacity",
             Self::Salinity => "Salinity",
             Self::AirPressure => "Sea-level pressure",
             Self::IceFraction => "Sea ice",
@@ -144,6 +172,7 @@ impl Quantity {
             Self::Elevation => "Elevation",
             Self::SeaAreaFraction => "Share of sea",
             Self::LandAreaFraction => "Share of land",
+            Self::Open(open) => &open.words().title,
         }
     }
 
@@ -151,19 +180,7 @@ impl Quantity {
     pub fn ends(self) -> Option<[&'static str; 2]> {
         match self {
             Self::CarbonFlux | Self::AccumulatedCarbon => Some(["sea takes up", "sea gives off"]),
-            Self::SeaSurfaceTemperature
-            | Self::Chlorophyll
-            | Self::WindSpeed
-            | Self::Pco2
-            | Self::Salinity
-            | Self::AirPressure
-            | Self::IceFraction
-            | Self::WaveHeight
-            | Self::Precipitation
-            | Self::Current
-            | Self::Elevation
-            | Self::SeaAreaFraction
-            | Self::LandAreaFraction => None,
+            _ => None,
         }
     }
 
@@ -172,10 +189,13 @@ impl Quantity {
         match self {
             Self::CarbonFlux => -1e-6..=1e-6,
             Self::AccumulatedCarbon => -1e3..=1e3,
-            Self::SeaSurfaceTemperature => 250.0..=325.0,
+            Self::SeaSurfaceTemperature
+            | Self::SeaSurfaceSkinTemperature
+            | Self::SeaSurfaceSubskinTemperature
+            | Self::SeaSurfaceFoundationTemperature => 250.0..=325.0,
             Self::Chlorophyll => 0.0..=1e-2,
             Self::WindSpeed => 0.0..=120.0,
-            Self::Pco2 => 0.0..=500.0,
+            Self::Pco2 | Self::Fco2 => 0.0..=500.0,
             Self::Salinity => 0.0..=60.0,
             Self::AirPressure => 80_000.0..=110_000.0,
             Self::IceFraction | Self::SeaAreaFraction | Self::LandAreaFraction => 0.0..=1.0,
@@ -184,13 +204,92 @@ impl Quantity {
             Self::Current => -10.0..=10.0,
             // The Challenger Deep and Mount Everest, with room for other surfaces of reference.
             Self::Elevation => -12_000.0..=9_500.0,
+            // From there on numbers of files mean no data.
+            Self::Open(_) => -1e34..=1e34,
         }
+    }
+
+    /// Is it the same but for the title and the range of an open one?
+    pub fn is_same_kind(self, other: Self) -> bool {
+        match (self, other) {
+            (Self::Open(own), Self::Open(other)) => own.is_same_kind(other),
+            _ => self == other,
+        }
+    }
+
+    /// What a product of this quantity holds once values of another are added; none if they do not belong in one. Any
+    /// sea-surface temperature is one where the depth is left open, and ranges grow.
+    pub fn joined(self, other: Self) -> Option<Self> {
+        match (self, other) {
+            (Self::Open(own), Self::Open(other)) if own.is_same_kind(other) => {
+                let joined = match other.words().range {
+                    Some([low, high]) => own.over(low, high).ok()?,
+                    None => own,
+                };
+                Some(Self::Open(joined))
+            }
+            (
+                Self::SeaSurfaceTemperature,
+                Self::SeaSurfaceSkinTemperature
+                | Self::SeaSurfaceSubskinTemperature
+                | Self::SeaSurfaceFoundationTemperature,
+            ) => Some(self),
+            _ => (self == other).then_some(self),
+        }
+    }
+
+    /// The same with the range of stored values that was found; only open quantities keep one.
+    ///
+    /// # Errors
+    /// Too many quantities.
+    pub fn over(self, [low, high]: [f64; 2]) -> Result<Self, ContractError> {
+        match self {
+            Self::Open(open) => open.over(low, high).map(Self::Open),
+            known => Ok(known),
+        }
+    }
+
+    /// A quantity by its words: that of a statistic, say, whose unit is derived (`K year-1`).
+    ///
+    /// # Errors
+    /// A word out of its limits, or too many quantities.
+    pub fn open(name: &str, unit: &str, title: &str) -> Result<Self, ContractError> {
+        let words = OpenWords {
+            name: name.to_owned(),
+            unit: unit.to_owned(),
+            title: title.to_owned(),
+            range: None,
+        };
+        OpenQuantity::new(words).map(Self::Open)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_temperature_of_a_depth_joins_one_without_and_never_the_other_way_round() {
+        let (any, skin) = (
+            Quantity::SeaSurfaceTemperature,
+            Quantity::SeaSurfaceSkinTemperature,
+        );
+        assert_eq!(any.joined(skin), Some(any));
+        assert_eq!(skin.joined(any), None);
+        assert_eq!(skin.joined(Quantity::SeaSurfaceFoundationTemperature), None);
+        assert_eq!(Quantity::Pco2.joined(Quantity::Fco2), None);
+    }
+
+    #[test]
+    fn open_quantities_of_one_name_and_unit_join_over_both_ranges() {
+        let of = |unit, range| {
+            let plain = Quantity::open("river_flux", unit, "River flux").unwrap();
+            plain.over(range).unwrap()
+        };
+        let joined = of("1", [0.0, 5.0]).joined(of("1", [-2.0, 1.0]));
+        assert_eq!(joined, Some(of("1", [-2.0, 5.0])));
+        assert_eq!(of("1", [0.0, 5.0]).joined(of("m", [0.0, 5.0])), None);
+    }
 
     #[test]
     fn freezing_is_shown_as_zero_celsius() {

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use contract::grid::Grid;
 use contract::quantity::Quantity;
 use serde_json::{Map, Value, json};
 use zarrs::array::codec::{BytesCodec, Crc32cCodec, ZstdCodec};
@@ -131,7 +132,7 @@ pub(crate) enum Fixed {
 
 /// Latitudes, longitudes, their bounds and the grid mapping.
 pub(crate) fn fixed(description: &Description) -> Result<Vec<Fixed>, CubeError> {
-    let (lat, lon) = places(description);
+    let (lat, lon) = places(&description.grid);
     let crs = Shape {
         name: "crs".to_owned(),
         cells: vec![],
@@ -147,16 +148,16 @@ pub(crate) fn fixed(description: &Description) -> Result<Vec<Fixed>, CubeError> 
     ])
 }
 
-struct Places {
+/// The rows, or the columns, of a grid.
+pub struct Places {
     /// Degrees.
-    centres: Vec<f64>,
+    pub centres: Vec<f64>,
     /// Two a cell, in the order of the centres: degrees.
-    bounds: Vec<f64>,
+    pub bounds: Vec<f64>,
 }
 
 /// Latitudes north to south and longitudes eastwards, past 180 where the grid crosses the date line.
-fn places(description: &Description) -> (Places, Places) {
-    let grid = &description.grid;
+pub fn places(grid: &Grid) -> (Places, Places) {
     let of = |count: u32, edge: &dyn Fn(u32) -> f64| {
         let edges = |cell: u32| [edge(cell), edge(cell + 1)];
         let centre = |[from, to]: [f64; 2]| contract::grid::rounded_deg(0.5 * (from + to));

@@ -9,6 +9,21 @@ use crate::Description;
 /// Unit of the time coordinate; instants are whole milliseconds, so that no time is rounded.
 pub(crate) const TIME_UNITS: &str = "milliseconds since 1970-01-01 00:00:00";
 
+/// Names of the arrays beside the values.
+const OTHERS: [&str; 11] = [
+    "bnds",
+    "crs",
+    "lat",
+    "lat_bnds",
+    "lon",
+    "lon_bnds",
+    "sha256_byte",
+    "step_start",
+    "time",
+    "time_bnds",
+    "values_sha256",
+];
+
 /// Attributes from a JSON object.
 pub(crate) fn attributes(object: Value) -> Map<String, Value> {
     match object {
@@ -18,15 +33,18 @@ pub(crate) fn attributes(object: Value) -> Map<String, Value> {
 }
 
 /// Name of the variable that holds the values: that of the quantity.
-pub(crate) fn variable(quantity: Quantity) -> String {
-    let name = serde_json::to_value(quantity).unwrap_or_default();
-    name.as_str().unwrap_or("values").to_owned()
+pub fn variable(quantity: Quantity) -> String {
+    match quantity.word() {
+        name if OTHERS.contains(&name) => format!("{name}_values"),
+        name => name.to_owned(),
+    }
 }
 
 /// Standard name, if the conventions' table (version 93) has one that says what the values are and no more.
 ///
-/// It has none for the upward flux of CO2 as mass of carbon, nor for what that adds up to, and fugacity is not told from
-/// partial pressure here.
+/// It has none for the upward flux of CO2 as mass of carbon, nor for what that adds up to; under partial pressure lies
+/// fugacity too, of products that landed before the two were told apart. Of an open quantity it is not known whether its
+/// name is one of the table.
 fn standard_name(description: &Description) -> Option<&'static str> {
     match description.quantity {
         Quantity::Current if description.product.northward().is_some() => {
@@ -35,9 +53,15 @@ fn standard_name(description: &Description) -> Option<&'static str> {
         Quantity::Current if description.product.eastward().is_some() => {
             Some("northward_sea_water_velocity")
         }
-        Quantity::CarbonFlux | Quantity::AccumulatedCarbon | Quantity::Pco2 | Quantity::Current => {
-            None
-        }
+        Quantity::CarbonFlux
+        | Quantity::AccumulatedCarbon
+        | Quantity::Pco2
+        | Quantity::Current
+        | Quantity::Open(_) => None,
+        Quantity::Fco2 => Some("fugacity_of_carbon_dioxide_in_sea_water"),
+        Quantity::SeaSurfaceSkinTemperature => Some("sea_surface_skin_temperature"),
+        Quantity::SeaSurfaceSubskinTemperature => Some("sea_surface_subskin_temperature"),
+        Quantity::SeaSurfaceFoundationTemperature => Some("sea_surface_foundation_temperature"),
         Quantity::SeaSurfaceTemperature => Some("sea_surface_temperature"),
         Quantity::Chlorophyll => Some("mass_concentration_of_chlorophyll_a_in_sea_water"),
         Quantity::WindSpeed => Some("wind_speed"),
@@ -53,7 +77,7 @@ fn standard_name(description: &Description) -> Option<&'static str> {
 }
 
 /// What is said of the values.
-pub(crate) fn of_values(description: &Description) -> Map<String, Value> {
+pub fn of_values(description: &Description) -> Map<String, Value> {
     let quantity = description.quantity;
     let is_sum = quantity == Quantity::AccumulatedCarbon;
     let mut attributes = attributes(json!({
@@ -73,7 +97,7 @@ pub(crate) fn of_values(description: &Description) -> Map<String, Value> {
 }
 
 /// Of the time coordinate.
-pub(crate) fn of_time() -> Map<String, Value> {
+pub fn of_time() -> Map<String, Value> {
     attributes(
         json!({ "standard_name": "time", "long_name": "time", "axis": "T", "units": TIME_UNITS,
         "calendar": "proleptic_gregorian", "bounds": "time_bnds" }),
@@ -81,7 +105,7 @@ pub(crate) fn of_time() -> Map<String, Value> {
 }
 
 /// Of the first instants of steps, where the bounds of time are those of a sum.
-pub(crate) fn of_step_start() -> Map<String, Value> {
+pub fn of_step_start() -> Map<String, Value> {
     attributes(
         json!({ "long_name": "start of the step that was added last", "units": TIME_UNITS,
         "calendar": "proleptic_gregorian" }),
@@ -94,7 +118,7 @@ pub(crate) fn of_digests() -> Map<String, Value> {
 }
 
 /// Of latitudes.
-pub(crate) fn of_lat() -> Map<String, Value> {
+pub fn of_lat() -> Map<String, Value> {
     attributes(
         json!({ "standard_name": "latitude", "long_name": "latitude", "axis": "Y", "units": "degrees_north",
         "bounds": "lat_bnds" }),
@@ -102,7 +126,7 @@ pub(crate) fn of_lat() -> Map<String, Value> {
 }
 
 /// Of longitudes.
-pub(crate) fn of_lon() -> Map<String, Value> {
+pub fn of_lon() -> Map<String, Value> {
     attributes(
         json!({ "standard_name": "longitude", "long_name": "longitude", "axis": "X", "units": "degrees_east",
         "bounds": "lon_bnds" }),
@@ -110,7 +134,7 @@ pub(crate) fn of_lon() -> Map<String, Value> {
 }
 
 /// Of the grid mapping: the ellipsoid that latitudes are on.
-pub(crate) fn of_crs() -> Map<String, Value> {
+pub fn of_crs() -> Map<String, Value> {
     attributes(
         json!({ "grid_mapping_name": "latitude_longitude", "long_name": "WGS 84",
         "semi_major_axis": WGS84_EQUATORIAL_RADIUS_M, "semi_minor_axis": WGS84_POLAR_RADIUS_M,
@@ -128,5 +152,7 @@ mod tests {
         let names: BTreeSet<_> = Quantity::ALL.map(variable).into();
         assert_eq!(names.len(), Quantity::ALL.len());
         assert_eq!(variable(Quantity::CarbonFlux), "carbon_flux");
+        let open = Quantity::open("time", "1", "Time").unwrap();
+        assert_eq!(variable(open), "time_values");
     }
 }

@@ -54,7 +54,7 @@ impl Description {
     }
 
     /// Attributes of the group.
-    pub(crate) fn attributes(&self) -> Map<String, Value> {
+    pub fn attributes(&self) -> Map<String, Value> {
         let written = json!({ "schema": SCHEMA, "of": self });
         let mut attributes = Map::new();
         let mut put = |name: &str, value: Value| attributes.insert(name.to_owned(), value);

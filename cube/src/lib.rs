@@ -7,7 +7,7 @@
 
 mod arrays;
 mod axis;
-mod cf;
+pub mod cf;
 pub mod clean_up;
 mod description;
 mod edit;
@@ -26,6 +26,7 @@ mod staged;
 mod state;
 pub mod verify;
 
+pub use arrays::{Places, places};
 pub use axis::Step;
 pub use description::Description;
 pub use edit::{Committed, Edit};

@@ -48,6 +48,6 @@ impl State {
     /// Do its chunks hold the same cells of the same quantity?
     pub(crate) fn describes_same_cells(&self, other: &Description) -> bool {
         let own = self.description.as_ref();
-        own.is_some_and(|own| (own.grid, own.quantity) == (other.grid, other.quantity))
+        own.is_some_and(|own| own.grid == other.grid && own.quantity.is_same_kind(other.quantity))
     }
 }

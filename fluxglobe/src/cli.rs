@@ -262,6 +262,9 @@ pub(crate) struct Ingest {
     /// Product to land in, if not the profile's.
     #[arg(long, value_name = "PRODUCT")]
     pub(crate) product: Option<ProductId>,
+    /// Variable to land, where no profile is for the file and it holds several: any on a grid.
+    #[arg(long, value_name = "NAME", conflicts_with = "profile")]
+    pub(crate) variable: Option<String>,
     /// One JSON object a file.
     #[arg(long)]
     pub(crate) json: bool,
@@ -310,7 +313,8 @@ pub(crate) struct StatsPolygon {
     /// Product, of any quantity.
     #[arg(long)]
     pub(crate) product: ProductId,
-    /// `global`, a named region, a box WEST,SOUTH,EAST,NORTH, a GeoJSON or WKT file, or the text of one.
+    /// `global`, a named region, a box WEST,SOUTH,EAST,NORTH, a GeoJSON or WKT file, the text of one,
+    /// or PRODUCT:CODE, the cells where a landed mask has a code.
     #[arg(long, allow_hyphen_values = true)]
     pub(crate) region: String,
     /// First instant: 2000, 2000-03, 2000-03-15 or with a time of day. The product's first if absent.
@@ -337,7 +341,8 @@ pub(crate) struct Budget {
     /// Product, a carbon flux.
     #[arg(long)]
     pub(crate) product: ProductId,
-    /// `global`, a named region, a box WEST,SOUTH,EAST,NORTH, a GeoJSON or WKT file, or the text of one.
+    /// `global`, a named region, a box WEST,SOUTH,EAST,NORTH, a GeoJSON or WKT file, the text of one,
+    /// or PRODUCT:CODE, the cells where a landed mask has a code.
     #[arg(long, default_value = "global", allow_hyphen_values = true)]
     pub(crate) region: String,
     /// First instant: 2000, 2000-03, 2000-03-15 or with a time of day. The product's first if absent.

@@ -22,6 +22,19 @@ pub(crate) struct CheckedGrid {
     pub(crate) masked: MaskedCells,
 }
 
+impl CheckedGrid {
+    /// Lowest and highest value; of none at all nothing to be used.
+    pub(crate) fn range(&self) -> [f64; 2] {
+        let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
+        for value in &self.values {
+            // NaN is neither less nor more.
+            low = low.min(*value);
+            high = high.max(*value);
+        }
+        [low.into(), high.into()]
+    }
+}
+
 /// Checks one step. A step without any value passes with no valid cells; whether that is too little is for the file.
 pub(crate) fn run(
     grid: DecodedGrid,

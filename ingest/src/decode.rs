@@ -1,6 +1,7 @@
 //! [`PlannedGranule`] in, one [`DecodedGrid`] a step out: values on the stored grid, in the stored unit.
 
 use contract::masked::MaskedCells;
+use contract::quantity::Quantity;
 use contract::time::Period;
 
 use crate::error::Stop;
@@ -9,6 +10,7 @@ use crate::inspect::reader::session::Session;
 use crate::plan::cf::axis::Mapping;
 use crate::plan::cf::coordinate::{Axis, Role};
 use crate::plan::cf::packing::Unpacked;
+use crate::plan::cf::unmarked;
 use crate::plan::{PlannedGranule, PlannedStep};
 
 /// One step as values, `[row, col]`, row 0 north, stored unit, NaN for no data.
@@ -34,6 +36,14 @@ pub(crate) async fn run(
         let is_value = matches!(granule.packing.unpacked(*stored), Unpacked::Value(_));
         masked.poor_quality += u64::from(is_value);
         *stored = f64::NAN;
+    }
+    if matches!(granule.target.quantity, Quantity::Open(_)) && granule.recipe.profile.is_none() {
+        let said = |stored: &f64| match granule.packing.unpacked(*stored) {
+            Unpacked::Value(_) => *stored,
+            Unpacked::Missing | Unpacked::OutOfRange => f64::NAN,
+        };
+        let said: Vec<f64> = stored.iter().map(said).collect();
+        unmarked::check(&granule.variable.name, &said)?;
     }
     let is_lat_first = granule.axes.iter().position(|a| a.role == Role::Latitude)
         < granule.axes.iter().position(|a| a.role == Role::Longitude);

@@ -40,7 +40,7 @@ pub use generate::{GeneratedSteps, generate_china_sea};
 pub use ingestd::{IngestService, ServiceSettings};
 pub use inspect::reader;
 pub use limits::Limits;
-pub use notice::Outcome;
+pub use notice::{Outcome, Wishes};
 pub use pipeline::metrics::Metrics;
 pub use pipeline::progress::{Progress, Quiet, Stage};
 pub use plan::profile::{Profile, Profiles, shipped};

@@ -110,6 +110,7 @@ fn promised(path: &str, sha256: Option<Digest>, size_bytes: Option<u64>) -> Even
         path: path.to_owned(),
         profile: None,
         product: None,
+        variable: None,
         sha256,
         size_bytes,
         attempt: 1,

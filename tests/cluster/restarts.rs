@@ -97,6 +97,7 @@ fn one_trace_leads_from_the_notice_to_the_tile() {
         path: revised.display().to_string(),
         profile: None,
         product: Some(PRODUCT.parse().unwrap()),
+        variable: None,
         sha256: None,
         size_bytes: None,
         attempt: 1,

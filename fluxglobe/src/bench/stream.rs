@@ -107,6 +107,7 @@ async fn send(log: &dyn EventLog, file: &std::path::Path, product: &ProductId) -
         path: file.display().to_string(),
         profile: None,
         product: Some(product.clone()),
+        variable: None,
         sha256: None,
         size_bytes: None,
         attempt: 1,

@@ -11,6 +11,9 @@ use contract::product::ProductId;
 Examples:
   fluxglobe export takahashi09-flux --to zarr flux.zarr
   fluxglobe export takahashi09-flux@3 --to icechunk s3://BUCKET/takahashi09-flux
+  fluxglobe export takahashi09-flux --to netcdf flux.nc
+  fluxglobe export takahashi09-flux --to geotiff flux-maps/
+  fluxglobe export takahashi09-flux --to parquet flux.parquet
 
 Then, in Python:
   import xarray
@@ -22,11 +25,11 @@ pub(crate) struct Export {
     #[arg(value_name = "PRODUCT[@VERSION]")]
     pub(crate) product: ExportedProduct,
     /// What to write: plain Zarr version 3, which is files, or an Icechunk repository, which keeps versions and is never
-    /// seen half written.
+    /// seen half written; or, on this machine, NetCDF-4, a folder of GeoTIFFs, or a table in Parquet.
     #[arg(long, value_enum)]
     pub(crate) to: ExportFormat,
     /// A folder that is empty or not there yet, or such a place in a bucket: `s3://BUCKET/PREFIX`, `gs://`, `az://`,
-    /// `hdfs://HOST:PORT/PATH`.
+    /// `hdfs://HOST:PORT/PATH`. For NetCDF and Parquet a file that is not there yet.
     #[arg(value_name = "DEST")]
     pub(crate) destination: String,
     /// What was written as JSON.
@@ -41,6 +44,12 @@ pub(crate) enum ExportFormat {
     Zarr,
     /// Icechunk, format 2.
     Icechunk,
+    /// One NetCDF-4 file by the CF conventions.
+    Netcdf,
+    /// A folder with one GeoTIFF a step.
+    Geotiff,
+    /// One Parquet file with a row for each cell that holds a value.
+    Parquet,
 }
 
 impl ExportFormat {
@@ -49,6 +58,9 @@ impl ExportFormat {
         match self {
             Self::Zarr => "zarr",
             Self::Icechunk => "icechunk",
+            Self::Netcdf => "netcdf",
+            Self::Geotiff => "geotiff",
+            Self::Parquet => "parquet",
         }
     }
 }

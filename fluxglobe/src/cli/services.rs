@@ -102,6 +102,9 @@ pub(crate) struct Notice {
     /// Product to land in, if not the profile's.
     #[arg(long)]
     pub(crate) product: Option<ProductId>,
+    /// Variable to land, where no profile is for the file and it holds several: any on a grid.
+    #[arg(long, value_name = "NAME", conflicts_with = "profile")]
+    pub(crate) variable: Option<String>,
     /// SHA-256 that a fetched file must have; local files are digested here.
     #[arg(long)]
     pub(crate) sha256: Option<Digest>,

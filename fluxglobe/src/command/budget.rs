@@ -6,7 +6,7 @@ use std::sync::Arc;
 use anyhow::Result;
 use comfy_table::presets::NOTHING;
 use comfy_table::{CellAlignment, Table};
-use compute::region::file;
+use compute::region::{file, mask};
 use contract::budget::{BudgetAnswer, BudgetQuery, BudgetRow};
 use contract::manifest::Manifest;
 use contract::product::ProductId;
@@ -29,7 +29,10 @@ pub(crate) async fn run(settings: &Settings, options: &Budget) -> Result<()> {
         earth: options.earth,
         cells: options.cells,
         ocean: ocean(settings, &store, options.ocean.as_ref()).await?,
-        ..BudgetQuery::new(options.product.clone(), region(&options.region)?)
+        ..BudgetQuery::new(
+            options.product.clone(),
+            stored_region(settings, &store, &options.region).await?,
+        )
     };
     let bar = progress::bar("sum over the region", 1);
     let engine = deployment::region_engine(settings, store)?;
@@ -80,6 +83,19 @@ pub(crate) async fn ocean(
     };
     let manifest = deployment::manifest(store, product, &settings.data).await?;
     Ok(Some(Arc::new(manifest)))
+}
+
+/// As [`region`], or the cells of a landed mask that have a code: `PRODUCT:CODE`.
+pub(crate) async fn stored_region(
+    settings: &Settings,
+    store: &Store,
+    text: &str,
+) -> Result<AskedRegion> {
+    let Some((product, code)) = mask::asked(text) else {
+        return region(text);
+    };
+    let mask = deployment::manifest(store, &product, &settings.data).await?;
+    Ok(mask::region(store, &mask, code).await?)
 }
 
 /// A region file, a named region, a box, GeoJSON text or well-known text.

@@ -1,11 +1,13 @@
-//! `fluxglobe export`: a version of a product in, a cube in a folder or bucket out that others' programs open.
+//! `fluxglobe export`: a version of a product in, a cube or files out that others' programs open.
 
+use std::path::Path;
 use std::sync::Arc;
 
 use anyhow::{Context as _, Result, bail};
 use contract::manifest::{Manifest, Step};
 use contract::time::Period;
 use cube::{At, Cube, Description, Follower, PlainZarr, Repository};
+use export::Format;
 use futures::stream::{self, StreamExt as _, TryStreamExt as _};
 use indicatif::ProgressBar;
 use serde::Serialize;
@@ -34,40 +36,23 @@ struct Exported {
 pub(crate) async fn run(settings: &Settings, options: &Export) -> Result<()> {
     let store = deployment::store(settings)?;
     let manifest = version(&store, &options.product, settings).await?;
-    let destination = destination(&options.destination)?;
     let bar = progress::bar("export", manifest.steps.len() as u64);
-    let description = Description::of(&manifest);
-    let tag = match options.to {
-        ExportFormat::Zarr => {
-            let mut zarr = PlainZarr::create(&destination, "", &description).await?;
-            let cube = own_cube(&store, &manifest).await;
-            let mut fields = std::pin::pin!(fields(&store, cube.as_ref(), &manifest, &bar));
-            while let Some((period, values)) = fields.try_next().await? {
-                zarr.append(period, values).await?;
-                bar.inc(1);
-            }
-            zarr.finish().await?;
-            None
+    let (url, tag) = match file_format(options.to) {
+        Some(format) => {
+            let path = local(&options.destination)?;
+            files(&store, &manifest, (format, path), &bar).await?;
+            (options.destination.clone(), None)
         }
-        ExportFormat::Icechunk => {
-            if !destination.list("").await?.is_empty() {
-                bail!("{} is not empty: give another place", destination.url());
-            }
-            // A cube of one version, made as the store's own is.
-            let follower = Follower {
-                store: &destination,
-                folder: "",
-                fields: &store,
-                told: &|_period| bar.inc(1),
-            };
-            follower.run(&manifest).await?;
-            Some(manifest.number.to_string())
+        None => {
+            let destination = destination(&options.destination)?;
+            let tag = arrays(&store, &manifest, options.to, (&destination, &bar)).await?;
+            (destination.url().to_owned(), tag)
         }
     };
     let exported = Exported {
         version: manifest.id().to_string(),
         format: options.to.as_str(),
-        destination: destination.url().to_owned(),
+        destination: url,
         tag,
         steps: manifest.steps.len(),
         rows: manifest.grid.rows,
@@ -80,6 +65,84 @@ pub(crate) async fn run(settings: &Settings, options: &Export) -> Result<()> {
         progress::result(&exported.destination)?;
     }
     Ok(())
+}
+
+/// Formats that are files on this machine.
+fn file_format(to: ExportFormat) -> Option<Format> {
+    match to {
+        ExportFormat::Zarr | ExportFormat::Icechunk => None,
+        ExportFormat::Netcdf => Some(Format::NetCdf),
+        ExportFormat::Geotiff => Some(Format::GeoTiff),
+        ExportFormat::Parquet => Some(Format::Parquet),
+    }
+}
+
+fn local(text: &str) -> Result<&Path> {
+    if text.contains("://") {
+        bail!("{text} is an address: give a path on this machine, and copy it there then");
+    }
+    Ok(Path::new(text))
+}
+
+/// Writes files, each step on a thread for what blocks.
+async fn files(
+    store: &Store,
+    manifest: &Manifest,
+    (format, path): (Format, &Path),
+    bar: &ProgressBar,
+) -> Result<()> {
+    let description = Description::of(manifest);
+    let periods: Vec<Period> = manifest.steps.iter().map(|step| step.period).collect();
+    let mut written = export::create(format, path, &description, &periods)?;
+    let cube = own_cube(store, manifest).await;
+    let mut fields = std::pin::pin!(fields(store, cube.as_ref(), manifest, bar));
+    while let Some((period, values)) = fields.try_next().await? {
+        let append = tokio::task::spawn_blocking(move || {
+            written.append(period, &values)?;
+            Ok::<_, export::ExportError>(written)
+        });
+        written = append.await??;
+        bar.inc(1);
+    }
+    tokio::task::spawn_blocking(move || written.finish()).await??;
+    Ok(())
+}
+
+/// Writes a cube; of a repository the name of the version in it.
+async fn arrays(
+    store: &Store,
+    manifest: &Manifest,
+    to: ExportFormat,
+    (destination, bar): (&Store, &ProgressBar),
+) -> Result<Option<String>> {
+    let description = Description::of(manifest);
+    Ok(match to {
+        ExportFormat::Zarr => {
+            let mut zarr = PlainZarr::create(destination, "", &description).await?;
+            let cube = own_cube(store, manifest).await;
+            let mut fields = std::pin::pin!(fields(store, cube.as_ref(), manifest, bar));
+            while let Some((period, values)) = fields.try_next().await? {
+                zarr.append(period, values).await?;
+                bar.inc(1);
+            }
+            zarr.finish().await?;
+            None
+        }
+        _ => {
+            if !destination.list("").await?.is_empty() {
+                bail!("{} is not empty: give another place", destination.url());
+            }
+            // A cube of one version, made as the store's own is.
+            let follower = Follower {
+                store: destination,
+                folder: "",
+                fields: store,
+                told: &|_period| bar.inc(1),
+            };
+            follower.run(manifest).await?;
+            Some(manifest.number.to_string())
+        }
+    })
 }
 
 fn summary(exported: &Exported) -> String {

@@ -30,9 +30,12 @@ pub(crate) async fn run(settings: &Settings, options: Ingest) -> Result<ExitCode
         .iter()
         .map(|file| std::path::absolute(file).unwrap_or_else(|_| file.clone()))
         .collect();
-    service
-        .notify(&files, options.profile.as_deref(), options.product.as_ref())
-        .await?;
+    let wishes = ingest::Wishes {
+        profile: options.profile,
+        product: options.product,
+        variable: options.variable,
+    };
+    service.notify_of(&files, &wishes).await?;
     let bar = LandingBar::new(files.len());
     let outcomes = service.drain(&bar).await?;
     let refused = outcomes

@@ -53,6 +53,7 @@ fn notice(file: &str, options: &Notice, clock: &mut Clock) -> Result<Event> {
         path,
         profile: options.profile.clone(),
         product: options.product.clone(),
+        variable: options.variable.clone(),
         sha256,
         size_bytes,
         attempt: 1,

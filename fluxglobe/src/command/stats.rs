@@ -12,7 +12,7 @@ use contract::series::{PointSeries, RegionSeries, RegionSeriesQuery};
 use crate::cli::{Settings, StatsPoint, StatsPolygon};
 use crate::{deployment, progress};
 
-use super::budget::{ocean, region};
+use super::budget::{ocean, stored_region};
 
 /// Width of the longest bar, characters.
 const BAR_CHARS: f64 = 30.0;
@@ -48,7 +48,10 @@ pub(crate) async fn polygon(settings: &Settings, options: &StatsPolygon) -> Resu
         to: options.to,
         earth: options.earth,
         ocean: ocean(settings, &store, options.ocean.as_ref()).await?,
-        ..RegionSeriesQuery::new(options.product.clone(), region(&options.region)?)
+        ..RegionSeriesQuery::new(
+            options.product.clone(),
+            stored_region(settings, &store, &options.region).await?,
+        )
     };
     deployment::manifest(&store, &options.product, &settings.data).await?;
     let bar = progress::bar("mean over the region", 1);

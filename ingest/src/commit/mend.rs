@@ -116,6 +116,7 @@ mod tests {
             changes: vec![],
             is_revision: false,
             last_taken: None,
+            quantity: Some(Quantity::CarbonFlux),
         };
         let written = segments::write(store, &product, &GRID, None, &merged);
         let segments::Written { series, domain } = written.await.unwrap();

@@ -110,7 +110,7 @@ async fn build(
         product: last.product.clone(),
         number: newest.map_or(1, |m| m.number + 1),
         title: reading.title.clone(),
-        quantity: reading.quantity,
+        quantity: merged.quantity.unwrap_or(reading.quantity),
         synthetic: reading.synthetic,
         source: reading.source.clone(),
         grid,

@@ -3,7 +3,6 @@
 //! It has the shape of the product in the paper this project continues (1800 x 2460 cells of 1/60 degree, 12 months of
 //! 2009, or days of it), with a coast, clouds and seasons that look right on a globe. It is made up: every file says `synthetic = 1`.
 
-mod text_type;
 mod writer;
 
 use std::path::Path;

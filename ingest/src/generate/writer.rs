@@ -2,11 +2,10 @@
 
 use std::path::Path;
 
-use hdf5::types::{FixedAscii, VarLenArray, VarLenUnicode};
-use hdf5::{Dataset, File, Location, ObjectReference as _, ObjectReference1, SliceOrIndex};
+use hdf5::{Dataset, File, SliceOrIndex};
 use ndarray::ArrayView2;
+use netcdf4::{attach, create, scale, texts};
 
-use super::text_type::null_terminated;
 use super::{FILL, Shape, YEAR};
 
 /// Cells of a chunk: a map at scale 1 is 12 x 6 of them.
@@ -32,10 +31,7 @@ pub(super) fn write(
     edges_days: &[f64],
     mut values: impl FnMut(usize) -> Vec<f32>,
 ) -> hdf5::Result<()> {
-    // No object may carry the time of its making: the same seed gives the same bytes.
-    let file = File::with_options()
-        .with_fcpl(|create| create.obj_track_times(false))
-        .create(path)?;
+    let file = create(path)?;
     let generator = format!("fluxglobe china-sea, seed {seed}");
     let title = "SYNTHETIC China Sea air-sea CO2 flux 2009: made up by a program, no measurement";
     texts(
@@ -158,62 +154,4 @@ pub(super) fn first_day(month: usize) -> f64 {
     let first = start(YEAR, 1);
     day.and_then(|day| Ok(day - first?))
         .expect("months of 2009 exist")
-}
-
-fn texts(owner: &Location, attributes: &[(&str, &str)]) -> hdf5::Result<()> {
-    for (name, value) in attributes {
-        let value: VarLenUnicode = value
-            .parse()
-            .map_err(|e| hdf5::Error::from(format!("{name}: {e}")))?;
-        owner
-            .new_attr::<VarLenUnicode>()
-            .create(*name)?
-            .write_scalar(&value)?;
-    }
-    Ok(())
-}
-
-/// A coordinate variable, which is also the dimension's scale.
-fn scale(file: &File, name: &str, values: &[f64]) -> hdf5::Result<Dataset> {
-    let dataset = file
-        .new_dataset::<f64>()
-        .obj_track_times(false)
-        .shape([values.len()])
-        .create(name)?;
-    dataset.write_raw(values)?;
-    fixed(&dataset, "CLASS", "DIMENSION_SCALE")?;
-    fixed(&dataset, "NAME", name)?;
-    Ok(dataset)
-}
-
-/// A text as the dimension scales of HDF5 want it: of fixed length, with a null character at its end.
-fn fixed(owner: &Location, name: &str, value: &str) -> hdf5::Result<()> {
-    let text = FixedAscii::<32>::from_ascii(value)
-        .map_err(|e| hdf5::Error::from(format!("{name}: {e}")))?;
-    let attribute = owner
-        .new_attr_builder()
-        .empty_as(null_terminated(value.len() + 1)?)
-        .create(name)?;
-    attribute
-        .as_writer()
-        .conversion(hdf5::Conversion::Soft)
-        .write_scalar(&text)
-}
-
-/// Names the dimensions of a dataset by their scales.
-fn attach(file: &File, dataset: &Dataset, scales: &[&Dataset]) -> hdf5::Result<()> {
-    let lists: Vec<VarLenArray<ObjectReference1>> = scales
-        .iter()
-        .map(|scale| {
-            Ok(VarLenArray::from_slice(&[ObjectReference1::create(
-                file,
-                &scale.name(),
-            )?]))
-        })
-        .collect::<hdf5::Result<_>>()?;
-    dataset
-        .new_attr::<VarLenArray<ObjectReference1>>()
-        .shape([scales.len()])
-        .create("DIMENSION_LIST")?
-        .write_raw(&lists)
 }

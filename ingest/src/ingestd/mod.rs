@@ -33,7 +33,7 @@ use storage::log::EventLog;
 
 use crate::error::IngestError;
 use crate::limits::gates::Gates;
-use crate::notice::{Outcome, notice_body};
+use crate::notice::{Outcome, Wishes, notice_body};
 use crate::observation::ObservationSink;
 use crate::pipeline::Pipeline;
 use crate::pipeline::metrics::Metrics;
@@ -110,16 +110,26 @@ impl IngestService {
         }
     }
 
-    /// Appends a notice for each file.
+    /// Appends a notice for each file, with the name of a profile and a product to land in, if they are to be these.
     pub async fn notify(
         &self,
         files: &[PathBuf],
         profile: Option<&str>,
         product: Option<&ProductId>,
     ) -> Result<(), IngestError> {
+        let wishes = Wishes {
+            profile: profile.map(str::to_owned),
+            product: product.cloned(),
+            variable: None,
+        };
+        self.notify_of(files, &wishes).await
+    }
+
+    /// Appends a notice for each file, to be landed as is wished.
+    pub async fn notify_of(&self, files: &[PathBuf], wishes: &Wishes) -> Result<(), IngestError> {
         let noticed = now();
         let event = |file: &PathBuf| {
-            let body = notice_body(&file.display().to_string(), profile, product, 1);
+            let body = notice_body(&file.display().to_string(), wishes);
             // When it was given is when it came into the log, whose times never go back as a clock may.
             Event::new(trace(file, noticed), body)
         };

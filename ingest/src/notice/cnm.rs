@@ -7,7 +7,7 @@ use contract::event::{Event, MAX_TRACE_BYTES};
 use contract::time::TimeMs;
 use serde::Deserialize;
 
-use super::{Order, Said, bad, notice_body};
+use super::{Order, Said, Wishes, bad, notice_body};
 use crate::error::Rejection;
 use crate::fetch::{Expected, Location, Method};
 use crate::plan::profile::Profiles;
@@ -127,7 +127,11 @@ pub(super) fn notices(
             |_| "an address that cannot be read".to_owned(),
             ToString::to_string,
         );
-        let body = notice_body(&shown, profile.map(|p| p.name.as_str()), None, 1);
+        let wishes = Wishes {
+            profile: profile.map(|p| p.name.clone()),
+            ..Wishes::default()
+        };
+        let body = notice_body(&shown, &wishes);
         let mut cause = Event::new(trace.clone(), body);
         cause.noticed = noticed;
         let order = || {
@@ -136,6 +140,7 @@ pub(super) fn notices(
                 expected: expected(file)?,
                 profile: profile.cloned(),
                 product: None,
+                variable: None,
             })
         };
         Said {

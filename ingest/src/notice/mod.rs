@@ -50,6 +50,7 @@ pub(crate) struct Order {
     pub(crate) expected: Expected,
     pub(crate) profile: Option<Profile>,
     pub(crate) product: Option<ProductId>,
+    pub(crate) variable: Option<String>,
 }
 
 impl Order {
@@ -57,6 +58,7 @@ impl Order {
         Wish {
             profile: self.profile.as_ref(),
             product: self.product.as_ref(),
+            variable: self.variable.as_deref(),
         }
     }
 }
@@ -113,7 +115,7 @@ impl Said {
     fn nothing(message: &Message, rejection: Rejection, came: TimeMs) -> Self {
         let shown = message.origin.to_string();
         let trace = format!("message-{}", Digest::of(&message.content).short());
-        let mut cause = Event::new(trace, notice_body(&shown, None, None, 1));
+        let mut cause = Event::new(trace, notice_body(&shown, &Wishes::default()));
         cause.noticed = Some(came);
         Self {
             shown,
@@ -129,6 +131,7 @@ impl Said {
             path,
             profile,
             product,
+            variable,
             sha256,
             size_bytes,
             attempt,
@@ -151,6 +154,7 @@ impl Said {
                 },
                 profile: profile?,
                 product: product.clone(),
+                variable: variable.clone(),
             })
         };
         Ok(Self {
@@ -165,20 +169,32 @@ impl Said {
     }
 }
 
-/// The event of a notice.
-pub(crate) fn notice_body(
-    path: &str,
-    profile: Option<&str>,
-    product: Option<&ProductId>,
-    attempt: u32,
-) -> Body {
+/// How files are to be landed, as a command says it.
+#[derive(Debug, Clone, Default)]
+pub struct Wishes {
+    /// Name of the profile, or its file; found by itself if absent.
+    pub profile: Option<String>,
+    /// The product, if not the profile's.
+    pub product: Option<ProductId>,
+    /// The variable to land of files that no profile is for.
+    pub variable: Option<String>,
+}
+
+/// The event of a first notice.
+pub(crate) fn notice_body(path: &str, wishes: &Wishes) -> Body {
+    let Wishes {
+        profile,
+        product,
+        variable,
+    } = wishes.clone();
     Body::GranuleNotice {
         path: path.to_owned(),
-        profile: profile.map(str::to_owned),
-        product: product.cloned(),
+        profile,
+        product,
+        variable,
         sha256: None,
         size_bytes: None,
-        attempt,
+        attempt: 1,
     }
 }
 

@@ -25,9 +25,13 @@ impl Pipeline<'_> {
         newest: Option<&Manifest>,
     ) -> Result<(Reading, MaskedCells), Stop> {
         let (mut steps, mut masked) = (Vec::new(), MaskedCells::default());
+        let mut range: Option<[f64; 2]> = None;
         for index in 0..planned.steps.len() {
             let (step, own) = self.grid(shown, &mut planned, index, newest).await?;
-            steps.extend(step);
+            if let Some((step, [low, high])) = step {
+                steps.push(step);
+                range = Some(range.map_or([low, high], |[l, h]| [l.min(low), h.max(high)]));
+            }
             masked = masked + own;
         }
         planned.raw.check_unchanged()?;
@@ -42,19 +46,26 @@ impl Pipeline<'_> {
             assumptions,
             ..
         } = planned;
+        let mut target = target;
+        if let Some(range) = range {
+            let over = target.quantity.over(range);
+            target.quantity = over
+                .map_err(|e| Rejection::new(RejectReason::NoVariable, "quantity", e.to_string()))?;
+        }
         let mut reading = Reading::new(recipe, &target, mapping.grid, steps);
         reading.assumptions = assumptions;
         Ok((reading, masked))
     }
 
-    /// One time step: decode, check, encode, put; and what was masked in it. None if it holds no value at all.
+    /// One time step with the range of its values: decode, check, encode, put; and what was masked in it. None if it holds
+    /// no value at all.
     async fn grid(
         &self,
         shown: &Path,
         planned: &mut PlannedGranule,
         index: usize,
         newest: Option<&Manifest>,
-    ) -> Result<(Option<Step>, MaskedCells), Stop> {
+    ) -> Result<(Option<(Step, [f64; 2])>, MaskedCells), Stop> {
         let (number, count) = (index + 1, planned.steps.len());
         let tell = |stage| self.progress.stage(shown, stage, number, count);
         tell(Stage::Decode);
@@ -82,17 +93,17 @@ impl Pipeline<'_> {
             let running = metrics.start("encode");
             let encoded = encode::run(&checked, &product, &grid).map_err(Stop::from);
             running.done(ended(&encoded));
-            encoded.map(|encoded| (Some(encoded), checked.masked))
+            encoded.map(|encoded| (Some((encoded, checked.range())), checked.masked))
         })
         .await??;
-        let Some(encoded) = encoded else {
+        let Some((encoded, range)) = encoded else {
             return Ok((None, masked));
         };
         tell(Stage::Put);
         let there = newest.and_then(|newest| field_of(newest, encoded.period));
         let put = async { Ok(put::run(self.store, encoded, &planned.raw, &grid, there).await?) };
         let stored = self.metrics.timed("put", put).await?;
-        Ok((Some(stored), masked))
+        Ok((Some((stored, range)), masked))
     }
 }
 

@@ -227,7 +227,7 @@ fn unchanged(
 ) -> Option<(Versioned, Unchanged)> {
     if wish.profile.is_some()
         || planned.steps.is_empty()
-        || newest.quantity != planned.target.quantity
+        || newest.quantity.joined(planned.target.quantity).is_none()
         || newest.grid != planned.mapping.grid
     {
         return None;

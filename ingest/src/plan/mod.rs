@@ -29,6 +29,7 @@ use crate::inspect::reader::session::Session;
 use crate::limits::Limits;
 use crate::plan::cf::axis::Mapping;
 use crate::plan::cf::coordinate::{self, Axis, Role};
+use crate::plan::cf::open;
 use crate::plan::cf::packing::Packing;
 use crate::plan::profile::Profile;
 use crate::plan::recipe::Recipe;
@@ -85,6 +86,8 @@ pub(crate) struct PlannedStep {
 pub(crate) struct Wish<'a> {
     pub(crate) profile: Option<&'a Profile>,
     pub(crate) product: Option<&'a ProductId>,
+    /// The variable to land of a file that no profile is for.
+    pub(crate) variable: Option<&'a str>,
 }
 
 /// A file on its way through planning.
@@ -95,6 +98,8 @@ struct Planning<'a> {
     profile: Option<&'a Profile>,
     limits: Limits,
     assumptions: Vec<String>,
+    /// Is the variable one that holds at any time, so that its file says of none?
+    holds_always: bool,
 }
 
 pub(crate) async fn run(
@@ -110,24 +115,26 @@ pub(crate) async fn run(
     } = granule;
     let fits = |profile: &&Profile| profile.is_for(&raw.file_name, &description);
     let profile = wish.profile.or_else(|| settings.profiles.iter().find(fits));
-    let (variable, meaning) = target::choose(&description, profile)?;
-    let target = target::target(
-        &description,
-        variable,
-        profile,
-        meaning.quantity,
-        wish.product,
-    )?;
+    let wish = Wish { profile, ..wish };
+    let (variable, meaning, assumption) = target::choose(&description, wish)?;
     let mut planning = Planning {
         session,
         file: &description,
         file_name: &raw.file_name,
         profile,
         limits,
-        assumptions: vec![],
+        assumptions: assumption.into_iter().collect(),
+        holds_always: false,
     };
     let (axes, mapping) = place::mapping(&mut planning, variable).await?;
-    let periods = steps::periods(&mut planning, variable, &axes).await?;
+    let periods = steps::periods(&mut planning, (variable, meaning.quantity), &axes).await?;
+    if matches!(meaning.quantity, Quantity::Open(_)) && open::stated_unit(variable).is_none() {
+        planning.assume(format!(
+            "{}: has no units; taken for a number without one, as CF says",
+            variable.name
+        ));
+    }
+    let target = target::target(&planning, variable, wish, meaning.quantity)?;
     let steps = steps::convert(variable, profile, meaning, &periods)?;
     let packing = target::packing(variable, profile)?;
     packing
@@ -149,7 +156,7 @@ pub(crate) async fn run(
         packing,
         steps,
         quality,
-        recipe: Recipe::of(profile),
+        recipe: Recipe::of(wish),
         assumptions,
         raw,
     })

@@ -5,8 +5,9 @@ use contract::event::RejectReason;
 use super::Planning;
 use crate::error::{Rejection, Stop};
 use crate::inspect::file::description::{Dimension, Variable};
-use crate::plan::cf::axis::Mapping;
+use crate::plan::cf::axis::{Mapping, Registration};
 use crate::plan::cf::coordinate::{self, Axis, Evidence, Role};
+use crate::plan::cf::corner;
 use crate::plan::cf::projection;
 use crate::plan::profile::{GridRules, StatedGrid, TimeSource};
 
@@ -218,12 +219,33 @@ async fn read_mapping(
             check_evidence(planning, name, labels, most_deg)?;
         }
     }
+    let registration = registration(planning, rules, &names, [&lat_deg, &lon_deg]);
     Ok(Mapping::from_labels(
         &lat_deg,
         &lon_deg,
-        rules.registration,
+        registration,
         [&names[0], &names[1]],
     )?)
+}
+
+/// What labels name: what a profile says, else centres, unless they can only be corners.
+fn registration(
+    planning: &mut Planning<'_>,
+    rules: &GridRules,
+    names: &[String; 2],
+    [lat_deg, lon_deg]: [&[f64]; 2],
+) -> Registration {
+    if planning.profile.is_some() {
+        return rules.registration;
+    }
+    let Some(corner) = corner::of(lat_deg, lon_deg) else {
+        return rules.registration;
+    };
+    planning.assume(format!(
+        "{} and {}: as centres of cells their labels would reach past a pole; they are taken for corners ({corner:?}) of cells that cover the globe",
+        names[0], names[1]
+    ));
+    corner
 }
 
 /// Notes an axis that nothing but its name makes a latitude or longitude, and refuses it if it cannot be one.

@@ -3,13 +3,15 @@
 use contract::digest::Digest;
 use serde::{Deserialize, Serialize};
 
+use super::Wish;
 use crate::plan::profile::Profile;
 
 /// Version of the way from a file's bytes to a field's. It is raised with every change that gives other values or other
 /// fields for some file; what was read by an older one is then stale. A test compares the bytes of a known file.
 ///
 /// 2: masked cells are counted, valid ranges are read as CF says.
-pub(crate) const DECODER: u32 = 2;
+/// 3: fugacity is told from partial pressure, and temperatures of the sea surface by their depth.
+pub(crate) const DECODER: u32 = 3;
 
 /// How a file was read.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -19,6 +21,9 @@ pub(crate) struct Recipe {
     pub(crate) decoder: u32,
     /// The profile; none for a file that follows CF.
     pub(crate) profile: Option<Used>,
+    /// The variable that was asked for, of a file that no profile was for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) variable: Option<String>,
 }
 
 /// The profile that a file was read by.
@@ -32,21 +37,27 @@ pub(crate) struct Used {
 }
 
 impl Recipe {
-    /// How this program reads a file by a profile.
-    pub(crate) fn of(profile: Option<&Profile>) -> Self {
+    /// How this program reads a file by a profile, or else by itself and maybe a variable that is asked for.
+    pub(crate) fn of(wish: Wish<'_>) -> Self {
         let used = |profile: &Profile| Used {
             name: profile.name.clone(),
             rules: profile.rules(),
         };
+        let variable = wish.variable.filter(|_| wish.profile.is_none());
         Self {
             decoder: DECODER,
-            profile: profile.map(used),
+            profile: wish.profile.map(used),
+            variable: variable.map(str::to_owned),
         }
     }
 
     /// Hash of everything that shapes the reading of a file: its bytes, its name (which may hold its date) and this.
     pub(crate) fn input(&self, raw_sha256: Digest, file_name: &str) -> Digest {
         let rules = self.profile.as_ref().map(|used| used.rules);
-        Digest::of_json(&("reading", raw_sha256, file_name, self.decoder, rules))
+        let basis = ("reading", raw_sha256, file_name, self.decoder, rules);
+        match &self.variable {
+            None => Digest::of_json(&basis),
+            Some(variable) => Digest::of_json(&(basis, variable)),
+        }
     }
 }

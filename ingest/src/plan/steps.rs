@@ -1,6 +1,7 @@
 //! When the steps of a variable are, and how the values of each become the stored unit.
 
 use contract::event::RejectReason;
+use contract::quantity::Quantity;
 use contract::time::Period;
 
 use super::bounds::{self, Bounds};
@@ -11,15 +12,19 @@ use crate::inspect::file::description::Variable;
 use crate::plan::cf::calendar::CalendarDate;
 use crate::plan::cf::cell_methods::{self, TimeMethod};
 use crate::plan::cf::coordinate::{Axis, Role};
+use crate::plan::cf::open;
 use crate::plan::cf::quantity::Named;
 use crate::plan::cf::{period, spacing};
 use crate::plan::profile::{Profile, TimeRules, TimeSource};
 use crate::plan::unit;
 
+/// The year, a leap year, that stands for all where a file means none.
+const REFERENCE_YEAR: i32 = 2000;
+
 /// The periods of all steps, in the order of the file, not overlapping.
 pub(super) async fn periods(
     planning: &mut Planning<'_>,
-    variable: &Variable,
+    (variable, quantity): (&Variable, Quantity),
     axes: &[Axis],
 ) -> Result<Vec<Period>, Stop> {
     let count = axes
@@ -37,7 +42,7 @@ pub(super) async fn periods(
     }
     let periods = match planning.profile.and_then(|p| p.time.as_ref()) {
         Some(rules) => by_rules(planning, rules, count).await?,
-        None => by_file(planning, variable, axes).await?,
+        None => by_file(planning, (variable, quantity), axes).await?,
     };
     if periods.len() as u64 != count {
         let detail = format!(
@@ -111,13 +116,17 @@ async fn by_rules(
 /// Time as CF has it: bounds, then `cell_methods`, the distance of stamps, and attributes about the coverage.
 async fn by_file(
     planning: &mut Planning<'_>,
-    variable: &Variable,
+    (variable, quantity): (&Variable, Quantity),
     axes: &[Axis],
 ) -> Result<Vec<Period>, Stop> {
+    let is_fixed = open::is_fixed(quantity);
     let Some(name) = planning.time_variable(axes) else {
-        return Ok(vec![coverage::period(planning, None)?]);
+        let period = coverage::period(planning, None);
+        return Ok(vec![period.or_else(|silent| {
+            fixed(planning, variable, None, is_fixed, silent)
+        })?]);
     };
-    let stamps = stamps::read(planning, &name, None, None).await?;
+    let stamps = stamps_of(planning, &name).await?;
     let method = variable.attributes.text("cell_methods");
     let mut method = method.and_then(|text| cell_methods::of_time(text, &name));
     match bounds::read(planning, &name, &stamps, method).await? {
@@ -126,7 +135,10 @@ async fn by_file(
         Bounds::Silent => {}
     }
     if let [stamp] = stamps[..] {
-        return Ok(vec![coverage::period(planning, Some((&name, stamp)))?]);
+        let period = coverage::period(planning, Some((&name, stamp)));
+        return Ok(vec![period.or_else(|silent| {
+            fixed(planning, variable, Some(stamp), is_fixed, silent)
+        })?]);
     }
     if method == Some(TimeMethod::Point) {
         let periods = spacing::around(&stamps).map_err(|e| refused(&name, e))?;
@@ -136,6 +148,52 @@ async fn by_file(
         return Ok(periods);
     }
     Ok(by_spacing(planning, &name, &stamps)?)
+}
+
+/// The one step of what holds at any time, of which nothing says when it is: the year of its stamp, if it has one.
+fn fixed(
+    planning: &mut Planning<'_>,
+    variable: &Variable,
+    stamp: Option<CalendarDate>,
+    is_fixed: bool,
+    silent: Rejection,
+) -> Result<Period, Rejection> {
+    if !is_fixed {
+        return Err(silent);
+    }
+    planning.holds_always = true;
+    let year = stamp.map_or(REFERENCE_YEAR, |stamp| stamp.year);
+    planning.assume(format!(
+        "{}: says of no time that it covers it; taken for what holds at any time, its one step is the year {year}",
+        variable.name
+    ));
+    let period = Period::year(year);
+    period.map_err(|e| refused(&variable.name, e.to_string()))
+}
+
+/// The stamps of a time axis. Those in the year 0 are of a mean year (COARDS), and become those of a year that can be shown.
+async fn stamps_of(planning: &mut Planning<'_>, time: &str) -> Result<Vec<CalendarDate>, Stop> {
+    let units = planning.file.variable(time);
+    let units = units.and_then(|v| v.attributes.text("units"));
+    if let Some(unit) = units.and_then(in_reference_year) {
+        let moved = stamps::read(planning, time, Some(&unit), None).await?;
+        if moved.iter().all(|stamp| stamp.year == REFERENCE_YEAR) {
+            planning.assume(format!(
+                "{time}: is in the year 0, which stands for a mean year; its steps are those of {REFERENCE_YEAR}"
+            ));
+            return Ok(moved);
+        }
+    }
+    stamps::read(planning, time, None, None).await
+}
+
+/// `hours since 0000-01-01` from the same day of the reference year on.
+fn in_reference_year(units: &str) -> Option<String> {
+    let (step, date) = units.split_once(" since ")?;
+    let day = ["0000-", "0-"]
+        .iter()
+        .find_map(|year| date.trim().strip_prefix(year))?;
+    Some(format!("{step} since {REFERENCE_YEAR}-{day}"))
 }
 
 /// Steps from the distance of their stamps, or of the length that an attribute states.
@@ -175,11 +233,20 @@ pub(super) fn convert(
     periods: &[Period],
 ) -> Result<Vec<PlannedStep>, Rejection> {
     let stated = profile.and_then(|p| p.variable.unit.as_deref());
-    let own = ["units", "Units", "unit", "Unit"]
-        .into_iter()
-        .find_map(|name| variable.attributes.text(name));
+    let own = open::stated_unit(variable);
     let bad = |detail: String| Rejection::new(RejectReason::Unit, &variable.name, detail);
     let missing = || bad("has no units attribute; state the unit in a profile".to_owned());
+    if let (Quantity::Open(_), None) = (meaning.quantity, profile) {
+        // In the unit that the file has, or in base units.
+        let factor = unit::canonical(own.unwrap_or("1")).map_or(1.0, |(_, factor)| factor);
+        let step = |(time_index, period): (usize, &Period)| PlannedStep {
+            period: *period,
+            time_index: time_index as u64,
+            factor,
+            offset: 0.0,
+        };
+        return Ok(periods.iter().enumerate().map(step).collect());
+    }
     let spelling = stated.or(own).ok_or_else(missing)?;
     let wrong = |e: String| bad(format!("has unit {spelling:?}, which {e}"));
     let unit = unit::parse(spelling).map_err(wrong)?;

@@ -4,12 +4,12 @@ use contract::event::RejectReason;
 use contract::product::ProductId;
 use contract::quantity::Quantity;
 
-use super::Target;
+use super::{Planning, Target, Wish};
 use crate::error::Rejection;
 use crate::inspect::file::description::{Description, Variable};
-use crate::plan::cf::coordinate::{self, Role};
+use crate::plan::cf::main_variable::{self, listed};
+use crate::plan::cf::open;
 use crate::plan::cf::packing::Packing;
-use crate::plan::cf::projection;
 use crate::plan::cf::quantity::{Named, directions, has_direction, of_standard_name};
 use crate::plan::profile::Profile;
 use crate::plan::unit::Substance;
@@ -17,16 +17,45 @@ use crate::plan::unit::Substance;
 /// Longest title and citation taken from a file, characters.
 const MAX_TITLE_CHARS: usize = 200;
 
-/// The variable to land and what it means.
+/// The variable to land, what it means, and what is taken for granted with that.
 pub(super) fn choose<'a>(
     file: &'a Description,
-    profile: Option<&Profile>,
-) -> Result<(&'a Variable, Named), Rejection> {
-    let Some(profile) = profile else {
-        let (variable, named) = choose_by_standard_name(file)?;
-        let sign = sign(variable, named.quantity, None)?;
-        return Ok((variable, Named { sign, ..named }));
+    wish: Wish<'_>,
+) -> Result<(&'a Variable, Named, Option<String>), Rejection> {
+    let Some(profile) = wish.profile else {
+        return choose_by_file(file, wish.variable);
     };
+    let (variable, named) = choose_by_profile(file, profile)?;
+    Ok((variable, named, None))
+}
+
+/// Without a profile: the variable that is asked for, or else the one that the file is about, as its standard name or, if
+/// that is none of ours, its own words say.
+fn choose_by_file<'a>(
+    file: &'a Description,
+    asked: Option<&str>,
+) -> Result<(&'a Variable, Named, Option<String>), Rejection> {
+    let (variable, assumption) = match asked {
+        Some(name) => (main_variable::asked(file, name)?, None),
+        None => main_variable::of(file)?,
+    };
+    let standard_name = variable.attributes.text("standard_name");
+    let named = match standard_name.and_then(of_standard_name) {
+        Some(named) => named,
+        None => Named {
+            quantity: open::quantity(variable)?,
+            sign: 1.0,
+            substance: None,
+        },
+    };
+    let sign = sign(variable, named.quantity, None)?;
+    Ok((variable, Named { sign, ..named }, assumption))
+}
+
+fn choose_by_profile<'a>(
+    file: &'a Description,
+    profile: &Profile,
+) -> Result<(&'a Variable, Named), Rejection> {
     let name = &profile.variable.name;
     let missing = || {
         let detail = format!(
@@ -100,74 +129,18 @@ fn sign(
     }
 }
 
-fn choose_by_standard_name(file: &Description) -> Result<(&Variable, Named), Rejection> {
-    let is_data = |v: &&Variable| {
-        v.is_numeric() && coordinate::role_of(v) == Role::Other && v.dimensions.len() >= 2
-    };
-    let data: Vec<&Variable> = file.variables.iter().filter(is_data).collect();
-    let named = |v: &&'_ Variable| {
-        v.attributes
-            .text("standard_name")
-            .and_then(of_standard_name)
-    };
-    let found: Vec<_> = data
-        .iter()
-        .filter_map(|v| named(v).map(|n| (*v, n)))
-        .collect();
-    let candidate = found.first().map(|(v, _)| *v).or(data.first().copied());
-    // That a file is on another projection or a swath matters before what its variables are called.
-    if let Some(candidate) = candidate {
-        projection::check(file, candidate)?;
-    }
-    if let Some(first) = candidate.filter(|first| is_swath(file, first)) {
-        return Err(coordinate::no_grid(file, first));
-    }
-    let refused = |detail: String| Err(Rejection::new(RejectReason::NoVariable, "file", detail));
-    match found.as_slice() {
-        [only] => Ok(*only),
-        [] if data.is_empty() => {
-            refused("holds no gridded variable; give a file with one".to_owned())
-        }
-        [] => refused(format!(
-            "has no variable whose standard_name is one that is stored (it holds {}); say in a profile which one to land",
-            listed(data.into_iter())
-        )),
-        several => refused(format!(
-            "has several variables that could be landed ({}); say in a profile which one",
-            listed(several.iter().map(|(v, _)| *v))
-        )),
-    }
-}
-
-/// Has the variable no latitude axis, and the file a latitude or longitude of two dimensions?
-fn is_swath(file: &Description, variable: &Variable) -> bool {
-    let on_axes = coordinate::axes(file, variable)
-        .iter()
-        .any(|a| a.role == Role::Latitude);
-    let is_plane = |v: &&Variable| v.dimensions.len() >= 2;
-    let mut planes = file
-        .variables
-        .iter()
-        .filter(is_plane)
-        .map(coordinate::role_of);
-    !on_axes && planes.any(|role| matches!(role, Role::Latitude | Role::Longitude))
-}
-
-fn listed<'a>(variables: impl Iterator<Item = &'a Variable>) -> String {
-    const SHOWN: usize = 8;
-    let names: Vec<&str> = variables.map(|v| v.name.as_str()).collect();
-    let more = if names.len() > SHOWN { ", ..." } else { "" };
-    format!("{}{more}", names[..names.len().min(SHOWN)].join(", "))
-}
-
-/// What the variable becomes.
+/// What the variable becomes. Files of one variable make one product, but for what holds at any time: of that each file is
+/// one of its own, called as the file is.
 pub(super) fn target(
-    file: &Description,
+    planning: &Planning<'_>,
     variable: &Variable,
-    profile: Option<&Profile>,
+    wish: Wish<'_>,
     quantity: Quantity,
-    product: Option<&ProductId>,
 ) -> Result<Target, Rejection> {
+    let file = planning.file;
+    let Wish {
+        profile, product, ..
+    } = wish;
     let marked = file.attributes.0.contains_key("synthetic")
         && file.attributes.number("synthetic") != Some(0.0);
     if let Some(profile) = profile {
@@ -205,6 +178,11 @@ pub(super) fn target(
     Ok(Target {
         product: product
             .cloned()
+            .or_else(|| {
+                let stem = planning.file_name.split('.').next();
+                let stem = stem.filter(|_| planning.holds_always);
+                stem.and_then(product_name)
+            })
             .or_else(|| product_name(&variable.name))
             .ok_or_else(unnamed)?,
         title: title.unwrap_or_else(|| quantity.title().to_owned()),

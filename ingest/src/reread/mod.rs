@@ -108,6 +108,8 @@ enum By {
     Given,
     /// By a known profile of this name.
     Named(String),
+    /// By the CF conventions, the variable of this name.
+    Variable(String),
 }
 
 /// What would be done.

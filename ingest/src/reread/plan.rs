@@ -10,6 +10,7 @@ use storage::{Store, manifests, verify};
 
 use super::{By, Item, Plan, Reason, Request};
 use crate::error::IngestError;
+use crate::plan::Wish;
 use crate::plan::profile::Profiles;
 use crate::plan::recipe::{DECODER, Recipe};
 use crate::put::reading::{self, Reading};
@@ -251,14 +252,32 @@ fn wanted(
     request: &Request,
 ) -> Result<Wanted, String> {
     if let Some(profile) = &request.profile {
-        return Ok(Wanted::As(By::Given, Recipe::of(Some(profile))));
+        let wish = Wish {
+            profile: Some(profile),
+            ..Wish::default()
+        };
+        return Ok(Wanted::As(By::Given, Recipe::of(wish)));
     }
     let now = |reading: &Reading| match &reading.recipe.profile {
-        None => Some((By::Found, Recipe::of(None))),
+        None => {
+            let variable = reading.recipe.variable.clone();
+            let wish = Wish {
+                variable: variable.as_deref(),
+                ..Wish::default()
+            };
+            let recipe = Recipe::of(wish);
+            Some((variable.map_or(By::Found, By::Variable), recipe))
+        }
         Some(used) => profiles
             .iter()
             .find(|profile| profile.name == used.name)
-            .map(|profile| (By::Named(used.name.clone()), Recipe::of(Some(profile)))),
+            .map(|profile| {
+                let wish = Wish {
+                    profile: Some(profile),
+                    ..Wish::default()
+                };
+                (By::Named(used.name.clone()), Recipe::of(wish))
+            }),
     };
     let is_current = |r: &&Reading| now(r).is_some_and(|(_, recipe)| recipe == r.recipe);
     // The reading that the product holds, if there are several one that would be repeated; else one of a run that was

@@ -96,14 +96,23 @@ impl Work<'_> {
     async fn read(&self, item: &Item) -> Result<Reading, Stop> {
         let named = match &item.by {
             By::Named(name) => Some(self.pipeline.settings.profiles.named(name)?),
-            By::Found | By::Given => None,
+            By::Found | By::Given | By::Variable(_) => None,
         };
         let profile = match item.by {
             By::Given => self.given,
-            By::Found | By::Named(_) => named.as_ref(),
+            By::Found | By::Named(_) | By::Variable(_) => named.as_ref(),
+        };
+        let variable = match &item.by {
+            By::Variable(name) => Some(name.as_str()),
+            By::Found | By::Given | By::Named(_) => None,
+        };
+        let wish = Wish {
+            profile,
+            product: Some(self.product),
+            variable,
         };
         if item.is_read {
-            let recipe = Recipe::of(profile);
+            let recipe = Recipe::of(wish);
             let (product, store) = (self.product, self.pipeline.store);
             let key = reading::key(product, &recipe, item.raw_sha256, &item.file)
                 .map_err(IngestError::storage("find a reading"))?;
@@ -113,10 +122,6 @@ impl Work<'_> {
             // Cleaned up since the plan was made.
         }
         let fetched = self.raw.fetch(self.product, item.raw_sha256, &item.file);
-        let wish = Wish {
-            profile,
-            product: Some(self.product),
-        };
         let reread = self.reread(Path::new(&item.file), fetched.await?, wish);
         match boundary::contained(Box::pin(reread))
             .await

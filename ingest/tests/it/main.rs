@@ -20,6 +20,7 @@ mod many_steps;
 mod masked;
 mod memory;
 mod observed;
+mod open;
 mod order;
 mod other_writers;
 mod quality;

@@ -403,6 +403,7 @@ mod tests {
             path: path.to_owned(),
             profile: None,
             product: None,
+            variable: None,
             sha256: None,
             size_bytes: None,
             attempt: 1,

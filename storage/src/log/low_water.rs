@@ -106,6 +106,7 @@ mod tests {
             path: name.to_owned(),
             profile: None,
             product: None,
+            variable: None,
             sha256: None,
             size_bytes: None,
             attempt: 1,

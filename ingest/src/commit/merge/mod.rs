@@ -6,6 +6,7 @@ use contract::event::RejectReason;
 use contract::grid::Grid;
 use contract::manifest::{Manifest, Step};
 use contract::notice::NoticeOrder;
+use contract::quantity::Quantity;
 use contract::time::{Period, TimeMs};
 
 use crate::error::Rejection;
@@ -27,6 +28,8 @@ pub(super) struct Merged {
     pub(super) is_revision: bool,
     /// Index of the last file that was taken.
     pub(super) last_taken: Option<usize>,
+    /// What the values of all steps are; none without any.
+    pub(super) quantity: Option<Quantity>,
 }
 
 /// What became of one file.
@@ -89,20 +92,24 @@ pub(super) fn merge(newest: Option<&Manifest>, granules: &[StoredGranule]) -> Me
         changes: Vec::with_capacity(granules.len()),
         is_revision: false,
         last_taken: None,
+        quantity: newest.map(|m| m.quantity),
     };
     for (index, granule) in granules.iter().enumerate() {
-        let base = newest
-            .map(|m| (m.grid, m.quantity, m.synthetic))
-            .or_else(|| {
-                let first = &granules.get(merged.last_taken?)?.reading;
-                Some((first.grid, first.quantity, first.synthetic))
-            });
-        let change = match base.map_or(Ok(()), |base| check_fits(granule, base)) {
-            Ok(()) => add(&mut placed, granule),
-            Err(rejection) => Change::Refused(rejection),
+        let base = newest.map(|m| (m.grid, m.synthetic)).or_else(|| {
+            let first = &granules.get(merged.last_taken?)?.reading;
+            Some((first.grid, first.synthetic))
+        });
+        let base = base.zip(merged.quantity);
+        let fits = base.map_or(Ok(granule.reading.quantity), |base| {
+            check_fits(granule, base)
+        });
+        let (change, quantity) = match fits {
+            Ok(quantity) => (add(&mut placed, granule), Some(quantity)),
+            Err(rejection) => (Change::Refused(rejection), None),
         };
         if let Change::Taken { revised, .. } = &change {
             merged.last_taken = Some(index);
+            merged.quantity = quantity;
             merged.is_revision |= revised;
         }
         merged.changes.push(change);
@@ -115,11 +122,11 @@ fn conflict(detail: String) -> Rejection {
     Rejection::new(RejectReason::Conflict, "product", detail)
 }
 
-/// Is the file of the grid and quantity of its product?
+/// What the product holds with the file, which is of its grid and quantity.
 fn check_fits(
     granule: &StoredGranule,
-    (grid, quantity, synthetic): (Grid, contract::quantity::Quantity, bool),
-) -> Result<(), Rejection> {
+    ((grid, synthetic), quantity): ((Grid, bool), Quantity),
+) -> Result<Quantity, Rejection> {
     let StoredGranule {
         product, reading, ..
     } = granule;
@@ -137,13 +144,18 @@ fn check_fits(
             shape(&reading.grid)
         )));
     }
-    if reading.quantity != quantity {
+    let Some(joined) = quantity.joined(reading.quantity) else {
         return Err(conflict(format!(
-            "{product} holds {}, the file {}; {advice}",
-            quantity.title(),
-            reading.quantity.title()
+            "{product} holds {}, the file {}; {}",
+            of_unit(quantity),
+            of_unit(reading.quantity),
+            if (quantity, reading.quantity) == (Quantity::Pco2, Quantity::Fco2) {
+                "if its files did so too when the two were not told apart, recompute it (fluxglobe recompute --product), else land this one in a product of its own"
+            } else {
+                advice
+            }
         )));
-    }
+    };
     if reading.synthetic != synthetic {
         let word = |synthetic| if synthetic { "synthetic" } else { "measured" };
         return Err(conflict(format!(
@@ -152,7 +164,14 @@ fn check_fits(
             word(reading.synthetic)
         )));
     }
-    Ok(())
+    Ok(joined)
+}
+
+fn of_unit(quantity: Quantity) -> String {
+    match quantity {
+        Quantity::Open(_) => format!("{} ({})", quantity.title(), quantity.unit()),
+        known => known.title().to_owned(),
+    }
 }
 
 pub(super) fn is_same_grid(a: &Grid, b: &Grid) -> bool {

@@ -16,6 +16,7 @@ use storage::log::Message;
 use super::*;
 use crate::notice::PendingNotice;
 use crate::plan::Target;
+use crate::plan::Wish;
 use crate::plan::recipe::Recipe;
 use crate::put::reading::Reading;
 use crate::settings::{DecoderCommand, Settings};
@@ -58,7 +59,7 @@ fn noticed(content: &str, periods: &[Period], second: u32) -> StoredGranule {
     let steps = periods.iter().map(step).collect();
     StoredGranule {
         notice: Arc::new(notice(second)),
-        reading: Reading::new(Recipe::of(None), &target, GRID, steps),
+        reading: Reading::new(Recipe::of(Wish::default()), &target, GRID, steps),
         product,
         masked: MaskedCells::default(),
     }

@@ -7,6 +7,7 @@ use contract::digest::Digest;
 use contract::manifest::{MANIFEST_SCHEMA, Manifest, Step};
 use contract::notice::{NoticeOrder, NoticeRun};
 use contract::product::ProductId;
+use contract::quantity::Quantity;
 use contract::time::Period;
 use storage::{StorageError, Store, manifests};
 
@@ -48,6 +49,7 @@ pub(crate) async fn replace(
             changes: vec![],
             is_revision: true,
             last_taken: None,
+            quantity: Some(next.quantity),
         };
         let values = segments::most_values(&next.steps, &next.grid);
         let _memory = gates.memory(memory::of_segment(values)).await;
@@ -117,7 +119,7 @@ fn next(newest: &Manifest, readings: &[Reading]) -> Result<Manifest, String> {
         .filter(|step| !anew.contains(&file_of(step)))
         .cloned()
         .collect();
-    check_alike(newest, &taken, steps.is_empty())?;
+    let quantity = quantity_of(newest, &taken, steps.is_empty())?;
     let mut later = vec![];
     for reading in &taken {
         let held = &held[&file_of(&reading.steps[0])];
@@ -157,7 +159,7 @@ fn next(newest: &Manifest, readings: &[Reading]) -> Result<Manifest, String> {
     let places: Vec<_> = steps.iter().map(place).collect();
     let mut next = Manifest {
         notices: NoticeRun::of(&places),
-        quantity: first.quantity,
+        quantity,
         synthetic: first.synthetic,
         steps,
         ..newest.clone()
@@ -174,8 +176,9 @@ fn next(newest: &Manifest, readings: &[Reading]) -> Result<Manifest, String> {
     Ok(next)
 }
 
-/// Files of one product have one grid and one quantity: those that are read anew with those that are not, too.
-fn check_alike(newest: &Manifest, taken: &[&Reading], is_whole: bool) -> Result<(), String> {
+/// What all files hold. Those of one product have one grid and one quantity: those that are read anew with those that are
+/// not, too.
+fn quantity_of(newest: &Manifest, taken: &[&Reading], is_whole: bool) -> Result<Quantity, String> {
     let first = taken[0];
     let like = if is_whole {
         (first.grid, first.quantity, first.synthetic)
@@ -184,10 +187,12 @@ fn check_alike(newest: &Manifest, taken: &[&Reading], is_whole: bool) -> Result<
     };
     let is_other = |reading: &&&Reading| {
         !is_same_grid(&reading.grid, &like.0)
-            || (reading.quantity, reading.synthetic) != (like.1, like.2)
+            || reading.synthetic != like.2
+            || like.1.joined(reading.quantity).is_none()
     };
     let Some(other) = taken.iter().find(is_other) else {
-        return Ok(());
+        let join = |all: Quantity, reading: &&Reading| all.joined(reading.quantity).unwrap_or(all);
+        return Ok(taken.iter().fold(like.1, join));
     };
     let origin = &other.steps[0].origin;
     Err(if is_whole {

@@ -7,6 +7,7 @@ use contract::quantity::Quantity;
 
 use super::*;
 use crate::plan::Target;
+use crate::plan::Wish;
 use crate::plan::recipe::Recipe;
 use crate::settings::{DecoderCommand, Settings};
 
@@ -45,7 +46,7 @@ fn reading(steps: Vec<Step>) -> Reading {
         quantity: Quantity::CarbonFlux,
         synthetic: false,
     };
-    Reading::new(Recipe::of(None), &target, GRID, steps)
+    Reading::new(Recipe::of(Wish::default()), &target, GRID, steps)
 }
 
 fn manifest(steps: Vec<Step>) -> Manifest {

@@ -68,17 +68,17 @@ pub(crate) fn of_standard_name(name: &str) -> Option<Named> {
         "surface_downward_mass_flux_of_carbon_dioxide" => flux(-1.0, Some(Substance::Co2)),
         "surface_upward_mole_flux_of_carbon_dioxide" => flux(1.0, None),
         "surface_downward_mole_flux_of_carbon_dioxide" => flux(-1.0, None),
-        "sea_surface_temperature"
-        | "sea_surface_skin_temperature"
-        | "sea_surface_subskin_temperature"
-        | "sea_surface_foundation_temperature" => plain(Quantity::SeaSurfaceTemperature),
+        "sea_surface_temperature" => plain(Quantity::SeaSurfaceTemperature),
+        "sea_surface_skin_temperature" => plain(Quantity::SeaSurfaceSkinTemperature),
+        "sea_surface_subskin_temperature" => plain(Quantity::SeaSurfaceSubskinTemperature),
+        "sea_surface_foundation_temperature" => plain(Quantity::SeaSurfaceFoundationTemperature),
         "mass_concentration_of_chlorophyll_a_in_sea_water"
         | "mass_concentration_of_chlorophyll_in_sea_water"
         | "concentration_of_chlorophyll_in_sea_water" => plain(Quantity::Chlorophyll),
         "wind_speed" => plain(Quantity::WindSpeed),
         "surface_partial_pressure_of_carbon_dioxide_in_sea_water"
-        | "partial_pressure_of_carbon_dioxide_in_sea_water"
-        | "fugacity_of_carbon_dioxide_in_sea_water" => plain(Quantity::Pco2),
+        | "partial_pressure_of_carbon_dioxide_in_sea_water" => plain(Quantity::Pco2),
+        "fugacity_of_carbon_dioxide_in_sea_water" => plain(Quantity::Fco2),
         "sea_surface_salinity" | "sea_water_practical_salinity" | "sea_water_salinity" => {
             plain(Quantity::Salinity)
         }

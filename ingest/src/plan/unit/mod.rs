@@ -77,6 +77,9 @@ impl Unit {
         quantity: Quantity,
         substance: Option<Substance>,
     ) -> Result<Conversion, String> {
+        if let Quantity::Open(_) = quantity {
+            return self.to_open(quantity);
+        }
         let Ok(target) = parse(quantity.unit()) else {
             return Err(format!("no unit for {quantity:?}"));
         };
@@ -110,6 +113,67 @@ impl Unit {
             offset: self.offset,
             months,
         })
+    }
+}
+
+impl Unit {
+    /// The conversion to the unit that a profile states for an open quantity.
+    fn to_open(self, quantity: Quantity) -> Result<Conversion, String> {
+        let target = parse(quantity.unit())?;
+        if self.dimension != target.dimension || self.substance != target.substance {
+            return Err(wrong_kind(quantity));
+        }
+        Ok(Conversion {
+            factor: usable(self.factor / target.factor)?,
+            offset: (self.offset - target.offset) / target.factor,
+            months: 0,
+        })
+    }
+}
+
+/// The unit of base units that a spelling comes to, and what values are multiplied by; none where values are better left
+/// as they are: a unit that is not known, a zero that was agreed upon (in a difference of temperatures it is none), months
+/// (whose length is that of a step), and masses of carbon (which the unit would not say any more).
+pub(crate) fn canonical(spelling: &str) -> Option<(String, f64)> {
+    let unit = parse(spelling).ok()?;
+    if unit.offset != 0.0 || unit.substance.is_some() || unit.dimension.month != 0 {
+        return None;
+    }
+    Some((base_spelling(unit.dimension), unit.factor))
+}
+
+/// `kg m-2 s-1` and the like; pressures in Pa, fluxes of energy in W m-2.
+fn base_spelling(dimension: Dimension) -> String {
+    let Dimension {
+        mass,
+        length,
+        time,
+        month: _,
+        temperature,
+        amount,
+    } = dimension;
+    match (mass, length, time, temperature, amount) {
+        (1, -1, -2, 0, 0) => return "Pa".to_owned(),
+        (1, 0, -3, 0, 0) => return "W m-2".to_owned(),
+        _ => {}
+    }
+    let powers = [
+        ("kg", mass),
+        ("mol", amount),
+        ("m", length),
+        ("s", time),
+        ("K", temperature),
+    ];
+    let word = |(name, power): (&str, i8)| match power {
+        0 => None,
+        1 => Some(name.to_owned()),
+        _ => Some(format!("{name}{power}")),
+    };
+    let words: Vec<String> = powers.into_iter().filter_map(word).collect();
+    if words.is_empty() {
+        "1".to_owned()
+    } else {
+        words.join(" ")
     }
 }
 

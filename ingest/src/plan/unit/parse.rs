@@ -12,8 +12,17 @@ const MAX_POWER: i8 = 9;
 /// Deepest brackets.
 const MAX_DEPTH: u32 = 4;
 
-/// Reads a spelling; the error says which word is not known.
+/// Reads a spelling; the error says which word is not known. What is in capitals only is read in small letters if it is no
+/// unit otherwise: `M/S`, `G/KG`.
 pub(crate) fn parse(text: &str) -> Result<Unit, String> {
+    let read = spelled(text);
+    if read.is_err() && !text.chars().any(char::is_lowercase) {
+        return spelled(&text.to_lowercase()).or(read);
+    }
+    read
+}
+
+fn spelled(text: &str) -> Result<Unit, String> {
     if text.len() > MAX_UNIT_BYTES {
         return Err(format!(
             "is longer than {MAX_UNIT_BYTES} bytes; give a unit in a profile"

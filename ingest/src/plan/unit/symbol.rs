@@ -33,6 +33,12 @@ const PRESSURE: Dimension = Dimension {
     time: -2,
     ..NONE
 };
+const POWER: Dimension = Dimension {
+    mass: 1,
+    length: 2,
+    time: -3,
+    ..NONE
+};
 
 /// Zero of the Celsius scale, K.
 const CELSIUS_ZERO_K: f64 = 273.15;
@@ -132,6 +138,8 @@ const ENTRIES: &[Entry] = &[
     (&["mole", "moles"], AMOUNT, 1.0, 0.0, Prefix::Name),
     (&["Pa"], PRESSURE, 1.0, 0.0, Prefix::Symbol),
     (&["pascal", "pascals"], PRESSURE, 1.0, 0.0, Prefix::Name),
+    (&["W"], POWER, 1.0, 0.0, Prefix::Symbol),
+    (&["watt", "watts"], POWER, 1.0, 0.0, Prefix::Name),
     (&["bar"], PRESSURE, 1e5, 0.0, Prefix::Symbol),
     (&["mb", "mbars"], PRESSURE, 100.0, 0.0, Prefix::No),
     (&["atm"], PRESSURE, 101_325.0, 0.0, Prefix::Symbol),

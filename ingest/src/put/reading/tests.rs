@@ -52,6 +52,7 @@ fn noted() -> Reading {
                 name: "frozen".to_owned(),
                 rules: Digest::of(b"what it says"),
             }),
+            variable: None,
         },
         title: "Frozen flux".to_owned(),
         source: "made by a test".to_owned(),

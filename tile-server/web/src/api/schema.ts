@@ -774,6 +774,20 @@ export interface components {
             /** @description The rows. */
             observations: components["schemas"]["Observation"][];
         };
+        /** @description A quantity that nothing is built in for, by its own words. */
+        OpenQuantity: {
+            /** @description Its CF standard name, or else its long name or the variable's: lower-case letters, digits and `_`, a letter first. */
+            name: string;
+            /** @description Lowest and highest stored value, outwards to two digits; none if that is not known. */
+            range?: [
+                number,
+                number
+            ];
+            /** @description Title for people. */
+            title: string;
+            /** @description Unit of stored values, as UDUNITS spells it; `1` for shares and codes. */
+            unit: string;
+        };
         /**
          * @description A list of colours with a name.
          * @enum {string}
@@ -972,11 +986,8 @@ export interface components {
          * @enum {string}
          */
         Quality: "good" | "not_evaluated" | "questionable" | "bad";
-        /**
-         * @description What the values of a product are.
-         * @enum {string}
-         */
-        Quantity: "carbon_flux" | "accumulated_carbon" | "sea_surface_temperature" | "chlorophyll" | "wind_speed" | "pco2" | "salinity" | "air_pressure" | "ice_fraction" | "wave_height" | "precipitation" | "current" | "elevation" | "sea_area_fraction" | "land_area_fraction";
+        /** @description What the values of a product are: one that is built in, or any other by its own words. */
+        Quantity: ("carbon_flux" | "accumulated_carbon" | "sea_surface_temperature" | "sea_surface_skin_temperature" | "sea_surface_subskin_temperature" | "sea_surface_foundation_temperature" | "chlorophyll" | "wind_speed" | "pco2" | "fco2" | "salinity" | "air_pressure" | "ice_fraction" | "wave_height" | "precipitation" | "current" | "elevation" | "sea_area_fraction" | "land_area_fraction") | components["schemas"]["OpenQuantity"];
         /** @description Can the server do its work, and which part of it cannot? */
         Readiness: {
             /** @description All parts. */
@@ -2883,6 +2894,6 @@ export const platformFeatureTypeValues: ReadonlyArray<FlattenedDeepRequired<comp
 export const platformKindValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["PlatformKind"]> = ["buoy", "ship", "station", "profile"];
 export const platformsTypeValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Platforms"]["type"]> = ["FeatureCollection"];
 export const qualityValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Quality"]> = ["good", "not_evaluated", "questionable", "bad"];
-export const quantityValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Quantity"]> = ["carbon_flux", "accumulated_carbon", "sea_surface_temperature", "chlorophyll", "wind_speed", "pco2", "salinity", "air_pressure", "ice_fraction", "wave_height", "precipitation", "current", "elevation", "sea_area_fraction", "land_area_fraction"];
+export const quantityOneOf0Values: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Quantity"]> = ["carbon_flux", "accumulated_carbon", "sea_surface_temperature", "sea_surface_skin_temperature", "sea_surface_subskin_temperature", "sea_surface_foundation_temperature", "chlorophyll", "wind_speed", "pco2", "fco2", "salinity", "air_pressure", "ice_fraction", "wave_height", "precipitation", "current", "elevation", "sea_area_fraction", "land_area_fraction"];
 export const scaleValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Scale"]> = ["linear", "log"];
 export const verdictValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Verdict"]> = ["within", "outside", "no_uncertainty_stated"];

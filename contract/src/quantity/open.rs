@@ -1,0 +1,297 @@
+//! Quantities that this program knows nothing special of: a name, a unit and a title as a file states them, and the range
+//! of their values. Kept once for as long as the program runs, so that a quantity stays as small as a number.
+
+use std::collections::BTreeMap;
+use std::hash::{Hash, Hasher};
+use std::sync::{Mutex, PoisonError};
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::ContractError;
+
+/// Longest name, bytes: CF standard names stay below.
+pub const MAX_NAME_BYTES: usize = 128;
+/// Longest unit, bytes.
+pub const MAX_UNIT_BYTES: usize = 64;
+/// Longest title, bytes.
+pub const MAX_TITLE_BYTES: usize = 256;
+/// Most open quantities that a program knows at a time, all ranges counted: some 2 MB.
+pub(super) const MAX_OPEN: usize = 8192;
+/// Values beyond are no range for colours.
+const MAX_RANGE: f64 = 1e20;
+
+/// An open quantity: a handle to what is known of it, the same for the same words and range.
+#[derive(Clone, Copy)]
+pub struct OpenQuantity(&'static Known);
+
+/// What an open quantity is, as JSON has it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+#[schema(as = OpenQuantity, description = "A quantity that nothing is built in for, by its own words.")]
+pub struct OpenWords {
+    /// Its CF standard name, or else its long name or the variable's: lower-case letters, digits and `_`, a letter first.
+    pub name: String,
+    /// Unit of stored values, as UDUNITS spells it; `1` for shares and codes.
+    pub unit: String,
+    /// Title for people.
+    pub title: String,
+    /// Lowest and highest stored value, outwards to two digits; none if that is not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = Option<(f64, f64)>, nullable = false)]
+    pub range: Option<[f64; 2]>,
+}
+
+struct Known {
+    words: OpenWords,
+    shown_unit: String,
+}
+
+/// All that are known, by their JSON.
+static KNOWN: Mutex<BTreeMap<String, &'static Known>> = Mutex::new(BTreeMap::new());
+
+impl OpenQuantity {
+    /// The quantity of these words; its range is rounded outwards to two digits.
+    ///
+    /// # Errors
+    /// A word out of its limits, or too many quantities.
+    pub fn new(mut words: OpenWords) -> Result<Self, ContractError> {
+        validate(&words)?;
+        words.range = words.range.map(|[low, high]| {
+            let within = |value: f64| value.clamp(-MAX_RANGE, MAX_RANGE);
+            // Not -0.
+            [
+                0.0 - rounded_up(-within(low.min(high))),
+                rounded_up(within(high.max(low))),
+            ]
+        });
+        let key = serde_json::to_string(&words)
+            .map_err(|e| ContractError::invalid("quantity", &words.name, e.to_string()))?;
+        let mut all = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = all.get(&key) {
+            return Ok(Self(known));
+        }
+        if all.len() >= MAX_OPEN {
+            let reason = format!(
+                "{MAX_OPEN} quantities that are not built in are known at most; start the program anew"
+            );
+            return Err(ContractError::invalid("quantity", &words.name, reason));
+        }
+        let known = Known {
+            shown_unit: shown_unit(&words.unit),
+            words,
+        };
+        let known: &'static Known = Box::leak(Box::new(known));
+        all.insert(key, known);
+        Ok(Self(known))
+    }
+
+    /// Its words.
+    pub fn words(self) -> &'static OpenWords {
+        &self.0.words
+    }
+
+    /// The unit with raised powers, as people read it; empty for `1`.
+    pub(super) fn shown_unit(self) -> &'static str {
+        &self.0.shown_unit
+    }
+
+    /// Is it the same but for title and range?
+    pub fn is_same_kind(self, other: Self) -> bool {
+        let (own, other) = (self.words(), other.words());
+        own.name == other.name && own.unit == other.unit
+    }
+
+    /// The same over a range of stored values that was found.
+    ///
+    /// # Errors
+    /// Too many quantities.
+    pub fn over(self, low: f64, high: f64) -> Result<Self, ContractError> {
+        let (low, high) = match self.words().range {
+            Some([l, h]) => (l.min(low), h.max(high)),
+            None => (low, high),
+        };
+        Self::new(OpenWords {
+            range: Some([low, high]),
+            ..self.words().clone()
+        })
+    }
+}
+
+impl PartialEq for OpenQuantity {
+    fn eq(&self, other: &Self) -> bool {
+        // Each is kept once.
+        std::ptr::eq(self.0, other.0)
+    }
+}
+
+impl Eq for OpenQuantity {}
+
+impl Hash for OpenQuantity {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        self.words().name.hash(state);
+        self.words().unit.hash(state);
+    }
+}
+
+impl std::fmt::Debug for OpenQuantity {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.words().fmt(f)
+    }
+}
+
+fn validate(words: &OpenWords) -> Result<(), ContractError> {
+    let OpenWords {
+        name,
+        unit,
+        title,
+        range,
+    } = words;
+    let is_name = name.starts_with(|c: char| c.is_ascii_lowercase())
+        && name
+            .bytes()
+            .all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'_');
+    if !is_name || name.len() > MAX_NAME_BYTES {
+        let reason = format!(
+            "a name of lower-case letters, digits and _, a letter first, at most {MAX_NAME_BYTES} bytes"
+        );
+        return Err(ContractError::invalid("quantity", name, reason));
+    }
+    for (what, text, most) in [
+        ("unit", unit, MAX_UNIT_BYTES),
+        ("title", title, MAX_TITLE_BYTES),
+    ] {
+        if text.is_empty() || text.len() > most || text.chars().any(char::is_control) {
+            let reason = format!("text without control characters, 1 to {most} bytes");
+            return Err(ContractError::invalid(what, text, reason));
+        }
+    }
+    if range.is_some_and(|range| range.iter().any(|value| !value.is_finite())) {
+        let reason = "two finite numbers".to_owned();
+        return Err(ContractError::invalid("range", name, reason));
+    }
+    Ok(())
+}
+
+/// The least number of two digits (and a power of ten) that is not below; one that is read a last bit off is itself.
+fn rounded_up(value: f64) -> f64 {
+    if value == 0.0 {
+        return 0.0;
+    }
+    let text = format!("{value:.1e}");
+    let near: f64 = text.parse().unwrap_or(value);
+    // Stored values are of 32 bits.
+    if near >= value || (near - value).abs() <= f64::from(f32::EPSILON) * value.abs() {
+        return near;
+    }
+    let step = 10f64.powi(value.abs().log10().floor() as i32 - 1);
+    format!("{:.1e}", near + step).parse().unwrap_or(value)
+}
+
+/// `kg m-2 s-1` as `kg m⁻² s⁻¹`: digits that end a word, and their sign, are raised.
+fn shown_unit(unit: &str) -> String {
+    const RAISED: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
+    if unit == "1" {
+        return String::new();
+    }
+    let raised = |word: &str| -> String {
+        let letters = word.trim_end_matches(|c: char| c.is_ascii_digit() || c == '-');
+        let power = &word[letters.len()..];
+        if letters.is_empty() || !letters.chars().all(char::is_alphabetic) {
+            return word.to_owned();
+        }
+        let raise = |c: char| match c.to_digit(10) {
+            Some(digit) => RAISED[digit as usize],
+            None => '⁻',
+        };
+        letters.chars().chain(power.chars().map(raise)).collect()
+    };
+    let words: Vec<String> = unit.split(' ').map(raised).collect();
+    words.join(" ")
+}
+
+impl TryFrom<OpenWords> for OpenQuantity {
+    type Error = ContractError;
+
+    fn try_from(words: OpenWords) -> Result<Self, Self::Error> {
+        Self::new(words)
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::float_cmp, reason = "these values are exact")]
+mod tests {
+    use super::*;
+
+    fn words(name: &str, unit: &str, range: Option<[f64; 2]>) -> OpenWords {
+        OpenWords {
+            name: name.to_owned(),
+            unit: unit.to_owned(),
+            title: "Title".to_owned(),
+            range,
+        }
+    }
+
+    #[test]
+    fn ranges_are_rounded_outwards_and_stay_as_they_are() {
+        for (range, wanted) in [
+            ([271.35, 304.9], [270.0, 310.0]),
+            ([-3.14159e-7, 0.0], [-3.2e-7, 0.0]),
+            ([5.0, 1.0], [1.0, 5.0]),
+            ([0.0, f64::from(0.063f32)], [0.0, 0.063]),
+            ([99.1, 99.9], [99.0, 100.0]),
+            ([-1e30, 1e30], [-1e20, 1e20]),
+        ] {
+            let quantity = OpenQuantity::new(words("a", "m", Some(range))).unwrap();
+            assert_eq!(quantity.words().range, Some(wanted), "{range:?}");
+            let json = serde_json::to_string(quantity.words()).unwrap();
+            assert!(!json.contains("-0.0"), "{json}");
+            let again = OpenQuantity::new(quantity.words().clone()).unwrap();
+            assert_eq!(again, quantity);
+        }
+    }
+
+    #[test]
+    fn a_range_grows_by_what_is_found_in_any_order() {
+        let plain = OpenQuantity::new(words("b", "m", None)).unwrap();
+        let one = plain.over(1.0, 2.0).unwrap().over(-5.5, 0.0).unwrap();
+        let other = plain.over(-5.5, 0.0).unwrap().over(1.0, 2.0).unwrap();
+        assert_eq!(one, other);
+        assert_eq!(one.words().range, Some([-5.5, 2.0]));
+        assert_ne!(one, plain);
+        assert!(one.is_same_kind(plain));
+    }
+
+    #[test]
+    fn words_beyond_a_limit_are_refused() {
+        for bad in [
+            words("", "m", None),
+            words("Sst", "m", None),
+            words("2m", "m", None),
+            words("a b", "m", None),
+            words(&"a".repeat(MAX_NAME_BYTES + 1), "m", None),
+            words("a", "", None),
+            words("a", "m\n", None),
+            words("a", &"m".repeat(MAX_UNIT_BYTES + 1), None),
+            words("a", "m", Some([f64::NAN, 1.0])),
+        ] {
+            assert!(OpenQuantity::new(bad.clone()).is_err(), "{bad:?}");
+        }
+    }
+
+    #[test]
+    fn units_are_shown_with_raised_powers() {
+        for (unit, shown) in [
+            ("kg m-2 s-1", "kg m⁻² s⁻¹"),
+            ("m3 s-1", "m³ s⁻¹"),
+            ("K year-1", "K year⁻¹"),
+            ("1", ""),
+            ("degC", "degC"),
+            ("W/m2", "W/m2"),
+            ("1e-3", "1e-3"),
+            ("10 m", "10 m"),
+        ] {
+            assert_eq!(shown_unit(unit), shown);
+        }
+    }
+}

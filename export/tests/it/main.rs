@@ -1,0 +1,3 @@
+//! Tests of exports as others' programs read them.
+
+mod read_back;

@@ -1,0 +1,186 @@
+//! What was exported, read by others: netCDF4 with its C library, GDAL by rasterio, Arrow for Python. Bit for bit.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use contract::grid::Grid;
+use contract::quantity::Quantity;
+use contract::time::Period;
+use cube::Description;
+use export::{ExportError, Format, create};
+use serde_json::{Value, json};
+
+/// Across the date line, with steps that are no round fraction of a degree.
+const GRID: Grid = Grid {
+    rows: 30,
+    cols: 41,
+    north_deg: 12.25,
+    west_deg: 170.5,
+    dlat_deg: 0.25,
+    dlon_deg: 1.0 / 3.0,
+};
+
+fn description(quantity: Quantity) -> Description {
+    Description {
+        product: "some-product".parse().unwrap(),
+        title: "Flux <of> \"CO₂\" & more".to_owned(),
+        quantity,
+        synthetic: true,
+        source: "Somebody et al. (2000)".to_owned(),
+        grid: GRID,
+        version: "some-product@3-0a1b2c3d".parse().ok(),
+    }
+}
+
+fn periods() -> Vec<Period> {
+    [1, 2, 4]
+        .map(|month| Period::month(2000, month).unwrap())
+        .to_vec()
+}
+
+/// Numbers of every size, no data here and there.
+fn values(step: usize) -> Vec<f32> {
+    let value = |cell: usize| match (cell * 7 + step * 13) % 11 {
+        0 => f32::NAN,
+        1 => -0.0,
+        2 => f32::MIN_POSITIVE / 4.0,
+        other => (other as f32 - 5.5) * 1.2345e-9 * (cell as f32 + 1.0).powi(step as i32 + 1),
+    };
+    (0..GRID.cell_count()).map(value).collect()
+}
+
+fn written(format: Format, path: &Path, quantity: Quantity) -> Result<(), ExportError> {
+    let mut written = create(format, path, &description(quantity), &periods())?;
+    for (step, period) in periods().into_iter().enumerate() {
+        written.append(period, &values(step))?;
+    }
+    written.finish()
+}
+
+/// What must be found, each value as its bits.
+fn expected(quantity: Quantity) -> Value {
+    let (lat, lon) = cube::places(&GRID);
+    let steps: Vec<Value> = periods()
+        .iter()
+        .enumerate()
+        .map(|(step, period)| {
+            let bits: Vec<u32> = values(step).iter().map(|value| value.to_bits()).collect();
+            json!({ "start_ms": period.start.ms(), "end_ms": period.end.ms(), "bits": bits })
+        })
+        .collect();
+    json!({
+        "variable": quantity.word(),
+        "units": quantity.unit(),
+        "long_name": quantity.title(),
+        "is_sum": quantity == Quantity::AccumulatedCarbon,
+        "lat": lat.centres,
+        "lon": lon.centres,
+        "edges": [GRID.west_deg, GRID.south_deg(), GRID.east_deg(), GRID.north_deg],
+        "steps": steps,
+    })
+}
+
+/// What the others find: how many values, or what is otherwise.
+fn compared(format: &str, path: &Path, expected: &Value) -> Result<Value, String> {
+    let folder = tempfile::tempdir().unwrap();
+    let told = folder.path().join("expected.json");
+    std::fs::write(&told, expected.to_string()).unwrap();
+    let script = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../tests/reference/exported_files.py"
+    );
+    let run = Command::new(test_data::python())
+        .args([Path::new(script), Path::new(format), path, &told])
+        .output()
+        .unwrap();
+    if run.status.success() {
+        Ok(serde_json::from_slice(&run.stdout).unwrap())
+    } else {
+        Err(String::from_utf8_lossy(&run.stderr).into_owned())
+    }
+}
+
+fn read_back(format: Format, name: &str, quantity: Quantity) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("out");
+    written(format, &path, quantity).unwrap();
+    let right = expected(quantity);
+    let found = compared(name, &path, &right).unwrap();
+    assert_eq!(found["values"], GRID.cell_count() * 3);
+    // The comparison sees one bit of one value, another place and another time.
+    let wrong: [fn(&mut Value); 3] = [
+        |told| {
+            told["steps"][1]["bits"][700] =
+                json!(told["steps"][1]["bits"][700].as_u64().unwrap() ^ 1)
+        },
+        |told| told["lat"][3] = json!(told["lat"][3].as_f64().unwrap() + 1e-9),
+        |told| {
+            told["steps"][2]["end_ms"] = json!(told["steps"][2]["end_ms"].as_i64().unwrap() + 1000)
+        },
+    ];
+    for (number, change) in wrong.into_iter().enumerate() {
+        let mut told = right.clone();
+        change(&mut told);
+        assert!(
+            compared(name, &path, &told).is_err(),
+            "{name}: fault {number}"
+        );
+    }
+    assert!(
+        matches!(
+            written(format, &path, quantity),
+            Err(ExportError::Exists { .. })
+        ),
+        "it takes the place of something"
+    );
+    let left: Vec<PathBuf> = std::fs::read_dir(folder.path())
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .collect();
+    assert_eq!(left, [path], "something is left over");
+}
+
+#[test]
+fn netcdf_is_read_by_the_netcdf_library() {
+    read_back(Format::NetCdf, "netcdf", Quantity::CarbonFlux);
+    read_back(Format::NetCdf, "netcdf", Quantity::AccumulatedCarbon);
+}
+
+#[test]
+fn geotiff_is_read_by_gdal() {
+    read_back(Format::GeoTiff, "geotiff", Quantity::CarbonFlux);
+}
+
+#[test]
+fn parquet_is_read_by_arrow() {
+    let open = Quantity::open("river_flux", "mol m-2 s-1", "River flux").unwrap();
+    read_back(Format::Parquet, "parquet", open);
+}
+
+#[test]
+fn half_an_export_leaves_nothing_and_a_wrong_step_is_refused() {
+    for format in [Format::NetCdf, Format::GeoTiff, Format::Parquet] {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("out");
+        let quantity = Quantity::CarbonFlux;
+        let mut half = create(format, &path, &description(quantity), &periods()).unwrap();
+        half.append(periods()[0], &values(0)).unwrap();
+        let short = half.append(periods()[1], &values(1)[1..]);
+        assert!(matches!(short, Err(ExportError::Shape { .. })));
+        drop(half);
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+}
+
+#[test]
+fn the_same_values_are_the_same_bytes() {
+    for format in [Format::NetCdf, Format::Parquet] {
+        let folder = tempfile::tempdir().unwrap();
+        let bytes = |name: &str| {
+            let path = folder.path().join(name);
+            written(format, &path, Quantity::CarbonFlux).unwrap();
+            std::fs::read(path).unwrap()
+        };
+        assert!(bytes("a") == bytes("b"), "{format:?}");
+    }
+}

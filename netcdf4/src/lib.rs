@@ -1,0 +1,88 @@
+//! What makes an HDF5 file one that the netCDF library opens: dimensions by their scales, texts as attributes, and no time
+//! of making, so that the same values are the same bytes.
+
+mod text_type;
+
+use std::path::Path;
+
+use hdf5::types::{FixedAscii, VarLenArray, VarLenUnicode};
+use hdf5::{Dataset, File, H5Type, Location, ObjectReference as _, ObjectReference1};
+
+use text_type::null_terminated;
+
+/// A new file.
+///
+/// # Errors
+/// It cannot be made there.
+pub fn create(path: &Path) -> hdf5::Result<File> {
+    // No object may carry the time of its making: the same values give the same bytes.
+    File::with_options()
+        .with_fcpl(|create| create.obj_track_times(false))
+        .create(path)
+}
+
+/// Texts as attributes.
+///
+/// # Errors
+/// A text with a null character, or an attribute that cannot be written.
+pub fn texts(owner: &Location, attributes: &[(&str, &str)]) -> hdf5::Result<()> {
+    for (name, value) in attributes {
+        let value: VarLenUnicode = value
+            .parse()
+            .map_err(|e| hdf5::Error::from(format!("{name}: {e}")))?;
+        owner
+            .new_attr::<VarLenUnicode>()
+            .create(*name)?
+            .write_scalar(&value)?;
+    }
+    Ok(())
+}
+
+/// A coordinate variable, which is also the dimension's scale.
+///
+/// # Errors
+/// It cannot be written.
+pub fn scale<T: H5Type>(file: &File, name: &str, values: &[T]) -> hdf5::Result<Dataset> {
+    let dataset = file
+        .new_dataset::<T>()
+        .obj_track_times(false)
+        .shape([values.len()])
+        .create(name)?;
+    dataset.write_raw(values)?;
+    fixed(&dataset, "CLASS", "DIMENSION_SCALE")?;
+    fixed(&dataset, "NAME", name)?;
+    Ok(dataset)
+}
+
+/// A text as the dimension scales of HDF5 want it: of fixed length, with a null character at its end.
+fn fixed(owner: &Location, name: &str, value: &str) -> hdf5::Result<()> {
+    let text = FixedAscii::<32>::from_ascii(value)
+        .map_err(|e| hdf5::Error::from(format!("{name}: {e}")))?;
+    let attribute = owner
+        .new_attr_builder()
+        .empty_as(null_terminated(value.len() + 1)?)
+        .create(name)?;
+    attribute
+        .as_writer()
+        .conversion(hdf5::Conversion::Soft)
+        .write_scalar(&text)
+}
+
+/// Names the dimensions of a dataset by their scales.
+///
+/// # Errors
+/// A scale is not in the file, or the attribute cannot be written.
+pub fn attach(file: &File, dataset: &Dataset, scales: &[&Dataset]) -> hdf5::Result<()> {
+    let lists: Vec<VarLenArray<ObjectReference1>> = scales
+        .iter()
+        .map(|scale| {
+            let reference = ObjectReference1::create(file, &scale.name())?;
+            Ok(VarLenArray::from_slice(&[reference]))
+        })
+        .collect::<hdf5::Result<_>>()?;
+    dataset
+        .new_attr::<VarLenArray<ObjectReference1>>()
+        .shape([scales.len()])
+        .create("DIMENSION_LIST")?
+        .write_raw(&lists)
+}
