@@ -9,7 +9,7 @@ use contract::time::{Period, TimeMs};
 use cube::Description;
 use tempfile::TempDir;
 use tiff::TiffResult;
-use tiff::encoder::{Compression, DeflateLevel, TiffEncoder, TiffKind, colourtype};
+use tiff::encoder::{Compression, DeflateLevel, TiffEncoder, TiffKind, colortype};
 use tiff::tags::Tag;
 
 use crate::{ExportError, Written, folder_of};
@@ -94,7 +94,7 @@ fn write<W: Write + Seek, K: TiffKind>(
         dlon_deg,
     } = description.grid;
     let mut tiff = tiff.with_compression(Compression::Deflate(DeflateLevel::Balanced));
-    let mut image = tiff.new_image::<colourtype::Gray32Float>(cols, rows)?;
+    let mut image = tiff.new_image::<colortype::Gray32Float>(cols, rows)?;
     let tags = image.encoder();
     tags.write_tag(Tag::ModelPixelScaleTag, &[dlon_deg, dlat_deg, 0.0][..])?;
     let corner = [0.0, 0.0, 0.0, west_deg, north_deg, 0.0];

@@ -115,34 +115,30 @@ async fn arrays(
     to: ExportFormat,
     (destination, bar): (&Store, &ProgressBar),
 ) -> Result<Option<String>> {
-    let description = Description::of(manifest);
-    Ok(match to {
-        ExportFormat::Zarr => {
-            let mut zarr = PlainZarr::create(destination, "", &description).await?;
-            let cube = own_cube(store, manifest).await;
-            let mut fields = std::pin::pin!(fields(store, cube.as_ref(), manifest, bar));
-            while let Some((period, values)) = fields.try_next().await? {
-                zarr.append(period, values).await?;
-                bar.inc(1);
-            }
-            zarr.finish().await?;
-            None
+    if to == ExportFormat::Zarr {
+        let description = Description::of(manifest);
+        let mut zarr = PlainZarr::create(destination, "", &description).await?;
+        let cube = own_cube(store, manifest).await;
+        let mut fields = std::pin::pin!(fields(store, cube.as_ref(), manifest, bar));
+        while let Some((period, values)) = fields.try_next().await? {
+            zarr.append(period, values).await?;
+            bar.inc(1);
         }
-        _ => {
-            if !destination.list("").await?.is_empty() {
-                bail!("{} is not empty: give another place", destination.url());
-            }
-            // A cube of one version, made as the store's own is.
-            let follower = Follower {
-                store: destination,
-                folder: "",
-                fields: store,
-                told: &|_period| bar.inc(1),
-            };
-            follower.run(manifest).await?;
-            Some(manifest.number.to_string())
-        }
-    })
+        zarr.finish().await?;
+        return Ok(None);
+    }
+    if !destination.list("").await?.is_empty() {
+        bail!("{} is not empty: give another place", destination.url());
+    }
+    // A cube of one version, made as the store's own is.
+    let follower = Follower {
+        store: destination,
+        folder: "",
+        fields: store,
+        told: &|_period| bar.inc(1),
+    };
+    follower.run(manifest).await?;
+    Ok(Some(manifest.number.to_string()))
 }
 
 fn summary(exported: &Exported) -> String {

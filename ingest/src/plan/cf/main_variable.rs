@@ -117,16 +117,14 @@ fn of_known<'a>(
     }
     let all: Vec<&Variable> = known.iter().map(|(v, _)| *v).collect();
     let mut main = all.iter().filter(|v| !is_for_another(file, &all, v));
-    match (main.next(), main.next()) {
-        (Some(only), None) => Ok((only, beside(only, &all))),
-        _ => {
-            let detail = format!(
-                "has several variables that could be landed ({}); {ADVICE}",
-                listed(all.iter().copied())
-            );
-            Err(Rejection::new(RejectReason::NoVariable, "file", detail))
-        }
+    if let (Some(only), None) = (main.next(), main.next()) {
+        return Ok((only, beside(only, &all)));
     }
+    let detail = format!(
+        "has several variables that could be landed ({}); {ADVICE}",
+        listed(all.iter().copied())
+    );
+    Err(Rejection::new(RejectReason::NoVariable, "file", detail))
 }
 
 fn named(variable: &Variable) -> Option<Named> {
