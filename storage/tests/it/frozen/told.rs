@@ -158,7 +158,7 @@ fn others() -> Vec<Event> {
             job: Box::new(super::jobs::full()),
         },
         done(None),
-        done(Some("its fields are gone")),
+        done(Some("its frames are gone")),
     ]);
     bodies.into_iter().map(event).collect()
 }
