@@ -131,4 +131,22 @@ mod tests {
         second.await.unwrap();
         assert!(is_over(&over));
     }
+
+    #[tokio::test]
+    async fn what_is_given_up_before_it_has_a_core_is_not_encoded() {
+        let encoders = Encoders::new(NonZeroUsize::MIN);
+        let (go, wait) = sync_channel::<()>(1);
+        let mut first = Box::pin(encoders.run((), move || wait.recv_timeout(LIMIT)));
+        assert!(first.as_mut().now_or_never().is_none());
+        let (held, over) = turn();
+        let (told, encoded) = sync_channel(1);
+        let mut second = Box::pin(encoders.run(held, move || told.send(())));
+        assert!(second.as_mut().now_or_never().is_none());
+        drop(second);
+        assert!(is_over(&over), "its turn is the next one's");
+        go.send(()).unwrap();
+        first.await.unwrap().unwrap();
+        encoders.run((), || ()).await.unwrap();
+        assert_eq!(encoded.try_recv().ok(), None);
+    }
 }

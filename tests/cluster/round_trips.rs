@@ -1,11 +1,13 @@
 //! A store that is far away: how often it is waited for between a question and its picture, and that its writes are not.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use harness::cluster::{Cluster, Shape};
 use harness::granule;
+use harness::node::Node;
 use harness::proxy::{Passed, rounds};
+use harness::servers::free_port;
 
 use crate::alone;
 use crate::faults::{PRODUCT, notice, say, until_whole};
@@ -17,6 +19,8 @@ const MOST_ROUNDS: usize = 2;
 const MONTHS: usize = 6;
 const QUIET: Duration = Duration::from_secs(2);
 const LIMIT: Duration = Duration::from_mins(1);
+/// The same while somebody is asked to stop: long beside what else that takes.
+const LONG_DELAY: Duration = Duration::from_millis(700);
 
 /// A question with what passed to the store before its answer, and when that came.
 struct Asked {
@@ -122,4 +126,31 @@ fn a_new_tile_waits_for_a_store_far_away_twice_at_most_and_for_no_write() {
         assert!(count <= most, "{what}: {count} rounds: {:?}", asked.lines());
         asked.assert_stored_behind(&cluster);
     }
+    assert_stores_before_it_ends(&cluster, inbox.path());
+}
+
+/// A server that draws by itself and is asked to stop when it has just given out a picture has that stored when it ends.
+fn assert_stores_before_it_ends(cluster: &Cluster, folder: &Path) {
+    let address = format!("127.0.0.1:{}", free_port());
+    let mut settings = cluster.settings().to_vec();
+    // It draws and computes by itself.
+    settings.retain(|(name, _)| name.starts_with("AWS_") || name == "FLUXGLOBE_STORE");
+    let words = ["serve", "--listen", &address];
+    let mut server = Node::start(folder, "serve", &words, &address, &settings).unwrap();
+    server.wait_until_ready().unwrap();
+    cluster.s3.delay(LONG_DELAY);
+    let tile = format!("/tiles/{PRODUCT}/map/2/1/2.png?time=2000-03-25");
+    let given = server.get(&tile).unwrap();
+    assert_eq!(given.status, 200, "{}", given.text());
+    let asked_to_stop = Instant::now();
+    assert_eq!(server.stop().unwrap(), Some(0));
+    let ended = Instant::now();
+    let passed = cluster.s3.passed();
+    let is_write = |one: &&Passed| one.line.starts_with("PUT") && one.line.contains("/tiles/");
+    let last = passed.iter().filter(is_write).next_back();
+    let stored = last.and_then(|one| one.answered);
+    assert!(
+        stored.is_some_and(|at| at > asked_to_stop && at < ended),
+        "not stored while it ended: {last:?}"
+    );
 }

@@ -37,10 +37,10 @@ pub struct Settings {
     /// Pictures that may wait to be drawn, or are drawn and not yet encoded, before clients are sent away, 0 to 65536
     #[arg(long, env = "FLUXGLOBE_DRAW_QUEUE", default_value_t = DRAW_QUEUE, value_parser = clap::value_parser!(u32).range(0..=65_536))]
     pub draw_queue: u32,
-    /// Series and budgets computed at the same time, 1 to 1024
+    /// Series and budgets computed at the same time, and as many questions about observations, 1 to 1024
     #[arg(long, env = "FLUXGLOBE_ANALYSES_AT_ONCE", default_value_t = ANALYSES_AT_ONCE, value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub analyses_at_once: u32,
-    /// Series and budgets that may wait before clients are sent away, 0 to 65536
+    /// Series and budgets, and as many questions about observations, that may wait before clients are sent away, 0 to 65536
     #[arg(long, env = "FLUXGLOBE_ANALYSIS_QUEUE", default_value_t = ANALYSIS_QUEUE, value_parser = clap::value_parser!(u32).range(0..=65_536))]
     pub analysis_queue: u32,
     /// Longest time until an answer begins, seconds, 1 to 3600

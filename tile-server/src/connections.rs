@@ -6,7 +6,8 @@
 //! | time for a request's head | clients that send their request a byte at a time, so that it never begins |
 //! | time without a byte in either direction | clients that are gone without a word, or never take their answer |
 //!
-//! None of it is a layer's work: layers see requests whose heads are whole, and nothing of the bytes of an answer.
+//! None of it is a layer's work: layers see requests whose heads are whole, and nothing of the bytes of an answer. They only
+//! tell that one is being answered.
 
 pub(crate) mod counts;
 mod guarded;

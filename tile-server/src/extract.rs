@@ -1,5 +1,6 @@
 //! Parts of an address as typed values, with the reason as JSON where they are not.
 
+use std::fmt;
 use std::str::FromStr;
 
 use axum::extract::{FromRequestParts, Path, Query};
@@ -7,7 +8,7 @@ use axum::http::Uri;
 use axum::http::request::Parts;
 use contract::ContractError;
 use contract::time::TimeMs;
-use serde::de::DeserializeOwned;
+use serde::de::{DeserializeOwned, Deserializer, Error as _, IgnoredAny, MapAccess, Visitor};
 
 use crate::error::ServerError;
 
@@ -59,6 +60,34 @@ impl<T: DeserializeOwned> UrlQuery<T> {
             Err(rejection) => Err(ServerError::Address {
                 reason: rejection.body_text(),
             }),
+        }
+    }
+}
+
+/// What nobody knows of a query, which is refused: what is misspelt would be answered as if it were not there. As the last of
+/// the flattened parts of a query, or as all of it where there are no parameters.
+#[derive(Debug, Default)]
+pub(crate) struct NoOthers;
+
+impl<'de> serde::Deserialize<'de> for NoOthers {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_map(Self)
+    }
+}
+
+impl<'de> Visitor<'de> for NoOthers {
+    type Value = Self;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("no other parameters")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Self, A::Error> {
+        match map.next_entry::<String, IgnoredAny>()? {
+            None => Ok(self),
+            Some((name, _value)) => Err(A::Error::custom(format!(
+                "unknown parameter `{name}`; /api/openapi.json has those of every address"
+            ))),
         }
     }
 }

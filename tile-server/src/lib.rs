@@ -38,6 +38,7 @@ pub mod metrics;
 mod middleware;
 mod openapi;
 mod pictures;
+mod readiness;
 mod request;
 mod router;
 mod routes;

@@ -12,6 +12,7 @@ use contract::key::ObjectKey;
 use quick_cache::Weighter;
 use quick_cache::sync::Cache;
 use storage::{StorageError, Store};
+use tokio::task::AbortHandle;
 
 use crate::backend::{Draw, Keep, Turn};
 use crate::error::ServerError;
@@ -56,16 +57,35 @@ struct Maker {
     drawer: Arc<dyn Draw>,
     gate: Gate,
     memory: Cache<Digest, Bytes, ByBytes>,
+    /// How long anybody waits for a picture.
+    request_limit: Duration,
     metrics: Metrics,
 }
 
+/// A drawing under way. It is given up with those who wait for it, unless one of them may have waited as long as he could
+/// stand: he comes again, and finds it.
+struct Waited {
+    drawing: AbortHandle,
+    since: Instant,
+    long: Duration,
+}
+
+impl Drop for Waited {
+    fn drop(&mut self) {
+        if self.since.elapsed() < self.long {
+            // Nothing happens to one that has ended.
+            self.drawing.abort();
+        }
+    }
+}
+
 impl Pictures {
-    /// No pictures yet. `memory_bytes` bounds those kept in memory.
+    /// No pictures yet. `memory_bytes` bounds those kept in memory, `request_limit` is how long anybody waits for one.
     pub fn new(
         store: Store,
         drawer: Arc<dyn Draw>,
         gate: Gate,
-        memory_bytes: u64,
+        (memory_bytes, request_limit): (u64, Duration),
         metrics: Metrics,
     ) -> Self {
         let memory = Cache::with_weighter(
@@ -80,6 +100,7 @@ impl Pictures {
                 drawer,
                 gate,
                 memory,
+                request_limit,
                 metrics,
             }),
         }
@@ -109,9 +130,8 @@ impl Pictures {
         Ok(picture)
     }
 
-    /// The picture of a job, as a PNG.
-    pub async fn get(&self, job: RenderJob) -> Result<Bytes, ServerError> {
-        let digest = job.digest();
+    /// The picture of a job, as a PNG. Its digest is the caller's to tell: of a picture that is there it is most of the work.
+    pub async fn get(&self, digest: Digest, job: RenderJob) -> Result<Bytes, ServerError> {
         if let Some(picture) = self.maker.memory.get(&digest) {
             self.maker.metrics.hit(Source::Memory);
             return Ok(picture);
@@ -130,6 +150,7 @@ fn signature(encoding: Encoding) -> &'static [u8] {
 
 impl Maker {
     async fn make(self: Arc<Self>, digest: Digest, job: RenderJob) -> Result<Bytes, ServerError> {
+        let asked_at = Instant::now();
         // The flight before this one may have ended since the memory was asked.
         if let Some(picture) = self.memory.get(&digest) {
             self.metrics.hit(Source::Memory);
@@ -144,7 +165,7 @@ impl Maker {
         }
         let limit = stored.err().map(|StoreAway| AWAY_LIMIT);
         self.metrics.cache_misses.inc();
-        let asked_at = Instant::now();
+        let waiting = Instant::now();
         let Pass { place, turn } = self
             .gate
             .enter()
@@ -152,15 +173,25 @@ impl Maker {
             .inspect_err(|_busy| self.metrics.refused.inc())?;
         self.metrics
             .draw_wait_s
-            .observe(asked_at.elapsed().as_secs_f64());
-        // Drawing goes on if those who asked go away: the work is half done, and the next one finds it in the store.
+            .observe(waiting.elapsed().as_secs_f64());
+        let request_limit = self.request_limit;
         let drawing = tokio::spawn(async move {
-            let picture = self.draw_within(limit, &job, turn).await?;
+            // Nobody waits longer than once; what takes longer is found by who asks again.
+            let drawing = self.draw_within(limit, &job, turn);
+            let drawn = tokio::time::timeout(2 * request_limit, drawing).await;
+            let picture = drawn.map_err(|_elapsed| ServerError::TimedOut {
+                limit_s: 2 * request_limit.as_secs(),
+            })??;
             self.remember(digest, &picture);
             // The turn went to the next one when this was drawn; pictures that are encoded count until here.
             drop(place);
             Ok(picture)
         });
+        let _waited = Waited {
+            drawing: drawing.abort_handle(),
+            since: asked_at,
+            long: request_limit / 2,
+        };
         drawing.await.unwrap_or_else(|e| {
             Err(ServerError::Defect {
                 what: format!("drawing ended early: {e}"),

@@ -39,7 +39,7 @@ pub fn router(state: AppState) -> Router {
         // Everybody gets the same headers: caches on the way need one copy for all pages.
         .vary([])
         .expose_headers([SHOWN_TIME, COVERED, header::CONTENT_LOCATION]);
-    // What a request waited for goes on after its time only if somebody else waits for it too.
+    // What a request waited for goes on after its time only if somebody else waits for it too, or comes again (`pictures.rs`).
     let limit_s = state.settings.request_limit_s;
     let timed_out = move |_elapsed: BoxError| async move { ServerError::TimedOut { limit_s } };
     let layers = ServiceBuilder::new()

@@ -1,12 +1,15 @@
 //! Listening: an address in, answers until told to stop, and an end that lets requests under way finish.
 
-use std::future::{Future, IntoFuture as _};
+use std::convert::Infallible;
+use std::future::{Future, IntoFuture as _, ready};
 use std::io::ErrorKind;
 use std::net::SocketAddr;
 use std::time::Duration;
 
+use axum::serve::IncomingStream;
 use tokio::net::TcpListener;
 use tokio::sync::watch;
+use tower::{ServiceBuilder, service_fn};
 
 use crate::config::Settings;
 use crate::connections::Door;
@@ -71,7 +74,14 @@ impl Server {
             ending.streams.close();
             stop.send_replace(true);
         };
-        let serving = axum::serve(door, router(self.state)).with_graceful_shutdown(until_told);
+        let routes = router(self.state);
+        // The service of one connection, which is told while an answer is worked at.
+        let service = service_fn(move |connection: IncomingStream<'_, Door>| {
+            let answers = connection.io().answers();
+            let counted = ServiceBuilder::new().map_future(move |one| answers.counting(one));
+            ready(Ok::<_, Infallible>(counted.service(routes.clone())))
+        });
+        let serving = axum::serve(door, service).with_graceful_shutdown(until_told);
         let drained = async move {
             // An error means that serving ended by itself: then this branch has nothing to limit.
             if stopping.wait_for(|stop| *stop).await.is_err() {

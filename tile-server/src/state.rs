@@ -17,6 +17,7 @@ use crate::gate::Gate;
 use crate::live::{Freshness, HotTiles, News};
 use crate::metrics::{Metrics, Registry};
 use crate::pictures::Pictures;
+use crate::readiness::Readiness;
 use crate::stream;
 
 /// Shared by all requests; clones are handles on the same thing.
@@ -37,6 +38,10 @@ pub struct Parts {
     pub drawer: Arc<dyn Draw>,
     /// Finds observations, where there are any.
     pub observer: OnceLock<Arc<dyn Observe>>,
+    /// Before questions to the one who finds them.
+    pub(crate) observing: Gate,
+    /// How the parts were when they were last asked.
+    pub(crate) readiness: Readiness,
     /// The event log, once this server follows it.
     pub log: OnceLock<Arc<dyn EventLog>>,
     /// Tiles that are asked for often.
@@ -71,7 +76,9 @@ impl AppState {
         let draws = Gate::new(at_once.get(), settings.draw_queue);
         let analyses = Gate::new(settings.analyses_at_once, settings.analysis_queue);
         let max_age = Duration::from_millis(settings.catalogue_age_ms);
-        let memory_bytes = settings.tile_memory_bytes;
+        let request_limit = Duration::from_secs(settings.request_limit_s);
+        // Observations are asked of a database of their own.
+        let observing = Gate::new(settings.analyses_at_once, settings.analysis_queue);
         Ok(Self(Arc::new(Parts {
             catalogue: Catalogue::new(store.clone(), max_age, metrics.clone()),
             cubes: Cubes::new(store.clone()),
@@ -79,12 +86,14 @@ impl AppState {
                 store,
                 Arc::clone(&drawer),
                 draws,
-                memory_bytes,
+                (settings.tile_memory_bytes, request_limit),
                 metrics.clone(),
             ),
             analyses: Analyses::new(analyst, analyses, metrics.clone()),
             drawer,
             observer: OnceLock::new(),
+            observing,
+            readiness: Readiness::default(),
             log: OnceLock::new(),
             hot: HotTiles::default(),
             news: News::new(start_ms()),

@@ -50,6 +50,7 @@ impl Inner {
         let encoding = self
             .pipeline
             .encode(annotated, image, order.encoding, permit);
+        let encoding = flight.while_wanted(Box::pin(encoding));
         let bytes = self.measured("encode", encoding).await?;
         Ok(self.kept(job, bytes, order).await)
     }

@@ -2,6 +2,8 @@
 
 use std::io;
 use std::pin::Pin;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::task::{Context, Poll, ready};
 
 use prometheus::IntCounterVec;
@@ -20,7 +22,41 @@ pub(crate) struct Guarded {
     alarm: Pin<Box<Sleep>>,
     has_ended: bool,
     ended: IntCounterVec,
+    answers: Answers,
     _place: Place,
+}
+
+/// Requests of one connection that are being answered, counted by who answers them. Clones count the same.
+#[derive(Clone, Default)]
+pub(crate) struct Answers(Arc<AtomicUsize>);
+
+/// Counts as long as it is there.
+struct Answer(Answers);
+
+impl Answers {
+    /// An answer, counted until its head is there or nobody works at it any more.
+    pub(crate) fn counting<F: Future>(
+        &self,
+        answer: F,
+    ) -> impl Future<Output = F::Output> + use<F> {
+        self.0.fetch_add(1, Ordering::AcqRel);
+        let counted = Answer(self.clone());
+        async move {
+            let answer = answer.await;
+            drop(counted);
+            answer
+        }
+    }
+
+    fn is_any(&self) -> bool {
+        self.0.load(Ordering::Acquire) > 0
+    }
+}
+
+impl Drop for Answer {
+    fn drop(&mut self) {
+        self.0.0.fetch_sub(1, Ordering::AcqRel);
+    }
 }
 
 impl Guarded {
@@ -39,12 +75,21 @@ impl Guarded {
             alarm: Box::pin(tokio::time::sleep_until(at)),
             has_ended: false,
             ended,
+            answers: Answers::default(),
             _place: place,
         }
     }
 
+    /// For whoever answers its requests.
+    pub(crate) fn answers(&self) -> Answers {
+        self.answers.clone()
+    }
+
     /// Nothing moves now: is that the end? Wakes the task when it will be.
     fn wait<T>(&mut self, cx: &mut Context<'_>) -> Poll<io::Result<T>> {
+        if self.answers.is_any() {
+            self.progress.answering();
+        }
         while !self.has_ended {
             let (at, why) = self.progress.due(self.limits.head, self.limits.idle);
             // An alarm that rings too early is put off only then, so that bytes that come need not touch it.
@@ -77,7 +122,10 @@ impl Guarded {
                 self.progress.wrote(begin, Instant::now());
                 Poll::Ready(written)
             }
-            Poll::Pending => self.wait(cx),
+            Poll::Pending => {
+                self.progress.answering();
+                self.wait(cx)
+            }
         }
     }
 }

@@ -17,7 +17,7 @@ use crate::annotations::AnnotationsQuery;
 use crate::catalogue::Layer;
 use crate::edition::{Edition, Named};
 use crate::error::ServerError;
-use crate::extract::{UrlPath, UrlQuery, number, time, whole_number};
+use crate::extract::{NoOthers, UrlPath, UrlQuery, number, time, whole_number};
 use crate::ground::GroundQuery;
 use crate::look::LookQuery;
 use crate::openapi::words;
@@ -91,6 +91,9 @@ pub(crate) struct GlobeQuery {
     #[serde(flatten)]
     #[param(ignore)]
     annotations: AnnotationsQuery,
+    #[serde(flatten)]
+    #[param(ignore)]
+    _others: NoOthers,
 }
 
 /// The globe from a camera over a place or looking at one, as a PNG of any size.

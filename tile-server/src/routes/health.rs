@@ -2,7 +2,6 @@
 
 use std::time::Duration;
 
-use axum::Json;
 use axum::extract::State;
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse as _, Response};
@@ -11,11 +10,14 @@ use tokio::time::timeout;
 use utoipa::ToSchema;
 
 use crate::catalogue::Probe;
+use crate::readiness::Said;
 use crate::routes::viewer;
 use crate::state::AppState;
 
 /// A part that needs longer than this to say that it is there is as good as away.
 const PART_LIMIT: Duration = Duration::from_secs(2);
+/// The parts are asked no more often than this, however many want to know.
+const READY_AGE: Duration = Duration::from_secs(1);
 
 /// Can the server do its work, and which part of it cannot?
 #[derive(Debug, Serialize, ToSchema)]
@@ -51,7 +53,7 @@ pub(crate) async fn live() -> Response {
     ([(header::CACHE_CONTROL, "no-store")], "ok\n").into_response()
 }
 
-/// Every part, asked now.
+/// Every part, asked within the last second.
 #[utoipa::path(
     get,
     path = "/readyz",
@@ -63,15 +65,29 @@ pub(crate) async fn live() -> Response {
     ),
 )]
 pub(crate) async fn ready(State(state): State<AppState>) -> Response {
+    let age = if state.news.is_closed() {
+        Duration::ZERO
+    } else {
+        Duration::from_millis(state.settings.catalogue_age_ms).min(READY_AGE)
+    };
+    let (status, body) = state.readiness.within(age, ask(&state)).await;
+    let headers = [
+        (header::CACHE_CONTROL, "no-store"),
+        (header::CONTENT_TYPE, "application/json"),
+    ];
+    (status, headers, body).into_response()
+}
+
+async fn ask(state: &AppState) -> Said {
     let (store, renderer, log, observations) = tokio::join!(
-        store(&state),
-        renderer(&state),
-        log(&state),
-        observations(&state)
+        store(state),
+        renderer(state),
+        log(state),
+        observations(state)
     );
-    let mut checks = vec![store, renderer, viewer_files(&state).await];
+    let mut checks = vec![store, renderer, viewer_files(state).await];
     checks.extend(log);
-    checks.extend(ending(&state));
+    checks.extend(ending(state));
     checks.extend(observations);
     let ready = checks.iter().all(|part| part.ok || !part.required);
     let status = if ready {
@@ -79,12 +95,8 @@ pub(crate) async fn ready(State(state): State<AppState>) -> Response {
     } else {
         StatusCode::SERVICE_UNAVAILABLE
     };
-    (
-        status,
-        [(header::CACHE_CONTROL, "no-store")],
-        Json(Readiness { ready, checks }),
-    )
-        .into_response()
+    let said = serde_json::to_vec(&Readiness { ready, checks });
+    (status, said.expect("it has string keys only").into())
 }
 
 /// A server that was asked to end, or lost a part, is no place to send anybody.

@@ -9,7 +9,7 @@ use serde::Deserialize;
 use utoipa::IntoParams;
 
 use crate::error::ServerError;
-use crate::extract::{UrlPath, UrlQuery};
+use crate::extract::{NoOthers, UrlPath, UrlQuery};
 use crate::look::LookQuery;
 use crate::openapi::words;
 use crate::request;
@@ -28,6 +28,9 @@ pub(crate) struct LegendQuery {
     #[serde(flatten)]
     #[param(ignore)]
     look: LookQuery,
+    #[serde(flatten)]
+    #[param(ignore)]
+    _others: NoOthers,
 }
 
 /// What the colours of a layer mean: numbers, a drawing or pixels.

@@ -72,6 +72,11 @@ pub(crate) async fn get(
         after: asked.after,
         ..Filter::default()
     };
+    let _pass = state
+        .observing
+        .enter()
+        .await
+        .inspect_err(|_busy| state.metrics.refused.inc())?;
     let page = observer.observations(&filter).await?;
     Ok(([(header::CACHE_CONTROL, "no-cache")], Json(page)).into_response())
 }

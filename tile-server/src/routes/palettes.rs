@@ -5,6 +5,7 @@ use contract::colour::Palette;
 use serde::Serialize;
 use utoipa::ToSchema;
 
+use crate::extract::{NoOthers, UrlQuery};
 use crate::openapi::words;
 use legend::evenly_placed;
 
@@ -31,9 +32,12 @@ struct Named {
     path = "/api/palettes",
     operation_id = "palettes",
     tag = "catalogue",
-    responses((status = 200, description = "All of them", body = Palettes)),
+    responses(
+        (status = 200, description = "All of them", body = Palettes),
+        (status = 400, description = "A parameter: there are none", body = crate::error::Refusal),
+    ),
 )]
-pub(crate) async fn list() -> Json<Palettes> {
+pub(crate) async fn list(_no: UrlQuery<NoOthers>) -> Json<Palettes> {
     let named = Palette::ALL.iter().map(|palette| Named {
         name: palette.as_str(),
         stops: evenly_placed(palette.stops().iter()),

@@ -66,7 +66,8 @@ pub(crate) async fn respond(
     shown: Shown,
     is_pinned: bool,
 ) -> Result<Response, ServerError> {
-    let tag = format!("\"{}\"", job.digest());
+    let digest = job.digest();
+    let tag = format!("\"{digest}\"");
     let cache_control = if is_pinned {
         CACHE_CONTROL_PINNED
     } else {
@@ -80,7 +81,7 @@ pub(crate) async fn respond(
         state.metrics.hit(Source::Client);
         return Ok((StatusCode::NOT_MODIFIED, headers, shown.headers()).into_response());
     }
-    let picture = state.pictures.get(job).await?;
+    let picture = state.pictures.get(digest, job).await?;
     let content = [(header::CONTENT_TYPE, "image/png")];
     Ok((headers, shown.headers(), content, picture).into_response())
 }

@@ -111,6 +111,11 @@ pub(crate) async fn get(
 ) -> Result<Response, ServerError> {
     let observer = state.observer.get().ok_or(ServerError::NoObservations)?;
     let filter = asked.filter()?;
+    let _pass = state
+        .observing
+        .enter()
+        .await
+        .inspect_err(|_busy| state.metrics.refused.inc())?;
     let mut features = vec![];
     let mut tracks = 0;
     for platform in observer.platforms(&filter).await? {

@@ -16,6 +16,7 @@ use utoipa::ToSchema;
 use crate::catalogue::Layer;
 use crate::edition::Edition;
 use crate::error::ServerError;
+use crate::extract::{NoOthers, UrlQuery};
 use crate::openapi::words;
 use crate::request::Beside;
 use crate::routes::picture::has_tag;
@@ -125,10 +126,12 @@ impl From<Period> for StepTimes {
     responses(
         (status = 200, description = "All products", body = Products, headers(("etag" = String, description = "Weak; changes with any version"))),
         (status = 304, description = "The copy that `If-None-Match` names is still right"),
+        (status = 400, description = "A parameter: there are none", body = crate::error::Refusal),
     ),
 )]
 pub(crate) async fn list(
     State(state): State<AppState>,
+    _no: UrlQuery<NoOthers>,
     asked: HeaderMap,
 ) -> Result<Response, ServerError> {
     let layers = state.catalogue.layers().await?;

@@ -5,6 +5,8 @@ use contract::region::NAMED_REGIONS;
 use serde::Serialize;
 use utoipa::ToSchema;
 
+use crate::extract::{NoOthers, UrlQuery};
+
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct Regions {
     /// In the order they are offered.
@@ -30,9 +32,12 @@ struct Named {
     path = "/api/regions",
     operation_id = "regions",
     tag = "catalogue",
-    responses((status = 200, description = "All of them", body = Regions)),
+    responses(
+        (status = 200, description = "All of them", body = Regions),
+        (status = 400, description = "A parameter: there are none", body = crate::error::Refusal),
+    ),
 )]
-pub(crate) async fn list() -> Json<Regions> {
+pub(crate) async fn list(_no: UrlQuery<NoOthers>) -> Json<Regions> {
     let named = NAMED_REGIONS.iter().map(|r| Named {
         name: r.name,
         title: r.title,

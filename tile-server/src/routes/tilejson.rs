@@ -17,7 +17,7 @@ use crate::annotations::AnnotationsQuery;
 use crate::catalogue::{Catalogue, Layer};
 use crate::edition::Edition;
 use crate::error::ServerError;
-use crate::extract::{UrlPath, UrlQuery, time};
+use crate::extract::{NoOthers, UrlPath, UrlQuery, time};
 use crate::look::LookQuery;
 use crate::openapi::words;
 use crate::request;
@@ -48,6 +48,9 @@ pub(crate) struct TileJsonQuery {
     #[serde(flatten)]
     #[param(ignore)]
     annotations: AnnotationsQuery,
+    #[serde(flatten)]
+    #[param(ignore)]
+    _others: NoOthers,
 }
 
 /// The queries of tiles, in their canonical form.

@@ -12,7 +12,7 @@ use utoipa::IntoParams;
 use crate::annotations::AnnotationsQuery;
 use crate::edition::{Edition, Named};
 use crate::error::ServerError;
-use crate::extract::{UrlPath, UrlQuery, time, whole_number};
+use crate::extract::{NoOthers, UrlPath, UrlQuery, time, whole_number};
 use crate::look::LookQuery;
 use crate::openapi::words;
 use crate::request;
@@ -50,6 +50,9 @@ pub(crate) struct TileQuery {
     #[serde(flatten)]
     #[param(ignore)]
     annotations: AnnotationsQuery,
+    #[serde(flatten)]
+    #[param(ignore)]
+    _others: NoOthers,
 }
 
 /// A map tile at any instant: Web Mercator (EPSG:3857), XYZ scheme, PNG with alpha.

@@ -1,7 +1,7 @@
 //! What streams are counted by.
 
 use prometheus::{
-    HistogramOpts, HistogramVec, IntCounter, IntCounterVec, IntGauge, Opts, Registry,
+    Histogram, HistogramOpts, HistogramVec, IntCounter, IntCounterVec, IntGauge, Opts, Registry,
 };
 
 /// Bounds of the time from a state to its picture, seconds: 30 ms is the aim for one that moves.
@@ -15,6 +15,7 @@ pub(crate) struct StreamMetrics {
     pub(super) pictures: IntCounterVec,
     pub(super) bytes: IntCounterVec,
     pub(super) latency_s: HistogramVec,
+    pub(super) send_s: Histogram,
     pub(super) ended: IntCounterVec,
 }
 
@@ -25,6 +26,10 @@ impl StreamMetrics {
         let latency = HistogramOpts::new(
             name("latency_seconds"),
             "Time from the arrival of a state to its picture.",
+        );
+        let send = HistogramOpts::new(
+            name("send_seconds"),
+            "Time until the connection of a stream took a picture.",
         );
         let counters = |what: &str, help: &str, label: &str| {
             IntCounterVec::new(Opts::new(name(what), help), &[label])
@@ -38,6 +43,7 @@ impl StreamMetrics {
             pictures: counters("pictures_total", "Pictures sent, by kind.", "kind")?,
             bytes: counters("bytes_total", "Bytes of pictures sent, by kind.", "kind")?,
             latency_s: HistogramVec::new(latency.buckets(BOUNDS_S.to_vec()), &["kind"])?,
+            send_s: Histogram::with_opts(send.buckets(BOUNDS_S.to_vec()))?,
             ended: counters("ended_total", "Streams ended, by reason.", "reason")?,
         };
         registry.register(Box::new(metrics.open.clone()))?;
@@ -45,6 +51,7 @@ impl StreamMetrics {
         registry.register(Box::new(metrics.pictures.clone()))?;
         registry.register(Box::new(metrics.bytes.clone()))?;
         registry.register(Box::new(metrics.latency_s.clone()))?;
+        registry.register(Box::new(metrics.send_s.clone()))?;
         registry.register(Box::new(metrics.ended.clone()))?;
         Ok(metrics)
     }

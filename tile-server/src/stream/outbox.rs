@@ -1,10 +1,11 @@
 //! What goes to a client: one message at a time, and a client that takes none for long is given up.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use axum::extract::ws::{CloseFrame, Message, WebSocket};
 use futures::SinkExt as _;
 use futures::stream::SplitSink;
+use prometheus::Histogram;
 use tokio::sync::mpsc;
 use tokio::task::JoinHandle;
 
@@ -20,9 +21,10 @@ pub(super) struct Outbox {
 }
 
 impl Outbox {
-    pub(super) fn start(sink: SplitSink<WebSocket, Message>) -> Self {
+    /// `send_s` learns how long pictures take to be taken.
+    pub(super) fn start(sink: SplitSink<WebSocket, Message>, send_s: Histogram) -> Self {
         let (sender, messages) = mpsc::channel(WAITING);
-        let writing = tokio::spawn(write(sink, messages));
+        let writing = tokio::spawn(write(sink, messages, send_s));
         Self { sender, writing }
     }
 
@@ -53,9 +55,16 @@ impl Outbox {
     }
 }
 
-async fn write(mut sink: SplitSink<WebSocket, Message>, mut messages: mpsc::Receiver<Message>) {
+async fn write(
+    mut sink: SplitSink<WebSocket, Message>,
+    mut messages: mpsc::Receiver<Message>,
+    send_s: Histogram,
+) {
     while let Some(message) = messages.recv().await {
+        let is_picture = matches!(message, Message::Binary(_));
+        let begun = Instant::now();
         match tokio::time::timeout(LIMIT, sink.send(message)).await {
+            Ok(Ok(())) if is_picture => send_s.observe(begun.elapsed().as_secs_f64()),
             Ok(Ok(())) => {}
             Ok(Err(_gone)) => return,
             Err(_elapsed) => {

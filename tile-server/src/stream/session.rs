@@ -97,7 +97,7 @@ pub(crate) async fn run(server: AppState, socket: WebSocket, mut place: Place) {
     let metrics = server.metrics.streams.clone();
     metrics.open.inc();
     let (sink, mut said) = socket.split();
-    let outbox = Outbox::start(sink);
+    let outbox = Outbox::start(sink, metrics.send_s.clone());
     let mut session = Session::new(server);
     let end = session.serve(&mut said, &outbox, &mut place).await;
     metrics.ended.with_label_values(&[end.reason]).inc();

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use axum::http::StatusCode;
 use contract::quantity::Quantity;
+use futures::FutureExt as _;
 use futures::future::join_all;
 use tile_server::backend::Keep;
 
@@ -123,11 +124,46 @@ async fn twenty_who_ask_at_once_cause_one_drawing() {
 }
 
 #[tokio::test]
-async fn a_picture_nobody_waits_for_any_more_still_lands_in_the_store() {
+async fn a_picture_nobody_waits_for_any_more_is_given_up() {
     let app = TestApp::new().await;
     app.drawer.is_slow.store(true, Ordering::SeqCst);
-    let impatient = tokio::time::timeout(Duration::from_millis(50), app.get(TILE)).await;
-    assert!(impatient.is_err());
+    let mut both = Box::pin(async { tokio::join!(app.get(TILE), app.get(TILE)) });
+    let mut third = Box::pin(app.get(TILE));
+    while app.drawer.drawn_count() == 0 {
+        assert!(both.as_mut().now_or_never().is_none());
+        tokio::task::yield_now().await;
+    }
+    for _ in 0..1000 {
+        assert!(third.as_mut().now_or_never().is_none());
+        tokio::task::yield_now().await;
+    }
+    let under_way = || app.drawer.under_way.load(Ordering::SeqCst);
+    drop(both);
+    for _ in 0..100 {
+        tokio::task::yield_now().await;
+    }
+    assert_eq!(under_way(), 1, "somebody waits");
+    drop(third);
+    let given_up = async {
+        while under_way() > 0 {
+            tokio::task::yield_now().await;
+        }
+    };
+    let limit = Duration::from_secs(20);
+    let in_time = tokio::time::timeout(limit, given_up).await;
+    assert!(in_time.is_ok(), "it is drawn for nobody");
+    app.drawer.is_slow.store(false, Ordering::SeqCst);
+    assert_eq!(app.get(TILE).await.status, StatusCode::OK);
+    assert_eq!(app.drawer.drawn_count(), 2);
+}
+
+#[tokio::test]
+async fn a_picture_that_took_longer_than_anybody_waits_is_there_for_who_comes_again() {
+    let app = TestApp::with(|settings| settings.request_limit_s = 1).await;
+    app.drawer.is_slow.store(true, Ordering::SeqCst);
+    let late = app.get(TILE).await;
+    assert_eq!(late.status, StatusCode::GATEWAY_TIMEOUT);
+    assert_eq!(late.header("retry-after"), "5");
     app.drawer.turns.add_permits(1);
     let key = app.drawer.last_job().key();
     while !app.store.exists(&key).await.unwrap() {
@@ -135,6 +171,18 @@ async fn a_picture_nobody_waits_for_any_more_still_lands_in_the_store() {
     }
     app.get(TILE).await;
     assert_eq!(app.drawer.drawn_count(), 1);
+    // Not for ever, though.
+    let other = "/tiles/flux/map/1/0/0.png";
+    assert_eq!(app.get(other).await.status, StatusCode::GATEWAY_TIMEOUT);
+    assert_eq!(app.drawer.under_way.load(Ordering::SeqCst), 1);
+    let given_up = async {
+        while app.drawer.under_way.load(Ordering::SeqCst) > 0 {
+            tokio::time::sleep(Duration::from_millis(10)).await;
+        }
+    };
+    let limit = Duration::from_secs(20);
+    let in_time = tokio::time::timeout(limit, given_up).await;
+    assert!(in_time.is_ok(), "it is drawn for ever");
 }
 
 #[tokio::test]

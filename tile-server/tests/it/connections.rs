@@ -154,6 +154,26 @@ async fn a_connection_on_which_nothing_moves_is_ended_and_a_slow_answer_is_not()
 }
 
 #[tokio::test]
+async fn an_answer_to_a_request_that_came_with_another_may_take_its_time() {
+    let server = Running::new(|settings| settings.request_limit_s = 6).await;
+    let drawer = Arc::clone(&server.app.drawer);
+    drawer.is_slow.store(true, Ordering::SeqCst);
+    let mut both = server.connect().await;
+    let tile = "GET /tiles/flux/map/0/0/0.png HTTP/1.1\r\nHost: a\r\n\r\n";
+    let together = format!("{REQUEST}{tile}");
+    both.write_all(together.as_bytes()).await.unwrap();
+    assert!(answer(&mut both).await.starts_with("HTTP/1.1 200"));
+    tokio::time::sleep(Duration::from_secs(3)).await;
+    drawer.turns.add_permits(1);
+    let drawn = answer(&mut both).await;
+    assert!(
+        drawn.starts_with("HTTP/1.1 200"),
+        "3 s are more than a head may take, and this one was there: {drawn}"
+    );
+    assert_eq!(server.ended("slow").await, 0);
+}
+
+#[tokio::test]
 async fn those_beyond_the_limit_are_told_to_come_again_and_find_room_when_others_go() {
     let server = Running::new(|settings| settings.connections = 3).await;
     let mut inside = vec![];

@@ -48,6 +48,22 @@ impl Mood {
     }
 }
 
+/// One more as long as it is there.
+struct Counted<'a>(&'a AtomicUsize);
+
+impl<'a> Counted<'a> {
+    fn one_more(count: &'a AtomicUsize) -> Self {
+        count.fetch_add(1, Ordering::SeqCst);
+        Self(count)
+    }
+}
+
+impl Drop for Counted<'_> {
+    fn drop(&mut self) {
+        self.0.fetch_sub(1, Ordering::SeqCst);
+    }
+}
+
 /// Draws nothing: its picture is a pixel with the digest of the job beside it.
 pub(crate) struct Drawer {
     store: Store,
@@ -58,6 +74,8 @@ pub(crate) struct Drawer {
     /// While true, pictures wait for a permit of `turns` each.
     pub(crate) is_slow: AtomicBool,
     pub(crate) turns: Semaphore,
+    /// Pictures that are begun, and neither given out nor given up.
+    pub(crate) under_way: AtomicUsize,
     /// While true, pictures that are drawn are slow to be encoded: they wait for a permit of `turns` after they let go
     /// of their turn.
     pub(crate) encodes_slowly: AtomicBool,
@@ -85,6 +103,7 @@ impl Drawer {
             mood: Mutex::default(),
             is_slow: AtomicBool::new(false),
             turns: Semaphore::new(0),
+            under_way: AtomicUsize::new(0),
             encodes_slowly: AtomicBool::new(false),
             stores_nothing: AtomicBool::new(false),
         }
@@ -146,6 +165,7 @@ impl Draw for Drawer {
     ) -> Result<Bytes, BackendError> {
         self.jobs.lock().unwrap().push(job.clone());
         self.keeps.lock().unwrap().push(keep);
+        let _drawing = Counted::one_more(&self.under_way);
         if self.is_slow.load(Ordering::SeqCst) {
             self.turns.acquire().await.unwrap().forget();
         }
@@ -345,6 +365,8 @@ pub(crate) struct Observer {
     pub(crate) observations: Mutex<Vec<Observation>>,
     pub(crate) questions: Mutex<Vec<Filter>>,
     pub(crate) mood: Mutex<Mood>,
+    /// While true, no question is answered.
+    pub(crate) is_stuck: AtomicBool,
 }
 
 impl Observer {
@@ -366,6 +388,9 @@ impl Observer {
 impl Observe for Observer {
     async fn platforms(&self, filter: &Filter) -> Result<Vec<Platform>, BackendError> {
         self.asked(filter)?;
+        if self.is_stuck.load(Ordering::SeqCst) {
+            std::future::pending::<()>().await;
+        }
         Ok(self.platforms.lock().unwrap().clone())
     }
 

@@ -119,6 +119,25 @@ const BAD_ADDRESSES: &[(&str, &str)] = &[
     ),
     ("/api/products/flux/budget?earth=flat", "local-radius"),
     ("/api/products/flux/budget?form=2000", "unknown field"),
+    // What is misspelt is not answered as if it were not there.
+    (
+        "/tiles/flux/map/0/0/0.png?size=256&tme=2000-01",
+        "unknown parameter `tme`",
+    ),
+    (
+        "/tiles/flux/map/0/0/0.png?range=0:1&sunn=time",
+        "unknown parameter `sunn`",
+    ),
+    ("/tiles/flux/map.json?pallete=ice", "unknown parameter"),
+    ("/globe/flux/map.png?titl=60", "unknown parameter `titl`"),
+    (
+        "/api/products/flux/legend.svg?sun=time",
+        "unknown parameter `sun`",
+    ),
+    ("/api/products?product=flux", "unknown parameter"),
+    ("/api/regions?bbox=0,0,1,1", "unknown parameter"),
+    ("/api/palettes?name=ice", "unknown parameter"),
+    ("/api/check?from=2000", "unknown parameter"),
 ];
 
 #[tokio::test]

@@ -1,9 +1,13 @@
 //! `/api/observations/platforms` and `/api/observations/{dataset}/{platform}`.
 
+use std::sync::atomic::Ordering;
+
 use axum::http::StatusCode;
 use contract::observation::{Observation, Platform, PlatformKind, Quality, TrackPoint};
 use contract::region::Region;
+use futures::FutureExt as _;
 use serde_json::json;
+use tile_server::Settings;
 use tile_server::backend::Class;
 
 use crate::app::TestApp;
@@ -208,4 +212,29 @@ async fn a_database_that_is_away_is_worth_another_try() {
         assert_eq!(answer.status, StatusCode::SERVICE_UNAVAILABLE);
         assert_eq!(answer.header("retry-after"), "5");
     }
+}
+
+#[tokio::test]
+async fn questions_beyond_the_limit_are_sent_away_with_a_time_to_come_back() {
+    let change = |settings: &mut Settings| {
+        (settings.analyses_at_once, settings.analysis_queue) = (1, 1);
+    };
+    let app = TestApp::with(change).await.observing();
+    app.observer.is_stuck.store(true, Ordering::SeqCst);
+    let platforms = "/api/observations/platforms";
+    let (mut asking, mut waiting) = (Box::pin(app.get(platforms)), Box::pin(app.get(platforms)));
+    assert!(asking.as_mut().now_or_never().is_none());
+    assert!(waiting.as_mut().now_or_never().is_none());
+    assert_eq!(app.observer.questions.lock().unwrap().len(), 1);
+    for path in [platforms, "/api/observations/buoys/51001"] {
+        let sent_away = app.get(path).await;
+        assert_eq!(sent_away.status, StatusCode::SERVICE_UNAVAILABLE, "{path}");
+        assert_eq!(sent_away.header("retry-after"), "1");
+    }
+    // Numbers of products are asked of others.
+    let point = app.get("/api/products/flux/point?lon=0&lat=0").await;
+    assert_eq!(point.status, StatusCode::OK);
+    app.observer.is_stuck.store(false, Ordering::SeqCst);
+    drop(asking);
+    assert_eq!(waiting.await.status, StatusCode::OK);
 }

@@ -269,7 +269,7 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** Every part, asked now. */
+        /** Every part, asked within the last second. */
         get: operations["readiness"];
         put?: never;
         post?: never;
@@ -1188,6 +1188,15 @@ export interface operations {
                     "application/json": components["schemas"]["Check"] | null;
                 };
             };
+            /** @description A parameter: there are none */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
             /** @description A defect of this server */
             500: {
                 headers: {
@@ -1511,6 +1520,15 @@ export interface operations {
                     "application/json": components["schemas"]["Palettes"];
                 };
             };
+            /** @description A parameter: there are none */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
             /** @description A defect of this server */
             500: {
                 headers: {
@@ -1570,6 +1588,15 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content?: never;
+            };
+            /** @description A parameter: there are none */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
             };
             /** @description A defect of this server */
             500: {
@@ -1994,6 +2021,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["Regions"];
+                };
+            };
+            /** @description A parameter: there are none */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
                 };
             };
             /** @description A defect of this server */
