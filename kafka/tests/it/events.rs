@@ -25,6 +25,7 @@ pub(crate) fn notice_of(path: &str, product: Option<&str>) -> Event {
         path: path.to_owned(),
         profile: None,
         product: product.map(|product| product.parse().unwrap()),
+        variable: None,
         sha256: None,
         size_bytes: None,
         attempt: 1,
