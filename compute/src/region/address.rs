@@ -3,6 +3,7 @@
 //! An engine that answers strangers stores nothing for them, however many regions they think of. Regions that have a name
 //! are few: their weights are stored for everybody.
 
+use contract::geometry::Geometry;
 use contract::key::ObjectKey;
 use contract::region::{NAMED_REGIONS, NamedRegion};
 use storage::{StorageError, Store};
@@ -78,7 +79,7 @@ async fn found_or_asked(
     }
     let question = ComputedWeights {
         grid: *asked.grid,
-        region: asked.region.clone(),
+        geometry: Geometry::Region(asked.region.clone()),
         earth: asked.earth,
         surface: surface.clone(),
         shares_at: surface
