@@ -57,7 +57,7 @@ async fn distributed(
     let keys: BTreeSet<ObjectKey> = pieces.iter().map(|piece| piece.key.clone()).collect();
     let keys: Vec<&ObjectKey> = keys.iter().collect();
     let tasks = dealt(
-        question,
+        &question,
         pieces,
         engine.partitions().get().max(CLUSTER_TASKS),
     );
@@ -72,7 +72,7 @@ async fn distributed(
 }
 
 /// Pieces as at most `part_count` tasks.
-fn dealt(question: Question, pieces: Vec<Piece>, part_count: usize) -> Vec<Task> {
+fn dealt(question: &Question, pieces: Vec<Piece>, part_count: usize) -> Vec<Task> {
     let part_count = part_count.clamp(1, pieces.len().max(1));
     let task = |_part| Task {
         question: question.clone(),

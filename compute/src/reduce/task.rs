@@ -18,8 +18,8 @@ use super::kernel::{Block, Scratch, Target, add_sums, add_weights};
 use super::scale::Scale;
 use crate::ComputeError;
 use crate::objects::Objects;
-use crate::region::address::weights_failed;
-use crate::region::loaded::RegionWeights;
+
+use crate::region::loaded::{RegionWeights, weights_failed};
 
 /// What is asked of every piece.
 #[derive(Debug, Clone, Serialize, Deserialize)]

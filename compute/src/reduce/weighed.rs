@@ -10,10 +10,10 @@ use contract::statistics::StatisticsQuery;
 
 use super::cells::{Cells, Shape, WeightUnit};
 use crate::budget::over_region::{AskedArea, extent_of, weights, with_shares};
-use crate::region::address::weights_failed;
+
 use crate::region::computed::ComputedWeights;
 use crate::region::line_cover::length_m;
-use crate::region::loaded::RegionWeights;
+use crate::region::loaded::{RegionWeights, weights_failed};
 use crate::region::shares;
 use crate::region::weights::Surface;
 use crate::{ComputeError, Engine};

@@ -9,6 +9,7 @@ use contract::region::{NAMED_REGIONS, NamedRegion};
 use storage::{StorageError, Store};
 
 use super::computed::ComputedWeights;
+use super::loaded::weights_failed;
 use super::weights::{EARTH, OnGrid, RegionKeys, Surface};
 use crate::{ComputeError, Engine};
 
@@ -88,19 +89,4 @@ async fn found_or_asked(
     };
     question.check_size()?;
     Ok(question.text())
-}
-
-/// Why weights could not be had, in the words of whoever found out.
-pub(crate) fn weights_failed(error: datafusion::error::DataFusionError) -> ComputeError {
-    use datafusion::error::DataFusionError::External;
-    match error {
-        External(source) => match source.downcast::<ComputeError>() {
-            Ok(own) => *own,
-            Err(other) => match other.downcast::<StorageError>() {
-                Ok(own) => (*own).into(),
-                Err(other) => ComputeError::engine("reading a region's weights")(External(other)),
-            },
-        },
-        other => ComputeError::engine("reading a region's weights")(other),
-    }
 }

@@ -54,11 +54,9 @@ fn sums_are_those_of_a_plain_loop() {
         let total = |of: &dyn Fn(usize) -> f64| there.iter().map(|cell| of(*cell)).sum::<f64>();
         let weight = |cell: usize| cells[cell].weight as f64;
         assert_eq!(own.count, there.len() as u64);
-        assert_eq!(own.weight as f64, total(&weight));
-        assert_eq!(
-            own.covered as f64,
-            total(&|cell| cells[cell].covered as f64)
-        );
+        assert!((own.weight as f64 - total(&weight)).abs() < 1.0);
+        let covered = total(&|cell| cells[cell].covered as f64);
+        assert!((own.covered as f64 - covered).abs() < 1.0);
         let mean = total(&|cell| weight(cell) * f64::from(at(cell))) / total(&weight);
         assert!((scale.mean(own.sum, own.weight) - mean).abs() < 1e-18);
         let variance =
@@ -66,8 +64,12 @@ fn sums_are_those_of_a_plain_loop() {
         let std = scale.std(own.squares, own.sum, own.weight);
         assert!((std - variance.sqrt()).abs() < 1e-6 * variance.sqrt());
         let extremes = there.iter().map(|cell| at(*cell));
-        assert_eq!(own.min, extremes.clone().fold(f32::INFINITY, f32::min));
-        assert_eq!(own.max, extremes.fold(f32::NEG_INFINITY, f32::max));
+        let (min, max) = (
+            extremes.clone().fold(f32::INFINITY, f32::min),
+            extremes.fold(f32::NEG_INFINITY, f32::max),
+        );
+        assert_eq!(own.min.to_bits(), min.to_bits());
+        assert_eq!(own.max.to_bits(), max.to_bits());
     }
 }
 

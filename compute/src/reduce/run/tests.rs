@@ -54,7 +54,7 @@ async fn plan(tasks: &[Task]) -> String {
 #[test]
 fn every_piece_is_in_one_task_and_no_task_is_idle() {
     for (pieces_count, parts, expected) in [(9, 4, 4), (2, 7, 2), (1, 1, 1), (0, 5, 1)] {
-        let tasks = dealt(question(), pieces(pieces_count), parts);
+        let tasks = dealt(&question(), pieces(pieces_count), parts);
         assert_eq!(tasks.len(), expected);
         let mut firsts: Vec<u32> = tasks
             .iter()
@@ -72,7 +72,7 @@ fn every_piece_is_in_one_task_and_no_task_is_idle() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn nothing_but_what_tasks_accumulated_passes_from_part_to_part() {
-    let plan = plan(&dealt(question(), pieces(9), 4)).await;
+    let plan = plan(&dealt(&question(), pieces(9), 4)).await;
     let count = |word: &str| plan.matches(word).count();
     assert_eq!(count("AsyncFuncExec"), 4, "{plan}");
     assert_eq!(
