@@ -18,6 +18,7 @@ mod objects;
 pub mod point;
 pub mod published;
 pub mod recompute;
+pub mod reduce;
 pub mod region;
 mod retry_store;
 mod scan;

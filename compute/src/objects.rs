@@ -3,16 +3,22 @@
 use std::sync::Arc;
 
 use bytes::Bytes;
+use contract::digest::Digest;
 use contract::key::ObjectKey;
 use datafusion::error::DataFusionError;
 use datafusion::execution::runtime_env::RuntimeEnv;
 use object_store::path::Path;
 use object_store::{ObjectStore, ObjectStoreExt as _};
-use storage::Store;
+use quick_cache::Weighter;
+use quick_cache::sync::Cache;
+use storage::rows::{RowIndex, Stored};
+use storage::{StorageError, Store};
 use url::{Position, Url};
 
 use crate::ComputeError;
+use crate::reduce::remembered::Remembered;
 use crate::region::computed::ComputedWeights;
+use crate::region::extent::Extent;
 use crate::region::loaded::{LoadedWeights, RegionWeights};
 use crate::retry_store::RetryStore;
 use crate::tail_store::TailStore;
@@ -23,6 +29,27 @@ pub struct Objects {
     root: Url,
     store: Arc<dyn ObjectStore>,
     weights: Arc<LoadedWeights>,
+    /// Where rows lie in files that were read, by their path.
+    row_indexes: Arc<Cache<Path, Option<Arc<RowIndex>>, ByRows>>,
+    extents: Arc<Cache<Digest, Extent>>,
+    sums: Arc<Remembered>,
+}
+
+/// Files whose rows are known: series of 16 years of a few products.
+const HELD_INDEXES: usize = 256;
+/// Rows of them all together, at some 40 bytes each.
+const HELD_ROWS: u64 = 1 << 20;
+/// Regions whose extent is known.
+const HELD_EXTENTS: usize = 1000;
+
+/// Counts rows of files.
+#[derive(Debug, Clone)]
+struct ByRows;
+
+impl Weighter<Path, Option<Arc<RowIndex>>> for ByRows {
+    fn weight(&self, _at: &Path, index: &Option<Arc<RowIndex>>) -> u64 {
+        index.as_ref().map_or(1, |index| index.row_count().max(1))
+    }
 }
 
 impl Objects {
@@ -38,6 +65,9 @@ impl Objects {
             root,
             store: Arc::new(TailStore::new(Arc::new(RetryStore::new(store)))),
             weights: Arc::default(),
+            row_indexes: Arc::new(Cache::with_weighter(HELD_INDEXES, HELD_ROWS, ByRows)),
+            extents: Arc::new(Cache::new(HELD_EXTENTS)),
+            sums: Arc::default(),
         }
     }
 
@@ -86,6 +116,12 @@ impl Objects {
     }
 
     async fn content(&self, address: &str) -> Result<Bytes, DataFusionError> {
+        let path = self.path(address)?;
+        Ok(self.store.get(&path).await?.bytes().await?)
+    }
+
+    /// Where an address leads in the store.
+    fn path(&self, address: &str) -> Result<Path, DataFusionError> {
         let elsewhere = || {
             let root = &self.root;
             DataFusionError::Execution(format!("{address} is not in the store at {root}"))
@@ -94,8 +130,42 @@ impl Objects {
         if url[..Position::BeforePath] != self.root[..Position::BeforePath] {
             return Err(elsewhere());
         }
-        let path = Path::from_url_path(url.path()).map_err(|_no_path| elsewhere())?;
-        Ok(self.store.get(&path).await?.bytes().await?)
+        Path::from_url_path(url.path()).map_err(|_no_path| elsewhere())
+    }
+
+    /// An object whose rows are read, by its address.
+    pub(crate) fn stored(&self, key: &ObjectKey, address: &str) -> Result<Stored, ComputeError> {
+        let path = self.path(address);
+        Ok(Stored {
+            objects: Arc::clone(&self.store),
+            path: path.map_err(ComputeError::engine("naming stored objects"))?,
+            key: key.clone(),
+        })
+    }
+
+    /// Where its rows lie, read once; none where it must be read whole.
+    pub(crate) async fn row_index(
+        &self,
+        stored: &Stored,
+    ) -> Result<Option<Arc<RowIndex>>, StorageError> {
+        let reading = async { Ok(RowIndex::read(stored).await?.map(Arc::new)) };
+        let held = &self.row_indexes;
+        held.get_or_insert_async(&stored.path, reading).await
+    }
+
+    /// What is known of an object no longer holds.
+    pub(crate) fn forget(&self, stored: &Stored) {
+        self.row_indexes.remove(&stored.path);
+    }
+
+    /// Sums that were found before.
+    pub(crate) fn remembered(&self) -> &Remembered {
+        &self.sums
+    }
+
+    /// Extents of regions by the digest of the region and of how it is measured.
+    pub(crate) fn extents(&self) -> &Cache<Digest, Extent> {
+        &self.extents
     }
 }
 

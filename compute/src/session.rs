@@ -200,6 +200,11 @@ impl Engine {
         &self.inner.objects
     }
 
+    /// Parts that a question is cut into.
+    pub(crate) fn partitions(&self) -> NonZeroUsize {
+        self.inner.partitions
+    }
+
     /// Does every query pass through Ballista's scheduler?
     pub fn is_distributed(&self) -> bool {
         !matches!(self.inner.kind, Kind::Local)

@@ -9,6 +9,7 @@ mod observations;
 mod pictures;
 mod services;
 mod show;
+mod statistics;
 mod surroundings;
 mod upkeep;
 
@@ -38,6 +39,7 @@ pub(crate) use services::{
     TileServer, Topics,
 };
 pub(crate) use show::settings as shown_settings;
+pub(crate) use statistics::{StatisticsOptions, Stats, StatsLine, StatsPoint, StatsPolygon};
 pub(crate) use surroundings::Surroundings;
 pub(crate) use upkeep::{Gc, Recompute, RecomputeWhat, Survey, Verify};
 
@@ -276,60 +278,6 @@ pub(crate) struct Products {
     /// More about one product.
     #[command(subcommand)]
     pub(crate) of: Option<ProductsOf>,
-    /// JSON instead of a table.
-    #[arg(long)]
-    pub(crate) json: bool,
-}
-
-/// `fluxglobe stats`.
-#[derive(Debug, Subcommand)]
-pub(crate) enum Stats {
-    /// The series of the cell at a place.
-    Point(StatsPoint),
-    /// The mean over a region at every step, each cell by its area, with the area that holds data.
-    Polygon(StatsPolygon),
-}
-
-/// `fluxglobe stats point`.
-#[derive(Debug, Args)]
-pub(crate) struct StatsPoint {
-    /// Product.
-    #[arg(long)]
-    pub(crate) product: ProductId,
-    /// Longitude, degrees east.
-    #[arg(long, allow_negative_numbers = true)]
-    pub(crate) lon: f64,
-    /// Latitude, degrees north.
-    #[arg(long, allow_negative_numbers = true)]
-    pub(crate) lat: f64,
-    /// JSON instead of a table.
-    #[arg(long)]
-    pub(crate) json: bool,
-}
-
-/// `fluxglobe stats polygon`.
-#[derive(Debug, Args)]
-pub(crate) struct StatsPolygon {
-    /// Product, of any quantity.
-    #[arg(long)]
-    pub(crate) product: ProductId,
-    /// `global`, a named region, a box WEST,SOUTH,EAST,NORTH, a GeoJSON or WKT file, the text of one,
-    /// or PRODUCT:CODE, the cells where a landed mask has a code.
-    #[arg(long, allow_hyphen_values = true)]
-    pub(crate) region: String,
-    /// First instant: 2000, 2000-03, 2000-03-15 or with a time of day. The product's first if absent.
-    #[arg(long)]
-    pub(crate) from: Option<TimeMs>,
-    /// First instant after the period. The product's end if absent.
-    #[arg(long)]
-    pub(crate) to: Option<TimeMs>,
-    /// Figure of the earth for areas: wgs84, sphere (R = 6371 km) or local-radius (as FluxEngine sums).
-    #[arg(long, default_value = "wgs84")]
-    pub(crate) earth: Earth,
-    /// Product that says how much of every cell is sea or land (`sea_area_fraction`, `land_area_fraction`), on the same grid.
-    /// Natural Earth's land, 1:50 million, if absent.
-    #[arg(long, value_name = "PRODUCT")]
-    pub(crate) ocean: Option<ProductId>,
     /// JSON instead of a table.
     #[arg(long)]
     pub(crate) json: bool,

@@ -11,10 +11,12 @@ use compute::{ComputeError, Engine, ErrorClass};
 use contract::budget::{BudgetAnswer, BudgetQuery};
 use contract::check::Check;
 use contract::encoding::Encoding;
+use contract::geometry::Geometry;
 use contract::grid::LonLatDeg;
 use contract::job::RenderJob;
 use contract::manifest::{Manifest, ManifestId};
 use contract::series::{PointSeries, RegionSeries, RegionSeriesQuery};
+use contract::statistics::{StatisticsAnswer, StatisticsQuery};
 use render_worker::Desk;
 use render_worker::desk::{DeskError, Order, Storing};
 use render_worker::fleet::{Fleet, FleetError};
@@ -124,6 +126,20 @@ impl Analyse for Analyst {
         query: &RegionSeriesQuery,
     ) -> Result<RegionSeries, BackendError> {
         let answer = compute::stats::region_series_of(&self.regions, query, manifest);
+        answer.await.map_err(compute_failed)
+    }
+
+    async fn statistics(
+        &self,
+        manifest: &Manifest,
+        query: &StatisticsQuery,
+    ) -> Result<StatisticsAnswer, BackendError> {
+        // A place is a few blocks: asking a cluster would take longer than reading them.
+        let engine = match query.geometry {
+            Geometry::Point { .. } => &self.local,
+            Geometry::Line(_) | Geometry::Region(_) => &self.regions,
+        };
+        let answer = compute::reduce::statistics_of(engine, query, manifest);
         answer.await.map_err(compute_failed)
     }
 

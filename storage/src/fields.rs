@@ -14,7 +14,7 @@ use arrow::datatypes::{
     DataType, Field, Float32Type, Schema, SchemaRef, TimeUnit, TimestampMillisecondType, UInt32Type,
 };
 use bytes::Bytes;
-use contract::chunk::field_chunks;
+use contract::chunk::{Window, field_chunks};
 use contract::digest::Digest;
 use contract::grid::Grid;
 use contract::key::ObjectKey;
@@ -25,6 +25,7 @@ use contract::time::{Period, TimeMs};
 use crate::off_thread::off_thread;
 use crate::parquet_table::{self, Table, shape_only, value_field};
 use crate::row_check::RowCheck;
+use crate::rows::Expected;
 use crate::sound::{self, damage};
 use crate::values::{ValuesDigest, no_data_alike};
 use crate::{Encoded, StorageError, Store};
@@ -54,6 +55,15 @@ pub static SCHEMA_1: LazyLock<SchemaRef> = LazyLock::new(|| {
         Field::new("values", DataType::List(value_field()), false),
     ]))
 });
+
+/// What the row of a chunk must be, for who reads some rows ([`crate::rows`]); `chunks` are all of the grid.
+pub fn expected(chunks: &[Window], chunk: u32, period: Period) -> Expected {
+    let check = RowCheck::new().u32(chunk);
+    Expected {
+        length: chunks.get(chunk as usize).map_or(0, |own| own.cell_count()),
+        check: check.i64(period.start.ms()).i64(period.end.ms()),
+    }
+}
 
 /// A field of `values` (`[row, col]`, stored unit, NaN no data) as bytes.
 pub fn encode(grid: &Grid, values: &[f32], period: Period) -> Result<Encoded, StorageError> {

@@ -15,6 +15,7 @@ pub mod manifests;
 mod off_thread;
 mod parquet_table;
 pub mod row_check;
+pub mod rows;
 pub mod series;
 pub mod sound;
 pub mod store;

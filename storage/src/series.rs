@@ -5,7 +5,7 @@ use std::sync::{Arc, LazyLock};
 use arrow::array::{Float32Builder, ListBuilder, RecordBatch, UInt32Array};
 use arrow::datatypes::{DataType, Field, Float32Type, Schema, SchemaRef, UInt32Type};
 use bytes::Bytes;
-use contract::chunk::windows;
+use contract::chunk::{Window, windows};
 use contract::digest::Digest;
 use contract::grid::Grid;
 use contract::key::ObjectKey;
@@ -15,6 +15,7 @@ use contract::product::ProductId;
 use crate::off_thread::off_thread;
 use crate::parquet_table::{self, shape_only, value_field};
 use crate::row_check::RowCheck;
+use crate::rows::Expected;
 use crate::sound::damage;
 use crate::values::{ValuesDigest, no_data_alike};
 use crate::{Encoded, StorageError, Store};
@@ -46,6 +47,15 @@ pub fn block_of(grid: &Grid, row: u32, col: u32) -> (u32, u32) {
     let width = BLOCK_CELLS.min(grid.cols - j * BLOCK_CELLS);
     let cell = (row % BLOCK_CELLS) * width + col % BLOCK_CELLS;
     (i * blocks_across + j, cell)
+}
+
+/// What the row of a block must be, for who reads some rows ([`crate::rows`]); `blocks` are all of the grid.
+pub fn expected(blocks: &[Window], block: u32, step_count: usize) -> Expected {
+    let cells = blocks.get(block as usize).map_or(0, |own| own.cell_count());
+    Expected {
+        length: cells * step_count,
+        check: RowCheck::new().u32(block),
+    }
 }
 
 /// A series of `steps`, each `[row, col]`, in the order of time, as bytes.

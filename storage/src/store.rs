@@ -214,7 +214,7 @@ fn path(key: &ObjectKey) -> Path {
     Path::from(key.as_str())
 }
 
-fn failed(key: impl std::fmt::Display, source: object_store::Error) -> StorageError {
+pub(crate) fn failed(key: impl std::fmt::Display, source: object_store::Error) -> StorageError {
     StorageError::Object {
         key: key.to_string(),
         source,

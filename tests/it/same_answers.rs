@@ -83,6 +83,22 @@ fn a_question_on_the_command_line_and_over_http_has_one_answer() {
             "flux/point?lon=181.3&lat=-4.1",
         ),
         (
+            "stats polygon --product flux --region 170,-20,-170.5,33.3 --statistic mean,sum,std,p90,min --step season --min-coverage 5",
+            "flux/area?region=170,-20,-170.5,33.3&statistic=mean,sum,std,p90,min&step=season&min_coverage=5",
+        ),
+        (
+            "stats polygon --product flux --region china-sea --cells ocean-share",
+            "flux/area?region=china-sea&cells=ocean-share",
+        ),
+        (
+            "stats line --product flux --line 170,-20;-170.5,33.3;10,80 --statistic mean,max,count --step total --earth sphere",
+            "flux/line?line=170,-20;-170.5,33.3;10,80&statistic=mean,max,count&step=total&earth=sphere",
+        ),
+        (
+            "stats point --product flux --lon 181.3 --lat -4.1 --sampling bilinear --step year",
+            "flux/point?lon=181.3&lat=-4.1&sampling=bilinear&step=year",
+        ),
+        (
             "stats point --product flux-accumulated --lon 2 --lat 40",
             "flux-accumulated/point?lon=2&lat=40",
         ),

@@ -9,6 +9,8 @@ use contract::check::Check;
 use contract::digest::Digest;
 use contract::grid::LonLatDeg;
 use contract::series::{PointSeries, RegionSeries, RegionSeriesQuery};
+use contract::statistics::{StatisticsAnswer, StatisticsQuery};
+use quick_cache::Weighter;
 use quick_cache::sync::Cache;
 
 use crate::backend::{Analyse, BackendError};
@@ -23,6 +25,18 @@ const BUDGETS: usize = 1000;
 /// Series over regions remembered; one of 16 years of days takes 320 KiB.
 const AREAS: usize = 100;
 
+/// Statistics remembered, a guess that sizes tables.
+const STATISTICS: usize = 1000;
+/// Numbers in all of them, some 64 bytes each.
+const STATISTICS_NUMBERS: u64 = 1 << 20;
+
+/// Numbers of an answer.
+fn numbers(answer: &StatisticsAnswer) -> u64 {
+    // Instants and coverage of a row are some numbers too.
+    let a_row = answer.statistics.len() as u64 + 4;
+    answer.rows.len() as u64 * a_row + 1
+}
+
 /// The analyses of one server.
 pub struct Analyses {
     analyst: Arc<dyn Analyse>,
@@ -30,18 +44,35 @@ pub struct Analyses {
     metrics: Metrics,
     budgets: Answers<BudgetAnswer>,
     areas: Answers<RegionSeries>,
+    statistics: Answers<StatisticsAnswer>,
 }
 
 /// Answers of one kind, by the digest of what was asked: those remembered and those under way.
 struct Answers<T: Send + Sync + 'static> {
-    remembered: Cache<Digest, Arc<T>>,
+    remembered: Cache<Digest, Arc<T>, Weight<T>>,
     under_way: SingleFlight<Arc<T>>,
 }
 
+/// What an answer weighs.
+struct Weight<T>(fn(&T) -> u64);
+
+impl<T> Clone for Weight<T> {
+    fn clone(&self) -> Self {
+        Self(self.0)
+    }
+}
+
+impl<T> Weighter<Digest, Arc<T>> for Weight<T> {
+    fn weight(&self, _key: &Digest, answer: &Arc<T>) -> u64 {
+        (self.0)(answer)
+    }
+}
+
 impl<T: Send + Sync + 'static> Answers<T> {
-    fn new(most: usize) -> Self {
+    /// Remembers as many as together have at most this weight; `typical_count` sizes tables.
+    fn new(typical_count: usize, most: u64, weight: fn(&T) -> u64) -> Self {
         Self {
-            remembered: Cache::new(most),
+            remembered: Cache::with_weighter(typical_count, most, Weight(weight)),
             under_way: SingleFlight::default(),
         }
     }
@@ -78,8 +109,9 @@ impl Analyses {
             analyst,
             gate,
             metrics,
-            budgets: Answers::new(BUDGETS),
-            areas: Answers::new(AREAS),
+            budgets: Answers::new(BUDGETS, BUDGETS as u64, |_one| 1),
+            areas: Answers::new(AREAS, AREAS as u64, |_one| 1),
+            statistics: Answers::new(STATISTICS, STATISTICS_NUMBERS, numbers),
         }
     }
 
@@ -134,6 +166,28 @@ impl Analyses {
         let (analyst, manifest) = (Arc::clone(&self.analyst), Arc::clone(&layer.manifest));
         let computed = async move { analyst.area(&manifest, &query).await };
         self.areas
+            .answer(key, &self.gate, &self.metrics, computed)
+            .await
+    }
+
+    /// Statistics of `layer` over a geometry.
+    pub async fn statistics(
+        &self,
+        layer: &Layer,
+        query: StatisticsQuery,
+    ) -> Result<Arc<StatisticsAnswer>, ServerError> {
+        let key = Digest::of_json(&(
+            "statistics",
+            &layer.id,
+            (&query.geometry, &query.geometry_name),
+            (&query.statistics, query.step, query.min_coverage),
+            (query.from, query.to),
+            (query.earth, query.cells),
+            query.ocean.as_ref().map(|ocean| ocean.id()),
+        ));
+        let (analyst, manifest) = (Arc::clone(&self.analyst), Arc::clone(&layer.manifest));
+        let computed = async move { analyst.statistics(&manifest, &query).await };
+        self.statistics
             .answer(key, &self.gate, &self.metrics, computed)
             .await
     }

@@ -17,6 +17,7 @@ use contract::job::RenderJob;
 use contract::manifest::{Manifest, ManifestId};
 use contract::observation::{Filter, Page, Platform, TrackPoint, TrackQuery};
 use contract::series::{PointSeries, RegionSeries, RegionSeriesQuery};
+use contract::statistics::{StatisticsAnswer, StatisticsQuery};
 use tokio::sync::OwnedSemaphorePermit;
 
 /// Leave to draw one picture; the next one waiting gets it when this is dropped.
@@ -91,6 +92,13 @@ pub trait Analyse: Send + Sync + 'static {
         manifest: &Manifest,
         query: &RegionSeriesQuery,
     ) -> Result<RegionSeries, BackendError>;
+
+    /// Statistics of a version of a product over a geometry, by bins of time.
+    async fn statistics(
+        &self,
+        manifest: &Manifest,
+        query: &StatisticsQuery,
+    ) -> Result<StatisticsAnswer, BackendError>;
 
     /// Our budgets beside published ones; none where this deployment has nothing to compare with.
     async fn check(&self) -> Result<Option<Check>, BackendError>;

@@ -14,8 +14,8 @@ use utoipa::{Modify, OpenApi};
 
 use crate::error::Refusal;
 use crate::routes::{
-    area, budget, check, events, globe, health, legend, metrics, observations, openapi, palettes,
-    platforms, point, products, regions, stream, tilejson, tiles, zarr,
+    area, budget, check, events, globe, health, legend, line, metrics, observations, openapi,
+    palettes, platforms, point, products, regions, stream, tilejson, tiles, zarr,
 };
 
 /// What an operation that takes long or needs others answers when it cannot.
@@ -44,6 +44,7 @@ const RETRY_AFTER: &str = "Seconds after which the same request may succeed";
         events::get,
         openapi::get,
         point::get,
+        line::get,
         area::get,
         budget::get,
         check::get,
@@ -58,8 +59,10 @@ const RETRY_AFTER: &str = "Seconds after which the same request may succeed";
         Refusal,
         contract::budget::BudgetStep,
         contract::earth::Earth,
+        contract::geometry::Sampling,
         contract::observation::PlatformKind,
         contract::region::Cells,
+        contract::statistics::StatisticsStep,
         words::Background,
         words::BaseMap,
         words::LegendForm,

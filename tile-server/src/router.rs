@@ -19,8 +19,8 @@ use crate::error::ServerError;
 use crate::middleware::{body, panics::CountPanics, security, track};
 use crate::routes::picture::{COVERED, SHOWN_TIME};
 use crate::routes::{
-    area, budget, check, events, globe, health, legend, metrics, observations, openapi, palettes,
-    platforms, point, products, regions, stream, tilejson, tiles, viewer, zarr,
+    area, budget, check, events, globe, health, legend, line, metrics, observations, openapi,
+    palettes, platforms, point, products, regions, stream, tilejson, tiles, viewer, zarr,
 };
 use crate::state::AppState;
 
@@ -62,6 +62,7 @@ pub fn router(state: AppState) -> Router {
         .route("/stream", get(stream::get))
         .route("/api/products", get(products::list))
         .route("/api/products/{product}/point", get(point::get))
+        .route("/api/products/{product}/line", get(line::get))
         .route("/api/products/{product}/area", get(area::get))
         .route("/api/products/{product}/budget", get(budget::get))
         .route("/api/products/{product}/{legend_file}", get(legend::get))

@@ -8,8 +8,8 @@ use contract::time::TimeMs;
 use storage::{Store, contributed};
 
 use super::over_region::{AskedArea, weights};
-use crate::region::address::weights_failed;
-use crate::region::loaded::RegionWeights;
+
+use crate::region::loaded::{RegionWeights, weights_failed};
 use crate::{ComputeError, Engine};
 
 /// The budget of the flux as that of a version of the carbon that was accumulated from it.

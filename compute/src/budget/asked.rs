@@ -15,7 +15,8 @@ use serde::{Deserialize, Serialize};
 
 use super::bands::{BAND_COUNT, band_areas, summed_bands};
 use super::rows::StepSum;
-use crate::region::address::{RegionAddress, weights_failed};
+use crate::region::address::RegionAddress;
+use crate::region::loaded::weights_failed;
 use crate::scan::{self, Layout};
 use crate::session::QueryContext;
 use crate::{ComputeError, Engine};

@@ -1,6 +1,7 @@
 //! Sums over a region and what they are set against: its area, its sea, and who says what is sea.
 
 use contract::budget::BudgetQuery;
+use contract::digest::Digest;
 use contract::earth::Earth;
 use contract::manifest::{Manifest, Step};
 use contract::region::Region;
@@ -74,6 +75,44 @@ pub(crate) async fn weights(
     })
 }
 
+/// The extent of an area; without its sea where a product says what is sea.
+pub(crate) async fn extent_of(
+    engine: &Engine,
+    asked: AskedArea<'_>,
+) -> Result<Extent, ComputeError> {
+    let has_shares = asked.ocean.is_some();
+    let (region, earth) = (asked.region.clone(), asked.earth);
+    let name = Digest::of_json(&(&region, earth, has_shares));
+    // Overlaid with all land, which takes a while.
+    let measured = async move {
+        let measure = move || {
+            if has_shares {
+                outline(&region, earth)
+            } else {
+                extent(&region, earth)
+            }
+        };
+        let found = tokio::task::spawn_blocking(measure).await;
+        found.map_err(|e| ComputeError::inconsistent("region", e))?
+    };
+    let known = engine.objects().extents();
+    known.get_or_insert_async(&name, measured).await
+}
+
+/// The extent with the sea that a product says lies on its grid.
+pub(crate) fn with_shares(mut extent: Extent, on_grid_m2: f64, sea_m2: f64) -> Extent {
+    let area_m2 = extent.area_m2;
+    if on_grid_m2 < area_m2 * (1.0 - OUTSIDE_SHARE) {
+        extent.notes.push(format!(
+            "of the region's {:.6} million km² {:.6} lie on the grid, and nobody says how much of the rest is sea: it is \
+             left out of the sea asked for",
+            area_m2 / M2_PER_MILLION_KM2,
+            on_grid_m2 / M2_PER_MILLION_KM2
+        ));
+    }
+    extent.with_ocean(sea_m2)
+}
+
 /// The sums of some steps of a product over an area.
 pub(crate) async fn over_region(
     engine: &Engine,
@@ -82,34 +121,13 @@ pub(crate) async fn over_region(
     asked: AskedArea<'_>,
     measure: Measure,
 ) -> Result<OverRegion, ComputeError> {
-    let has_shares = asked.ocean.is_some();
-    let (region, earth) = (asked.region.clone(), asked.earth);
-    // Overlaid with all land, which takes a while.
-    let measured = move || {
-        if has_shares {
-            outline(&region, earth)
-        } else {
-            extent(&region, earth)
-        }
-    };
-    let found = tokio::task::spawn_blocking(measured)
-        .await
-        .map_err(|e| ComputeError::inconsistent("region", e))?;
-    let mut extent = found?;
+    let mut extent = extent_of(engine, asked).await?;
     let weights = weights(engine, manifest, asked).await?;
     let sums = sums::of_steps(engine, manifest, steps, &weights, measure).await?;
-    if has_shares {
-        let area_m2 = extent.area_m2;
-        if sums.on_grid_m2 < area_m2 * (1.0 - OUTSIDE_SHARE) {
-            extent.notes.push(format!(
-                "of the region's {:.6} million km² {:.6} lie on the grid, and nobody says how much of the rest is sea: it is \
-                 left out of the sea asked for",
-                area_m2 / M2_PER_MILLION_KM2,
-                sums.on_grid_m2 / M2_PER_MILLION_KM2
-            ));
-        }
+    if asked.ocean.is_some() {
         let sea_steps: i128 = sums.sea_steps.iter().sum();
-        extent = extent.with_ocean(sea_steps as f64 / 10f64.powi(AREA_DECIMALS as i32));
+        let sea_m2 = sea_steps as f64 / 10f64.powi(AREA_DECIMALS as i32);
+        extent = with_shares(extent, sums.on_grid_m2, sea_m2);
     }
     Ok(OverRegion {
         sums,

@@ -3,11 +3,13 @@
 //! An engine that answers strangers stores nothing for them, however many regions they think of. Regions that have a name
 //! are few: their weights are stored for everybody.
 
+use contract::geometry::Geometry;
 use contract::key::ObjectKey;
 use contract::region::{NAMED_REGIONS, NamedRegion};
 use storage::{StorageError, Store};
 
 use super::computed::ComputedWeights;
+use super::loaded::weights_failed;
 use super::weights::{EARTH, OnGrid, RegionKeys, Surface};
 use crate::{ComputeError, Engine};
 
@@ -78,7 +80,7 @@ async fn found_or_asked(
     }
     let question = ComputedWeights {
         grid: *asked.grid,
-        region: asked.region.clone(),
+        geometry: Geometry::Region(asked.region.clone()),
         earth: asked.earth,
         surface: surface.clone(),
         shares_at: surface
@@ -87,19 +89,4 @@ async fn found_or_asked(
     };
     question.check_size()?;
     Ok(question.text())
-}
-
-/// Why weights could not be had, in the words of whoever found out.
-pub(crate) fn weights_failed(error: datafusion::error::DataFusionError) -> ComputeError {
-    use datafusion::error::DataFusionError::External;
-    match error {
-        External(source) => match source.downcast::<ComputeError>() {
-            Ok(own) => *own,
-            Err(other) => match other.downcast::<StorageError>() {
-                Ok(own) => (*own).into(),
-                Err(other) => ComputeError::engine("reading a region's weights")(External(other)),
-            },
-        },
-        other => ComputeError::engine("reading a region's weights")(other),
-    }
 }

@@ -1,13 +1,16 @@
-//! Weights as a question of their own: a region on a grid as text in a query, computed by whoever reads it and stored by
+//! Weights as a question of their own: a geometry on a grid as text in a query, computed by whoever reads it and stored by
 //! nobody.
 
 use contract::digest::Digest;
 use contract::earth::Earth;
-use contract::grid::Grid;
+use contract::geometry::{Geometry, Line, Sampling};
+use contract::grid::{Grid, LonLatDeg};
 use contract::region::{Polygon, Region};
 use serde::{Deserialize, Serialize};
 
 use super::cut::bounds_deg;
+use super::line_cover::lengths_m;
+use super::place_cover;
 use super::weights::{Surface, compute_of};
 use crate::ComputeError;
 
@@ -20,7 +23,7 @@ const MAX_CELLS: u64 = 8 << 20;
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ComputedWeights {
     pub(crate) grid: Grid,
-    pub(crate) region: Region,
+    pub(crate) geometry: Geometry,
     pub(crate) earth: Earth,
     pub(crate) surface: Surface,
     /// Address of the field that the surface takes its shares from.
@@ -43,8 +46,9 @@ impl ComputedWeights {
             return Ok(None);
         };
         serde_json::from_str::<Written>(json)
-            .map(|written| Some(written.read()))
-            .map_err(|e| ComputeError::inconsistent("weights to compute", e))
+            .map_err(|e| ComputeError::inconsistent("weights to compute", e))?
+            .read()
+            .map(Some)
     }
 
     /// What the answer is remembered by.
@@ -55,7 +59,10 @@ impl ComputedWeights {
     /// # Errors
     /// `Region` if its weights could take more memory than a question that stores nothing may.
     pub(crate) fn check_size(&self) -> Result<(), ComputeError> {
-        let cells = cells_in_bounds(&self.grid, &self.region);
+        let Geometry::Region(region) = &self.geometry else {
+            return Ok(());
+        };
+        let cells = cells_in_bounds(&self.grid, region);
         if cells <= MAX_CELLS {
             return Ok(());
         }
@@ -66,13 +73,21 @@ impl ComputedWeights {
         Err(ComputeError::Region { reason })
     }
 
-    /// Areas of the region's share of every cell, m², by chunk; `shares` is `[row, col]`, where the surface needs them.
+    /// Areas of a region's share of every cell, m², lengths of a line's, m, or shares of a place, by chunk; `shares` is `[row, col]`, where the surface needs them.
     pub(crate) fn chunks(
         &self,
         shares: Option<&[f32]>,
     ) -> Result<Vec<(u32, Vec<f64>)>, ComputeError> {
         self.check_size()?;
-        compute_of(&self.grid, &self.region, self.earth, &self.surface, shares)
+        match &self.geometry {
+            Geometry::Region(region) => {
+                compute_of(&self.grid, region, self.earth, &self.surface, shares)
+            }
+            Geometry::Line(line) => lengths_m(&self.grid, line, self.earth),
+            Geometry::Point { place, sampling } => {
+                Ok(place_cover::shares(&self.grid, *place, *sampling))
+            }
+        }
     }
 }
 
@@ -83,7 +98,7 @@ impl ComputedWeights {
 struct Written {
     cells: [u32; 2],
     north_west_dlat_dlon: [u64; 4],
-    region: WrittenRegion,
+    geometry: WrittenGeometry,
     earth: Earth,
     surface: Surface,
     shares_at: Option<String>,
@@ -91,11 +106,17 @@ struct Written {
 
 #[derive(Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-enum WrittenRegion {
+enum WrittenGeometry {
     Global,
     Box([u64; 4]),
     /// Each an outer ring and its holes.
     Polygons(Vec<Vec<Vec<[u64; 2]>>>),
+    /// Vertices of each part.
+    Line(Vec<Vec<[u64; 2]>>),
+    Point {
+        at: [u64; 2],
+        is_bilinear: bool,
+    },
 }
 
 impl Written {
@@ -114,17 +135,25 @@ impl Written {
                 grid.dlat_deg,
                 grid.dlon_deg,
             ]),
-            region: match &weights.region {
-                Region::Global => WrittenRegion::Global,
-                Region::Box {
+            geometry: match &weights.geometry {
+                Geometry::Region(Region::Global) => WrittenGeometry::Global,
+                Geometry::Region(Region::Box {
                     west,
                     south,
                     east,
                     north,
-                } => WrittenRegion::Box(bits([*west, *south, *east, *north])),
-                Region::Polygons(polygons) => {
-                    WrittenRegion::Polygons(polygons.iter().map(rings).collect())
+                }) => WrittenGeometry::Box(bits([*west, *south, *east, *north])),
+                Geometry::Region(Region::Polygons(polygons)) => {
+                    WrittenGeometry::Polygons(polygons.iter().map(rings).collect())
                 }
+                Geometry::Line(line) => {
+                    let part = |part: &Vec<LonLatDeg>| part.iter().map(place_bits).collect();
+                    WrittenGeometry::Line(line.parts().iter().map(part).collect())
+                }
+                Geometry::Point { place, sampling } => WrittenGeometry::Point {
+                    at: place_bits(place),
+                    is_bilinear: *sampling == Sampling::Bilinear,
+                },
             },
             earth: weights.earth,
             surface: weights.surface.clone(),
@@ -132,7 +161,7 @@ impl Written {
         }
     }
 
-    fn read(self) -> ComputedWeights {
+    fn read(self) -> Result<ComputedWeights, ComputeError> {
         let [rows, cols] = self.cells;
         let [north_deg, west_deg, dlat_deg, dlon_deg] =
             self.north_west_dlat_dlon.map(f64::from_bits);
@@ -144,7 +173,7 @@ impl Written {
                 holes: rings.collect(),
             }
         };
-        ComputedWeights {
+        Ok(ComputedWeights {
             grid: Grid {
                 rows,
                 cols,
@@ -153,26 +182,46 @@ impl Written {
                 dlat_deg,
                 dlon_deg,
             },
-            region: match self.region {
-                WrittenRegion::Global => Region::Global,
-                WrittenRegion::Box(edges) => {
+            geometry: match self.geometry {
+                WrittenGeometry::Global => Geometry::Region(Region::Global),
+                WrittenGeometry::Box(edges) => {
                     let [west, south, east, north] = edges.map(f64::from_bits);
-                    Region::Box {
+                    Geometry::Region(Region::Box {
                         west,
                         south,
                         east,
                         north,
-                    }
+                    })
                 }
-                WrittenRegion::Polygons(polygons) => {
-                    Region::Polygons(polygons.into_iter().map(polygon).collect())
+                WrittenGeometry::Polygons(polygons) => {
+                    let polygons = polygons.into_iter().map(polygon).collect();
+                    Geometry::Region(Region::Polygons(polygons))
+                }
+                WrittenGeometry::Line(parts) => {
+                    let parts: Vec<Vec<[f64; 2]>> = parts.into_iter().map(ring).collect();
+                    Geometry::Line(Line::new(&parts)?)
+                }
+                WrittenGeometry::Point { at, is_bilinear } => {
+                    let [lon, lat] = at.map(f64::from_bits);
+                    Geometry::Point {
+                        place: LonLatDeg::new(lon, lat)?,
+                        sampling: if is_bilinear {
+                            Sampling::Bilinear
+                        } else {
+                            Sampling::Cell
+                        },
+                    }
                 }
             },
             earth: self.earth,
             surface: self.surface,
             shares_at: self.shares_at,
-        }
+        })
     }
+}
+
+fn place_bits(place: &LonLatDeg) -> [u64; 2] {
+    [place.lon, place.lat].map(f64::to_bits)
 }
 
 /// How many cells of a grid a region can touch at most.
@@ -211,7 +260,7 @@ mod tests {
                 dlat_deg: 1.0 / f64::from(cells_a_degree),
                 dlon_deg: 1.0 / f64::from(cells_a_degree),
             },
-            region: region.parse().unwrap(),
+            geometry: Geometry::Region(region.parse().unwrap()),
             earth: Earth::Wgs84,
             surface: Surface::All,
             shares_at: None,
@@ -223,6 +272,23 @@ mod tests {
         let holed = "POLYGON((0.1 0,10 0.3,10 10,0.1 0),(5 1,6 1,6 2,5 1))";
         for region in ["global", "-0.1,0.2,170.3,0.30000000000000004", holed] {
             let question = asked(7, region);
+            let text = question.text();
+            assert_eq!(ComputedWeights::of_text(&text).unwrap(), Some(question));
+        }
+        let line = Geometry::Line(
+            "0.1,0.2;170.3,-80;-170,0.30000000000000004"
+                .parse()
+                .unwrap(),
+        );
+        let point = Geometry::Point {
+            place: LonLatDeg::new(0.1, 0.2).unwrap(),
+            sampling: Sampling::Bilinear,
+        };
+        for geometry in [line, point] {
+            let question = ComputedWeights {
+                geometry,
+                ..asked(7, "global")
+            };
             let text = question.text();
             assert_eq!(ComputedWeights::of_text(&text).unwrap(), Some(question));
         }

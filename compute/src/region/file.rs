@@ -23,21 +23,8 @@ pub fn is_file_name(word: &str) -> bool {
 
 /// Reads a region file.
 pub fn read(path: &Path) -> Result<Region, ComputeError> {
-    let failed = |reason: String| ComputeError::RegionFile {
-        file: path.display().to_string(),
-        reason,
-    };
-    let meta = std::fs::metadata(path).map_err(|e| failed(e.to_string()))?;
-    if !meta.is_file() {
-        return Err(failed("it is no file".to_owned()));
-    }
-    if meta.len() > MAX_TEXT_BYTES as u64 {
-        return Err(failed(format!(
-            "{} bytes, at most {MAX_TEXT_BYTES} are taken; simplify it",
-            meta.len()
-        )));
-    }
-    let text = std::fs::read_to_string(path).map_err(|e| failed(e.to_string()))?;
+    let text = text(path)?;
+    let failed = |reason: String| failed(path, reason);
     let region = text.parse().map_err(|e| {
         let contract::ContractError::Invalid { reason, .. } = e;
         failed(reason)
@@ -48,6 +35,29 @@ pub fn read(path: &Path) -> Result<Region, ComputeError> {
         Err(ComputeError::Region { reason }) => Err(failed(reason)),
         Err(other) => Err(other),
     }
+}
+
+fn failed(path: &Path, reason: String) -> ComputeError {
+    ComputeError::RegionFile {
+        file: path.display().to_string(),
+        reason,
+    }
+}
+
+/// The text of a file with a region or a line.
+pub fn text(path: &Path) -> Result<String, ComputeError> {
+    let failed = |reason: String| failed(path, reason);
+    let meta = std::fs::metadata(path).map_err(|e| failed(e.to_string()))?;
+    if !meta.is_file() {
+        return Err(failed("it is no file".to_owned()));
+    }
+    if meta.len() > MAX_TEXT_BYTES as u64 {
+        return Err(failed(format!(
+            "{} bytes, at most {MAX_TEXT_BYTES} are taken; simplify it",
+            meta.len()
+        )));
+    }
+    std::fs::read_to_string(path).map_err(|e| failed(e.to_string()))
 }
 
 #[cfg(test)]

@@ -6,6 +6,9 @@ use std::sync::Arc;
 use datafusion::error::DataFusionError;
 use quick_cache::Weighter;
 use quick_cache::sync::Cache;
+use storage::StorageError;
+
+use crate::ComputeError;
 
 /// Weights held, bytes: those of the whole 1/60-degree China Sea take 35 MB. Larger ones are read anew by each task.
 const HELD_BYTES: u64 = 256 << 20;
@@ -107,6 +110,21 @@ impl LoadedWeights {
     ) -> Result<Arc<RegionWeights>, DataFusionError> {
         let reading = async { Ok(Arc::new(read.await?)) };
         self.held.get_or_insert_async(address, reading).await
+    }
+}
+
+/// Why weights could not be had, in the words of whoever found out.
+pub(crate) fn weights_failed(error: datafusion::error::DataFusionError) -> ComputeError {
+    use datafusion::error::DataFusionError::External;
+    match error {
+        External(source) => match source.downcast::<ComputeError>() {
+            Ok(own) => *own,
+            Err(other) => match other.downcast::<StorageError>() {
+                Ok(own) => (*own).into(),
+                Err(other) => ComputeError::engine("reading a region's weights")(External(other)),
+            },
+        },
+        other => ComputeError::engine("reading a region's weights")(other),
     }
 }
 

@@ -33,6 +33,8 @@ mod recomputed;
 #[cfg(test)]
 mod regions;
 #[cfg(test)]
+mod statistics;
+#[cfg(test)]
 mod strangers;
 #[cfg(test)]
 mod takahashi;

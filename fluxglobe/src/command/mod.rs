@@ -16,6 +16,7 @@ mod recompute;
 mod rejected;
 pub(crate) mod render;
 pub(crate) mod serve;
+mod statistics;
 mod stats;
 mod survey;
 mod topics;
@@ -39,6 +40,7 @@ pub(crate) async fn run(settings: &Settings, command: Command) -> Result<ExitCod
         },
         Command::Export(options) => export::run(settings, &options).await?,
         Command::Stats(Stats::Point(options)) => stats::point(settings, &options).await?,
+        Command::Stats(Stats::Line(options)) => statistics::line(settings, &options).await?,
         Command::Stats(Stats::Polygon(options)) => stats::polygon(settings, &options).await?,
         Command::Budget(options) => budget::run(settings, &options).await?,
         Command::Derive(options) => derive::run(settings, options).await?,

@@ -13,6 +13,7 @@ use crate::cli::{Settings, StatsPoint, StatsPolygon};
 use crate::{deployment, progress};
 
 use super::budget::{ocean, stored_region};
+use super::statistics;
 
 /// Width of the longest bar, characters.
 const BAR_CHARS: f64 = 30.0;
@@ -20,6 +21,9 @@ const BAR_CHARS: f64 = 30.0;
 const M2_PER_MILLION_KM2: f64 = 1e12;
 
 pub(crate) async fn point(settings: &Settings, options: &StatsPoint) -> Result<()> {
+    if options.are_statistics_asked() {
+        return statistics::point(settings, options).await;
+    }
     let place = LonLatDeg::new(options.lon, options.lat)?;
     let store = deployment::store(settings)?;
     deployment::manifest(&store, &options.product, &settings.data).await?;
@@ -42,6 +46,9 @@ pub(crate) async fn point(settings: &Settings, options: &StatsPoint) -> Result<(
 }
 
 pub(crate) async fn polygon(settings: &Settings, options: &StatsPolygon) -> Result<()> {
+    if options.are_statistics_asked() {
+        return statistics::polygon(settings, options).await;
+    }
     let store = deployment::store(settings)?;
     let query = RegionSeriesQuery {
         from: options.from,

@@ -1,17 +1,21 @@
-//! `/api/products/{product}/area`: the mean of a product over a region, step by step, with what it is a mean of.
+//! `/api/products/{product}/area`: the mean of a product over a region, step by step, with what it is a mean of; or other
+//! statistics of it.
 
 use axum::Json;
 use axum::extract::State;
 use axum::http::header;
 use axum::response::{IntoResponse as _, Response};
 use contract::earth::Earth;
+use contract::region::{AskedRegion, Cells};
 use contract::series::{RegionSeries, RegionSeriesQuery};
+use contract::statistics::{StatisticsQuery, StatisticsStep};
 use serde::Deserialize;
 use utoipa::IntoParams;
 
 use crate::error::ServerError;
 use crate::extract::{UrlPath, UrlQuery, parsed, time};
 use crate::routes::budget::ocean;
+use crate::routes::statistics::{Asked, SeriesOrStatistics, answer};
 use crate::state::AppState;
 
 #[derive(Debug, Deserialize, IntoParams)]
@@ -30,6 +34,18 @@ pub(crate) struct AreaParameters {
     earth: Option<String>,
     /// Landed product whose cells say how much of them is sea or land, in place of Natural Earth.
     ocean: Option<String>,
+    /// Statistics, separated by commas: `mean`, `sum`, `min`, `max`, `std`, `median`, `count`, `coverage`, and percentiles such
+    /// as `p90`. With this, `step` or `min_coverage` the answer is a `StatisticsAnswer`.
+    statistic: Option<String>,
+    /// What a row of statistics covers; `native` unless told otherwise.
+    #[param(value_type = Option<StatisticsStep>)]
+    step: Option<String>,
+    /// Least coverage, percent: rows of statistics with less have no values; 0 unless told otherwise.
+    #[param(value_type = Option<f64>, minimum = 0, maximum = 100)]
+    min_coverage: Option<String>,
+    /// How cells on the coast count in statistics; `whole` unless told otherwise.
+    #[param(value_type = Option<Cells>)]
+    cells: Option<String>,
     /// Version, as answers name it; the newest unless one is given.
     manifest: Option<String>,
 }
@@ -41,7 +57,11 @@ pub(crate) struct AreaParameters {
     operation_id = "area",
     tag = "statistics",
     params(("product" = String, Path, description = "Name of the product"), AreaParameters),
-    responses((status = 200, description = "One mean for each step", body = RegionSeries)),
+    responses((
+        status = 200,
+        description = "One mean for each step; statistics where they are asked for",
+        body = inline(SeriesOrStatistics<RegionSeries>),
+    )),
 )]
 pub(crate) async fn get(
     State(state): State<AppState>,
@@ -56,12 +76,35 @@ pub(crate) async fn get(
             wanted: "global, a name that /api/regions lists, west,south,east,north in degrees, GeoJSON or WKT text",
         });
     };
+    let statistics = Asked {
+        statistic: asked.statistic.as_deref(),
+        step: asked.step.as_deref(),
+        min_coverage: asked.min_coverage.as_deref(),
+        from: asked.from.as_deref(),
+        to: asked.to.as_deref(),
+    };
+    let earth = parsed(asked.earth.as_deref())?.unwrap_or_default();
+    let ocean = ocean(&state, asked.ocean.as_deref()).await?;
+    let (product, region) = (
+        layer.manifest.product.clone(),
+        region.parse::<AskedRegion>()?,
+    );
+    let cells = parsed(asked.cells.as_deref())?;
+    if statistics.are_statistics() || cells.is_some() {
+        let usual = StatisticsQuery {
+            earth,
+            ocean,
+            cells: cells.unwrap_or_default(),
+            ..StatisticsQuery::new(product, region.into())
+        };
+        return answer(&state, &layer, statistics.query(usual)?).await;
+    }
     let query = RegionSeriesQuery {
         from: time(asked.from.as_deref())?,
         to: time(asked.to.as_deref())?,
-        earth: parsed(asked.earth.as_deref())?.unwrap_or_default(),
-        ocean: ocean(&state, asked.ocean.as_deref()).await?,
-        ..RegionSeriesQuery::new(layer.manifest.product.clone(), region.parse()?)
+        earth,
+        ocean,
+        ..RegionSeriesQuery::new(product, region)
     };
     // What cannot be asked waits for no turn.
     layer.manifest.steps_inside(query.from, query.to)?;

@@ -1,16 +1,20 @@
-//! `/api/products/{product}/point`: the series of the cell at a place, in the unit people read.
+//! `/api/products/{product}/point`: the series of the cell at a place, in the unit people read; or
+//! statistics of it by bins of time.
 
 use axum::Json;
 use axum::extract::State;
 use axum::http::header;
 use axum::response::{IntoResponse as _, Response};
+use contract::geometry::{AskedGeometry, Sampling};
 use contract::grid::LonLatDeg;
 use contract::series::PointSeries;
+use contract::statistics::{StatisticsQuery, StatisticsStep};
 use serde::Deserialize;
 use utoipa::IntoParams;
 
 use crate::error::ServerError;
-use crate::extract::{UrlPath, UrlQuery, number};
+use crate::extract::{UrlPath, UrlQuery, number, parsed};
+use crate::routes::statistics::{Asked, SeriesOrStatistics, answer};
 use crate::state::AppState;
 
 #[derive(Debug, Deserialize, IntoParams)]
@@ -23,6 +27,22 @@ pub(crate) struct PointParameters {
     /// Latitude, degrees north.
     #[param(value_type = f64, minimum = -90, maximum = 90)]
     lat: Option<String>,
+    /// Statistics, separated by commas: `mean`, `sum`, `min`, `max`, `std`, `median`, `count`, `coverage`, and percentiles such
+    /// as `p90`. With this, `step`, `min_coverage`, `from`, `to` or `sampling` the answer is a `StatisticsAnswer`.
+    statistic: Option<String>,
+    /// What a row of statistics covers; `native` unless told otherwise.
+    #[param(value_type = Option<StatisticsStep>)]
+    step: Option<String>,
+    /// Least coverage, percent: rows of statistics with less have no values; 0 unless told otherwise.
+    #[param(value_type = Option<f64>, minimum = 0, maximum = 100)]
+    min_coverage: Option<String>,
+    /// First instant of statistics, ISO 8601 UTC; the product's own unless one is given.
+    from: Option<String>,
+    /// First instant after the period; the product's own unless one is given.
+    to: Option<String>,
+    /// What the value at the place is: that of its cell, or bilinear of the four around it; `cell` unless told otherwise.
+    #[param(value_type = Option<Sampling>)]
+    sampling: Option<String>,
     /// Version, as answers name it; the newest unless one is given.
     manifest: Option<String>,
 }
@@ -34,7 +54,11 @@ pub(crate) struct PointParameters {
     operation_id = "point",
     tag = "statistics",
     params(("product" = String, Path, description = "Name of the product"), PointParameters),
-    responses((status = 200, description = "One value for each step", body = PointSeries)),
+    responses((
+        status = 200,
+        description = "One value for each step; statistics where they are asked for",
+        body = inline(SeriesOrStatistics<PointSeries>),
+    )),
 )]
 pub(crate) async fn get(
     State(state): State<AppState>,
@@ -52,6 +76,20 @@ pub(crate) async fn get(
     let place = LonLatDeg::new(lon, lat)?;
     // What cannot be asked waits for no turn.
     layer.manifest.cell_inside(place)?;
+    let statistics = Asked {
+        statistic: asked.statistic.as_deref(),
+        step: asked.step.as_deref(),
+        min_coverage: asked.min_coverage.as_deref(),
+        from: asked.from.as_deref(),
+        to: asked.to.as_deref(),
+    };
+    let sampling: Option<Sampling> = parsed(asked.sampling.as_deref())?;
+    let is_cut = asked.from.is_some() || asked.to.is_some();
+    if statistics.are_statistics() || is_cut || sampling.is_some() {
+        let point = AskedGeometry::point(place, sampling.unwrap_or_default());
+        let usual = StatisticsQuery::new(layer.manifest.product.clone(), point);
+        return answer(&state, &layer, statistics.query(usual)?).await;
+    }
     let series = state.analyses.point(&layer, place).await?;
     Ok(([(header::CACHE_CONTROL, "no-cache")], Json(series)).into_response())
 }

@@ -1,5 +1,6 @@
 //! Doubles for the ports: they record what they are asked, and answer what a test tells them to.
 
+use std::collections::BTreeMap;
 use std::num::NonZeroU32;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -17,6 +18,9 @@ use contract::observation::{Filter, Observation, Page, Platform, TrackPoint, Tra
 use contract::quantity::Quantity;
 use contract::series::{
     Cell, CellCounts, PointSeries, PointValue, RegionSeries, RegionSeriesQuery, RegionValue,
+};
+use contract::statistics::{
+    Statistic, StatisticNote, StatisticsAnswer, StatisticsQuery, StatisticsRow,
 };
 use contract::topic::{Origin, Topic};
 use storage::log::{EmbeddedLog, EventLog, Follower, Message, Reader, Start};
@@ -205,6 +209,7 @@ pub(crate) struct Analyst {
     /// Of each budget the number of the version that it is of.
     pub(crate) versions: Mutex<Vec<u64>>,
     pub(crate) areas: Mutex<Vec<RegionSeriesQuery>>,
+    pub(crate) statistics: Mutex<Vec<StatisticsQuery>>,
     pub(crate) check: Mutex<Option<Check>>,
     pub(crate) mood: Mutex<Mood>,
 }
@@ -308,6 +313,54 @@ impl Analyse for Analyst {
                     complete_m2: 3e14,
                     incomplete_m2: 3e13,
                 }),
+            }],
+        })
+    }
+
+    /// One row of all that is asked for; every statistic is 1.
+    async fn statistics(
+        &self,
+        manifest: &Manifest,
+        query: &StatisticsQuery,
+    ) -> Result<StatisticsAnswer, BackendError> {
+        self.mood().apply()?;
+        self.statistics.lock().unwrap().push(query.clone());
+        let (window, steps) = manifest.steps_inside(query.from, query.to).unwrap();
+        let note = |statistic: Statistic| StatisticNote {
+            name: statistic.to_string(),
+            unit: "1".to_owned(),
+            what: statistic.what(),
+        };
+        let names = query.statistics.iter().map(|one| one.to_string());
+        Ok(StatisticsAnswer {
+            product: manifest.product.clone(),
+            manifest: manifest.id(),
+            title: manifest.title.clone(),
+            source: manifest.source.clone(),
+            synthetic: manifest.synthetic,
+            quantity: manifest.quantity,
+            unit: manifest.quantity.display().unit.to_owned(),
+            kind: query.geometry.kind().to_owned(),
+            geometry: query.geometry_name.clone(),
+            step: query.step,
+            earth: query.earth,
+            cells: query.cells,
+            statistics: query.statistics.iter().map(note).collect(),
+            coverage_basis: "all of it".to_owned(),
+            size: 1.0,
+            size_unit: "m".to_owned(),
+            min_coverage_percent: query.min_coverage.percent(),
+            ocean_source: None,
+            notes: vec![],
+            rows: vec![StatisticsRow {
+                start: window.start,
+                end: window.end,
+                mid: window.mid(),
+                values: names.map(|name| (name, Some(1.0))).collect(),
+                found_at: BTreeMap::new(),
+                coverage_percent: 100.0,
+                step_count: steps.len() as u32,
+                is_withheld: false,
             }],
         })
     }

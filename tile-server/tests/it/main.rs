@@ -32,6 +32,7 @@ mod regions;
 mod remote_store;
 mod schema;
 mod serve;
+mod statistics;
 mod stream;
 mod surroundings;
 mod tilejson;

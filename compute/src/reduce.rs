@@ -1,0 +1,22 @@
+//! One reduction: a version of a product, weights of a geometry on its grid, and bins of time in; statistics out.
+//!
+//! Tasks of a run of blocks and a run of steps each read their own values and give back accumulators, which are integers
+//! and extremes: merged in any order they have the same bits (docs/decisions/023-one-reduction.md). Values leave no task.
+
+pub(crate) mod accumulator;
+mod answer;
+mod bins;
+mod bytes;
+mod cells;
+mod histogram;
+mod kernel;
+mod order;
+mod percentiles;
+pub(crate) mod remembered;
+mod run;
+mod scale;
+pub(crate) mod task;
+mod tasks;
+mod weighed;
+
+pub use answer::{statistics, statistics_of};

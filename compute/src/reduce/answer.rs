@@ -1,0 +1,282 @@
+//! Statistics of a version over a geometry: what is asked put together, passes over the values, rows.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use contract::manifest::Manifest;
+use contract::quantity::{Display, Quantity};
+use contract::statistics::{
+    Percentile, Statistic, StatisticNote, StatisticsAnswer, StatisticsQuery, StatisticsRow,
+};
+use contract::time::Period;
+
+use super::accumulator::{Accumulated, too_large};
+use super::bins::{BinSums, bin_sums};
+use super::percentiles::Searches;
+use super::run::run;
+use super::scale::Scale;
+use super::task::{Question, Wanted};
+use super::tasks::runs;
+use super::weighed::Weighed;
+use crate::budget::rows::coverage_percent;
+use crate::{ComputeError, Engine, catalogue};
+
+/// Statistics of the newest version of a product.
+pub async fn statistics(
+    engine: &Engine,
+    query: &StatisticsQuery,
+) -> Result<StatisticsAnswer, ComputeError> {
+    let manifest = catalogue::product(engine.store(), &query.product).await?;
+    statistics_of(engine, query, &manifest).await
+}
+
+/// The same of one version.
+pub async fn statistics_of(
+    engine: &Engine,
+    query: &StatisticsQuery,
+    manifest: &Manifest,
+) -> Result<StatisticsAnswer, ComputeError> {
+    let (window, inside) = manifest.steps_inside(query.from, query.to)?;
+    let periods: Vec<Period> = manifest.steps.iter().map(|step| step.period).collect();
+    let bins = query.step.bins(window, periods.iter().copied())?;
+    let weighed = Weighed::of(engine, manifest, query).await?;
+    let first = periods.partition_point(|period| period.end <= window.start);
+    let mut asked = Asked {
+        engine,
+        manifest,
+        weighed: &weighed,
+        steps: first as u32..(first + inside.len()) as u32,
+        scale: Scale::of_all(),
+    };
+    asked.scale = match Scale::of(manifest.quantity) {
+        Some(own) => own,
+        None => asked.own_scale().await?,
+    };
+    let with_squares = query.statistics.iter().any(|one| one == Statistic::Std);
+    let sums = asked.accumulated(Wanted::Sums { with_squares }).await?;
+    let bins = bin_sums(&periods, &bins, &sums).ok_or_else(too_large)?;
+    let percentiles = asked.percentiles(query, &bins, &periods).await?;
+    let rows = Rows {
+        query,
+        weighed: &weighed,
+        display: manifest.quantity.display(),
+        scale: asked.scale,
+        steps: &periods,
+        percentiles: &percentiles,
+    };
+    let rows = bins.iter().enumerate().map(|(at, bin)| rows.row(at, bin));
+    let rows: Vec<StatisticsRow> = rows.collect();
+    Ok(answer(manifest, query, weighed, rows))
+}
+
+fn answer(
+    manifest: &Manifest,
+    query: &StatisticsQuery,
+    weighed: Weighed,
+    rows: Vec<StatisticsRow>,
+) -> StatisticsAnswer {
+    let unit = manifest.quantity.display().unit;
+    let note = |statistic: Statistic| StatisticNote {
+        name: statistic.to_string(),
+        unit: unit_of(statistic, manifest.quantity, weighed.size_unit),
+        what: statistic.what(),
+    };
+    StatisticsAnswer {
+        product: manifest.product.clone(),
+        manifest: manifest.id(),
+        title: manifest.title.clone(),
+        source: manifest.source.clone(),
+        synthetic: manifest.synthetic,
+        quantity: manifest.quantity,
+        unit: unit.to_owned(),
+        kind: query.geometry.kind().to_owned(),
+        geometry: query.geometry_name.clone(),
+        step: query.step,
+        earth: query.earth,
+        cells: query.cells,
+        statistics: query.statistics.iter().map(note).collect(),
+        coverage_basis: weighed.coverage_basis.to_owned(),
+        size: weighed.size,
+        size_unit: weighed.size_unit.to_owned(),
+        min_coverage_percent: query.min_coverage.percent(),
+        ocean_source: weighed.ocean_source,
+        notes: weighed.notes,
+        rows,
+    }
+}
+
+fn unit_of(statistic: Statistic, quantity: Quantity, size_unit: &str) -> String {
+    let unit = quantity.display().unit;
+    match statistic {
+        Statistic::Count => "1".to_owned(),
+        Statistic::Coverage => "%".to_owned(),
+        Statistic::Sum if size_unit != "1" => format!("{unit} {size_unit}").trim().to_owned(),
+        // A difference of degrees Celsius is one of kelvins.
+        Statistic::Std if quantity.display().offset != 0.0 => quantity.unit().to_owned(),
+        Statistic::Mean
+        | Statistic::Sum
+        | Statistic::Min
+        | Statistic::Max
+        | Statistic::Std
+        | Statistic::Median
+        | Statistic::Percentile(_) => unit.to_owned(),
+    }
+}
+
+/// What every pass over the values is about.
+struct Asked<'a> {
+    engine: &'a Engine,
+    manifest: &'a Manifest,
+    weighed: &'a Weighed,
+    /// Steps that reach into the period.
+    steps: Range<u32>,
+    /// What values are summed in.
+    scale: Scale,
+}
+
+impl Asked<'_> {
+    /// Passes over the values. Sums of whole series are remembered, and not asked for a second time.
+    async fn accumulated(&self, wanted: Wanted) -> Result<Accumulated, ComputeError> {
+        let weighed = self.weighed;
+        let (store, steps) = (self.engine.store(), self.steps.clone());
+        let [whole, covered] = weighed.addresses.clone();
+        let question = Question {
+            shape: weighed.shape,
+            whole,
+            covered,
+            unit: weighed.unit,
+            scale: self.scale,
+            wanted,
+        };
+        let known = self.engine.objects().remembered();
+        let (mut all, mut pieces, mut new) = (Accumulated::default(), vec![], vec![]);
+        for run in runs(store, self.manifest, steps, &weighed.cells())? {
+            let name = run.series.as_ref().and_then(|key| question.sums_name(key));
+            if let Some(sums) = name.and_then(|name| known.get(&name)) {
+                let first = run.steps.start;
+                let own = sums.iter().map(|(step, sums)| (first + step, *sums));
+                all.steps.extend(own);
+                continue;
+            }
+            pieces.extend(run.pieces);
+            new.extend(name.map(|name| (name, run.steps)));
+        }
+        if !pieces.is_empty() {
+            all.merge(run(self.engine, question, pieces).await?)?;
+        }
+        for (name, steps) in new {
+            let own = all.steps.range(steps.clone());
+            let own = own.map(|(step, sums)| (step - steps.start, *sums));
+            known.insert(name, own.collect());
+        }
+        Ok(all)
+    }
+
+    /// The scale of the values that there are, of a quantity that says nothing of them.
+    async fn own_scale(&self) -> Result<Scale, ComputeError> {
+        let with_squares = false;
+        let found = self.accumulated(Wanted::Sums { with_squares }).await?;
+        let range = (f32::INFINITY, f32::NEG_INFINITY);
+        let (low, high) = found.steps.values().fold(range, |(low, high), sums| {
+            (low.min(sums.min), high.max(sums.max))
+        });
+        Ok(if low <= high {
+            Scale::over((low.into(), high.into()))
+        } else {
+            Scale::of_all()
+        })
+    }
+
+    /// The percentiles of every bin that are asked for, stored unit.
+    async fn percentiles(
+        &self,
+        query: &StatisticsQuery,
+        bins: &[BinSums],
+        periods: &[Period],
+    ) -> Result<BTreeMap<(usize, Percentile), f32>, ComputeError> {
+        let wanted = query.statistics.iter().filter_map(Statistic::percentile);
+        let mut searches = Searches::new(bins, &wanted.collect::<Vec<_>>());
+        while let Some(pass) = searches.next_pass(bins, periods) {
+            let found = self.accumulated(pass.wanted.clone()).await?;
+            searches.narrow(&pass, &found.histograms).ok_or_else(|| {
+                ComputeError::inconsistent("percentiles", "two passes read different values")
+            })?;
+        }
+        Ok(searches.values())
+    }
+}
+
+/// What rows are made with.
+struct Rows<'a> {
+    query: &'a StatisticsQuery,
+    weighed: &'a Weighed,
+    display: Display,
+    scale: Scale,
+    steps: &'a [Period],
+    percentiles: &'a BTreeMap<(usize, Percentile), f32>,
+}
+
+impl Rows<'_> {
+    fn row(&self, at: usize, bin: &BinSums) -> StatisticsRow {
+        let coverage_percent = self.coverage_percent(bin);
+        let has_data = bin.sums.count > 0;
+        let is_withheld = has_data && coverage_percent < self.query.min_coverage.percent();
+        let value = |statistic: Statistic| match statistic {
+            Statistic::Count => Some(bin.sums.count as f64),
+            Statistic::Coverage => Some(coverage_percent),
+            _ if !has_data || is_withheld => None,
+            other => self.value(other, at, bin),
+        };
+        let named = |statistic: Statistic| (statistic.to_string(), value(statistic));
+        let found_at = bin.found_at.filter(|_| has_data && !is_withheld);
+        let found = |statistic: Statistic| {
+            let [min, max] = found_at?;
+            let step = match statistic {
+                Statistic::Min => min,
+                Statistic::Max => max,
+                _ => return None,
+            };
+            Some((statistic.to_string(), self.steps[step as usize].mid()))
+        };
+        StatisticsRow {
+            start: bin.period.start,
+            end: bin.period.end,
+            mid: bin.period.mid(),
+            values: self.query.statistics.iter().map(named).collect(),
+            found_at: self.query.statistics.iter().filter_map(found).collect(),
+            coverage_percent,
+            step_count: bin.step_count,
+            is_withheld,
+        }
+    }
+
+    /// A statistic of a bin that holds data.
+    fn value(&self, statistic: Statistic, at: usize, bin: &BinSums) -> Option<f64> {
+        let sums = &bin.sums;
+        let shown = |value: f64| value * self.display.factor + self.display.offset;
+        let mean = || shown(self.scale.mean(sums.sum, sums.weight));
+        match statistic {
+            Statistic::Mean => Some(mean()),
+            Statistic::Sum => {
+                let with_data = sums.weight as f64 * self.weighed.unit.size();
+                Some(mean() * with_data / bin.data_time as f64)
+            }
+            Statistic::Min => Some(shown(sums.min.into())),
+            Statistic::Max => Some(shown(sums.max.into())),
+            Statistic::Std => {
+                let std = self.scale.std(sums.squares, sums.sum, sums.weight);
+                Some(std * self.display.factor.abs())
+            }
+            Statistic::Median | Statistic::Percentile(_) => {
+                let found = self.percentiles.get(&(at, statistic.percentile()?));
+                found.map(|value| shown(f64::from(*value)))
+            }
+            Statistic::Count | Statistic::Coverage => None,
+        }
+    }
+
+    fn coverage_percent(&self, bin: &BinSums) -> f64 {
+        let with_data = bin.sums.covered as f64 * self.weighed.unit.size();
+        coverage_percent(with_data / bin.length() as f64, self.weighed.covered_size)
+    }
+}

@@ -1,0 +1,220 @@
+//! Weights of cells as whole numbers: how much of each the geometry has, and how much of that coverage counts.
+
+use std::collections::BTreeSet;
+
+use contract::chunk::{CHUNK_COLS, CHUNK_ROWS, Window, field_chunks};
+use contract::earth::Earth;
+use contract::grid::Grid;
+use serde::{Deserialize, Serialize};
+use storage::series::BLOCK_CELLS;
+
+use crate::region::loaded::RegionWeights;
+
+/// Steps of the largest weight, as a power of two: a share of 1e-11 of a cell is told.
+const WEIGHT_BITS: i32 = 36;
+/// Shares of a cell below this are counted in steps of their own largest one: a sliver in one cell has a mean too.
+const SLIVER: f64 = 1.0 / 65_536.0;
+
+/// Size of a step of weight: a power of two of m², m, or shares of a place.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) struct WeightUnit(i32);
+
+impl WeightUnit {
+    /// That of areas: of the grid's largest cell, so that whole cells have the same weight in every region.
+    pub(super) fn of_areas(grid: &Grid, earth: Earth, weights: &RegionWeights) -> Self {
+        let areas = (0..grid.rows).map(|row| grid.cell_area_m2(row, earth));
+        let cell_m2 = areas.fold(0.0, f64::max);
+        let largest = largest(weights);
+        Self::of(if largest < cell_m2 * SLIVER {
+            largest
+        } else {
+            cell_m2
+        })
+    }
+
+    /// That of other weights: of the largest.
+    pub(super) fn of_largest(weights: &RegionWeights) -> Self {
+        Self::of(largest(weights))
+    }
+
+    fn of(largest: f64) -> Self {
+        Self(largest.log2().floor() as i32 - WEIGHT_BITS)
+    }
+
+    /// What a step is.
+    pub(super) fn size(self) -> f64 {
+        f64::from(self.0).exp2()
+    }
+
+    /// The nearest number of steps, but at least one of what there is.
+    fn steps(self, weight: f64) -> i64 {
+        if weight > 0.0 {
+            ((weight / self.size()).round() as i64).max(1)
+        } else {
+            0
+        }
+    }
+}
+
+fn largest(weights: &RegionWeights) -> f64 {
+    let all = weights.chunks().flat_map(|(_chunk, weights)| weights);
+    all.copied().fold(f64::MIN_POSITIVE, f64::max)
+}
+
+/// Weight of a cell, in steps.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) struct CellWeight {
+    /// What its value is summed with.
+    pub(super) weight: i64,
+    /// What coverage counts of it.
+    pub(super) covered: i64,
+}
+
+/// Rows and columns of a grid.
+pub(super) type Shape = [u32; 2];
+
+/// Windows of 8 x 8 cells of a grid, as series are cut.
+pub(super) fn blocks([rows, cols]: Shape) -> Vec<Window> {
+    contract::chunk::windows(&shape_only([rows, cols]), BLOCK_CELLS, BLOCK_CELLS)
+}
+
+/// Windows of chunks of a grid, as fields are cut.
+pub(super) fn chunks(shape: Shape) -> Vec<Window> {
+    field_chunks(&shape_only(shape))
+}
+
+/// A grid of which only the shape is known.
+fn shape_only([rows, cols]: Shape) -> Grid {
+    Grid {
+        rows,
+        cols,
+        north_deg: 0.0,
+        west_deg: 0.0,
+        dlat_deg: 0.0,
+        dlon_deg: 0.0,
+    }
+}
+
+/// A geometry's weights on a grid.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Cells<'a> {
+    pub(super) shape: Shape,
+    /// What is summed.
+    pub(super) whole: &'a RegionWeights,
+    /// What coverage counts.
+    pub(super) covered: &'a RegionWeights,
+    pub(super) unit: WeightUnit,
+}
+
+impl Cells<'_> {
+    /// Weights of the cells of a window, row-major.
+    pub(super) fn window(&self, window: Window) -> Vec<CellWeight> {
+        let mut cells = vec![CellWeight::default(); window.cell_count()];
+        for (row, own) in (window.row..).zip(cells.chunks_exact_mut(window.cols as usize)) {
+            self.fill(self.whole, row, window.col, own, |cell, steps| {
+                cell.weight = steps;
+            });
+            self.fill(self.covered, row, window.col, own, |cell, steps| {
+                cell.covered = steps;
+            });
+        }
+        cells
+    }
+
+    /// Sets weights of a run of cells of a row.
+    fn fill(
+        &self,
+        weights: &RegionWeights,
+        row: u32,
+        first_col: u32,
+        cells: &mut [CellWeight],
+        set: impl Fn(&mut CellWeight, i64),
+    ) {
+        let chunks_across = self.shape[1].div_ceil(CHUNK_COLS);
+        let mut col = first_col;
+        let end = first_col + cells.len() as u32;
+        while col < end {
+            let across = col / CHUNK_COLS;
+            let chunk_end = ((across + 1) * CHUNK_COLS).min(self.shape[1]);
+            let chunk = row / CHUNK_ROWS * chunks_across + across;
+            let run_end = end.min(chunk_end);
+            if let Some(areas) = weights.areas_m2(chunk) {
+                let width = chunk_end - across * CHUNK_COLS;
+                let at = (row % CHUNK_ROWS) * width + col % CHUNK_COLS;
+                let own = &mut cells[(col - first_col) as usize..(run_end - first_col) as usize];
+                for (cell, area) in own.iter_mut().zip(&areas[at as usize..]) {
+                    set(cell, self.unit.steps(*area));
+                }
+            }
+            col = run_end;
+        }
+    }
+
+    /// Numbers of the blocks that hold weight, increasing.
+    pub(super) fn blocks(&self) -> Vec<u32> {
+        let across = self.shape[1].div_ceil(BLOCK_CELLS);
+        let windows = chunks(self.shape);
+        let mut found = BTreeSet::new();
+        for (chunk, weights) in self.whole.chunks() {
+            let window = windows[chunk as usize];
+            let rows = weights.chunks_exact(window.cols as usize);
+            for (row, weights) in (window.row..).zip(rows) {
+                let mut last = None;
+                for (col, _) in (window.col..).zip(weights).filter(|(_, w)| **w > 0.0) {
+                    let block = row / BLOCK_CELLS * across + col / BLOCK_CELLS;
+                    if last != Some(block) {
+                        found.insert(block);
+                        last = Some(block);
+                    }
+                }
+            }
+        }
+        found.into_iter().collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn windows_find_the_weights_of_their_cells_across_chunks() {
+        let shape = [130, 250];
+        let grid = shape_only(shape);
+        let weight = |cell: usize| (cell % 101) as f64;
+        let weigh = |factor: f64| {
+            let chunk = |(chunk, window): (usize, &Window)| {
+                let cells = window.cell_indices(&grid).map(|cell| weight(cell) * factor);
+                (chunk as u32, cells.collect::<Vec<f64>>())
+            };
+            RegionWeights::new(chunks(shape).iter().enumerate().map(chunk).collect())
+        };
+        let (whole, covered) = (weigh(1.0), weigh(0.5));
+        let cells = Cells {
+            shape,
+            whole: &whole,
+            covered: &covered,
+            unit: WeightUnit::of_largest(&whole),
+        };
+        let step = cells.unit.size();
+        for window in blocks(shape).into_iter().chain(chunks(shape)) {
+            let found = cells.window(window);
+            assert_eq!(found.len(), window.cell_count());
+            for (cell, own) in window.cell_indices(&grid).zip(found) {
+                assert_eq!(own.weight, (weight(cell) / step) as i64);
+                assert_eq!(own.covered, (weight(cell) * 0.5 / step) as i64);
+            }
+        }
+        let all: Vec<u32> = (0..blocks(shape).len() as u32).collect();
+        assert_eq!(cells.blocks(), all);
+    }
+
+    #[test]
+    fn what_is_hardly_there_has_weight() {
+        let weights = RegionWeights::new(vec![(0, vec![1e9, 1e-9, 0.0])]);
+        let unit = WeightUnit::of_largest(&weights);
+        assert_eq!(unit.steps(1e-9), 1);
+        assert_eq!(unit.steps(0.0), 0);
+        assert!(unit.steps(1e9) >= 1 << WEIGHT_BITS);
+    }
+}

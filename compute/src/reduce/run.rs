@@ -1,0 +1,120 @@
+//! Pieces of a question worked on: by this process, or as a query whose every part is some of them.
+//!
+//! In process no query is planned: what a plan would do is known, and planning takes longer than a point's answer.
+
+use std::collections::BTreeSet;
+
+use contract::digest::Digest;
+use contract::key::ObjectKey;
+use datafusion::arrow::array::{Array as _, AsArray as _, RecordBatch};
+use futures::{StreamExt as _, TryStreamExt as _, stream};
+
+use super::accumulator::Accumulated;
+use super::task::{Piece, Question, Task, Worker};
+use crate::scan;
+use crate::session::QueryContext;
+use crate::{ComputeError, Engine};
+
+/// Tasks of a question to a cluster, whose room is not known here: they are small, and wait for nothing but room.
+const CLUSTER_TASKS: usize = 32;
+
+/// What some pieces of a question come to.
+pub(super) async fn run(
+    engine: &Engine,
+    question: Question,
+    pieces: Vec<Piece>,
+) -> Result<Accumulated, ComputeError> {
+    if engine.is_distributed() {
+        distributed(engine, question, pieces).await
+    } else {
+        in_process(engine, question, pieces).await
+    }
+}
+
+async fn in_process(
+    engine: &Engine,
+    question: Question,
+    pieces: Vec<Piece>,
+) -> Result<Accumulated, ComputeError> {
+    let worker = Worker::new(engine.objects(), question).await?;
+    // One is read while the others are reduced.
+    let at_once = engine.partitions().get() + 1;
+    let mut reduced = stream::iter(pieces)
+        .map(|piece| worker.reduce(piece))
+        .buffer_unordered(at_once);
+    let mut all = Accumulated::default();
+    while let Some(part) = reduced.try_next().await? {
+        all.merge(part)?;
+    }
+    Ok(all)
+}
+
+async fn distributed(
+    engine: &Engine,
+    question: Question,
+    pieces: Vec<Piece>,
+) -> Result<Accumulated, ComputeError> {
+    let keys: BTreeSet<ObjectKey> = pieces.iter().map(|piece| piece.key.clone()).collect();
+    let keys: Vec<&ObjectKey> = keys.iter().collect();
+    let tasks = dealt(
+        &question,
+        pieces,
+        engine.partitions().get().max(CLUSTER_TASKS),
+    );
+    let sql = sql(&tasks);
+    let job = Digest::of_json(&("statistics", &sql));
+    let answered = async {
+        let batches = engine.answer(job, |context| ask(context, &sql)).await?;
+        only_part(&batches)
+    };
+    let answered = scan::caught(Box::pin(answered)).await;
+    scan::or_damaged(engine.store(), &keys, answered).await
+}
+
+/// Pieces as at most `part_count` tasks.
+fn dealt(question: &Question, pieces: Vec<Piece>, part_count: usize) -> Vec<Task> {
+    let part_count = part_count.clamp(1, pieces.len().max(1));
+    let task = |_part| Task {
+        question: question.clone(),
+        pieces: vec![],
+    };
+    let mut tasks: Vec<Task> = (0..part_count).map(task).collect();
+    for (at, piece) in pieces.into_iter().enumerate() {
+        tasks[at % part_count].pieces.push(piece);
+    }
+    tasks
+}
+
+/// The question: each task a part of its own, which gives nothing but what it accumulated to the one that merges them.
+fn sql(tasks: &[Task]) -> String {
+    let quoted = |task: &Task| task.text().replace('\'', "''");
+    let part = |task: &Task| format!("SELECT accumulate('{}') AS part", quoted(task));
+    let parts: Vec<String> = tasks.iter().map(part).collect();
+    format!(
+        "SELECT merge_accumulated(part) FROM ({})",
+        parts.join(" UNION ALL ")
+    )
+}
+
+async fn ask(context: QueryContext, sql: &str) -> Result<Vec<RecordBatch>, ComputeError> {
+    let failed = || ComputeError::engine("statistics");
+    let query = context.sql(sql).await.map_err(failed())?;
+    query.collect().await.map_err(failed())
+}
+
+/// The one row of an answer.
+fn only_part(batches: &[RecordBatch]) -> Result<Accumulated, ComputeError> {
+    let mut rows = batches.iter().filter(|batch| batch.num_rows() > 0);
+    match (rows.next(), rows.next()) {
+        (Some(batch), None) if batch.num_rows() == 1 && batch.column(0).is_valid(0) => {
+            Accumulated::of_bytes(batch.column(0).as_binary::<i32>().value(0))
+        }
+        _ => Err(ComputeError::inconsistent(
+            "statistics",
+            "the engine gave no single row",
+        )),
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,94 @@
+//! The plan of a question to a cluster: what passes from part to part.
+
+use std::num::NonZeroUsize;
+
+use contract::digest::Digest;
+use datafusion::arrow::util::pretty::pretty_format_batches;
+use storage::Store;
+
+use super::*;
+use crate::reduce::cells::WeightUnit;
+use crate::reduce::scale::Scale;
+use crate::reduce::task::{Layout, Wanted};
+
+fn question() -> Question {
+    Question {
+        shape: [16, 16],
+        whole: "computed:{'quoted'}".to_owned(),
+        covered: "computed:{}".to_owned(),
+        unit: WeightUnit::default(),
+        scale: Scale::of_all(),
+        wanted: Wanted::Sums { with_squares: true },
+    }
+}
+
+fn pieces(count: u32) -> Vec<Piece> {
+    let piece = |at: u32| {
+        let digest = Digest::of(&at.to_le_bytes());
+        Piece {
+            key: ObjectKey::series(&"p".parse().unwrap(), &digest),
+            address: format!("memory:///{at}"),
+            layout: Layout::Series { steps: 5 },
+            first_step: at * 5,
+            steps: 0..5,
+            rows: vec![0, 1],
+        }
+    };
+    (0..count).map(piece).collect()
+}
+
+async fn plan(tasks: &[Task]) -> String {
+    let engine = Engine::in_process(Store::memory(), NonZeroUsize::new(4).unwrap());
+    let sql = format!("EXPLAIN FORMAT INDENT {}", sql(tasks));
+    let job = Digest::of(b"plan");
+    let batches = engine.answer(job, |context| ask(context, &sql)).await;
+    let batches = batches.unwrap();
+    let physical = batches.iter().find_map(|batch| {
+        let kinds = batch.column(0).as_string::<i32>();
+        let at = (0..batch.num_rows()).find(|row| kinds.value(*row) == "physical_plan")?;
+        Some(batch.column(1).as_string::<i32>().value(at).to_owned())
+    });
+    physical.unwrap_or_else(|| pretty_format_batches(&batches).unwrap().to_string())
+}
+
+#[test]
+fn every_piece_is_in_one_task_and_no_task_is_idle() {
+    for (pieces_count, parts, expected) in [(9, 4, 4), (2, 7, 2), (1, 1, 1), (0, 5, 1)] {
+        let tasks = dealt(&question(), pieces(pieces_count), parts);
+        assert_eq!(tasks.len(), expected);
+        let mut firsts: Vec<u32> = tasks
+            .iter()
+            .flat_map(|task| task.pieces.iter().map(|piece| piece.first_step))
+            .collect();
+        firsts.sort_unstable();
+        let all: Vec<u32> = (0..pieces_count).map(|at| at * 5).collect();
+        assert_eq!(firsts, all);
+        let sizes = tasks.iter().map(|task| task.pieces.len());
+        assert!(sizes.clone().max().unwrap() - sizes.min().unwrap() <= 1);
+        let text = tasks[0].text();
+        assert_eq!(Task::of_text(&text).unwrap().text(), text);
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn nothing_but_what_tasks_accumulated_passes_from_part_to_part() {
+    let plan = plan(&dealt(&question(), pieces(9), 4)).await;
+    let count = |word: &str| plan.matches(word).count();
+    assert_eq!(count("AsyncFuncExec"), 4, "{plan}");
+    assert_eq!(
+        (count("UnionExec"), count("mode=Partial")),
+        (1, 1),
+        "{plan}"
+    );
+    assert_eq!(count("CoalescePartitionsExec"), 1, "{plan}");
+    // No values are in it, so that none can be sent on: they are read inside of the function.
+    for never in ["RepartitionExec", "JoinExec", "DataSourceExec", "Sort"] {
+        assert_eq!(count(never), 0, "{never}: {plan}");
+    }
+    let partial = plan.find("mode=Partial").unwrap();
+    assert!(
+        plan.find("CoalescePartitionsExec").unwrap() < partial,
+        "{plan}"
+    );
+    assert!(partial < plan.find("UnionExec").unwrap(), "{plan}");
+}

@@ -1,0 +1,433 @@
+//! Statistics over geometries beside sums that share no code with them, and the same bits however they are computed.
+
+use std::collections::BTreeMap;
+
+use compute::Engine;
+use compute::reduce::statistics;
+use compute::region::weights;
+use contract::chunk::field_chunks;
+use contract::earth::Earth;
+use contract::geometry::{AskedGeometry, Sampling};
+use contract::grid::{Grid, LonLatDeg};
+use contract::manifest::Manifest;
+use contract::quantity::Quantity;
+use contract::statistics::{StatisticsAnswer, StatisticsQuery, StatisticsStep};
+use contract::time::Period;
+use storage::Store;
+
+use crate::fixture::{folder_store, land, parts, product, wavy_year};
+
+/// Cells of 2.5 degrees: neither chunks nor blocks fit it.
+const GRID: Grid = Grid {
+    rows: 72,
+    cols: 144,
+    north_deg: 90.0,
+    west_deg: -180.0,
+    dlat_deg: 2.5,
+    dlon_deg: 2.5,
+};
+const POLYGON: &str = "POLYGON((-60 -33.3,80 -41,120.5 20,33 61,-60 -33.3),(0 0,20 1,20 20,0 0))";
+
+async fn landed() -> (tempfile::TempDir, Store, Manifest, Vec<(Period, Vec<f32>)>) {
+    let (folder, store) = folder_store();
+    let steps = wavy_year(&GRID);
+    let manifest = land(
+        &store,
+        &product("wavy"),
+        Quantity::CarbonFlux,
+        GRID,
+        &steps,
+        5,
+    )
+    .await;
+    (folder, store, manifest, steps)
+}
+
+fn area(region: &str) -> AskedGeometry {
+    region
+        .parse::<contract::region::AskedRegion>()
+        .unwrap()
+        .into()
+}
+
+fn asked(geometry: AskedGeometry, statistics: &str, step: StatisticsStep) -> StatisticsQuery {
+    StatisticsQuery {
+        statistics: statistics.parse().unwrap(),
+        step,
+        ..StatisticsQuery::new(product("wavy"), geometry)
+    }
+}
+
+/// Values, stored unit, with their weights, of some steps.
+fn weighed(
+    steps: &[(Period, Vec<f32>)],
+    weights: &[(u32, Vec<f64>)],
+    grid: &Grid,
+) -> Vec<(f32, f64)> {
+    let windows = field_chunks(grid);
+    let mut all = vec![];
+    for (period, values) in steps {
+        for (chunk, areas) in weights {
+            for (cell, area) in windows[*chunk as usize].cell_indices(grid).zip(areas) {
+                if *area > 0.0 && !values[cell].is_nan() {
+                    all.push((values[cell], area * period.seconds()));
+                }
+            }
+        }
+    }
+    all
+}
+
+/// Mean, standard deviation, and a percentile as the smallest value with so much weight at or below it.
+fn plain(all: &[(f32, f64)], percent: f64) -> [f64; 3] {
+    let weight: f64 = all.iter().map(|(_, w)| w).sum();
+    let mean = all.iter().map(|(v, w)| f64::from(*v) * w).sum::<f64>() / weight;
+    let variance = all
+        .iter()
+        .map(|(v, w)| (f64::from(*v) - mean).powi(2) * w)
+        .sum::<f64>()
+        / weight;
+    let mut sorted = all.to_vec();
+    sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut below = 0.0;
+    let found = sorted.iter().find(|(_, w)| {
+        below += w;
+        below >= weight * percent / 100.0
+    });
+    [mean, variance.sqrt(), f64::from(found.unwrap().0)]
+}
+
+fn close(a: f64, b: f64) -> bool {
+    (a - b).abs() <= 1e-9 * b.abs().max(1e-3)
+}
+
+fn value(answer: &StatisticsAnswer, row: usize, name: &str) -> f64 {
+    answer.rows[row].values[name].unwrap_or_else(|| panic!("{name}: {:?}", answer.rows[row]))
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn statistics_of_a_polygon_are_those_of_plain_sums() {
+    let (_folder, store, _manifest, steps) = landed().await;
+    let engine = Engine::in_process(store, parts(2));
+    let weights = weights::compute(&GRID, &POLYGON.parse().unwrap(), Earth::Wgs84).unwrap();
+    let display = Quantity::CarbonFlux.display();
+    let seasons: [&[usize]; 5] = [&[0, 1], &[2, 3, 4], &[5, 6, 7], &[8, 9, 10], &[11]];
+    for (step, bins) in [
+        (StatisticsStep::Native, (0..12).map(|i| vec![i]).collect()),
+        (
+            StatisticsStep::Season,
+            seasons.map(<[usize]>::to_vec).to_vec(),
+        ),
+        (StatisticsStep::Total, vec![(0..12).collect::<Vec<_>>()]),
+    ] {
+        let query = asked(
+            area(POLYGON),
+            "mean,std,p90,median,min,max,count,sum,coverage",
+            step,
+        );
+        let answer = statistics(&engine, &query).await.unwrap();
+        assert_eq!(answer.rows.len(), bins.len(), "{step}");
+        for (row, bin) in bins.iter().enumerate() {
+            let own: Vec<_> = bin.iter().map(|i| steps[*i].clone()).collect();
+            let all = weighed(&own, &weights, &GRID);
+            let [mean, std, p90] = plain(&all, 90.0).map(|own| own * display.factor);
+            assert!(close(value(&answer, row, "mean"), mean), "{step} {row}");
+            assert!(close(value(&answer, row, "std"), std), "{step} {row}");
+            assert!(close(value(&answer, row, "p90"), p90), "{step} {row}");
+            let median = plain(&all, 50.0)[2] * display.factor;
+            assert!(close(value(&answer, row, "median"), median), "{step} {row}");
+            assert_eq!(value(&answer, row, "count") as usize, all.len());
+            let values = || {
+                all.iter()
+                    .map(|(value, _)| f64::from(*value) * display.factor)
+            };
+            let min = values().fold(f64::INFINITY, f64::min);
+            assert!(close(value(&answer, row, "min"), min));
+            let seconds: f64 = own.iter().map(|(period, _)| period.seconds()).sum();
+            let integral: f64 =
+                all.iter().map(|(v, w)| f64::from(*v) * w).sum::<f64>() / seconds * display.factor;
+            assert!((value(&answer, row, "sum") / integral - 1.0).abs() < 1e-9);
+            // The first step that holds the largest value.
+            let largest = |at: &usize| {
+                let own = weighed(&steps[*at..=*at], &weights, &GRID);
+                own.iter()
+                    .map(|(v, _)| *v)
+                    .fold(f32::NEG_INFINITY, f32::max)
+            };
+            let max = bin.iter().map(largest).fold(f32::NEG_INFINITY, f32::max);
+            let first = bin
+                .iter()
+                .find(|at| largest(at).to_bits() == max.to_bits())
+                .unwrap();
+            assert_eq!(answer.rows[row].found_at["max"], steps[*first].0.mid());
+            let coverage = value(&answer, row, "coverage");
+            assert_eq!(
+                coverage.to_bits(),
+                answer.rows[row].coverage_percent.to_bits()
+            );
+            assert!((40.0..100.0).contains(&coverage), "{coverage}");
+        }
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn means_and_coverage_are_those_of_the_series_that_was_always_given() {
+    let (_folder, store, _manifest, _steps) = landed().await;
+    let engine = Engine::in_process(store, parts(2));
+    for region in ["global", POLYGON, "170.5,-33.3,-120.1,12.7"] {
+        let query = asked(area(region), "mean", StatisticsStep::Native);
+        let answer = statistics(&engine, &query).await.unwrap();
+        let series =
+            contract::series::RegionSeriesQuery::new(product("wavy"), region.parse().unwrap());
+        let series = compute::stats::region_series(&engine, &series)
+            .await
+            .unwrap();
+        assert_eq!(answer.size.to_bits(), series.region_area_m2.to_bits());
+        for (row, own) in answer.rows.iter().zip(&series.series) {
+            assert!(close(row.values["mean"].unwrap(), own.mean.unwrap()));
+            assert!((row.coverage_percent - own.coverage_percent).abs() < 1e-6);
+        }
+    }
+}
+
+/// Answers to some questions.
+async fn answers(engine: &Engine) -> Vec<StatisticsAnswer> {
+    let place = LonLatDeg::new(171.3, -40.2).unwrap();
+    let line = "170.5,-33.3;-120.1,12.7;-100,85;80,80";
+    let mut all = vec![];
+    for (geometry, step) in [
+        (area("global"), StatisticsStep::Month),
+        (area(POLYGON), StatisticsStep::Total),
+        (area(POLYGON), StatisticsStep::Week),
+        (AskedGeometry::line(line).unwrap(), StatisticsStep::Season),
+        (
+            AskedGeometry::point(place, Sampling::Bilinear),
+            StatisticsStep::Native,
+        ),
+    ] {
+        let query = asked(geometry, "mean,std,min,max,sum,p10,p97.5,count", step);
+        all.push(statistics(engine, &query).await.unwrap());
+    }
+    all
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn any_number_of_parts_gives_the_same_bits_with_ballista_and_without() {
+    let (_folder, store, _manifest, _steps) = landed().await;
+    let right = answers(&Engine::local(store.clone())).await;
+    assert_eq!(right[0].rows.len(), 12);
+    let ballista = [1, 2, 7].map(|count| Engine::standalone(store.clone(), parts(count)));
+    let in_process = [2, 7].map(|count| Engine::in_process(store.clone(), parts(count)));
+    for engine in in_process.into_iter().chain(ballista) {
+        assert!(answers(&engine).await == right);
+    }
+    // The comparison sees the last bit of one value.
+    let mut planted = right.clone();
+    let values: &mut BTreeMap<_, _> = &mut planted[2].rows[7].values;
+    let mean = values.get_mut("mean").unwrap().as_mut().unwrap();
+    *mean = mean.next_up();
+    assert!(planted != right);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn values_of_fields_and_of_series_are_the_same() {
+    let (_folder, store, manifest, _steps) = landed().await;
+    let engine = Engine::in_process(store.clone(), parts(2));
+    // A version whose series are not there yet is read from its fields.
+    let mut fieldd = manifest.clone();
+    fieldd.series = vec![];
+    for geometry in [
+        area(POLYGON),
+        AskedGeometry::line("170,-33;-120,12").unwrap(),
+    ] {
+        let query = asked(geometry, "mean,std,p90,min", StatisticsStep::Season);
+        let of = async |manifest: &Manifest| {
+            let answer = compute::reduce::statistics_of(&engine, &query, manifest).await;
+            answer.unwrap().rows
+        };
+        let (series, fields) = (of(&manifest).await, of(&fieldd).await);
+        assert_eq!(series.len(), 5);
+        assert!(series == fields);
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_point_is_its_cell_and_four_cells_are_weighed() {
+    let (_folder, store, _manifest, steps) = landed().await;
+    let engine = Engine::local(store);
+    let place = LonLatDeg::new(11.0, 21.0).unwrap();
+    let of = async |sampling| {
+        let asked = asked(
+            AskedGeometry::point(place, sampling),
+            "mean,count",
+            StatisticsStep::Native,
+        );
+        statistics(&engine, &asked).await.unwrap().rows
+    };
+    let (row, col) = GRID.cell_at(place).unwrap();
+    let at = |step: usize, row: u32, col: u32| steps[step].1[(row * GRID.cols + col) as usize];
+    let factor = Quantity::CarbonFlux.display().factor;
+    for (step, own) in of(Sampling::Cell).await.iter().enumerate() {
+        let value = at(step, row, col);
+        match own.values["mean"] {
+            Some(mean) => assert!(close(mean, f64::from(value) * factor)),
+            None => assert!(value.is_nan() && own.coverage_percent < 1e-12),
+        }
+    }
+    // 21 N lies 0.1 of a row below the centre of its row, 11 E 0.1 of a column west of its.
+    let four = [
+        (row, col, 0.81),
+        (row + 1, col, 0.09),
+        (row, col - 1, 0.09),
+        (row + 1, col - 1, 0.01),
+    ];
+    for (step, own) in of(Sampling::Bilinear).await.iter().enumerate() {
+        let there = four
+            .iter()
+            .filter(|(row, col, _)| !at(step, *row, *col).is_nan());
+        let weight: f64 = there.clone().map(|(_, _, weight)| weight).sum();
+        let sum: f64 = there
+            .map(|(row, col, weight)| f64::from(at(step, *row, *col)) * weight)
+            .sum();
+        if weight > 0.0 {
+            assert!(
+                close(own.values["mean"].unwrap(), sum / weight * factor),
+                "{step}"
+            );
+        }
+        assert!(
+            (own.coverage_percent - 100.0 * weight).abs() < 1e-6,
+            "{step}"
+        );
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_row_says_what_is_missing_and_too_little_is_withheld() {
+    let (_folder, store, _manifest, _steps) = landed().await;
+    let engine = Engine::in_process(store, parts(2));
+    let ask = async |from: &str, to: &str, least: &str| {
+        let query = StatisticsQuery {
+            from: from.parse().ok(),
+            to: to.parse().ok(),
+            min_coverage: least.parse().unwrap(),
+            ..asked(
+                area(POLYGON),
+                "mean,min,count,coverage",
+                StatisticsStep::Month,
+            )
+        };
+        statistics(&engine, &query).await.unwrap().rows
+    };
+    // The data end with the year: of February and March 2001 there is nothing, of January's row neither.
+    let rows = ask("2000-11-16", "2001-02-10", "0").await;
+    assert_eq!(rows.len(), 4);
+    assert_eq!(rows[0].start, "2000-11-16".parse().unwrap());
+    assert!(rows[0].values["mean"].is_some());
+    for row in &rows[2..] {
+        assert_eq!((row.step_count, row.values["mean"]), (0, None));
+        assert_eq!(
+            (row.values["count"], row.values["coverage"]),
+            (Some(0.0), Some(0.0))
+        );
+        assert!(!row.is_withheld);
+    }
+    let all = ask("2000-01", "2001-01", "0").await;
+    let most = all
+        .iter()
+        .map(|row| row.coverage_percent)
+        .fold(0.0, f64::max);
+    let withheld = ask("2000-01", "2001-01", &most.to_string()).await;
+    assert!(withheld.iter().filter(|row| row.is_withheld).count() >= 8);
+    for (row, own) in all.iter().zip(&withheld) {
+        assert_eq!(own.is_withheld, row.coverage_percent < most);
+        assert_eq!(own.values["mean"].is_none(), own.is_withheld);
+        assert_eq!(own.found_at.is_empty(), own.is_withheld);
+        assert_eq!(own.values["count"], row.values["count"]);
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_step_that_lies_across_two_rows_counts_in_both_by_its_time() {
+    let (_folder, store) = folder_store();
+    let period =
+        |from: &str, to: &str| Period::new(from.parse().unwrap(), to.parse().unwrap()).unwrap();
+    let constant = |value: f32| vec![value; GRID.cell_count()];
+    let steps = [
+        (period("2000-01-28", "2000-02-05"), constant(1e-9)),
+        (period("2000-02-05", "2000-02-13"), constant(4e-9)),
+    ];
+    land(
+        &store,
+        &product("wavy"),
+        Quantity::CarbonFlux,
+        GRID,
+        &steps,
+        2,
+    )
+    .await;
+    let query = asked(
+        area("-40,-20,-10,10"),
+        "mean,min,max,std",
+        StatisticsStep::Month,
+    );
+    let answer = statistics(&Engine::local(store), &query).await.unwrap();
+    let factor = Quantity::CarbonFlux.display().factor;
+    let of = |row: usize, name: &str| value(&answer, row, name) / factor / 1e-9;
+    assert!((of(0, "mean") - 1.0).abs() < 1e-6);
+    // Four days of 1 and eight of 4.
+    assert!((of(1, "mean") - 3.0).abs() < 1e-6, "{}", of(1, "mean"));
+    assert!((of(1, "std") - 2f64.sqrt()).abs() < 1e-6);
+    assert!((of(1, "min") - 1.0).abs() < 1e-6 && (of(1, "max") - 4.0).abs() < 1e-6);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_cannot_be_answered_is_refused_with_the_reason() {
+    let (_folder, store, _manifest, _steps) = landed().await;
+    let engine = Engine::in_process(store.clone(), parts(2));
+    let refused =
+        async |query: StatisticsQuery| statistics(&engine, &query).await.unwrap_err().to_string();
+    let native = StatisticsStep::Native;
+    let outside = StatisticsQuery {
+        from: "2010".parse().ok(),
+        ..asked(area("global"), "mean", native)
+    };
+    assert!(refused(outside).await.contains("covers 2000-01-01"));
+    let crossing = "POLYGON((0 0,10 0,0 0))";
+    assert!(
+        refused(asked(area(crossing), "mean", native))
+            .await
+            .contains("fewer than three")
+    );
+    let unknown = StatisticsQuery {
+        product: product("nothing"),
+        ..asked(area("global"), "mean", native)
+    };
+    assert!(refused(unknown).await.contains("unknown"));
+    let years = StatisticsQuery {
+        from: "0001".parse().ok(),
+        to: "9999".parse().ok(),
+        ..asked(area("global"), "mean", StatisticsStep::Day)
+    };
+    assert!(refused(years).await.contains("longer ones"));
+    // What crosses itself, or lies within one cell, has its right answer.
+    for odd in [
+        "POLYGON((-40 -20,-10 10,-10 -20,-40 10,-40 -20))",
+        "POLYGON((-30.1 -10.1,-30.0999 -10.1,-30.0999 -10.0999,-30.1 -10.1))",
+    ] {
+        let answer = statistics(&engine, &asked(area(odd), "mean,count", native))
+            .await
+            .unwrap();
+        let weights = weights::compute(&GRID, &odd.parse().unwrap(), Earth::Wgs84).unwrap();
+        for (row, step) in answer.rows.iter().zip(&wavy_year(&GRID)) {
+            let all = weighed(std::slice::from_ref(step), &weights, &GRID);
+            match row.values["mean"] {
+                None => assert!(all.is_empty()),
+                Some(mean) => {
+                    let expected = plain(&all, 50.0)[0] * Quantity::CarbonFlux.display().factor;
+                    assert!((mean / expected - 1.0).abs() < 1e-9);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,146 @@
+//! Words of `fluxglobe stats`: where, which statistics, of which bins of time.
+
+use clap::{Args, Subcommand};
+use contract::earth::Earth;
+use contract::geometry::Sampling;
+use contract::product::ProductId;
+use contract::region::Cells;
+use contract::statistics::{MinCoverage, Statistics, StatisticsStep};
+use contract::time::TimeMs;
+
+/// `fluxglobe stats`.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Stats {
+    /// The series of the cell at a place, or statistics of it by day, month, year ...
+    Point(StatsPoint),
+    /// Statistics along a line, each cell by the length of the line in it.
+    Line(StatsLine),
+    /// The mean over a region at every step, each cell by its area, with the area that holds data; or other statistics of it.
+    Polygon(StatsPolygon),
+}
+
+/// What is asked besides a plain series.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Statistics")]
+pub(crate) struct StatisticsOptions {
+    /// Statistics, separated by commas: mean, sum, min, max, std, median, count, coverage, and percentiles such as p90 or p97.5.
+    #[arg(long, value_name = "mean,p90,...")]
+    pub(crate) statistic: Option<Statistics>,
+    /// What a row covers. Steps that lie in several rows count in each by their time there.
+    #[arg(long, value_name = "native|day|week|month|season|year|total")]
+    pub(crate) step: Option<StatisticsStep>,
+    /// Least coverage, percent: rows with less have no values and say so.
+    #[arg(long, value_name = "PERCENT")]
+    pub(crate) min_coverage: Option<MinCoverage>,
+    /// Comma-separated values instead of a table.
+    #[arg(long, conflicts_with = "json")]
+    pub(crate) csv: bool,
+}
+
+impl StatisticsOptions {
+    /// Is anything of it asked?
+    pub(crate) fn are_asked(&self) -> bool {
+        self.statistic.is_some() || self.step.is_some() || self.min_coverage.is_some() || self.csv
+    }
+}
+
+/// `fluxglobe stats point`.
+#[derive(Debug, Args)]
+pub(crate) struct StatsPoint {
+    /// Product.
+    #[arg(long)]
+    pub(crate) product: ProductId,
+    /// Longitude, degrees east.
+    #[arg(long, allow_negative_numbers = true)]
+    pub(crate) lon: f64,
+    /// Latitude, degrees north.
+    #[arg(long, allow_negative_numbers = true)]
+    pub(crate) lat: f64,
+    /// First instant of statistics: 2000, 2000-03, 2000-03-15 or with a time of day. The product's first if absent.
+    #[arg(long)]
+    pub(crate) from: Option<TimeMs>,
+    /// First instant after the period. The product's end if absent.
+    #[arg(long)]
+    pub(crate) to: Option<TimeMs>,
+    /// What the value at the place is: that of its cell, or bilinear of the four cells around it. Cell if absent.
+    #[arg(long, value_name = "cell|bilinear")]
+    pub(crate) sampling: Option<Sampling>,
+    #[command(flatten)]
+    pub(crate) statistics: StatisticsOptions,
+    /// JSON instead of a table.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+impl StatsPoint {
+    /// Is more asked than the series of the cell?
+    pub(crate) fn are_statistics_asked(&self) -> bool {
+        let is_cut = self.from.is_some() || self.to.is_some();
+        is_cut || self.sampling.is_some() || self.statistics.are_asked()
+    }
+}
+
+/// `fluxglobe stats line`.
+#[derive(Debug, Args)]
+pub(crate) struct StatsLine {
+    /// Product, of any quantity.
+    #[arg(long)]
+    pub(crate) product: ProductId,
+    /// `LON,LAT;LON,LAT;...`, a GeoJSON or WKT file with lines, or the text of one. Between two vertices it is a great circle.
+    #[arg(long, allow_hyphen_values = true)]
+    pub(crate) line: String,
+    /// First instant: 2000, 2000-03, 2000-03-15 or with a time of day. The product's first if absent.
+    #[arg(long)]
+    pub(crate) from: Option<TimeMs>,
+    /// First instant after the period. The product's end if absent.
+    #[arg(long)]
+    pub(crate) to: Option<TimeMs>,
+    /// Figure of the earth for lengths: wgs84, sphere (R = 6371 km) or local-radius.
+    #[arg(long, default_value = "wgs84")]
+    pub(crate) earth: Earth,
+    #[command(flatten)]
+    pub(crate) statistics: StatisticsOptions,
+    /// JSON instead of a table.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// `fluxglobe stats polygon`.
+#[derive(Debug, Args)]
+pub(crate) struct StatsPolygon {
+    /// Product, of any quantity.
+    #[arg(long)]
+    pub(crate) product: ProductId,
+    /// `global`, a named region, a box WEST,SOUTH,EAST,NORTH, a GeoJSON or WKT file, the text of one,
+    /// or PRODUCT:CODE, the cells where a landed mask has a code.
+    #[arg(long, allow_hyphen_values = true)]
+    pub(crate) region: String,
+    /// First instant: 2000, 2000-03, 2000-03-15 or with a time of day. The product's first if absent.
+    #[arg(long)]
+    pub(crate) from: Option<TimeMs>,
+    /// First instant after the period. The product's end if absent.
+    #[arg(long)]
+    pub(crate) to: Option<TimeMs>,
+    /// Figure of the earth for areas: wgs84, sphere (R = 6371 km) or local-radius (as FluxEngine sums).
+    #[arg(long, default_value = "wgs84")]
+    pub(crate) earth: Earth,
+    /// How cells on the coast count in statistics: whole, or by their ocean-share. Whole if absent.
+    #[arg(long, value_name = "whole|ocean-share")]
+    pub(crate) cells: Option<Cells>,
+    /// Product that says how much of every cell is sea or land (`sea_area_fraction`, `land_area_fraction`), on the same grid.
+    /// Natural Earth's land, 1:50 million, if absent.
+    #[arg(long, value_name = "PRODUCT")]
+    pub(crate) ocean: Option<ProductId>,
+    #[command(flatten)]
+    pub(crate) statistics: StatisticsOptions,
+    /// JSON instead of a table.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+impl StatsPolygon {
+    /// Is more asked than the mean at every step?
+    pub(crate) fn are_statistics_asked(&self) -> bool {
+        self.cells.is_some() || self.statistics.are_asked()
+    }
+}

@@ -1,0 +1,233 @@
+//! `fluxglobe stats` with statistics: a geometry, bins of time and names of statistics in; a table, CSV or JSON out.
+
+use std::path::Path;
+
+use anyhow::Result;
+use comfy_table::presets::NOTHING;
+use comfy_table::{CellAlignment, Table};
+use compute::reduce::statistics;
+use compute::region::file;
+use contract::geometry::AskedGeometry;
+use contract::grid::LonLatDeg;
+use contract::statistics::{StatisticsAnswer, StatisticsQuery, StatisticsRow};
+
+use super::budget::{ocean, stored_region};
+use crate::cli::{Settings, StatisticsOptions, StatsLine, StatsPoint, StatsPolygon};
+use crate::{deployment, progress};
+
+/// How an answer is printed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Form {
+    Table,
+    Json,
+    Csv,
+}
+
+impl Form {
+    fn of(options: &StatisticsOptions, is_json: bool) -> Self {
+        match (is_json, options.csv) {
+            (true, _) => Self::Json,
+            (false, true) => Self::Csv,
+            (false, false) => Self::Table,
+        }
+    }
+}
+
+pub(crate) async fn point(settings: &Settings, options: &StatsPoint) -> Result<()> {
+    let place = LonLatDeg::new(options.lon, options.lat)?;
+    let asked = AskedGeometry::point(place, options.sampling.unwrap_or_default());
+    let query = StatisticsQuery {
+        from: options.from,
+        to: options.to,
+        ..query(
+            StatisticsQuery::new(options.product.clone(), asked),
+            &options.statistics,
+        )
+    };
+    run(
+        settings,
+        &query,
+        Form::of(&options.statistics, options.json),
+    )
+    .await
+}
+
+pub(crate) async fn line(settings: &Settings, options: &StatsLine) -> Result<()> {
+    let asked = if file::is_file_name(&options.line) {
+        let text = file::text(Path::new(&options.line))?;
+        AskedGeometry {
+            name: options.line.clone(),
+            ..AskedGeometry::line(&text)?
+        }
+    } else {
+        AskedGeometry::line(&options.line)?
+    };
+    let query = StatisticsQuery {
+        from: options.from,
+        to: options.to,
+        earth: options.earth,
+        ..query(
+            StatisticsQuery::new(options.product.clone(), asked),
+            &options.statistics,
+        )
+    };
+    run(
+        settings,
+        &query,
+        Form::of(&options.statistics, options.json),
+    )
+    .await
+}
+
+pub(crate) async fn polygon(settings: &Settings, options: &StatsPolygon) -> Result<()> {
+    let store = deployment::store(settings)?;
+    let region = stored_region(settings, &store, &options.region).await?;
+    let asked = region.into();
+    let query = StatisticsQuery {
+        from: options.from,
+        to: options.to,
+        earth: options.earth,
+        cells: options.cells.unwrap_or_default(),
+        ocean: ocean(settings, &store, options.ocean.as_ref()).await?,
+        ..query(
+            StatisticsQuery::new(options.product.clone(), asked),
+            &options.statistics,
+        )
+    };
+    run(
+        settings,
+        &query,
+        Form::of(&options.statistics, options.json),
+    )
+    .await
+}
+
+fn query(usual: StatisticsQuery, options: &StatisticsOptions) -> StatisticsQuery {
+    StatisticsQuery {
+        statistics: options.statistic.clone().unwrap_or_default(),
+        step: options.step.unwrap_or_default(),
+        min_coverage: options.min_coverage.unwrap_or_default(),
+        ..usual
+    }
+}
+
+async fn run(settings: &Settings, query: &StatisticsQuery, form: Form) -> Result<()> {
+    let store = deployment::store(settings)?;
+    deployment::manifest(&store, &query.product, &settings.data).await?;
+    let engine = deployment::region_engine(settings, store)?;
+    let bar = progress::bar("statistics", 1);
+    let answer = statistics(&engine, query).await?;
+    bar.finish_and_clear();
+    match form {
+        Form::Json => return progress::result(&serde_json::to_string_pretty(&answer)?),
+        Form::Csv => progress::result(csv(&answer).trim_end())?,
+        Form::Table => progress::result(&table(&answer).to_string())?,
+    }
+    progress::say(&format!(
+        "{} in {}, {} of {} ({:.6e} {}) on the {} earth; cite {}",
+        answer.quantity.title(),
+        answer.unit,
+        answer.kind,
+        answer.geometry,
+        answer.size,
+        answer.size_unit,
+        answer.earth,
+        answer.manifest
+    ));
+    for one in &answer.statistics {
+        progress::say(&format!("{} ({}): {}", one.name, one.unit, one.what));
+    }
+    progress::say(&format!("coverage: {}", answer.coverage_basis));
+    if let Some(source) = &answer.ocean_source {
+        progress::say(&format!("what is sea: {source}"));
+    }
+    let withheld = answer.rows.iter().filter(|row| row.is_withheld).count();
+    if withheld > 0 {
+        progress::say(&format!(
+            "{withheld} rows have less than {} % coverage: their values are withheld",
+            answer.min_coverage_percent
+        ));
+    }
+    for note in &answer.notes {
+        progress::say(&format!("note: {note}"));
+    }
+    progress::say(&answer.source);
+    Ok(())
+}
+
+fn table(answer: &StatisticsAnswer) -> Table {
+    let mut table = Table::new();
+    table.load_preset(NOTHING);
+    let mut header = vec!["from".to_owned(), "to".to_owned()];
+    header.extend(answer.statistics.iter().map(|one| one.name.clone()));
+    header.push("% covered".to_owned());
+    let columns = header.len();
+    table.set_header(header);
+    for column in 2..columns {
+        if let Some(column) = table.column_mut(column) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    for row in &answer.rows {
+        let mut cells = vec![progress::day(row.start), progress::day(row.end)];
+        cells.extend(answer.statistics.iter().map(|one| shown(row, &one.name)));
+        cells.push(format!("{:.1}", row.coverage_percent));
+        table.add_row(cells);
+    }
+    table
+}
+
+/// A value with as many digits as people read, and where an extreme was found.
+fn shown(row: &StatisticsRow, name: &str) -> String {
+    let Some(value) = row.values.get(name).copied().flatten() else {
+        let why = if row.is_withheld {
+            "withheld"
+        } else {
+            "no data"
+        };
+        return why.to_owned();
+    };
+    let number = if value != 0.0 && !(1e-3..1e9).contains(&value.abs()) {
+        format!("{value:.4e}")
+    } else if name == "count" {
+        format!("{value}")
+    } else {
+        format!("{value:.4}")
+    };
+    match row.found_at.get(name) {
+        Some(time) => format!("{number} ({})", progress::day(*time)),
+        None => number,
+    }
+}
+
+/// A line a row; a value that is not there is empty.
+fn csv(answer: &StatisticsAnswer) -> String {
+    let names = || answer.statistics.iter().map(|one| one.name.as_str());
+    let mut header = vec!["start".to_owned(), "end".to_owned()];
+    for one in &answer.statistics {
+        header.push(one.name.clone());
+        if ["min", "max"].contains(&one.name.as_str()) {
+            header.push(format!("{}_found_at", one.name));
+        }
+    }
+    header.extend(["coverage_percent", "step_count", "is_withheld"].map(str::to_owned));
+    let mut lines = vec![header.join(",")];
+    for row in &answer.rows {
+        let mut cells = vec![row.start.to_string(), row.end.to_string()];
+        for name in names() {
+            let value = row.values.get(name).copied().flatten();
+            cells.push(value.map_or_else(String::new, |value| value.to_string()));
+            if ["min", "max"].contains(&name) {
+                let at = row.found_at.get(name);
+                cells.push(at.map_or_else(String::new, ToString::to_string));
+            }
+        }
+        cells.extend([
+            row.coverage_percent.to_string(),
+            row.step_count.to_string(),
+            row.is_withheld.to_string(),
+        ]);
+        lines.push(cells.join(","));
+    }
+    lines.join("\n") + "\n"
+}

@@ -1,0 +1,79 @@
+//! `/api/products/{product}/line`: statistics of a product along a line, each cell by the length of the line in it.
+
+use axum::extract::State;
+use axum::response::Response;
+use contract::earth::Earth;
+use contract::geometry::AskedGeometry;
+use contract::statistics::{StatisticsAnswer, StatisticsQuery, StatisticsStep};
+use serde::Deserialize;
+use utoipa::IntoParams;
+
+use crate::error::ServerError;
+use crate::extract::{UrlPath, UrlQuery, parsed};
+use crate::routes::statistics::{Asked, answer};
+use crate::state::AppState;
+
+#[derive(Debug, Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct LineParameters {
+    /// `LON,LAT;LON,LAT;...` in degrees, GeoJSON or well-known text; a great circle from each vertex to the next.
+    #[param(value_type = String)]
+    line: Option<String>,
+    /// Statistics, separated by commas: `mean`, `sum`, `min`, `max`, `std`, `median`, `count`, `coverage`, and percentiles such
+    /// as `p90`; `mean` unless told otherwise.
+    statistic: Option<String>,
+    /// What a row covers; `native` unless told otherwise.
+    #[param(value_type = Option<StatisticsStep>)]
+    step: Option<String>,
+    /// First instant, ISO 8601 UTC; the product's own unless one is given.
+    from: Option<String>,
+    /// First instant after the period; the product's own unless one is given.
+    to: Option<String>,
+    /// Least coverage, percent: rows with less have no values; 0 unless told otherwise.
+    #[param(value_type = Option<f64>, minimum = 0, maximum = 100)]
+    min_coverage: Option<String>,
+    /// Figure of the earth for lengths; `wgs84` unless one is given.
+    #[param(value_type = Option<Earth>)]
+    earth: Option<String>,
+    /// Version, as answers name it; the newest unless one is given.
+    manifest: Option<String>,
+}
+
+/// Statistics along a line, by length.
+#[utoipa::path(
+    get,
+    path = "/api/products/{product}/line",
+    operation_id = "line",
+    tag = "statistics",
+    params(("product" = String, Path, description = "Name of the product"), LineParameters),
+    responses((status = 200, description = "One row for each bin of time", body = StatisticsAnswer)),
+)]
+pub(crate) async fn get(
+    State(state): State<AppState>,
+    UrlPath(product): UrlPath<String>,
+    UrlQuery(own): UrlQuery<LineParameters>,
+) -> Result<Response, ServerError> {
+    let layer = state
+        .catalogue
+        .version(&product, own.manifest.as_deref())
+        .await?;
+    let Some(line) = own.line.as_deref() else {
+        return Err(ServerError::Missing {
+            name: "line",
+            wanted: "LON,LAT;LON,LAT;... in degrees, GeoJSON or WKT text",
+        });
+    };
+    let asked = Asked {
+        statistic: own.statistic.as_deref(),
+        step: own.step.as_deref(),
+        min_coverage: own.min_coverage.as_deref(),
+        from: own.from.as_deref(),
+        to: own.to.as_deref(),
+    };
+    let usual = StatisticsQuery {
+        earth: parsed(own.earth.as_deref())?.unwrap_or_default(),
+        ..StatisticsQuery::new(layer.manifest.product.clone(), AskedGeometry::line(line)?)
+    };
+    answer(&state, &layer, asked.query(usual)?).await
+}
