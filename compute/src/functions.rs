@@ -7,7 +7,6 @@ mod column_sum;
 mod has_data;
 mod lists;
 mod region_sums;
-mod series_at;
 mod sound;
 
 use std::sync::Arc;
@@ -25,7 +24,6 @@ pub fn scalar_functions(objects: &Objects) -> Vec<Arc<ScalarUDF>> {
         AsyncScalarUDF::new(Arc::new(region_sums)).into_scalar_udf(),
         AsyncScalarUDF::new(Arc::new(band_sums)).into_scalar_udf(),
         ScalarUDF::from(has_data::HasData::new()),
-        ScalarUDF::from(series_at::SeriesAt::new()),
         ScalarUDF::from(sound::Sound::new()),
     ]
     .map(Arc::new)

@@ -1,7 +1,7 @@
 //! Statistics and carbon budgets over stored products, on Ballista and DataFusion.
 //!
-//! Questions are SQL over the stored fields and series, a row a chunk; the array work happens in the SQL functions of
-//! [`functions`], which call the pure kernels of [`budget`] and [`stats`]. Sums are integers, so that an answer has the
+//! Questions are SQL over the stored fields, a row a chunk; the array work happens in the SQL functions of
+//! [`functions`], which call the pure kernels of [`budget`] and [`stats`]. Values along time come from cubes ([`values`]). Sums are integers, so that an answer has the
 //! same bits however many parts it was computed in.
 
 pub mod budget;
@@ -27,6 +27,7 @@ mod standalone;
 mod state;
 pub mod stats;
 mod tail_store;
+mod values;
 
 pub use budget::budget;
 pub use check::compare;

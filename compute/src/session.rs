@@ -18,6 +18,7 @@ use tokio::sync::OnceCell;
 
 use crate::cluster::{self, Cluster, SchedulerUrl};
 use crate::standalone::{self, WorkFolder, WorkLease};
+use crate::values::OpenVersions;
 use crate::{ComputeError, Objects, state};
 
 /// A query that a cluster does not answer within this is given up: no executor has been there, or none has room for it.
@@ -27,6 +28,7 @@ const QUERY_LIMIT: Duration = Duration::from_hours(1);
 #[derive(Clone)]
 pub struct Engine {
     inner: Arc<Inner>,
+    open_versions: Arc<OpenVersions>,
     /// May a question about a region leave its weights in the store?
     stores_weights: bool,
 }
@@ -186,6 +188,7 @@ impl Engine {
     fn of(inner: Inner) -> Self {
         Self {
             inner: Arc::new(inner),
+            open_versions: Arc::new(OpenVersions::new()),
             stores_weights: true,
         }
     }
@@ -193,6 +196,11 @@ impl Engine {
     /// The store that it reads and writes.
     pub fn store(&self) -> &Store {
         &self.inner.store
+    }
+
+    /// Versions whose values along time it has opened.
+    pub(crate) fn open_versions(&self) -> &OpenVersions {
+        &self.open_versions
     }
 
     /// Where its queries read objects.

@@ -2,9 +2,7 @@
 
 use contract::key::ObjectKey;
 use contract::kind::Kind;
-use contract::manifest::{
-    MANIFEST_SCHEMA, Manifest, ManifestId, OLDEST_MANIFEST_SCHEMA, SeriesSegment, Step,
-};
+use contract::manifest::{MANIFEST_SCHEMA, Manifest, ManifestId, OLDEST_MANIFEST_SCHEMA, Step};
 use contract::product::ProductId;
 
 use crate::sound::damage;
@@ -105,20 +103,6 @@ pub async fn settle(
             step.field = fields::settle(store, &there.field, &step.field, &next.grid).await?;
         }
     }
-    let fields = |manifest: &Manifest, segment: &SeriesSegment| {
-        let first = segment.first_step as usize;
-        let steps = manifest.steps.get(first..first + segment.steps as usize);
-        steps.map(|steps| steps.iter().map(|it| it.field.clone()).collect::<Vec<_>>())
-    };
-    let mut series = next.series.clone();
-    for segment in &mut series {
-        let own = fields(next, segment);
-        let same = |there: &&SeriesSegment| own.is_some() && fields(newest, there) == own;
-        if let Some(there) = newest.series.iter().find(same) {
-            segment.series = there.series.clone();
-        }
-    }
-    next.series = series;
     Ok(())
 }
 

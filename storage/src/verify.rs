@@ -193,7 +193,6 @@ async fn names_of(store: &Store, key: &ObjectKey) -> Result<Vec<ObjectKey>, Stor
         return Ok(vec![]);
     };
     let mut names = vec![manifest.domain.clone()];
-    names.extend(manifest.series.iter().map(|segment| segment.series.clone()));
     for step in &manifest.steps {
         names.push(step.field.clone());
         names.extend(step.contributed.as_ref().map(|of| of.counts.clone()));

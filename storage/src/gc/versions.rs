@@ -9,7 +9,7 @@ use contract::kind::Kind;
 use super::{Kept, Owner};
 use crate::{StorageError, Store};
 
-/// Manifests and what they name.
+/// Manifests and what they name; but for series, which versions of before name and nobody reads any more.
 #[derive(Debug)]
 pub struct Versions;
 
@@ -36,7 +36,6 @@ impl Owner for Versions {
             let product = &manifest.product;
             keys.insert(ObjectKey::manifest(product, manifest.number));
             keys.insert(manifest.domain.clone());
-            keys.extend(manifest.series.iter().map(|segment| segment.series.clone()));
             for step in &manifest.steps {
                 keys.insert(step.field.clone());
                 keys.extend(step.contributed.iter().map(|step| step.counts.clone()));

@@ -23,8 +23,6 @@ pub(super) struct Merged {
     pub(super) orders: Vec<Option<NoticeOrder>>,
     /// One for each file.
     pub(super) changes: Vec<Change>,
-    /// Was a step replaced, rather than only new ones added?
-    pub(super) is_revision: bool,
     /// Index of the last file that was taken.
     pub(super) last_taken: Option<usize>,
 }
@@ -87,7 +85,6 @@ pub(super) fn merge(newest: Option<&Manifest>, granules: &[StoredGranule]) -> Me
         steps: vec![],
         orders: vec![],
         changes: Vec::with_capacity(granules.len()),
-        is_revision: false,
         last_taken: None,
     };
     for (index, granule) in granules.iter().enumerate() {
@@ -101,9 +98,8 @@ pub(super) fn merge(newest: Option<&Manifest>, granules: &[StoredGranule]) -> Me
             Ok(()) => add(&mut placed, granule),
             Err(rejection) => Change::Refused(rejection),
         };
-        if let Change::Taken { revised, .. } = &change {
+        if let Change::Taken { .. } = &change {
             merged.last_taken = Some(index);
-            merged.is_revision |= revised;
         }
         merged.changes.push(change);
     }
