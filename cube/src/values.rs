@@ -283,20 +283,22 @@ impl Values {
         let reads = self.reads(&steps);
         let asked: Vec<[u32; 2]> = blocks.iter().map(|block| block.at).collect();
         let windows: Vec<Window> = blocks.iter().map(|block| block.window).collect();
-        for ((cube, run), pieces) in &reads.runs {
-            let read = |(number, at): (usize, &[u32; 2])| {
-                let at = *at;
-                async move {
-                    let values = cubes[*cube].block(*run, at).await?;
-                    Ok::<_, CubeError>((number, values))
-                }
-            };
-            let mut found =
-                stream::iter(asked.iter().enumerate().map(read)).buffered(BLOCKS_AT_ONCE);
-            while let Some((number, values)) = found.try_next().await? {
-                if let Some(values) = values {
-                    blocks[number].put_run(&values, pieces, steps.len());
-                }
+        let mut parts = vec![];
+        for (cube, run) in reads.runs.keys() {
+            parts.extend(
+                (0..)
+                    .zip(&asked)
+                    .map(|(number, at)| (*cube, *run, number, *at)),
+            );
+        }
+        let read = |(cube, run, number, at): (usize, usize, usize, [u32; 2])| async move {
+            let values = cubes[cube].block(run, at).await?;
+            Ok::<_, CubeError>(((cube, run), number, values))
+        };
+        let mut found = stream::iter(parts).map(read).buffered(BLOCKS_AT_ONCE);
+        while let Some((run, number, values)) = found.try_next().await? {
+            if let Some(values) = values {
+                blocks[number].put_run(&values, &reads.runs[&run], steps.len());
             }
         }
         let windows = &windows;

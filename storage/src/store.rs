@@ -34,6 +34,7 @@ use url::Url;
 use self::checked::Checked;
 use self::location::Location;
 use crate::StorageError;
+use crate::manifests::{Newest, Pages};
 
 pub use self::leftovers::Leftover;
 pub use self::settings::{RetryLimits, Settings};
@@ -59,6 +60,10 @@ pub struct Store {
     place: Place,
     retry_limits: RetryLimits,
     checked: Arc<Checked>,
+    /// Pages of manifests that were read.
+    pub(crate) pages: Arc<Pages>,
+    /// The newest numbers of manifests that were seen.
+    pub(crate) newest: Arc<Newest>,
 }
 
 /// What kind of store it is, where that matters.
@@ -122,6 +127,8 @@ impl Store {
             place: Place::Memory,
             retry_limits: RetryLimits::default(),
             checked: Arc::default(),
+            pages: Arc::default(),
+            newest: Arc::default(),
         }
     }
 
@@ -141,6 +148,8 @@ impl Store {
             place: Place::Folder(root),
             retry_limits: RetryLimits::default(),
             checked: Arc::default(),
+            pages: Arc::default(),
+            newest: Arc::default(),
         })
     }
 
@@ -160,6 +169,8 @@ impl Store {
             place,
             retry_limits,
             checked: Arc::default(),
+            pages: Arc::default(),
+            newest: Arc::default(),
         })
     }
 

@@ -18,6 +18,7 @@ impl Owner for Versions {
     fn kinds(&self) -> &'static [Kind] {
         &[
             Kind::Manifest,
+            Kind::ManifestPage,
             Kind::Contributed,
             Kind::Domain,
             Kind::Field,
@@ -36,6 +37,9 @@ impl Owner for Versions {
             let product = &manifest.product;
             keys.insert(ObjectKey::manifest(product, manifest.number));
             keys.insert(manifest.domain.clone());
+            if let Some((paged, _pages)) = manifest.paged() {
+                keys.extend(paged.page_keys());
+            }
             for step in &manifest.steps {
                 keys.insert(step.field.clone());
                 keys.extend(step.contributed.iter().map(|step| step.counts.clone()));

@@ -92,6 +92,7 @@ async fn put_others(store: &Store, product: &ProductId, raw_sha256: Digest, peri
         "readings/p/a",
         "checks/a.json",
         "observation-indexes/p/1.json",
+        "manifest-pages/p/a.json",
         "protocol/current.json",
     ] {
         let document = serde_json::json!({"schema": 2, "name": name});

@@ -13,13 +13,14 @@ use contract::grid::Grid;
 use contract::key::ObjectKey;
 use contract::kind::{Kind, Vouched};
 use contract::manifest::{MANIFEST_SCHEMA, Manifest, OLDEST_MANIFEST_SCHEMA, SeriesSegment, Step};
+use contract::manifest::{PAGED_SCHEMA, Page};
 use contract::masked::MaskedCells;
 use contract::notice::NoticeRun;
 use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::time::Period;
 use storage::contributed::{self, Contributed};
-use storage::{Store, domain, fields, manifests, verify, weights};
+use storage::{Store, document, domain, fields, manifests, verify, weights};
 
 const ROWS: u32 = 61;
 const COLS: u32 = 20;
@@ -313,6 +314,18 @@ async fn a_frozen_version_says_what_was_masked_and_in_which_order_files_came() {
         (at, 3, 17)
     );
     assert!(orders[0].file == 1 && orders[0] < orders[1]);
+}
+
+#[tokio::test]
+async fn a_frozen_page_holds_the_steps_of_its_manifest() {
+    let (_folder, store) = copy(2);
+    let keys = store.list("manifest-pages/fgco2").await.unwrap();
+    let page: Page = document::get(&store, &keys[0]).await.unwrap().unwrap();
+    assert_eq!(keys, [ObjectKey::manifest_page(&product(), &page.name())]);
+    let manifest = manifests::numbered(&store, &product(), 2).await.unwrap();
+    let manifest = manifest.unwrap();
+    assert_eq!((page.schema, page.steps), (PAGED_SCHEMA, manifest.steps));
+    assert_eq!(page.notices, manifest.notices);
 }
 
 #[tokio::test]

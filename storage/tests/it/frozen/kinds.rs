@@ -45,6 +45,10 @@ fn reader(kind: Kind) -> Reader {
             "compute/tests/it/frozen.rs",
             "frozen_sums_answer_where_no_field_can",
         ),
+        Kind::ManifestPage => since_2(
+            "storage/tests/it/frozen.rs",
+            "a_frozen_page_holds_the_steps_of_its_manifest",
+        ),
         // Cubes were exported only, never in a store, before.
         Kind::Cube => since_2(
             "cube/tests/it/frozen.rs",
