@@ -191,8 +191,13 @@ async fn names_of(store: &Store, key: &ObjectKey) -> Result<Vec<ObjectKey>, Stor
     let manifest = match manifests::at(store, key).await {
         Ok(Some(manifest)) => manifest,
         Ok(None) => return Ok(vec![]),
-        // A page of it: what is gone is told all the same.
-        Err(StorageError::Damaged { .. }) => return manifests::page_keys(store, key).await,
+        // A page of it is gone, which is told by its name; or it is of a program to come.
+        Err(StorageError::Damaged { .. }) => {
+            return match manifests::page_keys(store, key).await {
+                Err(StorageError::Damaged { .. }) => Ok(vec![]),
+                keys => keys,
+            };
+        }
         Err(e) => return Err(e),
     };
     let mut names = manifests::page_keys(store, key).await?;

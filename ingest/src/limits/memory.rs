@@ -34,7 +34,8 @@ const TEXT_BYTES_PER_OBSERVATION: u64 = 4;
 pub(crate) fn grids_at_once(planned: &PlannedGranule) -> usize {
     let processors = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
     let map = planned.plane_cells().saturating_mul(CELL_BYTES).max(1);
-    ((MAPS_BYTES / map) as usize).clamp(1, processors + MAPS_WAITING)
+    let most = planned.steps.len().min(processors + MAPS_WAITING);
+    ((MAPS_BYTES / map) as usize).clamp(1, most.max(1))
 }
 
 /// A file of maps: a few at a time, whatever their number.
