@@ -1,7 +1,7 @@
 //! Statistics and carbon budgets over stored products, on Ballista and DataFusion.
 //!
 //! Questions are SQL over the stored fields, a row a chunk; the array work happens in the SQL functions of
-//! [`functions`], which call the pure kernels of [`budget`] and [`stats`]. Values along time come from cubes ([`values`]). Sums are integers, so that an answer has the
+//! [`functions`], which call the pure kernels of [`budget`] and [`stats`]. Values along time come from cubes ([`Engine::values`]). Sums are integers, so that an answer has the
 //! same bits however many parts it was computed in.
 
 pub mod budget;
@@ -15,6 +15,7 @@ pub mod functions;
 pub mod gc;
 pub mod matchup;
 mod objects;
+mod open_versions;
 pub mod point;
 pub mod published;
 pub mod recompute;
@@ -27,7 +28,6 @@ mod standalone;
 mod state;
 pub mod stats;
 mod tail_store;
-mod values;
 
 pub use budget::budget;
 pub use check::compare;

@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use ballista::extension::SessionConfigExt as _;
 use contract::digest::Digest;
+use contract::manifest::{Manifest, ManifestId};
 use datafusion::catalog::MemoryCatalogProviderList;
 use datafusion::error::DataFusionError;
 use datafusion::execution::context::SessionContext;
@@ -17,8 +18,8 @@ use storage::Store;
 use tokio::sync::OnceCell;
 
 use crate::cluster::{self, Cluster, SchedulerUrl};
+use crate::open_versions::OpenVersions;
 use crate::standalone::{self, WorkFolder, WorkLease};
-use crate::values::OpenVersions;
 use crate::{ComputeError, Objects, state};
 
 /// A query that a cluster does not answer within this is given up: no executor has been there, or none has room for it.
@@ -198,9 +199,22 @@ impl Engine {
         &self.inner.store
     }
 
-    /// Versions whose values along time it has opened.
-    pub(crate) fn open_versions(&self) -> &OpenVersions {
-        &self.open_versions
+    /// Values of a version of a product along time; `id` is its name, which is costly to compute. What was opened is held.
+    ///
+    /// # Errors
+    /// A store that does not answer; a cube that cannot be read.
+    pub async fn values(
+        &self,
+        manifest: &Manifest,
+        id: &ManifestId,
+    ) -> Result<cube::Values, ComputeError> {
+        let opened = self.open_versions.values(self.store(), manifest, id);
+        Ok(opened.await?)
+    }
+
+    /// Lets go of a version's values; false if they were not held.
+    pub(crate) fn forget_values(&self, id: &ManifestId) -> bool {
+        self.open_versions.forget(id)
     }
 
     /// Where its queries read objects.

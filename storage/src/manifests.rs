@@ -1,6 +1,5 @@
 //! Numbered manifests: the newest of a product, one by its name, and the commit of the next.
 
-mod newest;
 mod pages;
 
 use std::collections::BTreeSet;
@@ -15,9 +14,6 @@ use contract::product::ProductId;
 
 use crate::sound::damage;
 use crate::{StorageError, Store, document, fields};
-
-pub(crate) use newest::Newest;
-pub(crate) use pages::Pages;
 
 /// Products that have a manifest, sorted by name.
 pub async fn products(store: &Store) -> Result<Vec<ProductId>, StorageError> {

@@ -12,8 +12,10 @@ mod create;
 mod faulty;
 mod folder;
 mod hdfs;
+mod held_pages;
 mod leftovers;
 mod location;
+mod newest;
 mod read;
 mod retry_store;
 mod settings;
@@ -32,9 +34,10 @@ use object_store::prefix::PrefixStore;
 use url::Url;
 
 use self::checked::Checked;
+use self::held_pages::HeldPages;
 use self::location::Location;
+use self::newest::Newest;
 use crate::StorageError;
-use crate::manifests::{Newest, Pages};
 
 pub use self::leftovers::Leftover;
 pub use self::settings::{RetryLimits, Settings};
@@ -61,7 +64,7 @@ pub struct Store {
     retry_limits: RetryLimits,
     checked: Arc<Checked>,
     /// Pages of manifests that were read.
-    pub(crate) pages: Arc<Pages>,
+    pub(crate) pages: Arc<HeldPages>,
     /// The newest numbers of manifests that were seen.
     pub(crate) newest: Arc<Newest>,
 }

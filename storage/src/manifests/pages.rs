@@ -6,24 +6,12 @@ use std::sync::Arc;
 use contract::key::ObjectKey;
 use contract::manifest::{Manifest, Page, PagedManifest};
 use futures::stream::{self, StreamExt as _, TryStreamExt as _};
-use quick_cache::sync::Cache;
 
 use crate::sound::damage;
 use crate::{StorageError, Store, document};
 
-/// Pages that are held, 60 kB each.
-const HELD: usize = 512;
 /// Pages that are read or sent at a time.
 const AT_ONCE: usize = 8;
-
-/// Pages that a process has read or written.
-pub(crate) struct Pages(Cache<ObjectKey, Arc<Page>>);
-
-impl Default for Pages {
-    fn default() -> Self {
-        Self(Cache::new(HELD))
-    }
-}
 
 /// The manifest whose pages these are named in.
 ///
@@ -44,8 +32,7 @@ pub(super) async fn assemble(
 }
 
 async fn read(store: &Store, key: ObjectKey) -> Result<Arc<Page>, StorageError> {
-    let held = &store.pages.0;
-    if let Some(page) = held.get(&key) {
+    if let Some(page) = store.pages.get(&key) {
         return Ok(page);
     }
     let Some(page) = document::get::<Page>(store, &key).await? else {
@@ -58,7 +45,7 @@ async fn read(store: &Store, key: ObjectKey) -> Result<Arc<Page>, StorageError> 
         return Err(damage::found(&key, "its steps are not those of its name"));
     }
     let page = Arc::new(page);
-    held.insert(key, Arc::clone(&page));
+    store.pages.insert(key, Arc::clone(&page));
     Ok(page)
 }
 
@@ -74,7 +61,7 @@ pub(super) async fn write(
     stream::iter(new.collect::<Vec<_>>())
         .map(|(key, page)| async move {
             document::put_new(store, &key, &page).await?;
-            store.pages.0.insert(key, Arc::new(page));
+            store.pages.insert(key, Arc::new(page));
             Ok::<_, StorageError>(())
         })
         .buffer_unordered(AT_ONCE)

@@ -10,18 +10,18 @@ use contract::product::ProductId;
 pub(crate) struct Newest(Mutex<BTreeMap<ProductId, u64>>);
 
 impl Newest {
-    pub(super) fn get(&self, product: &ProductId) -> Option<u64> {
+    pub(crate) fn get(&self, product: &ProductId) -> Option<u64> {
         self.lock().get(product).copied()
     }
 
     /// Keeps a number, unless a newer one was seen meanwhile.
-    pub(super) fn insert(&self, product: ProductId, number: u64) {
+    pub(crate) fn insert(&self, product: ProductId, number: u64) {
         let mut all = self.lock();
         let newest = all.entry(product).or_default();
         *newest = number.max(*newest);
     }
 
-    pub(super) fn remove(&self, product: &ProductId) {
+    pub(crate) fn remove(&self, product: &ProductId) {
         self.lock().remove(product);
     }
 
