@@ -64,6 +64,9 @@ pub enum ComputeError {
     /// Something durable could not be read or written.
     #[error(transparent)]
     Storage(#[from] StorageError),
+    /// A cube could not be read.
+    #[error(transparent)]
+    Cube(#[from] cube::CubeError),
     /// The query engine failed.
     #[error("query engine, {what}: {source}")]
     Engine {
@@ -143,6 +146,7 @@ impl ComputeError {
             | Self::SchedulerUrl { .. }
             | Self::Contract(_) => ErrorClass::BadRequest,
             Self::Storage(e) => retryable_if(e.is_retryable()),
+            Self::Cube(e) => retryable_if(e.is_retryable()),
             Self::Engine { source, .. } => retryable_if(failure::of(source) == Failure::Passing),
             Self::Cluster { source, .. } => {
                 retryable_if(failure::of_ballista(source) == Failure::Passing)

@@ -9,7 +9,6 @@ mod has_data;
 mod lists;
 mod merge_accumulated;
 mod region_sums;
-mod series_at;
 mod sound;
 
 use std::sync::Arc;
@@ -29,7 +28,6 @@ pub fn scalar_functions(objects: &Objects) -> Vec<Arc<ScalarUDF>> {
         AsyncScalarUDF::new(Arc::new(band_sums)).into_scalar_udf(),
         AsyncScalarUDF::new(Arc::new(accumulate)).into_scalar_udf(),
         ScalarUDF::from(has_data::HasData::new()),
-        ScalarUDF::from(series_at::SeriesAt::new()),
         ScalarUDF::from(sound::Sound::new()),
     ]
     .map(Arc::new)

@@ -1,7 +1,7 @@
 //! Statistics and carbon budgets over stored products, on Ballista and DataFusion.
 //!
-//! Questions are SQL over the stored fields and series, a row a chunk; the array work happens in the SQL functions of
-//! [`functions`], which call the pure kernels of [`budget`] and [`stats`]. Sums are integers, so that an answer has the
+//! Questions are SQL over the stored fields, a row a chunk; the array work happens in the SQL functions of
+//! [`functions`], which call the pure kernels of [`budget`] and [`stats`]. Values along time come from cubes ([`Engine::values`]). Sums are integers, so that an answer has the
 //! same bits however many parts it was computed in.
 
 pub mod budget;
@@ -15,6 +15,7 @@ pub mod functions;
 pub mod gc;
 pub mod matchup;
 mod objects;
+mod open_versions;
 pub mod point;
 pub mod published;
 pub mod recompute;

@@ -29,7 +29,7 @@ pub async fn point_series_of(
     let (row, col) = manifest.cell_inside(place)?;
     let display = manifest.quantity.display();
     let shown = |value: f32| f64::from(value) * display.factor + display.offset;
-    let values = cell_values(engine, manifest, row, col).await?;
+    let values = cell_values(engine, manifest, &id, row, col).await?;
     let counts = counts_at_cell(engine, manifest, row, col).await?;
     let point = |(index, step): (usize, &contract::manifest::Step)| PointValue {
         start: step.period.start,

@@ -1,4 +1,4 @@
-//! Stored objects as tables: fields and series under the names that SQL uses, each row checked as it is read.
+//! Stored objects as tables: fields under the name that SQL uses, each row checked as it is read.
 
 use std::panic::AssertUnwindSafe;
 use std::sync::Arc;
@@ -13,44 +13,15 @@ use datafusion::datasource::listing::{
 };
 use datafusion::execution::context::SessionContext;
 use futures::FutureExt as _;
-use storage::{StorageError, Store};
+use storage::{StorageError, Store, fields};
 
 use crate::ComputeError;
 use crate::tail_store::TAIL_BYTES;
 
-/// What rows of stored objects hold.
-#[derive(Debug, Clone, Copy)]
-pub(crate) enum Layout {
-    Fields,
-    Series,
-}
+/// What says which row of a field it is.
+const KEYS: &str = "chunk, period_start, period_end";
 
-impl Layout {
-    fn schema(self) -> &'static SchemaRef {
-        match self {
-            Self::Fields => &storage::fields::SCHEMA,
-            Self::Series => &storage::series::SCHEMA,
-        }
-    }
-
-    /// The schema of objects that are named by their bytes; they have no checks in their rows.
-    fn schema_1(self) -> &'static SchemaRef {
-        match self {
-            Self::Fields => &storage::fields::SCHEMA_1,
-            Self::Series => &storage::series::SCHEMA_1,
-        }
-    }
-
-    /// What says which row it is.
-    fn keys(self) -> &'static str {
-        match self {
-            Self::Fields => "chunk, period_start, period_end",
-            Self::Series => "block",
-        }
-    }
-}
-
-/// Makes a table of some objects of one layout. Values come out of it only where they are what their row's check says.
+/// Makes a table of some fields. Values come out of it only where they are what their row's check says.
 ///
 /// Objects of before rows had checks are each compared with their name once, whole, before they are read in parts.
 pub(crate) async fn register(
@@ -58,25 +29,23 @@ pub(crate) async fn register(
     table: &str,
     store: &Store,
     objects: &[&ObjectKey],
-    layout: Layout,
 ) -> Result<(), ComputeError> {
     let engine = || ComputeError::engine("naming stored objects");
     let is_old = |key: &&ObjectKey| matches!(key.vouches(), Vouched::Bytes(_));
     let (old, new): (Vec<&ObjectKey>, Vec<&ObjectKey>) = objects.iter().copied().partition(is_old);
-    let keys = layout.keys();
     let mut parts = vec![];
     if !new.is_empty() {
         let stored = format!("{table}_stored");
-        list(context, &stored, store, &new, layout.schema())?;
+        list(context, &stored, store, &new, &fields::SCHEMA)?;
         parts.push(format!(
-            "SELECT {keys}, sound(\"values\", \"check\", {keys}) AS \"values\" FROM {stored}"
+            "SELECT {KEYS}, sound(\"values\", \"check\", {KEYS}) AS \"values\" FROM {stored}"
         ));
     }
     if !old.is_empty() {
         store.check_once(&old).await?;
         let stored = format!("{table}_stored_1");
-        list(context, &stored, store, &old, layout.schema_1())?;
-        parts.push(format!("SELECT {keys}, \"values\" FROM {stored}"));
+        list(context, &stored, store, &old, &fields::SCHEMA_1)?;
+        parts.push(format!("SELECT {KEYS}, \"values\" FROM {stored}"));
     }
     let checked = context.sql(&parts.join(" UNION ALL ")).await;
     context

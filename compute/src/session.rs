@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use ballista::extension::SessionConfigExt as _;
 use contract::digest::Digest;
+use contract::manifest::{Manifest, ManifestId};
 use datafusion::catalog::MemoryCatalogProviderList;
 use datafusion::error::DataFusionError;
 use datafusion::execution::context::SessionContext;
@@ -17,6 +18,7 @@ use storage::Store;
 use tokio::sync::OnceCell;
 
 use crate::cluster::{self, Cluster, SchedulerUrl};
+use crate::open_versions::OpenVersions;
 use crate::standalone::{self, WorkFolder, WorkLease};
 use crate::{ComputeError, Objects, state};
 
@@ -27,6 +29,7 @@ const QUERY_LIMIT: Duration = Duration::from_hours(1);
 #[derive(Clone)]
 pub struct Engine {
     inner: Arc<Inner>,
+    open_versions: Arc<OpenVersions>,
     /// May a question about a region leave its weights in the store?
     stores_weights: bool,
 }
@@ -186,6 +189,7 @@ impl Engine {
     fn of(inner: Inner) -> Self {
         Self {
             inner: Arc::new(inner),
+            open_versions: Arc::new(OpenVersions::new()),
             stores_weights: true,
         }
     }
@@ -193,6 +197,24 @@ impl Engine {
     /// The store that it reads and writes.
     pub fn store(&self) -> &Store {
         &self.inner.store
+    }
+
+    /// Values of a version of a product along time; `id` is its name, which is costly to compute. What was opened is held.
+    ///
+    /// # Errors
+    /// A store that does not answer; a cube that cannot be read.
+    pub async fn values(
+        &self,
+        manifest: &Manifest,
+        id: &ManifestId,
+    ) -> Result<cube::Values, ComputeError> {
+        let opened = self.open_versions.values(self.store(), manifest, id);
+        Ok(opened.await?)
+    }
+
+    /// Lets go of a version's values; false if they were not held.
+    pub(crate) fn forget_values(&self, id: &ManifestId) -> bool {
+        self.open_versions.forget(id)
     }
 
     /// Where its queries read objects.

@@ -2,7 +2,6 @@
 
 mod cell_series;
 pub mod region_series;
-pub mod series;
 
 pub(crate) use cell_series::cell_values;
 pub use region_series::{region_series, region_series_of};

@@ -54,6 +54,11 @@ impl ObjectKey {
         Self(format!("manifests/{product}/{number:010}.json"))
     }
 
+    /// Some consecutive steps of manifests, named by the digest of their JSON.
+    pub fn manifest_page(product: &ProductId, sha256: &Digest) -> Self {
+        Self(format!("manifest-pages/{product}/{sha256}.json"))
+    }
+
     /// Areas of a region's share of every cell, named by grid, region and earth.
     pub fn weights(job: &Digest) -> Self {
         Self(format!("weights/{job}.parquet"))
@@ -143,6 +148,7 @@ mod tests {
             ObjectKey::contributed(&product, &digest),
             ObjectKey::domain(&product, &digest),
             ObjectKey::manifest(&product, 7),
+            ObjectKey::manifest_page(&product, &digest),
             ObjectKey::weights(&digest),
             ObjectKey::observations(&product, &digest),
             ObjectKey::check(&digest),

@@ -12,12 +12,14 @@ pub enum Kind {
     Field,
     /// Steps and time that each sum of accumulated carbon holds, map-major.
     Contributed,
-    /// A run of steps, time-major.
+    /// A run of steps, time-major, as programs of before stored it beside cubes: nobody reads it.
     Series,
     /// The cells that hold data in some step.
     Domain,
     /// What a product consists of.
     Manifest,
+    /// Steps of manifests, where there are many.
+    ManifestPage,
     /// A region's share of every cell.
     Weights,
     /// Sums over a region, of every step of a version.
@@ -57,13 +59,14 @@ pub enum Vouched {
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 19] = [
         Self::Raw,
         Self::Field,
         Self::Contributed,
         Self::Series,
         Self::Domain,
         Self::Manifest,
+        Self::ManifestPage,
         Self::Weights,
         Self::Sums,
         Self::Cube,
@@ -87,6 +90,7 @@ impl Kind {
             Self::Series => "series",
             Self::Domain => "domain",
             Self::Manifest => "manifests",
+            Self::ManifestPage => "manifest-pages",
             Self::Weights => "weights",
             Self::Sums => "sums",
             Self::Cube => "cubes",
@@ -140,7 +144,8 @@ mod tests {
             Kind::Contributed => Some(Kind::Series),
             Kind::Series => Some(Kind::Domain),
             Kind::Domain => Some(Kind::Manifest),
-            Kind::Manifest => Some(Kind::Weights),
+            Kind::Manifest => Some(Kind::ManifestPage),
+            Kind::ManifestPage => Some(Kind::Weights),
             Kind::Weights => Some(Kind::Sums),
             Kind::Sums => Some(Kind::Cube),
             Kind::Cube => Some(Kind::Accumulating),
@@ -189,6 +194,11 @@ mod tests {
             (
                 ObjectKey::manifest(&product, 7),
                 Kind::Manifest,
+                Vouched::Nothing,
+            ),
+            (
+                ObjectKey::manifest_page(&product, &digest),
+                Kind::ManifestPage,
                 Vouched::Nothing,
             ),
             (ObjectKey::weights(&digest), Kind::Weights, Vouched::Nothing),

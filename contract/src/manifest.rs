@@ -1,6 +1,7 @@
 //! The numbered list of what a product consists of: the only thing that changes, and it changes whole.
 
 mod inside;
+mod paged;
 
 use std::fmt::{Display, Formatter};
 
@@ -15,6 +16,8 @@ use crate::notice::{NoticeOrder, NoticeRun};
 use crate::product::ProductId;
 use crate::quantity::Quantity;
 use crate::time::{Period, TimeMs};
+
+pub use paged::{PAGE_STEPS, PAGED_SCHEMA, Page, PagedManifest};
 
 /// Version of the manifest's JSON as it is written. Those since [`OLDEST_MANIFEST_SCHEMA`] are read too.
 ///

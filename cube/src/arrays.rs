@@ -12,8 +12,11 @@ use zarrs::array::{
     BytesToBytesCodecTraits, CodecChain, DataType, FillValue,
 };
 
+use crate::layout::{BLOCK_CELLS, RUN_STEPS};
 use crate::{CubeError, Description, Layout, cf};
 
+/// Group of the time-major copy.
+pub(crate) const SERIES: &str = "series";
 /// Steps in a chunk of the time coordinate.
 pub(crate) const TIME_CHUNK: u64 = 1024;
 /// Steps in a chunk of digests, which do not compress.
@@ -53,6 +56,40 @@ pub(crate) fn values(description: &Description, steps: u64) -> Result<Definition
         cf::of_values(description),
         inner,
     )
+}
+
+/// The time-major copy of the values, `[lat, lon, time]` of complete runs: shards of blocks of cells.
+pub(crate) fn series(description: &Description, runs: usize) -> Result<Definition, CubeError> {
+    let (grid, [rows, cols]) = (
+        &description.grid,
+        Layout::of(&description.grid).series_object(),
+    );
+    let run = RUN_STEPS as u64;
+    let shape = Shape {
+        name: format!("{SERIES}/{}", cf::variable(description.quantity)),
+        cells: vec![grid.rows.into(), grid.cols.into(), runs as u64 * run],
+        chunk: vec![rows.into(), cols.into(), run],
+        dimensions: &["lat", "lon", "series_time"],
+    };
+    let block = u64::from(BLOCK_CELLS);
+    define(
+        &shape,
+        float32(),
+        f32::NAN.into(),
+        cf::of_series(description),
+        Some(vec![block, block, run]),
+    )
+}
+
+/// Of each run of the time-major copy what it was made of, `[run, byte]`; zeros of one that is not there.
+pub(crate) fn runs(runs: usize) -> Result<Definition, CubeError> {
+    let shape = Shape {
+        name: format!("{SERIES}/steps_sha256"),
+        cells: vec![runs as u64, DIGEST_BYTES],
+        chunk: vec![DIGEST_CHUNK, DIGEST_BYTES],
+        dimensions: &["run", "sha256_byte"],
+    };
+    define(&shape, uint8(), 0u8.into(), cf::of_runs(), None)
 }
 
 /// Codecs of one chunk of values, which in a shard is a part of an object.

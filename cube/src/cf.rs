@@ -96,6 +96,19 @@ pub fn of_values(description: &Description) -> Map<String, Value> {
     attributes
 }
 
+/// Of the time-major copy of the values.
+pub(crate) fn of_series(description: &Description) -> Map<String, Value> {
+    let mut attributes = of_values(description);
+    let comment = "a copy of the values for reading along time, of complete runs of steps from the first one on; NaN, too, where a run is not made yet, which steps_sha256 tells by zeros";
+    attributes.insert("comment".to_owned(), comment.into());
+    attributes
+}
+
+/// Of what the runs of the time-major copy were made of.
+pub(crate) fn of_runs() -> Map<String, Value> {
+    attributes(json!({ "long_name": "SHA-256 of the digests of the steps of a run" }))
+}
+
 /// Of the time coordinate.
 pub fn of_time() -> Map<String, Value> {
     attributes(

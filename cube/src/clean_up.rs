@@ -113,9 +113,12 @@ impl Repository {
             .lookup_branch(crate::repository::BRANCH)
             .await
             .map_err(|e| failed(&e))?;
+        // A name that was taken cannot be given again, and whoever follows names the state that is there.
+        let own = self.description.version.as_ref();
+        let own = own.map(|version| version.number.to_string());
         let mut cut = vec![];
         for version in self.versions().await? {
-            if kept.contains(&version) {
+            if kept.contains(&version) || own.as_ref() == Some(&version) {
                 continue;
             }
             let id = self

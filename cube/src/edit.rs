@@ -73,23 +73,34 @@ impl<'a> Edit<'a> {
     /// Puts a step, in the place of one of the same period if there is one: `values` `[row, col]`, stored unit, NaN no data.
     /// They are in the store when this returns, and seen by nobody.
     pub async fn put(&mut self, period: Period, values: Arc<[f32]>) -> Result<Step, CubeError> {
-        let grid = self.description.grid;
+        let (grid, own) = (self.description.grid, Arc::clone(&values));
         plain::check_length(&values, grid.cell_count())?;
-        let objects: Vec<_> = plain::encoded(&self.encoder, &values)
+        let digested =
+            tokio::task::spawn_blocking(move || storage::fields::digest_of(&grid, &own, period));
+        let digested = digested.await;
+        let step = Step {
+            period,
+            values_sha256: digested.map_err(|e| self.repository.failed("naming the values", &e))?,
+        };
+        let staged = self.send(step, &values).await?;
+        self.stage(staged);
+        Ok(step)
+    }
+
+    /// Sends the values of a step whose digest is known. Several may be on the way at once.
+    pub(crate) async fn send(&self, step: Step, values: &Arc<[f32]>) -> Result<Staged, CubeError> {
+        plain::check_length(values, self.description.grid.cell_count())?;
+        let objects: Vec<_> = plain::encoded(&self.encoder, values)
             .map(|object| self.upload(object))
             .buffer_unordered(OBJECTS_AT_ONCE)
             .try_collect()
             .await?;
-        let digested =
-            tokio::task::spawn_blocking(move || storage::fields::digest_of(&grid, &values, period));
-        let step = Step {
-            period,
-            values_sha256: digested
-                .await
-                .map_err(|e| self.repository.failed("naming the values", &e))?,
-        };
-        self.staged.insert(period.start, Staged { step, objects });
-        Ok(step)
+        Ok(Staged { step, objects })
+    }
+
+    /// Takes a step that was sent into the change.
+    pub(crate) fn stage(&mut self, staged: Staged) {
+        self.staged.insert(staged.step.period.start, staged);
     }
 
     async fn upload(

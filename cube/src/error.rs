@@ -72,6 +72,24 @@ pub enum CubeError {
 }
 
 impl CubeError {
+    /// May the same call succeed later?
+    pub fn is_retryable(&self) -> bool {
+        match self {
+            Self::Storage(error) => error.is_retryable(),
+            Self::Contended { .. } => true,
+            Self::Exists { .. }
+            | Self::Missing { .. }
+            | Self::NoVersion { .. }
+            | Self::Foreign { .. }
+            | Self::Chunk { .. }
+            | Self::Step { .. }
+            | Self::Overlap { .. }
+            | Self::Shape { .. }
+            | Self::Outside { .. }
+            | Self::Library { .. } => false,
+        }
+    }
+
     /// A failure of the libraries, without the trace of spans that Icechunk's errors carry behind their first lines.
     pub(crate) fn library(
         place: &str,

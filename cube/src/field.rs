@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::num::NonZeroU64;
 
 use bytes::Bytes;
+use contract::chunk::Window;
 use contract::grid::Grid;
 use zarrs::array::{
     ArrayToBytesCodecTraits as _, CodecChain, CodecOptions, FromArrayBytes as _,
@@ -11,6 +12,7 @@ use zarrs::array::{
 };
 
 use crate::arrays::{self, Definition};
+use crate::layout::{BLOCK_CELLS, RUN_STEPS};
 use crate::{CubeError, Description, Layout};
 
 /// Writes fields of one grid as objects of the layout.
@@ -69,24 +71,84 @@ impl Encoder {
                 content: None,
             });
         }
-        let failed = |e: String| CubeError::library(&arrays::name(&self.definition), "encoding", e);
-        let array = &self.definition;
-        let bytes = cells.into_array_bytes(array.data_type());
-        let bytes = bytes.map_err(|e| failed(e.to_string()))?;
-        let shape = array.chunk_shape(&[0, 0, 0]);
-        let shape = shape.map_err(|e| failed(e.to_string()))?;
-        let encoded = array.codecs().encode(
-            bytes,
-            &shape,
-            array.data_type(),
-            array.fill_value(),
-            &CodecOptions::default(),
-        );
-        let encoded = encoded.map_err(|e| failed(e.to_string()))?;
         Ok(EncodedObject {
             index,
-            content: Some(Bytes::from(encoded.into_owned())),
+            content: Some(object(&self.definition, cells)?),
         })
+    }
+}
+
+/// Encodes the values of one object of an array, all of them.
+fn object(array: &Definition, values: Vec<f32>) -> Result<Bytes, CubeError> {
+    let failed = |e: String| CubeError::library(&arrays::name(array), "encoding", e);
+    let bytes = values.into_array_bytes(array.data_type());
+    let bytes = bytes.map_err(|e| failed(e.to_string()))?;
+    let shape = array.chunk_shape(&[0, 0, 0]);
+    let shape = shape.map_err(|e| failed(e.to_string()))?;
+    let encoded = array.codecs().encode(
+        bytes,
+        &shape,
+        array.data_type(),
+        array.fill_value(),
+        &CodecOptions::default(),
+    );
+    let encoded = encoded.map_err(|e| failed(e.to_string()))?;
+    Ok(Bytes::from(encoded.into_owned()))
+}
+
+/// Writes runs of steps as shards of the time-major copy.
+pub(crate) struct SeriesEncoder {
+    definition: Definition,
+    grid: Grid,
+    /// Rows and columns of a shard, cells.
+    shard: [u32; 2],
+}
+
+impl SeriesEncoder {
+    pub(crate) fn new(description: &Description) -> Result<Self, CubeError> {
+        Ok(Self {
+            definition: arrays::series(description, 1)?,
+            grid: description.grid,
+            shard: Layout::of(&description.grid).series_object(),
+        })
+    }
+
+    /// Rows and columns of all shards of a run.
+    pub(crate) fn shards(&self) -> Vec<[u32; 2]> {
+        let rows = self.grid.rows.div_ceil(self.shard[0]);
+        let cols = self.grid.cols.div_ceil(self.shard[1]);
+        (0..rows)
+            .flat_map(|row| (0..cols).map(move |col| [row, col]))
+            .collect()
+    }
+
+    /// The cells of a shard that the grid has.
+    pub(crate) fn window(&self, shard: [u32; 2]) -> Window {
+        let (row, col) = (shard[0] * self.shard[0], shard[1] * self.shard[1]);
+        Window {
+            row,
+            col,
+            rows: self.shard[0].min(self.grid.rows - row),
+            cols: self.shard[1].min(self.grid.cols - col),
+        }
+    }
+
+    /// Columns of a shard, cells.
+    pub(crate) fn shard_cols(&self) -> usize {
+        self.shard[1] as usize
+    }
+
+    /// Values of a shard, those beyond the grid among them.
+    pub(crate) fn shard_values(&self) -> usize {
+        self.shard[0] as usize * self.shard[1] as usize * RUN_STEPS
+    }
+
+    /// Encodes a shard of `values`, `[row, col, step]`; none where no cell has data.
+    pub(crate) fn encode(&self, values: Vec<f32>) -> Result<Option<Bytes>, CubeError> {
+        if values.iter().all(|value| value.is_nan()) {
+            return Ok(None);
+        }
+        object(&self.definition, values).map(Some)
     }
 }
 
@@ -98,17 +160,28 @@ pub(crate) struct Decoder {
 }
 
 impl Decoder {
+    /// Of map-major chunks, `[row, col]`.
     pub(crate) fn new(description: &Description) -> Result<Self, CubeError> {
         let chunk = Layout::of(&description.grid).chunk;
-        let side = |cells: u32| NonZeroU64::new(cells.into()).unwrap_or(NonZeroU64::MIN);
+        Self::shaped(description, [1, chunk[0].into(), chunk[1].into()])
+    }
+
+    /// Of blocks of the time-major copy, `[cell, step]`.
+    pub(crate) fn of_blocks(description: &Description) -> Result<Self, CubeError> {
+        let side = u64::from(BLOCK_CELLS);
+        Self::shaped(description, [side, side, RUN_STEPS as u64])
+    }
+
+    fn shaped(description: &Description, shape: [u64; 3]) -> Result<Self, CubeError> {
+        let side = |cells: u64| NonZeroU64::new(cells).unwrap_or(NonZeroU64::MIN);
         Ok(Self {
             definition: arrays::values(description, 1)?,
             codecs: arrays::chunk_codecs(),
-            shape: vec![NonZeroU64::MIN, side(chunk[0]), side(chunk[1])],
+            shape: shape.map(side).to_vec(),
         })
     }
 
-    /// Values of a whole chunk, `[row, col]`. Its checksum is compared with its bytes before anything else: the library
+    /// Values of a whole chunk. Its checksum is compared with its bytes before anything else: the library
     /// does not do that where it decodes a part of a chunk.
     pub(crate) fn decode(&self, content: Vec<u8>) -> Result<Vec<f32>, String> {
         let array = &self.definition;

@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use contract::digest::Digest;
+use contract::grid::Grid;
 use contract::key::ObjectKey;
 use contract::kind::{Kind, Vouched};
 use contract::manifest::{Manifest, ManifestId};
@@ -18,11 +19,29 @@ use storage::{Store, fields, manifests};
 
 use crate::edit::ATTEMPTS;
 use crate::plan::Plan;
+use crate::staged::Staged;
 use crate::state::State;
-use crate::{CubeError, Description, Edit, Repository, Step};
+use crate::{CubeError, Description, Edit, Repository, Step, background};
 
-/// Fields that are read while one is written.
-const FIELDS_AHEAD: usize = 2;
+/// Memory that fields on their way may take together, bytes.
+const WAY_BYTES: usize = 128 << 20;
+/// Bytes of a cell on its way: as it is stored, in its pages, as a map and in its chunks.
+const CELL_BYTES: usize = 16;
+/// Most fields on their way: more only wait for each other.
+const MOST_AT_ONCE: usize = 8;
+
+/// Fields of a grid that are read, encoded and sent at a time.
+fn at_once(grid: &Grid) -> usize {
+    (WAY_BYTES / (grid.cell_count() * CELL_BYTES).max(1)).clamp(1, MOST_AT_ONCE)
+}
+
+async fn digest_of(grid: Grid, values: &Arc<[f32]>, period: Period) -> Result<Digest, CubeError> {
+    let values = Arc::clone(values);
+    let digested = tokio::task::spawn_blocking(move || fields::digest_of(&grid, &values, period));
+    digested
+        .await
+        .map_err(|e| CubeError::library("a thread", "naming values", e))
+}
 
 /// Where the cube of a product lies in a store.
 pub fn folder(product: &ProductId) -> String {
@@ -44,12 +63,16 @@ pub async fn follow(store: &Store, manifest: &Manifest) -> Result<Followed, Cube
 ///
 /// Versions are what is true, and a cube is made from them: one that cannot follow is said in the log and left behind, and
 /// is no reason to fail a landing. The next version brings it up, and so does `fluxglobe recompute --verify`.
+///
+/// Complete runs of steps are then made time-major, which nobody waits for but [`crate::compacted`].
 pub async fn keep_up(store: &Store, manifest: &Manifest) {
     let (own, version) = (store.clone(), manifest.clone());
     // A task of its own: a panic over a damaged cube ends there.
     let followed = tokio::spawn(async move { follow(&own, &version).await });
     let error = match followed.await {
-        Ok(Ok(_followed)) => return,
+        Ok(Ok(_followed)) => {
+            return background::begin(store.clone(), folder(&manifest.product));
+        }
         Ok(Err(error)) => error.to_string(),
         Err(error) => error.to_string(),
     };
@@ -142,7 +165,8 @@ impl Follower<'_> {
             });
         }
         let tag = there.number.to_string();
-        if !repository.is_tagged(&tag, &state.snapshot).await {
+        // What was committed since is the same version: its time-major copy.
+        if !repository.has_tag(&tag).await {
             repository.tag(&tag, &state.snapshot).await?;
         }
         Ok((there.number >= version.number).then(|| there.clone()))
@@ -189,19 +213,46 @@ impl Follower<'_> {
                 }
             }
         }
-        let read = |(place, period, field): (usize, Period, &ObjectKey)| {
-            let (store, field, grid) = (self.fields.clone(), field.clone(), manifest.grid);
-            async move {
-                let values = fields::read(&store, &field, &grid).await?;
-                Ok::<_, CubeError>((place, period, Arc::<[f32]>::from(values)))
-            }
-        };
-        let mut fields = stream::iter(absent).map(read).buffered(FIELDS_AHEAD);
-        while let Some((place, period, values)) = fields.try_next().await? {
-            wanted[place] = Some(edit.put(period, values).await?);
-            (self.told)(period);
+        for (place, staged) in self.sent(manifest, edit, absent).await? {
+            wanted[place] = Some(staged.step);
+            edit.stage(staged);
         }
         Ok(wanted.into_iter().flatten().collect())
+    }
+
+    /// Reads fields of a version and sends their values, several at a time.
+    async fn sent(
+        &self,
+        manifest: &Manifest,
+        edit: &Edit<'_>,
+        absent: Vec<(usize, Period, &ObjectKey)>,
+    ) -> Result<Vec<(usize, Staged)>, CubeError> {
+        let grid = manifest.grid;
+        let send = |(place, period, field): (usize, Period, &ObjectKey)| {
+            let (store, field) = (self.fields, field.clone());
+            async move {
+                let values: Arc<[f32]> = fields::read(store, &field, &grid).await?.into();
+                let values_sha256 = match field.vouches() {
+                    // It was compared with its name when it was read.
+                    Vouched::Values(digest) => digest,
+                    Vouched::Bytes(_) | Vouched::Nothing => {
+                        digest_of(grid, &values, period).await?
+                    }
+                };
+                let step = Step {
+                    period,
+                    values_sha256,
+                };
+                Ok::<_, CubeError>((place, edit.send(step, &values).await?))
+            }
+        };
+        let mut sending = stream::iter(absent).map(send).buffered(at_once(&grid));
+        let mut sent = vec![];
+        while let Some((place, staged)) = sending.try_next().await? {
+            (self.told)(staged.step.period);
+            sent.push((place, staged));
+        }
+        Ok(sent)
     }
 
     /// Fields of the version that the cube is of, by their periods: none if that version is gone, or not needed.

@@ -9,6 +9,7 @@ use icechunk::session::{SessionError, SessionErrorKind};
 use serde_json::Value;
 use zarrs_icechunk::AsyncIcechunkStore;
 
+use crate::field::SeriesEncoder;
 use crate::plan::Plan;
 use crate::staged::AllStaged;
 use crate::state::State;
@@ -58,6 +59,9 @@ impl Layer<'_> {
             plain::write_length(&arrays, description, plan.steps.len()).await?;
         }
         self.place(placed).await?;
+        if !is_anew {
+            self.drop_runs(&arrays).await?;
+        }
         let compared = if is_anew { &[] } else { &state.steps[..] };
         if let Some(first) = plan.first_change(compared) {
             axis::write(&arrays, description, &plan.steps, first).await?;
@@ -129,6 +133,26 @@ impl Layer<'_> {
             cut.map_err(|e| self.failed(&e))?;
         }
         Ok(())
+    }
+
+    /// Removes the runs of the time-major copy that are of other steps than come to lie in their places.
+    async fn drop_runs(&self, arrays: &Arc<AsyncIcechunkStore>) -> Result<(), CubeError> {
+        let (kept, gone) = self.state.runs.kept(&self.plan.steps);
+        if gone.is_empty() && kept == self.state.runs {
+            return Ok(());
+        }
+        let series = arrays::series(self.description, self.state.runs.len())?;
+        let path = Path::new(series.path().as_str());
+        let path = path.map_err(|e| self.repository.failed("placing values", &e))?;
+        let shards = SeriesEncoder::new(self.description)?.shards();
+        let place =
+            |run: usize| move |[row, col]: &[u32; 2]| ChunkIndices(vec![*row, *col, run as u32]);
+        let behind = gone.iter().flat_map(|run| shards.iter().map(place(*run)));
+        let mut session = self.state.session.write().await;
+        let cut = session.delete_chunks(&path, behind.collect::<Vec<_>>());
+        cut.await.map_err(|e| self.failed(&e))?;
+        drop(session);
+        kept.write(arrays, self.description).await
     }
 
     /// Gives the values their places in time: those that are there move by reference, those that were put are named.

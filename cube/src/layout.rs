@@ -11,6 +11,12 @@ const MOST_OBJECTS: u32 = 64;
 /// Chunks along each side of a shard: 64 MiB of values at most.
 const SHARD_SIDE: u32 = 8;
 
+/// Steps of a run of the time-major copy: a point reads 32 KiB of values for each, and of what no complete run holds yet a
+/// map-major chunk for each step.
+pub(crate) const RUN_STEPS: usize = 128;
+/// Side of a block of the time-major copy, cells.
+pub const BLOCK_CELLS: u32 = 8;
+
 /// How the fields of a grid are cut.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Layout {
@@ -38,6 +44,11 @@ impl Layout {
             chunk
         };
         Self { chunk, object }
+    }
+
+    /// Rows and columns of an object of the time-major copy, cells: those of a chunk, in whole blocks.
+    pub(crate) fn series_object(&self) -> [u32; 2] {
+        self.chunk.map(|cells| cells.next_multiple_of(BLOCK_CELLS))
     }
 
     /// Is an object more than one chunk?
@@ -83,6 +94,8 @@ mod tests {
         let of = |rows, cols| Layout::of(&grid(rows, cols));
         assert_eq!(of(180, 360).chunk, [180, 360]);
         assert_eq!(of(720, 1440).chunk, [360, 480]);
+        assert_eq!(of(450, 615).chunk, [450, 308]);
+        assert_eq!(of(450, 615).series_object(), [456, 312]);
         assert!(!of(720, 1440).is_sharded());
         let large = of(18_000, 36_000);
         assert_eq!((large.chunk, large.object), ([500, 508], [4000, 4064]));

@@ -7,8 +7,11 @@
 
 mod arrays;
 mod axis;
+mod background;
+mod blocks;
 pub mod cf;
 pub mod clean_up;
+mod compact;
 mod description;
 mod edit;
 mod error;
@@ -22,18 +25,24 @@ mod plain;
 mod plan;
 mod reader;
 mod repository;
+mod series;
 mod staged;
 mod state;
+mod unreadable;
+mod values;
 pub mod verify;
 
 pub use arrays::{Places, places};
 pub use axis::Step;
+pub use background::compacted;
+pub use compact::compact;
 pub use description::Description;
 pub use edit::{Committed, Edit};
 pub use error::CubeError;
 pub use follow::{Followed, Follower, folder, follow, keep_up};
 pub use keys::Keys;
-pub use layout::Layout;
+pub use layout::{BLOCK_CELLS, Layout};
 pub use plain::PlainZarr;
 pub use reader::Cube;
 pub use repository::{At, Repository};
+pub use values::{Block, Values};

@@ -1,5 +1,6 @@
-//! One state of a cube, to read: windows of cells of a step, whole fields, the series of a cell.
+//! One state of a cube, to read: windows of cells of a step, whole fields, blocks of its time-major copy.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use contract::chunk::Window;
@@ -9,8 +10,12 @@ use tokio::sync::RwLock;
 use zarrs::array::{Array, AsyncArrayShardedReadableExt as _, AsyncArrayShardedReadableExtCache};
 use zarrs_icechunk::AsyncIcechunkStore;
 
+use crate::blocks::Blocks;
 use crate::error::first_lines;
 use crate::field::Decoder;
+use crate::layout::RUN_STEPS;
+use crate::series::Runs;
+use crate::unreadable::Object;
 use crate::{CubeError, Description, Layout, Step, arrays, axis};
 
 /// Chunks that are read and decoded at a time.
@@ -22,12 +27,20 @@ pub struct Cube(Arc<Inner>);
 
 struct Inner {
     description: Description,
+    /// For messages.
+    place: String,
     layout: Layout,
     steps: Vec<Step>,
     array: Array<AsyncIcechunkStore>,
     /// Indexes of shards.
     shards: AsyncArrayShardedReadableExtCache,
     decoder: Arc<Decoder>,
+    /// Runs of the time-major copy.
+    runs: Runs,
+    /// Of each run, whether it is made of the steps in its place.
+    is_there: Vec<bool>,
+    /// Reads them; none where there are none.
+    blocks: Option<Blocks>,
 }
 
 impl Cube {
@@ -44,11 +57,25 @@ impl Cube {
                 reason: format!("it has {} steps, time {}", array.shape()[0], steps.len()),
             });
         }
+        let session = store.session();
+        let runs = Runs::read(&*session.read().await, &store, place).await?;
+        let blocks = if runs.len() == 0 {
+            None
+        } else {
+            let definition = arrays::series(&description, runs.len())?;
+            let series = axis::open(&store, &definition, place).await?;
+            Some(Blocks::new(series, &description, place)?)
+        };
+        let is_there = (0..runs.len()).map(|run| runs.is_of(run, &steps));
         Ok(Self(Arc::new(Inner {
+            is_there: is_there.collect(),
+            runs,
+            blocks,
             layout: Layout::of(&description.grid),
             shards: AsyncArrayShardedReadableExtCache::new(&array),
             decoder: Arc::new(Decoder::new(&description)?),
             description,
+            place: place.to_owned(),
             steps,
             array,
         })))
@@ -66,18 +93,35 @@ impl Cube {
 
     /// Values of a window of cells of a step, `[row, col]`, stored unit, NaN no data. Only its chunks are read.
     pub async fn window(&self, step: usize, window: Window) -> Result<Vec<f32>, CubeError> {
-        self.check(step, window)?;
-        let mut values = vec![f32::NAN; window.cell_count()];
-        let chunks: Vec<_> = self.0.layout.chunks_of(window).collect();
-        let mut read = stream::iter(chunks)
-            .map(|chunk| async move {
+        let mut found = self.windows(step, &[window]).await?;
+        Ok(found.pop().unwrap_or_default())
+    }
+
+    /// The same of several windows; a chunk that some of them touch is read once.
+    pub(crate) async fn windows(
+        &self,
+        step: usize,
+        windows: &[Window],
+    ) -> Result<Vec<Vec<f32>>, CubeError> {
+        let mut touched: BTreeMap<[u32; 2], Vec<usize>> = BTreeMap::new();
+        let mut values = vec![];
+        for (number, window) in windows.iter().enumerate() {
+            self.check(step, *window)?;
+            values.push(vec![f32::NAN; window.cell_count()]);
+            for chunk in self.0.layout.chunks_of(*window) {
+                touched.entry(chunk).or_default().push(number);
+            }
+        }
+        let mut read = stream::iter(touched)
+            .map(|(chunk, own)| async move {
                 let found = self.chunk(step, chunk).await?;
-                Ok::<_, CubeError>((chunk, found))
+                Ok::<_, CubeError>((chunk, own, found))
             })
             .buffered(CHUNKS_AT_ONCE);
-        while let Some((chunk, found)) = read.try_next().await? {
-            if let Some(found) = found {
-                self.copy(&found, chunk, window, &mut values);
+        while let Some((chunk, own, found)) = read.try_next().await? {
+            let Some(found) = found else { continue };
+            for number in own {
+                self.copy(&found, chunk, windows[number], &mut values[number]);
             }
         }
         Ok(values)
@@ -115,27 +159,32 @@ impl Cube {
         }
     }
 
-    /// Values of one cell in a run of steps, in the order of time. Each step's chunk is read.
-    pub async fn series(
+    /// The time-major run that holds a step, if it is there.
+    pub(crate) fn run_of(&self, step: usize) -> Option<usize> {
+        let run = step / RUN_STEPS;
+        self.0.is_there.get(run)?.then_some(run)
+    }
+
+    /// Which runs there are.
+    pub(crate) fn runs(&self) -> &Runs {
+        &self.0.runs
+    }
+
+    /// Values of a block in a run that [`Self::run_of`] gave, `[cell, step]`; none where no cell has data.
+    pub(crate) async fn block(
         &self,
-        row: u32,
-        col: u32,
-        steps: std::ops::Range<usize>,
-    ) -> Result<Vec<f32>, CubeError> {
-        let cell = Window {
-            row,
-            col,
-            rows: 1,
-            cols: 1,
-        };
-        if let Some(last) = steps.end.checked_sub(1) {
-            self.check(last, cell)?;
+        run: usize,
+        block: [u32; 2],
+    ) -> Result<Option<Vec<f32>>, CubeError> {
+        match &self.0.blocks {
+            Some(blocks) => blocks.read(run, block).await,
+            None => Err(CubeError::Outside {
+                what: format!("run {run} of the time-major copy"),
+                steps: self.0.steps.len(),
+                rows: self.0.description.grid.rows,
+                cols: self.0.description.grid.cols,
+            }),
         }
-        stream::iter(steps)
-            .map(|step| async move { Ok(self.window(step, cell).await?[0]) })
-            .buffered(CHUNKS_AT_ONCE)
-            .try_collect()
-            .await
     }
 
     /// What reads its parts.
@@ -148,15 +197,48 @@ impl Cube {
         arrays::name(&self.0.array)
     }
 
+    /// Name of the array of the time-major copy, if there is one.
+    pub(crate) fn series_name(&self) -> Option<String> {
+        self.0.blocks.as_ref().map(Blocks::name)
+    }
+
+    /// Values of a whole shard of the time-major copy, `[row, col, step]`; none where no cell has data.
+    pub(crate) async fn shard(
+        &self,
+        run: usize,
+        shard: [u32; 2],
+    ) -> Result<Option<Vec<f32>>, CubeError> {
+        match &self.0.blocks {
+            Some(blocks) => blocks.shard(run, shard).await,
+            None => Ok(None),
+        }
+    }
+
     /// Values of a whole chunk, `[row, col]`; none where it is not stored, since no cell has data.
     async fn chunk(&self, step: usize, chunk: [u32; 2]) -> Result<Option<Vec<f32>>, CubeError> {
         let inner = &self.0;
         let index = [step as u64, chunk[0].into(), chunk[1].into()];
-        let unreadable = |reason: String| CubeError::Chunk {
-            array: arrays::name(&inner.array),
-            chunk: index.to_vec(),
-            reason,
-        };
+        match self.decoded(index).await {
+            Ok(values) => Ok(values),
+            Err(reason) => {
+                let [rows, cols] =
+                    [0, 1].map(|at| inner.layout.object[at] / inner.layout.chunk[at]);
+                let object = Object {
+                    array: &inner.array,
+                    place: &inner.place,
+                    index: [
+                        index[0],
+                        index[1] / u64::from(rows),
+                        index[2] / u64::from(cols),
+                    ],
+                };
+                Err(object.unreadable(index, &reason).await)
+            }
+        }
+    }
+
+    async fn decoded(&self, index: [u64; 3]) -> Result<Option<Vec<f32>>, String> {
+        let inner = &self.0;
         let found = if inner.layout.is_sharded() {
             let found = inner
                 .array
@@ -168,13 +250,12 @@ impl Cube {
                 .map(|found| found.map(Vec::from))
                 .map_err(|e| first_lines(&e))
         };
-        let Some(content) = found.map_err(unreadable)? else {
+        let Some(content) = found? else {
             return Ok(None);
         };
         let decoder = Arc::clone(&inner.decoder);
         let decoded = tokio::task::spawn_blocking(move || decoder.decode(content));
-        let values = decoded.await.map_err(|e| unreadable(e.to_string()))?;
-        values.map(Some).map_err(unreadable)
+        decoded.await.map_err(|e| e.to_string())?.map(Some)
     }
 
     /// Copies the cells that a chunk and a window share.

@@ -215,6 +215,11 @@ impl Repository {
         there.is_ok_and(|there| there.to_string() == snapshot)
     }
 
+    /// Is there a state of this name?
+    pub(crate) async fn has_tag(&self, version: &str) -> bool {
+        self.inner.lookup_tag(version).await.is_ok()
+    }
+
     /// Names of versions, sorted.
     pub async fn versions(&self) -> Result<Vec<String>, CubeError> {
         let tags = self.inner.list_tags().await;
@@ -240,7 +245,7 @@ impl Repository {
 fn config(description: &Description) -> RepositoryConfig {
     let [rows, cols] = Layout::of(&description.grid).objects(&description.grid);
     let split = ManifestSplitDim {
-        condition: ManifestSplitDimCondition::DimensionName("^time$".to_owned()),
+        condition: ManifestSplitDimCondition::DimensionName("^(series_)?time$".to_owned()),
         num_chunks: (MANIFEST_CHUNKS / (rows * cols)).max(1),
     };
     let splitting = ManifestSplittingConfig {

@@ -7,6 +7,7 @@ use icechunk::session::{Session, SessionErrorKind};
 use tokio::sync::RwLock;
 use zarrs_icechunk::AsyncIcechunkStore;
 
+use crate::series::Runs;
 use crate::{CubeError, Description, Repository, Step, axis};
 
 /// What is there, and a session that changes it.
@@ -17,6 +18,8 @@ pub(crate) struct State {
     /// None of a repository that was made and never committed to.
     pub(crate) description: Option<Description>,
     pub(crate) steps: Vec<Step>,
+    /// Runs of the time-major copy.
+    pub(crate) runs: Runs,
 }
 
 impl State {
@@ -29,19 +32,21 @@ impl State {
             Err(e) => return Err(repository.failed("reading the newest state", &e)),
         };
         let snapshot = session.read().await.snapshot_id().to_string();
-        let (description, steps) = if is_empty {
-            (None, vec![])
+        let (description, steps, runs) = if is_empty {
+            (None, vec![], Runs::default())
         } else {
             let arrays = Arc::new(AsyncIcechunkStore::from(Arc::clone(&session)));
             let description = Description::of_group(&arrays, &repository.place).await?;
             let steps = axis::read(&arrays, &description, &repository.place).await?;
-            (Some(description), steps)
+            let runs = Runs::read(&*session.read().await, &arrays, &repository.place).await?;
+            (Some(description), steps, runs)
         };
         Ok(Self {
             session,
             snapshot,
             description,
             steps,
+            runs,
         })
     }
 

@@ -1,5 +1,5 @@
 //! The cube of a product in, what is wrong with it out: every version opened, every step compared with its digest, every
-//! chunk that is damaged or gone told by the array and the place it has there.
+//! run of its time-major copy with its steps, every chunk that is damaged or gone told by the array and the place it has there.
 //!
 //! Objects themselves are compared with their checksums and seals by `storage::verify`, as those of all kinds are.
 
@@ -14,7 +14,7 @@ use storage::verify::{Fault, Finding};
 use storage::{Store, manifests};
 
 use crate::follow::folder;
-use crate::{At, Cube, CubeError, Repository, Step};
+use crate::{At, Cube, CubeError, Repository, Step, compact, series};
 
 /// What a cube was found to be.
 #[derive(Debug, Clone, Default)]
@@ -75,6 +75,14 @@ pub async fn check(
 
 fn named(place: &str, error: &dyn std::fmt::Display) -> CubeError {
     CubeError::library(place, "naming an object", error)
+}
+
+/// What cannot be read of a state.
+#[derive(Default)]
+struct Broken {
+    steps: BTreeSet<u32>,
+    /// Of the time-major copy.
+    runs: BTreeSet<u32>,
 }
 
 struct Check<'a> {
@@ -173,15 +181,20 @@ impl Check<'_> {
             .enumerate()
             .filter(|(_, step)| seen.insert(*step.values_sha256.as_bytes()))
             .collect();
+        let fresh_runs = cube.runs().made_of();
+        let fresh_runs: Vec<usize> = fresh_runs
+            .filter(|(_, made_of)| seen.insert(*made_of.as_bytes()))
+            .map(|(run, _)| run)
+            .collect();
         let unplaced = self.damaged.iter();
         let mut unplaced = unplaced.filter(|key| !checked.places.contains_key(key));
-        if fresh.is_empty() && unplaced.next().is_none() {
+        if fresh.is_empty() && fresh_runs.is_empty() && unplaced.next().is_none() {
             return Ok(());
         }
         let broken = self.broken_chunks(cube, shown, checked).await?;
         for (place, step) in fresh {
             // Told of already, by its object.
-            if broken.contains(&(place as u32)) {
+            if broken.steps.contains(&(place as u32)) {
                 continue;
             }
             match cube.field(place).await {
@@ -194,21 +207,39 @@ impl Check<'_> {
                 Err(error) => return Err(error),
             }
         }
+        for run in fresh_runs {
+            let mut steps = series::steps_of(run);
+            // Told of already, by the objects of its steps or its own.
+            if broken.runs.contains(&(run as u32))
+                || steps.any(|step| broken.steps.contains(&(step as u32)))
+            {
+                continue;
+            }
+            match compact::compare(cube, run).await {
+                Ok(()) => {}
+                Err(error @ CubeError::Chunk { .. }) => {
+                    let mut finding = self.finding(&error);
+                    finding.reason = format!("{error} (in {shown})");
+                    checked.findings.push(finding);
+                }
+                Err(error) => return Err(error),
+            }
+        }
         Ok(())
     }
 
-    /// Notes where chunks are that are damaged or gone, and returns the steps whose values those are of.
+    /// Notes where chunks are that are damaged or gone, and returns whose values those are.
     async fn broken_chunks(
         &self,
         cube: &Cube,
         shown: &str,
         checked: &mut Checked,
-    ) -> Result<BTreeSet<u32>, CubeError> {
+    ) -> Result<Broken, CubeError> {
         let session = cube.session();
         let session = session.read().await;
         let failed = |e| CubeError::library(&self.folder, "listing chunks", e);
         let mut chunks = std::pin::pin!(session.all_chunks().await.map_err(failed)?);
-        let mut broken = BTreeSet::new();
+        let mut broken = Broken::default();
         while let Some((path, chunk)) = chunks.try_next().await.map_err(failed)? {
             let ChunkPayload::Ref(reference) = &chunk.payload else {
                 continue;
@@ -222,7 +253,9 @@ impl Check<'_> {
                 continue;
             }
             if array == cube.array_name() {
-                broken.extend(index.first());
+                broken.steps.extend(index.first());
+            } else if cube.series_name().as_deref() == Some(array) {
+                broken.runs.extend(index.last());
             }
             let place = format!("chunk {index:?} of {array} in {shown}");
             if is_gone && !checked.places.contains_key(&key) {
@@ -262,6 +295,7 @@ pub async fn mend(store: &Store, product: &ProductId) -> Result<bool, CubeError>
         && let Ok(followed) = crate::follow(store, &newest).await
         && followed.version == newest.id()
     {
+        compact::compact(store, &folder).await?;
         return Ok(false);
     }
     // What says where all else is goes last: until then others find a damaged cube, and none that they may add to.
@@ -275,5 +309,6 @@ pub async fn mend(store: &Store, product: &ProductId) -> Result<bool, CubeError>
             crate::follow(store, &manifest).await?;
         }
     }
+    compact::compact(store, &folder).await?;
     Ok(true)
 }

@@ -129,16 +129,18 @@ fn metadata(description: &Description, period: Period) -> String {
     ];
     let mut xml = "<GDALMetadata>\n".to_owned();
     for (name, text) in of_file {
-        xml += &format!("  <Item name=\"{name}\">{}</Item>\n", escaped(&text));
+        let item = format!("  <Item name=\"{name}\">{}</Item>\n", escaped(&text));
+        xml.push_str(&item);
     }
     for (role, name, text) in [
         ("description", "DESCRIPTION", quantity.title()),
         ("unittype", "UNITTYPE", quantity.unit()),
     ] {
-        xml += &format!(
+        let item = format!(
             "  <Item name=\"{name}\" sample=\"0\" role=\"{role}\">{}</Item>\n",
             escaped(text)
         );
+        xml.push_str(&item);
     }
     xml + "</GDALMetadata>\n"
 }
@@ -150,10 +152,9 @@ fn escaped(text: &str) -> String {
         match c {
             // GDAL writes and reads it escaped twice.
             '&' => plain += "&amp;amp;",
-            '<' | '>' | '"' => plain += &format!("&#{};", u32::from(c)),
-            c if c.is_ascii() && !c.is_ascii_control() => plain.push(c),
             c if c.is_control() => plain.push(' '),
-            c => plain += &format!("&#{};", u32::from(c)),
+            c if c.is_ascii() && !matches!(c, '<' | '>' | '"') => plain.push(c),
+            c => plain.push_str(&format!("&#{};", u32::from(c))),
         }
     }
     plain

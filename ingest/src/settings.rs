@@ -38,7 +38,7 @@ pub struct Settings {
     pub limits: Limits,
     /// Files that are read at the same time, 1 to 64.
     pub parallel_files: usize,
-    /// Memory that files which are worked on may take together, readers and series included, bytes: what they unpack to
+    /// Memory that files which are worked on may take together, readers included, bytes: what they unpack to
     /// counts, not what they weigh. One that needs more goes alone.
     pub parallel_bytes: u64,
     /// What may be read.

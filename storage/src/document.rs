@@ -40,15 +40,26 @@ pub async fn get<T: DeserializeOwned>(
     store: &Store,
     key: &ObjectKey,
 ) -> Result<Option<T>, StorageError> {
+    let Some(text) = text(store, key).await? else {
+        return Ok(None);
+    };
+    serde_json::from_slice(&text)
+        .map(Some)
+        .map_err(|e| damage::found(key, e))
+}
+
+/// The text of a document without its seal; none if there is none.
+///
+/// # Errors
+/// `Damaged` if its seal is broken.
+pub(crate) async fn text(store: &Store, key: &ObjectKey) -> Result<Option<Vec<u8>>, StorageError> {
     let (content, soundness) = match store.get_with_soundness(key).await {
         Ok(found) => found,
         Err(e) if e.is_not_found() => return Ok(None),
         Err(e) => return Err(e),
     };
     sound::check_document(key, &content, soundness)?;
-    serde_json::from_slice(&seal::opened(&content))
-        .map(Some)
-        .map_err(|e| damage::found(key, e))
+    Ok(Some(seal::opened(&content)))
 }
 
 fn sealed<T: Serialize>(key: &ObjectKey, document: &T) -> Result<Bytes, StorageError> {

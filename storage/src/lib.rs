@@ -1,4 +1,4 @@
-//! What lies durable between services: objects, manifests, fields, series, weights and the event log.
+//! What lies durable between services: objects, manifests, fields, weights and the event log.
 //! What is read is checked: a damaged object is an error that names it, never a value.
 //!
 //! Every service reads and writes through this crate, so that a layout has one writer and one reader. Left out on
@@ -16,7 +16,6 @@ mod off_thread;
 mod parquet_table;
 pub mod row_check;
 pub mod rows;
-pub mod series;
 pub mod sound;
 pub mod store;
 mod values;

@@ -1,9 +1,14 @@
 //! Numbered manifests: the newest of a product, one by its name, and the commit of the next.
 
+mod pages;
+
+use std::collections::BTreeSet;
+
 use contract::key::ObjectKey;
 use contract::kind::Kind;
 use contract::manifest::{
-    MANIFEST_SCHEMA, Manifest, ManifestId, OLDEST_MANIFEST_SCHEMA, SeriesSegment, Step,
+    MANIFEST_SCHEMA, Manifest, ManifestId, OLDEST_MANIFEST_SCHEMA, PAGED_SCHEMA, PagedManifest,
+    Step,
 };
 use contract::product::ProductId;
 
@@ -17,14 +22,29 @@ pub async fn products(store: &Store) -> Result<Vec<ProductId>, StorageError> {
 }
 
 /// The newest manifest of a product, if it has one.
+///
+/// Where this process has seen one before, the next number is asked for and nothing is listed.
 pub async fn latest(store: &Store, product: &ProductId) -> Result<Option<Manifest>, StorageError> {
-    let keys = store
-        .list(&format!("{}/{product}", Kind::Manifest.folder()))
-        .await?;
-    match keys.last() {
-        Some(key) => read(store, key).await,
-        None => Ok(None),
+    if let Some(known) = store.newest.get(product) {
+        let mut newest = known;
+        while store
+            .exists(&ObjectKey::manifest(product, newest + 1))
+            .await?
+        {
+            newest += 1;
+        }
+        if let Some(manifest) = numbered(store, product, newest).await? {
+            store.newest.insert(product.clone(), newest);
+            return Ok(Some(manifest));
+        }
+        // Somebody took it away.
+        store.newest.remove(product);
     }
+    let Some(newest) = numbers(store, product).await?.pop() else {
+        return Ok(None);
+    };
+    store.newest.insert(product.clone(), newest);
+    numbered(store, product, newest).await
 }
 
 /// Numbers of the manifests that a product has, ascending.
@@ -45,13 +65,13 @@ pub async fn numbered(
     product: &ProductId,
     number: u64,
 ) -> Result<Option<Manifest>, StorageError> {
-    read(store, &ObjectKey::manifest(product, number)).await
+    at(store, &ObjectKey::manifest(product, number)).await
 }
 
 /// The manifest of a name, which must still hold what it held when it was named.
 pub async fn load(store: &Store, id: &ManifestId) -> Result<Manifest, StorageError> {
     let key = ObjectKey::manifest(&id.product, id.number);
-    let Some(manifest) = read(store, &key).await? else {
+    let Some(manifest) = at(store, &key).await? else {
         let path = key.to_string();
         return Err(StorageError::Object {
             key: path.clone(),
@@ -79,9 +99,24 @@ pub async fn commit(store: &Store, manifest: &Manifest) -> Result<(), StorageErr
         let reason = format!("to write, it is of schema {}", manifest.schema);
         return Err(StorageError::damaged(key.as_str(), reason));
     }
-    document::put_new(store, &key, manifest)
-        .await
-        .map(|_new| ())
+    let Some((paged, pages)) = manifest.paged() else {
+        return document::put_new(store, &key, manifest)
+            .await
+            .map(|_new| ());
+    };
+    // What the version before names is durable; all else is made so now, whoever may have had it once.
+    let before = ObjectKey::manifest(&manifest.product, manifest.number.saturating_sub(1));
+    let named_before: BTreeSet<ObjectKey> = page_keys(store, &before).await?.into_iter().collect();
+    pages::write(store, &paged, pages, &named_before).await?;
+    document::put_new(store, &key, &paged).await.map(|_new| ())
+}
+
+/// Keys of the pages that a stored manifest names; nothing if it has none, or is not there.
+pub async fn page_keys(store: &Store, key: &ObjectKey) -> Result<Vec<ObjectKey>, StorageError> {
+    match stored(store, key).await? {
+        Some(Stored::Paged(paged)) => Ok(paged.page_keys().collect()),
+        Some(Stored::Whole(_)) | None => Ok(vec![]),
+    }
 }
 
 /// Gives what the next version holds the names that the newest one has for the same values: what was named by its bytes
@@ -105,40 +140,54 @@ pub async fn settle(
             step.field = fields::settle(store, &there.field, &step.field, &next.grid).await?;
         }
     }
-    let fields = |manifest: &Manifest, segment: &SeriesSegment| {
-        let first = segment.first_step as usize;
-        let steps = manifest.steps.get(first..first + segment.steps as usize);
-        steps.map(|steps| steps.iter().map(|it| it.field.clone()).collect::<Vec<_>>())
-    };
-    let mut series = next.series.clone();
-    for segment in &mut series {
-        let own = fields(next, segment);
-        let same = |there: &&SeriesSegment| own.is_some() && fields(newest, there) == own;
-        if let Some(there) = newest.series.iter().find(same) {
-            segment.series = there.series.clone();
-        }
-    }
-    next.series = series;
     Ok(())
 }
 
-async fn read(store: &Store, key: &ObjectKey) -> Result<Option<Manifest>, StorageError> {
-    let Some(manifest) = document::get::<Manifest>(store, key).await? else {
-        return Ok(None);
+/// The manifest under a key; none if there is none (any more).
+pub async fn at(store: &Store, key: &ObjectKey) -> Result<Option<Manifest>, StorageError> {
+    let manifest = match stored(store, key).await? {
+        None => return Ok(None),
+        Some(Stored::Whole(manifest)) => manifest,
+        Some(Stored::Paged(paged)) => pages::assemble(store, key, paged).await?,
     };
     manifest
         .grid
         .validate()
         .map_err(|e| damage::found(key, e))?;
-    if !(OLDEST_MANIFEST_SCHEMA..=MANIFEST_SCHEMA).contains(&manifest.schema) {
-        // Whole, but of a program to come.
-        let reason = format!(
-            "schema {} is unknown, this program reads {OLDEST_MANIFEST_SCHEMA} to {MANIFEST_SCHEMA}",
-            manifest.schema
-        );
-        return Err(StorageError::damaged(key.as_str(), reason));
-    }
     Ok(Some(manifest))
+}
+
+/// A manifest as it is stored.
+enum Stored {
+    Whole(Manifest),
+    Paged(PagedManifest),
+}
+
+async fn stored(store: &Store, key: &ObjectKey) -> Result<Option<Stored>, StorageError> {
+    #[derive(serde::Deserialize)]
+    struct Schema {
+        schema: u32,
+    }
+    let Some(text) = document::text(store, key).await? else {
+        return Ok(None);
+    };
+    let damaged = |e: serde_json::Error| damage::found(key, e);
+    let Schema { schema } = serde_json::from_slice(&text).map_err(damaged)?;
+    match schema {
+        OLDEST_MANIFEST_SCHEMA..=MANIFEST_SCHEMA => serde_json::from_slice(&text)
+            .map(|manifest| Some(Stored::Whole(manifest)))
+            .map_err(damaged),
+        PAGED_SCHEMA => serde_json::from_slice(&text)
+            .map(|paged| Some(Stored::Paged(paged)))
+            .map_err(damaged),
+        schema => {
+            // Whole, but of a program to come.
+            let reason = format!(
+                "schema {schema} is unknown, this program reads {OLDEST_MANIFEST_SCHEMA} to {PAGED_SCHEMA}"
+            );
+            Err(StorageError::damaged(key.as_str(), reason))
+        }
+    }
 }
 
 #[cfg(test)]
@@ -146,7 +195,9 @@ mod tests {
     use super::*;
     use contract::digest::Digest;
     use contract::grid::Grid;
+    use contract::manifest::PAGE_STEPS;
     use contract::quantity::Quantity;
+    use contract::time::{Period, TimeMs};
 
     fn manifest(number: u64, title: &str) -> Manifest {
         let product: ProductId = "p".parse().unwrap();
@@ -187,6 +238,98 @@ mod tests {
         let old = manifest(2, "t");
         assert_eq!(load(&store, &old.id()).await.unwrap(), old);
         assert_eq!(products(&store).await.unwrap(), [product]);
+    }
+
+    /// A manifest of so many days.
+    fn of_days(number: u64, days: usize) -> Manifest {
+        let mut manifest = manifest(number, "t");
+        let day = |day: usize| TimeMs::new(day as i64 * 86_400_000).unwrap();
+        manifest.steps = (0..days)
+            .map(|at| Step {
+                period: Period::new(day(at), day(at + 1)).unwrap(),
+                field: ObjectKey::field(&manifest.product, &Digest::of(&at.to_le_bytes())),
+                raw_sha256: Digest::of(b""),
+                origin: format!("{at}.nc"),
+                valid_cells: 1,
+                masked: None,
+                contributed: None,
+            })
+            .collect();
+        manifest
+    }
+
+    async fn bytes(store: &Store) -> usize {
+        let mut bytes = 0;
+        for key in store.list("").await.unwrap() {
+            bytes += store.get(&key).await.unwrap().len();
+        }
+        bytes
+    }
+
+    #[tokio::test]
+    async fn one_more_step_writes_no_page_again_and_all_versions_stay_readable() {
+        let store = Store::memory();
+        let product = "p".parse().unwrap();
+        let days = 5 * PAGE_STEPS + 3;
+        commit(&store, &of_days(1, days)).await.unwrap();
+        let before = bytes(&store).await;
+        commit(&store, &of_days(2, days + 1)).await.unwrap();
+        let more = bytes(&store).await - before;
+        assert!(more < 4000, "{more} bytes");
+        // By one who has seen none of it, and by one who has.
+        for store in [store.clone(), copy(&store).await] {
+            let newest = latest(&store, &product).await.unwrap().unwrap();
+            assert_eq!(newest, of_days(2, days + 1));
+            let first = load(&store, &of_days(1, days).id()).await.unwrap();
+            assert_eq!(first, of_days(1, days));
+        }
+        let keys = crate::verify::keys(&store, None).await.unwrap();
+        let report = crate::verify::run(&store, &keys, &|_, _| ());
+        let pages = report.await.unwrap().findings.into_iter();
+        let pages = pages.filter(|it| it.key.as_str().starts_with("manifest-pages"));
+        assert_eq!(pages.count(), 0);
+        // A page that is gone is told by its name, and looked for by those who verify.
+        let page = store.list("manifest-pages").await.unwrap().remove(2);
+        store.remove(&page).await.unwrap();
+        let other = copy(&store).await;
+        let error = latest(&other, &product).await.unwrap_err().to_string();
+        assert!(error.contains(page.as_str()), "{error}");
+        let keys = crate::verify::keys(&other, None).await.unwrap();
+        let report = crate::verify::run(&other, &keys, &|_, _| ()).await.unwrap();
+        assert!(report.findings.iter().any(|it| it.key == page));
+    }
+
+    /// The same objects in a store of its own.
+    async fn copy(store: &Store) -> Store {
+        let other = Store::memory();
+        for key in store.list("").await.unwrap() {
+            let content = store.get(&key).await.unwrap();
+            other.put_over(&key, content).await.unwrap();
+        }
+        other
+    }
+
+    #[tokio::test]
+    async fn the_newest_is_found_whoever_publishes_or_takes_away() {
+        let store = Store::memory();
+        let product: ProductId = "p".parse().unwrap();
+        let newest = async || latest(&store, &product).await.unwrap().map(|it| it.number);
+        assert_eq!(newest().await, None);
+        for number in 1..=3 {
+            commit(&store, &manifest(number, "t")).await.unwrap();
+        }
+        assert_eq!(newest().await, Some(3));
+        for number in 4..=6 {
+            commit(&store, &manifest(number, "t")).await.unwrap();
+        }
+        assert_eq!(newest().await, Some(6));
+        for number in [6, 5] {
+            store
+                .remove(&ObjectKey::manifest(&product, number))
+                .await
+                .unwrap();
+        }
+        assert_eq!(newest().await, Some(4));
     }
 
     #[tokio::test]

@@ -24,8 +24,9 @@ use seal::Seal;
 pub use object::of_object;
 
 /// Kinds that are JSON documents, sealed or of before that.
-const DOCUMENTS: [Kind; 7] = [
+const DOCUMENTS: [Kind; 8] = [
     Kind::Manifest,
+    Kind::ManifestPage,
     Kind::Sums,
     Kind::ObservationIndex,
     Kind::ObservationFile,

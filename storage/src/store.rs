@@ -12,8 +12,10 @@ mod create;
 mod faulty;
 mod folder;
 mod hdfs;
+mod held_pages;
 mod leftovers;
 mod location;
+mod newest;
 mod read;
 mod retry_store;
 mod settings;
@@ -32,7 +34,9 @@ use object_store::prefix::PrefixStore;
 use url::Url;
 
 use self::checked::Checked;
+use self::held_pages::HeldPages;
 use self::location::Location;
+use self::newest::Newest;
 use crate::StorageError;
 
 pub use self::leftovers::Leftover;
@@ -59,6 +63,10 @@ pub struct Store {
     place: Place,
     retry_limits: RetryLimits,
     checked: Arc<Checked>,
+    /// Pages of manifests that were read.
+    pub(crate) pages: Arc<HeldPages>,
+    /// The newest numbers of manifests that were seen.
+    pub(crate) newest: Arc<Newest>,
 }
 
 /// What kind of store it is, where that matters.
@@ -122,6 +130,8 @@ impl Store {
             place: Place::Memory,
             retry_limits: RetryLimits::default(),
             checked: Arc::default(),
+            pages: Arc::default(),
+            newest: Arc::default(),
         }
     }
 
@@ -141,6 +151,8 @@ impl Store {
             place: Place::Folder(root),
             retry_limits: RetryLimits::default(),
             checked: Arc::default(),
+            pages: Arc::default(),
+            newest: Arc::default(),
         })
     }
 
@@ -160,6 +172,8 @@ impl Store {
             place,
             retry_limits,
             checked: Arc::default(),
+            pages: Arc::default(),
+            newest: Arc::default(),
         })
     }
 

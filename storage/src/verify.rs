@@ -4,14 +4,13 @@ use std::collections::BTreeSet;
 
 use contract::key::ObjectKey;
 use contract::kind::Kind;
-use contract::manifest::Manifest;
 use contract::product::ProductId;
 use futures::{StreamExt as _, TryStreamExt as _, stream};
 use serde::Serialize;
 
 use crate::off_thread::off_thread;
 use crate::sound::{self, Soundness};
-use crate::{StorageError, Store, document};
+use crate::{StorageError, Store, manifests};
 
 /// Objects that are read at the same time.
 const AT_ONCE: usize = 4;
@@ -189,11 +188,20 @@ async fn check(store: &Store, key: &ObjectKey) -> Result<Checked, StorageError> 
 
 /// What a manifest names.
 async fn names_of(store: &Store, key: &ObjectKey) -> Result<Vec<ObjectKey>, StorageError> {
-    let Some(manifest) = document::get::<Manifest>(store, key).await? else {
-        return Ok(vec![]);
+    let manifest = match manifests::at(store, key).await {
+        Ok(Some(manifest)) => manifest,
+        Ok(None) => return Ok(vec![]),
+        // A page of it is gone, which is told by its name; or it is of a program to come.
+        Err(StorageError::Damaged { .. }) => {
+            return match manifests::page_keys(store, key).await {
+                Err(StorageError::Damaged { .. }) => Ok(vec![]),
+                keys => keys,
+            };
+        }
+        Err(e) => return Err(e),
     };
-    let mut names = vec![manifest.domain.clone()];
-    names.extend(manifest.series.iter().map(|segment| segment.series.clone()));
+    let mut names = manifests::page_keys(store, key).await?;
+    names.push(manifest.domain.clone());
     for step in &manifest.steps {
         names.push(step.field.clone());
         names.extend(step.contributed.as_ref().map(|of| of.counts.clone()));

@@ -147,7 +147,7 @@ fn assert_stores_before_it_ends(cluster: &Cluster, folder: &Path) {
     let ended = Instant::now();
     let passed = cluster.s3.passed();
     let is_write = |one: &&Passed| one.line.starts_with("PUT") && one.line.contains("/tiles/");
-    let last = passed.iter().filter(is_write).next_back();
+    let last = passed.iter().rfind(is_write);
     let stored = last.and_then(|one| one.answered);
     assert!(
         stored.is_some_and(|at| at > asked_to_stop && at < ended),

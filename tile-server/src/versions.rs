@@ -2,11 +2,10 @@
 
 use std::sync::Arc;
 
-use contract::kind::Kind;
 use contract::manifest::{Manifest, ManifestId};
 use contract::quantity::Quantity;
 use quick_cache::sync::Cache;
-use storage::{StorageError, Store, document, manifests};
+use storage::{StorageError, Store, manifests};
 
 use crate::catalogue::{Accumulated, Layer};
 use crate::error::ServerError;
@@ -99,12 +98,9 @@ impl Versions {
         let Ok(product) = manifest.product.accumulated() else {
             return Ok(None);
         };
-        let keys = self
-            .store
-            .list(&format!("{}/{product}", Kind::Manifest.folder()))
-            .await?;
-        for key in keys.iter().rev().take(DERIVATIONS) {
-            let Some(derived) = document::get::<Manifest>(&self.store, key).await? else {
+        let numbers = manifests::numbers(&self.store, &product).await?;
+        for number in numbers.into_iter().rev().take(DERIVATIONS) {
+            let Some(derived) = manifests::numbered(&self.store, &product, number).await? else {
                 continue;
             };
             if derived.derived_from.as_ref() == Some(id) {

@@ -17,7 +17,7 @@ use super::bands::{BAND_COUNT, band_areas, summed_bands};
 use super::rows::StepSum;
 use crate::region::address::RegionAddress;
 use crate::region::loaded::weights_failed;
-use crate::scan::{self, Layout};
+use crate::scan;
 use crate::session::QueryContext;
 use crate::{ComputeError, Engine};
 
@@ -149,7 +149,7 @@ async fn ask(
     measure: Measure,
 ) -> Result<Answer, ComputeError> {
     let store = engine.store();
-    scan::register(&context, "fields", store, fields, Layout::Fields).await?;
+    scan::register(&context, "fields", store, fields).await?;
     let failed = || ComputeError::engine("summing over a region");
     let query = context.sql(&sql(measure, region)).await.map_err(failed())?;
     Ok(Answer {

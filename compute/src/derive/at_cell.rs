@@ -18,21 +18,21 @@ pub(crate) async fn counts_at_cell(
     row: u32,
     col: u32,
 ) -> Result<Option<Vec<CellCounts>>, ComputeError> {
-    let (Some(source), Some(extent)) = (&manifest.derived_from, manifest.extent()) else {
+    let (Some(id), Some(extent)) = (&manifest.derived_from, manifest.extent()) else {
         return Ok(None);
     };
-    let source = match manifests::load(engine.store(), source).await {
+    let source = match manifests::load(engine.store(), id).await {
         Ok(source) => source,
         Err(e) if e.is_not_found() => return Ok(None),
         Err(e) => return Err(e.into()),
     };
     let steps = steps_since(&source, Some(extent.start))?;
-    let values = cell_values(engine, &source, row, col).await?;
+    let values = cell_values(engine, &source, id, row, col).await?;
     // The first step of the source that is counted.
     let skipped = source.steps.len() - steps.len();
     let is_same = steps.iter().map(|step| step.period);
     if !is_same.eq(manifest.steps.iter().map(|step| step.period)) {
-        let reason = format!("its steps are not those of {}", source.id());
+        let reason = format!("its steps are not those of {id}");
         return Err(ComputeError::inconsistent(
             manifest.id().to_string(),
             reason,

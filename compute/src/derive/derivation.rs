@@ -1,10 +1,10 @@
 //! One derivation: kept steps and new ones in the order of time, exact sums from one run of steps to the next.
 
-use contract::manifest::{Contributed, MANIFEST_SCHEMA, Manifest, SeriesSegment, Step};
+use contract::manifest::{Contributed, MANIFEST_SCHEMA, Manifest, Step};
 use contract::product::ProductId;
 use contract::quantity::Quantity;
 use storage::contributed::{self, Contributed as Counts};
-use storage::{Store, domain, fields, series};
+use storage::{Store, domain, fields};
 
 use super::prior::Prior;
 use super::source::SourceStep;
@@ -13,8 +13,8 @@ use super::{Progress, exact, of_all};
 use crate::{ComputeError, Engine};
 use contract::key::ObjectKey;
 
-/// Values of one query and one series segment: 256 MiB of f32, whatever the grid.
-const SEGMENT_VALUES: usize = 64 << 20;
+/// Values of one query: 256 MiB of f32, whatever the grid.
+const RUN_VALUES: usize = 64 << 20;
 
 /// A derivation under way. Its result is the same, bit for bit, whatever could be kept.
 pub(super) struct Derivation<'a> {
@@ -31,7 +31,6 @@ pub(super) struct Derivation<'a> {
     /// Steps and time that they hold.
     counts: Counts,
     done: Vec<Step>,
-    segments: Vec<SeriesSegment>,
 }
 
 impl<'a> Derivation<'a> {
@@ -77,7 +76,6 @@ impl<'a> Derivation<'a> {
             sums,
             counts,
             done: vec![],
-            segments: vec![],
         })
     }
 
@@ -86,8 +84,8 @@ impl<'a> Derivation<'a> {
         mut self,
         progress: &Progress<'_>,
     ) -> Result<Manifest, ComputeError> {
-        let per_segment = (SEGMENT_VALUES / self.source.grid.cell_count()).max(1);
-        for run in self.steps.chunks(per_segment) {
+        let per_run = (RUN_VALUES / self.source.grid.cell_count()).max(1);
+        for run in self.steps.chunks(per_run) {
             self.run(run, progress).await?;
         }
         if let Some(last) = self
@@ -108,7 +106,7 @@ impl<'a> Derivation<'a> {
             grid: self.source.grid,
             steps: self.done,
             domain: self.domain,
-            series: self.segments,
+            series: vec![],
             derived_from: Some(self.source.id()),
             notices: vec![],
         })
@@ -118,28 +116,21 @@ impl<'a> Derivation<'a> {
         self.engine.store()
     }
 
-    /// One run of steps, a segment of the series.
+    /// One run of steps.
     async fn run(
         &mut self,
         run: &[SourceStep<'_>],
         progress: &Progress<'_>,
     ) -> Result<(), ComputeError> {
         let first = self.done.len();
-        if let Some(segment) = self.prior.segment(first, run.len()) {
-            self.segments.push(segment.clone());
-            let kept = (first..first + run.len()).filter_map(|index| self.prior.step(index));
-            self.done.extend(kept.cloned());
+        let kept = (first..first + run.len()).map_while(|index| self.prior.step(index));
+        let kept: Vec<Step> = kept.cloned().collect();
+        if kept.len() == run.len() {
+            self.done.extend(kept);
             progress(of_all(self.done.len(), self.steps));
             return Ok(());
         }
         let (columns, has_data) = self.columns(first, run).await?;
-        let views: Vec<&[f32]> = columns.iter().map(Vec::as_slice).collect();
-        let grid = &self.source.grid;
-        self.segments.push(SeriesSegment {
-            first_step: first as u32,
-            steps: run.len() as u32,
-            series: series::write(self.store(), self.target, grid, &views).await?,
-        });
         let kept_count = run.len() - has_data.len();
         for (index, (step, values)) in run.iter().zip(&columns).enumerate() {
             let contributed = match index.checked_sub(kept_count) {
@@ -156,8 +147,8 @@ impl<'a> Derivation<'a> {
         Ok(())
     }
 
-    /// Values of every step of a run, `[row, col]` each: read where they are kept, else accumulated; and of those that
-    /// are accumulated the cells with data.
+    /// Values of every step of a run that is stored anew, `[row, col]` each: read where they are kept over another domain, else
+    /// accumulated; and of those that are accumulated the cells with data.
     async fn columns(
         &mut self,
         first: usize,
@@ -166,7 +157,11 @@ impl<'a> Derivation<'a> {
         let kept_count = self.prior.step_count.saturating_sub(first).min(run.len());
         let mut columns = vec![];
         for index in first..first + kept_count {
-            columns.push(self.prior.column(self.store(), index, &self.cells).await?);
+            columns.push(match self.prior.step(index) {
+                // Its field is kept as it is.
+                Some(_step) => vec![],
+                None => self.prior.column(self.store(), index, &self.cells).await?,
+            });
         }
         let rest = &run[kept_count..];
         if rest.is_empty() {

@@ -2,7 +2,7 @@
 
 use contract::grid::Grid;
 use contract::key::ObjectKey;
-use contract::manifest::{self, Manifest, SeriesSegment, Step};
+use contract::manifest::{self, Manifest, Step};
 use storage::contributed::{self, Contributed};
 use storage::{Store, domain, fields};
 
@@ -91,17 +91,6 @@ impl<'a> Prior<'a> {
     pub(super) fn step(&self, index: usize) -> Option<&'a Step> {
         let manifest = self.manifest.filter(|_| self.other_domain.is_none())?;
         (index < self.step_count).then(|| &manifest.steps[index])
-    }
-
-    /// The stored series of a run of steps, if it holds these and all of them are kept.
-    pub(super) fn segment(&self, first: usize, count: usize) -> Option<&'a SeriesSegment> {
-        let manifest = self.manifest.filter(|_| self.other_domain.is_none())?;
-        let holds = |segment: &&SeriesSegment| {
-            (segment.first_step as usize, segment.steps as usize) == (first, count)
-        };
-        (first + count <= self.step_count)
-            .then(|| manifest.series.iter().find(holds))
-            .flatten()
     }
 
     /// Values of a kept step as they are over the domain of now, `[row, col]`.

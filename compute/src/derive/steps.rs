@@ -14,7 +14,7 @@ use futures::TryStreamExt as _;
 
 use super::source::SourceStep;
 use crate::budget::running::{add_sums, column_kg_m2};
-use crate::scan::{self, Layout};
+use crate::scan;
 use crate::session::QueryContext;
 use crate::{ComputeError, Engine};
 
@@ -129,7 +129,7 @@ async fn query(
     run: &[SourceStep<'_>],
 ) -> Result<SendableRecordBatchStream, ComputeError> {
     let (store, fields) = (engine.store(), fields_of(run));
-    scan::register(context, "fields", store, &fields, Layout::Fields).await?;
+    scan::register(context, "fields", store, &fields).await?;
     let sql = sql.replace("$start", &run[0].period.start.ms().to_string());
     let query = context.sql(&sql).await.map_err(failed())?;
     query.execute_stream().await.map_err(failed())

@@ -105,8 +105,8 @@ fn is_whole(step: &Step, there: &BTreeSet<ObjectKey>) -> bool {
     there.contains(&step.field) && counts.is_some_and(|counts| there.contains(&counts.counts))
 }
 
-/// Fields, and counts of what contributed to them, that are there, and whole as far as that is asked for. A field without
-/// its series or domain counts as gone: these are made with it.
+/// Fields, and counts of what contributed to them, that are there, and whole as far as that is asked for. Fields without
+/// their domain count as gone: it is made with them.
 async fn fields_there(
     store: &Store,
     latest: Option<&Manifest>,
@@ -120,23 +120,18 @@ async fn fields_there(
     let Some(latest) = latest.filter(|_| request.is_verified) else {
         return Ok(there);
     };
-    let series = latest.series.iter().map(|segment| &segment.series);
     let fields = latest.steps.iter().map(|step| &step.field);
     let counts = latest
         .steps
         .iter()
         .filter_map(|step| step.contributed.as_ref());
     let counts = counts.map(|contributed| &contributed.counts);
-    let named = series.chain(fields).chain(counts).chain([&latest.domain]);
+    let named = fields.chain(counts).chain([&latest.domain]);
     let damaged = verify::damaged(store, named.cloned()).await?;
     there.retain(|field| !damaged.contains(field));
-    for segment in &latest.series {
-        let first = segment.first_step as usize;
-        let steps = latest.steps.get(first..first + segment.steps as usize);
-        if damaged.contains(&segment.series) || damaged.contains(&latest.domain) {
-            for step in steps.unwrap_or_default() {
-                there.remove(&step.field);
-            }
+    if damaged.contains(&latest.domain) {
+        for step in &latest.steps {
+            there.remove(&step.field);
         }
     }
     Ok(there)

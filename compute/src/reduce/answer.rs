@@ -3,12 +3,13 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use contract::manifest::Manifest;
+use contract::manifest::{Manifest, ManifestId};
 use contract::quantity::{Display, Quantity};
 use contract::statistics::{
     Percentile, Statistic, StatisticNote, StatisticsAnswer, StatisticsQuery, StatisticsRow,
 };
 use contract::time::Period;
+use cube::Values;
 
 use super::accumulator::{Accumulated, too_large};
 use super::bins::{BinSums, bin_sums};
@@ -16,7 +17,7 @@ use super::percentiles::Searches;
 use super::run::run;
 use super::scale::Scale;
 use super::task::{Question, Wanted};
-use super::tasks::runs;
+use super::tasks::Version;
 use super::weighed::Weighed;
 use crate::budget::rows::coverage_percent;
 use crate::{ComputeError, Engine, catalogue};
@@ -41,9 +42,12 @@ pub async fn statistics_of(
     let bins = query.step.bins(window, periods.iter().copied())?;
     let weighed = Weighed::of(engine, manifest, query).await?;
     let first = periods.partition_point(|period| period.end <= window.start);
+    let id = manifest.id();
     let mut asked = Asked {
         engine,
         manifest,
+        id: &id,
+        values: opened(engine, manifest, &id).await?,
         weighed: &weighed,
         steps: first as u32..(first + inside.len()) as u32,
         scale: Scale::of_all(),
@@ -66,11 +70,23 @@ pub async fn statistics_of(
     };
     let rows = bins.iter().enumerate().map(|(at, bin)| rows.row(at, bin));
     let rows: Vec<StatisticsRow> = rows.collect();
-    Ok(answer(manifest, query, weighed, rows))
+    Ok(answer((manifest, id), query, weighed, rows))
+}
+
+/// The version along time; a cluster's executors read its fields instead.
+async fn opened(
+    engine: &Engine,
+    manifest: &Manifest,
+    id: &ManifestId,
+) -> Result<Option<Values>, ComputeError> {
+    if engine.is_distributed() {
+        return Ok(None);
+    }
+    engine.values(manifest, id).await.map(Some)
 }
 
 fn answer(
-    manifest: &Manifest,
+    (manifest, id): (&Manifest, ManifestId),
     query: &StatisticsQuery,
     weighed: Weighed,
     rows: Vec<StatisticsRow>,
@@ -83,7 +99,7 @@ fn answer(
     };
     StatisticsAnswer {
         product: manifest.product.clone(),
-        manifest: manifest.id(),
+        manifest: id,
         title: manifest.title.clone(),
         source: manifest.source.clone(),
         synthetic: manifest.synthetic,
@@ -127,6 +143,10 @@ fn unit_of(statistic: Statistic, quantity: Quantity, size_unit: &str) -> String 
 struct Asked<'a> {
     engine: &'a Engine,
     manifest: &'a Manifest,
+    /// The name of the version, which is costly to compute.
+    id: &'a ManifestId,
+    /// The version along time, where this process reads it.
+    values: Option<Values>,
     weighed: &'a Weighed,
     /// Steps that reach into the period.
     steps: Range<u32>,
@@ -135,10 +155,15 @@ struct Asked<'a> {
 }
 
 impl Asked<'_> {
-    /// Passes over the values. Sums of whole series are remembered, and not asked for a second time.
+    /// Passes over the values. Sums of whole runs are remembered, and not asked for a second time.
     async fn accumulated(&self, wanted: Wanted) -> Result<Accumulated, ComputeError> {
         let weighed = self.weighed;
-        let (store, steps) = (self.engine.store(), self.steps.clone());
+        let version = Version {
+            store: self.engine.store(),
+            manifest: self.manifest,
+            id: self.id,
+            values: self.values.as_ref(),
+        };
         let [whole, covered] = weighed.addresses.clone();
         let question = Question {
             shape: weighed.shape,
@@ -150,8 +175,8 @@ impl Asked<'_> {
         };
         let known = self.engine.objects().remembered();
         let (mut all, mut pieces, mut new) = (Accumulated::default(), vec![], vec![]);
-        for run in runs(store, self.manifest, steps, &weighed.cells())? {
-            let name = run.series.as_ref().and_then(|key| question.sums_name(key));
+        for run in version.runs(self.steps.clone(), &weighed.cells()) {
+            let name = run.name.and_then(|name| question.sums_name(&name));
             if let Some(sums) = name.and_then(|name| known.get(&name)) {
                 let first = run.steps.start;
                 let own = sums.iter().map(|(step, sums)| (first + step, *sums));
@@ -162,7 +187,8 @@ impl Asked<'_> {
             new.extend(name.map(|name| (name, run.steps)));
         }
         if !pieces.is_empty() {
-            all.merge(run(self.engine, question, pieces).await?)?;
+            let values = self.values.clone();
+            all.merge(run(self.engine, question, values, pieces).await?)?;
         }
         for (name, steps) in new {
             let own = all.steps.range(steps.clone());

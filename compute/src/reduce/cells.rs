@@ -5,8 +5,8 @@ use std::collections::BTreeSet;
 use contract::chunk::{CHUNK_COLS, CHUNK_ROWS, Window, field_chunks};
 use contract::earth::Earth;
 use contract::grid::Grid;
+use cube::BLOCK_CELLS;
 use serde::{Deserialize, Serialize};
-use storage::series::BLOCK_CELLS;
 
 use crate::region::loaded::RegionWeights;
 
@@ -73,7 +73,7 @@ pub(super) struct CellWeight {
 /// Rows and columns of a grid.
 pub(super) type Shape = [u32; 2];
 
-/// Windows of 8 x 8 cells of a grid, as series are cut.
+/// Windows of 8 x 8 cells of a grid, as values along time are cut.
 pub(super) fn blocks([rows, cols]: Shape) -> Vec<Window> {
     contract::chunk::windows(&shape_only([rows, cols]), BLOCK_CELLS, BLOCK_CELLS)
 }

@@ -63,7 +63,7 @@ impl Scratch {
             *max = if *value > *max { *value } else { *max };
         }
         if with_squares {
-            let to_squares = scale.squares_per_step();
+            let to_squares = Scale::squares_per_step();
             for (sum, value) in self.squares.iter_mut().zip(values) {
                 let steps = (f64::from(*value) - zero) * factor;
                 let square = steps * steps * to_squares;

@@ -1,4 +1,4 @@
-//! Sums of whole series over a geometry that this process has found: another statistic, other bins or another period of the same
+//! Sums of whole runs of steps over a geometry that this process has found: another statistic, other bins or another period of the same
 //! geometry read nothing again.
 
 use std::sync::Arc;
@@ -14,7 +14,7 @@ const HELD_BYTES: u64 = 64 << 20;
 /// A year of days, which sizes tables.
 const TYPICAL_BYTES: u64 = 32 << 10;
 
-/// Sums by step, by the digest of all that they are made of: a series, weights, a scale. None of these ever changes.
+/// Sums by step, by the digest of all that they are made of: values of a run, weights, a scale. None of these ever changes.
 #[derive(Debug)]
 pub(crate) struct Remembered(Cache<Digest, Arc<Vec<(u32, StepSums)>>, Size>);
 
@@ -26,7 +26,7 @@ impl Default for Remembered {
 }
 
 impl Remembered {
-    /// Sums of the steps of a series that hold data, by their place in it.
+    /// Sums of the steps of a run that hold data, by their place in it.
     pub(super) fn get(&self, name: &Digest) -> Option<Arc<Vec<(u32, StepSums)>>> {
         self.0.get(name)
     }

@@ -6,6 +6,7 @@ use std::collections::BTreeSet;
 
 use contract::digest::Digest;
 use contract::key::ObjectKey;
+use cube::Values;
 use datafusion::arrow::array::{Array as _, AsArray as _, RecordBatch};
 use futures::{StreamExt as _, TryStreamExt as _, stream};
 
@@ -22,21 +23,23 @@ const CLUSTER_TASKS: usize = 32;
 pub(super) async fn run(
     engine: &Engine,
     question: Question,
+    values: Option<Values>,
     pieces: Vec<Piece>,
 ) -> Result<Accumulated, ComputeError> {
     if engine.is_distributed() {
         distributed(engine, question, pieces).await
     } else {
-        in_process(engine, question, pieces).await
+        in_process(engine, question, values, pieces).await
     }
 }
 
 async fn in_process(
     engine: &Engine,
     question: Question,
+    values: Option<Values>,
     pieces: Vec<Piece>,
 ) -> Result<Accumulated, ComputeError> {
-    let worker = Worker::new(engine.objects(), question).await?;
+    let worker = Worker::new(engine.objects(), question, values).await?;
     // One is read while the others are reduced.
     let at_once = engine.partitions().get() + 1;
     let mut reduced = stream::iter(pieces)

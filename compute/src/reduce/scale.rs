@@ -81,7 +81,7 @@ impl Scale {
 
     /// What the square of a number of steps is multiplied with to be one of squares.
     #[inline]
-    pub(super) fn squares_per_step(self) -> f64 {
+    pub(super) fn squares_per_step() -> f64 {
         f64::from(SQUARE_BITS - 2 * VALUE_BITS).exp2()
     }
 
@@ -188,7 +188,7 @@ mod tests {
             for value in values {
                 let steps = (value - scale.zero) * scale.steps_per_value();
                 sum += i128::from(nearest(steps));
-                squares += i128::from(nearest(steps * steps * scale.squares_per_step()));
+                squares += i128::from(nearest(steps * steps * Scale::squares_per_step()));
             }
             let count = values.len() as i128;
             (scale.mean(sum, count), scale.std(squares, sum, count))

@@ -1,15 +1,17 @@
-//! A piece of a question: some blocks of a series, or chunks of a field, read, reduced and forgotten.
+//! A piece of a question: some blocks of a run of steps, or chunks of a field, read, reduced and forgotten.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
+use contract::chunk::Window;
 use contract::digest::Digest;
 use contract::key::ObjectKey;
 use contract::time::Period;
+use cube::BLOCK_CELLS;
 use serde::{Deserialize, Serialize};
-use storage::rows::{Expected, Fetched, Stored};
-use storage::{StorageError, fields, series};
+use storage::rows::Stored;
+use storage::{StorageError, fields};
 
 use super::accumulator::{Accumulated, StepSums, too_large};
 use super::cells::{self, Cells, Shape, WeightUnit};
@@ -35,18 +37,13 @@ pub(super) struct Question {
 }
 
 impl Question {
-    /// What the sums of all steps of a series are remembered by; none of what is no sum.
-    pub(super) fn sums_name(&self, series: &ObjectKey) -> Option<Digest> {
+    /// What the sums of all steps of a run are remembered by, `run` being what names its values; none of what is no sum.
+    pub(super) fn sums_name(&self, run: &Digest) -> Option<Digest> {
         let Wanted::Sums { with_squares } = self.wanted else {
             return None;
         };
         let weights = (self.shape, &self.whole, &self.covered, self.unit);
-        Some(Digest::of_json(&(
-            series,
-            weights,
-            self.scale,
-            with_squares,
-        )))
+        Some(Digest::of_json(&(run, weights, self.scale, with_squares)))
     }
 }
 
@@ -70,9 +67,9 @@ pub(super) enum Wanted {
 /// Values to read.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Piece {
-    /// Name of the object.
+    /// Name of the object; of blocks that of the field of their first step.
     pub(super) key: ObjectKey,
-    /// Where queries read it.
+    /// Where queries read it; nowhere in particular if it holds blocks.
     pub(super) address: String,
     pub(super) layout: Layout,
     /// Index of its first step in the version.
@@ -83,15 +80,12 @@ pub(super) struct Piece {
     pub(super) rows: Vec<u32>,
 }
 
-/// How values lie in an object.
+/// How values lie where they are read.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum Layout {
-    /// A row a block, `[cell, step]`.
-    Series {
-        /// Steps of it.
-        steps: u32,
-    },
+    /// Time-major: a row a block, `[cell, step]`. Only a process that has opened the version reads it.
+    Blocks,
     /// A row a chunk of one step.
     Field(Period),
 }
@@ -119,7 +113,7 @@ impl Task {
 
     /// Works on its pieces one after the other.
     pub(crate) async fn run(self, objects: &Objects) -> Result<Accumulated, ComputeError> {
-        let worker = Worker::new(objects, self.question).await?;
+        let worker = Worker::new(objects, self.question, None).await?;
         let mut all = Accumulated::default();
         for piece in self.pieces {
             all.merge(worker.reduce(piece).await?)?;
@@ -128,17 +122,28 @@ impl Task {
     }
 }
 
+/// Takes a row and its values.
+type Take<'a> = dyn FnMut(u32, &[f32]) -> Result<(), ComputeError> + 'a;
+
+const NOT_OPENED: &str = "its values along time were not opened";
+
 /// Who works on pieces of a question, its weights at hand. Clones share them.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub(super) struct Worker {
     objects: Objects,
     question: Arc<Question>,
     whole: Arc<RegionWeights>,
     covered: Arc<RegionWeights>,
+    /// The version along time, where it was opened.
+    values: Option<cube::Values>,
 }
 
 impl Worker {
-    pub(super) async fn new(objects: &Objects, question: Question) -> Result<Self, ComputeError> {
+    pub(super) async fn new(
+        objects: &Objects,
+        question: Question,
+        values: Option<cube::Values>,
+    ) -> Result<Self, ComputeError> {
         let weights = async |address: &str| {
             let found = objects.weights(address).await;
             found.map_err(weights_failed)
@@ -148,6 +153,7 @@ impl Worker {
             covered: weights(&question.covered).await?,
             objects: objects.clone(),
             question: Arc::new(question),
+            values,
         })
     }
 
@@ -156,6 +162,9 @@ impl Worker {
     /// # Errors
     /// They cannot be read, are damaged, or beyond anything physical.
     pub(super) async fn reduce(&self, piece: Piece) -> Result<Accumulated, ComputeError> {
+        if piece.layout == Layout::Blocks {
+            return self.blocks(piece).await;
+        }
         let stored = self.objects.stored(&piece.key, &piece.address)?;
         let piece = Arc::new(piece);
         let first = self.tried(&stored, &piece).await;
@@ -174,16 +183,63 @@ impl Worker {
         stored: &Stored,
         piece: &Arc<Piece>,
     ) -> Result<Accumulated, ComputeError> {
+        let Layout::Field(period) = piece.layout else {
+            return Err(ComputeError::inconsistent(piece.key.as_str(), NOT_OPENED));
+        };
         let index = self.objects.row_index(stored).await?;
         let fetched = storage::rows::fetch(stored, index, piece.rows.clone()).await?;
+        let windows = cells::chunks(self.question.shape);
+        let expected = windows.clone();
+        self.beside(piece, windows, move |take| {
+            fetched.each(|row| fields::expected(&expected, row, period), take)
+        })
+        .await
+    }
+
+    /// Reads blocks of the version along time and reduces them.
+    async fn blocks(&self, piece: Piece) -> Result<Accumulated, ComputeError> {
+        let Some(values) = self.values.clone() else {
+            return Err(ComputeError::inconsistent(piece.key.as_str(), NOT_OPENED));
+        };
+        let shape = self.question.shape;
+        let across = shape[1].div_ceil(BLOCK_CELLS);
+        let places = piece.rows.iter().map(|row| [row / across, row % across]);
+        let places: Vec<[u32; 2]> = places.collect();
+        let [start, end] =
+            [piece.steps.start, piece.steps.end].map(|step| (piece.first_step + step) as usize);
+        // A task of its own: chunks are decompressed where they are read.
+        let read = tokio::spawn(async move { values.blocks(&places, start..end).await });
+        let blocks = read.await;
+        let blocks = blocks.map_err(|e| ComputeError::inconsistent("statistics", e))??;
+        let piece = Arc::new(piece);
+        let rows = Arc::clone(&piece);
+        self.beside(&piece, cells::blocks(shape), move |take| {
+            let mut own = rows.rows.iter().zip(&blocks);
+            own.try_for_each(|(row, block)| take(*row, &block.values))
+        })
+        .await
+    }
+
+    /// Reduces rows on a thread of its own; `each` hands them over, `windows` are where they lie.
+    async fn beside(
+        &self,
+        piece: &Arc<Piece>,
+        windows: Vec<Window>,
+        each: impl FnOnce(&mut Take<'_>) -> Result<(), ComputeError> + Send + 'static,
+    ) -> Result<Accumulated, ComputeError> {
         let (worker, piece) = (self.clone(), Arc::clone(piece));
-        let reduced = tokio::task::spawn_blocking(move || worker.reduced(&piece, &fetched));
+        let reduced = tokio::task::spawn_blocking(move || worker.reduced(&piece, &windows, each));
         let reduced = reduced.await;
         reduced.map_err(|e| ComputeError::inconsistent("statistics", e))?
     }
 
-    /// Reduces values that were fetched.
-    fn reduced(&self, piece: &Piece, fetched: &Fetched) -> Result<Accumulated, ComputeError> {
+    /// Reduces rows.
+    fn reduced(
+        &self,
+        piece: &Piece,
+        windows: &[Window],
+        each: impl FnOnce(&mut Take<'_>) -> Result<(), ComputeError>,
+    ) -> Result<Accumulated, ComputeError> {
         let question = &*self.question;
         let cells = Cells {
             shape: question.shape,
@@ -191,22 +247,12 @@ impl Worker {
             covered: &self.covered,
             unit: question.unit,
         };
-        let scale = question.scale;
-        let (windows, step_count) = match piece.layout {
-            Layout::Series { steps } => (cells::blocks(question.shape), steps as usize),
-            Layout::Field(_period) => (cells::chunks(question.shape), 1),
-        };
-        let expected = |row: u32| -> Expected {
-            match piece.layout {
-                Layout::Series { .. } => series::expected(&windows, row, step_count),
-                Layout::Field(period) => fields::expected(&windows, row, period),
-            }
-        };
+        let (scale, step_count) = (question.scale, piece.steps.len());
         let targets = piece.targets(&question.wanted);
         let mut scratch = Scratch::default();
         let mut sums = vec![StepSums::default(); piece.steps.len()];
         let mut all = Accumulated::default();
-        fetched.each(expected, |row, values| {
+        each(&mut |row: u32, values: &[f32]| {
             let cells = cells.window(windows[row as usize]);
             let block = Block {
                 values,

@@ -36,7 +36,7 @@ async fn field(store: &Store, manifest: &Manifest, step: usize) -> Vec<f32> {
 async fn what_is_derived_is_a_cube_too_and_one_that_is_behind_is_brought_up() {
     let (_folder, store) = folder_store();
     let (id, year) = (product("wavy"), wavy_year(&ONE_DEGREE));
-    land(&store, &id, Quantity::CarbonFlux, ONE_DEGREE, &year, 12).await;
+    land(&store, &id, Quantity::CarbonFlux, ONE_DEGREE, &year).await;
     let engine = Engine::local(store.clone());
     let derived = derive(&engine, "wavy", None).await;
     for is_again in [false, true] {
@@ -69,7 +69,6 @@ async fn the_last_field_holds_the_printed_budget() {
         Quantity::CarbonFlux,
         ONE_DEGREE,
         &wavy_year(&ONE_DEGREE),
-        12,
     )
     .await;
     let engine = Engine::standalone(store.clone(), parts(2));
@@ -142,7 +141,6 @@ async fn a_gap_adds_nothing_and_land_stays_empty() {
         Quantity::CarbonFlux,
         TINY,
         &tiny_year(),
-        4,
     )
     .await;
     let engine = Engine::standalone(store.clone(), parts(2));
@@ -181,7 +179,7 @@ async fn counts(store: &Store, manifest: &Manifest, step: usize) -> Contributed 
 async fn a_sum_says_which_steps_and_how_much_time_it_holds() {
     let (_folder, store) = folder_store();
     let (id, flux) = (product("tiny"), Quantity::CarbonFlux);
-    land(&store, &id, flux, TINY, &tiny_year(), 4).await;
+    land(&store, &id, flux, TINY, &tiny_year()).await;
     let engine = Engine::standalone(store.clone(), parts(2));
     let derived = derive(&engine, "tiny", None).await;
     let day_ms = 86_400_000;
@@ -217,7 +215,7 @@ async fn a_month_that_nobody_landed_leaves_no_sum_complete() {
     let (id, flux) = (product("tiny"), Quantity::CarbonFlux);
     let mut steps = tiny_year();
     steps.remove(2);
-    land(&store, &id, flux, TINY, &steps, 4).await;
+    land(&store, &id, flux, TINY, &steps).await;
     let engine = Engine::standalone(store.clone(), parts(2));
     let derived = derive(&engine, "tiny", None).await;
     let complete = derived
@@ -234,7 +232,7 @@ async fn a_month_that_nobody_landed_leaves_no_sum_complete() {
 async fn a_budget_of_sums_is_that_of_their_flux_and_says_which_are_complete() {
     let (_folder, store) = folder_store();
     let (id, flux) = (product("tiny"), Quantity::CarbonFlux);
-    land(&store, &id, flux, TINY, &tiny_year(), 4).await;
+    land(&store, &id, flux, TINY, &tiny_year()).await;
     let engine = Engine::standalone(store.clone(), parts(2));
     let derived = derive(&engine, "tiny", "2001-01-11".parse().ok()).await;
     let question = |product: &ProductId, step| BudgetQuery {
@@ -283,7 +281,7 @@ async fn a_budget_of_sums_is_that_of_their_flux_and_says_which_are_complete() {
 async fn a_version_that_did_not_count_has_a_budget_of_unknown_completeness() {
     let (_folder, store) = folder_store();
     let (id, flux) = (product("tiny"), Quantity::CarbonFlux);
-    land(&store, &id, flux, TINY, &tiny_year(), 4).await;
+    land(&store, &id, flux, TINY, &tiny_year()).await;
     let engine = Engine::standalone(store.clone(), parts(2));
     let mut old = derive(&engine, "tiny", None).await;
     old.number += 1;
@@ -300,7 +298,7 @@ async fn a_version_that_did_not_count_has_a_budget_of_unknown_completeness() {
 async fn a_point_says_what_its_sums_hold_as_the_stored_counts_do() {
     let (_folder, store) = folder_store();
     let (id, flux) = (product("tiny"), Quantity::CarbonFlux);
-    land(&store, &id, flux, TINY, &tiny_year(), 4).await;
+    land(&store, &id, flux, TINY, &tiny_year()).await;
     let engine = Engine::standalone(store.clone(), parts(2));
     let local = Engine::local(store.clone());
     for start in [None, "2001-02-11".parse().ok()] {
@@ -348,7 +346,6 @@ async fn a_start_inside_a_step_counts_the_rest_of_it() {
         Quantity::CarbonFlux,
         TINY,
         &tiny_year(),
-        4,
     )
     .await;
     let engine = Engine::standalone(store.clone(), parts(2));
@@ -383,7 +380,6 @@ async fn deriving_again_changes_nothing_until_the_source_does() {
         Quantity::CarbonFlux,
         TINY,
         &tiny_year(),
-        4,
     )
     .await;
     let engine = Engine::standalone(store.clone(), parts(2));
@@ -405,7 +401,6 @@ async fn deriving_again_changes_nothing_until_the_source_does() {
         Quantity::CarbonFlux,
         TINY,
         &revised,
-        4,
     )
     .await;
     let third = derive(&engine, "tiny", None).await;
@@ -428,7 +423,6 @@ async fn fields_have_the_same_bytes_at_any_parallelism() {
             Quantity::CarbonFlux,
             ONE_DEGREE,
             &year,
-            12,
         )
         .await;
         let engine = Engine::standalone(store, parts(partitions));

@@ -27,15 +27,7 @@ fn kg(text: &str) -> f64 {
 async fn an_even_flux_integrates_to_area_times_time() {
     let (_folder, store) = folder_store();
     let id = product("even");
-    let manifest = land(
-        &store,
-        &id,
-        Quantity::CarbonFlux,
-        ONE_DEGREE,
-        &even_year(),
-        12,
-    )
-    .await;
+    let manifest = land(&store, &id, Quantity::CarbonFlux, ONE_DEGREE, &even_year()).await;
     let engine = Engine::standalone(store, parts(2));
 
     let globe = ask(&engine, &total(&id, "global")).await;
@@ -85,15 +77,7 @@ async fn an_even_flux_integrates_to_area_times_time() {
 async fn months_and_years_and_the_total_are_the_same_mass() {
     let (_folder, store) = folder_store();
     let id = product("even");
-    land(
-        &store,
-        &id,
-        Quantity::CarbonFlux,
-        ONE_DEGREE,
-        &even_year(),
-        12,
-    )
-    .await;
+    land(&store, &id, Quantity::CarbonFlux, ONE_DEGREE, &even_year()).await;
     let engine = Engine::standalone(store, parts(2));
     let mut sums = vec![];
     for (step, rows) in [
@@ -141,7 +125,6 @@ async fn a_store_in_memory_serves_ballista_too() {
         Quantity::CarbonFlux,
         ONE_DEGREE,
         &even_year()[..2],
-        2,
     )
     .await;
     let answer = ask(&Engine::standalone(store, parts(2)), &total(&id, "global")).await;
@@ -160,7 +143,6 @@ async fn a_store_in_a_folder_with_an_odd_name_is_found() {
         Quantity::CarbonFlux,
         ONE_DEGREE,
         &even_year()[..1],
-        1,
     )
     .await;
     let answer = ask(&Engine::standalone(store, parts(2)), &total(&id, "global")).await;
@@ -187,7 +169,6 @@ async fn a_region_larger_than_the_grid_is_covered_in_part() {
         Quantity::CarbonFlux,
         grid,
         &[(Period::month(2000, 1).unwrap(), values)],
-        1,
     )
     .await;
     let engine = Engine::local(store);
@@ -218,7 +199,7 @@ async fn small_products(store: &storage::Store) {
     ] {
         let values = vec![FLUX; grid.cell_count()];
         let steps = [(Period::month(2000, 1).unwrap(), values)];
-        land(store, &product(name), quantity, grid, &steps, 1).await;
+        land(store, &product(name), quantity, grid, &steps).await;
     }
 }
 

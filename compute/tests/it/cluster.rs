@@ -17,7 +17,7 @@ const PARTS: usize = 8;
 async fn wavy_store() -> (tempfile::TempDir, Store) {
     let (folder, store) = folder_store();
     let (id, year) = (product("wavy"), wavy_year(&ONE_DEGREE));
-    land(&store, &id, Quantity::CarbonFlux, ONE_DEGREE, &year, 12).await;
+    land(&store, &id, Quantity::CarbonFlux, ONE_DEGREE, &year).await;
     (folder, store)
 }
 

@@ -38,15 +38,7 @@ const BOX: &str = "-60,-60,60.5,59.5";
 async fn landed() -> (tempfile::TempDir, Store) {
     let (folder, store) = folder_store();
     let months = &wavy_year(&GRID)[..2];
-    land(
-        &store,
-        &product("wavy"),
-        Quantity::CarbonFlux,
-        GRID,
-        months,
-        12,
-    )
-    .await;
+    land(&store, &product("wavy"), Quantity::CarbonFlux, GRID, months).await;
     (folder, store)
 }
 
@@ -164,7 +156,7 @@ async fn a_damaged_end_of_a_field_is_named_where_carbon_is_accumulated() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_flipped_bit_of_a_series_is_no_other_value_of_a_place() {
+async fn a_flipped_bit_of_a_field_or_a_chunk_is_no_other_value_of_a_place() {
     let (_folder, store) = landed().await;
     let place = LonLatDeg::new(3.3, 4.5).unwrap();
     let ask = async || {
@@ -174,15 +166,32 @@ async fn a_flipped_bit_of_a_series_is_no_other_value_of_a_place() {
     };
     let right = ask().await.unwrap();
     assert!(right.series.iter().any(|point| point.value.is_some()));
-    let series = first(&store, Kind::Series).await;
-    let errors = flipped(&store, &series, || async {
+    let field = first(&store, Kind::Field).await;
+    let newest = manifests::latest(&store, &product("wavy")).await;
+    cube::follow(&store, &newest.unwrap().unwrap())
+        .await
+        .unwrap();
+    let mut chunks = vec![];
+    for key in store.list("cubes/wavy/chunks").await.unwrap() {
+        chunks.push((store.get(&key).await.unwrap().len(), key));
+    }
+    let chunk = chunks.into_iter().max().unwrap().1;
+    assert_eq!(ask().await.unwrap(), right);
+    for (key, is_read) in [(&chunk, true), (&field, false)] {
+        let errors = flipped(&store, key, || async {
+            ask().await.map(|answer| answer == right)
+        });
+        let errors = errors.await;
+        // What the cube holds is not read from fields.
+        assert_eq!(errors > 50, is_read, "{key}: {errors} errors");
+    }
+    for key in store.list("cubes/wavy").await.unwrap() {
+        store.remove(&key).await.unwrap();
+    }
+    let errors = flipped(&store, &field, || async {
         ask().await.map(|answer| answer == right)
     });
-    let errors = errors.await;
-    assert!(
-        errors > 50,
-        "{errors} errors only: what was read is not looked at"
-    );
+    assert!(errors.await > 50, "there is no cube");
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -252,7 +261,7 @@ async fn a_damaged_domain_or_manifest_is_named() {
     }
 }
 
-/// The derived product with a bit flipped in a field, its series or its domain: made again under the same names.
+/// The derived product with a bit flipped in a field or its domain: made again under the same names.
 #[tokio::test(flavor = "multi_thread")]
 async fn damaged_derived_objects_are_made_again_when_they_are_looked_at() {
     use compute::recompute::{Request, What, plan, run};
@@ -268,11 +277,7 @@ async fn damaged_derived_objects_are_made_again_when_they_are_looked_at() {
         is_forced: false,
         is_verified,
     };
-    for key in [
-        &derived.steps[1].field,
-        &derived.series[0].series,
-        &derived.domain,
-    ] {
+    for key in [&derived.steps[1].field, &derived.domain] {
         let whole = store.get(key).await.unwrap();
         let mut flip = whole.to_vec();
         flip[whole.len() / 2] ^= 1;
@@ -341,7 +346,7 @@ async fn store_of_all_kinds() -> (tempfile::TempDir, Store) {
     }
     let march = months[1].1.iter().map(|value| value * 0.3).collect();
     months.push((Period::month(2001, 3).unwrap(), march));
-    land(&store, &id, flux, source.grid, &months, 12).await;
+    land(&store, &id, flux, source.grid, &months).await;
     (folder, store)
 }
 
@@ -376,7 +381,12 @@ async fn a_flipped_bit_of_any_object_of_a_store_is_no_other_number() {
             match now {
                 Ok(_) => assert_eq!(now, right, "{key}"),
                 Err(error) => {
-                    assert!(error.contains(key.as_str()), "{key}: {error}");
+                    // What names the chunks of a cube is told by the place of the cube.
+                    let told = match kind {
+                        Kind::Cube => "cubes/fgco2",
+                        _ => key.as_str(),
+                    };
+                    assert!(error.contains(told), "{key}: {error}");
                     refused.insert(kind);
                 }
             }
@@ -385,9 +395,9 @@ async fn a_flipped_bit_of_any_object_of_a_store_is_no_other_number() {
     let needed = [
         Kind::Field,
         Kind::Contributed,
-        Kind::Series,
         Kind::Domain,
         Kind::Manifest,
+        Kind::Cube,
     ];
     assert_eq!(
         refused,

@@ -8,12 +8,12 @@ use contract::budget::{BudgetAnswer, BudgetQuery, BudgetStep};
 use contract::digest::Digest;
 use contract::earth::Earth;
 use contract::grid::Grid;
-use contract::manifest::{MANIFEST_SCHEMA, Manifest, SeriesSegment, Step};
+use contract::manifest::{MANIFEST_SCHEMA, Manifest, Step};
 use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::region::Cells;
 use contract::time::Period;
-use storage::{Store, domain, fields, manifests, series};
+use storage::{Store, domain, fields, manifests};
 
 pub(crate) const ONE_DEGREE: Grid = Grid {
     rows: 180,
@@ -46,14 +46,13 @@ pub(crate) fn months(year: i32) -> Vec<Period> {
         .collect()
 }
 
-/// Stores a product of some steps, its series in runs of `run` steps.
+/// Stores a product of some steps; no cube follows it.
 pub(crate) async fn land(
     store: &Store,
     id: &ProductId,
     quantity: Quantity,
     grid: Grid,
     steps: &[(Period, Vec<f32>)],
-    run: usize,
 ) -> Manifest {
     let mut cells = vec![false; grid.cell_count()];
     let mut listed = vec![];
@@ -74,18 +73,6 @@ pub(crate) async fn land(
             contributed: None,
         });
     }
-    let mut segments = vec![];
-    for (index, run_steps) in steps.chunks(run).enumerate() {
-        let views: Vec<&[f32]> = run_steps
-            .iter()
-            .map(|(_, values)| values.as_slice())
-            .collect();
-        segments.push(SeriesSegment {
-            first_step: (index * run) as u32,
-            steps: run_steps.len() as u32,
-            series: series::write(store, id, &grid, &views).await.unwrap(),
-        });
-    }
     let latest = manifests::latest(store, id).await.unwrap();
     let manifest = Manifest {
         schema: MANIFEST_SCHEMA,
@@ -98,7 +85,7 @@ pub(crate) async fn land(
         grid,
         steps: listed,
         domain: domain::write(store, id, &cells).await.unwrap(),
-        series: segments,
+        series: vec![],
         derived_from: None,
         notices: vec![],
     };

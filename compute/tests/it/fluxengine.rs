@@ -65,7 +65,7 @@ async fn land_flux(store: &Store, folder: &Path, name: &str, year: i32) {
     let steps: Vec<_> = months(year).into_iter().zip(maps).map(of_month).collect();
     assert_eq!(steps.len(), 12);
     let flux = Quantity::CarbonFlux;
-    land(store, &product(name), flux, ONE_DEGREE, &steps, 12).await;
+    land(store, &product(name), flux, ONE_DEGREE, &steps).await;
 }
 
 async fn land_mask(store: &Store) -> Arc<Manifest> {
@@ -73,17 +73,7 @@ async fn land_mask(store: &Store) -> Arc<Manifest> {
     let share = reader.read_var_f32("land_proportion").unwrap();
     let steps = [(Period::year(2000).unwrap(), share)];
     let quantity = Quantity::LandAreaFraction;
-    Arc::new(
-        land(
-            store,
-            &product("onedeg-land"),
-            quantity,
-            ONE_DEGREE,
-            &steps,
-            1,
-        )
-        .await,
-    )
+    Arc::new(land(store, &product("onedeg-land"), quantity, ONE_DEGREE, &steps).await)
 }
 
 fn assert_close(ours: f64, theirs: f64, by: f64, what: &str) {

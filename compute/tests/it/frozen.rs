@@ -242,12 +242,12 @@ async fn frozen_exact_sums_are_gone_on_from() {
     let march = months[1].1.iter().map(|value| value * 0.3).collect();
     months.push((Period::month(2001, 3).unwrap(), march));
     let (id, grid, quantity) = (product("fgco2"), source.grid, source.quantity);
-    land(&kept, &id, quantity, grid, &months, 12).await;
+    land(&kept, &id, quantity, grid, &months).await;
     without_fields(&kept, &source).await;
     let gone_on = derive_accumulated(&Engine::local(kept), &id, None, &|_| ()).await;
     let gone_on = gone_on.unwrap();
     let (_folder, fresh) = folder_store();
-    land(&fresh, &id, quantity, grid, &months, 12).await;
+    land(&fresh, &id, quantity, grid, &months).await;
     let from_nothing = derive_accumulated(&Engine::local(fresh), &id, None, &|_| ()).await;
     assert_eq!(gone_on.steps.len(), 3);
     for (now, expected) in gone_on.steps.iter().zip(from_nothing.unwrap().steps) {

@@ -26,7 +26,7 @@ type Steps = Vec<(Period, Vec<f32>)>;
 
 async fn put(store: &Store, steps: &Steps) -> Manifest {
     let id = product("wavy");
-    land(store, &id, Quantity::CarbonFlux, FIVE_DEGREES, steps, 12).await
+    land(store, &id, Quantity::CarbonFlux, FIVE_DEGREES, steps).await
 }
 
 async fn derive(store: &Store) -> Manifest {

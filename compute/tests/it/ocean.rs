@@ -48,17 +48,7 @@ async fn mask(store: &Store, name: &str, quantity: Quantity, grid: Grid) -> Arc<
         _ => land_share(index),
     };
     let values = (0..grid.cell_count()).map(share).collect();
-    Arc::new(
-        land(
-            store,
-            &product(name),
-            quantity,
-            grid,
-            &[(month(), values)],
-            1,
-        )
-        .await,
-    )
+    Arc::new(land(store, &product(name), quantity, grid, &[(month(), values)]).await)
 }
 
 /// A flux everywhere but in column 7.
@@ -66,7 +56,7 @@ async fn flux(store: &Store) -> Manifest {
     let value = |index: usize| if index % 130 == 7 { f32::NAN } else { FLUX };
     let values = (0..GRID.cell_count()).map(value).collect();
     let flux = Quantity::CarbonFlux;
-    land(store, &product("even"), flux, GRID, &[(month(), values)], 1).await
+    land(store, &product("even"), flux, GRID, &[(month(), values)]).await
 }
 
 fn asked(region: &str, cells: Cells, ocean: Option<&Arc<Manifest>>) -> BudgetQuery {
@@ -200,13 +190,13 @@ async fn what_cannot_say_what_is_sea_is_refused_with_both_named() {
     let values = vec![0.5; GRID.cell_count()];
     let steps = [1, 2].map(|m| (Period::month(2000, m).unwrap(), values.clone()));
     let sea = Quantity::SeaAreaFraction;
-    let twice = land(&store, &product("twice"), sea, GRID, &steps, 2).await;
+    let twice = land(&store, &product("twice"), sea, GRID, &steps).await;
     let said = refused(&Arc::new(twice), "global").await;
     assert!(said.contains("2 steps"), "{said}");
 
     let mut holed = values;
     holed[3] = f32::NAN;
-    let holed = land(&store, &product("holed"), sea, GRID, &[(month(), holed)], 1).await;
+    let holed = land(&store, &product("holed"), sea, GRID, &[(month(), holed)]).await;
     let holed = Arc::new(holed);
     let said = refused(&holed, "global").await;
     assert!(

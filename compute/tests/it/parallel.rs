@@ -17,7 +17,6 @@ async fn any_number_of_partitions_gives_the_same_bits_with_ballista_and_without(
         Quantity::CarbonFlux,
         ONE_DEGREE,
         &wavy_year(&ONE_DEGREE),
-        12,
     )
     .await;
     let mut answers = vec![];
@@ -67,7 +66,7 @@ async fn the_order_of_files_does_not_change_one_bit_but_would_in_floats() {
             .map(|(i, &month)| (day(i), year[month].1.clone()))
             .collect();
         let id = product(name);
-        land(&store, &id, Quantity::CarbonFlux, ONE_DEGREE, &steps, 3).await;
+        land(&store, &id, Quantity::CarbonFlux, ONE_DEGREE, &steps).await;
         let engine = Engine::standalone(store.clone(), parts(3));
         sums.push(
             ask(&engine, &total(&id, "global")).await.rows[0]

@@ -31,14 +31,12 @@ fn year() -> Vec<(Period, Vec<f32>)> {
 #[tokio::test]
 async fn a_place_has_the_series_of_its_cell_in_the_unit_people_read() {
     let (_folder, store) = folder_store();
-    // Runs of five steps: the series is joined from three files.
     let manifest = land(
         &store,
         &product("sst"),
         Quantity::SeaSurfaceTemperature,
         GRID,
         &year(),
-        5,
     )
     .await;
     let engine = Engine::local(store);
@@ -82,7 +80,6 @@ async fn a_place_outside_the_grid_is_refused_with_its_bounds() {
         Quantity::SeaSurfaceTemperature,
         GRID,
         &year()[..1],
-        1,
     )
     .await;
     let engine = Engine::local(store);

@@ -175,7 +175,7 @@ async fn read(store: &Store, manifest: &Manifest, region: &str) -> Read {
 async fn a_small_box_reads_its_chunks_and_no_others() {
     let (_folder, store) = folder_store();
     let flux = Quantity::CarbonFlux;
-    let manifest = land(&store, &product("noise"), flux, GRID, &noise(), 4).await;
+    let manifest = land(&store, &product("noise"), flux, GRID, &noise()).await;
     assert_eq!(field_chunks(&GRID).len(), 48);
     let share = |cells: f64| cells / GRID.cell_count() as f64;
     // One chunk, and the end of each file.
@@ -198,7 +198,7 @@ async fn a_small_box_reads_its_chunks_and_no_others() {
 async fn what_is_remembered_of_the_end_of_a_field_is_not_believed_of_another_one_in_its_place() {
     let (_folder, store) = folder_store();
     let flux = Quantity::CarbonFlux;
-    let manifest = land(&store, &product("noise"), flux, GRID, &noise()[..1], 1).await;
+    let manifest = land(&store, &product("noise"), flux, GRID, &noise()[..1]).await;
     let field = &manifest.steps[0].field;
     let engine = Engine::in_process(store.clone(), parts(2));
     let question = total(&manifest.product, "110,20,111,21");
@@ -238,7 +238,7 @@ fn old_layout(content: Bytes) -> Bytes {
 async fn fields_of_the_layout_before_have_the_same_sums() {
     let (_folder, store) = folder_store();
     let (id, flux) = (product("noise"), Quantity::CarbonFlux);
-    let manifest = land(&store, &id, flux, GRID, &noise(), 4).await;
+    let manifest = land(&store, &id, flux, GRID, &noise()).await;
     let mut old = manifest.clone();
     old.product = product("old");
     for step in &mut old.steps {
@@ -265,7 +265,7 @@ async fn fields_of_the_layout_before_have_the_same_sums() {
 async fn the_sums_are_those_of_the_kernels_chunk_by_chunk() {
     let (_folder, store) = folder_store();
     let (id, flux) = (product("noise"), Quantity::CarbonFlux);
-    let manifest = land(&store, &id, flux, GRID, &noise()[..1], 1).await;
+    let manifest = land(&store, &id, flux, GRID, &noise()[..1]).await;
     let region = "105.3,3.1,127.7,38.2";
     let weights = weights::compute(&GRID, &region.parse().unwrap(), Earth::Wgs84).unwrap();
     let step = &manifest.steps[0];

@@ -29,7 +29,7 @@ const TEN_DEGREES: Grid = Grid {
 
 async fn put(store: &Store, steps: &[(Period, Vec<f32>)]) -> Manifest {
     let id = product("wavy");
-    land(store, &id, Quantity::CarbonFlux, TEN_DEGREES, steps, 12).await
+    land(store, &id, Quantity::CarbonFlux, TEN_DEGREES, steps).await
 }
 
 fn request(what: &[What]) -> Request {
@@ -170,7 +170,7 @@ async fn a_mean_over_a_region_is_the_mean_by_area() {
     let january = Period::month(2000, 1).unwrap();
     let id = product("sst");
     let sst = Quantity::SeaSurfaceTemperature;
-    land(&store, &id, sst, TEN_DEGREES, &[(january, values)], 1).await;
+    land(&store, &id, sst, TEN_DEGREES, &[(january, values)]).await;
     let query = RegionSeriesQuery {
         product: id,
         region: "-180,0,-170,90".parse().unwrap(),

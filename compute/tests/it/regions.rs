@@ -18,7 +18,7 @@ async fn a_box_drawn_in_a_file_has_the_budget_of_the_box() {
     let (folder, store) = folder_store();
     let id = product("wavy");
     let year = wavy_year(&ONE_DEGREE);
-    land(&store, &id, Quantity::CarbonFlux, ONE_DEGREE, &year, 12).await;
+    land(&store, &id, Quantity::CarbonFlux, ONE_DEGREE, &year).await;
     // Across the date line, once with longitudes past 180, with edges inside cells.
     let text = r#"{"type":"Feature","properties":{},"geometry":{"type":"Polygon","coordinates":
         [[[170.5,-33.3],[239.9,-33.3],[239.9,12.7],[170.5,12.7],[170.5,-33.3]]]}}"#;
@@ -177,7 +177,6 @@ async fn coverage_is_of_the_sea_and_gaps_are_estimated_apart() {
             Quantity::CarbonFlux,
             ONE_DEGREE,
             &steps,
-            1,
         )
         .await;
     }

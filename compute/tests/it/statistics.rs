@@ -31,15 +31,7 @@ const POLYGON: &str = "POLYGON((-60 -33.3,80 -41,120.5 20,33 61,-60 -33.3),(0 0,
 async fn landed() -> (tempfile::TempDir, Store, Manifest, Vec<(Period, Vec<f32>)>) {
     let (folder, store) = folder_store();
     let steps = wavy_year(&GRID);
-    let manifest = land(
-        &store,
-        &product("wavy"),
-        Quantity::CarbonFlux,
-        GRID,
-        &steps,
-        5,
-    )
-    .await;
+    let manifest = land(&store, &product("wavy"), Quantity::CarbonFlux, GRID, &steps).await;
     (folder, store, manifest, steps)
 }
 
@@ -230,24 +222,40 @@ async fn any_number_of_parts_gives_the_same_bits_with_ballista_and_without() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn values_of_fields_and_of_series_are_the_same() {
-    let (_folder, store, manifest, _steps) = landed().await;
-    let engine = Engine::in_process(store.clone(), parts(2));
-    // A version whose series are not there yet is read from its fields.
-    let mut fieldd = manifest.clone();
-    fieldd.series = vec![];
-    for geometry in [
+async fn values_of_fields_and_along_time_are_the_same() {
+    let (_folder, store) = folder_store();
+    // One complete run of the time-major copy, and steps that are in none.
+    let months = (0..140u32).map(|month| Period::month(1990 + month as i32 / 12, month % 12 + 1));
+    let year = wavy_year(&GRID);
+    let steps: Vec<(Period, Vec<f32>)> = months
+        .zip(year.iter().cycle())
+        .map(|(period, (_, values))| (period.unwrap(), values.clone()))
+        .collect();
+    let id = product("wavy");
+    let manifest = land(&store, &id, Quantity::CarbonFlux, GRID, &steps).await;
+    let geometries = [
         area(POLYGON),
         AskedGeometry::line("170,-33;-120,12").unwrap(),
-    ] {
-        let query = asked(geometry, "mean,std,p90,min", StatisticsStep::Season);
-        let of = async |manifest: &Manifest| {
-            let answer = compute::reduce::statistics_of(&engine, &query, manifest).await;
-            answer.unwrap().rows
-        };
-        let (series, fields) = (of(&manifest).await, of(&fieldd).await);
-        assert_eq!(series.len(), 5);
-        assert!(series == fields);
+    ];
+    let of = async |geometry: &AskedGeometry| {
+        let engine = Engine::in_process(store.clone(), parts(2));
+        let values = engine.values(&manifest, &manifest.id()).await.unwrap();
+        let query = asked(geometry.clone(), "mean,std,p90,min", StatisticsStep::Season);
+        let answer = compute::reduce::statistics_of(&engine, &query, &manifest).await;
+        (answer.unwrap().rows, values.time_major().len())
+    };
+    let mut fields = vec![];
+    for geometry in &geometries {
+        fields.push(of(geometry).await);
+        assert_eq!(fields[fields.len() - 1].1, 0);
+    }
+    cube::follow(&store, &manifest).await.unwrap();
+    assert_eq!(cube::compact(&store, "cubes/wavy").await.unwrap(), 1);
+    for (geometry, (rows, _)) in geometries.iter().zip(&fields) {
+        let (along_time, runs) = of(geometry).await;
+        assert_eq!(runs, 1);
+        assert!(along_time.len() > 40);
+        assert!(along_time == *rows);
     }
 }
 
@@ -357,15 +365,7 @@ async fn a_step_that_lies_across_two_rows_counts_in_both_by_its_time() {
         (period("2000-01-28", "2000-02-05"), constant(1e-9)),
         (period("2000-02-05", "2000-02-13"), constant(4e-9)),
     ];
-    land(
-        &store,
-        &product("wavy"),
-        Quantity::CarbonFlux,
-        GRID,
-        &steps,
-        2,
-    )
-    .await;
+    land(&store, &product("wavy"), Quantity::CarbonFlux, GRID, &steps).await;
     let query = asked(
         area("-40,-20,-10,10"),
         "mean,min,max,std",

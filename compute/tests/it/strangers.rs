@@ -28,7 +28,7 @@ async fn landed() -> (tempfile::TempDir, Store) {
     let (folder, store) = folder_store();
     let months = &wavy_year(&ONE_DEGREE)[..3];
     let flux = Quantity::CarbonFlux;
-    land(&store, &product("wavy"), flux, ONE_DEGREE, months, 12).await;
+    land(&store, &product("wavy"), flux, ONE_DEGREE, months).await;
     derive_accumulated(
         &Engine::local(store.clone()),
         &product("wavy"),
@@ -97,7 +97,7 @@ async fn a_region_outside_of_the_grid_is_outside_for_strangers_too() {
     };
     let step = (crate::fixture::months(2000)[0], vec![1e-9; 100]);
     let flux = Quantity::CarbonFlux;
-    land(&store, &product("corner"), flux, grid, &[step], 1).await;
+    land(&store, &product("corner"), flux, grid, &[step]).await;
     let engine = Engine::local(store).storing_no_weights();
     let refused = budget(&engine, &total(&product("corner"), "10,10,20,20")).await;
     let refused = refused.unwrap_err().to_string();

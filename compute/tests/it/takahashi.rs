@@ -17,7 +17,7 @@ async fn the_real_grids_have_the_published_budgets() {
     let year = takahashi_year();
     let (_folder, store) = folder_store();
     let id = product("takahashi09-flux");
-    land(&store, &id, Quantity::CarbonFlux, ONE_DEGREE, &year, 12).await;
+    land(&store, &id, Quantity::CarbonFlux, ONE_DEGREE, &year).await;
     let engine = Engine::standalone(store.clone(), parts(3));
 
     let rows = compare(&engine, &id).await.unwrap();
@@ -80,7 +80,7 @@ async fn read_as_centres_the_real_grids_would_fail_the_check() {
         .into_iter()
         .map(|(period, values)| (period, values[..179 * 360].to_vec()))
         .collect();
-    land(&store, &id, Quantity::CarbonFlux, shifted, &cut, 12).await;
+    land(&store, &id, Quantity::CarbonFlux, shifted, &cut).await;
     let engine = Engine::standalone(store, parts(2));
     let rows = compare(&engine, &id).await.unwrap();
     assert!(rows.iter().any(|row| !row.agrees));

@@ -72,7 +72,7 @@ async fn each_landed_granule_is_followed_by_one_event_and_a_batch_by_one_derivat
     for months in 1..=3 {
         let steps = &year[..months];
         let id = product("wavy");
-        let manifest = land(&store, &id, Quantity::CarbonFlux, COARSE, steps, 12).await;
+        let manifest = land(&store, &id, Quantity::CarbonFlux, COARSE, steps).await;
         log.append(&[landed(&format!("t{months}"), &manifest)])
             .await
             .unwrap();
@@ -102,9 +102,9 @@ async fn what_cannot_be_understood_or_derived_from_does_not_hold_up_the_rest() {
     let (_folder, store) = folder_store();
     let log: Arc<dyn EventLog> = Arc::new(EmbeddedLog::memory());
     let sst = Quantity::SeaSurfaceTemperature;
-    let warm = land(&store, &product("sst"), sst, COARSE, &year[..1], 1).await;
+    let warm = land(&store, &product("sst"), sst, COARSE, &year[..1]).await;
     let flux = Quantity::CarbonFlux;
-    let wavy = land(&store, &product("wavy"), flux, COARSE, &year[..1], 1).await;
+    let wavy = land(&store, &product("wavy"), flux, COARSE, &year[..1]).await;
     let unknown = Manifest {
         product: product("nobody"),
         ..wavy.clone()

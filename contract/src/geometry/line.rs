@@ -89,7 +89,7 @@ fn is_opposite(from: LonLatDeg, to: LonLatDeg) -> bool {
 impl FromStr for Line {
     type Err = ContractError;
 
-    /// Parses `LON,LAT;LON,LAT;...`, GeoJSON (LineString, MultiLineString, a feature or collection of them) or well-known text
+    /// Parses `LON,LAT;LON,LAT;...`, GeoJSON (`LineString`, `MultiLineString`, a feature or collection of them) or well-known text
     /// (LINESTRING, MULTILINESTRING).
     fn from_str(s: &str) -> Result<Self, Self::Err> {
         let told = |reason: String| ContractError::invalid("line", s, reason);

@@ -10,3 +10,4 @@ mod plain;
 mod product;
 mod rivals;
 mod round_trip;
+mod series;

@@ -8,7 +8,7 @@ use storage::Store;
 use crate::product::{bits, description, grid, month, stores, values};
 
 #[tokio::test]
-async fn fields_windows_and_series_are_those_that_were_put() {
+async fn fields_and_windows_are_those_that_were_put() {
     let (_folder, stores) = stores();
     for store in stores {
         let description = description(Quantity::CarbonFlux, grid(60, 90));
@@ -35,11 +35,6 @@ async fn fields_windows_and_series_are_those_that_were_put() {
             let put = values(&description.grid, step as u32 + 1);
             assert_eq!(bits(&field), bits(&put), "step {step}");
         }
-        let series = cube.series(7, 13, 0..3).await.unwrap();
-        let put: Vec<f32> = (1..=3)
-            .map(|number| values(&description.grid, number)[7 * 90 + 13])
-            .collect();
-        assert_eq!(bits(&series), bits(&put));
     }
 }
 

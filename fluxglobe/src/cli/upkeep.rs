@@ -15,7 +15,7 @@ pub(crate) enum RecomputeWhat {
     Statistics,
     /// Sums that budgets of named regions are made of.
     Budget,
-    /// Fields and series of the files themselves, read anew from the store where decoder or profile have changed since;
+    /// Fields of the files themselves, read anew from the store where decoder or profile have changed since;
     /// and the accumulated ones that follow from them.
     #[value(name = "frames", alias = "fields")]
     Fields,
@@ -85,7 +85,7 @@ pub(crate) struct Recompute {
     /// Also what is there and right by its name: made again and compared.
     #[arg(long)]
     pub(crate) force: bool,
-    /// Read what is there first, and make again what is damaged: fields, series and domain from raw/, sums and tiles from
+    /// Read what is there first, and make again what is damaged: fields and domain from raw/, sums and tiles from
     /// those.
     #[arg(long)]
     pub(crate) verify: bool,

@@ -37,17 +37,14 @@ pub(crate) async fn run(settings: &Settings, options: &Export) -> Result<()> {
     let store = deployment::store(settings)?;
     let manifest = version(&store, &options.product, settings).await?;
     let bar = progress::bar("export", manifest.steps.len() as u64);
-    let (url, tag) = match file_format(options.to) {
-        Some(format) => {
-            let path = local(&options.destination)?;
-            files(&store, &manifest, (format, path), &bar).await?;
-            (options.destination.clone(), None)
-        }
-        None => {
-            let destination = destination(&options.destination)?;
-            let tag = arrays(&store, &manifest, options.to, (&destination, &bar)).await?;
-            (destination.url().to_owned(), tag)
-        }
+    let (url, tag) = if let Some(format) = file_format(options.to) {
+        let path = local(&options.destination)?;
+        files(&store, &manifest, (format, path), &bar).await?;
+        (options.destination.clone(), None)
+    } else {
+        let destination = destination(&options.destination)?;
+        let tag = arrays(&store, &manifest, options.to, (&destination, &bar)).await?;
+        (destination.url().to_owned(), tag)
     };
     let exported = Exported {
         version: manifest.id().to_string(),

@@ -55,6 +55,8 @@ pub(crate) async fn run(settings: &Settings, options: Ingest) -> Result<ExitCode
             progress::result(&outcome.to_string())?;
         }
     }
+    // What landed is there and told of; it is only read faster along time for this.
+    cube::compacted().await;
     Ok(if refused == 0 {
         ExitCode::SUCCESS
     } else {

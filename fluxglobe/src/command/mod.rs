@@ -43,8 +43,11 @@ pub(crate) async fn run(settings: &Settings, command: Command) -> Result<ExitCod
         Command::Stats(Stats::Line(options)) => statistics::line(settings, &options).await?,
         Command::Stats(Stats::Polygon(options)) => stats::polygon(settings, &options).await?,
         Command::Budget(options) => budget::run(settings, &options).await?,
-        Command::Derive(options) => derive::run(settings, options).await?,
-        Command::Render(options) => render::run(settings, options).await?,
+        Command::Derive(options) => {
+            derive::run(settings, options).await?;
+            cube::compacted().await;
+        }
+        Command::Render(options) => Box::pin(render::run(settings, options)).await?,
         Command::Serve(options) => serve::run(settings, options).await?,
         Command::Ingestd(options) => services::ingestd::run(settings, options).await?,
         Command::Scheduler(options) => services::scheduler::run(settings, options).await?,
@@ -59,7 +62,10 @@ pub(crate) async fn run(settings: &Settings, command: Command) -> Result<ExitCod
         Command::Topics(command) => topics::run(command).await?,
         Command::Rejected(command) => rejected::run(settings, command).await?,
         Command::Observations(command) => observations::run(settings, command).await?,
-        Command::Recompute(options) => recompute::run(settings, options).await?,
+        Command::Recompute(options) => {
+            recompute::run(settings, options).await?;
+            cube::compacted().await;
+        }
         Command::Survey(options) => survey::run(&options).await?,
         Command::Verify(options) => return verify::run(settings, &options).await,
         Command::Gc(options) => gc::run(settings, &options).await?,

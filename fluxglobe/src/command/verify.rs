@@ -126,7 +126,6 @@ fn advice(report: &Report) -> Vec<String> {
     let made_again = [
         Kind::Field,
         Kind::Contributed,
-        Kind::Series,
         Kind::Domain,
         Kind::Cube,
         Kind::Sums,
@@ -134,7 +133,7 @@ fn advice(report: &Report) -> Vec<String> {
     ];
     if found(&made_again).is_some() {
         advice.push(
-            "fields, counts, series, domains, cubes, sums and tiles are made again by: fluxglobe recompute --product PRODUCT --verify"
+            "fields, counts, domains, cubes, sums and tiles are made again by: fluxglobe recompute --product PRODUCT --verify"
                 .to_owned(),
         );
     }
@@ -166,7 +165,19 @@ fn advice(report: &Report) -> Vec<String> {
             note.key
         ));
     }
-    if let Some(list) = found(&[Kind::Manifest, Kind::Observations, Kind::ObservationIndex]) {
+    if let Some(series) = found(&[Kind::Series]) {
+        advice.push(format!(
+            "{} was written by a program of before and is read by nobody: `fluxglobe gc` removes it",
+            series.key
+        ));
+    }
+    let lists = [
+        Kind::Manifest,
+        Kind::ManifestPage,
+        Kind::Observations,
+        Kind::ObservationIndex,
+    ];
+    if let Some(list) = found(&lists) {
         advice.push(format!(
             "{} cannot be made again: restore it from a copy of the store",
             list.key

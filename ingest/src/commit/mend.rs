@@ -1,53 +1,29 @@
-//! A version whose series or domain are damaged or gone in, the same objects whole out.
+//! A version whose domain is damaged or gone in, the same object whole out.
 
 use contract::manifest::{MANIFEST_SCHEMA, Manifest};
-use storage::{StorageError, Store, domain, manifests, series};
+use storage::{StorageError, Store, domain, manifests};
 
-use super::segments;
+use super::extent;
 use crate::error::IngestError;
 use crate::limits::gates::Gates;
 use crate::limits::memory;
 
-/// Writes them again from the version's fields. Objects that are named by their values come to be what they were, and the
-/// version stands; a series that was named by its bytes gets another name, and a version to name it.
+/// Writes it again from the version's fields: it comes to be what it was, or gets another name, and a version to name it.
 ///
-/// None if everything was whole.
+/// None if it was whole.
 pub(crate) async fn mend(
     store: &Store,
     gates: &Gates,
     newest: &Manifest,
 ) -> Result<Option<Manifest>, IngestError> {
     let mut next = newest.clone();
-    let mut is_changed = false;
-    let cells = newest.grid.cell_count();
-    for segment in &mut next.series {
-        let values = cells.saturating_mul(segment.steps as usize);
-        let _memory = gates.memory(memory::of_segment(values)).await;
-        if is_whole(series::check(store, &segment.series).await)? {
-            continue;
-        }
-        let first = segment.first_step as usize;
-        let steps = newest.steps.get(first..first + segment.steps as usize);
-        let values = segments::read_all(store, &newest.grid, steps.unwrap_or_default()).await?;
-        segment.series =
-            segments::write_series(store, &newest.product, &newest.grid, values).await?;
-        is_changed = true;
+    let _memory = gates.memory(memory::of_fields(&newest.grid)).await;
+    if is_whole(domain::read(store, &newest.domain).await.map(|_cells| ()))? {
+        return Ok(None);
     }
-    let _memory = gates.memory(memory::of_segment(cells)).await;
-    if !is_whole(domain::read(store, &newest.domain).await.map(|_cells| ()))? {
-        let mut cells = vec![false; cells];
-        for step in &newest.steps {
-            let values =
-                segments::read_all(store, &newest.grid, std::slice::from_ref(step)).await?;
-            segments::mark(&mut cells, &values);
-        }
-        next.domain = domain::write(store, &newest.product, &cells)
-            .await
-            .map_err(IngestError::storage("store the domain"))?;
-        is_changed = true;
-    }
+    next.domain = extent::write_again(store, newest).await?;
     if next == *newest {
-        return Ok(is_changed.then_some(next));
+        return Ok(Some(next));
     }
     next.number += 1;
     next.schema = MANIFEST_SCHEMA;
@@ -83,7 +59,6 @@ mod tests {
     use storage::fields;
 
     use super::*;
-    use crate::commit::merge::Merged;
     use crate::settings::{DecoderCommand, Settings};
 
     const GRID: Grid = Grid {
@@ -110,16 +85,8 @@ mod tests {
             contributed: None,
         };
         store.put_new(&step.field, field.content).await.unwrap();
-        let merged = Merged {
-            steps: vec![step],
-            orders: vec![],
-            changes: vec![],
-            is_revision: false,
-            last_taken: None,
-            quantity: Some(Quantity::CarbonFlux),
-        };
-        let written = segments::write(store, &product, &GRID, None, &merged);
-        let segments::Written { series, domain } = written.await.unwrap();
+        let steps = vec![step];
+        let domain = extent::write(store, &product, &GRID, None, &steps).await;
         let manifest = Manifest {
             schema: MANIFEST_SCHEMA,
             product,
@@ -129,9 +96,9 @@ mod tests {
             synthetic: false,
             source: "s".into(),
             grid: GRID,
-            steps: merged.steps,
-            domain,
-            series,
+            steps,
+            domain: domain.unwrap(),
+            series: vec![],
             derived_from: None,
             notices: vec![],
         };
@@ -143,9 +110,9 @@ mod tests {
     async fn what_is_mended_waits_for_memory_as_a_landing_does() {
         let store = Store::memory();
         let newest = landed(&store).await;
-        let series = &newest.series[0].series;
-        let damaged = bytes::Bytes::from("no series");
-        store.put_over(series, damaged).await.unwrap();
+        let domain = &newest.domain;
+        let damaged = bytes::Bytes::from("no domain");
+        store.put_over(domain, damaged).await.unwrap();
         let program = "/nowhere".into();
         let arguments = vec![];
         let settings = Settings::with_decoder(DecoderCommand { program, arguments });
@@ -155,9 +122,9 @@ mod tests {
         let limit = Duration::from_millis(300);
         let early = tokio::time::timeout(limit, &mut mending).await;
         assert!(early.is_err(), "somebody else has all memory: {early:?}");
-        assert!(store.get(series).await.is_err(), "nothing is written");
+        assert!(store.get(domain).await.is_err(), "nothing is written");
         drop(all);
         assert_eq!(mending.await.unwrap(), Some(newest.clone()));
-        assert!(store.get(series).await.is_ok());
+        assert!(store.get(domain).await.is_ok());
     }
 }

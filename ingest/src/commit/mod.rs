@@ -4,11 +4,11 @@
 //! newest is read again. Everything it names is durable before. A crash before the publication leaves objects that
 //! nothing names; the same files make the same objects again and land once. The product's cube follows the manifest.
 
+mod extent;
 pub(crate) mod landing_note;
 mod mend;
 mod merge;
 mod replace;
-mod segments;
 mod unchanged;
 
 use contract::manifest::{MANIFEST_SCHEMA, Manifest, ManifestId};
@@ -22,10 +22,10 @@ use crate::notice::{Answer, Versioned};
 use crate::put::StoredGranule;
 use merge::{Change, Merged};
 
+pub(crate) use extent::FIELDS_AT_ONCE;
 pub(crate) use mend::mend;
 pub(crate) use merge::is_later_or_same;
 pub(crate) use replace::replace;
-pub(crate) use segments::{MAX_SEGMENT_STEPS, MAX_SEGMENT_VALUES};
 pub(crate) use unchanged::Unchanged;
 pub(crate) use unchanged::answer as answer_unchanged;
 
@@ -93,7 +93,7 @@ async fn race_lost(product: &ProductId, pauses: &mut Pauses) -> Result<(), Inges
     Ok(())
 }
 
-/// The next manifest, with its series and domain durable.
+/// The next manifest, with its domain durable.
 async fn build(
     store: &Store,
     newest: Option<&Manifest>,
@@ -103,8 +103,7 @@ async fn build(
     let last = &granules[merged.last_taken.unwrap_or(0)];
     let reading = &last.reading;
     let grid = newest.map_or(reading.grid, |m| m.grid);
-    let segments::Written { series, domain } =
-        segments::write(store, &last.product, &grid, newest, merged).await?;
+    let domain = extent::write(store, &last.product, &grid, newest, &merged.steps).await?;
     Ok(Manifest {
         schema: MANIFEST_SCHEMA,
         product: last.product.clone(),
@@ -116,7 +115,7 @@ async fn build(
         grid,
         steps: merged.steps.clone(),
         domain,
-        series,
+        series: vec![],
         derived_from: None,
         notices: NoticeRun::of(&merged.orders),
     })

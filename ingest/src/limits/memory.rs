@@ -3,32 +3,45 @@
 //! Cells count, not bytes of the file: a map of one value everywhere is a thousand times smaller packed than read. The
 //! numbers are upper bounds for this process and the reader together, beside what each has anyway.
 
-use contract::time::Period;
+use std::num::NonZeroUsize;
 
-use crate::commit::{MAX_SEGMENT_STEPS, MAX_SEGMENT_VALUES};
+use contract::grid::Grid;
+
+use crate::commit::FIELDS_AT_ONCE;
 use crate::inspect::file::description::Description;
 use crate::observation::{MAX_OBSERVATIONS, MAX_VALUES, OBSERVATION_BYTES};
 use crate::plan::PlannedGranule;
-use crate::put::StoredGranule;
 
 /// Bytes of a cell while its map is worked on. At most at once: 8 as the reader has it and 8 as it comes here; 8 as it
 /// came and 4 as it is stored; 4 as it is stored, up to 12 in a list that grows, 4 and 4 in pages and in the object.
 const CELL_BYTES: u64 = 24;
+/// Memory of maps of one file that are worked on at a time, bytes, unless one alone needs more.
+const MAPS_BYTES: u64 = 128 << 20;
+/// Of these how many may wait for the store while processors work on others.
+const MAPS_WAITING: usize = 2;
 /// The file as it is stored: as it is sent, and as it is compared with one that is there.
 const RAW_COPIES: u64 = 2;
 /// Bytes of a value of an observation file: as the reader has it, or as it came and as it is unpacked.
 const VALUE_BYTES: u64 = 16;
-/// Bytes of a value of a series: 4 as a map, up to 12 in a list that grows, 4 in the object.
-const SERIES_BYTES: u64 = 20;
-/// A leap year, seconds.
-const YEAR_S: f64 = 366.0 * 86_400.0;
+/// Bytes of a cell of a stored field: 4 in the object, 4 in its pages, 4 as a map and, while a cube follows, 4 in its chunks.
+const FIELD_BYTES: u64 = 16;
 /// Fewest bytes of a text that an observation is read from: a number, what parts it from the next, and its share of place
 /// and time.
 const TEXT_BYTES_PER_OBSERVATION: u64 = 4;
 
-/// A file of maps: one map at a time, whatever their number.
+/// Maps of a file that are worked on at a time: as many as processors have something to do with, while the next is read, and
+/// one of what is large.
+pub(crate) fn grids_at_once(planned: &PlannedGranule) -> usize {
+    let processors = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
+    let map = planned.plane_cells().saturating_mul(CELL_BYTES).max(1);
+    let most = planned.steps.len().min(processors + MAPS_WAITING);
+    ((MAPS_BYTES / map) as usize).clamp(1, most.max(1))
+}
+
+/// A file of maps: a few at a time, whatever their number.
 pub(crate) fn of_grids(planned: &PlannedGranule) -> u64 {
     let map = planned.plane_cells().saturating_mul(CELL_BYTES);
+    let map = map.saturating_mul(grids_at_once(planned) as u64);
     let reading = map.saturating_add(planned.session.library_bytes());
     reading.max(planned.raw.size_bytes.saturating_mul(RAW_COPIES))
 }
@@ -51,24 +64,10 @@ pub(crate) fn of_text(file_bytes: u64) -> u64 {
     file_bytes.saturating_add(gathered_bytes(file_bytes / TEXT_BYTES_PER_OBSERVATION))
 }
 
-/// Files of one product that are published together: the series of a year, as maps and as runs of cells.
-///
-/// How many steps a year has is taken from the files themselves: a product has steps of one length.
-pub(crate) fn of_series(granules: &[StoredGranule]) -> u64 {
-    let values = granules.iter().map(|granule| {
-        let periods = granule.reading.steps.iter().map(|step| step.period);
-        let shortest_s = periods.map(Period::seconds).fold(YEAR_S, f64::min);
-        let steps = (YEAR_S / shortest_s.max(1.0)).ceil() as usize;
-        let cells = granule.reading.grid.cell_count();
-        let most = MAX_SEGMENT_VALUES.max(cells);
-        cells.saturating_mul(steps.min(MAX_SEGMENT_STEPS)).min(most)
-    });
-    of_segment(values.max().unwrap_or(0))
-}
-
-/// A segment of a series of so many values, as maps and as runs of cells.
-pub(crate) fn of_segment(values: usize) -> u64 {
-    (values as u64).saturating_mul(SERIES_BYTES)
+/// Maps of stored fields that are read, a few at a time, while a version is made.
+pub(crate) fn of_fields(grid: &Grid) -> u64 {
+    let cells = (grid.cell_count() as u64).saturating_mul(FIELDS_AT_ONCE as u64 + 1);
+    cells.saturating_mul(FIELD_BYTES)
 }
 
 /// Observations that are gathered before they are stored.

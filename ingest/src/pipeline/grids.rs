@@ -1,17 +1,26 @@
-//! [`PlannedGranule`] in, its [`Reading`] out: every step decoded, checked, encoded and put, one after the other.
+//! [`PlannedGranule`] in, its [`Reading`] out: steps are decoded one after the other, and checked, encoded and put a few at a
+//! time.
 
 use std::path::Path;
+use std::pin::pin;
 
 use contract::event::RejectReason;
+use contract::grid::Grid;
 use contract::key::ObjectKey;
 use contract::manifest::{Manifest, Step};
 use contract::masked::MaskedCells;
+use contract::product::ProductId;
+use contract::quantity::Quantity;
 use contract::time::Period;
+use futures::stream::{FuturesOrdered, StreamExt as _};
 
 use super::Pipeline;
 use super::metrics::ended;
 use super::progress::Stage;
+use crate::decode::DecodedGrid;
 use crate::error::{Rejection, Stop};
+use crate::fetch::RawGranule;
+use crate::limits::memory;
 use crate::plan::PlannedGranule;
 use crate::put::reading::Reading;
 use crate::{check, decode, encode, put};
@@ -24,16 +33,23 @@ impl Pipeline<'_> {
         mut planned: PlannedGranule,
         newest: Option<&Manifest>,
     ) -> Result<(Reading, MaskedCells), Stop> {
-        let (mut steps, mut masked) = (Vec::new(), MaskedCells::default());
-        let mut range: Option<[f64; 2]> = None;
-        for index in 0..planned.steps.len() {
-            let (step, own) = self.grid(shown, &mut planned, index, newest).await?;
-            if let Some((step, [low, high])) = step {
-                steps.push(step);
-                range = Some(range.map_or([low, high], |[l, h]| [l.min(low), h.max(high)]));
-            }
-            masked = masked + own;
-        }
+        let at_once = memory::grids_at_once(&planned);
+        let grids = Grids {
+            pipeline: *self,
+            shown,
+            count: planned.steps.len(),
+            quantity: planned.target.quantity,
+            product: planned.target.product.clone(),
+            grid: planned.mapping.grid,
+            variable: planned.variable.name.clone(),
+            raw: planned.raw.clone(),
+            newest,
+        };
+        let Stored {
+            mut steps,
+            masked,
+            range,
+        } = grids.all(&mut planned, at_once).await?;
         planned.raw.check_unchanged()?;
         if steps.is_empty() {
             return Err(without_values(&planned, masked).into());
@@ -56,32 +72,67 @@ impl Pipeline<'_> {
         reading.assumptions = assumptions;
         Ok((reading, masked))
     }
+}
 
-    /// One time step with the range of its values: decode, check, encode, put; and what was masked in it. None if it holds
-    /// no value at all.
+/// What the steps of a file have in common.
+struct Grids<'a> {
+    pipeline: Pipeline<'a>,
+    shown: &'a Path,
+    /// Steps of the file.
+    count: usize,
+    quantity: Quantity,
+    product: ProductId,
+    grid: Grid,
+    variable: String,
+    raw: RawGranule,
+    newest: Option<&'a Manifest>,
+}
+
+impl Grids<'_> {
+    /// All steps that hold a value, and what was masked in all. The reader reads one after the other; what is to be done
+    /// with each is done beside that.
+    async fn all(&self, planned: &mut PlannedGranule, at_once: usize) -> Result<Stored, Stop> {
+        let Pipeline {
+            progress, metrics, ..
+        } = self.pipeline;
+        let mut stored = FuturesOrdered::new();
+        let mut all = Stored::default();
+        for index in 0..self.count {
+            let step = planned.steps[index];
+            progress.stage(self.shown, Stage::Decode, index + 1, self.count);
+            let mut decoding = pin!(metrics.timed("decode", decode::run(planned, step)));
+            let decoded = loop {
+                tokio::select! {
+                    decoded = &mut decoding => break decoded?,
+                    Some(done) = stored.next() => all.take(done?),
+                }
+            };
+            stored.push_back(self.grid(index, decoded));
+            while stored.len() >= at_once {
+                if let Some(done) = stored.next().await {
+                    all.take(done?);
+                }
+            }
+        }
+        while let Some(done) = stored.next().await {
+            all.take(done?);
+        }
+        Ok(all)
+    }
+
+    /// One time step that was decoded, with the range of its values: check, encode, put; and what was masked in it. None if it
+    /// holds no value at all.
     async fn grid(
         &self,
-        shown: &Path,
-        planned: &mut PlannedGranule,
         index: usize,
-        newest: Option<&Manifest>,
+        decoded: DecodedGrid,
     ) -> Result<(Option<(Step, [f64; 2])>, MaskedCells), Stop> {
-        let (number, count) = (index + 1, planned.steps.len());
-        let tell = |stage| self.progress.stage(shown, stage, number, count);
-        tell(Stage::Decode);
-        let step = planned.steps[index];
-        let decoded = self
-            .metrics
-            .timed("decode", decode::run(planned, step))
-            .await?;
-        tell(Stage::Check);
-        let (quantity, product, grid) = (
-            planned.target.quantity,
-            planned.target.product.clone(),
-            planned.mapping.grid,
-        );
-        let variable = planned.variable.name.clone();
-        let metrics = self.metrics.clone();
+        let Pipeline {
+            store, progress, ..
+        } = self.pipeline;
+        progress.stage(self.shown, Stage::Check, index + 1, self.count);
+        let (quantity, product, grid) = (self.quantity, self.product.clone(), self.grid);
+        let (variable, metrics) = (self.variable.clone(), self.pipeline.metrics.clone());
         let (encoded, masked) = tokio::task::spawn_blocking(move || {
             let running = metrics.start("check");
             let checked = check::run(decoded, quantity, &variable).map_err(Stop::from);
@@ -99,11 +150,33 @@ impl Pipeline<'_> {
         let Some((encoded, range)) = encoded else {
             return Ok((None, masked));
         };
-        tell(Stage::Put);
-        let there = newest.and_then(|newest| field_of(newest, encoded.period));
-        let put = async { Ok(put::run(self.store, encoded, &planned.raw, &grid, there).await?) };
-        let stored = self.metrics.timed("put", put).await?;
+        progress.stage(self.shown, Stage::Put, index + 1, self.count);
+        let there = self
+            .newest
+            .and_then(|newest| field_of(newest, encoded.period));
+        let put = async { Ok(put::run(store, encoded, &self.raw, &self.grid, there).await?) };
+        let stored = self.pipeline.metrics.timed("put", put).await?;
         Ok((Some((stored, range)), masked))
+    }
+}
+
+/// Steps that are stored, in the order of the file.
+#[derive(Default)]
+struct Stored {
+    steps: Vec<Step>,
+    masked: MaskedCells,
+    /// Of the values of all steps, least and greatest.
+    range: Option<[f64; 2]>,
+}
+
+impl Stored {
+    fn take(&mut self, (step, masked): (Option<(Step, [f64; 2])>, MaskedCells)) {
+        if let Some((step, [low, high])) = step {
+            self.steps.push(step);
+            let own = self.range;
+            self.range = Some(own.map_or([low, high], |[l, h]| [l.min(low), h.max(high)]));
+        }
+        self.masked = self.masked + masked;
     }
 }
 

@@ -199,7 +199,10 @@ impl Pipeline<'_> {
         granules: &[StoredGranule],
     ) -> Result<Vec<Answer>, IngestError> {
         let running = self.metrics.start("commit");
-        let _memory = self.gates.memory(memory::of_series(granules)).await;
+        let needed = granules
+            .iter()
+            .map(|it| memory::of_fields(&it.reading.grid));
+        let _memory = self.gates.memory(needed.max().unwrap_or(0)).await;
         let work = async {
             for granule in granules {
                 let shown = granule.notice.path();

@@ -1,4 +1,4 @@
-//! Series and domain of a product that are damaged or gone, written again from its fields.
+//! The domain of a product that is damaged or gone, written again from its fields.
 
 use contract::manifest::Manifest;
 use contract::product::ProductId;
@@ -8,8 +8,8 @@ use super::Workplace;
 use crate::commit;
 use crate::error::IngestError;
 
-/// Writes the series and the domain of the newest version again where they are damaged or gone; its fields must be
-/// whole. The version that names them, a new one if they have other names now; none if nothing had to be done.
+/// Writes the domain of the newest version again where it is damaged or gone; its fields must be whole. The version that
+/// names it, a new one if it has another name now; none if nothing had to be done.
 pub async fn mend(
     store: &Store,
     product: &ProductId,

@@ -4,7 +4,7 @@ use contract::quantity::Quantity;
 use contract::time::Period;
 use ingest::Outcome;
 
-use crate::fixture::{FILL, GRID, Place, SmallFile, series_maps};
+use crate::fixture::{FILL, GRID, Place, SmallFile, cube_maps};
 use crate::made::{Made, MadeFile, Values};
 
 const G_PER_KG: f32 = 1e-3;
@@ -198,59 +198,10 @@ async fn a_revised_file_makes_a_new_manifest_and_the_old_one_stays() {
     assert_same(&place.values(&old, 0).await, &expected(1));
     let revised = place.values(&new, 0).await;
     assert!((revised[1] - 7.0 * G_PER_KG / january_s()).abs() < 1e-12 && revised[9].is_nan());
-    let series = series_maps(&place.store, &new, 0).await;
-    assert_eq!(series.len(), 2, "one map for each step");
-    assert_same(&series[0], &revised);
-    assert_same(&series[1], &expected(2));
-}
-
-#[tokio::test]
-async fn months_of_several_years_are_cut_into_segments_and_old_ones_are_kept() {
-    let place = Place::new();
-    let month = |unit: &'static str, value: f32| {
-        let mut file = SmallFile::new().first_month();
-        file.time_unit = Some(unit);
-        file.values
-            .iter_mut()
-            .filter(|v| **v != FILL)
-            .for_each(|v| *v += value);
-        file
-    };
-    let units = [
-        "days since 2000-11-03",
-        "days since 2000-12-31",
-        "days since 2001-01-10",
-        "days since 2001-03-05",
-    ];
-    for (i, unit) in units.iter().enumerate() {
-        month(unit, i as f32).write_classic(&place.path(&format!("{i}.nc")));
-    }
-    let paths: Vec<_> = (0..4).map(|i| place.path(&format!("{i}.nc"))).collect();
-    place
-        .land(&[paths[2].clone(), paths[0].clone(), paths[1].clone()])
-        .await;
-    let first = place.newest("fgco2").await;
-    assert_eq!(
-        first
-            .series
-            .iter()
-            .map(|s| (s.first_step, s.steps))
-            .collect::<Vec<_>>(),
-        [(0, 2), (2, 1)]
-    );
-    place.land(&[paths[3].clone()]).await;
-    let second = place.newest("fgco2").await;
-    assert_eq!(
-        second
-            .series
-            .iter()
-            .map(|s| (s.first_step, s.steps))
-            .collect::<Vec<_>>(),
-        [(0, 2), (2, 2)]
-    );
-    assert_eq!(second.series[0].series, first.series[0].series);
-    assert_ne!(second.series[1].series, first.series[1].series);
-    assert_eq!(second.steps[3].period, Period::month(2001, 3).unwrap());
+    let maps = cube_maps(&place.store, &new).await;
+    assert_eq!(maps.len(), 2, "one map for each step");
+    assert_same(&maps[0], &revised);
+    assert_same(&maps[1], &expected(2));
 }
 
 #[tokio::test]

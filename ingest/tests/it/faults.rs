@@ -45,7 +45,7 @@ fn objects(folder: &std::path::Path) -> Vec<String> {
     names
 }
 
-/// The store cannot take the manifest after fields and series are durable: a file stands where its folder belongs.
+/// The store cannot take the manifest after fields are durable: a file stands where its folder belongs.
 #[tokio::test]
 async fn a_crash_between_put_and_commit_loses_nothing_and_doubles_nothing() {
     let place = Place::new();

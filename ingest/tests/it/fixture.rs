@@ -271,40 +271,14 @@ impl SmallFile {
     }
 }
 
-/// The maps of a series segment, read back with nothing but a Parquet reader: `[step][row, col]`.
-pub(crate) async fn series_maps(
-    store: &Store,
-    manifest: &Manifest,
-    segment: usize,
-) -> Vec<Vec<f32>> {
-    use arrow::array::{Float32Array, ListArray};
-    let segment = &manifest.series[segment];
-    let bytes = store.get(&segment.series).await.unwrap();
-    let reader =
-        parquet::arrow::arrow_reader::ParquetRecordBatchReader::try_new(bytes, 1 << 20).unwrap();
-    let steps = segment.steps as usize;
-    let mut maps = vec![vec![f32::NAN; manifest.grid.cell_count()]; steps];
-    let mut blocks = contract::chunk::windows(
-        &manifest.grid,
-        storage::series::BLOCK_CELLS,
-        storage::series::BLOCK_CELLS,
-    )
-    .into_iter();
-    for batch in reader {
-        let batch = batch.unwrap();
-        let lists = batch
-            .column(1)
-            .as_any()
-            .downcast_ref::<ListArray>()
-            .unwrap();
-        for row in 0..batch.num_rows() {
-            let values = lists.value(row);
-            let values = values.as_any().downcast_ref::<Float32Array>().unwrap();
-            let block = blocks.next().unwrap();
-            for (place, index) in block.cell_indices(&manifest.grid).enumerate() {
-                (0..steps).for_each(|step| maps[step][index] = values.value(place * steps + step));
-            }
-        }
+/// The maps of the newest state of a product's cube, `[step][row, col]`.
+pub(crate) async fn cube_maps(store: &Store, manifest: &Manifest) -> Vec<Vec<f32>> {
+    let repository = cube::Repository::open(store, &cube::folder(&manifest.product)).await;
+    let cube = repository.unwrap().at(&cube::At::Newest).await.unwrap();
+    assert_eq!(cube.description().version, Some(manifest.id()));
+    let mut maps = vec![];
+    for step in 0..cube.steps().len() {
+        maps.push(cube.field(step).await.unwrap());
     }
     maps
 }

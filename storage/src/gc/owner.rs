@@ -8,7 +8,7 @@ use contract::key::ObjectKey;
 use contract::kind::Kind;
 use contract::manifest::Manifest;
 
-use crate::{StorageError, Store, document, manifests};
+use crate::{StorageError, Store, manifests};
 
 /// The youngest age that may be removed: whoever is writing has long been done.
 pub const LEAST_AGE: Duration = Duration::from_hours(1);
@@ -62,14 +62,17 @@ impl Kept {
         let mut kept = vec![];
         // A list that cannot be read names things that nobody knows: nothing may be removed.
         for product in manifests::products(store).await? {
-            let folder = format!("{}/{product}", Kind::Manifest.folder());
-            for key in store.list(&folder).await?.iter().rev().take(versions) {
-                let Some(manifest) = document::get::<Manifest>(store, key).await? else {
+            for number in manifests::numbers(store, &product)
+                .await?
+                .into_iter()
+                .rev()
+                .take(versions)
+            {
+                let Some(manifest) = manifests::numbered(store, &product, number).await? else {
                     continue;
                 };
                 if let Some(source) = &manifest.derived_from {
-                    let key = ObjectKey::manifest(&source.product, source.number);
-                    kept.extend(document::get(store, &key).await?);
+                    kept.extend(manifests::numbered(store, &source.product, source.number).await?);
                 }
                 kept.push(manifest);
             }

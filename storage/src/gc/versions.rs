@@ -9,7 +9,7 @@ use contract::kind::Kind;
 use super::{Kept, Owner};
 use crate::{StorageError, Store};
 
-/// Manifests and what they name.
+/// Manifests and what they name; but for series, which versions of before name and nobody reads any more.
 #[derive(Debug)]
 pub struct Versions;
 
@@ -18,6 +18,7 @@ impl Owner for Versions {
     fn kinds(&self) -> &'static [Kind] {
         &[
             Kind::Manifest,
+            Kind::ManifestPage,
             Kind::Contributed,
             Kind::Domain,
             Kind::Field,
@@ -36,7 +37,9 @@ impl Owner for Versions {
             let product = &manifest.product;
             keys.insert(ObjectKey::manifest(product, manifest.number));
             keys.insert(manifest.domain.clone());
-            keys.extend(manifest.series.iter().map(|segment| segment.series.clone()));
+            if let Some((paged, _pages)) = manifest.paged() {
+                keys.extend(paged.page_keys());
+            }
             for step in &manifest.steps {
                 keys.insert(step.field.clone());
                 keys.extend(step.contributed.iter().map(|step| step.counts.clone()));

@@ -1,38 +1,31 @@
 //! Rows are those that were written, whatever else lies in the file; damaged ones are errors.
 
-use contract::chunk::windows;
+use contract::chunk::field_chunks;
 use contract::grid::Grid;
 use contract::product::ProductId;
 
 use super::*;
 use crate::parquet_table::shape_only;
-use crate::series::{self, BLOCK_CELLS};
-use crate::{Store, sound};
+use crate::{Store, fields, sound};
+use contract::time::Period;
 
 fn product() -> ProductId {
     "p".parse().unwrap()
 }
 
-fn value(step: usize, cell: usize) -> f32 {
-    if (step + cell) % 7 == 0 {
-        f32::NAN
-    } else {
-        (step * 10_000 + cell) as f32
-    }
+fn period() -> Period {
+    Period::month(2000, 1).unwrap()
 }
 
-/// A store with a series of a grid.
-async fn stored(grid: &Grid, step_count: usize) -> (Store, Stored) {
+fn value(cell: usize) -> f32 {
+    if cell % 7 == 0 { f32::NAN } else { cell as f32 }
+}
+
+/// A store with a field of a grid.
+async fn stored(grid: &Grid) -> (Store, Stored) {
     let store = Store::memory();
-    let steps: Vec<Vec<f32>> = (0..step_count)
-        .map(|step| {
-            (0..grid.cell_count())
-                .map(|cell| value(step, cell))
-                .collect()
-        })
-        .collect();
-    let views: Vec<&[f32]> = steps.iter().map(Vec::as_slice).collect();
-    let key = series::write(&store, &product(), grid, &views)
+    let values: Vec<f32> = (0..grid.cell_count()).map(value).collect();
+    let key = fields::write(&store, &product(), grid, &values, period())
         .await
         .unwrap();
     let (_root, objects) = store.sql_root();
@@ -41,49 +34,55 @@ async fn stored(grid: &Grid, step_count: usize) -> (Store, Stored) {
 }
 
 /// Rows as they are read, each compared with what was written.
-async fn read(stored: &Stored, grid: &Grid, step_count: usize, rows: &[u32]) -> Vec<u32> {
+async fn read(stored: &Stored, grid: &Grid, rows: &[u32]) -> Vec<u32> {
     let index = RowIndex::read(stored).await.unwrap().map(Arc::new);
     assert!(index.is_some());
     let fetched = fetch(stored, index, rows.to_vec()).await.unwrap();
-    let blocks = windows(grid, BLOCK_CELLS, BLOCK_CELLS);
+    let chunks = field_chunks(grid);
     let mut seen = vec![];
     let take = |row: u32, values: &[f32]| {
-        let cells = blocks[row as usize].cell_indices(grid);
-        let written = cells.flat_map(|cell| (0..step_count).map(move |step| value(step, cell)));
-        let written: Vec<u32> = written.map(f32::to_bits).collect();
+        let cells = chunks[row as usize].cell_indices(grid);
+        let written: Vec<u32> = cells.map(|cell| value(cell).to_bits()).collect();
         let found: Vec<u32> = values.iter().map(|value| value.to_bits()).collect();
         assert_eq!(found, written, "{row}");
         seen.push(row);
         Ok::<_, StorageError>(())
     };
     fetched
-        .each(|row| series::expected(&blocks, row, step_count), take)
+        .each(|row| fields::expected(&chunks, row, period()), take)
         .unwrap();
     seen
 }
 
 #[tokio::test]
-async fn rows_are_those_that_were_written_whether_pages_hold_one_or_several() {
-    let grid = shape_only(19, 200);
-    for step_count in [1, 3, 4, 50] {
-        let (_store, stored) = stored(&grid, step_count).await;
-        let all: Vec<u32> = (0..75).collect();
-        assert_eq!(read(&stored, &grid, step_count, &all).await, all);
-        for some in [&[0][..], &[74], &[31, 32], &[5, 6, 40, 73]] {
-            assert_eq!(read(&stored, &grid, step_count, some).await, some);
+async fn rows_are_those_that_were_written() {
+    // Several chunks across and down, the last ones cut off; and many small ones.
+    for (rows, cols) in [(19, 200), (300, 700), (120, 4000)] {
+        let grid = shape_only(rows, cols);
+        let (_store, stored) = stored(&grid).await;
+        let count = field_chunks(&grid).len() as u32;
+        let all: Vec<u32> = (0..count).collect();
+        assert_eq!(read(&stored, &grid, &all).await, all);
+        for some in [vec![0], vec![count - 1], vec![count / 2, count - 1]] {
+            let mut once = some.clone();
+            once.dedup();
+            assert_eq!(read(&stored, &grid, &some).await, once);
         }
-        assert_eq!(read(&stored, &grid, step_count, &[7, 3, 7]).await, [3, 7]);
+        let disordered = [count - 1, 0, count - 1];
+        let mut sorted = vec![0, count - 1];
+        sorted.dedup();
+        assert_eq!(read(&stored, &grid, &disordered).await, sorted);
     }
 }
 
 #[tokio::test]
 async fn a_row_that_is_damaged_or_not_there_is_an_error_that_names_the_file() {
-    let grid = shape_only(16, 80);
-    let (store, mut stored) = stored(&grid, 40).await;
+    let grid = shape_only(100, 4000);
+    let (store, mut stored) = stored(&grid).await;
     let index = Arc::new(RowIndex::read(&stored).await.unwrap().unwrap());
-    let lacking = fetch(&stored, Some(Arc::clone(&index)), vec![99]).await;
+    let lacking = fetch(&stored, Some(Arc::clone(&index)), vec![9999]).await;
     assert!(matches!(lacking, Err(StorageError::Damaged { .. })));
-    let blocks = windows(&grid, BLOCK_CELLS, BLOCK_CELLS);
+    let chunks = field_chunks(&grid);
     let whole = store.get(&stored.key).await.unwrap();
     let page = index.page_of(0, 4).unwrap();
     let take = |_row: u32, _values: &[f32]| Ok::<_, StorageError>(());
@@ -96,7 +95,7 @@ async fn a_row_that_is_damaged_or_not_there_is_an_error_that_names_the_file() {
             .await
             .unwrap();
         let error = fetched
-            .each(|row| series::expected(&blocks, row, 40), take)
+            .each(|row| fields::expected(&chunks, row, period()), take)
             .unwrap_err();
         assert!(error.to_string().contains(stored.key.as_str()), "{error}");
         // Others of the same file are what they were.
@@ -104,12 +103,12 @@ async fn a_row_that_is_damaged_or_not_there_is_an_error_that_names_the_file() {
             .await
             .unwrap();
         fetched
-            .each(|row| series::expected(&blocks, row, 40), take)
+            .each(|row| fields::expected(&chunks, row, period()), take)
             .unwrap();
     }
     // A name of bytes: the file is read whole, and is not what its name says.
     store.put_over(&stored.key, whole).await.unwrap();
     let wrong = contract::digest::Digest::of(b"other");
-    stored.key = ObjectKey::series(&product(), &wrong);
+    stored.key = ObjectKey::field(&product(), &wrong);
     assert!(sound::of_bytes(&stored.key, b"x").is_err());
 }

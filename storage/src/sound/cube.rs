@@ -9,8 +9,8 @@ use super::seal::{self, Seal};
 
 /// Folder of chunks.
 const CHUNKS: &str = "chunks";
-/// Chunks of a shard: as many entries has the index at its end.
-pub const SHARD_CHUNKS: usize = 64;
+/// Most chunks of a shard: as many entries has the index at its end.
+const MOST_CHUNKS: usize = 1 << 16;
 /// Place and length of a chunk in a shard, bytes.
 const ENTRY_BYTES: usize = 16;
 const CRC_BYTES: usize = 4;
@@ -57,32 +57,55 @@ fn is_right(content: &[u8]) -> bool {
 }
 
 /// Is this a shard: chunks that end in their checksums, and an index of them that does, too, and nothing besides?
+///
+/// How many chunks it has is its array's to say, which is not at hand here: from the end backwards its index is as long as
+/// makes the chunks that it names fill the rest.
 fn is_right_shard(content: &[u8]) -> bool {
-    let index_bytes = SHARD_CHUNKS * ENTRY_BYTES + CRC_BYTES;
-    let at = content.len().checked_sub(index_bytes);
-    let Some((chunks, index)) = at.map(|at| content.split_at(at)) else {
+    let Some(entries) = content
+        .len()
+        .checked_sub(CRC_BYTES)
+        .map(|at| &content[..at])
+    else {
         return false;
     };
-    if !is_right(index) {
-        return false;
+    let mut named_bytes = 0_u64;
+    for (number, entry) in entries
+        .rchunks_exact(ENTRY_BYTES)
+        .take(MOST_CHUNKS)
+        .enumerate()
+    {
+        let rest = entries.len() - (number + 1) * ENTRY_BYTES;
+        if let Some((_, length)) = place_of(entry) {
+            named_bytes = named_bytes.saturating_add(length);
+        }
+        if named_bytes == rest as u64 {
+            let (chunks, index) = content.split_at(rest);
+            if is_right(index) {
+                return are_right(chunks, &index[..index.len() - CRC_BYTES]);
+            }
+        }
     }
+    false
+}
+
+/// Where a chunk lies in its shard, and its length; none of one without data, which is not stored.
+fn place_of(entry: &[u8]) -> Option<(u64, u64)> {
     let number = |bytes: &[u8]| bytes.try_into().map_or(u64::MAX, u64::from_le_bytes);
-    let mut checked_bytes = 0;
-    for entry in index[..index_bytes - CRC_BYTES].chunks_exact(ENTRY_BYTES) {
-        let (offset, length) = entry.split_at(ENTRY_BYTES / 2);
-        let (offset, length) = (number(offset), number(length));
-        // A chunk without data is not stored.
-        if (offset, length) == (u64::MAX, u64::MAX) {
-            continue;
-        }
-        let end = offset.saturating_add(length).min(chunks.len() as u64);
-        let chunk = chunks.get(offset as usize..end as usize);
-        if !chunk.is_some_and(is_right) {
-            return false;
-        }
-        checked_bytes += length;
-    }
-    checked_bytes == chunks.len() as u64
+    let (offset, length) = entry.split_at(ENTRY_BYTES / 2);
+    let place = (number(offset), number(length));
+    (place != (u64::MAX, u64::MAX)).then_some(place)
+}
+
+/// Do all chunks that an index names end in their checksums?
+fn are_right(chunks: &[u8], index: &[u8]) -> bool {
+    index
+        .chunks_exact(ENTRY_BYTES)
+        .filter_map(place_of)
+        .all(|(offset, length)| {
+            let end = offset.saturating_add(length).min(chunks.len() as u64);
+            let chunk = chunks.get(offset as usize..end as usize);
+            chunk.is_some_and(is_right)
+        })
 }
 
 #[cfg(test)]
@@ -92,6 +115,9 @@ mod tests {
     fn with_crc(data: &[u8]) -> Vec<u8> {
         [data, &crc32c::crc32c(data).to_le_bytes()].concat()
     }
+
+    /// Chunks of the shard of these tests.
+    const SHARD_CHUNKS: usize = 64;
 
     /// A shard of two chunks.
     fn shard() -> Vec<u8> {

@@ -13,13 +13,14 @@ use contract::grid::Grid;
 use contract::key::ObjectKey;
 use contract::kind::{Kind, Vouched};
 use contract::manifest::{MANIFEST_SCHEMA, Manifest, OLDEST_MANIFEST_SCHEMA, SeriesSegment, Step};
+use contract::manifest::{PAGED_SCHEMA, Page};
 use contract::masked::MaskedCells;
 use contract::notice::NoticeRun;
 use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::time::Period;
 use storage::contributed::{self, Contributed};
-use storage::{Store, domain, fields, manifests, series, verify, weights};
+use storage::{Store, document, domain, fields, manifests, verify, weights};
 
 const ROWS: u32 = 61;
 const COLS: u32 = 20;
@@ -134,9 +135,10 @@ async fn frozen_products_hold_the_values_that_were_put_in() {
                 assert!(expected.is_nan() || cells[index]);
             }
         }
-        series::check(&store, &manifest.series[0].series)
-            .await
-            .unwrap();
+        // Series are named by versions of then, and whole.
+        let segment = &manifest.series[0];
+        assert_eq!((segment.first_step, segment.steps), (0, 2));
+        verify::sound(&store, &segment.series).await.unwrap();
     }
 }
 
@@ -158,6 +160,10 @@ async fn version_1_keeps_the_names_that_were_cited_and_its_fields_keep_theirs() 
         );
     }
 }
+
+/// The series that a version named when there were any.
+const SERIES: &str =
+    "series/fgco2/v2-824ffb3aefcdee2cde255e535bc04ff4c108285b52efa9c7a5fb8c5c8c359300.parquet";
 
 /// Writes the objects of version 2.
 async fn write(store: &Store) -> Manifest {
@@ -183,8 +189,6 @@ async fn write(store: &Store) -> Manifest {
             masked: None,
         });
     }
-    let views = months.each_ref().map(|(_, values)| values.as_slice());
-    let series = series::write(store, &product(), &GRID, &views).await;
     let areas = [(0, vec![0.1; 60 * 20]), (1, vec![2.0 / 3.0; 20])];
     let job = ObjectKey::weights(&Digest::of(b"a region"));
     weights::write(store, &job, &areas).await.unwrap();
@@ -202,7 +206,7 @@ async fn write(store: &Store) -> Manifest {
         series: vec![SeriesSegment {
             first_step: 0,
             steps: 2,
-            series: series.unwrap(),
+            series: SERIES.parse().unwrap(),
         }],
         derived_from: None,
         notices: vec![],
@@ -251,7 +255,6 @@ async fn own(store: &Store) -> Vec<ObjectKey> {
     for kind in [
         Kind::Raw,
         Kind::Field,
-        Kind::Series,
         Kind::Domain,
         Kind::Contributed,
         Kind::Manifest,
@@ -311,6 +314,18 @@ async fn a_frozen_version_says_what_was_masked_and_in_which_order_files_came() {
         (at, 3, 17)
     );
     assert!(orders[0].file == 1 && orders[0] < orders[1]);
+}
+
+#[tokio::test]
+async fn a_frozen_page_holds_the_steps_of_its_manifest() {
+    let (_folder, store) = copy(2);
+    let keys = store.list("manifest-pages/fgco2").await.unwrap();
+    let page: Page = document::get(&store, &keys[0]).await.unwrap().unwrap();
+    assert_eq!(keys, [ObjectKey::manifest_page(&product(), &page.name())]);
+    let manifest = manifests::numbered(&store, &product(), 2).await.unwrap();
+    let manifest = manifest.unwrap();
+    assert_eq!((page.schema, page.steps), (PAGED_SCHEMA, manifest.steps));
+    assert_eq!(page.notices, manifest.notices);
 }
 
 #[tokio::test]

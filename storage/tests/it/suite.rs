@@ -11,7 +11,7 @@ use contract::time::Period;
 use futures::{StreamExt as _, TryStreamExt as _, stream};
 use object_store::ObjectStoreExt as _;
 use object_store::path::Path;
-use storage::{StorageError, Store, domain, fields, manifests, series, weights};
+use storage::{StorageError, Store, domain, fields, manifests, weights};
 
 fn key(text: &str) -> ObjectKey {
     text.parse().unwrap()
@@ -284,14 +284,6 @@ pub(crate) async fn grids_and_manifests_round_trip(store: &Store) {
         back.iter()
             .zip(&values)
             .all(|(a, b)| a.to_bits() == b.to_bits())
-    );
-    let run = series::write(store, &product, &GRID, &[&values, &values])
-        .await
-        .unwrap();
-    let run_bytes = store.get(&run).await.unwrap();
-    assert_eq!(
-        run_bytes,
-        series::encode(&GRID, &[&values, &values]).unwrap().content
     );
     let areas = vec![(3, vec![0.1, 0.0, 1e12]), (7, vec![2.0 / 3.0])];
     let weights_key = ObjectKey::weights(&Digest::of(b"job"));

@@ -15,6 +15,7 @@ use crate::state::AppState;
 /// Statistics or a series, whichever was asked for: never made, it describes answers.
 #[derive(Debug, Serialize, ToSchema)]
 #[serde(untagged)]
+#[expect(clippy::large_enum_variant, reason = "it is never made")]
 pub(crate) enum SeriesOrStatistics<S: ToSchema> {
     /// Nothing but the geometry was asked for.
     #[expect(dead_code, reason = "a schema")]

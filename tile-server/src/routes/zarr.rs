@@ -41,7 +41,7 @@ pub(crate) async fn get(
     UrlPath((product, key)): UrlPath<(String, String)>,
     asked: HeaderMap,
 ) -> Result<Response, ServerError> {
-    let (keys, is_pinned) = opened(&state, &product).await?;
+    let (keys, is_pinned) = Box::pin(opened(&state, &product)).await?;
     let tag = format!("\"{}\"", keys.snapshot());
     let cache_control = if is_pinned {
         CACHE_CONTROL_PINNED

@@ -8,13 +8,13 @@ use axum::body::{Body, Bytes, to_bytes};
 use axum::http::{HeaderMap, Request, StatusCode};
 use contract::digest::Digest;
 use contract::grid::Grid;
-use contract::manifest::{MANIFEST_SCHEMA, Manifest, ManifestId, SeriesSegment, Step};
+use contract::manifest::{MANIFEST_SCHEMA, Manifest, ManifestId, Step};
 use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::time::Period;
 use contract::time_sample::TimeSample;
 use serde_json::Value;
-use storage::{Store, domain, fields, manifests, series};
+use storage::{Store, domain, fields, manifests};
 use tile_server::metrics::Registry;
 use tile_server::{AppState, Settings, router};
 use tower::ServiceExt as _;
@@ -199,7 +199,6 @@ impl TestApp {
                 contributed: None,
             });
         }
-        let slices: Vec<&[f32]> = values.iter().map(Vec::as_slice).collect();
         let known: Vec<bool> = values[0].iter().map(|value| !value.is_nan()).collect();
         let manifest = Manifest {
             schema: MANIFEST_SCHEMA,
@@ -211,13 +210,7 @@ impl TestApp {
             grid: GRID,
             steps,
             domain: domain::write(&self.store, &product, &known).await.unwrap(),
-            series: vec![SeriesSegment {
-                first_step: 0,
-                steps: MONTHS,
-                series: series::write(&self.store, &product, &GRID, &slices)
-                    .await
-                    .unwrap(),
-            }],
+            series: vec![],
             derived_from,
             notices: vec![],
             product,

@@ -47,7 +47,7 @@ async fn plan(config: SessionConfig, region: &str) -> Arc<dyn ExecutionPlan> {
     let state = state::session_state(config, runtime, &objects).unwrap();
     let context = SessionContext::new_with_state(state);
     let keys: Vec<&ObjectKey> = keys.iter().collect();
-    let registered = scan::register(&context, "fields", &store, &keys, Layout::Fields);
+    let registered = scan::register(&context, "fields", &store, &keys);
     registered.await.unwrap();
     let query = context.sql(&sql(Measure::Mass, &region)).await;
     query.unwrap().create_physical_plan().await.unwrap()

@@ -26,9 +26,9 @@ fn pieces(count: u32) -> Vec<Piece> {
     let piece = |at: u32| {
         let digest = Digest::of(&at.to_le_bytes());
         Piece {
-            key: ObjectKey::series(&"p".parse().unwrap(), &digest),
+            key: ObjectKey::field(&"p".parse().unwrap(), &digest),
             address: format!("memory:///{at}"),
-            layout: Layout::Series { steps: 5 },
+            layout: Layout::Blocks,
             first_step: at * 5,
             steps: 0..5,
             rows: vec![0, 1],

@@ -67,10 +67,7 @@ impl Files {
             && let Some(mended) =
                 reread::mend(store, &self.request.product, &self.workplace).await?
         {
-            progress::say(&format!(
-                "{}: series and domain are whole again",
-                mended.id()
-            ));
+            progress::say(&format!("{}: its domain is whole again", mended.id()));
         }
         // Also after a run that was killed before it could tell.
         if let Some(log) = log {

@@ -24,8 +24,6 @@ pub(super) struct Merged {
     pub(super) orders: Vec<Option<NoticeOrder>>,
     /// One for each file.
     pub(super) changes: Vec<Change>,
-    /// Was a step replaced, rather than only new ones added?
-    pub(super) is_revision: bool,
     /// Index of the last file that was taken.
     pub(super) last_taken: Option<usize>,
     /// What the values of all steps are; none without any.
@@ -90,7 +88,6 @@ pub(super) fn merge(newest: Option<&Manifest>, granules: &[StoredGranule]) -> Me
         steps: vec![],
         orders: vec![],
         changes: Vec::with_capacity(granules.len()),
-        is_revision: false,
         last_taken: None,
         quantity: newest.map(|m| m.quantity),
     };
@@ -107,10 +104,9 @@ pub(super) fn merge(newest: Option<&Manifest>, granules: &[StoredGranule]) -> Me
             Ok(quantity) => (add(&mut placed, granule), Some(quantity)),
             Err(rejection) => (Change::Refused(rejection), None),
         };
-        if let Change::Taken { revised, .. } = &change {
+        if let Change::Taken { .. } = &change {
             merged.last_taken = Some(index);
             merged.quantity = quantity;
-            merged.is_revision |= revised;
         }
         merged.changes.push(change);
     }

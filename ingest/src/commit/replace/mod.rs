@@ -11,8 +11,8 @@ use contract::quantity::Quantity;
 use contract::time::Period;
 use storage::{StorageError, Store, manifests};
 
-use super::merge::{Merged, Taken, is_same_grid};
-use super::{ATTEMPTS, race_lost, segments};
+use super::merge::{Taken, is_same_grid};
+use super::{ATTEMPTS, extent, race_lost};
 use crate::error::IngestError;
 use crate::limits::gates::Gates;
 use crate::limits::memory;
@@ -21,7 +21,7 @@ use crate::put::reading::Reading;
 /// Publishes readings in the place of what their files were read as before; none if nothing is other than before.
 ///
 /// What other writers publish meanwhile stays: a file that was revised keeps its revision. It waits for the memory that
-/// turning maps into series takes, as a landing does.
+/// reading maps takes, as a landing does.
 pub(crate) async fn replace(
     store: &Store,
     gates: &Gates,
@@ -43,20 +43,10 @@ pub(crate) async fn replace(
         if next == newest {
             return Ok(None);
         }
-        let merged = Merged {
-            steps: next.steps.clone(),
-            orders: vec![],
-            changes: vec![],
-            is_revision: true,
-            last_taken: None,
-            quantity: Some(next.quantity),
-        };
-        let values = segments::most_values(&next.steps, &next.grid);
-        let _memory = gates.memory(memory::of_segment(values)).await;
-        let segments::Written { series, domain } =
-            segments::write(store, product, &next.grid, Some(&newest), &merged).await?;
+        let _memory = gates.memory(memory::of_fields(&next.grid)).await;
+        let domain = extent::write(store, product, &next.grid, Some(&newest), &next.steps);
+        (next.domain, next.series) = (domain.await?, vec![]);
         (next.schema, next.number) = (MANIFEST_SCHEMA, newest.number + 1);
-        (next.series, next.domain) = (series, domain);
         match manifests::commit(store, &next).await {
             Ok(()) => {
                 cube::keep_up(store, &next).await;

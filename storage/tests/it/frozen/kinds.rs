@@ -13,6 +13,7 @@ struct Reader {
 }
 
 /// A new kind of object has no arm here: freeze one of it (`tests/frozen/README.md`), and name the test that reads it.
+#[expect(clippy::too_many_lines, reason = "an arm a kind")]
 fn reader(kind: Kind) -> Reader {
     let since_1 = |file, test| Reader {
         since: 1,
@@ -44,6 +45,10 @@ fn reader(kind: Kind) -> Reader {
         Kind::Sums => since_1(
             "compute/tests/it/frozen.rs",
             "frozen_sums_answer_where_no_field_can",
+        ),
+        Kind::ManifestPage => since_2(
+            "storage/tests/it/frozen.rs",
+            "a_frozen_page_holds_the_steps_of_its_manifest",
         ),
         // Cubes were exported only, never in a store, before.
         Kind::Cube => since_2(

@@ -1,0 +1,49 @@
+//! Values of versions along time, opened once and held: what a version holds never changes.
+
+use std::sync::Arc;
+
+use contract::manifest::{Manifest, ManifestId};
+use cube::{CubeError, Values};
+use quick_cache::sync::Cache;
+use storage::Store;
+
+/// Versions that are held: each a few megabytes, and 16 MB of indexes.
+const VERSIONS: usize = 8;
+
+/// Versions that were opened, by their names.
+pub(crate) struct OpenVersions(Cache<ManifestId, Values>);
+
+impl OpenVersions {
+    pub(crate) fn new() -> Self {
+        Self(Cache::new(VERSIONS))
+    }
+
+    /// Values of a version, opened now if they are not held.
+    pub(crate) async fn values(
+        &self,
+        store: &Store,
+        manifest: &Manifest,
+        id: &ManifestId,
+    ) -> Result<Values, CubeError> {
+        if let Some(values) = self.0.get(id) {
+            return Ok(values);
+        }
+        let values = Values::of(store, &Arc::new(manifest.clone())).await?;
+        match values.in_fields_count() {
+            0 => {}
+            steps => {
+                tracing::debug!(version = %id, steps, "its cube lacks steps, which are read whole");
+            }
+        }
+        // What comes to be faster is opened again until it is.
+        if values.is_settled() {
+            self.0.insert(id.clone(), values.clone());
+        }
+        Ok(values)
+    }
+
+    /// Lets go of a version; false if it was not held.
+    pub(crate) fn forget(&self, id: &ManifestId) -> bool {
+        self.0.remove(id).is_some()
+    }
+}

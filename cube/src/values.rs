@@ -1,0 +1,379 @@
+//! A version of a product in, its values along time out, from where they are read fastest: runs of its cube that are
+//! time-major, map-major chunks of it, and fields where the cube does not have the version or is behind.
+//!
+//! Steps are the same where their periods and the digests of their values are, so that all three give the same bits, and a
+//! cube of another version serves wherever it holds the same steps.
+
+use std::cell::LazyCell;
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::sync::Arc;
+
+use contract::chunk::Window;
+use contract::kind::Vouched;
+use contract::manifest::Manifest;
+use futures::stream::{self, StreamExt as _, TryStreamExt as _};
+use storage::{Store, fields};
+
+use crate::follow::folder;
+use crate::layout::{BLOCK_CELLS, RUN_STEPS};
+use crate::{At, Cube, CubeError, Repository};
+
+/// Blocks that are read at a time.
+const BLOCKS_AT_ONCE: usize = 16;
+/// Steps that are read map-major at a time.
+const STEPS_AT_ONCE: usize = 4;
+/// Fields that are read at a time, whole.
+const FIELDS_AT_ONCE: usize = 2;
+
+/// Where a step is read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Place {
+    /// At its place in one of the states of the cube.
+    Cube { cube: usize, step: usize },
+    /// In its field, whole.
+    Field,
+}
+
+/// Values of one version of a product. It does not change; clones share it.
+#[derive(Clone)]
+pub struct Values(Arc<Inner>);
+
+struct Inner {
+    store: Store,
+    manifest: Arc<Manifest>,
+    /// The newest state and, if that has not all steps, the version's own.
+    cubes: Vec<Cube>,
+    /// Of each step of the version.
+    places: Vec<Place>,
+}
+
+/// Values of a block of cells in some steps.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Block {
+    /// Row and column of blocks, each of [`BLOCK_CELLS`] cells a side, from the north-west corner on.
+    pub at: [u32; 2],
+    /// Its cells; less than a whole block's where the grid ends.
+    pub window: Window,
+    /// `[cell, step]`, stored unit, NaN no data; cells row by row.
+    pub values: Vec<f32>,
+}
+
+impl Block {
+    /// A block without data.
+    fn empty(manifest: &Manifest, at: [u32; 2], steps: usize) -> Result<Self, CubeError> {
+        let grid = &manifest.grid;
+        let corner = at.map(|side| side.saturating_mul(BLOCK_CELLS));
+        if corner[0] >= grid.rows || corner[1] >= grid.cols {
+            return Err(CubeError::Outside {
+                what: format!("block {at:?}"),
+                steps: manifest.steps.len(),
+                rows: grid.rows,
+                cols: grid.cols,
+            });
+        }
+        let window = Window {
+            row: corner[0],
+            col: corner[1],
+            rows: BLOCK_CELLS.min(grid.rows - corner[0]),
+            cols: BLOCK_CELLS.min(grid.cols - corner[1]),
+        };
+        let values = vec![f32::NAN; window.cell_count() * steps];
+        Ok(Self { at, window, values })
+    }
+
+    /// Puts one step's values in, `[row, col]` of its window.
+    fn put_map(&mut self, map: &[f32], step: usize, steps: usize) {
+        for (cell, value) in map.iter().enumerate() {
+            self.values[cell * steps + step] = *value;
+        }
+    }
+
+    /// Puts the values of a run in, `[cell, step]` of a whole block, as far as its steps are asked for.
+    fn put_run(&mut self, run: &[f32], pieces: &[Piece], steps: usize) {
+        let Window { row, col, cols, .. } = self.window;
+        let (top, left) = (row % BLOCK_CELLS, col % BLOCK_CELLS);
+        for cell in 0..self.window.cell_count() {
+            let (down, right) = (cell as u32 / cols, cell as u32 % cols);
+            let in_block = ((top + down) * BLOCK_CELLS + left + right) as usize;
+            for piece in pieces {
+                let from = in_block * RUN_STEPS + piece.in_run;
+                let to = cell * steps + piece.asked;
+                self.values[to..to + piece.count].copy_from_slice(&run[from..from + piece.count]);
+            }
+        }
+    }
+}
+
+/// Steps side by side in a run that are side by side among those asked for.
+struct Piece {
+    in_run: usize,
+    asked: usize,
+    count: usize,
+}
+
+/// What is to be read for some steps, by their places among those asked for.
+#[derive(Default)]
+struct Reads {
+    /// Of which states which runs.
+    runs: BTreeMap<(usize, usize), Vec<Piece>>,
+    /// State, step in it, asked step.
+    maps: Vec<(usize, usize, usize)>,
+    /// Step of the version, asked step.
+    fields: Vec<(usize, usize)>,
+}
+
+impl Values {
+    /// Finds where the steps of a version are.
+    ///
+    /// # Errors
+    /// A store that does not answer; a cube whose state cannot be read.
+    pub async fn of(store: &Store, manifest: &Arc<Manifest>) -> Result<Self, CubeError> {
+        let mut own = Inner {
+            store: store.clone(),
+            places: vec![Place::Field; manifest.steps.len()],
+            manifest: Arc::clone(manifest),
+            cubes: vec![],
+        };
+        let repository = match Repository::open(store, &folder(&manifest.product)).await {
+            Ok(repository) => repository,
+            Err(CubeError::Missing { .. }) => return Ok(Self(Arc::new(own))),
+            Err(error) => return Err(error),
+        };
+        own.take(repository.at(&At::Newest).await?);
+        if own.places.contains(&Place::Field) {
+            let version = At::Version(manifest.number.to_string());
+            match repository.at(&version).await {
+                Ok(cube) => own.take(cube),
+                Err(CubeError::NoVersion { .. }) => {}
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(Self(Arc::new(own)))
+    }
+
+    /// Is all of it in the cube, and every complete run time-major? Then it is as fast as it will be.
+    pub fn is_settled(&self) -> bool {
+        let Inner { places, cubes, .. } = &*self.0;
+        let is_compact = |cube: &Cube| cube.runs().first_missing(cube.steps()).is_none();
+        !places.contains(&Place::Field) && cubes.iter().all(is_compact)
+    }
+
+    /// Steps that have to be read from their fields, whole.
+    pub fn in_fields_count(&self) -> usize {
+        let places = self.0.places.iter();
+        places.filter(|place| **place == Place::Field).count()
+    }
+
+    /// Runs of steps that the time-major copy holds, in the order of the version's steps.
+    pub fn time_major(&self) -> Vec<Range<usize>> {
+        let is_held = |run: &Range<usize>| match self.0.places[run.start] {
+            Place::Cube { cube, step } => self.0.cubes[cube].run_of(step).is_some(),
+            Place::Field => false,
+        };
+        self.runs().into_iter().filter(is_held).collect()
+    }
+
+    /// Where runs of steps begin and end that are best asked for together, so that no chunk is read twice: those of the
+    /// time-major copy, and pieces of at most as many steps of the rest.
+    pub fn runs(&self) -> Vec<Range<usize>> {
+        let places = &self.0.places;
+        let run_of = |place: &Place| match place {
+            Place::Cube { cube, step } => {
+                let run = self.0.cubes[*cube].run_of(*step);
+                run.map(|run| (*cube, run))
+            }
+            Place::Field => None,
+        };
+        let mut runs: Vec<Range<usize>> = vec![];
+        let mut before = None;
+        for (step, place) in places.iter().enumerate() {
+            let run = run_of(place);
+            match runs.last_mut() {
+                Some(last) if before == Some(run) && last.len() < RUN_STEPS => last.end = step + 1,
+                _ => runs.push(step..step + 1),
+            }
+            before = Some(run);
+        }
+        runs
+    }
+
+    /// Values of one cell at every step, stored unit, NaN no data.
+    ///
+    /// # Errors
+    /// `Outside` if there is no such cell; a chunk that is damaged or gone, by its name.
+    pub async fn cell(&self, row: u32, col: u32) -> Result<Vec<f32>, CubeError> {
+        let steps = 0..self.0.places.len();
+        let at = [row / BLOCK_CELLS, col / BLOCK_CELLS];
+        let mut block = Block::empty(&self.0.manifest, at, 0)?;
+        let Window { rows, cols, .. } = block.window;
+        if row - block.window.row >= rows || col - block.window.col >= cols {
+            return Err(self.outside(&format!("cell {row}, {col}")));
+        }
+        block.window = Window {
+            row,
+            col,
+            rows: 1,
+            cols: 1,
+        };
+        block.values = vec![f32::NAN; steps.len()];
+        let mut blocks = vec![block];
+        self.read(&mut blocks, steps).await?;
+        Ok(blocks.pop().map(|block| block.values).unwrap_or_default())
+    }
+
+    /// Values of some blocks in a run of steps of the version, in the order asked for. As many are held at once.
+    ///
+    /// # Errors
+    /// As [`Values::cell`].
+    pub async fn blocks(
+        &self,
+        blocks: &[[u32; 2]],
+        steps: Range<usize>,
+    ) -> Result<Vec<Block>, CubeError> {
+        if steps.start > steps.end || steps.end > self.0.places.len() {
+            return Err(self.outside(&format!("steps {steps:?}")));
+        }
+        let empty = |at: &[u32; 2]| Block::empty(&self.0.manifest, *at, steps.len());
+        let mut found: Vec<Block> = blocks.iter().map(empty).collect::<Result<_, _>>()?;
+        self.read(&mut found, steps).await?;
+        Ok(found)
+    }
+
+    fn outside(&self, what: &str) -> CubeError {
+        let Manifest { grid, steps, .. } = &*self.0.manifest;
+        CubeError::Outside {
+            what: what.to_owned(),
+            steps: steps.len(),
+            rows: grid.rows,
+            cols: grid.cols,
+        }
+    }
+
+    /// Where the asked steps are.
+    fn reads(&self, steps: &Range<usize>) -> Reads {
+        let mut reads = Reads::default();
+        for (asked, step) in steps.clone().enumerate() {
+            match self.0.places[step] {
+                Place::Field => reads.fields.push((step, asked)),
+                Place::Cube { cube, step } => match self.0.cubes[cube].run_of(step) {
+                    None => reads.maps.push((cube, step, asked)),
+                    Some(run) => {
+                        let in_run = step % RUN_STEPS;
+                        let pieces = reads.runs.entry((cube, run)).or_default();
+                        match pieces.last_mut() {
+                            Some(last)
+                                if last.in_run + last.count == in_run
+                                    && last.asked + last.count == asked =>
+                            {
+                                last.count += 1;
+                            }
+                            _ => pieces.push(Piece {
+                                in_run,
+                                asked,
+                                count: 1,
+                            }),
+                        }
+                    }
+                },
+            }
+        }
+        reads
+    }
+
+    /// Fills blocks with the values of some steps.
+    async fn read(&self, blocks: &mut [Block], steps: Range<usize>) -> Result<(), CubeError> {
+        let Inner {
+            store,
+            manifest,
+            cubes,
+            ..
+        } = &*self.0;
+        let reads = self.reads(&steps);
+        let asked: Vec<[u32; 2]> = blocks.iter().map(|block| block.at).collect();
+        let windows: Vec<Window> = blocks.iter().map(|block| block.window).collect();
+        let mut parts = vec![];
+        for (cube, run) in reads.runs.keys() {
+            parts.extend(
+                (0..)
+                    .zip(&asked)
+                    .map(|(number, at)| (*cube, *run, number, *at)),
+            );
+        }
+        let read = |(cube, run, number, at): (usize, usize, usize, [u32; 2])| async move {
+            let values = cubes[cube].block(run, at).await?;
+            Ok::<_, CubeError>(((cube, run), number, values))
+        };
+        let mut found = stream::iter(parts).map(read).buffered(BLOCKS_AT_ONCE);
+        while let Some((run, number, values)) = found.try_next().await? {
+            if let Some(values) = values {
+                blocks[number].put_run(&values, &reads.runs[&run], steps.len());
+            }
+        }
+        let windows = &windows;
+        let read = |(cube, step, asked): (usize, usize, usize)| async move {
+            let maps = cubes[cube].windows(step, windows).await?;
+            Ok::<_, CubeError>((asked, maps))
+        };
+        let mut found = stream::iter(reads.maps).map(read).buffered(STEPS_AT_ONCE);
+        while let Some((asked, maps)) = found.try_next().await? {
+            for (block, map) in blocks.iter_mut().zip(&maps) {
+                block.put_map(map, asked, steps.len());
+            }
+        }
+        let read = |(step, asked): (usize, usize)| async move {
+            let field = &manifest.steps[step].field;
+            let values = fields::read(store, field, &manifest.grid).await?;
+            Ok::<_, CubeError>((asked, values))
+        };
+        let mut found = stream::iter(reads.fields)
+            .map(read)
+            .buffered(FIELDS_AT_ONCE);
+        while let Some((asked, values)) = found.try_next().await? {
+            for block in blocks.iter_mut() {
+                let own = block.window.cell_indices(&manifest.grid);
+                let map: Vec<f32> = own.map(|index| values[index]).collect();
+                block.put_map(&map, asked, steps.len());
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Inner {
+    /// Takes the steps of a state of the cube that are the version's.
+    fn take(&mut self, cube: Cube) {
+        let (own, there) = (&self.manifest, cube.description());
+        let is_same_cells = (own.grid.rows, own.grid.cols, own.quantity)
+            == (there.grid.rows, there.grid.cols, there.quantity);
+        if there.product != own.product || !is_same_cells {
+            return;
+        }
+        // Its own name is costly to compute, and needed for old fields only.
+        let is_version = LazyCell::new(|| {
+            let version = there.version.as_ref();
+            version.is_some_and(|it| it.number == own.number && *it == own.id())
+        });
+        let number = self.cubes.len();
+        for (place, step) in self.places.iter_mut().zip(&own.steps) {
+            let start = step.period.start;
+            let found = cube
+                .steps()
+                .binary_search_by_key(&start, |it| it.period.start);
+            let Ok(found) = found else { continue };
+            let there = &cube.steps()[found];
+            let is_same = match step.field.vouches() {
+                Vouched::Values(digest) => there.values_sha256 == digest,
+                // Named by its bytes: only the version's own state is known to hold them.
+                Vouched::Bytes(_) | Vouched::Nothing => *is_version,
+            };
+            if *place == Place::Field && is_same && there.period == step.period {
+                *place = Place::Cube {
+                    cube: number,
+                    step: found,
+                };
+            }
+        }
+        self.cubes.push(cube);
+    }
+}
