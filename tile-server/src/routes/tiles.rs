@@ -40,6 +40,9 @@ pub(crate) struct TileQuery {
     /// edition of now the answer may be kept for ever.
     #[param(example = "0123456789abcdef")]
     edition: Option<String>,
+    /// Anything: it is not read. Another one is another address to caches on the way.
+    #[expect(dead_code, reason = "it tells addresses apart, and nothing else")]
+    revision: Option<String>,
     #[serde(flatten)]
     #[param(ignore)]
     look: LookQuery,

@@ -30,6 +30,9 @@ async fn the_same_tile_is_drawn_once() {
         app.metric("fluxglobe_tile_server_cache_misses_total").await,
         1
     );
+    let revised = app.get(&format!("{TILE}&revision=3")).await;
+    assert_eq!((revised.status, revised.body), (StatusCode::OK, first.body));
+    assert_eq!(app.drawer.drawn_count(), 1);
 }
 
 #[tokio::test]

@@ -76,7 +76,7 @@ const ENDLESS: &str = "/api/events";
 const SWITCHING: &str = "/stream";
 
 /// Parameters that are free text: no value of theirs is wrong.
-const FREE_TEXT: [&str; 2] = ["property", "after"];
+const FREE_TEXT: [&str; 3] = ["property", "after", "revision"];
 
 async fn described() -> Value {
     let app = TestApp::new().await;

@@ -2651,6 +2651,8 @@ export interface operations {
                  * @example 0123456789abcdef
                  */
                 edition?: string;
+                /** @description Anything: it is not read. Another one is another address to caches on the way. */
+                revision?: string;
                 /** @description Colours; the quantity's own unless one is named. Not together with `stops`. */
                 palette?: components["schemas"]["Palette"];
                 /**
