@@ -169,6 +169,7 @@ mod tests {
             domain: ObjectKey::domain(&product, &Digest::of(b"")),
             series: vec![],
             derived_from: None,
+            computed: None,
             notices: vec![],
             product,
         }

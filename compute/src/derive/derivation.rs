@@ -110,6 +110,7 @@ impl<'a> Derivation<'a> {
             domain: self.domain,
             series: self.segments,
             derived_from: Some(self.source.id()),
+            computed: None,
             notices: vec![],
         })
     }

@@ -100,6 +100,7 @@ pub(crate) async fn land(
         domain: domain::write(store, id, &cells).await.unwrap(),
         series: segments,
         derived_from: None,
+        computed: None,
         notices: vec![],
     };
     manifests::commit(store, &manifest).await.unwrap();

@@ -43,7 +43,7 @@ pub(crate) async fn run(settings: &Settings, command: Command) -> Result<ExitCod
         Command::Stats(Stats::Line(options)) => statistics::line(settings, &options).await?,
         Command::Stats(Stats::Polygon(options)) => stats::polygon(settings, &options).await?,
         Command::Budget(options) => budget::run(settings, &options).await?,
-        Command::Derive(options) => derive::run(settings, options).await?,
+        Command::Derive(options) => derive::run(settings, *options).await?,
         Command::Render(options) => render::run(settings, options).await?,
         Command::Serve(options) => serve::run(settings, options).await?,
         Command::Ingestd(options) => services::ingestd::run(settings, options).await?,

@@ -133,6 +133,7 @@ mod tests {
             domain,
             series,
             derived_from: None,
+            computed: None,
             notices: vec![],
         };
         manifests::commit(store, &manifest).await.unwrap();

@@ -118,6 +118,7 @@ async fn build(
         domain,
         series,
         derived_from: None,
+        computed: None,
         notices: NoticeRun::of(&merged.orders),
     })
 }

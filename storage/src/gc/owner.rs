@@ -67,7 +67,9 @@ impl Kept {
                 let Some(manifest) = document::get::<Manifest>(store, key).await? else {
                     continue;
                 };
-                if let Some(source) = &manifest.derived_from {
+                let computed = manifest.computed.iter().flat_map(|it| &it.inputs);
+                let sources = computed.map(|input| &input.manifest);
+                for source in manifest.derived_from.iter().chain(sources) {
                     let key = ObjectKey::manifest(&source.product, source.number);
                     kept.extend(document::get(store, &key).await?);
                 }

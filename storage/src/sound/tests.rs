@@ -56,6 +56,7 @@ async fn store() -> Store {
             series: series.unwrap(),
         }],
         derived_from: None,
+        computed: None,
         notices: vec![],
     };
     manifests::commit(&store, &manifest).await.unwrap();

@@ -205,6 +205,7 @@ async fn write(store: &Store) -> Manifest {
             series: series.unwrap(),
         }],
         derived_from: None,
+        computed: None,
         notices: vec![],
     };
     manifests::commit(store, &manifest).await.unwrap();
