@@ -153,6 +153,7 @@ impl Plan {
             quantity: request.quantity.unwrap_or(first.quantity),
         };
         check(&job)?;
+        matched::pressures_of_a_kind(&inputs, &request.how)?;
         let title = match &request.title {
             Some(title) => title.clone(),
             None if matches!(request.how, Computation::Regrid { .. }) => first.title.clone(),

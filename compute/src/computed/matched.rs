@@ -1,10 +1,11 @@
 //! Steps of the inputs that belong together: periods matched, grids compared, and a refusal that says what to write.
 
-use contract::computed::{Matching, Regridding};
+use contract::computed::{Computation, Matching, Regridding};
 use contract::digest::Digest;
 use contract::grid::Grid;
 use contract::key::ObjectKey;
 use contract::manifest::{Manifest, Step};
+use contract::quantity::Quantity;
 use contract::time::{Period, TimeMs};
 
 use crate::ComputeError;
@@ -84,6 +85,38 @@ fn in_words(grid: &Grid) -> String {
         "{} x {} cells over {west},{south},{east},{north}",
         grid.rows, grid.cols
     )
+}
+
+/// Partial pressure and fugacity of CO2 are both in Pa and differ by 0.4 %, a tenth of what lies between water and air: they
+/// enter one expression through a conversion only, and never under the name of the other.
+///
+/// # Errors
+/// They are mixed: which, and what brings one to the other.
+pub(super) fn pressures_of_a_kind(inputs: &[Input], how: &Computation) -> Result<(), ComputeError> {
+    let Computation::Expression { expression } = how else {
+        return Ok(());
+    };
+    let of = |quantity: Quantity| {
+        let mut named = inputs.iter().map(|it| (&it.name, it.manifest.quantity));
+        named
+            .find(|(_, own)| *own == quantity)
+            .map(|(name, _)| name)
+    };
+    for (quantity, wrong) in [(Quantity::Pco2, "fco2"), (Quantity::Fco2, "pco2")] {
+        if let Some(name) = of(quantity).filter(|name| name.starts_with(wrong)) {
+            return Err(refused(format!("{name} holds {}", quantity.title())));
+        }
+    }
+    let is_converted = ["fco2_of_pco2", "pco2_of_fco2"]
+        .iter()
+        .any(|conversion| expression.contains(conversion));
+    match (of(Quantity::Pco2), of(Quantity::Fco2)) {
+        (Some(pco2), Some(fco2)) if !is_converted => Err(refused(format!(
+            "{pco2} is a partial pressure and {fco2} a fugacity: bring one to the other by \
+             fco2_of_pco2_weiss1974(pco2, temperature, pressure) or pco2_of_fco2_weiss1974"
+        ))),
+        _ => Ok(()),
+    }
 }
 
 /// Steps of the result, inside a window, in the order of time.

@@ -72,7 +72,8 @@ pub(crate) struct Expression {
     /// Product to land the result in.
     #[arg(long)]
     pub(crate) name: Option<ProductId>,
-    /// What the result is, such as `carbon_flux` (positive out of the sea) or `wind_speed`; its unit must be that of the expression.
+    /// What the result is, such as `carbon_flux` (positive out of the sea) or `wind_speed`, or NAME:UNIT for anything else
+    /// ("wind_moment2:m2 s-2"); its unit must be that of the expression.
     #[arg(long, value_parser = quantity)]
     pub(crate) quantity: Option<Quantity>,
     /// NAME=PRODUCT or NAME=PRODUCT:climatology or NAME=PRODUCT:any-time; a name each in the expression.
@@ -240,14 +241,17 @@ impl DeriveCo2Flux {
     }
 }
 
-/// A quantity by its name in manifests.
+/// A quantity by its name in manifests, or `NAME:UNIT` for one that nothing is built in for.
 fn quantity(text: &str) -> anyhow::Result<Quantity> {
+    if let Some((name, unit)) = text.split_once(':') {
+        return Ok(Quantity::open(name, unit, &name.replace('_', " "))?);
+    }
     let known = || {
         let names = Quantity::ALL.map(|quantity| serde_json::json!(quantity).to_string());
         names.join(", ").replace('"', "")
     };
     serde_json::from_value(serde_json::Value::from(text))
-        .with_context(|| format!("there are {}", known()))
+        .with_context(|| format!("there are {}, and NAME:UNIT for anything else", known()))
 }
 
 /// `PRODUCT` or `PRODUCT:MATCHING`.

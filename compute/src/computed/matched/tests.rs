@@ -46,7 +46,8 @@ fn input(name: &str, grid: Grid, periods: &[Period], matching: Matching) -> Inpu
 }
 
 fn months(year: i32, of: std::ops::RangeInclusive<u32>) -> Vec<Period> {
-    of.map(|month| Period::month(year, month).unwrap()).collect()
+    of.map(|month| Period::month(year, month).unwrap())
+        .collect()
 }
 
 fn said(result: Result<impl std::fmt::Debug, ComputeError>) -> String {
@@ -59,7 +60,12 @@ fn periods_of_all_are_matched_a_climatology_by_month_and_a_mask_always() {
     let same = Matching::SamePeriod;
     let year = [months(2010, 1..=12), months(2011, 1..=3)].concat();
     let inputs = [
-        input("mask", grid, &[Period::year(1988).unwrap()], Matching::AnyTime),
+        input(
+            "mask",
+            grid,
+            &[Period::year(1988).unwrap()],
+            Matching::AnyTime,
+        ),
         input("wind", grid, &year, same),
         input("sst", grid, &months(2010, 2..=12), same),
         input("salt", grid, &months(2000, 1..=12), Matching::MonthOfYear),
@@ -71,7 +77,10 @@ fn periods_of_all_are_matched_a_climatology_by_month_and_a_mask_always() {
     assert_eq!(march.fields[0], inputs[0].manifest.steps[0].field);
     assert_eq!(march.fields[3], inputs[3].manifest.steps[2].field);
     assert_eq!(march.origin, "wind.nc");
-    let window = (Some("2010-06".parse().unwrap()), Some("2010-08".parse().unwrap()));
+    let window = (
+        Some("2010-06".parse().unwrap()),
+        Some("2010-08".parse().unwrap()),
+    );
     assert_eq!(steps(&inputs, window).unwrap().steps.len(), 2);
 }
 
@@ -103,4 +112,29 @@ fn what_does_not_belong_together_is_refused_with_what_to_write() {
     assert!(said(steps(&[monthly, many.clone()], (None, None))).contains("2 steps"));
     assert!(said(steps(&[many], (None, None))).contains("which periods"));
     assert!(said(shared_grid(&[])).contains("no product"));
+}
+
+#[test]
+fn partial_pressure_and_fugacity_are_not_mixed_unless_one_is_converted() {
+    let of = |name: &str, quantity| {
+        let mut input = input(
+            "p",
+            one_degree(3),
+            &months(2010, 1..=1),
+            Matching::SamePeriod,
+        );
+        input.name = name.to_owned();
+        input.manifest.quantity = quantity;
+        input
+    };
+    let ask = |inputs: &[Input], expression: &str| {
+        let expression = expression.to_owned();
+        pressures_of_a_kind(inputs, &Computation::Expression { expression })
+    };
+    let both = [of("water", Quantity::Fco2), of("air", Quantity::Pco2)];
+    assert!(said(ask(&both, "water - air")).contains("fco2_of_pco2_weiss1974"));
+    ask(&both, "water - fco2_of_pco2_weiss1974(air, t, p)").unwrap();
+    ask(&both[..1], "water").unwrap();
+    let named = [of("pco2_water", Quantity::Fco2)];
+    assert!(said(ask(&named, "pco2_water")).contains("pco2_water holds CO₂ fugacity"));
 }
