@@ -58,6 +58,12 @@ pub enum ComputeError {
         /// What is wrong and what to do.
         reason: String,
     },
+    /// A computation over products that makes no sense as it is asked for.
+    #[error("{reason}")]
+    Expression {
+        /// What is wrong and what to do.
+        reason: String,
+    },
     /// A value from outside that is not valid.
     #[error(transparent)]
     Contract(#[from] ContractError),
@@ -143,6 +149,7 @@ impl ComputeError {
             | Self::Region { .. }
             | Self::OceanShares { .. }
             | Self::RegionFile { .. }
+            | Self::Expression { .. }
             | Self::SchedulerUrl { .. }
             | Self::Contract(_) => ErrorClass::BadRequest,
             Self::Storage(e) => retryable_if(e.is_retryable()),

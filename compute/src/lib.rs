@@ -4,12 +4,15 @@
 //! [`functions`], which call the pure kernels of [`budget`] and [`stats`]. Values along time come from cubes ([`Engine::values`]). Sums are integers, so that an answer has the
 //! same bits however many parts it was computed in.
 
+pub mod air_sea;
 pub mod budget;
 pub mod catalogue;
 pub mod check;
 pub mod cluster;
+pub mod computed;
 pub mod derive;
 mod error;
+pub mod expression;
 mod failure;
 pub mod functions;
 pub mod gc;
@@ -21,6 +24,7 @@ pub mod published;
 pub mod recompute;
 pub mod reduce;
 pub mod region;
+pub mod regrid;
 mod retry_store;
 mod scan;
 pub mod service;

@@ -1,5 +1,6 @@
 //! Where queries read objects: SQL's scans by address, and our functions the weights that they sum with.
 
+use std::num::NonZeroUsize;
 use std::sync::Arc;
 
 use bytes::Bytes;
@@ -13,6 +14,7 @@ use quick_cache::Weighter;
 use quick_cache::sync::Cache;
 use storage::rows::{RowIndex, Stored};
 use storage::{StorageError, Store};
+use tokio::sync::Semaphore;
 use url::{Position, Url};
 
 use crate::ComputeError;
@@ -33,6 +35,8 @@ pub struct Objects {
     row_indexes: Arc<Cache<Path, Option<Arc<RowIndex>>, ByRows>>,
     extents: Arc<Cache<Digest, Extent>>,
     sums: Arc<Remembered>,
+    /// Where functions that compute products store them.
+    storing: Option<Storing>,
 }
 
 /// Files whose rows are known: series of 16 years of a few products.
@@ -52,11 +56,44 @@ impl Weighter<Path, Option<Arc<RowIndex>>> for ByRows {
     }
 }
 
+/// A store that functions write to, and how many of them may work at a time.
+#[derive(Clone)]
+pub(crate) struct Storing {
+    pub(crate) store: Store,
+    pub(crate) turns: Arc<Semaphore>,
+}
+
+impl std::fmt::Debug for Storing {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.store.url())
+    }
+}
+
 impl Objects {
     /// Those of a store; reads that fail for a passing reason are tried again.
     pub fn of(store: &Store) -> Self {
         let (root, objects) = store.sql_root();
-        Self::new(root, objects)
+        Self::new(root, objects).storing(store)
+    }
+
+    /// The same, whose functions store what they compute.
+    #[must_use]
+    pub fn storing(self, store: &Store) -> Self {
+        let turns = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
+        let storing = Storing {
+            store: store.clone(),
+            turns: Arc::new(Semaphore::new(turns)),
+        };
+        Self {
+            storing: Some(storing),
+            ..self
+        }
+    }
+
+    /// Where functions that compute products store them.
+    pub(crate) fn to_store(&self) -> Result<&Storing, DataFusionError> {
+        let none = || DataFusionError::Execution("nothing can be stored here".to_owned());
+        self.storing.as_ref().ok_or_else(none)
     }
 
     /// Those of any object store under a root.
@@ -68,6 +105,7 @@ impl Objects {
             row_indexes: Arc::new(Cache::with_weighter(HELD_INDEXES, HELD_ROWS, ByRows)),
             extents: Arc::new(Cache::new(HELD_EXTENTS)),
             sums: Arc::default(),
+            storing: None,
         }
     }
 

@@ -11,6 +11,7 @@ pub mod camera;
 pub mod check;
 pub mod chunk;
 pub mod colour;
+pub mod computed;
 pub mod context;
 pub mod digest;
 pub mod earth;

@@ -8,6 +8,7 @@ use std::fmt::{Display, Formatter};
 use serde::{Deserialize, Serialize};
 
 use crate::ContractError;
+use crate::computed::Computed;
 use crate::digest::Digest;
 use crate::grid::Grid;
 use crate::key::ObjectKey;
@@ -55,6 +56,9 @@ pub struct Manifest {
     pub series: Vec<SeriesSegment>,
     /// The manifest this one was derived from, if it was computed rather than ingested.
     pub derived_from: Option<ManifestId>,
+    /// How, if it was by an expression or by regridding; `derived_from` is the first of its inputs then.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub computed: Option<Computed>,
     /// Place of the steps' files in the order of notices; of steps without one nothing is known, and any file is newer.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub notices: Vec<NoticeRun>,
@@ -300,6 +304,7 @@ mod tests {
             domain: ObjectKey::domain(&product, &digest),
             series: vec![],
             derived_from: None,
+            computed: None,
             notices: vec![],
             product,
         }

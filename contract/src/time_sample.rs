@@ -176,6 +176,7 @@ mod tests {
             domain: ObjectKey::domain(&product, &Digest::of(b"d")),
             series: vec![],
             derived_from: None,
+            computed: None,
             notices: vec![],
             product,
         }

@@ -1,6 +1,7 @@
 //! The command line: words in, one plain `Command` out. Every value is parsed here, once, into its final type.
 
 mod annotations;
+mod derive;
 mod export;
 mod fill;
 mod ground;
@@ -26,6 +27,7 @@ use contract::region::Cells;
 use contract::time::TimeMs;
 
 pub(crate) use annotations::Annotated;
+pub(crate) use derive::{Derive, DeriveCo2Flux, DeriveWhat, Expression, Regrid};
 pub(crate) use export::{Export, ExportFormat, ExportedProduct};
 pub(crate) use fill::{BenchFill, FillError, ProductsOf};
 pub(crate) use ground::{Ground, GroundOptions};
@@ -139,9 +141,8 @@ pub(crate) enum Command {
     Stats(Stats),
     /// Integrate a flux over a region and time (Tg C, positive out of the sea).
     Budget(Budget),
-    /// Compute a product from another.
-    #[command(subcommand)]
-    Derive(Derive),
+    /// Compute a product from others: by an expression, the flux of CO2, another grid, or accumulated.
+    Derive(Box<Derive>),
     /// Draw a picture.
     #[command(subcommand)]
     Render(Render),
@@ -315,22 +316,6 @@ pub(crate) struct Budget {
     /// JSON instead of a table.
     #[arg(long)]
     pub(crate) json: bool,
-}
-
-/// `fluxglobe derive`.
-#[derive(Debug, Subcommand)]
-pub(crate) enum Derive {
-    /// Carbon accumulated in every cell since a start: what lifts and sinks the particles.
-    Accumulated {
-        /// Product, a carbon flux.
-        #[arg(long)]
-        product: ProductId,
-        /// Where accumulation starts; the product's first instant if absent.
-        #[arg(long)]
-        start: Option<TimeMs>,
-        #[command(flatten, next_help_heading = "Kafka")]
-        kafka: kafka_log::KafkaSettings,
-    },
 }
 
 /// `fluxglobe render`.

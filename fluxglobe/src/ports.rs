@@ -282,6 +282,7 @@ mod tests {
             domain: domain::write(store, &product, &cells).await.unwrap(),
             series: vec![],
             derived_from: None,
+            computed: None,
             notices: vec![],
             product,
         };

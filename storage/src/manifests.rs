@@ -220,6 +220,7 @@ mod tests {
             domain: ObjectKey::domain(&product, &Digest::of(b"")),
             series: vec![],
             derived_from: None,
+            computed: None,
             notices: vec![],
             product,
         }

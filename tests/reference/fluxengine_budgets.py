@@ -5,7 +5,8 @@
 
 DATA is `data/verification_data` of the FluxEngine 4.2.1 package, LAND its `data/onedeg_land.nc`. Prints JSON, a run each:
 what its authors print (`verification_reference_netflux/*_FEv4`), that total made anew in their way, and the budgets that
-Fluxglobe is held to. With FOLDER, writes there what Fluxglobe is to sum: `RUN.nc` of each run, NetCDF-3, twelve months.
+Fluxglobe is held to. With FOLDER, writes there what Fluxglobe is to sum: `RUN.nc` of each run, NetCDF-3, twelve months; and
+what it is to compute the second one from, `fluxengine-socatv4-inputs.nc`, whose files are HDF5 in five layouts.
 
 The runs are those of `fe_verify_takahashi09.py` (bulk formula, k = 0.26 U^2) and `fe_verify_socatv4.py` (cool and salty
 skin, Nightingale et al. 2000) with `configs/*.conf` of the package; the equations are those of its `core/fe_core.py`.
@@ -35,6 +36,7 @@ import numpy as np
 MONTH_DAYS = 30.5
 EQUATOR_M, POLE_M = 6_378_137.0, 6_356_752.3
 CARBON_G_PER_MOL = 12.0107
+UATM_PA = 0.101325
 RUNS = {
     "fluxengine-takahashi09": (2000, "takahashi09_FEv4/_global.txt"),
     "fluxengine-socatv4": (2010, "socatv4_sst_salinity_N00_reference_FEv4/SST_Salinity_gradients-N00_global.txt"),
@@ -110,27 +112,38 @@ def takahashi09(data, month):
     return flux(k, concentration(soluble, water), concentration(soluble, air)), ice
 
 
+def socatv4_inputs(data, month):
+    """What the other run reads of a month, in SI units: a share of ppm and of ice as 1, pressures in Pa, temperatures in K."""
+    stamp = f"2010{month:02}"
+    wind_file = data / f"globwave/2010/{stamp}_OCF-WSP-GLO-1M-100-MGD-GW-v2.nc"
+    name = calendar.month_abbr[month].lower()
+    gas = data / f"SOCATv4/{stamp}01_OCF-CO2-GLO-1M-KRG-CLIM.nc"
+    own = grid(gas, "Tcl_2010")
+    pressure = grid(data / f"air_pressure/2010/{stamp}_OCF-PRE-GLO-1M-100-ECMWF.nc", "msl_mean")
+    return {
+        "temperature": grid(data / f"SST/2010/{stamp}01_OCF-SST-GLO-1M-100-ATS-ARC.nc", "sst_skin_mean", 271.35, 400),
+        "wind": grid(wind_file, "wind_speed_cor_mean", 0, 100),
+        "wind_moment2": grid(wind_file, "wind_speed_cor_moment_2"),
+        "pressure": pressure,
+        "salinity": grid(one((data / "takahashi09").glob(f"M2001*{name}*.nc")), "salinity", 15, 40),
+        "dry_mole_fraction": grid(gas, "vCO2", 0, 600) * 1e-6,
+        "pco2_water": grid(gas, "pCO2_2010_interpolated_pred", 0, 2000) * UATM_PA,
+        "temperature_of_pco2": np.where((own - 273.15 >= -1.8) & (own - 273.15 <= 30.5), own, np.nan),
+        "ice": grid(data / f"ice/2010/{stamp}01_OCF-ICE-GLO-1M-100-MGD-SSMI.nc", "sea_ice_fraction_mean"),
+    }
+
+
 def socatv4(data, month):
     """The same with a cool and salty skin."""
-    stamp = f"2010{month:02}"
-    kelvin = grid(data / f"SST/2010/{stamp}01_OCF-SST-GLO-1M-100-ATS-ARC.nc", "sst_skin_mean", 271.35, 400)
-    wind_file = data / f"globwave/2010/{stamp}_OCF-WSP-GLO-1M-100-MGD-GW-v2.nc"
-    wind, wind_squared = grid(wind_file, "wind_speed_cor_mean", 0, 100), grid(wind_file, "wind_speed_cor_moment_2")
-    pressure = grid(data / f"air_pressure/2010/{stamp}_OCF-PRE-GLO-1M-100-ECMWF.nc", "msl_mean") * 0.01
-    name = calendar.month_abbr[month].lower()
-    salinity = grid(one((data / "takahashi09").glob(f"M2001*{name}*.nc")), "salinity", 15, 40)
-    gas = data / f"SOCATv4/{stamp}01_OCF-CO2-GLO-1M-KRG-CLIM.nc"
-    air, water = grid(gas, "vCO2", 0, 600), grid(gas, "pCO2_2010_interpolated_pred", 0, 2000)
-    own = grid(gas, "Tcl_2010") - 273.15
-    own = np.where((own >= -1.8) & (own <= 30.5), own, np.nan)
+    of = socatv4_inputs(data, month)
+    kelvin, salinity = of["temperature"], of["salinity"]
     below, skin_salinity = kelvin + 0.17, salinity + 0.1
-    air = air * (pressure - vapour_mbar(kelvin, skin_salinity)) / 1013.25
-    water = in_water(water, below - 273.15, own)
-    k = (0.222 * wind_squared + 0.333 * wind) * np.sqrt(600 / schmidt(kelvin - 273.15))
+    air = of["dry_mole_fraction"] * 1e6 * (of["pressure"] * 0.01 - vapour_mbar(kelvin, skin_salinity)) / 1013.25
+    water = in_water(of["pco2_water"] / UATM_PA, below - 273.15, of["temperature_of_pco2"] - 273.15)
+    k = (0.222 * of["wind_moment2"] + 0.333 * of["wind"]) * np.sqrt(600 / schmidt(kelvin - 273.15))
     water = concentration(solubility(below, salinity), water)
     air = concentration(solubility(kelvin, skin_salinity), air)
-    ice = grid(data / f"ice/2010/{stamp}01_OCF-ICE-GLO-1M-100-MGD-SSMI.nc", "sea_ice_fraction_mean")
-    return flux(k, water, air), ice
+    return flux(k, water, air), of["ice"]
 
 
 def open_water(ice):
@@ -185,8 +198,8 @@ def as_its_authors(months, sea):
     return [(held + missing) * MONTH_DAYS / 1e12, missing * MONTH_DAYS / 1e12]
 
 
-def write(file, year, months):
-    """Twelve months of flux through a cell's sea as NetCDF-3, north up, -999 without a value."""
+def write(file, year, variables):
+    """Twelve months of variables as NetCDF-3, north up, -999 without a value: by name the unit, more attributes, the months."""
     with netCDF4.Dataset(file, "w", format="NETCDF3_CLASSIC") as data:
         for name, size in (("time", 12), ("latitude", 180), ("longitude", 360)):
             data.createDimension(name, size)
@@ -200,12 +213,20 @@ def write(file, year, months):
         data["time"].units, data["time"].standard_name = "days since 1970-01-01", "time"
         data["time"].bounds = "time_bnds"
         data.createVariable("time_bnds", "f8", ("time", "two"))[:] = np.column_stack([starts[:-1], starts[1:]])
-        variable = data.createVariable("flux", "f4", ("time", "latitude", "longitude"), fill_value=-999.0)
-        variable.units = "g C m-2 d-1"
-        variable.standard_name = "surface_upward_mass_flux_of_carbon_dioxide_expressed_as_carbon"
-        for step, (per_day, ice) in enumerate(months):
-            through_sea = per_day * open_water(ice)
-            variable[step] = np.where(np.isfinite(through_sea), through_sea, -999.0)
+        for name, (attributes, months) in variables.items():
+            variable = data.createVariable(name, "f4", ("time", "latitude", "longitude"), fill_value=-999.0)
+            variable.setncatts(attributes)
+            for step, values in enumerate(months):
+                variable[step] = np.where(np.isfinite(values), values, -999.0)
+
+
+def through_sea(months):
+    """The mean flux through a cell's sea, ice and all."""
+    attributes = {
+        "units": "g C m-2 d-1",
+        "standard_name": "surface_upward_mass_flux_of_carbon_dioxide_expressed_as_carbon",
+    }
+    return {"flux": (attributes, [per_day * open_water(ice) for per_day, ice in months])}
 
 
 def main():
@@ -235,7 +256,11 @@ def main():
             "months_tg": budgets,
         }
         if folder:
-            write(folder[0] / f"{run}.nc", year, months)
+            write(folder[0] / f"{run}.nc", year, through_sea(months))
+    if folder:
+        inputs = [socatv4_inputs(data, month) for month in range(1, 13)]
+        variables = {name: ({}, [month[name] for month in inputs]) for name in inputs[0]}
+        write(folder[0] / "fluxengine-socatv4-inputs.nc", 2010, variables)
     print(json.dumps(answer, indent=2))
 
 

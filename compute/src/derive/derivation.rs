@@ -108,6 +108,7 @@ impl<'a> Derivation<'a> {
             domain: self.domain,
             series: vec![],
             derived_from: Some(self.source.id()),
+            computed: None,
             notices: vec![],
         })
     }

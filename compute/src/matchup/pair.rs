@@ -173,6 +173,7 @@ mod tests {
             domain: ObjectKey::domain(&product, &digest),
             series: vec![],
             derived_from: None,
+            computed: None,
             notices: vec![],
             product,
         }

@@ -54,6 +54,7 @@ async fn product(store: &Store) -> Manifest {
         domain: ObjectKey::domain(&product, &Digest::of(b"")),
         series: vec![],
         derived_from: None,
+        computed: None,
         notices: vec![],
         product,
     }

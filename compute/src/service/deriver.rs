@@ -20,6 +20,7 @@ use storage::StorageError;
 use storage::log::{EventLog, Finished, Message, Reader};
 
 use super::named_sums::NamedSums;
+use crate::computed::follow;
 use crate::derive::{chosen_start, derived};
 use crate::{ComputeError, Engine, ErrorClass, catalogue, derive_accumulated};
 
@@ -135,31 +136,33 @@ impl Deriver {
             }
         }
         for (product, events) in landed {
-            let manifest = self.derive(&product, &events, stop).await?;
+            let manifests = self.derive(&product, &events, stop).await?;
             for (origin, event) in events {
-                let body = manifest.as_ref().and_then(derived);
-                let follows = body.map(|body| event.followed_by(body));
-                done.push(finished(origin, follows.into_iter().collect()));
+                let bodies = manifests.iter().filter_map(derived);
+                let follows = bodies.map(|body| event.followed_by(body));
+                done.push(finished(origin, follows.collect()));
             }
         }
         Some(done)
     }
 
-    /// The product that is derived from what landed in another, up to date; inner none if there is none to derive.
+    /// The products that are derived from what landed in another, up to date; inner none if there are none to derive.
     async fn derive(
         &self,
         product: &ProductId,
         events: &[(Origin, Event)],
         stop: &Stop,
-    ) -> Option<Option<Manifest>> {
+    ) -> Option<Vec<Manifest>> {
         let running = self.red.start("derive");
         let _sums_wait = self.sums.hold().await;
         let attempt = || self.derived_now(product);
         let derived = until_there("derivation", stop, ComputeError::is_retryable, attempt).await;
         for (_, event) in events {
             match &derived {
-                Ok(Some(Some(manifest))) => {
-                    tracing::info!(trace = event.trace, manifest = %manifest.id(), "derived");
+                Ok(Some(manifests)) if !manifests.is_empty() => {
+                    for manifest in manifests {
+                        tracing::info!(trace = event.trace, manifest = %manifest.id(), "derived");
+                    }
                 }
                 Ok(_) => tracing::debug!(trace = event.trace, %product, "nothing to derive"),
                 Err(error) => {
@@ -168,9 +171,9 @@ impl Deriver {
             }
         }
         match derived {
-            Ok(Some(manifest)) => {
+            Ok(Some(manifests)) => {
                 running.done(Outcome::Ok);
-                Some(manifest)
+                Some(manifests)
             }
             // The guard counts it as dropped.
             Ok(None) => None,
@@ -181,21 +184,32 @@ impl Deriver {
                     ErrorClass::Retryable => Outcome::Retryable,
                     ErrorClass::Internal => Outcome::Failed,
                 });
-                Some(None)
+                Some(vec![])
             }
         }
     }
 
-    async fn derived_now(&self, product: &ProductId) -> Result<Option<Manifest>, ComputeError> {
+    /// Accumulated carbon of a flux, products that were computed from it, and the accumulated carbon of those.
+    async fn derived_now(&self, product: &ProductId) -> Result<Vec<Manifest>, ComputeError> {
         let source = catalogue::product(self.engine.store(), product).await?;
+        let mut made = self.accumulated(&source).await?;
+        for computed in follow(&self.engine, product).await? {
+            let accumulated = self.accumulated(&computed).await?;
+            made.push(computed);
+            made.extend(accumulated);
+        }
+        Ok(made)
+    }
+
+    async fn accumulated(&self, source: &Manifest) -> Result<Vec<Manifest>, ComputeError> {
         if source.quantity != Quantity::CarbonFlux {
-            return Ok(None);
+            return Ok(vec![]);
         }
         // A start that somebody chose stays as long as the product does.
-        let start = chosen_start(self.engine.store(), product).await?;
-        derive_accumulated(&self.engine, product, start, &|_progress| ())
-            .await
-            .map(Some)
+        let (engine, product) = (&self.engine, &source.product);
+        let start = chosen_start(engine.store(), product).await?;
+        let derived = derive_accumulated(engine, product, start, &|_progress| ()).await?;
+        Ok(vec![derived])
     }
 }
 

@@ -124,7 +124,7 @@ impl Executor {
             address,
             work: Arc::new(work),
             gone,
-            objects,
+            objects: objects.storing(&store),
             store,
             channel,
             work_bytes,

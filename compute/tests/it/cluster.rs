@@ -2,12 +2,16 @@
 
 use std::time::{Duration, Instant};
 
+use compute::computed::{Request, compute};
 use compute::{Engine, budget, derive_accumulated};
 use contract::budget::{BudgetAnswer, BudgetQuery, BudgetStep};
+use contract::manifest::{Manifest, Step};
 use contract::quantity::Quantity;
 use contract::region::{Polygon, Region};
+use contract::time::Period;
 use storage::Store;
 
+use crate::computed::{land_inputs, windy};
 use crate::fixture::{ONE_DEGREE, ask, folder_store, land, parts, product, total, wavy_year};
 use crate::node::Cluster;
 
@@ -183,4 +187,45 @@ async fn a_store_that_fails_for_a_while_changes_nothing() {
         node.line_count() > 2 // its address, its identity, and failures
     });
     assert!(failed, "the store never failed");
+}
+
+/// What a product holds, whatever its name: of every step the digest of its values, and its cells with data.
+fn held(manifest: &Manifest) -> Vec<(Period, String, u64)> {
+    let digest = |step: &Step| step.field.as_str().rsplit('/').next().unwrap().to_owned();
+    let steps = manifest.steps.iter();
+    steps
+        .map(|step| (step.period, digest(step), step.valid_cells))
+        .collect()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn executors_compute_and_store_a_product_with_the_bits_of_one_process_even_if_one_is_killed()
+{
+    let (folder, store) = folder_store();
+    land_inputs(&store).await;
+    let named = |name: &str| Request {
+        target: product(name),
+        ..windy()
+    };
+    let alone = compute(&Engine::local(store.clone()), &named("alone"), &|_| ()).await;
+    let expected = held(&alone.unwrap().manifest);
+    assert_eq!(expected.len(), 10);
+    let mut cluster = Cluster::start(folder.path());
+    for executor_count in [1, 2, 7] {
+        cluster.add(executor_count - cluster.executors.len(), 0, 0);
+        let engine = engine(&store, &cluster);
+        engine.ready().await.unwrap();
+        let name = format!("by-{executor_count}");
+        let found = compute(&engine, &named(&name), &|_| ()).await.unwrap();
+        assert_eq!(
+            held(&found.manifest),
+            expected,
+            "{executor_count} executors"
+        );
+    }
+    let engine = engine(&store, &cluster);
+    let asking = tokio::spawn(async move { compute(&engine, &named("by-six"), &|_| ()).await });
+    cluster.executors[0].kill();
+    let found = asking.await.unwrap().unwrap();
+    assert_eq!(held(&found.manifest), expected);
 }

@@ -87,6 +87,7 @@ pub(crate) async fn land(
         domain: domain::write(store, id, &cells).await.unwrap(),
         series: vec![],
         derived_from: None,
+        computed: None,
         notices: vec![],
     };
     manifests::commit(store, &manifest).await.unwrap();

@@ -19,12 +19,12 @@ use crate::fixture::{ONE_DEGREE, ask, folder_store, land, months, parts, product
 /// What the script says of a run, Tg C, negative into the sea.
 #[derive(Debug, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Run {
-    year: i32,
-    printed_net_tg: f64,
-    printed_missing_tg: f64,
+pub(crate) struct Run {
+    pub(crate) year: i32,
+    pub(crate) printed_net_tg: f64,
+    pub(crate) printed_missing_tg: f64,
     /// Net and missing flux of every month.
-    printed_months_tg: Vec<[f64; 2]>,
+    pub(crate) printed_months_tg: Vec<[f64; 2]>,
     made_anew_net_tg: f64,
     made_anew_missing_tg: f64,
     /// By earth and how cells count, January to December.
@@ -32,7 +32,7 @@ struct Run {
 }
 
 /// Runs the script; the fluxes that it makes are in the folder.
-fn runs(folder: &Path) -> BTreeMap<String, Run> {
+pub(crate) fn runs(folder: &Path) -> BTreeMap<String, Run> {
     let script = "../tests/reference/fluxengine_budgets.py";
     let printed = Command::new(test_data::python())
         .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join(script))
@@ -68,7 +68,7 @@ async fn land_flux(store: &Store, folder: &Path, name: &str, year: i32) {
     land(store, &product(name), flux, ONE_DEGREE, &steps).await;
 }
 
-async fn land_mask(store: &Store) -> Arc<Manifest> {
+pub(crate) async fn land_mask(store: &Store) -> Arc<Manifest> {
     let mut reader = netcdf3::FileReader::open(test_data::fluxengine_land()).unwrap();
     let share = reader.read_var_f32("land_proportion").unwrap();
     let steps = [(Period::year(2000).unwrap(), share)];
@@ -76,7 +76,7 @@ async fn land_mask(store: &Store) -> Arc<Manifest> {
     Arc::new(land(store, &product("onedeg-land"), quantity, ONE_DEGREE, &steps).await)
 }
 
-fn assert_close(ours: f64, theirs: f64, by: f64, what: &str) {
+pub(crate) fn assert_close(ours: f64, theirs: f64, by: f64, what: &str) {
     let off = (ours / theirs - 1.0).abs();
     assert!(
         off < by,

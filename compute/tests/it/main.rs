@@ -9,6 +9,10 @@ mod cleaned;
 #[cfg(test)]
 mod cluster;
 #[cfg(test)]
+mod co2_flux;
+#[cfg(test)]
+mod computed;
+#[cfg(test)]
 mod damaged;
 #[cfg(test)]
 mod fixture;

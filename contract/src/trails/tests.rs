@@ -50,6 +50,7 @@ fn product(name: &str, quantity: Quantity, days: std::ops::RangeInclusive<u32>) 
         domain: ObjectKey::domain(&product, &Digest::of(b"d")),
         series: vec![],
         derived_from: None,
+        computed: None,
         notices: vec![],
         product,
     }

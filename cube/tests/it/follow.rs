@@ -48,6 +48,7 @@ pub(crate) async fn version(store: &Store, grid: Grid, number: u64, steps: Steps
         domain: ObjectKey::domain(&product, &Digest::of(b"")),
         series: vec![],
         derived_from: None,
+        computed: None,
         notices: vec![],
         product,
     }

@@ -50,6 +50,7 @@ fn product() -> Manifest {
         domain: ObjectKey::domain(&product, &Digest::of(b"domain")),
         series: vec![],
         derived_from: None,
+        computed: None,
         notices: vec![],
         product,
     }

@@ -1,31 +1,189 @@
-//! `fluxglobe derive`: a product in, a product computed from it out.
+//! `fluxglobe derive`: products in, a product computed from them out.
 
-use anyhow::Result;
+use std::sync::Arc;
+
+use anyhow::{Context as _, Result, bail};
 use compute::DeriveProgress;
+use compute::computed::co2_flux::Source;
+use compute::computed::{Request, RequestedInput};
+use contract::computed::{Computation, Matching};
 use contract::event::Event;
 use contract::manifest::Manifest;
 use contract::product::ProductId;
+use contract::quantity::Quantity;
 use contract::time::TimeMs;
+use kafka_log::KafkaSettings;
 use storage::Store;
 use storage::log::EventLog;
 
-use crate::cli::{Derive, Settings};
+use crate::cli::{Derive, DeriveCo2Flux, DeriveWhat, Expression, Regrid, Settings};
 use crate::{deployment, progress};
 
 pub(crate) async fn run(settings: &Settings, options: Derive) -> Result<()> {
-    let Derive::Accumulated {
-        product,
-        start,
-        kafka,
-    } = options;
-    let store = deployment::store(settings)?;
-    deployment::manifest(&store, &product, &settings.data).await?;
-    let log = deployment::log(settings, &kafka).await?;
+    match options.what {
+        None => expression(settings, options.expression).await,
+        Some(DeriveWhat::Co2Flux(options)) => co2_flux(settings, *options).await,
+        Some(DeriveWhat::Regrid(options)) => regrid(settings, options).await,
+        Some(DeriveWhat::Functions) => functions(),
+        Some(DeriveWhat::Accumulated {
+            product,
+            start,
+            kafka,
+        }) => {
+            let store = deployment::store(settings)?;
+            deployment::manifest(&store, &product, &settings.data).await?;
+            let log = listening(settings, &kafka).await?;
+            let log = log.as_deref();
+            let manifest = accumulated(settings, store, log, &product, start).await?;
+            progress::result(&manifest.id().to_string())
+        }
+    }
+}
+
+/// The log that is told of what was derived.
+async fn listening(
+    settings: &Settings,
+    kafka: &KafkaSettings,
+) -> Result<Option<Arc<dyn EventLog>>> {
+    let log = deployment::log(settings, kafka).await?;
     if log.is_none() {
         progress::say("nobody is told of it: give --kafka to tell the services of this store");
     }
-    let manifest = accumulated(settings, store, log.as_deref(), &product, start).await?;
+    Ok(log)
+}
+
+async fn expression(settings: &Settings, options: Expression) -> Result<()> {
+    let (Some(expression), Some(target), Some(quantity)) =
+        (options.expr, options.name, options.quantity)
+    else {
+        bail!("give --expr, --name and --quantity, or what to derive: see fluxglobe derive --help");
+    };
+    let request = Request {
+        target,
+        title: options.about.title,
+        quantity: Some(quantity),
+        how: Computation::Expression { expression },
+        grid: None,
+        inputs: options.inputs,
+        from: options.about.from,
+        to: options.about.to,
+    };
+    computed(settings, &options.about.kafka, &request).await
+}
+
+async fn co2_flux(settings: &Settings, options: DeriveCo2Flux) -> Result<()> {
+    let flux = options.flux();
+    let expression = flux.expression()?;
+    progress::say(&expression);
+    let input = |(name, (product, matching)): (&str, Source)| RequestedInput {
+        name: name.to_owned(),
+        product,
+        matching,
+    };
+    let request = Request {
+        target: options.name,
+        title: options.about.title,
+        quantity: Some(Quantity::CarbonFlux),
+        how: Computation::Expression { expression },
+        grid: None,
+        inputs: flux.sources.into_iter().map(input).collect(),
+        from: options.about.from,
+        to: options.about.to,
+    };
+    computed(settings, &options.about.kafka, &request).await
+}
+
+async fn regrid(settings: &Settings, options: Regrid) -> Result<()> {
+    let store = deployment::store(settings)?;
+    let like = deployment::manifest(&store, &options.like, &settings.data).await?;
+    let target = match options.name {
+        Some(name) => name,
+        None => format!("{}-on-{}", options.product, options.like)
+            .parse()
+            .context("give the result a shorter --name")?,
+    };
+    let request = Request {
+        target,
+        title: options.about.title,
+        quantity: None,
+        how: Computation::Regrid {
+            method: options.method,
+            min_coverage: options.min_coverage,
+        },
+        grid: Some(like.grid),
+        inputs: vec![RequestedInput {
+            name: "source".to_owned(),
+            product: options.product,
+            matching: Matching::SamePeriod,
+        }],
+        from: options.about.from,
+        to: options.about.to,
+    };
+    computed(settings, &options.about.kafka, &request).await
+}
+
+/// Computes a product with a progress bar, tells of it, and says how far it is to be trusted.
+async fn computed(settings: &Settings, kafka: &KafkaSettings, request: &Request) -> Result<()> {
+    let store = deployment::store(settings)?;
+    let log = listening(settings, kafka).await?;
+    let bar = progress::bar("compute on Ballista", 0);
+    let engine = deployment::engine(settings, store)?;
+    let on_step = |progress: DeriveProgress| {
+        bar.set_length(progress.all_steps as u64);
+        bar.set_position(progress.done_steps as u64);
+    };
+    let outcome = compute::computed::compute(&engine, request, &on_step).await?;
+    let manifest = &outcome.manifest;
+    tell(log.as_deref(), manifest).await?;
+    let (count, product) = (manifest.steps.len(), &manifest.product);
+    let kept = outcome.kept_count;
+    progress::done(
+        &bar,
+        &format!("{count} steps of {product}, {kept} of them there before"),
+    );
+    if outcome.left_out > 0 {
+        progress::say(&format!(
+            "{} steps are left out: another input has nothing for their period",
+            outcome.left_out
+        ));
+    }
+    let (masked, _) = manifest.masked();
+    if masked.implausible > 0 {
+        progress::say(&format!(
+            "{} values are no numbers, or none that {:?} can have, and were masked",
+            masked.implausible, manifest.quantity
+        ));
+    }
+    for (name, count) in &outcome.outside {
+        progress::say(&format!(
+            "{name} was called {count} times outside the range that its paper gives"
+        ));
+    }
     progress::result(&manifest.id().to_string())
+}
+
+fn functions() -> Result<()> {
+    let mut text = String::new();
+    for function in compute::expression::function::ALL {
+        text.push_str(&function.signature());
+        text.push_str(&format!("\n    {}; {}\n", function.what, function.source));
+        for argument in function.arguments {
+            if let Some([low, high]) = argument.range {
+                let (name, unit) = (argument.name, argument.unit);
+                text.push_str(&format!("    {name} from {low} to {high} {unit}\n"));
+            }
+        }
+    }
+    progress::result(&text)
+}
+
+/// Tells of a derived version, once.
+async fn tell(log: Option<&dyn EventLog>, manifest: &Manifest) -> Result<()> {
+    if let (Some(log), Some(body)) = (log, compute::derive::derived(manifest)) {
+        let event = Event::new(manifest.id().to_string(), body);
+        storage::log::tell_once(log, &event).await?;
+    }
+    Ok(())
 }
 
 /// Computes accumulated carbon with a progress bar; at once if it is there already.
@@ -43,10 +201,7 @@ pub(crate) async fn accumulated(
         bar.set_position(progress.done_steps as u64);
     };
     let manifest = compute::derive_accumulated(&engine, product, start, &on_step).await?;
-    if let (Some(log), Some(body)) = (log, compute::derive::derived(&manifest)) {
-        let event = Event::new(manifest.id().to_string(), body);
-        storage::log::tell_once(log, &event).await?;
-    }
+    tell(log, &manifest).await?;
     progress::done(
         &bar,
         &format!("{} fields of {}", manifest.steps.len(), manifest.product),

@@ -44,7 +44,7 @@ pub(crate) async fn run(settings: &Settings, command: Command) -> Result<ExitCod
         Command::Stats(Stats::Polygon(options)) => stats::polygon(settings, &options).await?,
         Command::Budget(options) => budget::run(settings, &options).await?,
         Command::Derive(options) => {
-            derive::run(settings, options).await?;
+            derive::run(settings, *options).await?;
             cube::compacted().await;
         }
         Command::Render(options) => Box::pin(render::run(settings, options)).await?,

@@ -100,6 +100,7 @@ mod tests {
             domain: domain.unwrap(),
             series: vec![],
             derived_from: None,
+            computed: None,
             notices: vec![],
         };
         manifests::commit(store, &manifest).await.unwrap();

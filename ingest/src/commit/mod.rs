@@ -117,6 +117,7 @@ async fn build(
         domain,
         series: vec![],
         derived_from: None,
+        computed: None,
         notices: NoticeRun::of(&merged.orders),
     })
 }

@@ -141,6 +141,7 @@ mod tests {
             domain: ObjectKey::domain(&product, &Digest::of(b"d")),
             series: vec![],
             derived_from: None,
+            computed: None,
             notices: vec![],
             product,
         }

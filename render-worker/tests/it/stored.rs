@@ -56,6 +56,7 @@ pub(crate) async fn product(
         domain,
         series: vec![],
         derived_from: None,
+        computed: None,
         notices: vec![],
     };
     storage::manifests::commit(store, &manifest).await.unwrap();

@@ -71,7 +71,9 @@ impl Kept {
                 let Some(manifest) = manifests::numbered(store, &product, number).await? else {
                     continue;
                 };
-                if let Some(source) = &manifest.derived_from {
+                let computed = manifest.computed.iter().flat_map(|it| &it.inputs);
+                let sources = computed.map(|input| &input.manifest);
+                for source in manifest.derived_from.iter().chain(sources) {
                     kept.extend(manifests::numbered(store, &source.product, source.number).await?);
                 }
                 kept.push(manifest);

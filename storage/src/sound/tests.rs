@@ -59,6 +59,7 @@ async fn store() -> Store {
             series,
         }],
         derived_from: None,
+        computed: None,
         notices: vec![],
     };
     manifests::commit(&store, &manifest).await.unwrap();

@@ -209,6 +209,7 @@ async fn write(store: &Store) -> Manifest {
             series: SERIES.parse().unwrap(),
         }],
         derived_from: None,
+        computed: None,
         notices: vec![],
     };
     manifests::commit(store, &manifest).await.unwrap();

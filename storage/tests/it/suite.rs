@@ -139,6 +139,7 @@ fn manifest(product: &ProductId, number: u64, title: &str) -> Manifest {
         domain: ObjectKey::domain(product, &Digest::of(b"")),
         series: vec![],
         derived_from: None,
+        computed: None,
         notices: vec![],
     }
 }

@@ -92,6 +92,7 @@ mod tests {
             domain: ObjectKey::domain(&product(), &Digest::of(domain.as_bytes())),
             series: vec![],
             derived_from: None,
+            computed: None,
             notices: vec![],
         }
     }

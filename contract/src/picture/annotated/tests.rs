@@ -49,6 +49,7 @@ fn product(name: &str, quantity: Quantity, periods: Vec<Period>) -> Manifest {
         domain: ObjectKey::domain(&product, &Digest::of(b"d")),
         series: vec![],
         derived_from: None,
+        computed: None,
         notices: vec![],
         product,
     }

@@ -63,6 +63,7 @@ fn manifest(steps: Vec<Step>) -> Manifest {
         domain: ObjectKey::domain(&product(), &Digest::of(b"")),
         series: vec![],
         derived_from: None,
+        computed: None,
         notices: vec![],
     }
 }

@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 use super::Profile;
 
 /// Name and text of each, in the order in which they are tried.
-const TEXTS: [(&str, &str); 27] = [
+const TEXTS: [(&str, &str); 32] = [
     (
         "takahashi09-flux",
         include_str!("../../../profiles/takahashi09-flux.toml"),
@@ -75,6 +75,26 @@ const TEXTS: [(&str, &str); 27] = [
     (
         "takahashi09-salinity",
         include_str!("../../../profiles/takahashi09-salinity.toml"),
+    ),
+    (
+        "takahashi09-sst",
+        include_str!("../../../profiles/takahashi09-sst.toml"),
+    ),
+    (
+        "takahashi09-wind",
+        include_str!("../../../profiles/takahashi09-wind.toml"),
+    ),
+    (
+        "takahashi09-pressure",
+        include_str!("../../../profiles/takahashi09-pressure.toml"),
+    ),
+    (
+        "takahashi09-ice",
+        include_str!("../../../profiles/takahashi09-ice.toml"),
+    ),
+    (
+        "takahashi09-pco2-air",
+        include_str!("../../../profiles/takahashi09-pco2-air.toml"),
     ),
     ("etopo20", include_str!("../../../profiles/etopo20.toml")),
     ("etopo5", include_str!("../../../profiles/etopo5.toml")),

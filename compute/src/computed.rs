@@ -1,0 +1,469 @@
+//! Computed products: an expression over products, or a product brought to another grid, in; a product landed out.
+//!
+//! Every step is computed and stored by an executor, which reads the fields of the inputs and answers with names; then runs
+//! of steps are stored time-major in the same way. A step is named by the computation and the content of what it is made of:
+//! those of the newest version that still are what they would be are kept.
+
+pub mod co2_flux;
+mod dependents;
+pub(crate) mod job;
+pub(crate) mod make;
+mod matched;
+mod request;
+mod work;
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+
+use contract::computed::{Computation, Computed, ComputedInput};
+use contract::digest::Digest;
+use contract::manifest::{MANIFEST_SCHEMA, Manifest, SeriesSegment, Step};
+use contract::masked::MaskedCells;
+use contract::product::ProductId;
+use storage::{StorageError, domain, manifests};
+
+use crate::expression::unit::Unit;
+use crate::functions::{COMPUTED_FIELD, COMPUTED_SERIES};
+use crate::{ComputeError, DeriveProgress, Engine, catalogue};
+use job::{FieldMade, FieldTask, Job, SeriesMade, SeriesTask};
+use make::Maker;
+use matched::{Input, Matched, Matches};
+pub use request::{Request, RequestedInput};
+
+/// Version of the way products are computed: it changes when their bits do.
+const METHOD: u32 = 1;
+/// Values of one series segment: 256 MiB of f32, whatever the grid.
+const SEGMENT_VALUES: usize = 64 << 20;
+/// Steps that are asked of the engine at a time, so that progress is told.
+const STEPS_AT_A_TIME: usize = 1024;
+/// How often the commit is tried again when another writer takes the number.
+const COMMIT_ATTEMPTS: u32 = 5;
+
+/// What came of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outcome {
+    /// The version that holds it.
+    pub manifest: Manifest,
+    /// Steps that were there and are kept.
+    pub kept_count: usize,
+    /// Steps of the input that gives the periods which another input has nothing for.
+    pub left_out: usize,
+    /// In the steps that were computed now, calls by function outside the range that its paper gives; `origin` of a step says
+    /// it for good.
+    pub outside: BTreeMap<String, u64>,
+}
+
+/// Computes a product and lands it. Nothing is changed if the newest version is what would come out.
+///
+/// # Errors
+/// [`ComputeError::Expression`] where it makes no sense as it is asked for: mixed units, other grids, no common period.
+pub async fn compute(
+    engine: &Engine,
+    request: &Request,
+    progress: &(dyn Fn(DeriveProgress) + Send + Sync),
+) -> Result<Outcome, ComputeError> {
+    let plan = Plan::of(engine, request).await?;
+    let latest = manifests::latest(engine.store(), &request.target).await?;
+    if let Some(latest) = &latest {
+        fits_what_is_there(latest, &plan.job)?;
+    }
+    let kept = kept(&plan, latest.as_ref());
+    if let Some(latest) = latest.filter(|it| plan.is_what_is_there(request, it, &kept)) {
+        cube::keep_up(engine.store(), &latest).await;
+        return Ok(Outcome {
+            kept_count: latest.steps.len(),
+            left_out: plan.matches.left_out,
+            outside: BTreeMap::new(),
+            manifest: latest,
+        });
+    }
+    let (kept_count, left_out) = (kept.len(), plan.matches.left_out);
+    let (steps, outside) = plan.fields(engine, kept, progress).await?;
+    let (series, domain) = plan.series(engine, &steps).await?;
+    let manifest = plan.manifest(request, steps, series, domain);
+    Ok(Outcome {
+        manifest: commit(engine, manifest).await?,
+        kept_count,
+        left_out,
+        outside,
+    })
+}
+
+/// Brings every product up to date that was computed from one, and whatever was computed from those; their versions, each
+/// after those it was computed from. One that cannot be any more (its inputs have parted) is told of and left as it is.
+pub async fn follow(engine: &Engine, product: &ProductId) -> Result<Vec<Manifest>, ComputeError> {
+    let mut seen = BTreeSet::from([product.clone()]);
+    let mut open = VecDeque::from([product.clone()]);
+    let mut made = vec![];
+    while let Some(source) = open.pop_front() {
+        for request in dependents::of(engine.store(), &source).await? {
+            if !seen.insert(request.target.clone()) {
+                continue;
+            }
+            match compute(engine, &request, &|_progress| ()).await {
+                Ok(outcome) => {
+                    open.push_back(request.target);
+                    made.push(outcome.manifest);
+                }
+                Err(error) if error.is_retryable() => return Err(error),
+                Err(error) => {
+                    let product = request.target;
+                    tracing::error!(%product, %error, "cannot be computed again");
+                }
+            }
+        }
+    }
+    Ok(made)
+}
+
+/// Everything that is known before the first value is read.
+struct Plan {
+    inputs: Vec<Input>,
+    matches: Matches,
+    job: Job,
+    computation: Digest,
+    title: String,
+}
+
+impl Plan {
+    async fn of(engine: &Engine, request: &Request) -> Result<Self, ComputeError> {
+        let mut inputs: Vec<Input> = vec![];
+        for asked in &request.inputs {
+            if asked.product == request.target {
+                let reason = format!("{} cannot be computed from itself", request.target);
+                return Err(ComputeError::Expression { reason });
+            }
+            if inputs.iter().any(|input| input.name == asked.name) {
+                let reason = format!("two inputs have the name {:?}", asked.name);
+                return Err(ComputeError::Expression { reason });
+            }
+            inputs.push(Input {
+                name: asked.name.clone(),
+                manifest: catalogue::product(engine.store(), &asked.product).await?,
+                matching: asked.matching,
+            });
+        }
+        let grid = matched::shared_grid(&inputs)?;
+        let first = &inputs[0].manifest;
+        let job = Job {
+            how: request.how.clone(),
+            inputs: inputs.iter().map(named_unit).collect(),
+            grid,
+            target_grid: request.grid.unwrap_or(grid),
+            target: request.target.clone(),
+            quantity: request.quantity.unwrap_or(first.quantity),
+        };
+        check(&job)?;
+        matched::pressures_of_a_kind(&inputs, &request.how)?;
+        let title = match &request.title {
+            Some(title) => title.clone(),
+            None if matches!(request.how, Computation::Regrid { .. }) => first.title.clone(),
+            None => format!("{}, computed", job.quantity.title()),
+        };
+        Ok(Self {
+            matches: matched::steps(&inputs, (request.from, request.to))?,
+            computation: Digest::of_json(&(METHOD, &job)),
+            inputs,
+            job,
+            title,
+        })
+    }
+
+    fn is_what_is_there(
+        &self,
+        request: &Request,
+        latest: &Manifest,
+        kept: &BTreeMap<usize, Step>,
+    ) -> bool {
+        kept.len() == self.matches.steps.len()
+            && latest.steps.len() == kept.len()
+            && latest.title == self.title
+            && latest.computed.as_ref() == Some(&self.computed(request))
+    }
+
+    fn computed(&self, request: &Request) -> Computed {
+        let named = |input: &Input| ComputedInput {
+            name: input.name.clone(),
+            manifest: input.manifest.id(),
+            matching: input.matching,
+        };
+        Computed {
+            how: request.how.clone(),
+            inputs: self.inputs.iter().map(named).collect(),
+            from: request.from,
+            to: request.to,
+        }
+    }
+
+    /// Steps with their fields stored, those that are kept as they are.
+    async fn fields(
+        &self,
+        engine: &Engine,
+        mut done: BTreeMap<usize, Step>,
+        progress: &(dyn Fn(DeriveProgress) + Send + Sync),
+    ) -> Result<(Vec<Step>, BTreeMap<String, u64>), ComputeError> {
+        let steps = &self.matches.steps;
+        let tell = |done_steps| {
+            progress(DeriveProgress {
+                done_steps,
+                all_steps: steps.len(),
+            });
+        };
+        tell(done.len());
+        let task = |(index, step): (usize, &Matched)| FieldTask {
+            index,
+            period: step.period,
+            fields: step.fields.clone(),
+        };
+        let is_new = |(index, _): &(usize, &Matched)| !done.contains_key(index);
+        let tasks: Vec<FieldTask> = steps.iter().enumerate().filter(is_new).map(task).collect();
+        let mut outside: BTreeMap<String, u64> = BTreeMap::new();
+        for some in tasks.chunks(STEPS_AT_A_TIME) {
+            let made: Vec<FieldMade> =
+                work::on_engine(engine, COMPUTED_FIELD, &self.job, some).await?;
+            for made in made {
+                for (name, count) in &made.outside {
+                    *outside.entry(name.clone()).or_default() += count;
+                }
+                let step = steps.get(made.index).ok_or_else(not_asked)?;
+                done.insert(made.index, self.step(step, made));
+            }
+            tell(done.len());
+        }
+        if done.len() != steps.len() {
+            return Err(not_asked());
+        }
+        Ok((done.into_values().collect(), outside))
+    }
+
+    fn step(&self, step: &Matched, made: FieldMade) -> Step {
+        Step {
+            period: step.period,
+            field: made.field,
+            raw_sha256: matched::made_of(self.computation, step),
+            origin: origin(step, &made.outside),
+            valid_cells: made.valid_cells,
+            masked: Some(MaskedCells {
+                implausible: made.implausible,
+                ..MaskedCells::default()
+            }),
+            contributed: None,
+        }
+    }
+
+    /// Series of all steps, and the cells that hold data in some of them.
+    async fn series(
+        &self,
+        engine: &Engine,
+        steps: &[Step],
+    ) -> Result<(Vec<SeriesSegment>, contract::key::ObjectKey), ComputeError> {
+        let per_segment = (SEGMENT_VALUES / self.job.target_grid.cell_count()).max(1);
+        let task = |(index, run): (usize, &[Step])| SeriesTask {
+            first: index * per_segment,
+            fields: run.iter().map(|step| step.field.clone()).collect(),
+        };
+        let runs = steps.chunks(per_segment).enumerate();
+        let tasks: Vec<SeriesTask> = runs.map(task).collect();
+        let mut made: Vec<SeriesMade> =
+            work::on_engine(engine, COMPUTED_SERIES, &self.job, &tasks).await?;
+        made.sort_by_key(|made| made.first);
+        let mut cells = vec![false; self.job.target_grid.cell_count()];
+        let mut segments = vec![];
+        for (made, task) in made.iter().zip(&tasks) {
+            if made.first != task.first {
+                return Err(not_asked());
+            }
+            segments.push(SeriesSegment {
+                first_step: made.first as u32,
+                steps: task.fields.len() as u32,
+                series: made.series.clone(),
+            });
+            let of_run = domain::read(engine.store(), &made.domain).await?;
+            for (cell, held) in cells.iter_mut().zip(of_run) {
+                *cell |= held;
+            }
+        }
+        let domain = domain::write(engine.store(), &self.job.target, &cells).await?;
+        Ok((segments, domain))
+    }
+
+    fn manifest(
+        self,
+        request: &Request,
+        steps: Vec<Step>,
+        series: Vec<SeriesSegment>,
+        domain: contract::key::ObjectKey,
+    ) -> Manifest {
+        let computed = self.computed(request);
+        Manifest {
+            schema: MANIFEST_SCHEMA,
+            product: self.job.target,
+            number: 0,
+            title: self.title,
+            quantity: self.job.quantity,
+            synthetic: self.inputs.iter().any(|input| input.manifest.synthetic),
+            source: citation(&request.how, &self.inputs),
+            grid: self.job.target_grid,
+            steps,
+            domain,
+            series,
+            derived_from: computed.inputs.first().map(|input| input.manifest.clone()),
+            computed: Some(computed),
+            notices: vec![],
+        }
+    }
+}
+
+/// What a step is made of, for people, and where functions were called outside the range of their papers.
+fn origin(step: &Matched, outside: &BTreeMap<String, u64>) -> String {
+    let mut text = format!("computed from {}", step.origin);
+    for (name, count) in outside {
+        text.push_str(&format!(
+            "; {name} outside the range of its paper in {count} cells"
+        ));
+    }
+    text
+}
+
+fn not_asked() -> ComputeError {
+    ComputeError::inconsistent("a computed product", "the engine answered for other steps")
+}
+
+fn named_unit(input: &Input) -> (String, String) {
+    (
+        input.name.clone(),
+        input.manifest.quantity.unit().to_owned(),
+    )
+}
+
+/// Whether an expression can be read, over units that can be, and comes to the unit of its quantity; and whether grids meet.
+fn check(job: &Job) -> Result<(), ComputeError> {
+    let refused = |reason| Err(ComputeError::Expression { reason });
+    match Maker::of(job)? {
+        Maker::Expression(expression) => {
+            let (unit, wanted) = (expression.unit(), job.quantity.unit());
+            if Unit::stored(wanted) != Some(unit) {
+                return refused(format!(
+                    "the expression comes to {unit}, but {:?} is stored in {wanted}",
+                    job.quantity
+                ));
+            }
+            Ok(())
+        }
+        Maker::Regrid {
+            regridder,
+            min_coverage,
+        } => {
+            if job.inputs.len() != 1 {
+                return refused("one product is brought to another grid at a time".to_owned());
+            }
+            if !(0.0..=1.0).contains(&min_coverage) {
+                return refused(format!("a share of a cell is 0 to 1, not {min_coverage}"));
+            }
+            job.target_grid.validate()?;
+            if !regridder.touches() {
+                return refused("the two grids have no place in common".to_owned());
+            }
+            Ok(())
+        }
+    }
+}
+
+/// What is there under the name must be of the same kind.
+fn fits_what_is_there(latest: &Manifest, job: &Job) -> Result<(), ComputeError> {
+    let refused = |reason| Err(ComputeError::Expression { reason });
+    let product = &latest.product;
+    if latest.computed.is_none() {
+        return refused(format!(
+            "{product} is there and was not computed; give another name"
+        ));
+    }
+    if latest.grid != job.target_grid {
+        return refused(format!(
+            "{product} is there on another grid; give another name"
+        ));
+    }
+    if latest.quantity.unit() != job.quantity.unit() {
+        return refused(format!(
+            "{product} is there and holds {:?}; give another name",
+            latest.quantity
+        ));
+    }
+    Ok(())
+}
+
+/// Steps of the newest version that are what they would be.
+fn kept(plan: &Plan, latest: Option<&Manifest>) -> BTreeMap<usize, Step> {
+    let Some(latest) = latest.filter(|latest| latest.quantity == plan.job.quantity) else {
+        return BTreeMap::new();
+    };
+    let there: BTreeMap<Digest, &Step> = latest
+        .steps
+        .iter()
+        .map(|step| (step.raw_sha256, step))
+        .collect();
+    let kept = |(index, step): (usize, &Matched)| {
+        let there = there.get(&matched::made_of(plan.computation, step))?;
+        Some((index, (*there).clone()))
+    };
+    plan.matches
+        .steps
+        .iter()
+        .enumerate()
+        .filter_map(kept)
+        .collect()
+}
+
+/// Where the values come from, for people.
+fn citation(how: &Computation, inputs: &[Input]) -> String {
+    let of = |input: &Input| {
+        format!(
+            "{} = {} ({})",
+            input.name,
+            input.manifest.id(),
+            input.manifest.source
+        )
+    };
+    let inputs: Vec<String> = inputs.iter().map(of).collect();
+    let what = match how {
+        Computation::Expression { expression } => format!("Computed as {expression}"),
+        Computation::Regrid {
+            method,
+            min_coverage,
+        } => format!("Regridded ({method}, cells covered by {min_coverage} at least)"),
+    };
+    format!("{what}; {}", inputs.join("; "))
+}
+
+/// Publishes the manifest under the next free number and brings its cube there, unless just that is there.
+async fn commit(engine: &Engine, mut computed: Manifest) -> Result<Manifest, ComputeError> {
+    let store = engine.store();
+    let mut attempt = 1;
+    loop {
+        let latest = manifests::latest(store, &computed.product).await?;
+        if let Some(latest) = &latest {
+            manifests::settle(store, latest, &mut computed).await?;
+        }
+        let number = latest.as_ref().map_or(1, |latest| latest.number + 1);
+        let same = |latest: &Manifest| {
+            let number = latest.number;
+            *latest
+                == Manifest {
+                    number,
+                    ..computed.clone()
+                }
+        };
+        if let Some(latest) = latest.filter(same) {
+            cube::keep_up(store, &latest).await;
+            return Ok(latest);
+        }
+        computed.number = number;
+        match manifests::commit(store, &computed).await {
+            Ok(()) => {
+                cube::keep_up(store, &computed).await;
+                return Ok(computed);
+            }
+            Err(StorageError::Conflict { .. }) if attempt < COMMIT_ATTEMPTS => attempt += 1,
+            Err(e) => return Err(e.into()),
+        }
+    }
+}

@@ -1,0 +1,238 @@
+//! Steps of the inputs that belong together: periods matched, grids compared, and a refusal that says what to write.
+
+use contract::computed::{Computation, Matching, Regridding};
+use contract::digest::Digest;
+use contract::grid::Grid;
+use contract::key::ObjectKey;
+use contract::manifest::{Manifest, Step};
+use contract::quantity::Quantity;
+use contract::time::{Period, TimeMs};
+
+use crate::ComputeError;
+
+/// An input as it is read.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Input {
+    pub(super) name: String,
+    pub(super) manifest: Manifest,
+    pub(super) matching: Matching,
+}
+
+/// A step of the result and what it is made of.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Matched {
+    pub(super) period: Period,
+    /// A field an input, in their order.
+    pub(super) fields: Vec<ObjectKey>,
+    /// Files of the first input that is matched by period, for people.
+    pub(super) origin: String,
+}
+
+/// Steps that all inputs have, and how many those matched by period lack.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Matches {
+    pub(super) steps: Vec<Matched>,
+    /// Steps of some input that another one has nothing for.
+    pub(super) left_out: usize,
+}
+
+fn refused(reason: String) -> ComputeError {
+    ComputeError::Expression { reason }
+}
+
+/// The grid that all inputs share.
+///
+/// # Errors
+/// They do not: which do not, and how to bring one to the grid of the other.
+pub(super) fn shared_grid(inputs: &[Input]) -> Result<Grid, ComputeError> {
+    let [first, rest @ ..] = inputs else {
+        return Err(refused("it names no product".to_owned()));
+    };
+    for other in rest {
+        if !is_same(&first.manifest.grid, &other.manifest.grid) {
+            let (own, others) = (&first.manifest.product, &other.manifest.product);
+            return Err(refused(format!(
+                "{own} is on {}, {others} on {}: bring one to the grid of the other first, such as \
+                 fluxglobe derive regrid --product {others} --like {own} --method {}",
+                in_words(&first.manifest.grid),
+                in_words(&other.manifest.grid),
+                Regridding::Conservative,
+            )));
+        }
+    }
+    Ok(first.manifest.grid)
+}
+
+/// Are two grids the same but for the noise of their axes?
+fn is_same(a: &Grid, b: &Grid) -> bool {
+    /// Share of a cell: axes of files are written with five digits and more.
+    const SLACK_CELLS: f64 = 1e-3;
+    let near = |a: f64, b: f64, step: f64| (a - b).abs() < SLACK_CELLS * step;
+    let far = (
+        f64::from(a.rows) * a.dlat_deg,
+        f64::from(a.cols) * a.dlon_deg,
+    );
+    (a.rows, a.cols) == (b.rows, b.cols)
+        && near(a.north_deg, b.north_deg, a.dlat_deg)
+        && near(a.west_deg, b.west_deg, a.dlon_deg)
+        && near(far.0, f64::from(b.rows) * b.dlat_deg, a.dlat_deg)
+        && near(far.1, f64::from(b.cols) * b.dlon_deg, a.dlon_deg)
+}
+
+fn in_words(grid: &Grid) -> String {
+    let [west, south, east, north] = grid.shown_bounds_deg();
+    format!(
+        "{} x {} cells over {west},{south},{east},{north}",
+        grid.rows, grid.cols
+    )
+}
+
+/// Partial pressure and fugacity of CO2 are both in Pa and differ by 0.4 %, a tenth of what lies between water and air: they
+/// enter one expression through a conversion only, and never under the name of the other.
+///
+/// # Errors
+/// They are mixed: which, and what brings one to the other.
+pub(super) fn pressures_of_a_kind(inputs: &[Input], how: &Computation) -> Result<(), ComputeError> {
+    let Computation::Expression { expression } = how else {
+        return Ok(());
+    };
+    let of = |quantity: Quantity| {
+        let mut named = inputs.iter().map(|it| (&it.name, it.manifest.quantity));
+        named
+            .find(|(_, own)| *own == quantity)
+            .map(|(name, _)| name)
+    };
+    for (quantity, wrong) in [(Quantity::Pco2, "fco2"), (Quantity::Fco2, "pco2")] {
+        if let Some(name) = of(quantity).filter(|name| name.starts_with(wrong)) {
+            return Err(refused(format!("{name} holds {}", quantity.title())));
+        }
+    }
+    let is_converted = ["fco2_of_pco2", "pco2_of_fco2"]
+        .iter()
+        .any(|conversion| expression.contains(conversion));
+    match (of(Quantity::Pco2), of(Quantity::Fco2)) {
+        (Some(pco2), Some(fco2)) if !is_converted => Err(refused(format!(
+            "{pco2} is a partial pressure and {fco2} a fugacity: bring one to the other by \
+             fco2_of_pco2_weiss1974(pco2, temperature, pressure) or pco2_of_fco2_weiss1974"
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// Steps of the result, inside a window, in the order of time.
+///
+/// # Errors
+/// No input gives the periods, or there is no period that all have.
+pub(super) fn steps(
+    inputs: &[Input],
+    window: (Option<TimeMs>, Option<TimeMs>),
+) -> Result<Matches, ComputeError> {
+    let by_period = |input: &&Input| input.matching == Matching::SamePeriod;
+    let Some(lead) = inputs.iter().find(by_period) else {
+        let reason = "one input must say which periods the result has: leave climatology and any-time away from it";
+        return Err(refused(reason.to_owned()));
+    };
+    inputs.iter().try_for_each(fits_its_matching)?;
+    let (_window, inside) = lead.manifest.steps_inside(window.0, window.1)?;
+    let mut found = vec![];
+    for step in &inside {
+        let fields: Option<Vec<ObjectKey>> = inputs
+            .iter()
+            .map(|input| field_of(input, step.period))
+            .collect();
+        if let Some(fields) = fields {
+            found.push(Matched {
+                period: step.period,
+                fields,
+                origin: step.origin.clone(),
+            });
+        }
+    }
+    if found.is_empty() {
+        return Err(refused(format!(
+            "there is no period that all inputs have: {}; \
+             an input of one year that holds in every year is marked climatology, one that holds always any-time",
+            inputs
+                .iter()
+                .map(extent_in_words)
+                .collect::<Vec<_>>()
+                .join(", ")
+        )));
+    }
+    Ok(Matches {
+        left_out: inside.len() - found.len(),
+        steps: found,
+    })
+}
+
+fn extent_in_words(input: &Input) -> String {
+    let (name, steps) = (&input.name, &input.manifest.steps);
+    match (steps.first(), input.manifest.extent()) {
+        (Some(first), Some(extent)) => format!(
+            "{name} has {} from {} to {}, the first of {:.0} days",
+            steps.len(),
+            extent.start,
+            extent.end,
+            first.period.seconds() / 86_400.0
+        ),
+        _ => format!("{name} has none"),
+    }
+}
+
+/// A climatology is twelve months of one year, and what holds at any time one step.
+fn fits_its_matching(input: &Input) -> Result<(), ComputeError> {
+    let (name, steps) = (&input.name, &input.manifest.steps);
+    match input.matching {
+        Matching::SamePeriod => Ok(()),
+        Matching::AnyTime if steps.len() == 1 => Ok(()),
+        Matching::AnyTime => Err(refused(format!(
+            "{name} has {} steps; any-time takes a product of one",
+            steps.len()
+        ))),
+        Matching::MonthOfYear => {
+            let months: Vec<_> = steps.iter().filter_map(month_of).collect();
+            let is_year = months.len() == 12
+                && steps.len() == 12
+                && months
+                    .iter()
+                    .zip(1..)
+                    .all(|(&(year, month), n)| (year, month) == (months[0].0, n));
+            if is_year {
+                Ok(())
+            } else {
+                Err(refused(format!(
+                    "{name} is no climatology: that is January to December of one year, twelve steps of a month"
+                )))
+            }
+        }
+    }
+}
+
+/// Year and month of a step that is a calendar month.
+fn month_of(step: &Step) -> Option<(i32, u32)> {
+    let (year, month) = step.period.start.year_month();
+    (Period::month(year, month) == Ok(step.period)).then_some((year, month))
+}
+
+/// The field of an input that belongs to a period.
+fn field_of(input: &Input, period: Period) -> Option<ObjectKey> {
+    let steps = &input.manifest.steps;
+    let step = match input.matching {
+        Matching::SamePeriod => &steps[input.manifest.step_of(period)?],
+        Matching::AnyTime => steps.first()?,
+        Matching::MonthOfYear => {
+            let (year, month) = period.start.year_month();
+            let is_month = Period::month(year, month) == Ok(period);
+            steps.get(month as usize - 1).filter(|_| is_month)?
+        }
+    };
+    Some(step.field.clone())
+}
+
+/// The name of what a step is made of: the computation and the content of every field.
+pub(super) fn made_of(computation: Digest, step: &Matched) -> Digest {
+    Digest::of_json(&("computed", computation, step.period, &step.fields))
+}
+
+#[cfg(test)]
+mod tests;

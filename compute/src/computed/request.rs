@@ -1,0 +1,39 @@
+//! What is asked of a computation: the product to land, what to do, and the products that it is done with.
+
+use contract::computed::{Computation, Matching};
+use contract::grid::Grid;
+use contract::product::ProductId;
+use contract::quantity::Quantity;
+use contract::time::TimeMs;
+
+/// What is asked for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Request {
+    /// The product to land.
+    pub target: ProductId,
+    /// Its title; made of the inputs if absent.
+    pub title: Option<String>,
+    /// What it measures; that of the input for regridding.
+    pub quantity: Option<Quantity>,
+    /// What to do.
+    pub how: Computation,
+    /// The grid of the result; that of the inputs if absent.
+    pub grid: Option<Grid>,
+    /// What with: name, product, which step of it.
+    pub inputs: Vec<RequestedInput>,
+    /// First instant; the first of the inputs if absent.
+    pub from: Option<TimeMs>,
+    /// First instant after the period.
+    pub to: Option<TimeMs>,
+}
+
+/// A product under a name.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RequestedInput {
+    /// Name in the expression.
+    pub name: String,
+    /// Product; its newest version is read.
+    pub product: ProductId,
+    /// Which of its steps belongs to a period.
+    pub matching: Matching,
+}

@@ -1,0 +1,138 @@
+//! A parsed expression made ready: numbers are `f64`, `unit(...)` is the number that it stands for, `coalesce` is a CASE, and
+//! calls of our functions count where they leave the range of their paper.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::AtomicU64;
+
+use datafusion::common::metadata::FieldMetadata;
+use datafusion::common::tree_node::{Transformed, TreeNode as _, TreeNodeRecursion};
+use datafusion::common::{DataFusionError, Result, ScalarValue, plan_err};
+use datafusion::logical_expr::expr::{Case, ScalarFunction};
+use datafusion::logical_expr::{Expr, ScalarUDF, lit};
+
+use super::function::Function;
+use super::typed::UNIT_KEY;
+use super::udf::NumberFunction;
+use super::unit::Scaled;
+
+/// Numbers as `f64`, so that `1/2` is a half; and those with a unit in SI, their unit beside them.
+pub(super) fn numbers(expr: Expr) -> Result<Expr> {
+    let number = |expr: Expr| {
+        Ok(match expr {
+            Expr::Literal(value, None) => Transformed::yes(Expr::Literal(as_f64(value)?, None)),
+            Expr::ScalarFunction(call) if call.func.name() == "unit" => {
+                Transformed::yes(with_unit(&call.args)?)
+            }
+            Expr::Negative(inner) => match *inner {
+                Expr::Literal(ScalarValue::Float64(Some(value)), metadata) => {
+                    Transformed::yes(Expr::Literal(ScalarValue::from(-value), metadata))
+                }
+                inner => Transformed::no(Expr::Negative(Box::new(inner))),
+            },
+            other => Transformed::no(other),
+        })
+    };
+    expr.transform_up(number).map(|done| done.data)
+}
+
+fn as_f64(value: ScalarValue) -> Result<ScalarValue> {
+    Ok(match value {
+        ScalarValue::Int64(Some(value)) => ScalarValue::from(value as f64),
+        ScalarValue::UInt64(Some(value)) => ScalarValue::from(value as f64),
+        // Of unit(...), which its call takes away.
+        text @ (ScalarValue::Utf8(_) | ScalarValue::Float64(Some(_))) => text,
+        other => return plan_err!("{other} is no number"),
+    })
+}
+
+fn with_unit(arguments: &[Expr]) -> Result<Expr> {
+    let (
+        Some(Expr::Literal(ScalarValue::Float64(Some(value)), None)),
+        Some(Expr::Literal(ScalarValue::Utf8(Some(unit)), None)),
+        2,
+    ) = (arguments.first(), arguments.get(1), arguments.len())
+    else {
+        return plan_err!("unit takes a number and a unit: unit(0.17, 'K')");
+    };
+    let Some(scaled) = Scaled::parse(unit) else {
+        return plan_err!("{unit:?} is no unit that is known here");
+    };
+    let metadata = BTreeMap::from([(UNIT_KEY.to_owned(), scaled.unit.to_string())]);
+    let si = value * scaled.factor + scaled.offset;
+    Ok(Expr::Literal(
+        ScalarValue::from(si),
+        Some(FieldMetadata::from(metadata)),
+    ))
+}
+
+/// How often each function was called outside the range of its paper.
+pub(super) type Outside = BTreeMap<&'static str, Arc<AtomicU64>>;
+
+/// Calls that count, and CASE for `coalesce`, which the engine evaluates in this shape alone.
+pub(super) fn runnable(expr: Expr, outside: &mut Outside) -> Result<Expr> {
+    let run = |expr: Expr| {
+        Ok(match expr {
+            Expr::Literal(value, Some(_)) => Transformed::yes(Expr::Literal(value, None)),
+            Expr::ScalarFunction(call) if call.func.name() == "coalesce" => {
+                Transformed::yes(first_there(call.args)?)
+            }
+            // The engine's root of a negative number ends the query; its power is no number, which is counted in its cell.
+            Expr::ScalarFunction(call) if call.func.name() == "sqrt" => {
+                let args = call.args.into_iter().chain([lit(0.5)]).collect();
+                let func = datafusion::functions::math::power();
+                Transformed::yes(Expr::ScalarFunction(ScalarFunction { func, args }))
+            }
+            Expr::ScalarFunction(call) => match Function::named(call.func.name()) {
+                Some(function) => {
+                    let counter = outside.entry(function.name).or_default();
+                    let counting = NumberFunction::counting(function, Arc::clone(counter));
+                    let func = Arc::new(ScalarUDF::from(counting));
+                    let args = call.args;
+                    Transformed::yes(Expr::ScalarFunction(ScalarFunction { func, args }))
+                }
+                None => Transformed::no(Expr::ScalarFunction(call)),
+            },
+            other => Transformed::no(other),
+        })
+    };
+    expr.transform_up(run).map(|done| done.data)
+}
+
+fn first_there(mut arguments: Vec<Expr>) -> Result<Expr> {
+    let last = arguments
+        .pop()
+        .ok_or_else(|| DataFusionError::Plan("coalesce lacks arguments".to_owned()))?;
+    let when = |argument: Expr| {
+        let is_there = Expr::IsNotNull(Box::new(argument.clone()));
+        (Box::new(is_there), Box::new(argument))
+    };
+    let whens: Vec<_> = arguments.into_iter().map(when).collect();
+    if whens.is_empty() {
+        return Ok(last);
+    }
+    Ok(Expr::Case(Case::new(None, whens, Some(Box::new(last)))))
+}
+
+/// Columns that must hold data for a cell to have a result: all but those that stand in `coalesce` alone.
+pub(super) fn required(expr: &Expr) -> Result<std::collections::BTreeSet<String>> {
+    let mut found = std::collections::BTreeSet::new();
+    expr.apply(|expr| {
+        match expr {
+            Expr::Column(column) => {
+                found.insert(column.name.clone());
+            }
+            Expr::ScalarFunction(call) if call.func.name() == "coalesce" => {
+                for argument in &call.args {
+                    if !matches!(argument, Expr::Column(_)) {
+                        found.extend(required(argument)?);
+                    }
+                }
+                return Ok(TreeNodeRecursion::Jump);
+            }
+            _ => {}
+        }
+        Ok(TreeNodeRecursion::Continue)
+    })?;
+    Ok(found)
+}

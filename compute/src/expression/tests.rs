@@ -1,0 +1,137 @@
+use super::*;
+
+fn inputs() -> Vec<(String, Unit)> {
+    [
+        ("sst", Unit::KELVIN),
+        ("wind", Unit::METRE_PER_SECOND),
+        ("ice", Unit::ONE),
+        ("pco2", Unit::PASCAL),
+        ("taka-sss", Unit::ONE),
+    ]
+    .map(|(name, unit)| (name.to_owned(), unit))
+    .to_vec()
+}
+
+fn read(text: &str) -> Result<Expression, String> {
+    Expression::read(text, &inputs())
+}
+
+/// Two cells with all, one without ice, one without temperature.
+fn evaluate(text: &str) -> Evaluated {
+    let gap = f32::NAN;
+    let columns: [&[f32]; 5] = [
+        &[290.0, 300.0, 290.0, gap],
+        &[7.0, 10.0, 7.0, 7.0],
+        &[0.0, 0.5, gap, 0.0],
+        &[36.0, 40.0, 36.0, 36.0],
+        &[35.0; 4],
+    ];
+    read(text).unwrap().evaluate(&columns).unwrap()
+}
+
+#[track_caller]
+fn close(found: &[f64], expected: &[f64]) {
+    let is_close = |(found, expected): (&f64, &f64)| {
+        (found - expected).abs() < 1e-12 * expected.abs().max(1.0)
+            || found.is_nan() && expected.is_nan()
+    };
+    assert!(found.iter().zip(expected).all(is_close), "{found:?}");
+}
+
+#[test]
+fn arithmetic_is_of_64_bits_and_half_is_no_whole_number() {
+    close(&evaluate("wind * 1/2").values, &[3.5, 5.0, 3.5, 3.5]);
+    close(
+        &evaluate("sst - unit(0.5, 'K')").values,
+        &[289.5, 299.5, 289.5, f64::NAN],
+    );
+    close(&evaluate("-ice + 1").values, &[1.0, 0.5, f64::NAN, 1.0]);
+    close(&evaluate("\"taka-sss\" / 7").values, &[5.0; 4]);
+}
+
+#[test]
+fn no_data_in_an_input_is_no_data_whatever_is_compared() {
+    let open = "CASE WHEN ice > 0.1 THEN 1 - ice ELSE 1 END * wind";
+    close(&evaluate(open).values, &[7.0, 5.0, f64::NAN, 7.0]);
+    let filled = open.replace("ice", "coalesce(ice, 0)");
+    close(&evaluate(&filled).values, &[7.0, 5.0, 7.0, 7.0]);
+    close(
+        &evaluate("greatest(ice, 0.2)").values,
+        &[0.2, 0.5, f64::NAN, 0.2],
+    );
+    // Where it stands outside as well, it is needed.
+    let both = "coalesce(ice, 0) + ice";
+    assert!(evaluate(both).values[2].is_nan());
+}
+
+#[test]
+fn functions_of_the_flux_are_those_of_the_papers_and_count_what_they_do_not_hold_for() {
+    let found = evaluate("gas_transfer_wanninkhof1992(wind * wind, schmidt_wanninkhof1992(sst))");
+    let by_hand = |wind: f64, sst| {
+        crate::air_sea::gas_transfer::wanninkhof1992(
+            wind * wind,
+            crate::air_sea::schmidt::wanninkhof1992(sst),
+        )
+    };
+    let expected = [
+        by_hand(7.0, 290.0),
+        by_hand(10.0, 300.0),
+        by_hand(7.0, 290.0),
+        f64::NAN,
+    ];
+    close(&found.values, &expected);
+    assert_eq!(found.outside, BTreeMap::new());
+    let cold = evaluate("schmidt_wanninkhof1992(sst - unit(20, 'K'))");
+    assert_eq!(cold.outside["schmidt_wanninkhof1992"], 2);
+    let constant = evaluate("wind * carbon_kg_per_mol()").values[0];
+    close(&[constant], &[7.0 * 0.012_011]);
+}
+
+#[test]
+fn what_is_no_number_is_no_data_and_counted() {
+    let found = evaluate("wind / ice");
+    close(&found.values, &[f64::NAN, 20.0, f64::NAN, f64::NAN]);
+    assert_eq!(found.not_finite, 2);
+    assert_eq!(evaluate("sqrt(pco2 * pco2 * -1)").not_finite, 4);
+}
+
+#[test]
+fn mixed_units_and_whatever_is_no_arithmetic_are_refused_with_the_reason() {
+    for (text, reason) in [
+        ("sst + wind", "one is in K, the other in m s-1"),
+        ("sst - 273.15", "one is in K, the other in 1"),
+        ("ice > sst", "one is in 1, the other in K"),
+        (
+            "CASE WHEN ice > 0.1 THEN sst ELSE wind END",
+            "branches of CASE",
+        ),
+        ("coalesce(sst, 280)", "arguments of coalesce"),
+        ("exp(sst)", "takes a pure number"),
+        ("sqrt(sst)", "no whole powers"),
+        ("power(sst, ice)", "second argument of power"),
+        (
+            "gas_transfer_wanninkhof2014(wind, 660)",
+            "is in m s-1, but gas_transfer_wanninkhof2014(wind_moment2",
+        ),
+        ("schmidt_wanninkhof2014(sst, ice)", "2 arguments are given"),
+        ("sst > unit(280, 'K')", "it is a comparison"),
+        ("unit(1, 'furlong') * sst", "no unit"),
+        ("nobody * 2", "nobody"),
+        ("sin(ice)", "the function sin is not one of"),
+        ("ice % 2", "operator %"),
+        ("CAST(ice AS INT)", "not understood"),
+        ("(SELECT 1)", ""),
+        ("ice IS NULL", "not understood"),
+        ("sum(ice)", "not understood"),
+        ("ice +", ""),
+        ("ice; DROP TABLE x", ""),
+        ("'text'", ""),
+        ("", ""),
+        (&"(".repeat(3000), ""),
+        (&"ice+".repeat(2500), "longer than"),
+    ] {
+        let refused = read(text).map(|_| ()).unwrap_err();
+        assert!(refused.contains(reason), "{text}: {refused}");
+        assert!(!refused.contains('\n'), "{refused}");
+    }
+}
