@@ -4,6 +4,7 @@
 //! [`functions`], which call the pure kernels of [`budget`] and [`stats`]. Sums are integers, so that an answer has the
 //! same bits however many parts it was computed in.
 
+pub mod analysis;
 pub mod budget;
 pub mod catalogue;
 pub mod check;

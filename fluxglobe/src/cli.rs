@@ -1,6 +1,8 @@
 //! The command line: words in, one plain `Command` out. Every value is parsed here, once, into its final type.
 
+mod analysis;
 mod annotations;
+mod derived;
 mod export;
 mod fill;
 mod ground;
@@ -25,7 +27,11 @@ use contract::product::ProductId;
 use contract::region::Cells;
 use contract::time::TimeMs;
 
+pub(crate) use analysis::{
+    Place, PlotFile, PlotForm, StatsCorrelate, StatsDifference, StatsHovmoller,
+};
 pub(crate) use annotations::Annotated;
+pub(crate) use derived::DeriveStatistic;
 pub(crate) use export::{Export, ExportFormat, ExportedProduct};
 pub(crate) use fill::{BenchFill, FillError, ProductsOf};
 pub(crate) use ground::{Ground, GroundOptions};
@@ -331,6 +337,8 @@ pub(crate) enum Derive {
         #[command(flatten, next_help_heading = "Kafka")]
         kafka: kafka_log::KafkaSettings,
     },
+    /// A statistic of each cell over time, as a product that is drawn and served like any other.
+    Statistic(DeriveStatistic),
 }
 
 /// `fluxglobe render`.
