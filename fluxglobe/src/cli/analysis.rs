@@ -45,7 +45,7 @@ pub(crate) struct Analysis {
     /// Means that the trend is drawn through; steps as they are where those are longer.
     #[arg(long, default_value_t, value_name = "month|year|native", help_heading = HEADING)]
     trend_step: MeanStep,
-    /// Draw it too: the series, its climatology, its anomalies or its trend.
+    /// Draw it too: the series (with --statistic mean,std also its spread), its climatology, its anomalies or its trend.
     #[arg(long, value_name = "FILE.svg|FILE.png", help_heading = HEADING)]
     pub(crate) plot: Option<PlotFile>,
 }

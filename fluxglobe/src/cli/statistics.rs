@@ -8,7 +8,7 @@ use contract::region::Cells;
 use contract::statistics::{MinCoverage, Statistics, StatisticsStep};
 use contract::time::TimeMs;
 
-use super::analysis::{Analysis, StatsCorrelate, StatsDifference, StatsHovmoller};
+use super::analysis::{Analysis, PlotFile, StatsCorrelate, StatsDifference, StatsHovmoller};
 
 /// `fluxglobe stats`.
 #[derive(Debug, Subcommand)]
@@ -110,6 +110,9 @@ pub(crate) struct StatsLine {
     pub(crate) earth: Earth,
     #[command(flatten)]
     pub(crate) statistics: StatisticsOptions,
+    /// Draw it too: the mean with its standard deviation where both are asked for, and the other statistics of its unit.
+    #[arg(long, value_name = "FILE.svg|FILE.png")]
+    pub(crate) plot: Option<PlotFile>,
     /// JSON instead of a table.
     #[arg(long)]
     pub(crate) json: bool,

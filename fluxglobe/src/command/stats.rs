@@ -10,7 +10,7 @@ use contract::analysis::SeriesQuery;
 use contract::grid::LonLatDeg;
 use contract::series::{PointSeries, RegionSeries, RegionSeriesQuery};
 
-use crate::cli::{PlotFile, Settings, StatsPoint, StatsPolygon};
+use crate::cli::{Settings, StatsPoint, StatsPolygon};
 use crate::{deployment, plot, progress};
 
 use super::analysis::{self, Output};
@@ -40,7 +40,6 @@ pub(crate) async fn point(settings: &Settings, options: &StatsPoint) -> Result<(
         return analysis::of_series(settings, store, &query, &asked, output).await;
     }
     if options.are_statistics_asked() {
-        no_plot(output.plot)?;
         return statistics::point(settings, options).await;
     }
     let store = deployment::store(settings)?;
@@ -71,7 +70,6 @@ pub(crate) async fn polygon(settings: &Settings, options: &StatsPolygon) -> Resu
     if analysed.is_some() {
         alone(options.are_statistics_asked())?;
     } else if options.are_statistics_asked() {
-        no_plot(options.analysis.plot.as_ref())?;
         return statistics::polygon(settings, options).await;
     }
     let store = deployment::store(settings)?;
@@ -128,16 +126,6 @@ fn alone(are_statistics_asked: bool) -> Result<()> {
         bail!(
             "--climatology, --anomaly, --trend, --season and --extremes are made of the means of all steps: leave \
              --statistic, --step, --min-coverage, --sampling, --cells and --csv out"
-        );
-    }
-    Ok(())
-}
-
-/// Statistics by rows have no picture.
-fn no_plot(plot: Option<&PlotFile>) -> Result<()> {
-    if plot.is_some() {
-        bail!(
-            "--plot draws the series, or --climatology, --anomaly or --trend of it: leave --statistic and its like out"
         );
     }
     Ok(())

@@ -1,8 +1,9 @@
 //! Series, anomalies and trends as lines against time.
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use contract::analysis::{Anomalies, Cited, SeriesAnalysis, Trend};
 use contract::series::{PointSeries, RegionSeries};
+use contract::statistics::{Statistic, StatisticsAnswer, StatisticsRow};
 use contract::time::{Period, TimeMs};
 use plotters::chart::ChartContext;
 use plotters::coord::types::RangedCoordf64;
@@ -69,6 +70,111 @@ pub(super) fn of_region(answer: &RegionSeries) -> Result<String> {
         &format!("mean over {}", named(&answer.region)),
         &points,
     )
+}
+
+pub(super) fn of_statistics(answer: &StatisticsAnswer) -> Result<String> {
+    let cited = Cited {
+        product: answer.product.clone(),
+        manifest: answer.manifest.clone(),
+        title: answer.title.clone(),
+        source: answer.source.clone(),
+        synthetic: answer.synthetic,
+        quantity: answer.quantity,
+        unit: answer.unit.clone(),
+    };
+    let is_spread = |name: &str| name == Statistic::Std.to_string();
+    let all = answer.statistics.iter();
+    let names: Vec<&str> = all
+        .filter(|one| one.unit == answer.unit && !is_spread(&one.name))
+        .map(|one| one.name.as_str())
+        .take(COLOURS.len())
+        .collect();
+    if names.is_empty() {
+        bail!(
+            "a plot is of statistics in the product's unit: ask for mean, min, max, median or percentiles"
+        );
+    }
+    let of_name = |name: &str| -> Vec<Point> {
+        let value = |row: &StatisticsRow| row.values.get(name).copied().flatten();
+        let rows = answer.rows.iter();
+        rows.map(|row| (period(row.start, row.end), value(row)))
+            .collect()
+    };
+    let (mean, spread) = (
+        of_name(&Statistic::Mean.to_string()),
+        of_name(&Statistic::Std.to_string()),
+    );
+    let ends = |sign: f64| -> Vec<Point> {
+        let both = mean.iter().zip(&spread);
+        both.map(|((period, mean), (_, spread))| {
+            (
+                *period,
+                mean.zip(*spread).map(|(mean, spread)| mean + sign * spread),
+            )
+        })
+        .collect()
+    };
+    let (low, high) = (ends(-1.0), ends(1.0));
+    let has_band = low.iter().any(|(_, value)| value.is_some());
+    let below = format!(
+        "{} of {}, a row a {}{}",
+        names.join(", "),
+        answer.kind,
+        answer.step,
+        if has_band {
+            "; band: mean and one standard deviation on either side"
+        } else {
+            ""
+        }
+    );
+    let words = Words::of(&cited, &named(&answer.geometry), below);
+    let drawn: Vec<(&str, Vec<Point>)> = names.iter().map(|name| (*name, of_name(name))).collect();
+    page::drawn(&words, |area| {
+        let axis = axis_of(&mean);
+        let lines_of = drawn.iter().map(|(_, points)| points).chain([&low, &high]);
+        let values = range(lines_of.flatten().filter_map(|(_, value)| *value));
+        let mut chart = chart(area, &axis, values, &label(&cited))?;
+        band(&mut chart, &axis, &low, &high)?;
+        for ((name, points), colour) in drawn.iter().zip(COLOURS) {
+            lines(&mut chart, &axis, points, colour)?;
+            let nothing = LineSeries::new(std::iter::empty(), colour.stroke_width(2));
+            let drawn = chart.draw_series(nothing)?;
+            drawn.label(*name).legend(move |(x, y)| {
+                PathElement::new(vec![(x, y), (x + 18, y)], colour.stroke_width(2))
+            });
+        }
+        legend(&mut chart)
+    })
+}
+
+/// What lies between two lines, broken where either has a gap.
+fn band(
+    chart: &mut Chart<'_, '_>,
+    axis: &TimeAxis,
+    low: &[Point],
+    high: &[Point],
+) -> Result<(), Failed> {
+    let at = |(period, value): &Point| value.map(|value| (axis.at(period.mid()), value));
+    let both: Vec<(&Point, &Point)> = low.iter().zip(high).collect();
+    for run in both.chunk_by(|a, b| a.0.1.is_some() && b.0.1.is_some()) {
+        let mut edge: Vec<(f64, f64)> = run.iter().filter_map(|(low, _)| at(low)).collect();
+        edge.extend(run.iter().rev().filter_map(|(_, high)| at(high)));
+        if edge.len() > 2 {
+            chart.draw_series([Polygon::new(edge, COLOURS[0].mix(0.2).filled())])?;
+        }
+    }
+    Ok(())
+}
+
+/// What the lines are, in the upper left corner.
+fn legend(chart: &mut Chart<'_, '_>) -> Result<(), Failed> {
+    chart
+        .configure_series_labels()
+        .position(SeriesLabelPosition::UpperLeft)
+        .background_style(WHITE.mix(0.85))
+        .label_font(("sans-serif", 14))
+        .draw()?;
+    Ok(())
 }
 
 fn period(start: TimeMs, end: TimeMs) -> Period {
@@ -231,13 +337,7 @@ fn drawn_trend(area: &Area<'_>, answer: &SeriesAnalysis, trend: &Trend) -> Resul
             PathElement::new(vec![(x, y), (x + 18, y)], colour.stroke_width(2))
         });
     }
-    chart
-        .configure_series_labels()
-        .position(SeriesLabelPosition::UpperLeft)
-        .background_style(WHITE.mix(0.85))
-        .label_font(("sans-serif", 14))
-        .draw()?;
-    Ok(())
+    legend(&mut chart)
 }
 
 fn label(cited: &Cited) -> String {

@@ -10,6 +10,7 @@ mod time_axis;
 use anyhow::{Context as _, Result, bail};
 use contract::analysis::{Hovmoller, SeriesAnalysis};
 use contract::series::{PointSeries, RegionSeries};
+use contract::statistics::StatisticsAnswer;
 
 use crate::cli::{PlotFile, PlotForm};
 
@@ -31,6 +32,11 @@ pub(crate) fn of_point(answer: &PointSeries) -> Result<String> {
 /// The means over a region.
 pub(crate) fn of_region(answer: &RegionSeries) -> Result<String> {
     lines::of_region(answer)
+}
+
+/// Statistics by rows: the mean in a band of its standard deviation, and other ones of its unit.
+pub(crate) fn of_statistics(answer: &StatisticsAnswer) -> Result<String> {
+    lines::of_statistics(answer)
 }
 
 /// The first of climatology, anomalies and trend that there is.
