@@ -4,7 +4,7 @@ use anyhow::Result;
 use contract::analysis::{CalendarBins, Climatology, ClimatologyRow, SeriesAnalysis};
 use plotters::prelude::{BLACK, ChartBuilder, Circle, Color as _, LineSeries, Polygon};
 
-use super::lines::place;
+use super::chart::place;
 use super::marked::Marked;
 use super::page::{self, Area, COLOURS, Failed, Words, range, with_unit};
 

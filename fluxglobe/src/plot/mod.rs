@@ -1,11 +1,14 @@
 //! Plots of series and of what is made of them: an answer in, SVG or PNG out. The same answer is always the same bytes.
 
+mod chart;
 mod climatology;
 mod hovmoller;
 mod lines;
 mod marked;
 mod page;
+mod rows;
 mod time_axis;
+mod trend;
 
 use anyhow::{Context as _, Result, bail};
 use contract::analysis::{Hovmoller, SeriesAnalysis};
@@ -36,7 +39,7 @@ pub(crate) fn of_region(answer: &RegionSeries) -> Result<String> {
 
 /// Statistics by rows: the mean in a band of its standard deviation, and other ones of its unit.
 pub(crate) fn of_statistics(answer: &StatisticsAnswer) -> Result<String> {
-    lines::of_statistics(answer)
+    rows::of_statistics(answer)
 }
 
 /// The first of climatology, anomalies and trend that there is.
@@ -48,7 +51,7 @@ pub(crate) fn of_analysis(answer: &SeriesAnalysis) -> Result<String> {
         return lines::of_anomalies(answer, made);
     }
     if answer.trend.is_some() {
-        return lines::of_trend(answer);
+        return trend::of_trend(answer);
     }
     let reasons: Vec<&str> = answer
         .refused

@@ -1,3 +1,5 @@
+use contract::time::Period;
+
 use super::*;
 
 fn series(values: &[Option<f64>]) -> PointSeries {
